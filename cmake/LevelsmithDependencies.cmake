@@ -1,0 +1,29 @@
+# Third-party packages, each found once. Read by our build and by the installed package; in the
+# latter, only what the requested components link is looked for.
+
+list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_CXX_LIBRARY_ARCHITECTURE}/cmake/OpenVDB
+     /usr/lib/x86_64-linux-gnu/cmake/OpenVDB)
+
+find_package(Threads REQUIRED)
+find_package(Imath CONFIG REQUIRED)
+find_package(TBB CONFIG REQUIRED)
+find_package(ZLIB REQUIRED)
+find_package(fmt CONFIG REQUIRED)
+if(NOT TARGET OpenVDB::openvdb)
+  find_package(OpenVDB REQUIRED)
+endif()
+find_package(Eigen3 CONFIG REQUIRED)
+
+if(LEVELSMITH_MAPPING)
+  find_package(OpenMesh REQUIRED)
+endif()
+if(LEVELSMITH_RENDER)
+  find_package(embree 3 CONFIG REQUIRED)
+  find_package(OpenEXR CONFIG REQUIRED)
+  find_package(PNG REQUIRED)
+endif()
+if(LEVELSMITH_APPS)
+  find_package(CLI11 CONFIG REQUIRED)
+  find_package(spdlog CONFIG REQUIRED)
+  find_package(nlohmann_json CONFIG REQUIRED)
+endif()

@@ -1,0 +1,54 @@
+# levelsmith_module(NAME SOURCES … HEADERS … [PUBLIC libs…] [PRIVATE libs…])
+#
+# One library per top folder: alias Levelsmith::NAME, C++20, warnings, header self-check, install and
+# export. Paths are relative to the calling folder; headers are included from the repository root.
+
+include(GNUInstallDirs)
+
+add_library(levelsmith_warnings INTERFACE)
+target_compile_options(levelsmith_warnings INTERFACE -Wall -Wextra -Wshadow -Wconversion)
+if(LEVELSMITH_STRICT)
+  target_compile_options(levelsmith_warnings INTERFACE -Werror)
+endif()
+
+# Same bits on every machine: no contraction of a*b+c behind our back.
+add_library(levelsmith_flags INTERFACE)
+target_compile_options(levelsmith_flags INTERFACE -ffp-contract=off)
+
+function(levelsmith_module name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;PUBLIC;PRIVATE" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  add_library(Levelsmith::${name} ALIAS ${name})
+  target_compile_features(${name} PUBLIC cxx_std_20)
+  set_target_properties(${name} PROPERTIES
+    OUTPUT_NAME levelsmith_${name} POSITION_INDEPENDENT_CODE ON VERIFY_INTERFACE_HEADER_SETS ON)
+  target_sources(${name} PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${ARG_HEADERS})
+  target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE}
+                        $<BUILD_INTERFACE:levelsmith_warnings> $<BUILD_INTERFACE:levelsmith_flags>)
+  install(TARGETS ${name} EXPORT Levelsmith_${name} COMPONENT ${name}
+          ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+          FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/levelsmith)
+  install(EXPORT Levelsmith_${name} NAMESPACE Levelsmith:: COMPONENT ${name}
+          DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/Levelsmith FILE Levelsmith_${name}.cmake)
+endfunction()
+
+# Files that take part in precompilation of levelset/vdb.h (dev preset): the heaviest include we have.
+function(levelsmith_precompile_vdb name)
+  if(LEVELSMITH_PCH)
+    target_precompile_headers(${name} PRIVATE ${PROJECT_SOURCE_DIR}/levelset/vdb.h)
+  endif()
+endfunction()
+
+function(levelsmith_install_package)
+  include(CMakePackageConfigHelpers)
+  set(destination ${CMAKE_INSTALL_LIBDIR}/cmake/Levelsmith)
+  configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/LevelsmithConfig.cmake.in
+                                ${PROJECT_BINARY_DIR}/LevelsmithConfig.cmake
+                                INSTALL_DESTINATION ${destination})
+  write_basic_package_version_file(${PROJECT_BINARY_DIR}/LevelsmithConfigVersion.cmake
+                                   COMPATIBILITY SameMinorVersion)
+  install(FILES ${PROJECT_BINARY_DIR}/LevelsmithConfig.cmake
+                ${PROJECT_BINARY_DIR}/LevelsmithConfigVersion.cmake
+                ${PROJECT_SOURCE_DIR}/cmake/LevelsmithDependencies.cmake
+          DESTINATION ${destination} COMPONENT levelset)
+endfunction()

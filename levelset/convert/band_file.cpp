@@ -1,0 +1,1 @@
+#include "levelset/convert/band_file.h"

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <Imath/ImathBox.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "levelset/narrow_band.h"
+#include "levelset/progress.h"
+
+/// Narrow bands in OpenVDB (`.vdb`) and NanoVDB (`.nvdb`) files.
+namespace levelset {
+
+struct ReadBandOptions {
+  std::string grid = {};  ///< name of the grid; empty: the only float level set of the file
+  std::size_t maxMemory = kNoMemoryLimit;
+};
+
+/// @throws IoError when it cannot be opened; InvalidInput when it is damaged, holds no such grid, or
+///         the grid breaks the invariants of a band. Damaged files end in an error, never in a hang.
+[[nodiscard]] NarrowBand readBand(const std::filesystem::path& path, const ReadBandOptions& options = {});
+
+struct WriteBandOptions {
+  std::string name = "surface";  ///< of the grid
+  std::string format = {};       ///< "vdb" or "nvdb"; empty: by extension
+};
+
+/// Writes beside the target and renames. Equal bands give equal bytes: the identifier that OpenVDB
+/// draws at random is replaced by the content hash.
+void writeBand(const std::filesystem::path& path, const NarrowBand& band,
+               const WriteBandOptions& options = {});
+
+/// One grid of a .vdb file, from its header and metadata alone: no voxel is loaded.
+struct GridInfo {
+  std::string name, type, gridClass;
+  std::uint64_t activeVoxels = 0;  ///< 0 when the file does not say
+  double voxelSize = 0;
+  Imath::Box3d indexBounds;  ///< empty when the file does not say
+  std::uint64_t bytes = 0;
+};
+[[nodiscard]] std::vector<GridInfo> bandFileInfo(const std::filesystem::path& path);
+
+[[nodiscard]] bool isBandFormat(const std::filesystem::path& nameOrFormat);
+
+}  // namespace levelset

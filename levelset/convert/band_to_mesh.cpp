@@ -1,0 +1,1 @@
+#include "levelset/convert/band_to_mesh.h"

@@ -1,0 +1,1 @@
+#include "levelset/convert/mesh_file.h"

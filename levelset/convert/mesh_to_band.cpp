@@ -1,0 +1,1 @@
+#include "levelset/convert/mesh_to_band.h"

@@ -1,0 +1,1 @@
+#include "levelset/eikonal/redistance.h"

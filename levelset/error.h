@@ -1,0 +1,48 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+/// One exception class per exit class of the command line. A message is one sentence: what was
+/// attempted, what is wrong and where, and what to do about it.
+namespace levelset {
+
+enum class ExitCode : int {
+  Done = 0,
+  Usage = 2,        ///< the call itself is wrong: a negative length, a missing operand
+  Input = 3,        ///< the data cannot be used as asked: truncated file, open mesh under `closed`
+  Resource = 4,     ///< memory, index range or image size would pass its limit
+  Numeric = 5,      ///< a numeric check failed
+  File = 6,         ///< missing, unreadable, not writable, disk full
+  Interrupted = 130
+};
+
+class Error : public std::runtime_error {
+ public:
+  Error(ExitCode code, const std::string& sentence) : std::runtime_error(sentence), code_(code) {}
+  [[nodiscard]] ExitCode exitCode() const { return code_; }
+
+ private:
+  ExitCode code_;
+};
+
+struct UsageError : Error {
+  explicit UsageError(const std::string& sentence) : Error(ExitCode::Usage, sentence) {}
+};
+struct InvalidInput : Error {
+  explicit InvalidInput(const std::string& sentence) : Error(ExitCode::Input, sentence) {}
+};
+struct ResourceLimit : Error {
+  explicit ResourceLimit(const std::string& sentence) : Error(ExitCode::Resource, sentence) {}
+};
+struct NumericalError : Error {
+  explicit NumericalError(const std::string& sentence) : Error(ExitCode::Numeric, sentence) {}
+};
+struct IoError : Error {
+  explicit IoError(const std::string& sentence) : Error(ExitCode::File, sentence) {}
+};
+struct Cancelled : Error {
+  explicit Cancelled(const std::string& sentence) : Error(ExitCode::Interrupted, sentence) {}
+};
+
+}  // namespace levelset

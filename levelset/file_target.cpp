@@ -1,0 +1,1 @@
+#include "levelset/file_target.h"

@@ -1,0 +1,1 @@
+#include "levelset/inspect/check.h"

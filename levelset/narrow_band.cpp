@@ -1,0 +1,198 @@
+#include "levelset/narrow_band.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string>
+
+#include "levelset/error.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using LeafNode = openvdb::FloatTree::LeafNodeType;
+
+/// Rotation, uniform scale and translation only, to within rounding of the stored matrix.
+bool isSimilarity(const openvdb::math::Transform& transform) {
+  if (!transform.isLinear()) return false;
+  const openvdb::math::Mat4d m = transform.baseMap()->getAffineMap()->getMat4();
+  const openvdb::Vec3d rows[3] = {{m[0][0], m[0][1], m[0][2]},
+                                  {m[1][0], m[1][1], m[1][2]},
+                                  {m[2][0], m[2][1], m[2][2]}};
+  const double squaredScale = rows[0].lengthSqr();
+  const double tolerance = 1e-6 * squaredScale;
+  if (!(squaredScale > 0) || !std::isfinite(squaredScale)) return false;
+  for (int i = 0; i < 3; ++i) {
+    if (std::abs(rows[i].lengthSqr() - squaredScale) > tolerance) return false;
+    if (std::abs(rows[i].dot(rows[(i + 1) % 3])) > tolerance) return false;
+  }
+  return rows[0].cross(rows[1]).dot(rows[2]) > 0;
+}
+
+std::string coordText(const Coord& c) { return fmt::format("[{}, {}, {}]", c.x(), c.y(), c.z()); }
+
+std::uint64_t mix(std::uint64_t hash, std::uint64_t word) {
+  hash ^= word + 0x9e3779b97f4a7c15ull + (hash << 6) + (hash >> 2);
+  hash *= 0xff51afd7ed558ccdull;
+  return hash ^ (hash >> 32);
+}
+
+template <typename T>
+std::uint64_t mixBytes(std::uint64_t hash, const T* data, std::size_t count) {
+  const auto* bytes = reinterpret_cast<const unsigned char*>(data);
+  const std::size_t size = count * sizeof(T);
+  for (std::size_t i = 0; i < size; i += 8) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, bytes + i, std::min<std::size_t>(8, size - i));
+    hash = mix(hash, word);
+  }
+  return hash;
+}
+
+}  // namespace
+
+bool NarrowBand::isEmpty() const { return !grid_ || grid_->grid->tree().empty() || !activeVoxelCount(); }
+
+double NarrowBand::voxelSize() const { return grid_ ? grid_->grid->voxelSize()[0] : 0; }
+
+double NarrowBand::halfWidth() const {
+  return grid_ ? static_cast<double>(grid_->grid->background()) / voxelSize() : 0;
+}
+
+std::size_t NarrowBand::activeVoxelCount() const {
+  return grid_ ? grid_->grid->activeVoxelCount() : 0;
+}
+
+std::size_t NarrowBand::memoryUse() const { return grid_ ? grid_->grid->memUsage() : 0; }
+
+Imath::M44d NarrowBand::indexToWorld() const {
+  Imath::M44d result;
+  if (!grid_) return result;
+  const openvdb::math::Mat4d m = grid_->grid->transform().baseMap()->getAffineMap()->getMat4();
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) result[i][j] = m[i][j];
+  return result;
+}
+
+Imath::Box3d NarrowBand::zeroSetBounds() const {
+  Imath::Box3d box;
+  if (!grid_) return box;
+  const FloatGrid& grid = *grid_->grid;
+  FloatGrid::ConstAccessor accessor = grid.getConstAccessor();
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
+    for (auto it = leaf->cbeginValueOn(); it; ++it) {
+      const Coord c = it.getCoord();
+      const float a = *it;
+      for (int axis = 0; axis < 3; ++axis) {
+        Coord next = c;
+        next[axis] += 1;
+        float b;
+        if (!accessor.probeValue(next, b) || (a < 0) == (b < 0)) continue;
+        openvdb::Vec3d p = c.asVec3d();
+        p[axis] += static_cast<double>(a) / (static_cast<double>(a) - static_cast<double>(b));
+        box.extendBy(toImath(grid.indexToWorld(p)));
+      }
+    }
+  }
+  return box;
+}
+
+std::uint64_t NarrowBand::contentHash() const {
+  std::uint64_t hash = 0x4c4556454c534d54ull;
+  if (!grid_) return hash;
+  const FloatGrid& grid = *grid_->grid;
+  const Imath::M44d matrix = indexToWorld();
+  hash = mixBytes(hash, &matrix[0][0], 16);
+  const float background = grid.background();
+  hash = mixBytes(hash, &background, 1);
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
+    const Coord origin = leaf->origin();
+    hash = mixBytes(hash, origin.data(), 3);
+    hash = mixBytes(hash, &leaf->valueMask(), 1);
+    hash = mixBytes(hash, leaf->buffer().data(), LeafNode::SIZE);
+  }
+  // Tiles carry the sign away from the band.
+  for (auto it = grid.tree().cbeginValueAll(); it; ++it) {
+    if (it.getDepth() == FloatGrid::TreeType::DEPTH - 1) continue;
+    const openvdb::CoordBBox box = it.getBoundingBox();
+    const float value = *it;
+    hash = mixBytes(hash, box.min().data(), 3);
+    hash = mixBytes(hash, &value, 1);
+  }
+  return hash;
+}
+
+FloatGrid& editVdb(NarrowBand& band) {
+  std::shared_ptr<VdbGrid>& slot = VdbAccess::slot(band);
+  if (slot.use_count() > 1) slot = std::make_shared<VdbGrid>(VdbGrid{slot->grid->deepCopy()});
+  return *slot->grid;
+}
+
+NarrowBand makeBand(FloatGrid::Ptr grid) {
+  assert(grid && grid->background() > 0 && isSimilarity(grid->transform()));
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  return NarrowBand(std::make_shared<VdbGrid>(VdbGrid{std::move(grid)}));
+}
+
+NarrowBand importBand(FloatGrid::Ptr grid, const char* action) {
+  if (!grid) throw InvalidInput(fmt::format("{}: there is no float grid", action));
+  const std::string name = grid->getName().empty() ? "(unnamed)" : grid->getName();
+  if (grid->getGridClass() != openvdb::GRID_LEVEL_SET) {
+    throw InvalidInput(fmt::format(
+        "{}: grid '{}' is of class '{}', not a level set; convert it before it is read", action, name,
+        FloatGrid::gridClassToString(grid->getGridClass())));
+  }
+  if (!isSimilarity(grid->transform())) {
+    throw InvalidInput(fmt::format(
+        "{}: the transform of grid '{}' shears, mirrors or scales its axes differently; resample it to "
+        "uniform voxels first",
+        action, name));
+  }
+  const float background = grid->background();
+  if (!(background > 0) || !std::isfinite(background)) {
+    throw InvalidInput(fmt::format("{}: the background of grid '{}' is {}, a level set needs a "
+                                   "positive one",
+                                   action, name, background));
+  }
+  grid->tree().voxelizeActiveTiles();
+  for (auto leaf = grid->tree().beginLeaf(); leaf; ++leaf) {
+    float* values = leaf->buffer().data();
+    for (openvdb::Index i = 0; i < LeafNode::SIZE; ++i) {
+      if (!std::isfinite(values[i])) {
+        throw InvalidInput(fmt::format("{}: grid '{}' holds {} at index {}; repair the file or make it "
+                                       "again",
+                                       action, name, values[i],
+                                       coordText(leaf->offsetToGlobalCoord(i))));
+      }
+      if (!leaf->isValueOn(i)) values[i] = std::signbit(values[i]) ? -background : background;
+    }
+  }
+  for (auto it = grid->tree().beginValueOff(); it; ++it) {
+    if (it.getDepth() == FloatGrid::TreeType::DEPTH - 1) continue;
+    if (!std::isfinite(*it)) {
+      throw InvalidInput(
+          fmt::format("{}: grid '{}' holds {} in a tile; repair the file", action, name, *it));
+    }
+    it.setValue(std::signbit(*it) ? -background : background);
+  }
+  return NarrowBand(std::make_shared<VdbGrid>(VdbGrid{std::move(grid)}));
+}
+
+openvdb::math::Transform::Ptr uniformTransform(double voxelSize) {
+  return openvdb::math::Transform::createLinearTransform(voxelSize);
+}
+
+FloatGrid::Ptr emptyLevelSet(openvdb::math::Transform::Ptr transform, double halfWidth) {
+  const double voxelSize = transform->voxelSize()[0];
+  FloatGrid::Ptr grid = FloatGrid::create(static_cast<float>(halfWidth * voxelSize));
+  grid->setTransform(std::move(transform));
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  return grid;
+}
+
+}  // namespace levelset

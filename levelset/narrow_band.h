@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Imath/ImathBox.h>
+#include <Imath/ImathMatrix.h>
+#include <Imath/ImathVec.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+namespace levelset {
+
+struct VdbGrid;  // levelset/vdb.h, for .cpp files only
+
+/// A solid as a signed distance in a narrow band on a sparse grid: `float` values in world units,
+/// negative inside, |∇φ| ≈ 1 in the band, ± background elsewhere.
+///
+/// A value: copies share one grid and show it as const, so they are cheap and nobody sees another's
+/// edit. Grid points sit at integer index coordinates; the transform to world space is a rotation, a
+/// uniform scale and a translation. The bits of the tree do not depend on the number of threads.
+class NarrowBand {
+ public:
+  NarrowBand() = default;
+
+  /// True when the band has no active voxel: there is no surface.
+  [[nodiscard]] bool isEmpty() const;
+  /// Edge of a voxel, world units.
+  [[nodiscard]] double voxelSize() const;
+  /// Distance to which the band reaches on each side, in voxels; background = halfWidth × voxelSize.
+  [[nodiscard]] double halfWidth() const;
+  [[nodiscard]] std::size_t activeVoxelCount() const;
+  /// Bytes that the tree takes.
+  [[nodiscard]] std::size_t memoryUse() const;
+  /// Index to world; Imath multiplies row vectors: `world = index * matrix`.
+  [[nodiscard]] Imath::M44d indexToWorld() const;
+  /// World-space box of the zero set's sign changes (between voxel centres, by linear
+  /// interpolation); empty when there are none.
+  [[nodiscard]] Imath::Box3d zeroSetBounds() const;
+  /// Hash of transform, topology and values: equal for equal trees, whatever made them.
+  [[nodiscard]] std::uint64_t contentHash() const;
+
+  /// For our own .cpp files; see levelset/vdb.h.
+  [[nodiscard]] const std::shared_ptr<VdbGrid>& shared() const { return grid_; }
+  explicit NarrowBand(std::shared_ptr<VdbGrid> grid) : grid_(std::move(grid)) {}
+
+ private:
+  friend struct VdbAccess;
+  std::shared_ptr<VdbGrid> grid_;
+};
+
+}  // namespace levelset

@@ -1,0 +1,26 @@
+#include "levelset/progress.h"
+
+#include <fmt/core.h>
+
+#include "levelset/error.h"
+
+namespace levelset {
+
+void report(const Progress& progress, double fraction, const char* action) {
+  if (progress && !progress(fraction)) throw Cancelled(fmt::format("{}: cancelled", action));
+}
+
+Progress subProgress(const Progress& whole, double from, double to) {
+  if (!whole) return {};
+  return [=](double fraction) { return whole(from + (to - from) * fraction); };
+}
+
+void requireMemory(double estimatedBytes, std::size_t maxBytes, const char* action) {
+  if (estimatedBytes <= static_cast<double>(maxBytes)) return;
+  throw ResourceLimit(
+      fmt::format("{}: needs about {:.3g} GB, which passes the limit of {:.3g} GB; use larger voxels "
+                  "or raise --max-memory",
+                  action, estimatedBytes * 1e-9, static_cast<double>(maxBytes) * 1e-9));
+}
+
+}  // namespace levelset

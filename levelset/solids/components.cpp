@@ -1,0 +1,1 @@
+#include "levelset/solids/components.h"

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstddef>
+
+#include "levelset/narrow_band.h"
+
+/// Connected parts of a solid and of the space around it. Grid points are connected along the edges of
+/// the grid (6 neighbours) inside, and with all 26 neighbours outside, so that a solid and its
+/// surroundings never cross.
+namespace levelset {
+
+struct Topology {
+  std::size_t components = 0;  ///< solids
+  std::size_t shells = 0;      ///< surfaces
+  std::size_t cavities = 0;    ///< enclosed voids
+};
+[[nodiscard]] Topology topology(const NarrowBand& solid);
+
+/// Keeps the `count` solids of largest volume with their cavities, drops the others.
+/// @throws UsageError for count = 0; InvalidInput if the band is empty
+[[nodiscard]] NarrowBand keepLargest(const NarrowBand& solid, std::size_t count);
+
+/// Fills enclosed voids up to `maxVolume` world units³ (default: all).
+[[nodiscard]] NarrowBand fillCavities(const NarrowBand& solid, double maxVolume = 1e300);
+
+}  // namespace levelset

@@ -1,0 +1,1 @@
+#include "levelset/solids/transform.h"

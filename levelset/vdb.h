@@ -1,0 +1,47 @@
+#pragma once
+
+// The one header that includes OpenVDB. Include it from .cpp files only: it costs three seconds.
+
+#include <openvdb/openvdb.h>
+
+#include "levelset/narrow_band.h"
+
+namespace levelset {
+
+struct VdbGrid {
+  openvdb::FloatGrid::Ptr grid;
+};
+
+struct VdbAccess {
+  static std::shared_ptr<VdbGrid>& slot(NarrowBand& band) { return band.grid_; }
+};
+
+/// The grid behind a band, to read. @pre the band was made, not default constructed
+[[nodiscard]] inline const openvdb::FloatGrid& vdb(const NarrowBand& band) {
+  return *band.shared()->grid;
+}
+
+/// The grid behind a band, to change: copied first if somebody else holds it.
+[[nodiscard]] openvdb::FloatGrid& editVdb(NarrowBand& band);
+
+/// Takes a grid that holds the invariants of a band (asserted in debug builds, not checked):
+/// class level set, background > 0, no active tiles, inactive values ± background.
+[[nodiscard]] NarrowBand makeBand(openvdb::FloatGrid::Ptr grid);
+
+/// Checks the invariants of a grid that came from outside and takes it.
+/// Active tiles are voxelised, inactive values are set to ± background.
+/// @throws InvalidInput for NaN or infinite values, a background ≤ 0, a class other than level set,
+///         or a transform that is not a rotation, uniform scale and translation
+[[nodiscard]] NarrowBand importBand(openvdb::FloatGrid::Ptr grid, const char* action);
+
+[[nodiscard]] inline Imath::V3d toImath(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
+[[nodiscard]] inline openvdb::Vec3d toVdb(const Imath::V3d& v) { return {v.x, v.y, v.z}; }
+
+/// An axis-aligned transform: world = voxelSize × index.
+[[nodiscard]] openvdb::math::Transform::Ptr uniformTransform(double voxelSize);
+
+/// An empty level-set grid with that transform and background halfWidth × voxelSize.
+[[nodiscard]] openvdb::FloatGrid::Ptr emptyLevelSet(openvdb::math::Transform::Ptr transform,
+                                                    double halfWidth);
+
+}  // namespace levelset

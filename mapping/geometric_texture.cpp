@@ -1,0 +1,1 @@
+#include "mapping/geometric_texture.h"

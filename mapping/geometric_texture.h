@@ -1,0 +1,56 @@
+#pragma once
+
+#include <Imath/ImathBox.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "levelset/narrow_band.h"
+#include "levelset/progress.h"
+#include "mapping/patch.h"
+#include "mapping/rbf_map.h"
+
+/// Any solid laid onto a patch of any surface as a level set [Brodersen07 §8.3, §8.5].
+namespace mapping {
+
+enum class TextureMerge {
+  Union,  ///< stands on the surface
+  Carve,  ///< is cut out of it
+  Alone   ///< only the warped texture
+};
+
+struct TextureOptions {
+  TextureMerge merge = TextureMerge::Union;
+  std::optional<double> sink = {};          ///< how deep the texture dips below the surface, world units; empty: one voxel
+  double blend = 0;                         ///< radius along the seam, world units; 0: none
+  std::optional<Imath::Box3d> textureBox = {};  ///< what the unit cube of u, v, w is; empty: the texture's zero-set box
+  std::optional<double> voxelSize = {};     ///< empty: the finest of base and texture × smallest stretch
+  double halfWidth = 3;                     ///< voxels
+  RbfMapOptions rbf = {};
+  bool allowFolds = false;
+  std::size_t maxMemory = levelset::kNoMemoryLimit;
+  levelset::Progress progress = {};
+};
+
+struct TextureReport {
+  double voxelSize = 0;
+  std::size_t particles = 0, blocksTested = 0, blocksEvaluated = 0;
+  double minJacobian = 0;            ///< of the map × the patch's volume scale; ≤ 0 means a fold
+  double minStretch = 0, maxStretch = 0;  ///< singular values of texture → patch, world per world
+  double mapResidual = 0;            ///< largest |Φ(p) − uvw| × texture size, world units
+  std::vector<std::string> notes;
+};
+
+struct TextureResult {
+  levelset::NarrowBand band;
+  TextureReport report;
+};
+
+/// @throws InvalidInput when the map folds (with the place), the patch does not lie on `base`, or the
+///         texture box is empty; ResourceLimit before allocating too much
+[[nodiscard]] TextureResult mapTexture(const levelset::NarrowBand& base,
+                                       const levelset::NarrowBand& texture, const Patch& patch,
+                                       const TextureOptions& options = {});
+
+}  // namespace mapping

@@ -1,0 +1,1 @@
+#include "mapping/rbf_map.h"

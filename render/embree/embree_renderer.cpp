@@ -1,0 +1,1 @@
+#include "render/embree/embree_renderer.h"

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Imath/ImathColor.h>
+#include <Imath/ImathVec.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "levelset/narrow_band.h"
+#include "render/camera.h"
+
+namespace render {
+
+struct Light {
+  Imath::V3d direction{-0.4, 0.7, 0.6};  ///< towards the light, in camera space (x right, y up, z to the eye)
+  double strength = 0.75;
+  double softness = 0.15;                ///< half angle of the light, radians: penumbrae
+};
+
+struct Solid {
+  levelset::NarrowBand band;
+  Imath::C3f colour{0.72f, 0.70f, 0.66f};
+  std::uint32_t id = 1;
+};
+
+struct Scene {
+  Camera camera;
+  Light key;
+  double ambient = 0.45;       ///< weight of the ambient term, dimmed by occlusion
+  std::vector<Solid> solids;
+};
+
+}  // namespace render
