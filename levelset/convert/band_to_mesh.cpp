@@ -1,1 +1,61 @@
 #include "levelset/convert/band_to_mesh.h"
+
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
+#include "levelset/convert/cell_surface.h"
+#include "levelset/error.h"
+
+namespace levelset {
+namespace {
+
+constexpr const char* kAction = "mesh";
+
+void validate(const NarrowBand& band, const BandToMeshOptions& options) {
+  if (!(options.adaptivity >= 0 && options.adaptivity <= 1)) {
+    throw UsageError(fmt::format("mesh: adaptivity {} is outside [0, 1]; give a number in it",
+                                 options.adaptivity));
+  }
+  if (options.sharp && options.adaptivity > 0) {
+    throw UsageError("mesh: sharp and adaptivity do not go together; leave one out");
+  }
+  if (band.isEmpty()) {
+    throw InvalidInput(
+        "mesh: the band is empty, so there is no surface; check the steps before it");
+  }
+}
+
+TriMesh toWorld(const IndexMesh& mesh, const NarrowBand& band) {
+  TriMesh result;
+  const Imath::M44d matrix = band.indexToWorld();
+  result.positions.resize(mesh.positions.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 4096),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                        matrix.multVecMatrix(toImath(mesh.positions[i]), result.positions[i]);
+                      }
+                    });
+  return result;
+}
+
+}  // namespace
+
+TriMesh bandToMesh(const NarrowBand& band, const BandToMeshOptions& options) {
+  validate(band, options);
+  report(options.progress, 0, kAction);
+  const CellSurface surface(vdb(band));
+  if (!surface.triangleCount()) {
+    throw InvalidInput(
+        "mesh: the band has no zero crossing, so there is no surface; check the steps "
+        "before it");
+  }
+  report(options.progress, 0.3, kAction);
+  IndexMesh mesh = marchCells(surface);
+  report(options.progress, 0.8, kAction);
+  TriMesh result = toWorld(mesh, band);
+  result.triangles = std::move(mesh.triangles);
+  report(options.progress, 1, kAction);
+  return result;
+}
+
+}  // namespace levelset

@@ -8,7 +8,8 @@ namespace levelset {
 
 struct BandToMeshOptions {
   double adaptivity = 0;  ///< [0, 1]: how far flat parts may be coarsened; 0 is uniform
-  bool sharp = false;     ///< keep the edges and corners that the field implies [Ju02]; not with adaptivity
+  bool sharp =
+      false;  ///< keep the edges and corners that the field implies [Ju02]; not with adaptivity
   Progress progress = {};
 };
 

@@ -1,1 +1,276 @@
 #include "levelset/inspect/check.h"
+
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using LeafNode = FloatTree::LeafNodeType;
+
+constexpr double kMeanResidualLimit = 0.1;
+/// Bounds of |∇φ|² at a zero crossing, those of openvdb::tools::checkLevelSet.
+constexpr double kMinSquaredSlope = 0.5, kMaxSquaredSlope = 1.5;
+/// In a narrower band, only voxels at edges of the solid have all their neighbours in it.
+constexpr double kMinHalfWidthForResidual = 2 - 1e-5;
+
+/// Values that fail a check: how many, and the first in tree order.
+struct Finding {
+  std::size_t count = 0;
+  Coord where;
+  float value = 0;
+  bool isBackground = false;
+
+  void add(const Coord& at, float bad) {
+    if (!count++) where = at, value = bad;
+  }
+  void append(const Finding& later) {
+    if (!later.count) return;
+    if (!count) where = later.where, value = later.value;
+    count += later.count;
+  }
+};
+
+CheckItem item(const char* name, const Finding& finding, const char* fault) {
+  if (!finding.count) return {name, true, ""};
+  const std::string place =
+      finding.isBackground
+          ? "the background"
+          : fmt::format("[{}, {}, {}]", finding.where.x(), finding.where.y(), finding.where.z());
+  return {name, false,
+          fmt::format("{} {}: first at {} with {}", finding.count, fault, place, finding.value)};
+}
+
+struct EikonalSum {
+  double sum = 0, max = 0;
+  std::size_t count = 0;
+};
+
+struct LeafFindings {
+  Finding notFinite, outOfRange, badInactive, badSlope;
+  EikonalSum eikonal;
+};
+
+/// One voxel with its six neighbours.
+class SlopeStencil {
+ public:
+  explicit SlopeStencil(const FloatGrid& grid)
+      : accessor_(grid.getConstAccessor()), inverse_(1 / grid.voxelSize()[0]) {}
+
+  /// False when a neighbour is outside the band: there is no slope to speak of.
+  bool moveTo(const Coord& c, float value) {
+    centre_ = static_cast<double>(value);
+    bool inBand = true;
+    hasCrossing_ = false;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int side = 0; side < 2; ++side) {
+        Coord next = c;
+        next[axis] += side ? 1 : -1;
+        float neighbour;
+        inBand &= accessor_.probeValue(next, neighbour);
+        around_[axis][side] = static_cast<double>(neighbour);
+        hasCrossing_ |= (neighbour < 0) != (value < 0);
+      }
+    }
+    return inBand;
+  }
+
+  [[nodiscard]] double inverseVoxel() const { return inverse_; }
+  [[nodiscard]] bool hasCrossing() const { return hasCrossing_; }
+
+  /// Godunov's choice of one-sided differences, which looks towards the zero set.
+  [[nodiscard]] double upwindSquaredSlope() const {
+    double sum = 0;
+    const double sign = centre_ < 0 ? -1 : 1;
+    for (const auto& pair : around_) {
+      const double back = sign * (centre_ - pair[0]) * inverse_;
+      const double ahead = sign * (pair[1] - centre_) * inverse_;
+      const double steepest = std::max({back, -ahead, 0.0});
+      sum += steepest * steepest;
+    }
+    return sum;
+  }
+
+  /// Can a slope between the one-sided differences of each axis have a square in [low, high]?
+  /// Beside an edge of the solid, where they differ much, any of them may be the right one.
+  [[nodiscard]] bool canHaveSquaredSlope(double low, double high) const {
+    double least = 0, most = 0;
+    for (const auto& pair : around_) {
+      const double back = (centre_ - pair[0]) * inverse_, ahead = (pair[1] - centre_) * inverse_;
+      most += std::max(back * back, ahead * ahead);
+      if (back * ahead > 0) least += std::min(back * back, ahead * ahead);
+    }
+    return least <= high && most >= low;
+  }
+
+  [[nodiscard]] double centralSquaredSlope() const {
+    double sum = 0;
+    for (const auto& pair : around_) {
+      const double slope = (pair[1] - pair[0]) * inverse_ / 2;
+      sum += slope * slope;
+    }
+    return sum;
+  }
+
+ private:
+  FloatGrid::ConstAccessor accessor_;
+  double inverse_;
+  double centre_ = 0;
+  double around_[3][2] = {};
+  bool hasCrossing_ = false;
+};
+
+void checkLeaf(const LeafNode& leaf, float background, SlopeStencil& stencil, LeafFindings& out) {
+  const float* values = leaf.buffer().data();
+  const float tolerance = openvdb::math::Tolerance<float>::value() * std::max(1.0f, background);
+  const bool measureResidual =
+      static_cast<double>(background) * stencil.inverseVoxel() >= kMinHalfWidthForResidual;
+  for (openvdb::Index i = 0; i < LeafNode::SIZE; ++i) {
+    const float value = values[i];
+    const Coord c = leaf.offsetToGlobalCoord(i);
+    if (!std::isfinite(value)) {
+      out.notFinite.add(c, value);
+      continue;
+    }
+    if (!leaf.isValueOn(i)) {
+      if (!(std::abs(std::abs(value) - background) <= tolerance)) out.badInactive.add(c, value);
+      continue;
+    }
+    if (!(std::abs(value) <= background)) out.outOfRange.add(c, value);
+    if (!stencil.moveTo(c, value)) continue;
+    const double upwind = stencil.upwindSquaredSlope();
+    if (stencil.hasCrossing() && !stencil.canHaveSquaredSlope(kMinSquaredSlope, kMaxSquaredSlope)) {
+      out.badSlope.add(c, static_cast<float>(std::sqrt(upwind)));
+    }
+    if (!measureResidual) continue;
+    // Where distances meet from two sides only one-sided differences are right; elsewhere central
+    // ones are more exact. A field of the wrong slope fails by either.
+    const double residual = std::min(std::abs(std::sqrt(upwind) - 1),
+                                     std::abs(std::sqrt(stencil.centralSquaredSlope()) - 1));
+    if (!std::isfinite(residual)) continue;
+    out.eikonal.sum += residual;
+    out.eikonal.max = std::max(out.eikonal.max, residual);
+    ++out.eikonal.count;
+  }
+}
+
+LeafFindings checkLeaves(const FloatGrid& grid) {
+  std::vector<const LeafNode*> leaves;
+  leaves.reserve(grid.tree().leafCount());
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
+  std::vector<LeafFindings> found(leaves.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      SlopeStencil stencil(grid);
+                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                        checkLeaf(*leaves[i], grid.background(), stencil, found[i]);
+                      }
+                    });
+  LeafFindings total;
+  for (const LeafFindings& leaf : found) {
+    total.notFinite.append(leaf.notFinite);
+    total.outOfRange.append(leaf.outOfRange);
+    total.badInactive.append(leaf.badInactive);
+    total.badSlope.append(leaf.badSlope);
+    total.eikonal.sum += leaf.eikonal.sum;
+    total.eikonal.max = std::max(total.eikonal.max, leaf.eikonal.max);
+    total.eikonal.count += leaf.eikonal.count;
+  }
+  return total;
+}
+
+/// Tiles with their faults; active ones are found apart.
+void checkTiles(const FloatGrid& grid, Finding& active, LeafFindings& out) {
+  const float background = grid.background();
+  for (auto tile = grid.tree().cbeginValueAll(); tile; ++tile) {
+    if (tile.getDepth() == FloatTree::DEPTH - 1) continue;
+    const Coord c = tile.getBoundingBox().min();
+    if (tile.isValueOn()) active.add(c, *tile);
+    if (!std::isfinite(*tile)) {
+      out.notFinite.add(c, *tile);
+    } else if (!tile.isValueOn() && !(std::abs(*tile) == background)) {
+      out.badInactive.add(c, *tile);
+    }
+  }
+}
+
+CheckItem checkBackground(const FloatGrid& grid) {
+  const double voxels = static_cast<double>(grid.background()) / grid.voxelSize()[0];
+  // Rounded to float, a half width of one voxel may fall a little short.
+  if (std::isfinite(voxels) && voxels >= 1 - 1e-5) return {"positive background", true, ""};
+  return {"positive background", false,
+          fmt::format("the background is {}, which is {} voxels; it needs at least one",
+                      grid.background(), voxels)};
+}
+
+CheckItem checkClass(const FloatGrid& grid) {
+  const bool passed = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
+  return {
+      "level-set class", passed,
+      passed ? ""
+             : fmt::format("the class is '{}'", FloatGrid::gridClassToString(grid.getGridClass()))};
+}
+
+CheckItem checkVoxels(const FloatGrid& grid) {
+  const openvdb::Vec3d size = grid.voxelSize();
+  const bool passed = grid.hasUniformVoxels();
+  return {"uniform voxels", passed,
+          passed ? "" : fmt::format("voxels measure {} × {} × {}", size.x(), size.y(), size.z())};
+}
+
+}  // namespace
+
+bool CheckReport::passed() const {
+  return std::all_of(items.begin(), items.end(), [](const CheckItem& i) { return i.passed; });
+}
+
+CheckReport check(const NarrowBand& solid) {
+  CheckReport report;
+  if (!solid.shared()) {
+    report.items.push_back({"floating-point values", false, "there is no grid"});
+    return report;
+  }
+  const FloatGrid& grid = vdb(solid);
+  LeafFindings found;
+  Finding activeTiles, notFinite;
+  checkTiles(grid, activeTiles, found);
+  const LeafFindings leaves = checkLeaves(grid);
+  if (!std::isfinite(grid.background())) {
+    notFinite.add(Coord(0), grid.background());
+    notFinite.isBackground = true;
+  }
+  notFinite.append(found.notFinite);
+  notFinite.append(leaves.notFinite);
+  found.badInactive.append(leaves.badInactive);
+
+  report.items.push_back({"floating-point values", true, ""});
+  report.items.push_back(checkClass(grid));
+  report.items.push_back(checkVoxels(grid));
+  report.items.push_back(checkBackground(grid));
+  report.items.push_back(item("no active tiles", activeTiles, "active tiles"));
+  report.items.push_back(item("finite values", notFinite, "values are not finite"));
+  report.items.push_back(
+      item("values within the background", leaves.outOfRange, "active values lie beyond it"));
+  report.items.push_back(item("symmetric background", found.badInactive,
+                              "inactive values differ from plus or minus the background"));
+  report.items.push_back(item("unit slope at the zero set", leaves.badSlope,
+                              "slopes at zero crossings lie outside [0.71, 1.22]"));
+  if (leaves.eikonal.count) {
+    report.eikonalMean = leaves.eikonal.sum / static_cast<double>(leaves.eikonal.count);
+    report.eikonalMax = leaves.eikonal.max;
+  }
+  report.items.push_back({"eikonal residual", report.eikonalMean <= kMeanResidualLimit,
+                          fmt::format("the mean of ||∇φ| - 1| is {:.2g}, the maximum {:.2g}",
+                                      report.eikonalMean, report.eikonalMax)});
+  return report;
+}
+
+}  // namespace levelset

@@ -21,7 +21,9 @@ struct CheckReport {
 };
 
 /// The nine checks of openvdb::tools::checkLevelSet, one item each, and the eikonal residual of the
-/// band (fails when its mean passes 0.1).
+/// band (fails when its mean passes 0.1). They differ from OpenVDB where those fault sound bands: a
+/// half width of one voxel is enough, and beside an edge of the solid, where one-sided slopes differ,
+/// any between them may be the right one.
 [[nodiscard]] CheckReport check(const NarrowBand& solid);
 
 }  // namespace levelset

@@ -52,12 +52,12 @@ TEST(NarrowBand, RefusesGridsThatAreNoLevelSets) {
   nan->tree().setValueOn(openvdb::Coord(5, 0, 0), std::numeric_limits<float>::quiet_NaN());
   EXPECT_THROW((void)importBand(nan, "read"), InvalidInput);
   auto sheared = sound();
-  sheared->setTransform(openvdb::math::Transform::createLinearTransform(openvdb::math::Mat4d(
-      1., 0., 0., 0., .5, 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.)));
+  sheared->setTransform(openvdb::math::Transform::createLinearTransform(
+      openvdb::math::Mat4d(1., 0., 0., 0., .5, 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.)));
   EXPECT_THROW((void)importBand(sheared, "read"), InvalidInput);
   auto mirrored = sound();
-  mirrored->setTransform(openvdb::math::Transform::createLinearTransform(openvdb::math::Mat4d(
-      -1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.)));
+  mirrored->setTransform(openvdb::math::Transform::createLinearTransform(
+      openvdb::math::Mat4d(-1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.)));
   EXPECT_THROW((void)importBand(mirrored, "read"), InvalidInput);
   EXPECT_THROW((void)importBand(nullptr, "read"), InvalidInput);
 }

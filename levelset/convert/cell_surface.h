@@ -1,0 +1,113 @@
+#pragma once
+
+// The cells that the zero set passes, block by block. Includes OpenVDB: for .cpp files only.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "levelset/convert/cell_table.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+
+/// 8³ grid points, and the cells and edges whose lowest corner is one of them. Bit y·8 + z of word
+/// x stands for a grid point, as in OpenVDB's masks.
+struct SurfaceBlock {
+  openvdb::Coord origin;
+  const float* values = nullptr;  ///< of the leaf; null: `fill` everywhere
+  float fill = 0;
+  std::array<std::uint32_t, 8> neighbour = {};  ///< by dx·4 + dy·2 + dz; [0] is the block itself
+  std::array<float, 8> neighbourFill = {};      ///< the value there, where no block is
+  std::array<std::uint64_t, 8> inside = {};
+  std::array<std::uint64_t, 24> crossed = {};  ///< [x·3 + axis]: edges with a change of sign
+  std::array<std::uint16_t, 24> rank = {};     ///< crossed edges before that word
+  std::size_t firstVertex = 0, vertexCount = 0;
+  std::size_t firstTriangle = 0, triangleCount = 0;
+  std::size_t firstCycle = 0, cycleCount = 0;  ///< polygons of the table, for dual meshes
+  [[nodiscard]] float value(int offset) const { return values ? values[offset] : fill; }
+};
+
+/// Every cell with corners of both signs, and every edge with ends of both, in an order that
+/// depends on the grid alone: leaves in tree order, then further blocks by position. A grid point
+/// with φ < 0 is inside. Values outside the leaves are those of the tiles, so that a band cut open
+/// still gives a closed surface.
+class CellSurface {
+ public:
+  /// @throws ResourceLimit when a triangle mesh of it would need more than 2³² vertices
+  explicit CellSurface(const openvdb::FloatGrid& grid);
+
+  static constexpr std::uint32_t kNoBlock = 0xffffffffu;
+
+  [[nodiscard]] const std::vector<SurfaceBlock>& blocks() const { return blocks_; }
+  [[nodiscard]] std::size_t vertexCount() const { return vertexCount_; }
+  [[nodiscard]] std::size_t triangleCount() const { return triangleCount_; }
+  [[nodiscard]] std::size_t cycleCount() const { return cycleCount_; }
+
+  /// Sign words of the corners of all cells with lowest corner in slab x, by corner number.
+  [[nodiscard]] std::array<std::uint64_t, 8> cornerWords(const SurfaceBlock& block, int x) const;
+  /// Value at a grid point given relative to the block, each coordinate in [0, 8].
+  [[nodiscard]] float valueAt(const SurfaceBlock& block, int x, int y, int z) const;
+  /// Is the grid point inside? Any point; slow.
+  [[nodiscard]] bool isInside(const openvdb::Coord& point) const;
+  /// Number of the crossed edge `edge` of the cell (x, y, z).
+  [[nodiscard]] std::uint32_t vertexOf(const SurfaceBlock& block, int x, int y, int z,
+                                       int edge) const;
+
+  /// Calls visit(x, y, z, pattern) for each cell of the block with corners of both signs.
+  template <typename Visit>
+  void forEachCell(const SurfaceBlock& block, Visit&& visit) const {
+    for (int x = 0; x < 8; ++x) {
+      const auto words = cornerWords(block, x);
+      std::uint64_t any = 0, all = ~0ull;
+      for (const std::uint64_t word : words) any |= word, all &= word;
+      for (std::uint64_t left = any & ~all; left; left &= left - 1) {
+        const int bit = __builtin_ctzll(left);
+        unsigned pattern = 0;
+        for (unsigned corner = 0; corner < 8; ++corner) {
+          pattern |= static_cast<unsigned>((words[corner] >> bit) & 1) << corner;
+        }
+        visit(x, bit >> 3, bit & 7, pattern);
+      }
+    }
+  }
+
+  /// Calls visit(x, y, z, axis) for each crossed edge that the block owns, in the order of numbers.
+  template <typename Visit>
+  static void forEachVertex(const SurfaceBlock& block, Visit&& visit) {
+    for (int word = 0; word < 24; ++word) {
+      for (std::uint64_t left = block.crossed[static_cast<std::size_t>(word)]; left;
+           left &= left - 1) {
+        const int bit = __builtin_ctzll(left);
+        visit(word / 3, bit >> 3, bit & 7, word % 3);
+      }
+    }
+  }
+
+ private:
+  using Slab = std::array<std::uint64_t, 4>;
+  void collectBlocks();
+  void linkBlocks();
+  [[nodiscard]] Slab slabWords(const SurfaceBlock& block, int x) const;
+  [[nodiscard]] std::uint64_t insideWord(const SurfaceBlock& block, unsigned side, int x) const;
+  void countBlock(SurfaceBlock& block) const;
+  void numberAll();
+
+  const openvdb::FloatGrid& grid_;
+  std::vector<SurfaceBlock> blocks_;
+  std::size_t vertexCount_ = 0, triangleCount_ = 0, cycleCount_ = 0;
+};
+
+/// Where the zero of linear interpolation lies on a crossed edge, in index space. Kept a little
+/// away from a grid point where other edges cross too, so that no two vertices coincide.
+[[nodiscard]] openvdb::Vec3d crossingPoint(const CellSurface& surface, const SurfaceBlock& block,
+                                           int x, int y, int z, int axis);
+
+/// The uniform mesh in index space: marching cubes on the table's polygons [Lor87].
+struct IndexMesh {
+  std::vector<openvdb::Vec3d> positions;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+[[nodiscard]] IndexMesh marchCells(const CellSurface& surface);
+
+}  // namespace levelset

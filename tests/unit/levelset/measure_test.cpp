@@ -1,0 +1,149 @@
+#include "levelset/inspect/measure.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "levelset/convert/band_to_mesh.h"
+#include "tests/support/bands.h"
+
+namespace {
+
+using namespace levelset;
+using Imath::V3d;
+using std::numbers::pi;
+
+NarrowBand sphere(double radius, double voxelSize, const V3d& centre) {
+  return support::sampleBand([=](const V3d& p) { return (p - centre).length() - radius; },
+                             {centre - V3d(radius), centre + V3d(radius)}, voxelSize);
+}
+
+double torusDistance(const V3d& p, double radius, double tube) {
+  return std::hypot(std::hypot(p.x, p.y) - radius, p.z) - tube;
+}
+
+/// Solid sphere with a cavity in which another solid floats.
+NarrowBand nested(double h) {
+  return support::sampleBand(
+      [](const V3d& p) {
+        const double r = p.length();
+        return std::min(std::max(r - 20, 14 - r), r - 6);
+      },
+      {V3d(-20), V3d(20)}, h);
+}
+
+TriMesh tetrahedron() {
+  return {{V3d(0), V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)},
+          {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
+}
+
+TEST(Measure, SphereConvergesSecondOrder) {
+  double volumeError[2], areaError[2];
+  for (int i = 0; i < 2; ++i) {
+    const double h = 1. / (32 << i);
+    volumeError[i] = areaError[i] = 0;
+    for (int k = 0; k < 3; ++k) {
+      const Measurement m = measure(sphere(1, h, V3d(0.13 * k, 0.29 * k, 0.41 * k) * h));
+      volumeError[i] += std::abs(m.volume / (4 * pi / 3) - 1) / 3;
+      areaError[i] += std::abs(m.area / (4 * pi) - 1) / 3;
+    }
+  }
+  EXPECT_LT(volumeError[0], 7e-4);
+  EXPECT_GT(std::log2(volumeError[0] / volumeError[1]), 1.8);
+  EXPECT_LT(areaError[0], 5e-4);
+  EXPECT_GT(std::log2(areaError[0] / areaError[1]), 1.8);
+}
+
+TEST(Measure, TellsTopologyOfTorusAndNestedShells) {
+  const Measurement torus =
+      measure(support::sampleBand([](const V3d& p) { return torusDistance(p, 12, 5); },
+                                  {V3d(-17, -17, -5), V3d(17, 17, 5)}, 1));
+  EXPECT_EQ(torus.euler, 0);
+  EXPECT_EQ(torus.components, 1u);
+  EXPECT_EQ(torus.shells, 1u);
+  EXPECT_EQ(torus.cavities, 0u);
+  EXPECT_NEAR(torus.volume, 2 * pi * pi * 12 * 25, 0.01 * 2 * pi * pi * 12 * 25);
+  const Measurement shells = measure(nested(1));
+  EXPECT_EQ(shells.components, 2u);
+  EXPECT_EQ(shells.shells, 3u);
+  EXPECT_EQ(shells.cavities, 1u);
+  EXPECT_EQ(shells.euler, 6);
+  const double exact = 4 * pi / 3 * (20. * 20 * 20 - 14. * 14 * 14 + 6. * 6 * 6);
+  EXPECT_NEAR(shells.volume, exact, 3e-3 * exact);
+}
+
+TEST(Measure, KnowsFiguresOfTheBand) {
+  const NarrowBand band = sphere(5, 0.5, V3d(1, 2, 3));
+  const Measurement m = measure(band);
+  EXPECT_EQ(m.activeVoxels, band.activeVoxelCount());
+  EXPECT_DOUBLE_EQ(m.voxelSize, 0.5);
+  EXPECT_NEAR(m.halfWidth, 3, 1e-6);
+  const Imath::Box3d box = band.zeroSetBounds();
+  EXPECT_NEAR((m.bounds.min - box.min).length(), 0, 1e-3 * 0.5);
+  EXPECT_NEAR((m.bounds.max - box.max).length(), 0, 1e-3 * 0.5);
+  EXPECT_EQ(measure(NarrowBand()).volume, 0);
+  EXPECT_EQ(measure(NarrowBand()).shells, 0u);
+}
+
+TEST(Measure, IsTheSameFarFromOrigin) {
+  const NarrowBand band = sphere(10, 1, V3d(0.2));
+  auto grid = vdb(band).deepCopy();
+  grid->transform().postTranslate(openvdb::Vec3d(1e6, 2e6, -1e6));
+  const Measurement here = measure(band), there = measure(makeBand(grid));
+  EXPECT_EQ(here.volume, there.volume);
+  EXPECT_EQ(here.area, there.area);
+  EXPECT_NEAR(there.bounds.min.x - here.bounds.min.x, 1e6, 1e-6);
+  TriMesh mesh = bandToMesh(band);
+  const double volume = measure(mesh).volume;
+  for (V3d& p : mesh.positions) p += V3d(1e6, 2e6, -1e6);
+  EXPECT_NEAR(measure(mesh).volume, volume, 1e-6 * volume);
+}
+
+TEST(Measure, AgreesWithItsMesh) {
+  const NarrowBand band = nested(1);
+  const Measurement ofBand = measure(band), ofMesh = measure(bandToMesh(band));
+  EXPECT_NEAR(ofBand.volume, ofMesh.volume, 1e-9 * ofBand.volume);
+  EXPECT_NEAR(ofBand.area, ofMesh.area, 1e-9 * ofBand.area);
+  EXPECT_EQ(ofBand.components, ofMesh.components);
+  EXPECT_EQ(ofBand.cavities, ofMesh.cavities);
+  EXPECT_EQ(ofBand.euler, ofMesh.euler);
+}
+
+TEST(Manifoldness, AcceptsClosedMesh) {
+  EXPECT_TRUE(manifoldness(tetrahedron()).isClosedManifold());
+  const Measurement m = measure(tetrahedron());
+  EXPECT_NEAR(m.volume, 1. / 6, 1e-15);
+  EXPECT_NEAR(m.area, 1.5 + std::sqrt(3) / 2, 1e-15);
+  EXPECT_EQ(m.euler, 2);
+}
+
+TEST(Manifoldness, CountsEachDefect) {
+  TriMesh open = tetrahedron();
+  open.triangles.pop_back();
+  EXPECT_EQ(manifoldness(open).boundaryEdges, 3u);
+  EXPECT_EQ(manifoldness(open).nonManifoldVertices, 0u);
+
+  TriMesh flipped = tetrahedron();
+  std::swap(flipped.triangles[3][0], flipped.triangles[3][1]);
+  EXPECT_EQ(manifoldness(flipped).misorientedEdges, 3u);
+  EXPECT_EQ(manifoldness(flipped).nonManifoldEdges, 0u);
+
+  TriMesh fin = tetrahedron();
+  fin.positions.push_back(V3d(1, 1, 1));
+  fin.triangles.push_back({1, 2, 4});
+  EXPECT_EQ(manifoldness(fin).nonManifoldEdges, 1u);
+  EXPECT_EQ(manifoldness(fin).boundaryEdges, 2u);
+
+  TriMesh bowTie = tetrahedron();  // a second one that shares vertex 0
+  for (const V3d& p : {V3d(-1, 0, 0), V3d(0, -1, 0), V3d(0, 0, -1)}) bowTie.positions.push_back(p);
+  for (const auto& t : tetrahedron().triangles) {
+    const auto moved = [](std::uint32_t v) { return v ? v + 3 : 0; };
+    bowTie.triangles.push_back({moved(t[0]), moved(t[1]), moved(t[2])});
+  }
+  const Manifoldness found = manifoldness(bowTie);
+  EXPECT_EQ(found.nonManifoldVertices, 1u);
+  EXPECT_EQ(found.boundaryEdges + found.nonManifoldEdges + found.misorientedEdges, 0u);
+}
+
+}  // namespace
