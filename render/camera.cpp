@@ -1,1 +1,169 @@
 #include "render/camera.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "levelset/error.h"
+
+namespace render {
+namespace {
+
+using Imath::V3d;
+
+/// Right-handed axes of the image plane: right, up, and forward into the scene.
+struct CameraAxes {
+  V3d right, up, forward;
+};
+
+CameraAxes axesOf(const Camera& camera) {
+  CameraAxes axes;
+  axes.forward = (camera.to - camera.from).normalized();
+  axes.right = axes.forward.cross(camera.up).normalized();
+  axes.up = axes.right.cross(axes.forward);
+  return axes;
+}
+
+/// Half extents of the picture: at unit distance (perspective), or in world units (orthographic).
+struct HalfExtent {
+  double x, y;
+};
+
+HalfExtent halfExtentOf(const Camera& camera) {
+  const double y =
+      camera.orthoHeight ? 0.5 * *camera.orthoHeight : std::tan(0.5 * camera.verticalFov);
+  return {y * camera.width / camera.height, y};
+}
+
+bool isFinite(const V3d& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+std::string text(const V3d& v) {
+  return fmt::format("{},{},{}", v.x, v.y, v.z);
+}
+
+}  // namespace
+
+Camera::Ray Camera::ray(double x, double y) const {
+  const CameraAxes axes = axesOf(*this);
+  const HalfExtent half = halfExtentOf(*this);
+  const V3d shift =
+      axes.right * ((2 * x / width - 1) * half.x) + axes.up * ((1 - 2 * y / height) * half.y);
+  if (orthoHeight) return {from + shift, axes.forward};
+  return {from, (axes.forward + shift).normalized()};
+}
+
+V3d Camera::axis() const {
+  return (to - from).normalized();
+}
+
+Imath::M44d Camera::worldToCamera() const {
+  const CameraAxes axes = axesOf(*this);
+  const V3d columns[3] = {axes.right, axes.up, axes.forward};
+  Imath::M44d m;
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 3; ++i) m[i][j] = columns[j][i];
+    m[3][j] = -from.dot(columns[j]);
+  }
+  return m;
+}
+
+Imath::M44d Camera::worldToNdc() const {
+  const HalfExtent half = halfExtentOf(*this);
+  const double sx = 0.5 / half.x, sy = -0.5 / half.y;
+  // The third coordinate is discarded by readers; it keeps the matrix regular.
+  const Imath::M44d perspective(sx, 0, 0, 0, 0, sy, 0, 0, 0.5, 0.5, 1, 1, 0, 0, -1, 0);
+  const Imath::M44d orthographic(sx, 0, 0, 0, 0, sy, 0, 0, 0, 0, 1, 0, 0.5, 0.5, 0, 1);
+  return worldToCamera() * (orthoHeight ? orthographic : perspective);
+}
+
+void validate(const Camera& camera) {
+  using levelset::UsageError;
+  if (camera.width <= 0 || camera.height <= 0) {
+    throw UsageError(
+        fmt::format("camera: an image of {}x{} pixels has nothing to show; give both "
+                    "sizes a positive number",
+                    camera.width, camera.height));
+  }
+  if (static_cast<double>(camera.width) * camera.height > kMaxPixels) {
+    throw levelset::ResourceLimit(
+        fmt::format("camera: an image of {}x{} pixels passes the limit of "
+                    "{:.0f} pixels; choose a smaller size",
+                    camera.width, camera.height, kMaxPixels));
+  }
+  if (!isFinite(camera.from) || !isFinite(camera.to) || !isFinite(camera.up)) {
+    throw UsageError(
+        fmt::format("camera: from {}, to {}, up {} are not all finite; give finite "
+                    "points",
+                    text(camera.from), text(camera.to), text(camera.up)));
+  }
+  const V3d view = camera.to - camera.from;
+  if (!(view.length() > 0)) {
+    throw UsageError(fmt::format("camera: from and to are the same point {}; move one of them",
+                                 text(camera.to)));
+  }
+  const V3d across = view.normalized().cross(camera.up);
+  if (!(across.length() > 1e-9 * camera.up.length())) {
+    throw UsageError(
+        fmt::format("camera: up {} is parallel to the view from {} to {}; choose "
+                    "another up",
+                    text(camera.up), text(camera.from), text(camera.to)));
+  }
+  if (camera.orthoHeight) {
+    if (!(*camera.orthoHeight > 0) || !std::isfinite(*camera.orthoHeight)) {
+      throw UsageError(fmt::format("camera: the orthographic height {} is not a positive length",
+                                   *camera.orthoHeight));
+    }
+  } else if (!(camera.verticalFov > 0 && camera.verticalFov < std::numbers::pi)) {
+    throw UsageError(fmt::format("camera: the field of view of {} degrees is not between 0 and 180",
+                                 camera.verticalFov * 180 / std::numbers::pi));
+  }
+}
+
+Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double verticalFov) {
+  if (bounds.isEmpty() || !isFinite(bounds.min) || !isFinite(bounds.max)) {
+    throw levelset::UsageError("camera: there is no surface to frame; give the view with --from");
+  }
+  Camera camera;
+  camera.width = width;
+  camera.height = height;
+  camera.verticalFov = verticalFov;
+  camera.to = bounds.center();
+  camera.from = camera.to + V3d(0.45, 0.35, 1);
+  validate(camera);
+
+  // A corner at (x, y, depth) beyond a camera that stands `back` behind the target and is shifted
+  // by s is seen when |x - s| <= k (back + depth): linear in s and back, so each axis has a closed
+  // form.
+  const CameraAxes axes = axesOf(camera);
+  const double half[2] = {halfExtentOf(camera).x, halfExtentOf(camera).y};
+  constexpr double kMargin = 0.94;  // of the picture that the box may take
+  double back = 0, shift[2];
+  for (int axis = 0; axis < 2; ++axis) {
+    const double k = kMargin * half[axis];
+    double upper = -std::numeric_limits<double>::infinity(), lower = upper;
+    for (int corner = 0; corner < 8; ++corner) {
+      const V3d p =
+          V3d(corner & 1 ? bounds.max.x : bounds.min.x, corner & 2 ? bounds.max.y : bounds.min.y,
+              corner & 4 ? bounds.max.z : bounds.min.z) -
+          camera.to;
+      const double x = p.dot(axis == 0 ? axes.right : axes.up), depth = p.dot(axes.forward);
+      upper = std::max(upper, x - k * depth);
+      lower = std::max(lower, -x - k * depth);
+    }
+    shift[axis] = 0.5 * (upper - lower);
+    back = std::max(back, 0.5 * (upper + lower) / k);
+  }
+  const double size = bounds.size().length();
+  if (!(back > 0)) back = size > 0 ? size : 1;
+  camera.to += axes.right * shift[0] + axes.up * shift[1];
+  camera.from = camera.to - axes.forward * back;
+  validate(camera);
+  return camera;
+}
+
+}  // namespace render

@@ -10,7 +10,7 @@ namespace render {
 
 /// Looks from a point to a point; perspective with a vertical field of view, or orthographic.
 struct Camera {
-  Imath::V3d from{0, -5, 0}, to{0, 0, 0}, up{0, 1, 0};
+  Imath::V3d from{0, 0, 5}, to{0, 0, 0}, up{0, 1, 0};
   double verticalFov = 0.6108652381980153;  ///< radians, (0, π)
   std::optional<double> orthoHeight = {};   ///< world units; set: orthographic
   int width = 1024, height = 1024;          ///< pixels
@@ -22,14 +22,23 @@ struct Camera {
   [[nodiscard]] Ray ray(double x, double y) const;
   /// Unit view axis, towards `to`.
   [[nodiscard]] Imath::V3d axis() const;
+  /// OpenEXR's camera space: x right, y up, z along the view. Row vectors: `camera = world *
+  /// matrix`.
   [[nodiscard]] Imath::M44d worldToCamera() const;
+  /// OpenEXR's normalised device space: (0, 0) the upper left corner, (1, 1) the lower right one.
   [[nodiscard]] Imath::M44d worldToNdc() const;
 };
 
-/// @throws levelset::UsageError when from equals to, up is parallel to the view, or a size is not positive
+/// More pixels than this are refused.
+inline constexpr double kMaxPixels = 268435456;  // 2^28
+
+/// @throws levelset::UsageError when a number is not finite, from equals to, up is parallel to the
+///         view, the field of view or the height is out of range, or a size is not positive
+/// @throws levelset::ResourceLimit for more than kMaxPixels
 void validate(const Camera& camera);
 
-/// A three-quarter view that frames the box, width × height pixels.
+/// A three-quarter view from the right, above and in front (y up) that just frames the box, at any
+/// aspect. @throws levelset::UsageError when the box is empty, and as validate()
 [[nodiscard]] Camera framingCamera(const Imath::Box3d& bounds, int width, int height,
                                    double verticalFov = 0.6108652381980153);
 

@@ -12,9 +12,10 @@
 namespace render {
 
 struct Light {
-  Imath::V3d direction{-0.4, 0.7, 0.6};  ///< towards the light, in camera space (x right, y up, z to the eye)
+  Imath::V3d direction{-0.4, 0.7,
+                       0.6};  ///< towards the light, in camera space (x right, y up, z to the eye)
   double strength = 0.75;
-  double softness = 0.15;                ///< half angle of the light, radians: penumbrae
+  double softness = 0.15;  ///< half angle of the light, radians: penumbrae
 };
 
 struct Solid {
@@ -26,7 +27,7 @@ struct Solid {
 struct Scene {
   Camera camera;
   Light key;
-  double ambient = 0.45;       ///< weight of the ambient term, dimmed by occlusion
+  double ambient = 0.45;  ///< weight of the ambient term, dimmed by occlusion
   std::vector<Solid> solids;
 };
 

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <map>
 #include <memory>
+#include <string>
 
 #include "levelset/progress.h"
 #include "render/image.h"
@@ -11,35 +15,60 @@
 namespace render {
 
 struct EmbreeOptions {
-  int samples = 4;            ///< per pixel, colour only; data layers come from the pixel centre
-  int ambientSamples = 16;    ///< per colour sample; 0: none
-  int shadowSamples = 4;      ///< 0: none
-  bool curvature = true;      ///< layers curvature.mean .gauss .k1 .k2
+  int samples = 4;                                  ///< per pixel, at least 1; colour only
+  int ambientSamples = 16;                          ///< per colour sample; 0: no occlusion
+  int shadowSamples = 4;                            ///< per colour sample; 0: no shadows
+  bool curvature = true;                            ///< layers curvature.mean .gauss .k1 .k2
+  std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< for the image
   levelset::Progress progress = {};
 };
 
-/// @return layers R G B A Z N.X N.Y N.Z P.X P.Y P.Z curvature.* id, as the command line names them
-/// @throws levelset::UsageError for a camera that cannot see; levelset::ResourceLimit for an image too large
+/// Draws the scene. Pixels depend on the scene alone, not on the number of threads.
+/// @return layers R G B A (linear, premultiplied, mean of the samples), and from the pixel centre Z
+///         (distance along the view axis, +inf for a miss), N.X N.Y N.Z, P.X P.Y P.Z, curvature.*
+///         and id (0: none), all world units; header attributes say how they were made
+/// @throws levelset::UsageError for a camera that cannot see, or sample counts out of range
+/// @throws levelset::InvalidInput when there is no surface in the scene
+/// @throws levelset::ResourceLimit for an image too large; levelset::Cancelled
 [[nodiscard]] Image renderEmbree(const Scene& scene, const EmbreeOptions& options = {});
 
 struct Hit {
   bool found = false;
-  double distance = 0;        ///< along the unit direction
-  Imath::V3d position, normal;
-  std::uint32_t id = 0;
+  double distance = 0;          ///< along the unit direction, world units
+  Imath::V3d position, normal;  ///< normal outwards, of unit length, from a tricubic B-spline
+  Imath::V3d facetNormal;       ///< outwards, of the trilinear interpolant itself
+  double surfaceError = 0;  ///< bound on the interpolant's distance from a smooth surface, world
+  std::uint32_t id = 0;     ///< Solid::id
+  std::size_t solid = 0;    ///< index in Scene::solids
 };
 
-/// The scene made ready for rays.
+struct CurvatureSample {
+  double mean = 0, gauss = 0, k1 = 0,
+         k2 = 0;  ///< per world unit (gauss: squared); spheres positive
+};
+
+/// The scene made ready for rays: thread-safe, results do not depend on the order of anything.
+/// Rays are unit directions; of two solids hit at the same distance the lower id counts.
 class EmbreeScene {
  public:
+  /// @throws levelset::ResourceLimit when Embree finds no memory
   explicit EmbreeScene(const Scene& scene);
   ~EmbreeScene();
   EmbreeScene(EmbreeScene&&) noexcept;
   /// First hit beyond `near`. A ray that starts inside hits where it leaves.
-  [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near = 0,
-                              double far = 1e300) const;
+  /// @throws levelset::UsageError when origin or direction are not finite or the direction is zero
+  [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction,
+                              double near = 0, double far = 1e300) const;
+  /// True when there is a hit in [near, far]. @throws as intersect()
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                                 double far) const;
+  /// At the position of a hit, from the Hessian of the tricubic B-spline.
+  [[nodiscard]] CurvatureSample curvatureAt(const Hit& hit) const;
+  /// Header attributes that say what is drawn and how: ls:renderer, ls:filter, ls:mode, ls:normal,
+  /// ls:grid (name and content hash of each solid), ls:voxelSize.
+  [[nodiscard]] std::map<std::string, std::string> provenance() const;
+  /// World-space box of the cells that hold surface; empty when there are none.
+  [[nodiscard]] const Imath::Box3d& bounds() const;
 
  private:
   struct Impl;

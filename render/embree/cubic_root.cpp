@@ -1,0 +1,62 @@
+#include "render/embree/cubic_root.h"
+
+namespace render {
+namespace {
+
+/// Halvings after which an interval is as narrow as the spacing of doubles below 1.
+constexpr int kMaxDepth = 52;
+
+int signChanges(const BernsteinCubic& b) {
+  const bool s0 = b[0] < 0, s1 = b[1] < 0, s2 = b[2] < 0, s3 = b[3] < 0;
+  return (s0 != s1) + (s1 != s2) + (s2 != s3);
+}
+
+struct CubicPiece {
+  BernsteinCubic b;
+  double low, width;
+  int depth;
+};
+
+/// De Casteljau at one half: `piece` becomes its left half, the right half is returned.
+CubicPiece splitCubic(CubicPiece& piece) {
+  const BernsteinCubic b = piece.b;
+  const double b01 = 0.5 * (b[0] + b[1]), b12 = 0.5 * (b[1] + b[2]), b23 = 0.5 * (b[2] + b[3]);
+  const double b012 = 0.5 * (b01 + b12), b123 = 0.5 * (b12 + b23);
+  const double middle = 0.5 * (b012 + b123);
+  piece.b = {b[0], b01, b012, middle};
+  piece.width *= 0.5;
+  ++piece.depth;
+  return {{middle, b123, b23, b[3]}, piece.low + piece.width, piece.width, piece.depth};
+}
+
+/// Walks the pieces from the left. A piece without sign variation has no root (convex hull); one
+/// whose ends differ in sign has one for certain. `stopAtProof` returns as soon as that is known.
+double searchCubic(const BernsteinCubic& cubic, bool stopAtProof) {
+  CubicPiece stack[kMaxDepth + 1];
+  int size = 0;
+  CubicPiece piece{cubic, 0, 1, 0};
+  for (;;) {
+    const int changes = signChanges(piece.b);
+    const bool isProven = changes & 1;
+    if (changes > 0 && piece.depth < kMaxDepth && !(isProven && stopAtProof)) {
+      stack[size++] = splitCubic(piece);
+      continue;
+    }
+    if (isProven) return piece.low + 0.5 * piece.width;
+    if (size == 0) return -1;
+    piece = stack[--size];
+  }
+}
+
+}  // namespace
+
+double firstSignChange(const BernsteinCubic& cubic) {
+  return signChanges(cubic) == 0 ? -1 : searchCubic(cubic, false);
+}
+
+bool hasSignChange(const BernsteinCubic& cubic) {
+  const int changes = signChanges(cubic);
+  return changes != 0 && ((changes & 1) || searchCubic(cubic, true) >= 0);
+}
+
+}  // namespace render

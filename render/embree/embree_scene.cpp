@@ -1,0 +1,321 @@
+#include <Imath/ImathBoxAlgo.h>
+#include <embree3/rtcore.h>
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "levelset/error.h"
+#include "render/embree/embree_renderer.h"
+#include "render/embree/surface_blocks_vdb.h"
+#include "render/embree/surface_shape_vdb.h"
+
+namespace render {
+namespace {
+
+using Imath::Box3d;
+using Imath::V3d;
+
+/// Embree's floats see the scene scaled to a diagonal of 1 around the origin, and rays that start
+/// at its box. Then origin, direction and box carry errors of some 2^-24 each, and this covers
+/// them.
+constexpr double kFloatPad = 2e-6;
+
+struct RaySolid {
+  levelset::NarrowBand band;  // keeps the tree alive
+  Imath::M44d indexToWorld, worldToIndex;
+  std::vector<SurfaceBlock> blocks;
+  std::uint32_t id;
+  std::size_t index;
+  // From world to Embree's box.
+  V3d centre;
+  double scale;
+};
+
+/// What the callbacks need beside Embree's float ray: the ray in double, and the best hit so far.
+struct RayQuery {
+  RTCIntersectContext embree;  // first: Embree hands its address back
+  V3d origin, direction;       // world; the origin at the scene's box
+  double far;
+  double scale;
+  const RaySolid* solid = nullptr;
+};
+
+std::optional<double> crossingOf(const RayQuery& query, const RaySolid& solid, unsigned primitive,
+                                 Search search) {
+  V3d origin, direction;
+  solid.worldToIndex.multVecMatrix(query.origin, origin);
+  solid.worldToIndex.multDirMatrix(query.direction, direction);
+  return findCrossing(solid.blocks[primitive], IndexRay(origin, direction), 0, query.far, search);
+}
+
+void boundBlock(const RTCBoundsFunctionArguments* args) {
+  const auto& solid = *static_cast<const RaySolid*>(args->geometryUserPtr);
+  const Box3d box = Imath::transform(solid.blocks[args->primID].bounds(), solid.indexToWorld);
+  const V3d low = (box.min - solid.centre) * solid.scale - V3d(kFloatPad);
+  const V3d high = (box.max - solid.centre) * solid.scale + V3d(kFloatPad);
+  RTCBounds& bounds = *args->bounds_o;
+  bounds.lower_x = static_cast<float>(low.x);
+  bounds.lower_y = static_cast<float>(low.y);
+  bounds.lower_z = static_cast<float>(low.z);
+  bounds.upper_x = static_cast<float>(high.x);
+  bounds.upper_y = static_cast<float>(high.y);
+  bounds.upper_z = static_cast<float>(high.z);
+}
+
+void intersectBlock(const RTCIntersectFunctionNArguments* args) {
+  if (!args->valid[0]) return;
+  auto& query = *reinterpret_cast<RayQuery*>(args->context);
+  const auto& solid = *static_cast<const RaySolid*>(args->geometryUserPtr);
+  const auto t = crossingOf(query, solid, args->primID, Search::FirstCrossing);
+  if (!t || *t > query.far) return;
+  if (query.solid && *t == query.far && solid.id >= query.solid->id) return;
+  query.far = *t;
+  query.solid = &solid;
+  // Blocks that could tie stay in Embree's sight.
+  RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, args->N);
+  RTCRayN_tfar(ray, args->N, 0) =
+      std::min(RTCRayN_tfar(ray, args->N, 0), static_cast<float>(*t * query.scale + kFloatPad));
+  RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, args->N);
+  RTCHitN_geomID(hit, args->N, 0) = args->geomID;
+  RTCHitN_primID(hit, args->N, 0) = args->primID;
+}
+
+void occludeBlock(const RTCOccludedFunctionNArguments* args) {
+  if (!args->valid[0]) return;
+  const auto& query = *reinterpret_cast<const RayQuery*>(args->context);
+  const auto& solid = *static_cast<const RaySolid*>(args->geometryUserPtr);
+  if (crossingOf(query, solid, args->primID, Search::AnyCrossing))
+    RTCRayN_tfar(args->ray, args->N, 0) = -std::numeric_limits<float>::infinity();
+}
+
+/// Where the ray enters the box, at least `near`; nothing when it misses.
+std::optional<double> entryOf(const Box3d& box, const V3d& origin, const V3d& direction,
+                              double near, double far) {
+  for (int a = 0; a < 3; ++a) {
+    if (direction[a] == 0) {
+      if (origin[a] < box.min[a] || origin[a] > box.max[a]) return std::nullopt;
+      continue;
+    }
+    const double t0 = (box.min[a] - origin[a]) / direction[a];
+    const double t1 = (box.max[a] - origin[a]) / direction[a];
+    near = std::max(near, std::min(t0, t1));
+    far = std::min(far, std::max(t0, t1));
+  }
+  return near <= far ? std::optional(near) : std::nullopt;
+}
+
+void requireRay(const V3d& origin, const V3d& direction) {
+  const double sum = origin.x + origin.y + origin.z + direction.x + direction.y + direction.z;
+  if (std::isfinite(sum) && direction != V3d(0)) return;
+  throw levelset::UsageError(fmt::format(
+      "render: a ray from {},{},{} along {},{},{} leads nowhere; give finite numbers and "
+      "a direction",
+      origin.x, origin.y, origin.z, direction.x, direction.y, direction.z));
+}
+
+V3d unitOr(const V3d& v, const V3d& fallback) {
+  const V3d unit = v.normalized();
+  return unit == V3d(0) ? fallback : unit;
+}
+
+}  // namespace
+
+struct EmbreeScene::Impl {
+  std::vector<RaySolid> solids;
+  Box3d bounds;     // of the crossing cells
+  Box3d rayBounds;  // a little larger: where rays may start
+  V3d centre;
+  double scale = 1;
+  RTCDevice device = nullptr;
+  RTCScene scene = nullptr;
+
+  explicit Impl(const Scene& source);
+  ~Impl() {
+    if (scene) rtcReleaseScene(scene);
+    if (device) rtcReleaseDevice(device);
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  void gather(const Scene& source);
+  void build();
+  /// A query and Embree's ray for it; nothing when the ray misses the scene's box. `moved`: how far
+  /// the origin was moved towards the scene.
+  std::optional<RayQuery> prepare(const V3d& origin, const V3d& direction, double near, double far,
+                                  double& moved, RTCRay& ray) const;
+};
+
+EmbreeScene::Impl::Impl(const Scene& source) {
+  gather(source);
+  if (bounds.isEmpty()) return;
+  try {
+    build();
+  } catch (...) {  // the destructor does not run for a constructor that throws
+    if (scene) rtcReleaseScene(scene);
+    if (device) rtcReleaseDevice(device);
+    throw;
+  }
+}
+
+void EmbreeScene::Impl::gather(const Scene& source) {
+  for (std::size_t i = 0; i < source.solids.size(); ++i) {
+    const Solid& solid = source.solids[i];
+    if (solid.band.isEmpty()) continue;
+    RaySolid entry;
+    entry.band = solid.band;
+    entry.indexToWorld = solid.band.indexToWorld();
+    entry.worldToIndex = entry.indexToWorld.inverse();
+    entry.blocks = surfaceBlocks(levelset::vdb(entry.band).tree());
+    entry.id = solid.id;
+    entry.index = i;
+    for (const SurfaceBlock& block : entry.blocks)
+      bounds.extendBy(Imath::transform(block.bounds(), entry.indexToWorld));
+    if (!entry.blocks.empty()) solids.push_back(std::move(entry));
+  }
+  if (bounds.isEmpty()) return;
+  centre = bounds.center();
+  scale = 1 / bounds.size().length();
+  const V3d pad(1e-3 / scale);
+  rayBounds = {bounds.min - pad, bounds.max + pad};
+}
+
+void EmbreeScene::Impl::build() {
+  device = rtcNewDevice(nullptr);
+  const auto check = [&] {
+    const RTCError error = rtcGetDeviceError(device);
+    if (error == RTC_ERROR_NONE) return;
+    throw levelset::ResourceLimit(fmt::format(
+        "render: Embree failed with its error {} ({}); use larger voxels or free memory",
+        static_cast<int>(error), error == RTC_ERROR_OUT_OF_MEMORY ? "out of memory" : "other"));
+  };
+  check();
+  scene = rtcNewScene(device);
+  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+  for (RaySolid& solid : solids) {
+    solid.centre = centre;
+    solid.scale = scale;
+    const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+    rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(solid.blocks.size()));
+    rtcSetGeometryUserData(geometry, &solid);
+    rtcSetGeometryBoundsFunction(
+        geometry, [](const RTCBoundsFunctionArguments* args) { boundBlock(args); }, nullptr);
+    rtcSetGeometryIntersectFunction(
+        geometry, [](const RTCIntersectFunctionNArguments* args) { intersectBlock(args); });
+    rtcSetGeometryOccludedFunction(
+        geometry, [](const RTCOccludedFunctionNArguments* args) { occludeBlock(args); });
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    rtcReleaseGeometry(geometry);
+  }
+  rtcCommitScene(scene);
+  check();
+}
+
+std::optional<RayQuery> EmbreeScene::Impl::prepare(const V3d& origin, const V3d& direction,
+                                                   double near, double far, double& moved,
+                                                   RTCRay& ray) const {
+  requireRay(origin, direction);
+  if (!scene) return std::nullopt;
+  const auto entry = entryOf(rayBounds, origin, direction, near, far);
+  if (!entry) return std::nullopt;
+  moved = *entry;
+  RayQuery query;
+  rtcInitIntersectContext(&query.embree);
+  query.origin = origin + direction * moved;
+  query.direction = direction;
+  query.far = far - moved;
+  query.scale = scale;
+
+  const V3d start = (query.origin - centre) * scale;
+  ray = {};
+  ray.org_x = static_cast<float>(start.x);
+  ray.org_y = static_cast<float>(start.y);
+  ray.org_z = static_cast<float>(start.z);
+  ray.dir_x = static_cast<float>(direction.x);
+  ray.dir_y = static_cast<float>(direction.y);
+  ray.dir_z = static_cast<float>(direction.z);
+  // The scene has a diagonal of 1, so nothing lies beyond 2.
+  ray.tfar = static_cast<float>(std::min(2.0, query.far * scale + kFloatPad));
+  ray.mask = ~0u;
+  return query;
+}
+
+EmbreeScene::EmbreeScene(const Scene& scene) : impl_(std::make_unique<Impl>(scene)) {}
+EmbreeScene::~EmbreeScene() = default;
+EmbreeScene::EmbreeScene(EmbreeScene&&) noexcept = default;
+
+Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
+  Hit hit;
+  double moved;
+  RTCRayHit rayHit;
+  auto query = impl_->prepare(origin, direction, near, far, moved, rayHit.ray);
+  if (!query) return hit;
+  rayHit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  rayHit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(impl_->scene, &query->embree, &rayHit);
+  if (!query->solid) return hit;
+
+  const RaySolid& solid = *query->solid;
+  hit.found = true;
+  hit.distance = moved + query->far;
+  hit.position = query->origin + direction * query->far;
+  hit.id = solid.id;
+  hit.solid = solid.index;
+  V3d position;
+  solid.worldToIndex.multVecMatrix(hit.position, position);
+  const SurfaceShape shape = surfaceShape(levelset::vdb(solid.band).tree(), position);
+  // For a rotation with uniform scale, gradients turn as directions do.
+  V3d facet, smooth;
+  solid.indexToWorld.multDirMatrix(shape.trilinearGradient, facet);
+  solid.indexToWorld.multDirMatrix(shape.gradient, smooth);
+  hit.facetNormal = unitOr(facet, unitOr(smooth, -direction));
+  hit.normal = unitOr(smooth, hit.facetNormal);
+  hit.surfaceError = shape.interpolationError;
+  return hit;
+}
+
+bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double near,
+                             double far) const {
+  double moved;
+  RTCRay ray;
+  auto query = impl_->prepare(origin, direction, near, far, moved, ray);
+  if (!query) return false;
+  rtcOccluded1(impl_->scene, &query->embree, &ray);
+  return ray.tfar < 0;
+}
+
+CurvatureSample EmbreeScene::curvatureAt(const Hit& hit) const {
+  const auto solid = std::find_if(impl_->solids.begin(), impl_->solids.end(),
+                                  [&](const RaySolid& s) { return s.index == hit.solid; });
+  if (!hit.found || solid == impl_->solids.end()) return {};
+  V3d position;
+  solid->worldToIndex.multVecMatrix(hit.position, position);
+  const SurfaceShape shape = surfaceShape(levelset::vdb(solid->band).tree(), position);
+  const Curvatures c = curvaturesOf(shape.gradient, shape.hessian);
+  const double h = solid->band.voxelSize();
+  return {c.mean / h, c.gauss / (h * h), c.k1 / h, c.k2 / h};
+}
+
+std::map<std::string, std::string> EmbreeScene::provenance() const {
+  std::string grids, voxelSizes;
+  for (const RaySolid& solid : impl_->solids) {
+    const char* comma = grids.empty() ? "" : ", ";
+    grids += fmt::format("{}{} {:016x}", comma, levelset::vdb(solid.band).getName(),
+                         solid.band.contentHash());
+    voxelSizes += fmt::format("{}{}", comma, solid.band.voxelSize());
+  }
+  return {{"ls:renderer", fmt::format("embree {}", RTC_VERSION_STRING)},
+          {"ls:filter", "trilinear"},
+          {"ls:mode", "exact"},
+          {"ls:normal", "bspline-qi"},
+          {"ls:grid", grids},
+          {"ls:voxelSize", voxelSizes}};
+}
+
+const Box3d& EmbreeScene::bounds() const {
+  return impl_->bounds;
+}
+
+}  // namespace render

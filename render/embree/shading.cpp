@@ -1,0 +1,142 @@
+#include "render/embree/shading.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace render {
+namespace {
+
+using Imath::C3f;
+using Imath::V2d;
+using Imath::V3d;
+
+constexpr double kOcclusionReach =
+    0.25;  // of the scene's diagonal: hollows darken, open sides do not
+constexpr std::uint64_t kAmbient = 1, kShadow = 2;
+
+std::uint64_t scramble(std::uint64_t x) {  // the finaliser of SplitMix64
+  x += 0x9e3779b97f4a7c15ull;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
+  return x ^ (x >> 31);
+}
+
+double unitInterval(std::uint64_t bits) {
+  return static_cast<double>(bits >> 11) * 0x1p-53;
+}
+
+/// Two unit vectors that make a frame with n [Duff17].
+void tangentFrame(const V3d& n, V3d& s, V3d& t) {
+  const double sign = std::copysign(1.0, n.z);
+  const double a = -1 / (sign + n.z), b = n.x * n.y * a;
+  s = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x};
+  t = {b, sign + n.y * n.y * a, -n.y};
+}
+
+/// Around `axis`: cosine-weighted over the hemisphere.
+V3d cosineDirection(const V3d& axis, const V2d& u) {
+  V3d s, t;
+  tangentFrame(axis, s, t);
+  const double r = std::sqrt(u.x), angle = 2 * std::numbers::pi * u.y;
+  return s * (r * std::cos(angle)) + t * (r * std::sin(angle)) + axis * std::sqrt(1 - u.x);
+}
+
+/// Around `axis`: even over the cone of that half angle.
+V3d coneDirection(const V3d& axis, double halfAngle, const V2d& u) {
+  V3d s, t;
+  tangentFrame(axis, s, t);
+  const double cosine = 1 - u.x * (1 - std::cos(halfAngle));
+  const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+  const double angle = 2 * std::numbers::pi * u.y;
+  return s * (sine * std::cos(angle)) + t * (sine * std::sin(angle)) + axis * cosine;
+}
+
+C3f scaled(const C3f& colour, double factor) {
+  return colour * static_cast<float>(factor);
+}
+
+}  // namespace
+
+PixelSequence::PixelSequence(int x, int y, std::uint64_t purpose) {
+  const auto ux = static_cast<std::uint64_t>(x), uy = static_cast<std::uint64_t>(y);
+  const std::uint64_t first = scramble(scramble(ux) ^ (uy << 20) ^ (purpose << 60));
+  start_ = {unitInterval(first), unitInterval(scramble(first))};
+}
+
+V2d PixelSequence::at(int index) const {
+  constexpr double kPlastic = 1.32471795724474602596;
+  const double x = start_.x + index / kPlastic, y = start_.y + index / (kPlastic * kPlastic);
+  return {x - std::floor(x), y - std::floor(y)};
+}
+
+Shader::Shader(const Scene& scene, const EmbreeScene& rays, const EmbreeOptions& options)
+    : scene_(scene), rays_(rays), options_(options), diagonal_(rays.bounds().size().length()) {
+  const V3d forward = scene.camera.axis();
+  const V3d right = forward.cross(scene.camera.up).normalized();
+  up_ = right.cross(forward);
+  const V3d& d = scene.key.direction;
+  key_ = (right * d.x + up_ * d.y - forward * d.z).normalized();
+  fill_ = (right * -d.x + up_ * (0.3 * d.y) - forward * d.z).normalized();
+}
+
+double Shader::openSky(const Frame& frame, int x, int y, int sample) const {
+  const int count = options_.ambientSamples;
+  if (count == 0) return 1;
+  const PixelSequence sequence(x, y, kAmbient);
+  int open = 0;
+  for (int i = 0; i < count; ++i) {
+    V3d d = cosineDirection(frame.normal, sequence.at(sample * count + i));
+    // The smooth normal's hemisphere dips below the facet's plane: mirror what does.
+    const double below = d.dot(frame.facet);
+    if (below < 0) d = (d - frame.facet * (2 * below)).normalized();
+    open += !rays_.isOccluded(frame.start, d, 0, kOcclusionReach * diagonal_);
+  }
+  return static_cast<double>(open) / count;
+}
+
+double Shader::keyLight(const Frame& frame, int x, int y, int sample) const {
+  const int count = options_.shadowSamples;
+  if (count == 0) return std::max(0.0, frame.normal.dot(key_));
+  const PixelSequence sequence(x, y, kShadow);
+  double sum = 0;
+  for (int i = 0; i < count; ++i) {
+    const V3d d = coneDirection(key_, scene_.key.softness, sequence.at(sample * count + i));
+    const double cosine = frame.normal.dot(d);
+    if (cosine <= 0 || frame.facet.dot(d) <= 0) continue;
+    if (!rays_.isOccluded(frame.start, d, 0, 4 * diagonal_)) sum += cosine;
+  }
+  return sum / count;
+}
+
+C3f Shader::colour(const Hit& hit, const V3d& direction, int x, int y, int sample) const {
+  Frame frame{hit.position, hit.normal, hit.facetNormal};
+  if (frame.facet.dot(direction) > 0) frame.facet = -frame.facet;
+  if (frame.normal.dot(frame.facet) < 0) frame.normal = -frame.normal;
+  // Off the interpolant's ripples, and off the rounding of the hit itself.
+  frame.start += frame.facet * (2 * hit.surfaceError + 1e-9 * diagonal_);
+
+  const C3f& albedo = scene_.solids[hit.solid].colour;
+  const double open = openSky(frame, x, y, sample);
+  const double key = scene_.key.strength * keyLight(frame, x, y, sample);
+  const double facing = std::clamp(-direction.dot(frame.normal), 0.0, 1.0);
+  const double upward = 0.5 + 0.5 * frame.normal.dot(up_);
+  const double fill = 0.35 * scene_.ambient * std::max(0.0, frame.normal.dot(fill_));
+  const double rim = 0.25 * scene_.ambient * std::pow(1 - facing, 4) * upward * open;
+  const V3d half = (key_ - direction).normalized();
+  const double gloss =
+      key > 0 ? 0.08 * key * std::pow(std::max(0.0, half.dot(frame.normal)), 32) : 0;
+
+  const C3f sky = C3f(0.86f, 0.94f, 1.06f) * static_cast<float>(upward) +
+                  C3f(0.80f, 0.74f, 0.68f) * static_cast<float>(1 - upward);
+  C3f result = scaled(C3f(1.06f, 1.0f, 0.90f), key);
+  for (int c = 0; c < 3; ++c) {
+    // Light that bounces in a hollow of this colour; 1 where the sky is open.
+    const double lit = open / (1 - static_cast<double>(albedo[c]) * (1 - open));
+    result[c] += static_cast<float>(lit) * static_cast<float>(scene_.ambient) * sky[c];
+  }
+  result += scaled(C3f(0.82f, 0.92f, 1.10f), fill * open);
+  return albedo * result + C3f(static_cast<float>(rim + gloss));
+}
+
+}  // namespace render

@@ -1,0 +1,265 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "render/embree/cubic_root.h"
+#include "render/embree/surface_blocks_vdb.h"
+
+namespace render {
+namespace {
+
+using Imath::V3d;
+using openvdb::Coord;
+using openvdb::FloatTree;
+
+// === Which cells hold the surface
+
+/// Bit z of rows[x][y]: the value at (x, y, z), 0 … 8 each, is negative.
+using SignRows = std::array<std::array<unsigned, 9>, 9>;
+
+SignRows signRowsOf(const SurfaceBlock& block) {
+  SignRows rows;
+  for (unsigned x = 0; x < 9; ++x) {
+    for (unsigned y = 0; y < 9; ++y) {
+      unsigned bits = 0;
+      for (unsigned z = 0; z < 9; ++z) bits |= unsigned{block.value(x, y, z) < 0} << z;
+      rows[x][y] = bits;
+    }
+  }
+  return rows;
+}
+
+/// Fills `crossing` and `extent`; false when no cell crosses.
+bool markCrossingCells(SurfaceBlock& block) {
+  const SignRows rows = signRowsOf(block);
+  block.crossing.fill(0);
+  block.extent = {8, 8, 8, 0, 0, 0};
+  for (unsigned x = 0; x < 8; ++x) {
+    for (unsigned y = 0; y < 8; ++y) {
+      const unsigned some = rows[x][y] | rows[x + 1][y] | rows[x][y + 1] | rows[x + 1][y + 1];
+      const unsigned all = rows[x][y] & rows[x + 1][y] & rows[x][y + 1] & rows[x + 1][y + 1];
+      const unsigned cells = (some | some >> 1) & ~(all & all >> 1) & 0xffu;
+      block.crossing[x] |= std::uint64_t{cells} << (8 * y);
+      for (unsigned z = 0; z < 8; ++z) {
+        if (!(cells >> z & 1)) continue;
+        const unsigned at[3] = {x, y, z};
+        for (std::size_t a = 0; a < 3; ++a) {
+          block.extent[a] = static_cast<std::uint8_t>(std::min<unsigned>(block.extent[a], at[a]));
+          block.extent[a + 3] =
+              static_cast<std::uint8_t>(std::max<unsigned>(block.extent[a + 3], at[a] + 1));
+        }
+      }
+    }
+  }
+  return block.extent[3] != 0;
+}
+
+// === Through a block, cell by cell
+
+/// What a ray sees of one block: a cell and the plane through which it came.
+struct BlockWalk {
+  const SurfaceBlock& block;
+  const IndexRay& ray;
+  double enter, leave;  ///< of the block, clipped to the ray's range
+  int axis = -1;        ///< of the entry plane of the cell; -1: the ray starts inside
+  int cell[3] = {};     ///< index coordinates
+  double t = 0;         ///< at the entry
+
+  [[nodiscard]] bool isForward(int a) const { return ray.direction[a] > 0; }
+  [[nodiscard]] double exitPlane(int a, int k) const {
+    return ray.plane(a, isForward(a) ? k + 1 : k);
+  }
+  [[nodiscard]] double entryPlane(int a, int k) const {
+    return ray.plane(a, isForward(a) ? k : k + 1);
+  }
+
+  bool clip();
+  void findFirstCell();
+  int exitAxis(double& exit) const;
+  [[nodiscard]] BernsteinCubic restrictToRay(double exit, int exitAxis) const;
+};
+
+/// False when the ray misses the block. Of planes met together the last counts as the entry, which
+/// is the order in which findFirstCell and exitAxis take them.
+bool BlockWalk::clip() {
+  for (int a = 0; a < 3; ++a) {
+    const int low = block.origin[a], high = low + 8;
+    if (ray.isParallel[a]) {
+      if (!(ray.origin[a] >= low && ray.origin[a] < high)) return false;
+      continue;
+    }
+    const double in = ray.plane(a, isForward(a) ? low : high);
+    const double out = ray.plane(a, isForward(a) ? high : low);
+    if (in >= enter) {
+      enter = in;
+      axis = a;
+    }
+    leave = std::min(leave, out);
+  }
+  return enter <= leave;
+}
+
+/// The cell in which the walk of the whole grid would enter this block: found by floor, put right
+/// with the planes themselves.
+void BlockWalk::findFirstCell() {
+  t = enter;
+  for (int a = 0; a < 3; ++a) {
+    const int low = block.origin[a], high = low + 7;
+    const int forward = isForward(a) ? 1 : -1;
+    if (a == axis) {
+      cell[a] = forward > 0 ? low : high;
+      continue;
+    }
+    cell[a] = static_cast<int>(
+        std::clamp(std::floor(ray.at(a, t)), static_cast<double>(low), static_cast<double>(high)));
+    if (ray.isParallel[a]) continue;
+    // Planes met at the same parameter are crossed in the order x, y, z.
+    const bool isEarlier = axis >= 0 && a < axis, isLater = axis >= 0 && a > axis;
+    const int last = forward > 0 ? high : low, first = forward > 0 ? low : high;
+    while (cell[a] != last &&
+           (exitPlane(a, cell[a]) < t || (isEarlier && exitPlane(a, cell[a]) == t)))
+      cell[a] += forward;
+    while (cell[a] != first &&
+           (entryPlane(a, cell[a]) > t || (isLater && entryPlane(a, cell[a]) == t)))
+      cell[a] -= forward;
+  }
+}
+
+int BlockWalk::exitAxis(double& exit) const {
+  int result = -1;
+  exit = std::numeric_limits<double>::infinity();
+  for (int a = 0; a < 3; ++a) {
+    if (ray.isParallel[a]) continue;
+    const double out = exitPlane(a, cell[a]);
+    if (out < exit) {
+      exit = out;
+      result = a;
+    }
+  }
+  return result;
+}
+
+/// a at 0 and b at 1, both to the bit: the value on a face is the same from either side.
+double mix(double a, double b, double f) {
+  return a * (1 - f) + b * f;
+}
+
+/// The interpolant between `t` and `exit`: the cubic's blossom at the two ends, since the
+/// interpolant is affine in each coordinate. On the faces the coordinate is 0 or 1 exactly.
+/// @param outAxis  of the face at `exit`; -1 when the ray ends within the cell
+BernsteinCubic BlockWalk::restrictToRay(double exit, int outAxis) const {
+  double p[2][3];
+  for (int a = 0; a < 3; ++a) {
+    const double base = cell[a];
+    p[0][a] = std::clamp(ray.at(a, t) - base, 0.0, 1.0);
+    p[1][a] = std::clamp(ray.at(a, exit) - base, 0.0, 1.0);
+  }
+  if (axis >= 0) p[0][axis] = isForward(axis) ? 0 : 1;
+  if (outAxis >= 0) p[1][outAxis] = isForward(outAxis) ? 1 : 0;
+
+  unsigned c[3];
+  for (int a = 0; a < 3; ++a) c[a] = static_cast<unsigned>(cell[a] - block.origin[a]);
+  double alongX[2][2][2], value[2][2][2];  // [end x][y][z], then [end x][end y][end z]
+  for (unsigned y = 0; y < 2; ++y) {
+    for (unsigned z = 0; z < 2; ++z) {
+      const double v0 = block.value(c[0], c[1] + y, c[2] + z);
+      const double v1 = block.value(c[0] + 1, c[1] + y, c[2] + z);
+      for (int i = 0; i < 2; ++i) alongX[i][y][z] = mix(v0, v1, p[i][0]);
+    }
+  }
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) {
+      const double w0 = mix(alongX[i][0][0], alongX[i][1][0], p[j][1]);
+      const double w1 = mix(alongX[i][0][1], alongX[i][1][1], p[j][1]);
+      for (int k = 0; k < 2; ++k) value[i][j][k] = mix(w0, w1, p[k][2]);
+    }
+  }
+  return {value[0][0][0], (value[0][0][1] + value[0][1][0] + value[1][0][0]) / 3,
+          (value[0][1][1] + value[1][0][1] + value[1][1][0]) / 3, value[1][1][1]};
+}
+
+}  // namespace
+
+IndexRay::IndexRay(const V3d& origin_, const V3d& direction_)
+    : origin(origin_), direction(direction_) {
+  for (int a = 0; a < 3; ++a) {
+    inverse[a] = 1 / direction[a];
+    isParallel[a] = !std::isfinite(inverse[a]);
+  }
+}
+
+Imath::Box3d SurfaceBlock::bounds() const {
+  const V3d base(origin.x(), origin.y(), origin.z());
+  return {base + V3d(extent[0], extent[1], extent[2]), base + V3d(extent[3], extent[4], extent[5])};
+}
+
+std::vector<SurfaceBlock> surfaceBlocks(const FloatTree& tree) {
+  using Leaf = FloatTree::LeafNodeType;
+  // A cell belongs to the block of its lowest corner, so a leaf also reaches into the seven blocks
+  // below it, which need not have leaves of their own.
+  std::vector<Coord> origins;
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
+    for (int n = 0; n < 8; ++n)
+      origins.push_back(leaf->origin() - Coord(8 * (n >> 2), 8 * (n >> 1 & 1), 8 * (n & 1)));
+  std::sort(origins.begin(), origins.end());
+  origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
+
+  std::vector<std::optional<SurfaceBlock>> found(origins.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, origins.size(), 64), [&](const auto& range) {
+    openvdb::tree::ValueAccessor<const FloatTree, false> accessor(tree);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      SurfaceBlock block;
+      block.origin = origins[i];
+      for (unsigned n = 0; n < 8; ++n) {
+        const Coord at =
+            origins[i] + Coord(static_cast<int>(8 * (n >> 2)), static_cast<int>(8 * (n >> 1 & 1)),
+                               static_cast<int>(8 * (n & 1)));
+        const Leaf* leaf = accessor.probeConstLeaf(at);
+        block.leaves[n] = leaf ? leaf->buffer().data() : nullptr;
+        block.tiles[n] = leaf ? 0 : accessor.getValue(at);
+      }
+      if (markCrossingCells(block)) found[i] = block;
+    }
+  });
+  std::vector<SurfaceBlock> blocks;
+  for (const auto& block : found)
+    if (block) blocks.push_back(*block);
+  return blocks;
+}
+
+std::optional<double> findCrossing(const SurfaceBlock& block, const IndexRay& ray, double near,
+                                   double far, Search search) {
+  BlockWalk walk{block, ray, near, far};
+  if (!walk.clip()) return std::nullopt;
+  walk.findFirstCell();
+  for (;;) {
+    double exit;
+    int exitAxis = walk.exitAxis(exit);
+    const int stepAxis = exitAxis;
+    if (!(exit < far)) {
+      exit = far;
+      exitAxis = -1;
+    }
+    const int x = walk.cell[0] - block.origin[0];
+    const int bit = (walk.cell[1] - block.origin[1]) * 8 + walk.cell[2] - block.origin[2];
+    if (block.crossing[static_cast<std::size_t>(x)] >> bit & 1) {
+      const BernsteinCubic cubic = walk.restrictToRay(exit, exitAxis);
+      if (search == Search::AnyCrossing) {
+        if (hasSignChange(cubic)) return walk.t;
+      } else if (const double s = firstSignChange(cubic); s >= 0) {
+        return walk.t + s * (exit - walk.t);
+      }
+    }
+    if (exitAxis < 0) return std::nullopt;
+    walk.cell[stepAxis] += walk.isForward(stepAxis) ? 1 : -1;
+    const int local = walk.cell[stepAxis] - block.origin[stepAxis];
+    if (local < 0 || local > 7) return std::nullopt;
+    walk.axis = stepAxis;
+    walk.t = exit;
+  }
+}
+
+}  // namespace render
