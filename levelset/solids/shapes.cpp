@@ -1,1 +1,218 @@
 #include "levelset/solids/shapes.h"
+
+#include <Imath/ImathBox.h>
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "levelset/error.h"
+#include "levelset/solids/fill_blocks_vdb.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using Imath::V3d;
+
+/// What must be known of a shape before its band is made.
+struct ShapeExtent {
+  Imath::Box3d bounds;
+  double area;  ///< of the surface, to estimate memory
+};
+
+void requireLength(double length, const char* action, const char* name) {
+  if (length > 0 && std::isfinite(length)) return;
+  throw UsageError(
+      fmt::format("{}: {} is {}, it must be a positive, finite length", action, name, length));
+}
+
+void requirePoint(const V3d& point, const char* action, const char* name) {
+  if (std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z)) return;
+  throw UsageError(fmt::format("{}: {} is {},{},{}; its coordinates must be finite", action, name,
+                               point.x, point.y, point.z));
+}
+
+V3d requireAxis(const V3d& axis, const char* action) {
+  requirePoint(axis, action, "the axis");
+  const V3d unit = axis.normalized();
+  if (unit.length2() > 0.5) return unit;
+  throw UsageError(fmt::format("{}: the axis is 0,0,0; give it a direction", action));
+}
+
+void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
+                 const char* action) {
+  const V3d size = extent.bounds.size();
+  const double longest = std::max({size.x, size.y, size.z});
+  if (voxelSize > longest) {
+    throw InvalidInput(fmt::format(
+        "{}: the voxel size {} is larger than the whole shape, whose longest side is {}; "
+        "use smaller voxels",
+        action, voxelSize, longest));
+  }
+  double farthest = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    farthest =
+        std::max({farthest, std::abs(extent.bounds.min[axis]), std::abs(extent.bounds.max[axis])});
+  const double index = farthest / voxelSize + options.halfWidth;
+  if (!(index < 2147475456.0)) {  // 2³¹ less two blocks of the tree
+    throw ResourceLimit(
+        fmt::format("{}: at voxel size {} the shape reaches grid index {:.3g}, beyond 32 bits; use "
+                    "larger voxels "
+                    "or move it towards the origin",
+                    action, voxelSize, index));
+  }
+  // A surface patch of one leaf face meets the leaves within the band and about one leaf more.
+  const double leaves =
+      extent.area / (64 * voxelSize * voxelSize) * (2 * options.halfWidth + 15) / 8;
+  requireMemory(leaves * 2300 + 1e5, options.maxMemory, action);
+}
+
+/// @param phi  exact signed distance at a world position
+template <typename Distance>
+NarrowBand makeShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
+                     const char* action, const Distance& distance) {
+  requireLength(voxelSize, action, "the voxel size");
+  if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth)) {
+    throw UsageError(fmt::format("{}: the half width is {} voxels, it must be at least 1", action,
+                                 options.halfWidth));
+  }
+  requireFits(extent, voxelSize, options, action);
+  report(options.progress, 0, action);
+
+  const auto grid = emptyLevelSet(uniformTransform(voxelSize), options.halfWidth);
+  openvdb::CoordBBox domain;
+  for (int axis = 0; axis < 3; ++axis) {
+    domain.min()[axis] =
+        static_cast<int>(std::floor(extent.bounds.min[axis] / voxelSize - options.halfWidth)) - 1;
+    domain.max()[axis] =
+        static_cast<int>(std::ceil(extent.bounds.max[axis] / voxelSize + options.halfWidth)) + 1;
+  }
+  const auto phi = [&](double i, double j, double k) {
+    return distance(V3d(i * voxelSize, j * voxelSize, k * voxelSize));
+  };
+  if (!BlockFiller(*grid, phi).fill(domain, options.progress, action)) {
+    throw InvalidInput(
+        fmt::format("{}: no grid point lies inside, the shape is too thin for voxels "
+                    "of {}; use smaller voxels",
+                    action, voxelSize));
+  }
+  return makeBand(grid);
+}
+
+Imath::Box3d around(const V3d& center, const V3d& half) {
+  return {center - half, center + half};
+}
+
+/// Half extents of a disc of `radius` about a unit axis.
+V3d discExtent(double radius, const V3d& axis) {
+  V3d half;
+  for (int i = 0; i < 3; ++i) half[i] = radius * std::sqrt(std::max(0.0, 1 - axis[i] * axis[i]));
+  return half;
+}
+
+/// Without std::hypot's guard against overflow, which costs ten times as much.
+double length2d(double u, double v) {
+  return std::sqrt(u * u + v * v);
+}
+
+/// Distance from (u, v) to the quadrant u < 0, v < 0, negative inside.
+double quadrantDistance(double u, double v) {
+  return std::min(std::max(u, v), 0.0) + length2d(std::max(u, 0.0), std::max(v, 0.0));
+}
+
+/// In the half plane of a ring's profile (r ≥ 0 from the axis, z along it): the distance to a disc
+/// of radius `tube` about (radius, 0). A tube wider than its ring is cut by the axis: what the disc
+/// has beyond is the profile of the other side. Then a point whose nearest point of the circle lies
+/// there is nearest to the cusp where the circle meets the axis instead.
+double ringDistance(double r, double z, double radius, double tube) {
+  const double toCenter = length2d(r - radius, z);
+  if (tube > radius && tube * (radius - r) > radius * toCenter) {
+    const double cusp = std::sqrt((tube - radius) * (tube + radius));
+    return std::copysign(length2d(r, std::abs(z) - cusp), toCenter - tube);
+  }
+  return toCenter - tube;
+}
+
+}  // namespace
+
+NarrowBand makeSphere(double radius, const V3d& center, double voxelSize,
+                      const ShapeOptions& options) {
+  const char* action = "sphere";
+  requireLength(radius, action, "the radius");
+  requirePoint(center, action, "the centre");
+  return makeShape({around(center, V3d(radius)), 4 * std::numbers::pi * radius * radius}, voxelSize,
+                   options, action, [=](const V3d& p) { return (p - center).length() - radius; });
+}
+
+NarrowBand makeBox(const V3d& size, const V3d& center, double voxelSize,
+                   const ShapeOptions& options) {
+  const char* action = "box";
+  for (int axis = 0; axis < 3; ++axis) requireLength(size[axis], action, "a side");
+  requirePoint(center, action, "the centre");
+  const V3d half = size / 2;
+  const double area = 2 * (size.x * size.y + size.y * size.z + size.z * size.x);
+  return makeShape({around(center, half), area}, voxelSize, options, action, [=](const V3d& p) {
+    const V3d q(std::abs(p.x - center.x) - half.x, std::abs(p.y - center.y) - half.y,
+                std::abs(p.z - center.z) - half.z);
+    const V3d outside(std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0));
+    return outside.length() + std::min(std::max({q.x, q.y, q.z}), 0.0);
+  });
+}
+
+NarrowBand makeTorus(double radius, double tube, const V3d& center, const V3d& axis,
+                     double voxelSize, const ShapeOptions& options) {
+  const char* action = "torus";
+  requireLength(radius, action, "the radius");
+  requireLength(tube, action, "the tube radius");
+  requirePoint(center, action, "the centre");
+  const V3d n = requireAxis(axis, action);
+  const double pi = std::numbers::pi;
+  return makeShape({around(center, discExtent(radius, n) + V3d(tube)), 4 * pi * pi * radius * tube},
+                   voxelSize, options, action, [=](const V3d& p) {
+                     const double z = (p - center) ^ n;
+                     const double r = (p - center - n * z).length();
+                     return ringDistance(r, z, radius, tube);
+                   });
+}
+
+NarrowBand makeCylinder(double radius, double height, const V3d& center, const V3d& axis,
+                        double voxelSize, const ShapeOptions& options) {
+  const char* action = "cylinder";
+  requireLength(radius, action, "the radius");
+  requireLength(height, action, "the height");
+  requirePoint(center, action, "the centre");
+  const V3d n = requireAxis(axis, action);
+  const V3d cap(std::abs(n.x), std::abs(n.y), std::abs(n.z));
+  return makeShape({around(center, discExtent(radius, n) + cap * (height / 2)),
+                    2 * std::numbers::pi * radius * (radius + height)},
+                   voxelSize, options, action, [=](const V3d& p) {
+                     const double z = (p - center) ^ n;
+                     const double r = (p - center - n * z).length();
+                     return quadrantDistance(r - radius, std::abs(z) - height / 2);
+                   });
+}
+
+NarrowBand makeCapsule(const V3d& from, const V3d& to, double radius, double voxelSize,
+                       const ShapeOptions& options) {
+  const char* action = "capsule";
+  requireLength(radius, action, "the radius");
+  requirePoint(from, action, "the first end");
+  requirePoint(to, action, "the second end");
+  const V3d along = to - from;
+  const double squaredLength = along.length2();
+  Imath::Box3d bounds(from);
+  bounds.extendBy(to);
+  bounds.min -= V3d(radius);
+  bounds.max += V3d(radius);
+  const double area = 2 * std::numbers::pi * radius * (2 * radius + std::sqrt(squaredLength));
+  return makeShape({bounds, area}, voxelSize, options, action, [=](const V3d& p) {
+    // Both ends in one place: a sphere.
+    const double t =
+        squaredLength > 0 ? std::clamp(((p - from) ^ along) / squaredLength, 0.0, 1.0) : 0.0;
+    return (p - from - along * t).length() - radius;
+  });
+}
+
+}  // namespace levelset

@@ -1,0 +1,144 @@
+#pragma once
+
+// Interpolation on the samples of a tree, for our own .cpp files: the sampler and the resampling
+// kernels share it.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "levelset/vdb.h"
+
+namespace levelset {
+
+/// Weights of N = 2 (linear) or N = 4 (Catmull-Rom) samples at fraction t in [0, 1) past the sample
+/// that lies at or before the position, and their derivatives by t. They sum to 1 and to 0.
+template <int N>
+struct AxisWeights {
+  std::array<double, N> weight, slope;
+
+  explicit AxisWeights(double t) {
+    static_assert(N == 2 || N == 4);
+    if constexpr (N == 2) {
+      weight = {1 - t, t};
+      slope = {-1, 1};
+    } else {
+      weight = {t * (-0.5 + t * (1 - 0.5 * t)), 1 + t * t * (1.5 * t - 2.5),
+                t * (0.5 + t * (2 - 1.5 * t)), t * t * (0.5 * t - 0.5)};
+      slope = {-0.5 + t * (2 - 1.5 * t), t * (4.5 * t - 5), 0.5 + t * (4 - 4.5 * t),
+               t * (1.5 * t - 1)};
+    }
+  }
+};
+
+/// The N³ samples about an index position, x slowest, and where the position lies among them.
+template <int N>
+struct SampleBlock {
+  static constexpr int kBefore = N / 2 - 1;  ///< samples before the one at or before the position
+  openvdb::Coord origin;                     ///< of the first sample
+  openvdb::Vec3d fraction;
+  std::array<float, N * N * N> values;
+
+  template <typename Accessor>
+  SampleBlock(const Accessor& accessor, const openvdb::Vec3d& index) : SampleBlock(index) {
+    fetch(accessor);
+  }
+
+  /// Without values: to ask only whether all samples are active.
+  explicit SampleBlock(const openvdb::Vec3d& index) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double cell = std::fmax(-kFarthest, std::fmin(kFarthest, std::floor(index[axis])));
+      origin[axis] = static_cast<int>(cell) - kBefore;
+      fraction[axis] = std::clamp(index[axis] - cell, 0.0, 1.0);
+    }
+  }
+
+  template <typename Accessor>
+  [[nodiscard]] bool allActive(const Accessor& accessor) const {
+    if (isInOneLeaf()) {
+      const auto* leaf = accessor.probeConstLeaf(origin);
+      if (!leaf) return false;
+      const std::uint64_t pattern = rowPattern();
+      for (int x = 0; x < N; ++x) {
+        const auto row = static_cast<openvdb::Index>((origin[0] & 7) + x);
+        const auto word = leaf->valueMask().template getWord<std::uint64_t>(row);
+        if ((word & pattern) != pattern) return false;
+      }
+      return true;
+    }
+    openvdb::Coord c;
+    for (int x = 0; x < N; ++x)
+      for (int y = 0; y < N; ++y)
+        for (int z = 0; z < N; ++z)
+          if (!accessor.isValueOn(origin.offsetBy(x, y, z))) return false;
+    return true;
+  }
+
+  [[nodiscard]] double value() const {
+    const AxisWeights<N> wx(fraction[0]), wy(fraction[1]), wz(fraction[2]);
+    double sum = 0;
+    for (int x = 0; x < N; ++x)
+      for (int y = 0; y < N; ++y) sum += wx.weight[x] * wy.weight[y] * row(x, y, wz.weight);
+    return sum;
+  }
+
+  /// By index coordinates.
+  [[nodiscard]] openvdb::Vec3d gradient() const {
+    const AxisWeights<N> wx(fraction[0]), wy(fraction[1]), wz(fraction[2]);
+    openvdb::Vec3d sum(0, 0, 0);
+    for (int x = 0; x < N; ++x) {
+      for (int y = 0; y < N; ++y) {
+        const double along = row(x, y, wz.weight);
+        sum[0] += wx.slope[x] * wy.weight[y] * along;
+        sum[1] += wx.weight[x] * wy.slope[y] * along;
+        sum[2] += wx.weight[x] * wy.weight[y] * row(x, y, wz.slope);
+      }
+    }
+    return sum;
+  }
+
+ private:
+  // Positions beyond any tree, NaN among them, still give a valid coordinate.
+  static constexpr double kFarthest = 2147483000.0;
+
+  [[nodiscard]] bool isInOneLeaf() const {
+    return (origin[0] & 7) <= 8 - N && (origin[1] & 7) <= 8 - N && (origin[2] & 7) <= 8 - N;
+  }
+
+  /// Bits of N × N voxels in one x-slice of a leaf's mask (8 y rows of 8 z bits).
+  [[nodiscard]] std::uint64_t rowPattern() const {
+    const std::uint64_t bits = ((std::uint64_t{1} << N) - 1) << (origin[2] & 7);
+    std::uint64_t pattern = 0;
+    for (int y = 0; y < N; ++y) pattern |= bits << (8 * ((origin[1] & 7) + y));
+    return pattern;
+  }
+
+  [[nodiscard]] double row(int x, int y, const std::array<double, N>& weights) const {
+    const float* samples = values.data() + (x * N + y) * N;
+    double sum = 0;
+    for (int z = 0; z < N; ++z) sum += weights[z] * static_cast<double>(samples[z]);
+    return sum;
+  }
+
+  template <typename Accessor>
+  void fetch(const Accessor& accessor) {
+    float* out = values.data();
+    if (isInOneLeaf()) {
+      const auto* leaf = accessor.probeConstLeaf(origin);
+      if (!leaf) {
+        values.fill(accessor.getValue(origin));
+        return;
+      }
+      const float* samples = leaf->buffer().data() + leaf->coordToOffset(origin);
+      for (int x = 0; x < N; ++x)
+        for (int y = 0; y < N; ++y, out += N) std::copy_n(samples + x * 64 + y * 8, N, out);
+      return;
+    }
+    for (int x = 0; x < N; ++x)
+      for (int y = 0; y < N; ++y)
+        for (int z = 0; z < N; ++z) *out++ = accessor.getValue(origin.offsetBy(x, y, z));
+  }
+};
+
+}  // namespace levelset

@@ -1,0 +1,151 @@
+#pragma once
+
+// Bands of distances that are given by a formula, for our own .cpp files.
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "levelset/progress.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+
+/// Fills a tree with a function that changes by at most one world unit per world unit. A block
+/// whose centre is further from the zero set than its corners are from its centre, by the band's
+/// width, holds no voxel of the band: it becomes a tile, and only the blocks near the surface are
+/// looked into. Blocks are independent, so the bits do not depend on the number of threads.
+/// @tparam Phi  double(double i, double j, double k): world distance at an index position
+template <typename Phi>
+class BlockFiller {
+ public:
+  using Leaf = openvdb::FloatTree::LeafNodeType;
+
+  BlockFiller(openvdb::FloatGrid& grid, const Phi& phi)
+      : tree_(grid.tree()),
+        phi_(phi),
+        voxelSize_(grid.voxelSize()[0]),
+        background_(grid.background()) {}
+
+  /// Fills the 128³ blocks that meet `domain`; the rest stays as it was.
+  /// @return whether any grid point lies inside
+  bool fill(const openvdb::CoordBBox& domain, const Progress& progress, const char* action) {
+    const openvdb::Coord first = domain.min() & ~(kRoot - 1);
+    for (int x = first[0]; x <= domain.max()[0]; x += kRoot)
+      for (int y = first[1]; y <= domain.max()[1]; y += kRoot)
+        for (int z = first[2]; z <= domain.max()[2]; z += kRoot)
+          descend(openvdb::Coord(x, y, z), kRoot, domain);
+    // In slices, so that a cancel is heard in time and from one thread.
+    constexpr std::size_t kSlice = 64;
+    std::vector<Filled> slice(std::min(kSlice, surfaceBlocks_.size()));
+    for (std::size_t from = 0; from < surfaceBlocks_.size(); from += kSlice) {
+      const std::size_t count = std::min(kSlice, surfaceBlocks_.size() - from);
+      tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+        slice[i] = {};
+        refine(surfaceBlocks_[from + i], kLower, slice[i]);
+      });
+      for (std::size_t i = 0; i < count; ++i) insert(slice[i]);
+      report(progress,
+             static_cast<double>(from + count) / static_cast<double>(surfaceBlocks_.size()),
+             action);
+    }
+    return anyInside_;
+  }
+
+ private:
+  static constexpr int kRoot = 4096, kLower = 128, kLeaf = 8;  // edges of the tree's nodes
+  enum class Side { Inside, Outside, Near };
+
+  struct Filled {
+    std::vector<std::unique_ptr<Leaf>> leaves;
+    std::vector<openvdb::Coord> inside;  ///< leaf-sized tiles
+    bool anyInside = false;
+  };
+
+  [[nodiscard]] Side sideOf(const openvdb::Coord& origin, int edge) const {
+    const double half = 0.5 * (edge - 1);
+    const double value = phi_(origin[0] + half, origin[1] + half, origin[2] + half);
+    if (std::abs(value) - half * std::sqrt(3.0) * voxelSize_ < static_cast<double>(background_))
+      return Side::Near;
+    return value < 0 ? Side::Inside : Side::Outside;
+  }
+
+  /// From root blocks down to blocks of kLower, serially: there are few.
+  void descend(const openvdb::Coord& origin, int edge, const openvdb::CoordBBox& domain) {
+    if (!domain.hasOverlap(openvdb::CoordBBox::createCube(origin, edge))) return;
+    const Side side = sideOf(origin, edge);
+    if (side == Side::Outside) return;
+    if (side == Side::Inside && (edge == kRoot || edge == kLower)) {
+      tree_.addTile(edge == kRoot ? 3 : 2, origin, -background_, false);
+      anyInside_ = true;
+    } else if (edge == kLower) {
+      surfaceBlocks_.push_back(origin);
+    } else {
+      forOctants(origin, edge, [&](const openvdb::Coord& c) { descend(c, edge / 2, domain); });
+    }
+  }
+
+  void refine(const openvdb::Coord& origin, int edge, Filled& out) const {
+    const Side side = sideOf(origin, edge);
+    if (side == Side::Outside) return;
+    if (edge > kLeaf) {
+      forOctants(origin, edge, [&](const openvdb::Coord& c) { refine(c, edge / 2, out); });
+    } else if (side == Side::Inside) {
+      out.inside.push_back(origin);
+      out.anyInside = true;
+    } else {
+      sample(origin, out);
+    }
+  }
+
+  void sample(const openvdb::Coord& origin, Filled& out) const {
+    auto leaf = std::make_unique<Leaf>(origin, background_, false);
+    float* values = leaf->buffer().data();
+    bool inside = false;
+    openvdb::Index n = 0;
+    for (int x = 0; x < kLeaf; ++x)
+      for (int y = 0; y < kLeaf; ++y)
+        for (int z = 0; z < kLeaf; ++z, ++n) {
+          const auto value = static_cast<float>(phi_(origin[0] + x, origin[1] + y, origin[2] + z));
+          inside |= value < 0;
+          if (std::abs(value) < background_) {
+            values[n] = value;
+            leaf->setValueOn(n);
+          } else {
+            values[n] = std::copysign(background_, value);
+          }
+        }
+    out.anyInside |= inside;
+    if (!leaf->isEmpty())
+      out.leaves.push_back(std::move(leaf));
+    else if (inside)
+      out.inside.push_back(origin);
+  }
+
+  void insert(Filled& filled) {
+    for (const openvdb::Coord& c : filled.inside) tree_.addTile(1, c, -background_, false);
+    for (auto& leaf : filled.leaves) tree_.addLeaf(leaf.release());
+    anyInside_ |= filled.anyInside;
+    filled = {};
+  }
+
+  template <typename Visit>
+  static void forOctants(const openvdb::Coord& origin, int edge, const Visit& visit) {
+    const int half = edge / 2;
+    for (int i = 0; i < 8; ++i)
+      visit(origin.offsetBy((i & 4) ? half : 0, (i & 2) ? half : 0, (i & 1) ? half : 0));
+  }
+
+  openvdb::FloatTree& tree_;
+  const Phi& phi_;
+  double voxelSize_;
+  float background_;
+  std::vector<openvdb::Coord> surfaceBlocks_;
+  bool anyInside_ = false;
+};
+
+}  // namespace levelset
