@@ -1,0 +1,158 @@
+#include <fmt/core.h>
+#include <oneapi/tbb/global_control.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "apps/cli/progress_line.h"
+#include "apps/cli/watch.h"
+#include "apps/pipeline/chain.h"
+#include "apps/pipeline/help.h"
+#include "apps/pipeline/report.h"
+#include "apps/pipeline/runner.h"
+#include "apps/pipeline/units.h"
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+
+namespace {
+
+using levelset::ExitCode;
+
+void printAll(const std::string& text) {
+  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
+    throw levelset::IoError(
+        fmt::format("levelsmith: standard output cannot be written: {}", std::strerror(errno)));
+}
+
+bool claimsStandardOutput(const pipeline::Chain& chain) {
+  if (chain.globals.contains("report") && chain.globals.at("report") == "-") return true;
+  for (const pipeline::Action& action : chain.actions) {
+    const auto& claims = action.op->usesStandardOutput;
+    if (claims && !action.options.contains("json") &&
+        claims(pipeline::Invocation(*action.op, action.options)))
+      return true;
+  }
+  return false;
+}
+
+bool claimsJson(const pipeline::Chain& chain) {
+  for (const pipeline::Action& action : chain.actions)
+    if (action.options.contains("json")) return true;
+  return false;
+}
+
+cli::ProgressStyle progressStyle(const pipeline::Chain& chain) {
+  const auto it = chain.globals.find("progress");
+  const std::string wanted = it == chain.globals.end() ? "auto" : it->second;
+  if (wanted == "json") return cli::ProgressStyle::Json;
+  if (wanted == "off" || chain.globals.contains("quiet") || !isatty(STDERR_FILENO))
+    return cli::ProgressStyle::Off;
+  return cli::ProgressStyle::Bar;
+}
+
+int runChain(const pipeline::Chain& chain) {
+  const auto& globals = chain.globals;
+  const std::size_t maxMemory = globals.contains("max-memory")
+                                    ? pipeline::parseBytes(globals.at("max-memory"), "--max-memory")
+                                    : cli::defaultMemoryLimit();
+  cli::startWatch(maxMemory);
+  std::unique_ptr<tbb::global_control> threads;
+  if (globals.contains("threads")) {
+    threads = std::make_unique<tbb::global_control>(
+        tbb::global_control::max_allowed_parallelism,
+        static_cast<std::size_t>(pipeline::parseInteger(globals.at("threads"), "--threads")));
+  }
+  if (globals.contains("no-clobber")) levelset::setClobberDefault(false);
+  const bool quiet = globals.contains("quiet"), verbose = globals.contains("verbose"),
+             dryRun = globals.contains("dry-run");
+  const bool dataOnly = claimsStandardOutput(chain), json = claimsJson(chain);
+
+  cli::ProgressLine line(progressStyle(chain), chain.actions.size());
+  pipeline::RunSettings settings;
+  settings.dryRun = dryRun;
+  settings.maxMemory = maxMemory;
+  settings.measureErrors = verbose || globals.contains("report");
+  settings.progress = [&](std::size_t index, const std::string& action, double fraction) {
+    line.update(index, action, fraction);
+  };
+  settings.print = [&](const std::string& text) {
+    line.clear();
+    // Data for programs and text for people do not mix on one stream.
+    if (dataOnly || (json && !text.starts_with("{")))
+      fmt::print(stderr, "{}", text);
+    else
+      printAll(text);
+  };
+  settings.warn = [&](const std::string& sentence) {
+    line.clear();
+    if (!quiet) fmt::print(stderr, "levelsmith: warning: {}\n", sentence);
+  };
+  settings.note = [&](const std::string& sentence) {
+    line.clear();
+    if (!quiet) fmt::print(stderr, "levelsmith: {}\n", sentence);
+  };
+  pipeline::RunReport report;
+  const auto finish = [&] {
+    line.clear();
+    if (verbose || dryRun)
+      for (const pipeline::StepReport& step : report.steps)
+        fmt::print(stderr, "{}\n", pipeline::stepLine(step, dryRun));
+    if (globals.contains("report") && !dryRun) pipeline::writeReport(globals.at("report"), report);
+  };
+  try {
+    pipeline::run(chain, settings, report);
+  } catch (const levelset::Error&) {
+    finish();
+    throw;
+  }
+  finish();
+  return static_cast<int>(ExitCode::Done);
+}
+
+int levelsmith(const std::vector<std::string>& words) {
+  if (words.empty() || words[0] == "--help" || words[0] == "-h") {
+    printAll(pipeline::helpOverview());
+    return words.empty() ? static_cast<int>(ExitCode::Usage) : 0;
+  }
+  if (words[0] == "--version") {
+    printAll("levelsmith " LEVELSMITH_VERSION "\n");
+    return 0;
+  }
+  if (words[0] == "help") {
+    printAll(pipeline::help({words.begin() + 1, words.end()}));
+    return 0;
+  }
+  return runChain(pipeline::parseChain(words));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  int code = 0;
+  try {
+    code = levelsmith({argv + 1, argv + argc});
+  } catch (const levelset::Error& error) {
+    fmt::print(stderr, "levelsmith: {}\n", error.what());
+    code = static_cast<int>(error.exitCode());
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "levelsmith: memory ran out; use larger voxels or a narrower band\n");
+    code = static_cast<int>(ExitCode::Resource);
+  } catch (const std::exception& error) {
+    fmt::print(
+        stderr,
+        "levelsmith: unexpected failure: {}; please report it with the command that caused it\n",
+        error.what());
+    code = static_cast<int>(ExitCode::Input);
+  }
+  std::fflush(stderr);
+  levelset::removeTemporaryFiles();
+  // The watching thread may be anywhere; nothing is left to be torn down.
+  if (std::fflush(stdout) != 0 && code == 0) code = static_cast<int>(ExitCode::File);
+  _exit(code);
+}

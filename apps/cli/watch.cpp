@@ -1,0 +1,73 @@
+#include "apps/cli/watch.h"
+
+#include <pthread.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <fstream>
+#include <string>
+#include <thread>
+
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+
+namespace cli {
+namespace {
+
+[[noreturn]] void endNow(const char* sentence, int code) {
+  levelset::removeTemporaryFiles();
+  (void)!write(STDERR_FILENO, sentence, std::strlen(sentence));
+  _exit(code);
+}
+
+std::size_t residentBytes() {
+  std::ifstream statm("/proc/self/statm");
+  std::size_t pages = 0, resident = 0;
+  statm >> pages >> resident;
+  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+}
+
+void watch(sigset_t signals, std::size_t maxBytes) {
+  constexpr timespec kInterval{0, 50'000'000};
+  for (;;) {
+    const int signal = sigtimedwait(&signals, nullptr, &kInterval);
+    if (signal == SIGINT)
+      endNow("\nlevelsmith: interrupted; unfinished files are removed\n",
+             static_cast<int>(levelset::ExitCode::Interrupted));
+    if (signal > 0)
+      endNow("\nlevelsmith: ended by a signal; unfinished files are removed\n", 128 + signal);
+    if (residentBytes() > maxBytes) {
+      endNow(
+          "\nlevelsmith: memory in use passes --max-memory; use larger voxels or a narrower band, "
+          "or raise it\n",
+          static_cast<int>(levelset::ExitCode::Resource));
+    }
+  }
+}
+
+}  // namespace
+
+void startWatch(std::size_t maxBytes) {
+  std::signal(SIGPIPE, SIG_IGN);
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, signal);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  std::thread(watch, signals, maxBytes).detach();
+}
+
+std::size_t defaultMemoryLimit() {
+  std::ifstream meminfo("/proc/meminfo");
+  for (std::string line; std::getline(meminfo, line);) {
+    if (line.starts_with("MemAvailable:"))
+      return static_cast<std::size_t>(0.8 * 1024 *
+                                      static_cast<double>(std::atoll(line.c_str() + 13)));
+  }
+  return static_cast<std::size_t>(-1);
+}
+
+}  // namespace cli

@@ -1,0 +1,291 @@
+#include "apps/pipeline/chain.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+
+#include "apps/pipeline/invocation.h"
+#include "apps/pipeline/units.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::UsageError;
+
+/// `--name`, but not a negative number, a bare `-` or an operand.
+bool isOption(const std::string& token) {
+  return token.size() > 1 && token[0] == '-' &&
+         !(token[1] == '.' || (token[1] >= '0' && token[1] <= '9'));
+}
+
+std::vector<std::string> namesOf(const std::vector<Param>& params) {
+  std::vector<std::string> names;
+  for (const Param& param : params) names.push_back(param.name);
+  return names;
+}
+
+bool findIn(const std::vector<Param>& params, const std::string& name) {
+  return std::any_of(params.begin(), params.end(), [&](const Param& p) { return p.name == name; });
+}
+
+/// By full name, or by a beginning that only one parameter has.
+const Param& matchParam(const std::vector<Param>& params, const std::string& name,
+                        const std::string& who) {
+  std::vector<const Param*> begun;
+  for (const Param& param : params) {
+    if (param.name == name) return param;
+    if (!name.empty() && param.name.starts_with(name)) begun.push_back(&param);
+  }
+  if (begun.size() == 1) return *begun[0];
+  std::string hint;
+  if (begun.size() > 1) {
+    hint = fmt::format("; it may mean --{} or --{}", begun[0]->name, begun[1]->name);
+  } else if (const std::string guess = didYouMean(name, namesOf(params)); !guess.empty()) {
+    hint = fmt::format("; did you mean --{}?", guess);
+  } else if (who != "levelsmith" && findIn(globalParams(), name)) {
+    hint = fmt::format("; --{} belongs before the first action", name);
+  } else if (who != "levelsmith") {
+    hint = fmt::format("; `levelsmith help {}` lists its options", who);
+  } else {
+    hint = "; `levelsmith help` lists the options";
+  }
+  throw UsageError(fmt::format("{}: there is no option --{}{}", who, name, hint));
+}
+
+struct Reader {
+  const std::vector<std::string>& tokens;
+  std::size_t next = 0;
+
+  [[nodiscard]] bool atEnd() const { return next >= tokens.size(); }
+  [[nodiscard]] bool atBang() const { return !atEnd() && tokens[next] == "!"; }
+
+  /// Reads `--name value`, `--name=value` or a flag into `options`.
+  void readOption(const std::vector<Param>& params, const std::string& who,
+                  std::map<std::string, std::string>& options) {
+    std::string token = tokens[next++];
+    if (token == "-v") token = "--verbose";
+    if (token == "-q") token = "--quiet";
+    if (!token.starts_with("--")) {
+      throw UsageError(
+          fmt::format("{}: '{}' is not an option; options begin with two dashes", who, token));
+    }
+    const std::size_t equals = token.find('=');
+    const Param& param =
+        matchParam(params, token.substr(2, equals == std::string::npos ? equals : equals - 2), who);
+    const std::string where = who + ": --" + param.name;
+    if (options.contains(param.name)) throw UsageError(where + ": is given twice");
+    if (param.type == ParamType::Flag) {
+      if (equals != std::string::npos) throw UsageError(where + ": is a flag and takes no value");
+      options[param.name] = "true";
+      return;
+    }
+    std::string value;
+    if (equals != std::string::npos) {
+      value = token.substr(equals + 1);
+    } else {
+      if (atEnd() || atBang() || tokens[next].starts_with("--")) {
+        throw UsageError(
+            fmt::format("{}: needs a value: --{} {}", where, param.name, placeholder(param)));
+      }
+      value = tokens[next++];
+    }
+    checkText(param, value, where);
+    options[param.name] = value;
+  }
+};
+
+const Operator& matchOperator(const std::string& name) {
+  if (const Operator* op = findOperator(name)) return *op;
+  std::vector<std::string> names{"help"};
+  for (const Operator& op : operators()) names.push_back(op.name);
+  const std::string guess = didYouMean(name, names);
+  throw UsageError(fmt::format("levelsmith: there is no action '{}'{}", name,
+                               guess.empty() ? "; `levelsmith help` lists them"
+                                             : fmt::format("; did you mean '{}'?", guess)));
+}
+
+std::string operandName(const std::string& token, const std::string& who) {
+  if (token.size() < 2) throw UsageError(fmt::format("{}: '@' needs a name behind it", who));
+  return token.substr(1);
+}
+
+Action readAction(Reader& reader) {
+  Action action;
+  action.op = &matchOperator(reader.tokens[reader.next++]);
+  const Operator& op = *action.op;
+  std::vector<Param> params = op.params;
+  if (op.flow == Flow::Makes)
+    params.push_back({.name = "as", .type = ParamType::Text, .doc = "name the result"});
+  std::vector<std::string> positional;
+  while (!reader.atEnd() && !reader.atBang()) {
+    const std::string& token = reader.tokens[reader.next];
+    if (token.starts_with('@')) {
+      action.operandNames.push_back(operandName(token, op.name));
+      ++reader.next;
+    } else if (isOption(token)) {
+      reader.readOption(params, op.name, action.options);
+    } else {
+      positional.push_back(token);
+      ++reader.next;
+    }
+  }
+  for (std::size_t i = 0; i < positional.size(); ++i) {
+    const auto param = std::find_if(op.params.begin(), op.params.end(), [&](const Param& p) {
+      return p.position == static_cast<int>(i);
+    });
+    if (param == op.params.end()) {
+      throw UsageError(
+          fmt::format("{}: what is '{}' for? separate actions with a lone '!', name operands "
+                      "with '@'",
+                      op.name, positional[i]));
+    }
+    const std::string where = op.name + ": " + param->name;
+    if (action.options.contains(param->name)) throw UsageError(where + ": is given twice");
+    checkText(*param, positional[i], where);
+    action.options[param->name] = positional[i];
+  }
+  for (const Param& param : op.params) {
+    if (param.required && !action.options.contains(param.name)) {
+      throw UsageError(fmt::format("{}: needs {}{} {}", op.name, param.position >= 0 ? "" : "--",
+                                   param.name, placeholder(param)));
+    }
+  }
+  if (const auto it = action.options.find("as"); it != action.options.end()) {
+    action.resultName = it->second.starts_with('@') ? it->second.substr(1) : it->second;
+    action.options.erase(it);
+  }
+  return action;
+}
+
+/// Follows the kinds of values through the chain, as the run will follow the values.
+class KindChecker {
+ public:
+  void visit(const Action& action) {
+    const Operator& op = *action.op;
+    const std::vector<Kind> operands = takeOperands(action);
+    for (std::size_t i = 0; i < operands.size(); ++i) {
+      const std::vector<Kind>& allowed = op.operands[std::min(i, op.operands.size() - 1)];
+      if (std::find(allowed.begin(), allowed.end(), operands[i]) == allowed.end())
+        throw UsageError(mismatch(op, i, operands[i], allowed));
+    }
+    if (op.flow == Flow::PassesThrough) return;
+    const Kind result = op.resultKind ? op.resultKind(probe(action, operands)) : Kind::Band;
+    stack_.push_back(result);
+    if (action.resultName.empty()) return;
+    if (!names_.emplace(action.resultName, result).second) {
+      throw UsageError(
+          fmt::format("{}: the name '{}' is taken; values do not change, so choose another",
+                      op.name, action.resultName));
+    }
+  }
+
+ private:
+  std::vector<Kind> takeOperands(const Action& action) {
+    const Operator& op = *action.op;
+    std::vector<Kind> named;
+    for (const std::string& name : action.operandNames) {
+      const auto it = names_.find(name);
+      if (it == names_.end()) {
+        std::vector<std::string> known;
+        for (const auto& entry : names_) known.push_back(entry.first);
+        const std::string guess = didYouMean(name, known);
+        throw UsageError(fmt::format("{}: nothing is named '@{}'{}", op.name, name,
+                                     guess.empty() ? "; give an earlier result that name with --as"
+                                                   : fmt::format("; did you mean '@{}'?", guess)));
+      }
+      named.push_back(it->second);
+    }
+    if (named.size() > op.operands.size() && !op.takesMore) {
+      throw UsageError(fmt::format("{}: takes {} operand{}, not {}", op.name, op.operands.size(),
+                                   op.operands.size() == 1 ? "" : "s", named.size()));
+    }
+    if (named.size() >= op.operands.size()) return named;
+    const std::size_t missing = op.operands.size() - named.size();
+    if (stack_.size() < missing) {
+      if (op.operandsOptional) return named;
+      throw UsageError(
+          fmt::format("{}: needs {} operand{} and finds {}; read or make {} first, or name {} with "
+                      "'@'",
+                      op.name, op.operands.size(), op.operands.size() == 1 ? "" : "s",
+                      stack_.size() + named.size(), missing == 1 ? "one" : "them",
+                      missing == 1 ? "it" : "them"));
+    }
+    std::vector<Kind> operands(stack_.end() - static_cast<std::ptrdiff_t>(missing), stack_.end());
+    if (op.flow == Flow::Makes) stack_.resize(stack_.size() - missing);
+    operands.insert(operands.end(), named.begin(), named.end());
+    return operands;
+  }
+
+  static std::string mismatch(const Operator& op, std::size_t index, Kind found,
+                              const std::vector<Kind>& allowed) {
+    const char* remedy = "";
+    if (found == Kind::Mesh && allowed == std::vector{Kind::Band})
+      remedy = "; put 'level-set' before it";
+    if (found == Kind::Band && allowed == std::vector{Kind::Mesh})
+      remedy = "; put 'mesh' before it";
+    return fmt::format("{}: operand {} is a {}, a {} is needed{}", op.name, index + 1,
+                       kindName(found), kindName(allowed[0]), remedy);
+  }
+
+  static Invocation probe(const Action& action, const std::vector<Kind>& kinds) {
+    Invocation invocation(*action.op, action.options);
+    for (Kind kind : kinds) invocation.operands.emplace_back(Plan{.kind = kind});
+    return invocation;
+  }
+
+  std::vector<Kind> stack_;
+  std::map<std::string, Kind> names_;
+};
+
+using StreamUse = std::function<bool(const Invocation&)> Operator::*;
+
+/// Two actions that claim the same standard stream for data would garble each other.
+void checkStandardStream(const Chain& chain, StreamUse use, const char* stream,
+                         std::string firstUser) {
+  for (const Action& action : chain.actions) {
+    const auto& claims = action.op->*use;
+    if (!claims || !claims(Invocation(*action.op, action.options))) continue;
+    if (!firstUser.empty()) {
+      throw UsageError(
+          fmt::format("{}: standard {} is used already, by {}; use a file for one of them",
+                      action.op->name, stream, firstUser));
+    }
+    firstUser = "'" + action.op->name + "'";
+  }
+}
+
+}  // namespace
+
+Chain parseChain(const std::vector<std::string>& tokens) {
+  Chain chain;
+  Reader reader{tokens};
+  while (!reader.atEnd() && isOption(tokens[reader.next]))
+    reader.readOption(globalParams(), "levelsmith", chain.globals);
+  KindChecker kinds;
+  while (!reader.atEnd()) {
+    if (reader.atBang()) {
+      throw UsageError(
+          fmt::format("levelsmith: there is no action {} the '!' at word {}",
+                      reader.next == 0 || chain.actions.empty() ? "before" : "between this and",
+                      reader.next + 1));
+    }
+    chain.actions.push_back(readAction(reader));
+    kinds.visit(chain.actions.back());
+    if (reader.atBang()) {
+      ++reader.next;
+      if (reader.atEnd()) throw UsageError("levelsmith: an action must follow the last '!'");
+    }
+  }
+  if (chain.actions.empty())
+    throw UsageError("levelsmith: nothing to do; `levelsmith help` shows how to begin");
+  const bool reportsThere = chain.globals.contains("report") && chain.globals.at("report") == "-";
+  checkStandardStream(chain, &Operator::usesStandardOutput, "output",
+                      reportsThere ? "--report" : "");
+  checkStandardStream(chain, &Operator::usesStandardInput, "input", "");
+  return chain;
+}
+
+}  // namespace pipeline

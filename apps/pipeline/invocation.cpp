@@ -1,0 +1,119 @@
+#include "apps/pipeline/invocation.h"
+
+#include <fmt/core.h>
+
+#include <cassert>
+#include <cmath>
+
+#include "apps/pipeline/units.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+
+using levelset::InvalidInput;
+using levelset::UsageError;
+
+std::string Invocation::text(const std::string& name) const {
+  if (const auto it = options_.find(name); it != options_.end()) return it->second;
+  const Param* param = op_->find(name);
+  assert(param && "an operator asks for a parameter that it does not declare");
+  return param->fallback;
+}
+
+double Invocation::number(const std::string& name) const {
+  return parseNumber(text(name), where(name));
+}
+long Invocation::integer(const std::string& name) const {
+  return parseInteger(text(name), where(name));
+}
+double Invocation::radians(const std::string& name) const {
+  return number(name) * 3.14159265358979323846 / 180;
+}
+std::vector<double> Invocation::numbers(const std::string& name) const {
+  return parseNumbers(text(name), where(name));
+}
+Imath::V3d Invocation::point(const std::string& name) const {
+  return parsePoint(text(name), where(name));
+}
+std::vector<Imath::V3d> Invocation::points(const std::string& name) const {
+  return parsePoints(text(name), where(name));
+}
+Imath::Box3d Invocation::box(const std::string& name) const {
+  return parseBox(text(name), where(name));
+}
+Imath::M44d Invocation::matrix(const std::string& name) const {
+  return parseMatrix(text(name), where(name));
+}
+std::pair<int, int> Invocation::imageSize(const std::string& name) const {
+  return parseImageSize(text(name), where(name));
+}
+
+void Invocation::setReference(double voxelSize, double diagonal) {
+  referenceVoxel_ = voxelSize > 0 ? std::optional(voxelSize) : std::nullopt;
+  referenceDiagonal_ = diagonal > 0 ? std::optional(diagonal) : std::nullopt;
+}
+
+double Invocation::toWorld(const std::string& name, const std::string& text) {
+  const Length length = parseLength(text, where(name));
+  if (!referenceVoxel_ && !referenceDiagonal_ && !operands.empty())
+    setReference(operands[0].plan().voxelSize, operands[0].diagonal());
+  double world = length.number;
+  if (length.unit == Unit::Voxels) {
+    if (!referenceVoxel_) {
+      throw UsageError(
+          fmt::format("{}: '{}' counts in voxels, but there is no grid yet to count on; write "
+                      "it in world units",
+                      where(name), text));
+    }
+    world *= *referenceVoxel_;
+  } else if (length.unit == Unit::Percent) {
+    if (!referenceDiagonal_) {
+      throw UsageError(
+          fmt::format("{}: '{}' is a share of the first operand's diagonal, but there is no "
+                      "operand; write it in world units",
+                      where(name), text));
+    }
+    world *= *referenceDiagonal_ / 100;
+  }
+  Resolved resolved{.param = name, .written = text, .world = world};
+  if (referenceVoxel_) resolved.voxels = world / *referenceVoxel_;
+  notes.lengths.push_back(resolved);
+  return world;
+}
+
+double Invocation::length(const std::string& name) {
+  return toWorld(name, text(name));
+}
+
+std::pair<double, double> Invocation::lengthPair(const std::string& name) {
+  const std::string both = text(name);
+  const std::size_t comma = both.find(',');
+  return {toWorld(name, both.substr(0, comma)), toWorld(name, both.substr(comma + 1))};
+}
+
+bool Invocation::asksVoxelSize() const {
+  if (given("voxel") && given("resolution")) {
+    throw UsageError(
+        fmt::format("{}: --voxel and --resolution say the same thing twice; give one", op_->name));
+  }
+  return given("voxel") || given("resolution");
+}
+
+double Invocation::voxelSize(double longestSide) {
+  if (!asksVoxelSize()) {
+    throw UsageError(fmt::format("{}: how fine? give --voxel L or --resolution N", op_->name));
+  }
+  if (given("voxel")) return length("voxel");
+  const long resolution = integer("resolution");
+  if (!(longestSide > 0)) {
+    throw InvalidInput(
+        fmt::format("{}: --resolution {} divides the object's longest side, which is {}", op_->name,
+                    resolution, longestSide));
+  }
+  const double voxel = longestSide / static_cast<double>(resolution);
+  notes.lengths.push_back(
+      {.param = "voxel", .written = fmt::format("--resolution {}", resolution), .world = voxel});
+  return voxel;
+}
+
+}  // namespace pipeline

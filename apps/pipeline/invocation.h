@@ -1,0 +1,103 @@
+#pragma once
+
+#include <Imath/ImathBox.h>
+#include <Imath/ImathMatrix.h>
+#include <Imath/ImathVec.h>
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/pipeline/operator.h"
+#include "apps/pipeline/value.h"
+#include "levelset/progress.h"
+
+namespace pipeline {
+
+/// Lengths as they were resolved, for the report.
+struct Resolved {
+  std::string param;
+  std::string written;
+  double world = 0;
+  std::optional<double> voxels = {};
+};
+
+/// One figure that says how far off a result may be.
+struct ErrorEstimate {
+  std::string measure;  ///< "eikonal residual, mean"
+  double value = 0;
+  std::string unit;  ///< "" or "voxels" or a world unit
+};
+
+/// What an operator left behind beside its value.
+struct StepNotes {
+  std::vector<Resolved> lengths;
+  std::vector<std::string> warnings;
+  std::vector<std::string> notes;
+  std::vector<ErrorEstimate> errors;
+  std::string certificateJson;  ///< of level-set
+  std::string detailsJson;      ///< operator's own figures, an object
+};
+
+/// One action of a chain as its operator sees it: typed parameters, operands, and where to report
+/// to.
+class Invocation {
+ public:
+  Invocation(const Operator& op, std::map<std::string, std::string> options)
+      : op_(&op), options_(std::move(options)) {}
+
+  // Operands, oldest first.
+  std::vector<Value> operands;
+  [[nodiscard]] const levelset::NarrowBand& band(std::size_t index = 0) const {
+    return operands.at(index).band();
+  }
+  [[nodiscard]] const levelset::TriMesh& mesh(std::size_t index = 0) const {
+    return operands.at(index).mesh();
+  }
+
+  // Parameters. A parameter that was not given answers with its default; asking for one that has
+  // neither is a programming error.
+  [[nodiscard]] bool given(const std::string& name) const { return options_.contains(name); }
+  [[nodiscard]] bool flag(const std::string& name) const { return given(name); }
+  [[nodiscard]] std::string text(const std::string& name) const;
+  [[nodiscard]] double number(const std::string& name) const;
+  [[nodiscard]] long integer(const std::string& name) const;
+  [[nodiscard]] double radians(const std::string& name) const;
+  [[nodiscard]] std::vector<double> numbers(const std::string& name) const;
+  [[nodiscard]] Imath::V3d point(const std::string& name) const;
+  [[nodiscard]] std::vector<Imath::V3d> points(const std::string& name) const;
+  [[nodiscard]] Imath::Box3d box(const std::string& name) const;
+  [[nodiscard]] Imath::M44d matrix(const std::string& name) const;
+  [[nodiscard]] std::pair<int, int> imageSize(const std::string& name) const;
+  /// World units. `vx` and `%` refer to the first operand, or to setReference().
+  [[nodiscard]] double length(const std::string& name);
+  [[nodiscard]] std::pair<double, double> lengthPair(const std::string& name);
+  /// The voxel size asked by --voxel or --resolution; the latter needs the object's longest side.
+  [[nodiscard]] double voxelSize(double longestSide);
+  /// True when --voxel or --resolution was given; both, or a `vx` beside --resolution, are refused.
+  [[nodiscard]] bool asksVoxelSize() const;
+  void setReference(double voxelSize, double diagonal);
+
+  [[nodiscard]] const Operator& op() const { return *op_; }
+  [[nodiscard]] std::string where(const std::string& param) const {
+    return op_->name + ": --" + param;
+  }
+
+  // What comes from the run as a whole.
+  levelset::Progress progress = {};
+  std::size_t maxMemory = levelset::kNoMemoryLimit;
+  bool dryRun = false;
+  StepNotes notes;
+  std::string output;  ///< text for people, printed when the operator is done
+
+ private:
+  [[nodiscard]] double toWorld(const std::string& name, const std::string& text);
+
+  const Operator* op_;
+  std::map<std::string, std::string> options_;
+  std::optional<double> referenceVoxel_, referenceDiagonal_;
+};
+
+}  // namespace pipeline

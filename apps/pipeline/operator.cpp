@@ -1,0 +1,175 @@
+#include "apps/pipeline/operator.h"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "apps/pipeline/units.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+
+using levelset::UsageError;
+
+std::string placeholder(const Param& param) {
+  switch (param.type) {
+    case ParamType::Flag:
+      return "";
+    case ParamType::Number:
+      return "X";
+    case ParamType::Integer:
+      return "N";
+    case ParamType::Length:
+      return "L";
+    case ParamType::LengthPair:
+      return "L,L";
+    case ParamType::Degrees:
+      return "DEG";
+    case ParamType::Numbers:
+      return "X|X,Y,Z";
+    case ParamType::Point:
+      return "x,y,z";
+    case ParamType::Points:
+      return "\"x,y,z …\"";
+    case ParamType::Box:
+      return "\"lo hi\"";
+    case ParamType::Matrix:
+      return "\"m00 m01 …\"";
+    case ParamType::Choice:
+      return fmt::format("{}", fmt::join(param.choices, "|"));
+    case ParamType::Text:
+      return "TEXT";
+    case ParamType::Path:
+      return "FILE";
+    case ParamType::ImageSize:
+      return "WxH";
+    case ParamType::Bytes:
+      return "SIZE";
+  }
+  return "";
+}
+
+namespace {
+
+void checkRange(const Param& param, double number, const std::string& text,
+                const std::string& where) {
+  if (param.range == Range::Positive && !(number > 0))
+    throw UsageError(fmt::format("{}: '{}' must be positive", where, text));
+  if (param.range == Range::NonNegative && !(number >= 0))
+    throw UsageError(fmt::format("{}: '{}' must not be negative", where, text));
+}
+
+}  // namespace
+
+void checkText(const Param& param, const std::string& text, const std::string& where) {
+  switch (param.type) {
+    case ParamType::Flag:
+      return;
+    case ParamType::Number:
+      return checkRange(param, parseNumber(text, where), text, where);
+    case ParamType::Degrees:
+      return checkRange(param, parseNumber(text, where), text, where);
+    case ParamType::Integer:
+      return checkRange(param, static_cast<double>(parseInteger(text, where)), text, where);
+    case ParamType::Length: {
+      if (param.allowsAuto && text == "auto") return;
+      const Length length = parseLength(text, where);
+      if (length.unit == Unit::Voxels && !param.allowsVoxels) {
+        throw UsageError(
+            fmt::format("{}: a voxel size cannot be given in voxels; write it in world units, "
+                        "or use --resolution",
+                        where));
+      }
+      return checkRange(param, length.number, text, where);
+    }
+    case ParamType::LengthPair:
+      return void(parseLengthPair(text, where));
+    case ParamType::Numbers:
+      for (double number : parseNumbers(text, where)) checkRange(param, number, text, where);
+      return;
+    case ParamType::Point:
+      for (int axis = 0; axis < 3; ++axis)
+        checkRange(param, parsePoint(text, where)[axis], text, where);
+      return;
+    case ParamType::Points:
+      return void(parsePoints(text, where));
+    case ParamType::Box:
+      return void(parseBox(text, where));
+    case ParamType::Matrix:
+      return void(parseMatrix(text, where));
+    case ParamType::Choice:
+      if (std::find(param.choices.begin(), param.choices.end(), text) == param.choices.end()) {
+        throw UsageError(
+            fmt::format("{}: '{}' is not one of {}", where, text, fmt::join(param.choices, ", ")));
+      }
+      return;
+    case ParamType::Text:
+    case ParamType::Path:
+      if (text.empty()) throw UsageError(fmt::format("{}: is empty", where));
+      return;
+    case ParamType::ImageSize:
+      return void(parseImageSize(text, where));
+    case ParamType::Bytes:
+      return void(parseBytes(text, where));
+  }
+}
+
+const Param* Operator::find(const std::string& param) const {
+  const auto it =
+      std::find_if(params.begin(), params.end(), [&](const Param& p) { return p.name == param; });
+  return it == params.end() ? nullptr : &*it;
+}
+
+const std::vector<Operator>& operators() {
+  static const std::vector<Operator> all = [] {
+    std::vector<Operator> list;
+    addFileOperators(list);
+    addShapeOperators(list);
+    addConversionOperators(list);
+    addSolidOperators(list);
+    addPlacementOperators(list);
+    addTextureOperators(list);
+    addInspectionOperators(list);
+    addPictureOperators(list);
+    return list;
+  }();
+  return all;
+}
+
+const Operator* findOperator(const std::string& name) {
+  const auto it = std::find_if(operators().begin(), operators().end(),
+                               [&](const Operator& op) { return op.name == name; });
+  return it == operators().end() ? nullptr : &*it;
+}
+
+const std::vector<Param>& globalParams() {
+  static const std::vector<Param> params = {
+      {.name = "threads",
+       .type = ParamType::Integer,
+       .doc = "threads to use; results do not depend on it",
+       .range = Range::Positive},
+      {.name = "max-memory",
+       .type = ParamType::Bytes,
+       .doc = "refuse or stop what would take more, e.g. 4G; default: 80 % of what is free"},
+      {.name = "quiet", .type = ParamType::Flag, .doc = "errors only"},
+      {.name = "verbose",
+       .type = ParamType::Flag,
+       .doc = "time, memory and voxels of each step (also -v)"},
+      {.name = "report",
+       .type = ParamType::Path,
+       .doc = "write what each step did and cost, as .json or .html"},
+      {.name = "progress",
+       .type = ParamType::Choice,
+       .doc = "bars on a terminal, lines of JSON, or nothing",
+       .fallback = "auto",
+       .choices = {"auto", "json", "off"}},
+      {.name = "no-clobber", .type = ParamType::Flag, .doc = "never overwrite a file"},
+      {.name = "dry-run",
+       .type = ParamType::Flag,
+       .doc = "resolve every parameter and estimate cost, without computing or writing anything"},
+  };
+  return params;
+}
+
+}  // namespace pipeline

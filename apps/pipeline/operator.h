@@ -1,0 +1,98 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "apps/pipeline/value.h"
+
+/// The registry: one declaration per operator. The command line, its help and its checks are made
+/// from it.
+namespace pipeline {
+
+class Invocation;
+
+enum class ParamType {
+  Flag,
+  Number,
+  Integer,
+  Length,
+  LengthPair,
+  Degrees,
+  Numbers,
+  Point,
+  Points,
+  Box,
+  Matrix,
+  Choice,
+  Text,
+  Path,
+  ImageSize,
+  Bytes
+};
+
+enum class Range { Any, Positive, NonNegative };
+
+struct Param {
+  std::string name;  ///< without the dashes
+  ParamType type = ParamType::Number;
+  std::string doc;                        ///< one line; the unit is told by the type
+  std::string fallback = {};              ///< default as one would write it; empty: none
+  std::vector<std::string> choices = {};  ///< of a Choice
+  Range range = Range::Any;
+  bool required = false;
+  int position = -1;         ///< ≥ 0: may be given without its name, at this place
+  bool allowsVoxels = true;  ///< Length: may it be given in vx?
+  bool allowsAuto = false;   ///< Length: `auto` is an answer too
+};
+
+/// The form of a value in help, e.g. "L" for a length.
+[[nodiscard]] std::string placeholder(const Param& param);
+
+/// Throws UsageError when `text` cannot be a value of `param`. @param where  "action: --name"
+void checkText(const Param& param, const std::string& text, const std::string& where);
+
+enum class Flow {
+  Makes,         ///< takes its operands off the stack and leaves its result
+  PassesThrough  ///< leaves its operand where it is: write, measure, check, info, render
+};
+
+struct Operator {
+  std::string name;
+  std::string group;         ///< heading in `help`
+  std::string summary;       ///< one line
+  std::string details = {};  ///< what a user should know beyond the parameters
+  std::string example = {};  ///< a whole command line
+  std::vector<Param> params = {};
+  std::vector<std::vector<Kind>> operands = {};  ///< kinds allowed at each place
+  bool takesMore = false;         ///< further operands of the last place's kinds may follow
+  bool operandsOptional = false;  ///< may run without any operand (`info FILE`)
+  Flow flow = Flow::Makes;
+  /// Kind of the result, told before anything runs.
+  std::function<Kind(const Invocation&)> resultKind = {};
+  std::function<Value(Invocation&)> run = {};
+  /// What `run` would return, for --dry-run; by default the plan of the first operand.
+  std::function<Plan(Invocation&)> plan = {};
+  /// Does it claim standard output, or input, for data? Text for people goes to standard error
+  /// then.
+  std::function<bool(const Invocation&)> usesStandardOutput = {};
+  std::function<bool(const Invocation&)> usesStandardInput = {};
+
+  [[nodiscard]] const Param* find(const std::string& param) const;
+};
+
+[[nodiscard]] const std::vector<Operator>& operators();
+[[nodiscard]] const Operator* findOperator(const std::string& name);
+[[nodiscard]] const std::vector<Param>& globalParams();
+
+// Each fills its group; see apps/pipeline/operators/.
+void addFileOperators(std::vector<Operator>& all);
+void addShapeOperators(std::vector<Operator>& all);
+void addConversionOperators(std::vector<Operator>& all);
+void addSolidOperators(std::vector<Operator>& all);
+void addPlacementOperators(std::vector<Operator>& all);
+void addTextureOperators(std::vector<Operator>& all);
+void addInspectionOperators(std::vector<Operator>& all);
+void addPictureOperators(std::vector<Operator>& all);
+
+}  // namespace pipeline

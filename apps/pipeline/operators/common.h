@@ -1,0 +1,30 @@
+#pragma once
+
+// Parameters that several operators share.
+
+#include "apps/pipeline/operator.h"
+
+namespace pipeline {
+
+inline Param voxelParam(const char* doc = "edge of a voxel") {
+  return {.name = "voxel",
+          .type = ParamType::Length,
+          .doc = doc,
+          .range = Range::Positive,
+          .allowsVoxels = false};
+}
+inline Param resolutionParam() {
+  return {.name = "resolution",
+          .type = ParamType::Integer,
+          .doc = "in place of --voxel: voxels along the longest side of the object",
+          .range = Range::Positive};
+}
+inline Param halfWidthParam(const char* fallback = "3") {
+  return {.name = "half-width",
+          .type = ParamType::Number,
+          .doc = "reach of the band on each side, in voxels",
+          .fallback = fallback,
+          .range = Range::Positive};
+}
+
+}  // namespace pipeline

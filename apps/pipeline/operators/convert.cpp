@@ -1,0 +1,128 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "apps/pipeline/invocation.h"
+#include "apps/pipeline/operators/common.h"
+#include "levelset/convert/band_to_mesh.h"
+#include "levelset/convert/mesh_to_band.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::SignCertificate;
+using levelset::SignMode;
+
+std::string certificateJson(const SignCertificate& c) {
+  nlohmann::ordered_json json;
+  json["closed"] = c.closed;
+  json["boundary_edges"] = c.boundaryEdges;
+  json["non_manifold_edges"] = c.nonManifoldEdges;
+  if (c.selfIntersections < 0)
+    json["self_intersections"] = "not searched";
+  else
+    json["self_intersections"] = c.selfIntersections;
+  json["method"] = c.method == SignMode::Closed ? "closed" : "winding";
+  json["flipped"] = c.flipped;
+  json["ambiguous_share"] = c.ambiguousShare;
+  json["dropped_triangles"] = c.droppedTriangles;
+  return json.dump();
+}
+
+double longestSide(const Value& value) {
+  const Imath::V3d size = value.plan().bounds.size();
+  return std::max({size.x, size.y, size.z});
+}
+
+Value levelSet(Invocation& in) {
+  levelset::MeshToBandOptions options{.halfWidth = in.number("half-width"),
+                                      .signAnyway = in.flag("sign-anyway"),
+                                      .searchSelfIntersections = !in.flag("trust-mesh"),
+                                      .maxMemory = in.maxMemory,
+                                      .progress = in.progress};
+  const std::string sign = in.text("sign");
+  options.sign = sign == "closed"    ? SignMode::Closed
+                 : sign == "winding" ? SignMode::Winding
+                                     : SignMode::Auto;
+  options.nesting = in.text("nested") == "orientation" ? levelset::Nesting::Orientation
+                                                       : levelset::Nesting::Parity;
+  levelset::MeshToBandResult result =
+      levelset::meshToBand(in.mesh(), in.voxelSize(longestSide(in.operands[0])), options);
+  in.notes.certificateJson = certificateJson(result.certificate);
+  in.notes.notes.push_back(describe(result.certificate));
+  return Value(std::move(result.band));
+}
+
+Plan planLevelSet(Invocation& in) {
+  Plan plan = in.operands[0].plan();
+  plan.kind = Kind::Band;
+  plan.voxelSize = in.voxelSize(longestSide(in.operands[0]));
+  plan.halfWidth = in.number("half-width");
+  return plan;
+}
+
+Value mesh(Invocation& in) {
+  return Value(levelset::bandToMesh(
+      in.band(),
+      {.adaptivity = in.number("adaptivity"), .sharp = in.flag("sharp"), .progress = in.progress}));
+}
+
+}  // namespace
+
+void addConversionOperators(std::vector<Operator>& all) {
+  all.push_back({
+      .name = "level-set",
+      .group = "Conversion",
+      .summary = "turn a mesh into a level set with exact distances",
+      .details =
+          "auto takes 'closed' when every edge has two faces and no self-intersection is found, "
+          "otherwise "
+          "'winding' (inside where the generalised winding number passes one half). The sign "
+          "certificate says what "
+          "was found; where the sign would be a guess the mesh is refused unless --sign-anyway.",
+      .example = "levelsmith read dragon.ply ! level-set --resolution 512 ! write dragon.vdb",
+      .params = {voxelParam(),
+                 resolutionParam(),
+                 halfWidthParam(),
+                 {.name = "sign",
+                  .type = ParamType::Choice,
+                  .doc = "how inside is told from outside",
+                  .fallback = "auto",
+                  .choices = {"auto", "closed", "winding"}},
+                 {.name = "nested",
+                  .type = ParamType::Choice,
+                  .doc = "under 'closed': shells in shells alternate, or follow the way they face",
+                  .fallback = "parity",
+                  .choices = {"parity", "orientation"}},
+                 {.name = "sign-anyway",
+                  .type = ParamType::Flag,
+                  .doc = "accept a sign that is a guess"},
+                 {.name = "trust-mesh",
+                  .type = ParamType::Flag,
+                  .doc = "under 'auto': do not search self-intersections"}},
+      .operands = {{Kind::Mesh}},
+      .run = levelSet,
+      .plan = planLevelSet,
+  });
+  all.push_back({
+      .name = "mesh",
+      .group = "Conversion",
+      .summary = "turn a level set into a closed triangle mesh",
+      .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! mesh --sharp ! write box.ply",
+      .params = {{.name = "adaptivity",
+                  .type = ParamType::Number,
+                  .doc = "0 to 1: how far flat parts are coarsened",
+                  .fallback = "0",
+                  .range = Range::NonNegative},
+                 {.name = "sharp",
+                  .type = ParamType::Flag,
+                  .doc = "keep the edges and corners that the field implies"}},
+      .operands = {{Kind::Band}},
+      .resultKind = [](const Invocation&) { return Kind::Mesh; },
+      .run = mesh,
+  });
+}
+
+}  // namespace pipeline

@@ -1,0 +1,137 @@
+#include <fmt/core.h>
+
+#include <filesystem>
+
+#include "apps/pipeline/invocation.h"
+#include "levelset/convert/band_file.h"
+#include "levelset/convert/mesh_file.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::UsageError;
+
+bool isStandardStream(const Invocation& in) {
+  return in.text("file") == "-";
+}
+
+/// The format by --format, or the name that tells it.
+std::string formatName(const Invocation& in) {
+  if (in.given("format")) return in.text("format");
+  if (isStandardStream(in)) {
+    throw UsageError(
+        fmt::format("{}: '-' has no extension to tell the format; give --format", in.op().name));
+  }
+  return in.text("file");
+}
+
+Kind fileKind(const Invocation& in) {
+  const std::string name = formatName(in);
+  if (levelset::isMeshFormat(name)) return Kind::Mesh;
+  if (levelset::isBandFormat(name)) return Kind::Band;
+  throw UsageError(
+      fmt::format("{}: '{}' is of no known format; use ply, obj, stl or off (also .gz), vdb{}",
+                  in.op().name, name, in.op().name == "write" ? " or nvdb" : ""));
+}
+
+Value read(Invocation& in) {
+  const std::filesystem::path file = in.text("file");
+  if (fileKind(in) == Kind::Mesh) {
+    return Value(levelset::readMesh(
+        file, {.format = in.text("format"), .maxMemory = in.maxMemory, .progress = in.progress}));
+  }
+  return Value(levelset::readBand(file, {.grid = in.text("grid"), .maxMemory = in.maxMemory}));
+}
+
+/// Meshes are read, since lengths resolve on their size; of bands the header is enough.
+Plan planRead(Invocation& in) {
+  if (fileKind(in) == Kind::Mesh) return read(in).plan();
+  for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file"))) {
+    if (in.given("grid") && grid.name != in.text("grid")) continue;
+    Plan plan{.kind = Kind::Band, .voxelSize = grid.voxelSize, .halfWidth = 3};
+    if (!grid.indexBounds.isEmpty())
+      plan.bounds = {grid.indexBounds.min * grid.voxelSize, grid.indexBounds.max * grid.voxelSize};
+    plan.area = static_cast<double>(grid.activeVoxels) * grid.voxelSize * grid.voxelSize /
+                (2 * plan.halfWidth);
+    return plan;
+  }
+  return read(in).plan();
+}
+
+Value write(Invocation& in) {
+  const std::filesystem::path file = in.text("file");
+  const Value& value = in.operands[0];
+  const Kind kind = fileKind(in);
+  if (value.kind() != kind) {
+    throw UsageError(fmt::format(
+        "write: a {} cannot be written as '{}'; {}", kindName(value.kind()), formatName(in),
+        value.kind() == Kind::Band ? "put 'mesh' before it, or write .vdb"
+                                   : "put 'level-set' before it, or write .ply"));
+  }
+  if (kind == Kind::Mesh) {
+    levelset::writeMesh(file, value.mesh(), {.format = in.text("format"), .progress = in.progress});
+  } else {
+    levelset::writeBand(file, value.band(), {.name = in.text("name"), .format = in.text("format")});
+  }
+  return value;
+}
+
+Plan planWrite(Invocation& in) {
+  (void)fileKind(in);
+  return in.operands[0].plan();
+}
+
+}  // namespace
+
+void addFileOperators(std::vector<Operator>& all) {
+  all.push_back({
+      .name = "read",
+      .group = "Files",
+      .summary = "read a mesh (ply, obj, stl, off, also .gz) or a level set (vdb)",
+      .details = "A .vdb with more than one level set needs --grid. '-' is standard input and "
+                 "needs --format.",
+      .example = "levelsmith read dragon.ply.gz ! info",
+      .params = {{.name = "file",
+                  .type = ParamType::Path,
+                  .doc = "what to read, or -",
+                  .required = true,
+                  .position = 0},
+                 {.name = "format",
+                  .type = ParamType::Text,
+                  .doc = "ply, obj, stl, off, vdb; default: by extension"},
+                 {.name = "grid", .type = ParamType::Text, .doc = "name of the grid in a .vdb"}},
+      .resultKind = fileKind,
+      .run = read,
+      .plan = planRead,
+      .usesStandardInput = isStandardStream,
+  });
+  all.push_back({
+      .name = "write",
+      .group = "Files",
+      .summary = "write a mesh (ply, obj, stl, off, also .gz) or a level set (vdb, nvdb)",
+      .details = "The file is written beside its target and renamed when whole; what was there "
+                 "stays until then. "
+                 "The value stays on the stack.",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! write sphere.ply",
+      .params = {{.name = "file",
+                  .type = ParamType::Path,
+                  .doc = "where to, or -",
+                  .required = true,
+                  .position = 0},
+                 {.name = "format",
+                  .type = ParamType::Text,
+                  .doc = "ply, obj, stl, off, vdb, nvdb; default: by extension"},
+                 {.name = "name",
+                  .type = ParamType::Text,
+                  .doc = "of the grid in a .vdb or .nvdb",
+                  .fallback = "surface"}},
+      .operands = {{Kind::Mesh, Kind::Band}},
+      .flow = Flow::PassesThrough,
+      .run = write,
+      .plan = planWrite,
+      .usesStandardOutput = isStandardStream,
+  });
+}
+
+}  // namespace pipeline

@@ -1,0 +1,240 @@
+#include <fmt/core.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "apps/pipeline/invocation.h"
+#include "levelset/convert/band_file.h"
+#include "levelset/convert/mesh_file.h"
+#include "levelset/error.h"
+#include "levelset/inspect/check.h"
+#include "levelset/inspect/measure.h"
+
+namespace pipeline {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json toJson(const Imath::V3d& v) {
+  return Json::array({v.x, v.y, v.z});
+}
+Json toJson(const Imath::Box3d& box) {
+  if (box.isEmpty()) return nullptr;
+  return {{"min", toJson(box.min)}, {"max", toJson(box.max)}};
+}
+
+std::string coordinates(const Imath::V3d& v) {
+  return fmt::format("{:.6g},{:.6g},{:.6g}", v.x, v.y, v.z);
+}
+
+bool asksJson(const Invocation& in) {
+  return in.flag("json");
+}
+
+Param jsonParam() {
+  return {.name = "json", .type = ParamType::Flag, .doc = "one JSON object on standard output"};
+}
+
+Value measure(Invocation& in) {
+  const Value& value = in.operands[0];
+  const levelset::Measurement m = value.kind() == Kind::Band ? levelset::measure(value.band())
+                                                             : levelset::measure(value.mesh());
+  Json json;
+  json["volume"] = m.volume;
+  json["area"] = m.area;
+  json["bounds"] = toJson(m.bounds);
+  json["active_voxels"] = m.activeVoxels;
+  json["voxel_size"] = m.voxelSize;
+  json["half_width"] = m.halfWidth;
+  json["components"] = m.components;
+  json["shells"] = m.shells;
+  json["cavities"] = m.cavities;
+  json["euler"] = m.euler;
+  if (value.kind() == Kind::Mesh) {
+    const levelset::Manifoldness manifold = levelset::manifoldness(value.mesh());
+    json["closed_manifold"] = manifold.isClosedManifold();
+    json["boundary_edges"] = manifold.boundaryEdges;
+    json["non_manifold_edges"] = manifold.nonManifoldEdges;
+    json["misoriented_edges"] = manifold.misorientedEdges;
+    json["non_manifold_vertices"] = manifold.nonManifoldVertices;
+    json["triangles"] = value.mesh().triangles.size();
+    json["vertices"] = value.mesh().positions.size();
+  }
+  in.notes.detailsJson = json.dump();
+  if (asksJson(in)) {
+    in.output = json.dump(2) + "\n";
+    return value;
+  }
+  for (const auto& [key, entry] : json.items()) {
+    if (key == "bounds" && !m.bounds.isEmpty())
+      in.output += fmt::format("{:<22}{} to {}\n", key, coordinates(m.bounds.min),
+                               coordinates(m.bounds.max));
+    else
+      in.output += fmt::format(
+          "{:<22}{}\n", key,
+          entry.is_number_float() ? fmt::format("{:.9g}", entry.get<double>()) : entry.dump());
+  }
+  return value;
+}
+
+Value check(Invocation& in) {
+  const levelset::CheckReport report = levelset::check(in.band());
+  Json json;
+  json["passed"] = report.passed();
+  json["items"] = Json::array();
+  std::string failed;
+  for (const levelset::CheckItem& item : report.items) {
+    json["items"].push_back(
+        {{"name", item.name}, {"passed", item.passed}, {"detail", item.detail}});
+    if (!asksJson(in)) {
+      in.output += fmt::format("{:<6}{}{}{}\n", item.passed ? "ok" : "FAIL", item.name,
+                               item.detail.empty() ? "" : ": ", item.detail);
+    }
+    if (!item.passed && failed.empty())
+      failed = item.name + (item.detail.empty() ? "" : " (" + item.detail + ")");
+  }
+  json["eikonal_mean"] = report.eikonalMean;
+  json["eikonal_max"] = report.eikonalMax;
+  in.notes.detailsJson = json.dump();
+  in.notes.errors.push_back({"eikonal residual, mean", report.eikonalMean, ""});
+  if (asksJson(in))
+    in.output = json.dump(2) + "\n";
+  else
+    in.output += fmt::format("eikonal residual: mean {:.3g}, largest {:.3g}\n", report.eikonalMean,
+                             report.eikonalMax);
+  if (!report.passed()) {
+    throw levelset::NumericalError(fmt::format(
+        "check: the level set fails: {}; make it again with 'resample', or from its mesh", failed));
+  }
+  return in.operands[0];
+}
+
+Json fileInfo(const std::string& file, const std::string& format) {
+  Json json;
+  json["file"] = file;
+  const std::string name = format.empty() ? file : format;
+  if (levelset::isMeshFormat(name)) {
+    const levelset::MeshFileInfo info = levelset::meshFileInfo(file);
+    json["format"] = info.format;
+    json["vertices"] = info.vertices;
+    json["faces"] = info.faces;
+    return json;
+  }
+  if (!levelset::isBandFormat(name)) {
+    throw levelset::UsageError(fmt::format(
+        "info: '{}' is of no known format; it can tell of ply, obj, stl, off (also .gz) and vdb",
+        file));
+  }
+  json["grids"] = Json::array();
+  for (const levelset::GridInfo& grid : levelset::bandFileInfo(file)) {
+    Json entry{{"name", grid.name},
+               {"type", grid.type},
+               {"class", grid.gridClass},
+               {"voxel_size", grid.voxelSize},
+               {"active_voxels", grid.activeVoxels},
+               {"bytes", grid.bytes}};
+    entry["index_bounds"] = toJson(grid.indexBounds);
+    json["grids"].push_back(entry);
+  }
+  return json;
+}
+
+Json valueInfo(const Value& value) {
+  Json json;
+  json["kind"] = kindName(value.kind());
+  json["bounds"] = toJson(value.plan().bounds);
+  if (value.kind() == Kind::Band) {
+    json["voxel_size"] = value.band().voxelSize();
+    json["half_width"] = value.band().halfWidth();
+    json["active_voxels"] = value.band().activeVoxelCount();
+    json["bytes"] = value.band().memoryUse();
+    json["hash"] = fmt::format("{:016x}", value.band().contentHash());
+  } else if (value.kind() == Kind::Mesh) {
+    json["vertices"] = value.mesh().positions.size();
+    json["triangles"] = value.mesh().triangles.size();
+  } else {
+    json["levels"] = value.patch().patch.levels.size();
+    json["particles"] = value.patch().patch.particleCount();
+  }
+  return json;
+}
+
+void appendText(const Json& json, const std::string& indent, std::string& text) {
+  for (const auto& [key, entry] : json.items()) {
+    if (entry.is_array() && !entry.empty() && entry[0].is_object()) {
+      for (const Json& item : entry) {
+        text += indent + key + ":\n";
+        appendText(item, indent + "  ", text);
+      }
+    } else if (!entry.is_null()) {
+      text += fmt::format("{}{:<16}{}\n", indent, key,
+                          entry.is_string() ? entry.get<std::string>() : entry.dump());
+    }
+  }
+}
+
+Value info(Invocation& in) {
+  Json json;
+  if (in.given("file")) {
+    json = fileInfo(in.text("file"), in.text("format"));
+  } else if (!in.operands.empty()) {
+    json = valueInfo(in.operands[0]);
+  } else {
+    throw levelset::UsageError(
+        "info: of what? name a file, or put it behind an action that makes something");
+  }
+  if (asksJson(in))
+    in.output = json.dump(2) + "\n";
+  else
+    appendText(json, "", in.output);
+  return in.operands.empty() ? Value(Plan{}) : in.operands[0];
+}
+
+}  // namespace
+
+void addInspectionOperators(std::vector<Operator>& all) {
+  all.push_back({
+      .name = "measure",
+      .group = "Inspection",
+      .summary = "volume, area, bounds, components, shells, cavities, Euler characteristic",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! measure --json",
+      .params = {jsonParam()},
+      .operands = {{Kind::Band, Kind::Mesh}},
+      .flow = Flow::PassesThrough,
+      .run = measure,
+      .usesStandardOutput = asksJson,
+  });
+  all.push_back({
+      .name = "check",
+      .group = "Inspection",
+      .summary = "is it a sound level set? exit code 5 if not",
+      .example = "levelsmith box --size 1,1,1 --voxel 0.05 ! check",
+      .params = {jsonParam()},
+      .operands = {{Kind::Band}},
+      .flow = Flow::PassesThrough,
+      .run = check,
+      .usesStandardOutput = asksJson,
+  });
+  all.push_back({
+      .name = "info",
+      .group = "Inspection",
+      .summary = "what is in a file, without loading its voxels, or what is on the stack",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! info",
+      .params = {{.name = "file",
+                  .type = ParamType::Path,
+                  .doc = "a mesh or .vdb file; default: the newest value",
+                  .position = 0},
+                 {.name = "format",
+                  .type = ParamType::Text,
+                  .doc = "of the file; default: by extension"},
+                 jsonParam()},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Patch}},
+      .operandsOptional = true,
+      .flow = Flow::PassesThrough,
+      .run = info,
+      .plan = [](Invocation&) { return Plan{}; },
+      .usesStandardOutput = asksJson,
+  });
+}
+
+}  // namespace pipeline

@@ -1,0 +1,204 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "apps/pipeline/invocation.h"
+#include "apps/pipeline/operators/common.h"
+#include "levelset/error.h"
+#include "levelset/solids/blend.h"
+#include "levelset/solids/components.h"
+#include "levelset/solids/csg.h"
+#include "levelset/solids/offset.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::CsgOperation;
+using levelset::NarrowBand;
+
+std::vector<NarrowBand> bands(const Invocation& in) {
+  std::vector<NarrowBand> all;
+  for (const Value& value : in.operands) all.push_back(value.band());
+  return all;
+}
+
+template <CsgOperation operation>
+Value csg(Invocation& in) {
+  levelset::CsgResult result =
+      levelset::combine(operation, bands(in), {.maxMemory = in.maxMemory, .progress = in.progress});
+  in.notes.notes = std::move(result.notes);
+  return Value(std::move(result.band));
+}
+
+Plan planCsg(Invocation& in) {
+  Plan plan = in.operands[0].plan();
+  for (std::size_t i = 1; i < in.operands.size(); ++i) {
+    const Plan& other = in.operands[i].plan();
+    plan.voxelSize = std::min(plan.voxelSize, other.voxelSize);
+    plan.halfWidth = std::min(plan.halfWidth, other.halfWidth);
+    plan.area += other.area;
+    plan.bounds.extendBy(other.bounds);
+  }
+  return plan;
+}
+
+CsgOperation operationOf(const Invocation& in) {
+  const std::string op = in.text("op");
+  return op == "union"          ? CsgOperation::Union
+         : op == "intersection" ? CsgOperation::Intersection
+                                : CsgOperation::Difference;
+}
+
+Value blend(Invocation& in) {
+  const std::string side = in.text("side");
+  levelset::BlendOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
+  options.side = side == "add"      ? levelset::BlendSide::Add
+                 : side == "remove" ? levelset::BlendSide::Remove
+                                    : levelset::BlendSide::Both;
+  levelset::CsgResult result =
+      levelset::blend(operationOf(in), in.band(0), in.band(1), in.length("radius"), options);
+  in.notes.notes = std::move(result.notes);
+  return Value(std::move(result.band));
+}
+
+Value offset(Invocation& in) {
+  levelset::OffsetOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
+  if (in.given("half-width")) options.halfWidth = in.number("half-width");
+  const double distance = in.length("distance");
+  NarrowBand band = in.band();
+  in.operands.clear();
+  return Value(levelset::offset(std::move(band), distance, options));
+}
+
+Plan planOffset(Invocation& in) {
+  Plan plan = in.operands[0].plan();
+  const double distance = in.length("distance");
+  const double before = plan.bounds.size().length();
+  plan.bounds.min -= Imath::V3d(distance);
+  plan.bounds.max += Imath::V3d(distance);
+  const double after = plan.bounds.isEmpty() ? 0 : plan.bounds.size().length();
+  if (before > 0) plan.area *= (after / before) * (after / before);
+  if (in.given("half-width")) plan.halfWidth = in.number("half-width");
+  return plan;
+}
+
+Value keep(Invocation& in) {
+  return Value(levelset::keepLargest(in.band(), static_cast<std::size_t>(in.integer("largest"))));
+}
+
+Value fillCavities(Invocation& in) {
+  return Value(in.given("up-to") ? levelset::fillCavities(in.band(), in.number("up-to"))
+                                 : levelset::fillCavities(in.band()));
+}
+
+template <CsgOperation operation>
+Operator csgOperator(const char* name, const char* summary, const char* example) {
+  return {.name = name,
+          .group = "Solids",
+          .summary = summary,
+          .details =
+              "Operands on different grids are brought to the finest of them, and the report says "
+              "so. Without "
+              "names it takes the two newest values, older first.",
+          .example = example,
+          .operands = {{Kind::Band}, {Kind::Band}},
+          .takesMore = true,
+          .run = csg<operation>,
+          .plan = planCsg};
+}
+
+}  // namespace
+
+void addSolidOperators(std::vector<Operator>& all) {
+  all.push_back(csgOperator<CsgOperation::Union>(
+      "union", "all that is in any of the solids",
+      "levelsmith sphere --radius 2 --voxel 0.1 ! box --size 3,3,3 --voxel 0.1 ! union ! measure"));
+  all.push_back(
+      csgOperator<CsgOperation::Intersection>("intersection", "what is in all of the solids",
+                                              "levelsmith sphere --radius 2 --voxel 0.1 ! box "
+                                              "--size 3,3,3 --voxel 0.1 ! intersection ! measure"));
+  all.push_back(
+      csgOperator<CsgOperation::Difference>("difference", "the first solid without the others",
+                                            "levelsmith box --size 3,3,3 --voxel 0.1 ! sphere "
+                                            "--radius 1.8 --voxel 0.1 ! difference ! measure"));
+  all.push_back({
+      .name = "blend",
+      .group = "Solids",
+      .summary = "union, intersection or difference with a rounded seam",
+      .details = "Curvature flow localised along the curve in which the two surfaces meet; nothing "
+                 "changes further than the "
+                 "radius from that curve, and solids that are near but do not meet stay apart.",
+      .example = "levelsmith box --size 8,8,2 --voxel 0.1 ! cylinder --radius 1.5 --height 6 "
+                 "--voxel 0.1 ! blend --radius 0.8 ! measure",
+      .params = {{.name = "radius",
+                  .type = ParamType::Length,
+                  .doc = "of the rounding",
+                  .range = Range::NonNegative,
+                  .required = true},
+                 {.name = "op",
+                  .type = ParamType::Choice,
+                  .doc = "what is blended",
+                  .fallback = "union",
+                  .choices = {"union", "intersection", "difference"}},
+                 {.name = "method",
+                  .type = ParamType::Choice,
+                  .doc = "how the seam is rounded",
+                  .fallback = "curvature",
+                  .choices = {"curvature"}},
+                 {.name = "side",
+                  .type = ParamType::Choice,
+                  .doc = "add material, remove it, or both",
+                  .fallback = "both",
+                  .choices = {"both", "add", "remove"}}},
+      .operands = {{Kind::Band}, {Kind::Band}},
+      .run = blend,
+      .plan = planCsg,
+  });
+  all.push_back({
+      .name = "offset",
+      .group = "Solids",
+      .summary = "move the surface along its normal; positive grows the solid",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! offset 2vx ! measure",
+      .params = {{.name = "distance",
+                  .type = ParamType::Length,
+                  .doc = "how far; negative shrinks",
+                  .required = true,
+                  .position = 0},
+                 {.name = "half-width",
+                  .type = ParamType::Number,
+                  .doc = "of the result, in voxels; default: as before",
+                  .range = Range::Positive}},
+      .operands = {{Kind::Band}},
+      .run = offset,
+      .plan = planOffset,
+  });
+  all.push_back({
+      .name = "keep",
+      .group = "Solids",
+      .summary = "keep the largest solids and drop small parts",
+      .example = "levelsmith sphere --radius 2 --voxel 0.1 ! sphere --radius 0.5 --center 4,0,0 "
+                 "--voxel 0.1 ! union ! keep --largest 1 ! measure",
+      .params = {{.name = "largest",
+                  .type = ParamType::Integer,
+                  .doc = "how many to keep, by volume",
+                  .range = Range::Positive,
+                  .required = true}},
+      .operands = {{Kind::Band}},
+      .run = keep,
+  });
+  all.push_back({
+      .name = "fill-cavities",
+      .group = "Solids",
+      .summary = "fill enclosed voids",
+      .example = "levelsmith sphere --radius 2 --voxel 0.1 ! sphere --radius 1 --voxel 0.1 ! "
+                 "difference ! fill-cavities ! measure",
+      .params = {{.name = "up-to",
+                  .type = ParamType::Number,
+                  .doc = "only voids up to this volume, world units cubed",
+                  .range = Range::Positive}},
+      .operands = {{Kind::Band}},
+      .run = fillCavities,
+  });
+}
+
+}  // namespace pipeline

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "apps/pipeline/runner.h"
+
+namespace pipeline {
+
+/// The report as JSON: an object with `version`, `steps`, `warnings`, `exit_code`, `error`.
+[[nodiscard]] std::string reportJson(const RunReport& report);
+/// The same as a page.
+[[nodiscard]] std::string reportHtml(const RunReport& report);
+/// By extension: .json or .html; "-" is JSON on standard output. Written beside the target and
+/// renamed.
+void writeReport(const std::filesystem::path& path, const RunReport& report);
+
+/// One line for people: what the step made, how long it took, how far off it may be.
+[[nodiscard]] std::string stepLine(const StepReport& step, bool dryRun);
+
+}  // namespace pipeline

@@ -1,0 +1,229 @@
+#include "apps/pipeline/runner.h"
+
+#include <fmt/core.h>
+#include <sys/resource.h>
+
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <new>
+
+#include "levelset/error.h"
+#include "levelset/inspect/check.h"
+#include "levelset/sample.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::InvalidInput;
+
+double cpuSeconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+/// High-water mark of the resident set since the last reset (Linux).
+double peakBytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("VmHWM:")) return 1024 * std::atof(line.c_str() + 6);
+  return 0;
+}
+void resetPeak() {
+  std::ofstream("/proc/self/clear_refs") << "5";
+}
+
+struct Slot {
+  Value value;
+  std::string name;
+  bool used = false;
+};
+
+class Stack {
+ public:
+  std::vector<Value> take(const Action& action) {
+    const Operator& op = *action.op;
+    std::vector<Value> operands;
+    const std::size_t named = action.operandNames.size();
+    const std::size_t wanted = op.operands.size();
+    if (named < wanted && slots_.size() >= wanted - named) {
+      const std::size_t missing = wanted - named;
+      for (std::size_t i = slots_.size() - missing; i < slots_.size(); ++i) {
+        markUsed(slots_[i]);
+        operands.push_back(slots_[i].value);
+      }
+      if (op.flow == Flow::Makes)
+        slots_.resize(slots_.size() - missing, Slot{Value(Plan{}), {}, {}});
+    }
+    for (const std::string& name : action.operandNames) {
+      usedNames_[name] = true;
+      operands.push_back(named_.at(name));
+    }
+    return operands;
+  }
+
+  void push(Value value, const std::string& name) {
+    if (!name.empty()) {
+      named_.emplace(name, value);
+      usedNames_[name] = false;
+    }
+    slots_.push_back({std::move(value), name, false});
+  }
+
+  [[nodiscard]] std::vector<std::string> unused() const {
+    std::vector<std::string> sentences;
+    for (const Slot& slot : slots_) {
+      if (slot.used || (!slot.name.empty() && usedNames_.at(slot.name))) continue;
+      sentences.push_back(fmt::format(
+          "the {}{} at the end of the chain is not used; write it, or leave it out",
+          kindName(slot.value.kind()), slot.name.empty() ? "" : " '" + slot.name + "'"));
+    }
+    return sentences;
+  }
+
+ private:
+  void markUsed(Slot& slot) {
+    slot.used = true;
+    if (!slot.name.empty()) usedNames_[slot.name] = true;
+  }
+  std::vector<Slot> slots_;
+  std::map<std::string, Value> named_;
+  std::map<std::string, bool> usedNames_;
+};
+
+/// How far off a result may be, by what can be told from the result itself.
+void estimateError(const Value& value, const Invocation& invocation, StepNotes& notes) {
+  if (value.kind() == Kind::Band) {
+    const levelset::CheckReport report = levelset::check(value.band());
+    notes.errors.push_back({"eikonal residual, mean", report.eikonalMean, ""});
+  } else if (value.kind() == Kind::Mesh && !invocation.operands.empty() &&
+             invocation.operands[0].kind() == Kind::Band) {
+    const levelset::NarrowBand& band = invocation.band();
+    const levelset::BandSampler phi(band, levelset::Interpolation::Tricubic);
+    const levelset::TriMesh& mesh = value.mesh();
+    double worst = 0, sum = 0;
+    for (const auto& t : mesh.triangles) {
+      const Imath::V3d centre =
+          (mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]]) / 3.0;
+      const double distance = std::abs(phi.value(centre)) / band.voxelSize();
+      worst = std::max(worst, distance);
+      sum += distance;
+    }
+    notes.errors.push_back(
+        {"distance of face centres to the zero set, mean",
+         sum / static_cast<double>(std::max<std::size_t>(1, mesh.triangles.size())), "voxels"});
+    notes.errors.push_back({"distance of face centres to the zero set, largest", worst, "voxels"});
+  }
+}
+
+void describeResult(const Value& value, bool dryRun, StepReport& step) {
+  step.resultKind = kindName(value.kind());
+  if (value.kind() == Kind::Band) {
+    step.voxelSize = value.plan().voxelSize;
+    step.halfWidth = value.plan().halfWidth;
+    step.activeVoxels =
+        dryRun ? value.plan().activeVoxels() : static_cast<double>(value.band().activeVoxelCount());
+  } else if (value.kind() == Kind::Mesh && !dryRun) {
+    step.triangles = value.mesh().triangles.size();
+  }
+}
+
+Plan planOf(Invocation& invocation) {
+  const Operator& op = invocation.op();
+  if (op.plan) return op.plan(invocation);
+  Plan plan = invocation.operands.at(0).plan();
+  if (op.resultKind) plan.kind = op.resultKind(invocation);
+  return plan;
+}
+
+void runAction(const Action& action, std::size_t index, const RunSettings& settings, Stack& stack,
+               StepReport& step) {
+  const Operator& op = *action.op;
+  Invocation invocation(op, action.options);
+  invocation.operands = stack.take(action);
+  invocation.maxMemory = settings.maxMemory;
+  invocation.dryRun = settings.dryRun;
+  if (settings.progress) {
+    invocation.progress = [&, index](double fraction) {
+      settings.progress(index, op.name, fraction);
+      return true;
+    };
+  }
+  const auto finish = [&] {
+    step.notes = invocation.notes;
+    if (!invocation.output.empty() && settings.print) settings.print(invocation.output);
+    for (const std::string& text : step.notes.warnings) settings.warn(op.name + ": " + text);
+    for (const std::string& text : step.notes.notes) settings.note(op.name + ": " + text);
+  };
+  try {
+    if (settings.dryRun) {
+      const Plan plan = planOf(invocation);
+      levelset::requireMemory(plan.bytes(), settings.maxMemory, op.name.c_str());
+      if (op.flow == Flow::Makes) {
+        const Value value(plan);
+        describeResult(value, true, step);
+        stack.push(value, action.resultName);
+      }
+    } else {
+      Value value = op.run(invocation);
+      if (op.flow == Flow::Makes) {
+        describeResult(value, false, step);
+        if (settings.measureErrors) estimateError(value, invocation, invocation.notes);
+        stack.push(std::move(value), action.resultName);
+      }
+    }
+  } catch (...) {
+    finish();
+    throw;
+  }
+  finish();
+}
+
+}  // namespace
+
+void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
+  Stack stack;
+  try {
+    for (std::size_t i = 0; i < chain.actions.size(); ++i) {
+      const Action& action = chain.actions[i];
+      StepReport& step = report.steps.emplace_back();
+      step.action = action.op->name;
+      step.parameters = action.options;
+      step.resultName = action.resultName;
+      resetPeak();
+      const auto start = std::chrono::steady_clock::now();
+      const double cpuStart = cpuSeconds();
+      const auto stop = [&] {
+        step.wallSeconds =
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        step.cpuSeconds = cpuSeconds() - cpuStart;
+        step.peakBytes = peakBytes();
+      };
+      try {
+        runAction(action, i, settings, stack, step);
+      } catch (const std::bad_alloc&) {
+        stop();
+        throw levelset::ResourceLimit(fmt::format(
+            "{}: memory ran out; use larger voxels or a narrower band", action.op->name));
+      } catch (...) {
+        stop();
+        throw;
+      }
+      stop();
+    }
+  } catch (const levelset::Error& error) {
+    report.error = error.what();
+    report.exitCode = static_cast<int>(error.exitCode());
+    throw;
+  }
+  for (const std::string& sentence : stack.unused()) {
+    report.warnings.push_back(sentence);
+    settings.warn(sentence);
+  }
+}
+
+}  // namespace pipeline

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "apps/pipeline/chain.h"
+#include "apps/pipeline/invocation.h"
+
+namespace pipeline {
+
+struct RunSettings {
+  bool dryRun = false;
+  bool measureErrors = false;  ///< estimate each result's error: costs a pass over it
+  std::size_t maxMemory = levelset::kNoMemoryLimit;
+  /// Called with the action's place in the chain, its name and the fraction done.
+  std::function<void(std::size_t, const std::string&, double)> progress = {};
+  /// Text for people that an action prints.
+  std::function<void(const std::string&)> print = {};
+  /// One sentence beside the result.
+  std::function<void(const std::string&)> warn = {}, note = {};
+};
+
+struct StepReport {
+  std::string action;
+  std::map<std::string, std::string> parameters;  ///< as written
+  StepNotes notes;
+  double wallSeconds = 0, cpuSeconds = 0;
+  double peakBytes = 0;
+  std::string resultName, resultKind;
+  double activeVoxels = 0, voxelSize = 0, halfWidth = 0;
+  std::size_t triangles = 0;
+};
+
+struct RunReport {
+  std::vector<StepReport> steps;
+  std::vector<std::string> warnings;  ///< about the chain as a whole
+  std::string error;                  ///< the sentence that ended it, if one did
+  int exitCode = 0;
+};
+
+/// Runs the actions in order. A refusal is recorded in the report and then thrown on.
+void run(const Chain& chain, const RunSettings& settings, RunReport& report);
+
+}  // namespace pipeline

@@ -1,0 +1,83 @@
+#include "apps/pipeline/value.h"
+
+namespace pipeline {
+
+using levelset::NarrowBand;
+using levelset::TriMesh;
+
+const char* kindName(Kind kind) {
+  switch (kind) {
+    case Kind::Mesh:
+      return "mesh";
+    case Kind::Band:
+      return "level set";
+    case Kind::Patch:
+      return "patch";
+  }
+  return "";
+}
+
+double Plan::activeVoxels() const {
+  return voxelSize > 0 ? area / (voxelSize * voxelSize) * 2 * halfWidth : 0;
+}
+
+double Plan::bytes() const {
+  // A band fills about a third of its leaf blocks: 12 bytes for each active voxel, as measured.
+  constexpr double kBytesPerVoxel = 12;
+  return kBytesPerVoxel * activeVoxels();
+}
+
+Value::Value(TriMesh mesh) : data_(std::make_shared<const TriMesh>(std::move(mesh))) {}
+Value::Value(NarrowBand band) : data_(std::move(band)) {}
+Value::Value(PatchValue patch) : data_(std::make_shared<const PatchValue>(std::move(patch))) {}
+Value::Value(Plan plan) : plan_(plan) {}
+
+Kind Value::kind() const {
+  switch (data_.index()) {
+    case 1:
+      return Kind::Mesh;
+    case 2:
+      return Kind::Band;
+    case 3:
+      return Kind::Patch;
+    default:
+      return plan_->kind;
+  }
+}
+
+const TriMesh& Value::mesh() const {
+  return *std::get<std::shared_ptr<const TriMesh>>(data_);
+}
+const NarrowBand& Value::band() const {
+  return std::get<NarrowBand>(data_);
+}
+const PatchValue& Value::patch() const {
+  return *std::get<std::shared_ptr<const PatchValue>>(data_);
+}
+
+const Plan& Value::plan() const {
+  if (plan_) return *plan_;
+  Plan plan;
+  plan.kind = kind();
+  switch (plan.kind) {
+    case Kind::Mesh:
+      plan.bounds = bounds(mesh());
+      plan.area = surfaceArea(mesh());
+      break;
+    case Kind::Band:
+      plan.bounds = band().zeroSetBounds();
+      plan.voxelSize = band().voxelSize();
+      plan.halfWidth = band().halfWidth();
+      plan.area = static_cast<double>(band().activeVoxelCount()) * plan.voxelSize * plan.voxelSize /
+                  (2 * plan.halfWidth);
+      break;
+    case Kind::Patch:
+      for (const mapping::ParticleLevel& level : patch().patch.levels)
+        for (const Imath::V3d& p : level.positions) plan.bounds.extendBy(p);
+      break;
+  }
+  plan_ = plan;
+  return *plan_;
+}
+
+}  // namespace pipeline

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Imath/ImathBox.h>
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "levelset/mesh.h"
+#include "levelset/narrow_band.h"
+#include "mapping/patch.h"
+
+namespace pipeline {
+
+enum class Kind { Mesh, Band, Patch };
+[[nodiscard]] const char* kindName(Kind kind);
+
+/// What is known of a value before it is computed: enough to resolve lengths and estimate cost.
+struct Plan {
+  Kind kind = Kind::Band;
+  Imath::Box3d bounds = {};         ///< of the zero set or the vertices, world units
+  double area = 0;             ///< of the surface, world units²
+  double voxelSize = 0;        ///< bands only
+  double halfWidth = 0;        ///< voxels, bands only
+  double smallestStretch = 1;  ///< patches only
+  /// Active voxels that a band of this area takes.
+  [[nodiscard]] double activeVoxels() const;
+  [[nodiscard]] double bytes() const;
+};
+
+/// A patch, and what it takes to make it again once the texture is known (`--height auto`).
+struct PatchValue {
+  mapping::Patch patch;
+  bool autoHeight = false;
+  levelset::NarrowBand base = {};
+  std::array<Imath::V3d, 4> corners = {};
+  mapping::PatchOptions options = {};
+};
+
+/// What flows through a chain: immutable, cheap to copy. In a dry run only the plan is there.
+class Value {
+ public:
+  explicit Value(levelset::TriMesh mesh);
+  explicit Value(levelset::NarrowBand band);
+  explicit Value(PatchValue patch);
+  explicit Value(Plan plan);
+
+  [[nodiscard]] Kind kind() const;
+  [[nodiscard]] const levelset::TriMesh& mesh() const;
+  [[nodiscard]] const levelset::NarrowBand& band() const;
+  [[nodiscard]] const PatchValue& patch() const;
+
+  /// Known, or read off the value and remembered.
+  [[nodiscard]] const Plan& plan() const;
+  [[nodiscard]] double diagonal() const {
+    return plan().bounds.isEmpty() ? 0 : plan().bounds.size().length();
+  }
+
+ private:
+  std::variant<std::monostate, std::shared_ptr<const levelset::TriMesh>, levelset::NarrowBand,
+               std::shared_ptr<const PatchValue>>
+      data_;
+  mutable std::optional<Plan> plan_;
+};
+
+}  // namespace pipeline

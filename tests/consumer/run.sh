@@ -1,0 +1,21 @@
+#!/bin/sh
+# Installs a build in parts, and builds the consumer against what was installed. run.sh BUILD SOURCE
+set -eu
+build=$1
+source=$2
+work=$build/consumer
+rm -rf "$work"
+
+# With levelset alone, nothing else may be looked for.
+cmake --install "$build" --prefix "$work/some" --component levelset >/dev/null
+[ ! -d "$work/some/include/levelsmith/render" ]
+cmake -S "$source" -B "$work/build-some" -G Ninja -DCMAKE_PREFIX_PATH="$work/some" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache >/dev/null
+cmake --build "$work/build-some" >/dev/null
+"$work/build-some/solid"
+
+for component in levelset mapping render; do
+  cmake --install "$build" --prefix "$work/all" --component $component >/dev/null
+done
+cmake -S "$source" -B "$work/build-all" -G Ninja -DCMAKE_PREFIX_PATH="$work/all" -DWITH_RENDER=ON -DCMAKE_CXX_COMPILER_LAUNCHER=ccache >/dev/null
+cmake --build "$work/build-all" >/dev/null
+"$work/build-all/picture"

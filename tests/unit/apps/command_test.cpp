@@ -1,0 +1,172 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/shell.h"
+
+namespace {
+
+using Json = nlohmann::json;
+constexpr double kPi = 3.14159265358979323846;
+
+class Command : public support::ShellTest {
+ protected:
+  Json measure(const std::string& chain) {
+    const auto outcome = levelsmith(chain + " ! measure --json");
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return Json::parse(outcome.out, nullptr, false);
+  }
+};
+
+TEST_F(Command, MeasuresASphere) {
+  const Json m = measure("sphere --radius 1 --voxel 0.05");
+  EXPECT_NEAR(m["volume"], 4 * kPi / 3, 2e-3 * 4 * kPi / 3);
+  EXPECT_NEAR(m["area"], 4 * kPi, 2e-3 * 4 * kPi);
+  EXPECT_NEAR(m["bounds"]["max"][0], 1, 0.05 * 0.05);
+  EXPECT_EQ(m["components"], 1);
+  EXPECT_EQ(m["shells"], 1);
+  EXPECT_EQ(m["cavities"], 0);
+  EXPECT_EQ(m["euler"], 2);
+  EXPECT_DOUBLE_EQ(m["voxel_size"], 0.05);
+  EXPECT_DOUBLE_EQ(m["half_width"], 3);
+}
+
+TEST_F(Command, TakesOlderMinusNewer) {
+  const Json m =
+      measure("box --size 3,3,3 --voxel 0.1 ! sphere --radius 1 --voxel 0.1 ! difference");
+  EXPECT_NEAR(m["volume"], 27 - 4 * kPi / 3, 0.1);
+  EXPECT_EQ(m["cavities"], 1);
+  EXPECT_EQ(m["shells"], 2);
+}
+
+TEST_F(Command, ResolvesLengthsInVoxelsAndPercent) {
+  const double radius = 1, voxel = 0.05;
+  for (const auto& [text, grown] : {std::pair<std::string, double>{"2vx", 2 * voxel},
+                                    {"-0.2", -0.2},
+                                    {"5%", 0.05 * 2 * std::sqrt(3.0) * radius}}) {
+    const Json m = measure("sphere --radius 1 --voxel 0.05 ! offset " + text);
+    EXPECT_NEAR(m["bounds"]["max"][1], radius + grown, 0.05 * voxel) << text;
+  }
+}
+
+TEST_F(Command, ReadsBackWhatItWrites) {
+  ASSERT_EQ(levelsmith("torus --radius 2 --tube 0.7 --voxel 0.1 ! write a.vdb ! mesh ! write a.ply "
+                       "! write a.obj.gz ! write a.stl ! write a.off")
+                .code,
+            0);
+  const Json band = measure("read a.vdb");
+  const double exact = 2 * kPi * kPi * 2 * 0.7 * 0.7;
+  EXPECT_NEAR(band["volume"], exact, 5e-3 * exact);
+  EXPECT_EQ(band["euler"], 0);
+  for (const char* file : {"a.ply", "a.obj.gz", "a.stl", "a.off"}) {
+    const Json mesh = measure(std::string("read ") + file);
+    EXPECT_NEAR(mesh["volume"], band["volume"], 1e-3 * exact) << file;
+    EXPECT_EQ(mesh["closed_manifold"], true) << file;
+  }
+  EXPECT_EQ(fileCount(), 5u);
+}
+
+TEST_F(Command, PipesThroughStandardStreams) {
+  const auto outcome =
+      shell(command() + " --quiet sphere --radius 1 --voxel 0.1 ! mesh ! write - --format ply | " +
+            command() + " read - --format ply ! measure --json");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NEAR(Json::parse(outcome.out)["volume"], 4 * kPi / 3, 0.05);
+}
+
+TEST_F(Command, KeepsDataApartFromTextOnStandardOutput) {
+  const auto outcome = levelsmith("sphere --radius 1 --voxel 0.1 ! check ! measure --json");
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_TRUE(Json::accept(outcome.out)) << outcome.out;
+  EXPECT_NE(outcome.err.find("ok"), std::string::npos);
+}
+
+TEST_F(Command, WarnsOfValuesThatNobodyUses) {
+  const auto outcome = levelsmith("sphere --radius 1 --voxel 0.1");
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_NE(outcome.err.find("not used"), std::string::npos);
+  EXPECT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! measure").err.find("not used"),
+            std::string::npos);
+}
+
+TEST_F(Command, WritesAReport) {
+  ASSERT_EQ(levelsmith("--report r.json box --size 2,2,2 --voxel 0.1 ! mesh ! level-set --voxel "
+                       "0.1 ! offset 2vx ! write a.vdb")
+                .code,
+            0);
+  const Json report = Json::parse(support::slurp(folder_ / "r.json"));
+  ASSERT_EQ(report["steps"].size(), 5u);
+  const Json& offset = report["steps"][3];
+  EXPECT_DOUBLE_EQ(offset["resolved"]["distance"]["world"], 0.2);
+  EXPECT_DOUBLE_EQ(offset["resolved"]["distance"]["voxels"], 2);
+  EXPECT_GT(offset["result"]["active_voxels"], 1000);
+  EXPECT_GT(offset["peak_bytes"], 0);
+  EXPECT_EQ(report["steps"][2]["certificate"]["closed"], true);
+  EXPECT_LT(offset["errors"][0]["value"], 0.1);
+  ASSERT_EQ(levelsmith("--report r.html sphere --radius 1 --voxel 0.1 ! measure").code, 0);
+  EXPECT_NE(support::slurp(folder_ / "r.html").find("<table>"), std::string::npos);
+}
+
+TEST_F(Command, DryRunComputesAndWritesNothing) {
+  const auto outcome =
+      levelsmith("--dry-run sphere --radius 1 --voxel 0.001 ! offset 2vx ! mesh ! write out.ply");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("active voxels"), std::string::npos);
+  EXPECT_FALSE(exists("out.ply"));
+  EXPECT_REFUSED(levelsmith("--dry-run --max-memory 100M sphere --radius 1 --voxel 0.001 ! mesh"),
+                 4, "limit");
+}
+
+TEST_F(Command, MapsATextureAsInTheReadme) {
+  const auto outcome = levelsmith(
+      "box --size 40,40,10 --voxel 0.5 --as base ! torus --radius 4 --tube 1.5 --voxel 0.25 --as "
+      "rings "
+      "! patch @base --corners \"-10,-10,5 10,-10,5 10,10,5 -10,10,5\" --height 8 --levels 6 --as "
+      "p "
+      "! texture @base @rings @p --map rbf --blend 1 ! mesh ! write out.ply ! measure --json",
+      110);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json m = Json::parse(outcome.out);
+  EXPECT_EQ(m["closed_manifold"], true);
+  EXPECT_EQ(m["shells"], 1);
+  EXPECT_EQ(m["components"], 1);
+  EXPECT_GT(m["volume"], 40 * 40 * 10);
+  EXPECT_NEAR(m["bounds"]["max"][2], 5 + 8, 0.5);
+}
+
+TEST_F(Command, RendersExrAndPng) {
+  const auto outcome = levelsmith(
+      "sphere --radius 1 --voxel 0.1 --as s ! render a.exr --size 64x48 --from 3,2,4 --to 0,0,0 ! "
+      "render a.png --size 64x48");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(support::slurp(folder_ / "a.png").substr(1, 3), "PNG");
+  EXPECT_EQ(support::slurp(folder_ / "a.exr").substr(0, 4), "\x76\x2f\x31\x01");
+}
+
+TEST_F(Command, OutputMayEqualInput) {
+  ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! write a.vdb").code, 0);
+  ASSERT_EQ(levelsmith("read a.vdb ! offset 0.2 ! write a.vdb").code, 0);
+  EXPECT_NEAR(measure("read a.vdb")["bounds"]["max"][0], 1.2, 0.01);
+}
+
+TEST_F(Command, TellsWhatIsInAFile) {
+  ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! write a.vdb ! mesh ! write a.ply").code, 0);
+  const Json vdb = Json::parse(levelsmith("info a.vdb --json").out);
+  EXPECT_NEAR(vdb["grids"][0]["voxel_size"], 0.1, 1e-9);
+  EXPECT_EQ(vdb["grids"][0]["class"], "level set");
+  EXPECT_GT(Json::parse(levelsmith("info a.ply --json").out)["vertices"], 100);
+}
+
+TEST_F(Command, TransformsExactlyAndBakesOnRequest) {
+  EXPECT_NEAR(
+      measure("box --size 2,1,1 --voxel 0.05 ! transform --rotate 90 --translate 1,0,0")["bounds"]
+                                                                                        ["max"][1],
+      1, 0.003);
+  EXPECT_NEAR(measure("box --size 1,1,1 --voxel 0.05 ! transform --scale 2,1,1 --bake")["volume"],
+              2, 0.02);
+  EXPECT_REFUSED(levelsmith("box --size 1,1,1 --voxel 0.05 ! transform --mirror x ! measure"), 2,
+                 "--bake");
+}
+
+}  // namespace

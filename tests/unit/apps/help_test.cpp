@@ -1,0 +1,66 @@
+#include "apps/pipeline/help.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "apps/pipeline/units.h"
+#include "tests/support/shell.h"
+
+namespace {
+
+using support::ShellTest;
+
+class Help : public ShellTest {};
+
+TEST_F(Help, ListsEveryAction) {
+  const auto outcome = levelsmith("help");
+  EXPECT_EQ(outcome.code, 0);
+  for (const auto& op : pipeline::operators())
+    EXPECT_NE(outcome.out.find("  " + op.name), std::string::npos) << op.name;
+}
+
+TEST_F(Help, EveryDeclarationIsWhole) {
+  std::set<std::string> names;
+  for (const auto& op : pipeline::operators()) {
+    EXPECT_TRUE(names.insert(op.name).second) << op.name << " is declared twice";
+    EXPECT_FALSE(op.summary.empty()) << op.name;
+    EXPECT_FALSE(op.group.empty()) << op.name;
+    EXPECT_FALSE(op.example.empty()) << op.name;
+    EXPECT_TRUE(op.run) << op.name;
+    std::set<std::string> params;
+    for (const auto& param : op.params) {
+      EXPECT_TRUE(params.insert(param.name).second) << op.name << " --" << param.name;
+      EXPECT_FALSE(param.doc.empty()) << op.name << " --" << param.name;
+      if (!param.fallback.empty())
+        EXPECT_NO_THROW(pipeline::checkText(param, param.fallback, op.name));
+    }
+  }
+}
+
+TEST_F(Help, ShowsOneActionAsTextAndJson) {
+  const auto text = levelsmith("help offset");
+  EXPECT_EQ(text.code, 0);
+  EXPECT_NE(text.out.find("negative shrinks"), std::string::npos);
+  const auto json = nlohmann::json::parse(levelsmith("help offset --json").out);
+  EXPECT_EQ(json["name"], "offset");
+  EXPECT_EQ(json["parameters"][0]["type"], "length");
+}
+
+TEST_F(Help, FindsWordsAndGuesses) {
+  EXPECT_NE(levelsmith("help --search winding").out.find("level-set"), std::string::npos);
+  EXPECT_REFUSED(levelsmith("help ofset"), 2, "did you mean 'offset'");
+}
+
+// The dragon's file is not in the tree: its example is run by the main job.
+TEST_F(Help, ExamplesRun) {
+  for (const auto& op : pipeline::operators()) {
+    ASSERT_TRUE(op.example.starts_with("levelsmith ")) << op.name;
+    if (op.example.find("dragon") != std::string::npos) continue;
+    const auto outcome = levelsmith("--quiet " + op.example.substr(11), 100);
+    EXPECT_EQ(outcome.code, 0) << op.example << "\n" << outcome.err;
+  }
+}
+
+}  // namespace

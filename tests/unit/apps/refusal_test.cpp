@@ -1,0 +1,198 @@
+// Every row of the exit-code table, and the inputs that break other tools: each ends with its code
+// and a sentence, and leaves no file behind.
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+
+#include "tests/support/shell.h"
+
+namespace {
+
+class Refusal : public support::ShellTest {
+ protected:
+  /// A tetrahedron of edge about 1 as ascii PLY, with one vertex replaced.
+  void writeTetrahedron(const std::string& name, const std::string& apex = "0 0 1",
+                        const std::string& type = "float") {
+    writeFile(name, "ply\nformat ascii 1.0\nelement vertex 4\nproperty " + type + " x\nproperty " +
+                        type + " y\nproperty " + type +
+                        " z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n0 "
+                        "0 0\n1 0 0\n0 1 0\n" +
+                        apex + "\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n");
+  }
+  /// An unpierced strip with a half twist.
+  void writeMoebius(const std::string& name) {
+    std::string text;
+    constexpr int kSteps = 48;
+    for (int i = 0; i < kSteps; ++i)
+      for (double side : {-0.3, 0.3}) {
+        const double a = 2 * 3.14159265358979 * i / kSteps, r = 1 + side * std::cos(a / 2);
+        text += "v " + std::to_string(r * std::cos(a)) + " " + std::to_string(r * std::sin(a)) +
+                " " + std::to_string(side * std::sin(a / 2)) + "\n";
+      }
+    for (int i = 0; i < kSteps; ++i) {
+      const int a = 2 * i + 1, b = a + 1;
+      int c = 2 * ((i + 1) % kSteps) + 1, d = c + 1;
+      if (i + 1 == kSteps) std::swap(c, d);
+      text += "f " + std::to_string(a) + " " + std::to_string(c) + " " + std::to_string(d) + " " +
+              std::to_string(b) + "\n";
+    }
+    writeFile(name, text);
+  }
+  static std::string toBand(const std::string& file, const std::string& rest = "--voxel 0.05") {
+    return "read " + file + " ! level-set " + rest + " ! write out.vdb";
+  }
+  void expectNothingWritten(std::size_t inputs) { EXPECT_EQ(fileCount(), inputs); }
+};
+
+TEST_F(Refusal, UsageIsTwo) {
+  EXPECT_REFUSED(levelsmith("spere --radius 1"), 2, "did you mean");
+  EXPECT_REFUSED(levelsmith("sphere --colour red"), 2, "no option");
+  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! union"), 2, "operand");
+  for (const char* bad : {"0", "-0.1", "nan", "inf", "x", "2vx"})
+    EXPECT_REFUSED(levelsmith(std::string("sphere --radius 1 --voxel ") + bad), 2, "voxel");
+  EXPECT_REFUSED(levelsmith("sphere --radius -1 --voxel 0.1"), 2, "positive");
+  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! offset nan"), 2, "finite");
+  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! render a.png --size 0x0"), 2,
+                 "nothing to show");
+  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! write a.xyz"), 2, "format");
+  EXPECT_REFUSED(levelsmith("sphere --radius 1"), 2, "--voxel");
+  expectNothingWritten(0);
+}
+
+TEST_F(Refusal, CorruptMeshFilesAreThree) {
+  writeFile("empty.ply", "");
+  writeFile("empty.obj", "");
+  writeFile("empty.stl", "");
+  writeFile("words.ply", "this is not a mesh\n");
+  writeTetrahedron("nan.ply", "nan 0 1");
+  writeTetrahedron("inf.ply", "0 inf 1");
+  writeFile("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
+  writeFile("zero.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n");
+  writeFile(
+      "claims.ply",
+      "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty "
+      "float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n");
+  ASSERT_EQ(
+      levelsmith("sphere --radius 1 --voxel 0.2 ! mesh ! write whole.ply ! write whole.stl").code,
+      0);
+  const std::string ply = support::slurp(folder_ / "whole.ply"),
+                    stl = support::slurp(folder_ / "whole.stl");
+  writeFile("cut.ply", ply.substr(0, ply.size() / 2));
+  writeFile("cut.stl", stl.substr(0, stl.size() / 2));
+  for (const char* file : {"empty.ply", "empty.obj", "empty.stl", "words.ply", "nan.ply", "inf.ply",
+                           "range.obj", "zero.obj", "claims.ply", "cut.ply", "cut.stl"})
+    EXPECT_REFUSED(levelsmith(toBand(file), 10), 3, file);
+  EXPECT_FALSE(exists("out.vdb"));
+}
+
+TEST_F(Refusal, CorruptBandFilesAreThree) {
+  ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! write whole.vdb").code, 0);
+  const std::string vdb = support::slurp(folder_ / "whole.vdb");
+  for (int part = 0; part < 10; ++part) {
+    writeFile("cut.vdb", vdb.substr(0, vdb.size() * static_cast<std::size_t>(part) / 10));
+    EXPECT_REFUSED(levelsmith("read cut.vdb ! write out.ply --format vdb", 20), 3, "cut.vdb");
+  }
+  writeFile("words.vdb", "not a vdb at all");
+  EXPECT_REFUSED(levelsmith("read words.vdb ! measure"), 3, "words.vdb");
+  EXPECT_REFUSED(levelsmith("read whole.vdb --grid density ! measure"), 3, "density");
+}
+
+TEST_F(Refusal, MeshesThatCannotBeUsedAsAskedAreThree) {
+  writeFile("triangle.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_REFUSED(levelsmith(toBand("triangle.obj")), 3, "level-set");
+  writeFile("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
+  EXPECT_REFUSED(levelsmith(toBand("open.obj", "--voxel 0.05 --sign closed")), 3, "boundary");
+  writeMoebius("moebius.obj");
+  EXPECT_REFUSED(levelsmith(toBand("moebius.obj", "--voxel 0.05 --sign closed")), 3, "level-set");
+  EXPECT_REFUSED(levelsmith(toBand("moebius.obj", "--voxel 0.05 --sign winding")), 3, "level-set");
+  writeTetrahedron("tetra.ply");
+  EXPECT_REFUSED(levelsmith(toBand("tetra.ply", "--voxel 5")), 3, "voxel");
+  EXPECT_FALSE(exists("out.vdb"));
+}
+
+TEST_F(Refusal, CoordinatesTooCoarseForTheVoxelAreThree) {
+  std::string obj;
+  writeFile("far.ply",
+            "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty "
+            "float z\nelement face 4\n"
+            "property list uchar int vertex_indices\nend_header\n10000000 0 0\n10000004 0 "
+            "0\n10000000 4 0\n10000000 0 4\n"
+            "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n");
+  EXPECT_REFUSED(levelsmith(toBand("far.ply", "--voxel 0.02")), 3, "level-set");
+  EXPECT_FALSE(exists("out.vdb"));
+}
+
+TEST_F(Refusal, ResourcesAreFour) {
+  writeTetrahedron("tetra.ply");
+  EXPECT_REFUSED(levelsmith(toBand("tetra.ply", "--voxel 1e-9"), 10), 4, "level-set");
+  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 1e-9 ! write out.vdb", 10), 4, "sphere");
+  EXPECT_REFUSED(levelsmith("--max-memory 50M sphere --radius 1 --voxel 0.002 ! write out.vdb", 30),
+                 4, "emory");
+  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! offset 1e6 ! write out.vdb", 10), 4,
+                 "offset");
+  EXPECT_REFUSED(
+      levelsmith("sphere --radius 1 --voxel 0.1 ! render a.png --size 1000000x1000000", 10), 4,
+      "image");
+  expectNothingWritten(1);
+}
+
+TEST_F(Refusal, OneVertexFarAwayEndsAtOnce) {
+  writeTetrahedron("far.ply", "0 0 1e30");
+  const auto outcome = levelsmith(toBand("far.ply"), 10);
+  EXPECT_TRUE(outcome.code == 3 || outcome.code == 4) << outcome.code << outcome.err;
+  EXPECT_NE(outcome.err.find("level-set"), std::string::npos) << outcome.err;
+  EXPECT_FALSE(exists("out.vdb"));
+}
+
+TEST_F(Refusal, FilesAreSix) {
+  EXPECT_REFUSED(levelsmith("read missing.ply ! measure"), 6, "missing.ply");
+  ASSERT_EQ(shell("mkdir folder.ply").code, 0);
+  EXPECT_REFUSED(levelsmith("read folder.ply ! measure"), 6, "folder.ply");
+  const std::string sphere = "sphere --radius 1 --voxel 0.2 ! mesh ! ";
+  EXPECT_REFUSED(levelsmith(sphere + "write nowhere/out.ply"), 6, "nowhere");
+  EXPECT_REFUSED(levelsmith(sphere + "write folder.ply"), 6, "folder.ply");
+  EXPECT_REFUSED(levelsmith(sphere + "write /dev/full --format ply"), 6, "/dev/full");
+  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.2 ! write /dev/full --format vdb"), 6,
+                 "/dev/full");
+  EXPECT_REFUSED(
+      levelsmith("sphere --radius 1 --voxel 0.2 ! render /dev/full --format png --size 32x32"), 6,
+      "/dev/full");
+  EXPECT_EQ(shell(command() + " help > /dev/full").code, 6);
+  EXPECT_EQ(levelsmith(sphere + "write out.ply").code, 0);
+  const std::string before = support::slurp(folder_ / "out.ply");
+  EXPECT_REFUSED(levelsmith("--no-clobber sphere --radius 2 --voxel 0.2 ! mesh ! write out.ply"), 6,
+                 "out.ply");
+  EXPECT_EQ(support::slurp(folder_ / "out.ply"), before);
+  expectNothingWritten(2);
+}
+
+TEST_F(Refusal, InterruptedIsOneHundredAndThirty) {
+  writeFile("out.vdb", "what was there");
+  for (const char* delay : {"0.2", "0.7", "1.5"}) {
+    const auto outcome = shell(
+        command() +
+        " --quiet sphere --radius 1 --voxel 0.004 ! offset 3vx ! write out.vdb & pid=$!; sleep " +
+        delay +
+        "; kill -INT $pid; s=$(date +%s%N); wait $pid; code=$?; e=$(date +%s%N); "
+        "[ $(( (e - s) / 1000000 )) -lt 500 ] || exit 99; exit $code");
+    EXPECT_EQ(outcome.code, 130) << outcome.err;
+    EXPECT_NE(outcome.err.find("interrupted"), std::string::npos);
+    EXPECT_EQ(support::slurp(folder_ / "out.vdb"), "what was there");
+    expectNothingWritten(1);
+  }
+}
+
+TEST_F(Refusal, NestedShellsKeepTheirCavity) {
+  ASSERT_EQ(levelsmith("box --size 3,3,3 --voxel 0.1 ! sphere --radius 1 --voxel 0.1 ! difference "
+                       "! mesh ! write nested.ply")
+                .code,
+            0);
+  const auto outcome = levelsmith("read nested.ply ! level-set --voxel 0.1 ! measure --json");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("\"cavities\": 1"), std::string::npos) << outcome.out;
+}
+
+}  // namespace
