@@ -21,7 +21,8 @@ struct RedistanceOptions {
 /// Beside the interface each grid point finds the closest point on a local high-order interpolant;
 /// from there closest points travel outwards block by block, and each grid point keeps the nearest.
 /// The result does not depend on the order of blocks or on the number of threads.
-/// @param field  right sign everywhere, Lipschitz, any slope; only values beside the zero set are read
+/// @param field  right sign everywhere, Lipschitz, any slope; only values beside the zero set are
+/// read
 /// @throws InvalidInput if the field has no zero crossing
 [[nodiscard]] NarrowBand redistance(NarrowBand field, const RedistanceOptions& options = {});
 

@@ -1,0 +1,29 @@
+#pragma once
+
+// For the .cpp files of levelset/eikonal and levelset/solids only.
+
+#include <optional>
+
+#include "levelset/progress.h"
+#include "levelset/vdb.h"
+
+namespace levelset::eikonal {
+
+/// Which distances are made, in voxels. The result is d − shift where |d − shift| < halfWidth.
+struct DistanceRequest {
+  const char* action = "redistance";  ///< for messages
+  double halfWidth = 3;
+  double shift = 0;  ///< moves the surface outwards (> 0) or inwards
+  std::optional<openvdb::CoordBBox> region = {};
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
+};
+
+/// The signed distance to the zero set of `field`, on the same grid points.
+/// Points of the zero set are found beside it (surface_points.h), the nearest of them travels
+/// outwards (propagate.h), and each grid point polishes the one it got on the interpolant.
+/// @throws InvalidInput without a zero crossing; ResourceLimit before too much is allocated
+[[nodiscard]] openvdb::FloatGrid::Ptr distanceTransform(const openvdb::FloatGrid& field,
+                                                        const DistanceRequest& request);
+
+}  // namespace levelset::eikonal

@@ -1,0 +1,77 @@
+#pragma once
+
+// For the .cpp files of levelset/eikonal and levelset/solids only.
+
+#include <array>
+#include <cstring>
+
+#include "levelset/vdb.h"
+
+namespace levelset::eikonal {
+
+/// Value and derivatives up to the second of an interpolated field, per voxel.
+struct Jet {
+  double value = 0;
+  openvdb::Vec3d gradient;
+  double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
+
+  [[nodiscard]] openvdb::Vec3d hessianTimes(const openvdb::Vec3d& v) const {
+    return {xx * v.x() + xy * v.y() + xz * v.z(), xy * v.x() + yy * v.y() + yz * v.z(),
+            xz * v.x() + yz * v.y() + zz * v.z()};
+  }
+};
+
+/// Dense copy of a leaf block of a tree and of four grid points on each side of it. Interpolates
+/// tricubically (Catmull-Rom: passes through the grid values, C¹). Positions are in voxels from the
+/// first grid point of the leaf.
+class DenseBlock {
+ public:
+  static constexpr int kPad = 4;
+  static constexpr int kSide = 16;
+  /// Where the 4³ stencil lies inside the copy.
+  static constexpr double kDomainMin = 1 - kPad;
+  static constexpr double kDomainMax = kSide - kPad - 2;
+
+  /// Reads the values around the leaf block that begins at `origin`.
+  void load(const openvdb::FloatGrid::ConstAccessor& accessor, const openvdb::Coord& origin);
+
+  [[nodiscard]] const openvdb::Coord& origin() const { return origin_; }
+  [[nodiscard]] float at(int x, int y, int z) const {
+    return values_[static_cast<std::size_t>(((x + kPad) * kSide + y + kPad) * kSide + z + kPad)];
+  }
+  [[nodiscard]] static bool contains(const openvdb::Vec3d& p) {
+    for (int i = 0; i < 3; ++i)
+      if (!(p[i] >= kDomainMin && p[i] < kDomainMax)) return false;
+    return true;
+  }
+  /// @pre contains(p)
+  [[nodiscard]] Jet jet(const openvdb::Vec3d& p) const;
+
+ private:
+  openvdb::Coord origin_;
+  alignas(64) std::array<float, kSide * kSide * kSide> values_;
+};
+
+/// A few dense blocks of one tree, kept while neighbouring positions are asked for. One per thread.
+class DenseBlockCache {
+ public:
+  explicit DenseBlockCache(const openvdb::FloatTree& tree) : accessor_(tree) {}
+  /// The block whose leaf holds the cell of `position` (index space).
+  const DenseBlock& around(const openvdb::Vec3d& position);
+
+ private:
+  struct Slot {
+    bool used = false;
+    DenseBlock block;
+  };
+  static constexpr std::size_t kSlots = 64;
+  openvdb::FloatGrid::ConstAccessor accessor_;
+  std::vector<Slot> slots_ = std::vector<Slot>(kSlots);
+};
+
+/// First grid point of the leaf block that holds a position.
+[[nodiscard]] inline openvdb::Coord leafOrigin(const openvdb::Vec3d& position) {
+  return openvdb::Coord::floor(position) & ~7;
+}
+
+}  // namespace levelset::eikonal

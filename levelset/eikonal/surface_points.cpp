@@ -1,0 +1,207 @@
+#include "levelset/eikonal/surface_points.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "levelset/eikonal/closest_point.h"
+
+namespace levelset::eikonal {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using openvdb::Vec3d;
+using LeafNode = FloatTree::LeafNodeType;
+
+constexpr std::array<std::array<int, 3>, 6> kDirections = {
+    {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}}};
+
+// Linear crossings stand off the interpolant's by up to about this much.
+constexpr double kCrossingTolerance = 0.05;
+
+Vec3d vectorOf(const std::array<int, 3>& d) {
+  return Vec3d(d[0], d[1], d[2]);
+}
+
+/// Where linear interpolation puts the crossings on the six edges at a grid point; 2 = no crossing.
+struct Crossings {
+  std::array<double, 6> at;
+  int nearest = 0;
+
+  Crossings(const DenseBlock& block, int x, int y, int z, float background) {
+    const float here = block.at(x, y, z);
+    for (int i = 0; i < 6; ++i) {
+      const auto& d = kDirections[static_cast<std::size_t>(i)];
+      const float there = block.at(x + d[0], y + d[1], z + d[2]);
+      const bool informs = std::abs(here) < background || std::abs(there) < background;
+      const double a = here, b = there;
+      at[static_cast<std::size_t>(i)] = (here < 0) != (there < 0) && informs ? a / (a - b) : 2;
+      if (at[static_cast<std::size_t>(i)] < at[static_cast<std::size_t>(nearest)]) nearest = i;
+    }
+  }
+  [[nodiscard]] double nearestDistance() const { return at[static_cast<std::size_t>(nearest)]; }
+  [[nodiscard]] Vec3d offset(int i) const {
+    return vectorOf(kDirections[static_cast<std::size_t>(i)]) * at[static_cast<std::size_t>(i)];
+  }
+};
+
+/// The gradient's guess where it is plausible, else the nearest crossing.
+Vec3d firstGuess(const DenseBlock& block, int x, int y, int z, const Crossings& crossings) {
+  const auto difference = [&](int dx, int dy, int dz) {
+    const double ahead = block.at(x + dx, y + dy, z + dz),
+                 behind = block.at(x - dx, y - dy, z - dz);
+    return (ahead - behind) / 2;
+  };
+  const Vec3d gradient(difference(1, 0, 0), difference(0, 1, 0), difference(0, 0, 1));
+  const double squared = gradient.lengthSqr();
+  if (squared > 0) {
+    const Vec3d step = gradient * (-static_cast<double>(block.at(x, y, z)) / squared);
+    if (step.length() <= crossings.nearestDistance() + kCrossingTolerance) return step;
+  }
+  return crossings.offset(crossings.nearest);
+}
+
+/// Closest point of the zero set to a grid point beside it. Each crossing nearer than what Newton's
+/// method found is a start of its own, so both walls of a narrow gap are seen.
+Vec3d findFoot(const DenseBlock& block, int x, int y, int z, const Crossings& crossings) {
+  const Vec3d from(x, y, z);
+  Foot best = closestPoint(block, from, from + firstGuess(block, x, y, z, crossings));
+  for (int i = 0; i < 6; ++i) {
+    const double distance = crossings.at[static_cast<std::size_t>(i)];
+    if (distance > 1 || (best.converged && distance > best.distance - kCrossingTolerance)) continue;
+    const Foot other = closestPoint(block, from, from + crossings.offset(i));
+    if (other.converged && (!best.converged || other.distance < best.distance)) best = other;
+  }
+  // On creases the method may find no rest; the crossing does lie on the surface.
+  const bool plausible =
+      best.converged && best.distance <= crossings.nearestDistance() + 4 * kCrossingTolerance;
+  return plausible ? best.point : from + crossings.offset(crossings.nearest);
+}
+
+template <typename Visit>
+void forEachPointBeside(const DenseBlock& block, float background, const Visit& visit) {
+  for (int x = 0; x < 8; ++x)
+    for (int y = 0; y < 8; ++y)
+      for (int z = 0; z < 8; ++z) {
+        const bool inside = block.at(x, y, z) < 0;
+        const bool beside =
+            (block.at(x - 1, y, z) < 0) != inside || (block.at(x + 1, y, z) < 0) != inside ||
+            (block.at(x, y - 1, z) < 0) != inside || (block.at(x, y + 1, z) < 0) != inside ||
+            (block.at(x, y, z - 1) < 0) != inside || (block.at(x, y, z + 1) < 0) != inside;
+        if (!beside) continue;
+        const Crossings crossings(block, x, y, z, background);
+        if (crossings.nearestDistance() <= 1) visit(x, y, z, crossings);
+      }
+}
+
+std::vector<const LeafNode*> leavesOf(const FloatTree& tree,
+                                      const std::optional<openvdb::CoordBBox>& within) {
+  std::vector<const LeafNode*> leaves;
+  for (auto it = tree.cbeginLeaf(); it; ++it)
+    if (!within || within->hasOverlap(it->getNodeBoundingBox())) leaves.push_back(it.getLeaf());
+  return leaves;
+}
+
+/// Calls work(leaf number, dense block around it) for all, in parallel.
+template <typename Work>
+void forEachBlock(const FloatTree& tree, const std::vector<const LeafNode*>& leaves,
+                  const Work& work) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16), [&](const auto& range) {
+    const FloatGrid::ConstAccessor accessor(tree);
+    const auto block = std::make_unique<DenseBlock>();
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      block->load(accessor, leaves[i]->origin());
+      work(i, *block);
+    }
+  });
+}
+
+/// Linear extrapolation to a grid point that holds the bare background, from pairs behind it along
+/// the axes: the mean of what they say, beyond the background. 0 = there is no such pair.
+float extrapolate(const DenseBlock& block, int x, int y, int z, float background) {
+  const float sign = block.at(x, y, z) < 0 ? -1.0f : 1.0f;
+  float sum = 0, count = 0;
+  for (const auto& d : kDirections) {
+    const float near = sign * block.at(x + d[0], y + d[1], z + d[2]);
+    const float far = sign * block.at(x + 2 * d[0], y + 2 * d[1], z + 2 * d[2]);
+    if (std::abs(near) == background || std::abs(far) == background || near < far) continue;
+    sum += std::max(background * 1.000001f, 2 * near - far);
+    ++count;
+  }
+  return count > 0 ? sign * sum / count : 0;
+}
+
+void addLayer(FloatTree& tree) {
+  const float background = tree.background();
+  std::vector<Coord> origins;
+  for (const LeafNode* leaf : leavesOf(tree, {})) origins.push_back(leaf->origin());
+  for (const Coord& o : origins)
+    for (const auto& d : kDirections) tree.touchLeaf(o.offsetBy(8 * d[0], 8 * d[1], 8 * d[2]));
+  const std::vector<const LeafNode*> leaves = leavesOf(tree, {});
+  std::vector<std::vector<std::pair<openvdb::Index, float>>> additions(leaves.size());
+  forEachBlock(tree, leaves, [&](std::size_t i, const DenseBlock& block) {
+    for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
+      const Coord c = LeafNode::offsetToLocalCoord(n);
+      if (std::abs(block.at(c.x(), c.y(), c.z())) != background) continue;
+      const float value = extrapolate(block, c.x(), c.y(), c.z(), background);
+      if (value != 0) additions[i].emplace_back(n, value);
+    }
+  });
+  std::size_t i = 0;
+  for (auto leaf = tree.beginLeaf(); leaf; ++leaf, ++i)
+    for (const auto& [n, value] : additions[i]) leaf->setValueOnly(n, value);
+}
+
+/// Does the interpolant beside this grid point reach grid points without a distance?
+bool isThinAt(const DenseBlock& block, int x, int y, int z, float background) {
+  const float here = std::abs(block.at(x, y, z));
+  for (const auto& d : kDirections) {
+    const float one = std::abs(block.at(x + d[0], y + d[1], z + d[2]));
+    const float two = std::abs(block.at(x + 2 * d[0], y + 2 * d[1], z + 2 * d[2]));
+    if (one >= background || (two >= background && here < 0.75f * std::abs(one - here)))
+      return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+SurfacePoints findSurfacePoints(const FloatTree& field,
+                                const std::optional<openvdb::CoordBBox>& within) {
+  const std::vector<const LeafNode*> leaves = leavesOf(field, within);
+  const float background = field.background();
+  std::vector<SurfacePoints> found(leaves.size());
+  forEachBlock(field, leaves, [&](std::size_t i, const DenseBlock& block) {
+    forEachPointBeside(block, background, [&](int x, int y, int z, const Crossings& crossings) {
+      const Vec3d origin = block.origin().asVec3d();
+      found[i].positions.push_back(origin + findFoot(block, x, y, z, crossings));
+      found[i].gridPoints.push_back(block.origin().offsetBy(x, y, z));
+      found[i].thin = found[i].thin || isThinAt(block, x, y, z, background);
+    });
+  });
+  SurfacePoints all;
+  std::size_t count = 0;
+  for (const SurfacePoints& part : found) count += part.size();
+  all.positions.reserve(count);
+  all.gridPoints.reserve(count);
+  for (const SurfacePoints& part : found) {
+    all.positions.insert(all.positions.end(), part.positions.begin(), part.positions.end());
+    all.gridPoints.insert(all.gridPoints.end(), part.gridPoints.begin(), part.gridPoints.end());
+    all.thin = all.thin || part.thin;
+  }
+  return all;
+}
+
+FloatTree::Ptr thicken(const FloatTree& field) {
+  auto result = std::make_shared<FloatTree>(field);
+  addLayer(*result);
+  addLayer(*result);
+  return result;
+}
+
+}  // namespace levelset::eikonal

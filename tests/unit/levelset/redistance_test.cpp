@@ -1,0 +1,246 @@
+#include "levelset/eikonal/redistance.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/tools/Diagnostics.h>
+#include <tbb/global_control.h>
+
+#include <limits>
+
+#include "levelset/error.h"
+#include "levelset/vdb.h"
+#include "tests/support/bands.h"
+
+namespace {
+
+using namespace levelset;
+using Imath::V3d;
+using Shape = std::function<double(const V3d&)>;
+
+struct BandError {
+  double l1 = 0, linf = 0;  ///< voxels
+  std::size_t count = 0;
+};
+
+BandError bandError(const NarrowBand& band, const Shape& exact) {
+  BandError e;
+  support::forEachActive(band, [&](const V3d& p, double value) {
+    const double error = std::abs(value - exact(p)) / band.voxelSize();
+    e.l1 += error;
+    e.linf = std::max(e.linf, error);
+    ++e.count;
+  });
+  e.l1 /= static_cast<double>(e.count);
+  return e;
+}
+
+/// Mean distance to `exact` of the places where values change sign along an edge of the grid, found
+/// by cubic interpolation: how far the surface is off, in voxels.
+double surfaceError(const NarrowBand& band, const Shape& exact) {
+  const openvdb::FloatGrid& grid = vdb(band);
+  auto accessor = grid.getConstAccessor();
+  double sum = 0, count = 0;
+  for (auto it = grid.cbeginValueOn(); it; ++it)
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto at = [&](int k) {
+        openvdb::Coord c = it.getCoord();
+        c[axis] += k;
+        return static_cast<double>(accessor.getValue(c));
+      };
+      const double a = at(-1), b = at(0), c = at(1), d = at(2);
+      if ((b < 0) == (c < 0)) continue;
+      double t = b / (b - c);
+      for (int i = 0; i < 5; ++i) {
+        const double c1 = (c - a) / 2, c2 = a - 2.5 * b + 2 * c - 0.5 * d,
+                     c3 = 1.5 * (b - c) + (d - a) / 2;
+        t -= (((c3 * t + c2) * t + c1) * t + b) / ((3 * c3 * t + 2 * c2) * t + c1);
+      }
+      openvdb::Vec3d p = it.getCoord().asVec3d();
+      p[axis] += t;
+      sum += std::abs(exact(toImath(grid.indexToWorld(p)))) / band.voxelSize();
+      ++count;
+    }
+  return sum / count;
+}
+
+const V3d kCentre(0.013, -0.007, 0.021);
+
+Shape sphere(double radius) {
+  return [=](const V3d& p) { return (p - kCentre).length() - radius; };
+}
+
+/// A sphere whose slope runs from 0.7 to 2.3.
+Shape distortedSphere(double radius) {
+  return [=](const V3d& p) {
+    const V3d q = (p - kCentre) / radius;
+    return sphere(radius)(p) * (1.5 + 0.8 * std::sin(3 * q.x) * std::cos(2 * q.y + q.z));
+  };
+}
+
+Shape box(const V3d& half) {
+  return [=](const V3d& p) {
+    const V3d q(std::abs(p.x) - half.x, std::abs(p.y) - half.y, std::abs(p.z) - half.z);
+    const V3d out(std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0));
+    return out.length() + std::min(0.0, std::max({q.x, q.y, q.z}));
+  };
+}
+
+NarrowBand sampleUnit(const Shape& shape, int voxelsPerUnit, double halfWidth = 3,
+                      double size = 1.1) {
+  return support::sampleBand(shape, {V3d(-size), V3d(size)}, 1.0 / voxelsPerUnit, halfWidth);
+}
+
+void expectSound(const NarrowBand& band) {
+  EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(band), 6), "");
+}
+
+TEST(Redistance, KeepsAnExactDistance) {
+  const NarrowBand result = redistance(sampleUnit(sphere(1), 24));
+  EXPECT_LE(bandError(result, sphere(1)).linf, 2e-3);
+  EXPECT_NEAR(result.halfWidth(), 3, 1e-6);
+  expectSound(result);
+}
+
+TEST(Redistance, MendsSlopesWithoutMovingTheSurface) {
+  const NarrowBand field = sampleUnit(distortedSphere(1), 64);
+  const NarrowBand result = redistance(field);
+  EXPECT_LE(bandError(result, sphere(1)).linf, 0.05);
+  EXPECT_LE(surfaceError(result, sphere(1)), 1e-3);
+  expectSound(result);
+}
+
+TEST(Redistance, ConvergesSecondOrderOverTheBand) {
+  double previous = 0;
+  for (const int n : {12, 24, 48}) {
+    // Errors in voxels times the voxel size.
+    const double error =
+        bandError(redistance(sampleUnit(distortedSphere(1), n)), sphere(1)).linf / n;
+    if (previous > 0) {
+      EXPECT_GE(std::log2(previous / error), 1.8) << "at " << n;
+    }
+    previous = error;
+  }
+}
+
+TEST(Redistance, ReachesAsFarAsAsked) {
+  const int n = 20;
+  const NarrowBand result = redistance(sampleUnit(sphere(1), n), {.halfWidth = 1.5 * n});
+  const BandError e = bandError(result, sphere(1));
+  EXPECT_NEAR(static_cast<double>(e.count), 4.0 / 3 * M_PI * std::pow(2.5 * n, 3), 0.01 * 1e6);
+  EXPECT_LE(e.l1, 1e-3);
+  // At the centre every point of the sphere is as near; there the error is first order.
+  EXPECT_LE(e.linf, 0.1);
+  expectSound(result);
+}
+
+TEST(Redistance, StaysInItsRegion) {
+  const int n = 20;
+  const Imath::Box3d region(V3d(0.5, -0.3, 0.8), V3d(1.2, 0.5, 1.7));
+  const NarrowBand field = sampleUnit(sphere(1), n);
+  const NarrowBand part = redistance(field, {.halfWidth = 15, .region = region});
+  const NarrowBand whole = redistance(field, {.halfWidth = 15});
+  auto accessor = vdb(whole).getConstAccessor();
+  std::size_t count = 0;
+  for (auto it = vdb(part).cbeginValueOn(); it; ++it, ++count) {
+    const V3d p = toImath(vdb(part).indexToWorld(it.getCoord()));
+    EXPECT_TRUE(Imath::Box3d(region.min - V3d(1.0 / n), region.max + V3d(1.0 / n)).intersects(p));
+    ASSERT_NEAR(*it * n, accessor.getValue(it.getCoord()) * n, 2e-3);
+  }
+  EXPECT_GT(count, 1000u);
+  // Signs hold outside the region as well.
+  EXPECT_LT(vdb(part).tree().getValue(openvdb::Coord(0)), 0);
+  EXPECT_LT(vdb(part).tree().getValue(openvdb::Coord(-n + 2, 0, 0)), 0);
+  EXPECT_GT(vdb(part).tree().getValue(openvdb::Coord(-n - 2, 0, 0)), 0);
+}
+
+TEST(Redistance, MeasuresRoundTheEdgesOfACube) {
+  const V3d half(0.413, 0.377, 0.291);
+  const int n = 32;
+  const NarrowBand flat = sampleUnit(
+      [=](const V3d& p) {
+        return std::max({std::abs(p.x) - half.x, std::abs(p.y) - half.y, std::abs(p.z) - half.z});
+      },
+      n, 4, 0.5);
+  const NarrowBand result = redistance(flat, {.halfWidth = 8});
+  double nearFaces = 0, nearEdges = 0;  // by where the closest point lies
+  support::forEachActive(result, [&](const V3d& p, double value) {
+    const double error = std::abs(value - box(half)(p)) * n;
+    int free = 0;  // axes along which the closest point is well inside a face
+    for (int i = 0; i < 3; ++i) free += std::abs(p[i]) < half[i] - 2.0 / n;
+    double& worst = box(half)(p) > 0 && free == 2 ? nearFaces : nearEdges;
+    worst = std::max(worst, error);
+  });
+  EXPECT_LE(nearFaces, 0.01);
+  // The grid shows an edge to about half a voxel, and all the wedge outside measures from there.
+  EXPECT_LE(nearEdges, 0.5);
+  expectSound(result);
+}
+
+TEST(Redistance, SeesBothWallsOfANarrowGap) {
+  // Two slabs 1.6 voxels apart: grid points in the gap have a wall on either side.
+  const double gap = 0.8;
+  const NarrowBand field = support::sampleBand(
+      [=](const V3d& p) { return gap - std::abs(p.z - 0.3); }, {V3d(-12), V3d(12)}, 1, 3);
+  const NarrowBand result = redistance(field);
+  double worst = 0;
+  support::forEachActive(result, [&](const V3d& p, double value) {
+    if (std::max(std::abs(p.x), std::abs(p.y)) > 6 || std::abs(p.z) > 3) return;
+    worst = std::max(worst, std::abs(value - (gap - std::abs(p.z - 0.3))));
+  });
+  EXPECT_LE(worst, 0.2);
+}
+
+TEST(Redistance, IsStableUnderRepetition) {
+  NarrowBand band = sampleUnit(sphere(1), 24);
+  for (int i = 0; i < 10; ++i) band = redistance(std::move(band));
+  EXPECT_LE(surfaceError(band, sphere(1)), 1e-3);
+  EXPECT_LE(bandError(band, sphere(1)).linf, 5e-3);
+}
+
+TEST(Redistance, CountsZeroAsOutside) {
+  // Faces on grid points, one of them a single layer thick beside the band's end.
+  const NarrowBand field =
+      support::sampleBand(box(V3d(8, 6, 4)), {V3d(-8, -6, -4), V3d(8, 6, 4)}, 1, 3);
+  const NarrowBand result = redistance(field);
+  EXPECT_EQ(vdb(result).tree().getValue(openvdb::Coord(8, 0, 0)), 0.0f);
+  EXPECT_FALSE(std::signbit(vdb(result).tree().getValue(openvdb::Coord(8, 0, 0))));
+  EXPECT_NEAR(vdb(result).tree().getValue(openvdb::Coord(7, 0, 0)), -1, 1e-3);
+  EXPECT_NEAR(vdb(result).tree().getValue(openvdb::Coord(10, 0, 0)), 2, 1e-3);
+  expectSound(result);
+}
+
+TEST(Redistance, ReadsABandOfTwoVoxels) {
+  // Slopes of 2.3 in a band of three leave little more than one voxel on each side.
+  const int n = 32;
+  const NarrowBand result =
+      redistance(sampleUnit([](const V3d& p) { return 2.3 * sphere(1)(p); }, n), {.halfWidth = 5});
+  EXPECT_LE(bandError(result, sphere(1)).linf, 0.03);
+}
+
+TEST(Redistance, DoesNotDependOnThreads) {
+  const NarrowBand field = sampleUnit(distortedSphere(1), 24);
+  std::uint64_t hashes[3];
+  for (int threads : {1, 2, 4}) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                              static_cast<std::size_t>(threads));
+    hashes[threads / 2] = redistance(field, {.halfWidth = 10}).contentHash();
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+  EXPECT_EQ(hashes[0], hashes[2]);
+}
+
+TEST(Redistance, Refuses) {
+  EXPECT_THROW((void)redistance(NarrowBand()), InvalidInput);
+  const NarrowBand positive = sampleUnit([](const V3d& p) { return std::abs(sphere(1)(p)); }, 10);
+  EXPECT_THROW((void)redistance(positive), InvalidInput);
+  const NarrowBand ball = sampleUnit(sphere(1), 10);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW((void)redistance(ball, {.halfWidth = nan}), UsageError);
+  EXPECT_THROW((void)redistance(ball, {.halfWidth = 0.5}), UsageError);
+  EXPECT_THROW((void)redistance(ball, {.region = Imath::Box3d()}), UsageError);
+  EXPECT_THROW((void)redistance(ball, {.region = Imath::Box3d(V3d(50), V3d(51))}), InvalidInput);
+  EXPECT_THROW((void)redistance(ball, {.halfWidth = 1e6}), ResourceLimit);
+  EXPECT_THROW((void)redistance(ball, {.halfWidth = 50, .maxMemory = 100000}), ResourceLimit);
+  EXPECT_THROW((void)redistance(ball, {.progress = [](double) { return false; }}), Cancelled);
+}
+
+}  // namespace
