@@ -22,11 +22,14 @@ enum class TextureMerge {
 
 struct TextureOptions {
   TextureMerge merge = TextureMerge::Union;
-  std::optional<double> sink = {};          ///< how deep the texture dips below the surface, world units; empty: one voxel
-  double blend = 0;                         ///< radius along the seam, world units; 0: none
-  std::optional<Imath::Box3d> textureBox = {};  ///< what the unit cube of u, v, w is; empty: the texture's zero-set box
-  std::optional<double> voxelSize = {};     ///< empty: the finest of base and texture × smallest stretch
-  double halfWidth = 3;                     ///< voxels
+  std::optional<double> sink =
+      {};            ///< how deep the texture dips below the surface, world units; empty: one voxel
+  double blend = 0;  ///< radius along the seam, world units; 0: none
+  std::optional<Imath::Box3d> textureBox =
+      {};  ///< what the unit cube of u, v, w is; empty: the texture's zero-set box
+  std::optional<double> voxelSize =
+      {};                ///< empty: the finest of base and texture × smallest stretch
+  double halfWidth = 3;  ///< voxels
   RbfMapOptions rbf = {};
   bool allowFolds = false;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
@@ -36,9 +39,9 @@ struct TextureOptions {
 struct TextureReport {
   double voxelSize = 0;
   std::size_t particles = 0, blocksTested = 0, blocksEvaluated = 0;
-  double minJacobian = 0;            ///< of the map × the patch's volume scale; ≤ 0 means a fold
+  double minJacobian = 0;  ///< of the map × the patch's volume scale; ≤ 0 means a fold
   double minStretch = 0, maxStretch = 0;  ///< singular values of texture → patch, world per world
-  double mapResidual = 0;            ///< largest |Φ(p) − uvw| × texture size, world units
+  double mapResidual = 0;                 ///< largest |Φ(p) − uvw| × texture size, world units
   std::vector<std::string> notes;
 };
 
@@ -47,7 +50,16 @@ struct TextureResult {
   TextureReport report;
 };
 
-/// @throws InvalidInput when the map folds (with the place), the patch does not lie on `base`, or the
+/// The map of a patch: through its particles to their texture coordinates, λ near for w = 0.
+[[nodiscard]] RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options = {});
+
+/// Warps `texture` into the patch, re-distances it [Brodersen07 §8.3], and merges it with `base`.
+/// A voxel finer than the base's is chosen only where the texture, squeezed, has voxels of less
+/// than 0.8 of it; on equal voxels the result has the base's own grid.
+/// @param base     the solid that the patch was made on
+/// @param texture  any solid; x, y, z of its box become u, v, w
+/// @throws UsageError for lengths that are negative or not finite; InvalidInput when the map folds
+/// (with the place), the patch does not lie on `base`, or the
 ///         texture box is empty; ResourceLimit before allocating too much
 [[nodiscard]] TextureResult mapTexture(const levelset::NarrowBand& base,
                                        const levelset::NarrowBand& texture, const Patch& patch,

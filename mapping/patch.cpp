@@ -1,1 +1,242 @@
 #include "mapping/patch.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/eikonal/redistance.h"
+#include "levelset/error.h"
+#include "mapping/closest_point.h"
+#include "mapping/geodesic.h"
+#include "mapping/particle_levels.h"
+#include "mapping/surface_field.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using levelset::NarrowBand;
+using levelset::UsageError;
+
+constexpr const char* kAction = "patch";
+// The map's system is dense: n³ / 3 operations and n² numbers. This many particles cost a second or
+// two, and lie some five to ten voxels apart on a patch of a hundred or two.
+constexpr double kParticleBudget = 2000;
+constexpr double kSmallestSpacing = 1.5;  // voxels; closer ones say the same thing twice
+constexpr std::size_t kFewest = 4;        // particles along a side
+constexpr double kMarginVoxels = 6;       // of distances beyond the highest level, for the filters
+
+std::string text(const V3d& p) {
+  return fmt::format("{:.6g},{:.6g},{:.6g}", p.x, p.y, p.z);
+}
+
+void checkArguments(const std::array<V3d, 4>& corners, double height, const PatchOptions& options) {
+  if (!(height > 0) || !std::isfinite(height)) {
+    throw UsageError(fmt::format("{}: the height is {}; give a positive length", kAction, height));
+  }
+  if (options.levels < 2) {
+    throw UsageError(
+        fmt::format("{}: {} levels of particles; give at least 2", kAction, options.levels));
+  }
+  if (!(options.spacing >= 0) || !std::isfinite(options.spacing)) {
+    throw UsageError(fmt::format("{}: the spacing of particles is {}; give a positive length",
+                                 kAction, options.spacing));
+  }
+  for (const V3d& c : corners) {
+    if (!std::isfinite(c.x) || !std::isfinite(c.y) || !std::isfinite(c.z)) {
+      throw UsageError(fmt::format("{}: the corner {} is not finite", kAction, text(c)));
+    }
+  }
+}
+
+void checkApart(const NarrowBand& base, const std::array<V3d, 4>& corners) {
+  for (std::size_t i = 0; i < 4; ++i)
+    for (std::size_t j = i + 1; j < 4; ++j) {
+      const double distance = (corners[i] - corners[j]).length();
+      if (distance < 2 * base.voxelSize()) {
+        throw InvalidInput(fmt::format(
+            "{}: corners {} and {} both fall on {}, {:.3g} voxels apart; a patch needs sides of at "
+            "least two voxels",
+            kAction, i, j, text(corners[i]), distance / base.voxelSize()));
+      }
+    }
+}
+
+/// Positive when the corners run anticlockwise seen from outside: twice the area that each corner
+/// spans with its neighbours, against the normal there.
+double handedness(const NarrowBand& base, const std::array<V3d, 4>& corners) {
+  const SurfaceField field(base);
+  double sum = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const V3d &p = corners[i], &next = corners[(i + 1) % 4], &last = corners[(i + 3) % 4];
+    sum += (next - p).cross(last - p).dot(field.normal(p));
+  }
+  return sum;
+}
+
+/// @return true when mirrored
+bool checkOrientation(const NarrowBand& base, const std::array<V3d, 4>& given,
+                      const std::array<V3d, 4>& corners, bool mirror) {
+  const double area = handedness(base, corners);
+  double scale = 0;
+  for (std::size_t i = 0; i < 4; ++i) scale += (corners[(i + 1) % 4] - corners[i]).length2();
+  if (std::abs(area) < 1e-3 * scale) {
+    throw InvalidInput(
+        fmt::format("{}: the corners {}, {}, {} and {} span no area; move one of them", kAction,
+                    text(corners[0]), text(corners[1]), text(corners[2]), text(corners[3])));
+  }
+  if (area < 0 && !mirror) {
+    throw UsageError(
+        fmt::format("{}: the corners run clockwise seen from outside, which would mirror the "
+                    "texture; give them as "
+                    "\"{} {} {} {}\" or ask for --mirror",
+                    kAction, text(given[0]), text(given[3]), text(given[2]), text(given[1])));
+  }
+  return area < 0;
+}
+
+double chooseSpacing(const NarrowBand& base, double uLength, double vLength, std::size_t levels) {
+  const double perLevel = std::max(16.0, kParticleBudget / static_cast<double>(levels));
+  // (u/s + 1)(v/s + 1) = perLevel, solved for s.
+  const double sum = uLength + vLength, product = uLength * vLength, rest = perLevel - 1;
+  const double spacing = (sum + std::sqrt(sum * sum + 4 * rest * product)) / (2 * rest);
+  return std::max(spacing, kSmallestSpacing * base.voxelSize());
+}
+
+std::size_t countAlong(double length, double spacing) {
+  return std::max(kFewest, static_cast<std::size_t>(std::lround(length / spacing)) + 1);
+}
+
+/// The base with distances as far as the patch reaches: swept out of the narrow band in a box about
+/// the patch, unless they are there already.
+NarrowBand sweepDistances(const NarrowBand& base, const PatchSides& sides, double height,
+                          const PatchOptions& options) {
+  const double reach = height + kMarginVoxels * base.voxelSize();
+  if (base.halfWidth() * base.voxelSize() >= reach) return base;
+  Imath::Box3d box;
+  for (const std::vector<V3d>& side : sides)
+    for (const V3d& p : side) box.extendBy(p);
+  // Inner particles may lie outside the box of the sides: allow a patch to bulge by half its width.
+  const double bulge = 0.25 * std::min(sideLengthU(sides), sideLengthV(sides));
+  box.min -= V3d(reach + bulge);
+  box.max += V3d(reach + bulge);
+  return levelset::redistance(base,
+                              {.halfWidth = reach / base.voxelSize(),
+                               .region = box,
+                               .maxMemory = options.maxMemory,
+                               .progress = levelset::subProgress(options.progress, 0.1, 0.4)});
+}
+
+double meanSpacing(const Patch& patch) {
+  double sum = 0, count = 0;
+  for (const ParticleLevel& level : patch.levels)
+    for (std::size_t j = 0; j < level.rows; ++j)
+      for (std::size_t i = 0; i < level.columns; ++i) {
+        if (i > 0) sum += (level.at(i, j) - level.at(i - 1, j)).length(), ++count;
+        if (j > 0) sum += (level.at(i, j) - level.at(i, j - 1)).length(), ++count;
+      }
+  return sum / count;
+}
+
+void checkParticleCount(double uLength, double vLength, double spacing, std::size_t levels,
+                        const PatchOptions& options) {
+  const double count =
+      (uLength / spacing + 1) * (vLength / spacing + 1) * static_cast<double>(levels);
+  levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kAction);
+  constexpr double kMostParticles = 1e6;
+  if (count > kMostParticles) {
+    throw levelset::ResourceLimit(fmt::format(
+        "{}: a spacing of {:.6g} would make {:.3g} particles, more than {:.0g}; take a wider "
+        "one",
+        kAction, spacing, count, kMostParticles));
+  }
+}
+
+}  // namespace
+
+std::size_t Patch::particleCount() const {
+  std::size_t count = 0;
+  for (const ParticleLevel& level : levels) count += level.positions.size();
+  return count;
+}
+
+PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners, double height,
+                      const PatchOptions& options) {
+  checkArguments(corners, height, options);
+  PatchResult result;
+  Patch& patch = result.patch;
+  PatchReport& report = result.report;
+
+  // === The quadrilateral on the surface
+  for (std::size_t i = 0; i < 4; ++i) {
+    patch.corners[i] = closestSurfacePoint(base, corners[i], kAction);
+    report.projectionDistance =
+        std::max(report.projectionDistance, (patch.corners[i] - corners[i]).length());
+  }
+  checkApart(base, patch.corners);
+  patch.mirrored = checkOrientation(base, corners, patch.corners, options.mirror);
+  patch.height = height;
+  PatchSides sides = makeSides(base, 0, patch.corners);
+  const double uLength = sideLengthU(sides), vLength = sideLengthV(sides);
+  const double spacing =
+      options.spacing > 0 ? options.spacing : chooseSpacing(base, uLength, vLength, options.levels);
+  checkParticleCount(uLength, vLength, spacing, options.levels, options);
+  levelset::report(options.progress, 0.1, kAction);
+
+  // === Scheme B: a complete patch on each level, from its own advected corners
+  const NarrowBand wide = sweepDistances(base, sides, height, options);
+  std::array<V3d, 4> advected = patch.corners;
+  for (std::size_t k = 0; k < options.levels; ++k) {
+    ParticleLevel level;
+    level.w = static_cast<double>(k) / static_cast<double>(options.levels - 1);
+    level.height = height * level.w;
+    if (k > 0) {
+      advectCorners(wide, patch.levels.back().height, level.height, advected);
+      sides = makeSides(wide, level.height, advected);
+    }
+    level.columns = countAlong(sideLengthU(sides), spacing);
+    level.rows = countAlong(sideLengthV(sides), spacing);
+    const Relaxation relaxation = fillLevel(wide, sides, level);
+    report.relaxIterations += relaxation.iterations;
+    report.isRelaxed = report.isRelaxed && relaxation.isConverged;
+    patch.levels.push_back(std::move(level));
+    levelset::report(options.progress,
+                     0.4 + 0.6 * static_cast<double>(k + 1) / static_cast<double>(options.levels),
+                     kAction);
+  }
+  patch.spacing = meanSpacing(patch);
+  report.uLength = uLength;
+  report.vLength = vLength;
+  report.cellAreaVariation = cellAreaVariation(patch.levels.front());
+  return result;
+}
+
+std::array<V3d, 4> cornersAround(const NarrowBand& base, const V3d& point, double a, double b,
+                                 double rotation) {
+  for (const double size : {a, b}) {
+    if (!(size > 0) || !std::isfinite(size)) {
+      throw UsageError(fmt::format("{}: the size is {}; give two positive lengths", kAction, size));
+    }
+  }
+  if (!std::isfinite(rotation)) {
+    throw UsageError(fmt::format("{}: the rotation is {}; give an angle", kAction, rotation));
+  }
+  const V3d center = closestSurfacePoint(base, point, kAction);
+  const SurfaceField field(base);
+  const V3d normal = field.normal(center);
+  const V3d reference = std::abs(normal.x) < 0.9 ? V3d(1, 0, 0) : V3d(0, 1, 0);
+  const V3d east = (reference - normal * normal.dot(reference)).normalized();
+  const V3d north = normal.cross(east);
+  const V3d u = east * std::cos(rotation) + north * std::sin(rotation), v = normal.cross(u);
+  constexpr std::array<std::array<double, 2>, 4> kSigns = {{{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}};
+  std::array<V3d, 4> corners;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const V3d way = u * (0.5 * a * kSigns[i][0]) + v * (0.5 * b * kSigns[i][1]);
+    corners[i] = walkStraight(field, center, way, way.length());
+  }
+  return corners;
+}
+
+}  // namespace mapping

@@ -15,10 +15,10 @@ namespace mapping {
 
 /// One level of particles: an iso-surface φ = height of the base, sampled on a grid of u and v.
 struct ParticleLevel {
-  std::size_t columns = 0, rows = 0;    ///< along u, along v; each at least 2
-  double w = 0;                         ///< texture coordinate of the level
-  double height = 0;                    ///< distance from the base surface, world units
-  std::vector<Imath::V3d> positions;    ///< rows × columns, row major: index = row * columns + column
+  std::size_t columns = 0, rows = 0;  ///< along u, along v; each at least 2
+  double w = 0;                       ///< texture coordinate of the level
+  double height = 0;                  ///< distance from the base surface, world units
+  std::vector<Imath::V3d> positions;  ///< rows × columns, row major: index = row * columns + column
   [[nodiscard]] const Imath::V3d& at(std::size_t column, std::size_t row) const {
     return positions[row * columns + column];
   }
@@ -35,10 +35,11 @@ struct Patch {
 
 /// How the sides and rows of a patch turned out.
 struct PatchReport {
-  double uLength = 0, vLength = 0;    ///< mean length of the rows and columns at w = 0
-  double cellAreaVariation = 0;       ///< standard deviation / mean of the cells' areas at w = 0
-  std::size_t relaxIterations = 0;
-  double projectionDistance = 0;      ///< the farthest corner's way to the surface
+  double uLength = 0, vLength = 0;  ///< mean length of the rows and columns at w = 0
+  double cellAreaVariation = 0;     ///< standard deviation / mean of the cells' areas at w = 0
+  std::size_t relaxIterations = 0;  ///< of all levels together
+  bool isRelaxed = true;            ///< the last step moved no particle by more than 1e-3 voxel
+  double projectionDistance = 0;    ///< the farthest corner's way to the surface
 };
 
 enum class LevelScheme {
@@ -46,10 +47,10 @@ enum class LevelScheme {
 };
 
 struct PatchOptions {
-  std::size_t levels = 6;        ///< at least 2
+  std::size_t levels = 6;  ///< at least 2
   LevelScheme scheme = LevelScheme::Reduced;
-  double spacing = 0;            ///< of particles, world units; 0: chosen from patch and voxel size
-  bool mirror = false;           ///< accept corners that run clockwise seen from outside
+  double spacing = 0;   ///< of particles, world units; 0: chosen from patch and voxel size
+  bool mirror = false;  ///< accept corners that run clockwise seen from outside
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
@@ -59,7 +60,8 @@ struct PatchResult {
   PatchReport report;
 };
 
-/// @param corners  u runs from corner 0 to 1, v from corner 0 to 3; projected along φ to the zero set
+/// @param corners  u runs from corner 0 to 1, v from corner 0 to 3; projected along φ to the zero
+/// set
 /// @param height   of the patch space above the surface, world units, positive
 /// @throws UsageError for corners that run clockwise seen from outside (the message has the right
 ///         order) or a height that is not positive; InvalidInput when a corner is further from the
@@ -69,7 +71,8 @@ struct PatchResult {
                                     const PatchOptions& options = {});
 
 /// A patch of size a × b (world units along the surface) about a point, u turned by `rotation`
-/// radians about the normal from the direction that projects best onto +x (or +y where +x is normal).
+/// radians about the normal from the direction that projects best onto +x (or +y where +x is
+/// normal).
 [[nodiscard]] std::array<Imath::V3d, 4> cornersAround(const levelset::NarrowBand& base,
                                                       const Imath::V3d& point, double a, double b,
                                                       double rotation = 0);

@@ -1,0 +1,333 @@
+#include "mapping/texture_warp.h"
+
+#include <fmt/core.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "levelset/error.h"
+#include "levelset/sample.h"
+#include "levelset/vdb.h"
+#include "mapping/level_map.h"
+
+namespace mapping {
+namespace {
+
+using Imath::Box3d;
+using Imath::M33d;
+using Imath::V3d;
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using LeafNode = openvdb::FloatTree::LeafNodeType;
+
+constexpr const char* kAction = "texture";
+constexpr int kRootEdge = 64;  // grid points along a block that the descent begins with
+constexpr int kLeafEdge = 8;
+// The map is tabulated to this share of a texture voxel.
+constexpr double kMapTolerance = 0.01;
+constexpr double kLeafBytes = sizeof(LeafNode) + LeafNode::SIZE * sizeof(float);
+
+/// Which parts of a texture's grid have leaf nodes: counts over boxes in constant time.
+class Occupancy {
+ public:
+  explicit Occupancy(const openvdb::FloatGrid& grid) : grid_(grid) {
+    CoordBBox box;
+    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) box.expand(leaf->origin());
+    constexpr double kMostCells = 1 << 25;
+    for (shift_ = 3;; ++shift_) {
+      origin_ = cell(box.min());
+      size_ = cell(box.max()) - origin_ + Coord(1);
+      if (static_cast<double>(size_.x()) * size_.y() * size_.z() <= kMostCells) break;
+    }
+    sums_.assign(index(size_) + 1, 0);
+    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
+      sums_[index(cell(leaf->origin()) - origin_ + Coord(1))] += 1;
+    for (int axis = 0; axis < 3; ++axis) accumulate(axis);
+  }
+
+  /// Is there a leaf node within a box of world coordinates, widened by `pad` voxels?
+  [[nodiscard]] bool touches(const Box3d& world, double pad) const {
+    openvdb::Vec3d low(std::numeric_limits<double>::max()), high(-low);
+    for (int corner = 0; corner < 8; ++corner) {
+      const openvdb::Vec3d p = grid_.worldToIndex(openvdb::Vec3d(
+          corner & 1 ? world.max.x : world.min.x, corner & 2 ? world.max.y : world.min.y,
+          corner & 4 ? world.max.z : world.min.z));
+      low = openvdb::math::minComponent(low, p);
+      high = openvdb::math::maxComponent(high, p);
+    }
+    Coord a, b;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double first = std::floor((low[axis] - pad) / (1 << shift_)) - origin_[axis];
+      const double last = std::floor((high[axis] + pad) / (1 << shift_)) - origin_[axis];
+      if (!(last >= 0) || !(first < size_[axis])) return false;
+      a[axis] = static_cast<int>(std::max(first, 0.0));
+      b[axis] = static_cast<int>(std::min(last, size_[axis] - 1.0)) + 1;
+    }
+    std::uint32_t count = 0;  // wraps around in between, ends right
+    for (int corner = 0; corner < 8; ++corner) {
+      const Coord c(corner & 1 ? a.x() : b.x(), corner & 2 ? a.y() : b.y(),
+                    corner & 4 ? a.z() : b.z());
+      const bool isNegative = ((corner & 1) + (corner >> 1 & 1) + (corner >> 2 & 1)) % 2 == 1;
+      count += isNegative ? 0u - sums_[index(c)] : sums_[index(c)];
+    }
+    return count != 0;
+  }
+
+ private:
+  Coord cell(const Coord& c) const { return c >> static_cast<std::size_t>(shift_); }
+  std::size_t index(const Coord& c) const {
+    const auto wide = [](int x) { return static_cast<std::size_t>(x); };
+    return (wide(c.x()) * (wide(size_.y()) + 1) + wide(c.y())) * (wide(size_.z()) + 1) +
+           wide(c.z());
+  }
+  void accumulate(int axis) {
+    Coord step(0);
+    step[axis] = 1;
+    for (int x = step.x(); x <= size_.x(); ++x)
+      for (int y = step.y(); y <= size_.y(); ++y)
+        for (int z = step.z(); z <= size_.z(); ++z)
+          sums_[index({x, y, z})] += sums_[index(Coord(x, y, z) - step)];
+  }
+
+  const openvdb::FloatGrid& grid_;
+  int shift_ = 3;
+  Coord origin_, size_;
+  std::vector<std::uint32_t> sums_;  // over all cells below, in each axis one more than cells
+};
+
+struct Block {
+  Coord origin;
+  int edge;
+};
+
+enum class Meets : char { Nothing, Inside, Band };
+
+/// One pass over patch space.
+class TextureWarp {
+ public:
+  TextureWarp(const levelset::NarrowBand& texture, const TexturePlacement& placement,
+              const Patch& patch, const RbfMap& map, const WarpOptions& options)
+      : texture_(texture),
+        placement_(placement),
+        patch_(patch),
+        map_(map),
+        options_(options),
+        occupancy_(levelset::vdb(texture)),
+        textureBackground_(texture.halfWidth() * texture.voxelSize()),
+        ghostDistance_(1.5 * longestCellEdge(patch)) {
+    openvdb::math::Mat4d matrix;
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) matrix[i][j] = options.indexToWorld[i][j];
+    transform_ = openvdb::math::Transform::createLinearTransform(matrix);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) step_[i][j] = options.indexToWorld[i][j];
+    const V3d size = placement.box.size();
+    tolerance_ = kMapTolerance * texture.voxelSize() / std::max({size.x, size.y, size.z});
+  }
+
+  Warp run() {
+    Warp warp;
+    std::vector<Block> blocks = rootBlocks(), leaves, inside;
+    for (int edge = kRootEdge; !blocks.empty(); edge /= 2) {
+      const std::vector<Meets> meets = test(blocks);
+      warp.blocksTested += blocks.size();
+      std::vector<Block> children;
+      for (std::size_t n = 0; n < blocks.size(); ++n) {
+        if (meets[n] == Meets::Inside) inside.push_back(blocks[n]);
+        if (meets[n] != Meets::Band) continue;
+        if (edge == kLeafEdge) {
+          leaves.push_back(blocks[n]);
+        } else {
+          split(blocks[n], children);
+        }
+      }
+      blocks.swap(children);
+      requireBlocks(edge > kLeafEdge ? blocks.size() : leaves.size());
+    }
+    levelset::report(options_.progress, 0.3, kAction);
+    if (leaves.empty()) {
+      throw levelset::InvalidInput(fmt::format(
+          "{}: nothing of the texture falls into the patch; check the texture box and the sink",
+          kAction));
+    }
+    warp.blocksEvaluated = leaves.size();
+    warp.field = evaluate(leaves, inside, warp.ghosts);
+    return warp;
+  }
+
+ private:
+  V3d world(const openvdb::Vec3d& index) const {
+    return levelset::toImath(transform_->indexToWorld(index));
+  }
+
+  /// Aligned blocks over the image of the texture's band under the straight map, with room for what
+  /// the two maps differ by.
+  std::vector<Block> rootBlocks() const {
+    const openvdb::FloatGrid& grid = levelset::vdb(texture_);
+    const CoordBBox active = grid.evalActiveVoxelBoundingBox();
+    Box3d uvw;
+    for (int corner = 0; corner < 8; ++corner) {
+      const openvdb::Vec3d p(corner & 1 ? active.max().x() : active.min().x(),
+                             corner & 2 ? active.max().y() : active.min().y(),
+                             corner & 4 ? active.max().z() : active.min().z());
+      uvw.extendBy(placement_.toUvw(levelset::toImath(grid.indexToWorld(p))));
+    }
+    constexpr int kSamples = 24;
+    openvdb::BBoxd box;
+    for (int i = 0; i <= kSamples; ++i)
+      for (int j = 0; j <= kSamples; ++j)
+        for (int k = 0; k <= kSamples; ++k) {
+          const V3d t = uvw.min + uvw.size() * V3d(i, j, k) / kSamples;
+          box.expand(transform_->worldToIndex(levelset::toVdb(levelPosition(patch_, t))));
+        }
+    box.expand(ghostDistance_ / transform_->voxelSize()[0]);
+    constexpr double kMostIndex = 1e9;
+    double count = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      count *= box.extents()[axis] / kRootEdge + 2;
+      if (!(std::abs(box.min()[axis]) < kMostIndex) || !(std::abs(box.max()[axis]) < kMostIndex)) {
+        throw levelset::ResourceLimit(fmt::format(
+            "{}: at a voxel of {:.3g} the grid passes the range of 32-bit indices; take a "
+            "larger one",
+            kAction, transform_->voxelSize()[0]));
+      }
+    }
+    levelset::requireMemory(count * (sizeof(Block) + 1) * 2, options_.maxMemory, kAction);
+    std::vector<Block> blocks;
+    const Coord low = Coord::floor(box.min()) & ~(kRootEdge - 1), high = Coord::ceil(box.max());
+    for (int x = low.x(); x <= high.x(); x += kRootEdge)
+      for (int y = low.y(); y <= high.y(); y += kRootEdge)
+        for (int z = low.z(); z <= high.z(); z += kRootEdge)
+          blocks.push_back({{x, y, z}, kRootEdge});
+    return blocks;
+  }
+
+  static void split(const Block& block, std::vector<Block>& children) {
+    const int half = block.edge / 2;
+    for (int child = 0; child < 8; ++child)
+      children.push_back(
+          {block.origin.offsetBy(child & 4 ? half : 0, child & 2 ? half : 0, child & 1 ? half : 0),
+           half});
+  }
+
+  void requireBlocks(std::size_t count) const {
+    // The field, its copy while distances are made, and the result.
+    levelset::requireMemory(static_cast<double>(count) * 3 * kLeafBytes, options_.maxMemory,
+                            kAction);
+  }
+
+  std::vector<Meets> test(const std::vector<Block>& blocks) const {
+    std::vector<Meets> meets(blocks.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 8), [&](const auto& range) {
+      const levelset::BandSampler sampler(texture_);
+      for (std::size_t n = range.begin(); n != range.end(); ++n)
+        meets[n] = testBlock(blocks[n], sampler);
+    });
+    return meets;
+  }
+
+  Meets testBlock(const Block& block, const levelset::BandSampler& sampler) const {
+    const double half = 0.5 * (block.edge - 1);
+    const V3d center = world(block.origin.asVec3d() + openvdb::Vec3d(half));
+    M33d halfAxes;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) halfAxes[i][j] = half * step_[i][j];
+    const Box3d uvw = map_.imageBounds(center, halfAxes);
+    const Box3d image(placement_.toTexture(uvw.min), placement_.toTexture(uvw.max));
+    if (occupancy_.touches(image, 1)) return Meets::Band;
+    const V3d middle = uvw.center();
+    const bool isInside =
+        sampler.value(placement_.toTexture(middle)) < 0 && !isGhost(center, middle);
+    return isInside ? Meets::Inside : Meets::Nothing;
+  }
+
+  /// Far from the particles the map may return to the texture; going there through the particles
+  /// shows that this is another place.
+  bool isGhost(const V3d& place, const V3d& uvw) const {
+    return (levelPosition(patch_, uvw) - place).length() > ghostDistance_;
+  }
+
+  levelset::NarrowBand evaluate(const std::vector<Block>& leaves, const std::vector<Block>& inside,
+                                std::size_t& ghosts) const {
+    const double halfWidth = textureBackground_ * options_.scale / transform_->voxelSize()[0];
+    const openvdb::FloatGrid::Ptr grid = levelset::emptyLevelSet(transform_->copy(), halfWidth);
+    const float background = grid->background();
+    for (const Block& block : inside)
+      grid->sparseFill(CoordBBox::createCube(block.origin, block.edge), -background, false);
+
+    std::vector<std::unique_ptr<LeafNode>> nodes(leaves.size());
+    std::vector<std::size_t> cut(leaves.size(), 0);
+    constexpr std::size_t kBatch = 2048;  // between two reports
+    for (std::size_t begin = 0; begin < leaves.size(); begin += kBatch) {
+      const std::size_t end = std::min(leaves.size(), begin + kBatch);
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 4), [&](const auto& range) {
+        const levelset::BandSampler linear(texture_);
+        const levelset::BandSampler cubic(texture_, levelset::Interpolation::Tricubic);
+        for (std::size_t n = range.begin(); n != range.end(); ++n) {
+          nodes[n] = std::make_unique<LeafNode>(leaves[n].origin, background, false);
+          cut[n] = fillLeaf(*nodes[n], background, linear, cubic);
+        }
+      });
+      levelset::report(options_.progress,
+                       0.3 + 0.7 * static_cast<double>(end) / static_cast<double>(leaves.size()),
+                       kAction);
+    }
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+      grid->tree().addLeaf(nodes[n].release());
+      ghosts += cut[n];
+    }
+    return levelset::makeBand(grid);
+  }
+
+  /// @return the number of ghosts
+  std::size_t fillLeaf(LeafNode& leaf, float background, const levelset::BandSampler& linear,
+                       const levelset::BandSampler& cubic) const {
+    std::array<V3d, LeafNode::SIZE> uvw;
+    const V3d origin = world(leaf.origin().asVec3d());
+    map_.evaluateBlock(origin, step_, tolerance_, uvw);
+    std::size_t ghosts = 0;
+    for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
+      const V3d place = placement_.toTexture(uvw[n]);
+      double value = linear.value(place);
+      const double rim = textureBackground_ * (1 - 1e-6);
+      if (value >= rim) continue;
+      const openvdb::Vec3d index = leaf.offsetToGlobalCoord(n).asVec3d();
+      if (isGhost(world(index), uvw[n])) {
+        ++ghosts;
+        continue;
+      }
+      if (value > -rim) value = cubic.value(place);
+      const float scaled = static_cast<float>(value * options_.scale);
+      if (scaled <= -background) {
+        leaf.setValueOff(n, -background);
+      } else if (scaled < background) {
+        leaf.setValueOn(n, scaled);
+      }
+    }
+    return ghosts;
+  }
+
+  const levelset::NarrowBand& texture_;
+  const TexturePlacement& placement_;
+  const Patch& patch_;
+  const RbfMap& map_;
+  const WarpOptions& options_;
+  Occupancy occupancy_;
+  openvdb::math::Transform::Ptr transform_;
+  M33d step_;  ///< rows: world steps of the grid's axes
+  double textureBackground_, tolerance_ = 0, ghostDistance_;
+};
+
+}  // namespace
+
+Warp warpTexture(const levelset::NarrowBand& texture, const TexturePlacement& placement,
+                 const Patch& patch, const RbfMap& map, const WarpOptions& options) {
+  return TextureWarp(texture, placement, patch, map, options).run();
+}
+
+}  // namespace mapping

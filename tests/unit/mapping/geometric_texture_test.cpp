@@ -1,0 +1,262 @@
+#include "mapping/geometric_texture.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+
+#include "levelset/error.h"
+#include "levelset/sample.h"
+#include "tests/support/bands.h"
+
+namespace {
+
+using Imath::Box3d;
+using Imath::V3d;
+using levelset::NarrowBand;
+using mapping::mapTexture;
+using mapping::Patch;
+using mapping::TextureMerge;
+using mapping::TextureResult;
+
+double boxDistance(const V3d& p, const V3d& half) {
+  const V3d d(std::abs(p.x) - half.x, std::abs(p.y) - half.y, std::abs(p.z) - half.z);
+  const V3d out(std::max(d.x, 0.0), std::max(d.y, 0.0), std::max(d.z, 0.0));
+  return out.length() + std::min(std::max({d.x, d.y, d.z}), 0.0);
+}
+
+double torusDistance(const V3d& p, double radius, double tube) {
+  return std::hypot(std::hypot(p.x, p.y) - radius, p.z) - tube;
+}
+
+NarrowBand makeBall(double radius, double voxel, double halfWidth) {
+  return support::sampleBand([=](const V3d& p) { return p.length() - radius; },
+                             {V3d(-radius), V3d(radius)}, voxel, halfWidth);
+}
+
+NarrowBand makeRing(double radius, double tube, double voxel) {
+  const double out = radius + tube;
+  return support::sampleBand([=](const V3d& p) { return torusDistance(p, radius, tube); },
+                             {V3d(-out, -out, -tube), V3d(out, out, tube)}, voxel);
+}
+
+/// A slab of 12 × 12 × 3 whose top is z = 0.
+NarrowBand makeSlab(double voxel) {
+  return support::sampleBand(
+      [](const V3d& p) { return boxDistance(p + V3d(0, 0, 1.5), V3d(6, 6, 1.5)); },
+      {V3d(-6, -6, -3), V3d(6, 6, 0)}, voxel);
+}
+
+std::array<V3d, 4> square(double half) {
+  return {V3d(-half, -half, 0), V3d(half, -half, 0), V3d(half, half, 0), V3d(-half, half, 0)};
+}
+
+std::array<V3d, 4> cap(double polar, double radius) {
+  const double side = radius * std::sin(polar) / std::sqrt(2.0), up = radius * std::cos(polar);
+  return {V3d(-side, -side, up), V3d(side, -side, up), V3d(side, side, up), V3d(-side, side, up)};
+}
+
+std::string refusal(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const levelset::InvalidInput& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(GeometricTexture, FlatPatchIsTheIdentity) {
+  // A torus with a tube of 16 voxels, its box laid onto the same box on a slab's top.
+  const double voxel = 0.0625, tube = 1, radius = 2;
+  const NarrowBand base = makeSlab(voxel), ring = makeRing(radius, tube, voxel);
+  const Patch patch = mapping::makePatch(base, square(radius + tube), 2 * tube).patch;
+  const TextureResult result =
+      mapTexture(base, ring, patch, {.merge = TextureMerge::Alone, .sink = 0});
+  EXPECT_NEAR(result.report.minJacobian, 1, 1e-3);
+  EXPECT_NEAR(result.report.minStretch, 1, 1e-3);
+  EXPECT_NEAR(result.report.maxStretch, 1, 1e-3);
+  EXPECT_DOUBLE_EQ(result.report.voxelSize, voxel);
+
+  const V3d center(0, 0, tube);
+  double worst = 0;
+  support::forEachActive(result.band, [&](const V3d& p, double phi) {
+    const double truth = torusDistance(p - center, radius, tube);
+    if (std::abs(truth) < 1.5 * voxel) worst = std::max(worst, std::abs(phi - truth));
+  });
+  EXPECT_LT(worst, 0.05 * voxel);
+  // And the other way: every place of the torus lies on the zero set.
+  const levelset::BandSampler sampler(result.band, levelset::Interpolation::Tricubic);
+  double missed = 0;
+  for (int i = 0; i < 360; ++i)
+    for (int j = 0; j < 120; ++j) {
+      const double a = i * M_PI / 180, b = j * M_PI / 60, r = radius + tube * std::cos(b);
+      const V3d p = center + V3d(r * std::cos(a), r * std::sin(a), tube * std::sin(b));
+      missed = std::max(missed, std::abs(sampler.value(p)));
+    }
+  EXPECT_LT(missed, 0.05 * voxel);
+}
+
+TEST(GeometricTexture, SphereCoordinatesAreRadial) {
+  const double radius = 2, height = 1, voxel = 0.1;
+  const NarrowBand base = makeBall(radius, voxel, 16);
+  const Patch patch = mapping::makePatch(base, cap(0.5, radius), height).patch;
+  const mapping::RbfMap map = mapping::patchToTexture(patch);
+  double worstW = 0, worstU = 0, worstPlane = 0;
+  for (int i = -3; i <= 3; ++i)
+    for (int j = -3; j <= 3; ++j) {
+      const V3d ray = V3d(0.08 * i, 0.08 * j, 1).normalized();
+      const V3d foot = map(ray * radius);
+      for (int k = 0; k <= 10; ++k) {
+        const double w = 0.1 * k;
+        const V3d uvw = map(ray * (radius + w * height));
+        worstW = std::max(worstW, std::abs(uvw.z - w));
+        worstU = std::max({worstU, std::abs(uvw.x - foot.x), std::abs(uvw.y - foot.y)});
+        if (i == 0) worstPlane = std::max(worstPlane, std::abs(uvw.x - 0.5));
+        if (j == 0) worstPlane = std::max(worstPlane, std::abs(uvw.y - 0.5));
+      }
+    }
+  EXPECT_LT(worstW, 0.01);
+  EXPECT_LT(worstU, 0.01);
+  EXPECT_LT(worstPlane, 1e-3);
+}
+
+TEST(GeometricTexture, BendsATorusOntoASphere) {
+  const double radius = 2, height = 0.5, voxel = 0.05;
+  const NarrowBand base = makeBall(radius, voxel, 16);
+  const NarrowBand ring = makeRing(1, 0.25, 0.05);
+  const Patch patch = mapping::makePatch(base, cap(0.6, radius), height).patch;
+  const TextureResult result = mapTexture(base, ring, patch, {.merge = TextureMerge::Alone});
+  // It sits one voxel deep in the sphere and is as high as the patch, all around.
+  double low = 10, high = 0;
+  support::forEachActive(result.band, [&](const V3d& p, double phi) {
+    if (std::abs(phi) > 0.5 * voxel) return;
+    // Outwards is downwards below and upwards above.
+    low = std::min(low, p.length() + phi);
+    high = std::max(high, p.length() - phi);
+  });
+  EXPECT_NEAR(low, radius - voxel, 0.6 * voxel);
+  EXPECT_NEAR(high, radius + height - voxel, 0.6 * voxel);
+  EXPECT_GT(result.report.blocksTested, result.report.blocksEvaluated);
+  EXPECT_GT(result.report.minJacobian, 0.3);
+  EXPECT_GT(result.report.mapResidual, 0);
+  EXPECT_LT(result.report.mapResidual, voxel);
+}
+
+TEST(GeometricTexture, FillsTheInsideOfTheTexture) {
+  // Blocks that the band does not touch are inside as a whole.
+  const double voxel = 0.04;
+  const NarrowBand base = makeSlab(0.1), ball = makeBall(1, voxel, 3);
+  const Patch patch = mapping::makePatch(base, square(2), 4).patch;
+  const TextureResult result =
+      mapTexture(base, ball, patch, {.merge = TextureMerge::Alone, .sink = 0, .voxelSize = voxel});
+  const levelset::BandSampler sampler(result.band);
+  for (int n = 0; n <= 40; ++n) {
+    EXPECT_LT(sampler.value(V3d(0, 0, 0.1 + 0.095 * n)), 0) << n;
+    EXPECT_GT(sampler.value(V3d(0, 0, 4.1 + n)), 0) << n;
+  }
+}
+
+TEST(GeometricTexture, HonoursTheTextureBox) {
+  // A box twice as large in u leaves the texture half as wide.
+  const double voxel = 0.1;
+  const NarrowBand base = makeSlab(voxel), ball = makeBall(1, voxel, 3);
+  const Patch patch = mapping::makePatch(base, square(2), 2).patch;
+  const TextureResult result = mapTexture(base, ball, patch,
+                                          {.merge = TextureMerge::Alone,
+                                           .sink = 0.5,
+                                           .textureBox = Box3d(V3d(-2, -1, -1), V3d(2, 1, 1))});
+  const Box3d bounds = result.band.zeroSetBounds();
+  EXPECT_NEAR(bounds.min.x, -1, 0.1 * voxel);
+  EXPECT_NEAR(bounds.max.x, 1, 0.1 * voxel);
+  EXPECT_NEAR(bounds.max.y, 2, 0.1 * voxel);
+  EXPECT_NEAR(bounds.min.z, -0.5, 0.1 * voxel);
+  EXPECT_NEAR(bounds.max.z, 1.5, 0.1 * voxel);
+}
+
+TEST(GeometricTexture, MirrorsWhenThePatchDoes) {
+  const double voxel = 0.1;
+  const NarrowBand base = makeSlab(voxel);
+  const NarrowBand ball =
+      support::sampleBand([](const V3d& p) { return (p - V3d(0.5, 0, 0)).length() - 0.5; },
+                          {V3d(0, -0.5, -0.5), V3d(1, 0.5, 0.5)}, voxel);
+  std::array<V3d, 4> corners = square(1);
+  std::swap(corners[0], corners[1]);
+  std::swap(corners[2], corners[3]);
+  const Patch patch = mapping::makePatch(base, corners, 1, {.mirror = true}).patch;
+  const TextureResult result = mapTexture(
+      base, ball, patch,
+      {.merge = TextureMerge::Alone, .textureBox = Box3d(V3d(-1, -0.5, -0.5), V3d(1, 0.5, 0.5))});
+  EXPECT_GT(result.report.minJacobian, 0.9);
+  EXPECT_LT(result.band.zeroSetBounds().max.x, 0.1);
+}
+
+TEST(GeometricTexture, RefusesPatchesThatFold) {
+  // Above the axis of a trough of radius 1 the sides would cross.
+  const NarrowBand trough = support::sampleBand(
+      [](const V3d& p) { return std::max(1 - std::hypot(p.y, p.z + 1e-9), -0.5); },
+      {V3d(-1, -1, -1), V3d(1, 1, 1)}, 0.05, 30);
+  const double y = 0.7, z = -std::sqrt(1 - y * y);
+  Patch patch = mapping::makePatch(
+                    trough, {V3d(-0.5, -y, z), V3d(0.5, -y, z), V3d(0.5, y, z), V3d(-0.5, y, z)},
+                    0.9, {.levels = 4, .spacing = 0.15})
+                    .patch;
+  // Straight on past the axis, as explicit offsets would go.
+  for (mapping::ParticleLevel& level : patch.levels)
+    for (V3d& p : level.positions) {
+      const double r = std::hypot(p.y, p.z);
+      const double wanted = 1 - 1.4 * level.w;
+      p.y *= wanted / r, p.z *= wanted / r;
+    }
+  const NarrowBand ball = makeBall(1, 0.1, 3);
+  const std::string message = refusal([&] { (void)mapTexture(trough, ball, patch); });
+  EXPECT_NE(message.find("folds at ("), std::string::npos) << message;
+  EXPECT_NE(message.find("u, v, w"), std::string::npos) << message;
+}
+
+TEST(GeometricTexture, SameBitsForAnyNumberOfThreads) {
+  const double radius = 2, voxel = 0.1;
+  const NarrowBand base = makeBall(radius, voxel, 12), ring = makeRing(1, 0.25, 0.05);
+  std::set<std::uint64_t> hashes;
+  for (const std::size_t threads : {1, 2, 4, 2}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    const Patch patch =
+        mapping::makePatch(base, cap(0.6, radius), 0.5, {.levels = 3, .spacing = 0.2}).patch;
+    hashes.insert(mapTexture(base, ring, patch, {.merge = TextureMerge::Alone}).band.contentHash());
+  }
+  EXPECT_EQ(hashes.size(), 1u);
+}
+
+TEST(GeometricTexture, RefusesWhatCannotBeMapped) {
+  const double voxel = 0.1;
+  const NarrowBand base = makeSlab(voxel), ball = makeBall(1, voxel, 3);
+  const Patch patch = mapping::makePatch(base, square(2), 1, {.levels = 2, .spacing = 0.5}).patch;
+  const auto with = [&](const mapping::TextureOptions& options) {
+    (void)mapTexture(base, ball, patch, options);
+  };
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(with({.sink = kNan}), levelset::UsageError);
+  EXPECT_THROW(with({.blend = -1}), levelset::UsageError);
+  EXPECT_THROW(with({.voxelSize = 0.0}), levelset::UsageError);
+  EXPECT_THROW(with({.voxelSize = kNan}), levelset::UsageError);
+  EXPECT_THROW(with({.halfWidth = 0.5}), levelset::UsageError);
+  EXPECT_THROW(with({.textureBox = Box3d()}), levelset::InvalidInput);
+  EXPECT_THROW(with({.textureBox = Box3d(V3d(0), V3d(1, 1, 0))}), levelset::InvalidInput);
+  EXPECT_THROW(with({.textureBox = Box3d(V3d(50), V3d(51))}), levelset::InvalidInput);
+  EXPECT_THROW(with({.maxMemory = 100000}), levelset::ResourceLimit);
+  EXPECT_THROW(with({.voxelSize = 1e-12, .maxMemory = std::size_t{1} << 33}),
+               levelset::ResourceLimit);
+  EXPECT_THROW(with({.progress = [](double f) { return f < 0.4; }}), levelset::Cancelled);
+  EXPECT_THROW((void)mapTexture(NarrowBand(), ball, patch), levelset::InvalidInput);
+  EXPECT_THROW((void)mapTexture(base, NarrowBand(), patch), levelset::InvalidInput);
+  EXPECT_THROW((void)mapTexture(base, ball, Patch()), levelset::InvalidInput);
+  const NarrowBand elsewhere =
+      support::sampleBand([](const V3d& p) { return (p - V3d(0, 0, -2)).length() - 1; },
+                          {V3d(-1, -1, -3), V3d(1, 1, -1)}, voxel);
+  EXPECT_THROW((void)mapTexture(elsewhere, ball, patch), levelset::InvalidInput);
+}
+
+}  // namespace

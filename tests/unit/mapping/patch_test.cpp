@@ -1,0 +1,229 @@
+#include "mapping/patch.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "levelset/error.h"
+#include "mapping/geodesic.h"
+#include "tests/support/bands.h"
+
+namespace {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+using mapping::makePatch;
+using mapping::ParticleLevel;
+using mapping::PatchResult;
+
+constexpr double kVoxel = 0.05;
+
+/// Distances as far as `reach` in all of the box: what redistance makes for patch space.
+NarrowBand wideBand(const std::function<double(const V3d&)>& phi, const Imath::Box3d& box,
+                    double reach, double voxel = kVoxel) {
+  return support::sampleBand(phi, box, voxel, reach / voxel);
+}
+
+NarrowBand sphere(double reach = 0.8) {
+  return wideBand([](const V3d& p) { return p.length() - 1; }, {V3d(-1), V3d(1)}, reach);
+}
+
+NarrowBand slab(double reach = 1) {
+  return wideBand([](const V3d& p) { return p.z; }, {V3d(-2, -2, -0.5), V3d(2, 2, 0.5)}, reach,
+                  0.1);
+}
+
+/// Four directions at `polar` from +z, anticlockwise seen from outside, about both symmetry planes.
+std::array<V3d, 4> cap(double polar, double radius = 1) {
+  const double side = radius * std::sin(polar) / std::sqrt(2.0), up = radius * std::cos(polar);
+  return {V3d(-side, -side, up), V3d(side, -side, up), V3d(side, side, up), V3d(-side, side, up)};
+}
+
+std::string refusal(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const levelset::Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Patch, IsALatticeOnAPlane) {
+  const PatchResult result =
+      makePatch(slab(), {V3d(-1, -0.5, 0), V3d(1, -0.5, 0), V3d(1, 0.5, 0), V3d(-1, 0.5, 0)}, 0.6,
+                {.levels = 4});
+  ASSERT_EQ(result.patch.levels.size(), 4u);
+  for (const ParticleLevel& level : result.patch.levels) {
+    EXPECT_NEAR(level.height, 0.6 * level.w, 1e-12);
+    for (std::size_t j = 0; j < level.rows; ++j)
+      for (std::size_t i = 0; i < level.columns; ++i) {
+        const V3d p = level.at(i, j);
+        EXPECT_NEAR(p.x, -1 + 2.0 * static_cast<double>(i) / static_cast<double>(level.columns - 1),
+                    1e-4 * 0.1);
+        EXPECT_NEAR(p.y, -0.5 + static_cast<double>(j) / static_cast<double>(level.rows - 1),
+                    1e-4 * 0.1);
+        EXPECT_NEAR(p.z, level.height, 1e-4 * 0.1);
+      }
+  }
+  EXPECT_NEAR(result.report.uLength, 2, 1e-5);
+  EXPECT_NEAR(result.report.vLength, 1, 1e-5);
+  EXPECT_LT(result.report.cellAreaVariation, 1e-4);
+  EXPECT_TRUE(result.report.isRelaxed);
+  EXPECT_LE(result.patch.particleCount(), 2600u);
+}
+
+TEST(Patch, LevelsOnASphereAreConcentricAndSymmetric) {
+  const PatchResult result = makePatch(sphere(), cap(0.6), 0.5, {.levels = 4, .spacing = 0.09});
+  EXPECT_FALSE(result.patch.mirrored);
+  for (const ParticleLevel& level : result.patch.levels) {
+    for (std::size_t j = 0; j < level.rows; ++j)
+      for (std::size_t i = 0; i < level.columns; ++i) {
+        const V3d p = level.at(i, j);
+        EXPECT_NEAR(p.length() - 1, level.height, 0.01 * kVoxel);
+        const V3d mirrored = level.at(level.columns - 1 - i, j);
+        EXPECT_LT((p - V3d(-mirrored.x, mirrored.y, mirrored.z)).length(), 0.05 * kVoxel);
+        const V3d turned =
+            level.at(level.rows - 1 - j, i);  // a quarter turn maps the grid to itself
+        if (level.rows == level.columns) {
+          EXPECT_LT((p - V3d(turned.y, -turned.x, turned.z)).length(), 0.05 * kVoxel);
+        }
+      }
+  }
+  // Sides are great circles.
+  const ParticleLevel& surface = result.patch.levels.front();
+  const V3d pole = surface.at(0, 0).cross(surface.at(surface.columns - 1, 0)).normalized();
+  for (std::size_t i = 0; i < surface.columns; ++i)
+    EXPECT_NEAR(surface.at(i, 0).dot(pole), 0, 0.02 * kVoxel);
+  const double angle = std::acos(V3d(cap(0.6)[0]).dot(cap(0.6)[1]));
+  EXPECT_NEAR(result.report.uLength, angle, 1e-3 * angle);
+}
+
+TEST(Patch, RelaxationMakesCellsEven) {
+  const PatchResult result = makePatch(sphere(), cap(0.7), 0.3, {.levels = 2, .spacing = 0.08});
+  EXPECT_TRUE(result.report.isRelaxed);
+  EXPECT_LT(result.report.cellAreaVariation, 0.12);
+}
+
+TEST(Patch, KeepsDensityFromLevelToLevel) {
+  const PatchResult result = makePatch(sphere(), cap(0.6), 0.6, {.levels = 3, .spacing = 0.08});
+  const ParticleLevel &low = result.patch.levels.front(), &high = result.patch.levels.back();
+  EXPECT_GT(high.columns, low.columns);
+  EXPECT_NEAR(static_cast<double>(high.columns - 1) / static_cast<double>(low.columns - 1), 1.6,
+              0.15);
+  EXPECT_NEAR(result.patch.spacing, 0.08, 0.01);
+}
+
+TEST(Patch, SidesRunOverAnEdge) {
+  // Two corners on top of a box, two on its side: the sides go over the edge, not through the box.
+  const auto box = [](const V3d& p) {
+    const V3d d(std::abs(p.x) - 1, std::abs(p.y) - 1, std::abs(p.z) - 1);
+    const V3d out(std::max(d.x, 0.0), std::max(d.y, 0.0), std::max(d.z, 0.0));
+    return out.length() + std::min(std::max({d.x, d.y, d.z}), 0.0);
+  };
+  const NarrowBand band = wideBand(box, {V3d(-1), V3d(1)}, 0.7);
+  const PatchResult result =
+      makePatch(band, {V3d(-0.5, -0.4, 1), V3d(1, -0.4, 0.5), V3d(1, 0.4, 0.5), V3d(-0.5, 0.4, 1)},
+                0.3, {.levels = 3, .spacing = 0.1});
+  EXPECT_NEAR(result.report.uLength, 2, 0.05);
+  EXPECT_NEAR(result.report.vLength, 0.8, 0.01);
+  for (const V3d& p : result.patch.levels.front().positions)
+    EXPECT_LT(std::abs(box(p)), 0.1 * kVoxel);
+}
+
+TEST(Patch, ProjectsCornersFromFarAway) {
+  // Three voxels of band; the corners are given twelve voxels off.
+  const NarrowBand thin = sphere(3 * kVoxel);
+  const V3d far(0.2, 0.3, 1.5);
+  const auto corners = mapping::cornersAround(thin, far, 0.3, 0.2);
+  V3d middle(0);
+  for (const V3d& c : corners) {
+    EXPECT_NEAR(c.length(), 1, 0.02 * kVoxel);
+    middle += c * 0.25;
+  }
+  EXPECT_LT((middle.normalized() - far.normalized()).length(), 0.05 * kVoxel);
+  EXPECT_THROW((void)mapping::cornersAround(thin, V3d(0, 0, 9), 0.3, 0.2), levelset::InvalidInput);
+}
+
+TEST(Patch, CornersAroundAPointHaveTheSizeAsked) {
+  const NarrowBand band = slab(0.3);
+  const auto straight = mapping::cornersAround(band, V3d(0.1, 0.2, 0.05), 1, 0.6);
+  EXPECT_LT((straight[0] - V3d(-0.4, -0.1, 0)).length(), 1e-3 * 0.1);
+  EXPECT_LT((straight[2] - V3d(0.6, 0.5, 0)).length(), 1e-3 * 0.1);
+  const auto turned =
+      mapping::cornersAround(band, V3d(0.1, 0.2, 0.05), 1, 0.6, std::acos(-1.0) / 2);
+  EXPECT_LT((turned[0] - V3d(0.4, -0.3, 0)).length(), 1e-3 * 0.1);
+  EXPECT_THROW((void)mapping::cornersAround(band, V3d(0), 0, 1), levelset::UsageError);
+  EXPECT_THROW((void)mapping::cornersAround(band, V3d(0), 1, 1, NAN), levelset::UsageError);
+}
+
+TEST(Patch, RefusesCornersThatRunClockwise) {
+  const NarrowBand band = slab();
+  const std::array<V3d, 4> clockwise = {V3d(-1, -0.5, 0), V3d(-1, 0.5, 0), V3d(1, 0.5, 0),
+                                        V3d(1, -0.5, 0)};
+  EXPECT_THROW((void)makePatch(band, clockwise, 0.3), levelset::UsageError);
+  const std::string message = refusal([&] { (void)makePatch(band, clockwise, 0.3); });
+  EXPECT_NE(message.find("\"-1,-0.5,0 1,-0.5,0 1,0.5,0 -1,0.5,0\""), std::string::npos) << message;
+  const PatchResult mirrored = makePatch(band, clockwise, 0.3, {.levels = 2, .mirror = true});
+  EXPECT_TRUE(mirrored.patch.mirrored);
+}
+
+TEST(Patch, RefusesWhatSpansNoPatch) {
+  const NarrowBand band = slab();
+  const std::array<V3d, 4> sound = {V3d(-1, -0.5, 0), V3d(1, -0.5, 0), V3d(1, 0.5, 0),
+                                    V3d(-1, 0.5, 0)};
+  for (const double height : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(),
+                              std::numeric_limits<double>::infinity()})
+    EXPECT_THROW((void)makePatch(band, sound, height), levelset::UsageError);
+  EXPECT_THROW((void)makePatch(band, sound, 0.3, {.levels = 1}), levelset::UsageError);
+  EXPECT_THROW((void)makePatch(band, sound, 0.3, {.spacing = -1}), levelset::UsageError);
+  EXPECT_THROW((void)makePatch(band, sound, 0.3, {.spacing = 1e-7}), levelset::ResourceLimit);
+
+  std::array<V3d, 4> twice = sound;
+  twice[2] = twice[1];
+  EXPECT_THROW((void)makePatch(band, twice, 0.3), levelset::InvalidInput);
+  std::array<V3d, 4> straight = sound;
+  straight[2] = V3d(0.5, -0.5, 0), straight[3] = V3d(-0.5, -0.5, 0);
+  EXPECT_THROW((void)makePatch(band, straight, 0.3), levelset::InvalidInput);
+  std::array<V3d, 4> far = sound;
+  far[0] = V3d(-90, -80, 70);
+  EXPECT_THROW((void)makePatch(band, far, 0.3), levelset::InvalidInput);
+  std::array<V3d, 4> nan = sound;
+  nan[3].x = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW((void)makePatch(band, nan, 0.3), levelset::UsageError);
+  EXPECT_THROW((void)makePatch(NarrowBand(), sound, 0.3), levelset::InvalidInput);
+}
+
+TEST(Patch, RefusesCornersOnSeparateParts) {
+  const NarrowBand two = wideBand(
+      [](const V3d& p) {
+        return std::min((p - V3d(-0.8, 0, 0)).length(), (p - V3d(0.8, 0, 0)).length()) - 0.5;
+      },
+      {V3d(-1.3, -0.5, -0.5), V3d(1.3, 0.5, 0.5)}, 0.15);
+  const std::array<V3d, 4> across = {V3d(-0.8, -0.3, 0.4), V3d(0.8, -0.3, 0.4), V3d(0.8, 0.3, 0.4),
+                                     V3d(-0.8, 0.3, 0.4)};
+  EXPECT_THROW((void)makePatch(two, across, 0.1), levelset::InvalidInput);
+}
+
+TEST(Patch, RefusesHeightsBeyondTheMedialAxis) {
+  // In a trough of radius 1 no point is further from the wall than 1.
+  const NarrowBand trough = wideBand([](const V3d& p) { return 1 - std::hypot(p.y, p.z); },
+                                     {V3d(-1, -1, -1), V3d(1, 1, 1)}, 1.3);
+  const double y = 0.5, z = -std::sqrt(0.75);
+  const std::array<V3d, 4> corners = {V3d(-0.5, -y, z), V3d(0.5, -y, z), V3d(0.5, y, z),
+                                      V3d(-0.5, y, z)};
+  EXPECT_NO_THROW((void)makePatch(trough, corners, 0.5, {.levels = 3, .spacing = 0.15}));
+  EXPECT_THROW((void)makePatch(trough, corners, 1.15, {.levels = 3, .spacing = 0.15}),
+               levelset::InvalidInput);
+}
+
+TEST(Patch, StopsWhenCancelled) {
+  EXPECT_THROW(
+      (void)makePatch(slab(), {V3d(-1, -0.5, 0), V3d(1, -0.5, 0), V3d(1, 0.5, 0), V3d(-1, 0.5, 0)},
+                      0.3, {.progress = [](double) { return false; }}),
+      levelset::Cancelled);
+}
+
+}  // namespace

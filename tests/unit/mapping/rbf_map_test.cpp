@@ -1,0 +1,205 @@
+#include "mapping/rbf_map.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "levelset/error.h"
+
+namespace {
+
+using Imath::M33d;
+using Imath::V3d;
+using mapping::RbfMap;
+using mapping::RbfMapOptions;
+
+struct Cloud {
+  std::vector<V3d> points, targets;
+  std::vector<char> near;
+};
+
+V3d bend(const V3d& p) {
+  return {p.x + 0.05 * p.y * p.y, p.y + 0.1 * std::sin(p.z), p.z - 0.04 * p.x * p.y};
+}
+V3d affine(const V3d& p) {
+  return {0.3 * p.x - 0.1 * p.y + 7, 0.2 * p.y + 0.4 * p.z - 3, 0.5 * p.z + 0.1 * p.x};
+}
+
+/// A slightly jittered lattice of spacing 1, moved far from the origin by `shift`.
+template <typename Map>
+Cloud lattice(int edge, const Map& map, const V3d& shift = V3d(0)) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> jitter(-0.2, 0.2);
+  Cloud cloud;
+  for (int i = 0; i < edge; ++i)
+    for (int j = 0; j < edge; ++j)
+      for (int k = 0; k < edge; ++k) {
+        const V3d p(i + jitter(random), j + jitter(random), k + jitter(random));
+        cloud.points.push_back(p + shift);
+        cloud.targets.push_back(map(p));
+        cloud.near.push_back(k == 0);
+      }
+  return cloud;
+}
+
+RbfMap fit(const Cloud& cloud, double lambda) {
+  return {cloud.points, cloud.targets, cloud.near, {.lambdaNear = lambda, .lambdaFar = lambda}};
+}
+
+TEST(RbfMap, IsExactAtParticlesWithoutRelaxation) {
+  const Cloud cloud = lattice(6, bend);
+  const RbfMap map = fit(cloud, 0);
+  EXPECT_EQ(map.size(), 216u);
+  EXPECT_LT(map.maxResidual(), 1e-11);
+  for (std::size_t i = 0; i < cloud.points.size(); i += 17)
+    EXPECT_LT((map(cloud.points[i]) - cloud.targets[i]).length(), 1e-11);
+  // Between the particles of a smooth map it is near, too.
+  EXPECT_LT((map(V3d(2.5)) - bend(V3d(2.5))).length(), 0.02);
+}
+
+TEST(RbfMap, ReproducesAffineMapsWhateverTheRelaxation) {
+  const V3d shift(1e4, -2e4, 3e4);
+  for (const double lambda : {0.0, 0.25, 0.5}) {
+    const Cloud cloud = lattice(5, affine, shift);
+    const RbfMap map = fit(cloud, lambda);
+    for (const V3d& x : {V3d(2.2, 1.7, 3.1), V3d(-4, 9, 2), V3d(40, -30, 20)})
+      EXPECT_LT((map(x + shift) - affine(x)).length(), 1e-8);
+    EXPECT_LT(map.maxResidual(), 1e-9);
+  }
+}
+
+TEST(RbfMap, ResidualGrowsWithRelaxation) {
+  const Cloud cloud = lattice(6, bend);
+  double last = -1;
+  for (const double lambda : {0.0, 0.05, 0.25, 0.5}) {
+    const double residual = fit(cloud, lambda).maxResidual();
+    EXPECT_GT(residual, last);
+    last = residual;
+  }
+  EXPECT_LT(last, 0.2);
+}
+
+// The experiment behind the erratum: φ(r) = r needs φ − λ; with φ + λ noise would grow.
+TEST(RbfMap, RelaxationRemovesNoise) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0, 0.1);
+  Cloud cloud;
+  std::vector<V3d> truth;
+  for (int i = 0; i < 125; ++i) {
+    const V3d p(i / 25, i / 5 % 5, i % 5);
+    truth.push_back(0.2 * p);
+    cloud.points.push_back(p);
+    cloud.targets.push_back(0.2 * p + V3d(noise(random), noise(random), noise(random)));
+    cloud.near.push_back(0);
+  }
+  const auto error = [&](double lambda) {
+    const RbfMap map = fit(cloud, lambda);
+    double sum = 0;
+    for (int i = 0; i < 125; ++i) {  // between the particles, where noise is not given
+      const V3d p(i / 25 * 0.8 + 0.4, i / 5 % 5 * 0.8 + 0.4, i % 5 * 0.8 + 0.4);
+      sum += (map(p) - 0.2 * p).length2() / 3;
+    }
+    return std::sqrt(sum / 125);
+  };
+  EXPECT_LT(error(0.5), 0.85 * error(0));
+  EXPECT_LT(error(0.5), error(0.1));
+}
+
+TEST(RbfMap, JacobianIsTheSlope) {
+  const RbfMap map = fit(lattice(5, bend), 0.1);
+  const V3d x(1.63, 2.41, 2.87);
+  const M33d jacobian = map.jacobian(x);
+  const double step = 1e-5;
+  for (int axis = 0; axis < 3; ++axis) {
+    V3d ahead = x, behind = x;
+    ahead[axis] += step;
+    behind[axis] -= step;
+    const V3d slope = (map(ahead) - map(behind)) / (2 * step);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(jacobian[k][axis], slope[k], 1e-7);
+  }
+}
+
+TEST(RbfMap, BoundsHoldTheImage) {
+  const RbfMap map = fit(lattice(5, bend), 0);
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const double half : {0.1, 0.7, 2.5}) {
+    const V3d center(1.9, 2.2, 2.6);
+    M33d axes;
+    for (int i = 0; i < 3; ++i) axes[i][i] = half;
+    const Imath::Box3d box = map.imageBounds(center, axes);
+    const double radius = std::sqrt(3.0) * half, slope = map.lipschitz(center, radius);
+    V3d last = center;
+    for (int i = 0; i < 500; ++i) {
+      const V3d x = center + half * V3d(unit(random), unit(random), unit(random));
+      EXPECT_TRUE(box.intersects(map(x)));
+      EXPECT_LE((map(x) - map(last)).length(), slope * (x - last).length() * (1 + 1e-12));
+      last = x;
+    }
+    // A bound that holds is not enough: it has to be near, or it excludes nothing.
+    if (half < 0.5) {
+      EXPECT_LT(box.size().x, 1.6 * 2 * half);
+    }
+  }
+}
+
+TEST(RbfMap, BlocksAgreeWithPoints) {
+  const RbfMap map = fit(lattice(9, bend), 0);
+  M33d rows;
+  for (int i = 0; i < 3; ++i) rows[i][i] = 0.13;
+  rows[0][1] = 0.02;  // a rotated grid is allowed
+  std::vector<V3d> values(512);
+  for (const double tolerance : {1e-3, 1e-6, 0.0}) {
+    for (const V3d& origin : {V3d(3.1, 3.3, 2.9), V3d(-2, 4, 9), V3d(7.9, 0.1, 4)}) {
+      map.evaluateBlock(origin, rows, tolerance, std::span<V3d, 512>(values.data(), 512));
+      double worst = 0;
+      for (std::size_t n = 0; n < 512; ++n) {
+        const double i = static_cast<double>(n / 64), j = static_cast<double>(n / 8 % 8),
+                     k = static_cast<double>(n % 8);
+        const V3d x = origin + V3d(i * rows[0][0], j * rows[1][1] + i * rows[0][1], k * rows[2][2]);
+        worst = std::max(worst, (values[n] - map(x)).length());
+      }
+      EXPECT_LE(worst, std::sqrt(3.0) * tolerance + 1e-12);
+    }
+  }
+}
+
+TEST(RbfMap, RefusesCloudsThatSpanNoSpace) {
+  Cloud flat = lattice(5, affine);
+  for (V3d& p : flat.points) p.z = 2;
+  EXPECT_THROW((void)fit(flat, 0.1), levelset::InvalidInput);
+  Cloud line = lattice(3, affine);
+  for (V3d& p : line.points) p.y = p.z = 0;
+  EXPECT_THROW((void)fit(line, 0), levelset::InvalidInput);
+  Cloud twice = lattice(4, affine);
+  twice.points[9] = twice.points[40];
+  EXPECT_THROW((void)fit(twice, 0), levelset::InvalidInput);
+  Cloud few = lattice(2, affine);
+  few.points.resize(3), few.targets.resize(3), few.near.resize(3);
+  EXPECT_THROW((void)fit(few, 0), levelset::InvalidInput);
+  Cloud nan = lattice(3, affine);
+  nan.points[4].y = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW((void)fit(nan, 0), levelset::InvalidInput);
+  const Cloud sound = lattice(3, affine);
+  EXPECT_THROW((void)fit(sound, -0.1), levelset::UsageError);
+  EXPECT_THROW((void)fit(sound, std::numeric_limits<double>::infinity()), levelset::UsageError);
+  EXPECT_THROW((void)RbfMap(sound.points, sound.targets, sound.near, {.maxMemory = 1000}),
+               levelset::ResourceLimit);
+  EXPECT_THROW((void)RbfMap(sound.points, sound.targets, sound.near,
+                            {.progress = [](double) { return false; }}),
+               levelset::Cancelled);
+}
+
+TEST(RbfMap, FourParticlesGiveTheAffineMap) {
+  const std::vector<V3d> points = {V3d(0), V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)};
+  std::vector<V3d> targets;
+  for (const V3d& p : points) targets.push_back(affine(p));
+  const std::vector<char> near(4, 1);
+  EXPECT_LT((RbfMap(points, targets, near)(V3d(3, 4, 5)) - affine(V3d(3, 4, 5))).length(), 1e-12);
+}
+
+}  // namespace
