@@ -9,9 +9,12 @@ namespace {
 using openvdb::Vec3d;
 
 constexpr int kMaxIterations = 8;
-constexpr double kReach = 2;             // voxels from the start
-constexpr double kLongestStep = 1;       // voxels
-constexpr double kLastStep = 0.01;       // voxels: the step after it would be its square
+constexpr double kReach = 2;        // voxels from the start
+constexpr double kLongestStep = 1;  // voxels
+// A step is the last when what it leaves, about the cube of its length by the square of the
+// curvature, is below this part of a voxel.
+constexpr double kTolerance = 1e-4;
+constexpr double kLongestLastStep = 0.6;
 constexpr double kLeastCurvature = 0.1;  // of the distance along the surface, against 1 on a plane
 
 /// Two unit vectors perpendicular to a unit vector and to each other.
@@ -23,9 +26,15 @@ void tangents(const Vec3d& n, Vec3d& t1, Vec3d& t2) {
   t2 = Vec3d(b, sign + n.y() * n.y() * a, -n.y());
 }
 
+struct NewtonStep {
+  Vec3d along;  ///< the step
+  double length = 0;
+  double remains = 0;  ///< estimate of the distance to the solution after it, voxels
+};
+
 /// One Newton step of the constrained problem: along the normal to φ = 0, along the tangents to
-/// where the distance to `from` is stationary.
-Vec3d newtonStep(const Jet& jet, double slope, const Vec3d& toFrom) {
+/// where the distance to `from` is stationary. The normal part includes the second order.
+NewtonStep newtonStep(const Jet& jet, double slope, const Vec3d& toFrom) {
   const Vec3d n = jet.gradient / slope;
   const double along = -jet.value / slope;
   const double lambda = (toFrom.dot(n) - along) / slope;
@@ -36,34 +45,41 @@ Vec3d newtonStep(const Jet& jet, double slope, const Vec3d& toFrom) {
   const double b1 = toFrom.dot(t1) - lambda * along * h1.dot(n);
   const double b2 = toFrom.dot(t2) - lambda * along * h2.dot(n);
   // Past the centre of curvature the stationary point is a maximum: lift the eigenvalues.
-  const double mean = (a11 + a22) / 2;
-  const double least = mean - std::hypot((a11 - a22) / 2, a12);
+  const double mean = (a11 + a22) / 2, half = (a11 - a22) / 2;
+  const double least = mean - std::sqrt(half * half + a12 * a12);
   if (least < kLeastCurvature) {
     a11 += kLeastCurvature - least;
     a22 += kLeastCurvature - least;
   }
-  const double determinant = a11 * a22 - a12 * a12;
-  return n * along + t1 * ((a22 * b1 - a12 * b2) / determinant) +
-         t2 * ((a11 * b2 - a12 * b1) / determinant);
+  const double scale = 1 / (a11 * a22 - a12 * a12);
+  NewtonStep step;
+  step.along =
+      n * along + t1 * (scale * (a22 * b1 - a12 * b2)) + t2 * (scale * (a11 * b2 - a12 * b1));
+  const double squared = step.along.lengthSqr();
+  step.length = std::sqrt(squared);
+  const double curvature = (h1.length() + h2.length()) / slope;
+  step.remains = curvature * curvature * squared * step.length;
+  if (step.length <= kLongestLastStep)
+    step.along -= n * (step.along.dot(jet.hessianTimes(step.along)) / (2 * slope));
+  return step;
 }
 
 }  // namespace
 
 Foot closestPoint(const DenseBlock& block, const Vec3d& from, const Vec3d& start) {
-  Foot foot{start, (from - start).length(), false};
+  Foot foot{start, (from - start).length(), false, false};
   Vec3d y = start;
   for (int i = 0; i < kMaxIterations; ++i) {
     if (!DenseBlock::contains(y)) return foot;
     const Jet jet = block.jet(y);
     const double slope = jet.gradient.length();
     if (!(slope > 0)) return foot;
-    Vec3d step = newtonStep(jet, slope, from - y);
-    const double length = step.length();
-    if (!std::isfinite(length)) return foot;
-    if (length > kLongestStep) step *= kLongestStep / length;
-    y += step;
-    if ((y - start).lengthSqr() > kReach * kReach) return foot;
-    if (length < kLastStep) return Foot{y, (from - y).length(), true};
+    const NewtonStep step = newtonStep(jet, slope, from - y);
+    if (!std::isfinite(step.length)) return foot;
+    y += step.length > kLongestStep ? step.along * (kLongestStep / step.length) : step.along;
+    if ((y - start).lengthSqr() > kReach * kReach) return Foot{y, foot.distance, false, true};
+    if (step.length <= kLongestLastStep && step.remains < kTolerance)
+      return Foot{y, (from - y).length(), true, false};
   }
   return foot;
 }

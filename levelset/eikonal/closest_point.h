@@ -11,12 +11,14 @@ struct Foot {
   openvdb::Vec3d point;
   double distance = 0;
   bool converged = false;
+  bool left = false;  ///< the search left the reach of the block at `point`: go on from there
 };
 
 /// The point of the interpolant's zero set that is closest to `from`, sought from `start`: Newton's
 /// method on φ(y) = 0, (from − y) × ∇φ(y) = 0 [Chopp01, Saye14], with the second derivatives, which
 /// keeps it quadratic at any distance. Safeguarded: bounded steps, stays within two voxels of
-/// `start`; otherwise not converged and of no use. Positions are in voxels from the block's origin.
+/// `start`; when it does not converge, only `left` says what to do. Positions are in voxels from
+/// the block's origin.
 [[nodiscard]] Foot closestPoint(const DenseBlock& block, const openvdb::Vec3d& from,
                                 const openvdb::Vec3d& start);
 

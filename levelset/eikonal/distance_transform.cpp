@@ -31,6 +31,8 @@ constexpr double kOtherPart = 2;
 // How much nearer another part can turn out to be once both are polished.
 constexpr double kPolishGain = 0.5;
 
+constexpr int kAttempts = 4;
+
 /// Distance of one grid point to the zero set, from the surface points that it and its neighbours
 /// got.
 class Polisher {
@@ -56,10 +58,20 @@ class Polisher {
   }
 
  private:
-  double polish(const Vec3d& x, const Vec3d& start) {
-    const DenseBlock& block = cache_.around(start);
-    const Vec3d origin = block.origin().asVec3d();
-    return closestPoint(block, x - origin, start - origin).distance;
+  /// Distance to the foot that Newton's method finds from `start`; as far as `start` if it fails.
+  /// Far inside, where the ways to much of the surface are almost as long, the foot may be far
+  /// along it.
+  double polish(const Vec3d& x, Vec3d start) {
+    const double first = (x - start).length();
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+      const DenseBlock& block = cache_.around(start);
+      const Vec3d origin = block.origin().asVec3d();
+      const Foot foot = closestPoint(block, x - origin, start - origin);
+      if (foot.converged) return foot.distance;
+      if (!foot.left) break;
+      start = foot.point + origin;
+    }
+    return first;
   }
 
   static std::uint32_t neighbour(const Block& block, Coord c, int axis, int side) {
@@ -172,31 +184,28 @@ void requireRoom(const SurfacePoints& points, const NearestPoints::Reach& reach,
                  const DistanceRequest& request) {
   CoordBBox box;
   for (const Coord& c : points.gridPoints) box.expand(c);
-  const double wide = std::max(reach.inside, reach.outside);
-  double reached = 1, dims = 0;
+  // Inwards there is never more than the solid's own box.
+  const double out = reach.outside + 1;
+  double reached = 1, longest = 0;
   for (int i = 0; i < 3; ++i) {
-    if (std::max(std::abs(static_cast<double>(box.min()[i])),
-                 std::abs(static_cast<double>(box.max()[i]))) +
-            wide >
-        2.1e9)
-      throw ResourceLimit(fmt::format(
-          "{}: a band of {:.4g} voxels passes the range of 32-bit indices; use a smaller "
-          "distance or larger voxels",
-          request.action, wide));
-    double from = box.min()[i] - wide, to = box.max()[i] + wide;
+    double from = box.min()[i] - out, to = box.max()[i] + out;
+    if (from < -2.1e9 || to > 2.1e9)
+      throw ResourceLimit(
+          fmt::format("{}: distances up to {:.4g} voxels pass the range of 32-bit indices; use a "
+                      "smaller distance or larger voxels",
+                      request.action, out));
     if (request.region) {
       from = std::max<double>(from, request.region->min()[i]);
       to = std::min<double>(to, request.region->max()[i]);
     }
     reached *= std::max(0.0, to - from + 1);
-    dims = std::max(dims, static_cast<double>(box.dim()[i]));
+    longest = std::max(longest, static_cast<double>(box.dim()[i]));
   }
   // Steiner's formula for a convex body, or the whole box. There are at least 1.15 points to a unit
   // of area.
   const double area = static_cast<double>(points.size()) / 1.15;
-  const double steiner = area * (reach.inside + reach.outside + 1) +
-                         2 * M_PI * dims * reach.outside * reach.outside +
-                         4.2 * reach.outside * reach.outside * reach.outside;
+  const double steiner = area * (std::min(reach.inside, longest / 2) + out) +
+                         2 * M_PI * longest * out * out + 4.0 / 3 * M_PI * out * out * out;
   constexpr double kBytesPerGridPoint = 20;  // state and result, with the unused part of blocks
   const double bytes = std::min(reached, steiner) * kBytesPerGridPoint;
   const double physical =

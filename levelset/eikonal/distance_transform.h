@@ -26,4 +26,7 @@ struct DistanceRequest {
 [[nodiscard]] openvdb::FloatGrid::Ptr distanceTransform(const openvdb::FloatGrid& field,
                                                         const DistanceRequest& request);
 
+/// Is there a pair of neighbouring grid points of different sign, one of them with a distance?
+[[nodiscard]] bool hasZeroCrossing(const openvdb::FloatTree& field);
+
 }  // namespace levelset::eikonal

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "levelset/eikonal/point_tree.h"
 
@@ -43,47 +44,85 @@ float squareOf(double x) {
   return static_cast<float>(x * x);
 }
 
-/// Relaxes one block to rest, given its neighbours.
-struct BlockWorker {
-  Block& block;
-  const SurfacePoints& points;
-  float limitInside, limitOutside;
-  std::vector<openvdb::Index> queue = {};
-  NearestPoints::Mask changed = {};
+using Float4 = float __attribute__((vector_size(16)));
+using Int4 = std::int32_t __attribute__((vector_size(16)));
 
-  [[nodiscard]] openvdb::Vec3f local(std::uint32_t point) const {
-    return openvdb::Vec3f(points.positions[point] - block.origin.asVec3d());
+/// Relaxes one block to rest, given its neighbours.
+class BlockWorker {
+ public:
+  BlockWorker(Block& block, const SurfacePoints& points) : block_(block), points_(points) {
+    held_.fill(-1);
+    for (int x = block.low.x(); x <= block.high.x(); ++x)
+      for (int y = block.low.y(); y <= block.high.y(); ++y)
+        for (int z = block.low.z(); z <= block.high.z(); ++z)
+          held_[slot(x, y, z)] = block.squared[offsetOf(x, y, z)];
   }
 
-  void offer(int x, int y, int z, std::uint32_t point, const openvdb::Vec3f& at) {
-    const float dx = at[0] - static_cast<float>(x), dy = at[1] - static_cast<float>(y),
-                dz = at[2] - static_cast<float>(z);
-    const float squared = dx * dx + dy * dy + dz * dz;
+  void relax() {
+    changed_ = block_.queued;
+    for (auto it = block_.queued.beginOn(); it; ++it) queue_.push_back(it.pos());
+    const std::uint32_t news = block_.inbox.exchange(0, std::memory_order_relaxed);
+    for (int i = 0; i < 27; ++i)
+      if (news >> i & 1) readNeighbour(i);
+    for (std::size_t head = 0; head < queue_.size(); ++head) {
+      const openvdb::Index n = queue_[head];
+      block_.queued.setOff(n);
+      offerAround(FloatTree::LeafNodeType::offsetToLocalCoord(n), block_.nearest[n]);
+    }
+  }
+
+  /// Bit i: neighbour i can use what changed here, as far as `limit` (squared).
+  [[nodiscard]] std::uint32_t outbox(float limit) const;
+
+ private:
+  // Squared distances of the block with two grid points around it that accept nothing (-1), so that
+  // rows of four can be compared without looking where they lie.
+  static constexpr int kPad = 2, kSide = 12, kRow = 16;
+  static std::size_t slot(int x, int y, int z) {
+    return static_cast<std::size_t>(((x + kPad) * kSide + y + kPad) * kRow + z + kPad);
+  }
+
+  [[nodiscard]] openvdb::Vec3f local(std::uint32_t point) const {
+    return openvdb::Vec3f(points_.positions[point] - block_.origin.asVec3d());
+  }
+
+  void accept(int x, int y, int z, std::uint32_t point, float squared) {
     const openvdb::Index n = offsetOf(x, y, z);
-    const float held = block.squared[n];
-    if (squared > held || (squared == held && point >= block.nearest[n])) return;
-    if (squared >= (block.inside.isOn(n) ? limitInside : limitOutside)) return;
-    block.squared[n] = squared;
-    block.nearest[n] = point;
-    block.own.setOff(n);
-    changed.setOn(n);
-    if (block.queued.isOn(n)) return;
-    block.queued.setOn(n);
-    queue.push_back(n);
+    held_[slot(x, y, z)] = squared;
+    block_.squared[n] = squared;
+    block_.nearest[n] = point;
+    block_.own.setOff(n);
+    changed_.setOn(n);
+    if (block_.queued.isOn(n)) return;
+    block_.queued.setOn(n);
+    queue_.push_back(n);
   }
 
   /// To the grid points of the block around a position, which may be one outside it.
   void offerAround(const Coord& c, std::uint32_t point) {
     const openvdb::Vec3f at = local(point);
-    const Coord from = Coord::maxComponent(c.offsetBy(-1), block.low),
-                to = Coord::minComponent(c.offsetBy(1), block.high);
-    for (int x = from.x(); x <= to.x(); ++x)
-      for (int y = from.y(); y <= to.y(); ++y)
-        for (int z = from.z(); z <= to.z(); ++z) offer(x, y, z, point, at);
+    const float dz = at[2] - static_cast<float>(c.z() - 1);
+    const Float4 alongZ = {dz, dz - 1, dz - 2, 1e18f};
+    const Float4 squareZ = alongZ * alongZ;
+    for (int x = c.x() - 1; x <= c.x() + 1; ++x) {
+      const float dx = at[0] - static_cast<float>(x);
+      for (int y = c.y() - 1; y <= c.y() + 1; ++y) {
+        const float dy = at[1] - static_cast<float>(y);
+        const Float4 squared = squareZ + (dx * dx + dy * dy);
+        Float4 held;
+        std::memcpy(&held, &held_[slot(x, y, c.z() - 1)], sizeof(held));
+        const Int4 better = squared < held;  // the first of equals stays: the order is fixed
+        std::uint64_t any[2];
+        std::memcpy(any, &better, sizeof(any));
+        if (!(any[0] | any[1])) continue;
+        for (int i = 0; i < 3; ++i)
+          if (better[i]) accept(x, y, c.z() - 1 + i, point, squared[i]);
+      }
+    }
   }
 
   void readNeighbour(int index) {
-    const Block& other = *block.neighbours[static_cast<std::size_t>(index)];
+    const Block& other = *block_.neighbours[static_cast<std::size_t>(index)];
     const Coord d = direction(index);
     Coord from, to;  // in the block's own coordinates
     for (int i = 0; i < 3; ++i) {
@@ -98,43 +137,34 @@ struct BlockWorker {
         }
   }
 
-  void relax() {
-    changed = block.queued;
-    for (auto it = block.queued.beginOn(); it; ++it) queue.push_back(it.pos());
-    const std::uint32_t news = block.inbox.exchange(0, std::memory_order_relaxed);
-    for (int i = 0; i < 27; ++i)
-      if (news >> i & 1) readNeighbour(i);
-    for (std::size_t head = 0; head < queue.size(); ++head) {
-      const openvdb::Index n = queue[head];
-      block.queued.setOff(n);
-      offerAround(FloatTree::LeafNodeType::offsetToLocalCoord(n), block.nearest[n]);
-    }
-  }
-
-  /// Bit i: neighbour i can use what changed here.
-  [[nodiscard]] std::uint32_t outbox() const {
-    const float limit = std::max(limitInside, limitOutside);
-    std::uint32_t bits = 0;
-    for (auto it = changed.beginOn(); it; ++it) {
-      const Coord c = FloatTree::LeafNodeType::offsetToLocalCoord(it.pos());
-      const Coord side((c.x() == 7) - (c.x() == 0), (c.y() == 7) - (c.y() == 0),
-                       (c.z() == 7) - (c.z() == 0));
-      if (side == Coord(0)) continue;
-      const openvdb::Vec3d at(local(block.nearest[it.pos()]));
-      for (int dx = -1; dx <= 1; ++dx)
-        for (int dy = -1; dy <= 1; ++dy)
-          for (int dz = -1; dz <= 1; ++dz) {
-            const Coord toward(dx && dx == side.x() ? dx : 0, dy && dy == side.y() ? dy : 0,
-                               dz && dz == side.z() ? dz : 0);
-            const int index = directionIndex(toward);
-            if (toward == Coord(0) || bits >> index & 1) continue;
-            if ((at - c.offsetBy(dx, dy, dz).asVec3d()).lengthSqr() < static_cast<double>(limit))
-              bits |= 1u << index;
-          }
-    }
-    return bits;
-  }
+  Block& block_;
+  const SurfacePoints& points_;
+  std::array<float, kSide * kSide * kRow> held_;
+  std::vector<openvdb::Index> queue_;
+  NearestPoints::Mask changed_;
 };
+
+std::uint32_t BlockWorker::outbox(float limit) const {
+  std::uint32_t bits = 0;
+  for (auto it = changed_.beginOn(); it; ++it) {
+    const Coord c = FloatTree::LeafNodeType::offsetToLocalCoord(it.pos());
+    const Coord side((c.x() == 7) - (c.x() == 0), (c.y() == 7) - (c.y() == 0),
+                     (c.z() == 7) - (c.z() == 0));
+    if (side == Coord(0)) continue;
+    const openvdb::Vec3d at(local(block_.nearest[it.pos()]));
+    for (int dx = -1; dx <= 1; ++dx)
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dz = -1; dz <= 1; ++dz) {
+          const Coord toward(dx && dx == side.x() ? dx : 0, dy && dy == side.y() ? dy : 0,
+                             dz && dz == side.z() ? dz : 0);
+          const int index = directionIndex(toward);
+          if (toward == Coord(0) || bits >> index & 1) continue;
+          if ((at - c.offsetBy(dx, dy, dz).asVec3d()).lengthSqr() < static_cast<double>(limit))
+            bits |= 1u << index;
+        }
+  }
+  return bits;
+}
 
 }  // namespace
 
@@ -152,7 +182,6 @@ NearestPoints::Block& NearestPoints::touch(const Coord& origin) {
   slot = &block;
   block.origin = origin;
   block.nearest.fill(kNone);
-  block.squared.fill(std::numeric_limits<float>::max());
   block.low = Coord(0);
   block.high = Coord(7);
   if (reach_.region) {
@@ -165,6 +194,10 @@ NearestPoints::Block& NearestPoints::touch(const Coord& origin) {
   } else {
     block.inside.set(accessor_.getValue(origin) < 0);
   }
+  const float inside = squareOf(reach_.inside + kMargin),
+              outside = squareOf(reach_.outside + kMargin);
+  for (openvdb::Index n = 0; n < 512; ++n)
+    block.squared[n] = block.inside.isOn(n) ? inside : outside;
   for (int i = 0; i < 27; ++i) {
     const auto found = index_.find(origin + blockStep(i));
     if (i == 13 || found == index_.end()) continue;
@@ -179,7 +212,7 @@ void NearestPoints::seed(const Coord& gridPoint, std::uint32_t point, bool own) 
   const openvdb::Index n = FloatTree::LeafNodeType::coordToOffset(gridPoint);
   const auto squared =
       static_cast<float>((points_.positions[point] - gridPoint.asVec3d()).lengthSqr());
-  if (squared >= block.squared[n]) return;
+  if (block.nearest[n] != kNone && squared >= block.squared[n]) return;
   block.squared[n] = squared;
   block.nearest[n] = point;
   block.own.set(n, own);
@@ -220,10 +253,10 @@ void NearestPoints::seedRegionBoundary() {
 }
 
 void NearestPoints::process(Block& block, std::vector<Coord>& missing) const {
-  BlockWorker worker{block, points_, squareOf(reach_.inside + kMargin),
-                     squareOf(reach_.outside + kMargin)};
+  BlockWorker worker(block, points_);
   worker.relax();
-  const std::uint32_t news = worker.outbox();
+  const std::uint32_t news =
+      worker.outbox(squareOf(std::max(reach_.inside, reach_.outside) + kMargin));
   for (int i = 0; i < 27; ++i) {
     if (!(news >> i & 1)) continue;
     if (Block* other = block.neighbours[static_cast<std::size_t>(i)])

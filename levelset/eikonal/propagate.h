@@ -26,7 +26,7 @@ class NearestPoints {
   struct Block {
     openvdb::Coord origin;
     std::array<std::uint32_t, 512> nearest;  ///< number of the surface point
-    std::array<float, 512> squared;          ///< squared distance to it, voxels²
+    std::array<float, 512> squared;          ///< to it, voxels²; without it, what is out of reach
     Mask inside;                             ///< φ < 0
     Mask own;  ///< holds the surface point that was found for this very grid point
     std::array<Block*, 27> neighbours{};   ///< as far as they exist

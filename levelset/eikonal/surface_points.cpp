@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 
 #include "levelset/eikonal/closest_point.h"
+#include "levelset/eikonal/distance_transform.h"
 
 namespace levelset::eikonal {
 namespace {
@@ -195,6 +197,16 @@ SurfacePoints findSurfacePoints(const FloatTree& field,
     all.thin = all.thin || part.thin;
   }
   return all;
+}
+
+bool hasZeroCrossing(const FloatTree& field) {
+  std::atomic<bool> found = false;
+  forEachBlock(field, leavesOf(field, {}), [&](std::size_t, const DenseBlock& block) {
+    if (!found)
+      forEachPointBeside(block, field.background(),
+                         [&](int, int, int, const Crossings&) { found = true; });
+  });
+  return found;
 }
 
 FloatTree::Ptr thicken(const FloatTree& field) {

@@ -1,0 +1,156 @@
+#include "levelset/solids/offset.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/tools/Diagnostics.h>
+#include <tbb/global_control.h>
+
+#include <limits>
+
+#include "levelset/error.h"
+#include "levelset/vdb.h"
+#include "tests/support/bands.h"
+
+namespace {
+
+using namespace levelset;
+using Imath::V3d;
+using Shape = std::function<double(const V3d&)>;
+
+// All shapes in voxels, off the grid points.
+const V3d kCentre(0.31, -0.17, 0.43);
+
+Shape sphere(double radius) {
+  return [=](const V3d& p) { return (p - kCentre).length() - radius; };
+}
+
+Shape box(double half) {
+  return [=](const V3d& p) {
+    const V3d r = p - kCentre;
+    const V3d q(std::abs(r.x) - half, std::abs(r.y) - half, std::abs(r.z) - half);
+    const V3d out(std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0));
+    return out.length() + std::min(0.0, std::max({q.x, q.y, q.z}));
+  };
+}
+
+NarrowBand sample(const Shape& shape, double extent) {
+  return support::sampleBand(shape, {V3d(-extent), V3d(extent)}, 1);
+}
+
+struct BandError {
+  double l1 = 0, linf = 0;
+};
+
+BandError bandError(const NarrowBand& band, const Shape& exact) {
+  BandError e;
+  double count = 0;
+  support::forEachActive(band, [&](const V3d& p, double value) {
+    const double error = std::abs(value - exact(p));
+    e.l1 += error;
+    e.linf = std::max(e.linf, error);
+    ++count;
+  });
+  e.l1 /= count;
+  return e;
+}
+
+TEST(Offset, MovesASphereExactly) {
+  const NarrowBand ball = sample(sphere(40), 42);
+  for (const double distance : {10.0, 0.7, -10.0, -30.0}) {
+    const NarrowBand moved = offset(ball, distance);
+    const BandError e = bandError(moved, sphere(40 + distance));
+    EXPECT_LE(e.l1, 1e-3) << distance;
+    EXPECT_LE(e.linf, 0.02) << distance;
+    EXPECT_NEAR(moved.halfWidth(), 3, 1e-6);
+    EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(moved), 6), "") << distance;
+  }
+}
+
+TEST(Offset, RoundsACubeOutwards) {
+  const BandError e =
+      bandError(offset(sample(box(20), 22), 5), [](const V3d& p) { return box(20)(p) - 5; });
+  EXPECT_LE(e.l1, 0.06);
+  EXPECT_LE(e.linf, 0.75);  // from the corner, of which the grid shows this much less
+}
+
+TEST(Offset, KeepsACubeSharpInwards) {
+  const NarrowBand moved = offset(sample(box(25), 27), -5);
+  double nearFaces = 0, all = 0;
+  support::forEachActive(moved, [&](const V3d& p, double value) {
+    const double truth = box(20)(p), error = std::abs(value - truth);
+    const V3d r = p - kCentre;
+    int free = 0;
+    for (int i = 0; i < 3; ++i) free += std::abs(r[i]) < 17;
+    if (free >= 2) nearFaces = std::max(nearFaces, error);
+    all = std::max(all, error);
+  });
+  EXPECT_LE(nearFaces, 0.01);
+  EXPECT_LE(bandError(moved, box(20)).l1, 0.015);
+  EXPECT_LE(all, 0.8);  // at the corners, which lie between grid points
+}
+
+TEST(Offset, AddsUpOnConvexSolids) {
+  const NarrowBand cube = sample(box(12), 14);
+  const NarrowBand twice = offset(offset(cube, 4), 5), once = offset(cube, 9);
+  auto accessor = vdb(once).getConstAccessor();
+  double sum = 0, count = 0;
+  for (auto it = vdb(twice).cbeginValueOn(); it; ++it, ++count)
+    sum += std::abs(*it - accessor.getValue(it.getCoord()));
+  EXPECT_LE(sum / count, 5e-3);
+}
+
+TEST(Offset, ComesBackOnSmoothSolids) {
+  const BandError e = bandError(offset(offset(sample(sphere(30), 32), 8), -8), sphere(30));
+  EXPECT_LE(e.l1, 2e-3);
+}
+
+TEST(Offset, FusesWhatComesNear) {
+  const Shape pair = [](const V3d& p) {
+    return std::min((p - V3d(-14, 0, 0)).length(), (p - V3d(14, 0, 0)).length()) - 10;
+  };
+  const NarrowBand grown = offset(sample(pair, 26), 5);
+  EXPECT_LT(vdb(grown).tree().getValue(openvdb::Coord(0)), 0);
+  // Where the fronts met there is a crease, on which the distance is that of the circle.
+  double worst = 0;
+  support::forEachActive(grown, [&](const V3d& p, double value) {
+    const V3d q(std::abs(p.x), p.y, p.z);
+    const double radial = std::hypot(p.y, p.z), circle = std::sqrt(15.0 * 15 - 14 * 14);
+    const double ball = (q - V3d(14, 0, 0)).length() - 15;
+    const double truth = ball < 0 ? -std::min(-ball, std::hypot(q.x, radial - circle)) : ball;
+    if (std::abs(q.x) > 1.5) worst = std::max(worst, std::abs(value - std::max(truth, -3.0)));
+  });
+  EXPECT_LE(worst, 0.5);
+}
+
+TEST(Offset, KeepsTheSolidForZero) {
+  const NarrowBand ball = sample(sphere(10), 12);
+  EXPECT_EQ(offset(ball, 0).contentHash(), ball.contentHash());
+  EXPECT_NEAR(offset(ball, 0, {.halfWidth = 5}).halfWidth(), 5, 1e-6);
+}
+
+TEST(Offset, DoesNotDependOnThreads) {
+  const NarrowBand cube = sample(box(12), 14);
+  std::uint64_t hashes[3];
+  for (int threads : {1, 2, 4}) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                              static_cast<std::size_t>(threads));
+    hashes[threads / 2] = offset(cube, 6).contentHash();
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+  EXPECT_EQ(hashes[0], hashes[2]);
+}
+
+TEST(Offset, Refuses) {
+  const NarrowBand ball = sample(sphere(10), 12);
+  EXPECT_THROW((void)offset(ball, std::numeric_limits<double>::quiet_NaN()), UsageError);
+  EXPECT_THROW((void)offset(ball, std::numeric_limits<double>::infinity()), UsageError);
+  EXPECT_THROW((void)offset(ball, 1, {.halfWidth = 0.2}), UsageError);
+  EXPECT_THROW((void)offset(NarrowBand(), 1), InvalidInput);
+  EXPECT_THROW((void)offset(ball, -10.5), InvalidInput);
+  EXPECT_THROW((void)offset(ball, -1e6), InvalidInput);
+  EXPECT_THROW((void)offset(ball, 1e6), ResourceLimit);
+  EXPECT_THROW((void)offset(ball, 3e9), ResourceLimit);
+  EXPECT_THROW((void)offset(ball, 30, {.maxMemory = 1000000}), ResourceLimit);
+  EXPECT_THROW((void)offset(ball, 5, {.progress = [](double) { return false; }}), Cancelled);
+}
+
+}  // namespace
