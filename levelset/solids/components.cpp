@@ -1,1 +1,257 @@
 #include "levelset/solids/components.h"
+
+#include <fmt/core.h>
+#include <openvdb/tools/Prune.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+#include <vector>
+
+#include "levelset/eikonal/redistance.h"
+#include "levelset/error.h"
+#include "levelset/inspect/measure.h"
+#include "levelset/solids/regions.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using openvdb::Int32Tree;
+using FloatLeaf = FloatTree::LeafNodeType;
+using LabelLeaf = Int32Tree::LeafNodeType;
+using BlockSet = std::set<Coord>;
+
+/// Share of a voxel by which a distance may differ from the one made anew and still be the same.
+constexpr float kSameDistance = 0.02f;
+/// Share of a voxel that a zero keeps when its sign must show.
+constexpr float kLeastDistance = 1e-3f;
+
+/// Turns regions over: what was inside becomes outside, or the other way round, and the surfaces
+/// between them and their neighbours vanish. Grid points that are nearer to a remaining surface
+/// keep their bits.
+class RegionFlip {
+ public:
+  RegionFlip(const NarrowBand& solid, const RegionMap& map, std::vector<bool> flipped)
+      : solid_(solid), map_(map), flipped_(std::move(flipped)) {
+    reach_ = static_cast<int>(std::ceil((solid.halfWidth() + 1) / 8));
+  }
+
+  [[nodiscard]] NarrowBand run() {
+    collectBlocks();
+    NarrowBand result = solid_;
+    FloatGrid& grid = editVdb(result);
+    flipTiles(grid);
+    openvdb::tree::LeafManager<FloatTree> leaves(grid.tree());
+    leaves.foreach ([this](FloatLeaf& leaf, std::size_t) { flipLeaf(leaf); });
+    if (!both_.empty()) renew(result);
+    openvdb::tools::prune(editVdb(result).tree());
+    return result;
+  }
+
+ private:
+  [[nodiscard]] bool isFlipped(std::int32_t region) const {
+    return flipped_[static_cast<std::size_t>(region)];
+  }
+
+  /// Blocks that a vanishing surface can reach, and among them those that a remaining one reaches.
+  void collectBlocks() {
+    BlockSet vanishing, remaining;
+    map_.forEachShellBlock([&](const Coord& origin, std::uint32_t shell) {
+      const RegionShell& s = map_.shells()[shell];
+      const bool stays = isFlipped(static_cast<std::int32_t>(s.inside)) ==
+                         isFlipped(static_cast<std::int32_t>(s.outside));
+      (stays ? remaining : vanishing).insert(origin);
+    });
+    vanishing_ = dilated(vanishing);
+    for (const Coord& origin : dilated(remaining)) {
+      if (vanishing_.count(origin)) both_.insert(origin);
+    }
+  }
+
+  [[nodiscard]] BlockSet dilated(const BlockSet& blocks) const {
+    BlockSet result;
+    for (const Coord& origin : blocks)
+      for (int x = -reach_; x <= reach_; ++x)
+        for (int y = -reach_; y <= reach_; ++y)
+          for (int z = -reach_; z <= reach_; ++z)
+            result.insert(origin.offsetBy(8 * x, 8 * y, 8 * z));
+    return result;
+  }
+
+  void flipTiles(FloatGrid& grid) const {
+    openvdb::tree::ValueAccessor<const Int32Tree> labels(map_.labels());
+    auto tile = grid.tree().beginValueAll();
+    tile.setMaxDepth(FloatTree::DEPTH - 2);
+    for (; tile; ++tile) {
+      if (isFlipped(labels.getValue(tile.getBoundingBox().min()))) tile.setValue(-*tile);
+    }
+  }
+
+  /// Signs become right everywhere. Values do where no remaining surface is near.
+  void flipLeaf(FloatLeaf& leaf) const {
+    const LabelLeaf& labels = *map_.labels().probeConstLeaf(leaf.origin());
+    const bool nearVanishing = vanishing_.count(leaf.origin()) > 0;
+    const bool nearBoth = both_.count(leaf.origin()) > 0;
+    const float background = vdb(solid_).background();
+    const float least = kLeastDistance * static_cast<float>(solid_.voxelSize());
+    float* values = leaf.buffer().data();
+    for (openvdb::Index i = 0; i < FloatLeaf::SIZE; ++i) {
+      const bool flips = isFlipped(labels.getValue(i));
+      if (!flips && !nearVanishing) continue;
+      const float sign = (values[i] < 0) != flips ? -1.f : 1.f;
+      if (nearBoth) {
+        if (flips) values[i] = sign * std::max(std::abs(values[i]), least);
+      } else {
+        values[i] = sign * background;
+        leaf.setValueOff(i);
+      }
+    }
+  }
+
+  /// The field with larger distances beside the vanished surfaces: those of small ones on both
+  /// sides would let an interpolant dip through zero.
+  [[nodiscard]] NarrowBand smoothed(const NarrowBand& flippedSolid) const {
+    NarrowBand result = flippedSolid;
+    FloatGrid& grid = editVdb(result);
+    auto before = vdb(solid_).getConstAccessor(), after = vdb(flippedSolid).getConstAccessor();
+    const float voxel = static_cast<float>(solid_.voxelSize());
+    for (const Coord& origin : both_) {
+      FloatLeaf* leaf = grid.tree().probeLeaf(origin);
+      if (!leaf) continue;
+      for (openvdb::Index i = 0; i < FloatLeaf::SIZE; ++i) {
+        const Coord c = leaf->offsetToGlobalCoord(i);
+        const float own = leaf->getValue(i);
+        if (std::abs(own) < voxel && isBesideSurface(before, c, before.getValue(c)) &&
+            !isBesideSurface(after, c, own)) {
+          leaf->setValueOnly(i, std::copysign(voxel, own));
+        }
+      }
+    }
+    return result;
+  }
+
+  /// A box, in the world, that holds those blocks and some surface.
+  [[nodiscard]] Imath::Box3d worldBoxOfBoth() const {
+    openvdb::BBoxd box;
+    for (const Coord& origin : both_) {
+      box.expand(openvdb::BBoxd(origin.asVec3d(), (origin + Coord(7)).asVec3d()));
+    }
+    box.expand(8.0 * (reach_ + 1));
+    const openvdb::BBoxd world = vdb(solid_).transform().indexToWorld(box);
+    return {toImath(world.min()), toImath(world.max())};
+  }
+
+  /// Where both kinds of surface are near: grid points that were nearest to a vanished one take
+  /// their distance from the field made anew.
+  void renew(NarrowBand& result) const {
+    // Wider than the result, so that a distance just within the background can be told from one
+    // that ends there.
+    const NarrowBand fresh = redistance(
+        smoothed(result), {.halfWidth = solid_.halfWidth() + 1, .region = worldBoxOfBoth()});
+    const NarrowBand before = result;
+    FloatGrid& grid = editVdb(result);
+    auto old = vdb(before).getConstAccessor();
+    auto out = grid.getAccessor();
+    auto in = vdb(fresh).getConstAccessor();
+    openvdb::tree::ValueAccessor<const Int32Tree> labels(map_.labels());
+    for (const Coord& origin : both_) {
+      if (!old.probeConstLeaf(origin) && !in.probeConstLeaf(origin)) continue;
+      FloatLeaf& leaf = *out.touchLeaf(origin);
+      for (openvdb::Index i = 0; i < FloatLeaf::SIZE; ++i) {
+        const Coord c = leaf.offsetToGlobalCoord(i);
+        const float distance = std::abs(in.getValue(c));
+        if (!isFlipped(labels.getValue(c)) && isRight(leaf, i, distance, old)) continue;
+        const bool inBand = distance < grid.background();
+        leaf.setValueOnly(i,
+                          std::copysign(inBand ? distance : grid.background(), leaf.getValue(i)));
+        leaf.setActiveState(i, inBand);
+      }
+    }
+  }
+
+  /// Outside the band no surface was near at all. In it, the value is right if the remaining
+  /// surfaces are not further than it says.
+  [[nodiscard]] bool isRight(const FloatLeaf& leaf, openvdb::Index i, float distance,
+                             FloatGrid::ConstAccessor& signs) const {
+    if (!leaf.isValueOn(i)) return true;
+    const float own = leaf.getValue(i);
+    return distance <= std::abs(own) + kSameDistance * static_cast<float>(solid_.voxelSize()) ||
+           isBesideSurface(signs, leaf.offsetToGlobalCoord(i), own);
+  }
+
+  /// Such a grid point makes the zero set: it must keep its value.
+  static bool isBesideSurface(FloatGrid::ConstAccessor& values, const Coord& c, float own) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int step = -1; step <= 1; step += 2) {
+        Coord beside = c;
+        beside[axis] += step;
+        if ((values.getValue(beside) < 0) != (own < 0)) return true;
+      }
+    }
+    return false;
+  }
+
+  const NarrowBand& solid_;
+  const RegionMap& map_;
+  std::vector<bool> flipped_;
+  int reach_ = 1;
+  BlockSet vanishing_, both_;
+};
+
+NarrowBand flip(const NarrowBand& solid, const RegionMap& map, std::vector<bool> flipped) {
+  if (std::find(flipped.begin(), flipped.end(), true) == flipped.end()) return solid;
+  return RegionFlip(solid, map, std::move(flipped)).run();
+}
+
+}  // namespace
+
+Topology topology(const NarrowBand& solid) {
+  const Measurement m = measure(solid);
+  return {m.components, m.shells, m.cavities};
+}
+
+NarrowBand keepLargest(const NarrowBand& solid, std::size_t count) {
+  if (!count) throw UsageError("keep: the number of solids to keep is 0; keep at least one");
+  if (solid.isEmpty()) {
+    throw InvalidInput(
+        "keep: the band is empty, so there is nothing to keep; check the steps "
+        "before it");
+  }
+  const RegionMap map(vdb(solid));
+  const std::vector<Region>& regions = map.regions();
+  std::vector<std::size_t> solids;
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    if (regions[i].inside) solids.push_back(i);
+  }
+  // Equal solids differ in the last bits of their volumes; ties fall to the first in the tree.
+  const auto volume = [&](std::size_t i) { return static_cast<float>(regions[i].volume); };
+  std::stable_sort(solids.begin(), solids.end(),
+                   [&](std::size_t a, std::size_t b) { return volume(a) > volume(b); });
+  std::vector<bool> flipped(regions.size(), false);
+  for (std::size_t i = count; i < solids.size(); ++i) flipped[solids[i]] = true;
+  return flip(solid, map, std::move(flipped));
+}
+
+NarrowBand fillCavities(const NarrowBand& solid, double maxVolume) {
+  if (!(maxVolume >= 0)) {
+    throw UsageError(fmt::format(
+        "fill-cavities: the largest volume to fill is {}; give a number that is not negative",
+        maxVolume));
+  }
+  if (solid.isEmpty()) return solid;
+  const RegionMap map(vdb(solid));
+  const std::vector<Region>& regions = map.regions();
+  const double limit = maxVolume / std::pow(solid.voxelSize(), 3);
+  std::vector<bool> flipped(regions.size(), false);
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    flipped[i] = i != RegionMap::kInfinite && !regions[i].inside && regions[i].volume <= limit;
+  }
+  return flip(solid, map, std::move(flipped));
+}
+
+}  // namespace levelset

@@ -4,9 +4,10 @@
 
 #include "levelset/narrow_band.h"
 
-/// Connected parts of a solid and of the space around it. Grid points are connected along the edges of
-/// the grid (6 neighbours) inside, and with all 26 neighbours outside, so that a solid and its
-/// surroundings never cross.
+/// Connected parts of a solid and of the space around it. Grid points are connected along the edges
+/// of the grid (6 neighbours) inside, and also across the diagonals of its faces (18 neighbours)
+/// outside, as the mesh of bandToMesh separates them, so that a solid and its surroundings never
+/// cross.
 namespace levelset {
 
 struct Topology {
@@ -16,11 +17,15 @@ struct Topology {
 };
 [[nodiscard]] Topology topology(const NarrowBand& solid);
 
-/// Keeps the `count` solids of largest volume with their cavities, drops the others.
+/// Keeps the `count` solids of largest volume with their cavities, drops the others. Of equal ones,
+/// those that come first in the tree stay. Grid points that are not nearest to a dropped surface
+/// keep their bits.
 /// @throws UsageError for count = 0; InvalidInput if the band is empty
 [[nodiscard]] NarrowBand keepLargest(const NarrowBand& solid, std::size_t count);
 
-/// Fills enclosed voids up to `maxVolume` world units³ (default: all).
+/// Fills enclosed voids up to `maxVolume` world units³ (default: all). What floats in a void is not
+/// part of its volume, and is swallowed when it is filled; an empty band stays empty.
+/// @throws UsageError if `maxVolume` is negative or not a number
 [[nodiscard]] NarrowBand fillCavities(const NarrowBand& solid, double maxVolume = 1e300);
 
 }  // namespace levelset

@@ -1,0 +1,217 @@
+#include "levelset/solids/components.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "levelset/convert/band_to_mesh.h"
+#include "levelset/error.h"
+#include "levelset/inspect/check.h"
+#include "levelset/inspect/measure.h"
+#include "tests/support/bands.h"
+
+namespace {
+
+using namespace levelset;
+using Imath::V3d;
+using std::numbers::pi;
+
+using Distance = std::function<double(const V3d&)>;
+
+NarrowBand sample(const Distance& phi, double half, double halfWidth = 3) {
+  return support::sampleBand(phi, {V3d(-half), V3d(half)}, 1, halfWidth);
+}
+
+double ball(const V3d& p, const V3d& centre, double radius) {
+  return (p - centre).length() - radius;
+}
+
+double ballVolume(double radius) {
+  return 4 * pi / 3 * radius * radius * radius;
+}
+
+/// A shell of radii 24 and 18 that holds a shell of 10 and 5, and a ball of 6 beside it.
+double nestedDistance(const V3d& p) {
+  const double r = p.length();
+  return std::min({std::max(r - 24, 18 - r), std::max(r - 10, 5 - r), ball(p, V3d(40, 0, 0), 6)});
+}
+NarrowBand nestedShells() {
+  return sample(nestedDistance, 46);
+}
+
+/// Largest difference from the exact distance over the band, in voxels, and that the band is as
+/// wide as it should be.
+void expectDistance(const NarrowBand& band, const Distance& exact, double tolerance) {
+  double worst = 0;
+  std::size_t count = 0;
+  support::forEachActive(band, [&](const V3d& p, double phi) {
+    worst = std::max(worst, std::abs(phi - exact(p)));
+    ++count;
+  });
+  EXPECT_LT(worst, tolerance);
+  const auto box = band.zeroSetBounds();
+  const double half = std::max(box.max.length(), box.min.length());
+  const auto expected = static_cast<double>(sample(exact, half).activeVoxelCount());
+  EXPECT_NEAR(static_cast<double>(count), expected, 2e-3 * expected);
+}
+
+TEST(Topology, CountsNestedShells) {
+  const Topology t = topology(nestedShells());
+  EXPECT_EQ(t.components, 3u);
+  EXPECT_EQ(t.shells, 5u);
+  EXPECT_EQ(t.cavities, 2u);
+  const Topology none = topology(NarrowBand());
+  EXPECT_EQ(none.components + none.shells + none.cavities, 0u);
+}
+
+TEST(Topology, TellsDiagonalNeighboursApart) {
+  // Two inside voxels that share the diagonal of a face are two solids.
+  auto grid = emptyLevelSet(uniformTransform(1), 3);
+  grid->tree().setValueOn(openvdb::Coord(7, 7, 7), -0.5f);
+  grid->tree().setValueOn(openvdb::Coord(8, 8, 7), -0.5f);
+  EXPECT_EQ(topology(makeBand(grid)).components, 2u);
+  grid->tree().setValueOn(openvdb::Coord(7, 8, 7), -0.5f);
+  EXPECT_EQ(topology(makeBand(grid)).components, 1u);
+}
+
+TEST(KeepLargest, DropsSmallerSolidsAndKeepsBitsOfTheRest) {
+  const NarrowBand solid = nestedShells();
+  const NarrowBand one = keepLargest(solid, 1);
+  const Topology t = topology(one);
+  EXPECT_EQ(t.components, 1u);
+  EXPECT_EQ(t.shells, 2u);
+  EXPECT_EQ(t.cavities, 1u);
+  EXPECT_EQ(one.contentHash(),
+            sample([](const V3d& p) { return std::max(p.length() - 24, 18 - p.length()); }, 46)
+                .contentHash());
+  const NarrowBand two = keepLargest(solid, 2);
+  EXPECT_EQ(topology(two).shells, 4u);
+  EXPECT_EQ(two.contentHash(), sample(
+                                   [](const V3d& p) {
+                                     const double r = p.length();
+                                     return std::min(std::max(r - 24, 18 - r),
+                                                     std::max(r - 10, 5 - r));
+                                   },
+                                   46)
+                                   .contentHash());
+  EXPECT_EQ(keepLargest(solid, 3).contentHash(), solid.contentHash());
+  EXPECT_EQ(keepLargest(solid, 99).contentHash(), solid.contentHash());
+}
+
+TEST(KeepLargest, KeepsSolidInsideADroppedOne) {
+  // The outer shell is thinner in volume than the ball that floats in it.
+  const auto thin = [](const V3d& p) { return std::max(p.length() - 30, 29 - p.length()); };
+  const auto inner = [](const V3d& p) { return p.length() - 22; };
+  const NarrowBand kept =
+      keepLargest(sample([&](const V3d& p) { return std::min(thin(p), inner(p)); }, 31), 1);
+  EXPECT_EQ(topology(kept).shells, 1u);
+  EXPECT_EQ(kept.contentHash(), sample(inner, 31).contentHash());
+}
+
+TEST(KeepLargest, RestoresDistanceBesideDroppedSolid) {
+  // The two bands meet: what belonged to the small one is measured from the large one again.
+  const auto large = [](const V3d& p) { return ball(p, V3d(-0.3, 0.2, 0.1), 16); };
+  const auto small = [](const V3d& p) { return ball(p, V3d(20.1, 0, 0), 2.8); };
+  const NarrowBand both = sample([&](const V3d& p) { return std::min(large(p), small(p)); }, 24);
+  ASSERT_EQ(topology(both).components, 2u);
+  const NarrowBand kept = keepLargest(both, 1);
+  EXPECT_EQ(topology(kept).shells, 1u);
+  expectDistance(kept, large, 0.05);
+  EXPECT_TRUE(check(kept).passed());
+  std::size_t changed = 0;
+  support::forEachActive(kept, [&](const V3d& p, double phi) {
+    changed += static_cast<float>(phi) != static_cast<float>(large(p));
+  });
+  EXPECT_LT(changed, 400u);  // only beside the small one
+}
+
+TEST(KeepLargest, BreaksTiesByPosition) {
+  const NarrowBand twins = sample(
+      [](const V3d& p) { return std::min(ball(p, V3d(-16, 0, 0), 5), ball(p, V3d(16, 0, 0), 5)); },
+      22);
+  EXPECT_LT(keepLargest(twins, 1).zeroSetBounds().max.x, 0);
+}
+
+TEST(KeepLargest, RefusesNothingToKeep) {
+  EXPECT_THROW((void)keepLargest(nestedShells(), 0), UsageError);
+  EXPECT_THROW((void)keepLargest(NarrowBand(), 1), InvalidInput);
+}
+
+TEST(FillCavities, FillsAllOrOnlySmallOnes) {
+  const NarrowBand solid = nestedShells();
+  const NarrowBand full = fillCavities(solid);
+  EXPECT_EQ(topology(full).shells, 2u);
+  EXPECT_EQ(topology(full).cavities, 0u);
+  EXPECT_EQ(
+      full.contentHash(),
+      sample([](const V3d& p) { return std::min(p.length() - 24, ball(p, V3d(40, 0, 0), 6)); }, 46)
+          .contentHash());
+  // The void of radius 5 holds 524, the one around the inner shell 18² 4π/3 less what floats in it.
+  const NarrowBand small = fillCavities(solid, 1.02 * ballVolume(5));
+  EXPECT_EQ(topology(small).shells, 4u);
+  EXPECT_EQ(topology(small).cavities, 1u);
+  EXPECT_EQ(fillCavities(solid, 0.95 * ballVolume(5)).contentHash(), solid.contentHash());
+  const double outer = ballVolume(18) - ballVolume(10);
+  EXPECT_EQ(topology(fillCavities(solid, 1.01 * outer)).shells, 2u);
+  EXPECT_EQ(topology(fillCavities(solid, 0.99 * outer)).shells, 4u);
+}
+
+TEST(FillCavities, RestoresDistanceUnderThinWalls) {
+  const auto hull = [](const V3d& p) { return p.length() - 14.2; };
+  const NarrowBand hollow =
+      sample([&](const V3d& p) { return std::max(hull(p), -ball(p, V3d(0, 0, 3), 8.5)); }, 15);
+  ASSERT_EQ(topology(hollow).cavities, 1u);
+  const NarrowBand filled = fillCavities(hollow);
+  EXPECT_EQ(topology(filled).shells, 1u);
+  expectDistance(filled, hull, 0.05);
+  EXPECT_TRUE(check(filled).passed());
+  EXPECT_NEAR(measure(filled).volume, ballVolume(14.2), 5e-3 * ballVolume(14.2));
+}
+
+TEST(FillCavities, LeavesOpenHollowsAndEmptyBands) {
+  const NarrowBand cup = sample(
+      [](const V3d& p) {
+        const double hole = std::max(std::hypot(p.x, p.y) - 3, -p.z);
+        return std::max({p.length() - 20, 12 - p.length(), -hole});
+      },
+      21);
+  EXPECT_EQ(topology(cup).cavities, 0u);
+  EXPECT_EQ(fillCavities(cup).contentHash(), cup.contentHash());
+  EXPECT_TRUE(fillCavities(NarrowBand()).isEmpty());
+  EXPECT_THROW((void)fillCavities(cup, -1), UsageError);
+  EXPECT_THROW((void)fillCavities(cup, std::numeric_limits<double>::quiet_NaN()), UsageError);
+}
+
+TEST(FillCavities, FindsVoidsMadeOfTilesOnly) {
+  // A void of many thousand voxels across: its middle is one large tile.
+  auto grid =
+      vdb(sample([](const V3d& p) { return std::max(p.length() - 60, 50 - p.length()); }, 61))
+          .deepCopy();
+  grid->pruneGrid();
+  const NarrowBand filled = fillCavities(makeBand(grid));
+  EXPECT_EQ(topology(filled).shells, 1u);
+  EXPECT_LT(vdb(filled).tree().getValue(openvdb::Coord(0)), 0);
+}
+
+TEST(Components, GiveSameBitsForAnyNumberOfThreads) {
+  const NarrowBand solid = sample(
+      [](const V3d& p) {
+        return std::min(std::max(p.length() - 14.2, -ball(p, V3d(0, 0, 3), 8.5)),
+                        ball(p, V3d(17, 3, 0), 1.9));
+      },
+      20);
+  std::uint64_t kept = 0, filled = 0;
+  for (const std::size_t threads : {1u, 2u, 4u}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    const std::uint64_t k = keepLargest(solid, 1).contentHash(),
+                        f = fillCavities(solid).contentHash();
+    if (threads == 1) kept = k, filled = f;
+    EXPECT_EQ(k, kept);
+    EXPECT_EQ(f, filled);
+  }
+}
+
+}  // namespace
