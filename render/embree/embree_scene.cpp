@@ -37,7 +37,9 @@ struct RaySolid {
 struct RayQuery {
   RTCIntersectContext embree;  // first: Embree hands its address back
   V3d origin, direction;       // world; the origin at the scene's box
-  double far;
+  double limit;  // of the search: the same for every block, so that a hit has the same bits however
+                 // the blocks are visited
+  double nearest;
   double scale;
   const RaySolid* solid = nullptr;
 };
@@ -47,7 +49,7 @@ std::optional<double> crossingOf(const RayQuery& query, const RaySolid& solid, u
   V3d origin, direction;
   solid.worldToIndex.multVecMatrix(query.origin, origin);
   solid.worldToIndex.multDirMatrix(query.direction, direction);
-  return findCrossing(solid.blocks[primitive], IndexRay(origin, direction), 0, query.far, search);
+  return findCrossing(solid.blocks[primitive], IndexRay(origin, direction), 0, query.limit, search);
 }
 
 void boundBlock(const RTCBoundsFunctionArguments* args) {
@@ -69,9 +71,9 @@ void intersectBlock(const RTCIntersectFunctionNArguments* args) {
   auto& query = *reinterpret_cast<RayQuery*>(args->context);
   const auto& solid = *static_cast<const RaySolid*>(args->geometryUserPtr);
   const auto t = crossingOf(query, solid, args->primID, Search::FirstCrossing);
-  if (!t || *t > query.far) return;
-  if (query.solid && *t == query.far && solid.id >= query.solid->id) return;
-  query.far = *t;
+  if (!t || *t > query.nearest) return;
+  if (query.solid && *t == query.nearest && solid.id >= query.solid->id) return;
+  query.nearest = *t;
   query.solid = &solid;
   // Blocks that could tie stay in Embree's sight.
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, args->N);
@@ -225,7 +227,7 @@ std::optional<RayQuery> EmbreeScene::Impl::prepare(const V3d& origin, const V3d&
   rtcInitIntersectContext(&query.embree);
   query.origin = origin + direction * moved;
   query.direction = direction;
-  query.far = far - moved;
+  query.limit = query.nearest = far - moved;
   query.scale = scale;
 
   const V3d start = (query.origin - centre) * scale;
@@ -237,7 +239,7 @@ std::optional<RayQuery> EmbreeScene::Impl::prepare(const V3d& origin, const V3d&
   ray.dir_y = static_cast<float>(direction.y);
   ray.dir_z = static_cast<float>(direction.z);
   // The scene has a diagonal of 1, so nothing lies beyond 2.
-  ray.tfar = static_cast<float>(std::min(2.0, query.far * scale + kFloatPad));
+  ray.tfar = static_cast<float>(std::min(2.0, query.limit * scale + kFloatPad));
   ray.mask = ~0u;
   return query;
 }
@@ -259,8 +261,8 @@ Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near,
 
   const RaySolid& solid = *query->solid;
   hit.found = true;
-  hit.distance = moved + query->far;
-  hit.position = query->origin + direction * query->far;
+  hit.distance = moved + query->nearest;
+  hit.position = query->origin + direction * query->nearest;
   hit.id = solid.id;
   hit.solid = solid.index;
   V3d position;
