@@ -14,20 +14,20 @@ namespace render {
 struct Light {
   Imath::V3d direction{-0.4, 0.7,
                        0.6};  ///< towards the light, in camera space (x right, y up, z to the eye)
-  double strength = 0.75;
+  double strength = 0.8;
   double softness = 0.15;  ///< half angle of the light, radians: penumbrae
 };
 
 struct Solid {
   levelset::NarrowBand band;
-  Imath::C3f colour{0.72f, 0.70f, 0.66f};
+  Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
 };
 
 struct Scene {
   Camera camera;
   Light key;
-  double ambient = 0.45;  ///< weight of the ambient term, dimmed by occlusion
+  double ambient = 0.32;  ///< weight of the ambient term, dimmed by occlusion
   std::vector<Solid> solids;
 };
 

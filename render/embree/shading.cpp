@@ -121,14 +121,14 @@ C3f Shader::colour(const Hit& hit, const V3d& direction, int x, int y, int sampl
   const double key = scene_.key.strength * keyLight(frame, x, y, sample);
   const double facing = std::clamp(-direction.dot(frame.normal), 0.0, 1.0);
   const double upward = 0.5 + 0.5 * frame.normal.dot(up_);
-  const double fill = 0.35 * scene_.ambient * std::max(0.0, frame.normal.dot(fill_));
+  const double fill = 0.5 * scene_.ambient * std::max(0.0, frame.normal.dot(fill_));
   const double rim = 0.25 * scene_.ambient * std::pow(1 - facing, 4) * upward * open;
   const V3d half = (key_ - direction).normalized();
   const double gloss =
       key > 0 ? 0.08 * key * std::pow(std::max(0.0, half.dot(frame.normal)), 32) : 0;
 
   const C3f sky = C3f(0.86f, 0.94f, 1.06f) * static_cast<float>(upward) +
-                  C3f(0.80f, 0.74f, 0.68f) * static_cast<float>(1 - upward);
+                  C3f(0.50f, 0.45f, 0.41f) * static_cast<float>(1 - upward);
   C3f result = scaled(C3f(1.06f, 1.0f, 0.90f), key);
   for (int c = 0; c < 3; ++c) {
     // Light that bounces in a hollow of this colour; 1 where the sky is open.
