@@ -176,7 +176,10 @@ std::vector<char> encodePng(const Image& image) {
 
 // === Reading
 
-Image readOpenExr(Imf::InputFile& file, const std::string& name) {
+/// ZIP packs about 1000 to 1 at best; a header that promises far more than the file holds is damaged.
+constexpr double kMaxCompression = 5000;
+
+Image readOpenExr(Imf::InputFile& file, const std::string& name, double fileBytes) {
   const Imf::Header& header = file.header();
   const Imath::Box2i window = header.dataWindow();
   const double width = static_cast<double>(window.max.x) - window.min.x + 1;
@@ -186,6 +189,14 @@ Image readOpenExr(Imf::InputFile& file, const std::string& name) {
         fmt::format("read image: {} has {:.0f}x{:.0f} pixels, which "
                     "passes the limit of {:.0f} pixels",
                     name, width, height, kMaxPixels));
+  }
+  double channelCount = 0;
+  for (auto it = header.channels().begin(); it != header.channels().end(); ++it) ++channelCount;
+  if (width * height * channelCount * 2 > fileBytes * kMaxCompression) {
+    throw InvalidInput(
+        fmt::format("read image: {} promises {:.0f}x{:.0f} pixels in {:.0f} channels, "
+                    "more than its {:.0f} bytes can hold; copy it again",
+                    name, width, height, channelCount, fileBytes));
   }
   Image image(static_cast<int>(width), static_cast<int>(height));
   Imf::FrameBuffer frame;
@@ -265,7 +276,7 @@ Image readExr(const std::filesystem::path& path) {
   }
   try {
     Imf::InputFile file(name.c_str(), 0);
-    return readOpenExr(file, name);
+    return readOpenExr(file, name, static_cast<double>(std::filesystem::file_size(path)));
   } catch (const levelset::Error&) {
     throw;
   } catch (const std::bad_alloc&) {

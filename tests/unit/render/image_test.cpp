@@ -135,6 +135,12 @@ TEST_F(ImageFiles, RefusesWhatItCannotRead) {
     std::ofstream(file("cut.exr"), std::ios::binary).write(bytes.data(), static_cast<long>(size));
     EXPECT_THROW((void)readExr(file("cut.exr")), levelset::InvalidInput) << size;
   }
+  // A header that promises 8192 x 8192 pixels: the four numbers of the data window.
+  std::string greedy = bytes;
+  const std::size_t window = greedy.find(std::string("dataWindow\0box2i", 16)) + 21;
+  greedy.replace(window, 16, std::string("\0\0\0\0\0\0\0\0\xff\x1f\0\0\xff\x1f\0\0", 16));
+  std::ofstream(file("greedy.exr"), std::ios::binary) << greedy;
+  EXPECT_THROW((void)readExr(file("greedy.exr")), levelset::InvalidInput);
 }
 
 }  // namespace
