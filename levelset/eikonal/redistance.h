@@ -18,12 +18,19 @@ struct RedistanceOptions {
 };
 
 /// Makes a signed distance again out of a field that has the right zero set, without moving that.
-/// Beside the interface each grid point finds the closest point on a local high-order interpolant;
-/// from there closest points travel outwards block by block, and each grid point keeps the nearest.
-/// The result does not depend on the order of blocks or on the number of threads.
+/// Beside the interface each grid point finds the closest point on a tricubic interpolant by
+/// Newton's method [Chopp01, Saye14]; from there closest points travel outwards block by block, and
+/// each grid point keeps the nearest and polishes it on the interpolant. Second order in the voxel
+/// size and better on smooth surfaces; an edge or corner is as sharp as the grid shows it, to about
+/// half a voxel. The result does not depend on the order of blocks or on the number of threads.
 /// @param field  right sign everywhere, Lipschitz, any slope; only values beside the zero set are
 /// read
-/// @throws InvalidInput if the field has no zero crossing
+/// @return       with `region`, distances on the smallest box of grid points that holds it, and
+/// signs
+///               everywhere
+/// @throws InvalidInput if the field has no zero crossing; UsageError for a half width below 1 or
+/// an
+///         empty region; ResourceLimit; Cancelled
 [[nodiscard]] NarrowBand redistance(NarrowBand field, const RedistanceOptions& options = {});
 
 }  // namespace levelset

@@ -18,11 +18,22 @@ struct BlendOptions {
   Progress progress = {};
 };
 
-/// CSG and its rounding in one, by curvature flow localised along the curve in which the two zero
-/// sets meet [Museth02, Brodersen07 §6.3]: φ_t = D(d) κ |∇φ|, where d is the distance to the curve and
-/// D falls smoothly from 1 to 0 at `radius`. Stops when the crease has taken that radius. Nothing
-/// changes further than `radius` from the curve, so solids that are near but do not meet stay apart.
+/// CSG and its rounding in one, by curvature flow along the curve in which the two zero sets meet
+/// [Museth02, Brodersen07 §6.3]: φ_t = D(d) (κ − clamp(κ, ±1/radius)) |∇φ| with κ = k1 + k2, where
+/// d is the distance to the curve and D falls smoothly from 1 to 0 at `radius`. Unlike the plain
+/// flow of the sources this one moves only what is bent more sharply than the radius, so it comes
+/// to rest as a fillet: a right-angled crease is filled as by a circle of that radius, within 10 %.
+/// A sharper crease has no room for it and becomes as round as `radius` to both sides allows.
+/// Nothing changes further than `radius` from the curve, so solids that are near but do not meet
+/// stay apart.
 /// @param radius  world units, ≥ 0; 0 is plain CSG
+/// @return        notes tell of resampled operands, of surfaces that do not meet (plain CSG then)
+/// and
+///                of a radius below 1.5 voxels
+/// @throws UsageError if `radius` is negative or not finite; InvalidInput if a solid is empty or
+/// the
+///         radius larger than the solids; ResourceLimit, Cancelled
+/// @note needs O(radius) steps over the grid points around the curve
 [[nodiscard]] CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b,
                               double radius, const BlendOptions& options = {});
 

@@ -13,10 +13,13 @@ struct OffsetOptions {
   Progress progress = {};
 };
 
-/// Moves the surface along its normal by `distance`; positive grows the solid. Distances are swept out
-/// to the new zero set and re-distanced once, whatever `distance`.
+/// Moves the surface along its normal by `distance`; positive grows the solid. Distances are swept
+/// out to the new zero set and re-distanced once, whatever `distance`.
 /// @param distance  world units, any sign
-/// @throws UsageError if `distance` is not finite; InvalidInput if `solid` is empty or nothing is left
-[[nodiscard]] NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& options = {});
+/// @throws UsageError if `distance` is not finite; InvalidInput if `solid` is empty or nothing is
+/// left;
+///         ResourceLimit, before anything is allocated; Cancelled
+[[nodiscard]] NarrowBand offset(NarrowBand solid, double distance,
+                                const OffsetOptions& options = {});
 
 }  // namespace levelset
