@@ -68,8 +68,7 @@ TEST(Blend, TakesTheRadiusAskedFor) {
     const CsgResult result = blend(CsgOperation::Union, corner.floor, corner.wall, radius);
     // A fillet of radius r fills a right angle up to (√2 − 1) r from the crease.
     const double filled = fillDepth(result.band) / (M_SQRT2 - 1);
-    std::printf("radius %g: filled as by %g\n", radius, filled);
-    EXPECT_NEAR(filled, radius, 0.25 * radius);
+    EXPECT_NEAR(filled, radius, 0.1 * radius);
     EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(result.band), 6), "");
     EXPECT_TRUE(result.notes.empty());
   }
