@@ -19,7 +19,7 @@ constexpr double kLeastCurvature = 0.1;  // of the distance along the surface, a
 
 /// Two unit vectors perpendicular to a unit vector and to each other.
 void tangents(const Vec3d& n, Vec3d& t1, Vec3d& t2) {
-  // Duff et al. 2017, without a branch that loses precision.
+  // [Duff17], without a branch that loses precision.
   const double sign = std::copysign(1.0, n.z());
   const double a = -1 / (sign + n.z()), b = n.x() * n.y() * a;
   t1 = Vec3d(1 + sign * n.x() * n.x() * a, sign * b, -sign * n.x());
