@@ -1,1 +1,262 @@
 #include "levelset/convert/band_file.h"
+
+#include <fmt/core.h>
+
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <fstream>
+#include <new>
+#include <system_error>
+
+#include "levelset/convert/byte_io.h"
+#include "levelset/convert/nano_file.h"
+#include "levelset/convert/vdb_layout.h"
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+
+namespace levelset {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Where the random identifier stands: behind magic number, three versions and a flag.
+constexpr std::streamoff kIdentifierOffset = 8 + 3 * 4 + 1;
+
+std::string bandFormat(const fs::path& nameOrFormat) {
+  std::string text = nameOrFormat.filename().string();
+  text = text.substr(text.rfind('.') + 1);
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c | 0x20);
+  return text == "vdb" || text == "nvdb" ? text : "";
+}
+
+std::string chooseFormat(const fs::path& path, const std::string& given) {
+  const std::string format = bandFormat(given.empty() ? path : fs::path(given));
+  if (!format.empty()) return format;
+  throw UsageError(
+      fmt::format("write: '{}' tells no format of a band; end the name in .vdb or .nvdb, or "
+                  "give --format",
+                  given.empty() ? path.string() : given));
+}
+
+// === Choice of a grid
+
+std::string valueType(const VdbEntry& entry) {
+  if (hasFloatTree(entry)) return entry.half ? "half" : "float";
+  if (hasDoubleTree(entry)) return entry.half ? "double as half" : "double";
+  return entry.type;
+}
+
+bool isReadable(const VdbEntry& entry) {
+  return hasFloatTree(entry) || hasDoubleTree(entry);
+}
+
+bool isLevelSet(const VdbEntry& entry) {
+  return isReadable(entry) &&
+         entry.gridClass() == openvdb::GridBase::gridClassToString(openvdb::GRID_LEVEL_SET);
+}
+
+std::string listOf(const std::vector<VdbEntry>& entries) {
+  std::string list;
+  for (const VdbEntry& entry : entries)
+    list += fmt::format("{}'{}' ({}, {})", list.empty() ? "" : ", ", entry.name, valueType(entry),
+                        entry.gridClass());
+  return list.empty() ? "nothing" : list;
+}
+
+const VdbEntry& chooseGrid(const std::vector<VdbEntry>& entries, const std::string& wanted,
+                           const std::string& file) {
+  const VdbEntry* chosen = nullptr;
+  for (const VdbEntry& entry : entries) {
+    if (wanted.empty() ? !isLevelSet(entry) : entry.name != wanted) continue;
+    if (chosen) {
+      throw InvalidInput(fmt::format("read: {} holds more than one {}: {}; {}", file,
+                                     wanted.empty() ? "level set" : "grid of that name",
+                                     listOf(entries),
+                                     wanted.empty() ? "choose with --grid" : "write them apart"));
+    }
+    chosen = &entry;
+  }
+  if (!chosen) {
+    throw InvalidInput(fmt::format(
+        "read: {} holds {}, and no {}; {}", file, listOf(entries),
+        wanted.empty() ? "level set of float values" : fmt::format("grid '{}'", wanted),
+        wanted.empty() ? "convert it to a level set before" : "choose one of these with --grid"));
+  }
+  if (!isReadable(*chosen)) {
+    throw InvalidInput(
+        fmt::format("read: grid '{}' of {} holds values of type {}, and float, half and "
+                    "double are read; convert it before",
+                    chosen->name, file, valueType(*chosen)));
+  }
+  return *chosen;
+}
+
+/// The entry that holds the tree: another one where trees are shared.
+const VdbEntry& treeOwner(const std::vector<VdbEntry>& entries, const VdbEntry& entry,
+                          const std::string& file) {
+  if (entry.instanceOf.empty()) return entry;
+  for (const VdbEntry& other : entries)
+    if (other.uniqueName == entry.instanceOf && other.instanceOf.empty() && isReadable(other))
+      return other;
+  throw InvalidInput(
+      fmt::format("read: {} is damaged: the tree of grid '{}' is missing; fetch or make "
+                  "the file again",
+                  file, entry.name));
+}
+
+NarrowBand readChosen(std::string_view file, const std::string& name,
+                      const ReadBandOptions& options) {
+  const std::vector<VdbEntry> entries = readVdbEntries(file, name);
+  const VdbEntry& entry = chooseGrid(entries, options.grid, name);
+  if (!entry.transform) {
+    throw InvalidInput(
+        fmt::format("read: grid '{}' of {} has a frustum transform; resample it to "
+                    "uniform voxels first",
+                    entry.name, name));
+  }
+  const std::size_t limit = memoryLimit(options.maxMemory);
+  requireMemory(static_cast<double>(file.size()), limit, "read");
+  const auto grid = openvdb::FloatGrid::create(
+      readVdbTree(file, name, treeOwner(entries, entry, name), limit - file.size()));
+  grid->setTransform(entry.transform);
+  grid->setName(entry.name);
+  grid->setGridClass(openvdb::GridBase::stringToGridClass(entry.gridClass()));
+  return importBand(grid, fmt::format("read: {}", name).c_str());
+}
+
+// === Writing
+
+/// OpenVDB's writer, with grid offsets, on any stream that can seek.
+struct StreamArchive : openvdb::io::Archive {
+  void writeGrids(std::ostream& out, const openvdb::FloatGrid::ConstPtr& grid) const {
+    Archive::write(out, openvdb::GridCPtrVec{grid}, true, openvdb::MetaMap());
+  }
+};
+
+/// The grid of a band with nothing but what we say about it; the tree is shared.
+openvdb::FloatGrid::Ptr namedGrid(const NarrowBand& band, const std::string& name) {
+  const openvdb::FloatGrid& source = vdb(band);
+  const auto grid =
+      openvdb::FloatGrid::create(openvdb::ConstPtrCast<openvdb::FloatTree>(source.constTreePtr()));
+  grid->setTransform(source.transform().copy());
+  grid->setName(name);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  grid->setCreator("Levelsmith");
+  return grid;
+}
+
+std::string identifierText(std::uint64_t hash) {
+  const std::uint64_t other = hash * 0x9E3779B97F4A7C15ull;
+  return fmt::format("{:08X}-{:04X}-{:04X}-{:04X}-{:012X}", hash >> 32, (hash >> 16) & 0xFFFF,
+                     hash & 0xFFFF, other >> 48, other & 0xFFFFFFFFFFFFull);
+}
+
+void writeVdb(const fs::path& path, const openvdb::FloatGrid::ConstPtr& grid, std::uint64_t hash) {
+  openvdb::initialize();
+  std::vector<char> buffer(1 << 20);
+  std::ofstream out;
+  out.rdbuf()->pubsetbuf(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+  out.exceptions(std::ios::badbit | std::ios::failbit);
+  out.open(path, std::ios::binary);
+  StreamArchive().writeGrids(out, grid);
+  out.seekp(kIdentifierOffset);
+  const std::string identifier = identifierText(hash);
+  out.write(identifier.data(), static_cast<std::streamsize>(identifier.size()));
+  out.close();
+}
+
+// === Information
+
+template <typename T>
+T metadataValue(const VdbEntry& entry, const char* key, T otherwise) {
+  const VdbMetadata* found = entry.find(key);
+  if (!found || found->value.size() != sizeof(T)) return otherwise;
+  T value;
+  std::memcpy(&value, found->value.data(), sizeof(T));
+  return value;
+}
+
+GridInfo describe(const VdbEntry& entry) {
+  using openvdb::GridBase;
+  GridInfo info;
+  info.name = entry.name;
+  info.type = valueType(entry);
+  info.gridClass = entry.gridClass();
+  const auto count = metadataValue<std::int64_t>(entry, GridBase::META_FILE_VOXEL_COUNT, 0);
+  const auto bytes = metadataValue<std::int64_t>(entry, GridBase::META_FILE_MEM_BYTES, 0);
+  info.activeVoxels = count > 0 ? static_cast<std::uint64_t>(count) : 0;
+  info.bytes = bytes > 0 ? static_cast<std::uint64_t>(bytes) : 0;
+  if (entry.transform && entry.transform->hasUniformScale())
+    info.voxelSize = entry.transform->voxelSize()[0];
+  using Triple = std::array<std::int32_t, 3>;
+  const auto low = metadataValue<Triple>(entry, GridBase::META_FILE_BBOX_MIN, {1, 1, 1});
+  const auto high = metadataValue<Triple>(entry, GridBase::META_FILE_BBOX_MAX, {0, 0, 0});
+  if (low[0] <= high[0] && low[1] <= high[1] && low[2] <= high[2])
+    info.indexBounds =
+        Imath::Box3d(Imath::V3d(low[0], low[1], low[2]), Imath::V3d(high[0], high[1], high[2]));
+  return info;
+}
+
+}  // namespace
+
+NarrowBand readBand(const fs::path& path, const ReadBandOptions& options) {
+  const std::string name = inputName(path);
+  if (bandFormat(path) == "nvdb") {
+    throw UsageError(
+        fmt::format("read: {} is written for renderers and not read back; read the .vdb "
+                    "that it was made from",
+                    name));
+  }
+  try {
+    const Bytes bytes = readBytes(path, options.maxMemory);
+    return readChosen(bytes.view(), name, options);
+  } catch (const std::bad_alloc&) {
+    throw ResourceLimit(
+        fmt::format("read: {} does not fit into memory; free memory or use larger voxels", name));
+  } catch (const openvdb::Exception& error) {
+    throw InvalidInput(
+        fmt::format("read: {} is damaged: {}; fetch or make the file again", name, error.what()));
+  }
+}
+
+void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOptions& options) {
+  const std::string format = chooseFormat(path, options.format);
+  if (!band.shared())
+    throw InvalidInput(
+        fmt::format("write: there is no band to write to '{}'; make one first", path.string()));
+  FileTarget target(path);
+  const auto grid = namedGrid(band, options.name);
+  try {
+    errno = 0;
+    if (format == "vdb")
+      writeVdb(target.path(), grid, band.contentHash());
+    else
+      writeNanoGrid(target.path(), *grid);
+  } catch (const std::ios_base::failure&) {
+    throw IoError(
+        fmt::format("write: '{}' could not be written: {}; make room on the disk or write "
+                    "elsewhere",
+                    path.string(), std::generic_category().message(errno != 0 ? errno : EIO)));
+  } catch (const openvdb::Exception& error) {
+    throw IoError(fmt::format("write: '{}' could not be written: {}; write elsewhere",
+                              path.string(), error.what()));
+  }
+  target.commit();
+}
+
+std::vector<GridInfo> bandFileInfo(const fs::path& path) {
+  const std::string name = inputName(path);
+  const Bytes bytes = readBytes(path, kNoMemoryLimit);
+  std::vector<GridInfo> result;
+  for (const VdbEntry& entry : readVdbEntries(bytes.view(), name))
+    result.push_back(describe(entry));
+  return result;
+}
+
+bool isBandFormat(const fs::path& nameOrFormat) {
+  return !bandFormat(nameOrFormat).empty();
+}
+
+}  // namespace levelset

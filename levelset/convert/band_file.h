@@ -18,27 +18,35 @@ struct ReadBandOptions {
   std::size_t maxMemory = kNoMemoryLimit;
 };
 
-/// @throws IoError when it cannot be opened; InvalidInput when it is damaged, holds no such grid, or
-///         the grid breaks the invariants of a band. Damaged files end in an error, never in a hang.
-[[nodiscard]] NarrowBand readBand(const std::filesystem::path& path, const ReadBandOptions& options = {});
+/// Values stored as half floats or doubles become floats.
+/// @param path  a .vdb file, or "-" for standard input
+/// @throws IoError when it cannot be opened; InvalidInput when it is damaged, holds no such grid,
+/// or
+///         the grid breaks the invariants of a band. Damaged files end in an error, never in a
+///         hang. ResourceLimit before the grid passes options.maxMemory or the machine's memory
+[[nodiscard]] NarrowBand readBand(const std::filesystem::path& path,
+                                  const ReadBandOptions& options = {});
 
 struct WriteBandOptions {
   std::string name = "surface";  ///< of the grid
   std::string format = {};       ///< "vdb" or "nvdb"; empty: by extension
 };
 
-/// Writes beside the target and renames. Equal bands give equal bytes: the identifier that OpenVDB
-/// draws at random is replaced by the content hash.
+/// Writes beside the target and renames (FileTarget). Equal bands give equal bytes: the identifier
+/// that OpenVDB draws at random is replaced by the content hash.
+/// @throws IoError; UsageError for an unknown format; InvalidInput for a band that was never made
 void writeBand(const std::filesystem::path& path, const NarrowBand& band,
                const WriteBandOptions& options = {});
 
 /// One grid of a .vdb file, from its header and metadata alone: no voxel is loaded.
 struct GridInfo {
-  std::string name, type, gridClass;
+  std::string name;
+  std::string type;  ///< of the values: "float", "half", "double"; else as OpenVDB names the tree
+  std::string gridClass;           ///< "level set", "fog volume", …
   std::uint64_t activeVoxels = 0;  ///< 0 when the file does not say
-  double voxelSize = 0;
-  Imath::Box3d indexBounds;  ///< empty when the file does not say
-  std::uint64_t bytes = 0;
+  double voxelSize = 0;            ///< 0 when the voxels are no cubes of one size
+  Imath::Box3d indexBounds;        ///< empty when the file does not say
+  std::uint64_t bytes = 0;         ///< of memory that its tree takes; 0 when the file does not say
 };
 [[nodiscard]] std::vector<GridInfo> bandFileInfo(const std::filesystem::path& path);
 

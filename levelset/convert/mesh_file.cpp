@@ -1,1 +1,118 @@
 #include "levelset/convert/mesh_file.h"
+
+#include <fmt/core.h>
+
+#include <new>
+#include <optional>
+
+#include "levelset/convert/mesh_parts.h"
+#include "levelset/error.h"
+
+namespace levelset {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kInfoBytes = 1 << 20;
+
+struct MeshFormat {
+  const char* extension;
+  void (*read)(std::string_view, MeshBuilder&);
+  void (*write)(ByteWriter&, const TriMesh&, const Progress&);
+};
+
+constexpr MeshFormat kFormats[] = {{"ply", readPly, writePly},
+                                   {"obj", readObj, writeObj},
+                                   {"stl", readStl, writeStl},
+                                   {"off", readOff, writeOff}};
+
+struct FormatChoice {
+  const MeshFormat* format;
+  bool compressed;
+};
+
+std::optional<FormatChoice> findFormat(const fs::path& nameOrFormat) {
+  std::string text = nameOrFormat.filename().string();
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c | 0x20);
+  const bool compressed = text.ends_with(".gz");
+  if (compressed) text.resize(text.size() - 3);
+  const std::string extension = text.substr(text.rfind('.') + 1);  // all of it without a point
+  for (const MeshFormat& format : kFormats)
+    if (extension == format.extension) return FormatChoice{&format, compressed};
+  return std::nullopt;
+}
+
+FormatChoice chooseFormat(const fs::path& path, const std::string& given, const char* action) {
+  if (!given.empty()) {
+    if (const auto choice = findFormat(given)) return *choice;
+    throw UsageError(
+        fmt::format("{}: the mesh format '{}' is not known; use ply, obj, stl or off, "
+                    "with .gz behind it if compressed",
+                    action, given));
+  }
+  if (const auto choice = findFormat(path)) return *choice;
+  if (path == "-") {
+    throw UsageError(fmt::format(
+        "{}: standard {} has no name that tells its format; give --format ply, obj, stl or off",
+        action, action[0] == 'r' ? "input" : "output"));
+  }
+  throw UsageError(
+      fmt::format("{}: the name '{}' tells no mesh format; end it in .ply, .obj, .stl or "
+                  ".off, or give --format",
+                  action, path.string()));
+}
+
+}  // namespace
+
+TriMesh readMesh(const fs::path& path, const ReadMeshOptions& options) {
+  const FormatChoice choice = chooseFormat(path, options.format, "read");
+  report(options.progress, 0, "read");
+  try {
+    const Bytes bytes = readBytes(path, options.maxMemory);
+    MeshBuilder builder(inputName(path), options, bytes.view());
+    choice.format->read(bytes.view(), builder);
+    TriMesh mesh = builder.finish();
+    report(options.progress, 1, "read");
+    return mesh;
+  } catch (const std::bad_alloc&) {
+    throw ResourceLimit(fmt::format(
+        "read: {} does not fit into memory; use a smaller mesh or free memory", inputName(path)));
+  }
+}
+
+void writeMesh(const fs::path& path, const TriMesh& mesh, const WriteMeshOptions& options) {
+  const FormatChoice choice = chooseFormat(path, options.format, "write");
+  report(options.progress, 0, "write");
+  ByteWriter out(path, choice.compressed);
+  choice.format->write(out, mesh, options.progress);
+  out.commit();
+  report(options.progress, 1, "write");
+}
+
+bool isMeshFormat(const fs::path& nameOrFormat) {
+  return findFormat(nameOrFormat).has_value();
+}
+
+MeshFileInfo meshFileInfo(const fs::path& path) {
+  const FormatChoice choice = chooseFormat(path, {}, "info");
+  const std::string name = inputName(path);
+  const Bytes head = readFirstBytes(path, kInfoBytes);
+  if (head.size() == 0) failFile(name, "is empty; fetch or make the file again");
+  MeshFileInfo info;
+  if (choice.format->read == readPly) {
+    info = plyInfo(head.view(), name);
+  } else if (choice.format->read == readStl) {
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(path, error);
+    info = stlInfo(head.view(), error || choice.compressed ? 0 : size);
+  } else if (choice.format->read == readOff) {
+    info = offInfo(head.view(), name);
+  } else {
+    info.format = choice.format->extension;
+  }
+  if (choice.compressed) info.format += ", compressed";
+  return info;
+}
+
+}  // namespace levelset

@@ -7,12 +7,13 @@
 #include "levelset/mesh.h"
 #include "levelset/progress.h"
 
-/// Triangle meshes in files: PLY, OBJ, STL and OFF, each also compressed as `.gz`. The format is told
-/// by the extension, or given. Polygons are split into triangles; unused elements are skipped.
+/// Triangle meshes in files: PLY, OBJ, STL and OFF, each also compressed as `.gz`. The format is
+/// told by the extension, or given. Polygons are split into triangles; unused elements are skipped.
 namespace levelset {
 
 struct ReadMeshOptions {
-  std::string format = {};  ///< "ply", "obj", "stl", "off", with ".gz" behind if compressed; empty: by extension
+  std::string format =
+      {};  ///< "ply", "obj", "stl", "off", with ".gz" behind if compressed; empty: by extension
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
@@ -21,7 +22,8 @@ struct ReadMeshOptions {
 /// @throws IoError when it cannot be opened or read; InvalidInput when it is not what it claims:
 ///         empty, truncated, counts beyond the file's size, index out of range, NaN or infinite
 ///         coordinate, no triangle
-[[nodiscard]] TriMesh readMesh(const std::filesystem::path& path, const ReadMeshOptions& options = {});
+[[nodiscard]] TriMesh readMesh(const std::filesystem::path& path,
+                               const ReadMeshOptions& options = {});
 
 struct WriteMeshOptions {
   std::string format = {};  ///< as in ReadMeshOptions; STL and PLY are written binary
@@ -38,8 +40,8 @@ void writeMesh(const std::filesystem::path& path, const TriMesh& mesh,
 
 /// What the header of a mesh file says, without reading its elements where the format allows.
 struct MeshFileInfo {
-  std::string format;          ///< e.g. "ply, binary little endian"
-  std::size_t vertices = 0;    ///< 0 when only a full read would tell
+  std::string format;        ///< e.g. "ply, binary little endian"
+  std::size_t vertices = 0;  ///< 0 when only a full read would tell
   std::size_t faces = 0;
 };
 [[nodiscard]] MeshFileInfo meshFileInfo(const std::filesystem::path& path);

@@ -1,0 +1,323 @@
+#include "levelset/convert/byte_io.h"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <system_error>
+#include <utility>
+
+#include "levelset/error.h"
+
+namespace levelset {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kReadChunk = 1 << 22;
+constexpr int kGzipWindow = 15 + 16;  // zlib's way to ask for a gzip wrapper
+
+std::string systemMessage(int error) {
+  return std::generic_category().message(error);
+}
+
+std::size_t physicalMemory() {
+  const long pages = ::sysconf(_SC_PHYS_PAGES), size = ::sysconf(_SC_PAGESIZE);
+  if (pages <= 0 || size <= 0) return kNoMemoryLimit;
+  return static_cast<std::size_t>(pages) * static_cast<std::size_t>(size);
+}
+
+/// An open file, or standard input.
+class InputFile {
+ public:
+  explicit InputFile(const fs::path& path) : name_(inputName(path)) {
+    if (path.empty()) throw IoError("read: the file name is empty; name a file");
+    if (path == "-") {
+      fd_ = STDIN_FILENO;
+      return;
+    }
+    fd_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (fd_ < 0) {
+      const int error = errno;
+      if (error == ENOENT)
+        throw IoError(fmt::format("read: there is no file {}; check the name", name_));
+      throw IoError(fmt::format("read: {} cannot be opened: {}; check its permissions", name_,
+                                systemMessage(error)));
+    }
+    struct stat status {};
+    if (::fstat(fd_, &status) != 0) return;
+    if (S_ISDIR(status.st_mode)) {
+      ::close(fd_);
+      throw IoError(fmt::format("read: {} is a directory; name a file in it", name_));
+    }
+    if (S_ISREG(status.st_mode)) expected_ = static_cast<std::size_t>(status.st_size);
+  }
+  ~InputFile() {
+    if (fd_ > STDIN_FILENO) ::close(fd_);
+  }
+  InputFile(const InputFile&) = delete;
+  InputFile& operator=(const InputFile&) = delete;
+
+  /// 0 when only reading will tell.
+  [[nodiscard]] std::size_t expectedSize() const { return expected_; }
+  [[nodiscard]] const std::string& name() const { return name_; }
+
+  /// 0 at the end.
+  std::size_t read(char* to, std::size_t size) {
+    for (;;) {
+      const ssize_t count = ::read(fd_, to, size);
+      if (count >= 0) return static_cast<std::size_t>(count);
+      if (errno == EINTR) continue;
+      throw IoError(
+          fmt::format("read: {} cannot be read: {}; check the disk", name_, systemMessage(errno)));
+    }
+  }
+
+ private:
+  std::string name_;
+  int fd_ = -1;
+  std::size_t expected_ = 0;
+};
+
+[[noreturn]] void throwTooLarge(const std::string& name, std::size_t limit, bool inflated) {
+  throw ResourceLimit(fmt::format(
+      "read: {} {}passes the memory limit of {:.3g} GB; raise --max-memory or use a smaller file",
+      name, inflated ? "when decompressed " : "", static_cast<double>(limit) * 1e-9));
+}
+
+/// Appends what `next` delivers until it delivers nothing, or `stopAt` bytes are there.
+template <typename Next>
+void fill(Bytes& bytes, std::size_t expected, std::size_t limit, std::size_t stopAt,
+          const std::string& name, bool inflated, Next next) {
+  std::size_t used = 0;
+  bytes.resize(std::min({std::max(expected + 1, std::size_t{1} << 16), limit, stopAt}));
+  for (;;) {
+    if (used == bytes.size()) {
+      if (used >= stopAt) break;
+      if (used >= limit) {
+        char more;
+        if (next(&more, 1) == 0) break;
+        throwTooLarge(name, limit, inflated);
+      }
+      bytes.resize(std::min({used + std::max(used / 2, kReadChunk), limit, stopAt}));
+    }
+    const std::size_t count = next(bytes.data() + used, bytes.size() - used);
+    if (count == 0) break;
+    used += count;
+  }
+  bytes.resize(used);
+}
+
+bool isGzip(std::string_view bytes) {
+  return bytes.size() >= 2 && bytes[0] == '\x1f' && bytes[1] == '\x8b';
+}
+
+/// Inflates gzip members one after the other; what follows them is ignored, as gzip does.
+class Inflater {
+ public:
+  Inflater(std::string_view input, std::string name) : rest_(input), name_(std::move(name)) {
+    if (inflateInit2(&stream_, kGzipWindow) != Z_OK)
+      throw ResourceLimit("read: no memory to decompress; close other programs");
+  }
+  ~Inflater() { inflateEnd(&stream_); }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+
+  std::size_t operator()(char* to, std::size_t size) {
+    std::size_t produced = 0;
+    while (produced < size && !done_) {
+      const std::size_t in = std::min(rest_.size(), kReadChunk);
+      const std::size_t out = std::min(size - produced, kReadChunk);
+      stream_.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(rest_.data()));
+      stream_.avail_in = static_cast<uInt>(in);
+      stream_.next_out = reinterpret_cast<Bytef*>(to + produced);
+      stream_.avail_out = static_cast<uInt>(out);
+      const int status = inflate(&stream_, Z_NO_FLUSH);
+      rest_.remove_prefix(in - stream_.avail_in);
+      produced += out - stream_.avail_out;
+      if (status == Z_STREAM_END) {
+        done_ = !isGzip(rest_) || inflateReset(&stream_) != Z_OK;
+      } else if (status == Z_BUF_ERROR && rest_.empty()) {
+        throwDamaged("ends in the middle");
+      } else if (status != Z_OK) {
+        throwDamaged("is damaged");
+      }
+    }
+    return produced;
+  }
+
+ private:
+  [[noreturn]] void throwDamaged(const char* how) const {
+    throw InvalidInput(fmt::format(
+        "read: the compressed data of {} {}; fetch or make the file again", name_, how));
+  }
+  z_stream stream_{};
+  std::string_view rest_;
+  std::string name_;
+  bool done_ = false;
+};
+
+}  // namespace
+
+void Bytes::resize(std::size_t size) {
+  char* grown = static_cast<char*>(std::realloc(data_.get(), std::max<std::size_t>(size, 1)));
+  if (!grown) {
+    throw ResourceLimit(
+        fmt::format("read: no memory for {:.3g} GB; use a smaller file or free memory",
+                    static_cast<double>(size) * 1e-9));
+  }
+  static_cast<void>(data_.release());
+  data_.reset(grown);
+  size_ = size;
+}
+
+std::size_t memoryLimit(std::size_t maxMemory) {
+  return std::max<std::size_t>(std::min(maxMemory, physicalMemory()), 1);
+}
+
+std::string inputName(const fs::path& path) {
+  return path == "-" ? "standard input" : fmt::format("'{}'", path.string());
+}
+
+Bytes readBytes(const fs::path& path, std::size_t maxMemory) {
+  const std::size_t limit = memoryLimit(maxMemory);
+  Bytes raw;
+  InputFile file(path);
+  if (file.expectedSize() > limit) throwTooLarge(file.name(), limit, false);
+  fill(raw, file.expectedSize(), limit, kNoMemoryLimit, file.name(), false,
+       [&](char* to, std::size_t size) { return file.read(to, size); });
+  if (raw.size() == 0)
+    throw InvalidInput(fmt::format("read: {} is empty; fetch or make the file again", file.name()));
+  if (!isGzip(raw.view())) return raw;
+  Bytes inflated;
+  fill(inflated, 4 * raw.size(), limit, kNoMemoryLimit, file.name(), true,
+       Inflater(raw.view(), file.name()));
+  if (inflated.size() == 0) {
+    throw InvalidInput(
+        fmt::format("read: {} holds nothing when decompressed; make the file again", file.name()));
+  }
+  return inflated;
+}
+
+Bytes readFirstBytes(const fs::path& path, std::size_t count) {
+  Bytes raw;
+  InputFile file(path);
+  fill(raw, 0, kNoMemoryLimit, count, file.name(), false,
+       [&](char* to, std::size_t size) { return file.read(to, size); });
+  if (!isGzip(raw.view())) return raw;
+  Bytes inflated;
+  std::size_t produced = 0;
+  inflated.resize(count);
+  Inflater inflater(raw.view(), file.name());
+  try {
+    while (produced < count) {
+      const std::size_t more =
+          inflater(inflated.data() + produced, std::min<std::size_t>(count - produced, 512));
+      if (more == 0) break;
+      produced += more;
+    }
+  } catch (const InvalidInput&) {
+    // The raw bytes were cut at `count`; what was inflated up to there is what was asked for.
+  }
+  inflated.resize(produced);
+  return inflated;
+}
+
+struct ByteWriter::Deflater {
+  z_stream stream{};
+  std::unique_ptr<char[]> out = std::make_unique<char[]>(kCapacity);
+  Deflater() {
+    if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, kGzipWindow, 8,
+                     Z_DEFAULT_STRATEGY) != Z_OK)
+      throw ResourceLimit("write: no memory to compress; close other programs");
+  }
+  ~Deflater() { deflateEnd(&stream); }
+};
+
+ByteWriter::ByteWriter(const fs::path& target, bool compressed)
+    : target_(target),
+      name_(target == "-" ? "standard output" : fmt::format("'{}'", target.string())),
+      buffer_(std::make_unique<char[]>(kCapacity)),
+      deflater_(compressed ? std::make_unique<Deflater>() : nullptr) {
+  fd_ = ::open(target_.path().c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC);
+  if (fd_ < 0)
+    throw IoError(fmt::format("write: {} cannot be opened: {}; check its permissions", name_,
+                              systemMessage(errno)));
+}
+
+ByteWriter::~ByteWriter() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+void ByteWriter::writeNumber(double value, bool asFloat) {
+  char text[40];
+  const auto end = asFloat ? std::to_chars(text, text + sizeof text, static_cast<float>(value)).ptr
+                           : std::to_chars(text, text + sizeof text, value).ptr;
+  write(text, static_cast<std::size_t>(end - text));
+}
+
+void ByteWriter::writeNumber(std::uint64_t value) {
+  char text[24];
+  write(text, static_cast<std::size_t>(std::to_chars(text, text + sizeof text, value).ptr - text));
+}
+
+void ByteWriter::commit() {
+  flush();
+  if (deflater_) deflateBuffer(true);
+  const int fd = std::exchange(fd_, -1);
+  if (::close(fd) != 0)
+    throw IoError(fmt::format("write: {} could not be written: {}; make room or write elsewhere",
+                              name_, systemMessage(errno)));
+  target_.commit();
+}
+
+void ByteWriter::writeSlowly(const char* data, std::size_t size) {
+  while (size > 0) {
+    if (used_ == kCapacity) flush();
+    const std::size_t part = std::min(size, kCapacity - used_);
+    std::memcpy(buffer_.get() + used_, data, part);
+    used_ += part;
+    data += part;
+    size -= part;
+  }
+}
+
+void ByteWriter::flush() {
+  if (deflater_)
+    deflateBuffer(false);
+  else
+    put(buffer_.get(), used_);
+  used_ = 0;
+}
+
+void ByteWriter::deflateBuffer(bool finish) {
+  z_stream& stream = deflater_->stream;
+  stream.next_in = reinterpret_cast<Bytef*>(buffer_.get());
+  stream.avail_in = static_cast<uInt>(used_);
+  do {
+    stream.next_out = reinterpret_cast<Bytef*>(deflater_->out.get());
+    stream.avail_out = static_cast<uInt>(kCapacity);
+    deflate(&stream, finish ? Z_FINISH : Z_NO_FLUSH);
+    put(deflater_->out.get(), kCapacity - stream.avail_out);
+  } while (stream.avail_out == 0);
+}
+
+void ByteWriter::put(const char* data, std::size_t size) {
+  while (size > 0) {
+    const ssize_t written = ::write(fd_, data, size);
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      throw IoError(fmt::format("write: {} could not be written: {}; make room or write elsewhere",
+                                name_, systemMessage(errno)));
+    }
+    data += written;
+    size -= static_cast<std::size_t>(written);
+  }
+}
+
+}  // namespace levelset

@@ -1,0 +1,226 @@
+#include "levelset/convert/mesh_parts.h"
+
+#include <fmt/core.h>
+#include <locale.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "levelset/error.h"
+
+namespace levelset {
+namespace {
+
+constexpr std::uint64_t kMaxIndex = std::numeric_limits<std::uint32_t>::max();
+constexpr double kMaxCoordinate = std::numeric_limits<float>::max();
+constexpr std::size_t kTickMask = 0xFFFF;
+
+bool fitsFloat(double x) {
+  return static_cast<double>(static_cast<float>(x)) == x;
+}
+
+/// What std::from_chars calls out of range, too large or too small: decided by strtod.
+double extremeNumber(const char* first, const char* last) {
+  static const locale_t plain = ::newlocale(LC_ALL_MASK, "C", nullptr);
+  return ::strtod_l(std::string(first, last).c_str(), nullptr, plain);
+}
+
+}  // namespace
+
+void failAt(const std::string& name, Place place, const std::string& what) {
+  throw InvalidInput(fmt::format("read: {}, {} {}: {}", name, place.unit, place.number, what));
+}
+
+void failFile(const std::string& name, const std::string& what) {
+  throw InvalidInput(fmt::format("read: {} {}", name, what));
+}
+
+void requireText(std::string_view input, const std::string& name, const char* format) {
+  if (input.substr(0, 4096).find('\0') != std::string_view::npos)
+    failFile(name, fmt::format("holds binary data, not {} text; give its true format", format));
+}
+
+// === MeshBuilder
+
+MeshBuilder::MeshBuilder(std::string name, const ReadMeshOptions& options, std::string_view input)
+    : name_(std::move(name)), options_(options), input_(input) {}
+
+void MeshBuilder::reserve(std::size_t vertices, std::size_t triangles) {
+  if (vertices > kMaxIndex)
+    failFile(name_, fmt::format("holds {} vertices, more than the 4294967295 that can be numbered; "
+                                "split it",
+                                vertices));
+  const double bytes = static_cast<double>(input_.size()) +
+                       static_cast<double>(vertices) * sizeof(Imath::V3d) +
+                       static_cast<double>(triangles) * sizeof(mesh_.triangles[0]);
+  requireMemory(bytes, options_.maxMemory, "read");
+  mesh_.positions.reserve(vertices);
+  mesh_.triangles.reserve(triangles);
+}
+
+void MeshBuilder::declarePrecision(CoordinatePrecision precision) {
+  mesh_.precision = precision;
+  precisionDeclared_ = true;
+}
+
+void MeshBuilder::tick(const char* at) {
+  if ((++added_ & kTickMask) != 0) return;
+  report(options_.progress,
+         static_cast<double>(at - input_.data()) / static_cast<double>(input_.size()), "read");
+  const double bytes =
+      static_cast<double>(input_.size() + mesh_.positions.capacity() * sizeof(Imath::V3d) +
+                          mesh_.triangles.capacity() * sizeof(mesh_.triangles[0]));
+  requireMemory(bytes, options_.maxMemory, "read");
+  if (mesh_.positions.size() > kMaxIndex)
+    failFile(name_, "holds more than the 4294967295 vertices that can be numbered; split it");
+}
+
+void MeshBuilder::addVertex(double x, double y, double z, Place place, const char* at) {
+  for (const double c : {x, y, z}) {
+    if (std::abs(c) <= kMaxCoordinate) continue;
+    const bool finite = std::isfinite(c);
+    failAt(name_, place,
+           fmt::format("the coordinate {} is {}; {}", c,
+                       finite ? "beyond the range of float, 3.4e38" : "not a finite number",
+                       finite ? "scale the model down" : "repair the mesh or export it again"));
+  }
+  if (!precisionDeclared_) allFloat_ = allFloat_ && fitsFloat(x) && fitsFloat(y) && fitsFloat(z);
+  mesh_.positions.emplace_back(x, y, z);
+  tick(at);
+}
+
+void MeshBuilder::addFace(std::span<const std::uint64_t> corners, Place place, const char* at) {
+  for (const std::uint64_t corner : corners) {
+    if (corner < highestIndex_) continue;
+    if (corner == highestIndex_ && highestPlace_.number != 0) continue;
+    highestIndex_ = corner;
+    highestPlace_ = place;
+  }
+  if (corners.size() > 3)
+    polygons_.push_back({mesh_.triangles.size(), corners.size(), place.number});
+  // A fan for now: it holds the corners until all vertices are known.
+  for (std::size_t i = 2; i < corners.size(); ++i) {
+    mesh_.triangles.push_back({static_cast<std::uint32_t>(corners[0]),
+                               static_cast<std::uint32_t>(corners[i - 1]),
+                               static_cast<std::uint32_t>(corners[i])});
+  }
+  tick(at);
+}
+
+void MeshBuilder::splitPolygons() {
+  std::vector<std::uint32_t> corners;
+  for (const Polygon& polygon : polygons_) {
+    auto* triangles = mesh_.triangles.data() + polygon.firstTriangle;
+    corners.assign({triangles[0][0], triangles[0][1]});
+    for (std::size_t i = 0; i + 2 < polygon.corners; ++i) corners.push_back(triangles[i][2]);
+    if (!splitPolygon(corners, mesh_.positions, triangles)) {
+      failAt(
+          name_, {highestPlace_.unit, polygon.place},
+          fmt::format("a face of {} corners is too intricate to split; triangulate the mesh before",
+                      polygon.corners));
+    }
+  }
+}
+
+TriMesh MeshBuilder::finish() {
+  const std::size_t count = mesh_.positions.size();
+  if (count > kMaxIndex)
+    failFile(name_, "holds more than the 4294967295 vertices that can be numbered; split it");
+  if (mesh_.triangles.empty())
+    failFile(name_, fmt::format("holds {} vertices and no triangle; export the mesh with its faces",
+                                count));
+  if (highestIndex_ >= count) {
+    failAt(
+        name_, highestPlace_,
+        fmt::format("a face names vertex {} (counted from 0) of {}; repair the mesh or export it "
+                    "again",
+                    highestIndex_, count));
+  }
+  splitPolygons();
+  if (!precisionDeclared_)
+    mesh_.precision = allFloat_ ? CoordinatePrecision::Float : CoordinatePrecision::Double;
+  return std::move(mesh_);
+}
+
+// === TextCursor
+
+TextCursor::TextCursor(std::string_view text, const std::string& name, std::size_t firstLine)
+    : p_(text.data()), end_(text.data() + text.size()), line_(firstLine), name_(name) {
+  if (text.starts_with("\xEF\xBB\xBF")) p_ += 3;  // byte order mark
+}
+
+bool TextCursor::skipContinuation() {
+  const char* next = p_ + 1;
+  if (next != end_ && *next == '\r') ++next;
+  if (next == end_ || *next != '\n') return false;
+  p_ = next + 1;
+  ++line_;
+  return true;
+}
+
+bool TextCursor::skipToToken(char comment) {
+  while (!skipBlanks(comment)) {
+    if (atEnd()) return false;
+    skipLine();
+  }
+  return true;
+}
+
+void TextCursor::skipLine() {
+  const auto* end = static_cast<const char*>(std::memchr(p_, '\n', remaining()));
+  if (!end) {
+    p_ = end_;
+    return;
+  }
+  p_ = end + 1;
+  ++line_;
+}
+
+std::string_view TextCursor::token() {
+  const char* begin = p_;
+  while (!atBlank()) ++p_;
+  return {begin, static_cast<std::size_t>(p_ - begin)};
+}
+
+double TextCursor::number(const char* what) {
+  const char* begin = p_;
+  if (begin != end_ && *begin == '+') ++begin;
+  double value = 0;
+  const auto [end, error] = std::from_chars(begin, end_, value);
+  if (error == std::errc::invalid_argument) failNumber(what);
+  if (error == std::errc::result_out_of_range) value = extremeNumber(begin, end);
+  const char* start = p_;
+  p_ = end;
+  if (!atBlank()) {
+    p_ = start;
+    failNumber(what);
+  }
+  return value;
+}
+
+std::int64_t TextCursor::integer(const char* what) {
+  const char* begin = p_;
+  if (begin != end_ && *begin == '+') ++begin;
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(begin, end_, value);
+  if (error != std::errc{}) failNumber(what);
+  p_ = end;
+  return value;
+}
+
+void TextCursor::failNumber(const char* what) const {
+  if (atEnd()) {
+    fail(fmt::format("the file ends where {} should stand; fetch or export it again", what));
+  }
+  const char* end = p_;
+  while (end != end_ && end - p_ < 24 && static_cast<unsigned char>(*end) > ' ') ++end;
+  std::string found(p_, end);
+  std::replace_if(
+      found.begin(), found.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, '?');
+  if (found.empty()) fail(fmt::format("{} is missing; repair the file or export it again", what));
+  fail(fmt::format("'{}' stands where {} should; repair the file or export it again", found, what));
+}
+
+}  // namespace levelset

@@ -1,0 +1,475 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "levelset/convert/mesh_parts.h"
+#include "levelset/error.h"
+
+// The Polygon File Format: Greg Turk, "The PLY Polygon File Format", Stanford 1994.
+
+namespace levelset {
+namespace {
+
+constexpr std::size_t kMaxHeader = 1 << 20;
+
+enum class Type { Int8, Uint8, Int16, Uint16, Int32, Uint32, Float, Double };
+enum class Role { Skip, X, Y, Z, Corners };
+enum class Encoding { Ascii, Little, Big };
+
+constexpr std::size_t sizeOf(Type type) {
+  constexpr std::size_t sizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+  return sizes[static_cast<int>(type)];
+}
+
+struct Property {
+  Type type;
+  std::optional<Type> listCount;  // set for a list
+  Role role = Role::Skip;
+};
+
+struct Element {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<Property> properties;
+
+  [[nodiscard]] bool has(Role role) const {
+    return std::any_of(properties.begin(), properties.end(),
+                       [role](const Property& p) { return p.role == role; });
+  }
+  [[nodiscard]] bool holdsVertices() const { return has(Role::X); }
+  [[nodiscard]] bool holdsFaces() const { return has(Role::Corners); }
+  /// Bytes that one element takes at least.
+  [[nodiscard]] std::size_t leastSize(Encoding encoding) const {
+    std::size_t size = 0;
+    for (const Property& p : properties)
+      size += encoding == Encoding::Ascii ? 2 : sizeOf(p.listCount.value_or(p.type));
+    return size;
+  }
+};
+
+struct Header {
+  Encoding encoding = Encoding::Ascii;
+  std::vector<Element> elements;
+  std::size_t size = 0;   // bytes, up to the data
+  std::size_t lines = 0;  // of text
+};
+
+// === Header
+
+std::vector<std::string_view> words(std::string_view line) {
+  std::vector<std::string_view> result;
+  std::size_t i = 0;
+  while (i < line.size()) {
+    const std::size_t begin = line.find_first_not_of(" \t\r", i);
+    if (begin == std::string_view::npos) break;
+    i = std::min(line.find_first_of(" \t\r", begin), line.size());
+    result.push_back(line.substr(begin, i - begin));
+  }
+  return result;
+}
+
+class HeaderReader {
+ public:
+  HeaderReader(std::string_view input, const std::string& name) : input_(input), name_(name) {}
+
+  Header read() {
+    if (words(nextLine()) != std::vector<std::string_view>{"ply"})
+      failFile(name_, "does not begin with 'ply'; give its true format");
+    for (;;) {
+      const auto line = words(nextLine());
+      if (line.empty() || line[0] == "comment" || line[0] == "obj_info") continue;
+      if (line[0] == "end_header") break;
+      if (line[0] == "format")
+        readFormat(line);
+      else if (line[0] == "element")
+        readElement(line);
+      else if (line[0] == "property")
+        readProperty(line);
+      else
+        fail(fmt::format("'{}' is no word of a PLY header", line[0]));
+    }
+    if (!formatSeen_) fail("the header names no format");
+    header_.size = offset_;
+    return std::move(header_);
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    failAt(name_, {"line", header_.lines}, what + "; export the mesh again");
+  }
+
+  std::string_view nextLine() {
+    const std::size_t end = input_.substr(0, kMaxHeader).find('\n', offset_);
+    ++header_.lines;
+    if (end == std::string_view::npos) {
+      if (header_.lines == 1) failFile(name_, "does not begin with 'ply'; give its true format");
+      fail("the header has no end");
+    }
+    const std::string_view line = input_.substr(offset_, end - offset_);
+    offset_ = end + 1;
+    return line;
+  }
+
+  void readFormat(const std::vector<std::string_view>& line) {
+    const std::string_view format = line.size() > 1 ? line[1] : "";
+    if (format == "ascii")
+      header_.encoding = Encoding::Ascii;
+    else if (format == "binary_little_endian")
+      header_.encoding = Encoding::Little;
+    else if (format == "binary_big_endian")
+      header_.encoding = Encoding::Big;
+    else
+      fail(fmt::format("the format '{}' is not known", format));
+    formatSeen_ = true;
+  }
+
+  void readElement(const std::vector<std::string_view>& line) {
+    Element element;
+    if (line.size() < 3) fail("an element needs a name and a count");
+    element.name = line[1];
+    const auto [end, error] =
+        std::from_chars(line[2].data(), line[2].data() + line[2].size(), element.count);
+    if (error != std::errc{} || end != line[2].data() + line[2].size())
+      fail(fmt::format("'{}' is no count of elements", line[2]));
+    header_.elements.push_back(std::move(element));
+  }
+
+  Type readType(std::string_view word) const {
+    constexpr std::pair<const char*, Type> names[] = {
+        {"char", Type::Int8},     {"int8", Type::Int8},     {"uchar", Type::Uint8},
+        {"uint8", Type::Uint8},   {"short", Type::Int16},   {"int16", Type::Int16},
+        {"ushort", Type::Uint16}, {"uint16", Type::Uint16}, {"int", Type::Int32},
+        {"int32", Type::Int32},   {"uint", Type::Uint32},   {"uint32", Type::Uint32},
+        {"float", Type::Float},   {"float32", Type::Float}, {"double", Type::Double},
+        {"float64", Type::Double}};
+    for (const auto& [name, type] : names)
+      if (word == name) return type;
+    fail(fmt::format("the type '{}' is not known", word));
+  }
+
+  void readProperty(const std::vector<std::string_view>& line) {
+    if (header_.elements.empty()) fail("a property stands before the first element");
+    Element& element = header_.elements.back();
+    const bool list = line.size() > 1 && line[1] == "list";
+    if (line.size() < (list ? 5u : 3u)) fail("a property needs a type and a name");
+    const std::string_view name = line[list ? 4 : 2];
+    Property property{readType(line[list ? 3 : 1]), {}, Role::Skip};
+    if (list) property.listCount = readType(line[2]);
+    property.role = roleOf(element.name, name, list);
+    if (property.role != Role::Skip && element.has(property.role))
+      fail(fmt::format("the property '{}' comes twice", name));
+    element.properties.push_back(property);
+  }
+
+  static Role roleOf(std::string_view element, std::string_view name, bool list) {
+    if (element == "face" && list && (name == "vertex_indices" || name == "vertex_index"))
+      return Role::Corners;
+    if (element == "vertex" && !list && name.size() == 1) {
+      if (name == "x") return Role::X;
+      if (name == "y") return Role::Y;
+      if (name == "z") return Role::Z;
+    }
+    return Role::Skip;
+  }
+
+  std::string_view input_;
+  const std::string& name_;
+  Header header_;
+  std::size_t offset_ = 0;
+  bool formatSeen_ = false;
+};
+
+/// What a mesh needs is there, and nothing promises more than the file can hold.
+void checkHeader(const Header& header, std::size_t dataSize, const std::string& name) {
+  bool vertices = false, faces = false;
+  std::size_t left = dataSize + 1;  // the last line of a text may lack its end
+  for (const Element& element : header.elements) {
+    if (element.has(Role::X) && element.has(Role::Y) && element.has(Role::Z)) vertices = true;
+    faces = faces || element.holdsFaces();
+    const std::size_t least = element.leastSize(header.encoding);
+    if (least == 0) continue;
+    if (element.count > left / least) {
+      failFile(name,
+               fmt::format("promises {} elements '{}', more than its {} bytes of data can hold; "
+                           "it was cut off or its header is damaged: fetch or export it again",
+                           element.count, element.name, dataSize));
+    }
+    left -= element.count * least;
+  }
+  if (!vertices) failFile(name, "has no element 'vertex' with x, y and z; export the mesh again");
+  if (!faces) {
+    failFile(name,
+             "has no element 'face' with a list 'vertex_indices'; export the mesh with its faces");
+  }
+}
+
+// === Data
+
+template <typename T>
+T load(const char* p, bool swap) {
+  char bytes[sizeof(T)];
+  std::memcpy(bytes, p, sizeof(T));
+  if (swap) std::reverse(bytes, bytes + sizeof(T));
+  return std::bit_cast<T>(bytes);
+}
+
+template <bool kSwap>
+class BinarySource {
+ public:
+  BinarySource(std::string_view data, std::size_t, const std::string& name)
+      : p_(data.data()), end_(data.data() + data.size()), name_(name) {}
+
+  void begin(const Element& element, std::size_t index) {
+    element_ = &element;
+    index_ = index;
+  }
+  void end() {}
+  [[nodiscard]] Place place() const { return {element_->name.c_str(), index_}; }
+  [[nodiscard]] const char* at() const { return p_; }
+
+  double value(Type type) {
+    require(sizeOf(type));
+    const char* p = p_;
+    p_ += sizeOf(type);
+    switch (type) {
+      case Type::Int8:
+        return static_cast<signed char>(*p);
+      case Type::Uint8:
+        return static_cast<unsigned char>(*p);
+      case Type::Int16:
+        return load<std::int16_t>(p, kSwap);
+      case Type::Uint16:
+        return load<std::uint16_t>(p, kSwap);
+      case Type::Int32:
+        return load<std::int32_t>(p, kSwap);
+      case Type::Uint32:
+        return load<std::uint32_t>(p, kSwap);
+      case Type::Float:
+        return static_cast<double>(load<float>(p, kSwap));
+      case Type::Double:
+        return load<double>(p, kSwap);
+    }
+    return 0;
+  }
+  void skip(Type type, std::size_t count) {
+    requireList(type, count);
+    p_ += count * sizeOf(type);
+  }
+  /// A list of `count` values is there.
+  void requireList(Type type, std::size_t count) {
+    if (count > static_cast<std::size_t>(end_ - p_) / sizeOf(type)) failShort();
+  }
+
+ private:
+  void require(std::size_t size) {
+    if (static_cast<std::size_t>(end_ - p_) < size) failShort();
+  }
+  [[noreturn]] void failShort() const {
+    failAt(name_, place(),
+           "the file ends in the middle of it; it was cut off or is damaged: fetch or export it "
+           "again");
+  }
+
+  const char* p_;
+  const char* end_;
+  const std::string& name_;
+  const Element* element_ = nullptr;
+  std::size_t index_ = 0;
+};
+
+/// One element a line; a line with too many values would shift all that follow.
+class AsciiSource {
+ public:
+  AsciiSource(std::string_view data, std::size_t headerLines, const std::string& name)
+      : cursor_(data, name, headerLines + 1), name_(name) {}
+
+  void begin(const Element& element, std::size_t) { element_ = &element; }
+  void end() {
+    if (cursor_.skipBlanks(0))
+      failAt(name_, place(),
+             fmt::format("there are more values than an element '{}' has; export the mesh again",
+                         element_->name));
+  }
+  [[nodiscard]] Place place() const { return cursor_.place(); }
+  [[nodiscard]] const char* at() const { return cursor_.at(); }
+
+  double value(Type type) {
+    if (!cursor_.skipToToken(0)) failEnd();
+    const double number = cursor_.number("a number");
+    // What is declared float is one; beyond its range the caller should see what was written.
+    const bool isFloat =
+        type == Type::Float && std::abs(number) <= std::numeric_limits<float>::max();
+    return isFloat ? static_cast<double>(static_cast<float>(number)) : number;
+  }
+  void skip(Type, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!cursor_.skipToToken(0)) failEnd();
+      static_cast<void>(cursor_.token());
+    }
+  }
+  void requireList(Type, std::size_t count) {
+    if (count > cursor_.remaining()) failEnd();
+  }
+
+ private:
+  [[noreturn]] void failEnd() const {
+    failAt(name_, place(),
+           fmt::format(
+               "the file ends within the elements '{}'; it was cut off or is damaged: fetch or "
+               "export it again",
+               element_->name));
+  }
+
+  TextCursor cursor_;
+  const std::string& name_;
+  const Element* element_ = nullptr;
+};
+
+template <typename Source>
+class ElementReader {
+ public:
+  ElementReader(Source source, MeshBuilder& builder) : source_(source), builder_(builder) {}
+
+  void read(const Element& element) {
+    if (element.properties.empty()) return;
+    const bool vertices = element.holdsVertices(), faces = element.holdsFaces();
+    for (std::size_t i = 0; i < element.count; ++i) {
+      source_.begin(element, i);
+      for (const Property& property : element.properties) readProperty(property);
+      source_.end();
+      if (vertices)
+        builder_.addVertex(position_[0], position_[1], position_[2], source_.place(), source_.at());
+      if (faces) builder_.addFace(corners_, source_.place(), source_.at());
+    }
+  }
+
+ private:
+  void readProperty(const Property& property) {
+    if (!property.listCount) {
+      if (property.role == Role::Skip) return source_.skip(property.type, 1);
+      position_[static_cast<int>(property.role) - static_cast<int>(Role::X)] =
+          source_.value(property.type);
+      return;
+    }
+    const std::size_t count =
+        wholeNumber(source_.value(*property.listCount), "the length of a list");
+    if (property.role != Role::Corners) return source_.skip(property.type, count);
+    source_.requireList(property.type, count);
+    corners_.resize(count);
+    for (std::uint64_t& corner : corners_)
+      corner = wholeNumber(source_.value(property.type), "the index of a vertex");
+  }
+
+  std::uint64_t wholeNumber(double value, const char* what) const {
+    constexpr double kLimit = 1e15;  // doubles count exactly up to 9e15
+    if (value >= 0 && value < kLimit) {
+      const auto whole = static_cast<std::uint64_t>(value);
+      if (static_cast<double>(whole) == value) return whole;
+    }
+    failAt(builder_.name(), source_.place(),
+           fmt::format("{} is {}; repair the mesh or export it again", what, value));
+  }
+
+  Source source_;
+  MeshBuilder& builder_;
+  double position_[3] = {};
+  std::vector<std::uint64_t> corners_;
+};
+
+template <typename Source>
+void readElements(const Header& header, std::string_view data, MeshBuilder& builder) {
+  ElementReader<Source> reader(Source(data, header.lines, builder.name()), builder);
+  std::size_t wanted = 0;
+  for (const Element& element : header.elements)
+    wanted += element.holdsVertices() || element.holdsFaces();
+  for (const Element& element : header.elements) {
+    if (wanted == 0) break;  // what follows the mesh does not matter
+    reader.read(element);
+    wanted -= element.holdsVertices() || element.holdsFaces();
+  }
+}
+
+/// Triangles cannot be more than the data can list; a header may claim what it likes.
+void reserveElements(const Header& header, std::size_t dataSize, MeshBuilder& builder) {
+  std::size_t vertices = 0, triangles = 0;
+  for (const Element& element : header.elements) {
+    if (element.holdsVertices()) {
+      vertices = element.count;
+      Type widest = Type::Int8;
+      for (const Property& p : element.properties)
+        if (p.role != Role::Skip) widest = std::max(widest, p.type);
+      builder.declarePrecision(widest == Type::Double ? CoordinatePrecision::Double
+                                                      : CoordinatePrecision::Float);
+    }
+    for (const Property& p : element.properties) {
+      if (p.role != Role::Corners) continue;
+      const bool ascii = header.encoding == Encoding::Ascii;
+      const std::size_t least = ascii ? 8 : sizeOf(*p.listCount) + 3 * sizeOf(p.type);
+      triangles = std::min(element.count, dataSize / least + 1);
+    }
+  }
+  builder.reserve(vertices, triangles);
+}
+
+}  // namespace
+
+void readPly(std::string_view input, MeshBuilder& builder) {
+  const Header header = HeaderReader(input, builder.name()).read();
+  const std::string_view data = input.substr(header.size);
+  checkHeader(header, data.size(), builder.name());
+  reserveElements(header, data.size(), builder);
+  constexpr bool kLittle = std::endian::native == std::endian::little;
+  switch (header.encoding) {
+    case Encoding::Ascii:
+      return readElements<AsciiSource>(header, data, builder);
+    case Encoding::Little:
+      return readElements<BinarySource<!kLittle>>(header, data, builder);
+    case Encoding::Big:
+      return readElements<BinarySource<kLittle>>(header, data, builder);
+  }
+}
+
+MeshFileInfo plyInfo(std::string_view head, const std::string& name) {
+  const Header header = HeaderReader(head, name).read();
+  constexpr const char* kEncodings[] = {"ascii", "binary little endian", "binary big endian"};
+  MeshFileInfo info{fmt::format("ply, {}", kEncodings[static_cast<int>(header.encoding)]), 0, 0};
+  for (const Element& element : header.elements) {
+    if (element.holdsVertices()) info.vertices = element.count;
+    if (element.holdsFaces()) info.faces = element.count;
+  }
+  return info;
+}
+
+void writePly(ByteWriter& out, const TriMesh& mesh, const Progress& progress) {
+  static_assert(std::endian::native == std::endian::little, "the header says little endian");
+  const bool asFloat = mesh.precision == CoordinatePrecision::Float;
+  const char* real = asFloat ? "float" : "double";
+  // Readers that take the index for a signed int are common; the wider type only where it is
+  // needed.
+  const char* index = mesh.positions.size() > 0x7FFFFFFF ? "uint" : "int";
+  out.write(
+      fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {0}\n"
+                  "property {1} x\nproperty {1} y\nproperty {1} z\nelement face {2}\n"
+                  "property list uchar {3} vertex_indices\nend_header\n",
+                  mesh.positions.size(), real, mesh.triangles.size(), index));
+  WriteProgress steps(progress, mesh.positions.size() + mesh.triangles.size());
+  for (const Imath::V3d& p : mesh.positions) {
+    if (asFloat)
+      out.writeValue(Imath::V3f(p));
+    else
+      out.writeValue(p);
+    steps.step();
+  }
+  for (const auto& triangle : mesh.triangles) {
+    out.writeValue(static_cast<unsigned char>(3));
+    out.writeValue(triangle);
+    steps.step();
+  }
+}
+
+}  // namespace levelset

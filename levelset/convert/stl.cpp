@@ -1,0 +1,215 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+#include "levelset/convert/mesh_parts.h"
+#include "levelset/error.h"
+
+// StereoLithography Interface Specification: 3D Systems, 1989.
+
+namespace levelset {
+namespace {
+
+constexpr std::size_t kHeaderSize = 84, kFacetSize = 50;
+
+/// Gives equal positions one number. Equal means the same bits, but that −0 is 0.
+class VertexMerger {
+ public:
+  explicit VertexMerger(MeshBuilder& builder) : builder_(builder), slots_(1 << 12, kFree) {}
+
+  std::uint64_t add(const Imath::V3d& stored, Place place, const char* at) {
+    const Imath::V3d p = stored + Imath::V3d(0);  // −0 + 0 = 0
+    if (2 * points_.size() >= slots_.size()) grow();
+    std::uint32_t& slot = find(p);
+    if (slot == kFree) {
+      if (points_.size() >= kFree)
+        failFile(builder_.name(), "holds more than 4294967294 vertices; split it");
+      builder_.addVertex(p.x, p.y, p.z, place, at);
+      slot = static_cast<std::uint32_t>(points_.size());
+      points_.push_back(p);
+    }
+    return slot;
+  }
+
+ private:
+  static constexpr std::uint32_t kFree = std::numeric_limits<std::uint32_t>::max();
+
+  std::uint32_t& find(const Imath::V3d& p) {
+    std::uint64_t hash = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      hash = (hash ^ std::bit_cast<std::uint64_t>(p[axis])) * 0x9E3779B97F4A7C15ull;
+      hash ^= hash >> 29;
+    }
+    std::size_t i = hash & (slots_.size() - 1);
+    while (slots_[i] != kFree && points_[slots_[i]] != p) i = (i + 1) & (slots_.size() - 1);
+    return slots_[i];
+  }
+
+  void grow() {
+    slots_.assign(4 * slots_.size(), kFree);
+    for (std::size_t i = 0; i < points_.size(); ++i)
+      find(points_[i]) = static_cast<std::uint32_t>(i);
+  }
+
+  MeshBuilder& builder_;
+  std::vector<std::uint32_t> slots_;
+  std::vector<Imath::V3d> points_;
+};
+
+std::uint32_t facetCount(std::string_view input) {
+  std::uint32_t count = 0;
+  std::memcpy(&count, input.data() + 80, sizeof count);
+  return count;
+}
+
+bool beginsWithSolid(std::string_view input) {
+  const std::size_t begin = input.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
+  if (begin == std::string_view::npos) return false;
+  constexpr std::string_view kSolid = "solid";
+  const std::string_view word = input.substr(begin, kSolid.size());
+  return std::equal(word.begin(), word.end(), kSolid.begin(), kSolid.end(),
+                    [](char a, char b) { return (a | 0x20) == b; });
+}
+
+/// Binary headers may begin with "solid" too, so the size of the file decides first.
+bool isBinary(std::string_view input, std::size_t fileSize) {
+  if (input.size() >= kHeaderSize &&
+      fileSize == kHeaderSize + std::size_t{facetCount(input)} * kFacetSize)
+    return true;
+  return !beginsWithSolid(input) || input.substr(0, 1024).find('\0') != std::string_view::npos;
+}
+
+void readBinary(std::string_view input, MeshBuilder& builder) {
+  if (input.size() < kHeaderSize)
+    failFile(builder.name(),
+             "is neither text that begins with 'solid' nor long enough for a binary "
+             "STL; give its true format");
+  const std::size_t count = facetCount(input), held = (input.size() - kHeaderSize) / kFacetSize;
+  if (count > held) {
+    failFile(builder.name(),
+             fmt::format("promises {} triangles and holds {}; it was cut off or is no STL: "
+                         "fetch or export it again",
+                         count, held));
+  }
+  builder.declarePrecision(CoordinatePrecision::Float);
+  builder.reserve(count / 2, count);
+  VertexMerger merger(builder);
+  std::array<std::uint64_t, 3> corners{};
+  for (std::size_t i = 0; i < count; ++i) {
+    const char* facet = input.data() + kHeaderSize + i * kFacetSize;
+    float numbers[9];
+    std::memcpy(numbers, facet + 12, sizeof numbers);  // behind the normal
+    const Place place{"triangle", i};
+    for (std::size_t k = 0; k < 3; ++k)
+      corners[k] =
+          merger.add({numbers[3 * k], numbers[3 * k + 1], numbers[3 * k + 2]}, place, facet);
+    builder.addFace(corners, place, facet);
+  }
+}
+
+class TextReader {
+ public:
+  TextReader(std::string_view input, MeshBuilder& builder)
+      : cursor_(input, builder.name()), builder_(builder), merger_(builder) {}
+
+  void read() {
+    bool open = false;
+    while (cursor_.skipToToken(0)) {
+      const std::string keyword = lowerToken();
+      if (keyword == "vertex") {
+        readVertex();
+        continue;
+      }
+      if (keyword == "endloop") {
+        builder_.addFace(corners_, cursor_.place(), cursor_.at());
+        corners_.clear();
+        continue;
+      }
+      if (keyword == "outer") {
+        corners_.clear();
+        cursor_.skipBlanks(0);
+        static_cast<void>(cursor_.token());
+        continue;
+      }
+      if (keyword == "endfacet") continue;
+      if (keyword == "facet") {
+        readNormal();
+        continue;
+      }
+      if (keyword != "solid" && keyword != "endsolid")
+        cursor_.fail(fmt::format("'{}' is no word of an STL file; export the mesh again", keyword));
+      open = keyword == "solid";
+      cursor_.skipLine();  // the name
+    }
+    if (open)
+      cursor_.fail("the file ends before 'endsolid'; it was cut off: fetch or export it again");
+  }
+
+ private:
+  std::string lowerToken() {
+    std::string word(cursor_.token().substr(0, 24));
+    if (word.empty()) cursor_.fail("a backslash stands where a word should; export the mesh again");
+    for (char& c : word)
+      if (c >= 'A' && c <= 'Z') c = static_cast<char>(c | 0x20);
+    return word;
+  }
+
+  /// Computed again from the corners, so neither needed nor checked.
+  void readNormal() {
+    for (int i = 0; i < 4; ++i) {
+      cursor_.skipToToken(0);
+      if (cursor_.token().empty())
+        cursor_.fail("the file ends within a facet; it was cut off: fetch or export it again");
+    }
+  }
+
+  void readVertex() {
+    Imath::V3d p;
+    for (int axis = 0; axis < 3; ++axis) {
+      cursor_.skipToToken(0);
+      p[axis] = cursor_.number("a coordinate");
+    }
+    corners_.push_back(merger_.add(p, cursor_.place(), cursor_.at()));
+  }
+
+  TextCursor cursor_;
+  MeshBuilder& builder_;
+  VertexMerger merger_;
+  std::vector<std::uint64_t> corners_;
+};
+
+}  // namespace
+
+void readStl(std::string_view input, MeshBuilder& builder) {
+  if (isBinary(input, input.size()))
+    readBinary(input, builder);
+  else
+    TextReader(input, builder).read();
+}
+
+MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize) {
+  if (!isBinary(head, fileSize)) return {"stl, ascii", 0, 0};
+  return {"stl, binary", 0, head.size() >= kHeaderSize ? facetCount(head) : 0};
+}
+
+void writeStl(ByteWriter& out, const TriMesh& mesh, const Progress& progress) {
+  if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max())
+    throw UsageError("write: STL cannot count more than 4294967295 triangles; write PLY");
+  char header[80] = "binary STL, triangles counter-clockwise seen from outside";
+  out.write(header, sizeof header);
+  out.writeValue(static_cast<std::uint32_t>(mesh.triangles.size()));
+  WriteProgress steps(progress, mesh.triangles.size());
+  for (const auto& triangle : mesh.triangles) {
+    const Imath::V3d corners[3] = {mesh.positions[triangle[0]], mesh.positions[triangle[1]],
+                                   mesh.positions[triangle[2]]};
+    const Imath::V3d normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
+    out.writeValue(Imath::V3f(normal));
+    for (const Imath::V3d& corner : corners) out.writeValue(Imath::V3f(corner));
+    out.writeValue(std::uint16_t{0});
+    steps.step();
+  }
+}
+
+}  // namespace levelset

@@ -1,0 +1,318 @@
+#include <fmt/core.h>
+#include <openvdb/io/Compression.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <istream>
+#include <limits>
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "levelset/convert/vdb_layout.h"
+#include "levelset/error.h"
+#include "levelset/progress.h"
+
+// The layout is that of readTopology and readBuffers in OpenVDB's tree/*.h and of
+// io::readCompressedValues, format 222 and later.
+
+namespace levelset {
+namespace {
+
+using openvdb::Coord;
+using openvdb::Index;
+
+/// How the values of one tree are stored.
+template <typename T>
+struct Storage {
+  std::uint32_t compression;
+  bool half;
+  T background;
+};
+
+/// The values of one node as they stand in the file, sizes checked.
+template <typename T, typename Mask>
+struct ValueBlock {
+  T inactive[2];   // for the inactive values that are not stored
+  Mask selection;  // which of the two
+  Index count;     // of stored values
+  bool activeOnly;
+  const char* data;  // with the length in front where compressed
+  std::size_t size;
+};
+
+template <typename Mask>
+Mask takeMask(VdbBytes& bytes) {
+  Mask mask;
+  const char* words = bytes.take(Mask::SIZE / 8);
+  for (Index i = 0; i < Mask::SIZE / 64; ++i)
+    std::memcpy(&mask.template getWord<openvdb::Index64>(i), words + 8 * i, 8);
+  return mask;
+}
+
+/// Blosc trusts the sizes in its own header, which stand in the file too.
+void checkBloscHeader(const VdbBytes& bytes, const char* block, std::size_t stored,
+                      std::size_t expected) {
+  constexpr std::size_t kHeaderSize = 16;
+  std::uint32_t plain = 0, packed = 0;
+  if (stored >= kHeaderSize) {
+    std::memcpy(&plain, block + 4, 4);
+    std::memcpy(&packed, block + 12, 4);
+  }
+  if (stored < kHeaderSize || plain != expected || packed != stored)
+    bytes.fail("a compressed block disagrees about its size");
+}
+
+/// Steps over stored data that unpack to `expected` bytes; returns what they take.
+std::size_t takeData(VdbBytes& bytes, std::uint32_t compression, std::size_t expected) {
+  namespace io = openvdb::io;
+  if ((compression & (io::COMPRESS_BLOSC | io::COMPRESS_ZIP)) == 0) {
+    static_cast<void>(bytes.take(expected));
+    return expected;
+  }
+  const auto length = bytes.value<std::int64_t>();  // negative: not compressed after all
+  if (length <= 0) {
+    if (length == std::numeric_limits<std::int64_t>::min() ||
+        static_cast<std::size_t>(-length) != expected)
+      bytes.fail("a block of values has the wrong size");
+    static_cast<void>(bytes.take(expected));
+    return sizeof length + expected;
+  }
+  const auto stored = static_cast<std::size_t>(length);
+  const char* block = bytes.take(stored);
+  if (expected > 0 && (compression & io::COMPRESS_BLOSC))
+    checkBloscHeader(bytes, block, stored, expected);
+  return sizeof length + stored;
+}
+
+template <typename T, typename Mask>
+ValueBlock<T, Mask> takeValues(VdbBytes& bytes, const Storage<T>& storage, const Mask& active) {
+  namespace io = openvdb::io;
+  ValueBlock<T, Mask> block;
+  const auto kind = bytes.value<std::int8_t>();
+  if (kind < io::NO_MASK_OR_INACTIVE_VALS || kind > io::NO_MASK_AND_ALL_VALS)
+    bytes.fail(fmt::format("a node has values of the unknown kind {}", kind));
+  block.inactive[1] = storage.background;
+  block.inactive[0] =
+      kind == io::NO_MASK_OR_INACTIVE_VALS ? storage.background : -storage.background;
+  if (kind == io::NO_MASK_AND_ONE_INACTIVE_VAL || kind == io::MASK_AND_ONE_INACTIVE_VAL ||
+      kind == io::MASK_AND_TWO_INACTIVE_VALS)
+    block.inactive[0] = bytes.value<T>();
+  if (kind == io::MASK_AND_TWO_INACTIVE_VALS) block.inactive[1] = bytes.value<T>();
+  if (kind == io::MASK_AND_NO_INACTIVE_VALS || kind == io::MASK_AND_ONE_INACTIVE_VAL ||
+      kind == io::MASK_AND_TWO_INACTIVE_VALS)
+    block.selection = takeMask<Mask>(bytes);
+  block.activeOnly =
+      (storage.compression & io::COMPRESS_ACTIVE_MASK) && kind != io::NO_MASK_AND_ALL_VALS;
+  block.count = block.activeOnly ? active.countOn() : Mask::SIZE;
+  block.data = bytes.rest().data();
+  block.size =
+      storage.half && block.count == 0
+          ? 0  // half floats: nothing at all is stored for none
+          : takeData(bytes, storage.compression, block.count * (storage.half ? 2 : sizeof(T)));
+  return block;
+}
+
+void unpack(const VdbBytes& bytes, const char* data, std::size_t size, std::uint32_t compression,
+            char* out, std::size_t outSize) {
+  namespace io = openvdb::io;
+  if (outSize == 0) return;
+  MemoryBuffer buffer({data, size});
+  std::istream stream(&buffer);
+  try {
+    if (compression & io::COMPRESS_BLOSC)
+      io::bloscFromStream(stream, out, outSize);
+    else if (compression & io::COMPRESS_ZIP)
+      io::unzipFromStream(stream, out, outSize);
+    else
+      std::memcpy(out, data, outSize);
+  } catch (const openvdb::Exception&) {
+    bytes.fail("a block of values cannot be decompressed");
+  }
+}
+
+/// All values of a node, stored or implied.
+template <typename T, typename Mask>
+void expand(const VdbBytes& bytes, const ValueBlock<T, Mask>& block, const Storage<T>& storage,
+            const Mask& active, T* values) {
+  std::vector<T> stored(block.count);
+  if (storage.half) {
+    std::vector<openvdb::math::half> halves(block.count);
+    unpack(bytes, block.data, block.size, storage.compression,
+           reinterpret_cast<char*>(halves.data()), 2 * halves.size());
+    std::transform(halves.begin(), halves.end(), stored.begin(),
+                   [](openvdb::math::half h) { return static_cast<T>(static_cast<float>(h)); });
+  } else {
+    unpack(bytes, block.data, block.size, storage.compression,
+           reinterpret_cast<char*>(stored.data()), sizeof(T) * stored.size());
+  }
+  if (!block.activeOnly) {
+    std::copy(stored.begin(), stored.end(), values);
+    return;
+  }
+  std::size_t next = 0;
+  for (Index i = 0; i < Mask::SIZE; ++i)
+    values[i] = active.isOn(i) ? stored[next++] : block.inactive[block.selection.isOn(i) ? 1 : 0];
+}
+
+/// Reads a tree from top to bottom, then the values of its leaves.
+template <typename TreeT>
+class TreeReader {
+  using T = typename TreeT::ValueType;
+  using Root = typename TreeT::RootNodeType;
+  using Leaf = typename TreeT::LeafNodeType;
+
+ public:
+  TreeReader(VdbBytes& bytes, const VdbEntry& entry, std::size_t maxMemory)
+      : bytes_(bytes), storage_{entry.compression, entry.half, T(0)}, maxMemory_(maxMemory) {}
+
+  typename TreeT::Ptr read() {
+    auto tree = std::make_shared<TreeT>();
+    readRoot(tree->root());
+    const std::vector<std::size_t> places = skipLeafValues();
+    tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t i) {
+      VdbBytes at = bytes_;
+      at.seek(places[i]);
+      readLeafValues(at, *leaves_[i]);
+    });
+    return tree;
+  }
+
+  /// Only moves `bytes` on.
+  void skip() {
+    countOnly_ = true;
+    TreeT tree;
+    readRoot(tree.root());
+    static_cast<void>(skipLeafValues());
+  }
+
+ private:
+  /// What a tree takes grows node by node, each of which takes bytes of the file too.
+  void spend(std::size_t size) {
+    memory_ += static_cast<double>(size);
+    if (memory_ > static_cast<double>(maxMemory_)) requireMemory(memory_, maxMemory_, "read");
+  }
+
+  void readRoot(Root& root) {
+    if (bytes_.value<std::int32_t>() != 1) bytes_.fail("a tree has more than one buffer");
+    storage_.background = bytes_.value<T>();
+    root.setBackground(storage_.background, false);
+    const auto tiles = bytes_.value<std::uint32_t>(), children = bytes_.value<std::uint32_t>();
+    constexpr std::size_t kTileSize = 3 * sizeof(std::int32_t) + sizeof(T) + 1;
+    if (tiles > bytes_.remaining() / kTileSize)
+      bytes_.fail(fmt::format("{} tiles are promised", tiles));
+    std::set<Coord> seen;
+    for (std::uint32_t i = 0; i < tiles; ++i) {
+      const Coord origin = takeOrigin<typename Root::ChildNodeType>(seen);
+      const T value = bytes_.value<T>();
+      const bool active = bytes_.value<std::uint8_t>() != 0;
+      if (active) spendTile(Root::ChildNodeType::TOTAL * 3);
+      root.addTile(origin, value, active);
+    }
+    for (std::uint32_t i = 0; i < children; ++i) {
+      const Coord origin = takeOrigin<typename Root::ChildNodeType>(seen);
+      root.addChild(readNode<typename Root::ChildNodeType>(origin).release());
+    }
+  }
+
+  template <typename Node>
+  Coord takeOrigin(std::set<Coord>& seen) {
+    Coord origin;
+    for (int axis = 0; axis < 3; ++axis) origin[axis] = bytes_.value<std::int32_t>();
+    const int mask = static_cast<int>(Node::DIM) - 1;
+    if ((origin & mask) != Coord(0)) bytes_.fail("a node stands off the tree's raster");
+    if (!seen.insert(origin).second) bytes_.fail("a node comes twice");
+    return origin;
+  }
+
+  /// An active tile is voxelised later: its leaves count now.
+  void spendTile(Index log2VoxelCount) {
+    const double leaves = std::ldexp(1.0, static_cast<int>(log2VoxelCount)) / Leaf::SIZE;
+    memory_ += leaves * static_cast<double>(sizeof(Leaf) + Leaf::SIZE * sizeof(T));
+    spend(0);
+  }
+
+  template <typename Node>
+  std::unique_ptr<Node> readNode(const Coord& origin) {
+    if constexpr (Node::LEVEL == 0) {
+      auto leaf = std::make_unique<Node>(openvdb::PartialCreate(), origin, storage_.background);
+      leaf->setValueMask(takeMask<typename Node::NodeMaskType>(bytes_));
+      if (!countOnly_) spend(sizeof(Node) + Node::SIZE * sizeof(T));
+      leaves_.push_back(leaf.get());
+      return leaf;
+    } else {
+      return readInternal<Node>(origin);
+    }
+  }
+
+  template <typename Node>
+  std::unique_ptr<Node> readInternal(const Coord& origin) {
+    using Mask = typename Node::NodeMaskType;
+    const auto children = takeMask<Mask>(bytes_), active = takeMask<Mask>(bytes_);
+    spend(sizeof(Node));
+    const auto block = takeValues<T, Mask>(bytes_, storage_, active);
+    std::vector<T> values(Node::NUM_VALUES);
+    expand(bytes_, block, storage_, active, values.data());
+    auto node = std::make_unique<Node>(origin, storage_.background, false);
+    for (Index i = 0; i < Node::NUM_VALUES; ++i) {
+      if (children.isOn(i)) continue;
+      node->addTile(i, values[i], active.isOn(i));
+      if (active.isOn(i)) spendTile(3 * Node::ChildNodeType::TOTAL);
+    }
+    for (auto it = children.beginOn(); it; ++it) {
+      const Coord childOrigin = node->offsetToGlobalCoord(it.pos());
+      node->addChild(readNode<typename Node::ChildNodeType>(childOrigin).release());
+    }
+    return node;
+  }
+
+  /// Where the values of each leaf stand.
+  std::vector<std::size_t> skipLeafValues() {
+    std::vector<std::size_t> places;
+    places.reserve(leaves_.size());
+    for (std::size_t i = 0; i < leaves_.size(); ++i) {
+      places.push_back(bytes_.position());
+      const auto active = takeMask<typename Leaf::NodeMaskType>(bytes_);
+      static_cast<void>(takeValues<T, typename Leaf::NodeMaskType>(bytes_, storage_, active));
+    }
+    return places;
+  }
+
+  void readLeafValues(VdbBytes& at, Leaf& leaf) const {
+    using Mask = typename Leaf::NodeMaskType;
+    const auto active = takeMask<Mask>(at);
+    const auto block = takeValues<T, Mask>(at, storage_, active);
+    leaf.setValueMask(active);
+    leaf.buffer().allocate();
+    expand(at, block, storage_, active, leaf.buffer().data());
+  }
+
+  VdbBytes& bytes_;
+  Storage<T> storage_;
+  std::size_t maxMemory_;
+  double memory_ = 0;
+  bool countOnly_ = false;
+  std::vector<Leaf*> leaves_;
+};
+
+}  // namespace
+
+openvdb::FloatTree::Ptr readVdbTree(std::string_view file, const std::string& name,
+                                    const VdbEntry& entry, std::size_t maxMemory) {
+  VdbBytes bytes(file, name);
+  bytes.seek(entry.treePosition);
+  if (hasFloatTree(entry)) return TreeReader<openvdb::FloatTree>(bytes, entry, maxMemory).read();
+  const auto wide = TreeReader<openvdb::DoubleTree>(bytes, entry, maxMemory).read();
+  return std::make_shared<openvdb::FloatTree>(*wide);
+}
+
+void skipVdbTree(VdbBytes& bytes, const VdbEntry& entry) {
+  if (hasFloatTree(entry))
+    TreeReader<openvdb::FloatTree>(bytes, entry, kNoMemoryLimit).skip();
+  else
+    TreeReader<openvdb::DoubleTree>(bytes, entry, kNoMemoryLimit).skip();
+}
+
+}  // namespace levelset
