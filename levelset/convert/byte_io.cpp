@@ -254,11 +254,9 @@ ByteWriter::~ByteWriter() {
   if (fd_ >= 0) ::close(fd_);
 }
 
-void ByteWriter::writeNumber(double value, bool asFloat) {
+void ByteWriter::writeNumber(double value) {
   char text[40];
-  const auto end = asFloat ? std::to_chars(text, text + sizeof text, static_cast<float>(value)).ptr
-                           : std::to_chars(text, text + sizeof text, value).ptr;
-  write(text, static_cast<std::size_t>(end - text));
+  write(text, static_cast<std::size_t>(std::to_chars(text, text + sizeof text, value).ptr - text));
 }
 
 void ByteWriter::writeNumber(std::uint64_t value) {

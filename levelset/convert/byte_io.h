@@ -71,7 +71,7 @@ class ByteWriter {
     write(&value, sizeof value);
   }
   /// The shortest text that reads back as `value`, whatever the locale.
-  void writeNumber(double value, bool asFloat);
+  void writeNumber(double value);
   void writeNumber(std::uint64_t value);
 
   /// Writes what is left and puts the file in place. @throws IoError

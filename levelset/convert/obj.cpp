@@ -88,13 +88,12 @@ void readObj(std::string_view input, MeshBuilder& builder) {
 }
 
 void writeObj(ByteWriter& out, const TriMesh& mesh, const Progress& progress) {
-  const bool asFloat = mesh.precision == CoordinatePrecision::Float;
   WriteProgress steps(progress, mesh.positions.size() + mesh.triangles.size());
   for (const Imath::V3d& p : mesh.positions) {
     out.write("v");
     for (int axis = 0; axis < 3; ++axis) {
       out.write(" ");
-      out.writeNumber(p[axis], asFloat);
+      out.writeNumber(p[axis]);
     }
     out.write("\n");
     steps.step();

@@ -111,12 +111,11 @@ MeshFileInfo offInfo(std::string_view head, const std::string& name) {
 }
 
 void writeOff(ByteWriter& out, const TriMesh& mesh, const Progress& progress) {
-  const bool asFloat = mesh.precision == CoordinatePrecision::Float;
   out.write(fmt::format("OFF\n{} {} 0\n", mesh.positions.size(), mesh.triangles.size()));
   WriteProgress steps(progress, mesh.positions.size() + mesh.triangles.size());
   for (const Imath::V3d& p : mesh.positions) {
     for (int axis = 0; axis < 3; ++axis) {
-      out.writeNumber(p[axis], asFloat);
+      out.writeNumber(p[axis]);
       out.write(axis < 2 ? " " : "\n");
     }
     steps.step();

@@ -41,7 +41,8 @@ bool says(const std::string& sentence, const std::string& part) {
 
 TriMesh tetrahedron(CoordinatePrecision precision = CoordinatePrecision::Float) {
   TriMesh mesh;
-  const double third = precision == CoordinatePrecision::Float ? 0.5 : 1.0 / 3;
+  const double third =
+      precision == CoordinatePrecision::Float ? static_cast<double>(1.f / 3) : 1.0 / 3;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, third, -2.25}};
   mesh.triangles = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
   mesh.precision = precision;
