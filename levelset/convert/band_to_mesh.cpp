@@ -4,6 +4,8 @@
 #include <tbb/parallel_for.h>
 
 #include "levelset/convert/cell_surface.h"
+#include "levelset/convert/decimate.h"
+#include "levelset/convert/sharp_surface.h"
 #include "levelset/error.h"
 
 namespace levelset {
@@ -50,8 +52,12 @@ TriMesh bandToMesh(const NarrowBand& band, const BandToMeshOptions& options) {
         "before it");
   }
   report(options.progress, 0.3, kAction);
-  IndexMesh mesh = marchCells(surface);
-  report(options.progress, 0.8, kAction);
+  IndexMesh mesh = options.sharp ? sharpSurface(surface, vdb(band)) : marchCells(surface);
+  if (options.adaptivity > 0) {
+    report(options.progress, 0.4, kAction);
+    mesh = decimate(mesh, options.adaptivity);
+  }
+  report(options.progress, 0.9, kAction);
   TriMesh result = toWorld(mesh, band);
   result.triangles = std::move(mesh.triangles);
   report(options.progress, 1, kAction);

@@ -166,6 +166,108 @@ TEST(BandToMesh, GivesSameBitsForAnyNumberOfThreads) {
   }
 }
 
+/// Distance to a cube of that half edge; a turned copy of it is what grids find hard.
+double cubeDistance(const V3d& p, double half) {
+  const V3d q(std::abs(p.x) - half, std::abs(p.y) - half, std::abs(p.z) - half);
+  const V3d outer(std::max(q.x, 0.), std::max(q.y, 0.), std::max(q.z, 0.));
+  return outer.length() + std::min(std::max({q.x, q.y, q.z}), 0.);
+}
+
+Imath::M44d turned() {
+  Imath::M44d m;
+  m.rotate(V3d(0.4, 0.7, -0.2));
+  return m;
+}
+
+struct CubeError {
+  double vertices = 0;      ///< largest distance of a vertex from the cube
+  double farTriangles = 0;  ///< share of triangles whose middle or sides pass 0.05 voxel from it
+};
+
+CubeError cubeError(const TriMesh& mesh, const Imath::M44d& back, double half) {
+  CubeError error;
+  std::vector<V3d> local;
+  for (const V3d& p : mesh.positions) {
+    local.push_back(p * back);
+    error.vertices = std::max(error.vertices, std::abs(cubeDistance(local.back(), half)));
+  }
+  double far = 0;
+  for (const auto& t : mesh.triangles) {
+    const V3d a = local[t[0]], b = local[t[1]], c = local[t[2]];
+    double worst = 0;
+    for (const V3d& p : {(a + b + c) / 3., (a + b) / 2., (b + c) / 2., (c + a) / 2.}) {
+      worst = std::max(worst, std::abs(cubeDistance(p, half)));
+    }
+    far += worst > 0.05;
+  }
+  error.farTriangles = far / static_cast<double>(mesh.triangles.size());
+  return error;
+}
+
+TEST(BandToMesh, SharpKeepsEdgesOfTurnedCube) {
+  const Imath::M44d matrix = turned(), back = matrix.inverse();
+  for (const double half : {16.0, 32.13}) {
+    const NarrowBand band = support::sampleBand(
+        [&](const V3d& p) { return cubeDistance(p * back, half); }, cube(half * 1.6), 1);
+    const TriMesh mesh = bandToMesh(band, {.sharp = true}), uniform = bandToMesh(band);
+    EXPECT_TRUE(manifoldness(mesh).isClosedManifold());
+    const CubeError sharp = cubeError(mesh, back, half), cut = cubeError(uniform, back, half);
+    EXPECT_LT(sharp.vertices, 0.05);
+    EXPECT_LT(sharp.farTriangles, 0.02 * cut.farTriangles);
+    const double exact = 8 * half * half * half;
+    EXPECT_LT(std::abs(signedVolume(mesh) - exact), 0.04 * std::abs(signedVolume(uniform) - exact));
+  }
+}
+
+TEST(BandToMesh, AdaptiveCoarsensFlatPartsWithinBound) {
+  const double adaptivity = 0.2;
+  const NarrowBand box =
+      support::sampleBand([](const V3d& p) { return cubeDistance(p, 12.3); }, cube(13), 1);
+  const TriMesh coarseBox = bandToMesh(box, {.adaptivity = adaptivity});
+  EXPECT_TRUE(manifoldness(coarseBox).isClosedManifold());
+  EXPECT_LT(coarseBox.triangles.size() * 10, bandToMesh(box).triangles.size());
+  const NarrowBand ball = sphere(12.2, 1);
+  const TriMesh coarseBall = bandToMesh(ball, {.adaptivity = adaptivity});
+  EXPECT_TRUE(manifoldness(coarseBall).isClosedManifold());
+  EXPECT_LT(coarseBall.triangles.size() * 3 / 2, bandToMesh(ball).triangles.size());
+  for (const auto& t : coarseBall.triangles) {
+    const V3d sum =
+        coarseBall.positions[t[0]] + coarseBall.positions[t[1]] + coarseBall.positions[t[2]];
+    EXPECT_NEAR(sum.length() / 3, 12.2, adaptivity + 0.02);
+  }
+  const TriMesh rough = bandToMesh(noise(10, 3, true), {.adaptivity = 1});
+  EXPECT_TRUE(manifoldness(rough).isClosedManifold());
+}
+
+TEST(BandToMesh, SharpIsAsExactOnSphere) {
+  const double h = 1. / 32;
+  const TriMesh mesh = bandToMesh(sphere(1, h, V3d(0.3 * h, 0.1 * h, -0.4 * h)), {.sharp = true});
+  EXPECT_TRUE(manifoldness(mesh).isClosedManifold());
+  double worst = 0;
+  for (const V3d& p : mesh.positions) {
+    worst = std::max(worst, std::abs((p - V3d(0.3 * h, 0.1 * h, -0.4 * h)).length() - 1));
+  }
+  EXPECT_LT(worst, 2 * h * h / 8);
+}
+
+TEST(BandToMesh, SharpIsClosedManifoldForEveryPatternOfSigns) {
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    const NarrowBand band = noise(26, seed, seed % 2 == 1);
+    TriMesh mesh;
+    withThreads(1, [&] { mesh = bandToMesh(band, {.sharp = true}); });
+    const Manifoldness found = manifoldness(mesh);
+    EXPECT_EQ(found.boundaryEdges, 0u);
+    EXPECT_EQ(found.nonManifoldEdges, 0u);
+    EXPECT_EQ(found.misorientedEdges, 0u);
+    EXPECT_EQ(found.nonManifoldVertices, 0u);
+    withThreads(4, [&] {
+      const TriMesh other = bandToMesh(band, {.sharp = true});
+      EXPECT_EQ(mesh.positions, other.positions);
+      EXPECT_EQ(mesh.triangles, other.triangles);
+    });
+  }
+}
+
 TEST(BandToMesh, RefusesWhatItCannotMesh) {
   const NarrowBand band = sphere(5, 1);
   EXPECT_THROW((void)bandToMesh(NarrowBand()), InvalidInput);
