@@ -15,6 +15,10 @@ struct DoubleTraits : OpenMesh::DefaultTraits {
 };
 using HalfedgeMesh = OpenMesh::TriMesh_ArrayKernelT<DoubleTraits>;
 
+/// Neighbours of both ends of an edge that may collapse. Without a limit, flat parts become fans of
+/// thousands of triangles, and each further collapse visits all of them.
+constexpr unsigned kMaxValences = 24;
+
 /// The quadric of a flat part is zero but for rounding; below zero would mean that the collapse is
 /// forbidden.
 template <typename AnyMesh>
@@ -24,6 +28,9 @@ class FlatQuadric : public OpenMesh::Decimater::ModQuadricT<AnyMesh> {
   explicit FlatQuadric(AnyMesh& mesh) : OpenMesh::Decimater::ModQuadricT<AnyMesh>(mesh) {}
 
   float collapse_priority(const CollapseInfo& collapse) override {
+    if (collapse.mesh.valence(collapse.v0) + collapse.mesh.valence(collapse.v1) > kMaxValences) {
+      return float(Base::ILLEGAL_COLLAPSE);
+    }
     const float priority = OpenMesh::Decimater::ModQuadricT<AnyMesh>::collapse_priority(collapse);
     const bool isRounding = priority < 0 && priority > float(Base::ILLEGAL_COLLAPSE) / 2;
     return isRounding ? 0 : priority;
