@@ -1,1 +1,163 @@
 #include "levelset/convert/mesh_to_band.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <mutex>
+
+#include "levelset/convert/band_assembly.h"
+#include "levelset/convert/mesh_to_band_input.h"
+#include "levelset/convert/open_surface.h"
+#include "levelset/convert/surface_blocks.h"
+#include "levelset/error.h"
+
+namespace levelset {
+namespace {
+
+using convert::LocalMesh;
+using convert::MeshTopology;
+using convert::SignField;
+using Imath::V3d;
+using Imath::V3i;
+
+/// Above this share of ambiguous voxels the sign is called a guess.
+constexpr double kGuess = 1e-3;
+
+/// The caller's progress, made to never fall while stages repeat.
+Progress rising(const Progress& progress) {
+  if (!progress) return {};
+  return [&progress, high = 0.0](double fraction) mutable {
+    high = std::max(high, fraction);
+    return progress(high);
+  };
+}
+
+SignMode chooseMethod(const TriMesh& mesh, const MeshToBandOptions& options,
+                      const MeshTopology& topology, SignCertificate& certificate,
+                      const Progress& progress) {
+  if (options.sign != SignMode::Auto) return options.sign;
+  if (!topology.isClosed()) return SignMode::Winding;
+  if (!options.searchSelfIntersections) return SignMode::Closed;
+  certificate.selfIntersections =
+      static_cast<std::ptrdiff_t>(countSelfIntersections(mesh, progress));
+  return certificate.selfIntersections == 0 ? SignMode::Closed : SignMode::Winding;
+}
+
+void checkClosed(const MeshTopology& topology, Nesting nesting) {
+  if (topology.oddEdges > 0)
+    throw InvalidInput(fmt::format(
+        "level-set: the mesh is not closed: {} edges have one face and {} have three or "
+        "more; use --sign winding, or close it first",
+        topology.boundaryEdges, topology.nonManifoldEdges));
+  if (nesting == Nesting::Orientation && !topology.boundary.empty())
+    throw InvalidInput(
+        fmt::format("level-set: at {} edges neighbouring faces are oriented differently, so nested "
+                    "shells cannot follow their orientation; use --nested parity",
+                    topology.boundary.size()));
+}
+
+SignField::Rule ruleFor(SignMode method, Nesting nesting) {
+  if (method == SignMode::Winding) return SignField::Rule::Winding;
+  return nesting == Nesting::Parity ? SignField::Rule::Parity : SignField::Rule::Orientation;
+}
+
+/// Adds to the mesh the surface that spans its holes.
+void addOpenSurface(LocalMesh& mesh, const SignField& field, double halfWidth,
+                    std::size_t maxMemory, const Progress& progress) {
+  std::vector<V3i> seeds;
+  std::mutex mutex;
+  convert::forEachBlock(
+      mesh, halfWidth,
+      [&](const V3i& block, std::span<const std::uint32_t>) {
+        if (field.isClearIn(block)) return;
+        const std::lock_guard lock(mutex);
+        seeds.push_back(block);
+      },
+      progress);
+  for (const std::array<V3d, 3>& t :
+       convert::findOpenSurface(field, std::move(seeds), maxMemory, progress)) {
+    const auto first = static_cast<std::uint32_t>(mesh.points.size());
+    mesh.points.insert(mesh.points.end(), t.begin(), t.end());
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+}
+
+void checkResult(const openvdb::FloatGrid& grid, const SignCertificate& certificate,
+                 const MeshToBandOptions& options) {
+  bool anyInside = false;
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf && !anyInside; ++leaf)
+    for (auto it = leaf->cbeginValueAll(); it && !anyInside; ++it) anyInside = *it < 0;
+  if (!anyInside) {
+    if (certificate.closed)
+      throw InvalidInput(
+          "level-set: no grid point lies inside the object, which is everywhere thinner than a "
+          "voxel; "
+          "use smaller voxels");
+    throw InvalidInput(fmt::format(
+        "level-set: the mesh encloses nothing: its winding number passes 1/2 at no grid "
+        "point ({} boundary edges); close it first, or use smaller voxels",
+        certificate.boundaryEdges));
+  }
+  if (certificate.ambiguousShare > kGuess && !options.signAnyway)
+    throw InvalidInput(fmt::format(
+        "level-set: inside and outside are a guess at {:.2g} % of the voxels next to the "
+        "surface ({} boundary edges, {} non-manifold); close the holes, or accept the guess "
+        "with --sign-anyway",
+        100 * certificate.ambiguousShare, certificate.boundaryEdges, certificate.nonManifoldEdges));
+}
+
+}  // namespace
+
+std::string describe(const SignCertificate& c) {
+  return fmt::format(
+      "sign by {}: {}, {} boundary edges, {} non-manifold edges, {} self-intersections, {} "
+      "triangles "
+      "dropped, {}ambiguous at {:.2g} % of the voxels next to the surface",
+      c.method == SignMode::Winding ? "winding number" : "crossings of a closed mesh",
+      c.closed ? "closed" : "not closed", c.boundaryEdges, c.nonManifoldEdges,
+      c.selfIntersections < 0 ? std::string("not searched for")
+                              : fmt::format("{}", c.selfIntersections),
+      c.droppedTriangles, c.flipped ? "turned inside out, " : "", 100 * c.ambiguousShare);
+}
+
+MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
+                            const MeshToBandOptions& options) {
+  constexpr const char* kAction = "level-set";
+  convert::checkMeshInput(mesh, voxelSize, options);
+  const Progress progress = rising(options.progress);
+  const std::size_t maxMemory = convert::memoryLimit(options);
+  report(progress, 0, kAction);
+
+  // === Topology and method
+  const MeshTopology topology = convert::findTopology(mesh);
+  report(progress, 0.05, kAction);
+  SignCertificate certificate;
+  certificate.closed = topology.isClosed();
+  certificate.boundaryEdges = topology.boundaryEdges;
+  certificate.nonManifoldEdges = topology.nonManifoldEdges;
+  certificate.droppedTriangles = topology.dropped;
+  if (topology.triangles.empty())
+    throw InvalidInput("level-set: every triangle is degenerate; there is no surface to convert");
+  certificate.method =
+      chooseMethod(mesh, options, topology, certificate, subProgress(progress, 0.05, 0.4));
+  if (certificate.method == SignMode::Closed) checkClosed(topology, options.nesting);
+
+  // === Signs
+  const V3i origin = convert::localOrigin(mesh, voxelSize);
+  LocalMesh local = convert::toLocal(mesh, topology, voxelSize, origin);
+  const SignField field(local, topology, ruleFor(certificate.method, options.nesting),
+                        subProgress(progress, 0.4, 0.5));
+  certificate.flipped = field.isFlipped();
+  if (field.isOpen())
+    addOpenSurface(local, field, options.halfWidth, maxMemory, subProgress(progress, 0.5, 0.6));
+
+  // === Distances
+  const auto grid = convert::assembleBand(local, field, origin, voxelSize, options.halfWidth,
+                                          maxMemory, subProgress(progress, 0.6, 1));
+  certificate.ambiguousShare = convert::ambiguousShare(*grid, field, origin);
+  checkResult(*grid, certificate, options);
+  report(progress, 1, kAction);
+  return {makeBand(grid), certificate};
+}
+
+}  // namespace levelset

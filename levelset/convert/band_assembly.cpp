@@ -1,0 +1,181 @@
+#include "levelset/convert/band_assembly.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <memory>
+
+#include "levelset/convert/surface_blocks.h"
+#include "levelset/convert/triangle_distance.h"
+
+namespace levelset::convert {
+namespace {
+
+using Imath::V3d;
+using Imath::V3i;
+using openvdb::Coord;
+using openvdb::FloatTree;
+using LeafNode = FloatTree::LeafNodeType;
+
+static_assert(LeafNode::DIM == kBlockDim && LeafNode::SIZE == kBlockVoxels);
+
+using Root = FloatTree::RootNodeType;
+using Upper = Root::ChildNodeType;
+using Lower = Upper::ChildNodeType;
+
+Coord toCoord(const V3i& p) {
+  return {p.x, p.y, p.z};
+}
+V3i toV3i(const Coord& p) {
+  return {p.x(), p.y(), p.z()};
+}
+
+/// Leaves made by many threads, each its own list.
+class LeafCollector {
+ public:
+  LeafCollector(double reach, double voxelSize, std::size_t maxMemory)
+      : voxelSize_(voxelSize),
+        background_(static_cast<float>(reach * voxelSize)),
+        maxMemory_(maxMemory),
+        scratch_([reach] { return BlockDistance(reach); }) {}
+
+  void add(const LocalMesh& surface, const SignField& field, const V3i& block,
+           std::span<const std::uint32_t> candidates, const V3i& origin, double reach) {
+    BlockDistance& distance = scratch_.local();
+    if (!distance.measure(surface, candidates, V3d(block))) return;
+    SignField::BlockWinding winding;
+    field.winding(block, winding);
+    auto leaf = std::make_unique<LeafNode>(toCoord(block + origin), background_, false);
+    float* values = leaf->buffer().data();
+    for (openvdb::Index i = 0; i < LeafNode::SIZE; ++i) {
+      const double d = distance.distances()[i];
+      const bool isActive = d < reach;
+      const float value =
+          isActive ? std::min(static_cast<float>(d * voxelSize_), background_) : background_;
+      values[i] = winding[i] > 0.5 && value > 0 ? -value : value;
+      if (isActive) leaf->setValueOn(i);
+    }
+    leaves_.local().push_back(std::move(leaf));
+    constexpr std::size_t kStep = 4096;
+    const std::size_t count = count_.fetch_add(1, std::memory_order_relaxed) + 1;
+    if (count % kStep == 0)
+      requireMemory(static_cast<double>(count) * sizeof(LeafNode) +
+                        static_cast<double>(count) * LeafNode::SIZE * sizeof(float),
+                    maxMemory_, "level-set");
+  }
+
+  openvdb::FloatGrid::Ptr finish(double halfWidth) {
+    std::vector<std::unique_ptr<LeafNode>> all;
+    for (auto& part : leaves_)
+      for (auto& leaf : part) all.push_back(std::move(leaf));
+    std::sort(all.begin(), all.end(),
+              [](const auto& a, const auto& b) { return a->origin() < b->origin(); });
+    auto grid = emptyLevelSet(uniformTransform(voxelSize_), halfWidth);
+    for (auto& leaf : all) grid->tree().addLeaf(leaf.release());
+    return grid;
+  }
+
+ private:
+  double voxelSize_;
+  float background_;
+  std::size_t maxMemory_;
+  std::atomic<std::size_t> count_{0};
+  tbb::enumerable_thread_specific<BlockDistance> scratch_;
+  tbb::enumerable_thread_specific<std::vector<std::unique_ptr<LeafNode>>> leaves_;
+};
+
+/// Signs of tiles. Their points lie at least a voxel from the surface, so neighbouring tiles agree:
+/// only the first of a row of them is looked up.
+template <typename Node>
+void signTiles(Node& node, const SignField& field, const V3i& origin, float background) {
+  constexpr openvdb::Index kZ = 1, kY = 1u << Node::LOG2DIM, kX = 1u << (2 * Node::LOG2DIM);
+  std::vector<signed char> side(Node::NUM_VALUES, 0);  // 0: a child
+  for (auto it = node.beginValueAll(); it; ++it) {
+    const openvdb::Index n = it.pos();
+    signed char& s = side[n];
+    if (n % kY != 0) s = side[n - kZ];
+    if (s == 0 && n % kX >= kY) s = side[n - kY];
+    if (s == 0 && n >= kX) s = side[n - kX];
+    if (s == 0) s = field.isInside(toV3i(it.getCoord()) - origin) ? -1 : 1;
+    it.setValue(s < 0 ? -background : background);
+  }
+}
+
+template <typename Node>
+void signTilesOfAll(FloatTree& tree, const SignField& field, const V3i& origin, float background) {
+  std::vector<Node*> nodes;
+  tree.getNodes(nodes);
+  tbb::parallel_for(std::size_t{0}, nodes.size(),
+                    [&](std::size_t i) { signTiles(*nodes[i], field, origin, background); });
+}
+
+/// Interior tiles of the root: a row of them lies between two nodes that hold the surface.
+void signRootTiles(FloatTree& tree, const SignField& field, const V3i& origin, float background) {
+  std::vector<Coord> keys;
+  for (auto it = tree.root().cbeginChildOn(); it; ++it) keys.push_back(it->origin());
+  std::sort(keys.begin(), keys.end(), [](const Coord& a, const Coord& b) {
+    return std::make_tuple(a.y(), a.z(), a.x()) < std::make_tuple(b.y(), b.z(), b.x());
+  });
+  constexpr std::int64_t kDim = Upper::DIM;
+  for (std::size_t i = 0; i + 1 < keys.size(); ++i) {
+    const Coord &from = keys[i], &to = keys[i + 1];
+    if (from.y() != to.y() || from.z() != to.z() || to.x() - kDim == from.x()) continue;
+    const Coord first(static_cast<int>(from.x() + kDim), from.y(), from.z());
+    if (!field.isInside(toV3i(first) - origin)) continue;
+    for (std::int64_t x = first.x(); x < to.x(); x += kDim)
+      tree.root().addTile(Coord(static_cast<int>(x), from.y(), from.z()), -background, false);
+  }
+}
+
+}  // namespace
+
+openvdb::FloatGrid::Ptr assembleBand(const LocalMesh& surface, const SignField& field,
+                                     const V3i& origin, double voxelSize, double halfWidth,
+                                     std::size_t maxMemory, const Progress& progress) {
+  LeafCollector collector(halfWidth, voxelSize, maxMemory);
+  forEachBlock(
+      surface, halfWidth,
+      [&](const V3i& block, std::span<const std::uint32_t> candidates) {
+        collector.add(surface, field, block, candidates, origin, halfWidth);
+      },
+      progress);
+  openvdb::FloatGrid::Ptr grid = collector.finish(halfWidth);
+  const float background = grid->background();
+  signTilesOfAll<Lower>(grid->tree(), field, origin, background);
+  signTilesOfAll<Upper>(grid->tree(), field, origin, background);
+  signRootTiles(grid->tree(), field, origin, background);
+  return grid;
+}
+
+double ambiguousShare(const openvdb::FloatGrid& grid, const SignField& field, const V3i& origin) {
+  if (!field.isOpen()) return 0;
+  std::vector<const LeafNode*> leaves;
+  grid.tree().getNodes(leaves);
+  std::vector<std::array<std::size_t, 2>> counts(leaves.size());  // next to the zero set, ambiguous
+  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
+    const LeafNode& leaf = *leaves[n];
+    const V3i block = toV3i(leaf.origin()) - origin;
+    const bool clear = field.isClearIn(block);
+    SignField::BlockWinding winding;
+    if (!clear) field.winding(block, winding);
+    auto accessor = grid.getConstAccessor();
+    for (auto it = leaf.cbeginValueOn(); it; ++it) {
+      bool atZero = false;
+      for (int k = 0; k < 6 && !atZero; ++k) {
+        Coord next = it.getCoord();
+        next[k / 2] += k % 2 ? 1 : -1;
+        atZero = (accessor.getValue(next) < 0) != (*it < 0);
+      }
+      counts[n][0] += atZero;
+      counts[n][1] += atZero && !clear && std::abs(winding[it.pos()] - 0.5) < 0.25;
+    }
+  });
+  std::array<std::size_t, 2> sum{};
+  for (const auto& c : counts) sum[0] += c[0], sum[1] += c[1];
+  return sum[0] ? static_cast<double>(sum[1]) / static_cast<double>(sum[0]) : 0;
+}
+
+}  // namespace levelset::convert

@@ -1,0 +1,144 @@
+#include "levelset/convert/mesh_to_band_input.h"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "levelset/error.h"
+
+namespace levelset::convert {
+namespace {
+
+using Imath::V3d;
+using Imath::V3i;
+
+/// Room beyond the band for the tree's nodes, so that no index overflows.
+constexpr double kIndexLimit = 2147483648.0 - 8192;
+
+std::string text(const V3d& p) {
+  return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z);
+}
+
+bool isFinite(const V3d& p) {
+  return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+}
+
+double largest(const V3d& p) {
+  return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+}
+
+void checkCall(double voxelSize, const MeshToBandOptions& options) {
+  if (!(voxelSize > 0) || !std::isfinite(voxelSize))
+    throw UsageError(fmt::format(
+        "level-set: the voxel size is {}; give a positive length in world units", voxelSize));
+  if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth))
+    throw UsageError(
+        fmt::format("level-set: the half width is {} voxels; give at least 1", options.halfWidth));
+}
+
+void checkElements(const TriMesh& mesh) {
+  if (mesh.isEmpty())
+    throw InvalidInput("level-set: the mesh has no triangles; there is no surface to convert");
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+    if (!isFinite(mesh.positions[v]))
+      throw InvalidInput(
+          fmt::format("level-set: vertex {} is at {}, which is not a place; repair the mesh", v,
+                      text(mesh.positions[v])));
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (const std::uint32_t v : mesh.triangles[t])
+      if (v >= mesh.positions.size())
+        throw InvalidInput(fmt::format(
+            "level-set: triangle {} names vertex {}, but there are only {}; repair the mesh", t, v,
+            mesh.positions.size()));
+}
+
+/// Of the vertices that faces use.
+Imath::Box3d usedBounds(const TriMesh& mesh) {
+  Imath::Box3d box;
+  for (const Triangle& t : mesh.triangles)
+    for (const std::uint32_t v : t) box.extendBy(mesh.positions[v]);
+  return box;
+}
+
+std::uint32_t outermostVertex(const TriMesh& mesh) {
+  std::uint32_t result = mesh.triangles[0][0];
+  for (const Triangle& t : mesh.triangles)
+    for (const std::uint32_t v : t)
+      if (largest(mesh.positions[v]) > largest(mesh.positions[result])) result = v;
+  return result;
+}
+
+/// Bytes: some 12 per voxel of the band, and per triangle our copy, its box and its lists.
+double estimateMemory(const TriMesh& mesh, double voxelSize, double halfWidth) {
+  const double area = surfaceArea(mesh) / voxelSize / voxelSize;
+  return 24 * halfWidth * area + 250.0 * static_cast<double>(mesh.triangles.size());
+}
+
+void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermost) {
+  const double size = largest(mesh.positions[outermost]);
+  const bool isFloat = mesh.precision == CoordinatePrecision::Float;
+  const double spacing = isFloat
+                             ? static_cast<double>(std::nextafter(
+                                   static_cast<float>(size), std::numeric_limits<float>::max())) -
+                                   static_cast<double>(static_cast<float>(size))
+                             : std::nextafter(size, std::numeric_limits<double>::max()) - size;
+  if (spacing > voxelSize / 8)
+    throw InvalidInput(
+        fmt::format("level-set: {} coordinates at vertex {}, {}, are {:.3g} apart, coarser than an "
+                    "eighth of the "
+                    "voxel size {:.6g}; move the object to the origin before it is written, or use "
+                    "larger voxels",
+                    isFloat ? "single-precision" : "double-precision", outermost,
+                    text(mesh.positions[outermost]), spacing, voxelSize));
+}
+
+}  // namespace
+
+std::size_t memoryLimit(const MeshToBandOptions& options) {
+  const long pages = sysconf(_SC_PHYS_PAGES), pageSize = sysconf(_SC_PAGE_SIZE);
+  if (pages <= 0 || pageSize <= 0) return options.maxMemory;
+  return std::min(options.maxMemory,
+                  static_cast<std::size_t>(pages) * static_cast<std::size_t>(pageSize));
+}
+
+void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
+  checkCall(voxelSize, options);
+  checkElements(mesh);
+  const V3d size = usedBounds(mesh).size();
+  const double longest = std::max({size.x, size.y, size.z});
+  if (voxelSize > longest)
+    throw InvalidInput(fmt::format(
+        "level-set: the voxel size {:.6g} is larger than the object, whose longest side is "
+        "{:.6g}; use smaller voxels",
+        voxelSize, longest));
+  const std::uint32_t outermost = outermostVertex(mesh);
+  if (largest(mesh.positions[outermost]) / voxelSize + options.halfWidth >= kIndexLimit)
+    throw ResourceLimit(fmt::format(
+        "level-set: vertex {} at {} is {:.3g} voxels from the origin, beyond an index of 32 "
+        "bits; use larger voxels, or remove the vertex if it is astray",
+        outermost, text(mesh.positions[outermost]),
+        largest(mesh.positions[outermost]) / voxelSize));
+  requireMemory(estimateMemory(mesh, voxelSize, options.halfWidth), memoryLimit(options),
+                "level-set");
+  checkPrecision(mesh, voxelSize, outermost);
+}
+
+V3i localOrigin(const TriMesh& mesh, double voxelSize) {
+  const V3d middle = usedBounds(mesh).center() / voxelSize;
+  const auto down = [](double x) { return static_cast<int>(std::floor(x / 8)) * 8; };
+  return {down(middle.x), down(middle.y), down(middle.z)};
+}
+
+LocalMesh toLocal(const TriMesh& mesh, const MeshTopology& topology, double voxelSize,
+                  const V3i& origin) {
+  LocalMesh local;
+  local.points.reserve(mesh.positions.size());
+  for (const V3d& p : mesh.positions) local.points.push_back(p / voxelSize - V3d(origin));
+  local.triangles = topology.triangles;
+  return local;
+}
+
+}  // namespace levelset::convert

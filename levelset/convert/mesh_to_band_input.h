@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+
+#include "levelset/convert/local_mesh.h"
+#include "levelset/convert/mesh_to_band.h"
+
+namespace levelset::convert {
+
+/// What meshToBand refuses before it starts, in the order: the call, the mesh, the index range, the
+/// memory, the precision of the coordinates.
+/// @throws UsageError, InvalidInput, ResourceLimit
+void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options);
+
+/// The caller's limit, or what the machine has.
+[[nodiscard]] std::size_t memoryLimit(const MeshToBandOptions& options);
+
+/// The grid point, of coordinates that 8 divides, nearest below the middle of the mesh.
+[[nodiscard]] Imath::V3i localOrigin(const TriMesh& mesh, double voxelSize);
+
+/// The welded faces in voxels about `origin`.
+[[nodiscard]] LocalMesh toLocal(const TriMesh& mesh, const MeshTopology& topology, double voxelSize,
+                                const Imath::V3i& origin);
+
+}  // namespace levelset::convert

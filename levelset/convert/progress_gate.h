@@ -1,0 +1,36 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <mutex>
+
+#include "levelset/progress.h"
+
+namespace levelset::convert {
+
+/// Lets parallel work report progress: one call at a time, with a fraction that never falls, and
+/// none that waits for another.
+class ProgressGate {
+ public:
+  ProgressGate(const Progress& progress, std::size_t total, const char* action)
+      : progress_(progress), total_(static_cast<double>(total ? total : 1)), action_(action) {}
+
+  /// @throws Cancelled
+  void advance(std::size_t count) {
+    done_.fetch_add(count, std::memory_order_relaxed);
+    if (!progress_) return;
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (!lock) return;
+    const double fraction = static_cast<double>(done_.load(std::memory_order_relaxed)) / total_;
+    report(progress_, fraction < 1 ? fraction : 1.0, action_);
+  }
+
+ private:
+  const Progress& progress_;
+  double total_;
+  const char* action_;
+  std::atomic<std::size_t> done_{0};
+  std::mutex mutex_;
+};
+
+}  // namespace levelset::convert

@@ -1,0 +1,130 @@
+#include "levelset/convert/surface_blocks.h"
+
+#include <tbb/task_group.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/convert/progress_gate.h"
+#include "levelset/convert/triangle_distance.h"
+
+namespace levelset::convert {
+namespace {
+
+using Imath::V3d;
+using Imath::V3i;
+using List = std::vector<std::uint32_t>;
+
+constexpr std::size_t kTaskSize = 2048;  // triangles; smaller cells stay with their task
+constexpr std::size_t kShare = std::size_t{1} << 50;  // of progress, for the whole
+
+struct Cell {
+  std::int64_t x, y, z, size;  // lowest grid point, edge
+};
+
+class BlockWalk {
+ public:
+  BlockWalk(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
+            const Progress& progress)
+      : mesh_(mesh), reach_(reach), visit_(visit), gate_(progress, kShare, "level-set") {
+    boxes_.resize(mesh.triangles.size());
+    for (std::size_t t = 0; t < boxes_.size(); ++t) boxes_[t] = boxOf(t);
+  }
+
+  void run() {
+    List all(mesh_.triangles.size());
+    for (std::size_t t = 0; t < all.size(); ++t) all[t] = static_cast<std::uint32_t>(t);
+    group_.run_and_wait([&] { walk(rootCell(), all, kShare); });
+  }
+
+ private:
+  struct Box {
+    V3d low, high;  // enlarged by reach
+    double extent;  // of the triangle, its longest side
+  };
+
+  Box boxOf(std::size_t t) const {
+    const V3d &a = mesh_.corner(t, 0), &b = mesh_.corner(t, 1), &c = mesh_.corner(t, 2);
+    Box box{};
+    for (int axis = 0; axis < 3; ++axis) {
+      box.low[axis] = std::min({a[axis], b[axis], c[axis]}) - reach_;
+      box.high[axis] = std::max({a[axis], b[axis], c[axis]}) + reach_;
+    }
+    const V3d size = box.high - box.low;
+    box.extent = std::max({size.x, size.y, size.z}) - 2 * reach_;
+    return box;
+  }
+
+  /// The cell of 8 · 2ⁿ points about the origin that holds everything within reach.
+  Cell rootCell() const {
+    double half = kBlockDim;
+    for (const Box& box : boxes_)
+      for (int axis = 0; axis < 3; ++axis)
+        half = std::max({half, std::abs(box.low[axis]), std::abs(box.high[axis])});
+    std::int64_t edge = kBlockDim;
+    while (static_cast<double>(edge) <= half) edge *= 2;
+    return {-edge, -edge, -edge, 2 * edge};
+  }
+
+  bool touches(std::uint32_t t, const Cell& cell) const {
+    const Box& box = boxes_[t];
+    const double last = static_cast<double>(cell.size - 1);
+    const V3d low(static_cast<double>(cell.x), static_cast<double>(cell.y),
+                  static_cast<double>(cell.z));
+    for (int axis = 0; axis < 3; ++axis)
+      if (box.low[axis] > low[axis] + last || box.high[axis] < low[axis]) return false;
+    if (box.extent <= static_cast<double>(cell.size)) return true;
+    const TriangleFrame frame(mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2));
+    const double range = reach_ + last * 0.8660255 + 1e-6;
+    return frame.squaredDistance(low + V3d(last / 2)) <= range * range;
+  }
+
+  void walk(const Cell& cell, const List& triangles, std::size_t share) {
+    if (cell.size == kBlockDim) {
+      visit_(V3i(static_cast<int>(cell.x), static_cast<int>(cell.y), static_cast<int>(cell.z)),
+             triangles);
+      gate_.advance(share);
+      return;
+    }
+    std::vector<std::pair<Cell, List>> parts;
+    std::size_t total = 0;
+    for (int child = 0; child < 8; ++child) {
+      const std::int64_t half = cell.size / 2;
+      const Cell part = {cell.x + (child & 4 ? half : 0), cell.y + (child & 2 ? half : 0),
+                         cell.z + (child & 1 ? half : 0), half};
+      List list;
+      for (const std::uint32_t t : triangles)
+        if (touches(t, part)) list.push_back(t);
+      total += list.size();
+      if (!list.empty()) parts.emplace_back(part, std::move(list));
+    }
+    for (auto& [part, list] : parts) {
+      const auto partShare =
+          static_cast<std::size_t>(static_cast<double>(share) * static_cast<double>(list.size()) /
+                                   static_cast<double>(total));
+      if (list.size() >= kTaskSize) {
+        gate_.advance(0);
+        group_.run(
+            [this, task = part, own = std::move(list), partShare] { walk(task, own, partShare); });
+      } else {
+        walk(part, list, partShare);
+      }
+    }
+  }
+
+  const LocalMesh& mesh_;
+  double reach_;
+  const BlockVisitor& visit_;
+  ProgressGate gate_;
+  std::vector<Box> boxes_;
+  tbb::task_group group_;
+};
+
+}  // namespace
+
+void forEachBlock(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
+                  const Progress& progress) {
+  if (!mesh.triangles.empty()) BlockWalk(mesh, reach, visit, progress).run();
+}
+
+}  // namespace levelset::convert
