@@ -42,11 +42,12 @@ bool isUnbroken(const ParticleLevel& level, double longestU, double longestV) {
   return true;
 }
 
-bool sweepBlended(const SurfaceField& field, const PatchSides& border, ParticleLevel& level) {
+bool sweepBlended(const SurfaceField& field, const SurfaceField& guide, const PatchSides& border,
+                  ParticleLevel& level) {
   for (std::size_t j = 1; j + 1 < level.rows; ++j)
     for (std::size_t i = 1; i + 1 < level.columns; ++i) {
       V3d p = coons(border, level, i, j);
-      if (!field.project(p, level.height)) return false;
+      if (!guide.project(p, level.height) || !field.project(p, level.height)) return false;
       level.positions[j * level.columns + i] = p;
     }
   const double u = std::max(pathLength(border[0]), pathLength(border[2]));
@@ -104,8 +105,8 @@ double sideLengthV(const PatchSides& sides) {
   return 0.5 * (pathLength(sides[1]) + pathLength(sides[3]));
 }
 
-Relaxation fillLevel(const levelset::NarrowBand& band, const PatchSides& sides,
-                     ParticleLevel& level) {
+Relaxation fillLevel(const levelset::NarrowBand& band, const levelset::NarrowBand& guide,
+                     const PatchSides& sides, ParticleLevel& level) {
   const SurfaceField field(band);
   PatchSides border;
   for (std::size_t side = 0; side < 4; ++side) {
@@ -122,7 +123,7 @@ Relaxation fillLevel(const levelset::NarrowBand& band, const PatchSides& sides,
     level.positions[j * level.columns] = border[3][j];
     level.positions[j * level.columns + level.columns - 1] = border[1][j];
   }
-  if (!sweepBlended(field, border, level)) sweepGeodesics(field, level);
+  if (!sweepBlended(field, SurfaceField(guide), border, level)) sweepGeodesics(field, level);
   return relax(band, level);
 }
 

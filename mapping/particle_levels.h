@@ -26,9 +26,10 @@ using PatchSides = std::array<std::vector<Imath::V3d>, 4>;
 
 /// A grid of particles swept between the sides onto φ = level.height and relaxed.
 /// @param level  with its counts, w and height; its positions are made
+/// @param guide  distances, perhaps coarser, that reach where the blend of the sides may lie
 /// @throws InvalidInput where the surface cannot be followed
-Relaxation fillLevel(const levelset::NarrowBand& band, const PatchSides& sides,
-                     ParticleLevel& level);
+Relaxation fillLevel(const levelset::NarrowBand& band, const levelset::NarrowBand& guide,
+                     const PatchSides& sides, ParticleLevel& level);
 
 /// Carries corners along ∇φ from one height to another, in steps of at most half a voxel (RK2).
 /// @throws InvalidInput where a corner meets the medial axis of the base before that height

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "levelset/eikonal/redistance.h"
 #include "levelset/error.h"
 #include "mapping/closest_point.h"
 #include "mapping/geodesic.h"
 #include "mapping/particle_levels.h"
+#include "mapping/patch_space.h"
 #include "mapping/surface_field.h"
 
 namespace mapping {
@@ -26,7 +26,6 @@ constexpr const char* kAction = "patch";
 constexpr double kParticleBudget = 2000;
 constexpr double kSmallestSpacing = 1.5;  // voxels; closer ones say the same thing twice
 constexpr std::size_t kFewest = 4;        // particles along a side
-constexpr double kMarginVoxels = 6;       // of distances beyond the highest level, for the filters
 
 std::string text(const V3d& p) {
   return fmt::format("{:.6g},{:.6g},{:.6g}", p.x, p.y, p.z);
@@ -97,36 +96,35 @@ bool checkOrientation(const NarrowBand& base, const std::array<V3d, 4>& given,
   return area < 0;
 }
 
-double chooseSpacing(const NarrowBand& base, double uLength, double vLength, std::size_t levels) {
-  const double perLevel = std::max(16.0, kParticleBudget / static_cast<double>(levels));
-  // (u/s + 1)(v/s + 1) = perLevel, solved for s.
-  const double sum = uLength + vLength, product = uLength * vLength, rest = perLevel - 1;
+struct LevelSides {
+  double height;
+  PatchSides sides;
+  double uLength, vLength;
+};
+
+/// (u/s + 1)(v/s + 1), summed over the levels.
+double particlesAt(double spacing, const std::vector<LevelSides>& levels) {
+  double count = 0;
+  for (const LevelSides& level : levels)
+    count += (level.uLength / spacing + 1) * (level.vLength / spacing + 1);
+  return count;
+}
+
+/// The spacing that makes kParticleBudget particles of all levels together.
+double chooseSpacing(const NarrowBand& base, const std::vector<LevelSides>& levels) {
+  double sum = 0, product = 0;
+  for (const LevelSides& level : levels) {
+    sum += level.uLength + level.vLength;
+    product += level.uLength * level.vLength;
+  }
+  const double count = static_cast<double>(levels.size());
+  const double rest = std::max(kParticleBudget, 16 * count) - count;
   const double spacing = (sum + std::sqrt(sum * sum + 4 * rest * product)) / (2 * rest);
   return std::max(spacing, kSmallestSpacing * base.voxelSize());
 }
 
 std::size_t countAlong(double length, double spacing) {
   return std::max(kFewest, static_cast<std::size_t>(std::lround(length / spacing)) + 1);
-}
-
-/// The base with distances as far as the patch reaches: swept out of the narrow band in a box about
-/// the patch, unless they are there already.
-NarrowBand sweepDistances(const NarrowBand& base, const PatchSides& sides, double height,
-                          const PatchOptions& options) {
-  const double reach = height + kMarginVoxels * base.voxelSize();
-  if (base.halfWidth() * base.voxelSize() >= reach) return base;
-  Imath::Box3d box;
-  for (const std::vector<V3d>& side : sides)
-    for (const V3d& p : side) box.extendBy(p);
-  // Inner particles may lie outside the box of the sides: allow a patch to bulge by half its width.
-  const double bulge = 0.25 * std::min(sideLengthU(sides), sideLengthV(sides));
-  box.min -= V3d(reach + bulge);
-  box.max += V3d(reach + bulge);
-  return levelset::redistance(base,
-                              {.halfWidth = reach / base.voxelSize(),
-                               .region = box,
-                               .maxMemory = options.maxMemory,
-                               .progress = levelset::subProgress(options.progress, 0.1, 0.4)});
 }
 
 double meanSpacing(const Patch& patch) {
@@ -140,10 +138,7 @@ double meanSpacing(const Patch& patch) {
   return sum / count;
 }
 
-void checkParticleCount(double uLength, double vLength, double spacing, std::size_t levels,
-                        const PatchOptions& options) {
-  const double count =
-      (uLength / spacing + 1) * (vLength / spacing + 1) * static_cast<double>(levels);
+void checkParticleCount(double count, double spacing, const PatchOptions& options) {
   levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kAction);
   constexpr double kMostParticles = 1e6;
   if (count > kMostParticles) {
@@ -152,6 +147,28 @@ void checkParticleCount(double uLength, double vLength, double spacing, std::siz
         "one",
         kAction, spacing, count, kMostParticles));
   }
+}
+
+LevelSides makeLevelSides(const NarrowBand& band, double height,
+                          const std::array<V3d, 4>& corners) {
+  LevelSides level{height, makeSides(band, height, corners), 0, 0};
+  level.uLength = sideLengthU(level.sides);
+  level.vLength = sideLengthV(level.sides);
+  return level;
+}
+
+/// Distances throughout patch space, from the sides on the surface.
+NarrowBand sweepAbove(const NarrowBand& base, const LevelSides& surface, double height,
+                      const PatchOptions& options) {
+  std::vector<V3d> border;
+  for (const std::vector<V3d>& side : surface.sides)
+    border.insert(border.end(), side.begin(), side.end());
+  // Inner particles may lie outside the box of the sides: a patch may bulge by a quarter of its
+  // width.
+  const double bulge = 0.25 * std::min(surface.uLength, surface.vLength);
+  return sweepPatchSpace(base, border, bulge, height,
+                         {.maxMemory = options.maxMemory,
+                          .progress = levelset::subProgress(options.progress, 0.1, 0.5)});
 }
 
 }  // namespace
@@ -178,37 +195,41 @@ PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners,
   checkApart(base, patch.corners);
   patch.mirrored = checkOrientation(base, corners, patch.corners, options.mirror);
   patch.height = height;
-  PatchSides sides = makeSides(base, 0, patch.corners);
-  const double uLength = sideLengthU(sides), vLength = sideLengthV(sides);
-  const double spacing =
-      options.spacing > 0 ? options.spacing : chooseSpacing(base, uLength, vLength, options.levels);
-  checkParticleCount(uLength, vLength, spacing, options.levels, options);
+  std::vector<LevelSides> sides = {makeLevelSides(base, 0, patch.corners)};
+  if (options.spacing > 0)
+    checkParticleCount(particlesAt(options.spacing, sides) * static_cast<double>(options.levels),
+                       options.spacing, options);
   levelset::report(options.progress, 0.1, kAction);
 
-  // === Scheme B: a complete patch on each level, from its own advected corners
-  const NarrowBand wide = sweepDistances(base, sides, height, options);
+  // === Scheme B: sides of each level from its own advected corners …
+  const NarrowBand space = sweepAbove(base, sides.front(), height, options);
   std::array<V3d, 4> advected = patch.corners;
-  for (std::size_t k = 0; k < options.levels; ++k) {
+  for (std::size_t k = 1; k < options.levels; ++k) {
+    const double level = height * static_cast<double>(k) / static_cast<double>(options.levels - 1);
+    advectCorners(space, sides.back().height, level, advected);
+    sides.push_back(makeLevelSides(space, level, advected));
+  }
+
+  // … and a complete patch between them
+  const double spacing = options.spacing > 0 ? options.spacing : chooseSpacing(base, sides);
+  for (const LevelSides& border : sides) {
     ParticleLevel level;
-    level.w = static_cast<double>(k) / static_cast<double>(options.levels - 1);
-    level.height = height * level.w;
-    if (k > 0) {
-      advectCorners(wide, patch.levels.back().height, level.height, advected);
-      sides = makeSides(wide, level.height, advected);
-    }
-    level.columns = countAlong(sideLengthU(sides), spacing);
-    level.rows = countAlong(sideLengthV(sides), spacing);
-    const Relaxation relaxation = fillLevel(wide, sides, level);
+    level.height = border.height;
+    level.w = border.height / height;
+    level.columns = countAlong(border.uLength, spacing);
+    level.rows = countAlong(border.vLength, spacing);
+    const bool isSurface = patch.levels.empty();
+    const Relaxation relaxation = fillLevel(isSurface ? base : space, space, border.sides, level);
     report.relaxIterations += relaxation.iterations;
     report.isRelaxed = report.isRelaxed && relaxation.isConverged;
     patch.levels.push_back(std::move(level));
-    levelset::report(options.progress,
-                     0.4 + 0.6 * static_cast<double>(k + 1) / static_cast<double>(options.levels),
-                     kAction);
+    const double done =
+        static_cast<double>(patch.levels.size()) / static_cast<double>(sides.size());
+    levelset::report(options.progress, 0.5 + 0.5 * done, kAction);
   }
   patch.spacing = meanSpacing(patch);
-  report.uLength = uLength;
-  report.vLength = vLength;
+  report.uLength = sides.front().uLength;
+  report.vLength = sides.front().vLength;
   report.cellAreaVariation = cellAreaVariation(patch.levels.front());
   return result;
 }

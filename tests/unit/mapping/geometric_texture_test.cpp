@@ -10,6 +10,7 @@
 #include <string>
 
 #include "levelset/error.h"
+#include "levelset/inspect/measure.h"
 #include "levelset/sample.h"
 #include "tests/support/bands.h"
 
@@ -148,7 +149,7 @@ TEST(GeometricTexture, BendsATorusOntoASphere) {
 
 TEST(GeometricTexture, FillsTheInsideOfTheTexture) {
   // Blocks that the band does not touch are inside as a whole.
-  const double voxel = 0.04;
+  const double voxel = 0.06;
   const NarrowBand base = makeSlab(0.1), ball = makeBall(1, voxel, 3);
   const Patch patch = mapping::makePatch(base, square(2), 4).patch;
   const TextureResult result =
@@ -215,6 +216,35 @@ TEST(GeometricTexture, RefusesPatchesThatFold) {
   const std::string message = refusal([&] { (void)mapTexture(trough, ball, patch); });
   EXPECT_NE(message.find("folds at ("), std::string::npos) << message;
   EXPECT_NE(message.find("u, v, w"), std::string::npos) << message;
+}
+
+TEST(GeometricTexture, UnionIsOneSolidAndCarvingLeavesAHole) {
+  const double voxel = 0.05, radius = 2;
+  const NarrowBand base = makeBall(radius, voxel, 3), ring = makeRing(1, 0.25, 0.05);
+  const Patch patch =
+      mapping::makePatch(base, cap(0.6, radius), 0.5, {.levels = 3, .spacing = 0.15}).patch;
+  const levelset::Measurement before = levelset::measure(base);
+  const auto measured = [&](const mapping::TextureOptions& options) {
+    return levelset::measure(mapTexture(base, ring, patch, options).band);
+  };
+  // Sunk by 0.2, the ring melts into the ball; Euler's number tells the handle of none from a
+  // ring's.
+  const levelset::Measurement united = measured({.sink = 0.2, .voxelSize = voxel});
+  EXPECT_EQ(united.components, 1u);
+  EXPECT_EQ(united.shells, 1u);
+  EXPECT_EQ(united.euler, 2);
+  EXPECT_GT(united.volume, before.volume);
+  const levelset::Measurement blended = measured({.sink = 0.2, .blend = 0.2, .voxelSize = voxel});
+  EXPECT_EQ(blended.components, 1u);
+  EXPECT_GT(blended.volume, united.volume);
+  const levelset::Measurement carved =
+      measured({.merge = TextureMerge::Carve, .sink = 0.2, .voxelSize = voxel});
+  EXPECT_EQ(carved.components, 1u);
+  EXPECT_LT(carved.volume, before.volume);
+  // What carving takes away and union adds are the two parts of the ring.
+  const levelset::Measurement alone =
+      measured({.merge = TextureMerge::Alone, .sink = 0.2, .voxelSize = voxel});
+  EXPECT_NEAR(united.volume - carved.volume, alone.volume, 0.02 * alone.volume);
 }
 
 TEST(GeometricTexture, SameBitsForAnyNumberOfThreads) {

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <cstddef>
+#include <span>
+
+#include "levelset/narrow_band.h"
+#include "levelset/progress.h"
+
+namespace mapping {
+
+struct PatchSpaceOptions {
+  std::size_t maxMemory = levelset::kNoMemoryLimit;
+  levelset::Progress progress = {};
+};
+
+/// Distances to the base as far as `height` above a patch, swept out of the narrow band in a box
+/// about it [Brodersen07 §8.2]. Where that is many voxels, a grid of up to a quarter of the
+/// resolution does: levels of φ grow smooth with their height, and the surface itself is left to
+/// the base's own band.
+/// @param border  points on the surface along the sides of the patch
+/// @param bulge   how far the inner surface may leave the box of the border, world units
+[[nodiscard]] levelset::NarrowBand sweepPatchSpace(const levelset::NarrowBand& base,
+                                                   std::span<const Imath::V3d> border, double bulge,
+                                                   double height,
+                                                   const PatchSpaceOptions& options = {});
+
+}  // namespace mapping
