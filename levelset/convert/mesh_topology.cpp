@@ -55,8 +55,9 @@ Triangle canonical(const Triangle& t) {
   return {t[low], t[(low + 1) % 3], t[(low + 2) % 3]};
 }
 
-/// Drops all but the first of equal faces, in place.
-void dropRepeated(std::vector<Triangle>& triangles, std::size_t vertices) {
+/// The faces without all but the first of equal ones.
+std::vector<Triangle> withoutRepeated(const std::vector<Triangle>& triangles,
+                                      std::size_t vertices) {
   const Buckets byVertex(vertices, triangles.size(),
                          [&](std::size_t i) { return canonical(triangles[i])[0]; });
   std::vector<bool> repeated(triangles.size(), false);
@@ -69,10 +70,11 @@ void dropRepeated(std::vector<Triangle>& triangles, std::size_t vertices) {
     for (std::size_t i = 1; i < row.size(); ++i)
       if (row[i].first == row[i - 1].first) repeated[row[i].second] = true;
   }
-  std::size_t kept = 0;
+  std::vector<Triangle> kept;
+  kept.reserve(triangles.size());
   for (std::size_t i = 0; i < triangles.size(); ++i)
-    if (!repeated[i]) triangles[kept++] = triangles[i];
-  triangles.resize(kept);
+    if (!repeated[i]) kept.push_back(triangles[i]);
+  return kept;
 }
 
 void countEdges(MeshTopology& topology, std::size_t vertices) {
@@ -113,9 +115,18 @@ MeshTopology findTopology(const TriMesh& mesh) {
     const Triangle w = {first[t[0]], first[t[1]], first[t[2]]};
     if (w[0] != w[1] && w[1] != w[2] && w[2] != w[0]) topology.triangles.push_back(w);
   }
-  dropRepeated(topology.triangles, mesh.positions.size());
-  topology.dropped = mesh.triangles.size() - topology.triangles.size();
+  std::vector<Triangle> single = withoutRepeated(topology.triangles, mesh.positions.size());
   countEdges(topology, mesh.positions.size());
+  if (single.size() < topology.triangles.size()) {
+    MeshTopology other;
+    other.triangles = std::move(single);
+    countEdges(other, mesh.positions.size());
+    // Decimation leaves faces that coincide though each closes a sheet of its own: to drop one of
+    // them would open the mesh.
+    if (other.boundary.size() <= topology.boundary.size() && other.oddEdges <= topology.oddEdges)
+      topology = std::move(other);
+  }
+  topology.dropped = mesh.triangles.size() - topology.triangles.size();
   return topology;
 }
 

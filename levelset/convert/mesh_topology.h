@@ -19,8 +19,8 @@ struct BoundaryEdge {
 
 struct MeshTopology {
   /// Faces over welded vertices: of vertices at equal positions, the one with the lowest index.
-  /// Faces with a repeated vertex and exact repetitions of a face are left out; a face and its
-  /// reverse stay.
+  /// Faces with a repeated vertex are left out, and exact repetitions of a face unless that opens
+  /// the mesh; a face and its reverse stay.
   std::vector<Triangle> triangles;
   std::size_t dropped = 0;
   std::size_t boundaryEdges = 0;       ///< with one face

@@ -102,4 +102,173 @@ TEST(MeshToBand, MatchesWindingNumberOfNestedShells) {
   expectExact(closed(same, h, Nesting::Orientation), same, byWinding(same));
 }
 
+TEST(MeshToBand, TurnsSoupThatFacesInwards) {
+  const TriMesh out = sphereMesh(1, V3d(0.01, 0.02, 0.03), 8);
+  const TriMesh in = soup(reversed(out), 1e-4);
+  const auto result = meshToBand(in, 0.13, {.sign = SignMode::Winding});
+  EXPECT_TRUE(result.certificate.flipped);
+  EXPECT_FALSE(result.certificate.closed);
+  EXPECT_EQ(result.certificate.boundaryEdges, 3 * in.triangles.size());
+  expectExact(result, in, byWinding(in, -1));
+}
+
+TEST(MeshToBand, MatchesWindingNumberOfSelfIntersectingUnion) {
+  const TriMesh mesh =
+      joined(sphereMesh(1, V3d(0.01, 0.02, 0.03), 10), sphereMesh(0.8, V3d(0.9, 0.1, 0.05), 10));
+  const auto result = meshToBand(mesh, 0.1);
+  EXPECT_EQ(result.certificate.method, SignMode::Winding);
+  EXPECT_GT(result.certificate.selfIntersections, 0);
+  EXPECT_EQ(result.certificate.ambiguousShare, 0);
+  expectExact(result, mesh, byWinding(mesh));
+}
+
+/// Signs as the exact winding number has them, every change of sign between active voxels,
+/// distances never beyond those to the mesh, and a surface where the number passes 1/2.
+void expectOpenSound(const MeshToBandResult& result, const TriMesh& mesh) {
+  const openvdb::FloatGrid& grid = vdb(result.band);
+  const double h = result.band.voxelSize();
+  auto accessor = grid.getConstAccessor();
+  std::size_t wrong = 0, loose = 0, beyond = 0;
+  const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+  for (auto it = box.begin(); it; ++it) {
+    const openvdb::Coord c = *it;
+    const V3d p = V3d(c.x(), c.y(), c.z()) * h;
+    const float value = accessor.getValue(c);
+    const double w = windingNumber(mesh, p), distance = unsignedDistance(mesh, p);
+    wrong += std::abs(w - 0.5) > 1e-9 && distance > 1e-6 * h && (value < 0) != (w > 0.5);
+    beyond += std::abs(static_cast<double>(value)) > std::max(distance, 0.0) + 1e-4 * h;
+    for (int axis = 0; axis < 3; ++axis) {
+      openvdb::Coord next = c;
+      next[axis] += 1;
+      const bool changes = (accessor.getValue(next) < 0) != (value < 0);
+      loose += changes && !(accessor.isValueOn(c) && accessor.isValueOn(next));
+    }
+  }
+  EXPECT_EQ(wrong, 0u);
+  EXPECT_EQ(loose, 0u);
+  EXPECT_EQ(beyond, 0u);
+}
+
+TEST(MeshToBand, SpansHoleOfHemisphere) {
+  const TriMesh mesh = sphereMesh(1, V3d(0.01, 0.02, 0.03), 10, 0.5);
+  const double h = 0.11;
+  EXPECT_THROW((void)meshToBand(mesh, h), InvalidInput);  // half the rim's disc is a guess
+  const auto result = meshToBand(mesh, h, {.signAnyway = true});
+  EXPECT_EQ(result.certificate.method, SignMode::Winding);
+  EXPECT_GT(result.certificate.ambiguousShare, 1e-3);
+  expectOpenSound(result, mesh);
+  // The rim lies in a plane, which its opening sees under half the sphere: w = 1/2 spans it flatly.
+  auto accessor = vdb(result.band).getConstAccessor();
+  for (int z = -2; z <= 2; ++z) {
+    const double phi = static_cast<double>(accessor.getValue({0, 0, z}));
+    EXPECT_NEAR(phi, z * h - 0.03, 0.1 * h);
+  }
+}
+
+TEST(MeshToBand, KeepsSmallHoleOfScanClosed) {
+  TriMesh mesh = torusMesh(1, 0.4, 48, 24, V3d(0.013, -0.021, 0.007));
+  mesh.triangles.erase(mesh.triangles.begin() + 100);
+  const auto result = meshToBand(mesh, 0.1);
+  EXPECT_EQ(result.certificate.boundaryEdges, 3u);
+  EXPECT_LT(result.certificate.ambiguousShare, 1e-3);
+  expectOpenSound(result, mesh);
+}
+
+TEST(MeshToBand, KeepsFacesThatCloseSheets) {
+  const TriMesh box = boxMesh(V3d(0), V3d(1));
+  // Every face twice is the same solid.
+  const auto twice = closed(joined(box, box), 0.1);
+  EXPECT_EQ(twice.certificate.droppedTriangles, 12u);
+  EXPECT_EQ(twice.band.contentHash(), closed(box, 0.1).band.contentHash());
+  // Two boxes that share an edge: four faces there, still crossed an even number of times.
+  const TriMesh touching = joined(box, boxMesh(V3d(1, 1, 0), V3d(2, 2, 1)));
+  const auto result = meshToBand(touching, 0.11);
+  EXPECT_EQ(result.certificate.nonManifoldEdges, 1u);
+  EXPECT_EQ(result.certificate.method, SignMode::Winding);
+  expectExact(result, touching, byWinding(touching));
+}
+
+TEST(MeshToBand, MeasuresNeedlesAndDegenerateFaces) {
+  // A box with a face split at a point on an edge (T-junction closed by a face without area).
+  TriMesh mesh = boxMesh(V3d(0), V3d(1));
+  const auto middle = static_cast<std::uint32_t>(mesh.positions.size());
+  mesh.positions.emplace_back(0.5, 0, 0);
+  mesh.triangles[0] = {0, 2, middle};  // {0, 2, 1} split; the neighbour keeps the whole edge 0–1
+  mesh.triangles.push_back({middle, 2, 1});
+  mesh.triangles.push_back({0, middle, 1});
+  mesh.triangles.push_back({3, 3, 5});
+  const auto result = closed(mesh, 0.13);
+  EXPECT_EQ(result.certificate.droppedTriangles, 1u);
+  mesh.triangles.pop_back();
+  mesh.triangles.pop_back();
+  expectExact(result, mesh, byWinding(mesh));
+}
+
+TEST(MeshToBand, KeepsDistancesFarFromTheOrigin) {
+  const V3d far(1e6, -1e6, 1e6);
+  const TriMesh near = torusMesh(1, 0.4, 24, 12);
+  const TriMesh mesh = transformed(near, [&](const V3d& p) { return p + far; });
+  const auto a = closed(near, 0.125), b = closed(mesh, 0.125);  // 0.125 divides the shift
+  EXPECT_EQ(a.band.activeVoxelCount(), b.band.activeVoxelCount());
+  const openvdb::FloatGrid &ga = vdb(a.band), &gb = vdb(b.band);
+  double worst = 0;
+  for (auto it = ga.cbeginValueOn(); it; ++it)
+    worst = std::max(
+        worst,
+        std::abs(double(*it) - double(gb.tree().getValue(
+                                   it.getCoord() + openvdb::Coord(8000000, -8000000, 8000000)))));
+  EXPECT_LT(worst, 1e-6 * 0.125);
+}
+
+TEST(MeshToBand, FillsTilesOfLargeSolids) {
+  const auto result = closed(boxMesh(V3d(-9000, -150, -150), V3d(9000, 150, 150)), 5);
+  const openvdb::FloatGrid& grid = vdb(result.band);
+  EXPECT_LT(grid.tree().getValue({0, 0, 0}), 0);
+  EXPECT_LT(grid.tree().getValue({1700, 20, -20}), 0);
+  EXPECT_GT(grid.tree().getValue({0, 40, 0}), 0);
+  EXPECT_GT(grid.tree().getValue({1900, 0, 0}), 0);
+}
+
+TEST(MeshToBand, GivesTheSameBitsForAnyThreadCount) {
+  const TriMesh whole = torusMesh(1, 0.4, 64, 32);
+  const TriMesh open = sphereMesh(1, V3d(0.01), 10, 0.7);
+  std::vector<std::uint64_t> hashes;
+  for (const std::size_t threads : {1u, 2u, 4u}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    hashes.push_back(meshToBand(whole, 0.03).band.contentHash());
+    hashes.push_back(meshToBand(open, 0.08, {.signAnyway = true}).band.contentHash());
+  }
+  for (std::size_t i = 2; i < hashes.size(); ++i) EXPECT_EQ(hashes[i], hashes[i % 2]);
+}
+
+TEST(MeshToBand, StopsWhenAsked) {
+  int calls = 0;
+  double last = 0;
+  const Progress progress = [&](double fraction) {
+    EXPECT_GE(fraction, last);
+    last = fraction;
+    return ++calls < 5;
+  };
+  EXPECT_THROW((void)meshToBand(torusMesh(1, 0.4, 64, 32), 0.02, {.progress = progress}),
+               Cancelled);
+  EXPECT_GE(calls, 5);
+}
+
+TEST(SelfIntersections, CountsPairsThatCross) {
+  EXPECT_EQ(countSelfIntersections(torusMesh(1, 0.4)), 0u);
+  EXPECT_EQ(countSelfIntersections(boxMesh(V3d(0), V3d(1))), 0u);
+  // A face folded back onto its neighbour, a coplanar overlap, a piercing edge.
+  const auto pair = [](const V3d& a, const V3d& b, const V3d& c) {
+    TriMesh mesh{{V3d(0, 0, 0), V3d(1, 0, 0), V3d(0, 1, 0), a, b, c}, {{0, 1, 2}, {3, 4, 5}}};
+    return countSelfIntersections(mesh);
+  };
+  EXPECT_EQ(pair(V3d(0, 0, 0), V3d(1, 0, 0), V3d(0.2, 0.3, 0)), 1u);   // shares an edge, folded
+  EXPECT_EQ(pair(V3d(0, 0, 0), V3d(1, 0, 0), V3d(0.2, -0.3, 0)), 0u);  // shares an edge, flat
+  EXPECT_EQ(pair(V3d(0.1, 0.1, 0), V3d(2, 0.1, 0), V3d(2, 2, 0)), 1u);
+  EXPECT_EQ(pair(V3d(0.2, 0.2, -1), V3d(0.2, 0.2, 1), V3d(3, 3, 0)), 1u);
+  EXPECT_EQ(pair(V3d(0, 0, 0), V3d(-1, 0, 1), V3d(0, -1, 1)), 0u);  // shares a vertex
+  EXPECT_EQ(pair(V3d(0, 0, 0), V3d(1, 1, -1), V3d(1, 1, 1)), 1u);   // and passes through
+  EXPECT_EQ(pair(V3d(0, 0, 1e-300), V3d(1, 0, 1e-300), V3d(0, 1, 1e-300)), 0u);
+}
+
 }  // namespace
