@@ -33,6 +33,16 @@ V3d centroid(const WeightedTriangle& t) {
   return (t.corners[0] + t.corners[1] + t.corners[2]) / 3;
 }
 
+/// The triangle's area over the smallest squared distance that any point of the ball may have.
+double boundOf(const WeightedTriangle& t, const V3d& centre, double radius) {
+  const V3d middle = centroid(t);
+  double reach = 0;
+  for (const V3d& p : t.corners) reach = std::max(reach, (p - middle).length());
+  const double gap = (middle - centre).length() - reach - radius;
+  if (gap <= 0) return std::numeric_limits<double>::infinity();
+  return kQuarterPi * areaVector(t).length() / (gap * gap);
+}
+
 double turns(const WeightedTriangle& t, const V3d& point) {
   return t.weight * solidAngle(t.corners[0], t.corners[1], t.corners[2], point);
 }
@@ -156,10 +166,11 @@ double WindingField::bound(const V3d& centre, double radius) const {
     const std::size_t index = stack[--top];
     const Node& node = nodes_[index];
     const double gap = (node.centre - centre).length() - node.radius - radius;
-    if (gap > node.radius + radius || (gap > 0 && node.right == 0)) {
+    if (gap > node.radius + radius) {
       sum += kQuarterPi * node.area / (gap * gap);
     } else if (node.right == 0) {
-      return std::numeric_limits<double>::infinity();
+      for (std::size_t i = node.begin; i < node.end; ++i)
+        sum += boundOf(triangles_[i], centre, radius);
     } else {
       stack[top++] = node.right;
       stack[top++] = index + 1;
