@@ -75,6 +75,13 @@ struct SampleBlock {
     return true;
   }
 
+  /// Does any sample hold the bare background?
+  [[nodiscard]] bool touches(float background) const {
+    for (const float v : values)
+      if (std::abs(v) == background) return true;
+    return false;
+  }
+
   [[nodiscard]] double value() const {
     const AxisWeights<N> wx(fraction[0]), wy(fraction[1]), wz(fraction[2]);
     double sum = 0;

@@ -1,1 +1,105 @@
 #include "levelset/solids/transform.h"
+
+#include <fmt/core.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <cmath>
+#include <utility>
+
+#include "levelset/error.h"
+#include "levelset/solids/resample_vdb.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::FloatTree;
+
+/// The matrix must move points to points, and back.
+void requireAffine(const Imath::M44d& matrix, const char* action) {
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) {
+      if (std::isfinite(matrix[i][j])) continue;
+      throw UsageError(
+          fmt::format("{}: the matrix holds {} in row {}, column {}; its elements must be "
+                      "finite",
+                      action, matrix[i][j], i + 1, j + 1));
+    }
+  if (matrix[0][3] != 0 || matrix[1][3] != 0 || matrix[2][3] != 0 || matrix[3][3] != 1) {
+    throw UsageError(
+        fmt::format("{}: the last column of the matrix is {},{},{},{}; it must be 0,0,0,1 "
+                    "(points are row vectors: a translation is the last row)",
+                    action, matrix[0][3], matrix[1][3], matrix[2][3], matrix[3][3]));
+  }
+  const Stretch stretch = stretchOf(matrix);
+  if (!(stretch.least > 1e-12 * stretch.greatest)) {
+    throw UsageError(
+        fmt::format("{}: the matrix flattens the solid (it stretches by {} and by {}); it "
+                    "must be invertible",
+                    action, stretch.least, stretch.greatest));
+  }
+}
+
+void scaleDistances(openvdb::FloatGrid& grid, double scale) {
+  const auto background = static_cast<float>(static_cast<double>(grid.background()) * scale);
+  const auto scaled = [=](float value, bool isOn) {
+    return isOn ? static_cast<float>(static_cast<double>(value) * scale)
+                : std::copysign(background, value);
+  };
+  openvdb::tree::LeafManager<FloatTree> leaves(grid.tree());
+  leaves.foreach ([&](FloatTree::LeafNodeType& leaf, std::size_t) {
+    float* values = leaf.buffer().data();
+    for (openvdb::Index i = 0; i < FloatTree::LeafNodeType::SIZE; ++i)
+      values[i] = scaled(values[i], leaf.isValueOn(i));
+  });
+  for (auto it = grid.tree().beginValueOff(); it; ++it)
+    if (it.getDepth() < FloatTree::DEPTH - 1) it.setValue(scaled(*it, false));
+  grid.tree().root().setBackground(background, /*updateChildNodes=*/false);
+}
+
+}  // namespace
+
+NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix) {
+  const char* action = "transform";
+  requireAffine(matrix, action);
+  const Stretch stretch = stretchOf(matrix);
+  if (stretch.greatest > stretch.least * (1 + 1e-7) || !(Imath::M44d(matrix).determinant() > 0)) {
+    throw InvalidInput(
+        fmt::format("{}: the matrix shears, mirrors or scales unevenly, which the "
+                    "transform of a grid cannot hold; bake it (--bake)",
+                    action));
+  }
+  if (!solid.shared()) throw InvalidInput(fmt::format("{}: the solid has no surface", action));
+  const Imath::M44d placed = solid.indexToWorld() * matrix;
+  const openvdb::math::Transform::Ptr transform = transformOf(placed, action);
+  openvdb::FloatGrid& grid = editVdb(solid);
+  grid.setTransform(transform);
+  const double scale = std::cbrt(Imath::M44d(matrix).determinant());
+  // A rotation's determinant is one but for rounding: its distances stay to the bit.
+  if (std::abs(scale - 1) > 1e-9) scaleDistances(grid, scale);
+  return solid;
+}
+
+NarrowBand bake(const NarrowBand& solid, const Imath::M44d& matrix, double voxelSize,
+                const BakeOptions& options) {
+  const char* action = "transform";
+  requireAffine(matrix, action);
+  requireVoxelSize(voxelSize, action);
+  return resampleField(solid, solid.indexToWorld() * matrix, axisAligned(voxelSize),
+                       solid.shared() ? solid.halfWidth() : 3, options.maxMemory, options.progress,
+                       action);
+}
+
+TriMesh transform(TriMesh mesh, const Imath::M44d& matrix) {
+  requireAffine(matrix, "transform");
+  for (Imath::V3d& position : mesh.positions) {
+    Imath::V3d moved;
+    matrix.multVecMatrix(position, moved);
+    position = moved;
+  }
+  if (Imath::M44d(matrix).determinant() < 0)
+    for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+  return mesh;
+}
+
+}  // namespace levelset
