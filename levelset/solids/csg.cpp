@@ -1,1 +1,216 @@
 #include "levelset/solids/csg.h"
+
+#include <fmt/core.h>
+#include <openvdb/tools/Merge.h>
+#include <openvdb/tools/Prune.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "levelset/error.h"
+#include "levelset/solids/csg_vdb.h"
+#include "levelset/solids/resample.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+
+const char* nameOf(CsgOperation operation) {
+  switch (operation) {
+    case CsgOperation::Union:
+      return "union";
+    case CsgOperation::Intersection:
+      return "intersection";
+    case CsgOperation::Difference:
+      return "difference";
+  }
+  return "";
+}
+
+/// Index positions of `a` and `b` name the same places, as far as either solid reaches.
+bool shareTransform(const FloatGrid& a, const FloatGrid& b) {
+  if (a.transform() == b.transform()) return true;
+  openvdb::CoordBBox box = a.evalActiveVoxelBoundingBox();
+  box.expand(b.evalActiveVoxelBoundingBox());
+  if (box.empty()) return false;
+  std::array<openvdb::Coord, 8> corners;
+  box.getCornerPoints(corners.data());
+  return std::all_of(corners.begin(), corners.end(), [&](const openvdb::Coord& corner) {
+    return (b.worldToIndex(a.indexToWorld(corner)) - corner.asVec3d()).length() < 1e-6;
+  });
+}
+
+bool shareWidth(double a, double b) {
+  return std::abs(a - b) <= 1e-5 * a;
+}
+
+/// Negative zero and zero compare equal but are not the same bits.
+void clearSignOfZeros(FloatTree& tree) {
+  openvdb::tree::LeafManager<FloatTree> leaves(tree);
+  leaves.foreach ([](FloatTree::LeafNodeType& leaf, std::size_t) {
+    float* values = leaf.buffer().data();
+    for (openvdb::Index i = 0; i < FloatTree::LeafNodeType::SIZE; ++i) values[i] += 0.0f;
+  });
+}
+
+void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options,
+                   const char* action) {
+  if (solids.size() < 2) {
+    throw UsageError(fmt::format("{}: needs at least two solids, there {}", action,
+                                 solids.empty() ? "are none" : "is one"));
+  }
+  double bytes = 0;
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    if (solids[i].isEmpty()) {
+      throw InvalidInput(fmt::format("{}: operand {} has no surface; leave it out", action, i + 1));
+    }
+    bytes += static_cast<double>(solids[i].memoryUse());
+  }
+  requireMemory(2 * bytes, options.maxMemory, action);
+}
+
+/// All solids on the grid points of the finest, with the smallest half width.
+std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgOptions& options,
+                                  const char* action, std::vector<std::string>& notes) {
+  const auto finest = std::min_element(
+      solids.begin(), solids.end(),
+      [](const auto& a, const auto& b) { return a.voxelSize() < b.voxelSize() * (1 - 1e-9); });
+  double halfWidth = finest->halfWidth();
+  for (const NarrowBand& solid : solids) halfWidth = std::min(halfWidth, solid.halfWidth());
+  std::vector<NarrowBand> result;
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    if (shareTransform(vdb(*finest), vdb(solids[i]))) {
+      result.push_back(narrowed(solids[i], halfWidth));
+      continue;
+    }
+    result.push_back(resampleTo(solids[i], finest->indexToWorld(),
+                                {.halfWidth = halfWidth, .maxMemory = options.maxMemory}));
+    notes.push_back(fmt::format(
+        "{}: operand {} was resampled from voxels of {} to the grid of operand {} "
+        "with voxels of {}",
+        action, i + 1, solids[i].voxelSize(), finest - solids.begin() + 1, finest->voxelSize()));
+  }
+  // Half widths that agree to rounding must agree to the bit: the band ends where |φ| = background.
+  for (NarrowBand& solid : result) {
+    if (vdb(solid).background() == vdb(result.front()).background()) continue;
+    solid = narrowed(std::move(solid),
+                     std::min(result.front().halfWidth(), solid.halfWidth()) * (1 - 1e-7));
+  }
+  return result;
+}
+
+}  // namespace
+
+CsgSigns csgSigns(CsgOperation operation) {
+  switch (operation) {
+    case CsgOperation::Union:
+      return {1, 1, 1};
+    case CsgOperation::Intersection:
+      return {-1, -1, -1};
+    case CsgOperation::Difference:
+      return {-1, 1, -1};
+  }
+  return {1, 1, 1};
+}
+
+bool hasInside(const FloatGrid& grid) {
+  for (auto it = grid.tree().cbeginValueAll(); it; ++it)
+    if (*it < 0) return true;
+  return false;
+}
+
+NarrowBand narrowed(NarrowBand band, double halfWidth) {
+  if (halfWidth >= band.halfWidth() || shareWidth(halfWidth, band.halfWidth())) return band;
+  FloatGrid& grid = editVdb(band);
+  const auto background = static_cast<float>(halfWidth * band.voxelSize());
+  openvdb::tree::LeafManager<FloatTree> leaves(grid.tree());
+  leaves.foreach ([background](FloatTree::LeafNodeType& leaf, std::size_t) {
+    float* values = leaf.buffer().data();
+    for (openvdb::Index i = 0; i < FloatTree::LeafNodeType::SIZE; ++i) {
+      if (std::abs(values[i]) < background) continue;
+      values[i] = std::copysign(background, values[i]);
+      leaf.setValueOff(i);
+    }
+  });
+  for (auto it = grid.tree().beginValueOff(); it; ++it)
+    if (it.getDepth() < FloatTree::DEPTH - 1) it.setValue(std::copysign(background, *it));
+  grid.tree().root().setBackground(background, /*updateChildNodes=*/false);
+  openvdb::tools::pruneLevelSet(grid.tree());
+  return band;
+}
+
+FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& a, const FloatGrid& b) {
+  FloatGrid::Ptr result = a.deepCopy();
+  {
+    openvdb::tree::DynamicNodeManager<FloatTree> nodes(result->tree());
+    const openvdb::DeepCopy tag;
+    if (operation == CsgOperation::Union)
+      nodes.foreachTopDown(openvdb::tools::CsgUnionOp<FloatTree>(b.tree(), tag));
+    else if (operation == CsgOperation::Intersection)
+      nodes.foreachTopDown(openvdb::tools::CsgIntersectionOp<FloatTree>(b.tree(), tag));
+    else
+      nodes.foreachTopDown(openvdb::tools::CsgDifferenceOp<FloatTree>(b.tree(), tag));
+  }
+  if (operation == CsgOperation::Difference) clearSignOfZeros(result->tree());
+  correctSeam(*result, a, b, csgSigns(operation));
+  openvdb::tools::pruneLevelSet(result->tree());
+  return result;
+}
+
+CsgResult combine(CsgOperation operation, std::span<const NarrowBand> solids,
+                  const CsgOptions& options) {
+  const char* action = nameOf(operation);
+  requireSolids(solids, options, action);
+  CsgResult result;
+  const std::vector<NarrowBand> operands = onOneGrid(solids, options, action, result.notes);
+  result.band = operands.front();
+  for (std::size_t i = 1; i < operands.size(); ++i) {
+    report(options.progress, static_cast<double>(i - 1) / static_cast<double>(operands.size() - 1),
+           action);
+    FloatGrid::Ptr merged = mergePair(operation, vdb(result.band), vdb(operands[i]));
+    if (!hasInside(*merged)) {
+      throw InvalidInput(
+          operation == CsgOperation::Intersection
+              ? fmt::format(
+                    "{}: nothing is left, operand {} does not overlap what is common to those "
+                    "before it; check where they are",
+                    action, i + 1)
+              : fmt::format("{}: nothing is left after operand {} is taken away; check which is "
+                            "subtracted from which",
+                            action, i + 1));
+    }
+    result.band = makeBand(std::move(merged));
+  }
+  report(options.progress, 1, action);
+  return result;
+}
+
+namespace {
+NarrowBand combinePair(CsgOperation operation, const NarrowBand& a, const NarrowBand& b) {
+  const std::array<NarrowBand, 2> solids = {a, b};
+  return combine(operation, solids).band;
+}
+}  // namespace
+
+NarrowBand unite(const NarrowBand& a, const NarrowBand& b) {
+  return combinePair(CsgOperation::Union, a, b);
+}
+NarrowBand intersect(const NarrowBand& a, const NarrowBand& b) {
+  return combinePair(CsgOperation::Intersection, a, b);
+}
+NarrowBand subtract(const NarrowBand& a, const NarrowBand& b) {
+  return combinePair(CsgOperation::Difference, a, b);
+}
+
+bool shareGrid(const NarrowBand& a, const NarrowBand& b) {
+  return a.shared() && b.shared() && shareTransform(vdb(a), vdb(b)) &&
+         shareWidth(a.halfWidth(), b.halfWidth());
+}
+
+}  // namespace levelset

@@ -1,0 +1,37 @@
+#pragma once
+
+// Steps of constructive solid geometry on grids, for our own .cpp files.
+
+#include "levelset/solids/csg.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+
+/// Every operation is result × min(first × a, second × b) for signs of ± 1, so that what holds of a
+/// union's inside holds of an intersection's outside.
+struct CsgSigns {
+  float first, second, result;
+};
+[[nodiscard]] CsgSigns csgSigns(CsgOperation operation);
+
+/// a op b of two grids with one transform and background, re-distanced where min and max are none.
+/// The result may have no inside.
+[[nodiscard]] openvdb::FloatGrid::Ptr mergePair(CsgOperation operation, const openvdb::FloatGrid& a,
+                                                const openvdb::FloatGrid& b);
+
+/// True when any voxel or tile is negative.
+[[nodiscard]] bool hasInside(const openvdb::FloatGrid& grid);
+
+/// The same field in a narrower band; a half width (voxels) that is no smaller changes nothing.
+[[nodiscard]] NarrowBand narrowed(NarrowBand band, double halfWidth);
+
+/// Corrects the minimum of two distances where it is a bound only. Inside a union, a point whose
+/// nearest point on one solid lies within the other is further from the surface than either
+/// distance says: it takes the distance to the planes that both surfaces have in the cells about
+/// it, and to the line where these meet. Voxels beside the zero set keep their values, so that it
+/// stays.
+/// @param result  result × min(first × a, second × b), same transform and background as both
+void correctSeam(openvdb::FloatGrid& result, const openvdb::FloatGrid& a,
+                 const openvdb::FloatGrid& b, const CsgSigns& signs);
+
+}  // namespace levelset
