@@ -128,23 +128,41 @@ struct SampleBlock {
     return sum;
   }
 
+  /// Leaf by leaf: along each axis the samples lie in one leaf or in two.
   template <typename Accessor>
   void fetch(const Accessor& accessor) {
-    float* out = values.data();
-    if (isInOneLeaf()) {
-      const auto* leaf = accessor.probeConstLeaf(origin);
-      if (!leaf) {
-        values.fill(accessor.getValue(origin));
-        return;
+    openvdb::Coord from(0), to;
+    for (from[0] = 0; from[0] < N; from[0] = to[0]) {
+      to[0] = endOfLeaf(0, from[0]);
+      for (from[1] = 0; from[1] < N; from[1] = to[1]) {
+        to[1] = endOfLeaf(1, from[1]);
+        for (from[2] = 0; from[2] < N; from[2] = to[2]) {
+          to[2] = endOfLeaf(2, from[2]);
+          fetchPart(accessor, from, to);
+        }
       }
-      const float* samples = leaf->buffer().data() + leaf->coordToOffset(origin);
-      for (int x = 0; x < N; ++x)
-        for (int y = 0; y < N; ++y, out += N) std::copy_n(samples + x * 64 + y * 8, N, out);
-      return;
     }
-    for (int x = 0; x < N; ++x)
-      for (int y = 0; y < N; ++y)
-        for (int z = 0; z < N; ++z) *out++ = accessor.getValue(origin.offsetBy(x, y, z));
+  }
+
+  [[nodiscard]] int endOfLeaf(int axis, int from) const {
+    return std::min(N, from + 8 - ((origin[axis] + from) & 7));
+  }
+
+  template <typename Accessor>
+  void fetchPart(const Accessor& accessor, const openvdb::Coord& from, const openvdb::Coord& to) {
+    const openvdb::Coord first = origin + from;
+    const auto* leaf = accessor.probeConstLeaf(first);
+    const float* samples = leaf ? leaf->buffer().data() + leaf->coordToOffset(first) : nullptr;
+    const float tile = leaf ? 0.0f : accessor.getValue(first);
+    const int count = to[2] - from[2];
+    for (int x = from[0]; x < to[0]; ++x)
+      for (int y = from[1]; y < to[1]; ++y) {
+        float* out = values.data() + (x * N + y) * N + from[2];
+        if (samples)
+          std::copy_n(samples + (x - from[0]) * 64 + (y - from[1]) * 8, count, out);
+        else
+          std::fill_n(out, count, tile);
+      }
   }
 };
 

@@ -145,7 +145,11 @@ NarrowBand narrowed(NarrowBand band, double halfWidth) {
   return band;
 }
 
-FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& a, const FloatGrid& b) {
+FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const FloatGrid& second) {
+  const CsgSigns signs = csgSigns(operation);
+  const std::optional<ClosedPair> closed = closeContacts(first, second, signs);
+  const FloatGrid& a = closed ? *closed->a : first;
+  const FloatGrid& b = closed ? *closed->b : second;
   FloatGrid::Ptr result = a.deepCopy();
   {
     openvdb::tree::DynamicNodeManager<FloatTree> nodes(result->tree());
@@ -158,7 +162,7 @@ FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& a, const Float
       nodes.foreachTopDown(openvdb::tools::CsgDifferenceOp<FloatTree>(b.tree(), tag));
   }
   if (operation == CsgOperation::Difference) clearSignOfZeros(result->tree());
-  correctSeam(*result, a, b, csgSigns(operation));
+  correctSeam(*result, a, b, signs);
   openvdb::tools::pruneLevelSet(result->tree());
   return result;
 }

@@ -2,6 +2,8 @@
 
 // Steps of constructive solid geometry on grids, for our own .cpp files.
 
+#include <optional>
+
 #include "levelset/solids/csg.h"
 #include "levelset/vdb.h"
 
@@ -24,6 +26,16 @@ struct CsgSigns {
 
 /// The same field in a narrower band; a half width (voxels) that is no smaller changes nothing.
 [[nodiscard]] NarrowBand narrowed(NarrowBand band, double halfWidth);
+
+struct ClosedPair {
+  openvdb::FloatGrid::Ptr a, b;
+};
+/// Where two faces touch on grid points, both distances are zero there and their minimum would
+/// leave a crack without width. Gives both operands the depth of their neighbours at such points;
+/// empty when there are none.
+[[nodiscard]] std::optional<ClosedPair> closeContacts(const openvdb::FloatGrid& a,
+                                                      const openvdb::FloatGrid& b,
+                                                      const CsgSigns& signs);
 
 /// Corrects the minimum of two distances where it is a bound only. Inside a union, a point whose
 /// nearest point on one solid lies within the other is further from the surface than either

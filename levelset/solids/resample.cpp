@@ -153,6 +153,15 @@ class ResampleKernel {
       else
         leaf.setValueOff(n, std::copysign(background, value));
     };
+    // By the nearest sample alone, most of a leaf is out of the band.
+    const Coord nearest = Coord::round(p);
+    const double offset = (p - nearest.asVec3d()).length() * place_.sourceVoxel;
+    const float sample = accessor.getValue(nearest);
+    if (std::abs(static_cast<double>(sample)) * place_.scale >
+        1.1 * (static_cast<double>(background) + offset)) {
+      leaf.setValueOff(n, std::copysign(background, sample));
+      return;
+    }
     const SampleBlock<2> cell(accessor, p);
     if (cell.touches(source_.background())) {
       leaf.setValueOff(n, signAt(p, accessor));

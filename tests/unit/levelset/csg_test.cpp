@@ -147,6 +147,29 @@ TEST(Csg, OverlappingBoxesAreOneBox) {
   }
 }
 
+TEST(Csg, FacesThatTouchOnGridPointsLeaveNoCrack) {
+  const double h = 0.1;
+  // Sides on grid points and between them.
+  for (const double side : {2.0, 1.92}) {
+    const NarrowBand lower = makeBox(V3d(side, side, 1), V3d(0, 0, -0.5), h);
+    const NarrowBand upper = makeBox(V3d(side, side, 1), V3d(0, 0, 0.5), h);
+    const NarrowBand both = makeBox(V3d(side, side, 2), V3d(0), h);
+    const NarrowBand united = unite(lower, upper);
+    EXPECT_EQ(united.contentHash(), unite(upper, lower).contentHash());
+    EXPECT_EQ(united.activeVoxelCount(), both.activeVoxelCount());
+    const auto want = vdb(both).getConstAccessor(), have = vdb(united).getConstAccessor();
+    for (const openvdb::Coord& c : openvdb::CoordBBox(openvdb::Coord(-14), openvdb::Coord(14)))
+      ASSERT_NEAR(have.getValue(c), want.getValue(c), 1e-5) << c << " side " << side;
+    // Taking the touching solid away takes nothing.
+    EXPECT_EQ(measure(subtract(lower, upper)).volume, measure(lower).volume);
+  }
+}
+
+TEST(Csg, SpheresThatTouchInAPointStayTwo) {
+  const NarrowBand a = makeSphere(1, V3d(-1, 0, 0), 0.125), b = makeSphere(1, V3d(1, 0, 0), 0.125);
+  EXPECT_EQ(vdb(unite(a, b)).tree().getValue(openvdb::Coord(0)), 0);
+}
+
 TEST(Csg, VolumesOfTwoSpheresConverge) {
   // d = R: the lens has 5/16 of a sphere's volume, the union 27/16.
   double previous[2] = {0, 0};
