@@ -10,10 +10,12 @@ if [ -f "$models/bunny.obj" ] && [ -f "$models/dragon_vrip.ply.gz" ]; then
   "$levelsmith" -v --report "$out/report.json" \
     read "$models/bunny.obj" ! level-set --resolution 400 --as bunny \
     ! read "$models/dragon_vrip.ply.gz" ! transform --rotate 90,0,0 ! level-set --resolution 400 --as dragon \
-    ! patch @bunny --at 0,0,0 --size 0.9,0.5 --height auto --as back \
-    ! texture @bunny @dragon @back --map rbf --blend 3vx \
-    ! fill-cavities ! keep --largest 1 ! check ! write "$out/dragon-on-bunny.vdb" \
+    ! patch @bunny --height 0.33 --levels 6 --as back \
+      --corners "0.2515,0.2480,0.3524 0.6682,0.0214,0.3417 0.6738,0.0403,0.1237 0.2558,0.2757,0.1390" \
+    ! texture @bunny @dragon @back --map rbf --sink 2vx --blend 2vx --voxel 0.0025 \
+    ! fill-cavities ! keep --largest 1 --as both ! check ! write "$out/dragon-on-bunny.vdb" \
     ! render "$out/dragon-on-bunny.exr" --png "$out/dragon-on-bunny.png" --size 1280x960 \
+      --from 2.4,1.6,2.8 --to 0.12,0.1,0.1 --fov 30 \
     ! mesh ! write "$out/dragon-on-bunny.ply" ! measure
 else
   echo "The scanned models are not in data/models (./dev fetch brings them): a knot of tubes stands on a ball instead."

@@ -9,11 +9,11 @@ namespace levelset {
 
 enum class ExitCode : int {
   Done = 0,
-  Usage = 2,        ///< the call itself is wrong: a negative length, a missing operand
-  Input = 3,        ///< the data cannot be used as asked: truncated file, open mesh under `closed`
-  Resource = 4,     ///< memory, index range or image size would pass its limit
-  Numeric = 5,      ///< a numeric check failed
-  File = 6,         ///< missing, unreadable, not writable, disk full
+  Usage = 2,     ///< the call itself is wrong: a negative length, a missing operand
+  Input = 3,     ///< the data cannot be used as asked: truncated file, open mesh under `closed`
+  Resource = 4,  ///< memory, index range or image size would pass its limit
+  Numeric = 5,   ///< a numeric check failed
+  File = 6,      ///< missing, unreadable, not writable, disk full
   Interrupted = 130
 };
 

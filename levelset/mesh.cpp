@@ -23,7 +23,8 @@ double signedVolume(const TriMesh& mesh) {
 double surfaceArea(const TriMesh& mesh) {
   double twofold = 0;
   for (const auto& t : mesh.triangles) {
-    const Imath::V3d &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+    const Imath::V3d &a = mesh.positions[t[0]], &b = mesh.positions[t[1]],
+                     &c = mesh.positions[t[2]];
     twofold += (b - a).cross(c - a).length();
   }
   return twofold / 2;

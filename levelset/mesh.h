@@ -14,8 +14,8 @@ enum class CoordinatePrecision { Float, Double };
 
 /// An indexed triangle mesh; polygons are split when read. Counter-clockwise seen from outside.
 struct TriMesh {
-  std::vector<Imath::V3d> positions;                   ///< n × 3, world units, finite
-  std::vector<std::array<std::uint32_t, 3>> triangles; ///< m × 3, each index < n
+  std::vector<Imath::V3d> positions;                    ///< n × 3, world units, finite
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< m × 3, each index < n
   CoordinatePrecision precision = CoordinatePrecision::Double;
 
   [[nodiscard]] bool isEmpty() const { return triangles.empty(); }
@@ -24,8 +24,8 @@ struct TriMesh {
 /// Bounding box of all vertices; empty for a mesh without vertices.
 [[nodiscard]] Imath::Box3d bounds(const TriMesh& mesh);
 
-/// Signed volume by the divergence theorem, world units³; positive for a closed mesh that faces out.
-/// Summed about the centre of the bounding box, in index order.
+/// Signed volume by the divergence theorem, world units³; positive for a closed mesh that faces
+/// out. Summed about the centre of the bounding box, in index order.
 [[nodiscard]] double signedVolume(const TriMesh& mesh);
 
 /// Sum of the triangles' areas, world units².

@@ -21,9 +21,8 @@ using LeafNode = openvdb::FloatTree::LeafNodeType;
 bool isSimilarity(const openvdb::math::Transform& transform) {
   if (!transform.isLinear()) return false;
   const openvdb::math::Mat4d m = transform.baseMap()->getAffineMap()->getMat4();
-  const openvdb::Vec3d rows[3] = {{m[0][0], m[0][1], m[0][2]},
-                                  {m[1][0], m[1][1], m[1][2]},
-                                  {m[2][0], m[2][1], m[2][2]}};
+  const openvdb::Vec3d rows[3] = {
+      {m[0][0], m[0][1], m[0][2]}, {m[1][0], m[1][1], m[1][2]}, {m[2][0], m[2][1], m[2][2]}};
   const double squaredScale = rows[0].lengthSqr();
   const double tolerance = 1e-6 * squaredScale;
   if (!(squaredScale > 0) || !std::isfinite(squaredScale)) return false;
@@ -34,7 +33,9 @@ bool isSimilarity(const openvdb::math::Transform& transform) {
   return rows[0].cross(rows[1]).dot(rows[2]) > 0;
 }
 
-std::string coordText(const Coord& c) { return fmt::format("[{}, {}, {}]", c.x(), c.y(), c.z()); }
+std::string coordText(const Coord& c) {
+  return fmt::format("[{}, {}, {}]", c.x(), c.y(), c.z());
+}
 
 std::uint64_t mix(std::uint64_t hash, std::uint64_t word) {
   hash ^= word + 0x9e3779b97f4a7c15ull + (hash << 6) + (hash >> 2);
@@ -56,9 +57,13 @@ std::uint64_t mixBytes(std::uint64_t hash, const T* data, std::size_t count) {
 
 }  // namespace
 
-bool NarrowBand::isEmpty() const { return !grid_ || grid_->grid->tree().empty() || !activeVoxelCount(); }
+bool NarrowBand::isEmpty() const {
+  return !grid_ || grid_->grid->tree().empty() || !activeVoxelCount();
+}
 
-double NarrowBand::voxelSize() const { return grid_ ? grid_->grid->voxelSize()[0] : 0; }
+double NarrowBand::voxelSize() const {
+  return grid_ ? grid_->grid->voxelSize()[0] : 0;
+}
 
 double NarrowBand::halfWidth() const {
   return grid_ ? static_cast<double>(grid_->grid->background()) / voxelSize() : 0;
@@ -68,7 +73,9 @@ std::size_t NarrowBand::activeVoxelCount() const {
   return grid_ ? grid_->grid->activeVoxelCount() : 0;
 }
 
-std::size_t NarrowBand::memoryUse() const { return grid_ ? grid_->grid->memUsage() : 0; }
+std::size_t NarrowBand::memoryUse() const {
+  return grid_ ? grid_->grid->memUsage() : 0;
+}
 
 Imath::M44d NarrowBand::indexToWorld() const {
   Imath::M44d result;
@@ -143,31 +150,33 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action) {
   if (!grid) throw InvalidInput(fmt::format("{}: there is no float grid", action));
   const std::string name = grid->getName().empty() ? "(unnamed)" : grid->getName();
   if (grid->getGridClass() != openvdb::GRID_LEVEL_SET) {
-    throw InvalidInput(fmt::format(
-        "{}: grid '{}' is of class '{}', not a level set; convert it before it is read", action, name,
-        FloatGrid::gridClassToString(grid->getGridClass())));
+    throw InvalidInput(
+        fmt::format("{}: grid '{}' is of class '{}', not a level set; convert it before it is read",
+                    action, name, FloatGrid::gridClassToString(grid->getGridClass())));
   }
   if (!isSimilarity(grid->transform())) {
-    throw InvalidInput(fmt::format(
-        "{}: the transform of grid '{}' shears, mirrors or scales its axes differently; resample it to "
-        "uniform voxels first",
-        action, name));
+    throw InvalidInput(
+        fmt::format("{}: the transform of grid '{}' shears, mirrors or scales its axes "
+                    "differently; resample it to "
+                    "uniform voxels first",
+                    action, name));
   }
   const float background = grid->background();
   if (!(background > 0) || !std::isfinite(background)) {
-    throw InvalidInput(fmt::format("{}: the background of grid '{}' is {}, a level set needs a "
-                                   "positive one",
-                                   action, name, background));
+    throw InvalidInput(
+        fmt::format("{}: the background of grid '{}' is {}, a level set needs a "
+                    "positive one",
+                    action, name, background));
   }
   grid->tree().voxelizeActiveTiles();
   for (auto leaf = grid->tree().beginLeaf(); leaf; ++leaf) {
     float* values = leaf->buffer().data();
     for (openvdb::Index i = 0; i < LeafNode::SIZE; ++i) {
       if (!std::isfinite(values[i])) {
-        throw InvalidInput(fmt::format("{}: grid '{}' holds {} at index {}; repair the file or make it "
-                                       "again",
-                                       action, name, values[i],
-                                       coordText(leaf->offsetToGlobalCoord(i))));
+        throw InvalidInput(
+            fmt::format("{}: grid '{}' holds {} at index {}; repair the file or make it "
+                        "again",
+                        action, name, values[i], coordText(leaf->offsetToGlobalCoord(i))));
       }
       if (!leaf->isValueOn(i)) values[i] = std::signbit(values[i]) ? -background : background;
     }

@@ -16,8 +16,8 @@ struct VdbGrid;  // levelset/vdb.h, for .cpp files only
 /// negative inside, |∇φ| ≈ 1 in the band, ± background elsewhere.
 ///
 /// A value: copies share one grid and show it as const, so they are cheap and nobody sees another's
-/// edit. Grid points sit at integer index coordinates; the transform to world space is a rotation, a
-/// uniform scale and a translation. The bits of the tree do not depend on the number of threads.
+/// edit. Grid points sit at integer index coordinates; the transform to world space is a rotation,
+/// a uniform scale and a translation. The bits of the tree do not depend on the number of threads.
 class NarrowBand {
  public:
   NarrowBand() = default;
@@ -26,7 +26,8 @@ class NarrowBand {
   [[nodiscard]] bool isEmpty() const;
   /// Edge of a voxel, world units.
   [[nodiscard]] double voxelSize() const;
-  /// Distance to which the band reaches on each side, in voxels; background = halfWidth × voxelSize.
+  /// Distance to which the band reaches on each side, in voxels; background = halfWidth ×
+  /// voxelSize.
   [[nodiscard]] double halfWidth() const;
   [[nodiscard]] std::size_t activeVoxelCount() const;
   /// Bytes that the tree takes.

@@ -6,9 +6,9 @@
 
 namespace levelset {
 
-/// Called by long operators with a fraction in [0, 1] that never falls; return false to cancel, upon
-/// which the operator throws Cancelled and leaves nothing behind. Calls come one at a time, though
-/// not always from the thread that called the operator. Empty: nobody asks.
+/// Called by long operators with a fraction in [0, 1] that never falls; return false to cancel,
+/// upon which the operator throws Cancelled and leaves nothing behind. Calls come one at a time,
+/// though not always from the thread that called the operator. Empty: nobody asks.
 using Progress = std::function<bool(double)>;
 
 /// Throws Cancelled if `progress` is set and answers false.

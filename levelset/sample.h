@@ -13,11 +13,12 @@ enum class Interpolation {
   Tricubic  ///< Catmull-Rom, 64 samples: passes through the grid values, C¹
 };
 
-/// Reads a band at world positions. Caches the path through the tree: cheap to make, one per thread.
-/// Outside the band the value is ± background and the gradient zero.
+/// Reads a band at world positions. Caches the path through the tree: cheap to make, one per
+/// thread. Outside the band the value is ± background and the gradient zero.
 class BandSampler {
  public:
-  explicit BandSampler(const NarrowBand& band, Interpolation interpolation = Interpolation::Trilinear);
+  explicit BandSampler(const NarrowBand& band,
+                       Interpolation interpolation = Interpolation::Trilinear);
   ~BandSampler();
   BandSampler(BandSampler&&) noexcept;
   BandSampler& operator=(BandSampler&&) noexcept;

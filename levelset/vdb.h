@@ -34,8 +34,12 @@ struct VdbAccess {
 ///         or a transform that is not a rotation, uniform scale and translation
 [[nodiscard]] NarrowBand importBand(openvdb::FloatGrid::Ptr grid, const char* action);
 
-[[nodiscard]] inline Imath::V3d toImath(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
-[[nodiscard]] inline openvdb::Vec3d toVdb(const Imath::V3d& v) { return {v.x, v.y, v.z}; }
+[[nodiscard]] inline Imath::V3d toImath(const openvdb::Vec3d& v) {
+  return {v.x(), v.y(), v.z()};
+}
+[[nodiscard]] inline openvdb::Vec3d toVdb(const Imath::V3d& v) {
+  return {v.x, v.y, v.z};
+}
 
 /// An axis-aligned transform: world = voxelSize × index.
 [[nodiscard]] openvdb::math::Transform::Ptr uniformTransform(double voxelSize);

@@ -176,7 +176,8 @@ std::vector<char> encodePng(const Image& image) {
 
 // === Reading
 
-/// ZIP packs about 1000 to 1 at best; a header that promises far more than the file holds is damaged.
+/// ZIP packs about 1000 to 1 at best; a header that promises far more than the file holds is
+/// damaged.
 constexpr double kMaxCompression = 5000;
 
 Image readOpenExr(Imf::InputFile& file, const std::string& name, double fileBytes) {

@@ -53,7 +53,8 @@ void watch(sigset_t signals, std::size_t maxBytes) {
 
 void startWatch(std::size_t maxBytes) {
   std::signal(SIGPIPE, SIG_IGN);
-  // A shell starts background jobs with SIGINT ignored; a signal that is ignored never reaches the watch.
+  // A shell starts background jobs with SIGINT ignored; a signal that is ignored never reaches the
+  // watch.
   std::signal(SIGINT, SIG_DFL);
   sigset_t signals;
   sigemptyset(&signals);

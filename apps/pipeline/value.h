@@ -20,7 +20,7 @@ enum class Kind { Mesh, Band, Patch };
 /// What is known of a value before it is computed: enough to resolve lengths and estimate cost.
 struct Plan {
   Kind kind = Kind::Band;
-  Imath::Box3d bounds = {};         ///< of the zero set or the vertices, world units
+  Imath::Box3d bounds = {};    ///< of the zero set or the vertices, world units
   double area = 0;             ///< of the surface, world units²
   double voxelSize = 0;        ///< bands only
   double halfWidth = 0;        ///< voxels, bands only

@@ -21,10 +21,10 @@ enum class Nesting {
 };
 
 struct MeshToBandOptions {
-  double halfWidth = 3;               ///< voxels, at least 1
+  double halfWidth = 3;  ///< voxels, at least 1
   SignMode sign = SignMode::Auto;
-  Nesting nesting = Nesting::Parity;  ///< read under Closed only
-  bool signAnyway = false;            ///< accept a sign that the certificate calls a guess
+  Nesting nesting = Nesting::Parity;    ///< read under Closed only
+  bool signAnyway = false;              ///< accept a sign that the certificate calls a guess
   bool searchSelfIntersections = true;  ///< when false, Auto trusts the mesh to have none
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
@@ -32,14 +32,14 @@ struct MeshToBandOptions {
 
 /// Why the sign may be trusted, or not.
 struct SignCertificate {
-  bool closed = false;                 ///< every edge has exactly two faces
-  std::size_t boundaryEdges = 0;       ///< edges with one face
-  std::size_t nonManifoldEdges = 0;    ///< edges with three or more faces
+  bool closed = false;                    ///< every edge has exactly two faces
+  std::size_t boundaryEdges = 0;          ///< edges with one face
+  std::size_t nonManifoldEdges = 0;       ///< edges with three or more faces
   std::ptrdiff_t selfIntersections = -1;  ///< pairs of triangles; -1: not searched
-  SignMode method = SignMode::Auto;    ///< Closed or Winding: what was used
-  bool flipped = false;                ///< a soup that faced inwards was turned
-  double ambiguousShare = 0;           ///< of voxels next to the zero set, |w − 0.5| < 0.25
-  std::size_t droppedTriangles = 0;    ///< without area, or repeated exactly
+  SignMode method = SignMode::Auto;       ///< Closed or Winding: what was used
+  bool flipped = false;                   ///< a soup that faced inwards was turned
+  double ambiguousShare = 0;              ///< of voxels next to the zero set, |w − 0.5| < 0.25
+  std::size_t droppedTriangles = 0;       ///< without area, or repeated exactly
 };
 
 /// The certificate as one line for people.
@@ -53,14 +53,16 @@ struct MeshToBandResult {
 /// @param mesh       finite coordinates; any soup under Winding
 /// @param voxelSize  world units, positive and finite; grid points sit at its integer multiples
 /// @return every voxel whose centre lies within halfWidth of the mesh, at its exact distance
-/// @throws UsageError for a voxel size or half width out of range; InvalidInput when the mesh cannot
+/// @throws UsageError for a voxel size or half width out of range; InvalidInput when the mesh
+/// cannot
 ///         be used as asked (open under Closed, ambiguous sign, voxel larger than the object,
 ///         coordinates coarser than voxel/8); ResourceLimit for memory or an index beyond 32 bits
 [[nodiscard]] MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
                                           const MeshToBandOptions& options = {});
 
 /// Pairs of triangles that cross each other, shared vertices and edges apart. Exact predicates.
-[[nodiscard]] std::size_t countSelfIntersections(const TriMesh& mesh, const Progress& progress = {});
+[[nodiscard]] std::size_t countSelfIntersections(const TriMesh& mesh,
+                                                 const Progress& progress = {});
 
 /// Generalised winding number of the mesh about `point`, by direct summation: the reference.
 [[nodiscard]] double windingNumber(const TriMesh& mesh, const Imath::V3d& point);

@@ -8,9 +8,9 @@
 namespace levelset {
 
 struct CheckItem {
-  std::string name;     ///< "positive background"
+  std::string name;  ///< "positive background"
   bool passed = false;
-  std::string detail;   ///< what was found where, when it failed
+  std::string detail;  ///< what was found where, when it failed
 };
 
 struct CheckReport {
@@ -22,8 +22,8 @@ struct CheckReport {
 
 /// The nine checks of openvdb::tools::checkLevelSet, one item each, and the eikonal residual of the
 /// band (fails when its mean passes 0.1). They differ from OpenVDB where those fault sound bands: a
-/// half width of one voxel is enough, and beside an edge of the solid, where one-sided slopes differ,
-/// any between them may be the right one.
+/// half width of one voxel is enough, and beside an edge of the solid, where one-sided slopes
+/// differ, any between them may be the right one.
 [[nodiscard]] CheckReport check(const NarrowBand& solid);
 
 }  // namespace levelset

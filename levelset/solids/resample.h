@@ -16,8 +16,8 @@ struct ResampleOptions {
 };
 
 /// The same solid on the axis-aligned grid of integer multiples of `voxelSize`: tricubic
-/// (Catmull-Rom) where the source band allows, re-distanced towards the rim of the new band. Per leaf
-/// block, so the bits do not depend on the number of threads.
+/// (Catmull-Rom) where the source band allows, re-distanced towards the rim of the new band. Per
+/// leaf block, so the bits do not depend on the number of threads.
 [[nodiscard]] NarrowBand resample(const NarrowBand& solid, double voxelSize,
                                   const ResampleOptions& options = {});
 

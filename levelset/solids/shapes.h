@@ -5,8 +5,8 @@
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 
-/// Solids made from formulas: exact signed distances on both sides, in a band on the axis-aligned grid
-/// of integer multiples of the voxel size. Sizes are full extents, world units.
+/// Solids made from formulas: exact signed distances on both sides, in a band on the axis-aligned
+/// grid of integer multiples of the voxel size. Sizes are full extents, world units.
 namespace levelset {
 
 struct ShapeOptions {
@@ -16,7 +16,8 @@ struct ShapeOptions {
 };
 
 /// All throw UsageError for sizes, voxel size or half width that are not positive and finite,
-/// InvalidInput when the voxel is larger than the shape, ResourceLimit for memory or 32-bit indices.
+/// InvalidInput when the voxel is larger than the shape, ResourceLimit for memory or 32-bit
+/// indices.
 [[nodiscard]] NarrowBand makeSphere(double radius, const Imath::V3d& center, double voxelSize,
                                     const ShapeOptions& options = {});
 [[nodiscard]] NarrowBand makeBox(const Imath::V3d& size, const Imath::V3d& center, double voxelSize,

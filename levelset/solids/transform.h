@@ -8,8 +8,10 @@
 
 namespace levelset {
 
-/// Moves a solid exactly, by changing the transform of its grid; a uniform scale scales the distances.
-/// @param matrix  rotation, uniform scale, translation; `world' = world * matrix` (Imath's row vectors)
+/// Moves a solid exactly, by changing the transform of its grid; a uniform scale scales the
+/// distances.
+/// @param matrix  rotation, uniform scale, translation; `world' = world * matrix` (Imath's row
+/// vectors)
 /// @throws InvalidInput for a matrix that shears, mirrors or scales unevenly: bake it
 [[nodiscard]] NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix);
 

@@ -1,4 +1,5 @@
-// Operators beside OpenVDB's own on the same grid, in one run. Items are active voxels of the input.
+// Operators beside OpenVDB's own on the same grid, in one run. Items are active voxels of the
+// input.
 
 #include <benchmark/benchmark.h>
 #include <openvdb/tools/Composite.h>
@@ -21,7 +22,8 @@ using levelset::NarrowBand;
 
 /// A ball whose diameter is range(0) voxels.
 NarrowBand ball(const benchmark::State& state, double shift = 0) {
-  return levelset::makeSphere(1, Imath::V3d(shift, 0, 0), 2.0 / static_cast<double>(state.range(0)));
+  return levelset::makeSphere(1, Imath::V3d(shift, 0, 0),
+                              2.0 / static_cast<double>(state.range(0)));
 }
 
 void countVoxels(benchmark::State& state, const NarrowBand& band) {
@@ -65,7 +67,8 @@ void BM_Redistance(benchmark::State& state) {
 }
 void BM_RedistanceOpenVdb(benchmark::State& state) {
   const NarrowBand a = ball(state);
-  for (auto _ : state) benchmark::DoNotOptimize(openvdb::tools::levelSetRebuild(levelset::vdb(a), 0.f, 3.f));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(openvdb::tools::levelSetRebuild(levelset::vdb(a), 0.f, 3.f));
   countVoxels(state, a);
 }
 
@@ -85,9 +88,13 @@ void BM_MeshOpenVdb(benchmark::State& state) {
   countVoxels(state, a);
 }
 
-#define LEVELSMITH_BENCH(name)                                                                  \
+#define LEVELSMITH_BENCH(name)                                                                 \
   BENCHMARK(name)->Arg(256)->Arg(512)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime(); \
-  BENCHMARK(name##OpenVdb)->Arg(256)->Arg(512)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()
+  BENCHMARK(name##OpenVdb)                                                                     \
+      ->Arg(256)                                                                               \
+      ->Arg(512)                                                                               \
+      ->Unit(benchmark::kMillisecond)                                                          \
+      ->MeasureProcessCPUTime()
 
 LEVELSMITH_BENCH(BM_Union);
 LEVELSMITH_BENCH(BM_Redistance);

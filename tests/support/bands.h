@@ -13,7 +13,8 @@ namespace support {
 
 /// Samples a signed distance (world) on the axis-aligned grid of `voxelSize` inside `box`.
 inline levelset::NarrowBand sampleBand(const std::function<double(const Imath::V3d&)>& phi,
-                                       const Imath::Box3d& box, double voxelSize, double halfWidth = 3) {
+                                       const Imath::Box3d& box, double voxelSize,
+                                       double halfWidth = 3) {
   const auto grid = levelset::emptyLevelSet(levelset::uniformTransform(voxelSize), halfWidth);
   const double background = halfWidth * voxelSize;
   auto accessor = grid->getAccessor();

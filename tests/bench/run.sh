@@ -1,0 +1,7 @@
+#!/bin/sh
+# Every benchmark beside its peer. run.sh BUILD
+set -eu
+build=$1
+here=$(dirname "$0")
+"$build/tests/operators_bench"
+"$here/mesh_to_band.sh" "$build/tests/mesh_to_band_bench" "$here/../../data/models/dragon_vrip.ply.gz"
