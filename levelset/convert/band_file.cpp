@@ -10,7 +10,7 @@
 #include <system_error>
 
 #include "levelset/convert/byte_io.h"
-#include "levelset/convert/nano_file.h"
+#include "levelset/convert/nano_file_vdb.h"
 #include "levelset/convert/vdb_layout.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"

@@ -100,7 +100,7 @@ void MeshBuilder::addFace(std::span<const std::uint64_t> corners, Place place, c
   }
   if (corners.size() > 3)
     polygons_.push_back({mesh_.triangles.size(), corners.size(), place.number});
-  // A fan for now: it holds the corners until all vertices are known.
+  // A fan holds the corners until all vertices are known.
   for (std::size_t i = 2; i < corners.size(); ++i) {
     mesh_.triangles.push_back({static_cast<std::uint32_t>(corners[0]),
                                static_cast<std::uint32_t>(corners[i - 1]),
