@@ -66,7 +66,9 @@ double NarrowBand::voxelSize() const {
 }
 
 double NarrowBand::halfWidth() const {
-  return grid_ ? static_cast<double>(grid_->grid->background()) / voxelSize() : 0;
+  if (!grid_) return 0;
+  // The background is stored as a float: the ratio is known no better than that.
+  return static_cast<double>(grid_->grid->background() / static_cast<float>(voxelSize()));
 }
 
 std::size_t NarrowBand::activeVoxelCount() const {
