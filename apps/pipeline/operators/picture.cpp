@@ -71,6 +71,7 @@ void addPictureOperators(std::vector<Operator>& all) {
             .doc = ".exr or .png, or -",
             .required = true,
             .position = 0},
+           {.name = "png", .type = ParamType::Path, .doc = "write the colours to this .png too"},
            {.name = "renderer",
             .type = ParamType::Choice,
             .doc = "which one draws",

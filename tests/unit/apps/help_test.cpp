@@ -33,8 +33,9 @@ TEST_F(Help, EveryDeclarationIsWhole) {
     for (const auto& param : op.params) {
       EXPECT_TRUE(params.insert(param.name).second) << op.name << " --" << param.name;
       EXPECT_FALSE(param.doc.empty()) << op.name << " --" << param.name;
-      if (!param.fallback.empty())
+      if (!param.fallback.empty()) {
         EXPECT_NO_THROW(pipeline::checkText(param, param.fallback, op.name));
+      }
     }
   }
 }
