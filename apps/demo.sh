@@ -15,7 +15,7 @@ if [ -f "$models/bunny.obj" ] && [ -f "$models/dragon_vrip.ply.gz" ]; then
     ! texture @bunny @dragon @back --map rbf --sink 2vx --blend 2vx --voxel 0.0025 \
     ! fill-cavities ! keep --largest 1 --as both ! check ! write "$out/dragon-on-bunny.vdb" \
     ! render "$out/dragon-on-bunny.exr" --png "$out/dragon-on-bunny.png" --size 1280x960 \
-      --from 2.4,1.6,2.8 --to 0.12,0.1,0.1 --fov 30 \
+      --from 2.7,1.5,2.5 --to 0.08,-0.02,0.05 --fov 38 \
     ! mesh ! write "$out/dragon-on-bunny.ply" ! measure
 else
   echo "The scanned models are not in data/models (./dev fetch brings them): a knot of tubes stands on a ball instead."

@@ -105,7 +105,8 @@ TEST_F(Refusal, MeshesThatCannotBeUsedAsAskedAreThree) {
   writeFile("triangle.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   EXPECT_REFUSED(levelsmith(toBand("triangle.obj")), 3, "level-set");
   writeFile("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
-  EXPECT_REFUSED(levelsmith(toBand("open.obj", "--voxel 0.05 --sign closed")), 3, "boundary");
+  EXPECT_REFUSED(levelsmith(toBand("open.obj", "--voxel 0.05 --sign closed")), 3,
+                 "edges have one face");
   writeMoebius("moebius.obj");
   EXPECT_REFUSED(levelsmith(toBand("moebius.obj", "--voxel 0.05 --sign closed")), 3, "level-set");
   EXPECT_REFUSED(levelsmith(toBand("moebius.obj", "--voxel 0.05 --sign winding")), 3, "level-set");

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <ostream>
 #include <string>
 
 #include "tests/support/shell.h"
@@ -13,6 +14,11 @@ struct Case {
   const char* chain;  ///< what is repeated; writes `out` + extension
   const char* output;
 };
+
+// Named in full by the tests' output, rather than as bytes.
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.chain;
+}
 
 class Repeat : public support::ShellTest, public ::testing::WithParamInterface<Case> {};
 
