@@ -88,7 +88,7 @@ struct Reader {
     } else {
       if (atEnd() || atBang() || tokens[next].starts_with("--")) {
         throw UsageError(
-            fmt::format("{}: needs a value: --{} {}", where, param.name, placeholder(param)));
+            fmt::format("{}: needs a value: --{} {}", where, param.name, valueForm(param)));
       }
       value = tokens[next++];
     }
@@ -150,7 +150,7 @@ Action readAction(Reader& reader) {
   for (const Param& param : op.params) {
     if (param.required && !action.options.contains(param.name)) {
       throw UsageError(fmt::format("{}: needs {}{} {}", op.name, param.position >= 0 ? "" : "--",
-                                   param.name, placeholder(param)));
+                                   param.name, valueForm(param)));
     }
   }
   if (const auto it = action.options.find("as"); it != action.options.end()) {

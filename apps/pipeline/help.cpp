@@ -15,7 +15,7 @@ namespace {
 using levelset::UsageError;
 
 std::string optionForm(const Param& param) {
-  const std::string value = placeholder(param);
+  const std::string value = valueForm(param);
   const std::string name = param.position >= 0 ? param.name : "--" + param.name;
   return value.empty() || param.position >= 0 ? name : name + " " + value;
 }

@@ -12,7 +12,7 @@ namespace pipeline {
 
 using levelset::UsageError;
 
-std::string placeholder(const Param& param) {
+std::string valueForm(const Param& param) {
   switch (param.type) {
     case ParamType::Flag:
       return "";

@@ -47,7 +47,7 @@ struct Param {
 };
 
 /// The form of a value in help, e.g. "L" for a length.
-[[nodiscard]] std::string placeholder(const Param& param);
+[[nodiscard]] std::string valueForm(const Param& param);
 
 /// Throws UsageError when `text` cannot be a value of `param`. @param where  "action: --name"
 void checkText(const Param& param, const std::string& text, const std::string& where);
