@@ -32,9 +32,9 @@ function(levelsmith_module name)
           DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/Levelsmith FILE Levelsmith_${name}.cmake)
 endfunction()
 
-# Files that take part in precompilation of levelset/vdb.h (dev preset): the heaviest include we have.
+# levelset/vdb.h is the heaviest include we have: precompiled where files are compiled one by one.
 function(levelsmith_precompile_vdb name)
-  if(LEVELSMITH_PCH)
+  if(LEVELSMITH_PCH AND NOT CMAKE_UNITY_BUILD)
     target_precompile_headers(${name} PRIVATE ${PROJECT_SOURCE_DIR}/levelset/vdb.h)
   endif()
 endfunction()

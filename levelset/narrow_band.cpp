@@ -199,8 +199,12 @@ openvdb::math::Transform::Ptr uniformTransform(double voxelSize) {
 }
 
 FloatGrid::Ptr emptyLevelSet(openvdb::math::Transform::Ptr transform, double halfWidth) {
-  const double voxelSize = transform->voxelSize()[0];
-  FloatGrid::Ptr grid = FloatGrid::create(static_cast<float>(halfWidth * voxelSize));
+  const double width = halfWidth * transform->voxelSize()[0];
+  // Rounded up: a band of three voxels must not become one of 2.9999999, which OpenVDB's own check
+  // refuses.
+  float background = static_cast<float>(width);
+  if (background < width) background = std::nextafter(background, INFINITY);
+  FloatGrid::Ptr grid = FloatGrid::create(background);
   grid->setTransform(std::move(transform));
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   return grid;

@@ -12,6 +12,10 @@ namespace levelset {
 
 struct VdbGrid;  // levelset/vdb.h, for .cpp files only
 
+/// Index coordinates stay below this, so that those of the nodes around them do not overflow 32
+/// bits.
+inline constexpr double kIndexLimit = 2147483648.0 - 8192;
+
 /// A solid as a signed distance in a narrow band on a sparse grid: `float` values in world units,
 /// negative inside, |∇φ| ≈ 1 in the band, ± background elsewhere.
 ///

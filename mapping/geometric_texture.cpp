@@ -23,9 +23,9 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-constexpr const char* kAction = "texture";
-// A voxel finer than the base's by less than this is not worth resampling the base for.
-constexpr double kWorthRefining = 0.8;
+constexpr const char* kTexture = "texture";
+// The stretch is sampled, and known to about this: a flat patch keeps the base's own grid.
+constexpr double kStretchError = 0.01;
 // Voxels of the result that the texture's band has to reach on each side, so that the high-order
 // interpolant beside the zero set reads nothing but distances.
 constexpr double kBandNeeded = 3;
@@ -35,29 +35,29 @@ void checkArguments(const NarrowBand& base, const NarrowBand& texture, const Pat
   const auto requirePositive = [](double value, const char* name) {
     if (!(value > 0) || !std::isfinite(value)) {
       throw UsageError(
-          fmt::format("{}: the {} is {}; give a positive number", kAction, name, value));
+          fmt::format("{}: the {} is {}; give a positive number", kTexture, name, value));
     }
   };
   if (options.voxelSize) requirePositive(*options.voxelSize, "voxel size");
   if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth)) {
-    throw UsageError(
-        fmt::format("{}: the half width is {}; give at least 1 voxel", kAction, options.halfWidth));
+    throw UsageError(fmt::format("{}: the half width is {}; give at least 1 voxel", kTexture,
+                                 options.halfWidth));
   }
   if (options.sink && !std::isfinite(*options.sink)) {
-    throw UsageError(fmt::format("{}: the sink is {}; give a length", kAction, *options.sink));
+    throw UsageError(fmt::format("{}: the sink is {}; give a length", kTexture, *options.sink));
   }
   if (!(options.blend >= 0) || !std::isfinite(options.blend)) {
-    throw UsageError(fmt::format("{}: the blend radius is {}; give a length of at least 0", kAction,
-                                 options.blend));
+    throw UsageError(fmt::format("{}: the blend radius is {}; give a length of at least 0",
+                                 kTexture, options.blend));
   }
   if (base.isEmpty() || texture.isEmpty()) {
     throw InvalidInput(
-        fmt::format("{}: the {} has no surface; give a solid with at least one voxel", kAction,
+        fmt::format("{}: the {} has no surface; give a solid with at least one voxel", kTexture,
                     base.isEmpty() ? "base" : "texture"));
   }
   if (patch.levels.size() < 2 || !(patch.height > 0)) {
     throw InvalidInput(
-        fmt::format("{}: the patch has no levels of particles; make it with `patch`", kAction));
+        fmt::format("{}: the patch has no levels of particles; make it with `patch`", kTexture));
   }
 }
 
@@ -70,7 +70,7 @@ void checkPatchOnBase(const NarrowBand& base, const Patch& patch) {
           fmt::format("{}: the patch does not lie on the base, at ({:.6g}, {:.6g}, {:.6g}) they "
                       "are {:.3g} voxels or "
                       "more apart; make the patch on this base",
-                      kAction, p.x, p.y, p.z, distance));
+                      kTexture, p.x, p.y, p.z, distance));
     }
   }
 }
@@ -82,13 +82,13 @@ Box3d chooseBox(const NarrowBand& texture, const TextureOptions& options) {
     throw InvalidInput(
         fmt::format("{}: the texture box has no volume, its size is {:.6g} × {:.6g} × "
                     "{:.6g}; give a low and a high corner",
-                    kAction, size.x, size.y, size.z));
+                    kTexture, size.x, size.y, size.z));
   }
   if (options.textureBox && !box.intersects(texture.zeroSetBounds())) {
     throw InvalidInput(
         fmt::format("{}: the texture box holds nothing of the texture; give one that its "
                     "surface passes through",
-                    kAction));
+                    kTexture));
   }
   return box;
 }
@@ -103,7 +103,7 @@ void checkFolds(const Distortion& distortion, TextureReport& report, bool allowF
       distortion.foldUvw.y, distortion.foldUvw.z, distortion.minJacobian);
   if (!allowFolds) {
     throw InvalidInput(
-        fmt::format("{}: {}; lower its height or choose a flatter place", kAction, sentence));
+        fmt::format("{}: {}; lower its height or choose a flatter place", kTexture, sentence));
   }
   report.notes.push_back(sentence);
 }
@@ -112,7 +112,7 @@ double chooseVoxelSize(const NarrowBand& base, const NarrowBand& texture, double
                        const TextureOptions& options) {
   if (options.voxelSize) return *options.voxelSize;
   const double fine = texture.voxelSize() * minStretch;
-  return fine < kWorthRefining * base.voxelSize() ? fine : base.voxelSize();
+  return fine < (1 - kStretchError) * base.voxelSize() ? fine : base.voxelSize();
 }
 
 /// The base's own grid where the voxels agree, so that merging needs no resampling.
@@ -133,7 +133,7 @@ void requireResult(const NarrowBand& texture, double voxelSize, double meanStret
   const double voxels =
       static_cast<double>(texture.activeVoxelCount()) * std::max(1e-3, finer * finer) * width;
   constexpr double kBytesPerVoxel = 40;  // active share of a block, and three fields of them
-  levelset::requireMemory(voxels * kBytesPerVoxel, options.maxMemory, kAction);
+  levelset::requireMemory(voxels * kBytesPerVoxel, options.maxMemory, kTexture);
 }
 
 /// A texture whose band, once it is warped, still reaches some voxels of the result.
@@ -225,7 +225,7 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture, cons
                               .maxMemory = options.maxMemory,
                               .progress = levelset::subProgress(options.progress, 0.7, 0.8)});
   result.band = merge(base, std::move(warped), options, report);
-  levelset::report(options.progress, 1, kAction);
+  levelset::report(options.progress, 1, kTexture);
   return result;
 }
 

@@ -54,8 +54,8 @@ struct TextureResult {
 [[nodiscard]] RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options = {});
 
 /// Warps `texture` into the patch, re-distances it [Brodersen07 §8.3], and merges it with `base`.
-/// A voxel finer than the base's is chosen only where the texture, squeezed, has voxels of less
-/// than 0.8 of it; on equal voxels the result has the base's own grid.
+/// Where the texture, squeezed by the map, has voxels no finer than the base's, the result has the
+/// base's own grid.
 /// @param base     the solid that the patch was made on
 /// @param texture  any solid; x, y, z of its box become u, v, w
 /// @throws UsageError for lengths that are negative or not finite; InvalidInput when the map folds

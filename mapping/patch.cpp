@@ -20,32 +20,33 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-constexpr const char* kAction = "patch";
+constexpr const char* kPatch = "patch";
 // The map's system is dense: n³ / 3 operations and n² numbers. This many particles cost a second or
 // two, and lie some five to ten voxels apart on a patch of a hundred or two.
 constexpr double kParticleBudget = 2000;
 constexpr double kSmallestSpacing = 1.5;  // voxels; closer ones say the same thing twice
 constexpr std::size_t kFewest = 4;        // particles along a side
 
-std::string text(const V3d& p) {
+std::string asOption(const V3d& p) {
   return fmt::format("{:.6g},{:.6g},{:.6g}", p.x, p.y, p.z);
 }
 
-void checkArguments(const std::array<V3d, 4>& corners, double height, const PatchOptions& options) {
+void checkPatchArguments(const std::array<V3d, 4>& corners, double height,
+                         const PatchOptions& options) {
   if (!(height > 0) || !std::isfinite(height)) {
-    throw UsageError(fmt::format("{}: the height is {}; give a positive length", kAction, height));
+    throw UsageError(fmt::format("{}: the height is {}; give a positive length", kPatch, height));
   }
   if (options.levels < 2) {
     throw UsageError(
-        fmt::format("{}: {} levels of particles; give at least 2", kAction, options.levels));
+        fmt::format("{}: {} levels of particles; give at least 2", kPatch, options.levels));
   }
   if (!(options.spacing >= 0) || !std::isfinite(options.spacing)) {
     throw UsageError(fmt::format("{}: the spacing of particles is {}; give a positive length",
-                                 kAction, options.spacing));
+                                 kPatch, options.spacing));
   }
   for (const V3d& c : corners) {
     if (!std::isfinite(c.x) || !std::isfinite(c.y) || !std::isfinite(c.z)) {
-      throw UsageError(fmt::format("{}: the corner {} is not finite", kAction, text(c)));
+      throw UsageError(fmt::format("{}: the corner {} is not finite", kPatch, asOption(c)));
     }
   }
 }
@@ -58,7 +59,7 @@ void checkApart(const NarrowBand& base, const std::array<V3d, 4>& corners) {
         throw InvalidInput(fmt::format(
             "{}: corners {} and {} both fall on {}, {:.3g} voxels apart; a patch needs sides of at "
             "least two voxels",
-            kAction, i, j, text(corners[i]), distance / base.voxelSize()));
+            kPatch, i, j, asOption(corners[i]), distance / base.voxelSize()));
       }
     }
 }
@@ -82,16 +83,16 @@ bool checkOrientation(const NarrowBand& base, const std::array<V3d, 4>& given,
   double scale = 0;
   for (std::size_t i = 0; i < 4; ++i) scale += (corners[(i + 1) % 4] - corners[i]).length2();
   if (std::abs(area) < 1e-3 * scale) {
-    throw InvalidInput(
-        fmt::format("{}: the corners {}, {}, {} and {} span no area; move one of them", kAction,
-                    text(corners[0]), text(corners[1]), text(corners[2]), text(corners[3])));
+    throw InvalidInput(fmt::format(
+        "{}: the corners {}, {}, {} and {} span no area; move one of them", kPatch,
+        asOption(corners[0]), asOption(corners[1]), asOption(corners[2]), asOption(corners[3])));
   }
   if (area < 0 && !mirror) {
-    throw UsageError(
-        fmt::format("{}: the corners run clockwise seen from outside, which would mirror the "
-                    "texture; give them as "
-                    "\"{} {} {} {}\" or ask for --mirror",
-                    kAction, text(given[0]), text(given[3]), text(given[2]), text(given[1])));
+    throw UsageError(fmt::format(
+        "{}: the corners run clockwise seen from outside, which would mirror the "
+        "texture; give them as "
+        "\"{} {} {} {}\" or ask for --mirror",
+        kPatch, asOption(given[0]), asOption(given[3]), asOption(given[2]), asOption(given[1])));
   }
   return area < 0;
 }
@@ -139,13 +140,13 @@ double meanSpacing(const Patch& patch) {
 }
 
 void checkParticleCount(double count, double spacing, const PatchOptions& options) {
-  levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kAction);
+  levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kPatch);
   constexpr double kMostParticles = 1e6;
   if (count > kMostParticles) {
     throw levelset::ResourceLimit(fmt::format(
         "{}: a spacing of {:.6g} would make {:.3g} particles, more than {:.0g}; take a wider "
         "one",
-        kAction, spacing, count, kMostParticles));
+        kPatch, spacing, count, kMostParticles));
   }
 }
 
@@ -181,14 +182,14 @@ std::size_t Patch::particleCount() const {
 
 PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners, double height,
                       const PatchOptions& options) {
-  checkArguments(corners, height, options);
+  checkPatchArguments(corners, height, options);
   PatchResult result;
   Patch& patch = result.patch;
   PatchReport& report = result.report;
 
   // === The quadrilateral on the surface
   for (std::size_t i = 0; i < 4; ++i) {
-    patch.corners[i] = closestSurfacePoint(base, corners[i], kAction);
+    patch.corners[i] = closestSurfacePoint(base, corners[i], kPatch);
     report.projectionDistance =
         std::max(report.projectionDistance, (patch.corners[i] - corners[i]).length());
   }
@@ -199,7 +200,7 @@ PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners,
   if (options.spacing > 0)
     checkParticleCount(particlesAt(options.spacing, sides) * static_cast<double>(options.levels),
                        options.spacing, options);
-  levelset::report(options.progress, 0.1, kAction);
+  levelset::report(options.progress, 0.1, kPatch);
 
   // === Scheme B: sides of each level from its own advected corners …
   const NarrowBand space = sweepAbove(base, sides.front(), height, options);
@@ -225,7 +226,7 @@ PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners,
     patch.levels.push_back(std::move(level));
     const double done =
         static_cast<double>(patch.levels.size()) / static_cast<double>(sides.size());
-    levelset::report(options.progress, 0.5 + 0.5 * done, kAction);
+    levelset::report(options.progress, 0.5 + 0.5 * done, kPatch);
   }
   patch.spacing = meanSpacing(patch);
   report.uLength = sides.front().uLength;
@@ -238,13 +239,13 @@ std::array<V3d, 4> cornersAround(const NarrowBand& base, const V3d& point, doubl
                                  double rotation) {
   for (const double size : {a, b}) {
     if (!(size > 0) || !std::isfinite(size)) {
-      throw UsageError(fmt::format("{}: the size is {}; give two positive lengths", kAction, size));
+      throw UsageError(fmt::format("{}: the size is {}; give two positive lengths", kPatch, size));
     }
   }
   if (!std::isfinite(rotation)) {
-    throw UsageError(fmt::format("{}: the rotation is {}; give an angle", kAction, rotation));
+    throw UsageError(fmt::format("{}: the rotation is {}; give an angle", kPatch, rotation));
   }
-  const V3d center = closestSurfacePoint(base, point, kAction);
+  const V3d center = closestSurfacePoint(base, point, kPatch);
   const SurfaceField field(base);
   const V3d normal = field.normal(center);
   const V3d reference = std::abs(normal.x) < 0.9 ? V3d(1, 0, 0) : V3d(0, 1, 0);

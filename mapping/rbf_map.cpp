@@ -19,7 +19,7 @@ namespace {
 using Imath::V3d;
 using levelset::InvalidInput;
 
-constexpr const char* kAction = "rbf map";
+constexpr const char* kRbfMap = "rbf map";
 // Two particles nearer than this share of the cloud's size give rows that rounding cannot tell
 // apart.
 constexpr double kSmallestGap = 1e-9;
@@ -36,21 +36,21 @@ void checkArguments(std::span<const V3d> points, std::span<const V3d> targets,
     if (!(lambda >= 0) || !std::isfinite(lambda)) {
       throw levelset::UsageError(
           fmt::format("{}: λ is {}; give a relaxation of at least 0, in mean particle spacings",
-                      kAction, lambda));
+                      kRbfMap, lambda));
     }
   }
   if (points.size() != targets.size() || points.size() != near.size()) {
     throw InvalidInput(fmt::format("{}: {} points, {} targets and {} flags; give as many of each",
-                                   kAction, points.size(), targets.size(), near.size()));
+                                   kRbfMap, points.size(), targets.size(), near.size()));
   }
   if (points.size() < 4) {
     throw InvalidInput(fmt::format(
-        "{}: there are {} particles, and a map of space needs at least 4", kAction, points.size()));
+        "{}: there are {} particles, and a map of space needs at least 4", kRbfMap, points.size()));
   }
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!isFinite(points[i]) || !isFinite(targets[i])) {
       throw InvalidInput(
-          fmt::format("{}: particle {} at ({}, {}, {}) is not finite; check the patch", kAction, i,
+          fmt::format("{}: particle {} at ({}, {}, {}) is not finite; check the patch", kRbfMap, i,
                       points[i].x, points[i].y, points[i].z));
     }
   }
@@ -88,7 +88,7 @@ RbfMap::RbfMap(std::span<const V3d> points, std::span<const V3d> targets,
     : count_(points.size()) {
   checkArguments(points, targets, near, options);
   const double n = static_cast<double>(count_);
-  levelset::requireMemory(2.5 * n * n * sizeof(double), options.maxMemory, kAction);
+  levelset::requireMemory(2.5 * n * n * sizeof(double), options.maxMemory, kRbfMap);
 
   for (const V3d& p : points) origin_ += p;
   origin_ /= n;
@@ -102,19 +102,19 @@ RbfMap::RbfMap(std::span<const V3d> points, std::span<const V3d> targets,
       throw InvalidInput(
           fmt::format("{}: two particles share the place ({}, {}, {}); take a larger "
                       "patch or a wider spacing",
-                      kAction, points[i].x, points[i].y, points[i].z));
+                      kRbfMap, points[i].x, points[i].y, points[i].z));
     }
   }
   meanSpacing_ = spacing / n;
-  levelset::report(options.progress, 0.1, kAction);
+  levelset::report(options.progress, 0.1, kRbfMap);
 
   std::vector<double> lambda(count_);
   for (std::size_t i = 0; i < count_; ++i)
     lambda[i] = meanSpacing_ * (near[i] ? options.lambdaNear : options.lambdaFar);
   solve(points, targets, lambda);
-  levelset::report(options.progress, 0.9, kAction);
+  levelset::report(options.progress, 0.9, kRbfMap);
   measureResidual(points, targets);
-  levelset::report(options.progress, 1, kAction);
+  levelset::report(options.progress, 1, kRbfMap);
 }
 
 /// −(φ − λ) is positive definite on the vectors that are orthogonal to constants, so the saddle
@@ -140,7 +140,7 @@ void RbfMap::solve(std::span<const V3d> points, std::span<const V3d> targets,
     throw InvalidInput(
         fmt::format("{}: the {} particles about ({}, {}, {}) lie in one plane; give the "
                     "patch a height and two directions",
-                    kAction, count_, origin_.x, origin_.y, origin_.z));
+                    kRbfMap, count_, origin_.x, origin_.y, origin_.z));
   }
 
   Eigen::MatrixXd kernel(n, n);
@@ -163,7 +163,7 @@ void RbfMap::solve(std::span<const V3d> points, std::span<const V3d> targets,
       throw InvalidInput(
           fmt::format("{}: the system of {} particles cannot be solved, particles are "
                       "too close together; take a wider spacing or a larger λ",
-                      kAction, count_));
+                      kRbfMap, count_));
     }
     weights.bottomRows(n - 4) = llt.solve(rotated.bottomRows(n - 4));
     weights.applyOnTheLeft(q);
@@ -177,7 +177,7 @@ void RbfMap::solve(std::span<const V3d> points, std::span<const V3d> targets,
     throw InvalidInput(
         fmt::format("{}: solving for {} particles overflowed; check the patch for "
                     "particles that lie on top of each other",
-                    kAction, count_));
+                    kRbfMap, count_));
   }
 
   constant_ = V3d(coefficients(0, 0), coefficients(0, 1), coefficients(0, 2));

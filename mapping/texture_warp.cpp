@@ -25,7 +25,7 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
-constexpr const char* kAction = "texture";
+constexpr const char* kWarp = "texture";
 constexpr int kRootEdge = 64;  // grid points along a block that the descent begins with
 constexpr int kLeafEdge = 8;
 // The map is tabulated to this share of a texture voxel.
@@ -149,11 +149,11 @@ class TextureWarp {
       blocks.swap(children);
       requireBlocks(edge > kLeafEdge ? blocks.size() : leaves.size());
     }
-    levelset::report(options_.progress, 0.3, kAction);
+    levelset::report(options_.progress, 0.3, kWarp);
     if (leaves.empty()) {
       throw levelset::InvalidInput(fmt::format(
           "{}: nothing of the texture falls into the patch; check the texture box and the sink",
-          kAction));
+          kWarp));
     }
     warp.blocksEvaluated = leaves.size();
     warp.field = evaluate(leaves, inside, warp.ghosts);
@@ -194,10 +194,10 @@ class TextureWarp {
         throw levelset::ResourceLimit(fmt::format(
             "{}: at a voxel of {:.3g} the grid passes the range of 32-bit indices; take a "
             "larger one",
-            kAction, transform_->voxelSize()[0]));
+            kWarp, transform_->voxelSize()[0]));
       }
     }
-    levelset::requireMemory(count * (sizeof(Block) + 1) * 2, options_.maxMemory, kAction);
+    levelset::requireMemory(count * (sizeof(Block) + 1) * 2, options_.maxMemory, kWarp);
     std::vector<Block> blocks;
     const Coord low = Coord::floor(box.min()) & ~(kRootEdge - 1), high = Coord::ceil(box.max());
     for (int x = low.x(); x <= high.x(); x += kRootEdge)
@@ -217,8 +217,7 @@ class TextureWarp {
 
   void requireBlocks(std::size_t count) const {
     // The field, its copy while distances are made, and the result.
-    levelset::requireMemory(static_cast<double>(count) * 3 * kLeafBytes, options_.maxMemory,
-                            kAction);
+    levelset::requireMemory(static_cast<double>(count) * 3 * kLeafBytes, options_.maxMemory, kWarp);
   }
 
   std::vector<Meets> test(const std::vector<Block>& blocks) const {
@@ -275,7 +274,7 @@ class TextureWarp {
       });
       levelset::report(options_.progress,
                        0.3 + 0.7 * static_cast<double>(end) / static_cast<double>(leaves.size()),
-                       kAction);
+                       kWarp);
     }
     for (std::size_t n = 0; n < nodes.size(); ++n) {
       grid->tree().addLeaf(nodes[n].release());

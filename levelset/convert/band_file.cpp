@@ -31,7 +31,7 @@ std::string bandFormat(const fs::path& nameOrFormat) {
   return text == "vdb" || text == "nvdb" ? text : "";
 }
 
-std::string chooseFormat(const fs::path& path, const std::string& given) {
+std::string bandFormat(const fs::path& path, const std::string& given) {
   const std::string format = bandFormat(given.empty() ? path : fs::path(given));
   if (!format.empty()) return format;
   throw UsageError(
@@ -222,7 +222,7 @@ NarrowBand readBand(const fs::path& path, const ReadBandOptions& options) {
 }
 
 void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOptions& options) {
-  const std::string format = chooseFormat(path, options.format);
+  const std::string format = bandFormat(path, options.format);
   if (!band.shared())
     throw InvalidInput(
         fmt::format("write: there is no band to write to '{}'; make one first", path.string()));

@@ -43,7 +43,7 @@ std::optional<FormatChoice> findFormat(const fs::path& nameOrFormat) {
   return std::nullopt;
 }
 
-FormatChoice chooseFormat(const fs::path& path, const std::string& given, const char* action) {
+FormatChoice meshFormat(const fs::path& path, const std::string& given, const char* action) {
   if (!given.empty()) {
     if (const auto choice = findFormat(given)) return *choice;
     throw UsageError(
@@ -66,7 +66,7 @@ FormatChoice chooseFormat(const fs::path& path, const std::string& given, const 
 }  // namespace
 
 TriMesh readMesh(const fs::path& path, const ReadMeshOptions& options) {
-  const FormatChoice choice = chooseFormat(path, options.format, "read");
+  const FormatChoice choice = meshFormat(path, options.format, "read");
   report(options.progress, 0, "read");
   try {
     const Bytes bytes = readBytes(path, options.maxMemory);
@@ -82,7 +82,7 @@ TriMesh readMesh(const fs::path& path, const ReadMeshOptions& options) {
 }
 
 void writeMesh(const fs::path& path, const TriMesh& mesh, const WriteMeshOptions& options) {
-  const FormatChoice choice = chooseFormat(path, options.format, "write");
+  const FormatChoice choice = meshFormat(path, options.format, "write");
   report(options.progress, 0, "write");
   ByteWriter out(path, choice.compressed);
   choice.format->write(out, mesh, options.progress);
@@ -95,7 +95,7 @@ bool isMeshFormat(const fs::path& nameOrFormat) {
 }
 
 MeshFileInfo meshFileInfo(const fs::path& path) {
-  const FormatChoice choice = chooseFormat(path, {}, "info");
+  const FormatChoice choice = meshFormat(path, {}, "info");
   const std::string name = inputName(path);
   const Bytes head = readFirstBytes(path, kInfoBytes);
   if (head.size() == 0) failFile(name, "is empty; fetch or make the file again");

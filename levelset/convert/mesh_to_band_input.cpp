@@ -15,9 +15,6 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 
-/// Room beyond the band for the tree's nodes, so that no index overflows.
-constexpr double kIndexLimit = 2147483648.0 - 8192;
-
 std::string text(const V3d& p) {
   return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z);
 }

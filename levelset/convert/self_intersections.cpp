@@ -17,7 +17,7 @@ using convert::Triangle;
 using Imath::V2d;
 using Imath::V3d;
 
-using Corners = std::array<V3d, 3>;
+using TriangleCorners = std::array<V3d, 3>;
 
 V2d dropAxis(const V3d& p, int axis) {
   return {p[(axis + 1) % 3], p[(axis + 2) % 3]};
@@ -25,7 +25,7 @@ V2d dropAxis(const V3d& p, int axis) {
 
 /// An axis along which the triangle does not project to a segment, the best conditioned first; −1
 /// for a triangle that is exactly without area.
-int projectionAxis(const Corners& t) {
+int projectionAxis(const TriangleCorners& t) {
   const V3d normal = (t[1] - t[0]).cross(t[2] - t[0]);
   std::array<int, 3> axes = {0, 1, 2};
   std::sort(axes.begin(), axes.end(),
@@ -59,7 +59,7 @@ bool contains(const std::array<V2d, 3>& t, const V2d& p) {
 }
 
 /// The closed segment pq and the closed triangle, all in one plane, have a point in common.
-bool meetsInPlane(const V3d& p, const V3d& q, const Corners& t) {
+bool meetsInPlane(const V3d& p, const V3d& q, const TriangleCorners& t) {
   const int axis = projectionAxis(t);
   const std::array<V2d, 3> f = {dropAxis(t[0], axis), dropAxis(t[1], axis), dropAxis(t[2], axis)};
   const V2d a = dropAxis(p, axis), b = dropAxis(q, axis);
@@ -69,7 +69,7 @@ bool meetsInPlane(const V3d& p, const V3d& q, const Corners& t) {
 
 /// The closed segment pq and the closed triangle have a point in common.
 /// @param sideP  of the triangle's plane, as orient3d gives it
-bool segmentMeets(const V3d& p, const V3d& q, int sideP, int sideQ, const Corners& t) {
+bool segmentMeets(const V3d& p, const V3d& q, int sideP, int sideQ, const TriangleCorners& t) {
   if (sideP * sideQ > 0) return false;
   if (sideP == 0 && sideQ == 0) return meetsInPlane(p, q, t);
   // Looking along pq, the three edges must not turn different ways.
@@ -93,8 +93,8 @@ bool trianglesMeet(const Triangle& first, const Triangle& second,
         ++shared;
         break;
       }
-  const Corners a = {positions[s[0]], positions[s[1]], positions[s[2]]};
-  const Corners b = {positions[t[0]], positions[t[1]], positions[t[2]]};
+  const TriangleCorners a = {positions[s[0]], positions[s[1]], positions[s[2]]};
+  const TriangleCorners b = {positions[t[0]], positions[t[1]], positions[t[2]]};
   if (shared == 3) return true;
   if (shared == 2) {
     if (convert::orient3d(a[0], a[1], a[2], b[2]) != 0) return false;

@@ -24,7 +24,7 @@ constexpr double kRank = 0.05;
 /// How far from its cell, in voxels, a plane may touch the surface and still be of use.
 constexpr double kTouchMargin = 0.75;
 /// How far outside its cell, in voxels, a vertex may lie.
-constexpr double kReach = 1;
+constexpr double kVertexReach = 1;
 /// Normals further apart than that form an edge.
 constexpr double kEdgeCosine = 0.9;
 
@@ -197,8 +197,9 @@ class CellVertices {
   /// A point on the edge or corner where the planes meet. It may lie a little outside the cell: it
   /// is on the surface there, which the nearest point of the cell is not.
   DualVertex placeByPlanes(const Vector3d& centre, unsigned corners) {
-    for (const auto& [touch, reach] : {std::pair(kTouchMargin, 0.0), std::pair(0.0, 0.0),
-                                       std::pair(kTouchMargin, kReach), std::pair(0.0, kReach)}) {
+    for (const auto& [touch, reach] :
+         {std::pair(kTouchMargin, 0.0), std::pair(0.0, 0.0), std::pair(kTouchMargin, kVertexReach),
+          std::pair(0.0, kVertexReach)}) {
       const bool isFeature = collectPlanes(corners, touch);
       if (planes_.empty()) continue;
       const Vector3d fitted = fitPlanes(planes_, centre);

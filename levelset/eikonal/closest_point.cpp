@@ -9,7 +9,7 @@ namespace {
 using openvdb::Vec3d;
 
 constexpr int kMaxIterations = 8;
-constexpr double kReach = 2;        // voxels from the start
+constexpr double kFootReach = 2;    // voxels from the start
 constexpr double kLongestStep = 1;  // voxels
 // A step is the last when what it leaves, about the cube of its length by the square of the
 // curvature, is below this part of a voxel.
@@ -77,7 +77,8 @@ Foot closestPoint(const DenseBlock& block, const Vec3d& from, const Vec3d& start
     const NewtonStep step = newtonStep(jet, slope, from - y);
     if (!std::isfinite(step.length)) return foot;
     y += step.length > kLongestStep ? step.along * (kLongestStep / step.length) : step.along;
-    if ((y - start).lengthSqr() > kReach * kReach) return Foot{y, foot.distance, false, true};
+    if ((y - start).lengthSqr() > kFootReach * kFootReach)
+      return Foot{y, foot.distance, false, true};
     if (step.length <= kLongestLastStep && step.remains < kTolerance)
       return Foot{y, (from - y).length(), true, false};
   }

@@ -18,7 +18,7 @@ using openvdb::Vec3d;
 using Block = NearestPoints::Block;
 
 // A surface point found for a neighbour may stand off our own by half a voxel along the surface.
-constexpr double kMargin = 0.5;
+constexpr double kBlockMargin = 0.5;
 
 int directionIndex(const Coord& d) {
   return (d.x() + 1) * 9 + (d.y() + 1) * 3 + d.z() + 1;
@@ -194,8 +194,8 @@ NearestPoints::Block& NearestPoints::touch(const Coord& origin) {
   } else {
     block.inside.set(accessor_.getValue(origin) < 0);
   }
-  const float inside = squareOf(reach_.inside + kMargin),
-              outside = squareOf(reach_.outside + kMargin);
+  const float inside = squareOf(reach_.inside + kBlockMargin),
+              outside = squareOf(reach_.outside + kBlockMargin);
   for (openvdb::Index n = 0; n < 512; ++n)
     block.squared[n] = block.inside.isOn(n) ? inside : outside;
   for (int i = 0; i < 27; ++i) {
@@ -230,7 +230,7 @@ void NearestPoints::seedRegionBoundary() {
   // with the boundary right, nothing outside has to be visited.
   const PointTree tree(points_.positions);
   const openvdb::CoordBBox& box = *reach_.region;
-  const double limit = std::max(reach_.inside, reach_.outside) + kMargin;
+  const double limit = std::max(reach_.inside, reach_.outside) + kBlockMargin;
   std::vector<std::uint32_t> nearest;
   for (int axis = 0; axis < 3; ++axis)
     for (const int level : {box.min()[axis], box.max()[axis]}) {
@@ -256,7 +256,7 @@ void NearestPoints::process(Block& block, std::vector<Coord>& missing) const {
   BlockWorker worker(block, points_);
   worker.relax();
   const std::uint32_t news =
-      worker.outbox(squareOf(std::max(reach_.inside, reach_.outside) + kMargin));
+      worker.outbox(squareOf(std::max(reach_.inside, reach_.outside) + kBlockMargin));
   for (int i = 0; i < 27; ++i) {
     if (!(news >> i & 1)) continue;
     if (Block* other = block.neighbours[static_cast<std::size_t>(i)])

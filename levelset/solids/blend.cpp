@@ -24,10 +24,10 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-constexpr double kHalfWidth = 4;     // voxels, of the band in which the flow runs
-constexpr double kMargin = 8;        // voxels around it that hold the surface it hangs on
-constexpr double kStepLength = 0.4;  // voxels that the surface may move in a step …
-constexpr double kDrift = 1;         // … and between two distance transforms
+constexpr double kHalfWidth = 4;      // voxels, of the band in which the flow runs
+constexpr double kSurfaceMargin = 8;  // voxels around it that hold the surface it hangs on
+constexpr double kStepLength = 0.4;   // voxels that the surface may move in a step …
+constexpr double kDrift = 1;          // … and between two distance transforms
 // The flow brings a right-angled crease to its radius within this time, voxels² per radius².
 constexpr double kDuration = 1;
 // It is at rest when it moves slower than this part of the curvature asked for.
@@ -79,7 +79,7 @@ FloatGrid::Ptr cutOut(const FloatGrid& solid, const eikonal::PointTree& curve, d
   std::set<Coord> inner, rim;
   for (auto leaf = solid.tree().cbeginLeaf(); leaf; ++leaf) {
     const Vec3d centre = leaf->origin().asVec3d() + Vec3d(3.5);
-    const double reach = radius + kMargin + 6.1;  // to the corners of the block
+    const double reach = radius + kSurfaceMargin + 6.1;  // to the corners of the block
     if (curve.nearest(centre, reach) == eikonal::PointTree::kNone) continue;
     inner.insert(leaf->origin());
     auto copy = std::make_unique<LeafNode>(*leaf);

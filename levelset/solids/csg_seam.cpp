@@ -74,20 +74,20 @@ struct SurfaceCell {
   bool isSeam = false;  ///< both surfaces pass: each counts where the other is not inside
 };
 
-struct Corners {
+struct CellCorners {
   std::array<double, 8> values;
 
   /// Of both solids together.
-  Corners(const Corners& first, const Corners& second) {
+  CellCorners(const CellCorners& first, const CellCorners& second) {
     for (std::size_t i = 0; i < 8; ++i) values[i] = std::min(first.values[i], second.values[i]);
   }
 
-  Corners(const SignedField& field, const Coord& c) {
+  CellCorners(const SignedField& field, const Coord& c) {
     for (int i = 0; i < 8; ++i)
       values[static_cast<std::size_t>(i)] = field(c.offsetBy((i >> 2) & 1, (i >> 1) & 1, i & 1));
   }
   /// Of the solids together: the result has no crossing in the cell.
-  bool allInsideWith(const Corners& other) const {
+  bool allInsideWith(const CellCorners& other) const {
     for (std::size_t i = 0; i < 8; ++i)
       if (!(values[i] < 0) && !(other.values[i] < 0)) return false;
     return true;
@@ -273,7 +273,7 @@ class SeamCorrector {
 
   static void addCell(const SignedField& u, const SignedField& v, const Coord& c,
                       std::vector<SurfaceCell>& cells) {
-    const Corners first(u, c), second(v, c);
+    const CellCorners first(u, c), second(v, c);
     if (first.allInsideWith(second)) return;
     const bool crossesFirst = !first.allOutside(), crossesSecond = !second.allOutside();
     if (!crossesFirst && !crossesSecond) return;
@@ -283,7 +283,7 @@ class SeamCorrector {
     if (cell.isSeam && (first.isBent() || second.isBent())) {
       // More than two faces meet: one plane through them all.
       cell.isSeam = false;
-      cell.first = Corners(first, second).patch();
+      cell.first = CellCorners(first, second).patch();
     } else {
       if (crossesFirst) cell.first = first.patch();
       if (crossesSecond) cell.second = second.patch();

@@ -37,8 +37,6 @@ const double kTricubicReach = 2 * kCubeDiagonal;
 constexpr double kReadReach = 3.5;
 /// Layers added to each side of a band by thickening it twice.
 constexpr double kThickened = 4;
-/// Leaves that a target tree may not pass, index coordinates.
-constexpr double kIndexLimit = 2147475456;
 
 /// Target index to source index, and what a source value is worth in the target's world.
 struct Placement {

@@ -4,7 +4,7 @@
 
 #include "levelset/error.h"
 
-namespace {
+namespace chain_test {
 
 using levelset::UsageError;
 using pipeline::Chain;
@@ -108,4 +108,4 @@ TEST(Chain, GivesStandardStreamsToOneUserOnly) {
   EXPECT_EQ(refusal("sphere --radius 1 --voxel 1 ! measure ! check"), "accepted");
 }
 
-}  // namespace
+}  // namespace chain_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/shell.h"
 
-namespace {
+namespace command_test {
 
 using Json = nlohmann::json;
 constexpr double kPi = 3.14159265358979323846;
@@ -170,4 +170,4 @@ TEST_F(Command, TransformsExactlyAndBakesOnRequest) {
                  "--bake");
 }
 
-}  // namespace
+}  // namespace command_test

@@ -8,7 +8,7 @@
 #include "apps/pipeline/units.h"
 #include "tests/support/shell.h"
 
-namespace {
+namespace help_test {
 
 using support::ShellTest;
 
@@ -64,4 +64,4 @@ TEST_F(Help, ExamplesRun) {
   }
 }
 
-}  // namespace
+}  // namespace help_test

@@ -5,7 +5,7 @@
 #include "levelset/vdb.h"
 #include "tests/support/shell.h"
 
-namespace {
+namespace numeric_test {
 
 class Numeric : public support::ShellTest {};
 
@@ -21,4 +21,4 @@ TEST_F(Numeric, FieldThatIsNoDistanceFailsTheCheck) {
   EXPECT_FALSE(exists("after.vdb"));
 }
 
-}  // namespace
+}  // namespace numeric_test

@@ -6,7 +6,7 @@
 
 #include "tests/support/shell.h"
 
-namespace {
+namespace readme_test {
 
 class Readme : public support::ShellTest {};
 
@@ -40,4 +40,4 @@ TEST_F(Readme, ExamplesRun) {
     EXPECT_TRUE(exists(file)) << file;
 }
 
-}  // namespace
+}  // namespace readme_test

@@ -9,7 +9,7 @@
 
 #include "tests/support/shell.h"
 
-namespace {
+namespace refusal_test {
 
 class Refusal : public support::ShellTest {
  protected:
@@ -197,4 +197,4 @@ TEST_F(Refusal, NestedShellsKeepTheirCavity) {
   EXPECT_NE(outcome.out.find("\"cavities\": 1"), std::string::npos) << outcome.out;
 }
 
-}  // namespace
+}  // namespace refusal_test

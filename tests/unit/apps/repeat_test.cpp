@@ -7,7 +7,7 @@
 
 #include "tests/support/shell.h"
 
-namespace {
+namespace repeat_test {
 
 struct Case {
   const char* name;
@@ -96,4 +96,4 @@ INSTANTIATE_TEST_SUITE_P(
       return std::string(param_info.param.name);
     });
 
-}  // namespace
+}  // namespace repeat_test

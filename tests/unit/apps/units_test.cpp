@@ -6,7 +6,7 @@
 
 #include "levelset/error.h"
 
-namespace {
+namespace units_test {
 
 using levelset::UsageError;
 using namespace pipeline;
@@ -63,4 +63,4 @@ TEST(Units, GuessesWhatWasMeant) {
   EXPECT_EQ(didYouMean("zzz", {"sphere", "box"}), "");
 }
 
-}  // namespace
+}  // namespace units_test

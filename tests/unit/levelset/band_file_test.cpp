@@ -13,7 +13,7 @@
 #include "tests/support/bands.h"
 #include "tests/support/files.h"
 
-namespace {
+namespace band_file_test {
 
 using levelset::InvalidInput;
 using levelset::NarrowBand;
@@ -322,4 +322,4 @@ TEST(BandFile, TellsFormatsByName) {
     EXPECT_FALSE(levelset::isBandFormat(name)) << name;
 }
 
-}  // namespace
+}  // namespace band_file_test

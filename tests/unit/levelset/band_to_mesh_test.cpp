@@ -12,7 +12,7 @@
 #include "levelset/inspect/measure.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace band_to_mesh_test {
 
 using namespace levelset;
 using Imath::V3d;
@@ -283,4 +283,4 @@ TEST(BandToMesh, RefusesWhatItCannotMesh) {
   EXPECT_THROW((void)bandToMesh(band, {.progress = [](double) { return false; }}), Cancelled);
 }
 
-}  // namespace
+}  // namespace band_to_mesh_test

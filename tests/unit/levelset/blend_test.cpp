@@ -10,7 +10,7 @@
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace blend_test {
 
 using namespace levelset;
 using Imath::V3d;
@@ -201,4 +201,4 @@ TEST(Blend, Refuses) {
   EXPECT_THROW((void)blend(CsgOperation::Union, balls.left, NarrowBand(), 1), InvalidInput);
 }
 
-}  // namespace
+}  // namespace blend_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/bands.h"
 
-namespace {
+namespace check_test {
 
 using namespace levelset;
 using openvdb::Coord;
@@ -111,4 +111,4 @@ TEST(Check, SaysThatThereIsNoGrid) {
   EXPECT_FALSE(check(NarrowBand()).passed());
 }
 
-}  // namespace
+}  // namespace check_test

@@ -12,7 +12,7 @@
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace clip_test {
 
 using namespace levelset;
 using Imath::Box3d;
@@ -89,4 +89,4 @@ TEST(Clip, RefusesWhatIsNoRegion) {
   EXPECT_THROW((void)clip(ball, Plane3d(V3d(0, 0, 1), std::nan(""))), UsageError);
 }
 
-}  // namespace
+}  // namespace clip_test

@@ -13,7 +13,7 @@
 #include "levelset/inspect/measure.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace components_test {
 
 using namespace levelset;
 using Imath::V3d;
@@ -214,4 +214,4 @@ TEST(Components, GiveSameBitsForAnyNumberOfThreads) {
   }
 }
 
-}  // namespace
+}  // namespace components_test

@@ -9,7 +9,7 @@
 #include "levelset/error.h"
 #include "tests/support/files.h"
 
-namespace {
+namespace file_target_test {
 
 namespace fs = std::filesystem;
 using levelset::FileTarget;
@@ -235,4 +235,4 @@ TEST(FileTargetDeathTest, RemovesTemporaryFilesAndRenamesNothing) {
   EXPECT_EQ(folder.fileCount(), 1u);
 }
 
-}  // namespace
+}  // namespace file_target_test

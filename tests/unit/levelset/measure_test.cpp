@@ -8,7 +8,7 @@
 #include "levelset/convert/band_to_mesh.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace measure_test {
 
 using namespace levelset;
 using Imath::V3d;
@@ -146,4 +146,4 @@ TEST(Manifoldness, CountsEachDefect) {
   EXPECT_EQ(found.boundaryEdges + found.nonManifoldEdges + found.misorientedEdges, 0u);
 }
 
-}  // namespace
+}  // namespace measure_test

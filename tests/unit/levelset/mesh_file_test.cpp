@@ -12,7 +12,7 @@
 #include "levelset/error.h"
 #include "tests/support/files.h"
 
-namespace {
+namespace mesh_file_test {
 
 using levelset::CoordinatePrecision;
 using levelset::InvalidInput;
@@ -578,4 +578,4 @@ TEST(MeshFile, SaysThatTheDiskIsFull) {
   EXPECT_THROW(levelset::writeMesh(folder / "a.xyz", tetrahedron()), levelset::UsageError);
 }
 
-}  // namespace
+}  // namespace mesh_file_test

@@ -14,7 +14,7 @@
 #include "levelset/vdb.h"
 #include "tests/support/meshes.h"
 
-namespace {
+namespace mesh_to_band_cgal_test {
 
 using namespace levelset;
 using Kernel = CGAL::Simple_cartesian<double>;
@@ -67,4 +67,4 @@ TEST(MeshToBandCgal, AgreesOnBunny) {
   expectExact(mesh, std::max({size.x, size.y, size.z}) / 150, 1000);
 }
 
-}  // namespace
+}  // namespace mesh_to_band_cgal_test

@@ -7,7 +7,7 @@
 #include "levelset/error.h"
 #include "tests/support/meshes.h"
 
-namespace {
+namespace mesh_to_band_refusal_test {
 
 using namespace levelset;
 using namespace support;
@@ -105,4 +105,4 @@ TEST(MeshToBandRefusal, NamesObjectsThinnerThanTheGrid) {
                 "thinner than a voxel");
 }
 
-}  // namespace
+}  // namespace mesh_to_band_refusal_test

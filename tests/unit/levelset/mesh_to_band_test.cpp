@@ -11,7 +11,7 @@
 #include "levelset/vdb.h"
 #include "tests/support/meshes.h"
 
-namespace {
+namespace mesh_to_band_test {
 
 using namespace levelset;
 using namespace support;
@@ -271,4 +271,4 @@ TEST(SelfIntersections, CountsPairsThatCross) {
   EXPECT_EQ(pair(V3d(0, 0, 1e-300), V3d(1, 0, 1e-300), V3d(0, 1, 1e-300)), 0u);
 }
 
-}  // namespace
+}  // namespace mesh_to_band_test

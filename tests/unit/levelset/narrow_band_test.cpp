@@ -8,7 +8,7 @@
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace narrow_band_test {
 
 using namespace levelset;
 
@@ -62,4 +62,4 @@ TEST(NarrowBand, RefusesGridsThatAreNoLevelSets) {
   EXPECT_THROW((void)importBand(nullptr, "read"), InvalidInput);
 }
 
-}  // namespace
+}  // namespace narrow_band_test

@@ -10,7 +10,7 @@
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace offset_test {
 
 using namespace levelset;
 using Imath::V3d;
@@ -153,4 +153,4 @@ TEST(Offset, Refuses) {
   EXPECT_THROW((void)offset(ball, 5, {.progress = [](double) { return false; }}), Cancelled);
 }
 
-}  // namespace
+}  // namespace offset_test

@@ -10,7 +10,7 @@
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace redistance_test {
 
 using namespace levelset;
 using Imath::V3d;
@@ -243,4 +243,4 @@ TEST(Redistance, Refuses) {
   EXPECT_THROW((void)redistance(ball, {.progress = [](double) { return false; }}), Cancelled);
 }
 
-}  // namespace
+}  // namespace redistance_test

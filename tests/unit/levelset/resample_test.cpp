@@ -12,7 +12,7 @@
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace resample_test {
 
 using namespace levelset;
 using Imath::V3d;
@@ -139,4 +139,4 @@ TEST(Resample, RefusesWhatCannotBe) {
   EXPECT_THROW((void)resample(source, 0.1, {.progress = [](double) { return false; }}), Cancelled);
 }
 
-}  // namespace
+}  // namespace resample_test

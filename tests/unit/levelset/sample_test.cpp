@@ -7,7 +7,7 @@
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace sample_test {
 
 using namespace levelset;
 using Imath::V3d;
@@ -151,4 +151,4 @@ TEST(Sample, TellsWhichPositionsAllSamplesCover) {
   EXPECT_FALSE(cubic.isInBand(V3d(13.5 * h)));
 }
 
-}  // namespace
+}  // namespace sample_test

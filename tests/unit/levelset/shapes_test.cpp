@@ -12,7 +12,7 @@
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace shapes_test {
 
 using namespace levelset;
 using Imath::V3d;
@@ -229,4 +229,4 @@ TEST(Shapes, StopWhenAsked) {
   EXPECT_EQ(last, 1);
 }
 
-}  // namespace
+}  // namespace shapes_test

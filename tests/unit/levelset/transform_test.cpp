@@ -10,7 +10,7 @@
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace transform_test {
 
 using namespace levelset;
 using Imath::M44d;
@@ -95,4 +95,4 @@ TEST(Transform, MirroredMeshStillFacesOut) {
   EXPECT_THROW((void)transform(tetrahedron, M44d().setScale(std::nan(""))), UsageError);
 }
 
-}  // namespace
+}  // namespace transform_test

@@ -14,7 +14,7 @@
 #include "levelset/sample.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace geometric_texture_test {
 
 using Imath::Box3d;
 using Imath::V3d;
@@ -289,4 +289,4 @@ TEST(GeometricTexture, RefusesWhatCannotBeMapped) {
   EXPECT_THROW((void)mapTexture(elsewhere, ball, patch), levelset::InvalidInput);
 }
 
-}  // namespace
+}  // namespace geometric_texture_test

@@ -11,7 +11,7 @@
 #include "mapping/geodesic.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace patch_test {
 
 using Imath::V3d;
 using levelset::NarrowBand;
@@ -226,4 +226,4 @@ TEST(Patch, StopsWhenCancelled) {
       levelset::Cancelled);
 }
 
-}  // namespace
+}  // namespace patch_test

@@ -10,7 +10,7 @@
 
 #include "levelset/error.h"
 
-namespace {
+namespace rbf_map_test {
 
 using Imath::M33d;
 using Imath::V3d;
@@ -202,4 +202,4 @@ TEST(RbfMap, FourParticlesGiveTheAffineMap) {
   EXPECT_LT((RbfMap(points, targets, near)(V3d(3, 4, 5)) - affine(V3d(3, 4, 5))).length(), 1e-12);
 }
 
-}  // namespace
+}  // namespace rbf_map_test

@@ -7,7 +7,7 @@
 
 #include "levelset/error.h"
 
-namespace {
+namespace camera_test {
 
 using namespace render;
 using Imath::V3d;
@@ -104,4 +104,4 @@ TEST(Camera, RefusesWhatCannotSee) {
   EXPECT_THROW((void)framingCamera({V3d(0), V3d(1)}, 0, 64), levelset::UsageError);
 }
 
-}  // namespace
+}  // namespace camera_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace {
+namespace cubic_root_test {
 
 using render::BernsteinCubic;
 using render::firstSignChange;
@@ -77,4 +77,4 @@ TEST(CubicRoot, AgreesWithSamplingOnRandomCubics) {
   EXPECT_GT(found, 5000);
 }
 
-}  // namespace
+}  // namespace cubic_root_test

@@ -10,7 +10,7 @@
 #include "levelset/error.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace embree_renderer_test {
 
 using namespace render;
 using Imath::V3d;
@@ -168,4 +168,4 @@ TEST(EmbreeRenderer, Refuses) {
   EXPECT_THROW((void)renderEmbree(empty), levelset::InvalidInput);
 }
 
-}  // namespace
+}  // namespace embree_renderer_test

@@ -9,7 +9,7 @@
 #include "render/embree/embree_renderer.h"
 #include "tests/support/bands.h"
 
-namespace {
+namespace embree_scene_test {
 
 using namespace render;
 using Imath::V3d;
@@ -352,4 +352,4 @@ TEST(EmbreeScene, RefusesRaysThatLeadNowhere) {
   EXPECT_THROW((void)scene.isOccluded(V3d(0), V3d(0), 0, 1), levelset::UsageError);
 }
 
-}  // namespace
+}  // namespace embree_scene_test

@@ -11,7 +11,7 @@
 
 #include "levelset/error.h"
 
-namespace {
+namespace image_test {
 
 using namespace render;
 namespace fs = std::filesystem;
@@ -143,4 +143,4 @@ TEST_F(ImageFiles, RefusesWhatItCannotRead) {
   EXPECT_THROW((void)readExr(file("greedy.exr")), levelset::InvalidInput);
 }
 
-}  // namespace
+}  // namespace image_test
