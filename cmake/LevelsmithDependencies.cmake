@@ -14,6 +14,7 @@ if(NOT TARGET OpenVDB::openvdb)
 endif()
 find_package(Eigen3 CONFIG REQUIRED)
 find_package(OpenMesh REQUIRED)
+find_package(muparser CONFIG REQUIRED)
 
 if(LEVELSMITH_RENDER)
   find_package(embree 3 CONFIG REQUIRED)

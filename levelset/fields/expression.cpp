@@ -1,0 +1,89 @@
+#include "levelset/fields/expression.h"
+
+#include <fmt/core.h>
+#include <muParser.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
+
+#include <memory>
+
+#include "levelset/error.h"
+
+namespace levelset {
+namespace {
+
+using Imath::V3d;
+
+/// A parser with the variables that it reads. Its variables are bound by address, so each thread
+/// has one of its own.
+class Formula {
+ public:
+  explicit Formula(const std::string& text) : text_(text) {
+    parser_.DefineVar("x", &place_.x);
+    parser_.DefineVar("y", &place_.y);
+    parser_.DefineVar("z", &place_.z);
+    parser_.DefineVar("r", &radius_);
+    parser_.DefineVar("t", &time_);
+    parser_.DefineConst("pi", M_PI);
+    parser_.SetExpr(text);
+  }
+  Formula(const Formula& other) : Formula(other.text_) {}
+  Formula& operator=(const Formula&) = delete;
+
+  /// The values of all formulas of the text, as many as it has.
+  const double* evaluate(const V3d& place, double time, int& count) {
+    place_ = place;
+    radius_ = place.length();
+    time_ = time;
+    return parser_.Eval(count);
+  }
+
+ private:
+  std::string text_;
+  mu::Parser parser_;
+  V3d place_ = V3d(0);
+  double radius_ = 0, time_ = 0;
+};
+
+class Formulas {
+ public:
+  Formulas(const std::string& text, int count, const char* action) : perThread_(Formula(text)) {
+    int found = 0;
+    try {
+      perThread_.local().evaluate(V3d(0.5), 0.5, found);
+    } catch (const mu::Parser::exception_type& error) {
+      throw UsageError(
+          fmt::format("{}: the formula '{}' cannot be read: {}; use x, y, z, r, t, "
+                      "numbers and functions such as sin(x)",
+                      action, text, error.GetMsg()));
+    }
+    if (found != count) {
+      throw UsageError(fmt::format("{}: '{}' holds {} formula{}; give {}", action, text, found,
+                                   found == 1 ? "" : "s",
+                                   count == 1 ? "one" : "three with commas between them"));
+    }
+  }
+  const double* operator()(const V3d& place, double time) {
+    int count = 0;
+    return perThread_.local().evaluate(place, time, count);
+  }
+
+ private:
+  oneapi::tbb::enumerable_thread_specific<Formula> perThread_;
+};
+
+}  // namespace
+
+ScalarField scalarExpression(const std::string& text, const char* action) {
+  const auto formulas = std::make_shared<Formulas>(text, 1, action);
+  return [formulas](const V3d& world) { return (*formulas)(world, 0)[0]; };
+}
+
+VectorField vectorExpression(const std::string& text, const char* action) {
+  const auto formulas = std::make_shared<Formulas>(text, 3, action);
+  return [formulas](const V3d& world, double time) {
+    const double* values = (*formulas)(world, time);
+    return V3d(values[0], values[1], values[2]);
+  };
+}
+
+}  // namespace levelset

@@ -1,0 +1,34 @@
+#include "levelset/fields/mask.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/error.h"
+
+namespace levelset {
+
+double Mask::weight(const Imath::V3d& world) const {
+  const double value = field(world);
+  double t = 0;
+  if (max > min)
+    t = std::clamp((value - min) / (max - min), 0.0, 1.0);
+  else if (value >= max)
+    t = 1;
+  if (std::isnan(t)) t = 0;
+  const double weight = t * t * (3 - 2 * t);
+  return invert ? 1 - weight : weight;
+}
+
+void checkMask(const Mask& mask, const char* action) {
+  if (!mask.field) throw UsageError(fmt::format("{}: the mask has no field; give one", action));
+  if (!(mask.min <= mask.max) || !std::isfinite(mask.min) || !std::isfinite(mask.max)) {
+    throw UsageError(
+        fmt::format("{}: the mask reaches from {} to {}; give finite values, the "
+                    "smaller first",
+                    action, mask.min, mask.max));
+  }
+}
+
+}  // namespace levelset

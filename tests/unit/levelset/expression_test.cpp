@@ -1,0 +1,59 @@
+#include "levelset/fields/expression.h"
+
+#include <gtest/gtest.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <atomic>
+#include <cmath>
+
+#include "levelset/error.h"
+#include "levelset/fields/mask.h"
+
+namespace expression_test {
+
+using namespace levelset;
+using Imath::V3d;
+
+TEST(Expression, ReadsSpaceAndTime) {
+  const ScalarField field = scalarExpression("x + 2*y - z^2 + sin(pi/2) + r", "test");
+  EXPECT_NEAR(field(V3d(3, 4, 0)), 3 + 8 + 1 + 5, 1e-12);
+  const VectorField spin = vectorExpression("-y, x, min(t, 1)", "test");
+  EXPECT_EQ(spin(V3d(1, 2, 3), 0.25), V3d(-2, 1, 0.25));
+  EXPECT_EQ(spin(V3d(1, 2, 3), 7), V3d(-2, 1, 1));
+  EXPECT_EQ(scalarExpression("x > 0 ? 1 : -1", "test")(V3d(-3, 0, 0)), -1);
+}
+
+TEST(Expression, ThreadsDoNotMixTheirPlaces) {
+  const ScalarField field = scalarExpression("x * 3 + y", "test");
+  std::atomic<int> wrong = 0;
+  tbb::parallel_for(0, 100000, [&](int i) {
+    if (field(V3d(i, -i, 0)) != 2.0 * i) ++wrong;
+  });
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST(Expression, RefusesWhatIsNoFormula) {
+  for (const char* text : {"", "x +", "x y", "q + 1", "x, y", "system(1)", "sin(", "x = 3,"})
+    EXPECT_THROW((void)scalarExpression(text, "test"), UsageError) << text;
+  for (const char* text : {"x, y", "x, y, z, 1", "1", ",,"})
+    EXPECT_THROW((void)vectorExpression(text, "test"), UsageError) << text;
+}
+
+TEST(Mask, RisesSmoothlyBetweenItsLimits) {
+  Mask mask{.field = [](const V3d& p) { return p.x; }, .min = 2, .max = 4};
+  EXPECT_EQ(mask.weight(V3d(1, 0, 0)), 0);
+  EXPECT_EQ(mask.weight(V3d(3, 0, 0)), 0.5);
+  EXPECT_EQ(mask.weight(V3d(5, 0, 0)), 1);
+  mask.invert = true;
+  EXPECT_EQ(mask.weight(V3d(1, 0, 0)), 1);
+  EXPECT_EQ(mask.weight(V3d(NAN, 0, 0)), 1);
+  mask.max = mask.min;
+  EXPECT_EQ(mask.weight(V3d(1.9, 0, 0)), 1);
+  EXPECT_EQ(mask.weight(V3d(2, 0, 0)), 0);
+  EXPECT_THROW(checkMask({.field = mask.field, .min = 1, .max = 0}, "test"), UsageError);
+  EXPECT_THROW(checkMask({.field = mask.field, .min = NAN}, "test"), UsageError);
+  EXPECT_THROW(checkMask({}, "test"), UsageError);
+  EXPECT_NO_THROW(checkMask(mask, "test"));
+}
+
+}  // namespace expression_test
