@@ -16,7 +16,7 @@ if [ -f "$models/bunny.obj" ] && [ -f "$models/dragon_vrip.ply.gz" ]; then
     ! fill-cavities ! keep --largest 1 --as both ! check ! write "$out/dragon-on-bunny.vdb" \
     ! render "$out/dragon-on-bunny.exr" --png "$out/dragon-on-bunny.png" --size 1280x960 \
       --from 2.7,1.5,2.5 --to 0.08,-0.02,0.05 --fov 38 \
-    ! mesh ! write "$out/dragon-on-bunny.ply" ! measure
+    ! mesh ! write "$out/dragon-on-bunny.ply" ! measure > "$out/measure.txt"
 else
   echo "The scanned models are not in data/models (./dev fetch brings them): a knot of tubes stands on a ball instead."
   "$levelsmith" -v --report "$out/report.json" \
@@ -26,7 +26,14 @@ else
     ! texture @base @knot @top --map rbf --blend 3vx \
     ! fill-cavities ! keep --largest 1 ! check ! write "$out/demo.vdb" \
     ! render "$out/demo.exr" --png "$out/demo.png" --size 1280x960 \
-    ! mesh ! write "$out/demo.ply" ! measure
+    ! mesh ! write "$out/demo.ply" ! measure > "$out/measure.txt"
 fi
+cat "$out/measure.txt"
+for expected in "closed_manifold *true" "components *1" "shells *1" "cavities *0"; do
+  if ! grep -q "^$expected\$" "$out/measure.txt"; then
+    echo "The mesh is not as it should be: '$expected' does not hold in $out/measure.txt." >&2
+    exit 1
+  fi
+done
 echo "Made in $out:"
 ls -l "$out"

@@ -27,8 +27,9 @@ constexpr double kParticleBudget = 2000;
 constexpr double kSmallestSpacing = 1.5;  // voxels; closer ones say the same thing twice
 constexpr std::size_t kFewest = 4;        // particles along a side
 
+/// As one would give it on the command line, to the last bit.
 std::string asOption(const V3d& p) {
-  return fmt::format("{:.6g},{:.6g},{:.6g}", p.x, p.y, p.z);
+  return fmt::format("{},{},{}", p.x, p.y, p.z);
 }
 
 void checkPatchArguments(const std::array<V3d, 4>& corners, double height,

@@ -124,7 +124,26 @@ void validate(const Camera& camera) {
   }
 }
 
-Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double verticalFov) {
+namespace {
+
+/// Turns the default view, whose up is y, to another up.
+V3d viewFrom(const V3d& up) {
+  const V3d view(0.45, 0.35, 1);
+  const double length = up.length();
+  if (!(length > 0) || !std::isfinite(length))
+    throw levelset::UsageError("camera: up has no direction; give for example 0,1,0");
+  const V3d y = up / length;
+  if (y == V3d(0, 1, 0)) return view;
+  // z stays in front as far as it is across `up`; where up is z, -y is in front.
+  const V3d front = std::abs(y.z) < 0.9 ? V3d(0, 0, 1) : V3d(0, y.z > 0 ? -1 : 1, 0);
+  const V3d x = y.cross(front).normalized();
+  return x * view.x + y * view.y + x.cross(y) * view.z;
+}
+
+}  // namespace
+
+Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double verticalFov,
+                     const V3d& up) {
   if (bounds.isEmpty() || !isFinite(bounds.min) || !isFinite(bounds.max)) {
     throw levelset::UsageError("camera: there is no surface to frame; give the view with --from");
   }
@@ -133,7 +152,8 @@ Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double v
   camera.height = height;
   camera.verticalFov = verticalFov;
   camera.to = bounds.center();
-  camera.from = camera.to + V3d(0.45, 0.35, 1);
+  camera.up = up;
+  camera.from = camera.to + viewFrom(up);
   validate(camera);
 
   // A corner at (x, y, depth) beyond a camera that stands `back` behind the target and is shifted

@@ -37,9 +37,10 @@ inline constexpr double kMaxPixels = 268435456;  // 2^28
 /// @throws levelset::ResourceLimit for more than kMaxPixels
 void validate(const Camera& camera);
 
-/// A three-quarter view from the right, above and in front (y up) that just frames the box, at any
-/// aspect. @throws levelset::UsageError when the box is empty, and as validate()
+/// A three-quarter view from the right, above and in front of what is up, that just frames the box,
+/// at any aspect. @throws levelset::UsageError when the box is empty, and as validate()
 [[nodiscard]] Camera framingCamera(const Imath::Box3d& bounds, int width, int height,
-                                   double verticalFov = 0.6108652381980153);
+                                   double verticalFov = 0.6108652381980153,
+                                   const Imath::V3d& up = {0, 1, 0});
 
 }  // namespace render

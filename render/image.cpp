@@ -240,12 +240,17 @@ std::vector<float>& Image::addChannel(const std::string& name, float fill) {
   return channel;
 }
 
-void writeImage(const std::filesystem::path& path, const Image& image, const std::string& format) {
+std::string imageFormat(const std::filesystem::path& path, const std::string& format) {
   std::string kind = format;
   if (kind.empty() && path.has_extension()) kind = path.extension().string().substr(1);
   std::transform(kind.begin(), kind.end(), kind.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (kind != "exr" && kind != "png") {
+  return kind == "exr" || kind == "png" ? kind : "";
+}
+
+void writeImage(const std::filesystem::path& path, const Image& image, const std::string& format) {
+  const std::string kind = imageFormat(path, format);
+  if (kind.empty()) {
     throw levelset::UsageError(
         fmt::format("write image: {} names no format we write; end it in .exr or .png, or give the "
                     "format",

@@ -27,6 +27,10 @@ struct Image {
   std::vector<float>& addChannel(const std::string& name, float fill = 0);
 };
 
+/// "exr" or "png" by `format` or the extension of `path`, in any case; empty for others.
+[[nodiscard]] std::string imageFormat(const std::filesystem::path& path,
+                                      const std::string& format = {});
+
 /// Writes beside the target and renames when whole; the bytes depend on the image alone.
 /// EXR: every channel, 32 bits, ZIP, no date. PNG: R G B (and A, opaque without one), 8 bits: alpha
 /// is divided out, a shoulder bends what is above 0.6 towards 1, then the sRGB curve.

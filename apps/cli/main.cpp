@@ -78,6 +78,7 @@ int runChain(const pipeline::Chain& chain) {
   settings.dryRun = dryRun;
   settings.maxMemory = maxMemory;
   settings.measureErrors = verbose || globals.contains("report");
+  settings.begin = [](const std::string& action) { cli::tellAction(action); };
   settings.progress = [&](std::size_t index, const std::string& action, double fraction) {
     line.update(index, action, fraction);
   };
@@ -103,12 +104,17 @@ int runChain(const pipeline::Chain& chain) {
     if (verbose || dryRun)
       for (const pipeline::StepReport& step : report.steps)
         fmt::print(stderr, "{}\n", pipeline::stepLine(step, dryRun));
-    if (globals.contains("report") && !dryRun) pipeline::writeReport(globals.at("report"), report);
+    if (globals.contains("report")) pipeline::writeReport(globals.at("report"), report);
   };
   try {
     pipeline::run(chain, settings, report);
-  } catch (const levelset::Error&) {
-    finish();
+  } catch (const std::exception&) {
+    // What went wrong first is what the user must hear.
+    try {
+      finish();
+    } catch (const levelset::Error& error) {
+      fmt::print(stderr, "levelsmith: {}\n", error.what());
+    }
     throw;
   }
   finish();

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <ctime>
 #include <fstream>
+#include <mutex>
 #include <string>
 #include <thread>
 
@@ -17,6 +18,15 @@
 
 namespace cli {
 namespace {
+
+std::mutex actionMutex;
+std::string currentAction = "levelsmith";
+
+std::string memorySentence() {
+  const std::lock_guard lock(actionMutex);
+  return "\nlevelsmith: " + currentAction +
+         ": memory in use passes --max-memory; use larger voxels or a narrower band, or raise it\n";
+}
 
 [[noreturn]] void endNow(const char* sentence, int code) {
   levelset::removeTemporaryFiles();
@@ -40,12 +50,8 @@ void watch(sigset_t signals, std::size_t maxBytes) {
              static_cast<int>(levelset::ExitCode::Interrupted));
     if (signal > 0)
       endNow("\nlevelsmith: ended by a signal; unfinished files are removed\n", 128 + signal);
-    if (residentBytes() > maxBytes) {
-      endNow(
-          "\nlevelsmith: memory in use passes --max-memory; use larger voxels or a narrower band, "
-          "or raise it\n",
-          static_cast<int>(levelset::ExitCode::Resource));
-    }
+    if (residentBytes() > maxBytes)
+      endNow(memorySentence().c_str(), static_cast<int>(levelset::ExitCode::Resource));
   }
 }
 
@@ -61,6 +67,11 @@ void startWatch(std::size_t maxBytes) {
   for (int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, signal);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   std::thread(watch, signals, maxBytes).detach();
+}
+
+void tellAction(const std::string& action) {
+  const std::lock_guard lock(actionMutex);
+  currentAction = action;
 }
 
 std::size_t defaultMemoryLimit() {

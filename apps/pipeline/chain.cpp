@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "apps/pipeline/invocation.h"
+#include "apps/pipeline/script.h"
 #include "apps/pipeline/units.h"
 #include "levelset/error.h"
 
@@ -101,6 +102,10 @@ const Operator& matchOperator(const std::string& name) {
   if (const Operator* op = findOperator(name)) return *op;
   std::vector<std::string> names{"help"};
   for (const Operator& op : operators()) names.push_back(op.name);
+  if (name == "help") {
+    throw UsageError(
+        "levelsmith: help stands alone: `levelsmith help` or `levelsmith help ACTION`");
+  }
   const std::string guess = didYouMean(name, names);
   throw UsageError(fmt::format("levelsmith: there is no action '{}'{}", name,
                                guess.empty() ? "; `levelsmith help` lists them"
@@ -171,6 +176,7 @@ class KindChecker {
       if (std::find(allowed.begin(), allowed.end(), operands[i]) == allowed.end())
         throw UsageError(mismatch(op, i, operands[i], allowed));
     }
+    if (op.validate) op.validate(probe(action, operands));
     if (op.flow == Flow::PassesThrough) return;
     const Kind result = op.resultKind ? op.resultKind(probe(action, operands)) : Kind::Band;
     stack_.push_back(result);
@@ -259,11 +265,42 @@ void checkStandardStream(const Chain& chain, StreamUse use, const char* stream,
 
 }  // namespace
 
-Chain parseChain(const std::vector<std::string>& tokens) {
+namespace {
+
+Chain parse(Reader& reader, bool mayRun);
+
+/// `run FILE`: the chain that the file holds. Global options of the command line come first.
+Chain parseScript(Reader& reader, const Chain& before) {
+  const std::vector<std::string>& tokens = reader.tokens;
+  if (reader.next + 2 != tokens.size()) {
+    throw UsageError(
+        "run: takes one file, and nothing behind it; write the further actions into "
+        "the file");
+  }
+  const std::string file = tokens[reader.next + 1];
+  const Script script = readScript(file);
+  Reader inner{script.words};
+  try {
+    Chain chain = parse(inner, false);
+    for (const auto& [name, value] : before.globals) chain.globals[name] = value;
+    return chain;
+  } catch (const UsageError& error) {
+    // The reader stands behind the action that failed.
+    const std::size_t word = std::min(inner.next, script.lines.size());
+    throw UsageError(
+        fmt::format("{} ({}, line {})", error.what(), file, script.lines[word > 0 ? word - 1 : 0]));
+  }
+}
+
+Chain parse(Reader& reader, bool mayRun) {
+  const std::vector<std::string>& tokens = reader.tokens;
   Chain chain;
-  Reader reader{tokens};
   while (!reader.atEnd() && isOption(tokens[reader.next]))
     reader.readOption(globalParams(), "levelsmith", chain.globals);
+  if (!reader.atEnd() && tokens[reader.next] == "run") {
+    if (mayRun) return parseScript(reader, chain);
+    throw UsageError("run: a file of actions cannot run another one; put its actions here");
+  }
   KindChecker kinds;
   while (!reader.atEnd()) {
     if (reader.atBang()) {
@@ -281,10 +318,20 @@ Chain parseChain(const std::vector<std::string>& tokens) {
   }
   if (chain.actions.empty())
     throw UsageError("levelsmith: nothing to do; `levelsmith help` shows how to begin");
+  return chain;
+}
+
+}  // namespace
+
+Chain parseChain(const std::vector<std::string>& tokens) {
+  Reader reader{tokens};
+  const Chain chain = parse(reader, true);
   const bool reportsThere = chain.globals.contains("report") && chain.globals.at("report") == "-";
   checkStandardStream(chain, &Operator::usesStandardOutput, "output",
                       reportsThere ? "--report" : "");
-  checkStandardStream(chain, &Operator::usesStandardInput, "input", "");
+  const bool scripted = tokens.size() >= 2 && tokens[tokens.size() - 2] == "run";
+  checkStandardStream(chain, &Operator::usesStandardInput, "input",
+                      scripted && tokens.back() == "-" ? "'run'" : "");
   return chain;
 }
 

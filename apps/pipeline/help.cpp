@@ -55,8 +55,8 @@ const char* typeName(ParamType type) {
       return "integer";
     case ParamType::Length:
       return "length";
-    case ParamType::LengthPair:
-      return "length pair";
+    case ParamType::Lengths:
+      return "lengths";
     case ParamType::Degrees:
       return "degrees";
     case ParamType::Numbers:

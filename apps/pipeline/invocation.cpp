@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 
@@ -85,10 +86,16 @@ double Invocation::length(const std::string& name) {
   return toWorld(name, text(name));
 }
 
-std::pair<double, double> Invocation::lengthPair(const std::string& name) {
-  const std::string both = text(name);
-  const std::size_t comma = both.find(',');
-  return {toWorld(name, both.substr(0, comma)), toWorld(name, both.substr(comma + 1))};
+std::vector<double> Invocation::lengths(const std::string& name) {
+  std::vector<double> result;
+  const std::string all = text(name);
+  for (std::size_t begin = 0; begin <= all.size();) {
+    const std::size_t end = std::min(all.find(',', begin), all.size());
+    result.push_back(toWorld(name, all.substr(begin, end - begin)));
+    notes.lengths.back().param += fmt::format("[{}]", result.size() - 1);
+    begin = end + 1;
+  }
+  return result;
 }
 
 bool Invocation::asksVoxelSize() const {
@@ -99,10 +106,13 @@ bool Invocation::asksVoxelSize() const {
   return given("voxel") || given("resolution");
 }
 
-double Invocation::voxelSize(double longestSide) {
-  if (!asksVoxelSize()) {
+void Invocation::requireVoxelSize() const {
+  if (!asksVoxelSize())
     throw UsageError(fmt::format("{}: how fine? give --voxel L or --resolution N", op_->name));
-  }
+}
+
+double Invocation::voxelSize(double longestSide) {
+  requireVoxelSize();
   if (given("voxel")) return length("voxel");
   const long resolution = integer("resolution");
   if (!(longestSide > 0)) {
@@ -111,8 +121,10 @@ double Invocation::voxelSize(double longestSide) {
                     resolution, longestSide));
   }
   const double voxel = longestSide / static_cast<double>(resolution);
-  notes.lengths.push_back(
-      {.param = "voxel", .written = fmt::format("--resolution {}", resolution), .world = voxel});
+  notes.lengths.push_back({.param = "voxel",
+                           .written = fmt::format("--resolution {}", resolution),
+                           .world = voxel,
+                           .voxels = 1});
   return voxel;
 }
 

@@ -73,9 +73,12 @@ class Invocation {
   [[nodiscard]] std::pair<int, int> imageSize(const std::string& name) const;
   /// World units. `vx` and `%` refer to the first operand, or to setReference().
   [[nodiscard]] double length(const std::string& name);
-  [[nodiscard]] std::pair<double, double> lengthPair(const std::string& name);
+  /// As many as its parameter counts.
+  [[nodiscard]] std::vector<double> lengths(const std::string& name);
   /// The voxel size asked by --voxel or --resolution; the latter needs the object's longest side.
   [[nodiscard]] double voxelSize(double longestSide);
+  /// Refuses a call that gives neither --voxel nor --resolution, or both.
+  void requireVoxelSize() const;
   /// True when --voxel or --resolution was given; both, or a `vx` beside --resolution, are refused.
   [[nodiscard]] bool asksVoxelSize() const;
   void setReference(double voxelSize, double diagonal);

@@ -22,8 +22,8 @@ std::string valueForm(const Param& param) {
       return "N";
     case ParamType::Length:
       return "L";
-    case ParamType::LengthPair:
-      return "L,L";
+    case ParamType::Lengths:
+      return param.count == 2 ? "L,L" : "L,L,L";
     case ParamType::Degrees:
       return "DEG";
     case ParamType::Numbers:
@@ -83,8 +83,10 @@ void checkText(const Param& param, const std::string& text, const std::string& w
       }
       return checkRange(param, length.number, text, where);
     }
-    case ParamType::LengthPair:
-      return void(parseLengthPair(text, where));
+    case ParamType::Lengths:
+      for (const Length& length : parseLengths(text, param.count, where))
+        checkRange(param, length.number, text, where);
+      return;
     case ParamType::Numbers:
       for (double number : parseNumbers(text, where)) checkRange(param, number, text, where);
       return;

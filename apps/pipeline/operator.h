@@ -17,7 +17,7 @@ enum class ParamType {
   Number,
   Integer,
   Length,
-  LengthPair,
+  Lengths,
   Degrees,
   Numbers,
   Point,
@@ -41,6 +41,7 @@ struct Param {
   std::vector<std::string> choices = {};  ///< of a Choice
   Range range = Range::Any;
   bool required = false;
+  std::size_t count = 1;     ///< Lengths: how many, with commas between them
   int position = -1;         ///< ≥ 0: may be given without its name, at this place
   bool allowsVoxels = true;  ///< Length: may it be given in vx?
   bool allowsAuto = false;   ///< Length: `auto` is an answer too
@@ -73,6 +74,11 @@ struct Operator {
   std::function<Value(Invocation&)> run = {};
   /// What `run` would return, for --dry-run; by default the plan of the first operand.
   std::function<Plan(Invocation&)> plan = {};
+  /// Refuses, before anything runs, what can be told from the options and the kinds of the
+  /// operands: options that exclude each other, formats, what is missing.
+  std::function<void(const Invocation&)> validate = {};
+  /// The files that it will write: refused before anything runs when they cannot be made.
+  std::function<std::vector<std::string>(const Invocation&)> targets = {};
   /// Does it claim standard output, or input, for data? Text for people goes to standard error
   /// then.
   std::function<bool(const Invocation&)> usesStandardOutput = {};

@@ -18,6 +18,7 @@ Json toJson(const StepReport& step) {
   json["action"] = step.action;
   if (!step.resultName.empty()) json["name"] = step.resultName;
   json["parameters"] = step.parameters;
+  json["defaults"] = step.defaults;
   for (const Resolved& length : step.notes.lengths) {
     Json& entry = json["resolved"][length.param];
     entry["written"] = length.written;
@@ -87,6 +88,7 @@ std::string reportJson(const RunReport& report) {
   Json json;
   json["version"] = LEVELSMITH_VERSION;
   json["exit_code"] = report.exitCode;
+  if (report.dryRun) json["dry_run"] = true;
   if (!report.error.empty()) json["error"] = report.error;
   json["steps"] = Json::array();
   for (const StepReport& step : report.steps) json["steps"].push_back(toJson(step));
@@ -104,6 +106,11 @@ std::string reportHtml(const RunReport& report) {
       "voxels<th>error<th>notes\n";
   for (const StepReport& step : report.steps) {
     std::string notes;
+    for (const Resolved& length : step.notes.lengths) {
+      notes += escaped(fmt::format("{} = {:.6g}", length.param, length.world));
+      if (length.voxels) notes += fmt::format(" ({:.4g} vx)", *length.voxels);
+      notes += "<br>";
+    }
     for (const std::string& text : step.notes.notes) notes += escaped(text) + "<br>";
     for (const std::string& text : step.notes.warnings) notes += "<b>" + escaped(text) + "</b><br>";
     page += fmt::format(

@@ -9,6 +9,7 @@
 #include <new>
 
 #include "levelset/error.h"
+#include "levelset/file_target.h"
 #include "levelset/inspect/check.h"
 #include "levelset/sample.h"
 
@@ -95,6 +96,42 @@ class Stack {
   std::map<std::string, bool> usedNames_;
 };
 
+/// A refusal from deeper down, told as one of the action that the user wrote.
+[[noreturn]] void refuseAs(const std::string& action, const levelset::Error& error) {
+  using levelset::ExitCode;
+  std::string sentence = error.what();
+  if (!sentence.starts_with(action + ":")) sentence = action + ": " + sentence;
+  switch (error.exitCode()) {
+    case ExitCode::Usage:
+      throw levelset::UsageError(sentence);
+    case ExitCode::Resource:
+      throw levelset::ResourceLimit(sentence);
+    case ExitCode::Numeric:
+      throw levelset::NumericalError(sentence);
+    case ExitCode::File:
+      throw levelset::IoError(sentence);
+    case ExitCode::Interrupted:
+      throw levelset::Cancelled(sentence);
+    case ExitCode::Input:
+    case ExitCode::Done:
+      break;
+  }
+  throw InvalidInput(sentence);
+}
+
+/// Refuses targets that cannot be written before time is spent on what should go there.
+void checkTargets(const Chain& chain) {
+  for (const Action& action : chain.actions) {
+    if (!action.op->targets) continue;
+    try {
+      for (const std::string& target : action.op->targets(Invocation(*action.op, action.options)))
+        const levelset::FileTarget probe(target);
+    } catch (const levelset::Error& error) {
+      refuseAs(action.op->name, error);
+    }
+  }
+}
+
 /// How far off a result may be, by what can be told from the result itself.
 void estimateError(const Value& value, const Invocation& invocation, StepNotes& notes) {
   if (value.kind() == Kind::Band) {
@@ -140,10 +177,12 @@ Plan planOf(Invocation& invocation) {
   return plan;
 }
 
+/// @param stop  ends the timing of the step; what follows is the report's own work
 void runAction(const Action& action, std::size_t index, const RunSettings& settings, Stack& stack,
-               StepReport& step) {
+               StepReport& step, const std::function<void()>& stop) {
   const Operator& op = *action.op;
   Invocation invocation(op, action.options);
+  if (settings.begin) settings.begin(op.name);
   invocation.operands = stack.take(action);
   invocation.maxMemory = settings.maxMemory;
   invocation.dryRun = settings.dryRun;
@@ -172,6 +211,7 @@ void runAction(const Action& action, std::size_t index, const RunSettings& setti
       Value value = op.run(invocation);
       if (op.flow == Flow::Makes) {
         describeResult(value, false, step);
+        stop();
         if (settings.measureErrors) estimateError(value, invocation, invocation.notes);
         stack.push(std::move(value), action.resultName);
       }
@@ -187,37 +227,52 @@ void runAction(const Action& action, std::size_t index, const RunSettings& setti
 
 void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
   Stack stack;
+  report.dryRun = settings.dryRun;
   try {
+    checkTargets(chain);
     for (std::size_t i = 0; i < chain.actions.size(); ++i) {
       const Action& action = chain.actions[i];
       StepReport& step = report.steps.emplace_back();
       step.action = action.op->name;
       step.parameters = action.options;
+      for (const Param& param : action.op->params)
+        if (!param.fallback.empty() && !action.options.contains(param.name))
+          step.defaults[param.name] = param.fallback;
       step.resultName = action.resultName;
       resetPeak();
       const auto start = std::chrono::steady_clock::now();
       const double cpuStart = cpuSeconds();
+      bool stopped = false;
       const auto stop = [&] {
+        if (stopped) return;
+        stopped = true;
         step.wallSeconds =
             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         step.cpuSeconds = cpuSeconds() - cpuStart;
         step.peakBytes = peakBytes();
       };
       try {
-        runAction(action, i, settings, stack, step);
+        runAction(action, i, settings, stack, step, stop);
+        stop();
       } catch (const std::bad_alloc&) {
         stop();
         throw levelset::ResourceLimit(fmt::format(
             "{}: memory ran out; use larger voxels or a narrower band", action.op->name));
+      } catch (const levelset::Error& error) {
+        stop();
+        refuseAs(action.op->name, error);
       } catch (...) {
         stop();
         throw;
       }
-      stop();
     }
   } catch (const levelset::Error& error) {
     report.error = error.what();
     report.exitCode = static_cast<int>(error.exitCode());
+    throw;
+  } catch (const std::exception& error) {
+    report.error = error.what();
+    report.exitCode = static_cast<int>(levelset::ExitCode::Input);
     throw;
   }
   for (const std::string& sentence : stack.unused()) {

@@ -14,6 +14,8 @@ struct RunSettings {
   bool dryRun = false;
   bool measureErrors = false;  ///< estimate each result's error: costs a pass over it
   std::size_t maxMemory = levelset::kNoMemoryLimit;
+  /// Called with the name of each action before it runs.
+  std::function<void(const std::string&)> begin = {};
   /// Called with the action's place in the chain, its name and the fraction done.
   std::function<void(std::size_t, const std::string&, double)> progress = {};
   /// Text for people that an action prints.
@@ -25,6 +27,7 @@ struct RunSettings {
 struct StepReport {
   std::string action;
   std::map<std::string, std::string> parameters;  ///< as written
+  std::map<std::string, std::string> defaults;    ///< of those that were not
   StepNotes notes;
   double wallSeconds = 0, cpuSeconds = 0;
   double peakBytes = 0;
@@ -38,6 +41,7 @@ struct RunReport {
   std::vector<std::string> warnings;  ///< about the chain as a whole
   std::string error;                  ///< the sentence that ended it, if one did
   int exitCode = 0;
+  bool dryRun = false;
 };
 
 /// Runs the actions in order. A refusal is recorded in the report and then thrown on.

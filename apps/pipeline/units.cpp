@@ -145,16 +145,15 @@ std::pair<int, int> parseImageSize(std::string_view text, std::string_view where
   return {static_cast<int>(width), static_cast<int>(height)};
 }
 
-std::pair<Length, Length> parseLengthPair(std::string_view text, std::string_view where) {
+std::vector<Length> parseLengths(std::string_view text, std::size_t count, std::string_view where) {
   const std::vector<std::string_view> parts = split(text, ",");
-  if (parts.size() != 2) {
-    throw UsageError(fmt::format("{}: '{}' is not a size; write it as a,b", where, text));
+  if (parts.size() != count) {
+    throw UsageError(fmt::format("{}: '{}' is not a size; write it as {}", where, text,
+                                 count == 2 ? "a,b" : "a,b,c"));
   }
-  const std::pair<Length, Length> pair{parseLength(parts[0], where), parseLength(parts[1], where)};
-  if (!(pair.first.number > 0) || !(pair.second.number > 0)) {
-    throw UsageError(fmt::format("{}: '{}' must be positive on both sides", where, text));
-  }
-  return pair;
+  std::vector<Length> lengths;
+  for (std::string_view part : parts) lengths.push_back(parseLength(part, where));
+  return lengths;
 }
 
 std::size_t parseBytes(std::string_view text, std::string_view where) {

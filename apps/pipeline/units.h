@@ -33,9 +33,9 @@ struct Length {
 [[nodiscard]] Imath::Box3d parseBox(std::string_view text, std::string_view where);
 /// "WxH", each at least 1.
 [[nodiscard]] std::pair<int, int> parseImageSize(std::string_view text, std::string_view where);
-/// "a,b": two lengths, positive.
-[[nodiscard]] std::pair<Length, Length> parseLengthPair(std::string_view text,
-                                                        std::string_view where);
+/// "a,b" or "a,b,c": `count` lengths.
+[[nodiscard]] std::vector<Length> parseLengths(std::string_view text, std::size_t count,
+                                               std::string_view where);
 /// "4G", "512M", "1.5T", "100000": bytes, with powers of 1024.
 [[nodiscard]] std::size_t parseBytes(std::string_view text, std::string_view where);
 /// 16 numbers, or 12 (the last column 0 0 0 1 left out), separated by commas or blanks; acts on row

@@ -94,8 +94,8 @@ bool isMeshFormat(const fs::path& nameOrFormat) {
   return findFormat(nameOrFormat).has_value();
 }
 
-MeshFileInfo meshFileInfo(const fs::path& path) {
-  const FormatChoice choice = meshFormat(path, {}, "info");
+MeshFileInfo meshFileInfo(const fs::path& path, const std::string& format) {
+  const FormatChoice choice = meshFormat(path, format, "info");
   const std::string name = inputName(path);
   const Bytes head = readFirstBytes(path, kInfoBytes);
   if (head.size() == 0) failFile(name, "is empty; fetch or make the file again");

@@ -44,6 +44,8 @@ struct MeshFileInfo {
   std::size_t vertices = 0;  ///< 0 when only a full read would tell
   std::size_t faces = 0;
 };
-[[nodiscard]] MeshFileInfo meshFileInfo(const std::filesystem::path& path);
+/// @param format  as in ReadMeshOptions
+[[nodiscard]] MeshFileInfo meshFileInfo(const std::filesystem::path& path,
+                                        const std::string& format = {});
 
 }  // namespace levelset

@@ -20,9 +20,6 @@ using convert::SignField;
 using Imath::V3d;
 using Imath::V3i;
 
-/// Above this share of ambiguous voxels the sign is called a guess.
-constexpr double kGuess = 1e-3;
-
 /// The caller's progress, made to never fall while stages repeat.
 Progress rising(const Progress& progress) {
   if (!progress) return {};
@@ -98,7 +95,7 @@ void checkResult(const openvdb::FloatGrid& grid, const SignCertificate& certific
         "point ({} boundary edges); close it first, or use smaller voxels",
         certificate.boundaryEdges));
   }
-  if (certificate.ambiguousShare > kGuess && !options.signAnyway)
+  if (certificate.ambiguousShare > kAmbiguousLimit && !options.signAnyway)
     throw InvalidInput(fmt::format(
         "level-set: inside and outside are a guess at {:.2g} % of the voxels next to the "
         "surface ({} boundary edges, {} non-manifold); close the holes, or accept the guess "

@@ -30,6 +30,9 @@ struct MeshToBandOptions {
   Progress progress = {};
 };
 
+/// A larger SignCertificate::ambiguousShare makes the sign a guess.
+inline constexpr double kAmbiguousLimit = 1e-3;
+
 /// Why the sign may be trusted, or not.
 struct SignCertificate {
   bool closed = false;                    ///< every edge has exactly two faces

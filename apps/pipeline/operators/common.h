@@ -2,6 +2,7 @@
 
 // Parameters that several operators share.
 
+#include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operator.h"
 
 namespace pipeline {
@@ -18,6 +19,9 @@ inline Param resolutionParam() {
           .type = ParamType::Integer,
           .doc = "in place of --voxel: voxels along the longest side of the object",
           .range = Range::Positive};
+}
+inline void requireVoxelSize(const Invocation& in) {
+  in.requireVoxelSize();
 }
 inline Param halfWidthParam(const char* fallback = "3") {
   return {.name = "half-width",

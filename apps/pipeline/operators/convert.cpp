@@ -52,6 +52,11 @@ Value levelSet(Invocation& in) {
       levelset::meshToBand(in.mesh(), in.voxelSize(longestSide(in.operands[0])), options);
   in.notes.certificateJson = certificateJson(result.certificate);
   in.notes.notes.push_back(describe(result.certificate));
+  if (options.signAnyway && result.certificate.ambiguousShare > levelset::kAmbiguousLimit) {
+    in.notes.warnings.push_back(
+        fmt::format("the sign is a guess at a share of {:.2g} of the voxels beside the surface",
+                    result.certificate.ambiguousShare));
+  }
   return Value(std::move(result.band));
 }
 
@@ -105,6 +110,7 @@ void addConversionOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Mesh}},
       .run = levelSet,
       .plan = planLevelSet,
+      .validate = requireVoxelSize,
   });
   all.push_back({
       .name = "mesh",
@@ -122,6 +128,14 @@ void addConversionOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .resultKind = [](const Invocation&) { return Kind::Mesh; },
       .run = mesh,
+      .validate =
+          [](const Invocation& in) {
+            if (in.number("adaptivity") > 1)
+              throw levelset::UsageError("mesh: --adaptivity must lie between 0 and 1");
+            if (in.flag("sharp") && in.number("adaptivity") > 0)
+              throw levelset::UsageError(
+                  "mesh: --sharp and --adaptivity exclude each other; give one");
+          },
   });
 }
 

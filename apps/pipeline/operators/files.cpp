@@ -59,27 +59,32 @@ Plan planRead(Invocation& in) {
   return read(in).plan();
 }
 
+void validateRead(const Invocation& in) {
+  if (fileKind(in) == Kind::Mesh && in.given("grid"))
+    throw UsageError("read: --grid picks a grid of a .vdb, and this is a mesh; leave it out");
+}
+
+void validateWrite(const Invocation& in) {
+  const Kind kind = fileKind(in), held = in.operands[0].kind();
+  if (held != kind) {
+    throw UsageError(fmt::format("write: a {} cannot be written as '{}'; {}", kindName(held),
+                                 formatName(in),
+                                 held == Kind::Band ? "put 'mesh' before it, or write .vdb"
+                                                    : "put 'level-set' before it, or write .ply"));
+  }
+  if (kind == Kind::Mesh && in.given("name"))
+    throw UsageError("write: --name is that of a grid, and this is a mesh; leave it out");
+}
+
 Value write(Invocation& in) {
   const std::filesystem::path file = in.text("file");
   const Value& value = in.operands[0];
-  const Kind kind = fileKind(in);
-  if (value.kind() != kind) {
-    throw UsageError(fmt::format(
-        "write: a {} cannot be written as '{}'; {}", kindName(value.kind()), formatName(in),
-        value.kind() == Kind::Band ? "put 'mesh' before it, or write .vdb"
-                                   : "put 'level-set' before it, or write .ply"));
-  }
-  if (kind == Kind::Mesh) {
+  if (value.kind() == Kind::Mesh) {
     levelset::writeMesh(file, value.mesh(), {.format = in.text("format"), .progress = in.progress});
   } else {
     levelset::writeBand(file, value.band(), {.name = in.text("name"), .format = in.text("format")});
   }
   return value;
-}
-
-Plan planWrite(Invocation& in) {
-  (void)fileKind(in);
-  return in.operands[0].plan();
 }
 
 }  // namespace
@@ -104,6 +109,7 @@ void addFileOperators(std::vector<Operator>& all) {
       .resultKind = fileKind,
       .run = read,
       .plan = planRead,
+      .validate = validateRead,
       .usesStandardInput = isStandardStream,
   });
   all.push_back({
@@ -129,7 +135,8 @@ void addFileOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Mesh, Kind::Band}},
       .flow = Flow::PassesThrough,
       .run = write,
-      .plan = planWrite,
+      .validate = validateWrite,
+      .targets = [](const Invocation& in) { return std::vector{in.text("file")}; },
       .usesStandardOutput = isStandardStream,
   });
 }

@@ -27,6 +27,11 @@ std::string coordinates(const Imath::V3d& v) {
   return fmt::format("{:.6g},{:.6g},{:.6g}", v.x, v.y, v.z);
 }
 
+/// File and grid names may be of any bytes.
+std::string printed(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
 bool asksJson(const Invocation& in) {
   return in.flag("json");
 }
@@ -62,7 +67,7 @@ Value measure(Invocation& in) {
   }
   in.notes.detailsJson = json.dump();
   if (asksJson(in)) {
-    in.output = json.dump(2) + "\n";
+    in.output = printed(json);
     return value;
   }
   for (const auto& [key, entry] : json.items()) {
@@ -98,7 +103,7 @@ Value check(Invocation& in) {
   in.notes.detailsJson = json.dump();
   in.notes.errors.push_back({"eikonal residual, mean", report.eikonalMean, ""});
   if (asksJson(in))
-    in.output = json.dump(2) + "\n";
+    in.output = printed(json);
   else
     in.output += fmt::format("eikonal residual: mean {:.3g}, largest {:.3g}\n", report.eikonalMean,
                              report.eikonalMax);
@@ -109,15 +114,20 @@ Value check(Invocation& in) {
   return in.operands[0];
 }
 
+/// Counts that a header does not tell are 0 there.
+Json countOrNull(std::uint64_t count) {
+  return count > 0 ? Json(count) : Json(nullptr);
+}
+
 Json fileInfo(const std::string& file, const std::string& format) {
   Json json;
   json["file"] = file;
   const std::string name = format.empty() ? file : format;
   if (levelset::isMeshFormat(name)) {
-    const levelset::MeshFileInfo info = levelset::meshFileInfo(file);
+    const levelset::MeshFileInfo info = levelset::meshFileInfo(file, format);
     json["format"] = info.format;
-    json["vertices"] = info.vertices;
-    json["faces"] = info.faces;
+    json["vertices"] = countOrNull(info.vertices);
+    json["faces"] = countOrNull(info.faces);
     return json;
   }
   if (!levelset::isBandFormat(name)) {
@@ -131,8 +141,8 @@ Json fileInfo(const std::string& file, const std::string& format) {
                {"type", grid.type},
                {"class", grid.gridClass},
                {"voxel_size", grid.voxelSize},
-               {"active_voxels", grid.activeVoxels},
-               {"bytes", grid.bytes}};
+               {"active_voxels", countOrNull(grid.activeVoxels)},
+               {"bytes", countOrNull(grid.bytes)}};
     entry["index_bounds"] = toJson(grid.indexBounds);
     json["grids"].push_back(entry);
   }
@@ -168,7 +178,9 @@ void appendText(const Json& json, const std::string& indent, std::string& text) 
       }
     } else if (!entry.is_null()) {
       text += fmt::format("{}{:<16}{}\n", indent, key,
-                          entry.is_string() ? entry.get<std::string>() : entry.dump());
+                          entry.is_string()
+                              ? entry.get<std::string>()
+                              : entry.dump(-1, ' ', false, Json::error_handler_t::replace));
     }
   }
 }
@@ -184,7 +196,7 @@ Value info(Invocation& in) {
         "info: of what? name a file, or put it behind an action that makes something");
   }
   if (asksJson(in))
-    in.output = json.dump(2) + "\n";
+    in.output = printed(json);
   else
     appendText(json, "", in.output);
   return in.operands.empty() ? Value(Plan{}) : in.operands[0];
@@ -234,6 +246,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
       .run = info,
       .plan = [](Invocation&) { return Plan{}; },
       .usesStandardOutput = asksJson,
+      .usesStandardInput = [](const Invocation& in) { return in.text("file") == "-"; },
   });
 }
 

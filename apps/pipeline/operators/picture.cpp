@@ -15,9 +15,6 @@ using levelset::UsageError;
 render::Camera cameraOf(Invocation& in) {
   const auto [width, height] = in.imageSize("size");
   const double fov = in.radians("fov");
-  if (!(fov < 3.1))
-    throw UsageError(
-        fmt::format("render: --fov {} degrees is too wide; it must be below 177", in.text("fov")));
   render::Camera camera;
   if (in.given("from")) {
     camera.from = in.point("from");
@@ -27,21 +24,47 @@ render::Camera cameraOf(Invocation& in) {
     camera.verticalFov = fov;
     camera.up = in.point("up");
   } else {
-    if (in.given("to")) throw UsageError("render: --to needs --from beside it");
-    camera = render::framingCamera(in.operands[0].plan().bounds, width, height, fov);
-    if (in.given("up")) camera.up = in.point("up");
+    camera =
+        render::framingCamera(in.operands[0].plan().bounds, width, height, fov, in.point("up"));
   }
   if (in.given("ortho")) camera.orthoHeight = in.length("ortho");
   render::validate(camera);
   return camera;
 }
 
+constexpr long kMostSamples = 4096;
+
+void validateDraw(const Invocation& in) {
+  if (in.given("to") && !in.given("from")) throw UsageError("render: --to needs --from beside it");
+  if (!(in.radians("fov") < 3.1))
+    throw UsageError(
+        fmt::format("render: --fov {} degrees is too wide; it must be below 177", in.text("fov")));
+  if (in.integer("samples") > kMostSamples)
+    throw UsageError(fmt::format("render: --samples {} is too many; {} are the most",
+                                 in.text("samples"), kMostSamples));
+  if (render::imageFormat(in.text("file"), in.text("format")).empty()) {
+    throw UsageError(
+        fmt::format("render: '{}' is of no known format; use .exr or .png, or --format",
+                    in.text(in.given("format") ? "format" : "file")));
+  }
+  if (in.text("file") == "-" && in.text("png") == "-")
+    throw UsageError("render: two images cannot share standard output; use a file for one");
+}
+
+std::vector<std::string> targetsOf(const Invocation& in) {
+  std::vector<std::string> targets{in.text("file")};
+  if (in.given("png")) targets.push_back(in.text("png"));
+  return targets;
+}
+
 Value draw(Invocation& in) {
   render::Scene scene;
   scene.camera = cameraOf(in);
   scene.solids.push_back({.band = in.band()});
-  const render::Image image = render::renderEmbree(
-      scene, {.samples = static_cast<int>(in.integer("samples")), .progress = in.progress});
+  const render::Image image =
+      render::renderEmbree(scene, {.samples = static_cast<int>(in.integer("samples")),
+                                   .maxBytes = in.maxMemory,
+                                   .progress = in.progress});
   render::writeImage(in.text("file"), image, in.text("format"));
   if (in.given("png")) render::writeImage(in.text("png"), image, "png");
   return in.operands[0];
@@ -102,7 +125,10 @@ void addPictureOperators(std::vector<Operator>& all) {
       .flow = Flow::PassesThrough,
       .run = draw,
       .plan = planDraw,
-      .usesStandardOutput = [](const Invocation& in) { return in.text("file") == "-"; },
+      .validate = validateDraw,
+      .targets = targetsOf,
+      .usesStandardOutput =
+          [](const Invocation& in) { return in.text("file") == "-" || in.text("png") == "-"; },
   });
 }
 

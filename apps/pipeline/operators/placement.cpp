@@ -19,15 +19,20 @@ using Imath::V3d;
 using levelset::UsageError;
 
 Value clip(Invocation& in) {
-  if (in.given("box") == in.given("plane")) throw UsageError("clip: give one of --box and --plane");
   if (in.given("box")) return Value(levelset::clip(in.band(), in.box("box")));
+  const std::vector<V3d> plane = in.points("plane");
+  return Value(levelset::clip(in.band(), Imath::Plane3d(plane[0], plane[1].normalized())));
+}
+
+void validateClip(const Invocation& in) {
+  if (in.given("box") == in.given("plane")) throw UsageError("clip: give one of --box and --plane");
+  if (in.given("box")) return;
   const std::vector<V3d> plane = in.points("plane");
   if (plane.size() != 2 || !(plane[1].length() > 0)) {
     throw UsageError(
         "clip: --plane needs a point and a normal, \"x,y,z x,y,z\"; what lies behind the plane "
         "stays");
   }
-  return Value(levelset::clip(in.band(), Imath::Plane3d(plane[0], plane[1].normalized())));
 }
 
 M44d rotationMatrix(const Invocation& in) {
@@ -53,7 +58,7 @@ M44d rotationMatrix(const Invocation& in) {
 }
 
 /// matrix, then mirror, scale, rotate, translate.
-M44d matrixOf(Invocation& in) {
+M44d matrixOf(const Invocation& in) {
   M44d matrix;
   if (in.given("matrix")) matrix = in.matrix("matrix");
   const V3d about = in.point("about");
@@ -94,6 +99,22 @@ bool isSimilarity(const M44d& m) {
          std::abs(z.dot(x)) < tolerance && x.cross(y).dot(z) > 0;
 }
 
+void validateTransform(const Invocation& in) {
+  const M44d matrix = matrixOf(in);
+  if (in.operands[0].kind() == Kind::Mesh) {
+    if (in.flag("bake") || in.given("voxel"))
+      throw UsageError("transform: --bake and --voxel are for level sets, and this is a mesh");
+    return;
+  }
+  if (in.flag("bake")) return;
+  if (in.given("voxel")) throw UsageError("transform: --voxel goes with --bake");
+  if (!isSimilarity(matrix)) {
+    throw UsageError(
+        "transform: a level set that is mirrored, sheared or scaled unevenly must be resampled; "
+        "add --bake");
+  }
+}
+
 Value transform(Invocation& in) {
   const M44d matrix = matrixOf(in);
   if (in.operands[0].kind() == Kind::Mesh) return Value(levelset::transform(in.mesh(), matrix));
@@ -101,12 +122,6 @@ Value transform(Invocation& in) {
     const double voxel = in.given("voxel") ? in.length("voxel") : in.band().voxelSize();
     return Value(levelset::bake(in.band(), matrix, voxel,
                                 {.maxMemory = in.maxMemory, .progress = in.progress}));
-  }
-  if (in.given("voxel")) throw UsageError("transform: --voxel goes with --bake");
-  if (!isSimilarity(matrix)) {
-    throw UsageError(
-        "transform: a level set that is mirrored, sheared or scaled unevenly must be resampled; "
-        "add --bake");
   }
   levelset::NarrowBand band = in.band();
   in.operands.clear();
@@ -204,6 +219,7 @@ void addPlacementOperators(std::vector<Operator>& all) {
       .resultKind = sameKind,
       .run = transform,
       .plan = planTransform,
+      .validate = validateTransform,
   });
   all.push_back({
       .name = "resample",
@@ -220,6 +236,7 @@ void addPlacementOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = resample,
       .plan = planResample,
+      .validate = requireVoxelSize,
   });
   all.push_back({
       .name = "clip",
@@ -233,6 +250,7 @@ void addPlacementOperators(std::vector<Operator>& all) {
                   .doc = "point and normal: keep what lies behind"}},
       .operands = {{Kind::Band}},
       .run = clip,
+      .validate = validateClip,
   });
 }
 

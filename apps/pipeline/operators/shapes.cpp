@@ -63,7 +63,8 @@ Shape sphere(Invocation& in) {
 }
 
 Shape box(Invocation& in) {
-  const V3d size = in.point("size"), center = in.point("center");
+  const std::vector<double> sides = in.lengths("size");
+  const V3d size(sides[0], sides[1], sides[2]), center = in.point("center");
   return {boxAbout(center, size / 2), 2 * (size.x * size.y + size.y * size.z + size.z * size.x),
           [=](double voxel, const auto& options) {
             return levelset::makeBox(size, center, voxel, options);
@@ -158,7 +159,8 @@ Operator shape(const char* name, const char* summary, const char* example,
           .example = example,
           .params = std::move(params),
           .run = make<describe>,
-          .plan = plan<describe>};
+          .plan = plan<describe>,
+          .validate = requireVoxelSize};
 }
 
 }  // namespace
@@ -167,8 +169,9 @@ void addShapeOperators(std::vector<Operator>& all) {
   all.push_back(shape<sphere>("sphere", "make a ball",
                               "levelsmith sphere --radius 10 --voxel 0.5 ! measure",
                               {positive("radius", "of the ball"), center()}));
-  Param size = place("size", "full extents, world units");
-  size.range = Range::Positive;
+  Param size = positive("size", "full extents");
+  size.type = ParamType::Lengths;
+  size.count = 3;
   all.push_back(shape<box>("box", "make a box along the axes",
                            "levelsmith box --size 40,40,10 --voxel 0.5 ! write box.vdb",
                            {size, center()}));

@@ -15,19 +15,41 @@ namespace {
 using Imath::V3d;
 using levelset::UsageError;
 
-std::array<V3d, 4> cornersOf(Invocation& in) {
-  if (in.given("corners") == in.given("at")) {
+constexpr long kMostLevels = 1000;
+
+void validatePatch(const Invocation& in) {
+  if (in.given("corners") == in.given("at"))
     throw UsageError("patch: give either --corners \"p0 p1 p2 p3\" or --at p --size a,b");
+  if (in.given("at") && !in.given("size"))
+    throw UsageError("patch: --at needs --size a,b beside it");
+  if (in.given("corners")) {
+    if (in.given("size") || in.given("rotate"))
+      throw UsageError("patch: --size and --rotate go with --at, not with --corners");
+    const std::size_t count = in.points("corners").size();
+    if (count != 4)
+      throw UsageError(fmt::format("patch: --corners needs four points, not {}", count));
   }
+  const long levels = in.integer("levels");
+  if (levels < 2 || levels > kMostLevels) {
+    throw UsageError(
+        fmt::format("patch: --levels {} is out of range; give 2 to {}", levels, kMostLevels));
+  }
+}
+
+std::array<V3d, 4> cornersOf(Invocation& in) {
   if (in.given("corners")) {
     const std::vector<V3d> points = in.points("corners");
-    if (points.size() != 4)
-      throw UsageError(fmt::format("patch: --corners needs four points, not {}", points.size()));
     return {points[0], points[1], points[2], points[3]};
   }
-  if (!in.given("size")) throw UsageError("patch: --at needs --size a,b beside it");
-  const auto [a, b] = in.lengthPair("size");
-  return mapping::cornersAround(in.band(), in.point("at"), a, b, in.radians("rotate"));
+  const std::vector<double> size = in.lengths("size");
+  for (const double side : size) {
+    if (side > 10 * in.operands[0].diagonal()) {
+      throw levelset::InvalidInput(fmt::format(
+          "patch: --size {} is over ten times the solid's diagonal of {:.6g}; make it smaller",
+          in.text("size"), in.operands[0].diagonal()));
+    }
+  }
+  return mapping::cornersAround(in.band(), in.point("at"), size[0], size[1], in.radians("rotate"));
 }
 
 Value patch(Invocation& in) {
@@ -65,14 +87,12 @@ Value patch(Invocation& in) {
 Plan planPatch(Invocation& in) {
   Plan plan = in.operands[0].plan();
   plan.kind = Kind::Patch;
-  if (in.given("corners") == in.given("at"))
-    throw UsageError("patch: give either --corners \"p0 p1 p2 p3\" or --at p --size a,b");
   Imath::Box3d box;
   if (in.given("corners")) {
     for (const V3d& p : in.points("corners")) box.extendBy(p);
   } else {
-    const auto [a, b] = in.lengthPair("size");
-    const double reach = std::hypot(a, b) / 2;
+    const std::vector<double> size = in.lengths("size");
+    const double reach = std::hypot(size[0], size[1]) / 2;
     box = {in.point("at") - V3d(reach), in.point("at") + V3d(reach)};
   }
   const double height = in.text("height") == "auto" ? box.size().length() / 2 : in.length("height");
@@ -116,11 +136,9 @@ std::string detailsOf(const mapping::TextureReport& report, double height) {
 Value texture(Invocation& in) {
   const PatchValue& onto = in.operands[2].patch();
   mapping::TextureOptions options;
-  if (in.flag("carve") && in.flag("alone"))
-    throw UsageError("texture: --carve and --alone exclude each other");
   if (in.flag("carve")) options.merge = mapping::TextureMerge::Carve;
   if (in.flag("alone")) options.merge = mapping::TextureMerge::Alone;
-  if (in.given("sink")) options.sink = in.length("sink");
+  options.sink = in.length("sink");
   options.blend = in.length("blend");
   if (in.given("texture-box")) options.textureBox = in.box("texture-box");
   if (in.given("voxel")) options.voxelSize = in.length("voxel");
@@ -177,41 +195,47 @@ void addTextureOperators(std::vector<Operator>& all) {
                  "--size 8,8 --height 3 --as p "
                  "! torus --radius 4 --tube 1.5 --voxel 0.25 --as ring ! texture @ball @ring @p "
                  "--blend 1 ! mesh ! write ring.ply",
-      .params =
-          {{.name = "corners", .type = ParamType::Points, .doc = "four points, \"p0 p1 p2 p3\""},
-           {.name = "at", .type = ParamType::Point, .doc = "centre of a patch of --size"},
-           {.name = "size", .type = ParamType::LengthPair, .doc = "along u and v, on the surface"},
-           {.name = "rotate",
-            .type = ParamType::Degrees,
-            .doc = "of u about the normal, with --at",
-            .fallback = "0"},
-           {.name = "height",
-            .type = ParamType::Length,
-            .doc = "of the texture; 'auto' keeps its proportions",
-            .range = Range::Positive,
-            .required = true,
-            .allowsAuto = true},
-           {.name = "levels",
-            .type = ParamType::Integer,
-            .doc = "of particles, 2 or more",
-            .fallback = "6",
-            .range = Range::Positive},
-           {.name = "particles",
-            .type = ParamType::Choice,
-            .doc = "how they are laid above the surface",
-            .fallback = "reduced",
-            .choices = {"reduced"}},
-           {.name = "spacing",
-            .type = ParamType::Length,
-            .doc = "of particles; default: by patch and voxel size",
-            .range = Range::Positive},
-           {.name = "mirror",
-            .type = ParamType::Flag,
-            .doc = "accept corners that run clockwise: the texture is mirrored"}},
+      .params = {{.name = "corners",
+                  .type = ParamType::Points,
+                  .doc = "four points, \"p0 p1 p2 p3\""},
+                 {.name = "at", .type = ParamType::Point, .doc = "centre of a patch of --size"},
+                 {.name = "size",
+                  .type = ParamType::Lengths,
+                  .doc = "along u and v, on the surface",
+                  .range = Range::Positive,
+                  .count = 2},
+                 {.name = "rotate",
+                  .type = ParamType::Degrees,
+                  .doc = "of u about the normal, with --at",
+                  .fallback = "0"},
+                 {.name = "height",
+                  .type = ParamType::Length,
+                  .doc = "of the texture; 'auto' keeps its proportions",
+                  .range = Range::Positive,
+                  .required = true,
+                  .allowsAuto = true},
+                 {.name = "levels",
+                  .type = ParamType::Integer,
+                  .doc = "of particles, 2 or more",
+                  .fallback = "6",
+                  .range = Range::Positive},
+                 {.name = "particles",
+                  .type = ParamType::Choice,
+                  .doc = "how they are laid above the surface",
+                  .fallback = "reduced",
+                  .choices = {"reduced"}},
+                 {.name = "spacing",
+                  .type = ParamType::Length,
+                  .doc = "of particles; default: by patch and voxel size",
+                  .range = Range::Positive},
+                 {.name = "mirror",
+                  .type = ParamType::Flag,
+                  .doc = "accept corners that run clockwise: the texture is mirrored"}},
       .operands = {{Kind::Band}},
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = patch,
       .plan = planPatch,
+      .validate = validatePatch,
   });
   all.push_back({
       .name = "texture",
@@ -233,7 +257,8 @@ void addTextureOperators(std::vector<Operator>& all) {
             .choices = {"rbf"}},
            {.name = "sink",
             .type = ParamType::Length,
-            .doc = "how deep the texture dips into the base; default: 1vx of the result",
+            .doc = "how deep the texture dips into the base",
+            .fallback = "1vx",
             .range = Range::NonNegative},
            {.name = "blend",
             .type = ParamType::Length,
@@ -261,6 +286,13 @@ void addTextureOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}, {Kind::Band}, {Kind::Patch}},
       .run = texture,
       .plan = planTexture,
+      .validate =
+          [](const Invocation& in) {
+            if (in.flag("carve") && in.flag("alone"))
+              throw UsageError("texture: --carve and --alone exclude each other");
+            if (in.flag("alone") && in.given("blend"))
+              throw UsageError("texture: --alone has no seam to blend; leave --blend out");
+          },
   });
 }
 

@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/LevelSetSphere.h>
+
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <limits>
 
 #include "tests/support/shell.h"
@@ -59,7 +63,71 @@ TEST_F(Refusal, UsageIsTwo) {
                  "nothing to show");
   EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! write a.xyz"), 2, "format");
   EXPECT_REFUSED(levelsmith("sphere --radius 1"), 2, "--voxel");
-  expectNothingWritten(0);
+  EXPECT_REFUSED(levelsmith("-v help"), 2, "help stands alone");
+  writeTetrahedron("tetra.ply");
+  for (const char* bad : {"0", "-0.1", "nan", "inf", "2vx"})
+    EXPECT_REFUSED(levelsmith(toBand("tetra.ply", std::string("--voxel ") + bad)), 2,
+                   "level-set: --voxel");
+  expectNothingWritten(1);
+}
+
+/// A chain whose end cannot work is refused before its beginning runs: within a second, though the
+/// sphere would take many.
+TEST_F(Refusal, WhatCanBeToldComesBeforeTheWork) {
+  const std::string large = "sphere --radius 1 --voxel 0.001 ! ";
+  const auto soon = [&](const std::string& rest, int code, const char* part) {
+    EXPECT_REFUSED(levelsmith(large + rest, 5), code, part);
+  };
+  soon("write a.xyz", 2, "no known format");
+  soon("write a.ply", 2, "put 'mesh' before it");
+  soon("mesh ! write a.ply --name x", 2, "--name");
+  soon("mesh --adaptivity 2 ! write a.ply", 2, "between 0 and 1");
+  soon("render a.jpg", 2, "no known format");
+  soon("render a.png --samples 4294967297", 2, "too many");
+  soon("render - --format exr --png -", 2, "cannot share standard output");
+  soon("render - --format exr ! write - --format vdb", 2, "used already");
+  soon("render a.exr --png - ! write - --format vdb", 2, "used already");
+  soon("clip --box \"0,0,0 1,1,1\" --plane \"0,0,0 0,0,1\"", 2, "give one of");
+  soon("resample", 2, "how fine");
+  soon("transform --mirror x", 2, "add --bake");
+  soon("patch --at 0,0,1 --height 0.1", 2, "needs --size");
+  soon("patch --corners \"0,0,1 0,1,1\" --height 0.1", 2, "four points");
+  soon("patch --at 0,0,1 --size 0.1,0.1 --height 0.1 --levels 1000000", 2, "out of range");
+  soon("write nowhere/a.vdb", 6, "no folder");
+  soon("render nowhere/a.png", 6, "render: ");
+  writeFile("there.vdb", "kept");
+  EXPECT_REFUSED(levelsmith("--no-clobber " + large + "write there.vdb", 5), 6, "no-clobber");
+  EXPECT_EQ(support::slurp(folder_ / "there.vdb"), "kept");
+  expectNothingWritten(1);
+}
+
+TEST_F(Refusal, GridsThatAreNoBandsAreThree) {
+  const auto save = [&](const char* name, const std::function<void(openvdb::FloatGrid&)>& spoil) {
+    openvdb::initialize();
+    auto grid =
+        openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(1, openvdb::Vec3f(0), 0.1f);
+    grid->setName("surface");
+    spoil(*grid);
+    openvdb::io::File file((folder_ / name).string());
+    file.write({grid});
+  };
+  save("nan.vdb", [](auto& grid) { grid.tree().setValueOn(openvdb::Coord(10, 0, 0), NAN); });
+  save("fog.vdb", [](auto& grid) { grid.setGridClass(openvdb::GRID_FOG_VOLUME); });
+  save("sheared.vdb", [](auto& grid) {
+    openvdb::Mat4d matrix = openvdb::Mat4d::identity();
+    matrix[1][0] = 0.5;
+    grid.setTransform(openvdb::math::Transform::createLinearTransform(matrix));
+  });
+  EXPECT_REFUSED(levelsmith("read nan.vdb ! measure"), 3, "nan.vdb");
+  EXPECT_REFUSED(levelsmith("read fog.vdb ! measure"), 3, "fog.vdb");
+  EXPECT_REFUSED(levelsmith("read sheared.vdb ! measure"), 3, "sheared.vdb");
+}
+
+TEST_F(Refusal, AFailureIsNotHiddenByItsReport) {
+  writeFile("words.ply", "this is not a mesh\n");
+  EXPECT_REFUSED(levelsmith("--report nowhere/r.json read words.ply ! measure"), 3, "words.ply");
+  EXPECT_REFUSED(levelsmith("--report r.json read words.ply ! measure"), 3, "words.ply");
+  EXPECT_NE(support::slurp(folder_ / "r.json").find("\"exit_code\": 3"), std::string::npos);
 }
 
 TEST_F(Refusal, CorruptMeshFilesAreThree) {
@@ -144,8 +212,7 @@ TEST_F(Refusal, ResourcesAreFour) {
 TEST_F(Refusal, OneVertexFarAwayEndsAtOnce) {
   writeTetrahedron("far.ply", "0 0 1e30");
   const auto outcome = levelsmith(toBand("far.ply"), 10);
-  EXPECT_TRUE(outcome.code == 3 || outcome.code == 4) << outcome.code << outcome.err;
-  EXPECT_NE(outcome.err.find("level-set"), std::string::npos) << outcome.err;
+  EXPECT_REFUSED(outcome, 4, "level-set");
   EXPECT_FALSE(exists("out.vdb"));
 }
 
@@ -184,6 +251,30 @@ TEST_F(Refusal, InterruptedIsOneHundredAndThirty) {
     EXPECT_NE(outcome.err.find("interrupted"), std::string::npos);
     EXPECT_EQ(support::slurp(folder_ / "out.vdb"), "what was there");
     expectNothingWritten(1);
+  }
+}
+
+TEST_F(Refusal, EveryLongActionEndsWithinHalfASecond) {
+  ASSERT_EQ(
+      levelsmith("torus --radius 2 --tube 0.8 --voxel 0.02 ! write in.vdb ! mesh ! write in.ply")
+          .code,
+      0);
+  const std::size_t inputs = fileCount();
+  for (const char* chain : {
+           "read in.ply ! level-set --voxel 0.004 ! write out.vdb",
+           "read in.vdb ! mesh --adaptivity 1 ! write out.ply",
+           "read in.vdb ! resample --voxel 0.005 ! write out.vdb",
+           "read in.vdb ! render out.exr --size 2000x2000 --samples 64",
+           "box --size 20,20,8 --voxel 0.1 --as b ! read in.vdb --as t ! patch @b --at 0,0,4 "
+           "--size "
+           "10,10 --height 5 --as p ! texture @b @t @p --voxel 0.02 ! write out.vdb",
+       }) {
+    const auto outcome =
+        shell(command() + " --quiet " + chain +
+              " & pid=$!; sleep 1; kill -INT $pid; s=$(date +%s%N); wait $pid; code=$?; "
+              "e=$(date +%s%N); [ $(( (e - s) / 1000000 )) -lt 500 ] || exit 99; exit $code");
+    EXPECT_EQ(outcome.code, 130) << chain << outcome.err;
+    expectNothingWritten(inputs);
   }
 }
 

@@ -90,6 +90,10 @@ INSTANTIATE_TEST_SUITE_P(
              "--blend 0.3 ! write out.vdb",
              "out.vdb"},
         Case{"render", "read in.vdb ! render out.exr --size 96x64", "out.exr"},
+        Case{"info", "info in.ply --json > out.json", "out.json"},
+        Case{"patch",
+             "read in.vdb ! patch --at 0,0,3 --size 1,1 --height 0.4 ! info --json > out.json",
+             "out.json"},
         Case{"measure", "read in.vdb ! measure --json > out.json", "out.json"},
         Case{"check", "read in.vdb ! check --json > out.json", "out.json"}),
     [](const ::testing::TestParamInfo<Case>& param_info) {
