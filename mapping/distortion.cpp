@@ -17,8 +17,17 @@ namespace {
 using Imath::V3d;
 
 /// Texture coordinates of the places that are looked at.
-std::vector<V3d> samplePlaces(const Patch& patch) {
+std::vector<V3d> samplePlaces(const Patch& patch, double sink) {
   std::vector<V3d> places;
+  if (sink > 0) {
+    const ParticleLevel& surface = patch.levels.front();
+    for (std::size_t j = 0; j < surface.rows; ++j)
+      for (std::size_t i = 0; i < surface.columns; ++i)
+        for (const double depth : {sink, sink / 2})
+          places.push_back({static_cast<double>(i) / static_cast<double>(surface.columns - 1),
+                            static_cast<double>(j) / static_cast<double>(surface.rows - 1),
+                            -depth});
+  }
   for (std::size_t k = 0; k < patch.levels.size(); ++k) {
     const ParticleLevel& level = patch.levels[k];
     const double columns = static_cast<double>(level.columns - 1);
@@ -58,8 +67,9 @@ Sample sampleAt(const RbfMap& map, const V3d& place, const V3d& textureSize) {
 
 }  // namespace
 
-Distortion surveyDistortion(const RbfMap& map, const Patch& patch, const V3d& textureSize) {
-  const std::vector<V3d> places = samplePlaces(patch);
+Distortion surveyDistortion(const RbfMap& map, const Patch& patch, const V3d& textureSize,
+                            double sink) {
+  const std::vector<V3d> places = samplePlaces(patch, sink);
   std::vector<Sample> samples(places.size());
   tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t n) {
     samples[n] = sampleAt(map, levelPosition(patch, places[n]), textureSize);

@@ -193,7 +193,8 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture, cons
   rbf.maxMemory = std::min(rbf.maxMemory, options.maxMemory);
   rbf.progress = levelset::subProgress(options.progress, 0, 0.2);
   const RbfMap map = patchToTexture(patch, rbf);
-  const Distortion distortion = surveyDistortion(map, patch, box.size());
+  const double sink = options.sink ? *options.sink : base.voxelSize();
+  const Distortion distortion = surveyDistortion(map, patch, box.size(), sink / patch.height);
   checkFolds(distortion, report, options.allowFolds);
   report.particles = map.size();
   report.minJacobian = distortion.minJacobian;
@@ -204,7 +205,6 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture, cons
 
   // === Warp, and make a distance of it again [Brodersen07, ERR-23 in our notes]
   requireResult(texture, report.voxelSize, distortion.meanStretch, options);
-  const double sink = options.sink ? *options.sink : base.voxelSize();
   const TexturePlacement placement{box, sink / patch.height};
   Warp warp = warpTexture(widen(texture, report.voxelSize, distortion.minStretch, options),
                           placement, patch, map,

@@ -10,6 +10,7 @@
 
 #include "levelset/eikonal/distance_transform.h"
 #include "levelset/error.h"
+#include "levelset/solids/csg_vdb.h"
 #include "levelset/solids/resample.h"
 #include "levelset/solids/seam_curve.h"
 #include "levelset/solids/seam_flow.h"
@@ -41,7 +42,7 @@ struct Operands {
 
 /// Both on the grid points of the finer.
 Operands onOneGrid(const NarrowBand& a, const NarrowBand& b, const BlendOptions& options) {
-  if (vdb(a).transform() == vdb(b).transform()) return {a, b, {}};
+  if (shareTransform(vdb(a), vdb(b))) return {a, b, {}};
   const bool firstIsFiner = a.voxelSize() <= b.voxelSize();
   const NarrowBand& fine = firstIsFiner ? a : b;
   const NarrowBand& coarse = firstIsFiner ? b : a;

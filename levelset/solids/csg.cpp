@@ -33,19 +33,6 @@ const char* nameOf(CsgOperation operation) {
   return "";
 }
 
-/// Index positions of `a` and `b` name the same places, as far as either solid reaches.
-bool shareTransform(const FloatGrid& a, const FloatGrid& b) {
-  if (a.transform() == b.transform()) return true;
-  openvdb::CoordBBox box = a.evalActiveVoxelBoundingBox();
-  box.expand(b.evalActiveVoxelBoundingBox());
-  if (box.empty()) return false;
-  std::array<openvdb::Coord, 8> corners;
-  box.getCornerPoints(corners.data());
-  return std::all_of(corners.begin(), corners.end(), [&](const openvdb::Coord& corner) {
-    return (b.worldToIndex(a.indexToWorld(corner)) - corner.asVec3d()).length() < 1e-6;
-  });
-}
-
 bool shareWidth(double a, double b) {
   return std::abs(a - b) <= 1e-5 * a;
 }
@@ -106,6 +93,18 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
 }
 
 }  // namespace
+
+bool shareTransform(const FloatGrid& a, const FloatGrid& b) {
+  if (a.transform() == b.transform()) return true;
+  openvdb::CoordBBox box = a.evalActiveVoxelBoundingBox();
+  box.expand(b.evalActiveVoxelBoundingBox());
+  if (box.empty()) return false;
+  std::array<openvdb::Coord, 8> corners;
+  box.getCornerPoints(corners.data());
+  return std::all_of(corners.begin(), corners.end(), [&](const openvdb::Coord& corner) {
+    return (b.worldToIndex(a.indexToWorld(corner)) - corner.asVec3d()).length() < 1e-6;
+  });
+}
 
 CsgSigns csgSigns(CsgOperation operation) {
   switch (operation) {

@@ -21,6 +21,9 @@ struct CsgSigns {
 [[nodiscard]] openvdb::FloatGrid::Ptr mergePair(CsgOperation operation, const openvdb::FloatGrid& a,
                                                 const openvdb::FloatGrid& b);
 
+/// Index positions of `a` and `b` name the same places, as far as either solid reaches.
+[[nodiscard]] bool shareTransform(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b);
+
 /// True when any voxel or tile is negative.
 [[nodiscard]] bool hasInside(const openvdb::FloatGrid& grid);
 
