@@ -16,12 +16,6 @@ namespace {
 
 using Imath::V3d;
 
-/// What must be known of a shape before its band is made.
-struct ShapeExtent {
-  Imath::Box3d bounds;
-  double area;  ///< of the surface, to estimate memory
-};
-
 void requireLength(double length, const char* action, const char* name) {
   if (length > 0 && std::isfinite(length)) return;
   throw UsageError(
@@ -56,7 +50,7 @@ void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions
     farthest =
         std::max({farthest, std::abs(extent.bounds.min[axis]), std::abs(extent.bounds.max[axis])});
   const double index = farthest / voxelSize + options.halfWidth;
-  if (!(index < 2147475456.0)) {  // 2³¹ less two blocks of the tree
+  if (!(index < kIndexLimit)) {
     throw ResourceLimit(
         fmt::format("{}: at voxel size {} the shape reaches grid index {:.3g}, beyond 32 bits; use "
                     "larger voxels "
@@ -137,13 +131,40 @@ double ringDistance(double r, double z, double radius, double tube) {
 
 }  // namespace
 
+ShapeExtent sphereExtent(double radius, const V3d& center) {
+  return {around(center, V3d(radius)), 4 * std::numbers::pi * radius * radius};
+}
+
+ShapeExtent boxExtent(const V3d& size, const V3d& center) {
+  return {around(center, size / 2), 2 * (size.x * size.y + size.y * size.z + size.z * size.x)};
+}
+
+ShapeExtent torusExtent(double radius, double tube, const V3d& center, const V3d& axis) {
+  return {around(center, discExtent(radius, axis.normalized()) + V3d(tube)),
+          4 * std::numbers::pi * std::numbers::pi * radius * tube};
+}
+
+ShapeExtent cylinderExtent(double radius, double height, const V3d& center, const V3d& axis) {
+  const V3d n = axis.normalized(), cap(std::abs(n.x), std::abs(n.y), std::abs(n.z));
+  return {around(center, discExtent(radius, n) + cap * (height / 2)),
+          2 * std::numbers::pi * radius * (radius + height)};
+}
+
+ShapeExtent capsuleExtent(const V3d& from, const V3d& to, double radius) {
+  Imath::Box3d bounds(from);
+  bounds.extendBy(to);
+  bounds.min -= V3d(radius);
+  bounds.max += V3d(radius);
+  return {bounds, 2 * std::numbers::pi * radius * (2 * radius + (to - from).length())};
+}
+
 NarrowBand makeSphere(double radius, const V3d& center, double voxelSize,
                       const ShapeOptions& options) {
   const char* action = "sphere";
   requireLength(radius, action, "the radius");
   requirePoint(center, action, "the centre");
-  return makeShape({around(center, V3d(radius)), 4 * std::numbers::pi * radius * radius}, voxelSize,
-                   options, action, [=](const V3d& p) { return (p - center).length() - radius; });
+  return makeShape(sphereExtent(radius, center), voxelSize, options, action,
+                   [=](const V3d& p) { return (p - center).length() - radius; });
 }
 
 NarrowBand makeBox(const V3d& size, const V3d& center, double voxelSize,
@@ -152,8 +173,7 @@ NarrowBand makeBox(const V3d& size, const V3d& center, double voxelSize,
   for (int axis = 0; axis < 3; ++axis) requireLength(size[axis], action, "a side");
   requirePoint(center, action, "the centre");
   const V3d half = size / 2;
-  const double area = 2 * (size.x * size.y + size.y * size.z + size.z * size.x);
-  return makeShape({around(center, half), area}, voxelSize, options, action, [=](const V3d& p) {
+  return makeShape(boxExtent(size, center), voxelSize, options, action, [=](const V3d& p) {
     const V3d q(std::abs(p.x - center.x) - half.x, std::abs(p.y - center.y) - half.y,
                 std::abs(p.z - center.z) - half.z);
     const V3d outside(std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0));
@@ -168,9 +188,8 @@ NarrowBand makeTorus(double radius, double tube, const V3d& center, const V3d& a
   requireLength(tube, action, "the tube radius");
   requirePoint(center, action, "the centre");
   const V3d n = requireAxis(axis, action);
-  const double pi = std::numbers::pi;
-  return makeShape({around(center, discExtent(radius, n) + V3d(tube)), 4 * pi * pi * radius * tube},
-                   voxelSize, options, action, [=](const V3d& p) {
+  return makeShape(torusExtent(radius, tube, center, n), voxelSize, options, action,
+                   [=](const V3d& p) {
                      const double z = (p - center) ^ n;
                      const double r = (p - center - n * z).length();
                      return ringDistance(r, z, radius, tube);
@@ -184,10 +203,8 @@ NarrowBand makeCylinder(double radius, double height, const V3d& center, const V
   requireLength(height, action, "the height");
   requirePoint(center, action, "the centre");
   const V3d n = requireAxis(axis, action);
-  const V3d cap(std::abs(n.x), std::abs(n.y), std::abs(n.z));
-  return makeShape({around(center, discExtent(radius, n) + cap * (height / 2)),
-                    2 * std::numbers::pi * radius * (radius + height)},
-                   voxelSize, options, action, [=](const V3d& p) {
+  return makeShape(cylinderExtent(radius, height, center, n), voxelSize, options, action,
+                   [=](const V3d& p) {
                      const double z = (p - center) ^ n;
                      const double r = (p - center - n * z).length();
                      return quadrantDistance(r - radius, std::abs(z) - height / 2);
@@ -202,12 +219,7 @@ NarrowBand makeCapsule(const V3d& from, const V3d& to, double radius, double vox
   requirePoint(to, action, "the second end");
   const V3d along = to - from;
   const double squaredLength = along.length2();
-  Imath::Box3d bounds(from);
-  bounds.extendBy(to);
-  bounds.min -= V3d(radius);
-  bounds.max += V3d(radius);
-  const double area = 2 * std::numbers::pi * radius * (2 * radius + std::sqrt(squaredLength));
-  return makeShape({bounds, area}, voxelSize, options, action, [=](const V3d& p) {
+  return makeShape(capsuleExtent(from, to, radius), voxelSize, options, action, [=](const V3d& p) {
     // Both ends in one place: a sphere.
     const double t =
         squaredLength > 0 ? std::clamp(((p - from) ^ along) / squaredLength, 0.0, 1.0) : 0.0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Imath/ImathBox.h>
 #include <Imath/ImathVec.h>
 
 #include "levelset/narrow_band.h"
@@ -31,5 +32,20 @@ struct ShapeOptions {
                                       const ShapeOptions& options = {});
 [[nodiscard]] NarrowBand makeCapsule(const Imath::V3d& from, const Imath::V3d& to, double radius,
                                      double voxelSize, const ShapeOptions& options = {});
+
+/// What is known of a shape before its band is made: its size, and what a band will cost.
+struct ShapeExtent {
+  Imath::Box3d bounds;  ///< of the surface
+  double area = 0;      ///< of the surface; of parts that overlap, their sum
+};
+[[nodiscard]] ShapeExtent sphereExtent(double radius, const Imath::V3d& center);
+[[nodiscard]] ShapeExtent boxExtent(const Imath::V3d& size, const Imath::V3d& center);
+/// @param axis  of any length but zero, here and below
+[[nodiscard]] ShapeExtent torusExtent(double radius, double tube, const Imath::V3d& center,
+                                      const Imath::V3d& axis);
+[[nodiscard]] ShapeExtent cylinderExtent(double radius, double height, const Imath::V3d& center,
+                                         const Imath::V3d& axis);
+[[nodiscard]] ShapeExtent capsuleExtent(const Imath::V3d& from, const Imath::V3d& to,
+                                        double radius);
 
 }  // namespace levelset

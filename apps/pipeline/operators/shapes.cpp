@@ -16,22 +16,15 @@ using Imath::V3d;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-constexpr double kPi = 3.14159265358979323846;
-
 /// A shape once its lengths are world units: how large it is, and how to make it.
 struct Shape {
-  Imath::Box3d bounds;
-  double area = 0;
+  levelset::ShapeExtent extent;
   std::function<NarrowBand(double voxelSize, const levelset::ShapeOptions&)> make;
 };
 
 /// Sizes in `vx` need --voxel: with --resolution the voxel itself follows from the size.
 void referToVoxel(Invocation& in) {
   if (in.asksVoxelSize() && in.given("voxel")) in.setReference(in.length("voxel"), 0);
-}
-
-Imath::Box3d boxAbout(const V3d& center, const V3d& halfSize) {
-  return {center - halfSize, center + halfSize};
 }
 
 V3d axisOf(const Invocation& in) {
@@ -42,22 +35,10 @@ V3d axisOf(const Invocation& in) {
   return axis.normalized();
 }
 
-/// Half extents of a disc of `radius` across `axis`.
-V3d discExtent(const V3d& axis, double radius) {
-  V3d extent;
-  for (int i = 0; i < 3; ++i) extent[i] = radius * std::sqrt(std::max(0.0, 1 - axis[i] * axis[i]));
-  return extent;
-}
-
-V3d absolute(const V3d& v) {
-  return {std::abs(v.x), std::abs(v.y), std::abs(v.z)};
-}
-
 Shape sphere(Invocation& in) {
   const double radius = in.length("radius");
   const V3d center = in.point("center");
-  return {boxAbout(center, V3d(radius)), 4 * kPi * radius * radius,
-          [=](double voxel, const auto& options) {
+  return {levelset::sphereExtent(radius, center), [=](double voxel, const auto& options) {
             return levelset::makeSphere(radius, center, voxel, options);
           }};
 }
@@ -65,8 +46,7 @@ Shape sphere(Invocation& in) {
 Shape box(Invocation& in) {
   const std::vector<double> sides = in.lengths("size");
   const V3d size(sides[0], sides[1], sides[2]), center = in.point("center");
-  return {boxAbout(center, size / 2), 2 * (size.x * size.y + size.y * size.z + size.z * size.x),
-          [=](double voxel, const auto& options) {
+  return {levelset::boxExtent(size, center), [=](double voxel, const auto& options) {
             return levelset::makeBox(size, center, voxel, options);
           }};
 }
@@ -74,7 +54,7 @@ Shape box(Invocation& in) {
 Shape torus(Invocation& in) {
   const double radius = in.length("radius"), tube = in.length("tube");
   const V3d center = in.point("center"), axis = axisOf(in);
-  return {boxAbout(center, discExtent(axis, radius) + V3d(tube)), 4 * kPi * kPi * radius * tube,
+  return {levelset::torusExtent(radius, tube, center, axis),
           [=](double voxel, const auto& options) {
             return levelset::makeTorus(radius, tube, center, axis, voxel, options);
           }};
@@ -83,8 +63,8 @@ Shape torus(Invocation& in) {
 Shape cylinder(Invocation& in) {
   const double radius = in.length("radius"), height = in.length("height");
   const V3d center = in.point("center"), axis = axisOf(in);
-  return {boxAbout(center, discExtent(axis, radius) + absolute(axis) * (height / 2)),
-          2 * kPi * radius * (radius + height), [=](double voxel, const auto& options) {
+  return {levelset::cylinderExtent(radius, height, center, axis),
+          [=](double voxel, const auto& options) {
             return levelset::makeCylinder(radius, height, center, axis, voxel, options);
           }};
 }
@@ -92,12 +72,7 @@ Shape cylinder(Invocation& in) {
 Shape capsule(Invocation& in) {
   const double radius = in.length("radius");
   const V3d from = in.point("from"), to = in.point("to");
-  Imath::Box3d bounds(from);
-  bounds.extendBy(to);
-  bounds.min -= V3d(radius);
-  bounds.max += V3d(radius);
-  return {bounds, 2 * kPi * radius * (2 * radius + (to - from).length()),
-          [=](double voxel, const auto& options) {
+  return {levelset::capsuleExtent(from, to, radius), [=](double voxel, const auto& options) {
             return levelset::makeCapsule(from, to, radius, voxel, options);
           }};
 }
@@ -105,7 +80,7 @@ Shape capsule(Invocation& in) {
 using Describe = Shape (*)(Invocation&);
 
 double voxelOf(Invocation& in, const Shape& shape) {
-  const V3d size = shape.bounds.size();
+  const V3d size = shape.extent.bounds.size();
   return in.voxelSize(std::max({size.x, size.y, size.z}));
 }
 
@@ -123,8 +98,8 @@ Plan plan(Invocation& in) {
   referToVoxel(in);
   const Shape shape = describe(in);
   return {.kind = Kind::Band,
-          .bounds = shape.bounds,
-          .area = shape.area,
+          .bounds = shape.extent.bounds,
+          .area = shape.extent.area,
           .voxelSize = voxelOf(in, shape),
           .halfWidth = in.number("half-width")};
 }
