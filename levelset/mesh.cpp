@@ -1,6 +1,25 @@
 #include "levelset/mesh.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 namespace levelset {
+
+double spacingAt(double magnitude, CoordinatePrecision precision) {
+  if (precision == CoordinatePrecision::Double)
+    return std::nextafter(magnitude, std::numeric_limits<double>::infinity()) - magnitude;
+  const auto stored = static_cast<float>(magnitude);
+  return static_cast<double>(std::nextafter(stored, std::numeric_limits<float>::infinity())) -
+         static_cast<double>(stored);
+}
+
+double coordinateSpacing(const TriMesh& mesh) {
+  double greatest = 0;
+  for (const Imath::V3d& p : mesh.positions)
+    for (int axis = 0; axis < 3; ++axis) greatest = std::max(greatest, std::abs(p[axis]));
+  return std::max(mesh.spacing, spacingAt(greatest, mesh.precision));
+}
 
 Imath::Box3d bounds(const TriMesh& mesh) {
   Imath::Box3d box;

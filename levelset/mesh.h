@@ -9,7 +9,7 @@
 
 namespace levelset {
 
-/// How finely the numbers of a mesh were stored where they came from.
+/// How finely the numbers of a mesh are stored in a file.
 enum class CoordinatePrecision { Float, Double };
 
 /// An indexed triangle mesh; polygons are split when read. Counter-clockwise seen from outside.
@@ -17,9 +17,19 @@ struct TriMesh {
   std::vector<Imath::V3d> positions;                    ///< n × 3, world units, finite
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< m × 3, each index < n
   CoordinatePrecision precision = CoordinatePrecision::Double;
+  /// World units: no coordinate is known better than this, whatever `precision` would allow where
+  /// the mesh lies now; 0 for one that was not moved.
+  double spacing = 0;
 
   [[nodiscard]] bool isEmpty() const { return triangles.empty(); }
 };
+
+/// Distance from a coordinate of that magnitude to the next that the precision can tell from it.
+[[nodiscard]] double spacingAt(double magnitude, CoordinatePrecision precision);
+
+/// How finely the coordinates of a mesh are known, world units: what `spacing` says, or the
+/// precision at the coordinate of greatest magnitude.
+[[nodiscard]] double coordinateSpacing(const TriMesh& mesh);
 
 /// Bounding box of all vertices; empty for a mesh without vertices.
 [[nodiscard]] Imath::Box3d bounds(const TriMesh& mesh);

@@ -3,8 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <sstream>
 #include <string>
 
 #include "levelset/error.h"
@@ -17,16 +20,22 @@ using openvdb::Coord;
 using openvdb::FloatGrid;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
+/// The linear part, one image of an axis per row. Not by way of OpenVDB's AffineMap, which refuses
+/// voxels below 1.4e-5 as singular.
+std::array<openvdb::Vec3d, 3> linearPart(const openvdb::math::Transform& transform) {
+  const openvdb::math::MapBase& map = *transform.baseMap();
+  return {map.applyJacobian(openvdb::Vec3d(1, 0, 0)), map.applyJacobian(openvdb::Vec3d(0, 1, 0)),
+          map.applyJacobian(openvdb::Vec3d(0, 0, 1))};
+}
+
 /// Rotation, uniform scale and translation only, to within rounding of the stored matrix.
 bool isSimilarity(const openvdb::math::Transform& transform) {
   if (!transform.isLinear()) return false;
-  const openvdb::math::Mat4d m = transform.baseMap()->getAffineMap()->getMat4();
-  const openvdb::Vec3d rows[3] = {
-      {m[0][0], m[0][1], m[0][2]}, {m[1][0], m[1][1], m[1][2]}, {m[2][0], m[2][1], m[2][2]}};
+  const std::array<openvdb::Vec3d, 3> rows = linearPart(transform);
   const double squaredScale = rows[0].lengthSqr();
   const double tolerance = 1e-6 * squaredScale;
   if (!(squaredScale > 0) || !std::isfinite(squaredScale)) return false;
-  for (int i = 0; i < 3; ++i) {
+  for (std::size_t i = 0; i < 3; ++i) {
     if (std::abs(rows[i].lengthSqr() - squaredScale) > tolerance) return false;
     if (std::abs(rows[i].dot(rows[(i + 1) % 3])) > tolerance) return false;
   }
@@ -82,9 +91,13 @@ std::size_t NarrowBand::memoryUse() const {
 Imath::M44d NarrowBand::indexToWorld() const {
   Imath::M44d result;
   if (!grid_) return result;
-  const openvdb::math::Mat4d m = grid_->grid->transform().baseMap()->getAffineMap()->getMat4();
-  for (int i = 0; i < 4; ++i)
-    for (int j = 0; j < 4; ++j) result[i][j] = m[i][j];
+  const openvdb::math::Transform& transform = grid_->grid->transform();
+  const std::array<openvdb::Vec3d, 3> rows = linearPart(transform);
+  const openvdb::Vec3d origin = transform.indexToWorld(openvdb::Vec3d(0));
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 3; ++i) result[i][j] = rows[static_cast<std::size_t>(i)][j];
+    result[3][j] = origin[j];
+  }
   return result;
 }
 
@@ -195,7 +208,18 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action) {
 }
 
 openvdb::math::Transform::Ptr uniformTransform(double voxelSize) {
-  return openvdb::math::Transform::createLinearTransform(voxelSize);
+  using openvdb::math::UniformScaleMap;
+  // The map's constructor refuses a determinant below 3e-15; its fields, read as from a file, may
+  // hold any scale.
+  const double fields[] = {voxelSize, voxelSize, 1 / voxelSize, 1 / voxelSize / voxelSize,
+                           1 / voxelSize / 2};
+  std::stringstream stream;
+  for (const double field : fields)
+    for (int axis = 0; axis < 3; ++axis)
+      stream.write(reinterpret_cast<const char*>(&field), sizeof field);
+  const auto map = std::make_shared<UniformScaleMap>();
+  map->read(stream);
+  return std::make_shared<openvdb::math::Transform>(map);
 }
 
 FloatGrid::Ptr emptyLevelSet(openvdb::math::Transform::Ptr transform, double halfWidth) {
@@ -204,6 +228,13 @@ FloatGrid::Ptr emptyLevelSet(openvdb::math::Transform::Ptr transform, double hal
   // refuses.
   float background = static_cast<float>(width);
   if (background < width) background = std::nextafter(background, INFINITY);
+  // Distances of a thousandth of a voxel must still be normal numbers.
+  if (!(background > 1000 * std::numeric_limits<float>::min()) || !std::isfinite(background)) {
+    throw InvalidInput(
+        fmt::format("level-set: voxels of {:.6g} are too {} for distances in single precision; "
+                    "change the unit of length",
+                    transform->voxelSize()[0], width < 1 ? "small" : "large"));
+  }
   FloatGrid::Ptr grid = FloatGrid::create(background);
   grid->setTransform(std::move(transform));
   grid->setGridClass(openvdb::GRID_LEVEL_SET);

@@ -12,6 +12,7 @@
 
 #include "levelset/error.h"
 #include "levelset/sample.h"
+#include "levelset/solids/resample_vdb.h"
 #include "levelset/vdb.h"
 #include "mapping/level_map.h"
 
@@ -120,10 +121,7 @@ class TextureWarp {
         occupancy_(levelset::vdb(texture)),
         textureBackground_(texture.halfWidth() * texture.voxelSize()),
         ghostDistance_(1.5 * longestCellEdge(patch)) {
-    openvdb::math::Mat4d matrix;
-    for (int i = 0; i < 4; ++i)
-      for (int j = 0; j < 4; ++j) matrix[i][j] = options.indexToWorld[i][j];
-    transform_ = openvdb::math::Transform::createLinearTransform(matrix);
+    transform_ = levelset::transformOf(options.indexToWorld, "texture");
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) step_[i][j] = options.indexToWorld[i][j];
     const V3d size = placement.box.size();

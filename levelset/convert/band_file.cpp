@@ -14,6 +14,7 @@
 #include "levelset/convert/vdb_layout.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
+#include "levelset/memory_limit.h"
 
 namespace levelset {
 namespace {
@@ -22,6 +23,8 @@ namespace fs = std::filesystem;
 
 /// Where the random identifier stands: behind magic number, three versions and a flag.
 constexpr std::streamoff kIdentifierOffset = 8 + 3 * 4 + 1;
+/// NanoVDB's writer inverts the matrix by OpenVDB's AffineMap, which takes less for singular.
+constexpr double kLeastNanoVoxel = 1.5e-5;
 
 std::string bandFormat(const fs::path& nameOrFormat) {
   std::string text = nameOrFormat.filename().string();
@@ -226,6 +229,11 @@ void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOpti
   if (!band.shared())
     throw InvalidInput(
         fmt::format("write: there is no band to write to '{}'; make one first", path.string()));
+  if (format == "nvdb" && band.voxelSize() < kLeastNanoVoxel)
+    throw InvalidInput(
+        fmt::format("write: '{}' cannot hold voxels of {:.6g}, NanoVDB takes none below {}; write "
+                    "a .vdb, or change the unit of length",
+                    path.string(), band.voxelSize(), kLeastNanoVoxel));
   FileTarget target(path);
   const auto grid = namedGrid(band, options.name);
   try {

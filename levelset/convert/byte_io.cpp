@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 
 namespace levelset {
 namespace {
@@ -24,12 +25,6 @@ constexpr int kGzipWindow = 15 + 16;  // zlib's way to ask for a gzip wrapper
 
 std::string systemMessage(int error) {
   return std::generic_category().message(error);
-}
-
-std::size_t physicalMemory() {
-  const long pages = ::sysconf(_SC_PHYS_PAGES), size = ::sysconf(_SC_PAGESIZE);
-  if (pages <= 0 || size <= 0) return kNoMemoryLimit;
-  return static_cast<std::size_t>(pages) * static_cast<std::size_t>(size);
 }
 
 /// An open file, or standard input.
@@ -174,10 +169,6 @@ void Bytes::resize(std::size_t size) {
   static_cast<void>(data_.release());
   data_.reset(grown);
   size_ = size;
-}
-
-std::size_t memoryLimit(std::size_t maxMemory) {
-  return std::max<std::size_t>(std::min(maxMemory, physicalMemory()), 1);
 }
 
 std::string inputName(const fs::path& path) {

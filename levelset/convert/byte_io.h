@@ -45,9 +45,6 @@ class Bytes {
 /// seen.
 [[nodiscard]] Bytes readFirstBytes(const std::filesystem::path& path, std::size_t count);
 
-/// `maxMemory`, or what the machine has if that is less: input from outside must not be believed.
-[[nodiscard]] std::size_t memoryLimit(std::size_t maxMemory);
-
 /// What messages call the file: its name in quotes, or standard input.
 [[nodiscard]] std::string inputName(const std::filesystem::path& path);
 

@@ -42,6 +42,15 @@ void requireText(std::string_view input, const std::string& name, const char* fo
     failFile(name, fmt::format("holds binary data, not {} text; give its true format", format));
 }
 
+void requireNothingBehind(std::string_view input, std::size_t end, const std::string& name,
+                          const std::string& what) {
+  const std::size_t more = input.find_first_not_of(" \t\r\n\f\v", end);
+  if (more == std::string_view::npos) return;
+  failFile(name, fmt::format("goes on behind {}, at byte {} of {}; its header is damaged or "
+                             "something was appended: export it again",
+                             what, more, input.size()));
+}
+
 // === MeshBuilder
 
 MeshBuilder::MeshBuilder(std::string name, const ReadMeshOptions& options, std::string_view input)

@@ -65,8 +65,9 @@ class MeshBuilder {
   bool allFloat_ = true;
 };
 
-/// Splits the polygon with those corners into corners.size() − 2 triangles: a fan where that keeps
-/// within the polygon, else by clipping ears in the plane that fits best.
+/// Splits the polygon with those corners into corners.size() − 2 triangles: a fan where there are
+/// few corners and that keeps within the polygon, else by clipping ears in the plane that fits
+/// best.
 /// @return false when the polygon is too intricate to split in reasonable time
 [[nodiscard]] bool splitPolygon(std::span<const std::uint32_t> corners,
                                 const std::vector<Imath::V3d>& positions,
@@ -132,6 +133,11 @@ class TextCursor {
 
 /// Reading stops here when text was promised and binary data found.
 void requireText(std::string_view input, const std::string& name, const char* format);
+
+/// Nothing but blanks may follow what the header promises: else it promises too little.
+/// @param what  that has been read, "the 12 triangles that its header promises"
+void requireNothingBehind(std::string_view input, std::size_t end, const std::string& name,
+                          const std::string& what);
 
 void readPly(std::string_view input, MeshBuilder& builder);
 void readObj(std::string_view input, MeshBuilder& builder);

@@ -10,6 +10,7 @@
 #include "levelset/convert/open_surface.h"
 #include "levelset/convert/surface_blocks.h"
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 
 namespace levelset {
 namespace {
@@ -122,7 +123,7 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
   constexpr const char* kAction = "level-set";
   convert::checkMeshInput(mesh, voxelSize, options);
   const Progress progress = rising(options.progress);
-  const std::size_t maxMemory = convert::memoryLimit(options);
+  const std::size_t maxMemory = memoryLimit(options.maxMemory);
   report(progress, 0, kAction);
 
   // === Topology and method

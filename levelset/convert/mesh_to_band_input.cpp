@@ -1,13 +1,13 @@
 #include "levelset/convert/mesh_to_band_input.h"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 
 namespace levelset::convert {
 namespace {
@@ -75,13 +75,15 @@ double estimateMemory(const TriMesh& mesh, double voxelSize, double halfWidth) {
 }
 
 void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermost) {
-  const double size = largest(mesh.positions[outermost]);
   const bool isFloat = mesh.precision == CoordinatePrecision::Float;
-  const double spacing = isFloat
-                             ? static_cast<double>(std::nextafter(
-                                   static_cast<float>(size), std::numeric_limits<float>::max())) -
-                                   static_cast<double>(static_cast<float>(size))
-                             : std::nextafter(size, std::numeric_limits<double>::max()) - size;
+  const double here = spacingAt(largest(mesh.positions[outermost]), mesh.precision);
+  if (mesh.spacing > voxelSize / 8 && mesh.spacing > here)
+    throw InvalidInput(
+        fmt::format("level-set: before the mesh was moved its coordinates were {:.3g} apart "
+                    "(measured where it is now), coarser than an eighth of the voxel size {:.6g}; "
+                    "move the object to the origin before it is written, or use larger voxels",
+                    mesh.spacing, voxelSize));
+  const double spacing = here;
   if (spacing > voxelSize / 8)
     throw InvalidInput(
         fmt::format("level-set: {} coordinates at vertex {}, {}, are {:.3g} apart, coarser than an "
@@ -93,13 +95,6 @@ void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermo
 }
 
 }  // namespace
-
-std::size_t memoryLimit(const MeshToBandOptions& options) {
-  const long pages = sysconf(_SC_PHYS_PAGES), pageSize = sysconf(_SC_PAGE_SIZE);
-  if (pages <= 0 || pageSize <= 0) return options.maxMemory;
-  return std::min(options.maxMemory,
-                  static_cast<std::size_t>(pages) * static_cast<std::size_t>(pageSize));
-}
 
 void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
   checkCall(voxelSize, options);
@@ -118,7 +113,7 @@ void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptio
         "bits; use larger voxels, or remove the vertex if it is astray",
         outermost, text(mesh.positions[outermost]),
         largest(mesh.positions[outermost]) / voxelSize));
-  requireMemory(estimateMemory(mesh, voxelSize, options.halfWidth), memoryLimit(options),
+  requireMemory(estimateMemory(mesh, voxelSize, options.halfWidth), memoryLimit(options.maxMemory),
                 "level-set");
   checkPrecision(mesh, voxelSize, outermost);
 }

@@ -12,9 +12,6 @@ namespace levelset::convert {
 /// @throws UsageError, InvalidInput, ResourceLimit
 void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options);
 
-/// The caller's limit, or what the machine has.
-[[nodiscard]] std::size_t memoryLimit(const MeshToBandOptions& options);
-
 /// The grid point, of coordinates that 8 divides, nearest below the middle of the mesh.
 [[nodiscard]] Imath::V3i localOrigin(const TriMesh& mesh, double voxelSize);
 

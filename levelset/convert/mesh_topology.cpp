@@ -1,35 +1,18 @@
 #include "levelset/convert/mesh_topology.h"
 
 #include <algorithm>
-#include <bit>
-#include <cstring>
+
+#include "levelset/convert/position_table.h"
 
 namespace levelset::convert {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffffu;
-
-std::uint64_t hashOf(const Imath::V3d& p) {
-  std::uint64_t hash = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double value = p[axis] + 0.0;  // -0 and +0 are one place
-    hash = (hash ^ std::bit_cast<std::uint64_t>(value)) * 0x9e3779b97f4a7c15ull;
-    hash ^= hash >> 29;
-  }
-  return hash;
-}
-
-/// For each vertex the lowest index among those at its position. Open addressing.
+/// For each vertex the lowest index among those at its position.
 std::vector<std::uint32_t> weld(const std::vector<Imath::V3d>& positions) {
-  const std::size_t slots = std::bit_ceil(positions.size() * 2 + 1);
-  std::vector<std::uint32_t> table(slots, kNone), first(positions.size());
-  for (std::uint32_t v = 0; v < positions.size(); ++v) {
-    std::size_t slot = hashOf(positions[v]) & (slots - 1);
-    while (table[slot] != kNone && positions[table[slot]] != positions[v])
-      slot = (slot + 1) & (slots - 1);
-    if (table[slot] == kNone) table[slot] = v;
-    first[v] = table[slot];
-  }
+  PositionTable table(positions, positions.size());
+  std::vector<std::uint32_t> first(positions.size());
+  for (std::uint32_t v = 0; v < positions.size(); ++v)
+    first[v] = table.findOrEnter(positions[v], v);
   return first;
 }
 

@@ -60,6 +60,11 @@ class OffReader {
     builder_.reserve(counts.vertices, std::min(counts.faces, left / 8));
     for (std::size_t i = 0; i < counts.vertices; ++i) readVertex();
     for (std::size_t i = 0; i < counts.faces; ++i) readFace();
+    if (cursor_.skipToToken('#'))
+      cursor_.fail(fmt::format(
+          "the file goes on behind the {} vertices and {} faces that its header promises; the "
+          "header is damaged or something was appended: export it again",
+          counts.vertices, counts.faces));
   }
 
  private:

@@ -78,6 +78,7 @@ class HeaderReader {
   HeaderReader(std::string_view input, const std::string& name) : input_(input), name_(name) {}
 
   Header read() {
+    if (input_.starts_with("\xEF\xBB\xBF")) offset_ = 3;  // byte order mark
     if (words(nextLine()) != std::vector<std::string_view>{"ply"})
       failFile(name_, "does not begin with 'ply'; give its true format");
     for (;;) {
@@ -333,7 +334,7 @@ class AsciiSource {
 template <typename Source>
 class ElementReader {
  public:
-  ElementReader(Source source, MeshBuilder& builder) : source_(source), builder_(builder) {}
+  ElementReader(Source& source, MeshBuilder& builder) : source_(source), builder_(builder) {}
 
   void read(const Element& element) {
     if (element.properties.empty()) return;
@@ -375,7 +376,7 @@ class ElementReader {
            fmt::format("{} is {}; repair the mesh or export it again", what, value));
   }
 
-  Source source_;
+  Source& source_;
   MeshBuilder& builder_;
   double position_[3] = {};
   std::vector<std::uint64_t> corners_;
@@ -383,15 +384,11 @@ class ElementReader {
 
 template <typename Source>
 void readElements(const Header& header, std::string_view data, MeshBuilder& builder) {
-  ElementReader<Source> reader(Source(data, header.lines, builder.name()), builder);
-  std::size_t wanted = 0;
-  for (const Element& element : header.elements)
-    wanted += element.holdsVertices() || element.holdsFaces();
-  for (const Element& element : header.elements) {
-    if (wanted == 0) break;  // what follows the mesh does not matter
-    reader.read(element);
-    wanted -= element.holdsVertices() || element.holdsFaces();
-  }
+  Source source(data, header.lines, builder.name());
+  ElementReader<Source> reader(source, builder);
+  for (const Element& element : header.elements) reader.read(element);
+  requireNothingBehind(data, static_cast<std::size_t>(source.at() - data.data()), builder.name(),
+                       "the elements that its header promises");
 }
 
 /// Triangles cannot be more than the data can list; a header may claim what it likes.

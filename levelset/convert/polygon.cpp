@@ -10,6 +10,9 @@ namespace {
 using Imath::V2d;
 using Imath::V3d;
 
+/// A larger polygon is no fan though it might be: its triangles would all share a corner, and so
+/// would their bounding boxes.
+constexpr std::size_t kLargestFan = 16;
 /// Beyond this many corner × reflex-corner tests (about two seconds) a polygon is refused.
 constexpr double kMaxTests = 5e8;
 
@@ -45,11 +48,16 @@ bool fanFits(const std::vector<V2d>& points) {
   return true;
 }
 
-/// Ear clipping with a queue of ears: clipping one changes the state of its two neighbours only.
+/// Ear clipping with a queue of ears: clipping one changes the state of its two neighbours only,
+/// and puts them at the end, so that one after the other corner goes rather than all around one.
 class EarClipper {
  public:
   explicit EarClipper(const std::vector<V2d>& points)
-      : points_(points), previous_(points.size()), next_(points.size()), state_(points.size()) {
+      : points_(points),
+        previous_(points.size()),
+        next_(points.size()),
+        state_(points.size()),
+        turns_(points.size(), 0) {
     const std::size_t n = points.size();
     for (std::size_t i = 0; i < n; ++i) {
       previous_[i] = (i + n - 1) % n;
@@ -91,7 +99,7 @@ class EarClipper {
 
   void update(std::size_t i) {
     state_[i] = isEar(i) ? State::Ear : State::Plain;
-    if (state_[i] == State::Ear) ears_.push_back(i);
+    if (state_[i] == State::Ear) ears_.push_back({i, ++turns_[i]});
   }
 
   [[nodiscard]] bool isEar(std::size_t i) const {
@@ -107,9 +115,9 @@ class EarClipper {
   /// When a polygon that crosses itself, or has no area, offers no ear: any corner will do.
   std::size_t nextEar(std::size_t current) {
     while (!ears_.empty()) {
-      const std::size_t ear = ears_.front();
+      const auto [ear, turn] = ears_.front();
       ears_.pop_front();
-      if (state_[ear] == State::Ear) return ear;
+      if (state_[ear] == State::Ear && turns_[ear] == turn) return ear;
     }
     return current;
   }
@@ -117,7 +125,8 @@ class EarClipper {
   const std::vector<V2d>& points_;
   std::vector<std::size_t> previous_, next_, reflex_;
   std::vector<State> state_;
-  std::deque<std::size_t> ears_;
+  std::vector<std::uint32_t> turns_;  // how often queued: earlier places in the queue are void
+  std::deque<std::pair<std::size_t, std::uint32_t>> ears_;
 };
 
 }  // namespace
@@ -128,13 +137,16 @@ bool splitPolygon(std::span<const std::uint32_t> corners, const std::vector<V3d>
     *triangles++ = {corners[a], corners[b], corners[c]};
   };
   const std::vector<V2d> points = flatten(corners, positions);
-  if (fanFits(points)) {
-    for (std::size_t i = 1; i + 1 < corners.size(); ++i) emit(0, i, i + 1);
-    return true;
+  const bool fits = fanFits(points);
+  if (!fits || corners.size() > kLargestFan) {
+    EarClipper clipper(points);
+    if (clipper.isAffordable()) {
+      clipper.run(emit);
+      return true;
+    }
+    if (!fits) return false;
   }
-  EarClipper clipper(points);
-  if (!clipper.isAffordable()) return false;
-  clipper.run(emit);
+  for (std::size_t i = 1; i + 1 < corners.size(); ++i) emit(0, i, i + 1);
   return true;
 }
 

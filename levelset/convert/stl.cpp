@@ -1,10 +1,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <bit>
 #include <limits>
 
 #include "levelset/convert/mesh_parts.h"
+#include "levelset/convert/position_table.h"
 #include "levelset/error.h"
 
 // StereoLithography Interface Specification: 3D Systems, 1989.
@@ -14,48 +14,28 @@ namespace {
 
 constexpr std::size_t kHeaderSize = 84, kFacetSize = 50;
 
-/// Gives equal positions one number. Equal means the same bits, but that −0 is 0.
+/// Gives equal positions one number.
 class VertexMerger {
  public:
-  explicit VertexMerger(MeshBuilder& builder) : builder_(builder), slots_(1 << 12, kFree) {}
+  explicit VertexMerger(MeshBuilder& builder) : builder_(builder), table_(points_, 1 << 11) {}
 
   std::uint64_t add(const Imath::V3d& stored, Place place, const char* at) {
     const Imath::V3d p = stored + Imath::V3d(0);  // −0 + 0 = 0
-    if (2 * points_.size() >= slots_.size()) grow();
-    std::uint32_t& slot = find(p);
-    if (slot == kFree) {
-      if (points_.size() >= kFree)
-        failFile(builder_.name(), "holds more than 4294967294 vertices; split it");
+    if (points_.size() >= std::numeric_limits<std::uint32_t>::max())
+      failFile(builder_.name(), "holds more than 4294967294 vertices; split it");
+    const auto next = static_cast<std::uint32_t>(points_.size());
+    const std::uint32_t found = table_.findOrEnter(p, next);
+    if (found == next) {
       builder_.addVertex(p.x, p.y, p.z, place, at);
-      slot = static_cast<std::uint32_t>(points_.size());
       points_.push_back(p);
     }
-    return slot;
+    return found;
   }
 
  private:
-  static constexpr std::uint32_t kFree = std::numeric_limits<std::uint32_t>::max();
-
-  std::uint32_t& find(const Imath::V3d& p) {
-    std::uint64_t hash = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      hash = (hash ^ std::bit_cast<std::uint64_t>(p[axis])) * 0x9E3779B97F4A7C15ull;
-      hash ^= hash >> 29;
-    }
-    std::size_t i = hash & (slots_.size() - 1);
-    while (slots_[i] != kFree && points_[slots_[i]] != p) i = (i + 1) & (slots_.size() - 1);
-    return slots_[i];
-  }
-
-  void grow() {
-    slots_.assign(4 * slots_.size(), kFree);
-    for (std::size_t i = 0; i < points_.size(); ++i)
-      find(points_[i]) = static_cast<std::uint32_t>(i);
-  }
-
   MeshBuilder& builder_;
-  std::vector<std::uint32_t> slots_;
   std::vector<Imath::V3d> points_;
+  convert::PositionTable table_;
 };
 
 std::uint32_t facetCount(std::string_view input) {
@@ -93,6 +73,9 @@ void readBinary(std::string_view input, MeshBuilder& builder) {
                          "fetch or export it again",
                          count, held));
   }
+  requireNothingBehind(
+      input, kHeaderSize + count * kFacetSize, builder.name(),
+      fmt::format("the {} triangles that its header promises (it has room for {})", count, held));
   builder.declarePrecision(CoordinatePrecision::Float);
   builder.reserve(count / 2, count);
   VertexMerger merger(builder);

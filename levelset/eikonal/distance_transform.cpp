@@ -5,7 +5,6 @@
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "levelset/eikonal/closest_point.h"
 #include "levelset/eikonal/propagate.h"
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 
 namespace levelset::eikonal {
 namespace {
@@ -208,10 +208,7 @@ void requireRoom(const SurfacePoints& points, const NearestPoints::Reach& reach,
                          2 * M_PI * longest * out * out + 4.0 / 3 * M_PI * out * out * out;
   constexpr double kBytesPerGridPoint = 20;  // state and result, with the unused part of blocks
   const double bytes = std::min(reached, steiner) * kBytesPerGridPoint;
-  const double physical =
-      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
-  const double limit = std::min(physical, static_cast<double>(request.maxMemory));
-  requireMemory(bytes, static_cast<std::size_t>(limit), request.action);
+  requireMemory(bytes, memoryLimit(request.maxMemory), request.action);
 }
 
 }  // namespace

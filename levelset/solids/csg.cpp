@@ -95,10 +95,10 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
 }  // namespace
 
 bool shareTransform(const FloatGrid& a, const FloatGrid& b) {
-  if (a.transform() == b.transform()) return true;
   openvdb::CoordBBox box = a.evalActiveVoxelBoundingBox();
   box.expand(b.evalActiveVoxelBoundingBox());
-  if (box.empty()) return false;
+  // OpenVDB compares transforms to 1e-7 world units, which may be more than a voxel.
+  if (box.empty()) return a.transform() == b.transform();
   std::array<openvdb::Coord, 8> corners;
   box.getCornerPoints(corners.data());
   return std::all_of(corners.begin(), corners.end(), [&](const openvdb::Coord& corner) {

@@ -92,6 +92,8 @@ NarrowBand bake(const NarrowBand& solid, const Imath::M44d& matrix, double voxel
 
 TriMesh transform(TriMesh mesh, const Imath::M44d& matrix) {
   requireAffine(matrix, "transform");
+  mesh.spacing = coordinateSpacing(mesh) * stretchOf(matrix).greatest;
+  mesh.precision = CoordinatePrecision::Double;  // moved numbers have more digits than stored ones
   for (Imath::V3d& position : mesh.positions) {
     Imath::V3d moved;
     matrix.multVecMatrix(position, moved);

@@ -25,7 +25,8 @@ struct BakeOptions {
 [[nodiscard]] NarrowBand bake(const NarrowBand& solid, const Imath::M44d& matrix, double voxelSize,
                               const BakeOptions& options = {});
 
-/// Moves the vertices; a mirroring matrix also turns the triangles.
+/// Moves the vertices; a mirroring matrix also turns the triangles. The mesh keeps in mind how
+/// finely its coordinates were known, and is written in double precision from then on.
 [[nodiscard]] TriMesh transform(TriMesh mesh, const Imath::M44d& matrix);
 
 }  // namespace levelset

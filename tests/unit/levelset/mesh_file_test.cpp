@@ -206,7 +206,46 @@ TEST(MeshFile, ReadsAsciiPly) {
   EXPECT_EQ(mesh.positions[2], Imath::V3d(1, 1, 0));
   EXPECT_EQ(mesh.triangles[1], (std::array<std::uint32_t, 3>{0, 2, 3}));
   EXPECT_EQ(parse("a.ply", kAsciiPly.substr(0, kAsciiPly.size() - 1)).triangles, mesh.triangles);
-  EXPECT_EQ(parse("a.ply", kAsciiPly + "junk").triangles, mesh.triangles);
+}
+
+TEST(MeshFile, RefusesWhatGoesOnBehindItsHeader) {
+  const std::string binary = strangePly("uchar", "int", "float", false);
+  for (const std::string& ply : {kAsciiPly, binary}) {
+    EXPECT_SAYS(refused("a.ply", ply + "junk"), "goes on behind the elements");
+    EXPECT_NO_THROW((void)parse("a.ply", ply + " \t\r\n\n"));
+  }
+  std::string ply = binary;
+  ply.replace(ply.find("face 5"), 6, "face 4");
+  EXPECT_SAYS(refused("a.ply", ply), "goes on behind the elements");
+  ply = kAsciiPly;
+  ply.replace(ply.find("face 2"), 6, "face 1");
+  EXPECT_SAYS(refused("a.ply", ply), "goes on behind the elements");
+  // Elements that no mesh needs are read to find the end.
+  ply = kAsciiPly + "1 2\n3\n";
+  ply.replace(ply.find("end_header"), 10, "element tag 2\nproperty list int int marks\nend_header");
+  EXPECT_SAYS(refused("a.ply", ply), "the file ends within the elements 'tag'");
+  EXPECT_EQ(parse("a.ply", ply + "5 6 7\n").triangles.size(), 2u);
+  const std::string off = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  EXPECT_SAYS(refused("a.off", off + "3 0 2 1\n"), "goes on behind the 3 vertices and 1 faces");
+  EXPECT_NO_THROW((void)parse("a.off", off + "\n # the end\n\n"));
+}
+
+TEST(MeshFile, ReadsTextBehindAByteOrderMark) {
+  const std::string mark = "\xEF\xBB\xBF";
+  EXPECT_EQ(parse("a.ply", mark + kAsciiPly).triangles.size(), 2u);
+  EXPECT_EQ(parse("a.ply", mark + strangePly("int", "int", "float", true)).triangles.size(), 4u);
+  EXPECT_EQ(parse("a.obj", mark + "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").triangles.size(), 1u);
+  EXPECT_EQ(parse("a.off", mark + "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").triangles.size(),
+            1u);
+  EXPECT_EQ(
+      parse("a.stl", mark + "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+                            "vertex 0 1 0\nendloop\nendfacet\nendsolid x\n")
+          .triangles.size(),
+      1u);
+  // Of other encodings none is read.
+  EXPECT_SAYS(refused("a.ply", std::string("\xFF\xFEp\0l\0y\0\n\0", 10)),
+              "does not begin with 'ply'");
+  EXPECT_SAYS(refused("a.obj", std::string("\xFF\xFEv\0 \0", 6)), "binary data");
 }
 
 TEST(MeshFile, RefusesAnyCutOfPly) {
@@ -254,7 +293,7 @@ TEST(MeshFile, RefusesBrokenPly) {
   EXPECT_SAYS(with("ascii", "ebcdic"), "'ebcdic'");
   EXPECT_SAYS(with("end_header", "property x"), "needs a type and a name");
   EXPECT_SAYS(with("ply", "plx"), "does not begin with 'ply'");
-  EXPECT_SAYS(with("element face 2", "element face 0"), "no triangle");
+  EXPECT_SAYS(with("element face 2", "element face 0"), "goes on behind the elements");
 }
 
 TEST(MeshFile, KeepsExtremeButFiniteCoordinates) {
@@ -369,7 +408,13 @@ TEST(MeshFile, SplitsHugeConvexPolygonsAtOnce) {
   std::vector<Imath::V2d> circle;
   for (int i = 0; i < 200000; ++i)
     circle.emplace_back(std::cos(2 * M_PI * i / 200000), std::sin(2 * M_PI * i / 200000));
-  EXPECT_NEAR(area(polygon(circle)), M_PI, 1e-8);
+  const TriMesh mesh = polygon(circle);
+  EXPECT_NEAR(area(mesh), M_PI, 1e-8);
+  // Not as a fan: its triangles would all lie in each other's bounding boxes.
+  std::vector<std::size_t> faces(circle.size(), 0);
+  for (const auto& t : mesh.triangles)
+    for (const std::uint32_t v : t) ++faces[v];
+  EXPECT_LT(*std::max_element(faces.begin(), faces.end()), 50u);
 }
 
 TEST(MeshFile, RefusesAPolygonTooIntricateToSplit) {
@@ -415,8 +460,12 @@ TEST(MeshFile, ReadsBinaryStlWhateverItsHeader) {
     const TriMesh mesh = parse("a.stl", binaryStl(header, {triangle, triangle}, 2));
     EXPECT_EQ(mesh.positions.size(), 3u) << header;
     EXPECT_EQ(mesh.triangles.size(), 2u) << header;
-    EXPECT_EQ(parse("a.stl", binaryStl(header, {triangle, triangle}, 2) + "tail").triangles.size(),
+    EXPECT_EQ(parse("a.stl", binaryStl(header, {triangle, triangle}, 2) + "\r\n").triangles.size(),
               2u);
+    EXPECT_SAYS(refused("a.stl", binaryStl(header, {triangle, triangle}, 2) + "tail"),
+                "goes on behind the 2 triangles");
+    EXPECT_SAYS(refused("a.stl", binaryStl(header, {triangle, triangle}, 1)),
+                "goes on behind the 1 triangles that its header promises (it has room for 2)");
   }
 }
 

@@ -1,14 +1,18 @@
 #include "levelset/convert/mesh_to_band.h"
 
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <openvdb/tools/Diagnostics.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
+#include <ctime>
 #include <mutex>
 
+#include "levelset/convert/mesh_file.h"
 #include "levelset/error.h"
 #include "levelset/vdb.h"
+#include "tests/support/files.h"
 #include "tests/support/meshes.h"
 
 namespace mesh_to_band_test {
@@ -252,6 +256,49 @@ TEST(MeshToBand, StopsWhenAsked) {
   EXPECT_THROW((void)meshToBand(torusMesh(1, 0.4, 64, 32), 0.02, {.progress = progress}),
                Cancelled);
   EXPECT_GE(calls, 5);
+}
+
+/// A prism over a regular polygon, read from a file whose caps are polygons.
+TriMesh prismOf(int corners) {
+  std::string obj, caps[2] = {"f", "f"}, sides;
+  for (int i = 0; i < corners; ++i) {
+    const double angle = 2 * std::numbers::pi * i / corners;
+    obj += fmt::format("v {0} {1} -1\nv {0} {1} 1\n", std::cos(angle), std::sin(angle));
+    caps[0] += fmt::format(" {}", 2 * (corners - i) - 1);
+    caps[1] += fmt::format(" {}", 2 * i + 2);
+    const int next = 2 * ((i + 1) % corners);
+    sides += fmt::format("f {} {} {} {}\n", 2 * i + 1, next + 1, next + 2, 2 * i + 2);
+  }
+  const TemporaryFolder folder;
+  writeText(folder / "prism.obj", obj + caps[0] + "\n" + caps[1] + "\n" + sides);
+  return readMesh(folder / "prism.obj");
+}
+
+TEST(SelfIntersections, SearchesLargeCapsInTime) {
+  // Written as polygons and read again: the reader splits the caps.
+  const TriMesh mesh = prismOf(100000);
+  EXPECT_EQ(mesh.triangles.size(), 2 * (100000u - 2) + 2 * 100000u);
+  const std::clock_t start = std::clock();
+  EXPECT_EQ(countSelfIntersections(mesh), 0u);
+  // CPU seconds; all pairs of a cap take minutes.
+  EXPECT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 20);
+}
+
+TEST(SelfIntersections, JudgesFlatFansAroundACorner) {
+  // A disc of triangles about one vertex lies flat; one of them turned over lies on another.
+  TriMesh fan{{V3d(0)}, {}};
+  constexpr std::uint32_t kSides = 4000;
+  for (std::uint32_t i = 0; i < kSides; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kSides;
+    fan.positions.emplace_back(turned(V3d(std::cos(angle), std::sin(angle), 0), 0.3));
+    fan.triangles.push_back({0, i + 1, (i + 1) % kSides + 1});
+  }
+  // Turned, its corners lie in no plane exactly; flat, they do.
+  EXPECT_EQ(countSelfIntersections(fan), 0u);
+  for (V3d& p : fan.positions) p = turned(p, -0.3), p.z = 0;
+  EXPECT_EQ(countSelfIntersections(fan), 0u);
+  fan.triangles.push_back({0, 11, 13});  // over those from 11 to 12 and to 13
+  EXPECT_EQ(countSelfIntersections(fan), 2u);
 }
 
 TEST(SelfIntersections, CountsPairsThatCross) {

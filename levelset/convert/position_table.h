@@ -1,0 +1,62 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+namespace levelset::convert {
+
+/// Finds points at equal positions; −0 and +0 are one place. Open addressing.
+class PositionTable {
+ public:
+  /// @param points    those that are entered, kept by the caller
+  /// @param expected  how many will be
+  PositionTable(const std::vector<Imath::V3d>& points, std::size_t expected)
+      : points_(points), slots_(std::bit_ceil(2 * expected + 2), kNone) {}
+
+  /// The index entered before for this position, or else `index`, which is entered for it.
+  /// @pre points[index] is `p`, at the latest when the next one is entered
+  std::uint32_t findOrEnter(const Imath::V3d& p, std::uint32_t index) {
+    if (2 * entered_ >= slots_.size()) grow();
+    std::uint32_t& slot = find(p);
+    if (slot == kNone) {
+      slot = index;
+      ++entered_;
+    }
+    return slot;
+  }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  static std::uint64_t hashOf(const Imath::V3d& p) {
+    std::uint64_t hash = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double value = p[axis] + 0.0;  // −0 + 0 = 0
+      hash = (hash ^ std::bit_cast<std::uint64_t>(value)) * 0x9e3779b97f4a7c15ull;
+      hash ^= hash >> 29;
+    }
+    return hash;
+  }
+
+  std::uint32_t& find(const Imath::V3d& p) {
+    std::size_t i = hashOf(p) & (slots_.size() - 1);
+    while (slots_[i] != kNone && points_[slots_[i]] != p) i = (i + 1) & (slots_.size() - 1);
+    return slots_[i];
+  }
+
+  void grow() {
+    std::vector<std::uint32_t> old(4 * slots_.size(), kNone);
+    old.swap(slots_);
+    for (const std::uint32_t index : old)
+      if (index != kNone) find(points_[index]) = index;
+  }
+
+  const std::vector<Imath::V3d>& points_;
+  std::vector<std::uint32_t> slots_;
+  std::size_t entered_ = 0;
+};
+
+}  // namespace levelset::convert
