@@ -2,15 +2,14 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <sstream>
 #include <string>
 
 #include "levelset/error.h"
+#include "levelset/tree_hash_vdb.h"
 #include "levelset/vdb.h"
 
 namespace levelset {
@@ -44,24 +43,6 @@ bool isSimilarity(const openvdb::math::Transform& transform) {
 
 std::string coordText(const Coord& c) {
   return fmt::format("[{}, {}, {}]", c.x(), c.y(), c.z());
-}
-
-std::uint64_t mix(std::uint64_t hash, std::uint64_t word) {
-  hash ^= word + 0x9e3779b97f4a7c15ull + (hash << 6) + (hash >> 2);
-  hash *= 0xff51afd7ed558ccdull;
-  return hash ^ (hash >> 32);
-}
-
-template <typename T>
-std::uint64_t mixBytes(std::uint64_t hash, const T* data, std::size_t count) {
-  const auto* bytes = reinterpret_cast<const unsigned char*>(data);
-  const std::size_t size = count * sizeof(T);
-  for (std::size_t i = 0; i < size; i += 8) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, bytes + i, std::min<std::size_t>(8, size - i));
-    hash = mix(hash, word);
-  }
-  return hash;
 }
 
 }  // namespace
@@ -125,28 +106,7 @@ Imath::Box3d NarrowBand::zeroSetBounds() const {
 }
 
 std::uint64_t NarrowBand::contentHash() const {
-  std::uint64_t hash = 0x4c4556454c534d54ull;
-  if (!grid_) return hash;
-  const FloatGrid& grid = *grid_->grid;
-  const Imath::M44d matrix = indexToWorld();
-  hash = mixBytes(hash, &matrix[0][0], 16);
-  const float background = grid.background();
-  hash = mixBytes(hash, &background, 1);
-  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
-    const Coord origin = leaf->origin();
-    hash = mixBytes(hash, origin.data(), 3);
-    hash = mixBytes(hash, &leaf->valueMask(), 1);
-    hash = mixBytes(hash, leaf->buffer().data(), LeafNode::SIZE);
-  }
-  // Tiles carry the sign away from the band.
-  for (auto it = grid.tree().cbeginValueAll(); it; ++it) {
-    if (it.getDepth() == FloatGrid::TreeType::DEPTH - 1) continue;
-    const openvdb::CoordBBox box = it.getBoundingBox();
-    const float value = *it;
-    hash = mixBytes(hash, box.min().data(), 3);
-    hash = mixBytes(hash, &value, 1);
-  }
-  return hash;
+  return grid_ ? gridHash(*grid_->grid) : 0x4c4556454c534d54ull;
 }
 
 FloatGrid& editVdb(NarrowBand& band) {

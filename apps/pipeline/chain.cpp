@@ -158,6 +158,9 @@ Action readAction(Reader& reader) {
                                    param.name, valueForm(param)));
     }
   }
+  for (const auto& [name, text] : action.options)
+    if (const Param* param = op.find(name); param && namesValue(*param, text))
+      action.named.emplace(name, text.substr(1));
   if (const auto it = action.options.find("as"); it != action.options.end()) {
     action.resultName = it->second.starts_with('@') ? it->second.substr(1) : it->second;
     action.options.erase(it);
@@ -176,6 +179,13 @@ class KindChecker {
       if (std::find(allowed.begin(), allowed.end(), operands[i]) == allowed.end())
         throw UsageError(mismatch(op, i, operands[i], allowed));
     }
+    for (const auto& [option, name] : action.named) {
+      const Kind kind = kindOf(name, op);
+      const bool isScalar = op.find(option)->type == ParamType::Scalar;
+      if (kind == Kind::Field || (isScalar && kind == Kind::Band)) continue;
+      throw UsageError(fmt::format("{}: --{}: '@{}' is a {}, a {} is needed", op.name, option, name,
+                                   kindName(kind), isScalar ? "field or a level set" : "field"));
+    }
     if (op.validate) op.validate(probe(action, operands));
     if (op.flow == Flow::PassesThrough) return;
     const Kind result = op.resultKind ? op.resultKind(probe(action, operands)) : Kind::Band;
@@ -189,21 +199,21 @@ class KindChecker {
   }
 
  private:
+  [[nodiscard]] Kind kindOf(const std::string& name, const Operator& op) const {
+    const auto it = names_.find(name);
+    if (it != names_.end()) return it->second;
+    std::vector<std::string> known;
+    for (const auto& entry : names_) known.push_back(entry.first);
+    const std::string guess = didYouMean(name, known);
+    throw UsageError(fmt::format("{}: nothing is named '@{}'{}", op.name, name,
+                                 guess.empty() ? "; give an earlier result that name with --as"
+                                               : fmt::format("; did you mean '@{}'?", guess)));
+  }
+
   std::vector<Kind> takeOperands(const Action& action) {
     const Operator& op = *action.op;
     std::vector<Kind> named;
-    for (const std::string& name : action.operandNames) {
-      const auto it = names_.find(name);
-      if (it == names_.end()) {
-        std::vector<std::string> known;
-        for (const auto& entry : names_) known.push_back(entry.first);
-        const std::string guess = didYouMean(name, known);
-        throw UsageError(fmt::format("{}: nothing is named '@{}'{}", op.name, name,
-                                     guess.empty() ? "; give an earlier result that name with --as"
-                                                   : fmt::format("; did you mean '@{}'?", guess)));
-      }
-      named.push_back(it->second);
-    }
+    for (const std::string& name : action.operandNames) named.push_back(kindOf(name, op));
     if (named.size() > op.operands.size() && !op.takesMore) {
       throw UsageError(fmt::format("{}: takes {} operand{}, not {}", op.name, op.operands.size(),
                                    op.operands.size() == 1 ? "" : "s", named.size()));

@@ -13,6 +13,7 @@ struct Action {
   const Operator* op = nullptr;
   std::map<std::string, std::string> options;  ///< by full name; a flag is "true"
   std::vector<std::string> operandNames;       ///< `@NAME`, without the @
+  std::map<std::string, std::string> named;    ///< option to the name in its `@NAME`
   std::string resultName;                      ///< --as
 };
 

@@ -79,6 +79,10 @@ const char* typeName(ParamType type) {
       return "image size";
     case ParamType::Bytes:
       return "bytes";
+    case ParamType::Scalar:
+      return "scalar field";
+    case ParamType::Velocity:
+      return "velocity";
   }
   return "";
 }

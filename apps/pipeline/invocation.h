@@ -57,6 +57,9 @@ class Invocation {
     return operands.at(index).mesh();
   }
 
+  /// The values that parameters name ("--mask @NAME"), by parameter.
+  std::map<std::string, Value> named;
+
   // Parameters. A parameter that was not given answers with its default; asking for one that has
   // neither is a programming error.
   [[nodiscard]] bool given(const std::string& name) const { return options_.contains(name); }

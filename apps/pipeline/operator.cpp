@@ -7,6 +7,7 @@
 
 #include "apps/pipeline/units.h"
 #include "levelset/error.h"
+#include "levelset/fields/expression.h"
 
 namespace pipeline {
 
@@ -46,6 +47,10 @@ std::string valueForm(const Param& param) {
       return "WxH";
     case ParamType::Bytes:
       return "SIZE";
+    case ParamType::Scalar:
+      return "X|FORMULA|@NAME";
+    case ParamType::Velocity:
+      return fmt::format("{}|\"FX, FY, FZ\"|@NAME", fmt::join(param.choices, "|"));
   }
   return "";
 }
@@ -60,7 +65,23 @@ void checkRange(const Param& param, double number, const std::string& text,
     throw UsageError(fmt::format("{}: '{}' must not be negative", where, text));
 }
 
+void checkField(const Param& param, const std::string& text, const std::string& where) {
+  if (text == "@") throw UsageError(fmt::format("{}: '@' needs a name behind it", where));
+  if (namesValue(param, text)) return;
+  const auto& known = param.choices;
+  if (std::find(known.begin(), known.end(), text) != known.end()) return;
+  if (param.type == ParamType::Scalar)
+    (void)levelset::scalarExpression(text, where.c_str());
+  else
+    (void)levelset::vectorExpression(text, where.c_str());
+}
+
 }  // namespace
+
+bool namesValue(const Param& param, const std::string& text) {
+  return (param.type == ParamType::Scalar || param.type == ParamType::Velocity) &&
+         text.starts_with('@');
+}
 
 void checkText(const Param& param, const std::string& text, const std::string& where) {
   switch (param.type) {
@@ -114,6 +135,9 @@ void checkText(const Param& param, const std::string& text, const std::string& w
       return void(parseImageSize(text, where));
     case ParamType::Bytes:
       return void(parseBytes(text, where));
+    case ParamType::Scalar:
+    case ParamType::Velocity:
+      return checkField(param, text, where);
   }
 }
 

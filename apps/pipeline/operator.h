@@ -28,7 +28,10 @@ enum class ParamType {
   Text,
   Path,
   ImageSize,
-  Bytes
+  Bytes,
+  Scalar,   ///< a number in space: a number, a formula in x, y, z, r, or the @NAME of a value
+  Velocity  ///< a vector in space and time: one of `choices`, three formulas, or the @NAME of a
+            ///< field
 };
 
 enum class Range { Any, Positive, NonNegative };
@@ -49,6 +52,9 @@ struct Param {
 
 /// The form of a value in help, e.g. "L" for a length.
 [[nodiscard]] std::string valueForm(const Param& param);
+
+/// Does the parameter name a value of the chain, "@NAME"?
+[[nodiscard]] bool namesValue(const Param& param, const std::string& text);
 
 /// Throws UsageError when `text` cannot be a value of `param`. @param where  "action: --name"
 void checkText(const Param& param, const std::string& text, const std::string& where);

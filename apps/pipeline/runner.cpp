@@ -60,11 +60,13 @@ class Stack {
       if (op.flow == Flow::Makes)
         slots_.resize(slots_.size() - missing, Slot{Value(Plan{}), {}, {}});
     }
-    for (const std::string& name : action.operandNames) {
-      usedNames_[name] = true;
-      operands.push_back(named_.at(name));
-    }
+    for (const std::string& name : action.operandNames) operands.push_back(get(name));
     return operands;
+  }
+
+  const Value& get(const std::string& name) {
+    usedNames_[name] = true;
+    return named_.at(name);
   }
 
   void push(Value value, const std::string& name) {
@@ -184,6 +186,7 @@ void runAction(const Action& action, std::size_t index, const RunSettings& setti
   Invocation invocation(op, action.options);
   if (settings.begin) settings.begin(op.name);
   invocation.operands = stack.take(action);
+  for (const auto& [option, name] : action.named) invocation.named.emplace(option, stack.get(name));
   invocation.maxMemory = settings.maxMemory;
   invocation.dryRun = settings.dryRun;
   if (settings.progress) {

@@ -1,5 +1,9 @@
 #include "apps/pipeline/value.h"
 
+#include <fmt/core.h>
+
+#include "levelset/error.h"
+
 namespace pipeline {
 
 using levelset::NarrowBand;
@@ -13,6 +17,8 @@ const char* kindName(Kind kind) {
       return "level set";
     case Kind::Patch:
       return "patch";
+    case Kind::Field:
+      return "field";
   }
   return "";
 }
@@ -22,6 +28,7 @@ double Plan::activeVoxels() const {
 }
 
 double Plan::bytes() const {
+  if (kind == Kind::Field) return fieldBytes;
   // A band fills about a third of its leaf blocks: 12 bytes for each active voxel, as measured.
   constexpr double kBytesPerVoxel = 12;
   return kBytesPerVoxel * activeVoxels();
@@ -30,6 +37,7 @@ double Plan::bytes() const {
 Value::Value(TriMesh mesh) : data_(std::make_shared<const TriMesh>(std::move(mesh))) {}
 Value::Value(NarrowBand band) : data_(std::move(band)) {}
 Value::Value(PatchValue patch) : data_(std::make_shared<const PatchValue>(std::move(patch))) {}
+Value::Value(levelset::FieldGrid field) : data_(std::move(field)) {}
 Value::Value(Plan plan) : plan_(plan) {}
 
 Kind Value::kind() const {
@@ -40,19 +48,33 @@ Kind Value::kind() const {
       return Kind::Band;
     case 3:
       return Kind::Patch;
+    case 4:
+      return Kind::Field;
     default:
       return plan_->kind;
   }
 }
 
+template <typename T>
+const T& Value::as(Kind wanted) const {
+  if (const T* value = std::get_if<T>(&data_)) return *value;
+  throw levelset::UsageError(
+      fmt::format("levelsmith: a {} stands where a {} is needed; choose "
+                  "another operand, or another grid of the file",
+                  kindName(kind()), kindName(wanted)));
+}
+
 const TriMesh& Value::mesh() const {
-  return *std::get<std::shared_ptr<const TriMesh>>(data_);
+  return *as<std::shared_ptr<const TriMesh>>(Kind::Mesh);
 }
 const NarrowBand& Value::band() const {
-  return std::get<NarrowBand>(data_);
+  return as<NarrowBand>(Kind::Band);
 }
 const PatchValue& Value::patch() const {
-  return *std::get<std::shared_ptr<const PatchValue>>(data_);
+  return *as<std::shared_ptr<const PatchValue>>(Kind::Patch);
+}
+const levelset::FieldGrid& Value::field() const {
+  return as<levelset::FieldGrid>(Kind::Field);
 }
 
 const Plan& Value::plan() const {
@@ -74,6 +96,11 @@ const Plan& Value::plan() const {
     case Kind::Patch:
       for (const mapping::ParticleLevel& level : patch().patch.levels)
         for (const Imath::V3d& p : level.positions) plan.bounds.extendBy(p);
+      break;
+    case Kind::Field:
+      plan.bounds = field().bounds();
+      plan.voxelSize = field().voxelSize();
+      plan.fieldBytes = static_cast<double>(field().memoryUse());
       break;
   }
   plan_ = plan;

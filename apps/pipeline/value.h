@@ -8,13 +8,14 @@
 #include <string>
 #include <variant>
 
+#include "levelset/fields/grid.h"
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
 #include "mapping/patch.h"
 
 namespace pipeline {
 
-enum class Kind { Mesh, Band, Patch };
+enum class Kind { Mesh, Band, Patch, Field };
 [[nodiscard]] const char* kindName(Kind kind);
 
 /// What is known of a value before it is computed: enough to resolve lengths and estimate cost.
@@ -25,6 +26,7 @@ struct Plan {
   double voxelSize = 0;        ///< bands only
   double halfWidth = 0;        ///< voxels, bands only
   double smallestStretch = 1;  ///< patches only
+  double fieldBytes = 0;       ///< fields only
   /// Active voxels that a band of this area takes.
   [[nodiscard]] double activeVoxels() const;
   [[nodiscard]] double bytes() const;
@@ -45,12 +47,16 @@ class Value {
   explicit Value(levelset::TriMesh mesh);
   explicit Value(levelset::NarrowBand band);
   explicit Value(PatchValue patch);
+  explicit Value(levelset::FieldGrid field);
   explicit Value(Plan plan);
 
   [[nodiscard]] Kind kind() const;
+  // The value as that kind. A file may turn out to hold another kind than its name promised.
+  // @throws levelset::UsageError when it is of another kind
   [[nodiscard]] const levelset::TriMesh& mesh() const;
   [[nodiscard]] const levelset::NarrowBand& band() const;
   [[nodiscard]] const PatchValue& patch() const;
+  [[nodiscard]] const levelset::FieldGrid& field() const;
 
   /// Known, or read off the value and remembered.
   [[nodiscard]] const Plan& plan() const;
@@ -59,8 +65,11 @@ class Value {
   }
 
  private:
+  template <typename T>
+  [[nodiscard]] const T& as(Kind wanted) const;
+
   std::variant<std::monostate, std::shared_ptr<const levelset::TriMesh>, levelset::NarrowBand,
-               std::shared_ptr<const PatchValue>>
+               std::shared_ptr<const PatchValue>, levelset::FieldGrid>
       data_;
   mutable std::optional<Plan> plan_;
 };

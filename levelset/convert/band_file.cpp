@@ -13,6 +13,7 @@
 #include "levelset/convert/nano_file_vdb.h"
 #include "levelset/convert/vdb_layout.h"
 #include "levelset/error.h"
+#include "levelset/fields/grid_vdb.h"
 #include "levelset/file_target.h"
 #include "levelset/memory_limit.h"
 
@@ -48,15 +49,19 @@ std::string bandFormat(const fs::path& path, const std::string& given) {
 std::string valueType(const VdbEntry& entry) {
   if (hasFloatTree(entry)) return entry.half ? "half" : "float";
   if (hasDoubleTree(entry)) return entry.half ? "double as half" : "double";
+  if (hasVectorTree(entry)) {
+    const std::string wide = entry.type == openvdb::Vec3DTree::treeType() ? "vec3d" : "vec3s";
+    return entry.half ? wide + " as half" : wide;
+  }
   return entry.type;
 }
 
-bool isReadable(const VdbEntry& entry) {
+bool hasNumbers(const VdbEntry& entry) {
   return hasFloatTree(entry) || hasDoubleTree(entry);
 }
 
 bool isLevelSet(const VdbEntry& entry) {
-  return isReadable(entry) &&
+  return hasNumbers(entry) &&
          entry.gridClass() == openvdb::GridBase::gridClassToString(openvdb::GRID_LEVEL_SET);
 }
 
@@ -68,6 +73,7 @@ std::string listOf(const std::vector<VdbEntry>& entries) {
   return list.empty() ? "nothing" : list;
 }
 
+/// By name, or the only level set.
 const VdbEntry& chooseGrid(const std::vector<VdbEntry>& entries, const std::string& wanted,
                            const std::string& file) {
   const VdbEntry* chosen = nullptr;
@@ -85,13 +91,9 @@ const VdbEntry& chooseGrid(const std::vector<VdbEntry>& entries, const std::stri
     throw InvalidInput(fmt::format(
         "read: {} holds {}, and no {}; {}", file, listOf(entries),
         wanted.empty() ? "level set of float values" : fmt::format("grid '{}'", wanted),
-        wanted.empty() ? "convert it to a level set before" : "choose one of these with --grid"));
-  }
-  if (!isReadable(*chosen)) {
-    throw InvalidInput(
-        fmt::format("read: grid '{}' of {} holds values of type {}, and float, half and "
-                    "double are read; convert it before",
-                    chosen->name, file, valueType(*chosen)));
+        wanted.empty() ? "convert it to a level set before, or name one with --grid to take it as "
+                         "a field"
+                       : "choose one of these with --grid"));
   }
   return *chosen;
 }
@@ -101,7 +103,8 @@ const VdbEntry& treeOwner(const std::vector<VdbEntry>& entries, const VdbEntry& 
                           const std::string& file) {
   if (entry.instanceOf.empty()) return entry;
   for (const VdbEntry& other : entries)
-    if (other.uniqueName == entry.instanceOf && other.instanceOf.empty() && isReadable(other))
+    if (other.uniqueName == entry.instanceOf && other.instanceOf.empty() &&
+        other.type == entry.type)
       return other;
   throw InvalidInput(
       fmt::format("read: {} is damaged: the tree of grid '{}' is missing; fetch or make "
@@ -109,43 +112,93 @@ const VdbEntry& treeOwner(const std::vector<VdbEntry>& entries, const VdbEntry& 
                   file, entry.name));
 }
 
-NarrowBand readChosen(std::string_view file, const std::string& name,
-                      const ReadBandOptions& options) {
-  const std::vector<VdbEntry> entries = readVdbEntries(file, name);
+/// A .vdb file in memory, one of its grids chosen.
+struct ChosenGrid {
+  std::string_view file;
+  const std::string& name;
+  const ReadBandOptions& options;
+  std::vector<VdbEntry> entries = readVdbEntries(file, name);
   const VdbEntry& entry = chooseGrid(entries, options.grid, name);
-  if (!entry.transform) {
+
+  [[nodiscard]] std::string action() const { return fmt::format("read: {}", name); }
+
+  [[noreturn]] void refuseType(const char* readable) const {
     throw InvalidInput(
-        fmt::format("read: grid '{}' of {} has a frustum transform; resample it to "
-                    "uniform voxels first",
-                    entry.name, name));
+        fmt::format("read: grid '{}' of {} holds values of type {}, and {} are read; convert it "
+                    "before",
+                    entry.name, name, valueType(entry), readable));
   }
-  const std::size_t limit = memoryLimit(options.maxMemory);
-  requireMemory(static_cast<double>(file.size()), limit, "read");
-  const auto grid = openvdb::FloatGrid::create(
-      readVdbTree(file, name, treeOwner(entries, entry, name), limit - file.size()));
-  grid->setTransform(entry.transform);
-  grid->setName(entry.name);
-  grid->setGridClass(openvdb::GridBase::stringToGridClass(entry.gridClass()));
-  return importBand(grid, fmt::format("read: {}", name).c_str());
+
+  template <typename GridT, typename Read>
+  [[nodiscard]] typename GridT::Ptr load(const Read& read, bool keepsTiles) const {
+    if (!entry.transform) {
+      throw InvalidInput(
+          fmt::format("read: grid '{}' of {} has a frustum transform; resample it to "
+                      "uniform voxels first",
+                      entry.name, name));
+    }
+    const std::size_t limit = memoryLimit(options.maxMemory);
+    requireMemory(static_cast<double>(file.size()), limit, "read");
+    const auto grid = GridT::create(read(file, name, treeOwner(entries, entry, name),
+                                         VdbTreeLimits{limit - file.size(), keepsTiles}));
+    grid->setTransform(entry.transform);
+    grid->setName(entry.name);
+    grid->setGridClass(openvdb::GridBase::stringToGridClass(entry.gridClass()));
+    return grid;
+  }
+
+  [[nodiscard]] NarrowBand band() const {
+    if (!hasNumbers(entry)) refuseType("float, half and double");
+    return importBand(load<openvdb::FloatGrid>(readVdbTree, false), action().c_str());
+  }
+
+  [[nodiscard]] FieldGrid field() const {
+    if (hasNumbers(entry))
+      return importField(load<openvdb::FloatGrid>(readVdbTree, true), action().c_str());
+    if (hasVectorTree(entry))
+      return importField(load<openvdb::Vec3SGrid>(readVdbVectorTree, true), action().c_str());
+    refuseType("numbers and vectors of float, half and double");
+  }
+};
+
+template <typename Take>
+auto readFrom(const fs::path& path, const ReadBandOptions& options, const Take& take) {
+  const std::string name = inputName(path);
+  if (bandFormat(path) == "nvdb") {
+    throw UsageError(
+        fmt::format("read: {} is written for renderers and not read back; read the .vdb "
+                    "that it was made from",
+                    name));
+  }
+  try {
+    const Bytes bytes = readBytes(path, options.maxMemory);
+    return take(ChosenGrid{bytes.view(), name, options});
+  } catch (const std::bad_alloc&) {
+    throw ResourceLimit(
+        fmt::format("read: {} does not fit into memory; free memory or use larger voxels", name));
+  } catch (const openvdb::Exception& error) {
+    throw InvalidInput(
+        fmt::format("read: {} is damaged: {}; fetch or make the file again", name, error.what()));
+  }
 }
 
 // === Writing
 
 /// OpenVDB's writer, with grid offsets, on any stream that can seek.
 struct StreamArchive : openvdb::io::Archive {
-  void writeGrids(std::ostream& out, const openvdb::FloatGrid::ConstPtr& grid) const {
+  void writeGrids(std::ostream& out, const openvdb::GridBase::ConstPtr& grid) const {
     Archive::write(out, openvdb::GridCPtrVec{grid}, true, openvdb::MetaMap());
   }
 };
 
-/// The grid of a band with nothing but what we say about it; the tree is shared.
-openvdb::FloatGrid::Ptr namedGrid(const NarrowBand& band, const std::string& name) {
-  const openvdb::FloatGrid& source = vdb(band);
-  const auto grid =
-      openvdb::FloatGrid::create(openvdb::ConstPtrCast<openvdb::FloatTree>(source.constTreePtr()));
+/// The grid with nothing but what we say about it; the tree is shared.
+template <typename GridT>
+typename GridT::Ptr namedGrid(const GridT& source, const std::string& name) {
+  using Tree = typename GridT::TreeType;
+  const auto grid = GridT::create(openvdb::ConstPtrCast<Tree>(source.constTreePtr()));
   grid->setTransform(source.transform().copy());
   grid->setName(name);
-  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  grid->setGridClass(source.getGridClass());
   grid->setCreator("Levelsmith");
   return grid;
 }
@@ -156,7 +209,7 @@ std::string identifierText(std::uint64_t hash) {
                      hash & 0xFFFF, other >> 48, other & 0xFFFFFFFFFFFFull);
 }
 
-void writeVdb(const fs::path& path, const openvdb::FloatGrid::ConstPtr& grid, std::uint64_t hash) {
+void writeVdb(const fs::path& path, const openvdb::GridBase::ConstPtr& grid, std::uint64_t hash) {
   openvdb::initialize();
   std::vector<char> buffer(1 << 20);
   std::ofstream out;
@@ -168,6 +221,25 @@ void writeVdb(const fs::path& path, const openvdb::FloatGrid::ConstPtr& grid, st
   const std::string identifier = identifierText(hash);
   out.write(identifier.data(), static_cast<std::streamsize>(identifier.size()));
   out.close();
+}
+
+/// @param write  fills the file at the path it is given
+template <typename Write>
+void writeTarget(const fs::path& path, const Write& write) {
+  FileTarget target(path);
+  try {
+    errno = 0;
+    write(target.path());
+  } catch (const std::ios_base::failure&) {
+    throw IoError(
+        fmt::format("write: '{}' could not be written: {}; make room on the disk or write "
+                    "elsewhere",
+                    path.string(), std::generic_category().message(errno != 0 ? errno : EIO)));
+  } catch (const openvdb::Exception& error) {
+    throw IoError(fmt::format("write: '{}' could not be written: {}; write elsewhere",
+                              path.string(), error.what()));
+  }
+  target.commit();
 }
 
 // === Information
@@ -187,6 +259,7 @@ GridInfo describe(const VdbEntry& entry) {
   info.name = entry.name;
   info.type = valueType(entry);
   info.gridClass = entry.gridClass();
+  info.isLevelSet = isLevelSet(entry);
   const auto count = metadataValue<std::int64_t>(entry, GridBase::META_FILE_VOXEL_COUNT, 0);
   const auto bytes = metadataValue<std::int64_t>(entry, GridBase::META_FILE_MEM_BYTES, 0);
   info.activeVoxels = count > 0 ? static_cast<std::uint64_t>(count) : 0;
@@ -205,23 +278,18 @@ GridInfo describe(const VdbEntry& entry) {
 }  // namespace
 
 NarrowBand readBand(const fs::path& path, const ReadBandOptions& options) {
-  const std::string name = inputName(path);
-  if (bandFormat(path) == "nvdb") {
-    throw UsageError(
-        fmt::format("read: {} is written for renderers and not read back; read the .vdb "
-                    "that it was made from",
-                    name));
-  }
-  try {
-    const Bytes bytes = readBytes(path, options.maxMemory);
-    return readChosen(bytes.view(), name, options);
-  } catch (const std::bad_alloc&) {
-    throw ResourceLimit(
-        fmt::format("read: {} does not fit into memory; free memory or use larger voxels", name));
-  } catch (const openvdb::Exception& error) {
-    throw InvalidInput(
-        fmt::format("read: {} is damaged: {}; fetch or make the file again", name, error.what()));
-  }
+  return readFrom(path, options, [](const ChosenGrid& chosen) { return chosen.band(); });
+}
+
+FieldGrid readField(const fs::path& path, const ReadBandOptions& options) {
+  return readFrom(path, options, [](const ChosenGrid& chosen) { return chosen.field(); });
+}
+
+BandOrField readGrid(const fs::path& path, const ReadBandOptions& options) {
+  return readFrom(path, options, [](const ChosenGrid& chosen) -> BandOrField {
+    if (isLevelSet(chosen.entry)) return chosen.band();
+    return chosen.field();
+  });
 }
 
 void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOptions& options) {
@@ -234,24 +302,30 @@ void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOpti
         fmt::format("write: '{}' cannot hold voxels of {:.6g}, NanoVDB takes none below {}; write "
                     "a .vdb, or change the unit of length",
                     path.string(), band.voxelSize(), kLeastNanoVoxel));
-  FileTarget target(path);
-  const auto grid = namedGrid(band, options.name);
-  try {
-    errno = 0;
+  const auto grid = namedGrid(vdb(band), options.name);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  writeTarget(path, [&](const fs::path& target) {
     if (format == "vdb")
-      writeVdb(target.path(), grid, band.contentHash());
+      writeVdb(target, grid, band.contentHash());
     else
-      writeNanoGrid(target.path(), *grid);
-  } catch (const std::ios_base::failure&) {
-    throw IoError(
-        fmt::format("write: '{}' could not be written: {}; make room on the disk or write "
-                    "elsewhere",
-                    path.string(), std::generic_category().message(errno != 0 ? errno : EIO)));
-  } catch (const openvdb::Exception& error) {
-    throw IoError(fmt::format("write: '{}' could not be written: {}; write elsewhere",
-                              path.string(), error.what()));
+      writeNanoGrid(target, *grid);
+  });
+}
+
+void writeField(const fs::path& path, const FieldGrid& field, const WriteBandOptions& options) {
+  if (bandFormat(path, options.format) != "vdb") {
+    throw UsageError(
+        fmt::format("write: '{}' would hold a field, which is written as .vdb only; name such a "
+                    "file",
+                    path.string()));
   }
-  target.commit();
+  const VdbField& source = *field.shared();
+  openvdb::GridBase::Ptr grid;
+  if (source.scalar)
+    grid = namedGrid(*source.scalar, options.name);
+  else
+    grid = namedGrid(*source.vector, options.name);
+  writeTarget(path, [&](const fs::path& target) { writeVdb(target, grid, field.contentHash()); });
 }
 
 std::vector<GridInfo> bandFileInfo(const fs::path& path) {

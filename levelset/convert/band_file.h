@@ -5,12 +5,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <variant>
 #include <vector>
 
+#include "levelset/fields/grid.h"
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 
-/// Narrow bands in OpenVDB (`.vdb`) and NanoVDB (`.nvdb`) files.
+/// Narrow bands and fields in OpenVDB (`.vdb`) files, and bands in NanoVDB (`.nvdb`) files.
 namespace levelset {
 
 struct ReadBandOptions {
@@ -27,6 +29,17 @@ struct ReadBandOptions {
 [[nodiscard]] NarrowBand readBand(const std::filesystem::path& path,
                                   const ReadBandOptions& options = {});
 
+/// The same for a grid of any class: numbers or vectors. The grid must be named unless it is a
+/// level set and the only one.
+/// @throws also InvalidInput for NaN or infinite values
+[[nodiscard]] FieldGrid readField(const std::filesystem::path& path,
+                                  const ReadBandOptions& options = {});
+
+/// A level set as a band, any other grid as a field.
+using BandOrField = std::variant<NarrowBand, FieldGrid>;
+[[nodiscard]] BandOrField readGrid(const std::filesystem::path& path,
+                                   const ReadBandOptions& options = {});
+
 struct WriteBandOptions {
   std::string name = "surface";  ///< of the grid
   std::string format = {};       ///< "vdb" or "nvdb"; empty: by extension
@@ -38,11 +51,16 @@ struct WriteBandOptions {
 void writeBand(const std::filesystem::path& path, const NarrowBand& band,
                const WriteBandOptions& options = {});
 
+/// As writeBand, to `.vdb` only; its class is kept.
+void writeField(const std::filesystem::path& path, const FieldGrid& field,
+                const WriteBandOptions& options = {});
+
 /// One grid of a .vdb file, from its header and metadata alone: no voxel is loaded.
 struct GridInfo {
   std::string name;
-  std::string type;  ///< of the values: "float", "half", "double"; else as OpenVDB names the tree
+  std::string type;  ///< of the values: "float", "half", "double", "vec3s", …; else OpenVDB's word
   std::string gridClass;           ///< "level set", "fog volume", …
+  bool isLevelSet = false;         ///< of that class, and of numbers: readBand takes it
   std::uint64_t activeVoxels = 0;  ///< 0 when the file does not say
   double voxelSize = 0;            ///< 0 when the voxels are no cubes of one size
   Imath::Box3d indexBounds;        ///< empty when the file does not say

@@ -101,7 +101,8 @@ void stepOver(VdbBytes& bytes, const VdbEntry& entry, std::int64_t end) {
     return bytes.seek(static_cast<std::size_t>(end));
   }
   if (!entry.instanceOf.empty()) return;
-  if (!entry.transform || (!hasFloatTree(entry) && !hasDoubleTree(entry))) {
+  if (!entry.transform ||
+      (!hasFloatTree(entry) && !hasDoubleTree(entry) && !hasVectorTree(entry))) {
     throw InvalidInput(
         fmt::format("read: {} was written as a stream, and grid '{}' of type '{}' in it "
                     "cannot be stepped over; write the level set to a file of its own",
@@ -151,6 +152,10 @@ bool hasFloatTree(const VdbEntry& entry) {
 }
 bool hasDoubleTree(const VdbEntry& entry) {
   return entry.type == openvdb::DoubleTree::treeType();
+}
+bool hasVectorTree(const VdbEntry& entry) {
+  return entry.type == openvdb::Vec3STree::treeType() ||
+         entry.type == openvdb::Vec3DTree::treeType();
 }
 
 std::vector<VdbEntry> readVdbEntries(std::string_view file, const std::string& name) {

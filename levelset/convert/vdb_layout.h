@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "levelset/progress.h"
 #include "levelset/vdb.h"
 
 // Private to levelset/convert: our own reader of .vdb files. OpenVDB's trusts every count and size
@@ -79,15 +80,28 @@ struct VdbEntry {
 /// @throws InvalidInput when the file is damaged
 [[nodiscard]] std::vector<VdbEntry> readVdbEntries(std::string_view file, const std::string& name);
 
+struct VdbTreeLimits {
+  std::size_t maxMemory = kNoMemoryLimit;
+  bool keepsTiles = false;  ///< active tiles stay tiles: they need not fit as voxels
+};
+
 /// The tree of an entry of float or double values, as a float tree.
-/// @throws InvalidInput when the file is damaged; ResourceLimit before the tree passes `maxMemory`
+/// @throws InvalidInput when the file is damaged; ResourceLimit before the tree passes its limit
 [[nodiscard]] openvdb::FloatTree::Ptr readVdbTree(std::string_view file, const std::string& name,
-                                                  const VdbEntry& entry, std::size_t maxMemory);
+                                                  const VdbEntry& entry,
+                                                  const VdbTreeLimits& limits);
+/// The same of float or double vectors.
+[[nodiscard]] openvdb::Vec3STree::Ptr readVdbVectorTree(std::string_view file,
+                                                        const std::string& name,
+                                                        const VdbEntry& entry,
+                                                        const VdbTreeLimits& limits);
 
 /// Takes bytes past the tree of an entry, for files that do not say where it ends.
 void skipVdbTree(VdbBytes& bytes, const VdbEntry& entry);
 
 [[nodiscard]] bool hasFloatTree(const VdbEntry& entry);
 [[nodiscard]] bool hasDoubleTree(const VdbEntry& entry);
+/// Of float or double vectors.
+[[nodiscard]] bool hasVectorTree(const VdbEntry& entry);
 
 }  // namespace levelset

@@ -24,6 +24,23 @@ namespace {
 using openvdb::Coord;
 using openvdb::Index;
 
+/// Floats of 16 bits may stand for those of a value.
+template <typename T>
+constexpr std::size_t kComponents = 1;
+template <>
+constexpr std::size_t kComponents<openvdb::Vec3s> = 3;
+template <>
+constexpr std::size_t kComponents<openvdb::Vec3d> = 3;
+
+template <typename T>
+T fromHalves(const openvdb::math::half* halves) {
+  if constexpr (kComponents<T> == 1)
+    return static_cast<T>(static_cast<float>(halves[0]));
+  else
+    return T(static_cast<float>(halves[0]), static_cast<float>(halves[1]),
+             static_cast<float>(halves[2]));
+}
+
 /// How the values of one tree are stored.
 template <typename T>
 struct Storage {
@@ -96,7 +113,7 @@ ValueBlock<T, Mask> takeValues(VdbBytes& bytes, const Storage<T>& storage, const
     bytes.fail(fmt::format("a node has values of the unknown kind {}", kind));
   block.inactive[1] = storage.background;
   block.inactive[0] =
-      kind == io::NO_MASK_OR_INACTIVE_VALS ? storage.background : -storage.background;
+      kind == io::NO_MASK_OR_INACTIVE_VALS ? storage.background : T(-storage.background);
   if (kind == io::NO_MASK_AND_ONE_INACTIVE_VAL || kind == io::MASK_AND_ONE_INACTIVE_VAL ||
       kind == io::MASK_AND_TWO_INACTIVE_VALS)
     block.inactive[0] = bytes.value<T>();
@@ -108,10 +125,10 @@ ValueBlock<T, Mask> takeValues(VdbBytes& bytes, const Storage<T>& storage, const
       (storage.compression & io::COMPRESS_ACTIVE_MASK) && kind != io::NO_MASK_AND_ALL_VALS;
   block.count = block.activeOnly ? active.countOn() : Mask::SIZE;
   block.data = bytes.rest().data();
-  block.size =
-      storage.half && block.count == 0
-          ? 0  // half floats: nothing at all is stored for none
-          : takeData(bytes, storage.compression, block.count * (storage.half ? 2 : sizeof(T)));
+  block.size = storage.half && block.count == 0
+                   ? 0  // half floats: nothing at all is stored for none
+                   : takeData(bytes, storage.compression,
+                              block.count * (storage.half ? 2 * kComponents<T> : sizeof(T)));
   return block;
 }
 
@@ -139,11 +156,11 @@ void expand(const VdbBytes& bytes, const ValueBlock<T, Mask>& block, const Stora
             const Mask& active, T* values) {
   std::vector<T> stored(block.count);
   if (storage.half) {
-    std::vector<openvdb::math::half> halves(block.count);
+    std::vector<openvdb::math::half> halves(kComponents<T> * block.count);
     unpack(bytes, block.data, block.size, storage.compression,
            reinterpret_cast<char*>(halves.data()), 2 * halves.size());
-    std::transform(halves.begin(), halves.end(), stored.begin(),
-                   [](openvdb::math::half h) { return static_cast<T>(static_cast<float>(h)); });
+    for (std::size_t i = 0; i < stored.size(); ++i)
+      stored[i] = fromHalves<T>(halves.data() + kComponents<T> * i);
   } else {
     unpack(bytes, block.data, block.size, storage.compression,
            reinterpret_cast<char*>(stored.data()), sizeof(T) * stored.size());
@@ -165,8 +182,10 @@ class TreeReader {
   using Leaf = typename TreeT::LeafNodeType;
 
  public:
-  TreeReader(VdbBytes& bytes, const VdbEntry& entry, std::size_t maxMemory)
-      : bytes_(bytes), storage_{entry.compression, entry.half, T(0)}, maxMemory_(maxMemory) {}
+  TreeReader(VdbBytes& bytes, const VdbEntry& entry, const VdbTreeLimits& limits)
+      : bytes_(bytes),
+        storage_{entry.compression, entry.half, openvdb::zeroVal<T>()},
+        limits_(limits) {}
 
   typename TreeT::Ptr read() {
     auto tree = std::make_shared<TreeT>();
@@ -192,7 +211,8 @@ class TreeReader {
   /// What a tree takes grows node by node, each of which takes bytes of the file too.
   void spend(std::size_t size) {
     memory_ += static_cast<double>(size);
-    if (memory_ > static_cast<double>(maxMemory_)) requireMemory(memory_, maxMemory_, "read");
+    if (memory_ > static_cast<double>(limits_.maxMemory))
+      requireMemory(memory_, limits_.maxMemory, "read");
   }
 
   void readRoot(Root& root) {
@@ -227,8 +247,9 @@ class TreeReader {
     return origin;
   }
 
-  /// An active tile is voxelised later: its leaves count now.
+  /// An active tile may be voxelised later: its leaves count now.
   void spendTile(Index log2VoxelCount) {
+    if (limits_.keepsTiles) return;
     const double leaves = std::ldexp(1.0, static_cast<int>(log2VoxelCount)) / Leaf::SIZE;
     memory_ += leaves * static_cast<double>(sizeof(Leaf) + Leaf::SIZE * sizeof(T));
     spend(0);
@@ -291,28 +312,58 @@ class TreeReader {
 
   VdbBytes& bytes_;
   Storage<T> storage_;
-  std::size_t maxMemory_;
+  VdbTreeLimits limits_;
   double memory_ = 0;
   bool countOnly_ = false;
   std::vector<Leaf*> leaves_;
 };
 
+/// OpenVDB's trees of vectors do not convert into each other.
+openvdb::Vec3STree::Ptr narrowed(const openvdb::Vec3DTree& wide) {
+  using Leaf = openvdb::Vec3STree::LeafNodeType;
+  auto tree = std::make_shared<openvdb::Vec3STree>(openvdb::Vec3s(wide.background()));
+  auto tile = wide.cbeginValueAll();
+  tile.setMaxDepth(decltype(tile)::LEAF_DEPTH - 1);
+  for (; tile; ++tile)
+    tree->addTile(tile.getLevel(), tile.getCoord(), openvdb::Vec3s(*tile), tile.isValueOn());
+  for (auto leaf = wide.cbeginLeaf(); leaf; ++leaf) {
+    auto copy = std::make_unique<Leaf>(leaf->origin());
+    for (Index i = 0; i < Leaf::SIZE; ++i) copy->setValueOnly(i, openvdb::Vec3s(leaf->getValue(i)));
+    copy->setValueMask(leaf->valueMask());
+    tree->addLeaf(copy.release());
+  }
+  return tree;
+}
+
 }  // namespace
 
 openvdb::FloatTree::Ptr readVdbTree(std::string_view file, const std::string& name,
-                                    const VdbEntry& entry, std::size_t maxMemory) {
+                                    const VdbEntry& entry, const VdbTreeLimits& limits) {
   VdbBytes bytes(file, name);
   bytes.seek(entry.treePosition);
-  if (hasFloatTree(entry)) return TreeReader<openvdb::FloatTree>(bytes, entry, maxMemory).read();
-  const auto wide = TreeReader<openvdb::DoubleTree>(bytes, entry, maxMemory).read();
+  if (hasFloatTree(entry)) return TreeReader<openvdb::FloatTree>(bytes, entry, limits).read();
+  const auto wide = TreeReader<openvdb::DoubleTree>(bytes, entry, limits).read();
   return std::make_shared<openvdb::FloatTree>(*wide);
+}
+
+openvdb::Vec3STree::Ptr readVdbVectorTree(std::string_view file, const std::string& name,
+                                          const VdbEntry& entry, const VdbTreeLimits& limits) {
+  VdbBytes bytes(file, name);
+  bytes.seek(entry.treePosition);
+  if (entry.type == openvdb::Vec3STree::treeType())
+    return TreeReader<openvdb::Vec3STree>(bytes, entry, limits).read();
+  return narrowed(*TreeReader<openvdb::Vec3DTree>(bytes, entry, limits).read());
 }
 
 void skipVdbTree(VdbBytes& bytes, const VdbEntry& entry) {
   if (hasFloatTree(entry))
-    TreeReader<openvdb::FloatTree>(bytes, entry, kNoMemoryLimit).skip();
+    TreeReader<openvdb::FloatTree>(bytes, entry, {}).skip();
+  else if (hasDoubleTree(entry))
+    TreeReader<openvdb::DoubleTree>(bytes, entry, {}).skip();
+  else if (entry.type == openvdb::Vec3STree::treeType())
+    TreeReader<openvdb::Vec3STree>(bytes, entry, {}).skip();
   else
-    TreeReader<openvdb::DoubleTree>(bytes, entry, kNoMemoryLimit).skip();
+    TreeReader<openvdb::Vec3DTree>(bytes, entry, {}).skip();
 }
 
 }  // namespace levelset

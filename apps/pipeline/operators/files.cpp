@@ -35,20 +35,40 @@ Kind fileKind(const Invocation& in) {
                   in.op().name, name, in.op().name == "write" ? " or nvdb" : ""));
 }
 
+/// A grid that is named may be a field: its file tells, if it is there already.
+Kind readKind(const Invocation& in) {
+  const Kind kind = fileKind(in);
+  if (kind != Kind::Band || !in.given("grid") || isStandardStream(in)) return kind;
+  try {
+    for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file")))
+      if (grid.name == in.text("grid")) return grid.isLevelSet ? Kind::Band : Kind::Field;
+  } catch (const levelset::Error&) {  // the run will tell
+  }
+  return kind;
+}
+
 Value read(Invocation& in) {
   const std::filesystem::path file = in.text("file");
   if (fileKind(in) == Kind::Mesh) {
     return Value(levelset::readMesh(
         file, {.format = in.text("format"), .maxMemory = in.maxMemory, .progress = in.progress}));
   }
-  return Value(levelset::readBand(file, {.grid = in.text("grid"), .maxMemory = in.maxMemory}));
+  const levelset::ReadBandOptions options{.grid = in.text("grid"), .maxMemory = in.maxMemory};
+  if (!in.given("grid")) return Value(levelset::readBand(file, options));
+  return std::visit([](auto&& grid) { return Value(std::forward<decltype(grid)>(grid)); },
+                    levelset::readGrid(file, options));
 }
 
 /// Meshes are read, since lengths resolve on their size; of bands the header is enough.
 Plan planRead(Invocation& in) {
   if (fileKind(in) == Kind::Mesh) return read(in).plan();
   for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file"))) {
-    if (in.given("grid") && grid.name != in.text("grid")) continue;
+    if (in.given("grid") ? grid.name != in.text("grid") : !grid.isLevelSet) continue;
+    if (!grid.isLevelSet) {
+      Plan plan{.kind = Kind::Field, .voxelSize = grid.voxelSize};
+      plan.fieldBytes = static_cast<double>(grid.bytes);
+      return plan;
+    }
     Plan plan{.kind = Kind::Band, .voxelSize = grid.voxelSize, .halfWidth = 3};
     if (!grid.indexBounds.isEmpty())
       plan.bounds = {grid.indexBounds.min * grid.voxelSize, grid.indexBounds.max * grid.voxelSize};
@@ -66,11 +86,12 @@ void validateRead(const Invocation& in) {
 
 void validateWrite(const Invocation& in) {
   const Kind kind = fileKind(in), held = in.operands[0].kind();
-  if (held != kind) {
-    throw UsageError(fmt::format("write: a {} cannot be written as '{}'; {}", kindName(held),
-                                 formatName(in),
-                                 held == Kind::Band ? "put 'mesh' before it, or write .vdb"
-                                                    : "put 'level-set' before it, or write .ply"));
+  if (held != kind && !(held == Kind::Field && kind == Kind::Band)) {
+    throw UsageError(
+        fmt::format("write: a {} cannot be written as '{}'; {}", kindName(held), formatName(in),
+                    held == Kind::Band    ? "put 'mesh' before it, or write .vdb"
+                    : held == Kind::Field ? "write .vdb"
+                                          : "put 'level-set' before it, or write .ply"));
   }
   if (kind == Kind::Mesh && in.given("name"))
     throw UsageError("write: --name is that of a grid, and this is a mesh; leave it out");
@@ -79,7 +100,11 @@ void validateWrite(const Invocation& in) {
 Value write(Invocation& in) {
   const std::filesystem::path file = in.text("file");
   const Value& value = in.operands[0];
-  if (value.kind() == Kind::Mesh) {
+  if (value.kind() == Kind::Field) {
+    levelset::writeField(file, value.field(),
+                         {.name = in.given("name") ? in.text("name") : value.field().name(),
+                          .format = in.text("format")});
+  } else if (value.kind() == Kind::Mesh) {
     levelset::writeMesh(file, value.mesh(), {.format = in.text("format"), .progress = in.progress});
   } else {
     levelset::writeBand(file, value.band(), {.name = in.text("name"), .format = in.text("format")});
@@ -93,9 +118,10 @@ void addFileOperators(std::vector<Operator>& all) {
   all.push_back({
       .name = "read",
       .group = "Files",
-      .summary = "read a mesh (ply, obj, stl, off, also .gz) or a level set (vdb)",
-      .details = "A .vdb with more than one level set needs --grid. '-' is standard input and "
-                 "needs --format.",
+      .summary = "read a mesh (ply, obj, stl, off, also .gz), a level set or a field (vdb)",
+      .details = "A .vdb with more than one level set needs --grid. A grid that is no level set "
+                 "must be named too; it becomes a field: of numbers, or of vectors, staggered ones "
+                 "among them. '-' is standard input and needs --format.",
       .example = "levelsmith read dragon.ply.gz ! info",
       .params = {{.name = "file",
                   .type = ParamType::Path,
@@ -106,7 +132,7 @@ void addFileOperators(std::vector<Operator>& all) {
                   .type = ParamType::Text,
                   .doc = "ply, obj, stl, off, vdb; default: by extension"},
                  {.name = "grid", .type = ParamType::Text, .doc = "name of the grid in a .vdb"}},
-      .resultKind = fileKind,
+      .resultKind = readKind,
       .run = read,
       .plan = planRead,
       .validate = validateRead,
@@ -115,7 +141,8 @@ void addFileOperators(std::vector<Operator>& all) {
   all.push_back({
       .name = "write",
       .group = "Files",
-      .summary = "write a mesh (ply, obj, stl, off, also .gz) or a level set (vdb, nvdb)",
+      .summary =
+          "write a mesh (ply, obj, stl, off, also .gz), a level set (vdb, nvdb) or a field (vdb)",
       .details = "The file is written beside its target and renamed when whole; what was there "
                  "stays until then. "
                  "The value stays on the stack.",
@@ -130,9 +157,9 @@ void addFileOperators(std::vector<Operator>& all) {
                   .doc = "ply, obj, stl, off, vdb, nvdb; default: by extension"},
                  {.name = "name",
                   .type = ParamType::Text,
-                  .doc = "of the grid in a .vdb or .nvdb",
+                  .doc = "of the grid in a .vdb or .nvdb; a field keeps its own",
                   .fallback = "surface"}},
-      .operands = {{Kind::Mesh, Kind::Band}},
+      .operands = {{Kind::Mesh, Kind::Band, Kind::Field}},
       .flow = Flow::PassesThrough,
       .run = write,
       .validate = validateWrite,

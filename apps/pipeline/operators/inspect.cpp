@@ -162,6 +162,14 @@ Json valueInfo(const Value& value) {
   } else if (value.kind() == Kind::Mesh) {
     json["vertices"] = value.mesh().positions.size();
     json["triangles"] = value.mesh().triangles.size();
+  } else if (value.kind() == Kind::Field) {
+    const levelset::FieldGrid& field = value.field();
+    json["values"] = field.isVector() ? "vectors" : "numbers";
+    json["class"] = field.gridClass();
+    json["voxel_size"] = field.voxelSize();
+    json["active_voxels"] = field.activeVoxelCount();
+    json["bytes"] = field.memoryUse();
+    json["hash"] = fmt::format("{:016x}", field.contentHash());
   } else {
     json["levels"] = value.patch().patch.levels.size();
     json["particles"] = value.patch().patch.particleCount();
@@ -240,7 +248,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
                   .type = ParamType::Text,
                   .doc = "of the file; default: by extension"},
                  jsonParam()},
-      .operands = {{Kind::Band, Kind::Mesh, Kind::Patch}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field}},
       .operandsOptional = true,
       .flow = Flow::PassesThrough,
       .run = info,

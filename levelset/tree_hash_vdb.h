@@ -1,0 +1,58 @@
+#pragma once
+
+// Content hashes of trees. Includes OpenVDB: for .cpp files only.
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+
+#include "levelset/vdb.h"
+
+namespace levelset {
+
+[[nodiscard]] inline std::uint64_t mixHash(std::uint64_t hash, std::uint64_t word) {
+  hash ^= word + 0x9e3779b97f4a7c15ull + (hash << 6) + (hash >> 2);
+  hash *= 0xff51afd7ed558ccdull;
+  return hash ^ (hash >> 32);
+}
+
+template <typename T>
+[[nodiscard]] std::uint64_t mixBytes(std::uint64_t hash, const T* data, std::size_t count) {
+  const auto* bytes = reinterpret_cast<const unsigned char*>(data);
+  const std::size_t size = count * sizeof(T);
+  for (std::size_t i = 0; i < size; i += 8) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, bytes + i, std::min<std::size_t>(8, size - i));
+    hash = mixHash(hash, word);
+  }
+  return hash;
+}
+
+/// Hash of transform, background, topology and values.
+template <typename GridT>
+[[nodiscard]] std::uint64_t gridHash(const GridT& grid) {
+  using Leaf = typename GridT::TreeType::LeafNodeType;
+  std::uint64_t hash = 0x4c4556454c534d54ull;
+  const openvdb::math::Mat4d matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
+  hash = mixBytes(hash, matrix.asPointer(), 16);
+  const typename GridT::ValueType background = grid.background();
+  hash = mixBytes(hash, &background, 1);
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
+    const openvdb::Coord origin = leaf->origin();
+    hash = mixBytes(hash, origin.data(), 3);
+    hash = mixBytes(hash, &leaf->valueMask(), 1);
+    hash = mixBytes(hash, leaf->buffer().data(), Leaf::SIZE);
+  }
+  // Tiles carry the sign away from the band.
+  auto it = grid.tree().cbeginValueAll();
+  it.setMaxDepth(decltype(it)::LEAF_DEPTH - 1);
+  for (; it; ++it) {
+    const openvdb::CoordBBox box = it.getBoundingBox();
+    const typename GridT::ValueType value = *it;
+    hash = mixBytes(hash, box.min().data(), 3);
+    hash = mixBytes(hash, &value, 1);
+  }
+  return hash;
+}
+
+}  // namespace levelset
