@@ -154,6 +154,7 @@ const std::vector<Operator>& operators() {
     addShapeOperators(list);
     addConversionOperators(list);
     addSolidOperators(list);
+    addAdvectionOperators(list);
     addPlacementOperators(list);
     addTextureOperators(list);
     addInspectionOperators(list);

@@ -4,4 +4,5 @@ set -eu
 build=$1
 here=$(dirname "$0")
 "$build/tests/operators_bench"
+"$build/tests/advect_bench" 64
 "$here/mesh_to_band.sh" "$build/tests/mesh_to_band_bench" "$here/../../data/models/dragon_vrip.ply.gz"
