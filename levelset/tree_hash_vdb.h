@@ -33,8 +33,13 @@ template <typename GridT>
 [[nodiscard]] std::uint64_t gridHash(const GridT& grid) {
   using Leaf = typename GridT::TreeType::LeafNodeType;
   std::uint64_t hash = 0x4c4556454c534d54ull;
-  const openvdb::math::Mat4d matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
-  hash = mixBytes(hash, matrix.asPointer(), 16);
+  // By where it takes four points: OpenVDB makes no matrix of small voxels.
+  for (int corner = 0; corner < 4; ++corner) {
+    openvdb::Vec3d point(0);
+    if (corner > 0) point[corner - 1] = 1;
+    const openvdb::Vec3d world = grid.transform().indexToWorld(point);
+    hash = mixBytes(hash, world.asPointer(), 3);
+  }
   const typename GridT::ValueType background = grid.background();
   hash = mixBytes(hash, &background, 1);
   for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
