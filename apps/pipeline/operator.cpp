@@ -155,6 +155,7 @@ const std::vector<Operator>& operators() {
     addConversionOperators(list);
     addSolidOperators(list);
     addAdvectionOperators(list);
+    addEikonalOperators(list);
     addPlacementOperators(list);
     addTextureOperators(list);
     addInspectionOperators(list);

@@ -103,6 +103,7 @@ void addShapeOperators(std::vector<Operator>& all);
 void addConversionOperators(std::vector<Operator>& all);
 void addSolidOperators(std::vector<Operator>& all);
 void addAdvectionOperators(std::vector<Operator>& all);
+void addEikonalOperators(std::vector<Operator>& all);
 void addPlacementOperators(std::vector<Operator>& all);
 void addTextureOperators(std::vector<Operator>& all);
 void addInspectionOperators(std::vector<Operator>& all);

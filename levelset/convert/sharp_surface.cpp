@@ -114,6 +114,25 @@ struct DualVertex {
   bool isFeature = false;
 };
 
+/// Normals closer than that are of one face.
+constexpr double kOneFaceCosine = 0.96;
+
+/// The faces among the planes that a vertex was fitted to.
+SharpFeature featureAt(const Vector3d& position,
+                       const std::vector<std::pair<Vector3d, double>>& planes) {
+  SharpFeature feature;
+  for (const auto& [normal, offset] : planes) {
+    feature.misfit = std::max(feature.misfit, std::abs(normal.dot(position) - offset));
+    const openvdb::Vec3d n(normal.x(), normal.y(), normal.z());
+    const auto last = feature.normals.begin() + static_cast<std::ptrdiff_t>(feature.normalCount);
+    const bool isKnown = std::any_of(feature.normals.begin(), last,
+                                     [&](const auto& m) { return m.dot(n) > kOneFaceCosine; });
+    if (!isKnown && feature.normalCount < feature.normals.size())
+      feature.normals[feature.normalCount++] = n;
+  }
+  return feature;
+}
+
 /// The point nearest to `centre` among those that fit the planes best.
 Vector3d fitPlanes(const std::vector<std::pair<Vector3d, double>>& planes, const Vector3d& centre) {
   Matrix3d matrix = Matrix3d::Zero();
@@ -141,6 +160,9 @@ bool isInCell(const Vector3d& p, double margin) {
 class CellVertices {
  public:
   CellVertices(BlockField& field, int x, int y, int z) : field_(field), x_(x), y_(y), z_(z) {}
+
+  /// The planes that the last vertex was fitted to, positions as the vertex.
+  [[nodiscard]] const std::vector<std::pair<Vector3d, double>>& planes() const { return planes_; }
 
   DualVertex place(const std::uint8_t* edges, std::size_t count) {
     crossings_.clear();
@@ -287,13 +309,16 @@ class DualMesher {
  public:
   DualMesher(const CellSurface& surface, const FloatGrid& grid) : surface_(surface), grid_(grid) {}
 
-  IndexMesh run() {
+  SharpMesh run() {
     vertices_.resize(surface_.cycleCount());
+    features_.resize(surface_.blocks().size());
     twice_.resize(surface_.cycleCount());
     cells_.resize(surface_.vertexCount());
     forEachBlock([this](const SurfaceBlock& block) { placeBlock(block); });
     collectSegments();
-    IndexMesh mesh;
+    SharpMesh mesh;
+    for (const auto& part : features_)
+      mesh.features.insert(mesh.features.end(), part.begin(), part.end());
     mesh.positions.reserve(vertices_.size() + segments_.size());
     for (const DualVertex& v : vertices_) {
       mesh.positions.emplace_back(v.position.x(), v.position.y(), v.position.z());
@@ -328,6 +353,11 @@ class DualMesher {
       const std::uint8_t* edges = cell.cycleEdges.data();
       for (std::size_t i = 0; i < cell.cycleCount; edges += cell.cycleLength[i++], ++cycle) {
         vertices_[cycle] = placer.place(edges, cell.cycleLength[i]);
+        if (vertices_[cycle].isFeature) {
+          SharpFeature& feature = features_[block.neighbour[0]].emplace_back(
+              featureAt(vertices_[cycle].position, placer.planes()));
+          feature.vertex = static_cast<std::uint32_t>(cycle);
+        }
         vertices_[cycle].position += origin + Vector3d(x, y, z);
         twice_[cycle] = twiceTable[pattern][i];
         for (std::size_t k = 0; k < cell.cycleLength[i]; ++k) {
@@ -461,12 +491,13 @@ class DualMesher {
   std::vector<std::uint8_t> twice_;                  ///< facesPassedTwice, by polygon
   std::vector<std::array<std::uint32_t, 4>> cells_;  ///< polygons around each crossed edge, by slot
   std::vector<FaceSegment> segments_;
+  std::vector<std::vector<SharpFeature>> features_;  ///< by block
   std::vector<std::size_t> firstTriangle_;
 };
 
 }  // namespace
 
-IndexMesh sharpSurface(const CellSurface& surface, const FloatGrid& grid) {
+SharpMesh sharpSurface(const CellSurface& surface, const FloatGrid& grid) {
   return DualMesher(surface, grid).run();
 }
 

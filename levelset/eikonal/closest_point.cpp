@@ -85,4 +85,29 @@ Foot closestPoint(const DenseBlock& block, const Vec3d& from, const Vec3d& start
   return foot;
 }
 
+Foot closestPointByOneStep(const Jet& jet, const Vec3d& from, const Vec3d& start) {
+  const double slope = jet.gradient.length();
+  if (!(slope > 0)) return {};
+  const NewtonStep step = newtonStep(jet, slope, from - start);
+  if (!(step.length <= kLongestLastStep) || !(step.remains < kTolerance)) return {};
+  const Vec3d point = start + step.along;
+  return {point, (from - point).length(), true, false};
+}
+
+bool changesSignAround(const DenseBlock& block, const Vec3d& point) {
+  // A curved surface bulges by this much through the face of a cell before a corner sees it.
+  constexpr double kBulge = 0.25;
+  int low[3], high[3];
+  for (int i = 0; i < 3; ++i) {
+    low[i] = static_cast<int>(std::floor(point[i] - kBulge));
+    high[i] = static_cast<int>(std::floor(point[i] + kBulge)) + 1;
+  }
+  const bool inside = block.at(low[0], low[1], low[2]) < 0;
+  for (int x = low[0]; x <= high[0]; ++x)
+    for (int y = low[1]; y <= high[1]; ++y)
+      for (int z = low[2]; z <= high[2]; ++z)
+        if ((block.at(x, y, z) < 0) != inside) return true;
+  return false;
+}
+
 }  // namespace levelset::eikonal

@@ -22,4 +22,13 @@ struct Foot {
 [[nodiscard]] Foot closestPoint(const DenseBlock& block, const openvdb::Vec3d& from,
                                 const openvdb::Vec3d& start);
 
+/// The same by one step from a point of the zero set, given the derivatives there; not converged
+/// when that is not enough. Positions in any frame.
+[[nodiscard]] Foot closestPointByOneStep(const Jet& jet, const openvdb::Vec3d& from,
+                                         const openvdb::Vec3d& start);
+
+/// Is there a change of sign among the grid points around a point of the zero set? Where values of
+/// one sign dip towards zero, an interpolant may pass it though the field does not.
+[[nodiscard]] bool changesSignAround(const DenseBlock& block, const openvdb::Vec3d& point);
+
 }  // namespace levelset::eikonal

@@ -12,8 +12,9 @@
 
 #include "levelset/eikonal/closest_point.h"
 #include "levelset/eikonal/propagate.h"
+#include "levelset/eikonal/room.h"
+#include "levelset/eikonal/signs.h"
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
 
 namespace levelset::eikonal {
 namespace {
@@ -33,41 +34,74 @@ constexpr double kPolishGain = 0.5;
 
 constexpr int kAttempts = 4;
 
-/// Distance of one grid point to the zero set, from the surface points that it and its neighbours
-/// got.
+/// A point of the zero set and how far it is, in voxels.
+struct Closest {
+  Vec3d point;
+  double distance = 0;
+  void takeIfNearer(const Closest& other) {
+    if (other.distance < distance) *this = other;
+  }
+};
+
+/// The point of the zero set closest to one grid point, from the surface points that it and its
+/// neighbours got.
 class Polisher {
  public:
-  Polisher(const FloatTree& field, const SurfacePoints& points) : cache_(field), points_(points) {}
+  Polisher(const FloatTree& field, const SurfacePoints& points, const SharpPatches& patches)
+      : cache_(field), points_(points), patches_(patches) {}
 
-  double distance(const Block& block, openvdb::Index n) {
+  Closest closest(const Block& block, openvdb::Index n) {
     const Coord c = LeafNode::offsetToLocalCoord(n);
     const Vec3d x = (block.origin + c).asVec3d();
-    const Vec3d nearest = points_.positions[block.nearest[n]];
-    double best = (x - nearest).length();
-    const double start = best;
-    if (!block.own.isOn(n)) best = std::min(best, polish(x, nearest));
+    const std::uint32_t first = block.nearest[n];
+    const Vec3d nearest = points_.positions[first];
+    Closest best{nearest, (x - nearest).length()};
+    const double start = best.distance;
+    if (!block.own.isOn(n)) best.takeIfNearer(polish(x, first));
     for (int axis = 0; axis < 3; ++axis)
       for (int side = -1; side <= 1; side += 2) {
         const std::uint32_t other = neighbour(block, c, axis, side);
-        if (other == NearestPoints::kNone || other == block.nearest[n]) continue;
+        if (other == NearestPoints::kNone || other == first) continue;
         const Vec3d point = points_.positions[other];
         if ((point - nearest).lengthSqr() < kOtherPart * kOtherPart) continue;
-        if ((x - point).length() < start + kPolishGain) best = std::min(best, polish(x, point));
+        if ((x - point).length() < start + kPolishGain) best.takeIfNearer(polish(x, other));
       }
     return best;
   }
 
  private:
-  /// Distance to the foot that Newton's method finds from `start`; as far as `start` if it fails.
+  /// Closest on the surface near a surface point: on the patches or on the interpolant, and where
+  /// the way leads from one to the other, on that.
+  Closest polish(const Vec3d& x, std::uint32_t point) {
+    const Vec3d start = points_.positions[point];
+    if (!points_.sharp[point]) {
+      const Foot foot = closestPointByOneStep(points_.jets[point].jet(), x, start);
+      if (foot.converged && !patches_.covers(Coord::floor(foot.point)))
+        return {foot.point, foot.distance};
+      return polishOnInterpolant(x, start);
+    }
+    const SharpPatches::Hit hit = patches_.nearest(x, (x - start).length());
+    if (!hit.found) return {start, (x - start).length()};
+    if (patches_.covers(Coord::floor(hit.point))) return {hit.point, hit.distance};
+    return polishOnInterpolant(x, hit.point);
+  }
+
+  /// The foot that Newton's method finds from `start`; that itself if it fails.
   /// Far inside, where the ways to much of the surface are almost as long, the foot may be far
   /// along it.
-  double polish(const Vec3d& x, Vec3d start) {
-    const double first = (x - start).length();
+  Closest polishOnInterpolant(const Vec3d& x, Vec3d start) {
+    const Closest first{start, (x - start).length()};
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
       const DenseBlock& block = cache_.around(start);
       const Vec3d origin = block.origin().asVec3d();
       const Foot foot = closestPoint(block, x - origin, start - origin);
-      if (foot.converged) return foot.distance;
+      if (foot.converged) {
+        if (!changesSignAround(block, foot.point)) break;
+        const Closest smooth{foot.point + origin, foot.distance};
+        if (!patches_.covers(Coord::floor(smooth.point))) return smooth;
+        const SharpPatches::Hit hit = patches_.nearest(x, foot.distance + kPolishGain);
+        return hit.found ? Closest{hit.point, hit.distance} : smooth;
+      }
       if (!foot.left) break;
       start = foot.point + origin;
     }
@@ -85,6 +119,7 @@ class Polisher {
 
   DenseBlockCache cache_;
   const SurfacePoints& points_;
+  const SharpPatches& patches_;
 };
 
 /// What the result holds in the place of a block: a leaf, or a tile when no value of it lies in the
@@ -94,9 +129,12 @@ struct LeafOrTile {
   float tile = 0;
 };
 
-LeafOrTile makeLeaf(const Block& block, Polisher& polisher, double shift, double halfWidth,
+LeafOrTile makeLeaf(const Block& block, Polisher& polisher, const DistanceRequest& request,
                     double voxelSize, float background) {
+  const double shift = request.shift, halfWidth = request.halfWidth;
   auto leaf = std::make_unique<LeafNode>(block.origin, background, false);
+  std::unique_ptr<ClosestPointLeaf> points;
+  if (request.visitPoints) points = std::make_unique<ClosestPointLeaf>();
   bool isOn = false;
   for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
     const bool inside = block.inside.isOn(n);
@@ -104,8 +142,11 @@ LeafOrTile makeLeaf(const Block& block, Polisher& polisher, double shift, double
     double value = sign * 1e30;
     if (block.nearest[n] != NearestPoints::kNone) {
       value = sign * std::sqrt(static_cast<double>(block.squared[n])) - shift;
-      if (std::abs(value) < halfWidth + kPolishGain)
-        value = sign * polisher.distance(block, n) - shift;
+      if (std::abs(value) < halfWidth + kPolishGain) {
+        const Closest closest = polisher.closest(block, n);
+        value = sign * closest.distance - shift;
+        if (points) (*points)[n] = closest.point;
+      }
     }
     // A grid point that was inside stays so when its distance rounds to nothing.
     if (inside && shift == 0) value = std::min(value, -1e-7);
@@ -115,39 +156,19 @@ LeafOrTile makeLeaf(const Block& block, Polisher& polisher, double shift, double
       leaf->setValueOnly(n, value < 0 ? -background : background);
   }
   float tile = 0;
+  if (points && !leaf->isEmpty()) request.visitPoints(*leaf, *points);
   if (leaf->isEmpty() && leaf->isConstant(tile, isOn)) return {nullptr, tile};
   return {std::move(leaf), 0};
 }
 
-/// Signs where no distance was made: those of the operand.
-void copySigns(const FloatTree& field, const NearestPoints& nearest, FloatTree& result) {
-  const float background = result.background();
-  for (auto it = field.cbeginValueAll(); it; ++it) {
-    it.setMaxDepth(FloatTree::DEPTH - 2);
-    if (it.getDepth() == FloatTree::DEPTH - 1) continue;
-    if (*it < 0) result.addTile(it.getLevel(), it.getCoord(), -background, false);
-  }
-  for (auto leaf = field.cbeginLeaf(); leaf; ++leaf) {
-    if (nearest.holds(leaf->origin())) continue;
-    openvdb::Index inside = 0;
-    for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) inside += leaf->getValue(n) < 0;
-    if (inside == LeafNode::SIZE) {
-      result.addTile(1, leaf->origin(), -background, false);
-    } else if (inside > 0) {
-      auto* signs = new LeafNode(leaf->origin(), background, false);
-      for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n)
-        if (leaf->getValue(n) < 0) signs->setValueOnly(n, -background);
-      result.addLeaf(signs);
-    }
-  }
-}
-
 FloatTree::Ptr makeTree(const FloatTree& field, const FloatTree& interpolated,
-                        const SurfacePoints& points, const NearestPoints& nearest,
-                        const DistanceRequest& request, double voxelSize) {
+                        const SurfacePoints& points, const SharpPatches& patches,
+                        const NearestPoints& nearest, const DistanceRequest& request,
+                        double voxelSize) {
   const auto background = static_cast<float>(request.halfWidth * voxelSize);
   auto result = std::make_shared<FloatTree>(background);
-  copySigns(field, nearest, *result);
+  copySigns(
+      field, [&](const Coord& origin) { return nearest.holds(origin); }, *result);
 
   std::vector<const Block*> blocks;
   for (const Block& block : nearest.blocks()) blocks.push_back(&block);
@@ -155,15 +176,14 @@ FloatTree::Ptr makeTree(const FloatTree& field, const FloatTree& interpolated,
             [](const Block* a, const Block* b) { return a->origin < b->origin; });
   std::vector<LeafOrTile> leaves(blocks.size());
   tbb::enumerable_thread_specific<Polisher> polishers(
-      [&] { return Polisher(interpolated, points); });
+      [&] { return Polisher(interpolated, points, patches); });
   constexpr std::size_t kBatch = 4096;
   for (std::size_t begin = 0; begin < blocks.size(); begin += kBatch) {
     const std::size_t end = std::min(begin + kBatch, blocks.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 16), [&](const auto& range) {
       Polisher& polisher = polishers.local();
       for (std::size_t i = range.begin(); i != range.end(); ++i)
-        leaves[i] =
-            makeLeaf(*blocks[i], polisher, request.shift, request.halfWidth, voxelSize, background);
+        leaves[i] = makeLeaf(*blocks[i], polisher, request, voxelSize, background);
     });
     report(request.progress,
            0.6 + 0.4 * static_cast<double>(end) / static_cast<double>(blocks.size()),
@@ -179,38 +199,6 @@ FloatTree::Ptr makeTree(const FloatTree& field, const FloatTree& interpolated,
   return result;
 }
 
-/// Refuses what cannot fit before anything is allocated.
-void requireRoom(const SurfacePoints& points, const NearestPoints::Reach& reach,
-                 const DistanceRequest& request) {
-  CoordBBox box;
-  for (const Coord& c : points.gridPoints) box.expand(c);
-  // Inwards there is never more than the solid's own box.
-  const double out = reach.outside + 1;
-  double reached = 1, longest = 0;
-  for (int i = 0; i < 3; ++i) {
-    double from = box.min()[i] - out, to = box.max()[i] + out;
-    if (from < -2.1e9 || to > 2.1e9)
-      throw ResourceLimit(
-          fmt::format("{}: distances up to {:.4g} voxels pass the range of 32-bit indices; use a "
-                      "smaller distance or larger voxels",
-                      request.action, out));
-    if (request.region) {
-      from = std::max<double>(from, request.region->min()[i]);
-      to = std::min<double>(to, request.region->max()[i]);
-    }
-    reached *= std::max(0.0, to - from + 1);
-    longest = std::max(longest, static_cast<double>(box.dim()[i]));
-  }
-  // Steiner's formula for a convex body, or the whole box. There are at least 1.15 points to a unit
-  // of area.
-  const double area = static_cast<double>(points.size()) / 1.15;
-  const double steiner = area * (std::min(reach.inside, longest / 2) + out) +
-                         2 * M_PI * longest * out * out + 4.0 / 3 * M_PI * out * out * out;
-  constexpr double kBytesPerGridPoint = 20;  // state and result, with the unused part of blocks
-  const double bytes = std::min(reached, steiner) * kBytesPerGridPoint;
-  requireMemory(bytes, memoryLimit(request.maxMemory), request.action);
-}
-
 }  // namespace
 
 FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& request) {
@@ -224,10 +212,11 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
 
   // === Points of the surface
   FloatTree::ConstPtr interpolated = field.constTreePtr();
-  SurfacePoints points = findSurfacePoints(*interpolated, within);
+  const SharpPatches patches(field, within);
+  SurfacePoints points = findSurfacePoints(*interpolated, within, patches);
   if (points.thin) {
     interpolated = thicken(field.tree());
-    points = findSurfacePoints(*interpolated, within);
+    points = findSurfacePoints(*interpolated, within, patches);
   }
   if (points.size() == 0)
     throw InvalidInput(
@@ -239,7 +228,15 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
         fmt::format("{}: more than 2^32 grid points lie beside the surface; use larger "
                     "voxels",
                     request.action));
-  requireRoom(points, reach, request);
+  Room room;
+  for (const Coord& c : points.gridPoints) room.surface.expand(c);
+  // There are at least 1.15 points to a unit of area.
+  room.area = static_cast<double>(points.size()) / 1.15;
+  room.inside = reach.inside;
+  room.outside = reach.outside;
+  room.region = request.region;
+  room.bytesPerGridPoint = 25;  // state and result, with the unused part of blocks
+  requireRoom(room, request.maxMemory, request.action);
   report(request.progress, 0.3, request.action);
 
   // === Nearest of them for each grid point
@@ -247,8 +244,8 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   nearest.run(subProgress(request.progress, 0.3, 0.6), request.action);
 
   // === Distances
-  FloatGrid::Ptr result = FloatGrid::create(
-      makeTree(field.tree(), *interpolated, points, nearest, request, field.voxelSize()[0]));
+  FloatGrid::Ptr result = FloatGrid::create(makeTree(field.tree(), *interpolated, points, patches,
+                                                     nearest, request, field.voxelSize()[0]));
   result->setTransform(field.transform().copy());
   result->setName(field.getName());
   result->setGridClass(openvdb::GRID_LEVEL_SET);

@@ -2,6 +2,8 @@
 
 // For the .cpp files of levelset/eikonal and levelset/solids only.
 
+#include <array>
+#include <functional>
 #include <optional>
 
 #include "levelset/progress.h"
@@ -9,12 +11,18 @@
 
 namespace levelset::eikonal {
 
+/// The closest point of each grid point of a leaf, index space; set where the leaf is active.
+using ClosestPointLeaf = std::array<openvdb::Vec3d, 512>;
+
 /// Which distances are made, in voxels. The result is d − shift where |d − shift| < halfWidth.
 struct DistanceRequest {
   const char* action = "redistance";  ///< for messages
   double halfWidth = 3;
   double shift = 0;  ///< moves the surface outwards (> 0) or inwards
   std::optional<openvdb::CoordBBox> region = {};
+  /// Called for each leaf that has active values, from many threads at once, in no fixed order.
+  std::function<void(const openvdb::FloatTree::LeafNodeType&, const ClosestPointLeaf&)>
+      visitPoints = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };

@@ -21,6 +21,21 @@ struct Jet {
   }
 };
 
+/// A jet to be kept by the million.
+struct CompactJet {
+  std::array<float, 10> numbers{};
+  CompactJet() = default;
+  explicit CompactJet(const Jet& jet) {
+    const double all[] = {jet.value, jet.gradient.x(), jet.gradient.y(), jet.gradient.z(), jet.xx,
+                          jet.yy,    jet.zz,           jet.xy,           jet.xz,           jet.yz};
+    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = static_cast<float>(all[i]);
+  }
+  [[nodiscard]] Jet jet() const {
+    const auto at = [this](std::size_t i) { return static_cast<double>(numbers[i]); };
+    return {at(0), {at(1), at(2), at(3)}, at(4), at(5), at(6), at(7), at(8), at(9)};
+  }
+};
+
 /// Dense copy of a leaf block of a tree and of four grid points on each side of it. Interpolates
 /// tricubically (Catmull-Rom: passes through the grid values, C¹). Positions are in voxels from the
 /// first grid point of the leaf.

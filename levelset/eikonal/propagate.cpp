@@ -220,9 +220,18 @@ void NearestPoints::seed(const Coord& gridPoint, std::uint32_t point, bool own) 
 }
 
 void NearestPoints::seedBesideSurface() {
-  for (std::uint32_t i = 0; i < points_.size(); ++i)
+  for (std::uint32_t i = 0; i < points_.gridPoints.size(); ++i)
     if (!reach_.region || reach_.region->isInside(points_.gridPoints[i]))
       seed(points_.gridPoints[i], i, true);
+  // An edge may lie nearer to a grid point than what its neighbours found on the faces.
+  for (std::size_t i = points_.gridPoints.size(); i < points_.size(); ++i) {
+    const Coord cell = Coord::floor(points_.positions[i]);
+    for (int corner = 0; corner < 8; ++corner) {
+      const Coord c = cell.offsetBy(corner >> 2, corner >> 1 & 1, corner & 1);
+      if (!reach_.region || reach_.region->isInside(c))
+        seed(c, static_cast<std::uint32_t>(i), false);
+    }
+  }
 }
 
 void NearestPoints::seedRegionBoundary() {
@@ -248,7 +257,9 @@ void NearestPoints::seedRegionBoundary() {
       });
       for (std::size_t i = 0; i < nearest.size(); ++i)
         if (nearest[i] != PointTree::kNone)
-          seed(gridPoint(i), nearest[i], points_.gridPoints[nearest[i]] == gridPoint(i));
+          seed(gridPoint(i), nearest[i],
+               nearest[i] < points_.gridPoints.size() &&
+                   points_.gridPoints[nearest[i]] == gridPoint(i));
     }
 }
 

@@ -25,6 +25,8 @@ constexpr std::array<std::array<int, 3>, 6> kDirections = {
 
 // Linear crossings stand off the interpolant's by up to about this much.
 constexpr double kCrossingTolerance = 0.05;
+// A sharp surface stands off the linear crossings by up to about this much.
+constexpr double kSharpTolerance = 0.5;
 
 Vec3d vectorOf(const std::array<int, 3>& d) {
   return Vec3d(d[0], d[1], d[2]);
@@ -80,8 +82,8 @@ Vec3d findFoot(const DenseBlock& block, int x, int y, int z, const Crossings& cr
     if (other.converged && (!best.converged || other.distance < best.distance)) best = other;
   }
   // On creases the method may find no rest; the crossing does lie on the surface.
-  const bool plausible =
-      best.converged && best.distance <= crossings.nearestDistance() + 4 * kCrossingTolerance;
+  const bool plausible = best.converged && changesSignAround(block, best.point) &&
+                         best.distance <= crossings.nearestDistance() + 4 * kCrossingTolerance;
   return plausible ? best.point : from + crossings.offset(crossings.nearest);
 }
 
@@ -159,13 +161,14 @@ void addLayer(FloatTree& tree) {
     for (const auto& [n, value] : additions[i]) leaf->setValueOnly(n, value);
 }
 
-/// Does the interpolant beside this grid point reach grid points without a distance?
+/// Does the interpolant beside this grid point read values that were cut off at the background?
 bool isThinAt(const DenseBlock& block, int x, int y, int z, float background) {
   const float here = std::abs(block.at(x, y, z));
   for (const auto& d : kDirections) {
     const float one = std::abs(block.at(x + d[0], y + d[1], z + d[2]));
     const float two = std::abs(block.at(x + 2 * d[0], y + 2 * d[1], z + 2 * d[2]));
-    if (one >= background || (two >= background && here < 0.75f * std::abs(one - here)))
+    // What lies further than a straight continuation says was not cut off.
+    if (one >= background || (two >= background && 2 * one - here > 1.02f * background))
       return true;
   }
   return false;
@@ -174,15 +177,26 @@ bool isThinAt(const DenseBlock& block, int x, int y, int z, float background) {
 }  // namespace
 
 SurfacePoints findSurfacePoints(const FloatTree& field,
-                                const std::optional<openvdb::CoordBBox>& within) {
+                                const std::optional<openvdb::CoordBBox>& within,
+                                const SharpPatches& patches) {
   const std::vector<const LeafNode*> leaves = leavesOf(field, within);
   const float background = field.background();
   std::vector<SurfacePoints> found(leaves.size());
   forEachBlock(field, leaves, [&](std::size_t i, const DenseBlock& block) {
     forEachPointBeside(block, background, [&](int x, int y, int z, const Crossings& crossings) {
       const Vec3d origin = block.origin().asVec3d();
-      found[i].positions.push_back(origin + findFoot(block, x, y, z, crossings));
-      found[i].gridPoints.push_back(block.origin().offsetBy(x, y, z));
+      const Coord gridPoint = block.origin().offsetBy(x, y, z);
+      SharpPatches::Hit hit;
+      if (patches.touches(gridPoint))
+        hit = patches.nearest(gridPoint.asVec3d(), crossings.nearestDistance() + kSharpTolerance);
+      const bool isSharp = hit.found && patches.covers(Coord::floor(hit.point));
+      if (!isSharp) hit.point = origin + findFoot(block, x, y, z, crossings);
+      const Vec3d local = hit.point - origin;
+      found[i].positions.push_back(hit.point);
+      found[i].jets.push_back(!isSharp && DenseBlock::contains(local) ? CompactJet(block.jet(local))
+                                                                      : CompactJet());
+      found[i].gridPoints.push_back(gridPoint);
+      found[i].sharp.push_back(isSharp);
       found[i].thin = found[i].thin || isThinAt(block, x, y, z, background);
     });
   });
@@ -191,11 +205,19 @@ SurfacePoints findSurfacePoints(const FloatTree& field,
   for (const SurfacePoints& part : found) count += part.size();
   all.positions.reserve(count);
   all.gridPoints.reserve(count);
+  all.jets.reserve(count);
+  all.sharp.reserve(count);
   for (const SurfacePoints& part : found) {
     all.positions.insert(all.positions.end(), part.positions.begin(), part.positions.end());
     all.gridPoints.insert(all.gridPoints.end(), part.gridPoints.begin(), part.gridPoints.end());
+    all.jets.insert(all.jets.end(), part.jets.begin(), part.jets.end());
+    all.sharp.insert(all.sharp.end(), part.sharp.begin(), part.sharp.end());
     all.thin = all.thin || part.thin;
   }
+  for (const Vec3d& feature : patches.features())
+    if (!within || within->isInside(Coord::floor(feature))) all.positions.push_back(feature);
+  all.jets.resize(all.positions.size());
+  all.sharp.resize(all.positions.size(), 1);
   return all;
 }
 

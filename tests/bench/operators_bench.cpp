@@ -3,6 +3,7 @@
 
 #include <benchmark/benchmark.h>
 #include <openvdb/tools/Composite.h>
+#include <openvdb/tools/FastSweeping.h>
 #include <openvdb/tools/LevelSetFilter.h>
 #include <openvdb/tools/LevelSetRebuild.h>
 #include <openvdb/tools/VolumeToMesh.h>
@@ -10,6 +11,7 @@
 #include <array>
 
 #include "levelset/convert/band_to_mesh.h"
+#include "levelset/eikonal/arrival.h"
 #include "levelset/eikonal/redistance.h"
 #include "levelset/solids/csg.h"
 #include "levelset/solids/offset.h"
@@ -72,6 +74,33 @@ void BM_RedistanceOpenVdb(benchmark::State& state) {
   countVoxels(state, a);
 }
 
+/// Eight voxels more on each side; items are active voxels of the result, since OpenVDB's dilation
+/// reaches less far along diagonals.
+void BM_Widen8(benchmark::State& state) {
+  const NarrowBand a = ball(state);
+  std::int64_t voxels = 0;
+  for (auto _ : state)
+    voxels +=
+        static_cast<std::int64_t>(levelset::redistance(a, {.halfWidth = 11}).activeVoxelCount());
+  state.SetItemsProcessed(voxels);
+}
+void BM_Sweep8(benchmark::State& state) {
+  const NarrowBand a = ball(state);
+  std::int64_t voxels = 0;
+  for (auto _ : state)
+    voxels += static_cast<std::int64_t>(
+        levelset::frontDistance(a, 11 * a.voxelSize()).band.activeVoxelCount());
+  state.SetItemsProcessed(voxels);
+}
+void BM_Sweep8OpenVdb(benchmark::State& state) {
+  const NarrowBand a = ball(state);
+  std::int64_t voxels = 0;
+  for (auto _ : state)
+    voxels += static_cast<std::int64_t>(
+        openvdb::tools::dilateSdf(levelset::vdb(a), 8)->activeVoxelCount());
+  state.SetItemsProcessed(voxels);
+}
+
 void BM_Mesh(benchmark::State& state) {
   const NarrowBand a = ball(state);
   for (auto _ : state) benchmark::DoNotOptimize(levelset::bandToMesh(a));
@@ -95,6 +124,12 @@ void BM_MeshOpenVdb(benchmark::State& state) {
       ->Arg(512)                                                                               \
       ->Unit(benchmark::kMillisecond)                                                          \
       ->MeasureProcessCPUTime()
+
+#define LEVELSMITH_BENCH_SWEEP(name) \
+  BENCHMARK(name)->Arg(128)->Arg(256)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()
+LEVELSMITH_BENCH_SWEEP(BM_Widen8);
+LEVELSMITH_BENCH_SWEEP(BM_Sweep8);
+LEVELSMITH_BENCH_SWEEP(BM_Sweep8OpenVdb);
 
 LEVELSMITH_BENCH(BM_Union);
 LEVELSMITH_BENCH(BM_Redistance);

@@ -1,0 +1,210 @@
+#include <fmt/core.h>
+
+#include "apps/pipeline/fields.h"
+#include "apps/pipeline/invocation.h"
+#include "apps/pipeline/operators/common.h"
+#include "levelset/eikonal/arrival.h"
+#include "levelset/eikonal/closest_points.h"
+#include "levelset/eikonal/redistance.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::FrontMethod;
+using levelset::NarrowBand;
+
+Value redistanceTo(Invocation& in, std::optional<double> halfWidth) {
+  levelset::RedistanceOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
+  options.halfWidth = halfWidth;
+  NarrowBand band = in.band();
+  in.operands.clear();
+  return Value(levelset::redistance(std::move(band), options));
+}
+
+Value reinitialize(Invocation& in) {
+  return redistanceTo(
+      in, in.given("half-width") ? std::optional(in.number("half-width")) : std::nullopt);
+}
+
+Value widen(Invocation& in) {
+  return redistanceTo(in, in.number("half-width"));
+}
+
+Plan planHalfWidth(Invocation& in) {
+  Plan plan = in.operands[0].plan();
+  if (in.given("half-width")) plan.halfWidth = in.number("half-width");
+  return plan;
+}
+
+Plan planField(Invocation& in, double halfWidth, double bytesPerVoxel) {
+  Plan plan = in.operands[0].plan();
+  plan.kind = Kind::Field;
+  plan.halfWidth = halfWidth;
+  plan.fieldBytes = plan.activeVoxels() * bytesPerVoxel;
+  return plan;
+}
+
+Value closestPoint(Invocation& in) {
+  levelset::ClosestPointOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
+  if (in.given("half-width")) options.halfWidth = in.number("half-width");
+  return Value(levelset::closestPoints(in.band(), options));
+}
+
+Plan planClosestPoint(Invocation& in) {
+  const Plan plan = planHalfWidth(in);
+  return planField(in, plan.halfWidth, 16);
+}
+
+bool givesField(const Invocation& in) {
+  return in.given("speed") || in.given("from") || in.given("extend");
+}
+
+void tellFigures(Invocation& in, const levelset::ArrivalFigures& figures) {
+  in.notes.notes.push_back(fmt::format("{} grid points reached", figures.reached));
+  if (in.integer("order") == 2)
+    in.notes.notes.push_back(
+        fmt::format("{} of them fell back to first order", figures.firstOrder));
+  in.notes.detailsJson = fmt::format(R"({{"reached":{},"started":{},"first_order":{}}})",
+                                     figures.reached, figures.started, figures.firstOrder);
+}
+
+Value extend(Invocation& in, double reach) {
+  for (const char* other : {"speed", "from"})
+    if (in.given(other))
+      throw levelset::UsageError(
+          fmt::format("{}: --extend carries an attribute along the normals, so --{} has no meaning "
+                      "beside it; leave one out",
+                      in.op().name, other));
+  levelset::ClosestPointOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
+  options.halfWidth = reach / in.band().voxelSize();
+  in.notes.notes.push_back("the attribute is that of the closest point of the surface");
+  return Value(levelset::extendOffSurface(in.band(), scalarField(in, "extend"), options));
+}
+
+template <FrontMethod method>
+Value runFront(Invocation& in) {
+  const double reach = in.length("to");
+  if (in.given("extend")) return extend(in, reach);
+  levelset::ArrivalOptions options{.method = method};
+  options.order = static_cast<int>(in.integer("order"));
+  options.maxMemory = in.maxMemory;
+  options.progress = in.progress;
+  if (in.given("speed")) options.speed = scalarField(in, "speed");
+  if (givesField(in)) {
+    const levelset::ArrivalTimes result =
+        in.given("from")
+            ? levelset::arrivalTimesFromPoints(in.band(), in.points("from"), reach, options)
+            : levelset::arrivalTimes(in.band(), reach, options);
+    tellFigures(in, result.figures);
+    return Value(result.times);
+  }
+  levelset::FrontDistance result = levelset::frontDistance(in.band(), reach, options);
+  tellFigures(in, result.figures);
+  return Value(std::move(result.band));
+}
+
+Plan planFront(Invocation& in) {
+  const double reach = in.length("to");
+  const double halfWidth = reach / in.operands[0].plan().voxelSize;
+  if (givesField(in)) return planField(in, halfWidth, 8);
+  Plan plan = in.operands[0].plan();
+  plan.halfWidth = halfWidth;
+  return plan;
+}
+
+template <FrontMethod method>
+Operator frontOperator(const char* name, const char* summary, const char* example) {
+  return {
+      .name = name,
+      .group = "Distances",
+      .summary = summary,
+      .details =
+          "Solves |grad T| F = 1 from the surface to both sides (negative inside) or from points. "
+          "Without --speed, --from and --extend the times are distances and the result is a band "
+          "again; `widen` makes the same by closest points, which is more exact. Otherwise the "
+          "result is a field. Where the speed is zero, negative or no number, nothing passes.",
+      .example = example,
+      .params = {{.name = "to",
+                  .type = ParamType::Length,
+                  .doc = "how far: the latest time, which at speed 1 is a distance",
+                  .fallback = "8vx",
+                  .range = Range::Positive},
+                 {.name = "speed",
+                  .type = ParamType::Scalar,
+                  .doc = "F, in world units per unit of time; default: 1"},
+                 {.name = "from",
+                  .type = ParamType::Points,
+                  .doc = "start at these points, on the grid of the operand, in place of its "
+                         "surface"},
+                 {.name = "order",
+                  .type = ParamType::Integer,
+                  .doc = "of the differences, 1 or 2; 2 falls back to 1 where it must",
+                  .fallback = "2",
+                  .range = Range::Positive},
+                 {.name = "extend",
+                  .type = ParamType::Scalar,
+                  .doc = "in place of times: this attribute, carried off the surface along its "
+                         "normals"}},
+      .operands = {{Kind::Band}},
+      .resultKind = [](const Invocation& in) { return givesField(in) ? Kind::Field : Kind::Band; },
+      .run = runFront<method>,
+      .plan = planFront,
+  };
+}
+
+Param halfWidthTo(bool required) {
+  return {
+      .name = "half-width",
+      .type = ParamType::Number,
+      .doc = required ? "of the result, in voxels" : "of the result, in voxels; default: as before",
+      .range = Range::Positive,
+      .required = required};
+}
+
+}  // namespace
+
+void addEikonalOperators(std::vector<Operator>& all) {
+  all.push_back({
+      .name = "reinitialize",
+      .group = "Distances",
+      .summary = "make the values distances again without moving the surface",
+      .details = "Only signs and the values beside the surface are read; they may have any slope.",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! reinitialize --half-width 4 ! check",
+      .params = {halfWidthTo(false)},
+      .operands = {{Kind::Band}},
+      .run = reinitialize,
+      .plan = planHalfWidth,
+  });
+  all.push_back({
+      .name = "widen",
+      .group = "Distances",
+      .summary = "make the band wider or narrower; the surface stays",
+      .details = "Distances by closest points: exact to interpolation at any width.",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! widen --half-width 8 ! check",
+      .params = {halfWidthTo(true)},
+      .operands = {{Kind::Band}},
+      .run = widen,
+      .plan = planHalfWidth,
+  });
+  all.push_back(frontOperator<FrontMethod::Marching>(
+      "march", "arrival times and distances by fast marching",
+      "levelsmith sphere --radius 1 --voxel 0.05 ! march --speed \"1 + 0.5*x\" --to 0.4 ! info"));
+  all.push_back(frontOperator<FrontMethod::Sweeping>(
+      "sweep", "arrival times and distances by fast sweeping",
+      "levelsmith sphere --radius 1 --voxel 0.05 ! sweep --to 8vx ! check"));
+  all.push_back({
+      .name = "closest-point",
+      .group = "Distances",
+      .summary = "the closest point of the surface, for each grid point of the band",
+      .details = "A field of vectors, in world units.",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! closest-point --half-width 4 ! info",
+      .params = {halfWidthTo(false)},
+      .operands = {{Kind::Band}},
+      .resultKind = [](const Invocation&) { return Kind::Field; },
+      .run = closestPoint,
+      .plan = planClosestPoint,
+  });
+}
+
+}  // namespace pipeline

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "levelset/fields/grid.h"
+#include "levelset/narrow_band.h"
+#include "levelset/progress.h"
+
+/// Fronts that move along their normals at a given speed: |∇T| F = 1.
+namespace levelset {
+
+enum class FrontMethod {
+  Marching,  ///< one grid point after the other in the order of time [Sethian99]; one thread
+  Sweeping   ///< block by block in alternating directions until nothing changes [Zhao05]
+};
+
+struct ArrivalOptions {
+  FrontMethod method = FrontMethod::Sweeping;
+  /// 1, or 2: second-order differences, per grid point back to first where they are not upwind.
+  int order = 2;
+  /// World units per unit of time. Where it is zero, negative or NaN, nothing passes. Empty: 1.
+  ScalarField speed = {};
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
+};
+
+struct ArrivalFigures {
+  std::size_t reached = 0;     ///< grid points with a time
+  std::size_t started = 0;     ///< of them, given by the start
+  std::size_t firstOrder = 0;  ///< of them, fell back to first order where the second was asked
+};
+
+struct ArrivalTimes {
+  FieldGrid times;  ///< active where the front came; elsewhere ± the latest time
+  ArrivalFigures figures;
+};
+
+struct FrontDistance {
+  NarrowBand band;
+  ArrivalFigures figures;
+};
+
+/// When a front that starts on the surface of `solid` at time 0 and moves to both sides comes to
+/// the grid points around it. Negative inside. Within two voxels of the surface the start is the
+/// time along the straight way to the closest point.
+/// @param until  the latest time; at speed 1 a distance, world units
+/// @throws UsageError for an order other than 1 or 2, or `until` not positive and finite;
+///         InvalidInput for an empty solid, or when the speed is nowhere positive on its surface;
+///         ResourceLimit; Cancelled
+[[nodiscard]] ArrivalTimes arrivalTimes(const NarrowBand& solid, double until,
+                                        const ArrivalOptions& options = {});
+
+/// The same from points, on the grid points of `lattice` (its solid does not count). The start is
+/// exact for constant speed within eight voxels of each point.
+/// @throws UsageError also when there is no point, or one that is not finite
+[[nodiscard]] ArrivalTimes arrivalTimesFromPoints(const NarrowBand& lattice,
+                                                  std::span<const Imath::V3d> sources, double until,
+                                                  const ArrivalOptions& options = {});
+
+/// The distance to `reach` (world units) on both sides, by front instead of by closest points;
+/// redistance() is more exact and as fast where the speed is 1.
+/// @throws UsageError also when a speed is set, or `reach` is below one voxel
+[[nodiscard]] FrontDistance frontDistance(const NarrowBand& solid, double reach,
+                                          const ArrivalOptions& options = {});
+
+}  // namespace levelset

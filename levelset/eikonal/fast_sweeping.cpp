@@ -1,0 +1,371 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "levelset/eikonal/arrival_blocks.h"
+
+namespace levelset::eikonal {
+namespace {
+
+using openvdb::Coord;
+using openvdb::Index;
+using Mask = ArrivalBlock::Mask;
+
+// Improvements below this part of a voxel's time do not count.
+constexpr float kImprovement = 1e-5f;
+// Blocks whose news are later than the earliest by more than this wait, voxels: what they would
+// compute now is not final yet.
+constexpr float kWindow = 8;
+constexpr std::size_t kBlocksPerTask = 8;
+
+int parityOf(const Coord& origin) {
+  return ((origin.x() >> 3) & 1) * 4 + ((origin.y() >> 3) & 1) * 2 + ((origin.z() >> 3) & 1);
+}
+
+/// What a sweep keeps of each block beside its times.
+struct Desk {
+  float earliest = kFar;        ///< time of the earliest news; kFar: nothing to do
+  std::uint8_t newsFrom = 0;    ///< bit d: neighbour d has news
+  std::uint8_t tells = 0;       ///< bit d: neighbour d should look; written by the block's own work
+  std::array<float, 6> told{};  ///< earliest change at that face
+  std::unique_ptr<std::array<std::uint16_t, ArrivalBlock::kSize>> order;  ///< by first-order time
+  std::unique_ptr<std::array<float, ArrivalBlock::kSize>> second;         ///< second-order times
+};
+
+/// Calls work(block, desk) for the blocks that have news until none has: the eight parities of
+/// block positions in turn, one parity in parallel, since its blocks do not touch; the earliest
+/// first. The order is fixed, hence the result.
+class Rounds {
+ public:
+  explicit Rounds(ArrivalBlocks& blocks) : blocks_(blocks) {}
+  std::vector<Desk> desks;
+
+  /// Passes on what the desks were told before the first round.
+  void deliverStart() {
+    desks.resize(blocks_.blocks().size());
+    for (std::size_t i = 0, end = desks.size(); i < end; ++i)
+      deliver(static_cast<std::uint32_t>(i), true);
+  }
+
+  template <typename Work>
+  void run(bool mayGrow, double from, double to, const Work& work) {
+    sortNew();
+    float window = 0;
+    for (;;) {
+      const float earliest = earliestNews();
+      if (earliest == kFar) return;
+      window = std::max(window, earliest + kWindow);
+      report(subProgress(blocks_.settings().progress, from, to),
+             std::min(1.0, static_cast<double>(earliest) / blocks_.settings().until),
+             blocks_.settings().action);
+      for (auto& candidates : byParity_) {
+        std::vector<std::uint32_t> due;
+        for (const std::uint32_t i : candidates)
+          if (desks[i].earliest <= window) due.push_back(i);
+        const auto range = tbb::blocked_range<std::size_t>(0, due.size(), kBlocksPerTask);
+        tbb::parallel_for(range, [&](const auto& part) {
+          for (std::size_t i = part.begin(); i != part.end(); ++i)
+            work(blocks_.block(due[i]), desks[due[i]]);
+        });
+        for (const std::uint32_t i : due) deliver(i, mayGrow);
+        if (mayGrow) sortNew();
+      }
+    }
+  }
+
+ private:
+  void sortNew() {
+    blocks_.loadSlowness();
+    for (; sorted_ < blocks_.blocks().size(); ++sorted_) {
+      const auto number = static_cast<std::uint32_t>(sorted_);
+      byParity_[static_cast<std::size_t>(parityOf(blocks_.block(number).origin))].push_back(number);
+    }
+    desks.resize(sorted_);
+  }
+
+  [[nodiscard]] float earliestNews() const {
+    float earliest = kFar;
+    for (const Desk& desk : desks) earliest = std::min(earliest, desk.earliest);
+    return earliest;
+  }
+
+  void deliver(std::uint32_t number, bool mayGrow) {
+    for (int d = 0; d < 6; ++d) {
+      if (!(desks[number].tells >> d & 1)) continue;
+      ArrivalBlock& block = blocks_.block(number);
+      ArrivalBlock* other = block.neighbours[static_cast<std::size_t>(d)];
+      if (!other && !mayGrow) continue;
+      if (!other) {
+        Coord origin = block.origin;
+        origin[d >> 1] += d & 1 ? 8 : -8;
+        other = &blocks_.touch(origin);
+        desks.resize(blocks_.blocks().size());
+      }
+      Desk& desk = desks[other->number];
+      desk.newsFrom |= static_cast<std::uint8_t>(1 << (d ^ 1));
+      desk.earliest = std::min(desk.earliest, desks[number].told[static_cast<std::size_t>(d)]);
+    }
+    desks[number].tells = 0;
+  }
+
+  ArrivalBlocks& blocks_;
+  std::array<std::vector<std::uint32_t>, 8> byParity_;
+  std::size_t sorted_ = 0;
+};
+
+/// Notes that the time at a grid point of the block changed, for the neighbours that read it.
+void tell(Desk& desk, Index n, float time, Index depth) {
+  const std::array<Index, 3> at = {n >> 6, n >> 3 & 7u, n & 7u};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (std::size_t side = 0; side < 2; ++side) {
+      if (side ? at[axis] < 8 - depth : at[axis] >= depth) continue;
+      const std::size_t d = 2 * axis + side;
+      if (!(desk.tells >> d & 1) || time < desk.told[d]) desk.told[d] = time;
+      desk.tells |= static_cast<std::uint8_t>(1u << d);
+    }
+}
+
+/// Gauss-Seidel sweeps over one block with its neighbours' nearest layers around it.
+class FirstOrderWorker {
+ public:
+  FirstOrderWorker(ArrivalBlock& block, Desk& desk, float until)
+      : block_(block), desk_(desk), until_(until) {
+    times_.fill(kFar);
+    for (int x = 0; x < 8; ++x)
+      for (int y = 0; y < 8; ++y)
+        std::copy_n(&block.time[offset(x, y, 0)], 8, &times_[slot(x, y, 0)]);
+    for (int d = 0; d < 6; ++d) loadFace(d);
+  }
+
+  void run() {
+    // Sweeps begin away from the side that the news come from.
+    const int start =
+        (desk_.newsFrom & 2 ? 4 : 0) | (desk_.newsFrom & 8 ? 2 : 0) | (desk_.newsFrom & 32 ? 1 : 0);
+    constexpr std::array<int, 8> kGray = {0, 1, 3, 2, 6, 7, 5, 4};
+    for (std::size_t i = 0; sweep(start ^ kGray[i % 8]); ++i) {
+    }
+    desk_.newsFrom = 0;
+    desk_.earliest = kFar;
+    for (auto it = changed_.beginOn(); it; ++it) {
+      const Index n = it.pos();
+      const float time = times_[slot(n)];
+      block_.time[n] = time;
+      if (time <= until_) tell(desk_, n, time, 1);
+    }
+  }
+
+ private:
+  static Index offset(int x, int y, int z) { return static_cast<Index>((x << 6) + (y << 3) + z); }
+  static std::size_t slot(int x, int y, int z) {
+    return static_cast<std::size_t>(((x + 1) * 10 + y + 1) * 10 + z + 1);
+  }
+  static std::size_t slot(Index n) {
+    return slot(static_cast<int>(n >> 6), static_cast<int>(n >> 3 & 7u), static_cast<int>(n & 7u));
+  }
+
+  void loadFace(int d) {
+    const ArrivalBlock* other = block_.neighbours[static_cast<std::size_t>(d)];
+    if (!other) return;
+    const int axis = d >> 1, u = (axis + 1) % 3, v = (axis + 2) % 3;
+    Coord here, there;
+    here[axis] = d & 1 ? 8 : -1;
+    there[axis] = d & 1 ? 0 : 7;
+    for (int i = 0; i < 8; ++i)
+      for (int j = 0; j < 8; ++j) {
+        here[u] = there[u] = i;
+        here[v] = there[v] = j;
+        times_[slot(here.x(), here.y(), here.z())] =
+            other->time[offset(there.x(), there.y(), there.z())];
+      }
+  }
+
+  /// @return did anything improve?
+  bool sweep(int direction) {
+    bool any = false;
+    const bool bx = direction & 4, by = direction & 2, bz = direction & 1;
+    for (int i = 0; i < 8; ++i)
+      for (int j = 0; j < 8; ++j)
+        for (int k = 0; k < 8; ++k) {
+          const int x = bx ? 7 - i : i, y = by ? 7 - j : j, z = bz ? 7 - k : k;
+          any = relax(x, y, z) || any;
+        }
+    return any;
+  }
+
+  bool relax(int x, int y, int z) {
+    const std::size_t s = slot(x, y, z);
+    float a = std::min(times_[s - 100], times_[s + 100]),
+          b = std::min(times_[s - 10], times_[s + 10]), c = std::min(times_[s - 1], times_[s + 1]);
+    if (a > b) std::swap(a, b);
+    if (b > c) std::swap(b, c);
+    if (a > b) std::swap(a, b);
+    const float here = times_[s];
+    if (!(a < here) || a > until_) return false;
+    const Index n = offset(x, y, z);
+    if (block_.known.isOn(n)) return false;
+    const auto slowness = static_cast<float>(block_.slownessAt(n));
+    if (!(slowness < kFar)) return false;
+    // [Zhao05, section 2], relative to the earliest neighbour.
+    float u = slowness;
+    const float p = b - a, q = c - a;
+    if (u > p) {
+      u = (p + std::sqrt(2 * slowness * slowness - p * p)) / 2;
+      if (u > q)
+        u = (p + q +
+             std::sqrt(
+                 std::max(0.0f, (p + q) * (p + q) - 3 * (p * p + q * q - slowness * slowness)))) /
+            3;
+    }
+    const float time = a + u;
+    if (!(time < here - kImprovement)) return false;
+    times_[s] = time;
+    changed_.setOn(n);
+    return true;
+  }
+
+  ArrivalBlock& block_;
+  Desk& desk_;
+  float until_;
+  std::array<float, 1000> times_;
+  Mask changed_;
+};
+
+/// Solves again with second-order differences. Which neighbours are upwind is taken from the first
+/// solution, so each grid point waits for earlier ones only and the equations have one solution.
+class SecondOrderWorker {
+ public:
+  SecondOrderWorker(ArrivalBlock& block, Desk& desk, const std::vector<Desk>& desks, float until)
+      : block_(block), desk_(desk), desks_(desks), until_(until) {}
+
+  void run() {
+    if (!desk_.order) sortByTime();
+    for (const std::uint16_t n : *desk_.order) {
+      if (block_.known.isOn(n)) continue;
+      if (block_.time[n] > until_) break;
+      const auto time = static_cast<float>(solve(n));
+      float& stored = (*desk_.second)[n];
+      if (std::abs(time - stored) <= kImprovement) continue;
+      stored = time;
+      tell(desk_, n, block_.time[n], 2);
+    }
+    desk_.newsFrom = 0;
+    desk_.earliest = kFar;
+  }
+
+ private:
+  void sortByTime() {
+    desk_.order = std::make_unique<std::array<std::uint16_t, ArrivalBlock::kSize>>();
+    std::iota(desk_.order->begin(), desk_.order->end(), std::uint16_t{0});
+    std::sort(desk_.order->begin(), desk_.order->end(), [&](std::uint16_t a, std::uint16_t b) {
+      return std::pair(block_.time[a], a) < std::pair(block_.time[b], b);
+    });
+  }
+
+  struct Neighbour {
+    float first = kFar;  ///< time of the first solution
+    double time = 0;     ///< of the second, with its sign
+  };
+  [[nodiscard]] Neighbour read(const ArrivalBlock* at, Index n, bool inside) const {
+    if (!at || !(at->time[n] < kFar)) return {};
+    const bool same = at->inside.isOn(n) == inside;
+    const auto& second = desks_[at->number].second;
+    const double time = static_cast<double>(second ? (*second)[n] : at->time[n]);
+    return {same ? at->time[n] : -at->time[n], same ? time : -time};
+  }
+
+  double solve(Index n) {
+    const bool inside = block_.inside.isOn(n);
+    UpwindTerms terms, plain;
+    for (int axis = 0; axis < 3; ++axis) {
+      Index low = 0, high = 0;
+      const ArrivalBlock* below = block_.step(n, 2 * axis, low);
+      const ArrivalBlock* above = block_.step(n, 2 * axis + 1, high);
+      const Neighbour a = read(below, low, inside), b = read(above, high, inside);
+      const bool up = b.first < a.first;
+      const Neighbour& near = up ? b : a;
+      if (!(near.first < block_.time[n])) continue;
+      Index next = 0;
+      const ArrivalBlock* beyond = (up ? above : below)->step(up ? high : low, 2 * axis + up, next);
+      const Neighbour far = read(beyond, next, inside);
+      plain.addFirst(near.time);
+      if (far.first <= near.first)
+        terms.addSecond(near.time, far.time);
+      else
+        terms.addFirst(near.time);
+    }
+    const double slowness = block_.slownessAt(n);
+    if (plain.count == 0) return static_cast<double>(block_.time[n]);
+    double time = solveUpwind(terms, slowness);
+    bool first = !terms.isSecond;
+    if (terms.isSecond && time < terms.latest) {
+      time = solveUpwind(plain, slowness);
+      first = true;
+    }
+    block_.firstOrder.set(n, first);
+    return time;
+  }
+
+  ArrivalBlock& block_;
+  Desk& desk_;
+  const std::vector<Desk>& desks_;
+  float until_;
+};
+
+float earliestUnknown(const ArrivalBlock& block) {
+  float earliest = kFar;
+  for (auto it = block.known.beginOff(); it; ++it)
+    earliest = std::min(earliest, block.time[it.pos()]);
+  return earliest;
+}
+
+void solveSecondOrder(ArrivalBlocks& blocks, float until) {
+  Rounds rounds(blocks);
+  rounds.desks.resize(blocks.blocks().size());
+  for (ArrivalBlock& block : blocks.blocks()) {
+    Desk& desk = rounds.desks[block.number];
+    desk.second = std::make_unique<std::array<float, ArrivalBlock::kSize>>(block.time);
+    const float earliest = earliestUnknown(block);
+    if (earliest <= until) desk.earliest = earliest;
+  }
+  rounds.run(false, 0.5, 1, [&](ArrivalBlock& block, Desk& desk) {
+    SecondOrderWorker(block, desk, rounds.desks, until).run();
+  });
+  for (ArrivalBlock& block : blocks.blocks()) block.time = *rounds.desks[block.number].second;
+}
+
+}  // namespace
+
+void sweepArrivals(ArrivalBlocks& blocks, int order) {
+  // The second solution runs a little ahead of the first: solve as far as it can reach back.
+  const auto until = static_cast<float>(blocks.settings().until);
+  const float reach = order == 2 ? until + std::max(1.0f, 0.05f * until) : until;
+  {
+    Rounds rounds(blocks);
+    rounds.desks.resize(blocks.blocks().size());
+    for (ArrivalBlock& block : blocks.blocks())
+      for (auto it = block.known.beginOn(); it; ++it) {
+        Desk& desk = rounds.desks[block.number];
+        if (block.time[it.pos()] > until) continue;
+        desk.earliest = std::min(desk.earliest, block.time[it.pos()]);
+        tell(desk, it.pos(), block.time[it.pos()], 1);
+      }
+    rounds.deliverStart();
+    rounds.run(true, 0, order == 2 ? 0.5 : 1, [&](ArrivalBlock& block, Desk& desk) {
+      FirstOrderWorker(block, desk, reach).run();
+    });
+  }
+  if (order == 2) solveSecondOrder(blocks, reach);
+  for (ArrivalBlock& block : blocks.blocks())
+    for (Index n = 0; n < ArrivalBlock::kSize; ++n) {
+      if (block.time[n] <= until)
+        block.known.setOn(n);
+      else
+        block.time[n] = kFar;
+    }
+}
+
+}  // namespace levelset::eikonal

@@ -1,0 +1,62 @@
+#pragma once
+
+// For the .cpp files of levelset/eikonal only.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "levelset/vdb.h"
+
+namespace levelset::eikonal {
+
+/// The zero set beside the edges and corners of a solid, as triangles in index space. A tricubic
+/// rounds them by up to half a voxel; planes fitted on either side do not [Ju02]. Smooth surfaces
+/// have no patches, whatever their curvature: the faces that meet must stay as flat beside the edge
+/// as the edge is sharp.
+class SharpPatches {
+ public:
+  /// None.
+  SharpPatches() = default;
+  /// Looks for them where the field bends. Only fields of unit slope show any.
+  /// Among the leaf blocks that touch `within`, all if empty.
+  SharpPatches(const openvdb::FloatGrid& field, const std::optional<openvdb::CoordBBox>& within);
+
+  [[nodiscard]] bool isEmpty() const { return triangles_.empty(); }
+  /// Do the patches stand for the interpolant in the cell whose lowest corner this is?
+  [[nodiscard]] bool covers(const openvdb::Coord& cell) const {
+    return !isEmpty() && zone_.isValueOn(cell);
+  }
+  /// Is the grid point a corner of such a cell?
+  [[nodiscard]] bool touches(const openvdb::Coord& gridPoint) const {
+    return !isEmpty() && border_.isValueOn(gridPoint);
+  }
+  /// Vertices on edges and corners, in an order that depends on the field alone.
+  [[nodiscard]] const std::vector<openvdb::Vec3d>& features() const { return features_; }
+
+  struct Hit {
+    openvdb::Vec3d point;
+    double distance = 0;
+    bool found = false;
+  };
+  /// The nearest point of the patches that is nearer than `limit`.
+  [[nodiscard]] Hit nearest(const openvdb::Vec3d& from, double limit) const;
+
+ private:
+  using Triangle = std::array<openvdb::Vec3d, 3>;
+  struct Node {
+    openvdb::Vec3f low, high;
+    std::uint32_t begin = 0, end = 0;  ///< triangles
+    std::uint32_t right = 0;           ///< second child; the first follows; 0: a leaf
+  };
+  struct Search;
+  std::uint32_t build(std::uint32_t begin, std::uint32_t end);
+
+  std::vector<openvdb::Vec3d> features_;
+  std::vector<Triangle> triangles_;  ///< in the order of the tree's leaves
+  std::vector<Node> nodes_;
+  openvdb::MaskTree zone_, border_;
+};
+
+}  // namespace levelset::eikonal

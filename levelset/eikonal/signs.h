@@ -1,0 +1,17 @@
+#pragma once
+
+// For the .cpp files of levelset/eikonal only.
+
+#include <functional>
+
+#include "levelset/vdb.h"
+
+namespace levelset::eikonal {
+
+/// Sets ± background of `result` by the signs of `field`, but for the leaf blocks that `holds` says
+/// are made by somebody else.
+void copySigns(const openvdb::FloatTree& field,
+               const std::function<bool(const openvdb::Coord& origin)>& holds,
+               openvdb::FloatTree& result);
+
+}  // namespace levelset::eikonal

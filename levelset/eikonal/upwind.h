@@ -1,0 +1,63 @@
+#pragma once
+
+// For the .cpp files of levelset/eikonal only.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace levelset::eikonal {
+
+/// A time that nothing has reached.
+inline constexpr float kFar = 1e30f;
+
+/// What the grid points behind x on one axis say: weight · (u − value)² is the square of the
+/// derivative. First order: the neighbour's time and 1. Second order: (4 T₁ − T₂) / 3 and 9/4.
+struct UpwindTerm {
+  double value = 0;
+  double weight = 1;
+};
+
+/// Up to one term for each axis.
+struct UpwindTerms {
+  UpwindTerm term[3];
+  int count = 0;
+  double latest = -std::numeric_limits<double>::max();  ///< nearest neighbours' times, the largest
+  bool isSecond = false;                                ///< is one of the terms of second order?
+
+  void addFirst(double near) { add(near, 1, near); }
+  void addSecond(double near, double beyond) {
+    add((4 * near - beyond) / 3, 2.25, near);
+    isSecond = true;
+  }
+
+ private:
+  void add(double value, double weight, double near) {
+    // Sorted by value.
+    int i = count++;
+    for (; i > 0 && term[i - 1].value > value; --i) term[i] = term[i - 1];
+    term[i] = {value, weight};
+    latest = std::max(latest, near);
+  }
+};
+
+/// The time u at which a front of the given slowness (per voxel) comes from the terms: solves
+/// Σ weight (u − value)² = slowness², with the later axes left out while they lie in the future
+/// [Sethian99, Zhao05].
+[[nodiscard]] inline double solveUpwind(const UpwindTerms& terms, double slowness) {
+  const double base = terms.term[0].value;
+  double u = base + slowness / std::sqrt(terms.term[0].weight);
+  double a = terms.term[0].weight, b = 0, c = -slowness * slowness;
+  for (int i = 1; i < terms.count && u > terms.term[i].value; ++i) {
+    const double v = terms.term[i].value - base, w = terms.term[i].weight;
+    a += w;
+    b += w * v;
+    c += w * v * v;
+    const double square = b * b - a * c;
+    if (square < 0) break;
+    u = base + (b + std::sqrt(square)) / a;
+  }
+  return u;
+}
+
+}  // namespace levelset::eikonal
