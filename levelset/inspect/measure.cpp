@@ -3,31 +3,145 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <limits>
+#include <cmath>
+#include <tuple>
 #include <vector>
 
 #include "levelset/convert/cell_surface.h"
+#include "levelset/inspect/curved_surface.h"
 #include "levelset/inspect/shells.h"
 
 namespace levelset {
 
 namespace {
 
-void describeShells(const std::vector<ShellFigures>& shells, Measurement& result) {
-  for (const ShellFigures& shell : shells) {
-    result.volume += shell.volume;
-    result.area += shell.area;
-    result.euler += shell.euler;
-    ++result.shells;
-    if (shell.volume > 0) ++result.components;
-    if (shell.volume < 0) ++result.cavities;
+using openvdb::Vec3d;
+
+/// Sums over the triangles of each shell: chunk by chunk, and the chunks in their order.
+/// @param piece  (triangle, anchor, worker) of one triangle; @param makeWorker  one for each chunk
+template <typename MakeWorker, typename Piece>
+std::vector<SurfaceMoments> sumShells(const std::vector<std::uint32_t>& shellOfTriangle,
+                                      const std::vector<Vec3d>& anchors,
+                                      const MakeWorker& makeWorker, const Piece& piece) {
+  constexpr std::size_t kChunk = 4096;
+  struct Part {
+    std::uint32_t shell;
+    SurfaceMoments sum;
+  };
+  const std::size_t count = shellOfTriangle.size();
+  std::vector<std::vector<Part>> parts((count + kChunk - 1) / kChunk);
+  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t chunk) {
+    auto worker = makeWorker();
+    const std::size_t end = std::min(count, (chunk + 1) * kChunk);
+    for (std::size_t i = chunk * kChunk; i < end; ++i) {
+      const std::uint32_t shell = shellOfTriangle[i];
+      if (parts[chunk].empty() || parts[chunk].back().shell != shell)
+        parts[chunk].push_back({shell, {}});
+      parts[chunk].back().sum.add(piece(i, anchors[shell], worker));
+    }
+  });
+  std::vector<SurfaceMoments> sums(anchors.size());
+  for (const auto& chunk : parts)
+    for (const Part& part : chunk) sums[part.shell].add(part.sum);
+  return sums;
+}
+
+/// A vertex of each shell: near to all of it, however far the shells are from each other.
+template <typename Vector>
+std::vector<Vec3d> shellAnchors(const Shells& shells, const std::vector<Vector>& positions) {
+  std::vector<Vec3d> anchors(shells.figures.size());
+  for (std::size_t v = positions.size(); v-- > 0;) {
+    const std::uint32_t shell = shells.shellOfVertex[v];
+    if (shell != Shells::kNoShell)
+      anchors[shell] = Vec3d(positions[v][0], positions[v][1], positions[v][2]);
   }
+  return anchors;
+}
+
+std::vector<std::uint32_t> shellsOfTriangles(
+    const Shells& shells, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  std::vector<std::uint32_t> result;
+  result.reserve(triangles.size());
+  for (const auto& t : triangles) result.push_back(shells.shellOfVertex[t[0]]);
+  return result;
+}
+
+/// @param anchor  that the moments are about; @param scale  the length of a unit in the world
+void describeMoments(const SurfaceMoments& whole, const Vec3d& anchor, const Imath::M44d& toWorld,
+                     double scale, Measurement& result) {
+  result.volume = whole.volume * scale * scale * scale;
+  result.area = whole.area * scale * scale;
+  result.meanCurvature = whole.meanCurvature * scale;
+  if (!(std::abs(whole.volume) > 0)) return;
+  const Vec3d middle = whole.first / whole.volume;
+  const SurfaceMoments central = whole.about(middle);
+  toWorld.multVecMatrix(toImath(anchor + middle), result.centroid);
+  const auto& s = central.second;
+  const Imath::M33d moment(s[0], s[3], s[4], s[3], s[1], s[5], s[4], s[5], s[2]);
+  Imath::M33d linear;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) linear[i][j] = toWorld[i][j];
+  const Imath::M33d turned = linear.transposed() * moment * linear * (scale * scale * scale);
+  const double trace = turned[0][0] + turned[1][1] + turned[2][2];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) result.inertia[i][j] = (i == j ? trace : 0) - turned[i][j];
+}
+
+void describeShells(const Shells& shells, const std::vector<SurfaceMoments>& sums,
+                    const std::vector<Vec3d>& anchors, const Imath::M44d& toWorld, double scale,
+                    Measurement& result) {
+  if (anchors.empty()) return;
+  SurfaceMoments whole;
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    result.euler += shells.figures[i].euler;
+    ++result.shells;
+    if (sums[i].volume > 0) ++result.components;
+    if (sums[i].volume < 0) ++result.cavities;
+    whole.add(sums[i].about(anchors[0] - anchors[i]));
+  }
+  describeMoments(whole, anchors[0], toWorld, scale, result);
+}
+
+/// Half the sum of length times angle over the edges, positive where convex [Steiner40].
+double edgeCurvature(const TriMesh& mesh) {
+  struct Side {
+    std::uint32_t low, high;
+    std::size_t triangle;
+  };
+  std::vector<Side> sides;
+  sides.reserve(mesh.triangles.size() * 3);
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto& t = mesh.triangles[i];
+    for (std::size_t k = 0; k < 3; ++k)
+      sides.push_back({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3]), i});
+  }
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+  });
+  const auto normal = [&](std::size_t i) {
+    const auto& t = mesh.triangles[i];
+    return (mesh.positions[t[1]] - mesh.positions[t[0]])
+        .cross(mesh.positions[t[2]] - mesh.positions[t[0]]);
+  };
+  double sum = 0;
+  for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
+    if (sides[i].low != sides[i + 1].low || sides[i].high != sides[i + 1].high) continue;
+    const auto& t = mesh.triangles[sides[i].triangle];
+    Imath::V3d along = mesh.positions[sides[i].high] - mesh.positions[sides[i].low];
+    for (std::size_t k = 0; k < 3; ++k)
+      if (t[k] == sides[i].high && t[(k + 1) % 3] == sides[i].low) along = -along;
+    const Imath::V3d first = normal(sides[i].triangle), second = normal(sides[i + 1].triangle);
+    const double length = along.length();
+    if (length > 0)
+      sum += std::atan2(first.cross(second).dot(along), first.dot(second) * length) * length / 2;
+  }
+  return sum;
 }
 
 }  // namespace
 
-// The figures are those of the uniform mesh in index space: near to the numbers' origin, so that a
-// part far away in the world measures the same.
+// The figures are those of the surface in index space: near to the numbers' origin, so that a part
+// far away in the world measures the same.
 Measurement measure(const NarrowBand& solid) {
   Measurement result;
   result.voxelSize = solid.voxelSize();
@@ -35,17 +149,34 @@ Measurement measure(const NarrowBand& solid) {
   result.activeVoxels = solid.activeVoxelCount();
   if (solid.isEmpty()) return result;
   const IndexMesh mesh = marchCells(CellSurface(vdb(solid)));
-  describeShells(findShells(mesh.positions, mesh.triangles).figures, result);
-  result.area *= result.voxelSize * result.voxelSize;
-  result.volume *= result.voxelSize * result.voxelSize * result.voxelSize;
+  const Shells shells = findShells(mesh.positions, mesh.triangles);
+  const std::vector<Vec3d> anchors = shellAnchors(shells, mesh.positions);
+  const CurvedSurface surface(mesh, vdb(solid));
+  const std::vector<SurfaceMoments> sums = sumShells(
+      shellsOfTriangles(shells, mesh.triangles), anchors, [&] { return surface.makeCache(); },
+      [&](std::size_t i, const Vec3d& anchor, CurvedSurface::Cache& cache) {
+        return surface.moments(i, anchor, cache);
+      });
   const Imath::M44d matrix = solid.indexToWorld();
-  for (const openvdb::Vec3d& p : mesh.positions) result.bounds.extendBy(toImath(p) * matrix);
+  describeShells(shells, sums, anchors, matrix, result.voxelSize, result);
+  for (const Vec3d& p : mesh.positions) result.bounds.extendBy(toImath(p) * matrix);
   return result;
 }
 
 Measurement measure(const TriMesh& mesh) {
   Measurement result;
-  describeShells(findShells(mesh.positions, mesh.triangles).figures, result);
+  const Shells shells = findShells(mesh.positions, mesh.triangles);
+  const std::vector<Vec3d> anchors = shellAnchors(shells, mesh.positions);
+  const std::vector<SurfaceMoments> sums = sumShells(
+      shellsOfTriangles(shells, mesh.triangles), anchors, [] { return 0; },
+      [&](std::size_t i, const Vec3d& anchor, int) {
+        const auto& t = mesh.triangles[i];
+        return flatTriangleMoments(toVdb(mesh.positions[t[0]]) - anchor,
+                                   toVdb(mesh.positions[t[1]]) - anchor,
+                                   toVdb(mesh.positions[t[2]]) - anchor);
+      });
+  describeShells(shells, sums, anchors, Imath::M44d(), 1, result);
+  result.meanCurvature = edgeCurvature(mesh);
   result.bounds = bounds(mesh);
   return result;
 }

@@ -18,7 +18,7 @@ double checkedHalfWidth(const NarrowBand& solid, const OffsetOptions& options) {
   const double halfWidth = options.halfWidth.value_or(solid.halfWidth());
   if (!std::isfinite(halfWidth) || halfWidth < 1)
     throw UsageError(
-        fmt::format("offset: the half width is {} voxels; give at least 1", halfWidth));
+        fmt::format("{}: the half width is {} voxels; give at least 1", options.action, halfWidth));
   return halfWidth;
 }
 
@@ -26,14 +26,16 @@ double checkedHalfWidth(const NarrowBand& solid, const OffsetOptions& options) {
 
 NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& options) {
   if (!std::isfinite(distance))
-    throw UsageError(fmt::format("offset: the distance is {}; give a finite length", distance));
+    throw UsageError(
+        fmt::format("{}: the distance is {}; give a finite length", options.action, distance));
   if (solid.isEmpty())
-    throw InvalidInput("offset: the solid is empty, so there is no surface to move; give a solid");
+    throw InvalidInput(fmt::format(
+        "{}: the solid is empty, so there is no surface to move; give a solid", options.action));
   const double halfWidth = checkedHalfWidth(solid, options);
   if (distance == 0 && halfWidth == solid.halfWidth()) return solid;
 
   eikonal::DistanceRequest request;
-  request.action = "offset";
+  request.action = options.action;
   request.maxMemory = options.maxMemory;
 
   // === Distances out to the new surface, kept beside it only
@@ -45,9 +47,9 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
     moved = eikonal::distanceTransform(vdb(solid), request);
     if (moved->activeVoxelCount() == 0 || !eikonal::hasZeroCrossing(moved->tree()))
       throw InvalidInput(
-          fmt::format("offset: nothing is left of the solid after {} world units; no part of it is "
-                      "thicker than twice that, use a smaller distance",
-                      distance));
+          fmt::format("{}: nothing is left of the solid after {} world units; no part of it is "
+                      "thicker than twice that, use a smaller length",
+                      options.action, distance));
   }
 
   // === A distance again: where fronts met, the shifted one is only a bound

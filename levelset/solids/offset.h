@@ -11,6 +11,7 @@ struct OffsetOptions {
   std::optional<double> halfWidth = {};  ///< of the result, voxels; empty: as the operand
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
+  const char* action = "offset";  ///< in messages
 };
 
 /// Moves the surface along its normal by `distance`; positive grows the solid. Distances are swept

@@ -8,6 +8,7 @@
 #include "levelset/convert/mesh_file.h"
 #include "levelset/error.h"
 #include "levelset/inspect/check.h"
+#include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"
 
 namespace pipeline {
@@ -55,6 +56,12 @@ Value measure(Invocation& in) {
   json["shells"] = m.shells;
   json["cavities"] = m.cavities;
   json["euler"] = m.euler;
+  json["centroid"] = toJson(m.centroid);
+  json["inertia"] = Json::array();
+  for (int i = 0; i < 3; ++i)
+    json["inertia"].push_back(
+        toJson(Imath::V3d(m.inertia[i][0], m.inertia[i][1], m.inertia[i][2])));
+  json["mean_curvature"] = m.meanCurvature;
   if (value.kind() == Kind::Mesh) {
     const levelset::Manifoldness manifold = levelset::manifoldness(value.mesh());
     json["closed_manifold"] = manifold.isClosedManifold();
@@ -80,6 +87,35 @@ Value measure(Invocation& in) {
           entry.is_number_float() ? fmt::format("{:.9g}", entry.get<double>()) : entry.dump());
   }
   return value;
+}
+
+Value compare(Invocation& in) {
+  const levelset::Comparison c =
+      levelset::compare(in.band(0), in.band(1), {.progress = in.progress});
+  Json json;
+  json["hausdorff"] = c.hausdorff();
+  json["hausdorff_a_to_b"] = c.hausdorffAtoB;
+  json["hausdorff_b_to_a"] = c.hausdorffBtoA;
+  json["mean_a_to_b"] = c.meanAtoB;
+  json["mean_b_to_a"] = c.meanBtoA;
+  json["chamfer"] = c.chamfer();
+  json["symmetric_difference"] = c.symmetricDifference;
+  in.notes.detailsJson = json.dump();
+  if (asksJson(in)) {
+    in.output = printed(json);
+  } else {
+    for (const auto& [key, entry] : json.items())
+      in.output += fmt::format("{:<22}{:.9g}\n", key, entry.get<double>());
+  }
+  if (in.given("tolerance")) {
+    const double tolerance = in.length("tolerance");
+    if (c.hausdorff() > tolerance)
+      throw levelset::NumericalError(fmt::format(
+          "compare: the surfaces are up to {:.6g} apart, more than the tolerance of {:.6g}; look "
+          "at the figures, or allow more",
+          c.hausdorff(), tolerance));
+  }
+  return in.operands[1];
 }
 
 Value check(Invocation& in) {
@@ -216,12 +252,33 @@ void addInspectionOperators(std::vector<Operator>& all) {
   all.push_back({
       .name = "measure",
       .group = "Inspection",
-      .summary = "volume, area, bounds, components, shells, cavities, Euler characteristic",
+      .summary = "volume, area, bounds, topology, centroid, inertia, mean curvature",
+      .details = "Inertia is about the centroid for density 1; mean_curvature is the integral of "
+                 "(k1 + k2) / 2 over the surface; euler is V - E + F of the surface.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! measure --json",
       .params = {jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh}},
       .flow = Flow::PassesThrough,
       .run = measure,
+      .usesStandardOutput = asksJson,
+  });
+  all.push_back({
+      .name = "compare",
+      .group = "Inspection",
+      .summary = "how far two solids differ: Hausdorff, mean and Chamfer distance, volume",
+      .details = "Both stay on the stack. hausdorff is the larger of both ways, chamfer the sum of "
+                 "both means, symmetric_difference the volume in one of the solids only. The grids "
+                 "need not be the same.",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! sphere --radius 1 --center 0.1,0,0 "
+                 "--voxel 0.05 ! compare --tolerance 0.11",
+      .params = {{.name = "tolerance",
+                  .type = ParamType::Length,
+                  .doc = "exit code 5 if the Hausdorff distance is larger",
+                  .range = Range::NonNegative},
+                 jsonParam()},
+      .operands = {{Kind::Band}, {Kind::Band}},
+      .flow = Flow::PassesThrough,
+      .run = compare,
       .usesStandardOutput = asksJson,
   });
   all.push_back({

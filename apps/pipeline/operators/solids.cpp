@@ -8,6 +8,7 @@
 #include "levelset/solids/blend.h"
 #include "levelset/solids/components.h"
 #include "levelset/solids/csg.h"
+#include "levelset/solids/morphology.h"
 #include "levelset/solids/offset.h"
 
 namespace pipeline {
@@ -55,15 +56,23 @@ Value blend(Invocation& in) {
   options.side = side == "add"      ? levelset::BlendSide::Add
                  : side == "remove" ? levelset::BlendSide::Remove
                                     : levelset::BlendSide::Both;
+  if (in.text("method") == "fillet") options.method = levelset::BlendMethod::Fillet;
+  if (in.given("reach")) options.reach = in.length("reach");
   levelset::CsgResult result =
       levelset::blend(operationOf(in), in.band(0), in.band(1), in.length("radius"), options);
   in.notes.notes = std::move(result.notes);
   return Value(std::move(result.band));
 }
 
-Value offset(Invocation& in) {
+levelset::OffsetOptions offsetOptions(Invocation& in) {
   levelset::OffsetOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
   if (in.given("half-width")) options.halfWidth = in.number("half-width");
+  options.action = in.op().name.c_str();
+  return options;
+}
+
+Value offset(Invocation& in) {
+  const levelset::OffsetOptions options = offsetOptions(in);
   const double distance = in.length("distance");
   NarrowBand band = in.band();
   in.operands.clear();
@@ -79,6 +88,42 @@ Plan planOffset(Invocation& in) {
   const double after = plan.bounds.isEmpty() ? 0 : plan.bounds.size().length();
   if (before > 0) plan.area *= (after / before) * (after / before);
   if (in.given("half-width")) plan.halfWidth = in.number("half-width");
+  return plan;
+}
+
+Value open(Invocation& in) {
+  return Value(levelset::opening(in.band(), in.length("radius"), offsetOptions(in)));
+}
+
+Value close(Invocation& in) {
+  return Value(levelset::closing(in.band(), in.length("radius"), offsetOptions(in)));
+}
+
+Plan planMorphology(Invocation& in) {
+  Plan plan = in.operands[0].plan();
+  if (in.given("half-width")) plan.halfWidth = in.number("half-width");
+  return plan;
+}
+
+levelset::ShellSide shellSide(const Invocation& in) {
+  const std::string side = in.text("side");
+  return side == "out"    ? levelset::ShellSide::Out
+         : side == "both" ? levelset::ShellSide::Both
+                          : levelset::ShellSide::In;
+}
+
+Value shell(Invocation& in) {
+  return Value(
+      levelset::shell(in.band(), in.length("thickness"), shellSide(in), offsetOptions(in)));
+}
+
+Plan planShell(Invocation& in) {
+  Plan plan = planMorphology(in);
+  const levelset::ShellSide side = shellSide(in);
+  const double out = side == levelset::ShellSide::In ? 0 : in.length("thickness");
+  plan.bounds.min -= Imath::V3d(out);
+  plan.bounds.max += Imath::V3d(out);
+  plan.area *= 2;
   return plan;
 }
 
@@ -125,9 +170,12 @@ void addSolidOperators(std::vector<Operator>& all) {
       .name = "blend",
       .group = "Solids",
       .summary = "union, intersection or difference with a rounded seam",
-      .details = "Curvature flow localised along the curve in which the two surfaces meet; nothing "
-                 "changes further than the "
-                 "radius from that curve, and solids that are near but do not meet stay apart.",
+      .details =
+          "'curvature' flows along the curve in which the two surfaces meet; nothing changes "
+          "further than the radius from it. 'fillet' is what a ball of that radius leaves "
+          "that rolls along the seam: an arc of the radius, tangent to both surfaces, with "
+          "nothing changed beyond radius / tan(angle / 2). Solids that are near but do not "
+          "meet stay apart.",
       .example = "levelsmith box --size 8,8,2 --voxel 0.1 ! cylinder --radius 1.5 --height 6 "
                  "--voxel 0.1 ! blend --radius 0.8 ! measure",
       .params = {{.name = "radius",
@@ -144,7 +192,12 @@ void addSolidOperators(std::vector<Operator>& all) {
                   .type = ParamType::Choice,
                   .doc = "how the seam is rounded",
                   .fallback = "curvature",
-                  .choices = {"curvature"}},
+                  .choices = {"curvature", "fillet"}},
+                 {.name = "reach",
+                  .type = ParamType::Length,
+                  .doc = "fillet: how far the middle of its arc may be from the seam, beyond which "
+                         "the ball gets smaller; default: twice the radius",
+                  .range = Range::Positive},
                  {.name = "side",
                   .type = ParamType::Choice,
                   .doc = "add material, remove it, or both",
@@ -171,6 +224,62 @@ void addSolidOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = offset,
       .plan = planOffset,
+  });
+  const Param halfWidth = {.name = "half-width",
+                           .type = ParamType::Number,
+                           .doc = "of the result, in voxels; default: as before",
+                           .range = Range::Positive};
+  const Param ball = {.name = "radius",
+                      .type = ParamType::Length,
+                      .doc = "of the ball",
+                      .range = Range::NonNegative,
+                      .required = true,
+                      .position = 0};
+  all.push_back({
+      .name = "open",
+      .group = "Solids",
+      .summary = "all balls of a radius that fit into the solid: drops thin parts",
+      .details =
+          "Moves the surface inwards and back: parts thinner than twice the radius go, convex "
+          "edges are rounded to it, the rest stays.",
+      .example = "levelsmith box --size 2,2,2 --voxel 0.05 ! open 0.3 ! measure",
+      .params = {ball, halfWidth},
+      .operands = {{Kind::Band}},
+      .run = open,
+      .plan = planMorphology,
+  });
+  all.push_back({
+      .name = "close",
+      .group = "Solids",
+      .summary = "fill what no ball of a radius outside the solid gets into",
+      .details = "Moves the surface outwards and back: gaps narrower than twice the radius are "
+                 "filled, concave edges are rounded to it, the rest stays.",
+      .example = "levelsmith box --size 2,2,0.6 --voxel 0.05 ! cylinder --radius 0.4 --height 2 "
+                 "--voxel 0.05 ! union ! close 0.3 ! measure",
+      .params = {ball, halfWidth},
+      .operands = {{Kind::Band}},
+      .run = close,
+      .plan = planMorphology,
+  });
+  all.push_back({
+      .name = "shell",
+      .group = "Solids",
+      .summary = "hollow a solid: the wall along its surface",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! shell --thickness 0.2 ! measure",
+      .params = {{.name = "thickness",
+                  .type = ParamType::Length,
+                  .doc = "of the wall, a voxel or more",
+                  .range = Range::Positive,
+                  .required = true},
+                 {.name = "side",
+                  .type = ParamType::Choice,
+                  .doc = "where the wall lies: inside the surface, outside, or half and half",
+                  .fallback = "in",
+                  .choices = {"in", "out", "both"}},
+                 halfWidth},
+      .operands = {{Kind::Band}},
+      .run = shell,
+      .plan = planShell,
   });
   all.push_back({
       .name = "keep",

@@ -161,7 +161,8 @@ TEST(Csg, FacesThatTouchOnGridPointsLeaveNoCrack) {
     for (const openvdb::Coord& c : openvdb::CoordBBox(openvdb::Coord(-14), openvdb::Coord(14)))
       ASSERT_NEAR(have.getValue(c), want.getValue(c), 1e-5) << c << " side " << side;
     // Taking the touching solid away takes nothing.
-    EXPECT_EQ(measure(subtract(lower, upper)).volume, measure(lower).volume);
+    const double volume = measure(lower).volume;
+    EXPECT_NEAR(measure(subtract(lower, upper)).volume, volume, 1e-6 * volume);
   }
 }
 
@@ -173,23 +174,25 @@ TEST(Csg, SpheresThatTouchInAPointStayTwo) {
 TEST(Csg, VolumesOfTwoSpheresConverge) {
   // d = R: the lens has 5/16 of a sphere's volume, the union 27/16.
   double previous[2] = {0, 0};
-  for (const int resolution : {32, 64, 128}) {
-    double error[2] = {0, 0};
+  for (const int resolution : {32, 64}) {
+    double error[2] = {0, 0};  // largest over the phases
     for (int i = 0; i < 5; ++i) {
       const V3d shift = V3d(0.17, 0.31, 0.43) * i;
       const NarrowBand a = makeSphere(resolution, shift, 1);
       const NarrowBand b = makeSphere(resolution, shift + V3d(resolution, 0, 0), 1);
       const double ball = 4 * kPi / 3 * std::pow(resolution, 3);
-      error[0] += (measure(unite(a, b)).volume / (ball * 27 / 16) - 1) / 5;
-      error[1] += (measure(intersect(a, b)).volume / (ball * 5 / 16) - 1) / 5;
+      const double united = measure(unite(a, b)).volume / (ball * 27 / 16) - 1,
+                   common = measure(intersect(a, b)).volume / (ball * 5 / 16) - 1;
+      error[0] = std::max(error[0], std::abs(united));
+      error[1] = std::max(error[1], std::abs(common));
     }
     if (resolution == 32) {
-      EXPECT_LT(std::abs(error[0]), 1e-3);
-      EXPECT_LT(std::abs(error[1]), 2e-3);
+      EXPECT_LT(error[0], 1e-4);
+      EXPECT_LT(error[1], 5e-4);
     }
     for (int i = 0; i < 2; ++i) {
       if (previous[i] != 0) {
-        EXPECT_GT(std::log2(std::abs(previous[i] / error[i])), 1.8);
+        EXPECT_GT(std::log2(previous[i] / error[i]), 1.8);
       }
       previous[i] = error[i];
     }
