@@ -156,6 +156,7 @@ const std::vector<Operator>& operators() {
     addSolidOperators(list);
     addAdvectionOperators(list);
     addEikonalOperators(list);
+    addFlowOperators(list);
     addPlacementOperators(list);
     addTextureOperators(list);
     addInspectionOperators(list);

@@ -104,6 +104,7 @@ void addConversionOperators(std::vector<Operator>& all);
 void addSolidOperators(std::vector<Operator>& all);
 void addAdvectionOperators(std::vector<Operator>& all);
 void addEikonalOperators(std::vector<Operator>& all);
+void addFlowOperators(std::vector<Operator>& all);
 void addPlacementOperators(std::vector<Operator>& all);
 void addTextureOperators(std::vector<Operator>& all);
 void addInspectionOperators(std::vector<Operator>& all);

@@ -1,0 +1,186 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "apps/pipeline/fields.h"
+#include "apps/pipeline/invocation.h"
+#include "apps/pipeline/operators/common.h"
+#include "levelset/convert/band_file.h"
+#include "levelset/error.h"
+#include "levelset/flow/curvature_flow.h"
+#include "levelset/flow/morph.h"
+#include "levelset/flow/smooth.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::NarrowBand;
+using levelset::UsageError;
+
+// === curvature-flow
+
+Value curvatureFlow(Invocation& in) {
+  const std::string scheme = in.text("scheme");
+  levelset::CurvatureFlowOptions options{.preservesVolume = in.flag("volume-preserving"),
+                                         .maxMemory = in.maxMemory,
+                                         .progress = in.progress};
+  options.scheme = scheme == "explicit"     ? levelset::FlowScheme::Explicit
+                   : scheme == "stabilized" ? levelset::FlowScheme::Stabilized
+                   : scheme == "implicit"   ? levelset::FlowScheme::Implicit
+                                            : levelset::FlowScheme::Auto;
+  options.mask = maskOf(in);
+  if (in.given("tolerance")) options.tolerance = in.length("tolerance");
+  if (in.given("step")) options.step = in.number("step");
+  NarrowBand band = in.band();
+  in.operands.clear();
+  levelset::CurvatureFlowResult result =
+      levelset::curvatureFlow(std::move(band), in.number("time"), options);
+  in.notes.notes.push_back(fmt::format("{} steps, {} evaluations, {} re-distancings", result.steps,
+                                       result.evaluations, result.redistances));
+  in.notes.errors.push_back(
+      {"steps in time, rms over the surface", result.errorEstimate, "world units"});
+  if (options.tolerance && result.errorEstimate > *options.tolerance)
+    in.notes.warnings.push_back(fmt::format(
+        "curvature-flow: the steps in time leave about {:.3g} world units, more than the "
+        "tolerance, since something shrank to nothing or broke on the way",
+        result.errorEstimate));
+  return Value(std::move(result.band));
+}
+
+// === smooth
+
+Value smooth(Invocation& in) {
+  const std::string kind = in.text("kind");
+  const double sigma = in.length("sigma");
+  const levelset::SmoothKind chosen = kind == "mean"     ? levelset::SmoothKind::Mean
+                                      : kind == "median" ? levelset::SmoothKind::Median
+                                      : kind == "taubin" ? levelset::SmoothKind::Taubin
+                                                         : levelset::SmoothKind::Gaussian;
+  NarrowBand band = in.band();
+  in.operands.clear();
+  return Value(
+      levelset::smooth(std::move(band), chosen, sigma,
+                       {.mask = maskOf(in), .maxMemory = in.maxMemory, .progress = in.progress}));
+}
+
+// === morph
+
+/// The name of a kept step: '#'s stand for its number with that many digits.
+std::filesystem::path stepFile(const std::string& pattern, int number) {
+  const std::size_t first = pattern.find('#');
+  const std::size_t last = pattern.find_first_not_of('#', first);
+  const std::size_t digits = (last == std::string::npos ? pattern.size() : last) - first;
+  return pattern.substr(0, first) + fmt::format("{:0{}}", number, digits) +
+         pattern.substr(first + digits);
+}
+
+std::string stepPattern(const Invocation& in) {
+  std::string pattern = in.text("keep-steps");
+  if (pattern.find('#') == std::string::npos || !levelset::isBandFormat(pattern))
+    throw UsageError(
+        fmt::format("{}: '{}' names no row of .vdb files; put # where the number goes, as in "
+                    "step_###.vdb",
+                    in.where("keep-steps"), pattern));
+  return pattern;
+}
+
+double partOfTheWay(const Invocation& in) {
+  return in.given("until") ? in.number("until") : 1;
+}
+
+Value morph(Invocation& in) {
+  levelset::MorphOptions options{.steps = static_cast<int>(in.integer("steps")),
+                                 .until = partOfTheWay(in),
+                                 .maxMemory = in.maxMemory,
+                                 .progress = in.progress};
+  if (in.given("keep-steps")) {
+    const std::string pattern = stepPattern(in);
+    options.keep = [pattern](const NarrowBand& step, int number) {
+      levelset::writeBand(stepFile(pattern, number), step);
+    };
+  }
+  return Value(levelset::morph(in.band(0), in.band(1), options));
+}
+
+}  // namespace
+
+void addFlowOperators(std::vector<Operator>& all) {
+  all.push_back(
+      {.name = "curvature-flow",
+       .group = "Flow",
+       .summary = "move the surface inwards with its curvature k1 + k2",
+       .details =
+           "A ball obeys R² = R0² - 4 time. Topology may change; a solid that vanishes on the "
+           "way is refused, with the time. Steps are as long as the tolerance allows and "
+           "stable whatever is asked.",
+       .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! curvature-flow --time 0.05 ! measure",
+       .params = withMask({{.name = "time",
+                            .doc = "how long, world units squared",
+                            .range = Range::NonNegative,
+                            .required = true,
+                            .position = 0},
+                           {.name = "volume-preserving",
+                            .type = ParamType::Flag,
+                            .doc = "take the mean curvature off, so that the volume stays"},
+                           {.name = "scheme",
+                            .type = ParamType::Choice,
+                            .doc = "of the steps in time; auto: what is predicted to cost least",
+                            .fallback = "auto",
+                            .choices = {"auto", "explicit", "stabilized", "implicit"}},
+                           {.name = "tolerance",
+                            .type = ParamType::Length,
+                            .doc = "error of the steps in time, rms; default: 0.02vx",
+                            .range = Range::Positive},
+                           {.name = "step",
+                            .doc = "longest step, world units squared",
+                            .range = Range::Positive}}),
+       .operands = {{Kind::Band}},
+       .run = curvatureFlow});
+  all.push_back(
+      {.name = "smooth",
+       .group = "Flow",
+       .summary = "smooth the surface by a filter of its distances",
+       .details =
+           "gaussian: a Gaussian of that sigma; mean: a box of the same variance; median: over "
+           "the grid points within sigma; taubin: a Gaussian that gives long waves back what "
+           "they lost.",
+       .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! smooth --sigma 1vx ! measure",
+       .params = withMask({{.name = "kind",
+                            .type = ParamType::Choice,
+                            .doc = "of the filter",
+                            .fallback = "gaussian",
+                            .choices = {"gaussian", "mean", "median", "taubin"}},
+                           {.name = "sigma",
+                            .type = ParamType::Length,
+                            .doc = "standard deviation of the filter",
+                            .range = Range::Positive,
+                            .required = true}}),
+       .operands = {{Kind::Band}},
+       .run = smooth});
+  all.push_back(
+      {.name = "morph",
+       .group = "Flow",
+       .summary = "turn the first solid into the second, step by step",
+       .details =
+           "Every step is nearer to the target than the one before; topology may change. The "
+           "result stays on the grid of the first. Without names it takes the two newest "
+           "values, the target last.",
+       .example = "levelsmith sphere --radius 1 --voxel 0.1 ! box --size 1.6,1.6,1.6 --voxel 0.1 ! "
+                  "morph --steps 3 ! measure",
+       .params = {{.name = "steps",
+                   .type = ParamType::Integer,
+                   .doc = "in which the way is gone",
+                   .fallback = "1",
+                   .range = Range::Positive},
+                  {.name = "until",
+                   .doc = "part of the way, up to 1; default: the target",
+                   .range = Range::Positive},
+                  {.name = "keep-steps",
+                   .type = ParamType::Path,
+                   .doc = "write every step; # in the name is its number (step_###.vdb)"}},
+       .operands = {{Kind::Band}, {Kind::Band}},
+       .run = morph});
+}
+
+}  // namespace pipeline

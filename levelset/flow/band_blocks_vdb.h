@@ -1,0 +1,94 @@
+#pragma once
+
+// For the .cpp files of levelset/flow only.
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <array>
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include "levelset/vdb.h"
+
+namespace levelset::flow {
+
+/// One float a grid point of a leaf block.
+using Values = std::array<float, 512>;
+/// One block a leaf, in tree order.
+using Field = std::vector<Values>;
+
+/// A leaf block and two grid points on each side of it, rows along z.
+struct PaddedBlock {
+  static constexpr int kPad = 2, kSide = 12, kRow = 16;
+  static constexpr int kStepX = kSide * kRow, kStepY = kRow;
+  alignas(64) std::array<float, kSide * kSide * kRow> values;
+
+  /// Where the grid point (x, y, z) of the leaf lies.
+  [[nodiscard]] const float* at(int x, int y, int z) const {
+    return values.data() + ((x + kPad) * kSide + y + kPad) * kRow + z + kPad;
+  }
+  /// Sum of the values at the six neighbours of a grid point, by its offset in the leaf.
+  [[nodiscard]] float sixAround(openvdb::Index offset) const {
+    const auto n = static_cast<int>(offset);
+    const float* p = at(n >> 6, n >> 3 & 7, n & 7);
+    return p[kStepX] + p[-kStepX] + p[kStepY] + p[-kStepY] + p[1] + p[-1];
+  }
+};
+
+/// The leaf blocks of a band and who borders on whom: fields on them are plain arrays, so that many
+/// can live side by side. The topology does not change.
+class BandBlocks {
+ public:
+  using LeafNode = openvdb::FloatTree::LeafNodeType;
+  using Mask = openvdb::util::NodeMask<3>;
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  explicit BandBlocks(const openvdb::FloatTree& tree);
+
+  [[nodiscard]] std::size_t size() const { return origins_.size(); }
+  [[nodiscard]] const openvdb::Coord& origin(std::size_t i) const { return origins_[i]; }
+  [[nodiscard]] const Mask& active(std::size_t i) const { return active_[i]; }
+  /// Number of a grid point, 512 × block + offset; kNone outside all blocks.
+  [[nodiscard]] std::uint32_t find(const openvdb::Coord& gridPoint) const;
+
+  /// All values of the leaves of a tree of this topology, divided by `unit`.
+  [[nodiscard]] Field read(const openvdb::FloatTree& tree, double unit) const;
+  /// The active values back, times `unit`.
+  void write(const Field& field, double unit, openvdb::FloatTree& tree) const;
+
+  /// @param outside  value beyond the blocks outside the solid; inside it is −outside
+  void gather(const Field& field, std::size_t i, float outside, PaddedBlock& block) const;
+
+  /// Calls work(i, scratch) for each block, in parallel; `Scratch` is made once a task.
+  template <typename Scratch, typename Work>
+  void forEach(const Work& work) const {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 16), [&](const auto& range) {
+      const auto scratch = std::make_unique<Scratch>();
+      for (std::size_t i = range.begin(); i != range.end(); ++i) work(i, *scratch);
+    });
+  }
+
+  /// Sums work(i) over the blocks, computed in parallel and added in tree order.
+  template <typename Sum, typename Work>
+  [[nodiscard]] Sum sum(const Work& work) const {
+    std::vector<Sum> parts(size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 16), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i != range.end(); ++i) parts[i] = work(i);
+    });
+    Sum total{};
+    for (const Sum& part : parts) total += part;
+    return total;
+  }
+
+ private:
+  static constexpr std::int32_t kOutside = -1, kInside = -2;  // in place of a neighbour's number
+
+  std::vector<openvdb::Coord> origins_;
+  std::vector<Mask> active_;
+  std::vector<std::array<std::int32_t, 27>> neighbours_;
+  std::unordered_map<openvdb::Coord, std::uint32_t, std::hash<openvdb::Coord>> index_;
+};
+
+}  // namespace levelset::flow

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <optional>
+
+#include "levelset/fields/mask.h"
+#include "levelset/narrow_band.h"
+#include "levelset/progress.h"
+
+namespace levelset {
+
+enum class FlowScheme {
+  Auto,        ///< whichever of the others is predicted to cost least
+  Explicit,    ///< Euler steps
+  Stabilized,  ///< Runge-Kutta-Legendre of second order, s stages for about s²/4 Euler steps
+  Implicit     ///< linearly implicit, second order by extrapolation, conjugate gradients
+};
+
+struct CurvatureFlowOptions {
+  FlowScheme scheme = FlowScheme::Auto;
+  bool preservesVolume = false;   ///< V_n = mean of κ over the surface − κ
+  std::optional<Mask> mask = {};  ///< V_n times its weight
+  std::optional<double> tolerance =
+      {};                           ///< of the steps in time, rms over the surface, world units
+  std::optional<double> step = {};  ///< longest step, world units²; cut where the band is left
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
+};
+
+struct CurvatureFlowResult {
+  NarrowBand band;
+  FlowScheme scheme = FlowScheme::Auto;  ///< that took most of the time; Auto: there was no step
+  std::size_t steps = 0;
+  std::size_t evaluations = 0;  ///< of the rate over the band, or what costs as much
+  std::size_t redistances = 0;
+  double errorEstimate = 0;  ///< of the steps in time, rms over the surface, world units
+};
+
+/// Moves the surface inwards with the speed κ = k1 + k2 for a `time` in world units²: a ball obeys
+/// R² = R0² − 4 time. Topology may change; parts may vanish.
+/// κ|∇φ| is of fourth order where the surface is smooth at the scale of the voxels. Distances are
+/// made again only when the surface has moved a voxel and a half. Without a tolerance the steps in
+/// time leave two hundredths of a voxel. [Meyer14, Smereka03, Sommeijer98]
+/// @throws UsageError for a time, step or tolerance that is not positive and finite (time may be
+/// 0); InvalidInput if `solid` is empty or vanishes on the way, telling when; ResourceLimit;
+/// Cancelled
+[[nodiscard]] CurvatureFlowResult curvatureFlow(NarrowBand solid, double time,
+                                                const CurvatureFlowOptions& options = {});
+
+}  // namespace levelset

@@ -1,0 +1,152 @@
+#include "levelset/flow/curvature_state_vdb.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/flow/curvature_rate_vdb.h"
+
+namespace levelset::flow {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::Vec3d;
+using LeafNode = openvdb::FloatTree::LeafNodeType;
+
+constexpr float kNear = 1;  // voxels
+// With less than this share of the corners there is no leader.
+constexpr float kLeastSum = 0.1f;
+
+struct Nothing {};
+
+/// Central differences at a grid point of a padded block.
+Vec3d gradientAt(const PaddedBlock& block, const Coord& c) {
+  const float* p = block.at(c.x(), c.y(), c.z());
+  const auto difference = [&](int step) { return static_cast<double>(p[step] - p[-step]) / 2; };
+  return {difference(PaddedBlock::kStepX), difference(PaddedBlock::kStepY), difference(1)};
+}
+
+}  // namespace
+
+CurvatureState::CurvatureState(const FloatGrid& distance, const std::optional<Mask>& mask)
+    : blocks_(distance.tree()) {
+  start_ = blocks_.read(distance.tree(), distance.voxelSize()[0]);
+  value = start_;
+  core_.resize(blocks_.size());
+  followers_.resize(blocks_.size());
+  blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) { findCore(i); });
+  blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) { findFollowers(i); });
+  if (!mask) return;
+  weights_.assign(blocks_.size(), Values{});
+  blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) {
+    for (auto it = blocks_.active(i).beginOn(); it; ++it) {
+      const Coord c = blocks_.origin(i) + LeafNode::offsetToLocalCoord(it.pos());
+      weights_[i][it.pos()] =
+          static_cast<float>(mask->weight(toImath(distance.transform().indexToWorld(c))));
+    }
+  });
+}
+
+void CurvatureState::findCore(std::size_t i) {
+  for (auto it = blocks_.active(i).beginOn(); it; ++it)
+    if (static_cast<double>(std::abs(start_[i][it.pos()])) < kFlowCore) core_[i].setOn(it.pos());
+}
+
+void CurvatureState::findFollowers(std::size_t i) {
+  const auto block = std::make_unique<PaddedBlock>();
+  blocks_.gather(start_, i, static_cast<float>(kFlowWidth), *block);
+  for (auto it = blocks_.active(i).beginOn(); it; ++it) {
+    const double phi = static_cast<double>(start_[i][it.pos()]);
+    if (std::abs(phi) < kFlowOwn) continue;
+    const Coord c = LeafNode::offsetToLocalCoord(it.pos());
+    Vec3d normal = gradientAt(*block, c);
+    if (!normal.normalize()) continue;
+    const double back = phi - std::copysign(kFlowOwn, phi);
+    const Vec3d p = (blocks_.origin(i) + c).asVec3d() - normal * back;
+    Follower follower;
+    follower.gridPoint = static_cast<std::uint16_t>(it.pos());
+    const Coord cell = Coord::floor(p);
+    const Vec3d t = p - cell.asVec3d();
+    float sum = 0;
+    for (unsigned k = 0; k < 8; ++k) {
+      const Coord d(k >> 2 & 1, k >> 1 & 1, k & 1);
+      const std::uint32_t corner = blocks_.find(cell + d);
+      if (corner == BandBlocks::kNone || !core_[corner / 512].isOn(corner % 512)) continue;
+      double weight = 1;
+      for (int axis = 0; axis < 3; ++axis) weight *= d[axis] ? t[axis] : 1 - t[axis];
+      follower.corners[k] = corner;
+      follower.weights[k] = static_cast<float>(weight);
+      sum += follower.weights[k];
+    }
+    if (!(sum > kLeastSum)) continue;
+    for (float& weight : follower.weights) weight /= sum;
+    followers_[i].push_back(follower);
+  }
+}
+
+void CurvatureState::evaluate(const Field& field, double shift, Field& rate) const {
+  blocks_.forEach<PaddedBlock>([&](std::size_t i, PaddedBlock& block) {
+    Values& out = rate[i];
+    if (!core_[i].isOff()) {
+      blocks_.gather(field, i, static_cast<float>(kFlowWidth), block);
+      curvatureRate(block, core_[i], static_cast<float>(shift), out);
+    }
+    for (auto it = core_[i].beginOff(); it; ++it) out[it.pos()] = 0;
+  });
+  followed_.resize(blocks_.size());
+  blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) {
+    followed_[i].clear();
+    for (const Follower& f : followers_[i]) {
+      float sum = 0;
+      for (std::size_t k = 0; k < 8; ++k)
+        sum += f.weights[k] * rate[f.corners[k] / 512][f.corners[k] % 512];
+      followed_[i].push_back(sum);
+    }
+  });
+  blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) {
+    for (std::size_t k = 0; k < followers_[i].size(); ++k)
+      rate[i][followers_[i][k].gridPoint] = followed_[i][k];
+  });
+  if (weights_.empty()) return;
+  blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) {
+    for (std::size_t n = 0; n < 512; ++n) rate[i][n] *= weights_[i][n];
+  });
+}
+
+FloatGrid::Ptr CurvatureState::toGrid(const FloatGrid& distance) const {
+  FloatGrid::Ptr grid = distance.deepCopy();
+  blocks_.write(value, distance.voxelSize()[0], grid->tree());
+  return grid;
+}
+
+NearSurface& NearSurface::operator+=(const NearSurface& other) {
+  count += other.count;
+  fastest = std::max(fastest, other.fastest);
+  displaced = std::max(displaced, other.displaced);
+  squares += other.squares;
+  rates += other.rates;
+  weights += other.weights;
+  return *this;
+}
+
+NearSurface lookNearSurface(const CurvatureState& state, const Field& rate) {
+  return state.blocks().sum<NearSurface>([&](std::size_t i) {
+    NearSurface near;
+    for (auto it = state.blocks().active(i).beginOn(); it; ++it) {
+      const float phi = state.value[i][it.pos()];
+      if (!(std::abs(phi) < kNear)) continue;
+      const double speed = static_cast<double>(rate[i][it.pos()]);
+      const double weight =
+          state.weights().empty() ? 1 : static_cast<double>(state.weights()[i][it.pos()]);
+      near += {1,
+               std::abs(speed),
+               static_cast<double>(std::abs(state.start()[i][it.pos()] - phi)),
+               speed * speed,
+               speed,
+               weight};
+    }
+    return near;
+  });
+}
+
+}  // namespace levelset::flow

@@ -1,0 +1,78 @@
+#pragma once
+
+// For the .cpp files of levelset/flow only.
+
+#include <optional>
+
+#include "levelset/fields/mask.h"
+#include "levelset/flow/band_blocks_vdb.h"
+
+namespace levelset::flow {
+
+/// All in voxels: distances are made so far on each side; the rate is computed so far; from here on
+/// it is that of the closest level within, so that all level sets go along with the surface, which
+/// may move by kFlowRoom before distances are made again. Between the surface and the level where
+/// that begins two voxels stay: less, and the surface feels it.
+inline constexpr double kFlowWidth = 7, kFlowCore = 4.6, kFlowOwn = 3.7, kFlowRoom = 1.5;
+
+/// φ of a solid in voxels while it flows, on blocks that hold still until distances are made again.
+class CurvatureState {
+ public:
+  /// @param distance  a band of kFlowWidth
+  CurvatureState(const openvdb::FloatGrid& distance, const std::optional<Mask>& mask);
+
+  Field value;
+
+  [[nodiscard]] const BandBlocks& blocks() const { return blocks_; }
+  [[nodiscard]] const Field& start() const { return start_; }
+  /// How strongly each grid point takes part; empty: all do fully.
+  [[nodiscard]] const Field& weights() const { return weights_; }
+
+  /// φ_t at all grid points of the band: weight (κ − shift) |∇φ|.
+  void evaluate(const Field& field, double shift, Field& rate) const;
+
+  /// Writes `value` to a copy of the band that this was made of.
+  [[nodiscard]] openvdb::FloatGrid::Ptr toGrid(const openvdb::FloatGrid& distance) const;
+
+ private:
+  /// Takes its rate from the corners of the cell in which its leader lies.
+  struct Follower {
+    std::uint16_t gridPoint = 0;
+    std::array<std::uint32_t, 8> corners{};  ///< BandBlocks::find
+    std::array<float, 8> weights{};
+  };
+
+  void findCore(std::size_t i);
+  void findFollowers(std::size_t i);
+
+  BandBlocks blocks_;
+  Field start_, weights_;
+  std::vector<BandBlocks::Mask> core_;
+  std::vector<std::vector<Follower>> followers_;
+  mutable std::vector<std::vector<float>> followed_;  ///< their rates, kept for the memory
+};
+
+/// What a field looks like beside its zero set, |φ| < 1.
+struct NearSurface {
+  double count = 0;
+  double fastest = 0;    ///< |rate|
+  double displaced = 0;  ///< how far the surface went since distances were made
+  double squares = 0;    ///< sum of squared rates
+  double rates = 0;      ///< sum of rates …
+  double weights = 0;    ///< … and of the weights
+  NearSurface& operator+=(const NearSurface& other);
+};
+[[nodiscard]] NearSurface lookNearSurface(const CurvatureState& state, const Field& rate);
+
+/// Volume in voxels³, and its loss when the values rise by one voxel times their weight. Cut by the
+/// tangent plane of each grid point's own cube, and by what the surface bends away from it.
+struct Content {
+  double volume = 0, area = 0;
+  Content& operator+=(const Content& other);
+};
+/// @param rate  what evaluate() made of the state with this `shift`
+[[nodiscard]] Content contentOf(const CurvatureState& state, const Field& rate, double shift);
+/// Grid points inside that the blocks of a tree do not hold as active: they change in no step.
+[[nodiscard]] double inactiveContent(const openvdb::FloatTree& tree);
+
+}  // namespace levelset::flow

@@ -1,0 +1,129 @@
+#include "levelset/flow/morph.h"
+
+#include <fmt/core.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "levelset/eikonal/distance_transform.h"
+#include "levelset/error.h"
+#include "levelset/solids/resample.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using TreeManager = openvdb::tree::LeafManager<FloatTree>;
+using LeafNode = FloatTree::LeafNodeType;
+
+constexpr const char* kMorph = "morph";
+// First guess of how far the surfaces are apart, voxels; doubled until it is enough.
+constexpr double kFirstReach = 8;
+// Distances reach this much further than the surfaces go, so that interpolation sees them whole.
+constexpr double kBesideSurface = 4;
+
+void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
+  if (options.steps < 1)
+    throw UsageError(
+        fmt::format("{}: {} steps were asked for; give at least 1", kMorph, options.steps));
+  if (!(options.until > 0 && options.until <= 1))
+    throw UsageError(fmt::format("{}: the part of the way is {}; give a number above 0, up to 1",
+                                 kMorph, options.until));
+  if (solid.isEmpty() || target.isEmpty())
+    throw InvalidInput(fmt::format("{}: the {} is empty; give two solids", kMorph,
+                                   solid.isEmpty() ? "solid" : "target"));
+}
+
+/// Two distances on blocks that they share.
+struct DistancePair {
+  FloatGrid::Ptr from, to;
+
+  void shareBlocks() {
+    from->tree().topologyUnion(to->tree());
+    to->tree().topologyUnion(from->tree());
+  }
+
+  /// Is there a grid point within one solid only, or near the surface of one, where either distance
+  /// is beyond its reach?
+  [[nodiscard]] bool fallsShort(double reach) const {
+    const auto limit = static_cast<float>((reach - kBesideSurface) * from->voxelSize()[0]);
+    std::atomic<bool> found = false;
+    TreeManager manager(from->tree());
+    manager.foreach ([&](LeafNode& a, std::size_t) {
+      if (found) return;
+      const LeafNode& b = *to->tree().probeConstLeaf(a.origin());
+      for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
+        const float x = a.getValue(n), y = b.getValue(n);
+        if ((x < 0) != (y < 0) && (std::abs(x) > limit || std::abs(y) > limit)) found = true;
+      }
+    });
+    return found;
+  }
+
+  [[nodiscard]] FloatGrid::Ptr at(double part) const {
+    FloatGrid::Ptr result = from->deepCopy();
+    const auto s = static_cast<float>(part);
+    TreeManager manager(result->tree());
+    manager.foreach ([&](LeafNode& leaf, std::size_t) {
+      const float* b = to->tree().probeConstLeaf(leaf.origin())->buffer().data();
+      float* values = leaf.buffer().data();
+      for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n)
+        values[n] = (1 - s) * values[n] + s * b[n];
+    });
+    return result;
+  }
+};
+
+/// @param distances  makes them of a field
+NarrowBand onTheWay(const DistancePair& pair, double part,
+                    const std::function<FloatGrid::Ptr(const FloatGrid&)>& distances) {
+  const FloatGrid::Ptr field = pair.at(part);
+  if (!eikonal::hasZeroCrossing(field->tree()))
+    throw InvalidInput(
+        fmt::format("{}: nothing is left of the solid at {:.3g} of the way, since the target lies "
+                    "apart from it; move the target until the two overlap, or ask for 1 step",
+                    kMorph, part));
+  return makeBand(distances(*field));
+}
+
+}  // namespace
+
+NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
+  checkMorph(solid, target, options);
+  const NarrowBand goal = resampleLike(target, solid, {.maxMemory = options.maxMemory});
+  const auto distances = [&](const FloatGrid& field, double halfWidth) {
+    eikonal::DistanceRequest request;
+    request.action = kMorph;
+    request.halfWidth = halfWidth;
+    request.maxMemory = options.maxMemory;
+    return eikonal::distanceTransform(field, request);
+  };
+
+  // === Distances wherever the surface will pass
+  DistancePair pair;
+  const bool isDirect = options.until == 1 && options.steps == 1;  // only the end is asked for
+  for (double reach = kFirstReach; !isDirect; reach *= 2) {
+    report(options.progress, 0, kMorph);
+    pair = {distances(vdb(solid), reach), distances(vdb(goal), reach)};
+    pair.shareBlocks();
+    if (!pair.fallsShort(reach)) break;
+  }
+
+  // === Steps
+  NarrowBand result;
+  for (int i = 1; i <= options.steps; ++i) {
+    const double part = options.until * i / options.steps;
+    result = part == 1 ? goal : onTheWay(pair, part, [&](const FloatGrid& field) {
+      return distances(field, solid.halfWidth());
+    });
+    if (options.keep) options.keep(result, i);
+    report(options.progress, static_cast<double>(i) / options.steps, kMorph);
+  }
+  return result;
+}
+
+}  // namespace levelset

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <functional>
+
+#include "levelset/narrow_band.h"
+#include "levelset/progress.h"
+
+namespace levelset {
+
+struct MorphOptions {
+  int steps = 1;
+  double until = 1;  ///< part of the way, in (0, 1]; 1 ends on the target
+  /// Receives every step, 1 to `steps`, the last one too.
+  std::function<void(const NarrowBand& step, int number)> keep = {};
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
+};
+
+/// Moves the surface of `solid` on to that of `target`, on the grid of `solid`. At the part s of
+/// the way it is the zero set of (1 − s) distance to the solid + s distance to the target, both
+/// exact and known wherever the surface passes, re-distanced. A point that belongs to one of the
+/// solids only changes sides once, at a time of its own: every step is nearer to the target than
+/// the one before, whatever the topology.
+/// @throws UsageError for fewer than one step or `until` outside (0, 1]; InvalidInput if a solid is
+/// empty, or if nothing is left on the way (the solids lie apart); ResourceLimit; Cancelled
+[[nodiscard]] NarrowBand morph(const NarrowBand& solid, const NarrowBand& target,
+                               const MorphOptions& options = {});
+
+}  // namespace levelset

@@ -1,0 +1,238 @@
+#include "levelset/flow/smooth.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/eikonal/distance_transform.h"
+#include "levelset/error.h"
+#include "levelset/flow/band_blocks_vdb.h"
+
+namespace levelset {
+namespace {
+
+using flow::BandBlocks;
+using flow::Field;
+using flow::Values;
+using openvdb::Coord;
+
+constexpr const char* kSmooth = "smooth";
+// A Gaussian is cut here.
+constexpr double kGaussianReach = 4;
+// What the interpolant reads beside the zero set.
+constexpr double kStencil = 3;
+// Beyond this many σ the tails of both sides of the surface balance: the band may end there.
+constexpr double kKnownReach = 3;
+constexpr double kFieldsAlive = 5;
+
+/// Weights of a symmetric filter along a line, the middle one first.
+std::vector<float> gaussianWeights(double sigma) {
+  const int reach = std::max(1, static_cast<int>(std::ceil(kGaussianReach * sigma)));
+  // Integrated over each voxel's own width, so that a σ below a voxel keeps its variance; that of
+  // the width is taken off.
+  std::vector<double> weights;
+  const double narrowed = std::sqrt(std::max(sigma * sigma - 1.0 / 12, 1e-4));
+  double sum = 0;
+  for (int i = 0; i <= reach; ++i) {
+    weights.push_back(std::erf((i + 0.5) / (narrowed * M_SQRT2)) -
+                      std::erf((i - 0.5) / (narrowed * M_SQRT2)));
+    sum += i == 0 ? weights.back() : 2 * weights.back();
+  }
+  std::vector<float> result;
+  for (const double w : weights) result.push_back(static_cast<float>(w / sum));
+  return result;
+}
+
+std::vector<float> boxWeights(double sigma) {
+  // Whole voxels and an equal part of one at each end, of variance σ².
+  int whole = 0;
+  const auto squares = [](int n) { return n * (n + 1.0) * (2.0 * n + 1) / 3; };
+  while (squares(whole + 1) / (2.0 * (whole + 1) + 1) <= sigma * sigma) ++whole;
+  const double end = whole + 1, variance = sigma * sigma;
+  // (squares + 2 p end²) / (2 whole + 1 + 2 p) = σ²
+  const double part =
+      (variance * (2.0 * whole + 1) - squares(whole)) / (2 * (end * end - variance));
+  const double sum = 2.0 * whole + 1 + 2 * part;
+  std::vector<float> result(static_cast<std::size_t>(whole) + 1, static_cast<float>(1 / sum));
+  result.push_back(static_cast<float>(part / sum));
+  return result;
+}
+
+/// Filters fields on the blocks of a band.
+class BlockFilter {
+ public:
+  BlockFilter(const openvdb::FloatGrid& grid, std::function<void()> pulse)
+      : tree_(grid.tree()),
+        blocks_(grid.tree()),
+        far_(static_cast<float>(static_cast<double>(grid.background()) / grid.voxelSize()[0])),
+        pulse_(std::move(pulse)) {}
+
+  [[nodiscard]] const BandBlocks& blocks() const { return blocks_; }
+
+  [[nodiscard]] Field convolve(const Field& field, const std::vector<float>& weights) const {
+    Field a = field, b(blocks_.size());
+    for (int axis = 0; axis < 3; ++axis) {
+      pulse_();
+      alongAxis(a, axis, weights, b);
+      std::swap(a, b);
+    }
+    return a;
+  }
+
+  [[nodiscard]] Field median(const Field& field, double radius) const {
+    pulse_();
+    const int r = std::max(1, static_cast<int>(std::floor(radius)));
+    const double squared = std::max(1.0, radius * radius);
+    Field result(blocks_.size());
+    blocks_.forEach<std::vector<float>>([&](std::size_t i, std::vector<float>& values) {
+      result[i] = field[i];
+      for (auto it = blocks_.active(i).beginOn(); it; ++it) {
+        const Coord c = blocks_.origin(i) + BandBlocks::LeafNode::offsetToLocalCoord(it.pos());
+        values.clear();
+        for (int x = -r; x <= r; ++x)
+          for (int y = -r; y <= r; ++y)
+            for (int z = -r; z <= r; ++z)
+              if (x * x + y * y + z * z <= squared)
+                values.push_back(at(field, c.offsetBy(x, y, z)));
+        const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+        std::nth_element(values.begin(), middle, values.end());
+        result[i][it.pos()] = *middle;
+      }
+    });
+    return result;
+  }
+
+ private:
+  [[nodiscard]] float farValue(const Coord& c) const {
+    return tree_.getValue(c) < 0 ? -far_ : far_;
+  }
+
+  [[nodiscard]] float at(const Field& field, const Coord& c) const {
+    const std::uint32_t n = blocks_.find(c);
+    return n == BandBlocks::kNone ? farValue(c) : field[n / 512][n % 512];
+  }
+
+  /// The blocks in a line, then each of the 64 lines through the one in the middle.
+  void alongAxis(const Field& in, int axis, const std::vector<float>& weights, Field& out) const {
+    const int reach = static_cast<int>(weights.size()) - 1, chain = (reach + 7) / 8;
+    const std::size_t stride = axis == 0 ? 64 : axis == 1 ? 8 : 1;
+    blocks_.forEach<std::vector<float>>([&](std::size_t i, std::vector<float>& lines) {
+      lines.resize(static_cast<std::size_t>(8 * (2 * chain + 1)) * 64);
+      for (int k = -chain; k <= chain; ++k) {
+        Coord origin = blocks_.origin(i);
+        origin[axis] += 8 * k;
+        const std::uint32_t n = blocks_.find(origin);
+        const float* source = n == BandBlocks::kNone ? nullptr : in[n / 512].data();
+        const float constant = source ? 0 : farValue(origin);
+        float* target = lines.data() + static_cast<std::size_t>(8 * (k + chain)) * 64;
+        for (std::size_t along = 0; along < 8; ++along)
+          for (std::size_t line = 0; line < 64; ++line)
+            target[along * 64 + line] =
+                source ? source[along * stride + startOfLine(line, axis)] : constant;
+      }
+      std::array<float, 64> sums;
+      for (std::size_t along = 0; along < 8; ++along) {
+        const float* centre = lines.data() + (static_cast<std::size_t>(8 * chain) + along) * 64;
+        for (std::size_t line = 0; line < 64; ++line) sums[line] = weights[0] * centre[line];
+        for (int k = 1; k <= reach; ++k) {
+          const float w = weights[static_cast<std::size_t>(k)];
+          const float *before = centre - 64 * k, *after = centre + 64 * k;
+          for (std::size_t line = 0; line < 64; ++line)
+            sums[line] += w * (before[line] + after[line]);
+        }
+        for (std::size_t line = 0; line < 64; ++line)
+          out[i][along * stride + startOfLine(line, axis)] = sums[line];
+      }
+    });
+  }
+
+  static std::size_t startOfLine(std::size_t line, int axis) {
+    return axis == 0 ? line : axis == 1 ? (line >> 3) * 64 + (line & 7) : line * 8;
+  }
+
+  const openvdb::FloatTree& tree_;
+  BandBlocks blocks_;
+  float far_;
+  std::function<void()> pulse_;
+};
+
+Field filtered(const BlockFilter& filter, const Field& field, SmoothKind kind, double sigma) {
+  switch (kind) {
+    case SmoothKind::Mean:
+      return filter.convolve(field, boxWeights(sigma));
+    case SmoothKind::Median:
+      return filter.median(field, sigma);
+    case SmoothKind::Taubin: {
+      const std::vector<float> weights = gaussianWeights(sigma);
+      Field once = filter.convolve(field, weights);
+      const Field twice = filter.convolve(once, weights);
+      for (std::size_t i = 0; i < once.size(); ++i)
+        for (std::size_t n = 0; n < 512; ++n) once[i][n] += once[i][n] - twice[i][n];
+      return once;
+    }
+    default:
+      return filter.convolve(field, gaussianWeights(sigma));
+  }
+}
+
+void applyMask(const Mask& mask, const openvdb::FloatGrid& grid, const BandBlocks& blocks,
+               const Field& before, Field& after) {
+  struct Nothing {};
+  blocks.forEach<Nothing>([&](std::size_t i, Nothing&) {
+    for (auto it = blocks.active(i).beginOn(); it; ++it) {
+      const openvdb::Index n = it.pos();
+      const Coord c = blocks.origin(i) + BandBlocks::LeafNode::offsetToLocalCoord(n);
+      const double weight = mask.weight(toImath(grid.transform().indexToWorld(c)));
+      after[i][n] = before[i][n] + static_cast<float>(weight) * (after[i][n] - before[i][n]);
+    }
+  });
+}
+
+}  // namespace
+
+NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothOptions& options) {
+  if (!(sigma > 0) || !std::isfinite(sigma))
+    throw UsageError(fmt::format("{}: sigma is {}; give a positive length", kSmooth, sigma));
+  if (options.mask) checkMask(*options.mask, kSmooth);
+  if (solid.isEmpty())
+    throw InvalidInput(fmt::format(
+        "{}: the solid is empty, so there is no surface to smooth; give a solid", kSmooth));
+  const double voxel = solid.voxelSize(), width = sigma / voxel;
+  eikonal::DistanceRequest request;
+  request.action = kSmooth;
+  request.maxMemory = options.maxMemory;
+
+  // === Distances as far as the filter reads
+  const double passes = kind == SmoothKind::Taubin ? 2 : 1;
+  const double known = kind == SmoothKind::Median ? width + 1 : passes * kKnownReach * width;
+  openvdb::FloatGrid::Ptr field;
+  if (known > solid.halfWidth() * 1.0001) {
+    request.halfWidth = known + kStencil;
+    request.progress = subProgress(options.progress, 0, 0.4);
+    field = eikonal::distanceTransform(vdb(solid), request);
+  } else {
+    field = vdb(solid).deepCopy();
+  }
+
+  // === Filter
+  requireMemory(static_cast<double>(field->tree().leafCount()) * sizeof(Values) * kFieldsAlive,
+                options.maxMemory, kSmooth);
+  const BlockFilter filter(*field, [&] { report(options.progress, 0.4, kSmooth); });
+  const Field before = filter.blocks().read(field->tree(), voxel);
+  Field after = filtered(filter, before, kind, width);
+  if (options.mask) applyMask(*options.mask, *field, filter.blocks(), before, after);
+  filter.blocks().write(after, voxel, field->tree());
+  if (!eikonal::hasZeroCrossing(field->tree()))
+    throw InvalidInput(
+        fmt::format("{}: nothing is left of the solid with a sigma of {} world units; give a "
+                    "smaller one",
+                    kSmooth, sigma));
+
+  // === Distances again
+  request.halfWidth = solid.halfWidth();
+  request.progress = subProgress(options.progress, 0.5, 1);
+  return makeBand(eikonal::distanceTransform(*field, request));
+}
+
+}  // namespace levelset

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+
+#include "levelset/fields/mask.h"
+#include "levelset/narrow_band.h"
+#include "levelset/progress.h"
+
+namespace levelset {
+
+enum class SmoothKind {
+  Gaussian,  ///< convolution of φ with a Gaussian of that σ, out to 4 σ
+  Mean,      ///< with a box of the same variance
+  Median,    ///< median over the grid points within σ, one voxel at least
+  Taubin     ///< a Gaussian, then sharpened by as much as long waves lost: keeps the volume
+};
+
+struct SmoothOptions {
+  std::optional<Mask> mask = {};
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
+};
+
+/// Smooths the surface: filters φ and makes distances of the result.
+/// @param sigma  world units
+/// @throws UsageError unless `sigma` is positive and finite; InvalidInput if `solid` is empty or
+/// nothing is left of it; ResourceLimit; Cancelled
+[[nodiscard]] NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma,
+                                const SmoothOptions& options = {});
+
+}  // namespace levelset

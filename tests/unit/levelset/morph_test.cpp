@@ -1,0 +1,104 @@
+#include "levelset/flow/morph.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/tools/Diagnostics.h>
+
+#include <limits>
+
+#include "levelset/error.h"
+#include "levelset/inspect/measure.h"
+#include "levelset/solids/shapes.h"
+#include "tests/support/bands.h"
+
+namespace morph_test {
+
+using namespace levelset;
+using Imath::V3d;
+
+/// Grid points inside one of two solids only.
+std::size_t symmetricDifference(const NarrowBand& a, const NarrowBand& b) {
+  openvdb::CoordBBox box = vdb(a).evalActiveVoxelBoundingBox();
+  box.expand(vdb(b).evalActiveVoxelBoundingBox());
+  auto x = vdb(a).getConstAccessor(), y = vdb(b).getConstAccessor();
+  std::size_t count = 0;
+  for (auto it = box.begin(); it; ++it) count += (x.getValue(*it) < 0) != (y.getValue(*it) < 0);
+  return count;
+}
+
+void expectSameSurface(const NarrowBand& a, const NarrowBand& b, double tolerance) {
+  auto accessor = vdb(b).getConstAccessor();
+  for (auto it = vdb(a).cbeginValueOn(); it; ++it) {
+    if (std::abs(*it) < 1) {
+      ASSERT_NEAR(*it, accessor.getValue(it.getCoord()), tolerance);
+    }
+  }
+}
+
+void expectMonotone(const NarrowBand& from, const NarrowBand& to, int steps) {
+  std::size_t previous = symmetricDifference(from, to);
+  int seen = 0;
+  const NarrowBand last =
+      morph(from, to, {.steps = steps, .keep = [&](const NarrowBand& step, int n) {
+                         EXPECT_EQ(n, ++seen);
+                         EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(step), 6), "");
+                         const std::size_t now = symmetricDifference(step, to);
+                         if (previous > 0) {
+                           EXPECT_LT(now, previous) << n;
+                         }
+                         previous = now;
+                       }});
+  EXPECT_EQ(seen, steps);
+  EXPECT_EQ(previous, 0u);
+  expectSameSurface(last, to, 0.01);
+}
+
+TEST(Morph, MovesABallNearerWithEveryStep) {
+  expectMonotone(makeSphere(16, V3d(0.3, 0.2, 0.1), 1), makeSphere(16, V3d(8.3, 0.2, 0.1), 1), 20);
+}
+
+TEST(Morph, TurnsABallIntoABoxAndBack) {
+  const NarrowBand ball = makeSphere(12, V3d(0.3, 0.2, 0.1), 1);
+  const NarrowBand box = makeBox(V3d(20, 18, 22), V3d(0.3, 0.2, 0.1), 1);
+  expectMonotone(ball, box, 4);
+  expectMonotone(box, ball, 4);
+}
+
+TEST(Morph, ChangesTheTopology) {
+  const NarrowBand ball = makeSphere(14, V3d(0.3, 0.2, 0.1), 1);
+  const NarrowBand ring = makeTorus(12, 5, V3d(0.3, 0.2, 0.1), V3d(0, 0, 1), 1);
+  expectMonotone(ball, ring, 5);
+  expectMonotone(ring, ball, 5);
+  EXPECT_EQ(measure(morph(ball, ring)).euler, 0);
+}
+
+TEST(Morph, StopsOnTheWay) {
+  const NarrowBand half =
+      morph(makeSphere(8, V3d(0.2), 1), makeSphere(16, V3d(0.2), 1), {.until = 0.5});
+  EXPECT_NEAR(std::cbrt(3 * measure(half).volume / (4 * M_PI)), 12, 0.05);
+}
+
+TEST(Morph, WorksAcrossGrids) {
+  const NarrowBand ball = makeSphere(1, V3d(0), 0.1), box = makeBox(V3d(1.6), V3d(0.1, 0, 0), 0.13);
+  const NarrowBand result = morph(ball, box, {.steps = 3});
+  EXPECT_NEAR(result.voxelSize(), 0.1, 1e-12);
+  EXPECT_NEAR(measure(result).volume, measure(box).volume, 0.03 * measure(box).volume);
+}
+
+TEST(Morph, RefusesWhatLiesApartAndReachesItInOneStep) {
+  const NarrowBand a = makeSphere(4, V3d(0.2), 1), b = makeSphere(4, V3d(14.2, 0.2, 0.2), 1);
+  EXPECT_THROW((void)morph(a, b, {.steps = 10}), InvalidInput);
+  EXPECT_EQ(symmetricDifference(morph(a, b), b), 0u);
+}
+
+TEST(Morph, Refuses) {
+  const NarrowBand a = makeSphere(6, V3d(0.2), 1);
+  EXPECT_THROW((void)morph(a, a, {.steps = 0}), UsageError);
+  EXPECT_THROW((void)morph(a, a, {.until = 0}), UsageError);
+  EXPECT_THROW((void)morph(a, a, {.until = std::numeric_limits<double>::quiet_NaN()}), UsageError);
+  EXPECT_THROW((void)morph(NarrowBand(), a), InvalidInput);
+  EXPECT_THROW((void)morph(a, NarrowBand()), InvalidInput);
+  EXPECT_THROW((void)morph(a, a, {.steps = 2, .maxMemory = 1000}), ResourceLimit);
+  EXPECT_THROW((void)morph(a, a, {.progress = [](double) { return false; }}), Cancelled);
+}
+
+}  // namespace morph_test

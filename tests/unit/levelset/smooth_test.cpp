@@ -1,0 +1,113 @@
+#include "levelset/flow/smooth.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/tools/Diagnostics.h>
+#include <tbb/global_control.h>
+
+#include <limits>
+
+#include "levelset/error.h"
+#include "levelset/inspect/measure.h"
+#include "levelset/interpolate_vdb.h"
+#include "levelset/solids/shapes.h"
+#include "tests/support/bands.h"
+
+namespace smooth_test {
+
+using namespace levelset;
+using Imath::V3d;
+
+const V3d kCentre(0.31, -0.17, 0.43);
+
+NarrowBand ball(double radius) {
+  return makeSphere(radius, kCentre, 1);
+}
+
+double radiusOf(const NarrowBand& band) {
+  // The mesh that is measured has its corners on the surface: the ball it came from measures alike.
+  return std::cbrt(3 * measure(band).volume / (4 * M_PI));
+}
+
+double shrinkage(double radius, double sigma, SmoothKind kind) {
+  return radiusOf(ball(radius)) - radiusOf(smooth(ball(radius), kind, sigma));
+}
+
+// The mean of |x| over a Gaussian about a point at radius R is R + σ²/R + …, so the ball loses
+// σ²/R.
+TEST(Smooth, GaussianHasTheSigmaAskedFor) {
+  for (const double sigma : {0.7, 1.0, 2.0, 3.5})
+    EXPECT_NEAR(shrinkage(24, sigma, SmoothKind::Gaussian), sigma * sigma / 24, 0.02) << sigma;
+}
+
+TEST(Smooth, MeanHasTheSameVariance) {
+  for (const double sigma : {1.0, 2.0})
+    EXPECT_NEAR(shrinkage(24, sigma, SmoothKind::Mean), sigma * sigma / 24, 0.02) << sigma;
+}
+
+TEST(Smooth, TaubinKeepsTheVolume) {
+  EXPECT_NEAR(shrinkage(24, 2, SmoothKind::Taubin), 0, 0.015);
+}
+
+TEST(Smooth, GaussianRoundsAnEdgeAsFarAsItShould) {
+  // Beside the edge φ is the greater of two planes; the mean of max(x, y) over a Gaussian there is
+  // σ/√π, and so far the surface goes inwards along the diagonal, by √2 times as much.
+  const double sigma = 2;
+  const NarrowBand box = makeBox(V3d(40, 40, 40), kCentre, 1);
+  const NarrowBand rounded = smooth(box, SmoothKind::Gaussian, sigma);
+  auto accessor = vdb(rounded).getConstAccessor();
+  double t = 0;
+  for (int i = 0; i < 20; ++i) {
+    const V3d p = kCentre + V3d(20 - t, 20 - t, 0);
+    t += 0.5 * SampleBlock<4>(accessor, toVdb(p)).value();
+  }
+  // Outside the edge φ is the distance to it, not the greater of the planes, which adds a little.
+  EXPECT_GT(t, sigma / std::sqrt(M_PI));
+  EXPECT_LT(t, 1.3 * sigma / std::sqrt(M_PI));
+  EXPECT_NEAR(SampleBlock<4>(accessor, toVdb(kCentre + V3d(20, 0, 0))).value(), 0, 5e-3);
+  EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(rounded), 6), "");
+}
+
+TEST(Smooth, MedianDropsASpeck) {
+  const NarrowBand speckled = support::sampleBand(
+      [](const V3d& p) {
+        return std::min((p - kCentre).length() - 10, (p - V3d(20.2, 0, 0)).length() - 0.8);
+      },
+      {V3d(-11), V3d(22, 11, 11)}, 1);
+  EXPECT_EQ(measure(speckled).components, 2u);
+  const NarrowBand cleaned = smooth(speckled, SmoothKind::Median, 2);
+  EXPECT_EQ(measure(cleaned).components, 1u);
+  EXPECT_NEAR(radiusOf(cleaned), 10, 0.2);
+}
+
+TEST(Smooth, LeavesWhatTheMaskLeaves) {
+  const Mask right{.field = [](const V3d& p) { return p.x; }, .min = 0, .max = 1};
+  const NarrowBand smoothed = smooth(ball(10), SmoothKind::Gaussian, 2, {.mask = right});
+  auto accessor = vdb(smoothed).getConstAccessor();
+  EXPECT_NEAR(SampleBlock<4>(accessor, toVdb(kCentre - V3d(10, 0, 0))).value(), 0, 5e-3);
+  EXPECT_NEAR(SampleBlock<4>(accessor, toVdb(kCentre + V3d(10, 0, 0))).value(), 0.4, 0.03);
+}
+
+TEST(Smooth, DoesNotDependOnThreads) {
+  std::uint64_t hashes[3];
+  for (int threads : {1, 2, 4}) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                              static_cast<std::size_t>(threads));
+    hashes[threads / 2] = smooth(ball(10), SmoothKind::Gaussian, 1.5).contentHash();
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+  EXPECT_EQ(hashes[0], hashes[2]);
+}
+
+TEST(Smooth, Refuses) {
+  const NarrowBand b = ball(6);
+  for (const double sigma : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_THROW((void)smooth(b, SmoothKind::Gaussian, sigma), UsageError);
+  EXPECT_THROW((void)smooth(NarrowBand(), SmoothKind::Gaussian, 1), InvalidInput);
+  EXPECT_THROW((void)smooth(ball(1.5), SmoothKind::Gaussian, 4), InvalidInput);
+  EXPECT_THROW((void)smooth(b, SmoothKind::Gaussian, 1, {.mask = Mask{}}), UsageError);
+  EXPECT_THROW((void)smooth(b, SmoothKind::Gaussian, 1, {.maxMemory = 1000}), ResourceLimit);
+  EXPECT_THROW((void)smooth(b, SmoothKind::Gaussian, 1, {.progress = [](double) { return false; }}),
+               Cancelled);
+}
+
+}  // namespace smooth_test
