@@ -25,7 +25,7 @@ constexpr double kPlanar = 0.1;
 /// alone: beside an edge, one face's own values may tell it better.
 constexpr double kSurelySmooth = 0.02;
 /// Values that close to a plane of unit slope are those of a flat face.
-constexpr double kFlat = 0.004;
+constexpr double kFlat = 1e-4;
 /// Of the planes of one sheet, those that are so many times worse than another do not count.
 constexpr double kWorse = 4;
 /// Eigenvalues of the planes' matrix below that share of the largest are noise.

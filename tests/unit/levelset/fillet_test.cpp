@@ -24,7 +24,7 @@ BlendOptions rolled(BlendSide side = BlendSide::Both, std::optional<double> reac
   return options;
 }
 
-constexpr double kDepth = 13;  ///< half of the length of the edges, along y
+constexpr double kDepth = 24;  ///< half of the length of the edges, along y
 
 /// Half a space, as far as a box shows it: negative where `normal` points away from.
 NarrowBand halfSpace(const V3d& normal, const V3d& through, double extent) {
@@ -91,7 +91,7 @@ WedgeError wedgeError(const NarrowBand& filleted, const NarrowBand& plain, const
     V3d off = p - kEdge;
     off.y = 0;
     const V3d q(std::abs(p.x), std::abs(p.y), std::abs(p.z));
-    if (std::max(q.x, q.z) > extent - 6 || q.y > kDepth - 6) return;
+    if (std::max(q.x, q.z) > extent - 6 || q.y > 6) return;
     if (std::max(off.dot(wedge.along1), off.dot(wedge.along2)) < tangent + 0.1) return;
     const auto now =
         static_cast<double>(vdb(filleted).tree().getValue(openvdb::Coord::round(toVdb(p))));

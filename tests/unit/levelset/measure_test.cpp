@@ -180,7 +180,7 @@ TEST(Manifoldness, AcceptsClosedMesh) {
   EXPECT_TRUE(manifoldness(tetrahedron()).isClosedManifold());
   const Measurement m = measure(tetrahedron());
   EXPECT_NEAR(m.volume, 1. / 6, 1e-15);
-  EXPECT_NEAR(m.area, 1.5 + std::sqrt(3) / 2, 1e-15);
+  EXPECT_NEAR(m.area, 1.5 + std::sqrt(3) / 2, 1e-14);
   EXPECT_EQ(m.euler, 2);
 }
 
