@@ -7,8 +7,6 @@
 #include <cmath>
 #include <tuple>
 
-#include "levelset/convert/sharp_features.h"
-
 namespace levelset {
 namespace {
 
@@ -21,36 +19,19 @@ using openvdb::FloatGrid;
 constexpr double kSmooth = 0.15;
 /// How far the values around a grid point may be from a plane of unit slope for it to tell one.
 constexpr double kPlanar = 0.1;
-/// A grid point whose second differences are no larger takes its plane from central differences
-/// alone: beside an edge, one face's own values may tell it better.
-constexpr double kSurelySmooth = 0.02;
-/// Values that close to a plane of unit slope are those of a flat face.
-constexpr double kFlat = 1e-4;
-/// Of the planes of one sheet, those that are so many times worse than another do not count.
-constexpr double kWorse = 4;
 /// Eigenvalues of the planes' matrix below that share of the largest are noise.
 constexpr double kRank = 0.05;
 /// How far from its cell, in voxels, a plane may touch the surface and still be of use.
 constexpr double kTouchMargin = 0.75;
-/// The field where a plane touches the surface is no larger, voxels, be it beside an edge: a plane
-/// may run on beyond its face.
-constexpr double kOffSurface = 0.3;
 /// How far outside its cell, in voxels, a vertex may lie.
 constexpr double kVertexReach = 1;
-/// A plane that a vertex lies off by more, voxels, is none of its sheets.
-constexpr double kOffSheet = 0.05;
-/// How far a vertex without a sheet may be from those of its neighbours, and from where they meet.
-constexpr double kAdoptReach = 1.25;
-/// Vertices stay that far apart, voxels.
-constexpr double kApart = 0.05;
-/// Diagonals whose gaps differ by less, voxels, are equally good.
-constexpr double kSameGap = 0.02;
+/// Normals further apart than that form an edge.
+constexpr double kEdgeCosine = 0.9;
 
 /// A tangent plane of the surface, told by one grid point.
 struct Plane {
   Vector3d normal = Vector3d::Zero();
   double distance = 0;  ///< of the grid point from it, voxels
-  double error = 0;     ///< how far the values around are from it, voxels
   bool isSmooth = false;
   bool isKnown = false;
 };
@@ -72,24 +53,6 @@ class BlockField {
     return values_[static_cast<std::size_t>(((x + 1) * kDim + y + 1) * kDim + z + 1)];
   }
 
-  /// Trilinear, at most one voxel outside the block.
-  [[nodiscard]] double interpolated(const Vector3d& p) const {
-    std::array<int, 3> low;
-    Vector3d t;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto axis = static_cast<Eigen::Index>(i);
-      low[i] = std::clamp(static_cast<int>(std::floor(p[axis])), -1, kEnd - 1);
-      t[axis] = p[axis] - low[i];
-    }
-    double sum = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-      const int dx = corner >> 2, dy = (corner >> 1) & 1, dz = corner & 1;
-      sum += (dx ? t[0] : 1 - t[0]) * (dy ? t[1] : 1 - t[1]) * (dz ? t[2] : 1 - t[2]) *
-             value(low[0] + dx, low[1] + dy, low[2] + dz);
-    }
-    return sum;
-  }
-
   /// Each coordinate in [0, 8].
   [[nodiscard]] const Plane& plane(int x, int y, int z) {
     const auto i = static_cast<std::size_t>((x * 9 + y) * 9 + z);
@@ -109,16 +72,12 @@ class BlockField {
     const Vector3d back(value(x - 1, y, z), value(x, y - 1, z), value(x, y, z - 1));
     const Vector3d ahead(value(x + 1, y, z), value(x, y + 1, z), value(x, y, z + 1));
     const Vector3d bend = back + ahead - Vector3d::Constant(2 * plane.distance);
-    plane.error = bend.cwiseAbs().maxCoeff();
-    plane.isSmooth = plane.error < kSmooth;
+    plane.isSmooth = bend.cwiseAbs().maxCoeff() < kSmooth;
     if (plane.isSmooth) {
       plane.normal = (ahead - back) / 2;
       plane.isKnown = plane.normal.norm() > 0.5;
-    }
-    if (!plane.isSmooth) {
-      chooseOctant(x, y, z, kPlanar, plane);
-    } else if (plane.error > kSurelySmooth) {
-      chooseOctant(x, y, z, kFlat, plane);
+    } else {
+      chooseOctant(x, y, z, plane);
     }
     if (plane.isKnown) plane.normal.normalize();
     return plane;
@@ -126,8 +85,8 @@ class BlockField {
 
   /// Beside an edge of the solid, differences across it mix two faces. Of the eight cells at the
   /// grid point, the one whose corners lie nearest to a plane of unit slope has a face to itself.
-  void chooseOctant(int x, int y, int z, double limit, Plane& plane) const {
-    double best = limit;
+  void chooseOctant(int x, int y, int z, Plane& plane) const {
+    double best = kPlanar;
     for (int octant = 0; octant < 8; ++octant) {
       const int sx = octant & 4 ? 1 : -1, sy = octant & 2 ? 1 : -1, sz = octant & 1 ? 1 : -1;
       const double base = plane.distance;
@@ -139,10 +98,9 @@ class BlockField {
                            std::abs(value(x, y + sy, z + sz) - base - dy - dz) +
                            std::abs(value(x + sx, y + sy, z + sz) - base - dx - dy - dz);
       if (!(error < best)) continue;
-      best = plane.error = error;
+      best = error;
       plane.normal = Vector3d(sx * dx, sy * dy, sz * dz);
       plane.isKnown = true;
-      plane.isSmooth = false;
     }
   }
 
@@ -153,24 +111,35 @@ class BlockField {
 
 struct DualVertex {
   Vector3d position;
-  VertexSheets sheets = {};
-  double misfit = -1;  ///< to the planes that met there, voxels; < 0: none did
+  bool isFeature = false;
 };
 
-/// Points x with normal · x = offset.
-struct FacePlane {
-  Vector3d normal;
-  double offset = 0, error = 0;
-  [[nodiscard]] double above(const Vector3d& p) const { return normal.dot(p) - offset; }
-};
+/// Normals closer than that are of one face.
+constexpr double kOneFaceCosine = 0.96;
+
+/// The faces among the planes that a vertex was fitted to.
+SharpFeature featureAt(const Vector3d& position,
+                       const std::vector<std::pair<Vector3d, double>>& planes) {
+  SharpFeature feature;
+  for (const auto& [normal, offset] : planes) {
+    feature.misfit = std::max(feature.misfit, std::abs(normal.dot(position) - offset));
+    const openvdb::Vec3d n(normal.x(), normal.y(), normal.z());
+    const auto last = feature.normals.begin() + static_cast<std::ptrdiff_t>(feature.normalCount);
+    const bool isKnown = std::any_of(feature.normals.begin(), last,
+                                     [&](const auto& m) { return m.dot(n) > kOneFaceCosine; });
+    if (!isKnown && feature.normalCount < feature.normals.size())
+      feature.normals[feature.normalCount++] = n;
+  }
+  return feature;
+}
 
 /// The point nearest to `centre` among those that fit the planes best.
-Vector3d fitPlanes(const std::vector<FacePlane>& planes, const Vector3d& centre) {
+Vector3d fitPlanes(const std::vector<std::pair<Vector3d, double>>& planes, const Vector3d& centre) {
   Matrix3d matrix = Matrix3d::Zero();
   Vector3d right = Vector3d::Zero();
-  for (const FacePlane& plane : planes) {
-    matrix += plane.normal * plane.normal.transpose();
-    right -= plane.normal * plane.above(centre);
+  for (const auto& [normal, offset] : planes) {
+    matrix += normal * normal.transpose();
+    right += normal * (offset - normal.dot(centre));
   }
   const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(matrix);
   const Vector3d& values = solver.eigenvalues();
@@ -183,48 +152,6 @@ Vector3d fitPlanes(const std::vector<FacePlane>& planes, const Vector3d& centre)
   return centre + shift;
 }
 
-openvdb::Vec3d toIndex(const Vector3d& p) {
-  return {p.x(), p.y(), p.z()};
-}
-
-openvdb::Vec3f toSheet(const Vector3d& normal) {
-  return {static_cast<float>(normal.x()), static_cast<float>(normal.y()),
-          static_cast<float>(normal.z())};
-}
-
-/// The planes that pass through a point, one of each sheet.
-VertexSheets sheetsAt(const Vector3d& point, const std::vector<FacePlane>& planes) {
-  VertexSheets sheets;
-  for (const FacePlane& plane : planes) {
-    if (sheets.count == VertexSheets::kMost || std::abs(plane.above(point)) > kOffSheet) continue;
-    const openvdb::Vec3f sheet = toSheet(plane.normal);
-    bool isKnown = false;
-    for (std::size_t i = 0; i < sheets.count; ++i)
-      isKnown |= static_cast<double>(sheets.normal[i].dot(sheet)) > kOneSheetCosine;
-    if (!isKnown) sheets.normal[sheets.count++] = sheet;
-  }
-  return sheets;
-}
-
-/// Largest distance of a point to the planes.
-double misfitOf(const Vector3d& point, const std::vector<FacePlane>& planes) {
-  double misfit = 0;
-  for (const FacePlane& plane : planes) misfit = std::max(misfit, std::abs(plane.above(point)));
-  return misfit;
-}
-
-/// Leaves out planes that another one of their sheet tells much better.
-void dropWorse(std::vector<FacePlane>& planes) {
-  const std::vector<FacePlane> all = planes;
-  std::erase_if(planes, [&](const FacePlane& plane) {
-    return plane.error > kSurelySmooth &&
-           std::any_of(all.begin(), all.end(), [&](const FacePlane& other) {
-             return other.error * kWorse < plane.error &&
-                    other.normal.dot(plane.normal) > kOneSheetCosine;
-           });
-  });
-}
-
 bool isInCell(const Vector3d& p, double margin) {
   return p.minCoeff() >= -margin && p.maxCoeff() <= 1 + margin;
 }
@@ -233,6 +160,9 @@ bool isInCell(const Vector3d& p, double margin) {
 class CellVertices {
  public:
   CellVertices(BlockField& field, int x, int y, int z) : field_(field), x_(x), y_(y), z_(z) {}
+
+  /// The planes that the last vertex was fitted to, positions as the vertex.
+  [[nodiscard]] const std::vector<std::pair<Vector3d, double>>& planes() const { return planes_; }
 
   DualVertex place(const std::uint8_t* edges, std::size_t count) {
     crossings_.clear();
@@ -256,7 +186,7 @@ class CellVertices {
     Vector3d centre = Vector3d::Zero();
     for (const auto& crossing : crossings_) centre += crossing.first;
     centre /= static_cast<double>(count);
-    return isSmooth ? placeSmooth(centre) : placeByPlanes(centre, corners);
+    return isSmooth ? DualVertex{placeSmooth(centre), false} : placeByPlanes(centre, corners);
   }
 
  private:
@@ -271,13 +201,11 @@ class CellVertices {
 
   /// The mean of the crossings lies as far inside a curved surface as the tangent planes at them
   /// lie outside: half way between is on it to higher order.
-  [[nodiscard]] DualVertex placeSmooth(const Vector3d& centre) const {
+  [[nodiscard]] Vector3d placeSmooth(const Vector3d& centre) const {
     Vector3d mean = Vector3d::Zero();
     for (const auto& [point, normal] : crossings_) mean += normal;
-    if (!(mean.norm() > 0.1)) return {centre};
+    if (!(mean.norm() > 0.1)) return centre;
     mean.normalize();
-    VertexSheets sheets;
-    sheets.normal[sheets.count++] = toSheet(mean);
     double above = 0, below = 0;
     for (const auto& [point, normal] : crossings_) {
       const Vector3d unit = normal.normalized();
@@ -285,7 +213,7 @@ class CellVertices {
       below += unit.dot(mean) * unit.dot(mean);
     }
     const Vector3d result = centre + mean * (above / below / 2);
-    return {isInCell(result, 0) ? result : centre, sheets};
+    return isInCell(result, 0) ? result : centre;
   }
 
   /// A point on the edge or corner where the planes meet. It may lie a little outside the cell: it
@@ -294,38 +222,39 @@ class CellVertices {
     for (const auto& [touch, reach] :
          {std::pair(kTouchMargin, 0.0), std::pair(0.0, 0.0), std::pair(kTouchMargin, kVertexReach),
           std::pair(0.0, kVertexReach)}) {
-      collectPlanes(corners, touch);
+      const bool isFeature = collectPlanes(corners, touch);
       if (planes_.empty()) continue;
       const Vector3d fitted = fitPlanes(planes_, centre);
-      if (isInCell(fitted, reach))
-        return {fitted, sheetsAt(fitted, planes_), misfitOf(fitted, planes_)};
+      if (isInCell(fitted, reach)) return {fitted, isFeature};
     }
-    const Vector3d moved = toNearestPlane(centre, corners);
-    return {moved, sheetsAt(moved, planes_)};
+    return {toNearestPlane(centre, corners), false};
   }
 
-  /// Planes that touch the surface in the cell or within `margin` of it.
-  void collectPlanes(unsigned corners, double margin) {
+  /// Planes that touch the surface in the cell or within `margin` of it. @return do they form an
+  /// edge?
+  bool collectPlanes(unsigned corners, double margin) {
     planes_.clear();
+    double leastCosine = 1;
     for (int corner = 0; corner < 8; ++corner) {
       if (!((corners >> corner) & 1)) continue;
       const std::array<int, 3> offset = {corner >> 2, (corner >> 1) & 1, corner & 1};
       const Plane& plane = planeAt(offset);
       const Vector3d point(offset[0], offset[1], offset[2]);
-      const Vector3d foot = point - plane.distance * plane.normal;
-      if (!plane.isKnown || !isInCell(foot, margin)) continue;
-      if (std::abs(field_.interpolated(foot + Vector3d(x_, y_, z_))) > kOffSurface) continue;
-      planes_.push_back({plane.normal, plane.normal.dot(point) - plane.distance, plane.error});
+      if (!plane.isKnown || !isInCell(point - plane.distance * plane.normal, margin)) continue;
+      for (const auto& other : planes_) {
+        leastCosine = std::min(leastCosine, plane.normal.dot(other.first));
+      }
+      planes_.emplace_back(plane.normal, plane.normal.dot(point) - plane.distance);
     }
-    dropWorse(planes_);
+    return leastCosine < kEdgeCosine;
   }
 
   Vector3d toNearestPlane(const Vector3d& centre, unsigned corners) {
     collectPlanes(corners, kTouchMargin);
     Vector3d shift = Vector3d::Constant(1);
-    for (const FacePlane& plane : planes_) {
-      const double distance = -plane.above(centre);
-      if (std::abs(distance) < shift.norm()) shift = distance * plane.normal;
+    for (const auto& [normal, offset] : planes_) {
+      const double distance = offset - normal.dot(centre);
+      if (std::abs(distance) < shift.norm()) shift = distance * normal;
     }
     return isInCell(centre + shift, 0) ? Vector3d(centre + shift) : centre;
   }
@@ -333,7 +262,7 @@ class CellVertices {
   BlockField& field_;
   int x_, y_, z_;
   std::vector<std::pair<Vector3d, Vector3d>> crossings_;  ///< with normals
-  std::vector<FacePlane> planes_;
+  std::vector<std::pair<Vector3d, double>> planes_;
 };
 
 /// Faces of a cell that one polygon passes twice: bit axis·2 + side, by polygon of the case.
@@ -380,24 +309,22 @@ class DualMesher {
  public:
   DualMesher(const CellSurface& surface, const FloatGrid& grid) : surface_(surface), grid_(grid) {}
 
-  /// With `inserts`, edges and corners between the cells get vertices of their own.
-  SharpMesh run(bool inserts) {
+  SharpMesh run() {
     vertices_.resize(surface_.cycleCount());
+    features_.resize(surface_.blocks().size());
     twice_.resize(surface_.cycleCount());
     cells_.resize(surface_.vertexCount());
     forEachBlock([this](const SurfaceBlock& block) { placeBlock(block); });
     collectSegments();
-    adoptSheets();
     SharpMesh mesh;
+    for (const auto& part : features_)
+      mesh.features.insert(mesh.features.end(), part.begin(), part.end());
     mesh.positions.reserve(vertices_.size() + segments_.size());
-    for (const DualVertex& v : vertices_) mesh.positions.push_back(toIndex(v.position));
+    for (const DualVertex& v : vertices_) {
+      mesh.positions.emplace_back(v.position.x(), v.position.y(), v.position.z());
+    }
     for (const FaceSegment& segment : segments_) mesh.positions.push_back(middle(segment));
     emit(mesh);
-    collectFeatures(mesh);
-    if (!inserts) return mesh;
-    std::vector<VertexSheets> sheets(mesh.positions.size());
-    for (std::size_t i = 0; i < vertices_.size(); ++i) sheets[i] = vertices_[i].sheets;
-    insertFeatures(mesh, sheets);
     return mesh;
   }
 
@@ -426,6 +353,11 @@ class DualMesher {
       const std::uint8_t* edges = cell.cycleEdges.data();
       for (std::size_t i = 0; i < cell.cycleCount; edges += cell.cycleLength[i++], ++cycle) {
         vertices_[cycle] = placer.place(edges, cell.cycleLength[i]);
+        if (vertices_[cycle].isFeature) {
+          SharpFeature& feature = features_[block.neighbour[0]].emplace_back(
+              featureAt(vertices_[cycle].position, placer.planes()));
+          feature.vertex = static_cast<std::uint32_t>(cycle);
+        }
         vertices_[cycle].position += origin + Vector3d(x, y, z);
         twice_[cycle] = twiceTable[pattern][i];
         for (std::size_t k = 0; k < cell.cycleLength[i]; ++k) {
@@ -461,59 +393,6 @@ class DualMesher {
     segment.oppositeCorner = lowInside ? high : low;
     segment.oppositeCorner[other] += kRing[i] & bit ? -1 : 1;
     return segment;
-  }
-
-  void collectFeatures(SharpMesh& mesh) const {
-    for (std::size_t v = 0; v < vertices_.size(); ++v) {
-      const DualVertex& vertex = vertices_[v];
-      if (vertex.sheets.count < 2 || vertex.misfit < 0) continue;
-      SharpFeature feature{.vertex = static_cast<std::uint32_t>(v),
-                           .normals = {},
-                           .normalCount = vertex.sheets.count,
-                           .misfit = vertex.misfit};
-      for (std::size_t i = 0; i < vertex.sheets.count; ++i)
-        feature.normals[i] = openvdb::Vec3d(vertex.sheets.normal[i]).unit();
-      mesh.features.push_back(feature);
-    }
-  }
-
-  /// A cell beside a corner may have no grid point with a face to itself. Its vertex then goes
-  /// where the sheets of the vertices around it meet.
-  void adoptSheets() {
-    std::vector<std::size_t> slot(vertices_.size(), kNoSlot);
-    std::size_t count = 0;
-    for (std::size_t v = 0; v < vertices_.size(); ++v)
-      if (!vertices_[v].sheets.count) slot[v] = count++;
-    if (!count) return;
-    std::vector<std::vector<std::uint32_t>> around(count);
-    for (const auto& cells : cells_)
-      for (const std::uint32_t v : cells)
-        if (slot[v] != kNoSlot)
-          around[slot[v]].insert(around[slot[v]].end(), cells.begin(), cells.end());
-    for (std::size_t v = 0; v < vertices_.size(); ++v)
-      if (slot[v] != kNoSlot) adoptFrom(around[slot[v]], vertices_[v]);
-  }
-
-  void adoptFrom(const std::vector<std::uint32_t>& around, DualVertex& vertex) const {
-    std::vector<FacePlane> planes;
-    for (const std::uint32_t v : around) {
-      const DualVertex& other = vertices_[v];
-      for (std::size_t i = 0; i < other.sheets.count; ++i) {
-        const openvdb::Vec3f& n = other.sheets.normal[i];
-        const Vector3d normal = Eigen::Vector3f(n[0], n[1], n[2]).cast<double>();
-        const FacePlane plane{normal, normal.dot(other.position), 0};
-        if (std::abs(plane.above(vertex.position)) < kAdoptReach) planes.push_back(plane);
-      }
-    }
-    if (planes.empty()) return;
-    const Vector3d fitted = fitPlanes(planes, vertex.position);
-    const auto isTaken = [&](std::uint32_t v) {
-      return &vertices_[v] != &vertex && (vertices_[v].position - fitted).norm() < kApart;
-    };
-    if ((fitted - vertex.position).norm() > kAdoptReach ||
-        std::any_of(around.begin(), around.end(), isTaken))
-      return;
-    vertex = {fitted, sheetsAt(fitted, planes), misfitOf(fitted, planes)};
   }
 
   template <typename Visit>
@@ -593,38 +472,33 @@ class DualMesher {
     });
   }
 
-  /// A diagonal must not cut across an edge of the solid; otherwise the shorter one.
+  /// A diagonal must not cut across an edge of the solid: it starts from vertices on one, where
+  /// there are such. Otherwise the shorter one.
   [[nodiscard]] std::size_t firstOfDiagonal(const std::vector<std::uint32_t>& quad) const {
-    const auto gap = [&](std::size_t i) {
-      const DualVertex &a = vertices_[quad[i]], &b = vertices_[quad[i + 2]];
-      return sheetGap(toIndex(a.position), a.sheets, toIndex(b.position), b.sheets);
+    const auto features = [&](std::size_t i) {
+      return vertices_[quad[i]].isFeature + vertices_[quad[i + 2]].isFeature;
     };
-    const double first = gap(0), second = gap(1);
-    if (std::abs(first - second) > kSameGap) return first < second ? 0 : 1;
+    if (features(0) != features(1)) return features(0) > features(1) ? 0 : 1;
     const auto length = [&](std::size_t i) {
       return (vertices_[quad[i]].position - vertices_[quad[i + 2]].position).squaredNorm();
     };
     return length(0) <= length(1) ? 0 : 1;
   }
 
-  static constexpr std::size_t kNoSlot = static_cast<std::size_t>(-1);
   const CellSurface& surface_;
   const FloatGrid& grid_;
   std::vector<DualVertex> vertices_;                 ///< by polygon
   std::vector<std::uint8_t> twice_;                  ///< facesPassedTwice, by polygon
   std::vector<std::array<std::uint32_t, 4>> cells_;  ///< polygons around each crossed edge, by slot
   std::vector<FaceSegment> segments_;
+  std::vector<std::vector<SharpFeature>> features_;  ///< by block
   std::vector<std::size_t> firstTriangle_;
 };
 
 }  // namespace
 
-IndexMesh sharpSurface(const CellSurface& surface, const FloatGrid& grid) {
-  return DualMesher(surface, grid).run(true);
-}
-
-SharpMesh dualSurface(const CellSurface& surface, const FloatGrid& grid) {
-  return DualMesher(surface, grid).run(false);
+SharpMesh sharpSurface(const CellSurface& surface, const FloatGrid& grid) {
+  return DualMesher(surface, grid).run();
 }
 
 }  // namespace levelset

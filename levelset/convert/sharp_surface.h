@@ -4,12 +4,6 @@
 
 namespace levelset {
 
-/// The zero set in index space with the edges and corners that the field implies: one vertex for
-/// each polygon of a cell, one quadrilateral for each crossed edge [Ju02, Nie04], and the vertices
-/// that edges and corners between the cells need (sharp_features.h). Closed and 2-manifold as the
-/// uniform mesh is.
-[[nodiscard]] IndexMesh sharpSurface(const CellSurface& surface, const openvdb::FloatGrid& grid);
-
 /// A vertex on an edge or corner of the solid, and the faces that meet there.
 struct SharpFeature {
   std::uint32_t vertex = 0;
@@ -22,8 +16,9 @@ struct SharpMesh : IndexMesh {
   std::vector<SharpFeature> features;  ///< by rising vertex
 };
 
-/// The same before edges and corners between the cells get vertices of their own, with what the
-/// cells' vertices tell of them.
-[[nodiscard]] SharpMesh dualSurface(const CellSurface& surface, const openvdb::FloatGrid& grid);
+/// The zero set in index space with the edges and corners that the field implies: one vertex for
+/// each polygon of a cell, one quadrilateral for each crossed edge [Ju02, Nie04]. Closed and
+/// 2-manifold as the uniform mesh is.
+[[nodiscard]] SharpMesh sharpSurface(const CellSurface& surface, const openvdb::FloatGrid& grid);
 
 }  // namespace levelset

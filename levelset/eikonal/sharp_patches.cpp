@@ -399,7 +399,7 @@ SharpPatches::SharpPatches(const FloatGrid& field, const std::optional<CoordBBox
   const FloatGrid::Ptr part = bentPart(field, within);
   if (part->tree().leafCount() == 0) return;
   const CellSurface surface(*part);
-  SharpMesh mesh = dualSurface(surface, *part);
+  SharpMesh mesh = sharpSurface(surface, *part);
   const Fans fans(mesh);
   Corners(mesh, fans).run();
   EdgeGaps(mesh, fans).run();

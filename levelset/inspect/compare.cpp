@@ -52,10 +52,10 @@ class ZeroSet {
     eikonal::SurfacePoints points;
   };
   static Points pointsOf(FloatTree::ConstPtr field) {
-    eikonal::SurfacePoints points = eikonal::findSurfacePoints(*field, {});
+    eikonal::SurfacePoints points = eikonal::findSurfacePoints(*field, {}, {});
     if (!points.thin) return {field, std::move(points)};
     field = eikonal::thicken(*field);
-    return {field, eikonal::findSurfacePoints(*field, {})};
+    return {field, eikonal::findSurfacePoints(*field, {}, {})};
   }
   ZeroSet(const FloatGrid& grid, Points found)
       : field_(std::move(found.field)),
