@@ -58,11 +58,14 @@ TEST_F(Command, ReadsBackWhatItWrites) {
             0);
   const Json band = measure("read a.vdb");
   const double exact = 2 * kPi * kPi * 2 * 0.7 * 0.7;
-  EXPECT_NEAR(band["volume"], exact, 5e-3 * exact);
+  EXPECT_NEAR(band["volume"], exact, 1e-4 * exact);
   EXPECT_EQ(band["euler"], 0);
+  // Flat triangles cut the round off.
+  const double flat = measure("read a.ply")["volume"];
+  EXPECT_NEAR(flat, exact, 5e-3 * exact);
   for (const char* file : {"a.ply", "a.obj.gz", "a.stl", "a.off"}) {
     const Json mesh = measure(std::string("read ") + file);
-    EXPECT_NEAR(mesh["volume"], band["volume"], 1e-3 * exact) << file;
+    EXPECT_NEAR(mesh["volume"], flat, 1e-6 * exact) << file;
     EXPECT_EQ(mesh["closed_manifold"], true) << file;
   }
   EXPECT_EQ(fileCount(), 5u);
