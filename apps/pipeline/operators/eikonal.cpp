@@ -69,13 +69,16 @@ void tellFigures(Invocation& in, const levelset::ArrivalFigures& figures) {
                                      figures.reached, figures.started, figures.firstOrder);
 }
 
-Value extend(Invocation& in, double reach) {
+void validateFront(const Invocation& in) {
   for (const char* other : {"speed", "from"})
-    if (in.given(other))
+    if (in.given("extend") && in.given(other))
       throw levelset::UsageError(
           fmt::format("{}: --extend carries an attribute along the normals, so --{} has no meaning "
                       "beside it; leave one out",
                       in.op().name, other));
+}
+
+Value extend(Invocation& in, double reach) {
   levelset::ClosestPointOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
   options.halfWidth = reach / in.band().voxelSize();
   in.notes.notes.push_back("the attribute is that of the closest point of the surface");
@@ -138,10 +141,10 @@ Operator frontOperator(const char* name, const char* summary, const char* exampl
                   .doc = "start at these points, on the grid of the operand, in place of its "
                          "surface"},
                  {.name = "order",
-                  .type = ParamType::Integer,
-                  .doc = "of the differences, 1 or 2; 2 falls back to 1 where it must",
+                  .type = ParamType::Choice,
+                  .doc = "of the differences; 2 falls back to 1 where it must",
                   .fallback = "2",
-                  .range = Range::Positive},
+                  .choices = {"1", "2"}},
                  {.name = "extend",
                   .type = ParamType::Scalar,
                   .doc = "in place of times: this attribute, carried off the surface along its "
@@ -150,6 +153,7 @@ Operator frontOperator(const char* name, const char* summary, const char* exampl
       .resultKind = [](const Invocation& in) { return givesField(in) ? Kind::Field : Kind::Band; },
       .run = runFront<method>,
       .plan = planFront,
+      .validate = validateFront,
   };
 }
 

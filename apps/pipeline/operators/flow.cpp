@@ -89,6 +89,20 @@ double partOfTheWay(const Invocation& in) {
   return in.given("until") ? in.number("until") : 1;
 }
 
+constexpr long kMostSteps = 100000;
+
+void validateMorph(const Invocation& in) {
+  if (in.given("keep-steps")) (void)stepPattern(in);
+  if (partOfTheWay(in) > 1) {
+    throw UsageError(fmt::format("{}: '{}' is past the target; give a part of the way up to 1",
+                                 in.where("until"), in.text("until")));
+  }
+  if (in.integer("steps") > kMostSteps) {
+    throw UsageError(fmt::format("{}: {} are too many; give at most {}", in.where("steps"),
+                                 in.text("steps"), kMostSteps));
+  }
+}
+
 Value morph(Invocation& in) {
   levelset::MorphOptions options{.steps = static_cast<int>(in.integer("steps")),
                                  .until = partOfTheWay(in),
@@ -180,7 +194,12 @@ void addFlowOperators(std::vector<Operator>& all) {
                    .type = ParamType::Path,
                    .doc = "write every step; # in the name is its number (step_###.vdb)"}},
        .operands = {{Kind::Band}, {Kind::Band}},
-       .run = morph});
+       .run = morph,
+       .validate = validateMorph,
+       .targets = [](const Invocation& in) {
+         return in.given("keep-steps") ? std::vector{stepFile(stepPattern(in), 1).string()}
+                                       : std::vector<std::string>{};
+       }});
 }
 
 }  // namespace pipeline

@@ -93,6 +93,13 @@ TEST_F(Refusal, WhatCanBeToldComesBeforeTheWork) {
   soon("patch --at 0,0,1 --height 0.1", 2, "needs --size");
   soon("patch --corners \"0,0,1 0,1,1\" --height 0.1", 2, "four points");
   soon("patch --at 0,0,1 --size 0.1,0.1 --height 0.1 --levels 1000000", 2, "out of range");
+  soon("march --order 3", 2, "--order");
+  soon("sweep --extend x --speed 2", 2, "--speed has no meaning");
+  const std::string target = "sphere --radius 1.2 --voxel 0.1 ! morph ";
+  soon(target + "--steps 4294967297", 2, "too many");
+  soon(target + "--until 1.5", 2, "up to 1");
+  soon(target + "--steps 3 --keep-steps step.vdb", 2, "put # where the number goes");
+  soon(target + "--steps 3 --keep-steps nowhere/step_#.vdb", 6, "no folder");
   soon("write nowhere/a.vdb", 6, "no folder");
   soon("render nowhere/a.png", 6, "render: ");
   writeFile("there.vdb", "kept");
