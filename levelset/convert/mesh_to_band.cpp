@@ -8,6 +8,7 @@
 #include "levelset/convert/band_assembly.h"
 #include "levelset/convert/mesh_to_band_input.h"
 #include "levelset/convert/open_surface.h"
+#include "levelset/convert/separating_surface.h"
 #include "levelset/convert/surface_blocks.h"
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
@@ -146,6 +147,11 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
   const SignField field(local, topology, ruleFor(certificate.method, options.nesting),
                         subProgress(progress, 0.4, 0.5));
   certificate.flipped = field.isFlipped();
+  if (certificate.method != SignMode::Closed || options.nesting != Nesting::Parity) {
+    if (topology.boundary.empty())
+      local = convert::separatingSurface(local, field.isFlipped() ? -1 : 1,
+                                         subProgress(progress, 0.5, 0.6));
+  }
   if (field.isOpen())
     addOpenSurface(local, field, options.halfWidth, maxMemory, subProgress(progress, 0.5, 0.6));
 

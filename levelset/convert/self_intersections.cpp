@@ -1,3 +1,5 @@
+#include "levelset/convert/self_intersections.h"
+
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -17,6 +19,7 @@ using convert::Triangle;
 using Imath::V2d;
 using Imath::V3d;
 
+using Pair = convert::TrianglePair;
 using TriangleCorners = std::array<V3d, 3>;
 
 V2d dropAxis(const V3d& p, int axis) {
@@ -146,35 +149,36 @@ bool trianglesMeet(const Triangle& first, const Triangle& second,
 /// boxes have in common.
 class PairSearch {
  public:
-  PairSearch(const TriMesh& mesh, const Progress& progress)
-      : positions_(mesh.positions), progress_(progress) {
-    for (const Triangle& t : convert::findTopology(mesh).triangles)
-      if (projectionAxis({positions_[t[0]], positions_[t[1]], positions_[t[2]]}) >= 0)
-        triangles_.push_back(t);
+  PairSearch(const std::vector<Triangle>& triangles, const std::vector<V3d>& positions,
+             const Progress& progress)
+      : positions_(positions), progress_(progress), triangles_(triangles) {
     boxes_.resize(triangles_.size());
     for (std::size_t i = 0; i < triangles_.size(); ++i)
       for (const std::uint32_t v : triangles_[i]) boxes_[i].extendBy(positions_[v]);
   }
 
-  std::size_t count() {
-    List all(triangles_.size());
+  std::vector<Pair> find() {
+    List all;
     Imath::Box3d region;
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      all[i] = static_cast<std::uint32_t>(i);
+    for (std::size_t i = 0; i < triangles_.size(); ++i) {
+      const Triangle& t = triangles_[i];
+      if (projectionAxis({positions_[t[0]], positions_[t[1]], positions_[t[2]]}) < 0) continue;
+      all.push_back(static_cast<std::uint32_t>(i));
       region.extendBy(boxes_[i]);
     }
     end_ = region.max;
     split(std::move(all), region, 0);
-    std::vector<std::size_t> found(parts_.size(), 0);
+    std::vector<std::vector<Pair>> found(parts_.size());
     const Progress second = subProgress(progress_, 0.5, 1);
     convert::ProgressGate gate(second, parts_.size(), kAction);
     tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
-      found[i] = countIn(parts_[i], gate);
+      found[i] = findIn(parts_[i], gate);
       gate.advance(1);
     });
-    std::size_t sum = 0;
-    for (const std::size_t n : found) sum += n;
-    return sum;
+    std::vector<Pair> result;
+    for (const auto& part : found) result.insert(result.end(), part.begin(), part.end());
+    std::sort(result.begin(), result.end());
+    return result;
   }
 
  private:
@@ -221,19 +225,20 @@ class PairSearch {
     return true;
   }
 
-  [[nodiscard]] std::size_t countIn(const Part& part, convert::ProgressGate& gate) const {
+  [[nodiscard]] std::vector<Pair> findIn(const Part& part, convert::ProgressGate& gate) const {
     List order = part.triangles;
     std::sort(order.begin(), order.end(), [&](std::uint32_t i, std::uint32_t j) {
       return boxes_[i].min.x != boxes_[j].min.x ? boxes_[i].min.x < boxes_[j].min.x : i < j;
     });
-    std::size_t found = 0;
+    std::vector<Pair> found;
     for (std::size_t m = 0; m < order.size(); ++m) {
       const std::uint32_t i = order[m];
       for (std::size_t n = m + 1; n < order.size(); ++n) {
         const std::uint32_t j = order[n];
         if (boxes_[j].min.x > boxes_[i].max.x) break;
-        found += boxes_[i].intersects(boxes_[j]) && belongs(part, i, j) &&
-                 trianglesMeet(triangles_[i], triangles_[j], positions_);
+        if (boxes_[i].intersects(boxes_[j]) && belongs(part, i, j) &&
+            trianglesMeet(triangles_[i], triangles_[j], positions_))
+          found.push_back(std::minmax(i, j));
       }
       if (m % 256 == 255) gate.advance(0);
     }
@@ -242,7 +247,7 @@ class PairSearch {
 
   const std::vector<V3d>& positions_;
   const Progress& progress_;
-  std::vector<Triangle> triangles_;
+  const std::vector<Triangle>& triangles_;
   std::vector<Imath::Box3d> boxes_;
   V3d end_;
   std::vector<Part> parts_;
@@ -250,8 +255,16 @@ class PairSearch {
 
 }  // namespace
 
+std::vector<convert::TrianglePair> convert::findSelfIntersections(
+    const std::vector<Triangle>& triangles, const std::vector<V3d>& positions,
+    const Progress& progress) {
+  return PairSearch(triangles, positions, progress).find();
+}
+
 std::size_t countSelfIntersections(const TriMesh& mesh, const Progress& progress) {
-  return PairSearch(mesh, progress).count();
+  return convert::findSelfIntersections(convert::findTopology(mesh).triangles, mesh.positions,
+                                        progress)
+      .size();
 }
 
 }  // namespace levelset

@@ -119,15 +119,69 @@ TEST(MeshToBandNasty, RepeatedAndOppositeFaces) {
   expectOpenSound(meshToBand(mesh, 0.11, {.signAnyway = true}), mesh);
 }
 
+/// A rectangle across an axis, as two triangles of a soup; distances do not ask which way it faces.
+void addRectangle(TriMesh& mesh, const V3d& low, const V3d& high) {
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  const int flat = low.x == high.x ? 0 : (low.y == high.y ? 1 : 2), u = (flat + 1) % 3;
+  V3d a = low, b = high;
+  a[u] = high[u];
+  b[u] = low[u];
+  mesh.positions.insert(mesh.positions.end(), {low, a, high, b});
+  mesh.triangles.push_back({first, first + 1, first + 2});
+  mesh.triangles.push_back({first, first + 2, first + 3});
+}
+
+/// The faces of a box, without those named: 0 for x low, 1 for x high, 2 for y low, …
+void addBox(TriMesh& mesh, const V3d& low, const V3d& high, std::initializer_list<int> without) {
+  for (int face = 0; face < 6; ++face) {
+    if (std::find(without.begin(), without.end(), face) != without.end()) continue;
+    V3d a = low, b = high;
+    a[face / 2] = b[face / 2] = face % 2 ? high[face / 2] : low[face / 2];
+    addRectangle(mesh, a, b);
+  }
+}
+
+TEST(MeshToBandNasty, BoxesThroughEachOther) {
+  // A pillar of twelve triangles through the top of a block of twelve: what lies inside separates
+  // nothing, and distances are those to the boundary of the union.
+  const TriMesh mesh =
+      joined(boxMesh(V3d(-1), V3d(1)), boxMesh(V3d(-0.5, -0.4, 0), V3d(0.5, 0.4, 2)));
+  TriMesh boundary;
+  addBox(boundary, V3d(-1), V3d(1), {5});
+  addBox(boundary, V3d(-0.5, -0.4, 1), V3d(0.5, 0.4, 2), {4});
+  addRectangle(boundary, V3d(-1, -1, 1), V3d(-0.5, 1, 1));
+  addRectangle(boundary, V3d(0.5, -1, 1), V3d(1, 1, 1));
+  addRectangle(boundary, V3d(-0.5, -1, 1), V3d(0.5, -0.4, 1));
+  addRectangle(boundary, V3d(-0.5, 0.4, 1), V3d(0.5, 1, 1));
+  const auto turn = [](const V3d& p) { return turned(p, 0.3); };
+  for (const double angle : {0.0, 0.3}) {
+    const TriMesh solid = angle > 0 ? transformed(mesh, turn) : mesh;
+    const TriMesh truth = angle > 0 ? transformed(boundary, turn) : boundary;
+    const auto result = meshToBand(solid, 0.083);
+    EXPECT_EQ(result.certificate.method, SignMode::Winding);
+    expectExact(result, truth, byWinding(solid));
+  }
+}
+
 TEST(MeshToBandNasty, CoplanarOverlaps) {
   // Two boxes whose tops lie in one plane and overlap.
   const TriMesh mesh = joined(boxMesh(V3d(-1, -1, -1), V3d(0.3, 1, 1)),
                               boxMesh(V3d(-0.3, -0.5, -0.5), V3d(1, 0.5, 1)));
+  TriMesh boundary;
+  addBox(boundary, V3d(-1, -1, -1), V3d(0.3, 1, 1), {1});
+  addBox(boundary, V3d(0.3, -0.5, -0.5), V3d(1, 0.5, 1), {0});
+  addRectangle(boundary, V3d(0.3, -1, -1), V3d(0.3, -0.5, 1));
+  addRectangle(boundary, V3d(0.3, 0.5, -1), V3d(0.3, 1, 1));
+  addRectangle(boundary, V3d(0.3, -0.5, -1), V3d(0.3, 0.5, -0.5));
   const auto result = meshToBand(mesh, 0.11);
   EXPECT_EQ(result.certificate.method, SignMode::Winding);
   EXPECT_GT(result.certificate.selfIntersections, 0);
   EXPECT_EQ(result.certificate.ambiguousShare, 0);
-  expectOpenSound(result, mesh);
+  expectExact(result, boundary, byWinding(mesh));
+  // Boxes that share a face: it has the solid on both sides.
+  const TriMesh touching =
+      joined(boxMesh(V3d(-1), V3d(0.013, 1, 1)), boxMesh(V3d(0.013, -1, -1), V3d(1)));
+  expectExact(meshToBand(touching, 0.11), boxMesh(V3d(-1), V3d(1)), byWinding(touching));
 }
 
 TEST(MeshToBandNasty, IslandsAMillionApart) {
