@@ -24,9 +24,9 @@ class Repeat : public support::ShellTest, public ::testing::WithParamInterface<C
 
 TEST_P(Repeat, GivesTheSameBits) {
   const Case& c = GetParam();
-  ASSERT_EQ(levelsmith("torus --radius 2 --tube 0.8 --axis 1,2,3 --voxel 0.1 ! write in.vdb ! mesh "
+  ASSERT_EQ(levelsmith("torus --radius 2 --tube 0.8 --axis 1,2,3 --voxel 0.14 ! write in.vdb ! mesh "
                        "! write in.ply "
-                       "! sphere --radius 1.4 --center 1,0.5,0.2 --voxel 0.08 ! write tool.vdb")
+                       "! sphere --radius 1.4 --center 1,0.5,0.2 --voxel 0.11 ! write tool.vdb")
                 .code,
             0);
   std::string first;
@@ -54,9 +54,9 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"capsule", "capsule --from 0,0,0 --to 1,1,1 --radius 0.4 --voxel 0.05 ! write out.vdb",
              "out.vdb"},
         Case{"read", "read in.vdb ! write out.nvdb", "out.nvdb"},
-        Case{"closed", "read in.ply ! level-set --voxel 0.07 --sign closed ! write out.vdb",
+        Case{"closed", "read in.ply ! level-set --voxel 0.09 --sign closed ! write out.vdb",
              "out.vdb"},
-        Case{"winding", "read in.ply ! level-set --voxel 0.07 --sign winding ! write out.vdb",
+        Case{"winding", "read in.ply ! level-set --voxel 0.09 --sign winding ! write out.vdb",
              "out.vdb"},
         Case{"mesh", "read in.vdb ! mesh ! write out.ply", "out.ply"},
         Case{"adaptive", "read in.vdb ! mesh --adaptivity 0.5 ! write out.ply", "out.ply"},
@@ -69,11 +69,11 @@ INSTANTIATE_TEST_SUITE_P(
              "out.vdb"},
         Case{"offset", "read in.vdb ! offset 3vx ! write out.vdb", "out.vdb"},
         Case{"keep",
-             "read in.vdb ! sphere --radius 0.3 --voxel 0.1 --center 5,5,5 ! union ! keep "
+             "read in.vdb ! sphere --radius 0.3 --voxel 0.14 --center 5,5,5 ! union ! keep "
              "--largest 1 ! write out.vdb",
              "out.vdb"},
         Case{"fill",
-             "read in.vdb ! sphere --radius 0.4 --voxel 0.1 --center 1.7,-0.9,0 ! difference ! "
+             "read in.vdb ! sphere --radius 0.4 --voxel 0.14 --center 1.7,-0.9,0 ! difference ! "
              "fill-cavities ! write out.vdb",
              "out.vdb"},
         Case{"clip", "read in.vdb ! clip --plane \"0,0,0 1,2,0\" ! write out.vdb", "out.vdb"},
@@ -82,7 +82,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"bake",
              "read in.vdb ! transform --rotate 10,20,30 --scale 1,1,2 --bake ! write out.vdb",
              "out.vdb"},
-        Case{"resample", "read in.vdb ! resample --voxel 0.06 ! write out.vdb", "out.vdb"},
+        Case{"resample", "read in.vdb ! resample --voxel 0.09 ! write out.vdb", "out.vdb"},
         Case{"texture",
              "box --size 8,8,3 --voxel 0.2 --as b ! torus --radius 1 --tube 0.5 --voxel 0.1 --as t "
              "! patch @b --corners "
