@@ -2,7 +2,9 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
+#include <mutex>
 
 #include "levelset/eikonal/distance_transform.h"
 #include "levelset/error.h"
@@ -11,8 +13,12 @@
 namespace levelset {
 namespace {
 
+using LeafNode = openvdb::FloatTree::LeafNodeType;
+
 // What the interpolant reads beside the moved surface before distances are made again.
 constexpr double kShell = 3;
+// Of a voxel: lengths beside each other on the surface may pass those that were seen by this.
+constexpr double kRangeMargin = 0.5;
 
 double checkedHalfWidth(const NarrowBand& solid, const OffsetOptions& options) {
   const double halfWidth = options.halfWidth.value_or(solid.halfWidth());
@@ -22,41 +28,142 @@ double checkedHalfWidth(const NarrowBand& solid, const OffsetOptions& options) {
   return halfWidth;
 }
 
+void requireSurface(const NarrowBand& solid, const OffsetOptions& options) {
+  if (solid.isEmpty())
+    throw InvalidInput(fmt::format(
+        "{}: the solid is empty, so there is no surface to move; give a solid", options.action));
+}
+
+/// Distances out to where the surface may go, kept beside it only.
+eikonal::DistanceRequest shellRequest(const OffsetOptions& options, double shift, double reach) {
+  eikonal::DistanceRequest request;
+  request.action = options.action;
+  request.halfWidth = reach + kShell;
+  request.shift = shift;
+  request.maxMemory = options.maxMemory;
+  return request;
+}
+
+/// A distance again: where fronts met, a shifted one is only a bound.
+NarrowBand distancesAgain(const openvdb::FloatGrid& field, double halfWidth,
+                          const OffsetOptions& options, double done) {
+  eikonal::DistanceRequest request;
+  request.action = options.action;
+  request.halfWidth = halfWidth;
+  request.maxMemory = options.maxMemory;
+  request.progress = subProgress(options.progress, done, 1);
+  return makeBand(eikonal::distanceTransform(field, request));
+}
+
+bool hasSurface(const openvdb::FloatGrid& field) {
+  return field.activeVoxelCount() > 0 && eikonal::hasZeroCrossing(field.tree());
+}
+
+/// The length at each closest point of the surface, in voxels.
+class Lengths {
+ public:
+  Lengths(const openvdb::FloatGrid& field, const ScalarField& distance, const char* action)
+      : field_(field), distance_(distance), action_(action) {}
+
+  [[nodiscard]] double at(const openvdb::Vec3d& point) const {
+    const Imath::V3d world = toImath(field_.indexToWorld(point));
+    const double length = distance_(world);
+    if (!std::isfinite(length)) {
+      throw InvalidInput(
+          fmt::format("{}: the length is {} at {:.6g},{:.6g},{:.6g} on the surface; give a field "
+                      "that is finite there",
+                      action_, length, world.x, world.y, world.z));
+    }
+    return length / field_.voxelSize()[0];
+  }
+
+  struct Range {
+    double low = INFINITY, high = -INFINITY;
+  };
+  /// Over the closest points of the grid points beside the surface.
+  [[nodiscard]] Range range(const OffsetOptions& options) const {
+    Range all;
+    std::mutex mutex;
+    eikonal::DistanceRequest request = shellRequest(options, 0, 0);
+    request.progress = subProgress(options.progress, 0, 0.3);
+    request.visitPoints = [&](const LeafNode& leaf, const eikonal::ClosestPointLeaf& points) {
+      Range own;
+      for (auto it = leaf.cbeginValueOn(); it; ++it) {
+        const double length = at(points[it.pos()]);
+        own = {std::min(own.low, length), std::max(own.high, length)};
+      }
+      const std::lock_guard lock(mutex);
+      all = {std::min(all.low, own.low), std::max(all.high, own.high)};
+    };
+    (void)eikonal::distanceTransform(field_, request);
+    return all;
+  }
+
+ private:
+  const openvdb::FloatGrid& field_;
+  const ScalarField& distance_;
+  const char* action_;
+};
+
 }  // namespace
 
 NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& options) {
   if (!std::isfinite(distance))
     throw UsageError(
         fmt::format("{}: the distance is {}; give a finite length", options.action, distance));
-  if (solid.isEmpty())
-    throw InvalidInput(fmt::format(
-        "{}: the solid is empty, so there is no surface to move; give a solid", options.action));
+  requireSurface(solid, options);
   const double halfWidth = checkedHalfWidth(solid, options);
   if (distance == 0 && halfWidth == solid.halfWidth()) return solid;
+  if (distance == 0) return distancesAgain(vdb(solid), halfWidth, options, 0);
 
-  eikonal::DistanceRequest request;
-  request.action = options.action;
-  request.maxMemory = options.maxMemory;
+  eikonal::DistanceRequest request = shellRequest(options, distance / solid.voxelSize(), 0);
+  request.progress = subProgress(options.progress, 0, 0.6);
+  const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
+  if (!hasSurface(*moved))
+    throw InvalidInput(
+        fmt::format("{}: nothing is left of the solid after {} world units; no part of it is "
+                    "thicker than twice that, use a smaller length",
+                    options.action, distance));
+  return distancesAgain(*moved, halfWidth, options, 0.6);
+}
 
-  // === Distances out to the new surface, kept beside it only
-  openvdb::FloatGrid::Ptr moved;
-  if (distance != 0) {
-    request.halfWidth = kShell;
-    request.shift = distance / solid.voxelSize();
-    request.progress = subProgress(options.progress, 0, 0.6);
-    moved = eikonal::distanceTransform(vdb(solid), request);
-    if (moved->activeVoxelCount() == 0 || !eikonal::hasZeroCrossing(moved->tree()))
-      throw InvalidInput(
-          fmt::format("{}: nothing is left of the solid after {} world units; no part of it is "
-                      "thicker than twice that, use a smaller length",
-                      options.action, distance));
-  }
+NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance, const OffsetOptions& options) {
+  if (!distance)
+    throw UsageError(
+        fmt::format("{}: there is no length; give a formula or a grid of numbers", options.action));
+  requireSurface(solid, options);
+  const double halfWidth = checkedHalfWidth(solid, options);
+  const double voxel = solid.voxelSize();
+  const Lengths lengths(vdb(solid), distance, options.action);
+  const Lengths::Range range = lengths.range(options);
 
-  // === A distance again: where fronts met, the shifted one is only a bound
-  request.halfWidth = halfWidth;
-  request.shift = 0;
-  request.progress = subProgress(options.progress, distance != 0 ? 0.6 : 0, 1);
-  return makeBand(eikonal::distanceTransform(moved ? *moved : vdb(solid), request));
+  // === φ(x) − length(closest point), where the surface may pass
+  const double middle = (range.low + range.high) / 2;
+  eikonal::DistanceRequest request =
+      shellRequest(options, middle, (range.high - range.low) / 2 + kRangeMargin);
+  request.progress = subProgress(options.progress, 0.3, 0.7);
+  const auto limit = static_cast<float>(request.halfWidth * voxel);
+  openvdb::FloatTree displaced;
+  std::mutex mutex;
+  request.visitPoints = [&](const LeafNode& leaf, const eikonal::ClosestPointLeaf& points) {
+    auto part = std::make_unique<LeafNode>(leaf);
+    for (auto it = part->beginValueOn(); it; ++it) {
+      const double length = lengths.at(points[it.pos()]);
+      const double value = static_cast<double>(*it) - (length - middle) * voxel;
+      it.setValue(std::clamp(static_cast<float>(value), -limit, limit));
+    }
+    const std::lock_guard lock(mutex);
+    displaced.addLeaf(part.release());
+  };
+  const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
+  for (auto leaf = displaced.beginLeaf(); leaf; ++leaf)
+    *moved->tree().touchLeaf(leaf->origin()) = *leaf;
+  if (!hasSurface(*moved))
+    throw InvalidInput(
+        fmt::format("{}: nothing is left of the solid after {:.6g} to {:.6g} world units; use "
+                    "smaller lengths",
+                    options.action, range.low * voxel, range.high * voxel));
+  return distancesAgain(*moved, halfWidth, options, 0.7);
 }
 
 }  // namespace levelset

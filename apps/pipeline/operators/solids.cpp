@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "apps/pipeline/fields.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
 #include "levelset/error.h"
@@ -71,23 +72,42 @@ levelset::OffsetOptions offsetOptions(Invocation& in) {
   return options;
 }
 
+void validateOffset(const Invocation& in) {
+  if (in.given("distance") == in.given("by"))
+    throw levelset::UsageError(
+        in.given("by") ? "offset: a distance and --by exclude each other; leave one out"
+                       : "offset: how far is missing; give a length, or --by and a field");
+}
+
 Value offset(Invocation& in) {
   const levelset::OffsetOptions options = offsetOptions(in);
-  const double distance = in.length("distance");
+  const std::optional<levelset::Mask> mask = maskOf(in);
   NarrowBand band = in.band();
+  if (!mask && !in.given("by")) {
+    const double distance = in.length("distance");
+    in.operands.clear();
+    return Value(levelset::offset(std::move(band), distance, options));
+  }
+  levelset::ScalarField length;
+  if (in.given("by"))
+    length = scalarField(in, "by");
+  else
+    length = [distance = in.length("distance")](const Imath::V3d&) { return distance; };
+  if (mask) length = [length, mask](const Imath::V3d& p) { return mask->weight(p) * length(p); };
   in.operands.clear();
-  return Value(levelset::offset(std::move(band), distance, options));
+  return Value(levelset::offsetBy(std::move(band), length, options));
 }
 
 Plan planOffset(Invocation& in) {
   Plan plan = in.operands[0].plan();
+  if (in.given("half-width")) plan.halfWidth = in.number("half-width");
+  if (!in.given("distance")) return plan;  // a field may say anything
   const double distance = in.length("distance");
   const double before = plan.bounds.size().length();
   plan.bounds.min -= Imath::V3d(distance);
   plan.bounds.max += Imath::V3d(distance);
   const double after = plan.bounds.isEmpty() ? 0 : plan.bounds.size().length();
   if (before > 0) plan.area *= (after / before) * (after / before);
-  if (in.given("half-width")) plan.halfWidth = in.number("half-width");
   return plan;
 }
 
@@ -211,19 +231,25 @@ void addSolidOperators(std::vector<Operator>& all) {
       .name = "offset",
       .group = "Solids",
       .summary = "move the surface along its normal; positive grows the solid",
+      .details = "Outwards, convex edges become round and concave ones stay sharp; inwards the "
+                 "reverse. --by displaces each point of the surface by a length of its own, "
+                 "--mask a part of it.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! offset 2vx ! measure",
-      .params = {{.name = "distance",
-                  .type = ParamType::Length,
-                  .doc = "how far; negative shrinks",
-                  .required = true,
-                  .position = 0},
-                 {.name = "half-width",
-                  .type = ParamType::Number,
-                  .doc = "of the result, in voxels; default: as before",
-                  .range = Range::Positive}},
+      .params = withMask({{.name = "distance",
+                           .type = ParamType::Length,
+                           .doc = "how far; negative shrinks",
+                           .position = 0},
+                          {.name = "by",
+                           .type = ParamType::Scalar,
+                           .doc = "how far at each point of the surface, world units"},
+                          {.name = "half-width",
+                           .type = ParamType::Number,
+                           .doc = "of the result, in voxels; default: as before",
+                           .range = Range::Positive}}),
       .operands = {{Kind::Band}},
       .run = offset,
       .plan = planOffset,
+      .validate = validateOffset,
   });
   const Param halfWidth = {.name = "half-width",
                            .type = ParamType::Number,

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "levelset/error.h"
+#include "levelset/sample.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 
@@ -200,6 +201,97 @@ TEST(Offset, Refuses) {
   EXPECT_THROW((void)offset(ball, 3e9), ResourceLimit);
   EXPECT_THROW((void)offset(ball, 30, {.maxMemory = 1000000}), ResourceLimit);
   EXPECT_THROW((void)offset(ball, 5, {.progress = [](double) { return false; }}), Cancelled);
+}
+
+// === By a length of each point's own
+
+/// Where the zero set lies along rays from the centre, less what is expected there; the largest.
+double radialError(const NarrowBand& band, const std::function<double(const V3d&)>& radius) {
+  const BandSampler phi(band, Interpolation::Tricubic);
+  double worst = 0;
+  for (int i = 0; i < 400; ++i) {
+    const double z = 1 - (2 * i + 1) / 400.0, turn = 2.399963 * i, r = std::sqrt(1 - z * z);
+    const V3d n(r * std::cos(turn), r * std::sin(turn), z);
+    worst = std::max(worst, std::abs(phi.value(kCentre + n * radius(n)) /
+                                     phi.gradient(kCentre + n * radius(n)).dot(n)));
+  }
+  return worst;
+}
+
+TEST(OffsetBy, AgreesWithTheConstant) {
+  const NarrowBand ball = sample(sphere(20), 22);
+  for (const double distance : {4.0, -4.0, 0.0}) {
+    const NarrowBand moved = offsetBy(ball, [=](const V3d&) { return distance; });
+    EXPECT_LE(bandError(moved, sphere(20 + distance)).linf, 0.02) << distance;
+  }
+}
+
+TEST(OffsetBy, DisplacesASphereAlongItsNormals) {
+  const NarrowBand ball = sample(sphere(20), 22);
+  // Read at the closest point: a field that has other values off the surface must not matter.
+  const auto length = [](const V3d& n) { return 1 + 3 * n.z * n.z - 4 * n.x; };
+  const NarrowBand moved = offsetBy(ball, [&](const V3d& p) {
+    const double off = (p - kCentre).length() - 20;
+    return length((p - kCentre).normalized()) + 100 * off;
+  });
+  EXPECT_LE(radialError(moved, [&](const V3d& n) { return 20 + length(n); }), 0.05);
+  EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(moved), 6), "");
+}
+
+TEST(OffsetBy, ConvergesToTheDisplacedSurface) {
+  double previous = 0;
+  for (const double scale : {1.0, 2.0, 4.0}) {
+    const NarrowBand ball = sample(sphere(10 * scale), 12 * scale);
+    const auto length = [=](const V3d& n) { return scale * (1 + 1.5 * n.z * n.z - 2 * n.x); };
+    const NarrowBand moved =
+        offsetBy(ball, [&](const V3d& p) { return length((p - kCentre).normalized()); });
+    const double error =
+        radialError(moved, [&](const V3d& n) { return 10 * scale + length(n); }) / scale;
+    if (previous > 0) {
+      EXPECT_LE(error, previous / 2) << scale;
+    }
+    previous = error;
+  }
+}
+
+TEST(OffsetBy, LeavesWhatIsNotReached) {
+  const NarrowBand ball = sample(sphere(15), 17);
+  const NarrowBand moved =
+      offsetBy(ball, [](const V3d& p) { return std::clamp(p.x / 2 - 2, 0.0, 2.0); });
+  auto before = vdb(ball).getConstAccessor();
+  double worst = 0, moves = 0;
+  support::forEachActive(moved, [&](const V3d& p, double value) {
+    const double was = before.getValue(openvdb::Coord::round(toVdb(p)));
+    if (p.x < -1) worst = std::max(worst, std::abs(value - was));
+    if (p.x > 12) moves = std::max(moves, was - value);
+  });
+  EXPECT_LE(worst, 2e-3);
+  EXPECT_GT(moves, 1.5);
+}
+
+TEST(OffsetBy, DoesNotDependOnThreads) {
+  const NarrowBand cube = sample(box(12), 14);
+  std::uint64_t hashes[3];
+  for (int threads : {1, 2, 4}) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                              static_cast<std::size_t>(threads));
+    hashes[threads / 2] =
+        offsetBy(cube, [](const V3d& p) { return std::sin(p.x / 3); }).contentHash();
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+  EXPECT_EQ(hashes[0], hashes[2]);
+}
+
+TEST(OffsetBy, Refuses) {
+  const NarrowBand ball = sample(sphere(10), 12);
+  EXPECT_THROW((void)offsetBy(ball, {}), UsageError);
+  EXPECT_THROW((void)offsetBy(ball, [](const V3d& p) { return std::sqrt(p.x); }), InvalidInput);
+  EXPECT_THROW((void)offsetBy(ball, [](const V3d&) { return -12.0; }), InvalidInput);
+  EXPECT_THROW((void)offsetBy(NarrowBand(), [](const V3d&) { return 1.0; }), InvalidInput);
+  EXPECT_THROW((void)offsetBy(ball, [](const V3d&) { return 1e6; }), ResourceLimit);
+  EXPECT_THROW((void)offsetBy(ball, [](const V3d&) { return 1.0; },
+                              {.progress = [](double) { return false; }}),
+               Cancelled);
 }
 
 }  // namespace offset_test
