@@ -9,6 +9,7 @@
 
 #include "levelset/eikonal/distance_transform.h"
 #include "levelset/error.h"
+#include "levelset/inspect/compare.h"
 #include "levelset/solids/resample.h"
 #include "levelset/vdb.h"
 
@@ -33,6 +34,9 @@ void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOp
   if (!(options.until > 0 && options.until <= 1))
     throw UsageError(fmt::format("{}: the part of the way is {}; give a number above 0, up to 1",
                                  kMorph, options.until));
+  if (options.tolerance && !(*options.tolerance > 0 && std::isfinite(*options.tolerance)))
+    throw UsageError(
+        fmt::format("{}: the tolerance is {}; give a positive length", kMorph, *options.tolerance));
   if (solid.isEmpty() || target.isEmpty())
     throw InvalidInput(fmt::format("{}: the {} is empty; give two solids", kMorph,
                                    solid.isEmpty() ? "solid" : "target"));
@@ -122,6 +126,8 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
     });
     if (options.keep) options.keep(result, i);
     report(options.progress, static_cast<double>(i) / options.steps, kMorph);
+    if (options.tolerance && part < 1 && compare(result, goal).hausdorff() <= *options.tolerance)
+      break;
   }
   return result;
 }

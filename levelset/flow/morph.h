@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
@@ -10,6 +11,9 @@ namespace levelset {
 struct MorphOptions {
   int steps = 1;
   double until = 1;  ///< part of the way, in (0, 1]; 1 ends on the target
+  /// World units: the first step whose surface is no farther than this from that of the target, and
+  /// the reverse (Hausdorff distance), is the last. Empty: all steps are gone.
+  std::optional<double> tolerance = {};
   /// Receives every step, 1 to `steps`, the last one too.
   std::function<void(const NarrowBand& step, int number)> keep = {};
   std::size_t maxMemory = kNoMemoryLimit;
@@ -21,7 +25,8 @@ struct MorphOptions {
 /// exact and known wherever the surface passes, re-distanced. A point that belongs to one of the
 /// solids only changes sides once, at a time of its own: every step is nearer to the target than
 /// the one before, whatever the topology.
-/// @throws UsageError for fewer than one step or `until` outside (0, 1]; InvalidInput if a solid is
+/// @throws UsageError for fewer than one step, `until` outside (0, 1] or a tolerance that is not
+/// positive; InvalidInput if a solid is
 /// empty, or if nothing is left on the way (the solids lie apart); ResourceLimit; Cancelled
 [[nodiscard]] NarrowBand morph(const NarrowBand& solid, const NarrowBand& target,
                                const MorphOptions& options = {});

@@ -6,11 +6,13 @@
 #include "apps/pipeline/fields.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/units.h"
 #include "levelset/convert/band_file.h"
 #include "levelset/error.h"
 #include "levelset/flow/curvature_flow.h"
 #include "levelset/flow/morph.h"
 #include "levelset/flow/smooth.h"
+#include "levelset/inspect/compare.h"
 
 namespace pipeline {
 namespace {
@@ -86,17 +88,26 @@ std::string stepPattern(const Invocation& in) {
 }
 
 double partOfTheWay(const Invocation& in) {
-  return in.given("until") ? in.number("until") : 1;
+  const std::string text = in.text("until");
+  if (text == "converged") return 1;
+  try {
+    if (const double part = parseNumber(text, "until"); part > 0 && part <= 1) return part;
+  } catch (const UsageError&) {  // told below
+  }
+  throw UsageError(
+      fmt::format("{}: '{}' is no part of the way; write converged, or a number above "
+                  "0 and up to 1",
+                  in.where("until"), text));
 }
 
 constexpr long kMostSteps = 100000;
 
 void validateMorph(const Invocation& in) {
   if (in.given("keep-steps")) (void)stepPattern(in);
-  if (partOfTheWay(in) > 1) {
-    throw UsageError(fmt::format("{}: '{}' is past the target; give a part of the way up to 1",
-                                 in.where("until"), in.text("until")));
-  }
+  if (partOfTheWay(in) < 1 && in.given("tolerance"))
+    throw UsageError(
+        "morph: --tolerance tells when the target is reached, and --until ends before; "
+        "leave one of them out");
   if (in.integer("steps") > kMostSteps) {
     throw UsageError(fmt::format("{}: {} are too many; give at most {}", in.where("steps"),
                                  in.text("steps"), kMostSteps));
@@ -108,13 +119,19 @@ Value morph(Invocation& in) {
                                  .until = partOfTheWay(in),
                                  .maxMemory = in.maxMemory,
                                  .progress = in.progress};
+  if (in.given("tolerance")) options.tolerance = in.length("tolerance");
   if (in.given("keep-steps")) {
     const std::string pattern = stepPattern(in);
     options.keep = [pattern](const NarrowBand& step, int number) {
       levelset::writeBand(stepFile(pattern, number), step);
     };
   }
-  return Value(levelset::morph(in.band(0), in.band(1), options));
+  NarrowBand result = levelset::morph(in.band(0), in.band(1), options);
+  if (options.tolerance) {
+    in.notes.errors.push_back({"distance to the target, largest",
+                               levelset::compare(result, in.band(1)).hausdorff(), "world units"});
+  }
+  return Value(std::move(result));
 }
 
 }  // namespace
@@ -188,7 +205,12 @@ void addFlowOperators(std::vector<Operator>& all) {
                    .fallback = "1",
                    .range = Range::Positive},
                   {.name = "until",
-                   .doc = "part of the way, up to 1; default: the target",
+                   .type = ParamType::Text,
+                   .doc = "converged: on the target; or a part of the way, above 0 and up to 1",
+                   .fallback = "converged"},
+                  {.name = "tolerance",
+                   .type = ParamType::Length,
+                   .doc = "a step as near as this to the target is the last",
                    .range = Range::Positive},
                   {.name = "keep-steps",
                    .type = ParamType::Path,

@@ -77,6 +77,16 @@ TEST(Morph, StopsOnTheWay) {
   EXPECT_NEAR(std::cbrt(3 * measure(half).volume / (4 * M_PI)), 12, 0.05);
 }
 
+TEST(Morph, EndsOnceItIsNearEnough) {
+  // Radii 8, 10, 12, 14, 16: the fourth is the first within 2.1 of the target.
+  int steps = 0;
+  const NarrowBand result =
+      morph(makeSphere(6, V3d(0.2), 1), makeSphere(16, V3d(0.2), 1),
+            {.steps = 5, .tolerance = 2.1, .keep = [&](const NarrowBand&, int n) { steps = n; }});
+  EXPECT_EQ(steps, 4);
+  EXPECT_NEAR(std::cbrt(3 * measure(result).volume / (4 * M_PI)), 14, 0.05);
+}
+
 TEST(Morph, WorksAcrossGrids) {
   const NarrowBand ball = makeSphere(1, V3d(0), 0.1), box = makeBox(V3d(1.6), V3d(0.1, 0, 0), 0.13);
   const NarrowBand result = morph(ball, box, {.steps = 3});
@@ -94,6 +104,7 @@ TEST(Morph, Refuses) {
   const NarrowBand a = makeSphere(6, V3d(0.2), 1);
   EXPECT_THROW((void)morph(a, a, {.steps = 0}), UsageError);
   EXPECT_THROW((void)morph(a, a, {.until = 0}), UsageError);
+  EXPECT_THROW((void)morph(a, a, {.tolerance = 0}), UsageError);
   EXPECT_THROW((void)morph(a, a, {.until = std::numeric_limits<double>::quiet_NaN()}), UsageError);
   EXPECT_THROW((void)morph(NarrowBand(), a), InvalidInput);
   EXPECT_THROW((void)morph(a, NarrowBand()), InvalidInput);
