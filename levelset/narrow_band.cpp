@@ -121,7 +121,7 @@ NarrowBand makeBand(FloatGrid::Ptr grid) {
   return NarrowBand(std::make_shared<VdbGrid>(VdbGrid{std::move(grid)}));
 }
 
-NarrowBand importBand(FloatGrid::Ptr grid, const char* action) {
+NarrowBand importBand(FloatGrid::Ptr grid, const char* action, BandRepairs* repairs) {
   if (!grid) throw InvalidInput(fmt::format("{}: there is no float grid", action));
   const std::string name = grid->getName().empty() ? "(unnamed)" : grid->getName();
   if (grid->getGridClass() != openvdb::GRID_LEVEL_SET) {
@@ -143,7 +143,15 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action) {
                     "positive one",
                     action, name, background));
   }
+  BandRepairs made;
+  made.activeTiles = grid->tree().activeTileCount();
   grid->tree().voxelizeActiveTiles();
+  // Half floats round the background of a file that holds them.
+  const auto takes = [&](float& value) {
+    const float right = std::signbit(value) ? -background : background;
+    made.inactiveValues += std::abs(value - right) > 1e-3f * background;
+    value = right;
+  };
   for (auto leaf = grid->tree().beginLeaf(); leaf; ++leaf) {
     float* values = leaf->buffer().data();
     for (openvdb::Index i = 0; i < LeafNode::SIZE; ++i) {
@@ -153,7 +161,7 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action) {
                         "again",
                         action, name, values[i], coordText(leaf->offsetToGlobalCoord(i))));
       }
-      if (!leaf->isValueOn(i)) values[i] = std::signbit(values[i]) ? -background : background;
+      if (!leaf->isValueOn(i)) takes(values[i]);
     }
   }
   for (auto it = grid->tree().beginValueOff(); it; ++it) {
@@ -162,8 +170,11 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action) {
       throw InvalidInput(
           fmt::format("{}: grid '{}' holds {} in a tile; repair the file", action, name, *it));
     }
-    it.setValue(std::signbit(*it) ? -background : background);
+    float value = *it;
+    takes(value);
+    it.setValue(value);
   }
+  if (repairs) *repairs = made;
   return NarrowBand(std::make_shared<VdbGrid>(VdbGrid{std::move(grid)}));
 }
 

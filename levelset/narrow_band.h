@@ -16,6 +16,12 @@ struct VdbGrid;  // levelset/vdb.h, for .cpp files only
 /// bits.
 inline constexpr double kIndexLimit = 2147483648.0 - 8192;
 
+/// What a grid from outside lacked to be a band.
+struct BandRepairs {
+  std::uint64_t activeTiles = 0;     ///< were split into voxels
+  std::uint64_t inactiveValues = 0;  ///< were not ± background, and were set to it by their sign
+};
+
 /// A solid as a signed distance in a narrow band on a sparse grid: `float` values in world units,
 /// negative inside, |∇φ| ≈ 1 in the band, ± background elsewhere.
 ///

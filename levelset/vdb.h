@@ -29,10 +29,12 @@ struct VdbAccess {
 [[nodiscard]] NarrowBand makeBand(openvdb::FloatGrid::Ptr grid);
 
 /// Checks the invariants of a grid that came from outside and takes it.
-/// Active tiles are voxelised, inactive values are set to ± background.
+/// Active tiles are voxelised, inactive values are set to ± background by their sign; `repairs`,
+/// if given, counts them.
 /// @throws InvalidInput for NaN or infinite values, a background ≤ 0, a class other than level set,
 ///         or a transform that is not a rotation, uniform scale and translation
-[[nodiscard]] NarrowBand importBand(openvdb::FloatGrid::Ptr grid, const char* action);
+[[nodiscard]] NarrowBand importBand(openvdb::FloatGrid::Ptr grid, const char* action,
+                                    BandRepairs* repairs = nullptr);
 
 [[nodiscard]] inline Imath::V3d toImath(const openvdb::Vec3d& v) {
   return {v.x(), v.y(), v.z()};

@@ -149,7 +149,8 @@ struct ChosenGrid {
 
   [[nodiscard]] NarrowBand band() const {
     if (!hasNumbers(entry)) refuseType("float, half and double");
-    return importBand(load<openvdb::FloatGrid>(readVdbTree, false), action().c_str());
+    return importBand(load<openvdb::FloatGrid>(readVdbTree, false), action().c_str(),
+                      options.repairs);
   }
 
   [[nodiscard]] FieldGrid field() const {
@@ -253,7 +254,21 @@ T metadataValue(const VdbEntry& entry, const char* key, T otherwise) {
   return value;
 }
 
-GridInfo describe(const VdbEntry& entry) {
+/// The box around the corners of an index box in the world.
+Imath::Box3d worldBox(const Imath::Box3d& box, const openvdb::math::Transform& transform) {
+  Imath::Box3d result;
+  for (int corner = 0; corner < 8; ++corner) {
+    openvdb::Vec3d p;
+    for (int axis = 0; axis < 3; ++axis)
+      p[axis] = corner >> axis & 1 ? box.max[axis] : box.min[axis];
+    result.extendBy(toImath(transform.indexToWorld(p)));
+  }
+  return result;
+}
+
+/// @param owner  the entry that holds the tree
+GridInfo describe(const VdbEntry& entry, const VdbEntry& owner, std::string_view file,
+                  const std::string& name) {
   using openvdb::GridBase;
   GridInfo info;
   info.name = entry.name;
@@ -272,6 +287,10 @@ GridInfo describe(const VdbEntry& entry) {
   if (low[0] <= high[0] && low[1] <= high[1] && low[2] <= high[2])
     info.indexBounds =
         Imath::Box3d(Imath::V3d(low[0], low[1], low[2]), Imath::V3d(high[0], high[1], high[2]));
+  if (entry.transform && !info.indexBounds.isEmpty())
+    info.worldBounds = worldBox(info.indexBounds, *entry.transform);
+  if (info.isLevelSet && info.voxelSize > 0)
+    info.halfWidth = readVdbBackground(file, name, owner) / info.voxelSize;
   return info;
 }
 
@@ -332,8 +351,9 @@ std::vector<GridInfo> bandFileInfo(const fs::path& path) {
   const std::string name = inputName(path);
   const Bytes bytes = readBytes(path, kNoMemoryLimit);
   std::vector<GridInfo> result;
-  for (const VdbEntry& entry : readVdbEntries(bytes.view(), name))
-    result.push_back(describe(entry));
+  const std::vector<VdbEntry> entries = readVdbEntries(bytes.view(), name);
+  for (const VdbEntry& entry : entries)
+    result.push_back(describe(entry, treeOwner(entries, entry, name), bytes.view(), name));
   return result;
 }
 

@@ -18,6 +18,7 @@ namespace levelset {
 struct ReadBandOptions {
   std::string grid = {};  ///< name of the grid; empty: the only float level set of the file
   std::size_t maxMemory = kNoMemoryLimit;
+  BandRepairs* repairs = nullptr;  ///< told what the grid lacked to be a band
 };
 
 /// Values stored as half floats or doubles become floats.
@@ -63,7 +64,9 @@ struct GridInfo {
   bool isLevelSet = false;         ///< of that class, and of numbers: readBand takes it
   std::uint64_t activeVoxels = 0;  ///< 0 when the file does not say
   double voxelSize = 0;            ///< 0 when the voxels are no cubes of one size
+  double halfWidth = 0;            ///< voxels, of a level set; else 0
   Imath::Box3d indexBounds;        ///< empty when the file does not say
+  Imath::Box3d worldBounds;        ///< of the centres of its active voxels; empty likewise
   std::uint64_t bytes = 0;         ///< of memory that its tree takes; 0 when the file does not say
 };
 [[nodiscard]] std::vector<GridInfo> bandFileInfo(const std::filesystem::path& path);

@@ -159,6 +159,7 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
   const auto grid = convert::assembleBand(local, field, origin, voxelSize, options.halfWidth,
                                           maxMemory, subProgress(progress, 0.6, 1));
   certificate.ambiguousShare = convert::ambiguousShare(*grid, field, origin);
+  if (options.certified) options.certified(certificate);
   checkResult(*grid, certificate, options);
   report(progress, 1, kAction);
   return {makeBand(grid), certificate};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
 
 #include "levelset/mesh.h"
@@ -20,19 +21,6 @@ enum class Nesting {
   Orientation  ///< nested shells follow the way they face
 };
 
-struct MeshToBandOptions {
-  double halfWidth = 3;  ///< voxels, at least 1
-  SignMode sign = SignMode::Auto;
-  Nesting nesting = Nesting::Parity;    ///< read under Closed only
-  bool signAnyway = false;              ///< accept a sign that the certificate calls a guess
-  bool searchSelfIntersections = true;  ///< when false, Auto trusts the mesh to have none
-  std::size_t maxMemory = kNoMemoryLimit;
-  Progress progress = {};
-};
-
-/// A larger SignCertificate::ambiguousShare makes the sign a guess.
-inline constexpr double kAmbiguousLimit = 1e-3;
-
 /// Why the sign may be trusted, or not.
 struct SignCertificate {
   bool closed = false;                    ///< every edge has exactly two faces
@@ -44,6 +32,21 @@ struct SignCertificate {
   double ambiguousShare = 0;              ///< of voxels next to the zero set, |w − 0.5| < 0.25
   std::size_t droppedTriangles = 0;       ///< without area, or repeated exactly
 };
+
+struct MeshToBandOptions {
+  double halfWidth = 3;  ///< voxels, at least 1
+  SignMode sign = SignMode::Auto;
+  Nesting nesting = Nesting::Parity;    ///< read under Closed only
+  bool signAnyway = false;              ///< accept a sign that the certificate calls a guess
+  bool searchSelfIntersections = true;  ///< when false, Auto trusts the mesh to have none
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
+  /// Told the certificate once it is whole, also when the mesh is refused after it.
+  std::function<void(const SignCertificate&)> certified = {};
+};
+
+/// A larger SignCertificate::ambiguousShare makes the sign a guess.
+inline constexpr double kAmbiguousLimit = 1e-3;
 
 /// The certificate as one line for people.
 [[nodiscard]] std::string describe(const SignCertificate& certificate);

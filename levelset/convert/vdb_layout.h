@@ -96,6 +96,10 @@ struct VdbTreeLimits {
                                                         const VdbEntry& entry,
                                                         const VdbTreeLimits& limits);
 
+/// The background of such a tree, from its head alone.
+[[nodiscard]] double readVdbBackground(std::string_view file, const std::string& name,
+                                       const VdbEntry& entry);
+
 /// Takes bytes past the tree of an entry, for files that do not say where it ends.
 void skipVdbTree(VdbBytes& bytes, const VdbEntry& entry);
 

@@ -355,6 +355,12 @@ openvdb::Vec3STree::Ptr readVdbVectorTree(std::string_view file, const std::stri
   return narrowed(*TreeReader<openvdb::Vec3DTree>(bytes, entry, limits).read());
 }
 
+double readVdbBackground(std::string_view file, const std::string& name, const VdbEntry& entry) {
+  VdbBytes bytes(file, name);
+  bytes.seek(entry.treePosition + sizeof(std::int32_t));  // behind the count of buffers
+  return hasFloatTree(entry) ? static_cast<double>(bytes.value<float>()) : bytes.value<double>();
+}
+
 void skipVdbTree(VdbBytes& bytes, const VdbEntry& entry) {
   if (hasFloatTree(entry))
     TreeReader<openvdb::FloatTree>(bytes, entry, {}).skip();

@@ -48,10 +48,12 @@ Value levelSet(Invocation& in) {
                                      : SignMode::Auto;
   options.nesting = in.text("nested") == "orientation" ? levelset::Nesting::Orientation
                                                        : levelset::Nesting::Parity;
+  options.certified = [&](const SignCertificate& certificate) {
+    in.notes.certificateJson = certificateJson(certificate);
+    in.notes.notes.push_back(describe(certificate));
+  };
   levelset::MeshToBandResult result =
       levelset::meshToBand(in.mesh(), in.voxelSize(longestSide(in.operands[0])), options);
-  in.notes.certificateJson = certificateJson(result.certificate);
-  in.notes.notes.push_back(describe(result.certificate));
   if (options.signAnyway && result.certificate.ambiguousShare > levelset::kAmbiguousLimit) {
     in.notes.warnings.push_back(
         fmt::format("the sign is a guess at a share of {:.2g} of the voxels beside the surface",

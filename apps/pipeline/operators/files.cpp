@@ -53,10 +53,23 @@ Value read(Invocation& in) {
     return Value(levelset::readMesh(
         file, {.format = in.text("format"), .maxMemory = in.maxMemory, .progress = in.progress}));
   }
-  const levelset::ReadBandOptions options{.grid = in.text("grid"), .maxMemory = in.maxMemory};
-  if (!in.given("grid")) return Value(levelset::readBand(file, options));
-  return std::visit([](auto&& grid) { return Value(std::forward<decltype(grid)>(grid)); },
-                    levelset::readGrid(file, options));
+  levelset::BandRepairs repairs;
+  const levelset::ReadBandOptions options{
+      .grid = in.text("grid"), .maxMemory = in.maxMemory, .repairs = &repairs};
+  Value value = in.given("grid") ? std::visit([](auto&& grid) { return Value(std::move(grid)); },
+                                              levelset::readGrid(file, options))
+                                 : Value(levelset::readBand(file, options));
+  if (repairs.activeTiles > 0)
+    in.notes.warnings.push_back(
+        fmt::format("{} active tiles of {} were split into voxels; 'reinitialize' gives them "
+                    "distances",
+                    repairs.activeTiles, file.string()));
+  if (repairs.inactiveValues > 0)
+    in.notes.warnings.push_back(fmt::format(
+        "{} inactive values of {} were set to the background of their sign; run 'check' "
+        "to see whether the signs are right",
+        repairs.inactiveValues, file.string()));
+  return value;
 }
 
 /// Meshes are read, since lengths resolve on their size; of bands the header is enough.
@@ -69,9 +82,14 @@ Plan planRead(Invocation& in) {
       plan.fieldBytes = static_cast<double>(grid.bytes);
       return plan;
     }
-    Plan plan{.kind = Kind::Band, .voxelSize = grid.voxelSize, .halfWidth = 3};
-    if (!grid.indexBounds.isEmpty())
-      plan.bounds = {grid.indexBounds.min * grid.voxelSize, grid.indexBounds.max * grid.voxelSize};
+    Plan plan{.kind = Kind::Band, .voxelSize = grid.voxelSize, .halfWidth = grid.halfWidth};
+    if (!grid.worldBounds.isEmpty()) {
+      // The zero set lies half a band's width inside of its voxels.
+      plan.bounds = grid.worldBounds;
+      const Imath::V3d rim(plan.halfWidth * plan.voxelSize);
+      if (Imath::Box3d inner(plan.bounds.min + rim, plan.bounds.max - rim); !inner.isEmpty())
+        plan.bounds = inner;
+    }
     plan.area = static_cast<double>(grid.activeVoxels) * grid.voxelSize * grid.voxelSize /
                 (2 * plan.halfWidth);
     return plan;

@@ -112,6 +112,30 @@ TEST_F(Command, WritesAReport) {
   EXPECT_NE(support::slurp(folder_ / "r.html").find("<table>"), std::string::npos);
 }
 
+TEST_F(Command, ReportsTheCertificateOfARefusedMesh) {
+  // A box without its top, whose sign is a guess along the hole.
+  writeFile("open.off",
+            "OFF\n8 10 0\n-1 -1 -1\n1 -1 -1\n1 1 -1\n-1 1 -1\n-1 -1 1\n1 -1 1\n1 1 1\n-1 1 1\n"
+            "3 0 2 1\n3 0 3 2\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n"
+            "3 3 4 7\n");
+  EXPECT_REFUSED(levelsmith("--report r.json read open.off ! level-set --voxel 0.1"), 3, "guess");
+  const Json report = Json::parse(support::slurp(folder_ / "r.json"));
+  EXPECT_EQ(report["exit_code"], 3);
+  EXPECT_EQ(report["steps"][1]["certificate"]["boundary_edges"], 4);
+  EXPECT_GT(report["steps"][1]["certificate"]["ambiguous_share"], 1e-3);
+}
+
+TEST_F(Command, PlansATurnedBandWhereItLies) {
+  ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 --half-width 5 ! transform --rotate "
+                       "30 ! transform --translate 100,0,0 ! write a.vdb")
+                .code,
+            0);
+  ASSERT_EQ(levelsmith("--dry-run --report r.json read a.vdb ! render a.png").code, 0);
+  const Json read = Json::parse(support::slurp(folder_ / "r.json"))["steps"][0]["result"];
+  EXPECT_NEAR(read["half_width"], 5, 1e-6);
+  EXPECT_NEAR(read["voxel_size"], 0.1, 1e-9);
+}
+
 TEST_F(Command, DryRunComputesAndWritesNothing) {
   const auto outcome =
       levelsmith("--dry-run sphere --radius 1 --voxel 0.001 ! offset 2vx ! mesh ! write out.ply");

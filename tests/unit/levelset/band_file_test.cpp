@@ -145,8 +145,26 @@ TEST(BandFile, ReadsActiveTilesAsVoxels) {
   const auto grid = gridOf(sphere(), "a");
   grid->tree().addTile(1, openvdb::Coord(800, 0, 0), -0.25f, true);
   writeForeign(folder / "a.vdb", {grid});
-  const NarrowBand band = readBand(folder / "a.vdb");
+  levelset::BandRepairs repairs;
+  const NarrowBand band = readBand(folder / "a.vdb", {.repairs = &repairs});
   EXPECT_EQ(band.activeVoxelCount(), sphere().activeVoxelCount() + 512);
+  EXPECT_EQ(repairs.activeTiles, 1u);
+  EXPECT_EQ(repairs.inactiveValues, 0u);
+}
+
+TEST(BandFile, TellsWhatItRepaired) {
+  const TemporaryFolder folder;
+  const auto grid = gridOf(sphere(), "a");
+  const auto leaf = grid->tree().beginLeaf();
+  for (auto it = leaf->beginValueOff(); it; ++it) it.setValue(0.25f * *it);
+  const auto changed = leaf->offVoxelCount();
+  ASSERT_GT(changed, 0u);
+  writeForeign(folder / "a.vdb", {grid}, openvdb::io::COMPRESS_ZIP);
+  levelset::BandRepairs repairs;
+  const NarrowBand band = readBand(folder / "a.vdb", {.repairs = &repairs});
+  EXPECT_EQ(repairs.inactiveValues, changed);
+  EXPECT_EQ(band.contentHash(), sphere().contentHash());
+  static_cast<void>(readBand(folder / "a.vdb"));  // nobody need ask
 }
 
 TEST(BandFile, ReadsASharedTree) {
@@ -313,6 +331,22 @@ TEST(BandFile, TellsWhatIsInAFile) {
   EXPECT_EQ(grids[1].type, "double");
   EXPECT_EQ(grids[1].gridClass, "fog volume");
   EXPECT_TRUE(grids[1].indexBounds.isEmpty());
+}
+
+TEST(BandFile, TellsWhereABandLies) {
+  const TemporaryFolder folder;
+  NarrowBand band = support::sampleBand([](const Imath::V3d& p) { return p.length() - 4; },
+                                        Imath::Box3d(Imath::V3d(-4), Imath::V3d(4)), 0.25, 5);
+  levelset::editVdb(band).transform().postRotate(0.3, openvdb::math::Y_AXIS);
+  levelset::editVdb(band).transform().postTranslate(openvdb::Vec3d(1, -7, 30));
+  levelset::writeBand(folder / "a.vdb", band);
+  const levelset::GridInfo info = levelset::bandFileInfo(folder / "a.vdb").at(0);
+  EXPECT_NEAR(info.halfWidth, 5, 1e-6);
+  EXPECT_NEAR((info.worldBounds.center() - Imath::V3d(1, -7, 30)).length(), 0, 1e-6);
+  // A turned box around the ball and its band: as wide as its edges' projections.
+  const double reach = (4 + 5 * 0.25) * (std::cos(0.3) + std::sin(0.3));
+  EXPECT_NEAR(info.worldBounds.size().x / 2, reach, 0.5);
+  EXPECT_NEAR(info.worldBounds.size().y / 2, 4 + 5 * 0.25, 0.26);
 }
 
 TEST(BandFile, TellsFormatsByName) {
