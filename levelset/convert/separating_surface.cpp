@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <span>
 
 #include "levelset/convert/exact_predicates.h"
+#include "levelset/convert/near_surface.h"
 #include "levelset/convert/progress_gate.h"
 #include "levelset/convert/self_intersections.h"
 #include "levelset/convert/winding.h"
@@ -19,12 +21,17 @@ namespace {
 
 using Imath::V3d;
 using Polygon = std::vector<V3d>;
+/// Polygons that are kept, or not, as a whole.
+using Sheet = std::vector<Polygon>;
 
 constexpr const char* kAction = "level-set";
 /// With more points to judge than this, the winding number is summed over a tree.
 constexpr std::size_t kFewPoints = 16;
 /// Of a polygon's size: corners nearer to a plane count as on it.
 constexpr double kOnPlane = 1e-12;
+/// Voxels: folds no deeper than this stay as they are. No grid shows what they hide, and distances
+/// stay those to the mesh as it was given.
+constexpr double kShallow = 0.25;
 
 /// The directed edges of triangles, to find those that share one with a single neighbour.
 struct HalfEdge {
@@ -121,9 +128,21 @@ class SeparatingSurface {
       kept[patches[i]] = separates(t, corners(t));
     });
     LocalMesh result{mesh_.points, {}};
-    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
-      if (!isCrossed(t) && kept[groups_->find(t)]) result.triangles.push_back(mesh_.triangles[t]);
-    addPieces(result);
+    std::map<std::uint32_t, Sheet> dropped;  // by patch
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+      if (isCrossed(t)) continue;
+      const std::uint32_t patch = groups_->find(t);
+      if (kept[patch]) {
+        result.triangles.push_back(mesh_.triangles[t]);
+      } else {
+        const auto c = corners(t);
+        dropped[patch].emplace_back(c.begin(), c.end());
+      }
+    }
+    std::vector<Sheet> sheets;
+    for (auto& [patch, sheet] : dropped) sheets.push_back(std::move(sheet));
+    addPieces(result, sheets);
+    addShallow(sheets, result);
     return result;
   }
 
@@ -266,25 +285,71 @@ class SeparatingSurface {
     return result;
   }
 
-  void addPieces(LocalMesh& result) const {
+  static void add(const Polygon& polygon, LocalMesh& result) {
+    const auto first = static_cast<std::uint32_t>(result.points.size());
+    result.points.insert(result.points.end(), polygon.begin(), polygon.end());
+    for (std::uint32_t k = 2; k < polygon.size(); ++k)
+      result.triangles.push_back({first, first + k - 1, first + k});
+  }
+
+  /// What separates goes to the result, the rest to the sheets.
+  void addPieces(LocalMesh& result, std::vector<Sheet>& sheets) const {
     std::vector<std::uint32_t> crossed;
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
       if (isCrossed(t)) crossed.push_back(t);
-    std::vector<std::vector<Polygon>> found(crossed.size());
+    struct Found {
+      std::vector<Polygon> kept, dropped;
+    };
+    std::vector<Found> found(crossed.size());
     const Progress last = subProgress(progress_, 0.9, 1);
     ProgressGate gate(last, crossed.size(), kAction);
     tbb::parallel_for(std::size_t{0}, crossed.size(), [&](std::size_t i) {
       for (Polygon& piece : pieces(crossed[i]))
-        if (separates(crossed[i], piece)) found[i].push_back(std::move(piece));
+        (separates(crossed[i], piece) ? found[i].kept : found[i].dropped)
+            .push_back(std::move(piece));
       gate.advance(1);
     });
-    for (const auto& list : found)
-      for (const Polygon& piece : list) {
-        const auto first = static_cast<std::uint32_t>(result.points.size());
-        result.points.insert(result.points.end(), piece.begin(), piece.end());
-        for (std::uint32_t k = 2; k < piece.size(); ++k)
-          result.triangles.push_back({first, first + k - 1, first + k});
-      }
+    for (Found& list : found) {
+      for (const Polygon& piece : list.kept) add(piece, result);
+      for (Polygon& piece : list.dropped) sheets.push_back({std::move(piece)});
+    }
+  }
+
+  /// Gives back the sheets that lie within kShallow of the result all over.
+  static void addShallow(const std::vector<Sheet>& sheets, LocalMesh& result) {
+    // One point of each tells the deep ones.
+    std::vector<V3d> points;
+    for (const Sheet& sheet : sheets) {
+      const auto largest =
+          std::max_element(sheet.begin(), sheet.end(), [](const Polygon& a, const Polygon& b) {
+            return areaVector(a).length2() < areaVector(b).length2();
+          });
+      points.push_back(centroid(*largest));
+    }
+    const std::vector<char> isNear = areNear(result, points, kShallow);
+    points.clear();
+    std::vector<std::size_t> candidates, ends;
+    for (std::size_t i = 0; i < sheets.size(); ++i) {
+      if (!isNear[i]) continue;
+      for (const Polygon& polygon : sheets[i]) addSamples(polygon, points);
+      candidates.push_back(i);
+      ends.push_back(points.size());
+    }
+    const std::vector<char> areSamplesNear = areNear(result, points, kShallow);
+    for (std::size_t k = 0, from = 0; k < candidates.size(); from = ends[k++]) {
+      const auto first = areSamplesNear.begin();
+      if (std::all_of(first + static_cast<std::ptrdiff_t>(from),
+                      first + static_cast<std::ptrdiff_t>(ends[k]), [](char near) { return near; }))
+        for (const Polygon& polygon : sheets[candidates[k]]) add(polygon, result);
+    }
+  }
+
+  static void addSamples(const Polygon& polygon, std::vector<V3d>& points) {
+    points.push_back(centroid(polygon));
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      points.push_back(polygon[i]);
+      points.push_back((polygon[i] + polygon[(i + 1) % polygon.size()]) / 2);
+    }
   }
 
   const LocalMesh& mesh_;

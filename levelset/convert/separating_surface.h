@@ -7,7 +7,8 @@ namespace levelset::convert {
 
 /// The part of a mesh without boundary that has the solid on one side and not on the other: where
 /// shells overlap, or one lies in another of the same orientation, the sheets inside separate
-/// nothing. Triangles that cross others are cut along them.
+/// nothing. Triangles that cross others are cut along them. Folds shallower than a quarter voxel
+/// stay.
 /// @param flip  −1 when the mesh faces inwards and is taken to be turned
 [[nodiscard]] LocalMesh separatingSurface(const LocalMesh& mesh, double flip,
                                           const Progress& progress);

@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
-#include <numeric>
+#include <optional>
 
 #include "levelset/eikonal/arrival_blocks.h"
 
@@ -17,9 +18,9 @@ using Mask = ArrivalBlock::Mask;
 
 // Improvements below this part of a voxel's time do not count.
 constexpr float kImprovement = 1e-5f;
-// Blocks whose news are later than the earliest by more than this wait, voxels: what they would
-// compute now is not final yet.
-constexpr float kWindow = 8;
+// News later than the earliest by more than this wait, voxels: what they would lead to now is not
+// final yet. First-order sweeps work on whole blocks, the second solution grid point by grid point.
+constexpr float kBlockWindow = 8, kPointWindow = 1.5f;
 constexpr std::size_t kBlocksPerTask = 8;
 
 int parityOf(const Coord& origin) {
@@ -32,13 +33,14 @@ struct Desk {
   std::uint8_t newsFrom = 0;    ///< bit d: neighbour d has news
   std::uint8_t tells = 0;       ///< bit d: neighbour d should look; written by the block's own work
   std::array<float, 6> told{};  ///< earliest change at that face
-  std::unique_ptr<std::array<std::uint16_t, ArrivalBlock::kSize>> order;  ///< by first-order time
-  std::unique_ptr<std::array<float, ArrivalBlock::kSize>> second;         ///< second-order times
+  std::optional<std::vector<std::uint16_t>> order;  ///< what is to be solved, by first-order time
+  Mask pending;  ///< of these, what has not been solved, or has news
+  std::unique_ptr<std::array<float, ArrivalBlock::kSize>> second;  ///< second-order times
 };
 
-/// Calls work(block, desk) for the blocks that have news until none has: the eight parities of
-/// block positions in turn, one parity in parallel, since its blocks do not touch; the earliest
-/// first. The order is fixed, hence the result.
+/// Calls work(block, desk, latest time that may be final) for the blocks that have news until none
+/// has: the eight parities of block positions in turn, one parity in parallel, since its blocks do
+/// not touch; the earliest first. The order is fixed, hence the result.
 class Rounds {
  public:
   explicit Rounds(ArrivalBlocks& blocks) : blocks_(blocks) {}
@@ -52,13 +54,13 @@ class Rounds {
   }
 
   template <typename Work>
-  void run(bool mayGrow, double from, double to, const Work& work) {
+  void run(bool mayGrow, float width, double from, double to, const Work& work) {
     sortNew();
     float window = 0;
     for (;;) {
       const float earliest = earliestNews();
       if (earliest == kFar) return;
-      window = std::max(window, earliest + kWindow);
+      window = std::max(window, earliest + width);
       report(subProgress(blocks_.settings().progress, from, to),
              std::min(1.0, static_cast<double>(earliest) / blocks_.settings().until),
              blocks_.settings().action);
@@ -69,7 +71,7 @@ class Rounds {
         const auto range = tbb::blocked_range<std::size_t>(0, due.size(), kBlocksPerTask);
         tbb::parallel_for(range, [&](const auto& part) {
           for (std::size_t i = part.begin(); i != part.end(); ++i)
-            work(blocks_.block(due[i]), desks[due[i]]);
+            work(blocks_.block(due[i]), desks[due[i]], window);
         });
         for (const std::uint32_t i : due) deliver(i, mayGrow);
         if (mayGrow) sortNew();
@@ -239,69 +241,128 @@ class FirstOrderWorker {
 class SecondOrderWorker {
  public:
   SecondOrderWorker(ArrivalBlock& block, Desk& desk, const std::vector<Desk>& desks, float until)
-      : block_(block), desk_(desk), desks_(desks), until_(until) {}
+      : block_(block), desk_(desk), until_(until) {
+    for (std::size_t d = 0; d < 6; ++d)
+      if (const ArrivalBlock* other = block.neighbours[d])
+        views_[d] = {other, desks[other->number].second->data()};
+    views_[kOwn] = {&block, desk.second->data()};
+  }
 
-  void run() {
+  /// Solves what is pending and not later than `window`.
+  void run(float window) {
     if (!desk_.order) sortByTime();
+    markNews();
+    desk_.earliest = kFar;
     for (const std::uint16_t n : *desk_.order) {
-      if (block_.known.isOn(n)) continue;
-      if (block_.time[n] > until_) break;
+      if (!desk_.pending.isOn(n)) continue;
+      if (block_.time[n] > window) {
+        desk_.earliest = block_.time[n];
+        break;
+      }
+      desk_.pending.setOff(n);
       const auto time = static_cast<float>(solve(n));
       float& stored = (*desk_.second)[n];
       if (std::abs(time - stored) <= kImprovement) continue;
       stored = time;
       tell(desk_, n, block_.time[n], 2);
+      markReaders(n);
     }
     desk_.newsFrom = 0;
-    desk_.earliest = kFar;
   }
 
  private:
-  void sortByTime() {
-    desk_.order = std::make_unique<std::array<std::uint16_t, ArrivalBlock::kSize>>();
-    std::iota(desk_.order->begin(), desk_.order->end(), std::uint16_t{0});
-    std::sort(desk_.order->begin(), desk_.order->end(), [&](std::uint16_t a, std::uint16_t b) {
-      return std::pair(block_.time[a], a) < std::pair(block_.time[b], b);
-    });
+  /// The two layers beside each neighbour with news read from it.
+  void markNews() {
+    for (std::size_t d = 0; d < 6; ++d) {
+      if (!(desk_.newsFrom >> d & 1)) continue;
+      const Index shift = 6 - 3 * static_cast<Index>(d >> 1);
+      for (Index n = 0; n < ArrivalBlock::kSize; ++n) {
+        const Index at = n >> shift & 7u;
+        if (d & 1 ? at >= 6 : at < 2) desk_.pending.setOn(n);
+      }
+    }
   }
 
+  /// The grid points of the block up to two away that come later.
+  void markReaders(Index n) {
+    const auto mark = [&, time = block_.time[n]](Index reader) {
+      if (block_.time[reader] > time) desk_.pending.setOn(reader);
+    };
+    for (const Index shift : {0u, 3u, 6u}) {
+      const Index at = n >> shift & 7u, step = 1u << shift;
+      if (at > 0) mark(n - step);
+      if (at > 1) mark(n - 2 * step);
+      if (at < 7) mark(n + step);
+      if (at < 6) mark(n + 2 * step);
+    }
+  }
+
+  void sortByTime() {
+    // Times are not negative: their bits sort as they do.
+    std::array<std::uint64_t, ArrivalBlock::kSize> keys;
+    std::size_t count = 0;
+    for (Index n = 0; n < ArrivalBlock::kSize; ++n)
+      if (!block_.known.isOn(n) && block_.time[n] <= until_)
+        keys[count++] = std::uint64_t{std::bit_cast<std::uint32_t>(block_.time[n])} << 16 | n;
+    std::sort(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(count));
+    desk_.order.emplace(count);
+    for (std::size_t i = 0; i < count; ++i)
+      (*desk_.order)[i] = static_cast<std::uint16_t>(keys[i] & 0xFFFF);
+    desk_.pending.setOn();
+  }
+
+  static constexpr std::size_t kOwn = 6;
+  /// The block itself, or one beside it: what the first and the second solution say there.
+  struct View {
+    const ArrivalBlock* block = nullptr;
+    const float* second = nullptr;
+  };
   struct Neighbour {
     float first = kFar;  ///< time of the first solution
     double time = 0;     ///< of the second, with its sign
   };
-  [[nodiscard]] Neighbour read(const ArrivalBlock* at, Index n, bool inside) const {
-    if (!at || !(at->time[n] < kFar)) return {};
-    const bool same = at->inside.isOn(n) == inside;
-    const auto& second = desks_[at->number].second;
-    const double time = static_cast<double>(second ? (*second)[n] : at->time[n]);
-    return {same ? at->time[n] : -at->time[n], same ? time : -time};
+  [[nodiscard]] Neighbour read(const View& view, Index n, bool inside) const {
+    if (!view.block || !(view.block->time[n] < kFar)) return {};
+    const bool same = view.block->inside.isOn(n) == inside;
+    const float first = view.block->time[n];
+    const auto second = static_cast<double>(view.second[n]);
+    return same ? Neighbour{first, second} : Neighbour{-first, -second};
+  }
+
+  /// `count` grid points away in direction d.
+  [[nodiscard]] Neighbour look(Index n, std::size_t d, Index count, bool inside) const {
+    const Index shift = 6 - 3 * static_cast<Index>(d >> 1), at = n >> shift & 7u;
+    if (d & 1) {
+      return at + count > 7 ? read(views_[d], n + (count << shift) - (8u << shift), inside)
+                            : read(views_[kOwn], n + (count << shift), inside);
+    }
+    return at < count ? read(views_[d], n + (8u << shift) - (count << shift), inside)
+                      : read(views_[kOwn], n - (count << shift), inside);
   }
 
   double solve(Index n) {
     const bool inside = block_.inside.isOn(n);
-    UpwindTerms terms, plain;
-    for (int axis = 0; axis < 3; ++axis) {
-      Index low = 0, high = 0;
-      const ArrivalBlock* below = block_.step(n, 2 * axis, low);
-      const ArrivalBlock* above = block_.step(n, 2 * axis + 1, high);
-      const Neighbour a = read(below, low, inside), b = read(above, high, inside);
+    UpwindTerms terms;
+    std::array<double, 3> near{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const Neighbour a = look(n, 2 * axis, 1, inside), b = look(n, 2 * axis + 1, 1, inside);
       const bool up = b.first < a.first;
-      const Neighbour& near = up ? b : a;
-      if (!(near.first < block_.time[n])) continue;
-      Index next = 0;
-      const ArrivalBlock* beyond = (up ? above : below)->step(up ? high : low, 2 * axis + up, next);
-      const Neighbour far = read(beyond, next, inside);
-      plain.addFirst(near.time);
-      if (far.first <= near.first)
-        terms.addSecond(near.time, far.time);
+      const Neighbour& next = up ? b : a;
+      if (!(next.first < block_.time[n])) continue;
+      near[static_cast<std::size_t>(terms.count)] = next.time;
+      const Neighbour beyond = look(n, 2 * axis + up, 2, inside);
+      if (beyond.first <= next.first)
+        terms.addSecond(next.time, beyond.time);
       else
-        terms.addFirst(near.time);
+        terms.addFirst(next.time);
     }
     const double slowness = block_.slownessAt(n);
-    if (plain.count == 0) return static_cast<double>(block_.time[n]);
+    if (terms.count == 0) return static_cast<double>(block_.time[n]);
     double time = solveUpwind(terms, slowness);
     bool first = !terms.isSecond;
     if (terms.isSecond && time < terms.latest) {
+      UpwindTerms plain;
+      for (int i = 0; i < terms.count; ++i) plain.addFirst(near[static_cast<std::size_t>(i)]);
       time = solveUpwind(plain, slowness);
       first = true;
     }
@@ -311,8 +372,8 @@ class SecondOrderWorker {
 
   ArrivalBlock& block_;
   Desk& desk_;
-  const std::vector<Desk>& desks_;
   float until_;
+  std::array<View, 7> views_;
 };
 
 float earliestUnknown(const ArrivalBlock& block) {
@@ -331,8 +392,8 @@ void solveSecondOrder(ArrivalBlocks& blocks, float until) {
     const float earliest = earliestUnknown(block);
     if (earliest <= until) desk.earliest = earliest;
   }
-  rounds.run(false, 0.5, 1, [&](ArrivalBlock& block, Desk& desk) {
-    SecondOrderWorker(block, desk, rounds.desks, until).run();
+  rounds.run(false, kPointWindow, 0.5, 1, [&](ArrivalBlock& block, Desk& desk, float window) {
+    SecondOrderWorker(block, desk, rounds.desks, until).run(window);
   });
   for (ArrivalBlock& block : blocks.blocks()) block.time = *rounds.desks[block.number].second;
 }
@@ -354,7 +415,8 @@ void sweepArrivals(ArrivalBlocks& blocks, int order) {
         tell(desk, it.pos(), block.time[it.pos()], 1);
       }
     rounds.deliverStart();
-    rounds.run(true, 0, order == 2 ? 0.5 : 1, [&](ArrivalBlock& block, Desk& desk) {
+    const double end = order == 2 ? 0.5 : 1;
+    rounds.run(true, kBlockWindow, 0, end, [&](ArrivalBlock& block, Desk& desk, float) {
       FirstOrderWorker(block, desk, reach).run();
     });
   }
