@@ -11,8 +11,8 @@
 #include <span>
 #include <unordered_map>
 
-#include "levelset/convert/sharp_surface.h"
 #include "levelset/eikonal/interpolant.h"
+#include "levelset/meshing/sharp_surface.h"
 
 namespace levelset::eikonal {
 namespace {

@@ -17,7 +17,7 @@ struct VdbField;  // levelset/fields/grid_vdb.h, for .cpp files only
 /// narrow band: nothing is promised about its values but that they are finite.
 ///
 /// A value: copies share one grid, which nobody changes. Grids come from files (readField in
-/// levelset/convert/band_file.h) and from operators.
+/// levelset/files/band_file.h) and from operators.
 class FieldGrid {
  public:
   explicit FieldGrid(std::shared_ptr<const VdbField> field) : field_(std::move(field)) {}

@@ -4,12 +4,12 @@
 
 #include <cmath>
 
-#include "levelset/convert/band_to_mesh.h"
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
 #include "levelset/flow/front.h"
 #include "levelset/flow/grid_schemes.h"
 #include "levelset/inspect/measure.h"
+#include "levelset/meshing/band_to_mesh.h"
 #include "levelset/sample.h"
 #include "levelset/solids/offset.h"
 #include "levelset/solids/transform.h"

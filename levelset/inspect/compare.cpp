@@ -7,13 +7,13 @@
 #include <limits>
 #include <vector>
 
-#include "levelset/convert/cell_surface.h"
 #include "levelset/eikonal/closest_point.h"
 #include "levelset/eikonal/point_tree.h"
 #include "levelset/eikonal/surface_points.h"
 #include "levelset/error.h"
 #include "levelset/inspect/curved_surface.h"
 #include "levelset/inspect/symmetric_difference.h"
+#include "levelset/meshing/cell_surface.h"
 #include "levelset/solids/csg_vdb.h"
 #include "levelset/solids/resample.h"
 #include "levelset/vdb.h"

@@ -5,8 +5,8 @@
 #include <array>
 #include <vector>
 
-#include "levelset/convert/cell_surface.h"
 #include "levelset/eikonal/interpolant.h"
+#include "levelset/meshing/cell_surface.h"
 
 namespace levelset {
 

@@ -7,9 +7,9 @@
 #include <tuple>
 #include <vector>
 
-#include "levelset/convert/cell_surface.h"
 #include "levelset/inspect/curved_surface.h"
 #include "levelset/inspect/shells.h"
+#include "levelset/meshing/cell_surface.h"
 
 namespace levelset {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "levelset/convert/cell_surface.h"
+#include "levelset/meshing/cell_surface.h"
 #include "levelset/vdb.h"
 
 namespace levelset {

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "levelset/convert/mesh_file.h"
 #include "levelset/convert/mesh_to_band.h"
+#include "levelset/files/mesh_file.h"
 
 namespace {
 

@@ -10,9 +10,9 @@
 
 #include <array>
 
-#include "levelset/convert/band_to_mesh.h"
 #include "levelset/eikonal/arrival.h"
 #include "levelset/eikonal/redistance.h"
+#include "levelset/meshing/band_to_mesh.h"
 #include "levelset/solids/csg.h"
 #include "levelset/solids/offset.h"
 #include "levelset/solids/shapes.h"

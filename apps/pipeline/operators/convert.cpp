@@ -5,9 +5,9 @@
 
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
-#include "levelset/convert/band_to_mesh.h"
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
+#include "levelset/meshing/band_to_mesh.h"
 
 namespace pipeline {
 namespace {

@@ -3,9 +3,9 @@
 #include <filesystem>
 
 #include "apps/pipeline/invocation.h"
-#include "levelset/convert/band_file.h"
-#include "levelset/convert/mesh_file.h"
 #include "levelset/error.h"
+#include "levelset/files/band_file.h"
+#include "levelset/files/mesh_file.h"
 
 namespace pipeline {
 namespace {

@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/pipeline/invocation.h"
-#include "levelset/convert/band_file.h"
-#include "levelset/convert/mesh_file.h"
 #include "levelset/error.h"
+#include "levelset/files/band_file.h"
+#include "levelset/files/mesh_file.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"

@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/pipeline/units.h"
-#include "levelset/convert/band_file.h"
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
+#include "levelset/files/band_file.h"
 #include "levelset/solids/shapes.h"
 #include "tests/support/shell.h"
 

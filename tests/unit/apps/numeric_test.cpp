@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "levelset/convert/band_file.h"
+#include "levelset/files/band_file.h"
 #include "levelset/solids/shapes.h"
 #include "levelset/vdb.h"
 #include "tests/support/shell.h"

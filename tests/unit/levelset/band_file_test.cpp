@@ -1,4 +1,4 @@
-#include "levelset/convert/band_file.h"
+#include "levelset/files/band_file.h"
 
 #include <fmt/core.h>
 #include <openvdb/io/Stream.h>

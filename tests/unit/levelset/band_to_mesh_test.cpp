@@ -1,4 +1,4 @@
-#include "levelset/convert/band_to_mesh.h"
+#include "levelset/meshing/band_to_mesh.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

@@ -7,10 +7,10 @@
 #include <limits>
 #include <numbers>
 
-#include "levelset/convert/band_to_mesh.h"
 #include "levelset/error.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/measure.h"
+#include "levelset/meshing/band_to_mesh.h"
 #include "tests/support/bands.h"
 
 namespace components_test {

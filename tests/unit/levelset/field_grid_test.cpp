@@ -7,9 +7,9 @@
 #include <limits>
 #include <random>
 
-#include "levelset/convert/band_file.h"
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
+#include "levelset/files/band_file.h"
 #include "tests/support/bands.h"
 #include "tests/support/files.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "levelset/convert/band_to_mesh.h"
+#include "levelset/meshing/band_to_mesh.h"
 #include "tests/support/bands.h"
 
 namespace measure_test {

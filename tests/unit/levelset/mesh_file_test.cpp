@@ -1,4 +1,4 @@
-#include "levelset/convert/mesh_file.h"
+#include "levelset/files/mesh_file.h"
 
 #include <fmt/core.h>
 #include <zlib.h>

@@ -9,8 +9,8 @@
 
 #include <filesystem>
 
-#include "levelset/convert/mesh_file.h"
 #include "levelset/convert/mesh_to_band.h"
+#include "levelset/files/mesh_file.h"
 #include "levelset/vdb.h"
 #include "tests/support/meshes.h"
 

@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <numbers>
 
-#include "levelset/convert/mesh_file.h"
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
+#include "levelset/files/mesh_file.h"
 #include "tests/support/files.h"
 #include "tests/support/mesh_bands.h"
 

@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "levelset/convert/band_file.h"
-#include "levelset/convert/mesh_file.h"
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
+#include "levelset/files/band_file.h"
+#include "levelset/files/mesh_file.h"
 #include "levelset/solids/csg.h"
 #include "levelset/solids/resample.h"
 #include "levelset/solids/shapes.h"

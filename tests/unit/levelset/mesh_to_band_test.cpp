@@ -7,8 +7,8 @@
 
 #include <ctime>
 
-#include "levelset/convert/mesh_file.h"
 #include "levelset/error.h"
+#include "levelset/files/mesh_file.h"
 #include "levelset/vdb.h"
 #include "tests/support/files.h"
 #include "tests/support/mesh_bands.h"

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "levelset/convert/mesh_file.h"
 #include "levelset/error.h"
+#include "levelset/files/mesh_file.h"
 #include "tests/support/files.h"
 
 namespace polygon_test {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "levelset/convert/cell_surface.h"
+#include "levelset/meshing/cell_surface.h"
 
 namespace levelset {
 

@@ -1,4 +1,4 @@
-#include "levelset/convert/sharp_surface.h"
+#include "levelset/meshing/sharp_surface.h"
 
 #include <tbb/parallel_for.h>
 

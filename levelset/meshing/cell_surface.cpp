@@ -1,4 +1,4 @@
-#include "levelset/convert/cell_surface.h"
+#include "levelset/meshing/cell_surface.h"
 
 #include <tbb/parallel_for.h>
 

@@ -8,10 +8,10 @@
 #include <string_view>
 #include <vector>
 
-#include "levelset/convert/byte_io.h"
-#include "levelset/convert/mesh_file.h"
+#include "levelset/files/byte_io.h"
+#include "levelset/files/mesh_file.h"
 
-// Private to levelset/convert: what the readers and writers of the mesh formats share.
+// Private to levelset/files: what the readers and writers of the mesh formats share.
 
 namespace levelset {
 

@@ -11,7 +11,7 @@
 #include "levelset/progress.h"
 #include "levelset/vdb.h"
 
-// Private to levelset/convert: our own reader of .vdb files. OpenVDB's trusts every count and size
+// Private to levelset/files: our own reader of .vdb files. OpenVDB's trusts every count and size
 // in the file: on a damaged one it loops for hours, writes past buffers or leaks. Here each is
 // checked against the bytes that are there before it is believed; only the decompression is
 // OpenVDB's, of blocks whose sizes are known to be right.

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <limits>
 
-#include "levelset/convert/mesh_parts.h"
 #include "levelset/convert/position_table.h"
 #include "levelset/error.h"
+#include "levelset/files/mesh_parts.h"
 
 // StereoLithography Interface Specification: 3D Systems, 1989.
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "levelset/convert/mesh_parts.h"
 #include "levelset/error.h"
+#include "levelset/files/mesh_parts.h"
 
 // Object File Format: Geomview manual, section 4.2.5, The Geometry Center 1998.
 

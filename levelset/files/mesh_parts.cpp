@@ -1,4 +1,4 @@
-#include "levelset/convert/mesh_parts.h"
+#include "levelset/files/mesh_parts.h"
 
 #include <fmt/core.h>
 #include <locale.h>

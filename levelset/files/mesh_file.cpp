@@ -1,12 +1,12 @@
-#include "levelset/convert/mesh_file.h"
+#include "levelset/files/mesh_file.h"
 
 #include <fmt/core.h>
 
 #include <new>
 #include <optional>
 
-#include "levelset/convert/mesh_parts.h"
 #include "levelset/error.h"
+#include "levelset/files/mesh_parts.h"
 
 namespace levelset {
 namespace {

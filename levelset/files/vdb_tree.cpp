@@ -11,8 +11,8 @@
 #include <set>
 #include <vector>
 
-#include "levelset/convert/vdb_layout.h"
 #include "levelset/error.h"
+#include "levelset/files/vdb_layout.h"
 #include "levelset/progress.h"
 
 // The layout is that of readTopology and readBuffers in OpenVDB's tree/*.h and of

@@ -1,12 +1,12 @@
-#include "levelset/convert/band_to_mesh.h"
+#include "levelset/meshing/band_to_mesh.h"
 
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
-#include "levelset/convert/cell_surface.h"
-#include "levelset/convert/decimate.h"
-#include "levelset/convert/sharp_surface.h"
 #include "levelset/error.h"
+#include "levelset/meshing/cell_surface.h"
+#include "levelset/meshing/decimate.h"
+#include "levelset/meshing/sharp_surface.h"
 
 namespace levelset {
 namespace {

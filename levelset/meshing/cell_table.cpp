@@ -1,4 +1,4 @@
-#include "levelset/convert/cell_table.h"
+#include "levelset/meshing/cell_table.h"
 
 #include <cassert>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "levelset/convert/vdb_layout.h"
+#include "levelset/files/vdb_layout.h"
 
 #include <fmt/core.h>
 

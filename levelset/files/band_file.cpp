@@ -1,4 +1,4 @@
-#include "levelset/convert/band_file.h"
+#include "levelset/files/band_file.h"
 
 #include <fmt/core.h>
 
@@ -9,12 +9,12 @@
 #include <new>
 #include <system_error>
 
-#include "levelset/convert/byte_io.h"
-#include "levelset/convert/nano_file_vdb.h"
-#include "levelset/convert/vdb_layout.h"
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
 #include "levelset/file_target.h"
+#include "levelset/files/byte_io.h"
+#include "levelset/files/nano_file_vdb.h"
+#include "levelset/files/vdb_layout.h"
 #include "levelset/memory_limit.h"
 
 namespace levelset {

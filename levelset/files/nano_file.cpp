@@ -1,4 +1,4 @@
-#include "levelset/convert/nano_file_vdb.h"
+#include "levelset/files/nano_file_vdb.h"
 
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/OpenToNanoVDB.h>

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <deque>
 
-#include "levelset/convert/mesh_parts.h"
+#include "levelset/files/mesh_parts.h"
 
 namespace levelset {
 namespace {

@@ -1,4 +1,4 @@
-#include "levelset/convert/byte_io.h"
+#include "levelset/files/byte_io.h"
 
 #include <fcntl.h>
 #include <fmt/core.h>

@@ -1,4 +1,4 @@
-#include "levelset/convert/decimate.h"
+#include "levelset/meshing/decimate.h"
 
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <OpenMesh/Tools/Decimater/DecimaterT.hh>

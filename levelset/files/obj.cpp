@@ -1,7 +1,7 @@
 #include <fmt/core.h>
 
-#include "levelset/convert/mesh_parts.h"
 #include "levelset/error.h"
+#include "levelset/files/mesh_parts.h"
 
 // Wavefront OBJ: Wavefront Technologies, "The Advanced Visualizer Manual", appendix B1, 1992.
 

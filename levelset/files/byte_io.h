@@ -12,7 +12,7 @@
 #include "levelset/file_target.h"
 #include "levelset/progress.h"
 
-// Private to levelset/convert: whole files into memory and out again, compressed or not.
+// Private to levelset/files: whole files into memory and out again, compressed or not.
 
 namespace levelset {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "levelset/convert/cell_table.h"
+#include "levelset/meshing/cell_table.h"
 #include "levelset/vdb.h"
 
 namespace levelset {

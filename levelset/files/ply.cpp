@@ -7,8 +7,8 @@
 #include <limits>
 #include <optional>
 
-#include "levelset/convert/mesh_parts.h"
 #include "levelset/error.h"
+#include "levelset/files/mesh_parts.h"
 
 // The Polygon File Format: Greg Turk, "The PLY Polygon File Format", Stanford 1994.
 

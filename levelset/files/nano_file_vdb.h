@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-// Private to levelset/convert: NanoVDB's headers, four seconds of compile time, stay behind this
+// Private to levelset/files: NanoVDB's headers, four seconds of compile time, stay behind this
 // one.
 
 namespace levelset {
