@@ -161,6 +161,7 @@ const std::vector<Operator>& operators() {
     addTextureOperators(list);
     addInspectionOperators(list);
     addPictureOperators(list);
+    addRegressionOperators(list);
     return list;
   }();
   return all;

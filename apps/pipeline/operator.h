@@ -109,5 +109,6 @@ void addPlacementOperators(std::vector<Operator>& all);
 void addTextureOperators(std::vector<Operator>& all);
 void addInspectionOperators(std::vector<Operator>& all);
 void addPictureOperators(std::vector<Operator>& all);
+void addRegressionOperators(std::vector<Operator>& all);
 
 }  // namespace pipeline

@@ -1,13 +1,12 @@
 #include "apps/pipeline/runner.h"
 
 #include <fmt/core.h>
-#include <sys/resource.h>
 
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <new>
 
+#include "apps/process_cost.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/inspect/check.h"
@@ -17,26 +16,6 @@ namespace pipeline {
 namespace {
 
 using levelset::InvalidInput;
-
-double cpuSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-/// High-water mark of the resident set since the last reset (Linux).
-double peakBytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.starts_with("VmHWM:")) return 1024 * std::atof(line.c_str() + 6);
-  return 0;
-}
-void resetPeak() {
-  std::ofstream("/proc/self/clear_refs") << "5";
-}
 
 struct Slot {
   Value value;
@@ -242,17 +221,17 @@ void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
         if (!param.fallback.empty() && !action.options.contains(param.name))
           step.defaults[param.name] = param.fallback;
       step.resultName = action.resultName;
-      resetPeak();
+      apps::resetPeakResident();
       const auto start = std::chrono::steady_clock::now();
-      const double cpuStart = cpuSeconds();
+      const double cpuStart = apps::processCpuSeconds();
       bool stopped = false;
       const auto stop = [&] {
         if (stopped) return;
         stopped = true;
         step.wallSeconds =
             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        step.cpuSeconds = cpuSeconds() - cpuStart;
-        step.peakBytes = peakBytes();
+        step.cpuSeconds = apps::processCpuSeconds() - cpuStart;
+        step.peakBytes = apps::peakResidentBytes();
       };
       try {
         runAction(action, i, settings, stack, step, stop);

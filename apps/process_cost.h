@@ -1,0 +1,55 @@
+#pragma once
+
+#include <malloc.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <ctime>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <string>
+
+/// What a piece of work costs this process (Linux): shared by the runner and the regression suite.
+namespace apps {
+
+/// CPU seconds of all threads so far.
+[[nodiscard]] inline double processCpuSeconds() {
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+/// A line of /proc/self/status that holds kilobytes, in bytes; NaN where there is none.
+[[nodiscard]] inline double processStatusBytes(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with(key)) return 1024 * std::atof(line.c_str() + key.size());
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+/// High-water mark of the resident set since the last reset.
+[[nodiscard]] inline double peakResidentBytes() {
+  return processStatusBytes("VmHWM:");
+}
+inline void resetPeakResident() {
+  std::ofstream("/proc/self/clear_refs") << "5";
+}
+
+struct Cost {
+  double cpuSeconds = 0;
+  double peakBytes = 0;  ///< by which the resident set grew at its largest
+};
+
+/// Runs `work` and tells what it took. Freed memory is handed back first, so that it counts again.
+[[nodiscard]] inline Cost costOf(const std::function<void()>& work) {
+  malloc_trim(0);
+  resetPeakResident();
+  const double before = processStatusBytes("VmRSS:");
+  const double start = processCpuSeconds();
+  work();
+  const double seconds = processCpuSeconds() - start;
+  return {seconds, std::max(0.0, peakResidentBytes() - before)};
+}
+
+}  // namespace apps

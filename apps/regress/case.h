@@ -1,0 +1,105 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/regress/truth.h"
+
+/// The regression suite: problems with exact answers, run at several resolutions and placements on
+/// the grid.
+namespace regress {
+
+class Recorder;
+
+enum class Budget { Quick, Full };
+
+/// One run of a problem. The object has a size near one; the voxel size is 1 / resolution.
+struct Sample {
+  int resolution = 0;     ///< voxels per unit of length
+  int phase = 0;          ///< which of the placements
+  double voxelSize = 0;   ///< world units
+  Imath::V3d shift = {};  ///< by which the object lies off the grid points, world units
+};
+
+/// Placements of an object between the grid points, in voxels.
+[[nodiscard]] const std::vector<Imath::V3d>& subVoxelPhases();
+
+enum class Sense { AtMost, AtLeast };
+
+/// What must hold of a figure of ours, in the worst placement.
+struct Bound {
+  std::string variant;
+  std::string figure;  ///< a column, see columns.h
+  double limit = 0;
+  int resolution = 0;  ///< 0: at every one
+  Sense sense = Sense::AtMost;
+};
+
+struct Case {
+  std::string name = {};        ///< as --case takes it
+  std::string group = {};       ///< operator: the plots are made by it
+  std::string title = {};       ///< one line
+  std::string definition = {};  ///< what is computed and what the answer is
+  std::string citation = {};    ///< keys of REFERENCES.md
+  std::vector<int> quick = {},
+                   full = {};  ///< resolutions; empty for cases that only state outcomes
+  std::vector<Bound> bounds = {};
+  std::function<void(Recorder&)> run = {};
+};
+
+/// All cases, in the order in which they run.
+[[nodiscard]] const std::vector<Case>& cases();
+
+// Each fills its group; see apps/regress/cases/.
+void addShapeCases(std::vector<Case>& all);
+void addMeshCases(std::vector<Case>& all);
+void addRedistanceCases(std::vector<Case>& all);
+void addOffsetCases(std::vector<Case>& all);
+void addCsgCases(std::vector<Case>& all);
+void addResampleCases(std::vector<Case>& all);
+void addExtremeCases(std::vector<Case>& all);
+void addBadInputCases(std::vector<Case>& all);
+
+using Figures = std::map<std::string, double>;
+
+/// One run of one tool.
+struct Row {
+  std::string variant, tool;
+  int resolution = 0;
+  int phase = 0;             ///< -1 in a summary: all of them
+  Figures figures = {};      ///< by column; what was not measured is missing
+  std::string failure = {};  ///< why there are none
+};
+
+/// A statement that holds or not.
+struct Outcome {
+  std::string variant;
+  std::string expected;
+  std::string found;
+  bool passed = false;
+};
+
+/// A bound and what came out.
+struct Judgement {
+  Bound bound;
+  int resolution = 0;
+  double found = 0;
+  bool passed = false;
+  std::string remark = {};
+};
+
+struct CaseResult {
+  const Case* of = nullptr;
+  std::vector<Row> rows;
+  std::vector<Row> summary;  ///< worst placement, by variant, tool and resolution
+  std::vector<Outcome> outcomes;
+  std::vector<Judgement> judgements;
+  double cpuSeconds = 0;  ///< with all measuring
+};
+
+}  // namespace regress

@@ -1,0 +1,23 @@
+#pragma once
+
+#include "apps/regress/case.h"
+#include "levelset/narrow_band.h"
+
+/// How far a band is from the truth.
+namespace regress {
+
+/// Whose surface extraction the column of the mesh is about.
+enum class Mesher { Ours, OpenVdb };
+
+/// All columns that compare `result` with `truth`, both sides of the surface apart.
+void addErrors(const levelset::NarrowBand& result, const Truth& truth, Mesher mesher,
+               Figures& figures);
+
+/// Volume, area, eikonal residual and checks.
+void addInvariants(const levelset::NarrowBand& result, const Truth& truth, Figures& figures);
+
+/// Largest difference of φ over the grid points at which either band is active, in voxels;
+/// infinite where the grids are not the same.
+[[nodiscard]] double deviation(const levelset::NarrowBand& a, const levelset::NarrowBand& b);
+
+}  // namespace regress

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include "levelset/mesh.h"
+#include "levelset/narrow_band.h"
+#include "levelset/solids/csg.h"
+
+/// OpenVDB 10's own tools on the same input, by their defaults.
+namespace regress::peer {
+
+inline constexpr const char* kRebuild = "OpenVDB levelSetRebuild";
+inline constexpr const char* kSweep = "OpenVDB sdfToSdf";
+inline constexpr const char* kFilter = "OpenVDB LevelSetFilter";
+inline constexpr const char* kCsg = "OpenVDB csg + levelSetRebuild";
+inline constexpr const char* kShapes = "OpenVDB createLevelSet";
+inline constexpr const char* kMesh = "OpenVDB meshToLevelSet";
+inline constexpr const char* kResample = "OpenVDB resampleToMatch";
+
+[[nodiscard]] levelset::NarrowBand sphere(double radius, const Imath::V3d& centre,
+                                          double voxelSize);
+[[nodiscard]] levelset::NarrowBand box(const Imath::V3d& size, const Imath::V3d& centre,
+                                       double voxelSize);
+[[nodiscard]] levelset::NarrowBand fromMesh(const levelset::TriMesh& mesh, double voxelSize);
+[[nodiscard]] levelset::NarrowBand rebuild(const levelset::NarrowBand& band);
+[[nodiscard]] levelset::NarrowBand sweep(const levelset::NarrowBand& band);
+[[nodiscard]] levelset::NarrowBand offset(const levelset::NarrowBand& band, double distance);
+[[nodiscard]] levelset::NarrowBand combine(levelset::CsgOperation operation,
+                                           const levelset::NarrowBand& a,
+                                           const levelset::NarrowBand& b);
+[[nodiscard]] levelset::NarrowBand resample(const levelset::NarrowBand& band, double voxelSize);
+
+}  // namespace regress::peer

@@ -1,0 +1,11 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace regress {
+
+/// Replaces the file as a whole. @throws IoError
+void writeText(const std::filesystem::path& path, const std::string& text);
+
+}  // namespace regress

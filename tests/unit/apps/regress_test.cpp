@@ -1,0 +1,222 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "apps/regress/columns.h"
+#include "apps/regress/errors.h"
+#include "apps/regress/exact_band.h"
+#include "apps/regress/rays.h"
+#include "apps/regress/recorder.h"
+#include "apps/regress/suite.h"
+#include "apps/regress/truth.h"
+#include "tests/support/shell.h"
+
+namespace regress_test {
+
+using namespace regress;
+using Imath::V3d;
+using levelset::CsgOperation;
+using Json = nlohmann::json;
+
+constexpr double kVoxel = 1.0 / 16;
+const V3d kCentre(0.011, -0.023, 0.017);
+
+Figures errorsOf(const levelset::NarrowBand& band, const Truth& truth) {
+  Figures figures;
+  addErrors(band, truth, Mesher::Ours, figures);
+  addInvariants(band, truth, figures);
+  return figures;
+}
+
+TEST(RegressErrors, VanishForTheExactBand) {
+  const Figures f = errorsOf(exactBand(ball(kCentre, 1), kVoxel), ball(kCentre, 1));
+  for (const char* column : {"band_in_linf_vx", "band_out_linf_vx"}) EXPECT_LE(f.at(column), 1e-6);
+  // Tricubic interpolation of a sphere of 16 voxels' radius.
+  EXPECT_LE(f.at("surface_l1_vx"), 1e-3);
+  EXPECT_GT(f.at("surface_l1_vx"), 0);
+  EXPECT_EQ(f.at("missed_hits"), 0);
+  EXPECT_EQ(f.at("checks_failed"), 0);
+  EXPECT_LE(std::abs(f.at("volume_error")), 3e-3);
+}
+
+TEST(RegressErrors, AreThoseOfAWrongRadius) {
+  const double off = 0.3 * kVoxel;
+  const Figures f = errorsOf(exactBand(ball(kCentre, 1), kVoxel), ball(kCentre, 1 + off));
+  for (const char* column : {"band_in_l1_vx", "band_in_linf_vx", "band_out_l1_vx",
+                             "band_out_linf_vx", "surface_l1_vx", "surface_linf_vx"})
+    EXPECT_NEAR(f.at(column), 0.3, 0.01) << column;
+  EXPECT_NEAR(f.at("surface_l1"), off, 0.01 * kVoxel);
+  EXPECT_NEAR(f.at("volume_error"), std::pow(1 + off, -3) - 1, 3e-3);
+}
+
+TEST(RegressErrors, TellTheSidesApart) {
+  // Distances inside are too short by a tenth of a voxel at the most, those outside exact.
+  const Truth exact = ball(kCentre, 1);
+  Truth bent = exact;
+  bent.distance = [&](const V3d& p) {
+    const double d = exact.distance(p);
+    return d < 0 ? d * (1 - 0.1 / 3) : d;
+  };
+  const Figures f = errorsOf(exactBand(bent, kVoxel), exact);
+  EXPECT_NEAR(f.at("band_in_linf_vx"), 0.1, 0.01);
+  EXPECT_LE(f.at("band_out_linf_vx"), 1e-6);
+}
+
+TEST(RegressErrors, SeeABandThatIsTooNarrow) {
+  // One and a half voxels of distances on a background that claims three.
+  const Truth exact = ball(kCentre, 1);
+  Truth clipped = exact;
+  clipped.distance = [&](const V3d& p) {
+    const double d = exact.distance(p);
+    return std::abs(d) < 1.5 * kVoxel ? d : std::copysign(3 * kVoxel, d);
+  };
+  EXPECT_GE(errorsOf(exactBand(clipped, kVoxel), exact).at("band_out_linf_vx"), 1.4);
+}
+
+TEST(RegressErrors, MissWhatIsNotThere) {
+  const Truth pair = apart(ball(V3d(-1.5, 0, 0), 1), ball(V3d(1.5, 0, 0), 1));
+  const Figures f = errorsOf(exactBand(ball(V3d(-1.5, 0, 0), 1), kVoxel), pair);
+  EXPECT_NEAR(f.at("missed_hits"), 0.5, 0.1);
+  EXPECT_NEAR(f.at("volume_error"), -0.5, 0.01);
+}
+
+TEST(RegressDeviation, IsZeroOnlyForTheSameBand) {
+  const auto a = exactBand(ball(kCentre, 1), kVoxel);
+  EXPECT_EQ(deviation(a, a), 0);
+  EXPECT_NEAR(deviation(a, exactBand(ball(kCentre, 1 + 0.2 * kVoxel), kVoxel)), 0.2, 1e-5);
+  EXPECT_TRUE(std::isinf(deviation(a, exactBand(ball(kCentre, 1), 2 * kVoxel))));
+}
+
+TEST(RegressRays, FindTheZerosOfTheExactSolid) {
+  const Truth ring = torus(kCentre, V3d(1, 2, 3), 0.7, 0.3);
+  const RayHits hits = shootRays(exactBand(ring, 1.0 / 24), ring);
+  EXPECT_GT(hits.exactHits, kRayCount);  // a chord of the ball around meets it more than once
+  // Rays that graze the surface may go either way.
+  EXPECT_NEAR(static_cast<double>(hits.errors.size()), hits.exactHits, 0.002 * hits.exactHits);
+}
+
+/// Volume of a truth by counting grid points, and slope of its distance.
+void expectConsistent(const Truth& truth, const char* name) {
+  const double h = 1.0 / 40;
+  const int n = static_cast<int>(std::ceil(truth.reach / h)) + 1;
+  double inside = 0, steepest = 0;
+  for (int x = -n; x <= n; ++x)
+    for (int y = -n; y <= n; ++y)
+      for (int z = -n; z <= n; ++z) {
+        const V3d p = truth.centre + V3d(x + 0.21, y - 0.13, z + 0.37) * h;
+        const double d = truth.distance(p);
+        inside += d < 0;
+        steepest = std::max(steepest, std::abs(truth.distance(p + V3d(h, 0, 0)) - d) / h);
+      }
+  EXPECT_LE(steepest, 1 + 1e-9) << name;
+  EXPECT_NEAR(inside * h * h * h, *truth.volume, 0.01 * *truth.volume) << name;
+}
+
+TEST(RegressTruth, IsADistanceWithItsVolume) {
+  const V3d axis(1, 2, 3);
+  expectConsistent(ball(kCentre, 0.9), "ball");
+  expectConsistent(box(kCentre, V3d(1.2, 0.9, 0.7)), "box");
+  expectConsistent(box(kCentre, V3d(1.2, 0.9, 0.7), 0.2), "rounded box");
+  expectConsistent(torus(kCentre, axis, 0.6, 0.3), "torus");
+  expectConsistent(cylinder(kCentre, axis, 0.5, 1.1), "cylinder");
+  expectConsistent(capsule(kCentre, V3d(0.5, 0.3, 0.1), 0.4), "capsule");
+  expectConsistent(moved(box(kCentre, V3d(1.2, 0.9, 0.7)), skewRotation()), "rotated box");
+  for (const auto op : {CsgOperation::Union, CsgOperation::Intersection, CsgOperation::Difference})
+    expectConsistent(twoBalls(op, V3d(0), 0.8, V3d(0.5, 0.3, 0.2), 0.6), "two balls");
+}
+
+Row rowOf(int resolution, int phase, double error) {
+  return {"v",
+          kOurs,
+          resolution,
+          phase,
+          {{"voxel_size", 1.0 / resolution},
+           {"band_in_l1", error},
+           {"surface_l1", error},
+           {"volume_error", -error},
+           {"cpu_s", phase + 1.0}},
+          {}};
+}
+
+TEST(RegressSummary, TakesTheWorstPlacementAndTheOrder) {
+  const auto summary =
+      summarize({rowOf(8, 0, 0.1), rowOf(8, 1, 0.16), rowOf(16, 0, 0.04), rowOf(16, 1, 0.02)});
+  ASSERT_EQ(summary.size(), 2u);
+  EXPECT_DOUBLE_EQ(summary[0].figures.at("surface_l1"), 0.16);
+  EXPECT_DOUBLE_EQ(summary[0].figures.at("volume_error"), -0.16);
+  EXPECT_DOUBLE_EQ(summary[0].figures.at("cpu_s"), 1.5);
+  EXPECT_DOUBLE_EQ(summary[1].figures.at("order_surface"), 2);
+  EXPECT_DOUBLE_EQ(summary[1].figures.at("order_volume"), 2);
+}
+
+TEST(RegressJudge, FailsBoundsThatAreMissedOrFitNothing) {
+  Case c{.name = "c", .quick = {8}, .full = {8, 16}};
+  c.bounds = {{"v", "surface_l1", 0.2},
+              {"v", "surface_l1", 0.1, 8},
+              {"v", "surface_l1", 0.1, 16},
+              {"v", "cpu_s", 1, 8, Sense::AtLeast},
+              {"other", "surface_l1", 1}};
+  const auto summary = summarize({rowOf(8, 0, 0.15)});
+  const auto quick = judge(c, summary, Budget::Quick);
+  ASSERT_EQ(quick.size(), 4u);
+  EXPECT_TRUE(quick[0].passed);
+  EXPECT_FALSE(quick[1].passed);
+  EXPECT_TRUE(quick[2].passed);
+  EXPECT_FALSE(quick[3].passed);
+  EXPECT_EQ(judge(c, summary, Budget::Full).size(), 5u);
+}
+
+TEST(RegressJudge, FailsWhatWasRefused) {
+  const Case c{.name = "c"};
+  Row refused = rowOf(8, 0, 0);
+  refused.failure = "offset: no";
+  EXPECT_FALSE(judge(c, {refused}, Budget::Quick).at(0).passed);
+}
+
+TEST(RegressCases, AreWhole) {
+  std::set<std::string> names, columnNames;
+  for (const Column& column : columns()) columnNames.insert(column.name);
+  for (const Case& c : cases()) {
+    EXPECT_TRUE(names.insert(c.name).second) << c.name << " is there twice";
+    EXPECT_FALSE(c.group.empty() || c.title.empty() || c.definition.empty() || c.citation.empty())
+        << c.name;
+    EXPECT_TRUE(c.run) << c.name;
+    for (const Bound& bound : c.bounds)
+      EXPECT_TRUE(columnNames.contains(bound.figure)) << c.name << " " << bound.figure;
+  }
+}
+
+class Regress : public support::ShellTest {};
+
+TEST_F(Regress, ListsItsCases) {
+  const auto outcome = levelsmith("regress --list");
+  EXPECT_EQ(outcome.code, 0);
+  for (const Case& c : cases()) EXPECT_NE(outcome.out.find(c.name + " "), std::string::npos);
+}
+
+TEST_F(Regress, WritesResultsAndPage) {
+  const auto outcome = levelsmith("--quiet regress --case skewed-axes,damaged-grids --out r");
+  EXPECT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+  const Json json = Json::parse(support::slurp(folder_ / "r/results.json"));
+  EXPECT_EQ(json["budget"], "quick");
+  ASSERT_EQ(json["cases"].size(), 2u);
+  EXPECT_EQ(json["failures"].size(), 0u);
+  for (const Json& o : json["cases"][1]["outcomes"]) EXPECT_EQ(o["passed"], true) << o.dump();
+  const std::string csv = support::slurp(folder_ / "r/results.csv");
+  EXPECT_TRUE(csv.starts_with("case,variant,tool,resolution,phase,voxel_size,")) << csv;
+  EXPECT_NE(support::slurp(folder_ / "r/index.html").find("grid with sheared axes"),
+            std::string::npos);
+}
+
+TEST_F(Regress, Refuses) {
+  EXPECT_REFUSED(levelsmith("regress --case no-such --out r"), 2, "no case 'no-such'");
+  EXPECT_REFUSED(levelsmith("regress"), 2, "--out");
+  EXPECT_REFUSED(levelsmith("regress --budget huge --out r"), 2, "budget");
+  writeFile("taken", "");
+  EXPECT_REFUSED(levelsmith("regress --case skewed-axes --out taken"), 6, "taken");
+  EXPECT_FALSE(exists("r"));
+}
+
+}  // namespace regress_test
