@@ -101,7 +101,8 @@ void addTally(const std::string& name, const Tally& tally, double voxelSize, Fig
 
 }  // namespace
 
-void addErrors(const NarrowBand& result, const Truth& truth, Mesher mesher, Figures& figures) {
+void addErrors(const NarrowBand& result, const Truth& truth, Mesher mesher, Figures& figures,
+               int rays) {
   const double h = result.voxelSize();
   figures["voxel_size"] = h;
   figures["active_voxels"] = static_cast<double>(result.activeVoxelCount());
@@ -109,7 +110,7 @@ void addErrors(const NarrowBand& result, const Truth& truth, Mesher mesher, Figu
   addTally("band_in", sides.inside, h, figures);
   addTally("band_out", sides.outside, h, figures);
 
-  const RayHits hits = shootRays(result, truth);
+  const RayHits hits = shootRays(result, truth, rays);
   Tally surface;
   for (const double error : hits.errors) surface.add(error);
   addTally("surface", surface, h, figures);

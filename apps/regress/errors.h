@@ -1,6 +1,7 @@
 #pragma once
 
 #include "apps/regress/case.h"
+#include "apps/regress/rays.h"
 #include "levelset/narrow_band.h"
 
 /// How far a band is from the truth.
@@ -11,7 +12,7 @@ enum class Mesher { Ours, OpenVdb };
 
 /// All columns that compare `result` with `truth`, both sides of the surface apart.
 void addErrors(const levelset::NarrowBand& result, const Truth& truth, Mesher mesher,
-               Figures& figures);
+               Figures& figures, int rays = kRayCount);
 
 /// Volume, area, eikonal residual and checks.
 void addInvariants(const levelset::NarrowBand& result, const Truth& truth, Figures& figures);

@@ -16,15 +16,16 @@ namespace {
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
 void fillBlock(const openvdb::Coord& origin, const Distance& distance, openvdb::FloatGrid& grid) {
-  const double background = static_cast<double>(grid.background());
-  auto leaf = std::make_unique<Leaf>(origin, grid.background());
+  const float background = grid.background();
+  auto leaf = std::make_unique<Leaf>(origin, background);
   for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
-    const double value =
-        distance(levelset::toImath(grid.indexToWorld(leaf->offsetToGlobalCoord(i))));
+    // Rounded first: a value that rounds to the background is not one of the band.
+    const auto value = static_cast<float>(
+        distance(levelset::toImath(grid.indexToWorld(leaf->offsetToGlobalCoord(i)))));
     if (std::abs(value) < background)
-      leaf->setValueOn(i, static_cast<float>(value));
+      leaf->setValueOn(i, value);
     else
-      leaf->setValueOff(i, value < 0 ? -grid.background() : grid.background());
+      leaf->setValueOff(i, std::copysign(background, value));
   }
   grid.tree().addLeaf(leaf.release());
 }

@@ -117,17 +117,21 @@ std::string csvText(const SuiteResult& result) {
 
 }  // namespace
 
-std::vector<std::string> writeResults(const SuiteResult& result,
-                                      const std::filesystem::path& folder) {
+void makeFolder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error || !std::filesystem::is_directory(folder))
     throw levelset::IoError(fmt::format("regress: the folder '{}' cannot be made: {}",
                                         folder.string(),
                                         error ? error.message() : "a file is in its place"));
+}
+
+std::vector<std::string> writeResults(const SuiteResult& result,
+                                      const std::filesystem::path& folder, bool withPlots) {
+  makeFolder(folder);
   writeText(folder / "results.json", jsonText(result));
   writeText(folder / "results.csv", csvText(result));
-  const Plots plots = makePlots(folder);
+  const Plots plots = withPlots ? makePlots(folder) : Plots{};
   writeText(folder / "index.html", pageText(result, plots.names));
   return plots.notes;
 }

@@ -7,7 +7,7 @@
 
 namespace regress {
 
-inline constexpr int kRayCount = 10000;
+inline constexpr int kRayCount = 10000, kQuickRayCount = 2500;
 
 struct RayHits {
   std::vector<double> errors;  ///< exact distances of all zeros, in the order of rays
@@ -15,7 +15,8 @@ struct RayHits {
 };
 
 /// The zeros of the tricubic interpolant of `band` along fixed rays: chords of a ball about the
-/// exact solid between Halton points, evenly spread over all lines.
-[[nodiscard]] RayHits shootRays(const levelset::NarrowBand& band, const Truth& truth);
+/// exact solid between Halton points, evenly spread over all lines. Any first `count` of them are.
+[[nodiscard]] RayHits shootRays(const levelset::NarrowBand& band, const Truth& truth,
+                                int count = kRayCount);
 
 }  // namespace regress

@@ -40,6 +40,10 @@ bool Recorder::wantsPeer(const Sample& at, int finest, int phases) const {
   return isQuick() ? at.phase == kQuickPhase && at.resolution <= finest : at.phase < phases;
 }
 
+bool Recorder::wantsRepeats(const Sample& at) const {
+  return !isQuick() || (at.phase == kQuickPhase && at.resolution == result_.of->quick.front());
+}
+
 void Recorder::tick() {
   levelset::report(progress_, 0, "regress");
 }
@@ -54,7 +58,8 @@ std::optional<NarrowBand> Recorder::measure(const Subject& subject, const std::s
     const apps::Cost cost = apps::costOf([&] { made = work(); });
     row.figures["cpu_s"] = cost.cpuSeconds;
     row.figures["peak_bytes"] = cost.peakBytes;
-    addErrors(*made, subject.truth, tool == kOurs ? Mesher::Ours : Mesher::OpenVdb, row.figures);
+    addErrors(*made, subject.truth, tool == kOurs ? Mesher::Ours : Mesher::OpenVdb, row.figures,
+              isQuick() ? kQuickRayCount : kRayCount);
     addInvariants(*made, subject.truth, row.figures);
   } catch (const levelset::Cancelled&) {
     throw;

@@ -38,6 +38,10 @@ class Recorder {
   /// `finest`; at `phases` placements in the full one.
   [[nodiscard]] bool wantsPeer(const Sample& at, int finest, int phases = 5) const;
 
+  /// True where work that is repeated many times is done: everywhere in the full budget, at the
+  /// coarsest resolution in the quick one.
+  [[nodiscard]] bool wantsRepeats(const Sample& at) const;
+
   /// Runs and times `work`, compares what it returns with the truth and adds a row. A refusal
   /// becomes a row that says so.
   /// @return the result, for more figures by set(); empty if refused

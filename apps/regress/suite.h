@@ -24,18 +24,25 @@ struct SuiteResult {
   double cpuSeconds = 0;
 };
 
-/// @throws UsageError for a name that no case has; Cancelled
+/// @throws UsageError for a name that no case has
+void checkNames(const std::vector<std::string>& names);
+
+/// @throws UsageError as checkNames(); Cancelled
 [[nodiscard]] SuiteResult runSuite(const SuiteOptions& options);
 
 /// A sentence for each bound that was missed and each statement that does not hold.
 [[nodiscard]] std::vector<std::string> failures(const CaseResult& result);
 [[nodiscard]] std::vector<std::string> failures(const SuiteResult& result);
 
+/// Makes the folder for results if it is missing.
+/// @throws IoError
+void makeFolder(const std::filesystem::path& folder);
+
 /// Writes results.json, results.csv, index.html and, where Python has matplotlib, the plots (PNG
-/// and SVG) with the script that made them. The folder is made if it is missing.
+/// and SVG; only `withPlots`) with the script that made them.
 /// @return notes: what was left out, and why
 /// @throws IoError
 std::vector<std::string> writeResults(const SuiteResult& result,
-                                      const std::filesystem::path& folder);
+                                      const std::filesystem::path& folder, bool withPlots);
 
 }  // namespace regress

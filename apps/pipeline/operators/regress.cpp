@@ -15,7 +15,7 @@ void listCases(std::string& text) {
     text += fmt::format("{:<18}{}\n", c.name, c.title);
 }
 
-std::vector<std::string> names(const Invocation& in) {
+std::vector<std::string> caseNames(const Invocation& in) {
   std::vector<std::string> all;
   if (!in.given("case")) return all;
   std::istringstream text(in.text("case"));
@@ -30,20 +30,25 @@ void appendLine(const regress::CaseResult& result, std::string& text) {
                       result.judgements.size() + result.outcomes.size(), result.cpuSeconds);
 }
 
+void validateRegression(const Invocation& in) {
+  regress::checkNames(caseNames(in));
+  if (!in.given("out") && !in.flag("list"))
+    throw levelset::UsageError("regress: --out is missing; name the folder for the results");
+}
+
 Value runRegression(Invocation& in) {
   if (in.flag("list")) {
     listCases(in.output);
     return Value(Plan{});
   }
-  if (!in.given("out"))
-    throw levelset::UsageError("regress: --out is missing; name the folder for the results");
+  regress::makeFolder(in.text("out"));
   const regress::SuiteResult result = regress::runSuite(
-      {.names = names(in),
+      {.names = caseNames(in),
        .budget = in.text("budget") == "full" ? regress::Budget::Full : regress::Budget::Quick,
        .maxMemory = in.maxMemory,
        .progress = in.progress,
        .finished = [&](const regress::CaseResult& c) { appendLine(c, in.output); }});
-  in.notes.notes = regress::writeResults(result, in.text("out"));
+  in.notes.notes = regress::writeResults(result, in.text("out"), !in.flag("no-plots"));
   const std::vector<std::string> failed = regress::failures(result);
   for (const std::string& sentence : failed) in.output += "missed: " + sentence + "\n";
   if (!failed.empty())
@@ -77,12 +82,17 @@ void addRegressionOperators(std::vector<Operator>& all) {
                  {.name = "out",
                   .type = ParamType::Path,
                   .doc = "folder for the results; made if it is missing"},
+                 {.name = "no-plots",
+                  .type = ParamType::Flag,
+                  .doc =
+                      "leave the plots out; plots.py in the folder draws them from an earlier run"},
                  {.name = "list",
                   .type = ParamType::Flag,
                   .doc = "print the names of all cases and run none"}},
       .flow = Flow::PassesThrough,
       .run = runRegression,
       .plan = [](Invocation&) { return Plan{}; },
+      .validate = validateRegression,
   });
 }
 

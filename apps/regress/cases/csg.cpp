@@ -45,7 +45,7 @@ void combineBalls(Recorder& out) {
       const Subject subject{op.name, at, awayFromCrease(truth, a, b, 1, at.voxelSize)};
       const std::array<NarrowBand, 2> both{first, second};
       out.measure(subject, kOurs, [&] { return levelset::combine(op.operation, both).band; });
-      if (out.wantsPeer(at, 32))
+      if (out.wantsPeer(at, 16))
         out.measure(subject, peer::kCsg,
                     [&] { return peer::combine(op.operation, first, second); });
     }
@@ -105,7 +105,7 @@ void addCsgCases(std::vector<Case>& all) {
            "volume and area are those of caps. Grid points nearer than 1.5 voxels to the circle "
            "are left out of the band's errors.",
        .citation = "closed form",
-       .quick = {16, 32, 64},
+       .quick = {12, 16, 32},
        .full = {32, 64, 128, 256},
        .bounds = ballBounds(),
        .run = combineBalls});
@@ -116,7 +116,7 @@ void addCsgCases(std::vector<Case>& all) {
                      "The same balls, and a box of edge 4 around them. deviation: largest "
                      "difference of the two sides' bands, in voxels.",
                  .citation = "set algebra",
-                 .quick = {8, 16, 32},
+                 .quick = {8, 12, 16},
                  .full = {16, 32, 64},
                  .bounds = {{"A ∪ A = A", "deviation_vx", 1e-5},
                             {"A ∩ A = A", "deviation_vx", 1e-5},

@@ -48,7 +48,7 @@ std::vector<Bound> scaleBounds() {
 void halfWidths(Recorder& out) {
   for (const Sample& at : out.samples()) {
     for (const double width : {1.0, 1.5, 3.0, 50.0}) {
-      if (width > 3 && out.isQuick() && (at.phase != kQuickPhase || at.resolution > 8)) continue;
+      if (width > 3 && out.isQuick() && (at.phase != kQuickPhase || at.resolution > 6)) continue;
       const Truth truth = ball(at.shift, 1);
       const NarrowBand field = exactBand(truth, at.voxelSize, width);
       std::string name = "half width " + std::to_string(width).substr(0, width > 9 ? 2 : 3);
@@ -150,7 +150,7 @@ void addExtremeCases(std::vector<Case>& all) {
                      "1, 1e-6 and 1e6, and with its centre 1e6 voxels from the origin along each "
                      "axis. Resolution is the radius in voxels; the errors must be the same.",
                  .citation = "closed form",
-                 .quick = {8, 12, 16},
+                 .quick = {6, 8, 12},
                  .full = {16, 32, 64},
                  .bounds = scaleBounds(),
                  .run = scales});
@@ -161,7 +161,7 @@ void addExtremeCases(std::vector<Case>& all) {
                      "A sphere of radius 1 with half widths of 1, 1.5, 3 and 50 voxels is "
                      "re-distanced; a band of 3 is widened to 10 and narrowed again.",
                  .citation = "closed form",
-                 .quick = {8, 12, 16},
+                 .quick = {6, 8, 12},
                  .full = {16, 32, 64},
                  .bounds = {{"half width 1.5", "band_in_linf_vx", 0.05},
                             {"half width 3.0", "band_in_linf_vx", 0.05},
@@ -181,7 +181,7 @@ void addExtremeCases(std::vector<Case>& all) {
            "than 4 voxels from the place; boxes with a face or three in one plane, united and "
            "subtracted.",
        .citation = "closed form",
-       .quick = {16, 24, 32},
+       .quick = {12, 16, 24},
        .full = {16, 32, 64},
        .bounds = {{"torus closes its hole", "surface_l1_vx", 0.02},
                   {"union of balls that touch", "band_out_linf_vx", 0.1},

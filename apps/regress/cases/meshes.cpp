@@ -47,7 +47,7 @@ void convertMeshes(Recorder& out) {
       const TriMesh mesh = levelset::transform(cubeMesh(), matrix);
       const Subject subject{turned ? "rotated cube" : "cube", at, cubeTruth(matrix)};
       out.measure(subject, kOurs, [&] { return levelset::meshToBand(mesh, at.voxelSize).band; });
-      if (out.wantsPeer(at, 32))
+      if (out.wantsPeer(at, 16))
         out.measure(subject, peer::kMesh, [&] { return peer::fromMesh(mesh, at.voxelSize); });
     }
     // To a mesh and back: the error is that of the mesh between.
@@ -57,7 +57,7 @@ void convertMeshes(Recorder& out) {
     out.measure(subject, kOurs, [&] {
       return levelset::meshToBand(levelset::bandToMesh(exact), at.voxelSize).band;
     });
-    if (out.wantsPeer(at, 32))
+    if (out.wantsPeer(at, 16))
       out.measure(subject, "OpenVDB volumeToMesh + meshToLevelSet",
                   [&] { return peer::rebuild(exact); });
   }
@@ -127,12 +127,13 @@ void addMeshCases(std::vector<Case>& all) {
            "a band: every distance is known exactly. An exact band of a torus 0.35 / 0.15 becomes "
            "a mesh and a band again.",
        .citation = "closed forms; Jones95",
-       .quick = {16, 24, 32},
+       .quick = {12, 16, 24},
        .full = {32, 64, 128},
        .bounds = {{"cube", "band_in_linf_vx", 1e-4},
                   {"cube", "band_out_linf_vx", 1e-4},
                   {"rotated cube", "band_in_linf_vx", 1e-4},
                   {"rotated cube", "band_out_linf_vx", 1e-4},
+                  {"torus and back", "order_surface", 1.8, 24, Sense::AtLeast},
                   {"torus and back", "order_surface", 1.8, 64, Sense::AtLeast}},
        .run = convertMeshes});
   all.push_back(

@@ -19,7 +19,7 @@ void offsetSphere(Recorder& out) {
       const double d = voxels * at.voxelSize;
       const Subject subject{voxels > 0 ? "+10 voxels" : "-5 voxels", at, ball(at.shift, 1 + d)};
       out.measure(subject, kOurs, [&] { return levelset::offset(solid, d); });
-      if (out.wantsPeer(at, 16, 1))
+      if (out.wantsPeer(at, 8, 1))
         out.measure(subject, peer::kFilter, [&] { return peer::offset(solid, d); });
     }
   }
@@ -48,7 +48,7 @@ void offsetCube(Recorder& out) {
           outwards{name + "+5 voxels", at, place(outer, rotated)};
       out.measure(inwards, kOurs, [&] { return levelset::offset(solid, -d); });
       out.measure(outwards, kOurs, [&] { return levelset::offset(solid, d); });
-      if (!out.wantsPeer(at, 20, 1)) continue;
+      if (!out.wantsPeer(at, 14, 1)) continue;
       out.measure(inwards, peer::kFilter, [&] { return peer::offset(solid, -d); });
       out.measure(outwards, peer::kFilter, [&] { return peer::offset(solid, d); });
     }
@@ -71,7 +71,7 @@ void offsetLaws(Recorder& out) {
       if (sum) out.set("deviation_vx", deviation(*sum, levelset::offset(solid, 7 * h)));
       out.measure({name + "+5 then -5", at, grown(0)}, kOurs,
                   [&] { return levelset::offset(levelset::offset(solid, 5 * h), -5 * h); });
-      if (out.wantsPeer(at, 8, 1))
+      if (out.wantsPeer(at, 6, 1))
         out.measure({name + "+5 then -5", at, grown(0)}, peer::kFilter,
                     [&] { return peer::offset(peer::offset(solid, 5 * h), -5 * h); });
     }
@@ -87,7 +87,7 @@ void addOffsetCases(std::vector<Case>& all) {
        .title = "a sphere grows and shrinks",
        .definition = "The exact band of a sphere of radius 1, offset by +10 and by −5 voxels.",
        .citation = "closed form",
-       .quick = {16, 32, 64},
+       .quick = {8, 24, 64},
        .full = {32, 64, 128},
        .bounds = {{"+10 voxels", "surface_l1_vx", 0.002, 64},
                   {"+10 voxels", "band_in_linf_vx", 0.05, 64},
@@ -105,9 +105,13 @@ void addOffsetCases(std::vector<Case>& all) {
            "voxels it is the smaller cube, edges and corners sharp; outwards by 5 it is the cube "
            "with edges rounded by 5 voxels.",
        .citation = "closed form",
-       .quick = {20, 30, 40},
+       .quick = {14, 20, 32},
        .full = {40, 80, 160},
-       .bounds = {{"cube, -5 voxels", "band_in_linf_vx", 0.1, 80},
+       .bounds = {{"cube, -5 voxels", "band_in_linf_vx", 0.1, 32},
+                  {"cube, -5 voxels", "band_out_linf_vx", 0.1, 32},
+                  {"rotated cube, -5 voxels", "band_in_linf_vx", 0.25, 32},
+                  {"rotated cube, -5 voxels", "band_out_linf_vx", 0.25, 32},
+                  {"cube, -5 voxels", "band_in_linf_vx", 0.1, 80},
                   {"cube, -5 voxels", "band_out_linf_vx", 0.1, 80},
                   {"rotated cube, -5 voxels", "band_in_linf_vx", 0.25, 80},
                   {"rotated cube, -5 voxels", "band_out_linf_vx", 0.25, 80}},
@@ -120,10 +124,11 @@ void addOffsetCases(std::vector<Case>& all) {
            "Sphere of radius 1 and box 1.6 × 1.2 × 0.8: +3 then +4 voxels must be +7 (deviation), "
            "+5 then −5 must be the solid again, since both are convex.",
        .citation = "closed form",
-       .quick = {8, 12, 16},
+       .quick = {6, 8, 12},
        .full = {16, 32, 64},
-       .bounds = {{"sphere, +3 then +4", "surface_l1_vx", 0.002, 32},
-                  {"sphere, +5 then -5", "surface_l1_vx", 0.002, 32}},
+       .bounds = {{"sphere, +3 then +4", "surface_l1_vx", 0.002},
+                  {"sphere, +3 then +4", "deviation_vx", 0.002},
+                  {"sphere, +5 then -5", "surface_l1_vx", 0.002}},
        .run = offsetLaws});
 }
 

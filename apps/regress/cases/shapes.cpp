@@ -16,13 +16,13 @@ void sampleShapes(Recorder& out) {
     const double h = at.voxelSize;
     const Subject sphere{"sphere", at, ball(c, 1)};
     out.measure(sphere, kOurs, [&] { return levelset::makeSphere(1, c, h); });
-    if (out.wantsPeer(at, 32))
+    if (out.wantsPeer(at, 16))
       out.measure(sphere, peer::kShapes, [&] { return peer::sphere(1, c, h); });
 
     const V3d size(1.6, 1.2, 0.8);
     const Subject cuboid{"box", at, box(c, size)};
     out.measure(cuboid, kOurs, [&] { return levelset::makeBox(size, c, h); });
-    if (out.wantsPeer(at, 32))
+    if (out.wantsPeer(at, 16))
       out.measure(cuboid, peer::kShapes, [&] { return peer::box(size, c, h); });
 
     out.measure({"torus", at, torus(c, axis, 0.7, 0.3)}, kOurs,
@@ -41,8 +41,10 @@ std::vector<Bound> shapeBounds() {
   for (const char* variant : {"sphere", "box", "torus", "cylinder", "capsule"})
     for (const char* figure : {"band_in_linf_vx", "band_out_linf_vx"})
       bounds.push_back({variant, figure, 2e-6});
-  for (const char* variant : {"sphere", "torus"})
-    bounds.push_back({variant, "order_volume", 1.8, 32, Sense::AtLeast});
+  // A sphere's is below what floats hold at these resolutions, and shows no order.
+  bounds.push_back({"sphere", "volume_error", 1e-6});
+  bounds.push_back({"torus", "order_volume", 1.8, 24, Sense::AtLeast});
+  bounds.push_back({"torus", "order_volume", 1.8, 32, Sense::AtLeast});
   return bounds;
 }
 
@@ -59,7 +61,7 @@ void addShapeCases(std::vector<Case>& all) {
            "0.4, against their closed forms on both sides. What is left of the surface's "
            "error is that of tricubic interpolation.",
        .citation = "closed forms",
-       .quick = {8, 16, 32},
+       .quick = {8, 16, 24},
        .full = {16, 32, 64},
        .bounds = shapeBounds(),
        .run = sampleShapes});

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <set>
 
 #include "apps/regress/columns.h"
@@ -11,6 +12,7 @@
 #include "apps/regress/recorder.h"
 #include "apps/regress/suite.h"
 #include "apps/regress/truth.h"
+#include "levelset/vdb.h"
 #include "tests/support/shell.h"
 
 namespace regress_test {
@@ -41,12 +43,24 @@ TEST(RegressErrors, VanishForTheExactBand) {
   EXPECT_LE(std::abs(f.at("volume_error")), 3e-3);
 }
 
+TEST(RegressExactBand, EndsBelowTheBackground) {
+  // Grid points at 15 voxels from a sphere of 12: exactly at the end of a band of three.
+  const double h = 1.0 / 12;
+  const auto band = exactBand(ball(V3d(0), 1), h);
+  const auto& grid = levelset::vdb(band);
+  EXPECT_FALSE(grid.tree().isValueOn(openvdb::Coord(5, 2, 14)));
+  for (auto it = grid.cbeginValueOn(); it; ++it)
+    ASSERT_LT(std::abs(*it), grid.background()) << it.getCoord();
+}
+
 TEST(RegressErrors, AreThoseOfAWrongRadius) {
   const double off = 0.3 * kVoxel;
   const Figures f = errorsOf(exactBand(ball(kCentre, 1), kVoxel), ball(kCentre, 1 + off));
-  for (const char* column : {"band_in_l1_vx", "band_in_linf_vx", "band_out_l1_vx",
-                             "band_out_linf_vx", "surface_l1_vx", "surface_linf_vx"})
+  for (const char* column :
+       {"band_in_l1_vx", "band_in_linf_vx", "band_out_linf_vx", "surface_l1_vx", "surface_linf_vx"})
     EXPECT_NEAR(f.at(column), 0.3, 0.01) << column;
+  // The outermost grid points are at the background already.
+  EXPECT_NEAR(f.at("band_out_l1_vx"), 0.285, 0.01);
   EXPECT_NEAR(f.at("surface_l1"), off, 0.01 * kVoxel);
   EXPECT_NEAR(f.at("volume_error"), std::pow(1 + off, -3) - 1, 3e-3);
 }
@@ -92,7 +106,10 @@ TEST(RegressDeviation, IsZeroOnlyForTheSameBand) {
 TEST(RegressRays, FindTheZerosOfTheExactSolid) {
   const Truth ring = torus(kCentre, V3d(1, 2, 3), 0.7, 0.3);
   const RayHits hits = shootRays(exactBand(ring, 1.0 / 24), ring);
-  EXPECT_GT(hits.exactHits, kRayCount);  // a chord of the ball around meets it more than once
+  // Crofton: lines spread evenly over a ball's cross 2 A / 4πR² times a surface of area A within.
+  const double radius = ring.reach + 4.0 / 24;
+  const double expected = kRayCount * *ring.area / (2 * std::numbers::pi * radius * radius);
+  EXPECT_NEAR(hits.exactHits, expected, 0.01 * expected);
   // Rays that graze the surface may go either way.
   EXPECT_NEAR(static_cast<double>(hits.errors.size()), hits.exactHits, 0.002 * hits.exactHits);
 }
@@ -197,7 +214,8 @@ TEST_F(Regress, ListsItsCases) {
 }
 
 TEST_F(Regress, WritesResultsAndPage) {
-  const auto outcome = levelsmith("--quiet regress --case skewed-axes,damaged-grids --out r");
+  const auto outcome =
+      levelsmith("--quiet regress --case skewed-axes,damaged-grids --no-plots --out r");
   EXPECT_EQ(outcome.code, 0) << outcome.out << outcome.err;
   const Json json = Json::parse(support::slurp(folder_ / "r/results.json"));
   EXPECT_EQ(json["budget"], "quick");
