@@ -14,26 +14,26 @@ namespace levelset::convert {
 namespace {
 
 using Imath::V3d;
-using Cell = std::array<std::int64_t, 3>;
+using SampleCell = std::array<std::int64_t, 3>;
 
 constexpr double kCellSize = 4;
 
-Cell cellOf(const V3d& p) {
-  Cell cell;
+SampleCell cellOf(const V3d& p) {
+  SampleCell cell;
   for (std::size_t i = 0; i < 3; ++i)
     cell[i] = static_cast<std::int64_t>(std::floor(p[static_cast<int>(i)] / kCellSize));
   return cell;
 }
 
 /// The cells that hold points, each with the triangles that come near it.
-class Cells {
+class SampleCells {
  public:
-  explicit Cells(std::span<const V3d> points) {
+  explicit SampleCells(std::span<const V3d> points) {
     for (const V3d& p : points) lists_[cellOf(p)];
   }
 
   void add(std::uint32_t triangle, const Imath::Box3d& reach) {
-    const Cell low = cellOf(reach.min), high = cellOf(reach.max);
+    const SampleCell low = cellOf(reach.min), high = cellOf(reach.max);
     double covered = 1;
     for (std::size_t i = 0; i < 3; ++i) covered *= static_cast<double>(high[i] - low[i] + 1);
     if (covered > static_cast<double>(lists_.size())) {
@@ -45,7 +45,7 @@ class Cells {
       }
       return;
     }
-    Cell c;
+    SampleCell c;
     for (c[0] = low[0]; c[0] <= high[0]; ++c[0])
       for (c[1] = low[1]; c[1] <= high[1]; ++c[1])
         for (c[2] = low[2]; c[2] <= high[2]; ++c[2])
@@ -58,7 +58,7 @@ class Cells {
   }
 
  private:
-  std::map<Cell, std::vector<std::uint32_t>> lists_;
+  std::map<SampleCell, std::vector<std::uint32_t>> lists_;
 };
 
 }  // namespace
@@ -68,7 +68,7 @@ std::vector<char> areNear(const LocalMesh& mesh, std::span<const V3d> points, do
   if (points.empty()) return result;
   Imath::Box3d region;
   for (const V3d& p : points) region.extendBy(p);
-  Cells cells(points);
+  SampleCells cells(points);
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     Imath::Box3d box;
     for (std::size_t k = 0; k < 3; ++k) box.extendBy(mesh.corner(t, k));
