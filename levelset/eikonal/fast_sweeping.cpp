@@ -18,9 +18,9 @@ using Mask = ArrivalBlock::Mask;
 
 // Improvements below this part of a voxel's time do not count.
 constexpr float kImprovement = 1e-5f;
-// News later than the earliest by more than this wait, voxels: what they would lead to now is not
-// final yet. First-order sweeps work on whole blocks, the second solution grid point by grid point.
-constexpr float kBlockWindow = 8, kPointWindow = 1.5f;
+// Blocks whose news are later than the earliest by more than this wait, voxels: what they would
+// compute now is not final yet.
+constexpr float kWindow = 8;
 constexpr std::size_t kBlocksPerTask = 8;
 
 int parityOf(const Coord& origin) {
@@ -34,13 +34,12 @@ struct Desk {
   std::uint8_t tells = 0;       ///< bit d: neighbour d should look; written by the block's own work
   std::array<float, 6> told{};  ///< earliest change at that face
   std::optional<std::vector<std::uint16_t>> order;  ///< what is to be solved, by first-order time
-  Mask pending;  ///< of these, what has not been solved, or has news
   std::unique_ptr<std::array<float, ArrivalBlock::kSize>> second;  ///< second-order times
 };
 
-/// Calls work(block, desk, latest time that may be final) for the blocks that have news until none
-/// has: the eight parities of block positions in turn, one parity in parallel, since its blocks do
-/// not touch; the earliest first. The order is fixed, hence the result.
+/// Calls work(block, desk) for the blocks that have news until none has: the eight parities of
+/// block positions in turn, one parity in parallel, since its blocks do not touch; the earliest
+/// first. The order is fixed, hence the result.
 class Rounds {
  public:
   explicit Rounds(ArrivalBlocks& blocks) : blocks_(blocks) {}
@@ -54,13 +53,13 @@ class Rounds {
   }
 
   template <typename Work>
-  void run(bool mayGrow, float width, double from, double to, const Work& work) {
+  void run(bool mayGrow, double from, double to, const Work& work) {
     sortNew();
     float window = 0;
     for (;;) {
       const float earliest = earliestNews();
       if (earliest == kFar) return;
-      window = std::max(window, earliest + width);
+      window = std::max(window, earliest + kWindow);
       report(subProgress(blocks_.settings().progress, from, to),
              std::min(1.0, static_cast<double>(earliest) / blocks_.settings().until),
              blocks_.settings().action);
@@ -71,7 +70,7 @@ class Rounds {
         const auto range = tbb::blocked_range<std::size_t>(0, due.size(), kBlocksPerTask);
         tbb::parallel_for(range, [&](const auto& part) {
           for (std::size_t i = part.begin(); i != part.end(); ++i)
-            work(blocks_.block(due[i]), desks[due[i]], window);
+            work(blocks_.block(due[i]), desks[due[i]]);
         });
         for (const std::uint32_t i : due) deliver(i, mayGrow);
         if (mayGrow) sortNew();
@@ -248,18 +247,15 @@ class SecondOrderWorker {
     views_[kOwn] = {&block, desk.second->data()};
   }
 
-  /// Solves what is pending and not later than `window`.
-  void run(float window) {
-    if (!desk_.order) sortByTime();
-    markNews();
-    desk_.earliest = kFar;
+  void run() {
+    if (desk_.order) {
+      markNews();
+    } else {
+      sortByTime();
+      pending_.setOn();
+    }
     for (const std::uint16_t n : *desk_.order) {
-      if (!desk_.pending.isOn(n)) continue;
-      if (block_.time[n] > window) {
-        desk_.earliest = block_.time[n];
-        break;
-      }
-      desk_.pending.setOff(n);
+      if (!pending_.isOn(n)) continue;
       const auto time = static_cast<float>(solve(n));
       float& stored = (*desk_.second)[n];
       if (std::abs(time - stored) <= kImprovement) continue;
@@ -268,32 +264,37 @@ class SecondOrderWorker {
       markReaders(n);
     }
     desk_.newsFrom = 0;
+    desk_.earliest = kFar;
   }
 
  private:
   /// The two layers beside each neighbour with news read from it.
   void markNews() {
-    for (std::size_t d = 0; d < 6; ++d) {
-      if (!(desk_.newsFrom >> d & 1)) continue;
-      const Index shift = 6 - 3 * static_cast<Index>(d >> 1);
-      for (Index n = 0; n < ArrivalBlock::kSize; ++n) {
-        const Index at = n >> shift & 7u;
-        if (d & 1 ? at >= 6 : at < 2) desk_.pending.setOn(n);
-      }
-    }
+    for (std::size_t d = 0; d < 6; ++d)
+      if (desk_.newsFrom >> d & 1) pending_ |= facingLayers()[d];
   }
 
-  /// The grid points of the block up to two away that come later.
+  static const std::array<Mask, 6>& facingLayers() {
+    static const std::array<Mask, 6> layers = [] {
+      std::array<Mask, 6> made;
+      for (Index n = 0; n < ArrivalBlock::kSize; ++n)
+        for (std::size_t d = 0; d < 6; ++d) {
+          const Index at = n >> (6 - 3 * static_cast<Index>(d >> 1)) & 7u;
+          if (d & 1 ? at >= 6 : at < 2) made[d].setOn(n);
+        }
+      return made;
+    }();
+    return layers;
+  }
+
+  /// The grid points of the block up to two away; of those that came before none reads this one.
   void markReaders(Index n) {
-    const auto mark = [&, time = block_.time[n]](Index reader) {
-      if (block_.time[reader] > time) desk_.pending.setOn(reader);
-    };
     for (const Index shift : {0u, 3u, 6u}) {
       const Index at = n >> shift & 7u, step = 1u << shift;
-      if (at > 0) mark(n - step);
-      if (at > 1) mark(n - 2 * step);
-      if (at < 7) mark(n + step);
-      if (at < 6) mark(n + 2 * step);
+      if (at > 0) pending_.setOn(n - step);
+      if (at > 1) pending_.setOn(n - 2 * step);
+      if (at < 7) pending_.setOn(n + step);
+      if (at < 6) pending_.setOn(n + 2 * step);
     }
   }
 
@@ -308,7 +309,6 @@ class SecondOrderWorker {
     desk_.order.emplace(count);
     for (std::size_t i = 0; i < count; ++i)
       (*desk_.order)[i] = static_cast<std::uint16_t>(keys[i] & 0xFFFF);
-    desk_.pending.setOn();
   }
 
   static constexpr std::size_t kOwn = 6;
@@ -374,6 +374,7 @@ class SecondOrderWorker {
   Desk& desk_;
   float until_;
   std::array<View, 7> views_;
+  Mask pending_;  ///< to be solved in this round
 };
 
 float earliestUnknown(const ArrivalBlock& block) {
@@ -392,8 +393,8 @@ void solveSecondOrder(ArrivalBlocks& blocks, float until) {
     const float earliest = earliestUnknown(block);
     if (earliest <= until) desk.earliest = earliest;
   }
-  rounds.run(false, kPointWindow, 0.5, 1, [&](ArrivalBlock& block, Desk& desk, float window) {
-    SecondOrderWorker(block, desk, rounds.desks, until).run(window);
+  rounds.run(false, 0.5, 1, [&](ArrivalBlock& block, Desk& desk) {
+    SecondOrderWorker(block, desk, rounds.desks, until).run();
   });
   for (ArrivalBlock& block : blocks.blocks()) block.time = *rounds.desks[block.number].second;
 }
@@ -415,8 +416,7 @@ void sweepArrivals(ArrivalBlocks& blocks, int order) {
         tell(desk, it.pos(), block.time[it.pos()], 1);
       }
     rounds.deliverStart();
-    const double end = order == 2 ? 0.5 : 1;
-    rounds.run(true, kBlockWindow, 0, end, [&](ArrivalBlock& block, Desk& desk, float) {
+    rounds.run(true, 0, order == 2 ? 0.5 : 1, [&](ArrivalBlock& block, Desk& desk) {
       FirstOrderWorker(block, desk, reach).run();
     });
   }
