@@ -13,6 +13,8 @@ inline constexpr const char* kRebuild = "OpenVDB levelSetRebuild";
 inline constexpr const char* kSweep = "OpenVDB sdfToSdf";
 inline constexpr const char* kFilter = "OpenVDB LevelSetFilter";
 inline constexpr const char* kCsg = "OpenVDB csg + levelSetRebuild";
+inline constexpr const char* kDilate = "OpenVDB dilateSdf";
+inline constexpr const char* kCurvature = "OpenVDB meanCurvature";
 inline constexpr const char* kShapes = "OpenVDB createLevelSet";
 inline constexpr const char* kMesh = "OpenVDB meshToLevelSet";
 inline constexpr const char* kResample = "OpenVDB resampleToMatch";
@@ -28,6 +30,9 @@ inline constexpr const char* kResample = "OpenVDB resampleToMatch";
 [[nodiscard]] levelset::NarrowBand combine(levelset::CsgOperation operation,
                                            const levelset::NarrowBand& a,
                                            const levelset::NarrowBand& b);
+/// To `voxels` more on both sides; the band is as much wider.
+[[nodiscard]] levelset::NarrowBand dilate(const levelset::NarrowBand& band, int voxels);
+[[nodiscard]] levelset::NarrowBand curvatureFlow(const levelset::NarrowBand& band, double time);
 [[nodiscard]] levelset::NarrowBand resample(const levelset::NarrowBand& band, double voxelSize);
 
 }  // namespace regress::peer

@@ -18,6 +18,11 @@ const std::vector<Case>& cases() {
     addRedistanceCases(list);
     addOffsetCases(list);
     addCsgCases(list);
+    addMorphologyCases(list);
+    addFilletCases(list);
+    addEikonalCases(list);
+    addCurvatureCases(list);
+    addMorphCases(list);
     addResampleCases(list);
     addExtremeCases(list);
     addBadInputCases(list);

@@ -12,7 +12,7 @@ namespace {
 
 void listCases(std::string& text) {
   for (const regress::Case& c : regress::cases())
-    text += fmt::format("{:<18}{}\n", c.name, c.title);
+    text += fmt::format("{:<20}{}\n", c.name, c.title);
 }
 
 std::vector<std::string> caseNames(const Invocation& in) {
@@ -25,7 +25,7 @@ std::vector<std::string> caseNames(const Invocation& in) {
 
 void appendLine(const regress::CaseResult& result, std::string& text) {
   const std::size_t missed = regress::failures(result).size();
-  text += fmt::format("{:<6}{:<18}{:>4} runs {:>4} bounds {:>8.1f} CPU s\n", missed ? "FAIL" : "ok",
+  text += fmt::format("{:<6}{:<20}{:>4} runs {:>4} bounds {:>8.1f} CPU s\n", missed ? "FAIL" : "ok",
                       result.of->name, result.rows.size(),
                       result.judgements.size() + result.outcomes.size(), result.cpuSeconds);
 }
