@@ -7,9 +7,9 @@
 #include <limits>
 
 #include "apps/regress/rays.h"
-#include "levelset/meshing/band_to_mesh.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/measure.h"
+#include "levelset/meshing/band_to_mesh.h"
 #include "levelset/vdb.h"
 
 namespace regress {

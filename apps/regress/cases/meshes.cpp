@@ -6,9 +6,9 @@
 #include "apps/regress/exact_band.h"
 #include "apps/regress/peer.h"
 #include "apps/regress/recorder.h"
-#include "levelset/meshing/band_to_mesh.h"
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/convert/triangle_distance.h"
+#include "levelset/meshing/band_to_mesh.h"
 #include "levelset/solids/transform.h"
 
 namespace regress {

@@ -24,11 +24,12 @@ class Repeat : public support::ShellTest, public ::testing::WithParamInterface<C
 
 TEST_P(Repeat, GivesTheSameBits) {
   const Case& c = GetParam();
-  ASSERT_EQ(levelsmith("torus --radius 2 --tube 0.8 --axis 1,2,3 --voxel 0.14 ! write in.vdb ! mesh "
-                       "! write in.ply "
-                       "! sphere --radius 1.4 --center 1,0.5,0.2 --voxel 0.11 ! write tool.vdb")
-                .code,
-            0);
+  ASSERT_EQ(
+      levelsmith("torus --radius 2 --tube 0.8 --axis 1,2,3 --voxel 0.14 ! write in.vdb ! mesh "
+                 "! write in.ply "
+                 "! sphere --radius 1.4 --center 1,0.5,0.2 --voxel 0.11 ! write tool.vdb")
+          .code,
+      0);
   std::string first;
   for (int i = 0; i < 10; ++i) {
     const int threads = 1 << (i % 3);
