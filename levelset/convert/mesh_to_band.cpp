@@ -8,6 +8,7 @@
 #include "levelset/convert/band_assembly.h"
 #include "levelset/convert/mesh_to_band_input.h"
 #include "levelset/convert/open_surface.h"
+#include "levelset/convert/self_intersections.h"
 #include "levelset/convert/separating_surface.h"
 #include "levelset/convert/surface_blocks.h"
 #include "levelset/error.h"
@@ -31,15 +32,34 @@ Progress rising(const Progress& progress) {
   };
 }
 
-SignMode chooseMethod(const TriMesh& mesh, const MeshToBandOptions& options,
-                      const MeshTopology& topology, SignCertificate& certificate,
-                      const Progress& progress) {
+/// Searched for once, by the first who asks.
+class SelfIntersections {
+ public:
+  SelfIntersections(const TriMesh& mesh, const MeshTopology& topology, Progress progress)
+      : mesh_(mesh), topology_(topology), progress_(std::move(progress)) {}
+  const std::vector<convert::TrianglePair>& get() {
+    if (!searched_)
+      pairs_ = convert::findSelfIntersections(topology_.triangles, mesh_.positions, progress_);
+    searched_ = true;
+    return pairs_;
+  }
+  /// −1: nobody asked.
+  [[nodiscard]] std::ptrdiff_t count() const { return searched_ ? std::ssize(pairs_) : -1; }
+
+ private:
+  const TriMesh& mesh_;
+  const MeshTopology& topology_;
+  Progress progress_;
+  bool searched_ = false;
+  std::vector<convert::TrianglePair> pairs_;
+};
+
+SignMode chooseMethod(const MeshToBandOptions& options, const MeshTopology& topology,
+                      SelfIntersections& selfIntersections) {
   if (options.sign != SignMode::Auto) return options.sign;
   if (!topology.isClosed()) return SignMode::Winding;
   if (!options.searchSelfIntersections) return SignMode::Closed;
-  certificate.selfIntersections =
-      static_cast<std::ptrdiff_t>(countSelfIntersections(mesh, progress));
-  return certificate.selfIntersections == 0 ? SignMode::Closed : SignMode::Winding;
+  return selfIntersections.get().empty() ? SignMode::Closed : SignMode::Winding;
 }
 
 void checkClosed(const MeshTopology& topology, Nesting nesting) {
@@ -137,8 +157,8 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
   certificate.droppedTriangles = topology.dropped;
   if (topology.triangles.empty())
     throw InvalidInput("level-set: every triangle is degenerate; there is no surface to convert");
-  certificate.method =
-      chooseMethod(mesh, options, topology, certificate, subProgress(progress, 0.05, 0.4));
+  SelfIntersections selfIntersections(mesh, topology, subProgress(progress, 0.05, 0.4));
+  certificate.method = chooseMethod(options, topology, selfIntersections);
   if (certificate.method == SignMode::Closed) checkClosed(topology, options.nesting);
 
   // === Signs
@@ -147,11 +167,12 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
   const SignField field(local, topology, ruleFor(certificate.method, options.nesting),
                         subProgress(progress, 0.4, 0.5));
   certificate.flipped = field.isFlipped();
-  if (certificate.method != SignMode::Closed || options.nesting != Nesting::Parity) {
-    if (topology.boundary.empty())
-      local = convert::separatingSurface(local, field.isFlipped() ? -1 : 1,
-                                         subProgress(progress, 0.5, 0.6));
-  }
+  const bool byParity =
+      certificate.method == SignMode::Closed && options.nesting == Nesting::Parity;
+  if (topology.boundary.empty() && !byParity)
+    local = convert::separatingSurface(local, selfIntersections.get(), field.isFlipped() ? -1 : 1,
+                                       subProgress(progress, 0.5, 0.6));
+  certificate.selfIntersections = selfIntersections.count();
   if (field.isOpen())
     addOpenSurface(local, field, options.halfWidth, maxMemory, subProgress(progress, 0.5, 0.6));
 

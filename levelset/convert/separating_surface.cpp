@@ -7,14 +7,13 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <optional>
 #include <span>
 
 #include "levelset/convert/exact_predicates.h"
 #include "levelset/convert/near_surface.h"
 #include "levelset/convert/progress_gate.h"
-#include "levelset/convert/self_intersections.h"
 #include "levelset/convert/winding.h"
+#include "levelset/disjoint_sets.h"
 
 namespace levelset::convert {
 namespace {
@@ -42,24 +41,6 @@ struct HalfEdge {
     if (high != other.high) return high < other.high;
     return triangle < other.triangle;
   }
-};
-
-class Groups {
- public:
-  explicit Groups(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-  }
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::uint32_t i, std::uint32_t j) {
-    const std::uint32_t a = find(i), b = find(j);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
 };
 
 V3d areaVector(std::span<const V3d> polygon) {
@@ -108,20 +89,24 @@ void cut(const Polygon& polygon, const V3d& point, const V3d& normal, std::vecto
 
 class SeparatingSurface {
  public:
-  SeparatingSurface(const LocalMesh& mesh, double flip, const Progress& progress)
-      : mesh_(mesh), flip_(flip), progress_(progress) {}
+  SeparatingSurface(const LocalMesh& mesh, std::span<const TrianglePair> pairs, double flip,
+                    const Progress& progress)
+      : mesh_(mesh),
+        pairs_(pairs),
+        flip_(flip),
+        progress_(progress),
+        groups_(mesh.triangles.size()) {}
 
   LocalMesh find() {
-    pairs_ = findSelfIntersections(mesh_.triangles, mesh_.points, subProgress(progress_, 0, 0.7));
     findPartners();
     findPatches();
-    report(progress_, 0.8, kAction);
+    report(progress_, 0.3, kAction);
     std::vector<std::uint32_t> patches;  // by their largest triangle
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
       if (largest_[t] != kNone) patches.push_back(t);
     if (pairs_.empty() && patches.size() <= 1) return mesh_;
     if (!pairs_.empty() || patches.size() > kFewPoints) buildField();
-    report(progress_, 0.9, kAction);
+    report(progress_, 0.6, kAction);
     std::vector<char> kept(mesh_.triangles.size(), 0);  // by patch
     tbb::parallel_for(std::size_t{0}, patches.size(), [&](std::size_t i) {
       const std::uint32_t t = largest_[patches[i]];
@@ -131,7 +116,7 @@ class SeparatingSurface {
     std::map<std::uint32_t, Sheet> dropped;  // by patch
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       if (isCrossed(t)) continue;
-      const std::uint32_t patch = groups_->find(t);
+      const std::uint32_t patch = groups_.find(t);
       if (kept[patch]) {
         result.triangles.push_back(mesh_.triangles[t]);
       } else {
@@ -177,7 +162,6 @@ class SeparatingSurface {
         edges.push_back({std::min(from, to), std::max(from, to), t, from < to});
       }
     std::sort(edges.begin(), edges.end());
-    groups_.emplace(mesh_.triangles.size());
     for (std::size_t i = 0; i < edges.size();) {
       std::size_t end = i + 1;
       while (end < edges.size() && edges[end].low == edges[i].low &&
@@ -185,14 +169,14 @@ class SeparatingSurface {
         ++end;
       if (end - i == 2 && edges[i].rising != edges[i + 1].rising && !isCrossed(edges[i].triangle) &&
           !isCrossed(edges[i + 1].triangle))
-        groups_->join(edges[i].triangle, edges[i + 1].triangle);
+        groups_.join(edges[i].triangle, edges[i + 1].triangle);
       i = end;
     }
     largest_.assign(mesh_.triangles.size(), kNone);
     std::vector<double> area(mesh_.triangles.size(), -1);
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       if (isCrossed(t)) continue;
-      const std::uint32_t patch = groups_->find(t);
+      const std::uint32_t patch = groups_.find(t);
       const double own = areaVector(corners(t)).length();
       if (own > area[patch]) area[patch] = own, largest_[patch] = t;
     }
@@ -301,7 +285,7 @@ class SeparatingSurface {
       std::vector<Polygon> kept, dropped;
     };
     std::vector<Found> found(crossed.size());
-    const Progress last = subProgress(progress_, 0.9, 1);
+    const Progress last = subProgress(progress_, 0.6, 1);
     ProgressGate gate(last, crossed.size(), kAction);
     tbb::parallel_for(std::size_t{0}, crossed.size(), [&](std::size_t i) {
       for (Polygon& piece : pieces(crossed[i]))
@@ -353,20 +337,21 @@ class SeparatingSurface {
   }
 
   const LocalMesh& mesh_;
+  std::span<const TrianglePair> pairs_;
   double flip_;
   const Progress& progress_;
-  std::vector<TrianglePair> pairs_;
   std::vector<std::size_t> first_;       // of each triangle's partners
   std::vector<std::uint32_t> partners_;  // triangles that meet it
-  std::optional<Groups> groups_;
+  DisjointSets groups_;
   std::vector<std::uint32_t> largest_;  // triangle of each patch, by the patch's lowest
   WindingField field_;
 };
 
 }  // namespace
 
-LocalMesh separatingSurface(const LocalMesh& mesh, double flip, const Progress& progress) {
-  return SeparatingSurface(mesh, flip, progress).find();
+LocalMesh separatingSurface(const LocalMesh& mesh, std::span<const TrianglePair> pairs, double flip,
+                            const Progress& progress) {
+  return SeparatingSurface(mesh, pairs, flip, progress).find();
 }
 
 }  // namespace levelset::convert

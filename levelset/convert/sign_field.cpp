@@ -1,7 +1,8 @@
 #include "levelset/convert/sign_field.h"
 
 #include <cmath>
-#include <numeric>
+
+#include "levelset/disjoint_sets.h"
 
 namespace levelset::convert {
 namespace {
@@ -16,31 +17,12 @@ struct ClosedMesh {
   std::vector<WeightedTriangle> rest;
 };
 
-/// The component of the boundary that each vertex belongs to, named by one of its vertices.
-class BoundaryLoops {
- public:
-  BoundaryLoops(const std::vector<BoundaryEdge>& boundary, std::size_t vertices)
-      : parent_(vertices) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-    for (const BoundaryEdge& e : boundary) {
-      const std::uint32_t a = find(e.from), b = find(e.to);
-      parent_[std::max(a, b)] = std::min(a, b);
-    }
-  }
-  std::uint32_t find(std::uint32_t v) {
-    while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
-    return v;
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
-
 /// Closes each loop of the boundary by a fan about the mean of its edges' ends. The edges of a loop
 /// form a cycle, so mesh and fans have no boundary, whatever the loop's shape.
 ClosedMesh closeByFans(const LocalMesh& mesh, const std::vector<BoundaryEdge>& boundary) {
   ClosedMesh closed{mesh, std::vector<int>(mesh.triangles.size(), 1), {}};
-  BoundaryLoops loops(boundary, mesh.points.size());
+  DisjointSets loops(mesh.points.size());
+  for (const BoundaryEdge& e : boundary) loops.join(e.from, e.to);
   struct Apex {
     V3d sum = V3d(0);
     double count = 0;

@@ -4,8 +4,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numeric>
 #include <vector>
+
+#include "levelset/disjoint_sets.h"
 
 /// The connected surfaces of a triangle mesh, for any vector type with [] (internal).
 namespace levelset {
@@ -23,11 +24,6 @@ struct Shells {
 };
 
 namespace shells_detail {
-
-inline std::uint32_t root(std::vector<std::uint32_t>& parent, std::uint32_t i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
 
 using Triple = std::array<double, 3>;
 
@@ -51,23 +47,18 @@ template <typename Vector>
 Shells findShells(const std::vector<Vector>& positions,
                   const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   using namespace shells_detail;
-  std::vector<std::uint32_t> parent(positions.size());
-  std::iota(parent.begin(), parent.end(), 0u);
+  DisjointSets sets(positions.size());
   Shells shells;
   shells.shellOfVertex.assign(positions.size(), Shells::kNoShell);
   for (const auto& t : triangles) {
-    std::uint32_t low = root(parent, t[0]);
-    for (std::size_t i = 1; i < 3; ++i) {
-      const std::uint32_t other = root(parent, t[i]);
-      parent[low > other ? low : other] = low < other ? low : other;
-      low = low < other ? low : other;
-    }
+    sets.join(t[0], t[1]);
+    sets.join(t[0], t[2]);
     for (const std::uint32_t v : t) shells.shellOfVertex[v] = 0;  // in use
   }
   std::vector<std::uint32_t> anchors;
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
     if (shells.shellOfVertex[v] == Shells::kNoShell) continue;
-    const std::uint32_t top = root(parent, v);  // its lowest vertex, numbered before
+    const std::uint32_t top = sets.find(v);  // its lowest vertex, numbered before
     if (top == v) {
       shells.shellOfVertex[v] = static_cast<std::uint32_t>(anchors.size());
       anchors.push_back(v);

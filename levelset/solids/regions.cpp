@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "levelset/disjoint_sets.h"
 #include "levelset/inspect/shells.h"
 
 namespace levelset {
@@ -89,25 +90,19 @@ std::array<openvdb::Index, 64> faceOffsets(int axis, int position) {
 /// Joins labels; the lowest stands for its set. Label 0 is the space that the tree does not cover.
 class RegionMap::Linker {
  public:
-  std::int32_t add() {
-    parent_.push_back(static_cast<std::int32_t>(parent_.size()));
-    return parent_.back();
-  }
+  std::int32_t add() { return static_cast<std::int32_t>(sets_.add()); }
   std::int32_t root(std::int32_t i) {
-    while (at(i) != i) i = at(i) = at(at(i));
-    return i;
+    return static_cast<std::int32_t>(sets_.find(static_cast<std::uint32_t>(i)));
   }
   void join(std::int32_t a, std::int32_t b) {
     if (a == lastA_ && b == lastB_) return;
     lastA_ = a, lastB_ = b;
-    a = root(a), b = root(b);
-    at(std::max(a, b)) = std::min(a, b);
+    sets_.join(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
   }
-  [[nodiscard]] std::int32_t size() const { return static_cast<std::int32_t>(parent_.size()); }
+  [[nodiscard]] std::int32_t size() const { return static_cast<std::int32_t>(sets_.size()); }
 
  private:
-  std::int32_t& at(std::int32_t i) { return parent_[static_cast<std::size_t>(i)]; }
-  std::vector<std::int32_t> parent_ = {0};
+  DisjointSets sets_{1};
   std::int32_t lastA_ = 0, lastB_ = 0;
 };
 
