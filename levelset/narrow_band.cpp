@@ -57,8 +57,11 @@ double NarrowBand::voxelSize() const {
 
 double NarrowBand::halfWidth() const {
   if (!grid_) return 0;
-  // The background is stored as a float: the ratio is known no better than that.
-  return static_cast<double>(grid_->grid->background() / static_cast<float>(voxelSize()));
+  // The background is a float. The short number that it was made from, if there is one: 3, not
+  // 3.0000001; in any case one that gives the same background again.
+  const double voxel = voxelSize(), ratio = static_cast<double>(grid_->grid->background()) / voxel;
+  const double rounded = std::round(ratio * 1e6) / 1e6;
+  return backgroundOf(rounded, voxel) == grid_->grid->background() ? rounded : ratio;
 }
 
 std::size_t NarrowBand::activeVoxelCount() const {
@@ -193,19 +196,25 @@ openvdb::math::Transform::Ptr uniformTransform(double voxelSize) {
   return std::make_shared<openvdb::math::Transform>(map);
 }
 
-FloatGrid::Ptr emptyLevelSet(openvdb::math::Transform::Ptr transform, double halfWidth) {
-  const double width = halfWidth * transform->voxelSize()[0];
-  // Rounded up: a band of three voxels must not become one of 2.9999999, which OpenVDB's own check
-  // refuses.
-  float background = static_cast<float>(width);
-  if (background < width) background = std::nextafter(background, INFINITY);
+float backgroundOf(double halfWidth, double voxelSize) {
+  const double width = halfWidth * voxelSize;
+  const auto background = static_cast<float>(width);
+  // A float times the inverse of its factor is itself but for the last bits of a double.
+  return background < width * (1 - 1e-12) ? std::nextafter(background, INFINITY) : background;
+}
+
+void requireBackground(float background, double voxelSize, const char* action) {
   // Distances of a thousandth of a voxel must still be normal numbers.
-  if (!(background > 1000 * std::numeric_limits<float>::min()) || !std::isfinite(background)) {
-    throw InvalidInput(
-        fmt::format("level-set: voxels of {:.6g} are too {} for distances in single precision; "
-                    "change the unit of length",
-                    transform->voxelSize()[0], width < 1 ? "small" : "large"));
-  }
+  if (background > 1000 * std::numeric_limits<float>::min() && std::isfinite(background)) return;
+  throw InvalidInput(
+      fmt::format("{}: voxels of {:.6g} are too {} for distances in single precision; change the "
+                  "unit of length",
+                  action, voxelSize, background < 1 ? "small" : "large"));
+}
+
+FloatGrid::Ptr emptyLevelSet(openvdb::math::Transform::Ptr transform, double halfWidth) {
+  const float background = backgroundOf(halfWidth, transform->voxelSize()[0]);
+  requireBackground(background, transform->voxelSize()[0], "level-set");
   FloatGrid::Ptr grid = FloatGrid::create(background);
   grid->setTransform(std::move(transform));
   grid->setGridClass(openvdb::GRID_LEVEL_SET);

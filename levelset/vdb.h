@@ -46,6 +46,15 @@ struct VdbAccess {
 /// An axis-aligned transform: world = voxelSize × index.
 [[nodiscard]] openvdb::math::Transform::Ptr uniformTransform(double voxelSize);
 
+/// halfWidth × voxelSize, rounded up: a band of three voxels must not become one of 2.9999999,
+/// which OpenVDB's own check refuses. Bands must agree to the bit in where they end, so that
+/// everybody takes it from here; `NarrowBand::halfWidth` gives back what makes the same number
+/// again.
+[[nodiscard]] float backgroundOf(double halfWidth, double voxelSize);
+
+/// @throws InvalidInput when distances up to there leave the range of `float`
+void requireBackground(float background, double voxelSize, const char* action);
+
 /// An empty level-set grid with that transform and background halfWidth × voxelSize.
 [[nodiscard]] openvdb::FloatGrid::Ptr emptyLevelSet(openvdb::math::Transform::Ptr transform,
                                                     double halfWidth);

@@ -165,7 +165,7 @@ FloatTree::Ptr makeTree(const FloatTree& field, const FloatTree& interpolated,
                         const SurfacePoints& points, const SharpPatches& patches,
                         const NearestPoints& nearest, const DistanceRequest& request,
                         double voxelSize) {
-  const auto background = static_cast<float>(request.halfWidth * voxelSize);
+  const auto background = backgroundOf(request.halfWidth, voxelSize);
   auto result = std::make_shared<FloatTree>(background);
   copySigns(
       field, [&](const Coord& origin) { return nearest.holds(origin); }, *result);

@@ -33,8 +33,21 @@ const char* nameOf(CsgOperation operation) {
   return "";
 }
 
-bool shareWidth(double a, double b) {
-  return std::abs(a - b) <= 1e-5 * a;
+/// Cuts the band where |φ| passes `background`.
+void endBandAt(FloatGrid& grid, float background) {
+  openvdb::tree::LeafManager<FloatTree> leaves(grid.tree());
+  leaves.foreach ([background](FloatTree::LeafNodeType& leaf, std::size_t) {
+    float* values = leaf.buffer().data();
+    for (openvdb::Index i = 0; i < FloatTree::LeafNodeType::SIZE; ++i) {
+      if (std::abs(values[i]) < background) continue;
+      values[i] = std::copysign(background, values[i]);
+      leaf.setValueOff(i);
+    }
+  });
+  for (auto it = grid.tree().beginValueOff(); it; ++it)
+    if (it.getDepth() < FloatTree::DEPTH - 1) it.setValue(std::copysign(background, *it));
+  grid.tree().root().setBackground(background, /*updateChildNodes=*/false);
+  openvdb::tools::pruneLevelSet(grid.tree());
 }
 
 /// Negative zero and zero compare equal but are not the same bits.
@@ -83,12 +96,11 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
         "with voxels of {}",
         action, i + 1, solids[i].voxelSize(), finest - solids.begin() + 1, finest->voxelSize()));
   }
-  // Half widths that agree to rounding must agree to the bit: the band ends where |φ| = background.
-  for (NarrowBand& solid : result) {
-    if (vdb(solid).background() == vdb(result.front()).background()) continue;
-    solid = narrowed(std::move(solid),
-                     std::min(result.front().halfWidth(), solid.halfWidth()) * (1 - 1e-7));
-  }
+  // Of voxel sizes that differ in the last bits, the same half width ends in different places.
+  float background = vdb(result.front()).background();
+  for (const NarrowBand& solid : result) background = std::min(background, vdb(solid).background());
+  for (NarrowBand& solid : result)
+    if (vdb(solid).background() != background) endBandAt(editVdb(solid), background);
   return result;
 }
 
@@ -125,22 +137,8 @@ bool hasInside(const FloatGrid& grid) {
 }
 
 NarrowBand narrowed(NarrowBand band, double halfWidth) {
-  if (halfWidth >= band.halfWidth() || shareWidth(halfWidth, band.halfWidth())) return band;
-  FloatGrid& grid = editVdb(band);
-  const auto background = static_cast<float>(halfWidth * band.voxelSize());
-  openvdb::tree::LeafManager<FloatTree> leaves(grid.tree());
-  leaves.foreach ([background](FloatTree::LeafNodeType& leaf, std::size_t) {
-    float* values = leaf.buffer().data();
-    for (openvdb::Index i = 0; i < FloatTree::LeafNodeType::SIZE; ++i) {
-      if (std::abs(values[i]) < background) continue;
-      values[i] = std::copysign(background, values[i]);
-      leaf.setValueOff(i);
-    }
-  });
-  for (auto it = grid.tree().beginValueOff(); it; ++it)
-    if (it.getDepth() < FloatTree::DEPTH - 1) it.setValue(std::copysign(background, *it));
-  grid.tree().root().setBackground(background, /*updateChildNodes=*/false);
-  openvdb::tools::pruneLevelSet(grid.tree());
+  const float background = backgroundOf(halfWidth, band.voxelSize());
+  if (background < vdb(band).background()) endBandAt(editVdb(band), background);
   return band;
 }
 
@@ -213,7 +211,7 @@ NarrowBand subtract(const NarrowBand& a, const NarrowBand& b) {
 
 bool shareGrid(const NarrowBand& a, const NarrowBand& b) {
   return a.shared() && b.shared() && shareTransform(vdb(a), vdb(b)) &&
-         shareWidth(a.halfWidth(), b.halfWidth());
+         vdb(a).background() == vdb(b).background();
 }
 
 }  // namespace levelset

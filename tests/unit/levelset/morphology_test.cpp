@@ -7,10 +7,12 @@
 #include <numbers>
 
 #include "levelset/error.h"
+#include "levelset/inspect/check.h"
 #include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/sample.h"
 #include "levelset/solids/csg.h"
+#include "levelset/solids/shapes.h"
 #include "tests/support/bands.h"
 
 namespace morphology_test {
@@ -120,6 +122,25 @@ TEST(Shell, HollowsABoxWithSharpCavity) {
   const Measurement thin = measure(shell(ball(15), 1.5));
   const double skin = 4 * pi / 3 * (15. * 15 * 15 - 13.5 * 13.5 * 13.5);
   EXPECT_NEAR(thin.volume, skin, 6e-2 * skin);  // both surfaces in one stencil
+}
+
+// At these voxel sizes three voxels are no float, and the bands of intermediate results must still
+// end in the same place to the bit.
+TEST(Morphology, GivesSoundBandsOfAnyVoxelSize) {
+  for (const double voxel : {0.07, 0.13, 0.14, 0.15, 0.3}) {
+    const NarrowBand solid = makeSphere(12.3 * voxel, V3d(0), voxel);
+    EXPECT_EQ(solid.halfWidth(), 3) << voxel;
+    const NarrowBand cube = makeBox(V3d(20 * voxel), V3d(voxel), voxel);
+    const NarrowBand moved = offset(solid, 2 * voxel);
+    for (const NarrowBand& result :
+         {opening(cube, 2.2 * voxel), closing(solid, 2 * voxel), closing(cube, 2.9 * voxel),
+          shell(cube, 2.9 * voxel, ShellSide::In), moved, unite(moved, cube),
+          subtract(cube, moved)}) {
+      EXPECT_EQ(vdb(result).background(), vdb(solid).background()) << voxel;
+      for (const CheckItem& item : check(result).items)
+        EXPECT_TRUE(item.passed) << voxel << ": " << item.name << ", " << item.detail;
+    }
+  }
 }
 
 TEST(Morphology, Refuses) {
