@@ -23,12 +23,13 @@ double coordinateSpacing(const TriMesh& mesh) {
 
 Imath::Box3d bounds(const TriMesh& mesh) {
   Imath::Box3d box;
-  for (const Imath::V3d& p : mesh.positions) box.extendBy(p);
+  for (const auto& triangle : mesh.triangles)
+    for (const std::uint32_t v : triangle) box.extendBy(mesh.positions[v]);
   return box;
 }
 
 double signedVolume(const TriMesh& mesh) {
-  if (mesh.positions.empty()) return 0;
+  if (mesh.isEmpty()) return 0;
   const Imath::V3d centre = bounds(mesh).center();
   double sixfold = 0;
   for (const auto& t : mesh.triangles) {

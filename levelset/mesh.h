@@ -31,7 +31,7 @@ struct TriMesh {
 /// precision at the coordinate of greatest magnitude.
 [[nodiscard]] double coordinateSpacing(const TriMesh& mesh);
 
-/// Bounding box of all vertices; empty for a mesh without vertices.
+/// Bounding box of the vertices that triangles use; empty for a mesh without triangles.
 [[nodiscard]] Imath::Box3d bounds(const TriMesh& mesh);
 
 /// Signed volume by the divergence theorem, world units³; positive for a closed mesh that faces

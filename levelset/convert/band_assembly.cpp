@@ -26,6 +26,9 @@ using Root = FloatTree::RootNodeType;
 using Upper = Root::ChildNodeType;
 using Lower = Upper::ChildNodeType;
 
+/// Voxels. Far below what distances are exact to, far above what rounding leaves of zero.
+constexpr double kOnSurface = 1e-6;
+
 Coord toCoord(const V3i& p) {
   return {p.x, p.y, p.z};
 }
@@ -38,7 +41,7 @@ class LeafCollector {
  public:
   LeafCollector(double reach, double voxelSize, std::size_t maxMemory)
       : voxelSize_(voxelSize),
-        background_(static_cast<float>(reach * voxelSize)),
+        background_(backgroundOf(reach, voxelSize)),
         maxMemory_(maxMemory),
         scratch_([reach] { return BlockDistance(reach); }) {}
 
@@ -51,7 +54,8 @@ class LeafCollector {
     auto leaf = std::make_unique<LeafNode>(toCoord(block + origin), background_, false);
     float* values = leaf->buffer().data();
     for (openvdb::Index i = 0; i < LeafNode::SIZE; ++i) {
-      const double d = distance.distances()[i];
+      // On the surface, which is outside: rounding must not make specks of single points of it.
+      const double d = distance.distances()[i] < kOnSurface ? 0 : distance.distances()[i];
       const bool isActive = d < reach;
       const float value =
           isActive ? std::min(static_cast<float>(d * voxelSize_), background_) : background_;

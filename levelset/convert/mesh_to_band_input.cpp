@@ -52,14 +52,6 @@ void checkElements(const TriMesh& mesh) {
             mesh.positions.size()));
 }
 
-/// Of the vertices that faces use.
-Imath::Box3d usedBounds(const TriMesh& mesh) {
-  Imath::Box3d box;
-  for (const Triangle& t : mesh.triangles)
-    for (const std::uint32_t v : t) box.extendBy(mesh.positions[v]);
-  return box;
-}
-
 std::uint32_t outermostVertex(const TriMesh& mesh) {
   std::uint32_t result = mesh.triangles[0][0];
   for (const Triangle& t : mesh.triangles)
@@ -99,7 +91,7 @@ void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermo
 void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
   checkCall(voxelSize, options);
   checkElements(mesh);
-  const V3d size = usedBounds(mesh).size();
+  const V3d size = bounds(mesh).size();
   const double longest = std::max({size.x, size.y, size.z});
   if (voxelSize > longest)
     throw InvalidInput(fmt::format(
@@ -119,7 +111,7 @@ void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptio
 }
 
 V3i localOrigin(const TriMesh& mesh, double voxelSize) {
-  const V3d middle = usedBounds(mesh).center() / voxelSize;
+  const V3d middle = bounds(mesh).center() / voxelSize;
   const auto down = [](double x) { return static_cast<int>(std::floor(x / 8)) * 8; };
   return {down(middle.x), down(middle.y), down(middle.z)};
 }

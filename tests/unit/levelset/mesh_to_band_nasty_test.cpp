@@ -10,6 +10,7 @@
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
 #include "levelset/files/mesh_file.h"
+#include "levelset/inspect/measure.h"
 #include "tests/support/files.h"
 #include "tests/support/mesh_bands.h"
 
@@ -296,6 +297,52 @@ TEST(SlowMeshToBandNasty, DecimatedDragons) {
   expectScan("dragon_vrip_res4.ply.gz", 200, 20);
   expectScan("dragon_vrip_res3.ply.gz", 200, 50);
   expectScan("dragon_vrip_res2.ply.gz", 200, 200);
+}
+
+/// A prism over a polygon in the plane z = 0, counter-clockwise, whose first corner sees all.
+TriMesh prism(const std::vector<V3d>& base, double height) {
+  TriMesh mesh;
+  const auto n = static_cast<std::uint32_t>(base.size());
+  mesh.positions = base;
+  for (const V3d& p : base) mesh.positions.push_back(p + V3d(0, 0, height));
+  for (std::uint32_t i = 1; i + 1 < n; ++i) {
+    mesh.triangles.push_back({0, i + 1, i});
+    mesh.triangles.push_back({n, n + i, n + i + 1});
+  }
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t j = (i + 1) % n;
+    mesh.triangles.push_back({i, j, n + j});
+    mesh.triangles.push_back({i, n + j, n + i});
+  }
+  return mesh;
+}
+
+TEST(MeshToBandNasty, FacesThroughGridPointsLeaveNoSpecks) {
+  const TriMesh bracket =
+      prism({{4, 4, 0}, {4, 8, 0}, {0, 8, 0}, {0, 0, 0}, {8, 0, 0}, {8, 4, 0}}, 4);
+  const TriMesh wedge = prism({{0, 0, 0}, {8, 0, 0}, {0, 8, 0}}, 8);
+  TriMesh tetrahedron;
+  tetrahedron.positions = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}, {0, 0, 8}};
+  tetrahedron.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+  for (const TriMesh* mesh : {&bracket, &wedge, &tetrahedron})
+    for (const double voxel : {1.0, 0.5, 0.25})
+      for (const SignMode sign : {SignMode::Closed, SignMode::Winding}) {
+        const Measurement found = measure(meshToBand(*mesh, voxel, {.sign = sign}).band);
+        EXPECT_EQ(found.components, 1u) << voxel;
+        EXPECT_NEAR(found.volume, signedVolume(*mesh), 0.1 * voxel * surfaceArea(*mesh)) << voxel;
+      }
+  // Of the small one only points of its faces are grid points: nothing is inside.
+  for (V3d& p : tetrahedron.positions) p /= 8;
+  expectSays(refusal<InvalidInput>([&] { (void)meshToBand(tetrahedron, 0.9); }),
+             "no grid point lies inside");
+}
+
+TEST(MeshToBandNasty, VerticesThatNoFaceUsesDoNotCount) {
+  TriMesh mesh = boxMesh(V3d(0), V3d(1));
+  mesh.positions.emplace_back(100, 100, 100);
+  EXPECT_EQ(bounds(mesh).max, V3d(1));
+  EXPECT_EQ(meshToBand(mesh, 0.1).band.contentHash(),
+            meshToBand(boxMesh(V3d(0), V3d(1)), 0.1).band.contentHash());
 }
 
 }  // namespace mesh_to_band_nasty_test
