@@ -177,7 +177,33 @@ MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize) {
   return {"stl, binary", 0, head.size() >= kHeaderSize ? facetCount(head) : 0};
 }
 
+namespace {
+
+/// What single precision must leave of the object's longest side.
+constexpr double kStlPrecision = 1e-3;
+
+void requireSinglePrecision(const TriMesh& mesh) {
+  if (mesh.precision == CoordinatePrecision::Float) return;  // nothing is lost
+  const Imath::Box3d box = bounds(mesh);
+  if (box.isEmpty()) return;
+  double farthest = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    farthest = std::max({farthest, std::abs(box.min[axis]), std::abs(box.max[axis])});
+  const Imath::V3d size = box.size();
+  const double longest = std::max({size.x, size.y, size.z});
+  if (farthest < static_cast<double>(std::numeric_limits<float>::max()) &&
+      spacingAt(farthest, CoordinatePrecision::Float) <= kStlPrecision * longest)
+    return;
+  throw InvalidInput(fmt::format(
+      "write: STL keeps places in single precision, too coarse for an object of {:.3g} that lies "
+      "{:.3g} from the origin; write PLY, OBJ or OFF, or move it to the origin first",
+      longest, farthest));
+}
+
+}  // namespace
+
 void writeStl(ByteWriter& out, const TriMesh& mesh, const Progress& progress) {
+  requireSinglePrecision(mesh);
   if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max())
     throw UsageError("write: STL cannot count more than 4294967295 triangles; write PLY");
   char header[80] = "binary STL, triangles counter-clockwise seen from outside";

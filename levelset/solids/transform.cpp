@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <openvdb/tree/LeafManager.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -40,11 +41,37 @@ void requireAffine(const Imath::M44d& matrix, const char* action) {
   }
 }
 
-void scaleDistances(openvdb::FloatGrid& grid, double scale) {
-  const auto background = static_cast<float>(static_cast<double>(grid.background()) * scale);
+/// Grids and meshes keep places in double precision, of which volumes must not overflow.
+constexpr double kFarthest = 1e100;
+/// Of a voxel: what rounding of places in the world may change.
+constexpr double kPlaceTolerance = 1e-6;
+
+/// Where places are rounded to a good part of a voxel, a grid no longer knows its own voxel size.
+void requirePlace(const Imath::M44d& indexToWorld, double voxelSize, const char* action) {
+  double farthest = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    farthest = std::max(farthest, std::abs(indexToWorld[3][axis]));
+  const double spacing = spacingAt(farthest, CoordinatePrecision::Double);
+  if (spacing <= kPlaceTolerance * voxelSize) return;
+  throw InvalidInput(
+      fmt::format("{}: at {:.3g} from the origin places are {:.2g} apart in double precision, too "
+                  "far for voxels of {:.3g}; move the solid less far, or use larger voxels",
+                  action, farthest, spacing, voxelSize));
+}
+
+void requireStretch(const Stretch& stretch, const char* action) {
+  if (stretch.greatest < kFarthest && stretch.least > 1 / kFarthest) return;
+  throw InvalidInput(
+      fmt::format("{}: the matrix stretches by {:.3g} to {:.3g}, beyond what numbers hold; change "
+                  "the unit of length",
+                  action, stretch.least, stretch.greatest));
+}
+
+void scaleDistances(openvdb::FloatGrid& grid, double scale, float background) {
   const auto scaled = [=](float value, bool isOn) {
-    return isOn ? static_cast<float>(static_cast<double>(value) * scale)
-                : std::copysign(background, value);
+    if (!isOn) return std::copysign(background, value);
+    return std::clamp(static_cast<float>(static_cast<double>(value) * scale), -background,
+                      background);
   };
   openvdb::tree::LeafManager<FloatTree> leaves(grid.tree());
   leaves.foreach ([&](FloatTree::LeafNodeType& leaf, std::size_t) {
@@ -63,6 +90,7 @@ NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix) {
   const char* action = "transform";
   requireAffine(matrix, action);
   const Stretch stretch = stretchOf(matrix);
+  requireStretch(stretch, action);
   if (stretch.greatest > stretch.least * (1 + 1e-7) || !(Imath::M44d(matrix).determinant() > 0)) {
     throw InvalidInput(
         fmt::format("{}: the matrix shears, mirrors or scales unevenly, which the "
@@ -71,12 +99,16 @@ NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix) {
   }
   if (!solid.shared()) throw InvalidInput(fmt::format("{}: the solid has no surface", action));
   const Imath::M44d placed = solid.indexToWorld() * matrix;
+  const double voxelSize = solid.voxelSize() * stretch.greatest, halfWidth = solid.halfWidth();
+  const float background = backgroundOf(halfWidth, voxelSize);
+  requireBackground(background, voxelSize, action);
+  requirePlace(placed, voxelSize, action);
   const openvdb::math::Transform::Ptr transform = transformOf(placed, action);
   openvdb::FloatGrid& grid = editVdb(solid);
   grid.setTransform(transform);
   const double scale = std::cbrt(Imath::M44d(matrix).determinant());
   // A rotation's determinant is one but for rounding: its distances stay to the bit.
-  if (std::abs(scale - 1) > 1e-9) scaleDistances(grid, scale);
+  if (std::abs(scale - 1) > 1e-9) scaleDistances(grid, scale, background);
   return solid;
 }
 
@@ -91,12 +123,21 @@ NarrowBand bake(const NarrowBand& solid, const Imath::M44d& matrix, double voxel
 }
 
 TriMesh transform(TriMesh mesh, const Imath::M44d& matrix) {
-  requireAffine(matrix, "transform");
-  mesh.spacing = coordinateSpacing(mesh) * stretchOf(matrix).greatest;
+  const char* action = "transform";
+  requireAffine(matrix, action);
+  const Stretch stretch = stretchOf(matrix);
+  requireStretch(stretch, action);
+  mesh.spacing = coordinateSpacing(mesh) * stretch.greatest;
   mesh.precision = CoordinatePrecision::Double;  // moved numbers have more digits than stored ones
   for (Imath::V3d& position : mesh.positions) {
     Imath::V3d moved;
     matrix.multVecMatrix(position, moved);
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(std::abs(moved[axis]) < kFarthest))
+        throw InvalidInput(
+            fmt::format("{}: a vertex would come to lie at ({:.3g}, {:.3g}, {:.3g}), beyond what "
+                        "volumes can be told of; change the unit of length",
+                        action, moved.x, moved.y, moved.z));
     position = moved;
   }
   if (Imath::M44d(matrix).determinant() < 0)

@@ -93,6 +93,22 @@ TEST(MeshFile, WritesStlAndMergesItsVertices) {
   EXPECT_EQ(std::filesystem::file_size(folder / "a.stl"), 84u + 4 * 50);
 }
 
+TEST(MeshFile, RefusesStlWhereSinglePrecisionIsTooCoarse) {
+  const TemporaryFolder folder;
+  TriMesh far = tetrahedron();
+  for (auto& p : far.positions) p.x += 1e8;
+  TriMesh huge = tetrahedron();
+  for (auto& p : huge.positions) p *= 1e90;
+  for (const TriMesh* mesh : {&far, &huge}) {
+    EXPECT_THROW(levelset::writeMesh(folder / "far.stl", *mesh), levelset::InvalidInput);
+    EXPECT_FALSE(std::filesystem::exists(folder / "far.stl"));
+  }
+  // What came from single precision goes back as it was.
+  far.precision = CoordinatePrecision::Float;
+  levelset::writeMesh(folder / "far.stl", far);
+  EXPECT_TRUE(std::filesystem::exists(folder / "far.stl"));
+}
+
 TEST(MeshFile, WritesTheSameBytesTwice) {
   const TemporaryFolder folder;
   for (const std::string name : {"a.ply", "a.ply.gz", "a.obj", "a.stl"}) {

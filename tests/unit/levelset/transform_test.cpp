@@ -53,6 +53,23 @@ TEST(Transform, RefusesWhatAGridCannotHold) {
   EXPECT_THROW((void)bake(ball, M44d().setScale(0.01), 0.3), InvalidInput);
 }
 
+TEST(Transform, RefusesPlacesThatNumbersCannotTell) {
+  const NarrowBand ball = makeSphere(1, V3d(0), 0.1);
+  // A hundred million voxels from the origin all is well.
+  const NarrowBand far = transform(ball, M44d().setTranslation(V3d(1e7, 0, 0)));
+  EXPECT_NEAR(measure(far).volume, measure(ball).volume, 1e-6);
+  for (const double shift : {1e10, 1e12, 1e15, 1e16, 1e300})
+    EXPECT_THROW((void)transform(ball, M44d().setTranslation(V3d(shift, 0, 0))), InvalidInput)
+        << shift;
+  for (const double scale : {1e39, 1e40, 1e200, 1e-40, 1e-200})
+    EXPECT_THROW((void)transform(ball, M44d().setScale(scale)), InvalidInput) << scale;
+  TriMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.triangles = {{0, 1, 2}};
+  EXPECT_THROW((void)transform(mesh, M44d().setScale(1e200)), InvalidInput);
+  EXPECT_THROW((void)transform(mesh, M44d().setTranslation(V3d(1e200, 0, 0))), InvalidInput);
+}
+
 TEST(Transform, BakedEllipsoidIsADistance) {
   const double h = 0.05;
   const NarrowBand baked = bake(makeSphere(1, V3d(0), h), M44d().setScale(V3d(2, 1, 0.7)), h);
