@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 #include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/task_arena.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -62,11 +63,13 @@ int runChain(const pipeline::Chain& chain) {
                                     ? pipeline::parseBytes(globals.at("max-memory"), "--max-memory")
                                     : cli::defaultMemoryLimit();
   cli::startWatch(maxMemory);
-  std::unique_ptr<tbb::global_control> threads;
+  std::unique_ptr<tbb::global_control> limit;
+  tbb::task_arena arena;
   if (globals.contains("threads")) {
-    threads = std::make_unique<tbb::global_control>(
-        tbb::global_control::max_allowed_parallelism,
-        static_cast<std::size_t>(pipeline::parseInteger(globals.at("threads"), "--threads")));
+    const auto threads = pipeline::parseInteger(globals.at("threads"), "--threads");
+    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                  static_cast<std::size_t>(threads));
+    arena.initialize(static_cast<int>(threads));  // more than there are cores, if asked
   }
   if (globals.contains("no-clobber")) levelset::setClobberDefault(false);
   const bool quiet = globals.contains("quiet"), verbose = globals.contains("verbose"),
@@ -107,7 +110,7 @@ int runChain(const pipeline::Chain& chain) {
     if (globals.contains("report")) pipeline::writeReport(globals.at("report"), report);
   };
   try {
-    pipeline::run(chain, settings, report);
+    arena.execute([&] { pipeline::run(chain, settings, report); });
   } catch (const std::exception&) {
     // What went wrong first is what the user must hear.
     try {

@@ -2,13 +2,13 @@
 
 #include <gtest/gtest.h>
 #include <openvdb/tools/Diagnostics.h>
-#include <tbb/global_control.h>
 
 #include <limits>
 
 #include "levelset/error.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/threads.h"
 
 namespace blend_test {
 
@@ -179,11 +179,10 @@ TEST(Blend, SaysWhatTheGridCannotShow) {
 TEST(Blend, DoesNotDependOnThreads) {
   const TwoBalls balls;
   std::uint64_t hashes[3];
-  for (int threads : {1, 2, 4}) {
-    tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                              static_cast<std::size_t>(threads));
-    hashes[threads / 2] = blend(CsgOperation::Union, balls.left, balls.right, 4).band.contentHash();
-  }
+  for (const std::size_t threads : {1, 2, 4})
+    hashes[threads / 2] = support::onThreads(threads, [&] {
+      return blend(CsgOperation::Union, balls.left, balls.right, 4).band.contentHash();
+    });
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0], hashes[2]);
 }

@@ -1,7 +1,6 @@
 #include "levelset/solids/components.h"
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <cmath>
 #include <limits>
@@ -12,6 +11,7 @@
 #include "levelset/inspect/measure.h"
 #include "levelset/meshing/band_to_mesh.h"
 #include "tests/support/bands.h"
+#include "tests/support/threads.h"
 
 namespace components_test {
 
@@ -205,9 +205,11 @@ TEST(Components, GiveSameBitsForAnyNumberOfThreads) {
       20);
   std::uint64_t kept = 0, filled = 0;
   for (const std::size_t threads : {1u, 2u, 4u}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    const std::uint64_t k = keepLargest(solid, 1).contentHash(),
-                        f = fillCavities(solid).contentHash();
+    std::uint64_t k = 0, f = 0;
+    support::onThreads(threads, [&] {
+      k = keepLargest(solid, 1).contentHash();
+      f = fillCavities(solid).contentHash();
+    });
     if (threads == 1) kept = k, filled = f;
     EXPECT_EQ(k, kept);
     EXPECT_EQ(f, filled);

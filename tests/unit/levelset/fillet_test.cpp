@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 #include <openvdb/tools/Diagnostics.h>
-#include <tbb/global_control.h>
 
 #include <limits>
 
@@ -9,6 +8,7 @@
 #include "levelset/solids/blend.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/threads.h"
 
 namespace fillet_test {
 
@@ -218,10 +218,10 @@ TEST(Fillet, IsTheSameForAnyNumberOfThreads) {
   const Wedge wedge(90);
   const NarrowBand a = halfSpace(wedge.n1, kEdge, 20), b = halfSpace(wedge.n2, kEdge, 20);
   std::uint64_t hash[2] = {};
-  for (int i = 0; i < 2; ++i) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, i ? 4 : 1);
-    hash[i] = blend(CsgOperation::Union, a, b, 4, rolled()).band.contentHash();
-  }
+  for (int i = 0; i < 2; ++i)
+    hash[i] = support::onThreads(i ? 4 : 1, [&] {
+      return blend(CsgOperation::Union, a, b, 4, rolled()).band.contentHash();
+    });
   EXPECT_EQ(hash[0], hash[1]);
 }
 

@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <openvdb/tools/Diagnostics.h>
-#include <tbb/global_control.h>
 
 #include <ctime>
 
@@ -13,6 +12,7 @@
 #include "tests/support/files.h"
 #include "tests/support/mesh_bands.h"
 #include "tests/support/meshes.h"
+#include "tests/support/threads.h"
 
 namespace mesh_to_band_test {
 
@@ -192,9 +192,10 @@ TEST(MeshToBand, GivesTheSameBitsForAnyThreadCount) {
   const TriMesh open = sphereMesh(1, V3d(0.01), 10, 0.7);
   std::vector<std::uint64_t> hashes;
   for (const std::size_t threads : {1u, 2u, 4u}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    hashes.push_back(meshToBand(whole, 0.03).band.contentHash());
-    hashes.push_back(meshToBand(open, 0.08, {.signAnyway = true}).band.contentHash());
+    support::onThreads(threads, [&] {
+      hashes.push_back(meshToBand(whole, 0.03).band.contentHash());
+      hashes.push_back(meshToBand(open, 0.08, {.signAnyway = true}).band.contentHash());
+    });
   }
   for (std::size_t i = 2; i < hashes.size(); ++i) EXPECT_EQ(hashes[i], hashes[i % 2]);
 }

@@ -2,13 +2,13 @@
 
 #include <gtest/gtest.h>
 #include <openvdb/tools/Diagnostics.h>
-#include <tbb/global_control.h>
 
 #include <limits>
 
 #include "levelset/error.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/threads.h"
 
 namespace redistance_test {
 
@@ -297,11 +297,9 @@ TEST(Redistance, ReadsABandOfTwoVoxels) {
 TEST(Redistance, DoesNotDependOnThreads) {
   const NarrowBand field = sampleUnit(distortedSphere(1), 24);
   std::uint64_t hashes[3];
-  for (int threads : {1, 2, 4}) {
-    tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                              static_cast<std::size_t>(threads));
-    hashes[threads / 2] = redistance(field, {.halfWidth = 10}).contentHash();
-  }
+  for (const std::size_t threads : {1, 2, 4})
+    hashes[threads / 2] = support::onThreads(
+        threads, [&] { return redistance(field, {.halfWidth = 10}).contentHash(); });
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0], hashes[2]);
 }

@@ -1,7 +1,6 @@
 #include "levelset/solids/resample.h"
 
 #include <gtest/gtest.h>
-#include <oneapi/tbb/global_control.h>
 
 #include <cmath>
 #include <limits>
@@ -11,6 +10,7 @@
 #include "levelset/solids/shapes.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/threads.h"
 
 namespace resample_test {
 
@@ -114,11 +114,9 @@ TEST(Resample, OwnGridIsTheSameSolid) {
 TEST(Resample, SameBitsForAnyNumberOfThreads) {
   const NarrowBand source = makeTorus(10, 4, V3d(0.3), V3d(1, 1, 0), 0.5);
   std::vector<std::uint64_t> hashes;
-  for (const std::size_t threads : {1, 2, 4}) {
-    const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism,
-                                            threads);
-    hashes.push_back(resample(source, 0.3).contentHash());
-  }
+  for (const std::size_t threads : {1, 2, 4})
+    hashes.push_back(
+        support::onThreads(threads, [&] { return resample(source, 0.3).contentHash(); }));
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0], hashes[2]);
 }

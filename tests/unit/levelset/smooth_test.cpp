@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 #include <openvdb/tools/Diagnostics.h>
-#include <tbb/global_control.h>
 
 #include <limits>
 
@@ -11,6 +10,7 @@
 #include "levelset/interpolate_vdb.h"
 #include "levelset/solids/shapes.h"
 #include "tests/support/bands.h"
+#include "tests/support/threads.h"
 
 namespace smooth_test {
 
@@ -89,11 +89,9 @@ TEST(Smooth, LeavesWhatTheMaskLeaves) {
 
 TEST(Smooth, DoesNotDependOnThreads) {
   std::uint64_t hashes[3];
-  for (int threads : {1, 2, 4}) {
-    tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                              static_cast<std::size_t>(threads));
-    hashes[threads / 2] = smooth(ball(10), SmoothKind::Gaussian, 1.5).contentHash();
-  }
+  for (const std::size_t threads : {1, 2, 4})
+    hashes[threads / 2] = support::onThreads(
+        threads, [&] { return smooth(ball(10), SmoothKind::Gaussian, 1.5).contentHash(); });
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0], hashes[2]);
 }

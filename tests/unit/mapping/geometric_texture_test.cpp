@@ -1,7 +1,6 @@
 #include "mapping/geometric_texture.h"
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include "levelset/inspect/measure.h"
 #include "levelset/sample.h"
 #include "tests/support/bands.h"
+#include "tests/support/threads.h"
 
 namespace geometric_texture_test {
 
@@ -252,10 +252,12 @@ TEST(GeometricTexture, SameBitsForAnyNumberOfThreads) {
   const NarrowBand base = makeBall(radius, voxel, 12), ring = makeRing(1, 0.25, 0.05);
   std::set<std::uint64_t> hashes;
   for (const std::size_t threads : {1, 2, 4, 2}) {
-    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    const Patch patch =
-        mapping::makePatch(base, cap(0.6, radius), 0.5, {.levels = 3, .spacing = 0.2}).patch;
-    hashes.insert(mapTexture(base, ring, patch, {.merge = TextureMerge::Alone}).band.contentHash());
+    support::onThreads(threads, [&] {
+      const Patch patch =
+          mapping::makePatch(base, cap(0.6, radius), 0.5, {.levels = 3, .spacing = 0.2}).patch;
+      hashes.insert(
+          mapTexture(base, ring, patch, {.merge = TextureMerge::Alone}).band.contentHash());
+    });
   }
   EXPECT_EQ(hashes.size(), 1u);
 }

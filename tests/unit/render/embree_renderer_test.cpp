@@ -1,7 +1,6 @@
 #include "render/embree/embree_renderer.h"
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <cmath>
 #include <cstring>
@@ -9,6 +8,7 @@
 
 #include "levelset/error.h"
 #include "tests/support/bands.h"
+#include "tests/support/threads.h"
 
 namespace embree_renderer_test {
 
@@ -130,8 +130,8 @@ TEST(EmbreeRenderer, HollowsAndShadowsAreDarker) {
 TEST(EmbreeRenderer, SamePixelsForAnyThreadCount) {
   const Scene scene = ballOverSlab(70, 50);
   const auto withThreads = [&](std::size_t threads) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return renderEmbree(scene, {.samples = 3, .ambientSamples = 5});
+    return support::onThreads(
+        threads, [&] { return renderEmbree(scene, {.samples = 3, .ambientSamples = 5}); });
   };
   const Image one = withThreads(1);
   expectSameImage(one, withThreads(2));

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <cstddef>
+
+namespace support {
+
+/// Runs on that many threads, whatever number of cores there is: a limit alone gives no more
+/// threads than cores.
+template <typename F>
+auto onThreads(std::size_t count, const F& run) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, count);
+  tbb::task_arena arena(static_cast<int>(count));
+  return arena.execute(run);
+}
+
+}  // namespace support
