@@ -138,6 +138,14 @@ void writeAll(int fd, const char* data, std::size_t size, const fs::path& target
   }
 }
 
+/// A device that takes nothing, as /dev/full, says so when asked to take no bytes.
+void requireTakes(int fd, const fs::path& target) {
+  if (fd < 0) throwErrno(target, "cannot be opened for writing", errno);
+  struct stat status {};
+  if (::fstat(fd, &status) != 0 || !S_ISCHR(status.st_mode)) return;
+  if (::write(fd, "", 0) < 0) throwErrno(target, "could not be written", errno);
+}
+
 bool isClosed() {
   const std::lock_guard lock(registry().mutex);
   return registry().closed;
@@ -160,6 +168,11 @@ FileTarget::FileTarget(const fs::path& target, bool clobber)
   if (exists && S_ISDIR(status.st_mode)) throwIo(target_, "is a directory; name a file in it");
   writtenThrough_ = descriptor_ >= 0 || (exists && !S_ISREG(status.st_mode));
   if (writtenThrough_) {
+    if (descriptor_ >= 0) {
+      requireTakes(descriptor_, target_);
+    } else if (S_ISCHR(status.st_mode)) {  // to open a pipe may wait for its reader
+      requireTakes(Descriptor(::open(finalPath_.c_str(), O_WRONLY | O_CLOEXEC)).get(), target_);
+    }
     std::error_code error;
     const fs::path folder = fs::temp_directory_path(error);
     createTemporary(error ? fs::path("/tmp") : folder, "levelsmith-output");
@@ -251,6 +264,19 @@ void FileTarget::copyThrough() {
     if (isClosed()) throwCancelled(target_);
     writeAll(sink.get(), chunk.data(), static_cast<std::size_t>(count), target_);
   }
+}
+
+bool isStandardOutput(const fs::path& target) {
+  if (target.empty()) return false;
+  return target == "-" || ownDescriptor(followLinks(target)) == STDOUT_FILENO;
+}
+
+bool isSameFile(const fs::path& a, const fs::path& b) {
+  if (a == "-" || b == "-") return isStandardOutput(a) && isStandardOutput(b);
+  std::error_code error;
+  const fs::path first = fs::weakly_canonical(a, error), second = fs::weakly_canonical(b, error);
+  if (first.empty() || first != second) return false;
+  return !fs::exists(first, error) || fs::is_regular_file(first, error);
 }
 
 void removeTemporaryFiles() noexcept {

@@ -15,7 +15,8 @@ namespace levelset {
 class FileTarget {
  public:
   /// @throws IoError when the folder is missing or not writable, the target is a directory or
-  ///         read-only, or it exists and `clobber` (or setClobberDefault) is false
+  ///         read-only, it is a device that takes nothing, or it exists and `clobber` (or
+  ///         setClobberDefault) is false
   explicit FileTarget(const std::filesystem::path& target, bool clobber = true);
   ~FileTarget();
   FileTarget(const FileTarget&) = delete;
@@ -43,6 +44,13 @@ class FileTarget {
   bool writtenThrough_ = false;
   bool committed_ = false;
 };
+
+/// Does the name stand for standard output: "-", /dev/stdout, /dev/fd/1 or a link to one of these?
+[[nodiscard]] bool isStandardOutput(const std::filesystem::path& target);
+
+/// Do both names, of files that need not exist, lead to one and the same? Never of devices, which
+/// take from many.
+[[nodiscard]] bool isSameFile(const std::filesystem::path& a, const std::filesystem::path& b);
 
 /// Removes every temporary file of this process at once. Safe to call from a thread that handles
 /// a signal while others write; nothing is renamed or begun afterwards.

@@ -32,7 +32,8 @@ void printAll(const std::string& text) {
 }
 
 bool claimsStandardOutput(const pipeline::Chain& chain) {
-  if (chain.globals.contains("report") && chain.globals.at("report") == "-") return true;
+  const auto report = chain.globals.find("report");
+  if (report != chain.globals.end() && levelset::isStandardOutput(report->second)) return true;
   for (const pipeline::Action& action : chain.actions) {
     const auto& claims = action.op->usesStandardOutput;
     if (claims && !action.options.contains("json") &&
@@ -72,6 +73,7 @@ int runChain(const pipeline::Chain& chain) {
     arena.initialize(static_cast<int>(threads));  // more than there are cores, if asked
   }
   if (globals.contains("no-clobber")) levelset::setClobberDefault(false);
+  pipeline::checkReportTarget(chain);
   const bool quiet = globals.contains("quiet"), verbose = globals.contains("verbose"),
              dryRun = globals.contains("dry-run");
   const bool dataOnly = claimsStandardOutput(chain), json = claimsJson(chain);

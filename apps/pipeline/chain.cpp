@@ -10,6 +10,7 @@
 #include "apps/pipeline/script.h"
 #include "apps/pipeline/units.h"
 #include "levelset/error.h"
+#include "levelset/file_target.h"
 
 namespace pipeline {
 namespace {
@@ -336,7 +337,9 @@ Chain parse(Reader& reader, bool mayRun) {
 Chain parseChain(const std::vector<std::string>& tokens) {
   Reader reader{tokens};
   const Chain chain = parse(reader, true);
-  const bool reportsThere = chain.globals.contains("report") && chain.globals.at("report") == "-";
+  const auto report = chain.globals.find("report");
+  const bool reportsThere =
+      report != chain.globals.end() && levelset::isStandardOutput(report->second);
   checkStandardStream(chain, &Operator::usesStandardOutput, "output",
                       reportsThere ? "--report" : "");
   const bool scripted = tokens.size() >= 2 && tokens[tokens.size() - 2] == "run";

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "apps/pipeline/refusal.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 
@@ -125,17 +126,40 @@ std::string reportHtml(const RunReport& report) {
   return page;
 }
 
+void checkReportTarget(const Chain& chain) {
+  const auto wanted = chain.globals.find("report");
+  if (wanted == chain.globals.end()) return;
+  for (const Action& action : chain.actions) {
+    if (!action.op->targets) continue;
+    for (const std::string& target : action.op->targets(Invocation(*action.op, action.options))) {
+      if (!levelset::isSameFile(target, wanted->second)) continue;
+      throw levelset::UsageError(
+          fmt::format("--report: '{}' is what '{}' writes too; use another file for one of them",
+                      wanted->second, action.op->name));
+    }
+  }
+  try {
+    const levelset::FileTarget probe(wanted->second);
+  } catch (const levelset::Error& error) {
+    refuseAs("--report", error);
+  }
+}
+
 void writeReport(const std::filesystem::path& path, const RunReport& report) {
   const bool html = path.extension() == ".html" || path.extension() == ".htm";
   const std::string text = html ? reportHtml(report) : reportJson(report);
-  levelset::FileTarget target(path);
-  std::FILE* file = std::fopen(target.path().c_str(), "wb");
-  if (!file) throw levelset::IoError(fmt::format("report: cannot write '{}'", path.string()));
-  const bool whole = std::fwrite(text.data(), 1, text.size(), file) == text.size();
-  if (std::fclose(file) != 0 || !whole)
-    throw levelset::IoError(
-        fmt::format("report: '{}' cannot be written to the end; is the disk full?", path.string()));
-  target.commit();
+  try {
+    levelset::FileTarget target(path);
+    std::FILE* file = std::fopen(target.path().c_str(), "wb");
+    if (!file) throw levelset::IoError(fmt::format("cannot write '{}'", path.string()));
+    const bool whole = std::fwrite(text.data(), 1, text.size(), file) == text.size();
+    if (std::fclose(file) != 0 || !whole)
+      throw levelset::IoError(
+          fmt::format("'{}' cannot be written to the end; is the disk full?", path.string()));
+    target.commit();
+  } catch (const levelset::Error& error) {
+    refuseAs("--report", error);
+  }
 }
 
 std::string stepLine(const StepReport& step, bool dryRun) {

@@ -11,6 +11,9 @@ namespace pipeline {
 [[nodiscard]] std::string reportJson(const RunReport& report);
 /// The same as a page.
 [[nodiscard]] std::string reportHtml(const RunReport& report);
+/// Refuses a --report that cannot be written before time is spent on what it should tell of.
+/// @throws levelset::IoError; UsageError when an action writes the same file
+void checkReportTarget(const Chain& chain);
 /// By extension: .json or .html; "-" is JSON on standard output. Written beside the target and
 /// renamed.
 void writeReport(const std::filesystem::path& path, const RunReport& report);

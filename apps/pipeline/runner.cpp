@@ -6,6 +6,7 @@
 #include <cmath>
 #include <new>
 
+#include "apps/pipeline/refusal.h"
 #include "apps/process_cost.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
@@ -14,8 +15,6 @@
 
 namespace pipeline {
 namespace {
-
-using levelset::InvalidInput;
 
 struct Slot {
   Value value;
@@ -77,39 +76,14 @@ class Stack {
   std::map<std::string, bool> usedNames_;
 };
 
-/// A refusal from deeper down, told as one of the action that the user wrote.
-[[noreturn]] void refuseAs(const std::string& action, const levelset::Error& error) {
-  using levelset::ExitCode;
-  std::string sentence = error.what();
-  if (!sentence.starts_with(action + ":")) sentence = action + ": " + sentence;
-  switch (error.exitCode()) {
-    case ExitCode::Usage:
-      throw levelset::UsageError(sentence);
-    case ExitCode::Resource:
-      throw levelset::ResourceLimit(sentence);
-    case ExitCode::Numeric:
-      throw levelset::NumericalError(sentence);
-    case ExitCode::File:
-      throw levelset::IoError(sentence);
-    case ExitCode::Interrupted:
-      throw levelset::Cancelled(sentence);
-    case ExitCode::Input:
-    case ExitCode::Done:
-      break;
-  }
-  throw InvalidInput(sentence);
-}
-
 /// Refuses targets that cannot be written before time is spent on what should go there.
-void checkTargets(const Chain& chain) {
-  for (const Action& action : chain.actions) {
-    if (!action.op->targets) continue;
-    try {
-      for (const std::string& target : action.op->targets(Invocation(*action.op, action.options)))
-        const levelset::FileTarget probe(target);
-    } catch (const levelset::Error& error) {
-      refuseAs(action.op->name, error);
-    }
+void checkTargets(const Action& action) {
+  if (!action.op->targets) return;
+  try {
+    for (const std::string& target : action.op->targets(Invocation(*action.op, action.options)))
+      const levelset::FileTarget probe(target);
+  } catch (const levelset::Error& error) {
+    refuseAs(action.op->name, error);
   }
 }
 
@@ -211,7 +185,7 @@ void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
   Stack stack;
   report.dryRun = settings.dryRun;
   try {
-    checkTargets(chain);
+    for (const Action& action : chain.actions) checkTargets(action);
     for (std::size_t i = 0; i < chain.actions.size(); ++i) {
       const Action& action = chain.actions[i];
       StepReport& step = report.steps.emplace_back();

@@ -4,6 +4,7 @@
 
 #include "apps/pipeline/invocation.h"
 #include "levelset/error.h"
+#include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
 #include "levelset/files/mesh_file.h"
 
@@ -182,7 +183,8 @@ void addFileOperators(std::vector<Operator>& all) {
       .run = write,
       .validate = validateWrite,
       .targets = [](const Invocation& in) { return std::vector{in.text("file")}; },
-      .usesStandardOutput = isStandardStream,
+      .usesStandardOutput =
+          [](const Invocation& in) { return levelset::isStandardOutput(in.text("file")); },
   });
 }
 

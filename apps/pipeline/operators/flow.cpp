@@ -100,6 +100,16 @@ double partOfTheWay(const Invocation& in) {
                   in.where("until"), text));
 }
 
+/// Every file that --keep-steps may write.
+std::vector<std::string> stepFiles(const Invocation& in) {
+  std::vector<std::string> files;
+  if (!in.given("keep-steps")) return files;
+  const std::string pattern = stepPattern(in);
+  const auto steps = static_cast<int>(in.integer("steps"));
+  for (int i = 1; i <= steps; ++i) files.push_back(stepFile(pattern, i).string());
+  return files;
+}
+
 constexpr long kMostSteps = 100000;
 
 void validateMorph(const Invocation& in) {
@@ -218,10 +228,7 @@ void addFlowOperators(std::vector<Operator>& all) {
        .operands = {{Kind::Band}, {Kind::Band}},
        .run = morph,
        .validate = validateMorph,
-       .targets = [](const Invocation& in) {
-         return in.given("keep-steps") ? std::vector{stepFile(stepPattern(in), 1).string()}
-                                       : std::vector<std::string>{};
-       }});
+       .targets = stepFiles});
 }
 
 }  // namespace pipeline

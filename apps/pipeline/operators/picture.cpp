@@ -2,6 +2,7 @@
 
 #include "apps/pipeline/invocation.h"
 #include "levelset/error.h"
+#include "levelset/file_target.h"
 #include "render/camera.h"
 #include "render/embree/embree_renderer.h"
 #include "render/image.h"
@@ -47,8 +48,14 @@ void validateDraw(const Invocation& in) {
         fmt::format("render: '{}' is of no known format; use .exr or .png, or --format",
                     in.text(in.given("format") ? "format" : "file")));
   }
-  if (in.text("file") == "-" && in.text("png") == "-")
+  if (!in.given("png")) return;
+  const std::string file = in.text("file"), png = in.text("png");
+  if (levelset::isStandardOutput(file) && levelset::isStandardOutput(png))
     throw UsageError("render: two images cannot share standard output; use a file for one");
+  if (levelset::isSameFile(file, png))
+    throw UsageError(
+        fmt::format("render: '{}' is named twice, for the image and for --png; name two files",
+                    file));
 }
 
 std::vector<std::string> targetsOf(const Invocation& in) {
@@ -128,7 +135,10 @@ void addPictureOperators(std::vector<Operator>& all) {
       .validate = validateDraw,
       .targets = targetsOf,
       .usesStandardOutput =
-          [](const Invocation& in) { return in.text("file") == "-" || in.text("png") == "-"; },
+          [](const Invocation& in) {
+            return levelset::isStandardOutput(in.text("file")) ||
+                   (in.given("png") && levelset::isStandardOutput(in.text("png")));
+          },
   });
 }
 

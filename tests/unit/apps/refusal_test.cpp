@@ -87,6 +87,8 @@ TEST_F(Refusal, WhatCanBeToldComesBeforeTheWork) {
   soon("render - --format exr --png -", 2, "cannot share standard output");
   soon("render - --format exr ! write - --format vdb", 2, "used already");
   soon("render a.exr --png - ! write - --format vdb", 2, "used already");
+  soon("write /dev/stdout --format vdb ! measure --json", 2, "used already");
+  soon("render a.exr --png ./a.exr", 2, "named twice");
   soon("clip --box \"0,0,0 1,1,1\" --plane \"0,0,0 0,0,1\"", 2, "give one of");
   soon("resample", 2, "how fine");
   soon("transform --mirror x", 2, "add --bake");
@@ -105,6 +107,26 @@ TEST_F(Refusal, WhatCanBeToldComesBeforeTheWork) {
   writeFile("there.vdb", "kept");
   EXPECT_REFUSED(levelsmith("--no-clobber " + large + "write there.vdb", 5), 6, "no-clobber");
   EXPECT_EQ(support::slurp(folder_ / "there.vdb"), "kept");
+  writeFile("step_3.vdb", "kept");
+  EXPECT_REFUSED(levelsmith("--no-clobber " + large + target + "--steps 4 --keep-steps step_#.vdb",
+                            5),
+                 6, "step_3.vdb");
+  expectNothingWritten(2);
+}
+
+TEST_F(Refusal, AReportThatCannotBeWrittenComesBeforeTheWork) {
+  const std::string large = "sphere --radius 1 --voxel 0.001 ! write out.vdb";
+  writeFile("there.json", "kept");
+  for (const char* globals : {"--report . ", "--report /dev/full ", "--report nowhere/r.json ",
+                              "--no-clobber --report there.json "}) {
+    const auto outcome = levelsmith(globals + large, 5);
+    EXPECT_REFUSED(outcome, 6, "levelsmith: --report: '");
+    EXPECT_EQ(outcome.err.find("write:"), std::string::npos) << outcome.err;
+  }
+  EXPECT_REFUSED(levelsmith("--report ./out.vdb " + large, 5), 2, "--report");
+  EXPECT_REFUSED(levelsmith("--report /dev/stdout " + large + " ! measure --json", 5), 2,
+                 "used already");
+  EXPECT_EQ(support::slurp(folder_ / "there.json"), "kept");
   expectNothingWritten(1);
 }
 
@@ -132,7 +154,11 @@ TEST_F(Refusal, GridsThatAreNoBandsAreThree) {
 
 TEST_F(Refusal, AFailureIsNotHiddenByItsReport) {
   writeFile("words.ply", "this is not a mesh\n");
-  EXPECT_REFUSED(levelsmith("--report nowhere/r.json read words.ply ! measure"), 3, "words.ply");
+  const auto outcome = shell("( sleep 0.3; " + command() +
+                             " --report /dev/stdout read words.ply ! measure ) | true; "
+                             "exit ${PIPESTATUS[0]}");
+  EXPECT_REFUSED(outcome, 3, "words.ply");
+  EXPECT_NE(outcome.err.find("--report: '/dev/stdout' could not be written"), std::string::npos);
   EXPECT_REFUSED(levelsmith("--report r.json read words.ply ! measure"), 3, "words.ply");
   EXPECT_NE(support::slurp(folder_ / "r.json").find("\"exit_code\": 3"), std::string::npos);
 }

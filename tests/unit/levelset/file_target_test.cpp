@@ -133,6 +133,20 @@ TEST(FileTarget, AppendsToStandardOutput) {
   }
 }
 
+TEST(FileTarget, KnowsStandardOutputAndOneFileByItsNames) {
+  for (const char* name : {"-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"})
+    EXPECT_TRUE(levelset::isStandardOutput(name)) << name;
+  for (const char* name : {"", "stdout", "/dev/stderr", "/dev/null"})
+    EXPECT_FALSE(levelset::isStandardOutput(name)) << name;
+  const TemporaryFolder folder;
+  fs::create_symlink("/dev/stdout", folder / "link");
+  EXPECT_TRUE(levelset::isStandardOutput(folder / "link"));
+  EXPECT_TRUE(levelset::isSameFile(folder / "a", folder / "." / "a"));
+  EXPECT_FALSE(levelset::isSameFile(folder / "a", folder / "b"));
+  EXPECT_FALSE(levelset::isSameFile("/dev/null", "/dev/null"));
+  EXPECT_TRUE(levelset::isSameFile("-", "/dev/stdout"));
+}
+
 TEST(FileTarget, SaysThatTheReaderIsGone) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);

@@ -1,0 +1,37 @@
+#include "apps/pipeline/refusal.h"
+
+namespace pipeline {
+
+std::string sentenceOf(const std::string& who, std::string sentence) {
+  if (sentence.starts_with(who + ":")) return sentence;
+  // Whoever reads or writes for an action is no action that the user knows of.
+  for (const std::string helper : {"read: ", "write: ", "levelsmith: "}) {
+    if (!sentence.starts_with(helper)) continue;
+    sentence.erase(0, helper.size());
+    break;
+  }
+  return who + ": " + sentence;
+}
+
+void refuseAs(const std::string& who, const levelset::Error& error) {
+  using levelset::ExitCode;
+  const std::string sentence = sentenceOf(who, error.what());
+  switch (error.exitCode()) {
+    case ExitCode::Usage:
+      throw levelset::UsageError(sentence);
+    case ExitCode::Resource:
+      throw levelset::ResourceLimit(sentence);
+    case ExitCode::Numeric:
+      throw levelset::NumericalError(sentence);
+    case ExitCode::File:
+      throw levelset::IoError(sentence);
+    case ExitCode::Interrupted:
+      throw levelset::Cancelled(sentence);
+    case ExitCode::Input:
+    case ExitCode::Done:
+      break;
+  }
+  throw levelset::InvalidInput(sentence);
+}
+
+}  // namespace pipeline
