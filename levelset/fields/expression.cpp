@@ -13,20 +13,31 @@ namespace {
 
 using Imath::V3d;
 
+/// What a formula may read.
+struct Variables {
+  bool space = false, time = false;
+  const char* names = "";
+};
+constexpr Variables kSpace = {true, false, "x, y, z, r"}, kTime = {false, true, "t"},
+                    kSpaceAndTime = {true, true, "x, y, z, r, t"};
+
 /// A parser with the variables that it reads. Its variables are bound by address, so each thread
 /// has one of its own.
 class Formula {
  public:
-  explicit Formula(const std::string& text) : text_(text) {
-    parser_.DefineVar("x", &place_.x);
-    parser_.DefineVar("y", &place_.y);
-    parser_.DefineVar("z", &place_.z);
-    parser_.DefineVar("r", &radius_);
-    parser_.DefineVar("t", &time_);
+  Formula(const std::string& text, const Variables& variables)
+      : text_(text), variables_(variables) {
+    if (variables.space) {
+      parser_.DefineVar("x", &place_.x);
+      parser_.DefineVar("y", &place_.y);
+      parser_.DefineVar("z", &place_.z);
+      parser_.DefineVar("r", &radius_);
+    }
+    if (variables.time) parser_.DefineVar("t", &time_);
     parser_.DefineConst("pi", M_PI);
     parser_.SetExpr(text);
   }
-  Formula(const Formula& other) : Formula(other.text_) {}
+  Formula(const Formula& other) : Formula(other.text_, other.variables_) {}
   Formula& operator=(const Formula&) = delete;
 
   /// The values of all formulas of the text, as many as it has.
@@ -39,6 +50,7 @@ class Formula {
 
  private:
   std::string text_;
+  Variables variables_;
   mu::Parser parser_;
   V3d place_ = V3d(0);
   double radius_ = 0, time_ = 0;
@@ -46,15 +58,16 @@ class Formula {
 
 class Formulas {
  public:
-  Formulas(const std::string& text, int count, const char* action) : perThread_(Formula(text)) {
+  Formulas(const std::string& text, const Variables& variables, int count, const char* action)
+      : perThread_(Formula(text, variables)) {
     int found = 0;
     try {
       perThread_.local().evaluate(V3d(0.5), 0.5, found);
     } catch (const mu::Parser::exception_type& error) {
       throw UsageError(
-          fmt::format("{}: the formula '{}' cannot be read: {}; use x, y, z, r, t, "
-                      "numbers and functions such as sin(x)",
-                      action, text, error.GetMsg()));
+          fmt::format("{}: the formula '{}' cannot be read: {}; use {}, numbers and functions such "
+                      "as sin({})",
+                      action, text, error.GetMsg(), variables.names, variables.names[0]));
     }
     if (found != count) {
       throw UsageError(fmt::format("{}: '{}' holds {} formula{}; give {}", action, text, found,
@@ -74,16 +87,21 @@ class Formulas {
 }  // namespace
 
 ScalarField scalarExpression(const std::string& text, const char* action) {
-  const auto formulas = std::make_shared<Formulas>(text, 1, action);
+  const auto formulas = std::make_shared<Formulas>(text, kSpace, 1, action);
   return [formulas](const V3d& world) { return (*formulas)(world, 0)[0]; };
 }
 
 VectorField vectorExpression(const std::string& text, const char* action) {
-  const auto formulas = std::make_shared<Formulas>(text, 3, action);
+  const auto formulas = std::make_shared<Formulas>(text, kSpaceAndTime, 3, action);
   return [formulas](const V3d& world, double time) {
     const double* values = (*formulas)(world, time);
     return V3d(values[0], values[1], values[2]);
   };
+}
+
+std::function<double(double)> timeExpression(const std::string& text, const char* action) {
+  const auto formulas = std::make_shared<Formulas>(text, kTime, 1, action);
+  return [formulas](double time) { return (*formulas)(V3d(0), time)[0]; };
 }
 
 }  // namespace levelset

@@ -16,7 +16,12 @@ namespace {
 using levelset::AdvectScheme;
 using levelset::UsageError;
 
+std::function<double(double)> factorOf(const Invocation& in) {
+  return levelset::timeExpression(in.text("factor"), in.where("factor").c_str());
+}
+
 void validateAdvect(const Invocation& in) {
+  if (in.given("factor")) (void)factorOf(in);
   const std::string field = in.text("field");
   const bool named = field == "enright" || field == "vortex" || field == "rotation";
   if (in.given("period") && !named)
@@ -42,10 +47,8 @@ levelset::VectorField velocityOf(const Invocation& in) {
           ? levelset::rotationVelocity(in.point("center"), in.point("axis"), period(1))
           : vectorField(in, "field");
   if (!in.given("factor")) return velocity;
-  const levelset::VectorField factor =
-      levelset::vectorExpression(in.text("factor") + ", 0, 0", "advect: --factor");
-  return [velocity, factor](const Imath::V3d& p, double time) {
-    return velocity(p, time) * factor(Imath::V3d(0), time).x;
+  return [velocity, factor = factorOf(in)](const Imath::V3d& p, double time) {
+    return velocity(p, time) * factor(time);
   };
 }
 

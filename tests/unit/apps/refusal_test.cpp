@@ -97,6 +97,12 @@ TEST_F(Refusal, WhatCanBeToldComesBeforeTheWork) {
   soon("patch --at 0,0,1 --size 0.1,0.1 --height 0.1 --levels 1000000", 2, "out of range");
   soon("march --order 3", 2, "--order");
   soon("sweep --extend x --speed 2", 2, "--speed has no meaning");
+  soon("march --extend x --order 1", 2, "--order has no meaning");
+  soon("march --speed \"1 + t\"", 2, "march: --speed: the formula '1 + t'");
+  soon("offset --by \"0.3*t\"", 2, "use x, y, z, r, numbers");
+  soon("advect --field vortex --time 1 --factor \"1 +\"", 2, "advect: --factor");
+  soon("advect --field vortex --time 1 --factor \"x*t\"", 2, "use t, numbers");
+  soon("advect --field vortex --time 1 --factor \"1,2\"", 2, "'1,2' holds 2 formulas; give one");
   const std::string target = "sphere --radius 1.2 --voxel 0.1 ! morph ";
   soon(target + "--steps 4294967297", 2, "too many");
   soon(target + "--until 1.5", 2, "up to 1");

@@ -8,6 +8,7 @@
 
 #include "levelset/error.h"
 #include "levelset/fields/mask.h"
+#include "tests/support/files.h"
 
 namespace expression_test {
 
@@ -37,6 +38,15 @@ TEST(Expression, RefusesWhatIsNoFormula) {
     EXPECT_THROW((void)scalarExpression(text, "test"), UsageError) << text;
   for (const char* text : {"x, y", "x, y, z, 1", "1", ",,"})
     EXPECT_THROW((void)vectorExpression(text, "test"), UsageError) << text;
+  for (const char* text : {"", "x", "t + r", "1, 2", "t, 0, 0"})
+    EXPECT_THROW((void)timeExpression(text, "test"), UsageError) << text;
+}
+
+TEST(Expression, KnowsOnlyWhatHasAMeaning) {
+  EXPECT_EQ(timeExpression("2*t + pi", "test")(0.5), 1 + M_PI);
+  const std::string sentence =
+      support::refusal<UsageError>([] { (void)scalarExpression("0.3*t", "test"); });
+  EXPECT_NE(sentence.find("use x, y, z, r, numbers"), std::string::npos) << sentence;
 }
 
 TEST(Mask, RisesSmoothlyBetweenItsLimits) {
