@@ -78,14 +78,25 @@ class Solver {
     request_.options.method == FrontMethod::Marching ? marchArrivals(*blocks_, order)
                                                      : sweepArrivals(*blocks_, order);
     for (const ArrivalBlock& block : blocks_->blocks()) {
-      result.figures.reached += block.known.countOn();
-      result.figures.firstOrder += (block.firstOrder & block.known).countOn();
+      const ArrivalBlock::Mask reached = reachedOf(block);
+      result.figures.reached += reached.countOn();
+      result.figures.firstOrder += (block.firstOrder & reached).countOn();
     }
     result.times = makeGrid();
     return result;
   }
 
  private:
+  /// The grid points that makeLeaf() gives a time: a start may come too late for one.
+  [[nodiscard]] ArrivalBlock::Mask reachedOf(const ArrivalBlock& block) const {
+    const auto voxelSize = static_cast<float>(transform_.voxelSize()[0]);
+    ArrivalBlock::Mask reached = block.known;
+    for (auto it = block.known.beginOn(); it; ++it)
+      if (!(block.time[it.pos()] * voxelSize < static_cast<float>(request_.until)))
+        reached.setOff(it.pos());
+    return reached;
+  }
+
   FloatGrid::Ptr makeGrid() const {
     const double voxelSize = transform_.voxelSize()[0];
     const auto background = static_cast<float>(request_.until);

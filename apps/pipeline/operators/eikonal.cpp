@@ -1,5 +1,7 @@
 #include <fmt/core.h>
 
+#include <cmath>
+
 #include "apps/pipeline/fields.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
@@ -70,7 +72,7 @@ void tellFigures(Invocation& in, const levelset::ArrivalFigures& figures) {
 }
 
 void validateFront(const Invocation& in) {
-  for (const char* other : {"speed", "from"})
+  for (const char* other : {"speed", "from", "order"})
     if (in.given("extend") && in.given(other))
       throw levelset::UsageError(
           fmt::format("{}: --extend carries an attribute along the normals, so --{} has no meaning "
@@ -78,11 +80,25 @@ void validateFront(const Invocation& in) {
                       in.op().name, other));
 }
 
+/// The attribute of --extend, refused where the surface has none: the field made of it would not
+/// know any more what was written, nor where.
+levelset::ScalarField attributeOf(const Invocation& in) {
+  return [attribute = scalarField(in, "extend"), where = in.where("extend"),
+          text = in.text("extend")](const Imath::V3d& p) {
+    const double value = attribute(p);
+    if (std::isfinite(static_cast<float>(value))) return value;
+    throw levelset::InvalidInput(
+        fmt::format("{}: '{}' is {} on the surface at {:.6g},{:.6g},{:.6g}; give an attribute that "
+                    "is finite on all of it",
+                    where, text, value, p.x, p.y, p.z));
+  };
+}
+
 Value extend(Invocation& in, double reach) {
   levelset::ClosestPointOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
   options.halfWidth = reach / in.band().voxelSize();
   in.notes.notes.push_back("the attribute is that of the closest point of the surface");
-  return Value(levelset::extendOffSurface(in.band(), scalarField(in, "extend"), options));
+  return Value(levelset::extendOffSurface(in.band(), attributeOf(in), options));
 }
 
 template <FrontMethod method>

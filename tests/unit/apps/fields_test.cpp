@@ -107,4 +107,22 @@ TEST_F(FieldCommand, ReadsTellsAndWritesFields) {
   EXPECT_REFUSED(levelsmith("read wind.vdb --grid wind ! write a.ply"), 2, "write .vdb");
 }
 
+TEST_F(FieldCommand, TellsWhereAnAttributeIsNotFinite) {
+  const auto outcome = levelsmith("sphere --radius 1 --voxel 0.1 ! sweep --extend \"1/x\"");
+  EXPECT_REFUSED(outcome, 3, "sweep: --extend: '1/x' is");
+  EXPECT_NE(outcome.err.find("on the surface at 0,"), std::string::npos) << outcome.err;
+}
+
+TEST_F(FieldCommand, CountsTheGridPointsThatTheFrontReaches) {
+  for (const char* front : {"march", "sweep --speed 1"}) {
+    ASSERT_EQ(levelsmith(std::string("--report r.json sphere --radius 1 --voxel 0.1 ! ") + front +
+                         " --to 1vx ! info --json > info.json")
+                  .code,
+              0);
+    const auto report = nlohmann::json::parse(support::slurp(folder_ / "r.json"));
+    const auto info = nlohmann::json::parse(support::slurp(folder_ / "info.json"));
+    EXPECT_EQ(report["steps"][1]["details"]["reached"], info["active_voxels"]) << front;
+  }
+}
+
 }  // namespace fields_test
