@@ -111,8 +111,7 @@ void checkFolds(const Distortion& distortion, TextureReport& report, bool allowF
 double chooseVoxelSize(const NarrowBand& base, const NarrowBand& texture, double minStretch,
                        const TextureOptions& options) {
   if (options.voxelSize) return *options.voxelSize;
-  const double fine = texture.voxelSize() * minStretch;
-  return fine < (1 - kStretchError) * base.voxelSize() ? fine : base.voxelSize();
+  return resultVoxelSize(base.voxelSize(), texture.voxelSize(), minStretch);
 }
 
 /// The base's own grid where the voxels agree, so that merging needs no resampling.
@@ -165,6 +164,11 @@ NarrowBand merge(const NarrowBand& base, NarrowBand warped, const TextureOptions
 }
 
 }  // namespace
+
+double resultVoxelSize(double base, double texture, double minStretch) {
+  const double fine = texture * minStretch;
+  return fine < (1 - kStretchError) * base ? fine : base;
+}
 
 RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options) {
   std::vector<V3d> points, targets;

@@ -50,6 +50,10 @@ struct TextureResult {
   TextureReport report;
 };
 
+/// Voxel size of a result for which none is asked: the texture's where the map squeezes it below the
+/// base's, else the base's own. @param minStretch  of texture → patch
+[[nodiscard]] double resultVoxelSize(double base, double texture, double minStretch);
+
 /// The map of a patch: through its particles to their texture coordinates, λ near for w = 0.
 [[nodiscard]] RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options = {});
 

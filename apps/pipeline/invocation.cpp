@@ -54,7 +54,8 @@ void Invocation::setReference(double voxelSize, double diagonal) {
   referenceDiagonal_ = diagonal > 0 ? std::optional(diagonal) : std::nullopt;
 }
 
-double Invocation::toWorld(const std::string& name, const std::string& text) {
+double Invocation::toWorld(const std::string& name, const std::string& text,
+                           const std::string& label) {
   const Length length = parseLength(text, where(name));
   if (!referenceVoxel_ && !referenceDiagonal_ && !operands.empty())
     setReference(operands[0].plan().voxelSize, operands[0].diagonal());
@@ -76,14 +77,43 @@ double Invocation::toWorld(const std::string& name, const std::string& text) {
     }
     world *= *referenceDiagonal_ / 100;
   }
-  Resolved resolved{.param = name, .written = text, .world = world};
+  Resolved resolved{.param = label, .written = text, .world = world};
   if (referenceVoxel_) resolved.voxels = world / *referenceVoxel_;
-  notes.lengths.push_back(resolved);
+  note(resolved);
   return world;
 }
 
+/// A length that is asked for again is told once, by what is known last.
+void Invocation::note(const Resolved& length) {
+  const auto known =
+      std::find_if(notes.lengths.begin(), notes.lengths.end(),
+                   [&](const Resolved& other) { return other.param == length.param; });
+  if (known == notes.lengths.end())
+    notes.lengths.push_back(length);
+  else
+    *known = length;
+}
+
 double Invocation::length(const std::string& name) {
-  return toWorld(name, text(name));
+  return toWorld(name, text(name), name);
+}
+
+void Invocation::resolveLengths() {
+  const auto isKnown = [&](const std::string& name) {
+    return std::any_of(notes.lengths.begin(), notes.lengths.end(), [&](const Resolved& length) {
+      return length.param == name || length.param.starts_with(name + "[");
+    });
+  };
+  for (const Param& param : op_->params) {
+    const bool isLength = param.type == ParamType::Length || param.type == ParamType::Lengths;
+    if (!isLength || isKnown(param.name)) continue;
+    const std::string written = text(param.name);
+    if (written.empty() || written == "auto") continue;
+    if (param.type == ParamType::Length)
+      (void)length(param.name);
+    else
+      (void)lengths(param.name);
+  }
 }
 
 std::vector<double> Invocation::lengths(const std::string& name) {
@@ -91,8 +121,8 @@ std::vector<double> Invocation::lengths(const std::string& name) {
   const std::string all = text(name);
   for (std::size_t begin = 0; begin <= all.size();) {
     const std::size_t end = std::min(all.find(',', begin), all.size());
-    result.push_back(toWorld(name, all.substr(begin, end - begin)));
-    notes.lengths.back().param += fmt::format("[{}]", result.size() - 1);
+    result.push_back(toWorld(name, all.substr(begin, end - begin),
+                             fmt::format("{}[{}]", name, result.size())));
     begin = end + 1;
   }
   return result;
@@ -121,10 +151,10 @@ double Invocation::voxelSize(double longestSide) {
                     resolution, longestSide));
   }
   const double voxel = longestSide / static_cast<double>(resolution);
-  notes.lengths.push_back({.param = "voxel",
-                           .written = fmt::format("--resolution {}", resolution),
-                           .world = voxel,
-                           .voxels = 1});
+  note({.param = "voxel",
+        .written = fmt::format("--resolution {}", resolution),
+        .world = voxel,
+        .voxels = 1});
   return voxel;
 }
 

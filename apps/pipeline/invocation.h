@@ -85,6 +85,8 @@ class Invocation {
   /// True when --voxel or --resolution was given; both, or a `vx` beside --resolution, are refused.
   [[nodiscard]] bool asksVoxelSize() const;
   void setReference(double voxelSize, double diagonal);
+  /// Every length that was given or has a default, for a dry run's report.
+  void resolveLengths();
 
   [[nodiscard]] const Operator& op() const { return *op_; }
   [[nodiscard]] std::string where(const std::string& param) const {
@@ -99,7 +101,10 @@ class Invocation {
   std::string output;  ///< text for people, printed when the operator is done
 
  private:
-  [[nodiscard]] double toWorld(const std::string& name, const std::string& text);
+  /// @param label  what the report calls it
+  [[nodiscard]] double toWorld(const std::string& name, const std::string& text,
+                               const std::string& label);
+  void note(const Resolved& length);
 
   const Operator* op_;
   std::map<std::string, std::string> options_;

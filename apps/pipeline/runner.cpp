@@ -157,6 +157,7 @@ void runAction(const Action& action, std::size_t index, const RunSettings& setti
   try {
     if (settings.dryRun) {
       const Plan plan = planOf(invocation);
+      invocation.resolveLengths();
       levelset::requireMemory(plan.bytes(), settings.maxMemory, op.name.c_str());
       if (op.flow == Flow::Makes) {
         const Value value(plan);

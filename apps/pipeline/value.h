@@ -25,8 +25,9 @@ struct Plan {
   double area = 0;             ///< of the surface, world units²
   double voxelSize = 0;        ///< bands only
   double halfWidth = 0;        ///< voxels, bands only
-  double smallestStretch = 1;  ///< patches only
   double fieldBytes = 0;       ///< fields only
+  /// Patches only: along u, along v, and the height, 0 where only the texture will tell.
+  Imath::V3d patchSize = Imath::V3d(0);
   /// Active voxels that a band of this area takes.
   [[nodiscard]] double activeVoxels() const;
   [[nodiscard]] double bytes() const;

@@ -37,6 +37,11 @@ V3d requireAxis(const V3d& axis, const char* action) {
 
 void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
                  const char* action) {
+  if (!std::isfinite(extent.area)) {
+    throw InvalidInput(
+        fmt::format("{}: the area of the surface is beyond all numbers; change the unit of length",
+                    action));
+  }
   const V3d size = extent.bounds.size();
   const double longest = std::max({size.x, size.y, size.z});
   if (voxelSize > longest) {
@@ -67,12 +72,7 @@ void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions
 template <typename Distance>
 NarrowBand makeShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
                      const char* action, const Distance& distance) {
-  requireLength(voxelSize, action, "the voxel size");
-  if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth)) {
-    throw UsageError(fmt::format("{}: the half width is {} voxels, it must be at least 1", action,
-                                 options.halfWidth));
-  }
-  requireFits(extent, voxelSize, options, action);
+  checkShape(extent, voxelSize, options, action);
   report(options.progress, 0, action);
 
   const auto grid = emptyLevelSet(uniformTransform(voxelSize), options.halfWidth);
@@ -130,6 +130,16 @@ double ringDistance(double r, double z, double radius, double tube) {
 }
 
 }  // namespace
+
+void checkShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
+                const char* action) {
+  requireLength(voxelSize, action, "the voxel size");
+  if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth)) {
+    throw UsageError(fmt::format("{}: the half width is {} voxels, it must be at least 1", action,
+                                 options.halfWidth));
+  }
+  requireFits(extent, voxelSize, options, action);
+}
 
 ShapeExtent sphereExtent(double radius, const V3d& center) {
   return {around(center, V3d(radius)), 4 * std::numbers::pi * radius * radius};

@@ -84,23 +84,28 @@ double voxelOf(Invocation& in, const Shape& shape) {
   return in.voxelSize(std::max({size.x, size.y, size.z}));
 }
 
+levelset::ShapeOptions optionsOf(const Invocation& in) {
+  return {
+      .halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress};
+}
+
 template <Describe describe>
 Value make(Invocation& in) {
   referToVoxel(in);
   const Shape shape = describe(in);
-  return Value(shape.make(
-      voxelOf(in, shape),
-      {.halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress}));
+  return Value(shape.make(voxelOf(in, shape), optionsOf(in)));
 }
 
 template <Describe describe>
 Plan plan(Invocation& in) {
   referToVoxel(in);
   const Shape shape = describe(in);
+  const double voxel = voxelOf(in, shape);
+  levelset::checkShape(shape.extent, voxel, optionsOf(in), in.op().name.c_str());
   return {.kind = Kind::Band,
           .bounds = shape.extent.bounds,
           .area = shape.extent.area,
-          .voxelSize = voxelOf(in, shape),
+          .voxelSize = voxel,
           .halfWidth = in.number("half-width")};
 }
 

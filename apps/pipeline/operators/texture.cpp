@@ -89,13 +89,19 @@ Plan planPatch(Invocation& in) {
   plan.kind = Kind::Patch;
   Imath::Box3d box;
   if (in.given("corners")) {
-    for (const V3d& p : in.points("corners")) box.extendBy(p);
+    const std::vector<V3d> p = in.points("corners");
+    for (const V3d& corner : p) box.extendBy(corner);
+    plan.patchSize = {std::min((p[1] - p[0]).length(), (p[2] - p[3]).length()),
+                      std::min((p[3] - p[0]).length(), (p[2] - p[1]).length()), 0};
   } else {
     const std::vector<double> size = in.lengths("size");
+    plan.patchSize = {size[0], size[1], 0};
     const double reach = std::hypot(size[0], size[1]) / 2;
     box = {in.point("at") - V3d(reach), in.point("at") + V3d(reach)};
   }
-  const double height = in.text("height") == "auto" ? box.size().length() / 2 : in.length("height");
+  const bool isAuto = in.text("height") == "auto";
+  const double height = isAuto ? box.size().length() / 2 : in.length("height");
+  if (!isAuto) plan.patchSize.z = height;
   box.min -= V3d(height);
   box.max += V3d(height);
   plan.bounds = box;
@@ -169,11 +175,25 @@ Value texture(Invocation& in) {
   return Value(std::move(result.band));
 }
 
+/// How far the flattest map of the texture's box onto the patch squeezes: the run surveys the real
+/// one.
+double plannedStretch(const Invocation& in, const Plan& texture, const Plan& patch) {
+  const V3d box = in.given("texture-box") ? in.box("texture-box").size() : texture.bounds.size();
+  double stretch = HUGE_VAL;
+  for (int axis = 0; axis < 3; ++axis)
+    if (patch.patchSize[axis] > 0 && box[axis] > 0)
+      stretch = std::min(stretch, patch.patchSize[axis] / box[axis]);
+  return std::isfinite(stretch) ? stretch : 1;
+}
+
 Plan planTexture(Invocation& in) {
   Plan plan = in.operands[0].plan();
   const Plan &texture = in.operands[1].plan(), &patch = in.operands[2].plan();
   plan.voxelSize =
-      in.given("voxel") ? in.length("voxel") : std::min(plan.voxelSize, texture.voxelSize);
+      in.given("voxel")
+          ? in.length("voxel")
+          : mapping::resultVoxelSize(plan.voxelSize, texture.voxelSize,
+                                     plannedStretch(in, texture, patch));
   const double from = texture.bounds.size().length(), to = patch.bounds.size().length();
   const double scale = from > 0 ? to / from : 1;
   plan.area = (in.flag("alone") ? 0 : plan.area) + texture.area * scale * scale;

@@ -146,6 +146,37 @@ TEST_F(Command, DryRunComputesAndWritesNothing) {
                  4, "limit");
 }
 
+TEST_F(Command, DryRunResolvesEveryLength) {
+  const auto outcome = levelsmith(
+      "--dry-run --report r.json box --size 40,40,10 --voxel 0.5 --as base ! torus --radius 4 "
+      "--tube 1.5 --voxel 0.25 --as rings ! patch @base --at 0,0,5 --size 20,20 --height 8 "
+      "--spacing 2vx --as p ! texture @base @rings @p --blend 1 ! sphere --radius 3 --voxel 0.5 ! "
+      "blend --radius 2vx ! smooth --sigma 2vx ! write a.vdb");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json steps = Json::parse(support::slurp(folder_ / "r.json"))["steps"];
+  EXPECT_EQ(steps[2]["resolved"]["spacing"]["world"], 1);
+  EXPECT_EQ(steps[3]["resolved"]["sink"]["world"], 0.5);
+  EXPECT_EQ(steps[3]["resolved"]["blend"]["voxels"], 2);
+  // The rings, 11 across, become at least so much wider on the patch.
+  EXPECT_NEAR(steps[3]["result"]["voxel_size"], 0.25 * 20 / 11, 1e-9);
+  EXPECT_NEAR(steps[5]["resolved"]["radius"]["world"], 2 * 0.25 * 20 / 11, 1e-9);
+  EXPECT_TRUE(steps[6]["resolved"].contains("sigma"));
+  // Once each.
+  const std::size_t first = outcome.err.find("voxel = "), end = outcome.err.find('\n');
+  EXPECT_LT(first, end) << outcome.err;
+  EXPECT_GT(outcome.err.find("voxel = ", first + 1), end) << outcome.err;
+}
+
+TEST_F(Command, DryRunRefusesAsTheRunWould) {
+  for (const char* run : {"", "--dry-run "}) {
+    EXPECT_REFUSED(levelsmith(std::string(run) + "sphere --radius 1 --voxel 5"), 3,
+                   "larger than the whole shape");
+    EXPECT_REFUSED(levelsmith(std::string(run) + "sphere --radius 1 --voxel 1e-10"), 4, "32 bits");
+    EXPECT_REFUSED(levelsmith(std::string(run) + "sphere --radius 1e300 --voxel 1e299"), 3,
+                   "change the unit of length");
+  }
+}
+
 TEST_F(Command, MapsATextureAsInTheReadme) {
   const auto outcome = levelsmith(
       "box --size 40,40,10 --voxel 0.5 --as base ! torus --radius 4 --tube 1.5 --voxel 0.25 --as "
