@@ -195,12 +195,13 @@ Bytes readBytes(const fs::path& path, std::size_t maxMemory) {
   return inflated;
 }
 
-Bytes readFirstBytes(const fs::path& path, std::size_t count) {
+FirstBytes readFirstBytes(const fs::path& path, std::size_t count) {
   Bytes raw;
   InputFile file(path);
   fill(raw, 0, kNoMemoryLimit, count, file.name(), false,
        [&](char* to, std::size_t size) { return file.read(to, size); });
-  if (!isGzip(raw.view())) return raw;
+  const std::size_t atHand = raw.size() < count ? raw.size() : 0;
+  if (!isGzip(raw.view())) return {std::move(raw), std::max(file.expectedSize(), atHand)};
   Bytes inflated;
   std::size_t produced = 0;
   inflated.resize(count);
@@ -216,7 +217,7 @@ Bytes readFirstBytes(const fs::path& path, std::size_t count) {
     // The raw bytes were cut at `count`; what was inflated up to there is what was asked for.
   }
   inflated.resize(produced);
-  return inflated;
+  return {std::move(inflated), atHand > 0 && produced < count ? produced : 0};
 }
 
 struct ByteWriter::Deflater {

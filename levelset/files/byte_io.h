@@ -41,9 +41,13 @@ class Bytes {
 ///         memory
 [[nodiscard]] Bytes readBytes(const std::filesystem::path& path, std::size_t maxMemory);
 
-/// The first bytes of a file (all of a shorter one), inflated likewise; damage further on is not
-/// seen.
-[[nodiscard]] Bytes readFirstBytes(const std::filesystem::path& path, std::size_t count);
+/// The beginning of a file, inflated likewise; damage further on is not seen.
+struct FirstBytes {
+  Bytes bytes;
+  std::size_t whole = 0;  ///< bytes of all of the file; 0 when only reading it would tell
+};
+/// @param count  as many at most
+[[nodiscard]] FirstBytes readFirstBytes(const std::filesystem::path& path, std::size_t count);
 
 /// What messages call the file: its name in quotes, or standard input.
 [[nodiscard]] std::string inputName(const std::filesystem::path& path);

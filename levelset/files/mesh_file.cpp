@@ -97,17 +97,19 @@ bool isMeshFormat(const fs::path& nameOrFormat) {
 MeshFileInfo meshFileInfo(const fs::path& path, const std::string& format) {
   const FormatChoice choice = meshFormat(path, format, "info");
   const std::string name = inputName(path);
-  const Bytes head = readFirstBytes(path, kInfoBytes);
-  if (head.size() == 0) failFile(name, "is empty; fetch or make the file again");
+  const FirstBytes first = readFirstBytes(path, kInfoBytes);
+  const std::string_view head = first.bytes.view();
+  if (head.empty()) failFile(name, "is empty; fetch or make the file again");
   MeshFileInfo info;
   if (choice.format->read == readPly) {
-    info = plyInfo(head.view(), name);
+    info = plyInfo(head, first.whole, name);
+    const bool isMesh = info.vertices > 0 && info.faces > 0, isKnown = first.whole > 0;
+    if (isMesh && isKnown && path != "-" && !plyHoldsTriangles(head, first.whole, name))
+      (void)readMesh(path, {.format = format});  // which tells where it ends
   } else if (choice.format->read == readStl) {
-    std::error_code error;
-    const std::uintmax_t size = fs::file_size(path, error);
-    info = stlInfo(head.view(), error || choice.compressed ? 0 : size);
+    info = stlInfo(head, first.whole, name);
   } else if (choice.format->read == readOff) {
-    info = offInfo(head.view(), name);
+    info = offInfo(head, first.whole, name);
   } else {
     info.format = choice.format->extension;
   }

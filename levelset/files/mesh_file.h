@@ -44,6 +44,7 @@ struct MeshFileInfo {
   std::size_t vertices = 0;  ///< 0 when only a full read would tell
   std::size_t faces = 0;
 };
+/// Counts are compared with the size of the file: what it cannot hold is refused as readMesh does.
 /// @param format  as in ReadMeshOptions
 [[nodiscard]] MeshFileInfo meshFileInfo(const std::filesystem::path& path,
                                         const std::string& format = {});

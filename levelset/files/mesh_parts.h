@@ -149,10 +149,18 @@ void writeObj(ByteWriter& out, const TriMesh& mesh, const Progress& progress);
 void writeStl(ByteWriter& out, const TriMesh& mesh, const Progress& progress);
 void writeOff(ByteWriter& out, const TriMesh& mesh, const Progress& progress);
 
-/// From the first bytes of a file of `fileSize` bytes (0: not known).
-[[nodiscard]] MeshFileInfo plyInfo(std::string_view head, const std::string& name);
-[[nodiscard]] MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize);
-[[nodiscard]] MeshFileInfo offInfo(std::string_view head, const std::string& name);
+/// From the first bytes of a file of `fileSize` bytes (0: not known). A header that promises more
+/// than that many bytes can hold is refused as a reader refuses it.
+[[nodiscard]] MeshFileInfo plyInfo(std::string_view head, std::size_t fileSize,
+                                   const std::string& name);
+[[nodiscard]] MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize,
+                                   const std::string& name);
+[[nodiscard]] MeshFileInfo offInfo(std::string_view head, std::size_t fileSize,
+                                   const std::string& name);
+/// Can a PLY file of that size hold what its header promises if every face is a triangle? Where it
+/// cannot, it was cut off or has faces of fewer corners, and only a full read tells.
+[[nodiscard]] bool plyHoldsTriangles(std::string_view head, std::size_t fileSize,
+                                     const std::string& name);
 
 /// Reports every so many elements, without a call for each.
 class WriteProgress {

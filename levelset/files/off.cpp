@@ -40,6 +40,20 @@ Counts readHeader(TextCursor& cursor) {
   return {static_cast<std::size_t>(counts[0]), static_cast<std::size_t>(counts[1])};
 }
 
+constexpr std::size_t kLeastVertex = 6, kLeastFace = 2;  // "0 0 0\n", "0\n"
+
+/// @param remaining  bytes behind the header
+void checkCounts(const Counts& counts, std::size_t remaining, const std::string& name) {
+  const std::size_t left = remaining + 1;  // the last line may lack its end
+  if (counts.vertices <= left / kLeastVertex &&
+      counts.faces <= (left - counts.vertices * kLeastVertex) / kLeastFace)
+    return;
+  failFile(name,
+           fmt::format("promises {} vertices and {} faces, more than its {} bytes of data can hold; "
+                       "it was cut off or its header is damaged: fetch or export it again",
+                       counts.vertices, counts.faces, remaining));
+}
+
 class OffReader {
  public:
   OffReader(std::string_view input, MeshBuilder& builder)
@@ -47,17 +61,8 @@ class OffReader {
 
   void read() {
     const Counts counts = readHeader(cursor_);
-    constexpr std::size_t kLeastVertex = 6, kLeastFace = 2;  // "0 0 0\n", "0\n"
-    const std::size_t left = cursor_.remaining() + 1;
-    if (counts.vertices > left / kLeastVertex ||
-        counts.faces > (left - counts.vertices * kLeastVertex) / kLeastFace) {
-      failFile(
-          builder_.name(),
-          fmt::format("promises {} vertices and {} faces, more than its {} bytes of data can hold; "
-                      "it was cut off or its header is damaged: fetch or export it again",
-                      counts.vertices, counts.faces, cursor_.remaining()));
-    }
-    builder_.reserve(counts.vertices, std::min(counts.faces, left / 8));
+    checkCounts(counts, cursor_.remaining(), builder_.name());
+    builder_.reserve(counts.vertices, std::min(counts.faces, cursor_.remaining() / 8 + 1));
     for (std::size_t i = 0; i < counts.vertices; ++i) readVertex();
     for (std::size_t i = 0; i < counts.faces; ++i) readFace();
     if (cursor_.skipToToken('#'))
@@ -109,9 +114,10 @@ void readOff(std::string_view input, MeshBuilder& builder) {
   OffReader(input, builder).read();
 }
 
-MeshFileInfo offInfo(std::string_view head, const std::string& name) {
+MeshFileInfo offInfo(std::string_view head, std::size_t fileSize, const std::string& name) {
   TextCursor cursor(head, name);
   const Counts counts = readHeader(cursor);
+  if (fileSize > 0) checkCounts(counts, fileSize - (head.size() - cursor.remaining()), name);
   return {"off", counts.vertices, counts.faces};
 }
 

@@ -185,13 +185,10 @@ class HeaderReader {
   bool formatSeen_ = false;
 };
 
-/// What a mesh needs is there, and nothing promises more than the file can hold.
-void checkHeader(const Header& header, std::size_t dataSize, const std::string& name) {
-  bool vertices = false, faces = false;
+/// Nothing promises more than the file can hold.
+void checkPromises(const Header& header, std::size_t dataSize, const std::string& name) {
   std::size_t left = dataSize + 1;  // the last line of a text may lack its end
   for (const Element& element : header.elements) {
-    if (element.has(Role::X) && element.has(Role::Y) && element.has(Role::Z)) vertices = true;
-    faces = faces || element.holdsFaces();
     const std::size_t least = element.leastSize(header.encoding);
     if (least == 0) continue;
     if (element.count > left / least) {
@@ -201,6 +198,16 @@ void checkHeader(const Header& header, std::size_t dataSize, const std::string& 
                            element.count, element.name, dataSize));
     }
     left -= element.count * least;
+  }
+}
+
+/// What a mesh needs is there, and the file may hold it.
+void checkHeader(const Header& header, std::size_t dataSize, const std::string& name) {
+  checkPromises(header, dataSize, name);
+  bool vertices = false, faces = false;
+  for (const Element& element : header.elements) {
+    if (element.has(Role::X) && element.has(Role::Y) && element.has(Role::Z)) vertices = true;
+    faces = faces || element.holdsFaces();
   }
   if (!vertices) failFile(name, "has no element 'vertex' with x, y and z; export the mesh again");
   if (!faces) {
@@ -431,8 +438,22 @@ void readPly(std::string_view input, MeshBuilder& builder) {
   }
 }
 
-MeshFileInfo plyInfo(std::string_view head, const std::string& name) {
+bool plyHoldsTriangles(std::string_view head, std::size_t fileSize, const std::string& name) {
   const Header header = HeaderReader(head, name).read();
+  const bool ascii = header.encoding == Encoding::Ascii;
+  double promised = 0;
+  for (const Element& element : header.elements) {
+    std::size_t least = element.leastSize(header.encoding);
+    for (const Property& p : element.properties)
+      if (p.role == Role::Corners) least += 3 * (ascii ? 2 : sizeOf(p.type));
+    promised += static_cast<double>(element.count) * static_cast<double>(least);
+  }
+  return promised <= static_cast<double>(fileSize) - static_cast<double>(header.size) + 1;
+}
+
+MeshFileInfo plyInfo(std::string_view head, std::size_t fileSize, const std::string& name) {
+  const Header header = HeaderReader(head, name).read();
+  if (fileSize > 0) checkPromises(header, fileSize - header.size, name);
   constexpr const char* kEncodings[] = {"ascii", "binary little endian", "binary big endian"};
   MeshFileInfo info{fmt::format("ply, {}", kEncodings[static_cast<int>(header.encoding)]), 0, 0};
   for (const Element& element : header.elements) {

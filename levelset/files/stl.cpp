@@ -61,18 +61,24 @@ bool isBinary(std::string_view input, std::size_t fileSize) {
   return !beginsWithSolid(input) || input.substr(0, 1024).find('\0') != std::string_view::npos;
 }
 
-void readBinary(std::string_view input, MeshBuilder& builder) {
-  if (input.size() < kHeaderSize)
-    failFile(builder.name(),
+/// The triangles that a file of so many bytes has room for; what its header promises must fit.
+std::size_t roomForFacets(std::string_view head, std::size_t fileSize, const std::string& name) {
+  if (fileSize < kHeaderSize)
+    failFile(name,
              "is neither text that begins with 'solid' nor long enough for a binary "
              "STL; give its true format");
-  const std::size_t count = facetCount(input), held = (input.size() - kHeaderSize) / kFacetSize;
+  const std::size_t count = facetCount(head), held = (fileSize - kHeaderSize) / kFacetSize;
   if (count > held) {
-    failFile(builder.name(),
-             fmt::format("promises {} triangles and holds {}; it was cut off or is no STL: "
-                         "fetch or export it again",
-                         count, held));
+    failFile(name, fmt::format("promises {} triangles and holds {}; it was cut off or is no STL: "
+                               "fetch or export it again",
+                               count, held));
   }
+  return held;
+}
+
+void readBinary(std::string_view input, MeshBuilder& builder) {
+  const std::size_t held = roomForFacets(input, input.size(), builder.name());
+  const std::size_t count = facetCount(input);
   requireNothingBehind(
       input, kHeaderSize + count * kFacetSize, builder.name(),
       fmt::format("the {} triangles that its header promises (it has room for {})", count, held));
@@ -172,8 +178,9 @@ void readStl(std::string_view input, MeshBuilder& builder) {
     TextReader(input, builder).read();
 }
 
-MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize) {
+MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize, const std::string& name) {
   if (!isBinary(head, fileSize)) return {"stl, ascii", 0, 0};
+  if (fileSize > 0) (void)roomForFacets(head, fileSize, name);
   return {"stl, binary", 0, head.size() >= kHeaderSize ? facetCount(head) : 0};
 }
 

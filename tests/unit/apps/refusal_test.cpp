@@ -114,9 +114,9 @@ TEST_F(Refusal, WhatCanBeToldComesBeforeTheWork) {
   EXPECT_REFUSED(levelsmith("--no-clobber " + large + "write there.vdb", 5), 6, "no-clobber");
   EXPECT_EQ(support::slurp(folder_ / "there.vdb"), "kept");
   writeFile("step_3.vdb", "kept");
-  EXPECT_REFUSED(levelsmith("--no-clobber " + large + target + "--steps 4 --keep-steps step_#.vdb",
-                            5),
-                 6, "step_3.vdb");
+  EXPECT_REFUSED(
+      levelsmith("--no-clobber " + large + target + "--steps 4 --keep-steps step_#.vdb", 5), 6,
+      "step_3.vdb");
   expectNothingWritten(2);
 }
 
@@ -193,6 +193,17 @@ TEST_F(Refusal, CorruptMeshFilesAreThree) {
   for (const char* file : {"empty.ply", "empty.obj", "empty.stl", "words.ply", "nan.ply", "inf.ply",
                            "range.obj", "zero.obj", "claims.ply", "cut.ply", "cut.stl"})
     EXPECT_REFUSED(levelsmith(toBand(file), 10), 3, file);
+  // Whoever only asks what is in them hears of it too, where the size of the file tells.
+  writeFile("faces.ply", ply.substr(0, ply.find("face ") + 5) + "3000000000" +
+                             ply.substr(ply.find("\nproperty list")));
+  std::string claims = stl;
+  claims.replace(80, 4, "\xFF\xFF\xFF\xEE");
+  writeFile("claims.stl", claims);
+  writeFile("claims.off", "OFF\n3000000000 1 0\n0 0 0\n");
+  for (const char* file :
+       {"claims.ply", "cut.ply", "faces.ply", "cut.stl", "claims.stl", "claims.off"})
+    EXPECT_REFUSED(levelsmith(std::string("info ") + file, 10), 3,
+                   std::string("info: '") + file + "'");
   EXPECT_FALSE(exists("out.vdb"));
 }
 
