@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cmath>
@@ -139,8 +140,9 @@ struct ChosenGrid {
     }
     const std::size_t limit = memoryLimit(options.maxMemory);
     requireMemory(static_cast<double>(file.size()), limit, "read");
-    const auto grid = GridT::create(read(file, name, treeOwner(entries, entry, name),
-                                         VdbTreeLimits{limit - file.size(), keepsTiles}));
+    const auto grid = GridT::create(read(
+        file, name, treeOwner(entries, entry, name),
+        VdbTreeLimits{limit - file.size(), keepsTiles, subProgress(options.progress, 0.3, 0.9)}));
     grid->setTransform(entry.transform);
     grid->setName(entry.name);
     grid->setGridClass(openvdb::GridBase::stringToGridClass(entry.gridClass()));
@@ -172,8 +174,12 @@ auto readFrom(const fs::path& path, const ReadBandOptions& options, const Take& 
                     name));
   }
   try {
+    report(options.progress, 0, "read");
     const Bytes bytes = readBytes(path, options.maxMemory);
-    return take(ChosenGrid{bytes.view(), name, options});
+    report(options.progress, 0.3, "read");
+    auto result = take(ChosenGrid{bytes.view(), name, options});
+    report(options.progress, 1, "read");
+    return result;
   } catch (const std::bad_alloc&) {
     throw ResourceLimit(
         fmt::format("read: {} does not fit into memory; free memory or use larger voxels", name));
@@ -184,6 +190,29 @@ auto readFrom(const fs::path& path, const ReadBandOptions& options, const Take& 
 }
 
 // === Writing
+
+/// A file that tells how much of what was expected has gone into it.
+class ReportingFile : public std::filebuf {
+ public:
+  ReportingFile(const Progress& progress, double expected)
+      : progress_(progress), expected_(expected) {}
+
+ protected:
+  std::streamsize xsputn(const char* data, std::streamsize size) override {
+    constexpr double kStep = 1 << 20;
+    written_ += static_cast<double>(size);
+    if (written_ > told_ + kStep) {
+      told_ = written_;
+      // Compression leaves less than was expected; the end is told by whoever closes the file.
+      report(progress_, std::min(0.9, written_ / expected_), "write");
+    }
+    return std::filebuf::xsputn(data, size);
+  }
+
+ private:
+  const Progress& progress_;
+  double expected_, written_ = 0, told_ = 0;
+};
 
 /// OpenVDB's writer, with grid offsets, on any stream that can seek.
 struct StreamArchive : openvdb::io::Archive {
@@ -210,18 +239,22 @@ std::string identifierText(std::uint64_t hash) {
                      hash & 0xFFFF, other >> 48, other & 0xFFFFFFFFFFFFull);
 }
 
-void writeVdb(const fs::path& path, const openvdb::GridBase::ConstPtr& grid, std::uint64_t hash) {
+void writeVdb(const fs::path& path, const openvdb::GridBase::ConstPtr& grid, std::uint64_t hash,
+              const Progress& progress) {
   openvdb::initialize();
+  report(progress, 0, "write");
   std::vector<char> buffer(1 << 20);
-  std::ofstream out;
-  out.rdbuf()->pubsetbuf(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+  ReportingFile file(progress, static_cast<double>(grid->memUsage()));
+  file.pubsetbuf(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+  std::ostream out(&file);
   out.exceptions(std::ios::badbit | std::ios::failbit);
-  out.open(path, std::ios::binary);
+  if (!file.open(path, std::ios::out | std::ios::binary)) out.setstate(std::ios::failbit);
   StreamArchive().writeGrids(out, grid);
   out.seekp(kIdentifierOffset);
   const std::string identifier = identifierText(hash);
   out.write(identifier.data(), static_cast<std::streamsize>(identifier.size()));
-  out.close();
+  if (!file.close()) out.setstate(std::ios::failbit);
+  report(progress, 1, "write");
 }
 
 /// @param write  fills the file at the path it is given
@@ -324,10 +357,10 @@ void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOpti
   const auto grid = namedGrid(vdb(band), options.name);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   writeTarget(path, [&](const fs::path& target) {
-    if (format == "vdb")
-      writeVdb(target, grid, band.contentHash());
-    else
-      writeNanoGrid(target, *grid);
+    if (format == "vdb") return writeVdb(target, grid, band.contentHash(), options.progress);
+    report(options.progress, 0, "write");
+    writeNanoGrid(target, *grid);
+    report(options.progress, 1, "write");
   });
 }
 
@@ -344,7 +377,9 @@ void writeField(const fs::path& path, const FieldGrid& field, const WriteBandOpt
     grid = namedGrid(*source.scalar, options.name);
   else
     grid = namedGrid(*source.vector, options.name);
-  writeTarget(path, [&](const fs::path& target) { writeVdb(target, grid, field.contentHash()); });
+  writeTarget(path, [&](const fs::path& target) {
+    writeVdb(target, grid, field.contentHash(), options.progress);
+  });
 }
 
 std::vector<GridInfo> bandFileInfo(const fs::path& path) {

@@ -19,6 +19,7 @@ struct ReadBandOptions {
   std::string grid = {};  ///< name of the grid; empty: the only float level set of the file
   std::size_t maxMemory = kNoMemoryLimit;
   BandRepairs* repairs = nullptr;  ///< told what the grid lacked to be a band
+  Progress progress = {};
 };
 
 /// Values stored as half floats or doubles become floats.
@@ -44,6 +45,7 @@ using BandOrField = std::variant<NarrowBand, FieldGrid>;
 struct WriteBandOptions {
   std::string name = "surface";  ///< of the grid
   std::string format = {};       ///< "vdb" or "nvdb"; empty: by extension
+  Progress progress = {};
 };
 
 /// Writes beside the target and renames (FileTarget). Equal bands give equal bytes: the identifier

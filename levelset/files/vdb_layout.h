@@ -83,6 +83,7 @@ struct VdbEntry {
 struct VdbTreeLimits {
   std::size_t maxMemory = kNoMemoryLimit;
   bool keepsTiles = false;  ///< active tiles stay tiles: they need not fit as voxels
+  Progress progress = {};
 };
 
 /// The tree of an entry of float or double values, as a float tree.

@@ -11,6 +11,7 @@
 #include <set>
 #include <vector>
 
+#include "levelset/convert/progress_gate.h"
 #include "levelset/error.h"
 #include "levelset/files/vdb_layout.h"
 #include "levelset/progress.h"
@@ -191,10 +192,13 @@ class TreeReader {
     auto tree = std::make_shared<TreeT>();
     readRoot(tree->root());
     const std::vector<std::size_t> places = skipLeafValues();
+    convert::ProgressGate gate(limits_.progress, leaves_.size(), "read");
     tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t i) {
       VdbBytes at = bytes_;
       at.seek(places[i]);
       readLeafValues(at, *leaves_[i]);
+      constexpr std::size_t kOften = 64;  // leaves between two reports
+      if (i % kOften == 0) gate.advance(std::min(kOften, leaves_.size() - i));
     });
     return tree;
   }

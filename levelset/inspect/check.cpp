@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "levelset/convert/progress_gate.h"
 #include "levelset/vdb.h"
 
 namespace levelset {
@@ -162,17 +163,19 @@ void checkLeaf(const LeafNode& leaf, float background, SlopeStencil& stencil, Le
   }
 }
 
-LeafFindings checkLeaves(const FloatGrid& grid) {
+LeafFindings checkLeaves(const FloatGrid& grid, const Progress& progress) {
   std::vector<const LeafNode*> leaves;
   leaves.reserve(grid.tree().leafCount());
   for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
   std::vector<LeafFindings> found(leaves.size());
+  convert::ProgressGate gate(progress, leaves.size(), "check");
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16),
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       SlopeStencil stencil(grid);
                       for (std::size_t i = range.begin(); i < range.end(); ++i) {
                         checkLeaf(*leaves[i], grid.background(), stencil, found[i]);
                       }
+                      gate.advance(range.size());
                     });
   LeafFindings total;
   for (const LeafFindings& leaf : found) {
@@ -232,7 +235,8 @@ bool CheckReport::passed() const {
   return std::all_of(items.begin(), items.end(), [](const CheckItem& i) { return i.passed; });
 }
 
-CheckReport check(const NarrowBand& solid) {
+CheckReport check(const NarrowBand& solid, const Progress& progress) {
+  levelset::report(progress, 0, "check");
   CheckReport report;
   if (!solid.shared()) {
     report.items.push_back({"floating-point values", false, "there is no grid"});
@@ -242,7 +246,7 @@ CheckReport check(const NarrowBand& solid) {
   LeafFindings found;
   Finding activeTiles, notFinite;
   checkTiles(grid, activeTiles, found);
-  const LeafFindings leaves = checkLeaves(grid);
+  const LeafFindings leaves = checkLeaves(grid, progress);
   if (!std::isfinite(grid.background())) {
     notFinite.add(Coord(0), grid.background());
     notFinite.isBackground = true;

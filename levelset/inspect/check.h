@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "levelset/narrow_band.h"
+#include "levelset/progress.h"
 
 namespace levelset {
 
@@ -24,6 +25,6 @@ struct CheckReport {
 /// band (fails when its mean passes 0.1). They differ from OpenVDB where those fault sound bands: a
 /// half width of one voxel is enough, and beside an edge of the solid, where one-sided slopes
 /// differ, any between them may be the right one.
-[[nodiscard]] CheckReport check(const NarrowBand& solid);
+[[nodiscard]] CheckReport check(const NarrowBand& solid, const Progress& progress = {});
 
 }  // namespace levelset

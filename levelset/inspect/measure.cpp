@@ -7,6 +7,7 @@
 #include <tuple>
 #include <vector>
 
+#include "levelset/convert/progress_gate.h"
 #include "levelset/inspect/curved_surface.h"
 #include "levelset/inspect/shells.h"
 #include "levelset/meshing/cell_surface.h"
@@ -17,11 +18,13 @@ namespace {
 
 using openvdb::Vec3d;
 
+constexpr const char* kMeasure = "measure";
+
 /// Sums over the triangles of each shell: chunk by chunk, and the chunks in their order.
 /// @param piece  (triangle, anchor, worker) of one triangle; @param makeWorker  one for each chunk
 template <typename MakeWorker, typename Piece>
 std::vector<SurfaceMoments> sumShells(const std::vector<std::uint32_t>& shellOfTriangle,
-                                      const std::vector<Vec3d>& anchors,
+                                      const std::vector<Vec3d>& anchors, const Progress& progress,
                                       const MakeWorker& makeWorker, const Piece& piece) {
   constexpr std::size_t kChunk = 4096;
   struct Part {
@@ -30,6 +33,7 @@ std::vector<SurfaceMoments> sumShells(const std::vector<std::uint32_t>& shellOfT
   };
   const std::size_t count = shellOfTriangle.size();
   std::vector<std::vector<Part>> parts((count + kChunk - 1) / kChunk);
+  convert::ProgressGate gate(progress, parts.size(), kMeasure);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t chunk) {
     auto worker = makeWorker();
     const std::size_t end = std::min(count, (chunk + 1) * kChunk);
@@ -39,6 +43,7 @@ std::vector<SurfaceMoments> sumShells(const std::vector<std::uint32_t>& shellOfT
         parts[chunk].push_back({shell, {}});
       parts[chunk].back().sum.add(piece(i, anchors[shell], worker));
     }
+    gate.advance(1);
   });
   std::vector<SurfaceMoments> sums(anchors.size());
   for (const auto& chunk : parts)
@@ -142,18 +147,22 @@ double edgeCurvature(const TriMesh& mesh) {
 
 // The figures are those of the surface in index space: near to the numbers' origin, so that a part
 // far away in the world measures the same.
-Measurement measure(const NarrowBand& solid) {
+Measurement measure(const NarrowBand& solid, const Progress& progress) {
+  report(progress, 0, kMeasure);
   Measurement result;
   result.voxelSize = solid.voxelSize();
   result.halfWidth = solid.halfWidth();
   result.activeVoxels = solid.activeVoxelCount();
   if (solid.isEmpty()) return result;
   const IndexMesh mesh = marchCells(CellSurface(vdb(solid)));
+  report(progress, 0.2, kMeasure);
   const Shells shells = findShells(mesh.positions, mesh.triangles);
   const std::vector<Vec3d> anchors = shellAnchors(shells, mesh.positions);
+  report(progress, 0.3, kMeasure);
   const CurvedSurface surface(mesh, vdb(solid));
+  const Progress last = subProgress(progress, 0.4, 1);
   const std::vector<SurfaceMoments> sums = sumShells(
-      shellsOfTriangles(shells, mesh.triangles), anchors, [&] { return surface.makeCache(); },
+      shellsOfTriangles(shells, mesh.triangles), anchors, last, [&] { return surface.makeCache(); },
       [&](std::size_t i, const Vec3d& anchor, CurvedSurface::Cache& cache) {
         return surface.moments(i, anchor, cache);
       });
@@ -163,12 +172,14 @@ Measurement measure(const NarrowBand& solid) {
   return result;
 }
 
-Measurement measure(const TriMesh& mesh) {
+Measurement measure(const TriMesh& mesh, const Progress& progress) {
+  report(progress, 0, kMeasure);
   Measurement result;
   const Shells shells = findShells(mesh.positions, mesh.triangles);
   const std::vector<Vec3d> anchors = shellAnchors(shells, mesh.positions);
+  const Progress middle = subProgress(progress, 0.3, 0.6);
   const std::vector<SurfaceMoments> sums = sumShells(
-      shellsOfTriangles(shells, mesh.triangles), anchors, [] { return 0; },
+      shellsOfTriangles(shells, mesh.triangles), anchors, middle, [] { return 0; },
       [&](std::size_t i, const Vec3d& anchor, int) {
         const auto& t = mesh.triangles[i];
         return flatTriangleMoments(toVdb(mesh.positions[t[0]]) - anchor,
@@ -178,6 +189,7 @@ Measurement measure(const TriMesh& mesh) {
   describeShells(shells, sums, anchors, Imath::M44d(), 1, result);
   result.meanCurvature = edgeCurvature(mesh);
   result.bounds = bounds(mesh);
+  report(progress, 1, kMeasure);
   return result;
 }
 

@@ -7,6 +7,7 @@
 
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
+#include "levelset/progress.h"
 
 namespace levelset {
 
@@ -27,12 +28,12 @@ struct Measurement {
 /// By quadrature on the zero set of the tricubic interpolant: on smooth surfaces better than third
 /// order in the voxel size, along edges second, as a grid shows them. Sums run in a fixed order.
 /// An empty band measures zero.
-[[nodiscard]] Measurement measure(const NarrowBand& solid);
+[[nodiscard]] Measurement measure(const NarrowBand& solid, const Progress& progress = {});
 
 /// The same figures of a triangle mesh, exact for its flat triangles. `components` counts connected
 /// surfaces that face outwards. Volume, centroid and inertia mean something for a closed mesh only;
 /// the curvature is that of its edges, half the length times the angle [Steiner40].
-[[nodiscard]] Measurement measure(const TriMesh& mesh);
+[[nodiscard]] Measurement measure(const TriMesh& mesh, const Progress& progress = {});
 
 /// Is every edge shared by exactly two triangles that run along it in opposite directions, and
 /// every vertex the centre of one fan?

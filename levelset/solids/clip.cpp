@@ -26,17 +26,20 @@ Imath::Box3d worldBounds(const openvdb::FloatGrid& grid, const openvdb::CoordBBo
 
 /// The solid's grid with the distance of a region of space, as far as the solid reaches.
 template <typename Distance>
-NarrowBand clipBy(const NarrowBand& solid, const Distance& distance) {
+NarrowBand clipBy(const NarrowBand& solid, const Progress& progress, const Distance& distance) {
+  report(progress, 0, "clip");
   const openvdb::FloatGrid& grid = vdb(solid);
   const auto region = emptyLevelSet(grid.transform().copy(), 1);
   region->tree().root().setBackground(grid.background(), /*updateChildNodes=*/false);
   const auto phi = [&](double i, double j, double k) {
     return distance(toImath(grid.indexToWorld(openvdb::Vec3d(i, j, k))));
   };
-  if (!BlockFiller(*region, phi).fill(grid.evalActiveVoxelBoundingBox(), {}, "clip"))
+  if (!BlockFiller(*region, phi)
+           .fill(grid.evalActiveVoxelBoundingBox(), subProgress(progress, 0, 0.5), "clip"))
     throw nothingLeft();
   openvdb::FloatGrid::Ptr merged = mergePair(CsgOperation::Intersection, grid, *region);
   if (!hasInside(*merged)) throw nothingLeft();
+  report(progress, 1, "clip");
   return makeBand(std::move(merged));
 }
 
@@ -46,7 +49,7 @@ void requireSurface(const NarrowBand& solid) {
 
 }  // namespace
 
-NarrowBand clip(const NarrowBand& solid, const Imath::Box3d& box) {
+NarrowBand clip(const NarrowBand& solid, const Imath::Box3d& box, const Progress& progress) {
   requireSurface(solid);
   for (int axis = 0; axis < 3; ++axis) {
     if (box.min[axis] < box.max[axis]) continue;  // false for NaN
@@ -67,7 +70,7 @@ NarrowBand clip(const NarrowBand& solid, const Imath::Box3d& box) {
     center[axis] = (low + high) / 2;
     half[axis] = (high - low) / 2;
   }
-  return clipBy(solid, [=](const V3d& p) {
+  return clipBy(solid, progress, [=](const V3d& p) {
     const V3d q(std::abs(p.x - center.x) - half.x, std::abs(p.y - center.y) - half.y,
                 std::abs(p.z - center.z) - half.z);
     const V3d outside(std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0));
@@ -75,7 +78,7 @@ NarrowBand clip(const NarrowBand& solid, const Imath::Box3d& box) {
   });
 }
 
-NarrowBand clip(const NarrowBand& solid, const Imath::Plane3d& plane) {
+NarrowBand clip(const NarrowBand& solid, const Imath::Plane3d& plane, const Progress& progress) {
   requireSurface(solid);
   const double length = plane.normal.length();
   if (!(length > 0) || !std::isfinite(length) || !std::isfinite(plane.distance)) {
@@ -86,7 +89,7 @@ NarrowBand clip(const NarrowBand& solid, const Imath::Plane3d& plane) {
   }
   const V3d normal = plane.normal / length;
   const double distance = plane.distance / length;
-  return clipBy(solid, [=](const V3d& p) { return (normal ^ p) - distance; });
+  return clipBy(solid, progress, [=](const V3d& p) { return (normal ^ p) - distance; });
 }
 
 }  // namespace levelset

@@ -10,9 +10,11 @@ namespace levelset {
 
 /// The part of a solid inside an axis-aligned world box, closed by the box's faces.
 /// @throws InvalidInput when nothing is left
-[[nodiscard]] NarrowBand clip(const NarrowBand& solid, const Imath::Box3d& box);
+[[nodiscard]] NarrowBand clip(const NarrowBand& solid, const Imath::Box3d& box,
+                              const Progress& progress = {});
 
 /// The part of a solid behind a plane (on the side that its normal points away from), closed by it.
-[[nodiscard]] NarrowBand clip(const NarrowBand& solid, const Imath::Plane3d& plane);
+[[nodiscard]] NarrowBand clip(const NarrowBand& solid, const Imath::Plane3d& plane,
+                              const Progress& progress = {});
 
 }  // namespace levelset

@@ -36,8 +36,9 @@ constexpr float kLeastDistance = 1e-3f;
 /// keep their bits.
 class RegionFlip {
  public:
-  RegionFlip(const NarrowBand& solid, const RegionMap& map, std::vector<bool> flipped)
-      : solid_(solid), map_(map), flipped_(std::move(flipped)) {
+  RegionFlip(const NarrowBand& solid, const RegionMap& map, std::vector<bool> flipped,
+             const Progress& progress)
+      : solid_(solid), map_(map), flipped_(std::move(flipped)), progress_(progress) {
     reach_ = static_cast<int>(std::ceil((solid.halfWidth() + 1) / 8));
   }
 
@@ -151,8 +152,10 @@ class RegionFlip {
   void renew(NarrowBand& result) const {
     // Wider than the result, so that a distance just within the background can be told from one
     // that ends there.
-    const NarrowBand fresh = redistance(
-        smoothed(result), {.halfWidth = solid_.halfWidth() + 1, .region = worldBoxOfBoth()});
+    const NarrowBand fresh =
+        redistance(smoothed(result), {.halfWidth = solid_.halfWidth() + 1,
+                                      .region = worldBoxOfBoth(),
+                                      .progress = subProgress(progress_, 0.2, 0.9)});
     const NarrowBand before = result;
     FloatGrid& grid = editVdb(result);
     auto old = vdb(before).getConstAccessor();
@@ -199,13 +202,15 @@ class RegionFlip {
   const NarrowBand& solid_;
   const RegionMap& map_;
   std::vector<bool> flipped_;
+  const Progress& progress_;
   int reach_ = 1;
   BlockSet vanishing_, both_;
 };
 
-NarrowBand flip(const NarrowBand& solid, const RegionMap& map, std::vector<bool> flipped) {
+NarrowBand flip(const NarrowBand& solid, const RegionMap& map, std::vector<bool> flipped,
+                const Progress& progress) {
   if (std::find(flipped.begin(), flipped.end(), true) == flipped.end()) return solid;
-  return RegionFlip(solid, map, std::move(flipped)).run();
+  return RegionFlip(solid, map, std::move(flipped), progress).run();
 }
 
 }  // namespace
@@ -215,14 +220,14 @@ Topology topology(const NarrowBand& solid) {
   return {m.components, m.shells, m.cavities};
 }
 
-NarrowBand keepLargest(const NarrowBand& solid, std::size_t count) {
+NarrowBand keepLargest(const NarrowBand& solid, std::size_t count, const Progress& progress) {
   if (!count) throw UsageError("keep: the number of solids to keep is 0; keep at least one");
   if (solid.isEmpty()) {
     throw InvalidInput(
         "keep: the band is empty, so there is nothing to keep; check the steps "
         "before it");
   }
-  const RegionMap map(vdb(solid));
+  const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5), "keep");
   const std::vector<Region>& regions = map.regions();
   std::vector<std::size_t> solids;
   for (std::size_t i = 0; i < regions.size(); ++i) {
@@ -234,24 +239,28 @@ NarrowBand keepLargest(const NarrowBand& solid, std::size_t count) {
                    [&](std::size_t a, std::size_t b) { return volume(a) > volume(b); });
   std::vector<bool> flipped(regions.size(), false);
   for (std::size_t i = count; i < solids.size(); ++i) flipped[solids[i]] = true;
-  return flip(solid, map, std::move(flipped));
+  NarrowBand result = flip(solid, map, std::move(flipped), subProgress(progress, 0.5, 1));
+  report(progress, 1, "keep");
+  return result;
 }
 
-NarrowBand fillCavities(const NarrowBand& solid, double maxVolume) {
+NarrowBand fillCavities(const NarrowBand& solid, double maxVolume, const Progress& progress) {
   if (!(maxVolume >= 0)) {
     throw UsageError(fmt::format(
         "fill-cavities: the largest volume to fill is {}; give a number that is not negative",
         maxVolume));
   }
   if (solid.isEmpty()) return solid;
-  const RegionMap map(vdb(solid));
+  const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5), "fill-cavities");
   const std::vector<Region>& regions = map.regions();
   const double limit = maxVolume / std::pow(solid.voxelSize(), 3);
   std::vector<bool> flipped(regions.size(), false);
   for (std::size_t i = 0; i < regions.size(); ++i) {
     flipped[i] = i != RegionMap::kInfinite && !regions[i].inside && regions[i].volume <= limit;
   }
-  return flip(solid, map, std::move(flipped));
+  NarrowBand result = flip(solid, map, std::move(flipped), subProgress(progress, 0.5, 1));
+  report(progress, 1, "fill-cavities");
+  return result;
 }
 
 }  // namespace levelset

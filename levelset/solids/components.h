@@ -3,6 +3,7 @@
 #include <cstddef>
 
 #include "levelset/narrow_band.h"
+#include "levelset/progress.h"
 
 /// Connected parts of a solid and of the space around it. Grid points are connected along the edges
 /// of the grid (6 neighbours) inside, and also across the diagonals of its faces (18 neighbours)
@@ -21,11 +22,13 @@ struct Topology {
 /// those that come first in the tree stay. Grid points that are not nearest to a dropped surface
 /// keep their bits.
 /// @throws UsageError for count = 0; InvalidInput if the band is empty
-[[nodiscard]] NarrowBand keepLargest(const NarrowBand& solid, std::size_t count);
+[[nodiscard]] NarrowBand keepLargest(const NarrowBand& solid, std::size_t count,
+                                     const Progress& progress = {});
 
 /// Fills enclosed voids up to `maxVolume` world units³ (default: all). What floats in a void is not
 /// part of its volume, and is swallowed when it is filled; an empty band stays empty.
 /// @throws UsageError if `maxVolume` is negative or not a number
-[[nodiscard]] NarrowBand fillCavities(const NarrowBand& solid, double maxVolume = 1e300);
+[[nodiscard]] NarrowBand fillCavities(const NarrowBand& solid, double maxVolume = 1e300,
+                                      const Progress& progress = {});
 
 }  // namespace levelset

@@ -106,16 +106,24 @@ class RegionMap::Linker {
   std::int32_t lastA_ = 0, lastB_ = 0;
 };
 
-RegionMap::RegionMap(const FloatGrid& grid) : labels_(grid.tree(), 0, openvdb::TopologyCopy()) {
+RegionMap::RegionMap(const FloatGrid& grid, const Progress& progress, const char* action)
+    : labels_(grid.tree(), 0, openvdb::TopologyCopy()) {
+  report(progress, 0, action);
   const CellSurface surface(grid);
   Linker linker;
+  report(progress, 0.1, action);
   labelLeaves(grid, linker);
   labelTiles(grid, linker);
+  report(progress, 0.3, action);
   joinLeaves(grid, linker);
   joinTiles(grid, linker);
+  report(progress, 0.5, action);
   joinDiagonals(surface, linker);
+  report(progress, 0.6, action);
   numberRegions(grid, linker);
+  report(progress, 0.7, action);
   findShells(surface);
+  report(progress, 1, action);
 }
 
 void RegionMap::labelLeaves(const FloatGrid& grid, Linker& linker) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "levelset/meshing/cell_surface.h"
+#include "levelset/progress.h"
 #include "levelset/vdb.h"
 
 namespace levelset {
@@ -25,7 +26,9 @@ struct RegionShell {
 class RegionMap {
  public:
   /// All space: leaves by their voxels, the rest by its tiles. Nothing is made dense.
-  explicit RegionMap(const openvdb::FloatGrid& grid);
+  /// @param action  for messages
+  explicit RegionMap(const openvdb::FloatGrid& grid, const Progress& progress = {},
+                     const char* action = "regions");
 
   static constexpr std::uint32_t kInfinite = 0;  ///< the outside that reaches infinity
 

@@ -55,8 +55,10 @@ Value read(Invocation& in) {
         file, {.format = in.text("format"), .maxMemory = in.maxMemory, .progress = in.progress}));
   }
   levelset::BandRepairs repairs;
-  const levelset::ReadBandOptions options{
-      .grid = in.text("grid"), .maxMemory = in.maxMemory, .repairs = &repairs};
+  const levelset::ReadBandOptions options{.grid = in.text("grid"),
+                                          .maxMemory = in.maxMemory,
+                                          .repairs = &repairs,
+                                          .progress = in.progress};
   Value value = in.given("grid") ? std::visit([](auto&& grid) { return Value(std::move(grid)); },
                                               levelset::readGrid(file, options))
                                  : Value(levelset::readBand(file, options));
@@ -122,11 +124,14 @@ Value write(Invocation& in) {
   if (value.kind() == Kind::Field) {
     levelset::writeField(file, value.field(),
                          {.name = in.given("name") ? in.text("name") : value.field().name(),
-                          .format = in.text("format")});
+                          .format = in.text("format"),
+                          .progress = in.progress});
   } else if (value.kind() == Kind::Mesh) {
     levelset::writeMesh(file, value.mesh(), {.format = in.text("format"), .progress = in.progress});
   } else {
-    levelset::writeBand(file, value.band(), {.name = in.text("name"), .format = in.text("format")});
+    levelset::writeBand(
+        file, value.band(),
+        {.name = in.text("name"), .format = in.text("format"), .progress = in.progress});
   }
   return value;
 }

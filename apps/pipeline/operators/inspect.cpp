@@ -43,8 +43,9 @@ Param jsonParam() {
 
 Value measure(Invocation& in) {
   const Value& value = in.operands[0];
-  const levelset::Measurement m = value.kind() == Kind::Band ? levelset::measure(value.band())
-                                                             : levelset::measure(value.mesh());
+  const levelset::Measurement m = value.kind() == Kind::Band
+                                      ? levelset::measure(value.band(), in.progress)
+                                      : levelset::measure(value.mesh(), in.progress);
   Json json;
   json["volume"] = m.volume;
   json["area"] = m.area;
@@ -119,7 +120,7 @@ Value compare(Invocation& in) {
 }
 
 Value check(Invocation& in) {
-  const levelset::CheckReport report = levelset::check(in.band());
+  const levelset::CheckReport report = levelset::check(in.band(), in.progress);
   Json json;
   json["passed"] = report.passed();
   json["items"] = Json::array();

@@ -19,9 +19,10 @@ using Imath::V3d;
 using levelset::UsageError;
 
 Value clip(Invocation& in) {
-  if (in.given("box")) return Value(levelset::clip(in.band(), in.box("box")));
+  if (in.given("box")) return Value(levelset::clip(in.band(), in.box("box"), in.progress));
   const std::vector<V3d> plane = in.points("plane");
-  return Value(levelset::clip(in.band(), Imath::Plane3d(plane[0], plane[1].normalized())));
+  return Value(
+      levelset::clip(in.band(), Imath::Plane3d(plane[0], plane[1].normalized()), in.progress));
 }
 
 void validateClip(const Invocation& in) {

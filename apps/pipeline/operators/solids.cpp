@@ -148,12 +148,13 @@ Plan planShell(Invocation& in) {
 }
 
 Value keep(Invocation& in) {
-  return Value(levelset::keepLargest(in.band(), static_cast<std::size_t>(in.integer("largest"))));
+  const auto count = static_cast<std::size_t>(in.integer("largest"));
+  return Value(levelset::keepLargest(in.band(), count, in.progress));
 }
 
 Value fillCavities(Invocation& in) {
-  return Value(in.given("up-to") ? levelset::fillCavities(in.band(), in.number("up-to"))
-                                 : levelset::fillCavities(in.band()));
+  const double most = in.given("up-to") ? in.number("up-to") : 1e300;
+  return Value(levelset::fillCavities(in.band(), most, in.progress));
 }
 
 template <CsgOperation operation>

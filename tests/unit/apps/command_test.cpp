@@ -3,6 +3,13 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "levelset/error.h"
+#include "levelset/files/band_file.h"
+#include "levelset/inspect/check.h"
+#include "levelset/inspect/measure.h"
+#include "levelset/solids/clip.h"
+#include "levelset/solids/components.h"
+#include "levelset/solids/shapes.h"
 #include "tests/support/shell.h"
 
 namespace command_test {
@@ -175,6 +182,36 @@ TEST_F(Command, DryRunRefusesAsTheRunWould) {
     EXPECT_REFUSED(levelsmith(std::string(run) + "sphere --radius 1e300 --voxel 1e299"), 3,
                    "change the unit of length");
   }
+}
+
+TEST_F(Command, TellsTheProgressOfWhateverMayTakeLong) {
+  ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.05 ! write a.vdb").code, 0);
+  const auto outcome = levelsmith(
+      "--progress json read a.vdb ! keep --largest 1 ! fill-cavities ! clip --plane \"0,0,0 "
+      "0,0,1\" ! check ! measure ! write b.vdb ! mesh ! measure");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  for (const char* action : {"read", "keep", "fill-cavities", "clip", "check", "measure", "write"})
+    EXPECT_NE(outcome.err.find("\"steps\": 9, \"action\": \"" + std::string(action) + "\""),
+              std::string::npos)
+        << action << "\n"
+        << outcome.err;
+}
+
+TEST_F(Command, EndsWhereItsProgressIsCancelled) {
+  const levelset::Progress half = [](double fraction) { return fraction < 0.45; };
+  const levelset::NarrowBand ball = levelset::makeSphere(1, Imath::V3d(0), 0.05);
+  levelset::writeBand(folder_ / "a.vdb", ball);
+  EXPECT_THROW((void)levelset::measure(ball, half), levelset::Cancelled);
+  EXPECT_THROW((void)levelset::check(ball, half), levelset::Cancelled);
+  EXPECT_THROW((void)levelset::keepLargest(ball, 1, half), levelset::Cancelled);
+  EXPECT_THROW((void)levelset::fillCavities(ball, 1, half), levelset::Cancelled);
+  EXPECT_THROW((void)levelset::clip(ball, Imath::Box3d(Imath::V3d(0), Imath::V3d(2)), half),
+               levelset::Cancelled);
+  EXPECT_THROW((void)levelset::readBand(folder_ / "a.vdb", {.progress = half}),
+               levelset::Cancelled);
+  EXPECT_THROW(levelset::writeBand(folder_ / "b.vdb", ball, {.progress = half}),
+               levelset::Cancelled);
+  EXPECT_FALSE(exists("b.vdb"));
 }
 
 TEST_F(Command, MapsATextureAsInTheReadme) {
