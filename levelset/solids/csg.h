@@ -20,7 +20,7 @@ struct CsgOptions {
 
 struct CsgResult {
   NarrowBand band;
-  std::vector<std::string> notes;  ///< a sentence for each operand that had to be resampled
+  std::vector<std::string> notes;  ///< for each operand that had to be resampled or cut
 };
 
 /// First op second op third …; Difference subtracts all others from the first.

@@ -259,17 +259,19 @@ TEST(Csg, BringsOperandsToTheFinestGrid) {
   const CsgResult result = combine(CsgOperation::Union, std::array{coarse, fine});
   EXPECT_NEAR(result.band.voxelSize(), 0.05, 1e-12);
   EXPECT_NEAR(result.band.halfWidth(), 3, 1e-4);
-  ASSERT_EQ(result.notes.size(), 1u);
+  ASSERT_EQ(result.notes.size(), 2u);
   EXPECT_EQ(
       result.notes[0],
       "union: operand 1 was resampled from voxels of 0.1 to the grid of operand 2 with voxels of "
       "0.05");
+  EXPECT_EQ(result.notes[1], "union: operand 2 cut to half width 3 voxels");
   const double direct = measure(unite(makeSphere(1, V3d(0.5, 0, 0), 0.05), fine)).volume;
   EXPECT_NEAR(measure(result.band).volume, direct, 1e-3 * direct);
   // Widths alone are cut, not resampled.
   const NarrowBand wide = makeSphere(1, V3d(0), 0.1, {.halfWidth = 5});
   const CsgResult cut = combine(CsgOperation::Union, std::array{wide, coarse});
-  EXPECT_TRUE(cut.notes.empty());
+  EXPECT_EQ(cut.notes, std::vector<std::string>{"union: operand 1 cut to half width 3 voxels"});
+  EXPECT_TRUE(combine(CsgOperation::Union, std::array{coarse, coarse}).notes.empty());
   EXPECT_EQ(cut.band.contentHash(), unite(makeSphere(1, V3d(0), 0.1), coarse).contentHash());
 }
 
