@@ -31,6 +31,12 @@ void printAll(const std::string& text) {
         fmt::format("levelsmith: standard output cannot be written: {}", std::strerror(errno)));
 }
 
+/// On standard error, under the name of the program, which some sentences begin with.
+void tell(const std::string& sentence) {
+  fmt::print(stderr, "{}{}\n",
+             sentence.starts_with("levelsmith: ") ? "" : "levelsmith: ", sentence);
+}
+
 bool claimsStandardOutput(const pipeline::Chain& chain) {
   const auto report = chain.globals.find("report");
   if (report != chain.globals.end() && levelset::isStandardOutput(report->second)) return true;
@@ -97,11 +103,11 @@ int runChain(const pipeline::Chain& chain) {
   };
   settings.warn = [&](const std::string& sentence) {
     line.clear();
-    if (!quiet) fmt::print(stderr, "levelsmith: warning: {}\n", sentence);
+    if (!quiet) tell("warning: " + sentence);
   };
   settings.note = [&](const std::string& sentence) {
     line.clear();
-    if (!quiet) fmt::print(stderr, "levelsmith: {}\n", sentence);
+    if (!quiet) tell(sentence);
   };
   pipeline::RunReport report;
   const auto finish = [&] {
@@ -118,7 +124,7 @@ int runChain(const pipeline::Chain& chain) {
     try {
       finish();
     } catch (const levelset::Error& error) {
-      fmt::print(stderr, "levelsmith: {}\n", error.what());
+      tell(error.what());
     }
     throw;
   }
@@ -149,7 +155,7 @@ int main(int argc, char** argv) {
   try {
     code = levelsmith({argv + 1, argv + argc});
   } catch (const levelset::Error& error) {
-    fmt::print(stderr, "levelsmith: {}\n", error.what());
+    tell(error.what());
     code = static_cast<int>(error.exitCode());
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "levelsmith: memory ran out; use larger voxels or a narrower band\n");

@@ -101,12 +101,14 @@ struct Reader {
 
 const Operator& matchOperator(const std::string& name) {
   if (const Operator* op = findOperator(name)) return *op;
-  std::vector<std::string> names{"help"};
+  std::vector<std::string> names{"help", "run"};
   for (const Operator& op : operators()) names.push_back(op.name);
   if (name == "help") {
     throw UsageError(
         "levelsmith: help stands alone: `levelsmith help` or `levelsmith help ACTION`");
   }
+  if (name == runOperator().name)
+    throw UsageError("run: stands alone, behind global options only: `levelsmith run FILE`");
   const std::string guess = didYouMean(name, names);
   throw UsageError(fmt::format("levelsmith: there is no action '{}'{}", name,
                                guess.empty() ? "; `levelsmith help` lists them"
@@ -243,8 +245,16 @@ class KindChecker {
       remedy = "; put 'level-set' before it";
     if (found == Kind::Band && allowed == std::vector{Kind::Mesh})
       remedy = "; put 'mesh' before it";
-    return fmt::format("{}: operand {} is a {}, a {} is needed{}", op.name, index + 1,
-                       kindName(found), kindName(allowed[0]), remedy);
+    if (found == Kind::Patch) remedy = "; 'texture' makes a level set with it";
+    std::string kinds;
+    for (std::size_t i = 0; i < allowed.size(); ++i)
+      kinds += fmt::format("{}a {}",
+                           i == 0                    ? ""
+                           : i + 1 == allowed.size() ? " or "
+                                                     : ", ",
+                           kindName(allowed[i]));
+    return fmt::format("{}: operand {} is a {}, {} is needed{}", op.name, index + 1,
+                       kindName(found), kinds, remedy);
   }
 
   static Invocation probe(const Action& action, const std::vector<Kind>& kinds) {
@@ -308,7 +318,7 @@ Chain parse(Reader& reader, bool mayRun) {
   Chain chain;
   while (!reader.atEnd() && isOption(tokens[reader.next]))
     reader.readOption(globalParams(), "levelsmith", chain.globals);
-  if (!reader.atEnd() && tokens[reader.next] == "run") {
+  if (!reader.atEnd() && tokens[reader.next] == runOperator().name) {
     if (mayRun) return parseScript(reader, chain);
     throw UsageError("run: a file of actions cannot run another one; put its actions here");
   }

@@ -39,6 +39,14 @@ std::string operandText(const Operator& op) {
   return text;
 }
 
+/// What help knows of: every action, and `run`.
+std::vector<const Operator*> helpTopics() {
+  std::vector<const Operator*> topics;
+  for (const Operator& op : operators()) topics.push_back(&op);
+  topics.push_back(&runOperator());
+  return topics;
+}
+
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -98,10 +106,10 @@ std::string helpOverview() {
       "result, @NAME takes it. Lengths are world units (0.5), voxels (2vx) or a share of the "
       "diagonal (1%).\n";
   std::string group;
-  for (const Operator& op : operators()) {
-    if (op.group != group) text += "\n" + op.group + "\n";
-    group = op.group;
-    text += fmt::format("  {:<14} {}\n", op.name, op.summary);
+  for (const Operator* op : helpTopics()) {
+    if (op->group != group) text += "\n" + op->group + "\n";
+    group = op->group;
+    text += fmt::format("  {:<14} {}\n", op->name, op->summary);
   }
   text +=
       "\nHelp\n  help           this page; `help ACTION`, `help ACTION --json`, `help --search "
@@ -117,8 +125,9 @@ std::string helpOverview() {
 std::string helpPage(const Operator& op) {
   std::string text = fmt::format("levelsmith {}: {}\n", op.name, op.summary);
   if (!op.details.empty()) text += "\n" + op.details + "\n";
-  text += fmt::format("\nOperands: {}{}\n", operandText(op),
-                      op.flow == Flow::PassesThrough ? " (stays on the stack)" : "");
+  text += fmt::format(
+      "\nOperands: {}{}\n", operandText(op),
+      op.flow == Flow::PassesThrough && !op.operands.empty() ? " (stays on the stack)" : "");
   if (!op.params.empty()) {
     text += "\n";
     for (const Param& param : op.params) text += optionLine(param);
@@ -163,15 +172,15 @@ std::string helpJson(const Operator& op) {
 std::string helpSearch(const std::string& word) {
   const std::string wanted = lower(word);
   std::string text;
-  for (const Operator& op : operators()) {
+  for (const Operator* op : helpTopics()) {
     const bool inOperator =
-        lower(op.name + " " + op.summary + " " + op.details).find(wanted) != std::string::npos;
+        lower(op->name + " " + op->summary + " " + op->details).find(wanted) != std::string::npos;
     std::string lines;
-    for (const Param& param : op.params)
+    for (const Param& param : op->params)
       if (lower(param.name + " " + param.doc).find(wanted) != std::string::npos)
         lines += "  " + optionLine(param);
     if (inOperator || !lines.empty())
-      text += fmt::format("  {:<14} {}\n{}", op.name, op.summary, lines);
+      text += fmt::format("  {:<14} {}\n{}", op->name, op->summary, lines);
   }
   return text.empty()
              ? fmt::format("Nothing mentions '{}'; `levelsmith help` lists all actions.\n", word)
@@ -198,16 +207,18 @@ std::string help(const std::vector<std::string>& words) {
   }
   if (!search.empty()) return helpSearch(search);
   if (name.empty() || name == "help") return helpOverview();
-  const Operator* op = findOperator(name);
-  if (!op) {
+  const std::vector<const Operator*> topics = helpTopics();
+  const auto op = std::find_if(topics.begin(), topics.end(),
+                               [&](const Operator* topic) { return topic->name == name; });
+  if (op == topics.end()) {
     std::vector<std::string> names;
-    for (const Operator& each : operators()) names.push_back(each.name);
+    for (const Operator* each : topics) names.push_back(each->name);
     const std::string guess = didYouMean(name, names);
     throw UsageError(fmt::format("help: there is no action '{}'{}", name,
                                  guess.empty() ? "; `levelsmith help` lists them"
                                                : fmt::format("; did you mean '{}'?", guess)));
   }
-  return json ? helpJson(*op) : helpPage(*op);
+  return json ? helpJson(**op) : helpPage(**op);
 }
 
 }  // namespace pipeline

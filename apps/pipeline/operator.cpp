@@ -173,6 +173,25 @@ const Operator* findOperator(const std::string& name) {
   return it == operators().end() ? nullptr : &*it;
 }
 
+const Operator& runOperator() {
+  static const Operator op{
+      .name = "run",
+      .group = "Chains in files",
+      .summary = "run the chain that a text file holds, one action a line",
+      .details =
+          "No '!' between actions; # begins a comment; quotes and backslashes as in a "
+          "shell. Lines of options before the first action are global options; those of the "
+          "command line win. Nothing stands behind the file.",
+      .example = "levelsmith --threads 2 run chain.txt",
+      .params = {{.name = "file",
+                  .type = ParamType::Path,
+                  .doc = "what to run, or -",
+                  .required = true,
+                  .position = 0}},
+      .flow = Flow::PassesThrough};
+  return op;
+}
+
 const std::vector<Param>& globalParams() {
   static const std::vector<Param> params = {
       {.name = "threads",

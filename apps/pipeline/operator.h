@@ -96,6 +96,8 @@ struct Operator {
 [[nodiscard]] const std::vector<Operator>& operators();
 [[nodiscard]] const Operator* findOperator(const std::string& name);
 [[nodiscard]] const std::vector<Param>& globalParams();
+/// `run FILE`, which parseChain() replaces by the actions of the file: for help only.
+[[nodiscard]] const Operator& runOperator();
 
 // Each fills its group; see apps/pipeline/operators/.
 void addFileOperators(std::vector<Operator>& all);

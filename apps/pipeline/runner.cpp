@@ -151,8 +151,8 @@ void runAction(const Action& action, std::size_t index, const RunSettings& setti
   const auto finish = [&] {
     step.notes = invocation.notes;
     if (!invocation.output.empty() && settings.print) settings.print(invocation.output);
-    for (const std::string& text : step.notes.warnings) settings.warn(op.name + ": " + text);
-    for (const std::string& text : step.notes.notes) settings.note(op.name + ": " + text);
+    for (const std::string& text : step.notes.warnings) settings.warn(sentenceOf(op.name, text));
+    for (const std::string& text : step.notes.notes) settings.note(sentenceOf(op.name, text));
   };
   try {
     if (settings.dryRun) {

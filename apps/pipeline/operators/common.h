@@ -2,10 +2,23 @@
 
 // Parameters that several operators share.
 
+#include <fmt/core.h>
+
+#include <string>
+
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operator.h"
+#include "levelset/error.h"
 
 namespace pipeline {
+
+/// The format of the parameter `file`, by --format or the name that tells it.
+inline std::string formatName(const Invocation& in) {
+  if (in.given("format")) return in.text("format");
+  if (in.text("file") != "-") return in.text("file");
+  throw levelset::UsageError(
+      fmt::format("{}: '-' has no extension to tell the format; give --format", in.op().name));
+}
 
 inline Param voxelParam(const char* doc = "edge of a voxel") {
   return {.name = "voxel",

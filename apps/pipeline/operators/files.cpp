@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "apps/pipeline/invocation.h"
+#include "apps/pipeline/operators/common.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
@@ -15,16 +16,6 @@ using levelset::UsageError;
 
 bool isStandardStream(const Invocation& in) {
   return in.text("file") == "-";
-}
-
-/// The format by --format, or the name that tells it.
-std::string formatName(const Invocation& in) {
-  if (in.given("format")) return in.text("format");
-  if (isStandardStream(in)) {
-    throw UsageError(
-        fmt::format("{}: '-' has no extension to tell the format; give --format", in.op().name));
-  }
-  return in.text("file");
 }
 
 Kind fileKind(const Invocation& in) {

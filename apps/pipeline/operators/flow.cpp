@@ -43,10 +43,10 @@ Value curvatureFlow(Invocation& in) {
   in.notes.errors.push_back(
       {"steps in time, rms over the surface", result.errorEstimate, "world units"});
   if (options.tolerance && result.errorEstimate > *options.tolerance)
-    in.notes.warnings.push_back(fmt::format(
-        "curvature-flow: the steps in time leave about {:.3g} world units, more than the "
-        "tolerance, since something shrank to nothing or broke on the way",
-        result.errorEstimate));
+    in.notes.warnings.push_back(
+        fmt::format("the steps in time leave about {:.3g} world units, more than the "
+                    "tolerance, since something shrank to nothing or broke on the way",
+                    result.errorEstimate));
   return Value(std::move(result.band));
 }
 

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/pipeline/invocation.h"
+#include "apps/pipeline/operators/common.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
 #include "levelset/files/mesh_file.h"
@@ -156,6 +157,15 @@ Json countOrNull(std::uint64_t count) {
   return count > 0 ? Json(count) : Json(nullptr);
 }
 
+void validateInfo(const Invocation& in) {
+  if (!in.given("file")) return;
+  const std::string name = formatName(in);
+  if (levelset::isMeshFormat(name) || levelset::isBandFormat(name)) return;
+  throw levelset::UsageError(fmt::format(
+      "info: '{}' is of no known format; it can tell of ply, obj, stl, off (also .gz) and vdb",
+      name));
+}
+
 Json fileInfo(const std::string& file, const std::string& format) {
   Json json;
   json["file"] = file;
@@ -166,11 +176,6 @@ Json fileInfo(const std::string& file, const std::string& format) {
     json["vertices"] = countOrNull(info.vertices);
     json["faces"] = countOrNull(info.faces);
     return json;
-  }
-  if (!levelset::isBandFormat(name)) {
-    throw levelset::UsageError(fmt::format(
-        "info: '{}' is of no known format; it can tell of ply, obj, stl, off (also .gz) and vdb",
-        file));
   }
   json["grids"] = Json::array();
   for (const levelset::GridInfo& grid : levelset::bandFileInfo(file)) {
@@ -311,6 +316,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
       .flow = Flow::PassesThrough,
       .run = info,
       .plan = [](Invocation&) { return Plan{}; },
+      .validate = validateInfo,
       .usesStandardOutput = asksJson,
       .usesStandardInput = [](const Invocation& in) { return in.text("file") == "-"; },
   });

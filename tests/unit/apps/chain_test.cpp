@@ -65,6 +65,7 @@ TEST(Chain, TakesOperandsByName) {
 
 TEST(Chain, RefusesUnknownWords) {
   EXPECT_REFUSAL("spere --radius 1", "did you mean 'sphere'");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! run chain.txt", "run: stands alone");
   EXPECT_REFUSAL("sphere --raduis 1 --voxel 0.1", "did you mean --radius");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 --threads 2", "before the first action");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! offset 1 2", "what is '2' for");
@@ -96,6 +97,9 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! union", "needs 2 operands and finds 1");
   EXPECT_REFUSAL("read a.ply ! offset 1", "put 'level-set' before it");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! level-set --voxel 1", "put 'mesh' before it");
+  EXPECT_REFUSAL(
+      "sphere --radius 1 --voxel 0.1 ! patch --at 0,0,1 --size 1,1 --height 1 ! write p.vdb",
+      "is a patch, a mesh, a level set or a field is needed; 'texture' makes");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 1 --voxel 0.1 --as a",
                  "is taken");
 }
@@ -105,6 +109,8 @@ TEST(Chain, GivesStandardStreamsToOneUserOnly) {
                  "standard output is used already");
   EXPECT_REFUSAL("--report - sphere --radius 1 --voxel 1 ! measure --json", "--report");
   EXPECT_REFUSAL("read - --format ply ! read - --format ply", "standard input is used already");
+  EXPECT_REFUSAL("info -", "info: '-' has no extension to tell the format; give --format");
+  EXPECT_REFUSAL("info a.xyz", "no known format");
   EXPECT_EQ(refusal("sphere --radius 1 --voxel 1 ! measure ! check"), "accepted");
 }
 

@@ -93,6 +93,29 @@ TEST_F(Command, KeepsDataApartFromTextOnStandardOutput) {
   EXPECT_NE(outcome.err.find("ok"), std::string::npos);
 }
 
+TEST_F(Command, NamesWhoSpeaksOnce) {
+  const std::string ball = "sphere --radius 1 --voxel 0.1 ! ";
+  const auto cut = levelsmith("--report r.json sphere --radius 1 --voxel 0.1 --half-width 4 ! " +
+                              ball + "union ! measure");
+  EXPECT_NE(cut.err.find("levelsmith: union: operand 1 cut to half width 3 voxels\n"),
+            std::string::npos)
+      << cut.err;
+  const Json notes = Json::parse(support::slurp(folder_ / "r.json"))["steps"][2]["notes"];
+  EXPECT_EQ(notes[0], "union: operand 1 cut to half width 3 voxels");
+
+  const auto says = [&](const support::Outcome& outcome, const std::string& start) {
+    EXPECT_TRUE(outcome.err.starts_with(start)) << outcome.err;
+  };
+  says(levelsmith(ball + "sphere --radius 1 --center 9,0,0 --voxel 0.1 ! blend --radius 0.3"),
+       "levelsmith: blend: the surfaces do not meet");
+  says(levelsmith("--threads 0 " + ball + "measure"), "levelsmith: --threads: ");
+  says(levelsmith("spere"), "levelsmith: there is no action");
+  says(shell(command() + " " + ball + "measure --json > /dev/full"),
+       "levelsmith: measure: standard output cannot be written");
+  writeFile("empty.ply", "");
+  says(levelsmith("info empty.ply"), "levelsmith: info: 'empty.ply' is empty");
+}
+
 TEST_F(Command, WarnsOfValuesThatNobodyUses) {
   const auto outcome = levelsmith("sphere --radius 1 --voxel 0.1");
   EXPECT_EQ(outcome.code, 0);

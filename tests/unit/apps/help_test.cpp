@@ -49,6 +49,15 @@ TEST_F(Help, ShowsOneActionAsTextAndJson) {
   EXPECT_EQ(json["parameters"][0]["type"], "length");
 }
 
+TEST_F(Help, KnowsRun) {
+  EXPECT_NE(levelsmith("help").out.find("  run "), std::string::npos);
+  const auto page = levelsmith("help run");
+  EXPECT_EQ(page.code, 0) << page.err;
+  EXPECT_NE(page.out.find("one action a line"), std::string::npos) << page.out;
+  EXPECT_EQ(nlohmann::json::parse(levelsmith("help run --json").out)["name"], "run");
+  EXPECT_NE(levelsmith("help --search comment").out.find("run"), std::string::npos);
+}
+
 TEST_F(Help, FindsWordsAndGuesses) {
   EXPECT_NE(levelsmith("help --search winding").out.find("level-set"), std::string::npos);
   EXPECT_REFUSED(levelsmith("help ofset"), 2, "did you mean 'offset'");
