@@ -221,13 +221,15 @@ TEST_F(Refusal, CorruptBandFilesAreThree) {
 
 TEST_F(Refusal, MeshesThatCannotBeUsedAsAskedAreThree) {
   writeFile("triangle.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  EXPECT_REFUSED(levelsmith(toBand("triangle.obj")), 3, "level-set");
+  EXPECT_REFUSED(levelsmith(toBand("triangle.obj")), 3, "the mesh encloses nothing");
   writeFile("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
   EXPECT_REFUSED(levelsmith(toBand("open.obj", "--voxel 0.05 --sign closed")), 3,
                  "edges have one face");
   writeMoebius("moebius.obj");
-  EXPECT_REFUSED(levelsmith(toBand("moebius.obj", "--voxel 0.05 --sign closed")), 3, "level-set");
-  EXPECT_REFUSED(levelsmith(toBand("moebius.obj", "--voxel 0.05 --sign winding")), 3, "level-set");
+  EXPECT_REFUSED(levelsmith(toBand("moebius.obj", "--voxel 0.05 --sign closed")), 3,
+                 "96 edges have one face");
+  EXPECT_REFUSED(levelsmith(toBand("moebius.obj", "--voxel 0.05 --sign winding")), 3,
+                 "inside and outside are a guess at");
   writeTetrahedron("tetra.ply");
   EXPECT_REFUSED(levelsmith(toBand("tetra.ply", "--voxel 5")), 3, "voxel");
   EXPECT_FALSE(exists("out.vdb"));
@@ -241,14 +243,17 @@ TEST_F(Refusal, CoordinatesTooCoarseForTheVoxelAreThree) {
             "property list uchar int vertex_indices\nend_header\n10000000 0 0\n10000004 0 "
             "0\n10000000 4 0\n10000000 0 4\n"
             "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n");
-  EXPECT_REFUSED(levelsmith(toBand("far.ply", "--voxel 0.02")), 3, "level-set");
+  EXPECT_REFUSED(levelsmith(toBand("far.ply", "--voxel 0.02")), 3,
+                 "are 1 apart, coarser than an eighth of the voxel size");
   EXPECT_FALSE(exists("out.vdb"));
 }
 
 TEST_F(Refusal, ResourcesAreFour) {
   writeTetrahedron("tetra.ply");
-  EXPECT_REFUSED(levelsmith(toBand("tetra.ply", "--voxel 1e-9"), 10), 4, "level-set");
-  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 1e-9 ! write out.vdb", 10), 4, "sphere");
+  EXPECT_REFUSED(levelsmith(toBand("tetra.ply", "--voxel 1e-9"), 10), 4,
+                 "level-set: needs about 1.7e+11 GB");
+  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 1e-9 ! write out.vdb", 10), 4,
+                 "sphere: needs about");
   EXPECT_REFUSED(levelsmith("--max-memory 50M sphere --radius 1 --voxel 0.002 ! write out.vdb", 30),
                  4, "emory");
   EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! offset 1e6 ! write out.vdb", 10), 4,
@@ -262,8 +267,33 @@ TEST_F(Refusal, ResourcesAreFour) {
 TEST_F(Refusal, OneVertexFarAwayEndsAtOnce) {
   writeTetrahedron("far.ply", "0 0 1e30");
   const auto outcome = levelsmith(toBand("far.ply"), 10);
-  EXPECT_REFUSED(outcome, 4, "level-set");
+  EXPECT_REFUSED(outcome, 4,
+                 "level-set: vertex 3 at (0, 0, 1e+30) is 2e+31 voxels from the origin");
   EXPECT_FALSE(exists("out.vdb"));
+}
+
+/// What no estimate foresees ends when it is there.
+TEST_F(Refusal, MemoryInUseIsFour) {
+  ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.005 ! write in.vdb").code, 0);
+  EXPECT_REFUSED(levelsmith("--max-memory 110M read in.vdb ! mesh ! write out.ply"), 4,
+                 "memory in use passes --max-memory");
+  expectNothingWritten(1);
+}
+
+TEST_F(Refusal, PermissionsAreSix) {
+  // Root may read and write everything.
+  const std::string drop = getuid() == 0 ? "setpriv --reuid=65534 --clear-groups " : "";
+  const std::string sphere = " sphere --radius 1 --voxel 0.2 ! ";
+  ASSERT_EQ(levelsmith(sphere + "write in.vdb ! mesh ! write in.ply").code, 0);
+  ASSERT_EQ(
+      shell("chmod 755 . && chmod 000 in.ply in.vdb && mkdir locked && chmod 555 locked").code, 0);
+  if (shell(drop + command() + " --version").code != 0) GTEST_SKIP() << "root cannot be dropped";
+  for (const char* chain : {"read in.ply ! measure", "read in.vdb ! measure", "info in.ply"})
+    EXPECT_REFUSED(shell(drop + command() + " " + chain), 6, "Permission denied");
+  EXPECT_REFUSED(shell(drop + command() + sphere + "write locked/out.vdb"), 6, "Permission denied");
+  EXPECT_REFUSED(shell(drop + command() + " --report locked/r.json" + sphere + "measure"), 6,
+                 "--report: 'locked/r.json'");
+  expectNothingWritten(3);
 }
 
 TEST_F(Refusal, FilesAreSix) {
