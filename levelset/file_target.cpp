@@ -274,7 +274,8 @@ bool isStandardOutput(const fs::path& target) {
 bool isSameFile(const fs::path& a, const fs::path& b) {
   if (a == "-" || b == "-") return isStandardOutput(a) && isStandardOutput(b);
   std::error_code error;
-  const fs::path first = fs::weakly_canonical(a, error), second = fs::weakly_canonical(b, error);
+  const fs::path first = fs::weakly_canonical(fs::absolute(a, error), error),
+                 second = fs::weakly_canonical(fs::absolute(b, error), error);
   if (first.empty() || first != second) return false;
   return !fs::exists(first, error) || fs::is_regular_file(first, error);
 }
