@@ -50,8 +50,8 @@ struct TextureResult {
   TextureReport report;
 };
 
-/// Voxel size of a result for which none is asked: the texture's where the map squeezes it below the
-/// base's, else the base's own. @param minStretch  of texture → patch
+/// Voxel size of a result for which none is asked: the texture's where the map squeezes it below
+/// the base's, else the base's own. @param minStretch  of texture → patch
 [[nodiscard]] double resultVoxelSize(double base, double texture, double minStretch);
 
 /// The map of a patch: through its particles to their texture coordinates, λ near for w = 0.

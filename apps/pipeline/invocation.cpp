@@ -121,8 +121,8 @@ std::vector<double> Invocation::lengths(const std::string& name) {
   const std::string all = text(name);
   for (std::size_t begin = 0; begin <= all.size();) {
     const std::size_t end = std::min(all.find(',', begin), all.size());
-    result.push_back(toWorld(name, all.substr(begin, end - begin),
-                             fmt::format("{}[{}]", name, result.size())));
+    result.push_back(
+        toWorld(name, all.substr(begin, end - begin), fmt::format("{}[{}]", name, result.size())));
     begin = end + 1;
   }
   return result;

@@ -21,11 +21,11 @@ enum class Kind { Mesh, Band, Patch, Field };
 /// What is known of a value before it is computed: enough to resolve lengths and estimate cost.
 struct Plan {
   Kind kind = Kind::Band;
-  Imath::Box3d bounds = {};    ///< of the zero set or the vertices, world units
-  double area = 0;             ///< of the surface, world units²
-  double voxelSize = 0;        ///< bands only
-  double halfWidth = 0;        ///< voxels, bands only
-  double fieldBytes = 0;       ///< fields only
+  Imath::Box3d bounds = {};  ///< of the zero set or the vertices, world units
+  double area = 0;           ///< of the surface, world units²
+  double voxelSize = 0;      ///< bands only
+  double halfWidth = 0;      ///< voxels, bands only
+  double fieldBytes = 0;     ///< fields only
   /// Patches only: along u, along v, and the height, 0 where only the texture will tell.
   Imath::V3d patchSize = Imath::V3d(0);
   /// Active voxels that a band of this area takes.

@@ -5,8 +5,8 @@
 
 #include "levelset/fields/field.h"
 
-/// Fields written as formulas in x, y, z (world units) and r = |(x, y, z)|, in t (time), or in all of
-/// them: muParser's grammar (+ − * / ^, comparison, ?:, &&, ||, sin … atan2, exp, ln, sqrt, min,
+/// Fields written as formulas in x, y, z (world units) and r = |(x, y, z)|, in t (time), or in all
+/// of them: muParser's grammar (+ − * / ^, comparison, ?:, &&, ||, sin … atan2, exp, ln, sqrt, min,
 /// max, abs, sign, rint, sum, avg), and `pi`. A formula that reads what has no meaning for it is
 /// refused.
 namespace levelset {

@@ -48,10 +48,10 @@ void checkCounts(const Counts& counts, std::size_t remaining, const std::string&
   if (counts.vertices <= left / kLeastVertex &&
       counts.faces <= (left - counts.vertices * kLeastVertex) / kLeastFace)
     return;
-  failFile(name,
-           fmt::format("promises {} vertices and {} faces, more than its {} bytes of data can hold; "
-                       "it was cut off or its header is damaged: fetch or export it again",
-                       counts.vertices, counts.faces, remaining));
+  failFile(name, fmt::format(
+                     "promises {} vertices and {} faces, more than its {} bytes of data can hold; "
+                     "it was cut off or its header is damaged: fetch or export it again",
+                     counts.vertices, counts.faces, remaining));
 }
 
 class OffReader {

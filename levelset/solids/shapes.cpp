@@ -38,9 +38,8 @@ V3d requireAxis(const V3d& axis, const char* action) {
 void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
                  const char* action) {
   if (!std::isfinite(extent.area)) {
-    throw InvalidInput(
-        fmt::format("{}: the area of the surface is beyond all numbers; change the unit of length",
-                    action));
+    throw InvalidInput(fmt::format(
+        "{}: the area of the surface is beyond all numbers; change the unit of length", action));
   }
   const V3d size = extent.bounds.size();
   const double longest = std::max({size.x, size.y, size.z});

@@ -48,8 +48,8 @@ struct ShapeExtent {
 [[nodiscard]] ShapeExtent capsuleExtent(const Imath::V3d& from, const Imath::V3d& to,
                                         double radius);
 
-
-/// Refuses, as making it would, what can be told from the extent of a shape. @param action  its name
+/// Refuses, as making it would, what can be told from the extent of a shape. @param action  its
+/// name
 void checkShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
                 const char* action);
 

@@ -68,10 +68,10 @@ Plan planLevelSet(Invocation& in) {
   plan.voxelSize = in.voxelSize(longestSide(in.operands[0]));
   plan.halfWidth = in.number("half-width");
   if (plan.voxelSize > longestSide(in.operands[0]))
-    throw levelset::InvalidInput(
-        fmt::format("level-set: the voxel size {:.6g} is larger than the object, whose longest side "
-                    "is {:.6g}; use smaller voxels",
-                    plan.voxelSize, longestSide(in.operands[0])));
+    throw levelset::InvalidInput(fmt::format(
+        "level-set: the voxel size {:.6g} is larger than the object, whose longest side "
+        "is {:.6g}; use smaller voxels",
+        plan.voxelSize, longestSide(in.operands[0])));
   return plan;
 }
 

@@ -53,9 +53,8 @@ void validateDraw(const Invocation& in) {
   if (levelset::isStandardOutput(file) && levelset::isStandardOutput(png))
     throw UsageError("render: two images cannot share standard output; use a file for one");
   if (levelset::isSameFile(file, png))
-    throw UsageError(
-        fmt::format("render: '{}' is named twice, for the image and for --png; name two files",
-                    file));
+    throw UsageError(fmt::format(
+        "render: '{}' is named twice, for the image and for --png; name two files", file));
 }
 
 std::vector<std::string> targetsOf(const Invocation& in) {

@@ -85,8 +85,7 @@ double voxelOf(Invocation& in, const Shape& shape) {
 }
 
 levelset::ShapeOptions optionsOf(const Invocation& in) {
-  return {
-      .halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress};
+  return {.halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress};
 }
 
 template <Describe describe>

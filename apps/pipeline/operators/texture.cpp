@@ -189,11 +189,9 @@ double plannedStretch(const Invocation& in, const Plan& texture, const Plan& pat
 Plan planTexture(Invocation& in) {
   Plan plan = in.operands[0].plan();
   const Plan &texture = in.operands[1].plan(), &patch = in.operands[2].plan();
-  plan.voxelSize =
-      in.given("voxel")
-          ? in.length("voxel")
-          : mapping::resultVoxelSize(plan.voxelSize, texture.voxelSize,
-                                     plannedStretch(in, texture, patch));
+  plan.voxelSize = in.given("voxel") ? in.length("voxel")
+                                     : mapping::resultVoxelSize(plan.voxelSize, texture.voxelSize,
+                                                                plannedStretch(in, texture, patch));
   const double from = texture.bounds.size().length(), to = patch.bounds.size().length();
   const double scale = from > 0 ? to / from : 1;
   plan.area = (in.flag("alone") ? 0 : plan.area) + texture.area * scale * scale;
