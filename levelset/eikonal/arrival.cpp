@@ -6,11 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 
-#include "levelset/eikonal/arrival_blocks.h"
+#include "levelset/eikonal/arrival_start.h"
 #include "levelset/eikonal/arrival_vdb.h"
-#include "levelset/eikonal/distance_transform.h"
 #include "levelset/eikonal/room.h"
 #include "levelset/eikonal/signs.h"
 #include "levelset/error.h"
@@ -27,46 +25,45 @@ using openvdb::Index;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Second-order differences read two grid points back: that far the start is exact, voxels.
-constexpr double kStartWidth = 2;
-// The curvature of the front around a point is too much for differences up to here, voxels.
-constexpr double kStartBall = 8;
 constexpr double kBytesPerGridPoint = 24;
+// A grid point that was inside stays so when its time rounds to nothing, voxels.
+constexpr double kLeastDepth = 1e-7;
+constexpr double kStarted = 0.1;  // share of the work
 
-/// 1 / speed; kFar where nothing passes.
-double slownessOf(double speed) {
-  return speed > 0 && std::isfinite(speed) ? 1 / speed : static_cast<double>(kFar);
+/// At an index position; kFar where nothing passes. Empty at speed 1.
+Slowness slownessOf(const ScalarField& speed, const openvdb::math::Transform& transform) {
+  if (!speed) return {};
+  return [&](const Vec3d& index) {
+    const double here = speed(toImath(transform.indexToWorld(index)));
+    return here > 0 && std::isfinite(here) ? 1 / here : static_cast<double>(kFar);
+  };
 }
 
-/// Time over a short straight way: Simpson's rule on the slowness. kFar when something is in the
-/// way.
-template <typename Slowness>
-float shortTime(const Vec3d& from, const Vec3d& to, const Slowness& slowness) {
-  const double a = slowness(from), b = slowness((from + to) / 2), c = slowness(to);
-  if (!(std::max({a, b, c}) < static_cast<double>(kFar))) return kFar;
-  return static_cast<float>((to - from).length() * (a + 4 * b + c) / 6);
+Slowness scaled(const Slowness& slowness, double unit) {
+  if (!slowness) return {};
+  return [=](const Vec3d& index) {
+    const double here = slowness(index);
+    return here < static_cast<double>(kFar) ? here / unit : static_cast<double>(kFar);
+  };
 }
 
 class Solver {
  public:
+  /// @param slowness  over `unit`, the typical one: so the times of the solver are about voxels
   Solver(const ArrivalRequest& request, const openvdb::math::Transform& transform,
-         const FloatTree* side)
-      : request_(request), transform_(transform), side_(side) {
+         const FloatTree* side, const Slowness& slowness, double unit)
+      : request_(request),
+        transform_(transform),
+        side_(side),
+        voxelTime_(unit * transform.voxelSize()[0]) {
     ArrivalBlocks::Settings settings;
     settings.action = request.action;
-    settings.until = request.until / transform.voxelSize()[0];
-    if (request.options.speed)
-      settings.slowness = [this](const Coord& c) { return slownessAt(c.asVec3d()); };
+    settings.until = request.until / voxelTime_;
+    if (slowness) settings.slowness = [=](const Coord& c) { return slowness(c.asVec3d()); };
     settings.side = side;
     settings.maxMemory = request.options.maxMemory;
-    settings.progress = subProgress(request.options.progress, 0.1, 1);
+    settings.progress = subProgress(request.options.progress, kStarted, 1);
     blocks_ = std::make_unique<ArrivalBlocks>(settings);
-  }
-
-  [[nodiscard]] double slownessAt(const Vec3d& index) const {
-    return request_.options.speed
-               ? slownessOf(request_.options.speed(toImath(transform_.indexToWorld(index))))
-               : 1;
   }
 
   ArrivalGrid run(const std::vector<StartTime>& start) {
@@ -98,7 +95,6 @@ class Solver {
   }
 
   FloatGrid::Ptr makeGrid() const {
-    const double voxelSize = transform_.voxelSize()[0];
     const auto background = static_cast<float>(request_.until);
     const auto tree = std::make_shared<FloatTree>(background);
     if (side_)
@@ -106,7 +102,7 @@ class Solver {
           *side_, [&](const Coord& origin) { return blocks_->holds(origin); }, *tree);
     std::vector<std::unique_ptr<LeafNode>> leaves(blocks_->blocks().size());
     tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
-      leaves[i] = makeLeaf(blocks_->blocks()[i], static_cast<float>(voxelSize), background);
+      leaves[i] = makeLeaf(blocks_->blocks()[i], background);
     });
     for (std::unique_ptr<LeafNode>& leaf : leaves) {
       float tile = 0;
@@ -123,14 +119,15 @@ class Solver {
     return grid;
   }
 
-  static std::unique_ptr<LeafNode> makeLeaf(const ArrivalBlock& block, float voxelSize,
-                                            float background) {
+  [[nodiscard]] std::unique_ptr<LeafNode> makeLeaf(const ArrivalBlock& block,
+                                                   float background) const {
     auto leaf = std::make_unique<LeafNode>(block.origin, background, false);
     for (Index n = 0; n < ArrivalBlock::kSize; ++n) {
       const bool inside = block.inside.isOn(n);
-      const float time = block.time[n] * voxelSize;
+      const auto time = static_cast<float>(static_cast<double>(block.time[n]) * voxelTime_);
+      const auto least = static_cast<float>(kLeastDepth * block.slownessAt(n) * voxelTime_);
       if (block.known.isOn(n) && time < background)
-        leaf->setValueOn(n, inside ? std::min(-time, -1e-7f * voxelSize) : time);
+        leaf->setValueOn(n, inside ? std::min(-time, -least) : time);
       else if (inside)
         leaf->setValueOnly(n, -background);
     }
@@ -140,39 +137,9 @@ class Solver {
   const ArrivalRequest& request_;
   const openvdb::math::Transform& transform_;
   const FloatTree* side_;
+  double voxelTime_;  ///< that the front takes for a voxel at the typical speed
   std::unique_ptr<ArrivalBlocks> blocks_;
 };
-
-/// The grid points beside the surface and their times.
-std::vector<StartTime> surfaceStart(const FloatGrid& field, const ArrivalRequest& request,
-                                    const Solver& solver) {
-  DistanceRequest near;
-  near.action = request.action;
-  near.halfWidth = kStartWidth;
-  near.maxMemory = request.options.maxMemory;
-  near.progress = subProgress(request.options.progress, 0, 0.1);
-  const double inverse = 1 / field.voxelSize()[0];
-  std::vector<StartTime> start;
-  if (!request.options.speed) {
-    const FloatGrid::Ptr distance = distanceTransform(field, near);
-    for (auto it = distance->cbeginValueOn(); it; ++it)
-      start.push_back({it.getCoord(), static_cast<float>(std::abs(*it) * inverse)});
-    return start;
-  }
-  const auto slowness = [&](const Vec3d& p) { return solver.slownessAt(p); };
-  const auto times = std::make_shared<FloatTree>(kFar);
-  std::mutex mutex;
-  near.visitPoints = [&](const LeafNode& leaf, const ClosestPointLeaf& points) {
-    auto part = std::make_unique<LeafNode>(leaf.origin(), kFar, false);
-    for (auto it = leaf.cbeginValueOn(); it; ++it)
-      part->setValueOn(it.pos(), shortTime(points[it.pos()], it.getCoord().asVec3d(), slowness));
-    const std::lock_guard lock(mutex);
-    times->addLeaf(part.release());
-  };
-  const FloatGrid::Ptr distance = distanceTransform(field, near);
-  for (auto it = times->cbeginValueOn(); it; ++it) start.push_back({it.getCoord(), *it});
-  return start;
-}
 
 void checkRoom(const std::vector<StartTime>& start, const FloatGrid& field,
                const ArrivalRequest& request) {
@@ -180,7 +147,7 @@ void checkRoom(const std::vector<StartTime>& start, const FloatGrid& field,
   if (request.options.speed) return;
   Room room;
   for (const StartTime& s : start) room.surface.expand(s.gridPoint);
-  room.area = static_cast<double>(start.size()) / (2 * kStartWidth);
+  room.area = static_cast<double>(start.size()) / 4;  // two voxels to each side
   room.inside = room.outside = request.until / field.voxelSize()[0];
   room.bytesPerGridPoint = kBytesPerGridPoint;
   requireRoom(room, request.options.maxMemory, request.action);
@@ -188,38 +155,51 @@ void checkRoom(const std::vector<StartTime>& start, const FloatGrid& field,
 
 }  // namespace
 
+namespace {
+
+ArrivalStart startOf(const ArrivalRequest& request, const Slowness& slowness) {
+  return {.action = request.action,
+          .slowness = slowness,
+          .maxMemory = request.options.maxMemory,
+          .progress = subProgress(request.options.progress, 0, kStarted)};
+}
+
+/// Index positions. @throws ResourceLimit beyond the range of indices
+std::vector<Vec3d> placesOf(std::span<const Imath::V3d> sources,
+                            const openvdb::math::Transform& transform, const char* action) {
+  std::vector<Vec3d> places;
+  for (const Imath::V3d& source : sources) {
+    places.push_back(transform.worldToIndex(toVdb(source)));
+    for (int i = 0; i < 3; ++i)
+      if (!(std::abs(places.back()[i]) < kIndexLimit))
+        throw ResourceLimit(
+            fmt::format("{}: a point lies {:.4g} voxels from the origin, beyond the range of "
+                        "32-bit indices; use larger voxels",
+                        action, std::abs(places.back()[i])));
+  }
+  return places;
+}
+
+}  // namespace
+
 ArrivalGrid arrivalFromSurface(const FloatGrid& field, const ArrivalRequest& request) {
-  Solver solver(request, field.transform(), &field.tree());
-  const std::vector<StartTime> start = surfaceStart(field, request, solver);
+  const Slowness world = slownessOf(request.options.speed, field.transform());
+  const double unit = world ? typicalSlowness(field, world) : 1;
+  const Slowness slowness = scaled(world, unit);
+  const std::vector<StartTime> start = startAtSurface(field, startOf(request, slowness));
   checkRoom(start, field, request);
-  return solver.run(start);
+  return Solver(request, field.transform(), &field.tree(), slowness, unit).run(start);
 }
 
 ArrivalGrid arrivalFromPoints(std::span<const Imath::V3d> sources,
                               const openvdb::math::Transform& transform,
                               const ArrivalRequest& request) {
-  Solver solver(request, transform, nullptr);
-  std::vector<StartTime> start;
-  const auto slowness = [&](const Vec3d& p) { return solver.slownessAt(p); };
-  const int reach = static_cast<int>(kStartBall) + 1;
-  for (const Imath::V3d& source : sources) {
-    const Vec3d p = transform.worldToIndex(toVdb(source));
-    for (int i = 0; i < 3; ++i)
-      if (!(std::abs(p[i]) < kIndexLimit))
-        throw ResourceLimit(
-            fmt::format("{}: a point lies {:.4g} voxels from the origin, beyond the range of "
-                        "32-bit indices; use larger voxels",
-                        request.action, std::abs(p[i])));
-    const Coord centre = Coord::round(p);
-    for (int x = -reach; x <= reach; ++x)
-      for (int y = -reach; y <= reach; ++y)
-        for (int z = -reach; z <= reach; ++z) {
-          const Coord c = centre.offsetBy(x, y, z);
-          if ((c.asVec3d() - p).length() > kStartBall) continue;
-          start.push_back({c, shortTime(p, c.asVec3d(), slowness)});
-        }
-  }
-  return solver.run(start);
+  const std::vector<Vec3d> places = placesOf(sources, transform, request.action);
+  const Slowness world = slownessOf(request.options.speed, transform);
+  const double unit = world ? typicalSlowness(places, world) : 1;
+  const Slowness slowness = scaled(world, unit);
+  const std::vector<StartTime> start = startAtPoints(places, startOf(request, slowness));
+  return Solver(request, transform, nullptr, slowness, unit).run(start);
 }
 
 }  // namespace eikonal

@@ -43,7 +43,7 @@ struct FrontDistance {
 
 /// When a front that starts on the surface of `solid` at time 0 and moves to both sides comes to
 /// the grid points around it. Negative inside. Within two voxels of the surface the start is the
-/// time along the straight way to the closest point.
+/// time along the straight way to the closest point, as far as the speed on it is much the same.
 /// @param until  the latest time; at speed 1 a distance, world units
 /// @throws UsageError for an order other than 1 or 2, or `until` not positive and finite;
 ///         InvalidInput for an empty solid, or when the speed is nowhere positive on its surface;
@@ -52,7 +52,8 @@ struct FrontDistance {
                                         const ArrivalOptions& options = {});
 
 /// The same from points, on the grid points of `lattice` (its solid does not count). The start is
-/// exact for constant speed within eight voxels of each point.
+/// exact within eight voxels of each point, as far as the speed is about linear all around; where
+/// it is not, the front starts as a ball of about two voxels.
 /// @throws UsageError also when there is no point, or one that is not finite
 [[nodiscard]] ArrivalTimes arrivalTimesFromPoints(const NarrowBand& lattice,
                                                   std::span<const Imath::V3d> sources, double until,

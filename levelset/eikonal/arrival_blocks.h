@@ -16,8 +16,9 @@
 
 namespace levelset::eikonal {
 
-/// Times at the 8³ grid points of a leaf block. All times are divided by the voxel size, so that at
-/// speed 1 they are distances in voxels; they count from the front's start, on either side of it.
+/// Times at the 8³ grid points of a leaf block. All times are divided by what the front takes for a
+/// voxel at a typical speed, so that at that speed they are distances in voxels, whatever it is;
+/// they count from the front's start, on either side of it.
 struct ArrivalBlock {
   using Mask = openvdb::util::NodeMask<3>;
   static constexpr openvdb::Index kSize = 512;
@@ -25,7 +26,7 @@ struct ArrivalBlock {
   openvdb::Coord origin;
   std::uint32_t number = 0;
   std::array<float, kSize> time;
-  /// 1 / speed, kFar where nothing passes; empty: 1 everywhere.
+  /// Of the typical one; kFar where nothing passes; empty: 1 everywhere.
   std::unique_ptr<std::array<float, kSize>> slowness;
   std::array<ArrivalBlock*, 6> neighbours{};  ///< −x, +x, −y, +y, −z, +z, as far as they exist
   Mask inside;                                ///< behind the front's start

@@ -16,12 +16,22 @@ using openvdb::Coord;
 using openvdb::Index;
 using Mask = ArrivalBlock::Mask;
 
-// Improvements below this part of a voxel's time do not count.
+// Improvements below this part of the time that the grid point's own voxel takes do not count.
 constexpr float kImprovement = 1e-5f;
 // Blocks whose news are later than the earliest by more than this wait, voxels: what they would
 // compute now is not final yet.
 constexpr float kWindow = 8;
 constexpr std::size_t kBlocksPerTask = 8;
+
+/// How late the first solution is followed. The second runs a little ahead of it: by as much as it
+/// can reach back, a voxel at the speed there or a twentieth of the time.
+struct SweepLimit {
+  float until = 0;
+  bool ahead = false;
+  [[nodiscard]] float at(double slowness) const {
+    return ahead ? std::max(until + static_cast<float>(slowness), 1.05f * until) : until;
+  }
+};
 
 int parityOf(const Coord& origin) {
   return ((origin.x() >> 3) & 1) * 4 + ((origin.y() >> 3) & 1) * 2 + ((origin.z() >> 3) & 1);
@@ -133,8 +143,8 @@ void tell(Desk& desk, Index n, float time, Index depth) {
 /// Gauss-Seidel sweeps over one block with its neighbours' nearest layers around it.
 class FirstOrderWorker {
  public:
-  FirstOrderWorker(ArrivalBlock& block, Desk& desk, float until)
-      : block_(block), desk_(desk), until_(until) {
+  FirstOrderWorker(ArrivalBlock& block, Desk& desk, const SweepLimit& limit)
+      : block_(block), desk_(desk), limit_(limit) {
     times_.fill(kFar);
     for (int x = 0; x < 8; ++x)
       for (int y = 0; y < 8; ++y)
@@ -155,7 +165,7 @@ class FirstOrderWorker {
       const Index n = it.pos();
       const float time = times_[slot(n)];
       block_.time[n] = time;
-      if (time <= until_) tell(desk_, n, time, 1);
+      if (time <= limit_.at(block_.slownessAt(n))) tell(desk_, n, time, 1);
     }
   }
 
@@ -205,11 +215,11 @@ class FirstOrderWorker {
     if (b > c) std::swap(b, c);
     if (a > b) std::swap(a, b);
     const float here = times_[s];
-    if (!(a < here) || a > until_) return false;
+    if (!(a < here)) return false;
     const Index n = offset(x, y, z);
     if (block_.known.isOn(n)) return false;
     const auto slowness = static_cast<float>(block_.slownessAt(n));
-    if (!(slowness < kFar)) return false;
+    if (!(slowness < kFar) || a > limit_.at(block_.slownessAt(n))) return false;
     // [Zhao05, section 2], relative to the earliest neighbour.
     float u = slowness;
     const float p = b - a, q = c - a;
@@ -222,7 +232,7 @@ class FirstOrderWorker {
             3;
     }
     const float time = a + u;
-    if (!(time < here - kImprovement)) return false;
+    if (!(time < here - kImprovement * slowness)) return false;
     times_[s] = time;
     changed_.setOn(n);
     return true;
@@ -230,7 +240,7 @@ class FirstOrderWorker {
 
   ArrivalBlock& block_;
   Desk& desk_;
-  float until_;
+  SweepLimit limit_;
   std::array<float, 1000> times_;
   Mask changed_;
 };
@@ -239,8 +249,9 @@ class FirstOrderWorker {
 /// solution, so each grid point waits for earlier ones only and the equations have one solution.
 class SecondOrderWorker {
  public:
-  SecondOrderWorker(ArrivalBlock& block, Desk& desk, const std::vector<Desk>& desks, float until)
-      : block_(block), desk_(desk), until_(until) {
+  SecondOrderWorker(ArrivalBlock& block, Desk& desk, const std::vector<Desk>& desks,
+                    const SweepLimit& limit)
+      : block_(block), desk_(desk), limit_(limit) {
     for (std::size_t d = 0; d < 6; ++d)
       if (const ArrivalBlock* other = block.neighbours[d])
         views_[d] = {other, desks[other->number].second->data()};
@@ -258,7 +269,8 @@ class SecondOrderWorker {
       if (!pending_.isOn(n)) continue;
       const auto time = static_cast<float>(solve(n));
       float& stored = (*desk_.second)[n];
-      if (std::abs(time - stored) <= kImprovement) continue;
+      if (std::abs(time - stored) <= kImprovement * static_cast<float>(block_.slownessAt(n)))
+        continue;
       stored = time;
       tell(desk_, n, block_.time[n], 2);
       markReaders(n);
@@ -303,7 +315,7 @@ class SecondOrderWorker {
     std::array<std::uint64_t, ArrivalBlock::kSize> keys;
     std::size_t count = 0;
     for (Index n = 0; n < ArrivalBlock::kSize; ++n)
-      if (!block_.known.isOn(n) && block_.time[n] <= until_)
+      if (!block_.known.isOn(n) && block_.time[n] <= limit_.at(block_.slownessAt(n)))
         keys[count++] = std::uint64_t{std::bit_cast<std::uint32_t>(block_.time[n])} << 16 | n;
     std::sort(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(count));
     desk_.order.emplace(count);
@@ -372,7 +384,7 @@ class SecondOrderWorker {
 
   ArrivalBlock& block_;
   Desk& desk_;
-  float until_;
+  SweepLimit limit_;
   std::array<View, 7> views_;
   Mask pending_;  ///< to be solved in this round
 };
@@ -384,17 +396,16 @@ float earliestUnknown(const ArrivalBlock& block) {
   return earliest;
 }
 
-void solveSecondOrder(ArrivalBlocks& blocks, float until) {
+void solveSecondOrder(ArrivalBlocks& blocks, const SweepLimit& limit) {
   Rounds rounds(blocks);
   rounds.desks.resize(blocks.blocks().size());
   for (ArrivalBlock& block : blocks.blocks()) {
     Desk& desk = rounds.desks[block.number];
     desk.second = std::make_unique<std::array<float, ArrivalBlock::kSize>>(block.time);
-    const float earliest = earliestUnknown(block);
-    if (earliest <= until) desk.earliest = earliest;
+    desk.earliest = earliestUnknown(block);
   }
   rounds.run(false, 0.5, 1, [&](ArrivalBlock& block, Desk& desk) {
-    SecondOrderWorker(block, desk, rounds.desks, until).run();
+    SecondOrderWorker(block, desk, rounds.desks, limit).run();
   });
   for (ArrivalBlock& block : blocks.blocks()) block.time = *rounds.desks[block.number].second;
 }
@@ -402,9 +413,8 @@ void solveSecondOrder(ArrivalBlocks& blocks, float until) {
 }  // namespace
 
 void sweepArrivals(ArrivalBlocks& blocks, int order) {
-  // The second solution runs a little ahead of the first: solve as far as it can reach back.
   const auto until = static_cast<float>(blocks.settings().until);
-  const float reach = order == 2 ? until + std::max(1.0f, 0.05f * until) : until;
+  const SweepLimit limit{until, order == 2};
   {
     Rounds rounds(blocks);
     rounds.desks.resize(blocks.blocks().size());
@@ -417,10 +427,10 @@ void sweepArrivals(ArrivalBlocks& blocks, int order) {
       }
     rounds.deliverStart();
     rounds.run(true, 0, order == 2 ? 0.5 : 1, [&](ArrivalBlock& block, Desk& desk) {
-      FirstOrderWorker(block, desk, reach).run();
+      FirstOrderWorker(block, desk, limit).run();
     });
   }
-  if (order == 2) solveSecondOrder(blocks, reach);
+  if (order == 2) solveSecondOrder(blocks, limit);
   for (ArrivalBlock& block : blocks.blocks())
     for (Index n = 0; n < ArrivalBlock::kSize; ++n) {
       if (block.time[n] <= until)

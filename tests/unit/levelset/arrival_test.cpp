@@ -207,6 +207,92 @@ TEST(Arrival, GoesAroundWhatItCannotPass) {
     }
 }
 
+TEST(Arrival, StopsAtAWallBesideItsSource) {
+  const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
+  // Walls that three places on a straight way of eight voxels miss; the last one slants.
+  const std::pair<V3d, Shape> cases[] = {
+      {V3d(0), [](const V3d& p) { return p.x - 4; }},
+      {V3d(0.3, 0.2, -0.4), [](const V3d& p) { return p.x - 3; }},
+      {V3d(0), [](const V3d& p) { return (p.x + p.y + p.z) / 3 - 1.7; }}};
+  for (const auto& [source, plane] : cases)
+    for (const FrontMethod method : kMethods)
+      for (const int order : {1, 2}) {
+        ArrivalOptions o = options(method, order);
+        o.speed = [&plane = plane](const V3d& p) { return std::abs(plane(p)) < 0.4 ? 0.0 : 1.0; };
+        const V3d sources[] = {source};
+        const ArrivalTimes times = arrivalTimesFromPoints(lattice, sources, 12, o);
+        EXPECT_GT(times.figures.reached, 1000u);
+        for (auto it = grid(times).cbeginValueOn(); it; ++it)
+          ASSERT_LT(plane(toImath(it.getCoord().asVec3d())), 0) << it.getCoord();
+      }
+}
+
+TEST(Arrival, IsSlowedAndSpedByWhatIsBesideItsSource) {
+  const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
+  const V3d sources[] = {V3d(0)};
+  for (const FrontMethod method : kMethods) {
+    ArrivalOptions o = options(method, 2);
+    // A wall of one grid point's width, a hundred times slower.
+    o.speed = [](const V3d& p) { return std::abs(p.x - 4) < 0.4 ? 0.01 : 1.0; };
+    const ArrivalTimes slowed = arrivalTimesFromPoints(lattice, sources, 150, o);
+    EXPECT_NEAR(grid(slowed).tree().getValue(openvdb::Coord(3, 0, 0)), 3, 0.1);
+    EXPECT_NEAR(grid(slowed).tree().getValue(openvdb::Coord(6, 0, 0)), 105, 10);
+    // A lane that makes the way round faster than the straight one.
+    o.speed = [](const V3d& p) { return std::abs(p.y - 3) < 0.6 ? 50.0 : 1.0; };
+    const ArrivalTimes sped = arrivalTimesFromPoints(lattice, sources, 12, o);
+    EXPECT_LT(grid(sped).tree().getValue(openvdb::Coord(7, 2, 0)), 4.5f);
+    EXPECT_NEAR(grid(sped).tree().getValue(openvdb::Coord(0, -6, 0)), 6, 0.3);
+  }
+}
+
+TEST(Arrival, ErrsAlikeAtAnySpeed) {
+  const NarrowBand ball = sample(sphere(12), 13);
+  for (const FrontMethod method : kMethods)
+    for (const int order : {1, 2}) {
+      Errors expected;
+      for (const double speed : {1.0, 1e-6, 1e3, 1e6, 1e9}) {
+        ArrivalOptions o = options(method, order);
+        o.speed = [=](const V3d&) { return speed; };
+        const Shape exact = [=](const V3d& p) { return sphere(12)(p) / speed; };
+        Errors e = errors(grid(arrivalTimes(ball, 6 / speed, o)), exact, 0, 5.9 / speed);
+        e.inside *= speed;
+        e.outside *= speed;
+        if (speed == 1) expected = e;
+        EXPECT_NEAR(e.inside, expected.inside, 0.01 * expected.inside) << speed << ", " << order;
+        EXPECT_NEAR(e.outside, expected.outside, 0.01 * expected.outside) << speed << ", " << order;
+        EXPECT_EQ(e.count, expected.count) << speed;
+      }
+    }
+}
+
+TEST(Arrival, SolvesLittleFurtherThanAsked) {
+  const NarrowBand ball = sample(sphere(12), 13);
+  ArrivalOptions o = options(FrontMethod::Sweeping, 2);
+  // A voxel's time at speed 1 would be a hundred voxels here, 270 MB of blocks.
+  o.speed = [](const V3d&) { return 100.0; };
+  o.maxMemory = 40 << 20;
+  EXPECT_GT(arrivalTimes(ball, 0.06, o).figures.reached, 10000u);
+}
+
+TEST(Arrival, TakesManySourcesInLittleRoom) {
+  const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
+  std::vector<V3d> sources;
+  for (int i = 0; i < 3000; ++i) sources.emplace_back(i % 50 * 0.2, i / 50 * 0.1, 0.3);
+  ArrivalOptions o = options(FrontMethod::Sweeping, 2);
+  o.maxMemory = 20 << 20;  // in a row of their own, their starts would take 100 MB
+  int early = 0;
+  o.progress = [&](double fraction) {
+    early += fraction < 0.1;
+    return true;
+  };
+  EXPECT_GT(arrivalTimesFromPoints(lattice, sources, 9, o).figures.reached, 1000u);
+  EXPECT_GT(early, 10);
+  for (V3d& p : sources) p *= 100;
+  EXPECT_THROW((void)arrivalTimesFromPoints(lattice, sources, 9, o), ResourceLimit);
+  o.progress = [](double fraction) { return fraction > 0.1; };
+  EXPECT_THROW((void)arrivalTimesFromPoints(lattice, sources, 9, o), Cancelled);
+}
+
 TEST(Arrival, StartsAtTheSurfaceAtItsOwnSpeed) {
   // Speed constant on spheres: T = ∫ dr / F(r).
   const auto speed = [](const V3d& p) { return 0.5 + 0.05 * (p - kCentre).length(); };
