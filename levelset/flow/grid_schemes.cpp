@@ -25,6 +25,9 @@ using LeafNode = FloatTree::LeafNodeType;
 
 // Semi-Lagrangian: a step moves nothing further than this many voxels, and strains no more.
 constexpr double kFarthestFoot = 4, kFootStrain = 0.5;
+// The band that it works in, voxels: all that is interpolated for the values beside the zero set
+// and for the distances made of them is a distance, not the background.
+constexpr double kFootWidth = 5;
 // Upwind: share of what the CFL condition allows, and how far the surface may move before its
 // distance is made again, in voxels; the working band must hold that and the stencils beyond it.
 constexpr double kCfl = 0.5, kUpwindTravel = 1.5, kUpwindWidth = 6;
@@ -167,8 +170,9 @@ FloatGrid::Ptr upwindStep(const FloatGrid& start, const Journey& journey, double
 }  // namespace
 
 std::size_t carryBySemiLagrange(NarrowBand& band, const Journey& journey) {
-  const double halfWidth = band.halfWidth();
-  FloatGrid::Ptr grid = vdb(band).deepCopy();
+  const double halfWidth = band.halfWidth(), width = std::max(halfWidth, kFootWidth);
+  FloatGrid::Ptr grid =
+      width > halfWidth ? distanceOf(vdb(band), width, journey) : vdb(band).deepCopy();
   const auto longest = [&](double time) {
     return longestStep(*grid, [&](const V3d& p) {
       const V3d speed = journey.velocity(p, time);
@@ -183,9 +187,9 @@ std::size_t carryBySemiLagrange(NarrowBand& band, const Journey& journey) {
     });
   };
   const std::size_t steps = walk(journey, longest, [&](double from, double to) {
-    grid = distanceOf(*semiLagrangeStep(*grid, journey, from, to), halfWidth, journey);
+    grid = distanceOf(*semiLagrangeStep(*grid, journey, from, to), width, journey);
   });
-  if (steps > 0) band = makeBand(grid);
+  if (steps > 0) band = makeBand(width > halfWidth ? distanceOf(*grid, halfWidth, journey) : grid);
   return steps;
 }
 

@@ -8,13 +8,14 @@
 namespace levelset::flow {
 
 /// φ at the feet of backward characteristics (classical Runge-Kutta), interpolated tricubically;
-/// a signed distance again after each step.
+/// a signed distance again after each step. Works in a band of five voxels, or the solid's own if
+/// that is wider.
 /// @return the number of steps
 std::size_t carryBySemiLagrange(NarrowBand& band, const Journey& journey);
 
-/// OpenVDB's HJ-WENO5 with TVD-RK3; its own normalisation after each step, our re-distancing at the
-/// end.
-/// @return the number of steps, as its CFL condition makes them
+/// HJ-WENO5 with TVD-RK3, a signed distance again whenever the surface has moved a voxel and a
+/// half.
+/// @return the number of steps, as the CFL condition makes them
 std::size_t carryUpwind(NarrowBand& band, const Journey& journey);
 
 }  // namespace levelset::flow

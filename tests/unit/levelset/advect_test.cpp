@@ -277,6 +277,19 @@ TEST(Advect, GridSchemesCarryASphereRound) {
   }
 }
 
+TEST(Advect, GridSchemesKeepTheVolumeOfNarrowBands) {
+  const VectorField spin = levelset::rotationVelocity(V3d(0), V3d(0, 0, 1));
+  for (const double halfWidth : {1.0, 1.5, 3.0}) {
+    const NarrowBand ball =
+        levelset::makeSphere(0.4, V3d(0.6, 0, 0), 0.08, {.halfWidth = halfWidth});
+    for (const AdvectScheme scheme : {AdvectScheme::SemiLagrangian, AdvectScheme::Upwind}) {
+      const AdvectResult result = levelset::advect(ball, spin, 1, {.scheme = scheme});
+      EXPECT_LT(std::abs(volumeChange(result)), 0.01) << halfWidth;
+      EXPECT_NEAR(result.band.halfWidth(), halfWidth, 1e-6);
+    }
+  }
+}
+
 TEST(Advect, AnswersOnTurnedGrids) {
   NarrowBand ball = levelset::makeSphere(1, V3d(0), 0.1);
   Imath::M44d place;
