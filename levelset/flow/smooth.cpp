@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 
 #include "levelset/eikonal/distance_transform.h"
 #include "levelset/error.h"
@@ -25,6 +26,9 @@ constexpr double kStencil = 3;
 // Beyond this many σ the tails of both sides of the surface balance: the band may end there.
 constexpr double kKnownReach = 3;
 constexpr double kFieldsAlive = 5;
+// Values that a median may read in all: some thousand CPU seconds.
+constexpr double kMostReadings = 1e12;
+constexpr double kWidened = 0.3, kFiltered = 0.7;  // shares of the work
 
 /// Weights of a symmetric filter along a line, the middle one first.
 std::vector<float> gaussianWeights(double sigma) {
@@ -59,21 +63,50 @@ std::vector<float> boxWeights(double sigma) {
   return result;
 }
 
+/// Steps within a dense cube of `side` grid points to those within `radius` of its centre.
+std::vector<std::ptrdiff_t> stepsWithin(double radius, int pad, std::ptrdiff_t side) {
+  const double squared = std::max(1.0, radius * radius);
+  std::vector<std::ptrdiff_t> steps;
+  for (int x = -pad; x <= pad; ++x)
+    for (int y = -pad; y <= pad; ++y)
+      for (int z = -pad; z <= pad; ++z)
+        if (static_cast<double>(x) * x + static_cast<double>(y) * y + static_cast<double>(z) * z <=
+            squared)
+          steps.push_back((x * side + y) * side + z);
+  return steps;
+}
+
+int medianPad(double radius) {
+  return std::max(1, static_cast<int>(std::floor(radius)));
+}
+
+/// Refuses a median that nobody would wait for.
+void requireMedian(const openvdb::FloatGrid& grid, double radius) {
+  const double around = 4.0 / 3 * M_PI * std::pow(std::max(1.0, radius), 3);
+  const double readings = static_cast<double>(grid.activeVoxelCount()) * around;
+  if (readings <= kMostReadings) return;
+  throw ResourceLimit(
+      fmt::format("{}: a median within {:.4g} voxels reads {:.3g} values, and {:.3g} are the most; "
+                  "use a smaller sigma, larger voxels or --kind gaussian",
+                  kSmooth, radius, readings, kMostReadings));
+}
+
 /// Filters fields on the blocks of a band.
 class BlockFilter {
  public:
-  BlockFilter(const openvdb::FloatGrid& grid, std::function<void()> pulse)
+  /// @param passes  over all blocks, for the progress
+  BlockFilter(const openvdb::FloatGrid& grid, double passes, Progress progress)
       : tree_(grid.tree()),
         blocks_(grid.tree()),
         far_(static_cast<float>(static_cast<double>(grid.background()) / grid.voxelSize()[0])),
-        pulse_(std::move(pulse)) {}
+        work_(passes * static_cast<double>(blocks_.size())),
+        progress_(std::move(progress)) {}
 
   [[nodiscard]] const BandBlocks& blocks() const { return blocks_; }
 
   [[nodiscard]] Field convolve(const Field& field, const std::vector<float>& weights) const {
     Field a = field, b(blocks_.size());
     for (int axis = 0; axis < 3; ++axis) {
-      pulse_();
       alongAxis(a, axis, weights, b);
       std::swap(a, b);
     }
@@ -81,22 +114,25 @@ class BlockFilter {
   }
 
   [[nodiscard]] Field median(const Field& field, double radius) const {
-    pulse_();
-    const int r = std::max(1, static_cast<int>(std::floor(radius)));
-    const double squared = std::max(1.0, radius * radius);
+    struct Scratch {
+      std::vector<float> dense, values;
+    };
+    const int pad = medianPad(radius);
+    const std::ptrdiff_t side = 8 + 2 * pad;
+    const std::vector<std::ptrdiff_t> steps = stepsWithin(radius, pad, side);
     Field result(blocks_.size());
-    blocks_.forEach<std::vector<float>>([&](std::size_t i, std::vector<float>& values) {
+    forEachBlock<Scratch>([&](std::size_t i, Scratch& scratch) {
+      gatherWide(field, i, pad, scratch.dense);
+      scratch.values.resize(steps.size());
       result[i] = field[i];
       for (auto it = blocks_.active(i).beginOn(); it; ++it) {
-        const Coord c = blocks_.origin(i) + BandBlocks::LeafNode::offsetToLocalCoord(it.pos());
-        values.clear();
-        for (int x = -r; x <= r; ++x)
-          for (int y = -r; y <= r; ++y)
-            for (int z = -r; z <= r; ++z)
-              if (x * x + y * y + z * z <= squared)
-                values.push_back(at(field, c.offsetBy(x, y, z)));
-        const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-        std::nth_element(values.begin(), middle, values.end());
+        const Coord c = BandBlocks::LeafNode::offsetToLocalCoord(it.pos()).offsetBy(pad);
+        const float* centre = scratch.dense.data() + (c.x() * side + c.y()) * side + c.z();
+        std::transform(steps.begin(), steps.end(), scratch.values.begin(),
+                       [centre](std::ptrdiff_t step) { return centre[step]; });
+        const auto middle =
+            scratch.values.begin() + static_cast<std::ptrdiff_t>(scratch.values.size() / 2);
+        std::nth_element(scratch.values.begin(), middle, scratch.values.end());
         result[i][it.pos()] = *middle;
       }
     });
@@ -108,16 +144,51 @@ class BlockFilter {
     return tree_.getValue(c) < 0 ? -far_ : far_;
   }
 
-  [[nodiscard]] float at(const Field& field, const Coord& c) const {
-    const std::uint32_t n = blocks_.find(c);
-    return n == BandBlocks::kNone ? farValue(c) : field[n / 512][n % 512];
+  /// Calls work(i, scratch) for each block, in parallel, and tells of each.
+  template <typename Scratch, typename Work>
+  void forEachBlock(const Work& work) const {
+    blocks_.forEach<Scratch>([&](std::size_t i, Scratch& scratch) {
+      work(i, scratch);
+      const std::lock_guard lock(mutex_);
+      report(progress_, std::min(1.0, ++done_ / work_), kSmooth);
+    });
+  }
+
+  /// Values of a block and of `pad` grid points on each side of it, rows along z.
+  void gatherWide(const Field& field, std::size_t i, int pad, std::vector<float>& dense) const {
+    const int side = 8 + 2 * pad, chain = (pad + 7) / 8;
+    dense.resize(static_cast<std::size_t>(side) * static_cast<std::size_t>(side) *
+                 static_cast<std::size_t>(side));
+    // First and last but one of the block `k` blocks away, counted from the first block's own.
+    const auto from = [&](int k) { return std::max(8 * k, -pad); };
+    const auto to = [&](int k) { return std::min(8 * k + 8, 8 + pad); };
+    for (int bx = -chain; bx <= chain; ++bx)
+      for (int by = -chain; by <= chain; ++by)
+        for (int bz = -chain; bz <= chain; ++bz) {
+          const Coord origin = blocks_.origin(i).offsetBy(8 * bx, 8 * by, 8 * bz);
+          const std::uint32_t n = blocks_.find(origin);
+          const float* source = n == BandBlocks::kNone ? nullptr : field[n / 512].data();
+          const float constant = source ? 0 : farValue(origin);
+          const std::ptrdiff_t count = to(bz) - from(bz);
+          for (int x = from(bx); x < to(bx); ++x)
+            for (int y = from(by); y < to(by); ++y) {
+              float* target = dense.data() +
+                              (static_cast<std::ptrdiff_t>(x + pad) * side + y + pad) * side +
+                              from(bz) + pad;
+              if (source)
+                std::copy_n(source + ((x & 7) << 6) + ((y & 7) << 3) + (from(bz) & 7), count,
+                            target);
+              else
+                std::fill_n(target, count, constant);
+            }
+        }
   }
 
   /// The blocks in a line, then each of the 64 lines through the one in the middle.
   void alongAxis(const Field& in, int axis, const std::vector<float>& weights, Field& out) const {
     const int reach = static_cast<int>(weights.size()) - 1, chain = (reach + 7) / 8;
     const std::size_t stride = axis == 0 ? 64 : axis == 1 ? 8 : 1;
-    blocks_.forEach<std::vector<float>>([&](std::size_t i, std::vector<float>& lines) {
+    forEachBlock<std::vector<float>>([&](std::size_t i, std::vector<float>& lines) {
       lines.resize(static_cast<std::size_t>(8 * (2 * chain + 1)) * 64);
       for (int k = -chain; k <= chain; ++k) {
         Coord origin = blocks_.origin(i);
@@ -154,7 +225,10 @@ class BlockFilter {
   const openvdb::FloatTree& tree_;
   BandBlocks blocks_;
   float far_;
-  std::function<void()> pulse_;
+  double work_;  ///< blocks, each as often as it is filtered
+  mutable double done_ = 0;
+  mutable std::mutex mutex_;
+  Progress progress_;
 };
 
 Field filtered(const BlockFilter& filter, const Field& field, SmoothKind kind, double sigma) {
@@ -209,7 +283,7 @@ NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothO
   openvdb::FloatGrid::Ptr field;
   if (known > solid.halfWidth() * 1.0001) {
     request.halfWidth = known + kStencil;
-    request.progress = subProgress(options.progress, 0, 0.4);
+    request.progress = subProgress(options.progress, 0, kWidened);
     field = eikonal::distanceTransform(vdb(solid), request);
   } else {
     field = vdb(solid).deepCopy();
@@ -218,7 +292,9 @@ NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothO
   // === Filter
   requireMemory(static_cast<double>(field->tree().leafCount()) * sizeof(Values) * kFieldsAlive,
                 options.maxMemory, kSmooth);
-  const BlockFilter filter(*field, [&] { report(options.progress, 0.4, kSmooth); });
+  if (kind == SmoothKind::Median) requireMedian(*field, width);
+  const BlockFilter filter(*field, kind == SmoothKind::Median ? 1 : 3 * passes,
+                           subProgress(options.progress, kWidened, kFiltered));
   const Field before = filter.blocks().read(field->tree(), voxel);
   Field after = filtered(filter, before, kind, width);
   if (options.mask) applyMask(*options.mask, *field, filter.blocks(), before, after);
@@ -231,7 +307,7 @@ NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothO
 
   // === Distances again
   request.halfWidth = solid.halfWidth();
-  request.progress = subProgress(options.progress, 0.5, 1);
+  request.progress = subProgress(options.progress, kFiltered, 1);
   return makeBand(eikonal::distanceTransform(*field, request));
 }
 

@@ -24,7 +24,8 @@ struct SmoothOptions {
 /// Smooths the surface: filters φ and makes distances of the result.
 /// @param sigma  world units
 /// @throws UsageError unless `sigma` is positive and finite; InvalidInput if `solid` is empty or
-/// nothing is left of it; ResourceLimit; Cancelled
+/// nothing is left of it; ResourceLimit, also for a median over more than 1e12 values in all;
+/// Cancelled
 [[nodiscard]] NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma,
                                 const SmoothOptions& options = {});
 

@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "levelset/eikonal/redistance.h"
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/interpolate_vdb.h"
@@ -77,6 +78,48 @@ TEST(Smooth, MedianDropsASpeck) {
   const NarrowBand cleaned = smooth(speckled, SmoothKind::Median, 2);
   EXPECT_EQ(measure(cleaned).components, 1u);
   EXPECT_NEAR(radiusOf(cleaned), 10, 0.2);
+}
+
+/// By definition: the median of the exact distances around each grid point.
+TEST(Smooth, MedianIsTheMedian) {
+  const double sigma = 9.3;  // across more blocks than the next
+  const NarrowBand solid = makeBox(V3d(30, 22, 26), kCentre, 1);
+  const NarrowBand wide = redistance(solid, {.halfWidth = sigma + 4});
+  const NarrowBand smoothed = smooth(solid, SmoothKind::Median, sigma);
+  auto read = vdb(wide).getConstAccessor(), result = vdb(smoothed).getConstAccessor();
+  for (const openvdb::Coord c :
+       {openvdb::Coord(15, 11, 0), {14, 10, 12}, {13, 9, 11}, {-13, 9, -12}, {0, 11, 13}}) {
+    std::vector<float> values;
+    for (int x = -9; x <= 9; ++x)
+      for (int y = -9; y <= 9; ++y)
+        for (int z = -9; z <= 9; ++z)
+          if (x * x + y * y + z * z <= sigma * sigma)
+            values.push_back(read.getValue(c.offsetBy(x, y, z)));
+    std::sort(values.begin(), values.end());
+    const float median = values[values.size() / 2];
+    EXPECT_EQ(result.getValue(c) < 0, median < 0) << c;
+  }
+}
+
+TEST(Smooth, TellsOfEachBlock) {
+  for (const SmoothKind kind : {SmoothKind::Median, SmoothKind::Mean, SmoothKind::Taubin}) {
+    int during = 0;
+    double last = 0;
+    const auto count = [&](double fraction) {
+      EXPECT_GE(fraction, last);
+      last = fraction;
+      during += fraction > 0.31 && fraction < 0.69;
+      return true;
+    };
+    (void)smooth(ball(12), kind, 2, {.progress = count});
+    EXPECT_GT(during, 20);
+    const auto cancel = [](double fraction) { return fraction < 0.5; };
+    EXPECT_THROW((void)smooth(ball(12), kind, 2, {.progress = cancel}), Cancelled);
+  }
+}
+
+TEST(Smooth, RefusesAMedianWithoutEnd) {
+  EXPECT_THROW((void)smooth(ball(6), SmoothKind::Median, 63), ResourceLimit);
 }
 
 TEST(Smooth, LeavesWhatTheMaskLeaves) {
