@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
 
 #include "levelset/eikonal/distance_transform.h"
 #include "levelset/eikonal/interpolant.h"
+#include "levelset/memory_limit.h"
 #include "levelset/solids/csg_vdb.h"
 #include "levelset/solids/seam_curve.h"
 
@@ -44,6 +44,7 @@ struct Ball {
 /// Lengths in voxels.
 struct FilletSize {
   double radius, reach;
+  double bound = HUGE_VAL;  ///< nothing that the ball touches is further from the seam
 
   /// Of the ball that fits where the normals have that cosine: the middle of its arc is
   /// r (1 / sin(θ/2) − 1) from the seam.
@@ -54,9 +55,18 @@ struct FilletSize {
   /// How far from the seam the surface changes: r / tan(θ/2), largest where the reach binds first.
   [[nodiscard]] double extent() const {
     const double sine = radius / (reach + radius);
-    return radius * std::sqrt(1 - sine * sine) / sine;
+    return std::min(bound, radius * std::sqrt(1 - sine * sine) / sine);
   }
 };
+
+/// How far from the seam both solids are within reach of one ball: the seam lies in both their
+/// boxes, and so does, up to the ball, what it touches. Voxels.
+double boundOf(const FloatGrid& a, const FloatGrid& b, const FilletSize& size, double halfWidth) {
+  openvdb::CoordBBox common = a.evalActiveVoxelBoundingBox();
+  common.intersect(b.evalActiveVoxelBoundingBox());
+  const double margin = 2 * size.radius + halfWidth + kStencil + 1;
+  return (common.extents().asVec3d() + Vec3d(2 * margin)).length();
+}
 
 /// Distances in voxels, positive where the ball rolls.
 FloatGrid::Ptr widened(const NarrowBand& solid, float sign, const eikonal::PointTree& curve,
@@ -66,6 +76,7 @@ FloatGrid::Ptr widened(const NarrowBand& solid, float sign, const eikonal::Point
   request.action = "blend";
   request.halfWidth = 2 * size.radius + halfWidth + kStencil + 1;
   request.maxMemory = options.maxMemory;
+  request.progress = options.progress;
   part = eikonal::distanceTransform(*part, request);
   if (sign > 0) return part;
   for (auto it = part->beginValueAll(); it; ++it) it.setValue(-*it);
@@ -143,28 +154,33 @@ class BallRoller {
   const eikonal::PointTree& curve_;
 };
 
-/// Leaf blocks that come within `extent` of the curve, in order.
-std::vector<Coord> blocksBeside(const std::vector<Vec3d>& curve, const eikonal::PointTree& tree,
-                                double extent) {
-  std::set<Coord> homes, found;
-  for (const Vec3d& p : curve) homes.insert(eikonal::leafOrigin(p));
-  const int steps = static_cast<int>(std::ceil(extent / 8)) * 8;
-  for (const Coord& home : homes)
-    for (int x = -steps; x <= steps; x += 8)
-      for (int y = -steps; y <= steps; y += 8)
-        for (int z = -steps; z <= steps; z += 8) {
-          const Coord origin = home.offsetBy(x, y, z);
-          const Vec3d centre = origin.asVec3d() + Vec3d(3.5);
-          if (found.count(origin)) continue;
-          if (tree.nearest(centre, extent + 6.1) != eikonal::PointTree::kNone) found.insert(origin);
-        }
-  return {found.begin(), found.end()};
+/// Leaf blocks that come within `extent` of the curve and in which both distances are known, in
+/// order: where one is not, no ball touches both.
+std::vector<Coord> blocksBeside(const FloatTree& a, const FloatTree& b,
+                                const eikonal::PointTree& curve, double extent) {
+  std::vector<Coord> both;
+  for (auto leaf = a.cbeginLeaf(); leaf; ++leaf)
+    if (!leaf->isEmpty() && b.probeConstLeaf(leaf->origin())) both.push_back(leaf->origin());
+  std::vector<char> isNear(both.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, both.size(), 64), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      const Vec3d centre = both[i].asVec3d() + Vec3d(3.5);
+      isNear[i] = curve.nearest(centre, extent + 6.1) != eikonal::PointTree::kNone;
+    }
+  });
+  std::vector<Coord> found;
+  for (std::size_t i = 0; i < both.size(); ++i)
+    if (isNear[i]) found.push_back(both[i]);
+  std::sort(found.begin(), found.end());
+  return found;
 }
 
 struct FilletBlock {
   Coord origin;
   std::vector<std::pair<openvdb::Index, float>> values;  ///< voxels, with the result's sign
 };
+// With all its values, as a vector grows, and the leaf that they go to.
+constexpr double kBytesPerBlock = sizeof(FilletBlock) + 2 * 512 * 8 + 2300;
 
 void putFillet(const std::vector<FilletBlock>& blocks, FloatGrid& solid) {
   const float background = solid.background();
@@ -194,7 +210,8 @@ void addFillet(CsgOperation operation, const SeamOperands& operands, double radi
     return;
   }
   const double voxelSize = result.band.voxelSize(), halfWidth = result.band.halfWidth();
-  const FilletSize size{radius / voxelSize, options.reach.value_or(2 * radius) / voxelSize};
+  FilletSize size{radius / voxelSize, options.reach.value_or(2 * radius) / voxelSize};
+  size.bound = boundOf(vdb(operands.a), vdb(operands.b), size, halfWidth);
   const std::vector<Vec3d> curve = seamCurve(vdb(operands.a).tree(), vdb(operands.b).tree());
   if (curve.empty()) {
     result.notes.emplace_back("blend: the surfaces do not meet, so there is no crease to round");
@@ -208,13 +225,21 @@ void addFillet(CsgOperation operation, const SeamOperands& operands, double radi
   // === Distances as far as the ball is wide
   const eikonal::PointTree tree(curve);
   const CsgSigns signs = csgSigns(operation);
-  const FloatGrid::Ptr a = widened(operands.a, signs.first, tree, size, halfWidth, options);
-  report(options.progress, 0.6, "blend");
-  const FloatGrid::Ptr b = widened(operands.b, signs.second, tree, size, halfWidth, options);
-  report(options.progress, 0.8, "blend");
+  const auto within = [&](double from, double to) {
+    BlendOptions part = options;
+    part.progress = subProgress(options.progress, from, to);
+    return part;
+  };
+  const FloatGrid::Ptr a =
+      widened(operands.a, signs.first, tree, size, halfWidth, within(0.4, 0.6));
+  const FloatGrid::Ptr b =
+      widened(operands.b, signs.second, tree, size, halfWidth, within(0.6, 0.8));
 
   // === The ball at each grid point beside the seam
-  const std::vector<Coord> origins = blocksBeside(curve, tree, size.extent() + halfWidth + 1);
+  const std::vector<Coord> origins =
+      blocksBeside(a->tree(), b->tree(), tree, size.extent() + halfWidth + 1);
+  requireMemory(static_cast<double>(origins.size()) * kBytesPerBlock,
+                memoryLimit(options.maxMemory), "blend");
   std::vector<FilletBlock> blocks(origins.size());
   constexpr std::size_t kBatch = 512;
   for (std::size_t begin = 0; begin < origins.size(); begin += kBatch) {

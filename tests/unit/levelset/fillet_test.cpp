@@ -192,6 +192,33 @@ TEST(Fillet, MakesNoBulgeWhereSurfacesNearlyTouch) {
   EXPECT_EQ(gap.band.contentHash(), unite(a, apart).contentHash());
 }
 
+TEST(Fillet, ReachesNoFurtherThanTheSolids) {
+  const Wedge wedge(45);
+  const NarrowBand a = halfSpace(wedge.n1, kEdge, 24), b = halfSpace(wedge.n2, kEdge, 24);
+  const auto hash = [&](double reach) {
+    return blend(CsgOperation::Union, a, b, 5, rolled(BlendSide::Both, reach)).band.contentHash();
+  };
+  // At 45° the middle of the arc is 8 voxels from the seam: more changes nothing.
+  const std::uint64_t expected = hash(9);
+  for (const double reach : {1e3, 1e6, 1e12, 1e300}) EXPECT_EQ(hash(reach), expected) << reach;
+}
+
+TEST(Fillet, TellsHowFarItIs) {
+  const Wedge wedge(90);
+  const NarrowBand a = halfSpace(wedge.n1, kEdge, 20), b = halfSpace(wedge.n2, kEdge, 20);
+  BlendOptions options = rolled();
+  int during = 0;
+  double last = 0;
+  options.progress = [&](double fraction) {
+    EXPECT_GE(fraction, last);
+    last = fraction;
+    during += fraction > 0.41 && fraction < 0.79;
+    return true;
+  };
+  (void)blend(CsgOperation::Union, a, b, 6, options);
+  EXPECT_GT(during, 5);
+}
+
 TEST(Fillet, KeepsToItsSide) {
   const Wedge wedge(90);
   const NarrowBand a = halfSpace(wedge.n1, kEdge, 24), b = halfSpace(wedge.n2, kEdge, 24);
