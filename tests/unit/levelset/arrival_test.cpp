@@ -232,13 +232,19 @@ TEST(Arrival, IsSlowedAndSpedByWhatIsBesideItsSource) {
   const V3d sources[] = {V3d(0)};
   for (const FrontMethod method : kMethods) {
     ArrivalOptions o = options(method, 2);
-    // A wall of one grid point's width, a hundred times slower.
-    o.speed = [](const V3d& p) { return std::abs(p.x - 4) < 0.4 ? 0.01 : 1.0; };
+    // A wall of one grid point's width, a hundred times slower; all in a box.
+    o.speed = [](const V3d& p) {
+      if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > 9) return 0.0;
+      return std::abs(p.x - 4) < 0.4 ? 0.01 : 1.0;
+    };
     const ArrivalTimes slowed = arrivalTimesFromPoints(lattice, sources, 150, o);
     EXPECT_NEAR(grid(slowed).tree().getValue(openvdb::Coord(3, 0, 0)), 3, 0.1);
     EXPECT_NEAR(grid(slowed).tree().getValue(openvdb::Coord(6, 0, 0)), 105, 10);
     // A lane that makes the way round faster than the straight one.
-    o.speed = [](const V3d& p) { return std::abs(p.y - 3) < 0.6 ? 50.0 : 1.0; };
+    o.speed = [](const V3d& p) {
+      if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > 9) return 0.0;
+      return std::abs(p.y - 3) < 0.6 ? 50.0 : 1.0;
+    };
     const ArrivalTimes sped = arrivalTimesFromPoints(lattice, sources, 12, o);
     EXPECT_LT(grid(sped).tree().getValue(openvdb::Coord(7, 2, 0)), 4.5f);
     EXPECT_NEAR(grid(sped).tree().getValue(openvdb::Coord(0, -6, 0)), 6, 0.3);
