@@ -37,6 +37,9 @@ struct StepNotes {
   std::vector<std::string> warnings;
   std::vector<std::string> notes;
   std::vector<ErrorEstimate> errors;
+  /// A numeric check that the value does not pass: the chain goes on with it and then ends with
+  /// exit code 5.
+  std::string failure;
   std::string certificateJson;  ///< of level-set
   std::string detailsJson;      ///< operator's own figures, an object
 };

@@ -76,6 +76,13 @@ class Stack {
   std::map<std::string, bool> usedNames_;
 };
 
+/// Ends a chain in which a step left its value behind without reaching what was asked.
+void tellFailures(const RunReport& report) {
+  for (const StepReport& step : report.steps)
+    if (!step.notes.failure.empty())
+      throw levelset::NumericalError(step.action + ": " + step.notes.failure);
+}
+
 /// Refuses targets that cannot be written before time is spent on what should go there.
 void checkTargets(const Action& action) {
   if (!action.op->targets) return;
@@ -153,6 +160,8 @@ void runAction(const Action& action, std::size_t index, const RunSettings& setti
     if (!invocation.output.empty() && settings.print) settings.print(invocation.output);
     for (const std::string& text : step.notes.warnings) settings.warn(sentenceOf(op.name, text));
     for (const std::string& text : step.notes.notes) settings.note(sentenceOf(op.name, text));
+    // Told at the end, and by the report where it belongs.
+    if (!step.notes.failure.empty()) step.notes.warnings.push_back(step.notes.failure);
   };
   try {
     if (settings.dryRun) {
@@ -223,6 +232,11 @@ void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
         throw;
       }
     }
+    for (const std::string& sentence : stack.unused()) {
+      report.warnings.push_back(sentence);
+      settings.warn(sentence);
+    }
+    tellFailures(report);
   } catch (const levelset::Error& error) {
     report.error = error.what();
     report.exitCode = static_cast<int>(error.exitCode());
@@ -231,10 +245,6 @@ void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
     report.error = error.what();
     report.exitCode = static_cast<int>(levelset::ExitCode::Input);
     throw;
-  }
-  for (const std::string& sentence : stack.unused()) {
-    report.warnings.push_back(sentence);
-    settings.warn(sentence);
   }
 }
 

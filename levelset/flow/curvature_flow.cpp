@@ -30,6 +30,10 @@ constexpr double kLeastShare = 0.4;
 // Blocks of fields that are alive during a step, and the part of a band's blocks that is active.
 constexpr double kFields = 9, kFilled = 0.45;
 constexpr double kVolumeTolerance = 1e-6;  // of the volume
+constexpr std::size_t kMostFlowSteps = 100000;
+// A surface that keeps its volume has come to rest when it would move no further than this, at its
+// pace, in the time in which it rounds itself, voxels.
+constexpr double kRestMove = 0.05;
 
 void checkPositive(double value, const char* what, const char* unit) {
   if (!(value > 0) || !std::isfinite(value))
@@ -47,6 +51,11 @@ void checkArguments(const NarrowBand& solid, double time, const CurvatureFlowOpt
   if (solid.isEmpty())
     throw InvalidInput(fmt::format(
         "{}: the solid is empty, so there is no surface to move; give a solid", kAction));
+  if (options.step && time / *options.step > static_cast<double>(kMostFlowSteps))
+    throw ResourceLimit(fmt::format(
+        "{}: a time of {} in steps of {} makes {:.3g} of them, and {} are the most; ask "
+        "for longer steps or a shorter time",
+        kAction, time, *options.step, time / *options.step, kMostFlowSteps));
 }
 
 /// One flow, in voxels.
@@ -69,6 +78,7 @@ class CurvatureFlow {
     }
     result_.band = makeBand(distances(*grid, solid.halfWidth()));
     result_.errorEstimate = error_ * voxel_;
+    result_.shortestStep = flow::kExplicitStep * voxel_ * voxel_;
     result_.scheme = *std::max_element(kSchemes.begin(), kSchemes.end(), [&](auto a, auto b) {
       return spent_[index(a)] < spent_[index(b)];
     });
@@ -113,9 +123,15 @@ class CurvatureFlow {
     CurvatureState state(grid, options_.mask);
     CurvatureSteps steps(state, [&] { tell(); });
     if (options_.preservesVolume) prepareVolume(grid, state, steps);
+    const double begun = now_;
     for (bool first = true; now_ < time_; first = false) {
       const NearSurface near = flow::lookNearSurface(state, steps.rate());
       if (near.count == 0) break;
+      if (options_.preservesVolume && isAtRest(state, near, steps.shift, now_ - begun)) {
+        result_.restedAfter = now_ * voxel_ * voxel_;
+        now_ = time_;
+        break;
+      }
       const double left = time_ - now_;
       const double wanted = std::min({wanted_, longest_, left});
       const double room =
@@ -129,6 +145,36 @@ class CurvatureFlow {
     }
     result_.evaluations += steps.evaluations();
     return state.toGrid(grid);
+  }
+
+  /// By the pace of the moment, or, since what long steps and new distances leave behind may be
+  /// rougher than that, by the way since distances were made, `elapsed` ago.
+  static bool isAtRest(const CurvatureState& state, const NearSurface& near, double meanCurvature,
+                       double elapsed) {
+    const double rounding = meanCurvature * meanCurvature;
+    if (near.unevenness() < kRestMove * rounding) return true;
+    if (elapsed * rounding < 1) return false;
+    flow::Field moved = state.value;
+    for (std::size_t i = 0; i < moved.size(); ++i)
+      for (std::size_t n = 0; n < 512; ++n) moved[i][n] -= state.start()[i][n];
+    return flow::lookNearSurface(state, moved).unevenness() < kRestMove * rounding * elapsed;
+  }
+
+  /// What the error of the steps is spread over. One that keeps its volume forgets its errors while
+  /// it rounds itself: the slowest wave on a ball dies with the square of its mean curvature.
+  double errorSpan(double meanCurvature) const {
+    if (!options_.preservesVolume || meanCurvature == 0) return time_;
+    return std::min(time_, 1 / (meanCurvature * meanCurvature));
+  }
+
+  void requireEnd(double dt) const {
+    if (result_.steps < kMostFlowSteps && now_ + dt > now_) return;
+    throw ResourceLimit(
+        fmt::format("{}: {} steps have come to a time of {:.4g} world units squared, and the next "
+                    "is of {:.3g}, so the {:.4g} asked for is out of reach; ask for a shorter time "
+                    "or use larger voxels",
+                    kAction, result_.steps, now_ * voxel_ * voxel_, dt * voxel_ * voxel_,
+                    time_ * voxel_ * voxel_));
   }
 
   FlowScheme cheapest(double dt, double left) const {
@@ -147,11 +193,13 @@ class CurvatureFlow {
   void step(CurvatureState& state, CurvatureSteps& steps, double dt, bool first) {
     const FlowScheme scheme = cheapest(dt, time_ - now_);
     if (scheme == FlowScheme::Explicit) dt = std::min(dt, flow::kExplicitStep);
+    requireEnd(dt);
+    const double span = errorSpan(steps.shift);
     const double power = 1.0 / CurvatureSteps::errorOrder(scheme);
     for (;;) {
       const double error = steps.take(scheme, dt);
       if (first) break;
-      const double allowed = tolerance_ * dt / time_;
+      const double allowed = tolerance_ * dt / span;
       const double factor = error > 0 ? std::clamp(kSafety * std::pow(allowed / error, power),
                                                    kMostShrinkage, kMostGrowth)
                                       : kMostGrowth;
@@ -164,6 +212,7 @@ class CurvatureFlow {
       }
       // A step that was cut short says little of how far one may go.
       wanted_ = std::max({flow::kExplicitStep, dt * factor, factor > 1 ? wanted_ : 0.0});
+      if (span < time_) error_ *= std::exp(-dt / span);
       error_ += error;
       break;
     }

@@ -33,6 +33,8 @@ struct CurvatureFlowResult {
   std::size_t evaluations = 0;  ///< of the rate over the band, or what costs as much
   std::size_t redistances = 0;
   double errorEstimate = 0;  ///< of the steps in time, rms over the surface, world units
+  double shortestStep = 0;   ///< world units²; no step is made shorter for the tolerance's sake
+  std::optional<double> restedAfter = {};  ///< a time; with preservesVolume nothing moved any more
 };
 
 /// Moves the surface inwards with the speed κ = k1 + k2 for a `time` in world units²: a ball obeys
@@ -40,9 +42,10 @@ struct CurvatureFlowResult {
 /// κ|∇φ| is of fourth order where the surface is smooth at the scale of the voxels. Distances are
 /// made again only when the surface has moved a voxel and a half. Without a tolerance the steps in
 /// time leave two hundredths of a voxel. [Meyer14, Smereka03, Sommeijer98]
+/// With preservesVolume it ends when the surface has come to rest.
 /// @throws UsageError for a time, step or tolerance that is not positive and finite (time may be
-/// 0); InvalidInput if `solid` is empty or vanishes on the way, telling when; ResourceLimit;
-/// Cancelled
+/// 0); InvalidInput if `solid` is empty or vanishes on the way, telling when; ResourceLimit,
+/// also for more than 100 000 steps; Cancelled
 [[nodiscard]] CurvatureFlowResult curvatureFlow(NarrowBand solid, double time,
                                                 const CurvatureFlowOptions& options = {});
 

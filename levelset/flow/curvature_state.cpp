@@ -126,7 +126,18 @@ NearSurface& NearSurface::operator+=(const NearSurface& other) {
   squares += other.squares;
   rates += other.rates;
   weights += other.weights;
+  levels += other.levels;
+  levelSquares += other.levelSquares;
+  levelRates += other.levelRates;
   return *this;
+}
+
+double NearSurface::unevenness() const {
+  const double spread = levelSquares - levels * levels / count,
+               together = levelRates - levels * rates / count,
+               all = squares - rates * rates / count;
+  const double linear = spread > 0 ? together * together / spread : 0;
+  return std::sqrt(std::max(0.0, all - linear) / count);
 }
 
 NearSurface lookNearSurface(const CurvatureState& state, const Field& rate) {
@@ -138,12 +149,16 @@ NearSurface lookNearSurface(const CurvatureState& state, const Field& rate) {
       const double speed = static_cast<double>(rate[i][it.pos()]);
       const double weight =
           state.weights().empty() ? 1 : static_cast<double>(state.weights()[i][it.pos()]);
+      const auto level = static_cast<double>(phi);
       near += {1,
                std::abs(speed),
                static_cast<double>(std::abs(state.start()[i][it.pos()] - phi)),
                speed * speed,
                speed,
-               weight};
+               weight,
+               level,
+               level * level,
+               level * speed};
     }
     return near;
   });

@@ -60,6 +60,10 @@ struct NearSurface {
   double squares = 0;    ///< sum of squared rates
   double rates = 0;      ///< sum of rates …
   double weights = 0;    ///< … and of the weights
+  double levels = 0, levelSquares = 0, levelRates = 0;  ///< sums of φ, φ² and φ times the rate
+  /// Deviation of the rate on the surface, rms. Level sets beside it bend more or less than it
+  /// does: what of the rate is linear in φ is taken off.
+  [[nodiscard]] double unevenness() const;
   NearSurface& operator+=(const NearSurface& other);
 };
 [[nodiscard]] NearSurface lookNearSurface(const CurvatureState& state, const Field& rate);

@@ -42,11 +42,16 @@ Value curvatureFlow(Invocation& in) {
                                        result.evaluations, result.redistances));
   in.notes.errors.push_back(
       {"steps in time, rms over the surface", result.errorEstimate, "world units"});
+  if (result.restedAfter)
+    in.notes.notes.push_back(
+        fmt::format("at rest after a time of {:.4g} world units squared", *result.restedAfter));
   if (options.tolerance && result.errorEstimate > *options.tolerance)
-    in.notes.warnings.push_back(
-        fmt::format("the steps in time leave about {:.3g} world units, more than the "
-                    "tolerance, since something shrank to nothing or broke on the way",
-                    result.errorEstimate));
+    in.notes.failure = fmt::format(
+        "the steps in time leave about {:.3g} world units, more than the tolerance of {:.3g}, "
+        "since "
+        "for its sake none is made shorter than {:.3g}; ask for a shorter --step or a larger "
+        "--tolerance",
+        result.errorEstimate, *options.tolerance, result.shortestStep);
   return Value(std::move(result.band));
 }
 
@@ -154,7 +159,8 @@ void addFlowOperators(std::vector<Operator>& all) {
        .details =
            "A ball obeys R² = R0² - 4 time. Topology may change; a solid that vanishes on the "
            "way is refused, with the time. Steps are as long as the tolerance allows and "
-           "stable whatever is asked.",
+           "stable whatever is asked. Where the tolerance is not reached the result is still "
+           "written, and the exit code is 5. A flow that keeps its volume ends at rest.",
        .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! curvature-flow --time 0.05 ! measure",
        .params = withMask({{.name = "time",
                             .doc = "how long, world units squared",
@@ -184,7 +190,8 @@ void addFlowOperators(std::vector<Operator>& all) {
        .summary = "smooth the surface by a filter of its distances",
        .details =
            "gaussian: a Gaussian of that sigma; mean: a box of the same variance; median: over "
-           "the grid points within sigma; taubin: a Gaussian that gives long waves back what "
+           "the grid points within sigma, which takes long when it is large; taubin: a Gaussian "
+           "that gives long waves back what "
            "they lost.",
        .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! smooth --sigma 1vx ! measure",
        .params = withMask({{.name = "kind",

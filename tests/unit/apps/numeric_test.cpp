@@ -21,4 +21,16 @@ TEST_F(Numeric, FieldThatIsNoDistanceFailsTheCheck) {
   EXPECT_FALSE(exists("after.vdb"));
 }
 
+TEST_F(Numeric, ToleranceNotReachedKeepsTheBestAndFails) {
+  const std::string flow =
+      "--report r.json sphere --radius 1 --voxel 0.1 ! curvature-flow --time 0.02 --tolerance ";
+  const auto missed = levelsmith(flow + "1e-12 ! write best.vdb");
+  EXPECT_EQ(missed.code, 5);
+  EXPECT_NE(missed.err.find("more than the tolerance"), std::string::npos) << missed.err;
+  EXPECT_NE(missed.err.find("--step"), std::string::npos) << missed.err;
+  EXPECT_TRUE(exists("best.vdb"));
+  EXPECT_NE(support::slurp(folder_ / "r.json").find("\"exit_code\": 5"), std::string::npos);
+  EXPECT_EQ(levelsmith(flow + "0.01 ! write good.vdb").code, 0);
+}
+
 }  // namespace numeric_test

@@ -162,6 +162,24 @@ TEST(CurvatureFlow, KeepsTheVolumeAskedFor) {
   EXPECT_LT(measure(flowed).area, 0.99 * measure(rod).area);
 }
 
+TEST(CurvatureFlow, EndsWhenWhatKeepsItsVolumeIsRound) {
+  const NarrowBand rod = makeCapsule(V3d(-10.69, -0.17, 0.43), V3d(13.31, -0.17, 0.43), 10, 1);
+  const CurvatureFlowResult rested = curvatureFlow(rod, 1e9, {.preservesVolume = true});
+  ASSERT_TRUE(rested.restedAfter.has_value());
+  EXPECT_LT(*rested.restedAfter, 1000);
+  // A ball has the least area of all that hold as much.
+  const Measurement round = measure(rested.band);
+  EXPECT_NEAR(round.volume, measure(rod).volume, 1e-3 * round.volume);
+  EXPECT_NEAR(round.area, std::cbrt(36 * M_PI * round.volume * round.volume), 2e-3 * round.area);
+  EXPECT_FALSE(curvatureFlow(rod, 5, {.preservesVolume = true}).restedAfter.has_value());
+}
+
+TEST(CurvatureFlow, RefusesStepsWithoutEnd) {
+  EXPECT_THROW((void)curvatureFlow(ball(6), 1, {.step = 1e-18}), ResourceLimit);
+  EXPECT_THROW((void)curvatureFlow(ball(6), 1, {.preservesVolume = true, .step = 1e-18}),
+               ResourceLimit);
+}
+
 TEST(CurvatureFlow, LeavesWhatTheMaskLeaves) {
   const Mask right{.field = [](const V3d& p) { return p.x; }, .min = 0, .max = 1};
   const NarrowBand flowed = curvatureFlow(ball(16), 20, {.mask = right}).band;
