@@ -16,6 +16,7 @@
 #include "levelset/eikonal/surface_points.h"
 #include "levelset/error.h"
 #include "levelset/interpolate_vdb.h"
+#include "levelset/kinks.h"
 #include "levelset/solids/csg_vdb.h"
 #include "levelset/solids/resample_vdb.h"
 #include "levelset/vdb.h"
@@ -59,7 +60,10 @@ struct Placement {
 class ResampleKernel {
  public:
   ResampleKernel(const FloatGrid& source, FloatGrid& target, const Placement& placement)
-      : source_(source), target_(target), place_(placement) {}
+      : source_(source),
+        target_(target),
+        place_(placement),
+        kink_(static_cast<float>(kKinkBend * placement.sourceVoxel / placement.scale)) {}
 
   /// Makes the target's leaves that can hold voxels of the source's band.
   void addLeaves(const char* action) {
@@ -165,8 +169,13 @@ class ResampleKernel {
       leaf.setValueOff(n, signAt(p, accessor));
       return;
     }
-    const SampleBlock<4> block(accessor, p);
-    take(block.touches(source_.background()) ? cell.value() : block.value());
+    SampleBlock<4> block(accessor, p);
+    if (block.touches(source_.background())) {
+      take(cell.value());
+      return;
+    }
+    leaveOutKinks(block.values, kink_);
+    take(block.value());
   }
 
   /// ± background, by the nearest sample: the position is at the rim of the band or beyond.
@@ -193,6 +202,7 @@ class ResampleKernel {
   const FloatGrid& source_;
   FloatGrid& target_;
   const Placement& place_;
+  float kink_;
 };
 
 Placement placementOf(const NarrowBand& solid, const Imath::M44d& sourceToWorld,

@@ -282,8 +282,10 @@ TEST_F(Command, TransformsExactlyAndBakesOnRequest) {
       measure("box --size 2,1,1 --voxel 0.05 ! transform --rotate 90 --translate 1,0,0")["bounds"]
                                                                                         ["max"][1],
       1, 0.003);
+  // Both lose the same at their edges, which are cut off within a voxel.
+  const double whole = measure("box --size 2,1,1 --voxel 0.05")["volume"];
   EXPECT_NEAR(measure("box --size 1,1,1 --voxel 0.05 ! transform --scale 2,1,1 --bake")["volume"],
-              2, 0.02);
+              whole, 0.005);
   EXPECT_REFUSED(levelsmith("box --size 1,1,1 --voxel 0.05 ! transform --mirror x ! measure"), 2,
                  "--bake");
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "levelset/error.h"
+#include "levelset/inspect/measure.h"
 #include "levelset/solids/shapes.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
@@ -109,6 +110,17 @@ TEST(Resample, WidensAndNarrowsTheBand) {
 TEST(Resample, OwnGridIsTheSameSolid) {
   const NarrowBand source = makeSphere(1, V3d(0), 0.1);
   EXPECT_EQ(resampleLike(source, makeBox(V3d(1), V3d(0), 0.1)).contentHash(), source.contentHash());
+}
+
+// A cubic through samples on both sides of an edge swings over, by a quarter of a new voxel.
+TEST(Resample, KeepsFacesFlatUpToTheirEdges) {
+  const NarrowBand box = makeBox(V3d(20, 20, 6), V3d(0), 0.5);
+  const Imath::Box3d bounds = measure(resample(box, 0.25)).bounds;
+  const V3d half(10, 10, 3);
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(bounds.max[axis], half[axis], 0.05 * 0.25);
+    EXPECT_NEAR(bounds.min[axis], -half[axis], 0.05 * 0.25);
+  }
 }
 
 TEST(Resample, SameBitsForAnyNumberOfThreads) {
