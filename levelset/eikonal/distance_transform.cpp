@@ -80,7 +80,7 @@ class Polisher {
         return {foot.point, foot.distance};
       return polishOnInterpolant(x, start);
     }
-    const SharpPatches::Hit hit = patches_.nearest(x, (x - start).length());
+    const TriangleTree::Hit hit = patches_.nearest(x, (x - start).length());
     if (!hit.found) return {start, (x - start).length()};
     if (patches_.covers(Coord::floor(hit.point))) return {hit.point, hit.distance};
     return polishOnInterpolant(x, hit.point);
@@ -99,7 +99,7 @@ class Polisher {
         if (!changesSignAround(block, foot.point)) break;
         const Closest smooth{foot.point + origin, foot.distance};
         if (!patches_.covers(Coord::floor(smooth.point))) return smooth;
-        const SharpPatches::Hit hit = patches_.nearest(x, foot.distance + kPolishGain);
+        const TriangleTree::Hit hit = patches_.nearest(x, foot.distance + kPolishGain);
         return hit.found ? Closest{hit.point, hit.distance} : smooth;
       }
       if (!foot.left) break;

@@ -22,9 +22,7 @@ using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
 using openvdb::Vec3d;
-using openvdb::Vec3f;
 using LeafNode = FloatTree::LeafNodeType;
-using Triangle = std::array<Vec3d, 3>;
 
 // Second differences of unit slope beyond which a grid point may lie beside an edge, voxels.
 constexpr double kSharpBend = 0.15;
@@ -48,7 +46,6 @@ constexpr double kOneCorner = 0.8;  // tips nearer than this are the same corner
 constexpr double kOneNormalCosine = 0.96;
 // Between features of one edge, voxels; and how far beside it a vertex may be that fills the gap.
 constexpr double kShortestGap = 0.7, kLongestGap = 3, kBesideEdge = 0.9;
-constexpr std::uint32_t kTrianglesPerLeaf = 4;
 
 /// Is there a sharp bend at a grid point beside the surface?
 bool bends(const DenseBlock& block, double limit) {
@@ -361,38 +358,6 @@ bool isConfirmed(const SharpMesh& mesh, const Fans& fans, const SharpFeature& fe
   return odd <= kOddPart * area;
 }
 
-Vec3d closestOnTriangle(const Vec3d& p, const Triangle& t) {
-  // By the region of the plane that p projects to [Ericson05, 5.1.5].
-  const auto& [a, b, c] = t;
-  const Vec3d ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0 && d2 <= 0) return a;
-  const Vec3d bp = p - b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0 && d4 <= d3) return b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return d1 > d3 ? Vec3d(a + ab * (d1 / (d1 - d3))) : a;
-  const Vec3d cp = p - c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0 && d5 <= d6) return c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return d2 > d6 ? Vec3d(a + ac * (d2 / (d2 - d6))) : a;
-  const double va = d3 * d6 - d5 * d4, e4 = d4 - d3, e5 = d5 - d6;
-  if (va <= 0 && e4 >= 0 && e5 >= 0) return e4 + e5 > 0 ? Vec3d(b + (c - b) * (e4 / (e4 + e5))) : b;
-  const double sum = va + vb + vc;
-  return a + ab * (vb / sum) + ac * (vc / sum);
-}
-
-double squaredToBox(const Vec3f& low, const Vec3f& high, const Vec3d& p) {
-  double sum = 0;
-  for (int i = 0; i < 3; ++i) {
-    const double out =
-        std::max({static_cast<double>(low[i]) - p[i], p[i] - static_cast<double>(high[i]), 0.0});
-    sum += out * out;
-  }
-  return sum;
-}
-
 }  // namespace
 
 SharpPatches::SharpPatches(const FloatGrid& field, const std::optional<CoordBBox>& within) {
@@ -424,83 +389,14 @@ SharpPatches::SharpPatches(const FloatGrid& field, const std::optional<CoordBBox
     if (zone_.isValueOn(Coord::floor(position))) features_.push_back(position);
   }
   const openvdb::tree::ValueAccessor<const openvdb::MaskTree> zone(zone_);
+  std::vector<TriangleTree::Triangle> triangles;
   for (const auto& [a, b, c] : mesh.triangles) {
-    const Triangle t{mesh.positions[a], mesh.positions[b], mesh.positions[c]};
+    const TriangleTree::Triangle t{mesh.positions[a], mesh.positions[b], mesh.positions[c]};
     if (std::any_of(t.begin(), t.end(),
                     [&](const Vec3d& p) { return zone.isValueOn(Coord::floor(p)); }))
-      triangles_.push_back(t);
+      triangles.push_back(t);
   }
-  if (!triangles_.empty()) build(0, static_cast<std::uint32_t>(triangles_.size()));
-}
-
-std::uint32_t SharpPatches::build(std::uint32_t begin, std::uint32_t end) {
-  const auto index = static_cast<std::uint32_t>(nodes_.size());
-  nodes_.emplace_back();
-  Vec3d low(std::numeric_limits<double>::max()), high = -low;
-  for (std::uint32_t i = begin; i < end; ++i)
-    for (const Vec3d& p : triangles_[i]) {
-      low = openvdb::math::minComponent(low, p);
-      high = openvdb::math::maxComponent(high, p);
-    }
-  // Rounded outwards: a box must hold its triangles.
-  for (int i = 0; i < 3; ++i) {
-    nodes_[index].low[i] = std::nextafter(static_cast<float>(low[i]), -INFINITY);
-    nodes_[index].high[i] = std::nextafter(static_cast<float>(high[i]), INFINITY);
-  }
-  nodes_[index].begin = begin;
-  nodes_[index].end = end;
-  if (end - begin <= kTrianglesPerLeaf) return index;
-  const Vec3d size = high - low;
-  const int axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
-  const std::uint32_t middle = begin + (end - begin) / 2;
-  const auto at = [&](std::uint32_t i) { return triangles_.begin() + i; };
-  std::nth_element(at(begin), at(middle), at(end), [axis](const Triangle& a, const Triangle& b) {
-    return a[0][axis] + a[1][axis] + a[2][axis] < b[0][axis] + b[1][axis] + b[2][axis];
-  });
-  build(begin, middle);
-  nodes_[index].right = build(middle, end);
-  return index;
-}
-
-struct SharpPatches::Search {
-  const SharpPatches& patches;
-  Vec3d from;
-  double squared;
-  Hit hit = {};
-
-  void visit(std::uint32_t index) {
-    const Node& node = patches.nodes_[index];
-    if (!node.right) {
-      for (std::uint32_t i = node.begin; i < node.end; ++i) {
-        const Vec3d point = closestOnTriangle(from, patches.triangles_[i]);
-        const double d = (point - from).lengthSqr();
-        if (!(d < squared)) continue;
-        squared = d;
-        hit.point = point;
-        hit.found = true;
-      }
-      return;
-    }
-    std::uint32_t near = index + 1, far = node.right;
-    double first = box(near), second = box(far);
-    if (second < first) {
-      std::swap(near, far);
-      std::swap(first, second);
-    }
-    if (first < squared) visit(near);
-    if (second < squared) visit(far);
-  }
-  [[nodiscard]] double box(std::uint32_t index) const {
-    return squaredToBox(patches.nodes_[index].low, patches.nodes_[index].high, from);
-  }
-};
-
-SharpPatches::Hit SharpPatches::nearest(const Vec3d& from, double limit) const {
-  if (isEmpty()) return {};
-  Search search{*this, from, limit * limit};
-  search.visit(0);
-  search.hit.distance = std::sqrt(search.squared);
-  return search.hit;
+  surface_ = TriangleTree(std::move(triangles));
 }
 
 }  // namespace levelset::eikonal

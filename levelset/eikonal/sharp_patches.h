@@ -2,12 +2,10 @@
 
 // For the .cpp files of levelset/eikonal only.
 
-#include <array>
-#include <cstdint>
 #include <optional>
 #include <vector>
 
-#include "levelset/vdb.h"
+#include "levelset/meshing/triangle_tree.h"
 
 namespace levelset::eikonal {
 
@@ -23,7 +21,7 @@ class SharpPatches {
   /// Among the leaf blocks that touch `within`, all if empty.
   SharpPatches(const openvdb::FloatGrid& field, const std::optional<openvdb::CoordBBox>& within);
 
-  [[nodiscard]] bool isEmpty() const { return triangles_.empty(); }
+  [[nodiscard]] bool isEmpty() const { return surface_.isEmpty(); }
   /// Do the patches stand for the interpolant in the cell whose lowest corner this is?
   [[nodiscard]] bool covers(const openvdb::Coord& cell) const {
     return !isEmpty() && zone_.isValueOn(cell);
@@ -35,27 +33,14 @@ class SharpPatches {
   /// Vertices on edges and corners, in an order that depends on the field alone.
   [[nodiscard]] const std::vector<openvdb::Vec3d>& features() const { return features_; }
 
-  struct Hit {
-    openvdb::Vec3d point;
-    double distance = 0;
-    bool found = false;
-  };
   /// The nearest point of the patches that is nearer than `limit`.
-  [[nodiscard]] Hit nearest(const openvdb::Vec3d& from, double limit) const;
+  [[nodiscard]] TriangleTree::Hit nearest(const openvdb::Vec3d& from, double limit) const {
+    return surface_.nearest(from, limit);
+  }
 
  private:
-  using Triangle = std::array<openvdb::Vec3d, 3>;
-  struct Node {
-    openvdb::Vec3f low, high;
-    std::uint32_t begin = 0, end = 0;  ///< triangles
-    std::uint32_t right = 0;           ///< second child; the first follows; 0: a leaf
-  };
-  struct Search;
-  std::uint32_t build(std::uint32_t begin, std::uint32_t end);
-
   std::vector<openvdb::Vec3d> features_;
-  std::vector<Triangle> triangles_;  ///< in the order of the tree's leaves
-  std::vector<Node> nodes_;
+  TriangleTree surface_;
   openvdb::MaskTree zone_, border_;
 };
 

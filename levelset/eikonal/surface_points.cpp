@@ -186,7 +186,7 @@ SurfacePoints findSurfacePoints(const FloatTree& field,
     forEachPointBeside(block, background, [&](int x, int y, int z, const Crossings& crossings) {
       const Vec3d origin = block.origin().asVec3d();
       const Coord gridPoint = block.origin().offsetBy(x, y, z);
-      SharpPatches::Hit hit;
+      TriangleTree::Hit hit;
       if (patches.touches(gridPoint))
         hit = patches.nearest(gridPoint.asVec3d(), crossings.nearestDistance() + kSharpTolerance);
       const bool isSharp = hit.found && patches.covers(Coord::floor(hit.point));

@@ -14,6 +14,7 @@
 #include "levelset/inspect/curved_surface.h"
 #include "levelset/inspect/symmetric_difference.h"
 #include "levelset/meshing/cell_surface.h"
+#include "levelset/meshing/triangle_tree.h"
 #include "levelset/solids/csg_vdb.h"
 #include "levelset/solids/resample.h"
 #include "levelset/vdb.h"
@@ -25,28 +26,71 @@ using openvdb::FloatGrid;
 using openvdb::FloatTree;
 using openvdb::Vec3d;
 
-/// The zero set of one solid, to measure distances to.
+using Sample = CurvedSurface::Sample;
+constexpr std::size_t kSampleChunk = 2048, kChunkBatch = 32;
+
+/// Calls work(chunk, first, end) for chunks of so many things, in parallel, with progress between.
+template <typename Work>
+void forEachChunk(std::size_t count, const Progress& progress, const Work& work) {
+  const std::size_t chunks = (count + kSampleChunk - 1) / kSampleChunk;
+  for (std::size_t begin = 0; begin < chunks; begin += kChunkBatch) {
+    tbb::parallel_for(begin, std::min(chunks, begin + kChunkBatch), [&](std::size_t chunk) {
+      work(chunk, chunk * kSampleChunk, std::min(count, (chunk + 1) * kSampleChunk));
+    });
+    report(progress, static_cast<double>(begin) / static_cast<double>(chunks), "compare");
+  }
+}
+
+/// The zero set of one solid: samples of it, and what distances to it are measured by.
 class ZeroSet {
  public:
-  explicit ZeroSet(const NarrowBand& solid)
-      : ZeroSet(vdb(solid), pointsOf(vdb(solid).constTreePtr())) {}
+  ZeroSet(const NarrowBand& solid, const Progress& progress)
+      : ZeroSet(vdb(solid), pointsOf(vdb(solid).constTreePtr())) {
+    const IndexMesh mesh = marchCells(CellSurface(vdb(solid)));
+    const CurvedSurface surface(mesh, vdb(solid));
+    samples_.resize(mesh.triangles.size());
+    forEachChunk(samples_.size(), progress, [&](std::size_t, std::size_t first, std::size_t end) {
+      CurvedSurface::Cache cache = surface.makeCache();
+      for (std::size_t i = first; i < end; ++i) samples_[i] = surface.middle(i, cache);
+    });
+    std::vector<TriangleTree::Triangle> flat;
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      const auto& [a, b, c] = mesh.triangles[i];
+      if (samples_[i].isFlat)
+        flat.push_back({mesh.positions[a], mesh.positions[b], mesh.positions[c]});
+    }
+    flat_ = TriangleTree(std::move(flat));
+  }
 
   using Cache = eikonal::DenseBlockCache;
   [[nodiscard]] Cache makeCache() const { return Cache(*field_); }
   [[nodiscard]] bool isEmpty() const { return points_.size() == 0; }
+  /// Index space.
+  [[nodiscard]] const std::vector<Sample>& samples() const { return samples_; }
+  [[nodiscard]] Vec3d toWorld(const Vec3d& index) const { return transform_->indexToWorld(index); }
 
-  /// World units. The nearest of the known points is where Newton's method starts from.
+  /// World units. By Newton's method from the nearest known point and, close to the surface, from
+  /// where the query is itself; at edges, which it does not find its way about, by the triangles.
   [[nodiscard]] double distance(const Vec3d& world, Cache& cache) const {
     const Vec3d query = transform_->worldToIndex(world);
     const Vec3d start = points_.positions[tree_.nearest(query, std::numeric_limits<double>::max())];
-    const eikonal::DenseBlock& block = cache.around(start);
-    const Vec3d origin = block.origin().asVec3d();
-    const eikonal::Foot foot = eikonal::closestPoint(block, query - origin, start - origin);
-    const double known = (query - start).length();
-    return voxelSize_ * (foot.converged ? std::min(foot.distance, known) : known);
+    double best = (query - start).length();
+    for (const bool atQuery : {false, true}) {
+      if (atQuery && best > kOwnStart) break;
+      const Vec3d& from = atQuery ? query : start;
+      const eikonal::DenseBlock& block = cache.around(from);
+      const Vec3d origin = block.origin().asVec3d();
+      const eikonal::Foot foot = eikonal::closestPoint(block, query - origin, from - origin);
+      if (foot.converged) best = std::min(best, foot.distance);
+    }
+    const TriangleTree::Hit hit = flat_.nearest(query, best);
+    return voxelSize_ * (hit.found ? hit.distance : best);
   }
 
  private:
+  /// Voxels.
+  static constexpr double kOwnStart = 1.5;
+
   struct Points {
     FloatTree::ConstPtr field;
     eikonal::SurfacePoints points;
@@ -69,33 +113,27 @@ class ZeroSet {
   eikonal::PointTree tree_;
   openvdb::math::Transform::ConstPtr transform_;
   double voxelSize_;
+  std::vector<Sample> samples_;
+  TriangleTree flat_;
 };
 
 struct DistanceSums {
   double largest = 0, weighted = 0, area = 0;
 };
 
-DistanceSums distancesTo(const ZeroSet& target, const NarrowBand& solid, const Progress& progress) {
-  constexpr std::size_t kChunk = 2048, kBatch = 32;
-  const IndexMesh mesh = marchCells(CellSurface(vdb(solid)));
-  const CurvedSurface surface(mesh, vdb(solid));
-  const openvdb::math::Transform& transform = vdb(solid).transform();
-  std::vector<DistanceSums> parts((mesh.triangles.size() + kChunk - 1) / kChunk);
-  for (std::size_t begin = 0; begin < parts.size(); begin += kBatch) {
-    tbb::parallel_for(begin, std::min(parts.size(), begin + kBatch), [&](std::size_t chunk) {
-      CurvedSurface::Cache own = surface.makeCache();
-      ZeroSet::Cache other = target.makeCache();
-      const std::size_t end = std::min(mesh.triangles.size(), (chunk + 1) * kChunk);
-      for (std::size_t i = chunk * kChunk; i < end; ++i) {
-        const CurvedSurface::Sample sample = surface.middle(i, own);
-        const double distance = target.distance(transform.indexToWorld(sample.position), other);
-        parts[chunk].largest = std::max(parts[chunk].largest, distance);
-        parts[chunk].weighted += distance * sample.area;
-        parts[chunk].area += sample.area;
-      }
-    });
-    report(progress, static_cast<double>(begin) / static_cast<double>(parts.size()), "compare");
-  }
+DistanceSums distancesTo(const ZeroSet& target, const ZeroSet& surface, const Progress& progress) {
+  const std::vector<Sample>& samples = surface.samples();
+  std::vector<DistanceSums> parts((samples.size() + kSampleChunk - 1) / kSampleChunk);
+  forEachChunk(
+      samples.size(), progress, [&](std::size_t chunk, std::size_t first, std::size_t end) {
+        ZeroSet::Cache cache = target.makeCache();
+        for (std::size_t i = first; i < end; ++i) {
+          const double distance = target.distance(surface.toWorld(samples[i].position), cache);
+          parts[chunk].largest = std::max(parts[chunk].largest, distance);
+          parts[chunk].weighted += distance * samples[i].area;
+          parts[chunk].area += samples[i].area;
+        }
+      });
   DistanceSums sum;
   for (const DistanceSums& part : parts) {
     sum.largest = std::max(sum.largest, part.largest);
@@ -125,14 +163,17 @@ Comparison compare(const NarrowBand& a, const NarrowBand& b, const CompareOption
       throw InvalidInput(fmt::format(
           "compare: the {} solid is empty, so there is no surface to compare; give two solids",
           solid == &a ? "first" : "second"));
-  const ZeroSet surfaceA(a), surfaceB(b);
+  const ZeroSet surfaceA(a, subProgress(options.progress, 0, 0.15)),
+      surfaceB(b, subProgress(options.progress, 0.15, 0.3));
   if (surfaceA.isEmpty() || surfaceB.isEmpty())
     throw InvalidInput(fmt::format(
         "compare: the {} solid has no zero crossing, so there is no surface to compare; give two "
         "solids",
         surfaceA.isEmpty() ? "first" : "second"));
-  const DistanceSums fromA = distancesTo(surfaceB, a, subProgress(options.progress, 0.1, 0.5));
-  const DistanceSums fromB = distancesTo(surfaceA, b, subProgress(options.progress, 0.5, 0.9));
+  const DistanceSums fromA =
+      distancesTo(surfaceB, surfaceA, subProgress(options.progress, 0.3, 0.6));
+  const DistanceSums fromB =
+      distancesTo(surfaceA, surfaceB, subProgress(options.progress, 0.6, 0.9));
   Comparison result;
   result.hausdorffAtoB = fromA.largest;
   result.hausdorffBtoA = fromB.largest;

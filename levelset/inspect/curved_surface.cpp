@@ -83,8 +83,8 @@ SurfaceMoments flatTriangleMoments(const Vec3d& a, const Vec3d& b, const Vec3d& 
   return sum;
 }
 
-CurvedSurface::CurvedSurface(const IndexMesh& mesh, const openvdb::FloatGrid& grid) : mesh_(mesh) {
-  field_ = grid.constTreePtr();
+CurvedSurface::CurvedSurface(const IndexMesh& mesh, const openvdb::FloatGrid& grid)
+    : mesh_(mesh), field_(grid.constTreePtr()) {
   const double halfWidth = static_cast<double>(grid.background()) / grid.voxelSize()[0];
   if (halfWidth < kTricubicHalfWidth * (1 - 1e-5)) field_ = eikonal::thicken(*field_);
   findNormals();
@@ -94,7 +94,7 @@ void CurvedSurface::findNormals() {
   normals_.assign(mesh_.positions.size(), openvdb::Vec3f(0));
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, normals_.size(), 4096),
                     [&](const tbb::blocked_range<std::size_t>& range) {
-                      Cache cache(*field_);
+                      Cache cache = makeCache();
                       for (std::size_t i = range.begin(); i != range.end(); ++i) {
                         const eikonal::DenseBlock& block = cache.around(mesh_.positions[i]);
                         Vec3d normal =
@@ -141,6 +141,7 @@ CurvedSurface::Node CurvedSurface::node(std::size_t triangle, bool bends, double
       su -= normal * (jet.gradient.dot(su) / slope);
       sv -= normal * (jet.gradient.dot(sv) / slope);
       result.position = flat + normal * lift;
+      result.isFlat = false;
       result.areaVector = su.cross(sv) * 0.5;
       break;
     }
@@ -169,7 +170,7 @@ SurfaceMoments CurvedSurface::moments(std::size_t triangle, const Vec3d& anchor,
 
 CurvedSurface::Sample CurvedSurface::middle(std::size_t triangle, Cache& cache) const {
   const Node at = node(triangle, isSmooth(triangle), 1. / 3, 1. / 3, cache);
-  return {at.position, at.areaVector.length()};
+  return {at.position, at.areaVector.length(), at.isFlat};
 }
 
 }  // namespace levelset

@@ -48,6 +48,7 @@ class CurvedSurface {
   struct Sample {
     openvdb::Vec3d position;
     double area = 0;
+    bool isFlat = true;  ///< in the triangle, which stands for an edge that the interpolant rounds
   };
   /// The middle of a triangle, with its area.
   [[nodiscard]] Sample middle(std::size_t triangle, Cache& cache) const;
@@ -56,6 +57,7 @@ class CurvedSurface {
   struct Node {
     openvdb::Vec3d position, areaVector;
     double meanCurvature = 0;  ///< times area
+    bool isFlat = true;
   };
   [[nodiscard]] Node node(std::size_t triangle, bool bends, double u, double v, Cache& cache) const;
   [[nodiscard]] bool isSmooth(std::size_t triangle) const;

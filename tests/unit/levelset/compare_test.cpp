@@ -6,7 +6,9 @@
 #include <numbers>
 
 #include "levelset/error.h"
+#include "levelset/solids/resample.h"
 #include "levelset/solids/shapes.h"
+#include "levelset/solids/transform.h"
 #include "tests/support/bands.h"
 
 namespace compare_test {
@@ -37,6 +39,19 @@ TEST(Compare, FindsNothingBetweenEquals) {
   EXPECT_LT(c.hausdorff(), 1e-3);
   EXPECT_LT(c.chamfer(), 1e-3);
   EXPECT_LT(c.symmetricDifference, 1e-9);
+}
+
+TEST(Compare, FindsNothingBetweenEqualsWithEdges) {
+  for (const V3d& centre : {V3d(0), V3d(0.31, -0.17, 0.43)}) {
+    const NarrowBand cube = block(V3d(10), centre, 1);
+    NarrowBand turned = transform(cube, Imath::M44d().setEulerAngles(V3d(0.3, 0.5, 0.7)));
+    turned = resample(turned, 1);
+    for (const NarrowBand& solid : {cube, turned}) {
+      const Comparison c = compare(solid, solid);
+      EXPECT_LT(c.hausdorff(), 1e-3);
+      EXPECT_LT(c.chamfer(), 1e-4);
+    }
+  }
 }
 
 TEST(Compare, KnowsConcentricSpheres) {
