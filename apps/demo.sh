@@ -35,5 +35,13 @@ for expected in "closed_manifold *true" "components *1" "shells *1" "cavities *0
     exit 1
   fi
 done
+# Time depends on the machine and is only told; memory does not.
+tr ',' '\n' < "$out/report.json" | awk -F: '
+  /"wall_s"/ { wall += $2 }
+  /"peak_bytes"/ { if ($2 + 0 > peak) peak = $2 + 0 }
+  END {
+    printf "%.0f s, at most %.2f GB\n", wall, peak / 1e9
+    if (!(peak > 0) || peak > 6e9) { print "That is more than 6 GB, or not known." > "/dev/stderr"; exit 1 }
+  }'
 echo "Made in $out:"
 ls -l "$out"

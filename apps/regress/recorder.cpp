@@ -17,9 +17,8 @@ const std::vector<Imath::V3d>& subVoxelPhases() {
   return phases;
 }
 
-Recorder::Recorder(const Case& of, Budget budget, std::size_t maxMemory,
-                   levelset::Progress progress)
-    : budget_(budget), maxMemory_(maxMemory), progress_(std::move(progress)) {
+Recorder::Recorder(const Case& of, Budget budget, levelset::Progress progress)
+    : budget_(budget), progress_(std::move(progress)) {
   result_.of = &of;
 }
 

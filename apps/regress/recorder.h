@@ -27,10 +27,9 @@ struct Subject {
 /// What a case writes its results into.
 class Recorder {
  public:
-  Recorder(const Case& of, Budget budget, std::size_t maxMemory, levelset::Progress progress);
+  Recorder(const Case& of, Budget budget, levelset::Progress progress);
 
   [[nodiscard]] bool isQuick() const { return budget_ == Budget::Quick; }
-  [[nodiscard]] std::size_t maxMemory() const { return maxMemory_; }
   /// Every resolution with every placement; in the quick budget, all placements at the coarsest
   /// resolution and kQuickPhase at the others.
   [[nodiscard]] std::vector<Sample> samples() const;
@@ -69,7 +68,6 @@ class Recorder {
   void tick();
 
   Budget budget_;
-  std::size_t maxMemory_;
   levelset::Progress progress_;
   CaseResult result_;
 };

@@ -13,7 +13,6 @@ namespace regress {
 struct SuiteOptions {
   std::vector<std::string> names = {};  ///< of cases; empty: all
   Budget budget = Budget::Quick;
-  std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
   std::function<void(const CaseResult&)> finished = {};  ///< called after each case
 };

@@ -45,7 +45,6 @@ Value runRegression(Invocation& in) {
   const regress::SuiteResult result = regress::runSuite(
       {.names = caseNames(in),
        .budget = in.text("budget") == "full" ? regress::Budget::Full : regress::Budget::Quick,
-       .maxMemory = in.maxMemory,
        .progress = in.progress,
        .finished = [&](const regress::CaseResult& c) { appendLine(c, in.output); }});
   in.notes.notes = regress::writeResults(result, in.text("out"), !in.flag("no-plots"));
