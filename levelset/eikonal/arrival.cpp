@@ -84,13 +84,15 @@ class Solver {
   }
 
  private:
+  [[nodiscard]] float timeOf(const ArrivalBlock& block, Index n) const {
+    return static_cast<float>(static_cast<double>(block.time[n]) * voxelTime_);
+  }
+
   /// The grid points that makeLeaf() gives a time: a start may come too late for one.
   [[nodiscard]] ArrivalBlock::Mask reachedOf(const ArrivalBlock& block) const {
-    const auto voxelSize = static_cast<float>(transform_.voxelSize()[0]);
     ArrivalBlock::Mask reached = block.known;
     for (auto it = block.known.beginOn(); it; ++it)
-      if (!(block.time[it.pos()] * voxelSize < static_cast<float>(request_.until)))
-        reached.setOff(it.pos());
+      if (!(timeOf(block, it.pos()) < static_cast<float>(request_.until))) reached.setOff(it.pos());
     return reached;
   }
 
@@ -124,7 +126,7 @@ class Solver {
     auto leaf = std::make_unique<LeafNode>(block.origin, background, false);
     for (Index n = 0; n < ArrivalBlock::kSize; ++n) {
       const bool inside = block.inside.isOn(n);
-      const auto time = static_cast<float>(static_cast<double>(block.time[n]) * voxelTime_);
+      const float time = timeOf(block, n);
       const auto least = static_cast<float>(kLeastDepth * block.slownessAt(n) * voxelTime_);
       if (block.known.isOn(n) && time < background)
         leaf->setValueOn(n, inside ? std::min(-time, -least) : time);

@@ -87,7 +87,8 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
   for (std::size_t i = 0; i < solids.size(); ++i) {
     if (shareTransform(vdb(*finest), vdb(solids[i]))) {
       result.push_back(narrowed(solids[i], halfWidth));
-      if (!shareWidth(halfWidth, solids[i].halfWidth()))
+      // More than the last bits.
+      if (halfWidth < solids[i].halfWidth() * (1 - 1e-5))
         notes.push_back(fmt::format("{}: operand {} cut to half width {:.6g} voxels", action, i + 1,
                                     halfWidth));
       continue;

@@ -95,9 +95,9 @@ TEST(MeshFile, WritesStlAndMergesItsVertices) {
 
 TEST(MeshFile, RefusesStlWhereSinglePrecisionIsTooCoarse) {
   const TemporaryFolder folder;
-  TriMesh far = tetrahedron();
+  TriMesh far = tetrahedron(CoordinatePrecision::Double);
   for (auto& p : far.positions) p.x += 1e8;
-  TriMesh huge = tetrahedron();
+  TriMesh huge = tetrahedron(CoordinatePrecision::Double);
   for (auto& p : huge.positions) p *= 1e90;
   for (const TriMesh* mesh : {&far, &huge}) {
     EXPECT_THROW(levelset::writeMesh(folder / "far.stl", *mesh), levelset::InvalidInput);

@@ -324,12 +324,13 @@ TEST(MeshToBandNasty, FacesThroughGridPointsLeaveNoSpecks) {
   TriMesh tetrahedron;
   tetrahedron.positions = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}, {0, 0, 8}};
   tetrahedron.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
-  for (const TriMesh* mesh : {&bracket, &wedge, &tetrahedron})
+  for (const TriMesh& mesh : {bracket, wedge, tetrahedron})
     for (const double voxel : {1.0, 0.5, 0.25})
       for (const SignMode sign : {SignMode::Closed, SignMode::Winding}) {
-        const Measurement found = measure(meshToBand(*mesh, voxel, {.sign = sign}).band);
+        const Measurement found = measure(meshToBand(mesh, voxel, {.sign = sign}).band);
         EXPECT_EQ(found.components, 1u) << voxel;
-        EXPECT_NEAR(found.volume, signedVolume(*mesh), 0.1 * voxel * surfaceArea(*mesh)) << voxel;
+        // Edges are cut off by up to half a voxel's square.
+        EXPECT_NEAR(found.volume, signedVolume(mesh), 0.2 * voxel * surfaceArea(mesh)) << voxel;
       }
   // Of the small one only points of its faces are grid points: nothing is inside.
   for (V3d& p : tetrahedron.positions) p /= 8;

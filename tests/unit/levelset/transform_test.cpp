@@ -61,7 +61,7 @@ TEST(Transform, RefusesPlacesThatNumbersCannotTell) {
   for (const double shift : {1e10, 1e12, 1e15, 1e16, 1e300})
     EXPECT_THROW((void)transform(ball, M44d().setTranslation(V3d(shift, 0, 0))), InvalidInput)
         << shift;
-  for (const double scale : {1e39, 1e40, 1e200, 1e-40, 1e-200})
+  for (const double scale : {1e40, 1e200, 1e-40, 1e-200})
     EXPECT_THROW((void)transform(ball, M44d().setScale(scale)), InvalidInput) << scale;
   TriMesh mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
