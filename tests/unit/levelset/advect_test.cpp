@@ -262,7 +262,7 @@ TEST(Advect, FixesTheVolumeOnlyWhenAsked) {
   EXPECT_NEAR(volumeChange(fixed), std::exp(0.3) - 1, 0.01);
 }
 
-TEST(Advect, GridSchemesCarryASphereRound) {
+TEST(SlowAdvect, GridSchemesCarryASphereRound) {
   const double h = 0.08;
   const V3d center(0.6, 0, 0);
   const NarrowBand ball = levelset::makeSphere(0.4, center, h);

@@ -200,7 +200,7 @@ TEST(Fillet, ReachesNoFurtherThanTheSolids) {
   };
   // At 45° the middle of the arc is 8 voxels from the seam: more changes nothing.
   const std::uint64_t expected = hash(9);
-  for (const double reach : {1e3, 1e6, 1e12, 1e300}) EXPECT_EQ(hash(reach), expected) << reach;
+  for (const double reach : {1e3, 1e300}) EXPECT_EQ(hash(reach), expected) << reach;
 }
 
 TEST(Fillet, TellsHowFarItIs) {

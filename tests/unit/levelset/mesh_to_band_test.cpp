@@ -229,7 +229,7 @@ TriMesh prismOf(int corners) {
   return readMesh(folder / "prism.obj");
 }
 
-TEST(SelfIntersections, SearchesLargeCapsInTime) {
+TEST(SlowSelfIntersections, SearchesLargeCapsInTime) {
   // Written as polygons and read again: the reader splits the caps.
   const TriMesh mesh = prismOf(100000);
   EXPECT_EQ(mesh.triangles.size(), 2 * (100000u - 2) + 2 * 100000u);
