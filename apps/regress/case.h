@@ -52,6 +52,17 @@ struct Case {
   std::function<void(Recorder&)> run = {};
 };
 
+/// A case without rows of figures, which only states outcomes.
+[[nodiscard]] inline Case statedCase(const char* name, const char* title, const char* definition,
+                                     const char* citation, void (*run)(Recorder&)) {
+  return {.name = name,
+          .group = name,
+          .title = title,
+          .definition = definition,
+          .citation = citation,
+          .run = run};
+}
+
 /// All cases, in the order in which they run.
 [[nodiscard]] const std::vector<Case>& cases();
 

@@ -46,10 +46,6 @@ std::vector<const Case*> chosen(const std::vector<std::string>& names) {
   return list;
 }
 
-}  // namespace
-
-namespace {
-
 /// What a case does not catch itself is a missed outcome of it; the others go on.
 void runWhole(const Case& of, Recorder& recorder) {
   std::exception_ptr failure;

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "levelset/convert/exact_predicates.h"
-#include "levelset/convert/progress_gate.h"
+#include "levelset/progress_gate.h"
 
 namespace levelset::convert {
 namespace {

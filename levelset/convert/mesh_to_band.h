@@ -29,7 +29,7 @@ struct SignCertificate {
   std::ptrdiff_t selfIntersections = -1;  ///< pairs of triangles; -1: not searched
   SignMode method = SignMode::Auto;       ///< Closed or Winding: what was used
   bool flipped = false;                   ///< a soup that faced inwards was turned
-  double ambiguousShare = 0;              ///< of voxels next to the zero set, |w − 0.5| < 0.25
+  double ambiguousShare = 0;  ///< of voxels next to the zero set, |w − 0.5| < 0.25; 1 if none is
   std::size_t droppedTriangles = 0;       ///< without area, or repeated exactly
 };
 
@@ -37,7 +37,7 @@ struct MeshToBandOptions {
   double halfWidth = 3;  ///< voxels, at least 1
   SignMode sign = SignMode::Auto;
   Nesting nesting = Nesting::Parity;    ///< read under Closed only
-  bool signAnyway = false;              ///< accept a sign that the certificate calls a guess
+  bool signAnyway = false;              ///< accept a sign that is a guess, or no inside
   bool searchSelfIntersections = true;  ///< when false, Auto trusts the mesh to have none
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
@@ -65,6 +65,10 @@ struct MeshToBandResult {
 ///         coordinates coarser than voxel/8); ResourceLimit for memory or an index beyond 32 bits
 [[nodiscard]] MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
                                           const MeshToBandOptions& options = {});
+
+/// The part of it that can be told before there is a mesh.
+/// @throws InvalidInput for a voxel larger than the object
+void checkVoxelSize(double voxelSize, double longestSide);
 
 /// Pairs of triangles that cross each other, shared vertices and edges apart. Exact predicates.
 [[nodiscard]] std::size_t countSelfIntersections(const TriMesh& mesh,

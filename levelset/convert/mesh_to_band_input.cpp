@@ -9,7 +9,8 @@
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
 
-namespace levelset::convert {
+namespace levelset {
+namespace convert {
 namespace {
 
 using Imath::V3d;
@@ -87,17 +88,23 @@ void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermo
 }
 
 }  // namespace
+}  // namespace convert
+
+void checkVoxelSize(double voxelSize, double longestSide) {
+  if (voxelSize > longestSide)
+    throw InvalidInput(fmt::format(
+        "level-set: the voxel size {:.6g} is larger than the object, whose longest side is "
+        "{:.6g}; use smaller voxels",
+        voxelSize, longestSide));
+}
+
+namespace convert {
 
 void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
   checkCall(voxelSize, options);
   checkElements(mesh);
   const V3d size = bounds(mesh).size();
-  const double longest = std::max({size.x, size.y, size.z});
-  if (voxelSize > longest)
-    throw InvalidInput(fmt::format(
-        "level-set: the voxel size {:.6g} is larger than the object, whose longest side is "
-        "{:.6g}; use smaller voxels",
-        voxelSize, longest));
+  checkVoxelSize(voxelSize, std::max({size.x, size.y, size.z}));
   const std::uint32_t outermost = outermostVertex(mesh);
   if (largest(mesh.positions[outermost]) / voxelSize + options.halfWidth >= kIndexLimit)
     throw ResourceLimit(fmt::format(
@@ -125,4 +132,5 @@ LocalMesh toLocal(const TriMesh& mesh, const MeshTopology& topology, double voxe
   return local;
 }
 
-}  // namespace levelset::convert
+}  // namespace convert
+}  // namespace levelset

@@ -8,7 +8,7 @@
 #include <memory>
 #include <unordered_map>
 
-#include "levelset/convert/progress_gate.h"
+#include "levelset/progress_gate.h"
 
 namespace levelset::convert {
 namespace {

@@ -10,7 +10,7 @@
 #include "levelset/convert/exact_predicates.h"
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/convert/mesh_topology.h"
-#include "levelset/convert/progress_gate.h"
+#include "levelset/progress_gate.h"
 
 namespace levelset {
 namespace {
@@ -170,7 +170,7 @@ class PairSearch {
     split(std::move(all), region, 0);
     std::vector<std::vector<Pair>> found(parts_.size());
     const Progress second = subProgress(progress_, 0.5, 1);
-    convert::ProgressGate gate(second, parts_.size(), kAction);
+    ProgressGate gate(second, parts_.size(), kAction);
     tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
       found[i] = findIn(parts_[i], gate);
       gate.advance(1);
@@ -225,7 +225,7 @@ class PairSearch {
     return true;
   }
 
-  [[nodiscard]] std::vector<Pair> findIn(const Part& part, convert::ProgressGate& gate) const {
+  [[nodiscard]] std::vector<Pair> findIn(const Part& part, ProgressGate& gate) const {
     List order = part.triangles;
     std::sort(order.begin(), order.end(), [&](std::uint32_t i, std::uint32_t j) {
       return boxes_[i].min.x != boxes_[j].min.x ? boxes_[i].min.x < boxes_[j].min.x : i < j;

@@ -11,9 +11,9 @@
 
 #include "levelset/convert/exact_predicates.h"
 #include "levelset/convert/near_surface.h"
-#include "levelset/convert/progress_gate.h"
 #include "levelset/convert/winding.h"
 #include "levelset/disjoint_sets.h"
+#include "levelset/progress_gate.h"
 
 namespace levelset::convert {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "levelset/convert/progress_gate.h"
 #include "levelset/convert/triangle_distance.h"
+#include "levelset/progress_gate.h"
 
 namespace levelset::convert {
 namespace {

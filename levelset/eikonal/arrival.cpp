@@ -149,15 +149,11 @@ void checkRoom(const std::vector<StartTime>& start, const FloatGrid& field,
   if (request.options.speed) return;
   Room room;
   for (const StartTime& s : start) room.surface.expand(s.gridPoint);
-  room.area = static_cast<double>(start.size()) / 4;  // two voxels to each side
+  room.area = static_cast<double>(start.size()) / (2 * kStartWidth);
   room.inside = room.outside = request.until / field.voxelSize()[0];
   room.bytesPerGridPoint = kBytesPerGridPoint;
   requireRoom(room, request.options.maxMemory, request.action);
 }
-
-}  // namespace
-
-namespace {
 
 ArrivalStart startOf(const ArrivalRequest& request, const Slowness& slowness) {
   return {.action = request.action,

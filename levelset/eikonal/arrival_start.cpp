@@ -18,8 +18,6 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Second-order differences read two grid points back: that far the start is given, voxels.
-constexpr double kStartWidth = 2;
 // The curvature of the front around a point is too much for differences up to here, voxels …
 constexpr double kStartBall = 8;
 // … so far the start is given where the speed is linear up to this part of that at the point, and

@@ -11,6 +11,9 @@ namespace levelset::eikonal {
 /// At an index position; kFar where nothing passes. Safe to call from many threads.
 using Slowness = std::function<double(const openvdb::Vec3d&)>;
 
+/// Second-order differences read two grid points back: that far the start is given, voxels.
+inline constexpr double kStartWidth = 2;
+
 /// Where a front starts, before it is solved for.
 struct ArrivalStart {
   const char* action = "sweep";

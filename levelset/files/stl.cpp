@@ -169,23 +169,6 @@ class TextReader {
   std::vector<std::uint64_t> corners_;
 };
 
-}  // namespace
-
-void readStl(std::string_view input, MeshBuilder& builder) {
-  if (isBinary(input, input.size()))
-    readBinary(input, builder);
-  else
-    TextReader(input, builder).read();
-}
-
-MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize, const std::string& name) {
-  if (!isBinary(head, fileSize)) return {"stl, ascii", 0, 0};
-  if (fileSize > 0) (void)roomForFacets(head, fileSize, name);
-  return {"stl, binary", 0, head.size() >= kHeaderSize ? facetCount(head) : 0};
-}
-
-namespace {
-
 /// What single precision must leave of the object's longest side.
 constexpr double kStlPrecision = 1e-3;
 
@@ -208,6 +191,19 @@ void requireSinglePrecision(const TriMesh& mesh) {
 }
 
 }  // namespace
+
+void readStl(std::string_view input, MeshBuilder& builder) {
+  if (isBinary(input, input.size()))
+    readBinary(input, builder);
+  else
+    TextReader(input, builder).read();
+}
+
+MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize, const std::string& name) {
+  if (!isBinary(head, fileSize)) return {"stl, ascii", 0, 0};
+  if (fileSize > 0) (void)roomForFacets(head, fileSize, name);
+  return {"stl, binary", 0, head.size() >= kHeaderSize ? facetCount(head) : 0};
+}
 
 void writeStl(ByteWriter& out, const TriMesh& mesh, const Progress& progress) {
   requireSinglePrecision(mesh);

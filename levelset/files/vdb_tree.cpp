@@ -11,10 +11,10 @@
 #include <set>
 #include <vector>
 
-#include "levelset/convert/progress_gate.h"
 #include "levelset/error.h"
 #include "levelset/files/vdb_layout.h"
 #include "levelset/progress.h"
+#include "levelset/progress_gate.h"
 
 // The layout is that of readTopology and readBuffers in OpenVDB's tree/*.h and of
 // io::readCompressedValues, format 222 and later.
@@ -192,7 +192,7 @@ class TreeReader {
     auto tree = std::make_shared<TreeT>();
     readRoot(tree->root());
     const std::vector<std::size_t> places = skipLeafValues();
-    convert::ProgressGate gate(limits_.progress, leaves_.size(), "read");
+    ProgressGate gate(limits_.progress, leaves_.size(), "read");
     tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t i) {
       VdbBytes at = bytes_;
       at.seek(places[i]);

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "levelset/convert/progress_gate.h"
+#include "levelset/progress_gate.h"
 #include "levelset/vdb.h"
 
 namespace levelset {
@@ -168,7 +168,7 @@ LeafFindings checkLeaves(const FloatGrid& grid, const Progress& progress) {
   leaves.reserve(grid.tree().leafCount());
   for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
   std::vector<LeafFindings> found(leaves.size());
-  convert::ProgressGate gate(progress, leaves.size(), "check");
+  ProgressGate gate(progress, leaves.size(), "check");
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16),
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       SlopeStencil stencil(grid);

@@ -15,6 +15,7 @@
 #include "levelset/inspect/symmetric_difference.h"
 #include "levelset/meshing/cell_surface.h"
 #include "levelset/meshing/triangle_tree.h"
+#include "levelset/progress_gate.h"
 #include "levelset/solids/csg_vdb.h"
 #include "levelset/solids/resample.h"
 #include "levelset/vdb.h"
@@ -27,18 +28,17 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 
 using Sample = CurvedSurface::Sample;
-constexpr std::size_t kSampleChunk = 2048, kChunkBatch = 32;
+constexpr std::size_t kSampleChunk = 2048;
 
-/// Calls work(chunk, first, end) for chunks of so many things, in parallel, with progress between.
+/// Calls work(chunk, first, end) for chunks of so many things, in parallel.
 template <typename Work>
 void forEachChunk(std::size_t count, const Progress& progress, const Work& work) {
   const std::size_t chunks = (count + kSampleChunk - 1) / kSampleChunk;
-  for (std::size_t begin = 0; begin < chunks; begin += kChunkBatch) {
-    tbb::parallel_for(begin, std::min(chunks, begin + kChunkBatch), [&](std::size_t chunk) {
-      work(chunk, chunk * kSampleChunk, std::min(count, (chunk + 1) * kSampleChunk));
-    });
-    report(progress, static_cast<double>(begin) / static_cast<double>(chunks), "compare");
-  }
+  ProgressGate gate(progress, chunks, "compare");
+  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+    work(chunk, chunk * kSampleChunk, std::min(count, (chunk + 1) * kSampleChunk));
+    gate.advance(1);
+  });
 }
 
 /// The zero set of one solid: samples of it, and what distances to it are measured by.

@@ -7,10 +7,10 @@
 #include <tuple>
 #include <vector>
 
-#include "levelset/convert/progress_gate.h"
 #include "levelset/inspect/curved_surface.h"
 #include "levelset/inspect/shells.h"
 #include "levelset/meshing/cell_surface.h"
+#include "levelset/progress_gate.h"
 
 namespace levelset {
 
@@ -33,7 +33,7 @@ std::vector<SurfaceMoments> sumShells(const std::vector<std::uint32_t>& shellOfT
   };
   const std::size_t count = shellOfTriangle.size();
   std::vector<std::vector<Part>> parts((count + kChunk - 1) / kChunk);
-  convert::ProgressGate gate(progress, parts.size(), kMeasure);
+  ProgressGate gate(progress, parts.size(), kMeasure);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t chunk) {
     auto worker = makeWorker();
     const std::size_t end = std::min(count, (chunk + 1) * kChunk);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
@@ -25,10 +26,13 @@ struct Topology {
 [[nodiscard]] NarrowBand keepLargest(const NarrowBand& solid, std::size_t count,
                                      const Progress& progress = {});
 
+/// More than any void has.
+inline constexpr double kAnyVolume = std::numeric_limits<double>::infinity();
+
 /// Fills enclosed voids up to `maxVolume` world units³ (default: all). What floats in a void is not
 /// part of its volume, and is swallowed when it is filled; an empty band stays empty.
 /// @throws UsageError if `maxVolume` is negative or not a number
-[[nodiscard]] NarrowBand fillCavities(const NarrowBand& solid, double maxVolume = 1e300,
+[[nodiscard]] NarrowBand fillCavities(const NarrowBand& solid, double maxVolume = kAnyVolume,
                                       const Progress& progress = {});
 
 }  // namespace levelset

@@ -54,7 +54,10 @@ Value levelSet(Invocation& in) {
   };
   levelset::MeshToBandResult result =
       levelset::meshToBand(in.mesh(), in.voxelSize(longestSide(in.operands[0])), options);
-  if (options.signAnyway && result.certificate.ambiguousShare > levelset::kAmbiguousLimit) {
+  if (options.signAnyway && result.band.zeroSetBounds().isEmpty()) {
+    in.notes.warnings.push_back(
+        "no grid point lies inside: the band holds distances to the mesh, and no surface");
+  } else if (options.signAnyway && result.certificate.ambiguousShare > levelset::kAmbiguousLimit) {
     in.notes.warnings.push_back(
         fmt::format("the sign is a guess at a share of {:.2g} of the voxels beside the surface",
                     result.certificate.ambiguousShare));
@@ -67,11 +70,7 @@ Plan planLevelSet(Invocation& in) {
   plan.kind = Kind::Band;
   plan.voxelSize = in.voxelSize(longestSide(in.operands[0]));
   plan.halfWidth = in.number("half-width");
-  if (plan.voxelSize > longestSide(in.operands[0]))
-    throw levelset::InvalidInput(fmt::format(
-        "level-set: the voxel size {:.6g} is larger than the object, whose longest side "
-        "is {:.6g}; use smaller voxels",
-        plan.voxelSize, longestSide(in.operands[0])));
+  levelset::checkVoxelSize(plan.voxelSize, longestSide(in.operands[0]));
   return plan;
 }
 

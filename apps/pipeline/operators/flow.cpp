@@ -48,8 +48,7 @@ Value curvatureFlow(Invocation& in) {
   if (options.tolerance && result.errorEstimate > *options.tolerance)
     in.notes.failure = fmt::format(
         "the steps in time leave about {:.3g} world units, more than the tolerance of {:.3g}, "
-        "since "
-        "for its sake none is made shorter than {:.3g}; ask for a shorter --step or a larger "
+        "since for its sake none is made shorter than {:.3g}; ask for a shorter --step or a larger "
         "--tolerance",
         result.errorEstimate, *options.tolerance, result.shortestStep);
   return Value(std::move(result.band));

@@ -153,7 +153,7 @@ Value keep(Invocation& in) {
 }
 
 Value fillCavities(Invocation& in) {
-  const double most = in.given("up-to") ? in.number("up-to") : 1e300;
+  const double most = in.given("up-to") ? in.number("up-to") : levelset::kAnyVolume;
   return Value(levelset::fillCavities(in.band(), most, in.progress));
 }
 

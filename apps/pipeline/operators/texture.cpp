@@ -211,7 +211,7 @@ void addTextureOperators(std::vector<Operator>& all) {
                  "outwards; corners run anticlockwise seen from outside.",
       .example = "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
                  "--size 8,8 --height 3 --as p "
-                 "! torus --radius 4 --tube 1.5 --voxel 0.25 --as ring ! texture @ball @ring @p "
+                 "! torus --radius 4 --tube 1.5 --voxel 0.5 --as ring ! texture @ball @ring @p "
                  "--blend 1 ! mesh ! write ring.ply",
       .params = {{.name = "corners",
                   .type = ParamType::Points,
@@ -262,11 +262,12 @@ void addTextureOperators(std::vector<Operator>& all) {
       .details = "The operands are base, texture and patch. The texture's zero-set box is the unit "
                  "cube of u, v, w. A map that "
                  "folds is refused with the place.",
-      .example = "levelsmith box --size 40,40,10 --voxel 0.5 --as base ! torus --radius 4 --tube "
-                 "1.5 --voxel 0.25 --as rings "
-                 "! patch @base --corners \"-10,-10,5 10,-10,5 10,10,5 -10,10,5\" --height 8 "
-                 "--levels 6 --as p "
-                 "! texture @base @rings @p --map rbf --blend 1 ! mesh ! write out.ply",
+      .example =
+          "levelsmith box --size 40,40,10 --voxel 0.5 --as base ! torus --radius 4 --tube "
+          "1.5 --voxel 0.25 --as rings "
+          "! patch @base --corners \"-10,-10,5 10,-10,5 10,10,5 -10,10,5\" --height 8 "
+          "--levels 6 --as p "
+          "! texture @base @rings @p --map rbf --blend 1 ! write out.vdb ! mesh ! write out.ply",
       .params =
           {{.name = "map",
             .type = ParamType::Choice,

@@ -166,12 +166,7 @@ void skewedAxes(Recorder& out) {
 void addBadInputCases(std::vector<Case>& all) {
   const auto add = [&](const char* name, const char* title, const char* definition,
                        void (*run)(Recorder&)) {
-    all.push_back({.name = name,
-                   .group = name,
-                   .title = title,
-                   .definition = definition,
-                   .citation = "stated outcomes",
-                   .run = run});
+    all.push_back(statedCase(name, title, definition, "stated outcomes", run));
   };
   add("huge-offsets", "offsets to nothing and to a hundred times the object",
       "A sphere of 16 voxels' radius: what cannot be is refused before memory is taken; on coarser "

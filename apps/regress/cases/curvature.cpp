@@ -164,12 +164,7 @@ void addCurvatureCases(std::vector<Case>& all) {
        .run = shrinkCylinder});
   const auto add = [&](const char* name, const char* title, const char* definition,
                        void (*run)(Recorder&)) {
-    all.push_back({.name = name,
-                   .group = name,
-                   .title = title,
-                   .definition = definition,
-                   .citation = "stated outcomes; Smereka03",
-                   .run = run});
+    all.push_back(statedCase(name, title, definition, "stated outcomes; Smereka03", run));
   };
   add("curvature-topology", "a dumb-bell pinches, tori shrink and close",
       "Balls of radius 0.5 joined by a bar of radius 0.15; tori 0.8 / 0.2 and 0.6 / 0.5.", pinch);

@@ -6,10 +6,10 @@
 
 #include "levelset/progress.h"
 
-namespace levelset::convert {
+namespace levelset {
 
 /// Lets parallel work report progress: one call at a time, with a fraction that never falls, and
-/// none that waits for another.
+/// none that waits for another (internal).
 class ProgressGate {
  public:
   ProgressGate(const Progress& progress, std::size_t total, const char* action)
@@ -33,4 +33,4 @@ class ProgressGate {
   std::mutex mutex_;
 };
 
-}  // namespace levelset::convert
+}  // namespace levelset
