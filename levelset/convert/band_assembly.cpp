@@ -179,7 +179,7 @@ double ambiguousShare(const openvdb::FloatGrid& grid, const SignField& field, co
   });
   std::array<std::size_t, 2> sum{};
   for (const auto& c : counts) sum[0] += c[0], sum[1] += c[1];
-  return sum[0] ? static_cast<double>(sum[1]) / static_cast<double>(sum[0]) : 0;
+  return sum[0] ? static_cast<double>(sum[1]) / static_cast<double>(sum[0]) : 1;
 }
 
 }  // namespace levelset::convert

@@ -106,17 +106,16 @@ void checkResult(const openvdb::FloatGrid& grid, const SignCertificate& certific
   bool anyInside = false;
   for (auto leaf = grid.tree().cbeginLeaf(); leaf && !anyInside; ++leaf)
     for (auto it = leaf->cbeginValueAll(); it && !anyInside; ++it) anyInside = *it < 0;
-  if (!anyInside) {
-    if (certificate.closed)
-      throw InvalidInput(
-          "level-set: no grid point lies inside the object, which is everywhere thinner than a "
-          "voxel; "
-          "use smaller voxels");
+  if (!anyInside && certificate.closed)
+    throw InvalidInput(
+        "level-set: no grid point lies inside the object, which is everywhere thinner than a "
+        "voxel; use smaller voxels");
+  if (!anyInside && !options.signAnyway)
     throw InvalidInput(fmt::format(
-        "level-set: the mesh encloses nothing: its winding number passes 1/2 at no grid "
-        "point ({} boundary edges); close it first, or use smaller voxels",
+        "level-set: the mesh encloses nothing: its winding number passes 1/2 at no grid point ({} "
+        "boundary edges); close it first, use smaller voxels, or take distances without an inside "
+        "with --sign-anyway",
         certificate.boundaryEdges));
-  }
   if (certificate.ambiguousShare > kAmbiguousLimit && !options.signAnyway)
     throw InvalidInput(fmt::format(
         "level-set: inside and outside are a guess at {:.2g} % of the voxels next to the "

@@ -5,6 +5,7 @@
 
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
+#include "tests/support/bands.h"
 #include "tests/support/meshes.h"
 
 namespace mesh_to_band_refusal_test {
@@ -67,9 +68,7 @@ TEST(MeshToBandRefusal, NamesCoordinatesTooCoarse) {
 TEST(MeshToBandRefusal, NamesOpenMeshes) {
   const TriMesh triangle{{V3d(0), V3d(1, 0, 0), V3d(0, 1, 0)}, {{0, 1, 2}}};
   for (const SignMode mode : {SignMode::Auto, SignMode::Winding})
-    for (const bool anyway : {false, true})
-      expectRefused(triangle, 0.1, ExitCode::Input, "encloses nothing",
-                    {.sign = mode, .signAnyway = anyway});
+    expectRefused(triangle, 0.1, ExitCode::Input, "encloses nothing", {.sign = mode});
   expectRefused(triangle, 0.1, ExitCode::Input, "3 edges have one face",
                 {.sign = SignMode::Closed});
 
@@ -89,6 +88,19 @@ TEST(MeshToBandRefusal, NamesOpenMeshes) {
     return mesh;
   }();
   expectRefused(moebius, 0.1, ExitCode::Input, "not closed", {.sign = SignMode::Closed});
+}
+
+TEST(MeshToBandRefusal, GivesDistancesWithoutAnInsideWhenAskedTo) {
+  const TriMesh triangle{{V3d(0), V3d(1, 0, 0), V3d(0, 1, 0)}, {{0, 1, 2}}};
+  for (const SignMode mode : {SignMode::Auto, SignMode::Winding}) {
+    const auto result = meshToBand(triangle, 0.1, {.sign = mode, .signAnyway = true});
+    EXPECT_EQ(result.certificate.ambiguousShare, 1);
+    EXPECT_TRUE(result.band.zeroSetBounds().isEmpty());
+    EXPECT_GT(result.band.activeVoxelCount(), 300);
+    forEachActive(result.band, [&](const V3d& p, double phi) {
+      EXPECT_NEAR(phi, unsignedDistance(triangle, p), 1e-6);
+    });
+  }
 }
 
 TEST(MeshToBandRefusal, NamesShellsThatCannotFollowTheirOrientation) {
