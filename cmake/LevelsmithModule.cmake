@@ -15,6 +15,15 @@ endif()
 add_library(levelsmith_flags INTERFACE)
 target_compile_options(levelsmith_flags INTERFACE -ffp-contract=off)
 
+# The tests themselves are only linked with them: they take as long to instrument as all they test.
+set(LEVELSMITH_SANITIZE "" CACHE STRING "Sanitizers for the modules and the command, as -fsanitize= takes them")
+add_library(levelsmith_sanitizers INTERFACE)
+if(LEVELSMITH_SANITIZE)
+  target_compile_options(levelsmith_sanitizers INTERFACE -fsanitize=${LEVELSMITH_SANITIZE}
+                         -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(levelsmith_sanitizers INTERFACE -fsanitize=${LEVELSMITH_SANITIZE})
+endif()
+
 function(levelsmith_module name)
   cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;PUBLIC;PRIVATE" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
@@ -24,7 +33,8 @@ function(levelsmith_module name)
     OUTPUT_NAME levelsmith_${name} POSITION_INDEPENDENT_CODE ON VERIFY_INTERFACE_HEADER_SETS ON)
   target_sources(${name} PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${ARG_HEADERS})
   target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE}
-                        $<BUILD_INTERFACE:levelsmith_warnings> $<BUILD_INTERFACE:levelsmith_flags>)
+                        $<BUILD_INTERFACE:levelsmith_warnings> $<BUILD_INTERFACE:levelsmith_flags>
+                        $<BUILD_INTERFACE:levelsmith_sanitizers>)
   install(TARGETS ${name} EXPORT Levelsmith_${name} COMPONENT ${name}
           ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
           FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/levelsmith)

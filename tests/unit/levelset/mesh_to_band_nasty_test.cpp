@@ -205,19 +205,30 @@ TEST(MeshToBandNasty, IslandsAMillionApart) {
   EXPECT_EQ(result.band.activeVoxelCount(), 2 * meshToBand(left, 0.1).band.activeVoxelCount());
 }
 
-TEST(MeshToBandNasty, AMillionTrianglesSmallerThanAVoxel) {
-  const TriMesh mesh = sphereMesh(1, V3d(0.01, 0.02, 0.03), 500);
-  EXPECT_GT(mesh.triangles.size(), 990000u);
+/// A ball of so many rings of triangles, far smaller than a voxel.
+void expectBallOfTiny(unsigned rings) {
+  const V3d center(0.01, 0.02, 0.03);
+  const TriMesh mesh = sphereMesh(1, center, rings);
+  EXPECT_GT(mesh.triangles.size(), 39ull * rings * rings / 10);
   const double h = 0.11;
   const auto result = meshToBand(mesh, h);
   EXPECT_EQ(result.certificate.method, SignMode::Closed);
   double worst = 0;
   for (auto it = vdb(result.band).cbeginValueOn(); it; ++it) {
-    const V3d p = toImath(it.getCoord().asVec3d()) * h - V3d(0.01, 0.02, 0.03);
+    const V3d p = toImath(it.getCoord().asVec3d()) * h - center;
     worst = std::max(worst, std::abs(static_cast<double>(*it) - (p.length() - 1)));
   }
-  // Chords lie (π / 500)² / 8 below the sphere, both ways.
-  EXPECT_LT(worst, 1.1e-5);
+  // Chords lie (π / rings)² / 8 below the sphere, both ways; single precision adds the rest.
+  const double chord = std::numbers::pi / rings;
+  EXPECT_LT(worst, 2 * chord * chord / 8 + 1e-6);
+}
+
+TEST(MeshToBandNasty, AMillionTrianglesSmallerThanAVoxel) {
+  expectBallOfTiny(500);
+}
+
+TEST(SlowMeshToBandNasty, TenMillionTrianglesSmallerThanAVoxel) {
+  expectBallOfTiny(1582);
 }
 
 TEST(MeshToBandNasty, TwelveTrianglesLargerThanTheGrid) {
@@ -258,7 +269,7 @@ void expectSoup(unsigned rings, double tolerance) {
 }
 
 TEST(MeshToBandNasty, Soup) {
-  expectSoup(30, 3e-3);
+  expectSoup(20, 7e-3);
 }
 
 TEST(SlowMeshToBandNasty, SoupOf57600Triangles) {

@@ -50,7 +50,7 @@ TEST(MeshToBand, MatchesWindingNumberOfNestedShells) {
   const TriMesh outer = sphereMesh(1, V3d(0.01, 0.02, 0.03), 12);
   const TriMesh same = joined(outer, sphereMesh(0.5, V3d(0), 10));
   const TriMesh cavity = joined(outer, reversed(sphereMesh(0.5, V3d(0), 10)));
-  const double h = 0.09;
+  const double h = 0.12;
   const auto winding = [&](const TriMesh& mesh) {
     return meshToBand(mesh, h, {.sign = SignMode::Winding});
   };
@@ -77,7 +77,7 @@ TEST(MeshToBand, TurnsSoupThatFacesInwards) {
 TEST(MeshToBand, MeasuresToTheBoundaryOfSelfIntersectingUnion) {
   const TriMesh first = sphereMesh(1, V3d(0.01, 0.02, 0.03), 10),
                 second = sphereMesh(0.8, V3d(0.9, 0.1, 0.05), 10), mesh = joined(first, second);
-  const double h = 0.1;
+  const double h = 0.13;
   const auto result = meshToBand(mesh, h);
   EXPECT_EQ(result.certificate.method, SignMode::Winding);
   EXPECT_GT(result.certificate.selfIntersections, 0);

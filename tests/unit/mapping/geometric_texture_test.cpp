@@ -102,14 +102,15 @@ TEST(GeometricTexture, FlatPatchIsTheIdentity) {
 }
 
 TEST(GeometricTexture, SphereCoordinatesAreRadial) {
-  const double radius = 2, height = 1, voxel = 0.1;
+  const double radius = 2, height = 1, voxel = 0.1, polar = 0.5;
   const NarrowBand base = makeBall(radius, voxel, 16);
-  const Patch patch = mapping::makePatch(base, cap(0.5, radius), height).patch;
+  const Patch patch = mapping::makePatch(base, cap(polar, radius), height).patch;
   const mapping::RbfMap map = mapping::patchToTexture(patch);
+  const double corner = std::tan(polar) / std::sqrt(2.0);
   double worstW = 0, worstU = 0, worstPlane = 0;
   for (int i = -3; i <= 3; ++i)
     for (int j = -3; j <= 3; ++j) {
-      const V3d ray = V3d(0.08 * i, 0.08 * j, 1).normalized();
+      const V3d ray = V3d(corner * i / 3, corner * j / 3, 1).normalized();
       const V3d foot = map(ray * radius);
       for (int k = 0; k <= 10; ++k) {
         const double w = 0.1 * k;
