@@ -30,7 +30,7 @@ struct SignCertificate {
   SignMode method = SignMode::Auto;       ///< Closed or Winding: what was used
   bool flipped = false;                   ///< a soup that faced inwards was turned
   double ambiguousShare = 0;  ///< of voxels next to the zero set, |w − 0.5| < 0.25; 1 if none is
-  std::size_t droppedTriangles = 0;       ///< without area, or repeated exactly
+  std::size_t droppedTriangles = 0;  ///< without area, or repeated exactly
 };
 
 struct MeshToBandOptions {
