@@ -16,7 +16,7 @@ namespace levelset::convert {
                                                    const Progress& progress);
 
 /// Of the grid points with a neighbour of opposite sign, the share with |w − 1/2| < 1/4.
-/// 1 where there are none.
+/// 0 for a closed surface, 1 where there are no such points.
 [[nodiscard]] double ambiguousShare(const openvdb::FloatGrid& grid, const SignField& field,
                                     const Imath::V3i& origin);
 

@@ -129,13 +129,15 @@ void checkResult(const openvdb::FloatGrid& grid, const SignCertificate& certific
 std::string describe(const SignCertificate& c) {
   return fmt::format(
       "sign by {}: {}, {} boundary edges, {} non-manifold edges, {} self-intersections, {} "
-      "triangles "
-      "dropped, {}ambiguous at {:.2g} % of the voxels next to the surface",
+      "triangles dropped, {}{}",
       c.method == SignMode::Winding ? "winding number" : "crossings of a closed mesh",
       c.closed ? "closed" : "not closed", c.boundaryEdges, c.nonManifoldEdges,
       c.selfIntersections < 0 ? std::string("not searched for")
                               : fmt::format("{}", c.selfIntersections),
-      c.droppedTriangles, c.flipped ? "turned inside out, " : "", 100 * c.ambiguousShare);
+      c.droppedTriangles, c.flipped ? "turned inside out, " : "",
+      c.ambiguousShare < 1 ? fmt::format("ambiguous at {:.2g} % of the voxels next to the surface",
+                                         100 * c.ambiguousShare)
+                           : std::string("no voxel of whose side it is sure"));
 }
 
 MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,

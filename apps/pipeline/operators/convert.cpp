@@ -109,7 +109,7 @@ void addConversionOperators(std::vector<Operator>& all) {
                   .choices = {"parity", "orientation"}},
                  {.name = "sign-anyway",
                   .type = ParamType::Flag,
-                  .doc = "accept a sign that is a guess"},
+                  .doc = "accept a sign that is a guess, or distances without an inside"},
                  {.name = "trust-mesh",
                   .type = ParamType::Flag,
                   .doc = "under 'auto': do not search self-intersections"}},
