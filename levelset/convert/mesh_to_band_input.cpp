@@ -9,8 +9,7 @@
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
 
-namespace levelset {
-namespace convert {
+namespace levelset::convert {
 namespace {
 
 using Imath::V3d;
@@ -88,17 +87,6 @@ void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermo
 }
 
 }  // namespace
-}  // namespace convert
-
-void checkVoxelSize(double voxelSize, double longestSide) {
-  if (voxelSize > longestSide)
-    throw InvalidInput(fmt::format(
-        "level-set: the voxel size {:.6g} is larger than the object, whose longest side is "
-        "{:.6g}; use smaller voxels",
-        voxelSize, longestSide));
-}
-
-namespace convert {
 
 void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
   checkCall(voxelSize, options);
@@ -132,5 +120,16 @@ LocalMesh toLocal(const TriMesh& mesh, const MeshTopology& topology, double voxe
   return local;
 }
 
-}  // namespace convert
+}  // namespace levelset::convert
+
+namespace levelset {
+
+void checkVoxelSize(double voxelSize, double longestSide) {
+  if (voxelSize > longestSide)
+    throw InvalidInput(fmt::format(
+        "level-set: the voxel size {:.6g} is larger than the object, whose longest side is "
+        "{:.6g}; use smaller voxels",
+        voxelSize, longestSide));
+}
+
 }  // namespace levelset

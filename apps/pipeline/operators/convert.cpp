@@ -56,7 +56,8 @@ Value levelSet(Invocation& in) {
       levelset::meshToBand(in.mesh(), in.voxelSize(longestSide(in.operands[0])), options);
   if (options.signAnyway && result.band.zeroSetBounds().isEmpty()) {
     in.notes.warnings.push_back(
-        "no grid point lies inside: the band holds distances to the mesh, and no surface");
+        "no grid point lies inside: the band holds distances to the mesh and no surface; close the "
+        "mesh to get a solid");
   } else if (options.signAnyway && result.certificate.ambiguousShare > levelset::kAmbiguousLimit) {
     in.notes.warnings.push_back(
         fmt::format("the sign is a guess at a share of {:.2g} of the voxels beside the surface",

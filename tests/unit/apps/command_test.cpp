@@ -237,23 +237,6 @@ TEST_F(Command, EndsWhereItsProgressIsCancelled) {
   EXPECT_FALSE(exists("b.vdb"));
 }
 
-TEST_F(Command, MapsATextureAsInTheReadme) {
-  const auto outcome = levelsmith(
-      "box --size 40,40,10 --voxel 0.5 --as base ! torus --radius 4 --tube 1.5 --voxel 0.25 --as "
-      "rings "
-      "! patch @base --corners \"-10,-10,5 10,-10,5 10,10,5 -10,10,5\" --height 8 --levels 6 --as "
-      "p "
-      "! texture @base @rings @p --map rbf --blend 1 ! mesh ! write out.ply ! measure --json",
-      110);
-  ASSERT_EQ(outcome.code, 0) << outcome.err;
-  const Json m = Json::parse(outcome.out);
-  EXPECT_EQ(m["closed_manifold"], true);
-  EXPECT_EQ(m["shells"], 1);
-  EXPECT_EQ(m["components"], 1);
-  EXPECT_GT(m["volume"], 40 * 40 * 10);
-  EXPECT_NEAR(m["bounds"]["max"][2], 5 + 8 - 0.5, 0.05);  // sunk by a voxel of the base
-}
-
 TEST_F(Command, RendersExrAndPng) {
   const auto outcome = levelsmith(
       "sphere --radius 1 --voxel 0.1 --as s ! render a.exr --size 64x48 --from 3,2,4 --to 0,0,0 ! "

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "tests/support/shell.h"
@@ -38,6 +39,15 @@ TEST_F(Readme, ExamplesRun) {
   }
   for (const char* file : {"plate.ply", "ring.ply", "ring.vdb", "out.vdb", "out.ply", "out.png"})
     EXPECT_TRUE(exists(file)) << file;
+  // The rings on the base, as the README maps them.
+  const auto outcome = levelsmith("read out.ply ! measure --json");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto m = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(m["closed_manifold"], true);
+  EXPECT_EQ(m["shells"], 1);
+  EXPECT_EQ(m["components"], 1);
+  EXPECT_GT(m["volume"], 40 * 40 * 10);
+  EXPECT_NEAR(m["bounds"]["max"][2], 5 + 8 - 0.5, 0.05);  // sunk by a voxel of the base
 }
 
 }  // namespace readme_test

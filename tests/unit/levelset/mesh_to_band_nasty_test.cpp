@@ -269,7 +269,7 @@ void expectSoup(unsigned rings, double tolerance) {
 }
 
 TEST(MeshToBandNasty, Soup) {
-  expectSoup(20, 7e-3);
+  expectSoup(30, 3e-3);
 }
 
 TEST(SlowMeshToBandNasty, SoupOf57600Triangles) {

@@ -237,7 +237,6 @@ TEST(Redistance, DoesNotDependOnScaleOrPlace) {
 TEST(Redistance, WorksAtAnyHalfWidth) {
   for (const double from : {1.0, 1.5, 3.0})
     for (const double to : {1.0, 1.5, 3.0, 50.0}) {
-      if (to == 50 && from != 1.5) continue;
       const NarrowBand result = redistance(sampleVoxels(sphere(12), 13, from), {.halfWidth = to});
       const BandError e = bandError(result, sphere(12));
       // One layer on each side shows curvature badly; at the centre all of the surface is as near.
