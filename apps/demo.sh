@@ -24,7 +24,7 @@ else
     ! torus --radius 4 --tube 1.5 --voxel 0.125 ! torus --radius 4 --tube 1.5 --axis 1,0,0 --voxel 0.125 ! union --as knot \
     ! patch @base --at 0,20,0 --size 16,16 --height auto --as top \
     ! texture @base @knot @top --map rbf --blend 3vx \
-    ! fill-cavities ! keep --largest 1 ! check ! write "$out/demo.vdb" \
+    ! fill-cavities ! check ! write "$out/demo.vdb" \
     ! render "$out/demo.exr" --png "$out/demo.png" --size 1280x960 \
     ! mesh ! write "$out/demo.ply" ! measure > "$out/measure.txt"
 fi
