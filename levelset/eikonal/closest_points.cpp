@@ -16,7 +16,7 @@ namespace {
 template <typename Grid, typename Make>
 typename Grid::Ptr gridOfClosestPoints(const NarrowBand& solid, const ClosestPointOptions& options,
                                        const char* action, const Make& make) {
-  using LeafNode = typename Grid::TreeType::LeafNodeType;
+  using GridLeaf = typename Grid::TreeType::LeafNodeType;
   if (solid.isEmpty())
     throw InvalidInput(
         fmt::format("{}: the solid is empty, so it has no surface; give a solid", action));
@@ -35,7 +35,7 @@ typename Grid::Ptr gridOfClosestPoints(const NarrowBand& solid, const ClosestPoi
   std::mutex mutex;
   request.visitPoints = [&](const openvdb::FloatTree::LeafNodeType& leaf,
                             const eikonal::ClosestPointLeaf& points) {
-    auto part = std::make_unique<LeafNode>(leaf.origin());
+    auto part = std::make_unique<GridLeaf>(leaf.origin());
     for (auto it = leaf.cbeginValueOn(); it; ++it)
       part->setValueOn(it.pos(), make(field.indexToWorld(points[it.pos()])));
     const std::lock_guard lock(mutex);

@@ -18,12 +18,12 @@ using openvdb::FloatTree;
 using openvdb::Int32Tree;
 using FloatLeaf = FloatTree::LeafNodeType;
 using LabelLeaf = Int32Tree::LeafNodeType;
-using Mask = std::array<std::uint64_t, 8>;  ///< word x, bit y·8 + z
+using LeafBits = std::array<std::uint64_t, 8>;  ///< word x, bit y·8 + z
 
 constexpr int kLeafDepth = FloatTree::DEPTH - 1;
 
-Mask insideMask(const FloatLeaf& leaf) {
-  Mask mask = {};
+LeafBits insideMask(const FloatLeaf& leaf) {
+  LeafBits mask = {};
   const float* values = leaf.buffer().data();
   for (std::size_t i = 0; i < FloatLeaf::SIZE; ++i) {
     mask[i >> 6] |= static_cast<std::uint64_t>(values[i] < 0) << (i & 63);
@@ -31,14 +31,14 @@ Mask insideMask(const FloatLeaf& leaf) {
   return mask;
 }
 
-bool isEmpty(const Mask& mask) {
+bool isEmpty(const LeafBits& mask) {
   return std::all_of(mask.begin(), mask.end(), [](std::uint64_t word) { return word == 0; });
 }
 
 /// The part of `within` that hangs together with its first voxel.
-Mask firstComponent(const Mask& within) {
+LeafBits firstComponent(const LeafBits& within) {
   constexpr std::uint64_t kLowZ = 0x0101010101010101ull, kHighZ = kLowZ << 7;
-  Mask grown = {};
+  LeafBits grown = {};
   const auto seed = std::find_if(within.begin(), within.end(), [](std::uint64_t w) { return w; });
   const auto slab = static_cast<std::size_t>(seed - within.begin());
   grown[slab] = *seed & (~*seed + 1);
@@ -57,9 +57,9 @@ Mask firstComponent(const Mask& within) {
 }
 
 /// Components of both signs, in a fixed order.
-std::vector<Mask> splitLeaf(const FloatLeaf& leaf) {
-  std::vector<Mask> parts;
-  Mask left = insideMask(leaf);
+std::vector<LeafBits> splitLeaf(const FloatLeaf& leaf) {
+  std::vector<LeafBits> parts;
+  LeafBits left = insideMask(leaf);
   for (int sign = 0; sign < 2; ++sign) {
     if (sign) {
       left = insideMask(leaf);
@@ -131,7 +131,7 @@ void RegionMap::labelLeaves(const FloatGrid& grid, Linker& linker) {
   std::vector<LabelLeaf*> labelled;
   for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
   for (auto leaf = labels_.beginLeaf(); leaf; ++leaf) labelled.push_back(leaf.getLeaf());
-  std::vector<std::vector<Mask>> parts(leaves.size());
+  std::vector<std::vector<LeafBits>> parts(leaves.size());
   std::vector<std::int32_t> first(leaves.size());
   tbb::parallel_for(std::size_t{0}, leaves.size(),
                     [&](std::size_t i) { parts[i] = splitLeaf(*leaves[i]); });
