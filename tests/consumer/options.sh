@@ -1,0 +1,38 @@
+#!/bin/sh
+# Configures the project with modules left out, and what only these need made unfindable: nothing of
+# them may be built or looked for. options.sh SOURCE WORK
+set -eu
+source=$1
+work=$2
+
+configure() {  # configure NAME OPTIONS…: leaves what would be built in NAME.plan
+  name=$1
+  shift
+  rm -rf "${work:?}/$name"
+  cmake -S "$source" -B "$work/$name" -G Ninja --no-warn-unused-cli -DCMAKE_BUILD_TYPE=Release "$@" >/dev/null
+  ninja -C "$work/$name" -n >"$work/$name.plan"
+  grep -q levelset_tests "$work/$name.plan"
+}
+
+lacks() {  # lacks NAME FOLDER: nothing is built in it
+  if grep -q " $2/" "$work/$1.plan"; then
+    echo "$1: $2/ was left out, yet it would be built:" >&2
+    grep -m 3 " $2/" "$work/$1.plan" >&2
+    exit 1
+  fi
+}
+
+without="-DCMAKE_DISABLE_FIND_PACKAGE"
+mkdir -p "$work"
+configure no-render -DLEVELSMITH_RENDER=OFF ${without}_embree=ON ${without}_OpenEXR=ON ${without}_PNG=ON \
+  ${without}_nlohmann_json=ON
+grep -q " mapping/" "$work/no-render.plan"
+lacks no-render render
+lacks no-render apps
+configure no-mapping -DLEVELSMITH_MAPPING=OFF ${without}_nlohmann_json=ON
+grep -q " render/" "$work/no-mapping.plan"
+lacks no-mapping mapping
+lacks no-mapping apps
+configure levelset-alone -DLEVELSMITH_MAPPING=OFF -DLEVELSMITH_RENDER=OFF ${without}_embree=ON
+lacks levelset-alone mapping
+lacks levelset-alone render
