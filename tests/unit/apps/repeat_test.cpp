@@ -75,8 +75,9 @@ INSTANTIATE_TEST_SUITE_P(
              {"mesh.ply", "adaptive.ply", "sharp.ply"}},
         Case{"csg",
              "read in.vdb --as a ! read tool.vdb --as b ! union @a @b ! write union.vdb "
-             "! intersection @a @b ! write intersection.vdb "
-             "! difference @a @b ! write difference.vdb",
+             "! read coarse.vdb --as c ! read ball.vdb --as d "
+             "! intersection @c @d ! write intersection.vdb "
+             "! difference @c @d ! write difference.vdb",
              {"union.vdb", "intersection.vdb", "difference.vdb"}},
         Case{"blend",
              "read coarse.vdb --as a ! read ball.vdb --as b ! blend @a @b --radius 0.8 "
@@ -116,11 +117,12 @@ INSTANTIATE_TEST_SUITE_P(
              "! difference @a @hole ! fill-cavities ! write fill.vdb "
              "! clip @a --plane \"0,0,0 1,2,0\" ! write clip.vdb",
              {"keep.vdb", "fill.vdb", "clip.vdb"}},
-        Case{"placement",
-             "read in.vdb --as a ! transform @a --rotate 30 --scale 1.5 ! write transform.vdb "
-             "! transform @a --rotate 10,20,30 --scale 1,1,2 --bake ! write bake.vdb "
-             "! resample @a --voxel 0.14 ! write resample.vdb",
-             {"transform.vdb", "bake.vdb", "resample.vdb"}},
+        Case{
+            "placement",
+            "read in.vdb --as a ! transform @a --rotate 30 --scale 1.5 ! write transform.vdb "
+            "! read coarse.vdb ! transform --rotate 10,20,30 --scale 1,1,2 --bake ! write bake.vdb "
+            "! resample @a --voxel 0.14 ! write resample.vdb",
+            {"transform.vdb", "bake.vdb", "resample.vdb"}},
         Case{
             "texture",
             "box --size 8,8,3 --voxel 0.5 --as b ! torus --radius 1 --tube 0.5 --voxel 0.25 --as t "
