@@ -21,8 +21,9 @@ struct RedistanceOptions {
 /// Beside the interface each grid point finds the closest point on a tricubic interpolant by
 /// Newton's method [Chopp01, Saye14]; from there closest points travel outwards block by block, and
 /// each grid point keeps the nearest and polishes it on the interpolant. Second order in the voxel
-/// size and better on smooth surfaces; an edge or corner is as sharp as the grid shows it, to about
-/// half a voxel. The result does not depend on the order of blocks or on the number of threads.
+/// size and better on smooth surfaces; edges and corners of faces that are flat beside them are
+/// those of `mesh --sharp`, others are rounded by up to 0.75 voxel. The result does not depend on
+/// the order of blocks or on the number of threads.
 /// @param field  right sign everywhere, Lipschitz, any slope; only values beside the zero set are
 /// read
 /// @return       with `region`, distances on the smallest box of grid points that holds it, and

@@ -10,7 +10,7 @@
 namespace levelset::eikonal {
 
 /// The zero set beside the edges and corners of a solid, as triangles in index space. A tricubic
-/// rounds them by up to half a voxel; planes fitted on either side do not [Ju02]. Smooth surfaces
+/// rounds them by up to 0.75 voxel; planes fitted on either side do not [Ju02]. Smooth surfaces
 /// have no patches, whatever their curvature: the faces that meet must stay as flat beside the edge
 /// as the edge is sharp.
 class SharpPatches {

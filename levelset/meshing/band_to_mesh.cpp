@@ -52,7 +52,8 @@ TriMesh bandToMesh(const NarrowBand& band, const BandToMeshOptions& options) {
         "before it");
   }
   report(options.progress, 0.3, kAction);
-  IndexMesh mesh = options.sharp ? sharpSurface(surface, vdb(band)) : marchCells(surface);
+  IndexMesh mesh =
+      options.sharp ? IndexMesh(sharpSurface(surface, vdb(band))) : marchCells(surface);
   if (options.adaptivity > 0) {
     report(options.progress, 0.4, kAction);
     mesh = decimate(mesh, options.adaptivity);

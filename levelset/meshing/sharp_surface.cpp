@@ -2,268 +2,29 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
+#include "levelset/meshing/sharp_vertices.h"
+
 namespace levelset {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using openvdb::Coord;
 using openvdb::FloatGrid;
 
-/// Second difference, in voxels, up to which a grid point counts as smooth.
-constexpr double kSmooth = 0.15;
-/// How far the values around a grid point may be from a plane of unit slope for it to tell one.
-constexpr double kPlanar = 0.1;
-/// Eigenvalues of the planes' matrix below that share of the largest are noise.
-constexpr double kRank = 0.05;
-/// How far from its cell, in voxels, a plane may touch the surface and still be of use.
-constexpr double kTouchMargin = 0.75;
-/// How far outside its cell, in voxels, a vertex may lie.
-constexpr double kVertexReach = 1;
-/// Normals further apart than that form an edge.
-constexpr double kEdgeCosine = 0.9;
+/// How far a vertex without a sheet may be from those of its neighbours, and from where they meet.
+constexpr double kAdoptReach = 1.25;
+/// Vertices stay that far apart, voxels.
+constexpr double kApart = 0.05;
+/// Diagonals whose gaps differ by less, voxels, are equally good.
+constexpr double kSameGap = 0.02;
 
-/// A tangent plane of the surface, told by one grid point.
-struct Plane {
-  Vector3d normal = Vector3d::Zero();
-  double distance = 0;  ///< of the grid point from it, voxels
-  bool isSmooth = false;
-  bool isKnown = false;
-};
-
-/// The values of a block and of two layers around it, in voxels, and what planes they tell.
-class BlockField {
- public:
-  BlockField(const FloatGrid& grid, const Coord& origin) {
-    auto values = grid.getConstAccessor();
-    const double inverse = 1 / grid.voxelSize()[0];
-    std::size_t i = 0;
-    for (int x = -1; x <= kEnd; ++x)
-      for (int y = -1; y <= kEnd; ++y)
-        for (int z = -1; z <= kEnd; ++z)
-          values_[i++] = static_cast<double>(values.getValue(origin.offsetBy(x, y, z))) * inverse;
-  }
-
-  [[nodiscard]] double value(int x, int y, int z) const {
-    return values_[static_cast<std::size_t>(((x + 1) * kDim + y + 1) * kDim + z + 1)];
-  }
-
-  /// Each coordinate in [0, 8].
-  [[nodiscard]] const Plane& plane(int x, int y, int z) {
-    const auto i = static_cast<std::size_t>((x * 9 + y) * 9 + z);
-    if (!made_[i]) {
-      planes_[i] = makePlane(x, y, z);
-      made_[i] = true;
-    }
-    return planes_[i];
-  }
-
- private:
-  static constexpr int kEnd = 9, kDim = kEnd + 2;
-
-  Plane makePlane(int x, int y, int z) const {
-    Plane plane;
-    plane.distance = value(x, y, z);
-    const Vector3d back(value(x - 1, y, z), value(x, y - 1, z), value(x, y, z - 1));
-    const Vector3d ahead(value(x + 1, y, z), value(x, y + 1, z), value(x, y, z + 1));
-    const Vector3d bend = back + ahead - Vector3d::Constant(2 * plane.distance);
-    plane.isSmooth = bend.cwiseAbs().maxCoeff() < kSmooth;
-    if (plane.isSmooth) {
-      plane.normal = (ahead - back) / 2;
-      plane.isKnown = plane.normal.norm() > 0.5;
-    } else {
-      chooseOctant(x, y, z, plane);
-    }
-    if (plane.isKnown) plane.normal.normalize();
-    return plane;
-  }
-
-  /// Beside an edge of the solid, differences across it mix two faces. Of the eight cells at the
-  /// grid point, the one whose corners lie nearest to a plane of unit slope has a face to itself.
-  void chooseOctant(int x, int y, int z, Plane& plane) const {
-    double best = kPlanar;
-    for (int octant = 0; octant < 8; ++octant) {
-      const int sx = octant & 4 ? 1 : -1, sy = octant & 2 ? 1 : -1, sz = octant & 1 ? 1 : -1;
-      const double base = plane.distance;
-      const double dx = value(x + sx, y, z) - base, dy = value(x, y + sy, z) - base,
-                   dz = value(x, y, z + sz) - base;
-      const double error = std::abs(std::sqrt(dx * dx + dy * dy + dz * dz) - 1) +
-                           std::abs(value(x + sx, y + sy, z) - base - dx - dy) +
-                           std::abs(value(x + sx, y, z + sz) - base - dx - dz) +
-                           std::abs(value(x, y + sy, z + sz) - base - dy - dz) +
-                           std::abs(value(x + sx, y + sy, z + sz) - base - dx - dy - dz);
-      if (!(error < best)) continue;
-      best = error;
-      plane.normal = Vector3d(sx * dx, sy * dy, sz * dz);
-      plane.isKnown = true;
-    }
-  }
-
-  std::array<double, kDim * kDim * kDim> values_;
-  std::array<Plane, 729> planes_;
-  std::array<bool, 729> made_ = {};
-};
-
-struct DualVertex {
-  Vector3d position;
-  bool isFeature = false;
-};
-
-/// Normals closer than that are of one face.
-constexpr double kOneFaceCosine = 0.96;
-
-/// The faces among the planes that a vertex was fitted to.
-SharpFeature featureAt(const Vector3d& position,
-                       const std::vector<std::pair<Vector3d, double>>& planes) {
-  SharpFeature feature;
-  for (const auto& [normal, offset] : planes) {
-    feature.misfit = std::max(feature.misfit, std::abs(normal.dot(position) - offset));
-    const openvdb::Vec3d n(normal.x(), normal.y(), normal.z());
-    const auto last = feature.normals.begin() + static_cast<std::ptrdiff_t>(feature.normalCount);
-    const bool isKnown = std::any_of(feature.normals.begin(), last,
-                                     [&](const auto& m) { return m.dot(n) > kOneFaceCosine; });
-    if (!isKnown && feature.normalCount < feature.normals.size())
-      feature.normals[feature.normalCount++] = n;
-  }
-  return feature;
+openvdb::Vec3d toIndex(const Vector3d& p) {
+  return {p.x(), p.y(), p.z()};
 }
-
-/// The point nearest to `centre` among those that fit the planes best.
-Vector3d fitPlanes(const std::vector<std::pair<Vector3d, double>>& planes, const Vector3d& centre) {
-  Matrix3d matrix = Matrix3d::Zero();
-  Vector3d right = Vector3d::Zero();
-  for (const auto& [normal, offset] : planes) {
-    matrix += normal * normal.transpose();
-    right += normal * (offset - normal.dot(centre));
-  }
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(matrix);
-  const Vector3d& values = solver.eigenvalues();
-  Vector3d shift = Vector3d::Zero();
-  for (int i = 0; i < 3; ++i) {
-    if (values[i] < kRank * values[2]) continue;
-    const Vector3d direction = solver.eigenvectors().col(i);
-    shift += direction * (direction.dot(right) / values[i]);
-  }
-  return centre + shift;
-}
-
-bool isInCell(const Vector3d& p, double margin) {
-  return p.minCoeff() >= -margin && p.maxCoeff() <= 1 + margin;
-}
-
-/// Places the vertices of one cell; positions are relative to its lowest corner.
-class CellVertices {
- public:
-  CellVertices(BlockField& field, int x, int y, int z) : field_(field), x_(x), y_(y), z_(z) {}
-
-  /// The planes that the last vertex was fitted to, positions as the vertex.
-  [[nodiscard]] const std::vector<std::pair<Vector3d, double>>& planes() const { return planes_; }
-
-  DualVertex place(const std::uint8_t* edges, std::size_t count) {
-    crossings_.clear();
-    planes_.clear();
-    bool isSmooth = true;
-    unsigned corners = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto offset = edgeOffset(edges[i]);
-      const auto axis = static_cast<std::size_t>(edgeAxis(edges[i]));
-      auto end = offset;
-      end[axis] = 1;
-      const Plane &low = planeAt(offset), &high = planeAt(end);
-      isSmooth &= low.isSmooth && high.isSmooth && low.isKnown && high.isKnown;
-      const double t = crossing(low.distance, high.distance);
-      Vector3d point(offset[0], offset[1], offset[2]);
-      point[static_cast<int>(axis)] = t;
-      crossings_.emplace_back(point, (1 - t) * low.normal + t * high.normal);
-      corners |= 1u << cornerOf(offset[0], offset[1], offset[2]);
-      corners |= 1u << cornerOf(end[0], end[1], end[2]);
-    }
-    Vector3d centre = Vector3d::Zero();
-    for (const auto& crossing : crossings_) centre += crossing.first;
-    centre /= static_cast<double>(count);
-    return isSmooth ? DualVertex{placeSmooth(centre), false} : placeByPlanes(centre, corners);
-  }
-
- private:
-  const Plane& planeAt(const std::array<int, 3>& offset) {
-    return field_.plane(x_ + offset[0], y_ + offset[1], z_ + offset[2]);
-  }
-
-  static double crossing(double low, double high) {
-    const double t = low / (low - high);
-    return t >= 0 && t <= 1 ? t : 0.5;
-  }
-
-  /// The mean of the crossings lies as far inside a curved surface as the tangent planes at them
-  /// lie outside: half way between is on it to higher order.
-  [[nodiscard]] Vector3d placeSmooth(const Vector3d& centre) const {
-    Vector3d mean = Vector3d::Zero();
-    for (const auto& [point, normal] : crossings_) mean += normal;
-    if (!(mean.norm() > 0.1)) return centre;
-    mean.normalize();
-    double above = 0, below = 0;
-    for (const auto& [point, normal] : crossings_) {
-      const Vector3d unit = normal.normalized();
-      above += unit.dot(mean) * unit.dot(point - centre);
-      below += unit.dot(mean) * unit.dot(mean);
-    }
-    const Vector3d result = centre + mean * (above / below / 2);
-    return isInCell(result, 0) ? result : centre;
-  }
-
-  /// A point on the edge or corner where the planes meet. It may lie a little outside the cell: it
-  /// is on the surface there, which the nearest point of the cell is not.
-  DualVertex placeByPlanes(const Vector3d& centre, unsigned corners) {
-    for (const auto& [touch, reach] :
-         {std::pair(kTouchMargin, 0.0), std::pair(0.0, 0.0), std::pair(kTouchMargin, kVertexReach),
-          std::pair(0.0, kVertexReach)}) {
-      const bool isFeature = collectPlanes(corners, touch);
-      if (planes_.empty()) continue;
-      const Vector3d fitted = fitPlanes(planes_, centre);
-      if (isInCell(fitted, reach)) return {fitted, isFeature};
-    }
-    return {toNearestPlane(centre, corners), false};
-  }
-
-  /// Planes that touch the surface in the cell or within `margin` of it. @return do they form an
-  /// edge?
-  bool collectPlanes(unsigned corners, double margin) {
-    planes_.clear();
-    double leastCosine = 1;
-    for (int corner = 0; corner < 8; ++corner) {
-      if (!((corners >> corner) & 1)) continue;
-      const std::array<int, 3> offset = {corner >> 2, (corner >> 1) & 1, corner & 1};
-      const Plane& plane = planeAt(offset);
-      const Vector3d point(offset[0], offset[1], offset[2]);
-      if (!plane.isKnown || !isInCell(point - plane.distance * plane.normal, margin)) continue;
-      for (const auto& other : planes_) {
-        leastCosine = std::min(leastCosine, plane.normal.dot(other.first));
-      }
-      planes_.emplace_back(plane.normal, plane.normal.dot(point) - plane.distance);
-    }
-    return leastCosine < kEdgeCosine;
-  }
-
-  Vector3d toNearestPlane(const Vector3d& centre, unsigned corners) {
-    collectPlanes(corners, kTouchMargin);
-    Vector3d shift = Vector3d::Constant(1);
-    for (const auto& [normal, offset] : planes_) {
-      const double distance = offset - normal.dot(centre);
-      if (std::abs(distance) < shift.norm()) shift = distance * normal;
-    }
-    return isInCell(centre + shift, 0) ? Vector3d(centre + shift) : centre;
-  }
-
-  BlockField& field_;
-  int x_, y_, z_;
-  std::vector<std::pair<Vector3d, Vector3d>> crossings_;  ///< with normals
-  std::vector<std::pair<Vector3d, double>> planes_;
-};
 
 /// Faces of a cell that one polygon passes twice: bit axis·2 + side, by polygon of the case.
 std::array<std::uint8_t, 4> facesPassedTwice(const CellCase& cell) {
@@ -311,20 +72,24 @@ class DualMesher {
 
   SharpMesh run() {
     vertices_.resize(surface_.cycleCount());
-    features_.resize(surface_.blocks().size());
     twice_.resize(surface_.cycleCount());
     cells_.resize(surface_.vertexCount());
     forEachBlock([this](const SurfaceBlock& block) { placeBlock(block); });
     collectSegments();
-    SharpMesh mesh;
-    for (const auto& part : features_)
-      mesh.features.insert(mesh.features.end(), part.begin(), part.end());
-    mesh.positions.reserve(vertices_.size() + segments_.size());
-    for (const DualVertex& v : vertices_) {
-      mesh.positions.emplace_back(v.position.x(), v.position.y(), v.position.z());
+    adoptSheets();
+    SharpMesh mesh = assemble();
+    std::vector<SheetQuality> quality(mesh.positions.size());
+    for (std::size_t i = 0; i < vertices_.size(); ++i)
+      quality[i] = {vertices_[i].misfit, vertices_[i].bend};
+    const std::vector<bool> isBeside = besideFeatures(mesh, grid_, mesh.sheets, quality);
+    takeFlatterPlanes(mesh, mesh.sheets, quality, isBeside);
+    for (std::size_t i = 0; i < vertices_.size(); ++i) {
+      const openvdb::Vec3d& p = mesh.positions[i];
+      vertices_[i].position = isBeside[i] ? Vector3d(p[0], p[1], p[2]) : vertices_[i].smooth;
+      vertices_[i].sheets = isBeside[i] ? mesh.sheets[i] : VertexSheets();
     }
-    for (const FaceSegment& segment : segments_) mesh.positions.push_back(middle(segment));
-    emit(mesh);
+    mesh = assemble();
+    insertFeatures(mesh, mesh.sheets);
     return mesh;
   }
 
@@ -344,21 +109,16 @@ class DualMesher {
       return table;
     }();
     if (!block.cycleCount) return;
-    BlockField field(grid_, block.origin);
+    VertexPlacer placer(grid_, block.origin);
     std::size_t cycle = block.firstCycle;
     const Vector3d origin(block.origin.x(), block.origin.y(), block.origin.z());
     surface_.forEachCell(block, [&](int x, int y, int z, unsigned pattern) {
       const CellCase& cell = cellTable()[pattern];
-      CellVertices placer(field, x, y, z);
       const std::uint8_t* edges = cell.cycleEdges.data();
       for (std::size_t i = 0; i < cell.cycleCount; edges += cell.cycleLength[i++], ++cycle) {
-        vertices_[cycle] = placer.place(edges, cell.cycleLength[i]);
-        if (vertices_[cycle].isFeature) {
-          SharpFeature& feature = features_[block.neighbour[0]].emplace_back(
-              featureAt(vertices_[cycle].position, placer.planes()));
-          feature.vertex = static_cast<std::uint32_t>(cycle);
-        }
-        vertices_[cycle].position += origin + Vector3d(x, y, z);
+        vertices_[cycle] = placer.place(x, y, z, edges, cell.cycleLength[i]);
+        vertices_[cycle].position += origin;
+        vertices_[cycle].smooth += origin;
         twice_[cycle] = twiceTable[pattern][i];
         for (std::size_t k = 0; k < cell.cycleLength[i]; ++k) {
           const std::uint32_t crossing = surface_.vertexOf(block, x, y, z, edges[k]);
@@ -393,6 +153,59 @@ class DualMesher {
     segment.oppositeCorner = lowInside ? high : low;
     segment.oppositeCorner[other] += kRing[i] & bit ? -1 : 1;
     return segment;
+  }
+
+  /// A cell beside a corner may have no grid point with a face to itself. Its vertex then goes
+  /// where the sheets of the vertices around it meet.
+  void adoptSheets() {
+    std::vector<std::size_t> slot(vertices_.size(), kNoSlot);
+    std::size_t count = 0;
+    for (std::size_t v = 0; v < vertices_.size(); ++v)
+      if (!vertices_[v].sheets.count) slot[v] = count++;
+    if (!count) return;
+    std::vector<std::vector<std::uint32_t>> around(count);
+    for (const auto& cells : cells_)
+      for (const std::uint32_t v : cells)
+        if (slot[v] != kNoSlot)
+          around[slot[v]].insert(around[slot[v]].end(), cells.begin(), cells.end());
+    for (std::size_t v = 0; v < vertices_.size(); ++v)
+      if (slot[v] != kNoSlot) adoptFrom(around[slot[v]], vertices_[v]);
+  }
+
+  void adoptFrom(const std::vector<std::uint32_t>& around, DualVertex& vertex) const {
+    std::vector<FacePlane> planes;
+    for (const std::uint32_t v : around) {
+      const DualVertex& other = vertices_[v];
+      for (std::size_t i = 0; i < other.sheets.count; ++i) {
+        const openvdb::Vec3f& n = other.sheets.normal[i];
+        const Vector3d normal = Eigen::Vector3f(n[0], n[1], n[2]).cast<double>();
+        const FacePlane plane{normal, normal.dot(other.position), 0};
+        if (std::abs(plane.above(vertex.position)) < kAdoptReach) planes.push_back(plane);
+      }
+    }
+    if (planes.empty()) return;
+    const Vector3d fitted = fitPlanes(planes, vertex.position);
+    const auto isTaken = [&](std::uint32_t v) {
+      return &vertices_[v] != &vertex && (vertices_[v].position - fitted).norm() < kApart;
+    };
+    if ((fitted - vertex.position).norm() > kAdoptReach ||
+        std::any_of(around.begin(), around.end(), isTaken))
+      return;
+    vertex.position = fitted;
+    vertex.sheets = sheetsAt(fitted, planes);
+    for (const FacePlane& plane : planes)
+      vertex.misfit = std::max(vertex.misfit, std::abs(plane.above(fitted)));
+  }
+
+  [[nodiscard]] SharpMesh assemble() const {
+    SharpMesh mesh;
+    mesh.positions.reserve(vertices_.size() + segments_.size());
+    for (const DualVertex& v : vertices_) mesh.positions.push_back(toIndex(v.position));
+    for (const FaceSegment& segment : segments_) mesh.positions.push_back(middle(segment));
+    mesh.sheets.resize(mesh.positions.size());
+    for (std::size_t i = 0; i < vertices_.size(); ++i) mesh.sheets[i] = vertices_[i].sheets;
+    emit(mesh);
+    return mesh;
   }
 
   template <typename Visit>
@@ -472,26 +285,27 @@ class DualMesher {
     });
   }
 
-  /// A diagonal must not cut across an edge of the solid: it starts from vertices on one, where
-  /// there are such. Otherwise the shorter one.
+  /// A diagonal must not cut across an edge of the solid; otherwise the shorter one.
   [[nodiscard]] std::size_t firstOfDiagonal(const std::vector<std::uint32_t>& quad) const {
-    const auto features = [&](std::size_t i) {
-      return vertices_[quad[i]].isFeature + vertices_[quad[i + 2]].isFeature;
+    const auto gap = [&](std::size_t i) {
+      const DualVertex &a = vertices_[quad[i]], &b = vertices_[quad[i + 2]];
+      return sheetGap(toIndex(a.position), a.sheets, toIndex(b.position), b.sheets);
     };
-    if (features(0) != features(1)) return features(0) > features(1) ? 0 : 1;
+    const double first = gap(0), second = gap(1);
+    if (std::abs(first - second) > kSameGap) return first < second ? 0 : 1;
     const auto length = [&](std::size_t i) {
       return (vertices_[quad[i]].position - vertices_[quad[i + 2]].position).squaredNorm();
     };
     return length(0) <= length(1) ? 0 : 1;
   }
 
+  static constexpr std::size_t kNoSlot = static_cast<std::size_t>(-1);
   const CellSurface& surface_;
   const FloatGrid& grid_;
   std::vector<DualVertex> vertices_;                 ///< by polygon
   std::vector<std::uint8_t> twice_;                  ///< facesPassedTwice, by polygon
   std::vector<std::array<std::uint32_t, 4>> cells_;  ///< polygons around each crossed edge, by slot
   std::vector<FaceSegment> segments_;
-  std::vector<std::vector<SharpFeature>> features_;  ///< by block
   std::vector<std::size_t> firstTriangle_;
 };
 

@@ -1,7 +1,6 @@
 #include "levelset/meshing/band_to_mesh.h"
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <openvdb/tools/ChangeBackground.h>
 #include <limits>
@@ -10,7 +9,10 @@
 
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
+#include "levelset/solids/csg.h"
 #include "tests/support/bands.h"
+#include "tests/support/rounded_solids.h"
+#include "tests/support/threads.h"
 
 namespace band_to_mesh_test {
 
@@ -53,12 +55,6 @@ double smallestArea(const TriMesh& mesh) {
     smallest = std::min(smallest, ab.cross(ac).length() / 2);
   }
   return smallest;
-}
-
-template <typename F>
-void withThreads(std::size_t count, const F& run) {
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, count);
-  run();
 }
 
 TEST(BandToMesh, PutsVerticesOnSphere) {
@@ -156,9 +152,9 @@ TEST(BandToMesh, HoldsFarFromOriginAndRotated) {
 TEST(BandToMesh, GivesSameBitsForAnyNumberOfThreads) {
   const NarrowBand band = noise(40, 7, true);
   TriMesh one;
-  withThreads(1, [&] { one = bandToMesh(band); });
+  support::onThreads(1, [&] { one = bandToMesh(band); });
   for (const std::size_t threads : {2u, 4u}) {
-    withThreads(threads, [&] {
+    support::onThreads(threads, [&] {
       const TriMesh other = bandToMesh(band);
       EXPECT_EQ(one.positions, other.positions);
       EXPECT_EQ(one.triangles, other.triangles);
@@ -179,43 +175,180 @@ Imath::M44d turned() {
   return m;
 }
 
-struct CubeError {
-  double vertices = 0;      ///< largest distance of a vertex from the cube
-  double farTriangles = 0;  ///< share of triangles whose middle or sides pass 0.05 voxel from it
-};
-
-CubeError cubeError(const TriMesh& mesh, const Imath::M44d& back, double half) {
-  CubeError error;
-  std::vector<V3d> local;
-  for (const V3d& p : mesh.positions) {
-    local.push_back(p * back);
-    error.vertices = std::max(error.vertices, std::abs(cubeDistance(local.back(), half)));
-  }
-  double far = 0;
+/// Largest distance of the points of a triangle mesh from the cube, on four points to a side.
+double meshToCube(const TriMesh& mesh, const Imath::M44d& back, double half) {
+  double worst = 0;
   for (const auto& t : mesh.triangles) {
-    const V3d a = local[t[0]], b = local[t[1]], c = local[t[2]];
-    double worst = 0;
-    for (const V3d& p : {(a + b + c) / 3., (a + b) / 2., (b + c) / 2., (c + a) / 2.}) {
-      worst = std::max(worst, std::abs(cubeDistance(p, half)));
+    for (int i = 0; i <= 4; ++i) {
+      for (int j = 0; i + j <= 4; ++j) {
+        const V3d p = (mesh.positions[t[0]] * i + mesh.positions[t[1]] * j +
+                       mesh.positions[t[2]] * (4 - i - j)) /
+                      4.0;
+        worst = std::max(worst, std::abs(cubeDistance(p * back, half)));
+      }
     }
-    far += worst > 0.05;
   }
-  error.farTriangles = far / static_cast<double>(mesh.triangles.size());
-  return error;
+  return worst;
 }
 
-TEST(BandToMesh, SharpKeepsEdgesOfTurnedCube) {
-  const Imath::M44d matrix = turned(), back = matrix.inverse();
-  for (const double half : {16.0, 32.13}) {
+double triangleDistance(const V3d& p, const V3d& a, const V3d& b, const V3d& c) {
+  const V3d normal = (b - a).cross(c - a);
+  bool isOver = true;
+  double nearest = std::numeric_limits<double>::max();
+  for (const auto& [from, to] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) {
+    isOver &= normal.cross(to - from).dot(p - from) >= 0;
+    const double t = std::clamp((p - from).dot(to - from) / (to - from).length2(), 0.0, 1.0);
+    nearest = std::min(nearest, (p - from - (to - from) * t).length());
+  }
+  return isOver ? std::abs(normal.dot(p - a)) / normal.length() : nearest;
+}
+
+/// Largest distance of the points of the cube's edges, corners among them, from the mesh.
+double cubeEdgesToMesh(const TriMesh& mesh, const Imath::M44d& back, double half) {
+  std::vector<std::array<V3d, 3>> beside;  // triangles near an edge, in the cube's own frame
+  for (const auto& t : mesh.triangles) {
+    const std::array<V3d, 3> corners = {mesh.positions[t[0]] * back, mesh.positions[t[1]] * back,
+                                        mesh.positions[t[2]] * back};
+    int near = 0;
+    for (int axis = 0; axis < 3; ++axis) near += std::abs(corners[0][axis]) > half - 2;
+    if (near > 1) beside.push_back(corners);
+  }
+  double worst = 0;
+  const int steps = static_cast<int>(std::ceil(2 * half / 0.4));
+  for (int edge = 0; edge < 12; ++edge) {
+    const int axis = edge / 4;
+    V3d p((edge & 1) ? half : -half);
+    p[(axis + 1) % 3] = (edge & 2) ? half : -half;
+    for (int i = 0; i <= steps; ++i) {
+      p[axis] = half * (2.0 * i / steps - 1);
+      double nearest = std::numeric_limits<double>::max();
+      for (const auto& t : beside) {
+        if ((t[0] - p).length2() > 9) continue;
+        nearest = std::min(nearest, triangleDistance(p, t[0], t[1], t[2]));
+      }
+      worst = std::max(worst, nearest);
+    }
+  }
+  return worst;
+}
+
+/// Area of the triangles whose normal is more than 60° off that of the cube's face under them.
+double foldedArea(const TriMesh& mesh, const Imath::M44d& back) {
+  double sum = 0;
+  for (const auto& t : mesh.triangles) {
+    const V3d a = mesh.positions[t[0]] * back, b = mesh.positions[t[1]] * back,
+              c = mesh.positions[t[2]] * back;
+    const V3d middle = (a + b + c) / 3.0, twice = (b - a).cross(c - a);
+    int axis = 0;
+    for (int i = 1; i < 3; ++i)
+      if (std::abs(middle[i]) > std::abs(middle[axis])) axis = i;
+    if (twice[axis] * (middle[axis] > 0 ? 1 : -1) < 0.5 * twice.length()) sum += twice.length() / 2;
+  }
+  return sum;
+}
+
+TEST(BandToMesh, SharpKeepsEdgesAndCornersOfTurnedCubes) {
+  std::mt19937 random(11);
+  const auto draw = [&] { return static_cast<double>(random() % 2001) / 1000 - 1; };
+  for (int turn = 0; turn < 8; ++turn) {
+    const double half = 10 + draw();
+    Imath::M44d matrix;
+    matrix.rotate(V3d(3 * draw(), 3 * draw(), 3 * draw()));
+    const V3d phase(draw(), draw(), draw());
+    for (int axis = 0; axis < 3; ++axis) matrix[3][axis] = phase[axis];
+    const Imath::M44d back = matrix.inverse();
     const NarrowBand band = support::sampleBand(
-        [&](const V3d& p) { return cubeDistance(p * back, half); }, cube(half * 1.6), 1);
-    const TriMesh mesh = bandToMesh(band, {.sharp = true}), uniform = bandToMesh(band);
+        [&](const V3d& p) { return cubeDistance(p * back, half); }, cube(half * 1.8), 1);
+    const TriMesh mesh = bandToMesh(band, {.sharp = true});
     EXPECT_TRUE(manifoldness(mesh).isClosedManifold());
-    const CubeError sharp = cubeError(mesh, back, half), cut = cubeError(uniform, back, half);
-    EXPECT_LT(sharp.vertices, 0.05);
-    EXPECT_LT(sharp.farTriangles, 0.02 * cut.farTriangles);
+    EXPECT_LT(meshToCube(mesh, back, half), 0.05) << turn;
+    EXPECT_LT(cubeEdgesToMesh(mesh, back, half), 0.05) << turn;
+    EXPECT_LT(foldedArea(mesh, back), 0.01) << turn;
     const double exact = 8 * half * half * half;
-    EXPECT_LT(std::abs(signedVolume(mesh) - exact), 0.04 * std::abs(signedVolume(uniform) - exact));
+    EXPECT_NEAR(signedVolume(mesh), exact, 1e-5 * exact);
+  }
+}
+
+TEST(BandToMesh, SharpKeepsConcaveEdges) {
+  // A cube without one of its octants: nine faces, three concave edges.
+  const Imath::M44d matrix = turned(), back = matrix.inverse();
+  const double half = 15.3;
+  const auto box = [&](const V3d& centre) {
+    return support::sampleBand([=](const V3d& p) { return cubeDistance(p * back - centre, half); },
+                               {V3d(-1.8 * half), V3d(3.6 * half)}, 1);
+  };
+  const NarrowBand band = subtract(box(V3d(0)), box(V3d(half)));
+  const TriMesh mesh = bandToMesh(band, {.sharp = true}), uniform = bandToMesh(band);
+  EXPECT_TRUE(manifoldness(mesh).isClosedManifold());
+  const double exact = 7 * half * half * half;
+  EXPECT_NEAR(signedVolume(mesh), exact, 1e-5 * exact);
+  EXPECT_GT(std::abs(signedVolume(uniform) - exact), 1e-4 * exact);
+}
+
+TEST(BandToMesh, SharpKeepsAWedge) {
+  // Two faces meet at 40° along the tip of a long prism.
+  const Imath::M44d matrix = turned(), back = matrix.inverse();
+  const double slope = 20 * std::acos(-1.0) / 180, length = 14, depth = 9;
+  const auto planes = [=](const V3d& p) {
+    const V3d q = p * back;
+    return std::max({std::abs(q.y) * std::cos(slope) + (q.x - length) * std::sin(slope),
+                     -q.x - length, std::abs(q.z) - depth});
+  };
+  const TriMesh mesh = bandToMesh(support::sampleBand(planes, cube(24), 1), {.sharp = true});
+  EXPECT_TRUE(manifoldness(mesh).isClosedManifold());
+  double worst = 0;
+  for (const V3d& p : mesh.positions) worst = std::max(worst, std::abs(planes(p)));
+  EXPECT_LT(worst, 0.05);
+  // What is cut off between the vertices is missing from the volume.
+  const double exact = 4 * length * length * std::tan(slope) * 2 * depth;
+  EXPECT_NEAR(signedVolume(mesh), exact, 1e-4 * exact);
+}
+
+TEST(BandToMesh, SharpKeepsRoundSolidsRound) {
+  for (const double radius : {3.0, 4.0, 5.0, 6.0, 8.0, 20.0}) {
+    for (const V3d& centre : {V3d(0), V3d(0.3, 0.1, -0.4), V3d(0.5, 0.25, 0.1)}) {
+      const TriMesh mesh = bandToMesh(sphere(radius, 1, centre), {.sharp = true});
+      EXPECT_TRUE(manifoldness(mesh).isClosedManifold());
+      double worst = 0;
+      for (const V3d& p : mesh.positions)
+        worst = std::max(worst, std::abs((p - centre).length() - radius));
+      EXPECT_LT(worst, 0.05) << radius << centre;
+    }
+  }
+}
+
+TEST(BandToMesh, SharpLeavesRoundedEdgesRound) {
+  for (const support::RoundedSolid& solid : support::roundedSolids()) {
+    const TriMesh mesh = bandToMesh(solid.band(), {.sharp = true});
+    double worst = 0;
+    for (const V3d& p : mesh.positions) worst = std::max(worst, std::abs(solid.distance(p)));
+    EXPECT_LT(worst, 0.1) << solid.name;
+  }
+}
+
+TEST(BandToMesh, SharpDoesNotDependOnThreads) {
+  const Imath::M44d back = turned().inverse();
+  const NarrowBand band =
+      support::sampleBand([&](const V3d& p) { return cubeDistance(p * back, 12.3); }, cube(22), 1);
+  std::vector<TriMesh> meshes;
+  for (const std::size_t threads : {1, 2, 4})
+    support::onThreads(threads, [&] { meshes.push_back(bandToMesh(band, {.sharp = true})); });
+  for (std::size_t i = 1; i < 3; ++i) {
+    EXPECT_EQ(meshes[0].positions, meshes[i].positions);
+    EXPECT_EQ(meshes[0].triangles, meshes[i].triangles);
+  }
+}
+
+TEST(BandToMesh, SharpFindsNoEdgesOnSmoothSurfaces) {
+  // A quadrilateral for each crossed edge, and nothing inserted.
+  const auto torus = [](const V3d& p) { return std::hypot(std::hypot(p.x, p.y) - 24, p.z) - 9.3; };
+  const std::array<NarrowBand, 2> bands = {
+      sphere(12.4, 1, V3d(0.3, 0.1, -0.4)),
+      support::sampleBand(torus, {V3d(-34, -34, -10), V3d(34, 34, 10)}, 1)};
+  for (const NarrowBand& band : bands) {
+    const TriMesh mesh = bandToMesh(band, {.sharp = true}), uniform = bandToMesh(band);
+    EXPECT_EQ(mesh.triangles.size(), 2 * uniform.positions.size());
+    EXPECT_EQ(measure(mesh).euler, measure(uniform).euler);
   }
 }
 
@@ -254,13 +387,13 @@ TEST(BandToMesh, SharpIsClosedManifoldForEveryPatternOfSigns) {
   for (unsigned seed = 0; seed < 4; ++seed) {
     const NarrowBand band = noise(26, seed, seed % 2 == 1);
     TriMesh mesh;
-    withThreads(1, [&] { mesh = bandToMesh(band, {.sharp = true}); });
+    support::onThreads(1, [&] { mesh = bandToMesh(band, {.sharp = true}); });
     const Manifoldness found = manifoldness(mesh);
     EXPECT_EQ(found.boundaryEdges, 0u);
     EXPECT_EQ(found.nonManifoldEdges, 0u);
     EXPECT_EQ(found.misorientedEdges, 0u);
     EXPECT_EQ(found.nonManifoldVertices, 0u);
-    withThreads(4, [&] {
+    support::onThreads(4, [&] {
       const TriMesh other = bandToMesh(band, {.sharp = true});
       EXPECT_EQ(mesh.positions, other.positions);
       EXPECT_EQ(mesh.triangles, other.triangles);

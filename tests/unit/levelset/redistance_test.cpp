@@ -8,6 +8,7 @@
 #include "levelset/error.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/rounded_solids.h"
 #include "tests/support/threads.h"
 
 namespace redistance_test {
@@ -232,6 +233,14 @@ TEST(Redistance, DoesNotDependOnScaleOrPlace) {
   const Shape ball = [=](const V3d& p) { return sphere(10)(p - away); };
   const NarrowBand field = support::sampleBand(ball, {away - V3d(11), away + V3d(11)}, 1);
   EXPECT_NEAR(bandError(redistance(field), ball).l1, l1, 1e-4);
+}
+
+TEST(Redistance, LeavesRoundedEdgesRound) {
+  for (const support::RoundedSolid& solid : support::roundedSolids()) {
+    const BandError e = bandError(redistance(solid.band()), solid.distance);
+    EXPECT_LE(e.l1, 0.02) << solid.name;
+    EXPECT_LE(e.linf, 0.2) << solid.name;
+  }
 }
 
 TEST(Redistance, WorksAtAnyHalfWidth) {

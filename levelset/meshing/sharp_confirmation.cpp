@@ -1,0 +1,335 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <tuple>
+
+#include "levelset/meshing/sharp_vertices.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::Vec3d;
+
+/// Of a feature: largest distance from the planes of its faces, voxels.
+constexpr double kMisfit = 0.1;
+/// Between these distances from a feature, in voxels, the surface must be as flat as its faces …
+constexpr double kRingBegin = 0.8, kRingEnd = 2.3;
+/// … which is when all but this part of it turns away from them by less than this part of the angle
+/// between them. On a round surface the normal goes on turning.
+constexpr double kOddPart = 0.15, kTurn = 0.35;
+/// The surface that does not turn away is no further from their planes, voxels.
+constexpr double kOffFace = 0.35;
+/// A vertex further from a plane that it was fitted to, voxels, stands for two surfaces that run
+/// through its cell; it lies on neither.
+constexpr double kTorn = 0.3;
+/// A sheet is flat where second differences, in voxels, are below that share of the feature's angle
+/// in radians.
+constexpr double kFlatBend = 0.06;
+/// Planes of places with larger second differences, voxels, give way to those of places where they
+/// are so many times smaller, …
+constexpr double kBent = 0.005, kFlatter = 4;
+/// … if these belong to the same face: no further off the vertex, voxels. What that moves a vertex
+/// by, voxels, is no more either.
+constexpr double kSameFace = 0.3;
+/// Inside a convex edge, or outside a concave one, the values up to that many voxels away are those
+/// of the nearer sheet, and beyond the edge those of the edge, …
+constexpr double kEdgeReach = 1.5;
+/// … to that many voxels, but for so large a part of them: near a corner a third sheet is nearer.
+/// At a right angle that is rounded off they differ by up to 2/5 of the radius.
+constexpr double kRounded = 0.06, kRoundedPart = 0.15, kCornerReach = 2;
+/// Vertices that near to a feature, along the surface, in voxels, are beside it.
+constexpr double kBeside = 3;
+
+/// The triangles at each vertex of a mesh.
+class Fans {
+ public:
+  explicit Fans(const IndexMesh& mesh) : begin_(mesh.positions.size() + 1) {
+    for (const auto& triangle : mesh.triangles)
+      for (const std::uint32_t v : triangle) ++begin_[v + 1];
+    for (std::size_t i = 1; i < begin_.size(); ++i) begin_[i] += begin_[i - 1];
+    triangles_.resize(mesh.triangles.size() * 3);
+    std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
+    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+      for (const std::uint32_t v : mesh.triangles[t]) triangles_[next[v]++] = t;
+  }
+  [[nodiscard]] std::span<const std::uint32_t> at(std::uint32_t vertex) const {
+    return {triangles_.data() + begin_[vertex], begin_[vertex + 1] - begin_[vertex]};
+  }
+
+ private:
+  std::vector<std::size_t> begin_;
+  std::vector<std::uint32_t> triangles_;
+};
+
+/// Triangles connected to a vertex and nearer than `radius`.
+std::vector<std::uint32_t> trianglesNear(const IndexMesh& mesh, const Fans& fans,
+                                         std::uint32_t vertex, double radius) {
+  const Vec3d centre = mesh.positions[vertex];
+  std::vector<std::uint32_t> vertices{vertex}, found;
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    for (const std::uint32_t t : fans.at(vertices[i])) {
+      if (std::find(found.begin(), found.end(), t) != found.end()) continue;
+      found.push_back(t);
+      for (const std::uint32_t v : mesh.triangles[t])
+        if ((mesh.positions[v] - centre).lengthSqr() < radius * radius &&
+            std::find(vertices.begin(), vertices.end(), v) == vertices.end())
+          vertices.push_back(v);
+    }
+  return found;
+}
+
+/// Between two of the sheets.
+double widestAngle(const VertexSheets& sheets) {
+  double least = 1;
+  for (std::size_t i = 0; i < sheets.count; ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      least = std::min(least, sheetNormal(sheets, i).dot(sheetNormal(sheets, j)));
+  return std::acos(std::clamp(least, -1.0, 1.0));
+}
+
+/// Is each sheet of a feature flat somewhere near it? A round surface that turns by the same angle
+/// within reach of one cell's planes is bent everywhere, by at least twice kFlatBend of the angle.
+bool hasFlatSheets(const IndexMesh& mesh, std::span<const std::uint32_t> triangles,
+                   std::uint32_t feature, const std::vector<VertexSheets>& sheets,
+                   const std::vector<SheetQuality>& quality) {
+  const VertexSheets& own = sheets[feature];
+  const double angle = widestAngle(own), turn = std::cos(kTurn * angle);
+  unsigned flat = 0;
+  for (const std::uint32_t t : triangles)
+    for (const std::uint32_t v : mesh.triangles[t]) {
+      if (quality[v].bend > kFlatBend * angle) continue;
+      for (std::size_t i = 0; i < own.count; ++i)
+        for (std::size_t k = 0; k < sheets[v].count; ++k)
+          if (sheetNormal(own, i).dot(sheetNormal(sheets[v], k)) > turn) flat |= 1u << i;
+    }
+  return flat + 1 == 1u << own.count;
+}
+
+/// Does the surface around a feature lie in the planes of its faces?
+bool isConfirmed(const IndexMesh& mesh, const Fans& fans, std::uint32_t vertex,
+                 const VertexSheets& sheets, const std::vector<SheetQuality>& quality) {
+  const double turn = std::cos(kTurn * widestAngle(sheets));
+  double area = 0, odd = 0;
+  for (const std::uint32_t t : trianglesNear(mesh, fans, vertex, kRingEnd)) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    const Vec3d p = mesh.positions[a];
+    const Vec3d middle = (p + mesh.positions[b] + mesh.positions[c]) / 3;
+    if ((middle - mesh.positions[vertex]).length() < kRingBegin) continue;
+    const Vec3d normal = (mesh.positions[b] - p).cross(mesh.positions[c] - p);
+    const double size = normal.length();
+    const auto& triangle = mesh.triangles[t];
+    const bool isTorn = std::any_of(triangle.begin(), triangle.end(),
+                                    [&](std::uint32_t v) { return quality[v].misfit > kTorn; });
+    bool isIn = false, isFar = false;
+    for (std::size_t i = 0; i < sheets.count; ++i) {
+      const Vec3d n = sheetNormal(sheets, i);
+      const double cosine = normal.dot(n);
+      isIn |= cosine >= turn * size && std::abs(n.dot(middle - mesh.positions[vertex])) < kOffFace;
+      isFar |= cosine < -turn * size;
+    }
+    // The far side of a thin plate neither shows the faces nor denies them.
+    if (isFar && !isIn && !isTorn) continue;
+    area += size;
+    if (!isIn || isTorn) odd += size;
+  }
+  return area > 0 && odd <= kOddPart * area;
+}
+
+/// How many grid points beside an edge were looked at, and at how many the values are not those of
+/// a sharp one: were it convex, were it concave.
+struct EdgeEvidence {
+  std::array<std::size_t, 2> points = {}, odd = {};
+
+  void add(const EdgeEvidence& other) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      points[i] += other.points[i];
+      odd[i] += other.odd[i];
+    }
+  }
+  [[nodiscard]] bool isSharp() const {
+    const auto speaksFor = [&](std::size_t i) {
+      return points[i] &&
+             static_cast<double>(odd[i]) <= kRoundedPart * static_cast<double>(points[i]);
+    };
+    return speaksFor(0) || speaksFor(1);
+  }
+};
+
+/// Of a vertex with two sheets. Inside a convex edge the distance is that to the nearer plane, and
+/// beyond the edge no larger than that to it; a concave one is the same with the signs changed.
+EdgeEvidence evidenceAt(const Vec3d& vertex, const VertexSheets& sheets,
+                        const openvdb::FloatGrid::ConstAccessor& field, double voxelSize,
+                        double halfWidth) {
+  const Vec3d n0 = sheetNormal(sheets, 0), n1 = sheetNormal(sheets, 1);
+  const double cosine = n0.dot(n1);
+  Vec3d along = n0.cross(n1);
+  along.normalize();
+  EdgeEvidence found;
+  const openvdb::Coord centre = openvdb::Coord::round(vertex);
+  for (const openvdb::Coord& c : openvdb::CoordBBox(centre.offsetBy(-2), centre.offsetBy(2))) {
+    const Vec3d to = c.asVec3d() - vertex;
+    const double ahead = to.dot(along), across = (to - along * ahead).length();
+    const double value = static_cast<double>(field.getValue(c)) / voxelSize;
+    // A value that is cut off at the band's rim tells nothing.
+    if (std::abs(ahead) > kEdgeReach || std::abs(value) > halfWidth * (1 - 1e-5)) continue;
+    for (const int sign : {1, -1}) {
+      const double d0 = sign * to.dot(n0), d1 = sign * to.dot(n1), d = sign * value;
+      const bool isInside = d0 < 0 && d1 < 0 && std::min(d0, d1) > -kEdgeReach;
+      const bool isBeyond = d0 > cosine * d1 && d1 > cosine * d0 && across < kEdgeReach;
+      if (!isInside && !isBeyond) continue;
+      ++found.points[sign < 0];
+      found.odd[sign < 0] +=
+          isInside ? std::abs(d - std::max(d0, d1)) > kRounded : d > across + kRounded;
+    }
+  }
+  return found;
+}
+
+/// Are the sheets of one edge those of the other?
+bool areSameSheets(const VertexSheets& a, const VertexSheets& b) {
+  if (a.count != 2 || b.count != 2) return false;
+  const auto match = [&](std::size_t i, std::size_t j) {
+    return sheetNormal(a, i).dot(sheetNormal(b, j)) > kOneSheetCosine;
+  };
+  return (match(0, 0) && match(1, 1)) || (match(0, 1) && match(1, 0));
+}
+
+/// Do the values around an edge say that it is not rounded off? Near a corner they tell of a third
+/// sheet.
+bool isSharp(const IndexMesh& mesh, std::span<const std::uint32_t> triangles, std::uint32_t feature,
+             const std::vector<VertexSheets>& sheets, const std::vector<EdgeEvidence>& evidence) {
+  std::vector<std::uint32_t> edge, corners;
+  for (const std::uint32_t t : triangles)
+    for (const std::uint32_t v : mesh.triangles[t]) {
+      if (areSameSheets(sheets[v], sheets[feature])) edge.push_back(v);
+      if (sheets[v].count > 2) corners.push_back(v);
+    }
+  for (auto* list : {&edge, &corners}) {
+    std::sort(list->begin(), list->end());
+    list->erase(std::unique(list->begin(), list->end()), list->end());
+  }
+  EdgeEvidence all, apart;
+  for (const std::uint32_t v : edge) {
+    all.add(evidence[v]);
+    if (std::none_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
+          return (mesh.positions[v] - mesh.positions[corner]).length() < kCornerReach;
+        }))
+      apart.add(evidence[v]);
+  }
+  return apart.points[0] + apart.points[1] ? apart.isSharp() : all.isSharp();
+}
+
+/// A sheet as one vertex tells it.
+struct ToldSheet {
+  std::uint32_t vertex;
+  Vec3d normal;
+};
+
+/// A sheet of a vertex as another one tells it better: the nearest of the much flatter ones.
+ToldSheet flatterSheet(const IndexMesh& mesh, std::span<const std::uint32_t> triangles,
+                       const ToldSheet& own, const std::vector<VertexSheets>& sheets,
+                       const std::vector<SheetQuality>& quality) {
+  const Vec3d position = mesh.positions[own.vertex];
+  ToldSheet best = own;
+  double least = kBeside * kBeside;
+  for (const std::uint32_t t : triangles)
+    for (const std::uint32_t v : mesh.triangles[t]) {
+      if (quality[v].bend * kFlatter > quality[own.vertex].bend || quality[v].misfit > kMisfit)
+        continue;
+      const Vec3d to = mesh.positions[v] - position;
+      for (std::size_t k = 0; k < sheets[v].count; ++k) {
+        const Vec3d n = sheetNormal(sheets[v], k);
+        if (n.dot(own.normal) < kOneSheetCosine || std::abs(n.dot(to)) > kSameFace ||
+            std::pair(to.lengthSqr(), v) >= std::pair(least, best.vertex))
+          continue;
+        least = to.lengthSqr();
+        best = {v, n};
+      }
+    }
+  return best;
+}
+
+}  // namespace
+
+void takeFlatterPlanes(IndexMesh& mesh, std::vector<VertexSheets>& sheets,
+                       const std::vector<SheetQuality>& quality,
+                       const std::vector<bool>& isBeside) {
+  std::vector<std::uint32_t> bent;
+  for (std::uint32_t v = 0; v < sheets.size(); ++v)
+    if (isBeside[v] && sheets[v].count && quality[v].bend > kBent) bent.push_back(v);
+  if (bent.empty()) return;
+  const Fans fans(mesh);
+  std::vector<std::pair<Vec3d, VertexSheets>> moved(bent.size());
+  tbb::parallel_for(std::size_t{0}, bent.size(), [&](std::size_t i) {
+    const std::uint32_t v = bent[i];
+    moved[i] = {mesh.positions[v], sheets[v]};
+    const auto near = trianglesNear(mesh, fans, v, kBeside);
+    std::vector<FacePlane> planes;
+    for (std::size_t k = 0; k < sheets[v].count; ++k) {
+      const auto [on, n] =
+          flatterSheet(mesh, near, {v, sheetNormal(sheets[v], k)}, sheets, quality);
+      moved[i].second.normal[k] = openvdb::Vec3f(n);
+      planes.push_back({{n[0], n[1], n[2]}, n.dot(mesh.positions[on])});
+    }
+    const Vec3d& p = mesh.positions[v];
+    const Eigen::Vector3d fitted = fitPlanes(planes, {p[0], p[1], p[2]});
+    const Vec3d target(fitted.x(), fitted.y(), fitted.z());
+    if ((target - p).length() > kSameFace)
+      moved[i].second = sheets[v];
+    else
+      moved[i].first = target;
+  });
+  for (std::size_t i = 0; i < bent.size(); ++i)
+    std::tie(mesh.positions[bent[i]], sheets[bent[i]]) = moved[i];
+}
+
+std::vector<bool> besideFeatures(const IndexMesh& mesh, const openvdb::FloatGrid& field,
+                                 const std::vector<VertexSheets>& sheets,
+                                 const std::vector<SheetQuality>& quality) {
+  std::vector<bool> isBeside(mesh.positions.size());
+  std::vector<std::uint32_t> features;
+  for (std::uint32_t v = 0; v < sheets.size(); ++v)
+    if (sheets[v].count > 1 && quality[v].misfit <= kMisfit) features.push_back(v);
+  if (features.empty()) return isBeside;
+  const Fans fans(mesh);
+  std::vector<EdgeEvidence> evidence(mesh.positions.size());
+  const double voxelSize = field.voxelSize()[0];
+  const double halfWidth = static_cast<double>(field.background()) / voxelSize;
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, features.size(), 64), [&](const auto& range) {
+        const auto accessor = field.getConstAccessor();
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          const std::uint32_t v = features[i];
+          if (sheets[v].count == 2)
+            evidence[v] = evidenceAt(mesh.positions[v], sheets[v], accessor, voxelSize, halfWidth);
+        }
+      });
+  std::vector<std::vector<std::uint32_t>> near(features.size());
+  std::vector<char> isSure(features.size()), isEdge(mesh.positions.size());
+  tbb::parallel_for(std::size_t{0}, features.size(), [&](std::size_t i) {
+    const std::uint32_t v = features[i];
+    near[i] = trianglesNear(mesh, fans, v, kBeside);
+    isSure[i] = isConfirmed(mesh, fans, v, sheets[v], quality) &&
+                hasFlatSheets(mesh, near[i], v, sheets, quality);
+    isEdge[v] = isSure[i] && isSharp(mesh, near[i], v, sheets, evidence);
+    if (!isEdge[v] && !(isSure[i] && sheets[v].count > 2)) near[i] = {};
+  });
+  // At a corner the values tell of three sheets: it is as sharp as the edges that end there.
+  const auto touchesEdge = [&](std::uint32_t t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    return isEdge[a] || isEdge[b] || isEdge[c];
+  };
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    const bool isCorner = isSure[i] && sheets[features[i]].count > 2 &&
+                          std::any_of(near[i].begin(), near[i].end(), touchesEdge);
+    if (!isCorner && !isEdge[features[i]]) continue;
+    for (const std::uint32_t t : near[i])
+      for (const std::uint32_t v : mesh.triangles[t]) isBeside[v] = true;
+  }
+  return isBeside;
+}
+
+}  // namespace levelset

@@ -1,0 +1,382 @@
+#include "levelset/meshing/sharp_features.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <span>
+#include <tuple>
+#include <utility>
+
+#include "levelset/meshing/sharp_edges.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::Vec3d;
+using Triangle = MeshTriangle;
+
+/// A mesh edge or triangle nearer to the solid's edge or corner than that, voxels, is left alone.
+constexpr double kFeatureTolerance = 0.01;
+/// What a new vertex may be away from the edge or triangle that it is put into, voxels.
+constexpr double kFeatureReach = 1.5;
+/// Sheets at a smaller angle form no edge.
+constexpr double kCreaseCosine = 0.88;
+/// What a pass inserts can ask for more: a corner after the three edges that run into it.
+constexpr int kPasses = 8;
+/// Two corners are at least that far apart, voxels.
+constexpr double kCornerApart = 0.1;
+/// Three sheets of which one is nearly parallel to the line of the others form no corner.
+constexpr double kLeastDeterminant = 0.05;
+constexpr std::uint32_t kNoVertex = 0xffffffffu;
+
+/// A sheet's plane n·x = d.
+struct SheetPlane {
+  Vec3d n;
+  double d;
+  [[nodiscard]] double above(const Vec3d& p) const { return n.dot(p) - d; }
+};
+
+struct NewVertex {
+  Vec3d position;
+  VertexSheets sheets;
+  double gap = 0;  ///< how far the surface is from the mesh there, voxels
+};
+
+void addSheet(VertexSheets& sheets, const Vec3d& n) {
+  if (sheets.count == VertexSheets::kMost) return;
+  for (std::size_t i = 0; i < sheets.count; ++i)
+    if (sheetNormal(sheets, i).dot(n) > kOneSheetCosine) return;
+  sheets.normal[sheets.count++] = openvdb::Vec3f(n);
+}
+
+/// The point of the line in which two sheets meet that is nearest to the middle of the segment from
+/// a point of the one to a point of the other; none where they do not form an edge between both.
+std::optional<Vec3d> creasePoint(const Vec3d& a, const Vec3d& na, const Vec3d& b, const Vec3d& nb) {
+  const double cosine = na.dot(nb);
+  if (cosine > kCreaseCosine || cosine < -kCreaseCosine) return std::nullopt;
+  // Across a convex edge each point lies below the other's plane, across a concave one above.
+  const double belowB = nb.dot(a - b), belowA = na.dot(b - a);
+  if (!(belowA * belowB > 0)) return std::nullopt;
+  const Vec3d middle = (a + b) * 0.5;
+  const double da = na.dot(a - middle), db = nb.dot(b - middle);
+  const double squaredSine = 1 - cosine * cosine;
+  return middle + na * ((da - cosine * db) / squaredSine) + nb * ((db - cosine * da) / squaredSine);
+}
+
+double segmentDistance(const Vec3d& p, const Vec3d& a, const Vec3d& b) {
+  const Vec3d along = b - a;
+  const double t = std::clamp((p - a).dot(along) / along.lengthSqr(), 0.0, 1.0);
+  return (p - a - along * t).length();
+}
+
+class FeatureInserter {
+ public:
+  FeatureInserter(IndexMesh& mesh, std::vector<VertexSheets>& sheets)
+      : positions_(mesh.positions), triangles_(mesh.triangles), sheets_(sheets) {}
+
+  void run() {
+    collectCorners();
+    for (int pass = 0; pass < kPasses; ++pass) {
+      collect();
+      if (edges_.empty() && faces_.empty()) return;
+      hasChanged_ = false;
+      flipEdges();
+      splitEdges();
+      splitFaces();
+      if (!hasChanged_) return;
+    }
+  }
+
+ private:
+  [[nodiscard]] double gapBetween(std::uint32_t a, std::uint32_t b) const {
+    return sheetGap(positions_[a], sheets_[a], positions_[b], sheets_[b]);
+  }
+
+  /// Where a vertex belongs on a mesh edge, if it needs one.
+  [[nodiscard]] std::optional<NewVertex> edgeVertex(std::uint32_t a, std::uint32_t b) const {
+    if (gapBetween(a, b) < kFeatureTolerance) return std::nullopt;
+    const Vec3d &pa = positions_[a], &pb = positions_[b];
+    const Vec3d middle = (pa + pb) * 0.5;
+    std::optional<NewVertex> best;
+    double least = kFeatureReach;
+    for (std::size_t i = 0; i < sheets_[a].count; ++i) {
+      for (std::size_t j = 0; j < sheets_[b].count; ++j) {
+        const Vec3d na = sheetNormal(sheets_[a], i), nb = sheetNormal(sheets_[b], j);
+        const std::optional<Vec3d> point = creasePoint(pa, na, pb, nb);
+        if (!point || (*point - middle).length() >= least) continue;
+        const double gap = segmentDistance(*point, pa, pb);
+        if (gap < kFeatureTolerance) continue;
+        least = (*point - middle).length();
+        best = NewVertex{*point, {}, gap};
+        addSheet(best->sheets, na);
+        addSheet(best->sheets, nb);
+      }
+    }
+    if (best) return best;
+    // The edge of the solid ends at a corner before it gets between both.
+    const std::array<std::uint32_t, 2> ends = {a, b};
+    best = cornerOf(ends, middle);
+    if (best) best->gap = segmentDistance(best->position, pa, pb);
+    return best && best->gap > kFeatureTolerance ? best : std::nullopt;
+  }
+
+  /// Does a triangle lie in one sheet of a vertex of it, turned as that?
+  [[nodiscard]] bool fitsSheet(const Triangle& t) const {
+    const Vec3d area =
+        (positions_[t[1]] - positions_[t[0]]).cross(positions_[t[2]] - positions_[t[0]]);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const VertexSheets& sheets = sheets_[t[i]];
+      for (std::size_t k = 0; k < sheets.count; ++k) {
+        const Vec3d n = sheetNormal(sheets, k);
+        const auto off = [&](std::size_t j) {
+          return std::abs(n.dot(positions_[t[j]] - positions_[t[i]]));
+        };
+        if (off((i + 1) % 3) < kInSheet && off((i + 2) % 3) < kInSheet && n.dot(area) > 0)
+          return true;
+      }
+    }
+    return false;
+  }
+
+  [[nodiscard]] bool isOffSheets(const Triangle& t) const {
+    const bool hasFeature =
+        std::any_of(t.begin(), t.end(), [this](std::uint32_t v) { return sheets_[v].count > 1; });
+    const bool isKnown =
+        std::all_of(t.begin(), t.end(), [this](std::uint32_t v) { return sheets_[v].count > 0; });
+    return hasFeature && isKnown && !fitsSheet(t);
+  }
+
+  /// The corner where the sheets of some vertices meet, if they are three and it is beside `near`.
+  [[nodiscard]] std::optional<NewVertex> cornerOf(std::span<const std::uint32_t> vertices,
+                                                  const Vec3d& near) const {
+    NewVertex corner;
+    std::vector<SheetPlane> planes;
+    for (const std::uint32_t v : vertices) {
+      for (std::size_t k = 0; k < sheets_[v].count; ++k) {
+        const std::uint8_t before = corner.sheets.count;
+        const Vec3d n = sheetNormal(sheets_[v], k);
+        addSheet(corner.sheets, n);
+        if (corner.sheets.count > before) planes.push_back({n, n.dot(positions_[v])});
+      }
+    }
+    if (planes.size() != 3) return std::nullopt;
+    const Vec3d &n0 = planes[0].n, &n1 = planes[1].n, &n2 = planes[2].n;
+    const double determinant = n0.dot(n1.cross(n2));
+    if (std::abs(determinant) < kLeastDeterminant) return std::nullopt;
+    corner.position =
+        (n1.cross(n2) * planes[0].d + n2.cross(n0) * planes[1].d + n0.cross(n1) * planes[2].d) /
+        determinant;
+    if ((corner.position - near).length() > kFeatureReach || isTaken(corner.position))
+      return std::nullopt;
+    return corner;
+  }
+
+  /// Where a vertex belongs in a triangle whose sides are fine, if it needs one.
+  [[nodiscard]] std::optional<NewVertex> faceVertex(const Triangle& t) const {
+    if (!isOffSheets(t)) return std::nullopt;
+    const Vec3d &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
+    std::optional<NewVertex> vertex = cornerOf(t, (a + b + c) / 3.0);
+    if (!vertex) return std::nullopt;
+    Vec3d normal = (b - a).cross(c - a);
+    normal.normalize();
+    vertex->gap = std::abs(normal.dot(vertex->position - a));
+    if (vertex->gap < kFeatureTolerance) return std::nullopt;
+    return vertex;
+  }
+
+  // === Corners, so that no two vertices are put on one
+
+  static std::array<int, 3> cornerCell(const Vec3d& p) {
+    return {static_cast<int>(std::floor(p[0])), static_cast<int>(std::floor(p[1])),
+            static_cast<int>(std::floor(p[2]))};
+  }
+
+  [[nodiscard]] bool isTaken(const Vec3d& p) const {
+    const std::array<int, 3> low = cornerCell(p - Vec3d(kCornerApart)),
+                             high = cornerCell(p + Vec3d(kCornerApart));
+    for (int x = low[0]; x <= high[0]; ++x)
+      for (int y = low[1]; y <= high[1]; ++y)
+        for (int z = low[2]; z <= high[2]; ++z) {
+          const auto found = corners_.find({x, y, z});
+          if (found == corners_.end()) continue;
+          for (const std::uint32_t v : found->second)
+            if ((positions_[v] - p).length() < kCornerApart) return true;
+        }
+    return false;
+  }
+
+  void collectCorners() {
+    for (std::uint32_t v = 0; v < sheets_.size(); ++v)
+      if (sheets_[v].count > 2) corners_[cornerCell(positions_[v])].push_back(v);
+  }
+
+  void collect() {
+    constexpr std::size_t kChunk = 1 << 14;
+    const std::size_t chunks = (triangles_.size() + kChunk - 1) / kChunk;
+    std::vector<std::vector<TriangleSide>> sides(chunks);
+    std::vector<std::vector<std::size_t>> faces(chunks);
+    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+      const std::size_t end = std::min(triangles_.size(), (chunk + 1) * kChunk);
+      for (std::size_t i = chunk * kChunk; i < end; ++i) {
+        const Triangle& t = triangles_[i];
+        bool isCut = false;
+        for (std::size_t k = 0; k < 3; ++k) {
+          const std::uint32_t a = std::min(t[k], t[(k + 1) % 3]),
+                              b = std::max(t[k], t[(k + 1) % 3]);
+          if (!edgeVertex(a, b)) continue;
+          sides[chunk].push_back({a, b, i});
+          isCut = true;
+        }
+        if (!isCut && isOffSheets(t)) faces[chunk].push_back(i);
+      }
+    });
+    std::vector<TriangleSide> all;
+    faces_.clear();
+    for (std::size_t i = 0; i < chunks; ++i) {
+      all.insert(all.end(), sides[i].begin(), sides[i].end());
+      faces_.insert(faces_.end(), faces[i].begin(), faces[i].end());
+    }
+    // A flip may join a triangle to a corner on the other side of one of its sides.
+    addSides(triangles_, faces_, all);
+    edges_ = pairSides(std::move(all));
+    for (PairedEdge& edge : edges_) {
+      const std::optional<NewVertex> vertex = edgeVertex(edge.low, edge.high);
+      edge.weight = vertex ? vertex->gap : 0;
+    }
+    std::stable_sort(edges_.begin(), edges_.end(),
+                     [](const PairedEdge& a, const PairedEdge& b) { return a.weight > b.weight; });
+  }
+
+  void flipEdges() {
+    if (edges_.empty()) return;
+    std::unordered_set<std::uint64_t> present = edgesBeside(edges_, triangles_, positions_.size());
+    touched_.assign(triangles_.size(), false);
+    for (PairedEdge& edge : edges_) {
+      const auto [first, second] = edge.triangle;
+      if (touched_[first] || touched_[second]) continue;
+      const EdgeFlip flip = flipOf(edge, triangles_, present);
+      if (!flip.isPossible || !fitsSheet(flip.left) || !fitsSheet(flip.right)) continue;
+      applyFlip(flip, edge, triangles_, present);
+      touched_[first] = touched_[second] = hasChanged_ = true;
+      edge.done = true;
+    }
+  }
+
+  [[nodiscard]] std::uint32_t add(const NewVertex& vertex) {
+    hasChanged_ = true;
+    const auto index = static_cast<std::uint32_t>(positions_.size());
+    positions_.push_back(vertex.position);
+    sheets_.push_back(vertex.sheets);
+    if (vertex.sheets.count > 2) corners_[cornerCell(vertex.position)].push_back(index);
+    return index;
+  }
+
+  /// Gives each edge that is still cut its vertex, then splits the triangles beside it. Triangles
+  /// that a flip has changed wait for the next pass.
+  void splitEdges() {
+    struct Cut {
+      std::size_t triangle;
+      std::uint32_t low, high, vertex;
+    };
+    std::vector<Cut> cuts;
+    for (const PairedEdge& edge : edges_) {
+      const auto [first, second] = edge.triangle;
+      if (edge.done || edge.weight == 0 || touched_[first] || touched_[second]) continue;
+      const std::optional<NewVertex> found = edgeVertex(edge.low, edge.high);
+      if (!found) continue;  // another edge has taken the corner
+      const std::uint32_t vertex = add(*found);
+      cuts.push_back({first, edge.low, edge.high, vertex});
+      cuts.push_back({second, edge.low, edge.high, vertex});
+    }
+    std::sort(cuts.begin(), cuts.end(), [](const Cut& a, const Cut& b) {
+      return std::tie(a.triangle, a.low, a.high) < std::tie(b.triangle, b.low, b.high);
+    });
+    for (std::size_t i = 0, end = 0; i < cuts.size(); i = end) {
+      const Triangle t = triangles_[cuts[i].triangle];
+      std::array<std::uint32_t, 3> middle;  // on the side from t[k] to the next
+      middle.fill(kNoVertex);
+      for (end = i; end < cuts.size() && cuts[end].triangle == cuts[i].triangle; ++end)
+        for (std::size_t k = 0; k < 3; ++k)
+          if (edgeKey(t[k], t[(k + 1) % 3]) == edgeKey(cuts[end].low, cuts[end].high))
+            middle[k] = cuts[end].vertex;
+      splitTriangle(cuts[i].triangle, t, middle, end - i);
+    }
+  }
+
+  void splitTriangle(std::size_t index, const Triangle& t,
+                     const std::array<std::uint32_t, 3>& middle, std::size_t count) {
+    if (count == 3) {
+      triangles_[index] = middle;
+      for (std::size_t k = 0; k < 3; ++k)
+        triangles_.push_back({t[k], middle[k], middle[(k + 2) % 3]});
+      return;
+    }
+    std::size_t k = 0;  // turned so that side k is cut and, of two, side k + 1 too
+    while (middle[k] == kNoVertex || (count == 2 && middle[(k + 1) % 3] == kNoVertex)) ++k;
+    const std::uint32_t a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3], ab = middle[k];
+    if (count == 1) {
+      triangles_[index] = {a, ab, c};
+      triangles_.push_back({ab, b, c});
+      return;
+    }
+    const std::uint32_t bc = middle[(k + 1) % 3];
+    triangles_[index] = {ab, b, bc};
+    if (gapBetween(a, bc) < gapBetween(ab, c)) {
+      triangles_.push_back({a, ab, bc});
+      triangles_.push_back({a, bc, c});
+    } else {
+      triangles_.push_back({a, ab, c});
+      triangles_.push_back({ab, bc, c});
+    }
+  }
+
+  void splitFaces() {
+    for (const std::size_t i : faces_) {
+      if (!touched_.empty() && touched_[i]) continue;
+      const Triangle t = triangles_[i];
+      const std::optional<NewVertex> vertex = faceVertex(t);
+      if (!vertex) continue;
+      const std::uint32_t v = add(*vertex);
+      triangles_[i] = {t[0], t[1], v};
+      triangles_.push_back({t[1], t[2], v});
+      triangles_.push_back({t[2], t[0], v});
+    }
+    touched_.clear();
+  }
+
+  std::vector<Vec3d>& positions_;
+  std::vector<Triangle>& triangles_;
+  std::vector<VertexSheets>& sheets_;
+  /// Mesh edges that cut across an edge of the solid, by how far, and the sides of faces_ (0).
+  std::vector<PairedEdge> edges_;
+  std::vector<std::size_t> faces_;  ///< triangles without a cut side that lie in no sheet
+  std::map<std::array<int, 3>, std::vector<std::uint32_t>> corners_;  ///< by cell
+  bool hasChanged_ = false;                                           ///< in this pass
+  std::vector<bool> touched_;  ///< triangles that a flip has changed in this pass
+};
+
+}  // namespace
+
+double sheetGap(const Vec3d& from, const VertexSheets& fromSheets, const Vec3d& to,
+                const VertexSheets& toSheets) {
+  if (!fromSheets.count || !toSheets.count) return 0;
+  const Vec3d along = to - from;
+  double least = along.length();
+  for (const VertexSheets* sheets : {&fromSheets, &toSheets})
+    for (std::size_t i = 0; i < sheets->count; ++i)
+      least = std::min(least, std::abs(sheetNormal(*sheets, i).dot(along)));
+  return least;
+}
+
+void insertFeatures(IndexMesh& mesh, std::vector<VertexSheets>& sheets) {
+  // What is unfolded may turn out to lack a corner that a folded triangle had.
+  for (int round = 0; round < 2; ++round) {
+    FeatureInserter(mesh, sheets).run();
+    unfoldSheets(mesh, sheets);
+  }
+}
+
+}  // namespace levelset

@@ -1,0 +1,211 @@
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "levelset/meshing/sharp_edges.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::Vec3d;
+using Triangle = MeshTriangle;
+
+/// A triangle of less height, voxels, is folded or without area; flips gain at least that.
+constexpr double kLeastHeight = 0.02, kLeastGain = 1e-3;
+/// The height of a triangle that lies in no sheet: less than any other.
+constexpr double kOffSheets = -10;
+/// A flip can ask for another one, and a vertex that goes for flips.
+constexpr int kUnfoldPasses = 8;
+
+class SheetUnfolder {
+ public:
+  SheetUnfolder(IndexMesh& mesh, std::vector<VertexSheets>& sheets)
+      : positions_(mesh.positions), triangles_(mesh.triangles), sheets_(sheets) {}
+
+  void run() {
+    for (int pass = 0; pass < kUnfoldPasses; ++pass) {
+      flip();
+      if (!collapse()) return;
+    }
+  }
+
+ private:
+  /// The least height of a triangle in the sheet that it lies in, voxels: negative when it is
+  /// turned over there; kOffSheets if it lies in none.
+  [[nodiscard]] double heightInSheet(const Triangle& t) const {
+    const Vec3d &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
+    const Vec3d area = (b - a).cross(c - a);
+    const double longest =
+        std::sqrt(std::max({(b - a).lengthSqr(), (c - b).lengthSqr(), (a - c).lengthSqr()}));
+    double best = kOffSheets;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const VertexSheets& sheets = sheets_[t[i]];
+      for (std::size_t k = 0; k < sheets.count; ++k) {
+        const Vec3d n = sheetNormal(sheets, k);
+        const auto off = [&](std::size_t j) {
+          return std::abs(n.dot(positions_[t[j]] - positions_[t[i]]));
+        };
+        if (off((i + 1) % 3) < kInSheet && off((i + 2) % 3) < kInSheet)
+          best = std::max(best, n.dot(area) / longest);
+      }
+    }
+    return best;
+  }
+
+  [[nodiscard]] std::vector<std::size_t> foldedTriangles() const {
+    constexpr std::size_t kChunk = 1 << 14;
+    std::vector<std::vector<std::size_t>> found((triangles_.size() + kChunk - 1) / kChunk);
+    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t chunk) {
+      const std::size_t end = std::min(triangles_.size(), (chunk + 1) * kChunk);
+      for (std::size_t i = chunk * kChunk; i < end; ++i) {
+        const Triangle& t = triangles_[i];
+        if (std::all_of(t.begin(), t.end(),
+                        [&](std::uint32_t v) { return sheets_[v].count > 0; }) &&
+            heightInSheet(t) < kLeastHeight)
+          found[chunk].push_back(i);
+      }
+    });
+    std::vector<std::size_t> all;
+    for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
+    return all;
+  }
+
+  /// Vertices out of order along an edge of the solid turn triangles over in their sheet, and three
+  /// of them on it make one without area. Where both triangles beside a mesh edge get better by it,
+  /// the edge is flipped.
+  void flip() {
+    for (int pass = 0; pass < kUnfoldPasses; ++pass) {
+      faces_ = foldedTriangles();
+      if (faces_.empty()) return;
+      std::vector<TriangleSide> sides;
+      addSides(triangles_, faces_, sides);
+      std::vector<PairedEdge> edges = pairSides(std::move(sides));
+      std::unordered_set<std::uint64_t> present = edgesBeside(edges, triangles_, positions_.size());
+      for (PairedEdge& edge : edges) edge.weight = gain(edge, flipOf(edge, triangles_, present));
+      std::stable_sort(edges.begin(), edges.end(), [](const PairedEdge& a, const PairedEdge& b) {
+        return a.weight > b.weight;
+      });
+      touched_.assign(triangles_.size(), false);
+      bool hasChanged = false;
+      for (const PairedEdge& edge : edges) {
+        const auto [first, second] = edge.triangle;
+        if (touched_[first] || touched_[second]) continue;
+        const EdgeFlip flip = flipOf(edge, triangles_, present);
+        if (gain(edge, flip) < kLeastGain) continue;
+        applyFlip(flip, edge, triangles_, present);
+        touched_[first] = touched_[second] = hasChanged = true;
+      }
+      if (!hasChanged) return;
+    }
+  }
+
+  /// What a triangle lacks to the least height, voxels.
+  [[nodiscard]] double deficit(const Triangle& t) const {
+    return std::max(0.0, kLeastHeight - heightInSheet(t));
+  }
+
+  /// By how much both triangles lack less after a flip, voxels.
+  [[nodiscard]] double gain(const PairedEdge& edge, const EdgeFlip& flip) const {
+    if (!flip.isPossible) return 0;
+    return deficit(triangles_[edge.triangle[0]]) + deficit(triangles_[edge.triangle[1]]) -
+           deficit(flip.left) - deficit(flip.right);
+  }
+
+  /// Where no flip unfolds a triangle, one of its vertices is superfluous: one that another can
+  /// stand for without folding anything else. @return was there any?
+  bool collapse() {
+    faces_ = foldedTriangles();
+    if (faces_.empty()) return false;
+    std::map<std::uint32_t, std::vector<std::size_t>> fans;
+    for (const std::size_t i : faces_)
+      for (const std::uint32_t v : triangles_[i]) fans[v];
+    for (std::size_t i = 0; i < triangles_.size(); ++i)
+      for (const std::uint32_t v : triangles_[i])
+        if (const auto fan = fans.find(v); fan != fans.end()) fan->second.push_back(i);
+    touched_.assign(triangles_.size(), false);
+    std::vector<bool> isGone(triangles_.size()), isUnused(positions_.size());
+    for (const std::size_t i : faces_) {
+      const Triangle t = triangles_[i];
+      for (std::size_t k = 0; k < 6 && !isGone[i]; ++k) {
+        const std::uint32_t from = t[k % 3], to = t[(k + 1 + k / 3) % 3];
+        if (!canStandFor(fans[from], from, to, fans[to])) continue;
+        for (const std::size_t j : fans[from]) {
+          touched_[j] = true;
+          Triangle& moved = triangles_[j];
+          isGone[j] = std::find(moved.begin(), moved.end(), to) != moved.end();
+          std::replace(moved.begin(), moved.end(), from, to);
+        }
+        for (const std::size_t j : fans[to]) touched_[j] = true;
+        isUnused[from] = true;
+      }
+    }
+    return remove(isGone, isUnused);
+  }
+
+  /// Can a vertex take the place of its neighbour `from`? The mesh must stay a manifold (their
+  /// common neighbours are the two opposite to their edge), and the triangles lack less than
+  /// before.
+  [[nodiscard]] bool canStandFor(const std::vector<std::size_t>& fan, std::uint32_t from,
+                                 std::uint32_t to, const std::vector<std::size_t>& other) const {
+    if (sheets_[to].count < sheets_[from].count) return false;
+    const auto isTouched = [&](std::size_t j) { return touched_[j]; };
+    if (std::any_of(fan.begin(), fan.end(), isTouched) ||
+        std::any_of(other.begin(), other.end(), isTouched))
+      return false;
+    std::set<std::uint32_t> around, aroundOther;
+    for (const std::size_t j : fan) around.insert(triangles_[j].begin(), triangles_[j].end());
+    for (const std::size_t j : other)
+      aroundOther.insert(triangles_[j].begin(), triangles_[j].end());
+    std::size_t common = 0;
+    for (const std::uint32_t v : around) common += v != from && v != to && aroundOther.count(v);
+    if (common != 2 || (fan.size() < 4 && other.size() < 4)) return false;
+    double before = 0, after = 0;
+    for (const std::size_t j : fan) {
+      Triangle moved = triangles_[j];
+      before += deficit(moved);
+      if (std::find(moved.begin(), moved.end(), to) != moved.end()) continue;
+      std::replace(moved.begin(), moved.end(), from, to);
+      after += deficit(moved);
+    }
+    return before - after > kLeastGain;
+  }
+
+  bool remove(const std::vector<bool>& isGone, const std::vector<bool>& isUnused) {
+    std::vector<std::uint32_t> target(positions_.size());
+    std::uint32_t count = 0;
+    for (std::size_t v = 0; v < positions_.size(); ++v) {
+      target[v] = count;
+      if (isUnused[v]) continue;
+      positions_[count] = positions_[v];
+      sheets_[count++] = sheets_[v];
+    }
+    if (count == positions_.size()) return false;
+    positions_.resize(count);
+    sheets_.resize(count);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < triangles_.size(); ++i) {
+      if (isGone[i]) continue;
+      for (std::size_t k = 0; k < 3; ++k) triangles_[kept][k] = target[triangles_[i][k]];
+      ++kept;
+    }
+    triangles_.resize(kept);
+    return true;
+  }
+
+  std::vector<Vec3d>& positions_;
+  std::vector<Triangle>& triangles_;
+  std::vector<VertexSheets>& sheets_;
+  std::vector<std::size_t> faces_;  ///< folded triangles
+  std::vector<bool> touched_;       ///< triangles that have changed in this pass
+};
+
+}  // namespace
+
+void unfoldSheets(IndexMesh& mesh, std::vector<VertexSheets>& sheets) {
+  SheetUnfolder(mesh, sheets).run();
+}
+
+}  // namespace levelset

@@ -1,0 +1,388 @@
+#include "levelset/meshing/sharp_vertices.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace levelset {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using openvdb::Coord;
+using openvdb::FloatGrid;
+
+/// Second difference, in voxels, up to which a grid point counts as smooth.
+constexpr double kSmooth = 0.15;
+/// How far the values around a grid point may be from a plane of unit slope for it to tell one.
+constexpr double kPlanar = 0.1;
+/// A grid point whose second differences are no larger takes its plane from central differences
+/// alone: beside an edge, one face's own values may tell it better.
+constexpr double kSurelySmooth = 0.02;
+/// Values that close to a plane of unit slope are those of a flat face.
+constexpr double kFlat = 1e-4;
+/// Of the planes of one sheet, those that are so many times worse than another do not count.
+constexpr double kWorse = 4;
+/// Eigenvalues of the planes' matrix below that share of the largest are noise.
+constexpr double kRank = 0.05;
+/// How far from its cell, in voxels, a plane may touch the surface and still be of use.
+constexpr double kTouchMargin = 0.75;
+/// The field where a plane touches the surface is no larger, voxels, be it beside an edge: a plane
+/// may run on beyond its face.
+constexpr double kOffSurface = 0.3;
+/// How far outside its cell, in voxels, a vertex may lie.
+constexpr double kVertexReach = 1;
+/// A plane that a vertex lies off by more, voxels, is none of its sheets.
+constexpr double kOffSheet = 0.05;
+
+/// Newton steps along a normal, and the slope along it, in voxels, from which they are of use.
+constexpr int kSettleSteps = 4;
+/// How far outside its cell, in voxels, they may lead: no further than the linear crossings were
+/// off.
+constexpr double kSettleReach = 0.15;
+constexpr double kLeastSlope = 0.5;
+
+openvdb::Vec3f toSheet(const Vector3d& normal) {
+  return {static_cast<float>(normal.x()), static_cast<float>(normal.y()),
+          static_cast<float>(normal.z())};
+}
+
+/// Leaves out planes that another one of their sheet tells much better.
+void dropWorse(std::vector<FacePlane>& planes) {
+  const std::vector<FacePlane> all = planes;
+  std::erase_if(planes, [&](const FacePlane& plane) {
+    return plane.error > kSurelySmooth &&
+           std::any_of(all.begin(), all.end(), [&](const FacePlane& other) {
+             return other.error * kWorse < plane.error &&
+                    other.normal.dot(plane.normal) > kOneSheetCosine;
+           });
+  });
+}
+
+bool isInCell(const Vector3d& p, double margin) {
+  return p.minCoeff() >= -margin && p.maxCoeff() <= 1 + margin;
+}
+
+}  // namespace
+
+/// A tangent plane of the surface, told by one grid point.
+struct VertexPlacer::Plane {
+  Vector3d normal = Vector3d::Zero();
+  Vector3d gradient = Vector3d::Zero();  ///< by central differences
+  double distance = 0;                   ///< of the grid point from it, voxels
+  double error = 0;                      ///< how far the values around are from it, voxels
+  double bend = 0;  ///< of the values that tell it, voxels: their largest second
+                    ///< difference, or the sum of all, which no rotation changes
+  bool isSmooth = false;
+  bool isKnown = false;
+};
+
+/// The values of a block, of a layer below it and of two above, in voxels, and what planes they
+/// tell.
+class VertexPlacer::BlockField {
+ public:
+  BlockField(const FloatGrid& grid, const Coord& origin) {
+    auto values = grid.getConstAccessor();
+    const double inverse = 1 / grid.voxelSize()[0];
+    std::size_t i = 0;
+    for (int x = -1; x <= kEnd; ++x)
+      for (int y = -1; y <= kEnd; ++y)
+        for (int z = -1; z <= kEnd; ++z)
+          values_[i++] = static_cast<double>(values.getValue(origin.offsetBy(x, y, z))) * inverse;
+  }
+
+  [[nodiscard]] double value(int x, int y, int z) const {
+    return values_[static_cast<std::size_t>(((x + 1) * kDim + y + 1) * kDim + z + 1)];
+  }
+
+  /// Trilinear, at most one voxel outside the block.
+  [[nodiscard]] double interpolated(const Vector3d& p) const {
+    std::array<int, 3> low;
+    Vector3d t;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto axis = static_cast<Eigen::Index>(i);
+      low[i] = std::clamp(static_cast<int>(std::floor(p[axis])), -1, kEnd - 1);
+      t[axis] = p[axis] - low[i];
+    }
+    double sum = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const int dx = corner >> 2, dy = (corner >> 1) & 1, dz = corner & 1;
+      sum += (dx ? t[0] : 1 - t[0]) * (dy ? t[1] : 1 - t[1]) * (dz ? t[2] : 1 - t[2]) *
+             value(low[0] + dx, low[1] + dy, low[2] + dz);
+    }
+    return sum;
+  }
+
+  /// Interpolated with second differences too, on a smooth field to third order; in [0, 8].
+  [[nodiscard]] double curved(const Vector3d& p) const {
+    std::array<int, 3> low;
+    Vector3d t;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto axis = static_cast<Eigen::Index>(i);
+      low[i] = std::clamp(static_cast<int>(std::floor(p[axis])), 0, kEnd - 2);
+      t[axis] = p[axis] - low[i];
+    }
+    double sum = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const int dx = corner >> 2, dy = (corner >> 1) & 1, dz = corner & 1;
+      const int x = low[0] + dx, y = low[1] + dy, z = low[2] + dz;
+      const double here = value(x, y, z);
+      const Vector3d bend(value(x - 1, y, z) + value(x + 1, y, z) - 2 * here,
+                          value(x, y - 1, z) + value(x, y + 1, z) - 2 * here,
+                          value(x, y, z - 1) + value(x, y, z + 1) - 2 * here);
+      const double weight =
+          (dx ? t[0] : 1 - t[0]) * (dy ? t[1] : 1 - t[1]) * (dz ? t[2] : 1 - t[2]);
+      sum += weight * (here - bend.dot((t.array() * (1 - t.array())).matrix()) / 2);
+    }
+    return sum;
+  }
+
+  /// Each coordinate in [0, 8].
+  [[nodiscard]] const Plane& plane(int x, int y, int z) {
+    const auto i = static_cast<std::size_t>((x * 9 + y) * 9 + z);
+    if (!made_[i]) {
+      planes_[i] = makePlane(x, y, z);
+      made_[i] = true;
+    }
+    return planes_[i];
+  }
+
+ private:
+  static constexpr int kEnd = 9, kDim = kEnd + 2;
+
+  Plane makePlane(int x, int y, int z) const {
+    Plane plane;
+    plane.distance = value(x, y, z);
+    const Vector3d back(value(x - 1, y, z), value(x, y - 1, z), value(x, y, z - 1));
+    const Vector3d ahead(value(x + 1, y, z), value(x, y + 1, z), value(x, y, z + 1));
+    const Vector3d bend = back + ahead - Vector3d::Constant(2 * plane.distance);
+    plane.error = bend.cwiseAbs().maxCoeff();
+    plane.bend = std::max(plane.error, std::abs(bend.sum()));
+    plane.isSmooth = plane.error < kSmooth;
+    plane.gradient = (ahead - back) / 2;
+    if (plane.isSmooth) {
+      plane.normal = plane.gradient;
+      plane.isKnown = plane.normal.norm() > 0.5;
+    }
+    if (!plane.isSmooth) {
+      chooseOctant(x, y, z, kPlanar, plane);
+    } else if (plane.error > kSurelySmooth) {
+      chooseOctant(x, y, z, kFlat, plane);
+    }
+    if (plane.isKnown) plane.normal.normalize();
+    return plane;
+  }
+
+  /// Beside an edge of the solid, differences across it mix two faces. Of the eight cells at the
+  /// grid point, the one whose corners lie nearest to a plane of unit slope has a face to itself.
+  void chooseOctant(int x, int y, int z, double limit, Plane& plane) const {
+    double best = limit;
+    for (int octant = 0; octant < 8; ++octant) {
+      const int sx = octant & 4 ? 1 : -1, sy = octant & 2 ? 1 : -1, sz = octant & 1 ? 1 : -1;
+      const double base = plane.distance;
+      const double dx = value(x + sx, y, z) - base, dy = value(x, y + sy, z) - base,
+                   dz = value(x, y, z + sz) - base;
+      const double error = std::abs(std::sqrt(dx * dx + dy * dy + dz * dz) - 1) +
+                           std::abs(value(x + sx, y + sy, z) - base - dx - dy) +
+                           std::abs(value(x + sx, y, z + sz) - base - dx - dz) +
+                           std::abs(value(x, y + sy, z + sz) - base - dy - dz) +
+                           std::abs(value(x + sx, y + sy, z + sz) - base - dx - dy - dz);
+      if (!(error < best)) continue;
+      best = plane.error = error;
+      plane.normal = Vector3d(sx * dx, sy * dy, sz * dz);
+      plane.isKnown = true;
+      plane.isSmooth = false;
+    }
+    // One cell's values are as flat at the pole of a small ball as on a face, but never exactly so.
+    if (best < kFlat) plane.bend = best;
+  }
+
+  std::array<double, kDim * kDim * kDim> values_;
+  std::array<Plane, 729> planes_;
+  std::array<bool, 729> made_ = {};
+};
+
+/// Positions are relative to the cell's lowest corner until the end.
+class VertexPlacer::Impl {
+ public:
+  Impl(const FloatGrid& grid, const Coord& origin) : field_(grid, origin) {}
+
+  DualVertex place(int x, int y, int z, const std::uint8_t* edges, std::size_t count) {
+    x_ = x, y_ = y, z_ = z;
+    crossings_.clear();
+    planes_.clear();
+    bool isSmooth = true;
+    double bend = 0;
+    unsigned corners = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto offset = edgeOffset(edges[i]);
+      const auto axis = static_cast<std::size_t>(edgeAxis(edges[i]));
+      auto end = offset;
+      end[axis] = 1;
+      const Plane &low = planeAt(offset), &high = planeAt(end);
+      isSmooth &= low.isSmooth && high.isSmooth && low.isKnown && high.isKnown;
+      bend = std::max({bend, low.bend, high.bend});
+      const double t = crossing(low.distance, high.distance);
+      Vector3d point(offset[0], offset[1], offset[2]);
+      point[static_cast<int>(axis)] = t;
+      crossings_.emplace_back(point, (1 - t) * low.gradient + t * high.gradient);
+      corners |= 1u << cornerOf(offset[0], offset[1], offset[2]);
+      corners |= 1u << cornerOf(end[0], end[1], end[2]);
+    }
+    Vector3d centre = Vector3d::Zero();
+    for (const auto& crossing : crossings_) centre += crossing.first;
+    centre /= static_cast<double>(count);
+    DualVertex vertex = placeSmooth(centre);
+    vertex.bend = bend;
+    if (!isSmooth) {
+      settle(vertex);
+      placeByPlanes(centre, corners, vertex);
+    }
+    const Vector3d cell(x_, y_, z_);
+    vertex.position += cell;
+    vertex.smooth += cell;
+    return vertex;
+  }
+
+ private:
+  const Plane& planeAt(const std::array<int, 3>& offset) {
+    return field_.plane(x_ + offset[0], y_ + offset[1], z_ + offset[2]);
+  }
+
+  static double crossing(double low, double high) {
+    const double t = low / (low - high);
+    return t >= 0 && t <= 1 ? t : 0.5;
+  }
+
+  /// The mean of the crossings lies as far inside a curved surface as the tangent planes at them
+  /// lie outside: half way between is on it to higher order.
+  [[nodiscard]] DualVertex placeSmooth(const Vector3d& centre) const {
+    Vector3d mean = Vector3d::Zero();
+    for (const auto& [point, normal] : crossings_) mean += normal;
+    if (!(mean.norm() > 0.1)) return {centre, {}, centre};
+    mean.normalize();
+    VertexSheets sheets;
+    sheets.normal[sheets.count++] = toSheet(mean);
+    double above = 0, below = 0;
+    for (const auto& [point, normal] : crossings_) {
+      const Vector3d unit = normal.normalized();
+      above += unit.dot(mean) * unit.dot(point - centre);
+      below += unit.dot(mean) * unit.dot(mean);
+    }
+    Vector3d result = centre + mean * (above / below / 2);
+    if (!isInCell(result, 0)) result = centre;
+    return {result, sheets, result};
+  }
+
+  /// Where curvatures are a good part of a voxel's, half way is not near enough: from there to the
+  /// zero of the field along the normal.
+  void settle(DualVertex& vertex) const {
+    if (!vertex.sheets.count) return;
+    const openvdb::Vec3d n = sheetNormal(vertex.sheets, 0);
+    const Vector3d normal(n[0], n[1], n[2]), cell(x_, y_, z_);
+    double slope = 0;
+    for (const auto& [point, gradient] : crossings_) slope += gradient.dot(normal);
+    slope /= static_cast<double>(crossings_.size());
+    if (!(slope > kLeastSlope)) return;
+    Vector3d p = vertex.smooth;
+    for (int i = 0; i < kSettleSteps && isInCell(p, 1); ++i)
+      p -= normal * (field_.curved(p + cell) / slope);
+    if (isInCell(p, kSettleReach)) vertex.smooth = p;
+  }
+
+  /// A point on the edge or corner where the planes meet. It may lie a little outside the cell: it
+  /// is on the surface there, which the nearest point of the cell is not.
+  void placeByPlanes(const Vector3d& centre, unsigned corners, DualVertex& vertex) {
+    for (const auto& [touch, reach] :
+         {std::pair(kTouchMargin, 0.0), std::pair(0.0, 0.0), std::pair(kTouchMargin, kVertexReach),
+          std::pair(0.0, kVertexReach)}) {
+      collectPlanes(corners, touch);
+      if (planes_.empty()) continue;
+      const Vector3d fitted = fitPlanes(planes_, centre);
+      if (isInCell(fitted, reach)) return moveTo(fitted, vertex);
+    }
+    moveTo(toNearestPlane(centre, corners), vertex);
+  }
+
+  void moveTo(const Vector3d& position, DualVertex& vertex) const {
+    vertex.position = position;
+    vertex.sheets = sheetsAt(position, planes_);
+    vertex.bend = planes_.empty() ? 1 : 0;
+    for (const FacePlane& plane : planes_) {
+      vertex.misfit = std::max(vertex.misfit, std::abs(plane.above(position)));
+      vertex.bend = std::max(vertex.bend, plane.bend);
+    }
+  }
+
+  /// Planes that touch the surface in the cell or within `margin` of it.
+  void collectPlanes(unsigned corners, double margin) {
+    planes_.clear();
+    for (int corner = 0; corner < 8; ++corner) {
+      if (!((corners >> corner) & 1)) continue;
+      const std::array<int, 3> offset = {corner >> 2, (corner >> 1) & 1, corner & 1};
+      const Plane& plane = planeAt(offset);
+      const Vector3d point(offset[0], offset[1], offset[2]);
+      const Vector3d foot = point - plane.distance * plane.normal;
+      if (!plane.isKnown || !isInCell(foot, margin)) continue;
+      if (std::abs(field_.interpolated(foot + Vector3d(x_, y_, z_))) > kOffSurface) continue;
+      planes_.push_back(
+          {plane.normal, plane.normal.dot(point) - plane.distance, plane.error, plane.bend});
+    }
+    dropWorse(planes_);
+  }
+
+  Vector3d toNearestPlane(const Vector3d& centre, unsigned corners) {
+    collectPlanes(corners, kTouchMargin);
+    Vector3d shift = Vector3d::Constant(1);
+    for (const FacePlane& plane : planes_) {
+      const double distance = -plane.above(centre);
+      if (std::abs(distance) < shift.norm()) shift = distance * plane.normal;
+    }
+    return isInCell(centre + shift, 0) ? Vector3d(centre + shift) : centre;
+  }
+
+  BlockField field_;
+  int x_ = 0, y_ = 0, z_ = 0;                             // the cell
+  std::vector<std::pair<Vector3d, Vector3d>> crossings_;  ///< with normals
+  std::vector<FacePlane> planes_;
+};
+
+Vector3d fitPlanes(const std::vector<FacePlane>& planes, const Vector3d& centre) {
+  Matrix3d matrix = Matrix3d::Zero();
+  Vector3d right = Vector3d::Zero();
+  for (const FacePlane& plane : planes) {
+    matrix += plane.normal * plane.normal.transpose();
+    right -= plane.normal * plane.above(centre);
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(matrix);
+  const Vector3d& values = solver.eigenvalues();
+  Vector3d shift = Vector3d::Zero();
+  for (int i = 0; i < 3; ++i) {
+    if (values[i] < kRank * values[2]) continue;
+    const Vector3d direction = solver.eigenvectors().col(i);
+    shift += direction * (direction.dot(right) / values[i]);
+  }
+  return centre + shift;
+}
+
+VertexSheets sheetsAt(const Vector3d& point, const std::vector<FacePlane>& planes) {
+  VertexSheets sheets;
+  for (const FacePlane& plane : planes) {
+    if (sheets.count == VertexSheets::kMost || std::abs(plane.above(point)) > kOffSheet) continue;
+    const openvdb::Vec3f sheet = toSheet(plane.normal);
+    bool isKnown = false;
+    for (std::size_t i = 0; i < sheets.count; ++i)
+      isKnown |= static_cast<double>(sheets.normal[i].dot(sheet)) > kOneSheetCosine;
+    if (!isKnown) sheets.normal[sheets.count++] = sheet;
+  }
+  return sheets;
+}
+
+VertexPlacer::VertexPlacer(const FloatGrid& grid, const Coord& origin)
+    : impl_(std::make_unique<Impl>(grid, origin)) {}
+VertexPlacer::~VertexPlacer() = default;
+
+DualVertex VertexPlacer::place(int x, int y, int z, const std::uint8_t* edges, std::size_t count) {
+  return impl_->place(x, y, z, edges, count);
+}
+
+}  // namespace levelset
