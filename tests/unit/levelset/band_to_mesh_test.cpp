@@ -322,7 +322,8 @@ TEST(BandToMesh, SharpLeavesRoundedEdgesRound) {
     const TriMesh mesh = bandToMesh(solid.band(), {.sharp = true});
     double worst = 0;
     for (const V3d& p : mesh.positions) worst = std::max(worst, std::abs(solid.distance(p)));
-    EXPECT_LT(worst, 0.1) << solid.name;
+    // An edge where a box is rounded by a voxel would be off by 0.41, a corner by 0.73.
+    EXPECT_LT(worst, 0.2) << solid.name;
   }
 }
 
