@@ -30,8 +30,8 @@ constexpr int kZone = 3;
 // Where another sheet faces away this near to an edge, in voxels, the values between both belong to
 // either, and the planes that they tell lie on neither.
 constexpr double kThin = 2;
-// Normals with a smaller scalar product face away from each other. At a knife edge of less than 26°
-// its own faces do: the sheets of a feature itself do not count.
+// Normals with a smaller scalar product face away from each other. So do the faces of a knife edge
+// of less than 26°, which looks like the rim of a plate and is left to the interpolant like that.
 constexpr double kFacesAway = -0.9;
 
 /// Is there a sharp bend at a grid point beside the surface?
@@ -123,13 +123,9 @@ class SheetTable {
     Vec3d centroid, normal;
   };
   [[nodiscard]] static bool facesAway(const Vec3d& normal, const VertexSheets& own) {
-    bool isAway = false;
-    for (std::size_t i = 0; i < own.count; ++i) {
-      const double cosine = normal.dot(sheetNormal(own, i));
-      if (cosine > kOneSheetCosine) return false;
-      isAway |= cosine < kFacesAway;
-    }
-    return isAway;
+    for (std::size_t i = 0; i < own.count; ++i)
+      if (normal.dot(sheetNormal(own, i)) < kFacesAway) return true;
+    return false;
   }
 
   std::vector<Sheet> sheets_;
