@@ -212,7 +212,12 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
 
   // === Points of the surface
   FloatTree::ConstPtr interpolated = field.constTreePtr();
-  const SharpPatches patches(field, within);
+  const auto tell = [&](double done) {
+    report(request.progress, 0.2 * done, request.action);
+    return true;
+  };
+  const SharpPatches patches =
+      request.mayHaveEdges ? SharpPatches(field, within, tell) : SharpPatches();
   SurfacePoints points = findSurfacePoints(*interpolated, within, patches);
   if (points.thin) {
     interpolated = thicken(field.tree());

@@ -20,6 +20,8 @@ struct DistanceRequest {
   double halfWidth = 3;
   double shift = 0;  ///< moves the surface outwards (> 0) or inwards
   std::optional<openvdb::CoordBBox> region = {};
+  /// Are edges and corners looked for? A surface that has just been smoothed has none.
+  bool mayHaveEdges = true;
   /// Called for each leaf that has active values, from many threads at once, in no fixed order.
   std::function<void(const openvdb::FloatTree::LeafNodeType&, const ClosestPointLeaf&)>
       visitPoints = {};

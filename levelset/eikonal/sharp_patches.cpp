@@ -133,11 +133,12 @@ class SheetTable {
 
 }  // namespace
 
-SharpPatches::SharpPatches(const FloatGrid& field, const std::optional<CoordBBox>& within) {
+SharpPatches::SharpPatches(const FloatGrid& field, const std::optional<CoordBBox>& within,
+                           const Progress& progress) {
   const FloatGrid::Ptr part = bentPart(field, within);
   if (part->tree().leafCount() == 0) return;
   const CellSurface surface(*part);
-  const SharpMesh mesh = sharpSurface(surface, *part);
+  const SharpMesh mesh = sharpSurface(surface, *part, progress);
 
   // === Where an edge is sure
   const bool hasFeatures = std::any_of(mesh.sheets.begin(), mesh.sheets.end(),

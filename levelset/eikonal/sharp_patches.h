@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "levelset/meshing/triangle_tree.h"
+#include "levelset/progress.h"
 
 namespace levelset::eikonal {
 
@@ -19,7 +20,8 @@ class SharpPatches {
   SharpPatches() = default;
   /// Looks for them where the field bends. Only fields of unit slope show any.
   /// Among the leaf blocks that touch `within`, all if empty.
-  SharpPatches(const openvdb::FloatGrid& field, const std::optional<openvdb::CoordBBox>& within);
+  SharpPatches(const openvdb::FloatGrid& field, const std::optional<openvdb::CoordBBox>& within,
+               const Progress& progress);
 
   [[nodiscard]] bool isEmpty() const { return surface_.isEmpty(); }
   /// Do the patches stand for the interpolant in the cell whose lowest corner this is?

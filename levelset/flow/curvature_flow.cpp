@@ -98,6 +98,7 @@ class CurvatureFlow {
     eikonal::DistanceRequest request;
     request.action = kAction;
     request.halfWidth = halfWidth;
+    request.mayHaveEdges = now_ == 0 || options_.mask;
     request.maxMemory = options_.maxMemory;
     const double done = time_ > 0 ? 0.99 * now_ / time_ : 0;
     request.progress = subProgress(options_.progress, done, done);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "levelset/progress_gate.h"
 #include "levelset/vdb.h"
@@ -20,6 +21,8 @@ using LeafNode = FloatTree::LeafNodeType;
 constexpr double kMeanResidualLimit = 0.1;
 /// Bounds of |∇φ|² at a zero crossing, those of openvdb::tools::checkLevelSet.
 constexpr double kMinSquaredSlope = 0.5, kMaxSquaredSlope = 1.5;
+/// A second difference, in voxels, beyond which two sheets meet or pass.
+constexpr double kTwoSheets = 0.5;
 /// In a narrower band, only voxels at edges of the solid have all their neighbours in it.
 constexpr double kMinHalfWidthForResidual = 2 - 1e-5;
 
@@ -103,13 +106,19 @@ class SlopeStencil {
   /// Can a slope between the one-sided differences of each axis have a square in [low, high]?
   /// Beside an edge of the solid, where they differ much, any of them may be the right one.
   [[nodiscard]] bool canHaveSquaredSlope(double low, double high) const {
-    double least = 0, most = 0;
-    for (const auto& pair : around_) {
-      const double back = (centre_ - pair[0]) * inverse_, ahead = (pair[1] - centre_) * inverse_;
-      most += std::max(back * back, ahead * ahead);
-      if (back * ahead > 0) least += std::min(back * back, ahead * ahead);
-    }
-    return least <= high && most >= low;
+    const SquaredSlopes range = squaredSlopes();
+    return range.least <= high && range.most >= low;
+  }
+
+  /// How far the nearest slope between the one-sided differences is from 1; only where they are
+  /// those of two sheets, which on some axis differ by more than a round surface lets them.
+  [[nodiscard]] std::optional<double> residualOfEither() const {
+    const bool areTwo = std::any_of(std::begin(around_), std::end(around_), [this](auto& pair) {
+      return std::abs(pair[0] + pair[1] - 2 * centre_) * inverse_ > kTwoSheets;
+    });
+    if (!areTwo) return std::nullopt;
+    const SquaredSlopes range = squaredSlopes();
+    return std::max({0.0, std::sqrt(range.least) - 1, 1 - std::sqrt(range.most)});
   }
 
   [[nodiscard]] double centralSquaredSlope() const {
@@ -122,6 +131,19 @@ class SlopeStencil {
   }
 
  private:
+  struct SquaredSlopes {
+    double least = 0, most = 0;
+  };
+  [[nodiscard]] SquaredSlopes squaredSlopes() const {
+    SquaredSlopes range;
+    for (const auto& pair : around_) {
+      const double back = (centre_ - pair[0]) * inverse_, ahead = (pair[1] - centre_) * inverse_;
+      range.most += std::max(back * back, ahead * ahead);
+      if (back * ahead > 0) range.least += std::min(back * back, ahead * ahead);
+    }
+    return range;
+  }
+
   FloatGrid::ConstAccessor accessor_;
   double inverse_;
   double centre_ = 0;
@@ -154,8 +176,12 @@ void checkLeaf(const LeafNode& leaf, float background, SlopeStencil& stencil, Le
     if (!measureResidual) continue;
     // Where distances meet from two sides only one-sided differences are right; elsewhere central
     // ones are more exact. A field of the wrong slope fails by either.
-    const double residual = std::min(std::abs(std::sqrt(upwind) - 1),
-                                     std::abs(std::sqrt(stencil.centralSquaredSlope()) - 1));
+    double residual = std::min(std::abs(std::sqrt(upwind) - 1),
+                               std::abs(std::sqrt(stencil.centralSquaredSlope()) - 1));
+    // Beside a sheet thinner than a voxel, the difference towards the surface is that across both
+    // sides of the sheet.
+    if (stencil.hasCrossing())
+      residual = std::min(residual, stencil.residualOfEither().value_or(residual));
     if (!std::isfinite(residual)) continue;
     out.eikonal.sum += residual;
     out.eikonal.max = std::max(out.eikonal.max, residual);

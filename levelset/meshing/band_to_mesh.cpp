@@ -53,7 +53,9 @@ TriMesh bandToMesh(const NarrowBand& band, const BandToMeshOptions& options) {
   }
   report(options.progress, 0.3, kAction);
   IndexMesh mesh =
-      options.sharp ? IndexMesh(sharpSurface(surface, vdb(band))) : marchCells(surface);
+      options.sharp
+          ? IndexMesh(sharpSurface(surface, vdb(band), subProgress(options.progress, 0.3, 0.9)))
+          : marchCells(surface);
   if (options.adaptivity > 0) {
     report(options.progress, 0.4, kAction);
     mesh = decimate(mesh, options.adaptivity);

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "levelset/meshing/sharp_vertices.h"
+#include "levelset/progress_gate.h"
 
 namespace levelset {
 namespace {
@@ -288,13 +289,18 @@ void takeFlatterPlanes(IndexMesh& mesh, std::vector<VertexSheets>& sheets,
 
 std::vector<bool> besideFeatures(const IndexMesh& mesh, const openvdb::FloatGrid& field,
                                  const std::vector<VertexSheets>& sheets,
-                                 const std::vector<SheetQuality>& quality) {
+                                 const std::vector<SheetQuality>& quality,
+                                 const Progress& progress) {
   std::vector<bool> isBeside(mesh.positions.size());
   std::vector<std::uint32_t> features;
   for (std::uint32_t v = 0; v < sheets.size(); ++v)
     if (sheets[v].count > 1 && quality[v].misfit <= kMisfit) features.push_back(v);
   if (features.empty()) return isBeside;
+  report(progress, 0, "mesh");
   const Fans fans(mesh);
+  report(progress, 0.2, "mesh");
+  const Progress asked = subProgress(progress, 0.2, 1);
+  ProgressGate gate(asked, 2 * features.size(), "mesh");
   std::vector<EdgeEvidence> evidence(mesh.positions.size());
   const double voxelSize = field.voxelSize()[0];
   const double halfWidth = static_cast<double>(field.background()) / voxelSize;
@@ -306,6 +312,7 @@ std::vector<bool> besideFeatures(const IndexMesh& mesh, const openvdb::FloatGrid
           if (sheets[v].count == 2)
             evidence[v] = evidenceAt(mesh.positions[v], sheets[v], accessor, voxelSize, halfWidth);
         }
+        gate.advance(range.size());
       });
   std::vector<std::vector<std::uint32_t>> near(features.size());
   std::vector<char> isSure(features.size()), isEdge(mesh.positions.size());
@@ -316,6 +323,7 @@ std::vector<bool> besideFeatures(const IndexMesh& mesh, const openvdb::FloatGrid
                 hasFlatSheets(mesh, near[i], v, sheets, quality);
     isEdge[v] = isSure[i] && isSharp(mesh, near[i], v, sheets, evidence);
     if (!isEdge[v] && !(isSure[i] && sheets[v].count > 2)) near[i] = {};
+    gate.advance(1);
   });
   // At a corner the values tell of three sheets: it is as sharp as the edges that end there.
   const auto touchesEdge = [&](std::uint32_t t) {

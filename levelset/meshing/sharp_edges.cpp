@@ -16,18 +16,27 @@ std::uint64_t edgeKey(std::uint32_t a, std::uint32_t b) {
   return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
 }
 
+std::vector<bool> markVertices(const std::vector<MeshTriangle>& triangles,
+                               const std::vector<std::size_t>& chosen, std::size_t vertexCount) {
+  std::vector<bool> isIn(vertexCount);
+  for (const std::size_t i : chosen)
+    for (const std::uint32_t v : triangles[i]) isIn[v] = true;
+  return isIn;
+}
+
 void addSides(const std::vector<MeshTriangle>& triangles, const std::vector<std::size_t>& chosen,
-              std::vector<TriangleSide>& sides) {
+              std::size_t vertexCount, std::vector<TriangleSide>& sides) {
   std::unordered_set<std::uint64_t> wanted;
   for (const std::size_t i : chosen)
     for (std::size_t k = 0; k < 3; ++k)
       wanted.insert(edgeKey(triangles[i][k], triangles[i][(k + 1) % 3]));
   if (wanted.empty()) return;
+  const std::vector<bool> isIn = markVertices(triangles, chosen, vertexCount);
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     const MeshTriangle& t = triangles[i];
     for (std::size_t k = 0; k < 3; ++k) {
       const auto [a, b] = std::minmax(t[k], t[(k + 1) % 3]);
-      if (wanted.count(edgeKey(a, b))) sides.push_back({a, b, i});
+      if (isIn[a] && isIn[b] && wanted.count(edgeKey(a, b))) sides.push_back({a, b, i});
     }
   }
 }

@@ -33,9 +33,13 @@ struct EdgeFlip {
 };
 
 [[nodiscard]] std::uint64_t edgeKey(std::uint32_t a, std::uint32_t b);
+/// The vertices of the chosen triangles. What scans a whole mesh looks here first: few are.
+[[nodiscard]] std::vector<bool> markVertices(const std::vector<MeshTriangle>& triangles,
+                                             const std::vector<std::size_t>& chosen,
+                                             std::size_t vertexCount);
 /// Adds the sides of the chosen triangles, as both triangles beside them have them.
 void addSides(const std::vector<MeshTriangle>& triangles, const std::vector<std::size_t>& chosen,
-              std::vector<TriangleSide>& sides);
+              std::size_t vertexCount, std::vector<TriangleSide>& sides);
 /// Edges of a closed mesh from their sides, each edge's both sides among these, in rising order.
 [[nodiscard]] std::vector<PairedEdge> pairSides(std::vector<TriangleSide> sides);
 /// All mesh edges between vertices that a flip of one of the edges could join.

@@ -74,16 +74,23 @@ double segmentDistance(const Vec3d& p, const Vec3d& a, const Vec3d& b) {
 
 class FeatureInserter {
  public:
-  FeatureInserter(IndexMesh& mesh, std::vector<VertexSheets>& sheets)
-      : positions_(mesh.positions), triangles_(mesh.triangles), sheets_(sheets) {}
+  FeatureInserter(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress)
+      : positions_(mesh.positions),
+        triangles_(mesh.triangles),
+        sheets_(sheets),
+        progress_(progress) {}
 
   void run() {
     collectCorners();
     for (int pass = 0; pass < kPasses; ++pass) {
+      const auto tell = [&](double done) { report(progress_, (pass + done) / kPasses, "mesh"); };
+      tell(0);
       collect();
       if (edges_.empty() && faces_.empty()) return;
       hasChanged_ = false;
+      tell(0.4);
       flipEdges();
+      tell(0.8);
       splitEdges();
       splitFaces();
       if (!hasChanged_) return;
@@ -240,7 +247,7 @@ class FeatureInserter {
       faces_.insert(faces_.end(), faces[i].begin(), faces[i].end());
     }
     // A flip may join a triangle to a corner on the other side of one of its sides.
-    addSides(triangles_, faces_, all);
+    addSides(triangles_, faces_, positions_.size(), all);
     edges_ = pairSides(std::move(all));
     for (PairedEdge& edge : edges_) {
       const std::optional<NewVertex> vertex = edgeVertex(edge.low, edge.high);
@@ -350,6 +357,7 @@ class FeatureInserter {
   std::vector<Vec3d>& positions_;
   std::vector<Triangle>& triangles_;
   std::vector<VertexSheets>& sheets_;
+  const Progress& progress_;
   /// Mesh edges that cut across an edge of the solid, by how far, and the sides of faces_ (0).
   std::vector<PairedEdge> edges_;
   std::vector<std::size_t> faces_;  ///< triangles without a cut side that lie in no sheet
@@ -371,11 +379,11 @@ double sheetGap(const Vec3d& from, const VertexSheets& fromSheets, const Vec3d& 
   return least;
 }
 
-void insertFeatures(IndexMesh& mesh, std::vector<VertexSheets>& sheets) {
+void insertFeatures(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress) {
   // What is unfolded may turn out to lack a corner that a folded triangle had.
-  for (int round = 0; round < 2; ++round) {
-    FeatureInserter(mesh, sheets).run();
-    unfoldSheets(mesh, sheets);
+  for (const double begin : {0.0, 0.5}) {
+    FeatureInserter(mesh, sheets, subProgress(progress, begin, begin + 0.3)).run();
+    unfoldSheets(mesh, sheets, subProgress(progress, begin + 0.3, begin + 0.5));
   }
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "levelset/meshing/cell_surface.h"
+#include "levelset/progress.h"
 
 namespace levelset {
 
@@ -44,7 +45,8 @@ struct SheetQuality {
 [[nodiscard]] std::vector<bool> besideFeatures(const IndexMesh& mesh,
                                                const openvdb::FloatGrid& field,
                                                const std::vector<VertexSheets>& sheets,
-                                               const std::vector<SheetQuality>& quality);
+                                               const std::vector<SheetQuality>& quality,
+                                               const Progress& progress);
 
 /// Puts vertices beside edges of the solid where the planes of their sheets meet as the flattest
 /// places near them tell these: an edge bends the values at the grid points next to it.
@@ -62,11 +64,11 @@ void takeFlatterPlanes(IndexMesh& mesh, std::vector<VertexSheets>& sheets,
 /// meet; a triangle whose vertices have no sheet in common gets one at the corner where three
 /// sheets meet. Positions are in voxels. The mesh stays closed and 2-manifold.
 /// @param sheets  one for each vertex; grows with the mesh
-void insertFeatures(IndexMesh& mesh, std::vector<VertexSheets>& sheets);
+void insertFeatures(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress);
 
 /// Mends triangles that are turned over in their sheet or without area there, where vertices of
 /// neighbouring cells have changed places or meet: by flips of mesh edges, then by taking vertices
 /// out. The surface stays where it is, the mesh closed and 2-manifold.
-void unfoldSheets(IndexMesh& mesh, std::vector<VertexSheets>& sheets);
+void unfoldSheets(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress);
 
 }  // namespace levelset

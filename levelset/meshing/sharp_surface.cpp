@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "levelset/meshing/sharp_vertices.h"
+#include "levelset/progress_gate.h"
 
 namespace levelset {
 namespace {
@@ -68,28 +69,38 @@ constexpr std::array<int, 4> kRingStep = {0, 1, 0, 1};
 
 class DualMesher {
  public:
-  DualMesher(const CellSurface& surface, const FloatGrid& grid) : surface_(surface), grid_(grid) {}
+  DualMesher(const CellSurface& surface, const FloatGrid& grid, const Progress& progress)
+      : surface_(surface), grid_(grid), progress_(progress) {}
 
   SharpMesh run() {
     vertices_.resize(surface_.cycleCount());
     twice_.resize(surface_.cycleCount());
     cells_.resize(surface_.vertexCount());
-    forEachBlock([this](const SurfaceBlock& block) { placeBlock(block); });
+    const Progress placed = subProgress(progress_, 0, 0.4);
+    ProgressGate gate(placed, surface_.blocks().size(), "mesh");
+    forEachBlock([&](const SurfaceBlock& block) {
+      placeBlock(block);
+      gate.advance(1);
+    });
     collectSegments();
+    report(progress_, 0.4, "mesh");
     adoptSheets();
+    report(progress_, 0.45, "mesh");
     SharpMesh mesh = assemble();
     std::vector<SheetQuality> quality(mesh.positions.size());
     for (std::size_t i = 0; i < vertices_.size(); ++i)
       quality[i] = {vertices_[i].misfit, vertices_[i].bend};
-    const std::vector<bool> isBeside = besideFeatures(mesh, grid_, mesh.sheets, quality);
+    const std::vector<bool> isBeside =
+        besideFeatures(mesh, grid_, mesh.sheets, quality, subProgress(progress_, 0.5, 0.65));
     takeFlatterPlanes(mesh, mesh.sheets, quality, isBeside);
     for (std::size_t i = 0; i < vertices_.size(); ++i) {
       const openvdb::Vec3d& p = mesh.positions[i];
       vertices_[i].position = isBeside[i] ? Vector3d(p[0], p[1], p[2]) : vertices_[i].smooth;
       vertices_[i].sheets = isBeside[i] ? mesh.sheets[i] : VertexSheets();
     }
+    report(progress_, 0.7, "mesh");
     mesh = assemble();
-    insertFeatures(mesh, mesh.sheets);
+    insertFeatures(mesh, mesh.sheets, subProgress(progress_, 0.75, 1));
     return mesh;
   }
 
@@ -302,6 +313,7 @@ class DualMesher {
   static constexpr std::size_t kNoSlot = static_cast<std::size_t>(-1);
   const CellSurface& surface_;
   const FloatGrid& grid_;
+  const Progress& progress_;
   std::vector<DualVertex> vertices_;                 ///< by polygon
   std::vector<std::uint8_t> twice_;                  ///< facesPassedTwice, by polygon
   std::vector<std::array<std::uint32_t, 4>> cells_;  ///< polygons around each crossed edge, by slot
@@ -311,8 +323,9 @@ class DualMesher {
 
 }  // namespace
 
-SharpMesh sharpSurface(const CellSurface& surface, const FloatGrid& grid) {
-  return DualMesher(surface, grid).run();
+SharpMesh sharpSurface(const CellSurface& surface, const FloatGrid& grid,
+                       const Progress& progress) {
+  return DualMesher(surface, grid, progress).run();
 }
 
 }  // namespace levelset

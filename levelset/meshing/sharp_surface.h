@@ -15,6 +15,8 @@ struct SharpMesh : IndexMesh {
 /// each polygon of a cell, one quadrilateral for each crossed edge [Ju02, Nie04], and the vertices
 /// that edges and corners between the cells need (sharp_features.h). Closed and 2-manifold as the
 /// uniform mesh is.
-[[nodiscard]] SharpMesh sharpSurface(const CellSurface& surface, const openvdb::FloatGrid& grid);
+/// @throws Cancelled
+[[nodiscard]] SharpMesh sharpSurface(const CellSurface& surface, const openvdb::FloatGrid& grid,
+                                     const Progress& progress);
 
 }  // namespace levelset

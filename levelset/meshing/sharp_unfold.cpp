@@ -22,12 +22,17 @@ constexpr int kUnfoldPasses = 8;
 
 class SheetUnfolder {
  public:
-  SheetUnfolder(IndexMesh& mesh, std::vector<VertexSheets>& sheets)
-      : positions_(mesh.positions), triangles_(mesh.triangles), sheets_(sheets) {}
+  SheetUnfolder(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress)
+      : positions_(mesh.positions),
+        triangles_(mesh.triangles),
+        sheets_(sheets),
+        progress_(progress) {}
 
   void run() {
     for (int pass = 0; pass < kUnfoldPasses; ++pass) {
-      flip();
+      const double done = static_cast<double>(pass) / kUnfoldPasses;
+      flip(done);
+      report(progress_, done, "mesh");
       if (!collapse()) return;
     }
   }
@@ -76,12 +81,13 @@ class SheetUnfolder {
   /// Vertices out of order along an edge of the solid turn triangles over in their sheet, and three
   /// of them on it make one without area. Where both triangles beside a mesh edge get better by it,
   /// the edge is flipped.
-  void flip() {
+  void flip(double done) {
     for (int pass = 0; pass < kUnfoldPasses; ++pass) {
+      report(progress_, done, "mesh");
       faces_ = foldedTriangles();
       if (faces_.empty()) return;
       std::vector<TriangleSide> sides;
-      addSides(triangles_, faces_, sides);
+      addSides(triangles_, faces_, positions_.size(), sides);
       std::vector<PairedEdge> edges = pairSides(std::move(sides));
       std::unordered_set<std::uint64_t> present = edgesBeside(edges, triangles_, positions_.size());
       for (PairedEdge& edge : edges) edge.weight = gain(edge, flipOf(edge, triangles_, present));
@@ -120,11 +126,10 @@ class SheetUnfolder {
     faces_ = foldedTriangles();
     if (faces_.empty()) return false;
     std::map<std::uint32_t, std::vector<std::size_t>> fans;
-    for (const std::size_t i : faces_)
-      for (const std::uint32_t v : triangles_[i]) fans[v];
+    const std::vector<bool> isIn = markVertices(triangles_, faces_, positions_.size());
     for (std::size_t i = 0; i < triangles_.size(); ++i)
       for (const std::uint32_t v : triangles_[i])
-        if (const auto fan = fans.find(v); fan != fans.end()) fan->second.push_back(i);
+        if (isIn[v]) fans[v].push_back(i);
     touched_.assign(triangles_.size(), false);
     std::vector<bool> isGone(triangles_.size()), isUnused(positions_.size());
     for (const std::size_t i : faces_) {
@@ -198,14 +203,15 @@ class SheetUnfolder {
   std::vector<Vec3d>& positions_;
   std::vector<Triangle>& triangles_;
   std::vector<VertexSheets>& sheets_;
+  const Progress& progress_;
   std::vector<std::size_t> faces_;  ///< folded triangles
   std::vector<bool> touched_;       ///< triangles that have changed in this pass
 };
 
 }  // namespace
 
-void unfoldSheets(IndexMesh& mesh, std::vector<VertexSheets>& sheets) {
-  SheetUnfolder(mesh, sheets).run();
+void unfoldSheets(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress) {
+  SheetUnfolder(mesh, sheets, progress).run();
 }
 
 }  // namespace levelset

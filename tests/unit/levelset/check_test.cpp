@@ -51,6 +51,23 @@ TEST(Check, PassesKinksAndNarrowBands) {
   }
 }
 
+// One grid plane is inside: beside it, the difference towards the surface is that across the plate.
+TEST(Check, MeasuresPlatesThinnerThanAVoxel) {
+  const auto plate = [](double scale) {
+    return [=](const Imath::V3d& p) {
+      const Imath::V3d q(std::abs(p.x) - 8.3, std::abs(p.y) - 8.3, std::abs(p.z - 0.4) - 0.45);
+      const Imath::V3d outer(std::max(q.x, 0.), std::max(q.y, 0.), std::max(q.z, 0.));
+      return scale * (outer.length() + std::min(std::max({q.x, q.y, q.z}), 0.));
+    };
+  };
+  const Imath::Box3d extent(Imath::V3d(-10), Imath::V3d(10));
+  const CheckReport report = check(support::sampleBand(plate(1), extent, 1));
+  EXPECT_TRUE(report.passed());
+  EXPECT_LT(report.eikonalMean, 0.03);
+  for (const double scale : {0.8, 1.25})
+    EXPECT_GT(check(support::sampleBand(plate(scale), extent, 1)).eikonalMean, 0.1) << scale;
+}
+
 TEST(Check, FindsWrongClass) {
   auto grid = sphereGrid();
   grid->setGridClass(openvdb::GRID_FOG_VOLUME);
