@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <exception>
 #include <memory>
 #include <new>
 #include <string>
@@ -15,6 +16,7 @@
 #include "apps/cli/watch.h"
 #include "apps/pipeline/chain.h"
 #include "apps/pipeline/help.h"
+#include "apps/pipeline/refusal.h"
 #include "apps/pipeline/report.h"
 #include "apps/pipeline/runner.h"
 #include "apps/pipeline/units.h"
@@ -29,6 +31,26 @@ void printAll(const std::string& text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
     throw levelset::IoError(
         fmt::format("levelsmith: standard output cannot be written: {}", std::strerror(errno)));
+}
+
+/// More are no help, and some systems give no more.
+constexpr long kMostThreads = 1024;
+
+/// For what is thrown where nobody can catch it: mostly a thread that the system refuses. Nothing
+/// half written stays behind.
+[[noreturn]] void endUnexpectedly() {
+  levelset::removeTemporaryFiles();
+  const auto say = [](const char* text) { (void)!write(STDERR_FILENO, text, std::strlen(text)); };
+  say("levelsmith: ended by '");
+  try {
+    if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
+  } catch (const std::exception& error) {
+    say(error.what());
+  } catch (...) {
+  }
+  say("'; raise the limits on threads and memory (ulimit -u, -v), or use fewer --threads or larger "
+      "voxels\n");
+  _exit(static_cast<int>(ExitCode::Resource));
 }
 
 /// On standard error, under the name of the program, which some sentences begin with.
@@ -69,11 +91,15 @@ int runChain(const pipeline::Chain& chain) {
   const std::size_t maxMemory = globals.contains("max-memory")
                                     ? pipeline::parseBytes(globals.at("max-memory"), "--max-memory")
                                     : cli::defaultMemoryLimit();
-  cli::startWatch(maxMemory);
+  pipeline::needingThreads("levelsmith", [&] { cli::startWatch(maxMemory); });
   std::unique_ptr<tbb::global_control> limit;
   tbb::task_arena arena;
   if (globals.contains("threads")) {
     const auto threads = pipeline::parseInteger(globals.at("threads"), "--threads");
+    if (threads > kMostThreads)
+      throw levelset::UsageError(
+          fmt::format("--threads: {} are more than {}; give about as many as there are cores",
+                      threads, kMostThreads));
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                   static_cast<std::size_t>(threads));
     arena.initialize(static_cast<int>(threads));  // more than there are cores, if asked
@@ -151,6 +177,7 @@ int levelsmith(const std::vector<std::string>& words) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::set_terminate(endUnexpectedly);
   int code = 0;
   try {
     code = levelsmith({argv + 1, argv + argc});

@@ -143,7 +143,7 @@ void Invocation::requireVoxelSize() const {
 
 double Invocation::voxelSize(double longestSide) {
   requireVoxelSize();
-  if (given("voxel")) return length("voxel");
+  if (given("voxel")) return countIn(length("voxel"));
   const long resolution = integer("resolution");
   if (!(longestSide > 0)) {
     throw InvalidInput(
@@ -155,6 +155,13 @@ double Invocation::voxelSize(double longestSide) {
         .written = fmt::format("--resolution {}", resolution),
         .world = voxel,
         .voxels = 1});
+  return countIn(voxel);
+}
+
+/// Lengths that were asked for before the voxel size are told in voxels from now on, too.
+double Invocation::countIn(double voxel) {
+  for (Resolved& length : notes.lengths)
+    if (!length.voxels) length.voxels = length.world / voxel;
   return voxel;
 }
 

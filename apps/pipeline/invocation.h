@@ -108,6 +108,7 @@ class Invocation {
   [[nodiscard]] double toWorld(const std::string& name, const std::string& text,
                                const std::string& label);
   void note(const Resolved& length);
+  [[nodiscard]] double countIn(double voxel);
 
   const Operator* op_;
   std::map<std::string, std::string> options_;

@@ -1,5 +1,8 @@
 #include "apps/pipeline/refusal.h"
 
+#include <string_view>
+#include <system_error>
+
 namespace pipeline {
 
 std::string sentenceOf(const std::string& who, std::string sentence) {
@@ -11,6 +14,12 @@ std::string sentenceOf(const std::string& who, std::string sentence) {
     break;
   }
   return who + ": " + sentence;
+}
+
+bool isWantOfThreads(const std::exception& error) {
+  const auto* system = dynamic_cast<const std::system_error*>(&error);
+  if (system) return system->code() == std::errc::resource_unavailable_try_again;
+  return std::string_view(error.what()).starts_with("pthread_create");
 }
 
 void refuseAs(const std::string& who, const levelset::Error& error) {

@@ -83,6 +83,10 @@ std::string errorText(const StepReport& step) {
   return text;
 }
 
+bool isHtml(const std::filesystem::path& path) {
+  return path.extension() == ".html" || path.extension() == ".htm";
+}
+
 }  // namespace
 
 std::string reportJson(const RunReport& report) {
@@ -138,6 +142,12 @@ void checkReportTarget(const Chain& chain) {
                       wanted->second, action.op->name));
     }
   }
+  const std::filesystem::path path = wanted->second, extension = path.extension();
+  std::error_code ignored;
+  const bool isDevice = std::filesystem::is_other(path, ignored);
+  if (!isDevice && extension != "" && extension != ".json" && !isHtml(path))
+    throw levelset::UsageError(fmt::format(
+        "--report: '{}' is no kind of report; name a .json or .html file", wanted->second));
   try {
     const levelset::FileTarget probe(wanted->second);
   } catch (const levelset::Error& error) {
@@ -146,8 +156,7 @@ void checkReportTarget(const Chain& chain) {
 }
 
 void writeReport(const std::filesystem::path& path, const RunReport& report) {
-  const bool html = path.extension() == ".html" || path.extension() == ".htm";
-  const std::string text = html ? reportHtml(report) : reportJson(report);
+  const std::string text = isHtml(path) ? reportHtml(report) : reportJson(report);
   try {
     levelset::FileTarget target(path);
     std::FILE* file = std::fopen(target.path().c_str(), "wb");

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <new>
@@ -84,11 +85,24 @@ void tellFailures(const RunReport& report) {
 }
 
 /// Refuses targets that cannot be written before time is spent on what should go there.
-void checkTargets(const Action& action) {
+/// @param earlier  what the actions before write; grows
+void checkTargets(const Action& action, const RunSettings& settings,
+                  std::vector<std::string>& earlier, RunReport& report) {
   if (!action.op->targets) return;
   try {
-    for (const std::string& target : action.op->targets(Invocation(*action.op, action.options)))
+    for (const std::string& target : action.op->targets(Invocation(*action.op, action.options))) {
       const levelset::FileTarget probe(target);
+      const bool isAgain = std::any_of(earlier.begin(), earlier.end(), [&](const auto& other) {
+        return levelset::isSameFile(other, target);
+      });
+      earlier.push_back(target);
+      if (!isAgain) continue;
+      report.warnings.push_back(
+          fmt::format("{}: '{}' is written by an action before, too, and only the last one stays; "
+                      "use another file",
+                      action.op->name, target));
+      settings.warn(report.warnings.back());
+    }
   } catch (const levelset::Error& error) {
     refuseAs(action.op->name, error);
   }
@@ -195,7 +209,8 @@ void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
   Stack stack;
   report.dryRun = settings.dryRun;
   try {
-    for (const Action& action : chain.actions) checkTargets(action);
+    std::vector<std::string> targets;
+    for (const Action& action : chain.actions) checkTargets(action, settings, targets, report);
     for (std::size_t i = 0; i < chain.actions.size(); ++i) {
       const Action& action = chain.actions[i];
       StepReport& step = report.steps.emplace_back();
@@ -218,7 +233,7 @@ void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
         step.peakBytes = apps::peakResidentBytes();
       };
       try {
-        runAction(action, i, settings, stack, step, stop);
+        needingThreads(action.op->name, [&] { runAction(action, i, settings, stack, step, stop); });
         stop();
       } catch (const std::bad_alloc&) {
         stop();

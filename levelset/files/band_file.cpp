@@ -384,7 +384,7 @@ void writeField(const fs::path& path, const FieldGrid& field, const WriteBandOpt
 
 std::vector<GridInfo> bandFileInfo(const fs::path& path) {
   const std::string name = inputName(path);
-  const Bytes bytes = readBytes(path, kNoMemoryLimit);
+  const MappedFile bytes(path);
   std::vector<GridInfo> result;
   const std::vector<VdbEntry> entries = readVdbEntries(bytes.view(), name);
   for (const VdbEntry& entry : entries)

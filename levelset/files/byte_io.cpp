@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
@@ -61,6 +62,13 @@ class InputFile {
   /// 0 when only reading will tell.
   [[nodiscard]] std::size_t expectedSize() const { return expected_; }
   [[nodiscard]] const std::string& name() const { return name_; }
+
+  /// Null where it cannot be had.
+  [[nodiscard]] void* mapped() const {
+    if (expected_ == 0) return nullptr;
+    void* begin = ::mmap(nullptr, expected_, PROT_READ, MAP_PRIVATE, fd_, 0);
+    return begin == MAP_FAILED ? nullptr : begin;
+  }
 
   /// 0 at the end.
   std::size_t read(char* to, std::size_t size) {
@@ -193,6 +201,25 @@ Bytes readBytes(const fs::path& path, std::size_t maxMemory) {
         fmt::format("read: {} holds nothing when decompressed; make the file again", file.name()));
   }
   return inflated;
+}
+
+MappedFile::MappedFile(const fs::path& path) {
+  {
+    const InputFile file(path);
+    mapped_ = file.mapped();
+    size_ = file.expectedSize();
+  }
+  if (mapped_ && !isGzip(view())) return;
+  if (mapped_) ::munmap(std::exchange(mapped_, nullptr), size_);
+  read_ = readBytes(path, kNoMemoryLimit);
+}
+
+MappedFile::~MappedFile() {
+  if (mapped_) ::munmap(mapped_, size_);
+}
+
+std::string_view MappedFile::view() const {
+  return mapped_ ? std::string_view(static_cast<const char*>(mapped_), size_) : read_.view();
 }
 
 FirstBytes readFirstBytes(const fs::path& path, std::size_t count) {

@@ -41,6 +41,23 @@ class Bytes {
 ///         memory
 [[nodiscard]] Bytes readBytes(const std::filesystem::path& path, std::size_t maxMemory);
 
+/// The bytes of a file without those that nobody looks at: mapped into memory, or read as by
+/// readBytes where that cannot be (pipes, standard input, gzip data).
+class MappedFile {
+ public:
+  /// @throws as readBytes
+  explicit MappedFile(const std::filesystem::path& path);
+  ~MappedFile();
+  MappedFile(const MappedFile&) = delete;
+  MappedFile& operator=(const MappedFile&) = delete;
+  [[nodiscard]] std::string_view view() const;
+
+ private:
+  Bytes read_;
+  void* mapped_ = nullptr;
+  std::size_t size_ = 0;
+};
+
 /// The beginning of a file, inflated likewise; damage further on is not seen.
 struct FirstBytes {
   Bytes bytes;

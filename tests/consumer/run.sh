@@ -13,9 +13,9 @@ cmake -S "$source" -B "$work/build-some" -G Ninja -DCMAKE_PREFIX_PATH="$work/som
 cmake --build "$work/build-some" >/dev/null
 "$work/build-some/solid"
 
-for component in levelset mapping render; do
+for component in levelset mapping render apps; do
   cmake --install "$build" --prefix "$work/all" --component $component >/dev/null
 done
-cmake -S "$source" -B "$work/build-all" -G Ninja -DCMAKE_PREFIX_PATH="$work/all" -DWITH_RENDER=ON -DCMAKE_CXX_COMPILER_LAUNCHER=ccache >/dev/null
+cmake -S "$source" -B "$work/build-all" -G Ninja -DCMAKE_PREFIX_PATH="$work/all" -DWITH_RENDER=ON -DWITH_APPS=ON -DCMAKE_CXX_COMPILER_LAUNCHER=ccache >/dev/null
 cmake --build "$work/build-all" >/dev/null
 "$work/build-all/picture"

@@ -160,7 +160,8 @@ Json countOrNull(std::uint64_t count) {
 void validateInfo(const Invocation& in) {
   if (!in.given("file")) return;
   const std::string name = formatName(in);
-  if (levelset::isMeshFormat(name) || levelset::isBandFormat(name)) return;
+  if (levelset::isMeshFormat(name)) return;
+  if (levelset::isBandFormat(name) && !name.ends_with("nvdb")) return;
   throw levelset::UsageError(fmt::format(
       "info: '{}' is of no known format; it can tell of ply, obj, stl, off (also .gz) and vdb",
       name));

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "levelset/error.h"
@@ -10,6 +11,7 @@
 #include "levelset/solids/clip.h"
 #include "levelset/solids/components.h"
 #include "levelset/solids/shapes.h"
+#include "render/image.h"
 #include "tests/support/shell.h"
 
 namespace command_test {
@@ -140,6 +142,30 @@ TEST_F(Command, WritesAReport) {
   EXPECT_LT(offset["errors"][0]["value"], 0.1);
   ASSERT_EQ(levelsmith("--report r.html sphere --radius 1 --voxel 0.1 ! measure").code, 0);
   EXPECT_NE(support::slurp(folder_ / "r.html").find("<table>"), std::string::npos);
+  // The voxel size is known only after the lengths that it follows from.
+  ASSERT_EQ(levelsmith("--report r.json sphere --radius 1 --resolution 100 ! measure").code, 0);
+  const Json sphere = Json::parse(support::slurp(folder_ / "r.json"))["steps"][0]["resolved"];
+  EXPECT_DOUBLE_EQ(sphere["radius"]["voxels"], 50);
+}
+
+TEST_F(Command, WarnsOfAFileThatIsWrittenTwice) {
+  const auto outcome = levelsmith(
+      "sphere --radius 1 --voxel 0.1 ! write a.vdb ! offset 0.1 ! write ./a.vdb ! measure");
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_NE(outcome.err.find("written by an action before"), std::string::npos) << outcome.err;
+  EXPECT_EQ(levelsmith("--quiet sphere --radius 1 --voxel 0.1 ! write /dev/null --format vdb "
+                       "! write /dev/null --format vdb")
+                .err,
+            "");
+}
+
+// A terminal made by script(1): bars come after a second, and are wiped away.
+TEST_F(Command, ShowsABarOnATerminal) {
+  const std::string slow = " torus --radius 2 --tube 0.8 --voxel 0.012 ! measure";
+  ASSERT_EQ(shell("script -qec '" + command() + slow + "' typed < /dev/null > /dev/null").code, 0);
+  const std::string typed = support::slurp(folder_ / "typed");
+  EXPECT_NE(typed.find('%'), std::string::npos) << typed;
+  EXPECT_NE(typed.find("\r"), std::string::npos);
 }
 
 TEST_F(Command, ReportsTheCertificateOfARefusedMesh) {
@@ -243,7 +269,15 @@ TEST_F(Command, RendersExrAndPng) {
       "render a.png --size 64x48");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(support::slurp(folder_ / "a.png").substr(1, 3), "PNG");
-  EXPECT_EQ(support::slurp(folder_ / "a.exr").substr(0, 4), "\x76\x2f\x31\x01");
+  const render::Image image = render::readExr(folder_ / "a.exr");
+  for (const char* layer : {"R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z",
+                            "curvature.mean", "curvature.gauss", "curvature.k1", "curvature.k2"})
+    EXPECT_TRUE(image.channels.contains(layer)) << layer;
+  ASSERT_TRUE(image.ids.contains("id"));
+  const std::size_t middle = 24 * 64 + 32;
+  EXPECT_NEAR(image.channels.at("Z")[middle], std::sqrt(29.0) - 1, 0.01);
+  EXPECT_NEAR(image.channels.at("curvature.mean")[middle], 1, 0.05);
+  EXPECT_EQ(image.channels.at("Z")[0], std::numeric_limits<float>::infinity());
 }
 
 TEST_F(Command, OutputMayEqualInput) {

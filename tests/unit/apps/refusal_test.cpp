@@ -280,6 +280,37 @@ TEST_F(Refusal, MemoryInUseIsFour) {
   expectNothingWritten(1);
 }
 
+// A thread that the system refuses is thrown where nobody can catch it.
+TEST_F(Refusal, ThreadsThatCannotBeHadAreFour) {
+  EXPECT_REFUSED(levelsmith("--threads 100000 sphere --radius 1 --voxel 0.1 ! measure"), 2,
+                 "--threads: 100000");
+  const std::string chain = " sphere --radius 1 --voxel 0.02 ! measure";
+  for (int kilobytes = 140'000; kilobytes < 280'000; kilobytes += 20'000) {
+    const std::string under = "ulimit -v " + std::to_string(kilobytes) + "; " + command();
+    if (shell(under + " --version").code != 0) continue;  // its libraries alone take more
+    const auto outcome = shell(under + chain);
+    EXPECT_TRUE(outcome.code == 0 || outcome.code == 4) << kilobytes << outcome.err;
+    if (outcome.code != 0) {
+      EXPECT_NE(outcome.err.find("levelsmith: "), std::string::npos) << outcome.err;
+      EXPECT_EQ(outcome.err.find("terminate"), std::string::npos) << outcome.err;
+    }
+  }
+}
+
+TEST_F(Refusal, TellingWhatIsInAFileReadsLittleOfIt) {
+  // Sparse: 3 GB of zeros that take no room.
+  ASSERT_EQ(shell("truncate -s 3G z.vdb").code, 0);
+  EXPECT_REFUSED(levelsmith("--max-memory 300M info z.vdb"), 3, "not an OpenVDB file");
+  ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! write a.vdb").code, 0);
+  ASSERT_EQ(shell("truncate -s 3G a.vdb").code, 0);
+  const auto outcome = levelsmith("--max-memory 300M info a.vdb");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! write q.nvdb ! info q.nvdb"), 2,
+                 "info");
+  EXPECT_REFUSED(levelsmith("--report r.txt sphere --radius 1 --voxel 0.1 ! measure"), 2,
+                 "--report");
+}
+
 TEST_F(Refusal, PermissionsAreSix) {
   // Root may read and write everything.
   const std::string drop = getuid() == 0 ? "setpriv --reuid=65534 --clear-groups " : "";
@@ -352,6 +383,7 @@ TEST_F(Refusal, EveryLongActionEndsWithinHalfASecond) {
   for (const char* chain : {
            "read in.ply ! level-set --voxel 0.004 ! write out.vdb",
            "read in.vdb ! mesh --adaptivity 1 ! write out.ply",
+           "box --size 16,16,16 --voxel 0.02 ! mesh --sharp ! write out.ply",
            "read in.vdb ! resample --voxel 0.005 ! write out.vdb",
            "read in.vdb ! render out.exr --size 2000x2000 --samples 64",
            "box --size 20,20,8 --voxel 0.1 --as b ! read in.vdb --as t ! patch @b --at 0,0,4 "

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <clocale>
+#include <locale>
 
 #include "levelset/error.h"
 
@@ -20,14 +21,24 @@ TEST(Units, ReadsLengthsInThreeUnits) {
 }
 
 TEST(Units, UsesPointsWhateverTheLocale) {
-  const char* before = std::setlocale(LC_ALL, nullptr);
-  const std::string saved = before ? before : "C";
-  for (const char* locale : {"de_DE.UTF-8", "fr_FR.UTF-8", "C"}) {
-    std::setlocale(LC_ALL, locale);
+  const auto expectPoints = [] {
     EXPECT_DOUBLE_EQ(parseNumber("1.5", "t"), 1.5);
+    EXPECT_DOUBLE_EQ(parseNumber("1234.5", "t"), 1234.5);
     EXPECT_THROW((void)parseNumber("1,5", "t"), UsageError);
-  }
-  std::setlocale(LC_ALL, saved.c_str());
+  };
+  expectPoints();
+  // Few machines have such a locale; streams take one that is made here.
+  struct Comma : std::numpunct<char> {
+    char do_decimal_point() const override { return ','; }
+    char do_thousands_sep() const override { return '.'; }
+    std::string do_grouping() const override { return "\3"; }
+  };
+  const std::locale before = std::locale::global(std::locale(std::locale(), new Comma));
+  expectPoints();
+  std::locale::global(before);
+  for (const char* locale : {"de_DE.UTF-8", "fr_FR.UTF-8"})
+    if (std::setlocale(LC_ALL, locale)) expectPoints();
+  std::setlocale(LC_ALL, "C");
 }
 
 TEST(Units, RefusesWhatIsNoNumber) {

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 #include <openvdb/tools/Diagnostics.h>
-#include <tbb/global_control.h>
 
 #include <limits>
 
@@ -10,6 +9,7 @@
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/threads.h"
 
 namespace arrival_test {
 
@@ -322,10 +322,9 @@ TEST(Arrival, DoesNotDependOnThreads) {
   ArrivalOptions o = options(FrontMethod::Sweeping, 2);
   o.speed = [](const V3d& p) { return 1 + 0.5 * std::sin(p.x) * std::cos(p.z); };
   std::uint64_t hashes[3];
-  for (int threads : {1, 2, 4}) {
-    tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                              static_cast<std::size_t>(threads));
-    hashes[threads / 2] = arrivalTimes(ball, 9, o).times.contentHash();
+  for (const std::size_t threads : {1, 2, 4}) {
+    hashes[threads / 2] =
+        support::onThreads(threads, [&] { return arrivalTimes(ball, 9, o).times.contentHash(); });
   }
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0], hashes[2]);

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 #include <openvdb/tools/Diagnostics.h>
-#include <tbb/global_control.h>
 
 #include <Imath/ImathMatrix.h>
 
@@ -12,6 +11,7 @@
 #include "levelset/sample.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/threads.h"
 
 namespace offset_test {
 
@@ -189,10 +189,9 @@ TEST(SlowOffset, MeetsItsBoundsOnTheSphereOfSixtyFour) {
 TEST(Offset, DoesNotDependOnThreads) {
   const NarrowBand cube = sample(box(12), 14);
   std::uint64_t hashes[3];
-  for (int threads : {1, 2, 4}) {
-    tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                              static_cast<std::size_t>(threads));
-    hashes[threads / 2] = offset(cube, 6).contentHash();
+  for (const std::size_t threads : {1, 2, 4}) {
+    hashes[threads / 2] =
+        support::onThreads(threads, [&] { return offset(cube, 6).contentHash(); });
   }
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0], hashes[2]);
@@ -281,11 +280,10 @@ TEST(OffsetBy, LeavesWhatIsNotReached) {
 TEST(OffsetBy, DoesNotDependOnThreads) {
   const NarrowBand cube = sample(box(12), 14);
   std::uint64_t hashes[3];
-  for (int threads : {1, 2, 4}) {
-    tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                              static_cast<std::size_t>(threads));
-    hashes[threads / 2] =
-        offsetBy(cube, [](const V3d& p) { return std::sin(p.x / 3); }).contentHash();
+  for (const std::size_t threads : {1, 2, 4}) {
+    hashes[threads / 2] = support::onThreads(threads, [&] {
+      return offsetBy(cube, [](const V3d& p) { return std::sin(p.x / 3); }).contentHash();
+    });
   }
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0], hashes[2]);

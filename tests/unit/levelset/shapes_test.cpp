@@ -1,7 +1,6 @@
 #include "levelset/solids/shapes.h"
 
 #include <gtest/gtest.h>
-#include <oneapi/tbb/global_control.h>
 
 #include <cmath>
 #include <functional>
@@ -11,6 +10,7 @@
 #include "levelset/error.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/threads.h"
 
 namespace shapes_test {
 
@@ -175,9 +175,8 @@ TEST(Shapes, ScaleWithTheirVoxels) {
 TEST(Shapes, SameBitsForAnyNumberOfThreads) {
   std::vector<std::uint64_t> hashes;
   for (const std::size_t threads : {1, 2, 4}) {
-    const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism,
-                                            threads);
-    hashes.push_back(makeTorus(20, 6, V3d(0.3), V3d(1, 1, 0), 0.25).contentHash());
+    hashes.push_back(support::onThreads(
+        threads, [] { return makeTorus(20, 6, V3d(0.3), V3d(1, 1, 0), 0.25).contentHash(); }));
   }
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0], hashes[2]);

@@ -101,9 +101,10 @@ TEST(GeometricTexture, FlatPatchIsTheIdentity) {
   EXPECT_LT(missed, 0.05 * voxel);
 }
 
-TEST(GeometricTexture, SphereCoordinatesAreRadial) {
+/// @param halfWidth  of the sphere's band: beyond it distances are swept out for the patch
+void expectRadialCoordinates(double halfWidth) {
   const double radius = 2, height = 1, voxel = 0.1, polar = 0.5;
-  const NarrowBand base = makeBall(radius, voxel, 16);
+  const NarrowBand base = makeBall(radius, voxel, halfWidth);
   const Patch patch = mapping::makePatch(base, cap(polar, radius), height).patch;
   const mapping::RbfMap map = mapping::patchToTexture(patch);
   const double corner = std::tan(polar) / std::sqrt(2.0);
@@ -126,9 +127,14 @@ TEST(GeometricTexture, SphereCoordinatesAreRadial) {
   EXPECT_LT(worstPlane, 1e-3);
 }
 
+TEST(GeometricTexture, SphereCoordinatesAreRadial) {
+  expectRadialCoordinates(3);
+  expectRadialCoordinates(16);
+}
+
 TEST(GeometricTexture, BendsATorusOntoASphere) {
   const double radius = 2, height = 0.5, voxel = 0.05;
-  const NarrowBand base = makeBall(radius, voxel, 16);
+  const NarrowBand base = makeBall(radius, voxel, 3);
   const NarrowBand ring = makeRing(1, 0.25, 0.05);
   const Patch patch = mapping::makePatch(base, cap(0.6, radius), height).patch;
   const TextureResult result = mapTexture(base, ring, patch, {.merge = TextureMerge::Alone});
