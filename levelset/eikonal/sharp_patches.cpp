@@ -92,11 +92,19 @@ FloatGrid::Ptr bentPart(const FloatGrid& field, const std::optional<CoordBBox>& 
 class SheetTable {
  public:
   explicit SheetTable(const SharpMesh& mesh) {
+    openvdb::MaskTree near;  // leaves within reach of a feature
+    for (std::size_t v = 0; v < mesh.sheets.size(); ++v)
+      for (int corner = 0; corner < 8 && mesh.sheets[v].count > 1; ++corner)
+        near.touchLeaf(Coord::floor(mesh.positions[v] + Vec3d(corner & 4 ? kThin : -kThin,
+                                                              corner & 2 ? kThin : -kThin,
+                                                              corner & 1 ? kThin : -kThin)));
+    const openvdb::tree::ValueAccessor<const openvdb::MaskTree> isNear(near);
     for (const auto& [a, b, c] : mesh.triangles) {
       const Vec3d &p = mesh.positions[a], &q = mesh.positions[b], &r = mesh.positions[c];
+      const Vec3d centroid = (p + q + r) / 3.0;
+      if (!isNear.probeConstLeaf(Coord::floor(centroid))) continue;
       Vec3d normal = (q - p).cross(r - p);
       if (!normal.normalize()) continue;
-      const Vec3d centroid = (p + q + r) / 3.0;
       sheets_.push_back({Coord::floor(centroid), centroid, normal});
     }
     std::sort(sheets_.begin(), sheets_.end(), [](const Sheet& s, const Sheet& t) {

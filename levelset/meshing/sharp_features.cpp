@@ -366,6 +366,43 @@ class FeatureInserter {
   std::vector<bool> touched_;  ///< triangles that a flip has changed in this pass
 };
 
+/// Takes the triangles out that touch a vertex with sheets, and those that may share a mesh edge
+/// between two vertices of these: what edges are looked for in, mostly a small part.
+std::vector<Triangle> takeFeaturePart(std::vector<Triangle>& triangles,
+                                      const std::vector<VertexSheets>& sheets) {
+  std::vector<bool> isNear(sheets.size());
+  for (const Triangle& t : triangles)
+    if (std::any_of(t.begin(), t.end(), [&](std::uint32_t v) { return sheets[v].count > 0; }))
+      for (const std::uint32_t v : t) isNear[v] = true;
+  std::vector<Triangle> part;
+  std::erase_if(triangles, [&](const Triangle& t) {
+    const bool isIn = std::count_if(t.begin(), t.end(), [&](auto v) { return isNear[v]; }) > 1;
+    if (isIn) part.push_back(t);
+    return isIn;
+  });
+  return part;
+}
+
+/// Removes vertices that no triangle has any more.
+void removeUnused(IndexMesh& mesh, std::vector<VertexSheets>& sheets) {
+  std::vector<bool> isUsed(mesh.positions.size());
+  for (const Triangle& t : mesh.triangles)
+    for (const std::uint32_t v : t) isUsed[v] = true;
+  std::vector<std::uint32_t> target(mesh.positions.size());
+  std::uint32_t count = 0;
+  for (std::size_t v = 0; v < target.size(); ++v) {
+    target[v] = count;
+    if (!isUsed[v]) continue;
+    mesh.positions[count] = mesh.positions[v];
+    sheets[count++] = sheets[v];
+  }
+  if (count == target.size()) return;
+  mesh.positions.resize(count);
+  sheets.resize(count);
+  for (Triangle& t : mesh.triangles)
+    for (std::uint32_t& v : t) v = target[v];
+}
+
 }  // namespace
 
 double sheetGap(const Vec3d& from, const VertexSheets& fromSheets, const Vec3d& to,
@@ -380,11 +417,19 @@ double sheetGap(const Vec3d& from, const VertexSheets& fromSheets, const Vec3d& 
 }
 
 void insertFeatures(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress) {
+  std::vector<Triangle> rest = std::move(mesh.triangles);
+  mesh.triangles = takeFeaturePart(rest, sheets);
+  if (mesh.triangles.empty()) {
+    mesh.triangles = std::move(rest);
+    return;
+  }
   // What is unfolded may turn out to lack a corner that a folded triangle had.
   for (const double begin : {0.0, 0.5}) {
     FeatureInserter(mesh, sheets, subProgress(progress, begin, begin + 0.3)).run();
     unfoldSheets(mesh, sheets, subProgress(progress, begin + 0.3, begin + 0.5));
   }
+  mesh.triangles.insert(mesh.triangles.end(), rest.begin(), rest.end());
+  removeUnused(mesh, sheets);
 }
 
 }  // namespace levelset

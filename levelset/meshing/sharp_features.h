@@ -67,8 +67,8 @@ void takeFlatterPlanes(IndexMesh& mesh, std::vector<VertexSheets>& sheets,
 void insertFeatures(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress);
 
 /// Mends triangles that are turned over in their sheet or without area there, where vertices of
-/// neighbouring cells have changed places or meet: by flips of mesh edges, then by taking vertices
-/// out. The surface stays where it is, the mesh closed and 2-manifold.
+/// neighbouring cells have changed places or meet: by flips of mesh edges, then by leaving vertices
+/// out, which stay behind without sheets. The surface stays where it is and 2-manifold.
 void unfoldSheets(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress);
 
 }  // namespace levelset

@@ -169,18 +169,20 @@ class DualMesher {
   /// A cell beside a corner may have no grid point with a face to itself. Its vertex then goes
   /// where the sheets of the vertices around it meet.
   void adoptSheets() {
-    std::vector<std::size_t> slot(vertices_.size(), kNoSlot);
-    std::size_t count = 0;
-    for (std::size_t v = 0; v < vertices_.size(); ++v)
-      if (!vertices_[v].sheets.count) slot[v] = count++;
-    if (!count) return;
-    std::vector<std::vector<std::uint32_t>> around(count);
+    std::vector<bool> isWithout(vertices_.size());
+    std::vector<std::uint32_t> without;
+    for (std::uint32_t v = 0; v < vertices_.size(); ++v)
+      if (!vertices_[v].sheets.count) isWithout[v] = true, without.push_back(v);
+    if (without.empty()) return;
+    std::vector<std::vector<std::uint32_t>> around(without.size());
     for (const auto& cells : cells_)
-      for (const std::uint32_t v : cells)
-        if (slot[v] != kNoSlot)
-          around[slot[v]].insert(around[slot[v]].end(), cells.begin(), cells.end());
-    for (std::size_t v = 0; v < vertices_.size(); ++v)
-      if (slot[v] != kNoSlot) adoptFrom(around[slot[v]], vertices_[v]);
+      for (const std::uint32_t v : cells) {
+        if (!isWithout[v]) continue;
+        const auto slot = std::lower_bound(without.begin(), without.end(), v) - without.begin();
+        auto& list = around[static_cast<std::size_t>(slot)];
+        list.insert(list.end(), cells.begin(), cells.end());
+      }
+    for (std::size_t i = 0; i < without.size(); ++i) adoptFrom(around[i], vertices_[without[i]]);
   }
 
   void adoptFrom(const std::vector<std::uint32_t>& around, DualVertex& vertex) const {
@@ -310,7 +312,6 @@ class DualMesher {
     return length(0) <= length(1) ? 0 : 1;
   }
 
-  static constexpr std::size_t kNoSlot = static_cast<std::size_t>(-1);
   const CellSurface& surface_;
   const FloatGrid& grid_;
   const Progress& progress_;

@@ -147,7 +147,14 @@ class SheetUnfolder {
         isUnused[from] = true;
       }
     }
-    return remove(isGone, isUnused);
+    for (std::size_t v = 0; v < isUnused.size(); ++v)
+      if (isUnused[v]) sheets_[v].count = 0;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < triangles_.size(); ++i)
+      if (!isGone[i]) triangles_[kept++] = triangles_[i];
+    const bool hasChanged = kept < triangles_.size();
+    triangles_.resize(kept);
+    return hasChanged;
   }
 
   /// Can a vertex take the place of its neighbour `from`? The mesh must stay a manifold (their
@@ -176,28 +183,6 @@ class SheetUnfolder {
       after += deficit(moved);
     }
     return before - after > kLeastGain;
-  }
-
-  bool remove(const std::vector<bool>& isGone, const std::vector<bool>& isUnused) {
-    std::vector<std::uint32_t> target(positions_.size());
-    std::uint32_t count = 0;
-    for (std::size_t v = 0; v < positions_.size(); ++v) {
-      target[v] = count;
-      if (isUnused[v]) continue;
-      positions_[count] = positions_[v];
-      sheets_[count++] = sheets_[v];
-    }
-    if (count == positions_.size()) return false;
-    positions_.resize(count);
-    sheets_.resize(count);
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < triangles_.size(); ++i) {
-      if (isGone[i]) continue;
-      for (std::size_t k = 0; k < 3; ++k) triangles_[kept][k] = target[triangles_[i][k]];
-      ++kept;
-    }
-    triangles_.resize(kept);
-    return true;
   }
 
   std::vector<Vec3d>& positions_;
