@@ -2,6 +2,7 @@
 
 #include <Imath/ImathVec.h>
 
+#include "levelset/fields/field.h"
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
 #include "levelset/solids/csg.h"
@@ -15,6 +16,7 @@ inline constexpr const char* kFilter = "OpenVDB LevelSetFilter";
 inline constexpr const char* kCsg = "OpenVDB csg + levelSetRebuild";
 inline constexpr const char* kDilate = "OpenVDB dilateSdf";
 inline constexpr const char* kCurvature = "OpenVDB meanCurvature";
+inline constexpr const char* kAdvect = "OpenVDB LevelSetAdvection";
 inline constexpr const char* kShapes = "OpenVDB createLevelSet";
 inline constexpr const char* kMesh = "OpenVDB meshToLevelSet";
 inline constexpr const char* kResample = "OpenVDB resampleToMatch";
@@ -33,6 +35,13 @@ inline constexpr const char* kResample = "OpenVDB resampleToMatch";
 /// To `voxels` more on both sides; the band is as much wider.
 [[nodiscard]] levelset::NarrowBand dilate(const levelset::NarrowBand& band, int voxels);
 [[nodiscard]] levelset::NarrowBand curvatureFlow(const levelset::NarrowBand& band, double time);
+/// By HJ-WENO5 and TVD-RK3; it must not be at rest as a whole on the way.
+[[nodiscard]] levelset::NarrowBand advect(const levelset::NarrowBand& band,
+                                          const levelset::VectorField& velocity, double from,
+                                          double to);
+/// The velocity at time 0 on a staggered grid over the unit cube.
+[[nodiscard]] levelset::VectorField staggered(const levelset::VectorField& velocity,
+                                              double voxelSize);
 [[nodiscard]] levelset::NarrowBand resample(const levelset::NarrowBand& band, double voxelSize);
 
 }  // namespace regress::peer

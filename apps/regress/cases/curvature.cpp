@@ -148,7 +148,7 @@ void addCurvatureCases(std::vector<Case>& all) {
        .citation = "Meyer14, Smereka03",
        .quick = {6, 8, 12},
        .full = {16, 32, 64},
-       .bounds = {{"auto", "value_error", 1e-3, 32}},
+       .bounds = {{"auto", "value_error", 0.01}, {"auto", "value_error", 1e-3, 32}},
        .run = shrinkSphere});
   all.push_back(
       {.name = "curvature-cylinder",
@@ -160,7 +160,7 @@ void addCurvatureCases(std::vector<Case>& all) {
        .citation = "Meyer14, Smereka03",
        .quick = {8, 10, 16},
        .full = {16, 32, 64},
-       .bounds = {{"cylinder", "value_error", 5e-3, 32}},
+       .bounds = {{"cylinder", "value_error", 0.02}, {"cylinder", "value_error", 5e-3, 32}},
        .run = shrinkCylinder});
   const auto add = [&](const char* name, const char* title, const char* definition,
                        void (*run)(Recorder&)) {

@@ -98,9 +98,9 @@ void addMorphologyCases(std::vector<Case>& all) {
                  .citation = "closed form",
                  .quick = {12, 16, 24},
                  .full = {16, 32, 64},
-                 .bounds = {{"wall of a sphere", "surface_l1_vx", 0.002, 64},
-                            {"wall of a sphere", "band_in_linf_vx", 0.05, 64},
-                            {"wall of a sphere", "band_out_linf_vx", 0.05, 64}},
+                 .bounds = {{"wall of a sphere", "surface_l1_vx", 0.002},
+                            {"wall of a sphere", "band_in_linf_vx", 0.05},
+                            {"wall of a sphere", "band_out_linf_vx", 0.05}},
                  .run = hollow});
 }
 
