@@ -27,7 +27,7 @@ constexpr int kMaxLinks = 40;          // as the kernel's own limit
 constexpr std::size_t kMaxStem = 180;  // keeps the temporary's name under NAME_MAX
 constexpr std::size_t kCopyChunk = 1 << 20;
 
-std::atomic<bool> clobberDefault{true};
+std::atomic<bool> mayClobber{true};
 
 /// The temporary files of this process. The lock is held for single system calls only.
 struct Registry {
@@ -154,7 +154,7 @@ bool isClosed() {
 }  // namespace
 
 FileTarget::FileTarget(const fs::path& target, bool clobber)
-    : target_(target), clobber_(clobber && clobberDefault) {
+    : target_(target), clobber_(clobber && mayClobber) {
   if (target.empty()) throw IoError("write: the file name is empty; name a file");
   if (target == "-") {
     target_ = "standard output";
@@ -289,7 +289,10 @@ void removeTemporaryFiles() noexcept {
 }
 
 void setClobberDefault(bool clobber) {
-  clobberDefault = clobber;
+  mayClobber = clobber;
+}
+bool clobberDefault() {
+  return mayClobber;
 }
 
 }  // namespace levelset

@@ -58,5 +58,6 @@ void removeTemporaryFiles() noexcept;
 
 /// With false, every FileTarget refuses to overwrite an existing file (`--no-clobber`).
 void setClobberDefault(bool clobber);
+[[nodiscard]] bool clobberDefault();
 
 }  // namespace levelset

@@ -36,21 +36,28 @@ void printAll(const std::string& text) {
 /// More are no help, and some systems give no more.
 constexpr long kMostThreads = 1024;
 
-/// For what is thrown where nobody can catch it: mostly a thread that the system refuses. Nothing
-/// half written stays behind.
+/// For what is thrown where nobody can catch it, as a thread that the system refuses to TBB may be.
+/// Nothing half written stays behind.
 [[noreturn]] void endUnexpectedly() {
   levelset::removeTemporaryFiles();
-  const auto say = [](const char* text) { (void)!write(STDERR_FILENO, text, std::strlen(text)); };
-  say("levelsmith: ended by '");
+  const auto end = [](const char* sentence, ExitCode code) {
+    (void)!write(STDERR_FILENO, sentence, std::strlen(sentence));
+    _exit(static_cast<int>(code));
+  };
   try {
     if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
+  } catch (const std::bad_alloc&) {
+    end("levelsmith: memory ran out; use larger voxels or a narrower band\n", ExitCode::Resource);
   } catch (const std::exception& error) {
-    say(error.what());
+    if (pipeline::isWantOfThreads(error))
+      end("levelsmith: the system gives no more threads; raise its limits (ulimit -u, -v), or use "
+          "fewer --threads\n",
+          ExitCode::Resource);
   } catch (...) {
   }
-  say("'; raise the limits on threads and memory (ulimit -u, -v), or use fewer --threads or larger "
-      "voxels\n");
-  _exit(static_cast<int>(ExitCode::Resource));
+  end("levelsmith: unexpected failure; please report it with the command that caused it\n",
+      ExitCode::Input);
+  _exit(static_cast<int>(ExitCode::Input));
 }
 
 /// On standard error, under the name of the program, which some sentences begin with.

@@ -83,8 +83,16 @@ std::string errorText(const StepReport& step) {
   return text;
 }
 
+/// In small letters.
+std::string extensionOf(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension;
+}
+
 bool isHtml(const std::filesystem::path& path) {
-  return path.extension() == ".html" || path.extension() == ".htm";
+  return extensionOf(path) == ".html" || extensionOf(path) == ".htm";
 }
 
 }  // namespace
@@ -142,10 +150,11 @@ void checkReportTarget(const Chain& chain) {
                       wanted->second, action.op->name));
     }
   }
-  const std::filesystem::path path = wanted->second, extension = path.extension();
+  const std::filesystem::path path = wanted->second;
+  const std::string extension = extensionOf(path);
   std::error_code ignored;
   const bool isDevice = std::filesystem::is_other(path, ignored);
-  if (!isDevice && extension != "" && extension != ".json" && !isHtml(path))
+  if (!isDevice && !extension.empty() && extension != ".json" && !isHtml(path))
     throw levelset::UsageError(fmt::format(
         "--report: '{}' is no kind of report; name a .json or .html file", wanted->second));
   try {

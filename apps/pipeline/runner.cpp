@@ -97,6 +97,11 @@ void checkTargets(const Action& action, const RunSettings& settings,
       });
       earlier.push_back(target);
       if (!isAgain) continue;
+      if (!levelset::clobberDefault())
+        throw levelset::IoError(
+            fmt::format("{}: '{}' is written by an action before, and --no-clobber forbids to "
+                        "overwrite it; use another file",
+                        action.op->name, target));
       report.warnings.push_back(
           fmt::format("{}: '{}' is written by an action before, too, and only the last one stays; "
                       "use another file",

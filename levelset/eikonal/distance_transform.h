@@ -20,7 +20,7 @@ struct DistanceRequest {
   double halfWidth = 3;
   double shift = 0;  ///< moves the surface outwards (> 0) or inwards
   std::optional<openvdb::CoordBBox> region = {};
-  /// Are edges and corners looked for? A surface that has just been smoothed has none.
+  /// Are edges and corners looked for? A surface that has been smoothed for long has none.
   bool mayHaveEdges = true;
   /// Called for each leaf that has active values, from many threads at once, in no fixed order.
   std::function<void(const openvdb::FloatTree::LeafNodeType&, const ClosestPointLeaf&)>

@@ -183,10 +183,11 @@ std::string inputName(const fs::path& path) {
   return path == "-" ? "standard input" : fmt::format("'{}'", path.string());
 }
 
-Bytes readBytes(const fs::path& path, std::size_t maxMemory) {
+namespace {
+
+Bytes readAll(InputFile& file, std::size_t maxMemory) {
   const std::size_t limit = memoryLimit(maxMemory);
   Bytes raw;
-  InputFile file(path);
   if (file.expectedSize() > limit) throwTooLarge(file.name(), limit, false);
   fill(raw, file.expectedSize(), limit, kNoMemoryLimit, file.name(), false,
        [&](char* to, std::size_t size) { return file.read(to, size); });
@@ -203,15 +204,20 @@ Bytes readBytes(const fs::path& path, std::size_t maxMemory) {
   return inflated;
 }
 
+}  // namespace
+
+Bytes readBytes(const fs::path& path, std::size_t maxMemory) {
+  InputFile file(path);
+  return readAll(file, maxMemory);
+}
+
 MappedFile::MappedFile(const fs::path& path) {
-  {
-    const InputFile file(path);
-    mapped_ = file.mapped();
-    size_ = file.expectedSize();
-  }
+  InputFile file(path);
+  mapped_ = file.mapped();
+  size_ = file.expectedSize();
   if (mapped_ && !isGzip(view())) return;
   if (mapped_) ::munmap(std::exchange(mapped_, nullptr), size_);
-  read_ = readBytes(path, kNoMemoryLimit);
+  read_ = readAll(file, kNoMemoryLimit);
 }
 
 MappedFile::~MappedFile() {

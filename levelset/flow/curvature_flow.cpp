@@ -58,6 +58,9 @@ void checkArguments(const NarrowBand& solid, double time, const CurvatureFlowOpt
         kAction, time, *options.step, time / *options.step, kMostFlowSteps));
 }
 
+/// After that time, voxels squared, an edge is rounded by more than a voxel.
+constexpr double kEdgesGone = 0.5;
+
 /// One flow, in voxels.
 class CurvatureFlow {
  public:
@@ -98,7 +101,7 @@ class CurvatureFlow {
     eikonal::DistanceRequest request;
     request.action = kAction;
     request.halfWidth = halfWidth;
-    request.mayHaveEdges = now_ == 0 || options_.mask;
+    request.mayHaveEdges = now_ < kEdgesGone || options_.mask;
     request.maxMemory = options_.maxMemory;
     const double done = time_ > 0 ? 0.99 * now_ / time_ : 0;
     request.progress = subProgress(options_.progress, done, done);

@@ -21,8 +21,6 @@ using LeafNode = FloatTree::LeafNodeType;
 constexpr double kMeanResidualLimit = 0.1;
 /// Bounds of |∇φ|² at a zero crossing, those of openvdb::tools::checkLevelSet.
 constexpr double kMinSquaredSlope = 0.5, kMaxSquaredSlope = 1.5;
-/// A second difference, in voxels, beyond which two sheets meet or pass.
-constexpr double kTwoSheets = 0.5;
 /// In a narrower band, only voxels at edges of the solid have all their neighbours in it.
 constexpr double kMinHalfWidthForResidual = 2 - 1e-5;
 
@@ -71,6 +69,7 @@ class SlopeStencil {
 
   /// False when a neighbour is outside the band: there is no slope to speak of.
   bool moveTo(const Coord& c, float value) {
+    at_ = c;
     centre_ = static_cast<double>(value);
     bool inBand = true;
     hasCrossing_ = false;
@@ -106,19 +105,38 @@ class SlopeStencil {
   /// Can a slope between the one-sided differences of each axis have a square in [low, high]?
   /// Beside an edge of the solid, where they differ much, any of them may be the right one.
   [[nodiscard]] bool canHaveSquaredSlope(double low, double high) const {
-    const SquaredSlopes range = squaredSlopes();
-    return range.least <= high && range.most >= low;
+    double least = 0, most = 0;
+    for (const auto& pair : around_) {
+      const double back = (centre_ - pair[0]) * inverse_, ahead = (pair[1] - centre_) * inverse_;
+      most += std::max(back * back, ahead * ahead);
+      if (back * ahead > 0) least += std::min(back * back, ahead * ahead);
+    }
+    return least <= high && most >= low;
   }
 
-  /// How far the nearest slope between the one-sided differences is from 1; only where they are
-  /// those of two sheets, which on some axis differ by more than a round surface lets them.
-  [[nodiscard]] std::optional<double> residualOfEither() const {
-    const bool areTwo = std::any_of(std::begin(around_), std::end(around_), [this](auto& pair) {
-      return std::abs(pair[0] + pair[1] - 2 * centre_) * inverse_ > kTwoSheets;
-    });
-    if (!areTwo) return std::nullopt;
-    const SquaredSlopes range = squaredSlopes();
-    return std::max({0.0, std::sqrt(range.least) - 1, 1 - std::sqrt(range.most)});
+  /// Of |∇φ| from 1, with the differences that lead away from sheets thinner than two voxels, if
+  /// there is one beside: towards it, a difference goes across both of its sides.
+  [[nodiscard]] std::optional<double> residualBesideSheet() const {
+    const bool isInside = centre_ < 0;
+    double sum = 0;
+    bool hasSheet = false;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double slopes[2] = {centre_ - around_[axis][0], around_[axis][1] - centre_};
+      bool isAcross[2];
+      for (int side = 0; side < 2; ++side) {
+        Coord beyond = at_;
+        beyond[axis] += side ? 2 : -2;
+        isAcross[side] =
+            (around_[axis][side] < 0) != isInside && (accessor_.getValue(beyond) < 0) == isInside;
+      }
+      hasSheet |= isAcross[0] || isAcross[1];
+      const double slope = isAcross[0] == isAcross[1] ? (slopes[0] + slopes[1]) / 2
+                           : isAcross[0]              ? slopes[1]
+                                                      : slopes[0];
+      sum += slope * slope;
+    }
+    if (!hasSheet) return std::nullopt;
+    return std::abs(std::sqrt(sum) * inverse_ - 1);
   }
 
   [[nodiscard]] double centralSquaredSlope() const {
@@ -131,21 +149,9 @@ class SlopeStencil {
   }
 
  private:
-  struct SquaredSlopes {
-    double least = 0, most = 0;
-  };
-  [[nodiscard]] SquaredSlopes squaredSlopes() const {
-    SquaredSlopes range;
-    for (const auto& pair : around_) {
-      const double back = (centre_ - pair[0]) * inverse_, ahead = (pair[1] - centre_) * inverse_;
-      range.most += std::max(back * back, ahead * ahead);
-      if (back * ahead > 0) range.least += std::min(back * back, ahead * ahead);
-    }
-    return range;
-  }
-
   FloatGrid::ConstAccessor accessor_;
   double inverse_;
+  Coord at_;
   double centre_ = 0;
   double around_[3][2] = {};
   bool hasCrossing_ = false;
@@ -178,10 +184,8 @@ void checkLeaf(const LeafNode& leaf, float background, SlopeStencil& stencil, Le
     // ones are more exact. A field of the wrong slope fails by either.
     double residual = std::min(std::abs(std::sqrt(upwind) - 1),
                                std::abs(std::sqrt(stencil.centralSquaredSlope()) - 1));
-    // Beside a sheet thinner than a voxel, the difference towards the surface is that across both
-    // sides of the sheet.
     if (stencil.hasCrossing())
-      residual = std::min(residual, stencil.residualOfEither().value_or(residual));
+      residual = std::min(residual, stencil.residualBesideSheet().value_or(residual));
     if (!std::isfinite(residual)) continue;
     out.eikonal.sum += residual;
     out.eikonal.max = std::max(out.eikonal.max, residual);

@@ -138,11 +138,10 @@ class FeatureInserter {
       const VertexSheets& sheets = sheets_[t[i]];
       for (std::size_t k = 0; k < sheets.count; ++k) {
         const Vec3d n = sheetNormal(sheets, k);
-        const auto off = [&](std::size_t j) {
-          return std::abs(n.dot(positions_[t[j]] - positions_[t[i]]));
+        const auto isIn = [&](std::size_t j) {
+          return isInSheet(n, positions_[t[j]] - positions_[t[i]], sheets_[t[j]]);
         };
-        if (off((i + 1) % 3) < kInSheet && off((i + 2) % 3) < kInSheet && n.dot(area) > 0)
-          return true;
+        if (isIn((i + 1) % 3) && isIn((i + 2) % 3) && n.dot(area) > 0) return true;
       }
     }
     return false;
@@ -375,11 +374,15 @@ std::vector<Triangle> takeFeaturePart(std::vector<Triangle>& triangles,
     if (std::any_of(t.begin(), t.end(), [&](std::uint32_t v) { return sheets[v].count > 0; }))
       for (const std::uint32_t v : t) isNear[v] = true;
   std::vector<Triangle> part;
-  std::erase_if(triangles, [&](const Triangle& t) {
-    const bool isIn = std::count_if(t.begin(), t.end(), [&](auto v) { return isNear[v]; }) > 1;
-    if (isIn) part.push_back(t);
-    return isIn;
-  });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const Triangle t = triangles[i];
+    if (std::count_if(t.begin(), t.end(), [&](std::uint32_t v) { return isNear[v]; }) > 1)
+      part.push_back(t);
+    else
+      triangles[kept++] = t;
+  }
+  triangles.resize(kept);
   return part;
 }
 

@@ -3,6 +3,7 @@
 // Edges and corners between the vertices of a mesh. Includes OpenVDB: for .cpp files only.
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "levelset/meshing/cell_surface.h"
@@ -25,8 +26,18 @@ struct VertexSheets {
 /// Sheets whose normals are less than that far apart are one.
 inline constexpr double kOneSheetCosine = 0.9;
 
-/// A triangle that is no further from a sheet, voxels, lies in it.
-inline constexpr double kInSheet = 0.03;
+/// Does the segment `to`, from a vertex whose sheet has normal `n` to one with `sheets`, run in
+/// that sheet? The chord of a round face is at right angles to the mean of the normals at its ends.
+[[nodiscard]] inline bool isInSheet(const openvdb::Vec3d& n, const openvdb::Vec3d& to,
+                                    const VertexSheets& sheets) {
+  constexpr double kOff = 0.03;  // voxels
+  if (std::abs(n.dot(to)) < kOff) return true;
+  for (std::size_t i = 0; i < sheets.count; ++i) {
+    const openvdb::Vec3d other = sheetNormal(sheets, i);
+    if (other.dot(n) > kOneSheetCosine && std::abs((n + other).dot(to)) < 2 * kOff) return true;
+  }
+  return false;
+}
 
 /// How well the planes are known that a vertex was fitted to.
 struct SheetQuality {

@@ -206,6 +206,7 @@ class DualMesher {
       return;
     vertex.position = fitted;
     vertex.sheets = sheetsAt(fitted, planes);
+    vertex.misfit = 0;
     for (const FacePlane& plane : planes)
       vertex.misfit = std::max(vertex.misfit, std::abs(plane.above(fitted)));
   }

@@ -50,11 +50,10 @@ class SheetUnfolder {
       const VertexSheets& sheets = sheets_[t[i]];
       for (std::size_t k = 0; k < sheets.count; ++k) {
         const Vec3d n = sheetNormal(sheets, k);
-        const auto off = [&](std::size_t j) {
-          return std::abs(n.dot(positions_[t[j]] - positions_[t[i]]));
+        const auto isIn = [&](std::size_t j) {
+          return isInSheet(n, positions_[t[j]] - positions_[t[i]], sheets_[t[j]]);
         };
-        if (off((i + 1) % 3) < kInSheet && off((i + 2) % 3) < kInSheet)
-          best = std::max(best, n.dot(area) / longest);
+        if (isIn((i + 1) % 3) && isIn((i + 2) % 3)) best = std::max(best, n.dot(area) / longest);
       }
     }
     return best;

@@ -153,10 +153,15 @@ TEST_F(Command, WarnsOfAFileThatIsWrittenTwice) {
       "sphere --radius 1 --voxel 0.1 ! write a.vdb ! offset 0.1 ! write ./a.vdb ! measure");
   EXPECT_EQ(outcome.code, 0);
   EXPECT_NE(outcome.err.find("written by an action before"), std::string::npos) << outcome.err;
-  EXPECT_EQ(levelsmith("--quiet sphere --radius 1 --voxel 0.1 ! write /dev/null --format vdb "
-                       "! write /dev/null --format vdb")
-                .err,
-            "");
+  const auto device = levelsmith(
+      "sphere --radius 1 --voxel 0.1 ! write /dev/null --format vdb ! write /dev/null --format "
+      "vdb");
+  EXPECT_EQ(device.code, 0);
+  EXPECT_EQ(device.err.find("written by an action before"), std::string::npos) << device.err;
+  const auto never = levelsmith(
+      "--no-clobber sphere --radius 1 --voxel 0.1 ! write b.vdb ! measure ! write b.vdb");
+  EXPECT_EQ(never.code, 6);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "b.vdb"));
 }
 
 // A terminal made by script(1): bars come after a second, and are wiped away.

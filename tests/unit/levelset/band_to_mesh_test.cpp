@@ -327,6 +327,39 @@ TEST(BandToMesh, SharpLeavesRoundedEdgesRound) {
   }
 }
 
+// Round faces that meet: no planes, and vertices beside the edge that are easily put out of order.
+TEST(BandToMesh, SharpKeepsTheRimsOfCylinders) {
+  for (const double radius : {12.7, 15.2, 20.0}) {
+    const auto cylinder = [=](const V3d& p) {
+      const V3d q = (p - V3d(0.13, 0.27, 0.41)) * turned().inverse();
+      const double along = std::abs(q.z) - 8.3, across = std::hypot(q.x, q.y) - radius;
+      return std::min(std::max(along, across), 0.0) +
+             std::hypot(std::max(along, 0.0), std::max(across, 0.0));
+    };
+    const NarrowBand band = support::sampleBand(cylinder, cube(24), 1);
+    const TriMesh mesh = bandToMesh(band, {.sharp = true});
+    EXPECT_TRUE(manifoldness(mesh).isClosedManifold());
+    double worst = 0, longest = 0;
+    for (const V3d& p : mesh.positions) worst = std::max(worst, std::abs(cylinder(p)));
+    EXPECT_LT(worst, 0.4) << radius;
+    std::size_t turnedOver = 0;
+    for (const auto& [a, b, c] : mesh.triangles) {
+      const V3d &p = mesh.positions[a], &q = mesh.positions[b], &r = mesh.positions[c];
+      longest = std::max({longest, (p - q).length(), (q - r).length(), (r - p).length()});
+      const V3d area = (q - p).cross(r - p), middle = (p + q + r) / 3.0;
+      if (area.length() > 0.01)
+        turnedOver += cylinder(middle + 0.1 * area.normalized()) < cylinder(middle) - 0.01;
+    }
+    EXPECT_LE(turnedOver, 4u) << radius;
+    EXPECT_LT(longest, 4) << radius;
+    // A uniform mesh cuts the rims off.
+    const double exact = M_PI * radius * radius * 2 * 8.3,
+                 lost = std::abs(signedVolume(mesh) - exact),
+                 lostByUniform = std::abs(signedVolume(bandToMesh(band)) - exact);
+    EXPECT_LT(lost, 0.3 * lostByUniform) << radius;
+  }
+}
+
 TEST(BandToMesh, SharpDoesNotDependOnThreads) {
   const Imath::M44d back = turned().inverse();
   const NarrowBand band =

@@ -7,6 +7,7 @@
 
 #include "levelset/eikonal/redistance.h"
 #include "levelset/error.h"
+#include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/interpolate_vdb.h"
 #include "levelset/solids/shapes.h"
@@ -54,6 +55,20 @@ TEST(CurvatureFlow, ShrinksABallBySquares) {
     EXPECT_LE(radiusError(result.band, radius).worst, 0.05) << time;
     EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(result.band), 6), "");
     EXPECT_EQ(result.scheme, FlowScheme::Stabilized);
+  }
+}
+
+// At first, edges are where they were.
+TEST(CurvatureFlow, BeginsWhereTheSolidIs) {
+  const NarrowBand cube = makeBox(V3d(20), kCentre, 1);
+  double before = 0;
+  for (const double time : {1e-6, 0.01, 0.1}) {
+    const double change = compare(curvatureFlow(cube, time).band, cube).symmetricDifference;
+    EXPECT_GT(change, before) << time;
+    before = change;
+    if (time < 1e-5) {
+      EXPECT_LT(change, 1) << "of an area of 2400";
+    }
   }
 }
 
