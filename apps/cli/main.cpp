@@ -36,34 +36,44 @@ void printAll(const std::string& text) {
 /// More are no help, and some systems give no more.
 constexpr long kMostThreads = 1024;
 
-/// For what is thrown where nobody can catch it, as a thread that the system refuses to TBB may be.
-/// Nothing half written stays behind.
-[[noreturn]] void endUnexpectedly() {
-  levelset::removeTemporaryFiles();
-  const auto end = [](const char* sentence, ExitCode code) {
-    (void)!write(STDERR_FILENO, sentence, std::strlen(sentence));
-    _exit(static_cast<int>(code));
-  };
-  try {
-    if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
-  } catch (const std::bad_alloc&) {
-    end("levelsmith: memory ran out; use larger voxels or a narrower band\n", ExitCode::Resource);
-  } catch (const std::exception& error) {
-    if (pipeline::isWantOfThreads(error))
-      end("levelsmith: the system gives no more threads; raise its limits (ulimit -u, -v), or use "
-          "fewer --threads\n",
-          ExitCode::Resource);
-  } catch (...) {
-  }
-  end("levelsmith: unexpected failure; please report it with the command that caused it\n",
-      ExitCode::Input);
-  _exit(static_cast<int>(ExitCode::Input));
-}
-
 /// On standard error, under the name of the program, which some sentences begin with.
 void tell(const std::string& sentence) {
   fmt::print(stderr, "{}{}\n",
              sentence.starts_with("levelsmith: ") ? "" : "levelsmith: ", sentence);
+}
+
+/// Says what went wrong. @return the exit code
+int tellFailure(const std::exception_ptr& failure) {
+  try {
+    if (failure) std::rethrow_exception(failure);
+  } catch (const levelset::Error& error) {
+    tell(error.what());
+    return static_cast<int>(error.exitCode());
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "levelsmith: memory ran out; use larger voxels or a narrower band\n");
+    return static_cast<int>(ExitCode::Resource);
+  } catch (const std::exception& error) {
+    if (pipeline::isWantOfThreads(error)) {
+      fmt::print(stderr, "levelsmith{}\n", pipeline::kWantOfThreads);
+      return static_cast<int>(ExitCode::Resource);
+    }
+    fmt::print(
+        stderr,
+        "levelsmith: unexpected failure: {}; please report it with the command that caused it\n",
+        error.what());
+    return static_cast<int>(ExitCode::Input);
+  } catch (...) {
+  }
+  fmt::print(stderr,
+             "levelsmith: unexpected failure; please report it with the command that caused it\n");
+  return static_cast<int>(ExitCode::Input);
+}
+
+/// For what is thrown where nobody can catch it, as a thread that the system refuses to TBB may be.
+/// Nothing half written stays behind.
+[[noreturn]] void endUnexpectedly() {
+  levelset::removeTemporaryFiles();
+  _exit(tellFailure(std::current_exception()));
 }
 
 bool claimsStandardOutput(const pipeline::Chain& chain) {
@@ -98,7 +108,7 @@ int runChain(const pipeline::Chain& chain) {
   const std::size_t maxMemory = globals.contains("max-memory")
                                     ? pipeline::parseBytes(globals.at("max-memory"), "--max-memory")
                                     : cli::defaultMemoryLimit();
-  pipeline::needingThreads("levelsmith", [&] { cli::startWatch(maxMemory); });
+  cli::startWatch(maxMemory);
   std::unique_ptr<tbb::global_control> limit;
   tbb::task_arena arena;
   if (globals.contains("threads")) {
@@ -188,18 +198,8 @@ int main(int argc, char** argv) {
   int code = 0;
   try {
     code = levelsmith({argv + 1, argv + argc});
-  } catch (const levelset::Error& error) {
-    tell(error.what());
-    code = static_cast<int>(error.exitCode());
-  } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "levelsmith: memory ran out; use larger voxels or a narrower band\n");
-    code = static_cast<int>(ExitCode::Resource);
-  } catch (const std::exception& error) {
-    fmt::print(
-        stderr,
-        "levelsmith: unexpected failure: {}; please report it with the command that caused it\n",
-        error.what());
-    code = static_cast<int>(ExitCode::Input);
+  } catch (...) {
+    code = tellFailure(std::current_exception());
   }
   std::fflush(stderr);
   levelset::removeTemporaryFiles();

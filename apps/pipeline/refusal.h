@@ -9,6 +9,9 @@ namespace pipeline {
 
 /// Is it what std::thread or TBB throws when the system gives no more threads?
 [[nodiscard]] bool isWantOfThreads(const std::exception& error);
+/// What to tell then, after the name of who wanted them.
+inline constexpr const char* kWantOfThreads =
+    ": the system gives no more threads; raise its limits (ulimit -u, -v), or use fewer --threads";
 
 /// `sentence` as one of `who`: "union: operand 1 …" is that already, "read: 'x.ply' is empty" of a
 /// reader deeper down becomes "info: 'x.ply' is empty".
@@ -16,21 +19,5 @@ namespace pipeline {
 
 /// A refusal from deeper down, told as one of what the user wrote: an action, or an option.
 [[noreturn]] void refuseAs(const std::string& who, const levelset::Error& error);
-
-/// Runs `work`; a thread that the system refuses, of ours or of TBB, becomes ResourceLimit.
-template <typename Work>
-void needingThreads(const std::string& who, const Work& work) {
-  try {
-    work();
-  } catch (const levelset::Error&) {
-    throw;
-  } catch (const std::exception& error) {
-    if (!isWantOfThreads(error)) throw;
-    throw levelset::ResourceLimit(
-        who +
-        ": the system gives no more threads; raise its limits (ulimit -u, -v), or use fewer "
-        "--threads");
-  }
-}
 
 }  // namespace pipeline

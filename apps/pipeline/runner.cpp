@@ -238,7 +238,7 @@ void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
         step.peakBytes = apps::peakResidentBytes();
       };
       try {
-        needingThreads(action.op->name, [&] { runAction(action, i, settings, stack, step, stop); });
+        runAction(action, i, settings, stack, step, stop);
         stop();
       } catch (const std::bad_alloc&) {
         stop();
@@ -247,6 +247,10 @@ void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
       } catch (const levelset::Error& error) {
         stop();
         refuseAs(action.op->name, error);
+      } catch (const std::exception& error) {
+        stop();
+        if (!isWantOfThreads(error)) throw;
+        throw levelset::ResourceLimit(action.op->name + kWantOfThreads);
       } catch (...) {
         stop();
         throw;

@@ -35,10 +35,11 @@ inline constexpr const char* kResample = "OpenVDB resampleToMatch";
 /// To `voxels` more on both sides; the band is as much wider.
 [[nodiscard]] levelset::NarrowBand dilate(const levelset::NarrowBand& band, int voxels);
 [[nodiscard]] levelset::NarrowBand curvatureFlow(const levelset::NarrowBand& band, double time);
-/// By HJ-WENO5 and TVD-RK3; it must not be at rest as a whole on the way.
+/// By HJ-WENO5 and TVD-RK3.
+/// @param turnsBack  the velocity vanishes at half the time, where OpenVDB would stop
 [[nodiscard]] levelset::NarrowBand advect(const levelset::NarrowBand& band,
-                                          const levelset::VectorField& velocity, double from,
-                                          double to);
+                                          const levelset::VectorField& velocity, double time,
+                                          bool turnsBack);
 /// The velocity at time 0 on a staggered grid over the unit cube.
 [[nodiscard]] levelset::VectorField staggered(const levelset::VectorField& velocity,
                                               double voxelSize);

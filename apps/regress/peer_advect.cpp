@@ -37,15 +37,16 @@ class Velocity {
 
 }  // namespace
 
-NarrowBand advect(const NarrowBand& band, const VectorField& velocity, double from, double to) {
+NarrowBand advect(const NarrowBand& band, const VectorField& velocity, double time,
+                  bool turnsBack) {
   const auto grid = levelset::vdb(band).deepCopy();
   const Velocity field(velocity, levelset::vdb(band).transformPtr());
   openvdb::tools::LevelSetAdvection<openvdb::FloatGrid, Velocity> advection(*grid, field);
   advection.setSpatialScheme(openvdb::math::HJWENO5_BIAS);
   advection.setTemporalScheme(openvdb::math::TVD_RK3);
-  advection.setTrackerSpatialScheme(openvdb::math::HJWENO5_BIAS);
-  advection.setTrackerTemporalScheme(openvdb::math::TVD_RK3);
-  advection.advect(static_cast<float>(from), static_cast<float>(to));
+  const double gap = turnsBack ? 1e-4 : 0;
+  advection.advect(0, static_cast<float>((0.5 - gap) * time));
+  advection.advect(static_cast<float>((0.5 + gap) * time), static_cast<float>(time));
   return adopt(grid);
 }
 

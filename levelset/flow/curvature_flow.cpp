@@ -58,7 +58,7 @@ void checkArguments(const NarrowBand& solid, double time, const CurvatureFlowOpt
         kAction, time, *options.step, time / *options.step, kMostFlowSteps));
 }
 
-/// After that time, voxels squared, an edge is rounded by more than a voxel.
+/// After that time, voxels squared, the corners of a cube have moved by a voxel.
 constexpr double kEdgesGone = 0.5;
 
 /// One flow, in voxels.

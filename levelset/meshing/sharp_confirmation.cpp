@@ -253,16 +253,12 @@ ToldSheet flatterSheet(const IndexMesh& mesh, std::span<const std::uint32_t> tri
   return best;
 }
 
-}  // namespace
-
-void takeFlatterPlanes(IndexMesh& mesh, std::vector<VertexSheets>& sheets,
+void takeFlatterPlanes(IndexMesh& mesh, const Fans& fans, std::vector<VertexSheets>& sheets,
                        const std::vector<SheetQuality>& quality,
                        const std::vector<bool>& isBeside) {
   std::vector<std::uint32_t> bent;
   for (std::uint32_t v = 0; v < sheets.size(); ++v)
     if (isBeside[v] && sheets[v].count && quality[v].bend > kBent) bent.push_back(v);
-  if (bent.empty()) return;
-  const Fans fans(mesh);
   std::vector<std::pair<Vec3d, VertexSheets>> moved(bent.size());
   tbb::parallel_for(std::size_t{0}, bent.size(), [&](std::size_t i) {
     const std::uint32_t v = bent[i];
@@ -287,10 +283,12 @@ void takeFlatterPlanes(IndexMesh& mesh, std::vector<VertexSheets>& sheets,
     std::tie(mesh.positions[bent[i]], sheets[bent[i]]) = moved[i];
 }
 
-std::vector<bool> besideFeatures(const IndexMesh& mesh, const openvdb::FloatGrid& field,
-                                 const std::vector<VertexSheets>& sheets,
-                                 const std::vector<SheetQuality>& quality,
-                                 const Progress& progress) {
+}  // namespace
+
+std::vector<bool> confirmFeatures(IndexMesh& mesh, const openvdb::FloatGrid& field,
+                                  std::vector<VertexSheets>& sheets,
+                                  const std::vector<SheetQuality>& quality,
+                                  const Progress& progress) {
   std::vector<bool> isBeside(mesh.positions.size());
   std::vector<std::uint32_t> features;
   for (std::uint32_t v = 0; v < sheets.size(); ++v)
@@ -337,6 +335,7 @@ std::vector<bool> besideFeatures(const IndexMesh& mesh, const openvdb::FloatGrid
     for (const std::uint32_t t : near[i])
       for (const std::uint32_t v : mesh.triangles[t]) isBeside[v] = true;
   }
+  takeFlatterPlanes(mesh, fans, sheets, quality, isBeside);
   return isBeside;
 }
 

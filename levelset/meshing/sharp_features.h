@@ -49,21 +49,15 @@ struct SheetQuality {
 /// the surface around it lies in these, and each of them is much flatter somewhere than a round
 /// surface that turns as far. Smooth surfaces have none, whatever their curvature, and nor have
 /// edges that are rounded off by a voxel or more: the values beside them are not those of the
-/// planes.
+/// planes. Those vertices are put where the planes of their sheets meet as the flattest places near
+/// them tell these: an edge bends the values at the grid points next to it.
 /// @param field    whose zero set the mesh is
 /// @param sheets   one for each vertex
 /// @param quality  one for each vertex
-[[nodiscard]] std::vector<bool> besideFeatures(const IndexMesh& mesh,
-                                               const openvdb::FloatGrid& field,
-                                               const std::vector<VertexSheets>& sheets,
-                                               const std::vector<SheetQuality>& quality,
-                                               const Progress& progress);
-
-/// Puts vertices beside edges of the solid where the planes of their sheets meet as the flattest
-/// places near them tell these: an edge bends the values at the grid points next to it.
-/// @param isBeside  by besideFeatures
-void takeFlatterPlanes(IndexMesh& mesh, std::vector<VertexSheets>& sheets,
-                       const std::vector<SheetQuality>& quality, const std::vector<bool>& isBeside);
+[[nodiscard]] std::vector<bool> confirmFeatures(IndexMesh& mesh, const openvdb::FloatGrid& field,
+                                                std::vector<VertexSheets>& sheets,
+                                                const std::vector<SheetQuality>& quality,
+                                                const Progress& progress);
 
 /// How far one end of a segment between two vertices is from the nearest sheet through the other,
 /// voxels: 0 when the segment runs in a sheet of either.

@@ -91,8 +91,7 @@ class DualMesher {
     for (std::size_t i = 0; i < vertices_.size(); ++i)
       quality[i] = {vertices_[i].misfit, vertices_[i].bend};
     const std::vector<bool> isBeside =
-        besideFeatures(mesh, grid_, mesh.sheets, quality, subProgress(progress_, 0.5, 0.65));
-    takeFlatterPlanes(mesh, mesh.sheets, quality, isBeside);
+        confirmFeatures(mesh, grid_, mesh.sheets, quality, subProgress(progress_, 0.5, 0.7));
     for (std::size_t i = 0; i < vertices_.size(); ++i) {
       const openvdb::Vec3d& p = mesh.positions[i];
       vertices_[i].position = isBeside[i] ? Vector3d(p[0], p[1], p[2]) : vertices_[i].smooth;

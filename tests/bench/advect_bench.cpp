@@ -2,12 +2,12 @@
 // same grid in one run. advect_bench [RESOLUTION …]
 
 #include <fmt/core.h>
-#include <openvdb/tools/LevelSetAdvect.h>
 #include <sys/resource.h>
 
 #include <cmath>
 #include <cstdlib>
 
+#include "apps/regress/peer.h"
 #include "levelset/flow/advect.h"
 #include "levelset/flow/velocity.h"
 #include "levelset/inspect/measure.h"
@@ -29,37 +29,6 @@ double cpuSeconds() {
     return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
   };
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-/// Our velocity in the form that OpenVDB asks for.
-struct Field {
-  using VectorType = openvdb::Vec3f;
-  using ValueType = float;
-  levelset::VectorField velocity = levelset::enrightVelocity(kPeriod);
-  openvdb::math::Transform::Ptr frame;
-
-  [[nodiscard]] const openvdb::math::Transform& transform() const { return *frame; }
-  VectorType operator()(const openvdb::Vec3d& world, float time) const {
-    return VectorType(
-        levelset::toVdb(velocity(levelset::toImath(world), static_cast<double>(time))));
-  }
-  VectorType operator()(const openvdb::Coord& c, float time) const {
-    return (*this)(frame->indexToWorld(c), time);
-  }
-};
-
-NarrowBand advectByOpenVdb(const NarrowBand& ball) {
-  const auto grid = levelset::vdb(ball).deepCopy();
-  const Field field{.frame = grid->transformPtr()};
-  openvdb::tools::LevelSetAdvection<openvdb::FloatGrid, Field> advection(*grid, field);
-  advection.setSpatialScheme(openvdb::math::HJWENO5_BIAS);
-  advection.setTemporalScheme(openvdb::math::TVD_RK3);
-  advection.setTrackerSpatialScheme(openvdb::math::HJWENO5_BIAS);
-  advection.setTrackerTemporalScheme(openvdb::math::TVD_RK1);
-  // In two parts: it stops where the velocity vanishes.
-  advection.advect(0, static_cast<float>(0.4999 * kPeriod));
-  advection.advect(static_cast<float>(0.5001 * kPeriod), static_cast<float>(kPeriod));
-  return levelset::makeBand(grid);
 }
 
 /// Mean distance of linear zeros along the grid's edges from the ball, voxels.
@@ -107,7 +76,9 @@ int main(int count, char** arguments) {
     show("semi-lagrangian", resolution, ball,
          [&] { return ours(levelset::AdvectScheme::SemiLagrangian); });
     show("upwind", resolution, ball, [&] { return ours(levelset::AdvectScheme::Upwind); });
-    show("OpenVDB", resolution, ball, [&] { return advectByOpenVdb(ball); });
+    show("OpenVDB", resolution, ball, [&] {
+      return regress::peer::advect(ball, levelset::enrightVelocity(kPeriod), kPeriod, true);
+    });
   }
   return 0;
 }
