@@ -30,6 +30,7 @@ const std::vector<Column>& columns() {
       {"eikonal_mean", "eikonal", "mean of ||∇φ| − 1| over the band"},
       {"eikonal_max", "eikonal max", "largest ||∇φ| − 1|"},
       {"checks_failed", "checks", "level-set checks that the result fails"},
+      {"cavities", "cavities", "enclosed voids where there are none"},
       {"deviation_vx", "deviation",
        "largest difference of the band from the one that must be the same, voxels"},
       {"value_error", "value", "error of a number with an exact answer, as the case tells it"},

@@ -30,7 +30,10 @@ constexpr double kSameCosine = 0.9995;
 constexpr int kSpineSteps = 16;
 constexpr double kSpineTolerance = 1e-3;  // voxels
 constexpr double kLongestSpineStep = 4;   // voxels
-constexpr double kStencil = 4;            // voxels beyond a point that its jet reads
+// What is left of the way along the spine shrinks at least by this share of a step, where it has
+// one nearest point.
+constexpr double kLeastShrinkage = 0.05;
+constexpr double kStencil = 4;  // voxels beyond a point that its jet reads
 // How far from the seam the planes that the ball touches may meet, by the ball's radius and in
 // voxels: further off, the surfaces face each other without having met there.
 constexpr double kSeamShare = 0.75, kSeamSlack = 2;
@@ -120,9 +123,11 @@ class BallRoller {
     return block.jet(p - block.origin().asVec3d());
   }
 
-  /// Newton's method on a(s) = b(s) = r and, along the curve, on the way to x.
+  /// Newton's method on a(s) = b(s) = r and, along the curve, the secant method on the way to x:
+  /// where the curve bends around x, that way shrinks by less than what is gone.
   bool findBall(const Vec3d& x, Ball& ball) {
     ball.centre = x;
+    double before = 0, gone = 0;
     for (int step = 0; step < kSpineSteps; ++step) {
       const eikonal::Jet a = jetAt(a_, ball.centre), b = jetAt(b_, ball.centre);
       if (std::abs(a.value) > known_ || std::abs(b.value) > known_) return false;
@@ -135,13 +140,18 @@ class BallRoller {
       if (ball.radius < kLeastRadius) return false;
       const double squaredSine = 1 - ball.cosine * ball.cosine;
       const double da = ball.radius - a.value, db = ball.radius - b.value;
-      Vec3d along = ball.normalA.cross(ball.normalB) / std::sqrt(squaredSine);
+      const Vec3d along = ball.normalA.cross(ball.normalB) / std::sqrt(squaredSine);
+      const double way = along.dot(x - ball.centre);
+      const double shrinks =
+          gone == 0 ? 1 : std::clamp((before - way) / gone, kLeastShrinkage, 2.0);
       Vec3d move = ball.normalA * ((da - ball.cosine * db) / squaredSine) +
-                   ball.normalB * ((db - ball.cosine * da) / squaredSine) +
-                   along * along.dot(x - ball.centre);
+                   ball.normalB * ((db - ball.cosine * da) / squaredSine) + along * (way / shrinks);
       const double length = move.length();
       if (!std::isfinite(length)) return false;
-      ball.centre += length > kLongestSpineStep ? move * (kLongestSpineStep / length) : move;
+      if (length > kLongestSpineStep) move *= kLongestSpineStep / length;
+      ball.centre += move;
+      before = way;
+      gone = along.dot(move);
       if (length < kSpineTolerance) return true;
     }
     return false;
