@@ -20,7 +20,7 @@ using Mask = ArrivalBlock::Mask;
 constexpr float kImprovement = 1e-5f;
 // Blocks whose news are later than the earliest by more than this wait, voxels: what they would
 // compute now is not final yet.
-constexpr float kWindow = 8;
+constexpr float kWindow = 0.5f;
 constexpr std::size_t kBlocksPerTask = 8;
 
 /// How late the first solution is followed. The second runs a little ahead of it: by as much as it
@@ -40,6 +40,7 @@ int parityOf(const Coord& origin) {
 /// What a sweep keeps of each block beside its times.
 struct Desk {
   float earliest = kFar;        ///< time of the earliest news; kFar: nothing to do
+  bool seen = false;            ///< has it been worked on?
   std::uint8_t newsFrom = 0;    ///< bit d: neighbour d has news
   std::uint8_t tells = 0;       ///< bit d: neighbour d should look; written by the block's own work
   std::array<float, 6> told{};  ///< earliest change at that face
@@ -140,7 +141,8 @@ void tell(Desk& desk, Index n, float time, Index depth) {
     }
 }
 
-/// Gauss-Seidel sweeps over one block with its neighbours' nearest layers around it.
+/// Gauss-Seidel sweeps over one block with its neighbours' nearest layers around it, each over the
+/// grid points only beside which something changed.
 class FirstOrderWorker {
  public:
   FirstOrderWorker(ArrivalBlock& block, Desk& desk, const SweepLimit& limit)
@@ -153,12 +155,13 @@ class FirstOrderWorker {
   }
 
   void run() {
+    markNews();
     // Sweeps begin away from the side that the news come from.
     const int start =
         (desk_.newsFrom & 2 ? 4 : 0) | (desk_.newsFrom & 8 ? 2 : 0) | (desk_.newsFrom & 32 ? 1 : 0);
     constexpr std::array<int, 8> kGray = {0, 1, 3, 2, 6, 7, 5, 4};
-    for (std::size_t i = 0; sweep(start ^ kGray[i % 8]); ++i) {
-    }
+    for (std::size_t i = 0; isPending(); ++i) sweep(start ^ kGray[i % 8]);
+    desk_.seen = true;
     desk_.newsFrom = 0;
     desk_.earliest = kFar;
     for (auto it = changed_.beginOn(); it; ++it) {
@@ -194,19 +197,63 @@ class FirstOrderWorker {
       }
   }
 
-  /// @return did anything improve?
-  bool sweep(int direction) {
-    bool any = false;
-    const bool bx = direction & 4, by = direction & 2, bz = direction & 1;
-    for (int i = 0; i < 8; ++i)
-      for (int j = 0; j < 8; ++j)
-        for (int k = 0; k < 8; ++k) {
-          const int x = bx ? 7 - i : i, y = by ? 7 - j : j, z = bz ? 7 - k : k;
-          any = relax(x, y, z) || any;
-        }
-    return any;
+  /// The first time all grid points, later those beside neighbours with news.
+  void markNews() {
+    if (!desk_.seen) {
+      pending_.fill(~std::uint64_t{0});
+      return;
+    }
+    constexpr std::uint64_t kColumn = 0x0101010101010101;
+    if (desk_.newsFrom & 1) pending_[0] = ~std::uint64_t{0};
+    if (desk_.newsFrom & 2) pending_[7] = ~std::uint64_t{0};
+    for (std::uint64_t& slice : pending_) {
+      if (desk_.newsFrom & 4) slice |= 0xFF;
+      if (desk_.newsFrom & 8) slice |= std::uint64_t{0xFF} << 56;
+      if (desk_.newsFrom & 16) slice |= kColumn;
+      if (desk_.newsFrom & 32) slice |= kColumn << 7;
+    }
   }
 
+  [[nodiscard]] bool isPending() const {
+    return std::any_of(pending_.begin(), pending_.end(), [](std::uint64_t s) { return s != 0; });
+  }
+
+  void sweep(int direction) {
+    const bool bx = direction & 4, by = direction & 2, bz = direction & 1;
+    for (int i = 0; i < 8; ++i) {
+      const int x = bx ? 7 - i : i;
+      for (int j = 0; j < 8 && pending_[static_cast<std::size_t>(x)]; ++j)
+        sweepRow(x, by ? 7 - j : j, bz);
+    }
+  }
+
+  void sweepRow(int x, int y, bool backwards) {
+    std::uint64_t& slice = pending_[static_cast<std::size_t>(x)];
+    unsigned ahead = 0xFF;
+    while (const unsigned row = static_cast<unsigned>(slice >> (8 * y)) & ahead) {
+      const int z = backwards ? std::bit_width(row) - 1 : std::countr_zero(row);
+      slice &= ~(std::uint64_t{1} << (8 * y + z));
+      ahead = backwards ? (1u << z) - 1 : 0xFFu << (z + 1) & 0xFFu;
+      if (relax(x, y, z)) markReaders(x, y, z);
+    }
+  }
+
+  /// Those beside it that are later: only they can come from there.
+  void markReaders(int x, int y, int z) {
+    const std::size_t here = slot(x, y, z);
+    const auto mark = [&](int i, int j, int k) {
+      if (times_[slot(i, j, k)] > times_[here])
+        pending_[static_cast<std::size_t>(i)] |= std::uint64_t{1} << (8 * j + k);
+    };
+    if (x > 0) mark(x - 1, y, z);
+    if (x < 7) mark(x + 1, y, z);
+    if (y > 0) mark(x, y - 1, z);
+    if (y < 7) mark(x, y + 1, z);
+    if (z > 0) mark(x, y, z - 1);
+    if (z < 7) mark(x, y, z + 1);
+  }
+
+  /// @return did the time improve?
   bool relax(int x, int y, int z) {
     const std::size_t s = slot(x, y, z);
     float a = std::min(times_[s - 100], times_[s + 100]),
@@ -242,6 +289,7 @@ class FirstOrderWorker {
   Desk& desk_;
   SweepLimit limit_;
   std::array<float, 1000> times_;
+  std::array<std::uint64_t, 8> pending_{};  ///< to be solved: slices of x, bits of 8 y + z
   Mask changed_;
 };
 
@@ -252,10 +300,16 @@ class SecondOrderWorker {
   SecondOrderWorker(ArrivalBlock& block, Desk& desk, const std::vector<Desk>& desks,
                     const SweepLimit& limit)
       : block_(block), desk_(desk), limit_(limit) {
-    for (std::size_t d = 0; d < 6; ++d)
-      if (const ArrivalBlock* other = block.neighbours[d])
-        views_[d] = {other, desks[other->number].second->data()};
-    views_[kOwn] = {&block, desk.second->data()};
+    load(block, desk, Coord(0), Coord(0), Coord(8));
+    for (int d = 0; d < 6; ++d) {
+      Coord from(0), to(8), shift(0);
+      shift[d >> 1] = d & 1 ? 8 : -8;
+      (d & 1 ? to : from)[d >> 1] = d & 1 ? 2 : 6;
+      if (const ArrivalBlock* other = block.neighbours[static_cast<std::size_t>(d)])
+        load(*other, desks[other->number], shift, from, to);
+      else
+        clear(shift, from, to);
+    }
   }
 
   void run() {
@@ -272,6 +326,7 @@ class SecondOrderWorker {
       if (std::abs(time - stored) <= kImprovement * static_cast<float>(block_.slownessAt(n)))
         continue;
       stored = time;
+      second_[slot(n)] = block_.inside.isOn(n) ? -time : time;
       tell(desk_, n, block_.time[n], 2);
       markReaders(n);
     }
@@ -323,46 +378,64 @@ class SecondOrderWorker {
       (*desk_.order)[i] = static_cast<std::uint16_t>(keys[i] & 0xFFFF);
   }
 
-  static constexpr std::size_t kOwn = 6;
-  /// The block itself, or one beside it: what the first and the second solution say there.
-  struct View {
-    const ArrivalBlock* block = nullptr;
-    const float* second = nullptr;
-  };
   struct Neighbour {
     float first = kFar;  ///< time of the first solution
-    double time = 0;     ///< of the second, with its sign
+    double time = 0;     ///< of the second; both negative on the other side
   };
-  [[nodiscard]] Neighbour read(const View& view, Index n, bool inside) const {
-    if (!view.block || !(view.block->time[n] < kFar)) return {};
-    const bool same = view.block->inside.isOn(n) == inside;
-    const float first = view.block->time[n];
-    const auto second = static_cast<double>(view.second[n]);
-    return same ? Neighbour{first, second} : Neighbour{-first, -second};
+
+  static std::size_t slot(const Coord& c) {
+    return static_cast<std::size_t>(((c.x() + 2) * 12 + c.y() + 2) * 12 + c.z() + 2);
+  }
+  static std::size_t slot(Index n) {
+    return slot(openvdb::FloatTree::LeafNodeType::offsetToLocalCoord(n));
   }
 
-  /// `count` grid points away in direction d.
-  [[nodiscard]] Neighbour look(Index n, std::size_t d, Index count, bool inside) const {
-    const Index shift = 6 - 3 * static_cast<Index>(d >> 1), at = n >> shift & 7u;
-    if (d & 1) {
-      return at + count > 7 ? read(views_[d], n + (count << shift) - (8u << shift), inside)
-                            : read(views_[kOwn], n + (count << shift), inside);
-    }
-    return at < count ? read(views_[d], n + (8u << shift) - (count << shift), inside)
-                      : read(views_[kOwn], n - (count << shift), inside);
+  /// Rows of z between two corners.
+  template <typename Each>
+  static void forEachRow(const Coord& from, const Coord& to, const Each& each) {
+    for (int x = from.x(); x < to.x(); ++x)
+      for (int y = from.y(); y < to.y(); ++y) each(Coord(x, y, from.z()));
+  }
+  void clear(const Coord& shift, const Coord& from, const Coord& to) {
+    const auto count = static_cast<std::size_t>(to.z() - from.z());
+    forEachRow(from, to,
+               [&](const Coord& c) { std::fill_n(&first_[slot(c + shift)], count, kFar); });
+  }
+  void load(const ArrivalBlock& block, const Desk& desk, const Coord& shift, const Coord& from,
+            const Coord& to) {
+    const auto count = static_cast<Index>(to.z() - from.z());
+    const bool isMixed = !block.inside.isOn() && !block.inside.isOff();
+    const float all = block.inside.isOn() ? -1.0f : 1.0f;
+    forEachRow(from, to, [&](const Coord& c) {
+      const Index n = openvdb::FloatTree::LeafNodeType::coordToOffset(c);
+      float* first = &first_[slot(c + shift)];
+      float* second = &second_[slot(c + shift)];
+      for (Index i = 0; i < count; ++i) {
+        const float side = !isMixed ? all : block.inside.isOn(n + i) ? -1.0f : 1.0f;
+        first[i] = side * block.time[n + i];
+        second[i] = side * (*desk.second)[n + i];
+      }
+    });
+  }
+
+  [[nodiscard]] Neighbour look(std::size_t at, float side) const {
+    if (!(std::abs(first_[at]) < kFar)) return {};
+    return {side * first_[at], static_cast<double>(side * second_[at])};
   }
 
   double solve(Index n) {
-    const bool inside = block_.inside.isOn(n);
+    constexpr std::array<std::size_t, 3> kStep = {144, 12, 1};
+    const float side = block_.inside.isOn(n) ? -1.0f : 1.0f;
+    const std::size_t here = slot(n);
     UpwindTerms terms;
     std::array<double, 3> near{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const Neighbour a = look(n, 2 * axis, 1, inside), b = look(n, 2 * axis + 1, 1, inside);
+    for (const std::size_t step : kStep) {
+      const Neighbour a = look(here - step, side), b = look(here + step, side);
       const bool up = b.first < a.first;
       const Neighbour& next = up ? b : a;
       if (!(next.first < block_.time[n])) continue;
       near[static_cast<std::size_t>(terms.count)] = next.time;
-      const Neighbour beyond = look(n, 2 * axis + up, 2, inside);
+      const Neighbour beyond = look(up ? here + 2 * step : here - 2 * step, side);
       if (beyond.first <= next.first)
         terms.addSecond(next.time, beyond.time);
       else
@@ -385,7 +458,8 @@ class SecondOrderWorker {
   ArrivalBlock& block_;
   Desk& desk_;
   SweepLimit limit_;
-  std::array<View, 7> views_;
+  /// Both solutions in the block and two layers of its neighbours, negative inside.
+  std::array<float, 12 * 12 * 12> first_, second_;
   Mask pending_;  ///< to be solved in this round
 };
 

@@ -46,18 +46,26 @@ struct UpwindTerms {
 /// [Sethian99, Zhao05].
 [[nodiscard]] inline double solveUpwind(const UpwindTerms& terms, double slowness) {
   const double base = terms.term[0].value;
-  double u = base + slowness / std::sqrt(terms.term[0].weight);
+  // An axis counts if the earlier ones alone come later than its value: if at that value the sum
+  // is below slowness². The sum rises from value to value, so the last that counts is found first.
+  int count = terms.count;
+  for (; count > 1; --count) {
+    double sum = 0;
+    for (int i = 0; i < count - 1; ++i) {
+      const double d = terms.term[count - 1].value - terms.term[i].value;
+      sum += terms.term[i].weight * d * d;
+    }
+    if (sum < slowness * slowness) break;
+  }
+  if (count == 1) return base + slowness / std::sqrt(terms.term[0].weight);
   double a = terms.term[0].weight, b = 0, c = -slowness * slowness;
-  for (int i = 1; i < terms.count && u > terms.term[i].value; ++i) {
+  for (int i = 1; i < count; ++i) {
     const double v = terms.term[i].value - base, w = terms.term[i].weight;
     a += w;
     b += w * v;
     c += w * v * v;
-    const double square = b * b - a * c;
-    if (square < 0) break;
-    u = base + (b + std::sqrt(square)) / a;
   }
-  return u;
+  return base + (b + std::sqrt(std::max(0.0, b * b - a * c))) / a;
 }
 
 }  // namespace levelset::eikonal
