@@ -8,6 +8,7 @@
 
 #include "apps/regress/rays.h"
 #include "levelset/inspect/check.h"
+#include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/meshing/band_to_mesh.h"
 #include "levelset/vdb.h"
@@ -121,6 +122,20 @@ void addErrors(const NarrowBand& result, const Truth& truth, Mesher mesher, Figu
   const Tally mesh = meshErrors(result, truth, mesher);
   figures["mesh_l1_vx"] = mesh.mean() / h;
   figures["mesh_linf_vx"] = mesh.largest / h;
+}
+
+void addDifferences(const NarrowBand& result, const NarrowBand& reference, Figures& figures) {
+  const double h = result.voxelSize();
+  figures["voxel_size"] = h;
+  figures["active_voxels"] = static_cast<double>(result.activeVoxelCount());
+  const levelset::Comparison c = levelset::compare(result, reference);
+  figures["surface_l1"] = std::max(c.meanAtoB, c.meanBtoA);
+  figures["surface_linf"] = c.hausdorff();
+  figures["surface_l1_vx"] = figures["surface_l1"] / h;
+  figures["surface_linf_vx"] = figures["surface_linf"] / h;
+  const double volume = levelset::measure(reference).volume;
+  figures["volume_error"] = levelset::measure(result).volume / volume - 1;
+  figures["value_error"] = c.symmetricDifference / volume;
 }
 
 void addInvariants(const NarrowBand& result, const Truth& truth, Figures& figures) {

@@ -14,6 +14,11 @@ enum class Mesher { Ours, OpenVdb };
 void addErrors(const levelset::NarrowBand& result, const Truth& truth, Mesher mesher,
                Figures& figures, int rays = kRayCount);
 
+/// The surface columns, volume and, as the value, the volume of what is in one of them only,
+/// against a band that stands for the truth. Distances are taken both ways, and the worse told.
+void addDifferences(const levelset::NarrowBand& result, const levelset::NarrowBand& reference,
+                    Figures& figures);
+
 /// Volume, area, eikonal residual and checks.
 void addInvariants(const levelset::NarrowBand& result, const Truth& truth, Figures& figures);
 

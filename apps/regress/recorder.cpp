@@ -47,19 +47,18 @@ void Recorder::tick() {
   levelset::report(progress_, 0, "regress");
 }
 
-std::optional<NarrowBand> Recorder::measure(const Subject& subject, const std::string& tool,
-                                            const std::function<NarrowBand()>& work) {
+std::optional<NarrowBand> Recorder::measure(
+    const std::string& variant, const Sample& at, const std::string& tool,
+    const std::function<NarrowBand()>& work,
+    const std::function<void(const NarrowBand&, Figures&)>& look) {
   tick();
-  Row& row = result_.rows.emplace_back(
-      Row{subject.variant, tool, subject.at.resolution, subject.at.phase, {}, {}});
+  Row& row = result_.rows.emplace_back(Row{variant, tool, at.resolution, at.phase, {}, {}});
   std::optional<NarrowBand> made;
   try {
     const apps::Cost cost = apps::costOf([&] { made = work(); });
     row.figures["cpu_s"] = cost.cpuSeconds;
     row.figures["peak_bytes"] = cost.peakBytes;
-    addErrors(*made, subject.truth, tool == kOurs ? Mesher::Ours : Mesher::OpenVdb, row.figures,
-              isQuick() ? kQuickRayCount : kRayCount);
-    addInvariants(*made, subject.truth, row.figures);
+    look(*made, row.figures);
   } catch (const levelset::Cancelled&) {
     throw;
   } catch (const std::exception& error) {
@@ -68,6 +67,21 @@ std::optional<NarrowBand> Recorder::measure(const Subject& subject, const std::s
     made.reset();
   }
   return made;
+}
+
+std::optional<NarrowBand> Recorder::measure(const Subject& subject, const std::string& tool,
+                                            const std::function<NarrowBand()>& work) {
+  return measure(subject.variant, subject.at, tool, work, [&](const NarrowBand& made, Figures& of) {
+    addErrors(made, subject.truth, tool == kOurs ? Mesher::Ours : Mesher::OpenVdb, of,
+              isQuick() ? kQuickRayCount : kRayCount);
+    addInvariants(made, subject.truth, of);
+  });
+}
+
+void Recorder::measure(const std::string& variant, const Sample& at, const NarrowBand& reference,
+                       const std::string& tool, const std::function<NarrowBand()>& work) {
+  measure(variant, at, tool, work,
+          [&](const NarrowBand& made, Figures& of) { addDifferences(made, reference, of); });
 }
 
 void Recorder::row(const std::string& variant, const std::string& tool, const Sample& at,

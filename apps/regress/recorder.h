@@ -46,6 +46,9 @@ class Recorder {
   /// @return the result, for more figures by set(); empty if refused
   std::optional<levelset::NarrowBand> measure(const Subject& subject, const std::string& tool,
                                               const std::function<levelset::NarrowBand()>& work);
+  /// The same where there is no closed form: the result is compared with a finer band.
+  void measure(const std::string& variant, const Sample& at, const levelset::NarrowBand& reference,
+               const std::string& tool, const std::function<levelset::NarrowBand()>& work);
   /// Adds a row without a band to look at.
   void row(const std::string& variant, const std::string& tool, const Sample& at, Figures figures);
   /// One more figure of the newest row.
@@ -66,6 +69,10 @@ class Recorder {
 
  private:
   void tick();
+  std::optional<levelset::NarrowBand> measure(
+      const std::string& variant, const Sample& at, const std::string& tool,
+      const std::function<levelset::NarrowBand()>& work,
+      const std::function<void(const levelset::NarrowBand&, Figures&)>& look);
 
   Budget budget_;
   levelset::Progress progress_;
