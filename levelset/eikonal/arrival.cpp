@@ -50,8 +50,9 @@ Slowness scaled(const Slowness& slowness, double unit) {
 class Solver {
  public:
   /// @param slowness  over `unit`, the typical one: so the times of the solver are about voxels
+  /// @param sources   empty: the front starts at the surface that `side` has
   Solver(const ArrivalRequest& request, const openvdb::math::Transform& transform,
-         const FloatTree* side, const Slowness& slowness, double unit)
+         const FloatTree* side, std::vector<Vec3d> sources, const Slowness& slowness, double unit)
       : request_(request),
         transform_(transform),
         side_(side),
@@ -61,6 +62,11 @@ class Solver {
     settings.until = request.until / voxelTime_;
     if (slowness) settings.slowness = [=](const Coord& c) { return slowness(c.asVec3d()); };
     settings.side = side;
+    if (!sources.empty()) {
+      std::vector<double> there;
+      for (const Vec3d& source : sources) there.push_back(slowness ? slowness(source) : 1);
+      settings.sources = std::make_shared<PointSources>(std::move(sources), std::move(there));
+    }
     settings.maxMemory = request.options.maxMemory;
     settings.progress = subProgress(request.options.progress, kStarted, 1);
     blocks_ = std::make_unique<ArrivalBlocks>(settings);
@@ -186,7 +192,7 @@ ArrivalGrid arrivalFromSurface(const FloatGrid& field, const ArrivalRequest& req
   const Slowness slowness = scaled(world, unit);
   const std::vector<StartTime> start = startAtSurface(field, startOf(request, slowness));
   checkRoom(start, field, request);
-  return Solver(request, field.transform(), &field.tree(), slowness, unit).run(start);
+  return Solver(request, field.transform(), &field.tree(), {}, slowness, unit).run(start);
 }
 
 ArrivalGrid arrivalFromPoints(std::span<const Imath::V3d> sources,
@@ -197,7 +203,7 @@ ArrivalGrid arrivalFromPoints(std::span<const Imath::V3d> sources,
   const double unit = world ? typicalSlowness(places, world) : 1;
   const Slowness slowness = scaled(world, unit);
   const std::vector<StartTime> start = startAtPoints(places, startOf(request, slowness));
-  return Solver(request, transform, nullptr, slowness, unit).run(start);
+  return Solver(request, transform, nullptr, places, slowness, unit).run(start);
 }
 
 }  // namespace eikonal

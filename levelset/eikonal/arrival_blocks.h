@@ -10,6 +10,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "levelset/eikonal/point_sources.h"
 #include "levelset/eikonal/upwind.h"
 #include "levelset/progress.h"
 #include "levelset/vdb.h"
@@ -63,7 +64,8 @@ class ArrivalBlocks {
     const char* action = "sweep";
     double until = 0;                                            ///< latest time kept
     std::function<double(const openvdb::Coord&)> slowness = {};  ///< empty: 1
-    const openvdb::FloatTree* side = nullptr;  ///< its sign: inside; null: none is
+    const openvdb::FloatTree* side = nullptr;          ///< its sign: inside; null: none is
+    std::shared_ptr<const PointSources> sources = {};  ///< where the front starts at points
     std::size_t maxMemory = kNoMemoryLimit;
     Progress progress = {};
   };
@@ -78,6 +80,12 @@ class ArrivalBlocks {
   void loadSlowness();
 
   [[nodiscard]] const Settings& settings() const { return settings_; }
+  [[nodiscard]] StraightTime straightTime(const ArrivalBlock& block, openvdb::Index n) const {
+    if (!settings_.sources) return {};
+    return settings_.sources->straightTime(
+        block.origin + openvdb::FloatTree::LeafNodeType::offsetToLocalCoord(n),
+        block.slownessAt(n));
+  }
   [[nodiscard]] std::deque<ArrivalBlock>& blocks() { return blocks_; }
   [[nodiscard]] const std::deque<ArrivalBlock>& blocks() const { return blocks_; }
   [[nodiscard]] ArrivalBlock& block(std::uint32_t number) { return blocks_[number]; }

@@ -66,12 +66,13 @@ class Marcher {
   void update(ArrivalBlock& block, Index n) {
     const double slowness = block.slownessAt(n);
     if (!(slowness < kFar)) return;
-    UpwindTerms terms = gather(block, n, order_);
+    const StraightTime straight = order_ == 2 ? blocks_.straightTime(block, n) : StraightTime{};
+    const UpwindTerms terms = gather(block, n, order_, straight);
     if (terms.count == 0) return;
     double time = solveUpwind(terms, slowness);
     bool first = order_ == 2 && !terms.isSecond;
     if (terms.isSecond && time < terms.latest) {
-      time = solveUpwind(gather(block, n, 1), slowness);
+      time = solveUpwind(gather(block, n, 1, straight), slowness);
       first = true;
     }
     const auto stored = static_cast<float>(time);
@@ -82,7 +83,8 @@ class Marcher {
   }
 
   /// Upwind values from accepted neighbours; those across the start count backwards.
-  static UpwindTerms gather(const ArrivalBlock& block, Index n, int order) {
+  static UpwindTerms gather(const ArrivalBlock& block, Index n, int order,
+                            const StraightTime& straight) {
     UpwindTerms terms;
     const bool inside = block.inside.isOn(n);
     const auto known = [inside](const ArrivalBlock* at, Index i, double& time) {
@@ -93,22 +95,28 @@ class Marcher {
     };
     for (int axis = 0; axis < 3; ++axis) {
       double best = 0, beyond = 0;
-      bool any = false, second = false;
+      bool any = false, second = false, up = false;
       for (int d = 2 * axis; d < 2 * axis + 2; ++d) {
         Index near = 0, far = 0;
         double time = 0, other = 0;
         const ArrivalBlock* at = block.step(n, d, near);
         if (!known(at, near, time) || (any && time >= best)) continue;
         any = true;
+        up = d & 1;
         best = time;
         const ArrivalBlock* behind = at->step(near, d, far);
         second = order == 2 && known(behind, far, other) && other <= time;
         if (second) beyond = other;
       }
+      if (!any) {
+        terms.known += straight.level(static_cast<std::size_t>(axis));
+        continue;
+      }
+      const double missed = straight.missed(static_cast<std::size_t>(axis), up, second);
       if (second)
-        terms.addSecond(best, beyond);
-      else if (any)
-        terms.addFirst(best);
+        terms.addSecond(best, beyond, missed);
+      else
+        terms.addFirst(best, missed);
     }
     return terms;
   }

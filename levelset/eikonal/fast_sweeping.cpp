@@ -297,9 +297,9 @@ class FirstOrderWorker {
 /// solution, so each grid point waits for earlier ones only and the equations have one solution.
 class SecondOrderWorker {
  public:
-  SecondOrderWorker(ArrivalBlock& block, Desk& desk, const std::vector<Desk>& desks,
-                    const SweepLimit& limit)
-      : block_(block), desk_(desk), limit_(limit) {
+  SecondOrderWorker(const ArrivalBlocks& blocks, ArrivalBlock& block, Desk& desk,
+                    const std::vector<Desk>& desks, const SweepLimit& limit)
+      : blocks_(blocks), block_(block), desk_(desk), limit_(limit) {
     load(block, desk, Coord(0), Coord(0), Coord(8));
     for (int d = 0; d < 6; ++d) {
       Coord from(0), to(8), shift(0);
@@ -427,19 +427,24 @@ class SecondOrderWorker {
     constexpr std::array<std::size_t, 3> kStep = {144, 12, 1};
     const float side = block_.inside.isOn(n) ? -1.0f : 1.0f;
     const std::size_t here = slot(n);
+    const StraightTime straight = blocks_.straightTime(block_, n);
     UpwindTerms terms;
     std::array<double, 3> near{};
-    for (const std::size_t step : kStep) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::size_t step = kStep[axis];
       const Neighbour a = look(here - step, side), b = look(here + step, side);
       const bool up = b.first < a.first;
       const Neighbour& next = up ? b : a;
-      if (!(next.first < block_.time[n])) continue;
-      near[static_cast<std::size_t>(terms.count)] = next.time;
+      if (!(next.first < block_.time[n])) {
+        terms.known += straight.level(axis);
+        continue;
+      }
+      near[static_cast<std::size_t>(terms.count)] = next.time - straight.missed(axis, up, false);
       const Neighbour beyond = look(up ? here + 2 * step : here - 2 * step, side);
       if (beyond.first <= next.first)
-        terms.addSecond(next.time, beyond.time);
+        terms.addSecond(next.time, beyond.time, straight.missed(axis, up, true));
       else
-        terms.addFirst(next.time);
+        terms.addFirst(near[static_cast<std::size_t>(terms.count)]);
     }
     const double slowness = block_.slownessAt(n);
     if (terms.count == 0) return static_cast<double>(block_.time[n]);
@@ -447,6 +452,7 @@ class SecondOrderWorker {
     bool first = !terms.isSecond;
     if (terms.isSecond && time < terms.latest) {
       UpwindTerms plain;
+      plain.known = terms.known;
       for (int i = 0; i < terms.count; ++i) plain.addFirst(near[static_cast<std::size_t>(i)]);
       time = solveUpwind(plain, slowness);
       first = true;
@@ -455,6 +461,7 @@ class SecondOrderWorker {
     return time;
   }
 
+  const ArrivalBlocks& blocks_;
   ArrivalBlock& block_;
   Desk& desk_;
   SweepLimit limit_;
@@ -479,7 +486,7 @@ void solveSecondOrder(ArrivalBlocks& blocks, const SweepLimit& limit) {
     desk.earliest = earliestUnknown(block);
   }
   rounds.run(false, 0.5, 1, [&](ArrivalBlock& block, Desk& desk) {
-    SecondOrderWorker(block, desk, rounds.desks, limit).run();
+    SecondOrderWorker(blocks, block, desk, rounds.desks, limit).run();
   });
   for (ArrivalBlock& block : blocks.blocks()) block.time = *rounds.desks[block.number].second;
 }

@@ -24,10 +24,12 @@ struct UpwindTerms {
   int count = 0;
   double latest = -std::numeric_limits<double>::max();  ///< nearest neighbours' times, the largest
   bool isSecond = false;                                ///< is one of the terms of second order?
+  double known = 0;  ///< squares of derivatives along axes that have no term
 
-  void addFirst(double near) { add(near, 1, near); }
-  void addSecond(double near, double beyond) {
-    add((4 * near - beyond) / 3, 2.25, near);
+  /// @param missed  what the difference lacks of the derivative, where that is known
+  void addFirst(double near, double missed = 0) { add(near - missed, 1, near); }
+  void addSecond(double near, double beyond, double missed = 0) {
+    add((4 * near - beyond - 2 * missed) / 3, 2.25, near);
     isSecond = true;
   }
 
@@ -42,10 +44,10 @@ struct UpwindTerms {
 };
 
 /// The time u at which a front of the given slowness (per voxel) comes from the terms: solves
-/// Σ weight (u − value)² = slowness², with the later axes left out while they lie in the future
-/// [Sethian99, Zhao05].
+/// Σ weight (u − value)² = slowness² − known, with the later axes left out while they lie in the
+/// future [Sethian99, Zhao05].
 [[nodiscard]] inline double solveUpwind(const UpwindTerms& terms, double slowness) {
-  const double base = terms.term[0].value;
+  const double base = terms.term[0].value, square = slowness * slowness - terms.known;
   // An axis counts if the earlier ones alone come later than its value: if at that value the sum
   // is below slowness². The sum rises from value to value, so the last that counts is found first.
   int count = terms.count;
@@ -55,10 +57,10 @@ struct UpwindTerms {
       const double d = terms.term[count - 1].value - terms.term[i].value;
       sum += terms.term[i].weight * d * d;
     }
-    if (sum < slowness * slowness) break;
+    if (sum < square) break;
   }
-  if (count == 1) return base + slowness / std::sqrt(terms.term[0].weight);
-  double a = terms.term[0].weight, b = 0, c = -slowness * slowness;
+  if (count == 1) return base + std::sqrt(square / terms.term[0].weight);
+  double a = terms.term[0].weight, b = 0, c = -square;
   for (int i = 1; i < count; ++i) {
     const double v = terms.term[i].value - base, w = terms.term[i].weight;
     a += w;

@@ -1,0 +1,65 @@
+#pragma once
+
+// For the .cpp files of levelset/eikonal only.
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "levelset/eikonal/point_tree.h"
+#include "levelset/eikonal/upwind.h"
+
+namespace levelset::eikonal {
+
+/// The time straight away from a point source, T0 = slowness |x − s|, as upwind differences see it.
+/// Its curvature is infinite at the source, so they lose there what no resolution brings back; but
+/// what they get wrong is known, and what is left of the time, T − T0, is smooth [Treister16].
+struct StraightTime {
+  openvdb::Vec3d away;  ///< x − s, voxels
+  double slowness = 0;  ///< 0: none is taken apart
+
+  /// What a difference on the grid points x, x + d, x + 2 d, with d a step along the axis, lacks
+  /// of the derivative of T0 along −d.
+  [[nodiscard]] double missed(std::size_t axis, bool up, bool second) const {
+    if (slowness == 0) return 0;
+    const double along = up ? away[static_cast<int>(axis)] : -away[static_cast<int>(axis)];
+    const double square = away.lengthSqr(), here = std::sqrt(square);
+    const double near = std::sqrt(square + 2 * along + 1);
+    const double difference =
+        second ? (3 * here - 4 * near + std::sqrt(square + 4 * along + 4)) / 2 : here - near;
+    return slowness * (-along / here - difference);
+  }
+  /// The square of the derivative of T0 along an axis on which both neighbours are later: upwind
+  /// differences take it for 0, but the source need not lie level with a grid point.
+  [[nodiscard]] double level(std::size_t axis) const {
+    const double a = away[static_cast<int>(axis)];
+    return slowness == 0 || std::abs(a) > 0.5 ? 0 : slowness * slowness * a * a / away.lengthSqr();
+  }
+};
+
+/// The points that a front starts at, index space.
+class PointSources {
+ public:
+  /// @param slowness  at each; kFar where nothing passes
+  PointSources(std::vector<openvdb::Vec3d> places, std::vector<double> slowness)
+      : places_(std::move(places)), slowness_(std::move(slowness)), tree_(places_) {}
+  PointSources(const PointSources&) = delete;
+  PointSources& operator=(const PointSources&) = delete;
+
+  /// From the nearest of them. Where the front goes more than twice as fast as there, nothing: T0
+  /// would bring in more than it takes away.
+  [[nodiscard]] StraightTime straightTime(const openvdb::Coord& gridPoint, double slowness) const {
+    const openvdb::Vec3d x = gridPoint.asVec3d();
+    const std::uint32_t i =
+        places_.size() == 1 ? 0 : tree_.nearest(x, std::numeric_limits<double>::max());
+    if (slowness_[i] > 2 * slowness || x == places_[i]) return {};
+    return {x - places_[i], slowness_[i]};
+  }
+
+ private:
+  std::vector<openvdb::Vec3d> places_;
+  std::vector<double> slowness_;
+  PointTree tree_;
+};
+
+}  // namespace levelset::eikonal
