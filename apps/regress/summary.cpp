@@ -7,6 +7,9 @@
 namespace regress {
 namespace {
 
+// Corners that a coarse grid rounds are missed by some rays.
+constexpr double kMostMissed = 0.3;
+
 bool isCost(const std::string& column) {
   return column == "cpu_s";
 }
@@ -112,6 +115,20 @@ std::vector<Judgement> judge(const Case& of, const std::vector<Row>& summary, Bu
     }
     if (!met && (budget == Budget::Full || bound.resolution == 0))
       judgements.push_back({bound, bound.resolution, 0, false, "there is no such row"});
+  }
+  // Errors of zeros that were found say nothing of those that were not.
+  for (const Row& row : summary) {
+    const auto missed = row.figures.find("missed_hits");
+    if (row.tool != kOurs || missed == row.figures.end()) continue;
+    if (std::any_of(of.bounds.begin(), of.bounds.end(), [&](const Bound& bound) {
+          return bound.variant == row.variant && bound.figure.starts_with("surface_l") &&
+                 (bound.resolution == 0 || bound.resolution == row.resolution);
+        }))
+      judgements.push_back({{row.variant, "missed_hits", kMostMissed, row.resolution},
+                            row.resolution,
+                            missed->second,
+                            missed->second <= kMostMissed,
+                            {}});
   }
   // A refusal is a failure whether or not a bound looks at it.
   for (const Row& row : summary)

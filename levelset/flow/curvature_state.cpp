@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "levelset/flow/curvature_rate_vdb.h"
 
@@ -17,7 +18,36 @@ constexpr float kNear = 1;  // voxels
 // With less than this share of the corners there is no leader.
 constexpr float kLeastSum = 0.1f;
 
+// What is bent more is taken for bent so: close to a focus or a crease nothing is parallel.
+constexpr double kMostBent = 0.12;
+
 struct Nothing {};
+
+/// k1 + k2 of the parallel surface `away` voxels further out, less the same here.
+double differenceOfParallel(double away, double sum, double squares) {
+  const double half = std::sqrt(std::max(0.0, squares / 2 - sum * sum / 4));
+  double difference = 0;
+  for (const double k : {sum / 2 + half, sum / 2 - half}) {
+    const double bent = std::clamp(k, -kMostBent, kMostBent);
+    difference += bent / (1 + away * bent) - bent;
+  }
+  return difference;
+}
+
+/// Sum and squared sum of the principal curvatures of the level set through a grid point of a
+/// distance: the trace of its second derivatives and of their square.
+std::pair<float, float> bendingAt(const float* p) {
+  constexpr std::array<int, 3> kSteps = {PaddedBlock::kStepX, PaddedBlock::kStepY, 1};
+  float sum = 0, squares = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const int s = kSteps[a], t = kSteps[(a + 1) % 3];
+    const float straight = p[s] - 2 * p[0] + p[-s];
+    const float mixed = (p[s + t] - p[s - t] - p[t - s] + p[-s - t]) / 4;
+    sum += straight;
+    squares += straight * straight + 2 * mixed * mixed;
+  }
+  return {sum, squares};
+}
 
 /// Central differences at a grid point of a padded block.
 Vec3d gradientAt(const PaddedBlock& block, const Coord& c) {
@@ -34,8 +64,9 @@ CurvatureState::CurvatureState(const FloatGrid& distance, const std::optional<Ma
   value = start_;
   core_.resize(blocks_.size());
   followers_.resize(blocks_.size());
-  blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) { findCore(i); });
-  blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) { findFollowers(i); });
+  Bending bending{Field(blocks_.size()), Field(blocks_.size())};
+  blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) { findCore(i, bending); });
+  blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) { findFollowers(i, bending); });
   if (!mask) return;
   weights_.assign(blocks_.size(), Values{});
   blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) {
@@ -47,12 +78,22 @@ CurvatureState::CurvatureState(const FloatGrid& distance, const std::optional<Ma
   });
 }
 
-void CurvatureState::findCore(std::size_t i) {
-  for (auto it = blocks_.active(i).beginOn(); it; ++it)
-    if (static_cast<double>(std::abs(start_[i][it.pos()])) < kFlowCore) core_[i].setOn(it.pos());
+void CurvatureState::findCore(std::size_t i, Bending& bending) {
+  const auto block = std::make_unique<PaddedBlock>();
+  blocks_.gather(start_, i, static_cast<float>(kFlowWidth), *block);
+  for (auto it = blocks_.active(i).beginOn(); it; ++it) {
+    const double phi = static_cast<double>(std::abs(start_[i][it.pos()]));
+    if (!(phi < kFlowCore)) continue;
+    core_[i].setOn(it.pos());
+    // The corners of a leader's cell are nearer than a diagonal to its level.
+    if (phi < kFlowOwn - 1.8) continue;
+    const Coord c = LeafNode::offsetToLocalCoord(it.pos());
+    std::tie(bending.sums[i][it.pos()], bending.squares[i][it.pos()]) =
+        bendingAt(block->at(c.x(), c.y(), c.z()));
+  }
 }
 
-void CurvatureState::findFollowers(std::size_t i) {
+void CurvatureState::findFollowers(std::size_t i, const Bending& bending) {
   const auto block = std::make_unique<PaddedBlock>();
   blocks_.gather(start_, i, static_cast<float>(kFlowWidth), *block);
   for (auto it = blocks_.active(i).beginOn(); it; ++it) {
@@ -79,7 +120,15 @@ void CurvatureState::findFollowers(std::size_t i) {
       sum += follower.weights[k];
     }
     if (!(sum > kLeastSum)) continue;
-    for (float& weight : follower.weights) weight /= sum;
+    double bent = 0, squares = 0;
+    for (std::size_t k = 0; k < 8; ++k) {
+      follower.weights[k] /= sum;
+      const std::uint32_t corner = follower.corners[k];
+      const auto weight = static_cast<double>(follower.weights[k]);
+      bent += weight * static_cast<double>(bending.sums[corner / 512][corner % 512]);
+      squares += weight * static_cast<double>(bending.squares[corner / 512][corner % 512]);
+    }
+    follower.ahead = static_cast<float>(differenceOfParallel(back, bent, squares));
     followers_[i].push_back(follower);
   }
 }
@@ -97,7 +146,7 @@ void CurvatureState::evaluate(const Field& field, double shift, Field& rate) con
   blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) {
     followed_[i].clear();
     for (const Follower& f : followers_[i]) {
-      float sum = 0;
+      float sum = f.ahead;
       for (std::size_t k = 0; k < 8; ++k)
         sum += f.weights[k] * rate[f.corners[k] / 512][f.corners[k] % 512];
       followed_[i].push_back(sum);

@@ -185,6 +185,15 @@ TEST(RegressJudge, FailsBoundsThatAreMissedOrFitNothing) {
   EXPECT_EQ(judge(c, summary, Budget::Full).size(), 5u);
 }
 
+TEST(RegressJudge, FailsASurfaceThatIsNotThere) {
+  const Case c{.name = "c", .bounds = {{"v", "surface_l1", 1}}};
+  Row row = rowOf(8, 0, 0.1);
+  row.figures["missed_hits"] = 0.2;
+  EXPECT_TRUE(judge(c, {row}, Budget::Quick).at(1).passed);
+  row.figures["missed_hits"] = 1;
+  EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(1).passed);
+}
+
 TEST(RegressJudge, FailsWhatWasRefused) {
   const Case c{.name = "c"};
   Row refused = rowOf(8, 0, 0);
