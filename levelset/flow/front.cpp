@@ -27,7 +27,8 @@ constexpr double kMostSteps = 20000;
 constexpr std::size_t kSampledTriangles = 16384;
 // Positions, triangles and what splitting and moving keep beside them.
 constexpr double kBytesPerTriangle = 100;
-// A surface with more triangles than this for each voxel of its area is crumpled, not stretched.
+// A surface with more triangles than this for each voxel of the largest area that it has had is
+// crumpled, not stretched. On the way back from a stretch they are as many as they were there.
 constexpr double kMostTrianglesPerVoxel = 100, kSpareTriangles = 100000;
 // A face that leans further than this from a vertex normal belongs to another side of a crease.
 constexpr double kCreaseCosine = 0.8;
@@ -269,8 +270,9 @@ std::size_t Front::advance(const Journey& journey) {
     splitLongEdges();
     requireMemory(kBytesPerTriangle * static_cast<double>(mesh_.triangles.size()),
                   journey.maxMemory, journey.action);
+    largestArea_ = std::max(largestArea_, surfaceArea(mesh_));
     if (static_cast<double>(mesh_.triangles.size()) >
-        kSpareTriangles + kMostTrianglesPerVoxel * surfaceArea(mesh_)) {
+        kSpareTriangles + kMostTrianglesPerVoxel * largestArea_) {
       throw ResourceLimit(fmt::format(
           "{}: at time {:.6g} the velocity has folded the surface too finely to follow; "
           "use a smoother velocity, a shorter time or --scheme semi-lagrangian",

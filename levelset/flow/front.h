@@ -46,6 +46,7 @@ class Front {
   void splitLongEdges();
 
   TriMesh mesh_;
+  double largestArea_ = 0;  ///< voxels²
 };
 
 /// Walks from journey.from to journey.to in steps that are short enough at their beginning, middle

@@ -163,6 +163,16 @@ TEST(Advect, ConvergesInSecondOrder) {
   EXPECT_GT(std::log2(errors[1] / errors[2]), 1.7);
 }
 
+// Triangles do not get fewer where a surface shrinks: by their number for its area alone it would
+// look crumpled, as Enright's sphere did on its way back at 128.
+TEST(Advect, FollowsASurfaceThatIsPressedTogether) {
+  const V3d center(0.3, -0.2, 0.1);
+  const auto inwards = [=](const V3d& p, double) { return center - p; };
+  const AdvectResult result =
+      levelset::advect(levelset::makeSphere(60, center, 1), inwards, std::log(10.0));
+  EXPECT_LT(surfaceError(result.band, ballDistance(center, 6)).mean, 0.01);
+}
+
 TEST(Advect, TurnsSolidsRigidly) {
   const double h = 0.05;
   const VectorField spin = levelset::rotationVelocity(V3d(0.5, 0.3, 0), V3d(1, 2, 3));
