@@ -21,7 +21,7 @@ const std::vector<Column>& columns() {
       {"surface_linf", "surface L∞ (world)", "the same in world units"},
       {"surface_hits", "hits", "zeros found along the rays"},
       {"missed_hits", "missed",
-       "difference between the numbers of zeros of band and exact solid along the rays, relative"},
+       "zeros that the rays lack or have too many, over those of the exact solid"},
       {"mesh_l1_vx", "mesh L1",
        "mean exact distance of vertices and face centres of the mesh of the result, voxels"},
       {"mesh_linf_vx", "mesh L∞", "largest of these distances, voxels"},

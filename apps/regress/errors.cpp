@@ -116,8 +116,7 @@ void addErrors(const NarrowBand& result, const Truth& truth, Mesher mesher, Figu
   for (const double error : hits.errors) surface.add(error);
   addTally("surface", surface, h, figures);
   figures["surface_hits"] = surface.count;
-  figures["missed_hits"] =
-      hits.exactHits > 0 ? std::abs(surface.count - hits.exactHits) / hits.exactHits : 0;
+  figures["missed_hits"] = hits.exactHits > 0 ? hits.different / hits.exactHits : surface.count;
 
   const Tally mesh = meshErrors(result, truth, mesher);
   figures["mesh_l1_vx"] = mesh.mean() / h;

@@ -153,7 +153,7 @@ RayHits shootRays(const NarrowBand& band, const Truth& truth, int count) {
   constexpr int kPerTask = 100;
   struct Part {
     std::vector<double> errors;
-    int exactHits = 0;
+    int exactHits = 0, different = 0;
   };
   std::vector<Part> parts(static_cast<std::size_t>(count / kPerTask));
   const double radius = truth.reach + 4 * band.voxelSize();
@@ -161,14 +161,19 @@ RayHits shootRays(const NarrowBand& band, const Truth& truth, int count) {
     Walk walk(band);
     for (int k = 0; k < kPerTask; ++k) {
       const Chord line = chord(static_cast<int>(part) * kPerTask + k, truth.centre, radius);
-      walk.zeros(line, truth.distance, parts[part].errors);
-      parts[part].exactHits += exactZeros(line, truth.distance, band.voxelSize());
+      std::vector<double>& errors = parts[part].errors;
+      const auto before = static_cast<int>(errors.size());
+      walk.zeros(line, truth.distance, errors);
+      const int exact = exactZeros(line, truth.distance, band.voxelSize());
+      parts[part].exactHits += exact;
+      parts[part].different += std::abs(static_cast<int>(errors.size()) - before - exact);
     }
   });
   RayHits hits;
   for (const Part& part : parts) {
     hits.errors.insert(hits.errors.end(), part.errors.begin(), part.errors.end());
     hits.exactHits += part.exactHits;
+    hits.different += part.different;
   }
   return hits;
 }

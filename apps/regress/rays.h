@@ -12,6 +12,7 @@ inline constexpr int kRayCount = 10000, kQuickRayCount = 2500;
 struct RayHits {
   std::vector<double> errors;  ///< exact distances of all zeros, in the order of rays
   double exactHits = 0;        ///< zeros of the exact distance along the same rays
+  double different = 0;        ///< zeros that a ray lacks or has too many, summed over the rays
 };
 
 /// The zeros of the tricubic interpolant of `band` along fixed rays: chords of a ball about the

@@ -84,7 +84,7 @@ class Recorder {
 
 /// Bounds against summaries, ours alone. A bound at a resolution that the budget leaves out is
 /// passed over in the quick budget; in the full one it has failed, as has one that fits no row.
-/// Where the surface is bounded, no more than three zeros of ten along the rays may be missing.
+/// Where the surface is bounded, no more than three zeros of ten may be missing or too many.
 [[nodiscard]] std::vector<Judgement> judge(const Case& of, const std::vector<Row>& summary,
                                            Budget budget);
 

@@ -54,7 +54,8 @@ struct FrontDistance {
 /// The same from points, on the grid points of `lattice` (its solid does not count). The start is
 /// exact within eight voxels of each point, as far as the speed is about linear all around; where
 /// it is not, the front starts as a ball of about two voxels. In second order the singularity at
-/// the points is taken apart: where the speed is constant times are exact to float [Treister16].
+/// the nearest point is taken apart: at constant speed times from one point are exact to float
+/// [Treister16].
 /// @throws UsageError also when there is no point, or one that is not finite
 [[nodiscard]] ArrivalTimes arrivalTimesFromPoints(const NarrowBand& lattice,
                                                   std::span<const Imath::V3d> sources, double until,

@@ -71,10 +71,13 @@ class Marcher {
     if (terms.count == 0) return;
     double time = solveUpwind(terms, slowness);
     bool first = order_ == 2 && !terms.isSecond;
-    if (terms.isSecond && time < terms.latest) {
+    // Each of these errs more than the one before it and is nearer to being causal; the last is.
+    if (terms.isSecond && time < terms.latest - straight.slack()) {
       time = solveUpwind(gather(block, n, 1, straight), slowness);
       first = true;
     }
+    if (time < terms.latest - straight.slack())
+      time = solveUpwind(gather(block, n, 1, {}), slowness);
     const auto stored = static_cast<float>(time);
     if (!(stored < block.time[n])) return;
     block.time[n] = stored;

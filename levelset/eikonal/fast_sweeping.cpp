@@ -18,9 +18,9 @@ using Mask = ArrivalBlock::Mask;
 
 // Improvements below this part of the time that the grid point's own voxel takes do not count.
 constexpr float kImprovement = 1e-5f;
-// Blocks whose news are later than the earliest by more than this wait, voxels: what they would
-// compute now is not final yet.
-constexpr float kWindow = 0.5f;
+// Blocks whose news are later than the earliest by more than this wait, voxels and part of the
+// time: what they would compute now is not final yet. Where the front is slow, voxels take long.
+constexpr float kWindow = 0.5f, kWindowShare = 0.05f;
 constexpr std::size_t kBlocksPerTask = 8;
 
 /// How late the first solution is followed. The second runs a little ahead of it: by as much as it
@@ -70,7 +70,7 @@ class Rounds {
     for (;;) {
       const float earliest = earliestNews();
       if (earliest == kFar) return;
-      window = std::max(window, earliest + kWindow);
+      window = std::max({window, earliest + kWindow, (1 + kWindowShare) * earliest});
       report(subProgress(blocks_.settings().progress, from, to),
              std::min(1.0, static_cast<double>(earliest) / blocks_.settings().until),
              blocks_.settings().action);
@@ -429,7 +429,7 @@ class SecondOrderWorker {
     const std::size_t here = slot(n);
     const StraightTime straight = blocks_.straightTime(block_, n);
     UpwindTerms terms;
-    std::array<double, 3> near{};
+    std::array<double, 3> near{}, missed{};  // of first order
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::size_t step = kStep[axis];
       const Neighbour a = look(here - step, side), b = look(here + step, side);
@@ -439,24 +439,32 @@ class SecondOrderWorker {
         terms.known += straight.level(axis);
         continue;
       }
-      near[static_cast<std::size_t>(terms.count)] = next.time - straight.missed(axis, up, false);
+      const auto term = static_cast<std::size_t>(terms.count);
+      near[term] = next.time;
+      missed[term] = straight.missed(axis, up, false);
       const Neighbour beyond = look(up ? here + 2 * step : here - 2 * step, side);
       if (beyond.first <= next.first)
         terms.addSecond(next.time, beyond.time, straight.missed(axis, up, true));
       else
-        terms.addFirst(near[static_cast<std::size_t>(terms.count)]);
+        terms.addFirst(near[term], missed[term]);
     }
     const double slowness = block_.slownessAt(n);
     if (terms.count == 0) return static_cast<double>(block_.time[n]);
     double time = solveUpwind(terms, slowness);
     bool first = !terms.isSecond;
-    if (terms.isSecond && time < terms.latest) {
+    const auto inFirstOrder = [&](double share) {
       UpwindTerms plain;
-      plain.known = terms.known;
-      for (int i = 0; i < terms.count; ++i) plain.addFirst(near[static_cast<std::size_t>(i)]);
-      time = solveUpwind(plain, slowness);
+      plain.known = share * terms.known;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(terms.count); ++i)
+        plain.addFirst(near[i], share * missed[i]);
+      return solveUpwind(plain, slowness);
+    };
+    // Each of these errs more than the one before it and is nearer to being causal; the last is.
+    if (terms.isSecond && time < terms.latest - straight.slack()) {
+      time = inFirstOrder(1);
       first = true;
     }
+    if (time < terms.latest - straight.slack()) time = inFirstOrder(0);
     block_.firstOrder.set(n, first);
     return time;
   }

@@ -15,8 +15,15 @@ namespace levelset::eikonal {
 /// Its curvature is infinite at the source, so they lose there what no resolution brings back; but
 /// what they get wrong is known, and what is left of the time, T − T0, is smooth [Treister16].
 struct StraightTime {
+  /// Half a voxel, and what rounding may tell apart of two neighbours as far from the source.
+  static constexpr double kLevel = 0.51;
+
   openvdb::Vec3d away;  ///< x − s, voxels
   double slowness = 0;  ///< 0: none is taken apart
+
+  /// How far a time may come before that of a neighbour it was made from: where the front runs
+  /// along an axis, what is upwind is not known for sure, and T0 makes up for it.
+  [[nodiscard]] double slack() const { return 0.25 * slowness; }
 
   /// What a difference on the grid points x, x + d, x + 2 d, with d a step along the axis, lacks
   /// of the derivative of T0 along −d.
@@ -24,6 +31,7 @@ struct StraightTime {
     if (slowness == 0) return 0;
     const double along = up ? away[static_cast<int>(axis)] : -away[static_cast<int>(axis)];
     const double square = away.lengthSqr(), here = std::sqrt(square);
+    if (along > here / 2) return 0;  // the front comes back: not straight from the source
     const double near = std::sqrt(square + 2 * along + 1);
     const double difference =
         second ? (3 * here - 4 * near + std::sqrt(square + 4 * along + 4)) / 2 : here - near;
@@ -33,7 +41,8 @@ struct StraightTime {
   /// differences take it for 0, but the source need not lie level with a grid point.
   [[nodiscard]] double level(std::size_t axis) const {
     const double a = away[static_cast<int>(axis)];
-    return slowness == 0 || std::abs(a) > 0.5 ? 0 : slowness * slowness * a * a / away.lengthSqr();
+    return slowness == 0 || std::abs(a) > kLevel ? 0
+                                                 : slowness * slowness * a * a / away.lengthSqr();
   }
 };
 

@@ -47,7 +47,8 @@ struct UpwindTerms {
 /// Σ weight (u − value)² = slowness² − known, with the later axes left out while they lie in the
 /// future [Sethian99, Zhao05].
 [[nodiscard]] inline double solveUpwind(const UpwindTerms& terms, double slowness) {
-  const double base = terms.term[0].value, square = slowness * slowness - terms.known;
+  const double base = terms.term[0].value,
+               square = std::max(0.0, slowness * slowness - terms.known);
   // An axis counts if the earlier ones alone come later than its value: if at that value the sum
   // is below slowness². The sum rises from value to value, so the last that counts is found first.
   int count = terms.count;

@@ -65,8 +65,10 @@ CurvatureState::CurvatureState(const FloatGrid& distance, const std::optional<Ma
   core_.resize(blocks_.size());
   followers_.resize(blocks_.size());
   Bending bending{Field(blocks_.size()), Field(blocks_.size())};
-  blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) { findCore(i, bending); });
-  blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) { findFollowers(i, bending); });
+  blocks_.forEach<PaddedBlock>(
+      [&](std::size_t i, PaddedBlock& block) { findCore(i, block, bending); });
+  blocks_.forEach<PaddedBlock>(
+      [&](std::size_t i, PaddedBlock& block) { findFollowers(i, block, bending); });
   if (!mask) return;
   weights_.assign(blocks_.size(), Values{});
   blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) {
@@ -78,9 +80,8 @@ CurvatureState::CurvatureState(const FloatGrid& distance, const std::optional<Ma
   });
 }
 
-void CurvatureState::findCore(std::size_t i, Bending& bending) {
-  const auto block = std::make_unique<PaddedBlock>();
-  blocks_.gather(start_, i, static_cast<float>(kFlowWidth), *block);
+void CurvatureState::findCore(std::size_t i, PaddedBlock& block, Bending& bending) {
+  blocks_.gather(start_, i, static_cast<float>(kFlowWidth), block);
   for (auto it = blocks_.active(i).beginOn(); it; ++it) {
     const double phi = static_cast<double>(std::abs(start_[i][it.pos()]));
     if (!(phi < kFlowCore)) continue;
@@ -89,18 +90,17 @@ void CurvatureState::findCore(std::size_t i, Bending& bending) {
     if (phi < kFlowOwn - 1.8) continue;
     const Coord c = LeafNode::offsetToLocalCoord(it.pos());
     std::tie(bending.sums[i][it.pos()], bending.squares[i][it.pos()]) =
-        bendingAt(block->at(c.x(), c.y(), c.z()));
+        bendingAt(block.at(c.x(), c.y(), c.z()));
   }
 }
 
-void CurvatureState::findFollowers(std::size_t i, const Bending& bending) {
-  const auto block = std::make_unique<PaddedBlock>();
-  blocks_.gather(start_, i, static_cast<float>(kFlowWidth), *block);
+void CurvatureState::findFollowers(std::size_t i, PaddedBlock& block, const Bending& bending) {
+  blocks_.gather(start_, i, static_cast<float>(kFlowWidth), block);
   for (auto it = blocks_.active(i).beginOn(); it; ++it) {
     const double phi = static_cast<double>(start_[i][it.pos()]);
     if (std::abs(phi) < kFlowOwn) continue;
     const Coord c = LeafNode::offsetToLocalCoord(it.pos());
-    Vec3d normal = gradientAt(*block, c);
+    Vec3d normal = gradientAt(block, c);
     if (!normal.normalize()) continue;
     const double back = phi - std::copysign(kFlowOwn, phi);
     const Vec3d p = (blocks_.origin(i) + c).asVec3d() - normal * back;

@@ -13,7 +13,7 @@ namespace levelset::flow {
 /// it is that of the closest level within and the difference that parallel surfaces have there at
 /// the start, so that all level sets go along with the surface, which may move by kFlowRoom before
 /// distances are made again. Between the surface and the level where that begins the diagonal of
-/// the differences stays, 2 √2 voxels: with 2.2, a ball of 32 lost a thousandth of a voxel each
+/// the differences stays, 2.8 voxels: with 2.2, a ball of 32 lost a thousandth of a voxel each
 /// time.
 inline constexpr double kFlowWidth = 7.6, kFlowCore = 5.2, kFlowOwn = 4.3, kFlowRoom = 1.5;
 
@@ -49,8 +49,8 @@ class CurvatureState {
   struct Bending {
     Field sums, squares;
   };
-  void findCore(std::size_t i, Bending& bending);
-  void findFollowers(std::size_t i, const Bending& bending);
+  void findCore(std::size_t i, PaddedBlock& block, Bending& bending);
+  void findFollowers(std::size_t i, PaddedBlock& block, const Bending& bending);
 
   BandBlocks blocks_;
   Field start_, weights_;

@@ -127,7 +127,7 @@ class BallRoller {
   /// where the curve bends around x, that way shrinks by less than what is gone.
   bool findBall(const Vec3d& x, Ball& ball) {
     ball.centre = x;
-    double before = 0, gone = 0;
+    double before = 0, gone = 0, shrinks = 1;
     for (int step = 0; step < kSpineSteps; ++step) {
       const eikonal::Jet a = jetAt(a_, ball.centre), b = jetAt(b_, ball.centre);
       if (std::abs(a.value) > known_ || std::abs(b.value) > known_) return false;
@@ -142,8 +142,8 @@ class BallRoller {
       const double da = ball.radius - a.value, db = ball.radius - b.value;
       const Vec3d along = ball.normalA.cross(ball.normalB) / std::sqrt(squaredSine);
       const double way = along.dot(x - ball.centre);
-      const double shrinks =
-          gone == 0 ? 1 : std::clamp((before - way) / gone, kLeastShrinkage, 2.0);
+      if (std::abs(gone) > kSpineTolerance)
+        shrinks = std::clamp((before - way) / gone, kLeastShrinkage, 2.0);
       Vec3d move = ball.normalA * ((da - ball.cosine * db) / squaredSine) +
                    ball.normalB * ((db - ball.cosine * da) / squaredSine) + along * (way / shrinks);
       const double length = move.length();

@@ -1,14 +1,20 @@
 #!/bin/sh
 # Runs a benchmark and prints its CPU times beside those of OpenVDB's tools in the same run. Exits 1
-# when a ratio passes its bound.   beside.sh BENCH [ARGUMENT …]
+# when a ratio passes its bound or cannot be told.
+#   beside.sh "NAME=BOUND …" BENCH [ARGUMENT …]
 set -eu
-[ $# -ge 1 ] || { sed -n '2,3s/^# *//p' "$0"; exit 2; }
-"$@" --benchmark_format=csv | awk -F, '
+[ $# -ge 2 ] || { sed -n '2,4s/^# *//p' "$0"; exit 2; }
+bounds=$1
+shift
+times=$(mktemp)
+trap 'rm -f "$times"' EXIT
+"$@" --benchmark_format=csv >"$times"
+awk -F, -v bounds="$bounds" '
   BEGIN {
-    most["Union/512"] = most["Gaussian/512"] = 1 / 4
-    most["Offset10/250"] = 1 / 5
-    most["HalveABall"] = 1 / 10
-    most["Sweep8/128"] = 1
+    for (n = split(bounds, each, " "); n > 0; --n) {
+      split(each[n], bound, "=")
+      most[bound[1]] = bound[2]
+    }
     printf "%-16s %12s %12s %8s %8s\n", "CPU ms", "levelsmith", "OpenVDB", "ratio", "bound"
   }
   /^"BM_/ {
@@ -21,7 +27,7 @@ set -eu
   END {
     for (i = 1; i <= count; ++i) {
       name = order[i]
-      if (!(name in theirs)) { printf "%-16s %12.0f\n", name, ours[name]; continue }
+      if (!(theirs[name] > 0 && ours[name] > 0)) { printf "%-16s %12.0f\n", name, ours[name]; continue }
       ratio = ours[name] / theirs[name]
       printf "%-16s %12.0f %12.0f %8.2f", name, ours[name], theirs[name], ratio
       if (name in most) {
@@ -31,5 +37,10 @@ set -eu
       }
       printf "\n"
     }
-    exit (count == 0 || missed)
-  }'
+    for (name in most)
+      if (!(ours[name] > 0 && theirs[name] > 0)) {
+        printf "%-16s has a bound of %s and no ratio\n", name, most[name]
+        missed = 1
+      }
+    exit missed
+  }' "$times"

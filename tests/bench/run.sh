@@ -4,8 +4,8 @@ set -u
 build=$1
 here=$(dirname "$0")
 status=0
-"$here/beside.sh" "$build/tests/operators_bench" || status=1
-"$here/beside.sh" "$build/tests/flow_bench" || status=1
+"$here/beside.sh" "Union/512=0.25 Offset10/250=0.2 Sweep8/128=1" "$build/tests/operators_bench" || status=1
+"$here/beside.sh" "Gaussian/512=0.25 HalveABall=0.1" "$build/tests/flow_bench" || status=1
 "$build/tests/advect_bench" 64 || status=1
 "$build/tests/sharp_mesh_bench" || status=1
 "$here/mesh_to_band.sh" "$build/tests/mesh_to_band_bench" "$here/../../data/models/dragon_vrip.ply.gz" || status=1

@@ -213,7 +213,11 @@ void addAdvectionCases(std::vector<Case>& all) {
                   {"staggered grid, front", "value_error", 0.20},
                   {"staggered grid, front", "surface_l1_vx", 0.5},
                   {"staggered grid, front", "volume_error", 0.03, 128},
-                  {"staggered grid, front", "value_error", 0.06, 128}},
+                  {"staggered grid, front", "value_error", 0.06, 128},
+                  {"function at T/2, front", "value_error", 0.20, 64},
+                  {"function at T/2, front", "value_error", 0.06, 128},
+                  {"staggered grid at T/2, front", "value_error", 0.20, 64},
+                  {"staggered grid at T/2, front", "value_error", 0.06, 128}},
        .run = enright});
   all.push_back({.name = "vortex",
                  .group = "advection, vortex",

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <set>
 
+#include "apps/regress/carried.h"
 #include "apps/regress/columns.h"
 #include "apps/regress/errors.h"
 #include "apps/regress/exact_band.h"
@@ -12,6 +13,7 @@
 #include "apps/regress/recorder.h"
 #include "apps/regress/suite.h"
 #include "apps/regress/truth.h"
+#include "levelset/flow/velocity.h"
 #include "levelset/vdb.h"
 #include "tests/support/shell.h"
 
@@ -155,6 +157,27 @@ Row rowOf(int resolution, int phase, double error) {
            {"volume_error", -error},
            {"cpu_s", phase + 1.0}},
           {}};
+}
+
+TEST(RegressErrors, CompareWithABandThatWasCarried) {
+  // A third of a turn about an axis off the ball, and standing still.
+  const V3d centre(0.5, 0.1, -0.2);
+  const auto turn = levelset::rotationVelocity(V3d(0), V3d(1, 1, 1), 3);
+  const auto still = [](const V3d&, double) { return V3d(0); };
+  const V3d turned(centre.z, centre.x, centre.y);
+  for (const auto& [velocity, there] :
+       {std::pair<levelset::VectorField, V3d>{turn, turned}, {still, centre}}) {
+    const auto reference = carriedBall(centre, 0.4, velocity, 1, kVoxel / 2);
+    Figures near, far;
+    addDifferences(exactBand(ball(there, 0.4), kVoxel), reference, near);
+    EXPECT_LE(near.at("surface_linf_vx"), 0.05);
+    EXPECT_LE(std::abs(near.at("volume_error")), 5e-3);
+    EXPECT_LE(near.at("value_error"), 5e-3);
+    addDifferences(exactBand(ball(there + V3d(kVoxel, 0, 0), 0.4), kVoxel), reference, far);
+    EXPECT_NEAR(far.at("surface_linf_vx"), 1, 0.1);
+    // π R² times the way on each side.
+    EXPECT_NEAR(far.at("value_error"), 1.5 * kVoxel / 0.4, 0.05);
+  }
 }
 
 TEST(RegressSummary, TakesTheWorstPlacementAndTheOrder) {

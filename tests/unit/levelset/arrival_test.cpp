@@ -354,6 +354,51 @@ TEST(Arrival, DoesNotDependOnThreads) {
   EXPECT_EQ(hashes[0], hashes[2]);
 }
 
+TEST(Arrival, FromPointsDoesNotDependOnThreads) {
+  const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
+  const V3d sources[] = {V3d(0.3, 0.1, -0.4), V3d(13, 2, 5)};
+  ArrivalOptions o = options(FrontMethod::Sweeping, 2);
+  o.speed = [](const V3d& p) { return 1 + 0.5 * std::sin(p.x) * std::cos(p.z); };
+  std::uint64_t hashes[3];
+  for (const std::size_t threads : {1, 2, 4}) {
+    hashes[threads / 2] = support::onThreads(threads, [&] {
+      return arrivalTimesFromPoints(lattice, sources, 20, o).times.contentHash();
+    });
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+  EXPECT_EQ(hashes[0], hashes[2]);
+}
+
+// The straight way's part is larger there than the whole: a root of less than nothing.
+TEST(Arrival, EndsBesideASourceInALayer) {
+  const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
+  const V3d sources[] = {V3d(0.5, 0.5, 0.9)};
+  for (const FrontMethod method : kMethods) {
+    ArrivalOptions o = options(method, 2);
+    o.speed = [](const V3d& p) {
+      if (p.z > 0.9) return 1.0;
+      return p.z > 0.45 ? 2.5 - (p.z - 0.45) / 0.3 : 1.9 + std::max(0.0, p.z) / 0.75;
+    };
+    const ArrivalTimes times = arrivalTimesFromPoints(lattice, sources, 8, o);
+    EXPECT_GT(times.figures.reached, 2000u);
+    for (auto it = grid(times).cbeginValueOn(); it; ++it) EXPECT_TRUE(*it >= 0 && *it <= 8) << *it;
+  }
+}
+
+// Two neighbours are as far from it, but for rounding.
+TEST(Arrival, IsExactAroundThePointBetweenTwoGridPoints) {
+  const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
+  for (const double off : {0.0, 1e-12, -1e-12, 1e-5, -1e-5, 1e-3}) {
+    const V3d sources[] = {V3d(0.5 + off, 0.5 - off, 0.2)};
+    for (const FrontMethod method : kMethods) {
+      const Errors e = errors(
+          grid(arrivalTimesFromPoints(lattice, sources, 20, options(method, 2))),
+          [&](const V3d& p) { return (p - sources[0]).length(); }, 0, 19.9);
+      EXPECT_LE(e.outside, 1e-4) << off;
+    }
+  }
+}
+
 TEST(Arrival, DoesNotDependOnTheVoxelSize) {
   const NarrowBand unit = sample(sphere(8), 9);
   const Errors expected = errors(vdb(frontDistance(unit, 6).band), sphere(8), 0, 5.9);

@@ -177,11 +177,14 @@ double largestChange(const NarrowBand& a, const NarrowBand& b) {
 TEST(Fillet, LeavesNoVoidWhereTheSpineBendsAroundTheSeam) {
   // On the plane through both seams the way along the spine to its nearest point shrinks by a fifth
   // of each step only; the grid points there once gave up.
-  const NarrowBand a = makeCapsule(V3d(-24, 0, 0), V3d(24, 0, 0), 12, 1),
-                   b = makeCapsule(V3d(0, -24, 0), V3d(0, 24, 0), 12, 1);
-  const Measurement m = measure(blend(CsgOperation::Union, a, b, 8, rolled()).band);
-  EXPECT_EQ(m.cavities, 0u);
-  EXPECT_EQ(m.components, 1u);
+  const V3d turned = V3d(2, 1, 2) / 3.0, across = V3d(1, 2, -2) / 3.0;
+  for (const auto& [u, v] : {std::pair{V3d(1, 0, 0), V3d(0, 1, 0)}, std::pair{turned, across}}) {
+    const NarrowBand a = makeCapsule(u * -24.0, u * 24.0, 12, 1),
+                     b = makeCapsule(v * -24.0, v * 24.0, 12, 1);
+    const Measurement m = measure(blend(CsgOperation::Union, a, b, 8, rolled()).band);
+    EXPECT_EQ(m.cavities, 0u);
+    EXPECT_EQ(m.components, 1u);
+  }
 }
 
 TEST(Fillet, MakesNoBulgeWhereSurfacesNearlyTouch) {
