@@ -135,7 +135,7 @@ Truth zalesakSphere(const V3d& centre) {
 void zalesak(Recorder& out) {
   for (const Sample& at : out.samples())
     carry(out, "slotted sphere", at, zalesakSphere(V3d(0.5, 0.75, 0.5) + at.shift),
-          {levelset::rotationVelocity(V3d(0.5, 0.5, 0.5), V3d(0, 0, 1), 628), 628, false}, 20);
+          {levelset::rotationVelocity(V3d(0.5, 0.5, 0.5), V3d(0, 0, 1), 628), 628, false}, 24);
 }
 
 void rotate(Recorder& out) {
@@ -240,7 +240,7 @@ void addAdvectionCases(std::vector<Case>& all) {
            "Sphere of radius 15 at (50, 75, 50) with a slot 5 wide up to y = 85, one turn "
            "about (50, 50) in 628; in hundredths here. value as for enright.",
        .citation = "Zalesak79, Enright02",
-       .quick = {20, 32, 50},
+       .quick = {24, 32, 50},
        .full = {50, 100, 200},
        .bounds = {{"slotted sphere, front", "surface_linf_vx", 1},
                   {"slotted sphere, front", "volume_error", 0.01, 100}},
