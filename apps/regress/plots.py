@@ -40,11 +40,13 @@ def series(cases, columns):
 
 
 def draw(group, cases):
-    figure, axes = plt.subplots(1, len(TITLES), figsize=(9.6, 4.4))
-    drawn = False
+    panels = [(title, series(cases, columns)) for title, columns in TITLES.values()]
+    panels = [(title, lines) for title, lines in panels if lines]
+    if not panels:
+        return
+    figure, axes = plt.subplots(1, len(panels), figsize=(4.8 * len(panels), 4.4), squeeze=False)
     variants, tools = [], []
-    for axis, (title, columns) in zip(axes, TITLES.values()):
-        lines = series(cases, columns)
+    for axis, (title, lines) in zip(axes[0], panels):
         for (variant, tool), points in lines.items():
             if variant not in variants:
                 variants.append(variant)
@@ -57,25 +59,21 @@ def draw(group, cases):
                       marker=MARKERS[variants.index(variant) % len(MARKERS)],
                       markersize=5 if ours else 4, markerfacecolor=colour if ours else "white",
                       linewidth=1.5 if ours else 1.0)
-            drawn = True
         axis.set_xscale("log")
         axis.set_yscale("log")
         axis.set_xlabel("CPU seconds")
         axis.set_ylabel(title)
         axis.grid(True, which="major", color="0.88")
-    if not drawn:
-        plt.close(figure)
-        return
     handles = [plt.Line2D([], [], color="C%d" % (i % 10), marker=MARKERS[i % len(MARKERS)],
                           label=v) for i, v in enumerate(variants)]
     handles += [plt.Line2D([], [], color="0.3",
                            linestyle="-" if t == OURS else ["--", ":", "-."][(i - 1) % 3], label=t)
                 for i, t in enumerate(tools)]
-    figure.suptitle(group + ": left and down is better; each line runs from coarse to fine",
-                    fontsize=10)
-    figure.legend(handles=handles, loc="lower center", ncol=min(4, len(handles)), fontsize=7,
-                  frameon=False)
-    rows = math.ceil(len(handles) / 4)
+    figure.suptitle(group + ": left and down is better;" + ("\n" if len(panels) == 1 else " ") +
+                    "each line runs from coarse to fine", fontsize=10)
+    columns = min(2 * len(panels), len(handles))
+    figure.legend(handles=handles, loc="lower center", ncol=columns, fontsize=7, frameon=False)
+    rows = math.ceil(len(handles) / columns)
     figure.tight_layout(rect=(0, 0.03 + 0.04 * rows, 1, 1))
     stem = os.path.join(FOLDER, "plot-" + group.replace(" ", "-"))
     figure.savefig(stem + ".png", dpi=90)
