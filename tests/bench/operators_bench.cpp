@@ -84,13 +84,22 @@ void BM_Widen8(benchmark::State& state) {
         static_cast<std::int64_t>(levelset::redistance(a, {.halfWidth = 11}).activeVoxelCount());
   state.SetItemsProcessed(voxels);
 }
-void BM_Sweep8(benchmark::State& state) {
+void goEight(benchmark::State& state, const levelset::ArrivalOptions& options) {
   const NarrowBand a = ball(state);
   std::int64_t voxels = 0;
   for (auto _ : state)
     voxels += static_cast<std::int64_t>(
-        levelset::frontDistance(a, 11 * a.voxelSize()).band.activeVoxelCount());
+        levelset::frontDistance(a, 11 * a.voxelSize(), options).band.activeVoxelCount());
   state.SetItemsProcessed(voxels);
+}
+void BM_Sweep8(benchmark::State& state) {
+  goEight(state, {});
+}
+void BM_Sweep8FirstOrder(benchmark::State& state) {
+  goEight(state, {.order = 1});
+}
+void BM_March8(benchmark::State& state) {
+  goEight(state, {.method = levelset::FrontMethod::Marching});
 }
 void BM_Sweep8OpenVdb(benchmark::State& state) {
   const NarrowBand a = ball(state);
@@ -129,6 +138,8 @@ void BM_MeshOpenVdb(benchmark::State& state) {
   BENCHMARK(name)->Arg(128)->Arg(256)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()
 LEVELSMITH_BENCH_SWEEP(BM_Widen8);
 LEVELSMITH_BENCH_SWEEP(BM_Sweep8);
+LEVELSMITH_BENCH_SWEEP(BM_Sweep8FirstOrder);
+LEVELSMITH_BENCH_SWEEP(BM_March8);
 LEVELSMITH_BENCH_SWEEP(BM_Sweep8OpenVdb);
 
 LEVELSMITH_BENCH(BM_Union);

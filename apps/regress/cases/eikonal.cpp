@@ -265,6 +265,8 @@ void addEikonalCases(std::vector<Case>& all) {
                  .quick = {8, 12, 24},
                  .full = {16, 32, 64},
                  .bounds = {{"sphere", "surface_linf_vx", 1e-3},
+                            {"sphere", "surface_linf_vx", 1e-4, 32},
+                            {"sphere", "surface_linf_vx", 1e-4, 64},
                             {"sphere", "value_error", 0.05},
                             {"torus", "order_surface", 2.8, 32, Sense::AtLeast}},
                  .run = closest});
