@@ -53,7 +53,7 @@ void addOrders(const Row& before, Row& row) {
     return std::max(figure(r, ("band_in_" + name).c_str()),
                     figure(r, ("band_out_" + name).c_str()));
   };
-  const double floor = 2e-5 * figure(row, "voxel_size");
+  const double floor = 2e-6 * figure(row, "voxel_size");
   addOrder("order_band_l1", band(before, "l1"), band(row, "l1"), floor, before, row);
   addOrder("order_band_linf", band(before, "linf"), band(row, "linf"), floor, before, row);
   addOrder("order_surface", figure(before, "surface_l1"), figure(row, "surface_l1"), floor, before,
@@ -113,7 +113,12 @@ std::vector<Judgement> judge(const Case& of, const std::vector<Row>& summary, Bu
       j.passed =
           bound.sense == Sense::AtMost ? std::abs(j.found) <= bound.limit : j.found >= bound.limit;
     }
-    if (!met && (budget == Budget::Full || bound.resolution == 0))
+    const std::vector<int>& resolutions = budget == Budget::Full ? of.full : of.quick;
+    const auto has = [&](const std::vector<int>& some) {
+      return std::find(some.begin(), some.end(), bound.resolution) != some.end();
+    };
+    // A bound on a resolution of the other budget is looked at there.
+    if (!met && (bound.resolution == 0 || has(resolutions) || !(has(of.full) || has(of.quick))))
       judgements.push_back({bound, bound.resolution, 0, false, "there is no such row"});
   }
   // Errors of zeros that were found say nothing of those that were not.

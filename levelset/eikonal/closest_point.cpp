@@ -13,7 +13,7 @@ constexpr double kFootReach = 2;    // voxels from the start
 constexpr double kLongestStep = 1;  // voxels
 // A step is the last when what it leaves, about the cube of its length by the square of the
 // curvature, is below this part of a voxel.
-constexpr double kTolerance = 1e-4;
+constexpr double kTolerance = 2e-5;
 constexpr double kLongestLastStep = 0.6;
 constexpr double kLeastCurvature = 0.1;  // of the distance along the surface, against 1 on a plane
 

@@ -32,6 +32,12 @@ constexpr double kOtherPart = 2;
 // How much nearer another part can turn out to be once both are polished.
 constexpr double kPolishGain = 0.5;
 
+// A grid point whose value is its distance to within the tricubic's own error keeps it, so that
+// what is a distance already does not creep when it is re-distanced again and again. That error is
+// about this much times the square of the curvature; never taken for more than at a radius of 8,
+// nor for less than what rounding leaves. Voxels.
+constexpr double kTricubicError = 0.03, kMostError = 1e-3, kRounding = 1e-6;
+
 constexpr int kAttempts = 4;
 
 /// A point of the zero set and how far it is, in voxels.
@@ -49,6 +55,15 @@ class Polisher {
  public:
   Polisher(const FloatTree& field, const SurfacePoints& points, const SharpPatches& patches)
       : cache_(field), points_(points), patches_(patches) {}
+
+  /// How far a distance to the surface beside a surface point is off by the interpolation, voxels.
+  [[nodiscard]] double interpolationError(std::uint32_t point) const {
+    const Jet jet = points_.jets[point].jet();
+    const double bend = jet.xx * jet.xx + jet.yy * jet.yy + jet.zz * jet.zz +
+                        2 * (jet.xy * jet.xy + jet.xz * jet.xz + jet.yz * jet.yz);
+    const double slope = jet.gradient.lengthSqr();
+    return std::max(kRounding, slope > 0 ? kTricubicError * bend / slope : 0);
+  }
 
   Closest closest(const Block& block, openvdb::Index n) {
     const Coord c = LeafNode::offsetToLocalCoord(n);
@@ -129,8 +144,9 @@ struct LeafOrTile {
   float tile = 0;
 };
 
-LeafOrTile makeLeaf(const Block& block, Polisher& polisher, const DistanceRequest& request,
-                    double voxelSize, float background) {
+/// @param before the field's values there, null where it has none
+LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Polisher& polisher,
+                    const DistanceRequest& request, double voxelSize, float background) {
   const double shift = request.shift, halfWidth = request.halfWidth;
   auto leaf = std::make_unique<LeafNode>(block.origin, background, false);
   std::unique_ptr<ClosestPointLeaf> points;
@@ -150,6 +166,12 @@ LeafOrTile makeLeaf(const Block& block, Polisher& polisher, const DistanceReques
     }
     // A grid point that was inside stays so when its distance rounds to nothing.
     if (inside && shift == 0) value = std::min(value, -1e-7);
+    if (before && shift == 0 && before->isValueOn(n)) {
+      const double kept = static_cast<double>(before->getValue(n)) / voxelSize;
+      if (std::abs(value - kept) < kMostError &&
+          std::abs(value - kept) < polisher.interpolationError(block.nearest[n]))
+        value = kept;
+    }
     if (std::abs(value) < halfWidth)
       leaf->setValueOn(n, static_cast<float>(value * voxelSize));
     else
@@ -183,7 +205,8 @@ FloatTree::Ptr makeTree(const FloatTree& field, const FloatTree& interpolated,
     tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 16), [&](const auto& range) {
       Polisher& polisher = polishers.local();
       for (std::size_t i = range.begin(); i != range.end(); ++i)
-        leaves[i] = makeLeaf(*blocks[i], polisher, request, voxelSize, background);
+        leaves[i] = makeLeaf(*blocks[i], field.probeConstLeaf(blocks[i]->origin), polisher, request,
+                             voxelSize, background);
     });
     report(request.progress,
            0.6 + 0.4 * static_cast<double>(end) / static_cast<double>(blocks.size()),

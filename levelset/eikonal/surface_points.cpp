@@ -125,16 +125,22 @@ void forEachBlock(const FloatTree& tree, const std::vector<const LeafNode*>& lea
   });
 }
 
-/// Linear extrapolation to a grid point that holds the bare background, from pairs behind it along
-/// the axes: the mean of what they say, beyond the background. 0 = there is no such pair.
+/// Extrapolation to a grid point that holds the bare background, from what lies behind it along
+/// each axis: the mean of what they say, beyond the background. 0 = there is nothing behind it.
+/// Quadratic where that bends the line only gently, so that smooth fields keep their order.
 float extrapolate(const DenseBlock& block, int x, int y, int z, float background) {
+  constexpr float kGentle = 0.25f;
   const float sign = block.at(x, y, z) < 0 ? -1.0f : 1.0f;
   float sum = 0, count = 0;
   for (const auto& d : kDirections) {
-    const float near = sign * block.at(x + d[0], y + d[1], z + d[2]);
-    const float far = sign * block.at(x + 2 * d[0], y + 2 * d[1], z + 2 * d[2]);
+    const auto behind = [&](int k) {
+      return sign * block.at(x + k * d[0], y + k * d[1], z + k * d[2]);
+    };
+    const float near = behind(1), far = behind(2), farther = behind(3);
     if (std::abs(near) == background || std::abs(far) == background || near < far) continue;
-    sum += std::max(background * 1.000001f, 2 * near - far);
+    const float slope = near - far, bend = slope - (far - farther);
+    const bool isSmooth = std::abs(farther) != background && std::abs(bend) < kGentle * slope;
+    sum += std::max(background * 1.000001f, near + slope + (isSmooth ? bend : 0));
     ++count;
   }
   return count > 0 ? sign * sum / count : 0;

@@ -29,7 +29,8 @@ struct SurfacePoints {
                                               const std::optional<openvdb::CoordBBox>& within,
                                               const SharpPatches& patches);
 
-/// The field with two layers more on each side, extrapolated linearly along the axes.
+/// The field with two layers more on each side, extrapolated along the axes: by a parabola where
+/// the field is smooth, else straight.
 [[nodiscard]] openvdb::FloatTree::Ptr thicken(const openvdb::FloatTree& field);
 
 }  // namespace levelset::eikonal

@@ -110,7 +110,8 @@ struct Advection::Impl {
     requireTime(time, "starting time");
     if (options.mask) checkMask(*options.mask, kAdvectAction);
     volumeBefore = measure(band).volume;
-    if (options.scheme == AdvectScheme::Front) front.emplace(surfaceOf(band));
+    if (options.scheme == AdvectScheme::Front)
+      front.emplace(surfaceOf(band), options.maxMemory, "advect");
     report(options.progress, kMeshed, kAdvectAction);
   }
 
@@ -120,10 +121,9 @@ struct Advection::Impl {
     return [this, &velocity, toWorld, toIndex](const V3d& place, double at) {
       V3d world, result;
       toWorld.multVecMatrix(place, world);
-      V3d speed = velocity(world, at);
-      flow::requireFinite(speed, world, at, kAdvectAction);
-      if (options.mask) speed *= options.mask->weight(world);
-      toIndex.multDirMatrix(speed, result);
+      const double share = options.mask ? options.mask->weight(world) : 1;
+      if (share == 0) return V3d(0);
+      toIndex.multDirMatrix(velocity(world, at) * share, result);
       return result;
     };
   }
@@ -137,6 +137,7 @@ struct Advection::Impl {
                                 .from = time,
                                 .to = end,
                                 .action = kAdvectAction,
+                                .toWorld = band.indexToWorld(),
                                 .maxMemory = options.maxMemory,
                                 .progress = subProgress(options.progress, kMeshed, kMoved)};
     if (front)

@@ -2,15 +2,15 @@
 
 #include <fmt/core.h>
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <unordered_map>
 
 #include "levelset/error.h"
+#include "levelset/flow/characteristic.h"
+#include "levelset/memory_limit.h"
 
 namespace levelset::flow {
 namespace {
@@ -19,13 +19,16 @@ using Imath::V3d;
 using Triangle = std::array<std::uint32_t, 3>;
 
 constexpr double kLongestEdge = 1;  // voxels
-// A step moves no vertex further than this many voxels, and stretches no edge by more than this:
-// the classical method then errs by some 1e-5 of the way.
-constexpr double kFarthestMove = 6, kMostStrain = 0.2;
+// A step moves no vertex further than this many voxels, turns and stretches no edge by more than
+// this share of it, and errs by no more voxels than this at any vertex.
+constexpr double kFarthestMove = 16, kMostStrain = 0.4, kMostError = 5e-4;
+// Where no velocity moves further than this within a step it may err by more: where the velocity
+// jumps, no step would be short enough.
+constexpr double kShortMove = 0.25;
+// What the method's second look may stand off the others, voxels.
+constexpr double kMostSecond = 1;
 // Differences over shorter edges tell more of rounding than of strain.
 constexpr double kShortestEdge = 0.25;
-constexpr double kMostSteps = 20000;
-constexpr std::size_t kSampledTriangles = 4096;
 // Positions, triangles and what splitting and moving keep beside them.
 constexpr double kBytesPerTriangle = 100;
 // A surface with more triangles than this for each voxel of the largest area that it has had is
@@ -46,18 +49,18 @@ V3d areaNormal(const TriMesh& mesh, const Triangle& t) {
 /// Splits the edges that are too long, once.
 class Splitter {
  public:
-  explicit Splitter(TriMesh& mesh) : mesh_(mesh) {}
-
-  /// @return whether there was any
-  bool run() {
+  explicit Splitter(TriMesh& mesh) : mesh_(mesh) {
     for (const Triangle& t : mesh_.triangles)
       for (std::size_t i = 0; i < 3; ++i) mark(t[i], t[(i + 1) % 3]);
-    if (edges_.empty()) return false;
     std::sort(edges_.begin(), edges_.end());
     edges_.erase(std::unique(edges_.begin(), edges_.end()), edges_.end());
+  }
+
+  [[nodiscard]] std::size_t longEdges() const { return edges_.size(); }
+
+  void run() {
     addMidpoints();
     divideTriangles();
-    return true;
   }
 
  private:
@@ -149,136 +152,138 @@ class Splitter {
   std::uint32_t first_ = 0;  ///< number of the first midpoint
 };
 
-template <typename Work>
-void forEachVertex(std::size_t count, const Work& work) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 256), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
-  });
-}
-
 }  // namespace
 
-void requireFinite(const V3d& velocity, const V3d& place, double time, const char* action) {
-  if (std::isfinite(velocity.x) && std::isfinite(velocity.y) && std::isfinite(velocity.z)) return;
-  throw InvalidInput(
-      fmt::format("{}: the velocity is {},{},{} at {:.6g},{:.6g},{:.6g} and time {:.6g}; "
-                  "give one that is finite wherever the surface goes",
-                  action, velocity.x, velocity.y, velocity.z, place.x, place.y, place.z, time));
+Front::Front(TriMesh mesh, std::size_t maxMemory, const char* action) : mesh_(std::move(mesh)) {
+  splitLongEdges(maxMemory, action);
+  largestArea_ = surfaceArea(mesh_);
+}
+
+void Front::splitLongEdges(std::size_t maxMemory, const char* action) {
+  constexpr int kPasses = 4;  // a step stretches little; what is left waits for the next
+  for (int pass = 0; pass < kPasses; ++pass) {
+    Splitter splitter(mesh_);
+    const double count = static_cast<double>(mesh_.triangles.size() + 2 * splitter.longEdges());
+    requireMemory(kBytesPerTriangle * count, memoryLimit(maxMemory), action);
+    if (splitter.longEdges() == 0) return;
+    splitter.run();
+  }
 }
 
 namespace {
 
-/// @param guess  what the step before it makes likely
-double chooseStep(const std::function<double(double)>& longest, double from, double to,
-                  double guess) {
-  const double left = std::abs(to - from), sign = to < from ? -1 : 1;
-  double step = std::min({left, guess, longest(from)});
-  constexpr int kTries = 40;
-  for (int i = 0; i < kTries; ++i) {
-    const double allowed = std::min(longest(from + sign * step / 2), longest(from + sign * step));
-    if (step <= 1.05 * allowed) break;
-    step = std::max(allowed, step / 4);
+/// Of all vertices.
+struct Largest {
+  double fastest = 0, move = 0, error = 0, second = 0;  ///< voxels, see Characteristic
+  double hole = HUGE_VAL;                               ///< the nearest
+
+  static Largest of(const Largest& a, const Largest& b) {
+    return {std::max(a.fastest, b.fastest), std::max(a.move, b.move), std::max(a.error, b.error),
+            std::max(a.second, b.second), std::min(a.hole, b.hole)};
   }
-  // The last two steps share what is left.
-  return step < left && left < 2 * step ? left / 2 : step;
-}
+};
 
 }  // namespace
 
-std::size_t walk(const Journey& journey, const std::function<double(double)>& longest,
-                 const std::function<void(double, double)>& step) {
-  const double to = journey.to;
-  double time = journey.from, dt = std::abs(to - time);
-  std::size_t done = 0;
-  while (time != to) {
-    report(journey.progress, (time - journey.from) / (to - journey.from), journey.action);
-    constexpr double kGrowth = 1.5;
-    dt = chooseStep(longest, time, to, kGrowth * dt);
-    const double needed = static_cast<double>(done) + std::abs(to - time) / dt;
-    const double next = dt >= std::abs(to - time) ? to : time + (to < time ? -dt : dt);
-    if (!(needed <= kMostSteps) || next == time) {
-      throw ResourceLimit(
-          fmt::format("{}: at time {:.6g} the velocity allows steps of {:.3g} only, which makes "
-                      "about {:.3g}, and {} are the most; ask for a shorter time or a gentler "
-                      "velocity",
-                      journey.action, time, dt, needed, kMostSteps));
-    }
-    step(time, next);
-    time = next;
-    ++done;
-  }
-  report(journey.progress, 1, journey.action);
-  return done;
-}
-
-Front::Front(TriMesh mesh) : mesh_(std::move(mesh)) {
-  splitLongEdges();
-}
-
-void Front::splitLongEdges() {
-  constexpr int kPasses = 4;  // a step stretches little; what is left waits for the next
-  for (int pass = 0; pass < kPasses && Splitter(mesh_).run(); ++pass) {
-  }
-}
-
-double Front::longestStep(const Velocity& velocity, double time, const char* action) const {
-  // A fixed choice of triangles; what they miss is as smooth as what they see.
-  const std::size_t count = mesh_.triangles.size(), stride = 1 + count / kSampledTriangles;
-  const double most = tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, count / stride, 256), 0.0,
+double Front::firstStep(const Journey& journey) const {
+  const double fastest = tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, mesh_.positions.size(), 256), 0.0,
       [&](const auto& range, double largest) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          std::array<V3d, 3> places, speeds;
-          for (std::size_t k = 0; k < 3; ++k) {
-            places[k] = mesh_.positions[mesh_.triangles[i * stride][k]];
-            speeds[k] = velocity(places[k], time);
-            requireFinite(speeds[k], places[k], time, action);
-            largest = std::max(largest, speeds[k].length() / kFarthestMove);
-          }
-          for (std::size_t k = 0; k < 3; ++k) {
-            const std::size_t next = (k + 1) % 3;
-            const double length = std::max(kShortestEdge, (places[k] - places[next]).length());
-            largest =
-                std::max(largest, (speeds[k] - speeds[next]).length() / (length * kMostStrain));
-          }
+          const V3d& p = mesh_.positions[i];
+          const V3d speed = journey.velocity(p, journey.from);
+          requireFinite(journey, speed, p, journey.from);
+          largest = std::max(largest, speed.length());
         }
         return largest;
       },
       [](double a, double b) { return std::max(a, b); });
-  return 1 / most;
+  return kFarthestMove / fastest;
 }
 
-void Front::move(const Velocity& velocity, double from, double to, const char* action) {
-  const double dt = to - from, middle = from + dt / 2;
-  forEachVertex(mesh_.positions.size(), [&](std::size_t i) {
-    V3d& p = mesh_.positions[i];
-    const V3d k1 = velocity(p, from);
-    const V3d k2 = velocity(p + k1 * (dt / 2), middle);
-    const V3d k3 = velocity(p + k2 * (dt / 2), middle);
-    const V3d k4 = velocity(p + k3 * dt, to);
-    const V3d mean = (k1 + (k2 + k3) * 2.0 + k4) / 6.0;
-    requireFinite(mean, p, from, action);
-    p += mean * dt;
-  });
+double Front::tryStep(const Journey& journey, double from, double to) {
+  moved_.resize(mesh_.positions.size());
+  const Largest largest = tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, mesh_.positions.size(), 256), Largest{},
+      [&](const auto& range, Largest result) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          const V3d& p = mesh_.positions[i];
+          const Characteristic way(journey.velocity, p, from, to);
+          moved_[i] = p + way.move;
+          result = Largest::of(
+              result, {way.fastest, way.move.length(), way.error.length(), way.second, way.hole});
+        }
+        return result;
+      },
+      Largest::of);
+  isStill_ = largest.fastest == 0;
+  if (!std::isfinite(largest.fastest)) {
+    // Perhaps only because the step looks further than the surface will go.
+    if (largest.hole > kShortMove) return 0.25;
+    for (const V3d& p : mesh_.positions) requireFiniteWay(journey, p, from, to);
+    throw InvalidInput(fmt::format("{}: the velocity overflows at time {:.6g}; use a gentler one",
+                                   journey.action, from));
+  }
+  double allowed = std::min(kFarthestMove / std::max(largest.move, largest.fastest / 4),
+                            kMostStrain / mostStrain());
+  if (largest.fastest > kShortMove) {
+    if (largest.error > 0)
+      allowed = std::min(allowed, std::max(0.1, std::pow(kMostError / largest.error, 0.2)));
+    if (largest.second > kMostSecond) allowed = std::min(allowed, 0.5);
+  }
+  return allowed;
+}
+
+double Front::mostStrain() const {
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, mesh_.triangles.size(), 1024), 0.0,
+      [&](const auto& range, double largest) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i)
+          for (std::size_t k = 0; k < 3; ++k) {
+            const std::uint32_t a = mesh_.triangles[i][k], b = mesh_.triangles[i][(k + 1) % 3];
+            const V3d before = mesh_.positions[b] - mesh_.positions[a];
+            const V3d change = moved_[b] - moved_[a] - before;
+            largest = std::max(largest, change.length() / std::max(kShortestEdge, before.length()));
+          }
+        return largest;
+      },
+      [](double a, double b) { return std::max(a, b); });
+}
+
+StepMade Front::step(const Journey& journey, double from, double longest) {
+  const double left = std::abs(journey.to - from), sign = journey.to < from ? -1 : 1;
+  constexpr double kSlack = 1.05, kMargin = 0.9, kGrowth = 4;
+  double dt = longest;
+  if (from == journey.from) dt = std::min(dt, firstStep(journey));
+  for (;;) {
+    const double to = dt >= left ? journey.to : from + sign * dt;
+    if (to == from || left > kGrowth * kMostSteps * dt) return {from, dt};
+    const double allowed = tryStep(journey, from, to);
+    if (allowed * kSlack >= 1) {
+      mesh_.positions.swap(moved_);
+      const double next = dt * std::clamp(kMargin * allowed, kMargin / kSlack, kGrowth);
+      // While all stands still, what comes and goes has to be waited for.
+      const double whole = std::abs(journey.to - journey.from);
+      return {to, isStill_ ? std::min(next, kFirstShare * whole) : next};
+    }
+    report(journey.progress, (from - journey.from) / (journey.to - journey.from), journey.action);
+    dt *= kMargin * allowed;
+  }
 }
 
 std::size_t Front::advance(const Journey& journey) {
-  const auto longest = [&](double time) {
-    return longestStep(journey.velocity, time, journey.action);
-  };
-  return walk(journey, longest, [&](double from, double to) {
-    move(journey.velocity, from, to, journey.action);
-    splitLongEdges();
-    requireMemory(kBytesPerTriangle * static_cast<double>(mesh_.triangles.size()),
-                  journey.maxMemory, journey.action);
+  return walk(journey, [&](double from, double longest) {
+    const StepMade made = step(journey, from, longest);
+    splitLongEdges(journey.maxMemory, journey.action);
     largestArea_ = std::max(largestArea_, surfaceArea(mesh_));
     if (static_cast<double>(mesh_.triangles.size()) >
         kSpareTriangles + kMostTrianglesPerVoxel * largestArea_) {
       throw ResourceLimit(fmt::format(
           "{}: at time {:.6g} the velocity has folded the surface too finely to follow; "
           "use a smoother velocity, a shorter time or --scheme semi-lagrangian",
-          journey.action, to));
+          journey.action, made.time));
     }
+    return made;
   });
 }
 

@@ -11,6 +11,7 @@
 
 #include "levelset/eikonal/distance_transform.h"
 #include "levelset/eikonal/interpolant.h"
+#include "levelset/flow/characteristic.h"
 #include "levelset/vdb.h"
 
 namespace levelset::flow {
@@ -66,14 +67,17 @@ FloatGrid::Ptr distanceOf(const FloatGrid& field, double halfWidth, const Journe
 
 // === Semi-Lagrangian
 
-V3d footOf(const Journey& journey, const V3d& place, double from, double to) {
-  const double dt = to - from, middle = from + dt / 2;
-  const auto at = [&](const V3d& p, double time) { return journey.velocity(p, time); };
-  const V3d k1 = at(place, from), k2 = at(place + k1 * (dt / 2), middle),
-            k3 = at(place + k2 * (dt / 2), middle), k4 = at(place + k3 * dt, to);
-  const V3d moved = (k1 + (k2 + k3) * 2.0 + k4) * (dt / 6);
-  requireFinite(moved, place, from, journey.action);
-  return place + moved;
+// A foot may be off by this many voxels for each step; no way is halved more often than that.
+constexpr double kFootError = 1e-3;
+constexpr int kMostHalvings = 6;
+
+V3d footOf(const Journey& journey, const V3d& place, double from, double to, int halvings = 0) {
+  const Characteristic way(journey.velocity, place, from, to);
+  if (!way.isFinite()) requireFiniteWay(journey, place, from, to);
+  if (!(way.error.length() > kFootError) || halvings == kMostHalvings) return place + way.move;
+  const double middle = from + (to - from) / 2;
+  return footOf(journey, footOf(journey, place, from, middle, halvings + 1), middle, to,
+                halvings + 1);
 }
 
 FloatGrid::Ptr semiLagrangeStep(const FloatGrid& before, const Journey& journey, double from,
@@ -143,7 +147,7 @@ void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, do
     for (auto it = leaves[i]->beginValueOn(); it; ++it) {
       const Coord c = LeafNode::offsetToLocalCoord(it.pos());
       const V3d speed = journey.velocity(placeOf(*leaves[i], it.pos()), time);
-      requireFinite(speed, placeOf(*leaves[i], it.pos()), time, journey.action);
+      requireFinite(journey, speed, placeOf(*leaves[i], it.pos()), time);
       double slope = 0;
       for (int axis = 0; axis < 3; ++axis)
         if (speed[axis] != 0)
@@ -176,7 +180,7 @@ std::size_t carryBySemiLagrange(NarrowBand& band, const Journey& journey) {
   const auto longest = [&](double time) {
     return longestStep(*grid, [&](const V3d& p) {
       const V3d speed = journey.velocity(p, time);
-      requireFinite(speed, p, time, journey.action);
+      requireFinite(journey, speed, p, time);
       double strain = 0;
       for (int axis = 0; axis < 3; ++axis) {
         V3d q = p;
@@ -200,7 +204,7 @@ std::size_t carryUpwind(NarrowBand& band, const Journey& journey) {
   const auto longest = [&](double time) {
     const double step = longestStep(*grid, [&](const V3d& p) {
       const V3d speed = journey.velocity(p, time);
-      requireFinite(speed, p, time, journey.action);
+      requireFinite(journey, speed, p, time);
       return kCfl / (std::abs(speed.x) + std::abs(speed.y) + std::abs(speed.z));
     });
     fastest = std::max(fastest, kCfl / step);

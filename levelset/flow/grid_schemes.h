@@ -2,7 +2,7 @@
 
 // For the .cpp files of levelset/flow only.
 
-#include "levelset/flow/front.h"
+#include "levelset/flow/journey.h"
 #include "levelset/narrow_band.h"
 
 namespace levelset::flow {

@@ -241,10 +241,13 @@ class SeamCorrector {
     return true;
   }
 
+  /// Shares a face of a cell with a grid point outside: its value has a say in where the surface
+  /// is.
   static bool isBesideSurface(const SignedField& u, const SignedField& v, const Coord& c) {
     for (int x = -1; x <= 1; ++x)
       for (int y = -1; y <= 1; ++y)
         for (int z = -1; z <= 1; ++z) {
+          if (x != 0 && y != 0 && z != 0) continue;
           const Coord near = c.offsetBy(x, y, z);
           if (!(u(near) < 0) && !(v(near) < 0)) return true;
         }

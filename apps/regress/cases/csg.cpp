@@ -77,8 +77,8 @@ void laws(Recorder& out) {
 }
 
 std::vector<Bound> ballBounds() {
-  std::vector<Bound> bounds = {{"union", "band_in_linf_vx", 0.1, 256},
-                               {"union", "band_out_linf_vx", 0.1, 256}};
+  std::vector<Bound> bounds = {{"union", "band_in_linf_vx", 0.1},
+                               {"union", "band_out_linf_vx", 0.1}};
   for (const Named& op : kOperations) {
     // Where the crease is nearest, its place between the grid points is known to a third of a
     // voxel.

@@ -98,6 +98,13 @@ TEST(RegressErrors, MissWhatIsNotThere) {
   EXPECT_NEAR(f.at("volume_error"), -0.5, 0.01);
 }
 
+TEST(RegressErrors, DoNotSetZerosTooManyAgainstZerosTooFew) {
+  // One ball is missing, another as large is there for it: as many zeros, on other rays.
+  const Truth left = ball(V3d(-1.5, 0, 0), 1), pair = apart(left, ball(V3d(1.5, 0, 0), 1));
+  const Truth other = apart(left, ball(V3d(0, 1.45, 0), 1));
+  EXPECT_GE(errorsOf(exactBand(other, kVoxel), pair).at("missed_hits"), 0.6);
+}
+
 TEST(RegressDeviation, IsZeroOnlyForTheSameBand) {
   const auto a = exactBand(ball(kCentre, 1), kVoxel);
   EXPECT_EQ(deviation(a, a), 0);

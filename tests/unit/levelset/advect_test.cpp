@@ -262,6 +262,70 @@ TEST(Advect, StaysWhereTheMaskIsZero) {
   }
 }
 
+TEST(Advect, SeesWhatMovesOnlyASmallPart) {
+  // Three voxels of a large ball, and fast: nothing can leave the place that moves.
+  const NarrowBand ball = levelset::makeSphere(40, V3d(0), 1);
+  const V3d place(39, 7, 5);
+  const VectorField jet = [&](const V3d& p, double) {
+    return V3d(1000 * std::max(0.0, 1 - (p - place).length2() / 9), 0, 0);
+  };
+  const NarrowBand drawn = levelset::advect(ball, jet, 0.1).band;
+  EXPECT_LE(drawn.zeroSetBounds().max.x, place.x + 3.1);
+  EXPECT_GE(drawn.zeroSetBounds().max.x, 41);
+  AdvectOptions options;
+  options.mask = {
+      .field = [&](const V3d& p) { return 3 - (p - place).length(); }, .min = 0, .max = 2};
+  const NarrowBand masked =
+      levelset::advect(ball, constantVelocity(V3d(300, 0, 0)), 1, options).band;
+  EXPECT_LE(masked.zeroSetBounds().max.x, place.x + 3.1);
+  EXPECT_GE(masked.zeroSetBounds().max.x, 40.5);
+}
+
+TEST(Advect, FollowsVelocitiesThatComeAndGo) {
+  const NarrowBand ball = levelset::makeSphere(10, V3d(0), 1);
+  const VectorField shaken = [](const V3d&, double t) { return V3d(60 * std::cos(60 * t), 0, 0); };
+  // Still at the start, in the middle and at the end.
+  const VectorField pulses = [](const V3d&, double t) {
+    return V3d(60 * std::pow(std::sin(20 * kPi * t), 2), 0, 0);
+  };
+  // Within the first step, and only at its end.
+  const VectorField early = [](const V3d&, double t) {
+    return V3d(t < 0.0259001 ? 6000 * std::sin(415.86 * t) : 0, 0, 0);
+  };
+  const double shift = 6000 / 415.86 * (1 - std::cos(415.86 * 0.0259001));
+  EXPECT_LE(
+      surfaceError(levelset::advect(ball, early, 1).band, ballDistance(V3d(shift, 0, 0), 10)).mean,
+      0.3);
+  // Long still.
+  const VectorField late = [](const V3d&, double t) {
+    return V3d(t > 0.18 && t < 0.24 ? 1000 * std::pow(std::sin(kPi * (t - 0.18) / 0.06), 2) : 0, 0,
+               0);
+  };
+  for (const AdvectScheme scheme : {AdvectScheme::Front, AdvectScheme::SemiLagrangian}) {
+    EXPECT_NEAR(levelset::advect(ball, late, 1, {.scheme = scheme}).band.zeroSetBounds().max.x, 40,
+                0.2);
+    const double allowed = scheme == AdvectScheme::Front ? 0.02 : 0.05;
+    const NarrowBand there = levelset::advect(ball, shaken, 1, {.scheme = scheme}).band;
+    EXPECT_LE(surfaceError(there, ballDistance(V3d(std::sin(60.0), 0, 0), 10)).mean, allowed);
+    const NarrowBand moved = levelset::advect(ball, pulses, 1, {.scheme = scheme}).band;
+    EXPECT_LE(surfaceError(moved, ballDistance(V3d(30, 0, 0), 10)).mean, allowed);
+  }
+}
+
+TEST(Advect, FollowsAVelocityThatChangesAheadOfTheSurface) {
+  const NarrowBand ball = levelset::makeSphere(16, V3d(0), 1);
+  // A gust across the way, narrower than a step might be.
+  const VectorField gust = [](const V3d& p, double) {
+    const double x = (p.x - 25) / 1.5;
+    return V3d(60, 60 * std::exp(-x * x), 0);
+  };
+  const NarrowBand moved = levelset::advect(ball, gust, 1).band;
+  const SurfaceError error =
+      surfaceError(moved, ballDistance(V3d(60, 1.5 * std::sqrt(kPi), 0), 16));
+  EXPECT_LE(error.mean, 0.01);
+  EXPECT_LE(error.largest, 0.05);
+}
+
 TEST(Advect, FixesTheVolumeOnlyWhenAsked) {
   const NarrowBand ball = levelset::makeSphere(1, V3d(0), 0.08);
   const VectorField growth = [](const V3d& p, double) { return p * 0.1; };
@@ -355,13 +419,29 @@ TEST(Advect, RefusesWhatCannotBeFollowed) {
     const AdvectOptions options{.scheme = scheme};
     EXPECT_NE(refusal<levelset::InvalidInput>([&] {
                 (void)levelset::advect(ball, constantVelocity(V3d(0, nan, 0)), 1, options);
-              }).find("velocity is 0,nan,0"),
+              }).find("velocity is not finite at"),
               std::string::npos);
     EXPECT_NE(refusal<levelset::ResourceLimit>([&] {
                 (void)levelset::advect(ball, constantVelocity(V3d(1e9, 0, 0)), 1, options);
               }).find("shorter time"),
               std::string::npos);
   }
+  // What lies beyond the surface's way does not matter.
+  const VectorField halfSpace = [nan](const V3d& p, double) {
+    return p.x < 3 ? V3d(1, 0, 0) : V3d(nan);
+  };
+  EXPECT_NEAR(levelset::advect(ball, halfSpace, 1.99).band.zeroSetBounds().max.x, 2.99, 0.01);
+  EXPECT_THROW((void)levelset::advect(ball, halfSpace, 2.1), levelset::InvalidInput);
+  const VectorField aheadOfSteps = [nan](const V3d& p, double t) {
+    return V3d(p.x < 14 ? 600 * std::sin(600 * t) : nan, 0, 0);
+  };
+  EXPECT_NO_THROW((void)levelset::advect(ball, aheadOfSteps, 0.1));
+  // Defined from the start on, and late in a day counted in seconds.
+  const VectorField fromStart = [](const V3d&, double t) { return V3d(std::sqrt(t - 0.1), 0, 0); };
+  for (const AdvectScheme scheme : {AdvectScheme::Front, AdvectScheme::SemiLagrangian})
+    EXPECT_NO_THROW((void)levelset::advect(ball, fromStart, 0.3, {.start = 0.1, .scheme = scheme}));
+  EXPECT_NO_THROW(
+      (void)levelset::advect(ball, constantVelocity(V3d(1, 0, 0)), 2e-6, {.start = 1.7e9}));
   // NaN that begins on the way.
   EXPECT_THROW(
       (void)levelset::advect(ball, levelset::vectorExpression("1/sqrt(0.5 - t), 0, 0", "test"), 1),

@@ -103,6 +103,16 @@ NarrowBand sampleUnit(const Shape& shape, int voxelsPerUnit, double halfWidth = 
   return support::sampleBand(shape, {V3d(-size), V3d(size)}, 1.0 / voxelsPerUnit, halfWidth);
 }
 
+/// Between the values of two bands, voxels.
+double largestDifference(const NarrowBand& a, const NarrowBand& b) {
+  auto accessor = vdb(b).getConstAccessor();
+  double largest = vdb(a).activeVoxelCount() == vdb(b).activeVoxelCount() ? 0 : a.halfWidth();
+  for (auto it = vdb(a).cbeginValueOn(); it; ++it)
+    largest = std::max(largest, std::abs(static_cast<double>(*it) -
+                                         static_cast<double>(accessor.getValue(it.getCoord()))));
+  return largest / a.voxelSize();
+}
+
 void expectSound(const NarrowBand& band) {
   EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(band), 6), "");
 }
@@ -277,8 +287,16 @@ TEST(Redistance, KeepsASingleVoxel) {
 }
 
 TEST(Redistance, IsStableUnderRepetition) {
-  NarrowBand band = sampleUnit(sphere(1), 24);
+  // What is a distance keeps its values to the bit, and what was none comes to rest.
+  for (const int radius : {10, 16}) {
+    const NarrowBand ball = sampleUnit(sphere(1), radius);
+    EXPECT_EQ(largestDifference(ball, redistance(ball)), 0) << radius;
+  }
+  const NarrowBand cuboid = sampleUnit(box(V3d(0.413, 0.377, 0.291)), 32);
+  EXPECT_LE(largestDifference(redistance(cuboid), redistance(redistance(cuboid))), 2e-6);
+  NarrowBand band = sampleUnit(distortedSphere(1), 24);
   for (int i = 0; i < 10; ++i) band = redistance(std::move(band));
+  EXPECT_EQ(largestDifference(band, redistance(band)), 0);
   EXPECT_LE(surfaceError(band, sphere(1)), 1e-3);
   EXPECT_LE(bandError(band, sphere(1)).linf, 5e-3);
 }
