@@ -11,7 +11,7 @@
 #include "levelset/fields/grid.h"
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
-#include "mapping/patch.h"
+#include "mapping/patches/patch.h"
 
 namespace pipeline {
 

@@ -1,7 +1,7 @@
 #include <cstdio>
 
 #include "levelset/solids/shapes.h"
-#include "mapping/patch.h"
+#include "mapping/patches/patch.h"
 #include "render/embree/embree_renderer.h"
 
 int main() {

@@ -6,8 +6,9 @@
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
 #include "levelset/error.h"
-#include "mapping/geometric_texture.h"
-#include "mapping/patch.h"
+#include "mapping/patches/patch.h"
+#include "mapping/textures/geometric_texture.h"
+#include "mapping/textures/mesh_texture.h"
 
 namespace pipeline {
 namespace {
@@ -29,11 +30,23 @@ void validatePatch(const Invocation& in) {
     if (count != 4)
       throw UsageError(fmt::format("patch: --corners needs four points, not {}", count));
   }
+  if (in.text("particles") != "spline" && (in.given("spline") || in.flag("fade")))
+    throw UsageError("patch: --spline and --fade go with --particles spline");
+  if (in.text("particles") == "spline" && in.text("height") == "auto")
+    throw UsageError(
+        "patch: --height auto does not go with --particles spline; give the length "
+        "along the spline");
   const long levels = in.integer("levels");
   if (levels < 2 || levels > kMostLevels) {
     throw UsageError(
         fmt::format("patch: --levels {} is out of range; give 2 to {}", levels, kMostLevels));
   }
+}
+
+mapping::LevelScheme schemeOf(const Invocation& in) {
+  const std::string name = in.text("particles");
+  if (name == "conforming") return mapping::LevelScheme::Conforming;
+  return name == "spline" ? mapping::LevelScheme::Spline : mapping::LevelScheme::Reduced;
 }
 
 std::array<V3d, 4> cornersOf(Invocation& in) {
@@ -57,10 +70,15 @@ Value patch(Invocation& in) {
   value.base = in.band();
   value.autoHeight = in.text("height") == "auto";
   value.options = {.levels = static_cast<std::size_t>(in.integer("levels")),
+                   .scheme = schemeOf(in),
+                   .fade = in.flag("fade"),
                    .spacing = in.given("spacing") ? in.length("spacing") : 0,
                    .mirror = in.flag("mirror"),
                    .maxMemory = in.maxMemory,
                    .progress = in.progress};
+  if (in.given("spline")) value.options.spline = in.points("spline");
+  value.options.transform = {
+      .twist = in.radians("twist"), .taper = in.number("taper"), .bend = in.radians("bend")};
   value.corners = cornersOf(in);
   // The texture will tell the height; one voxel is enough to know the patch's size until then.
   const double height = value.autoHeight ? in.band().voxelSize() : in.length("height");
@@ -75,7 +93,14 @@ Value patch(Invocation& in) {
   json["cell_area_variation"] = report.cellAreaVariation;
   json["relax_iterations"] = report.relaxIterations;
   json["projection_distance"] = report.projectionDistance;
+  json["slowed"] = report.slowed;
   in.notes.detailsJson = json.dump();
+  if (report.slowed > 0) {
+    in.notes.warnings.push_back(fmt::format(
+        "patch: {} of its particles would cross their neighbours where the spline bends "
+        "more narrowly than the patch is wide; they were slowed",
+        report.slowed));
+  }
   in.notes.notes.push_back(
       fmt::format("{:.4g} by {:.4g} along the surface, {} particles in {} levels", report.uLength,
                   report.vLength, result.patch.particleCount(), result.patch.levels.size()));
@@ -125,6 +150,26 @@ double aspectHeight(const mapping::Patch& patch, const Imath::Box3d& textureBox)
   return size.z * std::sqrt(u / size.x * v / size.y);
 }
 
+nlohmann::ordered_json spreadOf(const mapping::Spread& spread) {
+  nlohmann::ordered_json json;
+  json["min"] = spread.least;
+  json["percent_1"] = spread.percent1;
+  json["median"] = spread.median;
+  json["percent_99"] = spread.percent99;
+  json["max"] = spread.most;
+  return json;
+}
+
+void addDistortion(const mapping::Distortion& distortion, nlohmann::ordered_json& json) {
+  json["folded"] = distortion.folded;
+  json["samples"] = distortion.samples;
+  json["min_jacobian"] = distortion.jacobian.least;
+  json["min_stretch"] = distortion.stretch.least;
+  json["max_stretch"] = distortion.stretch.most;
+  json["jacobian"] = spreadOf(distortion.jacobian);
+  json["stretch"] = spreadOf(distortion.stretch);
+}
+
 std::string detailsOf(const mapping::TextureReport& report, double height) {
   nlohmann::ordered_json json;
   json["voxel_size"] = report.voxelSize;
@@ -132,15 +177,54 @@ std::string detailsOf(const mapping::TextureReport& report, double height) {
   json["particles"] = report.particles;
   json["blocks_tested"] = report.blocksTested;
   json["blocks_evaluated"] = report.blocksEvaluated;
-  json["min_jacobian"] = report.minJacobian;
-  json["min_stretch"] = report.minStretch;
-  json["max_stretch"] = report.maxStretch;
+  json["operations_per_point"] = report.operationsPerPoint;
+  addDistortion(report.distortion, json);
   json["map_residual"] = report.mapResidual;
   return json.dump();
 }
 
-Value texture(Invocation& in) {
+bool mapsMesh(const Invocation& in) {
+  return in.text("map") == "mesh";
+}
+
+/// The patch at the height that the texture asks for.
+mapping::Patch patchFor(Invocation& in, const Imath::Box3d& textureBox) {
   const PatchValue& onto = in.operands[2].patch();
+  if (!onto.autoHeight) return onto.patch;
+  const double height = aspectHeight(onto.patch, textureBox);
+  in.notes.notes.push_back(
+      fmt::format("--height auto: {:.6g} keeps the texture's proportions", height));
+  return mapping::makePatch(onto.base, onto.corners, height, onto.options).patch;
+}
+
+Imath::Box3d textureBoxOf(const Invocation& in) {
+  return in.given("texture-box") ? in.box("texture-box") : in.operands[1].plan().bounds;
+}
+
+Value textureMesh(Invocation& in) {
+  const mapping::Patch patch = patchFor(in, textureBoxOf(in));
+  mapping::MeshTextureOptions options;
+  options.sink = in.length("sink");
+  if (in.given("texture-box")) options.textureBox = in.box("texture-box");
+  options.allowFolds = in.flag("allow-folds");
+  options.maxMemory = in.maxMemory;
+  options.progress = in.progress;
+  mapping::requirePatchOn(in.band(0), patch);
+  mapping::MeshTextureResult result = mapping::mapMesh(in.mesh(1), patch, options);
+  nlohmann::ordered_json json;
+  json["height"] = patch.height;
+  json["particles"] = patch.particleCount();
+  addDistortion(result.distortion, json);
+  in.notes.detailsJson = json.dump();
+  in.notes.notes.insert(in.notes.notes.end(), result.notes.begin(), result.notes.end());
+  in.notes.notes.push_back(fmt::format("{} vertices moved, smallest Jacobian {:.3g}",
+                                       result.mesh.positions.size(),
+                                       result.distortion.jacobian.least));
+  return Value(std::move(result.mesh));
+}
+
+Value texture(Invocation& in) {
+  if (mapsMesh(in)) return textureMesh(in);
   mapping::TextureOptions options;
   if (in.flag("carve")) options.merge = mapping::TextureMerge::Carve;
   if (in.flag("alone")) options.merge = mapping::TextureMerge::Alone;
@@ -149,19 +233,14 @@ Value texture(Invocation& in) {
   if (in.given("texture-box")) options.textureBox = in.box("texture-box");
   if (in.given("voxel")) options.voxelSize = in.length("voxel");
   options.halfWidth = in.number("half-width");
+  if (in.text("map") == "shell") options.map = mapping::TextureMap::Shell;
+  options.mapTolerance = in.number("map-tolerance");
   options.rbf.lambdaNear = in.number("lambda-near");
   options.rbf.lambdaFar = in.number("lambda-far");
   options.allowFolds = in.flag("allow-folds");
   options.maxMemory = in.maxMemory;
   options.progress = in.progress;
-  mapping::Patch patch = onto.patch;
-  if (onto.autoHeight) {
-    const double height = aspectHeight(
-        patch, options.textureBox ? *options.textureBox : in.operands[1].plan().bounds);
-    patch = mapping::makePatch(onto.base, onto.corners, height, onto.options).patch;
-    in.notes.notes.push_back(
-        fmt::format("--height auto: {:.6g} keeps the texture's proportions", height));
-  }
+  const mapping::Patch patch = patchFor(in, textureBoxOf(in));
   mapping::TextureResult result = mapping::mapTexture(in.band(0), in.band(1), patch, options);
   in.notes.detailsJson = detailsOf(result.report, patch.height);
   in.notes.errors.push_back({"map residual at particles, largest",
@@ -170,8 +249,9 @@ Value texture(Invocation& in) {
                         result.report.notes.end());
   in.notes.notes.push_back(
       fmt::format("smallest Jacobian {:.3g}, stretch {:.3g} to {:.3g}, {} of {} blocks evaluated",
-                  result.report.minJacobian, result.report.minStretch, result.report.maxStretch,
-                  result.report.blocksEvaluated, result.report.blocksTested));
+                  result.report.distortion.jacobian.least, result.report.distortion.stretch.least,
+                  result.report.distortion.stretch.most, result.report.blocksEvaluated,
+                  result.report.blocksTested));
   return Value(std::move(result.band));
 }
 
@@ -187,6 +267,11 @@ double plannedStretch(const Invocation& in, const Plan& texture, const Plan& pat
 }
 
 Plan planTexture(Invocation& in) {
+  if (mapsMesh(in)) {
+    Plan plan = in.operands[1].plan();
+    plan.bounds = in.operands[2].plan().bounds;
+    return plan;
+  }
   Plan plan = in.operands[0].plan();
   const Plan &texture = in.operands[1].plan(), &patch = in.operands[2].plan();
   plan.voxelSize = in.given("voxel") ? in.length("voxel")
@@ -197,6 +282,28 @@ Plan planTexture(Invocation& in) {
   plan.area = (in.flag("alone") ? 0 : plan.area) + texture.area * scale * scale;
   plan.bounds.extendBy(patch.bounds);
   return plan;
+}
+
+void validateTexture(const Invocation& in) {
+  if (in.flag("carve") && in.flag("alone"))
+    throw UsageError("texture: --carve and --alone exclude each other");
+  if (in.flag("alone") && in.given("blend"))
+    throw UsageError("texture: --alone has no seam to blend; leave --blend out");
+  const Kind kind = in.operands[1].kind();
+  if (mapsMesh(in) && kind != Kind::Mesh)
+    throw UsageError("texture: --map mesh moves the vertices of a mesh; give one, or `mesh` first");
+  if (!mapsMesh(in) && kind == Kind::Mesh) {
+    throw UsageError(
+        "texture: the texture is a mesh; turn it into a solid with `level-set`, or move its "
+        "vertices with --map mesh");
+  }
+  std::vector<const char*> unused;
+  if (in.text("map") != "rbf") unused = {"map-tolerance", "lambda-near", "lambda-far"};
+  if (mapsMesh(in)) unused.insert(unused.end(), {"carve", "alone", "blend", "voxel", "half-width"});
+  for (const char* option : unused)
+    if (in.given(option))
+      throw UsageError(fmt::format("texture: --{} says nothing to --map {}; leave it out", option,
+                                   in.text("map")));
 }
 
 }  // namespace
@@ -213,42 +320,61 @@ void addTextureOperators(std::vector<Operator>& all) {
                  "--size 8,8 --height 3 --as p "
                  "! torus --radius 4 --tube 1.5 --voxel 0.5 --as ring ! texture @ball @ring @p "
                  "--blend 1 ! mesh ! write ring.ply",
-      .params = {{.name = "corners",
-                  .type = ParamType::Points,
-                  .doc = "four points, \"p0 p1 p2 p3\""},
-                 {.name = "at", .type = ParamType::Point, .doc = "centre of a patch of --size"},
-                 {.name = "size",
-                  .type = ParamType::Lengths,
-                  .doc = "along u and v, on the surface",
-                  .range = Range::Positive,
-                  .count = 2},
-                 {.name = "rotate",
-                  .type = ParamType::Degrees,
-                  .doc = "of u about the normal, with --at",
-                  .fallback = "0"},
-                 {.name = "height",
-                  .type = ParamType::Length,
-                  .doc = "of the texture; 'auto' keeps its proportions",
-                  .range = Range::Positive,
-                  .required = true,
-                  .allowsAuto = true},
-                 {.name = "levels",
-                  .type = ParamType::Integer,
-                  .doc = "of particles, 2 or more",
-                  .fallback = "6",
-                  .range = Range::Positive},
-                 {.name = "particles",
-                  .type = ParamType::Choice,
-                  .doc = "how they are laid above the surface",
-                  .fallback = "reduced",
-                  .choices = {"reduced"}},
-                 {.name = "spacing",
-                  .type = ParamType::Length,
-                  .doc = "of particles; default: by patch and voxel size",
-                  .range = Range::Positive},
-                 {.name = "mirror",
-                  .type = ParamType::Flag,
-                  .doc = "accept corners that run clockwise: the texture is mirrored"}},
+      .params =
+          {{.name = "corners", .type = ParamType::Points, .doc = "four points, \"p0 p1 p2 p3\""},
+           {.name = "at", .type = ParamType::Point, .doc = "centre of a patch of --size"},
+           {.name = "size",
+            .type = ParamType::Lengths,
+            .doc = "along u and v, on the surface",
+            .range = Range::Positive,
+            .count = 2},
+           {.name = "rotate",
+            .type = ParamType::Degrees,
+            .doc = "of u about the normal, with --at",
+            .fallback = "0"},
+           {.name = "height",
+            .type = ParamType::Length,
+            .doc = "of the texture; 'auto' keeps its proportions",
+            .range = Range::Positive,
+            .required = true,
+            .allowsAuto = true},
+           {.name = "levels",
+            .type = ParamType::Integer,
+            .doc = "of particles, 2 or more",
+            .fallback = "6",
+            .range = Range::Positive},
+           {.name = "particles",
+            .type = ParamType::Choice,
+            .doc = "how they are laid above the surface",
+            .fallback = "reduced",
+            .choices = {"reduced", "conforming", "spline"}},
+           {.name = "spline",
+            .type = ParamType::Points,
+            .doc = "with --particles spline: points that its curve passes from the patch's "
+                   "centre on; default: straight along the normal"},
+           {.name = "fade",
+            .type = ParamType::Flag,
+            .doc = "with --particles spline: the surface's relief goes to nothing on the way"},
+           {.name = "twist",
+            .type = ParamType::Degrees,
+            .doc = "of the top about the patch's axis, anticlockwise from outside",
+            .fallback = "0"},
+           {.name = "taper",
+            .type = ParamType::Number,
+            .doc = "width of the top over that of the surface",
+            .fallback = "1",
+            .range = Range::Positive},
+           {.name = "bend",
+            .type = ParamType::Degrees,
+            .doc = "that the axis leans towards u at the top",
+            .fallback = "0"},
+           {.name = "spacing",
+            .type = ParamType::Length,
+            .doc = "of particles; default: by patch and voxel size",
+            .range = Range::Positive},
+           {.name = "mirror",
+            .type = ParamType::Flag,
+            .doc = "accept corners that run clockwise: the texture is mirrored"}},
       .operands = {{Kind::Band}},
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = patch,
@@ -273,7 +399,12 @@ void addTextureOperators(std::vector<Operator>& all) {
             .type = ParamType::Choice,
             .doc = "from patch to texture",
             .fallback = "rbf",
-            .choices = {"rbf"}},
+            .choices = {"rbf", "shell", "mesh"}},
+           {.name = "map-tolerance",
+            .type = ParamType::Number,
+            .doc = "how far the fast evaluation of the map may be off, texture voxels",
+            .fallback = "0.05",
+            .range = Range::NonNegative},
            {.name = "sink",
             .type = ParamType::Length,
             .doc = "how deep the texture dips into the base",
@@ -302,16 +433,11 @@ void addTextureOperators(std::vector<Operator>& all) {
             .fallback = "0.25",
             .range = Range::NonNegative},
            {.name = "allow-folds", .type = ParamType::Flag, .doc = "map even where the map folds"}},
-      .operands = {{Kind::Band}, {Kind::Band}, {Kind::Patch}},
+      .operands = {{Kind::Band}, {Kind::Band, Kind::Mesh}, {Kind::Patch}},
+      .resultKind = [](const Invocation& in) { return mapsMesh(in) ? Kind::Mesh : Kind::Band; },
       .run = texture,
       .plan = planTexture,
-      .validate =
-          [](const Invocation& in) {
-            if (in.flag("carve") && in.flag("alone"))
-              throw UsageError("texture: --carve and --alone exclude each other");
-            if (in.flag("alone") && in.given("blend"))
-              throw UsageError("texture: --alone has no seam to blend; leave --blend out");
-          },
+      .validate = validateTexture,
   });
 }
 

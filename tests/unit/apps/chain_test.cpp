@@ -100,6 +100,15 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
   EXPECT_REFUSAL(
       "sphere --radius 1 --voxel 0.1 ! patch --at 0,0,1 --size 1,1 --height 1 ! write p.vdb",
       "is a patch, a mesh, a level set or a field is needed; 'texture' makes");
+  const std::string onto =
+      "sphere --radius 3 --voxel 0.2 --as b ! patch @b --at 0,0,3 --size 2,2 --height 1 --as p ! ";
+  EXPECT_REFUSAL(onto + "read a.ply --as t ! texture @b @t @p", "with `level-set`, or move its");
+  EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map mesh",
+                 "moves the vertices of a mesh");
+  EXPECT_REFUSAL(onto + "read a.ply --as t ! texture @b @t @p --map mesh --blend 1",
+                 "says nothing to --map mesh");
+  EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map-tolerance -1",
+                 "map-tolerance");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 1 --voxel 0.1 --as a",
                  "is taken");
 }

@@ -395,6 +395,9 @@ TEST_F(Refusal, EveryLongActionEndsWithinHalfASecond) {
            "read in.vdb ! render out.exr --size 2000x2000 --samples 64",
            "box --size 20,20,8 --voxel 0.1 --as b ! read in.vdb --as t ! patch @b --at 0,0,4 "
            "--size 10,10 --height 5 --as p ! texture @b @t @p --voxel 0.02 ! write out.vdb",
+           "box --size 20,20,8 --voxel 0.1 --as b ! read in.vdb --as t ! patch @b --at 0,0,4 "
+           "--size 10,10 --height 5 --as p ! texture @b @t @p --voxel 0.02 --map shell "
+           "! write out.vdb",
        }) {
     const auto outcome = shell(interrupted(command() + " --quiet " + chain, "1"));
     EXPECT_EQ(outcome.code, 130) << chain << outcome.err;

@@ -128,8 +128,10 @@ INSTANTIATE_TEST_SUITE_P(
             "box --size 8,8,3 --voxel 0.5 --as b ! torus --radius 1 --tube 0.5 --voxel 0.25 --as t "
             "! patch @b --corners "
             "\"-2,-2,1.5 2,-2,1.5 2,2,1.5 -2,2,1.5\" --height 1.5 --as p ! texture @b @t @p "
-            "--blend 0.8 ! write texture.vdb ! texture @b @t @p --carve ! write carve.vdb",
-            {"texture.vdb", "carve.vdb"}},
+            "--blend 0.8 ! write texture.vdb ! texture @b @t @p --carve ! write carve.vdb "
+            "! texture @b @t @p --map shell ! write shell.vdb "
+            "! mesh @t --as m ! texture @b @m @p --map mesh ! write moved.ply",
+            {"texture.vdb", "carve.vdb", "shell.vdb", "moved.ply"}},
         Case{"render",
              "read in.vdb ! render out.exr --size 96x64 ! read coarse.vdb "
              "! render png.exr --size 48x32 --png out.png",

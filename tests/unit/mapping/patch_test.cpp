@@ -1,4 +1,4 @@
-#include "mapping/patch.h"
+#include "mapping/patches/patch.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <string>
 
 #include "levelset/error.h"
-#include "mapping/geodesic.h"
-#include "tests/support/bands.h"
+#include "mapping/surface/geodesic.h"
+#include "tests/support/patches.h"
 
 namespace patch_test {
 
@@ -18,6 +18,7 @@ using levelset::NarrowBand;
 using mapping::makePatch;
 using mapping::ParticleLevel;
 using mapping::PatchResult;
+using support::cap;
 
 constexpr double kVoxel = 0.05;
 
@@ -34,12 +35,6 @@ NarrowBand sphere(double reach = 0.8) {
 NarrowBand slab(double reach = 1) {
   return wideBand([](const V3d& p) { return p.z; }, {V3d(-2, -2, -0.5), V3d(2, 2, 0.5)}, reach,
                   0.1);
-}
-
-/// Four directions at `polar` from +z, anticlockwise seen from outside, about both symmetry planes.
-std::array<V3d, 4> cap(double polar, double radius = 1) {
-  const double side = radius * std::sin(polar) / std::sqrt(2.0), up = radius * std::cos(polar);
-  return {V3d(-side, -side, up), V3d(side, -side, up), V3d(side, side, up), V3d(-side, side, up)};
 }
 
 std::string refusal(const std::function<void()>& call) {

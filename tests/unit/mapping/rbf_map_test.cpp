@@ -1,4 +1,4 @@
-#include "mapping/rbf_map.h"
+#include "mapping/maps/rbf_map.h"
 
 #include <gtest/gtest.h>
 
@@ -9,11 +9,13 @@
 #include <vector>
 
 #include "levelset/error.h"
+#include "mapping/maps/rbf_block.h"
 
 namespace rbf_map_test {
 
 using Imath::M33d;
 using Imath::V3d;
+using mapping::GridBlock;
 using mapping::RbfMap;
 using mapping::RbfMapOptions;
 
@@ -123,49 +125,75 @@ TEST(RbfMap, JacobianIsTheSlope) {
   }
 }
 
+/// A block of a grid that is turned and sheared a little.
+GridBlock blockAt(const V3d& origin, double step, int edge) {
+  GridBlock block{origin, M33d(), edge};
+  for (int i = 0; i < 3; ++i) block.rows[i][i] = step;
+  block.rows[0][1] = 0.15 * step;
+  return block;
+}
+
 TEST(RbfMap, BoundsHoldTheImage) {
   const RbfMap map = fit(lattice(5, bend), 0);
   std::mt19937 random(11);
-  std::uniform_real_distribution<double> unit(-1, 1);
-  for (const double half : {0.1, 0.7, 2.5}) {
-    const V3d center(1.9, 2.2, 2.6);
-    M33d axes;
-    for (int i = 0; i < 3; ++i) axes[i][i] = half;
-    const Imath::Box3d box = map.imageBounds(center, axes);
-    const double radius = std::sqrt(3.0) * half, slope = map.lipschitz(center, radius);
-    V3d last = center;
-    for (int i = 0; i < 500; ++i) {
-      const V3d x = center + half * V3d(unit(random), unit(random), unit(random));
-      EXPECT_TRUE(box.intersects(map(x)));
-      EXPECT_LE((map(x) - map(last)).length(), slope * (x - last).length() * (1 + 1e-12));
-      last = x;
-    }
-    // A bound that holds is not enough: it has to be near, or it excludes nothing.
-    if (half < 0.5) {
-      EXPECT_LT(box.size().x, 1.6 * 2 * half);
-    }
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (const double size : {0.2, 1.4, 5.0, 40.0})
+    for (const int edge : {8, 16, 64})
+      for (const V3d& origin : {V3d(1.9, 2.2, 2.6), V3d(-9, 3, 0.5)}) {
+        const GridBlock block = blockAt(origin, size / (edge - 1), edge);
+        const Imath::Box3d box = map.restrictTo(block, 1e-4)->imageBounds();
+        for (int i = 0; i < 200; ++i) {
+          const V3d t = V3d(unit(random), unit(random), unit(random)) * (edge - 1);
+          const V3d x = origin + block.row(0) * t.x + block.row(1) * t.y + block.row(2) * t.z;
+          EXPECT_TRUE(box.intersects(map(x))) << size << " " << edge;
+        }
+        // A bound that holds is not enough: it has to be near, or it excludes nothing.
+        if (size < 0.5) {
+          EXPECT_LT(box.size().x, 1.6 * size);
+        }
+      }
+}
+
+/// Largest difference between the map's points and its leaf blocks.
+double leafError(const RbfMap& map, const GridBlock& block, const mapping::BlockMap& at,
+                 std::size_t& near) {
+  double worst = 0;
+  if (block.edge > GridBlock::kLeafEdge) {
+    for (int bits = 0; bits < 8; ++bits)
+      worst = std::max(worst, leafError(map, block.octant(bits), *at.octant(bits), near));
+    return worst;
   }
+  near += dynamic_cast<const mapping::RbfBlock&>(at).nearCount();
+  std::array<V3d, 512> values;
+  at.evaluate(values);
+  for (std::size_t n = 0; n < 512; ++n) {
+    const V3d x = block.origin + block.row(0) * static_cast<double>(n / 64) +
+                  block.row(1) * static_cast<double>(n / 8 % 8) +
+                  block.row(2) * static_cast<double>(n % 8);
+    worst = std::max(worst, (values[n] - map(x)).length());
+  }
+  return worst;
 }
 
 TEST(RbfMap, BlocksAgreeWithPoints) {
   const RbfMap map = fit(lattice(9, bend), 0);
-  M33d rows;
-  for (int i = 0; i < 3; ++i) rows[i][i] = 0.13;
-  rows[0][1] = 0.02;  // a rotated grid is allowed
-  std::vector<V3d> values(512);
-  for (const double tolerance : {1e-3, 1e-6, 0.0}) {
+  for (const int edge : {8, 16, 32})
     for (const V3d& origin : {V3d(3.1, 3.3, 2.9), V3d(-2, 4, 9), V3d(7.9, 0.1, 4)}) {
-      map.evaluateBlock(origin, rows, tolerance, std::span<V3d, 512>(values.data(), 512));
-      double worst = 0;
-      for (std::size_t n = 0; n < 512; ++n) {
-        const double i = static_cast<double>(n / 64), j = static_cast<double>(n / 8 % 8),
-                     k = static_cast<double>(n % 8);
-        const V3d x = origin + V3d(i * rows[0][0], j * rows[1][1] + i * rows[0][1], k * rows[2][2]);
-        worst = std::max(worst, (values[n] - map(x)).length());
+      const GridBlock block = blockAt(origin, 0.13, edge);
+      const double leaves = std::pow(edge / 8, 3);
+      for (const double tolerance : {1e-3, 1e-6, 0.0}) {
+        std::size_t near = 0;
+        const double error = leafError(map, block, *map.restrictTo(block, tolerance), near);
+        EXPECT_LE(error, tolerance + 1e-12) << edge;
+        // The more may be off, the fewer particles are left to the grid points.
+        if (tolerance == 0) {
+          EXPECT_EQ(near, map.size() * static_cast<std::size_t>(leaves));
+        }
+        if (tolerance == 1e-3) {
+          EXPECT_LT(static_cast<double>(near), 0.4 * leaves * 729) << edge;
+        }
       }
-      EXPECT_LE(worst, std::sqrt(3.0) * tolerance + 1e-12);
     }
-  }
 }
 
 TEST(RbfMap, RefusesCloudsThatSpanNoSpace) {

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <vector>
+
+#include "mapping/maps/patch_map.h"
+#include "mapping/patches/patch.h"
+
+namespace mapping {
+
+/// Texture → patch space straight through the particles: bilinear in u and v within the two levels
+/// about w, then linear between them [Brodersen07 §8.4]. Beyond the unit cube the outermost cells
+/// go on linearly.
+[[nodiscard]] Imath::V3d levelPosition(const Patch& patch, const Imath::V3d& uvw);
+
+/// That map and its inverse's slopes in the middle and close to the corners of every cell, where a
+/// bilinear cell turns over first; for levels of unlike counts in those of both.
+/// @param sink  how far below w = 0 to look too, or above w = 1 if negative
+[[nodiscard]] std::vector<MapSample> sampleLevelMap(const Patch& patch, double sink);
+
+/// The longest edge of any cell of particles, across levels included.
+[[nodiscard]] double longestCellEdge(const Patch& patch);
+
+}  // namespace mapping

@@ -1,0 +1,58 @@
+// Compiled with -O3 -fno-math-errno, so that plain loops become vector code; neither flag changes a
+// bit of the results, since each point's sum runs over the particles in one order.
+
+#include "mapping/maps/rbf_sum.h"
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+namespace mapping {
+namespace {
+
+constexpr std::size_t kTile = 64;  // points, few enough for the first-level cache
+
+namespace plain {
+#include "mapping/maps/rbf_sum_tile.inc"
+}
+#if defined(__x86_64__)
+#pragma GCC push_options
+#pragma GCC target("avx2")
+namespace avx2 {
+#include "mapping/maps/rbf_sum_tile.inc"
+}
+#pragma GCC pop_options
+#pragma GCC push_options
+#pragma GCC target("avx512f,avx512vl,avx512dq,prefer-vector-width=512")
+namespace avx512 {
+#include "mapping/maps/rbf_sum_tile.inc"
+}
+#pragma GCC pop_options
+#endif
+
+/// The widest that the processor has.
+decltype(&plain::add) chooseAdd() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+      __builtin_cpu_supports("avx512dq"))
+    return avx512::add;
+  if (__builtin_cpu_supports("avx2")) return avx2::add;
+#endif
+  return plain::add;
+}
+
+static_assert(sizeof(RbfParticle) == 6 * sizeof(double) && std::is_standard_layout_v<RbfParticle>);
+
+}  // namespace
+
+void addRbfSums(std::span<const RbfParticle> particles, std::span<const std::uint32_t> chosen,
+                RbfPoints& points) {
+  static const auto add = chooseAdd();
+  if (particles.empty()) return;
+  const double* numbers = &particles.front().position.x;
+  for (std::size_t i = 0; i < points.size(); i += kTile)
+    add(numbers, chosen.data(), chosen.size(), &points.x[i], &points.y[i], &points.z[i],
+        &points.u[i], &points.v[i], &points.w[i], std::min(kTile, points.size() - i));
+}
+
+}  // namespace mapping

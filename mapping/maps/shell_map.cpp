@@ -1,0 +1,282 @@
+#include "mapping/maps/shell_map.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "mapping/maps/dual_basis.h"
+
+namespace mapping {
+namespace {
+
+using Imath::Box3d;
+using Imath::M33d;
+using Imath::V3d;
+using Cell = std::array<int, 3>;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+// What rounding may leave of a point's share in a corner that it lies opposite of.
+constexpr double kOnFace = -1e-9;
+
+bool isInside(const std::array<double, 4>& shares) {
+  return std::all_of(shares.begin(), shares.end(), [](double s) { return s >= kOnFace; });
+}
+
+V3d mix(const Lattice::Corners& corners, const std::array<double, 4>& shares) {
+  return corners[0] * shares[0] + corners[1] * shares[1] + corners[2] * shares[2] +
+         corners[3] * shares[3];
+}
+
+/// Gradients of u, v and w in a tetrahedron, as rows; not finite where it has no volume.
+M33d slopes(const Lattice::Corners& world, const Lattice::Corners& texture) {
+  const std::array<V3d, 3> dual =
+      dualBasis(world[1] - world[0], world[2] - world[0], world[3] - world[0]);
+  M33d result(0, 0, 0, 0, 0, 0, 0, 0, 0);
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    const V3d step = texture[corner + 1] - texture[0];
+    for (int k = 0; k < 3; ++k)
+      for (int axis = 0; axis < 3; ++axis) result[k][axis] += step[k] * dual[corner][axis];
+  }
+  return result;
+}
+
+Box3d around(const GridBlock& block) {
+  const V3d center = block.center();
+  V3d half(0);
+  for (int i = 0; i < 3; ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      half[axis] += std::abs(block.row(i)[axis]) * 0.5 * (block.edge - 1);
+  // Rounding must not lose what lies on the rim.
+  half *= 1 + 1e-9;
+  return {center - half, center + half};
+}
+
+}  // namespace
+
+/// The cells of a shell map that touch a block.
+class ShellBlock final : public BlockMap {
+ public:
+  ShellBlock(const ShellMap& map, const GridBlock& block) : map_(map), block_(block) {
+    map.tree_.visit(around(block), [&](const Cell& cell) {
+      cells_.push_back(cell);
+      return false;
+    });
+  }
+
+  [[nodiscard]] Box3d imageBounds() const override {
+    // Tetrahedra much smaller than the block fill their boxes.
+    constexpr std::size_t kFew = 32;
+    Box3d bounds;
+    for (const Cell& cell : cells_) {
+      const Box3d box = map_.lattice_.textureBox(cell);
+      if (cells_.size() > kFew)
+        bounds.extendBy(box);
+      else
+        for (int order = 0; order < 6; ++order) bounds.extendBy(imageIn({cell, order}, box));
+    }
+    // Barycentric sums round.
+    constexpr double kRounding = 1e-12;
+    if (!bounds.isEmpty()) bounds = {bounds.min - V3d(kRounding), bounds.max + V3d(kRounding)};
+    return bounds;
+  }
+
+  [[nodiscard]] bool isTotal() const override {
+    if (std::any_of(cells_.begin(), cells_.end(),
+                    [&](const Cell& cell) { return map_.lattice_.isOutermost(cell); }))
+      return false;
+    Tetrahedron t;
+    return map_.find(block_.center(), t);
+  }
+
+  [[nodiscard]] std::unique_ptr<BlockMap> octant(int bits) const override {
+    return std::unique_ptr<BlockMap>(new ShellBlock(*this, bits));
+  }
+
+  std::size_t evaluate(std::span<V3d, 512> uvw) const override {
+    Walk walk(*this);
+    for (std::size_t n = 0; n < uvw.size(); ++n) {
+      if (n % 8 == 0) walk.returnToRow();
+      const V3d x = block_.origin + block_.row(0) * static_cast<double>(n >> 6) +
+                    block_.row(1) * static_cast<double>((n >> 3) & 7) +
+                    block_.row(2) * static_cast<double>(n & 7);
+      uvw[n] = walk.to(x);
+    }
+    return walk.tests();
+  }
+
+ private:
+  ShellBlock(const ShellBlock& parent, int bits)
+      : map_(parent.map_), block_(parent.block_.octant(bits)) {
+    const Box3d box = around(block_);
+    for (const Cell& cell : parent.cells_)
+      if (map_.lattice_.worldBox(cell).intersects(box)) cells_.push_back(cell);
+  }
+
+  /// What one tetrahedron makes of the block: its straight map of the block's hull, as far as its
+  /// own box of texture space reaches.
+  [[nodiscard]] Box3d imageIn(const Tetrahedron& t, const Box3d& own) const {
+    const Lattice::Corners world = map_.lattice_.corners(t),
+                           texture = map_.lattice_.textureCorners(t);
+    const M33d slope = slopes(world, texture);
+    const V3d way = block_.center() - world[0];
+    Box3d image;
+    for (int k = 0; k < 3; ++k) {
+      const V3d gradient(slope[k][0], slope[k][1], slope[k][2]);
+      const double middle = texture[0][k] + gradient.dot(way);
+      double extent = 0;
+      for (int i = 0; i < 3; ++i)
+        extent += std::abs(gradient.dot(block_.row(i))) * 0.5 * (block_.edge - 1);
+      if (!std::isfinite(middle) || !std::isfinite(extent)) return own;
+      const double slack = 1e-9 * (std::abs(middle) + extent);
+      image.min[k] = std::max(own.min[k], middle - extent - slack);
+      image.max[k] = std::min(own.max[k], middle + extent + slack);
+      if (image.min[k] > image.max[k]) return {};
+    }
+    return image;
+  }
+
+  /// Goes from point to point through faces; searches the block's cells where that fails.
+  class Walk {
+   public:
+    explicit Walk(const ShellBlock& block)
+        : map_(block.map_), lattice_(block.map_.lattice_), block_(block) {}
+
+    /// The next point lies beside the first of the row before.
+    void returnToRow() {
+      current_ = first_;
+      isAt_ = hasFirst_;
+      isRowStart_ = true;
+    }
+
+    V3d to(const V3d& x) {
+      std::array<double, 4> shares;
+      const bool found = (isAt_ && walk(x, shares)) || search(x, shares);
+      if (found) isAt_ = true;
+      if (isRowStart_ && found) first_ = current_, hasFirst_ = true, isRowStart_ = false;
+      return found ? mix(lattice_.textureCorners(current_), shares) : V3d(kNaN);
+    }
+
+    [[nodiscard]] std::size_t tests() const { return tests_; }
+
+   private:
+    bool walk(const V3d& x, std::array<double, 4>& shares) {
+      constexpr int kMostSteps = 24;
+      Tetrahedron t = current_;
+      for (int step = 0; step < kMostSteps; ++step) {
+        shares = test(t, x);
+        if (isInside(shares)) {
+          current_ = t;
+          return true;
+        }
+        const auto least = std::min_element(shares.begin(), shares.end());
+        if (!std::isfinite(*least)) return false;
+        if (!lattice_.cross(t, static_cast<int>(least - shares.begin()))) return false;
+      }
+      return false;
+    }
+
+    bool search(const V3d& x, std::array<double, 4>& shares) {
+      for (const Cell& cell : block_.cells_) {
+        if (!lattice_.worldBox(cell).intersects(map_.aroundPoint(x))) continue;
+        for (int order = 0; order < 6; ++order) {
+          shares = test({cell, order}, x);
+          if (!isInside(shares)) continue;
+          current_ = {cell, order};
+          return true;
+        }
+      }
+      return false;
+    }
+
+    std::array<double, 4> test(const Tetrahedron& t, const V3d& x) {
+      ++tests_;
+      return barycentric(lattice_.corners(t), x);
+    }
+
+    const ShellMap& map_;
+    const Lattice& lattice_;
+    const ShellBlock& block_;
+    Tetrahedron current_, first_;
+    bool isAt_ = false, hasFirst_ = false, isRowStart_ = true;
+    std::size_t tests_ = 0;
+  };
+
+  const ShellMap& map_;
+  GridBlock block_;
+  std::vector<Cell> cells_;
+};
+
+ShellMap::ShellMap(const Patch& patch, const LatticeBorder& border)
+    : lattice_(patch, border), sink_(border.sink), tree_(lattice_) {}
+
+double ShellMap::estimateBytes(const Patch& patch) {
+  double columns = 0, rows = 0;
+  for (const ParticleLevel& level : patch.levels) {
+    columns = std::max(columns, static_cast<double>(level.columns));
+    rows = std::max(rows, static_cast<double>(level.rows));
+  }
+  // Nodes, boxes, samples and what is told from these, for each cell.
+  constexpr double kBytesPerCell = 1200;
+  return kBytesPerCell * (columns + 1) * (rows + 1) *
+         (static_cast<double>(patch.levels.size()) + 3);
+}
+
+Box3d ShellMap::aroundPoint(const V3d& x) const {
+  const V3d slack(-kOnFace * tree_.size());
+  return {x - slack, x + slack};
+}
+
+bool ShellMap::find(const V3d& x, Tetrahedron& t) const {
+  return tree_.visit(aroundPoint(x), [&](const Cell& cell) {
+    for (int order = 0; order < 6; ++order) {
+      t = {cell, order};
+      if (isInside(barycentric(lattice_.corners(t), x))) return true;
+    }
+    return false;
+  });
+}
+
+V3d ShellMap::operator()(const V3d& x) const {
+  Tetrahedron t;
+  if (!find(x, t)) return V3d(kNaN);
+  return mix(lattice_.textureCorners(t), barycentric(lattice_.corners(t), x));
+}
+
+M33d ShellMap::jacobian(const V3d& x) const {
+  Tetrahedron t;
+  if (!find(x, t)) return {kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, kNaN};
+  return slopes(lattice_.corners(t), lattice_.textureCorners(t));
+}
+
+std::unique_ptr<BlockMap> ShellMap::restrictTo(const GridBlock& block, double) const {
+  return std::make_unique<ShellBlock>(*this, block);
+}
+
+std::vector<MapSample> ShellMap::samples() const {
+  std::vector<MapSample> result;
+  result.reserve(6 * lattice_.cellCount());
+  const Cell cells = lattice_.cells();
+  constexpr std::array<double, 4> kMiddle = {0.25, 0.25, 0.25, 0.25};
+  for (int k = 0; k < cells[2]; ++k)
+    for (int j = 0; j < cells[1]; ++j)
+      for (int i = 0; i < cells[0]; ++i)
+        for (int order = 0; order < 6; ++order) {
+          const Tetrahedron t{{i, j, k}, order};
+          const Lattice::Corners world = lattice_.corners(t), texture = lattice_.textureCorners(t);
+          const V3d uvw = mix(texture, kMiddle);
+          if (std::min(uvw.x, uvw.y) < 0 || std::max(uvw.x, uvw.y) > 1) continue;
+          if (uvw.z < -std::max(0.0, sink_) || uvw.z > 1 + std::max(0.0, -sink_)) continue;
+          result.push_back({mix(world, kMiddle), uvw, slopes(world, texture)});
+        }
+  return result;
+}
+
+V3d ShellMap::toPatch(const V3d& uvw) const {
+  Tetrahedron t;
+  if (!lattice_.locate(uvw, t)) return V3d(kNaN);
+  return mix(lattice_.corners(t), barycentric(lattice_.textureCorners(t), uvw));
+}
+
+}  // namespace mapping

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+#include "mapping/maps/cell_tree.h"
+#include "mapping/maps/lattice.h"
+#include "mapping/maps/patch_map.h"
+#include "mapping/patches/patch.h"
+
+namespace mapping {
+
+/// The map that is straight in each tetrahedron of a patch's lattice, the hybrid of particle levels
+/// and shell maps [Brodersen07 §9; Porumbescu05]. Continuous, defined in the lattice only, and
+/// where no tetrahedron is turned over it goes both ways.
+class ShellMap final : public PatchMap {
+ public:
+  ShellMap(const Patch& patch, const LatticeBorder& border);
+
+  [[nodiscard]] Imath::V3d operator()(const Imath::V3d& x) const override;
+  [[nodiscard]] Imath::M33d jacobian(const Imath::V3d& x) const override;
+  [[nodiscard]] std::unique_ptr<BlockMap> restrictTo(const GridBlock& block,
+                                                     double tolerance) const override;
+  /// Of every tetrahedron where the texture lies: the unit cube of the patch, and as far below or
+  /// above it as it is sunk or lifted.
+  [[nodiscard]] std::vector<MapSample> samples() const;
+  [[nodiscard]] bool isLocal() const override { return true; }
+  /// What making it and looking at all of its tetrahedra takes.
+  [[nodiscard]] static double estimateBytes(const Patch& patch);
+  /// From texture coordinates to patch space; NaN outside the lattice.
+  [[nodiscard]] Imath::V3d toPatch(const Imath::V3d& uvw) const;
+  [[nodiscard]] const Lattice& lattice() const { return lattice_; }
+
+ private:
+  friend class ShellBlock;
+  /// A point with what rounding may leave between it and the cell that holds it.
+  [[nodiscard]] Imath::Box3d aroundPoint(const Imath::V3d& x) const;
+  /// @return false where no tetrahedron holds x
+  [[nodiscard]] bool find(const Imath::V3d& x, Tetrahedron& t) const;
+
+  Lattice lattice_;
+  double sink_;  ///< in w
+  CellTree tree_;
+};
+
+}  // namespace mapping

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "levelset/narrow_band.h"
+#include "mapping/patches/patch.h"
+
+/// Levels of particles that are made from those on the surface, see also particle_levels.h.
+namespace mapping {
+
+/// Scheme A: each particle follows ∇φ for as long as the height is high, and the levels between lie
+/// on its straight way [Brodersen07 §8.2]. The particles spread over what is convex and crowd where
+/// it is concave; towards the medial axis they slow down.
+/// @param space    distances throughout patch space
+/// @param surface  the level w = 0
+/// @return         `count` levels, the surface first
+[[nodiscard]] std::vector<ParticleLevel> conformingLevels(const levelset::NarrowBand& space,
+                                                          const ParticleLevel& surface,
+                                                          double height, std::size_t count);
+
+/// A curve through points, smooth and with tangents (Catmull-Rom by chord lengths), as a polyline
+/// that is dense enough to measure lengths on.
+class SweepCurve {
+ public:
+  /// @param points  two or more, no two that follow each other in one place
+  explicit SweepCurve(std::span<const Imath::V3d> points);
+  [[nodiscard]] double length() const { return lengths_.back(); }
+  [[nodiscard]] Imath::V3d position(double length) const;
+  /// Unit.
+  [[nodiscard]] Imath::V3d tangent(double length) const;
+
+ private:
+  [[nodiscard]] std::size_t segment(double length) const;
+  std::vector<Imath::V3d> positions_;
+  std::vector<double> lengths_;
+};
+
+struct SplineSweep {
+  std::vector<ParticleLevel> levels;
+  std::size_t slowed = 0;  ///< particles that would have gone backwards through their neighbours
+};
+
+/// Scheme C: the surface's particles travel along a curve and turn with it by the least rotation;
+/// w is the way travelled [Brodersen07 §8.2]. In a bend that is narrower than the patch those
+/// inside would go backwards; they are slowed to a crawl instead.
+/// @param height  how far along the curve, no more than its length
+/// @param isFaded let what stands above or below the plane across the curve go to nothing at the
+///                end
+[[nodiscard]] SplineSweep splineLevels(const ParticleLevel& surface, const SweepCurve& curve,
+                                       double height, std::size_t count, bool isFaded);
+
+/// Turns, scales and bends the levels about an axis, more with growing w.
+/// @param origin, axis  of the patch: its centre and unit normal; @param side  unit, the direction
+///        that a bend leans to
+void transformLevels(std::vector<ParticleLevel>& levels, const LevelTransform& transform,
+                     const Imath::V3d& origin, const Imath::V3d& axis, const Imath::V3d& side,
+                     double height);
+
+}  // namespace mapping

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <array>
+#include <vector>
+
+#include "levelset/narrow_band.h"
+#include "mapping/patches/patch.h"
+#include "mapping/patches/relaxation.h"
+
+/// Particles of a patch, level by level [Brodersen07 §8.2].
+namespace mapping {
+
+/// Sides of a patch on one level: 0 → 1, 1 → 2, 3 → 2 and 0 → 3, so that opposite sides run alike.
+using PatchSides = std::array<std::vector<Imath::V3d>, 4>;
+
+/// Geodesics between the corners on φ = height.
+/// @throws InvalidInput when two corners are not joined by the surface
+[[nodiscard]] PatchSides makeSides(const levelset::NarrowBand& band, double height,
+                                   const std::array<Imath::V3d, 4>& corners);
+
+/// Mean length of the sides along u, and along v.
+[[nodiscard]] double sideLengthU(const PatchSides& sides);
+[[nodiscard]] double sideLengthV(const PatchSides& sides);
+
+/// A grid of particles swept between the sides onto φ = level.height and relaxed, and the rim
+/// around it.
+/// @param level  with its counts, w and height; its positions are made
+/// @param guide  distances, perhaps coarser, that reach where the blend of the sides may lie
+/// @throws InvalidInput where the surface cannot be followed
+Relaxation fillLevel(const levelset::NarrowBand& band, const levelset::NarrowBand& guide,
+                     const PatchSides& sides, ParticleLevel& level);
+
+/// Carries corners along ∇φ from one height to another, in steps of at most half a voxel (RK2).
+/// @throws InvalidInput where a corner meets the medial axis of the base before that height
+void advectCorners(const levelset::NarrowBand& band, double from, double to,
+                   std::array<Imath::V3d, 4>& corners);
+
+}  // namespace mapping

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "levelset/narrow_band.h"
+#include "levelset/progress.h"
+
+/// Patches on a surface: a quadrilateral whose sides are geodesics, and the particles above it that
+/// carry texture coordinates [Brodersen07 §8.2].
+namespace mapping {
+
+/// One level of particles: an iso-surface φ = height of the base, sampled on a grid of u and v.
+struct ParticleLevel {
+  std::size_t columns = 0, rows = 0;  ///< along u, along v; each at least 2
+  double w = 0;                       ///< texture coordinate of the level
+  double height = 0;                  ///< distance from the base surface, world units
+  std::vector<Imath::V3d> positions;  ///< rows × columns, row major: index = row * columns + column
+  /// One more particle at each end of the rows and columns, which go on straight on the surface,
+  /// see beyond(); empty: there are none.
+  std::vector<Imath::V3d> rim = {};
+
+  [[nodiscard]] const Imath::V3d& at(std::size_t column, std::size_t row) const {
+    return positions[row * columns + column];
+  }
+  /// Index in `rim`, of 2 (columns + rows) + 4: the row before the first, the one after the last,
+  /// the column before the first, the one after the last.
+  /// @pre column is −1 or columns, or row is −1 or rows
+  [[nodiscard]] std::size_t rimIndex(int column, int row) const {
+    const auto c = static_cast<std::size_t>(column + 1), r = static_cast<std::size_t>(row);
+    if (row == -1) return c;
+    if (r == rows) return columns + 2 + c;
+    return 2 * (columns + 2) + (column == -1 ? r : rows + r);
+  }
+  /// @pre hasRim(); column from −1 to columns, row from −1 to rows
+  [[nodiscard]] const Imath::V3d& beyond(int column, int row) const {
+    const bool isInside = column >= 0 && static_cast<std::size_t>(column) < columns && row >= 0 &&
+                          static_cast<std::size_t>(row) < rows;
+    return isInside ? at(static_cast<std::size_t>(column), static_cast<std::size_t>(row))
+                    : rim[rimIndex(column, row)];
+  }
+  [[nodiscard]] bool hasRim() const { return !rim.empty(); }
+};
+
+struct Patch {
+  std::array<Imath::V3d, 4> corners;  ///< on the base surface, anticlockwise seen from outside
+  double height = 0;                  ///< world units
+  bool mirrored = false;
+  std::vector<ParticleLevel> levels;  ///< from the surface (w = 0) outwards (w = 1)
+  double spacing = 0;                 ///< mean distance of neighbouring particles, world units
+  [[nodiscard]] std::size_t particleCount() const;
+};
+
+/// How the sides and rows of a patch turned out.
+struct PatchReport {
+  double uLength = 0, vLength = 0;  ///< mean length of the rows and columns at w = 0
+  double cellAreaVariation = 0;     ///< standard deviation / mean of the cells' areas at w = 0
+  std::size_t relaxIterations = 0;  ///< of all levels together
+  bool isRelaxed = true;            ///< the last step moved no particle by more than 1e-3 voxel
+  double projectionDistance = 0;    ///< the farthest corner's way to the surface
+  std::size_t slowed = 0;  ///< particles of a spline that would have crossed their neighbours
+};
+
+enum class LevelScheme {
+  Reduced,     ///< scheme B: one relaxed patch per offset level, from its own advected corners
+  Conforming,  ///< scheme A: every particle follows ∇φ, the levels between on its straight way
+  Spline       ///< scheme C: the surface's particles travel along a curve and turn with it
+};
+
+/// What grows with w, about the axis of the patch.
+struct LevelTransform {
+  double twist = 0;  ///< radians, anticlockwise seen from outside, at w = 1
+  double taper = 1;  ///< scale across the axis at w = 1, positive
+  double bend = 0;   ///< radians that the axis leans towards u at w = 1
+  [[nodiscard]] bool isIdentity() const { return twist == 0 && taper == 1 && bend == 0; }
+};
+
+struct PatchOptions {
+  std::size_t levels = 6;  ///< at least 2
+  LevelScheme scheme = LevelScheme::Reduced;
+  /// Spline only: points that the curve passes after the patch's centre; none: straight along the
+  /// normal there. The height is measured along the curve.
+  std::vector<Imath::V3d> spline = {};
+  bool fade = false;  ///< Spline only: the surface's own relief goes to nothing on the way
+  LevelTransform transform = {};
+  double spacing = 0;   ///< of particles, world units; 0: chosen from patch and voxel size
+  bool mirror = false;  ///< accept corners that run clockwise seen from outside
+  std::size_t maxMemory = levelset::kNoMemoryLimit;
+  levelset::Progress progress = {};
+};
+
+struct PatchResult {
+  Patch patch;
+  PatchReport report;
+};
+
+/// @param corners  u runs from corner 0 to 1, v from corner 0 to 3; projected along φ to the zero
+/// set
+/// @param height   of the patch space above the surface, world units, positive
+/// @throws UsageError for corners that run clockwise seen from outside (the message has the right
+///         order) or a height that is not positive; InvalidInput when a corner is further from the
+///         surface than its bounding diagonal, corners coincide, or no geodesic joins them
+[[nodiscard]] PatchResult makePatch(const levelset::NarrowBand& base,
+                                    const std::array<Imath::V3d, 4>& corners, double height,
+                                    const PatchOptions& options = {});
+
+/// A patch of size a × b (world units along the surface) about a point, u turned by `rotation`
+/// radians about the normal from the direction that projects best onto +x (or +y where +x is
+/// normal).
+[[nodiscard]] std::array<Imath::V3d, 4> cornersAround(const levelset::NarrowBand& base,
+                                                      const Imath::V3d& point, double a, double b,
+                                                      double rotation = 0);
+
+}  // namespace mapping

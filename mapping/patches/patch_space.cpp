@@ -1,0 +1,61 @@
+#include "mapping/patches/patch_space.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/eikonal/redistance.h"
+#include "levelset/sample.h"
+#include "levelset/solids/resample.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+
+constexpr double kMarginVoxels = 6;   // of distances beyond the highest level, for the filters
+constexpr double kCoarseVoxels = 20;  // that a height is worth; with fewer, levels would be inexact
+constexpr double kCoarsest = 4;       // times the base's voxel
+constexpr double kThinnest = 12;      // coarse voxels through the base's box
+constexpr double kFaithful = 0.25;    // coarse voxels by which a coarse surface may be off
+
+bool isFaithful(const NarrowBand& coarse, std::span<const V3d> border) {
+  const levelset::BandSampler sampler(coarse, levelset::Interpolation::Tricubic);
+  return std::all_of(border.begin(), border.end(), [&](const V3d& p) {
+    return std::abs(sampler.value(p)) <= kFaithful * coarse.voxelSize();
+  });
+}
+
+/// The base on a coarser grid; the base itself when that would lose its surface.
+NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> border, double height,
+                   const PatchSpaceOptions& options) {
+  const V3d extent = base.zeroSetBounds().size();
+  const double thickness = std::min({extent.x, extent.y, extent.z}) / base.voxelSize();
+  double factor = std::floor(
+      std::min({kCoarsest, height / (kCoarseVoxels * base.voxelSize()), thickness / kThinnest}));
+  for (; factor >= 2; --factor) {
+    const NarrowBand coarse =
+        levelset::resample(base, factor * base.voxelSize(), {.maxMemory = options.maxMemory});
+    if (isFaithful(coarse, border)) return coarse;
+  }
+  return base;
+}
+
+}  // namespace
+
+NarrowBand sweepPatchSpace(const NarrowBand& base, std::span<const V3d> border, double bulge,
+                           double height, const PatchSpaceOptions& options) {
+  if (base.halfWidth() * base.voxelSize() >= height + kMarginVoxels * base.voxelSize()) return base;
+  const NarrowBand coarse = coarsen(base, border, height, options);
+  const double reach = height + kMarginVoxels * coarse.voxelSize();
+  Imath::Box3d box;
+  for (const V3d& p : border) box.extendBy(p);
+  box.min -= V3d(reach + bulge);
+  box.max += V3d(reach + bulge);
+  return levelset::redistance(coarse, {.halfWidth = reach / coarse.voxelSize(),
+                                       .region = box,
+                                       .maxMemory = options.maxMemory,
+                                       .progress = options.progress});
+}
+
+}  // namespace mapping

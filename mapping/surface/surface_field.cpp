@@ -1,0 +1,49 @@
+#include "mapping/surface/surface_field.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+
+constexpr int kMaxSteps = 40;
+constexpr int kUndampedSteps = 12;
+constexpr double kTolerance = 1e-5;  // voxels: near what float distances resolve
+constexpr double kAccepted = 1e-2;   // voxels: where a crease lets the steps swing to and fro
+
+}  // namespace
+
+SurfaceField::SurfaceField(const levelset::NarrowBand& band)
+    : sampler_(band, levelset::Interpolation::Tricubic),
+      voxelSize_(band.voxelSize()),
+      background_(band.halfWidth() * band.voxelSize()) {}
+
+V3d SurfaceField::normal(const V3d& p) const {
+  const V3d gradient = sampler_.gradient(p);
+  const double length = gradient.length();
+  return length > 1e-6 ? gradient / length : V3d(0);
+}
+
+bool SurfaceField::project(V3d& p, double height) const {
+  double last = 0;
+  for (int step = 0; step < kMaxSteps; ++step) {
+    const double phi = sampler_.value(p);
+    const double gap = phi - height;
+    if (std::abs(gap) <= kTolerance * voxelSize_) return true;
+    // Beyond the band there is nothing to follow.
+    if (std::abs(phi) >= background_ * (1 - 1e-6)) return false;
+    const V3d gradient = sampler_.gradient(p);
+    const double squared = gradient.length2();
+    if (squared < 1e-8) return false;
+    // A weak gradient is a ridge of φ nearby: a full Newton step would throw p far across it.
+    V3d move = gradient * (-gap / std::max(squared, 0.25));
+    if (step >= kUndampedSteps) move *= 0.5;
+    p += move;
+    last = std::abs(gap);
+  }
+  return last <= kAccepted * voxelSize_;
+}
+
+}  // namespace mapping

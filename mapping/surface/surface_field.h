@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include "levelset/narrow_band.h"
+#include "levelset/sample.h"
+
+namespace mapping {
+
+/// The levels φ = height of a base as surfaces to walk on. Cheap to make, one per thread.
+class SurfaceField {
+ public:
+  explicit SurfaceField(const levelset::NarrowBand& band);
+
+  [[nodiscard]] double voxelSize() const { return voxelSize_; }
+  [[nodiscard]] double value(const Imath::V3d& p) const { return sampler_.value(p); }
+  [[nodiscard]] Imath::V3d gradient(const Imath::V3d& p) const { return sampler_.gradient(p); }
+  /// ∇φ / |∇φ|; zero outside the band.
+  [[nodiscard]] Imath::V3d normal(const Imath::V3d& p) const;
+  /// Moves p along ∇φ until φ = height, to a hundred-thousandth of a voxel: p ← p − (φ − height)
+  /// ∇φ. False, with p where it stuck, when the way leaves the band or meets a ridge of φ.
+  [[nodiscard]] bool project(Imath::V3d& p, double height) const;
+
+ private:
+  levelset::BandSampler sampler_;
+  double voxelSize_, background_;
+};
+
+}  // namespace mapping

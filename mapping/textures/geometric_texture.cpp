@@ -1,0 +1,252 @@
+#include "mapping/textures/geometric_texture.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+
+#include "levelset/eikonal/redistance.h"
+#include "levelset/error.h"
+#include "levelset/sample.h"
+#include "levelset/solids/blend.h"
+#include "levelset/solids/clip.h"
+#include "levelset/solids/csg.h"
+#include "mapping/maps/shell_map.h"
+#include "mapping/textures/texture_warp.h"
+
+namespace mapping {
+namespace {
+
+using Imath::Box3d;
+using Imath::V3d;
+using levelset::InvalidInput;
+using levelset::NarrowBand;
+using levelset::UsageError;
+
+constexpr const char* kTexture = "texture";
+// The stretch is sampled, and known to about this: a flat patch keeps the base's own grid.
+constexpr double kStretchError = 0.01;
+// Voxels of the result that the texture's band has to reach on each side, so that the high-order
+// interpolant beside the zero set reads nothing but distances.
+constexpr double kBandNeeded = 3;
+
+void checkArguments(const NarrowBand& base, const NarrowBand& texture, const Patch& patch,
+                    const TextureOptions& options) {
+  const auto requirePositive = [](double value, const char* name) {
+    if (!(value > 0) || !std::isfinite(value)) {
+      throw UsageError(
+          fmt::format("{}: the {} is {}; give a positive number", kTexture, name, value));
+    }
+  };
+  if (options.voxelSize) requirePositive(*options.voxelSize, "voxel size");
+  if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth)) {
+    throw UsageError(fmt::format("{}: the half width is {}; give at least 1 voxel", kTexture,
+                                 options.halfWidth));
+  }
+  if (!(options.mapTolerance >= 0) || !std::isfinite(options.mapTolerance)) {
+    throw UsageError(fmt::format("{}: the map's tolerance is {}; give texture voxels, at least 0",
+                                 kTexture, options.mapTolerance));
+  }
+  if (options.sink && !std::isfinite(*options.sink)) {
+    throw UsageError(fmt::format("{}: the sink is {}; give a length", kTexture, *options.sink));
+  }
+  if (!(options.blend >= 0) || !std::isfinite(options.blend)) {
+    throw UsageError(fmt::format("{}: the blend radius is {}; give a length of at least 0",
+                                 kTexture, options.blend));
+  }
+  if (base.isEmpty() || texture.isEmpty()) {
+    throw InvalidInput(
+        fmt::format("{}: the {} has no surface; give a solid with at least one voxel", kTexture,
+                    base.isEmpty() ? "base" : "texture"));
+  }
+  if (patch.levels.size() < 2 || !(patch.height > 0)) {
+    throw InvalidInput(
+        fmt::format("{}: the patch has no levels of particles; make it with `patch`", kTexture));
+  }
+}
+
+double chooseVoxelSize(const NarrowBand& base, const NarrowBand& texture, double minStretch,
+                       const TextureOptions& options) {
+  if (options.voxelSize) return *options.voxelSize;
+  return resultVoxelSize(base.voxelSize(), texture.voxelSize(), minStretch);
+}
+
+/// The base's own grid where the voxels agree, so that merging needs no resampling.
+Imath::M44d chooseGrid(const NarrowBand& base, double voxelSize, TextureMerge merge) {
+  const bool agrees = std::abs(voxelSize - base.voxelSize()) <= 1e-9 * voxelSize;
+  if (agrees && merge != TextureMerge::Alone) return base.indexToWorld();
+  Imath::M44d result;
+  for (int axis = 0; axis < 3; ++axis) result[axis][axis] = voxelSize;
+  return result;
+}
+
+/// Blocks of the result by the texture's own count, before anything is allocated.
+void requireResult(const NarrowBand& texture, double voxelSize, double meanStretch,
+                   const TextureOptions& options) {
+  const double finer = texture.voxelSize() * meanStretch / voxelSize;
+  const double width =
+      std::max(1.0, options.halfWidth / std::max(1.0, texture.halfWidth() * finer));
+  const double voxels =
+      static_cast<double>(texture.activeVoxelCount()) * std::max(1e-3, finer * finer) * width;
+  constexpr double kBytesPerVoxel = 40;  // active share of a block, and three fields of them
+  levelset::requireMemory(voxels * kBytesPerVoxel, options.maxMemory, kTexture);
+}
+
+/// A texture whose band, once it is warped, still reaches some voxels of the result.
+NarrowBand widen(const NarrowBand& texture, double voxelSize, double minStretch,
+                 const TextureOptions& options) {
+  const double needed = kBandNeeded * voxelSize / (minStretch * texture.voxelSize());
+  if (needed <= texture.halfWidth() * (1 + 1e-6)) return texture;
+  return levelset::redistance(texture,
+                              {.halfWidth = std::ceil(needed), .maxMemory = options.maxMemory});
+}
+
+/// A map of the chosen kind, and what is known of it.
+struct ChosenMap {
+  std::unique_ptr<PatchMap> map;
+  std::vector<MapSample> samples;
+  std::size_t particles = 0;
+  V3d residual{0};  ///< at the particles, in u, v and w
+};
+
+ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink,
+                  const TextureOptions& options) {
+  ChosenMap result;
+  if (options.map == TextureMap::Shell) {
+    levelset::requireMemory(ShellMap::estimateBytes(patch), options.maxMemory, kTexture);
+    levelset::report(options.progress, 0, kTexture);
+    // Where the texture ends, its band goes on.
+    const double rim =
+        (kBandNeeded + 1) * std::max(base.voxelSize(), options.voxelSize.value_or(0));
+    auto shell = std::make_unique<ShellMap>(patch, LatticeBorder{.sink = sink, .rim = rim});
+    result.samples = shell->samples();
+    result.particles = shell->lattice().nodeCount();
+    result.map = std::move(shell);
+    return result;
+  }
+  RbfMapOptions rbf = options.rbf;
+  rbf.maxMemory = std::min(rbf.maxMemory, options.maxMemory);
+  rbf.progress = levelset::subProgress(options.progress, 0, 0.2);
+  auto smooth = std::make_unique<RbfMap>(patchToTexture(patch, rbf));
+  result.samples = sampleMap(*smooth, patch, sink);
+  result.particles = smooth->size();
+  result.residual = smooth->axisResidual();
+  result.map = std::move(smooth);
+  return result;
+}
+
+NarrowBand merge(const NarrowBand& base, NarrowBand warped, const TextureOptions& options,
+                 TextureReport& report) {
+  if (options.merge == TextureMerge::Alone) return warped;
+  const auto operation = options.merge == TextureMerge::Union ? levelset::CsgOperation::Union
+                                                              : levelset::CsgOperation::Difference;
+  const levelset::Progress progress = levelset::subProgress(options.progress, 0.8, 1);
+  levelset::CsgResult result;
+  if (options.blend > 0) {
+    result = levelset::blend(operation, base, warped, options.blend,
+                             {.maxMemory = options.maxMemory, .progress = progress});
+  } else {
+    const std::array<NarrowBand, 2> solids = {base, warped};
+    result = levelset::combine(operation, solids,
+                               {.maxMemory = options.maxMemory, .progress = progress});
+  }
+  for (std::string& note : result.notes) report.notes.push_back(std::move(note));
+  return result.band;
+}
+
+}  // namespace
+
+double resultVoxelSize(double base, double texture, double minStretch) {
+  const double fine = texture * minStretch;
+  return fine < (1 - kStretchError) * base ? fine : base;
+}
+
+void requirePatchOn(const NarrowBand& base, const Patch& patch) {
+  const levelset::BandSampler sampler(base);
+  for (const V3d& p : patch.levels.front().positions) {
+    const double distance = std::abs(sampler.value(p)) / base.voxelSize();
+    if (distance > 1) {
+      throw InvalidInput(
+          fmt::format("{}: the patch does not lie on the base, at ({:.6g}, {:.6g}, {:.6g}) they "
+                      "are {:.3g} voxels or "
+                      "more apart; make the patch on this base",
+                      kTexture, p.x, p.y, p.z, distance));
+    }
+  }
+}
+
+RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options) {
+  std::vector<V3d> points, targets;
+  std::vector<char> near;
+  for (const ParticleLevel& level : patch.levels) {
+    const int rim = level.hasRim() ? 1 : 0;
+    const auto columns = static_cast<int>(level.columns), rows = static_cast<int>(level.rows);
+    for (int j = -rim; j < rows + rim; ++j)
+      for (int i = -rim; i < columns + rim; ++i) {
+        points.push_back(level.beyond(i, j));
+        targets.emplace_back(static_cast<double>(i) / (columns - 1),
+                             static_cast<double>(j) / (rows - 1), level.w);
+        near.push_back(level.w == 0);
+      }
+  }
+  return {points, targets, near, options};
+}
+
+TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture, const Patch& patch,
+                         const TextureOptions& options) {
+  checkArguments(base, texture, patch, options);
+  requirePatchOn(base, patch);
+  TextureResult result;
+  TextureReport& report = result.report;
+  const Box3d box = chooseTextureBox(texture.zeroSetBounds(), options.textureBox);
+
+  // === The map, and what it does to lengths
+  const double sink = options.sink ? *options.sink : base.voxelSize();
+  ChosenMap chosen = makeMap(base, patch, sink / patch.height, options);
+  const Distortion distortion = surveyDistortion(chosen.samples, box.size(), patch.mirrored);
+  chosen.samples = {};
+  report.notes = judgeFolds(distortion, options.allowFolds);
+  report.particles = chosen.particles;
+  report.distortion = distortion;
+  report.mapResidual = (chosen.residual * box.size()).length();
+  // Most of the map is not stretched less than this; a fold here or there sets no voxel size.
+  const double minStretch =
+      distortion.folded > 0 ? distortion.stretch.percent1 : distortion.stretch.least;
+  report.voxelSize = chooseVoxelSize(base, texture, minStretch, options);
+
+  // === Warp, and make a distance of it again [Brodersen07, ERR-23 in our notes]
+  requireResult(texture, report.voxelSize, distortion.meanStretch, options);
+  const TexturePlacement placement{box, sink / patch.height};
+  // The shell ends somewhere around the unit cube, so what is outside of a box that was asked for
+  // is cut off there, not at the end of the shell.
+  const bool isCut = options.map == TextureMap::Shell && options.textureBox;
+  const NarrowBand whole = isCut ? levelset::clip(texture, box) : texture;
+  Warp warp = warpTexture(widen(whole, report.voxelSize, minStretch, options), placement, patch,
+                          *chosen.map,
+                          {.indexToWorld = chooseGrid(base, report.voxelSize, options.merge),
+                           .scale = distortion.meanStretch,
+                           .mapTolerance = options.mapTolerance,
+                           .maxMemory = options.maxMemory,
+                           .progress = levelset::subProgress(options.progress, 0.2, 0.7)});
+  report.blocksTested = warp.blocksTested;
+  report.blocksEvaluated = warp.blocksEvaluated;
+  report.operationsPerPoint =
+      static_cast<double>(warp.operations) / (512 * static_cast<double>(warp.blocksEvaluated));
+  if (warp.ghosts > 0) {
+    report.notes.push_back(
+        fmt::format("{} grid points far from the patch, which the map sends back into the texture, "
+                    "were left out",
+                    warp.ghosts));
+  }
+  NarrowBand warped = levelset::redistance(
+      std::move(warp.field), {.halfWidth = options.halfWidth,
+                              .maxMemory = options.maxMemory,
+                              .progress = levelset::subProgress(options.progress, 0.7, 0.8)});
+  result.band = merge(base, std::move(warped), options, report);
+  levelset::report(options.progress, 1, kTexture);
+  return result;
+}
+
+}  // namespace mapping

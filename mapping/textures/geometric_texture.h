@@ -1,0 +1,86 @@
+#pragma once
+
+#include <Imath/ImathBox.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "levelset/narrow_band.h"
+#include "levelset/progress.h"
+#include "mapping/maps/distortion.h"
+#include "mapping/maps/rbf_map.h"
+#include "mapping/patches/patch.h"
+
+/// Any solid laid onto a patch of any surface as a level set [Brodersen07 §8.3, §8.5].
+namespace mapping {
+
+enum class TextureMerge {
+  Union,  ///< stands on the surface
+  Carve,  ///< is cut out of it
+  Alone   ///< only the warped texture
+};
+
+enum class TextureMap {
+  Rbf,   ///< smooth, defined everywhere, relaxed by λ
+  Shell  ///< straight in tetrahedra between the particles, which have to be dense
+};
+
+struct TextureOptions {
+  TextureMerge merge = TextureMerge::Union;
+  TextureMap map = TextureMap::Rbf;
+  std::optional<double> sink =
+      {};            ///< how deep the texture dips below the surface, world units; empty: one voxel
+  double blend = 0;  ///< radius along the seam, world units; 0: none
+  std::optional<Imath::Box3d> textureBox =
+      {};  ///< what the unit cube of u, v, w is; empty: the texture's zero-set box. What is outside
+           ///< goes on beyond the patch, but not in a shell: there it is cut off
+  std::optional<double> voxelSize =
+      {};                ///< empty: the finest of base and texture × smallest stretch
+  double halfWidth = 3;  ///< voxels
+  RbfMapOptions rbf = {};
+  double mapTolerance = 0.05;  ///< of the map's fast evaluation, texture voxels
+  bool allowFolds = false;
+  std::size_t maxMemory = levelset::kNoMemoryLimit;
+  levelset::Progress progress = {};
+};
+
+struct TextureReport {
+  double voxelSize = 0;
+  std::size_t particles = 0, blocksTested = 0, blocksEvaluated = 0;
+  /// Particles added up or tetrahedra tried, for each grid point of the blocks evaluated.
+  double operationsPerPoint = 0;
+  Distortion distortion = {};
+  double mapResidual = 0;  ///< largest |Φ(p) − uvw| × texture size, world units
+  std::vector<std::string> notes;
+};
+
+struct TextureResult {
+  levelset::NarrowBand band;
+  TextureReport report;
+};
+
+/// Voxel size of a result for which none is asked: the texture's where the map squeezes it below
+/// the base's, else the base's own. @param minStretch  of texture → patch
+[[nodiscard]] double resultVoxelSize(double base, double texture, double minStretch);
+
+/// The map of a patch: through its particles, those of its rims too, to their texture coordinates,
+/// λ near for w = 0. Without the rims the map errs most beside the patch's sides.
+[[nodiscard]] RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options = {});
+
+/// @throws InvalidInput, telling where, when the patch's surface is not the base's
+void requirePatchOn(const levelset::NarrowBand& base, const Patch& patch);
+
+/// Warps `texture` into the patch, re-distances it [Brodersen07 §8.3], and merges it with `base`.
+/// Where the texture, squeezed by the map, has voxels no finer than the base's, the result has the
+/// base's own grid.
+/// @param base     the solid that the patch was made on
+/// @param texture  any solid; x, y, z of its box become u, v, w
+/// @throws UsageError for lengths that are negative or not finite; InvalidInput when the map folds
+/// (with the place), the patch does not lie on `base`, or the
+///         texture box is empty; ResourceLimit before allocating too much
+[[nodiscard]] TextureResult mapTexture(const levelset::NarrowBand& base,
+                                       const levelset::NarrowBand& texture, const Patch& patch,
+                                       const TextureOptions& options = {});
+
+}  // namespace mapping

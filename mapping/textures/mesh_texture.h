@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Imath/ImathBox.h>
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "levelset/mesh.h"
+#include "levelset/progress.h"
+#include "mapping/maps/distortion.h"
+#include "mapping/patches/patch.h"
+
+namespace mapping {
+
+struct MeshTextureOptions {
+  double sink = 0;  ///< how deep the texture dips below the surface, world units
+  std::optional<Imath::Box3d> textureBox =
+      {};  ///< what the unit cube of u, v, w is; empty: the mesh's own box
+  bool allowFolds = false;
+  std::size_t maxMemory = levelset::kNoMemoryLimit;
+  levelset::Progress progress = {};
+};
+
+struct MeshTextureResult {
+  levelset::TriMesh mesh;
+  Distortion distortion;  ///< in the middle and close to the corners of the particles' cells
+  std::vector<std::string> notes;
+};
+
+/// Moves the vertices of a mesh from texture space onto a patch, straight between its particles:
+/// within the two levels about w first, then from one to the other [Brodersen07 §8.4]. Any mesh
+/// will do, closed or not; its triangles stay, turned over where the patch is mirrored so that they
+/// face as before. Beyond the unit cube the outermost cells go on.
+/// @throws UsageError for a sink that is not finite; InvalidInput when the mesh is empty, its box
+///         has no volume, or the patch folds; ResourceLimit; Cancelled
+[[nodiscard]] MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
+                                        const MeshTextureOptions& options = {});
+
+}  // namespace mapping

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <Imath/ImathBox.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mapping/maps/distortion.h"
+
+namespace mapping {
+
+/// Where a texture lies in texture space: the unit cube is `box`, pushed inwards by `sink`.
+struct TexturePlacement {
+  Imath::Box3d box;
+  double sink = 0;  ///< in w
+  [[nodiscard]] Imath::V3d toTexture(const Imath::V3d& uvw) const {
+    return box.min + Imath::V3d(uvw.x, uvw.y, uvw.z + sink) * box.size();
+  }
+  [[nodiscard]] Imath::V3d toUvw(const Imath::V3d& texture) const {
+    return (texture - box.min) / box.size() - Imath::V3d(0, 0, sink);
+  }
+};
+
+/// The box that becomes the unit cube: the one that is given, else the texture's own.
+/// @throws InvalidInput when it has no volume or holds nothing of the texture
+[[nodiscard]] Imath::Box3d chooseTextureBox(const Imath::Box3d& own,
+                                            const std::optional<Imath::Box3d>& given);
+
+/// @return what to note of folds that are allowed, empty without any
+/// @throws InvalidInput for those that are not, telling where the worst is
+[[nodiscard]] std::vector<std::string> judgeFolds(const Distortion& distortion, bool areAllowed);
+
+}  // namespace mapping

@@ -1,0 +1,345 @@
+#include "mapping/textures/texture_warp.h"
+
+#include <fmt/core.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <iterator>
+#include <memory>
+#include <vector>
+
+#include "levelset/error.h"
+#include "levelset/progress_gate.h"
+#include "levelset/sample.h"
+#include "levelset/solids/resample_vdb.h"
+#include "levelset/vdb.h"
+#include "mapping/maps/level_map.h"
+
+namespace mapping {
+namespace {
+
+using Imath::Box3d;
+using Imath::M33d;
+using Imath::V3d;
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using LeafNode = openvdb::FloatTree::LeafNodeType;
+
+constexpr const char* kWarp = "texture";
+constexpr int kRootEdge = 64;  // grid points along a block that the descent begins with
+constexpr double kLeafBytes = sizeof(LeafNode) + LeafNode::SIZE * sizeof(float);
+
+/// Which parts of a texture's grid have leaf nodes: counts over boxes in constant time.
+class Occupancy {
+ public:
+  explicit Occupancy(const openvdb::FloatGrid& grid) : grid_(grid) {
+    CoordBBox box;
+    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) box.expand(leaf->origin());
+    constexpr double kMostCells = 1 << 25;
+    for (shift_ = 3;; ++shift_) {
+      origin_ = cell(box.min());
+      size_ = cell(box.max()) - origin_ + Coord(1);
+      if (static_cast<double>(size_.x()) * size_.y() * size_.z() <= kMostCells) break;
+    }
+    sums_.assign(index(size_) + 1, 0);
+    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
+      sums_[index(cell(leaf->origin()) - origin_ + Coord(1))] += 1;
+    for (int axis = 0; axis < 3; ++axis) accumulate(axis);
+  }
+
+  /// Is there a leaf node within a box of world coordinates, widened by `pad` voxels?
+  [[nodiscard]] bool touches(const Box3d& world, double pad) const {
+    openvdb::Vec3d low(std::numeric_limits<double>::max()), high(-low);
+    for (int corner = 0; corner < 8; ++corner) {
+      const openvdb::Vec3d p = grid_.worldToIndex(openvdb::Vec3d(
+          corner & 1 ? world.max.x : world.min.x, corner & 2 ? world.max.y : world.min.y,
+          corner & 4 ? world.max.z : world.min.z));
+      low = openvdb::math::minComponent(low, p);
+      high = openvdb::math::maxComponent(high, p);
+    }
+    Coord a, b;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double first = std::floor((low[axis] - pad) / (1 << shift_)) - origin_[axis];
+      const double last = std::floor((high[axis] + pad) / (1 << shift_)) - origin_[axis];
+      if (!(last >= 0) || !(first < size_[axis])) return false;
+      a[axis] = static_cast<int>(std::max(first, 0.0));
+      b[axis] = static_cast<int>(std::min(last, size_[axis] - 1.0)) + 1;
+    }
+    std::uint32_t count = 0;  // wraps around in between, ends right
+    for (int corner = 0; corner < 8; ++corner) {
+      const Coord c(corner & 1 ? a.x() : b.x(), corner & 2 ? a.y() : b.y(),
+                    corner & 4 ? a.z() : b.z());
+      const bool isNegative = ((corner & 1) + (corner >> 1 & 1) + (corner >> 2 & 1)) % 2 == 1;
+      count += isNegative ? 0u - sums_[index(c)] : sums_[index(c)];
+    }
+    return count != 0;
+  }
+
+ private:
+  Coord cell(const Coord& c) const { return c >> static_cast<std::size_t>(shift_); }
+  std::size_t index(const Coord& c) const {
+    const auto wide = [](int x) { return static_cast<std::size_t>(x); };
+    return (wide(c.x()) * (wide(size_.y()) + 1) + wide(c.y())) * (wide(size_.z()) + 1) +
+           wide(c.z());
+  }
+  void accumulate(int axis) {
+    Coord step(0);
+    step[axis] = 1;
+    for (int x = step.x(); x <= size_.x(); ++x)
+      for (int y = step.y(); y <= size_.y(); ++y)
+        for (int z = step.z(); z <= size_.z(); ++z)
+          sums_[index({x, y, z})] += sums_[index(Coord(x, y, z) - step)];
+  }
+
+  const openvdb::FloatGrid& grid_;
+  int shift_ = 3;
+  Coord origin_, size_;
+  std::vector<std::uint32_t> sums_;  // over all cells below, in each axis one more than cells
+};
+
+struct Block {
+  Coord origin;
+  int edge;
+};
+
+enum class Meets { Nothing, Inside, Band };
+
+/// What became of a block of patch space.
+struct Piece {
+  std::vector<std::unique_ptr<LeafNode>> leaves;
+  std::vector<Block> inside;  ///< wholly
+  std::size_t tested = 0, ghosts = 0, operations = 0;
+
+  void add(Piece&& part) {
+    std::move(part.leaves.begin(), part.leaves.end(), std::back_inserter(leaves));
+    inside.insert(inside.end(), part.inside.begin(), part.inside.end());
+    tested += part.tested;
+    ghosts += part.ghosts;
+    operations += part.operations;
+  }
+};
+
+/// One pass over patch space.
+class TextureWarp {
+ public:
+  TextureWarp(const levelset::NarrowBand& texture, const TexturePlacement& placement,
+              const Patch& patch, const PatchMap& map, const WarpOptions& options)
+      : texture_(texture),
+        placement_(placement),
+        patch_(patch),
+        map_(map),
+        options_(options),
+        occupancy_(levelset::vdb(texture)),
+        textureBackground_(texture.halfWidth() * texture.voxelSize()),
+        ghostDistance_(1.5 * longestCellEdge(patch)) {
+    transform_ = levelset::transformOf(options.indexToWorld, "texture");
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) step_[i][j] = options.indexToWorld[i][j];
+    const V3d size = placement.box.size();
+    tolerance_ = options.mapTolerance * texture.voxelSize() / std::max({size.x, size.y, size.z});
+  }
+
+  Warp run() {
+    const double halfWidth = textureBackground_ * options_.scale / transform_->voxelSize()[0];
+    const openvdb::FloatGrid::Ptr grid = levelset::emptyLevelSet(transform_->copy(), halfWidth);
+    background_ = grid->background();
+
+    const std::vector<Block> roots = rootBlocks();
+    std::vector<Piece> pieces(roots.size());
+    levelset::ProgressGate gate(options_.progress, 8 * roots.size(), kWarp);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, roots.size(), 1), [&](const auto& range) {
+      for (std::size_t n = range.begin(); n != range.end(); ++n)
+        pieces[n] = descendRoot(roots[n], gate);
+    });
+
+    Warp warp;
+    for (Piece& piece : pieces) {
+      for (const Block& block : piece.inside)
+        grid->sparseFill(CoordBBox::createCube(block.origin, block.edge), -background_, false);
+      for (std::unique_ptr<LeafNode>& leaf : piece.leaves) grid->tree().addLeaf(leaf.release());
+      warp.blocksTested += piece.tested;
+      warp.blocksEvaluated += piece.leaves.size();
+      warp.ghosts += piece.ghosts;
+      warp.operations += piece.operations;
+    }
+    if (warp.blocksEvaluated == 0) {
+      throw levelset::InvalidInput(fmt::format(
+          "{}: nothing of the texture falls into the patch; check the texture box and the sink",
+          kWarp));
+    }
+    warp.field = levelset::makeBand(grid);
+    return warp;
+  }
+
+ private:
+  V3d world(const openvdb::Vec3d& index) const {
+    return levelset::toImath(transform_->indexToWorld(index));
+  }
+
+  /// Aligned blocks over the image of the texture's band under the straight map, with room for what
+  /// the two maps differ by.
+  std::vector<Block> rootBlocks() const {
+    const openvdb::FloatGrid& grid = levelset::vdb(texture_);
+    const CoordBBox active = grid.evalActiveVoxelBoundingBox();
+    Box3d uvw;
+    for (int corner = 0; corner < 8; ++corner) {
+      const openvdb::Vec3d p(corner & 1 ? active.max().x() : active.min().x(),
+                             corner & 2 ? active.max().y() : active.min().y(),
+                             corner & 4 ? active.max().z() : active.min().z());
+      uvw.extendBy(placement_.toUvw(levelset::toImath(grid.indexToWorld(p))));
+    }
+    constexpr int kSamples = 24;
+    openvdb::BBoxd box;
+    for (int i = 0; i <= kSamples; ++i)
+      for (int j = 0; j <= kSamples; ++j)
+        for (int k = 0; k <= kSamples; ++k) {
+          const V3d t = uvw.min + uvw.size() * V3d(i, j, k) / kSamples;
+          box.expand(transform_->worldToIndex(levelset::toVdb(levelPosition(patch_, t))));
+        }
+    box.expand(ghostDistance_ / transform_->voxelSize()[0]);
+    constexpr double kMostIndex = 1e9;
+    double count = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      count *= box.extents()[axis] / kRootEdge + 2;
+      if (!(std::abs(box.min()[axis]) < kMostIndex) || !(std::abs(box.max()[axis]) < kMostIndex)) {
+        throw levelset::ResourceLimit(fmt::format(
+            "{}: at a voxel of {:.3g} the grid passes the range of 32-bit indices; take a "
+            "larger one",
+            kWarp, transform_->voxelSize()[0]));
+      }
+    }
+    levelset::requireMemory(count * (sizeof(Block) + sizeof(Piece)), options_.maxMemory, kWarp);
+    std::vector<Block> blocks;
+    const Coord low = Coord::floor(box.min()) & ~(kRootEdge - 1), high = Coord::ceil(box.max());
+    for (int x = low.x(); x <= high.x(); x += kRootEdge)
+      for (int y = low.y(); y <= high.y(); y += kRootEdge)
+        for (int z = low.z(); z <= high.z(); z += kRootEdge)
+          blocks.push_back({{x, y, z}, kRootEdge});
+    return blocks;
+  }
+
+  /// The samplers of one thread.
+  struct Samplers {
+    explicit Samplers(const levelset::NarrowBand& texture)
+        : linear(texture), cubic(texture, levelset::Interpolation::Tricubic) {}
+    levelset::BandSampler linear, cubic;
+  };
+
+  Piece descendRoot(const Block& root, levelset::ProgressGate& gate) {
+    Piece piece;
+    const V3d origin = world(root.origin.asVec3d());
+    const std::unique_ptr<BlockMap> map = map_.restrictTo({origin, step_, root.edge}, tolerance_);
+    if (!splits(root, *map, Samplers(texture_), piece)) {
+      gate.advance(8);
+      return piece;
+    }
+    std::array<Piece, 8> parts;
+    tbb::parallel_for(0, 8, [&](int bits) {
+      const Samplers samplers(texture_);
+      descend(octant(root, bits), *map->octant(bits), samplers,
+              parts[static_cast<std::size_t>(bits)]);
+      gate.advance(1);
+    });
+    for (Piece& part : parts) piece.add(std::move(part));
+    return piece;
+  }
+
+  void descend(const Block& block, const BlockMap& map, const Samplers& samplers, Piece& piece) {
+    if (!splits(block, map, samplers, piece)) return;
+    if (block.edge == GridBlock::kLeafEdge) {
+      requireLeaves(++leafCount_);
+      piece.leaves.push_back(std::make_unique<LeafNode>(block.origin, background_, false));
+      fillLeaf(*piece.leaves.back(), map, samplers, piece);
+      return;
+    }
+    for (int bits = 0; bits < 8; ++bits)
+      descend(octant(block, bits), *map.octant(bits), samplers, piece);
+  }
+
+  /// Must the block be looked into? Notes it if it lies wholly inside.
+  bool splits(const Block& block, const BlockMap& map, const Samplers& samplers,
+              Piece& piece) const {
+    ++piece.tested;
+    const Meets meets = testBlock(block, map, samplers);
+    if (meets == Meets::Inside) piece.inside.push_back(block);
+    return meets == Meets::Band;
+  }
+
+  static Block octant(const Block& block, int bits) {
+    const int half = block.edge / 2;
+    return {block.origin.offsetBy(bits & 4 ? half : 0, bits & 2 ? half : 0, bits & 1 ? half : 0),
+            half};
+  }
+
+  void requireLeaves(std::size_t count) const {
+    // The field, its copy while distances are made, and the result.
+    levelset::requireMemory(static_cast<double>(count) * 3 * kLeafBytes, options_.maxMemory, kWarp);
+  }
+
+  Meets testBlock(const Block& block, const BlockMap& map, const Samplers& samplers) const {
+    const Box3d uvw = map.imageBounds();
+    if (uvw.isEmpty()) return Meets::Nothing;
+    const Box3d image(placement_.toTexture(uvw.min), placement_.toTexture(uvw.max));
+    if (occupancy_.touches(image, 1)) return Meets::Band;
+    const V3d middle = uvw.center();
+    if (samplers.linear.value(placement_.toTexture(middle)) >= 0) return Meets::Nothing;
+    if (!map.isTotal()) return Meets::Band;
+    const V3d center = world(block.origin.asVec3d() + openvdb::Vec3d(0.5 * (block.edge - 1)));
+    return isGhost(center, middle) ? Meets::Nothing : Meets::Inside;
+  }
+
+  /// Far from the particles the map may return to the texture; going there through the particles
+  /// shows that this is another place.
+  bool isGhost(const V3d& place, const V3d& uvw) const {
+    return !map_.isLocal() && (levelPosition(patch_, uvw) - place).length() > ghostDistance_;
+  }
+
+  void fillLeaf(LeafNode& leaf, const BlockMap& map, const Samplers& samplers, Piece& piece) const {
+    std::array<V3d, LeafNode::SIZE> uvw;
+    piece.operations += map.evaluate(uvw);
+    const double rim = textureBackground_ * (1 - 1e-6);
+    for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
+      if (std::isnan(uvw[n].x)) continue;
+      const V3d place = placement_.toTexture(uvw[n]);
+      double value = samplers.linear.value(place);
+      if (value >= rim) continue;
+      const openvdb::Vec3d index = leaf.offsetToGlobalCoord(n).asVec3d();
+      if (isGhost(world(index), uvw[n])) {
+        ++piece.ghosts;
+        continue;
+      }
+      if (value > -rim) value = samplers.cubic.value(place);
+      const float scaled = static_cast<float>(value * options_.scale);
+      if (scaled <= -background_) {
+        leaf.setValueOff(n, -background_);
+      } else if (scaled < background_) {
+        leaf.setValueOn(n, scaled);
+      }
+    }
+  }
+
+  const levelset::NarrowBand& texture_;
+  const TexturePlacement& placement_;
+  const Patch& patch_;
+  const PatchMap& map_;
+  const WarpOptions& options_;
+  Occupancy occupancy_;
+  openvdb::math::Transform::Ptr transform_;
+  M33d step_;  ///< rows: world steps of the grid's axes
+  double textureBackground_, tolerance_ = 0, ghostDistance_;
+  float background_ = 0;
+  std::atomic<std::size_t> leafCount_ = 0;
+};
+
+}  // namespace
+
+Warp warpTexture(const levelset::NarrowBand& texture, const TexturePlacement& placement,
+                 const Patch& patch, const PatchMap& map, const WarpOptions& options) {
+  return TextureWarp(texture, placement, patch, map, options).run();
+}
+
+}  // namespace mapping

@@ -1,0 +1,186 @@
+// What a grid point, or a vertex, costs under each map, beside the direct sum of the RBF map, on
+// one thread: a third of a cylinder's wall with a texture of 256 x 256 x 64 voxels laid onto it.
+// Solving is timed apart. The direct sum runs on every hundredth block.
+//   mapping_bench [PARTICLES = 10000] [POINTS = 10000000]
+// Exits 1 when the fast sum is less than 30 times as fast, or off by more than 0.05 texture voxel.
+
+#include <fmt/core.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <ctime>
+#include <vector>
+
+#include "mapping/maps/level_map.h"
+#include "mapping/maps/rbf_map.h"
+#include "mapping/maps/shell_map.h"
+#include "mapping/patches/patch.h"
+
+namespace {
+
+using Imath::V3d;
+using mapping::GridBlock;
+
+constexpr double kTextureVoxels = 256;  // along the unit cube
+constexpr double kTolerance = 0.05;     // texture voxels
+constexpr int kDirectShare = 100;
+
+/// CPU seconds.
+double now() {
+  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
+
+V3d onCylinder(const V3d& uvw) {
+  // Not quite regular, as relaxed particles are not.
+  const double angle = 2.1 * (uvw.x - 0.5) + 0.02 * std::sin(7 * uvw.y), r = 2 + 0.6 * uvw.z;
+  return {r * std::sin(angle), 4.2 * uvw.y + 0.05 * std::sin(9 * uvw.x), r * std::cos(angle)};
+}
+
+mapping::Patch makePatch(std::size_t particles) {
+  constexpr std::size_t kLevels = 6;
+  const auto side = static_cast<std::size_t>(
+      std::max(4.0, std::round(std::sqrt(static_cast<double>(particles) / kLevels))));
+  mapping::Patch patch;
+  patch.height = 0.6;
+  for (std::size_t k = 0; k < kLevels; ++k) {
+    mapping::ParticleLevel level;
+    level.columns = level.rows = side;
+    level.w = static_cast<double>(k) / (kLevels - 1);
+    for (std::size_t j = 0; j < side; ++j)
+      for (std::size_t i = 0; i < side; ++i)
+        level.positions.push_back(
+            onCylinder({static_cast<double>(i) / static_cast<double>(side - 1),
+                        static_cast<double>(j) / static_cast<double>(side - 1), level.w}));
+    patch.levels.push_back(std::move(level));
+  }
+  return patch;
+}
+
+/// Grid points of the leaf blocks within the wall.
+struct Grid {
+  Imath::M33d rows;
+  std::vector<V3d> roots;
+  explicit Grid(double points) {
+    const double volume = 2.1 * 4.2 * 0.5 * (2.6 * 2.6 - 2 * 2);
+    const double step = std::cbrt(volume / points);
+    for (int i = 0; i < 3; ++i) rows[i][i] = step;
+    constexpr int kEdge = 64;
+    for (double x = -2.7; x < 2.7; x += kEdge * step)
+      for (double y = -0.2; y < 4.4; y += kEdge * step)
+        for (double z = 0.7; z < 2.7; z += kEdge * step) roots.emplace_back(x, y, z);
+  }
+};
+
+bool isInWall(const GridBlock& block) {
+  const V3d c = block.center();
+  const double r = std::hypot(c.x, c.z);
+  return r > 2 && r < 2.6 && std::abs(std::atan2(c.x, c.z)) < 1.05 && c.y > 0 && c.y < 4.2;
+}
+
+struct Cost {
+  double points = 0, seconds = 0, directPoints = 0, directSeconds = 0, operations = 0, worst = 0;
+};
+
+/// Descends into what touches the unit cube, as a texture warp does, and evaluates the wall.
+template <typename Direct>
+void descend(const GridBlock& block, const mapping::BlockMap& map, Cost& cost,
+             const Direct& direct) {
+  const Imath::Box3d image = map.imageBounds();
+  if (image.isEmpty() || !image.intersects({V3d(0), V3d(1)})) return;
+  if (block.edge > GridBlock::kLeafEdge) {
+    for (int bits = 0; bits < 8; ++bits)
+      descend(block.octant(bits), *map.octant(bits), cost, direct);
+    return;
+  }
+  if (!isInWall(block)) return;
+  std::array<V3d, 512> uvw;
+  cost.operations += static_cast<double>(map.evaluate(uvw));
+  cost.points += 512;
+  direct(block, uvw);
+}
+
+template <typename Direct>
+Cost run(const mapping::PatchMap& map, const Grid& grid, double tolerance, const Direct& direct) {
+  Cost cost;
+  const double start = now();
+  for (const V3d& origin : grid.roots) {
+    const GridBlock block{origin, grid.rows, 64};
+    descend(block, *map.restrictTo(block, tolerance), cost,
+            [&](const GridBlock& at, const std::array<V3d, 512>& uvw) { direct(at, uvw, cost); });
+  }
+  cost.seconds = now() - start - cost.directSeconds;
+  return cost;
+}
+
+void report(const char* name, const Cost& cost) {
+  fmt::print("{:<8} {:>10.3g} points {:>9.1f} ns a point {:>8.2f} operations a point\n", name,
+             cost.points, 1e9 * cost.seconds / cost.points, cost.operations / cost.points);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
+  const auto particles = static_cast<std::size_t>(argc > 1 ? std::atol(argv[1]) : 10000);
+  const double points = argc > 2 ? std::atof(argv[2]) : 1e7;
+  const mapping::Patch patch = makePatch(particles);
+  const Grid grid(points);
+
+  std::vector<V3d> places, targets;
+  std::vector<char> near;
+  for (const mapping::ParticleLevel& level : patch.levels)
+    for (std::size_t j = 0; j < level.rows; ++j)
+      for (std::size_t i = 0; i < level.columns; ++i) {
+        places.push_back(level.at(i, j));
+        targets.emplace_back(static_cast<double>(i) / static_cast<double>(level.columns - 1),
+                             static_cast<double>(j) / static_cast<double>(level.rows - 1), level.w);
+        near.push_back(level.w == 0);
+      }
+  double start = now();
+  const mapping::RbfMap rbf(places, targets, near);
+  fmt::print("{} particles, solved in {:.1f} s\n", rbf.size(), now() - start);
+
+  // Every particle at every grid point, with the same vector code.
+  std::size_t blocks = 0;
+  const Cost fast = run(rbf, grid, kTolerance / kTextureVoxels,
+                        [&](const GridBlock& block, const std::array<V3d, 512>& uvw, Cost& cost) {
+                          if (blocks++ % kDirectShare != 0) return;
+                          const double from = now();
+                          std::array<V3d, 512> exact;
+                          (void)rbf.restrictTo(block, 0)->evaluate(exact);
+                          cost.directSeconds += now() - from;
+                          cost.directPoints += 512;
+                          for (std::size_t n = 0; n < 512; ++n)
+                            cost.worst =
+                                std::max(cost.worst, (uvw[n] - exact[n]).length() * kTextureVoxels);
+                        });
+  const double direct = fast.directSeconds / fast.directPoints;
+  fmt::print("direct   {:>10.3g} points {:>9.1f} ns a point (every {}th block)\n",
+             fast.directPoints, 1e9 * direct, kDirectShare);
+  report("fast", fast);
+  const double ratio = direct / (fast.seconds / fast.points);
+  fmt::print("         {:.1f} times as fast (30 wanted), off by {:.4f} texture voxel at the most\n",
+             ratio, fast.worst);
+
+  start = now();
+  const mapping::ShellMap shell(patch, {.sink = 0.05, .rim = 0.05});
+  fmt::print("shell map made in {:.2f} s\n", now() - start);
+  const Cost tetrahedra =
+      run(shell, grid, 0, [](const GridBlock&, const std::array<V3d, 512>&, Cost&) {});
+  report("shell", tetrahedra);
+  fmt::print("         {:.1f} times as fast as the direct sum (5 wanted)\n",
+             direct / (tetrahedra.seconds / tetrahedra.points));
+
+  constexpr int kVertices = 5'000'000;
+  start = now();
+  V3d sum(0);
+  for (int i = 0; i < kVertices; ++i) {
+    const double t = static_cast<double>(i) / kVertices;
+    sum += mapping::levelPosition(patch, {t, std::fmod(37 * t, 1), std::fmod(1009 * t, 1)});
+  }
+  fmt::print("vertices {:.3g} million a second (5 wanted){}\n", kVertices / (now() - start) / 1e6,
+             sum.x == 0.5 ? " " : "");
+  return ratio >= 30 && fast.worst <= kTolerance ? 0 : 1;
+}

@@ -1,0 +1,211 @@
+#include "mapping/patches/level_schemes.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "levelset/error.h"
+#include "mapping/maps/distortion.h"
+#include "mapping/maps/shell_map.h"
+#include "mapping/patches/relaxation.h"
+#include "tests/support/patches.h"
+
+namespace level_schemes_test {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+using mapping::LevelScheme;
+using mapping::ParticleLevel;
+using mapping::Patch;
+using mapping::PatchOptions;
+using mapping::PatchResult;
+using support::makeBall;
+using support::square;
+
+/// The half-space below z = bump · cos x cos y.
+NarrowBand makeGround(double bump, double voxel = 0.1) {
+  return support::sampleBand(
+      [=](const V3d& p) {
+        return (p.z - bump * std::cos(4 * p.x) * std::cos(4 * p.y)) /
+               std::sqrt(1 + 16 * bump * bump);
+      },
+      {V3d(-3, -3, -0.5), V3d(3, 3, 0.5)}, voxel);
+}
+
+std::size_t foldsOf(const Patch& patch) {
+  return mapping::surveyDistortion(mapping::ShellMap(patch, {}).samples(), V3d(1)).folded;
+}
+
+TEST(SweepCurve, FollowsACircle) {
+  std::vector<V3d> points;
+  for (int i = 0; i <= 8; ++i)
+    points.emplace_back(std::cos(i * M_PI / 8), std::sin(i * M_PI / 8), 0);
+  const mapping::SweepCurve curve(points);
+  EXPECT_NEAR(curve.length(), M_PI, 0.003);
+  for (double s = 0; s < curve.length(); s += 0.05) {
+    const V3d p = curve.position(s), t = curve.tangent(s);
+    EXPECT_NEAR(p.length(), 1, 0.003);
+    EXPECT_NEAR(t.length(), 1, 1e-12);
+    EXPECT_NEAR(t.dot(p), 0, 0.03);
+  }
+  const mapping::SweepCurve straight(std::vector<V3d>{V3d(1), V3d(1, 1, 4)});
+  EXPECT_DOUBLE_EQ(straight.length(), 3);
+  EXPECT_LE((straight.position(1) - V3d(1, 1, 2)).length(), 1e-12);
+  EXPECT_LE((straight.tangent(3) - V3d(0, 0, 1)).length(), 1e-12);
+}
+
+TEST(ConformingLevels, AreRadialAboveASphere) {
+  const double radius = 2, height = 0.8;
+  const double side = radius * std::sin(0.5) / std::sqrt(2.0), up = radius * std::cos(0.5);
+  const PatchResult made = mapping::makePatch(makeBall(radius, 0.1), square(side, up), height,
+                                              {.levels = 5, .scheme = LevelScheme::Conforming});
+  ASSERT_EQ(made.patch.levels.size(), 5u);
+  const ParticleLevel& surface = made.patch.levels.front();
+  for (const ParticleLevel& level : made.patch.levels) {
+    ASSERT_EQ(level.positions.size(), surface.positions.size());
+    for (std::size_t n = 0; n < level.positions.size(); ++n) {
+      EXPECT_NEAR(level.positions[n].length(), radius + level.w * height, 0.004 * height);
+      EXPECT_LE((level.positions[n].normalized() - surface.positions[n].normalized()).length(),
+                0.002);
+    }
+  }
+  EXPECT_EQ(foldsOf(made.patch), 0u);
+}
+
+TEST(ConformingLevels, SpreadWhereReducedOnesStayEven) {
+  // On bumpy ground: the thesis shows it in a figure, the cells' areas say it in a number.
+  const NarrowBand ground = makeGround(0.12);
+  const PatchOptions even{.scheme = LevelScheme::Reduced, .spacing = 0.12},
+      faithful{.scheme = LevelScheme::Conforming, .spacing = 0.12};
+  const Patch reduced = mapping::makePatch(ground, square(1), 0.5, even).patch;
+  const Patch conforming = mapping::makePatch(ground, square(1), 0.5, faithful).patch;
+  EXPECT_LT(mapping::cellAreaVariation(reduced.levels.back()),
+            0.5 * mapping::cellAreaVariation(conforming.levels.back()));
+}
+
+TEST(ConformingLevels, SlowDownTowardsTheMedialAxis) {
+  // A trough whose walls meet above: reduced levels are refused there, these fold and say so.
+  const NarrowBand trough =
+      support::sampleBand([](const V3d& p) { return 1.5 - std::hypot(p.x, p.z - 1.5); },
+                          {V3d(-1.6, -2, -0.2), V3d(1.6, 2, 3.2)}, 0.1);
+  const std::array<V3d, 4> corners = {V3d(-0.9, -0.8, 0.3), V3d(0.9, -0.8, 0.3), V3d(0.9, 0.8, 0.3),
+                                      V3d(-0.9, 0.8, 0.3)};
+  const Patch patch =
+      mapping::makePatch(trough, corners, 2, {.scheme = LevelScheme::Conforming}).patch;
+  for (const V3d& p : patch.levels.back().positions)
+    EXPECT_LE(std::abs(p.x), 0.3);  // near the axis, not through it
+  const Patch shallow =
+      mapping::makePatch(trough, corners, 0.7, {.scheme = LevelScheme::Conforming}).patch;
+  EXPECT_EQ(foldsOf(shallow), 0u);
+}
+
+TEST(SplineLevels, GoStraightUpByThemselves) {
+  const PatchOptions options{.levels = 4, .scheme = LevelScheme::Spline};
+  const Patch patch = mapping::makePatch(makeGround(0), square(1), 1.5, options).patch;
+  for (const ParticleLevel& level : patch.levels)
+    for (std::size_t n = 0; n < level.positions.size(); ++n) {
+      const V3d& foot = patch.levels.front().positions[n];
+      EXPECT_LE((level.positions[n] - foot - V3d(0, 0, 1.5 * level.w)).length(), 1e-3);
+    }
+}
+
+TEST(SplineLevels, TravelAsRigidBodies) {
+  // A quarter of a circle of radius 3, the patch well within it.
+  std::vector<V3d> arc;
+  for (int i = 1; i <= 6; ++i)
+    arc.emplace_back(3 - 3 * std::cos(i * M_PI / 12), 0, 3 * std::sin(i * M_PI / 12));
+  const PatchOptions options{.levels = 7, .scheme = LevelScheme::Spline, .spline = arc};
+  const PatchResult made = mapping::makePatch(makeGround(0), square(1), 4.7, options);
+  EXPECT_EQ(made.report.slowed, 0u);
+  const std::vector<ParticleLevel>& levels = made.patch.levels;
+  const auto spread = [](const ParticleLevel& level, std::size_t n) {
+    return (level.positions[n] - level.positions.front()).length();
+  };
+  for (const ParticleLevel& level : levels)
+    for (std::size_t n = 0; n < level.positions.size(); ++n)
+      EXPECT_NEAR(spread(level, n), spread(levels.front(), n), 1e-9);
+  // At the end it faces along x, as far along as the circle says.
+  V3d low(10), high(-10);
+  for (const V3d& p : levels.back().positions)
+    for (int axis = 0; axis < 3; ++axis)
+      low[axis] = std::min(low[axis], p[axis]), high[axis] = std::max(high[axis], p[axis]);
+  EXPECT_LE(high.x - low.x, 0.05);
+  EXPECT_NEAR(high.z - low.z, 2, 0.02);
+  EXPECT_NEAR(0.5 * (low.z + high.z), 3, 0.05);
+  EXPECT_EQ(foldsOf(made.patch), 0u);
+}
+
+TEST(SplineLevels, SlowWhatWouldCross) {
+  // A bend of radius 0.5 under a patch that reaches out by 1.
+  const std::vector<V3d> bend = {V3d(0, 0, 0.5), V3d(0.15, 0, 0.85), V3d(0.5, 0, 1),
+                                 V3d(1.5, 0, 1)};
+  const PatchOptions options{.levels = 9, .scheme = LevelScheme::Spline, .spline = bend};
+  const PatchResult made = mapping::makePatch(makeGround(0), square(1), 2.2, options);
+  EXPECT_GT(made.report.slowed, 0u);
+  EXPECT_LT(made.report.slowed, made.patch.levels.front().positions.size());
+  for (std::size_t k = 1; k < made.patch.levels.size(); ++k)
+    for (std::size_t n = 0; n < made.patch.levels[k].positions.size(); ++n)
+      EXPECT_GT(
+          (made.patch.levels[k].positions[n] - made.patch.levels[k - 1].positions[n]).length(), 0);
+}
+
+TEST(SplineLevels, FadeToAPlane) {
+  const double radius = 2, side = 0.8, up = std::sqrt(4 - 2 * 0.64);
+  const PatchOptions options{.scheme = LevelScheme::Spline, .fade = true};
+  const Patch patch = mapping::makePatch(makeBall(radius, 0.1), square(side, up), 1, options).patch;
+  const auto relief = [](const ParticleLevel& level) {
+    const auto [low, high] =
+        std::minmax_element(level.positions.begin(), level.positions.end(),
+                            [](const V3d& a, const V3d& b) { return a.z < b.z; });
+    return high->z - low->z;
+  };
+  const double first = relief(patch.levels.front());
+  EXPECT_GT(first, 0.3);
+  EXPECT_LE(relief(patch.levels.back()), 1e-5);             // the normal is known to that
+  EXPECT_NEAR(relief(patch.levels[3]), 0.4 * first, 1e-3);  // w = 0.6
+}
+
+TEST(LevelTransform, TwistsTapersAndBends) {
+  const NarrowBand ground = makeGround(0);
+  const auto top = [&](const mapping::LevelTransform& transform) {
+    const PatchOptions options{.levels = 5, .transform = transform};
+    return mapping::makePatch(ground, square(1), 1, options).patch.levels.back();
+  };
+  const ParticleLevel plain = top({}), twisted = top({.twist = M_PI / 2}),
+                      tapered = top({.taper = 0.5}), bent = top({.bend = 1});
+  for (std::size_t n = 0; n < plain.positions.size(); ++n) {
+    const V3d p = plain.positions[n];
+    EXPECT_LE((twisted.positions[n] - V3d(-p.y, p.x, p.z)).length(), 2e-3);
+    EXPECT_LE((tapered.positions[n] - V3d(0.5 * p.x, 0.5 * p.y, p.z)).length(), 2e-3);
+    // The axis as an arc of length 1 through an angle of 1.
+    const V3d expected(1 - std::cos(1.0) + p.x * std::cos(1.0), p.y,
+                       std::sin(1.0) - p.x * std::sin(1.0));
+    EXPECT_LE((bent.positions[n] - expected).length(), 2e-3);
+  }
+}
+
+TEST(LevelSchemes, RefuseWhatMakesNoSense) {
+  const NarrowBand ground = makeGround(0);
+  const auto refused = [&](const PatchOptions& options) {
+    try {
+      (void)mapping::makePatch(ground, square(1), 1, options);
+    } catch (const levelset::UsageError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(refused({.fade = true}).find("spline scheme only"), std::string::npos);
+  EXPECT_NE(refused({.scheme = LevelScheme::Spline, .spline = {V3d(0, 0, 0.5)}}).find("only 0.5"),
+            std::string::npos);
+  EXPECT_NE(refused({.scheme = LevelScheme::Spline, .spline = {V3d(0)}}).find("stands still"),
+            std::string::npos);
+  EXPECT_NE(refused({.scheme = LevelScheme::Spline, .spline = {V3d(std::nan(""))}}).find("finite"),
+            std::string::npos);
+  EXPECT_NE(refused({.transform = {.taper = 0}}).find("positive scale"), std::string::npos);
+  EXPECT_NE(refused({.transform = {.twist = std::nan("")}}).find("twist"), std::string::npos);
+}
+
+}  // namespace level_schemes_test
