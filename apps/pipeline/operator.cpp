@@ -158,6 +158,7 @@ const std::vector<Operator>& operators() {
     addEikonalOperators(list);
     addFlowOperators(list);
     addPlacementOperators(list);
+    addPatchOperators(list);
     addTextureOperators(list);
     addInspectionOperators(list);
     addPictureOperators(list);

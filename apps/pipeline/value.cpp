@@ -94,8 +94,9 @@ const Plan& Value::plan() const {
                   (2 * plan.halfWidth);
       break;
     case Kind::Patch:
-      for (const mapping::ParticleLevel& level : patch().patch.levels)
-        for (const Imath::V3d& p : level.positions) plan.bounds.extendBy(p);
+      for (const mapping::Patch& one : patch().patches)
+        for (const mapping::ParticleLevel& level : one.levels)
+          for (const Imath::V3d& p : level.positions) plan.bounds.extendBy(p);
       break;
     case Kind::Field:
       plan.bounds = field().bounds();

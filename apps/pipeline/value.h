@@ -2,11 +2,12 @@
 
 #include <Imath/ImathBox.h>
 
-#include <array>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "levelset/fields/grid.h"
 #include "levelset/mesh.h"
@@ -33,13 +34,11 @@ struct Plan {
   [[nodiscard]] double bytes() const;
 };
 
-/// A patch, and what it takes to make it again once the texture is known (`--height auto`).
+/// One patch or many of one base.
 struct PatchValue {
-  mapping::Patch patch;
-  bool autoHeight = false;
-  levelset::NarrowBand base = {};
-  std::array<Imath::V3d, 4> corners = {};
-  mapping::PatchOptions options = {};
+  std::vector<mapping::Patch> patches;
+  /// With `--height auto`: makes them once the texture has told the height. Empty otherwise.
+  std::function<std::vector<mapping::Patch>(double height)> atHeight = {};
 };
 
 /// What flows through a chain: immutable, cheap to copy. In a dry run only the plan is there.

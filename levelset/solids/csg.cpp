@@ -168,12 +168,40 @@ FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const F
   return result;
 }
 
+namespace {
+
+/// Neighbours first, then what they make: with many small solids nothing large is copied for each.
+NarrowBand uniteAll(std::vector<NarrowBand> solids, const CsgOptions& options) {
+  const auto pairs = static_cast<double>(solids.size() - 1);
+  double done = 0;
+  while (solids.size() > 1) {
+    const std::size_t half = (solids.size() + 1) / 2;
+    for (std::size_t i = 0; i < half; ++i) {
+      const bool isPair = 2 * i + 1 < solids.size();
+      if (isPair) report(options.progress, done++ / pairs, nameOf(CsgOperation::Union));
+      solids[i] =
+          isPair
+              ? makeBand(mergePair(CsgOperation::Union, vdb(solids[2 * i]), vdb(solids[2 * i + 1])))
+              : std::move(solids[2 * i]);
+    }
+    solids.resize(half);
+  }
+  return std::move(solids.front());
+}
+
+}  // namespace
+
 CsgResult combine(CsgOperation operation, std::span<const NarrowBand> solids,
                   const CsgOptions& options) {
   const char* action = nameOf(operation);
   requireSolids(solids, options, action);
   CsgResult result;
-  const std::vector<NarrowBand> operands = onOneGrid(solids, options, action, result.notes);
+  std::vector<NarrowBand> operands = onOneGrid(solids, options, action, result.notes);
+  if (operation == CsgOperation::Union) {
+    result.band = uniteAll(std::move(operands), options);
+    report(options.progress, 1, action);
+    return result;
+  }
   result.band = operands.front();
   for (std::size_t i = 1; i < operands.size(); ++i) {
     report(options.progress, static_cast<double>(i - 1) / static_cast<double>(operands.size() - 1),

@@ -115,4 +115,35 @@ Distortion surveyDistortion(std::span<const MapSample> samples, const V3d& textu
   return result;
 }
 
+Distortion worstOf(std::span<const Distortion> maps) {
+  std::vector<const Distortion*> byJacobian;
+  for (const Distortion& map : maps) byJacobian.push_back(&map);
+  std::stable_sort(byJacobian.begin(), byJacobian.end(), [](const auto* a, const auto* b) {
+    return a->jacobian.least < b->jacobian.least;
+  });
+  Distortion result = *byJacobian.front();
+  const auto widen = [](Spread& spread, const Spread& other) {
+    spread.least = std::min(spread.least, other.least);
+    spread.percent1 = std::min(spread.percent1, other.percent1);
+    spread.percent99 = std::max(spread.percent99, other.percent99);
+    spread.most = std::max(spread.most, other.most);
+  };
+  const auto middle = [&](const auto& value) {
+    std::vector<double> values;
+    for (const Distortion& map : maps) values.push_back(value(map));
+    return spreadOf(std::move(values)).median;
+  };
+  result.samples = result.folded = 0;
+  for (const Distortion& map : maps) {
+    result.samples += map.samples;
+    result.folded += map.folded;
+    widen(result.jacobian, map.jacobian);
+    widen(result.stretch, map.stretch);
+  }
+  result.jacobian.median = middle([](const Distortion& map) { return map.jacobian.median; });
+  result.stretch.median = middle([](const Distortion& map) { return map.stretch.median; });
+  result.meanStretch = middle([](const Distortion& map) { return map.meanStretch; });
+  return result;
+}
+
 }  // namespace mapping

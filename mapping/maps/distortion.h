@@ -38,4 +38,9 @@ struct Distortion {
 [[nodiscard]] Distortion surveyDistortion(std::span<const MapSample> samples,
                                           const Imath::V3d& textureSize, bool isMirrored = false);
 
+/// Of several maps: counts are added up; the least, the percentiles and the most are those of the
+/// map where they are worst, medians and the mean stretch are the median map's.
+/// @pre maps is not empty
+[[nodiscard]] Distortion worstOf(std::span<const Distortion> maps);
+
 }  // namespace mapping

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <memory>
+#include <span>
 
 #include "levelset/eikonal/redistance.h"
 #include "levelset/error.h"
@@ -32,8 +34,8 @@ constexpr double kStretchError = 0.01;
 // interpolant beside the zero set reads nothing but distances.
 constexpr double kBandNeeded = 3;
 
-void checkArguments(const NarrowBand& base, const NarrowBand& texture, const Patch& patch,
-                    const TextureOptions& options) {
+void checkArguments(const NarrowBand& base, const NarrowBand& texture,
+                    std::span<const Patch> patches, const TextureOptions& options) {
   const auto requirePositive = [](double value, const char* name) {
     if (!(value > 0) || !std::isfinite(value)) {
       throw UsageError(
@@ -61,9 +63,14 @@ void checkArguments(const NarrowBand& base, const NarrowBand& texture, const Pat
         fmt::format("{}: the {} has no surface; give a solid with at least one voxel", kTexture,
                     base.isEmpty() ? "base" : "texture"));
   }
-  if (patch.levels.size() < 2 || !(patch.height > 0)) {
-    throw InvalidInput(
-        fmt::format("{}: the patch has no levels of particles; make it with `patch`", kTexture));
+  if (patches.empty())
+    throw UsageError(fmt::format("{}: there is no patch; make one with `patch`", kTexture));
+  for (const Patch& patch : patches) {
+    if (patch.levels.size() < 2 || !(patch.height > 0)) {
+      throw InvalidInput(
+          fmt::format("{}: the patch has no levels of particles; make it with `patch`", kTexture));
+    }
+    requirePatchOn(base, patch);
   }
 }
 
@@ -82,18 +89,6 @@ Imath::M44d chooseGrid(const NarrowBand& base, double voxelSize, TextureMerge me
   return result;
 }
 
-/// Blocks of the result by the texture's own count, before anything is allocated.
-void requireResult(const NarrowBand& texture, double voxelSize, double meanStretch,
-                   const TextureOptions& options) {
-  const double finer = texture.voxelSize() * meanStretch / voxelSize;
-  const double width =
-      std::max(1.0, options.halfWidth / std::max(1.0, texture.halfWidth() * finer));
-  const double voxels =
-      static_cast<double>(texture.activeVoxelCount()) * std::max(1e-3, finer * finer) * width;
-  constexpr double kBytesPerVoxel = 40;  // active share of a block, and three fields of them
-  levelset::requireMemory(voxels * kBytesPerVoxel, options.maxMemory, kTexture);
-}
-
 /// A texture whose band, once it is warped, still reaches some voxels of the result.
 NarrowBand widen(const NarrowBand& texture, double voxelSize, double minStretch,
                  const TextureOptions& options) {
@@ -107,8 +102,14 @@ NarrowBand widen(const NarrowBand& texture, double voxelSize, double minStretch,
 struct ChosenMap {
   std::unique_ptr<PatchMap> map;
   std::vector<MapSample> samples;
+  Distortion distortion = {};
   std::size_t particles = 0;
   V3d residual{0};  ///< at the particles, in u, v and w
+
+  /// Most of the map is not stretched less than this; a fold here or there sets no voxel size.
+  [[nodiscard]] double leastStretch() const {
+    return distortion.folded > 0 ? distortion.stretch.percent1 : distortion.stretch.least;
+  }
 };
 
 ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink,
@@ -135,6 +136,54 @@ ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink,
   result.residual = smooth->axisResidual();
   result.map = std::move(smooth);
   return result;
+}
+
+/// The map of every patch. What folds is refused, or noted.
+std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> patches, double sink,
+                                const V3d& textureSize, const TextureOptions& options,
+                                TextureReport& report) {
+  std::vector<ChosenMap> maps;
+  std::vector<Distortion> distortions;
+  for (const Patch& patch : patches) {
+    const auto done = static_cast<double>(maps.size());
+    const auto share = [&](double n) { return 0.2 * n / static_cast<double>(patches.size()); };
+    TextureOptions part = options;
+    part.progress = levelset::subProgress(options.progress, share(done), share(done + 1));
+    ChosenMap chosen = makeMap(base, patch, sink / patch.height, part);
+    chosen.distortion = surveyDistortion(chosen.samples, textureSize, patch.mirrored);
+    chosen.samples = {};
+    std::vector<std::string> notes = judgeFolds(chosen.distortion, options.allowFolds);
+    std::move(notes.begin(), notes.end(), std::back_inserter(report.notes));
+    report.particles += chosen.particles;
+    report.mapResidual = std::max(report.mapResidual, (chosen.residual * textureSize).length());
+    distortions.push_back(chosen.distortion);
+    maps.push_back(std::move(chosen));
+  }
+  report.patches = patches.size();
+  report.distortion = worstOf(distortions);
+  return maps;
+}
+
+/// Blocks of the result by the texture's own count, before anything is allocated.
+void requireResult(const NarrowBand& texture, double voxelSize, std::span<const ChosenMap> maps,
+                   const TextureOptions& options) {
+  double voxels = 0;
+  for (const ChosenMap& map : maps) {
+    const double finer = texture.voxelSize() * map.distortion.meanStretch / voxelSize;
+    const double width =
+        std::max(1.0, options.halfWidth / std::max(1.0, texture.halfWidth() * finer));
+    voxels +=
+        static_cast<double>(texture.activeVoxelCount()) * std::max(1e-3, finer * finer) * width;
+  }
+  constexpr double kBytesPerVoxel = 40;  // active share of a block, and three fields of them
+  levelset::requireMemory(voxels * kBytesPerVoxel, options.maxMemory, kTexture);
+}
+
+/// All that was mapped as one solid.
+NarrowBand join(std::vector<NarrowBand> pieces, const TextureOptions& options) {
+  if (pieces.size() == 1) return std::move(pieces.front());
+  return levelset::combine(levelset::CsgOperation::Union, pieces, {.maxMemory = options.maxMemory})
+      .band;
 }
 
 NarrowBand merge(const NarrowBand& base, NarrowBand warped, const TextureOptions& options,
@@ -196,55 +245,62 @@ RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options) {
 
 TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture, const Patch& patch,
                          const TextureOptions& options) {
-  checkArguments(base, texture, patch, options);
-  requirePatchOn(base, patch);
+  return mapTexture(base, texture, std::span(&patch, 1), options);
+}
+
+TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
+                         std::span<const Patch> patches, const TextureOptions& options) {
+  checkArguments(base, texture, patches, options);
   TextureResult result;
   TextureReport& report = result.report;
   const Box3d box = chooseTextureBox(texture.zeroSetBounds(), options.textureBox);
 
-  // === The map, and what it does to lengths
+  // === The maps, and what they do to lengths
   const double sink = options.sink ? *options.sink : base.voxelSize();
-  ChosenMap chosen = makeMap(base, patch, sink / patch.height, options);
-  const Distortion distortion = surveyDistortion(chosen.samples, box.size(), patch.mirrored);
-  chosen.samples = {};
-  report.notes = judgeFolds(distortion, options.allowFolds);
-  report.particles = chosen.particles;
-  report.distortion = distortion;
-  report.mapResidual = (chosen.residual * box.size()).length();
-  // Most of the map is not stretched less than this; a fold here or there sets no voxel size.
-  const double minStretch =
-      distortion.folded > 0 ? distortion.stretch.percent1 : distortion.stretch.least;
+  const std::vector<ChosenMap> maps = makeMaps(base, patches, sink, box.size(), options, report);
+  double minStretch = HUGE_VAL;
+  for (const ChosenMap& chosen : maps) minStretch = std::min(minStretch, chosen.leastStretch());
   report.voxelSize = chooseVoxelSize(base, texture, minStretch, options);
+  requireResult(texture, report.voxelSize, maps, options);
 
   // === Warp, and make a distance of it again [Brodersen07, ERR-23 in our notes]
-  requireResult(texture, report.voxelSize, distortion.meanStretch, options);
-  const TexturePlacement placement{box, sink / patch.height};
   // The shell ends somewhere around the unit cube, so what is outside of a box that was asked for
   // is cut off there, not at the end of the shell.
   const bool isCut = options.map == TextureMap::Shell && options.textureBox;
-  const NarrowBand whole = isCut ? levelset::clip(texture, box) : texture;
-  Warp warp = warpTexture(widen(whole, report.voxelSize, minStretch, options), placement, patch,
-                          *chosen.map,
-                          {.indexToWorld = chooseGrid(base, report.voxelSize, options.merge),
-                           .scale = distortion.meanStretch,
-                           .mapTolerance = options.mapTolerance,
-                           .maxMemory = options.maxMemory,
-                           .progress = levelset::subProgress(options.progress, 0.2, 0.7)});
-  report.blocksTested = warp.blocksTested;
-  report.blocksEvaluated = warp.blocksEvaluated;
+  const NarrowBand whole =
+      widen(isCut ? levelset::clip(texture, box) : texture, report.voxelSize, minStretch, options);
+  std::vector<NarrowBand> pieces;
+  std::size_t operations = 0, ghosts = 0;
+  for (std::size_t n = 0; n < patches.size(); ++n) {
+    const auto progress = [&](double from, double to) {
+      const auto share = [&](double part) {
+        return 0.2 + 0.6 * (static_cast<double>(n) + part) / static_cast<double>(patches.size());
+      };
+      return levelset::subProgress(options.progress, share(from), share(to));
+    };
+    Warp warp = warpTexture(whole, {box, sink / patches[n].height}, patches[n], *maps[n].map,
+                            {.indexToWorld = chooseGrid(base, report.voxelSize, options.merge),
+                             .scale = maps[n].distortion.meanStretch,
+                             .mapTolerance = options.mapTolerance,
+                             .maxMemory = options.maxMemory,
+                             .progress = progress(0, 0.8)});
+    report.blocksTested += warp.blocksTested;
+    report.blocksEvaluated += warp.blocksEvaluated;
+    operations += warp.operations;
+    ghosts += warp.ghosts;
+    pieces.push_back(levelset::redistance(std::move(warp.field), {.halfWidth = options.halfWidth,
+                                                                  .maxMemory = options.maxMemory,
+                                                                  .progress = progress(0.8, 1)}));
+  }
   report.operationsPerPoint =
-      static_cast<double>(warp.operations) / (512 * static_cast<double>(warp.blocksEvaluated));
-  if (warp.ghosts > 0) {
+      static_cast<double>(operations) / (512 * static_cast<double>(report.blocksEvaluated));
+  if (ghosts > 0) {
     report.notes.push_back(
         fmt::format("{} grid points far from the patch, which the map sends back into the texture, "
                     "were left out",
-                    warp.ghosts));
+                    ghosts));
   }
-  NarrowBand warped = levelset::redistance(
-      std::move(warp.field), {.halfWidth = options.halfWidth,
-                              .maxMemory = options.maxMemory,
-                              .progress = levelset::subProgress(options.progress, 0.7, 0.8)});
-  result.band = merge(base, std::move(warped), options, report);
+  result.band = merge(base, join(std::move(pieces), options), options, report);
   levelset::report(options.progress, 1, kTexture);
   return result;
 }

@@ -3,6 +3,7 @@
 #include <Imath/ImathBox.h>
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -45,9 +46,10 @@ struct TextureOptions {
   levelset::Progress progress = {};
 };
 
+/// Of all patches together; distortion is that of the worst.
 struct TextureReport {
   double voxelSize = 0;
-  std::size_t particles = 0, blocksTested = 0, blocksEvaluated = 0;
+  std::size_t patches = 0, particles = 0, blocksTested = 0, blocksEvaluated = 0;
   /// Particles added up or tetrahedra tried, for each grid point of the blocks evaluated.
   double operationsPerPoint = 0;
   Distortion distortion = {};
@@ -81,6 +83,14 @@ void requirePatchOn(const levelset::NarrowBand& base, const Patch& patch);
 ///         texture box is empty; ResourceLimit before allocating too much
 [[nodiscard]] TextureResult mapTexture(const levelset::NarrowBand& base,
                                        const levelset::NarrowBand& texture, const Patch& patch,
+                                       const TextureOptions& options = {});
+
+/// The same texture on each of many patches of one base: all have one voxel size, overlaps are
+/// united, and the base is merged once, so that a patch costs no more for being one of many.
+/// @throws as above; UsageError when there is no patch
+[[nodiscard]] TextureResult mapTexture(const levelset::NarrowBand& base,
+                                       const levelset::NarrowBand& texture,
+                                       std::span<const Patch> patches,
                                        const TextureOptions& options = {});
 
 }  // namespace mapping

@@ -5,6 +5,8 @@
 #include <tbb/parallel_for.h>
 
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <utility>
 
 #include "levelset/error.h"
@@ -57,6 +59,42 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
   mesh.triangles = texture.triangles;
   if (patch.mirrored)
     for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+  return result;
+}
+
+MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patch> patches,
+                          const MeshTextureOptions& options) {
+  if (patches.empty())
+    throw levelset::UsageError("texture: there is no patch; make one with `patch`");
+  if (patches.size() * texture.positions.size() > std::numeric_limits<std::uint32_t>::max()) {
+    throw levelset::ResourceLimit(fmt::format(
+        "texture: {} patches of {} vertices are more than a mesh can number; take fewer patches",
+        patches.size(), texture.positions.size()));
+  }
+  levelset::requireMemory(
+      static_cast<double>(patches.size()) * (24 * static_cast<double>(texture.positions.size()) +
+                                             12 * static_cast<double>(texture.triangles.size())),
+      options.maxMemory, "texture");
+  MeshTextureResult result;
+  std::vector<Distortion> distortions;
+  for (std::size_t n = 0; n < patches.size(); ++n) {
+    MeshTextureOptions part = options;
+    const auto share = [&](std::size_t k) {
+      return static_cast<double>(k) / static_cast<double>(patches.size());
+    };
+    part.progress = levelset::subProgress(options.progress, share(n), share(n + 1));
+    MeshTextureResult one = mapMesh(texture, patches[n], part);
+    const auto first = static_cast<std::uint32_t>(result.mesh.positions.size());
+    for (auto& triangle : one.mesh.triangles)
+      for (auto& vertex : triangle) vertex += first;
+    std::move(one.mesh.positions.begin(), one.mesh.positions.end(),
+              std::back_inserter(result.mesh.positions));
+    std::move(one.mesh.triangles.begin(), one.mesh.triangles.end(),
+              std::back_inserter(result.mesh.triangles));
+    std::move(one.notes.begin(), one.notes.end(), std::back_inserter(result.notes));
+    distortions.push_back(one.distortion);
+  }
+  result.distortion = worstOf(distortions);
   return result;
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,12 @@ struct MeshTextureResult {
 /// @throws UsageError for a sink that is not finite; InvalidInput when the mesh is empty, its box
 ///         has no volume, or the patch folds; ResourceLimit; Cancelled
 [[nodiscard]] MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
+                                        const MeshTextureOptions& options = {});
+
+/// The same mesh on each of many patches, one after the other in one mesh.
+/// @throws as above; UsageError when there is no patch
+[[nodiscard]] MeshTextureResult mapMesh(const levelset::TriMesh& texture,
+                                        std::span<const Patch> patches,
                                         const MeshTextureOptions& options = {});
 
 }  // namespace mapping

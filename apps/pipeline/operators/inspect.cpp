@@ -214,8 +214,12 @@ Json valueInfo(const Value& value) {
     json["bytes"] = field.memoryUse();
     json["hash"] = fmt::format("{:016x}", field.contentHash());
   } else {
-    json["levels"] = value.patch().patch.levels.size();
-    json["particles"] = value.patch().patch.particleCount();
+    const std::vector<mapping::Patch>& patches = value.patch().patches;
+    std::size_t particles = 0;
+    for (const mapping::Patch& patch : patches) particles += patch.particleCount();
+    json["patches"] = patches.size();
+    json["levels"] = patches.front().levels.size();
+    json["particles"] = particles;
   }
   return json;
 }

@@ -1,7 +1,9 @@
 #include <fmt/core.h>
 
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
@@ -16,126 +18,8 @@ namespace {
 using Imath::V3d;
 using levelset::UsageError;
 
-constexpr long kMostLevels = 1000;
-
-void validatePatch(const Invocation& in) {
-  if (in.given("corners") == in.given("at"))
-    throw UsageError("patch: give either --corners \"p0 p1 p2 p3\" or --at p --size a,b");
-  if (in.given("at") && !in.given("size"))
-    throw UsageError("patch: --at needs --size a,b beside it");
-  if (in.given("corners")) {
-    if (in.given("size") || in.given("rotate"))
-      throw UsageError("patch: --size and --rotate go with --at, not with --corners");
-    const std::size_t count = in.points("corners").size();
-    if (count != 4)
-      throw UsageError(fmt::format("patch: --corners needs four points, not {}", count));
-  }
-  if (in.text("particles") != "spline" && (in.given("spline") || in.flag("fade")))
-    throw UsageError("patch: --spline and --fade go with --particles spline");
-  if (in.text("particles") == "spline" && in.text("height") == "auto")
-    throw UsageError(
-        "patch: --height auto does not go with --particles spline; give the length "
-        "along the spline");
-  const long levels = in.integer("levels");
-  if (levels < 2 || levels > kMostLevels) {
-    throw UsageError(
-        fmt::format("patch: --levels {} is out of range; give 2 to {}", levels, kMostLevels));
-  }
-}
-
-mapping::LevelScheme schemeOf(const Invocation& in) {
-  const std::string name = in.text("particles");
-  if (name == "conforming") return mapping::LevelScheme::Conforming;
-  return name == "spline" ? mapping::LevelScheme::Spline : mapping::LevelScheme::Reduced;
-}
-
-std::array<V3d, 4> cornersOf(Invocation& in) {
-  if (in.given("corners")) {
-    const std::vector<V3d> points = in.points("corners");
-    return {points[0], points[1], points[2], points[3]};
-  }
-  const std::vector<double> size = in.lengths("size");
-  for (const double side : size) {
-    if (side > 10 * in.operands[0].diagonal()) {
-      throw levelset::InvalidInput(fmt::format(
-          "patch: --size {} is over ten times the solid's diagonal of {:.6g}; make it smaller",
-          in.text("size"), in.operands[0].diagonal()));
-    }
-  }
-  return mapping::cornersAround(in.band(), in.point("at"), size[0], size[1], in.radians("rotate"));
-}
-
-Value patch(Invocation& in) {
-  PatchValue value;
-  value.base = in.band();
-  value.autoHeight = in.text("height") == "auto";
-  value.options = {.levels = static_cast<std::size_t>(in.integer("levels")),
-                   .scheme = schemeOf(in),
-                   .fade = in.flag("fade"),
-                   .spacing = in.given("spacing") ? in.length("spacing") : 0,
-                   .mirror = in.flag("mirror"),
-                   .maxMemory = in.maxMemory,
-                   .progress = in.progress};
-  if (in.given("spline")) value.options.spline = in.points("spline");
-  value.options.transform = {
-      .twist = in.radians("twist"), .taper = in.number("taper"), .bend = in.radians("bend")};
-  value.corners = cornersOf(in);
-  // The texture will tell the height; one voxel is enough to know the patch's size until then.
-  const double height = value.autoHeight ? in.band().voxelSize() : in.length("height");
-  mapping::PatchResult result =
-      mapping::makePatch(value.base, value.corners, height, value.options);
-  const mapping::PatchReport& report = result.report;
-  nlohmann::ordered_json json;
-  json["u_length"] = report.uLength;
-  json["v_length"] = report.vLength;
-  json["particles"] = result.patch.particleCount();
-  json["levels"] = result.patch.levels.size();
-  json["cell_area_variation"] = report.cellAreaVariation;
-  json["relax_iterations"] = report.relaxIterations;
-  json["projection_distance"] = report.projectionDistance;
-  json["slowed"] = report.slowed;
-  in.notes.detailsJson = json.dump();
-  if (report.slowed > 0) {
-    in.notes.warnings.push_back(fmt::format(
-        "patch: {} of its particles would cross their neighbours where the spline bends "
-        "more narrowly than the patch is wide; they were slowed",
-        report.slowed));
-  }
-  in.notes.notes.push_back(
-      fmt::format("{:.4g} by {:.4g} along the surface, {} particles in {} levels", report.uLength,
-                  report.vLength, result.patch.particleCount(), result.patch.levels.size()));
-  value.patch = std::move(result.patch);
-  value.options.progress = {};
-  return Value(std::move(value));
-}
-
-Plan planPatch(Invocation& in) {
-  Plan plan = in.operands[0].plan();
-  plan.kind = Kind::Patch;
-  Imath::Box3d box;
-  if (in.given("corners")) {
-    const std::vector<V3d> p = in.points("corners");
-    for (const V3d& corner : p) box.extendBy(corner);
-    plan.patchSize = {std::min((p[1] - p[0]).length(), (p[2] - p[3]).length()),
-                      std::min((p[3] - p[0]).length(), (p[2] - p[1]).length()), 0};
-  } else {
-    const std::vector<double> size = in.lengths("size");
-    plan.patchSize = {size[0], size[1], 0};
-    const double reach = std::hypot(size[0], size[1]) / 2;
-    box = {in.point("at") - V3d(reach), in.point("at") + V3d(reach)};
-  }
-  const bool isAuto = in.text("height") == "auto";
-  const double height = isAuto ? box.size().length() / 2 : in.length("height");
-  if (!isAuto) plan.patchSize.z = height;
-  box.min -= V3d(height);
-  box.max += V3d(height);
-  plan.bounds = box;
-  plan.area = 0;
-  return plan;
-}
-
-/// Height that keeps the texture's proportions on a patch of this size.
-double aspectHeight(const mapping::Patch& patch, const Imath::Box3d& textureBox) {
+/// Mean lengths of the rows and of the columns of particles on the surface.
+std::array<double, 2> sidesOf(const mapping::Patch& patch) {
   const mapping::ParticleLevel& level = patch.levels.front();
   double u = 0, v = 0;
   for (std::size_t row = 0; row < level.rows; ++row)
@@ -144,10 +28,18 @@ double aspectHeight(const mapping::Patch& patch, const Imath::Box3d& textureBox)
   for (std::size_t column = 0; column < level.columns; ++column)
     for (std::size_t row = 1; row < level.rows; ++row)
       v += (level.at(column, row) - level.at(column, row - 1)).length();
-  u /= static_cast<double>(level.rows);
-  v /= static_cast<double>(level.columns);
+  return {u / static_cast<double>(level.rows), v / static_cast<double>(level.columns)};
+}
+
+/// Height that keeps the texture's proportions on patches of this size.
+double aspectHeight(std::span<const mapping::Patch> patches, const Imath::Box3d& textureBox) {
   const V3d size = textureBox.size();
-  return size.z * std::sqrt(u / size.x * v / size.y);
+  double sum = 0;
+  for (const mapping::Patch& patch : patches) {
+    const auto [u, v] = sidesOf(patch);
+    sum += size.z * std::sqrt(u / size.x * v / size.y);
+  }
+  return sum / static_cast<double>(patches.size());
 }
 
 nlohmann::ordered_json spreadOf(const mapping::Spread& spread) {
@@ -173,6 +65,7 @@ void addDistortion(const mapping::Distortion& distortion, nlohmann::ordered_json
 std::string detailsOf(const mapping::TextureReport& report, double height) {
   nlohmann::ordered_json json;
   json["voxel_size"] = report.voxelSize;
+  json["patches"] = report.patches;
   json["height"] = height;
   json["particles"] = report.particles;
   json["blocks_tested"] = report.blocksTested;
@@ -183,18 +76,24 @@ std::string detailsOf(const mapping::TextureReport& report, double height) {
   return json.dump();
 }
 
+std::size_t particlesOf(std::span<const mapping::Patch> patches) {
+  std::size_t particles = 0;
+  for (const mapping::Patch& patch : patches) particles += patch.particleCount();
+  return particles;
+}
+
 bool mapsMesh(const Invocation& in) {
   return in.text("map") == "mesh";
 }
 
-/// The patch at the height that the texture asks for.
-mapping::Patch patchFor(Invocation& in, const Imath::Box3d& textureBox) {
+/// The patches at the height that the texture asks for.
+std::vector<mapping::Patch> patchesFor(Invocation& in, const Imath::Box3d& textureBox) {
   const PatchValue& onto = in.operands[2].patch();
-  if (!onto.autoHeight) return onto.patch;
-  const double height = aspectHeight(onto.patch, textureBox);
+  if (!onto.atHeight) return onto.patches;
+  const double height = aspectHeight(onto.patches, textureBox);
   in.notes.notes.push_back(
       fmt::format("--height auto: {:.6g} keeps the texture's proportions", height));
-  return mapping::makePatch(onto.base, onto.corners, height, onto.options).patch;
+  return onto.atHeight(height);
 }
 
 Imath::Box3d textureBoxOf(const Invocation& in) {
@@ -202,18 +101,19 @@ Imath::Box3d textureBoxOf(const Invocation& in) {
 }
 
 Value textureMesh(Invocation& in) {
-  const mapping::Patch patch = patchFor(in, textureBoxOf(in));
+  const std::vector<mapping::Patch> patches = patchesFor(in, textureBoxOf(in));
   mapping::MeshTextureOptions options;
   options.sink = in.length("sink");
   if (in.given("texture-box")) options.textureBox = in.box("texture-box");
   options.allowFolds = in.flag("allow-folds");
   options.maxMemory = in.maxMemory;
   options.progress = in.progress;
-  mapping::requirePatchOn(in.band(0), patch);
-  mapping::MeshTextureResult result = mapping::mapMesh(in.mesh(1), patch, options);
+  for (const mapping::Patch& patch : patches) mapping::requirePatchOn(in.band(0), patch);
+  mapping::MeshTextureResult result = mapping::mapMesh(in.mesh(1), patches, options);
   nlohmann::ordered_json json;
-  json["height"] = patch.height;
-  json["particles"] = patch.particleCount();
+  json["patches"] = patches.size();
+  json["height"] = patches.front().height;
+  json["particles"] = particlesOf(patches);
   addDistortion(result.distortion, json);
   in.notes.detailsJson = json.dump();
   in.notes.notes.insert(in.notes.notes.end(), result.notes.begin(), result.notes.end());
@@ -240,9 +140,9 @@ Value texture(Invocation& in) {
   options.allowFolds = in.flag("allow-folds");
   options.maxMemory = in.maxMemory;
   options.progress = in.progress;
-  const mapping::Patch patch = patchFor(in, textureBoxOf(in));
-  mapping::TextureResult result = mapping::mapTexture(in.band(0), in.band(1), patch, options);
-  in.notes.detailsJson = detailsOf(result.report, patch.height);
+  const std::vector<mapping::Patch> patches = patchesFor(in, textureBoxOf(in));
+  mapping::TextureResult result = mapping::mapTexture(in.band(0), in.band(1), patches, options);
+  in.notes.detailsJson = detailsOf(result.report, patches.front().height);
   in.notes.errors.push_back({"map residual at particles, largest",
                              result.report.mapResidual / result.report.voxelSize, "voxels"});
   in.notes.notes.insert(in.notes.notes.end(), result.report.notes.begin(),
@@ -309,78 +209,6 @@ void validateTexture(const Invocation& in) {
 }  // namespace
 
 void addTextureOperators(std::vector<Operator>& all) {
-  all.push_back({
-      .name = "patch",
-      .group = "Texture mapping",
-      .summary = "lay a patch onto a surface: where a texture will stand",
-      .details = "Points are projected to the surface along the distance. u runs from corner 0 to "
-                 "1, v from corner 0 to 3, w "
-                 "outwards; corners run anticlockwise seen from outside.",
-      .example = "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
-                 "--size 8,8 --height 3 --as p "
-                 "! torus --radius 4 --tube 1.5 --voxel 0.5 --as ring ! texture @ball @ring @p "
-                 "--blend 1 ! mesh ! write ring.ply",
-      .params =
-          {{.name = "corners", .type = ParamType::Points, .doc = "four points, \"p0 p1 p2 p3\""},
-           {.name = "at", .type = ParamType::Point, .doc = "centre of a patch of --size"},
-           {.name = "size",
-            .type = ParamType::Lengths,
-            .doc = "along u and v, on the surface",
-            .range = Range::Positive,
-            .count = 2},
-           {.name = "rotate",
-            .type = ParamType::Degrees,
-            .doc = "of u about the normal, with --at",
-            .fallback = "0"},
-           {.name = "height",
-            .type = ParamType::Length,
-            .doc = "of the texture; 'auto' keeps its proportions",
-            .range = Range::Positive,
-            .required = true,
-            .allowsAuto = true},
-           {.name = "levels",
-            .type = ParamType::Integer,
-            .doc = "of particles, 2 or more",
-            .fallback = "6",
-            .range = Range::Positive},
-           {.name = "particles",
-            .type = ParamType::Choice,
-            .doc = "how they are laid above the surface",
-            .fallback = "reduced",
-            .choices = {"reduced", "conforming", "spline"}},
-           {.name = "spline",
-            .type = ParamType::Points,
-            .doc = "with --particles spline: points that its curve passes from the patch's "
-                   "centre on; default: straight along the normal"},
-           {.name = "fade",
-            .type = ParamType::Flag,
-            .doc = "with --particles spline: the surface's relief goes to nothing on the way"},
-           {.name = "twist",
-            .type = ParamType::Degrees,
-            .doc = "of the top about the patch's axis, anticlockwise from outside",
-            .fallback = "0"},
-           {.name = "taper",
-            .type = ParamType::Number,
-            .doc = "width of the top over that of the surface",
-            .fallback = "1",
-            .range = Range::Positive},
-           {.name = "bend",
-            .type = ParamType::Degrees,
-            .doc = "that the axis leans towards u at the top",
-            .fallback = "0"},
-           {.name = "spacing",
-            .type = ParamType::Length,
-            .doc = "of particles; default: by patch and voxel size",
-            .range = Range::Positive},
-           {.name = "mirror",
-            .type = ParamType::Flag,
-            .doc = "accept corners that run clockwise: the texture is mirrored"}},
-      .operands = {{Kind::Band}},
-      .resultKind = [](const Invocation&) { return Kind::Patch; },
-      .run = patch,
-      .plan = planPatch,
-      .validate = validatePatch,
-  });
   all.push_back({
       .name = "texture",
       .group = "Texture mapping",

@@ -96,7 +96,7 @@ TEST(MeshTexture, RefusesWhatCannotBeMoved) {
   const Patch patch = mapping::makePatch(makeBall(2, 0.1), cap(0.5, 2), 0.5).patch;
   const TriMesh ring = makeRing(1, 0.3, 12, 8);
   EXPECT_THROW((void)mapping::mapMesh({}, patch), levelset::InvalidInput);
-  EXPECT_THROW((void)mapping::mapMesh(ring, {}), levelset::InvalidInput);
+  EXPECT_THROW((void)mapping::mapMesh(ring, Patch{}), levelset::InvalidInput);
   EXPECT_THROW((void)mapping::mapMesh(ring, patch, {.sink = std::nan("")}), levelset::UsageError);
   TriMesh flat = ring;
   for (V3d& p : flat.positions) p.z = 0;
