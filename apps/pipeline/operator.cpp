@@ -159,6 +159,7 @@ const std::vector<Operator>& operators() {
     addFlowOperators(list);
     addPlacementOperators(list);
     addPatchOperators(list);
+    addScatterOperators(list);
     addTextureOperators(list);
     addInspectionOperators(list);
     addPictureOperators(list);

@@ -29,6 +29,7 @@ struct Plan {
   double fieldBytes = 0;     ///< fields only
   /// Patches only: along u, along v, and the height, 0 where only the texture will tell.
   Imath::V3d patchSize = Imath::V3d(0);
+  double patchCount = 1;
   /// Active voxels that a band of this area takes.
   [[nodiscard]] double activeVoxels() const;
   [[nodiscard]] double bytes() const;

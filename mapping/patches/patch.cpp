@@ -337,6 +337,11 @@ PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners,
   return result;
 }
 
+V3d eastOf(const V3d& normal) {
+  const V3d reference = std::abs(normal.x) < 0.9 ? V3d(1, 0, 0) : V3d(0, 1, 0);
+  return (reference - normal * normal.dot(reference)).normalized();
+}
+
 std::array<V3d, 4> cornersAround(const NarrowBand& base, const V3d& point, double a, double b,
                                  double rotation) {
   for (const double size : {a, b}) {
@@ -350,8 +355,7 @@ std::array<V3d, 4> cornersAround(const NarrowBand& base, const V3d& point, doubl
   const V3d center = closestSurfacePoint(base, point, kPatch);
   const SurfaceField field(base);
   const V3d normal = field.normal(center);
-  const V3d reference = std::abs(normal.x) < 0.9 ? V3d(1, 0, 0) : V3d(0, 1, 0);
-  const V3d east = (reference - normal * normal.dot(reference)).normalized();
+  const V3d east = eastOf(normal);
   const V3d north = normal.cross(east);
   const V3d u = east * std::cos(rotation) + north * std::sin(rotation), v = normal.cross(u);
   constexpr std::array<std::array<double, 2>, 4> kSigns = {{{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}};

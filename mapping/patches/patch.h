@@ -107,9 +107,11 @@ struct PatchResult {
                                     const std::array<Imath::V3d, 4>& corners, double height,
                                     const PatchOptions& options = {});
 
+/// Across a unit normal, the direction that projects best onto +x (or +y where +x is normal).
+[[nodiscard]] Imath::V3d eastOf(const Imath::V3d& normal);
+
 /// A patch of size a × b (world units along the surface) about a point, u turned by `rotation`
-/// radians about the normal from the direction that projects best onto +x (or +y where +x is
-/// normal).
+/// radians about the normal from eastOf.
 [[nodiscard]] std::array<Imath::V3d, 4> cornersAround(const levelset::NarrowBand& base,
                                                       const Imath::V3d& point, double a, double b,
                                                       double rotation = 0);

@@ -29,6 +29,7 @@ bool isFaithful(const NarrowBand& coarse, std::span<const V3d> border) {
 /// The base on a coarser grid; the base itself when that would lose its surface.
 NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> border, double height,
                    const PatchSpaceOptions& options) {
+  if (height < 2 * kCoarseVoxels * base.voxelSize()) return base;
   const V3d extent = base.zeroSetBounds().size();
   const double thickness = std::min({extent.x, extent.y, extent.z}) / base.voxelSize();
   double factor = std::floor(

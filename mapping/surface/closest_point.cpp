@@ -39,11 +39,6 @@ V3d nearestFoot(const levelset::NarrowBand& base, const V3d& point) {
 }  // namespace
 
 V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point, const char* action) {
-  const Imath::Box3d box = base.zeroSetBounds();
-  if (box.isEmpty()) {
-    throw levelset::InvalidInput(
-        fmt::format("{}: the base has no surface; give a solid with at least one voxel", action));
-  }
   const auto at = [&] {
     return fmt::format("({:.6g}, {:.6g}, {:.6g})", point.x, point.y, point.z);
   };
@@ -53,6 +48,10 @@ V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point, cons
   const SurfaceField field(base);
   V3d foot = point;
   if (!field.project(foot, 0)) {
+    if (base.zeroSetBounds().isEmpty()) {
+      throw levelset::InvalidInput(
+          fmt::format("{}: the base has no surface; give a solid with at least one voxel", action));
+    }
     foot = nearestFoot(base, point);
     if (!field.project(foot, 0)) {
       throw levelset::InvalidInput(fmt::format(
@@ -74,7 +73,10 @@ V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point, cons
       step *= 0.5;
     }
   }
-  const double distance = (point - foot).length(), diagonal = box.size().length();
+  const double distance = (point - foot).length();
+  // Within the band the answer is sure; the box would take a look at every voxel.
+  if (distance <= base.halfWidth() * base.voxelSize()) return foot;
+  const double diagonal = base.zeroSetBounds().size().length();
   if (distance > diagonal) {
     throw levelset::InvalidInput(fmt::format(
         "{}: the point {} is {:.6g} away from the surface, further than the diagonal {:.6g} "

@@ -138,7 +138,8 @@ ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink,
   return result;
 }
 
-/// The map of every patch. What folds is refused, or noted.
+/// The map of every patch, none where it folds and is skipped. What folds otherwise is refused, or
+/// noted.
 std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> patches, double sink,
                                 const V3d& textureSize, const TextureOptions& options,
                                 TextureReport& report) {
@@ -152,6 +153,11 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
     ChosenMap chosen = makeMap(base, patch, sink / patch.height, part);
     chosen.distortion = surveyDistortion(chosen.samples, textureSize, patch.mirrored);
     chosen.samples = {};
+    if (options.skipFolds && chosen.distortion.folded > 0) {
+      ++report.skipped;
+      maps.emplace_back();
+      continue;
+    }
     std::vector<std::string> notes = judgeFolds(chosen.distortion, options.allowFolds);
     std::move(notes.begin(), notes.end(), std::back_inserter(report.notes));
     report.particles += chosen.particles;
@@ -159,7 +165,16 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
     distortions.push_back(chosen.distortion);
     maps.push_back(std::move(chosen));
   }
-  report.patches = patches.size();
+  report.patches = distortions.size();
+  if (distortions.empty()) {
+    throw InvalidInput(
+        fmt::format("{}: all of {} patches fold; lower their height or make them smaller", kTexture,
+                    patches.size()));
+  }
+  if (report.skipped > 0) {
+    report.notes.push_back(
+        fmt::format("{} of {} patches fold and were left out", report.skipped, patches.size()));
+  }
   report.distortion = worstOf(distortions);
   return maps;
 }
@@ -169,6 +184,7 @@ void requireResult(const NarrowBand& texture, double voxelSize, std::span<const 
                    const TextureOptions& options) {
   double voxels = 0;
   for (const ChosenMap& map : maps) {
+    if (!map.map) continue;
     const double finer = texture.voxelSize() * map.distortion.meanStretch / voxelSize;
     const double width =
         std::max(1.0, options.halfWidth / std::max(1.0, texture.halfWidth() * finer));
@@ -259,7 +275,8 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
   const double sink = options.sink ? *options.sink : base.voxelSize();
   const std::vector<ChosenMap> maps = makeMaps(base, patches, sink, box.size(), options, report);
   double minStretch = HUGE_VAL;
-  for (const ChosenMap& chosen : maps) minStretch = std::min(minStretch, chosen.leastStretch());
+  for (const ChosenMap& chosen : maps)
+    if (chosen.map) minStretch = std::min(minStretch, chosen.leastStretch());
   report.voxelSize = chooseVoxelSize(base, texture, minStretch, options);
   requireResult(texture, report.voxelSize, maps, options);
 
@@ -272,6 +289,7 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
   std::vector<NarrowBand> pieces;
   std::size_t operations = 0, ghosts = 0;
   for (std::size_t n = 0; n < patches.size(); ++n) {
+    if (!maps[n].map) continue;
     const auto progress = [&](double from, double to) {
       const auto share = [&](double part) {
         return 0.2 + 0.6 * (static_cast<double>(n) + part) / static_cast<double>(patches.size());

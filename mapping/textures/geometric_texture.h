@@ -42,6 +42,7 @@ struct TextureOptions {
   RbfMapOptions rbf = {};
   double mapTolerance = 0.05;  ///< of the map's fast evaluation, texture voxels
   bool allowFolds = false;
+  bool skipFolds = false;  ///< of many patches, leave out those that fold
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
@@ -49,7 +50,8 @@ struct TextureOptions {
 /// Of all patches together; distortion is that of the worst.
 struct TextureReport {
   double voxelSize = 0;
-  std::size_t patches = 0, particles = 0, blocksTested = 0, blocksEvaluated = 0;
+  std::size_t patches = 0, skipped = 0;  ///< mapped, and left out because they fold
+  std::size_t particles = 0, blocksTested = 0, blocksEvaluated = 0;
   /// Particles added up or tetrahedra tried, for each grid point of the blocks evaluated.
   double operationsPerPoint = 0;
   Distortion distortion = {};
@@ -87,7 +89,7 @@ void requirePatchOn(const levelset::NarrowBand& base, const Patch& patch);
 
 /// The same texture on each of many patches of one base: all have one voxel size, overlaps are
 /// united, and the base is merged once, so that a patch costs no more for being one of many.
-/// @throws as above; UsageError when there is no patch
+/// @throws as above; UsageError when there is no patch; InvalidInput when all were to be skipped
 [[nodiscard]] TextureResult mapTexture(const levelset::NarrowBand& base,
                                        const levelset::NarrowBand& texture,
                                        std::span<const Patch> patches,

@@ -83,7 +83,9 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
       return static_cast<double>(k) / static_cast<double>(patches.size());
     };
     part.progress = levelset::subProgress(options.progress, share(n), share(n + 1));
+    part.allowFolds = options.allowFolds || options.skipFolds;
     MeshTextureResult one = mapMesh(texture, patches[n], part);
+    if (options.skipFolds && one.distortion.folded > 0) continue;
     const auto first = static_cast<std::uint32_t>(result.mesh.positions.size());
     for (auto& triangle : one.mesh.triangles)
       for (auto& vertex : triangle) vertex += first;
@@ -93,6 +95,15 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
               std::back_inserter(result.mesh.triangles));
     std::move(one.notes.begin(), one.notes.end(), std::back_inserter(result.notes));
     distortions.push_back(one.distortion);
+  }
+  if (distortions.empty()) {
+    throw levelset::InvalidInput(
+        fmt::format("texture: all of {} patches fold; lower their height or make them smaller",
+                    patches.size()));
+  }
+  if (distortions.size() < patches.size()) {
+    result.notes.push_back(fmt::format("{} of {} patches fold and were left out",
+                                       patches.size() - distortions.size(), patches.size()));
   }
   result.distortion = worstOf(distortions);
   return result;

@@ -20,6 +20,7 @@ struct MeshTextureOptions {
   std::optional<Imath::Box3d> textureBox =
       {};  ///< what the unit cube of u, v, w is; empty: the mesh's own box
   bool allowFolds = false;
+  bool skipFolds = false;  ///< of many patches, leave out those that fold
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };

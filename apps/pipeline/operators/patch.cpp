@@ -5,6 +5,7 @@
 
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/patch_options.h"
 #include "levelset/error.h"
 #include "mapping/patches/patch.h"
 
@@ -13,8 +14,6 @@ namespace {
 
 using Imath::V3d;
 using levelset::UsageError;
-
-constexpr long kMostLevels = 1000;
 
 void validatePatch(const Invocation& in) {
   if (in.given("corners") == in.given("at"))
@@ -28,23 +27,7 @@ void validatePatch(const Invocation& in) {
     if (count != 4)
       throw UsageError(fmt::format("patch: --corners needs four points, not {}", count));
   }
-  if (in.text("particles") != "spline" && (in.given("spline") || in.flag("fade")))
-    throw UsageError("patch: --spline and --fade go with --particles spline");
-  if (in.text("particles") == "spline" && in.text("height") == "auto")
-    throw UsageError(
-        "patch: --height auto does not go with --particles spline; give the length "
-        "along the spline");
-  const long levels = in.integer("levels");
-  if (levels < 2 || levels > kMostLevels) {
-    throw UsageError(
-        fmt::format("patch: --levels {} is out of range; give 2 to {}", levels, kMostLevels));
-  }
-}
-
-mapping::LevelScheme schemeOf(const Invocation& in) {
-  const std::string name = in.text("particles");
-  if (name == "conforming") return mapping::LevelScheme::Conforming;
-  return name == "spline" ? mapping::LevelScheme::Spline : mapping::LevelScheme::Reduced;
+  validateLevels(in);
 }
 
 std::array<V3d, 4> cornersOf(Invocation& in) {
@@ -63,22 +46,8 @@ std::array<V3d, 4> cornersOf(Invocation& in) {
   return mapping::cornersAround(in.band(), in.point("at"), size[0], size[1], in.radians("rotate"));
 }
 
-mapping::PatchOptions optionsOf(Invocation& in) {
-  mapping::PatchOptions options = {.levels = static_cast<std::size_t>(in.integer("levels")),
-                                   .scheme = schemeOf(in),
-                                   .fade = in.flag("fade"),
-                                   .spacing = in.given("spacing") ? in.length("spacing") : 0,
-                                   .mirror = in.flag("mirror"),
-                                   .maxMemory = in.maxMemory,
-                                   .progress = in.progress};
-  if (in.given("spline")) options.spline = in.points("spline");
-  options.transform = {
-      .twist = in.radians("twist"), .taper = in.number("taper"), .bend = in.radians("bend")};
-  return options;
-}
-
 Value patch(Invocation& in) {
-  mapping::PatchOptions options = optionsOf(in);
+  mapping::PatchOptions options = patchOptionsOf(in);
   const std::array<V3d, 4> corners = cornersOf(in);
   const bool isAuto = in.text("height") == "auto";
   // The texture will tell the height; one voxel is enough to know the patch's size until then.
@@ -154,7 +123,7 @@ void addPatchOperators(std::vector<Operator>& all) {
                  "--size 8,8 --height 3 --as p "
                  "! torus --radius 4 --tube 1.5 --voxel 0.5 --as ring ! texture @ball @ring @p "
                  "--blend 1 ! mesh ! write ring.ply",
-      .params =
+      .params = withLevels(
           {{.name = "corners", .type = ParamType::Points, .doc = "four points, \"p0 p1 p2 p3\""},
            {.name = "at", .type = ParamType::Point, .doc = "centre of a patch of --size"},
            {.name = "size",
@@ -166,22 +135,6 @@ void addPatchOperators(std::vector<Operator>& all) {
             .type = ParamType::Degrees,
             .doc = "of u about the normal, with --at",
             .fallback = "0"},
-           {.name = "height",
-            .type = ParamType::Length,
-            .doc = "of the texture; 'auto' keeps its proportions",
-            .range = Range::Positive,
-            .required = true,
-            .allowsAuto = true},
-           {.name = "levels",
-            .type = ParamType::Integer,
-            .doc = "of particles, 2 or more",
-            .fallback = "6",
-            .range = Range::Positive},
-           {.name = "particles",
-            .type = ParamType::Choice,
-            .doc = "how they are laid above the surface",
-            .fallback = "reduced",
-            .choices = {"reduced", "conforming", "spline"}},
            {.name = "spline",
             .type = ParamType::Points,
             .doc = "with --particles spline: points that its curve passes from the patch's "
@@ -189,26 +142,9 @@ void addPatchOperators(std::vector<Operator>& all) {
            {.name = "fade",
             .type = ParamType::Flag,
             .doc = "with --particles spline: the surface's relief goes to nothing on the way"},
-           {.name = "twist",
-            .type = ParamType::Degrees,
-            .doc = "of the top about the patch's axis, anticlockwise from outside",
-            .fallback = "0"},
-           {.name = "taper",
-            .type = ParamType::Number,
-            .doc = "width of the top over that of the surface",
-            .fallback = "1",
-            .range = Range::Positive},
-           {.name = "bend",
-            .type = ParamType::Degrees,
-            .doc = "that the axis leans towards u at the top",
-            .fallback = "0"},
-           {.name = "spacing",
-            .type = ParamType::Length,
-            .doc = "of particles; default: by patch and voxel size",
-            .range = Range::Positive},
            {.name = "mirror",
             .type = ParamType::Flag,
-            .doc = "accept corners that run clockwise: the texture is mirrored"}},
+            .doc = "accept corners that run clockwise: the texture is mirrored"}}),
       .operands = {{Kind::Band}},
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = patch,

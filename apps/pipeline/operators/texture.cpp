@@ -66,6 +66,7 @@ std::string detailsOf(const mapping::TextureReport& report, double height) {
   nlohmann::ordered_json json;
   json["voxel_size"] = report.voxelSize;
   json["patches"] = report.patches;
+  json["skipped"] = report.skipped;
   json["height"] = height;
   json["particles"] = report.particles;
   json["blocks_tested"] = report.blocksTested;
@@ -106,6 +107,7 @@ Value textureMesh(Invocation& in) {
   options.sink = in.length("sink");
   if (in.given("texture-box")) options.textureBox = in.box("texture-box");
   options.allowFolds = in.flag("allow-folds");
+  options.skipFolds = in.flag("skip-folds");
   options.maxMemory = in.maxMemory;
   options.progress = in.progress;
   for (const mapping::Patch& patch : patches) mapping::requirePatchOn(in.band(0), patch);
@@ -138,6 +140,7 @@ Value texture(Invocation& in) {
   options.rbf.lambdaNear = in.number("lambda-near");
   options.rbf.lambdaFar = in.number("lambda-far");
   options.allowFolds = in.flag("allow-folds");
+  options.skipFolds = in.flag("skip-folds");
   options.maxMemory = in.maxMemory;
   options.progress = in.progress;
   const std::vector<mapping::Patch> patches = patchesFor(in, textureBoxOf(in));
@@ -177,9 +180,10 @@ Plan planTexture(Invocation& in) {
   plan.voxelSize = in.given("voxel") ? in.length("voxel")
                                      : mapping::resultVoxelSize(plan.voxelSize, texture.voxelSize,
                                                                 plannedStretch(in, texture, patch));
-  const double from = texture.bounds.size().length(), to = patch.bounds.size().length();
+  const double from = texture.bounds.size().length();
+  const double to = (patch.patchCount > 1 ? patch.patchSize : patch.bounds.size()).length();
   const double scale = from > 0 ? to / from : 1;
-  plan.area = (in.flag("alone") ? 0 : plan.area) + texture.area * scale * scale;
+  plan.area = (in.flag("alone") ? 0 : plan.area) + patch.patchCount * texture.area * scale * scale;
   plan.bounds.extendBy(patch.bounds);
   return plan;
 }
@@ -187,6 +191,8 @@ Plan planTexture(Invocation& in) {
 void validateTexture(const Invocation& in) {
   if (in.flag("carve") && in.flag("alone"))
     throw UsageError("texture: --carve and --alone exclude each other");
+  if (in.flag("allow-folds") && in.flag("skip-folds"))
+    throw UsageError("texture: --allow-folds and --skip-folds exclude each other");
   if (in.flag("alone") && in.given("blend"))
     throw UsageError("texture: --alone has no seam to blend; leave --blend out");
   const Kind kind = in.operands[1].kind();
@@ -260,7 +266,10 @@ void addTextureOperators(std::vector<Operator>& all) {
             .doc = "the same above the surface",
             .fallback = "0.25",
             .range = Range::NonNegative},
-           {.name = "allow-folds", .type = ParamType::Flag, .doc = "map even where the map folds"}},
+           {.name = "allow-folds", .type = ParamType::Flag, .doc = "map even where the map folds"},
+           {.name = "skip-folds",
+            .type = ParamType::Flag,
+            .doc = "of many patches, leave out those whose map folds"}},
       .operands = {{Kind::Band}, {Kind::Band, Kind::Mesh}, {Kind::Patch}},
       .resultKind = [](const Invocation& in) { return mapsMesh(in) ? Kind::Mesh : Kind::Band; },
       .run = texture,

@@ -1,0 +1,316 @@
+#include "mapping/surface/scattered_points.h"
+
+#include <fmt/core.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <random>
+#include <span>
+#include <unordered_map>
+#include <utility>
+
+#include "levelset/error.h"
+#include "levelset/meshing/band_to_mesh.h"
+#include "mapping/surface/surface_field.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using levelset::UsageError;
+
+constexpr const char* kSpread = "scatter";
+constexpr double kCandidatesPerPoint = 20;  // [Yuksel15] takes five and more
+constexpr double kMostPoints = 1e6;
+constexpr double kOtherSide = -0.5;  // cosine between normals
+constexpr double kThin = 0.25;       // of the distance that is kept
+
+/// The same numbers everywhere, which the standard's distributions do not promise.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  /// In [0, 1).
+  double operator()() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// Which points are near: cells as wide as the distance that matters.
+class PointGrid {
+ public:
+  explicit PointGrid(double width) : width_(width) {}
+  void add(const V3d& p, std::size_t index) { cells_[cellOf(p)].push_back(index); }
+  /// Every point that may lie within the width of p.
+  template <typename Visit>
+  void visitNear(const V3d& p, const Visit& visit) const {
+    const CellKey c = cellOf(p);
+    for (long x = c[0] - 1; x <= c[0] + 1; ++x)
+      for (long y = c[1] - 1; y <= c[1] + 1; ++y)
+        for (long z = c[2] - 1; z <= c[2] + 1; ++z) {
+          const auto found = cells_.find({x, y, z});
+          if (found == cells_.end()) continue;
+          for (const std::size_t index : found->second) visit(index);
+        }
+  }
+
+ private:
+  using CellKey = std::array<long, 3>;
+  [[nodiscard]] CellKey cellOf(const V3d& p) const {
+    return {std::lround(p.x / width_), std::lround(p.y / width_), std::lround(p.z / width_)};
+  }
+  double width_;
+  struct Hash {
+    std::size_t operator()(const CellKey& c) const {
+      std::uint64_t h = 0;
+      for (const long x : c) h = (h ^ static_cast<std::uint64_t>(x)) * 0x9e3779b97f4a7c15;
+      return h ^ (h >> 29);
+    }
+  };
+  std::unordered_map<CellKey, std::vector<std::size_t>, Hash> cells_;
+};
+
+void checkDensity(const ScatterDensity& density) {
+  if (!(density.distance >= 0) || !std::isfinite(density.distance)) {
+    throw UsageError(fmt::format("{}: the distance of points is {}; give a positive length",
+                                 kSpread, density.distance));
+  }
+  if ((density.count > 0) == (density.distance > 0)) {
+    throw UsageError(
+        fmt::format("{}: give either how many points there are or how far apart", kSpread));
+  }
+}
+
+double scaleAt(const ScatterDensity& density, const V3d& place) {
+  const double scale = density.scale ? density.scale(place) : 1;
+  if (!(scale > 0) || !std::isfinite(scale)) {
+    throw UsageError(
+        fmt::format("{}: the scale at ({:.6g}, {:.6g}, {:.6g}) is {}; it has to be positive",
+                    kSpread, place.x, place.y, place.z, scale));
+  }
+  return scale;
+}
+
+/// The zero set as triangles, to choose from by area.
+class AreaSampler {
+ public:
+  explicit AreaSampler(const levelset::NarrowBand& base)
+      : mesh_(levelset::bandToMesh(base)), field_(base) {
+    sums_.reserve(mesh_.triangles.size());
+    for (const auto& [a, b, c] : mesh_.triangles) {
+      const V3d& p = mesh_.positions[a];
+      area_ += 0.5 * (mesh_.positions[b] - p).cross(mesh_.positions[c] - p).length();
+      sums_.push_back(area_);
+    }
+  }
+  [[nodiscard]] double area() const { return area_; }
+
+  SurfacePoint operator()(Random& random) const {
+    const auto chosen = std::upper_bound(sums_.begin(), sums_.end(), random() * area_);
+    const auto n = std::min(static_cast<std::size_t>(chosen - sums_.begin()), sums_.size() - 1);
+    const auto& [a, b, c] = mesh_.triangles[n];
+    const double root = std::sqrt(random()), share = random();
+    SurfacePoint point;
+    point.place = mesh_.positions[a] * (1 - root) + mesh_.positions[b] * (root * (1 - share)) +
+                  mesh_.positions[c] * (root * share);
+    V3d foot = point.place;
+    if (field_.project(foot, 0)) point.place = foot;
+    point.normal = field_.normal(point.place);
+    return point;
+  }
+
+ private:
+  levelset::TriMesh mesh_;
+  SurfaceField field_;
+  std::vector<double> sums_;
+  double area_ = 0;
+};
+
+struct Candidates {
+  std::vector<SurfacePoint> points;
+  double area = 0;  ///< that the weight leaves, each part in units of its scale²
+};
+
+/// By area, thinned by the weight.
+Candidates makeCandidates(const AreaSampler& sampler, const ScatterDensity& density,
+                          std::size_t count, Random& random) {
+  // A weight that leaves one place in a thousand is met often enough.
+  const std::size_t most = density.weight ? 1000 * count : count;
+  Candidates result;
+  double sum = 0;
+  std::size_t tried = 0;
+  for (; tried < most && result.points.size() < count; ++tried) {
+    SurfacePoint point = sampler(random);
+    const double luck = random();
+    if (density.weight && !(luck < density.weight(point.place))) continue;
+    point.scale = scaleAt(density, point.place);
+    sum += 1 / (point.scale * point.scale);
+    result.points.push_back(point);
+  }
+  if (result.points.empty()) {
+    throw InvalidInput(
+        fmt::format("{}: the mask leaves no place on the surface; widen it", kSpread));
+  }
+  result.area = sampler.area() * sum / static_cast<double>(tried);
+  return result;
+}
+
+/// In scales. @param reach  that matters, in scales
+double scaledDistance(const SurfacePoint& a, const SurfacePoint& b, double reach) {
+  const double scale = 0.5 * (a.scale + b.scale);
+  return surfaceDistance(a, b, kThin * reach * scale) / scale;
+}
+
+double largestScale(std::span<const SurfacePoint> points) {
+  double largest = 0;
+  for (const SurfacePoint& p : points) largest = std::max(largest, p.scale);
+  return largest;
+}
+
+/// In the order that they come, unless one that was taken is too near.
+std::vector<SurfacePoint> throwDarts(std::span<const SurfacePoint> candidates, double distance) {
+  std::vector<SurfacePoint> taken;
+  PointGrid grid(distance * largestScale(candidates));
+  for (const SurfacePoint& candidate : candidates) {
+    bool isFree = true;
+    grid.visitNear(candidate.place, [&](std::size_t index) {
+      isFree = isFree && !(scaledDistance(candidate, taken[index], distance) < distance);
+    });
+    if (!isFree) continue;
+    grid.add(candidate.place, taken.size());
+    taken.push_back(candidate);
+  }
+  return taken;
+}
+
+/// Gives up the most crowded until none are left: in reverse, every first n are well spread.
+std::vector<SurfacePoint> orderBySpread(std::span<const SurfacePoint> candidates, double reach,
+                                        std::size_t kept) {
+  PointGrid grid(reach * largestScale(candidates));
+  for (std::size_t i = 0; i < candidates.size(); ++i) grid.add(candidates[i].place, i);
+  struct Neighbour {
+    std::size_t index;
+    double crowding;
+  };
+  // What is much too near either way is not told apart: one of the two goes [Yuksel15].
+  const double share = static_cast<double>(kept) / static_cast<double>(candidates.size());
+  const double limit = 0.65 * (1 - std::pow(share, 1.5));
+  std::vector<std::vector<Neighbour>> neighbours(candidates.size());
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, candidates.size(), 64), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i)
+          grid.visitNear(candidates[i].place, [&](std::size_t j) {
+            if (j == i) return;
+            const double d = scaledDistance(candidates[i], candidates[j], 0.5 * reach) / reach;
+            if (d < 1) neighbours[i].push_back({j, std::pow(1 - std::max(d, limit), 8)});
+          });
+      });
+  std::vector<double> crowding(candidates.size(), 0);
+  std::priority_queue<std::pair<double, std::size_t>> queue;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    for (const Neighbour& n : neighbours[i]) crowding[i] += n.crowding;
+    queue.emplace(crowding[i], i);
+  }
+  std::vector<char> isGone(candidates.size(), 0);
+  std::vector<std::size_t> order;
+  while (order.size() + kept < candidates.size()) {
+    const auto [value, index] = queue.top();
+    queue.pop();
+    if (isGone[index] || value != crowding[index]) continue;
+    isGone[index] = 1;
+    order.push_back(index);
+    for (const Neighbour& n : neighbours[index]) {
+      if (isGone[n.index]) continue;
+      crowding[n.index] -= n.crowding;
+      queue.emplace(crowding[n.index], n.index);
+    }
+  }
+  std::vector<SurfacePoint> result;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    if (!isGone[i]) result.push_back(candidates[i]);
+  for (auto it = order.rbegin(); it != order.rend(); ++it) result.push_back(candidates[*it]);
+  return result;
+}
+
+/// @param reach  in scales: points further apart do not count
+double leastDistance(std::span<const SurfacePoint> points, double reach) {
+  PointGrid grid(reach * largestScale(points));
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    grid.visitNear(points[i].place, [&](std::size_t j) {
+      least = std::min(least, scaledDistance(points[i], points[j], 0.5 * reach));
+    });
+    grid.add(points[i].place, i);
+  }
+  return least;
+}
+
+}  // namespace
+
+double surfaceDistance(const SurfacePoint& a, const SurfacePoint& b, double thin) {
+  const V3d way = b.place - a.place;
+  const double straight = way.length();
+  if (straight == 0) return 0;
+  if (straight < thin && a.normal.dot(b.normal) < kOtherSide)
+    return std::numeric_limits<double>::infinity();
+  const auto clamped = [](double x) { return std::clamp(x, -1.0, 1.0); };
+  const double first = clamped(a.normal.dot(way) / straight),
+               last = clamped(b.normal.dot(way) / straight);
+  const double turn = first - last;
+  constexpr double kStraight = 1e-4;
+  const double bend = std::abs(turn) < kStraight ? 1 / std::sqrt(std::max(1 - first * first, 0.25))
+                                                 : (std::asin(first) - std::asin(last)) / turn;
+  return bend * straight;
+}
+
+ScatteredPoints scatterPoints(const levelset::NarrowBand& base, const ScatterDensity& density) {
+  checkDensity(density);
+  if (base.isEmpty()) {
+    throw InvalidInput(
+        fmt::format("{}: the base has no surface; give a solid with at least one voxel", kSpread));
+  }
+  levelset::report(density.progress, 0, kSpread);
+  const AreaSampler sampler(base);
+  if (!(sampler.area() > 0)) {
+    throw InvalidInput(
+        fmt::format("{}: the base has no surface; give a solid with at least one voxel", kSpread));
+  }
+  levelset::report(density.progress, 0.5, kSpread);
+  Random random(density.seed);
+  double wanted = static_cast<double>(density.count);
+  if (density.count == 0) {
+    // Discs cannot be packed more densely.
+    constexpr std::size_t kSurvey = 1000;
+    const double disc = 0.5 * std::sqrt(3.0) * density.distance * density.distance;
+    wanted = std::max(1.0, makeCandidates(sampler, density, kSurvey, random).area / disc);
+  }
+  if (!(wanted <= kMostPoints)) {
+    throw levelset::ResourceLimit(
+        fmt::format("{}: this would be {:.3g} points, more than {:.0g}; {}", kSpread, wanted,
+                    kMostPoints, density.count > 0 ? "ask for fewer" : "take a larger distance"));
+  }
+  const Candidates candidates = makeCandidates(
+      sampler, density, static_cast<std::size_t>(wanted * kCandidatesPerPoint) + 50, random);
+  levelset::report(density.progress, 0.7, kSpread);
+  ScatteredPoints result;
+  double reach = 2 * density.distance;
+  if (density.count == 0) {
+    result.points = throwDarts(candidates.points, density.distance);
+    result.wanted = result.points.size();
+  } else {
+    result.wanted = std::min(density.count, candidates.points.size());
+    reach = 2 * std::sqrt(candidates.area / (2 * std::sqrt(3.0) * wanted));
+    result.points = orderBySpread(candidates.points, reach, result.wanted);
+  }
+  result.distance = leastDistance(std::span(result.points).first(result.wanted), reach);
+  levelset::report(density.progress, 1, kSpread);
+  return result;
+}
+
+}  // namespace mapping
