@@ -159,6 +159,7 @@ const std::vector<Operator>& operators() {
     addFlowOperators(list);
     addPlacementOperators(list);
     addTextureOperators(list);
+    addGeneratorOperators(list);
     addInspectionOperators(list);
     addPictureOperators(list);
     addRegressionOperators(list);

@@ -109,6 +109,7 @@ void addEikonalOperators(std::vector<Operator>& all);
 void addFlowOperators(std::vector<Operator>& all);
 void addPlacementOperators(std::vector<Operator>& all);
 void addTextureOperators(std::vector<Operator>& all);
+void addGeneratorOperators(std::vector<Operator>& all);
 void addInspectionOperators(std::vector<Operator>& all);
 void addPictureOperators(std::vector<Operator>& all);
 void addRegressionOperators(std::vector<Operator>& all);
