@@ -119,8 +119,9 @@ levelset::NarrowBand makeHexagons(const Hexagons& hexagons, const V3d& center, d
   checkHexagons(hexagons, center, voxelSize, options);
   const TileBox box = hexagonsBox(hexagons, center);
   const V2d period = hexagonPeriod(hexagons);
-  // The first hexagon stands in the middle of the first column and row.
-  const V3d origin(box.tile.min.x + period.x / 2, box.tile.min.y + period.y / 2,
+  // The first row stands on the tile's lower side, which halves it: beside it, the side would cut
+  // slivers off the next row's corners.
+  const V3d origin(box.tile.min.x + period.x / 2, box.tile.min.y,
                    box.tile.max.z - hexagons.height);
   const HexagonField pattern(hexagons, origin);
   const double exact = (options.halfWidth + 0.5) * voxelSize;

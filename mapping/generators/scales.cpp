@@ -189,9 +189,12 @@ levelset::NarrowBand makeScales(const Scales& scales, const V3d& center, double 
   // Beyond a leaf, blocks need to know no more than that they are far.
   const double exact = (options.halfWidth + 0.5) * voxelSize;
   const ScalesField pattern(scales, origin, exact + 8 * voxelSize);
+  // Tips end by themselves.
+  Imath::Box3d cut = box.whole;
+  cut.max.z = HUGE_VAL;
   return levelset::makeShape(
       scalesExtent(scales, center), voxelSize, options, kScales,
-      [&](const V3d& p) { return clippedDistance(pattern, p, box.whole, exact, voxelSize); });
+      [&](const V3d& p) { return clippedDistance(pattern, p, cut, exact, voxelSize); });
 }
 
 }  // namespace mapping
