@@ -121,8 +121,7 @@ levelset::NarrowBand makeHexagons(const Hexagons& hexagons, const V3d& center, d
   const V2d period = hexagonPeriod(hexagons);
   // The first row stands on the tile's lower side, which halves it: beside it, the side would cut
   // slivers off the next row's corners.
-  const V3d origin(box.tile.min.x + period.x / 2, box.tile.min.y,
-                   box.tile.max.z - hexagons.height);
+  const V3d origin(box.tile.min.x + period.x / 2, box.tile.min.y, box.tile.max.z - hexagons.height);
   const HexagonField pattern(hexagons, origin);
   const double exact = (options.halfWidth + 0.5) * voxelSize;
   return levelset::makeShape(
