@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "levelset/error.h"
-#include "levelset/solids/fill_blocks_vdb.h"
+#include "levelset/solids/shape_band_vdb.h"
 #include "levelset/vdb.h"
 
 namespace levelset {
@@ -65,33 +65,6 @@ void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions
   const double leaves =
       extent.area / (64 * voxelSize * voxelSize) * (2 * options.halfWidth + 15) / 8;
   requireMemory(leaves * 2300 + 1e5, options.maxMemory, action);
-}
-
-/// @param phi  exact signed distance at a world position
-template <typename Distance>
-NarrowBand makeShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
-                     const char* action, const Distance& distance) {
-  checkShape(extent, voxelSize, options, action);
-  report(options.progress, 0, action);
-
-  const auto grid = emptyLevelSet(uniformTransform(voxelSize), options.halfWidth);
-  openvdb::CoordBBox domain;
-  for (int axis = 0; axis < 3; ++axis) {
-    domain.min()[axis] =
-        static_cast<int>(std::floor(extent.bounds.min[axis] / voxelSize - options.halfWidth)) - 1;
-    domain.max()[axis] =
-        static_cast<int>(std::ceil(extent.bounds.max[axis] / voxelSize + options.halfWidth)) + 1;
-  }
-  const auto phi = [&](double i, double j, double k) {
-    return distance(V3d(i * voxelSize, j * voxelSize, k * voxelSize));
-  };
-  if (!BlockFiller(*grid, phi).fill(domain, options.progress, action)) {
-    throw InvalidInput(
-        fmt::format("{}: no grid point lies inside, the shape is too thin for voxels "
-                    "of {}; use smaller voxels",
-                    action, voxelSize));
-  }
-  return makeBand(grid);
 }
 
 Imath::Box3d around(const V3d& center, const V3d& half) {

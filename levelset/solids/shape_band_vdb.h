@@ -1,0 +1,45 @@
+#pragma once
+
+// Bands of solids whose distance is a formula, for our own .cpp files.
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "levelset/error.h"
+#include "levelset/solids/fill_blocks_vdb.h"
+#include "levelset/solids/shapes.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+
+/// @param distance  double(const V3d&): signed distance at a world position. Further from the
+///                  surface than the band, less in magnitude will do, with the right sign.
+/// @throws as checkShape; InvalidInput when no grid point lies inside
+template <typename Distance>
+NarrowBand makeShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
+                     const char* action, const Distance& distance) {
+  checkShape(extent, voxelSize, options, action);
+  report(options.progress, 0, action);
+
+  const auto grid = emptyLevelSet(uniformTransform(voxelSize), options.halfWidth);
+  openvdb::CoordBBox domain;
+  for (int axis = 0; axis < 3; ++axis) {
+    domain.min()[axis] =
+        static_cast<int>(std::floor(extent.bounds.min[axis] / voxelSize - options.halfWidth)) - 1;
+    domain.max()[axis] =
+        static_cast<int>(std::ceil(extent.bounds.max[axis] / voxelSize + options.halfWidth)) + 1;
+  }
+  const auto phi = [&](double i, double j, double k) {
+    return distance(Imath::V3d(i * voxelSize, j * voxelSize, k * voxelSize));
+  };
+  if (!BlockFiller(*grid, phi).fill(domain, options.progress, action)) {
+    throw InvalidInput(
+        fmt::format("{}: no grid point lies inside, the shape is too thin for voxels "
+                    "of {}; use smaller voxels",
+                    action, voxelSize));
+  }
+  return makeBand(grid);
+}
+
+}  // namespace levelset

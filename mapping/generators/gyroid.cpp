@@ -1,0 +1,199 @@
+#include "mapping/generators/gyroid.h"
+
+#include <Imath/ImathMatrix.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "mapping/generators/generator_vdb.h"
+
+namespace mapping {
+namespace {
+
+using Imath::M33d;
+using Imath::V3d;
+using levelset::ShapeExtent;
+using levelset::ShapeOptions;
+
+constexpr const char* kGyroid = "gyroid";
+constexpr double kTurn = 2 * std::numbers::pi;
+// The largest slope of the formula, per radian.
+constexpr double kSteepest = 1.7320508075688773;
+// Of the surface in one cubic cell: area, in squares of its edge.
+constexpr double kCellArea = 3.0968;
+// From the middle of a strut's thinnest place to the surface, in cells.
+constexpr double kNeck = kThickestGyroidWall / 2;
+
+/// The formula with its derivatives, at angles.
+struct GyroidJet {
+  double value;
+  V3d slope;
+  M33d curvature;  ///< second derivatives
+
+  explicit GyroidJet(const V3d& p) {
+    const V3d s(std::sin(p.x), std::sin(p.y), std::sin(p.z)),
+        c(std::cos(p.x), std::cos(p.y), std::cos(p.z));
+    value = s.x * c.y + s.y * c.z + s.z * c.x;
+    slope = {c.x * c.y - s.z * s.x, c.y * c.z - s.x * s.y, c.z * c.x - s.y * s.z};
+    const double xy = -c.x * s.y, yz = -c.y * s.z, zx = -c.z * s.x;
+    curvature = {-s.x * c.y - s.z * c.x,
+                 xy,
+                 zx,  //
+                 xy,
+                 -s.y * c.z - s.x * c.y,
+                 yz,  //
+                 zx,
+                 yz,
+                 -s.z * c.x - s.y * c.z};
+  }
+};
+
+double gyroidValue(const V3d& p) {
+  return std::sin(p.x) * std::cos(p.y) + std::sin(p.y) * std::cos(p.z) +
+         std::sin(p.z) * std::cos(p.x);
+}
+
+/// From a point p to a foot on the surface, radians: Newton's method for the foot x and the
+/// multiplier λ of x − p + λ ∇g = 0, g = 0 [Saye14], from where x falls onto the surface along ∇g.
+/// HUGE_VAL where it finds none.
+double distanceToFoot(const V3d& p, V3d x) {
+  for (int i = 0; i < 2; ++i) {
+    const GyroidJet g(x);
+    x -= g.slope * (g.value / std::max(g.slope.length2(), 0.25));
+  }
+  // Towards the foot along the surface, which settles on the side that Newton's method is to find.
+  for (int i = 0; i < 4; ++i) {
+    const GyroidJet g(x);
+    const double squared = std::max(g.slope.length2(), 0.25);
+    const V3d back = p - x;
+    x += back - g.slope * ((g.value + (back ^ g.slope)) / squared);
+  }
+  double multiplier = 0;
+  {
+    const GyroidJet g(x);
+    multiplier = ((p - x) ^ g.slope) / std::max(g.slope.length2(), 0.25);
+  }
+  constexpr int kMostSteps = 20;
+  for (int i = 0; i < kMostSteps; ++i) {
+    const GyroidJet g(x);
+    M33d system = g.curvature * multiplier;
+    for (int axis = 0; axis < 3; ++axis) system[axis][axis] += 1;
+    const M33d inverse = system.inverse();  // symmetric; the identity when it has none
+    const V3d u = g.slope * inverse, v = (p - x - g.slope * multiplier) * inverse;
+    const double pivot = g.slope ^ u;
+    if (!(std::abs(pivot) > 1e-12)) break;
+    const double change = (g.value + (g.slope ^ v)) / pivot;
+    const V3d step = v - u * change;
+    x += step;
+    multiplier += change;
+    if (step.length2() < 1e-26) break;
+  }
+  return std::abs(gyroidValue(x)) < 1e-9 ? (x - p).length() : HUGE_VAL;
+}
+
+/// From a point to the nearest of the surface, radians. Where the foot is further than near the
+/// surface it can be, p may lie between several: starts around it tell which is nearest.
+double distanceToSurface(const V3d& p) {
+  const double least = std::abs(gyroidValue(p)) / kSteepest;
+  double best = distanceToFoot(p, p);
+  constexpr double kPlain = 1.34, kAround = 0.4;  // as at the necks, and radians
+  if (best <= kPlain * least) return best;
+  for (int corner = 0; corner < 8; ++corner) {
+    const V3d aside(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+    best = std::min(best, distanceToFoot(p, p + aside * kAround));
+  }
+  return std::isfinite(best) ? best : least;
+}
+
+void requireGyroid(const Gyroid& gyroid, const V3d& center) {
+  requirePositive(gyroid.cell, kGyroid, "the cell");
+  requirePositive(gyroid.thickness, kGyroid, "the thickness");
+  const bool isSheet = gyroid.kind == GyroidKind::Sheet;
+  const double most = (isSheet ? kThickestGyroidWall : kThickestGyroidStrut) * gyroid.cell;
+  if (gyroid.thickness >= most) {
+    throw levelset::UsageError(
+        fmt::format("{}: at a thickness of {:.6g} the {} close all openings of a cell of {:.6g}; "
+                    "stay under {:.6g}",
+                    kGyroid, gyroid.thickness, isSheet ? "walls" : "struts", gyroid.cell, most));
+  }
+  for (const int count : gyroid.cells) {
+    if (count >= 1 && count <= 1'000'000) continue;
+    throw levelset::UsageError(
+        fmt::format("{}: {} cells; give 1 to 1000000 along each axis", kGyroid, count));
+  }
+  requireFinite(center, kGyroid, "the centre");
+}
+
+class GyroidField {
+ public:
+  GyroidField(const Gyroid& gyroid, const V3d& corner, double reach)
+      : isSheet_(gyroid.kind == GyroidKind::Sheet),
+        // The solid is where the distance (from the surface or signed) is below this.
+        level_(isSheet_ ? gyroid.thickness / 2 : gyroid.thickness / 2 - kNeck * gyroid.cell),
+        cell_(gyroid.cell),
+        corner_(corner),
+        reach_(reach) {}
+
+  double operator()(const V3d& world) const {
+    const V3d p = world - corner_;
+    const double value = gyroidValue(p * (kTurn / cell_));
+    // What the distance is at least, by the steepest slope.
+    double least = value / kSteepest * cell_ / kTurn;
+    if (isSheet_) least = std::abs(least);
+    if (least - level_ > reach_ || (!isSheet_ && least - level_ < -reach_ && least < 0))
+      return least - level_;
+    const double distance = gyroidDistance(p, cell_);
+    return (isSheet_ ? std::abs(distance) : distance) - level_;
+  }
+
+ private:
+  bool isSheet_;
+  double level_, cell_;
+  V3d corner_;
+  double reach_;
+};
+
+}  // namespace
+
+double gyroidDistance(const V3d& position, double cell) {
+  const V3d p = position * (kTurn / cell);
+  return std::copysign(distanceToSurface(p) * cell / kTurn, gyroidValue(p));
+}
+
+TileBox gyroidBox(const Gyroid& gyroid, const V3d& center) {
+  requireGyroid(gyroid, center);
+  const V3d half = V3d(gyroid.cells[0], gyroid.cells[1], gyroid.cells[2]) * (gyroid.cell / 2);
+  return {{center - half, center + half}, {center - half, center + half}};
+}
+
+ShapeExtent gyroidExtent(const Gyroid& gyroid, const V3d& center) {
+  const Imath::Box3d bounds = gyroidBox(gyroid, center).whole;
+  const V3d size = bounds.size();
+  const double cells = size.x * size.y * size.z / std::pow(gyroid.cell, 3);
+  const double sides = gyroid.kind == GyroidKind::Sheet ? 2 : 1;
+  return {bounds, cells * sides * kCellArea * gyroid.cell * gyroid.cell + size.x * size.y +
+                      size.y * size.z + size.z * size.x};
+}
+
+void checkGyroid(const Gyroid& gyroid, const V3d& center, double voxelSize,
+                 const ShapeOptions& options) {
+  const ShapeExtent extent = gyroidExtent(gyroid, center);
+  levelset::checkShape(extent, voxelSize, options, kGyroid);
+  requireResolved(gyroid.thickness, voxelSize, kGyroid, "the thickness");
+  const double most = gyroid.kind == GyroidKind::Sheet ? kThickestGyroidWall : kThickestGyroidStrut;
+  requireResolved(most * gyroid.cell - gyroid.thickness, voxelSize, kGyroid,
+                  "what the openings leave at their necks");
+}
+
+levelset::NarrowBand makeGyroid(const Gyroid& gyroid, const V3d& center, double voxelSize,
+                                const ShapeOptions& options) {
+  checkGyroid(gyroid, center, voxelSize, options);
+  const ShapeExtent extent = gyroidExtent(gyroid, center);
+  const double exact = (options.halfWidth + 0.5) * voxelSize;
+  const GyroidField solid(gyroid, extent.bounds.min, exact);
+  return levelset::makeShape(extent, voxelSize, options, kGyroid, [&](const V3d& p) {
+    return clippedDistance(solid, p, extent.bounds, exact, voxelSize);
+  });
+}
+
+}  // namespace mapping

@@ -1,0 +1,278 @@
+#include "mapping/generators/ring.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "mapping/generators/generator_vdb.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V2d;
+using Imath::V3d;
+using levelset::ShapeExtent;
+using levelset::ShapeOptions;
+
+constexpr const char* kRing = "ring";
+constexpr int kMostRings = 1'000'000;
+
+// In radii: where the least distance between the circles of a sheet is largest, 0.5022. There the
+// next ring of the row, the rings held and the ring three rows on are equally near.
+constexpr double kBestColumn = 2.50219, kBestRow = 0.62,
+                 kBestLean = 34.7207 * 3.14159265358979323846 / 180;
+
+V2d ringSpacing(const Ring& ring) {
+  if (ring.spacing) return *ring.spacing;
+  return {kBestColumn * ring.radius, kBestRow * ring.radius};
+}
+
+/// Radius of the round wire that holds the section.
+double wireReach(const Ring& ring) {
+  return ring.section ? ring.section->length() / 2 : ring.tube;
+}
+
+void requireRing(const Ring& ring, const V3d& center) {
+  requirePositive(ring.radius, kRing, "the radius");
+  if (ring.section) {
+    requirePositive(ring.section->x, kRing, "the width of the section");
+    requirePositive(ring.section->y, kRing, "the height of the section");
+    if (ring.section->x >= 2 * ring.radius) {
+      throw levelset::UsageError(fmt::format(
+          "{}: the section is {:.6g} wide, which closes a ring of radius {:.6g}; make it narrower",
+          kRing, ring.section->x, ring.radius));
+    }
+  } else {
+    requirePositive(ring.tube, kRing, "the tube");
+    if (ring.tube >= ring.radius) {
+      throw levelset::UsageError(fmt::format(
+          "{}: a tube of radius {:.6g} closes a ring of radius {:.6g}; make it thinner (`torus` "
+          "makes what has no hole)",
+          kRing, ring.tube, ring.radius));
+    }
+  }
+  if (ring.lean) requireAngle(*ring.lean, -std::numbers::pi, std::numbers::pi, kRing, "the lean");
+  if (ring.columns < 1 || ring.rows < 1 || ring.columns > kMostRings ||
+      ring.rows > kMostRings / ring.columns) {
+    throw levelset::UsageError(
+        fmt::format("{}: {} columns and {} rows; give at least 1 of each "
+                    "and a million rings at most",
+                    kRing, ring.columns, ring.rows));
+  }
+  if (ring.spacing) {
+    requirePositive(ring.spacing->x, kRing, "the spacing along a row");
+    requirePositive(ring.spacing->y, kRing, "the spacing of rows");
+  }
+  requireNonNegative(ring.clearance, kRing, "the clearance");
+  requireFinite(center, kRing, "the centre");
+}
+
+/// A ring's circle: where it is, and the two directions that span it.
+struct Circle {
+  V3d center, along{1, 0, 0}, across, axis;
+  double radius;
+
+  Circle(const Ring& ring, int column, int row)
+      : center(ringCenter(ring, column, row)), radius(ring.radius) {
+    const double lean = ringLean(ring, row);
+    across = V3d(0, std::cos(lean), std::sin(lean));
+    axis = V3d(0, -std::sin(lean), std::cos(lean));
+  }
+  [[nodiscard]] V3d at(double angle) const {
+    return center + (along * std::cos(angle) + across * std::sin(angle)) * radius;
+  }
+  /// Of a point, in the half plane of the profile: from the circle outwards, and along the axis.
+  [[nodiscard]] V2d profile(const V3d& p) const {
+    const V3d d = p - center;
+    const double u = d ^ along, v = d ^ across;
+    return {std::sqrt(u * u + v * v) - radius, d ^ axis};
+  }
+};
+
+/// Least distance of two circles: the nearest of many points of one, and then by golden section
+/// between its neighbours.
+double distanceOfCircles(const Circle& a, const Circle& b) {
+  const auto distance = [&](double angle) { return b.profile(a.at(angle)).length(); };
+  constexpr int kSamples = 360;
+  constexpr double kStep = 2 * std::numbers::pi / kSamples;
+  int nearest = 0;
+  for (int i = 1; i < kSamples; ++i)
+    if (distance(i * kStep) < distance(nearest * kStep)) nearest = i;
+  const double golden = (std::sqrt(5.0) - 1) / 2;
+  double low = (nearest - 1) * kStep, high = (nearest + 1) * kStep;
+  for (int i = 0; i < 60; ++i) {
+    const double x = high - golden * (high - low), y = low + golden * (high - low);
+    (distance(x) < distance(y) ? high : low) = distance(x) < distance(y) ? y : x;
+  }
+  return distance((low + high) / 2);
+}
+
+/// Does one circle pass once through the disc of the other?
+bool holdsRing(const Circle& a, const Circle& b) {
+  // Where b meets the plane of a: s + c cos t + d sin t = 0.
+  const double s = (b.center - a.center) ^ a.axis, c = b.radius * (b.along ^ a.axis),
+               d = b.radius * (b.across ^ a.axis), size = std::sqrt(c * c + d * d);
+  if (!(std::abs(s) < size)) return false;
+  const double middle = std::atan2(d, c), turn = std::acos(-s / size);
+  const bool first = a.profile(b.at(middle + turn)).x < 0,
+             second = a.profile(b.at(middle - turn)).x < 0;
+  return first != second;
+}
+
+void requireMail(const Ring& ring) {
+  if (!ring.isSheet()) return;
+  const double clearance = ringClearance(ring);
+  if (!(clearance > ring.clearance) && !(clearance == ring.clearance && clearance > 0)) {
+    throw levelset::UsageError(fmt::format(
+        "{}: wires come within {:.6g} of each other, but {:.6g} is to be left; make the "
+        "wire thinner (a tube under {:.6g} radii, at the best spacing) or change "
+        "--spacing and --lean",
+        kRing, clearance, ring.clearance, 0.25));
+  }
+  if (ring.rows > 1 && !holdsRing(Circle(ring, 0, 0), Circle(ring, 0, 1))) {
+    throw levelset::UsageError(
+        fmt::format("{}: the rings do not hold each other; move the rows closer, or leave "
+                    "--spacing and --lean out",
+                    kRing));
+  }
+}
+
+/// Half extents of a ring about its centre.
+V3d ringHalfSize(const Ring& ring) {
+  const double lean = ringLean(ring, 0), c = std::abs(std::cos(lean)), s = std::abs(std::sin(lean));
+  if (!ring.section) return V3d(ring.radius, ring.radius * c, ring.radius * s) + V3d(ring.tube);
+  const double outer = ring.radius + ring.section->x / 2, half = ring.section->y / 2;
+  return {outer, outer * c + half * s, outer * s + half * c};
+}
+
+/// Centre of the box of all rings, in the frame of ring (0, 0).
+V3d sheetMiddle(const Ring& ring) {
+  const V2d spacing = ringSpacing(ring);
+  const double aside = ring.rows > 1 ? 0.5 : 0;
+  return {(ring.columns - 1 + aside) * spacing.x / 2, (ring.rows - 1) * spacing.y / 2, 0};
+}
+
+/// Signed distance to all rings, exact up to `reach`.
+class RingField {
+ public:
+  RingField(const Ring& ring, const V3d& origin, const Imath::Box3d& bounds, double reach)
+      : ring_(ring),
+        origin_(origin),
+        bounds_(bounds),
+        spacing_(ringSpacing(ring)),
+        half_(ringHalfSize(ring)),
+        reach_(reach) {}
+
+  double operator()(const V3d& world) const {
+    const V3d p = world - origin_;
+    double found = reach_;
+    const double y = half_.y + reach_, x = half_.x + reach_;
+    const int low = nth((p.y - y) / spacing_.y, ring_.rows, true),
+              high = nth((p.y + y) / spacing_.y, ring_.rows, false);
+    for (int row = low; row <= high; ++row) {
+      const double aside = (row & 1) * spacing_.x / 2;
+      const int left = nth((p.x - aside - x) / spacing_.x, ring_.columns, true),
+                right = nth((p.x - aside + x) / spacing_.x, ring_.columns, false);
+      for (int column = left; column <= right; ++column)
+        found = std::min(found, wire(Circle(ring_, column, row).profile(p)));
+    }
+    return std::max(found, boxDistance(world, bounds_));
+  }
+
+ private:
+  /// The first or last whole number of 0 … count − 1 from a place on.
+  static int nth(double place, int count, bool isFirst) {
+    return static_cast<int>(isFirst ? std::clamp(std::ceil(place), 0.0, double(count))
+                                    : std::clamp(std::floor(place), -1.0, double(count - 1)));
+  }
+
+  [[nodiscard]] double wire(const V2d& profile) const {
+    if (!ring_.section) return profile.length() - ring_.tube;
+    return convexEdge(std::abs(profile.x) - ring_.section->x / 2,
+                      std::abs(profile.y) - ring_.section->y / 2);
+  }
+
+  const Ring& ring_;
+  V3d origin_;
+  Imath::Box3d bounds_;
+  V2d spacing_;
+  V3d half_;
+  double reach_;
+};
+
+}  // namespace
+
+V3d ringCenter(const Ring& ring, int column, int row) {
+  const V2d spacing = ringSpacing(ring);
+  return {(column + 0.5 * (row & 1)) * spacing.x, row * spacing.y, 0};
+}
+
+double ringLean(const Ring& ring, int row) {
+  const double lean = ring.lean ? *ring.lean : ring.isSheet() ? kBestLean : 0;
+  return row & 1 ? -lean : lean;
+}
+
+double ringClearance(const Ring& ring) {
+  const V2d spacing = ringSpacing(ring);
+  const double reach = 2 * (ring.radius + wireReach(ring));
+  double least = HUGE_VAL;
+  // Rows and columns repeat: all pairs are those of the first two rows with what is near.
+  const double ranges = std::min<double>(ring.rows, reach / spacing.y + 1) *
+                        std::min<double>(ring.columns, 2 * reach / spacing.x + 3);
+  if (ranges > kMostRings) return -2 * wireReach(ring);
+  for (int first = 0; first < std::min(ring.rows, 2); ++first) {
+    for (int row = first; row < ring.rows && (row - first) * spacing.y <= reach; ++row) {
+      const int columns = std::min(ring.columns - 1, static_cast<int>(reach / spacing.x) + 1);
+      for (int column = -columns; column <= columns; ++column) {
+        if (row == first && column <= 0) continue;
+        const int from = std::max(0, -column);
+        least = std::min(
+            least, distanceOfCircles(Circle(ring, from, first), Circle(ring, from + column, row)));
+      }
+    }
+  }
+  return least - 2 * wireReach(ring);
+}
+
+TileBox ringBox(const Ring& ring, const V3d& center) {
+  requireRing(ring, center);
+  const V3d half = sheetMiddle(ring) + ringHalfSize(ring);
+  TileBox box{{center - half, center + half}, {center - half, center + half}};
+  if (!ring.isSheet()) return box;
+  const V2d spacing = ringSpacing(ring);
+  const V3d tile(ring.columns * spacing.x / 2, ring.rows * spacing.y / 2, half.z);
+  box.tile = {center - tile, center + tile};
+  return box;
+}
+
+ShapeExtent ringExtent(const Ring& ring, const V3d& center) {
+  const Imath::Box3d bounds = ringBox(ring, center).whole;
+  const double around =
+      ring.section ? 2 * (ring.section->x + ring.section->y) : 2 * std::numbers::pi * ring.tube;
+  return {bounds, 2 * std::numbers::pi * ring.radius * around * ring.columns * ring.rows};
+}
+
+void checkRing(const Ring& ring, const V3d& center, double voxelSize, const ShapeOptions& options) {
+  const ShapeExtent extent = ringExtent(ring, center);
+  levelset::checkShape(extent, voxelSize, options, kRing);
+  requireMail(ring);
+  if (ring.section) {
+    requireResolved(ring.section->x, voxelSize, kRing, "the width of the section");
+    requireResolved(ring.section->y, voxelSize, kRing, "the height of the section");
+  } else {
+    requireResolved(2 * ring.tube, voxelSize, kRing, "the wire");
+  }
+  if (ring.isSheet())
+    requireResolved(ringClearance(ring), voxelSize, kRing, "what is left between wires");
+}
+
+levelset::NarrowBand makeRing(const Ring& ring, const V3d& center, double voxelSize,
+                              const ShapeOptions& options) {
+  checkRing(ring, center, voxelSize, options);
+  const ShapeExtent extent = ringExtent(ring, center);
+  // Beyond a leaf, blocks need to know no more than that they are far.
+  const double reach = (options.halfWidth + 8) * voxelSize;
+  return levelset::makeShape(extent, voxelSize, options, kRing,
+                             RingField(ring, center - sheetMiddle(ring), extent.bounds, reach));
+}
+
+}  // namespace mapping

@@ -1,0 +1,200 @@
+#include "mapping/generators/scales.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "mapping/generators/generator_vdb.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V2d;
+using Imath::V3d;
+using levelset::ShapeExtent;
+using levelset::ShapeOptions;
+
+constexpr const char* kScales = "scales";
+
+double stepOf(const Scales& scales) {
+  return scales.step > 0 ? scales.step : scales.length / 2;
+}
+
+/// Scales without a thickness are so thick that their lower faces are inside the plate.
+double thicknessOf(const Scales& scales) {
+  return scales.thickness > 0 ? scales.thickness : 1.1 * scales.length * std::tan(scales.tilt);
+}
+
+/// What is left between a scale and the one under its tip.
+double rowGap(const Scales& scales) {
+  return stepOf(scales) * std::sin(scales.tilt) - scales.thickness;
+}
+
+double tipOf(const Scales& scales) {
+  return scales.tip > 0 ? scales.tip : scales.width / 2;
+}
+
+void requireScales(const Scales& scales, const V3d& center) {
+  requirePositive(scales.length, kScales, "the length");
+  requirePositive(scales.width, kScales, "the width");
+  requireNonNegative(scales.thickness, kScales, "the thickness");
+  requireAngle(scales.tilt, 0, std::numbers::pi / 3, kScales, "the tilt");
+  requireNonNegative(scales.step, kScales, "the step");
+  requireNonNegative(scales.tip, kScales, "the tip");
+  requireNonNegative(scales.rounding, kScales, "the rounding");
+  requireNonNegative(scales.base, kScales, "the base");
+  requireTiling(scales.tiling, kScales);
+  requireFinite(center, kScales, "the centre");
+  const auto refuse = [](const char* what, double is, double most) {
+    throw levelset::UsageError(
+        fmt::format("{}: {} is {:.6g}; give at most {:.6g}", kScales, what, is, most));
+  };
+  if (tipOf(scales) > scales.length)
+    refuse("the tip, which is part of the length,", tipOf(scales), scales.length);
+  if (tipOf(scales) < scales.width / 2) {
+    throw levelset::UsageError(
+        fmt::format("{}: a tip of {:.6g} is blunter than a half circle; give at least half the "
+                    "width, {:.6g}",
+                    kScales, tipOf(scales), scales.width / 2));
+  }
+  if (stepOf(scales) > scales.length)
+    refuse("the step, beyond which rows do not overlap,", stepOf(scales), scales.length);
+  const double roundest = std::min(thicknessOf(scales), scales.width) / 2;
+  if (scales.rounding > roundest) refuse("the rounding", scales.rounding, roundest);
+  if (scales.thickness > 0 && rowGap(scales) <= 0) {
+    throw levelset::UsageError(
+        fmt::format("{}: the rows touch at a thickness of {:.6g}; stay under {:.6g}, or give 0 for "
+                    "scales that are solid down to the plate",
+                    kScales, scales.thickness, stepOf(scales) * std::sin(scales.tilt)));
+  }
+}
+
+/// Neighbours of a row overlap by this share of their width, so that the notch between their tips
+/// has an angle that a grid can show.
+constexpr double kRowOverlap = 0.06;
+
+/// The row of tongues to which the scales of a row are cut, in their plane: a sheet whose border is
+/// two arcs for each scale, which meet at its tip and, with those of its neighbours, in notches.
+class ScaleOutline {
+ public:
+  explicit ScaleOutline(const Scales& scales)
+      : half_(scales.width / 2), rounding_(scales.rounding), length_(scales.length - rounding_) {
+    const double side = half_ * (1 + kRowOverlap), tip = tipOf(scales) + side - half_;
+    middle_ = scales.length - tip;
+    radius_ = (tip * tip + side * side) / (2 * side);
+    aside_ = radius_ - side;
+    notch_ = middle_ + std::sqrt(radius_ * radius_ - (half_ + aside_) * (half_ + aside_));
+    // Where the arcs of the scale without its rounding meet.
+    const double inner = radius_ - rounding_;
+    length_ = middle_ + std::sqrt(std::max(0.0, inner * inner - aside_ * aside_));
+  }
+
+  /// To the outline that is smaller by the rounding. @param u  from the root to the tip, @param v
+  /// across from the middle of the nearest scale
+  [[nodiscard]] double distance(double u, double v) const {
+    v = std::abs(v);
+    const double along = u - middle_, across = v + aside_;
+    const double fromCenter = std::sqrt(along * along + across * across);
+    // Beyond both arcs the tip is nearest; inside, where the arc is a neighbour's, the notch.
+    if (fromCenter > radius_ - rounding_ && across * (radius_ - rounding_) < aside_ * fromCenter) {
+      const double beyond = u - length_;
+      return std::sqrt(beyond * beyond + v * v);
+    }
+    if (along <= 0 || (across * radius_ > (half_ + aside_) * fromCenter && fromCenter < radius_)) {
+      const double before = u - notch_, beside = v - half_;
+      return rounding_ - std::sqrt(before * before + beside * beside);
+    }
+    return fromCenter - radius_ + rounding_;
+  }
+
+ private:
+  double half_, rounding_, length_, middle_ = 0, radius_ = 0, aside_ = 0, notch_ = 0;
+};
+
+/// In the pattern's own frame: the root of the first scale, in the middle of the first column, is
+/// the origin; the plate's top is z = 0.
+class ScalesField {
+ public:
+  ScalesField(const Scales& scales, const V3d& origin, double reach)
+      : scales_(scales),
+        outline_(scales),
+        thickness_(thicknessOf(scales)),
+        step_(stepOf(scales)),
+        origin_(origin),
+        reach_(reach),
+        along_(0, std::cos(scales.tilt), std::sin(scales.tilt)),
+        normal_(0, -std::sin(scales.tilt), std::cos(scales.tilt)) {}
+
+  double operator()(const V3d& world) const {
+    const V3d p = world - origin_;
+    double found = std::min(reach_, p.z);
+    const double before = thickness_ + reach_;
+    const double first = std::ceil((p.y - scales_.length - before) / step_),
+                 last = std::floor((p.y + before) / step_);
+    for (double row = first; row <= last; ++row) found = std::min(found, scale(p, row));
+    return found;
+  }
+
+ private:
+  /// To the nearest scale of a row.
+  [[nodiscard]] double scale(const V3d& p, double row) const {
+    const double aside = std::remainder(row, 2.0) != 0 ? scales_.width / 2 : 0;
+    const V3d q(std::remainder(p.x - aside, scales_.width), p.y - row * step_, p.z);
+    const double u = q ^ along_, r = scales_.rounding, half = thickness_ / 2;
+    // The root ends inside the plate.
+    const double outline = std::max(outline_.distance(u, q.x), -thickness_ + r - u);
+    return convexEdge(outline, std::abs((q ^ normal_) + half) - half + r) - r;
+  }
+
+  const Scales& scales_;
+  ScaleOutline outline_;
+  double thickness_, step_;
+  V3d origin_;
+  double reach_;
+  V3d along_, normal_;
+};
+
+}  // namespace
+
+TileBox scalesBox(const Scales& scales, const V3d& center) {
+  requireScales(scales, center);
+  return tileBox(scales.tiling, {scales.width, stepOf(scales)}, -scales.base,
+                 scales.length * std::sin(scales.tilt), center);
+}
+
+ShapeExtent scalesExtent(const Scales& scales, const V3d& center) {
+  const Imath::Box3d bounds = scalesBox(scales, center).whole;
+  const V3d size = bounds.size();
+  // Both faces of all scales, and their edges.
+  const double faces = 2 * scales.length / stepOf(scales) + 2 * scales.thickness *
+                                                                (scales.length + scales.width) /
+                                                                (stepOf(scales) * scales.width);
+  return {bounds, size.x * size.y * (2 + faces) + 2 * (size.x + size.y) * size.z};
+}
+
+void checkScales(const Scales& scales, const V3d& center, double voxelSize,
+                 const ShapeOptions& options) {
+  const ShapeExtent extent = scalesExtent(scales, center);
+  levelset::checkShape(extent, voxelSize, options, kScales);
+  requireResolved(scales.width, voxelSize, kScales, "the width");
+  if (scales.thickness == 0) return;
+  requireResolved(scales.thickness, voxelSize, kScales, "the thickness");
+  requireResolved(rowGap(scales), voxelSize, kScales, "what is left under the tips");
+}
+
+levelset::NarrowBand makeScales(const Scales& scales, const V3d& center, double voxelSize,
+                                const ShapeOptions& options) {
+  checkScales(scales, center, voxelSize, options);
+  const TileBox box = scalesBox(scales, center);
+  const V3d origin(box.tile.min.x + scales.width / 2, box.tile.min.y, box.tile.min.z + scales.base);
+  // Beyond a leaf, blocks need to know no more than that they are far.
+  const double exact = (options.halfWidth + 0.5) * voxelSize;
+  const ScalesField pattern(scales, origin, exact + 8 * voxelSize);
+  // Tips end by themselves.
+  Imath::Box3d cut = box.whole;
+  cut.max.z = HUGE_VAL;
+  return levelset::makeShape(
+      scalesExtent(scales, center), voxelSize, options, kScales,
+      [&](const V3d& p) { return clippedDistance(pattern, p, cut, exact, voxelSize); });
+}
+
+}  // namespace mapping
