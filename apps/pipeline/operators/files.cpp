@@ -8,6 +8,7 @@
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
 #include "levelset/files/mesh_file.h"
+#include "mapping/patches/patch_file.h"
 
 namespace pipeline {
 namespace {
@@ -22,9 +23,10 @@ Kind fileKind(const Invocation& in) {
   const std::string name = formatName(in);
   if (levelset::isMeshFormat(name)) return Kind::Mesh;
   if (levelset::isBandFormat(name)) return Kind::Band;
-  throw UsageError(
-      fmt::format("{}: '{}' is of no known format; use ply, obj, stl or off (also .gz), vdb{}",
-                  in.op().name, name, in.op().name == "write" ? " or nvdb" : ""));
+  if (name == "patch") return Kind::Patch;
+  throw UsageError(fmt::format(
+      "{}: '{}' is of no known format; use ply, obj, stl or off (also .gz), vdb{} or patch",
+      in.op().name, name, in.op().name == "write" ? ", nvdb" : ""));
 }
 
 /// A grid that is named may be a field: its file tells, if it is there already.
@@ -41,6 +43,8 @@ Kind readKind(const Invocation& in) {
 
 Value read(Invocation& in) {
   const std::filesystem::path file = in.text("file");
+  if (fileKind(in) == Kind::Patch)
+    return Value(PatchValue{.patches = mapping::readPatches(file, in.maxMemory)});
   if (fileKind(in) == Kind::Mesh) {
     return Value(levelset::readMesh(
         file, {.format = in.text("format"), .maxMemory = in.maxMemory, .progress = in.progress}));
@@ -68,7 +72,7 @@ Value read(Invocation& in) {
 
 /// Meshes are read, since lengths resolve on their size; of bands the header is enough.
 Plan planRead(Invocation& in) {
-  if (fileKind(in) == Kind::Mesh) return read(in).plan();
+  if (fileKind(in) != Kind::Band) return read(in).plan();
   for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file"))) {
     if (in.given("grid") ? grid.name != in.text("grid") : !grid.isLevelSet) continue;
     if (!grid.isLevelSet) {
@@ -92,8 +96,10 @@ Plan planRead(Invocation& in) {
 }
 
 void validateRead(const Invocation& in) {
-  if (fileKind(in) == Kind::Mesh && in.given("grid"))
-    throw UsageError("read: --grid picks a grid of a .vdb, and this is a mesh; leave it out");
+  const Kind kind = fileKind(in);
+  if (kind != Kind::Band && in.given("grid"))
+    throw UsageError(fmt::format(
+        "read: --grid picks a grid of a .vdb, and this is a {}; leave it out", kindName(kind)));
 }
 
 void validateWrite(const Invocation& in) {
@@ -103,16 +109,22 @@ void validateWrite(const Invocation& in) {
         fmt::format("write: a {} cannot be written as '{}'; {}", kindName(held), formatName(in),
                     held == Kind::Band    ? "put 'mesh' before it, or write .vdb"
                     : held == Kind::Field ? "write .vdb"
+                    : held == Kind::Patch ? "write .patch, or put 'mesh' before it"
                                           : "put 'level-set' before it, or write .ply"));
   }
-  if (kind == Kind::Mesh && in.given("name"))
-    throw UsageError("write: --name is that of a grid, and this is a mesh; leave it out");
+  if ((kind == Kind::Mesh || kind == Kind::Patch) && in.given("name"))
+    throw UsageError(fmt::format("write: --name is that of a grid, and this is a {}; leave it out",
+                                 kindName(kind)));
 }
 
 Value write(Invocation& in) {
   const std::filesystem::path file = in.text("file");
   const Value& value = in.operands[0];
-  if (value.kind() == Kind::Field) {
+  if (value.kind() == Kind::Patch) {
+    if (value.patch().atHeight)
+      throw UsageError("write: the texture is to tell this patch's height; give --height a length");
+    mapping::writePatches(file, value.patch().patches);
+  } else if (value.kind() == Kind::Field) {
     levelset::writeField(file, value.field(),
                          {.name = in.given("name") ? in.text("name") : value.field().name(),
                           .format = in.text("format"),
@@ -133,7 +145,8 @@ void addFileOperators(std::vector<Operator>& all) {
   all.push_back({
       .name = "read",
       .group = "Files",
-      .summary = "read a mesh (ply, obj, stl, off, also .gz), a level set or a field (vdb)",
+      .summary =
+          "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), patches (patch)",
       .details = "A .vdb with more than one level set needs --grid. A grid that is no level set "
                  "must be named too; it becomes a field: of numbers, or of vectors, staggered ones "
                  "among them. '-' is standard input and needs --format.",
@@ -145,7 +158,7 @@ void addFileOperators(std::vector<Operator>& all) {
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
-                  .doc = "ply, obj, stl, off, vdb; default: by extension"},
+                  .doc = "ply, obj, stl, off, vdb, patch; default: by extension"},
                  {.name = "grid", .type = ParamType::Text, .doc = "name of the grid in a .vdb"}},
       .resultKind = readKind,
       .run = read,
@@ -156,8 +169,8 @@ void addFileOperators(std::vector<Operator>& all) {
   all.push_back({
       .name = "write",
       .group = "Files",
-      .summary =
-          "write a mesh (ply, obj, stl, off, also .gz), a level set (vdb, nvdb) or a field (vdb)",
+      .summary = "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), "
+                 "patches (patch)",
       .details = "The file is written beside its target and renamed when whole; what was there "
                  "stays until then. "
                  "The value stays on the stack.",
@@ -169,12 +182,12 @@ void addFileOperators(std::vector<Operator>& all) {
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
-                  .doc = "ply, obj, stl, off, vdb, nvdb; default: by extension"},
+                  .doc = "ply, obj, stl, off, vdb, nvdb, patch; default: by extension"},
                  {.name = "name",
                   .type = ParamType::Text,
                   .doc = "of the grid in a .vdb or .nvdb; a field keeps its own",
                   .fallback = "surface"}},
-      .operands = {{Kind::Mesh, Kind::Band, Kind::Field}},
+      .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch}},
       .flow = Flow::PassesThrough,
       .run = write,
       .validate = validateWrite,

@@ -64,6 +64,7 @@ void addRedistanceCases(std::vector<Case>& all) {
        .bounds = {{"waves of 4 voxels", "band_in_linf_vx", 0.05, 64},
                   {"waves of 4 voxels", "band_out_linf_vx", 0.05, 64},
                   {"waves of 4 voxels", "surface_l1_vx", 1e-3, 64},
+                  {"waves of 4 voxels", "order_band_linf", 2, 128, Sense::AtLeast},
                   {"waves of 4 voxels", "checks_failed", 0},
                   {"waves of 4/16", "order_band_l1", 2, 24, Sense::AtLeast},
                   {"waves of 4/16", "order_band_l1", 2, 64, Sense::AtLeast},

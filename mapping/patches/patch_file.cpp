@@ -1,0 +1,217 @@
+#include "mapping/patches/patch_file.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFormat = "levelsmith patches";
+constexpr int kVersion = 1;
+// A number of some twenty letters becomes a node of the document and a double.
+constexpr double kBytesPerLetter = 4;
+
+Json toJson(const V3d& p) {
+  if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+    throw InvalidInput(fmt::format(
+        "write: a particle of the patch lies at ({}, {}, {}), which no file holds", p.x, p.y, p.z));
+  }
+  return {p.x, p.y, p.z};
+}
+
+Json toJson(std::span<const V3d> points) {
+  Json json = Json::array();
+  for (const V3d& p : points) json.push_back(toJson(p));
+  return json;
+}
+
+Json toJson(const Patch& patch) {
+  Json json;
+  json["corners"] = toJson(patch.corners);
+  json["height"] = patch.height;
+  json["mirrored"] = patch.mirrored;
+  json["spacing"] = patch.spacing;
+  json["levels"] = Json::array();
+  for (const ParticleLevel& level : patch.levels) {
+    Json entry;
+    entry["columns"] = level.columns;
+    entry["rows"] = level.rows;
+    entry["w"] = level.w;
+    entry["height"] = level.height;
+    entry["positions"] = toJson(level.positions);
+    entry["rim"] = toJson(level.rim);
+    json["levels"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+/// Reads a document, knowing where it is for what it says when something is wrong.
+class Reader {
+ public:
+  explicit Reader(std::string file) : file_(std::move(file)) {}
+
+  [[noreturn]] void refuse(const std::string& where, const std::string& what) const {
+    throw InvalidInput(fmt::format("read: {}: {} {}; write the patch again", file_, where, what));
+  }
+
+  [[nodiscard]] const Json& member(const Json& json, const char* name,
+                                   const std::string& where) const {
+    if (!json.is_object() || !json.contains(name))
+      refuse(where, fmt::format("has no \"{}\"", name));
+    return json.at(name);
+  }
+
+  [[nodiscard]] double number(const Json& json, const char* name, const std::string& where) const {
+    const Json& value = member(json, name, where);
+    if (!value.is_number() || !std::isfinite(value.get<double>()))
+      refuse(where, fmt::format("has a \"{}\" that is no number", name));
+    return value.get<double>();
+  }
+
+  [[nodiscard]] std::size_t count(const Json& json, const char* name,
+                                  const std::string& where) const {
+    const double value = number(json, name, where);
+    if (!(value >= 2) || value > 1e6 || value != std::floor(value))
+      refuse(where, fmt::format("has {} {}", value, name));
+    return static_cast<std::size_t>(value);
+  }
+
+  [[nodiscard]] std::vector<V3d> points(const Json& json, const char* name,
+                                        const std::string& where) const {
+    const Json& list = member(json, name, where);
+    if (!list.is_array()) refuse(where, fmt::format("has \"{}\" that are no list", name));
+    std::vector<V3d> result;
+    result.reserve(list.size());
+    for (const Json& entry : list) {
+      V3d p;
+      bool isPoint = entry.is_array() && entry.size() == 3;
+      for (std::size_t axis = 0; isPoint && axis < 3; ++axis) {
+        isPoint = entry[axis].is_number() && std::isfinite(entry[axis].get<double>());
+        if (isPoint) p[static_cast<int>(axis)] = entry[axis].get<double>();
+      }
+      if (!isPoint)
+        refuse(where, fmt::format("has no point at place {} of \"{}\"", result.size(), name));
+      result.push_back(p);
+    }
+    return result;
+  }
+
+  [[nodiscard]] ParticleLevel level(const Json& json, const std::string& where) const {
+    ParticleLevel level;
+    level.columns = count(json, "columns", where);
+    level.rows = count(json, "rows", where);
+    level.w = number(json, "w", where);
+    level.height = number(json, "height", where);
+    level.positions = points(json, "positions", where);
+    level.rim = points(json, "rim", where);
+    if (level.positions.size() != level.columns * level.rows)
+      refuse(where, fmt::format("has {} positions for {} columns and {} rows",
+                                level.positions.size(), level.columns, level.rows));
+    const std::size_t rim = 2 * (level.columns + level.rows) + 4;
+    if (level.hasRim() && level.rim.size() != rim)
+      refuse(where, fmt::format("has a rim of {} particles, not {}", level.rim.size(), rim));
+    return level;
+  }
+
+  [[nodiscard]] Patch patch(const Json& json, const std::string& where) const {
+    Patch patch;
+    const std::vector<V3d> corners = points(json, "corners", where);
+    if (corners.size() != 4) refuse(where, fmt::format("has {} corners", corners.size()));
+    std::copy(corners.begin(), corners.end(), patch.corners.begin());
+    patch.height = number(json, "height", where);
+    if (!(patch.height > 0)) refuse(where, "has a height that is not positive");
+    const Json& mirrored = member(json, "mirrored", where);
+    if (!mirrored.is_boolean()) refuse(where, "has a \"mirrored\" that is neither true nor false");
+    patch.mirrored = mirrored.get<bool>();
+    patch.spacing = number(json, "spacing", where);
+    const Json& levels = member(json, "levels", where);
+    if (!levels.is_array() || levels.size() < 2) refuse(where, "has fewer than two levels");
+    for (const Json& entry : levels) {
+      const std::string place = fmt::format("{}, level {}", where, patch.levels.size());
+      patch.levels.push_back(level(entry, place));
+      const bool isFirst = patch.levels.size() == 1;
+      const double below = isFirst ? 0 : patch.levels[patch.levels.size() - 2].w;
+      const double w = patch.levels.back().w;
+      if (isFirst ? w != 0 : !(w > below))
+        refuse(place, fmt::format("is at w = {}; levels go from 0 up to 1", w));
+    }
+    if (patch.levels.back().w != 1) refuse(where, "ends below w = 1");
+    return patch;
+  }
+
+ private:
+  std::string file_;
+};
+
+std::string textOf(const std::filesystem::path& file, std::size_t maxMemory) {
+  std::string text;
+  if (file == "-") {
+    text.assign(std::istreambuf_iterator<char>(std::cin), {});
+  } else {
+    std::error_code failed;
+    const auto size = std::filesystem::file_size(file, failed);
+    if (!failed)
+      levelset::requireMemory(kBytesPerLetter * static_cast<double>(size), maxMemory, "read");
+    std::ifstream stream(file, std::ios::binary);
+    text.assign(std::istreambuf_iterator<char>(stream), {});
+    if (!stream) {
+      throw levelset::IoError(
+          fmt::format("read: {} cannot be read; check its name and permissions", file.string()));
+    }
+  }
+  levelset::requireMemory(kBytesPerLetter * static_cast<double>(text.size()), maxMemory, "read");
+  return text;
+}
+
+}  // namespace
+
+void writePatches(const std::filesystem::path& file, std::span<const Patch> patches) {
+  Json json;
+  json["format"] = kFormat;
+  json["version"] = kVersion;
+  json["patches"] = Json::array();
+  for (const Patch& patch : patches) json["patches"].push_back(toJson(patch));
+  levelset::FileTarget target(file);
+  {
+    std::ofstream stream(target.path(), std::ios::binary);
+    stream << json.dump() << '\n';
+    stream.flush();
+    if (!stream) {
+      throw levelset::IoError(
+          fmt::format("write: {} cannot be written; is the disk full?", file.string()));
+    }
+  }
+  target.commit();
+}
+
+std::vector<Patch> readPatches(const std::filesystem::path& file, std::size_t maxMemory) {
+  const Reader reader(file.string());
+  const Json json = Json::parse(textOf(file, maxMemory), nullptr, /*allow_exceptions=*/false);
+  const std::string whole = "the file";
+  if (json.is_discarded()) reader.refuse(whole, "is no JSON document, or was cut off");
+  const Json& format = reader.member(json, "format", whole);
+  if (format != kFormat) reader.refuse(whole, "holds no patches");
+  if (reader.number(json, "version", whole) != kVersion)
+    reader.refuse(whole, fmt::format("is not of version {}", kVersion));
+  const Json& list = reader.member(json, "patches", whole);
+  if (!list.is_array() || list.empty()) reader.refuse(whole, "holds no patches");
+  std::vector<Patch> patches;
+  for (const Json& entry : list)
+    patches.push_back(reader.patch(entry, fmt::format("patch {}", patches.size())));
+  return patches;
+}
+
+}  // namespace mapping
