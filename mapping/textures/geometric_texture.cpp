@@ -31,6 +31,9 @@ constexpr double kStretchError = 0.01;
 // Voxels of the result that the texture's band has to reach on each side, so that the high-order
 // interpolant beside the zero set reads nothing but distances.
 constexpr double kBandNeeded = 3;
+// Share of the map's tolerance that is left to the solution, and the finest that is worth asking
+// for.
+constexpr double kSolveShare = 0.1, kFinestSolve = 1e-10;
 
 void checkArguments(const NarrowBand& base, const NarrowBand& texture, const Patch& patch,
                     const TextureOptions& options) {
@@ -109,9 +112,17 @@ struct ChosenMap {
   std::vector<MapSample> samples;
   std::size_t particles = 0;
   V3d residual{0};  ///< at the particles, in u, v and w
+  RbfSolveReport solve;
 };
 
-ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink,
+/// The solution's tolerance in u, v and w for one of the map in texture voxels.
+double solveTolerance(const NarrowBand& texture, const V3d& boxSize, double mapTolerance) {
+  const double longest = std::max({boxSize.x, boxSize.y, boxSize.z});
+  return std::max(kFinestSolve, kSolveShare * mapTolerance * texture.voxelSize() / longest);
+}
+
+/// @param tolerance  of the solution for an RBF map, u, v and w
+ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink, double tolerance,
                   const TextureOptions& options) {
   ChosenMap result;
   if (options.map == TextureMap::Shell) {
@@ -128,11 +139,13 @@ ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink,
   }
   RbfMapOptions rbf = options.rbf;
   rbf.maxMemory = std::min(rbf.maxMemory, options.maxMemory);
+  rbf.solveTolerance = tolerance;
   rbf.progress = levelset::subProgress(options.progress, 0, 0.2);
   auto smooth = std::make_unique<RbfMap>(patchToTexture(patch, rbf));
   result.samples = sampleMap(*smooth, patch, sink);
   result.particles = smooth->size();
   result.residual = smooth->axisResidual();
+  result.solve = smooth->solveReport();
   result.map = std::move(smooth);
   return result;
 }
@@ -204,11 +217,15 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture, cons
 
   // === The map, and what it does to lengths
   const double sink = options.sink ? *options.sink : base.voxelSize();
-  ChosenMap chosen = makeMap(base, patch, sink / patch.height, options);
+  ChosenMap chosen = makeMap(base, patch, sink / patch.height,
+                             solveTolerance(texture, box.size(), options.mapTolerance), options);
   const Distortion distortion = surveyDistortion(chosen.samples, box.size(), patch.mirrored);
   chosen.samples = {};
-  report.notes = judgeFolds(distortion, options.allowFolds);
+  report.notes = chosen.solve.notes;
+  for (std::string& note : judgeFolds(distortion, options.allowFolds))
+    report.notes.push_back(std::move(note));
   report.particles = chosen.particles;
+  report.solve = chosen.solve;
   report.distortion = distortion;
   report.mapResidual = (chosen.residual * box.size()).length();
   // Most of the map is not stretched less than this; a fold here or there sets no voxel size.

@@ -170,7 +170,27 @@ void addDistortion(const mapping::Distortion& distortion, nlohmann::ordered_json
   json["stretch"] = spreadOf(distortion.stretch);
 }
 
-std::string detailsOf(const mapping::TextureReport& report, double height) {
+const std::vector<std::string> kKernelNames = {"biharmonic", "triharmonic", "thin-plate",
+                                               "sum",        "laplacian",   "gaussian"};
+
+mapping::RbfKernel kernelOf(const std::string& name) {
+  for (std::size_t n = 0; n < kKernelNames.size(); ++n)
+    if (kKernelNames[n] == name) return static_cast<mapping::RbfKernel>(n);
+  return mapping::RbfKernel::Biharmonic;
+}
+
+void addSolve(const mapping::RbfSolveReport& solve, nlohmann::ordered_json& json) {
+  json["solved_by"] = solve.isIterative ? "iteration" : "factors";
+  json["iterations"] = solve.iterations;
+  json["solve_residual"] = solve.solveResidual;
+  json["condition"] = solve.condition;
+  json["regularized"] = solve.isRegularized;
+  json["directions"] = solve.directions;
+  json["merged"] = solve.merged;
+  json["averaged"] = solve.averaged;
+}
+
+std::string detailsOf(const mapping::TextureReport& report, double height, bool isRbf) {
   nlohmann::ordered_json json;
   json["voxel_size"] = report.voxelSize;
   json["height"] = height;
@@ -180,6 +200,7 @@ std::string detailsOf(const mapping::TextureReport& report, double height) {
   json["operations_per_point"] = report.operationsPerPoint;
   addDistortion(report.distortion, json);
   json["map_residual"] = report.mapResidual;
+  if (isRbf) addSolve(report.solve, json);
   return json.dump();
 }
 
@@ -235,6 +256,7 @@ Value texture(Invocation& in) {
   options.halfWidth = in.number("half-width");
   if (in.text("map") == "shell") options.map = mapping::TextureMap::Shell;
   options.mapTolerance = in.number("map-tolerance");
+  options.rbf.kernel = kernelOf(in.text("kernel"));
   options.rbf.lambdaNear = in.number("lambda-near");
   options.rbf.lambdaFar = in.number("lambda-far");
   options.allowFolds = in.flag("allow-folds");
@@ -242,11 +264,17 @@ Value texture(Invocation& in) {
   options.progress = in.progress;
   const mapping::Patch patch = patchFor(in, textureBoxOf(in));
   mapping::TextureResult result = mapping::mapTexture(in.band(0), in.band(1), patch, options);
-  in.notes.detailsJson = detailsOf(result.report, patch.height);
+  in.notes.detailsJson =
+      detailsOf(result.report, patch.height, options.map == mapping::TextureMap::Rbf);
   in.notes.errors.push_back({"map residual at particles, largest",
                              result.report.mapResidual / result.report.voxelSize, "voxels"});
   in.notes.notes.insert(in.notes.notes.end(), result.report.notes.begin(),
                         result.report.notes.end());
+  if (result.report.solve.isIterative) {
+    in.notes.notes.push_back(fmt::format(
+        "{} particles solved for in {} iterations, residual {:.2g}", result.report.particles,
+        result.report.solve.iterations, result.report.solve.solveResidual));
+  }
   in.notes.notes.push_back(
       fmt::format("smallest Jacobian {:.3g}, stretch {:.3g} to {:.3g}, {} of {} blocks evaluated",
                   result.report.distortion.jacobian.least, result.report.distortion.stretch.least,
@@ -298,7 +326,7 @@ void validateTexture(const Invocation& in) {
         "vertices with --map mesh");
   }
   std::vector<const char*> unused;
-  if (in.text("map") != "rbf") unused = {"map-tolerance", "lambda-near", "lambda-far"};
+  if (in.text("map") != "rbf") unused = {"kernel", "map-tolerance", "lambda-near", "lambda-far"};
   if (mapsMesh(in)) unused.insert(unused.end(), {"carve", "alone", "blend", "voxel", "half-width"});
   for (const char* option : unused)
     if (in.given(option))
@@ -400,6 +428,11 @@ void addTextureOperators(std::vector<Operator>& all) {
             .doc = "from patch to texture",
             .fallback = "rbf",
             .choices = {"rbf", "shell", "mesh"}},
+           {.name = "kernel",
+            .type = ParamType::Choice,
+            .doc = "of --map rbf: how a particle's influence grows or falls off",
+            .fallback = "biharmonic",
+            .choices = kKernelNames},
            {.name = "map-tolerance",
             .type = ParamType::Number,
             .doc = "how far the fast evaluation of the map may be off, texture voxels",
