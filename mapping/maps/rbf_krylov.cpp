@@ -242,8 +242,8 @@ RbfFit solveIteratively(const RbfCloud& cloud, const RbfMapOptions& options, con
                         const RbfColumns& values, RbfSolveReport& report) {
   const auto n = static_cast<double>(cloud.points.size());
   const double basis = 2.0 * kMostSteps * sizeof(double) * 3;
-  constexpr double kNodesPerParticle = 4 * 48;  // of the fast sum, and its particles
-  levelset::requireMemory(n * (basis + kNodesPerParticle + RbfPreconditioner::bytesPerParticle()),
+  constexpr double kSumBytes = 500;  // a particle's share of the nodes of the fast sum
+  levelset::requireMemory(n * (basis + kSumBytes) + RbfPreconditioner::estimateBytes(n),
                           options.maxMemory, kKrylov);
   const PointTree first(cloud.points, kSolveLeaf);
   const std::vector<std::uint32_t> order(first.order().begin(), first.order().end());

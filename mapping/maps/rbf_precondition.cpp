@@ -56,8 +56,11 @@ RbfPreconditioner::RbfPreconditioner(const RbfCloud& cloud, RbfKernel kernel, co
   factorCoarse();
 }
 
-double RbfPreconditioner::bytesPerParticle() {
-  return (2.0 * kAround + kAround) * sizeof(float) + 100;
+double RbfPreconditioner::estimateBytes(double particles) {
+  const double coarse = std::min(particles / kCoarseShare, static_cast<double>(kMostCoarse));
+  constexpr double kMatrices = 5;  // of the coarse particles, while they are factored
+  return particles * (3.0 * kAround * sizeof(float) + 100) +
+         kMatrices * coarse * coarse * sizeof(double);
 }
 
 void RbfPreconditioner::makeLeaf(const PointTree& tree, Leaf& leaf) const {

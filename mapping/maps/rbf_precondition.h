@@ -24,8 +24,8 @@ class RbfPreconditioner {
   /// Weights orthogonal to the polynomials.
   [[nodiscard]] RbfColumns operator()(const RbfColumns& residual) const;
 
-  /// Bytes for each particle.
-  [[nodiscard]] static double bytesPerParticle();
+  /// Bytes for so many particles.
+  [[nodiscard]] static double estimateBytes(double particles);
 
  private:
   struct Leaf {

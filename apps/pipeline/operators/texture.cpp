@@ -430,7 +430,7 @@ void addTextureOperators(std::vector<Operator>& all) {
             .choices = {"rbf", "shell", "mesh"}},
            {.name = "kernel",
             .type = ParamType::Choice,
-            .doc = "of --map rbf: how a particle's influence grows or falls off",
+            .doc = "with --map rbf: what a particle does at a distance",
             .fallback = "biharmonic",
             .choices = kKernelNames},
            {.name = "map-tolerance",
@@ -457,7 +457,8 @@ void addTextureOperators(std::vector<Operator>& all) {
            halfWidthParam(),
            {.name = "lambda-near",
             .type = ParamType::Number,
-            .doc = "relaxation of the map at the surface, in mean particle spacings",
+            .doc = "relaxation of the map at the surface, in mean particle spacings; for other "
+                   "kernels in their own units",
             .fallback = "0.005",
             .range = Range::NonNegative},
            {.name = "lambda-far",
