@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "mapping/maps/chebyshev.h"
 #include "mapping/maps/rbf_sum.h"
 
 namespace mapping {
@@ -18,84 +19,34 @@ constexpr std::size_t kNodes = 6;
 constexpr std::size_t kCubeNodes = kNodes * kNodes * kNodes;
 constexpr std::size_t kLeaf = GridBlock::kLeafEdge;
 
-template <std::size_t Out>
-using Weights = std::array<std::array<double, kNodes>, Out>;  ///< of node values, for each output
+using ToNodes = NodeWeights<kNodes, kNodes>;
 
-/// Chebyshev nodes of [−1, 1].
-std::array<double, kNodes> makeNodes() {
-  std::array<double, kNodes> nodes;
-  for (std::size_t m = 0; m < kNodes; ++m)
-    nodes[m] = -std::cos(M_PI * (2 * static_cast<double>(m) + 1) / (2 * kNodes));
-  return nodes;
-}
-const std::array<double, kNodes> kChebyshev = makeNodes();
-
-/// Values at `at` of the polynomial through the nodes.
-template <std::size_t Out>
-Weights<Out> interpolation(const std::array<double, Out>& at) {
-  Weights<Out> weights;
-  for (std::size_t i = 0; i < Out; ++i)
-    for (std::size_t m = 0; m < kNodes; ++m) {
-      double product = 1;
-      for (std::size_t j = 0; j < kNodes; ++j)
-        if (j != m) product *= (at[i] - kChebyshev[j]) / (kChebyshev[m] - kChebyshev[j]);
-      weights[i][m] = product;
-    }
-  return weights;
-}
+const std::array<double, kNodes>& kChebyshev = chebyshevNodes<kNodes>();
 
 /// Coefficients of T_0 … T_5 from values at the nodes.
-Weights<kNodes> makeToCoefficients() {
-  Weights<kNodes> weights;
+ToNodes makeToCoefficients() {
+  ToNodes weights;
   for (std::size_t k = 0; k < kNodes; ++k)
     for (std::size_t m = 0; m < kNodes; ++m)
       weights[k][m] = (k == 0 ? 1.0 : 2.0) / kNodes *
                       std::cos(static_cast<double>(k) * std::acos(kChebyshev[m]));
   return weights;
 }
-const Weights<kNodes> kToCoefficients = makeToCoefficients();
+const ToNodes kToCoefficients = makeToCoefficients();
 
-Weights<kLeaf> makeToGridPoints() {
+NodeWeights<kNodes, kLeaf> makeToGridPoints() {
   std::array<double, kLeaf> at;
   for (std::size_t i = 0; i < kLeaf; ++i) at[i] = 2 * static_cast<double>(i) / (kLeaf - 1) - 1;
-  return interpolation(at);
+  return interpolation<kNodes>(at);
 }
-const Weights<kLeaf> kToGridPoints = makeToGridPoints();
+const NodeWeights<kNodes, kLeaf> kToGridPoints = makeToGridPoints();
 
 /// From a block's nodes to those of its lower or upper half along an axis.
-Weights<kNodes> toHalf(int edge, bool isUpper) {
+ToNodes toHalf(int edge, bool isUpper) {
   const double half = (0.5 * edge - 1) / (edge - 1), middle = isUpper ? 1 - half : half - 1;
   std::array<double, kNodes> at;
   for (std::size_t m = 0; m < kNodes; ++m) at[m] = middle + half * kChebyshev[m];
-  return interpolation(at);
-}
-
-/// Applies weights along each axis of a cube of node values.
-template <std::size_t Out>
-void transform(const Weights<Out>& a, const Weights<Out>& b, const Weights<Out>& c,
-               const double* nodes, double* result) {
-  std::array<double, Out * kNodes * kNodes> first;
-  std::array<double, Out * Out * kNodes> second;
-  for (std::size_t i = 0; i < Out; ++i)
-    for (std::size_t mn = 0; mn < kNodes * kNodes; ++mn) {
-      double sum = 0;
-      for (std::size_t l = 0; l < kNodes; ++l) sum += a[i][l] * nodes[l * kNodes * kNodes + mn];
-      first[i * kNodes * kNodes + mn] = sum;
-    }
-  for (std::size_t i = 0; i < Out; ++i)
-    for (std::size_t j = 0; j < Out; ++j)
-      for (std::size_t n = 0; n < kNodes; ++n) {
-        double sum = 0;
-        for (std::size_t m = 0; m < kNodes; ++m)
-          sum += b[j][m] * first[(i * kNodes + m) * kNodes + n];
-        second[(i * Out + j) * kNodes + n] = sum;
-      }
-  for (std::size_t ij = 0; ij < Out * Out; ++ij)
-    for (std::size_t k = 0; k < Out; ++k) {
-      double sum = 0;
-      for (std::size_t n = 0; n < kNodes; ++n) sum += c[k][n] * second[ij * kNodes + n];
-      result[ij * Out + k] = sum;
-    }
+  return interpolation<kNodes>(at);
 }
 
 /// Half the longest diagonal of the block's hull.
@@ -106,37 +57,54 @@ double radiusOf(const GridBlock& block) {
   return 0.5 * (block.edge - 1) * std::sqrt(longest);
 }
 
-// |x − p| along a line is a generating function of Gegenbauer polynomials, so at a distance of D
-// or more its sixth derivative is at most 6! c / D⁵ with c = (|P₄(0)| + |P₆(0)|) / 11.
-constexpr double kSixth = (0.375 + 0.3125) / 11;
 // Lebesgue constant of six Chebyshev nodes.
 constexpr double kLebesgue = 2.11;
 
-/// How far the polynomial may be off for a particle of weight 1 that is `gap` from the hull.
+/// How far the polynomial may be off for a particle of weight 1 that is `gap` from the hull: by the
+/// sixth derivatives, or by all that there is of a kernel that falls off.
+template <typename Kernel>
 double farError(double halfEdge, double gap) {
-  const double a = halfEdge / 2, squared = a * a / (gap * gap);
-  const double axis = 2 * a * squared * squared * (a / gap) * kSixth;
-  return axis * (1 + kLebesgue + kLebesgue * kLebesgue);
+  const double a = halfEdge / 2, squared = a * a;
+  const double axis = 2 * squared * squared * squared * Kernel::sixth(gap);
+  const double cube = axis * (1 + kLebesgue + kLebesgue * kLebesgue);
+  return std::min(cube, Kernel::farBound(gap) * (1 + kLebesgue * kLebesgue * kLebesgue));
+}
+
+/// Room for what a tangent at the middle of a ball leaves out.
+template <typename Kernel>
+double beyondTangent(double distance, double radius) {
+  const double lo = std::max(distance - radius, 0.0), hi = distance + radius;
+  return std::min(2 * radius * Kernel::slopeBound(lo, hi),
+                  0.5 * radius * radius * Kernel::bendBound(lo, hi));
+}
+
+/// The block in the map's own coordinates, mean particle spacings about its origin.
+GridBlock scaled(const GridBlock& block, const V3d& origin, double spacing) {
+  GridBlock result = block;
+  result.origin = (block.origin - origin) / spacing;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) result.rows[i][j] = block.rows[i][j] / spacing;
+  return result;
 }
 
 }  // namespace
 
 RbfBlock::RbfBlock(const RbfMap& map, const GridBlock& block, double tolerance)
-    : map_(map), block_(block), tolerance_(tolerance) {
+    : map_(map), block_(scaled(block, map.origin_, map.spacing_)), tolerance_(tolerance) {
   const double half = 0.5 * (block.edge - 1);
   std::size_t n = 0;
   for (const double a : kChebyshev)
     for (const double b : kChebyshev)
       for (const double c : kChebyshev) {
         const V3d x =
-            block.center() + (block.row(0) * a + block.row(1) * b + block.row(2) * c) * half;
-        const V3d value = map.affine(x - map.origin_);
+            block_.center() + (block_.row(0) * a + block_.row(1) * b + block_.row(2) * c) * half;
+        const V3d value = map.affine(x);
         for (std::size_t k = 0; k < 3; ++k) far_[k][n] = value[static_cast<int>(k)];
         ++n;
       }
   std::vector<std::uint32_t> all(map.size());
   std::iota(all.begin(), all.end(), 0u);
-  sumFar(all);
+  chooseFar(all);
 }
 
 RbfBlock::RbfBlock(const RbfBlock& parent, int bits)
@@ -144,20 +112,26 @@ RbfBlock::RbfBlock(const RbfBlock& parent, int bits)
       block_(parent.block_.octant(bits)),
       tolerance_(parent.tolerance_),
       error_(parent.error_) {
-  const Weights<kNodes> lower = toHalf(parent.block_.edge, false),
-                        upper = toHalf(parent.block_.edge, true);
+  const ToNodes lower = toHalf(parent.block_.edge, false), upper = toHalf(parent.block_.edge, true);
   for (std::size_t k = 0; k < 3; ++k)
-    transform(bits & 4 ? upper : lower, bits & 2 ? upper : lower, bits & 1 ? upper : lower,
-              parent.far_[k].data(), far_[k].data());
-  sumFar(parent.near_);
+    transformCube(bits & 4 ? upper : lower, bits & 2 ? upper : lower, bits & 1 ? upper : lower,
+                  parent.far_[k].data(), far_[k].data());
+  chooseFar(parent.near_);
 }
 
-void RbfBlock::sumFar(std::span<const std::uint32_t> candidates) {
+void RbfBlock::chooseFar(std::span<const std::uint32_t> candidates) {
   if (!(tolerance_ > 0)) {
     near_.assign(candidates.begin(), candidates.end());
     return;
   }
-  const V3d center = block_.center() - map_.origin_;
+  const std::vector<std::uint32_t> far =
+      withKernel(map_.kernel_, [&](auto kernel) { return split(kernel, candidates); });
+  if (!far.empty()) sumFar(far);
+}
+
+template <typename Kernel>
+std::vector<std::uint32_t> RbfBlock::split(Kernel, std::span<const std::uint32_t> candidates) {
+  const V3d center = block_.center();
   const double radius = radiusOf(block_), half = 0.5 * (block_.edge - 1);
   double halfEdge = 0;
   for (int i = 0; i < 3; ++i) halfEdge = std::max(halfEdge, half * block_.row(i).length());
@@ -171,7 +145,7 @@ void RbfBlock::sumFar(std::span<const std::uint32_t> candidates) {
     const std::uint32_t i = candidates[n];
     const double gap = (map_.particles_[i].position - center).length() - radius;
     const double error =
-        gap > 0 ? map_.weightNorm_[i] * farError(halfEdge, gap) / tolerance_ : HUGE_VAL;
+        gap > 0 ? map_.weightNorm_[i] * farError<Kernel>(halfEdge, gap) / tolerance_ : HUGE_VAL;
     power[n] = static_cast<std::int8_t>(
         error < 1 ? std::clamp(std::ilogb(std::max(error, 1e-300)) + kPowers - 1, 0, kPowers - 2)
                   : kPowers - 1);
@@ -186,7 +160,12 @@ void RbfBlock::sumFar(std::span<const std::uint32_t> candidates) {
   std::vector<std::uint32_t> far;
   for (std::size_t n = 0; n < candidates.size(); ++n)
     (power[n] < last ? far : near_).push_back(candidates[n]);
-  if (far.empty()) return;
+  return far;
+}
+
+void RbfBlock::sumFar(std::span<const std::uint32_t> far) {
+  const V3d center = block_.center();
+  const double half = 0.5 * (block_.edge - 1);
   RbfPoints nodes(kCubeNodes);
   std::size_t n = 0;
   for (const double a : kChebyshev)
@@ -196,7 +175,7 @@ void RbfBlock::sumFar(std::span<const std::uint32_t> candidates) {
         nodes.x[n] = x.x, nodes.y[n] = x.y, nodes.z[n] = x.z;
         ++n;
       }
-  addRbfSums(map_.particles_, far, nodes);
+  addRbfSums(map_.kernel_, map_.particles_, far, nodes);
   for (std::size_t i = 0; i < kCubeNodes; ++i) {
     far_[0][i] += nodes.u[i];
     far_[1][i] += nodes.v[i];
@@ -205,28 +184,31 @@ void RbfBlock::sumFar(std::span<const std::uint32_t> candidates) {
 }
 
 Imath::Box3d RbfBlock::imageBounds() const {
-  const V3d center = block_.center() - map_.origin_;
+  return withKernel(map_.kernel_, [&](auto kernel) { return boundsFor(kernel); });
+}
+
+template <typename Kernel>
+Imath::Box3d RbfBlock::boundsFor(Kernel) const {
+  const V3d center = block_.center();
   const double radius = radiusOf(block_), half = 0.5 * (block_.edge - 1);
   V3d value(0), remainder(error_);
   M33d gradient(0, 0, 0, 0, 0, 0, 0, 0, 0);
   for (const std::uint32_t i : near_) {
     const V3d way = center - map_.particles_[i].position, weight = map_.particles_[i].weight;
     const double distance = way.length();
-    value += weight * distance;
-    const V3d direction = distance > 0 ? way / distance : V3d(0);
+    value += weight * Kernel::value(distance);
+    const V3d slope = distance > 0 ? way * (Kernel::slope(distance) / distance) : V3d(0);
     for (int k = 0; k < 3; ++k)
-      for (int axis = 0; axis < 3; ++axis) gradient[k][axis] += weight[k] * direction[axis];
-    // |x − p| is convex with Hessian ≤ 1 / |x − p|, and its slope never passes 1.
-    double beyond = 2 * radius;
-    if (distance > radius) beyond = std::min(beyond, 0.5 * radius * radius / (distance - radius));
+      for (int axis = 0; axis < 3; ++axis) gradient[k][axis] += weight[k] * slope[axis];
+    const double beyond = beyondTangent<Kernel>(distance, radius);
     for (int k = 0; k < 3; ++k) remainder[k] += std::abs(weight[k]) * beyond;
   }
   V3d extent = remainder;
   for (int k = 0; k < 3; ++k) {
     // |T_n| ≤ 1: beyond constant and slopes, coefficients add up.
     std::array<double, kCubeNodes> coefficients;
-    transform(kToCoefficients, kToCoefficients, kToCoefficients,
-              far_[static_cast<std::size_t>(k)].data(), coefficients.data());
+    transformCube(kToCoefficients, kToCoefficients, kToCoefficients,
+                  far_[static_cast<std::size_t>(k)].data(), coefficients.data());
     constexpr std::array<std::size_t, 3> kSlopes = {kNodes * kNodes, kNodes, 1};
     value[k] += coefficients[0];
     for (std::size_t n = 1; n < kCubeNodes; ++n)
@@ -246,17 +228,16 @@ std::unique_ptr<BlockMap> RbfBlock::octant(int bits) const {
 
 std::size_t RbfBlock::evaluate(std::span<V3d, 512> uvw) const {
   RbfPoints points(uvw.size());
-  transform(kToGridPoints, kToGridPoints, kToGridPoints, far_[0].data(), points.u.data());
-  transform(kToGridPoints, kToGridPoints, kToGridPoints, far_[1].data(), points.v.data());
-  transform(kToGridPoints, kToGridPoints, kToGridPoints, far_[2].data(), points.w.data());
-  const V3d local = block_.origin - map_.origin_;
+  transformCube(kToGridPoints, kToGridPoints, kToGridPoints, far_[0].data(), points.u.data());
+  transformCube(kToGridPoints, kToGridPoints, kToGridPoints, far_[1].data(), points.v.data());
+  transformCube(kToGridPoints, kToGridPoints, kToGridPoints, far_[2].data(), points.w.data());
   for (std::size_t n = 0; n < uvw.size(); ++n) {
-    const V3d x = local + block_.row(0) * static_cast<double>(n >> 6) +
+    const V3d x = block_.origin + block_.row(0) * static_cast<double>(n >> 6) +
                   block_.row(1) * static_cast<double>((n >> 3) & 7) +
                   block_.row(2) * static_cast<double>(n & 7);
     points.x[n] = x.x, points.y[n] = x.y, points.z[n] = x.z;
   }
-  addRbfSums(map_.particles_, near_, points);
+  addRbfSums(map_.kernel_, map_.particles_, near_, points);
   for (std::size_t n = 0; n < uvw.size(); ++n) uvw[n] = V3d(points.u[n], points.v[n], points.w[n]);
   return near_.size() * uvw.size();
 }

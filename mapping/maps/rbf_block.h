@@ -33,10 +33,16 @@ class RbfBlock final : public BlockMap {
 
   RbfBlock(const RbfBlock& parent, int bits);
   /// Moves particles that are far enough from `near_` into the polynomial.
-  void sumFar(std::span<const std::uint32_t> candidates);
+  void chooseFar(std::span<const std::uint32_t> candidates);
+  /// The far ones of the candidates; the others go to `near_`.
+  template <typename Kernel>
+  std::vector<std::uint32_t> split(Kernel kernel, std::span<const std::uint32_t> candidates);
+  void sumFar(std::span<const std::uint32_t> far);
+  template <typename Kernel>
+  [[nodiscard]] Imath::Box3d boundsFor(Kernel kernel) const;
 
   const RbfMap& map_;
-  GridBlock block_;
+  GridBlock block_;  ///< in mean particle spacings about the map's origin
   double tolerance_;
   double error_ = 0;  ///< of the polynomial, so far
   Values far_{};

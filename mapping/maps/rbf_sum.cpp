@@ -1,5 +1,5 @@
-// Compiled with -O3 -fno-math-errno, so that plain loops become vector code; neither flag changes a
-// bit of the results, since each point's sum runs over the particles in one order.
+// Compiled with -O3 -fno-math-errno -fno-trapping-math, so that plain loops become vector code; no
+// flag changes a bit of the results, since each point's sum runs over the particles in one order.
 
 #include "mapping/maps/rbf_sum.h"
 
@@ -11,6 +11,14 @@ namespace mapping {
 namespace {
 
 constexpr std::size_t kTile = 64;  // points, few enough for the first-level cache
+
+const double kScale = rbf::kLaplacian.scale, kA = rbf::kLaplacian.a, kB = rbf::kLaplacian.b,
+             kFast = rbf::kLaplacian.fast, kSlow = rbf::kLaplacian.slow;
+
+/// Adds `count` chosen particles of six numbers each at `points` points.
+using Adder = void (*)(const double* particles, const std::uint32_t* chosen, std::size_t count,
+                       const double* x, const double* y, const double* z, double* u, double* v,
+                       double* w, std::size_t points);
 
 namespace plain {
 #include "mapping/maps/rbf_sum_tile.inc"
@@ -30,25 +38,26 @@ namespace avx512 {
 #pragma GCC pop_options
 #endif
 
-/// The widest that the processor has.
-decltype(&plain::add) chooseAdd() {
+/// The widest that the processor has, in the order of RbfKernel.
+const Adder* chooseAdders() {
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
       __builtin_cpu_supports("avx512dq"))
-    return avx512::add;
-  if (__builtin_cpu_supports("avx2")) return avx2::add;
+    return avx512::kAdders;
+  if (__builtin_cpu_supports("avx2")) return avx2::kAdders;
 #endif
-  return plain::add;
+  return plain::kAdders;
 }
 
 static_assert(sizeof(RbfParticle) == 6 * sizeof(double) && std::is_standard_layout_v<RbfParticle>);
 
 }  // namespace
 
-void addRbfSums(std::span<const RbfParticle> particles, std::span<const std::uint32_t> chosen,
-                RbfPoints& points) {
-  static const auto add = chooseAdd();
+void addRbfSums(RbfKernel kernel, std::span<const RbfParticle> particles,
+                std::span<const std::uint32_t> chosen, RbfPoints& points) {
+  static const Adder* const adders = chooseAdders();
   if (particles.empty()) return;
+  const Adder add = adders[static_cast<std::size_t>(kernel)];
   const double* numbers = &particles.front().position.x;
   for (std::size_t i = 0; i < points.size(); i += kTile)
     add(numbers, chosen.data(), chosen.size(), &points.x[i], &points.y[i], &points.z[i],

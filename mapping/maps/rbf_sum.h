@@ -7,9 +7,11 @@
 #include <span>
 #include <vector>
 
+#include "mapping/maps/rbf_kernel.h"
+
 namespace mapping {
 
-/// A particle's position and its weights for u, v and w.
+/// A particle's position, in mean particle spacings, and its weights for u, v and w.
 struct RbfParticle {
   Imath::V3d position, weight;
 };
@@ -23,8 +25,8 @@ struct RbfPoints {
   [[nodiscard]] std::size_t size() const { return x.size(); }
 };
 
-/// Adds Σ ω_i |x − p_i| over the chosen particles at each point, in the order of `chosen`.
-void addRbfSums(std::span<const RbfParticle> particles, std::span<const std::uint32_t> chosen,
-                RbfPoints& points);
+/// Adds Σ ω_i φ(|x − p_i|) over the chosen particles at each point, in the order of `chosen`.
+void addRbfSums(RbfKernel kernel, std::span<const RbfParticle> particles,
+                std::span<const std::uint32_t> chosen, RbfPoints& points);
 
 }  // namespace mapping

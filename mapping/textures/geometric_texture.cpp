@@ -33,6 +33,9 @@ constexpr double kStretchError = 0.01;
 // Voxels of the result that the texture's band has to reach on each side, so that the high-order
 // interpolant beside the zero set reads nothing but distances.
 constexpr double kBandNeeded = 3;
+// Share of the map's tolerance that is left to the solution, and the finest that is worth asking
+// for.
+constexpr double kSolveShare = 0.1, kFinestSolve = 1e-10;
 
 void checkArguments(const NarrowBand& base, const NarrowBand& texture,
                     std::span<const Patch> patches, const TextureOptions& options) {
@@ -105,6 +108,7 @@ struct ChosenMap {
   Distortion distortion = {};
   std::size_t particles = 0;
   V3d residual{0};  ///< at the particles, in u, v and w
+  RbfSolveReport solve = {};
 
   /// Most of the map is not stretched less than this; a fold here or there sets no voxel size.
   [[nodiscard]] double leastStretch() const {
@@ -112,7 +116,14 @@ struct ChosenMap {
   }
 };
 
-ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink,
+/// The solution's tolerance in u, v and w for one of the map in texture voxels.
+double solveTolerance(const NarrowBand& texture, const V3d& boxSize, double mapTolerance) {
+  const double longest = std::max({boxSize.x, boxSize.y, boxSize.z});
+  return std::max(kFinestSolve, kSolveShare * mapTolerance * texture.voxelSize() / longest);
+}
+
+/// @param tolerance  of the solution for an RBF map, u, v and w
+ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink, double tolerance,
                   const TextureOptions& options) {
   ChosenMap result;
   if (options.map == TextureMap::Shell) {
@@ -129,20 +140,40 @@ ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink,
   }
   RbfMapOptions rbf = options.rbf;
   rbf.maxMemory = std::min(rbf.maxMemory, options.maxMemory);
+  rbf.solveTolerance = tolerance;
   rbf.progress = levelset::subProgress(options.progress, 0, 0.2);
   auto smooth = std::make_unique<RbfMap>(patchToTexture(patch, rbf));
   result.samples = sampleMap(*smooth, patch, sink);
   result.particles = smooth->size();
   result.residual = smooth->axisResidual();
+  result.solve = smooth->solveReport();
   result.map = std::move(smooth);
   return result;
+}
+
+/// Figures of the worst, counts of all, and what each has to say once.
+void addSolve(const RbfSolveReport& one, TextureReport& report) {
+  RbfSolveReport& all = report.solve;
+  all.merged += one.merged;
+  all.averaged += one.averaged;
+  all.directions = std::min(all.directions, one.directions);
+  all.condition = std::max(all.condition, one.condition);
+  all.isRegularized = all.isRegularized || one.isRegularized;
+  all.isIterative = all.isIterative || one.isIterative;
+  all.iterations = std::max(all.iterations, one.iterations);
+  all.solveResidual = std::max(all.solveResidual, one.solveResidual);
+  for (const std::string& note : one.notes) {
+    if (std::find(all.notes.begin(), all.notes.end(), note) != all.notes.end()) continue;
+    all.notes.push_back(note);
+    report.notes.push_back(note);
+  }
 }
 
 /// The map of every patch, none where it folds and is skipped. What folds otherwise is refused, or
 /// noted.
 std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> patches, double sink,
-                                const V3d& textureSize, const TextureOptions& options,
-                                TextureReport& report) {
+                                const V3d& textureSize, double tolerance,
+                                const TextureOptions& options, TextureReport& report) {
   std::vector<ChosenMap> maps;
   std::vector<Distortion> distortions;
   for (const Patch& patch : patches) {
@@ -150,7 +181,7 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
     const auto share = [&](double n) { return 0.2 * n / static_cast<double>(patches.size()); };
     TextureOptions part = options;
     part.progress = levelset::subProgress(options.progress, share(done), share(done + 1));
-    ChosenMap chosen = makeMap(base, patch, sink / patch.height, part);
+    ChosenMap chosen = makeMap(base, patch, sink / patch.height, tolerance, part);
     chosen.distortion = surveyDistortion(chosen.samples, textureSize, patch.mirrored);
     chosen.samples = {};
     if (options.skipFolds && chosen.distortion.folded > 0) {
@@ -161,6 +192,7 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
     std::vector<std::string> notes = judgeFolds(chosen.distortion, options.allowFolds);
     std::move(notes.begin(), notes.end(), std::back_inserter(report.notes));
     report.particles += chosen.particles;
+    addSolve(chosen.solve, report);
     report.mapResidual = std::max(report.mapResidual, (chosen.residual * textureSize).length());
     distortions.push_back(chosen.distortion);
     maps.push_back(std::move(chosen));
@@ -273,7 +305,9 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
 
   // === The maps, and what they do to lengths
   const double sink = options.sink ? *options.sink : base.voxelSize();
-  const std::vector<ChosenMap> maps = makeMaps(base, patches, sink, box.size(), options, report);
+  const double tolerance = solveTolerance(texture, box.size(), options.mapTolerance);
+  const std::vector<ChosenMap> maps =
+      makeMaps(base, patches, sink, box.size(), tolerance, options, report);
   double minStretch = HUGE_VAL;
   for (const ChosenMap& chosen : maps)
     if (chosen.map) minStretch = std::min(minStretch, chosen.leastStretch());

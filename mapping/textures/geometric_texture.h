@@ -37,9 +37,9 @@ struct TextureOptions {
       {};  ///< what the unit cube of u, v, w is; empty: the texture's zero-set box. What is outside
            ///< goes on beyond the patch, but not in a shell: there it is cut off
   std::optional<double> voxelSize =
-      {};                ///< empty: the finest of base and texture × smallest stretch
-  double halfWidth = 3;  ///< voxels
-  RbfMapOptions rbf = {};
+      {};                      ///< empty: the finest of base and texture × smallest stretch
+  double halfWidth = 3;        ///< voxels
+  RbfMapOptions rbf = {};      ///< but for solveTolerance, a tenth of mapTolerance
   double mapTolerance = 0.05;  ///< of the map's fast evaluation, texture voxels
   bool allowFolds = false;
   bool skipFolds = false;  ///< of many patches, leave out those that fold
@@ -55,7 +55,8 @@ struct TextureReport {
   /// Particles added up or tetrahedra tried, for each grid point of the blocks evaluated.
   double operationsPerPoint = 0;
   Distortion distortion = {};
-  double mapResidual = 0;  ///< largest |Φ(p) − uvw| × texture size, world units
+  double mapResidual = 0;     ///< largest |Φ(p) − uvw| × texture size, world units
+  RbfSolveReport solve = {};  ///< of an RBF map
   std::vector<std::string> notes;
 };
 
@@ -82,7 +83,8 @@ void requirePatchOn(const levelset::NarrowBand& base, const Patch& patch);
 /// @param texture  any solid; x, y, z of its box become u, v, w
 /// @throws UsageError for lengths that are negative or not finite; InvalidInput when the map folds
 /// (with the place), the patch does not lie on `base`, or the
-///         texture box is empty; ResourceLimit before allocating too much
+///         texture box is empty; NumericalError where an RBF map's solution by iteration stands
+///         still; ResourceLimit before allocating too much
 [[nodiscard]] TextureResult mapTexture(const levelset::NarrowBand& base,
                                        const levelset::NarrowBand& texture, const Patch& patch,
                                        const TextureOptions& options = {});

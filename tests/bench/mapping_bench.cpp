@@ -1,16 +1,21 @@
 // What a grid point, or a vertex, costs under each map, beside the direct sum of the RBF map, on
 // one thread: a third of a cylinder's wall with a texture of 256 x 256 x 64 voxels laid onto it.
 // Solving is timed apart. The direct sum runs on every hundredth block.
-//   mapping_bench [PARTICLES = 10000] [POINTS = 10000000]
+//   mapping_bench [PARTICLES = 10000] [POINTS = 10000000] [SOLVED = 100000]
+// Then the six kernels, on a tenth of the points with 2000 particles; and what solving for SOLVED
+// particles by iteration takes, on all threads (0: nothing).
 // Exits 1 when the fast sum is less than 30 times as fast, or off by more than 0.05 texture voxel.
 
 #include <fmt/core.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
+#include <optional>
 #include <vector>
 
 #include "mapping/maps/level_map.h"
@@ -115,19 +120,12 @@ Cost run(const mapping::PatchMap& map, const Grid& grid, double tolerance, const
 }
 
 void report(const char* name, const Cost& cost) {
-  fmt::print("{:<8} {:>10.3g} points {:>9.1f} ns a point {:>8.2f} operations a point\n", name,
+  fmt::print("{:<11} {:>10.3g} points {:>9.1f} ns a point {:>8.2f} operations a point\n", name,
              cost.points, 1e9 * cost.seconds / cost.points, cost.operations / cost.points);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
-  const auto particles = static_cast<std::size_t>(argc > 1 ? std::atol(argv[1]) : 10000);
-  const double points = argc > 2 ? std::atof(argv[2]) : 1e7;
-  const mapping::Patch patch = makePatch(particles);
-  const Grid grid(points);
-
+/// The RBF map of a patch.
+mapping::RbfMap solve(const mapping::Patch& patch, const mapping::RbfMapOptions& options) {
   std::vector<V3d> places, targets;
   std::vector<char> near;
   for (const mapping::ParticleLevel& level : patch.levels)
@@ -138,8 +136,46 @@ int main(int argc, char** argv) {
                              static_cast<double>(j) / static_cast<double>(level.rows - 1), level.w);
         near.push_back(level.w == 0);
       }
+  return {places, targets, near, options};
+}
+
+void compareKernels(double points) {
+  constexpr std::array kNames = {"biharmonic", "triharmonic", "thin-plate",
+                                 "sum",        "laplacian",   "gaussian"};
+  const mapping::Patch patch = makePatch(2000);
+  const Grid grid(points);
+  for (std::size_t n = 0; n < kNames.size(); ++n) {
+    const mapping::RbfMap map = solve(patch, {.kernel = static_cast<mapping::RbfKernel>(n)});
+    report(kNames[n], run(map, grid, kTolerance / kTextureVoxels,
+                          [](const GridBlock&, const std::array<V3d, 512>&, Cost&) {}));
+  }
+}
+
+void solveMany(std::size_t particles) {
+  const mapping::Patch patch = makePatch(particles);
+  const double start = now();
+  const auto wallStart = std::chrono::steady_clock::now();
+  const mapping::RbfMap map = solve(patch, {.denseLimit = 0});
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - wallStart;
+  const mapping::RbfSolveReport& report = map.solveReport();
+  fmt::print(
+      "{} particles solved by {} iterations in {:.1f} s ({:.1f} CPU s), residual {:.2g} of u, v, "
+      "w\n",
+      map.size(), report.iterations, wall.count(), now() - start, report.solveResidual);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::optional<tbb::global_control> oneThread;
+  oneThread.emplace(tbb::global_control::max_allowed_parallelism, 1);
+  const auto particles = static_cast<std::size_t>(argc > 1 ? std::atol(argv[1]) : 10000);
+  const double points = argc > 2 ? std::atof(argv[2]) : 1e7;
+  const mapping::Patch patch = makePatch(particles);
+  const Grid grid(points);
+
   double start = now();
-  const mapping::RbfMap rbf(places, targets, near);
+  const mapping::RbfMap rbf = solve(patch, {.denseLimit = particles + 1000});
   fmt::print("{} particles, solved in {:.1f} s\n", rbf.size(), now() - start);
 
   // Every particle at every grid point, with the same vector code.
@@ -157,7 +193,7 @@ int main(int argc, char** argv) {
                                 std::max(cost.worst, (uvw[n] - exact[n]).length() * kTextureVoxels);
                         });
   const double direct = fast.directSeconds / fast.directPoints;
-  fmt::print("direct   {:>10.3g} points {:>9.1f} ns a point (every {}th block)\n",
+  fmt::print("direct      {:>10.3g} points {:>9.1f} ns a point (every {}th block)\n",
              fast.directPoints, 1e9 * direct, kDirectShare);
   report("fast", fast);
   const double ratio = direct / (fast.seconds / fast.points);
@@ -182,5 +218,10 @@ int main(int argc, char** argv) {
   }
   fmt::print("vertices {:.3g} million a second (5 wanted){}\n", kVertices / (now() - start) / 1e6,
              sum.x == 0.5 ? " " : "");
+
+  compareKernels(points / 10);
+  oneThread.reset();
+  const auto solved = static_cast<std::size_t>(argc > 3 ? std::atol(argv[3]) : 100000);
+  if (solved > 0) solveMany(solved);
   return ratio >= 30 && fast.worst <= kTolerance ? 0 : 1;
 }

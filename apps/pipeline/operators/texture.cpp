@@ -62,7 +62,27 @@ void addDistortion(const mapping::Distortion& distortion, nlohmann::ordered_json
   json["stretch"] = spreadOf(distortion.stretch);
 }
 
-std::string detailsOf(const mapping::TextureReport& report, double height) {
+const std::vector<std::string> kKernelNames = {"biharmonic", "triharmonic", "thin-plate",
+                                               "sum",        "laplacian",   "gaussian"};
+
+mapping::RbfKernel kernelOf(const std::string& name) {
+  for (std::size_t n = 0; n < kKernelNames.size(); ++n)
+    if (kKernelNames[n] == name) return static_cast<mapping::RbfKernel>(n);
+  return mapping::RbfKernel::Biharmonic;
+}
+
+void addSolve(const mapping::RbfSolveReport& solve, nlohmann::ordered_json& json) {
+  json["solved_by"] = solve.isIterative ? "iteration" : "factors";
+  json["iterations"] = solve.iterations;
+  json["solve_residual"] = solve.solveResidual;
+  json["condition"] = solve.condition;
+  json["regularized"] = solve.isRegularized;
+  json["directions"] = solve.directions;
+  json["merged"] = solve.merged;
+  json["averaged"] = solve.averaged;
+}
+
+std::string detailsOf(const mapping::TextureReport& report, double height, bool isRbf) {
   nlohmann::ordered_json json;
   json["voxel_size"] = report.voxelSize;
   json["patches"] = report.patches;
@@ -74,6 +94,7 @@ std::string detailsOf(const mapping::TextureReport& report, double height) {
   json["operations_per_point"] = report.operationsPerPoint;
   addDistortion(report.distortion, json);
   json["map_residual"] = report.mapResidual;
+  if (isRbf) addSolve(report.solve, json);
   return json.dump();
 }
 
@@ -137,6 +158,7 @@ Value texture(Invocation& in) {
   options.halfWidth = in.number("half-width");
   if (in.text("map") == "shell") options.map = mapping::TextureMap::Shell;
   options.mapTolerance = in.number("map-tolerance");
+  options.rbf.kernel = kernelOf(in.text("kernel"));
   options.rbf.lambdaNear = in.number("lambda-near");
   options.rbf.lambdaFar = in.number("lambda-far");
   options.allowFolds = in.flag("allow-folds");
@@ -145,11 +167,17 @@ Value texture(Invocation& in) {
   options.progress = in.progress;
   const std::vector<mapping::Patch> patches = patchesFor(in, textureBoxOf(in));
   mapping::TextureResult result = mapping::mapTexture(in.band(0), in.band(1), patches, options);
-  in.notes.detailsJson = detailsOf(result.report, patches.front().height);
+  in.notes.detailsJson =
+      detailsOf(result.report, patches.front().height, options.map == mapping::TextureMap::Rbf);
   in.notes.errors.push_back({"map residual at particles, largest",
                              result.report.mapResidual / result.report.voxelSize, "voxels"});
   in.notes.notes.insert(in.notes.notes.end(), result.report.notes.begin(),
                         result.report.notes.end());
+  if (result.report.solve.isIterative) {
+    in.notes.notes.push_back(fmt::format(
+        "{} particles solved for in {} iterations, residual {:.2g}", result.report.particles,
+        result.report.solve.iterations, result.report.solve.solveResidual));
+  }
   in.notes.notes.push_back(
       fmt::format("smallest Jacobian {:.3g}, stretch {:.3g} to {:.3g}, {} of {} blocks evaluated",
                   result.report.distortion.jacobian.least, result.report.distortion.stretch.least,
@@ -204,7 +232,7 @@ void validateTexture(const Invocation& in) {
         "vertices with --map mesh");
   }
   std::vector<const char*> unused;
-  if (in.text("map") != "rbf") unused = {"map-tolerance", "lambda-near", "lambda-far"};
+  if (in.text("map") != "rbf") unused = {"kernel", "map-tolerance", "lambda-near", "lambda-far"};
   if (mapsMesh(in)) unused.insert(unused.end(), {"carve", "alone", "blend", "voxel", "half-width"});
   for (const char* option : unused)
     if (in.given(option))
@@ -234,6 +262,11 @@ void addTextureOperators(std::vector<Operator>& all) {
             .doc = "from patch to texture",
             .fallback = "rbf",
             .choices = {"rbf", "shell", "mesh"}},
+           {.name = "kernel",
+            .type = ParamType::Choice,
+            .doc = "with --map rbf: what a particle does at a distance",
+            .fallback = "biharmonic",
+            .choices = kKernelNames},
            {.name = "map-tolerance",
             .type = ParamType::Number,
             .doc = "how far the fast evaluation of the map may be off, texture voxels",
@@ -258,7 +291,8 @@ void addTextureOperators(std::vector<Operator>& all) {
            halfWidthParam(),
            {.name = "lambda-near",
             .type = ParamType::Number,
-            .doc = "relaxation of the map at the surface, in mean particle spacings",
+            .doc = "relaxation of the map at the surface, in mean particle spacings; for other "
+                   "kernels in their own units",
             .fallback = "0.005",
             .range = Range::NonNegative},
            {.name = "lambda-far",

@@ -109,6 +109,11 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
                  "says nothing to --map mesh");
   EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map-tolerance -1",
                  "map-tolerance");
+  EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --kernel cubic",
+                 "thin-plate");
+  EXPECT_REFUSAL(
+      onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map shell --kernel sum",
+      "--kernel says nothing to --map shell");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 1 --voxel 0.1 --as a",
                  "is taken");
 }

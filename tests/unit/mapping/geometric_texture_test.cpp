@@ -94,6 +94,50 @@ TEST(GeometricTexture, FlatPatchIsTheIdentity) {
   }
 }
 
+TEST(GeometricTexture, OtherKernelsMapAFlatPatchStraight) {
+  const double voxel = 0.125;
+  const NarrowBand base = makeSlab(voxel), ring = makeRing(1.2, 0.8, voxel);
+  const Patch patch = mapping::makePatch(base, square(2), 1.6).patch;
+  using mapping::RbfKernel;
+  for (const RbfKernel kernel :
+       {RbfKernel::Triharmonic, RbfKernel::ThinPlate, RbfKernel::Gaussian}) {
+    const TextureResult result = mapTexture(
+        base, ring, patch,
+        {.merge = TextureMerge::Alone, .sink = 0, .rbf = {.kernel = kernel, .lambdaFar = 0.1}});
+    EXPECT_EQ(result.report.solve.directions, 3);
+    EXPECT_EQ(result.report.solve.merged + result.report.solve.averaged, 0u);
+    EXPECT_GT(result.report.solve.condition, 1);
+    EXPECT_LT(result.report.solve.solveResidual, 1e-9);
+    double worst = 0;
+    support::forEachActive(result.band, [&](const V3d& p, double phi) {
+      const double truth = torusDistance(p - V3d(0, 0, 0.8), 1.2, 0.8);
+      if (std::abs(truth) < 1.5 * voxel) worst = std::max(worst, std::abs(phi - truth));
+    });
+    EXPECT_LT(worst, 0.02 * voxel) << static_cast<int>(kernel);
+  }
+}
+
+// Solved by iteration, to a tenth of the map's tolerance, the texture is the same.
+TEST(GeometricTexture, IterationGivesTheSameTexture) {
+  const double voxel = 0.125;
+  const NarrowBand base = makeBall(5, voxel), ring = makeRing(2, 1, voxel);
+  const Patch patch = mapping::makePatch(base, cap(0.5, 5), 2, {.spacing = 0.3}).patch;
+  mapping::TextureOptions options{.merge = TextureMerge::Alone, .mapTolerance = 0.01};
+  const TextureResult dense = mapTexture(base, ring, patch, options);
+  options.rbf.denseLimit = 500;
+  const TextureResult result = mapTexture(base, ring, patch, options);
+  EXPECT_FALSE(dense.report.solve.isIterative);
+  EXPECT_TRUE(result.report.solve.isIterative);
+  EXPECT_GT(result.report.solve.iterations, 2u);
+  EXPECT_LE(result.report.solve.solveResidual, 0.1 * 0.01 * voxel / 2);
+  const levelset::BandSampler sampler(dense.band);
+  double worst = 0;
+  support::forEachActive(result.band, [&](const V3d& p, double phi) {
+    if (std::abs(phi) < 1.5 * voxel) worst = std::max(worst, std::abs(phi - sampler.value(p)));
+  });
+  EXPECT_LT(worst, 0.03 * voxel);
+}
+
 TEST(GeometricTexture, ShellsEndBeyondTheTexturesBand) {
   // Particles a voxel apart: one cell around the patch would be narrower than the band.
   const double voxel = 0.125;

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <array>
+#include <cmath>
+#include <ostream>
+#include <random>
+#include <vector>
+
+#include "mapping/maps/rbf_map.h"
+
+namespace mapping {
+/// For the names of tests.
+inline void PrintTo(RbfKernel kernel, std::ostream* out) {
+  constexpr std::array<const char*, 6> kNames = {"Biharmonic", "Triharmonic", "ThinPlate",
+                                                 "Sum",        "Laplacian",   "Gaussian"};
+  *out << kNames[static_cast<std::size_t>(kernel)];
+}
+}  // namespace mapping
+
+/// Particles for RBF maps.
+namespace support {
+
+inline constexpr std::array kKernels = {
+    mapping::RbfKernel::Biharmonic, mapping::RbfKernel::Triharmonic, mapping::RbfKernel::ThinPlate,
+    mapping::RbfKernel::Sum,        mapping::RbfKernel::Laplacian,   mapping::RbfKernel::Gaussian};
+
+struct Cloud {
+  std::vector<Imath::V3d> points, targets;
+  std::vector<char> near;
+
+  void add(const Imath::V3d& point, const Imath::V3d& target, bool isNear = false) {
+    points.push_back(point);
+    targets.push_back(target);
+    near.push_back(isNear);
+  }
+};
+
+inline Imath::V3d bend(const Imath::V3d& p) {
+  return {p.x + 0.05 * p.y * p.y, p.y + 0.1 * std::sin(p.z), p.z - 0.04 * p.x * p.y};
+}
+inline Imath::V3d affine(const Imath::V3d& p) {
+  return {0.3 * p.x - 0.1 * p.y + 7, 0.2 * p.y + 0.4 * p.z - 3, 0.5 * p.z + 0.1 * p.x};
+}
+
+/// A slightly jittered lattice of spacing 1, moved far from the origin by `shift`.
+template <typename Map>
+Cloud lattice(int edge, const Map& map, const Imath::V3d& shift = Imath::V3d(0)) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> jitter(-0.2, 0.2);
+  Cloud cloud;
+  for (int i = 0; i < edge; ++i)
+    for (int j = 0; j < edge; ++j)
+      for (int k = 0; k < edge; ++k) {
+        const Imath::V3d p(i + jitter(random), j + jitter(random), k + jitter(random));
+        cloud.add(p + shift, map(p), k == 0);
+      }
+  return cloud;
+}
+
+/// @param options  all but λ
+inline mapping::RbfMap fit(const Cloud& cloud, double lambda, mapping::RbfMapOptions options = {}) {
+  options.lambdaNear = options.lambdaFar = lambda;
+  return {cloud.points, cloud.targets, cloud.near, options};
+}
+inline mapping::RbfMap fit(const Cloud& cloud, double lambda, mapping::RbfKernel kernel) {
+  return fit(cloud, lambda, mapping::RbfMapOptions{.kernel = kernel});
+}
+
+}  // namespace support
