@@ -58,10 +58,14 @@ bool sweepBlended(const SurfaceField& field, const SurfaceField& guide, const Pa
 }
 
 /// Geodesics that join opposite subdivision points: they never leave the surface.
-void sweepGeodesics(const SurfaceField& field, ParticleLevel& level) {
+void sweepGeodesics(const SurfaceField& field, const std::vector<V3d>& firstRow,
+                    ParticleLevel& level) {
+  std::vector<V3d> path = firstRow;
   for (std::size_t j = 1; j + 1 < level.rows; ++j) {
     const V3d a = level.at(0, j), b = level.at(level.columns - 1, j);
-    const std::vector<V3d> path = geodesic(field, level.height, a, b);
+    // Rows that lie side by side run alike, also where two ways are equally long.
+    path = geodesicLike(field, level.height, a, b, path);
+    if (path.empty()) path = geodesic(field, level.height, a, b);
     if (path.empty()) {
       throw InvalidInput(
           fmt::format("patch: no path on the surface joins {} and {}; move the corners "
@@ -77,53 +81,44 @@ void sweepGeodesics(const SurfaceField& field, ParticleLevel& level) {
   }
 }
 
-/// Rows and columns go on by their last spacing; straight through space where the surface ends or
-/// turns away, so that no particle comes to lie behind others.
-void addRim(const SurfaceField& field, ParticleLevel& level) {
-  const auto columns = static_cast<int>(level.columns), rows = static_cast<int>(level.rows);
-  level.rim.assign(2 * (level.columns + level.rows) + 4, V3d(0));
-  const auto onwards = [&](const V3d& last, const V3d& before) {
-    const V3d way = last - before;
-    constexpr double kMostTurn = 0.5;  // cosine
-    const std::optional<V3d> end = walkStraight(field, level.height, last, way, way.length());
-    const bool isAhead = end && field.normal(last).dot(field.normal(*end)) > kMostTurn;
-    return isAhead ? *end : last + way;
-  };
-  for (int j = 0; j < rows; ++j) {
-    level.rim[level.rimIndex(-1, j)] = onwards(level.beyond(0, j), level.beyond(1, j));
-    level.rim[level.rimIndex(columns, j)] =
-        onwards(level.beyond(columns - 1, j), level.beyond(columns - 2, j));
+/// Through all knots, each stretch the shortest way.
+/// @return empty when two knots are not joined, the first of them in `gap`
+std::vector<V3d> sideThrough(const SurfaceField& field, double height,
+                             const std::vector<V3d>& knots, const std::vector<V3d>* below,
+                             std::size_t& gap) {
+  if (below && knots.size() == 2) {
+    std::vector<V3d> path = geodesicLike(field, height, knots[0], knots[1], *below);
+    if (!path.empty()) return path;
   }
-  for (int i = 0; i < columns; ++i) {
-    level.rim[level.rimIndex(i, -1)] = onwards(level.beyond(i, 0), level.beyond(i, 1));
-    level.rim[level.rimIndex(i, rows)] =
-        onwards(level.beyond(i, rows - 1), level.beyond(i, rows - 2));
+  std::vector<V3d> side = {knots.front()};
+  for (std::size_t i = 1; i < knots.size(); ++i) {
+    const std::vector<V3d> path = geodesic(field, height, knots[i - 1], knots[i]);
+    gap = i - 1;
+    if (path.empty()) return {};
+    side.insert(side.end(), path.begin() + 1, path.end());
   }
-  for (const int i : {-1, columns})
-    for (const int j : {-1, rows}) {
-      const int a = i < 0 ? 0 : columns - 1, b = j < 0 ? 0 : rows - 1;
-      const V3d straight = level.beyond(i, b) + level.beyond(a, j) - level.beyond(a, b);
-      V3d p = straight;
-      level.rim[level.rimIndex(i, j)] = field.project(p, level.height) ? p : straight;
-    }
+  return side;
 }
 
 }  // namespace
 
 PatchSides makeSides(const levelset::NarrowBand& band, double height,
-                     const std::array<V3d, 4>& corners) {
+                     const std::array<V3d, 4>& corners, const PatchSides& between,
+                     const PatchSides* below) {
   const SurfaceField field(band);
   constexpr std::array<std::array<std::size_t, 2>, 4> kEnds = {{{0, 1}, {1, 2}, {3, 2}, {0, 3}}};
   PatchSides sides;
   for (std::size_t side = 0; side < 4; ++side) {
-    const V3d &a = corners[kEnds[side][0]], &b = corners[kEnds[side][1]];
-    sides[side] = geodesic(field, height, a, b);
+    std::vector<V3d> knots = {corners[kEnds[side][0]]};
+    knots.insert(knots.end(), between[side].begin(), between[side].end());
+    knots.push_back(corners[kEnds[side][1]]);
+    std::size_t gap = 0;
+    sides[side] = sideThrough(field, height, knots, below ? &(*below)[side] : nullptr, gap);
     if (sides[side].empty()) {
-      throw InvalidInput(
-          fmt::format("patch: no path on the surface joins corners {} {} and {} {} at height "
-                      "{:.6g}; put all four "
-                      "on one part of the base",
-                      kEnds[side][0], text(a), kEnds[side][1], text(b), height));
+      throw InvalidInput(fmt::format(
+          "patch: no path on the surface joins {} and {}, between corners {} and {}, at height "
+          "{:.6g}; put all points on one part of the base",
+          text(knots[gap]), text(knots[gap + 1]), kEnds[side][0], kEnds[side][1], height));
     }
   }
   return sides;
@@ -155,29 +150,59 @@ Relaxation fillLevel(const levelset::NarrowBand& band, const levelset::NarrowBan
     level.positions[j * level.columns] = border[3][j];
     level.positions[j * level.columns + level.columns - 1] = border[1][j];
   }
-  if (!sweepBlended(field, SurfaceField(guide), border, level)) sweepGeodesics(field, level);
+  if (!sweepBlended(field, SurfaceField(guide), border, level))
+    sweepGeodesics(field, sides[0], level);
   const Relaxation relaxation = relax(band, level);
-  addRim(field, level);
+  addRim(band, level);
   return relaxation;
 }
 
-void advectCorners(const levelset::NarrowBand& band, double from, double to,
-                   std::array<V3d, 4>& corners) {
+void addRim(const levelset::NarrowBand& band, ParticleLevel& level) {
+  const SurfaceField field(band);
+  const auto columns = static_cast<int>(level.columns), rows = static_cast<int>(level.rows);
+  level.rim.assign(2 * (level.columns + level.rows) + 4, V3d(0));
+  const auto onwards = [&](const V3d& last, const V3d& before) {
+    const V3d way = last - before;
+    constexpr double kMostTurn = 0.5;  // cosine
+    const std::optional<V3d> end = walkStraight(field, level.height, last, way, way.length());
+    const bool isAhead = end && field.normal(last).dot(field.normal(*end)) > kMostTurn;
+    return isAhead ? *end : last + way;
+  };
+  for (int j = 0; j < rows; ++j) {
+    level.rim[level.rimIndex(-1, j)] = onwards(level.beyond(0, j), level.beyond(1, j));
+    level.rim[level.rimIndex(columns, j)] =
+        onwards(level.beyond(columns - 1, j), level.beyond(columns - 2, j));
+  }
+  for (int i = 0; i < columns; ++i) {
+    level.rim[level.rimIndex(i, -1)] = onwards(level.beyond(i, 0), level.beyond(i, 1));
+    level.rim[level.rimIndex(i, rows)] =
+        onwards(level.beyond(i, rows - 1), level.beyond(i, rows - 2));
+  }
+  for (const int i : {-1, columns})
+    for (const int j : {-1, rows}) {
+      const int a = i < 0 ? 0 : columns - 1, b = j < 0 ? 0 : rows - 1;
+      const V3d straight = level.beyond(i, b) + level.beyond(a, j) - level.beyond(a, b);
+      V3d p = straight;
+      level.rim[level.rimIndex(i, j)] = field.project(p, level.height) ? p : straight;
+    }
+}
+
+void advectPoints(const levelset::NarrowBand& band, double from, double to, std::span<V3d> points) {
   const SurfaceField field(band);
   const double steps = std::max(1.0, std::ceil(std::abs(to - from) / (0.5 * field.voxelSize())));
   const double step = (to - from) / steps;
-  for (V3d& corner : corners) {
-    V3d p = corner;
+  for (V3d& point : points) {
+    V3d p = point;
     for (int i = 0; i < static_cast<int>(steps); ++i)
       p += field.normal(p + field.normal(p) * (0.5 * step)) * step;
     if (!field.project(p, to)) {
       throw InvalidInput(
-          fmt::format("patch: above the corner {} the distance to the base does not reach {:.6g}, "
+          fmt::format("patch: above the point {} the distance to the base does not reach {:.6g}, "
                       "other parts of it "
-                      "come too near at {}; lower the height or move the corner",
-                      text(corner), to, text(p)));
+                      "come too near at {}; lower the height or move the patch",
+                      text(point), to, text(p)));
     }
-    corner = p;
+    point = p;
   }
 }
 

@@ -3,6 +3,7 @@
 #include <Imath/ImathVec.h>
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "levelset/narrow_band.h"
@@ -15,10 +16,14 @@ namespace mapping {
 /// Sides of a patch on one level: 0 → 1, 1 → 2, 3 → 2 and 0 → 3, so that opposite sides run alike.
 using PatchSides = std::array<std::vector<Imath::V3d>, 4>;
 
-/// Geodesics between the corners on φ = height.
+/// Geodesics between the corners on φ = height, and through the points between them.
+/// @param between  points on φ = height that a side passes on its way; often none
+/// @param below    the sides on the level below, which these run like where they can; or nullptr
 /// @throws InvalidInput when two corners are not joined by the surface
 [[nodiscard]] PatchSides makeSides(const levelset::NarrowBand& band, double height,
-                                   const std::array<Imath::V3d, 4>& corners);
+                                   const std::array<Imath::V3d, 4>& corners,
+                                   const PatchSides& between = {},
+                                   const PatchSides* below = nullptr);
 
 /// Mean length of the sides along u, and along v.
 [[nodiscard]] double sideLengthU(const PatchSides& sides);
@@ -32,9 +37,13 @@ using PatchSides = std::array<std::vector<Imath::V3d>, 4>;
 Relaxation fillLevel(const levelset::NarrowBand& band, const levelset::NarrowBand& guide,
                      const PatchSides& sides, ParticleLevel& level);
 
-/// Carries corners along ∇φ from one height to another, in steps of at most half a voxel (RK2).
-/// @throws InvalidInput where a corner meets the medial axis of the base before that height
-void advectCorners(const levelset::NarrowBand& band, double from, double to,
-                   std::array<Imath::V3d, 4>& corners);
+/// Makes the rim: rows and columns go on by their last spacing; straight through space where the
+/// surface ends or turns away, so that no particle comes to lie behind others.
+void addRim(const levelset::NarrowBand& band, ParticleLevel& level);
+
+/// Carries points along ∇φ from one height to another, in steps of at most half a voxel (RK2).
+/// @throws InvalidInput where one meets the medial axis of the base before that height
+void advectPoints(const levelset::NarrowBand& band, double from, double to,
+                  std::span<Imath::V3d> points);
 
 }  // namespace mapping

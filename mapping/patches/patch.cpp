@@ -6,9 +6,8 @@
 #include <cmath>
 
 #include "levelset/error.h"
-#include "mapping/patches/level_schemes.h"
 #include "mapping/patches/particle_levels.h"
-#include "mapping/patches/patch_space.h"
+#include "mapping/patches/patch_levels.h"
 #include "mapping/surface/closest_point.h"
 #include "mapping/surface/geodesic.h"
 #include "mapping/surface/surface_field.h"
@@ -22,54 +21,22 @@ using levelset::NarrowBand;
 using levelset::UsageError;
 
 constexpr const char* kPatch = "patch";
-// The map's system is dense: n³ / 3 operations and n² numbers. This many particles cost a second or
-// two, and lie some five to ten voxels apart on a patch of a hundred or two.
-constexpr double kParticleBudget = 2000;
-constexpr double kSmallestSpacing = 1.5;  // voxels; closer ones say the same thing twice
-constexpr std::size_t kFewest = 4;        // particles along a side
-
-/// As one would give it on the command line, to the last bit.
-std::string asOption(const V3d& p) {
-  return fmt::format("{},{},{}", p.x, p.y, p.z);
-}
-
 void checkPatchArguments(const std::array<V3d, 4>& corners, double height,
                          const PatchOptions& options) {
-  if (!(height > 0) || !std::isfinite(height)) {
-    throw UsageError(fmt::format("{}: the height is {}; give a positive length", kPatch, height));
-  }
-  if (options.levels < 2) {
-    throw UsageError(
-        fmt::format("{}: {} levels of particles; give at least 2", kPatch, options.levels));
-  }
-  if (!(options.spacing >= 0) || !std::isfinite(options.spacing)) {
-    throw UsageError(fmt::format("{}: the spacing of particles is {}; give a positive length",
-                                 kPatch, options.spacing));
-  }
-  const LevelTransform& t = options.transform;
-  if (!std::isfinite(t.twist) || !std::isfinite(t.bend) || !(t.taper > 0) ||
-      !std::isfinite(t.taper)) {
-    throw UsageError(
-        fmt::format("{}: twist {}, taper {} and bend {}; give two angles and a positive scale",
-                    kPatch, t.twist, t.taper, t.bend));
-  }
-  if (options.scheme != LevelScheme::Spline && (!options.spline.empty() || options.fade)) {
-    throw UsageError(
-        fmt::format("{}: a spline and its fading go with the spline scheme only", kPatch));
-  }
-  for (const V3d& p : options.spline) {
-    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-      throw UsageError(fmt::format("{}: the spline's point {} is not finite", kPatch, asOption(p)));
-    }
-  }
+  checkPatchOptions(kPatch, height, options);
   for (const V3d& c : corners) {
-    if (!std::isfinite(c.x) || !std::isfinite(c.y) || !std::isfinite(c.z)) {
-      throw UsageError(fmt::format("{}: the corner {} is not finite", kPatch, asOption(c)));
-    }
+    if (!std::isfinite(c.x) || !std::isfinite(c.y) || !std::isfinite(c.z))
+      throw UsageError(fmt::format("{}: the corner {} is not finite", kPatch, pointAsOption(c)));
   }
 }
 
-void checkApart(const NarrowBand& base, const std::array<V3d, 4>& corners) {
+struct Outline {
+  std::array<V3d, 4> corners;
+  PatchSides between;  ///< points that the sides pass
+};
+
+void checkApart(const NarrowBand& base, const Outline& outline) {
+  const std::array<V3d, 4>& corners = outline.corners;
   for (std::size_t i = 0; i < 4; ++i)
     for (std::size_t j = i + 1; j < 4; ++j) {
       const double distance = (corners[i] - corners[j]).length();
@@ -77,9 +44,22 @@ void checkApart(const NarrowBand& base, const std::array<V3d, 4>& corners) {
         throw InvalidInput(fmt::format(
             "{}: corners {} and {} both fall on {}, {:.3g} voxels apart; a patch needs sides of at "
             "least two voxels",
-            kPatch, i, j, asOption(corners[i]), distance / base.voxelSize()));
+            kPatch, i, j, pointAsOption(corners[i]), distance / base.voxelSize()));
       }
     }
+  constexpr std::array<std::array<std::size_t, 2>, 4> kEnds = {{{0, 1}, {1, 2}, {3, 2}, {0, 3}}};
+  for (std::size_t side = 0; side < 4; ++side) {
+    std::vector<V3d> knots = {corners[kEnds[side][0]]};
+    knots.insert(knots.end(), outline.between[side].begin(), outline.between[side].end());
+    knots.push_back(corners[kEnds[side][1]]);
+    for (std::size_t i = 1; i < knots.size(); ++i) {
+      if ((knots[i] - knots[i - 1]).length() >= 2 * base.voxelSize()) continue;
+      throw InvalidInput(fmt::format(
+          "{}: two points of side {} both fall on {}; the side begins and ends at corners by "
+          "itself, leave one point out",
+          kPatch, side, pointAsOption(knots[i])));
+    }
+  }
 }
 
 /// Positive when the corners run anticlockwise seen from outside: twice the area that each corner
@@ -94,23 +74,51 @@ double handedness(const NarrowBand& base, const std::array<V3d, 4>& corners) {
   return sum;
 }
 
+/// The same by the directions in which sides leave the corners: it tells also where a patch is
+/// wrapped around an edge, so that its corners lie above each other.
+double handednessOfSides(const NarrowBand& base, const PatchSides& sides) {
+  const SurfaceField field(base);
+  // A tenth of the way along.
+  const auto leaving = [](const std::vector<V3d>& side, bool isReversed) {
+    const std::vector<V3d> tenths = sampleByArcLength(side, 11);
+    return isReversed ? (tenths[9] - tenths[10]).normalized()
+                      : (tenths[1] - tenths[0]).normalized();
+  };
+  const std::array<std::array<V3d, 2>, 4> ways = {
+      {{leaving(sides[0], false), leaving(sides[3], false)},
+       {leaving(sides[1], false), leaving(sides[0], true)},
+       {leaving(sides[2], true), leaving(sides[1], true)},
+       {leaving(sides[3], true), leaving(sides[2], false)}}};
+  const std::array<V3d, 4> corners = {sides[0].front(), sides[0].back(), sides[2].back(),
+                                      sides[2].front()};
+  double sum = 0;
+  for (std::size_t i = 0; i < 4; ++i)
+    sum += ways[i][0].cross(ways[i][1]).dot(field.normal(corners[i]));
+  return sum;
+}
+
 /// @return true when mirrored
 bool checkOrientation(const NarrowBand& base, const std::array<V3d, 4>& given,
-                      const std::array<V3d, 4>& corners, bool mirror) {
-  const double area = handedness(base, corners);
-  double scale = 0;
+                      const PatchSides& sides, bool mirror) {
+  const std::array<V3d, 4> corners = {sides[0].front(), sides[0].back(), sides[2].back(),
+                                      sides[2].front()};
+  constexpr double kFlat = 1e-3;
+  double area = handedness(base, corners), scale = 0;
   for (std::size_t i = 0; i < 4; ++i) scale += (corners[(i + 1) % 4] - corners[i]).length2();
-  if (std::abs(area) < 1e-3 * scale) {
-    throw InvalidInput(fmt::format(
-        "{}: the corners {}, {}, {} and {} span no area; move one of them", kPatch,
-        asOption(corners[0]), asOption(corners[1]), asOption(corners[2]), asOption(corners[3])));
+  if (std::abs(area) < kFlat * scale) area = handednessOfSides(base, sides) * scale / 4;
+  if (std::abs(area) < kFlat * scale) {
+    throw InvalidInput(
+        fmt::format("{}: the corners {}, {}, {} and {} span no area; move one of them", kPatch,
+                    pointAsOption(corners[0]), pointAsOption(corners[1]), pointAsOption(corners[2]),
+                    pointAsOption(corners[3])));
   }
   if (area < 0 && !mirror) {
-    throw UsageError(fmt::format(
-        "{}: the corners run clockwise seen from outside, which would mirror the "
-        "texture; give them as "
-        "\"{} {} {} {}\" or ask for --mirror",
-        kPatch, asOption(given[0]), asOption(given[3]), asOption(given[2]), asOption(given[1])));
+    throw UsageError(
+        fmt::format("{}: the corners run clockwise seen from outside, which would mirror the "
+                    "texture; give them as "
+                    "\"{} {} {} {}\" or ask for --mirror",
+                    kPatch, pointAsOption(given[0]), pointAsOption(given[3]),
+                    pointAsOption(given[2]), pointAsOption(given[1])));
   }
   return area < 0;
 }
@@ -118,95 +126,46 @@ bool checkOrientation(const NarrowBand& base, const std::array<V3d, 4>& given,
 struct LevelSides {
   double height;
   PatchSides sides;
-  double uLength, vLength;
+  LevelSize size;
+  [[nodiscard]] std::vector<V3d> outline() const {
+    std::vector<V3d> all;
+    for (const std::vector<V3d>& side : sides) all.insert(all.end(), side.begin(), side.end());
+    return all;
+  }
 };
 
-/// (u/s + 3)(v/s + 3), rims and all, summed over the levels.
-double particlesAt(double spacing, const std::vector<LevelSides>& levels) {
-  double count = 0;
-  for (const LevelSides& level : levels)
-    count += (level.uLength / spacing + 3) * (level.vLength / spacing + 3);
-  return count;
-}
-
-/// The spacing that makes kParticleBudget particles of all levels together.
-/// @param times  how often each level comes
-double chooseSpacing(const NarrowBand& base, const std::vector<LevelSides>& levels,
-                     std::size_t times = 1) {
-  double sum = 0, product = 0;
-  for (const LevelSides& level : levels) {
-    sum += level.uLength + level.vLength;
-    product += level.uLength * level.vLength;
-  }
-  sum *= static_cast<double>(times);
-  product *= static_cast<double>(times);
-  const double count = static_cast<double>(levels.size() * times);
-  const double rest = std::max(kParticleBudget, 36 * count) - 9 * count;
-  const double spacing = (3 * sum + std::sqrt(9 * sum * sum + 4 * rest * product)) / (2 * rest);
-  return std::max(spacing, kSmallestSpacing * base.voxelSize());
-}
-
-std::size_t countAlong(double length, double spacing) {
-  return std::max(kFewest, static_cast<std::size_t>(std::lround(length / spacing)) + 1);
-}
-
-double meanSpacing(const Patch& patch) {
-  double sum = 0, count = 0;
-  for (const ParticleLevel& level : patch.levels)
-    for (std::size_t j = 0; j < level.rows; ++j)
-      for (std::size_t i = 0; i < level.columns; ++i) {
-        if (i > 0) sum += (level.at(i, j) - level.at(i - 1, j)).length(), ++count;
-        if (j > 0) sum += (level.at(i, j) - level.at(i, j - 1)).length(), ++count;
-      }
-  return sum / count;
-}
-
-void checkParticleCount(double count, double spacing, const PatchOptions& options) {
-  levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kPatch);
-  constexpr double kMostParticles = 1e6;
-  if (count > kMostParticles) {
-    throw levelset::ResourceLimit(fmt::format(
-        "{}: a spacing of {:.6g} would make {:.3g} particles, more than {:.0g}; take a wider "
-        "one",
-        kPatch, spacing, count, kMostParticles));
-  }
-}
-
-LevelSides makeLevelSides(const NarrowBand& band, double height,
-                          const std::array<V3d, 4>& corners) {
-  LevelSides level{height, makeSides(band, height, corners), 0, 0};
-  level.uLength = sideLengthU(level.sides);
-  level.vLength = sideLengthV(level.sides);
+LevelSides makeLevelSides(const NarrowBand& band, double height, const std::array<V3d, 4>& corners,
+                          const PatchSides& between, const PatchSides* below = nullptr) {
+  LevelSides level{height, makeSides(band, height, corners, between, below), {}};
+  level.size = {sideLengthU(level.sides), sideLengthV(level.sides)};
   return level;
 }
 
-std::array<V3d, 4> cornersOf(const LevelSides& level) {
-  return {level.sides[0].front(), level.sides[0].back(), level.sides[2].back(),
-          level.sides[2].front()};
-}
-
-/// Distances throughout patch space, from the sides on the surface.
-NarrowBand sweepAbove(const NarrowBand& base, const LevelSides& surface, double height,
-                      const PatchOptions& options) {
-  std::vector<V3d> border;
-  for (const std::vector<V3d>& side : surface.sides)
-    border.insert(border.end(), side.begin(), side.end());
-  // Inner particles may lie outside the box of the sides: a patch may bulge by a quarter of its
-  // width.
-  const double bulge = 0.25 * std::min(surface.uLength, surface.vLength);
-  return sweepPatchSpace(base, border, bulge, height,
-                         {.maxMemory = options.maxMemory,
-                          .progress = levelset::subProgress(options.progress, 0.1, 0.5)});
+/// Corners and points between them, projected to the surface.
+Outline projectOutline(const NarrowBand& base, const std::array<V3d, 4>& corners,
+                       const PatchOptions& options, PatchReport& report) {
+  Outline outline;
+  const auto projected = [&](const V3d& p) {
+    const V3d foot = closestSurfacePoint(base, p, kPatch);
+    report.projectionDistance = std::max(report.projectionDistance, (foot - p).length());
+    return foot;
+  };
+  for (std::size_t side = 0; side < 4; ++side) {
+    outline.corners[side] = projected(corners[side]);
+    for (const V3d& p : options.sides[side]) outline.between[side].push_back(projected(p));
+  }
+  return outline;
 }
 
 /// Counts by the spacing; positions between the sides.
 ParticleLevel filledLevel(const NarrowBand& band, const NarrowBand& guide, const LevelSides& border,
-                          double height, double spacing, PatchReport& report) {
+                          double height, double spacing, const PatchOptions& options,
+                          PatchReport& report) {
   ParticleLevel level;
   level.height = border.height;
   level.w = border.height / height;
-  level.columns = countAlong(border.uLength, spacing);
-  level.rows = countAlong(border.vLength, spacing);
+  level.columns = options.cells[0] > 0 ? options.cells[0] + 1 : countAlong(border.size.u, spacing);
+  level.rows = options.cells[1] > 0 ? options.cells[1] + 1 : countAlong(border.size.v, spacing);
   const Relaxation relaxation = fillLevel(band, guide, border.sides, level);
   report.relaxIterations += relaxation.iterations;
   report.isRelaxed = report.isRelaxed && relaxation.isConverged;
@@ -215,80 +174,43 @@ ParticleLevel filledLevel(const NarrowBand& band, const NarrowBand& guide, const
 
 /// Scheme B: the sides of each level from its own advected corners, and a complete patch between
 /// them.
-std::vector<ParticleLevel> reducedLevels(const NarrowBand& base, std::vector<LevelSides> sides,
-                                         double height, const PatchOptions& options,
-                                         PatchReport& report) {
-  const NarrowBand space = sweepAbove(base, sides.front(), height, options);
-  std::array<V3d, 4> advected = cornersOf(sides.front());
+std::vector<ParticleLevel> reducedLevels(const NarrowBand& base, Outline outline,
+                                         std::vector<LevelSides> sides, double height,
+                                         const PatchOptions& options, PatchReport& report) {
+  const NarrowBand space =
+      sweepAbove(base, sides.front().outline(), sides.front().size, height, options);
   for (std::size_t k = 1; k < options.levels; ++k) {
     const double level = height * static_cast<double>(k) / static_cast<double>(options.levels - 1);
-    advectCorners(space, sides.back().height, level, advected);
-    sides.push_back(makeLevelSides(space, level, advected));
+    advectPoints(space, sides.back().height, level, outline.corners);
+    for (std::vector<V3d>& points : outline.between)
+      advectPoints(space, sides.back().height, level, points);
+    sides.push_back(
+        makeLevelSides(space, level, outline.corners, outline.between, &sides.back().sides));
   }
-  const double spacing = options.spacing > 0 ? options.spacing : chooseSpacing(base, sides);
+  std::vector<LevelSize> sizes;
+  for (const LevelSides& border : sides) sizes.push_back(border.size);
+  const double spacing =
+      options.spacing > 0 ? options.spacing : chooseSpacing(base.voxelSize(), sizes);
   std::vector<ParticleLevel> levels;
   for (const LevelSides& border : sides) {
-    levels.push_back(
-        filledLevel(levels.empty() ? base : space, space, border, height, spacing, report));
+    levels.push_back(filledLevel(levels.empty() ? base : space, space, border, height, spacing,
+                                 options, report));
     const double done = static_cast<double>(levels.size()) / static_cast<double>(sides.size());
     levelset::report(options.progress, 0.5 + 0.5 * done, kPatch);
   }
   return levels;
 }
 
-/// The middle of a level, and directions there.
-struct Axis {
-  V3d origin, normal, u;
-};
-
-Axis axisOf(const NarrowBand& base, const ParticleLevel& surface) {
-  const std::size_t i = (surface.columns - 1) / 2, j = (surface.rows - 1) / 2;
-  const std::size_t right = surface.columns / 2, above = surface.rows / 2;
-  Axis axis;
-  axis.origin =
-      (surface.at(i, j) + surface.at(right, j) + surface.at(i, above) + surface.at(right, above)) /
-      4.0;
-  const SurfaceField field(base);
-  (void)field.project(axis.origin, 0);
-  axis.normal = field.normal(axis.origin);
-  const V3d u = surface.at(i + 1, j) - surface.at(i, j);
-  axis.u = (u - axis.normal * axis.normal.dot(u)).normalized();
-  return axis;
-}
-
 /// Schemes A and C: one patch on the surface, whose particles travel.
-std::vector<ParticleLevel> levelsFromSurface(const NarrowBand& base, const LevelSides& sides,
-                                             double height, const PatchOptions& options,
-                                             PatchReport& report) {
-  const double spacing =
-      options.spacing > 0 ? options.spacing : chooseSpacing(base, {sides}, options.levels);
-  const ParticleLevel surface = filledLevel(base, base, sides, height, spacing, report);
+std::vector<ParticleLevel> travellingLevels(const NarrowBand& base, const LevelSides& sides,
+                                            double height, const PatchOptions& options,
+                                            PatchReport& report) {
+  const double spacing = options.spacing > 0
+                             ? options.spacing
+                             : chooseSpacing(base.voxelSize(), {{sides.size}}, options.levels);
+  const ParticleLevel surface = filledLevel(base, base, sides, height, spacing, options, report);
   levelset::report(options.progress, 0.2, kPatch);
-  if (options.scheme == LevelScheme::Conforming) {
-    const NarrowBand space = sweepAbove(base, sides, height, options);
-    return conformingLevels(space, surface, height, options.levels);
-  }
-  const Axis axis = axisOf(base, surface);
-  std::vector<V3d> points = {axis.origin};
-  points.insert(points.end(), options.spline.begin(), options.spline.end());
-  if (options.spline.empty()) points.push_back(axis.origin + axis.normal * height);
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    if ((points[i] - points[i - 1]).length() < 1e-6 * base.voxelSize()) {
-      throw UsageError(fmt::format("{}: the spline stands still at {}; leave one point out{}",
-                                   kPatch, asOption(points[i]),
-                                   i == 1 ? ", it begins at the patch's centre by itself" : ""));
-    }
-  }
-  const SweepCurve curve(points);
-  if (height > curve.length() * (1 + 1e-9)) {
-    throw UsageError(
-        fmt::format("{}: the height is {:.6g} and the spline only {:.6g} long; lower the height or "
-                    "lengthen the spline",
-                    kPatch, height, curve.length()));
-  }
-  SplineSweep sweep = splineLevels(surface, curve, height, options.levels, options.fade);
-  report.slowed = sweep.slowed;
-  return std::move(sweep.levels);
+  return levelsFromSurface(base, surface, sides.outline(), sides.size, height, options, report);
 }
 
 }  // namespace
@@ -307,33 +229,25 @@ PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners,
   PatchReport& report = result.report;
 
   // === The quadrilateral on the surface
-  for (std::size_t i = 0; i < 4; ++i) {
-    patch.corners[i] = closestSurfacePoint(base, corners[i], kPatch);
-    report.projectionDistance =
-        std::max(report.projectionDistance, (patch.corners[i] - corners[i]).length());
-  }
-  checkApart(base, patch.corners);
-  patch.mirrored = checkOrientation(base, corners, patch.corners, options.mirror);
+  const Outline outline = projectOutline(base, corners, options, report);
+  patch.corners = outline.corners;
+  checkApart(base, outline);
   patch.height = height;
-  std::vector<LevelSides> sides = {makeLevelSides(base, 0, patch.corners)};
+  std::vector<LevelSides> sides = {makeLevelSides(base, 0, patch.corners, outline.between)};
+  patch.mirrored = checkOrientation(base, corners, sides.front().sides, options.mirror);
+  const LevelSize size = sides.front().size;
   if (options.spacing > 0)
-    checkParticleCount(particlesAt(options.spacing, sides) * static_cast<double>(options.levels),
+    checkParticleCount(particlesAt(options.spacing, {{size}}) * static_cast<double>(options.levels),
                        options.spacing, options);
-  const double uLength = sides.front().uLength, vLength = sides.front().vLength;
   levelset::report(options.progress, 0.1, kPatch);
 
   // === Levels above it
   patch.levels = options.scheme == LevelScheme::Reduced
-                     ? reducedLevels(base, std::move(sides), height, options, report)
-                     : levelsFromSurface(base, sides.front(), height, options, report);
-  if (!options.transform.isIdentity()) {
-    const Axis axis = axisOf(base, patch.levels.front());
-    transformLevels(patch.levels, options.transform, axis.origin, axis.normal, axis.u, height);
-  }
-  patch.spacing = meanSpacing(patch);
-  report.uLength = uLength;
-  report.vLength = vLength;
-  report.cellAreaVariation = cellAreaVariation(patch.levels.front());
+                     ? reducedLevels(base, outline, std::move(sides), height, options, report)
+                     : travellingLevels(base, sides.front(), height, options, report);
+  report.uLength = size.u;
+  report.vLength = size.v;
+  finishPatch(base, options, patch, report);
   return result;
 }
 
@@ -367,7 +281,7 @@ std::array<V3d, 4> cornersAround(const NarrowBand& base, const V3d& point, doubl
       throw InvalidInput(fmt::format(
           "{}: the surface breaks off on the way from {} to corner {}; choose a smaller "
           "size or give the corners",
-          kPatch, asOption(center), i));
+          kPatch, pointAsOption(center), i));
     }
     corners[i] = *corner;
   }

@@ -86,7 +86,12 @@ struct PatchOptions {
   std::vector<Imath::V3d> spline = {};
   bool fade = false;  ///< Spline only: the surface's own relief goes to nothing on the way
   LevelTransform transform = {};
-  double spacing = 0;   ///< of particles, world units; 0: chosen from patch and voxel size
+  /// Points near the surface that the sides 0 → 1, 1 → 2, 3 → 2 and 0 → 3 pass in this order: a
+  /// side is the shortest way from point to point and has a corner at each.
+  std::array<std::vector<Imath::V3d>, 4> sides = {};
+  double spacing = 0;  ///< of particles, world units; 0: chosen from patch and voxel size
+  /// Of cells along u and v, the same on all levels, each at least 3; 0, 0: as the spacing asks.
+  std::array<std::size_t, 2> cells = {0, 0};
   bool mirror = false;  ///< accept corners that run clockwise seen from outside
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
@@ -102,7 +107,8 @@ struct PatchResult {
 /// @param height   of the patch space above the surface, world units, positive
 /// @throws UsageError for corners that run clockwise seen from outside (the message has the right
 ///         order) or a height that is not positive; InvalidInput when a corner is further from the
-///         surface than its bounding diagonal, corners coincide, or no geodesic joins them
+///         surface than its bounding diagonal, corners or points of a side coincide, or no geodesic
+///         joins them
 [[nodiscard]] PatchResult makePatch(const levelset::NarrowBand& base,
                                     const std::array<Imath::V3d, 4>& corners, double height,
                                     const PatchOptions& options = {});

@@ -107,12 +107,14 @@ struct RestLengths {
 };
 
 V3d springForce(const ParticleLevel& level, const RestLengths& rest, std::size_t column,
-                std::size_t row) {
+                std::size_t row, bool isRing) {
+  const long around = static_cast<long>(level.columns) - 1;
   const V3d p = level.at(column, row);
   V3d force(0);
   for (const Spring& spring : kSprings) {
-    const long i = static_cast<long>(column) + spring.columns,
-               j = static_cast<long>(row) + spring.rows;
+    long i = static_cast<long>(column) + spring.columns;
+    const long j = static_cast<long>(row) + spring.rows;
+    if (isRing) i = (i + around) % around;
     if (i < 0 || j < 0 || i >= static_cast<long>(level.columns) ||
         j >= static_cast<long>(level.rows))
       continue;
@@ -142,29 +144,36 @@ ParticleLevel coarsened(const SurfaceField& field, const ParticleLevel& fine) {
   return coarse;
 }
 
-Relaxation settle(const levelset::NarrowBand& band, ParticleLevel& level);
+/// The last column is the first one again.
+void closeRing(std::vector<V3d>& positions, std::size_t columns) {
+  for (std::size_t n = 0; n < positions.size(); n += columns)
+    positions[n + columns - 1] = positions[n];
+}
+
+Relaxation settle(const levelset::NarrowBand& band, ParticleLevel& level, bool isRing);
 
 /// What is out of place over many particles is put right where it is over few: springs alone hand
 /// it on by one particle an iteration.
-void settleCoarsely(const levelset::NarrowBand& band, ParticleLevel& level) {
+void settleCoarsely(const levelset::NarrowBand& band, ParticleLevel& level, bool isRing) {
   constexpr std::size_t kFewestToCoarsen = 8;
   if (std::min(level.columns, level.rows) < kFewestToCoarsen) return;
   const SurfaceField field(band);
   ParticleLevel coarse = coarsened(field, level);
   std::vector<V3d> moves = coarse.positions;
-  settleCoarsely(band, coarse);
-  (void)settle(band, coarse);
+  settleCoarsely(band, coarse, isRing);
+  (void)settle(band, coarse, isRing);
   for (std::size_t n = 0; n < moves.size(); ++n) moves[n] = coarse.positions[n] - moves[n];
   for (std::size_t j = 1; j + 1 < level.rows; ++j)
-    for (std::size_t i = 1; i + 1 < level.columns; ++i) {
+    for (std::size_t i = isRing ? 0 : 1; i + 1 < level.columns; ++i) {
       const Between place(coarse, fractionOf(i, level.columns), fractionOf(j, level.rows));
       V3d& p = level.positions[j * level.columns + i];
       V3d moved = p + place.of(moves);
       if (field.project(moved, level.height)) p = moved;
     }
+  if (isRing) closeRing(level.positions, level.columns);
 }
 
-Relaxation settle(const levelset::NarrowBand& band, ParticleLevel& level) {
+Relaxation settle(const levelset::NarrowBand& band, ParticleLevel& level, bool isRing) {
   Relaxation result;
   const RestLengths rest(level);
   const double voxel = band.voxelSize();
@@ -178,10 +187,11 @@ Relaxation settle(const levelset::NarrowBand& band, ParticleLevel& level) {
       const SurfaceField field(band);
       for (std::size_t n = range.begin(); n != range.end(); ++n) {
         const std::size_t column = n % level.columns, row = n / level.columns;
-        if (column == 0 || row == 0 || column + 1 == level.columns || row + 1 == level.rows)
-          continue;
+        if (row == 0 || row + 1 == level.rows || column + 1 == level.columns) continue;
+        if (column == 0 && !isRing) continue;
         const V3d p = level.positions[n];
-        V3d move = springForce(level, rest, column, row) * kStep + (p - previous[n]) * kMomentum;
+        V3d move =
+            springForce(level, rest, column, row, isRing) * kStep + (p - previous[n]) * kMomentum;
         const V3d normal = field.normal(p);
         move -= normal * move.dot(normal);
         const double length = move.length();
@@ -190,6 +200,7 @@ Relaxation settle(const levelset::NarrowBand& band, ParticleLevel& level) {
         next[n] = field.project(moved, level.height) ? moved : p;
       }
     });
+    if (isRing) closeRing(next, level.columns);
     result.lastMove = 0;
     for (std::size_t n = 0; n < count; ++n)
       result.lastMove = std::max(result.lastMove, (next[n] - level.positions[n]).length() / voxel);
@@ -203,10 +214,10 @@ Relaxation settle(const levelset::NarrowBand& band, ParticleLevel& level) {
 
 }  // namespace
 
-Relaxation relax(const levelset::NarrowBand& band, ParticleLevel& level) {
+Relaxation relax(const levelset::NarrowBand& band, ParticleLevel& level, bool isRing) {
   if (level.columns < 3 || level.rows < 3) return {.isConverged = true};
-  settleCoarsely(band, level);
-  return settle(band, level);
+  settleCoarsely(band, level, isRing);
+  return settle(band, level, isRing);
 }
 
 double cellAreaVariation(const ParticleLevel& level) {

@@ -45,6 +45,10 @@ V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point, cons
   if (!std::isfinite(point.x) || !std::isfinite(point.y) || !std::isfinite(point.z)) {
     throw levelset::UsageError(fmt::format("{}: the point {} is not finite", action, at()));
   }
+  if (base.isEmpty()) {
+    throw levelset::InvalidInput(
+        fmt::format("{}: the base has no surface; give a solid with at least one voxel", action));
+  }
   const SurfaceField field(base);
   V3d foot = point;
   if (!field.project(foot, 0)) {

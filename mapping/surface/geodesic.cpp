@@ -1,26 +1,25 @@
 #include "mapping/surface/geodesic.h"
 
-#include <fmt/core.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <queue>
-#include <unordered_map>
 
-#include "levelset/error.h"
+#include "mapping/surface/surface_walk.h"
+#include "mapping/surface/way_search.h"
 
 namespace mapping {
 namespace {
 
 using Imath::V3d;
 
-// A walk that came out this much longer than its chord may have gone astray: A* is asked as well.
-constexpr double kSuspiciousRatio = 1.7;
-constexpr std::size_t kMaxSearchNodes = 4'000'000;
+// No way is shorter than the chord: a path no longer than this is not worth a search for others.
+constexpr double kNearlyStraight = 1.01;
+constexpr double kWorthTrying = 1.02;  // times the shortest, of a way that is straightened roughly
+constexpr double kLeastTurnCosine = -0.7;  // between the ends of a segment, over an edge too
+constexpr double kFlatCosine = 0.98;       // of 0.2 radians: a chord that is 0.2 % short
 constexpr std::size_t kCoarsestSegments = 8;
 constexpr int kMaxSweeps = 600;
+constexpr int kSweepsBetweenLooks = 16;
+constexpr double kCalm = 1e-5;      // of the length, from one look to the next
 constexpr double kStraight = 1e-3;  // voxels that the last sweep moved a point
 
 V3d tangential(const V3d& way, const V3d& normal) {
@@ -47,107 +46,61 @@ std::vector<V3d> walkTowards(const SurfaceField& field, double height, const V3d
   return path;
 }
 
-/// A* over the lattice of one voxel about a, on the nodes next to the surface.
-class LatticeSearch {
- public:
-  LatticeSearch(const SurfaceField& field, double height, const V3d& a, const V3d& b)
-      : field_(field), height_(height), origin_(a), goal_(b), step_(field.voxelSize()) {}
+/// Could a straight step lead from one of these normals to the other along the surface? Through a
+/// thin sheet they are opposite.
+bool isSoundTurn(const V3d& normal, const V3d& next) {
+  return normal.dot(next) > kLeastTurnCosine;
+}
 
-  std::vector<V3d> path() {
-    open_.push({(goal_ - origin_).length(), pack({0, 0, 0})});
-    nodes_[pack({0, 0, 0})] = {0, pack({0, 0, 0}), false};
-    while (!open_.empty() && nodes_.size() < kMaxSearchNodes) {
-      const std::uint64_t key = open_.top().second;
-      open_.pop();
-      Node& node = nodes_[key];
-      if (node.closed) continue;
-      node.closed = true;
-      if ((place(unpack(key)) - goal_).length() <= step_) return trace(key);
-      expand(key, node.cost);
-    }
-    return {};
-  }
+std::vector<V3d> normalsOn(const SurfaceField& field, const std::vector<V3d>& path) {
+  std::vector<V3d> normals;
+  for (const V3d& p : path) normals.push_back(field.normal(p));
+  return normals;
+}
 
- private:
-  using Cell = std::array<int, 3>;
-  struct Node {
-    double cost;
-    std::uint64_t from;
-    bool closed;
-  };
-  static constexpr int kBias = 1 << 20;
-
-  static std::uint64_t pack(const Cell& c) {
-    std::uint64_t key = 0;
-    for (const int x : c) key = key << 21 | static_cast<std::uint64_t>(x + kBias);
-    return key;
-  }
-  static Cell unpack(std::uint64_t key) {
-    Cell c;
-    for (int axis = 2; axis >= 0; --axis, key >>= 21)
-      c[static_cast<std::size_t>(axis)] = static_cast<int>(key & 0x1fffff) - kBias;
-    return c;
-  }
-  V3d place(const Cell& c) const { return origin_ + V3d(c[0], c[1], c[2]) * step_; }
-
-  void expand(std::uint64_t key, double cost) {
-    const Cell c = unpack(key);
-    for (int neighbour = 0; neighbour < 27; ++neighbour) {
-      const Cell d = {neighbour / 9 - 1, neighbour / 3 % 3 - 1, neighbour % 3 - 1};
-      const Cell next = {c[0] + d[0], c[1] + d[1], c[2] + d[2]};
-      const V3d p = place(next);
-      const double length = std::sqrt(static_cast<double>(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
-      if (length == 0 || std::abs(field_.value(p) - height_) > 0.9 * step_) continue;
-      const double nextCost = cost + length * step_;
-      const auto [it, isNew] = nodes_.try_emplace(pack(next), Node{nextCost, key, false});
-      if (!isNew && (it->second.closed || it->second.cost <= nextCost)) continue;
-      it->second = {nextCost, key, false};
-      open_.push({nextCost + (goal_ - p).length(), pack(next)});
-    }
-  }
-
-  std::vector<V3d> trace(std::uint64_t key) {
-    std::vector<V3d> path = {goal_};
-    for (; nodes_[key].from != key; key = nodes_[key].from) {
-      V3d p = place(unpack(key));
-      if (field_.project(p, height_)) path.push_back(p);
-    }
-    path.push_back(origin_);
-    std::reverse(path.begin(), path.end());
-    return path;
-  }
-
-  using Entry = std::pair<double, std::uint64_t>;
-  const SurfaceField& field_;
-  double height_;
-  V3d origin_, goal_;
-  double step_;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open_;
-  std::unordered_map<std::uint64_t, Node> nodes_;
-};
+bool isSound(const std::vector<V3d>& normals) {
+  for (std::size_t i = 1; i < normals.size(); ++i)
+    if (!isSoundTurn(normals[i - 1], normals[i])) return false;
+  return true;
+}
 
 /// Over-relaxed sweeps until no point moves; the ends stay.
 void relaxPath(const SurfaceField& field, double height, std::vector<V3d>& path) {
   if (path.size() < 3) return;
   const double segments = static_cast<double>(path.size() - 1);
-  const double factor = 2 / (1 + std::sin(std::acos(-1.0) / segments));  // SOR's best for a chain
+  const double best = 2 / (1 + std::sin(std::acos(-1.0) / segments));  // SOR's for a chain
+  double factor = best, lengthBefore = HUGE_VAL;
   const double longest = 0.5 * pathLength(path) / segments;
+  std::vector<V3d> normals = normalsOn(field, path);
   for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
     double moved = 0;
     for (std::size_t n = 1; n + 1 < path.size(); ++n) {
       // There and back again, so that neither end is favoured.
       const std::size_t i = sweep % 2 == 0 ? n : path.size() - 1 - n;
       V3d move = ((path[i - 1] + path[i + 1]) * 0.5 - path[i]) * factor;
-      const V3d normal = field.normal(path[i]);
-      move = tangential(move, normal);
+      move = tangential(move, normals[i]);
       const double length = move.length();
       if (length > longest) move *= longest / length;
       V3d next = path[i] + move;
       if (!field.project(next, height) || (next - path[i]).length() > 2 * longest) continue;
+      const V3d normal = field.normal(next);
+      // A segment that is sound must stay so: the path would slip off a thin ear otherwise.
+      const auto spoils = [&](std::size_t other) {
+        return !isSoundTurn(normal, normals[other]) && isSoundTurn(normals[i], normals[other]);
+      };
+      if (spoils(i - 1) || spoils(i + 1)) continue;
       moved = std::max(moved, (next - path[i]).length());
       path[i] = next;
+      normals[i] = normal;
     }
     if (moved < kStraight * field.voxelSize()) return;
+    if (sweep % kSweepsBetweenLooks != 0) continue;
+    // Over edges the points may swing for ever about where they belong.
+    const double length = pathLength(path);
+    const bool isCalm = std::abs(length - lengthBefore) < kCalm * length;
+    if (isCalm && factor == 1) return;
+    if (isCalm) factor = 1;
+    lengthBefore = length;
   }
 }
 
@@ -160,6 +113,58 @@ std::vector<V3d> withMidpoints(const SurfaceField& field, double height,
     result.push_back(path[i]);
   }
   return result;
+}
+
+/// Points between those where the surface turns, so that chords do not cut its edges short.
+void followBend(const SurfaceField& field, double height, const V3d& p, const V3d& q, int depth,
+                std::vector<V3d>& result) {
+  const bool isFlat = field.normal(p).dot(field.normal(q)) > kFlatCosine;
+  V3d middle = (p + q) * 0.5;
+  if (!isFlat && depth > 0 && field.project(middle, height)) {
+    // Thrown aside by a ridge of φ, it would lengthen the path.
+    const double chord = (q - p).length();
+    if ((middle - p).length() < chord && (middle - q).length() < chord) {
+      followBend(field, height, p, middle, depth - 1, result);
+      followBend(field, height, middle, q, depth - 1, result);
+      return;
+    }
+  }
+  result.push_back(q);
+}
+
+std::vector<V3d> withBends(const SurfaceField& field, double height, const std::vector<V3d>& path) {
+  constexpr int kHalvings = 4;
+  std::vector<V3d> result = {path.front()};
+  for (std::size_t i = 1; i < path.size(); ++i)
+    followBend(field, height, path[i - 1], path[i], kHalvings, result);
+  return result;
+}
+
+/// Does the path lie within `distance` of the points and chords of another?
+bool isBeside(const std::vector<V3d>& path, const std::vector<V3d>& other, double distance) {
+  return std::all_of(path.begin(), path.end(), [&](const V3d& p) {
+    for (std::size_t i = 1; i < other.size(); ++i) {
+      const V3d chord = other[i] - other[i - 1], way = p - other[i - 1];
+      const double along = std::clamp(way.dot(chord) / chord.length2(), 0.0, 1.0);
+      if ((way - chord * along).length() <= distance) return true;
+    }
+    return false;
+  });
+}
+
+/// Equally spaced, some four voxels apart, and closer where that would cut through a thin part.
+std::vector<V3d> coarsePath(const SurfaceField& field, double height,
+                            const std::vector<V3d>& path) {
+  const double voxels = pathLength(path) / field.voxelSize();
+  std::vector<V3d> result;
+  // Segments of some four voxels first: chords that stay within any band.
+  for (std::size_t segments = std::max(kCoarsestSegments, static_cast<std::size_t>(voxels / 4));;
+       segments *= 2) {
+    result = sampleByArcLength(path, segments + 1);
+    for (std::size_t i = 1; i + 1 < result.size(); ++i) (void)field.project(result[i], height);
+    if (isSound(normalsOn(field, result)) || static_cast<double>(segments) > 4 * voxels)
+      return result;
+  }
 }
 
 }  // namespace
@@ -192,10 +197,7 @@ std::vector<V3d> sampleByArcLength(const std::vector<V3d>& path, std::size_t cou
 
 std::vector<V3d> straighten(const SurfaceField& field, double height, std::vector<V3d> path) {
   const double voxels = pathLength(path) / field.voxelSize();
-  // Segments of some four voxels first: chords that stay within any band.
-  std::size_t segments = std::max(kCoarsestSegments, static_cast<std::size_t>(voxels / 4));
-  path = sampleByArcLength(path, segments + 1);
-  for (std::size_t i = 1; i + 1 < path.size(); ++i) (void)field.project(path[i], height);
+  path = coarsePath(field, height, path);
   relaxPath(field, height, path);
   while (static_cast<double>(path.size()) < voxels) {
     const std::size_t before = path.size();
@@ -203,35 +205,58 @@ std::vector<V3d> straighten(const SurfaceField& field, double height, std::vecto
     if (path.size() == before) break;
     relaxPath(field, height, path);
   }
-  return path;
+  return withBends(field, height, path);
 }
 
 std::vector<V3d> geodesic(const SurfaceField& field, double height, const V3d& a, const V3d& b) {
+  const WaySearch search(field, height, a, b);
   std::vector<V3d> path = walkTowards(field, height, a, b);
-  if (path.empty() || pathLength(path) > kSuspiciousRatio * (b - a).length()) {
-    const std::vector<V3d> other = LatticeSearch(field, height, a, b).path();
-    // A lattice path is up to 13 % longer than the curve that it follows.
-    const bool isBetter =
-        !other.empty() && (path.empty() || pathLength(other) < 1.13 * pathLength(path));
-    if (isBetter) path = other;
-  }
+  if (path.empty()) path = search.shortest();
   if (path.empty()) return path;
-  return straighten(field, height, std::move(path));
+  path = straighten(field, height, std::move(path));
+  double shortest = pathLength(path);
+  if (shortest <= kNearlyStraight * (b - a).length()) return path;
+  for (const std::vector<V3d>& way : search.alternatives(shortest)) {
+    std::vector<V3d> other = coarsePath(field, height, way);
+    relaxPath(field, height, other);
+    if (pathLength(withBends(field, height, other)) > kWorthTrying * shortest ||
+        isBeside(other, path, 2 * field.voxelSize()))
+      continue;
+    other = straighten(field, height, std::move(other));
+    const double length = pathLength(other);
+    if (length >= shortest) continue;
+    shortest = length;
+    path = std::move(other);
+  }
+  return path;
+}
+
+std::vector<V3d> geodesicLike(const SurfaceField& field, double height, const V3d& a, const V3d& b,
+                              const std::vector<V3d>& path) {
+  constexpr double kLongest = 3;  // times the mean segment
+  const double voxels = pathLength(path) / field.voxelSize();
+  const std::size_t segments = std::max(kCoarsestSegments, static_cast<std::size_t>(voxels / 2));
+  std::vector<V3d> moved = sampleByArcLength(path, segments + 1);
+  const V3d first = a - path.front(), last = b - path.back();
+  for (std::size_t i = 1; i < segments; ++i) {
+    const double t = static_cast<double>(i) / static_cast<double>(segments);
+    moved[i] += first * (1 - t) + last * t;
+    if (!field.project(moved[i], height)) return {};
+  }
+  moved.front() = a;
+  moved.back() = b;
+  const double most = kLongest * pathLength(moved) / static_cast<double>(segments);
+  for (std::size_t i = 1; i <= segments; ++i)
+    if ((moved[i] - moved[i - 1]).length() > most) return {};
+  if (!isSound(normalsOn(field, moved))) return {};
+  return straighten(field, height, std::move(moved));
 }
 
 std::optional<V3d> walkStraight(const SurfaceField& field, double height, const V3d& from,
                                 const V3d& direction, double length) {
-  V3d p = from, ahead = tangential(direction, field.normal(from)).normalized();
-  const double steps = std::max(1.0, std::ceil(length / (0.5 * field.voxelSize())));
-  for (int i = 0; i < static_cast<int>(steps); ++i) {
-    V3d next = p + ahead * (length / steps);
-    const V3d normal = field.project(next, height) ? field.normal(next) : V3d(0);
-    ahead = tangential(ahead, normal);
-    if (normal == V3d(0) || ahead.length() < 1e-6) return {};
-    ahead.normalize();
-    p = next;
-  }
-  return p;
+  SurfaceWalk walk(field, height, from, direction);
+  if (!walk.advance(length)) return {};
+  return walk.position();
 }
 
 }  // namespace mapping

@@ -11,21 +11,31 @@
 /// Curves on a level φ = height of a base.
 namespace mapping {
 
-/// An approximate geodesic from a to b, points about a voxel apart: a path is found by walking
-/// towards b on the surface (so it never jumps through the solid to another side), or by A* over
-/// grid points near the surface where walking gets stuck or goes astray; then it is straightened by
-/// q_i ← Π((q_{i−1} + q_{i+1}) / 2), coarse to fine [Pedersen96; Brodersen07 §8.2].
+/// The shortest way from a to b, points about a voxel apart and closer where the surface turns: a
+/// path is found by walking towards b on the surface, or by A* over grid points near it where
+/// walking gets stuck; then it is straightened by q_i ← Π((q_{i−1} + q_{i+1}) / 2), coarse to fine
+/// [Pedersen96; Brodersen07 §8.2]. Unless it is next to straight in space, other ways that may come
+/// out shorter are searched and straightened too, and the shortest is kept. No path jumps through
+/// the solid to another side where that is two voxels thick. Lengths are within 1 % where radii of
+/// curvature exceed 2 voxels and over edges (`Geodesic.*`).
 /// @param a, b  on φ = height
 /// @return empty when the surface does not join a and b
 [[nodiscard]] std::vector<Imath::V3d> geodesic(const SurfaceField& field, double height,
                                                const Imath::V3d& a, const Imath::V3d& b);
 
-/// The same from a path that is near already: only straightened.
+/// The geodesic from a to b that runs as a path nearby does, perhaps one on another level: its
+/// points are moved over, and straightened.
+/// @return empty when the path cannot be moved over without breaking
+[[nodiscard]] std::vector<Imath::V3d> geodesicLike(const SurfaceField& field, double height,
+                                                   const Imath::V3d& a, const Imath::V3d& b,
+                                                   const std::vector<Imath::V3d>& path);
+
+/// The geodesic that a path from end to end slips into: only straightened.
 [[nodiscard]] std::vector<Imath::V3d> straighten(const SurfaceField& field, double height,
                                                  std::vector<Imath::V3d> path);
 
-/// Walks `length` straight ahead on φ = height: the direction turns with the tangent plane only.
-/// Empty when the surface breaks off on the way.
+/// Where a walk of `length` straight ahead on φ = height ends, see SurfaceWalk; empty when the
+/// surface breaks off on the way.
 [[nodiscard]] std::optional<Imath::V3d> walkStraight(const SurfaceField& field, double height,
                                                      const Imath::V3d& from,
                                                      const Imath::V3d& direction, double length);

@@ -8,6 +8,7 @@
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
 #include "levelset/meshing/band_to_mesh.h"
+#include "mapping/patches/patch_mesh.h"
 
 namespace pipeline {
 namespace {
@@ -75,7 +76,26 @@ Plan planLevelSet(Invocation& in) {
   return plan;
 }
 
+/// All patches of a set in one mesh.
+levelset::TriMesh meshOfPatches(const std::vector<mapping::Patch>& patches,
+                                mapping::PatchMeshKind kind) {
+  levelset::TriMesh all;
+  for (const mapping::Patch& patch : patches) {
+    const auto first = static_cast<std::uint32_t>(all.positions.size());
+    const levelset::TriMesh one = mapping::patchMesh(patch, kind);
+    all.positions.insert(all.positions.end(), one.positions.begin(), one.positions.end());
+    for (const auto& t : one.triangles)
+      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  return all;
+}
+
 Value mesh(Invocation& in) {
+  if (in.operands[0].kind() == Kind::Patch) {
+    return Value(meshOfPatches(
+        in.operands[0].patch().patches,
+        in.flag("sheets") ? mapping::PatchMeshKind::Sheets : mapping::PatchMeshKind::Shell));
+  }
   return Value(levelset::bandToMesh(
       in.band(),
       {.adaptivity = in.number("adaptivity"), .sharp = in.flag("sharp"), .progress = in.progress}));
@@ -122,7 +142,9 @@ void addConversionOperators(std::vector<Operator>& all) {
   all.push_back({
       .name = "mesh",
       .group = "Conversion",
-      .summary = "turn a level set into a closed triangle mesh",
+      .summary = "turn a level set, or the space of a patch, into a closed triangle mesh",
+      .details = "Of a patch: its lowest and highest particles and its sides, one closed shell to "
+                 "each, or with --sheets every level as it is.",
       .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! mesh --sharp ! write box.ply",
       .params = {{.name = "adaptivity",
                   .type = ParamType::Number,
@@ -131,12 +153,21 @@ void addConversionOperators(std::vector<Operator>& all) {
                   .range = Range::NonNegative},
                  {.name = "sharp",
                   .type = ParamType::Flag,
-                  .doc = "keep the edges and corners that the field implies"}},
-      .operands = {{Kind::Band}},
+                  .doc = "keep the edges and corners that the field implies"},
+                 {.name = "sheets",
+                  .type = ParamType::Flag,
+                  .doc = "of a patch: its levels of particles, each by itself"}},
+      .operands = {{Kind::Band, Kind::Patch}},
       .resultKind = [](const Invocation&) { return Kind::Mesh; },
       .run = mesh,
       .validate =
           [](const Invocation& in) {
+            const bool isPatch = in.operands[0].kind() == Kind::Patch;
+            if (isPatch && (in.given("adaptivity") || in.flag("sharp")))
+              throw levelset::UsageError(
+                  "mesh: --adaptivity and --sharp are for level sets, not for a patch");
+            if (!isPatch && in.flag("sheets"))
+              throw levelset::UsageError("mesh: --sheets is for a patch, not for a level set");
             if (in.number("adaptivity") > 1)
               throw levelset::UsageError("mesh: --adaptivity must lie between 0 and 1");
             if (in.flag("sharp") && in.number("adaptivity") > 0)

@@ -95,6 +95,16 @@ TEST_F(Refusal, WhatCanBeToldComesBeforeTheWork) {
   soon("patch --at 0,0,1 --height 0.1", 2, "needs --size");
   soon("patch --corners \"0,0,1 0,1,1\" --height 0.1", 2, "four points");
   soon("patch --at 0,0,1 --size 0.1,0.1 --height 0.1 --levels 1000000", 2, "out of range");
+  soon("patch --at 0,0,1 --size 1,1 --side0 \"0,0,1\" --height 0.1", 2, "goes with --corners");
+  soon("decal --at 0,0,1 --direction 1,0,0 --height 0.1", 2, "--radius");
+  soon("decal --at 0,0,1 --direction 1,0,0 --radius -1 --height 0.1", 2, "--radius");
+  soon("patch-grid --count 3,2 --height 0.1", 2, "give one of --corners");
+  soon("patch-grid --count 3 --around \"0,0,0 0,0,1\" --height 0.1", 2, "write 12,3");
+  soon("patch-grid --count 3,0 --around \"0,0,0 0,0,1\" --height 0.1", 2, "write 12,3");
+  soon("patch-grid --count 3,2 --around \"0,0,0\" --height 0.1", 2, "needs two points");
+  soon("patch-grid --count 3,2 --around \"0,0,0 0,0,1\" --twist 5 --height 0.1", 2, "--twist");
+  soon("patch-grid --count 3,2 --at 0,0,1 --size 1,1 --shift 1 --height 0.1", 2, "--shift");
+  soon("mesh --sheets", 2, "for a patch");
   soon("march --order 3", 2, "--order");
   soon("sweep --extend x --speed 2", 2, "--speed has no meaning");
   soon("march --extend x --order 1", 2, "--order has no meaning");

@@ -1,0 +1,195 @@
+#include "mapping/patches/patch_levels.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/error.h"
+#include "mapping/patches/level_schemes.h"
+#include "mapping/patches/patch_space.h"
+#include "mapping/patches/relaxation.h"
+#include "mapping/surface/surface_field.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+using levelset::UsageError;
+
+constexpr const char* kPatchLevels = "patch";
+// The map's system is dense: n³ / 3 operations and n² numbers. This many particles cost a second or
+// two, and lie some five to ten voxels apart on a patch of a hundred or two.
+constexpr double kParticleBudget = 2000;
+constexpr double kSmallestSpacing = 1.5;  // voxels; closer ones say the same thing twice
+constexpr std::size_t kFewest = 4;        // particles along a side
+
+/// The middle of a level, and directions there.
+struct Axis {
+  V3d origin, normal, u;
+};
+
+Axis axisOf(const NarrowBand& base, const ParticleLevel& surface) {
+  const std::size_t i = (surface.columns - 1) / 2, j = (surface.rows - 1) / 2;
+  const std::size_t right = surface.columns / 2, above = surface.rows / 2;
+  Axis axis;
+  axis.origin =
+      (surface.at(i, j) + surface.at(right, j) + surface.at(i, above) + surface.at(right, above)) /
+      4.0;
+  const SurfaceField field(base);
+  (void)field.project(axis.origin, 0);
+  axis.normal = field.normal(axis.origin);
+  const V3d u = surface.at(i + 1, j) - surface.at(i, j);
+  axis.u = (u - axis.normal * axis.normal.dot(u)).normalized();
+  return axis;
+}
+
+double meanSpacing(const Patch& patch) {
+  double sum = 0, count = 0;
+  for (const ParticleLevel& level : patch.levels)
+    for (std::size_t j = 0; j < level.rows; ++j)
+      for (std::size_t i = 0; i < level.columns; ++i) {
+        if (i > 0) sum += (level.at(i, j) - level.at(i - 1, j)).length(), ++count;
+        if (j > 0) sum += (level.at(i, j) - level.at(i, j - 1)).length(), ++count;
+      }
+  return sum / count;
+}
+
+}  // namespace
+
+std::string pointAsOption(const V3d& p) {
+  return fmt::format("{},{},{}", p.x, p.y, p.z);
+}
+
+void checkPatchOptions(const char* action, double height, const PatchOptions& options) {
+  if (!(height > 0) || !std::isfinite(height)) {
+    throw UsageError(fmt::format("{}: the height is {}; give a positive length", action, height));
+  }
+  if (options.levels < 2) {
+    throw UsageError(
+        fmt::format("{}: {} levels of particles; give at least 2", action, options.levels));
+  }
+  if (!(options.spacing >= 0) || !std::isfinite(options.spacing)) {
+    throw UsageError(fmt::format("{}: the spacing of particles is {}; give a positive length",
+                                 action, options.spacing));
+  }
+  const auto [across, up] = options.cells;
+  if ((across == 0) != (up == 0) || (across > 0 && std::min(across, up) < 3)) {
+    throw UsageError(
+        fmt::format("{}: {} by {} cells; give at least 3 along u and along v", action, across, up));
+  }
+  const LevelTransform& t = options.transform;
+  if (!std::isfinite(t.twist) || !std::isfinite(t.bend) || !(t.taper > 0) ||
+      !std::isfinite(t.taper)) {
+    throw UsageError(
+        fmt::format("{}: twist {}, taper {} and bend {}; give two angles and a positive scale",
+                    action, t.twist, t.taper, t.bend));
+  }
+  if (options.scheme != LevelScheme::Spline && (!options.spline.empty() || options.fade)) {
+    throw UsageError(
+        fmt::format("{}: a spline and its fading go with the spline scheme only", action));
+  }
+  for (const V3d& p : options.spline) {
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+      throw UsageError(
+          fmt::format("{}: the spline's point {} is not finite", action, pointAsOption(p)));
+    }
+  }
+  for (std::size_t side = 0; side < 4; ++side)
+    for (const V3d& p : options.sides[side]) {
+      if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+        throw UsageError(fmt::format("{}: the point {} of side {} is not finite", action,
+                                     pointAsOption(p), side));
+      }
+    }
+}
+
+double particlesAt(double spacing, std::span<const LevelSize> levels) {
+  double count = 0;
+  for (const LevelSize& level : levels) count += (level.u / spacing + 3) * (level.v / spacing + 3);
+  return count;
+}
+
+double chooseSpacing(double voxelSize, std::span<const LevelSize> levels, std::size_t times) {
+  double sum = 0, product = 0;
+  for (const LevelSize& level : levels) {
+    sum += level.u + level.v;
+    product += level.u * level.v;
+  }
+  sum *= static_cast<double>(times);
+  product *= static_cast<double>(times);
+  const double count = static_cast<double>(levels.size() * times);
+  const double rest = std::max(kParticleBudget, 36 * count) - 9 * count;
+  const double spacing = (3 * sum + std::sqrt(9 * sum * sum + 4 * rest * product)) / (2 * rest);
+  return std::max(spacing, kSmallestSpacing * voxelSize);
+}
+
+std::size_t countAlong(double length, double spacing) {
+  return std::max(kFewest, static_cast<std::size_t>(std::lround(length / spacing)) + 1);
+}
+
+void checkParticleCount(double count, double spacing, const PatchOptions& options) {
+  levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kPatchLevels);
+  constexpr double kMostParticles = 1e6;
+  if (count > kMostParticles) {
+    throw levelset::ResourceLimit(fmt::format(
+        "{}: a spacing of {:.6g} would make {:.3g} particles, more than {:.0g}; take a wider "
+        "one",
+        kPatchLevels, spacing, count, kMostParticles));
+  }
+}
+
+NarrowBand sweepAbove(const NarrowBand& base, std::span<const V3d> outline, const LevelSize& size,
+                      double height, const PatchOptions& options) {
+  // Inner particles may lie outside the box of the sides: a patch may bulge by a quarter of its
+  // width.
+  const double bulge = 0.25 * std::min(size.u, size.v);
+  return sweepPatchSpace(base, outline, bulge, height,
+                         {.maxMemory = options.maxMemory,
+                          .progress = levelset::subProgress(options.progress, 0.1, 0.5)});
+}
+
+std::vector<ParticleLevel> levelsFromSurface(const NarrowBand& base, const ParticleLevel& surface,
+                                             std::span<const V3d> outline, const LevelSize& size,
+                                             double height, const PatchOptions& options,
+                                             PatchReport& report) {
+  if (options.scheme == LevelScheme::Conforming) {
+    const NarrowBand space = sweepAbove(base, outline, size, height, options);
+    return conformingLevels(space, surface, height, options.levels);
+  }
+  const Axis axis = axisOf(base, surface);
+  std::vector<V3d> points = {axis.origin};
+  points.insert(points.end(), options.spline.begin(), options.spline.end());
+  if (options.spline.empty()) points.push_back(axis.origin + axis.normal * height);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    if ((points[i] - points[i - 1]).length() < 1e-6 * base.voxelSize()) {
+      throw UsageError(fmt::format("{}: the spline stands still at {}; leave one point out{}",
+                                   kPatchLevels, pointAsOption(points[i]),
+                                   i == 1 ? ", it begins at the patch's centre by itself" : ""));
+    }
+  }
+  const SweepCurve curve(points);
+  if (height > curve.length() * (1 + 1e-9)) {
+    throw UsageError(
+        fmt::format("{}: the height is {:.6g} and the spline only {:.6g} long; lower the height or "
+                    "lengthen the spline",
+                    kPatchLevels, height, curve.length()));
+  }
+  SplineSweep sweep = splineLevels(surface, curve, height, options.levels, options.fade);
+  report.slowed = sweep.slowed;
+  return std::move(sweep.levels);
+}
+
+void finishPatch(const NarrowBand& base, const PatchOptions& options, Patch& patch,
+                 PatchReport& report) {
+  if (!options.transform.isIdentity()) {
+    const Axis axis = axisOf(base, patch.levels.front());
+    transformLevels(patch.levels, options.transform, axis.origin, axis.normal, axis.u,
+                    patch.height);
+  }
+  patch.spacing = meanSpacing(patch);
+  report.cellAreaVariation = cellAreaVariation(patch.levels.front());
+}
+
+}  // namespace mapping

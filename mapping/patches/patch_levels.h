@@ -1,0 +1,61 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "levelset/narrow_band.h"
+#include "mapping/patches/patch.h"
+
+/// What all ways of making a patch share.
+namespace mapping {
+
+/// As one would give it on the command line, to the last bit.
+[[nodiscard]] std::string pointAsOption(const Imath::V3d& p);
+
+/// @param action  begins the message
+/// @throws UsageError for a height that is not positive and options out of range
+void checkPatchOptions(const char* action, double height, const PatchOptions& options);
+
+/// Mean lengths of a level's rows and columns, world units.
+struct LevelSize {
+  double u, v;
+};
+
+/// (u/s + 3)(v/s + 3), rims and all, summed over the levels.
+[[nodiscard]] double particlesAt(double spacing, std::span<const LevelSize> levels);
+
+/// The spacing that makes some two thousand particles of all levels together, and no less than 1.5
+/// voxels.
+/// @param times  how often each level comes
+[[nodiscard]] double chooseSpacing(double voxelSize, std::span<const LevelSize> levels,
+                                   std::size_t times = 1);
+
+/// How many particles lie along a length, at least four.
+[[nodiscard]] std::size_t countAlong(double length, double spacing);
+
+/// @throws ResourceLimit for more than a million, or more than memory holds
+void checkParticleCount(double count, double spacing, const PatchOptions& options);
+
+/// Distances throughout patch space, from points along the outline.
+[[nodiscard]] levelset::NarrowBand sweepAbove(const levelset::NarrowBand& base,
+                                              std::span<const Imath::V3d> outline,
+                                              const LevelSize& size, double height,
+                                              const PatchOptions& options);
+
+/// Schemes A and C: the particles on the surface travel.
+[[nodiscard]] std::vector<ParticleLevel> levelsFromSurface(const levelset::NarrowBand& base,
+                                                           const ParticleLevel& surface,
+                                                           std::span<const Imath::V3d> outline,
+                                                           const LevelSize& size, double height,
+                                                           const PatchOptions& options,
+                                                           PatchReport& report);
+
+/// Turns, scales and bends the levels as the options ask, and measures them.
+void finishPatch(const levelset::NarrowBand& base, const PatchOptions& options, Patch& patch,
+                 PatchReport& report);
+
+}  // namespace mapping
