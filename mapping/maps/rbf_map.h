@@ -48,6 +48,12 @@ class RbfMap final : public PatchMap {
   /// Mean distance of a particle to its nearest neighbour, world units.
   [[nodiscard]] double meanSpacing() const { return meanSpacing_; }
   [[nodiscard]] std::size_t size() const { return count_; }
+  /// Positions relative to origin(), and weights.
+  [[nodiscard]] std::span<const RbfParticle> particles() const { return particles_; }
+  [[nodiscard]] const Imath::V3d& origin() const { return origin_; }
+  /// Rows: gradients of the affine part; its value at origin().
+  [[nodiscard]] const Imath::M33d& linearPart() const { return linear_; }
+  [[nodiscard]] const Imath::V3d& constantPart() const { return constant_; }
 
  private:
   friend class RbfBlock;

@@ -150,17 +150,6 @@ std::size_t countAlong(double length, double spacing) {
   return std::max(kFewest, static_cast<std::size_t>(std::lround(length / spacing)) + 1);
 }
 
-double meanSpacing(const Patch& patch) {
-  double sum = 0, count = 0;
-  for (const ParticleLevel& level : patch.levels)
-    for (std::size_t j = 0; j < level.rows; ++j)
-      for (std::size_t i = 0; i < level.columns; ++i) {
-        if (i > 0) sum += (level.at(i, j) - level.at(i - 1, j)).length(), ++count;
-        if (j > 0) sum += (level.at(i, j) - level.at(i, j - 1)).length(), ++count;
-      }
-  return sum / count;
-}
-
 void checkParticleCount(double count, double spacing, const PatchOptions& options) {
   levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kPatch);
   constexpr double kMostParticles = 1e6;
@@ -297,6 +286,17 @@ std::size_t Patch::particleCount() const {
   std::size_t count = 0;
   for (const ParticleLevel& level : levels) count += level.positions.size() + level.rim.size();
   return count;
+}
+
+double meanSpacing(const Patch& patch) {
+  double sum = 0, count = 0;
+  for (const ParticleLevel& level : patch.levels)
+    for (std::size_t j = 0; j < level.rows; ++j)
+      for (std::size_t i = 0; i < level.columns; ++i) {
+        if (i > 0) sum += (level.at(i, j) - level.at(i - 1, j)).length(), ++count;
+        if (j > 0) sum += (level.at(i, j) - level.at(i, j - 1)).length(), ++count;
+      }
+  return sum / count;
 }
 
 PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners, double height,
