@@ -161,6 +161,7 @@ const std::vector<Operator>& operators() {
     addPatchOperators(list);
     addScatterOperators(list);
     addTextureOperators(list);
+    addFoldOperators(list);
     addInspectionOperators(list);
     addPictureOperators(list);
     addRegressionOperators(list);

@@ -87,7 +87,8 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
     part.progress = levelset::subProgress(options.progress, share(n), share(n + 1));
     part.allowFolds = options.allowFolds || options.skipFolds;
     MeshTextureResult one = mapMesh(texture, patches[n], part);
-    if (options.skipFolds && one.distortion.folded > 0) continue;
+    const bool folds = one.distortion.folded > 0 || one.certificate.verdict() == FoldVerdict::Folds;
+    if (options.skipFolds && folds) continue;
     const auto first = static_cast<std::uint32_t>(result.mesh.positions.size());
     for (auto& triangle : one.mesh.triangles)
       for (auto& vertex : triangle) vertex += first;
