@@ -32,8 +32,8 @@ struct FoldPlace {
 struct FoldCertificate {
   static constexpr std::size_t kMostPlaces = 5;
   std::size_t pieces = 0;  ///< tetrahedra, or parts of cells, that were judged
-  /// Of the volume: not positive for certain, and not decided. Of texture space, for a map from
-  /// patch space of this.
+  /// Of the volume, in the space that the map starts from: not positive for certain, and not
+  /// decided.
   double foldedShare = 0, undecidedShare = 0;
   /// The least determinant that was met, over its median: of texture → patch for shells and meshes,
   /// of patch → texture for the smooth map, each in the direction in which it is given. 1 for a
