@@ -6,9 +6,11 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string>
 
 #include "levelset/error.h"
 #include "levelset/fields/grid.h"
+#include "mapping/maps/distortion.h"
 #include "mapping/maps/jacobian_field.h"
 #include "mapping/maps/level_map.h"
 #include "mapping/maps/rbf_map.h"
@@ -17,6 +19,7 @@
 #include "mapping/patches/shell_cells.h"
 #include "mapping/patches/trilinear_volume.h"
 #include "mapping/textures/geometric_texture.h"
+#include "mapping/textures/mesh_texture.h"
 #include "tests/support/shells.h"
 #include "tests/support/threads.h"
 
@@ -223,6 +226,36 @@ TEST(FoldCertificate, SmoothMapsAreJudgedAsTheirSlopesSay) {
   }
   EXPECT_GE(certified, 2);
   EXPECT_GE(folded, 1);
+}
+
+TEST(FoldCertificate, FoldsThatTheSamplesMissAreRefused) {
+  // One cell with shaken corners, until one folds where nobody looked.
+  levelset::TriMesh triangle;
+  triangle.positions = {V3d(0.1, 0.1, 0.1), V3d(0.9, 0.1, 0.5), V3d(0.1, 0.9, 0.9)};
+  triangle.triangles = {{0, 1, 2}};
+  const Imath::Box3d whole(V3d(0), V3d(1));
+  std::mt19937 random(17);
+  std::uniform_real_distribution<double> unit(-0.6, 0.6);
+  int missed = 0;
+  for (int trial = 0; trial < 2000 && missed < 3; ++trial) {
+    const Patch patch = patchAt(
+        [&](const V3d& t) { return t + V3d(unit(random), unit(random), unit(random)); }, 2, 2, 2);
+    const std::vector<mapping::MapSample> samples = mapping::sampleLevelMap(patch, 0);
+    if (mapping::surveyDistortion(samples, V3d(1)).folded > 0) continue;
+    if (certifyLevels(patch, 0).verdict() != FoldVerdict::Folds) continue;
+    ++missed;
+    try {
+      (void)mapping::mapMesh(triangle, patch, {.textureBox = whole});
+      ADD_FAILURE() << "a fold was let pass";
+    } catch (const levelset::InvalidInput& error) {
+      EXPECT_NE(std::string(error.what()).find("in between"), std::string::npos) << error.what();
+    }
+    const auto allowed =
+        mapping::mapMesh(triangle, patch, {.textureBox = whole, .allowFolds = true});
+    EXPECT_EQ(allowed.certificate.verdict(), FoldVerdict::Folds);
+    EXPECT_FALSE(allowed.notes.empty());
+  }
+  EXPECT_GT(missed, 0);
 }
 
 TEST(FoldCertificate, LevelsOfUnlikeCountsAreCutWhereEitherEnds) {
