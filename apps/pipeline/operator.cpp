@@ -162,6 +162,7 @@ const std::vector<Operator>& operators() {
     addScatterOperators(list);
     addTextureOperators(list);
     addGeneratorOperators(list);
+    addFoldOperators(list);
     addInspectionOperators(list);
     addPictureOperators(list);
     addRegressionOperators(list);

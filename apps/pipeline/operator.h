@@ -112,6 +112,7 @@ void addPatchOperators(std::vector<Operator>& all);
 void addScatterOperators(std::vector<Operator>& all);
 void addTextureOperators(std::vector<Operator>& all);
 void addGeneratorOperators(std::vector<Operator>& all);
+void addFoldOperators(std::vector<Operator>& all);
 void addInspectionOperators(std::vector<Operator>& all);
 void addPictureOperators(std::vector<Operator>& all);
 void addRegressionOperators(std::vector<Operator>& all);

@@ -16,7 +16,32 @@ namespace {
 
 using Imath::V3d;
 
-/// Texture coordinates of the places that are looked at.
+/// Of texture → patch: the reciprocals of those of the scaled gradient.
+struct Stretch {
+  double least, most;
+};
+
+Stretch stretchOf(const Imath::M33d& jacobian, const V3d& textureSize) {
+  Eigen::Matrix3d scaled;
+  for (int k = 0; k < 3; ++k)
+    for (int axis = 0; axis < 3; ++axis) scaled(k, axis) = jacobian[k][axis] * textureSize[k];
+  if (!scaled.allFinite()) return {0, std::numeric_limits<double>::infinity()};
+  const Eigen::Vector3d squares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(
+                                      scaled * scaled.transpose(), Eigen::EigenvaluesOnly)
+                                      .eigenvalues();
+  return {1 / std::sqrt(squares[2]), 1 / std::sqrt(std::max(0.0, squares[0]))};
+}
+
+Spread spreadOf(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double share) {
+    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+  };
+  return {values.front(), at(0.01), at(0.5), at(0.99), values.back()};
+}
+
+}  // namespace
+
 std::vector<V3d> samplePlaces(const Patch& patch, double sink) {
   std::vector<V3d> places;
   if (sink > 0) {
@@ -45,32 +70,6 @@ std::vector<V3d> samplePlaces(const Patch& patch, double sink) {
   }
   return places;
 }
-
-/// Of texture → patch: the reciprocals of those of the scaled gradient.
-struct Stretch {
-  double least, most;
-};
-
-Stretch stretchOf(const Imath::M33d& jacobian, const V3d& textureSize) {
-  Eigen::Matrix3d scaled;
-  for (int k = 0; k < 3; ++k)
-    for (int axis = 0; axis < 3; ++axis) scaled(k, axis) = jacobian[k][axis] * textureSize[k];
-  if (!scaled.allFinite()) return {0, std::numeric_limits<double>::infinity()};
-  const Eigen::Vector3d squares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(
-                                      scaled * scaled.transpose(), Eigen::EigenvaluesOnly)
-                                      .eigenvalues();
-  return {1 / std::sqrt(squares[2]), 1 / std::sqrt(std::max(0.0, squares[0]))};
-}
-
-Spread spreadOf(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const auto at = [&](double share) {
-    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-  };
-  return {values.front(), at(0.01), at(0.5), at(0.99), values.back()};
-}
-
-}  // namespace
 
 std::vector<MapSample> sampleMap(const PatchMap& map, const Patch& patch, double sink) {
   const std::vector<V3d> places = samplePlaces(patch, sink);

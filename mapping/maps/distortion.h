@@ -26,9 +26,11 @@ struct Distortion {
   double meanStretch = 0;  ///< third root of the median volume ratio
 };
 
-/// A map at all particles, at the middles of their cells, between the levels, and below the
-/// surface.
-/// @param sink  how deep to look below the surface, in w
+/// Texture coordinates of the particles, of the middles of their cells, between the levels, and of
+/// places below the surface. @param sink  how deep to look there, in w
+[[nodiscard]] std::vector<Imath::V3d> samplePlaces(const Patch& patch, double sink);
+
+/// A map at all of them.
 [[nodiscard]] std::vector<MapSample> sampleMap(const PatchMap& map, const Patch& patch,
                                                double sink);
 

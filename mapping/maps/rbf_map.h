@@ -71,6 +71,13 @@ class RbfMap final : public PatchMap {
   /// Particles, those in one place once.
   [[nodiscard]] std::size_t size() const { return particles_.size(); }
   [[nodiscard]] const RbfSolveReport& solveReport() const { return solveReport_; }
+  [[nodiscard]] RbfKernel kernel() const { return kernel_; }
+  /// Positions in mean particle spacings about origin(), and weights.
+  [[nodiscard]] std::span<const RbfParticle> particles() const { return particles_; }
+  [[nodiscard]] const Imath::V3d& origin() const { return origin_; }
+  /// Rows: gradients of the affine part, for each mean particle spacing; its value at origin().
+  [[nodiscard]] const Imath::M33d& linearPart() const { return linear_; }
+  [[nodiscard]] const Imath::V3d& constantPart() const { return constant_; }
 
  private:
   friend class RbfBlock;

@@ -254,6 +254,11 @@ std::unique_ptr<BlockMap> ShellMap::restrictTo(const GridBlock& block, double) c
   return std::make_unique<ShellBlock>(*this, block);
 }
 
+bool ShellMap::holdsTexture(const V3d& uvw) const {
+  return std::min(uvw.x, uvw.y) >= 0 && std::max(uvw.x, uvw.y) <= 1 &&
+         uvw.z >= -std::max(0.0, sink_) && uvw.z <= 1 + std::max(0.0, -sink_);
+}
+
 std::vector<MapSample> ShellMap::samples() const {
   std::vector<MapSample> result;
   result.reserve(6 * lattice_.cellCount());
@@ -266,8 +271,7 @@ std::vector<MapSample> ShellMap::samples() const {
           const Tetrahedron t{{i, j, k}, order};
           const Lattice::Corners world = lattice_.corners(t), texture = lattice_.textureCorners(t);
           const V3d uvw = mix(texture, kMiddle);
-          if (std::min(uvw.x, uvw.y) < 0 || std::max(uvw.x, uvw.y) > 1) continue;
-          if (uvw.z < -std::max(0.0, sink_) || uvw.z > 1 + std::max(0.0, -sink_)) continue;
+          if (!holdsTexture(uvw)) continue;
           result.push_back({mix(world, kMiddle), uvw, slopes(world, texture)});
         }
   return result;

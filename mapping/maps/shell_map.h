@@ -30,6 +30,9 @@ class ShellMap final : public PatchMap {
   /// From texture coordinates to patch space; NaN outside the lattice.
   [[nodiscard]] Imath::V3d toPatch(const Imath::V3d& uvw) const;
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
+  /// Is a place of texture space in the unit cube, or as far below or above it as the texture is
+  /// sunk or lifted?
+  [[nodiscard]] bool holdsTexture(const Imath::V3d& uvw) const;
 
  private:
   friend class ShellBlock;

@@ -221,6 +221,17 @@ std::size_t Patch::particleCount() const {
   return count;
 }
 
+double meanSpacing(const Patch& patch) {
+  double sum = 0, count = 0;
+  for (const ParticleLevel& level : patch.levels)
+    for (std::size_t j = 0; j < level.rows; ++j)
+      for (std::size_t i = 0; i < level.columns; ++i) {
+        if (i > 0) sum += (level.at(i, j) - level.at(i - 1, j)).length(), ++count;
+        if (j > 0) sum += (level.at(i, j) - level.at(i, j - 1)).length(), ++count;
+      }
+  return sum / count;
+}
+
 PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners, double height,
                       const PatchOptions& options) {
   checkPatchArguments(corners, height, options);

@@ -54,6 +54,9 @@ struct Patch {
   [[nodiscard]] std::size_t particleCount() const;
 };
 
+/// Mean distance of neighbouring particles within the levels.
+[[nodiscard]] double meanSpacing(const Patch& patch);
+
 /// How the sides and rows of a patch turned out.
 struct PatchReport {
   double uLength = 0, vLength = 0;  ///< mean length of the rows and columns at w = 0

@@ -9,19 +9,19 @@ namespace mapping {
 namespace {
 
 using levelset::TriMesh;
-using Index = std::uint32_t;
+using VertexIndex = std::uint32_t;
 
 /// Vertices of a level's particles in a mesh: that of particle 0, and the counts.
 struct SheetIndex {
-  Index first;
+  VertexIndex first;
   const ParticleLevel* level;
-  [[nodiscard]] Index at(std::size_t column, std::size_t row) const {
-    return first + static_cast<Index>(row * level->columns + column);
+  [[nodiscard]] VertexIndex at(std::size_t column, std::size_t row) const {
+    return first + static_cast<VertexIndex>(row * level->columns + column);
   }
   /// Anticlockwise seen from above, from corner 0 back to it.
-  [[nodiscard]] std::vector<Index> side(int n) const {
+  [[nodiscard]] std::vector<VertexIndex> side(int n) const {
     const std::size_t right = level->columns - 1, top = level->rows - 1;
-    std::vector<Index> result;
+    std::vector<VertexIndex> result;
     for (std::size_t i = 0; i <= (n % 2 == 0 ? right : top); ++i) {
       if (n == 0) result.push_back(at(i, 0));
       if (n == 1) result.push_back(at(right, i));
@@ -33,14 +33,14 @@ struct SheetIndex {
 };
 
 SheetIndex addSheet(const ParticleLevel& level, TriMesh& mesh) {
-  const SheetIndex sheet{static_cast<Index>(mesh.positions.size()), &level};
+  const SheetIndex sheet{static_cast<VertexIndex>(mesh.positions.size()), &level};
   mesh.positions.insert(mesh.positions.end(), level.positions.begin(), level.positions.end());
   return sheet;
 }
 
 /// Facing the way that w goes, or back.
 void addCells(const SheetIndex& sheet, bool isUp, TriMesh& mesh) {
-  const auto add = [&](Index a, Index b, Index c) {
+  const auto add = [&](VertexIndex a, VertexIndex b, VertexIndex c) {
     if (isUp)
       mesh.triangles.push_back({a, b, c});
     else
@@ -55,7 +55,8 @@ void addCells(const SheetIndex& sheet, bool isUp, TriMesh& mesh) {
 
 /// A wall between two borders of perhaps different counts, whose triangles advance on the one that
 /// is behind.
-void addWall(const std::vector<Index>& low, const std::vector<Index>& high, TriMesh& mesh) {
+void addWall(const std::vector<VertexIndex>& low, const std::vector<VertexIndex>& high,
+             TriMesh& mesh) {
   std::size_t i = 0, j = 0;
   const std::size_t lows = low.size() - 1, highs = high.size() - 1;
   while (i < lows || j < highs) {
@@ -78,23 +79,23 @@ TriMesh patchMesh(const Patch& patch, PatchMeshKind kind) {
     for (const ParticleLevel& level : patch.levels) addCells(addSheet(level, mesh), true, mesh);
   } else {
     // Between bottom and top only the borders count: a vertex inside would have no triangle.
-    std::vector<std::array<std::vector<Index>, 4>> borders;
+    std::vector<std::array<std::vector<VertexIndex>, 4>> borders;
     for (const ParticleLevel& level : patch.levels) {
       const bool isEnd = &level == &patch.levels.front() || &level == &patch.levels.back();
-      std::array<std::vector<Index>, 4> border;
+      std::array<std::vector<VertexIndex>, 4> border;
       if (isEnd) {
         const SheetIndex sheet = addSheet(level, mesh);
         addCells(sheet, &level == &patch.levels.back(), mesh);
         for (int n = 0; n < 4; ++n) border[static_cast<std::size_t>(n)] = sheet.side(n);
       } else {
         const SheetIndex inLevel{0, &level};
-        const auto first = static_cast<Index>(mesh.positions.size());
+        const auto first = static_cast<VertexIndex>(mesh.positions.size());
         for (int n = 0; n < 4; ++n) {
-          const std::vector<Index> side = inLevel.side(n);
+          const std::vector<VertexIndex> side = inLevel.side(n);
           for (std::size_t i = 0; i < side.size(); ++i) {
             const bool isLast = i + 1 == side.size();  // where the next side begins
             border[static_cast<std::size_t>(n)].push_back(
-                isLast && n == 3 ? first : static_cast<Index>(mesh.positions.size()));
+                isLast && n == 3 ? first : static_cast<VertexIndex>(mesh.positions.size()));
             if (!isLast) mesh.positions.push_back(level.positions[side[i]]);
           }
         }

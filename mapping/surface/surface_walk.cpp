@@ -14,7 +14,7 @@ constexpr double kMostTurn = 0.15;            // radians within a step that is n
 constexpr double kSharpest = 1.2;             // radians within the shortest step
 // Distances have a slope of 1, and up to 1.1 beside edges where they are interpolated. Where a band
 // ends its values jump: that wall is none of the surface.
-constexpr double kSteepest = 2.5;
+constexpr double kSteepestWalk = 2.5;
 
 V3d withoutNormal(const V3d& v, const V3d& normal) {
   return v - normal * v.dot(normal);
@@ -71,7 +71,7 @@ bool SurfaceWalk::step(double length) {
   V3d next = position_ + way * (length * (half > 1e-4 ? std::sin(half) / half : 1.0) / chord);
   if (!field_.project(next, height_)) return inHalves();
   const V3d gradient = field_.gradient(next);
-  if (gradient.length() > kSteepest) return inHalves();
+  if (gradient.length() > kSteepestWalk) return inHalves();
   const V3d normal = unitOrZero(gradient);
   const V3d direction = carried(direction_, normal_, normal);
   if (direction == V3d(0)) return inHalves();

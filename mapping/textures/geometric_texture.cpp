@@ -106,6 +106,7 @@ struct ChosenMap {
   std::unique_ptr<PatchMap> map;
   std::vector<MapSample> samples;
   Distortion distortion = {};
+  FoldCertificate certificate = {};
   std::size_t particles = 0;
   V3d residual{0};  ///< at the particles, in u, v and w
   RbfSolveReport solve = {};
@@ -134,6 +135,7 @@ ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink, doubl
         (kBandNeeded + 1) * std::max(base.voxelSize(), options.voxelSize.value_or(0));
     auto shell = std::make_unique<ShellMap>(patch, LatticeBorder{.sink = sink, .rim = rim});
     result.samples = shell->samples();
+    result.certificate = certifyShell(*shell, patch.mirrored);
     result.particles = shell->lattice().nodeCount();
     result.map = std::move(shell);
     return result;
@@ -143,7 +145,8 @@ ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink, doubl
   rbf.solveTolerance = tolerance;
   rbf.progress = levelset::subProgress(options.progress, 0, 0.2);
   auto smooth = std::make_unique<RbfMap>(patchToTexture(patch, rbf));
-  result.samples = sampleMap(*smooth, patch, sink);
+  result.samples = sampleRbf(*smooth, patch, sink);
+  result.certificate = certifyRbf(*smooth, patch, sink);
   result.particles = smooth->size();
   result.residual = smooth->axisResidual();
   result.solve = smooth->solveReport();
@@ -176,6 +179,7 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
                                 const TextureOptions& options, TextureReport& report) {
   std::vector<ChosenMap> maps;
   std::vector<Distortion> distortions;
+  std::vector<FoldCertificate> certificates;
   for (const Patch& patch : patches) {
     const auto done = static_cast<double>(maps.size());
     const auto share = [&](double n) { return 0.2 * n / static_cast<double>(patches.size()); };
@@ -184,17 +188,21 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
     ChosenMap chosen = makeMap(base, patch, sink / patch.height, tolerance, part);
     chosen.distortion = surveyDistortion(chosen.samples, textureSize, patch.mirrored);
     chosen.samples = {};
-    if (options.skipFolds && chosen.distortion.folded > 0) {
+    const bool folds =
+        chosen.distortion.folded > 0 || chosen.certificate.verdict() == FoldVerdict::Folds;
+    if (options.skipFolds && folds) {
       ++report.skipped;
       maps.emplace_back();
       continue;
     }
-    std::vector<std::string> notes = judgeFolds(chosen.distortion, options.allowFolds);
+    std::vector<std::string> notes =
+        judgeFolds(chosen.distortion, chosen.certificate, options.allowFolds);
     std::move(notes.begin(), notes.end(), std::back_inserter(report.notes));
     report.particles += chosen.particles;
     addSolve(chosen.solve, report);
     report.mapResidual = std::max(report.mapResidual, (chosen.residual * textureSize).length());
     distortions.push_back(chosen.distortion);
+    certificates.push_back(std::move(chosen.certificate));
     maps.push_back(std::move(chosen));
   }
   report.patches = distortions.size();
@@ -208,6 +216,7 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
         fmt::format("{} of {} patches fold and were left out", report.skipped, patches.size()));
   }
   report.distortion = worstOf(distortions);
+  report.certificate = worstOf(certificates);
   return maps;
 }
 

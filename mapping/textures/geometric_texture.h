@@ -10,6 +10,7 @@
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 #include "mapping/maps/distortion.h"
+#include "mapping/maps/fold_certificate.h"
 #include "mapping/maps/rbf_map.h"
 #include "mapping/patches/patch.h"
 
@@ -55,6 +56,7 @@ struct TextureReport {
   /// Particles added up or tetrahedra tried, for each grid point of the blocks evaluated.
   double operationsPerPoint = 0;
   Distortion distortion = {};
+  FoldCertificate certificate = {};
   double mapResidual = 0;     ///< largest |Φ(p) − uvw| × texture size, world units
   RbfSolveReport solve = {};  ///< of an RBF map
   std::vector<std::string> notes;

@@ -45,7 +45,8 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
   levelset::report(options.progress, 0, kTexture);
   result.distortion =
       surveyDistortion(sampleLevelMap(patch, sink), placement.box.size(), patch.mirrored);
-  result.notes = judgeFolds(result.distortion, options.allowFolds);
+  result.certificate = certifyLevels(patch, sink);
+  result.notes = judgeFolds(result.distortion, result.certificate, options.allowFolds);
 
   levelset::TriMesh& mesh = result.mesh;
   mesh.positions.resize(texture.positions.size());
@@ -77,6 +78,7 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
       options.maxMemory, "texture");
   MeshTextureResult result;
   std::vector<Distortion> distortions;
+  std::vector<FoldCertificate> certificates;
   for (std::size_t n = 0; n < patches.size(); ++n) {
     MeshTextureOptions part = options;
     const auto share = [&](std::size_t k) {
@@ -85,7 +87,8 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
     part.progress = levelset::subProgress(options.progress, share(n), share(n + 1));
     part.allowFolds = options.allowFolds || options.skipFolds;
     MeshTextureResult one = mapMesh(texture, patches[n], part);
-    if (options.skipFolds && one.distortion.folded > 0) continue;
+    const bool folds = one.distortion.folded > 0 || one.certificate.verdict() == FoldVerdict::Folds;
+    if (options.skipFolds && folds) continue;
     const auto first = static_cast<std::uint32_t>(result.mesh.positions.size());
     for (auto& triangle : one.mesh.triangles)
       for (auto& vertex : triangle) vertex += first;
@@ -95,6 +98,7 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
               std::back_inserter(result.mesh.triangles));
     std::move(one.notes.begin(), one.notes.end(), std::back_inserter(result.notes));
     distortions.push_back(one.distortion);
+    certificates.push_back(std::move(one.certificate));
   }
   if (distortions.empty()) {
     throw levelset::InvalidInput(
@@ -106,6 +110,7 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
                                        patches.size() - distortions.size(), patches.size()));
   }
   result.distortion = worstOf(distortions);
+  result.certificate = worstOf(certificates);
   return result;
 }
 

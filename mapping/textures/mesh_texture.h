@@ -11,6 +11,7 @@
 #include "levelset/mesh.h"
 #include "levelset/progress.h"
 #include "mapping/maps/distortion.h"
+#include "mapping/maps/fold_certificate.h"
 #include "mapping/patches/patch.h"
 
 namespace mapping {
@@ -28,6 +29,7 @@ struct MeshTextureOptions {
 struct MeshTextureResult {
   levelset::TriMesh mesh;
   Distortion distortion;  ///< in the middle and close to the corners of the particles' cells
+  FoldCertificate certificate;
   std::vector<std::string> notes;
 };
 

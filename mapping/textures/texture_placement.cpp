@@ -34,17 +34,36 @@ Box3d chooseTextureBox(const Box3d& own, const std::optional<Box3d>& given) {
   return box;
 }
 
-std::vector<std::string> judgeFolds(const Distortion& distortion, bool areAllowed) {
-  if (distortion.folded == 0) return {};
-  std::string sentence = fmt::format(
-      "the patch folds at {} of {} places, most at ({:.6g}, {:.6g}, {:.6g}), u, v, w = {:.3g}, "
-      "{:.3g}, {:.3g}, where the map's Jacobian is {:.3g} of its mean",
-      distortion.folded, distortion.samples, distortion.foldPlace.x, distortion.foldPlace.y,
-      distortion.foldPlace.z, distortion.foldUvw.x, distortion.foldUvw.y, distortion.foldUvw.z,
-      distortion.jacobian.least);
+namespace {
+
+std::string foldSentence(const Distortion& distortion, const FoldCertificate& certificate) {
+  const auto placeOf = [](const V3d& place, const V3d& uvw, double jacobian) {
+    return fmt::format(
+        "most at ({:.6g}, {:.6g}, {:.6g}), u, v, w = {:.3g}, {:.3g}, {:.3g}, where the map's "
+        "Jacobian is {:.3g} of its median",
+        place.x, place.y, place.z, uvw.x, uvw.y, uvw.z, jacobian);
+  };
+  if (distortion.folded > 0)
+    return fmt::format(
+        "the patch folds at {} of {} places, {}", distortion.folded, distortion.samples,
+        placeOf(distortion.foldPlace, distortion.foldUvw, distortion.jacobian.least));
+  const FoldPlace& fold = certificate.worst.front();
+  return fmt::format("the patch folds in between the {} places that were sampled, {}",
+                     distortion.samples, placeOf(fold.place, fold.uvw, fold.jacobian));
+}
+
+}  // namespace
+
+std::vector<std::string> judgeFolds(const Distortion& distortion,
+                                    const FoldCertificate& certificate, bool areAllowed) {
+  if (distortion.folded == 0 && certificate.verdict() == FoldVerdict::Certified) return {};
+  if (distortion.folded == 0 && certificate.verdict() == FoldVerdict::Undecided)
+    return {fmt::format("no fold of the map was met, but {:.2g} of its volume is not certified",
+                        certificate.undecidedShare)};
+  std::string sentence = foldSentence(distortion, certificate);
   if (!areAllowed) {
-    throw InvalidInput(
-        fmt::format("{}: {}; lower its height or choose a flatter place", kAction, sentence));
+    throw InvalidInput(fmt::format(
+        "{}: {}; unfold the patch, lower its height or choose a flatter place", kAction, sentence));
   }
   return {std::move(sentence)};
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mapping/maps/distortion.h"
+#include "mapping/maps/fold_certificate.h"
 
 namespace mapping {
 
@@ -27,8 +28,11 @@ struct TexturePlacement {
 [[nodiscard]] Imath::Box3d chooseTextureBox(const Imath::Box3d& own,
                                             const std::optional<Imath::Box3d>& given);
 
-/// @return what to note of folds that are allowed, empty without any
-/// @throws InvalidInput for those that are not, telling where the worst is
-[[nodiscard]] std::vector<std::string> judgeFolds(const Distortion& distortion, bool areAllowed);
+/// @return what to note of folds that are allowed, and of parts that are not certified; empty
+///         without any
+/// @throws InvalidInput for folds that are not, telling where the worst is
+[[nodiscard]] std::vector<std::string> judgeFolds(const Distortion& distortion,
+                                                  const FoldCertificate& certificate,
+                                                  bool areAllowed);
 
 }  // namespace mapping

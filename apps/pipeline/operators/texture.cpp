@@ -7,6 +7,7 @@
 
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/shell.h"
 #include "levelset/error.h"
 #include "mapping/patches/patch.h"
 #include "mapping/textures/geometric_texture.h"
@@ -82,7 +83,8 @@ void addSolve(const mapping::RbfSolveReport& solve, nlohmann::ordered_json& json
   json["averaged"] = solve.averaged;
 }
 
-std::string detailsOf(const mapping::TextureReport& report, double height, bool isRbf) {
+std::string detailsOf(const mapping::TextureReport& report, double height, bool isRbf,
+                      const nlohmann::ordered_json& improvement) {
   nlohmann::ordered_json json;
   json["voxel_size"] = report.voxelSize;
   json["patches"] = report.patches;
@@ -95,6 +97,8 @@ std::string detailsOf(const mapping::TextureReport& report, double height, bool 
   addDistortion(report.distortion, json);
   json["map_residual"] = report.mapResidual;
   if (isRbf) addSolve(report.solve, json);
+  json["certificate"] = certificateJson(report.certificate);
+  json.update(improvement);
   return json.dump();
 }
 
@@ -109,7 +113,7 @@ bool mapsMesh(const Invocation& in) {
 }
 
 /// The patches at the height that the texture asks for.
-std::vector<mapping::Patch> patchesFor(Invocation& in, const Imath::Box3d& textureBox) {
+std::vector<mapping::Patch> patchesAtHeight(Invocation& in, const Imath::Box3d& textureBox) {
   const PatchValue& onto = in.operands[2].patch();
   if (!onto.atHeight) return onto.patches;
   const double height = aspectHeight(onto.patches, textureBox);
@@ -118,12 +122,18 @@ std::vector<mapping::Patch> patchesFor(Invocation& in, const Imath::Box3d& textu
   return onto.atHeight(height);
 }
 
+/// And as --unfold and --relax leave them.
+ImprovedPatches patchesFor(Invocation& in, const Imath::Box3d& textureBox) {
+  return improvedPatches(in, patchesAtHeight(in, textureBox), in.length("sink"), textureBox.size());
+}
+
 Imath::Box3d textureBoxOf(const Invocation& in) {
   return in.given("texture-box") ? in.box("texture-box") : in.operands[1].plan().bounds;
 }
 
 Value textureMesh(Invocation& in) {
-  const std::vector<mapping::Patch> patches = patchesFor(in, textureBoxOf(in));
+  const ImprovedPatches improved = patchesFor(in, textureBoxOf(in));
+  const std::vector<mapping::Patch>& patches = improved.patches;
   mapping::MeshTextureOptions options;
   options.sink = in.length("sink");
   if (in.given("texture-box")) options.textureBox = in.box("texture-box");
@@ -138,6 +148,8 @@ Value textureMesh(Invocation& in) {
   json["height"] = patches.front().height;
   json["particles"] = particlesOf(patches);
   addDistortion(result.distortion, json);
+  json["certificate"] = certificateJson(result.certificate);
+  json.update(improved.figures);
   in.notes.detailsJson = json.dump();
   in.notes.notes.insert(in.notes.notes.end(), result.notes.begin(), result.notes.end());
   in.notes.notes.push_back(fmt::format("{} vertices moved, smallest Jacobian {:.3g}",
@@ -165,10 +177,11 @@ Value texture(Invocation& in) {
   options.skipFolds = in.flag("skip-folds");
   options.maxMemory = in.maxMemory;
   options.progress = in.progress;
-  const std::vector<mapping::Patch> patches = patchesFor(in, textureBoxOf(in));
+  const ImprovedPatches improved = patchesFor(in, textureBoxOf(in));
+  const std::vector<mapping::Patch>& patches = improved.patches;
   mapping::TextureResult result = mapping::mapTexture(in.band(0), in.band(1), patches, options);
-  in.notes.detailsJson =
-      detailsOf(result.report, patches.front().height, options.map == mapping::TextureMap::Rbf);
+  in.notes.detailsJson = detailsOf(result.report, patches.front().height,
+                                   options.map == mapping::TextureMap::Rbf, improved.figures);
   in.notes.errors.push_back({"map residual at particles, largest",
                              result.report.mapResidual / result.report.voxelSize, "voxels"});
   in.notes.notes.insert(in.notes.notes.end(), result.report.notes.begin(),
@@ -217,6 +230,7 @@ Plan planTexture(Invocation& in) {
 }
 
 void validateTexture(const Invocation& in) {
+  validateShell(in);
   if (in.flag("carve") && in.flag("alone"))
     throw UsageError("texture: --carve and --alone exclude each other");
   if (in.flag("allow-folds") && in.flag("skip-folds"))
@@ -256,7 +270,7 @@ void addTextureOperators(std::vector<Operator>& all) {
           "! patch @base --corners \"-10,-10,5 10,-10,5 10,10,5 -10,10,5\" --height 8 "
           "--levels 6 --as p "
           "! texture @base @rings @p --map rbf --blend 1 ! write out.vdb ! mesh ! write out.ply",
-      .params =
+      .params = withShell(
           {{.name = "map",
             .type = ParamType::Choice,
             .doc = "from patch to texture",
@@ -303,7 +317,7 @@ void addTextureOperators(std::vector<Operator>& all) {
            {.name = "allow-folds", .type = ParamType::Flag, .doc = "map even where the map folds"},
            {.name = "skip-folds",
             .type = ParamType::Flag,
-            .doc = "of many patches, leave out those whose map folds"}},
+            .doc = "of many patches, leave out those whose map folds"}}),
       .operands = {{Kind::Band}, {Kind::Band, Kind::Mesh}, {Kind::Patch}},
       .resultKind = [](const Invocation& in) { return mapsMesh(in) ? Kind::Mesh : Kind::Band; },
       .run = texture,

@@ -132,6 +132,13 @@ INSTANTIATE_TEST_SUITE_P(
             "! texture @b @t @p --map shell ! write shell.vdb "
             "! mesh @t --as m ! texture @b @m @p --map mesh ! write moved.ply",
             {"texture.vdb", "carve.vdb", "shell.vdb", "moved.ply"}},
+        Case{
+            "folds",
+            "box --size 8,8,3 --voxel 0.5 --as b ! torus --radius 1 --tube 0.5 --voxel 0.25 --as t "
+            "! patch @b --at 0,0,1.5 --size 4,4 --height 1.5 --spacing 0.8 --as p "
+            "! folds @b @p ! write rbf.vdb ! folds @b @p --map mesh --relax patch ! write mesh.vdb "
+            "! texture @b @t @p --map shell --unfold --relax texture --sides free ! write out.vdb",
+            {"rbf.vdb", "mesh.vdb", "out.vdb"}},
         Case{"render",
              "read in.vdb ! render out.exr --size 96x64 ! read coarse.vdb "
              "! render png.exr --size 48x32 --png out.png",

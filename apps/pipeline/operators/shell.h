@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "apps/pipeline/invocation.h"
+#include "mapping/maps/fold_certificate.h"
+#include "mapping/patches/patch.h"
+
+// Certified, unfolded and relaxed patches, for the operators that map onto them.
+namespace pipeline {
+
+/// `params`, --unfold, --relax and --sides.
+[[nodiscard]] std::vector<Param> withShell(std::vector<Param> params);
+void validateShell(const Invocation& in);
+
+struct ImprovedPatches {
+  std::vector<mapping::Patch> patches;
+  /// Before and after, an array with an object for each patch under "unfold" and "relax".
+  nlohmann::ordered_json figures = nlohmann::ordered_json::object();
+};
+
+/// What --unfold and --relax make of patches of the first operand, told in the notes.
+/// @param sink  world units; @param textureSize  of the box that is the unit cube
+[[nodiscard]] ImprovedPatches improvedPatches(Invocation& in, std::vector<mapping::Patch> patches,
+                                              double sink, const Imath::V3d& textureSize);
+
+[[nodiscard]] nlohmann::ordered_json certificateJson(const mapping::FoldCertificate& certificate);
+
+}  // namespace pipeline
