@@ -107,7 +107,7 @@ Imath::V3d footWithin(const Distance& distance, const Imath::V3d& p, const Imath
   for (int axis = 0; axis < 3; ++axis)
     if (fixed[static_cast<std::size_t>(axis)]) start[axis] = corner[axis];
   Imath::V3d foot = start;
-  constexpr int kMostSteps = 8;
+  constexpr int kMostSteps = 40;
   for (int i = 0; i < kMostSteps; ++i) {
     const Imath::V3d slope = slopeOf(distance, foot, step);
     Imath::V3d within = slope;

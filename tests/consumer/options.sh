@@ -24,8 +24,7 @@ lacks() {  # lacks NAME FOLDER: nothing is built in it
 
 without="-DCMAKE_DISABLE_FIND_PACKAGE"
 mkdir -p "$work"
-configure no-render -DLEVELSMITH_RENDER=OFF ${without}_embree=ON ${without}_OpenEXR=ON ${without}_PNG=ON \
-  ${without}_nlohmann_json=ON
+configure no-render -DLEVELSMITH_RENDER=OFF ${without}_embree=ON ${without}_OpenEXR=ON ${without}_PNG=ON
 grep -q " mapping/" "$work/no-render.plan"
 lacks no-render render
 lacks no-render apps

@@ -99,7 +99,11 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! level-set --voxel 1", "put 'mesh' before it");
   EXPECT_REFUSAL(
       "sphere --radius 1 --voxel 0.1 ! patch --at 0,0,1 --size 1,1 --height 1 ! write p.vdb",
-      "is a patch, a mesh, a level set or a field is needed; 'texture' makes");
+      "a patch cannot be written as 'vdb'; write .patch, or put 'mesh' before it");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! write p.patch", "cannot be written as 'patch'");
+  EXPECT_REFUSAL(
+      "sphere --radius 1 --voxel 0.1 ! patch --at 0,0,1 --size 1,1 --height 1 ! offset 1",
+      "is a patch, a level set is needed; 'texture' makes");
   const std::string onto =
       "sphere --radius 3 --voxel 0.2 --as b ! patch @b --at 0,0,3 --size 2,2 --height 1 --as p ! ";
   EXPECT_REFUSAL(onto + "read a.ply --as t ! texture @b @t @p", "with `level-set`, or move its");
