@@ -197,6 +197,10 @@ void writePatches(const std::filesystem::path& file, std::span<const Patch> patc
   target.commit();
 }
 
+bool isPatchFormat(const std::string& name) {
+  return name == "patch" || std::filesystem::path(name).extension() == ".patch";
+}
+
 std::vector<Patch> readPatches(const std::filesystem::path& file, std::size_t maxMemory) {
   const Reader reader(file.string());
   const Json json = Json::parse(textOf(file, maxMemory), nullptr, /*allow_exceptions=*/false);

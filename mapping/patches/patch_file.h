@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "mapping/patches/patch.h"
@@ -16,5 +17,8 @@ void writePatches(const std::filesystem::path& file, std::span<const Patch> patc
 ///         not one of patches or its counts and numbers make none; ResourceLimit
 [[nodiscard]] std::vector<Patch> readPatches(const std::filesystem::path& file,
                                              std::size_t maxMemory = levelset::kNoMemoryLimit);
+
+/// True for a name, or a format, that readPatches understands: .patch.
+[[nodiscard]] bool isPatchFormat(const std::string& name);
 
 }  // namespace mapping

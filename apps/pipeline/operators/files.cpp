@@ -23,7 +23,7 @@ Kind fileKind(const Invocation& in) {
   const std::string name = formatName(in);
   if (levelset::isMeshFormat(name)) return Kind::Mesh;
   if (levelset::isBandFormat(name)) return Kind::Band;
-  if (name == "patch") return Kind::Patch;
+  if (mapping::isPatchFormat(name)) return Kind::Patch;
   throw UsageError(fmt::format(
       "{}: '{}' is of no known format; use ply, obj, stl or off (also .gz), vdb{} or patch",
       in.op().name, name, in.op().name == "write" ? ", nvdb" : ""));

@@ -99,8 +99,8 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! level-set --voxel 1", "put 'mesh' before it");
   EXPECT_REFUSAL(
       "sphere --radius 1 --voxel 0.1 ! patch --at 0,0,1 --size 1,1 --height 1 ! write p.vdb",
-      "a patch cannot be written as 'vdb'; write .patch, or put 'mesh' before it");
-  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! write p.patch", "cannot be written as 'patch'");
+      "a patch cannot be written as 'p.vdb'; write .patch, or put 'mesh' before it");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! write p.patch", "cannot be written as 'p.patch'");
   EXPECT_REFUSAL(
       "sphere --radius 1 --voxel 0.1 ! patch --at 0,0,1 --size 1,1 --height 1 ! offset 1",
       "is a patch, a level set is needed; 'texture' makes");
