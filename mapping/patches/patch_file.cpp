@@ -137,6 +137,7 @@ class Reader {
     if (!mirrored.is_boolean()) refuse(where, "has a \"mirrored\" that is neither true nor false");
     patch.mirrored = mirrored.get<bool>();
     patch.spacing = number(json, "spacing", where);
+    if (!(patch.spacing > 0)) refuse(where, "has a spacing that is not positive");
     const Json& levels = member(json, "levels", where);
     if (!levels.is_array() || levels.size() < 2) refuse(where, "has fewer than two levels");
     for (const Json& entry : levels) {
@@ -149,6 +150,10 @@ class Reader {
         refuse(place, fmt::format("is at w = {}; levels go from 0 up to 1", w));
     }
     if (patch.levels.back().w != 1) refuse(where, "ends below w = 1");
+    const auto last = static_cast<double>(patch.levels.size() - 1);
+    for (std::size_t k = 0; k < patch.levels.size(); ++k)
+      if (std::abs(patch.levels[k].w - static_cast<double>(k) / last) > 1e-9)
+        refuse(where, "has levels that are not evenly spaced in w");
     return patch;
   }
 
@@ -162,6 +167,10 @@ std::string textOf(const std::filesystem::path& file, std::size_t maxMemory) {
     text.assign(std::istreambuf_iterator<char>(std::cin), {});
   } else {
     std::error_code failed;
+    if (std::filesystem::is_directory(file, failed)) {
+      throw levelset::IoError(
+          fmt::format("read: {} is a folder; give a file of patches", file.string()));
+    }
     const auto size = std::filesystem::file_size(file, failed);
     if (!failed)
       levelset::requireMemory(kBytesPerLetter * static_cast<double>(size), maxMemory, "read");

@@ -48,7 +48,15 @@ double angleTowards(const SurfacePoint& point, const V3d& direction) {
 PatchSite siteAt(const NarrowBand& base, const SurfacePoint& point, std::size_t index,
                  const ScatterOptions& options) {
   double rotation = options.rotation + options.jitter * luckAt(options.density.seed, index);
-  if (options.direction) rotation += angleTowards(point, options.direction(point.place, 0));
+  if (options.direction) {
+    const V3d direction = options.direction(point.place, 0);
+    if (!std::isfinite(direction.length())) {
+      throw levelset::UsageError(
+          fmt::format("{}: the direction at ({:.6g}, {:.6g}, {:.6g}) is not finite", kScatter,
+                      point.place.x, point.place.y, point.place.z));
+    }
+    rotation += angleTowards(point, direction);
+  }
   return {cornersAround(base, point.place, options.uSize * point.scale, options.vSize * point.scale,
                         rotation),
           point.scale};
@@ -109,7 +117,6 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
   parts.patch.progress = {};
   const ScatteredPoints points = scatterPoints(base, parts.density);
   ScatterResult result;
-  result.distance = points.distance;
 
   // === The places that were chosen
   std::vector<Attempt> attempts(points.wanted);
@@ -133,9 +140,10 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
 
   // === The next best in the gaps of those that bear no patch
   const std::size_t tries = std::min(points.points.size(), kTriesPerPatch * points.wanted);
+  const double kept = std::isfinite(points.distance) ? points.distance : 0;
   for (std::size_t n = points.wanted; n < tries && taken.size() < points.wanted; ++n) {
     const SurfacePoint& point = points.points[n];
-    if (!isFarFrom(point, taken, kGapShare * points.distance)) continue;
+    if (!isFarFrom(point, taken, kGapShare * kept)) continue;
     Attempt attempt = tryAt(base, point, n, height, parts);
     take(attempt, point);
     levelset::report(options.density.progress, 0.9, kScatter);
@@ -144,6 +152,7 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
     throw InvalidInput(fmt::format("{}: none of {} places bears a patch, at the first because: {}",
                                    kScatter, result.leftOut, result.cause));
   }
+  result.distance = leastDistance(taken, base.zeroSetBounds().size().length(), kept);
   levelset::report(options.density.progress, 1, kScatter);
   return result;
 }

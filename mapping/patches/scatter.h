@@ -35,7 +35,7 @@ struct PatchSite {
 struct ScatterResult {
   std::vector<Patch> patches;
   std::vector<PatchSite> sites;  ///< of the patches
-  double distance = 0;           ///< least distance of two chosen places, in their scales
+  double distance = 0;           ///< least distance of two patches' centres, in their scales
   std::size_t leftOut = 0;       ///< places that bear no patch
   std::string cause;             ///< why the first of them does not
 };

@@ -97,18 +97,22 @@ double scaleAt(const ScatterDensity& density, const V3d& place) {
   return scale;
 }
 
-/// The zero set as triangles, to choose from by area.
+/// The zero set as triangles, to choose from by area in units of the scale there, so that small
+/// places are as likely to be met as large ones.
 class AreaSampler {
  public:
-  explicit AreaSampler(const levelset::NarrowBand& base)
+  AreaSampler(const levelset::NarrowBand& base, const ScatterDensity& density)
       : mesh_(levelset::bandToMesh(base)), field_(base) {
     sums_.reserve(mesh_.triangles.size());
     for (const auto& [a, b, c] : mesh_.triangles) {
       const V3d& p = mesh_.positions[a];
-      area_ += 0.5 * (mesh_.positions[b] - p).cross(mesh_.positions[c] - p).length();
+      const double scale = scaleAt(density, (p + mesh_.positions[b] + mesh_.positions[c]) / 3.0);
+      area_ +=
+          0.5 * (mesh_.positions[b] - p).cross(mesh_.positions[c] - p).length() / (scale * scale);
       sums_.push_back(area_);
     }
   }
+  /// In units of the scale².
   [[nodiscard]] double area() const { return area_; }
 
   SurfacePoint operator()(Random& random) const {
@@ -140,24 +144,26 @@ struct Candidates {
 /// By area, thinned by the weight.
 Candidates makeCandidates(const AreaSampler& sampler, const ScatterDensity& density,
                           std::size_t count, Random& random) {
-  // A weight that leaves one place in a thousand is met often enough.
-  const std::size_t most = density.weight ? 1000 * count : count;
+  // A weight that leaves less is taken for one that leaves nothing.
+  constexpr std::size_t kMostMisses = 200000, kReported = 4096;
   Candidates result;
-  double sum = 0;
-  std::size_t tried = 0;
-  for (; tried < most && result.points.size() < count; ++tried) {
+  std::size_t tried = 0, misses = 0;
+  for (; misses < kMostMisses && result.points.size() < count; ++tried) {
+    if (tried % kReported == 0) levelset::report(density.progress, 0.5, kSpread);
     SurfacePoint point = sampler(random);
     const double luck = random();
+    ++misses;
     if (density.weight && !(luck < density.weight(point.place))) continue;
+    misses = 0;
     point.scale = scaleAt(density, point.place);
-    sum += 1 / (point.scale * point.scale);
     result.points.push_back(point);
   }
   if (result.points.empty()) {
     throw InvalidInput(
         fmt::format("{}: the mask leaves no place on the surface; widen it", kSpread));
   }
-  result.area = sampler.area() * sum / static_cast<double>(tried);
+  result.area =
+      sampler.area() * static_cast<double>(result.points.size()) / static_cast<double>(tried);
   return result;
 }
 
@@ -238,19 +244,6 @@ std::vector<SurfacePoint> orderBySpread(std::span<const SurfacePoint> candidates
   return result;
 }
 
-/// @param reach  in scales: points further apart do not count
-double leastDistance(std::span<const SurfacePoint> points, double reach) {
-  PointGrid grid(reach * largestScale(points));
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    grid.visitNear(points[i].place, [&](std::size_t j) {
-      least = std::min(least, scaledDistance(points[i], points[j], 0.5 * reach));
-    });
-    grid.add(points[i].place, i);
-  }
-  return least;
-}
-
 }  // namespace
 
 double surfaceDistance(const SurfacePoint& a, const SurfacePoint& b, double thin) {
@@ -269,6 +262,18 @@ double surfaceDistance(const SurfacePoint& a, const SurfacePoint& b, double thin
   return bend * straight;
 }
 
+double leastDistance(std::span<const SurfacePoint> points, double reach, double kept) {
+  PointGrid grid(reach * largestScale(points));
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    grid.visitNear(points[i].place, [&](std::size_t j) {
+      least = std::min(least, scaledDistance(points[i], points[j], kept));
+    });
+    grid.add(points[i].place, i);
+  }
+  return least;
+}
+
 ScatteredPoints scatterPoints(const levelset::NarrowBand& base, const ScatterDensity& density) {
   checkDensity(density);
   if (base.isEmpty()) {
@@ -276,7 +281,7 @@ ScatteredPoints scatterPoints(const levelset::NarrowBand& base, const ScatterDen
         fmt::format("{}: the base has no surface; give a solid with at least one voxel", kSpread));
   }
   levelset::report(density.progress, 0, kSpread);
-  const AreaSampler sampler(base);
+  const AreaSampler sampler(base, density);
   if (!(sampler.area() > 0)) {
     throw InvalidInput(
         fmt::format("{}: the base has no surface; give a solid with at least one voxel", kSpread));
@@ -308,7 +313,8 @@ ScatteredPoints scatterPoints(const levelset::NarrowBand& base, const ScatterDen
     reach = 2 * std::sqrt(candidates.area / (2 * std::sqrt(3.0) * wanted));
     result.points = orderBySpread(candidates.points, reach, result.wanted);
   }
-  result.distance = leastDistance(std::span(result.points).first(result.wanted), reach);
+  result.distance =
+      leastDistance(std::span(result.points).first(result.wanted), reach, 0.5 * reach);
   levelset::report(density.progress, 1, kSpread);
   return result;
 }

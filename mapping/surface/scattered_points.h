@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "levelset/fields/field.h"
@@ -50,5 +51,10 @@ struct ScatteredPoints {
 /// How far it is from one point to another along a surface that turns evenly from normal to normal;
 /// infinite where it turns by more than 120° within `thin`, world units: on the other side.
 [[nodiscard]] double surfaceDistance(const SurfacePoint& a, const SurfacePoint& b, double thin);
+
+/// The least of any two in units of their mean scale; infinite where none see each other.
+/// @param reach  what is further apart does not count, in scales, positive
+/// @param kept   the two sides of what is thinner than a quarter of it do not see each other
+[[nodiscard]] double leastDistance(std::span<const SurfacePoint> points, double reach, double kept);
 
 }  // namespace mapping

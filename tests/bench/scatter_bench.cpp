@@ -8,7 +8,6 @@
 #include <tbb/global_control.h>
 
 #include <ctime>
-#include <span>
 
 #include "levelset/solids/shapes.h"
 #include "mapping/patches/scatter.h"
@@ -23,37 +22,32 @@ double now() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-struct Cost {
-  double patches = 0, mapping = 0;  ///< CPU seconds
-};
-
 }  // namespace
 
 int main() {
   const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
-  constexpr double kVoxel = 0.05;
+  constexpr double kVoxel = 0.1;
   const levelset::NarrowBand base = levelset::makeSphere(8, V3d(0), kVoxel);
   const levelset::NarrowBand stud = levelset::makeSphere(0.8, V3d(0), kVoxel);
   mapping::ScatterOptions options = {
-      .density = {.count = 100}, .uSize = 1.6, .vSize = 1.6, .patch = {.levels = 4}};
-  double start = now();
-  const mapping::ScatterResult strewn = mapping::scatter(base, 1.6, options);
-  const double perPatch = (now() - start) / static_cast<double>(strewn.patches.size());
-  fmt::print("{} patches, {:.3f} s each\n", strewn.patches.size(), perPatch);
+      .density = {.count = 1}, .uSize = 1.6, .vSize = 1.6, .patch = {.levels = 3, .spacing = 0.25}};
   const auto costOf = [&](std::size_t count) {
+    options.density.count = count;
+    double start = now();
+    const mapping::ScatterResult strewn = mapping::scatter(base, 1.6, options);
+    const double patches = now() - start;
     start = now();
-    (void)mapping::mapTexture(base, stud, std::span(strewn.patches).first(count),
-                              {.voxelSize = kVoxel});
-    const double seconds = now() - start;
-    fmt::print("texture on {:>3}: {:.2f} s\n", count, seconds);
-    return seconds;
+    (void)mapping::mapTexture(base, stud, strewn.patches, {.voxelSize = kVoxel});
+    const double mapped = now() - start;
+    fmt::print("{:>3} patches: strewn in {:.2f} s, mapped in {:.2f} s\n", strewn.patches.size(),
+               patches, mapped);
+    return patches + mapped;
   };
   const double first = costOf(1), ten = costOf(10), hundred = costOf(100);
   const double later = (hundred - ten) / 90;
-  const double ratio = (perPatch + later) / (perPatch + first);
   fmt::print(
       "from the eleventh on {:.3f} s each; the hundredth costs {:.2f} of the first (1.2 at "
       "most), {:.2f} of one of the first ten\n",
-      later, ratio, (perPatch + later) / (perPatch + ten / 10));
-  return ratio <= 1.2 ? 0 : 1;
+      later, later / first, later / (ten / 10));
+  return later <= 1.2 * first ? 0 : 1;
 }

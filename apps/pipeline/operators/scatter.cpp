@@ -37,6 +37,13 @@ mapping::ScatterOptions scatterOptions(Invocation& in) {
   options.density.seed = static_cast<std::uint64_t>(in.integer("seed"));
   options.density.progress = in.progress;
   const std::vector<double> size = in.lengths("size");
+  for (const double side : size) {
+    if (side > 10 * in.operands[0].diagonal()) {
+      throw levelset::InvalidInput(fmt::format(
+          "scatter: --size {} is over ten times the solid's diagonal of {:.6g}; make it smaller",
+          in.text("size"), in.operands[0].diagonal()));
+    }
+  }
   options.uSize = size[0];
   options.vSize = size[1];
   if (in.given("along")) options.direction = vectorField(in, "along");
@@ -58,10 +65,11 @@ Value scatter(Invocation& in) {
   json["left_out"] = result.leftOut;
   if (std::isfinite(result.distance)) json["least_distance"] = result.distance;
   in.notes.detailsJson = json.dump();
-  in.notes.notes.push_back(fmt::format("{} patches{}", result.patches.size(),
-                                       std::isfinite(result.distance)
-                                           ? fmt::format(", {:.4g} or more apart", result.distance)
-                                           : ""));
+  in.notes.notes.push_back(fmt::format(
+      "{} patches{}", result.patches.size(),
+      std::isfinite(result.distance) ? fmt::format(", {:.4g} or more apart{}", result.distance,
+                                                   in.given("scale") ? " at scale 1" : "")
+                                     : ""));
   if (options.density.count > result.patches.size()) {
     in.notes.warnings.push_back(
         fmt::format("scatter: {} of {} patches found no place, the first because: {}",

@@ -91,6 +91,18 @@ TEST(ScatteredPoints, FollowScaleAndWeight) {
   double above = 0, below = 0;
   for (const SurfacePoint& p : points) (p.place.z > 0 ? above : below) += 1;
   EXPECT_NEAR(above / below, 4, 0.6);  // discs of half the radius
+  // A small place at a small scale has room for as many as it has with that scale everywhere.
+  const auto inCap = [](const std::vector<SurfacePoint>& all) {
+    return static_cast<double>(
+        std::count_if(all.begin(), all.end(), [](const auto& p) { return p.place.x > 1.8; }));
+  };
+  const auto fine = [](const V3d&) { return 0.1; };
+  const auto fineInCap = [](const V3d& p) { return p.x > 1.8 ? 0.1 : 1.0; };
+  const auto onlyCap = [](const V3d& p) { return p.x > 1.8 ? 1.0 : 0.0; };
+  const double some = inCap(scatterPoints(ball(), {.distance = 1, .scale = fineInCap}).points);
+  const double full =
+      inCap(scatterPoints(ball(), {.distance = 1, .scale = fine, .weight = onlyCap}).points);
+  EXPECT_NEAR(some, full, 0.1 * full);
   const auto weighted = scatterPoints(
       ball(), {.count = 50, .weight = [](const V3d& p) { return p.x > 1.5 ? 1.0 : 0.0; }});
   ASSERT_EQ(weighted.wanted, 50u);
@@ -167,6 +179,12 @@ TEST(Scatter, LaysPatchesOfTheSizeAsked) {
     const V3d pole = (V3d(0, 0, 1) - normal * normal.z).normalized();
     EXPECT_GT(u.normalized().dot(pole), 0.97);
   }
+}
+
+TEST(Scatter, RefusesDirectionsThatAreNone) {
+  mapping::ScatterOptions options = small(3);
+  options.direction = [](const V3d&, double) { return V3d(std::nan(""), 0, 0); };
+  EXPECT_THROW((void)mapping::scatter(ball(), 0.3, options), UsageError);
 }
 
 TEST(Scatter, ScalesPatchesAndTurnsThem) {
