@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <ctime>
 #include <iterator>
 #include <memory>
 #include <span>
@@ -36,6 +37,15 @@ constexpr double kBandNeeded = 3;
 // Share of the map's tolerance that is left to the solution, and the finest that is worth asking
 // for.
 constexpr double kSolveShare = 0.1, kFinestSolve = 1e-10;
+
+/// @return what `work` returns; its CPU seconds are added
+template <typename Work>
+auto timed(double& seconds, const Work& work) {
+  const std::clock_t start = std::clock();
+  auto result = work();
+  seconds += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  return result;
+}
 
 void checkArguments(const NarrowBand& base, const NarrowBand& texture,
                     std::span<const Patch> patches, const TextureOptions& options) {
@@ -104,7 +114,6 @@ NarrowBand widen(const NarrowBand& texture, double voxelSize, double minStretch,
 /// A map of the chosen kind, and what is known of it.
 struct ChosenMap {
   std::unique_ptr<PatchMap> map;
-  std::vector<MapSample> samples;
   Distortion distortion = {};
   FoldCertificate certificate = {};
   std::size_t particles = 0;
@@ -124,32 +133,47 @@ double solveTolerance(const NarrowBand& texture, const V3d& boxSize, double mapT
 }
 
 /// @param tolerance  of the solution for an RBF map, u, v and w
-ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink, double tolerance,
-                  const TextureOptions& options) {
-  ChosenMap result;
-  if (options.map == TextureMap::Shell) {
-    levelset::requireMemory(ShellMap::estimateBytes(patch), options.maxMemory, kTexture);
-    levelset::report(options.progress, 0, kTexture);
-    // Where the texture ends, its band goes on.
-    const double rim =
-        (kBandNeeded + 1) * std::max(base.voxelSize(), options.voxelSize.value_or(0));
-    auto shell = std::make_unique<ShellMap>(patch, LatticeBorder{.sink = sink, .rim = rim});
-    result.samples = shell->samples();
-    result.certificate = certifyShell(*shell, patch.mirrored);
-    result.particles = shell->lattice().nodeCount();
-    result.map = std::move(shell);
-    return result;
-  }
+std::unique_ptr<RbfMap> solveRbf(const Patch& patch, double tolerance,
+                                 const TextureOptions& options) {
   RbfMapOptions rbf = options.rbf;
   rbf.maxMemory = std::min(rbf.maxMemory, options.maxMemory);
   rbf.solveTolerance = tolerance;
   rbf.progress = levelset::subProgress(options.progress, 0, 0.2);
-  auto smooth = std::make_unique<RbfMap>(patchToTexture(patch, rbf));
-  result.samples = sampleRbf(*smooth, patch, sink);
-  result.certificate = certifyRbf(*smooth, patch, sink);
+  return std::make_unique<RbfMap>(patchToTexture(patch, rbf));
+}
+
+std::unique_ptr<ShellMap> buildShell(const NarrowBand& base, const Patch& patch, double sink,
+                                     const TextureOptions& options) {
+  levelset::requireMemory(ShellMap::estimateBytes(patch), options.maxMemory, kTexture);
+  levelset::report(options.progress, 0, kTexture);
+  // Where the texture ends, its band goes on.
+  const double rim = (kBandNeeded + 1) * std::max(base.voxelSize(), options.voxelSize.value_or(0));
+  return std::make_unique<ShellMap>(patch, LatticeBorder{.sink = sink, .rim = rim});
+}
+
+/// @param sink  as a share of the patch's height
+ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink, const V3d& textureSize,
+                  double tolerance, const TextureOptions& options, TextureCost& cost) {
+  ChosenMap result;
+  if (options.map == TextureMap::Shell) {
+    auto shell = timed(cost.setup, [&] { return buildShell(base, patch, sink, options); });
+    result.particles = shell->lattice().nodeCount();
+    result.certificate = timed(cost.certificate, [&] {
+      result.distortion = surveyDistortion(shell->samples(), textureSize, patch.mirrored);
+      return certifyShell(*shell, patch.mirrored);
+    });
+    result.map = std::move(shell);
+    return result;
+  }
+  auto smooth = timed(cost.setup, [&] { return solveRbf(patch, tolerance, options); });
   result.particles = smooth->size();
   result.residual = smooth->axisResidual();
   result.solve = smooth->solveReport();
+  result.certificate = timed(cost.certificate, [&] {
+    result.distortion =
+        surveyDistortion(sampleRbf(*smooth, patch, sink), textureSize, patch.mirrored);
+    return certifyRbf(*smooth, patch, sink);
+  });
   result.map = std::move(smooth);
   return result;
 }
@@ -185,9 +209,8 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
     const auto share = [&](double n) { return 0.2 * n / static_cast<double>(patches.size()); };
     TextureOptions part = options;
     part.progress = levelset::subProgress(options.progress, share(done), share(done + 1));
-    ChosenMap chosen = makeMap(base, patch, sink / patch.height, tolerance, part);
-    chosen.distortion = surveyDistortion(chosen.samples, textureSize, patch.mirrored);
-    chosen.samples = {};
+    ChosenMap chosen =
+        makeMap(base, patch, sink / patch.height, textureSize, tolerance, part, report.cost);
     const bool folds =
         chosen.distortion.folded > 0 || chosen.certificate.verdict() == FoldVerdict::Folds;
     if (options.skipFolds && folds) {
@@ -339,19 +362,23 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
       };
       return levelset::subProgress(options.progress, share(from), share(to));
     };
-    Warp warp = warpTexture(whole, {box, sink / patches[n].height}, patches[n], *maps[n].map,
-                            {.indexToWorld = chooseGrid(base, report.voxelSize, options.merge),
-                             .scale = maps[n].distortion.meanStretch,
-                             .mapTolerance = options.mapTolerance,
-                             .maxMemory = options.maxMemory,
-                             .progress = progress(0, 0.8)});
+    Warp warp = timed(report.cost.mapping, [&] {
+      return warpTexture(whole, {box, sink / patches[n].height}, patches[n], *maps[n].map,
+                         {.indexToWorld = chooseGrid(base, report.voxelSize, options.merge),
+                          .scale = maps[n].distortion.meanStretch,
+                          .mapTolerance = options.mapTolerance,
+                          .maxMemory = options.maxMemory,
+                          .progress = progress(0, 0.8)});
+    });
     report.blocksTested += warp.blocksTested;
     report.blocksEvaluated += warp.blocksEvaluated;
     operations += warp.operations;
     ghosts += warp.ghosts;
-    pieces.push_back(levelset::redistance(std::move(warp.field), {.halfWidth = options.halfWidth,
-                                                                  .maxMemory = options.maxMemory,
-                                                                  .progress = progress(0.8, 1)}));
+    pieces.push_back(timed(report.cost.distance, [&] {
+      return levelset::redistance(std::move(warp.field), {.halfWidth = options.halfWidth,
+                                                          .maxMemory = options.maxMemory,
+                                                          .progress = progress(0.8, 1)});
+    }));
   }
   report.operationsPerPoint =
       static_cast<double>(operations) / (512 * static_cast<double>(report.blocksEvaluated));
@@ -361,7 +388,9 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
                     "were left out",
                     ghosts));
   }
-  result.band = merge(base, join(std::move(pieces), options), options, report);
+  result.band = timed(report.cost.merging, [&] {
+    return merge(base, join(std::move(pieces), options), options, report);
+  });
   levelset::report(options.progress, 1, kTexture);
   return result;
 }

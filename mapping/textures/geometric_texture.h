@@ -48,6 +48,15 @@ struct TextureOptions {
   levelset::Progress progress = {};
 };
 
+/// Where the CPU time went, seconds of all threads.
+struct TextureCost {
+  double setup = 0;        ///< solving for the map, or building its tetrahedra
+  double certificate = 0;  ///< surveying the distortion, and proving where there is no fold
+  double mapping = 0;      ///< the texture at the grid points
+  double distance = 0;     ///< making distances of it
+  double merging = 0;      ///< with the other pieces and the base
+};
+
 /// Of all patches together; distortion is that of the worst.
 struct TextureReport {
   double voxelSize = 0;
@@ -59,6 +68,7 @@ struct TextureReport {
   FoldCertificate certificate = {};
   double mapResidual = 0;     ///< largest |Φ(p) − uvw| × texture size, world units
   RbfSolveReport solve = {};  ///< of an RBF map
+  TextureCost cost = {};
   std::vector<std::string> notes;
 };
 

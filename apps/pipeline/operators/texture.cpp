@@ -83,6 +83,16 @@ void addSolve(const mapping::RbfSolveReport& solve, nlohmann::ordered_json& json
   json["averaged"] = solve.averaged;
 }
 
+nlohmann::ordered_json costJson(const mapping::TextureCost& cost) {
+  nlohmann::ordered_json json;
+  json["setup"] = cost.setup;
+  json["certificate"] = cost.certificate;
+  json["mapping"] = cost.mapping;
+  json["distance"] = cost.distance;
+  json["merging"] = cost.merging;
+  return json;
+}
+
 std::string detailsOf(const mapping::TextureReport& report, double height, bool isRbf,
                       const nlohmann::ordered_json& improvement) {
   nlohmann::ordered_json json;
@@ -94,6 +104,7 @@ std::string detailsOf(const mapping::TextureReport& report, double height, bool 
   json["blocks_tested"] = report.blocksTested;
   json["blocks_evaluated"] = report.blocksEvaluated;
   json["operations_per_point"] = report.operationsPerPoint;
+  json["cpu_s"] = costJson(report.cost);
   addDistortion(report.distortion, json);
   json["map_residual"] = report.mapResidual;
   if (isRbf) addSolve(report.solve, json);

@@ -1,0 +1,50 @@
+# Sourced by the cases with "$@": CASE.sh COMMAND FOLDER. Solids, reports and pictures go to FOLDER,
+# the sheet of pictures to docs/cases, the table to standard output.
+set -eu
+levelsmith=$1
+out=$2
+here=$(dirname "$0")
+models=$here/../../data/models
+mkdir -p "$out"
+[ -f "$models/bunny.obj" ] && [ -f "$models/dragon_vrip.ply.gz" ] || {
+  echo "The scanned models are not in data/models: fetch them with ./dev fetch." >&2
+  exit 1
+}
+
+make() {  # make NAME CHAIN...: NAME.vdb, once
+  name=$1
+  shift
+  [ -f "$out/$name.vdb" ] || "$levelsmith" --quiet "$@" ! write "$out/$name.vdb"
+}
+
+map() {  # map NAME CHAIN...: NAME.vdb and its report
+  name=$1
+  shift
+  "$levelsmith" --quiet --report "$out/$name.json" "$@" ! write "$out/$name.vdb"
+}
+
+picture() {  # picture NAME OPTIONS...: of NAME.vdb
+  name=$1
+  shift
+  "$levelsmith" --quiet read "$out/$name.vdb" ! render "$out/$name.png" --size 480x360 "$@"
+}
+
+sheet() {  # sheet NAME COLUMNS PICTURE=TITLE...
+  "${PYTHON:-/usr/bin/python3}" "$here/figures.py" sheet "$out" "$here/$@"
+}
+
+row() {  # row NAME FIELD... "text": one line of the table from NAME's report
+  "${PYTHON:-/usr/bin/python3}" "$here/figures.py" row "$out" "$@"
+}
+
+bunny() {  # bunny VOXELS: lying on its side of the base, as scanned
+  make "bunny$1" read "$models/bunny.obj" ! level-set --resolution "$1"
+}
+
+standing_bunny() {  # standing_bunny VOXELS: z is up, as textures want it
+  make "standing$1" read "$models/bunny.obj" ! transform --rotate 90,0,0 ! level-set --resolution "$1"
+}
+
+standing_dragon() {  # standing_dragon VOXELS
+  make "dragon$1" read "$models/dragon_vrip.ply.gz" ! transform --rotate 90,0,0 ! level-set --resolution "$1"
+}

@@ -1,0 +1,18 @@
+#!/bin/sh
+# A bunny on a bunny on a bunny: what was mapped is the next base [Brodersen07 fig. 8.10].
+. "$(dirname "$0")/case.sh"
+bunny 120
+standing_bunny 150
+echo "| level | particles | voxel | set-up s | mapping s | points | least Jacobian |"
+echo "|--:|--:|--:|--:|--:|--:|--:|"
+map recursion-1 read "$out/bunny120.vdb" --as base ! read "$out/standing150.vdb" --as small \
+  ! patch @base --at 0.45,0.13,0.24 --size 0.6,0.5 --rotate 20 --height 0.55 --as back \
+  ! texture @base @small @back --sink 2vx --blend 2vx --voxel 0.006
+row recursion-1 "'1'" particles voxel_size cpu_s.setup cpu_s.mapping points min_jacobian
+map recursion-2 read "$out/recursion-1.vdb" --as base ! read "$out/standing150.vdb" --as small \
+  ! patch @base --at 0.784,0.405,0.323 --size 0.15,0.12 --rotate 20 --height 0.15 --as back \
+  ! texture @base @small @back --sink 2vx --blend 2vx --voxel 0.003
+row recursion-2 "'2'" particles voxel_size cpu_s.setup cpu_s.mapping points min_jacobian
+picture recursion-1 --from 2.7,1.5,2.5 --to 0,-0.1,0
+picture recursion-2 --from 1.5,1,1.5 --to 0.55,0.42,0.35
+sheet recursion 2 "recursion-1=one on another" "recursion-2=and one on that"

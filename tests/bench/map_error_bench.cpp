@@ -1,0 +1,220 @@
+// Error against run time of the three ways to map grid points: the direct sum of an RBF map, the
+// fast sum, and tetrahedra; for 10³ to 10⁵ particles and 10⁶ to 10⁸ grid points of a third of a
+// cylinder's wall, on one thread, all threads to solve. The error is that of the whole map, against
+// the exact inverse of the one that made the particles, 99 % and largest of 2000 places well
+// inside. Direct sums above 10⁴ particles × 10⁷ points are timed on a sample of the blocks, and
+// marked so.
+//   map_error_bench [POINTS = 100000000] > map-error.csv
+
+#include <fmt/core.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <ctime>
+#include <random>
+#include <vector>
+
+#include "mapping/maps/rbf_map.h"
+#include "mapping/maps/shell_map.h"
+#include "mapping/patches/patch.h"
+
+namespace {
+
+using Imath::V3d;
+using mapping::GridBlock;
+
+constexpr int kPlaces = 2000;           // to ask for the error
+constexpr double kTextureVoxels = 256;  // along the unit cube
+constexpr double kTolerance = 0.05;     // texture voxels
+// Particles times points up to which a direct sum runs whole, and of the sample beyond.
+constexpr double kWhole = 1.1e11, kSampled = 1e10;
+constexpr double kAngle = 2.1, kLength = 4.2, kInner = 2, kHeight = 0.6;
+
+/// CPU seconds.
+double now() {
+  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
+
+/// A wall that is a little wavy, so that no map is exact.
+V3d onWall(const V3d& uvw) {
+  const double angle = kAngle * (uvw.x - 0.5) + 0.02 * std::sin(7 * uvw.y),
+               r = kInner + kHeight * uvw.z;
+  return {r * std::sin(angle), kLength * uvw.y + 0.05 * std::sin(9 * uvw.x), r * std::cos(angle)};
+}
+
+/// The exact u, v, w of a place, to rounding: the waves are so small that the fixed point is found.
+V3d fromWall(const V3d& x) {
+  const double w = (std::hypot(x.x, x.z) - kInner) / kHeight;
+  V3d uvw(std::atan2(x.x, x.z) / kAngle + 0.5, x.y / kLength, w);
+  for (int n = 0; n < 60; ++n) {
+    uvw.x = (std::atan2(x.x, x.z) - 0.02 * std::sin(7 * uvw.y)) / kAngle + 0.5;
+    uvw.y = (x.y - 0.05 * std::sin(9 * uvw.x)) / kLength;
+  }
+  return uvw;
+}
+
+mapping::Patch makePatch(std::size_t particles) {
+  constexpr std::size_t kLevels = 6;
+  const auto side = static_cast<std::size_t>(
+      std::max(4.0, std::round(std::sqrt(static_cast<double>(particles) / kLevels))));
+  mapping::Patch patch;
+  patch.height = kHeight;
+  for (std::size_t k = 0; k < kLevels; ++k) {
+    mapping::ParticleLevel level;
+    level.columns = level.rows = side;
+    level.w = static_cast<double>(k) / (kLevels - 1);
+    for (std::size_t j = 0; j < side; ++j)
+      for (std::size_t i = 0; i < side; ++i)
+        level.positions.push_back(
+            onWall({static_cast<double>(i) / static_cast<double>(side - 1),
+                    static_cast<double>(j) / static_cast<double>(side - 1), level.w}));
+    patch.levels.push_back(std::move(level));
+  }
+  return patch;
+}
+
+mapping::RbfMap solve(const mapping::Patch& patch) {
+  std::vector<V3d> places, targets;
+  for (const mapping::ParticleLevel& level : patch.levels)
+    for (std::size_t j = 0; j < level.rows; ++j)
+      for (std::size_t i = 0; i < level.columns; ++i) {
+        places.push_back(level.at(i, j));
+        targets.emplace_back(static_cast<double>(i) / static_cast<double>(level.columns - 1),
+                             static_cast<double>(j) / static_cast<double>(level.rows - 1), level.w);
+      }
+  mapping::RbfMapOptions options;
+  options.lambdaNear = options.lambdaFar = 0;
+  options.solveTolerance = 0.1 * kTolerance / kTextureVoxels;
+  return {places, targets, std::vector<char>(places.size(), 1), options};
+}
+
+bool isInWall(const V3d& center) {
+  const double r = std::hypot(center.x, center.z);
+  return r > kInner && r < kInner + kHeight && std::abs(std::atan2(center.x, center.z)) < 1.05 &&
+         center.y > 0 && center.y < kLength;
+}
+
+/// Evaluates the leaf blocks of the wall, all of them or a share.
+struct Run {
+  double points = 0, seconds = 0;
+  double share = 1;  ///< of the blocks, chosen at random
+  double timed = 0;  ///< points
+  std::mt19937_64 random{7};
+
+  void descend(const GridBlock& block, const mapping::BlockMap& map) {
+    const Imath::Box3d image = map.imageBounds();
+    if (image.isEmpty() || !image.intersects({V3d(0), V3d(1)})) return;
+    if (block.edge > GridBlock::kLeafEdge) {
+      for (int bits = 0; bits < 8; ++bits) descend(block.octant(bits), *map.octant(bits));
+      return;
+    }
+    if (!isInWall(block.center())) return;
+    std::array<V3d, 512> uvw;
+    (void)map.evaluate(uvw);
+    points += 512;
+  }
+
+  /// Without descending: the direct sum has nothing to gain from it.
+  void direct(const GridBlock& block, const mapping::PatchMap& map) {
+    if (block.edge > GridBlock::kLeafEdge) {
+      for (int bits = 0; bits < 8; ++bits) direct(block.octant(bits), map);
+      return;
+    }
+    if (!isInWall(block.center())) return;
+    points += 512;
+    if (std::uniform_real_distribution<double>(0, 1)(random) >= share) return;
+    timed += 512;
+    std::array<V3d, 512> uvw;
+    const double start = now();
+    (void)map.restrictTo(block, 0)->evaluate(uvw);
+    seconds += now() - start;
+  }
+};
+
+std::vector<GridBlock> rootsOf(double points) {
+  const double volume = kAngle * kLength * 0.5 * (2.6 * 2.6 - 2 * 2);
+  const double step = std::cbrt(volume / points);
+  Imath::M33d rows;
+  for (int i = 0; i < 3; ++i) rows[i][i] = step;
+  constexpr int kEdge = 64;
+  std::vector<GridBlock> roots;
+  for (double x = -2.7; x < 2.7; x += kEdge * step)
+    for (double y = -0.2; y < 4.4; y += kEdge * step)
+      for (double z = 0.7; z < 2.7; z += kEdge * step) roots.push_back({V3d(x, y, z), rows, kEdge});
+  return roots;
+}
+
+struct Error {
+  double percent99 = 0, largest = 0;  ///< texture voxels
+};
+
+/// @param at  the map's value at a place
+template <typename At>
+Error errorOf(const At& at) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> inside(0.1, 0.9);
+  std::vector<double> errors;
+  for (int n = 0; n < kPlaces; ++n) {
+    const double u = inside(random), v = inside(random), w = inside(random);
+    const V3d x = onWall({u, v, w});
+    errors.push_back((at(x) - fromWall(x)).length() * kTextureVoxels);
+  }
+  std::sort(errors.begin(), errors.end());
+  return {errors[errors.size() * 99 / 100], errors.back()};
+}
+
+/// A block of one spot's size about a place, to ask the fast sum there.
+V3d fastAt(const mapping::RbfMap& map, const V3d& x, double step) {
+  Imath::M33d rows;
+  for (int i = 0; i < 3; ++i) rows[i][i] = step;
+  std::array<V3d, 512> uvw;
+  (void)map.restrictTo({x, rows, GridBlock::kLeafEdge}, kTolerance / kTextureVoxels)->evaluate(uvw);
+  return uvw[0];
+}
+
+void tell(const char* map, std::size_t particles, double points, double setup, double seconds,
+          const Error& error, bool isSampled) {
+  fmt::print("{},{},{:.0f},{:.4g},{:.4g},{:.4g},{:.4g},{}\n", map, particles, points, setup,
+             seconds, error.percent99, error.largest, isSampled ? 1 : 0);
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const double most = argc > 1 ? std::atof(argv[1]) : 1e8;
+  fmt::print("map,particles,points,setup_s,mapping_s,error_99,error_max,sampled\n");
+  for (const std::size_t particles : {1000, 10000, 100000}) {
+    const mapping::Patch patch = makePatch(particles);
+    double start = now();
+    const mapping::RbfMap rbf = solve(patch);
+    const double solved = now() - start;
+    const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
+    start = now();
+    const mapping::ShellMap shell(patch, {.sink = 0.05, .rim = 0.05});
+    const double built = now() - start;
+    const Error direct = errorOf([&](const V3d& x) { return rbf(x); });
+    const Error fast = errorOf([&](const V3d& x) { return fastAt(rbf, x, 0.005); });
+    const Error straight = errorOf([&](const V3d& x) { return shell(x); });
+    for (double points = 1e6; points <= most * 1.01; points *= 10) {
+      const std::vector<GridBlock> roots = rootsOf(points);
+      Run hybrid, sum, all;
+      start = now();
+      for (const GridBlock& root : roots) hybrid.descend(root, *shell.restrictTo(root, 0));
+      tell("shell", rbf.size(), hybrid.points, built, now() - start, straight, false);
+      start = now();
+      for (const GridBlock& root : roots)
+        sum.descend(root, *rbf.restrictTo(root, kTolerance / kTextureVoxels));
+      tell("fast", rbf.size(), sum.points, solved, now() - start, fast, false);
+      const double sums = static_cast<double>(rbf.size()) * points;
+      all.share = sums > kWhole ? kSampled / sums : 1;
+      for (const GridBlock& root : roots) all.direct(root, rbf);
+      tell("direct", rbf.size(), all.points, solved, all.seconds * all.points / all.timed, direct,
+           all.share < 1);
+    }
+  }
+  return 0;
+}

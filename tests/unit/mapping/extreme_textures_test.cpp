@@ -1,0 +1,214 @@
+// Stiff and extreme textures and patches, each with its stated outcome. Those that concern one room
+// alone are beside its other tests: corners (Patch.Refuses…), ears (Patch.WrapsAThinEar), offsets
+// past the medial axis (Patch.RefusesHeightsBeyondTheMedialAxis, Unfold.MendsOffsets…).
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "levelset/error.h"
+#include "levelset/inspect/measure.h"
+#include "levelset/meshing/band_to_mesh.h"
+#include "levelset/sample.h"
+#include "levelset/solids/csg.h"
+#include "levelset/solids/shapes.h"
+#include "mapping/textures/geometric_texture.h"
+#include "tests/support/patches.h"
+
+namespace extreme_textures_test {
+
+using Imath::V3d;
+using levelset::Measurement;
+using levelset::NarrowBand;
+using mapping::makePatch;
+using mapping::mapTexture;
+using mapping::Patch;
+using mapping::TextureMap;
+using mapping::TextureMerge;
+using support::cap;
+using support::square;
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr std::size_t kGiB = std::size_t{1} << 30;
+
+const NarrowBand& slab() {
+  static const NarrowBand band = levelset::makeBox(V3d(8, 8, 2), V3d(0, 0, -1), 0.1);
+  return band;
+}
+
+Measurement measureAlone(const NarrowBand& base, const NarrowBand& texture, const Patch& patch,
+                         double voxel, TextureMap map = TextureMap::Rbf) {
+  const mapping::TextureResult mapped =
+      mapTexture(base, texture, patch,
+                 {.merge = TextureMerge::Alone, .map = map, .sink = 0.0, .voxelSize = voxel});
+  EXPECT_TRUE(levelset::manifoldness(levelset::bandToMesh(mapped.band)).isClosedManifold());
+  return levelset::measure(mapped.band);
+}
+
+TEST(ExtremeTextures, UnitsOfTheTextureDoNotMatter) {
+  // A texture in kilometres or microns on a patch in metres: only its proportions count.
+  const Patch patch = makePatch(slab(), square(1.5), 1, {.levels = 3}).patch;
+  const auto of = [&](double unit) {
+    return measureAlone(slab(),
+                        levelset::makeTorus(2 * unit, 0.6 * unit, V3d(0), V3d(0, 0, 1), 0.1 * unit),
+                        patch, 0.1);
+  };
+  const Measurement unit = of(1);
+  EXPECT_EQ(unit.euler, 0);
+  for (const double factor : {1e-3, 1e3}) {
+    const Measurement other = of(factor);
+    EXPECT_NEAR(other.volume, unit.volume, 1e-4 * unit.volume) << factor;
+    EXPECT_EQ(other.euler, 0) << factor;
+  }
+}
+
+TEST(ExtremeTextures, AThousandTimesFinerThanTheBase) {
+  // The texture's voxels come out a thousandth of the base's: alone it is mapped as it is; joined,
+  // the base would have to be that fine too, which is refused before anything is allocated, unless
+  // a coarser voxel is asked for. Then the texture is under a voxel, and next to nothing is added.
+  const Patch tiny =
+      makePatch(slab(), square(0.002), 0.002, {.levels = 3, .spacing = 0.0005}).patch;
+  const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.05);
+  const Measurement alone = measureAlone(slab(), texture, tiny, 1e-4);
+  EXPECT_NEAR(alone.volume, 4 * kPi / 3 * 0.002 * 0.002 * 0.001, 0.02 * alone.volume);
+  EXPECT_THROW((void)mapTexture(slab(), texture, tiny, {.voxelSize = 1e-4, .maxMemory = 4 * kGiB}),
+               levelset::ResourceLimit);
+  const mapping::TextureResult coarse =
+      mapTexture(slab(), texture, tiny, {.sink = 0.0, .voxelSize = 0.1});
+  EXPECT_NEAR(levelset::measure(coarse.band).volume, levelset::measure(slab()).volume, 1e-3);
+}
+
+TEST(ExtremeTextures, AThousandTimesCoarserThanTheBase) {
+  // Six voxels of texture over a patch of many of the base's: as round as six voxels are.
+  const NarrowBand fine = levelset::makeSphere(1, V3d(0), 0.02);
+  const Patch patch = makePatch(fine, cap(0.5), 0.5, {.levels = 3}).patch;
+  const NarrowBand rough = levelset::makeSphere(3000, V3d(0), 1000);
+  const Measurement mapped = measureAlone(fine, rough, patch, 0.02);
+  const Measurement smooth =
+      measureAlone(fine, levelset::makeSphere(3000, V3d(0), 150), patch, 0.02);
+  EXPECT_NEAR(mapped.volume, smooth.volume, 0.05 * smooth.volume);
+  EXPECT_EQ(mapped.euler, 2);
+}
+
+TEST(ExtremeTextures, HolesAndHandlesStay) {
+  // A plate with a hole and a handle over it: a surface of genus two, on a bent patch, by all maps.
+  const double voxel = 0.05;
+  const NarrowBand plate = levelset::makeBox(V3d(3, 2, 0.5), V3d(0), voxel),
+                   hole = levelset::makeCylinder(0.4, 2, V3d(-0.8, 0, 0), V3d(0, 0, 1), voxel),
+                   handle = levelset::makeTorus(0.5, 0.2, V3d(0.7, 0, 0.2), V3d(0, 1, 0), voxel);
+  const auto combine = [](levelset::CsgOperation how, const NarrowBand& a, const NarrowBand& b) {
+    const std::array<NarrowBand, 2> both = {a, b};
+    return levelset::combine(how, both).band;
+  };
+  const NarrowBand texture =
+      combine(levelset::CsgOperation::Union,
+              combine(levelset::CsgOperation::Difference, plate, hole), handle);
+  ASSERT_EQ(levelset::measure(texture).euler, -2);
+  const NarrowBand ball = support::makeBall(4, 0.1);
+  const Patch patch = makePatch(ball, cap(0.5, 4), 1.5, {.levels = 6, .spacing = 0.2}).patch;
+  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell})
+    EXPECT_EQ(measureAlone(ball, texture, patch, 0.05, map).euler, -2);
+}
+
+TEST(ExtremeTextures, ASpikeUnderAVoxelIsLostAndNothingElse) {
+  // A needle a fifth of a voxel wide: no grid point is inside, so it is not there; the rest is.
+  const double voxel = 0.1;
+  const std::array<NarrowBand, 2> both = {
+      levelset::makeSphere(1, V3d(0), voxel),
+      levelset::makeCapsule(V3d(0, 0, 0.5), V3d(0, 0, 2), 0.2 * voxel, voxel)};
+  const NarrowBand spiked = levelset::combine(levelset::CsgOperation::Union, both).band;
+  const Patch patch = makePatch(slab(), square(1), 3, {.levels = 4}).patch;
+  const mapping::TextureOptions options = {.merge = TextureMerge::Alone,
+                                           .sink = 0.0,
+                                           .textureBox = Imath::Box3d(V3d(-1), V3d(1, 1, 2)),
+                                           .voxelSize = voxel};
+  const Measurement mapped = levelset::measure(mapTexture(slab(), spiked, patch, options).band),
+                    ball = levelset::measure(mapTexture(slab(), both[0], patch, options).band);
+  EXPECT_NEAR(mapped.volume, ball.volume, 0.02 * ball.volume);
+  EXPECT_TRUE(std::isfinite(mapped.area));
+}
+
+TEST(ExtremeTextures, ASplineThroughItselfIsOneSolid) {
+  // A loop that comes back through its own stem: the warped texture covers the crossing twice, and
+  // is united with itself there. It is told where the shell's map has two answers.
+  const NarrowBand base = support::makeBall(4, 0.1);
+  const Patch patch = makePatch(base, square(0.4, 4), 12,
+                                {.levels = 24,
+                                 .scheme = mapping::LevelScheme::Spline,
+                                 .spline = {V3d(0, 0, 6), V3d(2, 0, 8), V3d(3, 0, 6.5),
+                                            V3d(1.5, 0, 5.3), V3d(-1, 0, 5.2)},
+                                 .spacing = 0.3})
+                          .patch;
+  const NarrowBand texture = levelset::makeBox(V3d(1, 1, 12), V3d(0), 0.1);
+  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell}) {
+    try {
+      const Measurement mapped = measureAlone(base, texture, patch, 0.1, map);
+      EXPECT_TRUE(std::isfinite(mapped.volume));
+      std::printf("map %d: volume %g euler %ld components %zu\n", static_cast<int>(map),
+                  mapped.volume, mapped.euler, mapped.components);
+    } catch (const levelset::Error& error) {
+      std::printf("map %d: %s\n", static_cast<int>(map), error.what());
+    }
+  }
+}
+
+TEST(ExtremeTextures, OverACreaseNothingTears) {
+  // Across the right-angled edge of a box, by both maps: one closed piece that stands on both
+  // sides, and joined one solid without cavities.
+  const std::array<V3d, 4> corners = {V3d(2.5, -1, 0), V3d(4, -1, -1.2), V3d(4, 1, -1.2),
+                                      V3d(2.5, 1, 0)};
+  const Patch patch = makePatch(slab(), corners, 0.6, {.levels = 4}).patch;
+  const NarrowBand texture = levelset::makeBox(V3d(2, 2, 1), V3d(0), 0.1);
+  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell}) {
+    const Measurement alone = measureAlone(slab(), texture, patch, 0.05, map);
+    EXPECT_EQ(alone.components, 1u);
+    EXPECT_EQ(alone.euler, 2);
+    EXPECT_NEAR(alone.volume, 0.6 * 2 * 2.7 + 2 * kPi / 4 * 0.6 * 0.6, 0.2 * alone.volume);
+    const Measurement joined =
+        levelset::measure(mapTexture(slab(), texture, patch, {.map = map}).band);
+    EXPECT_EQ(joined.components, 1u);
+    EXPECT_EQ(joined.cavities, 0u);
+    EXPECT_GT(joined.volume, 128 + 0.8 * alone.volume);
+  }
+}
+
+TEST(ExtremeTextures, OffsetsBeyondTheCurvatureRadiusFoldAndSaySo) {
+  // In a trough of radius 1.5 the sides of a texture 2 high meet: its particles cross, which is
+  // told as a fold or as a height that the distances do not reach, with the place.
+  const NarrowBand trough =
+      levelset::combine(
+          levelset::CsgOperation::Difference,
+          std::array<NarrowBand, 2>{
+              slab(), levelset::makeCylinder(1.5, 12, V3d(0, 0, 0), V3d(0, 1, 0), 0.1)})
+          .band;
+  const std::array<V3d, 4> corners = {V3d(-1, -1, -1.12), V3d(1, -1, -1.12), V3d(1, 1, -1.12),
+                                      V3d(-1, 1, -1.12)};
+  std::string message;
+  try {
+    const Patch patch =
+        makePatch(trough, corners, 2, {.levels = 4, .scheme = mapping::LevelScheme::Conforming})
+            .patch;
+    (void)mapTexture(trough, levelset::makeSphere(1, V3d(0), 0.05), patch);
+  } catch (const levelset::InvalidInput& error) {
+    message = error.what();
+  }
+  EXPECT_NE(message.find("lower"), std::string::npos) << message;
+  EXPECT_NE(message.find("("), std::string::npos) << message;
+}
+
+TEST(ExtremeTextures, LambdaIsANumber) {
+  const Patch patch = makePatch(slab(), square(1), 1, {.levels = 2, .spacing = 0.5}).patch;
+  const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.1);
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  for (const double bad : {kNan, -1.0, std::numeric_limits<double>::infinity()})
+    for (const bool near : {false, true}) {
+      mapping::TextureOptions options;
+      (near ? options.rbf.lambdaNear : options.rbf.lambdaFar) = bad;
+      EXPECT_THROW((void)mapTexture(slab(), texture, patch, options), levelset::UsageError);
+    }
+}
+
+}  // namespace extreme_textures_test
