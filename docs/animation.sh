@@ -31,17 +31,17 @@ done
 
 for frame in place_0 place_1 place_2 place_3 both_0 both_2 both_4 both_6; do
   case $frame in
-    place*) view="--from 0,-42,32 --to 0,0,0 --fov 36" ;;
-    *) view="--from 10,-36,30 --to 1,0,0 --fov 36" ;;
+    place*) view="--from 0,-42,32 --to 0,0,0.5 --fov 20" ;;
+    *) view="--from 10,-36,30 --to 0,0,0.5 --fov 28" ;;
   esac
-  "$levelsmith" --quiet read $frame.vdb ! render $frame.png --size 360x270 --up 0,0,1 $view
+  "$levelsmith" --quiet read $frame.vdb ! render $frame.png --size 360x216 --up 0,0,1 $view
 done
 "${PYTHON:-python3}" - "$here/animation.png" <<'PYTHON'
 import sys
 import matplotlib
 matplotlib.use("Agg")
 from matplotlib import pyplot
-sheet, panels = pyplot.subplots(2, 4, figsize=(10.4, 4.2))
+sheet, panels = pyplot.subplots(2, 4, figsize=(10.4, 3.6))
 names = [f"place_{i}" for i in range(4)] + [f"both_{i}" for i in (0, 2, 4, 6)]
 for panel, name in zip(panels.flat, names):
     panel.imshow(pyplot.imread(f"{name}.png"))

@@ -230,7 +230,13 @@ mapping::AnimationOptions animationOptions(Invocation& in,
   } else {
     options.make = first.recipe->make;
   }
-  if (first.recipe && first.recipe->isRigid) options.carry = mapping::CarryRule::Rigid;
+  if (first.recipe && first.recipe->isRigid) {
+    if (in.given("carry") && options.carry == mapping::CarryRule::Corners)
+      throw UsageError(
+          "animate: a decal is told by its centre and direction, so its corners cannot be carried "
+          "by themselves; leave --carry out");
+    options.carry = mapping::CarryRule::Rigid;
+  }
   if (in.given("base-frames")) {
     options.bases = [row = baseRow(in), &in](std::size_t frame) {
       return levelset::readBand(frameFile(in, row, "base-first", frame),
@@ -352,11 +358,11 @@ Value animate(Invocation& in) {
                         in.band(0), in.band(1), keys, options,
                         [&](std::size_t frame, const mapping::TextureResult& result, bool) {
                           const std::filesystem::path file = out.file(frame);
-                          last = result.band;
+                          if (frame + 1 == framesOf(in)) last = result.band;
                           if (levelset::isMeshFormat(file)) {
-                            levelset::writeMesh(file, levelset::bandToMesh(last));
+                            levelset::writeMesh(file, levelset::bandToMesh(result.band));
                           } else {
-                            levelset::writeBand(file, last);
+                            levelset::writeBand(file, result.band);
                           }
                         }));
   return Value(std::move(last));

@@ -12,8 +12,10 @@ using Json = nlohmann::json;
 /// A ball, a ring, and two patches, of one voxel size.
 const std::string kScene =
     "sphere --radius 5 --voxel 0.5 --as ball ! torus --radius 2 --tube 0.8 --voxel 0.5 --as ring "
-    "! patch @ball --at 0,0,5 --size 4,4 --height 1.5 --levels 2 --particles conforming --as here "
-    "! patch @ball --at 5,0,0 --size 3,3 --rotate -90 --height 1 --levels 2 --particles conforming "
+    "! patch @ball --at 0,0,5 --size 4,4 --height 1.5 --levels 2 --spacing 1 --particles "
+    "conforming --as here "
+    "! patch @ball --at 5,0,0 --size 3,3 --rotate -90 --height 1 --levels 2 --spacing 1 "
+    "--particles conforming "
     "--as there ! ";
 
 class Animate : public support::ShellTest {
@@ -39,7 +41,8 @@ TEST_F(Animate, BeginsAndEndsAsTheTextureOnItsPatches) {
   EXPECT_EQ(details["frames"], 3);
   EXPECT_EQ(details["reused"], 0);
   EXPECT_EQ(details["patches_made"], 1);
-  EXPECT_NEAR(details["frame"][1]["corners"][0][1].get<double>(), -1.7, 0.1);
+  // Half way along the great circle between the two corners.
+  EXPECT_NEAR(details["frame"][1]["corners"][0][1].get<double>(), -2.36, 0.02);
 }
 
 TEST_F(Animate, CarriesThePatchOnBasesFromFiles) {
@@ -61,7 +64,7 @@ TEST_F(Animate, CarriesThePatchOnBasesFromFiles) {
   const Json both =
       reportOf(kScene +
                "read base_03.vdb --as last ! patch @last --at 5.4,0,0 --size 3,3 --rotate -90 "
-               "--height 1 --levels 2 --particles conforming --as goal "
+               "--height 1 --levels 2 --spacing 1 --particles conforming --as goal "
                "! texture @last @ring @goal --voxel 0.5 ! write goal.vdb "
                "! animate @ball @ring @here @goal --frames 4 --base-frames base_##.vdb --voxel 0.5 "
                "--out both_#.vdb");
@@ -90,21 +93,28 @@ TEST_F(Animate, MovesMeshesDecalsGridsAndPatchesFromFiles) {
            "mesh @ring --as m ! animate @ball @m @here @there --map mesh --frames 3 --out "
            "m_#.ply");
   EXPECT_NE(bytes("m_0.ply"), bytes("m_1.ply"));
-  const Json decals = reportOf(
-      kScene +
-      "decal @ball --at 0,0,5 --direction 1,0,0 --radius 2 --height 1 --levels 2 --as d ! decal "
-      "@ball --at 5,0,0 --direction 0,1,0 --radius 1.5 --height 1 --levels 2 --as e ! animate "
-      "@ball "
-      "@ring @d @e" +
-      tail);
+  const Json decals = reportOf(kScene +
+                               "decal @ball --at 0,0,5 --direction 1,0,0 --radius 2 --height 1 "
+                               "--levels 2 --spacing 1 --as d ! decal "
+                               "@ball --at 5,0,0 --direction 0,1,0 --radius 1.5 --height 1 "
+                               "--levels 2 --spacing 1 --as e ! animate "
+                               "@ball "
+                               "@ring @d @e" +
+                               tail);
   EXPECT_EQ(decals["patches_made"], 1);
-  const Json tiles = reportOf(kScene +
-                              "patch-grid @ball --count 2,1 --at 0,0,5 --size 4,2 --height 1 "
-                              "--levels 2 --as g ! patch-grid "
-                              "@ball --count 2,1 --at 0.5,0,5 --size 4,2 --height 1 --levels 2 "
-                              "--as h ! animate @ball @ring "
-                              "@g @h" +
-                              tail);
+  EXPECT_REFUSED(levelsmith(kScene +
+                            "decal @ball --at 0,0,5 --direction 1,0,0 --radius 2 --height "
+                            "1 --as d ! animate @ball @ring @d --carry corners" +
+                            tail),
+                 2, "leave --carry out");
+  const Json tiles =
+      reportOf(kScene +
+               "patch-grid @ball --count 2,1 --at 0,0,5 --size 4,2 --height 1 "
+               "--levels 2 --spacing 1 --as g ! patch-grid "
+               "@ball --count 2,1 --at 0.5,0,5 --size 4,2 --height 1 --levels 2 --spacing 1 "
+               "--as h ! animate @ball @ring "
+               "@g @h" +
+               tail);
   EXPECT_EQ(tiles["patches_made"], 1);
   ASSERT_EQ(levelsmith(kScene + "write @here here.patch ! write @there there.patch").code, 0);
   const auto outcome = levelsmith(

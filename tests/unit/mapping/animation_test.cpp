@@ -214,7 +214,7 @@ TEST(PatchPath, GoesOneWayAroundAPipe) {
   // On opposite sides: of the shortest ways of the corners, two go left and two go right.
   const NarrowBand base = pipe();
   const Footprint a = footprint(base, V3d(1, 0, 0)),
-                  b = footprint(base, V3d(-1, 0.001, 0), 0.6, kPi);
+                  b = footprint(base, V3d(-1, 0.001, 0), 0.8, kPi);
   const mapping::SurfaceField field(base);
   double sides = 0;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -232,8 +232,14 @@ TEST(PatchPath, GoesOneWayAroundAPipe) {
       if (n == 5) {
         for (const V3d& corner : f.corners) EXPECT_GT(corner.y * side, 0.5);
       }
-      // The pipe turned about its axis: all lengths stay.
-      EXPECT_LT(mapping::driftBetween(a, f).factor(), 1.005) << n;
+      // As wide as the part of the way says, around the pipe and along it.
+      const double width = 0.6 + 0.2 * n / 10;
+      const V3d &p = f.corners[0], &q = f.corners[1], &r = f.corners[2];
+      EXPECT_NEAR(
+          std::acos((p.x * q.x + p.y * q.y) / (std::hypot(p.x, p.y) * std::hypot(q.x, q.y))), width,
+          0.02)
+          << n;
+      EXPECT_NEAR(std::abs(r.z - q.z), width, 0.02) << n;
     }
   }
 }
@@ -288,8 +294,9 @@ TEST(AnimatePatches, CarriesBothWaysOnAGrowingBase) {
     const V3d centre = V3d(std::sin(angle), 0, std::cos(angle)) * radius(f);
     for (const V3d& corner : played.patches[f].corners)
       EXPECT_NEAR(corner.length(), radius(f), 0.02 * kVoxel) << f;
+    // The corners' great circles are not quite as far from each other as from the middle.
     EXPECT_LT((centreOf(played.patches[f]).normalized() * radius(f) - centre).length(),
-              0.1 * kVoxel)
+              0.25 * kVoxel)
         << f;
   }
   EXPECT_EQ(played.patches[4].levels[0].positions, b.levels[0].positions);
