@@ -106,6 +106,7 @@ class Bases {
     frame_ = frame;
     return now_;
   }
+  [[nodiscard]] bool areMoving() const { return static_cast<bool>(frames_); }
   /// Of the base that was asked for last.
   [[nodiscard]] std::uint64_t hash() const { return hash_; }
 
@@ -206,6 +207,9 @@ class Animation {
           std::equal(given.begin(), given.end(), patches_.begin(), patches_.end(), isSamePatch);
       isUnchanged = isUnchanged && isSame;
       if (!isSame) patches_ = given;
+      // Where there is no way, no frame shall be made in vain.
+      if (!bases_.areMoving() && key_ + 1 < keys_.size() && begin + 1 < end)
+        (void)atFrame(f + 1, [&] { return onTheWay(f + 1, begin, end); });
     } else {
       if (!isSameBase) {
         const Footprints before = own_;

@@ -135,6 +135,38 @@ TEST(CarryFootprint, GoesAlongTheRadiiOfAGrowingBall) {
   }
 }
 
+/// A plane with a hump across it at x = `place`, near enough a distance.
+NarrowBand wave(double place) {
+  const double height = 0.8, width = 0.5;
+  const auto phi = [=](const V3d& p) {
+    const double x = (p.x - place) / width, hump = height * std::exp(-x * x);
+    return (p.z - hump) / std::hypot(1.0, 2 * x / width * hump);
+  };
+  return support::sampleBand(phi, {V3d(-2.5, -1, -0.4), V3d(2.5, 1, 1.2)}, kVoxel, 4);
+}
+
+TEST(CarryFootprint, HoldsPatchesTogetherUnderAWave) {
+  // It drags corners along its flanks, as in the thesis; the patch as a whole keeps its size.
+  const Footprint first = footprint(wave(-2.5), V3d(0), 0.8);
+  Footprint free = first, rigid = first;
+  double drifted = 0, held = 0;
+  for (int i = 0; i <= 50; ++i) {
+    const NarrowBand base = wave(-2.5 + 0.1 * i);
+    free = mapping::carryFootprint(base, free, CarryRule::Corners);
+    rigid = mapping::carryFootprint(base, rigid, CarryRule::Rigid);
+    const mapping::SurfaceField field(base);
+    const auto change = [&](const Footprint& f) {
+      const double side =
+          mapping::pathLength(mapping::geodesic(field, 0, f.corners[0], f.corners[1]));
+      return std::abs(std::log(side / 0.8));
+    };
+    drifted = std::max(drifted, change(free));
+    held = std::max(held, change(rigid));
+  }
+  EXPECT_GT(drifted, 0.35);
+  EXPECT_LT(held, 0.05);
+}
+
 TEST(CarryFootprint, StaysWhereTheSurfaceMovesAlongItself) {
   // A ball that turns, and the same ball on another grid: nothing tells that it has turned.
   const NarrowBand ball = ballAt(V3d(0));
@@ -344,10 +376,13 @@ TEST(AnimatePatches, TellsTheFrameOfWhatItRefuses) {
   EXPECT_NE(gone.find("animate: frame 2: the base has no surface"), std::string::npos) << gone;
   // The keys on two parts.
   const NarrowBand two = base(1.3);
+  std::size_t made = 0;
   const std::string apart = refusalOf([&] {
-    (void)play(two, {keyOf(patchAt(two, V3d(-1.3, 0, 1))), keyOf(patchAt(two, V3d(1.3, 0, 1)), 3)},
-               {.frames = 4});
+    (void)mapping::animatePatches(
+        two, {keyOf(patchAt(two, V3d(-1.3, 0, 1))), keyOf(patchAt(two, V3d(1.3, 0, 1)), 3)},
+        {.frames = 4, .make = remake}, [&](const PatchFrame&) { ++made; });
   });
+  EXPECT_EQ(made, 0u);
   EXPECT_NE(apart.find("animate: frame 1: no way on the surface"), std::string::npos) << apart;
 }
 
