@@ -161,6 +161,7 @@ const std::vector<Operator>& operators() {
     addPatchOperators(list);
     addScatterOperators(list);
     addTextureOperators(list);
+    addAnimationOperators(list);
     addGeneratorOperators(list);
     addFoldOperators(list);
     addInspectionOperators(list);

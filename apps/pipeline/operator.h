@@ -111,6 +111,7 @@ void addPlacementOperators(std::vector<Operator>& all);
 void addPatchOperators(std::vector<Operator>& all);
 void addScatterOperators(std::vector<Operator>& all);
 void addTextureOperators(std::vector<Operator>& all);
+void addAnimationOperators(std::vector<Operator>& all);
 void addGeneratorOperators(std::vector<Operator>& all);
 void addFoldOperators(std::vector<Operator>& all);
 void addInspectionOperators(std::vector<Operator>& all);

@@ -12,6 +12,7 @@
 #include "levelset/fields/grid.h"
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
+#include "mapping/animation/animation.h"
 #include "mapping/patches/patch.h"
 
 namespace pipeline {
@@ -35,11 +36,26 @@ struct Plan {
   [[nodiscard]] double bytes() const;
 };
 
+/// How patches were made, for whoever makes them again on another base or in another place.
+struct PatchRecipe {
+  /// What of them is to be carried, and how to make them there.
+  std::function<std::vector<mapping::PatchOutline>(const std::vector<mapping::Patch>&)> outlines =
+      {};
+  mapping::PatchMaker make = {};
+  /// In place of the two: of patches that an axis tells, which stay about it.
+  std::function<std::vector<mapping::Patch>(const levelset::NarrowBand& base, double height,
+                                            const levelset::Progress& progress)>
+      around = {};
+  bool isRigid = false;    ///< centre and direction tell all of it, as of a decal
+  std::string fixed = {};  ///< why it cannot be moved; empty: it can
+};
+
 /// One patch or many of one base.
 struct PatchValue {
   std::vector<mapping::Patch> patches;
   /// With `--height auto`: makes them once the texture has told the height. Empty otherwise.
   std::function<std::vector<mapping::Patch>(double height)> atHeight = {};
+  std::shared_ptr<const PatchRecipe> recipe = {};  ///< of those from files: none
 };
 
 /// What flows through a chain: immutable, cheap to copy. In a dry run only the plan is there.

@@ -1,9 +1,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "apps/pipeline/fields.h"
+#include "apps/pipeline/file_row.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/units.h"
@@ -72,23 +72,15 @@ Value smooth(Invocation& in) {
 
 // === morph
 
-/// The name of a kept step: '#'s stand for its number with that many digits.
-std::filesystem::path stepFile(const std::string& pattern, int number) {
-  const std::size_t first = pattern.find('#');
-  const std::size_t last = pattern.find_first_not_of('#', first);
-  const std::size_t digits = (last == std::string::npos ? pattern.size() : last) - first;
-  return pattern.substr(0, first) + fmt::format("{:0{}}", number, digits) +
-         pattern.substr(first + digits);
-}
-
-std::string stepPattern(const Invocation& in) {
-  std::string pattern = in.text("keep-steps");
-  if (pattern.find('#') == std::string::npos || !levelset::isBandFormat(pattern))
+FileRow stepRow(const Invocation& in) {
+  const std::string pattern = in.text("keep-steps");
+  FileRow row(pattern);
+  if (!row.hasNumber() || !levelset::isBandFormat(pattern))
     throw UsageError(
         fmt::format("{}: '{}' names no row of .vdb files; put # where the number goes, as in "
                     "step_###.vdb",
                     in.where("keep-steps"), pattern));
-  return pattern;
+  return row;
 }
 
 double partOfTheWay(const Invocation& in) {
@@ -108,16 +100,16 @@ double partOfTheWay(const Invocation& in) {
 std::vector<std::string> stepFiles(const Invocation& in) {
   std::vector<std::string> files;
   if (!in.given("keep-steps")) return files;
-  const std::string pattern = stepPattern(in);
-  const auto steps = static_cast<int>(in.integer("steps"));
-  for (int i = 1; i <= steps; ++i) files.push_back(stepFile(pattern, i).string());
+  const FileRow row = stepRow(in);
+  const auto steps = static_cast<std::size_t>(in.integer("steps"));
+  for (std::size_t i = 1; i <= steps; ++i) files.push_back(row.file(i).string());
   return files;
 }
 
 constexpr long kMostSteps = 100000;
 
 void validateMorph(const Invocation& in) {
-  if (in.given("keep-steps")) (void)stepPattern(in);
+  if (in.given("keep-steps")) (void)stepRow(in);
   if (partOfTheWay(in) < 1 && in.given("tolerance"))
     throw UsageError(
         "morph: --tolerance tells when the target is reached, and --until ends before; "
@@ -135,9 +127,8 @@ Value morph(Invocation& in) {
                                  .progress = in.progress};
   if (in.given("tolerance")) options.tolerance = in.length("tolerance");
   if (in.given("keep-steps")) {
-    const std::string pattern = stepPattern(in);
-    options.keep = [pattern](const NarrowBand& step, int number) {
-      levelset::writeBand(stepFile(pattern, number), step);
+    options.keep = [row = stepRow(in)](const NarrowBand& step, int number) {
+      levelset::writeBand(row.file(static_cast<std::size_t>(number)), step);
     };
   }
   NarrowBand result = levelset::morph(in.band(0), in.band(1), options);

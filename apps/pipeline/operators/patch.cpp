@@ -3,7 +3,10 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
+#include <utility>
 
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/patch_options.h"
@@ -136,13 +139,14 @@ void tellPatches(Invocation& in, const mapping::PatchReport& report,
 /// Made at the height asked, and again once the texture has told one.
 /// @param make  of a height: patches and their report
 template <typename Make>
-Value patchesAtHeight(Invocation& in, const Make& make) {
+Value patchesOf(Invocation& in, PatchRecipe recipe, const Make& make) {
   const bool isAuto = in.text("height") == "auto";
   // The texture will tell the height; one voxel is enough to know the patch's size until then.
   auto [patches, report] = make(isAuto ? in.band().voxelSize() : in.length("height"), in.progress);
   tellPatches(in, report, patches);
   PatchValue value;
   value.patches = std::move(patches);
+  value.recipe = std::make_shared<const PatchRecipe>(std::move(recipe));
   if (isAuto) value.atHeight = [make](double h) { return make(h, {}).patches; };
   return Value(std::move(value));
 }
@@ -157,25 +161,103 @@ PatchGridResult asSet(mapping::PatchResult result) {
   return set;
 }
 
+std::vector<mapping::PatchOutline> outlinesOf(const std::vector<mapping::Patch>& patches) {
+  std::vector<mapping::PatchOutline> outlines;
+  for (const mapping::Patch& one : patches) outlines.push_back(mapping::outlineOf(one));
+  return outlines;
+}
+
+/// For a patch that stands elsewhere than it did: a spline goes with it, corners that have come to
+/// run the other way round are for the caller to judge.
+mapping::PatchOptions optionsElsewhere(mapping::PatchOptions options,
+                                       const mapping::Footprint& origin,
+                                       const mapping::Footprint& now, const Progress& progress) {
+  for (V3d& p : options.spline) p = mapping::movedAlong(origin, now, p);
+  options.progress = progress;
+  return options;
+}
+
+std::string whyFixed(const Invocation& in) {
+  for (const char* side : kSides)
+    if (in.given(side))
+      return fmt::format("--{} of '{}' names points that stay where they are", side, in.op().name);
+  return "";
+}
+
 Value patch(Invocation& in) {
   mapping::PatchOptions options = patchOptionsOf(in);
   for (std::size_t side = 0; side < 4; ++side)
     if (in.given(kSides[side])) options.sides[side] = in.points(kSides[side]);
-  return patchesAtHeight(in, [base = in.band(), corners = cornersOf(in), options](
-                                 double height, const Progress& progress) {
-    mapping::PatchOptions now = options;
-    now.progress = progress;
-    return asSet(mapping::makePatch(base, corners, height, now));
-  });
+  PatchRecipe recipe{.outlines = outlinesOf, .fixed = whyFixed(in)};
+  recipe.make = [options](const levelset::NarrowBand& base,
+                          std::span<const mapping::Footprint> footprints,
+                          std::span<const mapping::Footprint> origins, const Progress& progress) {
+    mapping::PatchOptions now = optionsElsewhere(options, origins[0], footprints[0], progress);
+    now.mirror = true;
+    return std::vector{
+        mapping::makePatch(base, footprints[0].corners, footprints[0].height, now).patch};
+  };
+  return patchesOf(in, std::move(recipe),
+                   [base = in.band(), corners = cornersOf(in), options](double height,
+                                                                        const Progress& progress) {
+                     mapping::PatchOptions now = options;
+                     now.progress = progress;
+                     return asSet(mapping::makePatch(base, corners, height, now));
+                   });
+}
+
+/// Mean way along u and along v from the centre to the corners.
+double meanReach(const mapping::Footprint& footprint) {
+  double sum = 0;
+  for (const Imath::V2d& way : footprint.reach.value()) sum += std::abs(way.x) + std::abs(way.y);
+  return sum / 8;
 }
 
 Value decal(Invocation& in) {
-  return patchesAtHeight(in, [base = in.band(), at = in.point("at"), u = in.point("direction"),
-                              radius = in.length("radius"), options = patchOptionsOf(in)](
-                                 double height, const Progress& progress) {
+  const mapping::PatchOptions options = patchOptionsOf(in);
+  const V3d at = in.point("at"), direction = in.point("direction");
+  const double radius = in.length("radius");
+  PatchRecipe recipe{.isRigid = true};
+  recipe.outlines = [at, direction](const std::vector<mapping::Patch>& patches) {
+    std::vector<mapping::PatchOutline> outlines = outlinesOf(patches);
+    outlines.front().middle = at;
+    outlines.front().direction = direction;
+    return outlines;
+  };
+  recipe.make = [options, radius](const levelset::NarrowBand& base,
+                                  std::span<const mapping::Footprint> footprints,
+                                  std::span<const mapping::Footprint> origins,
+                                  const Progress& progress) {
+    const mapping::Footprint& now = footprints[0];
+    return std::vector{mapping::makeDecal(base, now.centre, now.direction,
+                                          radius * meanReach(now) / meanReach(origins[0]),
+                                          now.height,
+                                          optionsElsewhere(options, origins[0], now, progress))
+                           .patch};
+  };
+  return patchesOf(
+      in, std::move(recipe),
+      [base = in.band(), at, direction, radius, options](double height, const Progress& progress) {
+        mapping::PatchOptions now = options;
+        now.progress = progress;
+        return asSet(mapping::makeDecal(base, at, direction, radius, height, now));
+      });
+}
+
+Value gridAround(Invocation& in, const mapping::PatchGridOptions& grid,
+                 const mapping::PatchOptions& options) {
+  const auto make = [axis = in.points("around"), rotation = in.radians("rotate"), grid, options](
+                        const levelset::NarrowBand& base, double height, const Progress& progress) {
     mapping::PatchOptions now = options;
     now.progress = progress;
-    return asSet(mapping::makeDecal(base, at, u, radius, height, now));
+    return mapping::makePatchGridAround(base, axis[0], axis[1], rotation, height, grid, now);
+  };
+  const PatchRecipe recipe{
+      .around = [make](const levelset::NarrowBand& base, double height, const Progress& progress) {
+        return make(base, height, progress).patches;
+      }};
+  return patchesOf(in, recipe, [make, base = in.band()](double height, const Progress& progress) {
+    return make(base, height, progress);
   });
 }
 
@@ -189,22 +271,32 @@ Value patchGrid(Invocation& in) {
                                           .shift = in.number("shift")};
   mapping::PatchOptions options = patchOptionsOf(in);
   options.mirror = in.flag("mirrored");
-  if (!in.given("around")) {
-    for (std::size_t side = 0; side < 4; ++side)
-      if (in.given(kSides[side])) options.sides[side] = in.points(kSides[side]);
-    return patchesAtHeight(in, [base = in.band(), corners = cornersOf(in), grid, options](
-                                   double height, const Progress& progress) {
-      mapping::PatchOptions now = options;
-      now.progress = progress;
-      return mapping::makePatchGrid(base, corners, height, grid, now);
-    });
-  }
-  return patchesAtHeight(
-      in, [base = in.band(), axis = in.points("around"), rotation = in.radians("rotate"), grid,
-           options](double height, const Progress& progress) {
+  if (in.given("around")) return gridAround(in, grid, options);
+  for (std::size_t side = 0; side < 4; ++side)
+    if (in.given(kSides[side])) options.sides[side] = in.points(kSides[side]);
+  const std::array<V3d, 4> corners = cornersOf(in);
+  PatchRecipe recipe{.fixed = whyFixed(in)};
+  // One outline to all tiles: their borders stay shared.
+  recipe.outlines = [corners](const std::vector<mapping::Patch>& patches) {
+    const mapping::Patch& middle = patches[patches.size() / 2];
+    return std::vector<mapping::PatchOutline>{
+        {.corners = corners, .middle = mapping::outlineOf(middle).middle, .height = middle.height}};
+  };
+  recipe.make = [grid, options](const levelset::NarrowBand& base,
+                                std::span<const mapping::Footprint> footprints,
+                                std::span<const mapping::Footprint> origins,
+                                const Progress& progress) {
+    mapping::PatchOptions now = optionsElsewhere(options, origins[0], footprints[0], progress);
+    now.mirror = true;
+    return mapping::makePatchGrid(base, footprints[0].corners, footprints[0].height, grid, now)
+        .patches;
+  };
+  return patchesOf(
+      in, std::move(recipe),
+      [base = in.band(), corners, grid, options](double height, const Progress& progress) {
         mapping::PatchOptions now = options;
         now.progress = progress;
-        return mapping::makePatchGridAround(base, axis[0], axis[1], rotation, height, grid, now);
+        return mapping::makePatchGrid(base, corners, height, grid, now);
       });
 }
 

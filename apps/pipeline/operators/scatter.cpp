@@ -3,7 +3,9 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "apps/pipeline/fields.h"
 #include "apps/pipeline/invocation.h"
@@ -55,6 +57,34 @@ mapping::ScatterOptions scatterOptions(Invocation& in) {
   return options;
 }
 
+/// Each patch goes its own way, and keeps its scale.
+std::shared_ptr<const PatchRecipe> recipeOf(const std::vector<mapping::PatchSite>& sites,
+                                            const mapping::PatchOptions& options) {
+  PatchRecipe recipe;
+  recipe.outlines = [](const std::vector<mapping::Patch>& patches) {
+    std::vector<mapping::PatchOutline> outlines;
+    for (const mapping::Patch& patch : patches) outlines.push_back(mapping::outlineOf(patch));
+    return outlines;
+  };
+  recipe.make = [sites, options](const levelset::NarrowBand& base,
+                                 std::span<const mapping::Footprint> footprints,
+                                 std::span<const mapping::Footprint>,
+                                 const levelset::Progress& progress) {
+    std::vector<mapping::Patch> patches;
+    for (std::size_t i = 0; i < footprints.size(); ++i) {
+      mapping::PatchOptions now = options;
+      now.spacing *= sites[i].scale;
+      now.mirror = true;
+      levelset::report(progress, static_cast<double>(i) / static_cast<double>(footprints.size()),
+                       "scatter");
+      patches.push_back(
+          mapping::makePatch(base, footprints[i].corners, footprints[i].height, now).patch);
+    }
+    return patches;
+  };
+  return std::make_shared<const PatchRecipe>(std::move(recipe));
+}
+
 Value scatter(Invocation& in) {
   const mapping::ScatterOptions options = scatterOptions(in);
   const bool isAuto = in.text("height") == "auto";
@@ -81,6 +111,7 @@ Value scatter(Invocation& in) {
   }
   PatchValue value;
   value.patches = std::move(result.patches);
+  value.recipe = recipeOf(result.sites, options.patch);
   if (isAuto) {
     value.atHeight = [base = in.band(), sites = std::move(result.sites), patch = options.patch](
                          double h) { return mapping::makePatches(base, sites, h, patch); };

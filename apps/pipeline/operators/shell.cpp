@@ -40,11 +40,12 @@ mapping::ShellOptions shellOptions(const Invocation& in, const mapping::Patch& p
           .progress = in.progress};
 }
 
-void unfoldPatches(Invocation& in, ImprovedPatches& improved, double sink) {
+void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
+                   double sink) {
   mapping::ShellFolds before, after;
   before.leastJacobian = after.leastJacobian = HUGE_VAL;
   for (mapping::Patch& patch : improved.patches) {
-    mapping::Unfolding result = mapping::unfold(in.band(0), patch, shellOptions(in, patch, sink));
+    mapping::Unfolding result = mapping::unfold(base, patch, shellOptions(in, patch, sink));
     improved.figures["unfold"].push_back({{"before", foldsJson(result.before)},
                                           {"after", foldsJson(result.after)},
                                           {"iterations", result.iterations},
@@ -71,7 +72,8 @@ void unfoldPatches(Invocation& in, ImprovedPatches& improved, double sink) {
   }
 }
 
-void relaxPatches(Invocation& in, ImprovedPatches& improved, double sink, const V3d& textureSize) {
+void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
+                  double sink, const V3d& textureSize) {
   double before = 0, after = 0;
   for (mapping::Patch& patch : improved.patches) {
     mapping::ShellOptions options = shellOptions(in, patch, sink);
@@ -81,7 +83,7 @@ void relaxPatches(Invocation& in, ImprovedPatches& improved, double sink, const 
       continue;
     }
     if (in.text("relax") == "texture") options.proportions = textureSize;
-    mapping::DistortionGain result = mapping::minimiseDistortion(in.band(0), patch, options);
+    mapping::DistortionGain result = mapping::minimiseDistortion(base, patch, options);
     improved.figures["relax"].push_back({{"before", energyJson(result.before)},
                                          {"after", energyJson(result.after)},
                                          {"iterations", result.iterations},
@@ -150,7 +152,7 @@ Value folds(Invocation& in) {
   const double sink = in.length("sink");
   const double voxel = in.given("voxel") ? in.length("voxel") : in.band(0).voxelSize();
   // Relaxed towards the patch's own proportions, since there is no texture.
-  ImprovedPatches improved = improvedPatches(in, onto.patches, sink, V3d(1));
+  ImprovedPatches improved = improvedPatches(in, in.band(0), onto.patches, sink, V3d(1));
   JudgedMap judged = judgeMap(in, improved.patches.front(), sink, voxel);
   nlohmann::ordered_json json = std::move(improved.figures);
   json["certificate"] = certificateJson(judged.certificate);
@@ -209,12 +211,13 @@ void validateShell(const Invocation& in) {
         fmt::format("{}: --sides goes with --unfold or --relax; leave it out", in.op().name));
 }
 
-ImprovedPatches improvedPatches(Invocation& in, std::vector<mapping::Patch> patches, double sink,
+ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base,
+                                std::vector<mapping::Patch> patches, double sink,
                                 const V3d& textureSize) {
-  for (const mapping::Patch& patch : patches) mapping::requirePatchOn(in.band(0), patch);
+  for (const mapping::Patch& patch : patches) mapping::requirePatchOn(base, patch);
   ImprovedPatches improved{.patches = std::move(patches)};
-  if (in.flag("unfold")) unfoldPatches(in, improved, sink);
-  if (in.text("relax") != "none") relaxPatches(in, improved, sink, textureSize);
+  if (in.flag("unfold")) unfoldPatches(in, base, improved, sink);
+  if (in.text("relax") != "none") relaxPatches(in, base, improved, sink, textureSize);
   return improved;
 }
 

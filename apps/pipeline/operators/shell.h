@@ -22,10 +22,11 @@ struct ImprovedPatches {
   nlohmann::ordered_json figures = nlohmann::ordered_json::object();
 };
 
-/// What --unfold and --relax make of patches of the first operand, told in the notes.
+/// What --unfold and --relax make of patches of a base, told in the notes.
 /// @param sink  world units; @param textureSize  of the box that is the unit cube
-[[nodiscard]] ImprovedPatches improvedPatches(Invocation& in, std::vector<mapping::Patch> patches,
-                                              double sink, const Imath::V3d& textureSize);
+[[nodiscard]] ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base,
+                                              std::vector<mapping::Patch> patches, double sink,
+                                              const Imath::V3d& textureSize);
 
 [[nodiscard]] nlohmann::ordered_json certificateJson(const mapping::FoldCertificate& certificate);
 

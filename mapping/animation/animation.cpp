@@ -1,0 +1,423 @@
+#include "mapping/animation/animation.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "levelset/error.h"
+#include "mapping/animation/patch_path.h"
+#include "mapping/patches/patch_levels.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using levelset::NarrowBand;
+using levelset::UsageError;
+
+constexpr const char* kAnimation = "animate";
+using Footprints = std::vector<Footprint>;
+
+std::string sentenceAt(std::size_t frame, std::string sentence) {
+  const std::string own = std::string(kAnimation) + ": ";
+  if (sentence.starts_with(own)) sentence.erase(0, own.size());
+  return fmt::format("{}: frame {}: {}", kAnimation, frame, sentence);
+}
+
+/// Calls, and tells the frame in what is refused.
+template <typename Call>
+auto atFrame(std::size_t frame, const Call& call) {
+  try {
+    return call();
+  } catch (const InvalidInput& error) {
+    throw InvalidInput(sentenceAt(frame, error.what()));
+  } catch (const levelset::NumericalError& error) {
+    throw levelset::NumericalError(sentenceAt(frame, error.what()));
+  }
+}
+
+bool isSameLevel(const ParticleLevel& a, const ParticleLevel& b) {
+  return a.columns == b.columns && a.rows == b.rows && a.w == b.w && a.height == b.height &&
+         a.positions == b.positions && a.rim == b.rim;
+}
+
+bool isSamePatch(const Patch& a, const Patch& b) {
+  return a.corners == b.corners && a.height == b.height && a.mirrored == b.mirrored &&
+         std::equal(a.levels.begin(), a.levels.end(), b.levels.begin(), b.levels.end(),
+                    isSameLevel);
+}
+
+void checkKeys(const std::vector<AnimationKey>& keys, const AnimationOptions& options) {
+  if (options.frames < 1) throw UsageError(fmt::format("{}: there are no frames", kAnimation));
+  if (keys.empty() || keys.front().frame != 0)
+    throw UsageError(fmt::format("{}: the first patch stands at frame 0", kAnimation));
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    if (keys[k].patches.empty())
+      throw UsageError(fmt::format("{}: patch {} holds no patches", kAnimation, k + 1));
+    if (keys[k].frame >= options.frames || (k > 0 && keys[k].frame <= keys[k - 1].frame)) {
+      throw UsageError(fmt::format(
+          "{}: patch {} stands at frame {}, which is not between the frame of the patch before "
+          "and the last, {}; give rising frames, or more of them",
+          kAnimation, k + 1, keys[k].frame, options.frames - 1));
+    }
+    if (keys.size() == 1) continue;
+    if (keys[k].outlines.empty()) {
+      throw UsageError(fmt::format(
+          "{}: patch {} goes all around its axis and cannot be moved to another place; leave the "
+          "other patches out",
+          kAnimation, k + 1));
+    }
+    if (keys[k].outlines.size() != keys.front().outlines.size()) {
+      throw UsageError(
+          fmt::format("{}: patch {} is a set of {}, the first of {}; each must have "
+                      "one to go to",
+                      kAnimation, k + 1, keys[k].outlines.size(), keys.front().outlines.size()));
+    }
+    if (keys[k].patches.front().mirrored != keys.front().patches.front().mirrored) {
+      throw UsageError(
+          fmt::format("{}: patch {} is mirrored and the first is not, or the other way "
+                      "round; no way leads from one to the other",
+                      kAnimation, k + 1));
+    }
+  }
+}
+
+/// The bases of all frames, one held at a time beside the first.
+class Bases {
+ public:
+  Bases(const NarrowBand& first, const BandFrames& frames)
+      : first_(first),
+        frames_(frames),
+        now_(first),
+        hash_(first.contentHash()),
+        firstHash_(hash_) {}
+
+  const NarrowBand& at(std::size_t frame) {
+    if (frame == frame_) return now_;
+    if (!frames_) return now_;
+    now_ = NarrowBand();  // before the next is read
+    now_ = frame == 0 ? first_ : atFrame(frame, [&] { return frames_(frame); });
+    hash_ = frame == 0 ? firstHash_ : now_.contentHash();
+    frame_ = frame;
+    return now_;
+  }
+  [[nodiscard]] bool areMoving() const { return static_cast<bool>(frames_); }
+  /// Of the base that was asked for last.
+  [[nodiscard]] std::uint64_t hash() const { return hash_; }
+
+ private:
+  const NarrowBand& first_;
+  const BandFrames& frames_;
+  NarrowBand now_;
+  std::uint64_t hash_, firstHash_;
+  std::size_t frame_ = 0;
+};
+
+class Animation {
+ public:
+  Animation(const NarrowBand& base, const std::vector<AnimationKey>& keys,
+            const AnimationOptions& options, const std::function<void(const PatchFrame&)>& visit)
+      : keys_(keys), options_(options), visit_(visit), bases_(base, options.bases) {}
+
+  AnimationReport run() {
+    for (std::size_t k = 0; k < keys_.size(); ++k) {
+      key_ = k;
+      const std::size_t begin = keys_[k].frame;
+      const std::size_t end = k + 1 < keys_.size() ? keys_[k + 1].frame : options_.frames;
+      if (k + 1 < keys_.size()) carryBackwards(begin, end);
+      paths_.clear();
+      for (std::size_t f = begin; f < end; ++f) playFrame(f, begin, end);
+    }
+    return std::move(report_);
+  }
+
+ private:
+  [[nodiscard]] Footprints footprintsOf(const NarrowBand& base, std::size_t key) const {
+    Footprints all;
+    for (const PatchOutline& outline : keys_[key].outlines) {
+      levelset::report(options_.progress, done_, kAnimation);
+      Footprint one = footprintOf(base, outline);
+      if (options_.carry == CarryRule::Rigid || keys_.size() > 1)
+        one = withReach(base, std::move(one), outline.direction.has_value());
+      if (options_.carry == CarryRule::Rigid && !one.reach) {
+        throw InvalidInput(fmt::format(
+            "{}: no straight way leads from the centre {} of the patch to each of its corners; "
+            "carry the corners by themselves, or take a smaller patch",
+            kAnimation, pointAsOption(one.centre)));
+      }
+      all.push_back(std::move(one));
+    }
+    return all;
+  }
+
+  [[nodiscard]] Footprints carryAll(const NarrowBand& base, const Footprints& from) const {
+    Footprints moved;
+    for (const Footprint& one : from) {
+      levelset::report(options_.progress, done_, kAnimation);
+      moved.push_back(carryFootprint(base, one, options_.carry));
+      // Once it stands still, it shall do so to the bit.
+      if (farthestWay(one, moved.back()) <= 1e-6 * base.voxelSize()) moved.back() = one;
+    }
+    return moved;
+  }
+
+  /// What the next key's patches were on the bases before it.
+  void carryBackwards(std::size_t begin, std::size_t end) {
+    done_ = static_cast<double>(begin) / static_cast<double>(options_.frames);
+    later_.assign(end - begin, {});
+    Footprints now = atFrame(end, [&] { return footprintsOf(bases_.at(end), key_ + 1); });
+    const Footprints first = now;
+    std::uint64_t hash = bases_.hash();
+    for (std::size_t f = end; f > begin; --f) {
+      const NarrowBand& base = bases_.at(f);
+      const Footprints before = now;
+      if (bases_.hash() != hash) now = atFrame(f, [&] { return carryAll(base, now); });
+      hash = bases_.hash();
+      if (f < end) judgeDrift(f, before, now, first);
+      if (f < end) later_[f - begin] = now;
+    }
+  }
+
+  void playFrame(std::size_t f, std::size_t begin, std::size_t end) {
+    done_ = static_cast<double>(f) / static_cast<double>(options_.frames);
+    const double next = static_cast<double>(f + 1) / static_cast<double>(options_.frames);
+    levelset::report(options_.progress, done_, kAnimation);
+    const bool isFirst = report_.frames.empty();
+    const NarrowBand& base = bases_.at(f);
+    const bool isSameBase = !isFirst && bases_.hash() == baseHash_;
+    baseHash_ = bases_.hash();
+    FrameReport report;
+    report.frame = f;
+    bool isUnchanged = isSameBase;
+    const Footprints shownBefore = shown_;
+
+    // === Where the patches stand
+    if (f == begin) {
+      own_ = atFrame(f, [&] { return footprintsOf(base, key_); });
+      first_ = own_;
+      if (f == 0) origins_ = own_;
+      shown_ = own_;
+      const std::vector<Patch>& given = keys_[key_].patches;
+      const bool isSame =
+          std::equal(given.begin(), given.end(), patches_.begin(), patches_.end(), isSamePatch);
+      isUnchanged = isUnchanged && isSame;
+      if (!isSame) patches_ = given;
+      // Where there is no way, no frame shall be made in vain.
+      if (!bases_.areMoving() && key_ + 1 < keys_.size() && begin + 1 < end)
+        (void)atFrame(f + 1, [&] { return onTheWay(f + 1, begin, end); });
+    } else {
+      if (!isSameBase) {
+        const Footprints before = own_;
+        own_ = atFrame(f, [&] { return carryAll(base, own_); });
+        judgeDrift(f, before, own_, first_);
+      }
+      shown_ = key_ + 1 < keys_.size() ? atFrame(f, [&] { return onTheWay(f, begin, end); }) : own_;
+      isUnchanged = isUnchanged && shown_ == shownBefore;
+      if (!isUnchanged) {
+        patches_ = atFrame(f, [&] {
+          return remade(
+              base, levelset::subProgress(options_.progress, done_, done_ + 0.2 * (next - done_)));
+        });
+        report.isRemade = true;
+        ++report_.patchesMade;
+      }
+    }
+    report.drift = worstDrift(first_, own_);
+    for (std::size_t i = 0; i < shown_.size(); ++i) {
+      report.corners.push_back(shown_[i].corners);
+      if (i < shownBefore.size())
+        report.farthestWay = std::max(report.farthestWay, farthestWay(shownBefore[i], shown_[i]));
+    }
+    report_.frames.push_back(std::move(report));
+    visit_(
+        {.index = f,
+         .base = base,
+         .patches = patches_,
+         .isUnchanged = isUnchanged,
+         .progress = levelset::subProgress(options_.progress, done_ + 0.2 * (next - done_), next)});
+    if (isUnchanged) ++report_.reused;
+  }
+
+  [[nodiscard]] Footprints onTheWay(std::size_t f, std::size_t begin, std::size_t end) {
+    const NarrowBand& base = bases_.at(f);
+    const double part = static_cast<double>(f - begin) / static_cast<double>(end - begin);
+    const bool areNew = paths_.size() != own_.size();
+    if (areNew || pathHash_ != bases_.hash()) {
+      std::vector<PatchPath> paths;
+      for (std::size_t i = 0; i < own_.size(); ++i) {
+        levelset::report(options_.progress, done_, kAnimation);
+        Footprint from = own_[i], to = later_[f - begin][i];
+        if (!from.reach) from = withReach(base, std::move(from));
+        if (!to.reach) to = withReach(base, std::move(to));
+        paths.emplace_back(base, std::move(from), std::move(to), options_.carry,
+                           areNew ? std::vector<V3d>{} : paths_[i].centreWay());
+        tellOfPath(f, paths.back(), areNew ? nullptr : &paths_[i]);
+      }
+      paths_ = std::move(paths);
+      pathHash_ = bases_.hash();
+    }
+    Footprints result;
+    for (const PatchPath& path : paths_) result.push_back(path.at(part));
+    return result;
+  }
+
+  void tellOfPath(std::size_t f, const PatchPath& path, const PatchPath* before) {
+    if (!path.isAlike() && !(before && !before->isAlike())) {
+      report_.warnings.push_back(fmt::format(
+          "{}: frame {}: the corners' ways could not be laid beside that of the patch's centre; "
+          "each takes its own shortest, and where these lead around different sides the patch is "
+          "stretched; try --carry rigid, or a patch between the two",
+          kAnimation, f));
+    }
+    constexpr double kMostTurn = 1;  // radians: sides shrink by the cosine of half of it
+    if (!before && options_.carry == CarryRule::Corners && std::abs(path.turn()) > kMostTurn)
+      report_.warnings.push_back(fmt::format(
+          "{}: frame {}: the patch turns by {:.0f} degrees on its way, and shrinks in between as "
+          "its corners go straight; --carry rigid turns it as a whole",
+          kAnimation, f, std::abs(path.turn()) * 180 / std::acos(-1.0)));
+    if (path.hasJumped())
+      report_.warnings.push_back(
+          fmt::format("{}: frame {}: the way from patch to patch no longer runs as on the frame "
+                      "before, and may have jumped",
+                      kAnimation, f));
+  }
+
+  [[nodiscard]] std::vector<Patch> remade(const NarrowBand& base,
+                                          const levelset::Progress& progress) const {
+    if (!options_.make)
+      throw UsageError(fmt::format("{}: nothing tells how to make its patches again", kAnimation));
+    std::vector<Patch> patches;
+    try {
+      patches = options_.make(base, shown_, origins_, progress);
+    } catch (const UsageError& error) {  // its options were right for a patch that has moved since
+      throw InvalidInput(error.what());
+    }
+    const std::vector<Patch>& first = keys_.front().patches;
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      const Patch& patch = patches[i];
+      if (patch.mirrored == first[std::min(i, first.size() - 1)].mirrored) continue;
+      throw InvalidInput(fmt::format(
+          "{}: the patch has turned over, its corners {}, {}, {} and {} run the other way round; "
+          "carry it with --carry rigid, or end before",
+          kAnimation, pointAsOption(patch.corners[0]), pointAsOption(patch.corners[1]),
+          pointAsOption(patch.corners[2]), pointAsOption(patch.corners[3])));
+    }
+    return patches;
+  }
+
+  [[nodiscard]] static Drift worstDrift(const Footprints& first, const Footprints& now) {
+    Drift worst;
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      const Drift drift = driftBetween(first[i], now[i]);
+      if (drift.factor() > worst.factor()) worst = drift;
+    }
+    return worst;
+  }
+
+  /// Warns once a key of each.
+  void judgeDrift(std::size_t f, const Footprints& before, const Footprints& now,
+                  const Footprints& first) {
+    const Drift drift = worstDrift(first, now);
+    if (drift.factor() > options_.driftWarning && warnedOfDrift_ != key_ + 1) {
+      warnedOfDrift_ = key_ + 1;
+      report_.warnings.push_back(fmt::format(
+          "{}: frame {}: sides or diagonals of the patch are {:.3g} to {:.3g} times as long as at "
+          "first; {}",
+          kAnimation, f, drift.least, drift.most,
+          options_.carry == CarryRule::Corners ? "--carry rigid keeps its shape"
+                                               : "the surface bends under it"));
+    }
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      const double way = farthestWay(before[i], now[i]);
+      const double size = (before[i].corners[2] - before[i].corners[0]).length();
+      if (!(way > 0.5 * size) || warnedOfWay_ == key_ + 1) continue;
+      warnedOfWay_ = key_ + 1;
+      report_.warnings.push_back(fmt::format(
+          "{}: frame {}: a corner went {:.4g} to the nearest surface, over half of the patch's "
+          "diagonal; give frames in between, or look whether it is still the same part",
+          kAnimation, f, way));
+    }
+  }
+
+  const std::vector<AnimationKey>& keys_;
+  const AnimationOptions& options_;
+  const std::function<void(const PatchFrame&)>& visit_;
+  Bases bases_;
+  AnimationReport report_;
+  std::size_t key_ = 0, warnedOfDrift_ = 0, warnedOfWay_ = 0;
+  double done_ = 0;
+  std::uint64_t baseHash_ = 0, pathHash_ = 0;
+  Footprints origins_;
+  Footprints own_, first_,
+      shown_;                      ///< of the last key: carried, as it was; and what is mapped onto
+  std::vector<Footprints> later_;  ///< of the next key on the bases before it
+  std::vector<PatchPath> paths_;
+  std::vector<Patch> patches_;
+};
+
+}  // namespace
+
+PatchOptions optionsLike(const Patch& patch) {
+  const ParticleLevel& surface = patch.levels.front();
+  const bool areAlike =
+      std::all_of(patch.levels.begin(), patch.levels.end(), [&](const ParticleLevel& level) {
+        return level.columns == surface.columns && level.rows == surface.rows;
+      });
+  PatchOptions options{.levels = std::max<std::size_t>(2, patch.levels.size()),
+                       .scheme = areAlike ? LevelScheme::Conforming : LevelScheme::Reduced,
+                       .spacing = patch.spacing,
+                       .mirror = true};
+  if (areAlike && surface.columns > 3 && surface.rows > 3)
+    options.cells = {surface.columns - 1, surface.rows - 1};
+  return options;
+}
+
+AnimationReport animatePatches(const NarrowBand& base, const std::vector<AnimationKey>& keys,
+                               const AnimationOptions& options,
+                               const std::function<void(const PatchFrame&)>& visit) {
+  checkKeys(keys, options);
+  return Animation(base, keys, options, visit).run();
+}
+
+AnimationReport animateTexture(const NarrowBand& base, const NarrowBand& texture,
+                               const std::vector<AnimationKey>& keys,
+                               const TextureAnimationOptions& options, const FrameWriter& write) {
+  std::optional<TextureResult> result;
+  std::uint64_t textureHash = 0;
+  std::size_t reused = 0;
+  double finest = HUGE_VAL, coarsest = 0;
+  AnimationReport report = animatePatches(base, keys, options.animation, [&](const PatchFrame& f) {
+    const NarrowBand now = f.index == 0 || !options.textures ? texture : options.textures(f.index);
+    const std::uint64_t hash = !options.textures && f.index > 0 ? textureHash : now.contentHash();
+    const bool isReused = result && f.isUnchanged && hash == textureHash;
+    textureHash = hash;
+    if (isReused) {
+      ++reused;
+    } else {
+      result.reset();  // before the next takes memory
+      TextureOptions mapping = options.texture;
+      mapping.progress = f.progress;
+      result = atFrame(f.index, [&] {
+        return mapTexture(
+            f.base, now, options.improve ? options.improve(f.base, f.patches) : f.patches, mapping);
+      });
+      finest = std::min(finest, result->report.voxelSize);
+      coarsest = std::max(coarsest, result->report.voxelSize);
+    }
+    write(f.index, *result, isReused);
+  });
+  report.reused = reused;
+  if (coarsest > finest)
+    report.notes.push_back(
+        fmt::format("voxels of {:.4g} to {:.4g}, as the texture is squeezed from frame to frame; a "
+                    "voxel size that is given holds for all",
+                    finest, coarsest));
+  return report;
+}
+
+}  // namespace mapping

@@ -1,0 +1,183 @@
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "tests/support/shell.h"
+
+namespace animate_test {
+
+using Json = nlohmann::json;
+
+/// A ball, a ring, and two patches, of one voxel size.
+const std::string kScene =
+    "sphere --radius 5 --voxel 0.5 --as ball ! torus --radius 2 --tube 0.8 --voxel 0.5 --as ring "
+    "! patch @ball --at 0,0,5 --size 4,4 --height 1.5 --levels 2 --spacing 1 --particles "
+    "conforming --as here "
+    "! patch @ball --at 5,0,0 --size 3,3 --rotate -90 --height 1 --levels 2 --spacing 1 "
+    "--particles conforming "
+    "--as there ! ";
+
+class Animate : public support::ShellTest {
+ protected:
+  Json reportOf(const std::string& chain) {
+    const auto outcome = levelsmith("--quiet --report run.json " + chain);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    const Json report = Json::parse(support::slurp(folder_ / "run.json"), nullptr, false);
+    return report["steps"].back()["details"];
+  }
+  std::string bytes(const std::string& file) { return support::slurp(folder_ / file); }
+};
+
+TEST_F(Animate, BeginsAndEndsAsTheTextureOnItsPatches) {
+  const Json details =
+      reportOf(kScene +
+               "texture @ball @ring @here --voxel 0.5 ! write first.vdb "
+               "! texture @ball @ring @there --voxel 0.5 ! write last.vdb "
+               "! animate @ball @ring @here @there --frames 3 --voxel 0.5 --out f_#.vdb");
+  EXPECT_EQ(bytes("f_0.vdb"), bytes("first.vdb"));
+  EXPECT_EQ(bytes("f_2.vdb"), bytes("last.vdb"));
+  EXPECT_NE(bytes("f_1.vdb"), bytes("f_0.vdb"));
+  EXPECT_EQ(details["frames"], 3);
+  EXPECT_EQ(details["reused"], 0);
+  EXPECT_EQ(details["patches_made"], 1);
+  // Half way along the great circle between the two corners.
+  EXPECT_NEAR(details["frame"][1]["corners"][0][1].get<double>(), -2.36, 0.02);
+}
+
+TEST_F(Animate, CarriesThePatchOnBasesFromFiles) {
+  ASSERT_EQ(levelsmith("sphere --radius 5.2 --voxel 0.5 ! write base_01.vdb ! write base_02.vdb "
+                       "! sphere --radius 5.4 --voxel 0.5 ! write base_03.vdb")
+                .code,
+            0);
+  for (const std::string rule : {"corners", "rigid"}) {
+    const Json details = reportOf(
+        kScene + "animate @ball @ring @here --frames 4 --base-frames base_##.vdb --carry " + rule +
+        " --voxel 0.5 --out " + rule + "_#.ply");
+    EXPECT_EQ(details["reused"], 1) << "base 2 is base 1";
+    EXPECT_EQ(details["patches_made"], 2);
+    EXPECT_EQ(bytes(rule + "_1.ply"), bytes(rule + "_2.ply"));
+    EXPECT_NE(bytes(rule + "_2.ply"), bytes(rule + "_3.ply"));
+    EXPECT_NEAR(details["frame"][3]["drift"][1].get<double>(), rule == "rigid" ? 1 : 5.4 / 5, 0.01);
+  }
+  // Both together: the other patch stands on the last base.
+  const Json both =
+      reportOf(kScene +
+               "read base_03.vdb --as last ! patch @last --at 5.4,0,0 --size 3,3 --rotate -90 "
+               "--height 1 --levels 2 --spacing 1 --particles conforming --as goal "
+               "! texture @last @ring @goal --voxel 0.5 ! write goal.vdb "
+               "! animate @ball @ring @here @goal --frames 4 --base-frames base_##.vdb --voxel 0.5 "
+               "--out both_#.vdb");
+  EXPECT_EQ(both["patches_made"], 2);
+  EXPECT_EQ(bytes("both_3.vdb"), bytes("goal.vdb"));
+}
+
+TEST_F(Animate, PlaysTexturesAndReusesWhatStays) {
+  ASSERT_EQ(levelsmith("torus --radius 2 --tube 0.8 --voxel 0.5 ! write ring_1.vdb "
+                       "! torus --radius 2 --tube 0.6 --voxel 0.5 ! write ring_2.vdb")
+                .code,
+            0);
+  const Json details =
+      reportOf(kScene +
+               "animate @ball @ring @here --frames 3 --texture-frames ring_#.vdb --voxel 0.5 --out "
+               "f_#.vdb");
+  EXPECT_EQ(details["reused"], 1);
+  EXPECT_EQ(details["patches_made"], 0);
+  EXPECT_EQ(bytes("f_0.vdb"), bytes("f_1.vdb"));
+  EXPECT_NE(bytes("f_2.vdb"), bytes("f_1.vdb"));
+}
+
+TEST_F(Animate, MovesMeshesDecalsGridsAndPatchesFromFiles) {
+  const std::string tail = " --frames 3 --voxel 0.5 --out f_#.vdb";
+  reportOf(kScene +
+           "mesh @ring --as m ! animate @ball @m @here @there --map mesh --frames 3 --out "
+           "m_#.ply");
+  EXPECT_NE(bytes("m_0.ply"), bytes("m_1.ply"));
+  const Json decals = reportOf(kScene +
+                               "decal @ball --at 0,0,5 --direction 1,0,0 --radius 2 --height 1 "
+                               "--levels 2 --spacing 1 --as d ! decal "
+                               "@ball --at 5,0,0 --direction 0,1,0 --radius 1.5 --height 1 "
+                               "--levels 2 --spacing 1 --as e ! animate "
+                               "@ball "
+                               "@ring @d @e" +
+                               tail);
+  EXPECT_EQ(decals["patches_made"], 1);
+  EXPECT_REFUSED(levelsmith(kScene +
+                            "decal @ball --at 0,0,5 --direction 1,0,0 --radius 2 --height "
+                            "1 --as d ! animate @ball @ring @d --carry corners" +
+                            tail),
+                 2, "leave --carry out");
+  const Json tiles =
+      reportOf(kScene +
+               "patch-grid @ball --count 2,1 --at 0,0,5 --size 4,2 --height 1 "
+               "--levels 2 --spacing 1 --as g ! patch-grid "
+               "@ball --count 2,1 --at 0.5,0,5 --size 4,2 --height 1 --levels 2 --spacing 1 "
+               "--as h ! animate @ball @ring "
+               "@g @h" +
+               tail);
+  EXPECT_EQ(tiles["patches_made"], 1);
+  ASSERT_EQ(levelsmith(kScene + "write @here here.patch ! write @there there.patch").code, 0);
+  const auto outcome = levelsmith(
+      kScene + "read here.patch --as p ! read there.patch --as q ! animate @ball @ring @p @q" +
+      tail);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("not in its file"), std::string::npos) << outcome.err;
+}
+
+TEST_F(Animate, RefusesBeforeAnythingIsComputed) {
+  const std::string head = kScene + "animate @ball @ring @here ";
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --out frame.vdb"), 2, "put # where the number goes");
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --out f_#.txt"), 2, "names no row of such files");
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --out no/where_#.vdb"), 6, "where_0.vdb");
+  EXPECT_REFUSED(levelsmith(head + "--frames 0 --out f_#.vdb"), 2, "--frames");
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --base-frames b.vdb --out f_#.vdb"), 2,
+                 "--base-frames");
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --base-first 2 --out f_#.vdb"), 2,
+                 "goes with --base-frames");
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --base-frames f_#.vdb --out f_#.vdb"), 2,
+                 "would write over 'f_1.vdb'");
+  EXPECT_REFUSED(levelsmith(head + "@there --frames 1 --out f_#.vdb"), 2, "do not fit 1 frames");
+  EXPECT_REFUSED(levelsmith(head + "@there --frames 5 --key-frames 0,x --out f_#.vdb"), 2,
+                 "--key-frames");
+  EXPECT_REFUSED(levelsmith(head + "@there --frames 5 --key-frames 0 --out f_#.vdb"), 2,
+                 "1 frames for 2 patches");
+  EXPECT_REFUSED(levelsmith(head + "@there --frames 5 --key-frames 0,5 --out f_#.vdb"), 2,
+                 "would stand at frame 5");
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --drift 0.5 --out f_#.vdb"), 2, "--drift");
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --carve --alone --out f_#.vdb"), 2,
+                 "animate: --carve and --alone");
+  // What only the run can find: the file of a frame, before the first is made.
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --base-frames b_#.vdb --out f_#.vdb"), 6, "b_1.vdb");
+  EXPECT_REFUSED(
+      levelsmith(kScene + "patch @ball --corners \"-2,-2,4 2,-2,4 2,2,4 -2,2,4\" --side0 0,-3,4 "
+                          "--height 1 --as s ! animate @ball @ring @s @there --frames 3 --out "
+                          "f_#.vdb"),
+      2, "--side0");
+  EXPECT_EQ(fileCount(), 0u);
+}
+
+TEST_F(Animate, TellsTheFrameAndLeavesTheFramesBefore) {
+  ASSERT_EQ(levelsmith("sphere --radius 5.1 --voxel 0.5 ! write base_1.vdb ! sphere --radius 1 "
+                       "--center 60,0,0 --voxel 0.5 ! write base_2.vdb")
+                .code,
+            0);
+  EXPECT_REFUSED(
+      levelsmith(kScene + "animate @ball @ring @here --frames 3 --base-frames base_#.vdb "
+                          "--voxel 0.5 --out f_#.vdb"),
+      3, "frame 2");
+  EXPECT_EQ(fileCount(), 4u);  // two bases, two frames
+  EXPECT_FALSE(bytes("f_1.vdb").empty());
+}
+
+TEST_F(Animate, DryRunPlansAndWritesNothing) {
+  const auto outcome = levelsmith("--dry-run " + kScene +
+                                  "animate @ball @ring @here @there --frames 9 --base-frames "
+                                  "not_there_#.vdb --out f_#.vdb");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(fileCount(), 0u);
+  EXPECT_REFUSED(levelsmith("--max-memory 100k " + kScene +
+                            "animate @ball @ring @here --frames 9 --out f_#.vdb"),
+                 4, "");
+}
+
+}  // namespace animate_test
