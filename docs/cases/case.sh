@@ -30,11 +30,11 @@ picture() {  # picture NAME OPTIONS...: of NAME.vdb
 }
 
 sheet() {  # sheet NAME COLUMNS PICTURE=TITLE...
-  "${PYTHON:-/usr/bin/python3}" "$here/figures.py" sheet "$out" "$here/$@"
+  "${PYTHON:-python3}" "$here/figures.py" sheet "$out" "$here/$@"
 }
 
 row() {  # row NAME FIELD... "text": one line of the table from NAME's report
-  "${PYTHON:-/usr/bin/python3}" "$here/figures.py" row "$out" "$@"
+  "${PYTHON:-python3}" "$here/figures.py" row "$out" "$@"
 }
 
 bunny() {  # bunny VOXELS: lying on its side of the base, as scanned

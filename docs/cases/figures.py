@@ -1,4 +1,5 @@
-"""Sheets of pictures and rows of tables for the cases: figures.py sheet|row FOLDER ..."""
+"""Pictures and tables of the docs:
+figures.py sheet FOLDER TARGET COLUMNS NAME=TITLE..., row FOLDER NAME FIELD..., plot CSV TARGET."""
 
 import json
 import sys
@@ -44,5 +45,41 @@ def row(folder, name, *fields):
     print("| " + " | ".join(figure_of(steps, field) for field in fields) + " |")
 
 
+def plot(table, target):
+    """Error against run time from the table that map_error_bench prints, TARGET.png."""
+    import csv
+
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    with open(table) as file:
+        runs = list(csv.DictReader(file))
+    shown = sorted({float(run["points"]) for run in runs})
+    names = {"direct": "direct sum", "fast": "fast sum", "shell": "tetrahedra"}
+    figure, axes = pyplot.subplots(1, 3, figsize=(11, 3.6), sharey=True)
+    for axis, decade in zip(axes, (1e6, 1e7, 1e8)):
+        points = min(shown, key=lambda each: abs(each - decade))
+        for colour, (name, title) in zip(("C3", "C0", "C2"), names.items()):
+            some = [run for run in runs if run["map"] == name and abs(float(run["points"]) / points - 1) < 0.1]
+            some.sort(key=lambda run: int(run["particles"]))
+            times = [float(run["mapping_s"]) for run in some]
+            errors = [float(run["error_99"]) for run in some]
+            axis.loglog(times, errors, "-", color=colour, label=title)
+            for run, time, error in zip(some, times, errors):
+                sampled = run["sampled"] == "1"
+                axis.plot(time, error, "o", color=colour, fillstyle="none" if sampled else "full")
+                axis.annotate(f"{int(run['particles']):.0e}".replace("e+0", "e"), (time, error), fontsize=7,
+                              textcoords="offset points", xytext=(4, 4))
+        axis.set_title(f"{points:.2g} grid points", fontsize=9)
+        axis.set_xlabel("CPU seconds, one thread")
+        axis.grid(True, which="major", alpha=0.3)
+    axes[0].set_ylabel("error, texture voxels (99 % below)")
+    axes[0].legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(f"{target}.png", dpi=100, metadata={"Software": None})
+
+
 if __name__ == "__main__":
-    {"sheet": sheet, "row": row}[sys.argv[1]](*sys.argv[2:])
+    {"sheet": sheet, "row": row, "plot": plot}[sys.argv[1]](*sys.argv[2:])

@@ -16,6 +16,7 @@
 #include "levelset/solids/blend.h"
 #include "levelset/solids/clip.h"
 #include "levelset/solids/csg.h"
+#include "levelset/solids/resample.h"
 #include "mapping/maps/shell_map.h"
 #include "mapping/textures/texture_warp.h"
 
@@ -34,6 +35,9 @@ constexpr double kStretchError = 0.01;
 // Voxels of the result that the texture's band has to reach on each side, so that the high-order
 // interpolant beside the zero set reads nothing but distances.
 constexpr double kBandNeeded = 3;
+// Voxels of the texture for one of the result from which on they are too many: resampled first, its
+// band costs what the result does and not the cube of their ratio.
+constexpr double kCoarser = 6;
 // Share of the map's tolerance that is left to the solution, and the finest that is worth asking
 // for.
 constexpr double kSolveShare = 0.1, kFinestSolve = 1e-10;
@@ -102,12 +106,25 @@ Imath::M44d chooseGrid(const NarrowBand& base, double voxelSize, TextureMerge me
   return result;
 }
 
-/// A texture whose band, once it is warped, still reaches some voxels of the result.
-NarrowBand widen(const NarrowBand& texture, double voxelSize, double minStretch,
-                 const TextureOptions& options) {
-  const double needed = kBandNeeded * voxelSize / (minStretch * texture.voxelSize());
-  if (needed <= texture.halfWidth() * (1 + 1e-6)) return texture;
-  return levelset::redistance(texture,
+/// What a result of coarser voxels can show of a texture, with a band that still reaches some of
+/// them once it is warped.
+/// @param least, most  stretch of texture → patch
+NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least, double most,
+                      const TextureOptions& options) {
+  NarrowBand fitted = texture;
+  const double coarsest = voxelSize / most;  // of the texture's voxels that is still fine enough
+  if (coarsest > kCoarser * texture.voxelSize()) {
+    fitted = levelset::resample(texture, coarsest, {.maxMemory = options.maxMemory});
+    if (fitted.isEmpty()) {
+      throw InvalidInput(
+          fmt::format("{}: on the patch, the texture is smaller than a voxel of {:.6g}; use "
+                      "smaller voxels",
+                      kTexture, voxelSize));
+    }
+  }
+  const double needed = kBandNeeded * voxelSize / (least * fitted.voxelSize());
+  if (needed <= fitted.halfWidth() * (1 + 1e-6)) return fitted;
+  return levelset::redistance(fitted,
                               {.halfWidth = std::ceil(needed), .maxMemory = options.maxMemory});
 }
 
@@ -340,9 +357,12 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
   const double tolerance = solveTolerance(texture, box.size(), options.mapTolerance);
   const std::vector<ChosenMap> maps =
       makeMaps(base, patches, sink, box.size(), tolerance, options, report);
-  double minStretch = HUGE_VAL;
-  for (const ChosenMap& chosen : maps)
-    if (chosen.map) minStretch = std::min(minStretch, chosen.leastStretch());
+  double minStretch = HUGE_VAL, maxStretch = 0;
+  for (const ChosenMap& chosen : maps) {
+    if (!chosen.map) continue;
+    minStretch = std::min(minStretch, chosen.leastStretch());
+    maxStretch = std::max(maxStretch, chosen.distortion.stretch.most);
+  }
   report.voxelSize = chooseVoxelSize(base, texture, minStretch, options);
   requireResult(texture, report.voxelSize, maps, options);
 
@@ -350,8 +370,8 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
   // The shell ends somewhere around the unit cube, so what is outside of a box that was asked for
   // is cut off there, not at the end of the shell.
   const bool isCut = options.map == TextureMap::Shell && options.textureBox;
-  const NarrowBand whole =
-      widen(isCut ? levelset::clip(texture, box) : texture, report.voxelSize, minStretch, options);
+  const NarrowBand whole = fitTexture(isCut ? levelset::clip(texture, box) : texture,
+                                      report.voxelSize, minStretch, maxStretch, options);
   std::vector<NarrowBand> pieces;
   std::size_t operations = 0, ghosts = 0;
   for (std::size_t n = 0; n < patches.size(); ++n) {
