@@ -32,11 +32,12 @@ struct Measurement {
 
 /// The same figures of a triangle mesh, exact for its flat triangles. `components` counts connected
 /// surfaces that face outwards. Volume, centroid and inertia mean something for a closed mesh only;
-/// the curvature is that of its edges, half the length times the angle [Steiner40].
+/// the curvature is that of its edges, half the length times the angle [Steiner40]. Of a mesh with
+/// normals or texture coordinates, vertices at equal positions count as one.
 [[nodiscard]] Measurement measure(const TriMesh& mesh, const Progress& progress = {});
 
 /// Is every edge shared by exactly two triangles that run along it in opposite directions, and
-/// every vertex the centre of one fan?
+/// every vertex the centre of one fan? Vertices at the seams of attributes count as one.
 struct Manifoldness {
   std::size_t boundaryEdges = 0, nonManifoldEdges = 0, misorientedEdges = 0,
               nonManifoldVertices = 0;

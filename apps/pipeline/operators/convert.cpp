@@ -80,13 +80,7 @@ Plan planLevelSet(Invocation& in) {
 levelset::TriMesh meshOfPatches(const std::vector<mapping::Patch>& patches,
                                 mapping::PatchMeshKind kind) {
   levelset::TriMesh all;
-  for (const mapping::Patch& patch : patches) {
-    const auto first = static_cast<std::uint32_t>(all.positions.size());
-    const levelset::TriMesh one = mapping::patchMesh(patch, kind);
-    all.positions.insert(all.positions.end(), one.positions.begin(), one.positions.end());
-    for (const auto& t : one.triangles)
-      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  }
+  for (const mapping::Patch& patch : patches) append(all, mapping::patchMesh(patch, kind));
   return all;
 }
 

@@ -176,6 +176,7 @@ Json fileInfo(const std::string& file, const std::string& format) {
     json["format"] = info.format;
     json["vertices"] = countOrNull(info.vertices);
     json["faces"] = countOrNull(info.faces);
+    if (!info.attributes.empty()) json["attributes"] = info.attributes;
     return json;
   }
   json["grids"] = Json::array();
@@ -205,6 +206,7 @@ Json valueInfo(const Value& value) {
   } else if (value.kind() == Kind::Mesh) {
     json["vertices"] = value.mesh().positions.size();
     json["triangles"] = value.mesh().triangles.size();
+    if (!value.mesh().attributes.isEmpty()) json["attributes"] = describe(value.mesh().attributes);
   } else if (value.kind() == Kind::Field) {
     const levelset::FieldGrid& field = value.field();
     json["values"] = field.isVector() ? "vectors" : "numbers";
