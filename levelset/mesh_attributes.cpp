@@ -18,16 +18,18 @@ void requireList(const std::vector<Vector>& list, std::size_t vertices, const ch
                  const char* action) {
   if (list.empty()) return;
   if (list.size() != vertices) {
-    throw InvalidInput(fmt::format("{}: the mesh has {} {}s for {} vertices; give one to each, or "
-                                   "none",
-                                   action, list.size(), name, vertices));
+    throw InvalidInput(
+        fmt::format("{}: the mesh has {} {}s for {} vertices; give one to each, or "
+                    "none",
+                    action, list.size(), name, vertices));
   }
   for (std::size_t v = 0; v < vertices; ++v)
     for (unsigned axis = 0; axis < Vector::dimensions(); ++axis)
       if (!std::isfinite(list[v][static_cast<int>(axis)])) {
-        throw InvalidInput(fmt::format("{}: the {} of vertex {} holds {}, which is not a number; "
-                                       "repair the mesh, or leave its {}s out",
-                                       action, name, v, list[v][static_cast<int>(axis)], name));
+        throw InvalidInput(
+            fmt::format("{}: the {} of vertex {} holds {}, which is not a number; "
+                        "repair the mesh, or leave its {}s out",
+                        action, name, v, list[v][static_cast<int>(axis)], name));
       }
 }
 
@@ -66,7 +68,8 @@ void requireAttributes(const TriMesh& mesh, const char* action) {
 
 V3d carriedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, double hand) {
   // Divided by the largest number first, so that no product leaves the range of numbers.
-  const double size = std::max({largestPart(slopes[0]), largestPart(slopes[1]), largestPart(slopes[2])});
+  const double size =
+      std::max({largestPart(slopes[0]), largestPart(slopes[1]), largestPart(slopes[2])});
   const double length = largestPart(normal);
   if (!(size > 0) || !(length > 0)) return V3d(0);
   const V3d a = slopes[0] / size, b = slopes[1] / size, c = slopes[2] / size, n = normal / length;

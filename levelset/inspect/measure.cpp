@@ -153,6 +153,7 @@ bool mayHaveSeams(const TriMesh& mesh) {
 // The figures are those of the surface in index space: near to the numbers' origin, so that a part
 // far away in the world measures the same.
 Measurement measure(const NarrowBand& solid, const Progress& progress) {
+  requireSolid(solid, kMeasure);
   report(progress, 0, kMeasure);
   Measurement result;
   result.voxelSize = solid.voxelSize();

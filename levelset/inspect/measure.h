@@ -28,6 +28,7 @@ struct Measurement {
 /// By quadrature on the zero set of the tricubic interpolant: on smooth surfaces better than third
 /// order in the voxel size, along edges second, as a grid shows them. Sums run in a fixed order.
 /// An empty band measures zero.
+/// @throws InvalidInput for an open surface
 [[nodiscard]] Measurement measure(const NarrowBand& solid, const Progress& progress = {});
 
 /// The same figures of a triangle mesh, exact for its flat triangles. `components` counts connected

@@ -1,9 +1,12 @@
 #include "mapping/patches/patch_space.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "levelset/eikonal/redistance.h"
+#include "levelset/error.h"
 #include "levelset/sample.h"
 #include "levelset/solids/resample.h"
 
@@ -47,6 +50,13 @@ NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> border, double h
 NarrowBand sweepPatchSpace(const NarrowBand& base, std::span<const V3d> border, double bulge,
                            double height, const PatchSpaceOptions& options) {
   if (base.halfWidth() * base.voxelSize() >= height + kMarginVoxels * base.voxelSize()) return base;
+  if (base.isOpenSurface()) {
+    throw levelset::InvalidInput(fmt::format(
+        "patch: the band of the open surface reaches {:.6g} voxels and the height {:.6g} needs {}; "
+        "make it wider with surface-band --half-width {}, or lower the patch",
+        base.halfWidth(), height, std::ceil(height / base.voxelSize() + kMarginVoxels),
+        std::ceil(height / base.voxelSize() + kMarginVoxels)));
+  }
   const NarrowBand coarse = coarsen(base, border, height, options);
   const double reach = height + kMarginVoxels * coarse.voxelSize();
   Imath::Box3d box;

@@ -197,7 +197,7 @@ Json valueInfo(const Value& value) {
   Json json;
   json["kind"] = kindName(value.kind());
   json["bounds"] = toJson(value.plan().bounds);
-  if (value.kind() == Kind::Band) {
+  if (value.kind() == Kind::Band || value.kind() == Kind::Surface) {
     json["voxel_size"] = value.band().voxelSize();
     json["half_width"] = value.band().halfWidth();
     json["active_voxels"] = value.band().activeVoxelCount();
@@ -318,7 +318,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
                   .type = ParamType::Text,
                   .doc = "of the file; default: by extension"},
                  jsonParam()},
-      .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface}},
       .operandsOptional = true,
       .flow = Flow::PassesThrough,
       .run = info,

@@ -217,6 +217,7 @@ Plan planTexture(Invocation& in) {
     return plan;
   }
   Plan plan = in.operands[0].plan();
+  plan.kind = Kind::Band;
   const Plan &texture = in.operands[1].plan(), &patch = in.operands[2].plan();
   plan.voxelSize = in.given("voxel") ? in.length("voxel")
                                      : mapping::resultVoxelSize(plan.voxelSize, texture.voxelSize,
@@ -235,6 +236,10 @@ void validateTexture(const Invocation& in) {
     throw UsageError("texture: --carve and --alone exclude each other");
   if (in.flag("allow-folds") && in.flag("skip-folds"))
     throw UsageError("texture: --allow-folds and --skip-folds exclude each other");
+  if (in.operands[0].kind() == Kind::Surface && !mapsMesh(in) && !in.flag("alone"))
+    throw UsageError(
+        "texture: the base is a surface band, which has no inside to join; take the texture "
+        "--alone, or move a mesh with --map mesh");
   if (in.flag("alone") && in.given("blend"))
     throw UsageError("texture: --alone has no seam to blend; leave --blend out");
   const Kind kind = in.operands[1].kind();
@@ -318,7 +323,7 @@ void addTextureOperators(std::vector<Operator>& all) {
            {.name = "skip-folds",
             .type = ParamType::Flag,
             .doc = "of many patches, leave out those whose map folds"}}),
-      .operands = {{Kind::Band}, {Kind::Band, Kind::Mesh}, {Kind::Patch}},
+      .operands = {{Kind::Band, Kind::Surface}, {Kind::Band, Kind::Mesh}, {Kind::Patch}},
       .resultKind = [](const Invocation& in) { return mapsMesh(in) ? Kind::Mesh : Kind::Band; },
       .run = texture,
       .plan = planTexture,

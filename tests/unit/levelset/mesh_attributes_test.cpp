@@ -155,15 +155,17 @@ TEST(MeshAttributes, HalfAGroupIsNone) {
 
 TEST(MeshAttributes, GarbageIsRefusedWithItsPlace) {
   const auto ply = [](const char* type, const char* names, const std::string& values) {
-    std::string header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
-                         "property float y\nproperty float z\n";
+    std::string header =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+        "property float y\nproperty float z\n";
     for (const char* p = names; *p; p += std::strlen(p) + 1)
       header += fmt::format("property {} {}\n", type, p);
     return header + "element face 1\nproperty list uchar int vertex_indices\nend_header\n" +
            "0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 " + values + "\n3 0 1 2\n";
   };
   const std::string nans = ply("float", "nx\0ny\0nz\0", "0 nan 1");
-  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)parse("a.ply", nans); }), "line 15: a normal holds nan");
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)parse("a.ply", nans); }),
+              "line 15: a normal holds nan");
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)parse("a.ply", nans); }), "--bare");
   EXPECT_TRUE(parse("a.ply", nans, {.attributes = false}).attributes.isEmpty());
   EXPECT_SAYS(refusal<InvalidInput>(
@@ -176,12 +178,15 @@ TEST(MeshAttributes, GarbageIsRefusedWithItsPlace) {
   EXPECT_SAYS(refused("vn 0 0 nan\nf 1//1 2//1 3//1\n"), "line 4: a coordinate of a normal is nan");
   EXPECT_SAYS(refused("vn 0 0\nf 1//1 2//1 3//1\n"), "a coordinate of a normal is missing");
   EXPECT_SAYS(refused("vt 0 inf\nf 1/1 2/1 3/1\n"), "a texture coordinate is inf");
-  EXPECT_SAYS(refused("vt 0 0\nvt 1 0\nf 1/1 2/2 3/3\n"), "line 6: a face names texture coordinate 3 of 2");
+  EXPECT_SAYS(refused("vt 0 0\nvt 1 0\nf 1/1 2/2 3/3\n"),
+              "line 6: a face names texture coordinate 3 of 2");
   EXPECT_SAYS(refused("vn 0 0 1\nf 1//1 2//-2 3//1\n"), "names normal -2, but only 1 stand before");
   EXPECT_SAYS(refused("vn 0 0 1\nf 1//0 2//1 3//1\n"), "names normal 0, but OBJ counts from 1");
   EXPECT_SAYS(refused("v 1 1 1 0.5 oops 0\nf 1 2 3\n"), "'oops' stands where a weight or colour");
   EXPECT_SAYS(refused("vn 0 0 1\nf 1//1 2//1 9//1\n"), "vertex 8 (counted from 0) of 3");
-  EXPECT_EQ(parse("a.obj", obj + "vn 0 0 nan\nf 1//1 2//7 3//1\n", {.attributes = false}).triangles.size(), 1u);
+  EXPECT_EQ(parse("a.obj", obj + "vn 0 0 nan\nf 1//1 2//7 3//1\n", {.attributes = false})
+                .triangles.size(),
+            1u);
 }
 
 TEST(MeshAttributes, ListsThatDoNotFitAreRefused) {
@@ -209,12 +214,18 @@ TEST(MeshAttributes, ObjSplitsVerticesAtSeams) {
                              "v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 0 0 1\nv 1 1 0\nvt 0 0\nvt 1 1\n"
                              "vn 0 0 1\nvn 0 0 2\nvn 7 7 7\n"
                              "f 1/1/1 2/1/1 3/1/1\nf 3/1/2 2/2/2 4//2\n");
-  EXPECT_EQ(mesh.positions, (std::vector<V3d>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 1, 0}, {1, 0, 0}}));
+  EXPECT_EQ(mesh.positions,
+            (std::vector<V3d>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 1, 0}, {1, 0, 0}}));
   EXPECT_EQ(mesh.triangles, (std::vector<std::array<std::uint32_t, 3>>{{0, 1, 2}, {4, 5, 3}}));
-  EXPECT_EQ(mesh.attributes.normals, (std::vector<V3d>{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 2}, {0, 0, 2}, {0, 0, 2}}));
-  EXPECT_EQ(mesh.attributes.uvs, (std::vector<V2d>{{0, 0}, {0, 0}, {0, 0}, {0, 0}, {0, 0}, {1, 1}}));
+  EXPECT_EQ(mesh.attributes.normals,
+            (std::vector<V3d>{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 2}, {0, 0, 2}, {0, 0, 2}}));
+  EXPECT_EQ(mesh.attributes.uvs,
+            (std::vector<V2d>{{0, 0}, {0, 0}, {0, 0}, {0, 0}, {0, 0}, {1, 1}}));
   // White where there is no colour; a split vertex has that of its own.
-  EXPECT_EQ(mesh.attributes.colors, (std::vector<V4f>{{1, 0, 0, 1}, {1, 1, 1, 1}, {0, 0, 1, 1}, {1, 1, 1, 1}, {0, 0, 1, 1}, {1, 1, 1, 1}}));
+  EXPECT_EQ(
+      mesh.attributes.colors,
+      (std::vector<V4f>{
+          {1, 0, 0, 1}, {1, 1, 1, 1}, {0, 0, 1, 1}, {1, 1, 1, 1}, {0, 0, 1, 1}, {1, 1, 1, 1}}));
 }
 
 /// A cube with a normal to each face, as polygons: seams along all edges.
@@ -226,7 +237,8 @@ std::string cubeObj() {
 }
 
 TEST(MeshAttributes, SeamsDoNotOpenASolid) {
-  const TriMesh mesh = parse("a.obj", cubeObj()), bare = parse("a.obj", cubeObj(), {.attributes = false});
+  const TriMesh mesh = parse("a.obj", cubeObj()),
+                bare = parse("a.obj", cubeObj(), {.attributes = false});
   EXPECT_EQ(bare.positions.size(), 8u);
   ASSERT_EQ(mesh.positions.size(), 24u);
   for (const auto& t : mesh.triangles) {
@@ -249,12 +261,14 @@ TEST(MeshAttributes, ManyPairsAtOneVertexAreQuick) {
   std::string text = "v 0 0 0\n";
   const int count = 20000;
   for (int i = 0; i < count; ++i)
-    text += fmt::format("v {} {} 0\nvt {} 0\n", std::cos(6.28 * i / count), std::sin(6.28 * i / count), i);
+    text += fmt::format("v {} {} 0\nvt {} 0\n", std::cos(6.28 * i / count),
+                        std::sin(6.28 * i / count), i);
   for (int i = 1; i < count; ++i) text += fmt::format("f 1/{0} {1}/{0} {2}/{0}\n", i, i + 1, i + 2);
   const TriMesh mesh = parse("a.obj", text);
   EXPECT_EQ(mesh.triangles.size(), static_cast<std::size_t>(count - 1));
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
-    for (const std::uint32_t v : mesh.triangles[i]) ASSERT_EQ(mesh.attributes.uvs[v].x, static_cast<double>(i));
+    for (const std::uint32_t v : mesh.triangles[i])
+      ASSERT_EQ(mesh.attributes.uvs[v].x, static_cast<double>(i));
 }
 
 // === Transforms
@@ -286,10 +300,16 @@ TEST(MeshAttributes, TransformKeepsNormalsAcross) {
 TEST(MeshAttributes, CarriedNormalsSurviveAnyScale) {
   const V3d n(1, 2, -3);
   for (const double scale : {1e-150, 1.0, 1e150})
-    EXPECT_LT((levelset::carriedNormal(n * scale, {V3d(scale, 0, 0), V3d(0, scale, 0), V3d(0, 0, scale)}, 1) - n.normalized()).length(), 1e-15);
+    EXPECT_LT((levelset::carriedNormal(n * scale,
+                                       {V3d(scale, 0, 0), V3d(0, scale, 0), V3d(0, 0, scale)}, 1) -
+               n.normalized())
+                  .length(),
+              1e-15);
   // A thin map is no flat one.
-  EXPECT_EQ(levelset::carriedNormal({1, 0, 0}, {V3d(1, 0, 0), V3d(0, 1e-9, 0), V3d(0, 0, 1e-9)}, 1), V3d(1, 0, 0));
-  EXPECT_EQ(levelset::carriedNormal({0, 0, 1}, {V3d(1, 2, 0.1), V3d(3, 6, 0.3), V3d(0, 0, 1)}, 1), V3d(0));
+  EXPECT_EQ(levelset::carriedNormal({1, 0, 0}, {V3d(1, 0, 0), V3d(0, 1e-9, 0), V3d(0, 0, 1e-9)}, 1),
+            V3d(1, 0, 0));
+  EXPECT_EQ(levelset::carriedNormal({0, 0, 1}, {V3d(1, 2, 0.1), V3d(3, 6, 0.3), V3d(0, 0, 1)}, 1),
+            V3d(0));
 }
 
 TEST(MeshAttributes, AppendKeepsWhatBothCarry) {
