@@ -67,8 +67,8 @@ Pseudonormals::Pseudonormals(const LocalMesh& mesh)
   });
   for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
     Direction edge;
-    for (end = i; end < sides.size() && sides[end].low == sides[i].low &&
-                  sides[end].high == sides[i].high;
+    for (end = i;
+         end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high;
          ++end) {
       edge.normal += faces_[sides[end].triangle];
       edgeOf_[sides[end].triangle][sides[end].corner] = static_cast<std::uint32_t>(edges_.size());
@@ -78,8 +78,7 @@ Pseudonormals::Pseudonormals(const LocalMesh& mesh)
     edge.onBorder = faces == 1;
     edges_.push_back(edge);
     borderEdges_ += edge.onBorder;
-    if (edge.onBorder)
-      vertices_[sides[i].low].onBorder = vertices_[sides[i].high].onBorder = true;
+    if (edge.onBorder) vertices_[sides[i].low].onBorder = vertices_[sides[i].high].onBorder = true;
     const bool isSound = faces == 1 || (faces == 2 && sides[i].rises != sides[i + 1].rises);
     if (!isSound && !flaw_)
       flaw_ = UnorientedEdge{mesh.points[sides[i].low], mesh.points[sides[i].high], faces};

@@ -13,7 +13,7 @@ namespace levelset::convert {
 
 /// The point of a triangle that is nearest to another, and on which part of it that lies.
 struct TriangleFoot {
-  Imath::V3d point;
+  Imath::V3d point{0};
   int part = 6;  ///< 0 to 2: a corner; 3 to 5: the edge from corner part − 3 to the next; 6: within
 };
 [[nodiscard]] TriangleFoot closestOnTriangle(const Imath::V3d& p, const Imath::V3d& a,

@@ -72,8 +72,8 @@ class SideOfSurface {
       const Sphere& sphere = spheres_[t];
       const double most = distance + sphere.radius + 1e-3;
       if ((p - sphere.center).length2() > most * most) continue;
-      const convert::TriangleFoot at = convert::closestOnTriangle(
-          p, mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2));
+      const convert::TriangleFoot at =
+          convert::closestOnTriangle(p, mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2));
       const double squared = (p - at.point).length2();
       if (squared >= best) continue;
       best = squared;
@@ -123,8 +123,7 @@ openvdb::FloatGrid::Ptr measureBlocks(const LocalMesh& mesh, const SideOfSurface
           side.at(V3d(block) + V3d(local.x(), local.y(), local.z()), d, candidates);
       values[i] = point.value < 0 ? -background : background;
       if (!point.isActive) continue;
-      values[i] =
-          std::clamp(static_cast<float>(point.value * voxelSize), -background, background);
+      values[i] = std::clamp(static_cast<float>(point.value * voxelSize), -background, background);
       leaf->setValueOn(i);
     }
     if (leaf->isEmpty()) return;

@@ -25,8 +25,9 @@ struct SurfaceBandResult {
 /// Distances to an open mesh whose triangles face one way, positive on the side that they face: the
 /// sign is that of the closest face, and about edges and vertices of their pseudonormals, weighted
 /// by angle [Baerentzen05]. Beyond the border the surface goes on straight for three voxels, so
-/// that interpolation is sound up to the border; there the band is cut off, and beyond it nothing is
-/// active. So it is where the front of one part meets the back of another, at half their distance.
+/// that interpolation is sound up to the border; there the band is cut off, and beyond it nothing
+/// is active. So it is where the front of one part meets the back of another, at half their
+/// distance.
 /// @param mesh       vertices at equal positions count as one
 /// @param voxelSize  world units, positive and finite; grid points sit at its integer multiples
 /// @throws UsageError for a voxel size or half width out of range; InvalidInput for a mesh that
