@@ -30,9 +30,8 @@ bool says(const std::string& sentence, const std::string& part) {
 
 /// A square of edge 2 about the middle, in the plane through it across `normal`.
 TriMesh square(const V3d& middle, const V3d& u, const V3d& v, unsigned cells = 4) {
-  return patchMesh(cells + 1, cells + 1, false, false, [=](double s, double t) {
-    return middle + u * (2 * s - 1) + v * (2 * t - 1);
-  });
+  return patchMesh(cells + 1, cells + 1, false, false,
+                   [=](double s, double t) { return middle + u * (2 * s - 1) + v * (2 * t - 1); });
 }
 
 TEST(SurfaceBand, OfAPlaneIsTheDistanceToIt) {
@@ -162,7 +161,8 @@ TEST(SurfaceBand, RefusesTheCall) {
   EXPECT_THROW((void)surfaceBand(sheet, 0), levelset::UsageError);
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand({}, 0.1); }),
               "surface-band: the mesh has no triangles");
-  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand(sheet, 3); }), "surface-band: the voxel");
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand(sheet, 3); }),
+              "surface-band: the voxel");
   EXPECT_THROW((void)surfaceBand(sheet, 0.1, {.progress = [](double) { return false; }}),
                levelset::Cancelled);
   EXPECT_THROW((void)surfaceBand(sheet, 0.01, {.maxMemory = 1000}), levelset::ResourceLimit);
@@ -170,7 +170,8 @@ TEST(SurfaceBand, RefusesTheCall) {
 
 TEST(SurfaceBand, IsNoSolid) {
   const NarrowBand band = surfaceBand(square(V3d(0), V3d(1, 0, 0), V3d(0, 1, 0)), 0.1).band;
-  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)measure(band); }), "measure: the operand is an open");
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)measure(band); }),
+              "measure: the operand is an open");
   EXPECT_FALSE(levelset::meshToBand(support::sphereMesh(1), 0.2).band.isOpenSurface());
 }
 

@@ -114,16 +114,14 @@ TEST(OpenSurface, PatchesOverTheBorderAreRefusedWithThePlace) {
       refusal<InvalidInput>([&] { (void)makePatch(band, square(2.5), 0.5); });
   EXPECT_SAYS(corner, "the surface breaks off at about (-");
   EXPECT_SAYS(corner, "before the point (-2.5, -2.5, 0)");
-  EXPECT_SAYS(refusal<InvalidInput>(
-                  [&] { (void)mapping::cornersAround(band, V3d(1.5, 0, 0), 1.5, 1, 0); }),
-              "the surface breaks off");
-  EXPECT_SAYS(refusal<InvalidInput>([&] {
-                (void)mapping::makeDecal(band, V3d(1.5, 0, 0), V3d(1, 0, 0), 1, 0.5);
-              }),
-              "breaks off");
   EXPECT_SAYS(
-      refusal<InvalidInput>([&] { (void)makePatch(plane(2, 8), square(1), 0.9); }),
-      "surface-band --half-width 15");
+      refusal<InvalidInput>([&] { (void)mapping::cornersAround(band, V3d(1.5, 0, 0), 1.5, 1, 0); }),
+      "the surface breaks off");
+  EXPECT_SAYS(refusal<InvalidInput>(
+                  [&] { (void)mapping::makeDecal(band, V3d(1.5, 0, 0), V3d(1, 0, 0), 1, 0.5); }),
+              "breaks off");
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)makePatch(plane(2, 8), square(1), 0.9); }),
+              "surface-band --half-width 15");
   // A spline needs no distances above the surface.
   EXPECT_GT(makePatch(plane(2, 5), square(1), 3, {.scheme = mapping::LevelScheme::Spline})
                 .patch.particleCount(),
@@ -147,10 +145,12 @@ TEST(OpenSurface, PatchesOverAHoleAreRefusedWithThePlace) {
 
 TEST(OpenSurface, ClosestPointsLieWithin) {
   const NarrowBand band = plane();
-  EXPECT_LT((mapping::closestSurfacePoint(band, V3d(0.3, 1.9, 5), "test") - V3d(0.3, 1.9, 0)).length(),
-            1e-3 * kVoxel);
-  EXPECT_LT((mapping::closestSurfacePoint(band, V3d(0.3, 1.9, -4), "test") - V3d(0.3, 1.9, 0)).length(),
-            1e-3 * kVoxel);
+  EXPECT_LT(
+      (mapping::closestSurfacePoint(band, V3d(0.3, 1.9, 5), "test") - V3d(0.3, 1.9, 0)).length(),
+      1e-3 * kVoxel);
+  EXPECT_LT(
+      (mapping::closestSurfacePoint(band, V3d(0.3, 1.9, -4), "test") - V3d(0.3, 1.9, 0)).length(),
+      1e-3 * kVoxel);
   EXPECT_THROW((void)mapping::closestSurfacePoint(band, V3d(0, 2.4, 0), "test"), InvalidInput);
   EXPECT_THROW((void)mapping::closestSurfacePoint(band, V3d(0, 2.4, 2), "test"), InvalidInput);
 }
@@ -214,7 +214,8 @@ TEST(OpenSurface, SheetsOfHeightmapsPassTheirPixels) {
     const Imath::V2d uv = sheet.attributes.uvs[n];
     EXPECT_NEAR(sheet.positions[n].x, 1 + 4 * (uv.x - 0.5), 1e-12);
     EXPECT_NEAR(sheet.positions[n].y, 2 + 2 * (uv.y - 0.5), 1e-12);
-    EXPECT_NEAR(sheet.positions[n].z, 3 - 1 + 0.5 + 1.5 * mapping::heightAt(map, uv.x, uv.y), 1e-12);
+    EXPECT_NEAR(sheet.positions[n].z, 3 - 1 + 0.5 + 1.5 * mapping::heightAt(map, uv.x, uv.y),
+                1e-12);
   }
   // The pixel in the first row's middle lies at the largest y.
   EXPECT_NEAR(sheet.positions[4 * 9 + 4].z, 2.5 + 1.5 * 0.2, 1e-12);
