@@ -404,9 +404,9 @@ class ElementReader {
     attributes.precision = element.widest(Role::Nx, Role::V) == Type::Double
                                ? CoordinatePrecision::Double
                                : CoordinatePrecision::Float;
-    attributes.colorPrecision = element.widest(Role::Red, Role::Alpha) == Type::Uint8
-                                    ? ColorPrecision::Byte
-                                    : ColorPrecision::Float;
+    attributes.colorPrecision = element.widest(Role::Red, Role::Alpha) > Type::Uint8
+                                    ? ColorPrecision::Float
+                                    : ColorPrecision::Byte;
     attributes.hasAlpha = hasColors_ && element.has(Role::Alpha);
     if (hasNormals_) attributes.normals.reserve(element.count);
     if (hasUvs_) attributes.uvs.reserve(element.count);

@@ -76,8 +76,8 @@ TEST_F(OpenMesh, SurfaceBandsAreNoSolids) {
   EXPECT_EQ(joined.code, 2);
   EXPECT_NE(joined.err.find("no inside to join"), std::string::npos) << joined.err;
   EXPECT_EQ(levelsmith(land + onto + " --alone ! check").code, 0);
-  const auto over = levelsmith(
-      land + "patch @land --at 8,0,0 --size 12,6 --height 3 --particles spline ! info");
+  const auto over =
+      levelsmith(land + "patch @land --at 8,0,0 --size 12,6 --height 3 --particles spline ! info");
   EXPECT_EQ(over.code, 3);
   EXPECT_NE(over.err.find("breaks off"), std::string::npos) << over.err;
   const auto narrow = levelsmith(land + "patch @land --at 0,0,0 --size 6,6 --height 8 ! info");

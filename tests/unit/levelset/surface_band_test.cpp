@@ -118,7 +118,6 @@ TEST(SurfaceBand, FrontAndBackDoNotMeet) {
 
 TEST(SurfaceBand, SeamsAndThreadsDoNotMatter) {
   TriMesh whole = support::sphereMesh(1, V3d(0), 12, 0.7), torn;
-  torn.attributes.uvs.clear();
   for (const auto& t : whole.triangles) {
     const auto first = static_cast<std::uint32_t>(torn.positions.size());
     for (const std::uint32_t v : t) torn.positions.push_back(whole.positions[v]);
