@@ -184,8 +184,8 @@ TEST(MeshTextureAttributes, NormalsOfAStraightMapAreExact) {
 }
 
 TEST(MeshTextureAttributes, NormalsOfASheetAreRadial) {
-  // Cells are straight, so normals are off by up to half of the angle that a cell spans, and a
-  // little more where the map shears: first order in the spacing.
+  // Cells are straight, so normals are off by up to half of the angle that a cell spans, on the
+  // ball along its diagonal, and a little more where that shears: first order in the spacing.
   const double arc = 1.2;
   const auto cylinder = [&](const V3d& p) {
     const double a = arc * (p.x - 0.5), r = 2 + 0.5 * p.z;
@@ -202,7 +202,7 @@ TEST(MeshTextureAttributes, NormalsOfASheetAreRadial) {
         worstAngle(patchOf(cylinder, cells, 0.5), [](const V3d& p) { return V3d(p.x, 0, p.z); });
     const double offBall = worstAngle(patchOf(ball, cells, 0.5), [](const V3d& p) { return p; });
     EXPECT_LE(off, 0.51 * cell) << cells;
-    EXPECT_LE(offBall, 0.75 * cell) << cells;
+    EXPECT_LE(offBall, 0.8 * cell) << cells;
     if (before > 0) {
       EXPECT_NEAR(before / off, 2, 0.2) << cells;
       EXPECT_NEAR(beforeBall / offBall, 2, 0.3) << cells;

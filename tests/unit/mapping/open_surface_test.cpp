@@ -190,7 +190,7 @@ TEST(OpenSurface, TreesStandOnTerrain) {
   ASSERT_EQ(forest.patches.size(), 12u);
   for (const Patch& patch : forest.patches)
     for (const V3d& p : patch.levels.front().positions) {
-      EXPECT_LE(std::max(std::abs(p.x), std::abs(p.y)), 4 + 1e-6);
+      EXPECT_LE(std::max(std::abs(p.x), std::abs(p.y)), 4 + kVoxel);
       // Facets of 0.1 by 0.1 on curvatures of up to 0.7: a sagitta of up to 0.002.
       EXPECT_NEAR(p.z, hills(p.x, p.y), 0.004);
     }
