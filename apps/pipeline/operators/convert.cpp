@@ -169,8 +169,9 @@ void addConversionOperators(std::vector<Operator>& all) {
           "band has to be as wide as patches are high, and six voxels more, unless their levels "
           "follow a spline. A closed mesh is for 'level-set'.",
       .example =
-          "levelsmith read terrain.ply ! surface-band --voxel 1 --half-width 16 ! patch --at "
-          "0,0,5 --size 20,20 --height 10 ! mesh ! write p.ply",
+          "levelsmith heightmap --image <(printf '0 1 0\\n1 2 1\\n0 1 0\\n') --size 8,8 --height 2 "
+          "--voxel 0.2 --sheet ! surface-band --voxel 0.2 --half-width 12 ! patch --at "
+          "0,0,2 --size 3,3 --height 1 ! mesh ! measure",
       .params = {voxelParam(),
                  resolutionParam(),
                  {.name = "half-width",

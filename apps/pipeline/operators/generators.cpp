@@ -209,9 +209,12 @@ Value makeTexture(Invocation& in) {
 }
 
 Value heightmapSheet(Invocation& in) {
-  const double voxel = describeTexture(in, heightmap).second;
-  return Value(
-      mapping::heightmapSheet(heightmapOf(in), in.point("center"), voxel, generatorOptions(in)));
+  if (in.asksVoxelSize() && in.given("voxel")) in.setReference(in.length("voxel"), 0);
+  const mapping::Heightmap map = heightmapOf(in);  // once: the picture may be a pipe
+  const V3d center = in.point("center");
+  const V3d size = mapping::heightmapExtent(map, center).bounds.size();
+  const double voxel = in.voxelSize(std::max({size.x, size.y, size.z}));
+  return Value(mapping::heightmapSheet(map, center, voxel, generatorOptions(in)));
 }
 
 template <Generate generate>
