@@ -45,10 +45,12 @@ TEST_F(OpenMesh, AttributesAreToldAndMayBeLeftOut) {
 }
 
 TEST_F(OpenMesh, TreesStandOnTerrain) {
-  // The example of docs/texture-mapping.md, fewer and coarser.
+  // The example of docs/texture-mapping.md, fewer trees.
   const auto outcome = levelsmith(
-      "heightmap --image hills.txt --size 40,40 --height 8 --base 0 --voxel 1 --sheet --as ground "
-      "! surface-band @ground --voxel 1 --as land ! scatter @land --count 8 --size 2,2 --particles "
+      "heightmap --image hills.txt --size 40,40 --height 8 --base 0 --voxel 0.5 --sheet --as "
+      "ground "
+      "! surface-band @ground --voxel 0.5 --as land ! scatter @land --count 8 --size 2,2 "
+      "--particles "
       "spline --height 6 --levels 3 --as places ! capsule --from 0,0,0 --to 0,0,4 --radius 0.6 "
       "--voxel 0.3 ! mesh --as tree ! texture @land @tree @places --map mesh ! write trees.ply "
       "! measure --json");
