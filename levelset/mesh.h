@@ -4,13 +4,34 @@
 #include <Imath/ImathVec.h>
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace levelset {
 
 /// How finely the numbers of a mesh are stored in a file.
 enum class CoordinatePrecision { Float, Double };
+
+/// How finely the colours of a mesh are stored in a file: as whole numbers from 0 to 255, or as
+/// floats.
+enum class ColorPrecision { Byte, Float };
+
+/// What the vertices of a mesh carry beside their positions. Each list is empty, or as long as
+/// there are vertices. A seam, where one place has two normals or texture coordinates, has two
+/// vertices at equal positions.
+struct MeshAttributes {
+  std::vector<Imath::V3d> normals;  ///< n × 3, finite, of any length; zero: has no direction
+  std::vector<Imath::V2d> uvs;  ///< n × 2, texture coordinates, finite, (0, 0) at the lower left
+  std::vector<Imath::V4f> colors;  ///< n × 4, red, green, blue, alpha, finite, 1 for full, as they
+                                   ///< stand in the file (no curve is taken off or put on)
+  CoordinatePrecision precision = CoordinatePrecision::Float;  ///< of normals and uvs in a file
+  ColorPrecision colorPrecision = ColorPrecision::Byte;
+  bool hasAlpha = false;  ///< else every alpha is 1
+
+  [[nodiscard]] bool isEmpty() const { return normals.empty() && uvs.empty() && colors.empty(); }
+};
 
 /// An indexed triangle mesh; polygons are split when read. Counter-clockwise seen from outside.
 struct TriMesh {
@@ -20,9 +41,33 @@ struct TriMesh {
   /// World units: no coordinate is known better than this, whatever `precision` would allow where
   /// the mesh lies now; 0 for one that was not moved.
   double spacing = 0;
+  MeshAttributes attributes = {};
 
   [[nodiscard]] bool isEmpty() const { return triangles.empty(); }
 };
+
+/// What the mesh carries, in words: "normals, texture coordinates and colours"; empty for nothing.
+[[nodiscard]] std::string describe(const MeshAttributes& attributes);
+
+/// @throws InvalidInput for a list that is not as long as there are vertices, and for a number in
+///         one that is not finite: "texture: the mesh has 3 normals for 4 vertices; …"
+void requireAttributes(const TriMesh& mesh, const char* action);
+
+/// A normal under a map whose derivatives along x, y and z are `slopes`: by the inverse transpose,
+/// so that it stays across the surface, on the side that `hand` tells; unit length.
+/// @param hand  1, or −1 for a map that mirrors (where triangles are turned over)
+/// @return      zero for a normal of length zero, and where the map is so flat that none is left
+[[nodiscard]] Imath::V3d carriedNormal(const Imath::V3d& normal,
+                                       const std::array<Imath::V3d, 3>& slopes, double hand);
+
+/// Adds vertices and triangles of another mesh behind those of `mesh`. What only one of them
+/// carries is dropped.
+void append(TriMesh& mesh, const TriMesh& other);
+
+/// The mesh with vertices at equal positions made one, which is what it joins whatever its seams:
+/// the same positions, triangles between the first at each place, none of which names one twice,
+/// and no attributes.
+[[nodiscard]] TriMesh withoutSeams(const TriMesh& mesh);
 
 /// Distance from a coordinate of that magnitude to the next that the precision can tell from it.
 [[nodiscard]] double spacingAt(double magnitude, CoordinatePrecision precision);

@@ -19,6 +19,8 @@ using openvdb::Coord;
 using openvdb::FloatGrid;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
+constexpr const char* kOpenSurface = "levelsmith_open_surface";
+
 /// The linear part, one image of an axis per row. Not by way of OpenVDB's AffineMap, which refuses
 /// voxels below 1.4e-5 as singular.
 std::array<openvdb::Vec3d, 3> linearPart(const openvdb::math::Transform& transform) {
@@ -106,6 +108,22 @@ Imath::Box3d NarrowBand::zeroSetBounds() const {
     }
   }
   return box;
+}
+
+bool NarrowBand::isOpenSurface() const {
+  return grid_ && grid_->grid->getMetadata<openvdb::BoolMetadata>(kOpenSurface);
+}
+
+void markOpenSurface(FloatGrid& grid) {
+  grid.insertMeta(kOpenSurface, openvdb::BoolMetadata(true));
+}
+
+void requireSolid(const NarrowBand& band, const char* action) {
+  if (!band.isOpenSurface()) return;
+  throw InvalidInput(
+      fmt::format("{}: the operand is an open surface, which has two sides and no "
+                  "inside; give a solid",
+                  action));
 }
 
 std::uint64_t NarrowBand::contentHash() const {

@@ -47,6 +47,9 @@ class NarrowBand {
   /// World-space box of the zero set's sign changes (between voxel centres, by linear
   /// interpolation); empty when there are none.
   [[nodiscard]] Imath::Box3d zeroSetBounds() const;
+  /// Is it the band about a surface with a border (surfaceBand), cut off beyond that? It has two
+  /// sides and no inside: a base for patches, and no solid.
+  [[nodiscard]] bool isOpenSurface() const;
   /// Hash of transform, topology and values: equal for equal trees, whatever made them.
   [[nodiscard]] std::uint64_t contentHash() const;
 
@@ -58,5 +61,8 @@ class NarrowBand {
   friend struct VdbAccess;
   std::shared_ptr<VdbGrid> grid_;
 };
+
+/// @throws InvalidInput for an open surface: "measure: the operand is an open surface, …"
+void requireSolid(const NarrowBand& band, const char* action);
 
 }  // namespace levelset

@@ -28,6 +28,9 @@ struct VdbAccess {
 /// class level set, background > 0, no active tiles, inactive values ± background.
 [[nodiscard]] NarrowBand makeBand(openvdb::FloatGrid::Ptr grid);
 
+/// Makes the band of that grid one of an open surface.
+void markOpenSurface(openvdb::FloatGrid& grid);
+
 /// Checks the invariants of a grid that came from outside and takes it.
 /// Active tiles are voxelised, inactive values are set to ± background by their sign; `repairs`,
 /// if given, counts them.

@@ -245,6 +245,8 @@ class KindChecker {
       remedy = "; put 'level-set' before it";
     if (found == Kind::Band && allowed == std::vector{Kind::Mesh})
       remedy = "; put 'mesh' before it";
+    if (found == Kind::Surface)
+      remedy = "; it has no inside, and is the base of patches and of 'texture --alone' only";
     if (found == Kind::Patch) remedy = "; 'texture' makes a level set with it";
     std::string kinds;
     for (std::size_t i = 0; i < allowed.size(); ++i)

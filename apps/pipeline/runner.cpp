@@ -140,7 +140,7 @@ void estimateError(const Value& value, const Invocation& invocation, StepNotes& 
 
 void describeResult(const Value& value, bool dryRun, StepReport& step) {
   step.resultKind = kindName(value.kind());
-  if (value.kind() == Kind::Band) {
+  if (value.kind() == Kind::Band || value.kind() == Kind::Surface) {
     step.voxelSize = value.plan().voxelSize;
     step.halfWidth = value.plan().halfWidth;
     step.activeVoxels =

@@ -19,6 +19,8 @@ const char* kindName(Kind kind) {
       return "patch";
     case Kind::Field:
       return "field";
+    case Kind::Surface:
+      return "surface band";
   }
   return "";
 }
@@ -45,7 +47,7 @@ Kind Value::kind() const {
     case 1:
       return Kind::Mesh;
     case 2:
-      return Kind::Band;
+      return std::get<NarrowBand>(data_).isOpenSurface() ? Kind::Surface : Kind::Band;
     case 3:
       return Kind::Patch;
     case 4:
@@ -87,6 +89,7 @@ const Plan& Value::plan() const {
       plan.area = surfaceArea(mesh());
       break;
     case Kind::Band:
+    case Kind::Surface:
       plan.bounds = band().zeroSetBounds();
       plan.voxelSize = band().voxelSize();
       plan.halfWidth = band().halfWidth();

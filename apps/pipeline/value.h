@@ -17,7 +17,13 @@
 
 namespace pipeline {
 
-enum class Kind { Mesh, Band, Patch, Field };
+enum class Kind {
+  Mesh,
+  Band,
+  Patch,
+  Field,
+  Surface  ///< a band about an open surface: a base for patches
+};
 [[nodiscard]] const char* kindName(Kind kind);
 
 /// What is known of a value before it is computed: enough to resolve lengths and estimate cost.
@@ -25,7 +31,7 @@ struct Plan {
   Kind kind = Kind::Band;
   Imath::Box3d bounds = {};  ///< of the zero set or the vertices, world units
   double area = 0;           ///< of the surface, world units²
-  double voxelSize = 0;      ///< bands only
+  double voxelSize = 0;      ///< bands only, of solids or surfaces
   double halfWidth = 0;      ///< voxels, bands only
   double fieldBytes = 0;     ///< fields only
   /// Patches only: along u, along v, and the height, 0 where only the texture will tell.

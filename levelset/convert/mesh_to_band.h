@@ -67,8 +67,9 @@ struct MeshToBandResult {
                                           const MeshToBandOptions& options = {});
 
 /// The part of it that can be told before there is a mesh.
+/// @param action  begins the message
 /// @throws InvalidInput for a voxel larger than the object
-void checkVoxelSize(double voxelSize, double longestSide);
+void checkVoxelSize(double voxelSize, double longestSide, const char* action = "level-set");
 
 /// Pairs of triangles that cross each other, shared vertices and edges apart. Exact predicates.
 [[nodiscard]] std::size_t countSelfIntersections(const TriMesh& mesh,

@@ -27,29 +27,30 @@ double largest(const V3d& p) {
   return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
 }
 
-void checkCall(double voxelSize, const MeshToBandOptions& options) {
+void checkCall(double voxelSize, const MeshToBandOptions& options, const char* action) {
   if (!(voxelSize > 0) || !std::isfinite(voxelSize))
-    throw UsageError(fmt::format(
-        "level-set: the voxel size is {}; give a positive length in world units", voxelSize));
+    throw UsageError(fmt::format("{}: the voxel size is {}; give a positive length in world units",
+                                 action, voxelSize));
   if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth))
     throw UsageError(
-        fmt::format("level-set: the half width is {} voxels; give at least 1", options.halfWidth));
+        fmt::format("{}: the half width is {} voxels; give at least 1", action, options.halfWidth));
 }
 
-void checkElements(const TriMesh& mesh) {
+void checkElements(const TriMesh& mesh, const char* action) {
   if (mesh.isEmpty())
-    throw InvalidInput("level-set: the mesh has no triangles; there is no surface to convert");
+    throw InvalidInput(
+        fmt::format("{}: the mesh has no triangles; there is no surface to convert", action));
   for (std::size_t v = 0; v < mesh.positions.size(); ++v)
     if (!isFinite(mesh.positions[v]))
       throw InvalidInput(
-          fmt::format("level-set: vertex {} is at {}, which is not a place; repair the mesh", v,
+          fmt::format("{}: vertex {} is at {}, which is not a place; repair the mesh", action, v,
                       text(mesh.positions[v])));
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     for (const std::uint32_t v : mesh.triangles[t])
       if (v >= mesh.positions.size())
-        throw InvalidInput(fmt::format(
-            "level-set: triangle {} names vertex {}, but there are only {}; repair the mesh", t, v,
-            mesh.positions.size()));
+        throw InvalidInput(
+            fmt::format("{}: triangle {} names vertex {}, but there are only {}; repair the mesh",
+                        action, t, v, mesh.positions.size()));
 }
 
 std::uint32_t outermostVertex(const TriMesh& mesh) {
@@ -66,43 +67,45 @@ double estimateMemory(const TriMesh& mesh, double voxelSize, double halfWidth) {
   return 24 * halfWidth * area + 250.0 * static_cast<double>(mesh.triangles.size());
 }
 
-void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermost) {
+void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermost,
+                    const char* action) {
   const bool isFloat = mesh.precision == CoordinatePrecision::Float;
   const double here = spacingAt(largest(mesh.positions[outermost]), mesh.precision);
   if (mesh.spacing > voxelSize / 8 && mesh.spacing > here)
     throw InvalidInput(
-        fmt::format("level-set: before the mesh was moved its coordinates were {:.3g} apart "
+        fmt::format("{}: before the mesh was moved its coordinates were {:.3g} apart "
                     "(measured where it is now), coarser than an eighth of the voxel size {:.6g}; "
                     "move the object to the origin before it is written, or use larger voxels",
-                    mesh.spacing, voxelSize));
+                    action, mesh.spacing, voxelSize));
   const double spacing = here;
   if (spacing > voxelSize / 8)
     throw InvalidInput(
-        fmt::format("level-set: {} coordinates at vertex {}, {}, are {:.3g} apart, coarser than an "
+        fmt::format("{}: {} coordinates at vertex {}, {}, are {:.3g} apart, coarser than an "
                     "eighth of the "
                     "voxel size {:.6g}; move the object to the origin before it is written, or use "
                     "larger voxels",
-                    isFloat ? "single-precision" : "double-precision", outermost,
+                    action, isFloat ? "single-precision" : "double-precision", outermost,
                     text(mesh.positions[outermost]), spacing, voxelSize));
 }
 
 }  // namespace
 
-void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
-  checkCall(voxelSize, options);
-  checkElements(mesh);
+void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options,
+                    const char* action) {
+  checkCall(voxelSize, options, action);
+  checkElements(mesh, action);
   const V3d size = bounds(mesh).size();
-  checkVoxelSize(voxelSize, std::max({size.x, size.y, size.z}));
+  checkVoxelSize(voxelSize, std::max({size.x, size.y, size.z}), action);
   const std::uint32_t outermost = outermostVertex(mesh);
   if (largest(mesh.positions[outermost]) / voxelSize + options.halfWidth >= kIndexLimit)
-    throw ResourceLimit(fmt::format(
-        "level-set: vertex {} at {} is {:.3g} voxels from the origin, beyond an index of 32 "
-        "bits; use larger voxels, or remove the vertex if it is astray",
-        outermost, text(mesh.positions[outermost]),
-        largest(mesh.positions[outermost]) / voxelSize));
+    throw ResourceLimit(
+        fmt::format("{}: vertex {} at {} is {:.3g} voxels from the origin, beyond an index of 32 "
+                    "bits; use larger voxels, or remove the vertex if it is astray",
+                    action, outermost, text(mesh.positions[outermost]),
+                    largest(mesh.positions[outermost]) / voxelSize));
   requireMemory(estimateMemory(mesh, voxelSize, options.halfWidth), memoryLimit(options.maxMemory),
-                "level-set");
-  checkPrecision(mesh, voxelSize, outermost);
+                action);
+  checkPrecision(mesh, voxelSize, outermost, action);
 }
 
 V3i localOrigin(const TriMesh& mesh, double voxelSize) {
@@ -124,12 +127,12 @@ LocalMesh toLocal(const TriMesh& mesh, const MeshTopology& topology, double voxe
 
 namespace levelset {
 
-void checkVoxelSize(double voxelSize, double longestSide) {
+void checkVoxelSize(double voxelSize, double longestSide, const char* action) {
   if (voxelSize > longestSide)
-    throw InvalidInput(fmt::format(
-        "level-set: the voxel size {:.6g} is larger than the object, whose longest side is "
-        "{:.6g}; use smaller voxels",
-        voxelSize, longestSide));
+    throw InvalidInput(
+        fmt::format("{}: the voxel size {:.6g} is larger than the object, whose longest side is "
+                    "{:.6g}; use smaller voxels",
+                    action, voxelSize, longestSide));
 }
 
 }  // namespace levelset

@@ -224,7 +224,7 @@ eikonal::ArrivalRequest checkedRequest(double until, const ArrivalOptions& optio
   return request;
 }
 
-void requireSolid(const NarrowBand& solid, const char* action) {
+void requireStart(const NarrowBand& solid, const char* action) {
   if (solid.isEmpty())
     throw InvalidInput(
         fmt::format("{}: the solid is empty, so no front can start on it; give a solid", action));
@@ -239,7 +239,7 @@ ArrivalTimes asField(eikonal::ArrivalGrid result, const char* action) {
 
 ArrivalTimes arrivalTimes(const NarrowBand& solid, double until, const ArrivalOptions& options) {
   const eikonal::ArrivalRequest request = checkedRequest(until, options);
-  requireSolid(solid, request.action);
+  requireStart(solid, request.action);
   eikonal::ArrivalGrid result = eikonal::arrivalFromSurface(vdb(solid), request);
   result.times->setGridClass(openvdb::GRID_UNKNOWN);
   return asField(std::move(result), request.action);
@@ -265,7 +265,7 @@ ArrivalTimes arrivalTimesFromPoints(const NarrowBand& lattice, std::span<const I
 
 FrontDistance frontDistance(const NarrowBand& solid, double reach, const ArrivalOptions& options) {
   const eikonal::ArrivalRequest request = checkedRequest(reach, options);
-  requireSolid(solid, request.action);
+  requireStart(solid, request.action);
   if (options.speed)
     throw UsageError(
         fmt::format("{}: at another speed than 1 times are no distances; ask for arrival times",

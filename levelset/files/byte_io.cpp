@@ -284,6 +284,11 @@ void ByteWriter::writeNumber(double value) {
   write(text, static_cast<std::size_t>(std::to_chars(text, text + sizeof text, value).ptr - text));
 }
 
+void ByteWriter::writeNumber(float value) {
+  char text[24];
+  write(text, static_cast<std::size_t>(std::to_chars(text, text + sizeof text, value).ptr - text));
+}
+
 void ByteWriter::writeNumber(std::uint64_t value) {
   char text[24];
   write(text, static_cast<std::size_t>(std::to_chars(text, text + sizeof text, value).ptr - text));

@@ -90,6 +90,7 @@ class ByteWriter {
   }
   /// The shortest text that reads back as `value`, whatever the locale.
   void writeNumber(double value);
+  void writeNumber(float value);
   void writeNumber(std::uint64_t value);
 
   /// Writes what is left and puts the file in place. @throws IoError

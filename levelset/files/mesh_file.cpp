@@ -83,11 +83,17 @@ TriMesh readMesh(const fs::path& path, const ReadMeshOptions& options) {
 
 void writeMesh(const fs::path& path, const TriMesh& mesh, const WriteMeshOptions& options) {
   const FormatChoice choice = meshFormat(path, options.format, "write");
+  requireAttributes(mesh, "write");
   report(options.progress, 0, "write");
   ByteWriter out(path, choice.compressed);
   choice.format->write(out, mesh, options.progress);
   out.commit();
   report(options.progress, 1, "write");
+}
+
+bool holdsAttributes(const fs::path& nameOrFormat) {
+  const auto choice = findFormat(nameOrFormat);
+  return choice && (choice->format->read == readPly || choice->format->read == readObj);
 }
 
 bool isMeshFormat(const fs::path& nameOrFormat) {

@@ -14,11 +14,22 @@ namespace levelset {
 namespace {
 
 constexpr std::uint64_t kMaxIndex = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint64_t kSplit = std::uint64_t{1} << 63;  // marks a corner at a split vertex
 constexpr double kMaxCoordinate = std::numeric_limits<float>::max();
 constexpr std::size_t kTickMask = 0xFFFF;
 
 bool fitsFloat(double x) {
   return static_cast<double>(static_cast<float>(x)) == x;
+}
+
+template <typename Vector>
+void requireNumbers(const std::string& name, const Vector& numbers, const char* what, Place place) {
+  for (unsigned axis = 0; axis < Vector::dimensions(); ++axis)
+    if (const auto number = numbers[static_cast<int>(axis)]; !std::isfinite(number))
+      failAt(name, place,
+             fmt::format("a {} holds {}, which is not a finite number; repair the mesh, or read it "
+                         "bare, without what its vertices carry (--bare)",
+                         what, number));
 }
 
 /// What std::from_chars calls out of range, too large or too small: decided by strtod.
@@ -56,12 +67,12 @@ void requireNothingBehind(std::string_view input, std::size_t end, const std::st
 MeshBuilder::MeshBuilder(std::string name, const ReadMeshOptions& options, std::string_view input)
     : name_(std::move(name)), options_(options), input_(input) {}
 
-void MeshBuilder::reserve(std::size_t vertices, std::size_t triangles) {
+void MeshBuilder::reserve(std::size_t vertices, std::size_t triangles, std::size_t attributeBytes) {
   if (vertices > kMaxIndex)
     failFile(name_, fmt::format("holds {} vertices, more than the 4294967295 that can be numbered; "
                                 "split it",
                                 vertices));
-  const double bytes = static_cast<double>(input_.size()) +
+  const double bytes = static_cast<double>(input_.size() + attributeBytes) +
                        static_cast<double>(vertices) * sizeof(Imath::V3d) +
                        static_cast<double>(triangles) * sizeof(mesh_.triangles[0]);
   requireMemory(bytes, options_.maxMemory, "read");
@@ -78,9 +89,12 @@ void MeshBuilder::tick(const char* at) {
   if ((++added_ & kTickMask) != 0) return;
   report(options_.progress,
          static_cast<double>(at - input_.data()) / static_cast<double>(input_.size()), "read");
-  const double bytes =
-      static_cast<double>(input_.size() + mesh_.positions.capacity() * sizeof(Imath::V3d) +
-                          mesh_.triangles.capacity() * sizeof(mesh_.triangles[0]));
+  const MeshAttributes& held = mesh_.attributes;
+  const double bytes = static_cast<double>(
+      input_.size() + readerBytes_ + mesh_.positions.capacity() * sizeof(Imath::V3d) +
+      mesh_.triangles.capacity() * sizeof(mesh_.triangles[0]) +
+      held.normals.capacity() * sizeof(held.normals[0]) +
+      held.uvs.capacity() * sizeof(held.uvs[0]) + held.colors.capacity() * sizeof(held.colors[0]));
   requireMemory(bytes, options_.maxMemory, "read");
   if (mesh_.positions.size() > kMaxIndex)
     failFile(name_, "holds more than the 4294967295 vertices that can be numbered; split it");
@@ -100,13 +114,54 @@ void MeshBuilder::addVertex(double x, double y, double z, Place place, const cha
   tick(at);
 }
 
-void MeshBuilder::addFace(std::span<const std::uint64_t> corners, Place place, const char* at) {
-  for (const std::uint64_t corner : corners) {
-    if (corner < highestIndex_) continue;
-    if (corner == highestIndex_ && highestPlace_.number != 0) continue;
-    highestIndex_ = corner;
-    highestPlace_ = place;
+void MeshBuilder::addNormal(const Imath::V3d& normal, Place place) {
+  requireNumbers(name_, normal, "normal", place);
+  mesh_.attributes.normals.push_back(normal);
+}
+
+void MeshBuilder::addUv(const Imath::V2d& uv, Place place) {
+  requireNumbers(name_, uv, "texture coordinate", place);
+  mesh_.attributes.uvs.push_back(uv);
+}
+
+void MeshBuilder::addColor(const Imath::V4f& color, Place place) {
+  requireNumbers(name_, color, "colour", place);
+  mesh_.attributes.colors.push_back(color);
+}
+
+void MeshBuilder::noteIndex(std::uint64_t index, Place place) {
+  if (index < highestIndex_ || (index == highestIndex_ && highestPlace_.number != 0)) return;
+  highestIndex_ = index;
+  highestPlace_ = place;
+}
+
+std::uint64_t MeshBuilder::splitVertex(std::uint64_t vertex, Place place) {
+  noteIndex(vertex, place);
+  splitVertices_.push_back(static_cast<std::uint32_t>(vertex));
+  // Counted down, until all vertices are known: kMaxIndex - n fits a triangle's corner.
+  return kSplit | (kMaxIndex - (splitVertices_.size() - 1));
+}
+
+void MeshBuilder::placeSplitVertices() {
+  const std::size_t before = mesh_.positions.size(), splits = splitVertices_.size();
+  if (splits == 0) return;
+  if (before + splits > kMaxIndex) {
+    failFile(name_,
+             "has more than the 4294967295 vertices that can be numbered, once those with "
+             "several normals or texture coordinates are split; split it");
   }
+  const std::uint64_t first = kMaxIndex - (splits - 1);
+  for (auto& triangle : mesh_.triangles)
+    for (std::uint32_t& corner : triangle)
+      if (corner >= first) corner = static_cast<std::uint32_t>(before + (kMaxIndex - corner));
+  mesh_.positions.reserve(before + splits);
+  for (const std::uint32_t vertex : splitVertices_)
+    mesh_.positions.push_back(mesh_.positions[vertex]);
+}
+
+void MeshBuilder::addFace(std::span<const std::uint64_t> corners, Place place, const char* at) {
+  for (const std::uint64_t corner : corners)
+    if ((corner & kSplit) == 0) noteIndex(corner, place);
   if (corners.size() > 3)
     polygons_.push_back({mesh_.triangles.size(), corners.size(), place.number});
   // A fan holds the corners until all vertices are known.
@@ -147,6 +202,7 @@ TriMesh MeshBuilder::finish() {
                     "again",
                     highestIndex_, count));
   }
+  placeSplitVertices();
   splitPolygons();
   if (!precisionDeclared_)
     mesh_.precision = allFloat_ ? CoordinatePrecision::Float : CoordinatePrecision::Double;

@@ -35,12 +35,26 @@ class MeshBuilder {
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::size_t vertexCount() const { return mesh_.positions.size(); }
   /// The numbers of a header; the caller has checked them against the size of the file.
-  void reserve(std::size_t vertices, std::size_t triangles);
+  /// @param attributeBytes  that the vertices' attributes will take
+  void reserve(std::size_t vertices, std::size_t triangles, std::size_t attributeBytes = 0);
   /// Of the stored numbers; without it, float if every coordinate fits.
   void declarePrecision(CoordinatePrecision precision);
 
   /// `at` is where reading stands, for the progress.
   void addVertex(double x, double y, double z, Place place, const char* at);
+  /// The last vertex's. @throws InvalidInput for numbers that are not finite
+  void addNormal(const Imath::V3d& normal, Place place);
+  void addUv(const Imath::V2d& uv, Place place);
+  void addColor(const Imath::V4f& color, Place place);
+  [[nodiscard]] bool wantsAttributes() const { return options_.attributes; }
+  [[nodiscard]] MeshAttributes& attributes() { return mesh_.attributes; }
+  /// What the reader holds beside the mesh.
+  void noteBytes(std::size_t bytes) { readerBytes_ = bytes; }
+  /// Another vertex at the place of one that may be still to come.
+  /// @return what stands for it as a corner of faces; its number will be vertexCount() + n for the
+  ///         n-th of these
+  [[nodiscard]] std::uint64_t splitVertex(std::uint64_t vertex, Place place);
+
   /// Corners count from 0; faces with fewer than three are skipped.
   void addFace(std::span<const std::uint64_t> corners, Place place, const char* at);
   /// @throws InvalidInput when an index is out of range or there is no triangle
@@ -51,6 +65,8 @@ class MeshBuilder {
     std::size_t firstTriangle, corners, place;
   };
   void tick(const char* at);
+  void noteIndex(std::uint64_t index, Place place);
+  void placeSplitVertices();
   void splitPolygons();
 
   TriMesh mesh_;
@@ -58,6 +74,8 @@ class MeshBuilder {
   const ReadMeshOptions& options_;
   std::string_view input_;
   std::vector<Polygon> polygons_;
+  std::vector<std::uint32_t> splitVertices_;  // of which vertex
+  std::size_t readerBytes_ = 0;
   std::uint64_t highestIndex_ = 0;
   Place highestPlace_{"line", 0};
   std::size_t added_ = 0;

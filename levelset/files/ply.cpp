@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -18,8 +19,13 @@ namespace {
 constexpr std::size_t kMaxHeader = 1 << 20;
 
 enum class Type { Int8, Uint8, Int16, Uint16, Int32, Uint32, Float, Double };
-enum class Role { Skip, X, Y, Z, Corners };
+enum class Role { Skip, X, Y, Z, Nx, Ny, Nz, U, V, Red, Green, Blue, Alpha, Corners };
+constexpr std::size_t kRoles = static_cast<std::size_t>(Role::Corners) + 1;
 enum class Encoding { Ascii, Little, Big };
+
+constexpr bool isAttribute(Role role) {
+  return role >= Role::Nx && role <= Role::Alpha;
+}
 
 constexpr std::size_t sizeOf(Type type) {
   constexpr std::size_t sizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
@@ -43,6 +49,20 @@ struct Element {
   }
   [[nodiscard]] bool holdsVertices() const { return has(Role::X); }
   [[nodiscard]] bool holdsFaces() const { return has(Role::Corners); }
+  [[nodiscard]] bool holdsNormals() const {
+    return has(Role::Nx) && has(Role::Ny) && has(Role::Nz);
+  }
+  [[nodiscard]] bool holdsUvs() const { return has(Role::U) && has(Role::V); }
+  [[nodiscard]] bool holdsColors() const {
+    return has(Role::Red) && has(Role::Green) && has(Role::Blue);
+  }
+  /// The widest type among the properties from one role to another.
+  [[nodiscard]] Type widest(Role from, Role to) const {
+    Type widest = Type::Int8;
+    for (const Property& p : properties)
+      if (p.role >= from && p.role <= to) widest = std::max(widest, p.type);
+    return widest;
+  }
   /// Bytes that one element takes at least.
   [[nodiscard]] std::size_t leastSize(Encoding encoding) const {
     std::size_t size = 0;
@@ -162,8 +182,14 @@ class HeaderReader {
     Property property{readType(line[list ? 3 : 1]), {}, Role::Skip};
     if (list) property.listCount = readType(line[2]);
     property.role = roleOf(element.name, name, list);
-    if (property.role != Role::Skip && element.has(property.role))
-      fail(fmt::format("the property '{}' comes twice", name));
+    if (property.role != Role::Skip && element.has(property.role)) {
+      if (isAttribute(property.role))
+        property.role = Role::Skip;  // under another of its names: the first counts
+      else
+        fail(fmt::format("the property '{}' comes twice", name));
+    }
+    if (property.role >= Role::Red && property.role <= Role::Alpha && !isColorType(property.type))
+      property.role = Role::Skip;
     element.properties.push_back(property);
   }
 
@@ -175,8 +201,21 @@ class HeaderReader {
       if (name == "y") return Role::Y;
       if (name == "z") return Role::Z;
     }
+    if (element == "vertex" && !list)
+      for (const auto& [known, role] : kAttributes)
+        if (name == known) return role;
     return Role::Skip;
   }
+
+  /// Those of which it is plain what is full.
+  static bool isColorType(Type type) {
+    return type == Type::Uint8 || type == Type::Uint16 || type >= Type::Float;
+  }
+  static constexpr std::pair<std::string_view, Role> kAttributes[] = {
+      {"nx", Role::Nx},       {"ny", Role::Ny},   {"nz", Role::Nz},       {"u", Role::U},
+      {"v", Role::V},         {"s", Role::U},     {"t", Role::V},         {"texture_u", Role::U},
+      {"texture_v", Role::V}, {"red", Role::Red}, {"green", Role::Green}, {"blue", Role::Blue},
+      {"alpha", Role::Alpha}};
 
   std::string_view input_;
   const std::string& name_;
@@ -346,22 +385,56 @@ class ElementReader {
   void read(const Element& element) {
     if (element.properties.empty()) return;
     const bool vertices = element.holdsVertices(), faces = element.holdsFaces();
+    if (vertices) declareAttributes(element);
     for (std::size_t i = 0; i < element.count; ++i) {
       source_.begin(element, i);
       for (const Property& property : element.properties) readProperty(property);
       source_.end();
-      if (vertices)
-        builder_.addVertex(position_[0], position_[1], position_[2], source_.place(), source_.at());
+      if (vertices) addVertex();
       if (faces) builder_.addFace(corners_, source_.place(), source_.at());
     }
   }
 
  private:
+  void declareAttributes(const Element& element) {
+    hasNormals_ = element.holdsNormals();
+    hasUvs_ = element.holdsUvs();
+    hasColors_ = element.holdsColors();
+    MeshAttributes& attributes = builder_.attributes();
+    attributes.precision = element.widest(Role::Nx, Role::V) == Type::Double
+                               ? CoordinatePrecision::Double
+                               : CoordinatePrecision::Float;
+    attributes.colorPrecision = element.widest(Role::Red, Role::Alpha) > Type::Uint8
+                                    ? ColorPrecision::Float
+                                    : ColorPrecision::Byte;
+    attributes.hasAlpha = hasColors_ && element.has(Role::Alpha);
+    if (hasNormals_) attributes.normals.reserve(element.count);
+    if (hasUvs_) attributes.uvs.reserve(element.count);
+    if (hasColors_) attributes.colors.reserve(element.count);
+    of(Role::Alpha) = 1;
+  }
+
+  void addVertex() {
+    const Place place = source_.place();
+    builder_.addVertex(of(Role::X), of(Role::Y), of(Role::Z), place, source_.at());
+    if (hasNormals_) builder_.addNormal({of(Role::Nx), of(Role::Ny), of(Role::Nz)}, place);
+    if (hasUvs_) builder_.addUv({of(Role::U), of(Role::V)}, place);
+    if (hasColors_) {
+      const auto part = [this](Role role) { return static_cast<float>(of(role)); };
+      builder_.addColor({part(Role::Red), part(Role::Green), part(Role::Blue), part(Role::Alpha)},
+                        place);
+    }
+  }
+
+  double& of(Role role) { return values_[static_cast<std::size_t>(role)]; }
+
   void readProperty(const Property& property) {
     if (!property.listCount) {
       if (property.role == Role::Skip) return source_.skip(property.type, 1);
-      position_[static_cast<int>(property.role) - static_cast<int>(Role::X)] =
-          source_.value(property.type);
+      const double value = source_.value(property.type);
+      const bool isWhole = property.type < Type::Float;
+      const bool isColor = property.role >= Role::Red && property.role <= Role::Alpha;
+      of(property.role) = isColor && isWhole && hasColors_ ? share(value, property.type) : value;
       return;
     }
     const std::size_t count =
@@ -371,6 +444,18 @@ class ElementReader {
     corners_.resize(count);
     for (std::uint64_t& corner : corners_)
       corner = wholeNumber(source_.value(property.type), "the index of a vertex");
+  }
+
+  /// Of what the type can hold; the float next to it.
+  double share(double value, Type type) const {
+    const double full = type == Type::Uint8 ? 255 : 65535;
+    if (!(value >= 0 && value <= full) || std::floor(value) != value) {
+      failAt(builder_.name(), source_.place(),
+             fmt::format("a colour holds {}, which is no whole number from 0 to {}; repair the "
+                         "mesh, or read it bare, without what its vertices carry (--bare)",
+                         value, full));
+    }
+    return static_cast<double>(static_cast<float>(value) / static_cast<float>(full));
   }
 
   std::uint64_t wholeNumber(double value, const char* what) const {
@@ -385,7 +470,8 @@ class ElementReader {
 
   Source& source_;
   MeshBuilder& builder_;
-  double position_[3] = {};
+  std::array<double, kRoles> values_ = {};
+  bool hasNormals_ = false, hasUvs_ = false, hasColors_ = false;
   std::vector<std::uint64_t> corners_;
 };
 
@@ -398,17 +484,24 @@ void readElements(const Header& header, std::string_view data, MeshBuilder& buil
                        "the elements that its header promises");
 }
 
+void skipAttributes(Header& header) {
+  for (Element& element : header.elements)
+    for (Property& p : element.properties)
+      if (isAttribute(p.role)) p.role = Role::Skip;
+}
+
 /// Triangles cannot be more than the data can list; a header may claim what it likes.
 void reserveElements(const Header& header, std::size_t dataSize, MeshBuilder& builder) {
-  std::size_t vertices = 0, triangles = 0;
+  std::size_t vertices = 0, triangles = 0, attributeBytes = 0;
   for (const Element& element : header.elements) {
     if (element.holdsVertices()) {
       vertices = element.count;
-      Type widest = Type::Int8;
-      for (const Property& p : element.properties)
-        if (p.role != Role::Skip) widest = std::max(widest, p.type);
-      builder.declarePrecision(widest == Type::Double ? CoordinatePrecision::Double
-                                                      : CoordinatePrecision::Float);
+      builder.declarePrecision(element.widest(Role::X, Role::Z) == Type::Double
+                                   ? CoordinatePrecision::Double
+                                   : CoordinatePrecision::Float);
+      attributeBytes = element.count * ((element.holdsNormals() ? sizeof(Imath::V3d) : 0) +
+                                        (element.holdsUvs() ? sizeof(Imath::V2d) : 0) +
+                                        (element.holdsColors() ? sizeof(Imath::V4f) : 0));
     }
     for (const Property& p : element.properties) {
       if (p.role != Role::Corners) continue;
@@ -417,13 +510,14 @@ void reserveElements(const Header& header, std::size_t dataSize, MeshBuilder& bu
       triangles = std::min(element.count, dataSize / least + 1);
     }
   }
-  builder.reserve(vertices, triangles);
+  builder.reserve(vertices, triangles, attributeBytes);
 }
 
 }  // namespace
 
 void readPly(std::string_view input, MeshBuilder& builder) {
-  const Header header = HeaderReader(input, builder.name()).read();
+  Header header = HeaderReader(input, builder.name()).read();
+  if (!builder.wantsAttributes()) skipAttributes(header);
   const std::string_view data = input.substr(header.size);
   checkHeader(header, data.size(), builder.name());
   reserveElements(header, data.size(), builder);
@@ -457,37 +551,17 @@ MeshFileInfo plyInfo(std::string_view head, std::size_t fileSize, const std::str
   constexpr const char* kEncodings[] = {"ascii", "binary little endian", "binary big endian"};
   MeshFileInfo info{fmt::format("ply, {}", kEncodings[static_cast<int>(header.encoding)]), 0, 0};
   for (const Element& element : header.elements) {
-    if (element.holdsVertices()) info.vertices = element.count;
+    if (element.holdsVertices()) {
+      info.vertices = element.count;
+      MeshAttributes held;  // one of each that there is
+      if (element.holdsNormals()) held.normals.resize(1);
+      if (element.holdsUvs()) held.uvs.resize(1);
+      if (element.holdsColors()) held.colors.resize(1);
+      info.attributes = describe(held);
+    }
     if (element.holdsFaces()) info.faces = element.count;
   }
   return info;
-}
-
-void writePly(ByteWriter& out, const TriMesh& mesh, const Progress& progress) {
-  static_assert(std::endian::native == std::endian::little, "the header says little endian");
-  const bool asFloat = mesh.precision == CoordinatePrecision::Float;
-  const char* real = asFloat ? "float" : "double";
-  // Readers that take the index for a signed int are common; the wider type only where it is
-  // needed.
-  const char* index = mesh.positions.size() > 0x7FFFFFFF ? "uint" : "int";
-  out.write(
-      fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {0}\n"
-                  "property {1} x\nproperty {1} y\nproperty {1} z\nelement face {2}\n"
-                  "property list uchar {3} vertex_indices\nend_header\n",
-                  mesh.positions.size(), real, mesh.triangles.size(), index));
-  WriteProgress steps(progress, mesh.positions.size() + mesh.triangles.size());
-  for (const Imath::V3d& p : mesh.positions) {
-    if (asFloat)
-      out.writeValue(Imath::V3f(p));
-    else
-      out.writeValue(p);
-    steps.step();
-  }
-  for (const auto& triangle : mesh.triangles) {
-    out.writeValue(static_cast<unsigned char>(3));
-    out.writeValue(triangle);
-    steps.step();
-  }
 }
 
 }  // namespace levelset

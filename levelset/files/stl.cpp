@@ -12,7 +12,7 @@
 namespace levelset {
 namespace {
 
-constexpr std::size_t kHeaderSize = 84, kFacetSize = 50;
+constexpr std::size_t kStlHeaderSize = 84, kFacetSize = 50;
 
 /// Gives equal positions one number.
 class VertexMerger {
@@ -55,19 +55,19 @@ bool beginsWithSolid(std::string_view input) {
 
 /// Binary headers may begin with "solid" too, so the size of the file decides first.
 bool isBinary(std::string_view input, std::size_t fileSize) {
-  if (input.size() >= kHeaderSize &&
-      fileSize == kHeaderSize + std::size_t{facetCount(input)} * kFacetSize)
+  if (input.size() >= kStlHeaderSize &&
+      fileSize == kStlHeaderSize + std::size_t{facetCount(input)} * kFacetSize)
     return true;
   return !beginsWithSolid(input) || input.substr(0, 1024).find('\0') != std::string_view::npos;
 }
 
 /// The triangles that a file of so many bytes has room for; what its header promises must fit.
 std::size_t roomForFacets(std::string_view head, std::size_t fileSize, const std::string& name) {
-  if (fileSize < kHeaderSize)
+  if (fileSize < kStlHeaderSize)
     failFile(name,
              "is neither text that begins with 'solid' nor long enough for a binary "
              "STL; give its true format");
-  const std::size_t count = facetCount(head), held = (fileSize - kHeaderSize) / kFacetSize;
+  const std::size_t count = facetCount(head), held = (fileSize - kStlHeaderSize) / kFacetSize;
   if (count > held) {
     failFile(name, fmt::format("promises {} triangles and holds {}; it was cut off or is no STL: "
                                "fetch or export it again",
@@ -80,14 +80,14 @@ void readBinary(std::string_view input, MeshBuilder& builder) {
   const std::size_t held = roomForFacets(input, input.size(), builder.name());
   const std::size_t count = facetCount(input);
   requireNothingBehind(
-      input, kHeaderSize + count * kFacetSize, builder.name(),
+      input, kStlHeaderSize + count * kFacetSize, builder.name(),
       fmt::format("the {} triangles that its header promises (it has room for {})", count, held));
   builder.declarePrecision(CoordinatePrecision::Float);
   builder.reserve(count / 2, count);
   VertexMerger merger(builder);
   std::array<std::uint64_t, 3> corners{};
   for (std::size_t i = 0; i < count; ++i) {
-    const char* facet = input.data() + kHeaderSize + i * kFacetSize;
+    const char* facet = input.data() + kStlHeaderSize + i * kFacetSize;
     float numbers[9];
     std::memcpy(numbers, facet + 12, sizeof numbers);  // behind the normal
     const Place place{"triangle", i};
@@ -202,7 +202,7 @@ void readStl(std::string_view input, MeshBuilder& builder) {
 MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize, const std::string& name) {
   if (!isBinary(head, fileSize)) return {"stl, ascii", 0, 0};
   if (fileSize > 0) (void)roomForFacets(head, fileSize, name);
-  return {"stl, binary", 0, head.size() >= kHeaderSize ? facetCount(head) : 0};
+  return {"stl, binary", 0, head.size() >= kStlHeaderSize ? facetCount(head) : 0};
 }
 
 void writeStl(ByteWriter& out, const TriMesh& mesh, const Progress& progress) {

@@ -143,11 +143,17 @@ double edgeCurvature(const TriMesh& mesh) {
   return sum;
 }
 
+/// Vertices are doubled where a mesh has two normals or texture coordinates.
+bool mayHaveSeams(const TriMesh& mesh) {
+  return !mesh.attributes.normals.empty() || !mesh.attributes.uvs.empty();
+}
+
 }  // namespace
 
 // The figures are those of the surface in index space: near to the numbers' origin, so that a part
 // far away in the world measures the same.
 Measurement measure(const NarrowBand& solid, const Progress& progress) {
+  requireSolid(solid, kMeasure);
   report(progress, 0, kMeasure);
   Measurement result;
   result.voxelSize = solid.voxelSize();
@@ -173,6 +179,7 @@ Measurement measure(const NarrowBand& solid, const Progress& progress) {
 }
 
 Measurement measure(const TriMesh& mesh, const Progress& progress) {
+  if (mayHaveSeams(mesh)) return measure(withoutSeams(mesh), progress);
   report(progress, 0, kMeasure);
   Measurement result;
   const Shells shells = findShells(mesh.positions, mesh.triangles);
@@ -280,6 +287,7 @@ class FanJudge {
 }  // namespace
 
 Manifoldness manifoldness(const TriMesh& mesh) {
+  if (mayHaveSeams(mesh)) return manifoldness(withoutSeams(mesh));
   const VertexFans fans = collectFans(mesh);
   constexpr std::size_t kChunk = 1 << 14;
   std::vector<Manifoldness> parts((mesh.positions.size() + kChunk - 1) / kChunk);

@@ -28,15 +28,17 @@ struct Measurement {
 /// By quadrature on the zero set of the tricubic interpolant: on smooth surfaces better than third
 /// order in the voxel size, along edges second, as a grid shows them. Sums run in a fixed order.
 /// An empty band measures zero.
+/// @throws InvalidInput for an open surface
 [[nodiscard]] Measurement measure(const NarrowBand& solid, const Progress& progress = {});
 
 /// The same figures of a triangle mesh, exact for its flat triangles. `components` counts connected
 /// surfaces that face outwards. Volume, centroid and inertia mean something for a closed mesh only;
-/// the curvature is that of its edges, half the length times the angle [Steiner40].
+/// the curvature is that of its edges, half the length times the angle [Steiner40]. Of a mesh with
+/// normals or texture coordinates, vertices at equal positions count as one.
 [[nodiscard]] Measurement measure(const TriMesh& mesh, const Progress& progress = {});
 
 /// Is every edge shared by exactly two triangles that run along it in opposite directions, and
-/// every vertex the centre of one fan?
+/// every vertex the centre of one fan? Vertices at the seams of attributes count as one.
 struct Manifoldness {
   std::size_t boundaryEdges = 0, nonManifoldEdges = 0, misorientedEdges = 0,
               nonManifoldVertices = 0;

@@ -4,6 +4,7 @@
 #include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -125,6 +126,7 @@ NarrowBand bake(const NarrowBand& solid, const Imath::M44d& matrix, double voxel
 TriMesh transform(TriMesh mesh, const Imath::M44d& matrix) {
   const char* action = "transform";
   requireAffine(matrix, action);
+  requireAttributes(mesh, action);
   const Stretch stretch = stretchOf(matrix);
   requireStretch(stretch, action);
   mesh.spacing = coordinateSpacing(mesh) * stretch.greatest;
@@ -140,7 +142,16 @@ TriMesh transform(TriMesh mesh, const Imath::M44d& matrix) {
                         action, moved.x, moved.y, moved.z));
     position = moved;
   }
-  if (Imath::M44d(matrix).determinant() < 0)
+  const bool mirrors = Imath::M44d(matrix).determinant() < 0;
+  const std::array<Imath::V3d, 3> slopes = {Imath::V3d(matrix[0][0], matrix[0][1], matrix[0][2]),
+                                            Imath::V3d(matrix[1][0], matrix[1][1], matrix[1][2]),
+                                            Imath::V3d(matrix[2][0], matrix[2][1], matrix[2][2])};
+  const bool turns =
+      slopes != std::array{Imath::V3d(1, 0, 0), Imath::V3d(0, 1, 0), Imath::V3d(0, 0, 1)};
+  if (turns)  // else they stay to the bit
+    for (Imath::V3d& normal : mesh.attributes.normals)
+      normal = carriedNormal(normal, slopes, mirrors ? -1 : 1);
+  if (mirrors)
     for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
   return mesh;
 }

@@ -25,8 +25,11 @@ struct BakeOptions {
 [[nodiscard]] NarrowBand bake(const NarrowBand& solid, const Imath::M44d& matrix, double voxelSize,
                               const BakeOptions& options = {});
 
-/// Moves the vertices; a mirroring matrix also turns the triangles. The mesh keeps in mind how
+/// Moves the vertices; a mirroring matrix also turns the triangles. Normals follow by the inverse
+/// transpose, at unit length. The mesh keeps in mind how
 /// finely its coordinates were known, and is written in double precision from then on.
+/// @throws UsageError for a matrix that is not affine and invertible; InvalidInput for attributes
+///         that do not fit the vertices, and for places beyond what numbers hold
 [[nodiscard]] TriMesh transform(TriMesh mesh, const Imath::M44d& matrix);
 
 }  // namespace levelset

@@ -261,4 +261,38 @@ levelset::NarrowBand makeHeightmap(const Heightmap& heightmap, const V3d& center
       HeightField(heightmap, heightmapBox(heightmap, center).tile, extent.bounds, voxelSize));
 }
 
+levelset::TriMesh heightmapSheet(const Heightmap& heightmap, const V3d& center, double spacing,
+                                 const ShapeOptions& options) {
+  const Imath::Box3d tile = heightmapBox(heightmap, center).tile;
+  requirePositive(spacing, kHeightmap, "the distance of vertices");
+  const double columns = std::ceil(heightmap.size.x / spacing * (1 - 1e-9)),
+               rows = std::ceil(heightmap.size.y / spacing * (1 - 1e-9));
+  constexpr double kBytesPerVertex = 24 + 16 + 2 * 12, kMostVertices = 4294967295.0;
+  const double vertices = (columns + 1) * (rows + 1);
+  levelset::requireMemory(kBytesPerVertex * vertices, options.maxMemory, kHeightmap);
+  if (vertices > kMostVertices) {
+    throw levelset::ResourceLimit(
+        fmt::format("{}: {:.3g} vertices are more than a mesh can number; put them farther apart",
+                    kHeightmap, vertices));
+  }
+  const HeightSurface surface(heightmap);
+  levelset::TriMesh mesh;
+  const auto across = static_cast<std::uint32_t>(columns), up = static_cast<std::uint32_t>(rows);
+  for (std::uint32_t j = 0; j <= up; ++j) {
+    levelset::report(options.progress, static_cast<double>(j) / (rows + 1), kHeightmap);
+    for (std::uint32_t i = 0; i <= across; ++i) {
+      const double u = i / columns, v = j / rows;
+      mesh.positions.emplace_back(
+          tile.min.x + u * heightmap.size.x, tile.min.y + v * heightmap.size.y,
+          tile.min.z + heightmap.base + surface.at(u, v).value * heightmap.height);
+      mesh.attributes.uvs.emplace_back(u, v);
+      if (i == across || j == up) continue;
+      const std::uint32_t a = j * (across + 1) + i, b = a + across + 1;
+      mesh.triangles.push_back({a, a + 1, b + 1});
+      mesh.triangles.push_back({a, b + 1, b});
+    }
+  }
+  return mesh;
+}
+
 }  // namespace mapping

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
 #include "levelset/solids/shapes.h"
 #include "mapping/generators/tiling.h"
@@ -43,5 +44,14 @@ void checkHeightmap(const Heightmap& heightmap, const Imath::V3d& center, double
 [[nodiscard]] levelset::NarrowBand makeHeightmap(const Heightmap& heightmap,
                                                  const Imath::V3d& center, double voxelSize,
                                                  const levelset::ShapeOptions& options = {});
+
+/// Its top alone, as an open mesh that faces up: a terrain, to be a base by surfaceBand.
+/// Vertices lie `spacing` apart or closer, evenly along x and along y, with u and v as texture
+/// coordinates. Heights are those of the picture, also where a solid would be cut off below.
+/// @throws UsageError as makeHeightmap does, and for a spacing that is not positive; ResourceLimit;
+///         Cancelled
+[[nodiscard]] levelset::TriMesh heightmapSheet(const Heightmap& heightmap, const Imath::V3d& center,
+                                               double spacing,
+                                               const levelset::ShapeOptions& options = {});
 
 }  // namespace mapping

@@ -33,6 +33,16 @@ V3d onLevel(const ParticleLevel& level, double u, double v) {
               j.fraction);
 }
 
+LevelFrame frameOnLevel(const ParticleLevel& level, double u, double v) {
+  const Interval i = locate(u, level.columns), j = locate(v, level.rows);
+  const V3d &a = level.at(i.cell, j.cell), &b = level.at(i.cell + 1, j.cell),
+            &c = level.at(i.cell, j.cell + 1), &d = level.at(i.cell + 1, j.cell + 1);
+  const V3d low = lerp(a, b, i.fraction), high = lerp(c, d, i.fraction);
+  return {lerp(low, high, j.fraction),
+          {lerp(b - a, d - c, j.fraction) * static_cast<double>(level.columns - 1),
+           (high - low) * static_cast<double>(level.rows - 1), V3d(0)}};
+}
+
 /// Slopes by differences so small that they stay in one cell; exact to rounding, the map being
 /// trilinear there.
 MapSample sampleAt(const Patch& patch, const V3d& uvw, const V3d& step) {
@@ -58,6 +68,16 @@ V3d levelPosition(const Patch& patch, const V3d& uvw) {
   const Interval k = locate(uvw.z, patch.levels.size());  // levels are evenly spaced in w
   return lerp(onLevel(patch.levels[k.cell], uvw.x, uvw.y),
               onLevel(patch.levels[k.cell + 1], uvw.x, uvw.y), k.fraction);
+}
+
+LevelFrame levelFrame(const Patch& patch, const V3d& uvw) {
+  const Interval k = locate(uvw.z, patch.levels.size());
+  const LevelFrame low = frameOnLevel(patch.levels[k.cell], uvw.x, uvw.y),
+                   high = frameOnLevel(patch.levels[k.cell + 1], uvw.x, uvw.y);
+  return {lerp(low.position, high.position, k.fraction),
+          {lerp(low.slopes[0], high.slopes[0], k.fraction),
+           lerp(low.slopes[1], high.slopes[1], k.fraction),
+           (high.position - low.position) * static_cast<double>(patch.levels.size() - 1)}};
 }
 
 std::vector<MapSample> sampleLevelMap(const Patch& patch, double sink) {

@@ -2,6 +2,7 @@
 
 #include <Imath/ImathVec.h>
 
+#include <array>
 #include <vector>
 
 #include "mapping/maps/patch_map.h"
@@ -13,6 +14,16 @@ namespace mapping {
 /// about w, then linear between them [Brodersen07 §8.4]. Beyond the unit cube the outermost cells
 /// go on linearly.
 [[nodiscard]] Imath::V3d levelPosition(const Patch& patch, const Imath::V3d& uvw);
+
+/// That map with its derivatives, world units per unit of u, v and w.
+struct LevelFrame {
+  Imath::V3d position;  ///< to the bit that of levelPosition
+  std::array<Imath::V3d, 3> slopes;
+};
+
+/// On the border of two cells the slopes are those of the one that begins there, on the last border
+/// of the one that ends there.
+[[nodiscard]] LevelFrame levelFrame(const Patch& patch, const Imath::V3d& uvw);
 
 /// That map and its inverse's slopes in the middle and close to the corners of every cell, where a
 /// bilinear cell turns over first; for levels of unlike counts in those of both.

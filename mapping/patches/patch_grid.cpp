@@ -345,6 +345,7 @@ PatchGridResult makePatchGridAround(const NarrowBand& base, const V3d& from, con
   const auto [across, up] = cellsPerTile(base, rough, grid, options);
   ParticleLevel surface = roundLevel(base, frame, across * grid.columns, up * grid.rows);
   requireOneSheet(surface);
+  requireCovered(base, surface);
   settleRound(base, surface, result.report);
   const LevelSize size = roundSize(surface);
   result.report.uLength = size.u;

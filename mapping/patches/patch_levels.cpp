@@ -170,8 +170,35 @@ std::vector<ParticleLevel> levelsFromSurface(const NarrowBand& base, const Parti
   return std::move(sweep.levels);
 }
 
+void requireCovered(const NarrowBand& base, const ParticleLevel& level) {
+  if (!base.isOpenSurface()) return;
+  const SurfaceField field(base);
+  constexpr double kStepVoxels = 2;
+  const auto steps = [&](const V3d& along) {
+    return std::ceil(along.length() / (kStepVoxels * base.voxelSize()));
+  };
+  for (std::size_t j = 0; j + 1 < level.rows; ++j)
+    for (std::size_t i = 0; i + 1 < level.columns; ++i) {
+      const V3d &a = level.at(i, j), &b = level.at(i + 1, j), &c = level.at(i, j + 1),
+                &d = level.at(i + 1, j + 1);
+      const double across = steps(b - a), up = steps(c - a);
+      for (double s = 0.5; s < across; ++s)
+        for (double t = 0.5; t < up; ++t) {
+          const double u = s / across, v = t / up;
+          V3d p = (a * (1 - u) + b * u) * (1 - v) + (c * (1 - u) + d * u) * v;
+          const V3d before = p;
+          if (field.project(p, 0)) continue;
+          throw levelset::InvalidInput(fmt::format(
+              "{}: the surface breaks off at ({:.6g}, {:.6g}, {:.6g}), within the patch; keep to "
+              "one side of its border, and off its holes",
+              kPatchLevels, before.x, before.y, before.z));
+        }
+    }
+}
+
 void finishPatch(const NarrowBand& base, const PatchOptions& options, Patch& patch,
                  PatchReport& report) {
+  requireCovered(base, patch.levels.front());
   if (!options.transform.isIdentity()) {
     const Axis axis = axisOf(base, patch.levels.front());
     transformLevels(patch.levels, options.transform, axis.origin, axis.normal, axis.u,

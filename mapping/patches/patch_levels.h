@@ -54,6 +54,10 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
                                                            const PatchOptions& options,
                                                            PatchReport& report);
 
+/// An open surface lies under all of a level, looked for every two voxels; a solid does anyway.
+/// @throws InvalidInput with the place where it breaks off
+void requireCovered(const levelset::NarrowBand& base, const ParticleLevel& level);
+
 /// Turns, scales and bends the levels as the options ask, and measures them.
 void finishPatch(const levelset::NarrowBand& base, const PatchOptions& options, Patch& patch,
                  PatchReport& report);

@@ -1,9 +1,12 @@
 #include "mapping/patches/patch_space.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "levelset/eikonal/redistance.h"
+#include "levelset/error.h"
 #include "levelset/sample.h"
 #include "levelset/solids/resample.h"
 
@@ -46,7 +49,16 @@ NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> border, double h
 
 NarrowBand sweepPatchSpace(const NarrowBand& base, std::span<const V3d> border, double bulge,
                            double height, const PatchSpaceOptions& options) {
+  const double needed = height / base.voxelSize() + kMarginVoxels;
   if (base.halfWidth() * base.voxelSize() >= height + kMarginVoxels * base.voxelSize()) return base;
+  if (base.isOpenSurface()) {
+    constexpr double kRounding = 1e-6;
+    if (base.halfWidth() >= needed - kRounding) return base;
+    throw levelset::InvalidInput(fmt::format(
+        "patch: the band of the open surface reaches {:.6g} voxels, and the height {:.6g} "
+        "needs more; make it with surface-band --half-width {}, or lower the patch",
+        base.halfWidth(), height, std::ceil(needed - kRounding)));
+  }
   const NarrowBand coarse = coarsen(base, border, height, options);
   const double reach = height + kMarginVoxels * coarse.voxelSize();
   Imath::Box3d box;

@@ -19,6 +19,8 @@ struct PatchSpaceOptions {
 /// about it [Brodersen07 §8.2]. Where that is many voxels, a grid of up to a quarter of the
 /// resolution does: levels of φ grow smooth with their height, and the surface itself is left to
 /// the base's own band.
+/// @throws InvalidInput for an open surface whose band does not reach far enough: it cannot be
+/// swept
 /// @param border  points on the surface along the sides of the patch
 /// @param bulge   how far the inner surface may leave the box of the border, world units
 [[nodiscard]] levelset::NarrowBand sweepPatchSpace(const levelset::NarrowBand& base,

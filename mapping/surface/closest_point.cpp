@@ -36,6 +36,13 @@ V3d nearestFoot(const levelset::NarrowBand& base, const V3d& point) {
   return levelset::toImath(grid.indexToWorld(nearest));
 }
 
+[[noreturn]] void failBrokenOff(const V3d& foot, const V3d& point, const char* action) {
+  throw levelset::InvalidInput(fmt::format(
+      "{}: the surface breaks off at about ({:.6g}, {:.6g}, {:.6g}), before the point ({:.6g}, "
+      "{:.6g}, {:.6g}); choose a point farther within its border",
+      action, foot.x, foot.y, foot.z, point.x, point.y, point.z));
+}
+
 }  // namespace
 
 V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point, const char* action) {
@@ -58,6 +65,7 @@ V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point, cons
     }
     foot = nearestFoot(base, point);
     if (!field.project(foot, 0)) {
+      if (base.isOpenSurface()) failBrokenOff(foot, point, action);
       throw levelset::InvalidInput(fmt::format(
           "{}: the field about ({:.6g}, {:.6g}, {:.6g}), nearest to the point {}, is not a "
           "distance; re-distance the base first",
@@ -76,6 +84,15 @@ V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point, cons
     } else {
       step *= 0.5;
     }
+  }
+  // On an open surface the way to the closest point runs along the normal, or that lies at the
+  // border.
+  if (base.isOpenSurface()) {
+    const V3d normal = field.normal(foot), way = point - foot;
+    constexpr double kBeyondVoxels = 1, kSlant = 0.02;
+    const double along = (way - normal * way.dot(normal)).length();
+    if (along > kBeyondVoxels * base.voxelSize() && along > kSlant * way.length())
+      failBrokenOff(foot, point, action);
   }
   const double distance = (point - foot).length();
   // Within the band the answer is sure; the box would take a look at every voxel.

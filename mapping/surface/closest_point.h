@@ -10,7 +10,7 @@ namespace mapping {
 /// beside the surface, then along the surface until no step comes nearer.
 /// @param action  begins the message
 /// @throws InvalidInput when it is further than the diagonal of the zero set's box, or there is no
-///         surface
+///         surface; where an open surface breaks off before its nearest point, with that place
 [[nodiscard]] Imath::V3d closestSurfacePoint(const levelset::NarrowBand& base,
                                              const Imath::V3d& point, const char* action);
 

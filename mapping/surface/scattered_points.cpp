@@ -102,7 +102,8 @@ double scaleAt(const ScatterDensity& density, const V3d& place) {
 class AreaSampler {
  public:
   AreaSampler(const levelset::NarrowBand& base, const ScatterDensity& density)
-      : mesh_(levelset::bandToMesh(base)), field_(base) {
+      : mesh_(levelset::bandToMesh(base)), field_(base), isOpen_(base.isOpenSurface()) {
+    if (isOpen_) dropWalls();
     sums_.reserve(mesh_.triangles.size());
     for (const auto& [a, b, c] : mesh_.triangles) {
       const V3d& p = mesh_.positions[a];
@@ -124,14 +125,29 @@ class AreaSampler {
     point.place = mesh_.positions[a] * (1 - root) + mesh_.positions[b] * (root * (1 - share)) +
                   mesh_.positions[c] * (root * share);
     V3d foot = point.place;
-    if (field_.project(foot, 0)) point.place = foot;
+    if (!field_.project(foot, 0)) {
+      // At the border of an open surface: the middle is sure to lie on it.
+      foot = (mesh_.positions[a] + mesh_.positions[b] + mesh_.positions[c]) / 3.0;
+      if (!isOpen_ || !field_.project(foot, 0)) foot = point.place;
+    }
+    point.place = foot;
     point.normal = field_.normal(point.place);
     return point;
   }
 
  private:
+  /// Of an open surface: triangles where the band is cut off.
+  void dropWalls() {
+    std::erase_if(mesh_.triangles, [&](const auto& t) {
+      V3d p = (mesh_.positions[t[0]] + mesh_.positions[t[1]] + mesh_.positions[t[2]]) / 3.0;
+      const V3d before = p;
+      return !field_.project(p, 0) || (p - before).length() > 0.5 * field_.voxelSize();
+    });
+  }
+
   levelset::TriMesh mesh_;
   SurfaceField field_;
+  bool isOpen_;
   std::vector<double> sums_;
   double area_ = 0;
 };

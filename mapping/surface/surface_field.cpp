@@ -18,7 +18,8 @@ constexpr double kAccepted = 1e-2;   // voxels: where a crease lets the steps sw
 SurfaceField::SurfaceField(const levelset::NarrowBand& band)
     : sampler_(band, levelset::Interpolation::Tricubic),
       voxelSize_(band.voxelSize()),
-      background_(band.halfWidth() * band.voxelSize()) {}
+      background_(band.halfWidth() * band.voxelSize()),
+      isOpen_(band.isOpenSurface()) {}
 
 V3d SurfaceField::normal(const V3d& p) const {
   const V3d gradient = sampler_.gradient(p);
@@ -31,7 +32,7 @@ bool SurfaceField::project(V3d& p, double height) const {
   for (int step = 0; step < kMaxSteps; ++step) {
     const double phi = sampler_.value(p);
     const double gap = phi - height;
-    if (std::abs(gap) <= kTolerance * voxelSize_) return true;
+    if (std::abs(gap) <= kTolerance * voxelSize_) return !isOpen_ || sampler_.isInBand(p);
     // Beyond the band there is nothing to follow.
     if (std::abs(phi) >= background_ * (1 - 1e-6)) return false;
     const V3d gradient = sampler_.gradient(p);
@@ -43,7 +44,7 @@ bool SurfaceField::project(V3d& p, double height) const {
     p += move;
     last = std::abs(gap);
   }
-  return last <= kAccepted * voxelSize_;
+  return last <= kAccepted * voxelSize_ && (!isOpen_ || sampler_.isInBand(p));
 }
 
 }  // namespace mapping

@@ -18,12 +18,14 @@ class SurfaceField {
   /// ∇φ / |∇φ|; zero outside the band.
   [[nodiscard]] Imath::V3d normal(const Imath::V3d& p) const;
   /// Moves p along ∇φ until φ = height, to a hundred-thousandth of a voxel: p ← p − (φ − height)
-  /// ∇φ. False, with p where it stuck, when the way leaves the band or meets a ridge of φ.
+  /// ∇φ. False, with p where it stuck, when the way leaves the band or meets a ridge of φ, and
+  /// where an open surface breaks off.
   [[nodiscard]] bool project(Imath::V3d& p, double height) const;
 
  private:
   levelset::BandSampler sampler_;
   double voxelSize_, background_;
+  bool isOpen_;  ///< what is cut off is no surface
 };
 
 }  // namespace mapping

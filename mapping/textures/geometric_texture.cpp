@@ -75,6 +75,13 @@ void checkArguments(const NarrowBand& base, const NarrowBand& texture,
     throw UsageError(fmt::format("{}: the blend radius is {}; give a length of at least 0",
                                  kTexture, options.blend));
   }
+  if (options.merge != TextureMerge::Alone && base.isOpenSurface()) {
+    throw levelset::InvalidInput(
+        fmt::format("{}: the base is an open surface, which has no inside to join; take the "
+                    "texture --alone, or move a mesh with --map mesh",
+                    kTexture));
+  }
+  requireSolid(texture, kTexture);
   if (base.isEmpty() || texture.isEmpty()) {
     throw InvalidInput(
         fmt::format("{}: the {} has no surface; give a solid with at least one voxel", kTexture,

@@ -4,6 +4,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -18,31 +19,77 @@ namespace mapping {
 
 using Imath::V3d;
 
+namespace {
+
+constexpr const char* kMapMesh = "texture";
+
+/// Bytes of a mesh of that kind for each of its vertices.
+double bytesPerVertex(const levelset::TriMesh& mesh) {
+  const levelset::MeshAttributes& held = mesh.attributes;
+  return 24 + (held.normals.empty() ? 0 : 24) + (held.uvs.empty() ? 0 : 16) +
+         (held.colors.empty() ? 0 : 16);
+}
+
+/// How many normals have no direction.
+std::size_t countLost(const std::vector<V3d>& normals) {
+  return static_cast<std::size_t>(std::count(normals.begin(), normals.end(), V3d(0)));
+}
+
+/// Moves the vertices, and the normals with them where there are some.
+template <bool kNormals>
+void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
+                  const TexturePlacement& placement, const levelset::Progress& progress,
+                  levelset::TriMesh& mesh) {
+  const V3d size = placement.box.size();
+  const double hand = patch.mirrored ? -1 : 1;
+  levelset::ProgressGate gate(progress, mesh.positions.size(), kMapMesh);
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 4096), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          const V3d uvw = placement.toUvw(texture.positions[i]);
+          if constexpr (kNormals) {
+            const LevelFrame frame = levelFrame(patch, uvw);
+            mesh.positions[i] = frame.position;
+            mesh.attributes.normals[i] = levelset::carriedNormal(
+                texture.attributes.normals[i],
+                {frame.slopes[0] / size.x, frame.slopes[1] / size.y, frame.slopes[2] / size.z},
+                hand);
+          } else {
+            mesh.positions[i] = levelPosition(patch, uvw);
+          }
+        }
+        gate.advance(range.size());
+      });
+}
+
+}  // namespace
+
 MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
                           const MeshTextureOptions& options) {
-  constexpr const char* kTexture = "texture";
   if (!std::isfinite(options.sink)) {
     throw levelset::UsageError(
-        fmt::format("{}: the sink is {}; give a length", kTexture, options.sink));
+        fmt::format("{}: the sink is {}; give a length", kMapMesh, options.sink));
   }
   if (texture.isEmpty()) {
     throw levelset::InvalidInput(
-        fmt::format("{}: the mesh has no triangles; give one with some", kTexture));
+        fmt::format("{}: the mesh has no triangles; give one with some", kMapMesh));
   }
+  requireAttributes(texture, kMapMesh);
   if (patch.levels.size() < 2 || !(patch.height > 0)) {
     throw levelset::InvalidInput(
-        fmt::format("{}: the patch has no levels of particles; make it with `patch`", kTexture));
+        fmt::format("{}: the patch has no levels of particles; make it with `patch`", kMapMesh));
   }
   const double sink = options.sink / patch.height;
   const TexturePlacement placement{chooseTextureBox(levelset::bounds(texture), options.textureBox),
                                    sink};
   MeshTextureResult result;
   constexpr double kSampleBytes = 5 * 2 * 160;
-  levelset::requireMemory(kSampleBytes * static_cast<double>(patch.particleCount()) +
-                              40 * static_cast<double>(texture.positions.size()) +
-                              12 * static_cast<double>(texture.triangles.size()),
-                          options.maxMemory, kTexture);
-  levelset::report(options.progress, 0, kTexture);
+  levelset::requireMemory(
+      kSampleBytes * static_cast<double>(patch.particleCount()) +
+          (16 + bytesPerVertex(texture)) * static_cast<double>(texture.positions.size()) +
+          12 * static_cast<double>(texture.triangles.size()),
+      options.maxMemory, kMapMesh);
+  levelset::report(options.progress, 0, kMapMesh);
   result.distortion =
       surveyDistortion(sampleLevelMap(patch, sink), placement.box.size(), patch.mirrored);
   result.certificate = certifyLevels(patch, sink);
@@ -50,13 +97,17 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
 
   levelset::TriMesh& mesh = result.mesh;
   mesh.positions.resize(texture.positions.size());
-  levelset::ProgressGate gate(options.progress, mesh.positions.size(), kTexture);
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 4096), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i)
-          mesh.positions[i] = levelPosition(patch, placement.toUvw(texture.positions[i]));
-        gate.advance(range.size());
-      });
+  mesh.attributes = texture.attributes;
+  if (texture.attributes.normals.empty()) {
+    moveVertices<false>(texture, patch, placement, options.progress, mesh);
+  } else {
+    moveVertices<true>(texture, patch, placement, options.progress, mesh);
+    if (const std::size_t lost = countLost(mesh.attributes.normals)) {
+      result.notes.push_back(
+          fmt::format("{} of {} normals have no direction, or none on the patch, and are zero",
+                      lost, mesh.attributes.normals.size()));
+    }
+  }
   mesh.triangles = texture.triangles;
   if (patch.mirrored)
     for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
@@ -73,9 +124,10 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
         patches.size(), texture.positions.size()));
   }
   levelset::requireMemory(
-      static_cast<double>(patches.size()) * (24 * static_cast<double>(texture.positions.size()) +
-                                             12 * static_cast<double>(texture.triangles.size())),
-      options.maxMemory, "texture");
+      static_cast<double>(patches.size()) *
+          (bytesPerVertex(texture) * static_cast<double>(texture.positions.size()) +
+           12 * static_cast<double>(texture.triangles.size())),
+      options.maxMemory, kMapMesh);
   MeshTextureResult result;
   std::vector<Distortion> distortions;
   std::vector<FoldCertificate> certificates;
@@ -89,13 +141,7 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
     MeshTextureResult one = mapMesh(texture, patches[n], part);
     const bool folds = one.distortion.folded > 0 || one.certificate.verdict() == FoldVerdict::Folds;
     if (options.skipFolds && folds) continue;
-    const auto first = static_cast<std::uint32_t>(result.mesh.positions.size());
-    for (auto& triangle : one.mesh.triangles)
-      for (auto& vertex : triangle) vertex += first;
-    std::move(one.mesh.positions.begin(), one.mesh.positions.end(),
-              std::back_inserter(result.mesh.positions));
-    std::move(one.mesh.triangles.begin(), one.mesh.triangles.end(),
-              std::back_inserter(result.mesh.triangles));
+    append(result.mesh, one.mesh);
     std::move(one.notes.begin(), one.notes.end(), std::back_inserter(result.notes));
     distortions.push_back(one.distortion);
     certificates.push_back(std::move(one.certificate));

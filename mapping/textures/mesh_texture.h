@@ -37,8 +37,12 @@ struct MeshTextureResult {
 /// within the two levels about w first, then from one to the other [Brodersen07 §8.4]. Any mesh
 /// will do, closed or not; its triangles stay, turned over where the patch is mirrored so that they
 /// face as before. Beyond the unit cube the outermost cells go on.
+/// Normals follow by the inverse transpose of the map's derivatives in the cell of their vertex (on
+/// a border, in the one that begins there), at unit length and on the same side of the triangles;
+/// those of length zero stay so, with a note. Texture coordinates and colours are copied.
 /// @throws UsageError for a sink that is not finite; InvalidInput when the mesh is empty, its box
-///         has no volume, or the patch folds; ResourceLimit; Cancelled
+///         has no volume, its attributes do not fit its vertices or are not finite, or the patch
+///         folds; ResourceLimit; Cancelled
 [[nodiscard]] MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
                                         const MeshTextureOptions& options = {});
 

@@ -6,6 +6,7 @@
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
 #include "levelset/convert/mesh_to_band.h"
+#include "levelset/convert/surface_band.h"
 #include "levelset/error.h"
 #include "levelset/meshing/band_to_mesh.h"
 #include "mapping/patches/patch_mesh.h"
@@ -76,17 +77,34 @@ Plan planLevelSet(Invocation& in) {
   return plan;
 }
 
+Value surfaceBand(Invocation& in) {
+  const levelset::SurfaceBandResult result = levelset::surfaceBand(
+      in.mesh(), in.voxelSize(longestSide(in.operands[0])),
+      {.halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress});
+  in.notes.notes.push_back(fmt::format("{} border edges, {} triangles dropped", result.borderEdges,
+                                       result.droppedTriangles));
+  if (result.cutVoxels > 0)
+    in.notes.notes.push_back(
+        fmt::format("{} voxels lie half way between the front of one part of the surface and the "
+                    "back of another, and are cut out: patches cannot pass there",
+                    result.cutVoxels));
+  return Value(result.band);
+}
+
+Plan planSurfaceBand(Invocation& in) {
+  Plan plan = in.operands[0].plan();
+  plan.kind = Kind::Surface;
+  plan.voxelSize = in.voxelSize(longestSide(in.operands[0]));
+  plan.halfWidth = in.number("half-width");
+  levelset::checkVoxelSize(plan.voxelSize, longestSide(in.operands[0]), "surface-band");
+  return plan;
+}
+
 /// All patches of a set in one mesh.
 levelset::TriMesh meshOfPatches(const std::vector<mapping::Patch>& patches,
                                 mapping::PatchMeshKind kind) {
   levelset::TriMesh all;
-  for (const mapping::Patch& patch : patches) {
-    const auto first = static_cast<std::uint32_t>(all.positions.size());
-    const levelset::TriMesh one = mapping::patchMesh(patch, kind);
-    all.positions.insert(all.positions.end(), one.positions.begin(), one.positions.end());
-    for (const auto& t : one.triangles)
-      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  }
+  for (const mapping::Patch& patch : patches) append(all, mapping::patchMesh(patch, kind));
   return all;
 }
 
@@ -137,6 +155,34 @@ void addConversionOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Mesh}},
       .run = levelSet,
       .plan = planLevelSet,
+      .validate = requireVoxelSize,
+  });
+  all.push_back({
+      .name = "surface-band",
+      .group = "Conversion",
+      .summary = "make an open mesh (terrain, a sheet) a base for patches",
+      .details =
+          "Distances to one side and the other of a mesh whose faces are all turned to one side, "
+          "up "
+          "to its border. It has no inside: 'patch', 'decal', 'patch-grid', 'scatter' and 'folds' "
+          "take it as base, 'texture' with --alone or --map mesh. Patches end at the border. The "
+          "band has to be as wide as patches are high, and six voxels more, unless their levels "
+          "follow a spline. A closed mesh is for 'level-set'.",
+      .example =
+          "levelsmith heightmap --image <(printf '0 1 0\\n1 2 1\\n0 1 0\\n') --size 8,8 --height 2 "
+          "--voxel 0.2 --sheet ! surface-band --voxel 0.2 --half-width 12 ! patch --at "
+          "0,0,2 --size 3,3 --height 1 ! mesh ! measure",
+      .params = {voxelParam(),
+                 resolutionParam(),
+                 {.name = "half-width",
+                  .type = ParamType::Number,
+                  .doc = "half width of the band, voxels, at least 4",
+                  .fallback = "5",
+                  .range = Range::Positive}},
+      .operands = {{Kind::Mesh}},
+      .resultKind = [](const Invocation&) { return Kind::Surface; },
+      .run = surfaceBand,
+      .plan = planSurfaceBand,
       .validate = requireVoxelSize,
   });
   all.push_back({

@@ -46,8 +46,10 @@ Value read(Invocation& in) {
   if (fileKind(in) == Kind::Patch)
     return Value(PatchValue{.patches = mapping::readPatches(file, in.maxMemory)});
   if (fileKind(in) == Kind::Mesh) {
-    return Value(levelset::readMesh(
-        file, {.format = in.text("format"), .maxMemory = in.maxMemory, .progress = in.progress}));
+    return Value(levelset::readMesh(file, {.format = in.text("format"),
+                                           .attributes = !in.flag("bare"),
+                                           .maxMemory = in.maxMemory,
+                                           .progress = in.progress}));
   }
   levelset::BandRepairs repairs;
   const levelset::ReadBandOptions options{.grid = in.text("grid"),
@@ -97,6 +99,10 @@ Plan planRead(Invocation& in) {
 
 void validateRead(const Invocation& in) {
   const Kind kind = fileKind(in);
+  if (kind != Kind::Mesh && in.flag("bare"))
+    throw UsageError(
+        fmt::format("read: --bare leaves out what a mesh carries, and this is a {}; leave it out",
+                    kindName(kind)));
   if (kind != Kind::Band && in.given("grid"))
     throw UsageError(fmt::format(
         "read: --grid picks a grid of a .vdb, and this is a {}; leave it out", kindName(kind)));
@@ -131,6 +137,11 @@ Value write(Invocation& in) {
                           .progress = in.progress});
   } else if (value.kind() == Kind::Mesh) {
     levelset::writeMesh(file, value.mesh(), {.format = in.text("format"), .progress = in.progress});
+    if (!value.mesh().attributes.isEmpty() && !levelset::holdsAttributes(formatName(in)))
+      in.notes.warnings.push_back(fmt::format(
+          "{} holds positions and triangles only: the {} were left out; write .ply or .obj to keep "
+          "them",
+          file.string(), describe(value.mesh().attributes)));
   } else {
     levelset::writeBand(
         file, value.band(),
@@ -147,9 +158,12 @@ void addFileOperators(std::vector<Operator>& all) {
       .group = "Files",
       .summary =
           "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), patches (patch)",
-      .details = "A .vdb with more than one level set needs --grid. A grid that is no level set "
-                 "must be named too; it becomes a field: of numbers, or of vectors, staggered ones "
-                 "among them. '-' is standard input and needs --format.",
+      .details =
+          "A .vdb with more than one level set needs --grid. A grid that is no level set "
+          "must be named too; it becomes a field: of numbers, or of vectors, staggered ones "
+          "among them. Meshes keep the normals, texture coordinates and colours that PLY and "
+          "OBJ give their vertices. "
+          "'-' is standard input and needs --format.",
       .example = "levelsmith read dragon.ply.gz ! info",
       .params = {{.name = "file",
                   .type = ParamType::Path,
@@ -159,7 +173,11 @@ void addFileOperators(std::vector<Operator>& all) {
                  {.name = "format",
                   .type = ParamType::Text,
                   .doc = "ply, obj, stl, off, vdb, patch; default: by extension"},
-                 {.name = "grid", .type = ParamType::Text, .doc = "name of the grid in a .vdb"}},
+                 {.name = "grid", .type = ParamType::Text, .doc = "name of the grid in a .vdb"},
+                 {.name = "bare",
+                  .type = ParamType::Flag,
+                  .doc = "of a mesh: positions and triangles only, no normals, texture coordinates "
+                         "and colours"}},
       .resultKind = readKind,
       .run = read,
       .plan = planRead,

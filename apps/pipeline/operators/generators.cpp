@@ -156,7 +156,7 @@ Generator gyroid(Invocation& in) {
           }};
 }
 
-Generator heightmap(Invocation& in) {
+mapping::Heightmap heightmapOf(Invocation& in) {
   mapping::Heightmap heightmap;
   const std::vector<double> size = in.lengths("size");
   heightmap.size = {size[0], size[1]};
@@ -165,6 +165,11 @@ Generator heightmap(Invocation& in) {
   if (in.text("interpolation") == "linear")
     heightmap.interpolation = mapping::HeightInterpolation::Linear;
   heightmap.grid = readHeights(in.text("image"), in.flag("invert"), in.maxMemory);
+  return heightmap;
+}
+
+Generator heightmap(Invocation& in) {
+  mapping::Heightmap heightmap = heightmapOf(in);
   const V3d center = in.point("center");
   const levelset::ShapeExtent extent = mapping::heightmapExtent(heightmap, center);
   const mapping::TileBox box = mapping::heightmapBox(heightmap, center);
@@ -201,6 +206,15 @@ template <Generate generate>
 Value makeTexture(Invocation& in) {
   const auto [generator, voxel] = describeTexture(in, generate);
   return Value(generator.make(voxel, generatorOptions(in)));
+}
+
+Value heightmapSheet(Invocation& in) {
+  if (in.asksVoxelSize() && in.given("voxel")) in.setReference(in.length("voxel"), 0);
+  const mapping::Heightmap map = heightmapOf(in);  // once: the picture may be a pipe
+  const V3d center = in.point("center");
+  const V3d size = mapping::heightmapExtent(map, center).bounds.size();
+  const double voxel = in.voxelSize(std::max({size.x, size.y, size.z}));
+  return Value(mapping::heightmapSheet(map, center, voxel, generatorOptions(in)));
 }
 
 template <Generate generate>
@@ -369,7 +383,26 @@ void addGeneratorOperators(std::vector<Operator>& all) {
        size("height", "of white above black"),
        size("base", "of solid below black; 'auto': half the height", "auto", Range::NonNegative),
        choice("interpolation", "between pixels", {"cubic", "linear"}),
-       {.name = "invert", .type = ParamType::Flag, .doc = "black is high, white is low"}}));
+       {.name = "invert", .type = ParamType::Flag, .doc = "black is high, white is low"},
+       {.name = "sheet",
+        .type = ParamType::Flag,
+        .doc = "its top alone, as an open mesh with a vertex every voxel: for 'surface-band'"}}));
+  all.back().resultKind = [](const Invocation& in) {
+    return in.flag("sheet") ? Kind::Mesh : Kind::Band;
+  };
+  all.back().run = [](Invocation& in) {
+    return in.flag("sheet") ? heightmapSheet(in) : makeTexture<heightmap>(in);
+  };
+  all.back().plan = [](Invocation& in) {
+    Plan plan = planTextureSolid<heightmap>(in);
+    if (in.flag("sheet")) plan.kind = Kind::Mesh;
+    return plan;
+  };
+  all.back().validate = [](const Invocation& in) {
+    in.requireVoxelSize();
+    if (in.flag("sheet") && in.given("half-width"))
+      throw levelset::UsageError("heightmap: a --sheet is a mesh and has no --half-width");
+  };
 }
 
 }  // namespace pipeline

@@ -176,6 +176,7 @@ Json fileInfo(const std::string& file, const std::string& format) {
     json["format"] = info.format;
     json["vertices"] = countOrNull(info.vertices);
     json["faces"] = countOrNull(info.faces);
+    if (!info.attributes.empty()) json["attributes"] = info.attributes;
     return json;
   }
   json["grids"] = Json::array();
@@ -196,7 +197,7 @@ Json valueInfo(const Value& value) {
   Json json;
   json["kind"] = kindName(value.kind());
   json["bounds"] = toJson(value.plan().bounds);
-  if (value.kind() == Kind::Band) {
+  if (value.kind() == Kind::Band || value.kind() == Kind::Surface) {
     json["voxel_size"] = value.band().voxelSize();
     json["half_width"] = value.band().halfWidth();
     json["active_voxels"] = value.band().activeVoxelCount();
@@ -205,6 +206,7 @@ Json valueInfo(const Value& value) {
   } else if (value.kind() == Kind::Mesh) {
     json["vertices"] = value.mesh().positions.size();
     json["triangles"] = value.mesh().triangles.size();
+    if (!value.mesh().attributes.isEmpty()) json["attributes"] = describe(value.mesh().attributes);
   } else if (value.kind() == Kind::Field) {
     const levelset::FieldGrid& field = value.field();
     json["values"] = field.isVector() ? "vectors" : "numbers";
@@ -316,7 +318,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
                   .type = ParamType::Text,
                   .doc = "of the file; default: by extension"},
                  jsonParam()},
-      .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface}},
       .operandsOptional = true,
       .flow = Flow::PassesThrough,
       .run = info,

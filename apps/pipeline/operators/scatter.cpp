@@ -186,7 +186,7 @@ void addScatterOperators(std::vector<Operator>& all) {
             .doc = "another number gives other places",
             .fallback = "1"},
            {.name = "allow-folds", .type = ParamType::Flag, .doc = "lay patches that fold"}})),
-      .operands = {{Kind::Band}},
+      .operands = {{Kind::Band, Kind::Surface}},
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = scatter,
       .plan = planScatter,

@@ -267,7 +267,7 @@ void addFoldOperators(std::vector<Operator>& all) {
                             .doc = "as of `texture`",
                             .fallback = "0.25",
                             .range = Range::NonNegative}}),
-      .operands = {{Kind::Band}, {Kind::Patch}},
+      .operands = {{Kind::Band, Kind::Surface}, {Kind::Patch}},
       .resultKind = [](const Invocation&) { return Kind::Field; },
       .run = folds,
       .plan = planFolds,

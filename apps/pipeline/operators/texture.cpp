@@ -153,7 +153,7 @@ void addTextureOperators(std::vector<Operator>& all) {
           "--levels 6 --as p "
           "! texture @base @rings @p --map rbf --blend 1 ! write out.vdb ! mesh ! write out.ply",
       .params = textureParams(),
-      .operands = {{Kind::Band}, {Kind::Band, Kind::Mesh}, {Kind::Patch}},
+      .operands = {{Kind::Band, Kind::Surface}, {Kind::Band, Kind::Mesh}, {Kind::Patch}},
       .resultKind = [](const Invocation& in) { return mapsMesh(in) ? Kind::Mesh : Kind::Band; },
       .run = texture,
       .plan = planTexture,

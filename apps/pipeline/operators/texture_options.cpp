@@ -116,6 +116,7 @@ Plan planTexture(Invocation& in) {
     return plan;
   }
   Plan plan = in.operands[0].plan();
+  plan.kind = Kind::Band;
   const Plan &texture = in.operands[1].plan(), &patch = in.operands[2].plan();
   plan.voxelSize = in.given("voxel") ? in.length("voxel")
                                      : mapping::resultVoxelSize(plan.voxelSize, texture.voxelSize,
@@ -134,6 +135,10 @@ void validateTextureOptions(const Invocation& in) {
     throw UsageError(in.op().name + ": --carve and --alone exclude each other");
   if (in.flag("allow-folds") && in.flag("skip-folds"))
     throw UsageError(in.op().name + ": --allow-folds and --skip-folds exclude each other");
+  if (in.operands[0].kind() == Kind::Surface && !mapsMesh(in) && !in.flag("alone"))
+    throw UsageError(in.op().name +
+                     ": the base is a surface band, which has no inside to join; take the texture "
+                     "--alone, or move a mesh with --map mesh");
   if (in.flag("alone") && in.given("blend"))
     throw UsageError(in.op().name + ": --alone has no seam to blend; leave --blend out");
   const Kind kind = in.operands[1].kind();

@@ -322,14 +322,20 @@ TEST(MeshFile, KeepsExtremeButFiniteCoordinates) {
 // === OBJ
 
 TEST(MeshFile, ReadsObjInAllItsForms) {
-  const TriMesh mesh =
-      parse("a.obj",
-            "\xEF\xBB\xBF# made by hand\r\nmtllib a.mtl\r\no thing\\\r\n\r\n"
-            "v 0 0 0\r\nv 1 0 0 0.5 0.5 0.5\r\n v\t1 \\\r\n 1 0 # corner\r\nv 0 1 0 1\r\n"
-            "vt 0 0\r\nvn 0 0 1\r\ns off\r\n"
-            "f 1 2 3\r\nf 1/1 2/1 3/1\r\nf 1//1 2//1 3//1\r\nf 1/1/1 2/1/1 3/1/1\r\n"
-            "f -4 -3 -2\r\nf 1 2 \\\r\n3\r\nf -1/-1/-1 1// 3/\r\nf 1 2\r\nf\r\n"
-            "f 1 2 3 4 # quad\r\nl 1 2\r\nf 1 2 3");
+  const std::string text =
+      "\xEF\xBB\xBF# made by hand\r\nmtllib a.mtl\r\no thing\\\r\n\r\n"
+      "v 0 0 0\r\nv 1 0 0 0.5 0.5 0.5\r\n v\t1 \\\r\n 1 0 # corner\r\nv 0 1 0 1\r\n"
+      "vt 0 0\r\nvn 0 0 1\r\ns off\r\n"
+      "f 1 2 3\r\nf 1/1 2/1 3/1\r\nf 1//1 2//1 3//1\r\nf 1/1/1 2/1/1 3/1/1\r\n"
+      "f -4 -3 -2\r\nf 1 2 \\\r\n3\r\nf -1/-1/-1 1// 3/\r\nf 1 2\r\nf\r\n"
+      "f 1 2 3 4 # quad\r\nl 1 2\r\nf 1 2 3";
+  // Two of the first three vertices' pairs of vt and vn are others than the first.
+  const TriMesh whole = parse("a.obj", text), mesh = parse("a.obj", text, {.attributes = false});
+  ASSERT_EQ(whole.positions.size(), 4u + 3 * 2);
+  ASSERT_EQ(whole.triangles.size(), mesh.triangles.size());
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_EQ(whole.positions[whole.triangles[i][k]], mesh.positions[mesh.triangles[i][k]]) << i;
   ASSERT_EQ(mesh.positions.size(), 4u);
   EXPECT_EQ(mesh.positions[2], Imath::V3d(1, 1, 0));
   ASSERT_EQ(mesh.triangles.size(), 10u);

@@ -1,0 +1,95 @@
+#include "levelset/convert/pseudonormals.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace levelset::convert {
+namespace {
+
+using Imath::V3d;
+
+V3d directionOf(const V3d& v) {
+  const double length = v.length();
+  return length > 0 ? v / length : V3d(0);
+}
+
+double angleBetween(const V3d& a, const V3d& b) {
+  return std::atan2(a.cross(b).length(), a.dot(b));
+}
+
+}  // namespace
+
+// By the regions of its plane that are nearest to corners, edges and the inside [Ericson05, 5.1.5].
+TriangleFoot closestOnTriangle(const V3d& p, const V3d& a, const V3d& b, const V3d& c) {
+  const V3d ab = b - a, ac = c - a, ap = p - a;
+  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
+  if (d1 <= 0 && d2 <= 0) return {a, 0};
+  const V3d bp = p - b;
+  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
+  if (d3 >= 0 && d4 <= d3) return {b, 1};
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return {a + ab * (d1 / (d1 - d3)), 3};
+  const V3d cp = p - c;
+  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
+  if (d6 >= 0 && d5 <= d6) return {c, 2};
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return {a + ac * (d2 / (d2 - d6)), 5};
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
+    return {b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), 4};
+  const double sum = va + vb + vc;
+  return {a + ab * (vb / sum) + ac * (vc / sum), 6};
+}
+
+Pseudonormals::Pseudonormals(const LocalMesh& mesh)
+    : mesh_(mesh), vertices_(mesh.points.size()), edgeOf_(mesh.triangles.size()) {
+  const std::size_t count = mesh.triangles.size();
+  faces_.reserve(count);
+  struct Side {
+    std::uint32_t low, high, triangle, corner;
+    bool rises;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * count);
+  for (std::uint32_t t = 0; t < count; ++t) {
+    const V3d &a = mesh.corner(t, 0), &b = mesh.corner(t, 1), &c = mesh.corner(t, 2);
+    faces_.push_back(directionOf((b - a).cross(c - a)));
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3];
+      sides.push_back({std::min(from, to), std::max(from, to), t, k, from < to});
+      const V3d &at = mesh.points[from], &last = mesh.corner(t, (k + 2) % 3);
+      vertices_[from].normal += faces_[t] * angleBetween(mesh.points[to] - at, last - at);
+    }
+  }
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+  });
+  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
+    Direction edge;
+    for (end = i;
+         end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high;
+         ++end) {
+      edge.normal += faces_[sides[end].triangle];
+      edgeOf_[sides[end].triangle][sides[end].corner] = static_cast<std::uint32_t>(edges_.size());
+    }
+    const std::size_t faces = end - i;
+    edge.normal = directionOf(edge.normal);
+    edge.onBorder = faces == 1;
+    edges_.push_back(edge);
+    borderEdges_ += edge.onBorder;
+    if (edge.onBorder) vertices_[sides[i].low].onBorder = vertices_[sides[i].high].onBorder = true;
+    const bool isSound = faces == 1 || (faces == 2 && sides[i].rises != sides[i + 1].rises);
+    if (!isSound && !flaw_)
+      flaw_ = UnorientedEdge{mesh.points[sides[i].low], mesh.points[sides[i].high], faces};
+  }
+  for (Direction& vertex : vertices_) vertex.normal = directionOf(vertex.normal);
+}
+
+Pseudonormals::Direction Pseudonormals::at(std::uint32_t triangle, int part) const {
+  if (part == 6) return {faces_[triangle], false};
+  const auto k = static_cast<std::size_t>(part % 3);
+  return part < 3 ? vertices_[mesh_.triangles[triangle][k]] : edges_[edgeOf_[triangle][k]];
+}
+
+}  // namespace levelset::convert

@@ -1,0 +1,247 @@
+#include "levelset/convert/surface_band.h"
+
+#include <fmt/core.h>
+#include <openvdb/tree/LeafManager.h>
+#include <tbb/enumerable_thread_specific.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <memory>
+
+#include "levelset/convert/mesh_to_band_input.h"
+#include "levelset/convert/pseudonormals.h"
+#include "levelset/convert/surface_blocks.h"
+#include "levelset/convert/triangle_distance.h"
+#include "levelset/error.h"
+#include "levelset/memory_limit.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using convert::LocalMesh;
+using convert::Pseudonormals;
+using Imath::V3d;
+using Imath::V3i;
+using SurfaceLeaf = openvdb::FloatTree::LeafNodeType;
+
+constexpr const char* kSurfaceBand = "surface-band";
+// Voxels by which the surface goes on beyond its border: what a tricubic reads at a corner of it.
+constexpr double kBeyond = 3;
+constexpr double kTouching = 1e-6;  // voxels, as in meshToBand
+
+/// A triangle's bounding sphere, for a quick look.
+struct Sphere {
+  V3d center;
+  double radius;
+};
+
+std::vector<Sphere> spheresOf(const LocalMesh& mesh) {
+  std::vector<Sphere> spheres;
+  spheres.reserve(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    Imath::Box3d box;
+    for (std::size_t k = 0; k < 3; ++k) box.extendBy(mesh.corner(t, k));
+    spheres.push_back({box.center(), 0.5 * box.size().length()});
+  }
+  return spheres;
+}
+
+/// What a grid point knows of the surface: voxels.
+struct SignedPoint {
+  double value = 0;
+  bool isActive = false;
+};
+
+class SideOfSurface {
+ public:
+  SideOfSurface(const LocalMesh& mesh, const Pseudonormals& normals, double reach)
+      : mesh_(mesh), normals_(normals), spheres_(spheresOf(mesh)), reach_(reach) {}
+
+  /// As far as a block has to look, so that what the surface goes on by is seen.
+  [[nodiscard]] double search() const { return std::sqrt(reach_ * reach_ + kBeyond * kBeyond); }
+
+  /// @param distance  of the point to the nearest triangle
+  [[nodiscard]] SignedPoint at(const V3d& p, double distance,
+                               std::span<const std::uint32_t> candidates) const {
+    double best = HUGE_VAL;
+    std::uint32_t nearest = 0;
+    convert::TriangleFoot foot;
+    for (const std::uint32_t t : candidates) {
+      const Sphere& sphere = spheres_[t];
+      const double most = distance + sphere.radius + 1e-3;
+      if ((p - sphere.center).length2() > most * most) continue;
+      const convert::TriangleFoot at =
+          convert::closestOnTriangle(p, mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2));
+      const double squared = (p - at.point).length2();
+      if (squared >= best) continue;
+      best = squared;
+      nearest = t;
+      foot = at;
+    }
+    const Pseudonormals::Direction direction = normals_.at(nearest, foot.part);
+    const V3d way = p - foot.point;
+    const double ahead = way.dot(direction.normal);
+    if (!direction.onBorder) {
+      const double length = distance < kTouching ? 0 : distance;
+      return {ahead < 0 ? -length : length, length < reach_};
+    }
+    // Straight on beyond the border, across which `ahead` goes over from the distance smoothly.
+    const double beyond = (way - direction.normal * ahead).length();
+    const bool isOn = direction.normal != V3d(0) && beyond <= kBeyond && std::abs(ahead) < reach_;
+    return {std::abs(ahead) < kTouching ? 0 : ahead, isOn};
+  }
+
+ private:
+  const LocalMesh& mesh_;
+  const Pseudonormals& normals_;
+  std::vector<Sphere> spheres_;
+  double reach_;
+};
+
+openvdb::FloatGrid::Ptr measureBlocks(const LocalMesh& mesh, const SideOfSurface& side,
+                                      const V3i& origin, double voxelSize, double halfWidth,
+                                      std::size_t maxMemory, const Progress& progress) {
+  const float background = backgroundOf(halfWidth, voxelSize);
+  tbb::enumerable_thread_specific<convert::BlockDistance> scratch(
+      [&] { return convert::BlockDistance(side.search()); });
+  tbb::enumerable_thread_specific<std::vector<std::unique_ptr<SurfaceLeaf>>> parts;
+  std::atomic<std::size_t> leafCount{0};
+  const auto visit = [&](const V3i& block, std::span<const std::uint32_t> candidates) {
+    convert::BlockDistance& distance = scratch.local();
+    if (!distance.measure(mesh, candidates, V3d(block))) return;
+    const V3i corner = block + origin;
+    auto leaf = std::make_unique<SurfaceLeaf>(openvdb::Coord(corner.x, corner.y, corner.z),
+                                              background, false);
+    float* values = leaf->buffer().data();
+    for (openvdb::Index i = 0; i < SurfaceLeaf::SIZE; ++i) {
+      const double d = distance.distances()[i];
+      if (d >= side.search()) continue;
+      const openvdb::Coord local = SurfaceLeaf::offsetToLocalCoord(i);
+      const SignedPoint point =
+          side.at(V3d(block) + V3d(local.x(), local.y(), local.z()), d, candidates);
+      values[i] = point.value < 0 ? -background : background;
+      if (!point.isActive) continue;
+      values[i] = std::clamp(static_cast<float>(point.value * voxelSize), -background, background);
+      leaf->setValueOn(i);
+    }
+    if (leaf->isEmpty()) return;
+    parts.local().push_back(std::move(leaf));
+    constexpr std::size_t kStep = 4096;
+    const std::size_t count = leafCount.fetch_add(1, std::memory_order_relaxed) + 1;
+    if (count % kStep == 0)
+      requireMemory(
+          static_cast<double>(count) * (sizeof(SurfaceLeaf) + SurfaceLeaf::SIZE * sizeof(float)),
+          maxMemory, kSurfaceBand);
+  };
+  convert::forEachBlock(mesh, side.search(), visit, progress);
+  std::vector<std::unique_ptr<SurfaceLeaf>> all;
+  for (auto& part : parts)
+    for (auto& leaf : part) all.push_back(std::move(leaf));
+  std::sort(all.begin(), all.end(),
+            [](const auto& a, const auto& b) { return a->origin() < b->origin(); });
+  auto grid = emptyLevelSet(uniformTransform(voxelSize), halfWidth);
+  for (auto& leaf : all) grid->tree().addLeaf(leaf.release());
+  return grid;
+}
+
+/// Is the change of sign from `here` to `next` no surface, but the middle between the front of one
+/// part and the back of another? Distances differ by no more than the step where there is one
+/// surface; closer parts are told by slopes that run against the change on both sides of it.
+/// @param last, after  the points before and behind, where they are active
+bool isContradiction(float here, float next, const float* last, const float* after, float voxel) {
+  if ((here < 0) == (next < 0)) return false;
+  const float change = next - here;
+  if (std::abs(change) > 1.05f * voxel) return true;
+  return last && after && (here - *last) * change < 0 && (*after - next) * change < 0;
+}
+
+/// Takes out what lies beside a contradiction.
+std::size_t cutContradictions(openvdb::FloatGrid& grid) {
+  const float voxel = static_cast<float>(grid.voxelSize()[0]), background = grid.background();
+  openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid.tree());
+  std::vector<std::vector<openvdb::Index>> cuts(leaves.leafCount());
+  leaves.foreach ([&](const SurfaceLeaf& leaf, std::size_t n) {
+    auto accessor = grid.getConstAccessor();
+    for (auto it = leaf.cbeginValueOn(); it; ++it) {
+      bool isCut = false;
+      for (int k = 0; k < 6 && !isCut; ++k) {
+        openvdb::Coord step(0);
+        step[k / 2] = k % 2 ? 1 : -1;
+        const openvdb::Coord c = it.getCoord();
+        float next, last, after;
+        if (!accessor.probeValue(c + step, next)) continue;
+        const bool hasLast = accessor.probeValue(c - step, last),
+                   hasAfter = accessor.probeValue(c + step + step, after);
+        isCut = isContradiction(*it, next, hasLast ? &last : nullptr, hasAfter ? &after : nullptr,
+                                voxel);
+      }
+      if (isCut) cuts[n].push_back(it.pos());
+    }
+  });
+  std::size_t count = 0;
+  for (std::size_t n = 0; n < cuts.size(); ++n)
+    for (const openvdb::Index i : cuts[n]) {
+      SurfaceLeaf& leaf = leaves.leaf(n);
+      leaf.setValueOff(i, leaf.getValue(i) < 0 ? -background : background);
+      ++count;
+    }
+  return count;
+}
+
+void checkSurface(const Pseudonormals& normals, const V3i& origin, double voxelSize) {
+  if (const auto& flaw = normals.flaw()) {
+    const auto text = [&](const V3d& p) {
+      const V3d world = (p + V3d(origin)) * voxelSize;
+      return fmt::format("({:.6g}, {:.6g}, {:.6g})", world.x, world.y, world.z);
+    };
+    throw InvalidInput(
+        flaw->faces > 2
+            ? fmt::format("{}: at the edge from {} to {} {} faces meet, so that it has no two "
+                          "sides; take the surface apart there",
+                          kSurfaceBand, text(flaw->from), text(flaw->to), flaw->faces)
+            : fmt::format("{}: at the edge from {} to {} two faces are turned against each other; "
+                          "turn all to one side (a Moebius strip has only one: cut it)",
+                          kSurfaceBand, text(flaw->from), text(flaw->to)));
+  }
+  if (normals.borderEdges() == 0)
+    throw InvalidInput(fmt::format(
+        "{}: the mesh has no border; 'level-set' makes a solid of a closed one", kSurfaceBand));
+}
+
+}  // namespace
+
+SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
+                              const SurfaceBandOptions& options) {
+  constexpr double kNarrowest = 4;
+  if (!(options.halfWidth >= kNarrowest) || !std::isfinite(options.halfWidth))
+    throw UsageError(fmt::format("{}: the half width is {} voxels; give at least {}", kSurfaceBand,
+                                 options.halfWidth, kNarrowest));
+  convert::checkMeshInput(mesh, voxelSize,
+                          {.halfWidth = options.halfWidth, .maxMemory = options.maxMemory},
+                          kSurfaceBand);
+  report(options.progress, 0, kSurfaceBand);
+  const convert::MeshTopology topology = convert::findTopology(mesh);
+  if (topology.triangles.empty())
+    throw InvalidInput(
+        fmt::format("{}: every triangle is degenerate; there is no surface", kSurfaceBand));
+  const V3i origin = convert::localOrigin(mesh, voxelSize);
+  const LocalMesh local = convert::toLocal(mesh, topology, voxelSize, origin);
+  const Pseudonormals normals(local);
+  checkSurface(normals, origin, voxelSize);
+  const SideOfSurface side(local, normals, options.halfWidth);
+  const auto grid =
+      measureBlocks(local, side, origin, voxelSize, options.halfWidth,
+                    memoryLimit(options.maxMemory), subProgress(options.progress, 0.1, 1));
+  SurfaceBandResult result;
+  result.cutVoxels = cutContradictions(*grid);
+  markOpenSurface(*grid);
+  result.band = makeBand(grid);
+  result.borderEdges = normals.borderEdges();
+  result.droppedTriangles = topology.dropped;
+  report(options.progress, 1, kSurfaceBand);
+  return result;
+}
+
+}  // namespace levelset

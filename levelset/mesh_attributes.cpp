@@ -1,0 +1,125 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/convert/position_table.h"
+#include "levelset/error.h"
+#include "levelset/mesh.h"
+
+namespace levelset {
+namespace {
+
+using Imath::V3d;
+
+/// One list: as long as there are vertices, and all of it finite.
+template <typename Vector>
+void requireList(const std::vector<Vector>& list, std::size_t vertices, const char* name,
+                 const char* action) {
+  if (list.empty()) return;
+  if (list.size() != vertices) {
+    throw InvalidInput(
+        fmt::format("{}: the mesh has {} {}s for {} vertices; give one to each, or "
+                    "none",
+                    action, list.size(), name, vertices));
+  }
+  for (std::size_t v = 0; v < vertices; ++v)
+    for (unsigned axis = 0; axis < Vector::dimensions(); ++axis)
+      if (!std::isfinite(list[v][static_cast<int>(axis)])) {
+        throw InvalidInput(
+            fmt::format("{}: the {} of vertex {} holds {}, which is not a number; "
+                        "repair the mesh, or leave its {}s out",
+                        action, name, v, list[v][static_cast<int>(axis)], name));
+      }
+}
+
+double largestPart(const V3d& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+template <typename Vector>
+void appendList(std::vector<Vector>& list, std::size_t before, const std::vector<Vector>& other,
+                std::size_t more) {
+  if (list.size() != before || other.size() != more) return list.clear();
+  list.insert(list.end(), other.begin(), other.end());
+}
+
+}  // namespace
+
+std::string describe(const MeshAttributes& attributes) {
+  std::vector<const char*> names;
+  if (!attributes.normals.empty()) names.push_back("normals");
+  if (!attributes.uvs.empty()) names.push_back("texture coordinates");
+  if (!attributes.colors.empty()) names.push_back("colours");
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i > 0) text += i + 1 < names.size() ? ", " : " and ";
+    text += names[i];
+  }
+  return text;
+}
+
+void requireAttributes(const TriMesh& mesh, const char* action) {
+  const std::size_t count = mesh.positions.size();
+  requireList(mesh.attributes.normals, count, "normal", action);
+  requireList(mesh.attributes.uvs, count, "texture coordinate", action);
+  requireList(mesh.attributes.colors, count, "colour", action);
+}
+
+V3d carriedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, double hand) {
+  // Divided by the largest number first, so that no product leaves the range of numbers.
+  const double size =
+      std::max({largestPart(slopes[0]), largestPart(slopes[1]), largestPart(slopes[2])});
+  const double length = largestPart(normal);
+  if (!(size > 0) || !(length > 0)) return V3d(0);
+  const V3d a = slopes[0] / size, b = slopes[1] / size, c = slopes[2] / size, n = normal / length;
+  // The columns of the cofactor matrix: the inverse transpose but for its determinant, which need
+  // not be divided by.
+  const V3d moved = hand * (n.x * b.cross(c) + n.y * c.cross(a) + n.z * a.cross(b));
+  const double scale = largestPart(moved);
+  // What is left of a flat map is rounding.
+  const double sum = std::abs(n.x) * b.length() * c.length() +
+                     std::abs(n.y) * c.length() * a.length() +
+                     std::abs(n.z) * a.length() * b.length();
+  if (!(scale > 1e-14 * sum)) return V3d(0);
+  return (moved / scale).normalized();
+}
+
+void append(TriMesh& mesh, const TriMesh& other) {
+  const std::size_t before = mesh.positions.size(), more = other.positions.size();
+  const auto first = static_cast<std::uint32_t>(before);
+  mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
+  for (const auto& t : other.triangles)
+    mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  MeshAttributes& to = mesh.attributes;
+  const MeshAttributes& from = other.attributes;
+  if (before == 0) {
+    to = from;
+    return;
+  }
+  appendList(to.normals, before, from.normals, more);
+  appendList(to.uvs, before, from.uvs, more);
+  appendList(to.colors, before, from.colors, more);
+  if (from.precision == CoordinatePrecision::Double) to.precision = from.precision;
+  if (from.colorPrecision == ColorPrecision::Float) to.colorPrecision = from.colorPrecision;
+  to.hasAlpha = to.hasAlpha || from.hasAlpha;
+}
+
+TriMesh withoutSeams(const TriMesh& mesh) {
+  TriMesh welded;
+  welded.positions = mesh.positions;
+  welded.precision = mesh.precision;
+  welded.spacing = mesh.spacing;
+  convert::PositionTable table(mesh.positions, mesh.positions.size());
+  std::vector<std::uint32_t> first(mesh.positions.size());
+  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v)
+    first[v] = table.findOrEnter(mesh.positions[v], v);
+  welded.triangles.reserve(mesh.triangles.size());
+  for (const auto& t : mesh.triangles) {
+    const std::array<std::uint32_t, 3> w = {first[t[0]], first[t[1]], first[t[2]]};
+    if (w[0] != w[1] && w[1] != w[2] && w[2] != w[0]) welded.triangles.push_back(w);
+  }
+  return welded;
+}
+
+}  // namespace levelset
