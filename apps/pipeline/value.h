@@ -60,7 +60,8 @@ struct PatchRecipe {
 struct PatchValue {
   std::vector<mapping::Patch> patches;
   /// With `--height auto`: makes them once the texture has told the height. Empty otherwise.
-  std::function<std::vector<mapping::Patch>(double height)> atHeight = {};
+  std::function<std::vector<mapping::Patch>(double height, const levelset::Progress&)> atHeight =
+      {};
   std::shared_ptr<const PatchRecipe> recipe = {};  ///< of those from files: none
 };
 

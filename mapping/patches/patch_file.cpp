@@ -21,8 +21,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "levelsmith patches";
 constexpr int kVersion = 1;
-// A number of some twenty letters becomes a node of the document and a double.
-constexpr double kBytesPerLetter = 4;
+// The text, and what two letters may become: a node of the document, with its place in a list.
+constexpr double kBytesPerLetter = 20;
 
 Json toJson(const V3d& p) {
   if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
@@ -38,7 +38,16 @@ Json toJson(std::span<const V3d> points) {
   return json;
 }
 
+void requireFinite(double value, const char* what) {
+  if (!std::isfinite(value)) {
+    throw InvalidInput(
+        fmt::format("write: the {} of the patch is {}, which no file holds", what, value));
+  }
+}
+
 Json toJson(const Patch& patch) {
+  requireFinite(patch.height, "height");
+  requireFinite(patch.spacing, "spacing");
   Json json;
   json["corners"] = toJson(patch.corners);
   json["height"] = patch.height;
@@ -46,6 +55,8 @@ Json toJson(const Patch& patch) {
   json["spacing"] = patch.spacing;
   json["levels"] = Json::array();
   for (const ParticleLevel& level : patch.levels) {
+    requireFinite(level.w, "w of a level");
+    requireFinite(level.height, "height of a level");
     Json entry;
     entry["columns"] = level.columns;
     entry["rows"] = level.rows;
@@ -164,7 +175,13 @@ class Reader {
 std::string textOf(const std::filesystem::path& file, std::size_t maxMemory) {
   std::string text;
   if (file == "-") {
-    text.assign(std::istreambuf_iterator<char>(std::cin), {});
+    std::string part(std::size_t{1} << 20, '\0');
+    while (std::cin.read(part.data(), static_cast<std::streamsize>(part.size())) ||
+           std::cin.gcount() > 0) {
+      text.append(part, 0, static_cast<std::size_t>(std::cin.gcount()));
+      levelset::requireMemory(kBytesPerLetter * static_cast<double>(text.size()), maxMemory,
+                              "read");
+    }
   } else {
     std::error_code failed;
     if (std::filesystem::is_directory(file, failed)) {

@@ -161,9 +161,13 @@ std::vector<Patch> makePatches(const NarrowBand& base, const std::vector<PatchSi
                                double height, const PatchOptions& options) {
   std::vector<Patch> patches;
   patches.reserve(sites.size());
-  for (const PatchSite& site : sites)
-    patches.push_back(
-        makePatch(base, site.corners, height * site.scale, atScale(options, site.scale)).patch);
+  for (const PatchSite& site : sites) {
+    PatchOptions scaled = atScale(options, site.scale);
+    const auto share = [&](double n) { return n / static_cast<double>(sites.size()); };
+    const auto done = static_cast<double>(patches.size());
+    scaled.progress = levelset::subProgress(options.progress, share(done), share(done + 1));
+    patches.push_back(makePatch(base, site.corners, height * site.scale, scaled).patch);
+  }
   return patches;
 }
 

@@ -316,6 +316,11 @@ ScatteredPoints scatterPoints(const levelset::NarrowBand& base, const ScatterDen
         fmt::format("{}: this would be {:.3g} points, more than {:.0g}; {}", kSpread, wanted,
                     kMostPoints, density.count > 0 ? "ask for fewer" : "take a larger distance"));
   }
+  constexpr double kNeighbours = 70,
+                   kBytesPerNeighbour = 16;  // of a candidate, and to remember one
+  levelset::requireMemory(
+      wanted * kCandidatesPerPoint * (sizeof(SurfacePoint) + kNeighbours * kBytesPerNeighbour),
+      density.maxMemory, kSpread);
   const Candidates candidates = makeCandidates(
       sampler, density, static_cast<std::size_t>(wanted * kCandidatesPerPoint) + 50, random);
   levelset::report(density.progress, 0.7, kSpread);

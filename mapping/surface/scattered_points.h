@@ -20,6 +20,7 @@ struct ScatterDensity {
   levelset::ScalarField scale = {};   ///< multiplies distances at a place, positive; empty: 1
   levelset::ScalarField weight = {};  ///< 0 where no point may lie, 1 where any; empty: 1
   std::uint64_t seed = 1;
+  std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
 

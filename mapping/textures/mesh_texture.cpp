@@ -151,9 +151,10 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
         fmt::format("texture: all of {} patches fold; lower their height or make them smaller",
                     patches.size()));
   }
-  if (distortions.size() < patches.size()) {
-    result.notes.push_back(fmt::format("{} of {} patches fold and were left out",
-                                       patches.size() - distortions.size(), patches.size()));
+  result.skipped = patches.size() - distortions.size();
+  if (result.skipped > 0) {
+    result.notes.push_back(
+        fmt::format("{} of {} patches fold and were left out", result.skipped, patches.size()));
   }
   result.distortion = worstOf(distortions);
   result.certificate = worstOf(certificates);

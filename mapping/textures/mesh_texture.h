@@ -30,6 +30,7 @@ struct MeshTextureResult {
   levelset::TriMesh mesh;
   Distortion distortion;  ///< in the middle and close to the corners of the particles' cells
   FoldCertificate certificate;
+  std::size_t skipped = 0;  ///< patches left out because they fold
   std::vector<std::string> notes;
 };
 

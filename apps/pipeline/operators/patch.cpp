@@ -147,7 +147,11 @@ Value patchesOf(Invocation& in, PatchRecipe recipe, const Make& make) {
   PatchValue value;
   value.patches = std::move(patches);
   value.recipe = std::make_shared<const PatchRecipe>(std::move(recipe));
-  if (isAuto) value.atHeight = [make](double h) { return make(h, {}).patches; };
+  if (isAuto) {
+    value.atHeight = [make](double h, const levelset::Progress& progress) {
+      return make(h, progress).patches;
+    };
+  }
   return Value(std::move(value));
 }
 

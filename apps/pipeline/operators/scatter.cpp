@@ -38,6 +38,7 @@ mapping::ScatterOptions scatterOptions(Invocation& in) {
     options.density.weight = [mask = *mask](const Imath::V3d& p) { return mask.weight(p); };
   options.density.seed = static_cast<std::uint64_t>(in.integer("seed"));
   options.density.progress = in.progress;
+  options.density.maxMemory = in.maxMemory;
   const std::vector<double> size = in.lengths("size");
   for (const double side : size) {
     if (side > 10 * in.operands[0].diagonal()) {
@@ -114,7 +115,11 @@ Value scatter(Invocation& in) {
   value.recipe = recipeOf(result.sites, options.patch);
   if (isAuto) {
     value.atHeight = [base = in.band(), sites = std::move(result.sites), patch = options.patch](
-                         double h) { return mapping::makePatches(base, sites, h, patch); };
+                         double h, const levelset::Progress& progress) {
+      mapping::PatchOptions now = patch;
+      now.progress = progress;
+      return mapping::makePatches(base, sites, h, now);
+    };
   }
   return Value(std::move(value));
 }

@@ -97,6 +97,7 @@ Value textureMesh(Invocation& in) {
   mapping::MeshTextureResult result = mapping::mapMesh(in.mesh(1), patches, options);
   nlohmann::ordered_json json;
   json["patches"] = patches.size();
+  json["skipped"] = result.skipped;
   json["height"] = patches.front().height;
   json["particles"] = particlesOf(patches);
   addDistortion(result.distortion, json);

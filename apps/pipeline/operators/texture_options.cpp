@@ -76,7 +76,7 @@ std::vector<mapping::Patch> patchesAtHeight(Invocation& in, const PatchValue& on
   const double height = aspectHeight(onto.patches, textureBox);
   in.notes.notes.push_back(
       fmt::format("--height auto: {:.6g} keeps the texture's proportions", height));
-  return onto.atHeight(height);
+  return onto.atHeight(height, in.progress);
 }
 
 mapping::TextureOptions textureOptions(Invocation& in) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -90,6 +91,21 @@ TEST(MeshTexture, FacesAsBeforeOnAMirroredPatch) {
   const Patch patch = mapping::makePatch(base, corners, 0.5, {.mirror = true}).patch;
   ASSERT_TRUE(patch.mirrored);
   EXPECT_GT(levelset::signedVolume(mapping::mapMesh(makeRing(1, 0.3, 40, 20), patch).mesh), 0);
+}
+
+TEST(MeshTexture, LeavesOutPatchesThatFold) {
+  const NarrowBand base = makeBall(2, 0.1);
+  const TriMesh ring = makeRing(1, 0.25, 20, 8);
+  const Patch sound = mapping::makePatch(base, cap(0.4, 2), 0.5, {.levels = 3}).patch;
+  Patch folded = sound;
+  std::swap(folded.levels[1].positions[7], folded.levels[1].positions[8]);
+  const std::array<Patch, 3> patches = {folded, sound, folded};
+  EXPECT_THROW((void)mapping::mapMesh(ring, patches), levelset::InvalidInput);
+  const mapping::MeshTextureResult result = mapping::mapMesh(ring, patches, {.skipFolds = true});
+  EXPECT_EQ(result.skipped, 2u);
+  EXPECT_EQ(result.mesh.positions, mapping::mapMesh(ring, sound).mesh.positions);
+  EXPECT_THROW((void)mapping::mapMesh(ring, std::span(patches).first(1), {.skipFolds = true}),
+               levelset::InvalidInput);
 }
 
 TEST(MeshTexture, RefusesWhatCannotBeMoved) {

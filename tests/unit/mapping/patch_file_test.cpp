@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <iterator>
 #include <limits>
 #include <random>
 #include <string>
@@ -113,8 +115,15 @@ TEST(PatchFile, WritesNothingHalf) {
   const support::TemporaryFolder folder;
   std::vector<Patch> patches = twoPatches();
   patches[1].levels[0].positions[3].y = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(writePatches(folder.path() / "nan.patch", patches), InvalidInput);
-  EXPECT_FALSE(std::filesystem::exists(folder.path() / "nan.patch"));
+  const std::filesystem::path file = folder.path() / "old.patch";
+  writePatches(file, twoPatches());
+  EXPECT_THROW(writePatches(file, patches), InvalidInput);
+  patches = twoPatches();
+  patches[0].levels[1].w = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(writePatches(file, patches), InvalidInput);
+  // What was there is there still, and nothing else.
+  EXPECT_EQ(readPatches(file).size(), 2u);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
 }
 
 }  // namespace patch_file_test
