@@ -109,6 +109,9 @@ Distortion surveyDistortion(std::span<const MapSample> samples, const V3d& textu
   result.foldUvw = samples[worst].uvw;
   result.foldPlace = samples[worst].place;
   result.jacobian = spreadOf(std::move(jacobians));
+  result.leastAbove = HUGE_VAL;
+  for (std::size_t n = 0; n < samples.size(); ++n)
+    if (samples[n].uvw.z >= 0) result.leastAbove = std::min(result.leastAbove, stretches[2 * n]);
   result.stretch = spreadOf(std::move(stretches));
   result.meanStretch = std::cbrt(volume / (textureSize.x * textureSize.y * textureSize.z));
   return result;
@@ -121,6 +124,8 @@ Distortion worstOf(std::span<const Distortion> maps) {
     return a->jacobian.least < b->jacobian.least;
   });
   Distortion result = *byJacobian.front();
+  for (const Distortion& map : maps)
+    result.leastAbove = std::min(result.leastAbove, map.leastAbove);
   const auto widen = [](Spread& spread, const Spread& other) {
     spread.least = std::min(spread.least, other.least);
     spread.percent1 = std::min(spread.percent1, other.percent1);

@@ -23,6 +23,7 @@ struct Distortion {
   Imath::V3d foldPlace{0}, foldUvw{0};  ///< of the least, in world and texture coordinates
   Spread stretch;  ///< least and largest singular value of texture → patch, world per world; median
                    ///< and percentiles over both
+  double leastAbove = 0;   ///< least stretch at and above the surface; below it, a union shows none
   double meanStretch = 0;  ///< third root of the median volume ratio
 };
 

@@ -277,6 +277,17 @@ std::vector<MapSample> ShellMap::samples() const {
   return result;
 }
 
+std::size_t ShellMap::countOverlaps(std::span<const MapSample> samples, MapSample& first) const {
+  constexpr double kElsewhere = 1e-6;  // of u, v, w; rounding is far less
+  std::size_t count = 0;
+  for (const MapSample& sample : samples) {
+    const V3d found = (*this)(sample.place);
+    if (!((found - sample.uvw).length() > kElsewhere) || !holdsTexture(found)) continue;
+    if (count++ == 0) first = sample;
+  }
+  return count;
+}
+
 V3d ShellMap::toPatch(const V3d& uvw) const {
   Tetrahedron t;
   if (!lattice_.locate(uvw, t)) return V3d(kNaN);

@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "mapping/maps/cell_tree.h"
 #include "mapping/maps/lattice.h"
@@ -30,6 +32,11 @@ class ShellMap final : public PatchMap {
   /// From texture coordinates to patch space; NaN outside the lattice.
   [[nodiscard]] Imath::V3d toPatch(const Imath::V3d& uvw) const;
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
+  /// How many of these places the map sends elsewhere in the texture than where they come from:
+  /// there the shell passes through itself. @param first  one of them, unchanged where there is
+  /// none
+  [[nodiscard]] std::size_t countOverlaps(std::span<const MapSample> samples,
+                                          MapSample& first) const;
   /// Is a place of texture space in the unit cube, or as far below or above it as the texture is
   /// sunk or lifted?
   [[nodiscard]] bool holdsTexture(const Imath::V3d& uvw) const;

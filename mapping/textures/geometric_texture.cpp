@@ -38,6 +38,8 @@ constexpr double kBandNeeded = 3;
 // Voxels of the texture for one of the result from which on they are too many: resampled first, its
 // band costs what the result does and not the cube of their ratio.
 constexpr double kCoarser = 6;
+// A map whose least stretch is below this share of the median is told to squeeze.
+constexpr double kSqueezed = 0.2;
 // Share of the map's tolerance that is left to the solution, and the finest that is worth asking
 // for.
 constexpr double kSolveShare = 0.1, kFinestSolve = 1e-10;
@@ -141,12 +143,16 @@ struct ChosenMap {
   Distortion distortion = {};
   FoldCertificate certificate = {};
   std::size_t particles = 0;
-  V3d residual{0};  ///< at the particles, in u, v and w
+  V3d residual{0};           ///< at the particles, in u, v and w
+  std::size_t overlaps = 0;  ///< places where the patch passes through itself without folding
+  MapSample overlap = {};    ///< one of them
   RbfSolveReport solve = {};
 
-  /// Most of the map is not stretched less than this; a fold here or there sets no voxel size.
-  [[nodiscard]] double leastStretch() const {
-    return distortion.folded > 0 ? distortion.stretch.percent1 : distortion.stretch.least;
+  /// Where the texture is seen, most of the map is not stretched less than this; a fold here or
+  /// there sets no voxel size, nor does what is sunk into the base and squeezed there by a crease.
+  [[nodiscard]] double leastStretch(TextureMerge merge) const {
+    if (distortion.folded > 0) return distortion.stretch.percent1;
+    return merge == TextureMerge::Union ? distortion.leastAbove : distortion.stretch.least;
   }
 };
 
@@ -183,7 +189,9 @@ ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink, const
     auto shell = timed(cost.setup, [&] { return buildShell(base, patch, sink, options); });
     result.particles = shell->lattice().nodeCount();
     result.certificate = timed(cost.certificate, [&] {
-      result.distortion = surveyDistortion(shell->samples(), textureSize, patch.mirrored);
+      const std::vector<MapSample> samples = shell->samples();
+      result.distortion = surveyDistortion(samples, textureSize, patch.mirrored);
+      result.overlaps = shell->countOverlaps(samples, result.overlap);
       return certifyShell(*shell, patch.mirrored);
     });
     result.map = std::move(shell);
@@ -220,6 +228,15 @@ void addSolve(const RbfSolveReport& one, TextureReport& report) {
   }
 }
 
+std::string tellOverlap(const ChosenMap& map) {
+  const V3d &p = map.overlap.place, &uvw = map.overlap.uvw;
+  return fmt::format(
+      "{}: the patch passes through itself at {} of {} places, one at ({:.6g}, {:.6g}, {:.6g}), "
+      "u, v, w = {:.3g}, {:.3g}, {:.3g}, where the texture would have two values; lead its spline "
+      "clear of itself, lower its height, or map its halves one after the other",
+      kTexture, map.overlaps, map.distortion.samples, p.x, p.y, p.z, uvw.x, uvw.y, uvw.z);
+}
+
 /// The map of every patch, none where it folds and is skipped. What folds otherwise is refused, or
 /// noted.
 std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> patches, double sink,
@@ -237,7 +254,12 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
         makeMap(base, patch, sink / patch.height, textureSize, tolerance, part, report.cost);
     const bool folds =
         chosen.distortion.folded > 0 || chosen.certificate.verdict() == FoldVerdict::Folds;
-    if (options.skipFolds && folds) {
+    if (!folds && chosen.overlaps > 0) {
+      const std::string message = tellOverlap(chosen);
+      if (!options.skipFolds && !options.allowFolds) throw InvalidInput(message);
+      if (!options.skipFolds) report.notes.push_back(message);
+    }
+    if (options.skipFolds && (folds || chosen.overlaps > 0)) {
       ++report.skipped;
       maps.emplace_back();
       continue;
@@ -268,9 +290,10 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
 }
 
 /// Blocks of the result by the texture's own count, before anything is allocated.
-void requireResult(const NarrowBand& texture, double voxelSize, std::span<const ChosenMap> maps,
-                   const TextureOptions& options) {
-  double voxels = 0;
+void requireResult(const NarrowBand& texture, const TextureReport& report,
+                   std::span<const ChosenMap> maps, const TextureOptions& options) {
+  const double voxelSize = report.voxelSize;
+  double voxels = 0, warped = 0;
   for (const ChosenMap& map : maps) {
     if (!map.map) continue;
     const double finer = texture.voxelSize() * map.distortion.meanStretch / voxelSize;
@@ -278,9 +301,24 @@ void requireResult(const NarrowBand& texture, double voxelSize, std::span<const 
         std::max(1.0, options.halfWidth / std::max(1.0, texture.halfWidth() * finer));
     voxels +=
         static_cast<double>(texture.activeVoxelCount()) * std::max(1e-3, finer * finer) * width;
+    // All of the texture's band is warped, however many of the result's voxels it is wide.
+    warped = std::max(warped, static_cast<double>(texture.activeVoxelCount()) * std::pow(finer, 3));
   }
   constexpr double kBytesPerVoxel = 40;  // active share of a block, and three fields of them
-  levelset::requireMemory(voxels * kBytesPerVoxel, options.maxMemory, kTexture);
+  constexpr double kBytesWarped = 8;     // a value, and its share of the block's others
+  const double bytes = voxels * kBytesPerVoxel + warped * kBytesWarped;
+  const Distortion& worst = report.distortion;
+  if (bytes > static_cast<double>(options.maxMemory) && !options.voxelSize &&
+      worst.stretch.least < kSqueezed * worst.stretch.median) {
+    const V3d& p = worst.foldPlace;
+    throw levelset::ResourceLimit(fmt::format(
+        "{}: the map squeezes the texture to {:.2g} of its size, about ({:.6g}, {:.6g}, {:.6g}), "
+        "and "
+        "voxels that show it there, {:.3g}, need about {:.3g} GB; give --voxel, lower the height, "
+        "or choose a flatter place",
+        kTexture, worst.stretch.least, p.x, p.y, p.z, report.voxelSize, bytes / 1e9));
+  }
+  levelset::requireMemory(bytes, options.maxMemory, kTexture);
 }
 
 /// All that was mapped as one solid.
@@ -364,21 +402,24 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
   const double tolerance = solveTolerance(texture, box.size(), options.mapTolerance);
   const std::vector<ChosenMap> maps =
       makeMaps(base, patches, sink, box.size(), tolerance, options, report);
-  double minStretch = HUGE_VAL, maxStretch = 0;
+  double minStretch = HUGE_VAL, maxStretch = 0, bandStretch = HUGE_VAL;
   for (const ChosenMap& chosen : maps) {
     if (!chosen.map) continue;
-    minStretch = std::min(minStretch, chosen.leastStretch());
+    minStretch = std::min(minStretch, chosen.leastStretch(options.merge));
     maxStretch = std::max(maxStretch, chosen.distortion.stretch.most);
+    // What is squeezed further than that is under a voxel, unless voxels follow it.
+    bandStretch = std::min(bandStretch, std::max(chosen.leastStretch(options.merge),
+                                                 kSqueezed * chosen.distortion.stretch.median));
   }
   report.voxelSize = chooseVoxelSize(base, texture, minStretch, options);
-  requireResult(texture, report.voxelSize, maps, options);
+  requireResult(texture, report, maps, options);
 
   // === Warp, and make a distance of it again [Brodersen07, ERR-23 in our notes]
   // The shell ends somewhere around the unit cube, so what is outside of a box that was asked for
   // is cut off there, not at the end of the shell.
   const bool isCut = options.map == TextureMap::Shell && options.textureBox;
   const NarrowBand whole = fitTexture(isCut ? levelset::clip(texture, box) : texture,
-                                      report.voxelSize, minStretch, maxStretch, options);
+                                      report.voxelSize, bandStretch, maxStretch, options);
   std::vector<NarrowBand> pieces;
   std::size_t operations = 0, ghosts = 0;
   for (std::size_t n = 0; n < patches.size(); ++n) {
