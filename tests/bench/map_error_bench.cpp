@@ -57,15 +57,17 @@ V3d fromWall(const V3d& x) {
 }
 
 mapping::Patch makePatch(std::size_t particles) {
-  constexpr std::size_t kLevels = 6;
-  const auto side = static_cast<std::size_t>(
-      std::max(4.0, std::round(std::sqrt(static_cast<double>(particles) / kLevels))));
+  // As far apart across the wall as along it.
+  const auto wanted = static_cast<double>(particles);
+  const double spacing = std::cbrt(kLength * kLength * kHeight / wanted);
+  const double levels = std::max(4.0, std::round(kHeight / spacing) + 1);
+  const auto side = static_cast<std::size_t>(std::round(std::sqrt(wanted / levels)));
   mapping::Patch patch;
   patch.height = kHeight;
-  for (std::size_t k = 0; k < kLevels; ++k) {
+  for (double k = 0; k < levels; ++k) {
     mapping::ParticleLevel level;
     level.columns = level.rows = side;
-    level.w = static_cast<double>(k) / (kLevels - 1);
+    level.w = k / (levels - 1);
     for (std::size_t j = 0; j < side; ++j)
       for (std::size_t i = 0; i < side; ++i)
         level.positions.push_back(
