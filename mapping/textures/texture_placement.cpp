@@ -54,6 +54,10 @@ std::string foldSentence(const Distortion& distortion, const FoldCertificate& ce
 
 }  // namespace
 
+bool isBeyond(const Box3d& own, const Box3d& box) {
+  return !own.isEmpty() && !(box.intersects(own.min) && box.intersects(own.max));
+}
+
 std::vector<std::string> judgeFolds(const Distortion& distortion,
                                     const FoldCertificate& certificate, bool areAllowed) {
   if (distortion.folded == 0 && certificate.verdict() == FoldVerdict::Certified) return {};
