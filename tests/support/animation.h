@@ -54,15 +54,13 @@ struct Played {
   mapping::AnimationReport report;
   std::vector<mapping::Patch> patches;
 };
-inline Played play(const levelset::NarrowBand& base,
-                   const std::vector<mapping::AnimationKey>& keys,
+inline Played play(const levelset::NarrowBand& base, const std::vector<mapping::AnimationKey>& keys,
                    mapping::AnimationOptions options) {
   Played played;
   if (!options.make) options.make = remakePatches;
-  played.report =
-      mapping::animatePatches(base, keys, options, [&](const mapping::PatchFrame& f) {
-        played.patches.push_back(f.patches.at(0));
-      });
+  played.report = mapping::animatePatches(base, keys, options, [&](const mapping::PatchFrame& f) {
+    played.patches.push_back(f.patches.at(0));
+  });
   return played;
 }
 

@@ -487,7 +487,8 @@ std::vector<Param> animateParams() {
        .fallback = "1"},
       {.name = "texture-frames",
        .type = ParamType::Path,
-       .doc = "textures of the frames after the first, likewise"},
+       .doc = "textures of the frames after the first, likewise; without --texture-box, the box of "
+              "the first is the unit cube of all"},
       {.name = "texture-first",
        .type = ParamType::Integer,
        .doc = "number of the file that is the texture of frame 1",
@@ -521,7 +522,9 @@ void addAnimationOperators(std::vector<Operator>& all) {
           "The operands are base, texture and patch, as of `texture`, and further patches to go "
           "to. All are those of frame 0, but for the further patches, each of which stands on the "
           "base of its own frame. Between two patches the first is carried forwards and the second "
-          "backwards along the bases, and the way between them is gone evenly. Each frame is "
+          "backwards along the bases, and the way between them is gone evenly; frames between "
+          "follow "
+          "the first in how they are made. Each frame is "
           "written when it is done; the result is the last. What does not change is not computed "
           "again.",
       .example =

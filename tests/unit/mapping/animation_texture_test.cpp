@@ -117,14 +117,13 @@ TEST(AnimateTexture, ShowsTexturesThatGrowAndShrink) {
     options.textures = textures;
     std::vector<double> tops;
     std::vector<std::uint64_t> hashes;
-    const AnimationReport report = mapping::animateTexture(
-        ball, stud, {keyOf(a)}, options,
-        [&](std::size_t, const mapping::TextureResult& result, bool) {
-          tops.push_back(result.band.zeroSetBounds().max.z);
-          hashes.push_back(result.band.contentHash());
-        });
-    EXPECT_EQ(hashes[0],
-              mapping::mapTexture(ball, stud, a, options.texture).band.contentHash());
+    const AnimationReport report =
+        mapping::animateTexture(ball, stud, {keyOf(a)}, options,
+                                [&](std::size_t, const mapping::TextureResult& result, bool) {
+                                  tops.push_back(result.band.zeroSetBounds().max.z);
+                                  hashes.push_back(result.band.contentHash());
+                                });
+    EXPECT_EQ(hashes[0], mapping::mapTexture(ball, stud, a, options.texture).band.contentHash());
     EXPECT_LT(tops[1], tops[0] - 0.3 * kVoxel);  // by 15 % of a height of 3 voxels
     if (map == mapping::TextureMap::Rbf) {
       EXPECT_GT(tops[2], tops[0] + 0.3 * kVoxel);
@@ -136,8 +135,8 @@ TEST(AnimateTexture, ShowsTexturesThatGrowAndShrink) {
     }
     // A box that is given is kept.
     options.texture.textureBox = ballAt(V3d(0), 0.7).zeroSetBounds();
-    const AnimationReport given = mapping::animateTexture(
-        ball, stud, {keyOf(a)}, options, [](std::size_t, const auto&, bool) {});
+    const AnimationReport given = mapping::animateTexture(ball, stud, {keyOf(a)}, options,
+                                                          [](std::size_t, const auto&, bool) {});
     EXPECT_TRUE(given.warnings.empty());
   }
 }
@@ -168,11 +167,11 @@ TEST(AnimateTexture, ImprovesPatchesOnceWhileTheyStand) {
 }
 
 TEST(AnimateTexture, TellsWhatItsFramesSay) {
-  // A patch in a groove is taller than the groove is narrow: it folds, on every frame.
+  // Of two patches one folds, on every frame.
   const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
-  Patch a = patchAt(ball, V3d(0, 0, 1));
+  const Patch a = patchAt(ball, V3d(0, 0, 1));
   Patch folded = patchAt(ball, V3d(1, 0, 0));
-  for (V3d& p : folded.levels[1].positions) p.y = -p.y;
+  for (V3d& p : folded.levels.back().positions) p *= 0.5;
   AnimationKey key{{a, folded}, {mapping::outlineOf(a), mapping::outlineOf(folded)}, 0};
   mapping::TextureAnimationOptions options{.animation = {.frames = 3}, .texture = coarse()};
   options.texture.skipFolds = true;
