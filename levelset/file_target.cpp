@@ -271,13 +271,17 @@ bool isStandardOutput(const fs::path& target) {
   return target == "-" || ownDescriptor(followLinks(target)) == STDOUT_FILENO;
 }
 
+fs::path canonicalFile(const fs::path& file) {
+  if (file == "-") return {};
+  std::error_code error;
+  fs::path path = fs::weakly_canonical(fs::absolute(file, error), error);
+  return !fs::exists(path, error) || fs::is_regular_file(path, error) ? path : fs::path();
+}
+
 bool isSameFile(const fs::path& a, const fs::path& b) {
   if (a == "-" || b == "-") return isStandardOutput(a) && isStandardOutput(b);
-  std::error_code error;
-  const fs::path first = fs::weakly_canonical(fs::absolute(a, error), error),
-                 second = fs::weakly_canonical(fs::absolute(b, error), error);
-  if (first.empty() || first != second) return false;
-  return !fs::exists(first, error) || fs::is_regular_file(first, error);
+  const fs::path first = canonicalFile(a);
+  return !first.empty() && first == canonicalFile(b);
 }
 
 void removeTemporaryFiles() noexcept {

@@ -48,6 +48,10 @@ class FileTarget {
 /// Does the name stand for standard output: "-", /dev/stdout, /dev/fd/1 or a link to one of these?
 [[nodiscard]] bool isStandardOutput(const std::filesystem::path& target);
 
+/// The one name of a file that need not exist, behind all links and folders; empty for devices,
+/// which take from many, and for "-".
+[[nodiscard]] std::filesystem::path canonicalFile(const std::filesystem::path& file);
+
 /// Do both names, of files that need not exist, lead to one and the same? Never of devices, which
 /// take from many.
 [[nodiscard]] bool isSameFile(const std::filesystem::path& a, const std::filesystem::path& b);

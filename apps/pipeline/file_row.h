@@ -6,17 +6,18 @@
 
 namespace pipeline {
 
-/// A row of files whose names differ by their number: '#'s stand for it, with that many digits
-/// (step_###.vdb).
+/// A row of files of one folder whose names differ by their number: the first '#'s of the name
+/// stand for it, with that many digits (step_###.vdb). Those of folders stand for themselves.
 class FileRow {
  public:
   explicit FileRow(std::string pattern) : pattern_(std::move(pattern)) {}
-  [[nodiscard]] bool hasNumber() const { return pattern_.find('#') != std::string::npos; }
+  [[nodiscard]] bool hasNumber() const { return numberAt() != std::string::npos; }
   [[nodiscard]] const std::string& pattern() const { return pattern_; }
   /// @pre hasNumber()
   [[nodiscard]] std::filesystem::path file(std::size_t number) const;
 
  private:
+  [[nodiscard]] std::size_t numberAt() const;
   std::string pattern_;
 };
 

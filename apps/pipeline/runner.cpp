@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <new>
+#include <set>
 
 #include "apps/pipeline/refusal.h"
 #include "apps/process_cost.h"
@@ -84,19 +86,33 @@ void tellFailures(const RunReport& report) {
       throw levelset::NumericalError(step.action + ": " + step.notes.failure);
 }
 
+/// What the actions of a chain write.
+class Targets {
+ public:
+  /// @return was it named before? As isSameFile would find, in the time of one look
+  bool add(const std::string& target) {
+    const bool isDash = target == "-", isOutput = levelset::isStandardOutput(target);
+    const std::filesystem::path file = levelset::canonicalFile(target);
+    const bool isAgain = isDash ? hasOutput_ : isOutput && hasDash_;
+    hasDash_ = hasDash_ || isDash;
+    hasOutput_ = hasOutput_ || isOutput;
+    return (!file.empty() && !files_.insert(file).second) || isAgain;
+  }
+
+ private:
+  std::set<std::filesystem::path> files_;
+  bool hasDash_ = false, hasOutput_ = false;
+};
+
 /// Refuses targets that cannot be written before time is spent on what should go there.
 /// @param earlier  what the actions before write; grows
-void checkTargets(const Action& action, const RunSettings& settings,
-                  std::vector<std::string>& earlier, RunReport& report) {
+void checkTargets(const Action& action, const RunSettings& settings, Targets& earlier,
+                  RunReport& report) {
   if (!action.op->targets) return;
   try {
     for (const std::string& target : action.op->targets(Invocation(*action.op, action.options))) {
       const levelset::FileTarget probe(target);
-      const bool isAgain = std::any_of(earlier.begin(), earlier.end(), [&](const auto& other) {
-        return levelset::isSameFile(other, target);
-      });
-      earlier.push_back(target);
-      if (!isAgain) continue;
+      if (!earlier.add(target)) continue;
       if (!levelset::clobberDefault())
         throw levelset::IoError(
             fmt::format("{}: '{}' is written by an action before, and --no-clobber forbids to "
@@ -214,7 +230,7 @@ void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
   Stack stack;
   report.dryRun = settings.dryRun;
   try {
-    std::vector<std::string> targets;
+    Targets targets;
     for (const Action& action : chain.actions) checkTargets(action, settings, targets, report);
     for (std::size_t i = 0; i < chain.actions.size(); ++i) {
       const Action& action = chain.actions[i];

@@ -3,6 +3,7 @@
 #include <Imath/ImathBox.h>
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -54,6 +55,10 @@ struct PatchRecipe {
       around = {};
   bool isRigid = false;    ///< centre and direction tell all of it, as of a decal
   std::string fixed = {};  ///< why it cannot be moved; empty: it can
+  std::string action = {};
+  /// Its options but for the place and the height, as far as they shape the patch, and as far as
+  /// they only tell how finely it is made.
+  std::map<std::string, std::string> shape = {}, fineness = {};
 };
 
 /// One patch or many of one base.

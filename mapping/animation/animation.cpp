@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <utility>
 
 #include "levelset/error.h"
+#include "mapping/animation/frame_notes.h"
 #include "mapping/animation/patch_path.h"
 #include "mapping/patches/patch_levels.h"
+#include "mapping/textures/texture_placement.h"
 
 namespace mapping {
 namespace {
@@ -23,13 +26,18 @@ using levelset::UsageError;
 constexpr const char* kAnimation = "animate";
 using Footprints = std::vector<Footprint>;
 
+/// With the frame, unless it tells one; without the name of whoever worked for the animation.
 std::string sentenceAt(std::size_t frame, std::string sentence) {
-  const std::string own = std::string(kAnimation) + ": ";
-  if (sentence.starts_with(own)) sentence.erase(0, own.size());
+  if (sentence.starts_with(std::string(kAnimation) + ": frame ")) return sentence;
+  for (const std::string who : {"animate: ", "texture: ", "read: ", "write: "}) {
+    if (!sentence.starts_with(who)) continue;
+    sentence.erase(0, who.size());
+    break;
+  }
   return fmt::format("{}: frame {}: {}", kAnimation, frame, sentence);
 }
 
-/// Calls, and tells the frame in what is refused.
+/// Calls, and tells the frame in what is refused, but for what is wrong with the call as a whole.
 template <typename Call>
 auto atFrame(std::size_t frame, const Call& call) {
   try {
@@ -38,6 +46,10 @@ auto atFrame(std::size_t frame, const Call& call) {
     throw InvalidInput(sentenceAt(frame, error.what()));
   } catch (const levelset::NumericalError& error) {
     throw levelset::NumericalError(sentenceAt(frame, error.what()));
+  } catch (const levelset::ResourceLimit& error) {
+    throw levelset::ResourceLimit(sentenceAt(frame, error.what()));
+  } catch (const levelset::IoError& error) {
+    throw levelset::IoError(sentenceAt(frame, error.what()));
   }
 }
 
@@ -78,11 +90,19 @@ void checkKeys(const std::vector<AnimationKey>& keys, const AnimationOptions& op
                       "one to go to",
                       kAnimation, k + 1, keys[k].outlines.size(), keys.front().outlines.size()));
     }
-    if (keys[k].patches.front().mirrored != keys.front().patches.front().mirrored) {
+    const std::vector<Patch>&first = keys.front().patches, &patches = keys[k].patches;
+    if (patches.size() != first.size()) {
+      throw UsageError(fmt::format(
+          "{}: patch {} is a set of {} tiles, the first of {}; frames between them follow the "
+          "first, so give all the same count",
+          kAnimation, k + 1, patches.size(), first.size()));
+    }
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      if (patches[i].mirrored == first[i].mirrored) continue;
       throw UsageError(
           fmt::format("{}: patch {} is mirrored and the first is not, or the other way "
-                      "round; no way leads from one to the other",
-                      kAnimation, k + 1));
+                      "round{}; no way leads from one to the other",
+                      kAnimation, k + 1, i > 0 ? fmt::format(", in member {}", i + 1) : ""));
     }
   }
 }
@@ -101,12 +121,13 @@ class Bases {
     if (frame == frame_) return now_;
     if (!frames_) return now_;
     now_ = NarrowBand();  // before the next is read
-    now_ = frame == 0 ? first_ : atFrame(frame, [&] { return frames_(frame); });
+    now_ = frame == 0 ? first_ : frames_(frame);
     hash_ = frame == 0 ? firstHash_ : now_.contentHash();
     frame_ = frame;
     return now_;
   }
   [[nodiscard]] bool areMoving() const { return static_cast<bool>(frames_); }
+  [[nodiscard]] bool mustRead(std::size_t frame) const { return frames_ && frame != frame_; }
   /// Of the base that was asked for last.
   [[nodiscard]] std::uint64_t hash() const { return hash_; }
 
@@ -125,19 +146,46 @@ class Animation {
       : keys_(keys), options_(options), visit_(visit), bases_(base, options.bases) {}
 
   AnimationReport run() {
+    for (std::size_t k = 1; k < keys_.size(); ++k) {
+      warnOfLevels(k);
+      // On bases that move, when the way to the key is looked for.
+      if (!bases_.areMoving()) atFrame(keys_[k].frame, [&] { requireOn(bases_.at(0), k); });
+    }
     for (std::size_t k = 0; k < keys_.size(); ++k) {
       key_ = k;
       const std::size_t begin = keys_[k].frame;
       const std::size_t end = k + 1 < keys_.size() ? keys_[k + 1].frame : options_.frames;
-      if (k + 1 < keys_.size()) carryBackwards(begin, end);
       paths_.clear();
-      for (std::size_t f = begin; f < end; ++f) playFrame(f, begin, end);
+      if (k + 1 < keys_.size()) carryBackwards(begin, end);
+      for (std::size_t f = begin; f < end; ++f) atFrame(f, [&] { playFrame(f, begin, end); });
     }
     return std::move(report_);
   }
 
  private:
+  void warnOfLevels(std::size_t k) {
+    const std::size_t levels = keys_[k].patches.front().levels.size(),
+                      first = keys_.front().patches.front().levels.size();
+    if (levels == first) return;
+    report_.warnings.push_back(
+        fmt::format("{}: patch {} has {} levels and the first {}; the frames between follow the "
+                    "first, so give all the same --levels",
+                    kAnimation, k + 1, levels, first));
+  }
+
+  void requireOn(const NarrowBand& base, std::size_t key) const {
+    for (const Patch& patch : keys_[key].patches) requirePatchOn(base, patch);
+  }
+
+  /// The base of a frame. Nothing else holds the one before when another is read.
+  const NarrowBand& baseAt(std::size_t frame) {
+    if (bases_.mustRead(frame))
+      for (PatchPath& path : paths_) path.dropBase();
+    return bases_.at(frame);
+  }
+
   [[nodiscard]] Footprints footprintsOf(const NarrowBand& base, std::size_t key) const {
+    requireOn(base, key);
     Footprints all;
     for (const PatchOutline& outline : keys_[key].outlines) {
       levelset::report(options_.progress, done_, kAnimation);
@@ -170,16 +218,19 @@ class Animation {
   void carryBackwards(std::size_t begin, std::size_t end) {
     done_ = static_cast<double>(begin) / static_cast<double>(options_.frames);
     later_.assign(end - begin, {});
-    Footprints now = atFrame(end, [&] { return footprintsOf(bases_.at(end), key_ + 1); });
-    const Footprints first = now;
+    goal_ = atFrame(end, [&] { return footprintsOf(bases_.at(end), key_ + 1); });
+    Footprints now = goal_;
     std::uint64_t hash = bases_.hash();
-    for (std::size_t f = end; f > begin; --f) {
-      const NarrowBand& base = bases_.at(f);
+    for (std::size_t f = end - 1; f > begin; --f) {
+      levelset::report(options_.progress, done_, kAnimation);
       const Footprints before = now;
-      if (bases_.hash() != hash) now = atFrame(f, [&] { return carryAll(base, now); });
+      atFrame(f, [&] {
+        const NarrowBand& base = bases_.at(f);
+        if (bases_.hash() != hash) now = carryAll(base, now);
+      });
       hash = bases_.hash();
-      if (f < end) judgeDrift(f, before, now, first);
-      if (f < end) later_[f - begin] = now;
+      judgeDrift(f, before, now, goal_);
+      later_[f - begin] = now;
     }
   }
 
@@ -188,17 +239,18 @@ class Animation {
     const double next = static_cast<double>(f + 1) / static_cast<double>(options_.frames);
     levelset::report(options_.progress, done_, kAnimation);
     const bool isFirst = report_.frames.empty();
-    const NarrowBand& base = bases_.at(f);
+    const NarrowBand& base = baseAt(f);
     const bool isSameBase = !isFirst && bases_.hash() == baseHash_;
     baseHash_ = bases_.hash();
     FrameReport report;
     report.frame = f;
+    const bool isBetween = key_ + 1 < keys_.size();
     bool isUnchanged = isSameBase;
     const Footprints shownBefore = shown_;
 
     // === Where the patches stand
     if (f == begin) {
-      own_ = atFrame(f, [&] { return footprintsOf(base, key_); });
+      own_ = footprintsOf(base, key_);
       first_ = own_;
       if (f == 0) origins_ = own_;
       shown_ = own_;
@@ -208,26 +260,28 @@ class Animation {
       isUnchanged = isUnchanged && isSame;
       if (!isSame) patches_ = given;
       // Where there is no way, no frame shall be made in vain.
-      if (!bases_.areMoving() && key_ + 1 < keys_.size() && begin + 1 < end)
+      if (!bases_.areMoving() && isBetween && begin + 1 < end)
         (void)atFrame(f + 1, [&] { return onTheWay(f + 1, begin, end); });
     } else {
       if (!isSameBase) {
         const Footprints before = own_;
-        own_ = atFrame(f, [&] { return carryAll(base, own_); });
+        own_ = carryAll(base, own_);
         judgeDrift(f, before, own_, first_);
       }
-      shown_ = key_ + 1 < keys_.size() ? atFrame(f, [&] { return onTheWay(f, begin, end); }) : own_;
+      shown_ = isBetween ? onTheWay(f, begin, end) : own_;
       isUnchanged = isUnchanged && shown_ == shownBefore;
       if (!isUnchanged) {
-        patches_ = atFrame(f, [&] {
-          return remade(
-              base, levelset::subProgress(options_.progress, done_, done_ + 0.2 * (next - done_)));
-        });
+        patches_ = remade(
+            base, levelset::subProgress(options_.progress, done_, done_ + 0.2 * (next - done_)));
         report.isRemade = true;
         ++report_.patchesMade;
       }
     }
     report.drift = worstDrift(first_, own_);
+    if (isBetween && f > begin) {
+      const Drift later = worstDrift(goal_, later_[f - begin]);
+      if (later.factor() > report.drift.factor()) report.drift = later;
+    }
     for (std::size_t i = 0; i < shown_.size(); ++i) {
       report.corners.push_back(shown_[i].corners);
       if (i < shownBefore.size())
@@ -244,7 +298,7 @@ class Animation {
   }
 
   [[nodiscard]] Footprints onTheWay(std::size_t f, std::size_t begin, std::size_t end) {
-    const NarrowBand& base = bases_.at(f);
+    const NarrowBand& base = baseAt(f);
     const double part = static_cast<double>(f - begin) / static_cast<double>(end - begin);
     const bool areNew = paths_.size() != own_.size();
     if (areNew || pathHash_ != bases_.hash()) {
@@ -256,35 +310,52 @@ class Animation {
         if (!to.reach) to = withReach(base, std::move(to));
         paths.emplace_back(base, std::move(from), std::move(to), options_.carry,
                            areNew ? std::vector<V3d>{} : paths_[i].centreWay());
-        tellOfPath(f, paths.back(), areNew ? nullptr : &paths_[i]);
+        tellOfPath(f, paths.back(), areNew);
       }
       paths_ = std::move(paths);
       pathHash_ = bases_.hash();
     }
     Footprints result;
-    for (const PatchPath& path : paths_) result.push_back(path.at(part));
+    for (PatchPath& path : paths_) {
+      path.setBase(base);
+      result.push_back(path.at(part));
+    }
     return result;
   }
 
-  void tellOfPath(std::size_t f, const PatchPath& path, const PatchPath* before) {
-    if (!path.isAlike() && !(before && !before->isAlike())) {
-      report_.warnings.push_back(fmt::format(
-          "{}: frame {}: the corners' ways could not be laid beside that of the patch's centre; "
-          "each takes its own shortest, and where these lead around different sides the patch is "
-          "stretched; try --carry rigid, or a patch between the two",
-          kAnimation, f));
+  /// Each sentence once between two keys, for all patches and frames.
+  void tellOfPath(std::size_t f, const PatchPath& path, bool isNew) {
+    if (!path.isAlike()) {
+      tellOnce(warnedOfWays_,
+               fmt::format("{}: frame {}: the corners' ways could not be laid beside that of the "
+                           "patch's centre; "
+                           "each takes its own shortest, and where these lead around different "
+                           "sides the patch is "
+                           "stretched; try --carry rigid, or a patch between the two",
+                           kAnimation, f));
     }
     constexpr double kMostTurn = 1;  // radians: sides shrink by the cosine of half of it
-    if (!before && options_.carry == CarryRule::Corners && std::abs(path.turn()) > kMostTurn)
-      report_.warnings.push_back(fmt::format(
-          "{}: frame {}: the patch turns by {:.0f} degrees on its way, and shrinks in between as "
-          "its corners go straight; --carry rigid turns it as a whole",
-          kAnimation, f, std::abs(path.turn()) * 180 / std::acos(-1.0)));
-    if (path.hasJumped())
-      report_.warnings.push_back(
+    if (isNew && options_.carry == CarryRule::Corners && std::abs(path.turn()) > kMostTurn) {
+      tellOnce(warnedOfTurn_,
+               fmt::format("{}: frame {}: the patch turns by {:.0f} degrees on its way, and "
+                           "shrinks in between as "
+                           "its corners go straight; --carry rigid turns it as a whole",
+                           kAnimation, f, std::abs(path.turn()) * 180 / std::acos(-1.0)));
+    }
+    if (path.hasJumped()) {
+      tellOnce(
+          warnedOfJump_,
           fmt::format("{}: frame {}: the way from patch to patch no longer runs as on the frame "
                       "before, and may have jumped",
                       kAnimation, f));
+    }
+  }
+
+  /// @param key  of which it was told last, from 1
+  void tellOnce(std::size_t& key, std::string warning) {
+    if (key == key_ + 1) return;
+    key = key_ + 1;
+    report_.warnings.push_back(std::move(warning));
   }
 
   [[nodiscard]] std::vector<Patch> remade(const NarrowBand& base,
@@ -323,24 +394,25 @@ class Animation {
   void judgeDrift(std::size_t f, const Footprints& before, const Footprints& now,
                   const Footprints& first) {
     const Drift drift = worstDrift(first, now);
-    if (drift.factor() > options_.driftWarning && warnedOfDrift_ != key_ + 1) {
-      warnedOfDrift_ = key_ + 1;
-      report_.warnings.push_back(fmt::format(
-          "{}: frame {}: sides or diagonals of the patch are {:.3g} to {:.3g} times as long as at "
-          "first; {}",
-          kAnimation, f, drift.least, drift.most,
-          options_.carry == CarryRule::Corners ? "--carry rigid keeps its shape"
-                                               : "the surface bends under it"));
+    if (drift.factor() > options_.driftWarning) {
+      tellOnce(warnedOfDrift_,
+               fmt::format("{}: frame {}: sides or diagonals of the patch are {:.3g} to {:.3g} "
+                           "times as long as at "
+                           "first; {}",
+                           kAnimation, f, drift.least, drift.most,
+                           options_.carry == CarryRule::Corners ? "--carry rigid keeps its shape"
+                                                                : "the surface bends under it"));
     }
     for (std::size_t i = 0; i < now.size(); ++i) {
       const double way = farthestWay(before[i], now[i]);
       const double size = (before[i].corners[2] - before[i].corners[0]).length();
-      if (!(way > 0.5 * size) || warnedOfWay_ == key_ + 1) continue;
-      warnedOfWay_ = key_ + 1;
-      report_.warnings.push_back(fmt::format(
-          "{}: frame {}: a corner went {:.4g} to the nearest surface, over half of the patch's "
-          "diagonal; give frames in between, or look whether it is still the same part",
-          kAnimation, f, way));
+      if (!(way > 0.5 * size)) continue;
+      tellOnce(
+          warnedOfWay_,
+          fmt::format(
+              "{}: frame {}: a corner went {:.4g} to the nearest surface, over half of the patch's "
+              "diagonal; give frames in between, or look whether it is still the same part",
+              kAnimation, f, way));
     }
   }
 
@@ -349,13 +421,16 @@ class Animation {
   const std::function<void(const PatchFrame&)>& visit_;
   Bases bases_;
   AnimationReport report_;
-  std::size_t key_ = 0, warnedOfDrift_ = 0, warnedOfWay_ = 0;
+  std::size_t key_ = 0;
+  std::size_t warnedOfDrift_ = 0, warnedOfWay_ = 0, warnedOfWays_ = 0, warnedOfTurn_ = 0,
+              warnedOfJump_ = 0;  ///< last keys of which it was told, from 1
   double done_ = 0;
   std::uint64_t baseHash_ = 0, pathHash_ = 0;
   Footprints origins_;
   Footprints own_, first_,
       shown_;                      ///< of the last key: carried, as it was; and what is mapped onto
-  std::vector<Footprints> later_;  ///< of the next key on the bases before it
+  Footprints goal_;                ///< of the next key
+  std::vector<Footprints> later_;  ///< the same on the bases before it
   std::vector<PatchPath> paths_;
   std::vector<Patch> patches_;
 };
@@ -387,10 +462,19 @@ AnimationReport animatePatches(const NarrowBand& base, const std::vector<Animati
 AnimationReport animateTexture(const NarrowBand& base, const NarrowBand& texture,
                                const std::vector<AnimationKey>& keys,
                                const TextureAnimationOptions& options, const FrameWriter& write) {
+  constexpr double kImproving = 0.3;  // of the progress
   std::optional<TextureResult> result;
+  std::vector<Patch> improved;
+  std::vector<std::size_t> skipped;
+  std::vector<std::string> notes, warnings;
+  FrameNotes frameNotes, frameWarnings;
   std::uint64_t textureHash = 0;
   std::size_t reused = 0;
   double finest = HUGE_VAL, coarsest = 0;
+  TextureOptions mapping = options.texture;
+  // A texture that grows shall be seen to grow.
+  const bool keepsBox = options.textures && !mapping.textureBox;
+  if (keepsBox) mapping.textureBox = texture.zeroSetBounds();
   AnimationReport report = animatePatches(base, keys, options.animation, [&](const PatchFrame& f) {
     const NarrowBand now = f.index == 0 || !options.textures ? texture : options.textures(f.index);
     const std::uint64_t hash = !options.textures && f.index > 0 ? textureHash : now.contentHash();
@@ -400,18 +484,31 @@ AnimationReport animateTexture(const NarrowBand& base, const NarrowBand& texture
       ++reused;
     } else {
       result.reset();  // before the next takes memory
-      TextureOptions mapping = options.texture;
-      mapping.progress = f.progress;
-      result = atFrame(f.index, [&] {
-        return mapTexture(
-            f.base, now, options.improve ? options.improve(f.base, f.patches) : f.patches, mapping);
-      });
+      const bool improves = options.improve && !f.isUnchanged;
+      if (improves) {
+        PatchFrame part = f;
+        part.progress = levelset::subProgress(f.progress, 0, kImproving);
+        improved = options.improve(part);
+      }
+      mapping.progress = levelset::subProgress(f.progress, improves ? kImproving : 0, 1);
+      result = mapTexture(f.base, now, options.improve ? improved : f.patches, mapping);
       finest = std::min(finest, result->report.voxelSize);
       coarsest = std::max(coarsest, result->report.voxelSize);
+      for (const std::string& note : result->report.notes) frameNotes.add(f.index, note, notes);
+      if (keepsBox && mapping.map == TextureMap::Shell &&
+          isBeyond(now.zeroSetBounds(), *mapping.textureBox, now.voxelSize()))
+        frameWarnings.add(f.index,
+                          "the texture goes beyond the box of that of frame 0 and is cut off "
+                          "there, where the shell ends; give --texture-box, or --map rbf",
+                          warnings);
     }
+    skipped.push_back(result->report.skipped);
     write(f.index, *result, isReused);
   });
   report.reused = reused;
+  for (std::size_t f = 0; f < skipped.size(); ++f) report.frames[f].skipped = skipped[f];
+  std::move(notes.begin(), notes.end(), std::back_inserter(report.notes));
+  std::move(warnings.begin(), warnings.end(), std::back_inserter(report.warnings));
   if (coarsest > finest)
     report.notes.push_back(
         fmt::format("voxels of {:.4g} to {:.4g}, as the texture is squeezed from frame to frame; a "

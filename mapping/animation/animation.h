@@ -55,9 +55,10 @@ struct AnimationOptions {
 struct FrameReport {
   std::size_t frame = 0;
   std::vector<std::array<Imath::V3d, 4>> corners;  ///< of each outline
-  double farthestWay = 0;  ///< of any corner since the frame before, world units
-  Drift drift = {};        ///< of the worst outline since its key
-  bool isRemade = false;   ///< the patches had to be made again
+  double farthestWay = 0;   ///< of any corner since the frame before, world units
+  Drift drift = {};         ///< of the worst outline, since its key or until the next
+  bool isRemade = false;    ///< the patches had to be made again
+  std::size_t skipped = 0;  ///< patches left out because they fold, see TextureOptions::skipFolds
 };
 
 /// One frame, for whoever maps onto it. References end with the call.
@@ -73,6 +74,7 @@ struct AnimationReport {
   std::vector<FrameReport> frames;
   std::size_t patchesMade = 0;  ///< frames whose patches had to be made
   std::size_t reused = 0;       ///< frames that were the same as the one before, texture included
+  /// What any frame says ("frame 3: …"), told of the first to say it.
   std::vector<std::string> warnings, notes;
 };
 
@@ -83,10 +85,12 @@ struct AnimationReport {
 /// the other on the base of f, see PatchPath. At the frame of a key its patches are used as they
 /// are. After the last key they are carried on. Where nothing changes nothing is made again.
 /// @param base  of frame 0
-/// @param keys  at least one, the first at frame 0, in the order of their frames
-/// @throws UsageError for keys out of order or that do not go together; InvalidInput, telling the
-///         frame, where a corner has no surface, corners come to lie on different parts of it, or
-///         a patch turns over; and whatever `options` and `visit` throw
+/// @param keys  at least one, the first at frame 0, in the order of their frames; all of as many
+///              patches, mirrored alike
+/// @throws UsageError for keys out of order or that do not go together; InvalidInput where a patch
+///         does not lie on its base, a corner has no surface, corners come to lie on different
+///         parts of it, or a patch turns over; and whatever `options` and `visit` throw. All but
+///         UsageError and Cancelled tell the frame
 [[nodiscard]] AnimationReport animatePatches(const levelset::NarrowBand& base,
                                              const std::vector<AnimationKey>& keys,
                                              const AnimationOptions& options,
@@ -94,11 +98,12 @@ struct AnimationReport {
 
 struct TextureAnimationOptions {
   AnimationOptions animation = {};
-  TextureOptions texture = {};  ///< but for its progress
-  BandFrames textures = {};     ///< empty: the texture stays
-  /// Made of the patches before they are mapped onto; empty: nothing.
-  std::function<std::vector<Patch>(const levelset::NarrowBand& base, std::vector<Patch> patches)>
-      improve = {};
+  /// But for its progress. Where textures change and no box is given, that of frame 0 holds for
+  /// all: what leaves it goes on beyond the patch, but in a shell is cut off, with a warning.
+  TextureOptions texture = {};
+  BandFrames textures = {};  ///< empty: the texture stays
+  /// Made of the patches before they are mapped onto, once where these stay; empty: nothing.
+  std::function<std::vector<Patch>(const PatchFrame& frame)> improve = {};
 };
 
 /// @param isReused  base, texture and patches are those of the frame before, and so is the result

@@ -37,14 +37,14 @@ std::pair<std::size_t, double> placeOn(const std::vector<V3d>& path, double part
 /// Between the points of a path, and back on the surface.
 V3d pointOn(const SurfaceField& field, const std::vector<V3d>& path, double part) {
   const auto [i, share] = placeOn(path, part);
-  V3d p = path[i] * (1 - share) + path[i + 1] * share;
+  V3d p = path[i] + (path[i + 1] - path[i]) * share;
   V3d projected = p;
   return field.project(projected, 0) ? projected : p;
 }
 
 std::array<V2d, 4> between(const std::array<V2d, 4>& a, const std::array<V2d, 4>& b, double part) {
   std::array<V2d, 4> result;
-  for (std::size_t i = 0; i < 4; ++i) result[i] = a[i] * (1 - part) + b[i] * part;
+  for (std::size_t i = 0; i < 4; ++i) result[i] = a[i] + (b[i] - a[i]) * part;
   return result;
 }
 
@@ -164,7 +164,7 @@ Footprint PatchPath::at(double part) const {
   if (part <= 0) return from_;
   if (part >= 1) return to_;
   Footprint result = from_;
-  result.height = from_.height * (1 - part) + to_.height * part;
+  result.height = from_.height + (to_.height - from_.height) * part;  // to the bit where it stays
   if (isConstant_) return result;
   const SurfaceField field(base_);
   const SurfaceFrame frame = frameAt(part);

@@ -31,6 +31,10 @@ class PatchPath {
   /// @throws InvalidInput where the surface breaks off before a corner
   [[nodiscard]] Footprint at(double part) const;
 
+  /// Lets go of the base's memory; another of the same content has to be set before at().
+  void dropBase() { base_ = {}; }
+  void setBase(const levelset::NarrowBand& base) { base_ = base; }
+
   [[nodiscard]] const std::vector<Imath::V3d>& centreWay() const { return way_; }
   /// Do the corners run beside the centre? Otherwise each takes its own shortest way, which may
   /// lead around the other side.

@@ -416,8 +416,9 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
 
   // === Warp, and make a distance of it again [Brodersen07, ERR-23 in our notes]
   // The shell ends somewhere around the unit cube, so what is outside of a box that was asked for
-  // is cut off there, not at the end of the shell.
-  const bool isCut = options.map == TextureMap::Shell && options.textureBox;
+  // is cut off there, not at the end of the shell. What touches it is left as it is.
+  const bool isCut = options.map == TextureMap::Shell &&
+                     isBeyond(texture.zeroSetBounds(), box, texture.voxelSize());
   const NarrowBand whole = fitTexture(isCut ? levelset::clip(texture, box) : texture,
                                       report.voxelSize, bandStretch, maxStretch, options);
   std::vector<NarrowBand> pieces;

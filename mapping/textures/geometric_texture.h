@@ -36,7 +36,8 @@ struct TextureOptions {
   double blend = 0;  ///< radius along the seam, world units; 0: none
   std::optional<Imath::Box3d> textureBox =
       {};  ///< what the unit cube of u, v, w is; empty: the texture's zero-set box. What is outside
-           ///< goes on beyond the patch, but not in a shell: there it is cut off
+           ///< goes on beyond the patch, but not in a shell: there it is cut off. A box that holds
+           ///< all of the texture cuts nothing
   std::optional<double> voxelSize =
       {};                      ///< empty: the finest of base and texture × smallest stretch
   double halfWidth = 3;        ///< voxels

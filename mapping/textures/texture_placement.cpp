@@ -54,6 +54,12 @@ std::string foldSentence(const Distortion& distortion, const FoldCertificate& ce
 
 }  // namespace
 
+bool isBeyond(const Box3d& own, const Box3d& box, double voxelSize) {
+  const V3d slack(0.05 * voxelSize);
+  const Box3d wide(box.min - slack, box.max + slack);
+  return !own.isEmpty() && !(wide.intersects(own.min) && wide.intersects(own.max));
+}
+
 std::vector<std::string> judgeFolds(const Distortion& distortion,
                                     const FoldCertificate& certificate, bool areAllowed) {
   if (distortion.folded == 0 && certificate.verdict() == FoldVerdict::Certified) return {};

@@ -28,6 +28,9 @@ struct TexturePlacement {
 [[nodiscard]] Imath::Box3d chooseTextureBox(const Imath::Box3d& own,
                                             const std::optional<Imath::Box3d>& given);
 
+/// Does a texture of this box stick out of the other, by more than a small part of its voxels?
+[[nodiscard]] bool isBeyond(const Imath::Box3d& own, const Imath::Box3d& box, double voxelSize);
+
 /// @return what to note of folds that are allowed, and of parts that are not certified; empty
 ///         without any
 /// @throws InvalidInput for folds that are not, telling where the worst is

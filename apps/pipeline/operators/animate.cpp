@@ -12,14 +12,17 @@
 
 #include "apps/pipeline/file_row.h"
 #include "apps/pipeline/invocation.h"
+#include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/shell.h"
 #include "apps/pipeline/operators/texture_options.h"
 #include "apps/pipeline/units.h"
 #include "levelset/error.h"
+#include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
 #include "levelset/files/mesh_file.h"
 #include "levelset/meshing/band_to_mesh.h"
 #include "mapping/animation/animation.h"
+#include "mapping/animation/frame_notes.h"
 
 namespace pipeline {
 namespace {
@@ -97,9 +100,10 @@ void requireApart(const Invocation& in, const char* row, const char* first) {
   std::set<std::filesystem::path> read;
   const FileRow files(in.text(row));
   for (std::size_t f = 1; f < framesOf(in); ++f)
-    read.insert(std::filesystem::absolute(frameFile(in, files, first, f)).lexically_normal());
+    read.insert(levelset::canonicalFile(frameFile(in, files, first, f)));
   for (const std::string& file : outFiles(in)) {
-    if (!read.contains(std::filesystem::absolute(file).lexically_normal())) continue;
+    const std::filesystem::path written = levelset::canonicalFile(file);
+    if (written.empty() || !read.contains(written)) continue;
     throw UsageError(
         fmt::format("animate: --out would write over '{}' of --{}; use other names", file, row));
   }
@@ -161,8 +165,42 @@ void validateAnimate(const Invocation& in) {
   (void)keyFrames(in);
 }
 
+/// The frames between follow the first patch: refuses another that was made in another way, and
+/// warns where it is only finer, or not known.
+void requireLikeFirst(Invocation& in, std::size_t patch) {
+  const PatchRecipe* first = in.operands[2].patch().recipe.get();
+  const PatchRecipe* other = in.operands[1 + patch].patch().recipe.get();
+  if (!first) return;  // told where it is made again
+  if (!other) {
+    in.notes.warnings.push_back(fmt::format(
+        "how patch {} was made is not in its file; the frames between are made as the first",
+        patch));
+    return;
+  }
+  if (first->action != other->action) {
+    throw UsageError(fmt::format(
+        "animate: patch {} was made by '{}' and the first by '{}'; the frames between follow the "
+        "first, so make both by one action",
+        patch, other->action, first->action));
+  }
+  for (const auto& [option, value] : first->shape) {
+    if (other->shape.at(option) == value) continue;
+    throw UsageError(fmt::format(
+        "animate: patch {} has another --{} than the first; the frames between follow the first, "
+        "so give both the same",
+        patch, option));
+  }
+  for (const auto& [option, value] : first->fineness) {
+    if (other->fineness.at(option) == value) continue;
+    in.notes.warnings.push_back(
+        fmt::format("patch {} has another --{} than the first, which the frames between follow",
+                    patch, option));
+  }
+}
+
 std::vector<mapping::AnimationKey> keysOf(Invocation& in, const Imath::Box3d& textureBox) {
   const std::vector<std::size_t> frames = keyFrames(in);
+  for (std::size_t k = 1; k < frames.size(); ++k) requireLikeFirst(in, k + 1);
   std::vector<mapping::AnimationKey> keys;
   for (std::size_t k = 0; k < frames.size(); ++k) {
     const PatchValue& value = in.operands[2 + k].patch();
@@ -199,6 +237,17 @@ mapping::PatchMaker makerLike(const std::vector<Patch>& patches) {
     }
     return made;
   };
+}
+
+/// A level set, and once what it lacked. @param told  frames of which that was done
+NarrowBand readFrame(Invocation& in, std::size_t frame, const std::filesystem::path& file,
+                     std::set<std::size_t>& told) {
+  levelset::BandRepairs repairs;
+  NarrowBand band = levelset::readBand(file, {.maxMemory = in.maxMemory, .repairs = &repairs});
+  if (told.insert(frame).second)
+    for (const std::string& sentence : sentencesOf(repairs, file))
+      in.notes.warnings.push_back(fmt::format("frame {}: {}", frame, sentence));
+  return band;
 }
 
 mapping::AnimationOptions animationOptions(Invocation& in,
@@ -238,9 +287,9 @@ mapping::AnimationOptions animationOptions(Invocation& in,
     options.carry = mapping::CarryRule::Rigid;
   }
   if (in.given("base-frames")) {
-    options.bases = [row = baseRow(in), &in](std::size_t frame) {
-      return levelset::readBand(frameFile(in, row, "base-first", frame),
-                                {.maxMemory = in.maxMemory});
+    options.bases = [row = baseRow(in), &in,
+                     told = std::make_shared<std::set<std::size_t>>()](std::size_t frame) {
+      return readFrame(in, frame, frameFile(in, row, "base-first", frame), *told);
     };
   }
   return options;
@@ -261,6 +310,7 @@ void tellAnimation(Invocation& in, const mapping::AnimationReport& report) {
     entry["farthest_way"] = frame.farthestWay;
     entry["drift"] = {frame.drift.least, frame.drift.most};
     entry["remade"] = frame.isRemade;
+    entry["skipped"] = frame.skipped;
     if (frame.corners.size() == 1)
       for (const Imath::V3d& c : frame.corners.front()) entry["corners"].push_back({c.x, c.y, c.z});
     json["frame"].push_back(std::move(entry));
@@ -281,55 +331,98 @@ void tellAnimation(Invocation& in, const mapping::AnimationReport& report) {
         worst.least, worst.most));
 }
 
-/// Patches as --unfold and --relax leave them; what these say is told of the first frame only.
-std::vector<Patch> improvedAt(Invocation& in, const NarrowBand& base, std::vector<Patch> patches,
-                              const Imath::V3d& textureSize, bool& isTold) {
-  const std::size_t notes = in.notes.notes.size(), warnings = in.notes.warnings.size();
-  const levelset::Progress progress = std::exchange(in.progress, {});
+/// Patches as --unfold and --relax leave them. Warnings are told of their frame, notes of the first
+/// only.
+std::vector<Patch> improvedAt(Invocation& in, const mapping::PatchFrame& frame,
+                              const Imath::V3d& textureSize) {
+  std::vector<std::string>&notes = in.notes.notes, &warnings = in.notes.warnings;
+  const std::size_t firstNote = notes.size(), firstWarning = warnings.size();
+  const levelset::Progress progress = std::exchange(in.progress, frame.progress);
   ImprovedPatches improved =
-      improvedPatches(in, base, std::move(patches), in.length("sink"), textureSize);
+      improvedPatches(in, frame.base, frame.patches, in.length("sink"), textureSize);
   in.progress = progress;
-  if (isTold) {
-    in.notes.notes.resize(notes);
-    in.notes.warnings.resize(warnings);
+  for (std::size_t i = firstWarning; i < warnings.size(); ++i) {
+    const std::string own = "animate: ";
+    if (warnings[i].starts_with(own)) warnings[i].erase(0, own.size());
+    warnings[i] = fmt::format("frame {}: {}", frame.index, warnings[i]);
   }
-  isTold = isTold || in.notes.warnings.size() > warnings || in.notes.notes.size() > notes;
+  if (frame.index > 0) notes.resize(firstNote);
   return std::move(improved.patches);
+}
+
+/// Writes meshes frame by frame, and warns once of what their format leaves out.
+class MeshWriter {
+ public:
+  explicit MeshWriter(Invocation& in) : in_(in), out_(outRow(in)) {}
+  void write(std::size_t frame, const levelset::TriMesh& mesh) {
+    const std::filesystem::path file = out_.file(frame);
+    levelset::writeMesh(file, mesh);
+    if (isTold_ || mesh.attributes.isEmpty() || levelset::holdsAttributes(file)) return;
+    isTold_ = true;
+    in_.notes.warnings.push_back(fmt::format(
+        "{} and the frames after hold positions and triangles only: the {} were left out; write "
+        ".ply or .obj to keep them",
+        file.string(), describe(mesh.attributes)));
+  }
+
+ private:
+  Invocation& in_;
+  FileRow out_;
+  bool isTold_ = false;
+};
+
+bool isSame(const levelset::TriMesh& a, const levelset::TriMesh& b) {
+  const levelset::MeshAttributes &p = a.attributes, &q = b.attributes;
+  return a.positions == b.positions && a.triangles == b.triangles && a.precision == b.precision &&
+         a.spacing == b.spacing && p.normals == q.normals && p.uvs == q.uvs &&
+         p.colors == q.colors && p.precision == q.precision &&
+         p.colorPrecision == q.colorPrecision && p.hasAlpha == q.hasAlpha;
 }
 
 // === The action
 
 Value animateMesh(Invocation& in, const std::vector<mapping::AnimationKey>& keys) {
-  const FileRow out = outRow(in);
-  const Imath::V3d size = textureBoxOf(in).size();
-  levelset::TriMesh texture = in.mesh(1), result;
+  constexpr double kImproving = 0.3;  // of the progress
+  MeshWriter writer(in);
+  mapping::MeshTextureOptions options = meshTextureOptions(in);
+  options.textureBox = textureBoxOf(in);  // of frame 0 for all, so that what grows is seen to
+  levelset::TriMesh texture = in.mesh(1);
+  mapping::MeshTextureResult result;
+  std::vector<Patch> patches;
+  std::vector<std::size_t> skipped;
+  std::vector<std::string> notes;
+  mapping::FrameNotes frameNotes;
   std::size_t reused = 0;
-  bool isTold = false;
   mapping::AnimationReport report = mapping::animatePatches(
       in.band(0), keys, animationOptions(in, keys), [&](const mapping::PatchFrame& frame) {
-        bool isSame = frame.isUnchanged;
+        bool isReused = frame.isUnchanged;
         if (frame.index > 0 && in.given("texture-frames")) {
           levelset::TriMesh next =
               levelset::readMesh(frameFile(in, textureRow(in), "texture-first", frame.index),
                                  {.maxMemory = in.maxMemory});
-          isSame =
-              isSame && next.positions == texture.positions && next.triangles == texture.triangles;
+          isReused = isReused && isSame(next, texture);
           texture = std::move(next);
         }
-        if (isSame) {
+        if (isReused) {
           ++reused;
         } else {
-          mapping::MeshTextureOptions options = meshTextureOptions(in);
-          options.progress = frame.progress;
-          const std::vector<Patch> patches =
-              improvedAt(in, frame.base, frame.patches, size, isTold);
-          result = mapping::mapMesh(texture, patches, options).mesh;
+          if (!frame.isUnchanged) {
+            mapping::PatchFrame part = frame;
+            part.progress = levelset::subProgress(frame.progress, 0, kImproving);
+            patches = improvedAt(in, part, options.textureBox->size());
+          }
+          options.progress = levelset::subProgress(frame.progress, kImproving, 1);
+          result = mapping::mapMesh(texture, patches, options);
+          for (const std::string& note : result.notes) frameNotes.add(frame.index, note, notes);
         }
-        levelset::writeMesh(out.file(frame.index), result);
+        skipped.push_back(result.skipped);
+        writer.write(frame.index, result.mesh);
       });
   report.reused = reused;
+  report.notes.insert(report.notes.end(), notes.begin(), notes.end());
+  for (std::size_t f = 0; f < skipped.size(); ++f) report.frames[f].skipped = skipped[f];
   tellAnimation(in, report);
-  return Value(std::move(result));
+  return Value(std::move(result.mesh));
 }
 
 Value animate(Invocation& in) {
@@ -339,32 +432,37 @@ Value animate(Invocation& in) {
   const std::vector<mapping::AnimationKey> keys = keysOf(in, textureBox);
   if (mapsMesh(in)) return animateMesh(in, keys);
 
-  const FileRow out = outRow(in);
-  bool isTold = false;
   mapping::TextureAnimationOptions options;
   options.animation = animationOptions(in, keys);
   options.texture = textureOptions(in);
-  options.improve = [&](const NarrowBand& base, std::vector<Patch> patches) {
-    return improvedAt(in, base, std::move(patches), textureBox.size(), isTold);
-  };
-  if (in.given("texture-frames")) {
-    options.textures = [row = textureRow(in), &in](std::size_t frame) {
-      return levelset::readBand(frameFile(in, row, "texture-first", frame),
-                                {.maxMemory = in.maxMemory});
+  if (in.flag("unfold") || in.text("relax") != "none") {
+    options.improve = [&](const mapping::PatchFrame& frame) {
+      return improvedAt(in, frame, textureBox.size());
     };
   }
+  std::set<std::size_t> told;
+  if (in.given("texture-frames")) {
+    options.textures = [row = textureRow(in), &in, &told](std::size_t frame) {
+      return readFrame(in, frame, frameFile(in, row, "texture-first", frame), told);
+    };
+  }
+  const FileRow out = outRow(in);
+  MeshWriter writer(in);
+  levelset::TriMesh mesh;  // of the frame before, where that is what is written
   NarrowBand last;
-  tellAnimation(in, mapping::animateTexture(
-                        in.band(0), in.band(1), keys, options,
-                        [&](std::size_t frame, const mapping::TextureResult& result, bool) {
-                          const std::filesystem::path file = out.file(frame);
-                          if (frame + 1 == framesOf(in)) last = result.band;
-                          if (levelset::isMeshFormat(file)) {
-                            levelset::writeMesh(file, levelset::bandToMesh(result.band));
-                          } else {
-                            levelset::writeBand(file, result.band);
-                          }
-                        }));
+  tellAnimation(in,
+                mapping::animateTexture(
+                    in.band(0), in.band(1), keys, options,
+                    [&](std::size_t frame, const mapping::TextureResult& result, bool isReused) {
+                      const std::filesystem::path file = out.file(frame);
+                      if (frame + 1 == framesOf(in)) last = result.band;
+                      if (!levelset::isMeshFormat(file)) {
+                        levelset::writeBand(file, result.band);
+                        return;
+                      }
+                      if (!isReused) mesh = levelset::bandToMesh(result.band);
+                      writer.write(frame, mesh);
+                    }));
   return Value(std::move(last));
 }
 
@@ -389,7 +487,8 @@ std::vector<Param> animateParams() {
        .fallback = "1"},
       {.name = "texture-frames",
        .type = ParamType::Path,
-       .doc = "textures of the frames after the first, likewise"},
+       .doc = "textures of the frames after the first, likewise; without --texture-box, the box of "
+              "the first is the unit cube of all"},
       {.name = "texture-first",
        .type = ParamType::Integer,
        .doc = "number of the file that is the texture of frame 1",
@@ -423,7 +522,9 @@ void addAnimationOperators(std::vector<Operator>& all) {
           "The operands are base, texture and patch, as of `texture`, and further patches to go "
           "to. All are those of frame 0, but for the further patches, each of which stands on the "
           "base of its own frame. Between two patches the first is carried forwards and the second "
-          "backwards along the bases, and the way between them is gone evenly. Each frame is "
+          "backwards along the bases, and the way between them is gone evenly; frames between "
+          "follow "
+          "the first in how they are made. Each frame is "
           "written when it is done; the result is the last. What does not change is not computed "
           "again.",
       .example =

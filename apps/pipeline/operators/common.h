@@ -4,11 +4,14 @@
 
 #include <fmt/core.h>
 
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operator.h"
 #include "levelset/error.h"
+#include "levelset/narrow_band.h"
 
 namespace pipeline {
 
@@ -18,6 +21,23 @@ inline std::string formatName(const Invocation& in) {
   if (in.text("file") != "-") return in.text("file");
   throw levelset::UsageError(
       fmt::format("{}: '-' has no extension to tell the format; give --format", in.op().name));
+}
+
+/// What a grid that was read from a file lacked to be a band, to warn of.
+inline std::vector<std::string> sentencesOf(const levelset::BandRepairs& repairs,
+                                            const std::filesystem::path& file) {
+  std::vector<std::string> sentences;
+  if (repairs.activeTiles > 0)
+    sentences.push_back(
+        fmt::format("{} active tiles of {} were split into voxels; 'reinitialize' gives them "
+                    "distances",
+                    repairs.activeTiles, file.string()));
+  if (repairs.inactiveValues > 0)
+    sentences.push_back(fmt::format(
+        "{} inactive values of {} were set to the background of their sign; run 'check' "
+        "to see whether the signs are right",
+        repairs.inactiveValues, file.string()));
+  return sentences;
 }
 
 inline Param voxelParam(const char* doc = "edge of a voxel") {

@@ -59,16 +59,8 @@ Value read(Invocation& in) {
   Value value = in.given("grid") ? std::visit([](auto&& grid) { return Value(std::move(grid)); },
                                               levelset::readGrid(file, options))
                                  : Value(levelset::readBand(file, options));
-  if (repairs.activeTiles > 0)
-    in.notes.warnings.push_back(
-        fmt::format("{} active tiles of {} were split into voxels; 'reinitialize' gives them "
-                    "distances",
-                    repairs.activeTiles, file.string()));
-  if (repairs.inactiveValues > 0)
-    in.notes.warnings.push_back(fmt::format(
-        "{} inactive values of {} were set to the background of their sign; run 'check' "
-        "to see whether the signs are right",
-        repairs.inactiveValues, file.string()));
+  const std::vector<std::string> told = sentencesOf(repairs, file);
+  in.notes.warnings.insert(in.notes.warnings.end(), told.begin(), told.end());
   return value;
 }
 

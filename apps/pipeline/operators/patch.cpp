@@ -146,6 +146,7 @@ Value patchesOf(Invocation& in, PatchRecipe recipe, const Make& make) {
   tellPatches(in, report, patches);
   PatchValue value;
   value.patches = std::move(patches);
+  tellOrigin(in, recipe);
   value.recipe = std::make_shared<const PatchRecipe>(std::move(recipe));
   if (isAuto) {
     value.atHeight = [make](double h, const levelset::Progress& progress) {

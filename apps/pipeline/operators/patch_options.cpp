@@ -88,4 +88,24 @@ mapping::PatchOptions patchOptionsOf(Invocation& in) {
   return options;
 }
 
+void tellOrigin(const Invocation& in, PatchRecipe& recipe) {
+  recipe.action = in.op().name;
+  const auto written = [&](const Param& param) -> std::string {
+    if (param.type == ParamType::Flag || param.type == ParamType::Points)
+      return in.given(param.name) ? "given" : "none";  // a spline lies elsewhere, as the patch does
+    if (param.type == ParamType::Number) return fmt::format("{}", in.number(param.name));
+    if (param.type == ParamType::Degrees) return fmt::format("{}", in.radians(param.name));
+    return in.given(param.name) || !param.fallback.empty() ? in.text(param.name) : "none";
+  };
+  const bool isGrid = recipe.action == "patch-grid";
+  for (const Param& param : in.op().params) {
+    const std::string& name = param.name;
+    const bool isShape = name == "twist" || name == "taper" || name == "bend" || name == "spline" ||
+                         name == "fade" ||
+                         (isGrid && (name == "count" || name == "shift" || name == "mirror"));
+    if (isShape) recipe.shape[name] = written(param);
+    if (name == "particles" || name == "spacing") recipe.fineness[name] = written(param);
+  }
+}
+
 }  // namespace pipeline

@@ -13,5 +13,7 @@ namespace pipeline {
 /// @throws levelset::UsageError for options that exclude each other or are out of range
 void validateLevels(const Invocation& in);
 [[nodiscard]] mapping::PatchOptions patchOptionsOf(Invocation& in);
+/// Notes the action and those of its options that other patches can be compared by.
+void tellOrigin(const Invocation& in, PatchRecipe& recipe);
 
 }  // namespace pipeline

@@ -59,9 +59,11 @@ mapping::ScatterOptions scatterOptions(Invocation& in) {
 }
 
 /// Each patch goes its own way, and keeps its scale.
-std::shared_ptr<const PatchRecipe> recipeOf(const std::vector<mapping::PatchSite>& sites,
+std::shared_ptr<const PatchRecipe> recipeOf(const Invocation& in,
+                                            const std::vector<mapping::PatchSite>& sites,
                                             const mapping::PatchOptions& options) {
   PatchRecipe recipe;
+  tellOrigin(in, recipe);
   recipe.outlines = [](const std::vector<mapping::Patch>& patches) {
     std::vector<mapping::PatchOutline> outlines;
     for (const mapping::Patch& patch : patches) outlines.push_back(mapping::outlineOf(patch));
@@ -112,7 +114,7 @@ Value scatter(Invocation& in) {
   }
   PatchValue value;
   value.patches = std::move(result.patches);
-  value.recipe = recipeOf(result.sites, options.patch);
+  value.recipe = recipeOf(in, result.sites, options.patch);
   if (isAuto) {
     value.atHeight = [base = in.band(), sites = std::move(result.sites), patch = options.patch](
                          double h, const levelset::Progress& progress) {

@@ -33,19 +33,31 @@ nlohmann::ordered_json energyJson(const mapping::ShellDistortion& distortion) {
           {"max", distortion.most}};
 }
 
-mapping::ShellOptions shellOptions(const Invocation& in, const mapping::Patch& patch, double sink) {
+bool isRelaxed(const Invocation& in) {
+  return in.text("relax") != "none";
+}
+
+/// @param part, parts  which of the patches, for the progress
+mapping::ShellOptions shellOptions(const Invocation& in, const mapping::Patch& patch, double sink,
+                                   std::size_t part, std::size_t parts) {
+  const auto share = [&](std::size_t n) {
+    return static_cast<double>(n) / static_cast<double>(parts);
+  };
   return {.sink = sink / patch.height,
           .freeSides = in.text("sides") == "free",
           .maxMemory = in.maxMemory,
-          .progress = in.progress};
+          .progress = levelset::subProgress(in.progress, share(part), share(part + 1))};
 }
 
 void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
                    double sink) {
   mapping::ShellFolds before, after;
   before.leastJacobian = after.leastJacobian = HUGE_VAL;
+  const std::size_t parts = improved.patches.size() * (isRelaxed(in) ? 2 : 1);
   for (mapping::Patch& patch : improved.patches) {
-    mapping::Unfolding result = mapping::unfold(base, patch, shellOptions(in, patch, sink));
+    const auto part = static_cast<std::size_t>(&patch - improved.patches.data());
+    mapping::Unfolding result =
+        mapping::unfold(base, patch, shellOptions(in, patch, sink, part, parts));
     improved.figures["unfold"].push_back({{"before", foldsJson(result.before)},
                                           {"after", foldsJson(result.after)},
                                           {"iterations", result.iterations},
@@ -75,8 +87,11 @@ void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPat
 void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
                   double sink, const V3d& textureSize) {
   double before = 0, after = 0;
+  const std::size_t first = in.flag("unfold") ? improved.patches.size() : 0;
+  const std::size_t parts = first + improved.patches.size();
   for (mapping::Patch& patch : improved.patches) {
-    mapping::ShellOptions options = shellOptions(in, patch, sink);
+    const auto part = first + static_cast<std::size_t>(&patch - improved.patches.data());
+    mapping::ShellOptions options = shellOptions(in, patch, sink, part, parts);
     // What is left out afterwards need not be mended.
     if (in.flag("skip-folds") && mapping::countFolds(patch, options.sink).folded > 0) {
       improved.figures["relax"].push_back(nullptr);
@@ -217,7 +232,7 @@ ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base
   for (const mapping::Patch& patch : patches) mapping::requirePatchOn(base, patch);
   ImprovedPatches improved{.patches = std::move(patches)};
   if (in.flag("unfold")) unfoldPatches(in, base, improved, sink);
-  if (in.text("relax") != "none") relaxPatches(in, base, improved, sink, textureSize);
+  if (isRelaxed(in)) relaxPatches(in, base, improved, sink, textureSize);
   return improved;
 }
 

@@ -1,5 +1,8 @@
+#include <Imath/ImathVec.h>
 #include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -28,6 +31,36 @@ class Animate : public support::ShellTest {
   }
   std::string bytes(const std::string& file) { return support::slurp(folder_ / file); }
 };
+
+/// The middle of the patch at a frame, on a ball of that radius.
+Imath::V3d middleOf(const Json& details, std::size_t frame, double radius = 5) {
+  Imath::V3d sum(0);
+  for (const Json& corner : details["frame"][frame]["corners"]) {
+    const Imath::V3d c(corner[0].get<double>(), corner[1].get<double>(), corner[2].get<double>());
+    EXPECT_NEAR(c.length(), radius, 0.02);
+    sum += c;
+  }
+  return sum.normalized() * radius;
+}
+
+/// A closed tent with normals along z and a colour, as PLY.
+std::string tent(int red) {
+  std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty "
+      "float z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty uchar "
+      "red\nproperty uchar green\nproperty uchar blue\nelement face 4\nproperty list uchar int "
+      "vertex_indices\nend_header\n";
+  for (const char* vertex : {"0 0 0", "1 0 0", "0 1 0", "0.3 0.3 1"})
+    text += std::string(vertex) + " 0 0 1 " + std::to_string(red) + " 9 9\n";
+  return text + "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n";
+}
+
+std::size_t countOf(const std::string& part, const std::string& text) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+    ++count;
+  return count;
+}
 
 TEST_F(Animate, BeginsAndEndsAsTheTextureOnItsPatches) {
   const Json details =
@@ -89,10 +122,14 @@ TEST_F(Animate, PlaysTexturesAndReusesWhatStays) {
 
 TEST_F(Animate, MovesMeshesDecalsGridsAndPatchesFromFiles) {
   const std::string tail = " --frames 3 --voxel 0.5 --out f_#.vdb";
-  reportOf(kScene +
-           "mesh @ring --as m ! animate @ball @m @here @there --map mesh --frames 3 --out "
-           "m_#.ply");
+  // Half way from the pole to the equator, to a quarter of a voxel: corners go apart on a ball.
+  const Imath::V3d between = Imath::V3d(1, 0, 1).normalized() * 5;
+  const Json mesh =
+      reportOf(kScene +
+               "mesh @ring --as m ! animate @ball @m @here @there --map mesh --frames 3 --out "
+               "m_#.ply");
   EXPECT_NE(bytes("m_0.ply"), bytes("m_1.ply"));
+  EXPECT_LT((middleOf(mesh, 1) - between).length(), 0.125);
   const Json decals = reportOf(kScene +
                                "decal @ball --at 0,0,5 --direction 1,0,0 --radius 2 --height 1 "
                                "--levels 2 --spacing 1 --as d ! decal "
@@ -102,6 +139,7 @@ TEST_F(Animate, MovesMeshesDecalsGridsAndPatchesFromFiles) {
                                "@ring @d @e" +
                                tail);
   EXPECT_EQ(decals["patches_made"], 1);
+  EXPECT_LT((middleOf(decals, 1) - between).length(), 0.02);
   EXPECT_REFUSED(levelsmith(kScene +
                             "decal @ball --at 0,0,5 --direction 1,0,0 --radius 2 --height "
                             "1 --as d ! animate @ball @ring @d --carry corners" +
@@ -116,12 +154,101 @@ TEST_F(Animate, MovesMeshesDecalsGridsAndPatchesFromFiles) {
                "@g @h" +
                tail);
   EXPECT_EQ(tiles["patches_made"], 1);
+  EXPECT_NEAR(middleOf(tiles, 1).x, 0.25, 0.02);
+  EXPECT_NEAR(middleOf(tiles, 1).y, 0, 0.02);
   ASSERT_EQ(levelsmith(kScene + "write @here here.patch ! write @there there.patch").code, 0);
   const auto outcome = levelsmith(
-      kScene + "read here.patch --as p ! read there.patch --as q ! animate @ball @ring @p @q" +
-      tail);
+      "--report run.json " + kScene +
+      "read here.patch --as p ! read there.patch --as q ! animate @ball @ring @p @q" + tail);
   EXPECT_EQ(outcome.code, 0) << outcome.err;
+  const Json files = Json::parse(bytes("run.json"))["steps"].back()["details"];
+  EXPECT_LT((middleOf(files, 1) - between).length(), 0.125);
   EXPECT_NE(outcome.err.find("not in its file"), std::string::npos) << outcome.err;
+}
+
+TEST_F(Animate, ComparesAndKeepsWhatMeshesCarry) {
+  writeFile("t_0.ply", tent(200));
+  writeFile("t_1.ply", tent(100));
+  writeFile("t_2.ply", tent(100));
+  const std::string chain = kScene +
+                            "read t_0.ply --as t ! animate @ball @t @here --map mesh --frames 3 "
+                            "--texture-frames t_#.ply --out ";
+  const Json details = reportOf(chain + "f_#.ply");
+  EXPECT_EQ(details["reused"], 1);
+  EXPECT_NE(bytes("f_0.ply"), bytes("f_1.ply"));
+  EXPECT_EQ(bytes("f_1.ply"), bytes("f_2.ply"));
+  const auto outcome = levelsmith(chain + "f_#.stl");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(countOf("the normals and colours were left out", outcome.err), 1u) << outcome.err;
+  EXPECT_NE(outcome.err.find("f_0.stl and the frames after"), std::string::npos) << outcome.err;
+}
+
+TEST_F(Animate, HoldsTheLastPatchAndPlaysOneFrame) {
+  const Json details =
+      reportOf(kScene +
+               "texture @ball @ring @there --voxel 0.5 ! write last.vdb "
+               "! animate @ball @ring @here @there --frames 4 --key-frames 0,2 --voxel 0.5 "
+               "--out f_#.vdb ! animate @ball @ring @here --frames 1 --voxel 0.5 --out g_#.vdb");
+  EXPECT_EQ(details["frames"], 1);
+  EXPECT_EQ(bytes("f_2.vdb"), bytes("last.vdb"));
+  EXPECT_EQ(bytes("f_3.vdb"), bytes("last.vdb"));
+  EXPECT_EQ(bytes("g_0.vdb"), bytes("f_0.vdb"));
+  // To the end of the row.
+  reportOf(
+      kScene +
+      "animate @ball @ring @here @there --frames 3 --key-frames 0,2 --voxel 0.5 --out h_#.vdb");
+  EXPECT_EQ(bytes("h_2.vdb"), bytes("last.vdb"));
+}
+
+TEST_F(Animate, RefusesPatchesThatWereMadeInAnotherWay) {
+  const auto refusal = [&](const std::string& other) {
+    return levelsmith(kScene + other +
+                      " --as x ! animate @ball @ring @here @x --frames 3 --out "
+                      "f_#.vdb");
+  };
+  const std::string patch = "patch @ball --at 5,0,0 --size 3,3 --height 1 --levels 2 --spacing 1 ";
+  EXPECT_REFUSED(refusal(patch + "--particles conforming --twist 90"), 2,
+                 "patch 2 has another --twist than the first");
+  EXPECT_REFUSED(refusal("decal @ball --at 5,0,0 --direction 0,1,0 --radius 1 --height 1 --levels "
+                         "2 --spacing 1"),
+                 2, "patch 2 was made by 'decal' and the first by 'patch'");
+  EXPECT_REFUSED(
+      refusal(
+          "patch @ball --corners \"5,-1,-1 5,-1,1 5,1,1 5,1,-1\" --mirror --height 1 --levels 2 "
+          "--spacing 1 --particles conforming"),
+      2, "patch 2 is mirrored and the first is not");
+  EXPECT_EQ(fileCount(), 0u);
+  // What is only finer is told.
+  const auto outcome = refusal(patch + "--particles reduced");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("patch 2 has another --particles than the first"), std::string::npos)
+      << outcome.err;
+}
+
+TEST_F(Animate, TellsWhatFramesLack) {
+  ASSERT_EQ(levelsmith("sphere --radius 5 --voxel 0.5 ! write base_1.vdb").code, 0);
+  openvdb::initialize();
+  openvdb::io::File file((folder_ / "base_1.vdb").string());
+  file.open();
+  const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("surface"));
+  file.close();
+  grid->tree().addTile(1, openvdb::Coord(800, 0, 0), -0.25f, true);
+  openvdb::io::File((folder_ / "base_1.vdb").string()).write({grid});
+  std::filesystem::copy_file(folder_ / "base_1.vdb", folder_ / "base_2.vdb");
+  // They are read twice: on the way back from the goal, and when their frame is made.
+  const auto outcome = levelsmith(kScene +
+                                  "animate @ball @ring @here @here --frames 3 --base-frames "
+                                  "base_#.vdb --voxel 0.5 --out f_#.vdb");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(countOf("frame 1: 1 active tiles of base_1.vdb", outcome.err), 1u) << outcome.err;
+}
+
+TEST_F(Animate, TakesNumbersFromTheNameOfTheFileOnly) {
+  std::filesystem::create_directory(folder_ / "take#1");
+  reportOf(kScene + "animate @ball @ring @here --frames 2 --voxel 0.5 --out take#1/f_##.vdb");
+  EXPECT_TRUE(exists("take#1/f_01.vdb"));
+  EXPECT_REFUSED(levelsmith(kScene + "animate @ball @ring @here --frames 2 --out take#1/f.vdb"), 2,
+                 "put # where the number goes");
 }
 
 TEST_F(Animate, RefusesBeforeAnythingIsComputed) {
@@ -136,6 +263,10 @@ TEST_F(Animate, RefusesBeforeAnythingIsComputed) {
                  "goes with --base-frames");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --base-frames f_#.vdb --out f_#.vdb"), 2,
                  "would write over 'f_1.vdb'");
+  std::filesystem::create_directory_symlink(".", folder_ / "link");
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --base-frames link/f_#.vdb --out f_#.vdb"), 2,
+                 "would write over 'f_1.vdb'");
+  std::filesystem::remove(folder_ / "link");
   EXPECT_REFUSED(levelsmith(head + "@there --frames 1 --out f_#.vdb"), 2, "do not fit 1 frames");
   EXPECT_REFUSED(levelsmith(head + "@there --frames 5 --key-frames 0,x --out f_#.vdb"), 2,
                  "--key-frames");
@@ -164,8 +295,14 @@ TEST_F(Animate, TellsTheFrameAndLeavesTheFramesBefore) {
   EXPECT_REFUSED(
       levelsmith(kScene + "animate @ball @ring @here --frames 3 --base-frames base_#.vdb "
                           "--voxel 0.5 --out f_#.vdb"),
-      3, "frame 2");
+      3, "animate: frame 2: ");
   EXPECT_EQ(fileCount(), 4u);  // two bases, two frames
+  EXPECT_REFUSED(
+      levelsmith(kScene + "mesh @ring --as m ! read base_2.vdb --as far ! "
+                          "patch @far --at 61,0,0 --size 1.2,1.2 --height 1 --levels 2 --spacing 1 "
+                          "--particles conforming --as wrong ! animate @ball @m @wrong --map mesh "
+                          "--frames 2 --out m_#.ply"),
+      3, "animate: frame 0: the patch does not lie on the base");
   EXPECT_FALSE(bytes("f_1.vdb").empty());
 }
 
@@ -175,9 +312,16 @@ TEST_F(Animate, DryRunPlansAndWritesNothing) {
                                   "not_there_#.vdb --out f_#.vdb");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(fileCount(), 0u);
-  EXPECT_REFUSED(levelsmith("--max-memory 100k " + kScene +
-                            "animate @ball @ring @here --frames 9 --out f_#.vdb"),
-                 4, "");
+  // What the scene takes is there, what the frames take is not.
+  const std::string limit = "--max-memory 200M ";
+  const std::string fine =
+      kScene + "animate @ball @ring @here --frames 9 --voxel 0.005 --out f_#.vdb";
+  EXPECT_EQ(levelsmith(limit + kScene + "texture @ball @ring @here --voxel 0.5").code, 0);
+  const auto planned = levelsmith(limit + "--dry-run " + fine);
+  EXPECT_EQ(planned.code, 4);
+  EXPECT_NE(planned.err.find("animate: needs about"), std::string::npos) << planned.err;
+  EXPECT_REFUSED(levelsmith(limit + fine), 4, "animate: frame 0: needs about");
+  EXPECT_EQ(fileCount(), 0u);
 }
 
 }  // namespace animate_test

@@ -4,16 +4,18 @@
 
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <numbers>
 #include <string>
+#include <type_traits>
 
 #include "levelset/error.h"
 #include "levelset/solids/csg.h"
 #include "levelset/solids/shapes.h"
 #include "mapping/animation/patch_path.h"
 #include "mapping/surface/geodesic.h"
+#include "tests/support/animation.h"
 #include "tests/support/patches.h"
-#include "tests/support/threads.h"
 
 namespace animation_test {
 
@@ -21,73 +23,29 @@ using Imath::V3d;
 using levelset::NarrowBand;
 using mapping::AnimationKey;
 using mapping::AnimationOptions;
-using mapping::AnimationReport;
 using mapping::CarryRule;
 using mapping::Footprint;
 using mapping::makePatch;
 using mapping::Patch;
 using mapping::PatchFrame;
 using mapping::PatchPath;
+using support::ballAt;
+using support::keyOf;
+using support::patchAt;
+using support::play;
+using support::Played;
+using support::refusalOf;
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kVoxel = 0.1;
-
-const mapping::PatchOptions& thin() {
-  static const mapping::PatchOptions options = {
-      .levels = 2, .scheme = mapping::LevelScheme::Conforming, .spacing = 0.3};
-  return options;
-}
-
-NarrowBand ballAt(const V3d& centre, double radius = 1, double voxel = kVoxel) {
-  return levelset::makeSphere(radius, centre, voxel);
-}
-
-Patch patchAt(const NarrowBand& base, const V3d& at, double size = 0.6, double rotation = 0) {
-  return makePatch(base, mapping::cornersAround(base, at, size, size, rotation), 0.3, thin()).patch;
-}
-
-AnimationKey keyOf(const Patch& patch, std::size_t frame = 0) {
-  return {{patch}, {mapping::outlineOf(patch)}, frame};
-}
-
-std::vector<Patch> remake(const NarrowBand& base, std::span<const Footprint> footprints,
-                          std::span<const Footprint>, const levelset::Progress&) {
-  std::vector<Patch> patches;
-  for (const Footprint& f : footprints)
-    patches.push_back(makePatch(base, f.corners, f.height, thin()).patch);
-  return patches;
-}
+constexpr double kVoxel = support::kStageVoxel;
 
 Footprint footprint(const NarrowBand& base, const V3d& at, double size = 0.6, double rotation = 0) {
   return mapping::withReach(
       base, mapping::footprintOf(base, mapping::outlineOf(patchAt(base, at, size, rotation))));
 }
 
-std::string refusalOf(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const levelset::Error& error) {
-    return error.what();
-  }
-  return "";
-}
-
 V3d centreOf(const Patch& patch) {
   return (patch.corners[0] + patch.corners[1] + patch.corners[2] + patch.corners[3]) / 4.0;
-}
-
-/// Plays, and keeps the patches of all frames.
-struct Played {
-  AnimationReport report;
-  std::vector<Patch> patches;
-};
-Played play(const NarrowBand& base, const std::vector<AnimationKey>& keys,
-            AnimationOptions options) {
-  Played played;
-  if (!options.make) options.make = remake;
-  played.report = mapping::animatePatches(
-      base, keys, options, [&](const PatchFrame& f) { played.patches.push_back(f.patches.at(0)); });
-  return played;
 }
 
 // === Carrying
@@ -349,6 +307,9 @@ TEST(AnimatePatches, MakesNothingAgainThatStands) {
   const Played held = play(ball, {keyOf(a), keyOf(a, 3)}, {.frames = 4});
   EXPECT_EQ(held.report.patchesMade, 0u);
   EXPECT_EQ(held.report.reused, 3u);
+  // Of a height whose parts do not add up to it: 1.5 · 0.8 + 1.5 · 0.2 < 1.5.
+  const Patch tall = patchAt(ball, V3d(0, 0, 1), 0.6, 0, 1.5);
+  EXPECT_EQ(play(ball, {keyOf(tall), keyOf(tall, 5)}, {.frames = 6}).report.patchesMade, 0u);
 }
 
 TEST(AnimatePatches, TellsTheFrameOfWhatItRefuses) {
@@ -360,13 +321,14 @@ TEST(AnimatePatches, TellsTheFrameOfWhatItRefuses) {
   const Patch a = makePatch(first,
                             {V3d(-0.7, -0.4, 0.9), V3d(0.7, -0.4, 0.9), V3d(0.7, 0.4, 0.9),
                              V3d(-0.7, 0.4, 0.9)},
-                            0.2, thin())
+                            0.2, support::thinPatch())
                       .patch;
   const auto bases = [&](std::size_t f) { return base(f < 2 ? 0.7 : 1.3); };
   const std::string torn =
       refusalOf([&] { (void)play(first, {keyOf(a)}, {.frames = 4, .bases = bases}); });
   EXPECT_NE(torn.find("animate: frame 2: "), std::string::npos) << torn;
   EXPECT_NE(torn.find("one part of the base"), std::string::npos) << torn;
+  EXPECT_EQ(torn.find("frame"), torn.rfind("frame")) << torn;
   // Nothing is left.
   const NarrowBand ball = ballAt(V3d(0));
   const std::string gone = refusalOf([&] {
@@ -380,7 +342,7 @@ TEST(AnimatePatches, TellsTheFrameOfWhatItRefuses) {
   const std::string apart = refusalOf([&] {
     (void)mapping::animatePatches(
         two, {keyOf(patchAt(two, V3d(-1.3, 0, 1))), keyOf(patchAt(two, V3d(1.3, 0, 1)), 3)},
-        {.frames = 4, .make = remake}, [&](const PatchFrame&) { ++made; });
+        {.frames = 4, .make = support::remakePatches}, [&](const PatchFrame&) { ++made; });
   });
   EXPECT_EQ(made, 0u);
   EXPECT_NE(apart.find("animate: frame 1: no way on the surface"), std::string::npos) << apart;
@@ -435,7 +397,130 @@ TEST(AnimatePatches, RefusesKeysThatDoNotGoTogether) {
   EXPECT_NE(refusal({keyOf(a), two}).find("a set of 2"), std::string::npos);
   AnimationKey mirrored = keyOf(a, 3);
   mirrored.patches[0].mirrored = true;
-  EXPECT_NE(refusal({keyOf(a), mirrored}).find("mirrored"), std::string::npos);
+  EXPECT_NE(refusal({keyOf(a), mirrored}).find("patch 2 is mirrored"), std::string::npos);
+  // Tiles have one outline, and each counts.
+  AnimationKey tiles = keyOf(a), others = keyOf(a, 3);
+  tiles.patches.push_back(a);
+  EXPECT_NE(refusal({tiles, others}).find("a set of 1 tiles, the first of 2"), std::string::npos);
+  others.patches.push_back(a);
+  others.patches[1].mirrored = true;
+  EXPECT_NE(refusal({tiles, others}).find("in member 2"), std::string::npos);
+  // Of another number of levels: the frames between jump, so it is told.
+  mapping::PatchOptions finer = support::thinPatch();
+  finer.levels = 3;
+  const Patch b = makePatch(ball, a.corners, a.height, finer).patch;
+  const Played played = play(ball, {keyOf(a), keyOf(b, 3)}, {.frames = 4});
+  ASSERT_EQ(played.report.warnings.size(), 1u);
+  EXPECT_NE(played.report.warnings[0].find("3 levels and the first 2"), std::string::npos);
+}
+
+TEST(AnimatePatches, RefusesKeysOfAnotherBaseBeforeAFrameIsMade) {
+  const NarrowBand ball = ballAt(V3d(0)), other = ballAt(V3d(0), 1.4);
+  const Patch a = patchAt(ball, V3d(0, 0, 1)), b = patchAt(other, V3d(1.4, 0, 0));
+  std::size_t made = 0;
+  const auto refusal = [&](const std::vector<AnimationKey>& keys,
+                           const mapping::BandFrames& bases) {
+    return refusalOf([&] {
+      (void)mapping::animatePatches(ball, keys,
+                                    {.frames = 4, .bases = bases, .make = support::remakePatches},
+                                    [&](const PatchFrame&) { ++made; });
+    });
+  };
+  const auto bases = [](std::size_t f) {
+    return ballAt(V3d(0), 1 + 0.02 * static_cast<double>(f));
+  };
+  const std::string moving = refusal({keyOf(a), keyOf(b, 3)}, bases);
+  EXPECT_TRUE(moving.starts_with("animate: frame 3: the patch does not lie on the base")) << moving;
+  const std::string still = refusal({keyOf(a), keyOf(a, 1), keyOf(b, 3)}, {});
+  EXPECT_TRUE(still.starts_with("animate: frame 3: the patch does not lie on the base")) << still;
+  EXPECT_EQ(made, 0u);
+}
+
+TEST(AnimatePatches, TellsTheFrameOnceWhateverRefuses) {
+  const NarrowBand ball = ballAt(V3d(0));
+  const AnimationKey key = keyOf(patchAt(ball, V3d(0, 0, 1)));
+  const auto throwing = [&](const auto& error) {
+    return mapping::animatePatches(ball, {key}, {.frames = 3}, [&](const PatchFrame& frame) {
+      if (frame.index == 1) throw error;
+    });
+  };
+  const auto expect = [&](const auto& error, const std::string& sentence) {
+    using Thrown = std::decay_t<decltype(error)>;
+    EXPECT_THROW((void)throwing(error), Thrown);
+    EXPECT_EQ(refusalOf([&] { (void)throwing(error); }), sentence);
+  };
+  expect(levelset::InvalidInput("texture: a"), "animate: frame 1: a");
+  expect(levelset::ResourceLimit("map: b"), "animate: frame 1: map: b");
+  expect(levelset::IoError("write: c"), "animate: frame 1: c");
+  expect(levelset::NumericalError("animate: d"), "animate: frame 1: d");
+  expect(levelset::InvalidInput("animate: frame 2: e"), "animate: frame 2: e");
+  expect(levelset::UsageError("animate: f"), "animate: f");
+  expect(levelset::Cancelled("animate: g"), "animate: g");
+}
+
+TEST(AnimatePatches, HoldsOneBaseBesideTheFirst) {
+  const NarrowBand first = ballAt(V3d(0)), last = ballAt(V3d(0), 1.12);
+  const Patch a = patchAt(first, V3d(0, 0, 1)), b = patchAt(last, V3d(1.12, 0, 0));
+  std::weak_ptr<const void> before;
+  std::size_t read = 0;
+  const auto bases = [&](std::size_t f) {
+    EXPECT_TRUE(before.expired()) << f;
+    NarrowBand base = ballAt(V3d(0), 1 + 0.04 * static_cast<double>(f));
+    before = base.shared();
+    ++read;
+    return base;
+  };
+  (void)play(first, {keyOf(a), keyOf(b, 3)}, {.frames = 4, .bases = bases});
+  EXPECT_GE(read, 5u);
+}
+
+TEST(AnimatePatches, CountsTheDriftOfTheGoal) {
+  // The ball grows by a quarter a frame: the goal, as it would be on the second, is 5/8 as large.
+  const NarrowBand first = ballAt(V3d(0)), last = ballAt(V3d(0), 2);
+  const Patch a = patchAt(first, V3d(0, 0, 1)), b = patchAt(last, V3d(2, 0, 0), 1.2);
+  const auto bases = [](std::size_t f) {
+    return ballAt(V3d(0), 1 + 0.25 * static_cast<double>(f));
+  };
+  const Played played = play(first, {keyOf(a), keyOf(b, 4)}, {.frames = 5, .bases = bases});
+  EXPECT_NEAR(played.report.frames[1].drift.least, 0.625, 0.01);
+  EXPECT_NEAR(played.report.frames[3].drift.most, 1.75, 0.01);
+  EXPECT_NEAR(played.report.frames[4].drift.factor(), 1, 1e-12);
+}
+
+TEST(AnimatePatches, IsCancelledBetweenTheBasesOnItsWayBack) {
+  const NarrowBand ball = ballAt(V3d(0));
+  const Patch a = patchAt(ball, V3d(0, 0, 1)), b = patchAt(ball, V3d(1, 0, 0));
+  std::size_t read = 0;
+  AnimationOptions options{.frames = 10};
+  options.bases = [&](std::size_t) {
+    ++read;
+    return ball;
+  };
+  options.progress = [&](double) { return read < 3; };
+  EXPECT_THROW((void)play(ball, {keyOf(a), keyOf(b, 9)}, options), levelset::Cancelled);
+  EXPECT_EQ(read, 3u);
+}
+
+TEST(AnimatePatches, WarnsOncePerKeyOfManyPatches) {
+  const NarrowBand ball = ballAt(V3d(0));
+  const auto pair = [&](double turn, std::size_t frame) {
+    const Patch a = patchAt(ball, V3d(0.1 * turn, 0, 1), 0.6, turn),
+                b = patchAt(ball, V3d(0.1 * turn, 0, -1), 0.6, turn);
+    return AnimationKey{{a, b}, {mapping::outlineOf(a), mapping::outlineOf(b)}, frame};
+  };
+  const Played played = play(ball, {pair(0, 0), pair(2, 2), pair(0, 4)}, {.frames = 5});
+  std::size_t turns = 0;
+  for (const std::string& warning : played.report.warnings)
+    turns += warning.find("the patch turns by") != std::string::npos;
+  EXPECT_EQ(turns, 2u);
+}
+
+TEST(AnimatePatches, PlaysOneFrame) {
+  const NarrowBand ball = ballAt(V3d(0));
+  const Played played = play(ball, {keyOf(patchAt(ball, V3d(0, 0, 1)))}, {.frames = 1});
+  EXPECT_EQ(played.patches.size(), 1u);
+  EXPECT_EQ(played.report.frames.size(), 1u);
+  EXPECT_EQ(played.report.patchesMade, 0u);
 }
 
 TEST(AnimatePatches, MakesReadPatchesWithAsManyParticles) {
@@ -445,93 +530,6 @@ TEST(AnimatePatches, MakesReadPatchesWithAsManyParticles) {
   const Patch again = makePatch(ball, a.corners, a.height, like).patch;
   EXPECT_EQ(again.levels.size(), a.levels.size());
   EXPECT_EQ(again.particleCount(), a.particleCount());
-}
-
-// === With a texture
-
-struct Shown {
-  AnimationReport report;
-  std::vector<std::uint64_t> hashes;
-  std::vector<bool> reused;
-};
-Shown show(const NarrowBand& base, const NarrowBand& texture, const std::vector<AnimationKey>& keys,
-           mapping::TextureAnimationOptions options) {
-  Shown shown;
-  options.animation.make = remake;
-  shown.report = mapping::animateTexture(
-      base, texture, keys, options,
-      [&](std::size_t, const mapping::TextureResult& result, bool isReused) {
-        shown.hashes.push_back(result.band.contentHash());
-        shown.reused.push_back(isReused);
-      });
-  return shown;
-}
-
-mapping::TextureOptions coarse() {
-  return {.map = mapping::TextureMap::Rbf, .voxelSize = kVoxel};
-}
-
-TEST(AnimateTexture, IsTheTextureOnItsKeysAtBothEnds) {
-  const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
-  const Patch a = patchAt(ball, V3d(0, 0, 1)), b = patchAt(ball, V3d(1, 0, 0), 0.5, -kPi / 2);
-  const Shown shown =
-      show(ball, stud, {keyOf(a), keyOf(b, 2)}, {.animation = {.frames = 3}, .texture = coarse()});
-  ASSERT_EQ(shown.hashes.size(), 3u);
-  EXPECT_EQ(shown.hashes[0], mapping::mapTexture(ball, stud, a, coarse()).band.contentHash());
-  EXPECT_EQ(shown.hashes[2], mapping::mapTexture(ball, stud, b, coarse()).band.contentHash());
-  EXPECT_NE(shown.hashes[1], shown.hashes[0]);
-  EXPECT_EQ(shown.report.reused, 0u);
-}
-
-TEST(AnimateTexture, ReusesFramesThatDoNotChange) {
-  const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
-  const Patch a = patchAt(ball, V3d(0, 0, 1));
-  const auto textures = [](std::size_t f) { return ballAt(V3d(0), f < 2 ? 0.5 : 0.4); };
-  const Shown shown = show(ball, stud, {keyOf(a)},
-                           {.animation = {.frames = 4}, .texture = coarse(), .textures = textures});
-  EXPECT_EQ(shown.reused, (std::vector<bool>{false, true, false, true}));
-  EXPECT_EQ(shown.report.reused, 2u);
-  EXPECT_EQ(shown.report.patchesMade, 0u);
-  EXPECT_EQ(shown.hashes[0], shown.hashes[1]);
-  EXPECT_EQ(shown.hashes[2], shown.hashes[3]);
-  EXPECT_EQ(shown.hashes[2],
-            mapping::mapTexture(ball, textures(2), a, coarse()).band.contentHash());
-}
-
-TEST(AnimateTexture, GivesTheSameBitsForAnyThreads) {
-  const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
-  const Patch a = patchAt(ball, V3d(0, 0, 1)), b = patchAt(ball, V3d(1, 0, 0), 0.5, -kPi / 2);
-  std::vector<std::uint64_t> first;
-  for (const std::size_t threads : {1, 2}) {
-    support::onThreads(threads, [&] {
-      const Shown shown = show(ball, stud, {keyOf(a), keyOf(b, 2)},
-                               {.animation = {.frames = 2 + 1}, .texture = coarse()});
-      if (first.empty()) first = shown.hashes;
-      EXPECT_EQ(shown.hashes, first);
-    });
-  }
-}
-
-TEST(AnimateTexture, EndsWhereItIsCancelled) {
-  const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
-  const Patch a = patchAt(ball, V3d(0, 0, 1)), b = patchAt(ball, V3d(1, 0, 0), 0.5, -kPi / 2);
-  double last = 0;
-  mapping::TextureAnimationOptions options{.animation = {.frames = 3}, .texture = coarse()};
-  options.animation.make = remake;
-  options.animation.progress = [&](double done) {
-    EXPECT_GE(done, last - 1e-12);
-    last = done;
-    return done < 0.5;
-  };
-  std::size_t written = 0;
-  EXPECT_THROW((void)mapping::animateTexture(ball, stud, {keyOf(a), keyOf(b, 2)}, options,
-                                             [&](auto&&...) { ++written; }),
-               levelset::Cancelled);
-  EXPECT_EQ(written, 1u);
-  options.animation.progress = [&](double) { return true; };
-  (void)mapping::animateTexture(ball, stud, {keyOf(a), keyOf(b, 2)}, options,
-                                [&](auto&&...) { ++written; });
-  EXPECT_EQ(written, 4u);
 }
 
 }  // namespace animation_test
