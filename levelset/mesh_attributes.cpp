@@ -33,7 +33,7 @@ void requireList(const std::vector<Vector>& list, std::size_t vertices, const ch
 }
 
 double largestPart(const V3d& v) {
-  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  return std::max(std::max(std::abs(v.x), std::abs(v.y)), std::abs(v.z));
 }
 
 template <typename Vector>
@@ -67,8 +67,8 @@ void requireAttributes(const TriMesh& mesh, const char* action) {
 
 V3d carriedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, double hand) {
   // Divided by the largest number first, so that no product leaves the range of numbers.
-  const double size =
-      std::max({largestPart(slopes[0]), largestPart(slopes[1]), largestPart(slopes[2])});
+  double inA = largestPart(slopes[0]), inB = largestPart(slopes[1]), inC = largestPart(slopes[2]);
+  const double size = std::max(std::max(inA, inB), inC);
   const double length = largestPart(normal);
   constexpr double kLeast = 1e-300;  // whose inverse is a number
   if (!(size > kLeast) || !(length > kLeast)) return V3d(0);
@@ -79,7 +79,7 @@ V3d carriedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, double ha
   // not be divided by.
   const V3d moved = hand * (n.x * b.cross(c) + n.y * c.cross(a) + n.z * a.cross(b));
   // What is left of a flat map is rounding.
-  const double inA = largestPart(a), inB = largestPart(b), inC = largestPart(c);
+  inA *= bySize, inB *= bySize, inC *= bySize;
   const double sum =
       std::abs(n.x) * inB * inC + std::abs(n.y) * inC * inA + std::abs(n.z) * inA * inB;
   const double scale = largestPart(moved);
