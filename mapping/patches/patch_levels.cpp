@@ -173,7 +173,7 @@ std::vector<ParticleLevel> levelsFromSurface(const NarrowBand& base, const Parti
 void requireCovered(const NarrowBand& base, const ParticleLevel& level) {
   if (!base.isOpenSurface()) return;
   const SurfaceField field(base);
-  constexpr double kStepVoxels = 2;
+  constexpr double kStepVoxels = 1;  // a slit of four shows in the middle two of them
   const auto steps = [&](const V3d& along) {
     return std::ceil(along.length() / (kStepVoxels * base.voxelSize()));
   };
@@ -187,7 +187,7 @@ void requireCovered(const NarrowBand& base, const ParticleLevel& level) {
           const double u = s / across, v = t / up;
           V3d p = (a * (1 - u) + b * u) * (1 - v) + (c * (1 - u) + d * u) * v;
           const V3d before = p;
-          if (field.project(p, 0)) continue;
+          if (field.project(p, 0) && !field.isBeyondBorder(p)) continue;
           throw levelset::InvalidInput(fmt::format(
               "{}: the surface breaks off at ({:.6g}, {:.6g}, {:.6g}), within the patch; keep to "
               "one side of its border, and off its holes",
