@@ -10,6 +10,14 @@
 namespace levelset {
 namespace {
 
+/// Else nothing can be joined, and nothing has to be sorted to tell.
+bool anyCoincide(const std::vector<Imath::V3d>& positions) {
+  convert::PositionTable table(positions, positions.size());
+  for (std::uint32_t v = 0; v < positions.size(); ++v)
+    if (table.findOrEnter(positions[v], v) != v) return true;
+  return false;
+}
+
 /// An edge of one triangle alone.
 struct BorderSide {
   std::uint32_t low, high;  ///< the places of its ends
@@ -126,12 +134,16 @@ std::optional<TriMesh> withoutSeams(const TriMesh& mesh, const char* action,
                                     std::size_t maxMemory) {
   const auto triangles = static_cast<double>(mesh.triangles.size()),
              vertices = static_cast<double>(mesh.positions.size());
-  // The sides of all triangles; then at most as many of the border, and the result.
-  requireMemory(triangles * 3 * 16 + vertices * 8, maxMemory, action);
+  constexpr double kTableBytes = 16, kSideBytes = 16 + 8;
+  requireMemory(vertices * kTableBytes, maxMemory, action);
+  if (!anyCoincide(mesh.positions)) return std::nullopt;
+  requireMemory(triangles * 3 * kSideBytes, maxMemory, action);
   std::vector<BorderSide> border = findBorder(mesh);
   if (border.empty()) return std::nullopt;
-  requireMemory(static_cast<double>(border.size()) * 48 + triangles * 12 + vertices * 32, maxMemory,
-                action);
+  // With its order and places; then the result.
+  constexpr double kBorderBytes = sizeof(BorderSide) + 2 * 8 + kTableBytes;
+  requireMemory(static_cast<double>(border.size()) * kBorderBytes + triangles * 12 + vertices * 32,
+                maxMemory, action);
   findPlaces(mesh.positions, border);
   DisjointSets joined(mesh.positions.size());
   joinSides(border, joined);
