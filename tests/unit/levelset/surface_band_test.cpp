@@ -218,7 +218,7 @@ TEST(SurfaceBand, IsNoSolid) {
   refuses("keep", [&] { (void)levelset::keepLargest(band, 1); });
   refuses("resample", [&] { (void)levelset::resample(band, 0.2); });
   refuses("redistance", [&] { (void)levelset::redistance(band); });
-  refuses("closest-points", [&] { (void)levelset::closestPoints(band); });
+  refuses("closest-point", [&] { (void)levelset::closestPoints(band); });
   refuses("smooth", [&] { (void)smooth(band, levelset::SmoothKind::Gaussian, 0.2); });
   refuses("morph", [&] { (void)morph(ball, band); });
   refuses("compare", [&] { (void)compare(ball, band); });
