@@ -6,8 +6,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "levelset/progress.h"
 
 namespace levelset {
 
@@ -61,13 +64,17 @@ void requireAttributes(const TriMesh& mesh, const char* action);
                                        const std::array<Imath::V3d, 3>& slopes, double hand);
 
 /// Adds vertices and triangles of another mesh behind those of `mesh`. What only one of them
-/// carries is dropped.
+/// carries is dropped; of precision and spacing the coarser holds.
 void append(TriMesh& mesh, const TriMesh& other);
 
-/// The mesh with vertices at equal positions made one, which is what it joins whatever its seams:
-/// the same positions, triangles between the first at each place, none of which names one twice,
-/// and no attributes.
-[[nodiscard]] TriMesh withoutSeams(const TriMesh& mesh);
+/// The mesh without attributes, and with the seams closed at which vertices were doubled for them:
+/// edges of a single triangle each, at equal positions, that run against each other become one.
+/// Parts that merely touch keep their own vertices.
+/// @param action  what is named when memory does not suffice
+/// @return        nothing where there is nothing to close: the triangles of `mesh` are the result
+/// @throws ResourceLimit
+[[nodiscard]] std::optional<TriMesh> withoutSeams(const TriMesh& mesh, const char* action,
+                                                  std::size_t maxMemory = kNoMemoryLimit);
 
 /// Distance from a coordinate of that magnitude to the next that the precision can tell from it.
 [[nodiscard]] double spacingAt(double magnitude, CoordinatePrecision precision);

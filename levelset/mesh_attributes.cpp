@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "levelset/convert/position_table.h"
 #include "levelset/error.h"
 #include "levelset/mesh.h"
 
@@ -34,7 +33,7 @@ void requireList(const std::vector<Vector>& list, std::size_t vertices, const ch
 }
 
 double largestPart(const V3d& v) {
-  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  return std::max(std::max(std::abs(v.x), std::abs(v.y)), std::abs(v.z));
 }
 
 template <typename Vector>
@@ -68,26 +67,38 @@ void requireAttributes(const TriMesh& mesh, const char* action) {
 
 V3d carriedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, double hand) {
   // Divided by the largest number first, so that no product leaves the range of numbers.
-  const double size =
-      std::max({largestPart(slopes[0]), largestPart(slopes[1]), largestPart(slopes[2])});
+  double inA = largestPart(slopes[0]), inB = largestPart(slopes[1]), inC = largestPart(slopes[2]);
+  const double size = std::max(std::max(inA, inB), inC);
   const double length = largestPart(normal);
-  if (!(size > 0) || !(length > 0)) return V3d(0);
-  const V3d a = slopes[0] / size, b = slopes[1] / size, c = slopes[2] / size, n = normal / length;
+  constexpr double kLeast = 1e-300;  // whose inverse is a number
+  if (!(size > kLeast) || !(length > kLeast)) return V3d(0);
+  const double bySize = 1 / size, byLength = 1 / length;
+  const V3d a = slopes[0] * bySize, b = slopes[1] * bySize, c = slopes[2] * bySize,
+            n = normal * byLength;
   // The columns of the cofactor matrix: the inverse transpose but for its determinant, which need
   // not be divided by.
   const V3d moved = hand * (n.x * b.cross(c) + n.y * c.cross(a) + n.z * a.cross(b));
-  const double scale = largestPart(moved);
   // What is left of a flat map is rounding.
-  const double sum = std::abs(n.x) * b.length() * c.length() +
-                     std::abs(n.y) * c.length() * a.length() +
-                     std::abs(n.z) * a.length() * b.length();
-  if (!(scale > 1e-14 * sum)) return V3d(0);
-  return (moved / scale).normalized();
+  inA *= bySize, inB *= bySize, inC *= bySize;
+  const double sum =
+      std::abs(n.x) * inB * inC + std::abs(n.y) * inC * inA + std::abs(n.z) * inA * inB;
+  const double scale = largestPart(moved);
+  if (!(scale > 3e-14 * sum)) return V3d(0);
+  const V3d scaled = moved * (1 / scale);
+  return scaled * (1 / std::sqrt(scaled.length2()));
 }
 
 void append(TriMesh& mesh, const TriMesh& other) {
   const std::size_t before = mesh.positions.size(), more = other.positions.size();
   const auto first = static_cast<std::uint32_t>(before);
+  if (before == 0) {
+    mesh.precision = other.precision;
+    mesh.spacing = other.spacing;
+  } else if (more > 0) {
+    // The coarser of both: no coordinate of the whole is known better.
+    if (other.precision == CoordinatePrecision::Float) mesh.precision = other.precision;
+    mesh.spacing = std::max(mesh.spacing, other.spacing);
+  }
   mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
   for (const auto& t : other.triangles)
     mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
@@ -103,23 +114,6 @@ void append(TriMesh& mesh, const TriMesh& other) {
   if (from.precision == CoordinatePrecision::Double) to.precision = from.precision;
   if (from.colorPrecision == ColorPrecision::Float) to.colorPrecision = from.colorPrecision;
   to.hasAlpha = to.hasAlpha || from.hasAlpha;
-}
-
-TriMesh withoutSeams(const TriMesh& mesh) {
-  TriMesh welded;
-  welded.positions = mesh.positions;
-  welded.precision = mesh.precision;
-  welded.spacing = mesh.spacing;
-  convert::PositionTable table(mesh.positions, mesh.positions.size());
-  std::vector<std::uint32_t> first(mesh.positions.size());
-  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v)
-    first[v] = table.findOrEnter(mesh.positions[v], v);
-  welded.triangles.reserve(mesh.triangles.size());
-  for (const auto& t : mesh.triangles) {
-    const std::array<std::uint32_t, 3> w = {first[t[0]], first[t[1]], first[t[2]]};
-    if (w[0] != w[1] && w[1] != w[2] && w[2] != w[0]) welded.triangles.push_back(w);
-  }
-  return welded;
 }
 
 }  // namespace levelset

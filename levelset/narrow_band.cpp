@@ -71,7 +71,8 @@ std::size_t NarrowBand::activeVoxelCount() const {
 }
 
 std::size_t NarrowBand::memoryUse() const {
-  return grid_ ? grid_->grid->memUsage() : 0;
+  if (!grid_) return 0;
+  return grid_->grid->memUsage() + (grid_->beyond ? grid_->beyond->memUsage() : 0);
 }
 
 Imath::M44d NarrowBand::indexToWorld() const {
@@ -114,8 +115,11 @@ bool NarrowBand::isOpenSurface() const {
   return grid_ && grid_->grid->getMetadata<openvdb::BoolMetadata>(kOpenSurface);
 }
 
-void markOpenSurface(FloatGrid& grid) {
-  grid.insertMeta(kOpenSurface, openvdb::BoolMetadata(true));
+NarrowBand makeOpenBand(FloatGrid::Ptr grid, std::shared_ptr<const openvdb::FloatTree> beyond) {
+  grid->insertMeta(kOpenSurface, openvdb::BoolMetadata(true));
+  NarrowBand band = makeBand(std::move(grid));
+  VdbAccess::slot(band)->beyond = std::move(beyond);
+  return band;
 }
 
 void requireSolid(const NarrowBand& band, const char* action) {
@@ -132,14 +136,15 @@ std::uint64_t NarrowBand::contentHash() const {
 
 FloatGrid& editVdb(NarrowBand& band) {
   std::shared_ptr<VdbGrid>& slot = VdbAccess::slot(band);
-  if (slot.use_count() > 1) slot = std::make_shared<VdbGrid>(VdbGrid{slot->grid->deepCopy()});
+  if (slot.use_count() > 1)
+    slot = std::make_shared<VdbGrid>(VdbGrid{slot->grid->deepCopy(), slot->beyond});
   return *slot->grid;
 }
 
 NarrowBand makeBand(FloatGrid::Ptr grid) {
   assert(grid && grid->background() > 0 && isSimilarity(grid->transform()));
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  return NarrowBand(std::make_shared<VdbGrid>(VdbGrid{std::move(grid)}));
+  return NarrowBand(std::make_shared<VdbGrid>(VdbGrid{std::move(grid), {}}));
 }
 
 NarrowBand importBand(FloatGrid::Ptr grid, const char* action, BandRepairs* repairs) {
@@ -196,7 +201,7 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action, BandRepairs* repa
     it.setValue(value);
   }
   if (repairs) *repairs = made;
-  return NarrowBand(std::make_shared<VdbGrid>(VdbGrid{std::move(grid)}));
+  return NarrowBand(std::make_shared<VdbGrid>(VdbGrid{std::move(grid), {}}));
 }
 
 openvdb::math::Transform::Ptr uniformTransform(double voxelSize) {

@@ -62,6 +62,7 @@ class NarrowBand {
   std::shared_ptr<VdbGrid> grid_;
 };
 
+/// What every operator on solids asks first.
 /// @throws InvalidInput for an open surface: "measure: the operand is an open surface, …"
 void requireSolid(const NarrowBand& band, const char* action);
 

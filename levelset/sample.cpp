@@ -1,5 +1,7 @@
 #include "levelset/sample.h"
 
+#include <optional>
+
 #include "levelset/interpolate_vdb.h"
 #include "levelset/vdb.h"
 
@@ -8,6 +10,7 @@ namespace levelset {
 struct BandSampler::Impl {
   NarrowBand band;  // keeps the tree alive under the accessor
   openvdb::FloatGrid::ConstAccessor accessor;
+  std::optional<openvdb::FloatGrid::ConstAccessor> beyond;
   Interpolation interpolation;
   Imath::M44d indexToWorld, worldToIndex;
 
@@ -16,7 +19,9 @@ struct BandSampler::Impl {
         accessor(vdb(band).getConstAccessor()),
         interpolation(method),
         indexToWorld(source.indexToWorld()),
-        worldToIndex(indexToWorld.inverse()) {}
+        worldToIndex(indexToWorld.inverse()) {
+    if (band.shared()->beyond) beyond.emplace(*band.shared()->beyond);
+  }
 
   [[nodiscard]] openvdb::Vec3d toIndex(const Imath::V3d& world) const {
     Imath::V3d index;
@@ -71,6 +76,12 @@ bool BandSampler::isInBand(const Imath::V3d& world) const {
   return impl_->interpolation == Interpolation::Trilinear
              ? SampleBlock<2>(index).allActive(impl_->accessor)
              : SampleBlock<4>(index).allActive(impl_->accessor);
+}
+
+double BandSampler::beyondBorder(const Imath::V3d& world) const {
+  const auto& beyond = impl_->beyond;
+  if (!beyond) return 0;
+  return SampleBlock<2>(*beyond, impl_->toIndex(world)).value() * impl_->band.voxelSize();
 }
 
 }  // namespace levelset

@@ -30,6 +30,9 @@ class BandSampler {
   [[nodiscard]] Imath::V3d normal(const Imath::V3d& world) const;
   /// True when all grid points that value() reads are active.
   [[nodiscard]] bool isInBand(const Imath::V3d& world) const;
+  /// How far beyond the border of an open surface a place is to which the band goes on straight,
+  /// world units, trilinearly; 0 within the surface, of solids, and outside the band.
+  [[nodiscard]] double beyondBorder(const Imath::V3d& world) const;
 
  private:
   struct Impl;

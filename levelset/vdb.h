@@ -10,6 +10,9 @@ namespace levelset {
 
 struct VdbGrid {
   openvdb::FloatGrid::Ptr grid;
+  /// Of an open surface: how far beyond the border the closest point of what it goes on by lies,
+  /// voxels; active where it goes on.
+  std::shared_ptr<const openvdb::FloatTree> beyond = {};
 };
 
 struct VdbAccess {
@@ -28,8 +31,10 @@ struct VdbAccess {
 /// class level set, background > 0, no active tiles, inactive values ± background.
 [[nodiscard]] NarrowBand makeBand(openvdb::FloatGrid::Ptr grid);
 
-/// Makes the band of that grid one of an open surface.
-void markOpenSurface(openvdb::FloatGrid& grid);
+/// As makeBand, of an open surface.
+/// @param beyond  as in VdbGrid; background 0
+[[nodiscard]] NarrowBand makeOpenBand(openvdb::FloatGrid::Ptr grid,
+                                      std::shared_ptr<const openvdb::FloatTree> beyond);
 
 /// Checks the invariants of a grid that came from outside and takes it.
 /// Active tiles are voxelised, inactive values are set to ± background by their sign; `repairs`,

@@ -8,17 +8,18 @@
 
 namespace levelset::convert {
 
-/// Finds points at equal positions; −0 and +0 are one place. Open addressing.
-class PositionTable {
+/// Finds equal points, of two or three coordinates; −0 and +0 are one place. Open addressing.
+template <typename Vector>
+class ValueTable {
  public:
   /// @param points    those that are entered, kept by the caller
   /// @param expected  how many will be
-  PositionTable(const std::vector<Imath::V3d>& points, std::size_t expected)
+  ValueTable(const std::vector<Vector>& points, std::size_t expected)
       : points_(points), slots_(std::bit_ceil(2 * expected + 2), kNone) {}
 
   /// The index entered before for this position, or else `index`, which is entered for it.
   /// @pre points[index] is `p`, at the latest when the next one is entered
-  std::uint32_t findOrEnter(const Imath::V3d& p, std::uint32_t index) {
+  std::uint32_t findOrEnter(const Vector& p, std::uint32_t index) {
     if (2 * entered_ >= slots_.size()) grow();
     std::uint32_t& slot = find(p);
     if (slot == kNone) {
@@ -28,12 +29,14 @@ class PositionTable {
     return slot;
   }
 
+  [[nodiscard]] std::size_t bytes() const { return slots_.capacity() * sizeof(slots_[0]); }
+
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  static std::uint64_t hashOf(const Imath::V3d& p) {
+  static std::uint64_t hashOf(const Vector& p) {
     std::uint64_t hash = 0;
-    for (int axis = 0; axis < 3; ++axis) {
+    for (int axis = 0; axis < static_cast<int>(Vector::dimensions()); ++axis) {
       const double value = p[axis] + 0.0;  // −0 + 0 = 0
       hash = (hash ^ std::bit_cast<std::uint64_t>(value)) * 0x9e3779b97f4a7c15ull;
       hash ^= hash >> 29;
@@ -41,7 +44,7 @@ class PositionTable {
     return hash;
   }
 
-  std::uint32_t& find(const Imath::V3d& p) {
+  std::uint32_t& find(const Vector& p) {
     std::size_t i = hashOf(p) & (slots_.size() - 1);
     while (slots_[i] != kNone && points_[slots_[i]] != p) i = (i + 1) & (slots_.size() - 1);
     return slots_[i];
@@ -54,9 +57,11 @@ class PositionTable {
       if (index != kNone) find(points_[index]) = index;
   }
 
-  const std::vector<Imath::V3d>& points_;
+  const std::vector<Vector>& points_;
   std::vector<std::uint32_t> slots_;
   std::size_t entered_ = 0;
 };
+
+using PositionTable = ValueTable<Imath::V3d>;
 
 }  // namespace levelset::convert

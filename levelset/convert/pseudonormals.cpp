@@ -20,28 +20,6 @@ double angleBetween(const V3d& a, const V3d& b) {
 
 }  // namespace
 
-// By the regions of its plane that are nearest to corners, edges and the inside [Ericson05, 5.1.5].
-TriangleFoot closestOnTriangle(const V3d& p, const V3d& a, const V3d& b, const V3d& c) {
-  const V3d ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0 && d2 <= 0) return {a, 0};
-  const V3d bp = p - b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0 && d4 <= d3) return {b, 1};
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return {a + ab * (d1 / (d1 - d3)), 3};
-  const V3d cp = p - c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0 && d5 <= d6) return {c, 2};
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return {a + ac * (d2 / (d2 - d6)), 5};
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
-    return {b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), 4};
-  const double sum = va + vb + vc;
-  return {a + ab * (vb / sum) + ac * (vc / sum), 6};
-}
-
 Pseudonormals::Pseudonormals(const LocalMesh& mesh)
     : mesh_(mesh), vertices_(mesh.points.size()), edgeOf_(mesh.triangles.size()) {
   const std::size_t count = mesh.triangles.size();

@@ -11,14 +11,6 @@
 
 namespace levelset::convert {
 
-/// The point of a triangle that is nearest to another, and on which part of it that lies.
-struct TriangleFoot {
-  Imath::V3d point{0};
-  int part = 6;  ///< 0 to 2: a corner; 3 to 5: the edge from corner part − 3 to the next; 6: within
-};
-[[nodiscard]] TriangleFoot closestOnTriangle(const Imath::V3d& p, const Imath::V3d& a,
-                                             const Imath::V3d& b, const Imath::V3d& c);
-
 /// An edge at which the faces do not make one oriented surface.
 struct UnorientedEdge {
   Imath::V3d from, to;  ///< in the mesh's units

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <memory>
 
+#include "levelset/closest_on_triangle.h"
 #include "levelset/convert/mesh_to_band_input.h"
 #include "levelset/convert/pseudonormals.h"
 #include "levelset/convert/surface_blocks.h"
@@ -27,8 +28,9 @@ using Imath::V3i;
 using SurfaceLeaf = openvdb::FloatTree::LeafNodeType;
 
 constexpr const char* kSurfaceBand = "surface-band";
-// Voxels by which the surface goes on beyond its border: what a tricubic reads at a corner of it.
-constexpr double kBeyond = 3;
+// Voxels by which the surface goes on beyond its border: what a tricubic reads at a corner of it,
+// two along each axis.
+constexpr double kBeyond = 3.5;
 constexpr double kTouching = 1e-6;  // voxels, as in meshToBand
 
 /// A triangle's bounding sphere, for a quick look.
@@ -52,6 +54,7 @@ std::vector<Sphere> spheresOf(const LocalMesh& mesh) {
 struct SignedPoint {
   double value = 0;
   bool isActive = false;
+  double beyond = 0;  ///< the border
 };
 
 class SideOfSurface {
@@ -67,13 +70,13 @@ class SideOfSurface {
                                std::span<const std::uint32_t> candidates) const {
     double best = HUGE_VAL;
     std::uint32_t nearest = 0;
-    convert::TriangleFoot foot;
+    TriangleFoot<V3d> foot;
     for (const std::uint32_t t : candidates) {
       const Sphere& sphere = spheres_[t];
       const double most = distance + sphere.radius + 1e-3;
       if ((p - sphere.center).length2() > most * most) continue;
-      const convert::TriangleFoot at =
-          convert::closestOnTriangle(p, mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2));
+      const TriangleFoot<V3d> at =
+          closestOnTriangle(p, mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2));
       const double squared = (p - at.point).length2();
       if (squared >= best) continue;
       best = squared;
@@ -90,7 +93,7 @@ class SideOfSurface {
     // Straight on beyond the border, across which `ahead` goes over from the distance smoothly.
     const double beyond = (way - direction.normal * ahead).length();
     const bool isOn = direction.normal != V3d(0) && beyond <= kBeyond && std::abs(ahead) < reach_;
-    return {std::abs(ahead) < kTouching ? 0 : ahead, isOn};
+    return {std::abs(ahead) < kTouching ? 0 : ahead, isOn, beyond};
   }
 
  private:
@@ -100,13 +103,19 @@ class SideOfSurface {
   double reach_;
 };
 
-openvdb::FloatGrid::Ptr measureBlocks(const LocalMesh& mesh, const SideOfSurface& side,
-                                      const V3i& origin, double voxelSize, double halfWidth,
-                                      std::size_t maxMemory, const Progress& progress) {
+struct SurfaceGrids {
+  openvdb::FloatGrid::Ptr grid;
+  openvdb::FloatTree::Ptr beyond;
+};
+
+SurfaceGrids measureBlocks(const LocalMesh& mesh, const SideOfSurface& side, const V3i& origin,
+                           double voxelSize, double halfWidth, std::size_t maxMemory,
+                           const Progress& progress) {
   const float background = backgroundOf(halfWidth, voxelSize);
   tbb::enumerable_thread_specific<convert::BlockDistance> scratch(
       [&] { return convert::BlockDistance(side.search()); });
-  tbb::enumerable_thread_specific<std::vector<std::unique_ptr<SurfaceLeaf>>> parts;
+  using Leaves = std::vector<std::unique_ptr<SurfaceLeaf>>;
+  tbb::enumerable_thread_specific<Leaves> parts, beyondParts;
   std::atomic<std::size_t> leafCount{0};
   const auto visit = [&](const V3i& block, std::span<const std::uint32_t> candidates) {
     convert::BlockDistance& distance = scratch.local();
@@ -114,6 +123,7 @@ openvdb::FloatGrid::Ptr measureBlocks(const LocalMesh& mesh, const SideOfSurface
     const V3i corner = block + origin;
     auto leaf = std::make_unique<SurfaceLeaf>(openvdb::Coord(corner.x, corner.y, corner.z),
                                               background, false);
+    std::unique_ptr<SurfaceLeaf> beyond;
     float* values = leaf->buffer().data();
     for (openvdb::Index i = 0; i < SurfaceLeaf::SIZE; ++i) {
       const double d = distance.distances()[i];
@@ -125,25 +135,35 @@ openvdb::FloatGrid::Ptr measureBlocks(const LocalMesh& mesh, const SideOfSurface
       if (!point.isActive) continue;
       values[i] = std::clamp(static_cast<float>(point.value * voxelSize), -background, background);
       leaf->setValueOn(i);
+      if (!(point.beyond > 0)) continue;
+      if (!beyond) beyond = std::make_unique<SurfaceLeaf>(leaf->origin(), 0.f, false);
+      beyond->setValueOn(i, static_cast<float>(point.beyond));
     }
     if (leaf->isEmpty()) return;
+    const std::size_t added = beyond ? 2 : 1;
     parts.local().push_back(std::move(leaf));
+    if (beyond) beyondParts.local().push_back(std::move(beyond));
     constexpr std::size_t kStep = 4096;
-    const std::size_t count = leafCount.fetch_add(1, std::memory_order_relaxed) + 1;
-    if (count % kStep == 0)
+    const std::size_t count = leafCount.fetch_add(added, std::memory_order_relaxed) + added;
+    if (count % kStep < added)
       requireMemory(
           static_cast<double>(count) * (sizeof(SurfaceLeaf) + SurfaceLeaf::SIZE * sizeof(float)),
           maxMemory, kSurfaceBand);
   };
   convert::forEachBlock(mesh, side.search(), visit, progress);
-  std::vector<std::unique_ptr<SurfaceLeaf>> all;
-  for (auto& part : parts)
-    for (auto& leaf : part) all.push_back(std::move(leaf));
-  std::sort(all.begin(), all.end(),
-            [](const auto& a, const auto& b) { return a->origin() < b->origin(); });
-  auto grid = emptyLevelSet(uniformTransform(voxelSize), halfWidth);
-  for (auto& leaf : all) grid->tree().addLeaf(leaf.release());
-  return grid;
+  const auto addAll = [](tbb::enumerable_thread_specific<Leaves>& from, openvdb::FloatTree& tree) {
+    Leaves all;
+    for (auto& part : from)
+      for (auto& leaf : part) all.push_back(std::move(leaf));
+    std::sort(all.begin(), all.end(),
+              [](const auto& a, const auto& b) { return a->origin() < b->origin(); });
+    for (auto& leaf : all) tree.addLeaf(leaf.release());
+  };
+  SurfaceGrids grids{emptyLevelSet(uniformTransform(voxelSize), halfWidth),
+                     std::make_shared<openvdb::FloatTree>(0.f)};
+  addAll(parts, grids.grid->tree());
+  addAll(beyondParts, *grids.beyond);
+  return grids;
 }
 
 /// Is the change of sign from `here` to `next` no surface, but the middle between the front of one
@@ -214,10 +234,9 @@ void checkSurface(const Pseudonormals& normals, const V3i& origin, double voxelS
 
 SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
                               const SurfaceBandOptions& options) {
-  constexpr double kNarrowest = 4;
-  if (!(options.halfWidth >= kNarrowest) || !std::isfinite(options.halfWidth))
+  if (!(options.halfWidth >= kLeastSurfaceHalfWidth) || !std::isfinite(options.halfWidth))
     throw UsageError(fmt::format("{}: the half width is {} voxels; give at least {}", kSurfaceBand,
-                                 options.halfWidth, kNarrowest));
+                                 options.halfWidth, kLeastSurfaceHalfWidth));
   convert::checkMeshInput(mesh, voxelSize,
                           {.halfWidth = options.halfWidth, .maxMemory = options.maxMemory},
                           kSurfaceBand);
@@ -231,13 +250,12 @@ SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
   const Pseudonormals normals(local);
   checkSurface(normals, origin, voxelSize);
   const SideOfSurface side(local, normals, options.halfWidth);
-  const auto grid =
+  const SurfaceGrids grids =
       measureBlocks(local, side, origin, voxelSize, options.halfWidth,
                     memoryLimit(options.maxMemory), subProgress(options.progress, 0.1, 1));
   SurfaceBandResult result;
-  result.cutVoxels = cutContradictions(*grid);
-  markOpenSurface(*grid);
-  result.band = makeBand(grid);
+  result.cutVoxels = cutContradictions(*grids.grid);
+  result.band = makeOpenBand(grids.grid, grids.beyond);
   result.borderEdges = normals.borderEdges();
   result.droppedTriangles = topology.dropped;
   report(options.progress, 1, kSurfaceBand);

@@ -9,8 +9,11 @@
 /// A band about a surface that has a border: a base for patches, not a solid.
 namespace levelset {
 
+/// Voxels: a tricubic at the surface reads as far as 3.5.
+inline constexpr double kLeastSurfaceHalfWidth = 4;
+
 struct SurfaceBandOptions {
-  double halfWidth = 5;  ///< voxels, at least 4: a tricubic at the surface reads as far as 3.5
+  double halfWidth = 5;  ///< voxels, at least kLeastSurfaceHalfWidth
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
@@ -24,10 +27,11 @@ struct SurfaceBandResult {
 
 /// Distances to an open mesh whose triangles face one way, positive on the side that they face: the
 /// sign is that of the closest face, and about edges and vertices of their pseudonormals, weighted
-/// by angle [Baerentzen05]. Beyond the border the surface goes on straight for three voxels, so
-/// that interpolation is sound up to the border; there the band is cut off, and beyond it nothing
-/// is active. So it is where the front of one part meets the back of another, at half their
-/// distance.
+/// by angle [Baerentzen05]. Beyond the border the surface goes on straight for 3.5 voxels, so
+/// that interpolation is sound up to the border however the surface lies; there the band is cut
+/// off, and beyond it nothing is active. How far beyond the border a place lies is kept
+/// (BandSampler::beyondBorder), for what goes on so from both sides of a slit meets. So it is where
+/// the front of one part meets the back of another, at half their distance.
 /// @param mesh       vertices at equal positions count as one
 /// @param voxelSize  world units, positive and finite; grid points sit at its integer multiples
 /// @throws UsageError for a voxel size or half width out of range; InvalidInput for a mesh that

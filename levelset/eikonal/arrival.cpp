@@ -225,6 +225,7 @@ eikonal::ArrivalRequest checkedRequest(double until, const ArrivalOptions& optio
 }
 
 void requireStart(const NarrowBand& solid, const char* action) {
+  requireSolid(solid, action);
   if (solid.isEmpty())
     throw InvalidInput(
         fmt::format("{}: the solid is empty, so no front can start on it; give a solid", action));

@@ -17,6 +17,7 @@ template <typename Grid, typename Make>
 typename Grid::Ptr gridOfClosestPoints(const NarrowBand& solid, const ClosestPointOptions& options,
                                        const char* action, const Make& make) {
   using GridLeaf = typename Grid::TreeType::LeafNodeType;
+  requireSolid(solid, action);
   if (solid.isEmpty())
     throw InvalidInput(
         fmt::format("{}: the solid is empty, so it has no surface; give a solid", action));

@@ -32,6 +32,7 @@ bool isFinite(const Imath::Box3d& box) {
 }  // namespace
 
 NarrowBand redistance(NarrowBand field, const RedistanceOptions& options) {
+  requireSolid(field, "redistance");
   if (field.isEmpty())
     throw InvalidInput("redistance: the field has no zero crossing, it is empty; give a solid");
   eikonal::DistanceRequest request;

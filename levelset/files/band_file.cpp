@@ -349,6 +349,7 @@ void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOpti
   if (!band.shared())
     throw InvalidInput(
         fmt::format("write: there is no band to write to '{}'; make one first", path.string()));
+  requireSolid(band, "write");  // a file would not tell
   if (format == "nvdb" && band.voxelSize() < kLeastNanoVoxel)
     throw InvalidInput(
         fmt::format("write: '{}' cannot hold voxels of {:.6g}, NanoVDB takes none below {}; write "

@@ -19,12 +19,13 @@ struct MeshFormat {
   const char* extension;
   void (*read)(std::string_view, MeshBuilder&);
   void (*write)(ByteWriter&, const TriMesh&, const Progress&);
+  bool attributes;
 };
 
-constexpr MeshFormat kFormats[] = {{"ply", readPly, writePly},
-                                   {"obj", readObj, writeObj},
-                                   {"stl", readStl, writeStl},
-                                   {"off", readOff, writeOff}};
+constexpr MeshFormat kFormats[] = {{"ply", readPly, writePly, true},
+                                   {"obj", readObj, writeObj, true},
+                                   {"stl", readStl, writeStl, false},
+                                   {"off", readOff, writeOff, false}};
 
 struct FormatChoice {
   const MeshFormat* format;
@@ -73,6 +74,8 @@ TriMesh readMesh(const fs::path& path, const ReadMeshOptions& options) {
     MeshBuilder builder(inputName(path), options, bytes.view());
     choice.format->read(bytes.view(), builder);
     TriMesh mesh = builder.finish();
+    if (builder.droppedAttributes())
+      if (auto closed = withoutSeams(mesh, "read", options.maxMemory)) mesh = std::move(*closed);
     report(options.progress, 1, "read");
     return mesh;
   } catch (const std::bad_alloc&) {
@@ -85,15 +88,19 @@ void writeMesh(const fs::path& path, const TriMesh& mesh, const WriteMeshOptions
   const FormatChoice choice = meshFormat(path, options.format, "write");
   requireAttributes(mesh, "write");
   report(options.progress, 0, "write");
+  // Without the attributes that they are for, seams would be slits.
+  std::optional<TriMesh> closed;
+  if (!choice.format->attributes && !mesh.attributes.isEmpty())
+    closed = withoutSeams(mesh, "write", options.maxMemory);
   ByteWriter out(path, choice.compressed);
-  choice.format->write(out, mesh, options.progress);
+  choice.format->write(out, closed ? *closed : mesh, options.progress);
   out.commit();
   report(options.progress, 1, "write");
 }
 
 bool holdsAttributes(const fs::path& nameOrFormat) {
   const auto choice = findFormat(nameOrFormat);
-  return choice && (choice->format->read == readPly || choice->format->read == readObj);
+  return choice && choice->format->attributes;
 }
 
 bool isMeshFormat(const fs::path& nameOrFormat) {

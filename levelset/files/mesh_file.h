@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "levelset/mesh.h"
 #include "levelset/progress.h"
@@ -13,7 +14,8 @@
 /// `u v`, `texture_u texture_v`) and `red green blue` with or without `alpha`, of uchar, ushort or
 /// float. In OBJ they are `vn`, `vt` and numbers behind the coordinates of `v`; a vertex with
 /// several pairs of `vt` and `vn` becomes as many vertices, the first in its place and the others
-/// behind all. Seams are written as they are held, by vertices of their own. STL and OFF hold none.
+/// behind all. Seams are written as they are held, by vertices of their own. STL and OFF hold none;
+/// they are written with the seams closed, and a PLY whose attributes are not wanted is read so.
 namespace levelset {
 
 struct ReadMeshOptions {
@@ -21,6 +23,9 @@ struct ReadMeshOptions {
       {};  ///< "ply", "obj", "stl", "off", with ".gz" behind if compressed; empty: by extension
   bool attributes = true;  ///< false: positions and triangles only, whatever else is there
   std::size_t maxMemory = kNoMemoryLimit;
+  /// Told what the mesh had that it cannot carry, in words: "colours of faces"; not for meshes
+  /// whose attributes are not wanted.
+  std::vector<std::string>* leftAside = nullptr;
   Progress progress = {};
 };
 
@@ -33,6 +38,7 @@ struct ReadMeshOptions {
 
 struct WriteMeshOptions {
   std::string format = {};  ///< as in ReadMeshOptions; STL and PLY are written binary
+  std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 

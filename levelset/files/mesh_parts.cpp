@@ -89,15 +89,24 @@ void MeshBuilder::tick(const char* at) {
   if ((++added_ & kTickMask) != 0) return;
   report(options_.progress,
          static_cast<double>(at - input_.data()) / static_cast<double>(input_.size()), "read");
-  const MeshAttributes& held = mesh_.attributes;
-  const double bytes = static_cast<double>(
-      input_.size() + readerBytes_ + mesh_.positions.capacity() * sizeof(Imath::V3d) +
-      mesh_.triangles.capacity() * sizeof(mesh_.triangles[0]) +
-      held.normals.capacity() * sizeof(held.normals[0]) +
-      held.uvs.capacity() * sizeof(held.uvs[0]) + held.colors.capacity() * sizeof(held.colors[0]));
-  requireMemory(bytes, options_.maxMemory, "read");
+  requireMore(0);
   if (mesh_.positions.size() > kMaxIndex)
     failFile(name_, "holds more than the 4294967295 vertices that can be numbered; split it");
+}
+
+void MeshBuilder::requireMore(double bytes) const {
+  const MeshAttributes& held = mesh_.attributes;
+  const std::size_t now =
+      input_.size() + readerBytes_ + mesh_.positions.capacity() * sizeof(Imath::V3d) +
+      mesh_.triangles.capacity() * sizeof(mesh_.triangles[0]) +
+      polygons_.capacity() * sizeof(Polygon) + splitVertices_.capacity() * sizeof(std::uint32_t) +
+      held.normals.capacity() * sizeof(held.normals[0]) +
+      held.uvs.capacity() * sizeof(held.uvs[0]) + held.colors.capacity() * sizeof(held.colors[0]);
+  requireMemory(static_cast<double>(now) + bytes, options_.maxMemory, "read");
+}
+
+void MeshBuilder::leaveAside(std::string what) {
+  if (options_.leftAside) options_.leftAside->push_back(std::move(what));
 }
 
 void MeshBuilder::addVertex(double x, double y, double z, Place place, const char* at) {
@@ -154,6 +163,7 @@ void MeshBuilder::placeSplitVertices() {
   for (auto& triangle : mesh_.triangles)
     for (std::uint32_t& corner : triangle)
       if (corner >= first) corner = static_cast<std::uint32_t>(before + (kMaxIndex - corner));
+  requireMore(static_cast<double>(before + splits) * sizeof(Imath::V3d));
   mesh_.positions.reserve(before + splits);
   for (const std::uint32_t vertex : splitVertices_)
     mesh_.positions.push_back(mesh_.positions[vertex]);

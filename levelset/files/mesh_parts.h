@@ -48,8 +48,16 @@ class MeshBuilder {
   void addColor(const Imath::V4f& color, Place place);
   [[nodiscard]] bool wantsAttributes() const { return options_.attributes; }
   [[nodiscard]] MeshAttributes& attributes() { return mesh_.attributes; }
+  /// Attributes are there, and not wanted.
+  void dropAttributes() { droppedAttributes_ = true; }
+  [[nodiscard]] bool droppedAttributes() const { return droppedAttributes_; }
+  /// Something that a mesh cannot carry.
+  void leaveAside(std::string what);
   /// What the reader holds beside the mesh.
   void noteBytes(std::size_t bytes) { readerBytes_ = bytes; }
+  [[nodiscard]] std::size_t splitCount() const { return splitVertices_.size(); }
+  /// @throws ResourceLimit if so much more than is held does not fit
+  void requireMore(double bytes) const;
   /// Another vertex at the place of one that may be still to come.
   /// @return what stands for it as a corner of faces; its number will be vertexCount() + n for the
   ///         n-th of these
@@ -79,7 +87,7 @@ class MeshBuilder {
   std::uint64_t highestIndex_ = 0;
   Place highestPlace_{"line", 0};
   std::size_t added_ = 0;
-  bool precisionDeclared_ = false;
+  bool precisionDeclared_ = false, droppedAttributes_ = false;
   bool allFloat_ = true;
 };
 

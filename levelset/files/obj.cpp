@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "levelset/convert/position_table.h"
 #include "levelset/error.h"
 #include "levelset/files/mesh_parts.h"
 
@@ -42,7 +43,9 @@ class Seams {
 
   /// Of every vertex, the split ones behind the others.
   [[nodiscard]] std::vector<Pair> pairs(std::size_t vertices) const {
-    std::vector<Pair> result = first_;
+    std::vector<Pair> result;
+    result.reserve(vertices + splits_.size());
+    result = first_;
     result.resize(vertices, kNeither);
     for (const Key& split : splits_) result.push_back(split.pair);
     return result;
@@ -101,15 +104,50 @@ class ObjReader {
                              kUv = {"texture coordinate", "the index of a texture coordinate"},
                              kNormal = {"normal", "the index of a normal"};
 
-  /// The greatest index that a face names, and where.
+  /// What faces name of one list, and where the greatest index stands.
   struct Named {
     std::uint64_t count = 0;
     Place place{"line", 0};
-    void note(std::uint64_t index, Place at) {
+    std::vector<bool> seen;  ///< of those that stood before their faces
+    void note(std::uint64_t index, std::size_t soFar, Place at) {
+      if (index < soFar) {
+        if (seen.size() < soFar) seen.resize(soFar);
+        seen[index] = true;
+      } else {
+        isAhead = true;
+      }
       if (index < count) return;
       count = index + 1;
       place = at;
     }
+    bool isAhead = false;  ///< some stand behind their faces
+    [[nodiscard]] std::size_t unseen(std::size_t all) const {
+      if (isAhead) return 0;  // who knows
+      return all - static_cast<std::size_t>(std::count(seen.begin(), seen.end(), true));
+    }
+  };
+
+  /// Values of a list, and for each the first that equals it: seams lie where values differ, not
+  /// where a file repeats them.
+  template <typename Vector>
+  struct Values {
+    std::vector<Vector> all;
+    std::vector<std::uint32_t> first;
+    convert::ValueTable<Vector> table{all, 0};
+    void add(const Vector& value) {
+      all.push_back(value);
+      const auto index = static_cast<std::uint32_t>(std::min<std::size_t>(all.size(), kMost) - 1);
+      first.push_back(all.size() <= kMost ? table.findOrEnter(value, index) : index);
+    }
+    /// One that is still to come stands for itself.
+    [[nodiscard]] std::uint32_t firstEqual(std::uint64_t index) const {
+      if (index < first.size()) return first[index];
+      return static_cast<std::uint32_t>(std::min<std::uint64_t>(index, kMost));
+    }
+    [[nodiscard]] std::size_t bytes() const {
+      return all.capacity() * sizeof(Vector) + first.capacity() * sizeof(first[0]) + table.bytes();
+    }
+    static constexpr std::size_t kMost = Seams::kNone - 1;
   };
 
   void readStatement() {
@@ -146,7 +184,7 @@ class ObjReader {
   void readUv() {
     const double u = readNumber("a texture coordinate");
     const double v = cursor_.skipBlanks('#', true) ? readNumber("a texture coordinate") : 0;
-    uvs_.emplace_back(u, v);
+    uvs_.add({u, v});
     while (cursor_.skipBlanks('#', true)) skipToken();  // a third is the depth of a solid texture
     noteBytes();
   }
@@ -154,15 +192,14 @@ class ObjReader {
   void readNormal() {
     Imath::V3d normal;
     for (int axis = 0; axis < 3; ++axis) normal[axis] = readNumber("a coordinate of a normal");
-    normals_.push_back(normal);
+    normals_.add(normal);
     while (cursor_.skipBlanks('#', true)) skipToken();
     noteBytes();
   }
 
   void noteBytes() {
-    builder_.noteBytes(uvs_.capacity() * sizeof(uvs_[0]) +
-                       normals_.capacity() * sizeof(normals_[0]) +
-                       colors_.capacity() * sizeof(colors_[0]) + seams_.bytes());
+    builder_.noteBytes(uvs_.bytes() + normals_.bytes() + colors_.capacity() * sizeof(colors_[0]) +
+                       seams_.bytes());
   }
 
   void readVertex() {
@@ -209,6 +246,7 @@ class ObjReader {
             "the mesh again");
       corners_.push_back(builder_.wantsAttributes() ? seams_.corner(vertex, pair, place) : vertex);
     }
+    if (builder_.wantsAttributes()) noteBytes();
     builder_.addFace(corners_, place, cursor_.at());
   }
 
@@ -218,10 +256,10 @@ class ObjReader {
       static_cast<void>(cursor_.integer("the index of a texture coordinate or normal"));
       return;
     }
-    const std::uint64_t index =
-        part == 0 ? readIndex(kUv, uvs_.size()) : readIndex(kNormal, normals_.size());
-    (part == 0 ? highestUv_ : highestNormal_).note(index, place);
-    pair[part] = static_cast<std::uint32_t>(std::min<std::uint64_t>(index, Seams::kNone - 1));
+    const std::size_t soFar = part == 0 ? uvs_.all.size() : normals_.all.size();
+    const std::uint64_t index = readIndex(part == 0 ? kUv : kNormal, soFar);
+    (part == 0 ? namedUvs_ : namedNormals_).note(index, soFar, place);
+    pair[part] = part == 0 ? uvs_.firstEqual(index) : normals_.firstEqual(index);
   }
 
   /// From 0; negative ones count back from the latest.
@@ -249,28 +287,46 @@ class ObjReader {
   }
 
   void giveAttributes() {
-    requireNamed(highestUv_, uvs_.size(), "texture coordinate");
-    requireNamed(highestNormal_, normals_.size(), "normal");
+    requireNamed(namedUvs_, uvs_.all.size(), "texture coordinate");
+    requireNamed(namedNormals_, normals_.all.size(), "normal");
+    tellUnnamed(namedUvs_, uvs_.all.size(), "texture coordinates");
+    tellUnnamed(namedNormals_, normals_.all.size(), "normals");
     MeshAttributes& attributes = builder_.attributes();
-    const std::size_t count = builder_.vertexCount();
-    if (highestUv_.count > 0 || highestNormal_.count > 0) {
-      bool allFloat = true;
+    const std::size_t count = builder_.vertexCount(), whole = count + builder_.splitCount();
+    const bool hasUvs = namedUvs_.count > 0, hasNormals = namedNormals_.count > 0,
+               hasColors = !colors_.empty();
+    const std::size_t perVertex =
+        (hasUvs ? sizeof(Imath::V2d) : 0) + (hasNormals ? sizeof(Imath::V3d) : 0) +
+        (hasUvs || hasNormals ? sizeof(Seams::Pair) : 0) + (hasColors ? sizeof(Imath::V4f) : 0);
+    noteBytes();
+    builder_.requireMore(static_cast<double>(whole) * static_cast<double>(perVertex));
+    if (hasUvs || hasNormals) {
+      if (hasUvs) attributes.uvs.reserve(whole);
+      if (hasNormals) attributes.normals.reserve(whole);
       for (const auto& [uv, normal] : seams_.pairs(count)) {
-        if (highestUv_.count > 0)
-          attributes.uvs.push_back(uv == Seams::kNone ? Imath::V2d(0) : uvs_[uv]);
-        if (highestNormal_.count > 0)
-          attributes.normals.push_back(normal == Seams::kNone ? Imath::V3d(0) : normals_[normal]);
+        if (hasUvs) attributes.uvs.push_back(uv == Seams::kNone ? Imath::V2d(0) : uvs_.all[uv]);
+        if (hasNormals)
+          attributes.normals.push_back(normal == Seams::kNone ? Imath::V3d(0)
+                                                              : normals_.all[normal]);
       }
+      bool allFloat = true;
       for (const Imath::V2d& uv : attributes.uvs)
         allFloat = allFloat && Imath::V2d(Imath::V2f(uv)) == uv;
       for (const Imath::V3d& normal : attributes.normals)
         allFloat = allFloat && Imath::V3d(Imath::V3f(normal)) == normal;
       attributes.precision = allFloat ? CoordinatePrecision::Float : CoordinatePrecision::Double;
     }
-    if (!colors_.empty()) giveColors(attributes, count);
+    if (hasColors) giveColors(attributes, count, whole);
+    builder_.noteBytes(0);  // what is left of the reader goes before the mesh is made
   }
 
-  void giveColors(MeshAttributes& attributes, std::size_t count) {
+  void tellUnnamed(const Named& named, std::size_t count, const char* what) {
+    if (const std::size_t unseen = named.unseen(count))
+      builder_.leaveAside(fmt::format("{} of {} {}, which no face names", unseen, count, what));
+  }
+
+  void giveColors(MeshAttributes& attributes, std::size_t count, std::size_t whole) {
+    colors_.reserve(whole);
     colors_.resize(count, Imath::V4f(1));
     for (std::size_t n = 0; n < seams_.splitCount(); ++n)
       if (seams_.splitOf(n) < count) colors_.push_back(colors_[seams_.splitOf(n)]);
@@ -292,10 +348,10 @@ class ObjReader {
   MeshBuilder& builder_;
   Seams seams_;
   std::vector<std::uint64_t> corners_;
-  std::vector<Imath::V2d> uvs_;
-  std::vector<Imath::V3d> normals_;
+  Values<Imath::V2d> uvs_;
+  Values<Imath::V3d> normals_;
   std::vector<Imath::V4f> colors_;
-  Named highestUv_, highestNormal_;
+  Named namedUvs_, namedNormals_;
   bool hasAlpha_ = false;
 };
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
 
 #include "levelset/error.h"
 #include "levelset/files/mesh_parts.h"
@@ -36,6 +37,7 @@ struct Property {
   Type type;
   std::optional<Type> listCount;  // set for a list
   Role role = Role::Skip;
+  int family = 0;  // of texture coordinates: which of the pairs of names
 };
 
 struct Element {
@@ -77,6 +79,7 @@ struct Header {
   std::vector<Element> elements;
   std::size_t size = 0;   // bytes, up to the data
   std::size_t lines = 0;  // of text
+  std::set<std::string> leftAside = {};
 };
 
 // === Header
@@ -115,6 +118,7 @@ class HeaderReader {
         fail(fmt::format("'{}' is no word of a PLY header", line[0]));
     }
     if (!formatSeen_) fail("the header names no format");
+    for (Element& element : header_.elements) chooseUvs(element);
     header_.size = offset_;
     return std::move(header_);
   }
@@ -157,7 +161,24 @@ class HeaderReader {
         std::from_chars(line[2].data(), line[2].data() + line[2].size(), element.count);
     if (error != std::errc{} || end != line[2].data() + line[2].size())
       fail(fmt::format("'{}' is no count of elements", line[2]));
+    if (element.name == "vertex")
+      for (const Element& other : header_.elements)
+        if (other.name == element.name) fail("the element 'vertex' comes twice");
     header_.elements.push_back(std::move(element));
+  }
+
+  /// The first pair of names that is whole.
+  static void chooseUvs(Element& element) {
+    const auto holds = [&](Role role, int family) {
+      return std::any_of(element.properties.begin(), element.properties.end(),
+                         [&](const Property& p) { return p.role == role && p.family == family; });
+    };
+    int chosen = 0;
+    for (const Property& p : element.properties)
+      if (!chosen && p.family && holds(Role::U, p.family) && holds(Role::V, p.family))
+        chosen = p.family;
+    for (Property& p : element.properties)
+      if (p.family && p.family != chosen) p.role = Role::Skip;
   }
 
   Type readType(std::string_view word) const {
@@ -182,15 +203,30 @@ class HeaderReader {
     Property property{readType(line[list ? 3 : 1]), {}, Role::Skip};
     if (list) property.listCount = readType(line[2]);
     property.role = roleOf(element.name, name, list);
-    if (property.role != Role::Skip && element.has(property.role)) {
+    if (property.role == Role::U || property.role == Role::V) property.family = familyOf(name);
+    const auto isSame = [&](const Property& other) {
+      return other.role == property.role && other.family == property.family;
+    };
+    if (property.role != Role::Skip &&
+        std::any_of(element.properties.begin(), element.properties.end(), isSame)) {
       if (isAttribute(property.role))
-        property.role = Role::Skip;  // under another of its names: the first counts
+        property.role = Role::Skip;  // the first counts
       else
         fail(fmt::format("the property '{}' comes twice", name));
     }
     if (property.role >= Role::Red && property.role <= Role::Alpha && !isColorType(property.type))
       property.role = Role::Skip;
+    if (element.name == "face") noteOfFaces(name);
     element.properties.push_back(property);
+  }
+
+  static int familyOf(std::string_view name) { return name.size() > 1 ? 3 : name < "u" ? 2 : 1; }
+
+  void noteOfFaces(std::string_view name) {
+    if (name == "texcoord") header_.leftAside.insert("texture coordinates of faces");
+    if (name == "red" || name == "green" || name == "blue")
+      header_.leftAside.insert("colours of faces");
+    if (name == "nx" || name == "ny" || name == "nz") header_.leftAside.insert("normals of faces");
   }
 
   static Role roleOf(std::string_view element, std::string_view name, bool list) {
@@ -435,6 +471,7 @@ class ElementReader {
       const bool isWhole = property.type < Type::Float;
       const bool isColor = property.role >= Role::Red && property.role <= Role::Alpha;
       of(property.role) = isColor && isWhole && hasColors_ ? share(value, property.type) : value;
+      if (property.type == Type::Float && isAttribute(property.role)) requireFloat(value);
       return;
     }
     const std::size_t count =
@@ -444,6 +481,15 @@ class ElementReader {
     corners_.resize(count);
     for (std::uint64_t& corner : corners_)
       corner = wholeNumber(source_.value(property.type), "the index of a vertex");
+  }
+
+  /// As text a number may be beyond its type; what is no number at all is told elsewhere.
+  void requireFloat(double value) const {
+    if (!std::isfinite(value) || std::abs(value) <= std::numeric_limits<float>::max()) return;
+    failAt(builder_.name(), source_.place(),
+           fmt::format("{} is beyond the range of float, 3.4e38, of which its property is; repair "
+                       "the mesh, or read it bare, without what its vertices carry (--bare)",
+                       value));
   }
 
   /// Of what the type can hold; the float next to it.
@@ -484,10 +530,16 @@ void readElements(const Header& header, std::string_view data, MeshBuilder& buil
                        "the elements that its header promises");
 }
 
-void skipAttributes(Header& header) {
+/// @return  were there any?
+bool skipAttributes(Header& header) {
+  bool any = false;
   for (Element& element : header.elements)
     for (Property& p : element.properties)
-      if (isAttribute(p.role)) p.role = Role::Skip;
+      if (isAttribute(p.role)) {
+        p.role = Role::Skip;
+        any = true;
+      }
+  return any;
 }
 
 /// Triangles cannot be more than the data can list; a header may claim what it likes.
@@ -517,7 +569,11 @@ void reserveElements(const Header& header, std::size_t dataSize, MeshBuilder& bu
 
 void readPly(std::string_view input, MeshBuilder& builder) {
   Header header = HeaderReader(input, builder.name()).read();
-  if (!builder.wantsAttributes()) skipAttributes(header);
+  if (builder.wantsAttributes()) {
+    for (const std::string& what : header.leftAside) builder.leaveAside(what);
+  } else if (skipAttributes(header)) {
+    builder.dropAttributes();
+  }
   const std::string_view data = input.substr(header.size);
   checkHeader(header, data.size(), builder.name());
   reserveElements(header, data.size(), builder);

@@ -104,6 +104,7 @@ struct Advection::Impl {
 
   Impl(NarrowBand solid, const AdvectOptions& given)
       : options(given), band(std::move(solid)), time(given.start) {
+    requireSolid(band, kAdvectAction);
     if (band.isEmpty())
       throw InvalidInput(
           fmt::format("{}: the solid is empty; give one with a surface", kAdvectAction));

@@ -48,6 +48,7 @@ void checkArguments(const NarrowBand& solid, double time, const CurvatureFlowOpt
   if (options.tolerance) checkPositive(*options.tolerance, "tolerance", "world units");
   if (options.step) checkPositive(*options.step, "step", "world units squared");
   if (options.mask) checkMask(*options.mask, kAction);
+  requireSolid(solid, kAction);
   if (solid.isEmpty())
     throw InvalidInput(fmt::format(
         "{}: the solid is empty, so there is no surface to move; give a solid", kAction));

@@ -37,6 +37,8 @@ void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOp
   if (options.tolerance && !(*options.tolerance > 0 && std::isfinite(*options.tolerance)))
     throw UsageError(
         fmt::format("{}: the tolerance is {}; give a positive length", kMorph, *options.tolerance));
+  requireSolid(solid, kMorph);
+  requireSolid(target, kMorph);
   if (solid.isEmpty() || target.isEmpty())
     throw InvalidInput(fmt::format("{}: the {} is empty; give two solids", kMorph,
                                    solid.isEmpty() ? "solid" : "target"));

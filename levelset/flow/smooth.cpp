@@ -269,6 +269,7 @@ NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothO
   if (!(sigma > 0) || !std::isfinite(sigma))
     throw UsageError(fmt::format("{}: sigma is {}; give a positive length", kSmooth, sigma));
   if (options.mask) checkMask(*options.mask, kSmooth);
+  requireSolid(solid, kSmooth);
   if (solid.isEmpty())
     throw InvalidInput(fmt::format(
         "{}: the solid is empty, so there is no surface to smooth; give a solid", kSmooth));

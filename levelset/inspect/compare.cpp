@@ -158,6 +158,8 @@ double volumeOfDifference(const NarrowBand& a, const NarrowBand& b) {
 
 Comparison compare(const NarrowBand& a, const NarrowBand& b, const CompareOptions& options) {
   report(options.progress, 0, "compare");
+  requireSolid(a, "compare");
+  requireSolid(b, "compare");
   for (const NarrowBand* solid : {&a, &b})
     if (solid->isEmpty())
       throw InvalidInput(fmt::format(

@@ -9,6 +9,7 @@
 
 #include "levelset/inspect/curved_surface.h"
 #include "levelset/inspect/shells.h"
+#include "levelset/memory_limit.h"
 #include "levelset/meshing/cell_surface.h"
 #include "levelset/progress_gate.h"
 
@@ -143,9 +144,10 @@ double edgeCurvature(const TriMesh& mesh) {
   return sum;
 }
 
-/// Vertices are doubled where a mesh has two normals or texture coordinates.
-bool mayHaveSeams(const TriMesh& mesh) {
-  return !mesh.attributes.normals.empty() || !mesh.attributes.uvs.empty();
+/// Where attributes may have doubled vertices, and have.
+std::optional<TriMesh> withoutItsSeams(const TriMesh& mesh) {
+  if (mesh.attributes.isEmpty()) return std::nullopt;
+  return withoutSeams(mesh, kMeasure, memoryLimit(kNoMemoryLimit));
 }
 
 }  // namespace
@@ -179,8 +181,8 @@ Measurement measure(const NarrowBand& solid, const Progress& progress) {
 }
 
 Measurement measure(const TriMesh& mesh, const Progress& progress) {
-  if (mayHaveSeams(mesh)) return measure(withoutSeams(mesh), progress);
   report(progress, 0, kMeasure);
+  if (const auto closed = withoutItsSeams(mesh)) return measure(*closed, progress);
   Measurement result;
   const Shells shells = findShells(mesh.positions, mesh.triangles);
   const std::vector<Vec3d> anchors = shellAnchors(shells, mesh.positions);
@@ -287,7 +289,7 @@ class FanJudge {
 }  // namespace
 
 Manifoldness manifoldness(const TriMesh& mesh) {
-  if (mayHaveSeams(mesh)) return manifoldness(withoutSeams(mesh));
+  if (const auto closed = withoutItsSeams(mesh)) return manifoldness(*closed);
   const VertexFans fans = collectFans(mesh);
   constexpr std::size_t kChunk = 1 << 14;
   std::vector<Manifoldness> parts((mesh.positions.size() + kChunk - 1) / kChunk);

@@ -33,12 +33,12 @@ struct Measurement {
 
 /// The same figures of a triangle mesh, exact for its flat triangles. `components` counts connected
 /// surfaces that face outwards. Volume, centroid and inertia mean something for a closed mesh only;
-/// the curvature is that of its edges, half the length times the angle [Steiner40]. Of a mesh with
-/// normals or texture coordinates, vertices at equal positions count as one.
+/// the curvature is that of its edges, half the length times the angle [Steiner40]. Seams of
+/// attributes count as closed (withoutSeams).
 [[nodiscard]] Measurement measure(const TriMesh& mesh, const Progress& progress = {});
 
 /// Is every edge shared by exactly two triangles that run along it in opposite directions, and
-/// every vertex the centre of one fan? Vertices at the seams of attributes count as one.
+/// every vertex the centre of one fan? Seams of attributes count as closed (withoutSeams).
 struct Manifoldness {
   std::size_t boundaryEdges = 0, nonManifoldEdges = 0, misorientedEdges = 0,
               nonManifoldVertices = 0;

@@ -21,6 +21,7 @@ void validate(const NarrowBand& band, const BandToMeshOptions& options) {
   if (options.sharp && options.adaptivity > 0) {
     throw UsageError("mesh: sharp and adaptivity do not go together; leave one out");
   }
+  if (!options.openSurface) requireSolid(band, kAction);
   if (band.isEmpty()) {
     throw InvalidInput(
         "mesh: the band is empty, so there is no surface; check the steps before it");

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "levelset/closest_on_triangle.h"
+
 namespace levelset {
 namespace {
 
@@ -11,28 +13,6 @@ using openvdb::Vec3d;
 using openvdb::Vec3f;
 
 constexpr std::uint32_t kTrianglesPerLeaf = 4;
-
-Vec3d closestOnTriangle(const Vec3d& p, const TriangleTree::Triangle& t) {
-  // By the region of the plane that p projects to [Ericson05, 5.1.5].
-  const auto& [a, b, c] = t;
-  const Vec3d ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0 && d2 <= 0) return a;
-  const Vec3d bp = p - b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0 && d4 <= d3) return b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return d1 > d3 ? Vec3d(a + ab * (d1 / (d1 - d3))) : a;
-  const Vec3d cp = p - c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0 && d5 <= d6) return c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return d2 > d6 ? Vec3d(a + ac * (d2 / (d2 - d6))) : a;
-  const double va = d3 * d6 - d5 * d4, e4 = d4 - d3, e5 = d5 - d6;
-  if (va <= 0 && e4 >= 0 && e5 >= 0) return e4 + e5 > 0 ? Vec3d(b + (c - b) * (e4 / (e4 + e5))) : b;
-  const double sum = va + vb + vc;
-  return a + ab * (vb / sum) + ac * (vc / sum);
-}
 
 double squaredToBox(const Vec3f& low, const Vec3f& high, const Vec3d& p) {
   double sum = 0;
@@ -89,7 +69,9 @@ struct TriangleTree::Search {
     const Node& node = tree.nodes_[index];
     if (!node.right) {
       for (std::uint32_t i = node.begin; i < node.end; ++i) {
-        const Vec3d point = closestOnTriangle(from, tree.triangles_[i]);
+        const Vec3d point = closestOnTriangle(from, tree.triangles_[i][0], tree.triangles_[i][1],
+                                              tree.triangles_[i][2])
+                                .point;
         const double d = (point - from).lengthSqr();
         if (!(d < squared)) continue;
         squared = d;

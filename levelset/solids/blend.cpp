@@ -115,6 +115,8 @@ void checkAgainstSize(double radius, const NarrowBand& solid) {
 CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b, double radius,
                 const BlendOptions& options) {
   checkRadius(radius, options);
+  requireSolid(a, "blend");
+  requireSolid(b, "blend");
   if (a.isEmpty() || b.isEmpty())
     throw InvalidInput("blend: a solid is empty, so there is nothing to blend; give two solids");
 

@@ -44,6 +44,7 @@ NarrowBand clipBy(const NarrowBand& solid, const Progress& progress, const Dista
 }
 
 void requireSurface(const NarrowBand& solid) {
+  requireSolid(solid, "clip");
   if (solid.isEmpty()) throw InvalidInput("clip: the solid has no surface");
 }
 

@@ -222,6 +222,7 @@ Topology topology(const NarrowBand& solid) {
 
 NarrowBand keepLargest(const NarrowBand& solid, std::size_t count, const Progress& progress) {
   if (!count) throw UsageError("keep: the number of solids to keep is 0; keep at least one");
+  requireSolid(solid, "keep");
   if (solid.isEmpty()) {
     throw InvalidInput(
         "keep: the band is empty, so there is nothing to keep; check the steps "
@@ -250,6 +251,7 @@ NarrowBand fillCavities(const NarrowBand& solid, double maxVolume, const Progres
         "fill-cavities: the largest volume to fill is {}; give a number that is not negative",
         maxVolume));
   }
+  requireSolid(solid, "fill-cavities");
   if (solid.isEmpty()) return solid;
   const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5), "fill-cavities");
   const std::vector<Region>& regions = map.regions();

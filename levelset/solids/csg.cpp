@@ -67,6 +67,7 @@ void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options
   }
   double bytes = 0;
   for (std::size_t i = 0; i < solids.size(); ++i) {
+    requireSolid(solids[i], action);
     if (solids[i].isEmpty()) {
       throw InvalidInput(fmt::format("{}: operand {} has no surface; leave it out", action, i + 1));
     }

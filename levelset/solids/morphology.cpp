@@ -40,6 +40,7 @@ void checkShell(const NarrowBand& solid, double thickness) {
   if (!std::isfinite(thickness) || thickness <= 0)
     throw UsageError(
         fmt::format("shell: the thickness is {}; give a length above zero", thickness));
+  requireSolid(solid, "shell");
   if (solid.isEmpty())
     throw InvalidInput(
         "shell: the solid is empty, so there is no surface to thicken; give a solid");

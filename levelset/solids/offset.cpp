@@ -29,6 +29,7 @@ double checkedHalfWidth(const NarrowBand& solid, const OffsetOptions& options) {
 }
 
 void requireSurface(const NarrowBand& solid, const OffsetOptions& options) {
+  requireSolid(solid, options.action);
   if (solid.isEmpty())
     throw InvalidInput(fmt::format(
         "{}: the solid is empty, so there is no surface to move; give a solid", options.action));

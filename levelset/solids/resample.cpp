@@ -291,6 +291,7 @@ void requireVoxelSize(double voxelSize, const char* action) {
 NarrowBand resampleField(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
                          const Imath::M44d& targetToWorld, double halfWidth, std::size_t maxMemory,
                          const Progress& progress, const char* action) {
+  requireSolid(solid, action);
   if (solid.isEmpty()) throw InvalidInput(fmt::format("{}: the solid has no surface", action));
   if (!(halfWidth >= 1) || !std::isfinite(halfWidth)) {
     throw UsageError(

@@ -278,6 +278,10 @@ levelset::TriMesh heightmapSheet(const Heightmap& heightmap, const V3d& center, 
   const HeightSurface surface(heightmap);
   levelset::TriMesh mesh;
   const auto across = static_cast<std::uint32_t>(columns), up = static_cast<std::uint32_t>(rows);
+  const std::size_t count = (std::size_t{across} + 1) * (std::size_t{up} + 1);
+  mesh.positions.reserve(count);
+  mesh.attributes.uvs.reserve(count);
+  mesh.triangles.reserve(2 * std::size_t{across} * up);
   for (std::uint32_t j = 0; j <= up; ++j) {
     levelset::report(options.progress, static_cast<double>(j) / (rows + 1), kHeightmap);
     for (std::uint32_t i = 0; i <= across; ++i) {

@@ -26,15 +26,30 @@ V3d lerp(const V3d& a, const V3d& b, double t) {
   return a + (b - a) * t;
 }
 
-V3d onLevel(const ParticleLevel& level, double u, double v) {
-  const Interval i = locate(u, level.columns), j = locate(v, level.rows);
+/// The cell of a level, and where in it.
+struct Cell {
+  Interval i, j;
+};
+
+Cell cellOf(const ParticleLevel& level, double u, double v) {
+  return {locate(u, level.columns), locate(v, level.rows)};
+}
+
+/// Levels are alike as a rule: one search for both.
+Cell cellAbove(const ParticleLevel& low, const Cell& cell, const ParticleLevel& high, double u,
+               double v) {
+  return low.columns == high.columns && low.rows == high.rows ? cell : cellOf(high, u, v);
+}
+
+V3d onLevel(const ParticleLevel& level, const Cell& cell) {
+  const auto& [i, j] = cell;
   return lerp(lerp(level.at(i.cell, j.cell), level.at(i.cell + 1, j.cell), i.fraction),
               lerp(level.at(i.cell, j.cell + 1), level.at(i.cell + 1, j.cell + 1), i.fraction),
               j.fraction);
 }
 
-LevelFrame frameOnLevel(const ParticleLevel& level, double u, double v) {
-  const Interval i = locate(u, level.columns), j = locate(v, level.rows);
+LevelFrame frameOnLevel(const ParticleLevel& level, const Cell& cell) {
+  const auto& [i, j] = cell;
   const V3d &a = level.at(i.cell, j.cell), &b = level.at(i.cell + 1, j.cell),
             &c = level.at(i.cell, j.cell + 1), &d = level.at(i.cell + 1, j.cell + 1);
   const V3d low = lerp(a, b, i.fraction), high = lerp(c, d, i.fraction);
@@ -66,14 +81,18 @@ MapSample sampleAt(const Patch& patch, const V3d& uvw, const V3d& step) {
 
 V3d levelPosition(const Patch& patch, const V3d& uvw) {
   const Interval k = locate(uvw.z, patch.levels.size());  // levels are evenly spaced in w
-  return lerp(onLevel(patch.levels[k.cell], uvw.x, uvw.y),
-              onLevel(patch.levels[k.cell + 1], uvw.x, uvw.y), k.fraction);
+  const ParticleLevel &low = patch.levels[k.cell], &high = patch.levels[k.cell + 1];
+  const Cell cell = cellOf(low, uvw.x, uvw.y);
+  return lerp(onLevel(low, cell), onLevel(high, cellAbove(low, cell, high, uvw.x, uvw.y)),
+              k.fraction);
 }
 
 LevelFrame levelFrame(const Patch& patch, const V3d& uvw) {
   const Interval k = locate(uvw.z, patch.levels.size());
-  const LevelFrame low = frameOnLevel(patch.levels[k.cell], uvw.x, uvw.y),
-                   high = frameOnLevel(patch.levels[k.cell + 1], uvw.x, uvw.y);
+  const ParticleLevel &below = patch.levels[k.cell], &above = patch.levels[k.cell + 1];
+  const Cell cell = cellOf(below, uvw.x, uvw.y);
+  const LevelFrame low = frameOnLevel(below, cell),
+                   high = frameOnLevel(above, cellAbove(below, cell, above, uvw.x, uvw.y));
   return {lerp(low.position, high.position, k.fraction),
           {lerp(low.slopes[0], high.slopes[0], k.fraction),
            lerp(low.slopes[1], high.slopes[1], k.fraction),

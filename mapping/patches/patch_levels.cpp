@@ -173,7 +173,16 @@ std::vector<ParticleLevel> levelsFromSurface(const NarrowBand& base, const Parti
 void requireCovered(const NarrowBand& base, const ParticleLevel& level) {
   if (!base.isOpenSurface()) return;
   const SurfaceField field(base);
-  constexpr double kStepVoxels = 2;
+  const auto require = [&](const V3d& place) {
+    V3d p = place;
+    if (field.project(p, 0) && !field.isBeyondBorder(p)) return;
+    throw levelset::InvalidInput(fmt::format(
+        "{}: the surface breaks off at ({:.6g}, {:.6g}, {:.6g}), within the patch; keep to "
+        "one side of its border, and off its holes",
+        kPatchLevels, place.x, place.y, place.z));
+  };
+  for (const V3d& p : level.positions) require(p);
+  constexpr double kStepVoxels = 1;  // a slit of four shows in the middle two of them
   const auto steps = [&](const V3d& along) {
     return std::ceil(along.length() / (kStepVoxels * base.voxelSize()));
   };
@@ -185,13 +194,7 @@ void requireCovered(const NarrowBand& base, const ParticleLevel& level) {
       for (double s = 0.5; s < across; ++s)
         for (double t = 0.5; t < up; ++t) {
           const double u = s / across, v = t / up;
-          V3d p = (a * (1 - u) + b * u) * (1 - v) + (c * (1 - u) + d * u) * v;
-          const V3d before = p;
-          if (field.project(p, 0)) continue;
-          throw levelset::InvalidInput(fmt::format(
-              "{}: the surface breaks off at ({:.6g}, {:.6g}, {:.6g}), within the patch; keep to "
-              "one side of its border, and off its holes",
-              kPatchLevels, before.x, before.y, before.z));
+          require((a * (1 - u) + b * u) * (1 - v) + (c * (1 - u) + d * u) * v);
         }
     }
 }

@@ -102,7 +102,9 @@ double scaleAt(const ScatterDensity& density, const V3d& place) {
 class AreaSampler {
  public:
   AreaSampler(const levelset::NarrowBand& base, const ScatterDensity& density)
-      : mesh_(levelset::bandToMesh(base)), field_(base), isOpen_(base.isOpenSurface()) {
+      : mesh_(levelset::bandToMesh(base, {.openSurface = base.isOpenSurface()})),
+        field_(base),
+        isOpen_(base.isOpenSurface()) {
     if (isOpen_) dropWalls();
     sums_.reserve(mesh_.triangles.size());
     for (const auto& [a, b, c] : mesh_.triangles) {

@@ -21,6 +21,10 @@ class SurfaceField {
   /// ∇φ. False, with p where it stuck, when the way leaves the band or meets a ridge of φ, and
   /// where an open surface breaks off.
   [[nodiscard]] bool project(Imath::V3d& p, double height) const;
+  /// Does p lie by more than a voxel beyond the border of an open surface, where the band goes on?
+  [[nodiscard]] bool isBeyondBorder(const Imath::V3d& p) const {
+    return isOpen_ && sampler_.beyondBorder(p) > voxelSize_;
+  }
 
  private:
   levelset::BandSampler sampler_;

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -40,7 +39,7 @@ template <bool kNormals>
 void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
                   const TexturePlacement& placement, const levelset::Progress& progress,
                   levelset::TriMesh& mesh) {
-  const V3d size = placement.box.size();
+  const V3d perSize = V3d(1) / placement.box.size();
   const double hand = patch.mirrored ? -1 : 1;
   levelset::ProgressGate gate(progress, mesh.positions.size(), kMapMesh);
   tbb::parallel_for(
@@ -50,10 +49,11 @@ void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
           if constexpr (kNormals) {
             const LevelFrame frame = levelFrame(patch, uvw);
             mesh.positions[i] = frame.position;
-            mesh.attributes.normals[i] = levelset::carriedNormal(
-                texture.attributes.normals[i],
-                {frame.slopes[0] / size.x, frame.slopes[1] / size.y, frame.slopes[2] / size.z},
-                hand);
+            mesh.attributes.normals[i] =
+                levelset::carriedNormal(texture.attributes.normals[i],
+                                        {frame.slopes[0] * perSize.x, frame.slopes[1] * perSize.y,
+                                         frame.slopes[2] * perSize.z},
+                                        hand);
           } else {
             mesh.positions[i] = levelPosition(patch, uvw);
           }
@@ -62,9 +62,15 @@ void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
       });
 }
 
-}  // namespace
+void noteLostNormals(MeshTextureResult& result) {
+  if (result.lostNormals == 0) return;
+  result.notes.push_back(
+      fmt::format("{} of {} normals have no direction, or none on the patch, and are zero",
+                  result.lostNormals, result.mesh.attributes.normals.size()));
+}
 
-MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
+/// Without the note of lost normals.
+MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
                           const MeshTextureOptions& options) {
   if (!std::isfinite(options.sink)) {
     throw levelset::UsageError(
@@ -102,15 +108,20 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
     moveVertices<false>(texture, patch, placement, options.progress, mesh);
   } else {
     moveVertices<true>(texture, patch, placement, options.progress, mesh);
-    if (const std::size_t lost = countLost(mesh.attributes.normals)) {
-      result.notes.push_back(
-          fmt::format("{} of {} normals have no direction, or none on the patch, and are zero",
-                      lost, mesh.attributes.normals.size()));
-    }
+    result.lostNormals = countLost(mesh.attributes.normals);
   }
   mesh.triangles = texture.triangles;
   if (patch.mirrored)
     for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+  return result;
+}
+
+}  // namespace
+
+MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
+                          const MeshTextureOptions& options) {
+  MeshTextureResult result = mapOnto(texture, patch, options);
+  noteLostNormals(result);
   return result;
 }
 
@@ -131,6 +142,7 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
   MeshTextureResult result;
   std::vector<Distortion> distortions;
   std::vector<FoldCertificate> certificates;
+  std::size_t noted = 0;
   for (std::size_t n = 0; n < patches.size(); ++n) {
     MeshTextureOptions part = options;
     const auto share = [&](std::size_t k) {
@@ -138,11 +150,12 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
     };
     part.progress = levelset::subProgress(options.progress, share(n), share(n + 1));
     part.allowFolds = options.allowFolds || options.skipFolds;
-    MeshTextureResult one = mapMesh(texture, patches[n], part);
+    MeshTextureResult one = mapOnto(texture, patches[n], part);
     const bool folds = one.distortion.folded > 0 || one.certificate.verdict() == FoldVerdict::Folds;
     if (options.skipFolds && folds) continue;
     append(result.mesh, one.mesh);
-    std::move(one.notes.begin(), one.notes.end(), std::back_inserter(result.notes));
+    result.lostNormals += one.lostNormals;
+    noted += !one.notes.empty();
     distortions.push_back(one.distortion);
     certificates.push_back(std::move(one.certificate));
   }
@@ -156,8 +169,14 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
     result.notes.push_back(
         fmt::format("{} of {} patches fold and were left out", result.skipped, patches.size()));
   }
+  noteLostNormals(result);
   result.distortion = worstOf(distortions);
   result.certificate = worstOf(certificates);
+  if (noted > 0) {
+    for (const std::string& note : judgeFolds(result.distortion, result.certificate, true))
+      result.notes.push_back(noted == 1 ? note
+                                        : fmt::format("{} (the worst of {} patches)", note, noted));
+  }
   return result;
 }
 

@@ -30,7 +30,8 @@ struct MeshTextureResult {
   levelset::TriMesh mesh;
   Distortion distortion;  ///< in the middle and close to the corners of the particles' cells
   FoldCertificate certificate;
-  std::size_t skipped = 0;  ///< patches left out because they fold
+  std::size_t skipped = 0;      ///< patches left out because they fold
+  std::size_t lostNormals = 0;  ///< that had no direction, or have none on the patch: zero
   std::vector<std::string> notes;
 };
 

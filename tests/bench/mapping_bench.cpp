@@ -5,7 +5,8 @@
 // Then the six kernels, on a tenth of the points with 2000 particles; and what solving for SOLVED
 // particles by iteration takes, on all threads (0: nothing).
 // Exits 1 when the fast sum is less than 30 times as fast, or off by more than 0.05 texture voxel,
-// or when a mesh without attributes moves at less than 5 million vertices a second.
+// or when a mesh, bare or with normals and texture coordinates, moves at less than 5 million
+// vertices a second.
 
 #include <fmt/core.h>
 #include <tbb/global_control.h>
@@ -238,9 +239,9 @@ int main(int argc, char** argv) {
     const mapping::MeshTextureResult moved = mapping::mapMesh(
         cloud, patch, {.textureBox = Imath::Box3d(V3d(0), V3d(1)), .allowFolds = true});
     const double rate = static_cast<double>(moved.mesh.positions.size()) / (now() - start) / 1e6;
-    fmt::print("meshes   {:.3g} million vertices a second {}\n", rate,
-               carries ? "with normals and texture coordinates" : "without attributes (5 wanted)");
-    fastEnough = fastEnough && (carries || rate >= 5);
+    fmt::print("meshes   {:.3g} million vertices a second {} (5 wanted)\n", rate,
+               carries ? "with normals and texture coordinates" : "without attributes");
+    fastEnough = fastEnough && rate >= 5;
   }
 
   compareKernels(points / 10);

@@ -91,6 +91,15 @@ Value surfaceBand(Invocation& in) {
   return Value(result.band);
 }
 
+void validateSurfaceBand(const Invocation& in) {
+  requireVoxelSize(in);
+  if (in.number("half-width") < levelset::kLeastSurfaceHalfWidth) {
+    throw levelset::UsageError(
+        fmt::format("surface-band: --half-width is {} voxels; give at least {}",
+                    in.text("half-width"), levelset::kLeastSurfaceHalfWidth));
+  }
+}
+
 Plan planSurfaceBand(Invocation& in) {
   Plan plan = in.operands[0].plan();
   plan.kind = Kind::Surface;
@@ -176,14 +185,15 @@ void addConversionOperators(std::vector<Operator>& all) {
                  resolutionParam(),
                  {.name = "half-width",
                   .type = ParamType::Number,
-                  .doc = "half width of the band, voxels, at least 4",
-                  .fallback = "5",
+                  .doc = "half width of the band, voxels, at least 4; 16 are enough for patches of "
+                         "up to ten voxels",
+                  .fallback = "16",
                   .range = Range::Positive}},
       .operands = {{Kind::Mesh}},
       .resultKind = [](const Invocation&) { return Kind::Surface; },
       .run = surfaceBand,
       .plan = planSurfaceBand,
-      .validate = requireVoxelSize,
+      .validate = validateSurfaceBand,
   });
   all.push_back({
       .name = "mesh",

@@ -1,4 +1,4 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <filesystem>
 
@@ -46,10 +46,17 @@ Value read(Invocation& in) {
   if (fileKind(in) == Kind::Patch)
     return Value(PatchValue{.patches = mapping::readPatches(file, in.maxMemory)});
   if (fileKind(in) == Kind::Mesh) {
-    return Value(levelset::readMesh(file, {.format = in.text("format"),
-                                           .attributes = !in.flag("bare"),
-                                           .maxMemory = in.maxMemory,
-                                           .progress = in.progress}));
+    std::vector<std::string> leftAside;
+    Value mesh(levelset::readMesh(file, {.format = in.text("format"),
+                                         .attributes = !in.flag("bare"),
+                                         .maxMemory = in.maxMemory,
+                                         .leftAside = &leftAside,
+                                         .progress = in.progress}));
+    if (!leftAside.empty()) {
+      in.notes.warnings.push_back(fmt::format("{}: left aside what no vertex can carry: {}",
+                                              file.string(), fmt::join(leftAside, "; ")));
+    }
+    return mesh;
   }
   levelset::BandRepairs repairs;
   const levelset::ReadBandOptions options{.grid = in.text("grid"),
@@ -128,7 +135,9 @@ Value write(Invocation& in) {
                           .format = in.text("format"),
                           .progress = in.progress});
   } else if (value.kind() == Kind::Mesh) {
-    levelset::writeMesh(file, value.mesh(), {.format = in.text("format"), .progress = in.progress});
+    levelset::writeMesh(
+        file, value.mesh(),
+        {.format = in.text("format"), .maxMemory = in.maxMemory, .progress = in.progress});
     if (!value.mesh().attributes.isEmpty() && !levelset::holdsAttributes(formatName(in)))
       in.notes.warnings.push_back(fmt::format(
           "{} holds positions and triangles only: the {} were left out; write .ply or .obj to keep "

@@ -44,6 +44,34 @@ TEST_F(OpenMesh, AttributesAreToldAndMayBeLeftOut) {
   EXPECT_EQ(levelsmith("read s.vdb --bare ! info").code, 2);
 }
 
+TEST_F(OpenMesh, SeamsAreClosedAndWhatIsLeftAsideIsTold) {
+  writeFile("roof.obj",
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 -1\nvn 0 -1 0\nvn -1 0 0\nvn 1 1 1\n"
+            "vn 9 9 9\nf 1//1 3//1 2//1\nf 1//2 2//2 4//2\nf 1//3 4//3 3//3\nf 2//4 3//4 4//4\n");
+  const auto written = levelsmith("read roof.obj ! write roof.off ! write roof.ply");
+  EXPECT_EQ(written.code, 0) << written.err;
+  const std::string told = "1 of 5 normals, which no face names";
+  const std::size_t at = written.err.find(told);
+  ASSERT_NE(at, std::string::npos) << written.err;
+  EXPECT_EQ(written.err.find(told, at + 1), std::string::npos) << written.err;  // once
+  for (const char* file : {"roof.off", "roof.ply --bare"}) {
+    const auto measured = levelsmith(std::string("read ") + file + " ! measure --json");
+    ASSERT_EQ(measured.code, 0) << measured.err;
+    const Json m = Json::parse(measured.out);
+    EXPECT_EQ(m["vertices"], 4) << file;
+    EXPECT_EQ(m["closed_manifold"], true) << file;
+  }
+}
+
+TEST_F(OpenMesh, DefaultsOfBandAndPatchGoTogether) {
+  const std::string land =
+      "heightmap --image hills.txt --size 20,20 --height 4 --voxel 1 --sheet ! surface-band ";
+  EXPECT_EQ(levelsmith(land + "--voxel 1 ! patch --at 0,0,0 --size 6,6 --height 5 ! info").code, 0);
+  const auto narrow = levelsmith("--dry-run " + land + "--voxel 1 --half-width 3 ! info");
+  EXPECT_EQ(narrow.code, 2);
+  EXPECT_NE(narrow.err.find("give at least 4"), std::string::npos) << narrow.err;
+}
+
 TEST_F(OpenMesh, TreesStandOnTerrain) {
   // The example of docs/texture-mapping.md, fewer trees.
   const auto outcome = levelsmith(
@@ -82,9 +110,9 @@ TEST_F(OpenMesh, SurfaceBandsAreNoSolids) {
       levelsmith(land + "patch @land --at 8,0,0 --size 12,6 --height 3 --particles spline ! info");
   EXPECT_EQ(over.code, 3);
   EXPECT_NE(over.err.find("breaks off"), std::string::npos) << over.err;
-  const auto narrow = levelsmith(land + "patch @land --at 0,0,0 --size 6,6 --height 8 ! info");
+  const auto narrow = levelsmith(land + "patch @land --at 0,0,0 --size 6,6 --height 12 ! info");
   EXPECT_EQ(narrow.code, 3);
-  EXPECT_NE(narrow.err.find("--half-width 14"), std::string::npos) << narrow.err;
+  EXPECT_NE(narrow.err.find("--half-width 18"), std::string::npos) << narrow.err;
   EXPECT_EQ(levelsmith("heightmap --image hills.txt --size 4,4 --height 1 --voxel 0.5 --sheet "
                        "--half-width 4 ! info")
                 .code,

@@ -3,10 +3,28 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "levelset/convert/mesh_to_band.h"
+#include "levelset/eikonal/closest_points.h"
+#include "levelset/eikonal/redistance.h"
 #include "levelset/error.h"
+#include "levelset/files/band_file.h"
+#include "levelset/flow/advect.h"
+#include "levelset/flow/morph.h"
+#include "levelset/flow/smooth.h"
+#include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"
+#include "levelset/meshing/band_to_mesh.h"
+#include "levelset/sample.h"
+#include "levelset/solids/blend.h"
+#include "levelset/solids/clip.h"
+#include "levelset/solids/components.h"
+#include "levelset/solids/csg.h"
+#include "levelset/solids/morphology.h"
+#include "levelset/solids/offset.h"
+#include "levelset/solids/resample.h"
+#include "levelset/solids/transform.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 #include "tests/support/files.h"
@@ -49,13 +67,14 @@ TEST(SurfaceBand, OfAPlaneIsTheDistanceToIt) {
     EXPECT_NEAR(phi, way.dot(normal), 1e-6) << p;
     EXPECT_LT(std::abs(phi), 5 * h + 1e-6);
     const double over = std::max({0.0, std::abs(way.dot(u)) - 1, std::abs(way.dot(v)) - 1});
-    EXPECT_LE(over, 3 * h + 1e-6);  // the border, and what goes on straight
+    EXPECT_LE(over, 3.5 * h + 1e-6);  // the border, and what goes on straight
     ++(over > 0 ? beyond : within);
   });
-  // All of the slab of ten voxels over the square, and no more around it than a rim of three.
+  // All of the slab of ten voxels over the square, and no more around it than a rim of three and a
+  // half.
   EXPECT_NEAR(static_cast<double>(within) * h * h * h, 4 * 10 * h, 0.1);
-  EXPECT_NEAR(static_cast<double>(beyond) * h * h * h, (4 * 2 * 3 * h + M_PI * 9 * h * h) * 10 * h,
-              0.1);
+  EXPECT_NEAR(static_cast<double>(beyond) * h * h * h,
+              (4 * 2 * 3.5 * h + M_PI * 12.25 * h * h) * 10 * h, 0.1);
 }
 
 TEST(SurfaceBand, SignsAboutEdgesAndCorners) {
@@ -167,10 +186,48 @@ TEST(SurfaceBand, RefusesTheCall) {
   EXPECT_THROW((void)surfaceBand(sheet, 0.01, {.maxMemory = 1000}), levelset::ResourceLimit);
 }
 
+TEST(SurfaceBand, TellsWhatIsBeyondTheBorder) {
+  const double h = 0.1;
+  const NarrowBand band = surfaceBand(square(V3d(0), V3d(1, 0, 0), V3d(0, 1, 0)), h).band;
+  const levelset::BandSampler sampler(band);
+  EXPECT_EQ(sampler.beyondBorder(V3d(0.8, 0.3, 0.1)), 0);
+  EXPECT_NEAR(sampler.beyondBorder(V3d(1.25, 0.3, 0.1)), 0.25, 1e-6);
+  EXPECT_NEAR(sampler.beyondBorder(V3d(1.2, -1.1, 0)), std::hypot(0.2, 0.1), 0.1 * h);
+  EXPECT_EQ(sampler.beyondBorder(V3d(1.5, 0.3, 0)), 0);
+  const NarrowBand moved = transform(band, Imath::M44d().setScale(2));
+  EXPECT_NEAR(levelset::BandSampler(moved).beyondBorder(V3d(2.5, 0.6, 0.2)), 0.5, 1e-6);
+  EXPECT_EQ(levelset::BandSampler(support::sampleBand([](const V3d& p) { return p.length() - 1; },
+                                                      {V3d(-1), V3d(1)}, h))
+                .beyondBorder(V3d(1, 0, 0)),
+            0);
+}
+
 TEST(SurfaceBand, IsNoSolid) {
   const NarrowBand band = surfaceBand(square(V3d(0), V3d(1, 0, 0), V3d(0, 1, 0)), 0.1).band;
-  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)measure(band); }),
-              "measure: the operand is an open");
+  const NarrowBand ball =
+      support::sampleBand([](const V3d& p) { return p.length() - 1; }, {V3d(-1), V3d(1)}, 0.1);
+  const auto refuses = [&](const char* action, const std::function<void()>& run) {
+    EXPECT_SAYS(refusal<InvalidInput>(run), std::string(action) + ": the operand is an open");
+  };
+  refuses("measure", [&] { (void)measure(band); });
+  refuses("union", [&] { (void)unite(ball, band); });
+  refuses("blend", [&] { (void)levelset::blend(levelset::CsgOperation::Union, band, ball, 0.3); });
+  refuses("offset", [&] { (void)levelset::offset(band, 0.1); });
+  refuses("shell", [&] { (void)shell(band, 0.2, levelset::ShellSide::In); });
+  refuses("clip", [&] { (void)clip(band, Imath::Box3d(V3d(-1), V3d(1))); });
+  refuses("keep", [&] { (void)levelset::keepLargest(band, 1); });
+  refuses("resample", [&] { (void)levelset::resample(band, 0.2); });
+  refuses("redistance", [&] { (void)levelset::redistance(band); });
+  refuses("closest-point", [&] { (void)levelset::closestPoints(band); });
+  refuses("smooth", [&] { (void)smooth(band, levelset::SmoothKind::Gaussian, 0.2); });
+  refuses("morph", [&] { (void)morph(ball, band); });
+  refuses("compare", [&] { (void)compare(ball, band); });
+  refuses("mesh", [&] { (void)levelset::bandToMesh(band); });
+  const auto still = [](const V3d&, double) { return V3d(0); };
+  refuses("advect", [&] { (void)levelset::advect(band, still, 1); });
+  const support::TemporaryFolder folder;
+  refuses("write", [&] { levelset::writeBand(folder / "a.vdb", band); });
+  EXPECT_EQ(folder.fileCount(), 0u);
   EXPECT_FALSE(levelset::meshToBand(support::sphereMesh(1), 0.2).band.isOpenSurface());
 }
 

@@ -279,6 +279,11 @@ TEST(MeshTextureAttributes, WhatHasNoDirectionStaysZeroAndGarbageIsRefused) {
   EXPECT_EQ(moved.mesh.attributes.normals[5], V3d(0));
   ASSERT_EQ(moved.notes.size(), 1u);
   EXPECT_NE(moved.notes[0].find("1 of 16 normals"), std::string::npos);
+  const std::vector<Patch> many(7, patch);
+  const mapping::MeshTextureResult all = mapping::mapMesh(mesh, many, {.textureBox = kUnitBox});
+  EXPECT_EQ(all.lostNormals, 7u);
+  ASSERT_EQ(all.notes.size(), 1u);  // once, not for each patch
+  EXPECT_NE(all.notes[0].find("7 of 112 normals"), std::string::npos);
   mesh.attributes.normals[5].y = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW((void)mapping::mapMesh(mesh, patch, {.textureBox = kUnitBox}),
                levelset::InvalidInput);

@@ -19,6 +19,7 @@
 
 namespace open_surface_test {
 
+using Imath::M44d;
 using Imath::V3d;
 using levelset::InvalidInput;
 using levelset::NarrowBand;
@@ -143,6 +144,44 @@ TEST(OpenSurface, PatchesOverAHoleAreRefusedWithThePlace) {
   EXPECT_GT(makePatch(band, beside, 0.5).patch.particleCount(), 0u);
 }
 
+TEST(OpenSurface, PatchesOverASlitAreRefused) {
+  // What goes on from both of its sides meets: the band is whole, and the surface is not.
+  for (const double width : {4.0, 5.0, 6.0}) {
+    TriMesh sheet = terrain(2, 4, [](double, double) { return 0.0; });
+    TriMesh halves;
+    for (const double side : {-1.0, 1.0}) {
+      TriMesh half = sheet;
+      for (V3d& p : half.positions) p = V3d(p.x + side * (2 + width * kVoxel / 2), p.y, p.y);
+      append(halves, half);
+    }
+    const NarrowBand band = levelset::surfaceBand(halves, kVoxel, {.halfWidth = 8}).band;
+    const mapping::PatchOptions options = {.scheme = mapping::LevelScheme::Spline};
+    const auto over = [&](double x) {
+      std::array<V3d, 4> corners = square(0.5);
+      for (V3d& p : corners) p = V3d(p.x + x, p.y, p.y);
+      return makePatch(band, corners, 0.3, options);
+    };
+    EXPECT_SAYS(refusal<InvalidInput>([&] { (void)over(0.07); }), "the surface breaks off at (");
+    EXPECT_GT(over(0.5 + width * kVoxel / 2).patch.particleCount(), 0u);
+  }
+}
+
+TEST(OpenSurface, PatchesMayEndAtTheCornersOfTiltedSheets) {
+  const M44d turn = M44d().setEulerAngles(V3d(0.7, 0.5, 0.3));
+  TriMesh sheet = terrain(1, 4, [](double, double) { return 0.0; });
+  std::array<V3d, 4> corners = square(1);
+  const V3d shift(0.013, 0.027, 0.041);
+  for (V3d& p : sheet.positions) p = p * turn + shift;
+  for (V3d& p : corners) p = p * turn + shift;
+  const NarrowBand band = levelset::surfaceBand(sheet, kVoxel, {.halfWidth = 9}).band;
+  const Patch patch = makePatch(band, corners, 0.3, {.levels = 2}).patch;
+  V3d normal;
+  turn.multDirMatrix(V3d(0, 0, 1), normal);
+  for (const ParticleLevel& level : patch.levels)
+    for (const V3d& p : level.positions)
+      EXPECT_NEAR((p - shift).dot(normal), level.height, 0.01 * kVoxel);
+}
+
 TEST(OpenSurface, ClosestPointsLieWithin) {
   const NarrowBand band = plane();
   EXPECT_LT(
@@ -191,8 +230,10 @@ TEST(OpenSurface, TreesStandOnTerrain) {
   for (const Patch& patch : forest.patches)
     for (const V3d& p : patch.levels.front().positions) {
       EXPECT_LE(std::max(std::abs(p.x), std::abs(p.y)), 4 + kVoxel);
-      // Facets of 0.1 by 0.1 on curvatures of up to 0.7: a sagitta of up to 0.002.
-      EXPECT_NEAR(p.z, hills(p.x, p.y), 0.004);
+      // Facets of 0.1 by 0.1 on curvatures of up to 0.7: a sagitta of up to 0.002. Beyond the
+      // border the hills go on straight.
+      const bool isBeyond = std::max(std::abs(p.x), std::abs(p.y)) > 4;
+      EXPECT_NEAR(p.z, hills(p.x, p.y), 0.004 + (isBeyond ? 0.5 * 0.7 * kVoxel * kVoxel : 0));
     }
   const TriMesh trunk = support::sphereMesh(0.5, V3d(0.5), 6);
   const TriMesh trees = mapping::mapMesh(trunk, forest.patches).mesh;
