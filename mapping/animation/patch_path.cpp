@@ -20,7 +20,7 @@ using Imath::V3d;
 using levelset::InvalidInput;
 
 constexpr const char* kPath = "animate";
-constexpr double kStill = 1e-6;  // voxels: no way to speak of
+constexpr double kNoWay = 1e-6;  // voxels: no way to speak of
 
 /// The segment of a path that holds a part of its length, and the share of that segment.
 std::pair<std::size_t, double> placeOn(const std::vector<V3d>& path, double part) {
@@ -77,7 +77,7 @@ PatchPath::PatchPath(const levelset::NarrowBand& base, Footprint from, Footprint
 void PatchPath::findCentreWay(const std::vector<V3d>& guide) {
   const SurfaceField field(base_);
   const V3d &a = from_.centre, &b = to_.centre;
-  if ((b - a).length() <= kStill * base_.voxelSize()) {
+  if ((b - a).length() <= kNoWay * base_.voxelSize()) {
     way_ = {a, b};
     return;
   }
@@ -151,7 +151,8 @@ void PatchPath::findCornerWays() {
   }
   for (std::size_t i = 0; i < 4; ++i) {
     const V3d &a = from_.corners[i], &b = to_.corners[i];
-    if ((b - a).length() <= kStill * voxel && pathLength(isAlike_ ? beside[i] : way_) < voxel) {
+    if ((b - a).length() <= kNoWay * voxel &&
+        pathLength(isAlike_ ? beside[i] : way_) < voxel) {
       cornerWays_[i] = {a, b};
       continue;
     }

@@ -27,28 +27,28 @@ V3d lerp(const V3d& a, const V3d& b, double t) {
 }
 
 /// The cell of a level, and where in it.
-struct Cell {
+struct LevelCell {
   Interval i, j;
 };
 
-Cell cellOf(const ParticleLevel& level, double u, double v) {
+LevelCell cellOf(const ParticleLevel& level, double u, double v) {
   return {locate(u, level.columns), locate(v, level.rows)};
 }
 
 /// Levels are alike as a rule: one search for both.
-Cell cellAbove(const ParticleLevel& low, const Cell& cell, const ParticleLevel& high, double u,
-               double v) {
+LevelCell cellAbove(const ParticleLevel& low, const LevelCell& cell, const ParticleLevel& high,
+                    double u, double v) {
   return low.columns == high.columns && low.rows == high.rows ? cell : cellOf(high, u, v);
 }
 
-V3d onLevel(const ParticleLevel& level, const Cell& cell) {
+V3d onLevel(const ParticleLevel& level, const LevelCell& cell) {
   const auto& [i, j] = cell;
   return lerp(lerp(level.at(i.cell, j.cell), level.at(i.cell + 1, j.cell), i.fraction),
               lerp(level.at(i.cell, j.cell + 1), level.at(i.cell + 1, j.cell + 1), i.fraction),
               j.fraction);
 }
 
-LevelFrame frameOnLevel(const ParticleLevel& level, const Cell& cell) {
+LevelFrame frameOnLevel(const ParticleLevel& level, const LevelCell& cell) {
   const auto& [i, j] = cell;
   const V3d &a = level.at(i.cell, j.cell), &b = level.at(i.cell + 1, j.cell),
             &c = level.at(i.cell, j.cell + 1), &d = level.at(i.cell + 1, j.cell + 1);
@@ -82,7 +82,7 @@ MapSample sampleAt(const Patch& patch, const V3d& uvw, const V3d& step) {
 V3d levelPosition(const Patch& patch, const V3d& uvw) {
   const Interval k = locate(uvw.z, patch.levels.size());  // levels are evenly spaced in w
   const ParticleLevel &low = patch.levels[k.cell], &high = patch.levels[k.cell + 1];
-  const Cell cell = cellOf(low, uvw.x, uvw.y);
+  const LevelCell cell = cellOf(low, uvw.x, uvw.y);
   return lerp(onLevel(low, cell), onLevel(high, cellAbove(low, cell, high, uvw.x, uvw.y)),
               k.fraction);
 }
@@ -90,7 +90,7 @@ V3d levelPosition(const Patch& patch, const V3d& uvw) {
 LevelFrame levelFrame(const Patch& patch, const V3d& uvw) {
   const Interval k = locate(uvw.z, patch.levels.size());
   const ParticleLevel &below = patch.levels[k.cell], &above = patch.levels[k.cell + 1];
-  const Cell cell = cellOf(below, uvw.x, uvw.y);
+  const LevelCell cell = cellOf(below, uvw.x, uvw.y);
   const LevelFrame low = frameOnLevel(below, cell),
                    high = frameOnLevel(above, cellAbove(below, cell, above, uvw.x, uvw.y));
   return {lerp(low.position, high.position, k.fraction),
