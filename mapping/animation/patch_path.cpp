@@ -151,8 +151,7 @@ void PatchPath::findCornerWays() {
   }
   for (std::size_t i = 0; i < 4; ++i) {
     const V3d &a = from_.corners[i], &b = to_.corners[i];
-    if ((b - a).length() <= kNoWay * voxel &&
-        pathLength(isAlike_ ? beside[i] : way_) < voxel) {
+    if ((b - a).length() <= kNoWay * voxel && pathLength(isAlike_ ? beside[i] : way_) < voxel) {
       cornerWays_[i] = {a, b};
       continue;
     }

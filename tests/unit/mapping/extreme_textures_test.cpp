@@ -85,9 +85,9 @@ TEST(ExtremeTextures, AThousandTimesFinerThanTheBase) {
 }
 
 TEST(ExtremeTextures, CoarseVoxelsShowWhatTheyCan) {
-  // A texture of ten times too many voxels is right to second order in the voxels of the result.
+  // A texture of seven times too many voxels is right to second order in the voxels of the result.
   const Patch patch = makePatch(slab(), square(1), 1, {.levels = 3}).patch;
-  const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.02);
+  const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.03);
   const Measurement mapped = measureAlone(slab(), texture, patch, 0.2);
   EXPECT_NEAR(mapped.volume, 4 * kPi / 3 * 0.5, 0.02 * mapped.volume);
 }
