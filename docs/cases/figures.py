@@ -22,7 +22,7 @@ def sheet(folder, target, columns, *panels):
         axis.imshow(pyplot.imread(f"{folder}/{name}.png"))
         axis.set_title(title, fontsize=9)
     figure.tight_layout(pad=0.3)
-    figure.savefig(f"{target}.png", dpi=100, metadata={"Software": None})
+    figure.savefig(f"{target}.png", dpi=100, bbox_inches="tight", pad_inches=0.05, metadata={"Software": None})
 
 
 def figure_of(steps, field):
@@ -58,9 +58,10 @@ def plot(table, target):
         runs = list(csv.DictReader(file))
     shown = sorted({float(run["points"]) for run in runs})
     names = {"direct": "direct sum", "fast": "fast sum", "shell": "tetrahedra"}
-    figure, axes = pyplot.subplots(1, 3, figsize=(11, 3.6), sharey=True)
-    for axis, decade in zip(axes, (1e6, 1e7, 1e8)):
-        points = min(shown, key=lambda each: abs(each - decade))
+    decades = [decade for decade in (1e6, 1e7, 1e8) if any(abs(each / decade - 1) < 0.1 for each in shown)]
+    figure, axes = pyplot.subplots(1, len(decades), figsize=(3.7 * len(decades), 3.6), sharey=True, squeeze=False)
+    axes = axes[0]
+    for axis, points in zip(axes, decades):
         for colour, (name, title) in zip(("C3", "C0", "C2"), names.items()):
             some = [run for run in runs if run["map"] == name and abs(float(run["points"]) / points - 1) < 0.1]
             some.sort(key=lambda run: int(run["particles"]))
@@ -78,7 +79,7 @@ def plot(table, target):
     axes[0].set_ylabel("error, texture voxels (99 % below)")
     axes[0].legend(fontsize=8)
     figure.tight_layout()
-    figure.savefig(f"{target}.png", dpi=100, metadata={"Software": None})
+    figure.savefig(f"{target}.png", dpi=100, bbox_inches="tight", pad_inches=0.05, metadata={"Software": None})
 
 
 if __name__ == "__main__":

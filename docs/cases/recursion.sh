@@ -10,7 +10,7 @@ map recursion-1 read "$out/bunny120.vdb" --as base ! read "$out/standing150.vdb"
   ! texture @base @small @back --sink 2vx --blend 2vx --voxel 0.006
 row recursion-1 "'1'" particles voxel_size cpu_s.setup cpu_s.mapping points min_jacobian
 map recursion-2 read "$out/recursion-1.vdb" --as base ! read "$out/standing150.vdb" --as small \
-  ! patch @base --at 0.784,0.405,0.323 --size 0.15,0.12 --rotate 20 --height 0.15 --as back \
+  ! patch @base --at 0.82,0.37,0.32 --size 0.12,0.1 --rotate 20 --height 0.11 --as back \
   ! texture @base @small @back --sink 2vx --blend 2vx --voxel 0.003
 row recursion-2 "'2'" particles voxel_size cpu_s.setup cpu_s.mapping points min_jacobian
 picture recursion-1 --from 2.7,1.5,2.5 --to 0,-0.1,0
