@@ -15,4 +15,4 @@ map starfish-55 read "$out/bunny200.vdb" --as base ! read "$out/starfish.vdb" --
   ! texture @base @starfish @places --skip-folds --blend 1vx --voxel 0.0075
 row starfish-55 patches particles cpu_s.setup cpu_s.certificate cpu_s.mapping points cpu_s.distance cpu_s.merging
 picture starfish-55 --from 2.7,1.5,2.5 --to 0,-0.1,0
-sheet starfish 1 "starfish-55=fifty-five starfish"
+sheet starfish 1 "starfish-55=starfish strewn over a bunny"
