@@ -7,291 +7,20 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <set>
 
 #include "levelset/error.h"
 #include "levelset/files/mesh_parts.h"
-
-// The Polygon File Format: Greg Turk, "The PLY Polygon File Format", Stanford 1994.
+#include "levelset/files/ply_header.h"
 
 namespace levelset {
 namespace {
 
-constexpr std::size_t kMaxHeader = 1 << 20;
-
-enum class Type { Int8, Uint8, Int16, Uint16, Int32, Uint32, Float, Double };
-enum class Role { Skip, X, Y, Z, Nx, Ny, Nz, U, V, Red, Green, Blue, Alpha, Corners };
-constexpr std::size_t kRoles = static_cast<std::size_t>(Role::Corners) + 1;
-enum class Encoding { Ascii, Little, Big };
-
-constexpr bool isAttribute(Role role) {
-  return role >= Role::Nx && role <= Role::Alpha;
-}
-
-constexpr std::size_t sizeOf(Type type) {
-  constexpr std::size_t sizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
-  return sizes[static_cast<int>(type)];
-}
-
-struct Property {
-  Type type;
-  std::optional<Type> listCount;  // set for a list
-  Role role = Role::Skip;
-  int family = 0;  // of texture coordinates: which of the pairs of names
-};
-
-struct Element {
-  std::string name;
-  std::size_t count = 0;
-  std::vector<Property> properties;
-
-  [[nodiscard]] bool has(Role role) const {
-    return std::any_of(properties.begin(), properties.end(),
-                       [role](const Property& p) { return p.role == role; });
-  }
-  [[nodiscard]] bool holdsVertices() const { return has(Role::X); }
-  [[nodiscard]] bool holdsFaces() const { return has(Role::Corners); }
-  [[nodiscard]] bool holdsNormals() const {
-    return has(Role::Nx) && has(Role::Ny) && has(Role::Nz);
-  }
-  [[nodiscard]] bool holdsUvs() const { return has(Role::U) && has(Role::V); }
-  [[nodiscard]] bool holdsColors() const {
-    return has(Role::Red) && has(Role::Green) && has(Role::Blue);
-  }
-  /// The widest type among the properties from one role to another.
-  [[nodiscard]] Type widest(Role from, Role to) const {
-    Type widest = Type::Int8;
-    for (const Property& p : properties)
-      if (p.role >= from && p.role <= to) widest = std::max(widest, p.type);
-    return widest;
-  }
-  /// Bytes that one element takes at least.
-  [[nodiscard]] std::size_t leastSize(Encoding encoding) const {
-    std::size_t size = 0;
-    for (const Property& p : properties)
-      size += encoding == Encoding::Ascii ? 2 : sizeOf(p.listCount.value_or(p.type));
-    return size;
-  }
-};
-
-struct Header {
-  Encoding encoding = Encoding::Ascii;
-  std::vector<Element> elements;
-  std::size_t size = 0;   // bytes, up to the data
-  std::size_t lines = 0;  // of text
-  std::set<std::string> leftAside = {};
-};
-
-// === Header
-
-std::vector<std::string_view> words(std::string_view line) {
-  std::vector<std::string_view> result;
-  std::size_t i = 0;
-  while (i < line.size()) {
-    const std::size_t begin = line.find_first_not_of(" \t\r", i);
-    if (begin == std::string_view::npos) break;
-    i = std::min(line.find_first_of(" \t\r", begin), line.size());
-    result.push_back(line.substr(begin, i - begin));
-  }
-  return result;
-}
-
-class HeaderReader {
- public:
-  HeaderReader(std::string_view input, const std::string& name) : input_(input), name_(name) {}
-
-  Header read() {
-    if (input_.starts_with("\xEF\xBB\xBF")) offset_ = 3;  // byte order mark
-    if (words(nextLine()) != std::vector<std::string_view>{"ply"})
-      failFile(name_, "does not begin with 'ply'; give its true format");
-    for (;;) {
-      const auto line = words(nextLine());
-      if (line.empty() || line[0] == "comment" || line[0] == "obj_info") continue;
-      if (line[0] == "end_header") break;
-      if (line[0] == "format")
-        readFormat(line);
-      else if (line[0] == "element")
-        readElement(line);
-      else if (line[0] == "property")
-        readProperty(line);
-      else
-        fail(fmt::format("'{}' is no word of a PLY header", line[0]));
-    }
-    if (!formatSeen_) fail("the header names no format");
-    for (Element& element : header_.elements) chooseUvs(element);
-    header_.size = offset_;
-    return std::move(header_);
-  }
-
- private:
-  [[noreturn]] void fail(const std::string& what) const {
-    failAt(name_, {"line", header_.lines}, what + "; export the mesh again");
-  }
-
-  std::string_view nextLine() {
-    const std::size_t end = input_.substr(0, kMaxHeader).find('\n', offset_);
-    ++header_.lines;
-    if (end == std::string_view::npos) {
-      if (header_.lines == 1) failFile(name_, "does not begin with 'ply'; give its true format");
-      fail("the header has no end");
-    }
-    const std::string_view line = input_.substr(offset_, end - offset_);
-    offset_ = end + 1;
-    return line;
-  }
-
-  void readFormat(const std::vector<std::string_view>& line) {
-    const std::string_view format = line.size() > 1 ? line[1] : "";
-    if (format == "ascii")
-      header_.encoding = Encoding::Ascii;
-    else if (format == "binary_little_endian")
-      header_.encoding = Encoding::Little;
-    else if (format == "binary_big_endian")
-      header_.encoding = Encoding::Big;
-    else
-      fail(fmt::format("the format '{}' is not known", format));
-    formatSeen_ = true;
-  }
-
-  void readElement(const std::vector<std::string_view>& line) {
-    Element element;
-    if (line.size() < 3) fail("an element needs a name and a count");
-    element.name = line[1];
-    const auto [end, error] =
-        std::from_chars(line[2].data(), line[2].data() + line[2].size(), element.count);
-    if (error != std::errc{} || end != line[2].data() + line[2].size())
-      fail(fmt::format("'{}' is no count of elements", line[2]));
-    if (element.name == "vertex")
-      for (const Element& other : header_.elements)
-        if (other.name == element.name) fail("the element 'vertex' comes twice");
-    header_.elements.push_back(std::move(element));
-  }
-
-  /// The first pair of names that is whole.
-  static void chooseUvs(Element& element) {
-    const auto holds = [&](Role role, int family) {
-      return std::any_of(element.properties.begin(), element.properties.end(),
-                         [&](const Property& p) { return p.role == role && p.family == family; });
-    };
-    int chosen = 0;
-    for (const Property& p : element.properties)
-      if (!chosen && p.family && holds(Role::U, p.family) && holds(Role::V, p.family))
-        chosen = p.family;
-    for (Property& p : element.properties)
-      if (p.family && p.family != chosen) p.role = Role::Skip;
-  }
-
-  Type readType(std::string_view word) const {
-    constexpr std::pair<const char*, Type> names[] = {
-        {"char", Type::Int8},     {"int8", Type::Int8},     {"uchar", Type::Uint8},
-        {"uint8", Type::Uint8},   {"short", Type::Int16},   {"int16", Type::Int16},
-        {"ushort", Type::Uint16}, {"uint16", Type::Uint16}, {"int", Type::Int32},
-        {"int32", Type::Int32},   {"uint", Type::Uint32},   {"uint32", Type::Uint32},
-        {"float", Type::Float},   {"float32", Type::Float}, {"double", Type::Double},
-        {"float64", Type::Double}};
-    for (const auto& [name, type] : names)
-      if (word == name) return type;
-    fail(fmt::format("the type '{}' is not known", word));
-  }
-
-  void readProperty(const std::vector<std::string_view>& line) {
-    if (header_.elements.empty()) fail("a property stands before the first element");
-    Element& element = header_.elements.back();
-    const bool list = line.size() > 1 && line[1] == "list";
-    if (line.size() < (list ? 5u : 3u)) fail("a property needs a type and a name");
-    const std::string_view name = line[list ? 4 : 2];
-    Property property{readType(line[list ? 3 : 1]), {}, Role::Skip};
-    if (list) property.listCount = readType(line[2]);
-    property.role = roleOf(element.name, name, list);
-    if (property.role == Role::U || property.role == Role::V) property.family = familyOf(name);
-    const auto isSame = [&](const Property& other) {
-      return other.role == property.role && other.family == property.family;
-    };
-    if (property.role != Role::Skip &&
-        std::any_of(element.properties.begin(), element.properties.end(), isSame)) {
-      if (isAttribute(property.role))
-        property.role = Role::Skip;  // the first counts
-      else
-        fail(fmt::format("the property '{}' comes twice", name));
-    }
-    if (property.role >= Role::Red && property.role <= Role::Alpha && !isColorType(property.type))
-      property.role = Role::Skip;
-    if (element.name == "face") noteOfFaces(name);
-    element.properties.push_back(property);
-  }
-
-  static int familyOf(std::string_view name) { return name.size() > 1 ? 3 : name < "u" ? 2 : 1; }
-
-  void noteOfFaces(std::string_view name) {
-    if (name == "texcoord") header_.leftAside.insert("texture coordinates of faces");
-    if (name == "red" || name == "green" || name == "blue")
-      header_.leftAside.insert("colours of faces");
-    if (name == "nx" || name == "ny" || name == "nz") header_.leftAside.insert("normals of faces");
-  }
-
-  static Role roleOf(std::string_view element, std::string_view name, bool list) {
-    if (element == "face" && list && (name == "vertex_indices" || name == "vertex_index"))
-      return Role::Corners;
-    if (element == "vertex" && !list && name.size() == 1) {
-      if (name == "x") return Role::X;
-      if (name == "y") return Role::Y;
-      if (name == "z") return Role::Z;
-    }
-    if (element == "vertex" && !list)
-      for (const auto& [known, role] : kAttributes)
-        if (name == known) return role;
-    return Role::Skip;
-  }
-
-  /// Those of which it is plain what is full.
-  static bool isColorType(Type type) {
-    return type == Type::Uint8 || type == Type::Uint16 || type >= Type::Float;
-  }
-  static constexpr std::pair<std::string_view, Role> kAttributes[] = {
-      {"nx", Role::Nx},       {"ny", Role::Ny},   {"nz", Role::Nz},       {"u", Role::U},
-      {"v", Role::V},         {"s", Role::U},     {"t", Role::V},         {"texture_u", Role::U},
-      {"texture_v", Role::V}, {"red", Role::Red}, {"green", Role::Green}, {"blue", Role::Blue},
-      {"alpha", Role::Alpha}};
-
-  std::string_view input_;
-  const std::string& name_;
-  Header header_;
-  std::size_t offset_ = 0;
-  bool formatSeen_ = false;
-};
-
-/// Nothing promises more than the file can hold.
-void checkPromises(const Header& header, std::size_t dataSize, const std::string& name) {
-  std::size_t left = dataSize + 1;  // the last line of a text may lack its end
-  for (const Element& element : header.elements) {
-    const std::size_t least = element.leastSize(header.encoding);
-    if (least == 0) continue;
-    if (element.count > left / least) {
-      failFile(name,
-               fmt::format("promises {} elements '{}', more than its {} bytes of data can hold; "
-                           "it was cut off or its header is damaged: fetch or export it again",
-                           element.count, element.name, dataSize));
-    }
-    left -= element.count * least;
-  }
-}
-
-/// What a mesh needs is there, and the file may hold it.
-void checkHeader(const Header& header, std::size_t dataSize, const std::string& name) {
-  checkPromises(header, dataSize, name);
-  bool vertices = false, faces = false;
-  for (const Element& element : header.elements) {
-    if (element.has(Role::X) && element.has(Role::Y) && element.has(Role::Z)) vertices = true;
-    faces = faces || element.holdsFaces();
-  }
-  if (!vertices) failFile(name, "has no element 'vertex' with x, y and z; export the mesh again");
-  if (!faces) {
-    failFile(name,
-             "has no element 'face' with a list 'vertex_indices'; export the mesh with its faces");
-  }
-}
-
-// === Data
+using ply::Element;
+using ply::Encoding;
+using ply::Header;
+using ply::Property;
+using ply::Role;
+using ply::Type;
 
 template <typename T>
 T load(const char* p, bool swap) {
@@ -316,9 +45,9 @@ class BinarySource {
   [[nodiscard]] const char* at() const { return p_; }
 
   double value(Type type) {
-    require(sizeOf(type));
+    require(ply::sizeOf(type));
     const char* p = p_;
-    p_ += sizeOf(type);
+    p_ += ply::sizeOf(type);
     switch (type) {
       case Type::Int8:
         return static_cast<signed char>(*p);
@@ -341,11 +70,11 @@ class BinarySource {
   }
   void skip(Type type, std::size_t count) {
     requireList(type, count);
-    p_ += count * sizeOf(type);
+    p_ += count * ply::sizeOf(type);
   }
   /// A list of `count` values is there.
   void requireList(Type type, std::size_t count) {
-    if (count > static_cast<std::size_t>(end_ - p_) / sizeOf(type)) failShort();
+    if (count > static_cast<std::size_t>(end_ - p_) / ply::sizeOf(type)) failShort();
   }
 
  private:
@@ -471,7 +200,7 @@ class ElementReader {
       const bool isWhole = property.type < Type::Float;
       const bool isColor = property.role >= Role::Red && property.role <= Role::Alpha;
       of(property.role) = isColor && isWhole && hasColors_ ? share(value, property.type) : value;
-      if (property.type == Type::Float && isAttribute(property.role)) requireFloat(value);
+      if (property.type == Type::Float && ply::isAttribute(property.role)) requireFloat(value);
       return;
     }
     const std::size_t count =
@@ -516,7 +245,7 @@ class ElementReader {
 
   Source& source_;
   MeshBuilder& builder_;
-  std::array<double, kRoles> values_ = {};
+  std::array<double, ply::kRoles> values_ = {};
   bool hasNormals_ = false, hasUvs_ = false, hasColors_ = false;
   std::vector<std::uint64_t> corners_;
 };
@@ -535,7 +264,7 @@ bool skipAttributes(Header& header) {
   bool any = false;
   for (Element& element : header.elements)
     for (Property& p : element.properties)
-      if (isAttribute(p.role)) {
+      if (ply::isAttribute(p.role)) {
         p.role = Role::Skip;
         any = true;
       }
@@ -558,7 +287,7 @@ void reserveElements(const Header& header, std::size_t dataSize, MeshBuilder& bu
     for (const Property& p : element.properties) {
       if (p.role != Role::Corners) continue;
       const bool ascii = header.encoding == Encoding::Ascii;
-      const std::size_t least = ascii ? 8 : sizeOf(*p.listCount) + 3 * sizeOf(p.type);
+      const std::size_t least = ascii ? 8 : ply::sizeOf(*p.listCount) + 3 * ply::sizeOf(p.type);
       triangles = std::min(element.count, dataSize / least + 1);
     }
   }
@@ -568,14 +297,14 @@ void reserveElements(const Header& header, std::size_t dataSize, MeshBuilder& bu
 }  // namespace
 
 void readPly(std::string_view input, MeshBuilder& builder) {
-  Header header = HeaderReader(input, builder.name()).read();
+  Header header = ply::readHeader(input, builder.name());
   if (builder.wantsAttributes()) {
     for (const std::string& what : header.leftAside) builder.leaveAside(what);
   } else if (skipAttributes(header)) {
     builder.dropAttributes();
   }
   const std::string_view data = input.substr(header.size);
-  checkHeader(header, data.size(), builder.name());
+  ply::checkHeader(header, data.size(), builder.name());
   reserveElements(header, data.size(), builder);
   constexpr bool kLittle = std::endian::native == std::endian::little;
   switch (header.encoding) {
@@ -589,21 +318,21 @@ void readPly(std::string_view input, MeshBuilder& builder) {
 }
 
 bool plyHoldsTriangles(std::string_view head, std::size_t fileSize, const std::string& name) {
-  const Header header = HeaderReader(head, name).read();
+  const Header header = ply::readHeader(head, name);
   const bool ascii = header.encoding == Encoding::Ascii;
   double promised = 0;
   for (const Element& element : header.elements) {
     std::size_t least = element.leastSize(header.encoding);
     for (const Property& p : element.properties)
-      if (p.role == Role::Corners) least += 3 * (ascii ? 2 : sizeOf(p.type));
+      if (p.role == Role::Corners) least += 3 * (ascii ? 2 : ply::sizeOf(p.type));
     promised += static_cast<double>(element.count) * static_cast<double>(least);
   }
   return promised <= static_cast<double>(fileSize) - static_cast<double>(header.size) + 1;
 }
 
 MeshFileInfo plyInfo(std::string_view head, std::size_t fileSize, const std::string& name) {
-  const Header header = HeaderReader(head, name).read();
-  if (fileSize > 0) checkPromises(header, fileSize - header.size, name);
+  const Header header = ply::readHeader(head, name);
+  if (fileSize > 0) ply::checkPromises(header, fileSize - header.size, name);
   constexpr const char* kEncodings[] = {"ascii", "binary little endian", "binary big endian"};
   MeshFileInfo info{fmt::format("ply, {}", kEncodings[static_cast<int>(header.encoding)]), 0, 0};
   for (const Element& element : header.elements) {

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// What a PLY file promises: Greg Turk, "The PLY Polygon File Format", Stanford 1994.
+namespace levelset::ply {
+
+enum class Type { Int8, Uint8, Int16, Uint16, Int32, Uint32, Float, Double };
+enum class Role { Skip, X, Y, Z, Nx, Ny, Nz, U, V, Red, Green, Blue, Alpha, Corners };
+constexpr std::size_t kRoles = static_cast<std::size_t>(Role::Corners) + 1;
+enum class Encoding { Ascii, Little, Big };
+
+constexpr bool isAttribute(Role role) {
+  return role >= Role::Nx && role <= Role::Alpha;
+}
+
+constexpr std::size_t sizeOf(Type type) {
+  constexpr std::size_t sizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+  return sizes[static_cast<int>(type)];
+}
+
+/// Of an element, in the order of the data.
+struct Property {
+  Type type;
+  std::optional<Type> listCount;  ///< set for a list
+  Role role = Role::Skip;
+  int family = 0;  ///< of texture coordinates: which of the pairs of names
+};
+
+struct Element {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<Property> properties;
+
+  [[nodiscard]] bool has(Role role) const {
+    return std::any_of(properties.begin(), properties.end(),
+                       [role](const Property& p) { return p.role == role; });
+  }
+  [[nodiscard]] bool holdsVertices() const { return has(Role::X); }
+  [[nodiscard]] bool holdsFaces() const { return has(Role::Corners); }
+  [[nodiscard]] bool holdsNormals() const {
+    return has(Role::Nx) && has(Role::Ny) && has(Role::Nz);
+  }
+  [[nodiscard]] bool holdsUvs() const { return has(Role::U) && has(Role::V); }
+  [[nodiscard]] bool holdsColors() const {
+    return has(Role::Red) && has(Role::Green) && has(Role::Blue);
+  }
+  /// The widest type among the properties from one role to another.
+  [[nodiscard]] Type widest(Role from, Role to) const {
+    Type widest = Type::Int8;
+    for (const Property& p : properties)
+      if (p.role >= from && p.role <= to) widest = std::max(widest, p.type);
+    return widest;
+  }
+  /// Bytes that one element takes at least.
+  [[nodiscard]] std::size_t leastSize(Encoding encoding) const {
+    std::size_t size = 0;
+    for (const Property& p : properties)
+      size += encoding == Encoding::Ascii ? 2 : sizeOf(p.listCount.value_or(p.type));
+    return size;
+  }
+};
+
+struct Header {
+  Encoding encoding = Encoding::Ascii;
+  std::vector<Element> elements;
+  std::size_t size = 0;                  ///< bytes, up to the data
+  std::size_t lines = 0;                 ///< of text
+  std::set<std::string> leftAside = {};  ///< what a mesh might carry and ours do not
+};
+
+/// @param input  the whole file, or its beginning with the header in it
+/// @throws InvalidInput with the line
+[[nodiscard]] Header readHeader(std::string_view input, const std::string& name);
+
+/// Nothing promises more than the file can hold.
+/// @throws InvalidInput
+void checkPromises(const Header& header, std::size_t dataSize, const std::string& name);
+
+/// What a mesh needs is there, and the file may hold it.
+/// @throws InvalidInput
+void checkHeader(const Header& header, std::size_t dataSize, const std::string& name);
+
+}  // namespace levelset::ply
