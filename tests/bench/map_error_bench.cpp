@@ -13,37 +13,28 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <ctime>
 #include <random>
 #include <vector>
 
-#include "mapping/maps/rbf_map.h"
 #include "mapping/maps/shell_map.h"
-#include "mapping/patches/patch.h"
+#include "mapping/textures/geometric_texture.h"
+#include "tests/bench/wall.h"
 
 namespace {
 
 using Imath::V3d;
 using mapping::GridBlock;
+using wall::kAngle;
+using wall::kHeight;
+using wall::kInner;
+using wall::kLength;
+using wall::kTextureVoxels;
+using wall::kTolerance;
+using wall::now;
 
-constexpr int kPlaces = 2000;           // to ask for the error
-constexpr double kTextureVoxels = 256;  // along the unit cube
-constexpr double kTolerance = 0.05;     // texture voxels
+constexpr int kPlaces = 2000;  // to ask for the error
 // Particles times points up to which a direct sum runs whole, and of the sample beyond.
 constexpr double kWhole = 1.1e11, kSampled = 1e10;
-constexpr double kAngle = 2.1, kLength = 4.2, kInner = 2, kHeight = 0.6;
-
-/// CPU seconds.
-double now() {
-  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
-
-/// A wall that is a little wavy, so that no map is exact.
-V3d onWall(const V3d& uvw) {
-  const double angle = kAngle * (uvw.x - 0.5) + 0.02 * std::sin(7 * uvw.y),
-               r = kInner + kHeight * uvw.z;
-  return {r * std::sin(angle), kLength * uvw.y + 0.05 * std::sin(9 * uvw.x), r * std::cos(angle)};
-}
 
 /// The exact u, v, w of a place, to rounding: the waves are so small that the fixed point is found.
 V3d fromWall(const V3d& x) {
@@ -56,47 +47,17 @@ V3d fromWall(const V3d& x) {
   return uvw;
 }
 
-mapping::Patch makePatch(std::size_t particles) {
-  // As far apart across the wall as along it.
-  const auto wanted = static_cast<double>(particles);
-  const double spacing = std::cbrt(kLength * kLength * kHeight / wanted);
-  const double levels = std::max(4.0, std::round(kHeight / spacing) + 1);
-  const auto side = static_cast<std::size_t>(std::round(std::sqrt(wanted / levels)));
-  mapping::Patch patch;
-  patch.height = kHeight;
-  for (double k = 0; k < levels; ++k) {
-    mapping::ParticleLevel level;
-    level.columns = level.rows = side;
-    level.w = k / (levels - 1);
-    for (std::size_t j = 0; j < side; ++j)
-      for (std::size_t i = 0; i < side; ++i)
-        level.positions.push_back(
-            onWall({static_cast<double>(i) / static_cast<double>(side - 1),
-                    static_cast<double>(j) / static_cast<double>(side - 1), level.w}));
-    patch.levels.push_back(std::move(level));
-  }
-  return patch;
+/// As far apart across the wall as along it.
+mapping::Patch makePatch(double particles) {
+  const double spacing = std::cbrt(kLength * kLength * kHeight / particles);
+  return wall::makePatch(particles, std::max(4.0, std::round(kHeight / spacing) + 1));
 }
 
 mapping::RbfMap solve(const mapping::Patch& patch) {
-  std::vector<V3d> places, targets;
-  for (const mapping::ParticleLevel& level : patch.levels)
-    for (std::size_t j = 0; j < level.rows; ++j)
-      for (std::size_t i = 0; i < level.columns; ++i) {
-        places.push_back(level.at(i, j));
-        targets.emplace_back(static_cast<double>(i) / static_cast<double>(level.columns - 1),
-                             static_cast<double>(j) / static_cast<double>(level.rows - 1), level.w);
-      }
   mapping::RbfMapOptions options;
   options.lambdaNear = options.lambdaFar = 0;
   options.solveTolerance = 0.1 * kTolerance / kTextureVoxels;
-  return {places, targets, std::vector<char>(places.size(), 1), options};
-}
-
-bool isInWall(const V3d& center) {
-  const double r = std::hypot(center.x, center.z);
-  return r > kInner && r < kInner + kHeight && std::abs(std::atan2(center.x, center.z)) < 1.05 &&
-         center.y > 0 && center.y < kLength;
+  return mapping::patchToTexture(patch, options);
 }
 
 /// Evaluates the leaf blocks of the wall, all of them or a share.
@@ -113,7 +74,7 @@ struct Run {
       for (int bits = 0; bits < 8; ++bits) descend(block.octant(bits), *map.octant(bits));
       return;
     }
-    if (!isInWall(block.center())) return;
+    if (!wall::holds(block)) return;
     std::array<V3d, 512> uvw;
     (void)map.evaluate(uvw);
     points += 512;
@@ -125,7 +86,7 @@ struct Run {
       for (int bits = 0; bits < 8; ++bits) direct(block.octant(bits), map);
       return;
     }
-    if (!isInWall(block.center())) return;
+    if (!wall::holds(block)) return;
     points += 512;
     if (std::uniform_real_distribution<double>(0, 1)(random) >= share) return;
     timed += 512;
@@ -135,19 +96,6 @@ struct Run {
     seconds += now() - start;
   }
 };
-
-std::vector<GridBlock> rootsOf(double points) {
-  const double volume = kAngle * kLength * 0.5 * (2.6 * 2.6 - 2 * 2);
-  const double step = std::cbrt(volume / points);
-  Imath::M33d rows;
-  for (int i = 0; i < 3; ++i) rows[i][i] = step;
-  constexpr int kEdge = 64;
-  std::vector<GridBlock> roots;
-  for (double x = -2.7; x < 2.7; x += kEdge * step)
-    for (double y = -0.2; y < 4.4; y += kEdge * step)
-      for (double z = 0.7; z < 2.7; z += kEdge * step) roots.push_back({V3d(x, y, z), rows, kEdge});
-  return roots;
-}
 
 struct Error {
   double percent99 = 0, largest = 0;  ///< texture voxels
@@ -161,7 +109,7 @@ Error errorOf(const At& at) {
   std::vector<double> errors;
   for (int n = 0; n < kPlaces; ++n) {
     const double u = inside(random), v = inside(random), w = inside(random);
-    const V3d x = onWall({u, v, w});
+    const V3d x = wall::place({u, v, w});
     errors.push_back((at(x) - fromWall(x)).length() * kTextureVoxels);
   }
   std::sort(errors.begin(), errors.end());
@@ -190,7 +138,7 @@ int main(int argc, char** argv) {
   const double most = argc > 1 ? std::atof(argv[1]) : 1e8;
   fmt::print("map,particles,points,setup_s,mapping_s,error_99,error_max,sampled\n");
   for (const std::size_t particles : {1000, 10000, 100000}) {
-    const mapping::Patch patch = makePatch(particles);
+    const mapping::Patch patch = makePatch(static_cast<double>(particles));
     double start = now();
     const mapping::RbfMap rbf = solve(patch);
     const double solved = now() - start;
@@ -202,7 +150,7 @@ int main(int argc, char** argv) {
     const Error fast = errorOf([&](const V3d& x) { return fastAt(rbf, x, 0.005); });
     const Error straight = errorOf([&](const V3d& x) { return shell(x); });
     for (double points = 1e6; points <= most * 1.01; points *= 10) {
-      const std::vector<GridBlock> roots = rootsOf(points);
+      const std::vector<GridBlock> roots = wall::rootsOf(points);
       Run hybrid, sum, all;
       start = now();
       for (const GridBlock& root : roots) hybrid.descend(root, *shell.restrictTo(root, 0));

@@ -16,76 +16,28 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <ctime>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "mapping/maps/level_map.h"
-#include "mapping/maps/rbf_map.h"
 #include "mapping/maps/shell_map.h"
-#include "mapping/patches/patch.h"
+#include "mapping/textures/geometric_texture.h"
 #include "mapping/textures/mesh_texture.h"
+#include "tests/bench/wall.h"
 
 namespace {
 
 using Imath::V3d;
 using mapping::GridBlock;
+using mapping::patchToTexture;
+using wall::kTextureVoxels;
+using wall::kTolerance;
+using wall::now;
 
-constexpr double kTextureVoxels = 256;  // along the unit cube
-constexpr double kTolerance = 0.05;     // texture voxels
 constexpr int kDirectShare = 100;
 
-/// CPU seconds.
-double now() {
-  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
-
-V3d onCylinder(const V3d& uvw) {
-  // Not quite regular, as relaxed particles are not.
-  const double angle = 2.1 * (uvw.x - 0.5) + 0.02 * std::sin(7 * uvw.y), r = 2 + 0.6 * uvw.z;
-  return {r * std::sin(angle), 4.2 * uvw.y + 0.05 * std::sin(9 * uvw.x), r * std::cos(angle)};
-}
-
-mapping::Patch makePatch(std::size_t particles) {
-  constexpr std::size_t kLevels = 6;
-  const auto side = static_cast<std::size_t>(
-      std::max(4.0, std::round(std::sqrt(static_cast<double>(particles) / kLevels))));
-  mapping::Patch patch;
-  patch.height = 0.6;
-  for (std::size_t k = 0; k < kLevels; ++k) {
-    mapping::ParticleLevel level;
-    level.columns = level.rows = side;
-    level.w = static_cast<double>(k) / (kLevels - 1);
-    for (std::size_t j = 0; j < side; ++j)
-      for (std::size_t i = 0; i < side; ++i)
-        level.positions.push_back(
-            onCylinder({static_cast<double>(i) / static_cast<double>(side - 1),
-                        static_cast<double>(j) / static_cast<double>(side - 1), level.w}));
-    patch.levels.push_back(std::move(level));
-  }
-  return patch;
-}
-
-/// Grid points of the leaf blocks within the wall.
-struct Grid {
-  Imath::M33d rows;
-  std::vector<V3d> roots;
-  explicit Grid(double points) {
-    const double volume = 2.1 * 4.2 * 0.5 * (2.6 * 2.6 - 2 * 2);
-    const double step = std::cbrt(volume / points);
-    for (int i = 0; i < 3; ++i) rows[i][i] = step;
-    constexpr int kEdge = 64;
-    for (double x = -2.7; x < 2.7; x += kEdge * step)
-      for (double y = -0.2; y < 4.4; y += kEdge * step)
-        for (double z = 0.7; z < 2.7; z += kEdge * step) roots.emplace_back(x, y, z);
-  }
-};
-
-bool isInWall(const GridBlock& block) {
-  const V3d c = block.center();
-  const double r = std::hypot(c.x, c.z);
-  return r > 2 && r < 2.6 && std::abs(std::atan2(c.x, c.z)) < 1.05 && c.y > 0 && c.y < 4.2;
-}
+constexpr double kLevels = 6;
 
 struct Cost {
   double points = 0, seconds = 0, directPoints = 0, directSeconds = 0, operations = 0, worst = 0;
@@ -102,7 +54,7 @@ void descend(const GridBlock& block, const mapping::BlockMap& map, Cost& cost,
       descend(block.octant(bits), *map.octant(bits), cost, direct);
     return;
   }
-  if (!isInWall(block)) return;
+  if (!wall::holds(block)) return;
   std::array<V3d, 512> uvw;
   cost.operations += static_cast<double>(map.evaluate(uvw));
   cost.points += 512;
@@ -110,11 +62,11 @@ void descend(const GridBlock& block, const mapping::BlockMap& map, Cost& cost,
 }
 
 template <typename Direct>
-Cost run(const mapping::PatchMap& map, const Grid& grid, double tolerance, const Direct& direct) {
+Cost run(const mapping::PatchMap& map, std::span<const GridBlock> grid, double tolerance,
+         const Direct& direct) {
   Cost cost;
   const double start = now();
-  for (const V3d& origin : grid.roots) {
-    const GridBlock block{origin, grid.rows, 64};
+  for (const GridBlock& block : grid) {
     descend(block, *map.restrictTo(block, tolerance), cost,
             [&](const GridBlock& at, const std::array<V3d, 512>& uvw) { direct(at, uvw, cost); });
   }
@@ -127,38 +79,24 @@ void report(const char* name, const Cost& cost) {
              cost.points, 1e9 * cost.seconds / cost.points, cost.operations / cost.points);
 }
 
-/// The RBF map of a patch.
-mapping::RbfMap solve(const mapping::Patch& patch, const mapping::RbfMapOptions& options) {
-  std::vector<V3d> places, targets;
-  std::vector<char> near;
-  for (const mapping::ParticleLevel& level : patch.levels)
-    for (std::size_t j = 0; j < level.rows; ++j)
-      for (std::size_t i = 0; i < level.columns; ++i) {
-        places.push_back(level.at(i, j));
-        targets.emplace_back(static_cast<double>(i) / static_cast<double>(level.columns - 1),
-                             static_cast<double>(j) / static_cast<double>(level.rows - 1), level.w);
-        near.push_back(level.w == 0);
-      }
-  return {places, targets, near, options};
-}
-
 void compareKernels(double points) {
   constexpr std::array kNames = {"biharmonic", "triharmonic", "thin-plate",
                                  "sum",        "laplacian",   "gaussian"};
-  const mapping::Patch patch = makePatch(2000);
-  const Grid grid(points);
+  const mapping::Patch patch = wall::makePatch(2000, kLevels);
+  const std::vector<GridBlock> grid = wall::rootsOf(points);
   for (std::size_t n = 0; n < kNames.size(); ++n) {
-    const mapping::RbfMap map = solve(patch, {.kernel = static_cast<mapping::RbfKernel>(n)});
+    const mapping::RbfMap map =
+        patchToTexture(patch, {.kernel = static_cast<mapping::RbfKernel>(n)});
     report(kNames[n], run(map, grid, kTolerance / kTextureVoxels,
                           [](const GridBlock&, const std::array<V3d, 512>&, Cost&) {}));
   }
 }
 
 void solveMany(std::size_t particles) {
-  const mapping::Patch patch = makePatch(particles);
+  const mapping::Patch patch = wall::makePatch(static_cast<double>(particles), kLevels);
   const double start = now();
   const auto wallStart = std::chrono::steady_clock::now();
-  const mapping::RbfMap map = solve(patch, {.denseLimit = 0});
+  const mapping::RbfMap map = patchToTexture(patch, {.denseLimit = 0});
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - wallStart;
   const mapping::RbfSolveReport& report = map.solveReport();
   fmt::print(
@@ -174,11 +112,11 @@ int main(int argc, char** argv) {
   oneThread.emplace(tbb::global_control::max_allowed_parallelism, 1);
   const auto particles = static_cast<std::size_t>(argc > 1 ? std::atol(argv[1]) : 10000);
   const double points = argc > 2 ? std::atof(argv[2]) : 1e7;
-  const mapping::Patch patch = makePatch(particles);
-  const Grid grid(points);
+  const mapping::Patch patch = wall::makePatch(static_cast<double>(particles), kLevels);
+  const std::vector<GridBlock> grid = wall::rootsOf(points);
 
   double start = now();
-  const mapping::RbfMap rbf = solve(patch, {.denseLimit = particles + 1000});
+  const mapping::RbfMap rbf = patchToTexture(patch, {.denseLimit = particles + 1000});
   fmt::print("{} particles, solved in {:.1f} s\n", rbf.size(), now() - start);
 
   // Every particle at every grid point, with the same vector code.

@@ -64,4 +64,9 @@ std::string refusal(Action action) {
   return {};
 }
 
+inline bool says(const std::string& sentence, const std::string& part) {
+  return sentence.find(part) != std::string::npos;
+}
+#define EXPECT_SAYS(sentence, part) EXPECT_PRED2(support::says, sentence, part)
+
 }  // namespace support

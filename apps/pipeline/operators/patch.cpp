@@ -96,14 +96,7 @@ std::array<V3d, 4> cornersOf(Invocation& in) {
     const std::vector<V3d> points = in.points("corners");
     return {points[0], points[1], points[2], points[3]};
   }
-  const std::vector<double> size = in.lengths("size");
-  for (const double side : size) {
-    if (side > 10 * in.operands[0].diagonal()) {
-      throw levelset::InvalidInput(fmt::format(
-          "{}: --size {} is over ten times the solid's diagonal of {:.6g}; make it smaller",
-          in.op().name, in.text("size"), in.operands[0].diagonal()));
-    }
-  }
+  const std::array<double, 2> size = patchSizeOf(in);
   return mapping::cornersAround(in.band(), in.point("at"), size[0], size[1], in.radians("rotate"));
 }
 
@@ -164,12 +157,6 @@ PatchGridResult asSet(mapping::PatchResult result) {
   set.patches.push_back(std::move(result.patch));
   set.report = result.report;
   return set;
-}
-
-std::vector<mapping::PatchOutline> outlinesOf(const std::vector<mapping::Patch>& patches) {
-  std::vector<mapping::PatchOutline> outlines;
-  for (const mapping::Patch& one : patches) outlines.push_back(mapping::outlineOf(one));
-  return outlines;
 }
 
 /// For a patch that stands elsewhere than it did: a spline goes with it, corners that have come to

@@ -88,6 +88,24 @@ mapping::PatchOptions patchOptionsOf(Invocation& in) {
   return options;
 }
 
+std::array<double, 2> patchSizeOf(Invocation& in) {
+  const std::vector<double> size = in.lengths("size");
+  for (const double side : size) {
+    if (side > 10 * in.operands[0].diagonal()) {
+      throw levelset::InvalidInput(fmt::format(
+          "{}: --size {} is over ten times the solid's diagonal of {:.6g}; make it smaller",
+          in.op().name, in.text("size"), in.operands[0].diagonal()));
+    }
+  }
+  return {size[0], size[1]};
+}
+
+std::vector<mapping::PatchOutline> outlinesOf(const std::vector<mapping::Patch>& patches) {
+  std::vector<mapping::PatchOutline> outlines;
+  for (const mapping::Patch& one : patches) outlines.push_back(mapping::outlineOf(one));
+  return outlines;
+}
+
 void tellOrigin(const Invocation& in, PatchRecipe& recipe) {
   recipe.action = in.op().name;
   const auto written = [&](const Param& param) -> std::string {

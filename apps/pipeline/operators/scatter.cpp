@@ -39,14 +39,7 @@ mapping::ScatterOptions scatterOptions(Invocation& in) {
   options.density.seed = static_cast<std::uint64_t>(in.integer("seed"));
   options.density.progress = in.progress;
   options.density.maxMemory = in.maxMemory;
-  const std::vector<double> size = in.lengths("size");
-  for (const double side : size) {
-    if (side > 10 * in.operands[0].diagonal()) {
-      throw levelset::InvalidInput(fmt::format(
-          "scatter: --size {} is over ten times the solid's diagonal of {:.6g}; make it smaller",
-          in.text("size"), in.operands[0].diagonal()));
-    }
-  }
+  const std::array<double, 2> size = patchSizeOf(in);
   options.uSize = size[0];
   options.vSize = size[1];
   if (in.given("along")) options.direction = vectorField(in, "along");
@@ -64,11 +57,7 @@ std::shared_ptr<const PatchRecipe> recipeOf(const Invocation& in,
                                             const mapping::PatchOptions& options) {
   PatchRecipe recipe;
   tellOrigin(in, recipe);
-  recipe.outlines = [](const std::vector<mapping::Patch>& patches) {
-    std::vector<mapping::PatchOutline> outlines;
-    for (const mapping::Patch& patch : patches) outlines.push_back(mapping::outlineOf(patch));
-    return outlines;
-  };
+  recipe.outlines = outlinesOf;
   recipe.make = [sites, options](const levelset::NarrowBand& base,
                                  std::span<const mapping::Footprint> footprints,
                                  std::span<const mapping::Footprint>,

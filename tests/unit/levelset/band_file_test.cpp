@@ -24,10 +24,6 @@ using support::refusal;
 using support::TemporaryFolder;
 namespace fs = std::filesystem;
 
-bool says(const std::string& sentence, const std::string& part) {
-  return sentence.find(part) != std::string::npos;
-}
-
 NarrowBand sphere(double radius = 4, double voxelSize = 0.5) {
   const Imath::Box3d box(Imath::V3d(-radius), Imath::V3d(radius));
   return support::sampleBand([=](const Imath::V3d& p) { return p.length() - radius; }, box,
@@ -215,15 +211,15 @@ TEST(BandFile, PicksTheOnlyLevelSet) {
     return refusal<InvalidInput>(
         [&] { static_cast<void>(readBand(folder / "a.vdb", {.grid = grid})); });
   };
-  EXPECT_PRED2(says, sentence("fog"), "not a level set");
-  EXPECT_PRED2(says, sentence("vectors"), "vec3s");
-  EXPECT_PRED2(says, sentence("none"), "'fog' (float, fog volume)");
+  EXPECT_SAYS(sentence("fog"), "not a level set");
+  EXPECT_SAYS(sentence("vectors"), "vec3s");
+  EXPECT_SAYS(sentence("none"), "'fog' (float, fog volume)");
   writeForeign(folder / "a.vdb", {gridOf(sphere(2), "a"), gridOf(sphere(2), "b")});
-  EXPECT_PRED2(says, sentence(""), "choose with --grid");
+  EXPECT_SAYS(sentence(""), "choose with --grid");
   writeForeign(folder / "a.vdb", {gridOf(sphere(2), "a"), gridOf(sphere(2), "a")});
-  EXPECT_PRED2(says, sentence("a"), "more than one grid of that name");
+  EXPECT_SAYS(sentence("a"), "more than one grid of that name");
   writeForeign(folder / "a.vdb", {fog});
-  EXPECT_PRED2(says, sentence(""), "no level set");
+  EXPECT_SAYS(sentence(""), "no level set");
 }
 
 TEST(BandFile, RefusesBandsThatAreNone) {
@@ -234,14 +230,14 @@ TEST(BandFile, RefusesBandsThatAreNone) {
   };
   auto grid = gridOf(sphere(), "a");
   grid->tree().setValueOn(openvdb::Coord(8, 0, 0), std::numeric_limits<float>::quiet_NaN());
-  EXPECT_PRED2(says, sentence(grid), "holds nan");
+  EXPECT_SAYS(sentence(grid), "holds nan");
   grid = gridOf(sphere(), "a");
   grid->transform().postScale(openvdb::Vec3d(1, 2, 1));
-  EXPECT_PRED2(says, sentence(grid), "scales its axes differently");
+  EXPECT_SAYS(sentence(grid), "scales its axes differently");
   grid = gridOf(sphere(), "a");
   grid->setTransform(openvdb::math::Transform::createFrustumTransform(
       openvdb::BBoxd(openvdb::Vec3d(0), openvdb::Vec3d(10)), 0.5, 10, 1));
-  EXPECT_PRED2(says, sentence(grid), "frustum");
+  EXPECT_SAYS(sentence(grid), "frustum");
 }
 
 TEST(BandFile, KeepsToTheMemoryLimit) {
@@ -263,11 +259,11 @@ TEST(BandFile, RefusesMissingAndForeignFiles) {
   EXPECT_THROW(static_cast<void>(readBand(folder / "missing.vdb")), levelset::IoError);
   EXPECT_THROW(static_cast<void>(readBand(folder.path())), levelset::IoError);
   support::writeText(folder / "a.vdb", "");
-  EXPECT_PRED2(says, refusal<InvalidInput>([&] { static_cast<void>(readBand(folder / "a.vdb")); }),
-               "is empty");
+  EXPECT_SAYS(refusal<InvalidInput>([&] { static_cast<void>(readBand(folder / "a.vdb")); }),
+              "is empty");
   support::writeText(folder / "a.vdb", "ply\nformat ascii 1.0\n");
-  EXPECT_PRED2(says, refusal<InvalidInput>([&] { static_cast<void>(readBand(folder / "a.vdb")); }),
-               "not an OpenVDB file");
+  EXPECT_SAYS(refusal<InvalidInput>([&] { static_cast<void>(readBand(folder / "a.vdb")); }),
+              "not an OpenVDB file");
   levelset::writeBand(folder / "a.nvdb", sphere());
   EXPECT_THROW(static_cast<void>(readBand(folder / "a.nvdb")), levelset::UsageError);
 }

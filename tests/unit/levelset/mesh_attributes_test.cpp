@@ -11,6 +11,7 @@
 #include "levelset/inspect/measure.h"
 #include "levelset/solids/transform.h"
 #include "tests/support/files.h"
+#include "tests/support/mesh_files.h"
 #include "tests/support/meshes.h"
 
 namespace mesh_attributes_test {
@@ -24,21 +25,10 @@ using levelset::CoordinatePrecision;
 using levelset::InvalidInput;
 using levelset::readMesh;
 using levelset::TriMesh;
+using support::parse;
 using support::refusal;
 using support::TemporaryFolder;
 using support::writeText;
-
-TriMesh parse(const std::string& name, const std::string& text,
-              const levelset::ReadMeshOptions& options = {}) {
-  const TemporaryFolder folder;
-  writeText(folder / name, text);
-  return readMesh(folder / name, options);
-}
-
-#define EXPECT_SAYS(sentence, part) EXPECT_PRED2(says, sentence, part)
-bool says(const std::string& sentence, const std::string& part) {
-  return sentence.find(part) != std::string::npos;
-}
 
 /// A tetrahedron that carries everything.
 TriMesh dressed(CoordinatePrecision precision, ColorPrecision colors, bool hasAlpha) {

@@ -11,6 +11,7 @@
 
 #include "levelset/error.h"
 #include "tests/support/files.h"
+#include "tests/support/mesh_files.h"
 
 namespace mesh_file_test {
 
@@ -18,25 +19,14 @@ using levelset::CoordinatePrecision;
 using levelset::InvalidInput;
 using levelset::readMesh;
 using levelset::TriMesh;
+using support::parse;
 using support::refusal;
+using support::says;
 using support::TemporaryFolder;
 using support::writeText;
 
-/// What readMesh makes of `text` in a file of that name.
-TriMesh parse(const std::string& name, const std::string& text,
-              const levelset::ReadMeshOptions& options = {}) {
-  const TemporaryFolder folder;
-  writeText(folder / name, text);
-  return readMesh(folder / name, options);
-}
-
 std::string refused(const std::string& name, const std::string& text) {
   return refusal<InvalidInput>([&] { static_cast<void>(parse(name, text)); });
-}
-
-#define EXPECT_SAYS(sentence, part) EXPECT_PRED2(says, sentence, part)
-bool says(const std::string& sentence, const std::string& part) {
-  return sentence.find(part) != std::string::npos;
 }
 
 TriMesh tetrahedron(CoordinatePrecision precision = CoordinatePrecision::Float) {

@@ -8,6 +8,7 @@
 #include "levelset/inspect/measure.h"
 #include "levelset/solids/transform.h"
 #include "tests/support/files.h"
+#include "tests/support/mesh_files.h"
 #include "tests/support/meshes.h"
 
 namespace mesh_seams_test {
@@ -18,21 +19,10 @@ using Imath::V3d;
 using levelset::InvalidInput;
 using levelset::readMesh;
 using levelset::TriMesh;
+using support::parse;
 using support::refusal;
 using support::TemporaryFolder;
 using support::writeText;
-
-#define EXPECT_SAYS(sentence, part) EXPECT_PRED2(says, sentence, part)
-bool says(const std::string& sentence, const std::string& part) {
-  return sentence.find(part) != std::string::npos;
-}
-
-TriMesh parse(const std::string& name, const std::string& text,
-              const levelset::ReadMeshOptions& options = {}) {
-  const TemporaryFolder folder;
-  writeText(folder / name, text);
-  return readMesh(folder / name, options);
-}
 
 /// The cube [0, 1]³ with a normal to each face: seams along all edges.
 TriMesh cube() {

@@ -41,11 +41,6 @@ using levelset::TriMesh;
 using support::patchMesh;
 using support::refusal;
 
-#define EXPECT_SAYS(sentence, part) EXPECT_PRED2(says, sentence, part)
-bool says(const std::string& sentence, const std::string& part) {
-  return sentence.find(part) != std::string::npos;
-}
-
 /// A square of edge 2 about the middle, in the plane through it across `normal`.
 TriMesh square(const V3d& middle, const V3d& u, const V3d& v, unsigned cells = 4) {
   return patchMesh(cells + 1, cells + 1, false, false,

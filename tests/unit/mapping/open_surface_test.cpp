@@ -33,11 +33,6 @@ using support::square;
 
 constexpr double kVoxel = 0.1;
 
-#define EXPECT_SAYS(sentence, part) EXPECT_PRED2(says, sentence, part)
-bool says(const std::string& sentence, const std::string& part) {
-  return sentence.find(part) != std::string::npos;
-}
-
 /// z = height(x, y) over [−half, half]².
 TriMesh terrain(double half, unsigned cells, const std::function<double(double, double)>& height) {
   return patchMesh(cells + 1, cells + 1, false, false, [=](double s, double t) {

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "mapping/maps/distortion.h"
+#include "tests/support/formula_patches.h"
 
 namespace shell_map_test {
 
@@ -19,26 +20,6 @@ using mapping::LatticeBorder;
 using mapping::Patch;
 using mapping::ShellMap;
 using mapping::Tetrahedron;
-
-/// Particles at place(u, v, w).
-Patch patchOf(const std::function<V3d(const V3d&)>& place, std::size_t columns, std::size_t rows,
-              std::size_t levels) {
-  Patch patch;
-  patch.height = 1;
-  for (std::size_t k = 0; k < levels; ++k) {
-    mapping::ParticleLevel level;
-    level.columns = columns;
-    level.rows = rows;
-    level.w = level.height = static_cast<double>(k) / static_cast<double>(levels - 1);
-    for (std::size_t j = 0; j < rows; ++j)
-      for (std::size_t i = 0; i < columns; ++i)
-        level.positions.push_back(
-            place({static_cast<double>(i) / static_cast<double>(columns - 1),
-                   static_cast<double>(j) / static_cast<double>(rows - 1), level.w}));
-    patch.levels.push_back(std::move(level));
-  }
-  return patch;
-}
 
 /// A third of a cylinder of radius 2.
 V3d onCylinder(const V3d& uvw) {
@@ -59,7 +40,7 @@ void forEachTetrahedron(const Lattice& lattice, const Visit& visit) {
 }
 
 TEST(Lattice, NeighboursShareTheFaceBetweenThem) {
-  const Lattice lattice(patchOf(onCylinder, 4, 3, 3), {.sink = 0.2, .rim = 0.1});
+  const Lattice lattice(support::patchAt(onCylinder, 4, 3, 3), {.sink = 0.2, .rim = 0.1});
   std::size_t outside = 0;
   forEachTetrahedron(lattice, [&](const Tetrahedron& t) {
     const Lattice::Corners own = lattice.corners(t);
@@ -88,7 +69,7 @@ TEST(Lattice, TetrahedraFillTheirCells) {
   const auto bent = [](const V3d& t) {
     return V3d(4 * t.x + 0.3 * t.y, 3 * t.y, t.z * (1 + 0.2 * t.x));
   };
-  const Lattice lattice(patchOf(bent, 5, 4, 3), {});
+  const Lattice lattice(support::patchAt(bent, 5, 4, 3), {});
   double world = 0, texture = 0;
   forEachTetrahedron(lattice, [&](const Tetrahedron& t) {
     world += std::abs(volumeOf(lattice.corners(t)));
@@ -101,8 +82,8 @@ TEST(Lattice, TetrahedraFillTheirCells) {
 }
 
 TEST(Lattice, RefinesLevelsOfFewerParticles) {
-  Patch patch = patchOf(onCylinder, 17, 9, 3);
-  const Patch coarse = patchOf(onCylinder, 9, 5, 3);
+  Patch patch = support::patchAt(onCylinder, 17, 9, 3);
+  const Patch coarse = support::patchAt(onCylinder, 9, 5, 3);
   patch.levels[1] = coarse.levels[1];
   const Lattice lattice(patch, {});
   EXPECT_EQ(lattice.nodeCount(), 17u * 9 * 3);
@@ -117,7 +98,7 @@ TEST(Lattice, RefinesLevelsOfFewerParticles) {
 }
 
 TEST(ShellMap, GoesBothWays) {
-  const ShellMap map(patchOf(onCylinder, 9, 7, 4), {.sink = 0.2, .rim = 0.3});
+  const ShellMap map(support::patchAt(onCylinder, 9, 7, 4), {.sink = 0.2, .rim = 0.3});
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(0, 1);
   for (int i = 0; i < 2000; ++i) {
@@ -132,7 +113,7 @@ TEST(ShellMap, GoesBothWays) {
 
 TEST(ShellMap, FollowsTheCylinder) {
   // u, v and w within half a per cent of the height: chords of 64 cells stand off by 3e-4.
-  const ShellMap map(patchOf(onCylinder, 65, 33, 6), {.sink = 0.1, .rim = 0.1});
+  const ShellMap map(support::patchAt(onCylinder, 65, 33, 6), {.sink = 0.1, .rim = 0.1});
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(0, 1);
   for (int i = 0; i < 500; ++i) {
@@ -170,7 +151,7 @@ void expectLeaves(const ShellMap& map, const GridBlock& block, const mapping::Bl
 }
 
 TEST(ShellMap, KnowsBlocksThatLieInsideIt) {
-  const ShellMap map(patchOf(onCylinder, 40, 40, 9), {.sink = 0.2, .rim = 0.1});
+  const ShellMap map(support::patchAt(onCylinder, 40, 40, 9), {.sink = 0.2, .rim = 0.1});
   GridBlock block{V3d(-0.1, 1.4, 2.4), Imath::M33d(), 16};
   for (int i = 0; i < 3; ++i) block.rows[i][i] = 0.01;
   EXPECT_TRUE(map.restrictTo(block, 0)->isTotal());
@@ -180,7 +161,8 @@ TEST(ShellMap, KnowsBlocksThatLieInsideIt) {
 
 TEST(ShellMap, BlocksAgreeWithPoints) {
   for (const std::size_t columns : {4u, 40u}) {
-    const ShellMap map(patchOf(onCylinder, columns, columns, 5), {.sink = 0.2, .rim = 0.1});
+    const ShellMap map(support::patchAt(onCylinder, columns, columns, 5),
+                       {.sink = 0.2, .rim = 0.1});
     GridBlock block{V3d(-1.9, -0.2, 0.7), Imath::M33d(), 64};
     for (int i = 0; i < 3; ++i) block.rows[i][i] = 0.06;
     block.rows[0][1] = 0.01;
@@ -193,7 +175,7 @@ TEST(ShellMap, BlocksAgreeWithPoints) {
 }
 
 TEST(ShellMap, TellsEveryTetrahedronThatFolds) {
-  const Patch sound = patchOf(onCylinder, 9, 9, 4);
+  const Patch sound = support::patchAt(onCylinder, 9, 9, 4);
   const Distortion distortion =
       mapping::surveyDistortion(ShellMap(sound, {.sink = 0.1, .rim = 0.1}).samples(), V3d(1));
   EXPECT_EQ(distortion.folded, 0u);
@@ -211,7 +193,7 @@ TEST(ShellMap, TellsEveryTetrahedronThatFolds) {
   EXPECT_LE((folds.foldUvw - V3d(4.0 / 8, 4.0 / 8, 2.0 / 3)).length(), 0.4);
 
   // Turned over as a whole, on purpose: no fold.
-  const Patch mirrored = patchOf(
+  const Patch mirrored = support::patchAt(
       [](const V3d& t) {
         return onCylinder({1 - t.x, t.y, t.z});
       },

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "levelset/files/mesh_file.h"
+#include "tests/support/files.h"
+
+namespace support {
+
+/// What readMesh makes of `text` in a file of that name.
+inline levelset::TriMesh parse(const std::string& name, const std::string& text,
+                               const levelset::ReadMeshOptions& options = {}) {
+  const TemporaryFolder folder;
+  writeText(folder / name, text);
+  return levelset::readMesh(folder / name, options);
+}
+
+}  // namespace support
