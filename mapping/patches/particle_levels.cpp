@@ -82,7 +82,8 @@ void sweepGeodesics(const SurfaceField& field, const std::vector<V3d>& firstRow,
 }
 
 /// Through all knots, each stretch the shortest way.
-/// @return empty when two knots are not joined, the first of them in `gap`
+/// @return empty when two knots are not joined by any that is not absurdly longer than on the
+/// level below, the first of them in `gap`
 std::vector<V3d> sideThrough(const SurfaceField& field, double height,
                              const std::vector<V3d>& knots, const std::vector<V3d>* below,
                              std::size_t& gap) {
@@ -90,9 +91,12 @@ std::vector<V3d> sideThrough(const SurfaceField& field, double height,
     std::vector<V3d> path = geodesicLike(field, height, knots[0], knots[1], *below);
     if (!path.empty()) return path;
   }
+  // Half a turn in the way of a side adds π times the height.
+  constexpr double kMostGrowth = 4;
+  const double longest = below ? kMostGrowth * (pathLength(*below) + height) : HUGE_VAL;
   std::vector<V3d> side = {knots.front()};
   for (std::size_t i = 1; i < knots.size(); ++i) {
-    const std::vector<V3d> path = geodesic(field, height, knots[i - 1], knots[i]);
+    const std::vector<V3d> path = geodesic(field, height, knots[i - 1], knots[i], longest);
     gap = i - 1;
     if (path.empty()) return {};
     side.insert(side.end(), path.begin() + 1, path.end());
@@ -116,9 +120,10 @@ PatchSides makeSides(const levelset::NarrowBand& band, double height,
     sides[side] = sideThrough(field, height, knots, below ? &(*below)[side] : nullptr, gap);
     if (sides[side].empty()) {
       throw InvalidInput(fmt::format(
-          "patch: no path on the surface joins {} and {}, between corners {} and {}, at height "
-          "{:.6g}; put all points on one part of the base",
-          text(knots[gap]), text(knots[gap + 1]), kEnds[side][0], kEnds[side][1], height));
+          "patch: no {}path on the surface joins {} and {}, between corners {} and {}, at height "
+          "{:.6g}; put all points on one part of the base{}",
+          below ? "short " : "", text(knots[gap]), text(knots[gap + 1]), kEnds[side][0],
+          kEnds[side][1], height, below ? ", or lower the height" : ""));
     }
   }
   return sides;

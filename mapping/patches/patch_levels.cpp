@@ -131,6 +131,7 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
 
 NarrowBand sweepAbove(const NarrowBand& base, std::span<const V3d> outline, const LevelSize& size,
                       double height, const PatchOptions& options) {
+  if (options.space) return *options.space;
   // Inner particles may lie outside the box of the sides: a patch may bulge by a quarter of its
   // width.
   const double bulge = 0.25 * std::min(size.u, size.v);

@@ -22,15 +22,15 @@ constexpr double kCoarsest = 4;       // times the base's voxel
 constexpr double kThinnest = 12;      // coarse voxels through the base's box
 constexpr double kFaithful = 0.25;    // coarse voxels by which a coarse surface may be off
 
-bool isFaithful(const NarrowBand& coarse, std::span<const V3d> border) {
+bool isFaithful(const NarrowBand& coarse, std::span<const V3d> places) {
   const levelset::BandSampler sampler(coarse, levelset::Interpolation::Tricubic);
-  return std::all_of(border.begin(), border.end(), [&](const V3d& p) {
+  return std::all_of(places.begin(), places.end(), [&](const V3d& p) {
     return std::abs(sampler.value(p)) <= kFaithful * coarse.voxelSize();
   });
 }
 
 /// The base on a coarser grid; the base itself when that would lose its surface.
-NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> border, double height,
+NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> places, double height,
                    const PatchSpaceOptions& options) {
   if (height < 2 * kCoarseVoxels * base.voxelSize()) return base;
   const V3d extent = base.zeroSetBounds().size();
@@ -40,9 +40,19 @@ NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> border, double h
   for (; factor >= 2; --factor) {
     const NarrowBand coarse =
         levelset::resample(base, factor * base.voxelSize(), {.maxMemory = options.maxMemory});
-    if (isFaithful(coarse, border)) return coarse;
+    if (isFaithful(coarse, places)) return coarse;
   }
   return base;
+}
+
+/// Is the band wide enough as it is?
+bool reaches(const NarrowBand& base, double height) {
+  return base.halfWidth() * base.voxelSize() >= height + kMarginVoxels * base.voxelSize();
+}
+
+double areaOf(const NarrowBand& base) {
+  const double h = base.voxelSize();
+  return static_cast<double>(base.activeVoxelCount()) * h * h / (2 * base.halfWidth());
 }
 
 }  // namespace
@@ -50,7 +60,7 @@ NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> border, double h
 NarrowBand sweepPatchSpace(const NarrowBand& base, std::span<const V3d> border, double bulge,
                            double height, const PatchSpaceOptions& options) {
   const double needed = height / base.voxelSize() + kMarginVoxels;
-  if (base.halfWidth() * base.voxelSize() >= height + kMarginVoxels * base.voxelSize()) return base;
+  if (reaches(base, height)) return base;
   if (base.isOpenSurface()) {
     constexpr double kRounding = 1e-6;
     if (base.halfWidth() >= needed - kRounding) return base;
@@ -69,6 +79,25 @@ NarrowBand sweepPatchSpace(const NarrowBand& base, std::span<const V3d> border, 
                                        .region = box,
                                        .maxMemory = options.maxMemory,
                                        .progress = options.progress});
+}
+
+std::optional<NarrowBand> sweepSharedSpace(const NarrowBand& base, const PatchCrowd& crowd,
+                                           const PatchSpaceOptions& options) {
+  if (reaches(base, crowd.height) || base.isOpenSurface()) return {};
+  // Boxes and the whole reach equally far from the surface, so areas of surface compare them.
+  const double around = 2 * (crowd.height + kMarginVoxels * base.voxelSize());
+  const double boxes =
+      static_cast<double>(crowd.count) * (crowd.uSize + around) * (crowd.vSize + around);
+  if (boxes < areaOf(base)) return {};
+  try {
+    const NarrowBand coarse = coarsen(base, crowd.places, crowd.height, options);
+    return levelset::redistance(coarse,
+                                {.halfWidth = crowd.height / coarse.voxelSize() + kMarginVoxels,
+                                 .maxMemory = options.maxMemory,
+                                 .progress = options.progress});
+  } catch (const levelset::ResourceLimit&) {
+    return {};
+  }
 }
 
 }  // namespace mapping

@@ -3,6 +3,7 @@
 #include <Imath/ImathVec.h>
 
 #include <cstddef>
+#include <optional>
 #include <span>
 
 #include "levelset/narrow_band.h"
@@ -27,5 +28,18 @@ struct PatchSpaceOptions {
                                                    std::span<const Imath::V3d> border, double bulge,
                                                    double height,
                                                    const PatchSpaceOptions& options = {});
+
+/// Many patches on one base.
+struct PatchCrowd {
+  std::span<const Imath::V3d> places;  ///< on the surface, one or more for each patch
+  std::size_t count;
+  double uSize, vSize, height;  ///< of the largest, world units
+};
+
+/// The same for many patches at once: around all of the base, when that is less than a box about
+/// each of them. None when it is more, or when it would not fit into memory.
+[[nodiscard]] std::optional<levelset::NarrowBand> sweepSharedSpace(
+    const levelset::NarrowBand& base, const PatchCrowd& crowd,
+    const PatchSpaceOptions& options = {});
 
 }  // namespace mapping

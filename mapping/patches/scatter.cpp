@@ -14,6 +14,7 @@
 #include "levelset/progress_gate.h"
 #include "mapping/maps/distortion.h"
 #include "mapping/maps/level_map.h"
+#include "mapping/patches/patch_space.h"
 
 namespace mapping {
 namespace {
@@ -102,6 +103,37 @@ Attempt tryAt(const NarrowBand& base, const SurfacePoint& point, std::size_t ind
   return attempt;
 }
 
+/// Splines are followed without distances.
+std::optional<NarrowBand> sweepFor(const NarrowBand& base, const PatchCrowd& crowd,
+                                   const PatchOptions& options) {
+  if (options.scheme == LevelScheme::Spline) return {};
+  return sweepSharedSpace(base, crowd,
+                          {.maxMemory = options.maxMemory, .progress = options.progress});
+}
+
+PatchCrowd crowdOf(const ScatteredPoints& points, double height, const ScatterOptions& options,
+                   std::vector<V3d>& places) {
+  double largest = 0;
+  for (const SurfacePoint& point : points.points) {
+    places.push_back(point.place);
+    largest = std::max(largest, point.scale);
+  }
+  return {places, points.wanted, options.uSize * largest, options.vSize * largest,
+          height * largest};
+}
+
+PatchCrowd crowdOf(const std::vector<PatchSite>& sites, double height, std::vector<V3d>& places) {
+  double u = 0, v = 0, largest = 0;
+  for (const PatchSite& site : sites) {
+    const auto& [a, b, c, d] = site.corners;
+    places.insert(places.end(), site.corners.begin(), site.corners.end());
+    u = std::max({u, (b - a).length(), (c - d).length()});
+    v = std::max({v, (d - a).length(), (c - b).length()});
+    largest = std::max(largest, site.scale);
+  }
+  return {places, sites.size(), u, v, height * largest};
+}
+
 bool isFarFrom(const SurfacePoint& point, std::span<const SurfacePoint> others, double distance) {
   return std::all_of(others.begin(), others.end(), [&](const SurfacePoint& other) {
     const double kept = distance * 0.5 * (point.scale + other.scale);
@@ -118,9 +150,16 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
   const ScatteredPoints points = scatterPoints(base, parts.density);
   ScatterResult result;
 
+  parts.patch.progress = levelset::subProgress(options.density.progress, 0.2, 0.4);
+  std::vector<V3d> places;
+  const std::optional<NarrowBand> space =
+      sweepFor(base, crowdOf(points, height, options, places), parts.patch);
+  parts.patch.progress = {};
+  parts.patch.space = space ? &*space : nullptr;
+
   // === The places that were chosen
   std::vector<Attempt> attempts(points.wanted);
-  const levelset::Progress progress = levelset::subProgress(options.density.progress, 0.2, 0.9);
+  const levelset::Progress progress = levelset::subProgress(options.density.progress, 0.4, 0.9);
   levelset::ProgressGate gate(progress, points.wanted, kScatter);
   tbb::parallel_for(std::size_t{0}, points.wanted, [&](std::size_t n) {
     attempts[n] = tryAt(base, points.points[n], n, height, parts);
@@ -159,11 +198,19 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
 
 std::vector<Patch> makePatches(const NarrowBand& base, const std::vector<PatchSite>& sites,
                                double height, const PatchOptions& options) {
+  PatchOptions sweeping = options;
+  sweeping.progress = levelset::subProgress(options.progress, 0, 0.3);
+  std::vector<V3d> places;
+  const std::optional<NarrowBand> space = sweepFor(base, crowdOf(sites, height, places), sweeping);
+  const double begun = space ? 0.3 : 0;
   std::vector<Patch> patches;
   patches.reserve(sites.size());
   for (const PatchSite& site : sites) {
     PatchOptions scaled = atScale(options, site.scale);
-    const auto share = [&](double n) { return n / static_cast<double>(sites.size()); };
+    scaled.space = space ? &*space : nullptr;
+    const auto share = [&](double n) {
+      return begun + (1 - begun) * n / static_cast<double>(sites.size());
+    };
     const auto done = static_cast<double>(patches.size());
     scaled.progress = levelset::subProgress(options.progress, share(done), share(done + 1));
     patches.push_back(makePatch(base, site.corners, height * site.scale, scaled).patch);

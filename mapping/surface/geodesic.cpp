@@ -97,7 +97,7 @@ void relaxPath(const SurfaceField& field, double height, std::vector<V3d>& path)
     if (sweep % kSweepsBetweenLooks != 0) continue;
     // Over edges the points may swing for ever about where they belong.
     const double length = pathLength(path);
-    const bool isCalm = std::abs(length - lengthBefore) < kCalm * length;
+    const bool isCalm = lengthBefore - length < kCalm * length;
     if (isCalm && factor == 1) return;
     if (isCalm) factor = 1;
     lengthBefore = length;
@@ -208,11 +208,12 @@ std::vector<V3d> straighten(const SurfaceField& field, double height, std::vecto
   return withBends(field, height, path);
 }
 
-std::vector<V3d> geodesic(const SurfaceField& field, double height, const V3d& a, const V3d& b) {
+std::vector<V3d> geodesic(const SurfaceField& field, double height, const V3d& a, const V3d& b,
+                          double longest) {
   const WaySearch search(field, height, a, b);
   std::vector<V3d> path = walkTowards(field, height, a, b);
   if (path.empty()) path = search.shortest();
-  if (path.empty()) return path;
+  if (path.empty() || pathLength(path) > longest) return {};
   path = straighten(field, height, std::move(path));
   double shortest = pathLength(path);
   if (shortest <= kNearlyStraight * (b - a).length()) return path;

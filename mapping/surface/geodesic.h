@@ -2,6 +2,7 @@
 
 #include <Imath/ImathVec.h>
 
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -19,9 +20,11 @@ namespace mapping {
 /// the solid to another side where that is two voxels thick. Lengths are within 1 % where radii of
 /// curvature exceed 2 voxels and over edges (`Geodesic.*`).
 /// @param a, b  on φ = height
-/// @return empty when the surface does not join a and b
+/// @param longest  of a way that is of use; a longer one is not straightened
+/// @return empty when the surface does not join a and b, or only by a way longer than that
 [[nodiscard]] std::vector<Imath::V3d> geodesic(const SurfaceField& field, double height,
-                                               const Imath::V3d& a, const Imath::V3d& b);
+                                               const Imath::V3d& a, const Imath::V3d& b,
+                                               double longest = HUGE_VAL);
 
 /// The geodesic from a to b that runs as a path nearby does, perhaps one on another level: its
 /// points are moved over, and straightened.

@@ -47,6 +47,15 @@ TEST(Geodesic, IsAGreatCircleOnASphere) {
   EXPECT_LT(worst[1], 0.4 * worst[0]);  // chords, second order
 }
 
+TEST(Geodesic, IsNoneWhereItIsLongerThanWanted) {
+  const NarrowBand ball = support::makeBall(1, 0.05);
+  const SurfaceField field(ball);
+  V3d a(1, 0, 0), b(std::cos(2.5), std::sin(2.5), 0);
+  ASSERT_TRUE(field.project(a, 0) && field.project(b, 0));
+  EXPECT_TRUE(geodesic(field, 0, a, b, 2.2).empty());
+  EXPECT_NEAR(pathLength(geodesic(field, 0, a, b, 3)), 2.5, 2.5 * kOnePercent);
+}
+
 TEST(Geodesic, IsAHelixOnACylinderTheShorterWayRound) {
   const NarrowBand pipe = support::sampleBand([](const V3d& p) { return std::hypot(p.x, p.y) - 1; },
                                               {V3d(-1, -1, -3), V3d(1, 1, 3)}, 0.1);

@@ -9,6 +9,7 @@
 
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
+#include "mapping/patches/patch_space.h"
 #include "mapping/textures/geometric_texture.h"
 #include "tests/support/patches.h"
 #include "tests/support/threads.h"
@@ -239,6 +240,35 @@ TEST(Scatter, SkipsPatchesThatFold) {
   EXPECT_EQ(result.report.patches, 3u);
   EXPECT_EQ(levelset::measure(result.band).components, 3u);
   EXPECT_THROW((void)mapping::mapTexture(base, stud, patches[1], skipping), InvalidInput);
+}
+
+TEST(Scatter, SharesDistancesAndMakesThePatchesThatStandAlone) {
+  const NarrowBand base = ball();
+  mapping::ScatterOptions options;
+  options.density.count = 40;
+  options.uSize = options.vSize = 0.5;
+  options.patch.levels = 4;
+  constexpr double kHeight = 1;
+  const mapping::PatchSpaceOptions space;
+  const std::vector<V3d> places = {V3d(0, 0, kRadius)};
+  // So many do share, so few do not.
+  EXPECT_TRUE(mapping::sweepSharedSpace(base, {places, 40, 0.5, 0.5, kHeight}, space));
+  EXPECT_FALSE(mapping::sweepSharedSpace(base, {places, 2, 0.5, 0.5, kHeight}, space));
+  EXPECT_FALSE(mapping::sweepSharedSpace(base, {places, 40, 0.5, 0.5, kHeight}, {.maxMemory = 1}));
+  const auto together = mapping::scatter(base, kHeight, options);
+  ASSERT_EQ(together.patches.size(), 40u);
+  for (std::size_t n = 0; n < together.patches.size(); n += 13) {
+    const Patch alone =
+        mapping::makePatch(base, together.sites[n].corners, kHeight, options.patch).patch;
+    ASSERT_EQ(alone.levels.size(), together.patches[n].levels.size());
+    for (std::size_t k = 0; k < alone.levels.size(); ++k) {
+      const auto& one = alone.levels[k].positions;
+      const auto& other = together.patches[n].levels[k].positions;
+      ASSERT_EQ(one.size(), other.size());
+      for (std::size_t i = 0; i < one.size(); ++i)
+        EXPECT_LT((one[i] - other[i]).length(), 1e-3 * base.voxelSize());
+    }
+  }
 }
 
 }  // namespace scatter_test
