@@ -82,18 +82,15 @@ void sweepGeodesics(const SurfaceField& field, const std::vector<V3d>& firstRow,
 }
 
 /// Through all knots, each stretch the shortest way.
-/// @return empty when two knots are not joined by any that is not absurdly longer than on the
-/// level below, the first of them in `gap`
+/// @param longest  of a stretch
+/// @return empty when two knots are not joined, or by too long a way; the first of them in `gap`
 std::vector<V3d> sideThrough(const SurfaceField& field, double height,
                              const std::vector<V3d>& knots, const std::vector<V3d>* below,
-                             std::size_t& gap) {
+                             double longest, std::size_t& gap) {
   if (below && knots.size() == 2) {
     std::vector<V3d> path = geodesicLike(field, height, knots[0], knots[1], *below);
     if (!path.empty()) return path;
   }
-  // Half a turn in the way of a side adds π times the height.
-  constexpr double kMostGrowth = 4;
-  const double longest = below ? kMostGrowth * (pathLength(*below) + height) : HUGE_VAL;
   std::vector<V3d> side = {knots.front()};
   for (std::size_t i = 1; i < knots.size(); ++i) {
     const std::vector<V3d> path = geodesic(field, height, knots[i - 1], knots[i], longest);
@@ -108,8 +105,10 @@ std::vector<V3d> sideThrough(const SurfaceField& field, double height,
 
 PatchSides makeSides(const levelset::NarrowBand& band, double height,
                      const std::array<V3d, 4>& corners, const PatchSides& between,
-                     const PatchSides* below) {
+                     const PatchSides* below, const PatchSides* ground) {
   const SurfaceField field(band);
+  // Half a turn in the way of a side adds π times the height.
+  constexpr double kMostGrowth = 4;
   constexpr std::array<std::array<std::size_t, 2>, 4> kEnds = {{{0, 1}, {1, 2}, {3, 2}, {0, 3}}};
   PatchSides sides;
   for (std::size_t side = 0; side < 4; ++side) {
@@ -117,14 +116,21 @@ PatchSides makeSides(const levelset::NarrowBand& band, double height,
     knots.insert(knots.end(), between[side].begin(), between[side].end());
     knots.push_back(corners[kEnds[side][1]]);
     std::size_t gap = 0;
-    sides[side] = sideThrough(field, height, knots, below ? &(*below)[side] : nullptr, gap);
-    if (sides[side].empty()) {
-      throw InvalidInput(fmt::format(
-          "patch: no {}path on the surface joins {} and {}, between corners {} and {}, at height "
-          "{:.6g}; put all points on one part of the base{}",
-          below ? "short " : "", text(knots[gap]), text(knots[gap + 1]), kEnds[side][0],
-          kEnds[side][1], height, below ? ", or lower the height" : ""));
+    const double longest = ground ? kMostGrowth * (pathLength((*ground)[side]) + height) : HUGE_VAL;
+    sides[side] =
+        sideThrough(field, height, knots, below ? &(*below)[side] : nullptr, longest, gap);
+    if (!sides[side].empty()) continue;
+    const std::string ends =
+        fmt::format("joins {} and {}, between corners {} and {}, at height {:.6g}",
+                    text(knots[gap]), text(knots[gap + 1]), kEnds[side][0], kEnds[side][1], height);
+    if (ground) {
+      throw InvalidInput(
+          fmt::format("patch: no way shorter than {:.6g} {}: they have come apart above the "
+                      "surface; lower the height, or move the corners closer together",
+                      longest, ends));
     }
+    throw InvalidInput(fmt::format(
+        "patch: no path on the surface {}; put all points on one part of the base", ends));
   }
   return sides;
 }

@@ -19,11 +19,14 @@ using PatchSides = std::array<std::vector<Imath::V3d>, 4>;
 /// Geodesics between the corners on φ = height, and through the points between them.
 /// @param between  points on φ = height that a side passes on its way; often none
 /// @param below    the sides on the level below, which these run like where they can; or nullptr
-/// @throws InvalidInput when two corners are not joined by the surface
+/// @param ground   the sides on the surface, or nullptr: a side that is over four times as long as
+/// its own there and the height is none
+/// @throws InvalidInput when two corners are not joined, or by such a side only
 [[nodiscard]] PatchSides makeSides(const levelset::NarrowBand& band, double height,
                                    const std::array<Imath::V3d, 4>& corners,
                                    const PatchSides& between = {},
-                                   const PatchSides* below = nullptr);
+                                   const PatchSides* below = nullptr,
+                                   const PatchSides* ground = nullptr);
 
 /// Mean length of the sides along u, and along v.
 [[nodiscard]] double sideLengthU(const PatchSides& sides);

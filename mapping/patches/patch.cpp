@@ -135,8 +135,9 @@ struct LevelSides {
 };
 
 LevelSides makeLevelSides(const NarrowBand& band, double height, const std::array<V3d, 4>& corners,
-                          const PatchSides& between, const PatchSides* below = nullptr) {
-  LevelSides level{height, makeSides(band, height, corners, between, below), {}};
+                          const PatchSides& between, const PatchSides* below = nullptr,
+                          const PatchSides* ground = nullptr) {
+  LevelSides level{height, makeSides(band, height, corners, between, below, ground), {}};
   level.size = {sideLengthU(level.sides), sideLengthV(level.sides)};
   return level;
 }
@@ -184,8 +185,8 @@ std::vector<ParticleLevel> reducedLevels(const NarrowBand& base, Outline outline
     advectPoints(space, sides.back().height, level, outline.corners);
     for (std::vector<V3d>& points : outline.between)
       advectPoints(space, sides.back().height, level, points);
-    sides.push_back(
-        makeLevelSides(space, level, outline.corners, outline.between, &sides.back().sides));
+    sides.push_back(makeLevelSides(space, level, outline.corners, outline.between,
+                                   &sides.back().sides, &sides.front().sides));
   }
   std::vector<LevelSize> sizes;
   for (const LevelSides& border : sides) sizes.push_back(border.size);

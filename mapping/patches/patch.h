@@ -96,8 +96,8 @@ struct PatchOptions {
   /// Of cells along u and v, the same on all levels, each at least 3; 0, 0: as the spacing asks.
   std::array<std::size_t, 2> cells = {0, 0};
   bool mirror = false;  ///< accept corners that run clockwise seen from outside
-  /// Distances to the base as far as the height, where many patches share them; none: swept out
-  /// about the patch.
+  /// Of sweepSharedSpace, where many patches share distances to the base; it must outlive the call.
+  /// Where it does not do, or there is none, they are swept out about the patch.
   const levelset::NarrowBand* space = nullptr;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};

@@ -131,12 +131,12 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
 
 NarrowBand sweepAbove(const NarrowBand& base, std::span<const V3d> outline, const LevelSize& size,
                       double height, const PatchOptions& options) {
-  if (options.space) return *options.space;
   // Inner particles may lie outside the box of the sides: a patch may bulge by a quarter of its
   // width.
   const double bulge = 0.25 * std::min(size.u, size.v);
   return sweepPatchSpace(base, outline, bulge, height,
-                         {.maxMemory = options.maxMemory,
+                         {.shared = options.space,
+                          .maxMemory = options.maxMemory,
                           .progress = levelset::subProgress(options.progress, 0.1, 0.5)});
 }
 

@@ -7,6 +7,7 @@
 
 #include "levelset/eikonal/redistance.h"
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 #include "levelset/sample.h"
 #include "levelset/solids/resample.h"
 
@@ -22,25 +23,38 @@ constexpr double kCoarsest = 4;       // times the base's voxel
 constexpr double kThinnest = 12;      // coarse voxels through the base's box
 constexpr double kFaithful = 0.25;    // coarse voxels by which a coarse surface may be off
 
-bool isFaithful(const NarrowBand& coarse, std::span<const V3d> places) {
+bool isFaithful(const NarrowBand& coarse, std::span<const V3d> border) {
   const levelset::BandSampler sampler(coarse, levelset::Interpolation::Tricubic);
-  return std::all_of(places.begin(), places.end(), [&](const V3d& p) {
+  return std::all_of(border.begin(), border.end(), [&](const V3d& p) {
     return std::abs(sampler.value(p)) <= kFaithful * coarse.voxelSize();
   });
 }
 
-/// The base on a coarser grid; the base itself when that would lose its surface.
-NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> places, double height,
-                   const PatchSpaceOptions& options) {
-  if (height < 2 * kCoarseVoxels * base.voxelSize()) return base;
+/// How many times coarser a grid may be for levels up to a height.
+double coarsestFactor(const NarrowBand& base, double height) {
+  if (height < 2 * kCoarseVoxels * base.voxelSize()) return 1;
   const V3d extent = base.zeroSetBounds().size();
   const double thickness = std::min({extent.x, extent.y, extent.z}) / base.voxelSize();
-  double factor = std::floor(
-      std::min({kCoarsest, height / (kCoarseVoxels * base.voxelSize()), thickness / kThinnest}));
-  for (; factor >= 2; --factor) {
-    const NarrowBand coarse =
-        levelset::resample(base, factor * base.voxelSize(), {.maxMemory = options.maxMemory});
-    if (isFaithful(coarse, places)) return coarse;
+  return std::max(1.0, std::floor(std::min({kCoarsest, height / (kCoarseVoxels * base.voxelSize()),
+                                            thickness / kThinnest})));
+}
+
+/// None where no grid point of the coarser grid lies inside.
+std::optional<NarrowBand> coarsened(const NarrowBand& base, double factor,
+                                    const PatchSpaceOptions& options) {
+  try {
+    return levelset::resample(base, factor * base.voxelSize(), {.maxMemory = options.maxMemory});
+  } catch (const levelset::InvalidInput&) {
+    return {};
+  }
+}
+
+/// The base on a coarser grid; the base itself when that would lose its surface.
+NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> border, double height,
+                   const PatchSpaceOptions& options) {
+  for (double factor = coarsestFactor(base, height); factor >= 2; --factor) {
+    const auto coarse = coarsened(base, factor, options);
+    if (coarse && isFaithful(*coarse, border)) return *coarse;
   }
   return base;
 }
@@ -48,6 +62,16 @@ NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> places, double h
 /// Is the band wide enough as it is?
 bool reaches(const NarrowBand& base, double height) {
   return base.halfWidth() * base.voxelSize() >= height + kMarginVoxels * base.voxelSize();
+}
+
+/// Would the patch's own space be no better than this?
+bool serves(const NarrowBand& shared, const NarrowBand& base, std::span<const V3d> border,
+            double height) {
+  constexpr double kRounding = 1 + 1e-9;
+  if (!reaches(shared, height / kRounding)) return false;
+  if (shared.voxelSize() <= base.voxelSize() * kRounding) return true;
+  return shared.voxelSize() <= coarsestFactor(base, height) * base.voxelSize() * kRounding &&
+         isFaithful(shared, border);
 }
 
 double areaOf(const NarrowBand& base) {
@@ -69,6 +93,7 @@ NarrowBand sweepPatchSpace(const NarrowBand& base, std::span<const V3d> border, 
         "needs more; make it with surface-band --half-width {}, or lower the patch",
         base.halfWidth(), height, std::ceil(needed - kRounding)));
   }
+  if (options.shared && serves(*options.shared, base, border, height)) return *options.shared;
   const NarrowBand coarse = coarsen(base, border, height, options);
   const double reach = height + kMarginVoxels * coarse.voxelSize();
   Imath::Box3d box;
@@ -83,19 +108,23 @@ NarrowBand sweepPatchSpace(const NarrowBand& base, std::span<const V3d> border, 
 
 std::optional<NarrowBand> sweepSharedSpace(const NarrowBand& base, const PatchCrowd& crowd,
                                            const PatchSpaceOptions& options) {
-  if (reaches(base, crowd.height) || base.isOpenSurface()) return {};
+  if (base.isEmpty() || base.isOpenSurface() || reaches(base, crowd.highest)) return {};
+  const double factor = coarsestFactor(base, crowd.lowest);
   // Boxes and the whole reach equally far from the surface, so areas of surface compare them. A
-  // grid point costs some four times as much in a box, for the search along its faces.
+  // grid point costs three and more times as much in a box, for the search along its faces. A
+  // coarser grid is made of the whole base, for each patch that is alone.
   constexpr double kBoxCost = 3;
-  const double around = 2 * (crowd.height + kMarginVoxels * base.voxelSize());
+  const double around = 2 * (crowd.highest + kMarginVoxels * base.voxelSize());
   const double boxes =
       static_cast<double>(crowd.count) * (crowd.uSize + around) * (crowd.vSize + around);
-  if (kBoxCost * boxes < areaOf(base)) return {};
+  if (crowd.count < 2 || (factor < 2 && !(kBoxCost * boxes > areaOf(base)))) return {};
+  const std::size_t room = levelset::memoryLimit(options.maxMemory) / 4;
   try {
-    const NarrowBand coarse = coarsen(base, crowd.places, crowd.height, options);
-    return levelset::redistance(coarse,
-                                {.halfWidth = crowd.height / coarse.voxelSize() + kMarginVoxels,
-                                 .maxMemory = options.maxMemory,
+    const auto coarse = factor < 2 ? std::optional(base) : coarsened(base, factor, options);
+    if (!coarse) return {};
+    return levelset::redistance(*coarse,
+                                {.halfWidth = crowd.highest / coarse->voxelSize() + kMarginVoxels,
+                                 .maxMemory = room,
                                  .progress = options.progress});
   } catch (const levelset::ResourceLimit&) {
     return {};

@@ -12,6 +12,9 @@
 namespace mapping {
 
 struct PatchSpaceOptions {
+  /// Of sweepSharedSpace; taken where it reaches the height and is as exact there as the patch's
+  /// own.
+  const levelset::NarrowBand* shared = nullptr;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
@@ -31,13 +34,13 @@ struct PatchSpaceOptions {
 
 /// Many patches on one base.
 struct PatchCrowd {
-  std::span<const Imath::V3d> places;  ///< on the surface, one or more for each patch
   std::size_t count;
-  double uSize, vSize, height;  ///< of the largest, world units
+  double uSize, vSize;     ///< of the largest, world units
+  double lowest, highest;  ///< of their heights, world units, positive
 };
 
-/// The same for many patches at once: around all of the base, when that is less than a box about
-/// each of them. None when it is more, or when it would not fit into memory.
+/// Distances for many patches at once: around all of the base, when that costs less than a box
+/// about each of them. None when it costs more, or more than a quarter of the memory.
 [[nodiscard]] std::optional<levelset::NarrowBand> sweepSharedSpace(
     const levelset::NarrowBand& base, const PatchCrowd& crowd,
     const PatchSpaceOptions& options = {});

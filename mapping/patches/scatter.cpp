@@ -111,27 +111,31 @@ std::optional<NarrowBand> sweepFor(const NarrowBand& base, const PatchCrowd& cro
                           {.maxMemory = options.maxMemory, .progress = options.progress});
 }
 
-PatchCrowd crowdOf(const ScatteredPoints& points, double height, const ScatterOptions& options,
-                   std::vector<V3d>& places) {
-  double largest = 0;
-  for (const SurfacePoint& point : points.points) {
-    places.push_back(point.place);
-    largest = std::max(largest, point.scale);
+/// Places beyond the best so many are not tried.
+std::size_t triesOf(const ScatteredPoints& points) {
+  return std::min(points.points.size(), kTriesPerPatch * points.wanted);
+}
+
+PatchCrowd crowdOf(const ScatteredPoints& points, double height, const ScatterOptions& options) {
+  double smallest = HUGE_VAL, largest = 0;
+  for (std::size_t n = 0; n < triesOf(points); ++n) {
+    smallest = std::min(smallest, points.points[n].scale);
+    largest = std::max(largest, points.points[n].scale);
   }
-  return {places, points.wanted, options.uSize * largest, options.vSize * largest,
+  return {points.wanted, options.uSize * largest, options.vSize * largest, height * smallest,
           height * largest};
 }
 
-PatchCrowd crowdOf(const std::vector<PatchSite>& sites, double height, std::vector<V3d>& places) {
-  double u = 0, v = 0, largest = 0;
+PatchCrowd crowdOf(const std::vector<PatchSite>& sites, double height) {
+  double u = 0, v = 0, smallest = HUGE_VAL, largest = 0;
   for (const PatchSite& site : sites) {
     const auto& [a, b, c, d] = site.corners;
-    places.insert(places.end(), site.corners.begin(), site.corners.end());
     u = std::max({u, (b - a).length(), (c - d).length()});
     v = std::max({v, (d - a).length(), (c - b).length()});
+    smallest = std::min(smallest, site.scale);
     largest = std::max(largest, site.scale);
   }
-  return {places, sites.size(), u, v, height * largest};
+  return {sites.size(), u, v, height * smallest, height * largest};
 }
 
 bool isFarFrom(const SurfacePoint& point, std::span<const SurfacePoint> others, double distance) {
@@ -144,6 +148,7 @@ bool isFarFrom(const SurfacePoint& point, std::span<const SurfacePoint> others, 
 }  // namespace
 
 ScatterResult scatter(const NarrowBand& base, double height, const ScatterOptions& options) {
+  checkPatchOptions(kScatter, height, options.patch);
   ScatterOptions parts = options;
   parts.density.progress = levelset::subProgress(options.density.progress, 0, 0.2);
   parts.patch.progress = {};
@@ -151,9 +156,8 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
   ScatterResult result;
 
   parts.patch.progress = levelset::subProgress(options.density.progress, 0.2, 0.4);
-  std::vector<V3d> places;
   const std::optional<NarrowBand> space =
-      sweepFor(base, crowdOf(points, height, options, places), parts.patch);
+      sweepFor(base, crowdOf(points, height, options), parts.patch);
   parts.patch.progress = {};
   parts.patch.space = space ? &*space : nullptr;
 
@@ -178,7 +182,7 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
   for (std::size_t n = 0; n < points.wanted; ++n) take(attempts[n], points.points[n]);
 
   // === The next best in the gaps of those that bear no patch
-  const std::size_t tries = std::min(points.points.size(), kTriesPerPatch * points.wanted);
+  const std::size_t tries = triesOf(points);
   const double kept = std::isfinite(points.distance) ? points.distance : 0;
   for (std::size_t n = points.wanted; n < tries && taken.size() < points.wanted; ++n) {
     const SurfacePoint& point = points.points[n];
@@ -198,18 +202,18 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
 
 std::vector<Patch> makePatches(const NarrowBand& base, const std::vector<PatchSite>& sites,
                                double height, const PatchOptions& options) {
+  checkPatchOptions(kScatter, height, options);
+  constexpr double kSweep = 0.3;
   PatchOptions sweeping = options;
-  sweeping.progress = levelset::subProgress(options.progress, 0, 0.3);
-  std::vector<V3d> places;
-  const std::optional<NarrowBand> space = sweepFor(base, crowdOf(sites, height, places), sweeping);
-  const double begun = space ? 0.3 : 0;
+  sweeping.progress = levelset::subProgress(options.progress, 0, kSweep);
+  const std::optional<NarrowBand> space = sweepFor(base, crowdOf(sites, height), sweeping);
   std::vector<Patch> patches;
   patches.reserve(sites.size());
   for (const PatchSite& site : sites) {
     PatchOptions scaled = atScale(options, site.scale);
     scaled.space = space ? &*space : nullptr;
     const auto share = [&](double n) {
-      return begun + (1 - begun) * n / static_cast<double>(sites.size());
+      return kSweep + (1 - kSweep) * n / static_cast<double>(sites.size());
     };
     const auto done = static_cast<double>(patches.size());
     scaled.progress = levelset::subProgress(options.progress, share(done), share(done + 1));

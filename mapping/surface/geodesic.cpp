@@ -212,7 +212,7 @@ std::vector<V3d> geodesic(const SurfaceField& field, double height, const V3d& a
                           double longest) {
   const WaySearch search(field, height, a, b);
   std::vector<V3d> path = walkTowards(field, height, a, b);
-  if (path.empty()) path = search.shortest();
+  if (path.empty() || pathLength(path) > longest) path = search.shortest();
   if (path.empty() || pathLength(path) > longest) return {};
   path = straighten(field, height, std::move(path));
   double shortest = pathLength(path);

@@ -20,8 +20,8 @@ namespace mapping {
 /// the solid to another side where that is two voxels thick. Lengths are within 1 % where radii of
 /// curvature exceed 2 voxels and over edges (`Geodesic.*`).
 /// @param a, b  on φ = height
-/// @param longest  of a way that is of use; a longer one is not straightened
-/// @return empty when the surface does not join a and b, or only by a way longer than that
+/// @param longest  of a way that is of use, before it is straightened, which may take off an eighth
+/// @return empty when the surface does not join a and b, or by a way longer than that
 [[nodiscard]] std::vector<Imath::V3d> geodesic(const SurfaceField& field, double height,
                                                const Imath::V3d& a, const Imath::V3d& b,
                                                double longest = HUGE_VAL);

@@ -100,6 +100,20 @@ std::array<V3d, 4> cornersOf(Invocation& in) {
   return mapping::cornersAround(in.band(), in.point("at"), size[0], size[1], in.radians("rotate"));
 }
 
+/// Corners about a point run the right way round, unless the surface bends too much between them.
+/// @return what to say then; empty for corners that were given
+std::string whyMirrored(const Invocation& in) {
+  if (in.given("corners")) return "";
+  return fmt::format(
+      "{}: the surface bends too much about {} for a patch of size {}, it would be laid the wrong "
+      "way round; make it smaller, or lay it elsewhere",
+      in.op().name, in.text("at"), in.text("size"));
+}
+
+void requireUpright(const std::vector<mapping::Patch>& patches, const std::string& whyMirrored) {
+  if (!whyMirrored.empty() && patches.front().mirrored) throw levelset::InvalidInput(whyMirrored);
+}
+
 /// Distortion and counts, for the report; warns of particles that were slowed.
 void tellPatches(Invocation& in, const mapping::PatchReport& report,
                  const std::vector<mapping::Patch>& patches) {
@@ -190,11 +204,14 @@ Value patch(Invocation& in) {
         mapping::makePatch(base, footprints[0].corners, footprints[0].height, now).patch};
   };
   return patchesOf(in, std::move(recipe),
-                   [base = in.band(), corners = cornersOf(in), options](double height,
-                                                                        const Progress& progress) {
+                   [base = in.band(), corners = cornersOf(in), options, why = whyMirrored(in)](
+                       double height, const Progress& progress) {
                      mapping::PatchOptions now = options;
                      now.progress = progress;
-                     return asSet(mapping::makePatch(base, corners, height, now));
+                     now.mirror |= !why.empty();
+                     PatchGridResult set = asSet(mapping::makePatch(base, corners, height, now));
+                     requireUpright(set.patches, why);
+                     return set;
                    });
 }
 
@@ -283,13 +300,16 @@ Value patchGrid(Invocation& in) {
     return mapping::makePatchGrid(base, footprints[0].corners, footprints[0].height, grid, now)
         .patches;
   };
-  return patchesOf(
-      in, std::move(recipe),
-      [base = in.band(), corners, grid, options](double height, const Progress& progress) {
-        mapping::PatchOptions now = options;
-        now.progress = progress;
-        return mapping::makePatchGrid(base, corners, height, grid, now);
-      });
+  return patchesOf(in, std::move(recipe),
+                   [base = in.band(), corners, grid, options, why = whyMirrored(in)](
+                       double height, const Progress& progress) {
+                     mapping::PatchOptions now = options;
+                     now.progress = progress;
+                     now.mirror |= !why.empty();
+                     PatchGridResult set = mapping::makePatchGrid(base, corners, height, grid, now);
+                     requireUpright(set.patches, why);
+                     return set;
+                   });
 }
 
 /// With a box that the patch's height is added to on all sides.

@@ -71,6 +71,14 @@ TEST_F(Refusal, UsageIsTwo) {
   expectNothingWritten(1);
 }
 
+TEST_F(Refusal, PatchesAboutAPointOfASolidThatIsTooSmallSayThatItBends) {
+  const std::string ball = "sphere --radius 1 --voxel 0.1 --as ball ! ";
+  for (const char* rest :
+       {"patch @ball --at 1,0,0 --size 4,4 --height 0.2 ! mesh ! write a.ply",
+        "patch-grid @ball --at 1,0,0 --size 4,4 --count 2,2 --height 0.2 ! mesh ! write a.ply"})
+    EXPECT_REFUSED(levelsmith(ball + rest), 3, "bends too much about 1,0,0");
+}
+
 /// A chain whose end cannot work is refused before its beginning runs: within a second, though the
 /// sphere would take many.
 TEST_F(Refusal, WhatCanBeToldComesBeforeTheWork) {

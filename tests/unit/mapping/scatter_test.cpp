@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "levelset/error.h"
@@ -242,33 +244,85 @@ TEST(Scatter, SkipsPatchesThatFold) {
   EXPECT_THROW((void)mapping::mapTexture(base, stud, patches[1], skipping), InvalidInput);
 }
 
-TEST(Scatter, SharesDistancesAndMakesThePatchesThatStandAlone) {
+/// Between corners of levels: the counts between them may be rounded another way.
+double worstApart(const Patch& one, const Patch& other) {
+  if (one.levels.size() != other.levels.size()) return HUGE_VAL;
+  const auto cornersOf = [](const mapping::ParticleLevel& level) {
+    const std::size_t u = level.columns - 1, v = level.rows - 1;
+    return std::array{level.at(0, 0), level.at(u, 0), level.at(u, v), level.at(0, v)};
+  };
+  double worst = 0;
+  for (std::size_t k = 0; k < one.levels.size(); ++k) {
+    const auto a = cornersOf(one.levels[k]), b = cornersOf(other.levels[k]);
+    for (std::size_t i = 0; i < 4; ++i) worst = std::max(worst, (a[i] - b[i]).length());
+  }
+  return worst;
+}
+
+TEST(Scatter, PatchesThatShareDistancesStandAsThoseAlone) {
   const NarrowBand base = ball();
   mapping::ScatterOptions options;
-  options.density.count = 40;
-  options.uSize = options.vSize = 0.5;
+  options.density.count = 16;
+  options.density.scale = [](const V3d& p) { return p.x > 0 ? 1.0 : 0.5; };
+  options.uSize = options.vSize = 1;
   options.patch.levels = 4;
-  constexpr double kHeight = 1;
-  const mapping::PatchSpaceOptions space;
-  const std::vector<V3d> places = {V3d(0, 0, kRadius)};
-  // So many do share, so few do not.
-  EXPECT_TRUE(mapping::sweepSharedSpace(base, {places, 40, 0.5, 0.5, kHeight}, space));
-  EXPECT_FALSE(mapping::sweepSharedSpace(base, {places, 2, 0.5, 0.5, kHeight}, space));
-  EXPECT_FALSE(mapping::sweepSharedSpace(base, {places, 40, 0.5, 0.5, kHeight}, {.maxMemory = 1}));
-  const auto together = mapping::scatter(base, kHeight, options);
-  ASSERT_EQ(together.patches.size(), 40u);
-  for (std::size_t n = 0; n < together.patches.size(); n += 13) {
-    const Patch alone =
-        mapping::makePatch(base, together.sites[n].corners, kHeight, options.patch).patch;
-    ASSERT_EQ(alone.levels.size(), together.patches[n].levels.size());
-    for (std::size_t k = 0; k < alone.levels.size(); ++k) {
-      const auto& one = alone.levels[k].positions;
-      const auto& other = together.patches[n].levels[k].positions;
-      ASSERT_EQ(one.size(), other.size());
-      for (std::size_t i = 0; i < one.size(); ++i)
-        EXPECT_LT((one[i] - other[i]).length(), 1e-3 * base.voxelSize());
+  for (const auto& [scheme, height] : {std::pair(mapping::LevelScheme::Reduced, 1.0),
+                                       std::pair(mapping::LevelScheme::Reduced, 4.5),
+                                       std::pair(mapping::LevelScheme::Conforming, 1.0)}) {
+    options.patch.scheme = scheme;
+    const auto together = mapping::scatter(base, height, options);
+    ASSERT_EQ(together.patches.size(), 16u) << together.cause;
+    for (std::size_t n = 0; n < together.patches.size(); n += 8) {
+      const mapping::PatchSite& site = together.sites[n];
+      const Patch alone =
+          mapping::makePatch(base, site.corners, height * site.scale, options.patch).patch;
+      // The tall ones alone take voxels of twice the size; together, those of the lowest.
+      const double voxel = (height > 4 ? 2 : 1) * base.voxelSize();
+      EXPECT_LT(worstApart(alone, together.patches[n]), 0.02 * voxel) << height;
     }
   }
+}
+
+TEST(PatchSpace, IsSharedWhereThatCostsLess) {
+  const NarrowBand base = ball();
+  const auto isShared = [&](std::size_t count, double lowest, double highest,
+                            std::size_t maxMemory = levelset::kNoMemoryLimit) {
+    return mapping::sweepSharedSpace(base, {count, 0.5, 0.5, lowest, highest},
+                                     {.maxMemory = maxMemory});
+  };
+  const auto many = isShared(40, 1, 1);
+  ASSERT_TRUE(many);
+  EXPECT_DOUBLE_EQ(many->voxelSize(), base.voxelSize());
+  EXPECT_GE(many->halfWidth() * many->voxelSize(), 1.6 - 1e-9);
+  EXPECT_FALSE(isShared(1, 1, 1));
+  EXPECT_FALSE(isShared(40, 1, 1, 1000));
+  EXPECT_FALSE(isShared(40, 0.1, -1));  // reached as it is
+  // As coarse as the lowest of them may be, and no coarser.
+  const auto tall = isShared(40, 4.5, 6);
+  ASSERT_TRUE(tall);
+  EXPECT_DOUBLE_EQ(tall->voxelSize(), 2 * base.voxelSize());
+  const auto mixed = isShared(40, 1, 6);
+  ASSERT_TRUE(mixed);
+  EXPECT_DOUBLE_EQ(mixed->voxelSize(), base.voxelSize());
+}
+
+TEST(PatchSpace, IsItsOwnWhereTheSharedOneDoesNotDo) {
+  const NarrowBand base = ball();
+  const std::vector<V3d> border = {V3d(0, 0, kRadius), V3d(0.3, 0, std::sqrt(4 - 0.09))};
+  const auto voxelOf = [&](const NarrowBand& shared, double height) {
+    return mapping::sweepPatchSpace(base, border, 0.1, height, {.shared = &shared}).voxelSize();
+  };
+  const NarrowBand wide = mapping::sweepSharedSpace(base, {40, 0.5, 0.5, 4.5, 6}, {}).value();
+  EXPECT_DOUBLE_EQ(voxelOf(wide, 5), wide.voxelSize());
+  EXPECT_DOUBLE_EQ(voxelOf(wide, 1), base.voxelSize());  // too coarse
+  const NarrowBand low = mapping::sweepSharedSpace(base, {40, 0.5, 0.5, 1, 1}, {}).value();
+  const NarrowBand made = mapping::sweepPatchSpace(base, border, 0.1, 1.5, {.shared = &low});
+  EXPECT_GE(made.halfWidth() * made.voxelSize(), 2.1 - 1e-9);  // it does not reach
+}
+
+TEST(Scatter, RefusesAHeightThatIsNoneBeforeItSweeps) {
+  for (const double height : {-1.0, std::nan(""), HUGE_VAL})
+    EXPECT_THROW((void)mapping::scatter(ball(), height, small(40)), UsageError);
 }
 
 }  // namespace scatter_test
