@@ -326,13 +326,13 @@ class Animation {
   /// Each sentence once between two keys, for all patches and frames.
   void tellOfPath(std::size_t f, const PatchPath& path, bool isNew) {
     if (!path.isAlike()) {
-      tellOnce(warnedOfWays_,
-               fmt::format("{}: frame {}: the corners' ways could not be laid beside that of the "
-                           "patch's centre; "
-                           "each takes its own shortest, and where these lead around different "
-                           "sides the patch is "
-                           "stretched; try --carry rigid, or a patch between the two",
-                           kAnimation, f));
+      tellOnce(
+          warnedOfWays_,
+          fmt::format("{}: frame {}: the corners' ways could not be laid beside that of the "
+                      "patch's centre; each takes its own shortest, and where these lead around "
+                      "different sides the patch is stretched; try --carry rigid, or a patch "
+                      "between the two",
+                      kAnimation, f));
     }
     constexpr double kMostTurn = 1;  // radians: sides shrink by the cosine of half of it
     if (isNew && options_.carry == CarryRule::Corners && std::abs(path.turn()) > kMostTurn) {
@@ -397,8 +397,7 @@ class Animation {
     if (drift.factor() > options_.driftWarning) {
       tellOnce(warnedOfDrift_,
                fmt::format("{}: frame {}: sides or diagonals of the patch are {:.3g} to {:.3g} "
-                           "times as long as at "
-                           "first; {}",
+                           "times as long as at first; {}",
                            kAnimation, f, drift.least, drift.most,
                            options_.carry == CarryRule::Corners ? "--carry rigid keeps its shape"
                                                                 : "the surface bends under it"));

@@ -2,13 +2,10 @@
 
 #include <Imath/ImathVec.h>
 
-#include <functional>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
-#include "levelset/error.h"
 #include "levelset/solids/shapes.h"
 #include "mapping/animation/animation.h"
 
@@ -62,15 +59,6 @@ inline Played play(const levelset::NarrowBand& base, const std::vector<mapping::
     played.patches.push_back(f.patches.at(0));
   });
   return played;
-}
-
-inline std::string refusalOf(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const levelset::Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 }  // namespace support

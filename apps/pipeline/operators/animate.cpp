@@ -435,7 +435,7 @@ Value animate(Invocation& in) {
   mapping::TextureAnimationOptions options;
   options.animation = animationOptions(in, keys);
   options.texture = textureOptions(in);
-  if (in.flag("unfold") || in.text("relax") != "none") {
+  if (improvesPatches(in)) {
     options.improve = [&](const mapping::PatchFrame& frame) {
       return improvedAt(in, frame, textureBox.size());
     };
@@ -523,10 +523,8 @@ void addAnimationOperators(std::vector<Operator>& all) {
           "to. All are those of frame 0, but for the further patches, each of which stands on the "
           "base of its own frame. Between two patches the first is carried forwards and the second "
           "backwards along the bases, and the way between them is gone evenly; frames between "
-          "follow "
-          "the first in how they are made. Each frame is "
-          "written when it is done; the result is the last. What does not change is not computed "
-          "again.",
+          "follow the first in how they are made. Each frame is written when it is done; the "
+          "result is the last. What does not change is not computed again.",
       .example =
           "levelsmith sphere --radius 10 --voxel 0.8 --as ball ! torus --radius 4 --tube 1.5 "
           "--voxel 0.8 --as ring ! patch @ball --at 0,0,10 --size 8,8 --height 3 --levels 2 "

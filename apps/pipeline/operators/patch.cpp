@@ -101,9 +101,9 @@ std::array<V3d, 4> cornersOf(Invocation& in) {
 }
 
 /// Corners about a point run the right way round, unless the surface bends too much between them.
-/// @return what to say then; empty for corners that were given
-std::string whyMirrored(const Invocation& in) {
-  if (in.given("corners")) return "";
+/// @return what to say then; empty where the caller gave the corners, or allowed it
+std::string whyMirrored(const Invocation& in, const mapping::PatchOptions& options) {
+  if (in.given("corners") || options.mirror) return "";
   return fmt::format(
       "{}: the surface bends too much about {} for a patch of size {}, it would be laid the wrong "
       "way round; make it smaller, or lay it elsewhere",
@@ -204,8 +204,8 @@ Value patch(Invocation& in) {
         mapping::makePatch(base, footprints[0].corners, footprints[0].height, now).patch};
   };
   return patchesOf(in, std::move(recipe),
-                   [base = in.band(), corners = cornersOf(in), options, why = whyMirrored(in)](
-                       double height, const Progress& progress) {
+                   [base = in.band(), corners = cornersOf(in), options,
+                    why = whyMirrored(in, options)](double height, const Progress& progress) {
                      mapping::PatchOptions now = options;
                      now.progress = progress;
                      now.mirror |= !why.empty();
@@ -301,7 +301,7 @@ Value patchGrid(Invocation& in) {
         .patches;
   };
   return patchesOf(in, std::move(recipe),
-                   [base = in.band(), corners, grid, options, why = whyMirrored(in)](
+                   [base = in.band(), corners, grid, options, why = whyMirrored(in, options)](
                        double height, const Progress& progress) {
                      mapping::PatchOptions now = options;
                      now.progress = progress;

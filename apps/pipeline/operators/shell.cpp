@@ -220,8 +220,12 @@ std::vector<Param> withShell(std::vector<Param> params) {
   return params;
 }
 
+bool improvesPatches(const Invocation& in) {
+  return in.flag("unfold") || isRelaxed(in);
+}
+
 void validateShell(const Invocation& in) {
-  if (in.given("sides") && !in.flag("unfold") && in.text("relax") == "none")
+  if (in.given("sides") && !improvesPatches(in))
     throw UsageError(
         fmt::format("{}: --sides goes with --unfold or --relax; leave it out", in.op().name));
 }

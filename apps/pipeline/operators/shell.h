@@ -22,6 +22,9 @@ struct ImprovedPatches {
   nlohmann::ordered_json figures = nlohmann::ordered_json::object();
 };
 
+/// Do --unfold or --relax move particles?
+[[nodiscard]] bool improvesPatches(const Invocation& in);
+
 /// What --unfold and --relax make of patches of a base, told in the notes.
 /// @param sink  world units; @param textureSize  of the box that is the unit cube
 [[nodiscard]] ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base,

@@ -15,6 +15,7 @@
 #include "mapping/animation/patch_path.h"
 #include "mapping/surface/geodesic.h"
 #include "tests/support/animation.h"
+#include "tests/support/files.h"
 #include "tests/support/patches.h"
 
 namespace animation_test {
@@ -34,7 +35,6 @@ using support::keyOf;
 using support::patchAt;
 using support::play;
 using support::Played;
-using support::refusalOf;
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kVoxel = support::kStageVoxel;
@@ -249,7 +249,9 @@ TEST(PatchPath, KeepsToTheSideOfItsGuide) {
 TEST(PatchPath, RefusesAnotherComponent) {
   const NarrowBand two = levelset::unite(ballAt(V3d(-2, 0, 0)), ballAt(V3d(2, 0, 0)));
   const Footprint a = footprint(two, V3d(-2, 0, 1)), b = footprint(two, V3d(2, 0, 1));
-  EXPECT_NE(refusalOf([&] { PatchPath(two, a, b, CarryRule::Corners); }).find("no way"),
+  EXPECT_NE(support::refusal<levelset::Error>([&] {
+              PatchPath(two, a, b, CarryRule::Corners);
+            }).find("no way"),
             std::string::npos);
 }
 
@@ -324,14 +326,14 @@ TEST(AnimatePatches, TellsTheFrameOfWhatItRefuses) {
                             0.2, support::thinPatch())
                       .patch;
   const auto bases = [&](std::size_t f) { return base(f < 2 ? 0.7 : 1.3); };
-  const std::string torn =
-      refusalOf([&] { (void)play(first, {keyOf(a)}, {.frames = 4, .bases = bases}); });
+  const std::string torn = support::refusal<levelset::Error>(
+      [&] { (void)play(first, {keyOf(a)}, {.frames = 4, .bases = bases}); });
   EXPECT_NE(torn.find("animate: frame 2: "), std::string::npos) << torn;
   EXPECT_NE(torn.find("one part of the base"), std::string::npos) << torn;
   EXPECT_EQ(torn.find("frame"), torn.rfind("frame")) << torn;
   // Nothing is left.
   const NarrowBand ball = ballAt(V3d(0));
-  const std::string gone = refusalOf([&] {
+  const std::string gone = support::refusal<levelset::Error>([&] {
     (void)play(ball, {keyOf(patchAt(ball, V3d(0, 0, 1)))},
                {.frames = 3, .bases = [&](std::size_t f) { return f < 2 ? ball : NarrowBand(); }});
   });
@@ -339,7 +341,7 @@ TEST(AnimatePatches, TellsTheFrameOfWhatItRefuses) {
   // The keys on two parts.
   const NarrowBand two = base(1.3);
   std::size_t made = 0;
-  const std::string apart = refusalOf([&] {
+  const std::string apart = support::refusal<levelset::Error>([&] {
     (void)mapping::animatePatches(
         two, {keyOf(patchAt(two, V3d(-1.3, 0, 1))), keyOf(patchAt(two, V3d(1.3, 0, 1)), 3)},
         {.frames = 4, .make = support::remakePatches}, [&](const PatchFrame&) { ++made; });
@@ -387,7 +389,7 @@ TEST(AnimatePatches, RefusesKeysThatDoNotGoTogether) {
   const NarrowBand ball = ballAt(V3d(0));
   const Patch a = patchAt(ball, V3d(0, 0, 1));
   const auto refusal = [&](const std::vector<AnimationKey>& keys) {
-    return refusalOf([&] { (void)play(ball, keys, {.frames = 4}); });
+    return support::refusal<levelset::Error>([&] { (void)play(ball, keys, {.frames = 4}); });
   };
   EXPECT_NE(refusal({keyOf(a), keyOf(a, 4)}).find("patch 2 stands at frame 4"), std::string::npos);
   EXPECT_NE(refusal({keyOf(a), keyOf(a, 2), keyOf(a, 2)}).find("patch 3"), std::string::npos);
@@ -420,7 +422,7 @@ TEST(AnimatePatches, RefusesKeysOfAnotherBaseBeforeAFrameIsMade) {
   std::size_t made = 0;
   const auto refusal = [&](const std::vector<AnimationKey>& keys,
                            const mapping::BandFrames& bases) {
-    return refusalOf([&] {
+    return support::refusal<levelset::Error>([&] {
       (void)mapping::animatePatches(ball, keys,
                                     {.frames = 4, .bases = bases, .make = support::remakePatches},
                                     [&](const PatchFrame&) { ++made; });
@@ -447,7 +449,7 @@ TEST(AnimatePatches, TellsTheFrameOnceWhateverRefuses) {
   const auto expect = [&](const auto& error, const std::string& sentence) {
     using Thrown = std::decay_t<decltype(error)>;
     EXPECT_THROW((void)throwing(error), Thrown);
-    EXPECT_EQ(refusalOf([&] { (void)throwing(error); }), sentence);
+    EXPECT_EQ(support::refusal<levelset::Error>([&] { (void)throwing(error); }), sentence);
   };
   expect(levelset::InvalidInput("texture: a"), "animate: frame 1: a");
   expect(levelset::ResourceLimit("map: b"), "animate: frame 1: map: b");

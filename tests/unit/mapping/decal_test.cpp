@@ -10,6 +10,7 @@
 #include "levelset/solids/shapes.h"
 #include "mapping/maps/shell_map.h"
 #include "mapping/surface/surface_walk.h"
+#include "tests/support/files.h"
 #include "tests/support/patches.h"
 #include "tests/support/threads.h"
 
@@ -37,15 +38,6 @@ void forEachParticle(const ParticleLevel& level, double radius, const Visit& vis
   for (std::size_t j = 0; j < level.rows; ++j)
     for (std::size_t i = 0; i < level.columns; ++i)
       visit(radius * shareOf(i, level.columns), radius * shareOf(j, level.rows), level.at(i, j));
-}
-
-std::string refusalOf(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const levelset::Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 NarrowBand slab(double voxel = 0.1) {
@@ -222,7 +214,8 @@ TEST(Decal, RefusesToGoBeyondTheCutLocus) {
   const NarrowBand ball = support::makeBall(1, 0.1);
   const V3d z(0, 0, 1), x(1, 0, 0);
   EXPECT_NO_THROW((void)makeDecal(ball, z, x, 2.0, 0.1, options));
-  const std::string fold = refusalOf([&] { (void)makeDecal(ball, z, x, 2.6, 0.1, options); });
+  const std::string fold =
+      support::refusal<levelset::Error>([&] { (void)makeDecal(ball, z, x, 2.6, 0.1, options); });
   EXPECT_GT(advisedRadius(fold), 1.5) << fold;
   EXPECT_NO_THROW((void)makeDecal(ball, z, x, 0.99 * advisedRadius(fold), 0.1, options)) << fold;
 
@@ -230,8 +223,8 @@ TEST(Decal, RefusesToGoBeyondTheCutLocus) {
   const NarrowBand pipe = support::sampleBand([](const V3d& p) { return std::hypot(p.x, p.y) - 1; },
                                               {V3d(-1, -1, -5), V3d(1, 1, 5)}, 0.1);
   EXPECT_NO_THROW((void)makeDecal(pipe, x, V3d(0, 1, 0), 0.93 * kPi, 0.1, options));
-  const std::string round =
-      refusalOf([&] { (void)makeDecal(pipe, x, V3d(0, 1, 0), 1.15 * kPi, 0.1, options); });
+  const std::string round = support::refusal<levelset::Error>(
+      [&] { (void)makeDecal(pipe, x, V3d(0, 1, 0), 1.15 * kPi, 0.1, options); });
   EXPECT_NE(round.find("comes round to itself"), std::string::npos) << round;
   EXPECT_GT(advisedRadius(round), 0.75 * kPi) << round;
   EXPECT_NO_THROW((void)makeDecal(pipe, x, V3d(0, 1, 0), 0.99 * advisedRadius(round), 0.1, options))
@@ -240,8 +233,8 @@ TEST(Decal, RefusesToGoBeyondTheCutLocus) {
 
 TEST(Decal, RefusesToRunOffTheSurface) {
   const NarrowBand band = slab();  // ends at x, y = ±2 and some voxels
-  const std::string message =
-      refusalOf([&] { (void)makeDecal(band, V3d(0), V3d(1, 0, 0), 3, 0.2, kThin); });
+  const std::string message = support::refusal<levelset::Error>(
+      [&] { (void)makeDecal(band, V3d(0), V3d(1, 0, 0), 3, 0.2, kThin); });
   EXPECT_NE(message.find("breaks off"), std::string::npos) << message;
   const double advised = advisedRadius(message);
   EXPECT_GT(advised, 1.5) << message;
@@ -266,7 +259,7 @@ TEST(Decal, GoesAroundAnEarThatItsParticlesResolve) {
   // 0.4 to the edge, half a circle around it, the rest back below.
   EXPECT_NEAR(end.z, -half, 0.01);
   EXPECT_NEAR(end.x, 1 - (1.2 - 0.4 - kPi * half), 0.01);
-  const std::string coarse = refusalOf([&] {
+  const std::string coarse = support::refusal<levelset::Error>([&] {
     (void)makeDecal(plate, at, x, 1, 0.05,
                     {.levels = 2, .scheme = LevelScheme::Conforming, .spacing = 0.5});
   });

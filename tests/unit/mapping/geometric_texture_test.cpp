@@ -12,6 +12,7 @@
 #include "levelset/inspect/measure.h"
 #include "levelset/sample.h"
 #include "mapping/maps/shell_map.h"
+#include "tests/support/files.h"
 #include "tests/support/patches.h"
 #include "tests/support/threads.h"
 
@@ -50,15 +51,6 @@ NarrowBand makeSlab(double voxel) {
   return support::sampleBand(
       [](const V3d& p) { return boxDistance(p + V3d(0, 0, 1.5), V3d(6, 6, 1.5)); },
       {V3d(-6, -6, -3), V3d(6, 6, 0)}, voxel);
-}
-
-std::string refusal(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const levelset::InvalidInput& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(GeometricTexture, FlatPatchIsTheIdentity) {
@@ -340,7 +332,8 @@ TEST(GeometricTexture, RefusesPatchesThatFold) {
       p.y *= wanted / r, p.z *= wanted / r;
     }
   const NarrowBand ball = makeBall(1, 0.1, 3);
-  const std::string message = refusal([&] { (void)mapTexture(trough, ball, patch); });
+  const std::string message =
+      support::refusal<levelset::InvalidInput>([&] { (void)mapTexture(trough, ball, patch); });
   EXPECT_NE(message.find("most at ("), std::string::npos) << message;
   EXPECT_NE(message.find("u, v, w"), std::string::npos) << message;
 }

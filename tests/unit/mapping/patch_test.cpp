@@ -9,6 +9,7 @@
 
 #include "levelset/error.h"
 #include "mapping/surface/geodesic.h"
+#include "tests/support/files.h"
 #include "tests/support/patches.h"
 
 namespace patch_test {
@@ -35,15 +36,6 @@ NarrowBand sphere(double reach = 0.8) {
 NarrowBand slab(double reach = 1) {
   return wideBand([](const V3d& p) { return p.z; }, {V3d(-2, -2, -0.5), V3d(2, 2, 0.5)}, reach,
                   0.1);
-}
-
-std::string refusal(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const levelset::Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(Patch, IsALatticeOnAPlane) {
@@ -160,7 +152,8 @@ TEST(Patch, RefusesCornersThatRunClockwise) {
   const std::array<V3d, 4> clockwise = {V3d(-1, -0.5, 0), V3d(-1, 0.5, 0), V3d(1, 0.5, 0),
                                         V3d(1, -0.5, 0)};
   EXPECT_THROW((void)makePatch(band, clockwise, 0.3), levelset::UsageError);
-  const std::string message = refusal([&] { (void)makePatch(band, clockwise, 0.3); });
+  const std::string message =
+      support::refusal<levelset::UsageError>([&] { (void)makePatch(band, clockwise, 0.3); });
   EXPECT_NE(message.find("\"-1,-0.5,0 1,-0.5,0 1,0.5,0 -1,0.5,0\""), std::string::npos) << message;
   const PatchResult mirrored = makePatch(band, clockwise, 0.3, {.levels = 2, .mirror = true});
   EXPECT_TRUE(mirrored.patch.mirrored);
