@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "levelset/error.h"
@@ -20,35 +21,84 @@ using openvdb::Vec3SGrid;
 // Positions beyond any tree, NaN among them, still give a valid coordinate.
 constexpr double kFarthestIndex = 2147483000.0;
 
-/// Trilinear between the eight grid points about an index position; `pick` reads one number of a
-/// value.
-template <typename Accessor, typename Pick>
-double trilinear(const Accessor& accessor, const openvdb::Vec3d& index, const Pick& pick) {
-  Coord low;
-  double t[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    const double cell =
-        std::fmax(-kFarthestIndex, std::fmin(kFarthestIndex, std::floor(index[axis])));
-    low[axis] = static_cast<int>(cell);
-    t[axis] = std::fmax(0.0, std::fmin(1.0, index[axis] - cell));
+/// What is below a position on an axis: a cell of the grid, and the share of it.
+struct Cell {
+  int low;
+  double share;
+
+  explicit Cell(double index) {
+    // Comparisons that NaN fails, so that it goes to the far end.
+    const double near = index < kFarthestIndex ? index : kFarthestIndex;
+    const double inside = near > -kFarthestIndex ? near : -kFarthestIndex;
+    const int towardsZero = static_cast<int>(inside);
+    low = towardsZero - (static_cast<double>(towardsZero) > inside);
+    share = inside - low;
   }
-  double corner[8];
-  const auto* leaf = (low[0] & 7) < 7 && (low[1] & 7) < 7 && (low[2] & 7) < 7
-                         ? accessor.probeConstLeaf(low)
-                         : nullptr;
-  if (leaf) {
-    const auto* values = leaf->buffer().data() + leaf->coordToOffset(low);
-    for (int i = 0; i < 8; ++i)
-      corner[i] = static_cast<double>(pick(values[(i & 4 ? 64 : 0) + (i & 2 ? 8 : 0) + (i & 1)]));
-  } else {
-    for (int i = 0; i < 8; ++i)
-      corner[i] = static_cast<double>(
-          pick(accessor.getValue(low.offsetBy(i & 4 ? 1 : 0, i & 2 ? 1 : 0, i & 1))));
+};
+
+/// The N³ grid points from one on, in their leaf, or gathered from several.
+template <typename Value, int N>
+class PointBlock {
+ public:
+  template <typename Accessor>
+  PointBlock(const Accessor& accessor, const Coord& low) {
+    const Coord place(low[0] & 7, low[1] & 7, low[2] & 7);
+    const auto* leaf = accessor.probeConstLeaf(low);
+    if (leaf && place[0] <= 8 - N && place[1] <= 8 - N && place[2] <= 8 - N) {
+      first_ = leaf->buffer().data() + leaf->coordToOffset(low);
+      strideX_ = 64, strideY_ = 8;
+      return;
+    }
+    first_ = gathered_, strideX_ = N * N, strideY_ = N;
+    const auto next = [&](int axis, int i) { return i < 8 - place[axis] ? 8 - place[axis] : N; };
+    for (Coord from(0), to; from[0] < N; from[0] = to[0]) {
+      to[0] = std::min(N, next(0, from[0]));
+      for (from[1] = 0; from[1] < N; from[1] = to[1]) {
+        to[1] = std::min(N, next(1, from[1]));
+        for (from[2] = 0; from[2] < N; from[2] = to[2]) {
+          to[2] = std::min(N, next(2, from[2]));
+          gather(accessor, low, from, to);
+        }
+      }
+    }
   }
-  for (int i = 0; i < 4; ++i) corner[i] += t[0] * (corner[i + 4] - corner[i]);
-  for (int i = 0; i < 2; ++i) corner[i] += t[1] * (corner[i + 2] - corner[i]);
-  return corner[0] + t[2] * (corner[1] - corner[0]);
-}
+  PointBlock(const PointBlock&) = delete;
+  PointBlock& operator=(const PointBlock&) = delete;
+
+  /// Trilinear between eight of them; `pick` reads one number of a value.
+  /// @param first  of the eight
+  template <typename Pick>
+  [[nodiscard]] double trilinear(const Coord& first, const double (&t)[3], const Pick& pick) const {
+    const Value* values = first_ + first[0] * strideX_ + first[1] * strideY_ + first[2];
+    const auto between = [](double a, double b, double share) { return a + share * (b - a); };
+    const auto alongZ = [&](const Value* v) {
+      return between(static_cast<double>(pick(v[0])), static_cast<double>(pick(v[1])), t[2]);
+    };
+    const auto alongY = [&](const Value* v) {
+      return between(alongZ(v), alongZ(v + strideY_), t[1]);
+    };
+    return between(alongY(values), alongY(values + strideX_), t[0]);
+  }
+
+ private:
+  /// Those of one leaf, or tile.
+  template <typename Accessor>
+  void gather(const Accessor& accessor, const Coord& low, const Coord& from, const Coord& to) {
+    const Coord first = low + from;
+    const auto* leaf = accessor.probeConstLeaf(first);
+    const Value* values = leaf ? leaf->buffer().data() + leaf->coordToOffset(first) : nullptr;
+    const Value tile = leaf ? Value(0) : accessor.getValue(first);
+    for (int x = from[0]; x < to[0]; ++x)
+      for (int y = from[1]; y < to[1]; ++y)
+        for (int z = from[2]; z < to[2]; ++z)
+          gathered_[(x * N + y) * N + z] =
+              values ? values[64 * (x - from[0]) + 8 * (y - from[1]) + (z - from[2])] : tile;
+  }
+
+  const Value* first_;
+  int strideX_, strideY_;
+  Value gathered_[N * N * N];
+};
 
 /// A grid that many threads sample: each through an accessor of its own. The tree does not change,
 /// so nobody need be told of it.
@@ -74,8 +124,41 @@ class FieldSampler {
 ScalarField sampled(std::shared_ptr<const void> owner, const FloatGrid& grid) {
   const auto sampler = std::make_shared<FieldSampler<FloatGrid>>(std::move(owner), grid);
   return [sampler](const V3d& world) {
-    return trilinear(sampler->accessor(), sampler->toIndex(world), [](float v) { return v; });
+    const openvdb::Vec3d index = sampler->toIndex(world);
+    const Cell x(index[0]), y(index[1]), z(index[2]);
+    const PointBlock<float, 2> block(sampler->accessor(), {x.low, y.low, z.low});
+    return block.trilinear(Coord(0), {x.share, y.share, z.share}, [](float v) { return v; });
   };
+}
+
+using VectorSampler = FieldSampler<Vec3SGrid>;
+
+/// All three numbers stand at the grid's points.
+V3d centredVector(VectorSampler& sampler, const V3d& world) {
+  const openvdb::Vec3d index = sampler.toIndex(world);
+  const Cell x(index[0]), y(index[1]), z(index[2]);
+  const PointBlock<openvdb::Vec3s, 2> block(sampler.accessor(), {x.low, y.low, z.low});
+  V3d result;
+  for (int i = 0; i < 3; ++i)
+    result[i] = block.trilinear(Coord(0), {x.share, y.share, z.share},
+                                [i](const openvdb::Vec3s& v) { return v[i]; });
+  return result;
+}
+
+/// Each number stands half a voxel before the grid's points along its own axis.
+V3d staggeredVector(VectorSampler& sampler, const V3d& world) {
+  const openvdb::Vec3d index = sampler.toIndex(world);
+  const Cell x(index[0]), y(index[1]), z(index[2]);
+  const PointBlock<openvdb::Vec3s, 3> block(sampler.accessor(), {x.low, y.low, z.low});
+  V3d result;
+  for (int i = 0; i < 3; ++i) {
+    Coord first(0);
+    double t[3] = {x.share, y.share, z.share};
+    first[i] = t[i] < 0.5 ? 0 : 1;
+    t[i] += first[i] ? -0.5 : 0.5;
+    result[i] = block.trilinear(first, t, [i](const openvdb::Vec3s& v) { return v[i]; });
+  }
+  return result;
 }
 
 template <typename GridT>
@@ -169,18 +252,9 @@ VectorField asVectorField(const FieldGrid& grid, const char* action) {
   }
   const auto sampler =
       std::make_shared<FieldSampler<Vec3SGrid>>(grid.shared(), *grid.shared()->vector);
-  const double half = grid.isStaggered() ? 0.5 : 0;
-  return [sampler, half](const V3d& world, double) {
-    const openvdb::Vec3d index = sampler->toIndex(world);
-    const auto& accessor = sampler->accessor();
-    V3d result;
-    for (int i = 0; i < 3; ++i) {
-      openvdb::Vec3d at = index;
-      at[i] += half;
-      result[i] = trilinear(accessor, at, [i](const openvdb::Vec3s& v) { return v[i]; });
-    }
-    return result;
-  };
+  if (grid.isStaggered())
+    return [sampler](const V3d& world, double) { return staggeredVector(*sampler, world); };
+  return [sampler](const V3d& world, double) { return centredVector(*sampler, world); };
 }
 
 FieldGrid importField(const FloatGrid::Ptr& grid, const char* action) {

@@ -119,9 +119,11 @@ struct Advection::Impl {
   /// In voxels of the band's grid, masked.
   [[nodiscard]] flow::Velocity inVoxels(const VectorField& velocity) const {
     const Imath::M44d toWorld = band.indexToWorld(), toIndex = toWorld.inverse();
-    return [this, &velocity, toWorld, toIndex](const V3d& place, double at) {
+    const V3d origin = toWorld.translation();
+    return [this, &velocity, toWorld, toIndex, origin](const V3d& place, double at) {
       V3d world, result;
-      toWorld.multVecMatrix(place, world);
+      toWorld.multDirMatrix(place, world);
+      world += origin;
       const double share = options.mask ? options.mask->weight(world) : 1;
       if (share == 0) return V3d(0);
       toIndex.multDirMatrix(velocity(world, at) * share, result);

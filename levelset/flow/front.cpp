@@ -20,15 +20,15 @@ using Triangle = std::array<std::uint32_t, 3>;
 
 constexpr double kLongestEdge = 1;  // voxels
 // A step moves no vertex further than this many voxels, turns and stretches no edge by more than
-// this share of it, and errs by no more voxels than this at any vertex.
-constexpr double kFarthestMove = 16, kMostStrain = 0.4, kMostError = 5e-4;
+// this share of it, or of the longest, and errs by no more voxels than this at any vertex. The
+// stretch is limited because the curve of a new vertex is laid over a whole edge: shorter ones need
+// no new vertex, and what their ends do is the error's business alone.
+constexpr double kFarthestMove = 16, kMostStrain = 0.7, kMostError = 2e-3;
 // Where no velocity moves further than this within a step it may err by more: where the velocity
 // jumps, no step would be short enough.
 constexpr double kShortMove = 0.25;
 // What the method's second look may stand off the others, voxels.
 constexpr double kMostSecond = 1;
-// Differences over shorter edges tell more of rounding than of strain.
-constexpr double kShortestEdge = 0.25;
 // Positions, triangles and what splitting and moving keep beside them.
 constexpr double kBytesPerTriangle = 100;
 // A surface with more triangles than this for each voxel of the largest area that it has had is
@@ -68,8 +68,9 @@ class Splitter {
     return (mesh_.positions[a] - mesh_.positions[b]).length2() > kLongestEdge * kLongestEdge;
   }
 
+  /// One of the two triangles at an edge goes along it upwards.
   void mark(std::uint32_t a, std::uint32_t b) {
-    if (isLong(a, b)) edges_.push_back(edgeKey(a, b));
+    if (a < b && isLong(a, b)) edges_.push_back(edgeKey(a, b));
   }
 
   /// Number of a long edge.
@@ -235,19 +236,22 @@ double Front::tryStep(const Journey& journey, double from, double to) {
 }
 
 double Front::mostStrain() const {
-  return tbb::parallel_reduce(
+  const double squared = tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, mesh_.triangles.size(), 1024), 0.0,
       [&](const auto& range, double largest) {
         for (std::size_t i = range.begin(); i != range.end(); ++i)
           for (std::size_t k = 0; k < 3; ++k) {
             const std::uint32_t a = mesh_.triangles[i][k], b = mesh_.triangles[i][(k + 1) % 3];
+            if (a > b) continue;  // the triangle on its other side asks
             const V3d before = mesh_.positions[b] - mesh_.positions[a];
             const V3d change = moved_[b] - moved_[a] - before;
-            largest = std::max(largest, change.length() / std::max(kShortestEdge, before.length()));
+            largest = std::max(largest, change.length2() / std::max(kLongestEdge * kLongestEdge,
+                                                                    before.length2()));
           }
         return largest;
       },
       [](double a, double b) { return std::max(a, b); });
+  return std::sqrt(squared);
 }
 
 StepMade Front::step(const Journey& journey, double from, double longest) {

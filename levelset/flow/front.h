@@ -34,7 +34,7 @@ class Front {
   /// Puts the vertices of a step into `moved_`.
   /// @return the share of the step that would be allowed, 1 and more: all of it
   double tryStep(const Journey& journey, double from, double to);
-  /// How much the edges change on the way to `moved_`, as a share of their lengths.
+  /// How much the edges change on the way to `moved_`, as a share of their lengths or the longest.
   [[nodiscard]] double mostStrain() const;
   /// How long the first step may be, by the speeds at the start.
   [[nodiscard]] double firstStep(const Journey& journey) const;

@@ -1,5 +1,6 @@
 // Enright's deformation there and back, beside OpenVDB's own advection (HJ-WENO5, TVD-RK3) on the
-// same grid in one run. advect_bench [RESOLUTION …]
+// same grid in one run; the velocity is a function, then a staggered grid of the same voxels, which
+// both read with the same sampler. advect_bench [RESOLUTION …]
 
 #include <fmt/core.h>
 #include <sys/resource.h>
@@ -56,29 +57,39 @@ void show(const char* name, int resolution, const NarrowBand& ball, const Run& r
   const double start = cpuSeconds();
   const NarrowBand result = run();
   const double seconds = cpuSeconds() - start;
-  fmt::print("{:>4}  {:<16} volume {:+8.3f} %  surface L1 {:7.4f} voxels  {:7.1f} s CPU\n",
+  fmt::print("{:>4}  {:<18} volume {:+8.3f} %  surface L1 {:7.4f} voxels  {:7.1f} s CPU\n",
              resolution, name,
              100 * (levelset::measure(result).volume / levelset::measure(ball).volume - 1),
              surfaceError(result), seconds);
 }
 
+NarrowBand theirs(const NarrowBand& ball, const levelset::VectorField& velocity) {
+  return regress::peer::advect(ball, velocity, kPeriod, true);
+}
+
 }  // namespace
 
 int main(int count, char** arguments) {
+  using Scheme = levelset::AdvectScheme;
+  const levelset::VectorField function = levelset::enrightVelocity(kPeriod);
   for (int i = 1; i < std::max(2, count); ++i) {
     const int resolution = count > 1 ? std::atoi(arguments[i]) : 64;
-    const NarrowBand ball = levelset::makeSphere(kRadius, kCenter, 1.0 / resolution);
-    const auto ours = [&](levelset::AdvectScheme scheme) {
-      return levelset::advect(ball, levelset::enrightVelocity(kPeriod), kPeriod, {.scheme = scheme})
-          .band;
+    const double voxel = 1.0 / resolution;
+    const NarrowBand ball = levelset::makeSphere(kRadius, kCenter, voxel);
+    const auto ours = [&](Scheme scheme, const levelset::VectorField& velocity) {
+      return levelset::advect(ball, velocity, kPeriod, {.scheme = scheme}).band;
     };
-    show("front", resolution, ball, [&] { return ours(levelset::AdvectScheme::Front); });
+    show("front", resolution, ball, [&] { return ours(Scheme::Front, function); });
+    show("OpenVDB", resolution, ball, [&] { return theirs(ball, function); });
+    const levelset::VectorField still = regress::peer::staggered(function, voxel);  // at time 0
+    const levelset::VectorField staggered = [&still](const V3d& p, double time) {
+      return still(p, 0) * std::cos(M_PI * time / kPeriod);
+    };
+    show("front, staggered", resolution, ball, [&] { return ours(Scheme::Front, staggered); });
+    show("OpenVDB, staggered", resolution, ball, [&] { return theirs(ball, staggered); });
     show("semi-lagrangian", resolution, ball,
-         [&] { return ours(levelset::AdvectScheme::SemiLagrangian); });
-    show("upwind", resolution, ball, [&] { return ours(levelset::AdvectScheme::Upwind); });
-    show("OpenVDB", resolution, ball, [&] {
-      return regress::peer::advect(ball, levelset::enrightVelocity(kPeriod), kPeriod, true);
-    });
+         [&] { return ours(Scheme::SemiLagrangian, function); });
+    show("upwind", resolution, ball, [&] { return ours(Scheme::Upwind, function); });
   }
   return 0;
 }
