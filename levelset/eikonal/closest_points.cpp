@@ -67,4 +67,14 @@ FieldGrid extendOffSurface(const NarrowBand& solid, const ScalarField& attribute
   return importField(grid, "extend");
 }
 
+FieldGrid extendOffSurface(const NarrowBand& solid, const VectorField& attribute,
+                           const ClosestPointOptions& options) {
+  if (!attribute) throw UsageError("extend: there is no attribute; give a grid of vectors");
+  const auto grid = gridOfClosestPoints<openvdb::Vec3SGrid>(
+      solid, options, "extend",
+      [&](const openvdb::Vec3d& p) { return openvdb::Vec3s(toVdb(attribute(toImath(p), 0))); });
+  grid->setName("attribute");
+  return importField(grid, "extend");
+}
+
 }  // namespace levelset

@@ -29,4 +29,8 @@ struct ClosestPointOptions {
 [[nodiscard]] FieldGrid extendOffSurface(const NarrowBand& solid, const ScalarField& attribute,
                                          const ClosestPointOptions& options = {});
 
+/// The same of an attribute of vectors, at time 0.
+[[nodiscard]] FieldGrid extendOffSurface(const NarrowBand& solid, const VectorField& attribute,
+                                         const ClosestPointOptions& options = {});
+
 }  // namespace levelset

@@ -1,10 +1,12 @@
 #include "levelset/flow/smooth.h"
 
 #include <fmt/core.h>
+#include <openvdb/tools/Prune.h>
 
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <optional>
 
 #include "levelset/eikonal/distance_transform.h"
 #include "levelset/error.h"
@@ -17,6 +19,7 @@ using flow::BandBlocks;
 using flow::Field;
 using flow::Values;
 using openvdb::Coord;
+using openvdb::CoordBBox;
 
 constexpr const char* kSmooth = "smooth";
 // A Gaussian is cut here.
@@ -263,6 +266,113 @@ void applyMask(const Mask& mask, const openvdb::FloatGrid& grid, const BandBlock
   });
 }
 
+/// Grid points where the mask lets anything change; empty when nowhere.
+CoordBBox changingBox(const openvdb::FloatGrid& grid, const Mask& mask) {
+  CoordBBox box;
+  for (auto it = grid.cbeginValueOn(); it; ++it)
+    if (mask.weight(toImath(grid.transform().indexToWorld(it.getCoord()))) > 0)
+      box.expand(it.getCoord());
+  return box;
+}
+
+/// Puts what `source` holds in a box in place of what `target` does.
+void paste(const openvdb::FloatTree& source, const CoordBBox& box, openvdb::FloatTree& target) {
+  target.fill(box, target.background(), false);
+  for (auto it = source.cbeginValueAll(); it; ++it) {
+    if (it.isVoxelValue() || *it >= 0) continue;
+    CoordBBox tile;
+    it.getBoundingBox(tile);
+    tile.intersect(box);
+    if (!tile.empty()) target.fill(tile, *it, false);
+  }
+  for (auto leaf = source.cbeginLeaf(); leaf; ++leaf) {
+    if (!leaf->getNodeBoundingBox().hasOverlap(box)) continue;
+    auto* out = target.touchLeaf(leaf->origin());
+    for (auto it = leaf->cbeginValueAll(); it; ++it)
+      if (box.isInside(it.getCoord())) {
+        if (it.isValueOn())
+          out->setValueOn(it.pos(), *it);
+        else
+          out->setValueOff(it.pos(), *it);
+      }
+  }
+  openvdb::tools::pruneTiles(target);
+}
+
+struct Filtering {
+  SmoothKind kind;
+  double width;  ///< voxels
+  const SmoothOptions& options;
+
+  [[nodiscard]] double passes() const { return kind == SmoothKind::Taubin ? 2 : 1; }
+  /// How far from the surface distances have to be known, voxels.
+  [[nodiscard]] double known() const {
+    return kind == SmoothKind::Median ? width + 1 : passes() * kKnownReach * width;
+  }
+  /// How far from a grid point values are read, voxels.
+  [[nodiscard]] double reach() const {
+    return kind == SmoothKind::Median ? width + 1 : passes() * kGaussianReach * width;
+  }
+};
+
+/// The solid smoothed in a box of grid points, or everywhere; none when no surface is left there.
+std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const NarrowBand& solid,
+                                     const Filtering& filtering) {
+  const SmoothOptions& options = filtering.options;
+  const double voxel = solid.voxelSize();
+  eikonal::DistanceRequest request;
+  request.action = kSmooth;
+  request.maxMemory = options.maxMemory;
+  const auto around = [&](double voxels) {
+    CoordBBox wider = *box;
+    wider.expand(static_cast<int>(std::ceil(std::min(1e8, voxels))));
+    return wider;
+  };
+
+  // === Distances as far as the filter reads
+  // Those that are made in the end reach across the band from a surface as far away.
+  const double needed = std::max(filtering.reach(), 2 * solid.halfWidth() + 2) + 2 * kStencil;
+  openvdb::FloatGrid::Ptr field;
+  if (filtering.known() > solid.halfWidth() * 1.0001) {
+    request.halfWidth = filtering.known() + kStencil;
+    if (box) request.region = around(needed);
+    request.progress = subProgress(options.progress, 0, kWidened);
+    field = eikonal::distanceTransform(vdb(solid), request);
+  } else {
+    field = vdb(solid).deepCopy();
+    if (box) field->tree().clip(around(needed));
+  }
+
+  // === Filter
+  requireMemory(static_cast<double>(field->tree().leafCount()) * sizeof(Values) * kFieldsAlive,
+                options.maxMemory, kSmooth);
+  if (filtering.kind == SmoothKind::Median) requireMedian(*field, filtering.width);
+  const BlockFilter filter(*field,
+                           filtering.kind == SmoothKind::Median ? 1 : 3 * filtering.passes(),
+                           subProgress(options.progress, kWidened, kFiltered));
+  const Field before = filter.blocks().read(field->tree(), voxel);
+  Field after = filtered(filter, before, filtering.kind, filtering.width);
+  if (options.mask) applyMask(*options.mask, *field, filter.blocks(), before, after);
+  filter.blocks().write(after, voxel, field->tree());
+  if (!eikonal::hasZeroCrossing(field->tree())) return std::nullopt;
+
+  // === Distances again
+  request.halfWidth = solid.halfWidth();
+  request.progress = subProgress(options.progress, kFiltered, 1);
+  request.region.reset();
+  if (!box) return makeBand(eikonal::distanceTransform(*field, request));
+  request.region = around(solid.halfWidth() + 1);
+  openvdb::FloatGrid::Ptr changed;
+  try {
+    changed = eikonal::distanceTransform(*field, request);
+  } catch (const InvalidInput&) {
+    return std::nullopt;  // the crossings are those of the part's own borders
+  }
+  const openvdb::FloatGrid::Ptr result = vdb(solid).deepCopy();
+  paste(changed->tree(), *request.region, result->tree());
+  return makeBand(result);
+}
+
 }  // namespace
 
 NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothOptions& options) {
@@ -273,43 +383,19 @@ NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothO
   if (solid.isEmpty())
     throw InvalidInput(fmt::format(
         "{}: the solid is empty, so there is no surface to smooth; give a solid", kSmooth));
-  const double voxel = solid.voxelSize(), width = sigma / voxel;
-  eikonal::DistanceRequest request;
-  request.action = kSmooth;
-  request.maxMemory = options.maxMemory;
-
-  // === Distances as far as the filter reads
-  const double passes = kind == SmoothKind::Taubin ? 2 : 1;
-  const double known = kind == SmoothKind::Median ? width + 1 : passes * kKnownReach * width;
-  openvdb::FloatGrid::Ptr field;
-  if (known > solid.halfWidth() * 1.0001) {
-    request.halfWidth = known + kStencil;
-    request.progress = subProgress(options.progress, 0, kWidened);
-    field = eikonal::distanceTransform(vdb(solid), request);
-  } else {
-    field = vdb(solid).deepCopy();
+  const Filtering filtering{kind, sigma / solid.voxelSize(), options};
+  if (options.mask) {
+    const CoordBBox box = changingBox(vdb(solid), *options.mask);
+    if (box.empty()) return solid;
+    // Without a surface near by, what is left elsewhere tells the distances.
+    if (!box.isInside(vdb(solid).evalActiveVoxelBoundingBox()))
+      if (auto part = smoothedIn(box, solid, filtering)) return std::move(*part);
   }
-
-  // === Filter
-  requireMemory(static_cast<double>(field->tree().leafCount()) * sizeof(Values) * kFieldsAlive,
-                options.maxMemory, kSmooth);
-  if (kind == SmoothKind::Median) requireMedian(*field, width);
-  const BlockFilter filter(*field, kind == SmoothKind::Median ? 1 : 3 * passes,
-                           subProgress(options.progress, kWidened, kFiltered));
-  const Field before = filter.blocks().read(field->tree(), voxel);
-  Field after = filtered(filter, before, kind, width);
-  if (options.mask) applyMask(*options.mask, *field, filter.blocks(), before, after);
-  filter.blocks().write(after, voxel, field->tree());
-  if (!eikonal::hasZeroCrossing(field->tree()))
-    throw InvalidInput(
-        fmt::format("{}: nothing is left of the solid with a sigma of {} world units; give a "
-                    "smaller one",
-                    kSmooth, sigma));
-
-  // === Distances again
-  request.halfWidth = solid.halfWidth();
-  request.progress = subProgress(options.progress, kFiltered, 1);
-  return makeBand(eikonal::distanceTransform(*field, request));
+  if (auto whole = smoothedIn(std::nullopt, solid, filtering)) return std::move(*whole);
+  throw InvalidInput(
+      fmt::format("{}: nothing is left of the solid with a sigma of {} world units; give a "
+                  "smaller one",
+                  kSmooth, sigma));
 }
 
 }  // namespace levelset

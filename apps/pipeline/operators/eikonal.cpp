@@ -98,6 +98,10 @@ Value extend(Invocation& in, double reach) {
   levelset::ClosestPointOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
   options.halfWidth = reach / in.band().voxelSize();
   in.notes.notes.push_back("the attribute is that of the closest point of the surface");
+  const auto named = in.named.find("extend");
+  if (named != in.named.end() && named->second.kind() == Kind::Field &&
+      named->second.field().isVector())
+    return Value(levelset::extendOffSurface(in.band(), vectorField(in, "extend"), options));
   return Value(levelset::extendOffSurface(in.band(), attributeOf(in), options));
 }
 

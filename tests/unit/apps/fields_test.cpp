@@ -107,6 +107,15 @@ TEST_F(FieldCommand, ReadsTellsAndWritesFields) {
   EXPECT_REFUSED(levelsmith("read wind.vdb --grid wind ! write a.ply"), 2, "write .vdb");
 }
 
+TEST_F(FieldCommand, CarriesVectorsOffTheSurface) {
+  const auto outcome = levelsmith(
+      "sphere --radius 1 --voxel 0.1 --as ball ! closest-point --half-width 3 --as feet ! sweep "
+      "@ball "
+      "--extend @feet --to 4vx ! info --json");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(nlohmann::json::parse(outcome.out)["values"], "vectors");
+}
+
 TEST_F(FieldCommand, TellsWhereAnAttributeIsNotFinite) {
   const auto outcome = levelsmith("sphere --radius 1 --voxel 0.1 ! sweep --extend \"1/x\"");
   EXPECT_REFUSED(outcome, 3, "sweep: --extend: '1/x' is");

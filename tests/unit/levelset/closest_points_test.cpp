@@ -77,11 +77,26 @@ TEST(ClosestPoints, CarryAnAttributeAlongNormals) {
   EXPECT_LE(error, 5e-3);
 }
 
+TEST(ClosestPoints, CarryVectorsAsTheirNumbers) {
+  const VectorField spin = [](const V3d& p, double time) { return V3d(-p.y, p.x, p.z + time); };
+  const NarrowBand solid = ball(12);
+  const FieldGrid vectors = extendOffSurface(solid, spin);
+  ASSERT_TRUE(vectors.isVector());
+  for (int i = 0; i < 3; ++i) {
+    const ScalarField one = [&](const V3d& p) { return spin(p, 0)[i]; };
+    const FieldGrid numbers = extendOffSurface(solid, one);
+    const auto accessor = vectors.shared()->vector->getConstAccessor();
+    for (auto it = numbers.shared()->scalar->cbeginValueOn(); it; ++it)
+      ASSERT_EQ(accessor.getValue(it.getCoord())[i], *it) << it.getCoord();
+  }
+}
+
 TEST(ClosestPoints, Refuse) {
   EXPECT_THROW((void)closestPoints(NarrowBand()), InvalidInput);
   EXPECT_THROW((void)closestPoints(ball(8), {.halfWidth = 0.5}), UsageError);
   EXPECT_THROW((void)closestPoints(ball(8), {.halfWidth = 1e6}), ResourceLimit);
-  EXPECT_THROW((void)extendOffSurface(ball(8), {}), UsageError);
+  EXPECT_THROW((void)extendOffSurface(ball(8), ScalarField()), UsageError);
+  EXPECT_THROW((void)extendOffSurface(ball(8), VectorField()), UsageError);
   const auto undefined = [](const V3d&) { return std::numeric_limits<double>::quiet_NaN(); };
   EXPECT_THROW((void)extendOffSurface(ball(8), undefined), InvalidInput);
 }

@@ -9,6 +9,7 @@
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/interpolate_vdb.h"
+#include "levelset/solids/csg.h"
 #include "levelset/solids/shapes.h"
 #include "tests/support/bands.h"
 #include "tests/support/threads.h"
@@ -120,6 +121,68 @@ TEST(Smooth, TellsOfEachBlock) {
 
 TEST(Smooth, RefusesAMedianWithoutEnd) {
   EXPECT_THROW((void)smooth(ball(6), SmoothKind::Median, 63), ResourceLimit);
+}
+
+/// Grid points that a mask reaches are worked on, all others keep their bits.
+TEST(Smooth, TouchesOnlyWhatTheMaskReaches) {
+  const NarrowBand before = makeBox(V3d(40, 40, 40), kCentre, 1);
+  // A corner, within 8 of it fully.
+  const V3d corner = kCentre + V3d(20);
+  const Mask mask{.field = [=](const V3d& p) { return (p - corner).length(); },
+                  .min = 8,
+                  .max = 10,
+                  .invert = true};
+  for (const SmoothKind kind :
+       {SmoothKind::Gaussian, SmoothKind::Mean, SmoothKind::Median, SmoothKind::Taubin}) {
+    const double sigma = 1.5;
+    const NarrowBand after = smooth(before, kind, sigma, {.mask = mask});
+    const NarrowBand everywhere = smooth(before, kind, sigma);
+    // Distances, across the seam too: made again they differ only where the edge goes over from
+    // rounded to sharp.
+    const NarrowBand again = redistance(after);
+    const auto exact = vdb(again).getConstAccessor();
+    for (auto it = vdb(after).cbeginValueOn(); it; ++it)
+      ASSERT_NEAR(*it, exact.getValue(it.getCoord()), 0.03) << it.getCoord();
+    const auto old = vdb(before).getConstAccessor(), now = vdb(after).getConstAccessor(),
+               all = vdb(everywhere).getConstAccessor();
+    double moved = 0, off = 0;
+    for (openvdb::Coord c(-30); c[0] <= 30; ++c[0])
+      for (c[1] = -30; c[1] <= 30; ++c[1])
+        for (c[2] = -30; c[2] <= 30; ++c[2]) {
+          const V3d from = toImath(c.asVec3d()) - corner;
+          const double box = std::max({std::abs(from.x), std::abs(from.y), std::abs(from.z)});
+          if (box > 16) {
+            ASSERT_EQ(now.getValue(c), old.getValue(c)) << c;
+            ASSERT_EQ(now.isValueOn(c), old.isValueOn(c)) << c;
+          }
+          // Where both the surface and what the distance looks at are masked fully.
+          if (from.length() < 3) {
+            off = std::max(off, std::abs(static_cast<double>(now.getValue(c) - all.getValue(c))));
+            moved =
+                std::max(moved, std::abs(static_cast<double>(now.getValue(c) - old.getValue(c))));
+          }
+        }
+    EXPECT_LE(off, 1e-5) << static_cast<int>(kind);
+    EXPECT_GE(moved, 0.2) << static_cast<int>(kind);
+  }
+}
+
+TEST(Smooth, LeavesASolidAloneThatTheMaskDoesNotMeet) {
+  const NarrowBand before = ball(12);
+  const NarrowBand after =
+      smooth(before, SmoothKind::Gaussian, 1,
+             {.mask = Mask{.field = [](const V3d&) { return 0.0; }, .min = 0.5, .max = 1}});
+  EXPECT_EQ(after.contentHash(), before.contentHash());
+}
+
+TEST(Smooth, TakesAPartAwayThatTheMaskHolds) {
+  // A small ball that a wide Gaussian melts, beside one that is left out.
+  const NarrowBand small = makeSphere(2.2, V3d(30, 0, 0), 1), large = makeSphere(12, V3d(0), 1);
+  const NarrowBand after =
+      smooth(unite(small, large), SmoothKind::Gaussian, 4,
+             {.mask = Mask{.field = [](const V3d& p) { return p.x; }, .min = 20, .max = 21}});
+  EXPECT_EQ(measure(after).components, 1u);
+  EXPECT_NEAR(measure(after).volume, measure(large).volume, 1e-6 * measure(large).volume);
 }
 
 TEST(Smooth, LeavesWhatTheMaskLeaves) {
