@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mapping/patches/travel_guard.h"
 #include "mapping/surface/surface_field.h"
 
 namespace mapping {
@@ -45,6 +46,34 @@ template <typename Work>
 void forEachParticle(ParticleLevel& level, const Work& work) {
   for (V3d& p : level.positions) work(p);
   for (V3d& p : level.rim) work(p);
+}
+
+std::vector<V3d> particlesOf(const ParticleLevel& level) {
+  std::vector<V3d> all = level.positions;
+  all.insert(all.end(), level.rim.begin(), level.rim.end());
+  return all;
+}
+
+void setParticles(const std::vector<V3d>& all, ParticleLevel& level) {
+  const auto rim = all.begin() + static_cast<std::ptrdiff_t>(level.positions.size());
+  std::copy(all.begin(), rim, level.positions.begin());
+  std::copy(rim, all.end(), level.rim.begin());
+}
+
+/// Spheres of a twentieth of the least distance between neighbours.
+TravelGuard guardOf(const ParticleLevel& surface) {
+  constexpr double kShare = 0.05;
+  double least = HUGE_VAL;
+  const auto meet = [&](const V3d& a, const V3d& b) { least = std::min(least, (a - b).length()); };
+  const int border = surface.hasRim() ? 1 : 0;
+  const int columns = static_cast<int>(surface.columns), rows = static_cast<int>(surface.rows);
+  for (int j = -border; j < rows + border; ++j)
+    for (int i = -border; i < columns + border; ++i) {
+      const V3d& p = surface.beyond(i, j);
+      if (i + 1 < columns + border) meet(p, surface.beyond(i + 1, j));
+      if (j + 1 < rows + border) meet(p, surface.beyond(i, j + 1));
+    }
+  return {kShare * least, surface.positions.size() + surface.rim.size()};
 }
 
 }  // namespace
@@ -142,12 +171,14 @@ SplineSweep splineLevels(const ParticleLevel& surface, const SweepCurve& curve, 
   constexpr double kCrawl = 0.02;     // of the way that the curve goes
   SplineSweep sweep;
   sweep.levels.push_back(levelLike(surface, 0, 0));
-  ParticleLevel travelling = surface;
-  std::vector<char> isSlowed(surface.positions.size() + surface.rim.size(), 0);
+  ParticleLevel level = surface;
+  std::vector<V3d> places = particlesOf(surface), moves(places.size());
+  TravelGuard guard = guardOf(surface);
+  std::vector<char> isSlowed(places.size(), 0);
   // What stands above the plane across the curve's beginning.
   std::vector<double> above;
   const V3d start = curve.position(0), along = curve.tangent(0);
-  forEachParticle(travelling, [&](V3d& p) { above.push_back((p - start).dot(along)); });
+  for (const V3d& p : places) above.push_back((p - start).dot(along));
 
   const std::size_t steps = kSteps * (count - 1);
   double before = 0;
@@ -157,26 +188,26 @@ SplineSweep splineLevels(const ParticleLevel& surface, const SweepCurve& curve, 
     const V3d tangent = curve.tangent(before), next = curve.tangent(now);
     const V3d forward = (tangent + next).normalized();
     const double least = kCrawl * (now - before);
-    std::size_t n = 0;
-    forEachParticle(travelling, [&](V3d& p) {
-      V3d move = to + turned(p - from, tangent, next) - p;
+    for (std::size_t n = 0; n < places.size(); ++n) {
+      const V3d p = places[n];
+      V3d& move = moves[n];
+      move = to + turned(p - from, tangent, next) - p;
       if (isFaded) move -= next * (above[n] * (now - before) / height);
       const double progress = move.dot(forward);
-      if (progress < least) {
-        move += forward * (least - progress);
-        isSlowed[n] = 1;
-      }
-      p += move;
-      ++n;
-    });
+      if (progress >= least) continue;
+      move += forward * (least - progress);
+      isSlowed[n] = 1;
+    }
+    guard.limit(places, moves);
+    for (std::size_t n = 0; n < places.size(); ++n) places[n] += moves[n];
     before = now;
     if (step % kSteps != 0) continue;
-    const std::size_t k = step / kSteps;
-    sweep.levels.push_back(levelLike(travelling, shareOf(k, count), shareOf(k, count) * height));
+    const double w = shareOf(step / kSteps, count);
+    setParticles(places, level);
+    sweep.levels.push_back(levelLike(level, w, w * height));
   }
-  sweep.slowed = static_cast<std::size_t>(
-      std::count(isSlowed.begin(),
-                 isSlowed.begin() + static_cast<std::ptrdiff_t>(surface.positions.size()), 1));
+  for (std::size_t n = 0; n < surface.positions.size(); ++n)
+    sweep.slowed += guard.slowed()[n] || isSlowed[n];
   return sweep;
 }
 

@@ -14,7 +14,7 @@ namespace mapping {
 
 /// Scheme A: each particle follows ∇φ for as long as the height is high, and the levels between lie
 /// on its straight way [Brodersen07 §8.2]. The particles spread over what is convex and crowd where
-/// it is concave; towards the medial axis they slow down.
+/// it is concave; towards the medial axis they slow down. Ways along a gradient do not cross.
 /// @param space    distances throughout patch space
 /// @param surface  the level w = 0
 /// @return         `count` levels, the surface first
@@ -41,12 +41,13 @@ class SweepCurve {
 
 struct SplineSweep {
   std::vector<ParticleLevel> levels;
-  std::size_t slowed = 0;  ///< particles that would have gone backwards through their neighbours
+  /// Particles that would have met their neighbours, see TravelGuard, or gone backwards.
+  std::size_t slowed = 0;
 };
 
 /// Scheme C: the surface's particles travel along a curve and turn with it by the least rotation;
 /// w is the way travelled [Brodersen07 §8.2]. In a bend that is narrower than the patch those
-/// inside would go backwards; they are slowed to a crawl instead.
+/// inside would go backwards; they are slowed to a crawl instead, and none runs into another.
 /// @param height  how far along the curve, no more than its length
 /// @param isFaded let what stands above or below the plane across the curve go to nothing at the
 ///                end

@@ -217,4 +217,33 @@ void advectPoints(const levelset::NarrowBand& band, double from, double to, std:
   }
 }
 
+void raisePoints(const levelset::NarrowBand& band, double height, std::span<const V3d> directions,
+                 std::span<V3d> points) {
+  constexpr double kFarthest = 10;  // times the difference: a direction that leans by 84 degrees
+  constexpr int kHalvings = 40;
+  const SurfaceField field(band);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double rise = height - field.value(points[i]), step = 0.5 * field.voxelSize();
+    const auto isAbove = [&](double t) {
+      return field.value(points[i] + directions[i] * t) >= height;
+    };
+    double above = 0;
+    while (!isAbove(above)) {
+      above += step;
+      if (above > kFarthest * rise + step) {
+        throw InvalidInput(fmt::format(
+            "patch: from {} along {} the distance to the base does not come to {:.6g}; let the "
+            "direction lean less, or lower the height",
+            text(points[i]), text(directions[i]), height));
+      }
+    }
+    double below = std::max(0.0, above - step);
+    for (int k = 0; k < kHalvings; ++k) {
+      const double middle = 0.5 * (below + above);
+      (isAbove(middle) ? above : below) = middle;
+    }
+    points[i] += directions[i] * (0.5 * (below + above));
+  }
+}
+
 }  // namespace mapping

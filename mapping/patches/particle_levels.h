@@ -49,4 +49,9 @@ void addRim(const levelset::NarrowBand& band, ParticleLevel& level);
 void advectPoints(const levelset::NarrowBand& band, double from, double to,
                   std::span<Imath::V3d> points);
 
+/// Carries points straight along unit directions to φ = height, from below it.
+/// @throws InvalidInput where a way does not get there within ten times the difference
+void raisePoints(const levelset::NarrowBand& band, double height,
+                 std::span<const Imath::V3d> directions, std::span<Imath::V3d> points);
+
 }  // namespace mapping

@@ -173,18 +173,81 @@ ParticleLevel filledLevel(const NarrowBand& band, const NarrowBand& guide, const
   return level;
 }
 
+/// In which corners, and the points between them, rise; empty: along ∇φ.
+struct Rise {
+  std::vector<V3d> corners;
+  std::array<std::vector<V3d>, 4> between;
+  double lean = 0;  ///< how far they lead away sideways for each length of height
+};
+
+/// The unit direction of each corner.
+/// @throws UsageError for one that hardly leads away from the surface
+std::vector<V3d> cornerDirections(const NarrowBand& base, const Outline& outline,
+                                  const PatchOptions& options) {
+  const SurfaceField field(base);
+  std::vector<V3d> directions = options.directions;
+  if (options.parallel) {
+    const V3d middle =
+        (outline.corners[0] + outline.corners[1] + outline.corners[2] + outline.corners[3]) / 4.0;
+    directions = {field.normal(closestSurfacePoint(base, middle, kPatch))};
+  }
+  if (directions.size() == 1) directions.resize(4, directions.front());
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    directions[i].normalize();
+    constexpr double kLeastCosine = 0.2;  // 78 degrees
+    if (directions[i].dot(field.normal(outline.corners[i])) >= kLeastCosine) continue;
+    throw UsageError(fmt::format(
+        "{}: the direction {} hardly leads away from the surface at corner {}, {}; let it lean by "
+        "less than 78 degrees",
+        kPatch, pointAsOption(directions[i]), i, pointAsOption(outline.corners[i])));
+  }
+  return directions;
+}
+
+Rise riseOf(const NarrowBand& base, const Outline& outline, const PatchOptions& options) {
+  Rise rise{.corners = cornerDirections(base, outline, options), .between = {}};
+  if (rise.corners.empty()) return rise;
+  const SurfaceField field(base);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double cosine = rise.corners[i].dot(field.normal(outline.corners[i]));
+    rise.lean = std::max(rise.lean, std::sqrt(std::max(0.0, 1 - cosine * cosine)) / cosine);
+  }
+  constexpr std::array<std::array<std::size_t, 2>, 4> kEnds = {{{0, 1}, {1, 2}, {3, 2}, {0, 3}}};
+  for (std::size_t side = 0; side < 4; ++side) {
+    const V3d &first = rise.corners[kEnds[side][0]], &last = rise.corners[kEnds[side][1]];
+    const std::size_t count = outline.between[side].size();
+    for (std::size_t i = 1; i <= count; ++i) {
+      const double share = static_cast<double>(i) / static_cast<double>(count + 1);
+      rise.between[side].push_back((first * (1 - share) + last * share).normalized());
+    }
+  }
+  return rise;
+}
+
+/// Brings corners and points between them from one level to the next.
+void raiseOutline(const NarrowBand& space, const Rise& rise, double from, double to,
+                  Outline& outline) {
+  if (rise.corners.empty()) {
+    advectPoints(space, from, to, outline.corners);
+    for (std::vector<V3d>& points : outline.between) advectPoints(space, from, to, points);
+    return;
+  }
+  raisePoints(space, to, rise.corners, outline.corners);
+  for (std::size_t side = 0; side < 4; ++side)
+    raisePoints(space, to, rise.between[side], outline.between[side]);
+}
+
 /// Scheme B: the sides of each level from its own advected corners, and a complete patch between
 /// them.
 std::vector<ParticleLevel> reducedLevels(const NarrowBand& base, Outline outline,
                                          std::vector<LevelSides> sides, double height,
                                          const PatchOptions& options, PatchReport& report) {
-  const NarrowBand space =
-      sweepAbove(base, sides.front().outline(), sides.front().size, height, options);
+  const Rise rise = riseOf(base, outline, options);
+  const NarrowBand space = sweepAbove(base, sides.front().outline(), sides.front().size, height,
+                                      options, rise.lean * height);
   for (std::size_t k = 1; k < options.levels; ++k) {
     const double level = height * static_cast<double>(k) / static_cast<double>(options.levels - 1);
-    advectPoints(space, sides.back().height, level, outline.corners);
-    for (std::vector<V3d>& points : outline.between)
-      advectPoints(space, sides.back().height, level, points);
+    raiseOutline(space, rise, sides.back().height, level, outline);
     sides.push_back(makeLevelSides(space, level, outline.corners, outline.between,
                                    &sides.back().sides, &sides.front().sides));
   }

@@ -64,7 +64,8 @@ struct PatchReport {
   std::size_t relaxIterations = 0;  ///< of all levels together
   bool isRelaxed = true;            ///< the last step moved no particle by more than 1e-3 voxel
   double projectionDistance = 0;    ///< the farthest corner's way to the surface
-  std::size_t slowed = 0;  ///< particles of a spline that would have crossed their neighbours
+  std::size_t slowed =
+      0;  ///< particles of a spline that would have met their neighbours on the way
 };
 
 enum class LevelScheme {
@@ -92,7 +93,12 @@ struct PatchOptions {
   /// Points near the surface that the sides 0 → 1, 1 → 2, 3 → 2 and 0 → 3 pass in this order: a
   /// side is the shortest way from point to point and has a corner at each.
   std::array<std::vector<Imath::V3d>, 4> sides = {};
-  double spacing = 0;  ///< of particles, world units; 0: chosen from patch and voxel size
+  /// Reduced only: in which the corners rise, straight, instead of along ∇φ: one for all, or one
+  /// each; the corners of points on the sides lie between. Where a surface bends much, parallel
+  /// ones keep the upper levels from spreading [Brodersen07 fig. 8.4].
+  std::vector<Imath::V3d> directions = {};
+  bool parallel = false;  ///< Reduced only: all in that of the normal at the patch's centre
+  double spacing = 0;     ///< of particles, world units; 0: chosen from patch and voxel size
   /// Of cells along u and v, the same on all levels, each at least 3; 0, 0: as the spacing asks.
   std::array<std::size_t, 2> cells = {0, 0};
   bool mirror = false;  ///< accept corners that run clockwise seen from outside

@@ -79,6 +79,24 @@ void checkPatchOptions(const char* action, double height, const PatchOptions& op
     throw UsageError(
         fmt::format("{}: a spline and its fading go with the spline scheme only", action));
   }
+  if (options.scheme != LevelScheme::Reduced && (options.parallel || !options.directions.empty())) {
+    throw UsageError(
+        fmt::format("{}: directions of the corners go with the reduced scheme only", action));
+  }
+  if (options.parallel && !options.directions.empty()) {
+    throw UsageError(fmt::format(
+        "{}: the corners are to rise in directions of their own and in parallel; choose one",
+        action));
+  }
+  if (options.directions.size() > 1 && options.directions.size() != 4) {
+    throw UsageError(fmt::format("{}: {} directions of corners; give one for all, or four", action,
+                                 options.directions.size()));
+  }
+  for (const V3d& d : options.directions) {
+    if (!std::isfinite(d.x) || !std::isfinite(d.y) || !std::isfinite(d.z) || !(d.length() > 0)) {
+      throw UsageError(fmt::format("{}: the direction {} leads nowhere", action, pointAsOption(d)));
+    }
+  }
   for (const V3d& p : options.spline) {
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
       throw UsageError(
@@ -130,10 +148,10 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
 }
 
 NarrowBand sweepAbove(const NarrowBand& base, std::span<const V3d> outline, const LevelSize& size,
-                      double height, const PatchOptions& options) {
+                      double height, const PatchOptions& options, double lean) {
   // Inner particles may lie outside the box of the sides: a patch may bulge by a quarter of its
   // width.
-  const double bulge = 0.25 * std::min(size.u, size.v);
+  const double bulge = 0.25 * std::min(size.u, size.v) + lean;
   return sweepPatchSpace(base, outline, bulge, height,
                          {.shared = options.space,
                           .maxMemory = options.maxMemory,

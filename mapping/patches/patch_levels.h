@@ -41,10 +41,11 @@ struct LevelSize {
 void checkParticleCount(double count, double spacing, const PatchOptions& options);
 
 /// Distances throughout patch space, from points along the outline.
+/// @param lean  how far levels may leave the room above the outline sideways, world units
 [[nodiscard]] levelset::NarrowBand sweepAbove(const levelset::NarrowBand& base,
                                               std::span<const Imath::V3d> outline,
                                               const LevelSize& size, double height,
-                                              const PatchOptions& options);
+                                              const PatchOptions& options, double lean = 0);
 
 /// Schemes A and C: the particles on the surface travel.
 [[nodiscard]] std::vector<ParticleLevel> levelsFromSurface(const levelset::NarrowBand& base,

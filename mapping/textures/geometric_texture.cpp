@@ -443,6 +443,8 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
     report.blocksEvaluated += warp.blocksEvaluated;
     operations += warp.operations;
     ghosts += warp.ghosts;
+    report.mapErrorPoints += warp.checked;
+    report.mapError = std::max(report.mapError, warp.mapError);
     pieces.push_back(timed(report.cost.distance, [&] {
       return levelset::redistance(std::move(warp.field), {.halfWidth = options.halfWidth,
                                                           .maxMemory = options.maxMemory,

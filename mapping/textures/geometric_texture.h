@@ -67,7 +67,10 @@ struct TextureReport {
   double operationsPerPoint = 0;
   Distortion distortion = {};
   FoldCertificate certificate = {};
-  double mapResidual = 0;     ///< largest |Φ(p) − uvw| × texture size, world units
+  double mapResidual = 0;  ///< largest |Φ(p) − uvw| × texture size, world units
+  /// How far the map's fast evaluation was off at grid points drawn at random, texture voxels.
+  double mapError = 0;
+  std::size_t mapErrorPoints = 0;
   RbfSolveReport solve = {};  ///< of an RBF map
   TextureCost cost = {};
   std::vector<std::string> notes;

@@ -27,6 +27,10 @@ struct Warp {
   std::size_t operations = 0;  ///< particles added up or tetrahedra tried, see BlockMap::evaluate
   std::size_t ghosts =
       0;  ///< grid points that the map, far from the particles, sends back into the texture
+  /// Grid points drawn at random where the map was evaluated directly too, and how far the fast
+  /// evaluation was off at any of them, texture voxels.
+  std::size_t checked = 0;
+  double mapError = 0;
 };
 
 /// Pulls a texture back into patch space. Blocks of 64³ grid points are split down to 8³ while the

@@ -128,14 +128,21 @@ void tellPatches(Invocation& in, const mapping::PatchReport& report,
   json["levels"] = levels;
   json["cell_area_variation"] = report.cellAreaVariation;
   json["relax_iterations"] = report.relaxIterations;
+  json["relaxed"] = report.isRelaxed;
   json["projection_distance"] = report.projectionDistance;
   json["slowed"] = report.slowed;
   in.notes.detailsJson = json.dump();
   if (report.slowed > 0) {
     in.notes.warnings.push_back(
-        fmt::format("{}: {} of its particles would cross their neighbours where the spline bends "
-                    "more narrowly than the patch is wide; they were slowed",
+        fmt::format("{}: {} of its particles would meet their neighbours on the way, where the "
+                    "spline bends more narrowly than the patch is wide; they were slowed",
                     in.op().name, report.slowed));
+  }
+  if (!report.isRelaxed) {
+    in.notes.warnings.push_back(fmt::format(
+        "{}: particles still moved after {} steps of relaxation, so the texture may be stretched "
+        "unevenly; make the patch smaller, its spacing wider or its place flatter",
+        in.op().name, report.relaxIterations));
   }
   in.notes.notes.push_back(fmt::format(
       "{:.4g} by {:.4g} along the surface, {}{} particles in {} levels", report.uLength,
@@ -173,12 +180,15 @@ PatchGridResult asSet(mapping::PatchResult result) {
   return set;
 }
 
-/// For a patch that stands elsewhere than it did: a spline goes with it, corners that have come to
-/// run the other way round are for the caller to judge.
+/// For a patch that stands elsewhere than it did: a spline and directions go with it, corners that
+/// have come to run the other way round are for the caller to judge.
 mapping::PatchOptions optionsElsewhere(mapping::PatchOptions options,
                                        const mapping::Footprint& origin,
                                        const mapping::Footprint& now, const Progress& progress) {
   for (V3d& p : options.spline) p = mapping::movedAlong(origin, now, p);
+  for (V3d& d : options.directions)
+    d = mapping::movedAlong(origin, now, origin.centre + d) -
+        mapping::movedAlong(origin, now, origin.centre);
   options.progress = progress;
   return options;
 }
@@ -422,7 +432,14 @@ void addPatchOperators(std::vector<Operator>& all) {
                                         .doc = "of u about the normal, with --at",
                                         .fallback = "0"}}),
           joinParams(levelParams("reduced"),
-                     {{.name = "mirror",
+                     {{.name = "directions",
+                       .type = ParamType::Points,
+                       .doc = "with --particles reduced: vectors in which the corners rise, one "
+                              "for all or \"d0 d1 d2 d3\"; default: along the distance"},
+                      {.name = "parallel",
+                       .type = ParamType::Flag,
+                       .doc = "the same, all along the normal at the patch's centre"},
+                      {.name = "mirror",
                        .type = ParamType::Flag,
                        .doc = "accept corners that run clockwise: the texture is mirrored"}})),
       .operands = {{Kind::Band, Kind::Surface}},

@@ -62,6 +62,11 @@ void validateLevels(const Invocation& in) {
   const std::string& name = in.op().name;
   if (in.text("particles") != "spline" && (in.given("spline") || in.given("fade")))
     throw UsageError(fmt::format("{}: --spline and --fade go with --particles spline", name));
+  for (const char* option : {"directions", "parallel"})
+    if (in.given(option) && in.text("particles") != "reduced")
+      throw UsageError(fmt::format("{}: --{} goes with --particles reduced", name, option));
+  if (in.given("directions") && in.given("parallel"))
+    throw UsageError(fmt::format("{}: give one of --directions and --parallel", name));
   if (in.text("particles") == "spline" && in.text("height") == "auto") {
     throw UsageError(fmt::format(
         "{}: --height auto does not go with --particles spline; give the length along the spline",
@@ -83,6 +88,8 @@ mapping::PatchOptions patchOptionsOf(Invocation& in) {
                                    .maxMemory = in.maxMemory,
                                    .progress = in.progress};
   if (in.given("spline")) options.spline = in.points("spline");
+  if (in.given("directions")) options.directions = in.points("directions");
+  options.parallel = in.given("parallel");
   options.transform = {
       .twist = in.radians("twist"), .taper = in.number("taper"), .bend = in.radians("bend")};
   return options;
@@ -119,7 +126,7 @@ void tellOrigin(const Invocation& in, PatchRecipe& recipe) {
   for (const Param& param : in.op().params) {
     const std::string& name = param.name;
     const bool isShape = name == "twist" || name == "taper" || name == "bend" || name == "spline" ||
-                         name == "fade" ||
+                         name == "fade" || name == "directions" || name == "parallel" ||
                          (isGrid && (name == "count" || name == "shift" || name == "mirror"));
     if (isShape) recipe.shape[name] = written(param);
     if (name == "particles" || name == "spacing") recipe.fineness[name] = written(param);

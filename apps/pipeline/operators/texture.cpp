@@ -70,6 +70,8 @@ std::string detailsOf(const mapping::TextureReport& report, double height, bool 
   json["cpu_s"] = costJson(report.cost);
   addDistortion(report.distortion, json);
   json["map_residual"] = report.mapResidual;
+  json["map_error"] = report.mapError;
+  json["map_error_points"] = report.mapErrorPoints;
   if (isRbf) addSolve(report.solve, json);
   json["certificate"] = certificateJson(report.certificate);
   json.update(improvement);
@@ -111,6 +113,20 @@ Value textureMesh(Invocation& in) {
   return Value(std::move(result.mesh));
 }
 
+/// Of the fast evaluation, where the map was evaluated directly beside it.
+void tellMapError(Invocation& in, const mapping::TextureReport& report, double tolerance) {
+  if (report.mapErrorPoints == 0) return;
+  in.notes.errors.push_back(
+      {fmt::format("map's fast evaluation at {} random points, largest", report.mapErrorPoints),
+       report.mapError, "texture voxels"});
+  if (report.mapError > tolerance) {
+    in.notes.warnings.push_back(fmt::format(
+        "{}: the map's fast evaluation is off by {:.3g} texture voxels, and {} was asked; this is "
+        "a defect, please report it",
+        in.op().name, report.mapError, tolerance));
+  }
+}
+
 Value texture(Invocation& in) {
   if (mapsMesh(in)) return textureMesh(in);
   mapping::TextureOptions options = textureOptions(in);
@@ -122,6 +138,7 @@ Value texture(Invocation& in) {
                                    options.map == mapping::TextureMap::Rbf, improved.figures);
   in.notes.errors.push_back({"map residual at particles, largest",
                              result.report.mapResidual / result.report.voxelSize, "voxels"});
+  tellMapError(in, result.report, options.mapTolerance);
   in.notes.notes.insert(in.notes.notes.end(), result.report.notes.begin(),
                         result.report.notes.end());
   if (result.report.solve.isIterative) {

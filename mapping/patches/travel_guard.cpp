@@ -1,0 +1,98 @@
+#include "mapping/patches/travel_guard.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using Cell = std::array<std::int64_t, 3>;
+
+struct Entry {
+  Cell cell;
+  std::size_t particle;
+  bool operator<(const Entry& other) const { return cell < other.cell; }
+};
+
+/// The share of a step after which two come as close as the diameter; 1 where they do not.
+double contact(const V3d& apart, const V3d& relative, double diameter) {
+  const double approach = apart.dot(relative);
+  if (approach >= 0) return 1;
+  // The same one twice, as where a grid closes on itself: others never come that close.
+  if (apart.length2() < 0.25 * diameter * diameter) return 1;
+  const double over = apart.length2() - diameter * diameter;
+  if (over <= 0) return 0;
+  const double speed = relative.length2();
+  const double root = approach * approach - speed * over;
+  if (root < 0) return 1;
+  return std::min(1.0, over / (std::sqrt(root) - approach));
+}
+
+}  // namespace
+
+void TravelGuard::limit(std::span<const V3d> places, std::span<V3d> moves) {
+  // What all do together brings nobody closer.
+  V3d mean(0);
+  for (const V3d& move : moves) mean += move / static_cast<double>(moves.size());
+  double farthest = 0;
+  for (const V3d& move : moves) farthest = std::max(farthest, (move - mean).length());
+  // One that is stopped falls behind by the common move, too.
+  const double edge = diameter_ + 2 * (farthest + mean.length());
+  std::vector<Entry> entries(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    for (std::size_t a = 0; a < 3; ++a)
+      entries[i].cell[a] =
+          static_cast<std::int64_t>(std::floor(places[i][static_cast<int>(a)] / edge));
+    entries[i].particle = i;
+  }
+  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+    return a.cell != b.cell ? a.cell < b.cell : a.particle < b.particle;
+  });
+
+  const auto forEachPair = [&](const auto& meet) {
+    for (auto a = entries.begin(); a != entries.end(); ++a) {
+      for (auto b = a + 1; b != entries.end() && b->cell == a->cell; ++b)
+        meet(a->particle, b->particle);
+      for (int n = 14; n < 27; ++n) {  // the neighbours that come later in the order
+        const Cell cell = {a->cell[0] + n / 9 - 1, a->cell[1] + n / 3 % 3 - 1,
+                           a->cell[2] + n % 3 - 1};
+        for (auto b = std::lower_bound(a, entries.end(), Entry{cell, 0});
+             b != entries.end() && b->cell == cell; ++b)
+          meet(a->particle, b->particle);
+      }
+    }
+  };
+
+  // From where two touch they go on side by side: what would bring them closer is taken from both.
+  // That may push them into others, so there are some rounds; those that touch even then stop, and
+  // whoever comes up behind them, until nobody does.
+  constexpr int kRounds = 12;
+  std::vector<V3d> corrections(places.size());
+  for (int round = 0;; ++round) {
+    std::fill(corrections.begin(), corrections.end(), V3d(0));
+    bool isFree = true;
+    forEachPair([&](std::size_t i, std::size_t j) {
+      const V3d apart = places[j] - places[i], relative = moves[j] - moves[i];
+      const double t = contact(apart, relative, diameter_);
+      if (t == 1) return;
+      isFree = false;
+      isSlowed_[i] = isSlowed_[j] = 1;
+      if (round >= kRounds) {
+        corrections[i] = -moves[i];
+        corrections[j] = -moves[j];
+        return;
+      }
+      const V3d normal = (apart + relative * t).normalized();
+      const V3d back = normal * (0.5 * (1 - t) * relative.dot(normal));
+      corrections[i] += back;
+      corrections[j] -= back;
+    });
+    if (isFree) return;
+    for (std::size_t i = 0; i < moves.size(); ++i) moves[i] += corrections[i];
+  }
+}
+
+}  // namespace mapping
