@@ -422,7 +422,7 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
   const NarrowBand whole = fitTexture(isCut ? levelset::clip(texture, box) : texture,
                                       report.voxelSize, bandStretch, maxStretch, options);
   std::vector<NarrowBand> pieces;
-  std::size_t operations = 0, ghosts = 0;
+  std::size_t operations = 0, ghosts = 0, crumbs = 0;
   for (std::size_t n = 0; n < patches.size(); ++n) {
     if (!maps[n].map) continue;
     const auto progress = [&](double from, double to) {
@@ -443,6 +443,7 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
     report.blocksEvaluated += warp.blocksEvaluated;
     operations += warp.operations;
     ghosts += warp.ghosts;
+    crumbs += warp.crumbs;
     report.mapErrorPoints += warp.checked;
     report.mapError = std::max(report.mapError, warp.mapError);
     pieces.push_back(timed(report.cost.distance, [&] {
@@ -458,6 +459,12 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
         fmt::format("{} grid points far from the patch, which the map sends back into the texture, "
                     "were left out",
                     ghosts));
+  }
+  if (crumbs > 0) {
+    report.notes.push_back(fmt::format(
+        "{} pieces smaller than a voxel were left out, as where a flat side falls together with a "
+        "plane of the grid; smaller voxels show what they are",
+        crumbs));
   }
   result.band = timed(report.cost.merging, [&] {
     return merge(base, join(std::move(pieces), options), options, report);

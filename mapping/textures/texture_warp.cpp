@@ -188,8 +188,36 @@ class TextureWarp {
           "{}: nothing of the texture falls into the patch; check the texture box and the sink",
           kWarp));
     }
+    warp.crumbs = dropCrumbs(*grid);
     warp.field = levelset::makeBand(grid);
     return warp;
+  }
+
+  /// Grid points that are inside alone: where a face falls together with a plane of the grid, the
+  /// map's last digits tell its points apart, and each would become a solid of its own. Where there
+  /// are no others they are what there is of the texture, and stay.
+  /// @return how many
+  static std::size_t dropCrumbs(openvdb::FloatGrid& grid) {
+    const auto accessor = grid.getConstAccessor();
+    std::vector<Coord> crumbs;
+    std::size_t inside = 0;
+    for (auto it = grid.cbeginValueOn(); it; ++it) {
+      if (*it >= 0) continue;
+      ++inside;
+      const Coord c = it.getCoord();
+      bool isAlone = true;
+      for (int axis = 0; axis < 3 && isAlone; ++axis)
+        for (const int step : {-1, 1}) {
+          Coord next = c;
+          next[axis] += step;
+          isAlone = isAlone && accessor.getValue(next) >= 0;
+        }
+      if (isAlone) crumbs.push_back(c);
+    }
+    if (crumbs.size() == inside) return 0;
+    auto writer = grid.getAccessor();
+    for (const Coord& c : crumbs) writer.setValue(c, -writer.getValue(c));
+    return crumbs.size();
   }
 
  private:

@@ -22,7 +22,9 @@ using mapping::PatchOptions;
 
 constexpr double kVoxel = 0.05, kHeight = 0.4;
 
-levelset::NarrowBand ball() { return support::makeBall(1, kVoxel); }
+levelset::NarrowBand ball() {
+  return support::makeBall(1, kVoxel);
+}
 
 std::array<V3d, 4> corners() {
   const double side = 0.5, up = std::sqrt(1 - 2 * side * side);
@@ -30,8 +32,8 @@ std::array<V3d, 4> corners() {
 }
 
 std::array<V3d, 4> cornersOf(const ParticleLevel& level) {
-  return {level.at(0, 0), level.at(level.columns - 1, 0), level.at(level.columns - 1, level.rows - 1),
-          level.at(0, level.rows - 1)};
+  return {level.at(0, 0), level.at(level.columns - 1, 0),
+          level.at(level.columns - 1, level.rows - 1), level.at(0, level.rows - 1)};
 }
 
 void expectCornersRise(const Patch& patch, const std::array<V3d, 4>& directions) {
@@ -72,8 +74,8 @@ TEST(PatchDirections, OneForAllAndOneEach) {
 }
 
 TEST(PatchDirections, ShearAPlane) {
-  const levelset::NarrowBand plane = support::sampleBand(
-      [](const V3d& p) { return p.z; }, {V3d(-2, -2, -0.5), V3d(2, 2, 0.5)}, 0.1);
+  const levelset::NarrowBand plane = support::sampleBand([](const V3d& p) { return p.z; },
+                                                         {V3d(-2, -2, -0.5), V3d(2, 2, 0.5)}, 0.1);
   const Patch patch =
       makePatch(plane, support::square(0.5), 0.8, {.directions = {V3d(0.5, 0, 1)}}).patch;
   const ParticleLevel& ground = patch.levels.front();

@@ -25,8 +25,7 @@ constexpr double kDiameter = 0.1;
 double closest(const std::vector<V3d>& places) {
   double least = HUGE_VAL;
   for (std::size_t i = 0; i < places.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j)
-      least = std::min(least, (places[i] - places[j]).length());
+    for (std::size_t j = 0; j < i; ++j) least = std::min(least, (places[i] - places[j]).length());
   return least;
 }
 
@@ -90,8 +89,8 @@ TEST(TravelGuard, LetsNoCrowdComeTogether) {
 
 TEST(TravelGuard, KeepsASplinesParticlesApartWhereItsPlaneTurnsOnItself) {
   // The curve turns on a tenth of the patch's width: those inside would run into each other.
-  const levelset::NarrowBand ground = support::sampleBand(
-      [](const V3d& p) { return p.z; }, {V3d(-3, -3, -0.5), V3d(3, 3, 0.5)}, 0.1);
+  const levelset::NarrowBand ground = support::sampleBand([](const V3d& p) { return p.z; },
+                                                          {V3d(-3, -3, -0.5), V3d(3, 3, 0.5)}, 0.1);
   const PatchResult made = mapping::makePatch(
       ground, support::square(1), 2,
       {.levels = 6,
