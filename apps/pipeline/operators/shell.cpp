@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -10,6 +11,7 @@
 #include "apps/process_cost.h"
 #include "levelset/error.h"
 #include "mapping/maps/jacobian_field.h"
+#include "mapping/maps/level_map.h"
 #include "mapping/maps/rbf_map.h"
 #include "mapping/maps/shell_map.h"
 #include "mapping/patches/unfold.h"
@@ -20,6 +22,16 @@ namespace {
 
 using Imath::V3d;
 using levelset::UsageError;
+
+nlohmann::ordered_json spreadOf(const mapping::Spread& spread) {
+  nlohmann::ordered_json json;
+  json["min"] = spread.least;
+  json["percent_1"] = spread.percent1;
+  json["median"] = spread.median;
+  json["percent_99"] = spread.percent99;
+  json["max"] = spread.most;
+  return json;
+}
 
 nlohmann::ordered_json foldsJson(const mapping::ShellFolds& folds) {
   return {{"folded_cells", folds.folded},
@@ -33,6 +45,9 @@ nlohmann::ordered_json energyJson(const mapping::ShellDistortion& distortion) {
           {"percent_99", distortion.percent99},
           {"max", distortion.most}};
 }
+
+const std::vector<std::string> kKernelNames = {"biharmonic", "triharmonic", "thin-plate",
+                                               "sum",        "laplacian",   "gaussian"};
 
 bool isRelaxed(const Invocation& in) {
   return in.text("relax") != "none";
@@ -114,35 +129,44 @@ void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatc
                   before, after));
 }
 
-/// A certificate and the field of the map that --map names.
+/// A certificate, the distortion and the field of the map that --map names.
 struct JudgedMap {
   mapping::FoldCertificate certificate;
+  mapping::Distortion distortion;
   levelset::FieldGrid field;
 };
 
 JudgedMap judgeMap(const Invocation& in, const mapping::Patch& patch, double sink, double voxel) {
   mapping::JacobianFieldOptions options{
       .voxelSize = voxel, .sink = sink / patch.height, .maxMemory = in.maxMemory};
+  const auto [u, v] = sidesOf(patch);  // in place of a texture's
+  const V3d size(u, v, patch.height);
+  const auto survey = [&](const std::vector<mapping::MapSample>& samples) {
+    return mapping::surveyDistortion(samples, size, patch.mirrored);
+  };
   if (in.text("map") == "mesh") {
     mapping::FoldCertificate certificate = mapping::certifyLevels(patch, options.sink);
     levelset::FieldGrid field = mapping::jacobianField(patch, certificate, options);
-    return {std::move(certificate), std::move(field)};
+    return {std::move(certificate), survey(mapping::sampleLevelMap(patch, options.sink)),
+            std::move(field)};
   }
   if (in.text("map") == "shell") {
     levelset::requireMemory(mapping::ShellMap::estimateBytes(patch), in.maxMemory, "folds");
     const mapping::ShellMap map(patch, {.sink = options.sink});
     mapping::FoldCertificate certificate = mapping::certifyShell(map, patch.mirrored);
     levelset::FieldGrid field = mapping::jacobianField(patch, map, certificate, options);
-    return {std::move(certificate), std::move(field)};
+    return {std::move(certificate), survey(map.samples()), std::move(field)};
   }
   const mapping::RbfMap map =
-      mapping::patchToTexture(patch, {.lambdaNear = in.number("lambda-near"),
+      mapping::patchToTexture(patch, {.kernel = kernelOf(in),
+                                      .lambdaNear = in.number("lambda-near"),
                                       .lambdaFar = in.number("lambda-far"),
                                       .maxMemory = in.maxMemory,
                                       .progress = in.progress});
   mapping::FoldCertificate certificate = mapping::certifyRbf(map, patch, options.sink);
   levelset::FieldGrid field = mapping::jacobianField(patch, map, certificate, options);
-  return {std::move(certificate), std::move(field)};
+  return {std::move(certificate), survey(mapping::sampleRbf(map, patch, options.sink)),
+          std::move(field)};
 }
 
 std::string verdictSentence(const mapping::FoldCertificate& certificate) {
@@ -171,6 +195,7 @@ Value folds(Invocation& in) {
   ImprovedPatches improved = improvedPatches(in, in.band(0), onto.patches, sink, V3d(1));
   JudgedMap judged = judgeMap(in, improved.patches.front(), sink, voxel);
   nlohmann::ordered_json json = std::move(improved.figures);
+  addDistortion(judged.distortion, json);
   json["certificate"] = certificateJson(judged.certificate);
   in.notes.detailsJson = json.dump();
   in.notes.notes.push_back(verdictSentence(judged.certificate));
@@ -195,13 +220,48 @@ void validateFolds(const Invocation& in) {
   validateShell(in);
   if (in.text("relax") == "texture")
     throw UsageError("folds: --relax texture needs a texture; give --relax patch");
-  for (const char* option : {"lambda-near", "lambda-far"})
+  for (const char* option : {"kernel", "lambda-near", "lambda-far"})
     if (in.text("map") != "rbf" && in.given(option))
       throw UsageError(fmt::format("folds: --{} says nothing to --map {}; leave it out", option,
                                    in.text("map")));
 }
 
 }  // namespace
+
+std::array<double, 2> sidesOf(const mapping::Patch& patch) {
+  const mapping::ParticleLevel& level = patch.levels.front();
+  double u = 0, v = 0;
+  for (std::size_t row = 0; row < level.rows; ++row)
+    for (std::size_t column = 1; column < level.columns; ++column)
+      u += (level.at(column, row) - level.at(column - 1, row)).length();
+  for (std::size_t column = 0; column < level.columns; ++column)
+    for (std::size_t row = 1; row < level.rows; ++row)
+      v += (level.at(column, row) - level.at(column, row - 1)).length();
+  return {u / static_cast<double>(level.rows), v / static_cast<double>(level.columns)};
+}
+
+void addDistortion(const mapping::Distortion& distortion, nlohmann::ordered_json& json) {
+  json["folded"] = distortion.folded;
+  json["samples"] = distortion.samples;
+  json["min_jacobian"] = distortion.jacobian.least;
+  json["min_stretch"] = distortion.stretch.least;
+  json["max_stretch"] = distortion.stretch.most;
+  json["jacobian"] = spreadOf(distortion.jacobian);
+  json["stretch"] = spreadOf(distortion.stretch);
+}
+
+Param kernelParam() {
+  return {.name = "kernel",
+          .type = ParamType::Choice,
+          .doc = "with --map rbf: what a particle does at a distance",
+          .fallback = "biharmonic",
+          .choices = kKernelNames};
+}
+
+mapping::RbfKernel kernelOf(const Invocation& in) {
+  const auto name = std::find(kKernelNames.begin(), kKernelNames.end(), in.text("kernel"));
+  return static_cast<mapping::RbfKernel>(name - kKernelNames.begin());
+}
 
 std::vector<Param> withShell(std::vector<Param> params) {
   params.push_back({.name = "unfold",
@@ -264,9 +324,11 @@ void addFoldOperators(std::vector<Operator>& all) {
       .name = "folds",
       .group = "Texture mapping",
       .summary = "certify that a patch's map folds nowhere, and its Jacobian as a field",
-      .details = "The operands are base and patch. The field holds the map's Jacobian on the grid "
-                 "points of the patch: 1 where it is the median, 0 or less where the map turns "
-                 "over. The certificate is in the report.",
+      .details =
+          "The operands are base and patch. The field holds the map's Jacobian on the grid "
+          "points of the patch: 1 where it is the median, 0 or less where the map turns "
+          "over. The certificate is in the report, and how lengths and volumes spread, against "
+          "the patch's own size.",
       .example = "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
                  "--size 8,8 --height 3 --as p ! folds @ball @p ! write jacobian.vdb",
       .params = withShell({{.name = "map",
@@ -280,6 +342,7 @@ void addFoldOperators(std::vector<Operator>& all) {
                             .fallback = "1vx",
                             .range = Range::NonNegative},
                            voxelParam("of the field; default: the base's"),
+                           kernelParam(),
                            {.name = "lambda-near",
                             .type = ParamType::Number,
                             .doc = "as of `texture`",

@@ -2,11 +2,14 @@
 
 #include <Imath/ImathVec.h>
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <vector>
 
 #include "apps/pipeline/invocation.h"
+#include "mapping/maps/distortion.h"
 #include "mapping/maps/fold_certificate.h"
+#include "mapping/maps/rbf_kernel.h"
 #include "mapping/patches/patch.h"
 
 // Certified, unfolded and relaxed patches, for the operators that map onto them.
@@ -31,6 +34,13 @@ struct ImprovedPatches {
                                               std::vector<mapping::Patch> patches, double sink,
                                               const Imath::V3d& textureSize);
 
+/// Mean lengths of the rows and of the columns of particles on the surface.
+[[nodiscard]] std::array<double, 2> sidesOf(const mapping::Patch& patch);
+
+[[nodiscard]] Param kernelParam();
+[[nodiscard]] mapping::RbfKernel kernelOf(const Invocation& in);
+
+void addDistortion(const mapping::Distortion& distortion, nlohmann::ordered_json& json);
 [[nodiscard]] nlohmann::ordered_json certificateJson(const mapping::FoldCertificate& certificate);
 
 }  // namespace pipeline

@@ -15,26 +15,6 @@
 namespace pipeline {
 namespace {
 
-nlohmann::ordered_json spreadOf(const mapping::Spread& spread) {
-  nlohmann::ordered_json json;
-  json["min"] = spread.least;
-  json["percent_1"] = spread.percent1;
-  json["median"] = spread.median;
-  json["percent_99"] = spread.percent99;
-  json["max"] = spread.most;
-  return json;
-}
-
-void addDistortion(const mapping::Distortion& distortion, nlohmann::ordered_json& json) {
-  json["folded"] = distortion.folded;
-  json["samples"] = distortion.samples;
-  json["min_jacobian"] = distortion.jacobian.least;
-  json["min_stretch"] = distortion.stretch.least;
-  json["max_stretch"] = distortion.stretch.most;
-  json["jacobian"] = spreadOf(distortion.jacobian);
-  json["stretch"] = spreadOf(distortion.stretch);
-}
-
 void addSolve(const mapping::RbfSolveReport& solve, nlohmann::ordered_json& json) {
   json["solved_by"] = solve.isIterative ? "iteration" : "factors";
   json["iterations"] = solve.iterations;

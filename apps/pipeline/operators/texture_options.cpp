@@ -16,19 +16,6 @@ namespace {
 using Imath::V3d;
 using levelset::UsageError;
 
-/// Mean lengths of the rows and of the columns of particles on the surface.
-std::array<double, 2> sidesOf(const mapping::Patch& patch) {
-  const mapping::ParticleLevel& level = patch.levels.front();
-  double u = 0, v = 0;
-  for (std::size_t row = 0; row < level.rows; ++row)
-    for (std::size_t column = 1; column < level.columns; ++column)
-      u += (level.at(column, row) - level.at(column - 1, row)).length();
-  for (std::size_t column = 0; column < level.columns; ++column)
-    for (std::size_t row = 1; row < level.rows; ++row)
-      v += (level.at(column, row) - level.at(column, row - 1)).length();
-  return {u / static_cast<double>(level.rows), v / static_cast<double>(level.columns)};
-}
-
 /// Height that keeps the texture's proportions on patches of this size.
 double aspectHeight(std::span<const mapping::Patch> patches, const Imath::Box3d& textureBox) {
   const V3d size = textureBox.size();
@@ -38,15 +25,6 @@ double aspectHeight(std::span<const mapping::Patch> patches, const Imath::Box3d&
     sum += size.z * std::sqrt(u / size.x * v / size.y);
   }
   return sum / static_cast<double>(patches.size());
-}
-
-const std::vector<std::string> kKernelNames = {"biharmonic", "triharmonic", "thin-plate",
-                                               "sum",        "laplacian",   "gaussian"};
-
-mapping::RbfKernel kernelOf(const std::string& name) {
-  for (std::size_t n = 0; n < kKernelNames.size(); ++n)
-    if (kKernelNames[n] == name) return static_cast<mapping::RbfKernel>(n);
-  return mapping::RbfKernel::Biharmonic;
 }
 
 /// How far the flattest map of the texture's box onto the patch squeezes: the run surveys the real
@@ -90,7 +68,7 @@ mapping::TextureOptions textureOptions(Invocation& in) {
   options.halfWidth = in.number("half-width");
   if (in.text("map") == "shell") options.map = mapping::TextureMap::Shell;
   options.mapTolerance = in.number("map-tolerance");
-  options.rbf.kernel = kernelOf(in.text("kernel"));
+  options.rbf.kernel = kernelOf(in);
   options.rbf.lambdaNear = in.number("lambda-near");
   options.rbf.lambdaFar = in.number("lambda-far");
   options.allowFolds = in.flag("allow-folds");
@@ -166,11 +144,7 @@ std::vector<Param> textureParams() {
         .doc = "from patch to texture",
         .fallback = "rbf",
         .choices = {"rbf", "shell", "mesh"}},
-       {.name = "kernel",
-        .type = ParamType::Choice,
-        .doc = "with --map rbf: what a particle does at a distance",
-        .fallback = "biharmonic",
-        .choices = kKernelNames},
+       kernelParam(),
        {.name = "map-tolerance",
         .type = ParamType::Number,
         .doc = "how far the fast evaluation of the map may be off, texture voxels",
