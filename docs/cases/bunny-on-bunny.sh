@@ -19,6 +19,9 @@ lay 0.75 29 shell "52896, 2.266, 12.641"
 lay 6 5 rbf "361, mapping 102.828 with set-up"
 lay 3 8 rbf ""
 lay 1.5 15 rbf ""
+for spacing in 6 3 1.5 0.75; do  # the thesis' figure
+  expect "bunny-shell-$spacing" operations_per_point "<=" 2.8
+done
 map bunny-on-bunny read "$out/bunny100.vdb" --as base ! read "$out/standing190.vdb" --as small \
   ! patch @base --at 0.5,0.1,0.24 --size 30vx,30vx --rotate 20 --height 21vx --as back \
   ! texture @base @small @back --blend 1vx --voxel 0.0067

@@ -11,5 +11,6 @@ map carved-stars read "$out/lantern.vdb" --as lantern ! read "$out/star.vdb" --a
   ! scatter @lantern --count 32 --size 3.4,3.4 --height 2 --levels 3 --spacing 4vx --along "0,1,0" --mask "x*x+y*y+z*z" --mask-min 95 --mask-max 96 --as places \
   ! texture @lantern @star @places --carve --sink 1.4 --voxel 0.1
 row carved-stars patches particles cpu_s.mapping cpu_s.merging
+expect carved-stars patches = 32
 picture carved-stars
 sheet carved-stars 1 "carved-stars=thirty-two stars cut through the wall"

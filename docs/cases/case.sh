@@ -37,6 +37,10 @@ row() {  # row NAME FIELD... "text": one line of the table from NAME's report
   "${PYTHON:-python3}" "$here/figures.py" row "$out" "$@"
 }
 
+expect() {  # expect NAME FIELD OPERATOR VALUE: exits 5 with a sentence unless NAME's report says so; <, <=, =, >=, >
+  "${PYTHON:-python3}" "$here/figures.py" expect "$out" "$@"
+}
+
 bunny() {  # bunny VOXELS: lying on its side of the base, as scanned
   make "bunny$1" read "$models/bunny.obj" ! level-set --resolution "$1"
 }

@@ -1,7 +1,9 @@
 """Pictures and tables of the docs:
-figures.py sheet FOLDER TARGET COLUMNS NAME=TITLE..., row FOLDER NAME FIELD..., plot CSV TARGET."""
+figures.py sheet FOLDER TARGET COLUMNS NAME=TITLE..., row FOLDER NAME FIELD..., expect FOLDER NAME FIELD OPERATOR VALUE,
+plot CSV TARGET."""
 
 import json
+import operator
 import sys
 
 
@@ -25,24 +27,42 @@ def sheet(folder, target, columns, *panels):
     figure.savefig(f"{target}.png", dpi=100, bbox_inches="tight", pad_inches=0.05, metadata={"Software": None})
 
 
-def figure_of(steps, field):
-    """What the last texture of a report says of FIELD, a path with dots; text in quotes is itself."""
-    if field.startswith("'"):
-        return field.strip("'")
-    texture = [step for step in steps if step["action"] == "texture"][-1]
-    if field == "points":
-        return f"{512 * texture['details']['blocks_evaluated'] / 1e6:.2f} M"
-    value = texture["details"]
+def steps_of(folder, name):
+    with open(f"{folder}/{name}.json") as file:
+        return json.load(file)["steps"]
+
+
+def value_of(steps, field):
+    """What the last texture of a report says of FIELD, a path with dots."""
+    value = [step for step in steps if step["action"] == "texture"][-1]["details"]
     for part in field.split("."):
         value = value[part]
+    return value
+
+
+def figure_of(steps, field):
+    """The same as text for a table; text in quotes is itself."""
+    if field.startswith("'"):
+        return field.strip("'")
+    if field == "points":
+        return f"{512 * value_of(steps, 'blocks_evaluated') / 1e6:.2f} M"
+    value = value_of(steps, field)
     return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def row(folder, name, *fields):
     """A row of a Markdown table from FOLDER/NAME.json."""
-    with open(f"{folder}/{name}.json") as file:
-        steps = json.load(file)["steps"]
+    steps = steps_of(folder, name)
     print("| " + " | ".join(figure_of(steps, field) for field in fields) + " |")
+
+
+def expect(folder, name, field, comparison, wanted):
+    """Exits 5 with a sentence unless what FOLDER/NAME.json says of FIELD compares so."""
+    compare = {"<": operator.lt, "<=": operator.le, "=": operator.eq, ">=": operator.ge, ">": operator.gt}[comparison]
+    value = value_of(steps_of(folder, name), field)
+    if not compare(value, float(wanted)):
+        print(f"{name}: {field} is {value}, but {comparison} {wanted} is wanted.", file=sys.stderr)
+        sys.exit(5)
 
 
 def plot(table, target):
@@ -83,4 +103,4 @@ def plot(table, target):
 
 
 if __name__ == "__main__":
-    {"sheet": sheet, "row": row, "plot": plot}[sys.argv[1]](*sys.argv[2:])
+    {"sheet": sheet, "row": row, "expect": expect, "plot": plot}[sys.argv[1]](*sys.argv[2:])

@@ -17,6 +17,11 @@ map recursion-3 read "$out/recursion-2.vdb" --as base ! read "$out/standing150.v
   ! patch @base --at 0.905,0.38,0.345 --size 0.054,0.045 --rotate 20 --height 0.05 --as back \
   ! texture @base @small @back --sink 1.5vx --blend 2vx --voxel 0.0015
 row recursion-3 "'3'" particles voxel_size cpu_s.setup cpu_s.mapping points min_jacobian
+for level in 1 2 3; do
+  expect "recursion-$level" patches = 1
+  expect "recursion-$level" folded = 0
+  expect "recursion-$level" blocks_evaluated ">" 0
+done
 picture recursion-1 --from 2.7,1.5,2.5 --to 0,-0.1,0
 picture recursion-2 --from 1.5,1,1.5 --to 0.55,0.42,0.35
 picture recursion-3 --from 1.25,0.72,0.85 --to 0.86,0.42,0.33

@@ -14,5 +14,6 @@ map starfish-55 read "$out/bunny200.vdb" --as base ! read "$out/starfish.vdb" --
   ! scatter @base --count 55 --seed 2 --size 0.26,0.26 --height 0.05 --levels 3 --jitter 180 --as places \
   ! texture @base @starfish @places --blend 1vx --voxel 0.0075
 row starfish-55 patches particles cpu_s.setup cpu_s.certificate cpu_s.mapping points cpu_s.distance cpu_s.merging
+expect starfish-55 patches = 55
 picture starfish-55 --from 2.7,1.5,2.5 --to 0,-0.1,0
 sheet starfish 1 "starfish-55=starfish strewn over a bunny"

@@ -4,8 +4,11 @@
 #include "mapping/maps/rbf_sum.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <type_traits>
+
+#include "mapping/maps/rbf_adders.h"
 
 namespace mapping {
 namespace {
@@ -14,11 +17,6 @@ constexpr std::size_t kTile = 64;  // points, few enough for the first-level cac
 
 const double kScale = rbf::kLaplacian.scale, kA = rbf::kLaplacian.a, kB = rbf::kLaplacian.b,
              kFast = rbf::kLaplacian.fast, kSlow = rbf::kLaplacian.slow;
-
-/// Adds `count` chosen particles of six numbers each at `points` points.
-using Adder = void (*)(const double* particles, const std::uint32_t* chosen, std::size_t count,
-                       const double* x, const double* y, const double* z, double* u, double* v,
-                       double* w, std::size_t points);
 
 namespace plain {
 #include "mapping/maps/rbf_sum_tile.inc"
@@ -38,30 +36,47 @@ namespace avx512 {
 #pragma GCC pop_options
 #endif
 
-/// The widest that the processor has, in the order of RbfKernel.
-const Adder* chooseAdders() {
+struct Supported {
+  std::array<RbfAdders, 3> adders;
+  std::size_t count = 0;
+  void add(const char* name, const RbfAdder* each) { adders[count++] = {name, each}; }
+};
+
+Supported findSupported() {
+  Supported found;
+  found.add("plain", plain::kAdders);
 #if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2")) found.add("avx2", avx2::kAdders);
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
       __builtin_cpu_supports("avx512dq"))
-    return avx512::kAdders;
-  if (__builtin_cpu_supports("avx2")) return avx2::kAdders;
+    found.add("avx512", avx512::kAdders);
 #endif
-  return plain::kAdders;
+  return found;
 }
 
 static_assert(sizeof(RbfParticle) == 6 * sizeof(double) && std::is_standard_layout_v<RbfParticle>);
 
 }  // namespace
 
-void addRbfSums(RbfKernel kernel, std::span<const RbfParticle> particles,
+std::span<const RbfAdders> supportedRbfAdders() {
+  static const Supported supported = findSupported();
+  return {supported.adders.data(), supported.count};
+}
+
+void addRbfSums(const RbfAdders& adders, RbfKernel kernel, std::span<const RbfParticle> particles,
                 std::span<const std::uint32_t> chosen, RbfPoints& points) {
-  static const Adder* const adders = chooseAdders();
   if (particles.empty()) return;
-  const Adder add = adders[static_cast<std::size_t>(kernel)];
+  const RbfAdder add = adders.each[static_cast<std::size_t>(kernel)];
   const double* numbers = &particles.front().position.x;
   for (std::size_t i = 0; i < points.size(); i += kTile)
     add(numbers, chosen.data(), chosen.size(), &points.x[i], &points.y[i], &points.z[i],
         &points.u[i], &points.v[i], &points.w[i], std::min(kTile, points.size() - i));
+}
+
+void addRbfSums(RbfKernel kernel, std::span<const RbfParticle> particles,
+                std::span<const std::uint32_t> chosen, RbfPoints& points) {
+  static const RbfAdders& widest = supportedRbfAdders().back();
+  addRbfSums(widest, kernel, particles, chosen, points);
 }
 
 }  // namespace mapping

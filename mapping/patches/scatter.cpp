@@ -14,6 +14,7 @@
 #include "levelset/progress_gate.h"
 #include "mapping/maps/distortion.h"
 #include "mapping/maps/level_map.h"
+#include "mapping/patches/patch_levels.h"
 #include "mapping/patches/patch_space.h"
 
 namespace mapping {

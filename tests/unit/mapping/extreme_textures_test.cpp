@@ -16,6 +16,8 @@
 #include "levelset/solids/csg.h"
 #include "levelset/solids/shapes.h"
 #include "mapping/textures/geometric_texture.h"
+#include "tests/support/files.h"
+#include "tests/support/formula_patches.h"
 #include "tests/support/patches.h"
 
 namespace extreme_textures_test {
@@ -37,6 +39,20 @@ constexpr std::size_t kGiB = std::size_t{1} << 30;
 const NarrowBand& slab() {
   static const NarrowBand band = levelset::makeBox(V3d(8, 8, 2), V3d(0, 0, -1), 0.2);
   return band;
+}
+
+constexpr double kTrough = 1.5;  // its radius
+
+/// A slab with a round groove along y.
+NarrowBand makeTrough(const NarrowBand& plate) {
+  const std::array<NarrowBand, 2> both = {
+      plate, levelset::makeCylinder(kTrough, 12, V3d(0), V3d(0, 1, 0), 0.2)};
+  return levelset::combine(levelset::CsgOperation::Difference, both).band;
+}
+
+/// Near its bottom, as far along it as `half` on both sides.
+std::array<V3d, 4> troughCorners(double half) {
+  return {V3d(-1, -half, -1.12), V3d(1, -half, -1.12), V3d(1, half, -1.12), V3d(-1, half, -1.12)};
 }
 
 Measurement measureAlone(const NarrowBand& base, const NarrowBand& texture, const Patch& patch,
@@ -93,7 +109,7 @@ TEST(ExtremeTextures, CoarseVoxelsShowWhatTheyCan) {
 }
 
 TEST(ExtremeTextures, AThousandTimesCoarserThanTheBase) {
-  // Six voxels of texture over a patch of many of the base's: as round as six voxels are.
+  // A unit a thousand times larger, and six voxels of texture over a patch: as round as those are.
   const NarrowBand fine = levelset::makeSphere(1, V3d(0), 0.04);
   const Patch patch = makePatch(fine, cap(0.5), 0.5, {.levels = 3}).patch;
   const NarrowBand rough = levelset::makeSphere(3000, V3d(0), 1000);
@@ -102,6 +118,38 @@ TEST(ExtremeTextures, AThousandTimesCoarserThanTheBase) {
       measureAlone(fine, levelset::makeSphere(3000, V3d(0), 300), patch, 0.04);
   EXPECT_NEAR(mapped.volume, smooth.volume, 0.05 * smooth.volume);
   EXPECT_EQ(mapped.euler, 2);
+}
+
+TEST(ExtremeTextures, VoxelsFortyTimesTheBasesGiveASmoothSurface) {
+  // Six voxels of texture laid over 250 of the base's. What is mapped is the interpolant of the
+  // texture's distances. A straight one in each axis lies h²/12 |x|'' = h²/(6 r) above |x| on
+  // average, which takes h²/(2 R²) = 1/18 of the volume from a ball of R = 3 h. The tricubic one is
+  // exact for parabolas: what is left is of third order and changes its sign from cell to cell, and
+  // a hundredth is far more than that.
+  const double voxel = 0.01, half = 1.25, height = 0.25;
+  const NarrowBand base = levelset::makeBox(V3d(2.7, 2.7, 0.1), V3d(0, 0, -0.05), voxel);
+  const NarrowBand rough = levelset::makeSphere(3, V3d(0), 1);
+  const auto place = [&](const V3d& uvw) {
+    return V3d(half * (2 * uvw.x - 1), half * (2 * uvw.y - 1), height * uvw.z);
+  };
+  const mapping::TextureResult result =
+      mapTexture(base, rough, support::patchAt(place, 24, 24, 2, height),
+                 {.merge = TextureMerge::Alone, .map = TextureMap::Shell, .sink = 0.0});
+  EXPECT_EQ(result.report.voxelSize, voxel);
+  EXPECT_GT(result.report.distortion.stretch.most * rough.voxelSize(), 40 * voxel);
+  const Measurement mapped = levelset::measure(result.band);
+  const double ball = 4 * kPi / 3 * half * half * height / 2;
+  EXPECT_NEAR(mapped.volume, ball, 0.01 * ball);
+  EXPECT_EQ(mapped.euler, 2);
+  // Nowhere is it off the mapped ball by more than a tenth of the texture's voxel.
+  const levelset::BandSampler sampler(result.band);
+  for (int i = 0; i < 60; ++i)
+    for (int j = 0; j < 30; ++j) {
+      const double a = kPi * i / 30, b = kPi * (j + 0.5) / 30;
+      const V3d out(std::sin(b) * std::cos(a), std::sin(b) * std::sin(a), std::cos(b));
+      EXPECT_LT(sampler.value(place(V3d(0.5) + out * (2.9 / 6))), 0) << out;
+      EXPECT_GT(sampler.value(place(V3d(0.5) + out * (3.1 / 6))), 0) << out;
+    }
 }
 
 TEST(ExtremeTextures, HolesAndHandlesStay) {
@@ -189,19 +237,13 @@ TEST(ExtremeTextures, OverACreaseNothingTears) {
 }
 
 TEST(ExtremeTextures, OffsetsBeyondTheCurvatureRadiusAreRefusedWithTheCause) {
-  // In a trough of radius 1.5 the particles of a patch 2 high meet on the axis and stay there: the
-  // map squeezes the texture to nothing without folding it. Voxels that show it would be too many,
+  // In a trough the particles of a patch 2 high meet on the axis and stay there: the map
+  // squeezes the texture to nothing without folding it. Voxels that show it would be too many,
   // and the refusal tells the place; with voxels that are asked for, what can be seen is mapped.
-  const NarrowBand trough =
-      levelset::combine(levelset::CsgOperation::Difference,
-                        std::array<NarrowBand, 2>{
-                            slab(), levelset::makeCylinder(1.5, 12, V3d(0), V3d(0, 1, 0), 0.2)})
-          .band;
-  const std::array<V3d, 4> corners = {V3d(-1, -1, -1.12), V3d(1, -1, -1.12), V3d(1, 1, -1.12),
-                                      V3d(-1, 1, -1.12)};
-  const Patch patch =
-      makePatch(trough, corners, 2, {.levels = 4, .scheme = mapping::LevelScheme::Conforming})
-          .patch;
+  const NarrowBand trough = makeTrough(slab());
+  const Patch patch = makePatch(trough, troughCorners(1), 2,
+                                {.levels = 4, .scheme = mapping::LevelScheme::Conforming})
+                          .patch;
   const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.1);
   std::string message;
   try {
@@ -213,6 +255,38 @@ TEST(ExtremeTextures, OffsetsBeyondTheCurvatureRadiusAreRefusedWithTheCause) {
   EXPECT_NE(message.find("--voxel"), std::string::npos) << message;
   const Measurement mapped = measureAlone(trough, texture, patch, 0.1);
   EXPECT_GT(mapped.volume, 0.5);
+}
+
+TEST(ExtremeTextures, LevelsBeyondTheCurvatureRadiusThatFoldAreRefused) {
+  // In such a trough the corners of reduced levels meet over the axis and climb there: the sides
+  // of the levels above lie upon each other, and cells turn over. Samples and certificate both see
+  // it, of both maps; who asks for it gets what can be mapped, with the folds counted.
+  constexpr double kHeight = 2.5;
+  const NarrowBand trough = makeTrough(levelset::makeBox(V3d(4, 3, 2), V3d(0, 0, -1), 0.2));
+  const Patch patch =
+      makePatch(trough, troughCorners(0.7), kHeight, {.levels = 4, .spacing = 0.3}).patch;
+  const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.1);
+  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell}) {
+    SCOPED_TRACE(map == TextureMap::Rbf ? "rbf" : "shell");
+    mapping::TextureOptions options = {.map = map, .voxelSize = 0.2};
+    const std::string message = support::refusal<levelset::InvalidInput>(
+        [&] { (void)mapTexture(trough, texture, patch, options); });
+    EXPECT_NE(message.find("the patch folds at"), std::string::npos) << message;
+    options.allowFolds = true;
+    const mapping::TextureResult mapped = mapTexture(trough, texture, patch, options);
+    const mapping::TextureReport& report = mapped.report;
+    EXPECT_FALSE(mapped.band.isEmpty());
+    EXPECT_GT(report.distortion.folded, 0u);
+    EXPECT_LT(report.distortion.jacobian.least, 0);
+    EXPECT_GE(report.distortion.foldUvw.z * kHeight, kTrough);
+    EXPECT_EQ(report.certificate.verdict(), mapping::FoldVerdict::Folds);
+    EXPECT_GT(report.certificate.foldedShare, 0);
+    EXPECT_FALSE(report.certificate.worst.empty());
+    for (const mapping::FoldPlace& fold : report.certificate.worst) {
+      EXPECT_LE(fold.jacobian, 0);
+      EXPECT_GE(fold.uvw.z * kHeight, kTrough) << fold.uvw;
+    }
+  }
 }
 
 TEST(ExtremeTextures, LambdaIsANumber) {

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "levelset/error.h"
 #include "mapping/surface/geodesic.h"
@@ -62,30 +64,50 @@ TEST(Patch, IsALatticeOnAPlane) {
   EXPECT_LE(result.patch.particleCount(), 2600u);
 }
 
+/// All four sides of a level about a ball's centre, in steps of one length.
+void expectEvenGreatCircles(const ParticleLevel& level) {
+  std::array<std::vector<V3d>, 4> sides;
+  for (std::size_t i = 0; i < level.columns; ++i) {
+    sides[0].push_back(level.at(i, 0));
+    sides[1].push_back(level.at(i, level.rows - 1));
+  }
+  for (std::size_t j = 0; j < level.rows; ++j) {
+    sides[2].push_back(level.at(0, j));
+    sides[3].push_back(level.at(level.columns - 1, j));
+  }
+  for (const std::vector<V3d>& side : sides) {
+    const V3d pole = side.front().cross(side.back()).normalized();
+    double least = HUGE_VAL, largest = 0;
+    for (std::size_t n = 0; n < side.size(); ++n) {
+      EXPECT_NEAR(side[n].dot(pole), 0, 0.02 * kVoxel) << "level " << level.w;
+      if (n == 0) continue;
+      const V3d a = side[n - 1].normalized(), b = side[n].normalized();
+      const double step = std::atan2(a.cross(b).length(), a.dot(b));
+      least = std::min(least, step), largest = std::max(largest, step);
+    }
+    EXPECT_GE(least, 0.99 * largest) << "level " << level.w;
+  }
+}
+
 TEST(Patch, LevelsOnASphereAreConcentricAndSymmetric) {
   const PatchResult result = makePatch(sphere(), cap(0.6), 0.5, {.levels = 4, .spacing = 0.09});
   EXPECT_FALSE(result.patch.mirrored);
   for (const ParticleLevel& level : result.patch.levels) {
+    ASSERT_EQ(level.rows, level.columns);  // a quarter turn maps the grid to itself
     for (std::size_t j = 0; j < level.rows; ++j)
       for (std::size_t i = 0; i < level.columns; ++i) {
         const V3d p = level.at(i, j);
         EXPECT_NEAR(p.length() - 1, level.height, 0.01 * kVoxel);
         const V3d mirrored = level.at(level.columns - 1 - i, j);
         EXPECT_LT((p - V3d(-mirrored.x, mirrored.y, mirrored.z)).length(), 0.05 * kVoxel);
-        const V3d turned =
-            level.at(level.rows - 1 - j, i);  // a quarter turn maps the grid to itself
-        if (level.rows == level.columns) {
-          EXPECT_LT((p - V3d(turned.y, -turned.x, turned.z)).length(), 0.05 * kVoxel);
-        }
+        const V3d turned = level.at(level.rows - 1 - j, i);
+        EXPECT_LT((p - V3d(turned.y, -turned.x, turned.z)).length(), 0.05 * kVoxel);
       }
+    expectEvenGreatCircles(level);
   }
-  // Sides are great circles.
-  const ParticleLevel& surface = result.patch.levels.front();
-  const V3d pole = surface.at(0, 0).cross(surface.at(surface.columns - 1, 0)).normalized();
-  for (std::size_t i = 0; i < surface.columns; ++i)
-    EXPECT_NEAR(surface.at(i, 0).dot(pole), 0, 0.02 * kVoxel);
   const double angle = std::acos(V3d(cap(0.6)[0]).dot(cap(0.6)[1]));
   EXPECT_NEAR(result.report.uLength, angle, 1e-3 * angle);
+  EXPECT_NEAR(result.report.vLength, angle, 1e-3 * angle);
 }
 
 TEST(Patch, RelaxationMakesCellsEven) {

@@ -2,11 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <random>
+#include <string>
 #include <vector>
 
+#include "mapping/maps/rbf_adders.h"
 #include "mapping/maps/rbf_sum.h"
 #include "tests/support/clouds.h"
 
@@ -124,16 +128,73 @@ TEST_P(Kernel, VectorCodeAgreesWithIt) {
   const std::vector<std::uint32_t> chosen = {0};
   std::vector<double> radii = {0, 1e-140, 1e-20, 1, std::sqrt(0.5), 25, 400};
   for (double r = 1e-9; r < 1e5; r *= 1.0137) radii.push_back(r);
-  mapping::RbfPoints points(radii.size());
-  for (std::size_t i = 0; i < radii.size(); ++i) points.z[i] = radii[i];
-  addRbfSums(GetParam(), particle, chosen, points);
-  for (std::size_t i = 0; i < radii.size(); ++i) {
-    const double r = radii[i], expected = value(r);
-    const double size = std::abs(expected) + std::min(1.0, r * r);
-    EXPECT_NEAR(points.u[i], expected, 4e-15 * size) << r;
-    EXPECT_EQ(points.v[i], -2 * points.u[i]);
-    EXPECT_EQ(points.w[i], 0.5 * points.u[i]);
+  for (const mapping::RbfAdders& adders : mapping::supportedRbfAdders()) {
+    SCOPED_TRACE(adders.name);
+    mapping::RbfPoints points(radii.size());
+    for (std::size_t i = 0; i < radii.size(); ++i) points.z[i] = radii[i];
+    addRbfSums(adders, GetParam(), particle, chosen, points);
+    for (std::size_t i = 0; i < radii.size(); ++i) {
+      const double r = radii[i], expected = value(r);
+      const double size = std::abs(expected) + std::min(1.0, r * r);
+      EXPECT_NEAR(points.u[i], expected, 4e-15 * size) << r;
+      EXPECT_EQ(points.v[i], -2 * points.u[i]);
+      EXPECT_EQ(points.w[i], 0.5 * points.u[i]);
+    }
   }
+}
+
+// Sums of many particles, near and far, at counts of points that fill no vector and no tile.
+TEST_P(Kernel, EveryInstructionSetGivesTheSameBits) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const auto place = [&] { return V3d(unit(random), unit(random), unit(random)); };
+  std::vector<mapping::RbfParticle> particles;
+  std::vector<std::uint32_t> chosen;
+  for (std::uint32_t n = 0; n < 200; ++n) {
+    particles.push_back({place() * std::pow(10, 3 * unit(random)), place()});
+    if (n % 3 != 0) chosen.push_back(n);
+  }
+  std::shuffle(chosen.begin(), chosen.end(), random);
+  for (const std::size_t count : {1, 2, 3, 5, 7, 64, 1021}) {
+    mapping::RbfPoints start(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const V3d x = i % 17 == 4 ? particles[i % 200].position : place() * 10;
+      start.x[i] = x.x, start.y[i] = x.y, start.z[i] = x.z;
+      start.u[i] = unit(random), start.v[i] = unit(random), start.w[i] = unit(random);
+    }
+    const auto bitsOf = [](const mapping::RbfPoints& points) {
+      std::vector<std::uint64_t> bits;
+      for (const auto* numbers : {&points.u, &points.v, &points.w})
+        for (const double number : *numbers) bits.push_back(std::bit_cast<std::uint64_t>(number));
+      return bits;
+    };
+    const auto by = [&](const mapping::RbfAdders& adders) {
+      mapping::RbfPoints points = start;
+      addRbfSums(adders, GetParam(), particles, chosen, points);
+      return bitsOf(points);
+    };
+    const std::vector<std::uint64_t> plain = by(mapping::supportedRbfAdders().front());
+    ASSERT_NE(plain, bitsOf(start));
+    for (const mapping::RbfAdders& adders : mapping::supportedRbfAdders())
+      EXPECT_EQ(by(adders), plain) << adders.name << " at " << count;
+    mapping::RbfPoints chosenItself = start;
+    addRbfSums(GetParam(), particles, chosen, chosenItself);
+    EXPECT_EQ(bitsOf(chosenItself), plain) << count;
+  }
+}
+
+TEST(RbfAdders, AreAllThatTheProcessorCanRun) {
+  std::vector<std::string> expected = {"plain"};
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2")) expected.emplace_back("avx2");
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+      __builtin_cpu_supports("avx512dq"))
+    expected.emplace_back("avx512");
+#endif
+  std::vector<std::string> found;
+  for (const mapping::RbfAdders& adders : mapping::supportedRbfAdders())
+    found.emplace_back(adders.name);
+  EXPECT_EQ(found, expected);
 }
 
 // The limit at 0 that the closed form cannot be evaluated at, and the far field of a point charge.
