@@ -189,11 +189,15 @@ struct CubeProof {
   std::size_t pieces = 0;
 };
 
-/// The middle of a cube, if it is in the patch and goes into the texture.
+/// Is the middle of a cube in the patch, and does it go into the texture?
+bool isCenterWanted(const ProofScene& scene, const RbfCube& cube, const CubeSlopes& at) {
+  return scene.wanted.intersects(at.value / scene.sizes) && scene.isInPatch(cube, 0);
+}
+
+/// The middle of a cube. @pre isCenterWanted
 void lookAtCenter(const ProofScene& scene, const RbfCube& cube, const CubeSlopes& at,
                   CubeProof& proof) {
   const V3d uvw = at.value / scene.sizes;
-  if (!scene.wanted.intersects(uvw) || !scene.isInPatch(cube, 0)) return;
   const V3d place = cube.center + scene.origin;
   const double volume = scene.hand * scene.sizes.x * scene.sizes.y * scene.sizes.z;
   double determinant = scene.hand * scene.cubes.slopes(cube, cube.center).determinant();
@@ -217,18 +221,22 @@ CubeProof proveCube(const ProofScene& scene, const RbfCube& start, std::size_t m
     boundSlopes(scene.cubes, cube, at);
     if (!scene.reachesTexture(cube, at)) continue;
     ++proof.pieces;
-    const bool isDecided = at.relative < 1;
+    // One that turns over folds the texture only where it is part of it: of a cube across the
+    // border a part outside may be what does.
+    const bool isWanted = isCenterWanted(scene, cube, at);
+    const bool isPositive = scene.hand * at.determinant > 0;
+    const bool isDecided = at.relative < 1 && (isPositive || isWanted);
     const bool canHalve = cube.half > scene.smallest && queue.size() + 8 <= mostCubes;
     if (!isDecided && canHalve) {
       for (int bits = 0; bits < 8; ++bits) queue.push_back(scene.cubes.octant(cube, bits));
       continue;
     }
-    lookAtCenter(scene, cube, at, proof);
+    if (isWanted) lookAtCenter(scene, cube, at, proof);
     const double volume = 8 * cube.half * cube.half * cube.half;
     proof.size += volume;
     if (!isDecided)
       proof.undecided += volume;
-    else if (!(scene.hand * at.determinant > 0))
+    else if (!isPositive)
       proof.folded += volume;
   }
   return proof;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <ctime>
 #include <iterator>
+#include <map>
 #include <memory>
 #include <span>
 
@@ -18,6 +19,7 @@
 #include "levelset/solids/csg.h"
 #include "levelset/solids/resample.h"
 #include "mapping/maps/shell_map.h"
+#include "mapping/textures/shared_sides.h"
 #include "mapping/textures/texture_warp.h"
 
 namespace mapping {
@@ -136,6 +138,47 @@ NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least,
   return levelset::redistance(fitted,
                               {.halfWidth = std::ceil(needed), .maxMemory = options.maxMemory});
 }
+
+/// What of the texture is mapped onto each patch. A shell ends somewhere around the unit cube, so
+/// what is outside of a box that was asked for is cut off there, not at the end of the shell; at
+/// sides that patches share two voxels beyond them, so that tiles do not meet face to face, where
+/// the grid would see a gap. What touches the box is left as it is.
+class TextureParts {
+ public:
+  template <typename Fit>
+  TextureParts(const NarrowBand& texture, const Box3d& box, std::span<const Patch> patches,
+               double voxelSize, bool isCut, const Fit& fit) {
+    if (!isCut) {
+      parts_.emplace(SharedSides{}, fit(texture));
+      ofPatch_.resize(patches.size(), SharedSides{});
+      return;
+    }
+    ofPatch_ = sharedSides(patches);
+    constexpr double kBeyond = 2;  // voxels
+    double u = HUGE_VAL, v = HUGE_VAL;
+    for (const Patch& patch : patches) {
+      const ParticleLevel& level = patch.levels.front();
+      u = std::min(u, patch.spacing * static_cast<double>(level.columns - 1));
+      v = std::min(v, patch.spacing * static_cast<double>(level.rows - 1));
+    }
+    const double alongU = kBeyond * voxelSize / u * box.size().x,
+                 alongV = kBeyond * voxelSize / v * box.size().y;
+    for (const SharedSides& sides : ofPatch_) {
+      if (parts_.contains(sides)) continue;
+      Box3d wider = box;
+      if (sides[0]) wider.min.x -= alongU;
+      if (sides[1]) wider.max.x += alongU;
+      if (sides[2]) wider.min.y -= alongV;
+      if (sides[3]) wider.max.y += alongV;
+      parts_.emplace(sides, fit(levelset::clip(texture, wider)));
+    }
+  }
+  [[nodiscard]] const NarrowBand& of(std::size_t patch) const { return parts_.at(ofPatch_[patch]); }
+
+ private:
+  std::map<SharedSides, NarrowBand> parts_;
+  std::vector<SharedSides> ofPatch_;
+};
 
 /// A map of the chosen kind, and what is known of it.
 struct ChosenMap {
@@ -415,12 +458,12 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
   requireResult(texture, report, maps, options);
 
   // === Warp, and make a distance of it again [Brodersen07, ERR-23 in our notes]
-  // The shell ends somewhere around the unit cube, so what is outside of a box that was asked for
-  // is cut off there, not at the end of the shell. What touches it is left as it is.
   const bool isCut = options.map == TextureMap::Shell &&
                      isBeyond(texture.zeroSetBounds(), box, texture.voxelSize());
-  const NarrowBand whole = fitTexture(isCut ? levelset::clip(texture, box) : texture,
-                                      report.voxelSize, bandStretch, maxStretch, options);
+  const TextureParts parts(
+      texture, box, patches, report.voxelSize, isCut, [&](const NarrowBand& part) {
+        return fitTexture(part, report.voxelSize, bandStretch, maxStretch, options);
+      });
   std::vector<NarrowBand> pieces;
   std::size_t operations = 0, ghosts = 0, crumbs = 0;
   for (std::size_t n = 0; n < patches.size(); ++n) {
@@ -432,7 +475,7 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
       return levelset::subProgress(options.progress, share(from), share(to));
     };
     Warp warp = timed(report.cost.mapping, [&] {
-      return warpTexture(whole, {box, sink / patches[n].height}, patches[n], *maps[n].map,
+      return warpTexture(parts.of(n), {box, sink / patches[n].height}, patches[n], *maps[n].map,
                          {.indexToWorld = chooseGrid(base, report.voxelSize, options.merge),
                           .scale = maps[n].distortion.meanStretch,
                           .mapTolerance = options.mapTolerance,

@@ -46,8 +46,8 @@ void expectSpread(const json& spread) {
 
 TEST_F(TextureReport, TellsDistortionCostAndErrorOfEachMap) {
   for (const std::string map : {"rbf", "shell"}) {
-    const json details = detailsOf(kBall + patch("--height 3 --levels 4") + kRing +
-                                   "texture @b @t @p --map " + map);
+    const json details =
+        detailsOf(kBall + patch("--height 3 --levels 4") + kRing + "texture @b @t @p --map " + map);
     expectSpread(details["jacobian"]);
     expectSpread(details["stretch"]);
     EXPECT_EQ(details["folded"], 0) << map;
@@ -85,7 +85,8 @@ TEST_F(TextureReport, TellsThatUnfoldingFailed) {
 }
 
 TEST_F(TextureReport, TellsOfFoldsHowLengthsSpread) {
-  for (const char* map : {"--map rbf", "--map shell", "--map mesh", "--map rbf --kernel thin-plate"}) {
+  for (const char* map :
+       {"--map rbf", "--map shell", "--map mesh", "--map rbf --kernel thin-plate"}) {
     const json details =
         detailsOf(kBall + patch("--height 3 --levels 4") + "folds @b @p " + map + " ! info");
     expectSpread(details["jacobian"]);

@@ -10,6 +10,8 @@
 
 #include "levelset/error.h"
 #include "levelset/fields/grid.h"
+#include "levelset/solids/csg.h"
+#include "levelset/solids/shapes.h"
 #include "mapping/maps/distortion.h"
 #include "mapping/maps/jacobian_field.h"
 #include "mapping/maps/level_map.h"
@@ -437,6 +439,22 @@ TEST(JacobianField, HoldsTheJacobianOfEachMap) {
   EXPECT_THROW((void)mapping::jacobianField(patch, levels, {}), levelset::UsageError);
   EXPECT_THROW((void)mapping::jacobianField(patch, levels, {.voxelSize = 1e-12}),
                levelset::ResourceLimit);
+}
+
+TEST(FoldCertificate, OfASmoothMapShowsWhereWhatItCountsFolds) {
+  // Higher than the trough is wide: cubes that turn over lie across the texture's border, too.
+  const levelset::NarrowBand trough =
+      levelset::subtract(levelset::makeBox(V3d(8, 8, 2), V3d(0, 0, -1), 0.2),
+                         levelset::makeCylinder(1.5, 12, V3d(0), V3d(0, 1, 0), 0.2));
+  const std::array<V3d, 4> corners = {V3d(-1, -1, -1.12), V3d(1, -1, -1.12), V3d(1, 1, -1.12),
+                                      V3d(-1, 1, -1.12)};
+  const Patch patch = mapping::makePatch(trough, corners, 2.5, {.levels = 4}).patch;
+  const FoldCertificate proof = certifyRbf(mapping::patchToTexture(patch), patch, 0.1);
+  // Whatever is counted as folded has a place to show; what may only fold outside is not certified.
+  EXPECT_EQ(proof.foldedShare > 0, proof.verdict() == FoldVerdict::Folds);
+  EXPECT_EQ(proof.leastJacobian <= 0, proof.verdict() == FoldVerdict::Folds);
+  EXPECT_NE(proof.verdict(), FoldVerdict::Certified);
+  EXPECT_GT(proof.foldedShare + proof.undecidedShare, 0);
 }
 
 TEST(JacobianField, ShowsFoldsBetweenGridPoints) {
