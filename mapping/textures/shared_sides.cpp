@@ -50,8 +50,7 @@ std::vector<SharedSides> sharedSides(std::span<const Patch> patches) {
   for (auto a = sides.begin(); a != sides.end(); ++a) {
     const double tolerance = kTolerance * patches[a->patch].spacing;
     for (auto b = a + 1; b != sides.end() && b->middle.x - a->middle.x <= tolerance; ++b)
-      if (a->liesOn(*b, tolerance))
-        shared[a->patch][a->side] = shared[b->patch][b->side] = true;
+      if (a->liesOn(*b, tolerance)) shared[a->patch][a->side] = shared[b->patch][b->side] = true;
   }
   return shared;
 }

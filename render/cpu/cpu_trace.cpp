@@ -1,0 +1,59 @@
+#include "render/cpu/cpu_trace.h"
+
+#include <immintrin.h>
+
+#include <algorithm>
+#include <cstring>
+
+
+namespace render {
+
+#define LANES 8
+namespace sse2 {
+#include "render/cpu/lanes.inc"
+}
+#undef LANES
+
+#pragma GCC push_options
+#pragma GCC target("avx2")
+#define LANES 8
+namespace avx2 {
+#include "render/cpu/lanes.inc"
+}
+#undef LANES
+#pragma GCC pop_options
+
+#pragma GCC push_options
+#pragma GCC target("avx512f,avx512vl,avx512dq,avx512bw,prefer-vector-width=512")
+#define LANES 16
+namespace avx512 {
+#include "render/cpu/lanes.inc"
+}
+#undef LANES
+#pragma GCC pop_options
+
+std::vector<InstructionSet> instructionSets() {
+  std::vector<InstructionSet> sets = {InstructionSet::Sse2};
+  if (__builtin_cpu_supports("avx2")) sets.push_back(InstructionSet::Avx2);
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+      __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw"))
+    sets.push_back(InstructionSet::Avx512);
+  return sets;
+}
+
+void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits, InstructionSet set) {
+  if (pool.brickCount() == 0) {
+    std::fill(hits.found.begin(), hits.found.end(), 0);
+    return;
+  }
+  switch (set) {
+    case InstructionSet::Avx512:
+      return avx512::traceAll(pool, rays, hits);
+    case InstructionSet::Avx2:
+      return avx2::traceAll(pool, rays, hits);
+    default:
+      return sse2::traceAll(pool, rays, hits);
+  }
+}
+
+}  // namespace render

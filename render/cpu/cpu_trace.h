@@ -1,0 +1,21 @@
+#pragma once
+
+#include <vector>
+
+#include "render/kernel/brick_pool.h"
+#include "render/kernel/ray_block.h"
+
+namespace render {
+
+enum class InstructionSet { Sse2, Avx2, Avx512 };
+
+/// Those that this processor has, the fastest last.
+[[nodiscard]] std::vector<InstructionSet> instructionSets();
+
+/// First crossings of rays with a band's zero set; the bits are the same on all instruction sets.
+/// @param hits  as long as the rays
+/// @pre the processor has the set
+void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits,
+               InstructionSet set = instructionSets().back());
+
+}  // namespace render

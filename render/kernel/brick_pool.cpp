@@ -1,0 +1,241 @@
+#include "render/kernel/brick_pool.h"
+
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "levelset/error.h"
+#include "levelset/vdb.h"
+
+namespace render {
+namespace {
+
+using openvdb::Coord;
+using Leaf = openvdb::FloatTree::LeafNodeType;
+
+constexpr int kBlock = 8, kEntriesOfPage = 512;
+constexpr int kMostEmptyPages = 1 << 10;  // pages along the edge of an empty cube
+constexpr double kMostPages = 1 << 26;    // 256 MiB
+constexpr std::size_t kMostBricks = std::numeric_limits<std::int32_t>::max() / BrickPool::kValues;
+
+struct Brick {
+  Coord origin;
+  std::array<float, BrickPool::kValues> value;
+  std::array<std::uint32_t, BrickPool::kMaskWords> mask;
+};
+
+/// Origins of the blocks that can hold a crossing cell: those of leaves, and those before them,
+/// whose last cells reach into them. In tree order of no importance, each once.
+std::vector<Coord> blocksOf(const openvdb::FloatTree& tree) {
+  std::vector<Coord> blocks;
+  blocks.reserve(tree.leafCount() * 2);
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
+    for (int i = 0; i < 8; ++i)
+      blocks.push_back(leaf->origin().offsetBy(i & 4 ? -kBlock : 0, i & 2 ? -kBlock : 0,
+                                               i & 1 ? -kBlock : 0));
+  std::sort(blocks.begin(), blocks.end());
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+  return blocks;
+}
+
+/// The values of the 9³ points from a block's origin on, from up to eight leaves.
+/// @return do they differ in sign?
+template <typename Accessor>
+bool fill(const Accessor& accessor, Brick& brick) {
+  constexpr int kEdge = BrickPool::kEdge;
+  bool anyInside = false, anyOutside = false;
+  for (int i = 0; i < 8; ++i) {
+    const int fromX = i & 4 ? kBlock : 0, fromY = i & 2 ? kBlock : 0, fromZ = i & 1 ? kBlock : 0;
+    const Coord at = brick.origin.offsetBy(fromX, fromY, fromZ);
+    const Leaf* leaf = accessor.probeConstLeaf(at);
+    const float* values = leaf ? leaf->buffer().data() : nullptr;
+    const float tile = leaf ? 0.0f : accessor.getValue(at);
+    for (int x = fromX; x < (fromX ? kEdge : kBlock); ++x)
+      for (int y = fromY; y < (fromY ? kEdge : kBlock); ++y)
+        for (int z = fromZ; z < (fromZ ? kEdge : kBlock); ++z) {
+          const float v =
+              values ? values[(x - fromX) << 6 | (y - fromY) << 3 | (z - fromZ)] : tile;
+          brick.value[static_cast<std::size_t>((x * kEdge + y) * kEdge + z)] = v;
+          (v < 0 ? anyInside : anyOutside) = true;
+        }
+  }
+  return anyInside && anyOutside;
+}
+
+void findCrossings(Brick& brick) {
+  constexpr int kEdge = BrickPool::kEdge;
+  brick.mask = {};
+  for (int x = 0; x < kBlock; ++x)
+    for (int y = 0; y < kBlock; ++y) {
+      // Bit z: are the four points at z of this column of cells inside, all or any?
+      unsigned all = 0, any = 0;
+      for (int z = 0; z < kEdge; ++z) {
+        const auto isInside = [&](int i, int j) {
+          return brick.value[static_cast<std::size_t>(((x + i) * kEdge + y + j) * kEdge + z)] < 0;
+        };
+        const bool a = isInside(0, 0), b = isInside(0, 1), c = isInside(1, 0), d = isInside(1, 1);
+        all |= static_cast<unsigned>(a && b && c && d) << z;
+        any |= static_cast<unsigned>(a || b || c || d) << z;
+      }
+      const unsigned crossing = (any | any >> 1) & ~(all & all >> 1) & 0xff;
+      const unsigned bit = static_cast<unsigned>(x << 6 | y << 3);
+      brick.mask[bit >> 5] |= crossing << (bit & 31);
+    }
+}
+
+/// The bricks that hold a crossing, in the order of their origins.
+std::vector<std::unique_ptr<Brick>> bricksOf(const openvdb::FloatTree& tree) {
+  const std::vector<Coord> blocks = blocksOf(tree);
+  std::vector<std::unique_ptr<Brick>> bricks(blocks.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 64), [&](const auto& range) {
+    const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
+    auto brick = std::make_unique<Brick>();
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      brick->origin = blocks[i];
+      if (!fill(accessor, *brick)) continue;
+      findCrossings(*brick);
+      bricks[i] = std::move(brick);
+      brick = std::make_unique<Brick>();
+    }
+  });
+  std::erase(bricks, nullptr);
+  return bricks;
+}
+
+/// Writes into the empty items of a cubic table the edges of the largest aligned empty cubes.
+/// @param size    items along each axis
+/// @param isEmpty of an item's number
+/// @param edge    of an item
+template <typename IsEmpty, typename Set>
+void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty, const Set& set) {
+  const auto number = [&](const std::array<int, 3>& size_, int x, int y, int z) {
+    return (static_cast<std::size_t>(x) * static_cast<std::size_t>(size_[1]) +
+            static_cast<std::size_t>(y)) *
+               static_cast<std::size_t>(size_[2]) +
+           static_cast<std::size_t>(z);
+  };
+  // A pyramid, finest first: is all below empty?
+  std::vector<std::array<int, 3>> sizes{size};
+  std::vector<std::vector<char>> levels(1);
+  levels[0].resize(number(size, size[0] - 1, size[1] - 1, size[2] - 1) + 1);
+  for (std::size_t i = 0; i < levels[0].size(); ++i) levels[0][i] = isEmpty(i);
+  for (int edge = 2; edge <= most; edge *= 2) {
+    const std::array<int, 3> below = sizes.back();
+    std::array<int, 3> here;
+    for (std::size_t a = 0; a < 3; ++a) here[a] = (below[a] + 1) / 2;
+    std::vector<char> level(number(here, here[0] - 1, here[1] - 1, here[2] - 1) + 1, 1);
+    for (int x = 0; x < below[0]; ++x)
+      for (int y = 0; y < below[1]; ++y)
+        for (int z = 0; z < below[2]; ++z)
+          if (!levels.back()[number(below, x, y, z)]) level[number(here, x / 2, y / 2, z / 2)] = 0;
+    sizes.push_back(here);
+    levels.push_back(std::move(level));
+    if (here == std::array<int, 3>{1, 1, 1}) break;
+  }
+  for (int x = 0; x < size[0]; ++x)
+    for (int y = 0; y < size[1]; ++y)
+      for (int z = 0; z < size[2]; ++z) {
+        const std::size_t i = number(size, x, y, z);
+        if (!levels[0][i]) continue;
+        std::size_t level = 0;
+        while (level + 1 < levels.size() &&
+               levels[level + 1][number(sizes[level + 1], x >> (level + 1), y >> (level + 1),
+                                        z >> (level + 1))])
+          ++level;
+        set(i, 1 << level);
+      }
+}
+
+void layTable(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks) {
+  const auto pageOf = [&](const Coord& origin) {
+    std::size_t n = 0;
+    for (int a = 0; a < 3; ++a)
+      n = n * static_cast<std::size_t>(pool.pages[static_cast<std::size_t>(a)]) +
+          static_cast<std::size_t>((origin[a] - pool.origin[static_cast<std::size_t>(a)]) /
+                                   BrickPool::kPage);
+    return n;
+  };
+  std::size_t count = 1;
+  for (const int n : pool.pages) count *= static_cast<std::size_t>(n);
+  pool.page.assign(count, -BrickPool::kPage);
+  for (const auto& brick : bricks) {
+    std::int32_t& page = pool.page[pageOf(brick->origin)];
+    if (page >= 0) continue;
+    page = static_cast<std::int32_t>(pool.entry.size());
+    pool.entry.resize(pool.entry.size() + kEntriesOfPage, -kBlock);
+  }
+  for (std::size_t i = 0; i < bricks.size(); ++i) {
+    std::size_t slot = 0;
+    for (int a = 0; a < 3; ++a)
+      slot = slot << 3 |
+             static_cast<std::size_t>(
+                 ((bricks[i]->origin[a] - pool.origin[static_cast<std::size_t>(a)]) >> 3) & 7);
+    pool.entry[static_cast<std::size_t>(pool.page[pageOf(bricks[i]->origin)]) + slot] =
+        static_cast<std::int32_t>(i);
+  }
+  for (std::size_t first = 0; first < pool.entry.size(); first += kEntriesOfPage) {
+    std::int32_t* entries = pool.entry.data() + first;
+    markEmpty({8, 8, 8}, 4, [&](std::size_t i) { return entries[i] < 0; },
+              [&](std::size_t i, int edge) { entries[i] = -kBlock * edge; });
+  }
+  markEmpty(pool.pages, kMostEmptyPages, [&](std::size_t i) { return pool.page[i] < 0; },
+            [&](std::size_t i, int edge) { pool.page[i] = -BrickPool::kPage * edge; });
+}
+
+}  // namespace
+
+std::size_t BrickPool::bytes() const {
+  return 4 * (page.size() + entry.size() + mask.size() + value.size());
+}
+
+BrickPool makeBricks(const levelset::NarrowBand& band) {
+  BrickPool pool;
+  if (band.isEmpty()) return pool;
+  const openvdb::FloatTree& tree = levelset::vdb(band).tree();
+  const auto bricks = bricksOf(tree);
+  if (bricks.empty()) return pool;
+  if (bricks.size() > kMostBricks) {
+    throw levelset::ResourceLimit(
+        fmt::format("render: the surface crosses {} blocks, and {} are the most; use larger voxels",
+                    bricks.size(), kMostBricks));
+  }
+  openvdb::CoordBBox box;
+  for (const auto& brick : bricks) box.expand(brick->origin);
+  double count = 1;
+  for (int a = 0; a < 3; ++a) {
+    const auto i = static_cast<std::size_t>(a);
+    const double span = static_cast<double>(box.max()[a]) - box.min()[a] + kBlock;
+    const double pages = std::ceil(span / BrickPool::kPage);
+    count *= pages;
+    pool.origin[i] = box.min()[a];
+    pool.pages[i] = static_cast<int>(pages);
+    pool.low[i] = 0;
+    pool.high[i] = static_cast<int>(span);
+  }
+  if (count > kMostPages) {
+    throw levelset::ResourceLimit(fmt::format(
+        "render: the surface spans {:.3g} x {:.3g} x {:.3g} voxels, too many for a table of pages; "
+        "use larger voxels, or draw its parts apart",
+        static_cast<double>(pool.high[0]), static_cast<double>(pool.high[1]),
+        static_cast<double>(pool.high[2])));
+  }
+  layTable(pool, bricks);
+  pool.value.resize(bricks.size() * BrickPool::kValues);
+  pool.mask.resize(bricks.size() * BrickPool::kMaskWords);
+  tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) {
+    std::copy(bricks[i]->value.begin(), bricks[i]->value.end(),
+              pool.value.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kValues));
+    std::copy(bricks[i]->mask.begin(), bricks[i]->mask.end(),
+              pool.mask.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kMaskWords));
+  });
+  const std::size_t leaves = tree.leafCount();
+  pool.blocksLeftOut = leaves > bricks.size() ? leaves - bricks.size() : 0;
+  return pool;
+}
+
+}  // namespace render

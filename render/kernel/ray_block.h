@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace render {
+
+/// Rays in the space of a BrickPool's table, by number; arrays are a multiple of kLanes long. A ray
+/// that starts behind its end meets nothing.
+struct RayBlock {
+  static constexpr std::size_t kLanes = 16;
+
+  std::size_t size = 0;               ///< of the arrays
+  std::vector<float> ox, oy, oz;      ///< where t is 0
+  std::vector<float> dx, dy, dz;      ///< by t; never 0
+  std::vector<float> ix, iy, iz;      ///< 1 / d
+  std::vector<float> start, end;      ///< of t
+
+  explicit RayBlock(std::size_t count) : size((count + kLanes - 1) / kLanes * kLanes) {
+    for (auto* a : {&ox, &oy, &oz}) a->assign(size, 0);
+    for (auto* a : {&dx, &dy, &dz, &ix, &iy, &iz}) a->assign(size, 1);
+    start.assign(size, 0);
+    end.assign(size, -1);
+  }
+};
+
+/// What they meet.
+struct HitBlock {
+  std::vector<std::int32_t> found;    ///< −1, or 0
+  std::vector<float> t;
+  std::vector<std::int32_t> x, y, z;  ///< cell, in the table's space
+
+  explicit HitBlock(std::size_t size) : found(size), t(size), x(size), y(size), z(size) {}
+};
+
+}  // namespace render
