@@ -36,8 +36,8 @@ std::vector<Coord> blocksOf(const openvdb::FloatTree& tree) {
   blocks.reserve(tree.leafCount() * 2);
   for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
     for (int i = 0; i < 8; ++i)
-      blocks.push_back(leaf->origin().offsetBy(i & 4 ? -kBlock : 0, i & 2 ? -kBlock : 0,
-                                               i & 1 ? -kBlock : 0));
+      blocks.push_back(
+          leaf->origin().offsetBy(i & 4 ? -kBlock : 0, i & 2 ? -kBlock : 0, i & 1 ? -kBlock : 0));
   std::sort(blocks.begin(), blocks.end());
   blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
   return blocks;
@@ -58,8 +58,7 @@ bool fill(const Accessor& accessor, Brick& brick) {
     for (int x = fromX; x < (fromX ? kEdge : kBlock); ++x)
       for (int y = fromY; y < (fromY ? kEdge : kBlock); ++y)
         for (int z = fromZ; z < (fromZ ? kEdge : kBlock); ++z) {
-          const float v =
-              values ? values[(x - fromX) << 6 | (y - fromY) << 3 | (z - fromZ)] : tile;
+          const float v = values ? values[(x - fromX) << 6 | (y - fromY) << 3 | (z - fromZ)] : tile;
           brick.value[static_cast<std::size_t>((x * kEdge + y) * kEdge + z)] = v;
           (v < 0 ? anyInside : anyOutside) = true;
         }
@@ -180,11 +179,13 @@ void layTable(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
   }
   for (std::size_t first = 0; first < pool.entry.size(); first += kEntriesOfPage) {
     std::int32_t* entries = pool.entry.data() + first;
-    markEmpty({8, 8, 8}, 4, [&](std::size_t i) { return entries[i] < 0; },
-              [&](std::size_t i, int edge) { entries[i] = -kBlock * edge; });
+    markEmpty(
+        {8, 8, 8}, 4, [&](std::size_t i) { return entries[i] < 0; },
+        [&](std::size_t i, int edge) { entries[i] = -kBlock * edge; });
   }
-  markEmpty(pool.pages, kMostEmptyPages, [&](std::size_t i) { return pool.page[i] < 0; },
-            [&](std::size_t i, int edge) { pool.page[i] = -BrickPool::kPage * edge; });
+  markEmpty(
+      pool.pages, kMostEmptyPages, [&](std::size_t i) { return pool.page[i] < 0; },
+      [&](std::size_t i, int edge) { pool.page[i] = -BrickPool::kPage * edge; });
 }
 
 }  // namespace

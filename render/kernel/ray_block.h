@@ -11,11 +11,11 @@ namespace render {
 struct RayBlock {
   static constexpr std::size_t kLanes = 16;
 
-  std::size_t size = 0;               ///< of the arrays
-  std::vector<float> ox, oy, oz;      ///< where t is 0
-  std::vector<float> dx, dy, dz;      ///< by t; never 0
-  std::vector<float> ix, iy, iz;      ///< 1 / d
-  std::vector<float> start, end;      ///< of t
+  std::size_t size = 0;           ///< of the arrays
+  std::vector<float> ox, oy, oz;  ///< where t is 0
+  std::vector<float> dx, dy, dz;  ///< by t; never 0
+  std::vector<float> ix, iy, iz;  ///< 1 / d
+  std::vector<float> start, end;  ///< of t
 
   explicit RayBlock(std::size_t count) : size((count + kLanes - 1) / kLanes * kLanes) {
     for (auto* a : {&ox, &oy, &oz}) a->assign(size, 0);
@@ -27,7 +27,7 @@ struct RayBlock {
 
 /// What they meet.
 struct HitBlock {
-  std::vector<std::int32_t> found;    ///< −1, or 0
+  std::vector<std::int32_t> found;  ///< −1, or 0
   std::vector<float> t;
   std::vector<std::int32_t> x, y, z;  ///< cell, in the table's space
 

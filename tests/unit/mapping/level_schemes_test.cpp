@@ -170,20 +170,23 @@ TEST(SplineLevels, FadeToAPlane) {
 
 TEST(LevelTransform, TwistsTapersAndBends) {
   const NarrowBand ground = makeGround(0);
-  const auto top = [&](const mapping::LevelTransform& transform) {
-    const PatchOptions options{.levels = 5, .transform = transform};
-    return mapping::makePatch(ground, square(1), 1, options).patch.levels.back();
-  };
-  const ParticleLevel plain = top({}), twisted = top({.twist = M_PI / 2}),
-                      tapered = top({.taper = 0.5}), bent = top({.bend = 1});
-  for (std::size_t n = 0; n < plain.positions.size(); ++n) {
-    const V3d p = plain.positions[n];
-    EXPECT_LE((twisted.positions[n] - V3d(-p.y, p.x, p.z)).length(), 2e-3);
-    EXPECT_LE((tapered.positions[n] - V3d(0.5 * p.x, 0.5 * p.y, p.z)).length(), 2e-3);
-    // The axis as an arc of length 1 through an angle of 1.
-    const V3d expected(1 - std::cos(1.0) + p.x * std::cos(1.0), p.y,
-                       std::sin(1.0) - p.x * std::sin(1.0));
-    EXPECT_LE((bent.positions[n] - expected).length(), 2e-3);
+  for (const LevelScheme scheme :
+       {LevelScheme::Reduced, LevelScheme::Conforming, LevelScheme::Spline}) {
+    const auto top = [&](const mapping::LevelTransform& transform) {
+      const PatchOptions options{.levels = 5, .scheme = scheme, .transform = transform};
+      return mapping::makePatch(ground, square(1), 1, options).patch.levels.back();
+    };
+    const ParticleLevel plain = top({}), twisted = top({.twist = M_PI / 2}),
+                        tapered = top({.taper = 0.5}), bent = top({.bend = 1});
+    for (std::size_t n = 0; n < plain.positions.size(); ++n) {
+      const V3d p = plain.positions[n];
+      EXPECT_LE((twisted.positions[n] - V3d(-p.y, p.x, p.z)).length(), 2e-3);
+      EXPECT_LE((tapered.positions[n] - V3d(0.5 * p.x, 0.5 * p.y, p.z)).length(), 2e-3);
+      // The axis as an arc of length 1 through an angle of 1.
+      const V3d expected(1 - std::cos(1.0) + p.x * std::cos(1.0), p.y,
+                         std::sin(1.0) - p.x * std::sin(1.0));
+      EXPECT_LE((bent.positions[n] - expected).length(), 2e-3);
+    }
   }
 }
 

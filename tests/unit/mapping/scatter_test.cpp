@@ -11,6 +11,7 @@
 
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
+#include "levelset/sample.h"
 #include "mapping/patches/patch_space.h"
 #include "mapping/textures/geometric_texture.h"
 #include "tests/support/patches.h"
@@ -318,6 +319,27 @@ TEST(PatchSpace, IsItsOwnWhereTheSharedOneDoesNotDo) {
   const NarrowBand low = mapping::sweepSharedSpace(base, {40, 0.5, 0.5, 1, 1}, {}).value();
   const NarrowBand made = mapping::sweepPatchSpace(base, border, 0.1, 1.5, {.shared = &low});
   EXPECT_GE(made.halfWidth() * made.voxelSize(), 2.1 - 1e-9);  // it does not reach
+}
+
+TEST(PatchSpace, IsSweptAboutThePatchOnly) {
+  const NarrowBand base = ball();
+  const double height = 0.8, bulge = 0.1;
+  const auto at = [](double x, double y) {
+    return V3d(x, y, std::sqrt(kRadius * kRadius - x * x - y * y));
+  };
+  const NarrowBand own = mapping::sweepPatchSpace(
+      base, std::vector<V3d>{at(-0.3, -0.3), at(0.3, -0.3), at(0.3, 0.3), at(-0.3, 0.3)}, bulge,
+      height);
+  const levelset::BandSampler sampler(own);
+  // As far as patch space reaches, and no further than what the sweep has to look at.
+  EXPECT_NEAR(sampler.value(V3d(0.4, 0, kRadius + height)),
+              V3d(0.4, 0, kRadius + height).length() - kRadius, 0.01);
+  const NarrowBand all =
+      mapping::sweepSharedSpace(base, {40, 0.5, 0.5, height, height}, {}).value();
+  // The box is 0.6 + 2 (height + bulge) = 2.4 wide: of the ball's 4π 2² seen from above, a ninth;
+  // the room above it spreads to about twice that.
+  EXPECT_LT(static_cast<double>(own.activeVoxelCount()),
+            0.25 * static_cast<double>(all.activeVoxelCount()));
 }
 
 TEST(Scatter, RefusesAHeightThatIsNoneBeforeItSweeps) {

@@ -1,5 +1,5 @@
-// The kernel's first crossings against the judge, which shares no code with it, and against itself on
-// every instruction set.
+// The kernel's first crossings against the judge, which shares no code with it, and against itself
+// on every instruction set.
 
 #include <gtest/gtest.h>
 
@@ -144,7 +144,9 @@ Disagreement disagreementOf(const NarrowBand& solid, const std::vector<IndexRay>
   return result;
 }
 
-NarrowBand ball(double radius) { return levelset::makeSphere(radius, V3d(0.3, 0.2, 0.1), 1); }
+NarrowBand ball(double radius) {
+  return levelset::makeSphere(radius, V3d(0.3, 0.2, 0.1), 1);
+}
 
 TEST(KernelTrace, AgreesWithTheJudgeFromAllAround) {
   const auto rays = views(40, 20000);
@@ -153,8 +155,9 @@ TEST(KernelTrace, AgreesWithTheJudgeFromAllAround) {
   EXPECT_LE(off.missed, 1u);  // grazing
   EXPECT_LE(off.worst, 0.02);
   // A pair of tori through each other, with a crease.
-  const NarrowBand rings = levelset::unite(levelset::makeTorus(24, 8, V3d(0), V3d(0, 0, 1), 1),
-                                           levelset::makeTorus(24, 8, V3d(9, 0, 3), V3d(0, 1, 0), 1));
+  const NarrowBand rings =
+      levelset::unite(levelset::makeTorus(24, 8, V3d(0), V3d(0, 0, 1), 1),
+                      levelset::makeTorus(24, 8, V3d(9, 0, 3), V3d(0, 1, 0), 1));
   const Disagreement creased = disagreementOf(rings, rays);
   EXPECT_GT(creased.hits, 5000u);
   EXPECT_LE(creased.missed, 1u);
@@ -207,7 +210,8 @@ TEST(BrickPool, HoldsWhatTheSurfaceCrosses) {
   const BrickPool pool = render::makeBricks(solid);
   EXPECT_GT(pool.blocksLeftOut, 100u);
   std::size_t crossing = 0, set = 0, full = 0;
-  for (const std::uint32_t word : pool.mask) set += static_cast<std::size_t>(__builtin_popcount(word));
+  for (const std::uint32_t word : pool.mask)
+    set += static_cast<std::size_t>(__builtin_popcount(word));
   for (const std::int32_t entry : pool.entry) full += entry >= 0;
   EXPECT_EQ(full, pool.brickCount());
   for (std::size_t b = 0; b < pool.brickCount(); ++b)
@@ -216,7 +220,8 @@ TEST(BrickPool, HoldsWhatTheSurfaceCrosses) {
       for (int i = 0; i < 8; ++i) {
         const int x = (cell >> 6) + (i >> 2), y = (cell >> 3 & 7) + (i >> 1 & 1),
                   z = (cell & 7) + (i & 1);
-        inside += pool.value[b * BrickPool::kValues + static_cast<std::size_t>((x * 9 + y) * 9 + z)] < 0;
+        inside +=
+            pool.value[b * BrickPool::kValues + static_cast<std::size_t>((x * 9 + y) * 9 + z)] < 0;
       }
       crossing += inside > 0 && inside < 8;
     }
