@@ -26,9 +26,10 @@ struct ArrivalOptions {
 };
 
 struct ArrivalFigures {
-  std::size_t reached = 0;     ///< grid points with a time
-  std::size_t started = 0;     ///< of them, given by the start
-  std::size_t firstOrder = 0;  ///< of them, fell back to first order where the second was asked
+  std::size_t reached = 0;  ///< grid points with a time
+  std::size_t started = 0;  ///< of them, given by the start
+  /// Of them, fell back to first order, on one axis or more, where the second was asked.
+  std::size_t firstOrder = 0;
 };
 
 struct ArrivalTimes {

@@ -32,7 +32,7 @@ struct ArrivalBlock {
   std::array<ArrivalBlock*, 6> neighbours{};  ///< −x, +x, −y, +y, −z, +z, as far as they exist
   Mask inside;                                ///< behind the front's start
   Mask known;                                 ///< start values, or accepted ones
-  Mask firstOrder;  ///< fell back to first order where the second was asked
+  Mask firstOrder;  ///< fell back to first order, on one axis or more, where the second was asked
 
   [[nodiscard]] double slownessAt(openvdb::Index n) const {
     return slowness ? static_cast<double>((*slowness)[n]) : 1.0;

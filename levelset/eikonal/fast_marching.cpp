@@ -70,9 +70,9 @@ class Marcher {
     const UpwindTerms terms = gather(block, n, order_, straight);
     if (terms.count == 0) return;
     double time = solveUpwind(terms, slowness);
-    bool first = order_ == 2 && !terms.isSecond;
+    bool first = order_ == 2 && terms.hasFirst;
     // Each of these errs more than the one before it and is nearer to being causal; the last is.
-    if (terms.isSecond && time < terms.latest - straight.slack()) {
+    if (terms.hasSecond && time < terms.latest - straight.slack()) {
       time = solveUpwind(gather(block, n, 1, straight), slowness);
       first = true;
     }

@@ -451,7 +451,7 @@ class SecondOrderWorker {
     const double slowness = block_.slownessAt(n);
     if (terms.count == 0) return static_cast<double>(block_.time[n]);
     double time = solveUpwind(terms, slowness);
-    bool first = !terms.isSecond;
+    bool first = terms.hasFirst;
     const auto inFirstOrder = [&](double share) {
       UpwindTerms plain;
       plain.known = share * terms.known;
@@ -460,7 +460,7 @@ class SecondOrderWorker {
       return solveUpwind(plain, slowness);
     };
     // Each of these errs more than the one before it and is nearer to being causal; the last is.
-    if (terms.isSecond && time < terms.latest - straight.slack()) {
+    if (terms.hasSecond && time < terms.latest - straight.slack()) {
       time = inFirstOrder(1);
       first = true;
     }

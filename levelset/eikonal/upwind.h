@@ -23,14 +23,17 @@ struct UpwindTerms {
   UpwindTerm term[3];
   int count = 0;
   double latest = -std::numeric_limits<double>::max();  ///< nearest neighbours' times, the largest
-  bool isSecond = false;                                ///< is one of the terms of second order?
+  bool hasFirst = false, hasSecond = false;             ///< is one of the terms of that order?
   double known = 0;  ///< squares of derivatives along axes that have no term
 
   /// @param missed  what the difference lacks of the derivative, where that is known
-  void addFirst(double near, double missed = 0) { add(near - missed, 1, near); }
+  void addFirst(double near, double missed = 0) {
+    add(near - missed, 1, near);
+    hasFirst = true;
+  }
   void addSecond(double near, double beyond, double missed = 0) {
     add((4 * near - beyond - 2 * missed) / 3, 2.25, near);
-    isSecond = true;
+    hasSecond = true;
   }
 
  private:

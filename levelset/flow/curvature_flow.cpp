@@ -83,6 +83,7 @@ class CurvatureFlow {
     result_.band = makeBand(distances(*grid, solid.halfWidth()));
     result_.errorEstimate = error_ * voxel_;
     result_.shortestStep = flow::kExplicitStep * voxel_ * voxel_;
+    result_.longestStep = longestTaken_ * voxel_ * voxel_;
     result_.scheme = *std::max_element(kSchemes.begin(), kSchemes.end(), [&](auto a, auto b) {
       return spent_[index(a)] < spent_[index(b)];
     });
@@ -139,9 +140,10 @@ class CurvatureFlow {
       }
       const double left = time_ - now_;
       const double wanted = std::min({wanted_, longest_, left});
-      const double room =
+      const double onSurface =
           near.fastest > 0 ? std::max(0.0, flow::kFlowRoom - near.displaced) / near.fastest : left;
-      const double whole = room + (near.fastest > 0 ? near.displaced / near.fastest : 0);
+      const double whole = onSurface + (near.fastest > 0 ? near.displaced / near.fastest : 0);
+      const double room = std::min(onSurface, near.clear);
       if (!first && room < kLeastShare * std::min(wanted, whole)) break;
       // As long as an explicit step is always possible, the flow never stands still.
       double dt = std::min(wanted, std::max(room, flow::kExplicitStep));
@@ -223,6 +225,7 @@ class CurvatureFlow {
     }
     now_ = dt >= time_ - now_ ? time_ : now_ + dt;
     spent_[index(scheme)] += dt;
+    longestTaken_ = std::max(longestTaken_, dt);
     ++result_.steps;
     if (options_.preservesVolume) keepVolume(state, steps);
     tell();
@@ -256,7 +259,7 @@ class CurvatureFlow {
   double voxel_;
   double time_, tolerance_, longest_;
   double now_ = 0, wanted_ = kFirstStep;
-  double error_ = 0;
+  double error_ = 0, longestTaken_ = 0;
   std::array<double, 4> spent_{};
   std::optional<double> volume_;
   double inactive_ = 0;

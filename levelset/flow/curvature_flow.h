@@ -34,6 +34,7 @@ struct CurvatureFlowResult {
   std::size_t redistances = 0;
   double errorEstimate = 0;  ///< of the steps in time, rms over the surface, world units
   double shortestStep = 0;   ///< world units²; no step is made shorter for the tolerance's sake
+  double longestStep = 0;    ///< of those that were taken, world units²
   std::optional<double> restedAfter = {};  ///< a time; with preservesVolume nothing moved any more
 };
 

@@ -178,6 +178,7 @@ NearSurface& NearSurface::operator+=(const NearSurface& other) {
   levels += other.levels;
   levelSquares += other.levelSquares;
   levelRates += other.levelRates;
+  clear = std::min(clear, other.clear);
   return *this;
 }
 
@@ -193,15 +194,20 @@ NearSurface lookNearSurface(const CurvatureState& state, const Field& rate) {
   return state.blocks().sum<NearSurface>([&](std::size_t i) {
     NearSurface near;
     for (auto it = state.blocks().active(i).beginOn(); it; ++it) {
-      const float phi = state.value[i][it.pos()];
-      if (!(std::abs(phi) < kNear)) continue;
+      const float phi = state.value[i][it.pos()], start = state.start()[i][it.pos()];
       const double speed = static_cast<double>(rate[i][it.pos()]);
+      if (std::abs(start) >= static_cast<float>(kFlowOwn)) {
+        const auto side = static_cast<double>(std::copysign(1.0f, start));
+        const double left = side * static_cast<double>(phi) - kFlowNearest, pace = -side * speed;
+        if (pace > 0) near.clear = std::min(near.clear, std::max(0.0, left) / pace);
+      }
+      if (!(std::abs(phi) < kNear)) continue;
       const double weight =
           state.weights().empty() ? 1 : static_cast<double>(state.weights()[i][it.pos()]);
       const auto level = static_cast<double>(phi);
       near += {1,
                std::abs(speed),
-               static_cast<double>(std::abs(state.start()[i][it.pos()] - phi)),
+               static_cast<double>(std::abs(start - phi)),
                speed * speed,
                speed,
                weight,

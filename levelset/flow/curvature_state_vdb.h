@@ -2,6 +2,7 @@
 
 // For the .cpp files of levelset/flow only.
 
+#include <limits>
 #include <optional>
 
 #include "levelset/fields/mask.h"
@@ -59,6 +60,11 @@ class CurvatureState {
   mutable std::vector<std::vector<float>> followed_;  ///< their rates, kept for the memory
 };
 
+/// Until distances are made again no level set that began at kFlowOwn or further may come nearer to
+/// the surface than this. Where the surface stands still, as a ball does that keeps its volume,
+/// others still move: in time they would make a zero set of their own.
+inline constexpr double kFlowNearest = 1;
+
 /// What a field looks like beside its zero set, |φ| < 1.
 struct NearSurface {
   double count = 0;
@@ -68,6 +74,8 @@ struct NearSurface {
   double rates = 0;      ///< sum of rates …
   double weights = 0;    ///< … and of the weights
   double levels = 0, levelSquares = 0, levelRates = 0;  ///< sums of φ, φ² and φ times the rate
+  /// Time after which a level set from further off comes within kFlowNearest, at its pace.
+  double clear = std::numeric_limits<double>::infinity();
   /// Deviation of the rate on the surface, rms. Level sets beside it bend more or less than it
   /// does: what of the rate is linear in φ is taken off.
   [[nodiscard]] double unevenness() const;

@@ -66,7 +66,7 @@ void tellFigures(Invocation& in, const levelset::ArrivalFigures& figures) {
   in.notes.notes.push_back(fmt::format("{} grid points reached", figures.reached));
   if (in.integer("order") == 2)
     in.notes.notes.push_back(
-        fmt::format("{} of them fell back to first order", figures.firstOrder));
+        fmt::format("{} of them fell back to first order on some axis", figures.firstOrder));
   in.notes.detailsJson = fmt::format(R"({{"reached":{},"started":{},"first_order":{}}})",
                                      figures.reached, figures.started, figures.firstOrder);
 }

@@ -134,4 +134,22 @@ TEST_F(FieldCommand, CountsTheGridPointsThatTheFrontReaches) {
   }
 }
 
+TEST_F(FieldCommand, CountsGridPointsThatFallBackToFirstOrder) {
+  for (const std::string front : {"march", "sweep"})
+    for (const std::string order : {"1", "2"}) {
+      ASSERT_EQ(levelsmith("--report r.json sphere --radius 1 --voxel 0.1 ! " + front +
+                           " --from 0.02,-0.03,0.01 --to 1.5 --order " + order)
+                    .code,
+                0);
+      const auto report = nlohmann::json::parse(support::slurp(folder_ / "r.json"));
+      const auto& details = report["steps"][1]["details"];
+      const double reached = details["reached"], fellBack = details["first_order"];
+      // Six layers of the ball, less what the start gives.
+      if (order == "1")
+        EXPECT_EQ(fellBack, 0) << front;
+      else
+        EXPECT_NEAR(fellBack / reached, 0.2, 0.15) << front;
+    }
+}
+
 }  // namespace fields_test

@@ -399,6 +399,29 @@ TEST(Arrival, IsExactAroundThePointBetweenTwoGridPoints) {
   }
 }
 
+// One voxel beside a point source along an axis, the second grid point behind lies beyond the
+// source, where the front came later: on that axis the first order is all there is, on the others
+// the second is.
+TEST(Arrival, CountsGridPointsWithAnAxisOfFirstOrder) {
+  const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
+  const V3d sources[] = {V3d(0.2, -0.3, 0.1)};  // nearest to the grid point 0, 0, 0
+  for (const FrontMethod method : kMethods) {
+    const ArrivalTimes times = arrivalTimesFromPoints(lattice, sources, 20, options(method, 2));
+    std::size_t beside = 0, perhapsStarted = 0;
+    for (auto it = grid(times).cbeginValueOn(); it; ++it) {
+      const openvdb::Coord c = it.getCoord();
+      if (std::abs(c.x()) != 1 && std::abs(c.y()) != 1 && std::abs(c.z()) != 1) continue;
+      ++beside;
+      perhapsStarted += (toImath(c.asVec3d()) - sources[0]).length() < 9;
+    }
+    EXPECT_GT(beside, 2 * perhapsStarted);
+    EXPECT_GE(times.figures.firstOrder, beside - perhapsStarted);
+    EXPECT_LE(times.figures.firstOrder, beside);
+    EXPECT_EQ(arrivalTimesFromPoints(lattice, sources, 20, options(method, 1)).figures.firstOrder,
+              0u);
+  }
+}
+
 TEST(Arrival, DoesNotDependOnTheVoxelSize) {
   const NarrowBand unit = sample(sphere(8), 9);
   const Errors expected = errors(vdb(frontDistance(unit, 6).band), sphere(8), 0, 5.9);

@@ -186,6 +186,22 @@ TEST(CurvatureFlow, KeepsTheVolumeAskedFor) {
   EXPECT_LT(measure(flowed).area, 0.99 * measure(rod).area);
 }
 
+// While the surface is almost at rest the level sets within it shrink: left alone, they would leave
+// a cavity where they vanish.
+TEST(CurvatureFlow, LetsNoOtherLevelSetComeUpToTheSurface) {
+  const NarrowBand rod = makeCapsule(kCentre - V3d(1, 0, 0), kCentre + V3d(1, 0, 0), 12, 1);
+  const double before = measure(rod).volume;
+  for (const FlowScheme scheme : {FlowScheme::Stabilized, FlowScheme::Implicit}) {
+    const NarrowBand flowed =
+        curvatureFlow(rod, 60,
+                      {.scheme = scheme, .preservesVolume = true, .tolerance = 100, .step = 160})
+            .band;
+    const Measurement after = measure(flowed);
+    EXPECT_EQ(after.shells, 1u) << static_cast<int>(scheme);
+    EXPECT_NEAR(after.volume, before, 1e-3 * before) << static_cast<int>(scheme);
+  }
+}
+
 TEST(CurvatureFlow, EndsWhenWhatKeepsItsVolumeIsRound) {
   const NarrowBand rod = makeCapsule(V3d(-10.69, -0.17, 0.43), V3d(13.31, -0.17, 0.43), 10, 1);
   const CurvatureFlowResult rested = curvatureFlow(rod, 1e9, {.preservesVolume = true});
