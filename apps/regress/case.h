@@ -76,6 +76,7 @@ void addMorphologyCases(std::vector<Case>& all);
 void addFilletCases(std::vector<Case>& all);
 void addEikonalCases(std::vector<Case>& all);
 void addCurvatureCases(std::vector<Case>& all);
+void addSmoothCases(std::vector<Case>& all);
 void addAdvectionCases(std::vector<Case>& all);
 void addMorphCases(std::vector<Case>& all);
 void addResampleCases(std::vector<Case>& all);
