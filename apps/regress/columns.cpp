@@ -14,6 +14,9 @@ const std::vector<Column>& columns() {
       {"band_in_linf", "in L∞ (world)", "the same in world units"},
       {"band_out_l1", "out L1 (world)", "the same in world units"},
       {"band_out_linf", "out L∞ (world)", "the same in world units"},
+      {"missing_band", "gaps",
+       "grid points of the exact band, to a voxel within its end, that the result does not hold, "
+       "over all of them"},
       {"surface_l1_vx", "surface L1",
        "mean exact distance of the zeros of the tricubic interpolant along 10000 rays, voxels"},
       {"surface_linf_vx", "surface L∞", "largest of these distances, voxels"},

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "apps/regress/gaps.h"
 #include "apps/regress/rays.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/compare.h"
@@ -42,7 +43,8 @@ struct Sides {
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-/// Active voxels, and those inactive ones that the band should reach.
+/// Active voxels, and those inactive ones of a leaf that the band should reach; what has no leaf is
+/// counted by missingShare().
 Sides leafErrors(const Leaf& leaf, const openvdb::FloatGrid& grid, const Truth& truth) {
   Sides sides;
   const double background = static_cast<double>(grid.background());
@@ -110,6 +112,8 @@ void addErrors(const NarrowBand& result, const Truth& truth, Mesher mesher, Figu
   const Sides sides = bandErrors(levelset::vdb(result), truth);
   addTally("band_in", sides.inside, h, figures);
   addTally("band_out", sides.outside, h, figures);
+  figures["missing_band"] =
+      missingShare(bandRegion(truth, result.halfWidth(), h), levelset::vdb(result));
 
   const RayHits hits = shootRays(result, truth, rays);
   Tally surface;

@@ -35,6 +35,8 @@ inline constexpr const char* kResample = "OpenVDB resampleToMatch";
 /// To `voxels` more on both sides; the band is as much wider.
 [[nodiscard]] levelset::NarrowBand dilate(const levelset::NarrowBand& band, int voxels);
 [[nodiscard]] levelset::NarrowBand curvatureFlow(const levelset::NarrowBand& band, double time);
+/// Four passes of a box of three voxels: σ = √(8/3).
+[[nodiscard]] levelset::NarrowBand gaussian(const levelset::NarrowBand& band);
 /// By HJ-WENO5 and TVD-RK3.
 /// @param turnsBack  the velocity vanishes at half the time, where OpenVDB would stop
 [[nodiscard]] levelset::NarrowBand advect(const levelset::NarrowBand& band,

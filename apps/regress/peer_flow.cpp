@@ -24,4 +24,11 @@ NarrowBand curvatureFlow(const NarrowBand& band, double time) {
   return adopt(grid);
 }
 
+NarrowBand gaussian(const NarrowBand& band) {
+  const auto grid = levelset::vdb(band).deepCopy();
+  openvdb::tools::LevelSetFilter<openvdb::FloatGrid> filter(*grid);
+  filter.gaussian(1);
+  return adopt(grid);
+}
+
 }  // namespace regress::peer

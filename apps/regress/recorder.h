@@ -84,7 +84,9 @@ class Recorder {
 
 /// Bounds against summaries, ours alone. A bound at a resolution that the budget leaves out is
 /// passed over in the quick budget; in the full one it has failed, as has one that fits no row.
-/// Where the surface is bounded, no more than three zeros of ten may be missing or too many.
+/// Where the band's errors are bounded, none of its grid points may be missing; where the surface's
+/// are, no more than kMostMissed of its zeros may be missing or too many; unless the case has a
+/// bound of its own for that.
 [[nodiscard]] std::vector<Judgement> judge(const Case& of, const std::vector<Row>& summary,
                                            Budget budget);
 

@@ -23,6 +23,7 @@ const std::vector<Case>& cases() {
     addFilletCases(list);
     addEikonalCases(list);
     addCurvatureCases(list);
+    addSmoothCases(list);
     addAdvectionCases(list);
     addMorphCases(list);
     addResampleCases(list);

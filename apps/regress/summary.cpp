@@ -1,14 +1,22 @@
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <iterator>
+#include <string>
 
 #include "apps/regress/recorder.h"
 
 namespace regress {
 namespace {
 
-// Corners that a coarse grid rounds are missed by some rays.
-constexpr double kMostMissed = 0.3;
+/// What is not there has no error: a figure of it that is judged wherever errors are, unless the
+/// case has a bound of its own for it, and says why.
+struct Presence {
+  const char* figure;
+  const char* errors[2];  ///< how the names of the figures begin that say nothing of it
+  double most;
+};
+constexpr Presence kPresences[] = {{"missing_band", {"band_", "order_band"}, 0},
+                                   {"missed_hits", {"surface_l", "order_surface"}, kMostMissed}};
 
 bool isCost(const std::string& column) {
   return column == "cpu_s";
@@ -94,6 +102,33 @@ std::vector<Row> summarize(const std::vector<Row>& rows) {
   return summary;
 }
 
+namespace {
+
+void judgePresence(const Case& of, const Row& row, const Presence& presence,
+                   std::vector<Judgement>& judgements) {
+  const auto found = row.figures.find(presence.figure);
+  if (found == row.figures.end()) return;
+  const auto isBounded = [&](const auto& fits) {
+    return std::any_of(of.bounds.begin(), of.bounds.end(), [&](const Bound& bound) {
+      return bound.variant == row.variant && fits(bound.figure) &&
+             (bound.resolution == 0 || bound.resolution == row.resolution);
+    });
+  };
+  if (isBounded([&](const std::string& figure) { return figure == presence.figure; })) return;
+  if (!isBounded([&](const std::string& figure) {
+        return std::any_of(std::begin(presence.errors), std::end(presence.errors),
+                           [&](const char* start) { return figure.starts_with(start); });
+      }))
+    return;
+  judgements.push_back({{row.variant, presence.figure, presence.most, row.resolution},
+                        row.resolution,
+                        found->second,
+                        found->second <= presence.most,
+                        {}});
+}
+
+}  // namespace
+
 std::vector<Judgement> judge(const Case& of, const std::vector<Row>& summary, Budget budget) {
   std::vector<Judgement> judgements;
   for (const Bound& bound : of.bounds) {
@@ -121,20 +156,9 @@ std::vector<Judgement> judge(const Case& of, const std::vector<Row>& summary, Bu
     if (!met && (bound.resolution == 0 || has(resolutions) || !(has(of.full) || has(of.quick))))
       judgements.push_back({bound, bound.resolution, 0, false, "there is no such row"});
   }
-  // Errors of zeros that were found say nothing of those that were not.
-  for (const Row& row : summary) {
-    const auto missed = row.figures.find("missed_hits");
-    if (row.tool != kOurs || missed == row.figures.end()) continue;
-    if (std::any_of(of.bounds.begin(), of.bounds.end(), [&](const Bound& bound) {
-          return bound.variant == row.variant && bound.figure.starts_with("surface_l") &&
-                 (bound.resolution == 0 || bound.resolution == row.resolution);
-        }))
-      judgements.push_back({{row.variant, "missed_hits", kMostMissed, row.resolution},
-                            row.resolution,
-                            missed->second,
-                            missed->second <= kMostMissed,
-                            {}});
-  }
+  for (const Row& row : summary)
+    if (row.tool == kOurs)
+      for (const Presence& presence : kPresences) judgePresence(of, row, presence, judgements);
   // A refusal is a failure whether or not a bound looks at it.
   for (const Row& row : summary)
     if (row.tool == kOurs && !row.failure.empty() &&

@@ -9,6 +9,7 @@
 #include "apps/regress/columns.h"
 #include "apps/regress/errors.h"
 #include "apps/regress/exact_band.h"
+#include "apps/regress/gaps.h"
 #include "apps/regress/rays.h"
 #include "apps/regress/recorder.h"
 #include "apps/regress/suite.h"
@@ -89,6 +90,65 @@ TEST(RegressErrors, SeeABandThatIsTooNarrow) {
     return std::abs(d) < 1.5 * kVoxel ? d : std::copysign(3 * kVoxel, d);
   };
   EXPECT_GE(errorsOf(exactBand(clipped, kVoxel), exact).at("band_out_linf_vx"), 1.4);
+}
+
+/// Without the leaves whose origins have x ≥ 0: background.
+levelset::NarrowBand half(levelset::NarrowBand band) {
+  openvdb::FloatGrid& grid = levelset::editVdb(band);
+  std::vector<openvdb::Coord> origins;
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
+    if (leaf->origin().x() >= 0) origins.push_back(leaf->origin());
+  for (const openvdb::Coord& c : origins) grid.tree().addTile(1, c, grid.background(), false);
+  return band;
+}
+
+double gaps(const levelset::NarrowBand& band, const Truth& truth) {
+  return missingShare(bandRegion(truth, band.halfWidth(), band.voxelSize()), levelset::vdb(band));
+}
+
+TEST(RegressErrors, CountWhatTheBandLacks) {
+  const Truth exact = ball(kCentre, 1);
+  // What is left has no error.
+  const Figures f = errorsOf(half(exactBand(exact, kVoxel)), exact);
+  EXPECT_NEAR(f.at("missing_band"), 0.5, 0.05);
+  EXPECT_LE(f.at("band_in_linf_vx"), 1e-6);
+  EXPECT_LE(f.at("band_out_linf_vx"), 1e-6);
+}
+
+TEST(RegressGaps, AreNoneInTheExactBand) {
+  const Truth exact = ball(kCentre, 1);
+  for (const double halfWidth : {1.0, 1.5, 3.0, 6.0})
+    EXPECT_EQ(gaps(exactBand(exact, kVoxel, halfWidth), exact), 0) << halfWidth;
+  // Places that are not compared are not missed.
+  Truth left = exact;
+  left.compared = [](const V3d& p) { return p.x < -0.1; };
+  EXPECT_EQ(gaps(half(exactBand(exact, kVoxel)), left), 0);
+}
+
+TEST(RegressGaps, SeeASingleGridPointButAtTheEndOfTheBand) {
+  const Truth exact = ball(kCentre, 1);
+  for (const double distance : {0.4, 2.5}) {
+    levelset::NarrowBand band = exactBand(exact, kVoxel);
+    for (auto it = levelset::editVdb(band).beginValueOn(); it; ++it)
+      if (std::abs(*it) > distance * kVoxel && std::abs(*it) < (distance + 0.3) * kVoxel) {
+        it.setValueOff();
+        break;
+      }
+    EXPECT_EQ(gaps(band, exact) > 0, distance < 2) << distance;
+  }
+}
+
+TEST(RegressGaps, SeeAFrontThatStopsHalfWay) {
+  const auto grid = levelset::emptyLevelSet(levelset::uniformTransform(kVoxel), 3);
+  const auto times = [](const V3d& p) { return (p - kCentre).length(); };
+  for (openvdb::Coord c(-20); c[0] < 20; ++c[0])
+    for (c[1] = -20; c[1] < 20; ++c[1])
+      for (c[2] = -20; c[2] < 20; ++c[2])
+        if (times(levelset::toImath(grid->indexToWorld(c))) < 0.5) grid->tree().setValueOn(c, 0.5f);
+  const Region half{.value = times, .low = -1, .high = 0.5, .centre = kCentre, .extent = 0.5};
+  EXPECT_EQ(missingShare(half, *grid), 0);
+  const Region whole{.value = times, .low = -1, .high = 1, .centre = kCentre, .extent = 1};
+  EXPECT_NEAR(missingShare(whole, *grid), 1 - 0.125, 0.01);
 }
 
 TEST(RegressErrors, MissWhatIsNotThere) {
@@ -216,12 +276,39 @@ TEST(RegressJudge, FailsBoundsThatAreMissedOrFitNothing) {
 }
 
 TEST(RegressJudge, FailsASurfaceThatIsNotThere) {
-  const Case c{.name = "c", .bounds = {{"v", "surface_l1", 1}}};
+  Case c{.name = "c", .quick = {8, 16}, .bounds = {{"v", "surface_l1", 1}}};
   Row row = rowOf(8, 0, 0.1);
-  row.figures["missed_hits"] = 0.2;
+  row.figures["missed_hits"] = 0.8 * kMostMissed;
   EXPECT_TRUE(judge(c, {row}, Budget::Quick).at(1).passed);
-  row.figures["missed_hits"] = 1;
+  row.figures["missed_hits"] = 1.2 * kMostMissed;
   EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(1).passed);
+  // Edges: at each resolution as much less as the voxel is smaller.
+  allowAtEdges(c.bounds, "v", 0.4, {8});
+  EXPECT_TRUE(judge(c, {row}, Budget::Quick).at(1).passed);
+  row.figures["missed_hits"] = 0.06;
+  EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(1).passed);
+  row.resolution = 16;
+  row.figures["missed_hits"] = 1.2 * kMostMissed;
+  EXPECT_FALSE(judge(c, {row}, Budget::Quick).back().passed);
+}
+
+TEST(RegressJudge, FailsABandThatIsNotThere) {
+  Case c{.name = "c", .bounds = {{"v", "band_in_l1", 1}}};
+  Row row = rowOf(8, 0, 0.1);
+  row.figures["missing_band"] = 0;
+  EXPECT_TRUE(judge(c, {row}, Budget::Quick).at(1).passed);
+  row.figures["missing_band"] = 1e-6;
+  EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(1).passed);
+  // A case may allow for some, by a bound of its own.
+  c.bounds.push_back({"v", "missing_band", 0.1});
+  const auto allowed = judge(c, {row}, Budget::Quick);
+  ASSERT_EQ(allowed.size(), 2u);
+  EXPECT_TRUE(allowed[1].passed);
+  row.figures["missing_band"] = 0.5;
+  EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(1).passed);
+  // Where no error of the band is judged, nor is what is missing.
+  c.bounds = {{"v", "surface_l1", 1}};
+  EXPECT_EQ(judge(c, {row}, Budget::Quick).size(), 1u);
 }
 
 TEST(RegressJudge, FailsWhatWasRefused) {

@@ -139,6 +139,90 @@ TEST(Offset, ComesBackOnSmoothSolids) {
   EXPECT_LE(e.l1, 2e-3);
 }
 
+/// A prism 40 high over a square of 44 without its quarter x, y > −2, turned about z. Of its edges
+/// along z five are convex and one is concave.
+struct Angle {
+  static constexpr double kHalf = 22, kNotch = -2, kHeight = 20;
+  double turn;
+
+  /// Seen from the middle, along the prism's own axes.
+  [[nodiscard]] V3d own(const V3d& p) const {
+    const V3d r = p - kCentre;
+    return {r.x * std::cos(turn) + r.y * std::sin(turn),
+            r.y * std::cos(turn) - r.x * std::sin(turn), r.z};
+  }
+  /// Distance from outside to what is left of the two arms when each side is moved inwards by d.
+  static double toArms(const V3d& q, double d) {
+    const auto arm = [=](double x, double y) {
+      return std::hypot(std::max({x - kHalf + d, -kHalf + d - x, 0.0}),
+                        std::max({y - kNotch + d, -kHalf + d - y, 0.0}));
+    };
+    return std::min(arm(q.x, q.y), arm(q.y, q.x));
+  }
+  /// Distance from inside to all that is outside: the sides of the square and the notch.
+  static double toOutside(const V3d& q) {
+    const double notch = std::hypot(std::max(kNotch - q.x, 0.0), std::max(kNotch - q.y, 0.0));
+    return std::min({kHalf - std::abs(q.x), kHalf - std::abs(q.y), notch});
+  }
+  static double section(const V3d& q) {
+    const double inside = toOutside(q);
+    return inside > 0 ? -inside : toArms(q, 0);
+  }
+  [[nodiscard]] Shape solid() const {
+    return [angle = *this](const V3d& p) {
+      const V3d q = angle.own(p);
+      const double side = section(q), end = std::abs(q.z) - kHeight;
+      return std::hypot(std::max(side, 0.0), std::max(end, 0.0)) +
+             std::min(0.0, std::max(side, end));
+    };
+  }
+  /// Of the section of the solid grown by d, to where it was: all that a band of three holds.
+  static double grown(const V3d& q, double d) {
+    const double away = toArms(q, 0), x = q.x - kNotch, y = q.y - kNotch;
+    const bool isInNotch = x > 0 && y > 0 && q.x < kHalf && q.y < kHalf;
+    if (away >= d || !isInNotch) return away - d;
+    return -std::hypot(std::max(d - x, 0.0), std::max(d - y, 0.0));  // sharp
+  }
+  /// Of the section of the solid shrunk by d.
+  static double shrunk(const V3d& q, double d) {
+    const double inside = toOutside(q), x = q.x - kNotch, y = q.y - kNotch;
+    if (inside >= d || (x < 0 && y < 0 && std::hypot(x, y) < d)) return d - inside;  // round
+    return toArms(q, d);
+  }
+};
+
+/// In the middle of the prism, all and about the concave edge.
+struct EdgeError {
+  double all = 0, concave = 0;
+};
+EdgeError edgeError(const NarrowBand& moved, const Angle& angle,
+                    double (*exact)(const V3d&, double), double distance) {
+  EdgeError error;
+  support::forEachActive(moved, [&](const V3d& p, double value) {
+    const V3d q = angle.own(p);
+    if (std::abs(q.z) > 8) return;
+    const double off = std::abs(value - exact(q, distance));
+    error.all = std::max(error.all, off);
+    if (std::hypot(q.x - Angle::kNotch, q.y - Angle::kNotch) < 9)
+      error.concave = std::max(error.concave, off);
+  });
+  return error;
+}
+
+TEST(Offset, KeepsConcaveEdgesSharpOutwardsAndConvexOnesInwards) {
+  constexpr double kDistance = 5;
+  for (const double turn : {0.0, 0.6}) {
+    const Angle angle{turn};
+    const NarrowBand solid = sample(angle.solid(), 34);
+    const EdgeError grown = edgeError(offset(solid, kDistance), angle, Angle::grown, kDistance);
+    EXPECT_LE(grown.concave, 1e-3) << turn;
+    EXPECT_LE(grown.all, 0.02) << turn;
+    const EdgeError shrunk = edgeError(offset(solid, -kDistance), angle, Angle::shrunk, kDistance);
+    EXPECT_LE(shrunk.concave, 0.02) << turn;
+    EXPECT_LE(shrunk.all, 0.02) << turn;
+  }
+}
+
 TEST(Offset, FusesWhatComesNear) {
   const Shape pair = [](const V3d& p) {
     return std::min((p - V3d(-14, 0, 0)).length(), (p - V3d(14, 0, 0)).length()) - 10;

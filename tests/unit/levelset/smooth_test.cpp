@@ -34,11 +34,37 @@ double shrinkage(double radius, double sigma, SmoothKind kind) {
   return radiusOf(ball(radius)) - radiusOf(smooth(ball(radius), kind, sigma));
 }
 
-// The mean of |x| over a Gaussian about a point at radius R is R + σ²/R + …, so the ball loses
-// σ²/R.
+/// Greatest distance from a sphere of the zeros of the tricubic interpolant on all edges of the
+/// grid whose ends are on two sides.
+double worstZero(const NarrowBand& band, double radius) {
+  const openvdb::FloatGrid& grid = vdb(band);
+  auto accessor = grid.getConstAccessor();
+  double worst = 0;
+  for (auto it = grid.cbeginValueOn(); it; ++it)
+    for (int axis = 0; axis < 3; ++axis) {
+      openvdb::Coord next = it.getCoord();
+      ++next[axis];
+      if ((*it < 0) == (accessor.getValue(next) < 0)) continue;
+      openvdb::Vec3d low = it.getCoord().asVec3d(), high = next.asVec3d();
+      if (*it > 0) std::swap(low, high);
+      for (int i = 0; i < 20; ++i) {
+        const openvdb::Vec3d middle = 0.5 * (low + high);
+        (SampleBlock<4>(accessor, middle).value() < 0 ? low : high) = middle;
+      }
+      const V3d zero = toImath(grid.indexToWorld(low));
+      worst = std::max(worst, std::abs((zero - kCentre).length() - radius));
+    }
+  return worst;
+}
+
+// The mean of |x| over a Gaussian about a point at radius r is r + σ²/r, but for what the other
+// side of the ball adds, exp(−r²/2σ²): there the ball of radius R ends where that is R.
 TEST(Smooth, GaussianHasTheSigmaAskedFor) {
-  for (const double sigma : {0.7, 1.0, 2.0, 3.5})
-    EXPECT_NEAR(shrinkage(24, sigma, SmoothKind::Gaussian), sigma * sigma / 24, 0.02) << sigma;
+  constexpr double kRadius = 24;
+  for (const double sigma : {0.7, 1.0, 2.0, 3.5}) {
+    const double radius = (kRadius + std::sqrt(kRadius * kRadius - 4 * sigma * sigma)) / 2;
+    EXPECT_LE(worstZero(smooth(ball(kRadius), SmoothKind::Gaussian, sigma), radius), 0.02) << sigma;
+  }
 }
 
 TEST(Smooth, MeanHasTheSameVariance) {
