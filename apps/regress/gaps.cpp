@@ -43,12 +43,12 @@ std::vector<Coord> blocksOf(const Region& region, const openvdb::math::Transform
 
 template <typename Grid>
 Count countBlock(const Region& region, const Grid& grid, const Coord& origin) {
-  using Leaf = typename Grid::TreeType::LeafNodeType;
-  const Leaf* leaf = grid.tree().probeConstLeaf(origin);
+  using GridLeaf = typename Grid::TreeType::LeafNodeType;
+  const GridLeaf* leaf = grid.tree().probeConstLeaf(origin);
   const bool isTileOn = !leaf && grid.tree().isValueOn(origin);
   Count count;
-  for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
-    const Coord c = origin + Leaf::offsetToLocalCoord(i);
+  for (openvdb::Index i = 0; i < GridLeaf::SIZE; ++i) {
+    const Coord c = origin + GridLeaf::offsetToLocalCoord(i);
     const V3d p = levelset::toImath(grid.indexToWorld(c));
     if (region.compared && !region.compared(p)) continue;
     const double value = region.value(p);
