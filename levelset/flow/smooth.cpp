@@ -266,12 +266,22 @@ void applyMask(const Mask& mask, const openvdb::FloatGrid& grid, const BandBlock
   });
 }
 
-/// Grid points where the mask lets anything change; empty when nowhere.
+/// Points of the band where the mask lets anything change; empty when nowhere.
 CoordBBox changingBox(const openvdb::FloatGrid& grid, const Mask& mask) {
   CoordBBox box;
   for (auto it = grid.cbeginValueOn(); it; ++it)
     if (mask.weight(toImath(grid.transform().indexToWorld(it.getCoord()))) > 0)
       box.expand(it.getCoord());
+  return box;
+}
+
+/// Grid points whose values differ.
+CoordBBox differing(const BandBlocks& blocks, const Field& a, const Field& b) {
+  CoordBBox box;
+  for (std::size_t i = 0; i < blocks.size(); ++i)
+    for (openvdb::Index n = 0; n < BandBlocks::LeafNode::SIZE; ++n)
+      if (a[i][n] != b[i][n])
+        box.expand(blocks.origin(i) + BandBlocks::LeafNode::offsetToLocalCoord(n));
   return box;
 }
 
@@ -331,7 +341,8 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
 
   // === Distances as far as the filter reads
   // Those that are made in the end reach across the band from a surface as far away.
-  const double needed = std::max(filtering.reach(), 2 * solid.halfWidth() + 2) + 2 * kStencil;
+  const double trusted = filtering.known(), own = 2 * solid.halfWidth() + 2;
+  const double needed = trusted + std::max(filtering.reach(), own) + 2 * kStencil;
   openvdb::FloatGrid::Ptr field;
   if (filtering.known() > solid.halfWidth() * 1.0001) {
     request.halfWidth = filtering.known() + kStencil;
@@ -353,6 +364,10 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
   const Field before = filter.blocks().read(field->tree(), voxel);
   Field after = filtered(filter, before, filtering.kind, filtering.width);
   if (options.mask) applyMask(*options.mask, *field, filter.blocks(), before, after);
+  const CoordBBox moved = box ? differing(filter.blocks(), before, after) : CoordBBox();
+  if (box && moved.empty()) return solid;
+  // A wide filter may reach further than the part of the field that was looked at.
+  if (box && !around(trusted).isInside(moved)) return std::nullopt;
   filter.blocks().write(after, voxel, field->tree());
   if (!eikonal::hasZeroCrossing(field->tree())) return std::nullopt;
 
@@ -361,7 +376,8 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
   request.progress = subProgress(options.progress, kFiltered, 1);
   request.region.reset();
   if (!box) return makeBand(eikonal::distanceTransform(*field, request));
-  request.region = around(solid.halfWidth() + 1);
+  request.region = moved;
+  request.region->expand(static_cast<int>(std::ceil(solid.halfWidth() + 1)));
   openvdb::FloatGrid::Ptr changed;
   try {
     changed = eikonal::distanceTransform(*field, request);

@@ -242,6 +242,13 @@ void raisePoints(const levelset::NarrowBand& band, double height, std::span<cons
       const double middle = 0.5 * (below + above);
       (isAbove(middle) ? above : below) = middle;
     }
+    // At the end of the room that was swept values jump.
+    if (field.value(points[i] + directions[i] * above) - height > 0.1 * field.voxelSize()) {
+      throw InvalidInput(fmt::format(
+          "patch: from {} along {} the way leaves the room above the patch before the distance to "
+          "the base comes to {:.6g}; let the direction lean less, or lower the height",
+          text(points[i]), text(directions[i]), height));
+    }
     points[i] += directions[i] * (0.5 * (below + above));
   }
 }

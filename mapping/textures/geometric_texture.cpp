@@ -504,10 +504,11 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
                     ghosts));
   }
   if (crumbs > 0) {
-    report.notes.push_back(fmt::format(
-        "{} pieces smaller than a voxel were left out, as where a flat side falls together with a "
-        "plane of the grid; smaller voxels show what they are",
-        crumbs));
+    report.notes.push_back(
+        fmt::format("{} grid points, inside alone and by less than a tenth of a voxel, were left "
+                    "out, as where a "
+                    "flat side falls together with a plane of the grid",
+                    crumbs));
   }
   result.band = timed(report.cost.merging, [&] {
     return merge(base, join(std::move(pieces), options), options, report);

@@ -198,12 +198,15 @@ class TextureWarp {
   /// are no others they are what there is of the texture, and stay.
   /// @return how many
   static std::size_t dropCrumbs(openvdb::FloatGrid& grid) {
+    constexpr double kDepth = 0.1;  // voxels: what is deeper is more than rounding
+    const auto deepest = static_cast<float>(-kDepth * grid.voxelSize()[0]);
     const auto accessor = grid.getConstAccessor();
     std::vector<Coord> crumbs;
     std::size_t inside = 0;
     for (auto it = grid.cbeginValueOn(); it; ++it) {
       if (*it >= 0) continue;
       ++inside;
+      if (*it < deepest) continue;
       const Coord c = it.getCoord();
       bool isAlone = true;
       for (int axis = 0; axis < 3 && isAlone; ++axis)
@@ -372,6 +375,7 @@ class TextureWarp {
   /// same ones whatever the threads do, and so few that it costs a twentieth of the rest.
   void checkAgainstDirect(const LeafNode& leaf, const std::array<V3d, LeafNode::SIZE>& uvw,
                           Piece& piece) const {
+    if (map_.isLocal()) return;  // there is no other evaluation
     constexpr std::uint64_t kParticlesOfLeaf = 250;
     const std::uint64_t hash = hashOf(leaf.origin());
     const std::uint64_t every = 1 + patch_.particleCount() / kParticlesOfLeaf;

@@ -27,7 +27,8 @@ struct Warp {
   std::size_t operations = 0;  ///< particles added up or tetrahedra tried, see BlockMap::evaluate
   std::size_t ghosts =
       0;  ///< grid points that the map, far from the particles, sends back into the texture
-  /// Grid points that would have been solids of their own, smaller than a voxel, and were left out.
+  /// Grid points that would have been solids of their own, within a tenth of a voxel of nothing,
+  /// and were left out.
   std::size_t crumbs = 0;
   /// Grid points drawn at random where the map was evaluated directly too, and how far the fast
   /// evaluation was off at any of them, texture voxels.

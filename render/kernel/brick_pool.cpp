@@ -208,22 +208,24 @@ BrickPool makeBricks(const levelset::NarrowBand& band) {
   openvdb::CoordBBox box;
   for (const auto& brick : bricks) box.expand(brick->origin);
   double count = 1;
+  std::array<double, 3> spans{};
   for (int a = 0; a < 3; ++a) {
     const auto i = static_cast<std::size_t>(a);
     const double span = static_cast<double>(box.max()[a]) - box.min()[a] + kBlock;
     const double pages = std::ceil(span / BrickPool::kPage);
     count *= pages;
+    spans[i] = span;
     pool.origin[i] = box.min()[a];
-    pool.pages[i] = static_cast<int>(pages);
-    pool.low[i] = 0;
-    pool.high[i] = static_cast<int>(span);
   }
   if (count > kMostPages) {
     throw levelset::ResourceLimit(fmt::format(
         "render: the surface spans {:.3g} x {:.3g} x {:.3g} voxels, too many for a table of pages; "
         "use larger voxels, or draw its parts apart",
-        static_cast<double>(pool.high[0]), static_cast<double>(pool.high[1]),
-        static_cast<double>(pool.high[2])));
+        spans[0], spans[1], spans[2]));
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    pool.pages[i] = static_cast<int>(std::ceil(spans[i] / BrickPool::kPage));
+    pool.high[i] = static_cast<int>(spans[i]);
   }
   layTable(pool, bricks);
   pool.value.resize(bricks.size() * BrickPool::kValues);

@@ -309,7 +309,7 @@ Hit trace(Ray ray) {
       Crossing crossing = crossingIn(asked, brick, corner, x0, y0, z0, x1, y1, z1, entered, axis,
                                      aheadX, aheadY, aheadZ, carried, inside);
       VAR place = t + crossing.share * (tExit - t);
-      Bool hits = AND(asked, crossing.found);
+      Bool hits = AND(asked, AND(crossing.found, place <= ray.end));
       hit.found = OR(hit.found, hits);
       hit.t = select(hits, place, hit.t);
       solved = OR(solved, asked);

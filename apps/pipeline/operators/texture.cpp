@@ -99,7 +99,8 @@ void tellMapError(Invocation& in, const mapping::TextureReport& report, double t
   in.notes.errors.push_back(
       {fmt::format("map's fast evaluation at {} random points, largest", report.mapErrorPoints),
        report.mapError, "texture voxels"});
-  if (report.mapError > tolerance) {
+  constexpr double kRounding = 1e-6;
+  if (report.mapError > tolerance + kRounding) {
     in.notes.warnings.push_back(fmt::format(
         "{}: the map's fast evaluation is off by {:.3g} texture voxels, and {} was asked; this is "
         "a defect, please report it",
