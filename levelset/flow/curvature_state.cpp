@@ -21,6 +21,9 @@ constexpr float kLeastSum = 0.1f;
 // What is bent more is taken for bent so: close to a focus or a crease nothing is parallel.
 constexpr double kMostBent = 0.12;
 
+constexpr double kDifferencesReach = 2.8284271247461903;  // (2, 2, 0)
+static_assert(kFlowWidth >= kFlowCore + kDifferencesReach);
+
 struct Nothing {};
 
 /// k1 + k2 of the parallel surface `away` voxels further out, less the same here.
