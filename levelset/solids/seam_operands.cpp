@@ -35,6 +35,14 @@ void addSigns(const FloatTree& source, const Coord& origin, FloatTree& target) {
   target.addLeaf(signs);
 }
 
+/// The inside that holds no blocks: however deep, a ball asks on which side it is.
+void copyInsideTiles(const FloatTree& source, FloatTree& target) {
+  auto tile = source.cbeginValueOff();
+  tile.setMaxDepth(FloatTree::ValueOffCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile)
+    if (*tile < 0) target.addTile(tile.getLevel(), tile.getCoord(), -target.background(), false);
+}
+
 }  // namespace
 
 SeamOperands onOneGrid(const NarrowBand& a, const NarrowBand& b, const BlendOptions& options) {
@@ -57,6 +65,7 @@ FloatGrid::Ptr cutOut(const FloatGrid& solid, const eikonal::PointTree& curve, d
   const auto scale = static_cast<float>(1 / solid.voxelSize()[0]);
   FloatGrid::Ptr part = FloatGrid::create(solid.background() * scale);
   FloatTree& tree = part->tree();
+  copyInsideTiles(solid.tree(), tree);
   std::set<Coord> inner, rim;
   for (auto leaf = solid.tree().cbeginLeaf(); leaf; ++leaf) {
     const Vec3d centre = leaf->origin().asVec3d() + Vec3d(3.5);

@@ -18,7 +18,7 @@ struct SeamOperands {
                                      const BlendOptions& options);
 
 /// The blocks of a solid that come within `radius` (voxels) and a margin of the curve, its values
-/// in voxels, and the signs of the blocks around those.
+/// in voxels, and the signs of the blocks around those and of all that is deep inside.
 [[nodiscard]] openvdb::FloatGrid::Ptr cutOut(const openvdb::FloatGrid& solid,
                                              const eikonal::PointTree& curve, double radius);
 

@@ -2,11 +2,14 @@
 #include <openvdb/tools/Diagnostics.h>
 
 #include <limits>
+#include <vector>
 
+#include "levelset/eikonal/point_tree.h"
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/sample.h"
 #include "levelset/solids/blend.h"
+#include "levelset/solids/seam_operands.h"
 #include "levelset/solids/shapes.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
@@ -185,6 +188,19 @@ TEST(Fillet, LeavesNoVoidWhereTheSpineBendsAroundTheSeam) {
     EXPECT_EQ(m.cavities, 0u);
     EXPECT_EQ(m.components, 1u);
   }
+}
+
+TEST(Fillet, KnowsHowDeepInsideItIs) {
+  // Further from its surface than the blocks around that, a solid once passed for empty space, in
+  // which the ball rolled along the other one.
+  const NarrowBand thick = makeSphere(40, V3d(0), 1);
+  const std::vector<openvdb::Vec3d> points = {{40, 0, 0}, {0, 40, 0}};
+  const eikonal::PointTree curve(points);
+  const openvdb::FloatGrid::Ptr part = solids::cutOut(vdb(thick), curve, 20);
+  for (int depth = 1; depth <= 40; ++depth)
+    EXPECT_LT(part->tree().getValue(openvdb::Coord(40 - depth, 0, 0)), 0) << depth;
+  EXPECT_GT(part->tree().getValue(openvdb::Coord(50, 0, 0)), 0);
+  EXPECT_GT(part->tree().getValue(openvdb::Coord(80, 0, 0)), 0);
 }
 
 TEST(Fillet, MakesNoBulgeWhereSurfacesNearlyTouch) {
