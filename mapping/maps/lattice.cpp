@@ -4,48 +4,13 @@
 #include <array>
 #include <cmath>
 
+#include "mapping/patches/level_resampling.h"
+
 namespace mapping {
 namespace {
 
 using Imath::V3d;
 using Node = std::array<int, 3>;
-
-/// A row of positions along one axis of a level, at t in [0, 1]: Catmull-Rom, beyond the ends a
-/// parabola through three of them.
-template <typename At>
-V3d along(const At& at, std::size_t count, double t) {
-  const double x = t * static_cast<double>(count - 1);
-  const double cell = std::clamp(std::floor(x), 0.0, static_cast<double>(count - 2));
-  const auto i = static_cast<std::size_t>(cell);
-  const double f = x - cell;
-  const V3d b = at(i), c = at(i + 1);
-  const auto beyond = [&](const V3d& last, const V3d& next, std::size_t third) {
-    return count > 2 ? (last - next) * 3.0 + at(third) : last * 2.0 - next;
-  };
-  const V3d a = i > 0 ? at(i - 1) : beyond(b, c, 2),
-            d = i + 2 < count ? at(i + 2) : beyond(c, b, count - 3);
-  return b + (c - a) * (0.5 * f) + (a * 2.0 - b * 5.0 + c * 4.0 - d) * (0.5 * f * f) +
-         (b * 3.0 - a - c * 3.0 + d) * (0.5 * f * f * f);
-}
-
-V3d smoothOnLevel(const ParticleLevel& level, double u, double v) {
-  const auto row = [&](std::size_t j) {
-    return along([&](std::size_t i) { return level.at(i, j); }, level.columns, u);
-  };
-  return along(row, level.rows, v);
-}
-
-/// Positions of a level on a grid of columns × rows.
-std::vector<V3d> withCounts(const ParticleLevel& level, std::size_t columns, std::size_t rows) {
-  if (level.columns == columns && level.rows == rows) return level.positions;
-  std::vector<V3d> positions(columns * rows);
-  for (std::size_t j = 0; j < rows; ++j)
-    for (std::size_t i = 0; i < columns; ++i)
-      positions[j * columns + i] =
-          smoothOnLevel(level, static_cast<double>(i) / static_cast<double>(columns - 1),
-                        static_cast<double>(j) / static_cast<double>(rows - 1));
-  return positions;
-}
 
 /// Evenly spaced from 0 to 1.
 std::vector<double> evenly(std::size_t count) {
@@ -110,19 +75,18 @@ Lattice::Lattice(const Patch& patch, const LatticeBorder& border) {
     positions_[nodeIndex(to)] = a + (a - b) * share;
   };
   for (int k = below; k <= lastLevel; ++k) {
-    const ParticleLevel& given = patch.levels[static_cast<std::size_t>(k - below)];
-    const std::vector<V3d> level = withCounts(given, columns, rows);
+    const ParticleLevel level =
+        withCounts(patch.levels[static_cast<std::size_t>(k - below)], columns, rows);
     for (int j = 0; j < static_cast<int>(rows); ++j)
       for (int i = 0; i < static_cast<int>(columns); ++i)
         positions_[nodeIndex({i + around, j + around, k})] =
-            level[static_cast<std::size_t>(j) * columns + static_cast<std::size_t>(i)];
+            level.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
     if (!around) continue;
-    const bool hasRim = given.hasRim() && given.columns == columns && given.rows == rows;
     // The particles of the rim tell the direction, if there are any.
     const auto end = [&](const Node& to, const Node& near, const Node& far, double share) {
-      if (!hasRim) return straight(to, near, far, share);
+      if (!level.hasRim()) return straight(to, near, far, share);
       const V3d p = positions_[nodeIndex(near)];
-      positions_[nodeIndex(to)] = p + (given.beyond(to[0] - 1, to[1] - 1) - p) * share;
+      positions_[nodeIndex(to)] = p + (level.beyond(to[0] - 1, to[1] - 1) - p) * share;
     };
     for (int j = 1; j <= static_cast<int>(rows); ++j) {
       end({0, j, k}, {1, j, k}, {2, j, k}, wide[0]);

@@ -60,6 +60,39 @@ void setParticles(const std::vector<V3d>& all, ParticleLevel& level) {
   std::copy(rim, all.end(), level.rim.begin());
 }
 
+ParticleLevel advected(const levelset::NarrowBand& space, const ParticleLevel& surface,
+                       double height) {
+  ParticleLevel top = levelLike(surface, 1, height);
+  const auto follow = [&](std::vector<V3d>& particles) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, particles.size(), 64),
+                      [&](const auto& range) {
+                        const SurfaceField field(space);
+                        const double steps = std::ceil(height / (0.5 * field.voxelSize()));
+                        const double step = height / steps;
+                        for (std::size_t n = range.begin(); n != range.end(); ++n)
+                          for (int i = 0; i < static_cast<int>(steps); ++i) {
+                            const V3d& p = particles[n];
+                            const V3d middle = p + field.gradient(p) * (0.5 * step);
+                            particles[n] += field.gradient(middle) * step;
+                          }
+                      });
+  };
+  follow(top.positions);
+  follow(top.rim);
+  return top;
+}
+
+/// Evenly on the straight ways from the surface to the top.
+ParticleLevel between(const ParticleLevel& surface, const ParticleLevel& top, double height,
+                      double w) {
+  ParticleLevel level = levelLike(surface, w, w * height);
+  for (std::size_t n = 0; n < level.positions.size(); ++n)
+    level.positions[n] += (top.positions[n] - surface.positions[n]) * w;
+  for (std::size_t n = 0; n < level.rim.size(); ++n)
+    level.rim[n] += (top.rim[n] - surface.rim[n]) * w;
+  return level;
+}
+
 /// Spheres of a twentieth of the least distance between neighbours.
 TravelGuard guardOf(const ParticleLevel& surface) {
   constexpr double kShare = 0.05;
@@ -81,35 +114,16 @@ TravelGuard guardOf(const ParticleLevel& surface) {
 std::vector<ParticleLevel> conformingLevels(const levelset::NarrowBand& space,
                                             const ParticleLevel& surface, double height,
                                             std::size_t count) {
-  ParticleLevel top = levelLike(surface, 1, height);
-  const auto follow = [&](std::vector<V3d>& particles) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, particles.size(), 64),
-                      [&](const auto& range) {
-                        const SurfaceField field(space);
-                        const double steps = std::ceil(height / (0.5 * field.voxelSize()));
-                        const double step = height / steps;
-                        for (std::size_t n = range.begin(); n != range.end(); ++n)
-                          for (int i = 0; i < static_cast<int>(steps); ++i) {
-                            const V3d& p = particles[n];
-                            const V3d middle = p + field.gradient(p) * (0.5 * step);
-                            particles[n] += field.gradient(middle) * step;
-                          }
-                      });
-  };
-  follow(top.positions);
-  follow(top.rim);
-
+  const ParticleLevel top = advected(space, surface, height);
   std::vector<ParticleLevel> levels;
-  for (std::size_t k = 0; k < count; ++k) {
-    const double w = shareOf(k, count);
-    ParticleLevel level = levelLike(surface, w, w * height);
-    for (std::size_t n = 0; n < level.positions.size(); ++n)
-      level.positions[n] += (top.positions[n] - surface.positions[n]) * w;
-    for (std::size_t n = 0; n < level.rim.size(); ++n)
-      level.rim[n] += (top.rim[n] - surface.rim[n]) * w;
-    levels.push_back(std::move(level));
-  }
+  for (std::size_t k = 0; k < count; ++k)
+    levels.push_back(between(surface, top, height, shareOf(k, count)));
   return levels;
+}
+
+ParticleLevel conformingLevel(const levelset::NarrowBand& space, const ParticleLevel& surface,
+                              double height, double w) {
+  return between(surface, advected(space, surface, height), height, w);
 }
 
 SweepCurve::SweepCurve(std::span<const V3d> points) {

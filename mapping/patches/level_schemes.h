@@ -22,6 +22,10 @@ namespace mapping {
                                                           const ParticleLevel& surface,
                                                           double height, std::size_t count);
 
+/// The one of them at w alone.
+[[nodiscard]] ParticleLevel conformingLevel(const levelset::NarrowBand& space,
+                                            const ParticleLevel& surface, double height, double w);
+
 /// A curve through points, smooth and with tangents (Catmull-Rom by chord lengths), as a polyline
 /// that is dense enough to measure lengths on.
 class SweepCurve {

@@ -257,8 +257,9 @@ std::vector<ParticleLevel> reducedLevels(const NarrowBand& base, Outline outline
       options.spacing > 0 ? options.spacing : chooseSpacing(base.voxelSize(), sizes);
   std::vector<ParticleLevel> levels;
   for (const LevelSides& border : sides) {
-    levels.push_back(filledLevel(levels.empty() ? base : space, space, border, height, spacing,
-                                 options, report));
+    const double scale = std::lerp(1.0, options.transform.taper, border.height / height);
+    levels.push_back(filledLevel(levels.empty() ? base : space, space, border, height,
+                                 spacing / scale, options, report));
     const double done = static_cast<double>(levels.size()) / static_cast<double>(sides.size());
     levelset::report(options.progress, 0.5 + 0.5 * done, kPatch);
   }

@@ -103,17 +103,6 @@ ParticleLevel cut(const ParticleLevel& whole, const Tile& tile, bool isRing) {
   return part;
 }
 
-double meanTileSpacing(const Patch& patch) {
-  double sum = 0, count = 0;
-  for (const ParticleLevel& level : patch.levels)
-    for (std::size_t j = 0; j < level.rows; ++j)
-      for (std::size_t i = 0; i < level.columns; ++i) {
-        if (i > 0) sum += (level.at(i, j) - level.at(i - 1, j)).length(), ++count;
-        if (j > 0) sum += (level.at(i, j) - level.at(i, j - 1)).length(), ++count;
-      }
-  return sum / count;
-}
-
 Patch tilePatch(const Sheet& sheet, const Tile& tile) {
   Patch patch;
   patch.height = sheet.height;
@@ -124,7 +113,7 @@ Patch tilePatch(const Sheet& sheet, const Tile& tile) {
   const std::size_t right = tile.columns, top = tile.rows;
   patch.corners = {surface.at(0, 0), surface.at(right, 0), surface.at(right, top),
                    surface.at(0, top)};
-  patch.spacing = meanTileSpacing(patch);
+  patch.spacing = meanSpacing(patch);
   return patch;
 }
 
@@ -285,19 +274,6 @@ std::vector<ParticleLevel> roundLevels(const NarrowBand& base, ParticleLevel sur
   return levels;
 }
 
-/// Mean lengths around, and from end to end.
-LevelSize roundSize(const ParticleLevel& level) {
-  LevelSize size{0, 0};
-  for (std::size_t j = 0; j < level.rows; ++j)
-    for (std::size_t i = 0; i < level.columns; ++i) {
-      if (i > 0) size.u += (level.at(i, j) - level.at(i - 1, j)).length();
-      if (j > 0) size.v += (level.at(i, j) - level.at(i, j - 1)).length();
-    }
-  size.u /= static_cast<double>(level.rows);
-  size.v /= static_cast<double>(level.columns);
-  return size;
-}
-
 }  // namespace
 
 PatchGridResult makePatchGrid(const NarrowBand& base, const std::array<V3d, 4>& corners,
@@ -341,13 +317,13 @@ PatchGridResult makePatchGridAround(const NarrowBand& base, const V3d& from, con
   }
   const RoundFrame frame = roundFrame(base, from, to, rotation);
   PatchGridResult result;
-  const LevelSize rough = roundSize(roundLevel(base, frame, 64, 16));
+  const LevelSize rough = sizeOf(roundLevel(base, frame, 64, 16));
   const auto [across, up] = cellsPerTile(base, rough, grid, options);
   ParticleLevel surface = roundLevel(base, frame, across * grid.columns, up * grid.rows);
   requireOneSheet(surface);
   requireCovered(base, surface);
   settleRound(base, surface, result.report);
-  const LevelSize size = roundSize(surface);
+  const LevelSize size = sizeOf(surface);
   result.report.uLength = size.u;
   result.report.vLength = size.v;
   result.report.cellAreaVariation = cellAreaVariation(surface);

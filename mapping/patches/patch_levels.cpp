@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "levelset/error.h"
+#include "mapping/patches/level_resampling.h"
 #include "mapping/patches/level_schemes.h"
 #include "mapping/patches/patch_space.h"
 #include "mapping/patches/relaxation.h"
@@ -43,6 +44,45 @@ Axis axisOf(const NarrowBand& base, const ParticleLevel& surface) {
   const V3d u = surface.at(i + 1, j) - surface.at(i, j);
   axis.u = (u - axis.normal * axis.normal.dot(u)).normalized();
   return axis;
+}
+
+std::vector<ParticleLevel> transformed(const NarrowBand& base, std::vector<ParticleLevel> levels,
+                                       double height, const LevelTransform& transform) {
+  if (transform.isIdentity()) return levels;
+  const Axis axis = axisOf(base, levels.front());
+  transformLevels(levels, transform, axis.origin, axis.normal, axis.u, height);
+  return levels;
+}
+
+struct Counts {
+  std::size_t columns, rows;
+};
+
+/// Calls refit(level, counts) for each level above the surface whose particles lie over a quarter
+/// closer or farther apart than on the surface, along u or v.
+/// @throws ResourceLimit as checkParticleCount does
+template <typename Refit>
+void keepDensity(const NarrowBand& base, std::vector<ParticleLevel>& levels, double height,
+                 const PatchOptions& options, const Refit& refit) {
+  constexpr double kTolerated = 1.25;
+  const ParticleLevel& surface = levels.front();
+  const LevelSize ground = sizeOf(surface);
+  const auto count = [](std::size_t before, double stretch) {
+    const bool isFit = stretch <= kTolerated && stretch * kTolerated >= 1;
+    return isFit ? before : countAlong(static_cast<double>(before - 1) * stretch, 1);
+  };
+  std::vector<Counts> counts;
+  double total = 0;
+  for (const ParticleLevel& level : transformed(base, levels, height, options.transform)) {
+    const LevelSize size = sizeOf(level);
+    counts.push_back(
+        {count(surface.columns, size.u / ground.u), count(surface.rows, size.v / ground.v)});
+    total += static_cast<double>((counts.back().columns + 2) * (counts.back().rows + 2));
+  }
+  checkParticleCount(total, ground.u / static_cast<double>(surface.columns - 1), options);
+  for (std::size_t k = 1; k < levels.size(); ++k)
+    if (counts[k].columns != levels[k].columns || counts[k].rows != levels[k].rows)
+      refit(levels[k], counts[k]);
 }
 
 }  // namespace
@@ -112,6 +152,18 @@ void checkPatchOptions(const char* action, double height, const PatchOptions& op
     }
 }
 
+LevelSize sizeOf(const ParticleLevel& level) {
+  LevelSize size{0, 0};
+  for (std::size_t j = 0; j < level.rows; ++j)
+    for (std::size_t i = 0; i < level.columns; ++i) {
+      if (i > 0) size.u += (level.at(i, j) - level.at(i - 1, j)).length();
+      if (j > 0) size.v += (level.at(i, j) - level.at(i, j - 1)).length();
+    }
+  size.u /= static_cast<double>(level.rows);
+  size.v /= static_cast<double>(level.columns);
+  return size;
+}
+
 double particlesAt(double spacing, std::span<const LevelSize> levels) {
   double count = 0;
   for (const LevelSize& level : levels) count += (level.u / spacing + 3) * (level.v / spacing + 3);
@@ -164,7 +216,17 @@ std::vector<ParticleLevel> levelsFromSurface(const NarrowBand& base, const Parti
                                              PatchReport& report) {
   if (options.scheme == LevelScheme::Conforming) {
     const NarrowBand space = sweepAbove(base, outline, size, height, options);
-    return conformingLevels(space, surface, height, options.levels);
+    std::vector<ParticleLevel> levels = conformingLevels(space, surface, height, options.levels);
+    if (options.cells[0] == 0) {
+      keepDensity(base, levels, height, options, [&](ParticleLevel& level, const Counts& n) {
+        // New particles start on the surface like the others, wherever it has relief between them.
+        ParticleLevel start = withCounts(surface, n.columns, n.rows);
+        const SurfaceField field(base);
+        for (V3d& p : start.positions) (void)field.project(p, 0);
+        level = conformingLevel(space, start, height, level.w);
+      });
+    }
+    return levels;
   }
   const Axis axis = axisOf(base, surface);
   std::vector<V3d> points = {axis.origin};
@@ -186,6 +248,11 @@ std::vector<ParticleLevel> levelsFromSurface(const NarrowBand& base, const Parti
   }
   SplineSweep sweep = splineLevels(surface, curve, height, options.levels, options.fade);
   report.slowed = sweep.slowed;
+  if (options.cells[0] == 0) {
+    keepDensity(base, sweep.levels, height, options, [](ParticleLevel& level, const Counts& n) {
+      level = withCounts(level, n.columns, n.rows);
+    });
+  }
   return std::move(sweep.levels);
 }
 
@@ -221,11 +288,7 @@ void requireCovered(const NarrowBand& base, const ParticleLevel& level) {
 void finishPatch(const NarrowBand& base, const PatchOptions& options, Patch& patch,
                  PatchReport& report) {
   requireCovered(base, patch.levels.front());
-  if (!options.transform.isIdentity()) {
-    const Axis axis = axisOf(base, patch.levels.front());
-    transformLevels(patch.levels, options.transform, axis.origin, axis.normal, axis.u,
-                    patch.height);
-  }
+  patch.levels = transformed(base, std::move(patch.levels), patch.height, options.transform);
   patch.spacing = meanSpacing(patch);
   report.cellAreaVariation = cellAreaVariation(patch.levels.front());
 }

@@ -25,6 +25,8 @@ struct LevelSize {
   double u, v;
 };
 
+[[nodiscard]] LevelSize sizeOf(const ParticleLevel& level);
+
 /// (u/s + 3)(v/s + 3), rims and all, summed over the levels.
 [[nodiscard]] double particlesAt(double spacing, std::span<const LevelSize> levels);
 
@@ -47,7 +49,8 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
                                               const LevelSize& size, double height,
                                               const PatchOptions& options, double lean = 0);
 
-/// Schemes A and C: the particles on the surface travel.
+/// Schemes A and C: the particles on the surface travel. Unless the options give counts, a level
+/// that travel and taper spread or crowd by over a quarter gets the surface's spacing again.
 [[nodiscard]] std::vector<ParticleLevel> levelsFromSurface(const levelset::NarrowBand& base,
                                                            const ParticleLevel& surface,
                                                            std::span<const Imath::V3d> outline,

@@ -10,6 +10,7 @@
 #include "levelset/error.h"
 #include "mapping/maps/distortion.h"
 #include "mapping/maps/shell_map.h"
+#include "mapping/patches/level_resampling.h"
 #include "mapping/patches/relaxation.h"
 #include "tests/support/patches.h"
 
@@ -65,14 +66,101 @@ TEST(ConformingLevels, AreRadialAboveASphere) {
   ASSERT_EQ(made.patch.levels.size(), 5u);
   const ParticleLevel& surface = made.patch.levels.front();
   for (const ParticleLevel& level : made.patch.levels) {
-    ASSERT_EQ(level.positions.size(), surface.positions.size());
+    const ParticleLevel below = mapping::withCounts(surface, level.columns, level.rows);
     for (std::size_t n = 0; n < level.positions.size(); ++n) {
       EXPECT_NEAR(level.positions[n].length(), radius + level.w * height, 0.004 * height);
-      EXPECT_LE((level.positions[n].normalized() - surface.positions[n].normalized()).length(),
+      EXPECT_LE((level.positions[n].normalized() - below.positions[n].normalized()).length(),
                 0.002);
     }
   }
   EXPECT_EQ(foldsOf(made.patch), 0u);
+}
+
+double spacingOf(const ParticleLevel& level) {
+  Patch patch;
+  patch.levels = {level};
+  return mapping::meanSpacing(patch);
+}
+
+TEST(LevelDensity, StaysThatOfTheSurfaceWhateverALevelsSize) {
+  // Two and a half times as wide at the top of the ball's patch, or a third by taper.
+  const double side = std::sin(0.5) / std::sqrt(2.0), up = std::cos(0.5);
+  const NarrowBand ball = makeBall(1, 0.05), ground = makeGround(0.05);
+  const std::array<V3d, 4> onBall = square(side, up), onGround = square(1, 0);
+  struct Made {
+    const char* what;
+    PatchResult result;
+    double topStretch;
+  };
+  const Made all[] = {
+      {"conforming",
+       mapping::makePatch(ball, onBall, 1.5, {.levels = 5, .scheme = LevelScheme::Conforming}),
+       2.5},
+      {"conforming, tapered",
+       mapping::makePatch(
+           ball, onBall, 1.5,
+           {.levels = 5, .scheme = LevelScheme::Conforming, .transform = {.taper = 0.6}}),
+       1.6},
+      {"spline, tapered",
+       mapping::makePatch(
+           ground, onGround, 1,
+           {.levels = 5, .scheme = LevelScheme::Spline, .transform = {.taper = 1.0 / 3}}),
+       1.0 / 3},
+      {"reduced, tapered",
+       mapping::makePatch(ground, onGround, 0.3, {.levels = 5, .transform = {.taper = 1.0 / 3}}),
+       1.0 / 3}};
+  for (const Made& made : all) {
+    SCOPED_TRACE(made.what);
+    const std::vector<ParticleLevel>& levels = made.result.patch.levels;
+    const double spacing = spacingOf(levels.front());
+    for (const ParticleLevel& level : levels) {
+      EXPECT_NEAR(spacingOf(level) / spacing, 1, 0.28) << level.w;
+      EXPECT_TRUE(level.hasRim());
+      EXPECT_EQ(level.rim.size(), 2 * (level.columns + level.rows) + 4);
+    }
+    const auto cells = [](const ParticleLevel& level) {
+      return static_cast<double>(level.columns - 1);
+    };
+    EXPECT_NEAR(cells(levels.back()) / cells(levels.front()), made.topStretch, 0.1);
+    EXPECT_EQ(foldsOf(made.result.patch), 0u);
+  }
+  const PatchResult counted = mapping::makePatch(
+      ball, onBall, 1.5, {.levels = 3, .scheme = LevelScheme::Conforming, .cells = {8, 9}});
+  for (const ParticleLevel& level : counted.patch.levels) {
+    EXPECT_EQ(level.columns, 9u);
+    EXPECT_EQ(level.rows, 10u);
+  }
+}
+
+TEST(LevelResampling, KeepsWhatIsQuadraticAndItsRim) {
+  // x and y are texture coordinates, z a paraboloid; Catmull-Rom reproduces both.
+  const auto place = [](double u, double v) { return V3d(u, 2 * v, u * u - u * v + 3 * v * v); };
+  const auto sampled = [&](int columns, int rows) {
+    ParticleLevel level;
+    level.columns = static_cast<std::size_t>(columns);
+    level.rows = static_cast<std::size_t>(rows);
+    level.rim.resize(2 * (level.columns + level.rows) + 4);
+    for (int j = -1; j <= rows; ++j)
+      for (int i = -1; i <= columns; ++i) {
+        const V3d p =
+            place(i / static_cast<double>(columns - 1), j / static_cast<double>(rows - 1));
+        if (i >= 0 && i < columns && j >= 0 && j < rows)
+          level.positions.push_back(p);
+        else
+          level.rim[level.rimIndex(i, j)] = p;
+      }
+    return level;
+  };
+  const ParticleLevel coarse = sampled(8, 7), expected = sampled(15, 12);
+  const ParticleLevel fine = mapping::withCounts(coarse, 15, 12);
+  for (int j = -1; j <= 12; ++j)
+    for (int i = -1; i <= 15; ++i)
+      EXPECT_LE((fine.beyond(i, j) - expected.beyond(i, j)).length(), 1e-12) << i << ' ' << j;
+  // Fewer: the rim lies beyond the given one, straight on.
+  const ParticleLevel few = mapping::withCounts(coarse, 4, 4);
+  const V3d end = coarse.beyond(-1, 0), next = coarse.at(0, 0);
+  EXPECT_LE((few.beyond(-1, 0) - (end + (end - next) * (4.0 / 3))).length(), 1e-12);
+  EXPECT_LE((few.at(3, 3) - coarse.at(7, 6)).length(), 1e-12);
 }
 
 TEST(ConformingLevels, SpreadWhereReducedOnesStayEven) {
@@ -173,7 +261,9 @@ TEST(LevelTransform, TwistsTapersAndBends) {
   for (const LevelScheme scheme :
        {LevelScheme::Reduced, LevelScheme::Conforming, LevelScheme::Spline}) {
     const auto top = [&](const mapping::LevelTransform& transform) {
-      const PatchOptions options{.levels = 5, .scheme = scheme, .transform = transform};
+      // Of given counts: each particle has its like in the other patches.
+      const PatchOptions options{
+          .levels = 5, .scheme = scheme, .transform = transform, .cells = {12, 12}};
       return mapping::makePatch(ground, square(1), 1, options).patch.levels.back();
     };
     const ParticleLevel plain = top({}), twisted = top({.twist = M_PI / 2}),
