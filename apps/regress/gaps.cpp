@@ -70,7 +70,8 @@ double shareOf(const Region& region, const Grid& grid) {
     all.wanted += count.wanted;
     all.missing += count.missing;
   }
-  return all.wanted > 0 ? all.missing / all.wanted : 0;
+  // A region without a grid point would pass whatever is missing.
+  return all.wanted > 0 ? all.missing / all.wanted : std::nan("");
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "levelset/disjoint_sets.h"
+
 namespace mapping {
 namespace {
 
@@ -31,9 +33,26 @@ double contact(const V3d& apart, const V3d& relative, double diameter) {
   return std::min(1.0, over / (std::sqrt(root) - approach));
 }
 
+/// Gives all of a set the mean of their moves.
+void moveTogether(levelset::DisjointSets& sets, std::span<V3d> moves) {
+  struct Sum {
+    V3d moves = V3d(0);
+    double count = 0;
+  };
+  std::vector<Sum> sums(moves.size());
+  for (std::uint32_t i = 0; i < moves.size(); ++i) {
+    Sum& sum = sums[sets.find(i)];
+    sum.moves += moves[i];
+    ++sum.count;
+  }
+  for (std::uint32_t i = 0; i < moves.size(); ++i)
+    if (const Sum& sum = sums[sets.find(i)]; sum.count > 1) moves[i] = sum.moves / sum.count;
+}
+
 }  // namespace
 
 void TravelGuard::limit(std::span<const V3d> places, std::span<V3d> moves) {
+  if (!(diameter_ > 0)) return;
   // What all do together brings nobody closer.
   V3d mean(0);
   for (const V3d& move : moves) mean += move / static_cast<double>(moves.size());
@@ -67,10 +86,12 @@ void TravelGuard::limit(std::span<const V3d> places, std::span<V3d> moves) {
   };
 
   // From where two touch they go on side by side: what would bring them closer is taken from both.
-  // That may push them into others, so there are some rounds; those that touch even then stop, and
-  // whoever comes up behind them, until nobody does.
+  // That may push them into others, so there are some rounds; those that touch even then move as
+  // one, and with whoever they come up to, until nobody touches: in a round without an end to it
+  // two sets become one.
   constexpr int kRounds = 12;
   std::vector<V3d> corrections(places.size());
+  levelset::DisjointSets crowds(places.size());
   for (int round = 0;; ++round) {
     std::fill(corrections.begin(), corrections.end(), V3d(0));
     bool isFree = true;
@@ -81,8 +102,7 @@ void TravelGuard::limit(std::span<const V3d> places, std::span<V3d> moves) {
       isFree = false;
       isSlowed_[i] = isSlowed_[j] = 1;
       if (round >= kRounds) {
-        corrections[i] = -moves[i];
-        corrections[j] = -moves[j];
+        crowds.join(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j));
         return;
       }
       const V3d normal = (apart + relative * t).normalized();
@@ -91,7 +111,10 @@ void TravelGuard::limit(std::span<const V3d> places, std::span<V3d> moves) {
       corrections[j] -= back;
     });
     if (isFree) return;
-    for (std::size_t i = 0; i < moves.size(); ++i) moves[i] += corrections[i];
+    if (round >= kRounds)
+      moveTogether(crowds, moves);
+    else
+      for (std::size_t i = 0; i < moves.size(); ++i) moves[i] += corrections[i];
   }
 }
 

@@ -18,7 +18,7 @@ class TravelGuard {
   TravelGuard(double diameter, std::size_t particles) : diameter_(diameter), isSlowed_(particles) {}
 
   /// Takes from the moves of those that would touch what would bring them closer from there on:
-  /// they go on side by side. Where that is not enough in a crowd they stop.
+  /// they go on side by side. Where that is not enough, a crowd moves as one.
   void limit(std::span<const Imath::V3d> places, std::span<Imath::V3d> moves);
 
   /// Was its move ever changed?

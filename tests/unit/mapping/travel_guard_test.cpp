@@ -66,8 +66,9 @@ TEST(TravelGuard, LeavesOneThatIsThereTwiceAlone) {
   EXPECT_EQ(moves[1], V3d(1, 0, 0));
 }
 
-TEST(TravelGuard, LetsNoCrowdComeTogether) {
-  // A lattice that runs together in its middle, with noise: those in front hold up those behind.
+TEST(TravelGuard, LetsNoCrowdComeTogetherAndLeavesNobodyBehind) {
+  // A lattice that runs together in its middle, with noise, on its way upwards: those in front hold
+  // up those behind, and all get there.
   std::mt19937 random(1);
   std::uniform_real_distribution<double> noise(-0.05, 0.05);
   std::vector<V3d> places;
@@ -77,14 +78,18 @@ TEST(TravelGuard, LetsNoCrowdComeTogether) {
         places.push_back(V3d(x, y, z) * 0.4 + V3d(noise(random), noise(random), noise(random)));
   TravelGuard guard(kDiameter, places.size());
   ASSERT_GT(closest(places), kDiameter);
+  const V3d rise(0, 0, 0.3);
+  V3d middle(0);
   for (int step = 0; step < 40; ++step) {
     std::vector<V3d> moves;
-    for (const V3d& p : places) moves.push_back(p * -0.15);
+    for (const V3d& p : places) moves.push_back((p - middle) * -0.15 + rise);
     guard.limit(places, moves);
     for (std::size_t i = 0; i < places.size(); ++i) places[i] += moves[i];
+    middle += rise;
     ASSERT_GE(closest(places), kDiameter * (1 - 1e-9)) << step;
   }
   EXPECT_GT(std::count(guard.slowed().begin(), guard.slowed().end(), 1), 300);
+  for (const V3d& p : places) EXPECT_LT((p - middle).length(), 2.2);
 }
 
 TEST(TravelGuard, KeepsASplinesParticlesApartWhereItsPlaneTurnsOnItself) {
