@@ -1,9 +1,15 @@
 #include <fmt/core.h>
 
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
 #include "apps/pipeline/invocation.h"
+#include "apps/pipeline/operators/common.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "render/camera.h"
+#include "render/compare_images.h"
 #include "render/embree/embree_renderer.h"
 #include "render/image.h"
 #include "render/scene.h"
@@ -81,6 +87,165 @@ Plan planDraw(Invocation& in) {
   return in.operands[0].plan();
 }
 
+using Json = nlohmann::ordered_json;
+
+/// "LAYER=USUAL,WORST …"
+std::map<std::string, render::LayerTolerance> tolerancesOf(const Invocation& in) {
+  std::map<std::string, render::LayerTolerance> all;
+  if (!in.given("tolerance")) return all;
+  std::istringstream words(in.text("tolerance"));
+  for (std::string word; words >> word;) {
+    const std::size_t equals = word.find('=');
+    std::istringstream numbers(equals == std::string::npos ? "" : word.substr(equals + 1));
+    render::LayerTolerance tolerance{};
+    char comma = 0;
+    if (!(numbers >> tolerance.usual >> comma >> tolerance.worst) || comma != ',' ||
+        !numbers.eof() || !(tolerance.usual >= 0) || !(tolerance.worst >= 0))
+      throw UsageError(
+          fmt::format("compare-images: --tolerance '{}' is not understood; write "
+                      "LAYER=USUAL,WORST, as Z=1e-6,1e-3, and blanks between several",
+                      word));
+    all[word.substr(0, equals)] = tolerance;
+  }
+  return all;
+}
+
+void validateComparison(const Invocation& in) {
+  (void)tolerancesOf(in);
+  if (in.flag("exact") && in.given("tolerance"))
+    throw UsageError(
+        "compare-images: --exact allows nothing, so --tolerance has no place; give one");
+  if (in.given("difference") &&
+      render::imageFormat(in.text("difference"), in.text("format")) != "exr")
+    throw UsageError("compare-images: --difference holds layers; name a file .exr");
+}
+
+/// Infinity has no number in JSON.
+Json numberOrText(double value) {
+  return std::isfinite(value) ? Json(value) : Json("infinite");
+}
+
+Json pixelsOf(const std::vector<render::PixelDifference>& pixels) {
+  Json all = Json::array();
+  for (const render::PixelDifference& p : pixels)
+    all.push_back({{"x", p.x}, {"y", p.y}, {"difference", numberOrText(p.value)}});
+  return all;
+}
+
+Json toJson(const render::ImageComparison& found) {
+  Json json;
+  json["agrees"] = found.agrees();
+  json["exact"] = found.isExact;
+  json["pixels"] = found.pixels;
+  json["both_hit"] = found.bothHit;
+  json["unlike_at_outline"] = found.unlikeAtOutline;
+  json["unlike_elsewhere"] = found.unlikeElsewhere;
+  json["unlike"] = pixelsOf(found.unlike);
+  json["different_bits"] = found.differentBits;
+  json["only_one"] = found.onlyOne;
+  json["layers"] = Json::array();
+  for (const render::LayerComparison& layer : found.layers) {
+    Json entry = {{"layer", layer.layer}, {"measure", layer.measure}, {"compared", layer.compared}};
+    entry["median"] = numberOrText(layer.median);
+    entry["p99"] = numberOrText(layer.p99);
+    entry["p999"] = numberOrText(layer.p999);
+    entry["largest"] = numberOrText(layer.largest);
+    entry["allowed"] = {{"p999", numberOrText(layer.allowed.usual)},
+                        {"largest", numberOrText(layer.allowed.worst)}};
+    entry["agrees"] = layer.agrees();
+    entry["worst"] = pixelsOf(layer.worst);
+    json["layers"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+std::string asTable(const render::ImageComparison& found) {
+  std::string text = fmt::format(
+      "{} pixels, {} hit by both, {} by one along the outline and {} elsewhere, {} with other "
+      "bits\n",
+      found.pixels, found.bothHit, found.unlikeAtOutline, found.unlikeElsewhere,
+      found.differentBits);
+  text += fmt::format("{:<18}{:>10}{:>10}{:>10}{:>10}  {}\n", "layer", "median", "99 %", "99.9 %",
+                      "largest", "worst pixel");
+  for (const render::LayerComparison& l : found.layers) {
+    text += fmt::format(
+        "{:<18}{:>10.2g}{:>10.2g}{:>10.2g}{:>10.2g}  {}\n", l.layer, l.median, l.p99, l.p999,
+        l.largest, l.worst.empty() ? "none" : fmt::format("{},{}", l.worst[0].x, l.worst[0].y));
+  }
+  for (const std::string& name : found.onlyOne)
+    text += fmt::format("{} is in one picture only\n", name);
+  return text;
+}
+
+Value compareImages(Invocation& in) {
+  const render::ImageComparison found =
+      render::compareImages(render::readExr(in.text("first")), render::readExr(in.text("second")),
+                            {.exact = in.flag("exact"), .tolerances = tolerancesOf(in)});
+  const Json json = toJson(found);
+  in.notes.detailsJson = json.dump();
+  in.output = in.flag("json") ? json.dump(2) + "\n" : asTable(found);
+  if (in.given("difference"))
+    render::writeImage(in.text("difference"), found.difference, in.text("format"));
+  if (!found.agrees())
+    throw levelset::NumericalError(fmt::format(
+        "compare-images: the pictures differ: {}; look at the worst pixels, or at --difference{}",
+        found.reason(),
+        !found.isExact && found.coverageAgrees() ? ", or allow more with --tolerance" : ""));
+  return Value(Plan{});
+}
+
+Operator compareImagesOperator() {
+  return {
+      .name = "compare-images",
+      .group = "Pictures",
+      .summary = "compare two EXR pictures of one scene layer by layer",
+      .details =
+          "Shares of the differences and the worst pixels for each layer: Z and P relative to Z, "
+          "angles of N, curvatures by the voxel, id, colour. Exit code 5, after everything is "
+          "written, when they differ by more than two correct renderers may: pixels that only one "
+          "hits off the outline, or a layer that passes its tolerance.",
+      .example =
+          "levelsmith sphere --radius 1 --voxel 0.1 ! render a.exr --size 64x64 --samples 1 ! "
+          "render "
+          "b.exr --size 64x64 --samples 2 ! compare-images a.exr b.exr",
+      .params = {{.name = "first",
+                  .type = ParamType::Path,
+                  .doc = "an EXR with the layers of 'render'",
+                  .required = true,
+                  .position = 0},
+                 {.name = "second",
+                  .type = ParamType::Path,
+                  .doc = "another of the same size",
+                  .required = true,
+                  .position = 1},
+                 {.name = "exact", .type = ParamType::Flag, .doc = "ask for the same bits"},
+                 {.name = "tolerance",
+                  .type = ParamType::Text,
+                  .doc = "LAYER=USUAL,WORST: what 999 pixels of 1000 and all may differ by; blanks "
+                         "between several"},
+                 {.name = "difference",
+                  .type = ParamType::Path,
+                  .doc = "write the differences to this .exr, a channel for each layer"},
+                 {.name = "format", .type = ParamType::Text, .doc = "of the differences: exr"},
+                 {.name = "json",
+                  .type = ParamType::Flag,
+                  .doc = "one JSON object on standard output"}},
+      .flow = Flow::PassesThrough,
+      .run = compareImages,
+      .plan = [](Invocation&) { return Plan{}; },
+      .validate = validateComparison,
+      .targets =
+          [](const Invocation& in) {
+            return in.given("difference") ? std::vector<std::string>{in.text("difference")}
+                                          : std::vector<std::string>{};
+          },
+      .usesStandardOutput =
+          [](const Invocation& in) {
+            return in.given("difference") && levelset::isStandardOutput(in.text("difference"));
+          },
+  };
+}
+
 }  // namespace
 
 void addPictureOperators(std::vector<Operator>& all) {
@@ -139,6 +304,7 @@ void addPictureOperators(std::vector<Operator>& all) {
                    (in.given("png") && levelset::isStandardOutput(in.text("png")));
           },
   });
+  all.push_back(compareImagesOperator());
 }
 
 }  // namespace pipeline

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "render/image.h"
+
+/// How far two pictures of one scene differ, layer by layer: shares of the pixels and the worst
+/// ones, never one mean over all, in which a leak of one pixel drowns.
+namespace render {
+
+/// What may lie between two correct renderers.
+struct LayerTolerance {
+  double usual;  ///< for 999 pixels of 1000
+  double worst;  ///< for all
+};
+
+struct PixelDifference {
+  int x = 0, y = 0;  ///< from the upper left corner
+  double value = 0;
+};
+
+struct LayerComparison {
+  std::string layer;           ///< "Z", "N", "P", "curvature.mean", "id", "colour" …
+  std::string measure;         ///< of the difference: "relative", "radians" …
+  std::size_t compared = 0;    ///< pixels that both pictures hit
+  double median = 0, p99 = 0;  ///< of the differences there
+  double p999 = 0, largest = 0;
+  LayerTolerance allowed{};
+  std::vector<PixelDifference> worst;  ///< the largest first, at most five; none of 0
+  [[nodiscard]] bool agrees() const { return p999 <= allowed.usual && largest <= allowed.worst; }
+};
+
+struct ImageComparison {
+  std::size_t pixels = 0, bothHit = 0;
+  /// Hit by one only: beside an outline of both pictures, where rounding decides, and elsewhere.
+  std::size_t unlikeAtOutline = 0, unlikeElsewhere = 0;
+  std::size_t outlineAllowed = 0;           ///< of the first kind; of the others none
+  std::vector<PixelDifference> unlike;      ///< the first five, those elsewhere before the others
+  std::vector<LayerComparison> layers;      ///< in the order of their names
+  std::vector<std::string> onlyOne;         ///< layers of one picture; nobody compares them
+  std::size_t differentBits = 0;            ///< pixels in which any channel has other bits
+  bool isExact = false;                     ///< agreement asks for the same bits
+  Image difference;                         ///< a channel for each layer, and "coverage"
+
+  [[nodiscard]] bool coverageAgrees() const {
+    return unlikeElsewhere == 0 && unlikeAtOutline <= outlineAllowed;
+  }
+  [[nodiscard]] bool agrees() const;
+  /// The first reason why not, as the end of a sentence; empty when they agree.
+  [[nodiscard]] std::string reason() const;
+};
+
+struct ImageComparisonOptions {
+  bool exact = false;  ///< the same bits in all channels, and the same channels
+  /// In the place of the layers' own.
+  std::map<std::string, LayerTolerance> tolerances = {};
+};
+
+/// A pixel is hit where Z is finite, or without Z where A is positive. Differences of Z and P are
+/// relative to Z, those of N angles, those of curvatures by the voxel size that the first picture's
+/// header names (ls:voxelSize; 1 without), those of id 0 or 1. NaN differs infinitely.
+/// @throws levelset::InvalidInput for pictures of different sizes, or without Z and A
+/// @throws levelset::UsageError for a tolerance of a layer that they do not have
+[[nodiscard]] ImageComparison compareImages(const Image& first, const Image& second,
+                                            const ImageComparisonOptions& options = {});
+
+}  // namespace render

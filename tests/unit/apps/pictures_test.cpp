@@ -1,0 +1,77 @@
+// Pictures from the command line, and what is the same between them.
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/shell.h"
+
+namespace pictures_test {
+
+using support::Outcome;
+using Json = nlohmann::json;
+
+class Pictures : public support::ShellTest {
+ protected:
+  void draw(const std::string& solid, const std::string& options) {
+    const Outcome drawn = levelsmith(solid + " --voxel 0.1 ! render " + options + " --size 48x48");
+    ASSERT_EQ(drawn.code, 0) << drawn.err;
+  }
+};
+
+TEST_F(Pictures, OfTheSameSolidAgreeButForTheColour) {
+  draw("sphere --radius 1", "a.exr --samples 1");
+  draw("sphere --radius 1", "b.exr --samples 2");
+  const Outcome same = levelsmith("compare-images a.exr b.exr --json --difference d.exr");
+  EXPECT_EQ(same.code, 0) << same.err;
+  const Json json = Json::parse(same.out);
+  EXPECT_TRUE(json["agrees"]);
+  EXPECT_EQ(json["unlike_elsewhere"], 0);
+  EXPECT_GT(json["both_hit"], 500);
+  for (const Json& layer : json["layers"]) {
+    if (layer["layer"] == "colour") continue;
+    EXPECT_EQ(layer["largest"], 0) << layer["layer"];
+  }
+  EXPECT_TRUE(exists("d.exr"));
+  EXPECT_EQ(levelsmith("compare-images a.exr b.exr --exact").code, 5);
+  EXPECT_EQ(levelsmith("compare-images a.exr a.exr --exact").code, 0);
+}
+
+TEST_F(Pictures, OfOthersDifferAndEverythingIsWritten) {
+  const std::string view = " --from 0,0,6 --to 0,0,0";
+  draw("sphere --radius 1", "a.exr" + view);
+  draw("sphere --radius 1.02", "b.exr" + view);
+  const Outcome unlike = levelsmith("--report r.json compare-images a.exr b.exr --difference d.exr");
+  EXPECT_EQ(unlike.code, 5);
+  EXPECT_NE(unlike.err.find("compare-images: the pictures differ"), std::string::npos);
+  EXPECT_NE(unlike.out.find("curvature.mean"), std::string::npos);
+  EXPECT_TRUE(exists("d.exr"));
+  EXPECT_TRUE(exists("r.json"));
+  // The difference is a picture itself.
+  EXPECT_EQ(levelsmith("compare-images d.exr a.exr").code, 5);
+}
+
+TEST_F(Pictures, AreRefusedBeforeAnythingIsWritten) {
+  draw("sphere --radius 1", "a.exr");
+  ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! render small.exr --size 32x48").code, 0);
+  writeFile("broken.exr", "no picture");
+  const std::size_t files = fileCount();
+  const std::pair<const char*, int> lines[] = {
+      {"compare-images a.exr", 2},
+      {"compare-images a.exr nothing.exr --difference d.exr", 6},
+      {"compare-images a.exr broken.exr --difference d.exr", 3},
+      {"compare-images a.exr small.exr --difference d.exr", 3},
+      {"compare-images a.exr a.exr --difference d.png", 2},
+      {"compare-images a.exr a.exr --tolerance Z=1", 2},
+      {"compare-images a.exr a.exr --tolerance Z=1,-1", 2},
+      {"compare-images a.exr a.exr --tolerance depth=1,1 --difference d.exr", 2},
+      {"compare-images a.exr a.exr --tolerance Z=1,1 --exact", 2}};
+  for (const auto& [line, code] : lines) {
+    const Outcome refused = levelsmith(line);
+    EXPECT_EQ(refused.code, code) << line;
+    EXPECT_NE(refused.err.find("compare-images"), std::string::npos) << refused.err;
+    EXPECT_EQ(fileCount(), files) << line;
+  }
+}
+
+}  // namespace pictures_test
