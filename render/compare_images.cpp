@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <functional>
 #include <limits>
 #include <set>
@@ -20,6 +21,9 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr std::size_t kShown = 5;
 // Of all pixels: where a ray passes an outline within a rounding error, either answer is right.
 constexpr double kOutlineShare = 1e-5;
+// What Z of one surface may differ by at most, relative.
+constexpr double kOneSurface = 1e-3;
+enum : char { kMissed, kHit, kBroken };
 
 using Difference = std::function<double(std::size_t)>;
 
@@ -45,6 +49,11 @@ class Comparer {
       throw levelset::InvalidInput(fmt::format(
           "compare-images: the pictures have {} × {} and {} × {} pixels; draw both at one size",
           a_.width, a_.height, b_.width, b_.height));
+    for (const auto& [name, tolerance] : options_.tolerances)
+      if (!(tolerance.usual >= 0) || !(tolerance.worst >= 0))
+        throw levelset::UsageError(fmt::format(
+            "compare-images: the tolerance of {} is {}, {}; give two numbers, 0 or more", name,
+            tolerance.usual, tolerance.worst));
   }
 
   ImageComparison run() {
@@ -56,9 +65,9 @@ class Comparer {
     const std::vector<Layer> all = layers();
     for (const auto& [name, tolerance] : options_.tolerances)
       if (std::none_of(all.begin(), all.end(), [&](const Layer& l) { return l.name == name; }))
-        throw levelset::UsageError(fmt::format(
-            "compare-images: there is no layer '{}' in both pictures; they have {}", name,
-            namesOf(all)));
+        throw levelset::UsageError(
+            fmt::format("compare-images: there is no layer '{}' in both pictures; they have {}",
+                        name, namesOf(all)));
     for (const Layer& layer : all) compare(layer);
     compareBits();
     return std::move(result_);
@@ -86,12 +95,18 @@ class Comparer {
     const auto hits = [&](const Image& image) {
       const std::vector<float>& channel = image.channels.at(byDepth ? "Z" : "A");
       std::vector<char> hit(channel.size());
-      for (std::size_t i = 0; i < hit.size(); ++i)
-        hit[i] = byDepth ? std::isfinite(channel[i]) : channel[i] > 0;
+      for (std::size_t i = 0; i < hit.size(); ++i) {
+        const float z = channel[i];
+        const bool isMiss = byDepth ? z == std::numeric_limits<float>::infinity() : z <= 0;
+        hit[i] = std::isnan(z) || (byDepth && std::isinf(z) && !isMiss) ? kBroken
+                 : isMiss                                               ? kMissed
+                                                                        : kHit;
+      }
       return hit;
     };
     hitA_ = hits(a_);
     hitB_ = hits(b_);
+    isCompared_.assign(result_.pixels, 0);
   }
 
   /// Both a hit and a miss within one pixel.
@@ -99,11 +114,31 @@ class Comparer {
     bool any = false, all = true;
     for (int v = std::max(0, y - 1); v <= std::min(a_.height - 1, y + 1); ++v)
       for (int u = std::max(0, x - 1); u <= std::min(a_.width - 1, x + 1); ++u) {
-        const bool is = hit[index(u, v)];
+        const bool is = hit[index(u, v)] == kHit;
         any = any || is;
         all = all && is;
       }
     return any && !all;
+  }
+  /// One picture sees the front of two surfaces, the other the one behind: Z differs by more than
+  /// one surface allows, and each lies within what the other has within one pixel.
+  [[nodiscard]] bool isInnerOutline(int x, int y) const {
+    if (!has("Z")) return false;
+    const std::size_t i = index(x, y);
+    const double a = value(a_, "Z", i), b = value(b_, "Z", i);
+    if (!(std::abs(a - b) > kOneSurface * std::max(std::abs(a), std::abs(b)))) return false;
+    const auto holds = [&](const Image& image, const std::vector<char>& hit, double z) {
+      double low = kInfinite, high = -kInfinite;
+      for (int v = std::max(0, y - 1); v <= std::min(a_.height - 1, y + 1); ++v)
+        for (int u = std::max(0, x - 1); u <= std::min(a_.width - 1, x + 1); ++u)
+          if (hit[index(u, v)] == kHit) {
+            low = std::min(low, value(image, "Z", index(u, v)));
+            high = std::max(high, value(image, "Z", index(u, v)));
+          }
+      const double slack = kOneSurface * std::abs(z);
+      return z >= low - slack && z <= high + slack;
+    };
+    return holds(a_, hitA_, b) && holds(b_, hitB_, a);
   }
   [[nodiscard]] std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(a_.width) +
@@ -122,11 +157,16 @@ class Comparer {
     for (int y = 0; y < a_.height; ++y)
       for (int x = 0; x < a_.width; ++x) {
         const std::size_t i = index(x, y);
-        result_.bothHit += hitA_[i] && hitB_[i];
-        if (hitA_[i] == hitB_[i]) continue;
-        shown[i] = hitA_[i] ? 1 : -1;
+        const bool isBroken = hitA_[i] == kBroken || hitB_[i] == kBroken;
+        const bool areHit = hitA_[i] == kHit && hitB_[i] == kHit;
+        const bool isInner = areHit && isInnerOutline(x, y);
+        result_.bothHit += areHit && !isInner;
+        isCompared_[i] = areHit && !isInner;
+        if (hitA_[i] == hitB_[i] && !isBroken && !isInner) continue;
+        shown[i] = hitB_[i] == kHit && !isInner ? -1 : 1;
         // An outline of both: a leak is one of its own picture only.
-        const bool excused = isOutline(hitA_, x, y) && isOutline(hitB_, x, y);
+        const bool excused =
+            isInner || (!isBroken && isOutline(hitA_, x, y) && isOutline(hitB_, x, y));
         ++(excused ? result_.unlikeAtOutline : result_.unlikeElsewhere);
         std::vector<PixelDifference>& list = excused ? atOutline : result_.unlike;
         if (list.size() < kShown) list.push_back({x, y, 1});
@@ -138,9 +178,9 @@ class Comparer {
   [[nodiscard]] double voxelSize() const {
     const auto found = a_.attributes.find("ls:voxelSize");
     if (found == a_.attributes.end()) return 1;
-    // The smallest, where there are several solids.
+    // The first, where there are several solids.
     const double size = std::atof(found->second.c_str());
-    return size > 0 ? size : 1;
+    return size > 0 && std::isfinite(size * size) ? size : 1;
   }
 
   [[nodiscard]] double vectorDifference(const std::string& name, std::size_t i) const {
@@ -150,6 +190,11 @@ class Comparer {
       squares += d * d;
     }
     return std::sqrt(squares);
+  }
+  /// Of P from the origin: it is stored in so many bits.
+  [[nodiscard]] double distance(std::size_t i) const {
+    const double d = std::hypot(value(a_, "P.X", i), value(a_, "P.Y", i), value(a_, "P.Z", i));
+    return std::isfinite(d) ? d : 0;
   }
   [[nodiscard]] double depth(std::size_t i) const {
     return std::max(std::abs(value(a_, "Z", i)), std::abs(value(b_, "Z", i)));
@@ -184,17 +229,18 @@ class Comparer {
         {"curvature.gauss", "per voxel²", {1e-4, kInfinite}, [this, h](std::size_t i) {
            return h * h * apart(value(a_, "curvature.gauss", i), value(b_, "curvature.gauss", i));
          }});
-    add({"Z"}, {"Z", "relative", {2e-6, 1e-3}, [this](std::size_t i) {
+    add({"Z"}, {"Z", "relative", {2e-6, kOneSurface}, [this](std::size_t i) {
                   const double d = apart(value(a_, "Z", i), value(b_, "Z", i));
                   return d > 0 ? d / depth(i) : 0;
                 }});
-    add({"P.X", "P.Y", "P.Z"},
-        {"P", hasDepth ? "relative to Z" : "absolute",
-         {hasDepth ? 2e-6 : kInfinite, hasDepth ? 1e-3 : kInfinite},
-         [this, hasDepth](std::size_t i) {
-           const double d = vectorDifference("P", i);
-           return d > 0 && hasDepth ? d / depth(i) : d;
-         }});
+    add({"P.X", "P.Y", "P.Z"}, {"P",
+                                hasDepth ? "relative to Z" : "absolute",
+                                {hasDepth ? 2e-6 : kInfinite, hasDepth ? 1e-3 : kInfinite},
+                                [this, hasDepth](std::size_t i) {
+                                  const double d = vectorDifference("P", i);
+                                  return d > 0 && hasDepth ? d / std::max(depth(i), distance(i))
+                                                           : d;
+                                }});
     // The angle between unit vectors, precise where it is small.
     add({"N.X", "N.Y", "N.Z"}, {"N", "radians", {1e-5, 2e-2}, [this](std::size_t i) {
                                   const double d = vectorDifference("N", i);
@@ -232,7 +278,7 @@ class Comparer {
       return p.value > q.value;
     };
     for (std::size_t i = 0; i < result_.pixels; ++i) {
-      if (!hitA_[i] || !hitB_[i]) continue;
+      if (!isCompared_[i]) continue;
       const double difference = layer.at(i);
       shown[i] = static_cast<float>(difference);
       sorted.push_back(difference);
@@ -282,13 +328,13 @@ class Comparer {
     for (const auto& [name, values] : b_.ids)
       if (!a_.ids.count(name)) result_.onlyOne.push_back(name);
     std::sort(result_.onlyOne.begin(), result_.onlyOne.end());
-    result_.differentBits =
-        static_cast<std::size_t>(std::count(differs.begin(), differs.end(), 1));
+    result_.differentBits = static_cast<std::size_t>(std::count(differs.begin(), differs.end(), 1));
   }
 
   const Image &a_, &b_;
   const ImageComparisonOptions& options_;
   std::vector<char> hitA_, hitB_;
+  std::vector<char> isCompared_;  // both hit, and the same surface
   ImageComparison result_;
 };
 
@@ -312,7 +358,8 @@ std::string ImageComparison::reason() const {
   for (const LayerComparison& layer : layers) {
     if (layer.agrees()) continue;
     return fmt::format(
-        "{} differs by {:.3g} ({}) in one pixel of 1000 ({:.3g} allowed) and {:.3g} at most ({:.3g} "
+        "{} differs by {:.3g} ({}) in one pixel of 1000 ({:.3g} allowed) and {:.3g} at most "
+        "({:.3g} "
         "allowed), the worst at {},{}",
         layer.layer, layer.p999, layer.measure, layer.allowed.usual, layer.largest,
         layer.allowed.worst, layer.worst[0].x, layer.worst[0].y);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <map>
 #include <string>
@@ -30,20 +31,24 @@ struct LayerComparison {
   double p999 = 0, largest = 0;
   LayerTolerance allowed{};
   std::vector<PixelDifference> worst;  ///< the largest first, at most five; none of 0
-  [[nodiscard]] bool agrees() const { return p999 <= allowed.usual && largest <= allowed.worst; }
+  /// Never where a difference is infinite: one of the pictures is broken there.
+  [[nodiscard]] bool agrees() const {
+    return std::isfinite(largest) && p999 <= allowed.usual && largest <= allowed.worst;
+  }
 };
 
 struct ImageComparison {
   std::size_t pixels = 0, bothHit = 0;
-  /// Hit by one only: beside an outline of both pictures, where rounding decides, and elsewhere.
+  /// Hit by one only: beside an outline of both pictures, where rounding decides, and elsewhere;
+  /// there those of a Z that is none, too, and along inner outlines those of unlike surfaces.
   std::size_t unlikeAtOutline = 0, unlikeElsewhere = 0;
-  std::size_t outlineAllowed = 0;           ///< of the first kind; of the others none
-  std::vector<PixelDifference> unlike;      ///< the first five, those elsewhere before the others
-  std::vector<LayerComparison> layers;      ///< in the order of their names
-  std::vector<std::string> onlyOne;         ///< layers of one picture; nobody compares them
-  std::size_t differentBits = 0;            ///< pixels in which any channel has other bits
-  bool isExact = false;                     ///< agreement asks for the same bits
-  Image difference;                         ///< a channel for each layer, and "coverage"
+  std::size_t outlineAllowed = 0;       ///< of the first kind; of the others none
+  std::vector<PixelDifference> unlike;  ///< the first five, those elsewhere before the others
+  std::vector<LayerComparison> layers;  ///< in the order of their names
+  std::vector<std::string> onlyOne;     ///< layers of one picture; nobody compares them
+  std::size_t differentBits = 0;        ///< pixels in which any channel has other bits
+  bool isExact = false;                 ///< agreement asks for the same bits
+  Image difference;                     ///< a channel for each layer, and "coverage"
 
   [[nodiscard]] bool coverageAgrees() const {
     return unlikeElsewhere == 0 && unlikeAtOutline <= outlineAllowed;
@@ -59,11 +64,14 @@ struct ImageComparisonOptions {
   std::map<std::string, LayerTolerance> tolerances = {};
 };
 
-/// A pixel is hit where Z is finite, or without Z where A is positive. Differences of Z and P are
-/// relative to Z, those of N angles, those of curvatures by the voxel size that the first picture's
-/// header names (ls:voxelSize; 1 without), those of id 0 or 1. NaN differs infinitely.
+/// A pixel is hit where Z is finite, missed where it is +inf; without Z, hit where A is positive.
+/// Where each Z lies between those that the other picture has within a pixel, they belong to two
+/// surfaces in front of each other: an inner outline, and no layer is compared. Differences of Z
+/// are relative to Z, those of P to it or to P's length if that is larger, those of N angles, those
+/// of curvatures by the voxel size that the first picture's header names (ls:voxelSize; 1 without),
+/// those of id 0 or 1. NaN differs infinitely.
 /// @throws levelset::InvalidInput for pictures of different sizes, or without Z and A
-/// @throws levelset::UsageError for a tolerance of a layer that they do not have
+/// @throws levelset::UsageError for a tolerance of a layer that they do not have, or that is none
 [[nodiscard]] ImageComparison compareImages(const Image& first, const Image& second,
                                             const ImageComparisonOptions& options = {});
 

@@ -442,8 +442,10 @@ PatchOptions optionsLike(const Patch& patch) {
       std::all_of(patch.levels.begin(), patch.levels.end(), [&](const ParticleLevel& level) {
         return level.columns == surface.columns && level.rows == surface.rows;
       });
+  // Levels that differ in their counts tell what an older file does not.
+  const bool isTravelling = patch.scheme ? *patch.scheme != LevelScheme::Reduced : areAlike;
   PatchOptions options{.levels = std::max<std::size_t>(2, patch.levels.size()),
-                       .scheme = areAlike ? LevelScheme::Conforming : LevelScheme::Reduced,
+                       .scheme = isTravelling ? LevelScheme::Conforming : LevelScheme::Reduced,
                        .spacing = patch.spacing,
                        .mirror = true};
   if (areAlike && surface.columns > 3 && surface.rows > 3)

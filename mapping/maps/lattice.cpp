@@ -47,7 +47,8 @@ Lattice::Lattice(const Patch& patch, const LatticeBorder& border) {
   // How many of its cells the one around is wide, along u and v.
   std::array<double, 2> wide = {1, 1};
   if (around) {
-    const std::array<double, 2> spacing = endSpacings(patch.levels.front());
+    const std::array<double, 2> spacing =
+        endSpacings(withCounts(patch.levels.front(), columns, rows));
     for (std::size_t axis = 0; axis < 2; ++axis) {
       std::vector<double>& at = coordinates_[axis];
       wide[axis] = std::max(1.0, border.rim / spacing[axis]);

@@ -251,15 +251,20 @@ std::vector<ParticleLevel> reducedLevels(const NarrowBand& base, Outline outline
     sides.push_back(makeLevelSides(space, level, outline.corners, outline.between,
                                    &sides.back().sides, &sides.front().sides));
   }
+  // As large as taper leaves them.
+  const auto scaleOf = [&](const LevelSides& border) {
+    return std::lerp(1.0, options.transform.taper, border.height / height);
+  };
   std::vector<LevelSize> sizes;
-  for (const LevelSides& border : sides) sizes.push_back(border.size);
+  for (const LevelSides& border : sides)
+    sizes.push_back({border.size.u * scaleOf(border), border.size.v * scaleOf(border)});
   const double spacing =
       options.spacing > 0 ? options.spacing : chooseSpacing(base.voxelSize(), sizes);
+  if (options.cells[0] == 0) checkParticleCount(particlesAt(spacing, sizes), spacing, options);
   std::vector<ParticleLevel> levels;
   for (const LevelSides& border : sides) {
-    const double scale = std::lerp(1.0, options.transform.taper, border.height / height);
     levels.push_back(filledLevel(levels.empty() ? base : space, space, border, height,
-                                 spacing / scale, options, report));
+                                 spacing / scaleOf(border), options, report));
     const double done = static_cast<double>(levels.size()) / static_cast<double>(sides.size());
     levelset::report(options.progress, 0.5 + 0.5 * done, kPatch);
   }

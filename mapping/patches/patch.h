@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "levelset/narrow_band.h"
@@ -45,12 +46,20 @@ struct ParticleLevel {
   [[nodiscard]] bool hasRim() const { return !rim.empty(); }
 };
 
+enum class LevelScheme {
+  Reduced,     ///< scheme B: one relaxed patch per offset level, from its own advected corners
+  Conforming,  ///< scheme A: every particle follows ∇φ, the levels between on its straight way
+  Spline       ///< scheme C: the surface's particles travel along a curve and turn with it
+};
+
 struct Patch {
   std::array<Imath::V3d, 4> corners;  ///< on the base surface, anticlockwise seen from outside
   double height = 0;                  ///< world units
   bool mirrored = false;
   std::vector<ParticleLevel> levels;  ///< from the surface (w = 0) outwards (w = 1)
   double spacing = 0;                 ///< mean distance of neighbouring particles, world units
+  /// How its levels were made; none: an older file does not say.
+  std::optional<LevelScheme> scheme = {};
   [[nodiscard]] std::size_t particleCount() const;
 };
 
@@ -66,12 +75,6 @@ struct PatchReport {
   double projectionDistance = 0;    ///< the farthest corner's way to the surface
   std::size_t slowed =
       0;  ///< particles of a spline that would have met their neighbours on the way
-};
-
-enum class LevelScheme {
-  Reduced,     ///< scheme B: one relaxed patch per offset level, from its own advected corners
-  Conforming,  ///< scheme A: every particle follows ∇φ, the levels between on its straight way
-  Spline       ///< scheme C: the surface's particles travel along a curve and turn with it
 };
 
 /// What grows with w, about the axis of the patch.

@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <iostream>
@@ -21,6 +23,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "levelsmith patches";
 constexpr int kVersion = 1;
+constexpr std::array<const char*, 3> kSchemeNames = {"reduced", "conforming", "spline"};
 // The text, and what two letters may become: a node of the document, with its place in a list.
 constexpr double kBytesPerLetter = 20;
 
@@ -53,6 +56,7 @@ Json toJson(const Patch& patch) {
   json["height"] = patch.height;
   json["mirrored"] = patch.mirrored;
   json["spacing"] = patch.spacing;
+  if (patch.scheme) json["scheme"] = kSchemeNames[static_cast<std::size_t>(*patch.scheme)];
   json["levels"] = Json::array();
   for (const ParticleLevel& level : patch.levels) {
     requireFinite(level.w, "w of a level");
@@ -149,6 +153,11 @@ class Reader {
     patch.mirrored = mirrored.get<bool>();
     patch.spacing = number(json, "spacing", where);
     if (!(patch.spacing > 0)) refuse(where, "has a spacing that is not positive");
+    if (json.contains("scheme")) {
+      const auto name = std::find(kSchemeNames.begin(), kSchemeNames.end(), json.at("scheme"));
+      if (name == kSchemeNames.end()) refuse(where, "has a \"scheme\" that is none");
+      patch.scheme = static_cast<LevelScheme>(name - kSchemeNames.begin());
+    }
     const Json& levels = member(json, "levels", where);
     if (!levels.is_array() || levels.size() < 2) refuse(where, "has fewer than two levels");
     for (const Json& entry : levels) {

@@ -70,6 +70,7 @@ struct Sheet {
   bool isRing = false;                ///< the last column is the first one again
   double height = 0;
   bool isMirrored = false;
+  LevelScheme scheme = LevelScheme::Reduced;
 };
 
 struct Tile {
@@ -114,6 +115,7 @@ Patch tilePatch(const Sheet& sheet, const Tile& tile) {
   patch.corners = {surface.at(0, 0), surface.at(right, 0), surface.at(right, top),
                    surface.at(0, top)};
   patch.spacing = meanSpacing(patch);
+  patch.scheme = sheet.scheme;
   return patch;
 }
 
@@ -289,7 +291,8 @@ PatchGridResult makePatchGrid(const NarrowBand& base, const std::array<V3d, 4>& 
   const auto [across, up] = cellsPerTile(base, straight, grid, options);
   whole.cells = {across * grid.columns, up * grid.rows};
   PatchResult result = makePatch(base, corners, height, whole);
-  const Sheet sheet{std::move(result.patch.levels), false, height, result.patch.mirrored};
+  const Sheet sheet{std::move(result.patch.levels), false, height, result.patch.mirrored,
+                    options.scheme};
   return {cutTiles(sheet, grid), result.report};
 }
 
@@ -329,7 +332,7 @@ PatchGridResult makePatchGridAround(const NarrowBand& base, const V3d& from, con
   result.report.cellAreaVariation = cellAreaVariation(surface);
   levelset::report(options.progress, 0.1, kGrid);
   const Sheet sheet{roundLevels(base, std::move(surface), size, height, options, result.report),
-                    true, height, false};
+                    true, height, false, options.scheme};
   result.patches = cutTiles(sheet, grid);
   return result;
 }

@@ -25,6 +25,7 @@ constexpr const char* kPatchLevels = "patch";
 constexpr double kParticleBudget = 2000;
 constexpr double kSmallestSpacing = 1.5;  // voxels; closer ones say the same thing twice
 constexpr std::size_t kFewest = 4;        // particles along a side
+constexpr double kMostParticles = 1e6;
 
 /// The middle of a level, and directions there.
 struct Axis {
@@ -59,27 +60,35 @@ struct Counts {
 };
 
 /// Calls refit(level, counts) for each level above the surface whose particles lie over a quarter
-/// closer or farther apart than on the surface, along u or v.
+/// closer or farther apart than on the surface, along u or v; than the spacing that all levels
+/// together would be given, where that is wider and none is asked for.
 /// @throws ResourceLimit as checkParticleCount does
 template <typename Refit>
 void keepDensity(const NarrowBand& base, std::vector<ParticleLevel>& levels, double height,
                  const PatchOptions& options, const Refit& refit) {
   constexpr double kTolerated = 1.25;
+  std::vector<LevelSize> sizes;
+  for (const ParticleLevel& level : transformed(base, levels, height, options.transform))
+    sizes.push_back(sizeOf(level));
   const ParticleLevel& surface = levels.front();
-  const LevelSize ground = sizeOf(surface);
-  const auto count = [](std::size_t before, double stretch) {
-    const bool isFit = stretch <= kTolerated && stretch * kTolerated >= 1;
-    return isFit ? before : countAlong(static_cast<double>(before - 1) * stretch, 1);
+  const auto across = static_cast<double>(surface.columns - 1),
+             up = static_cast<double>(surface.rows - 1);
+  const double spacing = 0.5 * (sizes[0].u / across + sizes[0].v / up);
+  const double wider =
+      options.spacing > 0 ? 1 : std::max(1.0, chooseSpacing(base.voxelSize(), sizes) / spacing);
+  const auto count = [&](double cells, double stretch) {
+    const double share = stretch / wider;
+    const bool isFit = share <= kTolerated && share * kTolerated >= 1;
+    return countAlong(isFit ? cells : cells * share, 1);
   };
   std::vector<Counts> counts;
   double total = 0;
-  for (const ParticleLevel& level : transformed(base, levels, height, options.transform)) {
-    const LevelSize size = sizeOf(level);
-    counts.push_back(
-        {count(surface.columns, size.u / ground.u), count(surface.rows, size.v / ground.v)});
-    total += static_cast<double>((counts.back().columns + 2) * (counts.back().rows + 2));
+  for (const LevelSize& size : sizes) {
+    const Counts n = {count(across, size.u / sizes[0].u), count(up, size.v / sizes[0].v)};
+    total += static_cast<double>(n.columns + 2) * static_cast<double>(n.rows + 2);
+    counts.push_back(n);
   }
-  checkParticleCount(total, ground.u / static_cast<double>(surface.columns - 1), options);
+  checkParticleCount(total, spacing, options);
   for (std::size_t k = 1; k < levels.size(); ++k)
     if (counts[k].columns != levels[k].columns || counts[k].rows != levels[k].rows)
       refit(levels[k], counts[k]);
@@ -185,13 +194,19 @@ double chooseSpacing(double voxelSize, std::span<const LevelSize> levels, std::s
 }
 
 std::size_t countAlong(double length, double spacing) {
-  return std::max(kFewest, static_cast<std::size_t>(std::lround(length / spacing)) + 1);
+  const double cells = std::round(length / spacing);
+  if (!(cells < kMostParticles)) {
+    throw levelset::ResourceLimit(fmt::format(
+        "{}: {:.3g} particles lie along a side, more than {:.0g}; take a wider spacing, "
+        "or less taper",
+        kPatchLevels, cells, kMostParticles));
+  }
+  return std::max(kFewest, static_cast<std::size_t>(cells) + 1);
 }
 
 void checkParticleCount(double count, double spacing, const PatchOptions& options) {
   levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kPatchLevels);
-  constexpr double kMostParticles = 1e6;
-  if (count > kMostParticles) {
+  if (!(count <= kMostParticles)) {
     throw levelset::ResourceLimit(fmt::format(
         "{}: a spacing of {:.6g} would make {:.3g} particles, more than {:.0g}; take a wider "
         "one",
@@ -223,6 +238,7 @@ std::vector<ParticleLevel> levelsFromSurface(const NarrowBand& base, const Parti
         ParticleLevel start = withCounts(surface, n.columns, n.rows);
         const SurfaceField field(base);
         for (V3d& p : start.positions) (void)field.project(p, 0);
+        for (V3d& p : start.rim) (void)field.project(p, 0);
         level = conformingLevel(space, start, height, level.w);
       });
     }
@@ -290,6 +306,7 @@ void finishPatch(const NarrowBand& base, const PatchOptions& options, Patch& pat
   requireCovered(base, patch.levels.front());
   patch.levels = transformed(base, std::move(patch.levels), patch.height, options.transform);
   patch.spacing = meanSpacing(patch);
+  patch.scheme = options.scheme;
   report.cellAreaVariation = cellAreaVariation(patch.levels.front());
 }
 

@@ -36,7 +36,7 @@ struct LevelSize {
 [[nodiscard]] double chooseSpacing(double voxelSize, std::span<const LevelSize> levels,
                                    std::size_t times = 1);
 
-/// How many particles lie along a length, at least four.
+/// How many particles lie along a length, at least four. @throws ResourceLimit for over a million
 [[nodiscard]] std::size_t countAlong(double length, double spacing);
 
 /// @throws ResourceLimit for more than a million, or more than memory holds

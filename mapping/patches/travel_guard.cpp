@@ -33,6 +33,39 @@ double contact(const V3d& apart, const V3d& relative, double diameter) {
   return std::min(1.0, over / (std::sqrt(root) - approach));
 }
 
+/// Calls meet(i, j) for all pairs that may touch, always in the same order.
+template <typename Meet>
+void forEachNear(std::span<const V3d> places, std::span<const V3d> moves, double diameter,
+                 const Meet& meet) {
+  // What all do together brings nobody closer.
+  V3d mean(0);
+  for (const V3d& move : moves) mean += move / static_cast<double>(moves.size());
+  double farthest = 0;
+  for (const V3d& move : moves) farthest = std::max(farthest, (move - mean).length());
+  const double edge = diameter + 2 * farthest;
+  std::vector<Entry> entries(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    for (std::size_t a = 0; a < 3; ++a)
+      entries[i].cell[a] =
+          static_cast<std::int64_t>(std::floor(places[i][static_cast<int>(a)] / edge));
+    entries[i].particle = i;
+  }
+  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+    return a.cell != b.cell ? a.cell < b.cell : a.particle < b.particle;
+  });
+  for (auto a = entries.begin(); a != entries.end(); ++a) {
+    for (auto b = a + 1; b != entries.end() && b->cell == a->cell; ++b)
+      meet(a->particle, b->particle);
+    for (int n = 14; n < 27; ++n) {  // the neighbours that come later in the order
+      const Cell cell = {a->cell[0] + n / 9 - 1, a->cell[1] + n / 3 % 3 - 1,
+                         a->cell[2] + n % 3 - 1};
+      for (auto b = std::lower_bound(a, entries.end(), Entry{cell, 0});
+           b != entries.end() && b->cell == cell; ++b)
+        meet(a->particle, b->particle);
+    }
+  }
+}
+
 /// Gives all of a set the mean of their moves.
 void moveTogether(levelset::DisjointSets& sets, std::span<V3d> moves) {
   struct Sum {
@@ -53,49 +86,19 @@ void moveTogether(levelset::DisjointSets& sets, std::span<V3d> moves) {
 
 void TravelGuard::limit(std::span<const V3d> places, std::span<V3d> moves) {
   if (!(diameter_ > 0)) return;
-  // What all do together brings nobody closer.
-  V3d mean(0);
-  for (const V3d& move : moves) mean += move / static_cast<double>(moves.size());
-  double farthest = 0;
-  for (const V3d& move : moves) farthest = std::max(farthest, (move - mean).length());
-  // One that is stopped falls behind by the common move, too.
-  const double edge = diameter_ + 2 * (farthest + mean.length());
-  std::vector<Entry> entries(places.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    for (std::size_t a = 0; a < 3; ++a)
-      entries[i].cell[a] =
-          static_cast<std::int64_t>(std::floor(places[i][static_cast<int>(a)] / edge));
-    entries[i].particle = i;
-  }
-  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
-    return a.cell != b.cell ? a.cell < b.cell : a.particle < b.particle;
-  });
-
-  const auto forEachPair = [&](const auto& meet) {
-    for (auto a = entries.begin(); a != entries.end(); ++a) {
-      for (auto b = a + 1; b != entries.end() && b->cell == a->cell; ++b)
-        meet(a->particle, b->particle);
-      for (int n = 14; n < 27; ++n) {  // the neighbours that come later in the order
-        const Cell cell = {a->cell[0] + n / 9 - 1, a->cell[1] + n / 3 % 3 - 1,
-                           a->cell[2] + n % 3 - 1};
-        for (auto b = std::lower_bound(a, entries.end(), Entry{cell, 0});
-             b != entries.end() && b->cell == cell; ++b)
-          meet(a->particle, b->particle);
-      }
-    }
-  };
-
-  // From where two touch they go on side by side: what would bring them closer is taken from both.
-  // That may push them into others, so there are some rounds; those that touch even then move as
-  // one, and with whoever they come up to, until nobody touches: in a round without an end to it
-  // two sets become one.
+  // From where two touch they go on side by side: what would bring them closer is taken from both,
+  // the mean over all that they touch. That may push them into others, so there are some rounds;
+  // those that touch even then move as one, and with whoever they come up to, until nobody touches:
+  // in each of those rounds two sets become one.
   constexpr int kRounds = 12;
   std::vector<V3d> corrections(places.size());
+  std::vector<double> contacts(places.size());
   levelset::DisjointSets crowds(places.size());
   for (int round = 0;; ++round) {
     std::fill(corrections.begin(), corrections.end(), V3d(0));
+    std::fill(contacts.begin(), contacts.end(), 0);
     bool isFree = true;
-    forEachPair([&](std::size_t i, std::size_t j) {
+    forEachNear(places, moves, diameter_, [&](std::size_t i, std::size_t j) {
       const V3d apart = places[j] - places[i], relative = moves[j] - moves[i];
       const double t = contact(apart, relative, diameter_);
       if (t == 1) return;
@@ -109,12 +112,16 @@ void TravelGuard::limit(std::span<const V3d> places, std::span<V3d> moves) {
       const V3d back = normal * (0.5 * (1 - t) * relative.dot(normal));
       corrections[i] += back;
       corrections[j] -= back;
+      ++contacts[i];
+      ++contacts[j];
     });
     if (isFree) return;
-    if (round >= kRounds)
+    if (round >= kRounds) {
       moveTogether(crowds, moves);
-    else
-      for (std::size_t i = 0; i < moves.size(); ++i) moves[i] += corrections[i];
+    } else {
+      for (std::size_t i = 0; i < moves.size(); ++i)
+        if (contacts[i] > 0) moves[i] += corrections[i] / contacts[i];
+    }
   }
 }
 

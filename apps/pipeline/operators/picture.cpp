@@ -118,6 +118,11 @@ void validateComparison(const Invocation& in) {
   if (in.given("difference") &&
       render::imageFormat(in.text("difference"), in.text("format")) != "exr")
     throw UsageError("compare-images: --difference holds layers; name a file .exr");
+  for (const char* input : {"first", "second"})
+    if (in.given("difference") && levelset::isSameFile(in.text("difference"), in.text(input)))
+      throw UsageError(fmt::format(
+          "compare-images: '{}' is compared and named for --difference; name another file",
+          in.text(input)));
 }
 
 /// Infinity has no number in JSON.
@@ -183,6 +188,9 @@ Value compareImages(Invocation& in) {
                             {.exact = in.flag("exact"), .tolerances = tolerancesOf(in)});
   const Json json = toJson(found);
   in.notes.detailsJson = json.dump();
+  if (found.bothHit == 0)
+    in.notes.warnings.push_back(
+        "compare-images: no pixel shows a surface in both pictures, so no layer was compared");
   in.output = in.flag("json") ? json.dump(2) + "\n" : asTable(found);
   if (in.given("difference"))
     render::writeImage(in.text("difference"), found.difference, in.text("format"));

@@ -41,7 +41,8 @@ TEST_F(Pictures, OfOthersDifferAndEverythingIsWritten) {
   const std::string view = " --from 0,0,6 --to 0,0,0";
   draw("sphere --radius 1", "a.exr" + view);
   draw("sphere --radius 1.02", "b.exr" + view);
-  const Outcome unlike = levelsmith("--report r.json compare-images a.exr b.exr --difference d.exr");
+  const Outcome unlike =
+      levelsmith("--report r.json compare-images a.exr b.exr --difference d.exr");
   EXPECT_EQ(unlike.code, 5);
   EXPECT_NE(unlike.err.find("compare-images: the pictures differ"), std::string::npos);
   EXPECT_NE(unlike.out.find("curvature.mean"), std::string::npos);
@@ -62,6 +63,7 @@ TEST_F(Pictures, AreRefusedBeforeAnythingIsWritten) {
       {"compare-images a.exr broken.exr --difference d.exr", 3},
       {"compare-images a.exr small.exr --difference d.exr", 3},
       {"compare-images a.exr a.exr --difference d.png", 2},
+      {"compare-images a.exr a.exr --difference ./a.exr", 2},
       {"compare-images a.exr a.exr --tolerance Z=1", 2},
       {"compare-images a.exr a.exr --tolerance Z=1,-1", 2},
       {"compare-images a.exr a.exr --tolerance depth=1,1 --difference d.exr", 2},

@@ -94,12 +94,15 @@ TEST(LevelDensity, StaysThatOfTheSurfaceWhateverALevelsSize) {
   };
   const Made all[] = {
       {"conforming",
-       mapping::makePatch(ball, onBall, 1.5, {.levels = 5, .scheme = LevelScheme::Conforming}),
+       mapping::makePatch(ball, onBall, 1.5,
+                          {.levels = 5, .scheme = LevelScheme::Conforming, .spacing = 0.08}),
        2.5},
       {"conforming, tapered",
-       mapping::makePatch(
-           ball, onBall, 1.5,
-           {.levels = 5, .scheme = LevelScheme::Conforming, .transform = {.taper = 0.6}}),
+       mapping::makePatch(ball, onBall, 1.5,
+                          {.levels = 5,
+                           .scheme = LevelScheme::Conforming,
+                           .transform = {.taper = 0.6},
+                           .spacing = 0.08}),
        1.6},
       {"spline, tapered",
        mapping::makePatch(
@@ -124,6 +127,17 @@ TEST(LevelDensity, StaysThatOfTheSurfaceWhateverALevelsSize) {
     EXPECT_NEAR(cells(levels.back()) / cells(levels.front()), made.topStretch, 0.1);
     EXPECT_EQ(foldsOf(made.result.patch), 0u);
   }
+  // What the budget of all levels does not allow is left out where nobody asks for it.
+  const PatchResult chosen =
+      mapping::makePatch(ball, onBall, 1.5, {.levels = 12, .scheme = LevelScheme::Conforming});
+  EXPECT_LE(chosen.patch.particleCount(), 2600u);
+  for (const LevelScheme scheme : {LevelScheme::Reduced, LevelScheme::Conforming})
+    for (const double taper : {1e3, 1e30, 1e300}) {
+      const PatchOptions wide{
+          .levels = 3, .scheme = scheme, .transform = {.taper = taper}, .spacing = 0.08};
+      EXPECT_THROW((void)mapping::makePatch(ball, onBall, 0.3, wide), levelset::ResourceLimit)
+          << taper;
+    }
   const PatchResult counted = mapping::makePatch(
       ball, onBall, 1.5, {.levels = 3, .scheme = LevelScheme::Conforming, .cells = {8, 9}});
   for (const ParticleLevel& level : counted.patch.levels) {

@@ -101,7 +101,8 @@ TEST(CompareImages, TellsSharesAndTheWorstPixels) {
   auto& depth = other.channels["Z"];
   std::size_t changed = 0;
   for (std::size_t i = 0; i < depth.size(); ++i)
-    if (std::isfinite(depth[i]) && changed < 5) depth[i] = 5 + 0.01f * static_cast<float>(++changed);
+    if (std::isfinite(depth[i]) && changed < 5)
+      depth[i] = 5 + 0.01f * static_cast<float>(++changed);
   const ImageComparison found = compareImages(disc(), other);
   const LayerComparison& layer = layerOf(found, "Z");
   EXPECT_EQ(layer.median, 0);
@@ -135,10 +136,52 @@ TEST(CompareImages, NeverTakesNaNForAgreement) {
     const ImageComparison found =
         swapped ? compareImages(other, disc()) : compareImages(disc(), other);
     EXPECT_TRUE(std::isinf(layerOf(found, "curvature.gauss").largest));
+    EXPECT_FALSE(found.agrees());
     EXPECT_FALSE(compareImages(swapped ? other : disc(), swapped ? disc() : other,
                                {.tolerances = {{"curvature.gauss", {1, 1}}}})
                      .agrees());
   }
+}
+
+TEST(CompareImages, TakesADepthThatIsNoneForNeitherHitNorMiss) {
+  for (const float broken : {std::nanf(""), -kMiss})
+    for (const auto& [x, y] : {std::pair{31, 31}, {0, 0}}) {
+      Image other = disc();
+      other.channels["Z"][at(x, y)] = broken;
+      for (const Image& first : {disc(), other}) {
+        const ImageComparison found = compareImages(first, other);
+        EXPECT_EQ(found.unlikeElsewhere, 1u);
+        EXPECT_FALSE(found.agrees());
+      }
+    }
+}
+
+TEST(CompareImages, ForgivesRoundingAtInnerOutlinesToo) {
+  // A step in the middle of the disc, and one pixel beside it on the other side.
+  const auto stepped = [](int column) {
+    Image image = disc();
+    for (int y = 0; y < kSize; ++y)
+      for (int x = column; x < kSize; ++x)
+        if (auto& z = image.channels["Z"][at(x, y)]; std::isfinite(z)) {
+          z = 6;
+          image.ids["id"][at(x, y)] = 9;
+        }
+    return image;
+  };
+  Image other = stepped(32);
+  other.channels["Z"][at(32, 30)] = 5;
+  other.ids["id"][at(32, 30)] = 7;
+  const ImageComparison one = compareImages(stepped(32), other);
+  EXPECT_EQ(one.unlikeAtOutline, 1u);
+  EXPECT_TRUE(one.agrees()) << one.reason();
+  // A depth that neither side has, or two pixels away from the step: wrong.
+  other.channels["Z"][at(32, 30)] = 4.5f;
+  EXPECT_FALSE(compareImages(stepped(32), other).agrees());
+  other = stepped(32);
+  other.channels["Z"][at(34, 30)] = 5;
+  EXPECT_FALSE(compareImages(stepped(32), other).agrees());
+  // A whole column is too many.
+  EXPECT_FALSE(compareImages(stepped(32), stepped(33)).agrees());
 }
 
 TEST(CompareImages, AsksIdsToBeTheSame) {
@@ -168,6 +211,9 @@ TEST(CompareImages, Refuses) {
   EXPECT_THROW((void)compareImages(bare, bare), levelset::InvalidInput);
   EXPECT_THROW((void)compareImages(disc(), disc(), {.tolerances = {{"depth", {1, 1}}}}),
                levelset::UsageError);
+  for (const double bad : {-1.0, std::nan("")})
+    EXPECT_THROW((void)compareImages(disc(), disc(), {.tolerances = {{"Z", {bad, 1}}}}),
+                 levelset::UsageError);
 }
 
 TEST(CompareImages, SeesThatSamplesOfColourLeaveTheGeometry) {
