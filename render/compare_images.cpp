@@ -109,17 +109,23 @@ class Comparer {
     isCompared_.assign(result_.pixels, 0);
   }
 
+  /// Calls visit(index) for a pixel and those around it.
+  template <typename Visit>
+  void forEachWithinOne(int x, int y, const Visit& visit) const {
+    for (int v = std::max(0, y - 1); v <= std::min(a_.height - 1, y + 1); ++v)
+      for (int u = std::max(0, x - 1); u <= std::min(a_.width - 1, x + 1); ++u) visit(index(u, v));
+  }
+
   /// Both a hit and a miss within one pixel.
   [[nodiscard]] bool isOutline(const std::vector<char>& hit, int x, int y) const {
     bool any = false, all = true;
-    for (int v = std::max(0, y - 1); v <= std::min(a_.height - 1, y + 1); ++v)
-      for (int u = std::max(0, x - 1); u <= std::min(a_.width - 1, x + 1); ++u) {
-        const bool is = hit[index(u, v)] == kHit;
-        any = any || is;
-        all = all && is;
-      }
+    forEachWithinOne(x, y, [&](std::size_t i) {
+      any = any || hit[i] == kHit;
+      all = all && hit[i] == kHit;
+    });
     return any && !all;
   }
+
   /// One picture sees the front of two surfaces, the other the one behind: Z differs by more than
   /// one surface allows, and each lies within what the other has within one pixel.
   [[nodiscard]] bool isInnerOutline(int x, int y) const {
@@ -129,12 +135,11 @@ class Comparer {
     if (!(std::abs(a - b) > kOneSurface * std::max(std::abs(a), std::abs(b)))) return false;
     const auto holds = [&](const Image& image, const std::vector<char>& hit, double z) {
       double low = kInfinite, high = -kInfinite;
-      for (int v = std::max(0, y - 1); v <= std::min(a_.height - 1, y + 1); ++v)
-        for (int u = std::max(0, x - 1); u <= std::min(a_.width - 1, x + 1); ++u)
-          if (hit[index(u, v)] == kHit) {
-            low = std::min(low, value(image, "Z", index(u, v)));
-            high = std::max(high, value(image, "Z", index(u, v)));
-          }
+      forEachWithinOne(x, y, [&](std::size_t n) {
+        if (hit[n] != kHit) return;
+        low = std::min(low, value(image, "Z", n));
+        high = std::max(high, value(image, "Z", n));
+      });
       const double slack = kOneSurface * std::abs(z);
       return z >= low - slack && z <= high + slack;
     };
@@ -207,8 +212,6 @@ class Comparer {
       if (!std::all_of(channels.begin(), channels.end(), [&](const auto& c) { return has(c); }))
         return;
       told.insert(channels.begin(), channels.end());
-      const auto given = options_.tolerances.find(layer.name);
-      if (given != options_.tolerances.end()) layer.allowed = given->second;
       all.push_back(std::move(layer));
     };
     const bool hasDepth = has("Z");
@@ -254,12 +257,13 @@ class Comparer {
     }
     for (const auto& [name, channel] : a_.ids) {
       if (!b_.ids.count(name)) continue;
-      const auto given = options_.tolerances.find(name);
-      all.push_back({name, "unlike",
-                     given == options_.tolerances.end() ? LayerTolerance{0, 0} : given->second,
-                     [this, name = name](std::size_t i) {
+      all.push_back({name, "unlike", {0, 0}, [this, name = name](std::size_t i) {
                        return a_.ids.at(name)[i] == b_.ids.at(name)[i] ? 0.0 : 1.0;
                      }});
+    }
+    for (Layer& layer : all) {
+      const auto given = options_.tolerances.find(layer.name);
+      if (given != options_.tolerances.end()) layer.allowed = given->second;
     }
     std::sort(all.begin(), all.end(),
               [](const Layer& l, const Layer& m) { return l.name < m.name; });

@@ -14,10 +14,10 @@ namespace levelset::flow {
 /// it is that of the closest level within and the difference that parallel surfaces have there at
 /// the start, so that all level sets go along with the surface, which may move by kFlowRoom before
 /// distances are made again. The differences reach 2.83 along diagonals. So far must the distances
-/// go beyond the core: with 2.4, rates that followed its outermost grid points were off by 9e-5
-/// whatever the radius, and an implicit step of 1000 explicit ones by a fiftieth. So far, too, is
-/// it from the surface to the level where following begins: with 2.2, a ball of 32 lost a
-/// thousandth of a voxel each time.
+/// go beyond the core, or the rates that follow its outermost grid points are wrong and long steps
+/// carry that to the surface (CurvatureFlow.IsExactInLongSteps). So far, too, is it from the
+/// surface to the level where following begins: with 2.2, a ball of 32 lost a thousandth of a voxel
+/// each time.
 inline constexpr double kFlowWidth = 8.1, kFlowCore = 5.2, kFlowOwn = 4.3, kFlowRoom = 1.5;
 
 /// φ of a solid in voxels while it flows, on blocks that hold still until distances are made again.

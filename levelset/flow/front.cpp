@@ -32,9 +32,9 @@ constexpr double kMostSecond = 1;
 // Positions, triangles and what splitting and moving keep beside them.
 constexpr double kBytesPerTriangle = 100;
 // A surface with more triangles than this for each voxel of the largest area that it has had is
-// crumpled, not stretched. On the way back from a stretch they are as many as they were there: 35
-// for Enright's deformation and for a vortex, on any grid; 65 where a velocity that jumps has laid
-// hundreds of slivers over each other, which then take hours to be told apart.
+// crumpled, not stretched, and would take long to be told apart where it crosses itself. On the way
+// back from a stretch they are as many as they were there. Front.HasFewTrianglesWhereItIsStretched
+// tells how far those of smooth velocities stay below.
 constexpr double kMostTrianglesPerVoxel = 50, kSpareTriangles = 20000;
 // A face that leans further than this from a vertex normal belongs to another side of a crease.
 constexpr double kCreaseCosine = 0.8;

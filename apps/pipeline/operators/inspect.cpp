@@ -1,10 +1,10 @@
 #include <fmt/core.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/json_output.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
 #include "levelset/files/mesh_file.h"
@@ -14,8 +14,6 @@
 
 namespace pipeline {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json toJson(const Imath::V3d& v) {
   return Json::array({v.x, v.y, v.z});
@@ -27,19 +25,6 @@ Json toJson(const Imath::Box3d& box) {
 
 std::string coordinates(const Imath::V3d& v) {
   return fmt::format("{:.6g},{:.6g},{:.6g}", v.x, v.y, v.z);
-}
-
-/// File and grid names may be of any bytes.
-std::string printed(const Json& json) {
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-
-bool asksJson(const Invocation& in) {
-  return in.flag("json");
-}
-
-Param jsonParam() {
-  return {.name = "json", .type = ParamType::Flag, .doc = "one JSON object on standard output"};
 }
 
 Value measure(Invocation& in) {

@@ -1,11 +1,10 @@
 #include <fmt/core.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "apps/pipeline/invocation.h"
-#include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/json_output.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "render/camera.h"
@@ -86,8 +85,6 @@ Plan planDraw(Invocation& in) {
   (void)cameraOf(in);
   return in.operands[0].plan();
 }
-
-using Json = nlohmann::ordered_json;
 
 /// "LAYER=USUAL,WORST …"
 std::map<std::string, render::LayerTolerance> tolerancesOf(const Invocation& in) {
@@ -191,7 +188,7 @@ Value compareImages(Invocation& in) {
   if (found.bothHit == 0)
     in.notes.warnings.push_back(
         "compare-images: no pixel shows a surface in both pictures, so no layer was compared");
-  in.output = in.flag("json") ? json.dump(2) + "\n" : asTable(found);
+  in.output = asksJson(in) ? printed(json) : asTable(found);
   if (in.given("difference"))
     render::writeImage(in.text("difference"), found.difference, in.text("format"));
   if (!found.agrees())
@@ -213,9 +210,8 @@ Operator compareImagesOperator() {
           "written, when they differ by more than two correct renderers may: pixels that only one "
           "hits off the outline, or a layer that passes its tolerance.",
       .example =
-          "levelsmith sphere --radius 1 --voxel 0.1 ! render a.exr --size 64x64 --samples 1 ! "
-          "render "
-          "b.exr --size 64x64 --samples 2 ! compare-images a.exr b.exr",
+          "levelsmith sphere --radius 1 --voxel 0.1 ! render a.exr --size 64x64 --samples 1 "
+          "! render b.exr --size 64x64 --samples 2 ! compare-images a.exr b.exr",
       .params = {{.name = "first",
                   .type = ParamType::Path,
                   .doc = "an EXR with the layers of 'render'",
@@ -235,9 +231,7 @@ Operator compareImagesOperator() {
                   .type = ParamType::Path,
                   .doc = "write the differences to this .exr, a channel for each layer"},
                  {.name = "format", .type = ParamType::Text, .doc = "of the differences: exr"},
-                 {.name = "json",
-                  .type = ParamType::Flag,
-                  .doc = "one JSON object on standard output"}},
+                 jsonParam()},
       .flow = Flow::PassesThrough,
       .run = compareImages,
       .plan = [](Invocation&) { return Plan{}; },
