@@ -21,26 +21,27 @@ using openvdb::FloatTree;
 using TreeManager = openvdb::tree::LeafManager<FloatTree>;
 using LeafNode = FloatTree::LeafNodeType;
 
-constexpr const char* kMorph = "morph";
 // First guess of how far the surfaces are apart, voxels; doubled until it is enough.
 constexpr double kFirstReach = 8;
 // Distances reach this much further than the surfaces go, so that interpolation sees them whole.
 constexpr double kBesideSurface = 4;
 
 void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
+  const char* action = options.action;
+  if (options.mask) checkMask(*options.mask, action);
   if (options.steps < 1)
     throw UsageError(
-        fmt::format("{}: {} steps were asked for; give at least 1", kMorph, options.steps));
+        fmt::format("{}: {} steps were asked for; give at least 1", action, options.steps));
   if (!(options.until > 0 && options.until <= 1))
     throw UsageError(fmt::format("{}: the part of the way is {}; give a number above 0, up to 1",
-                                 kMorph, options.until));
+                                 action, options.until));
   if (options.tolerance && !(*options.tolerance > 0 && std::isfinite(*options.tolerance)))
     throw UsageError(
-        fmt::format("{}: the tolerance is {}; give a positive length", kMorph, *options.tolerance));
-  requireSolid(solid, kMorph);
-  requireSolid(target, kMorph);
+        fmt::format("{}: the tolerance is {}; give a positive length", action, *options.tolerance));
+  requireSolid(solid, options.action);
+  requireSolid(target, options.action);
   if (solid.isEmpty() || target.isEmpty())
-    throw InvalidInput(fmt::format("{}: the {} is empty; give two solids", kMorph,
+    throw InvalidInput(fmt::format("{}: the {} is empty; give two solids", action,
                                    solid.isEmpty() ? "solid" : "target"));
 }
 
@@ -70,29 +71,36 @@ struct DistancePair {
     return found;
   }
 
-  [[nodiscard]] FloatGrid::Ptr at(double part) const {
+  /// The field that is zero where that part of the way is gone; of it `mask` again a part.
+  [[nodiscard]] FloatGrid::Ptr at(double part, const std::optional<Mask>& mask) const {
     FloatGrid::Ptr result = from->deepCopy();
-    const auto s = static_cast<float>(part);
+    const auto everywhere = static_cast<float>(part);
     TreeManager manager(result->tree());
     manager.foreach ([&](LeafNode& leaf, std::size_t) {
       const float* b = to->tree().probeConstLeaf(leaf.origin())->buffer().data();
       float* values = leaf.buffer().data();
-      for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n)
+      for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
+        float s = everywhere;
+        if (mask) {
+          const openvdb::Vec3d p = from->indexToWorld(leaf.offsetToGlobalCoord(n));
+          s *= static_cast<float>(mask->weight({p.x(), p.y(), p.z()}));
+        }
         values[n] = (1 - s) * values[n] + s * b[n];
+      }
     });
     return result;
   }
 };
 
 /// @param distances  makes them of a field
-NarrowBand onTheWay(const DistancePair& pair, double part,
+NarrowBand onTheWay(const DistancePair& pair, double part, const MorphOptions& options,
                     const std::function<FloatGrid::Ptr(const FloatGrid&)>& distances) {
-  const FloatGrid::Ptr field = pair.at(part);
+  const FloatGrid::Ptr field = pair.at(part, options.mask);
   if (!eikonal::hasZeroCrossing(field->tree()))
     throw InvalidInput(
         fmt::format("{}: nothing is left of the solid at {:.3g} of the way, since the target lies "
                     "apart from it; move the target until the two overlap, or ask for 1 step",
-                    kMorph, part));
+                    options.action, part));
   return makeBand(distances(*field));
 }
 
@@ -103,7 +111,7 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
   const NarrowBand goal = resampleLike(target, solid, {.maxMemory = options.maxMemory});
   const auto distances = [&](const FloatGrid& field, double halfWidth) {
     eikonal::DistanceRequest request;
-    request.action = kMorph;
+    request.action = options.action;
     request.halfWidth = halfWidth;
     request.maxMemory = options.maxMemory;
     return eikonal::distanceTransform(field, request);
@@ -111,9 +119,10 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
 
   // === Distances wherever the surface will pass
   DistancePair pair;
-  const bool isDirect = options.until == 1 && options.steps == 1;  // only the end is asked for
+  const bool isOnTarget = options.until == 1 && !options.mask;
+  const bool isDirect = isOnTarget && options.steps == 1;  // only the end is asked for
   for (double reach = kFirstReach; !isDirect; reach *= 2) {
-    report(options.progress, 0, kMorph);
+    report(options.progress, 0, options.action);
     pair = {distances(vdb(solid), reach), distances(vdb(goal), reach)};
     pair.shareBlocks();
     if (!pair.fallsShort(reach)) break;
@@ -123,11 +132,12 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
   NarrowBand result;
   for (int i = 1; i <= options.steps; ++i) {
     const double part = options.until * i / options.steps;
-    result = part == 1 ? goal : onTheWay(pair, part, [&](const FloatGrid& field) {
-      return distances(field, solid.halfWidth());
-    });
+    result =
+        part == 1 && isOnTarget ? goal : onTheWay(pair, part, options, [&](const FloatGrid& field) {
+          return distances(field, solid.halfWidth());
+        });
     if (options.keep) options.keep(result, i);
-    report(options.progress, static_cast<double>(i) / options.steps, kMorph);
+    report(options.progress, static_cast<double>(i) / options.steps, options.action);
     if (options.tolerance && part < 1 && compare(result, goal).hausdorff() <= *options.tolerance)
       break;
   }

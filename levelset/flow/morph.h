@@ -3,6 +3,7 @@
 #include <functional>
 #include <optional>
 
+#include "levelset/fields/mask.h"
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 
@@ -14,10 +15,13 @@ struct MorphOptions {
   /// World units: the first step whose surface is no farther than this from that of the target, and
   /// the reverse (Hausdorff distance), is the last. Empty: all steps are gone.
   std::optional<double> tolerance = {};
+  /// Of the way, this part is gone at each point; the end is then no longer the target.
+  std::optional<Mask> mask = {};
   /// Receives every step, 1 to `steps`, the last one too.
   std::function<void(const NarrowBand& step, int number)> keep = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
+  const char* action = "morph";  ///< in messages
 };
 
 /// Moves the surface of `solid` on to that of `target`, on the grid of `solid`. At the part s of
@@ -25,8 +29,8 @@ struct MorphOptions {
 /// exact and known wherever the surface passes, re-distanced. A point that belongs to one of the
 /// solids only changes sides once, at a time of its own: every step is nearer to the target than
 /// the one before, whatever the topology.
-/// @throws UsageError for fewer than one step, `until` outside (0, 1] or a tolerance that is not
-/// positive; InvalidInput if a solid is
+/// @throws UsageError for fewer than one step, `until` outside (0, 1], a tolerance that is not
+/// positive or a bad mask; InvalidInput if a solid is
 /// empty, or if nothing is left on the way (the solids lie apart); ResourceLimit; Cancelled
 [[nodiscard]] NarrowBand morph(const NarrowBand& solid, const NarrowBand& target,
                                const MorphOptions& options = {});

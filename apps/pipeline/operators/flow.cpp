@@ -114,6 +114,10 @@ void validateMorph(const Invocation& in) {
     throw UsageError(
         "morph: --tolerance tells when the target is reached, and --until ends before; "
         "leave one of them out");
+  if (in.given("mask") && in.given("tolerance"))
+    throw UsageError(
+        "morph: --tolerance tells when the target is reached, and with --mask it is not; leave one "
+        "of them out");
   if (in.integer("steps") > kMostSteps) {
     throw UsageError(fmt::format("{}: {} are too many; give at most {}", in.where("steps"),
                                  in.text("steps"), kMostSteps));
@@ -125,6 +129,7 @@ Value morph(Invocation& in) {
                                  .until = partOfTheWay(in),
                                  .maxMemory = in.maxMemory,
                                  .progress = in.progress};
+  options.mask = maskOf(in);
   if (in.given("tolerance")) options.tolerance = in.length("tolerance");
   if (in.given("keep-steps")) {
     options.keep = [row = stepRow(in)](const NarrowBand& step, int number) {
@@ -202,26 +207,28 @@ void addFlowOperators(std::vector<Operator>& all) {
        .summary = "turn the first solid into the second, step by step",
        .details =
            "Every step is nearer to the target than the one before; topology may change. The "
-           "result stays on the grid of the first. Without names it takes the two newest "
+           "result stays on the grid of the first. With --mask a part of the way is gone at each "
+           "point, and the end is no longer the target. Without names it takes the two newest "
            "values, the target last.",
        .example = "levelsmith sphere --radius 1 --voxel 0.1 ! box --size 1.6,1.6,1.6 --voxel 0.1 ! "
                   "morph --steps 3 ! measure",
-       .params = {{.name = "steps",
-                   .type = ParamType::Integer,
-                   .doc = "in which the way is gone",
-                   .fallback = "1",
-                   .range = Range::Positive},
-                  {.name = "until",
-                   .type = ParamType::Text,
-                   .doc = "converged: on the target; or a part of the way, above 0 and up to 1",
-                   .fallback = "converged"},
-                  {.name = "tolerance",
-                   .type = ParamType::Length,
-                   .doc = "a step as near as this to the target is the last",
-                   .range = Range::Positive},
-                  {.name = "keep-steps",
-                   .type = ParamType::Path,
-                   .doc = "write every step; # in the name is its number (step_###.vdb)"}},
+       .params =
+           withMask({{.name = "steps",
+                      .type = ParamType::Integer,
+                      .doc = "in which the way is gone",
+                      .fallback = "1",
+                      .range = Range::Positive},
+                     {.name = "until",
+                      .type = ParamType::Text,
+                      .doc = "converged: on the target; or a part of the way, above 0 and up to 1",
+                      .fallback = "converged"},
+                     {.name = "tolerance",
+                      .type = ParamType::Length,
+                      .doc = "a step as near as this to the target is the last",
+                      .range = Range::Positive},
+                     {.name = "keep-steps",
+                      .type = ParamType::Path,
+                      .doc = "write every step; # in the name is its number (step_###.vdb)"}}),
        .operands = {{Kind::Band}, {Kind::Band}},
        .run = morph,
        .validate = validateMorph,

@@ -5,7 +5,9 @@
 #include "apps/pipeline/fields.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
+#include "levelset/eikonal/redistance.h"
 #include "levelset/error.h"
+#include "levelset/flow/morph.h"
 #include "levelset/solids/blend.h"
 #include "levelset/solids/components.h"
 #include "levelset/solids/csg.h"
@@ -111,12 +113,34 @@ Plan planOffset(Invocation& in) {
   return plan;
 }
 
+/// What an operator makes of the operand, as far as --mask lets it.
+template <typename Change>
+Value masked(Invocation& in, const Change& change) {
+  levelset::OffsetOptions options = offsetOptions(in);
+  const std::optional<levelset::Mask> mask = maskOf(in);
+  if (!mask) return Value(change(options));
+  options.progress = levelset::subProgress(in.progress, 0, 0.5);
+  const NarrowBand changed = change(options);
+  NarrowBand result = levelset::morph(in.band(), changed,
+                                      {.mask = mask,
+                                       .maxMemory = in.maxMemory,
+                                       .progress = levelset::subProgress(in.progress, 0.5, 1),
+                                       .action = options.action});
+  if (options.halfWidth)
+    result = levelset::redistance(std::move(result), {.halfWidth = options.halfWidth});
+  return Value(std::move(result));
+}
+
 Value open(Invocation& in) {
-  return Value(levelset::opening(in.band(), in.length("radius"), offsetOptions(in)));
+  return masked(in, [&](const levelset::OffsetOptions& options) {
+    return levelset::opening(in.band(), in.length("radius"), options);
+  });
 }
 
 Value close(Invocation& in) {
-  return Value(levelset::closing(in.band(), in.length("radius"), offsetOptions(in)));
+  return masked(in, [&](const levelset::OffsetOptions& options) {
+    return levelset::closing(in.band(), in.length("radius"), options);
+  });
 }
 
 Plan planMorphology(Invocation& in) {
@@ -133,8 +157,9 @@ levelset::ShellSide shellSide(const Invocation& in) {
 }
 
 Value shell(Invocation& in) {
-  return Value(
-      levelset::shell(in.band(), in.length("thickness"), shellSide(in), offsetOptions(in)));
+  return masked(in, [&](const levelset::OffsetOptions& options) {
+    return levelset::shell(in.band(), in.length("thickness"), shellSide(in), options);
+  });
 }
 
 Plan planShell(Invocation& in) {
@@ -270,7 +295,7 @@ void addSolidOperators(std::vector<Operator>& all) {
           "Moves the surface inwards and back: parts thinner than twice the radius go, convex "
           "edges are rounded to it, the rest stays.",
       .example = "levelsmith box --size 2,2,2 --voxel 0.05 ! open 0.3 ! measure",
-      .params = {ball, halfWidth},
+      .params = withMask({ball, halfWidth}),
       .operands = {{Kind::Band}},
       .run = open,
       .plan = planMorphology,
@@ -283,7 +308,7 @@ void addSolidOperators(std::vector<Operator>& all) {
                  "filled, concave edges are rounded to it, the rest stays.",
       .example = "levelsmith box --size 2,2,0.6 --voxel 0.05 ! cylinder --radius 0.4 --height 2 "
                  "--voxel 0.05 ! union ! close 0.3 ! measure",
-      .params = {ball, halfWidth},
+      .params = withMask({ball, halfWidth}),
       .operands = {{Kind::Band}},
       .run = close,
       .plan = planMorphology,
@@ -293,17 +318,18 @@ void addSolidOperators(std::vector<Operator>& all) {
       .group = "Solids",
       .summary = "hollow a solid: the wall along its surface",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! shell --thickness 0.2 ! measure",
-      .params = {{.name = "thickness",
-                  .type = ParamType::Length,
-                  .doc = "of the wall, a voxel or more",
-                  .range = Range::Positive,
-                  .required = true},
-                 {.name = "side",
-                  .type = ParamType::Choice,
-                  .doc = "where the wall lies: inside the surface, outside, or half and half",
-                  .fallback = "in",
-                  .choices = {"in", "out", "both"}},
-                 halfWidth},
+      .params =
+          withMask({{.name = "thickness",
+                     .type = ParamType::Length,
+                     .doc = "of the wall, a voxel or more",
+                     .range = Range::Positive,
+                     .required = true},
+                    {.name = "side",
+                     .type = ParamType::Choice,
+                     .doc = "where the wall lies: inside the surface, outside, or half and half",
+                     .fallback = "in",
+                     .choices = {"in", "out", "both"}},
+                    halfWidth}),
       .operands = {{Kind::Band}},
       .run = shell,
       .plan = planShell,

@@ -50,6 +50,26 @@ TEST_F(Command, TakesOlderMinusNewer) {
   EXPECT_EQ(m["shells"], 2);
 }
 
+TEST_F(Command, ChangesOnlyWhatTheMaskReaches) {
+  const std::string box = "box --size 2,2,2 --voxel 0.1";
+  const double before = measure(box)["volume"];
+  for (const std::string action : {"open 0.5", "shell --thickness 0.3", "close 0.3"}) {
+    const auto volume = [&](const std::string& mask) {
+      return measure(box + " ! " + action + mask)["volume"].get<double>();
+    };
+    const double everywhere = volume("");
+    EXPECT_NEAR(volume(" --mask x --mask-min 8 --mask-max 9"), before, 1e-3) << action;
+    EXPECT_NEAR(volume(" --mask x --mask-min -9 --mask-max -8"), everywhere, 1e-3) << action;
+    // Half of a solid that is the same on both sides; a cavity's new wall of 1.4² lies within half
+    // a voxel of the middle.
+    const double right = volume(" --mask x --mask-min -0.05 --mask-max 0.05");
+    EXPECT_NEAR(right, volume(" --mask x --mask-min -0.05 --mask-max 0.05 --mask-invert"), 0.01)
+        << action;
+    EXPECT_NEAR(right, (before + everywhere) / 2, 0.05 * 1.4 * 1.4) << action;
+  }
+  EXPECT_DOUBLE_EQ(measure(box + " ! open 0.5 --mask x --half-width 5")["half_width"], 5);
+}
+
 TEST_F(Command, ResolvesLengthsInVoxelsAndPercent) {
   const double radius = 1, voxel = 0.05;
   for (const auto& [text, grown] : {std::pair<std::string, double>{"2vx", 2 * voxel},

@@ -7,6 +7,7 @@
 
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
+#include "levelset/sample.h"
 #include "levelset/solids/shapes.h"
 #include "tests/support/bands.h"
 
@@ -71,6 +72,37 @@ TEST(Morph, ChangesTheTopology) {
   EXPECT_EQ(measure(morph(ball, ring)).euler, 0);
 }
 
+TEST(Morph, GoesAsFarAsTheMaskLetsIt) {
+  // Radius 20 on one side, 12 on the other, halfway where the mask is a half; walls of the step
+  // stand where it passes between.
+  const NarrowBand from = makeSphere(12, V3d(0.2), 1), to = makeSphere(20, V3d(0.2), 1);
+  const auto radiusAlong = [](const NarrowBand& band, const V3d& direction) {
+    const BandSampler sampler(band, Interpolation::Tricubic);
+    double inside = 0, outside = 30;
+    for (int i = 0; i < 30; ++i) {
+      const double middle = (inside + outside) / 2;
+      const V3d p = V3d(0.2) + middle * direction.normalized();
+      (sampler.value(p) < 0 ? inside : outside) = middle;
+    }
+    return inside;
+  };
+  const auto masked = [&](const Mask& mask, int steps) {
+    return morph(from, to, {.steps = steps, .mask = mask});
+  };
+  const Mask right = {.field = [](const V3d& p) { return p.x; }, .min = -2, .max = 2};
+  const NarrowBand mixed = masked(right, 1);
+  EXPECT_NEAR(radiusAlong(mixed, V3d(1, 0.3, 0.2)), 20, 0.02);
+  EXPECT_NEAR(radiusAlong(mixed, V3d(-1, 0.3, 0.2)), 12, 0.02);
+  EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(mixed), 6), "");
+
+  Mask left = right;
+  left.invert = true;
+  EXPECT_NEAR(radiusAlong(masked(left, 1), V3d(1, 0.3, 0.2)), 12, 0.02);
+  const Mask half = {.field = [](const V3d&) { return 0.5; }};
+  EXPECT_NEAR(radiusAlong(masked(half, 1), V3d(1, 2, 3)), 16, 0.02);
+  EXPECT_NEAR(radiusAlong(masked(half, 3), V3d(1, 2, 3)), 16, 0.02);
+}
+
 TEST(Morph, StopsOnTheWay) {
   const NarrowBand half =
       morph(makeSphere(8, V3d(0.2), 1), makeSphere(16, V3d(0.2), 1), {.until = 0.5});
@@ -106,6 +138,7 @@ TEST(Morph, Refuses) {
   EXPECT_THROW((void)morph(a, a, {.until = 0}), UsageError);
   EXPECT_THROW((void)morph(a, a, {.tolerance = 0}), UsageError);
   EXPECT_THROW((void)morph(a, a, {.until = std::numeric_limits<double>::quiet_NaN()}), UsageError);
+  EXPECT_THROW((void)morph(a, a, {.mask = Mask()}), UsageError);
   EXPECT_THROW((void)morph(NarrowBand(), a), InvalidInput);
   EXPECT_THROW((void)morph(a, NarrowBand()), InvalidInput);
   EXPECT_THROW((void)morph(a, a, {.steps = 2, .maxMemory = 1000}), ResourceLimit);
