@@ -57,6 +57,12 @@ Camera::Ray Camera::ray(double x, double y) const {
   return {from, (axes.forward + shift).normalized()};
 }
 
+Camera::PixelSteps Camera::pixelSteps() const {
+  const CameraAxes axes = axesOf(*this);
+  const HalfExtent half = halfExtentOf(*this);
+  return {axes.right * (2 * half.x / width), axes.up * (-2 * half.y / height)};
+}
+
 V3d Camera::axis() const {
   return (to - from).normalized();
 }

@@ -22,6 +22,12 @@ struct Camera {
   [[nodiscard]] Ray ray(double x, double y) const;
   /// Unit view axis, towards `to`.
   [[nodiscard]] Imath::V3d axis() const;
+  /// What a pixel to the right and one down are on the plane at unit depth (perspective), or in
+  /// world units (orthographic).
+  struct PixelSteps {
+    Imath::V3d right, down;
+  };
+  [[nodiscard]] PixelSteps pixelSteps() const;
   /// OpenEXR's camera space: x right, y up, z along the view. Row vectors: `camera = world *
   /// matrix`.
   [[nodiscard]] Imath::M44d worldToCamera() const;

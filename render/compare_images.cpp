@@ -245,7 +245,7 @@ class Comparer {
                                                            : d;
                                 }});
     // The angle between unit vectors, precise where it is small.
-    add({"N.X", "N.Y", "N.Z"}, {"N", "radians", {1e-5, 2e-2}, [this](std::size_t i) {
+    add({"N.X", "N.Y", "N.Z"}, {"N", "radians", {2e-4, 1.7e-3}, [this](std::size_t i) {
                                   const double d = vectorDifference("N", i);
                                   return d <= 2 ? 2 * std::asin(d / 2) : kInfinite;
                                 }});

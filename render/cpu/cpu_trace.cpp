@@ -40,19 +40,33 @@ std::vector<InstructionSet> instructionSets() {
   return sets;
 }
 
-void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits, InstructionSet set) {
+namespace {
+
+template <typename... What>
+void traceOn(InstructionSet set, HitBlock& hits, const BrickPool& pool, const What&... what) {
   if (pool.brickCount() == 0) {
     std::fill(hits.found.begin(), hits.found.end(), 0);
     return;
   }
   switch (set) {
     case InstructionSet::Avx512:
-      return avx512::traceAll(pool, rays, hits);
+      return avx512::traceAll(pool, what..., hits);
     case InstructionSet::Avx2:
-      return avx2::traceAll(pool, rays, hits);
+      return avx2::traceAll(pool, what..., hits);
     default:
-      return sse2::traceAll(pool, rays, hits);
+      return sse2::traceAll(pool, what..., hits);
   }
+}
+
+}  // namespace
+
+void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits, InstructionSet set) {
+  traceOn(set, hits, pool, rays);
+}
+
+void tracePixels(const BrickPool& pool, const RayFan& fan, const PixelBlock& pixels, HitBlock& hits,
+                 InstructionSet set) {
+  traceOn(set, hits, pool, fan, pixels);
 }
 
 }  // namespace render

@@ -4,6 +4,7 @@
 
 #include "render/kernel/brick_pool.h"
 #include "render/kernel/ray_block.h"
+#include "render/kernel/ray_fan.h"
 
 namespace render {
 
@@ -17,5 +18,10 @@ enum class InstructionSet { Sse2, Avx2, Avx512 };
 /// @pre the processor has the set
 void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits,
                InstructionSet set = instructionSets().back());
+
+/// The same of pixels of a fan; packets of neighbours are the fastest.
+/// @param hits  as long as the pixels
+void tracePixels(const BrickPool& pool, const RayFan& fan, const PixelBlock& pixels, HitBlock& hits,
+                 InstructionSet set = instructionSets().back());
 
 }  // namespace render

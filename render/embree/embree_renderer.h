@@ -2,26 +2,16 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <memory>
-#include <string>
 
-#include "levelset/progress.h"
+#include "render/hit.h"
 #include "render/image.h"
+#include "render/render_options.h"
 #include "render/scene.h"
 
 /// The judge: first zero of the trilinear interpolant along each ray, solved in double precision on
 /// OpenVDB's own tree; Embree only finds the leaf blocks. It may be slow, it may not be wrong.
 namespace render {
-
-struct EmbreeOptions {
-  int samples = 4;                                  ///< per pixel, at least 1; colour only
-  int ambientSamples = 16;                          ///< per colour sample; 0: no occlusion
-  int shadowSamples = 4;                            ///< per colour sample; 0: no shadows
-  bool curvature = true;                            ///< layers curvature.mean .gauss .k1 .k2
-  std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< for the image
-  levelset::Progress progress = {};
-};
 
 /// Draws the scene. Pixels depend on the scene alone, not on the number of threads.
 /// @return layers R G B A (linear, premultiplied, mean of the samples), and from the pixel centre Z
@@ -30,22 +20,7 @@ struct EmbreeOptions {
 /// @throws levelset::UsageError for a camera that cannot see, or sample counts out of range
 /// @throws levelset::InvalidInput when there is no surface in the scene
 /// @throws levelset::ResourceLimit for an image too large; levelset::Cancelled
-[[nodiscard]] Image renderEmbree(const Scene& scene, const EmbreeOptions& options = {});
-
-struct Hit {
-  bool found = false;
-  double distance = 0;          ///< along the unit direction, world units
-  Imath::V3d position, normal;  ///< normal outwards, of unit length, from a tricubic B-spline
-  Imath::V3d facetNormal;       ///< outwards, of the trilinear interpolant itself
-  double surfaceError = 0;  ///< bound on the interpolant's distance from a smooth surface, world
-  std::uint32_t id = 0;     ///< Solid::id
-  std::size_t solid = 0;    ///< index in Scene::solids
-};
-
-struct CurvatureSample {
-  double mean = 0, gauss = 0, k1 = 0,
-         k2 = 0;  ///< per world unit (gauss: squared); spheres positive
-};
+[[nodiscard]] Image renderEmbree(const Scene& scene, const RenderOptions& options = {});
 
 /// The scene made ready for rays: thread-safe, results do not depend on the order of anything.
 /// Rays are unit directions; of two solids hit at the same distance the lower id counts.
@@ -64,9 +39,6 @@ class EmbreeScene {
                                 double far) const;
   /// At the position of a hit, from the Hessian of the tricubic B-spline.
   [[nodiscard]] CurvatureSample curvatureAt(const Hit& hit) const;
-  /// Header attributes that say what is drawn and how: ls:renderer, ls:filter, ls:mode, ls:normal,
-  /// ls:grid (name and content hash of each solid), ls:voxelSize.
-  [[nodiscard]] std::map<std::string, std::string> provenance() const;
   /// World-space box of the cells that hold surface; empty when there are none.
   [[nodiscard]] const Imath::Box3d& bounds() const;
 

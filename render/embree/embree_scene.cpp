@@ -9,7 +9,7 @@
 #include "levelset/error.h"
 #include "render/embree/embree_renderer.h"
 #include "render/embree/surface_blocks_vdb.h"
-#include "render/embree/surface_shape_vdb.h"
+#include "render/shading/surface_point.h"
 
 namespace render {
 namespace {
@@ -115,11 +115,6 @@ void requireRay(const V3d& origin, const V3d& direction) {
       "render: a ray from {},{},{} along {},{},{} leads nowhere; give finite numbers and "
       "a direction",
       origin.x, origin.y, origin.z, direction.x, direction.y, direction.z));
-}
-
-V3d unitOr(const V3d& v, const V3d& fallback) {
-  const V3d unit = v.normalized();
-  return unit == V3d(0) ? fallback : unit;
 }
 
 }  // namespace
@@ -265,16 +260,7 @@ Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near,
   hit.position = query->origin + direction * query->nearest;
   hit.id = solid.id;
   hit.solid = solid.index;
-  V3d position;
-  solid.worldToIndex.multVecMatrix(hit.position, position);
-  const SurfaceShape shape = surfaceShape(levelset::vdb(solid.band).tree(), position);
-  // For a rotation with uniform scale, gradients turn as directions do.
-  V3d facet, smooth;
-  solid.indexToWorld.multDirMatrix(shape.trilinearGradient, facet);
-  solid.indexToWorld.multDirMatrix(shape.gradient, smooth);
-  hit.facetNormal = unitOr(facet, unitOr(smooth, -direction));
-  hit.normal = unitOr(smooth, hit.facetNormal);
-  hit.surfaceError = shape.interpolationError;
+  addNormals(hit, solid.band, direction);
   return hit;
 }
 
@@ -292,28 +278,7 @@ CurvatureSample EmbreeScene::curvatureAt(const Hit& hit) const {
   const auto solid = std::find_if(impl_->solids.begin(), impl_->solids.end(),
                                   [&](const RaySolid& s) { return s.index == hit.solid; });
   if (!hit.found || solid == impl_->solids.end()) return {};
-  V3d position;
-  solid->worldToIndex.multVecMatrix(hit.position, position);
-  const SurfaceShape shape = surfaceShape(levelset::vdb(solid->band).tree(), position);
-  const Curvatures c = curvaturesOf(shape.gradient, shape.hessian);
-  const double h = solid->band.voxelSize();
-  return {c.mean / h, c.gauss / (h * h), c.k1 / h, c.k2 / h};
-}
-
-std::map<std::string, std::string> EmbreeScene::provenance() const {
-  std::string grids, voxelSizes;
-  for (const RaySolid& solid : impl_->solids) {
-    const char* comma = grids.empty() ? "" : ", ";
-    grids += fmt::format("{}{} {:016x}", comma, levelset::vdb(solid.band).getName(),
-                         solid.band.contentHash());
-    voxelSizes += fmt::format("{}{}", comma, solid.band.voxelSize());
-  }
-  return {{"ls:renderer", fmt::format("embree {}", RTC_VERSION_STRING)},
-          {"ls:filter", "trilinear"},
-          {"ls:mode", "exact"},
-          {"ls:normal", "bspline-qi"},
-          {"ls:grid", grids},
-          {"ls:voxelSize", voxelSizes}};
+  return render::curvatureAt(solid->band, hit.position);
 }
 
 const Box3d& EmbreeScene::bounds() const {

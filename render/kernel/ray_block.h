@@ -25,6 +25,16 @@ struct RayBlock {
   }
 };
 
+/// Pixels of a RayFan by number: how far right of and below the picture's middle they are, in
+/// pixels. As many as a multiple of RayBlock::kLanes.
+struct PixelBlock {
+  std::vector<float> x, y;
+
+  explicit PixelBlock(std::size_t count)
+      : x((count + RayBlock::kLanes - 1) / RayBlock::kLanes * RayBlock::kLanes), y(x.size()) {}
+  [[nodiscard]] std::size_t size() const { return x.size(); }
+};
+
 /// What they meet.
 struct HitBlock {
   std::vector<std::int32_t> found;  ///< −1, or 0

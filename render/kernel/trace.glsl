@@ -13,6 +13,8 @@ CONST_INT kMostHalvings = 12;    // of a cell where two crossings are looked for
 CONST_INT kBisections = 20;      // of the part that holds one
 CONST_FLOAT kThird = 0.33333333333f;
 CONST_FLOAT kBarelyInside = -1e-30f;
+CONST_FLOAT kLeastDirection = 1e-20f;
+CONST_FLOAT kBesideBox = 0.0625f;  // so that rounding loses no crossing on a face of the box
 
 // Where a ray meets the plane of points k. The only such function: monotone in k, and the same for
 // the two cells at a plane, so that no ray slips between them.
@@ -212,6 +214,40 @@ struct Ray {
   Real ix, iy, iz;  // their inverses
   Real start, end;  // of t
 };
+
+// Where the ray of a pixel is on an axis of a RayFan.
+Real onFan(float middle, float right, float down, Real x, Real y) {
+  VAR across = x * right + y * down;
+  return across + middle;
+}
+
+// A direction that no division fails on; it is off by less than anything.
+Real notZero(Real d) {
+  return select(AND(d > -kLeastDirection, d < kLeastDirection), real(kLeastDirection), d);
+}
+
+// The ray of the pixel (x, y) of the fan, between the faces of the box of crossing cells.
+Ray viewRay(Real x, Real y) {
+  Ray ray;
+  ray.ox = onFan(fan.origin[0], fan.originX[0], fan.originY[0], x, y);
+  ray.oy = onFan(fan.origin[1], fan.originX[1], fan.originY[1], x, y);
+  ray.oz = onFan(fan.origin[2], fan.originX[2], fan.originY[2], x, y);
+  ray.dx = notZero(onFan(fan.direction[0], fan.directionX[0], fan.directionY[0], x, y));
+  ray.dy = notZero(onFan(fan.direction[1], fan.directionX[1], fan.directionY[1], x, y));
+  ray.dz = notZero(onFan(fan.direction[2], fan.directionX[2], fan.directionY[2], x, y));
+  ray.ix = 1.0f / ray.dx;
+  ray.iy = 1.0f / ray.dy;
+  ray.iz = 1.0f / ray.dz;
+  VAR ax = (fan.low[0] - kBesideBox - ray.ox) * ray.ix;
+  VAR ay = (fan.low[1] - kBesideBox - ray.oy) * ray.iy;
+  VAR az = (fan.low[2] - kBesideBox - ray.oz) * ray.iz;
+  VAR bx = (fan.high[0] + kBesideBox - ray.ox) * ray.ix;
+  VAR by = (fan.high[1] + kBesideBox - ray.oy) * ray.iy;
+  VAR bz = (fan.high[2] + kBesideBox - ray.oz) * ray.iz;
+  ray.start = larger(larger(smaller(ax, bx), smaller(ay, by)), larger(smaller(az, bz), 0.0f));
+  ray.end = smaller(smaller(larger(ax, bx), larger(ay, by)), larger(az, bz));
+  return ray;
+}
 
 struct Hit {
   Bool found;

@@ -9,6 +9,7 @@
 #include "levelset/file_target.h"
 #include "render/camera.h"
 #include "render/compare_images.h"
+#include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
 #include "render/image.h"
 #include "render/scene.h"
@@ -72,10 +73,11 @@ Value draw(Invocation& in) {
   render::Scene scene;
   scene.camera = cameraOf(in);
   scene.solids.push_back({.band = in.band()});
-  const render::Image image =
-      render::renderEmbree(scene, {.samples = static_cast<int>(in.integer("samples")),
-                                   .maxBytes = in.maxMemory,
-                                   .progress = in.progress});
+  const render::RenderOptions options{.samples = static_cast<int>(in.integer("samples")),
+                                      .maxBytes = in.maxMemory,
+                                      .progress = in.progress};
+  const render::Image image = in.text("renderer") == "cpu" ? render::renderCpu(scene, options)
+                                                           : render::renderEmbree(scene, options);
   render::writeImage(in.text("file"), image, in.text("format"));
   if (in.given("png")) render::writeImage(in.text("png"), image, "png");
   return in.operands[0];
@@ -272,7 +274,7 @@ void addPictureOperators(std::vector<Operator>& all) {
             .type = ParamType::Choice,
             .doc = "which one draws",
             .fallback = "embree",
-            .choices = {"embree"}},
+            .choices = {"cpu", "embree"}},
            {.name = "size", .type = ParamType::ImageSize, .doc = "pixels", .fallback = "1024x768"},
            {.name = "from", .type = ParamType::Point, .doc = "where the eye is"},
            {.name = "to",

@@ -112,7 +112,7 @@ TEST(EmbreeRenderer, ConvexSolidIsUnoccluded) {
 
 TEST(EmbreeRenderer, HollowsAndShadowsAreDarker) {
   const Scene scene = ballOverSlab(60, 45);
-  const auto brightness = [&](const EmbreeOptions& options) {
+  const auto brightness = [&](const RenderOptions& options) {
     double sum = 0;
     const Image image = renderEmbree(scene, options);
     for (const float v : image.channels.at("G")) sum += static_cast<double>(v);
@@ -141,7 +141,7 @@ TEST(EmbreeRenderer, SamePixelsForAnyThreadCount) {
 TEST(EmbreeRenderer, ReportsAndCancels) {
   const Scene scene = sphereScene(64, 64);
   double last = 0;
-  EmbreeOptions options{.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
+  RenderOptions options{.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
   options.progress = [&](double fraction) {
     EXPECT_GE(fraction, last);
     last = fraction;

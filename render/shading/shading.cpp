@@ -1,4 +1,4 @@
-#include "render/embree/shading.h"
+#include "render/shading/shading.h"
 
 #include <algorithm>
 #include <cmath>
@@ -70,8 +70,8 @@ V2d PixelSequence::at(int index) const {
   return {x - std::floor(x), y - std::floor(y)};
 }
 
-Shader::Shader(const Scene& scene, const EmbreeScene& rays, const EmbreeOptions& options)
-    : scene_(scene), rays_(rays), options_(options), diagonal_(rays.bounds().size().length()) {
+Shader::Shader(const Scene& scene, double diagonal, const RenderOptions& options)
+    : scene_(scene), options_(options), diagonal_(diagonal) {
   const V3d forward = scene.camera.axis();
   const V3d right = forward.cross(scene.camera.up).normalized();
   up_ = right.cross(forward);
@@ -80,45 +80,69 @@ Shader::Shader(const Scene& scene, const EmbreeScene& rays, const EmbreeOptions&
   fill_ = (right * -d.x + up_ * (0.3 * d.y) - forward * d.z).normalized();
 }
 
-double Shader::openSky(const Frame& frame, int x, int y, int sample) const {
-  const int count = options_.ambientSamples;
-  if (count == 0) return 1;
-  const PixelSequence sequence(x, y, kAmbient);
-  int open = 0;
-  for (int i = 0; i < count; ++i) {
-    V3d d = cosineDirection(frame.normal, sequence.at(sample * count + i));
-    // The smooth normal's hemisphere dips below the facet's plane: mirror what does.
-    const double below = d.dot(frame.facet);
-    if (below < 0) d = (d - frame.facet * (2 * below)).normalized();
-    open += !rays_.isOccluded(frame.start, d, 0, kOcclusionReach * diagonal_);
-  }
-  return static_cast<double>(open) / count;
-}
-
-double Shader::keyLight(const Frame& frame, int x, int y, int sample) const {
-  const int count = options_.shadowSamples;
-  if (count == 0) return std::max(0.0, frame.normal.dot(key_));
-  const PixelSequence sequence(x, y, kShadow);
-  double sum = 0;
-  for (int i = 0; i < count; ++i) {
-    const V3d d = coneDirection(key_, scene_.key.softness, sequence.at(sample * count + i));
-    const double cosine = frame.normal.dot(d);
-    if (cosine <= 0 || frame.facet.dot(d) <= 0) continue;
-    if (!rays_.isOccluded(frame.start, d, 0, 4 * diagonal_)) sum += cosine;
-  }
-  return sum / count;
-}
-
-C3f Shader::colour(const Hit& hit, const V3d& direction, int x, int y, int sample) const {
+Shader::Frame Shader::frameOf(const Hit& hit, const V3d& direction) const {
   Frame frame{hit.position, hit.normal, hit.facetNormal};
   if (frame.facet.dot(direction) > 0) frame.facet = -frame.facet;
   if (frame.normal.dot(frame.facet) < 0) frame.normal = -frame.normal;
   // Off the interpolant's ripples, and off the rounding of the hit itself.
   frame.start += frame.facet * (2 * hit.surfaceError + 1e-9 * diagonal_);
+  return frame;
+}
+
+void Shader::addSkyRays(const Frame& frame, int x, int y, int sample,
+                        std::vector<LightRay>& rays) const {
+  const int count = options_.ambientSamples;
+  const PixelSequence sequence(x, y, kAmbient);
+  for (int i = 0; i < count; ++i) {
+    V3d d = cosineDirection(frame.normal, sequence.at(sample * count + i));
+    // The smooth normal's hemisphere dips below the facet's plane: mirror what does.
+    const double below = d.dot(frame.facet);
+    if (below < 0) d = (d - frame.facet * (2 * below)).normalized();
+    rays.push_back({frame.start, d, kOcclusionReach * diagonal_, 1});
+  }
+}
+
+void Shader::addKeyRays(const Frame& frame, int x, int y, int sample,
+                        std::vector<LightRay>& rays) const {
+  const int count = options_.shadowSamples;
+  const PixelSequence sequence(x, y, kShadow);
+  for (int i = 0; i < count; ++i) {
+    const V3d d = coneDirection(key_, scene_.key.softness, sequence.at(sample * count + i));
+    const double cosine = frame.normal.dot(d);
+    if (cosine <= 0 || frame.facet.dot(d) <= 0) continue;
+    rays.push_back({frame.start, d, 4 * diagonal_, cosine});
+  }
+}
+
+LightRays Shader::addRays(const Hit& hit, const V3d& direction, int x, int y, int sample,
+                          std::vector<LightRay>& rays) const {
+  const Frame frame = frameOf(hit, direction);
+  LightRays range;
+  range.first = rays.size();
+  addSkyRays(frame, x, y, sample, rays);
+  range.sky = rays.size() - range.first;
+  addKeyRays(frame, x, y, sample, rays);
+  range.key = rays.size() - range.first - range.sky;
+  return range;
+}
+
+C3f Shader::colour(const Hit& hit, const V3d& direction, const LightRays& range,
+                   const std::vector<LightRay>& rays, const std::vector<char>& blocked) const {
+  const Frame frame = frameOf(hit, direction);
+  const auto lightOf = [&](std::size_t first, std::size_t count) {
+    double sum = 0;
+    for (std::size_t i = first; i < first + count; ++i)
+      if (!blocked[i]) sum += rays[i].light;
+    return sum;
+  };
+  const double open =
+      options_.ambientSamples == 0 ? 1 : lightOf(range.first, range.sky) / options_.ambientSamples;
+  const double lit = options_.shadowSamples == 0
+                         ? std::max(0.0, frame.normal.dot(key_))
+                         : lightOf(range.first + range.sky, range.key) / options_.shadowSamples;
 
   const C3f& albedo = scene_.solids[hit.solid].colour;
-  const double open = openSky(frame, x, y, sample);
-  const double key = scene_.key.strength * keyLight(frame, x, y, sample);
+  const double key = scene_.key.strength * lit;
   const double facing = std::clamp(-direction.dot(frame.normal), 0.0, 1.0);
   const double upward = 0.5 + 0.5 * frame.normal.dot(up_);
   const double fill = 0.5 * scene_.ambient * std::max(0.0, frame.normal.dot(fill_));
@@ -132,8 +156,8 @@ C3f Shader::colour(const Hit& hit, const V3d& direction, int x, int y, int sampl
   C3f result = scaled(C3f(1.06f, 1.0f, 0.90f), key);
   for (int c = 0; c < 3; ++c) {
     // Light that bounces in a hollow of this colour; 1 where the sky is open.
-    const double lit = open / (1 - static_cast<double>(albedo[c]) * (1 - open));
-    result[c] += static_cast<float>(lit) * static_cast<float>(scene_.ambient) * sky[c];
+    const double bounced = open / (1 - static_cast<double>(albedo[c]) * (1 - open));
+    result[c] += static_cast<float>(bounced) * static_cast<float>(scene_.ambient) * sky[c];
   }
   result += scaled(C3f(0.82f, 0.92f, 1.10f), fill * open);
   return albedo * result + C3f(static_cast<float>(rim + gloss));

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/embree/surface_shape_vdb.h"
+#include "render/shading/surface_shape_vdb.h"
 
 namespace render {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to the Embree renderer: normal and curvature of a band at a point of its surface.
+// Private to the renderers: normal and curvature of a band at a point of its surface.
 
 #include "levelset/vdb.h"
 

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace render {
+
+/// Where a ray meets a surface; world units.
+struct Hit {
+  bool found = false;
+  double distance = 0;          ///< along the unit direction
+  Imath::V3d position, normal;  ///< normal outwards, of unit length, from a tricubic B-spline
+  Imath::V3d facetNormal;       ///< outwards, of the trilinear interpolant itself
+  double surfaceError = 0;      ///< bound on the interpolant's distance from a smooth surface
+  std::uint32_t id = 0;         ///< Solid::id
+  std::size_t solid = 0;        ///< index in Scene::solids
+};
+
+struct CurvatureSample {
+  double mean = 0, gauss = 0, k1 = 0,
+         k2 = 0;  ///< per world unit (gauss: squared); spheres positive
+};
+
+}  // namespace render

@@ -1,0 +1,165 @@
+#include "render/kernel/kernel_scene.h"
+
+#include <Imath/ImathBoxAlgo.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/vdb.h"
+
+namespace render {
+namespace {
+
+using Imath::M44d;
+using Imath::V3d;
+
+constexpr double kLeastDirection = 1e-20;  // as the kernel's
+constexpr double kBesideBox = 0.0625;
+
+Imath::Box3d cellBox(const BrickPool& pool) {
+  Imath::Box3d box;
+  for (const std::array<int, 3>& corner : {pool.low, pool.high})
+    box.extendBy(V3d(corner[0], corner[1], corner[2]));
+  return box;
+}
+
+/// A part of a ray, by its parameter.
+struct Span {
+  double enter, leave;
+};
+
+Span clipped(const BrickPool& pool, const V3d& origin, const V3d& direction, double reach) {
+  Span span{0, reach};
+  for (int a = 0; a < 3; ++a) {
+    const auto i = static_cast<std::size_t>(a);
+    const double t0 = (pool.low[i] - kBesideBox - origin[a]) / direction[a],
+                 t1 = (pool.high[i] + kBesideBox - origin[a]) / direction[a];
+    span.enter = std::max(span.enter, std::min(t0, t1));
+    span.leave = std::min(span.leave, std::max(t0, t1));
+  }
+  return span;
+}
+
+V3d withoutZeros(V3d direction) {
+  for (int a = 0; a < 3; ++a)
+    if (std::abs(direction[a]) < kLeastDirection) direction[a] = kLeastDirection;
+  return direction;
+}
+
+/// Rays of a list that come near a solid, as its kernel takes them.
+struct PackedRays {
+  std::vector<std::size_t> number;  // in the list
+  RayBlock block{0};
+
+  PackedRays(const KernelSolid& solid, const std::vector<LightRay>& rays,
+             const std::vector<char>& isDone) {
+    struct Ready {
+      V3d origin, direction;
+      Span span;
+    };
+    std::vector<Ready> ready;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (isDone[i]) continue;
+      // A step of t is a voxel, so that single precision suits whatever the unit is.
+      V3d origin, direction;
+      solid.worldToTable.multVecMatrix(rays[i].origin, origin);
+      solid.worldToTable.multDirMatrix(rays[i].direction * solid.voxelSize, direction);
+      direction = withoutZeros(direction);
+      const Span span = clipped(solid.pool, origin, direction, rays[i].reach / solid.voxelSize);
+      if (!(span.enter <= span.leave)) continue;
+      ready.push_back({origin + direction * span.enter, direction, span});
+      number.push_back(i);
+    }
+    block = RayBlock(ready.size());
+    for (std::size_t n = 0; n < ready.size(); ++n) {
+      const Ready& ray = ready[n];
+      const auto set = [&](std::vector<float>& to, double value) {
+        to[n] = static_cast<float>(value);
+      };
+      set(block.ox, ray.origin.x);
+      set(block.oy, ray.origin.y);
+      set(block.oz, ray.origin.z);
+      set(block.dx, ray.direction.x);
+      set(block.dy, ray.direction.y);
+      set(block.dz, ray.direction.z);
+      block.ix[n] = 1 / block.dx[n];
+      block.iy[n] = 1 / block.dy[n];
+      block.iz[n] = 1 / block.dz[n];
+      block.start[n] = 0;
+      set(block.end, ray.span.leave - ray.span.enter);
+    }
+  }
+};
+
+}  // namespace
+
+KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes) {
+  // A block for each leaf; those the surface does not cross are built and dropped.
+  double leaves = 0;
+  for (const Solid& solid : scene.solids)
+    if (!solid.band.isEmpty())
+      leaves += static_cast<double>(levelset::vdb(solid.band).tree().leafCount());
+  constexpr double kBytesOfBlock = 2 * 4 * (BrickPool::kValues + BrickPool::kMaskWords);
+  levelset::requireMemory(leaves * kBytesOfBlock, maxBytes, "render");
+  for (std::size_t i = 0; i < scene.solids.size(); ++i) {
+    const Solid& source = scene.solids[i];
+    KernelSolid solid;
+    solid.pool = makeBricks(source.band);
+    if (solid.pool.brickCount() == 0) continue;
+    solid.index = i;
+    solid.id = source.id;
+    solid.voxelSize = source.band.voxelSize();
+    solid.fan = makeRayFan(scene.camera, source.band, solid.pool);
+    const V3d corner(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]);
+    const M44d tableToWorld = M44d().setTranslation(corner) * source.band.indexToWorld();
+    solid.worldToTable = tableToWorld.inverse();
+    bounds_.extendBy(Imath::transform(cellBox(solid.pool), tableToWorld));
+    solids_.push_back(std::move(solid));
+  }
+  std::stable_sort(solids_.begin(), solids_.end(),
+                   [](const KernelSolid& a, const KernelSolid& b) { return a.id < b.id; });
+}
+
+std::size_t KernelScene::bytes() const {
+  std::size_t sum = 0;
+  for (const KernelSolid& solid : solids_) sum += solid.pool.bytes();
+  return sum;
+}
+
+std::size_t KernelScene::blocksLeftOut() const {
+  std::size_t sum = 0;
+  for (const KernelSolid& solid : solids_) sum += solid.pool.blocksLeftOut;
+  return sum;
+}
+
+PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const {
+  PixelHits result(pixels.size());
+  HitBlock hits(pixels.size());
+  for (const KernelSolid& solid : solids_) {
+    tracer.trace(solid, pixels, hits);
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      if (!hits.found[i]) continue;
+      const double depth =
+          solid.fan.depth + static_cast<double>(hits.t[i]) * solid.fan.depthPerStep;
+      if (result.solid[i] >= 0 && result.depth[i] <= depth) continue;
+      result.depth[i] = depth;
+      result.solid[i] = static_cast<std::int32_t>(solid.index);
+    }
+  }
+  return result;
+}
+
+std::vector<char> KernelScene::findBlocked(const KernelTracer& tracer,
+                                           const std::vector<LightRay>& rays) const {
+  std::vector<char> blocked(rays.size(), 0);
+  for (const KernelSolid& solid : solids_) {
+    const PackedRays packed(solid, rays, blocked);
+    HitBlock hits(packed.block.size);
+    tracer.trace(solid, packed.block, hits);
+    for (std::size_t n = 0; n < packed.number.size(); ++n)
+      if (hits.found[n]) blocked[packed.number[n]] = 1;
+  }
+  return blocked;
+}
+
+}  // namespace render

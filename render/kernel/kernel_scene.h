@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Imath/ImathBox.h>
+#include <Imath/ImathMatrix.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "levelset/memory_limit.h"
+#include "render/kernel/brick_pool.h"
+#include "render/kernel/ray_block.h"
+#include "render/kernel/ray_fan.h"
+#include "render/scene.h"
+#include "render/shading/shading.h"
+
+namespace render {
+
+/// A solid of a scene as the kernel sees it.
+struct KernelSolid {
+  std::size_t index = 0;  ///< in Scene::solids
+  std::uint32_t id = 0;
+  double voxelSize = 1;
+  BrickPool pool;
+  RayFan fan;
+  Imath::M44d worldToTable;
+};
+
+/// Runs the kernel somewhere. The hits of all tracers have the same bits.
+class KernelTracer {
+ public:
+  virtual ~KernelTracer() = default;
+  virtual void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits) const = 0;
+  virtual void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const = 0;
+};
+
+/// What a block of pixels shows.
+struct PixelHits {
+  std::vector<double> depth;        ///< along the view axis, world units
+  std::vector<std::int32_t> solid;  ///< index in Scene::solids, or −1
+
+  explicit PixelHits(std::size_t size) : depth(size), solid(size, -1) {}
+};
+
+/// The surfaces of a scene made ready for the kernel, whoever runs it. Of two solids hit at the
+/// same depth the lower id counts.
+class KernelScene {
+ public:
+  /// @param maxBytes  for what the kernel reads
+  /// @pre the camera is valid
+  /// @throws levelset::ResourceLimit before anything is allocated; and as makeBricks()
+  explicit KernelScene(const Scene& scene, std::size_t maxBytes = levelset::kNoMemoryLimit);
+
+  [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
+  /// World-space box of the cells that hold surface; empty when there are none.
+  [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
+  [[nodiscard]] std::size_t bytes() const;
+  [[nodiscard]] std::size_t blocksLeftOut() const;
+
+  [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
+  /// @return for each ray 1 if it meets something within its reach, else 0
+  [[nodiscard]] std::vector<char> findBlocked(const KernelTracer& tracer,
+                                              const std::vector<LightRay>& rays) const;
+
+ private:
+  std::vector<KernelSolid> solids_;  // by id
+  Imath::Box3d bounds_;
+};
+
+}  // namespace render

@@ -1,0 +1,125 @@
+#include "render/kernel/paint.h"
+
+#include <algorithm>
+
+#include "render/shading/surface_point.h"
+
+namespace render {
+namespace {
+
+using Imath::V2d;
+using Imath::V3d;
+
+constexpr int kSquare = 4;        // pixels along the edge of a packet
+constexpr double kCastError = 2e-3;  // of the kernel's depths, voxels: rays to lights start beyond
+
+}  // namespace
+
+KernelPainter::KernelPainter(const Scene& scene, const KernelScene& surfaces,
+                             const RenderOptions& options, Image& image)
+    : scene_(scene),
+      surfaces_(surfaces),
+      options_(options),
+      shader_(scene, surfaces.bounds().size().length(), options),
+      layers_(image, options.curvature) {}
+
+void KernelPainter::paint(const KernelTracer& tracer, const PixelBox& box) const {
+  const std::vector<Pixel> pixels = pixelsOf(box);
+  paintData(tracer, pixels);
+  paintColours(tracer, pixels);
+}
+
+std::vector<KernelPainter::Pixel> KernelPainter::pixelsOf(const PixelBox& box) {
+  std::vector<Pixel> pixels;
+  for (int top = box.top; top < box.bottom; top += kSquare)
+    for (int left = box.left; left < box.right; left += kSquare)
+      for (int y = top; y < std::min(top + kSquare, box.bottom); ++y)
+        for (int x = left; x < std::min(left + kSquare, box.right); ++x) pixels.push_back({x, y});
+  return pixels;
+}
+
+std::size_t KernelPainter::numberOf(const Pixel& pixel) const {
+  return static_cast<std::size_t>(pixel.y) * static_cast<std::size_t>(scene_.camera.width) +
+         static_cast<std::size_t>(pixel.x);
+}
+
+Hit KernelPainter::hitAt(double x, double y, double depth, std::int32_t solid) const {
+  const Camera::Ray ray = scene_.camera.ray(x, y);
+  const Solid& source = scene_.solids[static_cast<std::size_t>(solid)];
+  Hit hit;
+  hit.found = true;
+  hit.distance = depth / ray.direction.dot(scene_.camera.axis());
+  hit.position = ray.origin + ray.direction * hit.distance;
+  hit.id = source.id;
+  hit.solid = static_cast<std::size_t>(solid);
+  addNormals(hit, source.band, ray.direction);
+  hit.surfaceError += kCastError * source.band.voxelSize();
+  return hit;
+}
+
+// From the pixels' centres.
+void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const {
+  const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
+  PixelBlock at(pixels.size());
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    at.x[i] = static_cast<float>(pixels[i].x + 0.5 - middleX);
+    at.y[i] = static_cast<float>(pixels[i].y + 0.5 - middleY);
+  }
+  const PixelHits hits = surfaces_.castPixels(tracer, at);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (hits.solid[i] < 0) continue;
+    const Hit hit = hitAt(pixels[i].x + 0.5, pixels[i].y + 0.5, hits.depth[i], hits.solid[i]);
+    const std::size_t number = numberOf(pixels[i]);
+    layers_.setHit(number, scene_.camera, hit);
+    if (options_.curvature)
+      layers_.setCurvature(number, curvatureAt(scene_.solids[hit.solid].band, hit.position));
+  }
+}
+
+// The means over the pixels' areas.
+void KernelPainter::paintColours(const KernelTracer& tracer,
+                                 const std::vector<Pixel>& pixels) const {
+  const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
+  std::vector<Imath::C3f> sums(pixels.size(), Imath::C3f(0));
+  std::vector<int> covered(pixels.size(), 0);
+  struct Lit {
+    std::size_t pixel;
+    Hit hit;
+    V3d direction;
+    LightRays range;
+  };
+  PixelBlock at(pixels.size());
+  for (int s = 0; s < options_.samples; ++s) {
+    std::vector<V2d> places;
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      const V2d shift = PixelSequence::overArea(pixels[i].x, pixels[i].y).at(s);
+      // What single precision makes of the place is where the ray goes.
+      at.x[i] = static_cast<float>(pixels[i].x + shift.x - middleX);
+      at.y[i] = static_cast<float>(pixels[i].y + shift.y - middleY);
+      places.emplace_back(static_cast<double>(at.x[i]) + middleX,
+                          static_cast<double>(at.y[i]) + middleY);
+    }
+    const PixelHits hits = surfaces_.castPixels(tracer, at);
+    std::vector<LightRay> rays;
+    std::vector<Lit> points;
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      if (hits.solid[i] < 0) continue;
+      Lit point;
+      point.pixel = i;
+      point.hit = hitAt(places[i].x, places[i].y, hits.depth[i], hits.solid[i]);
+      point.direction = scene_.camera.ray(places[i].x, places[i].y).direction;
+      point.range =
+          shader_.addRays(point.hit, point.direction, pixels[i].x, pixels[i].y, s, rays);
+      points.push_back(point);
+    }
+    const std::vector<char> blocked = surfaces_.findBlocked(tracer, rays);
+    for (const Lit& point : points) {
+      sums[point.pixel] += shader_.colour(point.hit, point.direction, point.range, rays, blocked);
+      ++covered[point.pixel];
+    }
+  }
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    layers_.setColour(numberOf(pixels[i]), sums[i], covered[i], options_.samples);
+}
+
+}  // namespace render

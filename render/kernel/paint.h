@@ -1,0 +1,44 @@
+#pragma once
+
+#include "render/image.h"
+#include "render/kernel/kernel_scene.h"
+#include "render/render_options.h"
+#include "render/scene.h"
+#include "render/shading/picture.h"
+#include "render/shading/shading.h"
+
+namespace render {
+
+/// A part of a picture, pixels.
+struct PixelBox {
+  int left, top, right, bottom;  ///< the last two are the first outside
+};
+
+/// Paints parts of a picture from the kernel's hits, a kind of ray at a time.
+class KernelPainter {
+ public:
+  KernelPainter(const Scene& scene, const KernelScene& surfaces, const RenderOptions& options,
+                Image& image);
+  /// Parts may be painted at the same time.
+  void paint(const KernelTracer& tracer, const PixelBox& box) const;
+
+ private:
+  struct Pixel {
+    int x, y;
+  };
+  /// Neighbours next to each other: squares of four.
+  [[nodiscard]] static std::vector<Pixel> pixelsOf(const PixelBox& box);
+  [[nodiscard]] std::size_t numberOf(const Pixel& pixel) const;
+  /// What is at that place of the picture (pixels) and depth.
+  [[nodiscard]] Hit hitAt(double x, double y, double depth, std::int32_t solid) const;
+  void paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
+  void paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
+
+  const Scene& scene_;
+  const KernelScene& surfaces_;
+  const RenderOptions& options_;
+  Shader shader_;
+  PictureLayers layers_;
+};
+
+}  // namespace render

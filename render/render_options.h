@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstddef>
+
+#include "levelset/progress.h"
+
+namespace render {
+
+struct RenderOptions {
+  int samples = 4;                                  ///< per pixel, at least 1; colour only
+  int ambientSamples = 16;                          ///< per colour sample; 0: no occlusion
+  int shadowSamples = 4;                            ///< per colour sample; 0: no shadows
+  bool curvature = true;                            ///< layers curvature.mean .gauss .k1 .k2
+  std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< for the image and the scene
+  levelset::Progress progress = {};
+};
+
+}  // namespace render

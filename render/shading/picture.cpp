@@ -1,0 +1,120 @@
+#include "render/shading/picture.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <limits>
+
+#include "levelset/error.h"
+#include "levelset/vdb.h"
+
+namespace render {
+namespace {
+
+using Imath::V3d;
+
+constexpr int kMaxSamples = 65536;
+
+}  // namespace
+
+PictureLayers::PictureLayers(Image& image, bool withCurvature) {
+  r = image.addChannel("R").data();
+  g = image.addChannel("G").data();
+  b = image.addChannel("B").data();
+  a = image.addChannel("A").data();
+  z = image.addChannel("Z", std::numeric_limits<float>::infinity()).data();
+  const char* axes[3] = {"X", "Y", "Z"};
+  for (int i = 0; i < 3; ++i) {
+    n[i] = image.addChannel(fmt::format("N.{}", axes[i])).data();
+    p[i] = image.addChannel(fmt::format("P.{}", axes[i])).data();
+  }
+  const char* kinds[4] = {"mean", "gauss", "k1", "k2"};
+  for (int i = 0; withCurvature && i < 4; ++i)
+    curvature[i] = image.addChannel(fmt::format("curvature.{}", kinds[i])).data();
+  auto& ids = image.ids["id"];
+  ids.assign(image.pixelCount(), 0);
+  id = ids.data();
+}
+
+void PictureLayers::setHit(std::size_t i, const Camera& camera, const Hit& hit) const {
+  z[i] = static_cast<float>((hit.position - camera.from).dot(camera.axis()));
+  for (int axis = 0; axis < 3; ++axis) {
+    n[axis][i] = static_cast<float>(hit.normal[axis]);
+    p[axis][i] = static_cast<float>(hit.position[axis]);
+  }
+  id[i] = hit.id;
+}
+
+void PictureLayers::setCurvature(std::size_t i, const CurvatureSample& sample) const {
+  const double values[4] = {sample.mean, sample.gauss, sample.k1, sample.k2};
+  for (int k = 0; k < 4; ++k) curvature[k][i] = static_cast<float>(values[k]);
+}
+
+void PictureLayers::setColour(std::size_t i, const Imath::C3f& sum, int covered,
+                              int samples) const {
+  const float weight = 1.0f / static_cast<float>(samples);
+  r[i] = sum.x * weight;
+  g[i] = sum.y * weight;
+  b[i] = sum.z * weight;
+  a[i] = static_cast<float>(covered) * weight;
+}
+
+void requirePicture(const Scene& scene, const RenderOptions& options) {
+  validate(scene.camera);
+  const auto inRange = [](int count, int low) { return count >= low && count <= kMaxSamples; };
+  if (!inRange(options.samples, 1) || !inRange(options.ambientSamples, 0) ||
+      !inRange(options.shadowSamples, 0)) {
+    throw levelset::UsageError(fmt::format(
+        "render: {} samples, {} ambient and {} shadow samples; give 1 to {} samples and 0 to {} of "
+        "the others",
+        options.samples, options.ambientSamples, options.shadowSamples, kMaxSamples, kMaxSamples));
+  }
+  const V3d& d = scene.key.direction;
+  const double sum = d.x + d.y + d.z + scene.key.strength + scene.ambient;
+  if (!std::isfinite(sum) || d == V3d(0) ||
+      !(scene.key.softness >= 0 && scene.key.softness < 1.5) || scene.key.strength < 0 ||
+      scene.ambient < 0) {
+    throw levelset::UsageError(fmt::format(
+        "render: a light towards {},{},{} of strength {}, softness {} and ambient {} cannot shine; "
+        "give finite numbers, none negative, and a softness below 1.5 radians",
+        d.x, d.y, d.z, scene.key.strength, scene.key.softness, scene.ambient));
+  }
+  const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
+  const double channels = options.curvature ? 16 : 12;
+  levelset::requireMemory(pixels * 4 * channels, options.maxBytes, "render");
+}
+
+void refuseEmptyScene() {
+  throw levelset::InvalidInput(
+      "render: there is no surface in the scene; give at least one solid with a zero set");
+}
+
+std::map<std::string, std::string> sceneAttributes(const Scene& scene) {
+  std::string grids, voxelSizes;
+  for (const Solid& solid : scene.solids) {
+    if (solid.band.isEmpty()) continue;
+    const char* comma = grids.empty() ? "" : ", ";
+    grids += fmt::format("{}{} {:016x}", comma, levelset::vdb(solid.band).getName(),
+                         solid.band.contentHash());
+    voxelSizes += fmt::format("{}{}", comma, solid.band.voxelSize());
+  }
+  return {{"ls:filter", "trilinear"},
+          {"ls:normal", "bspline-qi"},
+          {"ls:grid", grids},
+          {"ls:voxelSize", voxelSizes}};
+}
+
+void addViewAttributes(Image& image, const Scene& scene) {
+  image.attributes["software"] = "Levelsmith " LEVELSMITH_VERSION;
+  image.attributes["depthType"] = "distance along the view axis";
+  const auto floats = [](const Imath::M44d& m) {
+    std::vector<float> values;
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) values.push_back(static_cast<float>(m[i][j]));
+    return values;
+  };
+  image.matrices["worldToCamera"] = floats(scene.camera.worldToCamera());
+  image.matrices["worldToNDC"] = floats(scene.camera.worldToNdc());
+}
+
+}  // namespace render

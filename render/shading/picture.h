@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "render/hit.h"
+#include "render/image.h"
+#include "render/render_options.h"
+#include "render/scene.h"
+
+// What all renderers' pictures have in common.
+namespace render {
+
+/// The layers of a picture, as plain pointers for the tiles.
+struct PictureLayers {
+  float *r, *g, *b, *a, *z;
+  float *n[3], *p[3];
+  float* curvature[4] = {};
+  std::uint32_t* id;
+
+  PictureLayers(Image& image, bool withCurvature);
+  /// Of pixel `i`, from a hit whose normals are known.
+  void setHit(std::size_t i, const Camera& camera, const Hit& hit) const;
+  void setCurvature(std::size_t i, const CurvatureSample& sample) const;
+  /// From the sum over `samples` of which `covered` hit.
+  void setColour(std::size_t i, const Imath::C3f& sum, int covered, int samples) const;
+};
+
+/// @throws levelset::UsageError for a camera that cannot see, a light that cannot shine or sample
+///         counts out of range; levelset::ResourceLimit for an image too large
+void requirePicture(const Scene& scene, const RenderOptions& options);
+
+/// @throws levelset::InvalidInput
+[[noreturn]] void refuseEmptyScene();
+
+/// ls:grid (name and content hash of each solid), ls:voxelSize, and how layers are made.
+[[nodiscard]] std::map<std::string, std::string> sceneAttributes(const Scene& scene);
+
+/// Software, camera matrices and what Z is.
+void addViewAttributes(Image& image, const Scene& scene);
+
+}  // namespace render
