@@ -1,10 +1,5 @@
 #include "render/cpu/cpu_renderer.h"
 
-#include <tbb/parallel_for.h>
-
-#include <algorithm>
-#include <mutex>
-
 #include "render/cpu/cpu_trace.h"
 #include "render/kernel/kernel_scene.h"
 #include "render/kernel/paint.h"
@@ -12,8 +7,6 @@
 
 namespace render {
 namespace {
-
-constexpr int kCpuTile = 16;  // pixels
 
 class CpuTracer : public KernelTracer {
  public:
@@ -35,26 +28,8 @@ Image renderCpu(const Scene& scene, const RenderOptions& options) {
   levelset::report(options.progress, 0, "render");
   const KernelScene surfaces(scene, options.maxBytes);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();
-  const Camera& camera = scene.camera;
-  Image image(camera.width, camera.height);
-  const KernelPainter painter(scene, surfaces, options, image);
-  const CpuTracer tracer;
-
-  const int across = (camera.width + kCpuTile - 1) / kCpuTile, down = (camera.height + kCpuTile - 1) / kCpuTile;
-  std::mutex reporting;
-  int done = 0;
-  tbb::parallel_for(0, across * down, [&](int tile) {
-    const int left = tile % across * kCpuTile, top = tile / across * kCpuTile;
-    painter.paint(tracer, {left, top, std::min(left + kCpuTile, camera.width),
-                           std::min(top + kCpuTile, camera.height)});
-    const std::scoped_lock lock(reporting);
-    levelset::report(options.progress, static_cast<double>(++done) / (across * down), "render");
-  });
-  image.attributes = sceneAttributes(scene);
-  image.attributes["ls:renderer"] = "cpu";
-  image.attributes["ls:mode"] = "exact";
-  addViewAttributes(image, scene);
-  return image;
+  constexpr int kCpuTile = 16;  // pixels
+  return paintPicture(scene, surfaces, CpuTracer(), kCpuTile, "cpu", options);
 }
 
 }  // namespace render

@@ -1,6 +1,10 @@
 #include "render/kernel/paint.h"
 
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <mutex>
 
 #include "render/shading/surface_point.h"
 
@@ -10,7 +14,7 @@ namespace {
 using Imath::V2d;
 using Imath::V3d;
 
-constexpr int kSquare = 4;        // pixels along the edge of a packet
+constexpr int kSquare = 4;           // pixels along the edge of a packet
 constexpr double kCastError = 2e-3;  // of the kernel's depths, voxels: rays to lights start beyond
 
 }  // namespace
@@ -108,8 +112,7 @@ void KernelPainter::paintColours(const KernelTracer& tracer,
       point.pixel = i;
       point.hit = hitAt(places[i].x, places[i].y, hits.depth[i], hits.solid[i]);
       point.direction = scene_.camera.ray(places[i].x, places[i].y).direction;
-      point.range =
-          shader_.addRays(point.hit, point.direction, pixels[i].x, pixels[i].y, s, rays);
+      point.range = shader_.addRays(point.hit, point.direction, pixels[i].x, pixels[i].y, s, rays);
       points.push_back(point);
     }
     const std::vector<char> blocked = surfaces_.findBlocked(tracer, rays);
@@ -120,6 +123,33 @@ void KernelPainter::paintColours(const KernelTracer& tracer,
   }
   for (std::size_t i = 0; i < pixels.size(); ++i)
     layers_.setColour(numberOf(pixels[i]), sums[i], covered[i], options_.samples);
+}
+
+Image paintPicture(const Scene& scene, const KernelScene& surfaces, const KernelTracer& tracer,
+                   int tile, const std::string& renderer, const RenderOptions& options) {
+  const Camera& camera = scene.camera;
+  Image image(camera.width, camera.height);
+  const KernelPainter painter(scene, surfaces, options, image);
+  const int across = (camera.width + tile - 1) / tile, down = (camera.height + tile - 1) / tile;
+  std::mutex reporting;
+  int done = 0;
+  tbb::parallel_for(0, across * down, [&](int number) {
+    const int left = number % across * tile, top = number / across * tile;
+    painter.paint(tracer, {left, top, std::min(left + tile, camera.width),
+                           std::min(top + tile, camera.height)});
+    const std::scoped_lock lock(reporting);
+    levelset::report(options.progress, static_cast<double>(++done) / (across * down), "render");
+  });
+  image.attributes = sceneAttributes(scene);
+  image.attributes["ls:renderer"] = renderer;
+  image.attributes["ls:mode"] = "exact";
+  std::size_t bricks = 0;
+  for (const KernelSolid& solid : surfaces.solids()) bricks += solid.pool.brickCount();
+  image.attributes["ls:read"] = fmt::format(
+      "{} blocks of 8x8x8 cells, {:.1f} MB; {} more that the surface does not cross were left out",
+      bricks, static_cast<double>(surfaces.bytes()) * 1e-6, surfaces.blocksLeftOut());
+  addViewAttributes(image, scene);
+  return image;
 }
 
 }  // namespace render

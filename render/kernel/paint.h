@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "render/image.h"
 #include "render/kernel/kernel_scene.h"
 #include "render/render_options.h"
@@ -40,5 +43,12 @@ class KernelPainter {
   Shader shader_;
   PictureLayers layers_;
 };
+
+/// The whole picture, tile by tile in parallel, with its header.
+/// @param tile      edge of a tile, pixels
+/// @param renderer  for the header
+[[nodiscard]] Image paintPicture(const Scene& scene, const KernelScene& surfaces,
+                                 const KernelTracer& tracer, int tile, const std::string& renderer,
+                                 const RenderOptions& options);
 
 }  // namespace render

@@ -41,7 +41,8 @@ RayFan makeRayFan(const Camera& camera, const levelset::NarrowBand& band, const 
   fan.depth = depth;
   const V3d forward = directionIn(worldToTable, axis);
   fan.depthPerStep = 1 / forward.length();
-  const V3d right = directionIn(worldToTable, step.right), down = directionIn(worldToTable, step.down);
+  const V3d right = directionIn(worldToTable, step.right),
+            down = directionIn(worldToTable, step.down);
   const bool isOrtho = camera.orthoHeight.has_value();
   const double spread = isOrtho ? 1 : depth, turn = isOrtho ? 0 : fan.depthPerStep;
   set(fan.origin, (camera.from + axis * depth) * worldToTable);

@@ -17,8 +17,8 @@ struct RayFan {
   float direction[3], directionX[3], directionY[3];
   float low[3], high[3];  ///< box of the crossing cells
 
-  double depth = 0;          ///< of the plane, world units along the view axis
-  double depthPerStep = 0;   ///< what t = 1 is, world units
+  double depth = 0;         ///< of the plane, world units along the view axis
+  double depthPerStep = 0;  ///< what t = 1 is, world units
 };
 
 /// @pre the camera is valid and the pool is the band's and has bricks

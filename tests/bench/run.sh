@@ -14,4 +14,5 @@ status=0
 "$build/tests/map_error_bench" 1e7 || status=1
 "$here/scales_on_dragon.sh" "$build/apps/levelsmith" "$here/../../data/models/dragon_vrip.ply.gz" || status=1
 "$here/mesh_to_band.sh" "$build/tests/mesh_to_band_bench" "$here/../../data/models/dragon_vrip.ply.gz" || status=1
+"$here/render.sh" "$build/tests/render_bench" "$build/apps/levelsmith" "$here/../../data/models/dragon_vrip.ply.gz" || status=1
 exit $status

@@ -11,6 +11,7 @@
 #include "render/compare_images.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
+#include "render/gpu/gpu_renderer.h"
 #include "render/image.h"
 #include "render/scene.h"
 
@@ -69,17 +70,88 @@ std::vector<std::string> targetsOf(const Invocation& in) {
   return targets;
 }
 
+/// Infinity has no number in JSON.
+Json numberOrText(double value) {
+  return std::isfinite(value) ? Json(value) : Json("infinite");
+}
+
+Json pixelsOf(const std::vector<render::PixelDifference>& pixels) {
+  Json all = Json::array();
+  for (const render::PixelDifference& p : pixels)
+    all.push_back({{"x", p.x}, {"y", p.y}, {"difference", numberOrText(p.value)}});
+  return all;
+}
+
+Json toJson(const render::ImageComparison& found) {
+  Json json;
+  json["agrees"] = found.agrees();
+  json["exact"] = found.isExact;
+  json["pixels"] = found.pixels;
+  json["both_hit"] = found.bothHit;
+  json["unlike_at_outline"] = found.unlikeAtOutline;
+  json["unlike_elsewhere"] = found.unlikeElsewhere;
+  json["unlike"] = pixelsOf(found.unlike);
+  json["different_bits"] = found.differentBits;
+  json["only_one"] = found.onlyOne;
+  json["layers"] = Json::array();
+  for (const render::LayerComparison& layer : found.layers) {
+    Json entry = {{"layer", layer.layer}, {"measure", layer.measure}, {"compared", layer.compared}};
+    entry["median"] = numberOrText(layer.median);
+    entry["p99"] = numberOrText(layer.p99);
+    entry["p999"] = numberOrText(layer.p999);
+    entry["largest"] = numberOrText(layer.largest);
+    entry["allowed"] = {{"p999", numberOrText(layer.allowed.usual)},
+                        {"largest", numberOrText(layer.allowed.worst)}};
+    entry["agrees"] = layer.agrees();
+    entry["worst"] = pixelsOf(layer.worst);
+    json["layers"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+/// The kernel's picture: by OpenGL, or by the processor where there is none.
+render::Image drawByKernel(Invocation& in, const render::Scene& scene,
+                           const render::RenderOptions& options) {
+  try {
+    return render::renderGpu(scene, options);
+  } catch (const levelset::ResourceLimit& error) {
+    in.notes.warnings.push_back(fmt::format("{}; 'both' takes the processor now", error.what()));
+    return render::renderCpu(scene, options);
+  }
+}
+
 Value draw(Invocation& in) {
   render::Scene scene;
   scene.camera = cameraOf(in);
   scene.solids.push_back({.band = in.band()});
-  const render::RenderOptions options{.samples = static_cast<int>(in.integer("samples")),
-                                      .maxBytes = in.maxMemory,
-                                      .progress = in.progress};
-  const render::Image image = in.text("renderer") == "cpu" ? render::renderCpu(scene, options)
-                                                           : render::renderEmbree(scene, options);
+  const std::string renderer = in.text("renderer");
+  const bool isBoth = renderer == "both";
+  render::RenderOptions options{.samples = static_cast<int>(in.integer("samples")),
+                                .maxBytes = in.maxMemory,
+                                .progress = in.progress};
+  if (isBoth) options.progress = levelset::subProgress(in.progress, 0, 0.5);
+  const render::Image image = renderer == "cpu"   ? render::renderCpu(scene, options)
+                              : renderer == "gpu" ? render::renderGpu(scene, options)
+                              : isBoth            ? drawByKernel(in, scene, options)
+                                                  : render::renderEmbree(scene, options);
+  if (const auto read = image.attributes.find("ls:read"); read != image.attributes.end())
+    in.notes.notes.push_back(fmt::format("render: {}", read->second));
   render::writeImage(in.text("file"), image, in.text("format"));
   if (in.given("png")) render::writeImage(in.text("png"), image, "png");
+  if (isBoth) {
+    // Layers alone are judged, and they are of the pixels' centres.
+    options.samples = 1;
+    options.ambientSamples = options.shadowSamples = 0;
+    options.progress = levelset::subProgress(in.progress, 0.5, 1);
+    const render::ImageComparison found =
+        render::compareImages(image, render::renderEmbree(scene, options));
+    in.notes.detailsJson = toJson(found).dump();
+    if (!found.agrees())
+      throw levelset::NumericalError(
+          fmt::format("render: the kernel's picture and the judge's differ: {}; draw both and look "
+                      "at them with compare-images",
+                      found.reason()));
+  }
   return in.operands[0];
 }
 
@@ -122,45 +194,6 @@ void validateComparison(const Invocation& in) {
       throw UsageError(fmt::format(
           "compare-images: '{}' is compared and named for --difference; name another file",
           in.text(input)));
-}
-
-/// Infinity has no number in JSON.
-Json numberOrText(double value) {
-  return std::isfinite(value) ? Json(value) : Json("infinite");
-}
-
-Json pixelsOf(const std::vector<render::PixelDifference>& pixels) {
-  Json all = Json::array();
-  for (const render::PixelDifference& p : pixels)
-    all.push_back({{"x", p.x}, {"y", p.y}, {"difference", numberOrText(p.value)}});
-  return all;
-}
-
-Json toJson(const render::ImageComparison& found) {
-  Json json;
-  json["agrees"] = found.agrees();
-  json["exact"] = found.isExact;
-  json["pixels"] = found.pixels;
-  json["both_hit"] = found.bothHit;
-  json["unlike_at_outline"] = found.unlikeAtOutline;
-  json["unlike_elsewhere"] = found.unlikeElsewhere;
-  json["unlike"] = pixelsOf(found.unlike);
-  json["different_bits"] = found.differentBits;
-  json["only_one"] = found.onlyOne;
-  json["layers"] = Json::array();
-  for (const render::LayerComparison& layer : found.layers) {
-    Json entry = {{"layer", layer.layer}, {"measure", layer.measure}, {"compared", layer.compared}};
-    entry["median"] = numberOrText(layer.median);
-    entry["p99"] = numberOrText(layer.p99);
-    entry["p999"] = numberOrText(layer.p999);
-    entry["largest"] = numberOrText(layer.largest);
-    entry["allowed"] = {{"p999", numberOrText(layer.allowed.usual)},
-                        {"largest", numberOrText(layer.allowed.worst)}};
-    entry["agrees"] = layer.agrees();
-    entry["worst"] = pixelsOf(layer.worst);
-    json["layers"].push_back(std::move(entry));
-  }
-  return json;
 }
 
 std::string asTable(const render::ImageComparison& found) {
@@ -260,7 +293,11 @@ void addPictureOperators(std::vector<Operator>& all) {
       .details = "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y "
                  "N.Z, P.X P.Y P.Z, "
                  "curvature.mean .gauss .k1 .k2, id. Without --from, a three-quarter view that "
-                 "frames the solid.",
+                 "frames the solid. 'gpu' and 'cpu' are one kernel in single precision, with the "
+                 "same bits; 'embree' is in double precision and shares nothing with it. 'both' "
+                 "draws with the kernel, writes that, compares the layers with those of embree, "
+                 "and ends with exit code 5 where they differ by more than two correct renderers "
+                 "may.",
       .example = "levelsmith torus --radius 2 --tube 0.8 --voxel 0.05 ! render torus.png --size "
                  "320x240 --from 5,4,6 --to 0,0,0",
       .params =
@@ -272,9 +309,9 @@ void addPictureOperators(std::vector<Operator>& all) {
            {.name = "png", .type = ParamType::Path, .doc = "write the colours to this .png too"},
            {.name = "renderer",
             .type = ParamType::Choice,
-            .doc = "which one draws",
+            .doc = "which one draws; both: gpu and embree, compared",
             .fallback = "embree",
-            .choices = {"cpu", "embree"}},
+            .choices = {"gpu", "cpu", "embree", "both"}},
            {.name = "size", .type = ParamType::ImageSize, .doc = "pixels", .fallback = "1024x768"},
            {.name = "from", .type = ParamType::Point, .doc = "where the eye is"},
            {.name = "to",

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/shell.h"
@@ -35,6 +36,31 @@ TEST_F(Pictures, OfTheSameSolidAgreeButForTheColour) {
   EXPECT_TRUE(exists("d.exr"));
   EXPECT_EQ(levelsmith("compare-images a.exr b.exr --exact").code, 5);
   EXPECT_EQ(levelsmith("compare-images a.exr a.exr --exact").code, 0);
+}
+
+TEST_F(Pictures, AreTheSameBitsByGpuAndProcessorAndJudgedByEmbree) {
+  draw("torus --radius 1 --tube 0.4", "g.exr --samples 2 --renderer gpu");
+  draw("torus --radius 1 --tube 0.4", "c.exr --samples 2 --renderer cpu");
+  draw("torus --radius 1 --tube 0.4", "e.exr --renderer embree");
+  const Outcome same = levelsmith("compare-images g.exr c.exr --exact");
+  EXPECT_EQ(same.code, 0) << same.err;
+  const Outcome judged = levelsmith("compare-images g.exr e.exr");
+  EXPECT_EQ(judged.code, 0) << judged.err;
+  draw("torus --radius 1 --tube 0.4", "b.exr --png b.png --renderer both");
+  EXPECT_TRUE(exists("b.png"));
+  EXPECT_EQ(levelsmith("compare-images g.exr b.exr").code, 0);
+}
+
+TEST_F(Pictures, WithoutOpenGlAreRefusedOrDrawnByTheProcessor) {
+  const std::string chain = "sphere --radius 1 --voxel 0.1 ! render o.exr --size 32x32 --renderer ";
+  setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json", 1);
+  const Outcome refused = levelsmith(chain + "gpu"), both = levelsmith(chain + "both");
+  unsetenv("__EGL_VENDOR_LIBRARY_FILENAMES");
+  EXPECT_EQ(refused.code, 4) << refused.err;
+  EXPECT_NE(refused.err.find("--renderer cpu"), std::string::npos) << refused.err;
+  EXPECT_EQ(both.code, 0) << both.err;
+  EXPECT_NE(both.err.find("takes the processor"), std::string::npos) << both.err;
+  EXPECT_TRUE(exists("o.exr"));
 }
 
 TEST_F(Pictures, OfOthersDifferAndEverythingIsWritten) {

@@ -9,24 +9,19 @@
 #include <string>
 
 #include "levelset/error.h"
-#include "levelset/solids/csg.h"
 #include "levelset/solids/shapes.h"
 #include "levelset/solids/transform.h"
 #include "render/compare_images.h"
 #include "render/embree/embree_renderer.h"
+#include "tests/support/render_scenes.h"
 
 namespace cpu_renderer_test {
 
 using Imath::V3d;
 using levelset::NarrowBand;
+using support::rings;
+using support::sceneOf;
 using namespace render;
-
-Scene sceneOf(const NarrowBand& band, int width = 160, int height = 120) {
-  Scene scene;
-  scene.solids.push_back({.band = band});
-  scene.camera = framingCamera(band.zeroSetBounds(), width, height);
-  return scene;
-}
 
 const RenderOptions kDataOnly = {.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
 
@@ -36,11 +31,6 @@ std::string disagreement(const Scene& scene) {
   const ImageComparison found = compareImages(ours, judge);
   EXPECT_GT(found.bothHit, ours.pixelCount() / 50);
   return found.agrees() ? "" : found.reason();
-}
-
-NarrowBand rings() {
-  return levelset::unite(levelset::makeTorus(24, 8, V3d(0), V3d(0, 0, 1), 1),
-                         levelset::makeTorus(24, 8, V3d(9, 0, 3), V3d(0, 1, 0), 1));
 }
 
 TEST(CpuRenderer, AgreesWithTheJudge) {
@@ -55,9 +45,9 @@ TEST(CpuRenderer, AgreesWhateverTheUnitTheTurnAndThePlace) {
   for (const double scale : {1e-3, 1.0, 1e6}) {
     Imath::M44d turn;
     turn.rotate(V3d(0.3, 0.5, 0.7));
-    const NarrowBand placed = levelset::transform(
-        solid, Imath::M44d().setScale(scale) * turn *
-                   Imath::M44d().setTranslation(V3d(3, -2, 5) * 100 * scale));
+    const NarrowBand placed =
+        levelset::transform(solid, Imath::M44d().setScale(scale) * turn *
+                                       Imath::M44d().setTranslation(V3d(3, -2, 5) * 100 * scale));
     EXPECT_EQ(disagreement(sceneOf(placed)), "") << scale;
   }
 }
@@ -67,24 +57,18 @@ TEST(CpuRenderer, AgreesFromWithinFarAwayAndAlongTheLattice) {
   scene.camera.from = V3d(24, 0.1, 0.2);  // inside the tube
   scene.camera.to = V3d(20, 10, 1);
   EXPECT_EQ(disagreement(scene), "");
-  scene = sceneOf(rings());
-  scene.camera.from = scene.camera.to + (scene.camera.from - scene.camera.to).normalized() * 1e5;
-  scene.camera.verticalFov = 80 / 1e5;
-  EXPECT_EQ(disagreement(scene), "");
-  scene = sceneOf(rings());
-  scene.camera.from = V3d(0, 0, 100);
-  scene.camera.to = V3d(0);
-  scene.camera.orthoHeight = 120;  // a pixel is a voxel
-  EXPECT_EQ(disagreement(scene), "");
-  scene.camera.from = V3d(100, 0, 0);
-  EXPECT_EQ(disagreement(scene), "");
+  EXPECT_EQ(disagreement(support::seenFromFar(rings())), "");
+  EXPECT_EQ(disagreement(support::alongTheLattice(rings(), V3d(0, 0, 100))), "");
+  EXPECT_EQ(disagreement(support::alongTheLattice(rings(), V3d(100, 0, 0))), "");
 }
 
 TEST(CpuRenderer, DrawsTheNearerOfTwoSolids) {
   Scene scene = sceneOf(levelset::makeSphere(20, V3d(0), 1));
   scene.solids[0].id = 7;
-  scene.solids.push_back({.band = levelset::makeBox(V3d(18, 18, 18), V3d(14, 4, 10), 0.5), .id = 3});
-  scene.solids.push_back({.band = levelset::makeBox(V3d(18, 18, 18), V3d(14, 4, 10), 0.5), .id = 2});
+  scene.solids.push_back(
+      {.band = levelset::makeBox(V3d(18, 18, 18), V3d(14, 4, 10), 0.5), .id = 3});
+  scene.solids.push_back(
+      {.band = levelset::makeBox(V3d(18, 18, 18), V3d(14, 4, 10), 0.5), .id = 2});
   EXPECT_EQ(disagreement(scene), "");
   const Image image = renderCpu(scene, kDataOnly);
   std::size_t count[8] = {};

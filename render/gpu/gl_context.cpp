@@ -1,0 +1,195 @@
+#include "render/gpu/gl_context.h"
+
+#define EGL_NO_X11
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
+#include <dlfcn.h>
+#include <fmt/core.h>
+
+#include <array>
+#include <string_view>
+#include <vector>
+
+#include "levelset/error.h"
+
+namespace render {
+namespace {
+
+constexpr const char* kWayOut = "use a machine with OpenGL 4.5, or draw with --renderer cpu";
+
+bool hasWord(const char* words, std::string_view word) {
+  return words && std::string_view(words).find(word) != std::string_view::npos;
+}
+
+}  // namespace
+
+struct GlContext::Egl {
+  void* library = nullptr;
+  decltype(&eglGetProcAddress) getProcAddress = nullptr;
+  decltype(&eglQueryString) queryString = nullptr;
+  decltype(&eglInitialize) initialize = nullptr;
+  decltype(&eglTerminate) terminate = nullptr;
+  decltype(&eglBindAPI) bindApi = nullptr;
+  decltype(&eglCreateContext) createContext = nullptr;
+  decltype(&eglDestroyContext) destroyContext = nullptr;
+  decltype(&eglMakeCurrent) makeCurrent = nullptr;
+  PFNEGLGETPLATFORMDISPLAYEXTPROC getPlatformDisplay = nullptr;
+  EGLDisplay display = EGL_NO_DISPLAY;
+  EGLContext context = EGL_NO_CONTEXT;
+  std::string tried;  // what failed, and why
+
+  Egl() {
+    library = dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL);
+    if (!library) {
+      throw levelset::ResourceLimit(
+          fmt::format("render: there is no EGL here ({}); {}", dlerror(), kWayOut));
+    }
+    const auto load = [&](auto& function, const char* name) {
+      function = reinterpret_cast<std::remove_reference_t<decltype(function)>>(dlsym(library, name));
+      if (!function)
+        throw levelset::ResourceLimit(fmt::format("render: EGL has no {}; {}", name, kWayOut));
+    };
+    load(getProcAddress, "eglGetProcAddress");
+    load(queryString, "eglQueryString");
+    load(initialize, "eglInitialize");
+    load(terminate, "eglTerminate");
+    load(bindApi, "eglBindAPI");
+    load(createContext, "eglCreateContext");
+    load(destroyContext, "eglDestroyContext");
+    load(makeCurrent, "eglMakeCurrent");
+    getPlatformDisplay = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(
+        getProcAddress("eglGetPlatformDisplayEXT"));
+    if (!getPlatformDisplay)
+      throw levelset::ResourceLimit(
+          fmt::format("render: EGL cannot do without a window here; {}", kWayOut));
+  }
+  // Not closed: drivers leave threads and handlers behind that outlive the context.
+  ~Egl() { close(); }
+  Egl(const Egl&) = delete;
+  Egl& operator=(const Egl&) = delete;
+
+  void close() {
+    if (display == EGL_NO_DISPLAY) return;
+    makeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    if (context != EGL_NO_CONTEXT) destroyContext(display, context);
+    terminate(display);
+    display = EGL_NO_DISPLAY;
+    context = EGL_NO_CONTEXT;
+  }
+
+  /// Devices of hardware, then the platform without any, then devices of software.
+  void open() {
+    std::vector<EGLDeviceEXT> hardware, software;
+    listDevices(hardware, software);
+    for (EGLDeviceEXT device : hardware)
+      if (openOn(EGL_PLATFORM_DEVICE_EXT, device, "a device")) return;
+    if (openOn(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, "no surface")) return;
+    for (EGLDeviceEXT device : software)
+      if (openOn(EGL_PLATFORM_DEVICE_EXT, device, "a device in software")) return;
+    throw levelset::ResourceLimit(
+        fmt::format("render: no OpenGL 4.5 could be opened ({}); {}", tried, kWayOut));
+  }
+
+  void listDevices(std::vector<EGLDeviceEXT>& hardware, std::vector<EGLDeviceEXT>& software) {
+    const auto queryDevices =
+        reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(getProcAddress("eglQueryDevicesEXT"));
+    const auto queryDevice =
+        reinterpret_cast<PFNEGLQUERYDEVICESTRINGEXTPROC>(getProcAddress("eglQueryDeviceStringEXT"));
+    if (!queryDevices || !queryDevice) return;
+    std::array<EGLDeviceEXT, 32> devices;
+    EGLint count = 0;
+    if (!queryDevices(static_cast<EGLint>(devices.size()), devices.data(), &count)) return;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+      const bool isSoftware =
+          hasWord(queryDevice(devices[i], EGL_EXTENSIONS), "EGL_MESA_device_software");
+      (isSoftware ? software : hardware).push_back(devices[i]);
+    }
+  }
+
+  bool openOn(EGLenum platform, void* native, const char* name) {
+    const auto fail = [&](const char* what) {
+      tried += fmt::format("{}{}: {}", tried.empty() ? "" : ", ", name, what);
+      close();
+      return false;
+    };
+    display = getPlatformDisplay(platform, native, nullptr);
+    if (display == EGL_NO_DISPLAY) return fail("no display");
+    if (!initialize(display, nullptr, nullptr)) {
+      display = EGL_NO_DISPLAY;
+      return fail("not initialised");
+    }
+    if (!hasWord(queryString(display, EGL_EXTENSIONS), "EGL_KHR_surfaceless_context"))
+      return fail("it needs a window");
+    if (!bindApi(EGL_OPENGL_API)) return fail("no OpenGL");
+    constexpr EGLint kVersion[] = {EGL_CONTEXT_MAJOR_VERSION,
+                                   4,
+                                   EGL_CONTEXT_MINOR_VERSION,
+                                   5,
+                                   EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                   EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                   EGL_NONE};
+    context = createContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, kVersion);
+    if (context == EGL_NO_CONTEXT) return fail("no context of version 4.5");
+    if (!makeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
+      return fail("the context is of no use");
+    return true;
+  }
+};
+
+GlContext::GlContext() : egl_(std::make_unique<Egl>()) {
+  egl_->open();
+  const auto load = [&](auto& function, const char* name) {
+    function = reinterpret_cast<std::remove_reference_t<decltype(function)>>(
+        egl_->getProcAddress(name));
+    if (!function)
+      throw levelset::ResourceLimit(fmt::format("render: OpenGL has no {}; {}", name, kWayOut));
+  };
+#define LEVELSMITH_GL_LOAD(Type, name) load(gl_.name, "gl" #name);
+  LEVELSMITH_GL_FUNCTIONS(LEVELSMITH_GL_LOAD)
+#undef LEVELSMITH_GL_LOAD
+  const auto text = [&](GLenum name) {
+    const GLubyte* string = gl_.GetString(name);
+    return string ? std::string(reinterpret_cast<const char*>(string)) : std::string("unknown");
+  };
+  description_ = text(GL_RENDERER) + ", OpenGL " + text(GL_VERSION);
+  GLint64 bytes = 0, blocks = 0;
+  gl_.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
+  gl_.GetInteger64v(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, &blocks);
+  largestBlock_ = static_cast<std::size_t>(bytes);
+  blockCount_ = static_cast<int>(blocks);
+  egl_->makeCurrent(egl_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+}
+
+GlContext::~GlContext() = default;
+
+GlContext::Current::Current(const GlContext& context) : context_(context), lock_(context.mutex_) {
+  Egl& egl = *context.egl_;
+  // The API is each thread's own.
+  if (!egl.bindApi(EGL_OPENGL_API) ||
+      !egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, egl.context)) {
+    throw levelset::ResourceLimit(
+        "render: the graphics driver took the context away; draw again, or with --renderer cpu");
+  }
+}
+
+GlContext::Current::~Current() {
+  Egl& egl = *context_.egl_;
+  egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+}
+
+void GlContext::check(const char* what) const {
+  if (gl_.GetGraphicsResetStatus() != GL_NO_ERROR) {
+    throw levelset::ResourceLimit(fmt::format(
+        "render: the graphics driver gave up on {}, and the context is lost; draw a smaller "
+        "picture, or with --renderer cpu",
+        what));
+  }
+  const GLenum error = gl_.GetError();
+  if (error == GL_NO_ERROR) return;
+  throw levelset::ResourceLimit(fmt::format(
+      "render: {} failed with OpenGL's error {:#x}{}; use larger voxels, or draw with --renderer "
+      "cpu",
+      what, error, error == GL_OUT_OF_MEMORY ? " (out of memory)" : ""));
+}
+
+}  // namespace render

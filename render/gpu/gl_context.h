@@ -1,0 +1,96 @@
+#pragma once
+
+// Private to the GPU renderer. OpenGL 4.5 without a display or a window: EGL is loaded at run time,
+// so that programs start where there is none.
+
+#include <GL/glcorearb.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+
+namespace render {
+
+#define LEVELSMITH_GL_FUNCTIONS(X)                       \
+  X(PFNGLATTACHSHADERPROC, AttachShader)                 \
+  X(PFNGLBINDBUFFERBASEPROC, BindBufferBase)             \
+  X(PFNGLCOMPILESHADERPROC, CompileShader)               \
+  X(PFNGLCREATEBUFFERSPROC, CreateBuffers)               \
+  X(PFNGLCREATEPROGRAMPROC, CreateProgram)               \
+  X(PFNGLCREATESHADERPROC, CreateShader)                 \
+  X(PFNGLDELETEBUFFERSPROC, DeleteBuffers)               \
+  X(PFNGLDELETEPROGRAMPROC, DeleteProgram)               \
+  X(PFNGLDELETESHADERPROC, DeleteShader)                 \
+  X(PFNGLDISPATCHCOMPUTEPROC, DispatchCompute)           \
+  X(PFNGLFINISHPROC, Finish)                             \
+  X(PFNGLGETERRORPROC, GetError)                         \
+  X(PFNGLGETGRAPHICSRESETSTATUSPROC, GetGraphicsResetStatus) \
+  X(PFNGLGETINTEGER64VPROC, GetInteger64v)               \
+  X(PFNGLGETNAMEDBUFFERSUBDATAPROC, GetNamedBufferSubData) \
+  X(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)       \
+  X(PFNGLGETPROGRAMIVPROC, GetProgramiv)                 \
+  X(PFNGLGETSHADERINFOLOGPROC, GetShaderInfoLog)         \
+  X(PFNGLGETSHADERIVPROC, GetShaderiv)                   \
+  X(PFNGLGETSTRINGPROC, GetString)                       \
+  X(PFNGLGETUNIFORMLOCATIONPROC, GetUniformLocation)     \
+  X(PFNGLLINKPROGRAMPROC, LinkProgram)                   \
+  X(PFNGLMEMORYBARRIERPROC, MemoryBarrier)               \
+  X(PFNGLNAMEDBUFFERDATAPROC, NamedBufferData)           \
+  X(PFNGLSHADERSOURCEPROC, ShaderSource)                 \
+  X(PFNGLUNIFORM1FVPROC, Uniform1fv)                     \
+  X(PFNGLUNIFORM1IPROC, Uniform1i)                       \
+  X(PFNGLUSEPROGRAMPROC, UseProgram)
+
+/// The functions of OpenGL that are used, without their prefix.
+struct GlFunctions {
+#define LEVELSMITH_GL_MEMBER(Type, name) Type name = nullptr;
+  LEVELSMITH_GL_FUNCTIONS(LEVELSMITH_GL_MEMBER)
+#undef LEVELSMITH_GL_MEMBER
+};
+
+/// A context of OpenGL 4.5 of its own. Hardware is preferred to software.
+class GlContext {
+ public:
+  /// @throws levelset::ResourceLimit where there is no EGL, or no OpenGL 4.5, with what was tried
+  GlContext();
+  ~GlContext();
+  GlContext(const GlContext&) = delete;
+  GlContext& operator=(const GlContext&) = delete;
+
+  /// While it lives the calling thread, and no other, may call OpenGL.
+  class Current {
+   public:
+    explicit Current(const GlContext& context);
+    ~Current();
+    Current(const Current&) = delete;
+    Current& operator=(const Current&) = delete;
+
+   private:
+    const GlContext& context_;
+    std::unique_lock<std::mutex> lock_;
+  };
+
+  const GlFunctions& gl() const { return gl_; }
+  /// Renderer and version as the driver tells them.
+  [[nodiscard]] const std::string& description() const { return description_; }
+  /// Bytes of the largest storage block.
+  [[nodiscard]] std::size_t largestBlock() const { return largestBlock_; }
+  /// Storage blocks that a compute shader can see.
+  [[nodiscard]] int blockCount() const { return blockCount_; }
+  /// @pre current  @throws levelset::ResourceLimit when the context was lost or OpenGL reports an
+  ///                       error, with `what` was being done
+  void check(const char* what) const;
+
+ private:
+  struct Egl;
+  std::unique_ptr<Egl> egl_;
+  GlFunctions gl_;
+  std::string description_;
+  std::size_t largestBlock_ = 0;
+  int blockCount_ = 0;
+  mutable std::mutex mutex_;
+};
+
+}  // namespace render

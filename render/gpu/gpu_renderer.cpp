@@ -1,0 +1,21 @@
+#include "render/gpu/gpu_renderer.h"
+
+#include "render/gpu/gl_context.h"
+#include "render/gpu/gpu_tracer.h"
+#include "render/kernel/paint.h"
+#include "render/shading/picture.h"
+
+namespace render {
+
+Image renderGpu(const Scene& scene, const RenderOptions& options) {
+  requirePicture(scene, options);
+  levelset::report(options.progress, 0, "render");
+  const KernelScene surfaces(scene, options.maxBytes);
+  if (surfaces.bounds().isEmpty()) refuseEmptyScene();
+  const GlContext context;
+  const GpuTracer tracer(context, surfaces);
+  constexpr int kGpuTile = 64;  // pixels: enough rays for a run
+  return paintPicture(scene, surfaces, tracer, kGpuTile, "gpu " + context.description(), options);
+}
+
+}  // namespace render

@@ -1,0 +1,340 @@
+#include "render/gpu/gpu_tracer.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <map>
+#include <vector>
+
+#include "levelset/error.h"
+#include "render/kernel/trace_glsl.h"
+
+namespace render {
+namespace {
+
+constexpr int kGroup = 64;                  // invocations
+constexpr std::size_t kOneRun = 1u << 18;   // rays: short enough for any watchdog
+constexpr int kRayParts = 11, kPixelParts = 2, kHitParts = 5;
+
+enum Binding : GLuint { kPages, kEntries, kMasks, kRays, kHits, kFirstValues };
+
+/// What the kernel's words are in GLSL.
+constexpr const char* kDialect = R"GLSL(
+#define Real float
+#define Whole int
+#define Bool bool
+#define VAR precise float
+#define INOUT(Type) inout Type
+#define CONST_INT const int
+#define CONST_FLOAT const float
+#define AND(a, b) ((a) && (b))
+#define OR(a, b) ((a) || (b))
+#define NOT(a) (!(a))
+
+struct Fan {
+  float origin[3], originX[3], originY[3];
+  float direction[3], directionX[3], directionY[3];
+  float low[3], high[3];
+};
+uniform Fan fan;
+uniform int pagesY, pagesZ, tableSizeX, tableSizeY, tableSizeZ;
+uniform int firstRay, rayCount;
+
+layout(std430, binding = 0) readonly buffer Pages { int pages[]; };
+layout(std430, binding = 1) readonly buffer Entries { int entries[]; };
+layout(std430, binding = 2) readonly buffer Masks { int masks[]; };
+layout(std430, binding = 3) readonly buffer Rays { float rays[]; };
+layout(std430, binding = 4) writeonly buffer Hits { int hits[]; };
+
+Real real(float v) { return v; }
+Whole whole(int v) { return v; }
+Bool no() { return false; }
+Real toReal(Whole v) { return float(v); }
+Whole toWhole(Real v) { return int(v); }
+Real select(Bool c, Real a, Real b) { return c ? a : b; }
+Whole select(Bool c, Whole a, Whole b) { return c ? a : b; }
+Bool select(Bool c, Bool a, Bool b) { return c ? a : b; }
+Real smaller(Real a, Real b) { return b < a ? b : a; }
+Whole smaller(Whole a, Whole b) { return b < a ? b : a; }
+Real larger(Real a, Real b) { return a < b ? b : a; }
+Whole larger(Whole a, Whole b) { return a < b ? b : a; }
+Whole bit(Bool c, int n) { return c ? n : 0; }
+Bool differ(Bool a, Bool b) { return a != b; }
+Bool any(Bool c) { return c; }
+Bool many(Bool walking, Bool alive) { return walking; }
+Whole loadPage(Whole i) { return pages[i]; }
+Whole loadEntry(Whole i) { return entries[i]; }
+Whole loadMask(Whole i) { return masks[i]; }
+)GLSL";
+
+constexpr const char* kMain = R"GLSL(
+void main() {
+  int n = firstRay + int(gl_GlobalInvocationID.x);
+  if (n >= rayCount) return;
+  Hit hit = trace(rayNumber(n));
+  hits[n] = hit.found ? -1 : 0;
+  hits[rayCount + n] = floatBitsToInt(hit.t);
+  hits[2 * rayCount + n] = hit.x;
+  hits[3 * rayCount + n] = hit.y;
+  hits[4 * rayCount + n] = hit.z;
+}
+)GLSL";
+
+constexpr const char* kPixelRays = R"GLSL(
+Ray rayNumber(int n) { return viewRay(rays[n], rays[rayCount + n]); }
+)GLSL";
+
+constexpr const char* kListedRays = R"GLSL(
+Ray rayNumber(int n) {
+  Ray ray;
+  ray.ox = rays[n];
+  ray.oy = rays[rayCount + n];
+  ray.oz = rays[2 * rayCount + n];
+  ray.dx = rays[3 * rayCount + n];
+  ray.dy = rays[4 * rayCount + n];
+  ray.dz = rays[5 * rayCount + n];
+  ray.ix = rays[6 * rayCount + n];
+  ray.iy = rays[7 * rayCount + n];
+  ray.iz = rays[8 * rayCount + n];
+  ray.start = rays[9 * rayCount + n];
+  ray.end = rays[10 * rayCount + n];
+  return ray;
+}
+)GLSL";
+
+/// Values in one storage block, or in several of 2^shift floats each.
+std::string valueText(int blocks, int shift) {
+  std::string text;
+  for (int b = 0; b < blocks; ++b) {
+    text += fmt::format(
+        "layout(std430, binding = {}) readonly buffer Values{} {{ float values{}[]; }};\n",
+        static_cast<int>(kFirstValues) + b, b, b);
+  }
+  text += "Real loadValue(Whole i) {\n";
+  for (int b = 0; b + 1 < blocks; ++b)
+    text += fmt::format("  if (i >> {} == {}) return values{}[i & {}];\n", shift, b, b,
+                        (1 << shift) - 1);
+  text += blocks == 1 ? "  return values0[i];\n}\n"
+                      : fmt::format("  return values{}[i & {}];\n}}\n", blocks - 1, (1 << shift) - 1);
+  return text;
+}
+
+std::string shaderText(const char* rays, int valueBlocks, int shift) {
+  return fmt::format(
+             "#version 450 core\nlayout(local_size_x = {}) in;\n"
+             "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {};\n",
+             kGroup, BrickPool::kEdge, BrickPool::kValues,
+             std::countr_zero(static_cast<unsigned>(BrickPool::kPage))) +
+         kDialect + valueText(valueBlocks, shift) + kTraceKernel + rays + kMain;
+}
+
+}  // namespace
+
+GLuint compileCompute(const GlContext& context, const std::string& text) {
+  const GlFunctions& gl = context.gl();
+  const auto refuse = [&](const char* what, auto getLog, GLuint object) {
+    char log[400] = "";
+    getLog(object, sizeof log, nullptr, log);
+    throw levelset::ResourceLimit(fmt::format(
+        "render: the graphics driver ({}) does not {} the ray caster: {}; draw with --renderer cpu",
+        context.description(), what, log));
+  };
+  const GLuint shader = gl.CreateShader(GL_COMPUTE_SHADER);
+  const char* lines = text.c_str();
+  gl.ShaderSource(shader, 1, &lines, nullptr);
+  gl.CompileShader(shader);
+  GLint isGood = 0;
+  gl.GetShaderiv(shader, GL_COMPILE_STATUS, &isGood);
+  if (!isGood) refuse("compile", gl.GetShaderInfoLog, shader);
+  const GLuint program = gl.CreateProgram();
+  gl.AttachShader(program, shader);
+  gl.LinkProgram(program);
+  gl.GetProgramiv(program, GL_LINK_STATUS, &isGood);
+  if (!isGood) refuse("link", gl.GetProgramInfoLog, program);
+  gl.DeleteShader(shader);
+  return program;
+}
+
+struct GpuTracer::Impl {
+  struct Tables {
+    GLuint pages = 0, entries = 0, masks = 0;
+    std::vector<GLuint> values;
+  };
+
+  const GlContext& context;
+  const GlFunctions& gl;
+  const std::size_t largestBlock;
+  int shift = 0;  // of the number of floats in a block of values
+  std::map<const KernelSolid*, Tables> tables;
+  GLuint rays = 0, hits = 0;
+  /// By the number of blocks of values.
+  std::map<int, GLuint> pixelPrograms, rayPrograms;
+
+  Impl(const GlContext& context_, const KernelScene& scene, std::size_t largestBlock_)
+      : context(context_),
+        gl(context_.gl()),
+        largestBlock(largestBlock_ > 0 ? largestBlock_ : context_.largestBlock()) {
+    shift = static_cast<int>(std::bit_width(largestBlock / sizeof(float))) - 1;
+    shift = std::min(shift, 30);  // numbers of values are ints
+    for (const KernelSolid& solid : scene.solids()) upload(solid);
+    gl.CreateBuffers(1, &rays);
+    gl.CreateBuffers(1, &hits);
+  }
+
+  ~Impl() {
+    for (auto& [solid, t] : tables) {
+      for (const GLuint buffer : {t.pages, t.entries, t.masks}) gl.DeleteBuffers(1, &buffer);
+      for (const GLuint buffer : t.values) gl.DeleteBuffers(1, &buffer);
+    }
+    for (const GLuint buffer : {rays, hits}) gl.DeleteBuffers(1, &buffer);
+    for (const auto* programs : {&pixelPrograms, &rayPrograms})
+      for (const auto& [blocks, program] : *programs) gl.DeleteProgram(program);
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  GLuint bufferOf(const void* data, std::size_t bytes) {
+    if (bytes > largestBlock) {
+      throw levelset::ResourceLimit(fmt::format(
+          "render: a table of {} MB does not fit into the {} MB that a storage block of {} has; "
+          "use larger voxels, or draw with --renderer cpu",
+          bytes >> 20, largestBlock >> 20, context.description()));
+    }
+    GLuint buffer = 0;
+    gl.CreateBuffers(1, &buffer);
+    gl.NamedBufferData(buffer, static_cast<GLsizeiptr>(bytes), data, GL_STATIC_DRAW);
+    context.check("the upload of a grid");
+    return buffer;
+  }
+
+  void upload(const KernelSolid& solid) {
+    const BrickPool& pool = solid.pool;
+    const std::size_t perBlock = std::size_t{1} << shift;
+    const std::size_t blocks = (pool.value.size() + perBlock - 1) / perBlock;
+    if (blocks + kFirstValues > static_cast<std::size_t>(context.blockCount())) {
+      throw levelset::ResourceLimit(fmt::format(
+          "render: {} MB of values need {} storage blocks, and {} leaves {}; use larger voxels, or "
+          "draw with --renderer cpu",
+          pool.value.size() * 4 >> 20, blocks, context.description(),
+          context.blockCount() - static_cast<int>(kFirstValues)));
+    }
+    Tables& t = tables[&solid];
+    const auto whole = [&](const auto& data) {
+      return bufferOf(data.data(), data.size() * sizeof data[0]);
+    };
+    t.pages = whole(pool.page);
+    t.entries = whole(pool.entry);
+    t.masks = whole(pool.mask);
+    for (std::size_t first = 0; first < pool.value.size(); first += perBlock)
+      t.values.push_back(bufferOf(pool.value.data() + first,
+                                  4 * std::min(perBlock, pool.value.size() - first)));
+  }
+
+  GLuint programFor(const KernelSolid& solid, bool isPixels) {
+    const int blocks = static_cast<int>(tables.at(&solid).values.size());
+    auto& programs = isPixels ? pixelPrograms : rayPrograms;
+    const auto known = programs.find(blocks);
+    if (known != programs.end()) return known->second;
+    return programs[blocks] = compileCompute(
+               context, shaderText(isPixels ? kPixelRays : kListedRays, blocks, shift));
+  }
+
+  void setNumbers(GLuint program, const KernelSolid& solid) {
+    const auto place = [&](const char* name) { return gl.GetUniformLocation(program, name); };
+    const BrickPool& pool = solid.pool;
+    gl.Uniform1i(place("pagesY"), pool.pages[1]);
+    gl.Uniform1i(place("pagesZ"), pool.pages[2]);
+    gl.Uniform1i(place("tableSizeX"), pool.pages[0] * BrickPool::kPage);
+    gl.Uniform1i(place("tableSizeY"), pool.pages[1] * BrickPool::kPage);
+    gl.Uniform1i(place("tableSizeZ"), pool.pages[2] * BrickPool::kPage);
+    const RayFan& fan = solid.fan;
+    const auto three = [&](const char* name, const float(&v)[3]) {
+      gl.Uniform1fv(place(name), 3, v);
+    };
+    three("fan.origin[0]", fan.origin);
+    three("fan.originX[0]", fan.originX);
+    three("fan.originY[0]", fan.originY);
+    three("fan.direction[0]", fan.direction);
+    three("fan.directionX[0]", fan.directionX);
+    three("fan.directionY[0]", fan.directionY);
+    three("fan.low[0]", fan.low);
+    three("fan.high[0]", fan.high);
+  }
+
+  void bind(const KernelSolid& solid) {
+    const Tables& t = tables.at(&solid);
+    const auto bindTo = [&](GLuint place, GLuint buffer) {
+      gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, place, buffer);
+    };
+    bindTo(kPages, t.pages);
+    bindTo(kEntries, t.entries);
+    bindTo(kMasks, t.masks);
+    bindTo(kRays, rays);
+    bindTo(kHits, hits);
+    for (std::size_t b = 0; b < t.values.size(); ++b)
+      bindTo(kFirstValues + static_cast<GLuint>(b), t.values[b]);
+  }
+
+  void run(const KernelSolid& solid, bool isPixels, const std::vector<float>& input,
+           std::size_t count, HitBlock& found) {
+    if (count == 0) return;
+    const GlContext::Current current(context);
+    const GLuint program = programFor(solid, isPixels);
+    gl.UseProgram(program);
+    setNumbers(program, solid);
+    gl.NamedBufferData(rays, static_cast<GLsizeiptr>(input.size() * sizeof(float)), input.data(),
+                       GL_STREAM_DRAW);
+    gl.NamedBufferData(hits, static_cast<GLsizeiptr>(kHitParts * count * sizeof(int)), nullptr,
+                       GL_STREAM_READ);
+    bind(solid);
+    const auto place = [&](const char* name) { return gl.GetUniformLocation(program, name); };
+    gl.Uniform1i(place("rayCount"), static_cast<GLint>(count));
+    for (std::size_t first = 0; first < count; first += kOneRun) {
+      gl.Uniform1i(place("firstRay"), static_cast<GLint>(first));
+      const std::size_t groups = (std::min(kOneRun, count - first) + kGroup - 1) / kGroup;
+      gl.DispatchCompute(static_cast<GLuint>(groups), 1, 1);
+      gl.Finish();
+    }
+    gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    const auto fetch = [&](auto& to, std::size_t part) {
+      gl.GetNamedBufferSubData(hits, static_cast<GLintptr>(part * count * sizeof(int)),
+                               static_cast<GLsizeiptr>(count * sizeof(int)), to.data());
+    };
+    fetch(found.found, 0);
+    fetch(found.t, 1);
+    fetch(found.x, 2);
+    fetch(found.y, 3);
+    fetch(found.z, 4);
+    context.check("the rays");
+  }
+};
+
+GpuTracer::GpuTracer(const GlContext& context, const KernelScene& scene,
+                     std::size_t largestBlock) {
+  const GlContext::Current current(context);
+  impl_ = std::make_unique<Impl>(context, scene, largestBlock);
+}
+
+GpuTracer::~GpuTracer() {
+  const GlContext::Current current(impl_->context);
+  impl_.reset();
+}
+
+void GpuTracer::trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits) const {
+  std::vector<float> input(pixels.x);
+  input.insert(input.end(), pixels.y.begin(), pixels.y.end());
+  impl_->run(solid, true, input, pixels.size(), hits);
+}
+
+void GpuTracer::trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const {
+  std::vector<float> input;
+  input.reserve(kRayParts * rays.size);
+  for (const auto* part : {&rays.ox, &rays.oy, &rays.oz, &rays.dx, &rays.dy, &rays.dz, &rays.ix,
+                           &rays.iy, &rays.iz, &rays.start, &rays.end})
+    input.insert(input.end(), part->begin(), part->end());
+  impl_->run(solid, false, input, rays.size, hits);
+}
+
+}  // namespace render

@@ -1,0 +1,35 @@
+#pragma once
+
+// Private to the GPU renderer: the kernel as a compute shader.
+
+#include <memory>
+#include <string>
+
+#include "render/gpu/gl_context.h"
+#include "render/kernel/kernel_scene.h"
+
+namespace render {
+
+/// The kernel on the graphics processor. Each solid's tables are uploaded once. Safe to call from
+/// many threads, which take turns.
+class GpuTracer : public KernelTracer {
+ public:
+  /// @param context       must outlive it
+  /// @param largestBlock  bytes of a storage block at most; 0: what the driver says
+  /// @throws levelset::ResourceLimit where the tables do not fit, or the shader does not compile
+  GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestBlock = 0);
+  ~GpuTracer() override;
+
+  void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits) const override;
+  void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const override;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A compute shader, ready to run. @pre the context is current
+/// @throws levelset::ResourceLimit with the driver's first words where it does not compile
+[[nodiscard]] GLuint compileCompute(const GlContext& context, const std::string& text);
+
+}  // namespace render

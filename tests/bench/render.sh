@@ -1,0 +1,53 @@
+#!/bin/sh
+# Primary rays beside OpenVDB's vdb_render on one thread, of the same bands and views; exits 1 when
+# a bound is missed. vdb_render shades and writes its picture too, its start-up (a picture of 48
+# pixels) is taken off.
+#   render.sh RENDER_BENCH LEVELSMITH DRAGON.ply.gz
+set -eu
+[ $# -eq 3 ] || { sed -n '2,5s/^# *//p' "$0"; exit 2; }
+bench=$1 levelsmith=$2 dragon=$3
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+"$levelsmith" -q sphere --radius 100 --center 0.3,0.2,0.1 --voxel 1 ! write "$folder/sphere100.vdb"
+"$levelsmith" -q sphere --radius 400 --center 0.3,0.2,0.1 --voxel 1 ! write "$folder/sphere400.vdb"
+"$levelsmith" -q read "$dragon" ! level-set --resolution 512 ! write "$folder/dragon.vdb"
+
+# CPU seconds of the least of three runs: seconds SIZE FILE VIEW…
+seconds() {
+  size=$1 file=$2
+  shift 2
+  for run in 1 2 3; do
+    /usr/bin/time -f %U -o "$folder/time" vdb_render "$file" "$folder/out.exr" "$@" -res "$size" \
+      -cpus 1 -compression none >/dev/null
+    cat "$folder/time"
+  done | sort -n | head -1
+}
+
+for name in sphere100 sphere400 dragon; do
+  view=$("$bench" --view "$folder/$name.vdb")
+  whole=$(seconds 1024x768 "$folder/$name.vdb" $view)
+  start=$(seconds 8x6 "$folder/$name.vdb" $view)
+  "$bench" "$folder/$name.vdb" >"$folder/$name.txt"
+  echo "vdb_render $whole $start $name" >>"$folder/$name.txt"
+done
+cat "$folder"/*.txt | awk '
+  $1 == "vdb_render" {
+    name = $4
+    theirs = 1024 * 768 / ($2 - $3) * 1e-6
+    printf "%s, Mrays per CPU second: vdb_render %.2f\n", name, theirs
+    judge("cpu kernel", value["cpu_mrays_per_s"], value["cpu_mrays_per_s"] / theirs, 3, 1)
+    judge("gpu (" gpu ")", value["gpu_mrays_per_cpu_s"], value["gpu_mrays_per_cpu_s"] / theirs, 1, 1)
+    judge("embree judge", value["embree_mrays_per_s"], value["embree_mrays_per_s"] / theirs, 0.3, 1)
+    printf "  %-50s %8.3g s of CPU\n", "cpu, all layers and shading, one thread", value["cpu_all_layers_s"]
+    judge("tables, s per million voxels", value["prepare_s_per_million_voxels"], value["prepare_s_per_million_voxels"], 0.1, 0)
+    if (name == "dragon") judge("tables, bytes beside NanoVDB", value["tables_of_nanovdb"], value["tables_of_nanovdb"], 1.1, 0)
+    next
+  }
+  $1 == "gpu" { sub(/^gpu /, ""); gpu = $0; next }
+  { value[$1] = $2 }
+  function judge(what, figure, ratio, bound, isFloor) {
+    held = isFloor ? ratio >= bound : ratio <= bound
+    printf "  %-50s %8.3g  ratio %6.2f  bound %s %g%s\n", what, figure, ratio, isFloor ? ">=" : "<=", bound, held ? "" : "  missed"
+    if (!held) missed = 1
+  }
+  END { exit missed }'

@@ -1,0 +1,43 @@
+#pragma once
+
+#include "levelset/solids/csg.h"
+#include "levelset/solids/shapes.h"
+#include "render/camera.h"
+#include "render/scene.h"
+
+/// Small scenes that are hard for ray casters.
+namespace support {
+
+inline render::Scene sceneOf(const levelset::NarrowBand& band, int width = 160, int height = 120) {
+  render::Scene scene;
+  scene.solids.push_back({.band = band});
+  scene.camera = render::framingCamera(band.zeroSetBounds(), width, height);
+  return scene;
+}
+
+/// Two tori through each other, with a crease.
+inline levelset::NarrowBand rings() {
+  using Imath::V3d;
+  return levelset::unite(levelset::makeTorus(24, 8, V3d(0), V3d(0, 0, 1), 1),
+                         levelset::makeTorus(24, 8, V3d(9, 0, 3), V3d(0, 1, 0), 1));
+}
+
+/// From 1e5 world units away, through a lens that fills the picture.
+inline render::Scene seenFromFar(const levelset::NarrowBand& band) {
+  render::Scene scene = sceneOf(band);
+  render::Camera& camera = scene.camera;
+  camera.from = camera.to + (camera.from - camera.to).normalized() * 1e5;
+  camera.verticalFov = 80 / 1e5;
+  return scene;
+}
+
+/// Orthographic, a pixel of 120 a world unit, so that rays run along grid lines and faces.
+inline render::Scene alongTheLattice(const levelset::NarrowBand& band, const Imath::V3d& from) {
+  render::Scene scene = sceneOf(band);
+  scene.camera.from = from;
+  scene.camera.to = Imath::V3d(0);
+  scene.camera.orthoHeight = 120;
+  return scene;
+}
+
+}  // namespace support

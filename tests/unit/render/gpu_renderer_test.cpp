@@ -1,0 +1,130 @@
+// The compute shader against its twin for the processor: the same bits on every layer, the colours
+// too. Mesa's llvmpipe draws where there is no GPU.
+
+#include "render/gpu/gpu_renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <string>
+
+#include "levelset/error.h"
+#include "levelset/solids/csg.h"
+#include "levelset/solids/shapes.h"
+#include "levelset/solids/transform.h"
+#include "render/compare_images.h"
+#include "render/cpu/cpu_renderer.h"
+#include "render/cpu/cpu_trace.h"
+#include "render/gpu/gl_context.h"
+#include "render/gpu/gpu_tracer.h"
+#include "tests/support/render_scenes.h"
+
+namespace gpu_renderer_test {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+using support::rings;
+using support::sceneOf;
+using namespace render;
+
+void expectSameBits(const Scene& scene, const std::string& what) {
+  const RenderOptions options = {.samples = 2, .ambientSamples = 3, .shadowSamples = 2};
+  const Image gpu = renderGpu(scene, options), cpu = renderCpu(scene, options);
+  const ImageComparison found = compareImages(gpu, cpu, {.exact = true});
+  EXPECT_GT(found.bothHit, 100u) << what;
+  EXPECT_EQ(found.differentBits, 0u) << what << ": " << found.reason();
+  EXPECT_TRUE(found.agrees()) << what;
+}
+
+TEST(GpuRenderer, HasTheBitsOfTheProcessor) {
+  expectSameBits(sceneOf(levelset::makeSphere(20, V3d(0.3, 0.2, 0.1), 1)), "ball");
+  expectSameBits(sceneOf(rings()), "rings");
+  expectSameBits(sceneOf(levelset::makeBox(V3d(30, 30, 0.7), V3d(0.1, 0.2, 0.3), 1)), "sheet");
+  expectSameBits(sceneOf(levelset::makeCapsule(V3d(-40, 3, 2), V3d(40, 7, 5), 0.5, 1)), "needle");
+}
+
+TEST(GpuRenderer, HasTheBitsOfTheProcessorFromWithinFarAwayAndAlongTheLattice) {
+  Scene scene = sceneOf(rings());
+  scene.camera.from = V3d(24, 0.1, 0.2);
+  scene.camera.to = V3d(20, 10, 1);
+  expectSameBits(scene, "from within");
+  expectSameBits(support::seenFromFar(rings()), "far away");
+  for (const V3d& from : {V3d(100, 0, 0), V3d(0, 0, -100)}) {
+    scene = support::alongTheLattice(rings(), from);
+    expectSameBits(scene, "along the lattice");
+  }
+}
+
+TEST(GpuRenderer, HasTheBitsOfTheProcessorForSeveralSolids) {
+  Scene scene = sceneOf(levelset::makeSphere(20, V3d(0), 1));
+  scene.solids.push_back({.band = levelset::makeBox(V3d(18), V3d(14, 4, 10), 0.37), .id = 3});
+  scene.solids.push_back({.band = levelset::makeBox(V3d(18), V3d(-14, 4, 10), 0.37), .id = 2});
+  expectSameBits(scene, "three solids");
+}
+
+TEST(GpuTracer, SplitsValuesOverStorageBlocks) {
+  const Scene scene = sceneOf(levelset::makeSphere(30, V3d(0.3, 0.2, 0.1), 1));
+  const KernelScene surfaces(scene);
+  const GlContext context;
+  ASSERT_GT(surfaces.bytes(), 4u << 17);
+  const GpuTracer whole(context, surfaces), split(context, surfaces, 1u << 17);
+  PixelBlock pixels(64 * 64);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    pixels.x[i] = static_cast<float>(i % 64) * 2 - 63.5f;
+    pixels.y[i] = static_cast<float>(i / 64) * 1.5f - 47.25f;
+  }
+  HitBlock a(pixels.size()), b(pixels.size()), c(pixels.size());
+  whole.trace(surfaces.solids()[0], pixels, a);
+  split.trace(surfaces.solids()[0], pixels, b);
+  tracePixels(surfaces.solids()[0].pool, surfaces.solids()[0].fan, pixels, c);
+  EXPECT_GT(std::count(a.found.begin(), a.found.end(), -1), 800);
+  EXPECT_EQ(a.found, b.found);
+  EXPECT_EQ(a.t, b.t);
+  EXPECT_EQ(a.found, c.found);
+  EXPECT_EQ(a.t, c.t);
+  EXPECT_EQ(a.x, c.x);
+  EXPECT_EQ(a.y, c.y);
+  EXPECT_EQ(a.z, c.z);
+}
+
+std::string refusalOf(const auto& job) {
+  try {
+    job();
+  } catch (const levelset::ResourceLimit& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(GpuTracer, RefusesGridsThatDoNotFit) {
+  const Scene scene = sceneOf(levelset::makeSphere(30, V3d(0.3, 0.2, 0.1), 1));
+  const KernelScene surfaces(scene);
+  const GlContext context;
+  EXPECT_NE(refusalOf([&] { GpuTracer(context, surfaces, 1u << 14); }).find("storage blocks"),
+            std::string::npos);
+  EXPECT_NE(refusalOf([&] { GpuTracer(context, surfaces, 1u << 10); }).find("render:"),
+            std::string::npos);
+  // Nothing is wrong with the context after that.
+  const GpuTracer good(context, surfaces);
+}
+
+TEST(GlContext, SaysWhatDoesNotCompile) {
+  const GlContext context;
+  const GlContext::Current current(context);
+  const std::string words =
+      refusalOf([&] { (void)compileCompute(context, "#version 450 core\nvoid main() { x = 1; }"); });
+  EXPECT_NE(words.find("does not compile"), std::string::npos) << words;
+  EXPECT_NE(words.find("--renderer cpu"), std::string::npos) << words;
+}
+
+TEST(GpuRenderer, Refuses) {
+  EXPECT_THROW((void)renderGpu(Scene()), levelset::InvalidInput);
+  Scene scene = sceneOf(levelset::makeSphere(20, V3d(0), 1));
+  EXPECT_THROW((void)renderGpu(scene, {.progress = [](double p) { return p < 0.1; }}),
+               levelset::Cancelled);
+  scene.camera.width = 0;
+  EXPECT_THROW((void)renderGpu(scene), levelset::UsageError);
+}
+
+}  // namespace gpu_renderer_test
