@@ -159,6 +159,47 @@ Truth twoBalls(CsgOperation operation, const V3d& centreA, double radiusA, const
   return truth;
 }
 
+// A solid of revolution: in the half plane (x along the axis, y from it) two arcs and between them
+// the fillet's, about a centre that is as far from both circles as it is wide.
+Truth filletedBalls(const V3d& centreA, double radiusA, const V3d& centreB, double radiusB,
+                    double fillet) {
+  const V3d axis = (centreB - centreA).normalized();
+  const double gap = (centreB - centreA).length();
+  const double sumA = radiusA + fillet, sumB = radiusB + fillet;
+  const double x = (gap * gap + sumA * sumA - sumB * sumB) / (2 * gap),
+               y = std::sqrt(sumA * sumA - x * x);
+  const Distance distance = [=](const V3d& p) {
+    const V3d a = p - centreA;
+    const double along = a.dot(axis), off = (a - along * axis).length();
+    // Within the triangle of the three centres the fillet is nearest.
+    const bool isBetween = along * y >= off * x && (gap - along) * y >= off * (gap - x);
+    if (isBetween) return fillet - std::hypot(along - x, off - y);
+    return std::min(a.length() - radiusA, (p - centreB).length() - radiusB);
+  };
+
+  Truth truth{.distance = distance,
+              .centre = (centreA + centreB) / 2.0,
+              .reach = gap / 2 + std::max(radiusA, radiusB)};
+  // Whole balls but for what is beyond the planes where the arcs touch; between these by Simpson.
+  const double touchA = x * radiusA / sumA, touchB = gap - (gap - x) * radiusB / sumB;
+  const double heightA = radiusA - touchA, heightB = radiusB - (gap - touchB);
+  double volume = 4 * kPi / 3 * (std::pow(radiusA, 3) + std::pow(radiusB, 3)) -
+                  capVolume(radiusA, heightA) - capVolume(radiusB, heightB);
+  double area = 2 * kPi * (radiusA * (2 * radiusA - heightA) + radiusB * (2 * radiusB - heightB));
+  constexpr int kParts = 20000;
+  const double step = (touchB - touchA) / kParts;
+  for (int i = 0; i <= kParts; ++i) {
+    const double weight = (i == 0 || i == kParts ? 1 : i % 2 ? 4 : 2) * step / 3;
+    const double down = std::sqrt(fillet * fillet - std::pow(touchA + i * step - x, 2));
+    const double radius = y - down;
+    volume += weight * kPi * radius * radius;
+    area += weight * 2 * kPi * radius * fillet / down;
+  }
+  truth.volume = volume;
+  truth.area = area;
+  return truth;
+}
+
 Truth apart(const Truth& a, const Truth& b) {
   const double gap = (b.centre - a.centre).length();
   return {.distance = [first = a.distance,

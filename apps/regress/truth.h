@@ -40,6 +40,10 @@ struct Truth {
 [[nodiscard]] Truth twoBalls(levelset::CsgOperation operation, const Imath::V3d& centreA,
                              double radiusA, const Imath::V3d& centreB, double radiusB);
 
+/// The union of two balls as a ball of radius `fillet` leaves it that rolls around the seam.
+[[nodiscard]] Truth filletedBalls(const Imath::V3d& centreA, double radiusA,
+                                  const Imath::V3d& centreB, double radiusB, double fillet);
+
 /// Balls that do not meet.
 [[nodiscard]] Truth apart(const Truth& a, const Truth& b);
 

@@ -23,12 +23,17 @@ using LeafNode = FloatTree::LeafNodeType;
 
 // First guess of how far the surfaces are apart, voxels; doubled until it is enough.
 constexpr double kFirstReach = 8;
+// Of the job, when the target is on the grid of the solid and when the distances are known.
+constexpr double kUntilResampled = 0.05, kUntilDistances = 0.4;
 // Distances reach this much further than the surfaces go, so that interpolation sees them whole.
 constexpr double kBesideSurface = 4;
 
 void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
   const char* action = options.action;
   if (options.mask) checkMask(*options.mask, action);
+  if (options.farthest && !(*options.farthest >= kFirstReach && std::isfinite(*options.farthest)))
+    throw UsageError(fmt::format("{}: distances to {} voxels are too few; give {} or more", action,
+                                 *options.farthest, kFirstReach));
   if (options.steps < 1)
     throw UsageError(
         fmt::format("{}: {} steps were asked for; give at least 1", action, options.steps));
@@ -54,8 +59,8 @@ struct DistancePair {
     to->tree().topologyUnion(from->tree());
   }
 
-  /// Is there a grid point within one solid only, or near the surface of one, where either distance
-  /// is beyond its reach?
+  /// Is there a grid point within one solid only where either distance is beyond its reach, or
+  /// nearly?
   [[nodiscard]] bool fallsShort(double reach) const {
     const auto limit = static_cast<float>((reach - kBesideSurface) * from->voxelSize()[0]);
     std::atomic<bool> found = false;
@@ -75,6 +80,8 @@ struct DistancePair {
   [[nodiscard]] FloatGrid::Ptr at(double part, const std::optional<Mask>& mask) const {
     FloatGrid::Ptr result = from->deepCopy();
     const auto everywhere = static_cast<float>(part);
+    const float farInside = from->background(),
+                onSide = 1e-3f * static_cast<float>(from->voxelSize()[0]);
     TreeManager manager(result->tree());
     manager.foreach ([&](LeafNode& leaf, std::size_t) {
       const float* b = to->tree().probeConstLeaf(leaf.origin())->buffer().data();
@@ -85,7 +92,9 @@ struct DistancePair {
           const openvdb::Vec3d p = from->indexToWorld(leaf.offsetToGlobalCoord(n));
           s *= static_cast<float>(mask->weight({p.x(), p.y(), p.z()}));
         }
-        values[n] = (1 - s) * values[n] + s * b[n];
+        const float mixed = (1 - s) * values[n] + s * b[n];
+        // Far inside one and far outside the other, and halfway: what was solid stays.
+        values[n] = mixed == 0 && values[n] <= -farInside ? -onSide : mixed;
       }
     });
     return result;
@@ -108,12 +117,22 @@ NarrowBand onTheWay(const DistancePair& pair, double part, const MorphOptions& o
 
 NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
   checkMorph(solid, target, options);
-  const NarrowBand goal = resampleLike(target, solid, {.maxMemory = options.maxMemory});
-  const auto distances = [&](const FloatGrid& field, double halfWidth) {
+  const NarrowBand goal =
+      resampleLike(target, solid,
+                   {.maxMemory = options.maxMemory,
+                    .progress = subProgress(options.progress, 0, kUntilResampled)});
+  // The surface stays within what either solid holds.
+  openvdb::CoordBBox region = vdb(solid).evalActiveVoxelBoundingBox();
+  region.expand(vdb(goal).evalActiveVoxelBoundingBox());
+  region.expand(static_cast<int>(kBesideSurface));
+  const auto distances = [&](const FloatGrid& field, double halfWidth, double from, double to,
+                             const std::optional<openvdb::CoordBBox>& within = {}) {
     eikonal::DistanceRequest request;
     request.action = options.action;
     request.halfWidth = halfWidth;
+    request.region = within;
     request.maxMemory = options.maxMemory;
+    request.progress = subProgress(options.progress, from, to);
     return eikonal::distanceTransform(field, request);
   };
 
@@ -121,23 +140,30 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
   DistancePair pair;
   const bool isOnTarget = options.until == 1 && !options.mask;
   const bool isDirect = isOnTarget && options.steps == 1;  // only the end is asked for
-  for (double reach = kFirstReach; !isDirect; reach *= 2) {
-    report(options.progress, 0, options.action);
-    pair = {distances(vdb(solid), reach), distances(vdb(goal), reach)};
+  double done = kUntilResampled;
+  for (double reach = options.farthest.value_or(kFirstReach); !isDirect; reach *= 2) {
+    // Each is the last but for one as long as all before.
+    const double half = (done + kUntilDistances) / 2, quarter = (done + half) / 2;
+    pair.from = distances(vdb(solid), reach, done, quarter, region);
+    pair.to = distances(vdb(goal), reach, quarter, half, region);
+    done = half;
     pair.shareBlocks();
-    if (!pair.fallsShort(reach)) break;
+    if (options.farthest || !pair.fallsShort(reach)) break;
   }
 
   // === Steps
   NarrowBand result;
+  const auto fractionOf = [&](int step) {
+    return kUntilDistances + (1 - kUntilDistances) * step / options.steps;
+  };
   for (int i = 1; i <= options.steps; ++i) {
     const double part = options.until * i / options.steps;
     result =
         part == 1 && isOnTarget ? goal : onTheWay(pair, part, options, [&](const FloatGrid& field) {
-          return distances(field, solid.halfWidth());
+          return distances(field, solid.halfWidth(), fractionOf(i - 1), fractionOf(i));
         });
     if (options.keep) options.keep(result, i);
-    report(options.progress, static_cast<double>(i) / options.steps, options.action);
+    report(options.progress, fractionOf(i), options.action);
     if (options.tolerance && part < 1 && compare(result, goal).hausdorff() <= *options.tolerance)
       break;
   }

@@ -17,6 +17,9 @@ struct MorphOptions {
   std::optional<double> tolerance = {};
   /// Of the way, this part is gone at each point; the end is then no longer the target.
   std::optional<Mask> mask = {};
+  /// Distances count no further than this, voxels: for a mask that parts solids which differ near
+  /// their surfaces only, where it saves sweeping them whole. Empty: wherever the surface passes.
+  std::optional<double> farthest = {};
   /// Receives every step, 1 to `steps`, the last one too.
   std::function<void(const NarrowBand& step, int number)> keep = {};
   std::size_t maxMemory = kNoMemoryLimit;

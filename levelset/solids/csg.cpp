@@ -10,6 +10,7 @@
 #include <cmath>
 #include <utility>
 
+#include "levelset/eikonal/distance_transform.h"
 #include "levelset/error.h"
 #include "levelset/solids/csg_vdb.h"
 #include "levelset/solids/resample.h"
@@ -109,6 +110,27 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
   return result;
 }
 
+/// Gives grid points back what they had before a re-distancing where that was right, and the band
+/// its end where faces lie on grid points.
+void keepGoodValues(FloatGrid& made, const FloatGrid& before) {
+  constexpr double kSame = 0.05;  // voxels: what re-distancing may be off along ridges
+  const auto same = static_cast<float>(kSame * made.voxelSize()[0]);
+  openvdb::tree::LeafManager<FloatTree> leaves(made.tree());
+  leaves.foreach ([&](FloatTree::LeafNodeType& leaf, std::size_t) {
+    const FloatTree::LeafNodeType* old = before.tree().probeConstLeaf(leaf.origin());
+    for (openvdb::Index n = 0; n < FloatTree::LeafNodeType::SIZE; ++n) {
+      if (!leaf.isValueOn(n)) continue;
+      const float value = leaf.getValue(n);
+      if (old && old->isValueOn(n)) {
+        if (std::abs(value - old->getValue(n)) <= same) leaf.setValueOnly(n, old->getValue(n));
+      } else if (std::abs(value) > made.background() - same) {
+        leaf.setValueOff(n, std::copysign(made.background(), value));
+      }
+    }
+  });
+  openvdb::tools::pruneLevelSet(made.tree());
+}
+
 }  // namespace
 
 bool shareTransform(const FloatGrid& a, const FloatGrid& b) {
@@ -166,6 +188,15 @@ FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const F
   if (operation == CsgOperation::Difference) clearSignOfZeros(result->tree());
   correctSeam(*result, a, b, signs);
   openvdb::tools::pruneLevelSet(result->tree());
+  // Where they end at an edge of the result no plane tells how far it is.
+  if (hasCoincidentFaces(first, second, signs) && eikonal::hasZeroCrossing(result->tree())) {
+    eikonal::DistanceRequest request;
+    request.action = nameOf(operation);
+    request.halfWidth = static_cast<double>(result->background()) / result->voxelSize()[0];
+    FloatGrid::Ptr made = eikonal::distanceTransform(*result, request);
+    keepGoodValues(*made, *result);
+    return made;
+  }
   return result;
 }
 

@@ -2,6 +2,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -105,7 +106,44 @@ FloatGrid::Ptr withContacts(const FloatGrid& grid, const std::vector<Contact>& c
   return result;
 }
 
+/// Beside a face of both, whose slopes are opposite, and which goes on: round solids that touch are
+/// opposite in the point, and along the line through it, only.
+bool isBesideBoth(const SignedPair& pair, const Coord& c) {
+  const auto isOpposite = [&](const Coord& at) {
+    return std::abs(pair.u(at) + pair.v(at)) <= kGap;
+  };
+  if (!isOpposite(c)) return false;
+  int goesOn = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int step : {-2, 2}) goesOn += isOpposite(stepped(c, axis, step)) ? 1 : 0;
+  if (goesOn < 3) return false;
+  Vec3d slopeU, slopeV;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Coord up = stepped(c, axis, 1), down = stepped(c, axis, -1);
+    slopeU[axis] = pair.u(up) - pair.u(down);
+    slopeV[axis] = pair.v(up) - pair.v(down);
+  }
+  // Twice a unit slope; less at edges.
+  return slopeU.length() > 1.8 && slopeV.length() > 1.8 &&
+         slopeU.dot(slopeV) < -0.999 * slopeU.length() * slopeV.length();
+}
+
 }  // namespace
+
+bool hasCoincidentFaces(const FloatGrid& a, const FloatGrid& b, const CsgSigns& signs) {
+  std::vector<const Leaf*> shared;
+  for (auto leaf = b.tree().cbeginLeaf(); leaf; ++leaf)
+    if (a.tree().probeConstLeaf(leaf->origin())) shared.push_back(leaf.getLeaf());
+  std::atomic<bool> found = false;
+  const auto voxel = static_cast<float>(b.voxelSize()[0]);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, shared.size(), 16), [&](const auto& range) {
+    const SignedPair pair(a, b, signs);
+    for (std::size_t i = range.begin(); i != range.end() && !found; ++i)
+      for (auto it = shared[i]->cbeginValueOn(); it && !found; ++it)
+        if (std::abs(*it) < voxel && isBesideBoth(pair, it.getCoord())) found = true;
+  });
+  return found;
+}
 
 std::optional<ClosedPair> closeContacts(const FloatGrid& a, const FloatGrid& b,
                                         const CsgSigns& signs) {

@@ -45,7 +45,8 @@ struct GlContext::Egl {
           fmt::format("render: there is no EGL here ({}); {}", dlerror(), kWayOut));
     }
     const auto load = [&](auto& function, const char* name) {
-      function = reinterpret_cast<std::remove_reference_t<decltype(function)>>(dlsym(library, name));
+      function =
+          reinterpret_cast<std::remove_reference_t<decltype(function)>>(dlsym(library, name));
       if (!function)
         throw levelset::ResourceLimit(fmt::format("render: EGL has no {}; {}", name, kWayOut));
     };
@@ -139,8 +140,8 @@ struct GlContext::Egl {
 GlContext::GlContext() : egl_(std::make_unique<Egl>()) {
   egl_->open();
   const auto load = [&](auto& function, const char* name) {
-    function = reinterpret_cast<std::remove_reference_t<decltype(function)>>(
-        egl_->getProcAddress(name));
+    function =
+        reinterpret_cast<std::remove_reference_t<decltype(function)>>(egl_->getProcAddress(name));
     if (!function)
       throw levelset::ResourceLimit(fmt::format("render: OpenGL has no {}; {}", name, kWayOut));
   };

@@ -13,34 +13,34 @@
 
 namespace render {
 
-#define LEVELSMITH_GL_FUNCTIONS(X)                       \
-  X(PFNGLATTACHSHADERPROC, AttachShader)                 \
-  X(PFNGLBINDBUFFERBASEPROC, BindBufferBase)             \
-  X(PFNGLCOMPILESHADERPROC, CompileShader)               \
-  X(PFNGLCREATEBUFFERSPROC, CreateBuffers)               \
-  X(PFNGLCREATEPROGRAMPROC, CreateProgram)               \
-  X(PFNGLCREATESHADERPROC, CreateShader)                 \
-  X(PFNGLDELETEBUFFERSPROC, DeleteBuffers)               \
-  X(PFNGLDELETEPROGRAMPROC, DeleteProgram)               \
-  X(PFNGLDELETESHADERPROC, DeleteShader)                 \
-  X(PFNGLDISPATCHCOMPUTEPROC, DispatchCompute)           \
-  X(PFNGLFINISHPROC, Finish)                             \
-  X(PFNGLGETERRORPROC, GetError)                         \
+#define LEVELSMITH_GL_FUNCTIONS(X)                           \
+  X(PFNGLATTACHSHADERPROC, AttachShader)                     \
+  X(PFNGLBINDBUFFERBASEPROC, BindBufferBase)                 \
+  X(PFNGLCOMPILESHADERPROC, CompileShader)                   \
+  X(PFNGLCREATEBUFFERSPROC, CreateBuffers)                   \
+  X(PFNGLCREATEPROGRAMPROC, CreateProgram)                   \
+  X(PFNGLCREATESHADERPROC, CreateShader)                     \
+  X(PFNGLDELETEBUFFERSPROC, DeleteBuffers)                   \
+  X(PFNGLDELETEPROGRAMPROC, DeleteProgram)                   \
+  X(PFNGLDELETESHADERPROC, DeleteShader)                     \
+  X(PFNGLDISPATCHCOMPUTEPROC, DispatchCompute)               \
+  X(PFNGLFINISHPROC, Finish)                                 \
+  X(PFNGLGETERRORPROC, GetError)                             \
   X(PFNGLGETGRAPHICSRESETSTATUSPROC, GetGraphicsResetStatus) \
-  X(PFNGLGETINTEGER64VPROC, GetInteger64v)               \
-  X(PFNGLGETNAMEDBUFFERSUBDATAPROC, GetNamedBufferSubData) \
-  X(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)       \
-  X(PFNGLGETPROGRAMIVPROC, GetProgramiv)                 \
-  X(PFNGLGETSHADERINFOLOGPROC, GetShaderInfoLog)         \
-  X(PFNGLGETSHADERIVPROC, GetShaderiv)                   \
-  X(PFNGLGETSTRINGPROC, GetString)                       \
-  X(PFNGLGETUNIFORMLOCATIONPROC, GetUniformLocation)     \
-  X(PFNGLLINKPROGRAMPROC, LinkProgram)                   \
-  X(PFNGLMEMORYBARRIERPROC, MemoryBarrier)               \
-  X(PFNGLNAMEDBUFFERDATAPROC, NamedBufferData)           \
-  X(PFNGLSHADERSOURCEPROC, ShaderSource)                 \
-  X(PFNGLUNIFORM1FVPROC, Uniform1fv)                     \
-  X(PFNGLUNIFORM1IPROC, Uniform1i)                       \
+  X(PFNGLGETINTEGER64VPROC, GetInteger64v)                   \
+  X(PFNGLGETNAMEDBUFFERSUBDATAPROC, GetNamedBufferSubData)   \
+  X(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)           \
+  X(PFNGLGETPROGRAMIVPROC, GetProgramiv)                     \
+  X(PFNGLGETSHADERINFOLOGPROC, GetShaderInfoLog)             \
+  X(PFNGLGETSHADERIVPROC, GetShaderiv)                       \
+  X(PFNGLGETSTRINGPROC, GetString)                           \
+  X(PFNGLGETUNIFORMLOCATIONPROC, GetUniformLocation)         \
+  X(PFNGLLINKPROGRAMPROC, LinkProgram)                       \
+  X(PFNGLMEMORYBARRIERPROC, MemoryBarrier)                   \
+  X(PFNGLNAMEDBUFFERDATAPROC, NamedBufferData)               \
+  X(PFNGLSHADERSOURCEPROC, ShaderSource)                     \
+  X(PFNGLUNIFORM1FVPROC, Uniform1fv)                         \
+  X(PFNGLUNIFORM1IPROC, Uniform1i)                           \
   X(PFNGLUSEPROGRAMPROC, UseProgram)
 
 /// The functions of OpenGL that are used, without their prefix.

@@ -14,8 +14,8 @@
 namespace render {
 namespace {
 
-constexpr int kGroup = 64;                  // invocations
-constexpr std::size_t kOneRun = 1u << 18;   // rays: short enough for any watchdog
+constexpr int kGroup = 64;                 // invocations
+constexpr std::size_t kOneRun = 1u << 18;  // rays: short enough for any watchdog
 constexpr int kRayParts = 11, kPixelParts = 2, kHitParts = 5;
 
 enum Binding : GLuint { kPages, kEntries, kMasks, kRays, kHits, kFirstValues };
@@ -116,8 +116,9 @@ std::string valueText(int blocks, int shift) {
   for (int b = 0; b + 1 < blocks; ++b)
     text += fmt::format("  if (i >> {} == {}) return values{}[i & {}];\n", shift, b, b,
                         (1 << shift) - 1);
-  text += blocks == 1 ? "  return values0[i];\n}\n"
-                      : fmt::format("  return values{}[i & {}];\n}}\n", blocks - 1, (1 << shift) - 1);
+  text += blocks == 1
+              ? "  return values0[i];\n}\n"
+              : fmt::format("  return values{}[i & {}];\n}}\n", blocks - 1, (1 << shift) - 1);
   return text;
 }
 
@@ -228,8 +229,8 @@ struct GpuTracer::Impl {
     t.entries = whole(pool.entry);
     t.masks = whole(pool.mask);
     for (std::size_t first = 0; first < pool.value.size(); first += perBlock)
-      t.values.push_back(bufferOf(pool.value.data() + first,
-                                  4 * std::min(perBlock, pool.value.size() - first)));
+      t.values.push_back(
+          bufferOf(pool.value.data() + first, 4 * std::min(perBlock, pool.value.size() - first)));
   }
 
   GLuint programFor(const KernelSolid& solid, bool isPixels) {
@@ -311,8 +312,7 @@ struct GpuTracer::Impl {
   }
 };
 
-GpuTracer::GpuTracer(const GlContext& context, const KernelScene& scene,
-                     std::size_t largestBlock) {
+GpuTracer::GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestBlock) {
   const GlContext::Current current(context);
   impl_ = std::make_unique<Impl>(context, scene, largestBlock);
 }

@@ -1,6 +1,6 @@
-// Primary rays of a band's default view at 1024x768: CPU seconds of the kernel on one thread, of the
-// kernel on the GPU (or Mesa's llvmpipe, whose seconds are the processor's too), and of the judge;
-// what the tables take. render.sh holds them against vdb_render.
+// Primary rays of a band's default view at 1024x768: CPU seconds of the kernel on one thread, of
+// the kernel on the GPU (or Mesa's llvmpipe, whose seconds are the processor's too), and of the
+// judge; what the tables take. render.sh holds them against vdb_render.
 //   render_bench FILE.vdb            a table on standard output: NAME VALUE
 //   render_bench --view FILE.vdb     the view, as vdb_render takes it
 
@@ -82,8 +82,7 @@ void benchmark(const Scene& scene) {
   const double start = cpuSeconds();
   const KernelScene surfaces(scene);
   tell("prepare_s_per_million_voxels", (cpuSeconds() - start) / voxels * 1e6);
-  const double nano =
-      static_cast<double>(nanovdb::openToNanoVDB(levelset::vdb(band)).size());
+  const double nano = static_cast<double>(nanovdb::openToNanoVDB(levelset::vdb(band)).size());
   tell("tables_of_nanovdb", static_cast<double>(surfaces.bytes()) / nano);
 
   const PixelBlock pixels = allPixels();
@@ -131,8 +130,8 @@ int main(int argc, char** argv) try {
     const Camera& c = scene.camera;
     const double across =
         2 * std::atan(std::tan(c.verticalFov / 2) * kWidth / kHeight) * 180 / std::numbers::pi;
-    fmt::print("-translate {},{},{} -lookat {},{},{} -fov {}\n", c.from.x, c.from.y, c.from.z, c.to.x,
-               c.to.y, c.to.z, across);
+    fmt::print("-translate {},{},{} -lookat {},{},{} -fov {}\n", c.from.x, c.from.y, c.from.z,
+               c.to.x, c.to.y, c.to.z, across);
     return 0;
   }
   benchmark(scene);

@@ -7,7 +7,7 @@ status=0
 "$here/beside.sh" "Union/512=0.25 Offset10/250=0.2 Sweep8/128=1" "$build/tests/operators_bench" || status=1
 "$here/beside.sh" "Gaussian/512=0.25 HalveABall=0.1" "$build/tests/flow_bench" || status=1
 "$here/beside.sh" "" "$build/tests/modelling_bench" || status=1
-"$build/tests/advect_bench" function=1 staggered=1 64 || status=1
+for size in 64 128; do "$build/tests/advect_bench" function=1 staggered=1 $size || status=1; done
 "$build/tests/sharp_mesh_bench" || status=1
 "$build/tests/mapping_bench" || status=1
 "$build/tests/scatter_bench" || status=1

@@ -113,9 +113,12 @@ Plan planOffset(Invocation& in) {
   return plan;
 }
 
+constexpr double kBeyondMoved = 8;  // voxels: what is further off counts as that far
+
 /// What an operator makes of the operand, as far as --mask lets it.
+/// @param moved  how far the surface goes, world units
 template <typename Change>
-Value masked(Invocation& in, const Change& change) {
+Value masked(Invocation& in, double moved, const Change& change) {
   levelset::OffsetOptions options = offsetOptions(in);
   const std::optional<levelset::Mask> mask = maskOf(in);
   if (!mask) return Value(change(options));
@@ -123,22 +126,26 @@ Value masked(Invocation& in, const Change& change) {
   const NarrowBand changed = change(options);
   NarrowBand result = levelset::morph(in.band(), changed,
                                       {.mask = mask,
+                                       .farthest = moved / in.band().voxelSize() + kBeyondMoved,
                                        .maxMemory = in.maxMemory,
-                                       .progress = levelset::subProgress(in.progress, 0.5, 1),
+                                       .progress = levelset::subProgress(in.progress, 0.5, 0.9),
                                        .action = options.action});
   if (options.halfWidth)
-    result = levelset::redistance(std::move(result), {.halfWidth = options.halfWidth});
+    result = levelset::redistance(std::move(result),
+                                  {.halfWidth = options.halfWidth,
+                                   .maxMemory = in.maxMemory,
+                                   .progress = levelset::subProgress(in.progress, 0.9, 1)});
   return Value(std::move(result));
 }
 
 Value open(Invocation& in) {
-  return masked(in, [&](const levelset::OffsetOptions& options) {
+  return masked(in, in.length("radius"), [&](const levelset::OffsetOptions& options) {
     return levelset::opening(in.band(), in.length("radius"), options);
   });
 }
 
 Value close(Invocation& in) {
-  return masked(in, [&](const levelset::OffsetOptions& options) {
+  return masked(in, in.length("radius"), [&](const levelset::OffsetOptions& options) {
     return levelset::closing(in.band(), in.length("radius"), options);
   });
 }
@@ -157,7 +164,7 @@ levelset::ShellSide shellSide(const Invocation& in) {
 }
 
 Value shell(Invocation& in) {
-  return masked(in, [&](const levelset::OffsetOptions& options) {
+  return masked(in, in.length("thickness"), [&](const levelset::OffsetOptions& options) {
     return levelset::shell(in.band(), in.length("thickness"), shellSide(in), options);
   });
 }

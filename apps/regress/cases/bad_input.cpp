@@ -101,8 +101,14 @@ void emptyAndFull(Recorder& out) {
     grid->tree().setValueOn(openvdb::Coord(0), static_cast<float>(-0.4 * kVoxel));
     const NarrowBand made = levelset::redistance(levelset::makeBand(grid));
     const levelset::Measurement m = levelset::measure(made);
-    return std::pair{m.components == 1, fmt::format("{} solid of {:.3g} voxels³", m.components,
-                                                    m.volume / (kVoxel * kVoxel * kVoxel))};
+    // An octahedron whose tips are 0.4 of the way to the neighbours has 0.085 voxels³, the cube of
+    // its facets' planes some four times that.
+    const double volume = m.volume / (kVoxel * kVoxel * kVoxel);
+    const bool isSound = m.components == 1 && m.cavities == 0 && m.euler == 2 && volume > 0.02 &&
+                         volume < 0.6 && levelset::check(made).passed();
+    return std::pair{isSound,
+                     fmt::format("{} solid of {:.3g} voxels³, Euler {}{}", m.components, volume,
+                                 m.euler, levelset::check(made).passed() ? "" : ", fails check")};
   });
 }
 

@@ -112,8 +112,8 @@ TEST(GpuTracer, RefusesGridsThatDoNotFit) {
 TEST(GlContext, SaysWhatDoesNotCompile) {
   const GlContext context;
   const GlContext::Current current(context);
-  const std::string words =
-      refusalOf([&] { (void)compileCompute(context, "#version 450 core\nvoid main() { x = 1; }"); });
+  const std::string words = refusalOf(
+      [&] { (void)compileCompute(context, "#version 450 core\nvoid main() { x = 1; }"); });
   EXPECT_NE(words.find("does not compile"), std::string::npos) << words;
   EXPECT_NE(words.find("--renderer cpu"), std::string::npos) << words;
 }
