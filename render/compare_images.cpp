@@ -180,13 +180,15 @@ class Comparer {
     if (result_.unlike.size() > kShown) result_.unlike.resize(kShown);
   }
 
-  [[nodiscard]] double voxelSize() const {
-    const auto found = a_.attributes.find("ls:voxelSize");
-    if (found == a_.attributes.end()) return 1;
-    // The first, where there are several solids.
+  /// A positive length in the first picture's header.
+  [[nodiscard]] double lengthNamed(const char* name, double fallback) const {
+    const auto found = a_.attributes.find(name);
+    if (found == a_.attributes.end()) return fallback;
     const double size = std::atof(found->second.c_str());
-    return size > 0 && std::isfinite(size * size) ? size : 1;
+    return size > 0 && std::isfinite(size * size) ? size : fallback;
   }
+  /// The first, where there are several solids.
+  [[nodiscard]] double voxelSize() const { return lengthNamed("ls:voxelSize", 1); }
 
   [[nodiscard]] double vectorDifference(const std::string& name, std::size_t i) const {
     double squares = 0;
@@ -232,18 +234,20 @@ class Comparer {
         {"curvature.gauss", "per voxel²", {1e-4, kInfinite}, [this, h](std::size_t i) {
            return h * h * apart(value(a_, "curvature.gauss", i), value(b_, "curvature.gauss", i));
          }});
-    add({"Z"}, {"Z", "relative", {2e-6, kOneSurface}, [this](std::size_t i) {
+    // From close by, places are known relative to the solid's size only.
+    const double extent = lengthNamed(kExtentAttribute, 0);
+    add({"Z"}, {"Z", "relative", {2e-6, kOneSurface}, [this, extent](std::size_t i) {
                   const double d = apart(value(a_, "Z", i), value(b_, "Z", i));
-                  return d > 0 ? d / depth(i) : 0;
+                  return d > 0 ? d / std::max(depth(i), extent) : 0;
                 }});
-    add({"P.X", "P.Y", "P.Z"}, {"P",
-                                hasDepth ? "relative to Z" : "absolute",
-                                {hasDepth ? 2e-6 : kInfinite, hasDepth ? 1e-3 : kInfinite},
-                                [this, hasDepth](std::size_t i) {
-                                  const double d = vectorDifference("P", i);
-                                  return d > 0 && hasDepth ? d / std::max(depth(i), distance(i))
-                                                           : d;
-                                }});
+    add({"P.X", "P.Y", "P.Z"},
+        {"P",
+         hasDepth ? "relative to Z" : "absolute",
+         {hasDepth ? 2e-6 : kInfinite, hasDepth ? 1e-3 : kInfinite},
+         [this, hasDepth, extent](std::size_t i) {
+           const double d = vectorDifference("P", i);
+           return d > 0 && hasDepth ? d / std::max({depth(i), distance(i), extent}) : d;
+         }});
     // The angle between unit vectors, precise where it is small.
     add({"N.X", "N.Y", "N.Z"}, {"N", "radians", {2e-4, 1.7e-3}, [this](std::size_t i) {
                                   const double d = vectorDifference("N", i);

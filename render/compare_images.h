@@ -67,9 +67,10 @@ struct ImageComparisonOptions {
 /// A pixel is hit where Z is finite, missed where it is +inf; without Z, hit where A is positive.
 /// Where each Z lies between those that the other picture has within a pixel, they belong to two
 /// surfaces in front of each other: an inner outline, and no layer is compared. Differences of Z
-/// are relative to Z, those of P to it or to P's length if that is larger, those of N angles, those
-/// of curvatures by the voxel size that the first picture's header names (ls:voxelSize; 1 without),
-/// those of id 0 or 1. NaN differs infinitely.
+/// are relative to Z or to the size of what is drawn (ls:extent of the first header) if that is
+/// larger, those of P to these or to P's length, those of N angles, those of curvatures by the
+/// voxel size that the first picture's header names (ls:voxelSize; 1 without), those of id 0 or 1.
+/// NaN differs infinitely.
 /// @throws levelset::InvalidInput for pictures of different sizes, or without Z and A
 /// @throws levelset::UsageError for a tolerance of a layer that they do not have, or that is none
 [[nodiscard]] ImageComparison compareImages(const Image& first, const Image& second,

@@ -11,6 +11,10 @@
 /// Colour is linear with premultiplied alpha, as OpenEXR has it.
 namespace render {
 
+/// Diagonal of the box of what is drawn, world units: what positions in single precision are
+/// relative to.
+inline constexpr const char* kExtentAttribute = "ls:extent";
+
 struct Image {
   int width = 0, height = 0;  ///< pixels
   /// Each width × height, row major, top row first.

@@ -98,7 +98,7 @@ Image renderEmbree(const Scene& scene, const RenderOptions& options) {
   image.attributes = sceneAttributes(scene);
   image.attributes["ls:renderer"] = fmt::format("embree {}", RTC_VERSION_STRING);
   image.attributes["ls:mode"] = "exact";
-  addViewAttributes(image, scene);
+  addViewAttributes(image, scene, rays.bounds().size().length());
   return image;
 }
 

@@ -28,7 +28,9 @@ struct GlContext::Egl {
   decltype(&eglGetProcAddress) getProcAddress = nullptr;
   decltype(&eglQueryString) queryString = nullptr;
   decltype(&eglInitialize) initialize = nullptr;
-  decltype(&eglTerminate) terminate = nullptr;
+  decltype(&eglGetCurrentContext) currentContext = nullptr;
+  decltype(&eglGetCurrentDisplay) currentDisplay = nullptr;
+  decltype(&eglGetCurrentSurface) currentSurface = nullptr;
   decltype(&eglBindAPI) bindApi = nullptr;
   decltype(&eglCreateContext) createContext = nullptr;
   decltype(&eglDestroyContext) destroyContext = nullptr;
@@ -41,19 +43,19 @@ struct GlContext::Egl {
   Egl() {
     library = dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL);
     if (!library) {
-      throw levelset::ResourceLimit(
-          fmt::format("render: there is no EGL here ({}); {}", dlerror(), kWayOut));
+      throw NoOpenGl(fmt::format("render: there is no EGL here ({}); {}", dlerror(), kWayOut));
     }
     const auto load = [&](auto& function, const char* name) {
       function =
           reinterpret_cast<std::remove_reference_t<decltype(function)>>(dlsym(library, name));
-      if (!function)
-        throw levelset::ResourceLimit(fmt::format("render: EGL has no {}; {}", name, kWayOut));
+      if (!function) throw NoOpenGl(fmt::format("render: EGL has no {}; {}", name, kWayOut));
     };
     load(getProcAddress, "eglGetProcAddress");
     load(queryString, "eglQueryString");
     load(initialize, "eglInitialize");
-    load(terminate, "eglTerminate");
+    load(currentContext, "eglGetCurrentContext");
+    load(currentDisplay, "eglGetCurrentDisplay");
+    load(currentSurface, "eglGetCurrentSurface");
     load(bindApi, "eglBindAPI");
     load(createContext, "eglCreateContext");
     load(destroyContext, "eglDestroyContext");
@@ -61,19 +63,16 @@ struct GlContext::Egl {
     getPlatformDisplay = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(
         getProcAddress("eglGetPlatformDisplayEXT"));
     if (!getPlatformDisplay)
-      throw levelset::ResourceLimit(
-          fmt::format("render: EGL cannot do without a window here; {}", kWayOut));
+      throw NoOpenGl(fmt::format("render: EGL cannot do without a window here; {}", kWayOut));
   }
-  // Not closed: drivers leave threads and handlers behind that outlive the context.
+  // The library stays: drivers leave threads and handlers behind that outlive the context.
   ~Egl() { close(); }
   Egl(const Egl&) = delete;
   Egl& operator=(const Egl&) = delete;
 
+  /// The display, which is one for the whole process and whoever else uses it, is not terminated.
   void close() {
-    if (display == EGL_NO_DISPLAY) return;
-    makeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     if (context != EGL_NO_CONTEXT) destroyContext(display, context);
-    terminate(display);
     display = EGL_NO_DISPLAY;
     context = EGL_NO_CONTEXT;
   }
@@ -87,8 +86,7 @@ struct GlContext::Egl {
     if (openOn(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, "no surface")) return;
     for (EGLDeviceEXT device : software)
       if (openOn(EGL_PLATFORM_DEVICE_EXT, device, "a device in software")) return;
-    throw levelset::ResourceLimit(
-        fmt::format("render: no OpenGL 4.5 could be opened ({}); {}", tried, kWayOut));
+    throw NoOpenGl(fmt::format("render: no OpenGL 4.5 could be opened ({}); {}", tried, kWayOut));
   }
 
   void listDevices(std::vector<EGLDeviceEXT>& hardware, std::vector<EGLDeviceEXT>& software) {
@@ -122,28 +120,32 @@ struct GlContext::Egl {
     if (!hasWord(queryString(display, EGL_EXTENSIONS), "EGL_KHR_surfaceless_context"))
       return fail("it needs a window");
     if (!bindApi(EGL_OPENGL_API)) return fail("no OpenGL");
-    constexpr EGLint kVersion[] = {EGL_CONTEXT_MAJOR_VERSION,
-                                   4,
-                                   EGL_CONTEXT_MINOR_VERSION,
-                                   5,
-                                   EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                   EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                   EGL_NONE};
-    context = createContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, kVersion);
-    if (context == EGL_NO_CONTEXT) return fail("no context of version 4.5");
-    if (!makeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
-      return fail("the context is of no use");
-    return true;
+    // With word of a lost context where the driver can give it.
+    for (const bool tellsLoss : {true, false}) {
+      const EGLint version[] = {
+          EGL_CONTEXT_MAJOR_VERSION,
+          4,
+          EGL_CONTEXT_MINOR_VERSION,
+          5,
+          EGL_CONTEXT_OPENGL_PROFILE_MASK,
+          EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+          tellsLoss ? EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY : EGL_NONE,
+          EGL_LOSE_CONTEXT_ON_RESET,
+          EGL_NONE};
+      context = createContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, version);
+      if (context != EGL_NO_CONTEXT) return true;
+    }
+    return fail("no context of version 4.5 without a configuration");
   }
 };
 
 GlContext::GlContext() : egl_(std::make_unique<Egl>()) {
   egl_->open();
+  const Current current(*this);
   const auto load = [&](auto& function, const char* name) {
     function =
         reinterpret_cast<std::remove_reference_t<decltype(function)>>(egl_->getProcAddress(name));
-    if (!function)
-      throw levelset::ResourceLimit(fmt::format("render: OpenGL has no {}; {}", name, kWayOut));
+    if (!function) throw NoOpenGl(fmt::format("render: OpenGL has no {}; {}", name, kWayOut));
   };
 #define LEVELSMITH_GL_LOAD(Type, name) load(gl_.name, "gl" #name);
   LEVELSMITH_GL_FUNCTIONS(LEVELSMITH_GL_LOAD)
@@ -158,13 +160,16 @@ GlContext::GlContext() : egl_(std::make_unique<Egl>()) {
   gl_.GetInteger64v(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, &blocks);
   largestBlock_ = static_cast<std::size_t>(bytes);
   blockCount_ = static_cast<int>(blocks);
-  egl_->makeCurrent(egl_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
 }
 
 GlContext::~GlContext() = default;
 
 GlContext::Current::Current(const GlContext& context) : context_(context), lock_(context.mutex_) {
   Egl& egl = *context.egl_;
+  display_ = egl.currentDisplay();
+  draw_ = egl.currentSurface(EGL_DRAW);
+  read_ = egl.currentSurface(EGL_READ);
+  before_ = egl.currentContext();
   // The API is each thread's own.
   if (!egl.bindApi(EGL_OPENGL_API) ||
       !egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, egl.context)) {
@@ -175,7 +180,10 @@ GlContext::Current::Current(const GlContext& context) : context_(context), lock_
 
 GlContext::Current::~Current() {
   Egl& egl = *context_.egl_;
-  egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  if (before_ != EGL_NO_CONTEXT)
+    egl.makeCurrent(display_, draw_, read_, before_);
+  else
+    egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
 }
 
 void GlContext::check(const char* what) const {

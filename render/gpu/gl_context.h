@@ -11,6 +11,8 @@
 #include <mutex>
 #include <string>
 
+#include "render/gpu/gpu_renderer.h"
+
 namespace render {
 
 #define LEVELSMITH_GL_FUNCTIONS(X)                           \
@@ -53,13 +55,14 @@ struct GlFunctions {
 /// A context of OpenGL 4.5 of its own. Hardware is preferred to software.
 class GlContext {
  public:
-  /// @throws levelset::ResourceLimit where there is no EGL, or no OpenGL 4.5, with what was tried
+  /// @throws NoOpenGl where there is no EGL, or no OpenGL 4.5, with what was tried
   GlContext();
   ~GlContext();
   GlContext(const GlContext&) = delete;
   GlContext& operator=(const GlContext&) = delete;
 
-  /// While it lives the calling thread, and no other, may call OpenGL.
+  /// While it lives the calling thread, and no other, may call OpenGL; then what was current before
+  /// is again.
   class Current {
    public:
     explicit Current(const GlContext& context);
@@ -70,6 +73,7 @@ class GlContext {
    private:
     const GlContext& context_;
     std::unique_lock<std::mutex> lock_;
+    void *display_, *draw_, *read_, *before_;
   };
 
   const GlFunctions& gl() const { return gl_; }

@@ -135,21 +135,22 @@ std::string shaderText(const char* rays, int valueBlocks, int shift) {
 
 GLuint compileCompute(const GlContext& context, const std::string& text) {
   const GlFunctions& gl = context.gl();
+  const GLuint shader = gl.CreateShader(GL_COMPUTE_SHADER), program = gl.CreateProgram();
   const auto refuse = [&](const char* what, auto getLog, GLuint object) {
     char log[400] = "";
     getLog(object, sizeof log, nullptr, log);
+    gl.DeleteShader(shader);
+    gl.DeleteProgram(program);
     throw levelset::ResourceLimit(fmt::format(
         "render: the graphics driver ({}) does not {} the ray caster: {}; draw with --renderer cpu",
         context.description(), what, log));
   };
-  const GLuint shader = gl.CreateShader(GL_COMPUTE_SHADER);
   const char* lines = text.c_str();
   gl.ShaderSource(shader, 1, &lines, nullptr);
   gl.CompileShader(shader);
   GLint isGood = 0;
   gl.GetShaderiv(shader, GL_COMPILE_STATUS, &isGood);
   if (!isGood) refuse("compile", gl.GetShaderInfoLog, shader);
-  const GLuint program = gl.CreateProgram();
   gl.AttachShader(program, shader);
   gl.LinkProgram(program);
   gl.GetProgramiv(program, GL_LINK_STATUS, &isGood);
@@ -173,18 +174,18 @@ struct GpuTracer::Impl {
   /// By the number of blocks of values.
   std::map<int, GLuint> pixelPrograms, rayPrograms;
 
-  Impl(const GlContext& context_, const KernelScene& scene, std::size_t largestBlock_)
+  Impl(const GlContext& context_, std::size_t largestBlock_)
       : context(context_),
         gl(context_.gl()),
         largestBlock(largestBlock_ > 0 ? largestBlock_ : context_.largestBlock()) {
     shift = static_cast<int>(std::bit_width(largestBlock / sizeof(float))) - 1;
     shift = std::min(shift, 30);  // numbers of values are ints
-    for (const KernelSolid& solid : scene.solids()) upload(solid);
     gl.CreateBuffers(1, &rays);
     gl.CreateBuffers(1, &hits);
   }
 
-  ~Impl() {
+  /// @pre the context is current
+  void release() {
     for (auto& [solid, t] : tables) {
       for (const GLuint buffer : {t.pages, t.entries, t.masks}) gl.DeleteBuffers(1, &buffer);
       for (const GLuint buffer : t.values) gl.DeleteBuffers(1, &buffer);
@@ -206,7 +207,6 @@ struct GpuTracer::Impl {
     GLuint buffer = 0;
     gl.CreateBuffers(1, &buffer);
     gl.NamedBufferData(buffer, static_cast<GLsizeiptr>(bytes), data, GL_STATIC_DRAW);
-    context.check("the upload of a grid");
     return buffer;
   }
 
@@ -314,12 +314,21 @@ struct GpuTracer::Impl {
 
 GpuTracer::GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestBlock) {
   const GlContext::Current current(context);
-  impl_ = std::make_unique<Impl>(context, scene, largestBlock);
+  impl_ = std::make_unique<Impl>(context, largestBlock);
+  try {
+    for (const KernelSolid& solid : scene.solids()) impl_->upload(solid);
+  } catch (...) {
+    impl_->release();
+    throw;
+  }
 }
 
 GpuTracer::~GpuTracer() {
-  const GlContext::Current current(impl_->context);
-  impl_.reset();
+  try {
+    const GlContext::Current current(impl_->context);
+    impl_->release();
+  } catch (const levelset::Error&) {  // what a lost context held is lost with it
+  }
 }
 
 void GpuTracer::trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits) const {

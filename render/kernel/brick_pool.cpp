@@ -20,7 +20,8 @@ using Leaf = openvdb::FloatTree::LeafNodeType;
 
 constexpr int kBlock = 8, kEntriesOfPage = 512;
 constexpr int kMostEmptyPages = 1 << 10;  // pages along the edge of an empty cube
-constexpr double kMostPages = 1 << 26;    // 256 MiB
+// Single precision tells a place this far from the table's corner to 5e-4 voxel.
+constexpr double kWidest = 8192;  // voxels
 constexpr std::size_t kMostBricks = std::numeric_limits<std::int32_t>::max() / BrickPool::kValues;
 
 struct Brick {
@@ -207,21 +208,17 @@ BrickPool makeBricks(const levelset::NarrowBand& band) {
   }
   openvdb::CoordBBox box;
   for (const auto& brick : bricks) box.expand(brick->origin);
-  double count = 1;
   std::array<double, 3> spans{};
   for (int a = 0; a < 3; ++a) {
     const auto i = static_cast<std::size_t>(a);
-    const double span = static_cast<double>(box.max()[a]) - box.min()[a] + kBlock;
-    const double pages = std::ceil(span / BrickPool::kPage);
-    count *= pages;
-    spans[i] = span;
+    spans[i] = static_cast<double>(box.max()[a]) - box.min()[a] + kBlock;
     pool.origin[i] = box.min()[a];
   }
-  if (count > kMostPages) {
+  if (*std::max_element(spans.begin(), spans.end()) > kWidest) {
     throw levelset::ResourceLimit(fmt::format(
-        "render: the surface spans {:.3g} x {:.3g} x {:.3g} voxels, too many for a table of pages; "
-        "use larger voxels, or draw its parts apart",
-        spans[0], spans[1], spans[2]));
+        "render: the surface spans {:.6g} x {:.6g} x {:.6g} voxels, and {:.0f} are the most in "
+        "single precision; draw with --renderer embree, use larger voxels, or draw its parts apart",
+        spans[0], spans[1], spans[2], kWidest));
   }
   for (std::size_t i = 0; i < 3; ++i) {
     pool.pages[i] = static_cast<int>(std::ceil(spans[i] / BrickPool::kPage));

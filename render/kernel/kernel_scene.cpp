@@ -13,8 +13,9 @@ namespace {
 using Imath::M44d;
 using Imath::V3d;
 
-constexpr double kLeastDirection = 1e-20;  // as the kernel's
-constexpr double kBesideBox = 0.0625;
+constexpr double kBesideBox = 0.0625;  // lest rounding loses a crossing on a face of the box
+constexpr double kParallel = 1e30;
+constexpr std::size_t kRaysAtOnce = 1u << 18;
 
 Imath::Box3d cellBox(const BrickPool& pool) {
   Imath::Box3d box;
@@ -32,18 +33,13 @@ Span clipped(const BrickPool& pool, const V3d& origin, const V3d& direction, dou
   Span span{0, reach};
   for (int a = 0; a < 3; ++a) {
     const auto i = static_cast<std::size_t>(a);
-    const double t0 = (pool.low[i] - kBesideBox - origin[a]) / direction[a],
-                 t1 = (pool.high[i] + kBesideBox - origin[a]) / direction[a];
+    const double inverse = std::abs(direction[a]) < 1 / kParallel ? kParallel : 1 / direction[a];
+    const double t0 = (pool.low[i] - kBesideBox - origin[a]) * inverse,
+                 t1 = (pool.high[i] + kBesideBox - origin[a]) * inverse;
     span.enter = std::max(span.enter, std::min(t0, t1));
     span.leave = std::min(span.leave, std::max(t0, t1));
   }
   return span;
-}
-
-V3d withoutZeros(V3d direction) {
-  for (int a = 0; a < 3; ++a)
-    if (std::abs(direction[a]) < kLeastDirection) direction[a] = kLeastDirection;
-  return direction;
 }
 
 /// Rays of a list that come near a solid, as its kernel takes them.
@@ -51,20 +47,20 @@ struct PackedRays {
   std::vector<std::size_t> number;  // in the list
   RayBlock block{0};
 
+  /// Of those from `first` up to `last`.
   PackedRays(const KernelSolid& solid, const std::vector<LightRay>& rays,
-             const std::vector<char>& isDone) {
+             const std::vector<char>& isDone, std::size_t first, std::size_t last) {
     struct Ready {
       V3d origin, direction;
       Span span;
     };
     std::vector<Ready> ready;
-    for (std::size_t i = 0; i < rays.size(); ++i) {
+    for (std::size_t i = first; i < last; ++i) {
       if (isDone[i]) continue;
       // A step of t is a voxel, so that single precision suits whatever the unit is.
       V3d origin, direction;
       solid.worldToTable.multVecMatrix(rays[i].origin, origin);
       solid.worldToTable.multDirMatrix(rays[i].direction * solid.voxelSize, direction);
-      direction = withoutZeros(direction);
       const Span span = clipped(solid.pool, origin, direction, rays[i].reach / solid.voxelSize);
       if (!(span.enter <= span.leave)) continue;
       ready.push_back({origin + direction * span.enter, direction, span});
@@ -82,9 +78,9 @@ struct PackedRays {
       set(block.dx, ray.direction.x);
       set(block.dy, ray.direction.y);
       set(block.dz, ray.direction.z);
-      block.ix[n] = 1 / block.dx[n];
-      block.iy[n] = 1 / block.dy[n];
-      block.iz[n] = 1 / block.dz[n];
+      block.ix[n] = rayInverse(block.dx[n]);
+      block.iy[n] = rayInverse(block.dy[n]);
+      block.iz[n] = rayInverse(block.dz[n]);
       block.start[n] = 0;
       set(block.end, ray.span.leave - ray.span.enter);
     }
@@ -152,12 +148,15 @@ PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& 
 std::vector<char> KernelScene::findBlocked(const KernelTracer& tracer,
                                            const std::vector<LightRay>& rays) const {
   std::vector<char> blocked(rays.size(), 0);
-  for (const KernelSolid& solid : solids_) {
-    const PackedRays packed(solid, rays, blocked);
-    HitBlock hits(packed.block.size);
-    tracer.trace(solid, packed.block, hits);
-    for (std::size_t n = 0; n < packed.number.size(); ++n)
-      if (hits.found[n]) blocked[packed.number[n]] = 1;
+  for (std::size_t first = 0; first < rays.size(); first += kRaysAtOnce) {
+    const std::size_t last = std::min(rays.size(), first + kRaysAtOnce);
+    for (const KernelSolid& solid : solids_) {
+      const PackedRays packed(solid, rays, blocked, first, last);
+      HitBlock hits(packed.block.size);
+      tracer.trace(solid, packed.block, hits);
+      for (std::size_t n = 0; n < packed.number.size(); ++n)
+        if (hits.found[n]) blocked[packed.number[n]] = 1;
+    }
   }
   return blocked;
 }

@@ -14,7 +14,8 @@ namespace {
 using Imath::V2d;
 using Imath::V3d;
 
-constexpr int kSquare = 4;           // pixels along the edge of a packet
+constexpr int kSquare = 4;                        // pixels along the edge of a packet
+constexpr std::size_t kMostLightRays = 1u << 18;  // that wait for an answer
 constexpr double kCastError = 2e-3;  // of the kernel's depths, voxels: rays to lights start beyond
 
 }  // namespace
@@ -106,7 +107,17 @@ void KernelPainter::paintColours(const KernelTracer& tracer,
     const PixelHits hits = surfaces_.castPixels(tracer, at);
     std::vector<LightRay> rays;
     std::vector<Lit> points;
+    const auto addColours = [&] {
+      const std::vector<char> blocked = surfaces_.findBlocked(tracer, rays);
+      for (const Lit& point : points) {
+        sums[point.pixel] += shader_.colour(point.hit, point.direction, point.range, rays, blocked);
+        ++covered[point.pixel];
+      }
+      rays.clear();
+      points.clear();
+    };
     for (std::size_t i = 0; i < pixels.size(); ++i) {
+      if (rays.size() > kMostLightRays) addColours();
       if (hits.solid[i] < 0) continue;
       Lit point;
       point.pixel = i;
@@ -115,11 +126,7 @@ void KernelPainter::paintColours(const KernelTracer& tracer,
       point.range = shader_.addRays(point.hit, point.direction, pixels[i].x, pixels[i].y, s, rays);
       points.push_back(point);
     }
-    const std::vector<char> blocked = surfaces_.findBlocked(tracer, rays);
-    for (const Lit& point : points) {
-      sums[point.pixel] += shader_.colour(point.hit, point.direction, point.range, rays, blocked);
-      ++covered[point.pixel];
-    }
+    addColours();
   }
   for (std::size_t i = 0; i < pixels.size(); ++i)
     layers_.setColour(numberOf(pixels[i]), sums[i], covered[i], options_.samples);
@@ -148,7 +155,7 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
   image.attributes["ls:read"] = fmt::format(
       "{} blocks of 8x8x8 cells, {:.1f} MB; {} more that the surface does not cross were left out",
       bricks, static_cast<double>(surfaces.bytes()) * 1e-6, surfaces.blocksLeftOut());
-  addViewAttributes(image, scene);
+  addViewAttributes(image, scene, surfaces.bounds().size().length());
   return image;
 }
 

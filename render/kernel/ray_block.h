@@ -6,6 +6,11 @@
 
 namespace render {
 
+/// What the kernel takes for 1 / d: a ray that goes nowhere on an axis meets no plane of it.
+inline float rayInverse(float d) {
+  return d == 0 ? 1e30f : 1 / d;
+}
+
 /// Rays in the space of a BrickPool's table, by number; arrays are a multiple of kLanes long. A ray
 /// that starts behind its end meets nothing.
 struct RayBlock {
@@ -13,8 +18,8 @@ struct RayBlock {
 
   std::size_t size = 0;           ///< of the arrays
   std::vector<float> ox, oy, oz;  ///< where t is 0
-  std::vector<float> dx, dy, dz;  ///< by t; never 0
-  std::vector<float> ix, iy, iz;  ///< 1 / d
+  std::vector<float> dx, dy, dz;  ///< by t
+  std::vector<float> ix, iy, iz;  ///< rayInverse(d)
   std::vector<float> start, end;  ///< of t
 
   explicit RayBlock(std::size_t count) : size((count + kLanes - 1) / kLanes * kLanes) {

@@ -35,7 +35,8 @@ RayFan makeRayFan(const Camera& camera, const levelset::NarrowBand& band, const 
                 i & 1 ? pool.high[2] : pool.low[2]);
     depth = std::min(depth, (p * tableToWorld - camera.from).dot(axis));
   }
-  depth = std::max(depth, 0.0);
+  // Off the faces of the box, where the surface may be.
+  depth = std::max(depth - 2 * band.voxelSize(), 0.0);
 
   RayFan fan;
   fan.depth = depth;

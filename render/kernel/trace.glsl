@@ -14,13 +14,15 @@ CONST_INT kBisections = 20;      // of the part that holds one
 CONST_FLOAT kThird = 0.33333333333f;
 CONST_FLOAT kBarelyInside = -1e-30f;
 CONST_FLOAT kLeastDirection = 1e-20f;
+CONST_FLOAT kParallel = 1e30f;
 CONST_FLOAT kBesideBox = 0.0625f;  // so that rounding loses no crossing on a face of the box
 
 // Where a ray meets the plane of points k. The only such function: monotone in k, and the same for
 // the two cells at a plane, so that no ray slips between them.
 Real planeAt(Whole k, Real origin, Real inverse) {
   VAR distance = toReal(k) - origin;
-  return distance * inverse;
+  VAR t = distance * inverse;
+  return t;
 }
 
 // The cell on one axis that a ray is in at t, among those from low to high.
@@ -28,7 +30,7 @@ Whole cellAt(Real t, Real origin, Real direction, Real inverse, Whole low, Whole
   VAR place = origin + t * direction;
   VAR held = smaller(larger(place, toReal(low)), toReal(high));
   Whole cell = toWhole(held);  // not negative
-  Bool ahead = direction > 0.0f;
+  Bool ahead = direction >= 0.0f;
   VAR leaves = planeAt(select(ahead, cell + 1, cell), origin, inverse);
   VAR enters = planeAt(select(ahead, cell, cell + 1), origin, inverse);
   Whole onwards = select(ahead, whole(1), whole(-1));
@@ -210,8 +212,8 @@ Crossing crossingIn(Bool asked, Whole brick, Whole corner, Real x0, Real y0, Rea
 
 struct Ray {
   Real ox, oy, oz;  // where t is 0
-  Real dx, dy, dz;  // by t; never 0
-  Real ix, iy, iz;  // their inverses
+  Real dx, dy, dz;  // by t
+  Real ix, iy, iz;  // their inverses; kParallel where they are 0
   Real start, end;  // of t
 };
 
@@ -221,10 +223,13 @@ Real onFan(float middle, float right, float down, Real x, Real y) {
   return across + middle;
 }
 
-// A direction that no division fails on; it is off by less than anything.
-Real notZero(Real d) {
-  return select(AND(d > -kLeastDirection, d < kLeastDirection), real(kLeastDirection), d);
+// A ray that goes nowhere on an axis counts as going ahead and meets no plane of it: its inverse
+// is kParallel, and it is not moved off the place where it is.
+Real onlyFar(Real d) {
+  return select(AND(d > -kLeastDirection, d < kLeastDirection), real(0.0f), d);
 }
+
+Real inverseOf(Real d) { return select(d == 0.0f, real(kParallel), 1.0f / d); }
 
 // The ray of the pixel (x, y) of the fan, between the faces of the box of crossing cells.
 Ray viewRay(Real x, Real y) {
@@ -232,12 +237,12 @@ Ray viewRay(Real x, Real y) {
   ray.ox = onFan(fan.origin[0], fan.originX[0], fan.originY[0], x, y);
   ray.oy = onFan(fan.origin[1], fan.originX[1], fan.originY[1], x, y);
   ray.oz = onFan(fan.origin[2], fan.originX[2], fan.originY[2], x, y);
-  ray.dx = notZero(onFan(fan.direction[0], fan.directionX[0], fan.directionY[0], x, y));
-  ray.dy = notZero(onFan(fan.direction[1], fan.directionX[1], fan.directionY[1], x, y));
-  ray.dz = notZero(onFan(fan.direction[2], fan.directionX[2], fan.directionY[2], x, y));
-  ray.ix = 1.0f / ray.dx;
-  ray.iy = 1.0f / ray.dy;
-  ray.iz = 1.0f / ray.dz;
+  ray.dx = onlyFar(onFan(fan.direction[0], fan.directionX[0], fan.directionY[0], x, y));
+  ray.dy = onlyFar(onFan(fan.direction[1], fan.directionX[1], fan.directionY[1], x, y));
+  ray.dz = onlyFar(onFan(fan.direction[2], fan.directionX[2], fan.directionY[2], x, y));
+  ray.ix = inverseOf(ray.dx);
+  ray.iy = inverseOf(ray.dy);
+  ray.iz = inverseOf(ray.dz);
   VAR ax = (fan.low[0] - kBesideBox - ray.ox) * ray.ix;
   VAR ay = (fan.low[1] - kBesideBox - ray.oy) * ray.iy;
   VAR az = (fan.low[2] - kBesideBox - ray.oz) * ray.iz;
@@ -256,9 +261,9 @@ struct Hit {
 };
 
 Hit trace(Ray ray) {
-  Bool aheadX = ray.dx > 0.0f;
-  Bool aheadY = ray.dy > 0.0f;
-  Bool aheadZ = ray.dz > 0.0f;
+  Bool aheadX = ray.dx >= 0.0f;
+  Bool aheadY = ray.dy >= 0.0f;
+  Bool aheadZ = ray.dz >= 0.0f;
   Hit hit;
   hit.found = no();
   hit.t = ray.start;
@@ -267,6 +272,11 @@ Hit trace(Ray ray) {
   Whole x = cellAt(t, ray.ox, ray.dx, ray.ix, whole(0), whole(tableSizeX - 1));
   Whole y = cellAt(t, ray.oy, ray.dy, ray.iy, whole(0), whole(tableSizeY - 1));
   Whole z = cellAt(t, ray.oz, ray.dz, ray.iz, whole(0), whole(tableSizeZ - 1));
+  // A ray that starts before the table's first cells begins on their faces.
+  t = larger(t, planeAt(select(aheadX, x, x + 1), ray.ox, ray.ix));
+  t = larger(t, planeAt(select(aheadY, y, y + 1), ray.oy, ray.iy));
+  t = larger(t, planeAt(select(aheadZ, z, z + 1), ray.oz, ray.iz));
+  alive = AND(alive, t <= ray.end);
   Whole entered = whole(kNone);
   Bool solved = no();    // the cell where a lane is crosses the surface, and the ray does not there
   Bool carried = no();   // the cell before was such a one
@@ -336,12 +346,18 @@ Hit trace(Ray ray) {
       VAR fromX = ray.ox - toReal(x);
       VAR fromY = ray.oy - toReal(y);
       VAR fromZ = ray.oz - toReal(z);
-      VAR x0 = smaller(larger(fromX + t * ray.dx, 0.0f), 1.0f);
-      VAR y0 = smaller(larger(fromY + t * ray.dy, 0.0f), 1.0f);
-      VAR z0 = smaller(larger(fromZ + t * ray.dz, 0.0f), 1.0f);
-      VAR x1 = smaller(larger(fromX + tExit * ray.dx, 0.0f), 1.0f);
-      VAR y1 = smaller(larger(fromY + tExit * ray.dy, 0.0f), 1.0f);
-      VAR z1 = smaller(larger(fromZ + tExit * ray.dz, 0.0f), 1.0f);
+      VAR inX = fromX + t * ray.dx;
+      VAR x0 = smaller(larger(inX, 0.0f), 1.0f);
+      VAR inY = fromY + t * ray.dy;
+      VAR y0 = smaller(larger(inY, 0.0f), 1.0f);
+      VAR inZ = fromZ + t * ray.dz;
+      VAR z0 = smaller(larger(inZ, 0.0f), 1.0f);
+      VAR outX = fromX + tExit * ray.dx;
+      VAR x1 = smaller(larger(outX, 0.0f), 1.0f);
+      VAR outY = fromY + tExit * ray.dy;
+      VAR y1 = smaller(larger(outY, 0.0f), 1.0f);
+      VAR outZ = fromZ + tExit * ray.dz;
+      VAR z1 = smaller(larger(outZ, 0.0f), 1.0f);
       Crossing crossing = crossingIn(asked, brick, corner, x0, y0, z0, x1, y1, z1, entered, axis,
                                      aheadX, aheadY, aheadZ, carried, inside);
       VAR place = t + crossing.share * (tExit - t);

@@ -104,7 +104,8 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene) {
           {"ls:voxelSize", voxelSizes}};
 }
 
-void addViewAttributes(Image& image, const Scene& scene) {
+void addViewAttributes(Image& image, const Scene& scene, double extent) {
+  image.attributes[kExtentAttribute] = fmt::format("{:.9g}", extent);
   image.attributes["software"] = "Levelsmith " LEVELSMITH_VERSION;
   image.attributes["depthType"] = "distance along the view axis";
   const auto floats = [](const Imath::M44d& m) {

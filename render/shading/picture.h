@@ -38,7 +38,8 @@ void requirePicture(const Scene& scene, const RenderOptions& options);
 /// ls:grid (name and content hash of each solid), ls:voxelSize, and how layers are made.
 [[nodiscard]] std::map<std::string, std::string> sceneAttributes(const Scene& scene);
 
-/// Software, camera matrices and what Z is.
-void addViewAttributes(Image& image, const Scene& scene);
+/// Software, camera matrices, what Z is, and ls:extent.
+/// @param extent  diagonal of the surfaces' box, world units
+void addViewAttributes(Image& image, const Scene& scene, double extent);
 
 }  // namespace render

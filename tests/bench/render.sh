@@ -41,6 +41,8 @@ cat "$folder"/*.txt | awk '
     printf "  %-50s %8.3g s of CPU\n", "cpu, all layers and shading, one thread", value["cpu_all_layers_s"]
     judge("tables, s per million voxels", value["prepare_s_per_million_voxels"], value["prepare_s_per_million_voxels"], 0.1, 0)
     if (name == "dragon") judge("tables, bytes beside NanoVDB", value["tables_of_nanovdb"], value["tables_of_nanovdb"], 1.1, 0)
+    split("", value)
+    gpu = ""
     next
   }
   $1 == "gpu" { sub(/^gpu /, ""); gpu = $0; next }

@@ -31,13 +31,21 @@ inline render::Scene seenFromFar(const levelset::NarrowBand& band) {
   return scene;
 }
 
-/// Orthographic, a pixel of 120 a world unit, so that rays run along grid lines and faces.
+/// Orthographic, a pixel a world unit, so that rays run through grid points, along edges and in
+/// faces of cells.
 inline render::Scene alongTheLattice(const levelset::NarrowBand& band, const Imath::V3d& from) {
-  render::Scene scene = sceneOf(band);
-  scene.camera.from = from;
-  scene.camera.to = Imath::V3d(0);
-  scene.camera.orthoHeight = 120;
+  render::Scene scene = sceneOf(band, 128, 64);  // for which no place is rounded
+  const Imath::V3d half(from.x == 0 ? 0.5 : 0, from.y == 0 ? 0.5 : 0, from.z == 0 ? 0.5 : 0);
+  scene.camera.from = from + half;
+  scene.camera.to = half;
+  if (from.x == 0 && from.z == 0) scene.camera.up = Imath::V3d(0, 0, 1);
+  scene.camera.orthoHeight = 64;
   return scene;
+}
+
+/// All faces on grid points: cells that are zero on a face, an edge or in a corner.
+inline levelset::NarrowBand latticeBox() {
+  return levelset::makeBox(Imath::V3d(32, 24, 16), Imath::V3d(0), 1);
 }
 
 }  // namespace support

@@ -114,7 +114,7 @@ render::Image drawByKernel(Invocation& in, const render::Scene& scene,
                            const render::RenderOptions& options) {
   try {
     return render::renderGpu(scene, options);
-  } catch (const levelset::ResourceLimit& error) {
+  } catch (const render::NoOpenGl& error) {
     in.notes.warnings.push_back(fmt::format("{}; 'both' takes the processor now", error.what()));
     return render::renderCpu(scene, options);
   }
@@ -146,6 +146,9 @@ Value draw(Invocation& in) {
     const render::ImageComparison found =
         render::compareImages(image, render::renderEmbree(scene, options));
     in.notes.detailsJson = toJson(found).dump();
+    if (found.bothHit == 0)
+      in.notes.warnings.push_back(
+          "render: no pixel shows a surface in both pictures, so no layer was compared");
     if (!found.agrees())
       throw levelset::NumericalError(
           fmt::format("render: the kernel's picture and the judge's differ: {}; draw both and look "
@@ -294,7 +297,7 @@ void addPictureOperators(std::vector<Operator>& all) {
                  "N.Z, P.X P.Y P.Z, "
                  "curvature.mean .gauss .k1 .k2, id. Without --from, a three-quarter view that "
                  "frames the solid. 'gpu' and 'cpu' are one kernel in single precision, with the "
-                 "same bits; 'embree' is in double precision and shares nothing with it. 'both' "
+                 "same bits; 'embree' finds places by code of its own in double precision. 'both' "
                  "draws with the kernel, writes that, compares the layers with those of embree, "
                  "and ends with exit code 5 where they differ by more than two correct renderers "
                  "may.",

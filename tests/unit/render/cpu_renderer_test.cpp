@@ -58,8 +58,29 @@ TEST(CpuRenderer, AgreesFromWithinFarAwayAndAlongTheLattice) {
   scene.camera.to = V3d(20, 10, 1);
   EXPECT_EQ(disagreement(scene), "");
   EXPECT_EQ(disagreement(support::seenFromFar(rings())), "");
-  EXPECT_EQ(disagreement(support::alongTheLattice(rings(), V3d(0, 0, 100))), "");
-  EXPECT_EQ(disagreement(support::alongTheLattice(rings(), V3d(100, 0, 0))), "");
+  for (const NarrowBand& solid : {rings(), support::latticeBox()})
+    for (const V3d& from : {V3d(0, 0, 100), V3d(100, 0, 0), V3d(0, 100, 0), V3d(-100, 0, 0)})
+      EXPECT_EQ(disagreement(support::alongTheLattice(solid, from)), "") << from;
+}
+
+TEST(CpuRenderer, HasNoHoleInAFaceOfTheBoxAcrossTheView) {
+  Scene scene = sceneOf(levelset::makeBox(V3d(32), V3d(0), 1), 101, 101);
+  scene.camera.from = V3d(2e-5, 1.3e-5, 100);
+  scene.camera.to = V3d(0);
+  scene.camera.orthoHeight = 40;
+  EXPECT_EQ(disagreement(scene), "");
+  const Image image = renderCpu(scene, kDataOnly);
+  for (const float z : image.channels.at("Z"))
+    if (std::isfinite(z)) {
+      ASSERT_NEAR(z, 84, 0.1);
+    }
+}
+
+TEST(CpuRenderer, AgreesCloseUpToAWideSolid) {
+  Scene scene = sceneOf(levelset::makeBox(V3d(0.4, 0.4, 8), V3d(0.001, 0.002, 0.0037), 0.01));
+  scene.camera.from = V3d(0.01, 0.03, 4.2);
+  scene.camera.to = V3d(0, 0, 4);
+  EXPECT_EQ(disagreement(scene), "");
 }
 
 TEST(CpuRenderer, DrawsTheNearerOfTwoSolids) {
@@ -99,6 +120,9 @@ TEST(CpuRenderer, ColoursAsTheJudgeDoes) {
 
 TEST(CpuRenderer, Refuses) {
   EXPECT_THROW((void)renderCpu(Scene()), levelset::InvalidInput);
+  const NarrowBand apart = levelset::unite(levelset::makeSphere(1, V3d(-1.1e8, 0, 0), 0.1),
+                                           levelset::makeSphere(1, V3d(1.1e8, 0, 0), 0.1));
+  EXPECT_THROW((void)renderCpu(sceneOf(apart)), levelset::ResourceLimit);
   Scene scene = sceneOf(levelset::makeSphere(20, V3d(0), 1), 32, 24);
   RenderOptions little = kDataOnly;
   little.maxBytes = 200000;  // room for the picture

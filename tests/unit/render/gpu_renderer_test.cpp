@@ -51,8 +51,8 @@ TEST(GpuRenderer, HasTheBitsOfTheProcessorFromWithinFarAwayAndAlongTheLattice) {
   expectSameBits(scene, "from within");
   expectSameBits(support::seenFromFar(rings()), "far away");
   for (const V3d& from : {V3d(100, 0, 0), V3d(0, 0, -100)}) {
-    scene = support::alongTheLattice(rings(), from);
-    expectSameBits(scene, "along the lattice");
+    expectSameBits(support::alongTheLattice(rings(), from), "along the lattice");
+    expectSameBits(support::alongTheLattice(support::latticeBox(), from), "box on the lattice");
   }
 }
 
@@ -103,10 +103,26 @@ TEST(GpuTracer, RefusesGridsThatDoNotFit) {
   const GlContext context;
   EXPECT_NE(refusalOf([&] { GpuTracer(context, surfaces, 1u << 14); }).find("storage blocks"),
             std::string::npos);
-  EXPECT_NE(refusalOf([&] { GpuTracer(context, surfaces, 1u << 10); }).find("render:"),
+  // The table of blocks alone is larger than that.
+  EXPECT_NE(refusalOf([&] { GpuTracer(context, surfaces, 1u << 10); }).find("cpu"),
             std::string::npos);
   // Nothing is wrong with the context after that.
   const GpuTracer good(context, surfaces);
+}
+
+TEST(GlContext, OutlivesAnother) {
+  const Scene scene = sceneOf(levelset::makeSphere(20, V3d(0.3, 0.2, 0.1), 1));
+  const KernelScene surfaces(scene);
+  const GlContext first;
+  const GpuTracer tracer(first, surfaces);
+  {
+    const GlContext second;
+    const GlContext::Current current(second);
+  }
+  PixelBlock pixels(64);
+  HitBlock hits(pixels.size());
+  EXPECT_NO_THROW(tracer.trace(surfaces.solids()[0], pixels, hits));
+  EXPECT_EQ(hits.found[0], -1);
 }
 
 TEST(GlContext, SaysWhatDoesNotCompile) {

@@ -65,7 +65,7 @@ std::vector<double> traced(const BrickPool& pool, const std::vector<IndexRay>& r
                        V3d(pool.origin[0], pool.origin[1], pool.origin[2]);
     const auto direction = [&](int a) {
       const double d = rays[n].direction[a];
-      return static_cast<float>(std::abs(d) < 1e-20 ? 1e-20 : d);
+      return static_cast<float>(std::abs(d) < 1e-20 ? 0 : d);
     };
     block.ox[n] = static_cast<float>(origin.x);
     block.oy[n] = static_cast<float>(origin.y);
@@ -73,9 +73,9 @@ std::vector<double> traced(const BrickPool& pool, const std::vector<IndexRay>& r
     block.dx[n] = direction(0);
     block.dy[n] = direction(1);
     block.dz[n] = direction(2);
-    block.ix[n] = 1 / block.dx[n];
-    block.iy[n] = 1 / block.dy[n];
-    block.iz[n] = 1 / block.dz[n];
+    block.ix[n] = render::rayInverse(block.dx[n]);
+    block.iy[n] = render::rayInverse(block.dy[n]);
+    block.iz[n] = render::rayInverse(block.dz[n]);
     block.start[n] = 0;
     block.end[n] = static_cast<float>(way.leave - way.enter);
   }
