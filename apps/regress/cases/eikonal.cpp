@@ -279,7 +279,12 @@ void addEikonalCases(std::vector<Case>& all) {
                             {"sphere, sweeping, order 2", "band_out_linf_vx", 0.05},
                             {"two spheres, sweeping, order 2", "band_out_linf_vx", 0.15},
                             {"sphere, sweeping, order 2", "band_in_linf_vx", 0.02, 64},
-                            {"sphere, sweeping, order 2", "band_out_linf_vx", 0.02, 64}},
+                            {"sphere, sweeping, order 2", "band_out_linf_vx", 0.02, 64},
+                            {"two spheres, marching, order 2", "band_out_linf_vx", 0.15},
+                            {"sphere, marching, order 2", "band_in_linf_vx", 0.5},
+                            {"sphere, sweeping, order 2", "band_in_linf_vx", 0.5},
+                            {"two spheres, marching, order 2", "band_in_linf_vx", 0.5},
+                            {"two spheres, sweeping, order 2", "band_in_linf_vx", 0.5}},
                  .run = fromSurface});
   all.push_back({.name = "closest-point",
                  .group = "closest point",

@@ -56,7 +56,17 @@ void addResampleCases(std::vector<Case>& all) {
                  .full = {16, 32, 64},
                  .bounds = {{"torus, 1 time", "order_surface", 1.8, 12, Sense::AtLeast},
                             {"torus, 1 time", "order_surface", 1.8, 32, Sense::AtLeast},
-                            {"torus, 10 times", "order_surface", 1.8, 32, Sense::AtLeast}},
+                            {"torus, 10 times", "order_surface", 1.8, 32, Sense::AtLeast},
+                            {"torus, 1 time", "band_in_linf_vx", 0.1},
+                            {"torus, 1 time", "band_out_linf_vx", 0.1},
+                            {"torus, 1 time", "surface_l1_vx", 0.02},
+                            {"torus, 10 times", "band_in_linf_vx", 0.25},
+                            {"torus, 10 times", "band_out_linf_vx", 0.25},
+                            {"torus, 10 times", "surface_l1_vx", 0.05},
+                            {"rotated cube, 1 time", "band_in_linf_vx", 1.25},
+                            {"rotated cube, 1 time", "band_out_linf_vx", 1.25},
+                            {"rotated cube, 10 times", "band_in_linf_vx", 1.5, 32},
+                            {"rotated cube, 10 times", "band_out_linf_vx", 1.5, 32}},
                  .run = chains});
 }
 
