@@ -231,7 +231,7 @@ void addFilletCases(std::vector<Case>& all) {
            "voxels per radius of the larger ball.",
        .citation = "closed form; Rossignac84",
        .quick = {10, 14, 20},
-       .full = {16, 32, 64},
+       .full = {16, 24, 32},
        .bounds = {{"balls", "band_in_linf_vx", 0.005},
                   {"balls", "band_out_linf_vx", 0.005},
                   {"balls", "surface_l1_vx", 0.002},
