@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 #include <map>
 #include <vector>
 
@@ -16,7 +15,7 @@ namespace {
 
 constexpr int kGroup = 64;                 // invocations
 constexpr std::size_t kOneRun = 1u << 18;  // rays: short enough for any watchdog
-constexpr int kRayParts = 11, kPixelParts = 2, kHitParts = 5;
+constexpr int kRayParts = 11, kHitParts = 5;
 
 enum Binding : GLuint { kPages, kEntries, kMasks, kRays, kHits, kFirstValues };
 

@@ -203,10 +203,10 @@ std::vector<Bound> rotationBounds() {
                                {"torus, front", "surface_l1_vx", 0.1},
                                {"plate of two voxels, front", "surface_l1_vx", 0.15},
                                {"torus, front", "surface_linf_vx", 0.2}};
-  allowAtEdges(bounds, "cube, front", 1.4, {8, 12, 16, 32});
+  allowAtEdges(bounds, "cube, front", 1.2, {8, 12, 16, 32});
   // A tube of a voxel's radius.
   allowAtEdges(bounds, "torus, front", 0.8, {8});
-  allowAtEdges(bounds, "plate of two voxels, front", 2.4, {8, 12, 16, 32, 64});
+  allowAtEdges(bounds, "plate of two voxels, front", 1.8, {8, 12, 16, 32, 64});
   return bounds;
 }
 

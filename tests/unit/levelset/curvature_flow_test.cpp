@@ -89,15 +89,21 @@ TEST(CurvatureFlow, MeasuresTimeInWorldUnits) {
 TEST(CurvatureFlow, ConvergesWithTheVoxel) {
   // One ball, the same time, three resolutions, steps that err by next to nothing. The differences
   // are of higher order; what is left comes of re-distancing, as often as the voxels grow finer.
-  double previous = 0;
-  for (const double n : {8.0, 16.0, 32.0}) {
-    const NarrowBand flowed = curvatureFlow(ball(n), n * n / 16, {.tolerance = 1e-3}).band;
-    const double worst = radiusError(flowed, n * std::sqrt(0.75)).worst, error = worst / n;
-    EXPECT_LE(worst, 2.5e-3) << n;
-    if (previous > 0) {
-      EXPECT_GE(std::log2(previous / error), 0.8) << n;
+  for (const double tolerance : {1e-3, 5e-4}) {
+    std::vector<double> errors;  // in parts of the radius
+    for (const double n : {8.0, 16.0, 32.0}) {
+      const NarrowBand flowed = curvatureFlow(ball(n), n * n / 16, {.tolerance = tolerance}).band;
+      const double worst = radiusError(flowed, n * std::sqrt(0.75)).worst;
+      EXPECT_LE(worst, 2.5e-3) << n;
+      errors.push_back(worst / n);
     }
-    previous = error;
+    EXPECT_GE(std::log2(errors[0] / errors[2]) / 2, 1.5) << tolerance;
+    EXPECT_LE(errors[2], errors[1]) << tolerance;
+    // The shorter the steps, the more of the finest's error is re-distancing's.
+    if (tolerance == 1e-3) {
+      EXPECT_GE(std::log2(errors[0] / errors[1]), 0.8);
+      EXPECT_GE(std::log2(errors[1] / errors[2]), 0.8);
+    }
   }
 }
 
