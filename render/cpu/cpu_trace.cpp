@@ -43,30 +43,32 @@ std::vector<InstructionSet> instructionSets() {
 namespace {
 
 template <typename... What>
-void traceOn(InstructionSet set, HitBlock& hits, const BrickPool& pool, const What&... what) {
-  if (pool.brickCount() == 0) {
-    std::fill(hits.found.begin(), hits.found.end(), 0);
-    return;
-  }
+void traceOn(InstructionSet set, What&&... what) {
   switch (set) {
     case InstructionSet::Avx512:
-      return avx512::traceAll(pool, what..., hits);
+      return avx512::traceAll(what...);
     case InstructionSet::Avx2:
-      return avx2::traceAll(pool, what..., hits);
+      return avx2::traceAll(what...);
     default:
-      return sse2::traceAll(pool, what..., hits);
+      return sse2::traceAll(what...);
   }
+}
+
+void findNothing(HitBlock& hits) {
+  std::fill(hits.found.begin(), hits.found.end(), 0);
 }
 
 }  // namespace
 
 void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits, InstructionSet set) {
-  traceOn(set, hits, pool, rays);
+  if (pool.brickCount() == 0) return findNothing(hits);
+  traceOn(set, pool, rays, hits);
 }
 
 void tracePixels(const BrickPool& pool, const RayFan& fan, const PixelBlock& pixels, HitBlock& hits,
-                 InstructionSet set) {
-  traceOn(set, hits, pool, fan, pixels);
+                 ShapeBlock& shapes, InstructionSet set) {
+  if (pool.brickCount() == 0) return findNothing(hits);
+  traceOn(set, pool, fan, pixels, hits, shapes);
 }
 
 }  // namespace render

@@ -19,9 +19,10 @@ enum class InstructionSet { Sse2, Avx2, Avx512 };
 void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits,
                InstructionSet set = instructionSets().back());
 
-/// The same of pixels of a fan; packets of neighbours are the fastest.
-/// @param hits  as long as the pixels
+/// The same of pixels of a fan, and what the surface is like there; packets of neighbours are the
+/// fastest.
+/// @param hits, shapes  as long as the pixels
 void tracePixels(const BrickPool& pool, const RayFan& fan, const PixelBlock& pixels, HitBlock& hits,
-                 InstructionSet set = instructionSets().back());
+                 ShapeBlock& shapes, InstructionSet set = instructionSets().back());
 
 }  // namespace render

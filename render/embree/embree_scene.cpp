@@ -9,7 +9,8 @@
 #include "levelset/error.h"
 #include "render/embree/embree_renderer.h"
 #include "render/embree/surface_blocks_vdb.h"
-#include "render/shading/surface_point.h"
+#include "render/embree/surface_spline_vdb.h"
+#include "render/shading/surface_shape.h"
 
 namespace render {
 namespace {
@@ -31,6 +32,10 @@ struct RaySolid {
   // From world to Embree's box.
   V3d centre;
   double scale;
+
+  [[nodiscard]] SurfaceShape shapeAt(const V3d& world) const {
+    return surfaceShape(levelset::vdb(band).tree(), world * worldToIndex);
+  }
 };
 
 /// What the callbacks need beside Embree's float ray: the ray in double, and the best hit so far.
@@ -260,7 +265,7 @@ Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near,
   hit.position = query->origin + direction * query->nearest;
   hit.id = solid.id;
   hit.solid = solid.index;
-  addNormals(hit, solid.band, direction);
+  addNormals(hit, solid.shapeAt(hit.position), solid.indexToWorld, direction);
   return hit;
 }
 
@@ -278,7 +283,7 @@ CurvatureSample EmbreeScene::curvatureAt(const Hit& hit) const {
   const auto solid = std::find_if(impl_->solids.begin(), impl_->solids.end(),
                                   [&](const RaySolid& s) { return s.index == hit.solid; });
   if (!hit.found || solid == impl_->solids.end()) return {};
-  return render::curvatureAt(solid->band, hit.position);
+  return curvaturesOf(solid->shapeAt(hit.position), solid->band.voxelSize());
 }
 
 const Box3d& EmbreeScene::bounds() const {

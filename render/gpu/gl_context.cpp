@@ -35,6 +35,7 @@ struct GlContext::Egl {
   decltype(&eglCreateContext) createContext = nullptr;
   decltype(&eglDestroyContext) destroyContext = nullptr;
   decltype(&eglMakeCurrent) makeCurrent = nullptr;
+  decltype(&eglReleaseThread) releaseThread = nullptr;
   PFNEGLGETPLATFORMDISPLAYEXTPROC getPlatformDisplay = nullptr;
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
@@ -60,6 +61,7 @@ struct GlContext::Egl {
     load(createContext, "eglCreateContext");
     load(destroyContext, "eglDestroyContext");
     load(makeCurrent, "eglMakeCurrent");
+    load(releaseThread, "eglReleaseThread");
     getPlatformDisplay = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(
         getProcAddress("eglGetPlatformDisplayEXT"));
     if (!getPlatformDisplay)
@@ -180,10 +182,14 @@ GlContext::Current::Current(const GlContext& context) : context_(context), lock_
 
 GlContext::Current::~Current() {
   Egl& egl = *context_.egl_;
-  if (before_ != EGL_NO_CONTEXT)
+  if (before_ != EGL_NO_CONTEXT) {
     egl.makeCurrent(display_, draw_, read_, before_);
-  else
-    egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    return;
+  }
+  egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  // What a thread leaves behind Mesa frees when the thread ends, and again when the process does:
+  // a crash where both happen at once.
+  egl.releaseThread();
 }
 
 void GlContext::check(const char* what) const {

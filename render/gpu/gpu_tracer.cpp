@@ -25,6 +25,7 @@ constexpr const char* kDialect = R"GLSL(
 #define Whole int
 #define Bool bool
 #define VAR precise float
+#define IN(Type) Type
 #define INOUT(Type) inout Type
 #define CONST_INT const int
 #define CONST_FLOAT const float
@@ -72,17 +73,30 @@ constexpr const char* kMain = R"GLSL(
 void main() {
   int n = firstRay + int(gl_GlobalInvocationID.x);
   if (n >= rayCount) return;
-  Hit hit = trace(rayNumber(n));
+  Ray ray = rayNumber(n);
+  Hit hit = trace(ray);
   hits[n] = hit.found ? -1 : 0;
   hits[rayCount + n] = floatBitsToInt(hit.t);
   hits[2 * rayCount + n] = hit.x;
   hits[3 * rayCount + n] = hit.y;
   hits[4 * rayCount + n] = hit.z;
+  addShape(n, ray, hit);
 }
 )GLSL";
 
 constexpr const char* kPixelRays = R"GLSL(
 Ray rayNumber(int n) { return viewRay(rays[n], rays[rayCount + n]); }
+
+void addShape(int n, Ray ray, Hit hit) {
+  // llvmpipe runs through all branches, but leaves loops that no ray is in.
+  for (int i = hit.found ? 0 : 1; i < 1; ++i) {
+    Shape s = shapeOf(ray, hit);
+    float parts[kShapeParts] = float[kShapeParts](s.gx, s.gy, s.gz, s.tx, s.ty, s.tz, s.hxx, s.hyy,
+                                                  s.hzz, s.hxy, s.hxz, s.hyz, s.error);
+    for (int p = 0; p < kShapeParts; ++p)
+      hits[(kHitParts + p) * rayCount + n] = floatBitsToInt(parts[p]);
+  }
+}
 )GLSL";
 
 constexpr const char* kListedRays = R"GLSL(
@@ -101,6 +115,8 @@ Ray rayNumber(int n) {
   ray.end = rays[10 * rayCount + n];
   return ray;
 }
+
+void addShape(int n, Ray ray, Hit hit) {}
 )GLSL";
 
 /// Values in one storage block, or in several of 2^shift floats each.
@@ -124,10 +140,12 @@ std::string valueText(int blocks, int shift) {
 std::string shaderText(const char* rays, int valueBlocks, int shift) {
   return fmt::format(
              "#version 450 core\nlayout(local_size_x = {}) in;\n"
-             "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {};\n",
+             "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {}, kBlockOfEntry = {},\n"
+             "          kHitParts = {}, kShapeParts = {};\n",
              kGroup, BrickPool::kEdge, BrickPool::kValues,
-             std::countr_zero(static_cast<unsigned>(BrickPool::kPage))) +
-         kDialect + valueText(valueBlocks, shift) + kTraceKernel + rays + kMain;
+             std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kBlockOfEntry,
+             kHitParts, ShapeBlock::kParts) +
+         kDialect + valueText(valueBlocks, shift) + kTraceKernel + kShapeKernel + rays + kMain;
 }
 
 }  // namespace
@@ -277,16 +295,18 @@ struct GpuTracer::Impl {
       bindTo(kFirstValues + static_cast<GLuint>(b), t.values[b]);
   }
 
-  void run(const KernelSolid& solid, bool isPixels, const std::vector<float>& input,
-           std::size_t count, HitBlock& found) {
+  /// @param shapes  of pixels only
+  void run(const KernelSolid& solid, const std::vector<float>& input, std::size_t count,
+           HitBlock& found, ShapeBlock* shapes) {
     if (count == 0) return;
     const GlContext::Current current(context);
-    const GLuint program = programFor(solid, isPixels);
+    const GLuint program = programFor(solid, shapes != nullptr);
     gl.UseProgram(program);
     setNumbers(program, solid);
     gl.NamedBufferData(rays, static_cast<GLsizeiptr>(input.size() * sizeof(float)), input.data(),
                        GL_STREAM_DRAW);
-    gl.NamedBufferData(hits, static_cast<GLsizeiptr>(kHitParts * count * sizeof(int)), nullptr,
+    const std::size_t parts = kHitParts + (shapes ? ShapeBlock::kParts : 0);
+    gl.NamedBufferData(hits, static_cast<GLsizeiptr>(parts * count * sizeof(int)), nullptr,
                        GL_STREAM_READ);
     bind(solid);
     const auto place = [&](const char* name) { return gl.GetUniformLocation(program, name); };
@@ -307,6 +327,8 @@ struct GpuTracer::Impl {
     fetch(found.x, 2);
     fetch(found.y, 3);
     fetch(found.z, 4);
+    for (std::size_t p = 0; shapes && p < ShapeBlock::kParts; ++p)
+      fetch(shapes->part[p], kHitParts + p);
     context.check("the rays");
   }
 };
@@ -330,10 +352,11 @@ GpuTracer::~GpuTracer() {
   }
 }
 
-void GpuTracer::trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits) const {
+void GpuTracer::trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,
+                      ShapeBlock& shapes) const {
   std::vector<float> input(pixels.x);
   input.insert(input.end(), pixels.y.begin(), pixels.y.end());
-  impl_->run(solid, true, input, pixels.size(), hits);
+  impl_->run(solid, input, pixels.size(), hits, &shapes);
 }
 
 void GpuTracer::trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const {
@@ -342,7 +365,7 @@ void GpuTracer::trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& 
   for (const auto* part : {&rays.ox, &rays.oy, &rays.oz, &rays.dx, &rays.dy, &rays.dz, &rays.ix,
                            &rays.iy, &rays.iz, &rays.start, &rays.end})
     input.insert(input.end(), part->begin(), part->end());
-  impl_->run(solid, false, input, rays.size, hits);
+  impl_->run(solid, input, rays.size, hits, nullptr);
 }
 
 }  // namespace render

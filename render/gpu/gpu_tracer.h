@@ -20,7 +20,8 @@ class GpuTracer : public KernelTracer {
   GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestBlock = 0);
   ~GpuTracer() override;
 
-  void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits) const override;
+  void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,
+             ShapeBlock& shapes) const override;
   void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const override;
 
  private:

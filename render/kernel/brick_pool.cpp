@@ -18,11 +18,13 @@ namespace {
 using openvdb::Coord;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-constexpr int kBlock = 8, kEntriesOfPage = 512;
+constexpr int kBlock = 8;
+constexpr std::size_t kEntriesOfPage = 2 * BrickPool::kBlocksOfPage;
 constexpr int kMostEmptyPages = 1 << 10;  // pages along the edge of an empty cube
 // Single precision tells a place this far from the table's corner to 5e-4 voxel.
 constexpr double kWidest = 8192;  // voxels
 constexpr std::size_t kMostBricks = std::numeric_limits<std::int32_t>::max() / BrickPool::kValues;
+constexpr int kReachBefore = 2, kReachBehind = 3;  // grid points that tell a cell's curvature
 
 struct Brick {
   Coord origin;
@@ -107,6 +109,66 @@ std::vector<std::unique_ptr<Brick>> bricksOf(const openvdb::FloatTree& tree) {
   return bricks;
 }
 
+/// The range of the cells that are crossed, on each axis.
+openvdb::CoordBBox crossedCells(const Brick& brick) {
+  openvdb::CoordBBox box;
+  for (int x = 0; x < kBlock; ++x)
+    for (int y = 0; y < kBlock; ++y) {
+      const unsigned bit = static_cast<unsigned>(x << 6 | y << 3);
+      const unsigned column = brick.mask[bit >> 5] >> (bit & 31) & 0xff;
+      if (column == 0) continue;
+      box.expand(Coord(x, y, std::countr_zero(column)));
+      box.expand(Coord(x, y, std::bit_width(column) - 1));
+    }
+  return box;
+}
+
+/// A block that the surface does not cross, and whose values tell its curvature.
+struct Neighbour {
+  Coord origin;
+  std::unique_ptr<Brick> brick;  ///< none where all values are alike: far away
+  bool isInside = false;
+};
+
+/// In the order of their origins.
+std::vector<Neighbour> neighboursOf(const openvdb::FloatTree& tree,
+                                    const std::vector<std::unique_ptr<Brick>>& bricks) {
+  std::vector<Coord> origins;
+  for (const auto& brick : bricks) {
+    const openvdb::CoordBBox cells = crossedCells(*brick);
+    const Coord from = cells.min().offsetBy(-kReachBefore), to = cells.max().offsetBy(kReachBehind);
+    for (int x = from.x() >> 3; x <= to.x() >> 3; ++x)
+      for (int y = from.y() >> 3; y <= to.y() >> 3; ++y)
+        for (int z = from.z() >> 3; z <= to.z() >> 3; ++z)
+          if (x || y || z)
+            origins.push_back(brick->origin.offsetBy(x * kBlock, y * kBlock, z * kBlock));
+  }
+  std::sort(origins.begin(), origins.end());
+  origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
+  std::erase_if(origins, [&](const Coord& origin) {
+    const auto at = std::lower_bound(
+        bricks.begin(), bricks.end(), origin,
+        [](const std::unique_ptr<Brick>& b, const Coord& o) { return b->origin < o; });
+    return at != bricks.end() && (*at)->origin == origin;
+  });
+  std::vector<Neighbour> neighbours(origins.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, origins.size(), 64), [&](const auto& range) {
+    const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      Neighbour& n = neighbours[i];
+      n.origin = origins[i];
+      if (accessor.probeConstLeaf(n.origin)) {
+        n.brick = std::make_unique<Brick>();
+        n.brick->origin = n.origin;
+        (void)fill(accessor, *n.brick);
+      } else {
+        n.isInside = accessor.getValue(n.origin) < 0;
+      }
+    }
+  });
+  return neighbours;
+}
+
 /// Writes into the empty items of a cubic table the edges of the largest aligned empty cubes.
 /// @param size    items along each axis
 /// @param isEmpty of an item's number
@@ -151,33 +213,38 @@ void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty,
       }
 }
 
-void layTable(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks) {
-  const auto pageOf = [&](const Coord& origin) {
-    std::size_t n = 0;
-    for (int a = 0; a < 3; ++a)
-      n = n * static_cast<std::size_t>(pool.pages[static_cast<std::size_t>(a)]) +
-          static_cast<std::size_t>((origin[a] - pool.origin[static_cast<std::size_t>(a)]) /
-                                   BrickPool::kPage);
-    return n;
-  };
-  std::size_t count = 1;
-  for (const int n : pool.pages) count *= static_cast<std::size_t>(n);
-  pool.page.assign(count, -BrickPool::kPage);
-  for (const auto& brick : bricks) {
-    std::int32_t& page = pool.page[pageOf(brick->origin)];
-    if (page >= 0) continue;
-    page = static_cast<std::int32_t>(pool.entry.size());
-    pool.entry.resize(pool.entry.size() + kEntriesOfPage, -kBlock);
+/// Where the entry of the block with that origin is.
+class Table {
+ public:
+  explicit Table(BrickPool& pool) : pool_(pool) {
+    std::size_t count = 1;
+    for (const int n : pool.pages) count *= static_cast<std::size_t>(n);
+    pool.page.assign(count, -BrickPool::kPage);
   }
-  for (std::size_t i = 0; i < bricks.size(); ++i) {
-    std::size_t slot = 0;
-    for (int a = 0; a < 3; ++a)
-      slot = slot << 3 |
-             static_cast<std::size_t>(
-                 ((bricks[i]->origin[a] - pool.origin[static_cast<std::size_t>(a)]) >> 3) & 7);
-    pool.entry[static_cast<std::size_t>(pool.page[pageOf(bricks[i]->origin)]) + slot] =
-        static_cast<std::int32_t>(i);
+  /// Makes the page if there is none.
+  std::size_t slotOf(const Coord& origin) {
+    std::size_t page = 0, block = 0;
+    for (int a = 0; a < 3; ++a) {
+      const auto i = static_cast<std::size_t>(a);
+      const int at = origin[a] - pool_.origin[i];
+      page = page * static_cast<std::size_t>(pool_.pages[i]) +
+             static_cast<std::size_t>(at / BrickPool::kPage);
+      block = block << 3 | static_cast<std::size_t>((at >> 3) & 7);
+    }
+    std::int32_t& first = pool_.page[page];
+    if (first < 0) {
+      first = static_cast<std::int32_t>(pool_.entry.size());
+      pool_.entry.resize(pool_.entry.size() + BrickPool::kBlocksOfPage, -kBlock);
+      pool_.entry.resize(pool_.entry.size() + BrickPool::kBlocksOfPage, 0);
+    }
+    return static_cast<std::size_t>(first) + block;
   }
+
+ private:
+  BrickPool& pool_;
+};
+
+void markEmptyCubes(BrickPool& pool) {
   for (std::size_t first = 0; first < pool.entry.size(); first += kEntriesOfPage) {
     std::int32_t* entries = pool.entry.data() + first;
     markEmpty(
@@ -187,6 +254,62 @@ void layTable(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
   markEmpty(
       pool.pages, kMostEmptyPages, [&](std::size_t i) { return pool.page[i] < 0; },
       [&](std::size_t i, int edge) { pool.page[i] = -BrickPool::kPage * edge; });
+}
+
+/// The bricks that are crossed, then those beside them, then one that is far outside and one that
+/// is far inside.
+void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks,
+              const std::vector<Neighbour>& neighbours, float background) {
+  std::vector<const Brick*> held;
+  Table table(pool);
+  const auto hold = [&](std::size_t slot, const Brick& brick) {
+    pool.entry[slot + BrickPool::kBlockOfEntry] = static_cast<std::int32_t>(held.size());
+    held.push_back(&brick);
+  };
+  for (const auto& brick : bricks) {
+    const std::size_t slot = table.slotOf(brick->origin);
+    pool.entry[slot] = static_cast<std::int32_t>(held.size());
+    hold(slot, *brick);
+  }
+  for (const Neighbour& n : neighbours)
+    if (n.brick) hold(table.slotOf(n.origin), *n.brick);
+  Brick far[2];
+  for (const bool isInside : {false, true}) {
+    far[isInside].value.fill(isInside ? -background : background);
+    for (const Neighbour& n : neighbours)
+      if (!n.brick && n.isInside == isInside)
+        pool.entry[table.slotOf(n.origin) + BrickPool::kBlockOfEntry] =
+            static_cast<std::int32_t>(held.size());
+    held.push_back(&far[isInside]);
+  }
+  if (held.size() > kMostBricks) {
+    throw levelset::ResourceLimit(
+        fmt::format("render: the surface takes {} blocks, and {} are the most; use larger voxels",
+                    held.size(), kMostBricks));
+  }
+  markEmptyCubes(pool);
+  pool.value.resize(held.size() * BrickPool::kValues);
+  pool.mask.resize(bricks.size() * BrickPool::kMaskWords);
+  tbb::parallel_for(std::size_t{0}, held.size(), [&](std::size_t i) {
+    std::copy(held[i]->value.begin(), held[i]->value.end(),
+              pool.value.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kValues));
+    if (i < bricks.size())
+      std::copy(bricks[i]->mask.begin(), bricks[i]->mask.end(),
+                pool.mask.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kMaskWords));
+  });
+}
+
+/// @param crossed  origins of the bricks
+void requireNarrow(const openvdb::CoordBBox& crossed) {
+  std::array<double, 3> spans{};
+  for (int a = 0; a < 3; ++a)
+    spans[static_cast<std::size_t>(a)] =
+        static_cast<double>(crossed.max()[a]) - crossed.min()[a] + kBlock;
+  if (*std::max_element(spans.begin(), spans.end()) <= kWidest) return;
+  throw levelset::ResourceLimit(fmt::format(
+      "render: the surface spans {:.6g} x {:.6g} x {:.6g} voxels, and {:.0f} are the most in "
+      "single precision; draw with --renderer embree, use larger voxels, or draw its parts apart",
+      spans[0], spans[1], spans[2], kWidest));
 }
 
 }  // namespace
@@ -201,40 +324,23 @@ BrickPool makeBricks(const levelset::NarrowBand& band) {
   const openvdb::FloatTree& tree = levelset::vdb(band).tree();
   const auto bricks = bricksOf(tree);
   if (bricks.empty()) return pool;
-  if (bricks.size() > kMostBricks) {
-    throw levelset::ResourceLimit(
-        fmt::format("render: the surface crosses {} blocks, and {} are the most; use larger voxels",
-                    bricks.size(), kMostBricks));
-  }
-  openvdb::CoordBBox box;
-  for (const auto& brick : bricks) box.expand(brick->origin);
-  std::array<double, 3> spans{};
-  for (int a = 0; a < 3; ++a) {
-    const auto i = static_cast<std::size_t>(a);
-    spans[i] = static_cast<double>(box.max()[a]) - box.min()[a] + kBlock;
-    pool.origin[i] = box.min()[a];
-  }
-  if (*std::max_element(spans.begin(), spans.end()) > kWidest) {
-    throw levelset::ResourceLimit(fmt::format(
-        "render: the surface spans {:.6g} x {:.6g} x {:.6g} voxels, and {:.0f} are the most in "
-        "single precision; draw with --renderer embree, use larger voxels, or draw its parts apart",
-        spans[0], spans[1], spans[2], kWidest));
-  }
+  openvdb::CoordBBox crossed;
+  for (const auto& brick : bricks) crossed.expand(brick->origin);
+  requireNarrow(crossed);
+  const std::vector<Neighbour> neighbours = neighboursOf(tree, bricks);
+  openvdb::CoordBBox box = crossed;
+  for (const Neighbour& n : neighbours) box.expand(n.origin);
   for (std::size_t i = 0; i < 3; ++i) {
-    pool.pages[i] = static_cast<int>(std::ceil(spans[i] / BrickPool::kPage));
-    pool.high[i] = static_cast<int>(spans[i]);
+    const int a = static_cast<int>(i);
+    pool.origin[i] = box.min()[a];
+    pool.low[i] = crossed.min()[a] - box.min()[a];
+    pool.high[i] = crossed.max()[a] - box.min()[a] + kBlock;
+    pool.pages[i] =
+        (box.max()[a] - box.min()[a] + kBlock + BrickPool::kPage - 1) / BrickPool::kPage;
   }
-  layTable(pool, bricks);
-  pool.value.resize(bricks.size() * BrickPool::kValues);
-  pool.mask.resize(bricks.size() * BrickPool::kMaskWords);
-  tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) {
-    std::copy(bricks[i]->value.begin(), bricks[i]->value.end(),
-              pool.value.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kValues));
-    std::copy(bricks[i]->mask.begin(), bricks[i]->mask.end(),
-              pool.mask.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kMaskWords));
-  });
+  fillPool(pool, bricks, neighbours, levelset::vdb(band).background());
   const std::size_t leaves = tree.leafCount();
-  pool.blocksLeftOut = leaves > bricks.size() ? leaves - bricks.size() : 0;
+  pool.blocksLeftOut = leaves > pool.heldCount() ? leaves - pool.heldCount() : 0;
   return pool;
 }
 

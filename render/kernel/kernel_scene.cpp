@@ -105,11 +105,11 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes) {
     solid.index = i;
     solid.id = source.id;
     solid.voxelSize = source.band.voxelSize();
-    solid.fan = makeRayFan(scene.camera, source.band, solid.pool);
     const V3d corner(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]);
-    const M44d tableToWorld = M44d().setTranslation(corner) * source.band.indexToWorld();
-    solid.worldToTable = tableToWorld.inverse();
-    bounds_.extendBy(Imath::transform(cellBox(solid.pool), tableToWorld));
+    solid.tableToWorld = M44d().setTranslation(corner) * source.band.indexToWorld();
+    solid.worldToTable = solid.tableToWorld.inverse();
+    solid.fan = makeRayFan(scene.camera, solid.tableToWorld, solid.voxelSize, solid.pool);
+    bounds_.extendBy(Imath::transform(cellBox(solid.pool), solid.tableToWorld));
     solids_.push_back(std::move(solid));
   }
   std::stable_sort(solids_.begin(), solids_.end(),
@@ -131,15 +131,18 @@ std::size_t KernelScene::blocksLeftOut() const {
 PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const {
   PixelHits result(pixels.size());
   HitBlock hits(pixels.size());
-  for (const KernelSolid& solid : solids_) {
-    tracer.trace(solid, pixels, hits);
+  ShapeBlock shapes(pixels.size());
+  for (std::size_t s = 0; s < solids_.size(); ++s) {
+    const KernelSolid& solid = solids_[s];
+    tracer.trace(solid, pixels, hits, shapes);
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       if (!hits.found[i]) continue;
       const double depth =
           solid.fan.depth + static_cast<double>(hits.t[i]) * solid.fan.depthPerStep;
       if (result.solid[i] >= 0 && result.depth[i] <= depth) continue;
       result.depth[i] = depth;
-      result.solid[i] = static_cast<std::int32_t>(solid.index);
+      result.solid[i] = static_cast<std::int32_t>(s);
+      result.shapes.take(shapes, i);
     }
   }
   return result;

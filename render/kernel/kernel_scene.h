@@ -23,23 +23,26 @@ struct KernelSolid {
   double voxelSize = 1;
   BrickPool pool;
   RayFan fan;
-  Imath::M44d worldToTable;
+  Imath::M44d tableToWorld, worldToTable;
 };
 
 /// Runs the kernel somewhere. The hits of all tracers have the same bits.
 class KernelTracer {
  public:
   virtual ~KernelTracer() = default;
-  virtual void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits) const = 0;
+  /// @param hits, shapes  as long as the pixels; shapes only where something is hit
+  virtual void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,
+                     ShapeBlock& shapes) const = 0;
   virtual void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const = 0;
 };
 
 /// What a block of pixels shows.
 struct PixelHits {
   std::vector<double> depth;        ///< along the view axis, world units
-  std::vector<std::int32_t> solid;  ///< index in Scene::solids, or −1
+  std::vector<std::int32_t> solid;  ///< index in KernelScene::solids(), or −1
+  ShapeBlock shapes;
 
-  explicit PixelHits(std::size_t size) : depth(size), solid(size, -1) {}
+  explicit PixelHits(std::size_t size) : depth(size), solid(size, -1), shapes(size) {}
 };
 
 /// The surfaces of a scene made ready for the kernel, whoever runs it. Of two solids hit at the

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <mutex>
 
-#include "render/shading/surface_point.h"
+#include "render/shading/surface_shape.h"
 
 namespace render {
 namespace {
@@ -48,17 +48,16 @@ std::size_t KernelPainter::numberOf(const Pixel& pixel) const {
          static_cast<std::size_t>(pixel.x);
 }
 
-Hit KernelPainter::hitAt(double x, double y, double depth, std::int32_t solid) const {
-  const Camera::Ray ray = scene_.camera.ray(x, y);
-  const Solid& source = scene_.solids[static_cast<std::size_t>(solid)];
+Hit KernelPainter::hitOf(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const {
+  const KernelSolid& solid = surfaces_.solids()[static_cast<std::size_t>(hits.solid[i])];
   Hit hit;
   hit.found = true;
-  hit.distance = depth / ray.direction.dot(scene_.camera.axis());
+  hit.distance = hits.depth[i] / ray.direction.dot(scene_.camera.axis());
   hit.position = ray.origin + ray.direction * hit.distance;
-  hit.id = source.id;
-  hit.solid = static_cast<std::size_t>(solid);
-  addNormals(hit, source.band, ray.direction);
-  hit.surfaceError += kCastError * source.band.voxelSize();
+  hit.id = solid.id;
+  hit.solid = solid.index;
+  addNormals(hit, hits.shapes.at(i), solid.tableToWorld, ray.direction);
+  hit.surfaceError += kCastError * solid.voxelSize;
   return hit;
 }
 
@@ -73,11 +72,13 @@ void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixe
   const PixelHits hits = surfaces_.castPixels(tracer, at);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     if (hits.solid[i] < 0) continue;
-    const Hit hit = hitAt(pixels[i].x + 0.5, pixels[i].y + 0.5, hits.depth[i], hits.solid[i]);
     const std::size_t number = numberOf(pixels[i]);
-    layers_.setHit(number, scene_.camera, hit);
-    if (options_.curvature)
-      layers_.setCurvature(number, curvatureAt(scene_.solids[hit.solid].band, hit.position));
+    const Camera::Ray ray = scene_.camera.ray(pixels[i].x + 0.5, pixels[i].y + 0.5);
+    layers_.setHit(number, scene_.camera, hitOf(ray, hits, i));
+    if (options_.curvature) {
+      const double h = surfaces_.solids()[static_cast<std::size_t>(hits.solid[i])].voxelSize;
+      layers_.setCurvature(number, curvaturesOf(hits.shapes.at(i), h));
+    }
   }
 }
 
@@ -121,8 +122,9 @@ void KernelPainter::paintColours(const KernelTracer& tracer,
       if (hits.solid[i] < 0) continue;
       Lit point;
       point.pixel = i;
-      point.hit = hitAt(places[i].x, places[i].y, hits.depth[i], hits.solid[i]);
-      point.direction = scene_.camera.ray(places[i].x, places[i].y).direction;
+      const Camera::Ray ray = scene_.camera.ray(places[i].x, places[i].y);
+      point.hit = hitOf(ray, hits, i);
+      point.direction = ray.direction;
       point.range = shader_.addRays(point.hit, point.direction, pixels[i].x, pixels[i].y, s, rays);
       points.push_back(point);
     }
@@ -150,11 +152,16 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
   image.attributes = sceneAttributes(scene);
   image.attributes["ls:renderer"] = renderer;
   image.attributes["ls:mode"] = "exact";
-  std::size_t bricks = 0;
-  for (const KernelSolid& solid : surfaces.solids()) bricks += solid.pool.brickCount();
+  std::size_t bricks = 0, beside = 0;
+  for (const KernelSolid& solid : surfaces.solids()) {
+    bricks += solid.pool.brickCount();
+    beside += solid.pool.heldCount() - solid.pool.brickCount();
+  }
   image.attributes["ls:read"] = fmt::format(
-      "{} blocks of 8x8x8 cells, {:.1f} MB; {} more that the surface does not cross were left out",
-      bricks, static_cast<double>(surfaces.bytes()) * 1e-6, surfaces.blocksLeftOut());
+      "{} blocks of 8x8x8 cells that the surface crosses and {} beside them, for its curvature, "
+      "{:.1f} "
+      "MB; {} more were left out",
+      bricks, beside, static_cast<double>(surfaces.bytes()) * 1e-6, surfaces.blocksLeftOut());
   addViewAttributes(image, scene, surfaces.bounds().size().length());
   return image;
 }

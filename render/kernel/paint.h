@@ -32,8 +32,8 @@ class KernelPainter {
   /// Neighbours next to each other: squares of four.
   [[nodiscard]] static std::vector<Pixel> pixelsOf(const PixelBox& box);
   [[nodiscard]] std::size_t numberOf(const Pixel& pixel) const;
-  /// What is at that place of the picture (pixels) and depth.
-  [[nodiscard]] Hit hitAt(double x, double y, double depth, std::int32_t solid) const;
+  /// What the ray meets at number i.
+  [[nodiscard]] Hit hitOf(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
   void paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
   void paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
 

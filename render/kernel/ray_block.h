@@ -1,8 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
+
+#include "render/shading/surface_shape.h"
 
 namespace render {
 
@@ -47,6 +50,21 @@ struct HitBlock {
   std::vector<std::int32_t> x, y, z;  ///< cell, in the table's space
 
   explicit HitBlock(std::size_t size) : found(size), t(size), x(size), y(size), z(size) {}
+};
+
+/// What the surface is like where they meet it: the parts of the kernel's Shape in their order, per
+/// grid point and in the table's axes.
+struct ShapeBlock {
+  static constexpr std::size_t kParts = 13;
+  std::array<std::vector<float>, kParts> part;
+
+  explicit ShapeBlock(std::size_t size) {
+    for (std::vector<float>& p : part) p.resize(size);
+  }
+  [[nodiscard]] SurfaceShape at(std::size_t i) const;
+  void take(const ShapeBlock& from, std::size_t i) {
+    for (std::size_t p = 0; p < kParts; ++p) part[p][i] = from.part[p][i];
+  }
 };
 
 }  // namespace render

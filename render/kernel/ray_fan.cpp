@@ -21,9 +21,8 @@ void set(float (&to)[3], const V3d& from) {
 
 }  // namespace
 
-RayFan makeRayFan(const Camera& camera, const levelset::NarrowBand& band, const BrickPool& pool) {
-  const V3d corner(pool.origin[0], pool.origin[1], pool.origin[2]);
-  const M44d tableToWorld = M44d().setTranslation(corner) * band.indexToWorld();
+RayFan makeRayFan(const Camera& camera, const M44d& tableToWorld, double voxelSize,
+                  const BrickPool& pool) {
   const M44d worldToTable = tableToWorld.inverse();
   const V3d axis = camera.axis();
   const Camera::PixelSteps step = camera.pixelSteps();
@@ -36,7 +35,7 @@ RayFan makeRayFan(const Camera& camera, const levelset::NarrowBand& band, const 
     depth = std::min(depth, (p * tableToWorld - camera.from).dot(axis));
   }
   // Off the faces of the box, where the surface may be.
-  depth = std::max(depth - 2 * band.voxelSize(), 0.0);
+  depth = std::max(depth - 2 * voxelSize, 0.0);
 
   RayFan fan;
   fan.depth = depth;

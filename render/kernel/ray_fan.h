@@ -1,6 +1,7 @@
 #pragma once
 
-#include "levelset/narrow_band.h"
+#include <Imath/ImathMatrix.h>
+
 #include "render/camera.h"
 #include "render/kernel/brick_pool.h"
 
@@ -21,8 +22,9 @@ struct RayFan {
   double depthPerStep = 0;  ///< what t = 1 is, world units
 };
 
-/// @pre the camera is valid and the pool is the band's and has bricks
-[[nodiscard]] RayFan makeRayFan(const Camera& camera, const levelset::NarrowBand& band,
-                                const BrickPool& pool);
+/// @param voxelSize  world units
+/// @pre the camera is valid and the pool has bricks
+[[nodiscard]] RayFan makeRayFan(const Camera& camera, const Imath::M44d& tableToWorld,
+                                double voxelSize, const BrickPool& pool);
 
 }  // namespace render

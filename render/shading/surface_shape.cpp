@@ -1,108 +1,34 @@
+#include "render/shading/surface_shape.h"
+
 #include <algorithm>
 #include <cmath>
-
-#include "render/shading/surface_shape_vdb.h"
 
 namespace render {
 namespace {
 
 using Imath::V3d;
-using openvdb::Coord;
 
-/// 6³ grid values from cell − 2 on; the cell's own corners are at 2 and 3.
-struct ShapeWindow {
-  double f[6][6][6];
-
-  ShapeWindow(const openvdb::FloatTree& tree, const Coord& cell) {
-    openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> accessor(tree);
-    for (int x = 0; x < 6; ++x)
-      for (int y = 0; y < 6; ++y)
-        for (int z = 0; z < 6; ++z)
-          f[x][y][z] = static_cast<double>(accessor.getValue(cell.offsetBy(x - 2, y - 2, z - 2)));
-  }
-  [[nodiscard]] V3d secondDifferences(int x, int y, int z) const {
-    const double twice = 2 * f[x][y][z];
-    return {f[x + 1][y][z] + f[x - 1][y][z] - twice, f[x][y + 1][z] + f[x][y - 1][z] - twice,
-            f[x][y][z + 1] + f[x][y][z - 1] - twice};
-  }
-};
-
-/// Weights of the uniform cubic B-spline, its first and second derivative, at a in [0, 1].
-struct SplineWeights {
-  double w[3][4];
-
-  explicit SplineWeights(double a) {
-    const double b = 1 - a;
-    const double rows[3][4] = {
-        {b * b * b / 6, (3 * a * a * a - 6 * a * a + 4) / 6, (3 * b * b * b - 6 * b * b + 4) / 6,
-         a * a * a / 6},
-        {-b * b / 2, (3 * a * a - 4 * a) / 2, -(3 * b * b - 4 * b) / 2, a * a / 2},
-        {b, 3 * a - 2, 3 * b - 2, a}};
-    for (int d = 0; d < 3; ++d)
-      for (int i = 0; i < 4; ++i) w[d][i] = rows[d][i];
-  }
-};
-
-V3d trilinearGradientOf(const ShapeWindow& window, const V3d& a) {
-  V3d g(0);
-  const double w[3][2] = {{1 - a.x, a.x}, {1 - a.y, a.y}, {1 - a.z, a.z}};
-  for (int i = 0; i < 2; ++i) {
-    for (int j = 0; j < 2; ++j) {
-      for (int k = 0; k < 2; ++k) {
-        const double f = window.f[2 + i][2 + j][2 + k];
-        g.x += (i ? f : -f) * w[1][j] * w[2][k];
-        g.y += (j ? f : -f) * w[0][i] * w[2][k];
-        g.z += (k ? f : -f) * w[0][i] * w[1][j];
-      }
-    }
-  }
-  return g;
+V3d unitOr(const V3d& v, const V3d& fallback) {
+  const V3d unit = v.normalized();
+  return unit == V3d(0) ? fallback : unit;
 }
 
 }  // namespace
 
-SurfaceShape surfaceShape(const openvdb::FloatTree& tree, const V3d& position) {
-  const V3d base(std::floor(position.x), std::floor(position.y), std::floor(position.z));
-  const V3d a = position - base;
-  const ShapeWindow window(
-      tree, Coord(static_cast<int>(base.x), static_cast<int>(base.y), static_cast<int>(base.z)));
-  const SplineWeights weights[3] = {SplineWeights(a.x), SplineWeights(a.y), SplineWeights(a.z)};
-
-  // sum[p][q][r]: derivative of order p, q, r along x, y, z, up to two in all.
-  double sum[3][3][3] = {};
-  double error = 0;
-  for (int x = 0; x < 4; ++x) {
-    for (int y = 0; y < 4; ++y) {
-      double row[3] = {};
-      for (int z = 0; z < 4; ++z) {
-        const V3d second = window.secondDifferences(x + 1, y + 1, z + 1);
-        const double c = window.f[x + 1][y + 1][z + 1] - (second.x + second.y + second.z) / 6;
-        for (int r = 0; r < 3; ++r) row[r] += c * weights[2].w[r][z];
-        const bool isCorner = (x == 1 || x == 2) && (y == 1 || y == 2) && (z == 1 || z == 2);
-        if (isCorner) {
-          error =
-              std::max(error, (std::abs(second.x) + std::abs(second.y) + std::abs(second.z)) / 8);
-        }
-      }
-      for (int p = 0; p < 3; ++p)
-        for (int q = 0; p + q < 3; ++q)
-          for (int r = 0; p + q + r < 3; ++r)
-            sum[p][q][r] += weights[0].w[p][x] * weights[1].w[q][y] * row[r];
-    }
-  }
-  SurfaceShape shape;
-  shape.gradient = {sum[1][0][0], sum[0][1][0], sum[0][0][1]};
-  shape.trilinearGradient = trilinearGradientOf(window, a);
-  const double h[3][3] = {{sum[2][0][0], sum[1][1][0], sum[1][0][1]},
-                          {sum[1][1][0], sum[0][2][0], sum[0][1][1]},
-                          {sum[1][0][1], sum[0][1][1], sum[0][0][2]}};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) shape.hessian[i][j] = h[i][j];
-  shape.interpolationError = error;
-  return shape;
+void addNormals(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWorld,
+                const V3d& direction) {
+  // For a rotation with uniform scale, gradients turn as directions do.
+  V3d facet, smooth;
+  indexToWorld.multDirMatrix(shape.trilinearGradient, facet);
+  indexToWorld.multDirMatrix(shape.gradient, smooth);
+  hit.facetNormal = unitOr(facet, unitOr(smooth, -direction));
+  hit.normal = unitOr(smooth, hit.facetNormal);
+  hit.surfaceError = shape.interpolationError;
 }
 
-Curvatures curvaturesOf(const V3d& g, const double (&h)[3][3]) {
+CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
+  const V3d& g = shape.gradient;
+  const Imath::M33d& h = shape.hessian;
   const double squared = g.length2(), length = std::sqrt(squared);
   if (!(length > 0)) return {0, 0, 0, 0};
   const auto minor = [&](int i, int j) {  // cofactor of h
@@ -117,8 +43,8 @@ Curvatures curvaturesOf(const V3d& g, const double (&h)[3][3]) {
     }
   }
   const double trace = h[0][0] + h[1][1] + h[2][2];
-  const double mean = (squared * trace - gHg) / (2 * squared * length);
-  const double gauss = gAg / (squared * squared);
+  const double mean = (squared * trace - gHg) / (2 * squared * length) / voxelSize;
+  const double gauss = gAg / (squared * squared) / (voxelSize * voxelSize);
   const double spread = std::sqrt(std::max(0.0, mean * mean - gauss));
   return {mean, gauss, mean + spread, mean - spread};
 }

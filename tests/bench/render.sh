@@ -40,7 +40,10 @@ cat "$folder"/*.txt | awk '
     judge("embree judge", value["embree_mrays_per_s"], value["embree_mrays_per_s"] / theirs, 0.3, 1)
     printf "  %-50s %8.3g s of CPU\n", "cpu, all layers and shading, one thread", value["cpu_all_layers_s"]
     judge("tables, s per million voxels", value["prepare_s_per_million_voxels"], value["prepare_s_per_million_voxels"], 0.1, 0)
-    if (name == "dragon") judge("tables, bytes beside NanoVDB", value["tables_of_nanovdb"], value["tables_of_nanovdb"], 1.1, 0)
+    if (name == "dragon") {
+      judge("what rays read, bytes beside NanoVDB", value["crossed_of_nanovdb"], value["crossed_of_nanovdb"], 1.1, 0)
+      judge("with what curvature reads", value["tables_of_nanovdb"], value["tables_of_nanovdb"], 1.5, 0)
+    }
     split("", value)
     gpu = ""
     next

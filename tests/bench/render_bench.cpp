@@ -19,7 +19,7 @@
 #include "levelset/files/band_file.h"
 #include "levelset/vdb.h"
 #include "render/cpu/cpu_renderer.h"
-#include "render/cpu/cpu_trace.h"
+#include "render/cpu/cpu_tracer.h"
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gl_context.h"
 #include "render/gpu/gpu_tracer.h"
@@ -36,29 +36,22 @@ double cpuSeconds() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-/// The picture's pixels, squares of neighbours next to each other.
-PixelBlock allPixels() {
-  PixelBlock pixels(static_cast<std::size_t>(kRays));
+constexpr std::size_t kAtOnce = 1u << 12;  // of the processor: what stays in its cache
+
+/// The picture's pixels, squares of neighbours next to each other, so many at a time.
+std::vector<PixelBlock> allPixels(std::size_t atOnce) {
+  const std::size_t blocks = static_cast<std::size_t>(kRays) / atOnce;
+  std::vector<PixelBlock> all(blocks, PixelBlock(atOnce));
   std::size_t n = 0;
   for (int top = 0; top < kHeight; top += kSquare)
     for (int left = 0; left < kWidth; left += kSquare)
       for (int y = top; y < top + kSquare; ++y)
         for (int x = left; x < left + kSquare; ++x, ++n) {
-          pixels.x[n] = static_cast<float>(x + 0.5 - 0.5 * kWidth);
-          pixels.y[n] = static_cast<float>(y + 0.5 - 0.5 * kHeight);
+          all[n / atOnce].x[n % atOnce] = static_cast<float>(x + 0.5 - 0.5 * kWidth);
+          all[n / atOnce].y[n % atOnce] = static_cast<float>(y + 0.5 - 0.5 * kHeight);
         }
-  return pixels;
+  return all;
 }
-
-class OneThread : public KernelTracer {
- public:
-  void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits) const override {
-    tracePixels(solid.pool, solid.fan, pixels, hits);
-  }
-  void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const override {
-    traceRays(solid.pool, rays, hits);
-  }
-};
 
 /// The least of three, CPU seconds.
 template <typename Job>
@@ -83,14 +76,20 @@ void benchmark(const Scene& scene) {
   const KernelScene surfaces(scene);
   tell("prepare_s_per_million_voxels", (cpuSeconds() - start) / voxels * 1e6);
   const double nano = static_cast<double>(nanovdb::openToNanoVDB(levelset::vdb(band)).size());
+  const BrickPool& pool = surfaces.solids()[0].pool;
+  const std::size_t beside = (pool.heldCount() - pool.brickCount()) * BrickPool::kValues * 4;
+  tell("crossed_of_nanovdb", static_cast<double>(pool.bytes() - beside) / nano);
   tell("tables_of_nanovdb", static_cast<double>(surfaces.bytes()) / nano);
 
-  const PixelBlock pixels = allPixels();
-  tell("cpu_mrays_per_s",
-       1e-6 * kRays / timeOf([&] { (void)surfaces.castPixels(OneThread(), pixels); }));
+  const std::vector<PixelBlock> few = allPixels(kAtOnce);
+  tell("cpu_mrays_per_s", 1e-6 * kRays / timeOf([&] {
+                            for (const PixelBlock& block : few)
+                              (void)surfaces.castPixels(CpuTracer(), block);
+                          }));
   try {
     const GlContext context;
     const GpuTracer tracer(context, surfaces);
+    const PixelBlock pixels = allPixels(static_cast<std::size_t>(kRays))[0];
     (void)surfaces.castPixels(tracer, pixels);  // compiles
     tell("gpu_mrays_per_cpu_s",
          1e-6 * kRays / timeOf([&] { (void)surfaces.castPixels(tracer, pixels); }));

@@ -75,9 +75,10 @@ TEST(GpuTracer, SplitsValuesOverStorageBlocks) {
     pixels.y[i] = static_cast<float>(i / 64) * 1.5f - 47.25f;
   }
   HitBlock a(pixels.size()), b(pixels.size()), c(pixels.size());
-  whole.trace(surfaces.solids()[0], pixels, a);
-  split.trace(surfaces.solids()[0], pixels, b);
-  tracePixels(surfaces.solids()[0].pool, surfaces.solids()[0].fan, pixels, c);
+  ShapeBlock shapesA(pixels.size()), shapesB(pixels.size()), shapesC(pixels.size());
+  whole.trace(surfaces.solids()[0], pixels, a, shapesA);
+  split.trace(surfaces.solids()[0], pixels, b, shapesB);
+  tracePixels(surfaces.solids()[0].pool, surfaces.solids()[0].fan, pixels, c, shapesC);
   EXPECT_GT(std::count(a.found.begin(), a.found.end(), -1), 800);
   EXPECT_EQ(a.found, b.found);
   EXPECT_EQ(a.t, b.t);
@@ -86,6 +87,12 @@ TEST(GpuTracer, SplitsValuesOverStorageBlocks) {
   EXPECT_EQ(a.x, c.x);
   EXPECT_EQ(a.y, c.y);
   EXPECT_EQ(a.z, c.z);
+  for (std::size_t p = 0; p < ShapeBlock::kParts; ++p)
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      if (!a.found[i]) continue;
+      EXPECT_EQ(shapesA.part[p][i], shapesB.part[p][i]);
+      EXPECT_EQ(shapesA.part[p][i], shapesC.part[p][i]);
+    }
 }
 
 std::string refusalOf(const auto& job) {
@@ -121,7 +128,8 @@ TEST(GlContext, OutlivesAnother) {
   }
   PixelBlock pixels(64);
   HitBlock hits(pixels.size());
-  EXPECT_NO_THROW(tracer.trace(surfaces.solids()[0], pixels, hits));
+  ShapeBlock shapes(pixels.size());
+  EXPECT_NO_THROW(tracer.trace(surfaces.solids()[0], pixels, hits, shapes));
   EXPECT_EQ(hits.found[0], -1);
 }
 

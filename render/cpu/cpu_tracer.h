@@ -1,0 +1,23 @@
+#pragma once
+
+#include "render/cpu/cpu_trace.h"
+#include "render/kernel/kernel_scene.h"
+
+namespace render {
+
+/// The kernel on the processor, by the widest instructions that it has, on the calling thread.
+class CpuTracer : public KernelTracer {
+ public:
+  void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,
+             ShapeBlock& shapes) const override {
+    tracePixels(solid.pool, solid.fan, pixels, hits, shapes, set_);
+  }
+  void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const override {
+    traceRays(solid.pool, rays, hits, set_);
+  }
+
+ private:
+  InstructionSet set_ = instructionSets().back();
+};
+
+}  // namespace render

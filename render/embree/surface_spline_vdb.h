@@ -1,0 +1,15 @@
+#pragma once
+
+// Private to the judge: what a surface is like at a point, in double precision and from OpenVDB's
+// own tree.
+
+#include "levelset/vdb.h"
+#include "render/shading/surface_shape.h"
+
+namespace render {
+
+/// At `position` (index space), from the 6³ grid values around it. The B-spline's coefficients are
+/// f − ∇²f/6 by differences, which takes away the inward shift of a plain B-spline [Sigg05].
+[[nodiscard]] SurfaceShape surfaceShape(const openvdb::FloatTree& tree, const Imath::V3d& position);
+
+}  // namespace render

@@ -1,0 +1,16 @@
+#include "render/kernel/ray_block.h"
+
+namespace render {
+
+SurfaceShape ShapeBlock::at(std::size_t i) const {
+  const auto get = [&](std::size_t p) { return static_cast<double>(part[p][i]); };
+  SurfaceShape shape;
+  shape.gradient = {get(0), get(1), get(2)};
+  shape.trilinearGradient = {get(3), get(4), get(5)};
+  const double xx = get(6), yy = get(7), zz = get(8), xy = get(9), xz = get(10), yz = get(11);
+  shape.hessian = Imath::M33d(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+  shape.interpolationError = get(12);
+  return shape;
+}
+
+}  // namespace render
