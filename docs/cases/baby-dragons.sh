@@ -3,11 +3,14 @@
 . "$(dirname "$0")/case.sh"
 standing_dragon 512
 standing_dragon 120
-echo "| babies | particles | set-up s | certificate s | mapping s | points | distance s | merging s | folded places |"
-echo "|--:|--:|--:|--:|--:|--:|--:|--:|--:|"
+echo "| | babies | particles | set-up s | certificate s | mapping s | points | distance s | merging s | folded places |"
+echo "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|"
 map baby-dragons read "$out/dragon512.vdb" --as mother ! read "$out/dragon120.vdb" --as baby \
   ! scatter @mother --count 26 --size 0.03,0.0135 --height 0.021 --along "0,-1,0" --jitter 40 --levels 5 --spacing 6vx --mask "z" --mask-min 0.02 --mask-max 0.021 --as places \
   ! texture @mother @baby @places --blend 2vx --voxel 0.0004 --skip-folds
-row baby-dragons patches particles cpu_s.setup cpu_s.certificate cpu_s.mapping points cpu_s.distance cpu_s.merging folded
+row baby-dragons "'here'" patches particles cpu_s.setup cpu_s.certificate cpu_s.mapping points cpu_s.distance cpu_s.merging folded
+echo "| thesis | 12 | 300 to 400 each | – | – | 240 to 300 each | 20 to 30 M each | – | – | – |"
+expect baby-dragons patches ">=" 11
+expect baby-dragons folded = 0
 picture baby-dragons --from 0.15,-0.32,0.28 --to -0.005,0,0.13 --up 0,0,1
 sheet baby-dragons 1 "baby-dragons=baby dragons on their mother"

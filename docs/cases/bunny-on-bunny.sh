@@ -16,16 +16,20 @@ lay 6 5 shell "480, 0.047, 9.750"
 lay 3 8 shell "2926, 0.078, 10.797"
 lay 1.5 15 shell "13194, 0.485, 11.671"
 lay 0.75 29 shell "52896, 2.266, 12.641"
-lay 6 5 rbf "361, mapping 102.828 with set-up"
-lay 3 8 rbf ""
-lay 1.5 15 rbf ""
-lay 0.75 29 rbf ""  # the proof that nothing folds takes 20 CPU minutes of it
+lay 6 5 rbf "361, –, 102.828 with set-up"
+lay 3 8 rbf "–"
+lay 1.5 15 rbf "–"
+lay 0.75 29 rbf "–"  # the proof that nothing folds takes 20 CPU minutes of it
 for spacing in 6 3 1.5 0.75; do  # the thesis' figure
   expect "bunny-shell-$spacing" operations_per_point "<=" 2.8
+  expect "bunny-shell-$spacing" min_jacobian ">" 0.3
+  expect "bunny-rbf-$spacing" min_jacobian ">" 0.3
 done
 map bunny-on-bunny read "$out/bunny100.vdb" --as base ! read "$out/standing190.vdb" --as small \
   ! patch @base --at 0.5,0.1,0.24 --size 30vx,30vx --rotate 20 --height 21vx --as back \
   ! texture @base @small @back --blend 1vx --voxel 0.0067
+solid bunny-on-bunny
+expect bunny-on-bunny-solid components = 1
 for name in shell-6 shell-0.75 rbf-6; do
   picture "bunny-$name" --from 1.35,0.6,1.7 --to 0.5,0.32,0.33
 done

@@ -10,6 +10,9 @@ map bunny-scales read "$out/standing200.vdb" --as base ! read "$out/scale.vdb" -
   --scale "1.1-0.35*max(z,0)" --as places \
   ! texture @base @scale @places --sink 0.012 --skip-folds --blend 1vx --voxel 0.006
 row bunny-scales patches skipped particles cpu_s.setup cpu_s.certificate cpu_s.mapping points cpu_s.distance cpu_s.merging
-expect bunny-scales patches '>=' 390
+expect bunny-scales patches ">=" 390
+expect bunny-scales min_jacobian ">" 0.2
+solid bunny-scales
+expect bunny-scales-solid components = 1
 picture bunny-scales --from 1.8,-3.6,1.2 --to 0,0,-0.12
 sheet bunny-scales 1 "bunny-scales=A bunny in scales"

@@ -29,15 +29,20 @@ picture() {  # picture NAME OPTIONS...: of NAME.vdb
   "$levelsmith" --quiet read "$out/$name.vdb" ! render "$out/$name.png" --size 480x360 "$@"
 }
 
+solid() {  # solid NAME: NAME-solid.json tells components, cavities and Euler characteristic of NAME.vdb
+  "$levelsmith" --quiet --report "$out/$1-solid.json" read "$out/$1.vdb" ! measure > /dev/null
+}
+
 sheet() {  # sheet NAME COLUMNS PICTURE=TITLE...
   "${PYTHON:-python3}" "$here/figures.py" sheet "$out" "$here/$@"
 }
 
-row() {  # row NAME FIELD... "text": one line of the table from NAME's report
+row() {  # row NAME FIELD... "'text'": one line of the table from NAME's report, of its last texture
   "${PYTHON:-python3}" "$here/figures.py" row "$out" "$@"
 }
 
-expect() {  # expect NAME FIELD OPERATOR VALUE: exits 5 with a sentence unless NAME's report says so; <, <=, =, >=, >
+# expect NAME FIELD OPERATOR VALUE: exits 5 with a sentence unless NAME's report says so of each texture; <, <=, =, >=, >
+expect() {
   "${PYTHON:-python3}" "$here/figures.py" expect "$out" "$@"
 }
 

@@ -32,21 +32,21 @@ def steps_of(folder, name):
         return json.load(file)["steps"]
 
 
-def value_of(steps, field):
-    """What the last texture of a report says of FIELD, a path with dots."""
-    value = [step for step in steps if step["action"] == "texture"][-1]["details"]
+def values_of(steps, field):
+    """What each texture and each measurement of a report says of FIELD, a path with dots."""
+    values = [step["details"] for step in steps if step["action"] in ("texture", "measure")]
     for part in field.split("."):
-        value = value[part]
-    return value
+        values = [value[part] for value in values]
+    return values
 
 
 def figure_of(steps, field):
-    """The same as text for a table; text in quotes is itself."""
+    """What the last of them says, as text for a table; text in quotes is itself."""
     if field.startswith("'"):
         return field.strip("'")
     if field == "points":
-        return f"{512 * value_of(steps, 'blocks_evaluated') / 1e6:.2f} M"
-    value = value_of(steps, field)
+        return f"{512 * values_of(steps, 'blocks_evaluated')[-1] / 1e6:.2f} M"
+    value = values_of(steps, field)[-1]
     return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
@@ -57,11 +57,12 @@ def row(folder, name, *fields):
 
 
 def expect(folder, name, field, comparison, wanted):
-    """Exits 5 with a sentence unless what FOLDER/NAME.json says of FIELD compares so."""
+    """Exits 5 with a sentence unless all that FOLDER/NAME.json says of FIELD compares so."""
     compare = {"<": operator.lt, "<=": operator.le, "=": operator.eq, ">=": operator.ge, ">": operator.gt}[comparison]
-    value = value_of(steps_of(folder, name), field)
-    if not compare(value, float(wanted)):
-        print(f"{name}: {field} is {value}, but {comparison} {wanted} is wanted.", file=sys.stderr)
+    values = values_of(steps_of(folder, name), field)
+    if not values or not all(value is not None and compare(value, float(wanted)) for value in values):
+        said = ", ".join(str(value) for value in values) or "not told"
+        print(f"{name}: {field} is {said}, but {comparison} {wanted} is wanted.", file=sys.stderr)
         sys.exit(5)
 
 

@@ -4,7 +4,7 @@
 bunny 120
 standing_bunny 150
 echo "| level | particles | voxel | set-up s | mapping s | points | least Jacobian |"
-echo "|--:|--:|--:|--:|--:|--:|--:|"
+echo "|---|--:|--:|--:|--:|--:|--:|"
 map recursion-1 read "$out/bunny120.vdb" --as base ! read "$out/standing150.vdb" --as small \
   ! patch @base --at 0.45,0.13,0.24 --size 0.6,0.5 --rotate 20 --height 0.55 --as back \
   ! texture @base @small @back --sink 2vx --blend 2vx --voxel 0.006
@@ -17,10 +17,17 @@ map recursion-3 read "$out/recursion-2.vdb" --as base ! read "$out/standing150.v
   ! patch @base --at 0.905,0.38,0.345 --size 0.054,0.045 --rotate 20 --height 0.05 --as back \
   ! texture @base @small @back --sink 1.5vx --blend 2vx --voxel 0.0015
 row recursion-3 "'3'" particles voxel_size cpu_s.setup cpu_s.mapping points min_jacobian
+echo "| thesis, bunnies | – | – | – | – | – | – |"
+echo "| thesis, small latch | 280 | – | – | 20 to 30 | 4 M | – |"
+echo "| thesis, large latch | 660 | – | – | 20 to 30 | 5.6 M | – |"
 for level in 1 2 3; do
   expect "recursion-$level" patches = 1
   expect "recursion-$level" folded = 0
   expect "recursion-$level" blocks_evaluated ">" 0
+  expect "recursion-$level" min_jacobian ">" 0.3
+  solid "recursion-$level"
+  expect "recursion-$level-solid" components = 1
+  expect "recursion-$level-solid" cavities = 0
 done
 picture recursion-1 --from 2.7,1.5,2.5 --to 0,-0.1,0
 picture recursion-2 --from 1.5,1,1.5 --to 0.55,0.42,0.35

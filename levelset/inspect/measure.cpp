@@ -101,8 +101,10 @@ void describeShells(const Shells& shells, const std::vector<SurfaceMoments>& sum
   for (std::size_t i = 0; i < sums.size(); ++i) {
     result.euler += shells.figures[i].euler;
     ++result.shells;
-    if (sums[i].volume > 0) ++result.components;
-    if (sums[i].volume < 0) ++result.cavities;
+    // By flat triangles: what bends by more than a voxel may have a volume of the wrong sign else.
+    const double volume = shells.figures[i].volume;
+    if (volume > 0) ++result.components;
+    if (volume < 0) ++result.cavities;
     whole.add(sums[i].about(anchors[0] - anchors[i]));
   }
   describeMoments(whole, anchors[0], toWorld, scale, result);

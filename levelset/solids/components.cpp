@@ -13,6 +13,7 @@
 #include "levelset/eikonal/redistance.h"
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
+#include "levelset/sample.h"
 #include "levelset/solids/regions.h"
 
 namespace levelset {
@@ -243,6 +244,47 @@ NarrowBand keepLargest(const NarrowBand& solid, std::size_t count, const Progres
   NarrowBand result = flip(solid, map, std::move(flipped), subProgress(progress, 0.5, 1));
   report(progress, 1, "keep");
   return result;
+}
+
+SliversDropped dropSlivers(const NarrowBand& solid, const NarrowBand& cutter,
+                           const Progress& progress) {
+  constexpr float kDepth = 0.5, kNear = 1;  // voxels
+  const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5), "slivers");
+  const std::vector<Region>& regions = map.regions();
+  const auto voxel = static_cast<float>(solid.voxelSize());
+  std::vector<bool> isSliver(regions.size());
+  for (std::size_t i = 0; i < regions.size(); ++i) isSliver[i] = regions[i].inside;
+  const FloatTree& tree = vdb(solid).tree();
+  openvdb::tree::ValueAccessor<const Int32Tree> labels(map.labels());
+  auto tile = tree.cbeginValueAll();
+  tile.setMaxDepth(FloatTree::DEPTH - 2);
+  for (; tile; ++tile)
+    if (*tile < 0)
+      isSliver[static_cast<std::size_t>(labels.getValue(tile.getBoundingBox().min()))] = false;
+  std::vector<Coord> shallow;
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+    const LabelLeaf& own = *map.labels().probeConstLeaf(leaf->origin());
+    for (openvdb::Index i = 0; i < FloatLeaf::SIZE; ++i) {
+      const float value = leaf->getValue(i);
+      if (!(value < 0)) continue;
+      if (value < -kDepth * voxel)
+        isSliver[static_cast<std::size_t>(own.getValue(i))] = false;
+      else
+        shallow.push_back(leaf->offsetToGlobalCoord(i));
+    }
+  }
+  const BandSampler sampler(cutter);
+  for (const Coord& c : shallow) {
+    const auto region = static_cast<std::size_t>(labels.getValue(c));
+    if (!isSliver[region]) continue;
+    const double distance = sampler.value(toImath(vdb(solid).indexToWorld(c)));
+    isSliver[region] = std::abs(distance) < kNear * voxel;
+  }
+  const auto count = static_cast<std::size_t>(std::count(isSliver.begin(), isSliver.end(), true));
+  const auto solids = std::count_if(regions.begin(), regions.end(),
+                                    [](const Region& region) { return region.inside; });
+  if (count == 0 || count == static_cast<std::size_t>(solids)) return {solid, 0};
+  return {flip(solid, map, std::move(isSliver), subProgress(progress, 0.5, 1)), count};
 }
 
 NarrowBand fillCavities(const NarrowBand& solid, double maxVolume, const Progress& progress) {

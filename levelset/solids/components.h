@@ -35,4 +35,17 @@ inline constexpr double kAnyVolume = std::numeric_limits<double>::infinity();
 [[nodiscard]] NarrowBand fillCavities(const NarrowBand& solid, double maxVolume = kAnyVolume,
                                       const Progress& progress = {});
 
+struct SliversDropped {
+  NarrowBand band;
+  std::size_t count = 0;
+};
+
+/// Drops the skins that a cut leaves where the cutter ends in the surface of what it cuts, and
+/// rounding decides: solids that go nowhere half a voxel deep and lie within a voxel of the
+/// cutter's surface. Others keep their bits, as with keepLargest(); where nothing else is left they
+/// stay.
+/// @pre both are solids, and `cutter` has a band of two voxels of `solid` at least
+[[nodiscard]] SliversDropped dropSlivers(const NarrowBand& solid, const NarrowBand& cutter,
+                                         const Progress& progress = {});
+
 }  // namespace levelset

@@ -82,4 +82,45 @@ ParticleLevel withCounts(const ParticleLevel& level, std::size_t columns, std::s
   return result;
 }
 
+std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink) {
+  // Of the distance to a neighbour on the last level what must be left of it.
+  constexpr double kLeastShare = 0.25;
+  std::vector<SunkParticle> particles;
+  if (sink == 0 || patch.levels.size() < 2) return particles;
+  const bool isBelow = sink > 0;
+  const ParticleLevel& last = isBelow ? patch.levels.front() : patch.levels.back();
+  const ParticleLevel before =
+      withCounts(isBelow ? patch.levels[1] : *(patch.levels.end() - 2), last.columns, last.rows);
+  const int rim = last.hasRim() && before.hasRim() ? 1 : 0;
+  const auto right = static_cast<int>(last.columns), top = static_cast<int>(last.rows);
+  const auto isThere = [&](int i, int j) {
+    return i >= -rim && i < right + rim && j >= -rim && j < top + rim;
+  };
+  const double step = std::abs(last.w - before.w);
+  // A sink of whole steps takes so many layers, whatever its last digit. And one as far beyond: a
+  // smooth map errs most beside its last particles.
+  const auto layers = static_cast<int>(std::ceil(std::abs(sink) / step * (1 - 1e-9)));
+  for (int n = 1; n <= layers + 1; ++n) {
+    const double depth = std::abs(sink) * n / layers, share = depth / step;
+    const auto keepsApart = [&](int i, int j, int u, int v) {
+      if (!isThere(u, v)) return true;
+      const V3d way = last.beyond(u, v) - last.beyond(i, j);
+      const V3d turn = way - (before.beyond(u, v) - before.beyond(i, j));
+      return (way + turn * share).dot(way) >= kLeastShare * way.length2();
+    };
+    for (int j = -rim; j < top + rim; ++j)
+      for (int i = -rim; i < right + rim; ++i) {
+        if (!keepsApart(i, j, i - 1, j) || !keepsApart(i, j, i + 1, j) ||
+            !keepsApart(i, j, i, j - 1) || !keepsApart(i, j, i, j + 1))
+          continue;
+        const V3d place = last.beyond(i, j);
+        particles.push_back(
+            {place + (place - before.beyond(i, j)) * share,
+             {static_cast<double>(i) / (right - 1), static_cast<double>(j) / (top - 1),
+              last.w + (isBelow ? -depth : depth)}});
+      }
+  }
+  return particles;
+}
+
 }  // namespace mapping

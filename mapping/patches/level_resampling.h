@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include "mapping/patches/patch.h"
 
@@ -13,5 +14,16 @@ namespace mapping {
 /// @param columns, rows  each at least 2
 [[nodiscard]] ParticleLevel withCounts(const ParticleLevel& level, std::size_t columns,
                                        std::size_t rows);
+
+/// A particle below the levels of a patch, or above them.
+struct SunkParticle {
+  Imath::V3d place, uvw;
+};
+
+/// Down to w = −sink, or up to w = 1 − sink where that is more, and one layer beyond: the columns
+/// of the patch go straight on, in layers no wider apart than the patch's own there. Left out where
+/// columns come together, as below a crease.
+/// @param sink  as a share of the patch's height
+[[nodiscard]] std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink);
 
 }  // namespace mapping

@@ -88,8 +88,13 @@ Attempt tryAt(const NarrowBand& base, const SurfacePoint& point, std::size_t ind
     attempt.site = siteAt(base, point, index, options);
     PatchOptions part = atScale(options.patch, point.scale);
     part.mirror = true;  // corners in the wrong order are no mistake of the caller's here
-    Patch patch = makePatch(base, attempt.site.corners, height * point.scale, part).patch;
-    if (patch.mirrored) {
+    PatchResult made = makePatch(base, attempt.site.corners, height * point.scale, part);
+    Patch& patch = made.patch;
+    const auto isHalf = [&](double length, double asked) {
+      return length < 0.5 * asked * point.scale;
+    };
+    if (patch.mirrored || isHalf(made.report.uLength, options.uSize) ||
+        isHalf(made.report.vLength, options.vSize)) {
       attempt.cause = "the surface is too bent for a patch of this size";
       return attempt;
     }

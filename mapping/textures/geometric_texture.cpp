@@ -16,9 +16,11 @@
 #include "levelset/sample.h"
 #include "levelset/solids/blend.h"
 #include "levelset/solids/clip.h"
+#include "levelset/solids/components.h"
 #include "levelset/solids/csg.h"
 #include "levelset/solids/resample.h"
 #include "mapping/maps/shell_map.h"
+#include "mapping/patches/level_resampling.h"
 #include "mapping/textures/shared_sides.h"
 #include "mapping/textures/texture_warp.h"
 
@@ -74,6 +76,13 @@ void checkArguments(const NarrowBand& base, const NarrowBand& texture,
   }
   if (options.sink && !std::isfinite(*options.sink)) {
     throw UsageError(fmt::format("{}: the sink is {}; give a length", kTexture, *options.sink));
+  }
+  const double diagonal = base.zeroSetBounds().size().length();
+  if (options.sink && std::abs(*options.sink) > diagonal) {
+    throw InvalidInput(
+        fmt::format("{}: the sink of {:.6g} is larger than the base, whose diagonal is {:.6g}; "
+                    "give less",
+                    kTexture, *options.sink, diagonal));
   }
   if (!(options.blend >= 0) || !std::isfinite(options.blend)) {
     throw UsageError(fmt::format("{}: the blend radius is {}; give a length of at least 0",
@@ -190,6 +199,7 @@ struct ChosenMap {
   std::size_t overlaps = 0;  ///< places where the patch passes through itself without folding
   MapSample overlap = {};    ///< one of them
   RbfSolveReport solve = {};
+  bool isExtrapolated = false;  ///< where the texture is sunk no particles hold it
 
   /// Where the texture is seen, most of the map is not stretched less than this; a fold here or
   /// there sets no voxel size, nor does what is sunk into the base and squeezed there by a crease.
@@ -203,16 +213,6 @@ struct ChosenMap {
 double solveTolerance(const NarrowBand& texture, const V3d& boxSize, double mapTolerance) {
   const double longest = std::max({boxSize.x, boxSize.y, boxSize.z});
   return std::max(kFinestSolve, kSolveShare * mapTolerance * texture.voxelSize() / longest);
-}
-
-/// @param tolerance  of the solution for an RBF map, u, v and w
-std::unique_ptr<RbfMap> solveRbf(const Patch& patch, double tolerance,
-                                 const TextureOptions& options) {
-  RbfMapOptions rbf = options.rbf;
-  rbf.maxMemory = std::min(rbf.maxMemory, options.maxMemory);
-  rbf.solveTolerance = tolerance;
-  rbf.progress = levelset::subProgress(options.progress, 0, 0.2);
-  return std::make_unique<RbfMap>(patchToTexture(patch, rbf));
 }
 
 std::unique_ptr<ShellMap> buildShell(const NarrowBand& base, const Patch& patch, double sink,
@@ -240,16 +240,18 @@ ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink, const
     result.map = std::move(shell);
     return result;
   }
-  auto smooth = timed(cost.setup, [&] { return solveRbf(patch, tolerance, options); });
-  result.particles = smooth->size();
-  result.residual = smooth->axisResidual();
-  result.solve = smooth->solveReport();
-  result.certificate = timed(cost.certificate, [&] {
-    result.distortion =
-        surveyDistortion(sampleRbf(*smooth, patch, sink), textureSize, patch.mirrored);
-    return certifyRbf(*smooth, patch, sink);
-  });
-  result.map = std::move(smooth);
+  RbfMapOptions rbf = options.rbf;
+  rbf.maxMemory = std::min(rbf.maxMemory, options.maxMemory);
+  rbf.solveTolerance = tolerance;
+  rbf.progress = levelset::subProgress(options.progress, 0, 0.2);
+  JudgedRbf judged = judgedRbf(patch, sink, rbf, cost);
+  result.particles = judged.map->size();
+  result.residual = judged.map->axisResidual();
+  result.solve = judged.map->solveReport();
+  result.distortion = surveyDistortion(judged.samples, textureSize, patch.mirrored);
+  result.certificate = std::move(judged.certificate);
+  result.isExtrapolated = judged.isExtrapolated;
+  result.map = std::move(judged.map);
   return result;
 }
 
@@ -288,6 +290,7 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
   std::vector<ChosenMap> maps;
   std::vector<Distortion> distortions;
   std::vector<FoldCertificate> certificates;
+  std::size_t extrapolated = 0;
   for (const Patch& patch : patches) {
     const auto done = static_cast<double>(maps.size());
     const auto share = [&](double n) { return 0.2 * n / static_cast<double>(patches.size()); };
@@ -310,6 +313,7 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
     std::vector<std::string> notes =
         judgeFolds(chosen.distortion, chosen.certificate, options.allowFolds);
     std::move(notes.begin(), notes.end(), std::back_inserter(report.notes));
+    extrapolated += chosen.isExtrapolated;
     report.particles += chosen.particles;
     addSolve(chosen.solve, report);
     report.mapResidual = std::max(report.mapResidual, (chosen.residual * textureSize).length());
@@ -322,6 +326,13 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
     throw InvalidInput(
         fmt::format("{}: all of {} patches fold; lower their height or make them smaller", kTexture,
                     patches.size()));
+  }
+  if (extrapolated > 0) {
+    report.notes.push_back(
+        fmt::format("below {} of {} patches, where the surface has a crease or bends too narrowly "
+                    "for the sink, the map goes on by itself, without particles that hold it; sink "
+                    "the texture less, or take --map shell",
+                    extrapolated, patches.size()));
   }
   if (report.skipped > 0) {
     report.notes.push_back(
@@ -387,7 +398,15 @@ NarrowBand merge(const NarrowBand& base, NarrowBand warped, const TextureOptions
                                {.maxMemory = options.maxMemory, .progress = progress});
   }
   for (std::string& note : result.notes) report.notes.push_back(std::move(note));
-  return result.band;
+  if (options.merge != TextureMerge::Carve) return result.band;
+  levelset::SliversDropped clean = levelset::dropSlivers(result.band, warped);
+  if (clean.count > 0) {
+    report.notes.push_back(
+        fmt::format("{} skins of less than a voxel that were left where the texture ends in the "
+                    "base's surface were dropped; sink it deeper or raise it to be clear of it",
+                    clean.count));
+  }
+  return std::move(clean.band);
 }
 
 }  // namespace
@@ -411,7 +430,7 @@ void requirePatchOn(const NarrowBand& base, const Patch& patch) {
   }
 }
 
-RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options) {
+RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options, double sink) {
   std::vector<V3d> points, targets;
   std::vector<char> near;
   for (const ParticleLevel& level : patch.levels) {
@@ -425,7 +444,36 @@ RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options) {
         near.push_back(level.w == 0);
       }
   }
+  for (const SunkParticle& particle : sunkParticles(patch, sink)) {
+    points.push_back(particle.place);
+    targets.push_back(particle.uvw);
+    near.push_back(false);
+  }
   return {points, targets, near, options};
+}
+
+JudgedRbf judgedRbf(const Patch& patch, double sink, const RbfMapOptions& options,
+                    TextureCost& cost) {
+  const auto judged = [&](double held) {
+    JudgedRbf result;
+    result.map = timed(
+        cost.setup, [&] { return std::make_unique<RbfMap>(patchToTexture(patch, options, held)); });
+    result.certificate = timed(cost.certificate, [&] {
+      result.samples = sampleRbf(*result.map, patch, sink);
+      return certifyRbf(*result.map, patch, sink);
+    });
+    return result;
+  };
+  const auto folds = [&](const JudgedRbf& one) {
+    return one.certificate.verdict() == FoldVerdict::Folds ||
+           surveyDistortion(one.samples, V3d(1), patch.mirrored).folded > 0;
+  };
+  JudgedRbf result = judged(sink);
+  if (sink == 0 || !folds(result)) return result;
+  JudgedRbf free = judged(0);
+  if (folds(free)) return result;
+  free.isExtrapolated = true;
+  return free;
 }
 
 TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture, const Patch& patch,

@@ -2,6 +2,7 @@
 
 #include <Imath/ImathBox.h>
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -86,8 +87,26 @@ struct TextureResult {
 [[nodiscard]] double resultVoxelSize(double base, double texture, double minStretch);
 
 /// The map of a patch: through its particles, those of its rims too, to their texture coordinates,
-/// λ near for w = 0. Without the rims the map errs most beside the patch's sides.
-[[nodiscard]] RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options = {});
+/// λ near for w = 0. Without the rims the map errs most beside the patch's sides; and beyond its
+/// first and last level, so that where the texture is sunk columns go straight on by as many
+/// levels.
+/// @param sink  as a share of the patch's height; negative: beyond the last level
+[[nodiscard]] RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options = {},
+                                    double sink = 0);
+
+/// A map, and whether it folds.
+struct JudgedRbf {
+  std::unique_ptr<RbfMap> map;
+  std::vector<MapSample> samples;
+  FoldCertificate certificate;
+  bool isExtrapolated = false;
+};
+
+/// The map of a patch for a texture that is sunk; where columns that go straight on would fold it,
+/// as below a crease, and without them it does not fold, the map that goes on by itself.
+/// @param cost  its setup and certificate are added to
+[[nodiscard]] JudgedRbf judgedRbf(const Patch& patch, double sink, const RbfMapOptions& options,
+                                  TextureCost& cost);
 
 /// @throws InvalidInput, telling where, when the patch's surface is not the base's
 void requirePatchOn(const levelset::NarrowBand& base, const Patch& patch);

@@ -114,6 +114,26 @@ void requireUpright(const std::vector<mapping::Patch>& patches, const std::strin
   if (!whyMirrored.empty() && patches.front().mirrored) throw levelset::InvalidInput(whyMirrored);
 }
 
+/// Where the surface bends, a patch whose diagonals are as asked has other sides.
+void requireSize(Invocation& in, const mapping::PatchReport& report) {
+  if (in.op().name != "patch" || !in.given("at")) return;
+  const std::array<double, 2> asked = patchSizeOf(in);
+  const double u = report.uLength / asked[0], v = report.vLength / asked[1];
+  const double least = std::min(u, v), most = std::max(u, v);
+  if (least < 0.5 || most > 2) {
+    throw levelset::InvalidInput(
+        fmt::format("patch: about {} the surface bends too much for a patch of size {}, its sides "
+                    "would be {:.4g} by {:.4g} long; make it smaller, or give its corners",
+                    in.text("at"), in.text("size"), report.uLength, report.vLength));
+  }
+  if (least < 0.9 || most > 1.1) {
+    in.notes.warnings.push_back(
+        fmt::format("patch: where the surface bends like this, a patch of size {} has sides of "
+                    "{:.4g} by {:.4g}; give its corners if these are not as wanted",
+                    in.text("size"), report.uLength, report.vLength));
+  }
+}
+
 /// Distortion and counts, for the report; warns of particles that were slowed.
 void tellPatches(Invocation& in, const mapping::PatchReport& report,
                  const std::vector<mapping::Patch>& patches) {
@@ -157,6 +177,7 @@ Value patchesOf(Invocation& in, PatchRecipe recipe, const Make& make) {
   const bool isAuto = in.text("height") == "auto";
   // The texture will tell the height; one voxel is enough to know the patch's size until then.
   auto [patches, report] = make(isAuto ? in.band().voxelSize() : in.length("height"), in.progress);
+  requireSize(in, report);
   tellPatches(in, report, patches);
   PatchValue value;
   value.patches = std::move(patches);

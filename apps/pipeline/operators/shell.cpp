@@ -14,6 +14,7 @@
 #include "mapping/maps/level_map.h"
 #include "mapping/maps/rbf_map.h"
 #include "mapping/maps/shell_map.h"
+#include "mapping/patches/shared_particles.h"
 #include "mapping/patches/unfold.h"
 #include "mapping/textures/geometric_texture.h"
 
@@ -157,16 +158,17 @@ JudgedMap judgeMap(const Invocation& in, const mapping::Patch& patch, double sin
     levelset::FieldGrid field = mapping::jacobianField(patch, map, certificate, options);
     return {std::move(certificate), survey(map.samples()), std::move(field)};
   }
-  const mapping::RbfMap map =
-      mapping::patchToTexture(patch, {.kernel = kernelOf(in),
-                                      .lambdaNear = in.number("lambda-near"),
-                                      .lambdaFar = in.number("lambda-far"),
-                                      .maxMemory = in.maxMemory,
-                                      .progress = in.progress});
-  mapping::FoldCertificate certificate = mapping::certifyRbf(map, patch, options.sink);
-  levelset::FieldGrid field = mapping::jacobianField(patch, map, certificate, options);
-  return {std::move(certificate), survey(mapping::sampleRbf(map, patch, options.sink)),
-          std::move(field)};
+  mapping::TextureCost cost;
+  mapping::JudgedRbf judged = mapping::judgedRbf(patch, options.sink,
+                                                 {.kernel = kernelOf(in),
+                                                  .lambdaNear = in.number("lambda-near"),
+                                                  .lambdaFar = in.number("lambda-far"),
+                                                  .maxMemory = in.maxMemory,
+                                                  .progress = in.progress},
+                                                 cost);
+  levelset::FieldGrid field =
+      mapping::jacobianField(patch, *judged.map, judged.certificate, options);
+  return {std::move(judged.certificate), survey(judged.samples), std::move(field)};
 }
 
 std::string verdictSentence(const mapping::FoldCertificate& certificate) {
@@ -298,8 +300,10 @@ ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base
   ImprovedPatches improved{.patches = std::move(patches)};
   if (!improvesPatches(in)) return improved;
   const double start = apps::processCpuSeconds();
+  const std::vector<mapping::Patch> before = improved.patches;
   if (in.flag("unfold")) unfoldPatches(in, base, improved, sink);
   if (isRelaxed(in)) relaxPatches(in, base, improved, sink, textureSize);
+  mapping::joinSharedParticles(before, improved.patches);
   improved.figures["improvement_cpu_s"] = apps::processCpuSeconds() - start;
   return improved;
 }

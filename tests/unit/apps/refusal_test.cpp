@@ -77,6 +77,22 @@ TEST_F(Refusal, PatchesAboutAPointOfASolidThatIsTooSmallSayThatItBends) {
        {"patch @ball --at 1,0,0 --size 4,4 --height 0.2 ! mesh ! write a.ply",
         "patch-grid @ball --at 1,0,0 --size 4,4 --count 2,2 --height 0.2 ! mesh ! write a.ply"})
     EXPECT_REFUSED(levelsmith(ball + rest), 3, "bends too much about 1,0,0");
+  // Its diagonals go round the ball more than once and end the right way round again.
+  EXPECT_REFUSED(levelsmith(ball + "patch @ball --at 0,0,1 --size 10,10 --height 0.1 ! mesh ! "
+                                   "write a.ply"),
+                 3, "bends too much for a patch of size 10,10");
+  EXPECT_REFUSED(levelsmith(ball + "scatter @ball --count 3 --size 10,10 --height 0.1 ! mesh ! "
+                                   "write a.ply"),
+                 3, "none of");
+}
+
+TEST_F(Refusal, TexturesSunkThroughTheirBaseEndAtOnce) {
+  EXPECT_REFUSED(
+      levelsmith("sphere --radius 1 --voxel 0.1 --as ball ! sphere --radius 1 --voxel 0.1 "
+                 "--as t ! patch @ball --at 1,0,0 --size 1,1 --height 0.2 --as p ! "
+                 "texture @ball @t @p --sink 1e6 ! write a.vdb",
+                 10),
+      3, "larger than the base");
 }
 
 /// A chain whose end cannot work is refused before its beginning runs: within a second, though the

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "levelset/meshing/band_to_mesh.h"
+#include "levelset/vdb.h"
 #include "tests/support/bands.h"
 
 namespace measure_test {
@@ -31,6 +32,31 @@ NarrowBand nested(double h) {
         return std::min(std::max(r - 20, 14 - r), r - 6);
       },
       {V3d(-20), V3d(20)}, h);
+}
+
+TriMesh tetrahedron();
+
+TEST(Measure, TellsTheTiniestVoidsFromSolids) {
+  // One grid point within a ball, or far from it, barely on the other side: what bends so much has
+  // no volume to speak of.
+  for (const float value : {1e-4f, 0.01f, 0.1f, 0.4f, 0.9f}) {
+    for (const bool isVoid : {true, false}) {
+      NarrowBand ball = sphere(8, 1, V3d(0.3, 0.2, 0.1));
+      openvdb::FloatGrid& grid = editVdb(ball);
+      auto accessor = grid.getAccessor();
+      const openvdb::Coord c(isVoid ? 0 : 20, 1, 2);
+      for (int axis = 0; axis < 3; ++axis)
+        for (const int step : {-2, -1, 1, 2}) {
+          openvdb::Coord next = c;
+          next[axis] += step;
+          accessor.setValue(next, isVoid ? -1.f : 1.f);
+        }
+      accessor.setValue(c, isVoid ? value : -value);
+      const Measurement m = measure(ball);
+      EXPECT_EQ(m.components, isVoid ? 1u : 2u) << value;
+      EXPECT_EQ(m.cavities, isVoid ? 1u : 0u) << value;
+    }
+  }
 }
 
 TriMesh tetrahedron() {

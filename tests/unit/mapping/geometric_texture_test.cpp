@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <set>
 #include <string>
 
@@ -192,14 +193,15 @@ TEST(GeometricTexture, CylinderCoordinatesAreThoseOfTheCylinder) {
                            half * share(n / level.columns, level.rows), level.w);
       ASSERT_LE((level.positions[n] - place).length(), 1e-4 * height);
     }
-  const mapping::RbfMap smooth = mapping::patchToTexture(sparse);
-  const mapping::ShellMap shell(dense, {.sink = 0.1, .rim = 0.1});
+  const double sink = 0.4;
+  const mapping::RbfMap smooth = mapping::patchToTexture(sparse, {}, sink);
+  const mapping::ShellMap shell(dense, {.sink = sink, .rim = 0.1});
   for (const mapping::PatchMap* map : {static_cast<const mapping::PatchMap*>(&smooth),
                                        static_cast<const mapping::PatchMap*>(&shell)}) {
     V3d worst(0);
     for (int i = 0; i <= 20; ++i)
       for (int j = 0; j <= 4; ++j)
-        for (int k = 0; k <= 10; ++k) {
+        for (int k = -4; k <= 10; ++k) {  // below the surface, where a texture is sunk
           const V3d uvw(i / 20.0, j / 4.0, k / 10.0);
           const V3d place =
               at(angle * (2 * uvw.x - 1), half * (2 * uvw.y - 1), uvw.z) * (1 - 1e-12);
@@ -221,8 +223,9 @@ void expectRadialCoordinates(double halfWidth) {
   const Patch patch = mapping::makePatch(base, cap(polar, radius), height).patch;
   const Patch dense =
       mapping::makePatch(base, cap(polar, radius), height, {.spacing = voxel}).patch;
-  const mapping::RbfMap smooth = mapping::patchToTexture(patch);
-  const mapping::ShellMap shell(dense, {.sink = 0.1, .rim = 0.1});
+  const double sink = 0.4;
+  const mapping::RbfMap smooth = mapping::patchToTexture(patch, {}, sink);
+  const mapping::ShellMap shell(dense, {.sink = sink, .rim = 0.1});
   const double corner = std::tan(polar) / std::sqrt(2.0);
   for (const mapping::PatchMap* map : {static_cast<const mapping::PatchMap*>(&smooth),
                                        static_cast<const mapping::PatchMap*>(&shell)}) {
@@ -231,7 +234,7 @@ void expectRadialCoordinates(double halfWidth) {
       for (int j = -3; j <= 3; ++j) {
         const V3d ray = V3d(corner * i / 3, corner * j / 3, 1).normalized();
         const V3d foot = (*map)(ray * radius);
-        for (int k = 0; k <= 10; ++k) {
+        for (int k = -4; k <= 10; ++k) {
           const double w = 0.1 * k;
           const V3d uvw = (*map)(ray * (radius + w * height));
           ASSERT_TRUE(std::isfinite((uvw - foot).length())) << uvw << foot;
@@ -375,6 +378,70 @@ TEST(GeometricTexture, UnionIsOneSolidAndCarvingLeavesAHole) {
   const levelset::Measurement alone =
       measured({.merge = TextureMerge::Alone, .sink = 0.2, .voxelSize = voxel});
   EXPECT_NEAR(united.volume - carved.volume, alone.volume, 0.02 * alone.volume);
+}
+
+TEST(GeometricTexture, SunkTexturesHaveTheVolumeOfTheirShareOfTheShell) {
+  // A box that fills the unit cube, on a ball: a cone's part between two radii, up to the sides.
+  const double radius = 10, height = 2, voxel = 0.25;
+  const NarrowBand base = makeBall(radius, voxel, 3), box = levelset::makeBox(V3d(4), V3d(0), 0.1);
+  const Patch patch = mapping::makePatch(base, cap(0.4, radius), height).patch;
+  const auto volume = [&](TextureMap map, double sink) {
+    const mapping::TextureOptions options = {
+        .merge = TextureMerge::Alone, .map = map, .sink = sink, .voxelSize = 0.1};
+    return levelset::measure(mapTexture(base, box, patch, options).band).volume;
+  };
+  const auto cubes = [&](double sink) {
+    return std::pow(radius + height - sink, 3) - std::pow(radius - sink, 3);
+  };
+  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell}) {
+    const double flush = volume(map, 0);
+    for (const double sink : {0.5, 1.5, 2.0})
+      EXPECT_NEAR(volume(map, sink) / flush, cubes(sink) / cubes(0), 0.005)
+          << static_cast<int>(map) << " sunk by " << sink;
+    // Raised, with nothing of the map's own below.
+    EXPECT_NEAR(volume(map, -1) / flush, cubes(-1) / cubes(0), 0.01) << static_cast<int>(map);
+  }
+}
+
+TEST(GeometricTexture, CarvedFlushItLeavesNoSkins) {
+  // The texture ends in the base's surface, but for what the map errs.
+  const NarrowBand ball = makeBall(8, 0.25, 3), box = levelset::makeBox(V3d(4), V3d(0), 0.1);
+  const Patch patch = mapping::makePatch(ball, cap(0.6, 8), 2).patch;
+  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell}) {
+    const TextureResult result = mapTexture(
+        ball, box, patch, {.merge = TextureMerge::Carve, .map = map, .sink = 2, .voxelSize = 0.1});
+    const levelset::Measurement after = levelset::measure(result.band);
+    EXPECT_EQ(after.components, 1u) << static_cast<int>(map);
+    const double removed = 4 * std::numbers::pi / 3 * 512 - after.volume;
+    const levelset::Measurement alone = levelset::measure(
+        mapTexture(ball, box, patch,
+                   {.merge = TextureMerge::Alone, .map = map, .sink = 2, .voxelSize = 0.1})
+            .band);
+    // The skins are a fifth of a voxel thick.
+    EXPECT_NEAR(removed, alone.volume, 0.02 * alone.volume) << static_cast<int>(map);
+  }
+}
+
+TEST(GeometricTexture, AResultIsTheNextBase) {
+  // Three levels of recursion: each ball stands on the one before.
+  NarrowBand base = makeBall(2, 0.1, 3);
+  V3d top(0, 0, 2);
+  double volume = levelset::measure(base).volume;
+  for (const double size : {1.2, 0.6, 0.3}) {
+    const Patch patch =
+        mapping::makePatch(base, mapping::cornersAround(base, top, size, size), size).patch;
+    base = mapTexture(base, makeBall(1, 0.1), patch, {.sink = 0.1 * size}).band;
+    const levelset::Measurement result = levelset::measure(base);
+    EXPECT_EQ(result.components, 1u) << size;
+    EXPECT_EQ(result.euler, 2) << size;
+    // A ball in a shell that widens upwards, less what is sunk.
+    const double ball = std::numbers::pi / 6 * size * size * size;
+    EXPECT_GT(result.volume - volume, 0.9 * ball) << size;
+    EXPECT_LT(result.volume - volume, 1.9 * ball) << size;
+    volume = result.volume;
+    EXPECT_NEAR(result.bounds.max.z, top.z + 0.9 * size, 0.02 * size);
+    top.z = result.bounds.max.z;
+  }
 }
 
 TEST(GeometricTexture, SameBitsForAnyNumberOfThreads) {

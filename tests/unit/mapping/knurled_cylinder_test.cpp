@@ -6,13 +6,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <vector>
 
 #include "levelset/inspect/measure.h"
 #include "levelset/sample.h"
 #include "levelset/solids/shapes.h"
 #include "mapping/generators/knurl.h"
 #include "mapping/patches/patch_grid.h"
+#include "mapping/patches/shared_particles.h"
+#include "mapping/patches/unfold.h"
 #include "mapping/textures/geometric_texture.h"
 
 namespace knurled_cylinder_test {
@@ -60,12 +64,16 @@ double radiusOf(const levelset::BandSampler& sampler, double angle, double z) {
   return (low + high) / 2;
 }
 
-void expectKnurled(TextureMap map) {
+/// @param change  what is done to the patches first
+void expectKnurled(
+    TextureMap map,
+    const std::function<void(const NarrowBand&, std::vector<mapping::Patch>&)>& change = {}) {
   const NarrowBand base = levelset::makeCylinder(1, 3.05, V3d(0), V3d(0, 0, 1), kVoxel);
-  const mapping::PatchGridResult grid = mapping::makePatchGridAround(
+  mapping::PatchGridResult grid = mapping::makePatchGridAround(
       base, V3d(0, 0, -kHalfLength), V3d(0, 0, kHalfLength), 0, kHeight,
       {.columns = kTiles, .rows = kRows},
       {.levels = 3, .scheme = mapping::LevelScheme::Conforming, .spacing = 0.15});
+  if (change) change(base, grid.patches);
   const NarrowBand texture = mapping::makeKnurl(knurl(), V3d(0), 0.04);
   const NarrowBand result =
       mapping::mapTexture(base, texture, grid.patches,
@@ -79,6 +87,7 @@ void expectKnurled(TextureMap map) {
   EXPECT_EQ(measured.cavities, 0u);
   EXPECT_EQ(measured.euler, 2);
 
+  if (change) return;  // the relief is another
   const levelset::BandSampler sampler(result, levelset::Interpolation::Tricubic);
   double worst = 0, mostUneven = 0;
   V3d at(0);
@@ -106,6 +115,31 @@ TEST(KnurledCylinder, ClosesBySmoothMaps) {
 
 TEST(KnurledCylinder, ClosesByTetrahedra) {
   expectKnurled(TextureMap::Shell);
+}
+
+TEST(KnurledCylinder, StaysClosedWhenItsPatchesAreRelaxed) {
+  // Each by itself, and their common particles joined again.
+  expectKnurled(TextureMap::Rbf, [](const NarrowBand& base, std::vector<mapping::Patch>& patches) {
+    const std::vector<mapping::Patch> before = patches;
+    for (mapping::Patch& patch : patches)
+      patch = mapping::minimiseDistortion(
+                  base, patch,
+                  {.sink = kSink / kHeight,
+                   .proportions = mapping::knurlBox(knurl(), V3d(0)).tile.size()})
+                  .patch;
+    double apart = 0, moved = 0;
+    const auto& left = patches[0].levels.back();
+    for (std::size_t j = 0; j < left.rows; ++j) {
+      const std::size_t n = j * left.columns + left.columns - 1;
+      moved = std::max(moved, (left.positions[n] - before[0].levels.back().positions[n]).length());
+    }
+    mapping::joinSharedParticles(before, patches);
+    const auto& right = patches[1].levels.back();
+    for (std::size_t j = 0; j < left.rows; ++j)
+      apart = std::max(apart, (left.at(left.columns - 1, j) - right.at(0, j)).length());
+    EXPECT_GT(moved, 1e-4);
+    EXPECT_LE(apart, 1e-12);
+  });
 }
 
 }  // namespace knurled_cylinder_test

@@ -48,29 +48,30 @@ TEST(MeshTexture, AgreesWithTheImplicitMap) {
   ASSERT_GT(levelset::signedVolume(ring), 0);
   const NarrowBand solid = levelset::meshToBand(ring, voxel).band;
   const Patch patch = mapping::makePatch(base, cap(0.6, radius), 0.6).patch;
-  const mapping::MeshTextureResult moved = mapping::mapMesh(ring, patch, {.sink = voxel});
-  EXPECT_EQ(moved.mesh.triangles, ring.triangles);
-  EXPECT_GT(levelset::signedVolume(moved.mesh), 0);
-  for (const mapping::TextureMap map : {mapping::TextureMap::Rbf, mapping::TextureMap::Shell}) {
-    const NarrowBand warped = mapping::mapTexture(base, solid, patch,
-                                                  {.merge = mapping::TextureMerge::Alone,
-                                                   .map = map,
-                                                   .sink = voxel,
-                                                   .textureBox = levelset::bounds(ring),
-                                                   .voxelSize = voxel})
-                                  .band;
-    const levelset::BandSampler sampler(warped);
-    double worst = 0;
-    for (const V3d& p : moved.mesh.positions)
-      worst = std::max(worst, std::abs(sampler.value(p)) / voxel);
-    EXPECT_LE(worst, 1) << static_cast<int>(map);
-    const NarrowBand filled = levelset::meshToBand(moved.mesh, voxel).band;
-    const levelset::BandSampler other(filled);
-    worst = 0;
-    for (const V3d& p : levelset::bandToMesh(warped).positions)
-      worst = std::max(worst, std::abs(other.value(p)) / voxel);
-    EXPECT_LE(worst, 1) << static_cast<int>(map);
-  }
+  for (const double sink : {voxel, 0.3, 0.55})
+    for (const mapping::TextureMap map : {mapping::TextureMap::Rbf, mapping::TextureMap::Shell}) {
+      const mapping::MeshTextureResult moved = mapping::mapMesh(ring, patch, {.sink = sink});
+      EXPECT_EQ(moved.mesh.triangles, ring.triangles);
+      EXPECT_GT(levelset::signedVolume(moved.mesh), 0);
+      const NarrowBand warped = mapping::mapTexture(base, solid, patch,
+                                                    {.merge = mapping::TextureMerge::Alone,
+                                                     .map = map,
+                                                     .sink = sink,
+                                                     .textureBox = levelset::bounds(ring),
+                                                     .voxelSize = voxel})
+                                    .band;
+      const levelset::BandSampler sampler(warped);
+      double worst = 0;
+      for (const V3d& p : moved.mesh.positions)
+        worst = std::max(worst, std::abs(sampler.value(p)) / voxel);
+      EXPECT_LE(worst, 1) << static_cast<int>(map) << " sunk by " << sink;
+      const NarrowBand filled = levelset::meshToBand(moved.mesh, voxel).band;
+      const levelset::BandSampler other(filled);
+      worst = 0;
+      for (const V3d& p : levelset::bandToMesh(warped).positions)
+        worst = std::max(worst, std::abs(other.value(p)) / voxel);
+      EXPECT_LE(worst, 1) << static_cast<int>(map);
+    }
 }
 
 TEST(MeshTexture, StaysInThePatch) {
