@@ -198,6 +198,18 @@ class Comparer {
     }
     return std::sqrt(squares);
   }
+  /// Radians by which the surface turns from the place of one picture to the other's; 0 where
+  /// layers that tell it are missing.
+  [[nodiscard]] double turnBetweenPlaces(std::size_t i) const {
+    if (!has("P.X") || !has("P.Y") || !has("P.Z")) return 0;
+    double curvature = 0;
+    for (const char* name : {"curvature.k1", "curvature.k2"}) {
+      if (!has(name)) continue;
+      curvature = std::max({curvature, std::abs(value(a_, name, i)), std::abs(value(b_, name, i))});
+    }
+    const double turn = vectorDifference("P", i) * curvature;
+    return std::isfinite(turn) ? turn : 0;
+  }
   /// Of P from the origin: it is stored in so many bits.
   [[nodiscard]] double distance(std::size_t i) const {
     const double d = std::hypot(value(a_, "P.X", i), value(a_, "P.Y", i), value(a_, "P.Z", i));
@@ -248,10 +260,12 @@ class Comparer {
            const double d = vectorDifference("P", i);
            return d > 0 && hasDepth ? d / std::max({depth(i), distance(i), extent}) : d;
          }});
-    // The angle between unit vectors, precise where it is small.
+    // The angle between unit vectors, precise where it is small. Where a ray grazes the surface the
+    // places stand off each other, and the normals by that times the curvature.
     add({"N.X", "N.Y", "N.Z"}, {"N", "radians", {2e-4, 1.7e-3}, [this](std::size_t i) {
                                   const double d = vectorDifference("N", i);
-                                  return d <= 2 ? 2 * std::asin(d / 2) : kInfinite;
+                                  const double angle = d <= 2 ? 2 * std::asin(d / 2) : kInfinite;
+                                  return std::max(0.0, angle - turnBetweenPlaces(i));
                                 }});
     for (const auto& [name, channel] : a_.channels) {
       if (told.count(name) || name == "A" || !has(name)) continue;

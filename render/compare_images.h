@@ -68,7 +68,9 @@ struct ImageComparisonOptions {
 /// Where each Z lies between those that the other picture has within a pixel, they belong to two
 /// surfaces in front of each other: an inner outline, and no layer is compared. Differences of Z
 /// are relative to Z or to the size of what is drawn (ls:extent of the first header) if that is
-/// larger, those of P to these or to P's length, those of N angles, those of curvatures by the
+/// larger, those of P to these or to P's length, those of N angles, less the one that the surface
+/// turns by between the places of both (P times curvature, where there are such layers), those of
+/// curvatures by the
 /// voxel size that the first picture's header names (ls:voxelSize; 1 without), those of id 0 or 1.
 /// NaN differs infinitely.
 /// @throws levelset::InvalidInput for pictures of different sizes, or without Z and A

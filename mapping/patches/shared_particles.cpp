@@ -36,10 +36,9 @@ void joinSharedParticles(std::span<const Patch> before, std::span<Patch> after) 
   for (std::size_t p = 0; p < before.size(); ++p)
     for (std::size_t k = 0; k < before[p].levels.size(); ++k)
       addSides(before[p].levels[k], after[p].levels[k], kTolerance * before[p].spacing, particles);
-  std::stable_sort(particles.begin(), particles.end(),
-                   [](const SideParticle& a, const SideParticle& b) {
-                     return a.before.x < b.before.x;
-                   });
+  std::stable_sort(
+      particles.begin(), particles.end(),
+      [](const SideParticle& a, const SideParticle& b) { return a.before.x < b.before.x; });
   levelset::DisjointSets sets(particles.size());
   for (std::size_t a = 0; a < particles.size(); ++a) {
     const double tolerance = particles[a].tolerance;

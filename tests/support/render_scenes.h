@@ -27,7 +27,7 @@ inline render::Scene seenFromFar(const levelset::NarrowBand& band) {
   render::Scene scene = sceneOf(band);
   render::Camera& camera = scene.camera;
   camera.from = camera.to + (camera.from - camera.to).normalized() * 1e5;
-  camera.verticalFov = 80 / 1e5;
+  camera.verticalFov = 1.2 * band.zeroSetBounds().size().length() / 1e5;
   return scene;
 }
 
