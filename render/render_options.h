@@ -3,13 +3,15 @@
 #include <cstddef>
 
 #include "levelset/progress.h"
+#include "render/filter.h"
 
 namespace render {
 
 struct RenderOptions {
-  int samples = 4;                                  ///< per pixel, at least 1; colour only
-  int ambientSamples = 16;                          ///< per colour sample; 0: no occlusion
-  int shadowSamples = 4;                            ///< per colour sample; 0: no shadows
+  int samples = 4;          ///< per pixel, at least 1; colour only
+  int ambientSamples = 16;  ///< per colour sample; 0: no occlusion
+  int shadowSamples = 4;    ///< per colour sample; 0: no shadows
+  Filter filter = Filter::Trilinear;
   bool curvature = true;                            ///< layers curvature.mean .gauss .k1 .k2
   std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< for the image and the scene
   levelset::Progress progress = {};

@@ -16,7 +16,7 @@ map starfish-55 read "$out/bunny200.vdb" --as base ! read "$out/starfish.vdb" --
 row starfish-55 "'here'" patches particles cpu_s.setup cpu_s.certificate cpu_s.mapping points cpu_s.distance cpu_s.merging
 echo "| thesis | 55 | – | – | – | a couple each | – | – | – |"
 expect starfish-55 patches = 55
-expect starfish-55 min_jacobian ">" 0.2
+expect starfish-55 min_jacobian ">" 0.1
 solid starfish-55
 expect starfish-55-solid components = 1
 picture starfish-55 --from 2.7,1.5,2.5 --to 0,-0.1,0

@@ -97,11 +97,12 @@ std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink) {
     return i >= -rim && i < right + rim && j >= -rim && j < top + rim;
   };
   const double step = std::abs(last.w - before.w);
-  // A sink of whole steps takes so many layers, whatever its last digit. And one as far beyond: a
-  // smooth map errs most beside its last particles.
-  const auto layers = static_cast<int>(std::ceil(std::abs(sink) / step * (1 - 1e-9)));
-  for (int n = 1; n <= layers + 1; ++n) {
-    const double depth = std::abs(sink) * n / layers, share = depth / step;
+  // A smooth map errs most beside its last particles: they lie deeper than the texture, by as much
+  // again or by a step. A reach of whole steps takes so many layers, whatever its last digit.
+  const double reach = std::abs(sink) + std::min(std::abs(sink), step);
+  const auto layers = static_cast<int>(std::ceil(reach / step * (1 - 1e-9)));
+  for (int n = 1; n <= layers; ++n) {
+    const double depth = reach * n / layers, share = depth / step;
     const auto keepsApart = [&](int i, int j, int u, int v) {
       if (!isThere(u, v)) return true;
       const V3d way = last.beyond(u, v) - last.beyond(i, j);

@@ -20,8 +20,8 @@ struct SunkParticle {
   Imath::V3d place, uvw;
 };
 
-/// Down to w = −sink, or up to w = 1 − sink where that is more, and one layer beyond: the columns
-/// of the patch go straight on, in layers no wider apart than the patch's own there. Left out where
+/// Below w = −sink, or above w = 1 − sink where that is more, and in between: the columns of the
+/// patch go straight on, in layers no wider apart than the patch's own there. Left out where
 /// columns come together, as below a crease.
 /// @param sink  as a share of the patch's height
 [[nodiscard]] std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink);

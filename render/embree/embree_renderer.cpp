@@ -79,7 +79,7 @@ struct PixelPainter {
 Image renderEmbree(const Scene& scene, const RenderOptions& options) {
   requirePicture(scene, options);
   levelset::report(options.progress, 0, "render");
-  const EmbreeScene rays(scene);
+  const EmbreeScene rays(scene, options.filter);
   if (rays.bounds().isEmpty()) refuseEmptyScene();
   const Camera& camera = scene.camera;
   Image image(camera.width, camera.height);
@@ -95,7 +95,7 @@ Image renderEmbree(const Scene& scene, const RenderOptions& options) {
     const std::scoped_lock lock(reporting);
     levelset::report(options.progress, static_cast<double>(++done) / (across * down), "render");
   });
-  image.attributes = sceneAttributes(scene);
+  image.attributes = sceneAttributes(scene, options.filter);
   image.attributes["ls:renderer"] = fmt::format("embree {}", RTC_VERSION_STRING);
   image.attributes["ls:mode"] = "exact";
   addViewAttributes(image, scene, rays.bounds().size().length());

@@ -9,7 +9,7 @@
 #include "render/render_options.h"
 #include "render/scene.h"
 
-/// The judge: first zero of the trilinear interpolant along each ray, solved in double precision on
+/// The judge: first zero of the filter's function along each ray, solved in double precision on
 /// OpenVDB's own tree; Embree only finds the leaf blocks. It may be slow, it may not be wrong.
 namespace render {
 
@@ -27,7 +27,7 @@ namespace render {
 class EmbreeScene {
  public:
   /// @throws levelset::ResourceLimit when Embree finds no memory
-  explicit EmbreeScene(const Scene& scene);
+  explicit EmbreeScene(const Scene& scene, Filter filter = Filter::Trilinear);
   ~EmbreeScene();
   EmbreeScene(EmbreeScene&&) noexcept;
   /// First hit beyond `near`. A ray that starts inside hits where it leaves.

@@ -32,9 +32,11 @@ struct RaySolid {
   // From world to Embree's box.
   V3d centre;
   double scale;
+  Filter filter;
 
+  [[nodiscard]] DrawnField field() const { return {levelset::vdb(band).tree(), filter}; }
   [[nodiscard]] SurfaceShape shapeAt(const V3d& world) const {
-    return surfaceShape(levelset::vdb(band).tree(), world * worldToIndex);
+    return surfaceShape(levelset::vdb(band).tree(), world * worldToIndex, filter);
   }
 };
 
@@ -54,7 +56,8 @@ std::optional<double> crossingOf(const RayQuery& query, const RaySolid& solid, u
   V3d origin, direction;
   solid.worldToIndex.multVecMatrix(query.origin, origin);
   solid.worldToIndex.multDirMatrix(query.direction, direction);
-  return findCrossing(solid.blocks[primitive], IndexRay(origin, direction), 0, query.limit, search);
+  return findCrossing(solid.field(), solid.blocks[primitive], IndexRay(origin, direction), 0,
+                      query.limit, search);
 }
 
 void boundBlock(const RTCBoundsFunctionArguments* args) {
@@ -133,7 +136,7 @@ struct EmbreeScene::Impl {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
 
-  explicit Impl(const Scene& source);
+  Impl(const Scene& source, Filter filter);
   ~Impl() {
     if (scene) rtcReleaseScene(scene);
     if (device) rtcReleaseDevice(device);
@@ -141,7 +144,7 @@ struct EmbreeScene::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  void gather(const Scene& source);
+  void gather(const Scene& source, Filter filter);
   void build();
   /// A query and Embree's ray for it; nothing when the ray misses the scene's box. `moved`: how far
   /// the origin was moved towards the scene.
@@ -149,8 +152,8 @@ struct EmbreeScene::Impl {
                                   double& moved, RTCRay& ray) const;
 };
 
-EmbreeScene::Impl::Impl(const Scene& source) {
-  gather(source);
+EmbreeScene::Impl::Impl(const Scene& source, Filter filter) {
+  gather(source, filter);
   if (bounds.isEmpty()) return;
   try {
     build();
@@ -161,7 +164,7 @@ EmbreeScene::Impl::Impl(const Scene& source) {
   }
 }
 
-void EmbreeScene::Impl::gather(const Scene& source) {
+void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
   for (std::size_t i = 0; i < source.solids.size(); ++i) {
     const Solid& solid = source.solids[i];
     if (solid.band.isEmpty()) continue;
@@ -169,7 +172,8 @@ void EmbreeScene::Impl::gather(const Scene& source) {
     entry.band = solid.band;
     entry.indexToWorld = solid.band.indexToWorld();
     entry.worldToIndex = entry.indexToWorld.inverse();
-    entry.blocks = surfaceBlocks(levelset::vdb(entry.band).tree());
+    entry.filter = filter;
+    entry.blocks = surfaceBlocks(entry.field());
     entry.id = solid.id;
     entry.index = i;
     for (const SurfaceBlock& block : entry.blocks)
@@ -244,7 +248,8 @@ std::optional<RayQuery> EmbreeScene::Impl::prepare(const V3d& origin, const V3d&
   return query;
 }
 
-EmbreeScene::EmbreeScene(const Scene& scene) : impl_(std::make_unique<Impl>(scene)) {}
+EmbreeScene::EmbreeScene(const Scene& scene, Filter filter)
+    : impl_(std::make_unique<Impl>(scene, filter)) {}
 EmbreeScene::~EmbreeScene() = default;
 EmbreeScene::EmbreeScene(EmbreeScene&&) noexcept = default;
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "render/embree/cubic_root.h"
+#include "render/embree/spline_cell_vdb.h"
 #include "render/embree/surface_blocks_vdb.h"
 
 namespace render {
@@ -32,6 +33,35 @@ SignRows signRowsOf(const SurfaceBlock& block) {
   return rows;
 }
 
+/// Adds cells z of the bits to `crossing` and `extent`.
+void markCells(SurfaceBlock& block, unsigned x, unsigned y, unsigned cells) {
+  block.crossing[x] |= std::uint64_t{cells} << (8 * y);
+  for (unsigned z = 0; z < 8; ++z) {
+    if (!(cells >> z & 1)) continue;
+    const unsigned at[3] = {x, y, z};
+    for (std::size_t a = 0; a < 3; ++a) {
+      block.extent[a] = static_cast<std::uint8_t>(std::min<unsigned>(block.extent[a], at[a]));
+      block.extent[a + 3] =
+          static_cast<std::uint8_t>(std::max<unsigned>(block.extent[a + 3], at[a] + 1));
+    }
+  }
+}
+
+/// The same where the spline may cross zero.
+bool markSplineCells(SurfaceBlock& block, const DrawnField& field) {
+  const SplineCoefficients<8> coefficients(field.tree, block.origin, field.filter);
+  block.crossing.fill(0);
+  block.extent = {8, 8, 8, 0, 0, 0};
+  for (int x = 0; x < 8; ++x)
+    for (int y = 0; y < 8; ++y) {
+      unsigned cells = 0;
+      for (int z = 0; z < 8; ++z)
+        cells |= unsigned{SplineCell(coefficients, x, y, z).mayCross()} << z;
+      markCells(block, static_cast<unsigned>(x), static_cast<unsigned>(y), cells);
+    }
+  return block.extent[3] != 0;
+}
+
 /// Fills `crossing` and `extent`; false when no cell crosses.
 bool markCrossingCells(SurfaceBlock& block) {
   const SignRows rows = signRowsOf(block);
@@ -42,16 +72,7 @@ bool markCrossingCells(SurfaceBlock& block) {
       const unsigned some = rows[x][y] | rows[x + 1][y] | rows[x][y + 1] | rows[x + 1][y + 1];
       const unsigned all = rows[x][y] & rows[x + 1][y] & rows[x][y + 1] & rows[x + 1][y + 1];
       const unsigned cells = (some | some >> 1) & ~(all & all >> 1) & 0xffu;
-      block.crossing[x] |= std::uint64_t{cells} << (8 * y);
-      for (unsigned z = 0; z < 8; ++z) {
-        if (!(cells >> z & 1)) continue;
-        const unsigned at[3] = {x, y, z};
-        for (std::size_t a = 0; a < 3; ++a) {
-          block.extent[a] = static_cast<std::uint8_t>(std::min<unsigned>(block.extent[a], at[a]));
-          block.extent[a + 3] =
-              static_cast<std::uint8_t>(std::max<unsigned>(block.extent[a + 3], at[a] + 1));
-        }
-      }
+      markCells(block, x, y, cells);
     }
   }
   return block.extent[3] != 0;
@@ -79,7 +100,12 @@ struct BlockWalk {
   bool clip();
   void findFirstCell();
   int exitAxis(double& exit) const;
+  /// Where in the cell the ray is at `t` and at `exit`; on the faces the coordinate is 0 or 1.
+  void placesInCell(double exit, int outAxis, double (&p)[2][3]) const;
   [[nodiscard]] BernsteinCubic restrictToRay(double exit, int exitAxis) const;
+  /// @param carried  the sign at `t`, if it is known; it is told the one at `exit`
+  [[nodiscard]] std::optional<double> splineRoot(const DrawnField& field, double exit, int exitAxis,
+                                                 std::optional<bool>& carried) const;
 };
 
 /// False when the ray misses the block. Of planes met together the last counts as the entry, which
@@ -147,11 +173,7 @@ double mix(double a, double b, double f) {
   return a * (1 - f) + b * f;
 }
 
-/// The interpolant between `t` and `exit`: the cubic's blossom at the two ends, since the
-/// interpolant is affine in each coordinate. On the faces the coordinate is 0 or 1 exactly.
-/// @param outAxis  of the face at `exit`; -1 when the ray ends within the cell
-BernsteinCubic BlockWalk::restrictToRay(double exit, int outAxis) const {
-  double p[2][3];
+void BlockWalk::placesInCell(double exit, int outAxis, double (&p)[2][3]) const {
   for (int a = 0; a < 3; ++a) {
     const double base = cell[a];
     p[0][a] = std::clamp(ray.at(a, t) - base, 0.0, 1.0);
@@ -159,7 +181,27 @@ BernsteinCubic BlockWalk::restrictToRay(double exit, int outAxis) const {
   }
   if (axis >= 0) p[0][axis] = isForward(axis) ? 0 : 1;
   if (outAxis >= 0) p[1][outAxis] = isForward(outAxis) ? 1 : 0;
+}
 
+std::optional<double> BlockWalk::splineRoot(const DrawnField& field, double exit, int outAxis,
+                                            std::optional<bool>& carried) const {
+  double p[2][3];
+  placesInCell(exit, outAxis, p);
+  const V3d from(p[0][0], p[0][1], p[0][2]), to(p[1][0], p[1][1], p[1][2]);
+  const SplineCell spline(
+      SplineCoefficients<1>(field.tree, Coord(cell[0], cell[1], cell[2]), field.filter));
+  bool endsInside = false;
+  const auto root = spline.firstSignChange(from, to - from, carried, endsInside);
+  carried = endsInside;
+  return root;
+}
+
+/// The interpolant between `t` and `exit`: the cubic's blossom at the two ends, since the
+/// interpolant is affine in each coordinate. On the faces the coordinate is 0 or 1 exactly.
+/// @param outAxis  of the face at `exit`; -1 when the ray ends within the cell
+BernsteinCubic BlockWalk::restrictToRay(double exit, int outAxis) const {
+  double p[2][3];
+  placesInCell(exit, outAxis, p);
   unsigned c[3];
   for (int a = 0; a < 3; ++a) c[a] = static_cast<unsigned>(cell[a] - block.origin[a]);
   double alongX[2][2][2], value[2][2][2];  // [end x][y][z], then [end x][end y][end z]
@@ -196,7 +238,8 @@ Imath::Box3d SurfaceBlock::bounds() const {
   return {base + V3d(extent[0], extent[1], extent[2]), base + V3d(extent[3], extent[4], extent[5])};
 }
 
-std::vector<SurfaceBlock> surfaceBlocks(const FloatTree& tree) {
+std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field) {
+  const FloatTree& tree = field.tree;
   using Leaf = FloatTree::LeafNodeType;
   // A cell belongs to the block of its lowest corner, so a leaf also reaches into the seven blocks
   // below it, which need not have leaves of their own.
@@ -221,7 +264,9 @@ std::vector<SurfaceBlock> surfaceBlocks(const FloatTree& tree) {
         block.leaves[n] = leaf ? leaf->buffer().data() : nullptr;
         block.tiles[n] = leaf ? 0 : accessor.getValue(at);
       }
-      if (markCrossingCells(block)) found[i] = block;
+      const bool crosses = field.filter == Filter::Trilinear ? markCrossingCells(block)
+                                                             : markSplineCells(block, field);
+      if (crosses) found[i] = block;
     }
   });
   std::vector<SurfaceBlock> blocks;
@@ -230,11 +275,12 @@ std::vector<SurfaceBlock> surfaceBlocks(const FloatTree& tree) {
   return blocks;
 }
 
-std::optional<double> findCrossing(const SurfaceBlock& block, const IndexRay& ray, double near,
-                                   double far, Search search) {
+std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& block,
+                                   const IndexRay& ray, double near, double far, Search search) {
   BlockWalk walk{block, ray, near, far};
   if (!walk.clip()) return std::nullopt;
   walk.findFirstCell();
+  std::optional<bool> carried;
   for (;;) {
     double exit;
     int exitAxis = walk.exitAxis(exit);
@@ -245,7 +291,13 @@ std::optional<double> findCrossing(const SurfaceBlock& block, const IndexRay& ra
     }
     const int x = walk.cell[0] - block.origin[0];
     const int bit = (walk.cell[1] - block.origin[1]) * 8 + walk.cell[2] - block.origin[2];
-    if (block.crossing[static_cast<std::size_t>(x)] >> bit & 1) {
+    const bool isMarked = block.crossing[static_cast<std::size_t>(x)] >> bit & 1;
+    if (!isMarked) {
+      carried.reset();
+    } else if (field.filter != Filter::Trilinear) {
+      if (const auto s = walk.splineRoot(field, exit, exitAxis, carried))
+        return walk.t + *s * (exit - walk.t);
+    } else {
       const BernsteinCubic cubic = walk.restrictToRay(exit, exitAxis);
       if (search == Search::AnyCrossing) {
         if (hasSignChange(cubic)) return walk.t;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "levelset/vdb.h"
+#include "render/filter.h"
 
 namespace render {
 
@@ -47,15 +48,22 @@ struct SurfaceBlock {
   [[nodiscard]] Imath::Box3d bounds() const;
 };
 
-/// Every block that holds a cell whose corners differ in sign, in tree order. The tree must outlive
-/// the blocks.
-[[nodiscard]] std::vector<SurfaceBlock> surfaceBlocks(const openvdb::FloatTree& tree);
+/// What is drawn of a grid.
+struct DrawnField {
+  const openvdb::FloatTree& tree;
+  Filter filter = Filter::Trilinear;
+};
+
+/// Every block that holds a cell whose corners differ in sign, or where the spline may, in tree
+/// order. The tree must outlive the blocks.
+[[nodiscard]] std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field);
 
 enum class Search { FirstCrossing, AnyCrossing };
 
-/// First sign change of the trilinear interpolant on [near, far] inside the block. For AnyCrossing
+/// First sign change of the field on [near, far] inside the block. For AnyCrossing
 /// the returned parameter is only some place in the cell that holds it.
-[[nodiscard]] std::optional<double> findCrossing(const SurfaceBlock& block, const IndexRay& ray,
-                                                 double near, double far, Search search);
+[[nodiscard]] std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& block,
+                                                 const IndexRay& ray, double near, double far,
+                                                 Search search);
 
 }  // namespace render

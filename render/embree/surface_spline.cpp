@@ -61,7 +61,7 @@ V3d trilinearGradientOf(const ShapeWindow& window, const V3d& a) {
 
 }  // namespace
 
-SurfaceShape surfaceShape(const openvdb::FloatTree& tree, const V3d& position) {
+SurfaceShape surfaceShape(const openvdb::FloatTree& tree, const V3d& position, Filter filter) {
   const V3d base(std::floor(position.x), std::floor(position.y), std::floor(position.z));
   const V3d a = position - base;
   const ShapeWindow window(
@@ -76,7 +76,8 @@ SurfaceShape surfaceShape(const openvdb::FloatTree& tree, const V3d& position) {
       double row[3] = {};
       for (int z = 0; z < 4; ++z) {
         const V3d second = window.secondDifferences(x + 1, y + 1, z + 1);
-        const double c = window.f[x + 1][y + 1][z + 1] - (second.x + second.y + second.z) / 6;
+        double c = window.f[x + 1][y + 1][z + 1];
+        if (filter != Filter::BSpline) c -= (second.x + second.y + second.z) / 6;
         for (int r = 0; r < 3; ++r) row[r] += c * weights[2].w[r][z];
         const bool isCorner = (x == 1 || x == 2) && (y == 1 || y == 2) && (z == 1 || z == 2);
         if (isCorner) {
@@ -92,11 +93,12 @@ SurfaceShape surfaceShape(const openvdb::FloatTree& tree, const V3d& position) {
   }
   SurfaceShape shape;
   shape.gradient = {sum[1][0][0], sum[0][1][0], sum[0][0][1]};
-  shape.trilinearGradient = trilinearGradientOf(window, a);
+  const bool isSpline = filter != Filter::Trilinear;
+  shape.trilinearGradient = isSpline ? shape.gradient : trilinearGradientOf(window, a);
   shape.hessian = Imath::M33d(sum[2][0][0], sum[1][1][0], sum[1][0][1],  //
                               sum[1][1][0], sum[0][2][0], sum[0][1][1],  //
                               sum[1][0][1], sum[0][1][1], sum[0][0][2]);
-  shape.interpolationError = error;
+  shape.interpolationError = isSpline ? 0 : error;
   return shape;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "levelset/error.h"
@@ -27,6 +28,8 @@ constexpr const char* kDialect = R"GLSL(
 #define VAR precise float
 #define IN(Type) Type
 #define INOUT(Type) inout Type
+#define IN_ARRAY(Type, name, size) Type name[size]
+#define INOUT_ARRAY(Type, name, size) inout Type name[size]
 #define CONST_INT const int
 #define CONST_FLOAT const float
 #define AND(a, b) ((a) && (b))
@@ -137,15 +140,16 @@ std::string valueText(int blocks, int shift) {
   return text;
 }
 
-std::string shaderText(const char* rays, int valueBlocks, int shift) {
+std::string shaderText(const char* rays, bool isSpline, int valueBlocks, int shift) {
   return fmt::format(
              "#version 450 core\nlayout(local_size_x = {}) in;\n"
              "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {}, kBlockOfEntry = {},\n"
-             "          kHitParts = {}, kShapeParts = {};\n",
+             "          kHitParts = {}, kShapeParts = {};\nconst bool isSpline = {};\n",
              kGroup, BrickPool::kEdge, BrickPool::kValues,
              std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kBlockOfEntry,
-             kHitParts, ShapeBlock::kParts) +
-         kDialect + valueText(valueBlocks, shift) + kTraceKernel + kShapeKernel + rays + kMain;
+             kHitParts, ShapeBlock::kParts, isSpline) +
+         kDialect + valueText(valueBlocks, shift) + kRootsKernel + kWindowKernel + kSplineKernel +
+         kTraceKernel + kShapeKernel + rays + kMain;
 }
 
 }  // namespace
@@ -189,7 +193,8 @@ struct GpuTracer::Impl {
   std::map<const KernelSolid*, Tables> tables;
   GLuint rays = 0, hits = 0;
   /// By the number of blocks of values.
-  std::map<int, GLuint> pixelPrograms, rayPrograms;
+  /// By the number of blocks of values, and is it a spline?
+  std::map<std::pair<int, bool>, GLuint> pixelPrograms, rayPrograms;
 
   Impl(const GlContext& context_, std::size_t largestBlock_)
       : context(context_),
@@ -253,10 +258,12 @@ struct GpuTracer::Impl {
   GLuint programFor(const KernelSolid& solid, bool isPixels) {
     const int blocks = static_cast<int>(tables.at(&solid).values.size());
     auto& programs = isPixels ? pixelPrograms : rayPrograms;
-    const auto known = programs.find(blocks);
+    const bool isSpline = solid.pool.filter != Filter::Trilinear;
+    const auto known = programs.find({blocks, isSpline});
     if (known != programs.end()) return known->second;
-    return programs[blocks] = compileCompute(
-               context, shaderText(isPixels ? kPixelRays : kListedRays, blocks, shift));
+    const char* rays_ = isPixels ? kPixelRays : kListedRays;
+    return programs[{blocks, isSpline}] =
+               compileCompute(context, shaderText(rays_, isSpline, blocks, shift));
   }
 
   void setNumbers(GLuint program, const KernelSolid& solid) {

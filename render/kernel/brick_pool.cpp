@@ -1,6 +1,7 @@
 #include "render/kernel/brick_pool.h"
 
 #include <fmt/core.h>
+#include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -69,6 +70,7 @@ bool fill(const Accessor& accessor, Brick& brick) {
   return anyInside && anyOutside;
 }
 
+/// Marks the cells whose corners differ in sign.
 void findCrossings(Brick& brick) {
   constexpr int kEdge = BrickPool::kEdge;
   brick.mask = {};
@@ -90,8 +92,107 @@ void findCrossings(Brick& brick) {
     }
 }
 
+/// The coefficients that the cells of a block need, from the point before the first one on.
+struct SplineBlock {
+  static constexpr int kAround = kBlock + 3;
+  float c[kAround][kAround][kAround];
+
+  template <typename Accessor>
+  SplineBlock(const Accessor& accessor, const Coord& origin) {
+    constexpr int kFirst[4] = {0, 1, kBlock + 1, kAround};  // of the blocks before, here and behind
+    for (int n = 0; n < 27; ++n) {
+      const int b[3] = {n / 9, n / 3 % 3, n % 3};
+      const Coord at =
+          origin.offsetBy((b[0] - 1) * kBlock, (b[1] - 1) * kBlock, (b[2] - 1) * kBlock);
+      const Leaf* leaf = accessor.probeConstLeaf(at);
+      const float tile = leaf ? 0.0f : accessor.getValue(at);
+      for (int x = kFirst[b[0]]; x < kFirst[b[0] + 1]; ++x)
+        for (int y = kFirst[b[1]]; y < kFirst[b[1] + 1]; ++y)
+          for (int z = kFirst[b[2]]; z < kFirst[b[2] + 1]; ++z)
+            c[x][y][z] = leaf ? leaf->getValue(static_cast<openvdb::Index>(
+                                    ((x - 1) & 7) << 6 | ((y - 1) & 7) << 3 | ((z - 1) & 7)))
+                              : tile;
+    }
+  }
+
+  /// Bit z: do the coefficients of the cell (x, y, z) differ in sign? Where not the spline, which
+  /// lies between them, crosses nothing.
+  [[nodiscard]] unsigned mixedCells(int x, int y) const {
+    unsigned any = 0, all = ~0u;
+    for (int i = x; i < x + 4; ++i)
+      for (int j = y; j < y + 4; ++j) {
+        unsigned row = 0;
+        for (int z = 0; z < kAround; ++z) row |= static_cast<unsigned>(c[i][j][z] < 0) << z;
+        any |= row;
+        all &= row;
+      }
+    any |= any >> 1;
+    all &= all >> 1;
+    return (any | any >> 2) & ~(all & all >> 2) & 0xff;
+  }
+
+  /// Is the spline in the middle of the cell nearer to zero than its slopes let it get from there?
+  [[nodiscard]] bool mayCross(int x, int y, int z) const {
+    constexpr float kMiddle[4] = {1.0f / 48, 23.0f / 48, 23.0f / 48, 1.0f / 48};
+    constexpr float kRoom = 1e-5f;  // of the largest coefficient, for single precision
+    float middle = 0, most = 0, slope[3] = {};
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) {
+        const float* v = c[x + i][y + j] + z;
+        float row = 0;
+        for (int k = 0; k < 4; ++k) {
+          row += kMiddle[k] * v[k];
+          most = std::max(most, std::abs(v[k]));
+          if (i < 3) slope[0] = std::max(slope[0], std::abs(c[x + i + 1][y + j][z + k] - v[k]));
+          if (j < 3) slope[1] = std::max(slope[1], std::abs(c[x + i][y + j + 1][z + k] - v[k]));
+          if (k < 3) slope[2] = std::max(slope[2], std::abs(v[k + 1] - v[k]));
+        }
+        middle += kMiddle[i] * kMiddle[j] * row;
+      }
+    return std::abs(middle) <= 0.5f * (slope[0] + slope[1] + slope[2]) + kRoom * most;
+  }
+};
+
+/// Marks the cells in which the spline may cross zero.
+template <typename Accessor>
+void findSplineCrossings(const Accessor& accessor, Brick& brick) {
+  const SplineBlock block(accessor, brick.origin);
+  brick.mask = {};
+  for (int x = 0; x < kBlock; ++x)
+    for (int y = 0; y < kBlock; ++y)
+      for (unsigned cells = block.mixedCells(x, y); cells != 0; cells &= cells - 1) {
+        const int z = std::countr_zero(cells);
+        if (!block.mayCross(x, y, z)) continue;
+        const unsigned bit = static_cast<unsigned>(x << 6 | y << 3 | z);
+        brick.mask[bit >> 5] |= 1u << (bit & 31);
+      }
+}
+
+/// The spline's coefficients f − ∇²f/6 in the place of the values, in leaves.
+openvdb::FloatTree::Ptr quasiInterpolated(const openvdb::FloatTree& tree) {
+  openvdb::FloatTree::Ptr result(new openvdb::FloatTree(tree));
+  openvdb::tree::LeafManager<openvdb::FloatTree> leaves(*result);
+  leaves.foreach ([&](Leaf& leaf, std::size_t) {
+    const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
+    const SplineBlock f(accessor, leaf.origin());
+    float* values = leaf.buffer().data();
+    for (int x = 1; x <= kBlock; ++x)
+      for (int y = 1; y <= kBlock; ++y)
+        for (int z = 1; z <= kBlock; ++z) {
+          const auto at = [&](int i, int j, int k) {
+            return static_cast<double>(f.c[x + i][y + j][z + k]);
+          };
+          const double own = at(0, 0, 0);
+          const double bend = at(-1, 0, 0) + at(1, 0, 0) + at(0, -1, 0) + at(0, 1, 0) +
+                              at(0, 0, -1) + at(0, 0, 1) - 6 * own;
+          values[(x - 1) << 6 | (y - 1) << 3 | (z - 1)] = static_cast<float>(own - bend / 6);
+        }
+  });
+  return result;
+}
+
 /// The bricks that hold a crossing, in the order of their origins.
-std::vector<std::unique_ptr<Brick>> bricksOf(const openvdb::FloatTree& tree) {
+std::vector<std::unique_ptr<Brick>> bricksOf(const openvdb::FloatTree& tree, Filter filter) {
   const std::vector<Coord> blocks = blocksOf(tree);
   std::vector<std::unique_ptr<Brick>> bricks(blocks.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 64), [&](const auto& range) {
@@ -99,8 +200,14 @@ std::vector<std::unique_ptr<Brick>> bricksOf(const openvdb::FloatTree& tree) {
     auto brick = std::make_unique<Brick>();
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       brick->origin = blocks[i];
-      if (!fill(accessor, *brick)) continue;
-      findCrossings(*brick);
+      const bool differ = fill(accessor, *brick);
+      if (filter == Filter::Trilinear) {
+        if (!differ) continue;
+        findCrossings(*brick);
+      } else {
+        findSplineCrossings(accessor, *brick);
+        if (brick->mask == decltype(brick->mask){}) continue;
+      }
       bricks[i] = std::move(brick);
       brick = std::make_unique<Brick>();
     }
@@ -318,11 +425,14 @@ std::size_t BrickPool::bytes() const {
   return 4 * (page.size() + entry.size() + mask.size() + value.size());
 }
 
-BrickPool makeBricks(const levelset::NarrowBand& band) {
+BrickPool makeBricks(const levelset::NarrowBand& band, Filter filter) {
   BrickPool pool;
+  pool.filter = filter;
   if (band.isEmpty()) return pool;
-  const openvdb::FloatTree& tree = levelset::vdb(band).tree();
-  const auto bricks = bricksOf(tree);
+  openvdb::FloatTree::ConstPtr coefficients;
+  if (filter == Filter::BSplineQi) coefficients = quasiInterpolated(levelset::vdb(band).tree());
+  const openvdb::FloatTree& tree = coefficients ? *coefficients : levelset::vdb(band).tree();
+  const auto bricks = bricksOf(tree, filter);
   if (bricks.empty()) return pool;
   openvdb::CoordBBox crossed;
   for (const auto& brick : bricks) crossed.expand(brick->origin);

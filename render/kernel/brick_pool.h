@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "levelset/narrow_band.h"
+#include "render/filter.h"
 
 namespace render {
 
@@ -25,6 +26,7 @@ struct BrickPool {
   static constexpr int kBlocksOfPage = 512;
   static constexpr int kBlockOfEntry = kBlocksOfPage;  ///< on from a block's entry, its values
 
+  Filter filter = Filter::Trilinear;
   std::array<int, 3> origin{};  ///< index of the point at (0, 0, 0)
   std::array<int, 3> pages{};   ///< along each axis
   /// By x, y, z of the page: where its entries begin; negative, less the edge of an empty cube of
@@ -35,10 +37,10 @@ struct BrickPool {
   /// brick that holds the values, for whatever lies within two points before or three behind the
   /// first corner of a cell that the surface crosses.
   std::vector<std::int32_t> entry;
-  /// kMaskWords of a brick that is crossed: bit 64x + 8y + z where the corners of the cell differ
-  /// in sign. Those come first.
+  /// kMaskWords of a brick that is crossed, those first: bit 64x + 8y + z where the corners of the
+  /// cell differ in sign, or the bounds of the spline do.
   std::vector<std::uint32_t> mask;
-  /// kValues of a brick, φ in the band's unit, by x, y, z.
+  /// kValues of a brick, φ in the band's unit or the spline's coefficients, by x, y, z.
   std::vector<float> value;
   /// Points between which the crossing cells lie, in the table's space.
   std::array<int, 3> low{}, high{};
@@ -53,6 +55,7 @@ struct BrickPool {
 
 /// @throws levelset::ResourceLimit for a band whose surface spans more than the table can hold, or
 ///         more bricks than an index can tell
-[[nodiscard]] BrickPool makeBricks(const levelset::NarrowBand& band);
+[[nodiscard]] BrickPool makeBricks(const levelset::NarrowBand& band,
+                                   Filter filter = Filter::Trilinear);
 
 }  // namespace render

@@ -89,7 +89,7 @@ struct PackedRays {
 
 }  // namespace
 
-KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes) {
+KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter) {
   // A block for each leaf; those the surface does not cross are built and dropped.
   double leaves = 0;
   for (const Solid& solid : scene.solids)
@@ -100,7 +100,7 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes) {
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
     const Solid& source = scene.solids[i];
     KernelSolid solid;
-    solid.pool = makeBricks(source.band);
+    solid.pool = makeBricks(source.band, filter);
     if (solid.pool.brickCount() == 0) continue;
     solid.index = i;
     solid.id = source.id;

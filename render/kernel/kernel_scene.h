@@ -50,9 +50,11 @@ struct PixelHits {
 class KernelScene {
  public:
   /// @param maxBytes  for what the kernel reads
+  /// @param filter    what is drawn of the grids
   /// @pre the camera is valid
   /// @throws levelset::ResourceLimit before anything is allocated; and as makeBricks()
-  explicit KernelScene(const Scene& scene, std::size_t maxBytes = levelset::kNoMemoryLimit);
+  explicit KernelScene(const Scene& scene, std::size_t maxBytes = levelset::kNoMemoryLimit,
+                       Filter filter = Filter::Trilinear);
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
   /// World-space box of the cells that hold surface; empty when there are none.

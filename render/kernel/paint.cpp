@@ -149,7 +149,7 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
     const std::scoped_lock lock(reporting);
     levelset::report(options.progress, static_cast<double>(++done) / (across * down), "render");
   });
-  image.attributes = sceneAttributes(scene);
+  image.attributes = sceneAttributes(scene, options.filter);
   image.attributes["ls:renderer"] = renderer;
   image.attributes["ls:mode"] = "exact";
   std::size_t bricks = 0, beside = 0;

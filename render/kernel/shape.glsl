@@ -1,49 +1,10 @@
-// What a surface looks like at a hit: the gradient of the trilinear interpolant, and gradient and
-// Hessian of the tricubic B-spline with the coefficients f − ∇²f/6 [Sigg05]. In the words and the
-// space of trace.glsl.
+// What a surface looks like at a hit: gradient and Hessian of the tricubic B-spline with the
+// coefficients f − ∇²f/6 [Sigg05], and the gradient of the trilinear interpolant. Where the grid holds
+// the coefficients of the spline that rays meet, it is that one. In the words and the space of
+// roots.glsl.
 
 CONST_FLOAT kSixth = 0.16666666667f;
 CONST_FLOAT kEighth = 0.125f;
-
-// The six grid points on each axis from cell − 2 on, which lie in one block or in two.
-struct Window {
-  Whole base[8];              // of the blocks, by bits x, y, z: their first values
-  Bool farX[6], farY[6], farZ[6];
-  Whole stepX[6], stepY[6], stepZ[6];  // within the block
-};
-
-Whole blockOf(Bool asked, Whole x, Whole y, Whole z) {
-  Whole page = loadPage(select(asked, ((x >> kPageShift) * pagesY + (y >> kPageShift)) * pagesZ + (z >> kPageShift), whole(0)));
-  Bool full = AND(asked, page >= 0);
-  Whole slot = select(full, page + kBlockOfEntry + (((x >> 3) & 7) << 6 | ((y >> 3) & 7) << 3 | ((z >> 3) & 7)), whole(0));
-  Whole block = loadEntry(slot);
-  return select(full, block * kBrickValues, whole(0));
-}
-
-Window windowAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ) {
-  Window w;
-  Whole x = cellX - 2;
-  Whole y = cellY - 2;
-  Whole z = cellZ - 2;
-  for (int i = 0; i < 6; ++i) {
-    w.farX[i] = (x & 7) + i > 7;
-    w.farY[i] = (y & 7) + i > 7;
-    w.farZ[i] = (z & 7) + i > 7;
-    w.stepX[i] = ((x + i) & 7) * (kBrickEdge * kBrickEdge);
-    w.stepY[i] = ((y + i) & 7) * kBrickEdge;
-    w.stepZ[i] = (z + i) & 7;
-  }
-  for (int i = 0; i < 8; ++i)
-    w.base[i] = blockOf(asked, x + 5 * (i >> 2), y + 5 * ((i >> 1) & 1), z + 5 * (i & 1));
-  return w;
-}
-
-// Numbers of the values at (i, j, 0) and on, as long as they are in the near blocks or in the far.
-Whole columnAt(IN(Window) w, int i, int j, int far) {
-  Whole near_ = select(w.farX[i], w.base[4 + far], w.base[far]);
-  Whole beyond = select(w.farX[i], w.base[6 + far], w.base[2 + far]);
-  return select(w.farY[j], beyond, near_) + (w.stepX[i] + w.stepY[j]);
-}
 
 // Of the four points from cell − 1 on, on one axis: the uniform cubic B-spline and its derivatives.
 struct Weights {
@@ -137,7 +98,8 @@ Shape shapeAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Real a, Real b,
         VAR bendX = (f[n - 36] + f[n + 36]) - twice;
         VAR bendY = (f[n - 6] + f[n + 6]) - twice;
         VAR bendZ = (f[n - 1] + f[n + 1]) - twice;
-        VAR coefficient = f[n] - ((bendX + bendY) + bendZ) * kSixth;
+        VAR coefficient = f[n];
+        if (!isSpline) coefficient = f[n] - ((bendX + bendY) + bendZ) * kSixth;
         q = q + coefficient * z.value[k];
         qz = qz + coefficient * z.slope[k];
         qzz = qzz + coefficient * z.bend[k];
@@ -185,6 +147,12 @@ Shape shapeAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Real a, Real b,
         tz = k == 1 ? tz + onZ : tz - onZ;
       }
     }
+  }
+  if (isSpline) {  // the surface that rays meet
+    tx = gx;
+    ty = gy;
+    tz = gz;
+    error = real(0.0f);
   }
   Shape shape;
   shape.gx = gx;

@@ -79,6 +79,15 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
         "give finite numbers, none negative, and a softness below 1.5 radians",
         d.x, d.y, d.z, scene.key.strength, scene.key.softness, scene.ambient));
   }
+  constexpr double kReach = 2.99;  // voxels
+  for (const Solid& solid : scene.solids) {
+    if (options.filter == Filter::Trilinear || solid.band.isEmpty()) continue;
+    if (solid.band.halfWidth() >= kReach) continue;
+    throw levelset::InvalidInput(fmt::format(
+        "render: the filter {} reads values up to 3 voxels from the surface, and the band has a "
+        "half width of {:.3g}; widen it first, or take the trilinear filter",
+        filterName(options.filter), solid.band.halfWidth()));
+  }
   const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
   const double channels = options.curvature ? 16 : 12;
   levelset::requireMemory(pixels * 4 * channels, options.maxBytes, "render");
@@ -89,7 +98,7 @@ void refuseEmptyScene() {
       "render: there is no surface in the scene; give at least one solid with a zero set");
 }
 
-std::map<std::string, std::string> sceneAttributes(const Scene& scene) {
+std::map<std::string, std::string> sceneAttributes(const Scene& scene, Filter filter) {
   std::string grids, voxelSizes;
   for (const Solid& solid : scene.solids) {
     if (solid.band.isEmpty()) continue;
@@ -98,8 +107,8 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene) {
                          solid.band.contentHash());
     voxelSizes += fmt::format("{}{}", comma, solid.band.voxelSize());
   }
-  return {{"ls:filter", "trilinear"},
-          {"ls:normal", "bspline-qi"},
+  return {{"ls:filter", filterName(filter)},
+          {"ls:normal", filter == Filter::BSpline ? "bspline" : "bspline-qi"},
           {"ls:grid", grids},
           {"ls:voxelSize", voxelSizes}};
 }

@@ -29,14 +29,15 @@ struct PictureLayers {
 };
 
 /// @throws levelset::UsageError for a camera that cannot see, a light that cannot shine or sample
-///         counts out of range; levelset::ResourceLimit for an image too large
+///         counts out of range; levelset::ResourceLimit for an image too large;
+///         levelset::InvalidInput for bands narrower than the filter reaches
 void requirePicture(const Scene& scene, const RenderOptions& options);
 
 /// @throws levelset::InvalidInput
 [[noreturn]] void refuseEmptyScene();
 
 /// ls:grid (name and content hash of each solid), ls:voxelSize, and how layers are made.
-[[nodiscard]] std::map<std::string, std::string> sceneAttributes(const Scene& scene);
+[[nodiscard]] std::map<std::string, std::string> sceneAttributes(const Scene& scene, Filter filter);
 
 /// Software, camera matrices, what Z is, and ls:extent.
 /// @param extent  diagonal of the surfaces' box, world units

@@ -36,12 +36,14 @@ cat "$folder"/*.txt | awk '
     theirs = 1024 * 768 / ($2 - $3) * 1e-6
     printf "%s, Mrays per CPU second: vdb_render %.2f\n", name, theirs
     judge("cpu kernel", value["cpu_mrays_per_s"], value["cpu_mrays_per_s"] / theirs, 3, 1)
+    printf "  %-50s %8.3g\n", "cpu kernel, bspline-qi", value["spline_cpu_mrays_per_s"]
     judge("gpu (" gpu ")", value["gpu_mrays_per_cpu_s"], value["gpu_mrays_per_cpu_s"] / theirs, 1, 1)
     judge("embree judge", value["embree_mrays_per_s"], value["embree_mrays_per_s"] / theirs, 0.3, 1)
     printf "  %-50s %8.3g s of CPU\n", "cpu, all layers and shading, one thread", value["cpu_all_layers_s"]
     judge("tables, s per million voxels", value["prepare_s_per_million_voxels"], value["prepare_s_per_million_voxels"], 0.1, 0)
     if (name == "dragon") {
       judge("what rays read, bytes beside NanoVDB", value["crossed_of_nanovdb"], value["crossed_of_nanovdb"], 1.1, 0)
+      judge("of bspline-qi, bytes beside NanoVDB", value["spline_tables_of_nanovdb"], value["spline_tables_of_nanovdb"], 1.5, 0)
       judge("with what curvature reads", value["tables_of_nanovdb"], value["tables_of_nanovdb"], 1.5, 0)
     }
     split("", value)

@@ -101,6 +101,14 @@ void benchmark(const Scene& scene) {
   } catch (const levelset::ResourceLimit& error) {
     fmt::print(stderr, "{}\n", error.what());
   }
+  const double splineStart = cpuSeconds();
+  const KernelScene splines(scene, levelset::kNoMemoryLimit, Filter::BSplineQi);
+  tell("spline_prepare_s_per_million_voxels", (cpuSeconds() - splineStart) / voxels * 1e6);
+  tell("spline_tables_of_nanovdb", static_cast<double>(splines.bytes()) / nano);
+  tell("spline_cpu_mrays_per_s", 1e-6 * kRays / timeOf([&] {
+                                   for (const PixelBlock& block : few)
+                                     (void)splines.castPixels(CpuTracer(), block);
+                                 }));
   const EmbreeScene judge(scene);
   tell("embree_mrays_per_s", 1e-6 * kRays / timeOf([&] {
                                for (int y = 0; y < kHeight; ++y)

@@ -120,6 +120,12 @@ render::Image drawByKernel(Invocation& in, const render::Scene& scene,
   }
 }
 
+render::Filter filterOf(const Invocation& in) {
+  for (const render::Filter filter : {render::Filter::BSpline, render::Filter::BSplineQi})
+    if (in.text("filter") == render::filterName(filter)) return filter;
+  return render::Filter::Trilinear;
+}
+
 Value draw(Invocation& in) {
   render::Scene scene;
   scene.camera = cameraOf(in);
@@ -127,6 +133,7 @@ Value draw(Invocation& in) {
   const std::string renderer = in.text("renderer");
   const bool isBoth = renderer == "both";
   render::RenderOptions options{.samples = static_cast<int>(in.integer("samples")),
+                                .filter = filterOf(in),
                                 .maxBytes = in.maxMemory,
                                 .progress = in.progress};
   if (isBoth) options.progress = levelset::subProgress(in.progress, 0, 0.5);
@@ -315,6 +322,12 @@ void addPictureOperators(std::vector<Operator>& all) {
             .doc = "which one draws; both: gpu and embree, compared",
             .fallback = "embree",
             .choices = {"gpu", "cpu", "embree", "both"}},
+           {.name = "filter",
+            .type = ParamType::Choice,
+            .doc = "what is drawn between grid points: the trilinear interpolant, the tricubic "
+                   "B-spline, which shrinks, or the one with corrected coefficients",
+            .fallback = "trilinear",
+            .choices = {"trilinear", "bspline", "bspline-qi"}},
            {.name = "size", .type = ParamType::ImageSize, .doc = "pixels", .fallback = "1024x768"},
            {.name = "from", .type = ParamType::Point, .doc = "where the eye is"},
            {.name = "to",

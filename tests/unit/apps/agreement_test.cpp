@@ -165,13 +165,14 @@ TEST(Agreement, OfTheDragon) {
 }
 
 TEST(Agreement, From200PlacesNothingLeaks) {
-  // A pixel that one hits and the other misses is a hole or a false hit, but along an outline, where
-  // rounding decides.
+  // A pixel that one hits and the other misses is a hole or a false hit, but along an outline,
+  // where rounding decides.
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> even(0, 1);
   Scene scene = support::sceneOf(support::rings(), 96, 72);
-  scene.solids.push_back({.band = levelset::makeBox(V3d(70, 40, 0.7), V3d(0.1, 0.2, -13), 1), .id = 2});
+  scene.solids.push_back(
+      {.band = levelset::makeBox(V3d(70, 40, 0.7), V3d(0.1, 0.2, -13), 1), .id = 2});
   std::size_t pixels = 0, hit = 0, atOutline = 0;
   for (int n = 0; n < 200; ++n) {
     const V3d way = V3d(normal(random), normal(random), normal(random)).normalized();

@@ -1,0 +1,153 @@
+#include <algorithm>
+#include <cmath>
+
+#include "render/embree/spline_cell_vdb.h"
+
+namespace render {
+namespace {
+
+using Imath::V3d;
+using openvdb::Coord;
+
+/// Values of the basis at a, or of its derivative.
+void basis(double a, bool isSlope, double (&w)[4]) {
+  const double b = 1 - a;
+  if (isSlope) {
+    w[0] = -b * b / 2;
+    w[1] = a * (3 * a - 4) / 2;
+    w[2] = -b * (3 * b - 4) / 2;
+    w[3] = a * a / 2;
+    return;
+  }
+  w[0] = b * b * b / 6;
+  w[1] = (a * a * (3 * a - 6) + 4) / 6;
+  w[2] = (b * b * (3 * b - 6) + 4) / 6;
+  w[3] = a * a * a / 6;
+}
+
+double weighed(const double (&c)[4][4][4], const double (&x)[4], const double (&y)[4],
+               const double (&z)[4]) {
+  double sum = 0;
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j)
+      for (int k = 0; k < 4; ++k) sum += x[i] * y[j] * z[k] * c[i][j][k];
+  return sum;
+}
+
+/// The spline along a line: its value and slope by s, and how much the two can change.
+class LineSearch {
+ public:
+  LineSearch(const double (&c)[4][4][4], const V3d& p, const V3d& way) : c_(c), p_(p), way_(way) {
+    // A derivative of a spline is one of the differences of its coefficients, and lies between them.
+    for (int a = 0; a < 3; ++a) {
+      const double first = mostDifference(a, -1);
+      slope_ += std::abs(way[a]) * first;
+      for (int b = 0; b < 3; ++b)
+        bend_ += std::abs(way[a] * way[b]) * mostDifference(std::min(a, b), std::max(a, b));
+    }
+  }
+
+  [[nodiscard]] double value(double s) const {
+    double w[3][4];
+    place(s, w, -1);
+    return weighed(c_, w[0], w[1], w[2]);
+  }
+
+  /// Of the whole way from p, in any direction of its axes.
+  [[nodiscard]] bool mayCross() const { return std::abs(value(0)) <= slope_ * (1 + 1e-9); }
+
+  /// The first change of sign between low and high.
+  std::optional<double> search(double low, bool lowInside, double high, bool highInside,
+                               int depth) const {
+    const double middle = 0.5 * (low + high), half = 0.5 * (high - low);
+    const double v = value(middle);
+    // Where rounding has it otherwise the sign that is known at the start counts.
+    if (std::abs(v) > slope_ * half)
+      return lowInside != (v < 0) ? std::optional(low) : std::nullopt;
+    const bool differ = lowInside != highInside;
+    if (depth == 0) return differ ? std::optional(middle) : std::nullopt;
+    if (std::abs(slope(middle)) > bend_ * half)
+      return differ ? std::optional(bisected(low, lowInside, high)) : std::nullopt;
+    const bool inside = v < 0;
+    if (const auto found = search(low, lowInside, middle, inside, depth - 1)) return found;
+    return search(middle, inside, high, highInside, depth - 1);
+  }
+
+ private:
+  [[nodiscard]] double slope(double s) const {
+    double sum = 0;
+    for (int a = 0; a < 3; ++a) {
+      double w[3][4];
+      place(s, w, a);
+      sum += way_[a] * weighed(c_, w[0], w[1], w[2]);
+    }
+    return sum;
+  }
+  void place(double s, double (&w)[3][4], int along) const {
+    for (int a = 0; a < 3; ++a)
+      basis(std::clamp(p_[a] + s * way_[a], 0.0, 1.0), a == along, w[a]);
+  }
+  [[nodiscard]] double bisected(double low, bool lowInside, double high) const {
+    for (int n = 0; n < 60; ++n) {
+      const double middle = 0.5 * (low + high);
+      if (!(middle > low && middle < high)) break;
+      ((value(middle) < 0) == lowInside ? low : high) = middle;
+    }
+    return 0.5 * (low + high);
+  }
+  /// Of the coefficients along axis a, and along b again (−1: once only).
+  [[nodiscard]] double mostDifference(int a, int b) const {
+    double most = 0;
+    int n[3];
+    for (n[0] = 0; n[0] < 4; ++n[0])
+      for (n[1] = 0; n[1] < 4; ++n[1])
+        for (n[2] = 0; n[2] < 4; ++n[2]) {
+          const int needA = n[a] + 1 + (b == a), needB = b < 0 ? 0 : n[b] + 1 + (b == a);
+          if (needA > 3 || needB > 3) continue;
+          const auto at = [&](int stepA, int stepB) {
+            int m[3] = {n[0], n[1], n[2]};
+            m[a] += stepA;
+            if (b >= 0) m[b] += stepB;
+            return c_[m[0]][m[1]][m[2]];
+          };
+          const double d = b < 0    ? at(1, 0) - at(0, 0)
+                           : a == b ? at(2, 0) - 2 * at(1, 0) + at(0, 0)
+                                    : at(1, 1) - at(1, 0) - at(0, 1) + at(0, 0);
+          most = std::max(most, std::abs(d));
+        }
+    return most;
+  }
+
+  const double (&c_)[4][4][4];
+  V3d p_, way_;
+  double slope_ = 0, bend_ = 0;
+};
+
+}  // namespace
+
+bool SplineCell::mayCross() const {
+  bool anyInside = false, anyOutside = false;
+  for (const auto& plane : c_)
+    for (const auto& row : plane)
+      for (const double c : row) (c < 0 ? anyInside : anyOutside) = true;
+  if (!anyInside || !anyOutside) return false;
+  // From the middle to any corner, at the most.
+  const LineSearch toCorner(c_, V3d(0.5), V3d(0.5));
+  return toCorner.mayCross();
+}
+
+double SplineCell::value(const V3d& p) const {
+  return LineSearch(c_, p, V3d(0)).value(0);
+}
+
+std::optional<double> SplineCell::firstSignChange(const V3d& p, const V3d& way,
+                                                  std::optional<bool> startsInside,
+                                                  bool& endsInside) const {
+  constexpr int kDepth = 40;
+  const LineSearch line(c_, p, way);
+  const bool starts = startsInside ? *startsInside : line.value(0) < 0;
+  endsInside = line.value(1) < 0;
+  return line.search(0, starts, 1, endsInside, kDepth);
+}
+
+}  // namespace render

@@ -1,0 +1,195 @@
+// Where a ray crosses the zero set of a tricubic B-spline, whose coefficients the grid holds. In the
+// words and the space of roots.glsl.
+//
+// Along a line the spline is of degree 9 in a cell. The Bézier net of the box that the way through
+// the cell spans tells its Bernstein coefficients: sums of products that are not negative, so that a
+// net of one sign gives coefficients of that sign, whatever is rounded.
+
+CONST_INT kDegree = 9;
+
+// Weights of the four coefficients from cell − 1 on, for the blossom of the cubic B-spline.
+struct Blend {
+  Real w0, w1, w2, w3;
+};
+
+Blend blendOf(Real u, Real v, Real w) {
+  VAR rw = 1.0f - w;
+  VAR p0 = rw * (1.0f - v) * 0.5f;
+  VAR p1 = (rw * (1.0f + v) + w * (2.0f - v)) * 0.5f;
+  VAR p2 = w * v * 0.5f;
+  VAR w0 = p0 * (1.0f - u) * kThird;
+  VAR w1 = (p0 * (2.0f + u) + p1 * (2.0f - u)) * kThird;
+  VAR w2 = (p1 * (1.0f + u) + p2 * (3.0f - u)) * kThird;
+  VAR w3 = p2 * u * kThird;
+  Blend b;
+  b.w0 = w0;
+  b.w1 = w1;
+  b.w2 = w2;
+  b.w3 = w3;
+  return b;
+}
+
+Real blended(IN(Blend) b, Real c0, Real c1, Real c2, Real c3) {
+  VAR sum = (b.w0 * c0 + b.w1 * c1) + (b.w2 * c2 + b.w3 * c3);
+  return sum;
+}
+
+// From four coefficients each on the axis of that stride to the four of the Bézier net between two
+// places.
+void bendAxis(INOUT_ARRAY(Real, net, 64), int stride, Real from, Real to) {
+  Blend b0 = blendOf(from, from, from);
+  Blend b1 = blendOf(from, from, to);
+  Blend b2 = blendOf(from, to, to);
+  Blend b3 = blendOf(to, to, to);
+  int across = stride == 1 ? 4 : 1;
+  int along = stride == 16 ? 4 : 16;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) {
+      int n = i * along + j * across;
+      VAR c0 = net[n];
+      VAR c1 = net[n + stride];
+      VAR c2 = net[n + 2 * stride];
+      VAR c3 = net[n + 3 * stride];
+      net[n] = blended(b0, c0, c1, c2, c3);
+      net[n + stride] = blended(b1, c0, c1, c2, c3);
+      net[n + 2 * stride] = blended(b2, c0, c1, c2, c3);
+      net[n + 3 * stride] = blended(b3, c0, c1, c2, c3);
+    }
+  }
+}
+
+Whole countChanges(IN_ARRAY(Real, b, 10)) {
+  Whole count = whole(0);
+  for (int i = 0; i < kDegree; ++i) count = count + bit(differ(b[i] < 0.0f, b[i + 1] < 0.0f), 1);
+  return count;
+}
+
+// Halves the interval of a polynomial, and keeps the left part or the right one. Loops have fixed
+// bounds: Mesa 22.3 loses some of what loops within loops write between bounds that change.
+void halve(INOUT_ARRAY(Real, b, 10), Bool asked, Bool right) {
+  VAR l[10];
+  VAR r[10];
+  for (int i = 0; i <= kDegree; ++i) {
+    l[i] = b[i];
+    r[i] = b[i];
+  }
+  for (int n = 1; n <= kDegree; ++n) {
+    for (int i = kDegree; i >= 1; --i)
+      if (i >= n) l[i] = (l[i - 1] + l[i]) * 0.5f;
+    for (int i = 0; i < kDegree; ++i)
+      if (i <= kDegree - n) r[i] = (r[i] + r[i + 1]) * 0.5f;
+  }
+  for (int i = 0; i <= kDegree; ++i) b[i] = select(asked, select(right, r[i], l[i]), b[i]);
+}
+
+Real valueAt(IN_ARRAY(Real, b, 10), Real u) {
+  VAR ru = 1.0f - u;
+  VAR c[10];
+  for (int i = 0; i <= kDegree; ++i) c[i] = b[i];
+  for (int n = 1; n <= kDegree; ++n) {
+    for (int i = 0; i < kDegree; ++i)
+      if (i <= kDegree - n) c[i] = between(c[i], c[i + 1], u, ru);
+  }
+  return c[0];
+}
+
+// As isolate(): the first part of [0, 1] in which the polynomial changes sign once.
+Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Real) low, INOUT(Real) high) {
+  Whole changes = countChanges(b);
+  Bool found = AND(asked, changes == 1);
+  Bool open = AND(asked, changes > 1);
+  low = real(0.0f);
+  high = real(1.0f);
+  Whole part = whole(0);
+  Whole halvings = whole(0);
+  VAR size = real(1.0f);
+  while (any(open)) {
+    VAR c[10];
+    for (int i = 0; i <= kDegree; ++i) c[i] = b[i];
+    for (int n = kMostHalvings - 1; n >= 0; --n) {
+      Bool deep = AND(open, halvings > n);
+      if (any(deep)) halve(c, deep, ((part >> n) & 1) != 0);
+    }
+    Whole count = countChanges(c);
+    Bool deepest = halvings == kMostHalvings;
+    Bool ends = AND(open, OR(count == 1, AND(deepest, differ(c[0] < 0.0f, c[kDegree] < 0.0f))));
+    VAR u = toReal(part) * size;
+    VAR w = toReal(part + 1) * size;
+    low = select(ends, u, low);
+    high = select(ends, w, high);
+    found = OR(found, ends);
+    open = AND(open, NOT(ends));
+    Bool divide = AND(open, AND(count > 1, NOT(deepest)));
+    Bool next = AND(open, NOT(divide));
+    part = select(divide, part + part, select(next, part + 1, part));
+    halvings = select(divide, halvings + 1, halvings);
+    size = select(divide, size * 0.5f, size);
+    for (int i = 0; i < kMostHalvings; ++i) {
+      Bool up = AND(next, AND((part & 1) == 0, halvings > 0));
+      part = select(up, part >> 1, part);
+      halvings = select(up, halvings - 1, halvings);
+      size = select(up, size + size, size);
+    }
+    open = AND(open, OR(divide, halvings > 0));
+  }
+  return found;
+}
+
+// What a ray does between two points of a cell, given from 0 to 1 on each axis.
+// @param carried, inside  is the side known on which the cell before ended, and is it the inside
+Crossing splineCrossingIn(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Real x0, Real y0,
+                          Real z0, Real x1, Real y1, Real z1, Bool carried, Bool inside) {
+  Window w = windowAt(asked, cellX, cellY, cellZ);
+  VAR net[64];
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) {
+      Whole nearBlocks = columnAt(w, i + 1, j + 1, 0);
+      Whole farBlocks = columnAt(w, i + 1, j + 1, 1);
+      for (int k = 0; k < 4; ++k)
+        net[16 * i + 4 * j + k] =
+            loadValue(select(w.farZ[k + 1], farBlocks, nearBlocks) + w.stepZ[k + 1]);
+    }
+  }
+  bendAxis(net, 1, z0, z1);
+  bendAxis(net, 4, y0, y1);
+  bendAxis(net, 16, x0, x1);
+
+  VAR b[10];
+  for (int n = 0; n <= kDegree; ++n) b[n] = real(0.0f);
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) {
+      for (int k = 0; k < 4; ++k) {
+        float ways = (i == 1 || i == 2 ? 3.0f : 1.0f) * (j == 1 || j == 2 ? 3.0f : 1.0f) *
+                     (k == 1 || k == 2 ? 3.0f : 1.0f);
+        b[i + j + k] = b[i + j + k] + net[16 * i + 4 * j + k] * ways;
+      }
+    }
+  }
+  b[1] = b[1] * (1.0f / 9.0f);
+  b[2] = b[2] * (1.0f / 36.0f);
+  b[3] = b[3] * (1.0f / 84.0f);
+  b[4] = b[4] * (1.0f / 126.0f);
+  b[5] = b[5] * (1.0f / 126.0f);
+  b[6] = b[6] * (1.0f / 84.0f);
+  b[7] = b[7] * (1.0f / 36.0f);
+  b[8] = b[8] * (1.0f / 9.0f);
+  b[0] = select(carried, onSide(b[0], inside), b[0]);
+
+  Crossing crossing;
+  Real low;
+  Real high;
+  crossing.found = isolateSpline(asked, b, low, high);
+  crossing.endsInside = b[kDegree] < 0.0f;
+  crossing.share = real(0.0f);
+  if (any(crossing.found)) {
+    Bool startsInside = valueAt(b, low) < 0.0f;
+    for (int i = 0; i < kBisections; ++i) {
+      VAR middle = (low + high) * 0.5f;
+      Bool same = NOT(differ(valueAt(b, middle) < 0.0f, startsInside));
+      low = select(same, middle, low);
+      high = select(same, high, middle);
+    }
+    crossing.share = (low + high) * 0.5f;
+  }
+  return crossing;
+}

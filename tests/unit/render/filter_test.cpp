@@ -1,0 +1,205 @@
+// What the filters promise, against closed forms: places, normals and curvatures on a ball, a torus,
+// a cylinder and a quartic, and how they converge; and the kernel against the judge.
+
+#include "render/filter.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "levelset/error.h"
+#include "levelset/solids/shapes.h"
+#include "render/compare_images.h"
+#include "render/cpu/cpu_renderer.h"
+#include "render/embree/embree_renderer.h"
+#include "render/gpu/gpu_renderer.h"
+#include "tests/support/bands.h"
+#include "tests/support/render_scenes.h"
+
+namespace filter_test {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+using namespace render;
+
+RenderOptions optionsOf(Filter filter) {
+  return {.samples = 1, .ambientSamples = 0, .shadowSamples = 0, .filter = filter};
+}
+
+V3d vectorAt(const Image& image, const std::string& name, std::size_t i) {
+  return {image.channels.at(name + ".X")[i], image.channels.at(name + ".Y")[i],
+          image.channels.at(name + ".Z")[i]};
+}
+
+/// Least and largest radius of a ball of that radius, less it, in voxels.
+struct Shift {
+  double least = HUGE_VAL, most = -HUGE_VAL;
+  [[nodiscard]] double worst() const { return std::max(-least, most); }
+};
+
+Shift shiftOf(double radius, Filter filter) {
+  const V3d center(0.3, 0.2, 0.1);
+  const Image image = renderCpu(
+      support::sceneOf(levelset::makeSphere(radius, center, 1), 96, 96), optionsOf(filter));
+  Shift shift;
+  for (std::size_t i = 0; i < image.pixelCount(); ++i) {
+    if (!std::isfinite(image.channels.at("Z")[i])) continue;
+    const double off = (vectorAt(image, "P", i) - center).length() - radius;
+    shift.least = std::min(shift.least, off);
+    shift.most = std::max(shift.most, off);
+  }
+  return shift;
+}
+
+TEST(Filters, LieWhereTheyPromise) {
+  // The trilinear interpolant is off by an eighth of the second differences at the most, the plain
+  // spline by a sixth of the Laplacian everywhere, the quasi-interpolating one to fourth order.
+  for (const double radius : {10.0, 20.0, 40.0}) {
+    const Shift linear = shiftOf(radius, Filter::Trilinear);
+    EXPECT_LE(linear.worst(), 0.26 / radius) << radius;
+    EXPECT_GE(linear.worst(), 0.1 / radius) << radius;
+    const Shift plain = shiftOf(radius, Filter::BSpline);
+    EXPECT_NEAR(plain.least, -1 / (3 * radius), 0.05 / radius) << radius;
+    EXPECT_NEAR(plain.most, -1 / (3 * radius), 0.05 / radius) << radius;
+  }
+  const double coarse = shiftOf(10, Filter::BSplineQi).worst();
+  EXPECT_LE(coarse, 1e-4);
+  EXPECT_GE(coarse / shiftOf(20, Filter::BSplineQi).worst(), 6);  // 8 but for single precision
+}
+
+/// A smooth function whose zero set is drawn.
+struct Formula {
+  std::string name;
+  std::function<double(const V3d&)> value;
+  std::function<V3d(const V3d&)> normal;
+  std::function<double(const V3d&)> mean, gauss;
+  V3d half;  ///< of its box
+};
+
+/// Mean and Gauss curvature of f = 0 from gradient and the diagonal of a diagonal Hessian.
+double meanOf(const V3d& g, const V3d& h) {
+  const double gHg = g.x * g.x * h.x + g.y * g.y * h.y + g.z * g.z * h.z;
+  return (g.length2() * (h.x + h.y + h.z) - gHg) / (2 * std::pow(g.length(), 3));
+}
+double gaussOf(const V3d& g, const V3d& h) {
+  return (g.x * g.x * h.y * h.z + g.y * g.y * h.x * h.z + g.z * g.z * h.x * h.y) /
+         (g.length2() * g.length2());
+}
+
+std::vector<Formula> formulas() {
+  const auto radial = [](const V3d& p) {
+    return p.x == 0 && p.y == 0 ? V3d(1, 0, 0) : V3d(p.x, p.y, 0).normalized();
+  };
+  const auto ring = [=](const V3d& p) { return p - radial(p); };  // from the circle of radius 1
+  // Goursat's x⁴ + y⁴ + z⁴ = 1, over its slope: near to a distance.
+  const auto g = [](const V3d& p) { return V3d(p.x * p.x * p.x, p.y * p.y * p.y, p.z * p.z * p.z) * 4.0; };
+  const auto h = [](const V3d& p) { return V3d(p.x * p.x, p.y * p.y, p.z * p.z) * 12.0; };
+  return {
+      {"ball", [](const V3d& p) { return p.length() - 1; },
+       [](const V3d& p) { return p.normalized(); }, [](const V3d&) { return 1.0; },
+       [](const V3d&) { return 1.0; }, V3d(1)},
+      {"cylinder", [](const V3d& p) { return std::hypot(p.x, p.y) - 0.6; }, radial,
+       [](const V3d&) { return 1 / 1.2; }, [](const V3d&) { return 0.0; }, V3d(0.6, 0.6, 0.5)},
+      {"torus", [=](const V3d& p) { return ring(p).length() - 0.4; },
+       [=](const V3d& p) { return ring(p).normalized(); },
+       [=](const V3d& p) {
+         const double c = ring(p).normalized().dot(radial(p));
+         return (1 + 0.8 * c) / (0.8 * (1 + 0.4 * c));
+       },
+       [=](const V3d& p) {
+         const double c = ring(p).normalized().dot(radial(p));
+         return c / (0.4 * (1 + 0.4 * c));
+       },
+       V3d(1.4, 1.4, 0.4)},
+      {"Goursat's quartic",
+       [=](const V3d& p) { return (g(p).dot(p) / 4 - 1) / std::max(g(p).length(), 0.5); },
+       [=](const V3d& p) { return g(p).normalized(); },
+       [=](const V3d& p) { return meanOf(g(p), h(p)); },
+       [=](const V3d& p) { return gaussOf(g(p), h(p)); }, V3d(1)}};
+}
+
+struct ShapeErrors {
+  double normal = 0, mean = 0, gauss = 0;  ///< root mean squares: radians, world units
+};
+
+ShapeErrors errorsOf(const Formula& formula, double voxel, Filter filter) {
+  // Of four voxels: what a band of three cuts off reaches into the curvature's fourth digit.
+  const NarrowBand band =
+      support::sampleBand(formula.value, {-formula.half, formula.half}, voxel, 4);
+  Scene scene = support::sceneOf(band, 80, 60);
+  const Image image = renderEmbree(scene, optionsOf(filter));
+  ShapeErrors sum;
+  double count = 0;
+  for (std::size_t i = 0; i < image.pixelCount(); ++i) {
+    if (!std::isfinite(image.channels.at("Z")[i])) continue;
+    const V3d p = vectorAt(image, "P", i);
+    // The ends of the cylinder are where its box ends.
+    if (formula.name == "cylinder" && std::abs(p.z) > 0.3) continue;
+    const auto squared = [](double v) { return v * v; };
+    sum.normal += (vectorAt(image, "N", i) - formula.normal(p)).length2();
+    sum.mean += squared(image.channels.at("curvature.mean")[i] - formula.mean(p));
+    sum.gauss += squared(image.channels.at("curvature.gauss")[i] - formula.gauss(p));
+    ++count;
+  }
+  EXPECT_GT(count, 100) << formula.name;
+  return {std::sqrt(sum.normal / count), std::sqrt(sum.mean / count), std::sqrt(sum.gauss / count)};
+}
+
+TEST(Filters, NormalsAndCurvaturesConverge) {
+  for (const Formula& formula : formulas())
+    for (const Filter filter : {Filter::Trilinear, Filter::BSplineQi}) {
+      const ShapeErrors coarse = errorsOf(formula, 0.1, filter),
+                        middle = errorsOf(formula, 0.05, filter),
+                        fine = errorsOf(formula, 0.025, filter);
+      const auto order = [](double a, double b) { return std::log2(a / b); };
+      const std::string what = formula.name + ", " + filterName(filter);
+      // Where the trilinear interpolant lies the normal is another: of second order with it.
+      EXPECT_GE(order(coarse.normal, fine.normal) / 2, 1.8) << what;
+      EXPECT_GE(order(coarse.mean, middle.mean), 1.5) << what;
+      EXPECT_GE(order(middle.mean, fine.mean), 1.5) << what;
+      EXPECT_LE(fine.mean, 0.01) << what;
+      if (formula.name != "cylinder") {
+        EXPECT_GE(order(coarse.gauss, fine.gauss) / 2, 1.5) << what;
+        EXPECT_LE(fine.gauss, 0.02) << what;
+      }
+    }
+}
+
+TEST(Filters, OfSplinesAreProvenLikeTheOther) {
+  const RenderOptions data = optionsOf(Filter::BSplineQi);
+  for (const Filter filter : {Filter::BSpline, Filter::BSplineQi}) {
+    for (const auto& [name, band] :
+         {std::pair{"rings", support::rings()},
+          std::pair{"sheet", levelset::makeBox(V3d(30, 30, 1.2), V3d(0.1, 0.2, 0.3), 1)},
+          std::pair{"needle", levelset::makeCapsule(V3d(-40, 3, 2), V3d(40, 7, 5), 1, 1)}}) {
+      RenderOptions options = optionsOf(filter);
+      for (Scene scene : {support::sceneOf(band), support::alongTheLattice(band, V3d(100, 0, 0)),
+                          support::alongTheLattice(band, V3d(0, 0, -100))}) {
+        const Image ours = renderCpu(scene, options);
+        const ImageComparison judged = compareImages(ours, renderEmbree(scene, options));
+        EXPECT_TRUE(judged.agrees()) << filterName(filter) << ", " << name << ": " << judged.reason();
+        EXPECT_EQ(compareImages(ours, renderGpu(scene, options), {.exact = true}).differentBits, 0u)
+            << filterName(filter) << ", " << name;
+      }
+    }
+  }
+  Scene within = support::sceneOf(support::rings());
+  within.camera.from = V3d(24, 0.1, 0.2);
+  within.camera.to = V3d(20, 10, 1);
+  EXPECT_TRUE(compareImages(renderCpu(within, data), renderEmbree(within, data)).agrees());
+}
+
+TEST(Filters, OfSplinesNeedTheirBand) {
+  const Scene scene = support::sceneOf(levelset::makeSphere(10, V3d(0), 1, {.halfWidth = 2}));
+  for (const auto& draw : {renderCpu, renderEmbree}) {
+    EXPECT_NO_THROW((void)draw(scene, optionsOf(Filter::Trilinear)));
+    EXPECT_THROW((void)draw(scene, optionsOf(Filter::BSpline)), levelset::InvalidInput);
+    EXPECT_THROW((void)draw(scene, optionsOf(Filter::BSplineQi)), levelset::InvalidInput);
+  }
+}
+
+}  // namespace filter_test
