@@ -4,10 +4,13 @@ namespace render {
 
 /// What is drawn of a grid: the zero set of which function through its values.
 enum class Filter {
-  Trilinear,  ///< between the values
-  BSpline,    ///< tricubic B-spline with the values for coefficients: smooth, and shrunk by a sixth of
-              ///< the Laplacian
-  BSplineQi   ///< the same with the coefficients f − ∇²f/6: through the values to fourth order [Sigg05]
+  /// Between the values.
+  Trilinear,
+  /// Tricubic B-spline with the values for coefficients: smooth, and off by a sixth of the
+  /// Laplacian.
+  BSpline,
+  /// The same with the coefficients f − ∇²f/6: on the values to fourth order [Sigg05].
+  BSplineQi
 };
 
 [[nodiscard]] constexpr const char* filterName(Filter filter) {

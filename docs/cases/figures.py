@@ -1,6 +1,6 @@
 """Pictures and tables of the docs:
 figures.py sheet FOLDER TARGET COLUMNS NAME=TITLE..., row FOLDER NAME FIELD..., expect FOLDER NAME FIELD OPERATOR VALUE,
-plot CSV TARGET."""
+plot CSV TARGET, cost CSV TARGET."""
 
 import json
 import operator
@@ -103,5 +103,39 @@ def plot(table, target):
     figure.savefig(f"{target}.png", dpi=100, bbox_inches="tight", pad_inches=0.05, metadata={"Software": None})
 
 
+def cost(table, target):
+    """What rays cost from the table that render_cost_bench prints, TARGET.png."""
+    import csv
+
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    with open(table) as file:
+        runs = list(csv.DictReader(file))
+    panels = {
+        "pixels": ("pixels", "pixels of the picture", 1),
+        "radius": ("size", "radius of the ball, voxels", 3),
+        "balls": ("size", "outlines: n × n balls in the frame", 1),
+    }
+    figure, axes = pyplot.subplots(1, 3, figsize=(11, 3.4), sharey=True)
+    for axis, (series, (column, title, power)) in zip(axes, panels.items()):
+        some = [run for run in runs if run["series"] == series]
+        sizes = [float(run[column]) for run in some]
+        times = [float(run["cpu_s"]) for run in some]
+        axis.loglog(sizes, times, "o-", color="C0")
+        proportional = [times[0] * (size / sizes[0]) ** power for size in sizes]
+        name = {"pixels": "in proportion", "radius": "as the volume", "balls": "in proportion"}[series]
+        axis.loglog(sizes, proportional, ":", color="0.5", label=name)
+        axis.set_ylim(min(0.01, min(times) / 2), 10)
+        axis.set_xlabel(title)
+        axis.grid(True, which="major", alpha=0.3)
+        axis.legend(fontsize=8)
+    axes[0].set_ylabel("CPU seconds, one thread")
+    figure.tight_layout()
+    figure.savefig(f"{target}.png", dpi=100, bbox_inches="tight", pad_inches=0.05, metadata={"Software": None})
+
+
 if __name__ == "__main__":
-    {"sheet": sheet, "row": row, "expect": expect, "plot": plot}[sys.argv[1]](*sys.argv[2:])
+    {"sheet": sheet, "row": row, "expect": expect, "plot": plot, "cost": cost}[sys.argv[1]](*sys.argv[2:])

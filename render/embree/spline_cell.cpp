@@ -38,7 +38,8 @@ double weighed(const double (&c)[4][4][4], const double (&x)[4], const double (&
 class LineSearch {
  public:
   LineSearch(const double (&c)[4][4][4], const V3d& p, const V3d& way) : c_(c), p_(p), way_(way) {
-    // A derivative of a spline is one of the differences of its coefficients, and lies between them.
+    // A derivative of a spline is one of the differences of its coefficients, and lies between
+    // them.
     for (int a = 0; a < 3; ++a) {
       const double first = mostDifference(a, -1);
       slope_ += std::abs(way[a]) * first;
@@ -84,8 +85,7 @@ class LineSearch {
     return sum;
   }
   void place(double s, double (&w)[3][4], int along) const {
-    for (int a = 0; a < 3; ++a)
-      basis(std::clamp(p_[a] + s * way_[a], 0.0, 1.0), a == along, w[a]);
+    for (int a = 0; a < 3; ++a) basis(std::clamp(p_[a] + s * way_[a], 0.0, 1.0), a == along, w[a]);
   }
   [[nodiscard]] double bisected(double low, bool lowInside, double high) const {
     for (int n = 0; n < 60; ++n) {

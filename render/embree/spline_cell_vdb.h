@@ -1,7 +1,7 @@
 #pragma once
 
-// Private to the judge: the tricubic B-spline of a cell in double precision, and where a line crosses
-// its zero set, by bounds of its slopes.
+// Private to the judge: the tricubic B-spline of a cell in double precision, and where a line
+// crosses its zero set, by bounds of its slopes.
 
 #include <optional>
 

@@ -1,5 +1,5 @@
-// What the filters promise, against closed forms: places, normals and curvatures on a ball, a torus,
-// a cylinder and a quartic, and how they converge; and the kernel against the judge.
+// What the filters promise, against closed forms: places, normals and curvatures on a ball, a
+// torus, a cylinder and a quartic, and how they converge; and the kernel against the judge.
 
 #include "render/filter.h"
 
@@ -43,8 +43,8 @@ struct Shift {
 
 Shift shiftOf(double radius, Filter filter) {
   const V3d center(0.3, 0.2, 0.1);
-  const Image image = renderCpu(
-      support::sceneOf(levelset::makeSphere(radius, center, 1), 96, 96), optionsOf(filter));
+  const Image image = renderCpu(support::sceneOf(levelset::makeSphere(radius, center, 1), 96, 96),
+                                optionsOf(filter));
   Shift shift;
   for (std::size_t i = 0; i < image.pixelCount(); ++i) {
     if (!std::isfinite(image.channels.at("Z")[i])) continue;
@@ -96,30 +96,31 @@ std::vector<Formula> formulas() {
   };
   const auto ring = [=](const V3d& p) { return p - radial(p); };  // from the circle of radius 1
   // Goursat's x⁴ + y⁴ + z⁴ = 1, over its slope: near to a distance.
-  const auto g = [](const V3d& p) { return V3d(p.x * p.x * p.x, p.y * p.y * p.y, p.z * p.z * p.z) * 4.0; };
+  const auto g = [](const V3d& p) {
+    return V3d(p.x * p.x * p.x, p.y * p.y * p.y, p.z * p.z * p.z) * 4.0;
+  };
   const auto h = [](const V3d& p) { return V3d(p.x * p.x, p.y * p.y, p.z * p.z) * 12.0; };
-  return {
-      {"ball", [](const V3d& p) { return p.length() - 1; },
-       [](const V3d& p) { return p.normalized(); }, [](const V3d&) { return 1.0; },
-       [](const V3d&) { return 1.0; }, V3d(1)},
-      {"cylinder", [](const V3d& p) { return std::hypot(p.x, p.y) - 0.6; }, radial,
-       [](const V3d&) { return 1 / 1.2; }, [](const V3d&) { return 0.0; }, V3d(0.6, 0.6, 0.5)},
-      {"torus", [=](const V3d& p) { return ring(p).length() - 0.4; },
-       [=](const V3d& p) { return ring(p).normalized(); },
-       [=](const V3d& p) {
-         const double c = ring(p).normalized().dot(radial(p));
-         return (1 + 0.8 * c) / (0.8 * (1 + 0.4 * c));
-       },
-       [=](const V3d& p) {
-         const double c = ring(p).normalized().dot(radial(p));
-         return c / (0.4 * (1 + 0.4 * c));
-       },
-       V3d(1.4, 1.4, 0.4)},
-      {"Goursat's quartic",
-       [=](const V3d& p) { return (g(p).dot(p) / 4 - 1) / std::max(g(p).length(), 0.5); },
-       [=](const V3d& p) { return g(p).normalized(); },
-       [=](const V3d& p) { return meanOf(g(p), h(p)); },
-       [=](const V3d& p) { return gaussOf(g(p), h(p)); }, V3d(1)}};
+  return {{"ball", [](const V3d& p) { return p.length() - 1; },
+           [](const V3d& p) { return p.normalized(); }, [](const V3d&) { return 1.0; },
+           [](const V3d&) { return 1.0; }, V3d(1)},
+          {"cylinder", [](const V3d& p) { return std::hypot(p.x, p.y) - 0.6; }, radial,
+           [](const V3d&) { return 1 / 1.2; }, [](const V3d&) { return 0.0; }, V3d(0.6, 0.6, 0.5)},
+          {"torus", [=](const V3d& p) { return ring(p).length() - 0.4; },
+           [=](const V3d& p) { return ring(p).normalized(); },
+           [=](const V3d& p) {
+             const double c = ring(p).normalized().dot(radial(p));
+             return (1 + 0.8 * c) / (0.8 * (1 + 0.4 * c));
+           },
+           [=](const V3d& p) {
+             const double c = ring(p).normalized().dot(radial(p));
+             return c / (0.4 * (1 + 0.4 * c));
+           },
+           V3d(1.4, 1.4, 0.4)},
+          {"Goursat's quartic",
+           [=](const V3d& p) { return (g(p).dot(p) / 4 - 1) / std::max(g(p).length(), 0.5); },
+           [=](const V3d& p) { return g(p).normalized(); },
+           [=](const V3d& p) { return meanOf(g(p), h(p)); },
+           [=](const V3d& p) { return gaussOf(g(p), h(p)); }, V3d(1)}};
 }
 
 struct ShapeErrors {
@@ -181,7 +182,8 @@ TEST(Filters, OfSplinesAreProvenLikeTheOther) {
                           support::alongTheLattice(band, V3d(0, 0, -100))}) {
         const Image ours = renderCpu(scene, options);
         const ImageComparison judged = compareImages(ours, renderEmbree(scene, options));
-        EXPECT_TRUE(judged.agrees()) << filterName(filter) << ", " << name << ": " << judged.reason();
+        EXPECT_TRUE(judged.agrees())
+            << filterName(filter) << ", " << name << ": " << judged.reason();
         EXPECT_EQ(compareImages(ours, renderGpu(scene, options), {.exact = true}).differentBits, 0u)
             << filterName(filter) << ", " << name;
       }
