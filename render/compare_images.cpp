@@ -202,13 +202,15 @@ class Comparer {
   /// layers that tell it are missing.
   [[nodiscard]] double turnBetweenPlaces(std::size_t i) const {
     if (!has("P.X") || !has("P.Y") || !has("P.Z")) return 0;
-    double curvature = 0;
+    constexpr double kMostTurn = 1.7e-3;  // as much as is allowed without
+    double curvature[2] = {};
     for (const char* name : {"curvature.k1", "curvature.k2"}) {
       if (!has(name)) continue;
-      curvature = std::max({curvature, std::abs(value(a_, name, i)), std::abs(value(b_, name, i))});
+      curvature[0] = std::max(curvature[0], std::abs(value(a_, name, i)));
+      curvature[1] = std::max(curvature[1], std::abs(value(b_, name, i)));
     }
-    const double turn = vectorDifference("P", i) * curvature;
-    return std::isfinite(turn) ? turn : 0;
+    const double turn = vectorDifference("P", i) * std::min(curvature[0], curvature[1]);
+    return std::isfinite(turn) ? std::min(turn, kMostTurn) : 0;
   }
   /// Of P from the origin: it is stored in so many bits.
   [[nodiscard]] double distance(std::size_t i) const {

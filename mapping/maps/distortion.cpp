@@ -44,14 +44,14 @@ Spread spreadOf(std::vector<double> values) {
 
 std::vector<V3d> samplePlaces(const Patch& patch, double sink) {
   std::vector<V3d> places;
-  if (sink > 0) {
-    const ParticleLevel& surface = patch.levels.front();
-    for (std::size_t j = 0; j < surface.rows; ++j)
-      for (std::size_t i = 0; i < surface.columns; ++i)
-        for (const double depth : {sink, sink / 2})
-          places.push_back({static_cast<double>(i) / static_cast<double>(surface.columns - 1),
-                            static_cast<double>(j) / static_cast<double>(surface.rows - 1),
-                            -depth});
+  if (sink != 0) {  // below the surface, or above the last level
+    const ParticleLevel& end = sink > 0 ? patch.levels.front() : patch.levels.back();
+    for (std::size_t j = 0; j < end.rows; ++j)
+      for (std::size_t i = 0; i < end.columns; ++i)
+        for (const double share : {1.0, 0.5})
+          places.push_back({static_cast<double>(i) / static_cast<double>(end.columns - 1),
+                            static_cast<double>(j) / static_cast<double>(end.rows - 1),
+                            end.w - share * sink});
   }
   for (std::size_t k = 0; k < patch.levels.size(); ++k) {
     const ParticleLevel& level = patch.levels[k];

@@ -85,6 +85,7 @@ ParticleLevel withCounts(const ParticleLevel& level, std::size_t columns, std::s
 std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink) {
   // Of the distance to a neighbour on the last level what must be left of it.
   constexpr double kLeastShare = 0.25;
+  constexpr double kWidest = 1.1;  // steps of the levels from layer to layer
   std::vector<SunkParticle> particles;
   if (sink == 0 || patch.levels.size() < 2) return particles;
   const bool isBelow = sink > 0;
@@ -98,9 +99,11 @@ std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink) {
   };
   const double step = std::abs(last.w - before.w);
   // A smooth map errs most beside its last particles: they lie deeper than the texture, by as much
-  // again or by a step. A reach of whole steps takes so many layers, whatever its last digit.
+  // again or by a step. Columns are straight, so that layers may lie wider apart than levels, and
+  // the wider the deeper.
   const double reach = std::abs(sink) + std::min(std::abs(sink), step);
-  const auto layers = static_cast<int>(std::ceil(reach / step * (1 - 1e-9)));
+  const double most = 2.0 * static_cast<double>(patch.levels.size());
+  const auto layers = static_cast<int>(std::min(most, std::ceil(reach / (kWidest * step))));
   for (int n = 1; n <= layers; ++n) {
     const double depth = reach * n / layers, share = depth / step;
     const auto keepsApart = [&](int i, int j, int u, int v) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "levelset/disjoint_sets.h"
@@ -12,19 +13,20 @@ namespace {
 using Imath::V3d;
 
 struct SideParticle {
+  std::size_t level;
   V3d before;
   double tolerance;
   V3d* after;
 };
 
-void addSides(const ParticleLevel& before, ParticleLevel& after, double tolerance,
-              std::vector<SideParticle>& particles) {
+void addSides(std::size_t number, const ParticleLevel& before, ParticleLevel& after,
+              double tolerance, std::vector<SideParticle>& particles) {
   for (std::size_t j = 0; j < before.rows; ++j)
     for (std::size_t i = 0; i < before.columns; ++i) {
       const bool isSide = i == 0 || j == 0 || i + 1 == before.columns || j + 1 == before.rows;
       if (!isSide) continue;
       const std::size_t n = j * before.columns + i;
-      particles.push_back({before.positions[n], tolerance, &after.positions[n]});
+      particles.push_back({number, before.positions[n], tolerance, &after.positions[n]});
     }
 }
 
@@ -35,15 +37,19 @@ void joinSharedParticles(std::span<const Patch> before, std::span<Patch> after) 
   std::vector<SideParticle> particles;
   for (std::size_t p = 0; p < before.size(); ++p)
     for (std::size_t k = 0; k < before[p].levels.size(); ++k)
-      addSides(before[p].levels[k], after[p].levels[k], kTolerance * before[p].spacing, particles);
-  std::stable_sort(
-      particles.begin(), particles.end(),
-      [](const SideParticle& a, const SideParticle& b) { return a.before.x < b.before.x; });
+      addSides(k, before[p].levels[k], after[p].levels[k], kTolerance * before[p].spacing,
+               particles);
+  std::stable_sort(particles.begin(), particles.end(),
+                   [](const SideParticle& a, const SideParticle& b) {
+                     return std::pair(a.level, a.before.x) < std::pair(b.level, b.before.x);
+                   });
   levelset::DisjointSets sets(particles.size());
   for (std::size_t a = 0; a < particles.size(); ++a) {
     const double tolerance = particles[a].tolerance;
     for (std::size_t b = a + 1; b < particles.size(); ++b) {
-      if (particles[b].before.x - particles[a].before.x > tolerance) break;
+      if (particles[b].level != particles[a].level ||
+          particles[b].before.x - particles[a].before.x > tolerance)
+        break;
       if ((particles[b].before - particles[a].before).length() <= tolerance)
         sets.join(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
     }

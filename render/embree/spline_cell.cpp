@@ -57,19 +57,24 @@ class LineSearch {
   /// Of the whole way from p, in any direction of its axes.
   [[nodiscard]] bool mayCross() const { return std::abs(value(0)) <= slope_ * (1 + 1e-9); }
 
-  /// The first change of sign between low and high.
+  /// The first change of sign between low and high, whose signs are given: that of the two cells at
+  /// a face, whatever is rounded within.
   std::optional<double> search(double low, bool lowInside, double high, bool highInside,
-                               int depth) const {
+                               int depth) {
     const double middle = 0.5 * (low + high), half = 0.5 * (high - low);
-    const double v = value(middle);
-    // Where rounding has it otherwise the sign that is known at the start counts.
-    if (std::abs(v) > slope_ * half)
-      return lowInside != (v < 0) ? std::optional(low) : std::nullopt;
     const bool differ = lowInside != highInside;
-    if (depth == 0) return differ ? std::optional(middle) : std::nullopt;
+    // A line in the zero set, or at a point of it, is told by its ends.
+    if (depth == 0 || slope_ == 0 || evaluations_ > kMostEvaluations)
+      return differ ? std::optional(middle) : std::nullopt;
+    const double v = value(middle);
+    ++evaluations_;
+    const bool inside = v < 0;
+    if (std::abs(v) > slope_ * half) {
+      if (lowInside != inside) return low;
+      return highInside != inside ? std::optional(high) : std::nullopt;
+    }
     if (std::abs(slope(middle)) > bend_ * half)
       return differ ? std::optional(bisected(low, lowInside, high)) : std::nullopt;
-    const bool inside = v < 0;
     if (const auto found = search(low, lowInside, middle, inside, depth - 1)) return found;
     return search(middle, inside, high, highInside, depth - 1);
   }
@@ -121,6 +126,8 @@ class LineSearch {
   const double (&c_)[4][4][4];
   V3d p_, way_;
   double slope_ = 0, bend_ = 0;
+  int evaluations_ = 0;
+  static constexpr int kMostEvaluations = 4000;
 };
 
 }  // namespace
@@ -140,14 +147,10 @@ double SplineCell::value(const V3d& p) const {
   return LineSearch(c_, p, V3d(0)).value(0);
 }
 
-std::optional<double> SplineCell::firstSignChange(const V3d& p, const V3d& way,
-                                                  std::optional<bool> startsInside,
-                                                  bool& endsInside) const {
+std::optional<double> SplineCell::firstSignChange(const V3d& p, const V3d& q) const {
   constexpr int kDepth = 40;
-  const LineSearch line(c_, p, way);
-  const bool starts = startsInside ? *startsInside : line.value(0) < 0;
-  endsInside = line.value(1) < 0;
-  return line.search(0, starts, 1, endsInside, kDepth);
+  LineSearch line(c_, p, q - p);
+  return line.search(0, value(p) < 0, 1, value(q) < 0, kDepth);
 }
 
 }  // namespace render

@@ -48,16 +48,15 @@ class SplineCell {
   /// False where it crosses zero for certain nowhere: its coefficients have one sign, or the middle
   /// is farther from zero than its slopes allow.
   [[nodiscard]] bool mayCross() const;
+  /// The same bits for both cells at a face that p is on: what the farthest coefficients weigh
+  /// there is nothing.
   /// @param p  in [0, 1]³
   [[nodiscard]] double value(const Imath::V3d& p) const;
-  /// The first s in [0, 1] at which the spline changes sign from p to p + way: halves are left out
+  /// The first share of the way from p to q at which the spline changes sign: halves are left out
   /// where the middle is farther from zero than its slope allows, and not halved any more where the
   /// slope cannot change its sign.
-  /// @param startsInside  what is known of the sign at p
-  /// @param endsInside    is told: the sign at p + way, if nothing is found
-  [[nodiscard]] std::optional<double> firstSignChange(const Imath::V3d& p, const Imath::V3d& way,
-                                                      std::optional<bool> startsInside,
-                                                      bool& endsInside) const;
+  [[nodiscard]] std::optional<double> firstSignChange(const Imath::V3d& p,
+                                                      const Imath::V3d& q) const;
 
  private:
   double c_[4][4][4];

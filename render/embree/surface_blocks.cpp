@@ -103,9 +103,8 @@ struct BlockWalk {
   /// Where in the cell the ray is at `t` and at `exit`; on the faces the coordinate is 0 or 1.
   void placesInCell(double exit, int outAxis, double (&p)[2][3]) const;
   [[nodiscard]] BernsteinCubic restrictToRay(double exit, int exitAxis) const;
-  /// @param carried  the sign at `t`, if it is known; it is told the one at `exit`
-  [[nodiscard]] std::optional<double> splineRoot(const DrawnField& field, double exit, int exitAxis,
-                                                 std::optional<bool>& carried) const;
+  [[nodiscard]] std::optional<double> splineRoot(const DrawnField& field, double exit,
+                                                 int exitAxis) const;
 };
 
 /// False when the ray misses the block. Of planes met together the last counts as the entry, which
@@ -183,17 +182,13 @@ void BlockWalk::placesInCell(double exit, int outAxis, double (&p)[2][3]) const 
   if (outAxis >= 0) p[1][outAxis] = isForward(outAxis) ? 1 : 0;
 }
 
-std::optional<double> BlockWalk::splineRoot(const DrawnField& field, double exit, int outAxis,
-                                            std::optional<bool>& carried) const {
+std::optional<double> BlockWalk::splineRoot(const DrawnField& field, double exit,
+                                            int outAxis) const {
   double p[2][3];
   placesInCell(exit, outAxis, p);
-  const V3d from(p[0][0], p[0][1], p[0][2]), to(p[1][0], p[1][1], p[1][2]);
   const SplineCell spline(
       SplineCoefficients<1>(field.tree, Coord(cell[0], cell[1], cell[2]), field.filter));
-  bool endsInside = false;
-  const auto root = spline.firstSignChange(from, to - from, carried, endsInside);
-  carried = endsInside;
-  return root;
+  return spline.firstSignChange(V3d(p[0][0], p[0][1], p[0][2]), V3d(p[1][0], p[1][1], p[1][2]));
 }
 
 /// The interpolant between `t` and `exit`: the cubic's blossom at the two ends, since the
@@ -280,7 +275,6 @@ std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& 
   BlockWalk walk{block, ray, near, far};
   if (!walk.clip()) return std::nullopt;
   walk.findFirstCell();
-  std::optional<bool> carried;
   for (;;) {
     double exit;
     int exitAxis = walk.exitAxis(exit);
@@ -292,12 +286,10 @@ std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& 
     const int x = walk.cell[0] - block.origin[0];
     const int bit = (walk.cell[1] - block.origin[1]) * 8 + walk.cell[2] - block.origin[2];
     const bool isMarked = block.crossing[static_cast<std::size_t>(x)] >> bit & 1;
-    if (!isMarked) {
-      carried.reset();
-    } else if (field.filter != Filter::Trilinear) {
-      if (const auto s = walk.splineRoot(field, exit, exitAxis, carried))
+    if (isMarked && field.filter != Filter::Trilinear) {
+      if (const auto s = walk.splineRoot(field, exit, exitAxis))
         return walk.t + *s * (exit - walk.t);
-    } else {
+    } else if (isMarked) {
       const BernsteinCubic cubic = walk.restrictToRay(exit, exitAxis);
       if (search == Search::AnyCrossing) {
         if (hasSignChange(cubic)) return walk.t;

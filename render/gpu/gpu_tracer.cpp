@@ -192,7 +192,6 @@ struct GpuTracer::Impl {
   int shift = 0;  // of the number of floats in a block of values
   std::map<const KernelSolid*, Tables> tables;
   GLuint rays = 0, hits = 0;
-  /// By the number of blocks of values.
   /// By the number of blocks of values, and is it a spline?
   std::map<std::pair<int, bool>, GLuint> pixelPrograms, rayPrograms;
 

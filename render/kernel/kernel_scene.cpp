@@ -95,7 +95,9 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter
   for (const Solid& solid : scene.solids)
     if (!solid.band.isEmpty())
       leaves += static_cast<double>(levelset::vdb(solid.band).tree().leafCount());
-  constexpr double kBytesOfBlock = 2 * 4 * (BrickPool::kValues + BrickPool::kMaskWords);
+  // And a copy of the leaves where the spline's coefficients are made of the values.
+  const double kCopies = filter == Filter::BSplineQi ? 4 * 512 : 0;
+  const double kBytesOfBlock = 2 * 4 * (BrickPool::kValues + BrickPool::kMaskWords) + kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, maxBytes, "render");
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
     const Solid& source = scene.solids[i];

@@ -44,7 +44,7 @@ cat "$folder"/*.txt | awk '
     if (name == "dragon") {
       judge("what rays read, bytes beside NanoVDB", value["crossed_of_nanovdb"], value["crossed_of_nanovdb"], 1.1, 0)
       judge("of bspline-qi, bytes beside NanoVDB", value["spline_tables_of_nanovdb"], value["spline_tables_of_nanovdb"], 1.5, 0)
-      judge("with what curvature reads", value["tables_of_nanovdb"], value["tables_of_nanovdb"], 1.5, 0)
+      judge("with what curvature reads", value["tables_of_nanovdb"], value["tables_of_nanovdb"], 1.1, 0)
     }
     split("", value)
     gpu = ""

@@ -137,7 +137,7 @@ struct JudgedMap {
   levelset::FieldGrid field;
 };
 
-JudgedMap judgeMap(const Invocation& in, const mapping::Patch& patch, double sink, double voxel) {
+JudgedMap judgeMap(Invocation& in, const mapping::Patch& patch, double sink, double voxel) {
   mapping::JacobianFieldOptions options{
       .voxelSize = voxel, .sink = sink / patch.height, .maxMemory = in.maxMemory};
   const auto [u, v] = sidesOf(patch);  // in place of a texture's
@@ -166,6 +166,11 @@ JudgedMap judgeMap(const Invocation& in, const mapping::Patch& patch, double sin
                                                   .maxMemory = in.maxMemory,
                                                   .progress = in.progress},
                                                  cost);
+  if (judged.isExtrapolated)
+    in.notes.notes.push_back(
+        "folds: where the texture is sunk no particles hold the map, since columns that go "
+        "straight "
+        "on would fold it");
   levelset::FieldGrid field =
       mapping::jacobianField(patch, *judged.map, judged.certificate, options);
   return {std::move(judged.certificate), survey(judged.samples), std::move(field)};
