@@ -449,8 +449,10 @@ BrickPool makeBricks(const levelset::NarrowBand& band, Filter filter) {
         (box.max()[a] - box.min()[a] + kBlock + BrickPool::kPage - 1) / BrickPool::kPage;
   }
   fillPool(pool, bricks, neighbours, levelset::vdb(band).background());
-  const std::size_t leaves = tree.leafCount();
-  pool.blocksLeftOut = leaves > pool.heldCount() ? leaves - pool.heldCount() : 0;
+  pool.blocksLeftOut = tree.leafCount();
+  for (const auto& brick : bricks)
+    pool.blocksLeftOut -= tree.probeConstLeaf(brick->origin) != nullptr;
+  for (const Neighbour& n : neighbours) pool.blocksLeftOut -= n.brick != nullptr;
   return pool;
 }
 

@@ -24,6 +24,7 @@ struct BrickPool {
   static constexpr int kMaskWords = 16;  ///< 32 bits each
   static constexpr int kPage = 64;       ///< cells of a page along an axis
   static constexpr int kBlocksOfPage = 512;
+  static constexpr std::size_t kFarBricks = 2;         ///< all outside, all inside
   static constexpr int kBlockOfEntry = kBlocksOfPage;  ///< on from a block's entry, its values
 
   Filter filter = Filter::Trilinear;
@@ -48,8 +49,11 @@ struct BrickPool {
   std::size_t blocksLeftOut = 0;  ///< leaves of the band that are not held
   /// Those that the surface crosses.
   [[nodiscard]] std::size_t brickCount() const { return mask.size() / kMaskWords; }
-  /// With those beside them.
+  /// Of all that are held: with those beside them, and the two that are far away.
   [[nodiscard]] std::size_t heldCount() const { return value.size() / kValues; }
+  [[nodiscard]] std::size_t besideCount() const {
+    return heldCount() == 0 ? 0 : heldCount() - brickCount() - kFarBricks;
+  }
   [[nodiscard]] std::size_t bytes() const;
 };
 

@@ -155,7 +155,7 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
   std::size_t bricks = 0, beside = 0;
   for (const KernelSolid& solid : surfaces.solids()) {
     bricks += solid.pool.brickCount();
-    beside += solid.pool.heldCount() - solid.pool.brickCount();
+    beside += solid.pool.besideCount();
   }
   image.attributes["ls:read"] = fmt::format(
       "{} blocks of 8x8x8 cells that the surface crosses and {} beside them, for its curvature, "

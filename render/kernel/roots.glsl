@@ -60,6 +60,24 @@ Whole signChanges(Real b0, Real b1, Real b2, Real b3) {
          bit(differ(b2 < 0.0f, b3 < 0.0f), 1);
 }
 
+// Goes on from part number `part` of those of size `size`, to its first half where it is divided, else
+// to the next; whole parts are left where a sign rule proves them empty.
+// @return where there is one
+Bool goOn(Bool open, Bool divides, INOUT(Whole) part, INOUT(Whole) halvings, INOUT(Real) size) {
+  Bool divide = AND(open, divides);
+  Bool next = AND(open, NOT(divide));
+  part = select(divide, part + part, select(next, part + 1, part));
+  halvings = select(divide, halvings + 1, halvings);
+  size = select(divide, size * 0.5f, size);
+  for (int i = 0; i < kMostHalvings; ++i) {  // an even number begins a part twice as large
+    Bool up = AND(next, AND((part & 1) == 0, halvings > 0));
+    part = select(up, part >> 1, part);
+    halvings = select(up, halvings - 1, halvings);
+    size = select(up, size + size, size);
+  }
+  return AND(open, OR(divide, halvings > 0));
+}
+
 // Finds the first part of [0, 1] in which the cubic changes sign once.
 // @return where there is one
 Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Real) low, INOUT(Real) high) {
@@ -68,8 +86,6 @@ Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Real) low, IN
   Bool open = AND(asked, changes > 1);
   low = real(0.0f);
   high = real(1.0f);
-  // Part number `part` of those of size `size`, leftmost first; whole parts are left where a sign
-  // rule proves them empty.
   Whole part = whole(0);
   Whole halvings = whole(0);
   VAR size = real(1.0f);
@@ -87,18 +103,7 @@ Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Real) low, IN
     high = select(ends, w, high);
     found = OR(found, ends);
     open = AND(open, NOT(ends));
-    Bool divide = AND(open, AND(count > 1, NOT(deepest)));
-    Bool next = AND(open, NOT(divide));
-    part = select(divide, part + part, select(next, part + 1, part));
-    halvings = select(divide, halvings + 1, halvings);
-    size = select(divide, size * 0.5f, size);
-    for (int i = 0; i < kMostHalvings; ++i) {  // an even number begins a part twice as large
-      Bool up = AND(next, AND((part & 1) == 0, halvings > 0));
-      part = select(up, part >> 1, part);
-      halvings = select(up, halvings - 1, halvings);
-      size = select(up, size + size, size);
-    }
-    open = AND(open, OR(divide, halvings > 0));
+    open = goOn(open, AND(count > 1, NOT(deepest)), part, halvings, size);
   }
   return found;
 }

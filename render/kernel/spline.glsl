@@ -119,18 +119,7 @@ Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Real) low, INOUT(Rea
     high = select(ends, w, high);
     found = OR(found, ends);
     open = AND(open, NOT(ends));
-    Bool divide = AND(open, AND(count > 1, NOT(deepest)));
-    Bool next = AND(open, NOT(divide));
-    part = select(divide, part + part, select(next, part + 1, part));
-    halvings = select(divide, halvings + 1, halvings);
-    size = select(divide, size * 0.5f, size);
-    for (int i = 0; i < kMostHalvings; ++i) {
-      Bool up = AND(next, AND((part & 1) == 0, halvings > 0));
-      part = select(up, part >> 1, part);
-      halvings = select(up, halvings - 1, halvings);
-      size = select(up, size + size, size);
-    }
-    open = AND(open, OR(divide, halvings > 0));
+    open = goOn(open, AND(count > 1, NOT(deepest)), part, halvings, size);
   }
   return found;
 }

@@ -166,6 +166,11 @@ TEST(KernelTrace, AgreesWithTheJudgeFromAllAround) {
 }
 
 TEST(KernelTrace, LosesNoRayOfTheLattice) {
+  const Disagreement near = disagreementOf(ball(20), latticeRays(18));
+  EXPECT_GT(near.hits, 20000u);
+  EXPECT_EQ(near.missed, 0u);
+  EXPECT_LE(near.worst, 1e-4);
+  // Three times as large, and as far from the table's corner.
   const auto rays = latticeRays(70);
   EXPECT_GT(rays.size(), 500000u);
   const Disagreement off = disagreementOf(ball(60), rays);
@@ -211,6 +216,10 @@ TEST(KernelTrace, HasTheSameBitsOnEveryInstructionSet) {
 TEST(BrickPool, HoldsWhatTheSurfaceCrosses) {
   const NarrowBand solid = ball(40);
   const BrickPool pool = render::makeBricks(solid);
+  // Leaves that the surface does not cross are no bricks, and the others held only beside these.
+  const std::size_t leaves = levelset::vdb(solid).tree().leafCount();
+  EXPECT_GT(leaves, pool.brickCount() + 100);
+  EXPECT_EQ(pool.brickCount() + pool.besideCount() + pool.blocksLeftOut, leaves);
   std::size_t crossing = 0, set = 0, full = 0;
   for (const std::uint32_t word : pool.mask)
     set += static_cast<std::size_t>(__builtin_popcount(word));
