@@ -16,6 +16,8 @@ struct Hit {
   double surfaceError = 0;      ///< bound on the interpolant's distance from a smooth surface
   std::uint32_t id = 0;         ///< Solid::id
   std::size_t solid = 0;        ///< index in Scene::solids
+  bool isTurned = false;        ///< is that solid's outside inside what is drawn? Normals tell of
+                                ///< what is drawn
 };
 
 struct CurvatureSample {

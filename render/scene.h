@@ -4,10 +4,12 @@
 #include <Imath/ImathVec.h>
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "levelset/narrow_band.h"
 #include "render/camera.h"
+#include "render/csg.h"
 
 namespace render {
 
@@ -22,6 +24,7 @@ struct Solid {
   levelset::NarrowBand band;
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
+  std::string name = {};  ///< for the expression
 };
 
 struct Scene {
@@ -29,6 +32,7 @@ struct Scene {
   Light key;
   double ambient = 0.32;  ///< weight of the ambient term, dimmed by occlusion
   std::vector<Solid> solids;
+  CsgExpression csg = {};  ///< what is drawn of the solids; empty: each of them
 };
 
 }  // namespace render

@@ -31,7 +31,9 @@ CubicPiece splitCubic(CubicPiece& piece) {
 
 /// Walks the pieces from the left. A piece without sign variation has no root (convex hull); one
 /// whose ends differ in sign has one for certain. `stopAtProof` returns as soon as that is known.
-double searchCubic(const BernsteinCubic& cubic, bool stopAtProof) {
+/// @param all  where given, takes every root, and none is returned
+double searchCubic(const BernsteinCubic& cubic, bool stopAtProof,
+                   std::vector<double>* all = nullptr) {
   CubicPiece stack[kMaxDepth + 1];
   int size = 0;
   CubicPiece piece{cubic, 0, 1, 0};
@@ -42,7 +44,11 @@ double searchCubic(const BernsteinCubic& cubic, bool stopAtProof) {
       stack[size++] = splitCubic(piece);
       continue;
     }
-    if (isProven) return piece.low + 0.5 * piece.width;
+    if (isProven) {
+      const double root = piece.low + 0.5 * piece.width;
+      if (!all) return root;
+      all->push_back(root);
+    }
     if (size == 0) return -1;
     piece = stack[--size];
   }
@@ -52,6 +58,10 @@ double searchCubic(const BernsteinCubic& cubic, bool stopAtProof) {
 
 double firstSignChange(const BernsteinCubic& cubic) {
   return signChanges(cubic) == 0 ? -1 : searchCubic(cubic, false);
+}
+
+void addSignChanges(const BernsteinCubic& cubic, std::vector<double>& found) {
+  if (signChanges(cubic) > 0) searchCubic(cubic, false, &found);
 }
 
 bool hasSignChange(const BernsteinCubic& cubic) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <vector>
 
 namespace render {
 
@@ -12,6 +13,9 @@ using BernsteinCubic = std::array<double, 4>;
 /// steered by Descartes' rule of signs: no tolerance, and nothing but sums and halves of the
 /// coefficients.
 [[nodiscard]] double firstSignChange(const BernsteinCubic& cubic);
+
+/// Appends all parameters at which it changes sign, in order. Each turns to the other side.
+void addSignChanges(const BernsteinCubic& cubic, std::vector<double>& found);
 
 /// True when there is one; cheaper than finding where.
 [[nodiscard]] bool hasSignChange(const BernsteinCubic& cubic);

@@ -28,7 +28,8 @@ struct RaySolid {
   Imath::M44d indexToWorld, worldToIndex;
   std::vector<SurfaceBlock> blocks;
   std::uint32_t id;
-  std::size_t index;
+  std::size_t index;   // in the scene
+  std::size_t number;  // among those with a surface
   // From world to Embree's box.
   V3d centre;
   double scale;
@@ -49,14 +50,19 @@ struct RayQuery {
   double nearest;
   double scale;
   const RaySolid* solid = nullptr;
+  std::vector<std::vector<SideChange>>* changes = nullptr;  // set: all are wanted, by solid
 };
 
-std::optional<double> crossingOf(const RayQuery& query, const RaySolid& solid, unsigned primitive,
-                                 Search search) {
+IndexRay indexRayOf(const RayQuery& query, const RaySolid& solid) {
   V3d origin, direction;
   solid.worldToIndex.multVecMatrix(query.origin, origin);
   solid.worldToIndex.multDirMatrix(query.direction, direction);
-  return findCrossing(solid.field(), solid.blocks[primitive], IndexRay(origin, direction), 0,
+  return {origin, direction};
+}
+
+std::optional<double> crossingOf(const RayQuery& query, const RaySolid& solid, unsigned primitive,
+                                 Search search) {
+  return findCrossing(solid.field(), solid.blocks[primitive], indexRayOf(query, solid), 0,
                       query.limit, search);
 }
 
@@ -78,6 +84,11 @@ void intersectBlock(const RTCIntersectFunctionNArguments* args) {
   if (!args->valid[0]) return;
   auto& query = *reinterpret_cast<RayQuery*>(args->context);
   const auto& solid = *static_cast<const RaySolid*>(args->geometryUserPtr);
+  if (query.changes) {
+    addCrossings(solid.field(), solid.blocks[args->primID], indexRayOf(query, solid), 0,
+                 (*query.changes)[solid.number]);
+    return;
+  }
   const auto t = crossingOf(query, solid, args->primID, Search::FirstCrossing);
   if (!t || *t > query.nearest) return;
   if (query.solid && *t == query.nearest && solid.id >= query.solid->id) return;
@@ -98,6 +109,52 @@ void occludeBlock(const RTCOccludedFunctionNArguments* args) {
   const auto& solid = *static_cast<const RaySolid*>(args->geometryUserPtr);
   if (crossingOf(query, solid, args->primID, Search::AnyCrossing))
     RTCRayN_tfar(args->ray, args->N, 0) = -std::numeric_limits<float>::infinity();
+}
+
+/// In their order, without those that undo each other at one place.
+void putInOrder(std::vector<SideChange>& changes) {
+  std::stable_sort(changes.begin(), changes.end(),
+                   [](const SideChange& a, const SideChange& b) { return a.t < b.t; });
+  std::vector<SideChange> kept;
+  for (const SideChange& change : changes) {
+    if (!kept.empty() && kept.back().t == change.t && kept.back().goesIn != change.goesIn)
+      kept.pop_back();
+    else
+      kept.push_back(change);
+  }
+  changes = std::move(kept);
+}
+
+/// Where a ray first changes sides of what an expression makes of the solids.
+struct CsgChange {
+  double t;
+  std::size_t solid;
+  bool isTurned;
+};
+
+std::optional<CsgChange> firstChange(const CsgExpression& csg,
+                                     std::vector<std::vector<SideChange>>& changes) {
+  std::vector<char> inside(changes.size(), 0);
+  for (std::size_t s = 0; s < changes.size(); ++s) {
+    putInOrder(changes[s]);
+    if (!changes[s].empty()) inside[s] = changes[s][0].goesIn ? 0 : 1;
+  }
+  std::vector<std::size_t> next(changes.size(), 0);
+  for (;;) {
+    std::optional<CsgChange> change;
+    for (std::size_t s = 0; s < changes.size(); ++s)
+      if (next[s] < changes[s].size() && (!change || changes[s][next[s]].t < change->t))
+        change = CsgChange{changes[s][next[s]].t, s, false};
+    if (!change) return std::nullopt;
+    const bool before = csg.holds(inside.data());
+    for (std::size_t s = 0; s < changes.size(); ++s)
+      while (next[s] < changes[s].size() && changes[s][next[s]].t == change->t)
+        inside[s] = changes[s][next[s]++].goesIn ? 1 : 0;
+    const bool after = csg.holds(inside.data());
+    if (before == after) continue;
+    change->isTurned = (inside[change->solid] != 0) != after;
+    return change;
+  }
 }
 
 /// Where the ray enters the box, at least `near`; nothing when it misses.
@@ -129,8 +186,9 @@ void requireRay(const V3d& origin, const V3d& direction) {
 
 struct EmbreeScene::Impl {
   std::vector<RaySolid> solids;
-  Box3d bounds;     // of the crossing cells
-  Box3d rayBounds;  // a little larger: where rays may start
+  CsgExpression csg;  // of those
+  Box3d bounds;       // of the crossing cells
+  Box3d rayBounds;    // a little larger: where rays may start
   V3d centre;
   double scale = 1;
   RTCDevice device = nullptr;
@@ -150,6 +208,10 @@ struct EmbreeScene::Impl {
   /// the origin was moved towards the scene.
   std::optional<RayQuery> prepare(const V3d& origin, const V3d& direction, double near, double far,
                                   double& moved, RTCRay& ray) const;
+  /// Of what the expression makes of the solids, up to `limit` of the query.
+  std::optional<CsgChange> findCsg(RayQuery& query, RTCRay ray) const;
+  void complete(Hit& hit, const RayQuery& query, const RaySolid& solid, double moved,
+                double t) const;
 };
 
 EmbreeScene::Impl::Impl(const Scene& source, Filter filter) {
@@ -167,7 +229,7 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter) {
 void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
   for (std::size_t i = 0; i < source.solids.size(); ++i) {
     const Solid& solid = source.solids[i];
-    if (solid.band.isEmpty()) continue;
+    if (solid.band.isEmpty() || (!source.csg.isEmpty() && !source.csg.uses(i))) continue;
     RaySolid entry;
     entry.band = solid.band;
     entry.indexToWorld = solid.band.indexToWorld();
@@ -180,6 +242,12 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
       bounds.extendBy(Imath::transform(block.bounds(), entry.indexToWorld));
     if (!entry.blocks.empty()) solids.push_back(std::move(entry));
   }
+  std::vector<int> numbers(source.solids.size(), -1);
+  for (std::size_t s = 0; s < solids.size(); ++s) {
+    solids[s].number = s;
+    numbers[solids[s].index] = static_cast<int>(s);
+  }
+  csg = source.csg.renumbered(numbers);
   if (bounds.isEmpty()) return;
   centre = bounds.center();
   scale = 1 / bounds.size().length();
@@ -248,6 +316,30 @@ std::optional<RayQuery> EmbreeScene::Impl::prepare(const V3d& origin, const V3d&
   return query;
 }
 
+std::optional<CsgChange> EmbreeScene::Impl::findCsg(RayQuery& query, RTCRay ray) const {
+  std::vector<std::vector<SideChange>> changes(solids.size());
+  query.changes = &changes;
+  RTCRayHit all;
+  all.ray = ray;
+  all.ray.tfar = 2;  // to the end of the scene: what comes later tells the side at the start
+  all.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  all.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(scene, &query.embree, &all);
+  auto change = firstChange(csg, changes);
+  if (change && change->t > query.limit) change.reset();
+  return change;
+}
+
+void EmbreeScene::Impl::complete(Hit& hit, const RayQuery& query, const RaySolid& solid,
+                                 double moved, double t) const {
+  hit.found = true;
+  hit.distance = moved + t;
+  hit.position = query.origin + query.direction * t;
+  hit.id = solid.id;
+  hit.solid = solid.index;
+  addNormals(hit, solid.shapeAt(hit.position), solid.indexToWorld, query.direction);
+}
+
 EmbreeScene::EmbreeScene(const Scene& scene, Filter filter)
     : impl_(std::make_unique<Impl>(scene, filter)) {}
 EmbreeScene::~EmbreeScene() = default;
@@ -259,18 +351,17 @@ Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near,
   RTCRayHit rayHit;
   auto query = impl_->prepare(origin, direction, near, far, moved, rayHit.ray);
   if (!query) return hit;
+  if (!impl_->csg.isEmpty()) {
+    if (const auto change = impl_->findCsg(*query, rayHit.ray)) {
+      hit.isTurned = change->isTurned;
+      impl_->complete(hit, *query, impl_->solids[change->solid], moved, change->t);
+    }
+    return hit;
+  }
   rayHit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   rayHit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(impl_->scene, &query->embree, &rayHit);
-  if (!query->solid) return hit;
-
-  const RaySolid& solid = *query->solid;
-  hit.found = true;
-  hit.distance = moved + query->nearest;
-  hit.position = query->origin + direction * query->nearest;
-  hit.id = solid.id;
-  hit.solid = solid.index;
-  addNormals(hit, solid.shapeAt(hit.position), solid.indexToWorld, direction);
+  if (query->solid) impl_->complete(hit, *query, *query->solid, moved, query->nearest);
   return hit;
 }
 
@@ -280,6 +371,7 @@ bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double nea
   RTCRay ray;
   auto query = impl_->prepare(origin, direction, near, far, moved, ray);
   if (!query) return false;
+  if (!impl_->csg.isEmpty()) return impl_->findCsg(*query, ray).has_value();
   rtcOccluded1(impl_->scene, &query->embree, &ray);
   return ray.tfar < 0;
 }
@@ -288,7 +380,9 @@ CurvatureSample EmbreeScene::curvatureAt(const Hit& hit) const {
   const auto solid = std::find_if(impl_->solids.begin(), impl_->solids.end(),
                                   [&](const RaySolid& s) { return s.index == hit.solid; });
   if (!hit.found || solid == impl_->solids.end()) return {};
-  return curvaturesOf(solid->shapeAt(hit.position), solid->band.voxelSize());
+  const CurvatureSample sample =
+      curvaturesOf(solid->shapeAt(hit.position), solid->band.voxelSize());
+  return hit.isTurned ? turned(sample) : sample;
 }
 
 const Box3d& EmbreeScene::bounds() const {

@@ -9,6 +9,8 @@ namespace {
 using Imath::V3d;
 using openvdb::Coord;
 
+constexpr int kDepth = 40;  // halvings of a cell
+
 /// Values of the basis at a, or of its derivative.
 void basis(double a, bool isSlope, double (&w)[4]) {
   const double b = 1 - a;
@@ -57,26 +59,27 @@ class LineSearch {
   /// Of the whole way from p, in any direction of its axes.
   [[nodiscard]] bool mayCross() const { return std::abs(value(0)) <= slope_ * (1 + 1e-9); }
 
-  /// The first change of sign between low and high, whose signs are given: that of the two cells at
-  /// a face, whatever is rounded within.
-  std::optional<double> search(double low, bool lowInside, double high, bool highInside,
-                               int depth) {
+  /// The changes of sign between low and high, whose signs are given: that of the two cells at a
+  /// face, whatever is rounded within.
+  /// @param take  is told of them in their order, and says whether to go on
+  /// @return was it told to stop?
+  template <typename Take>
+  bool search(double low, bool lowInside, double high, bool highInside, int depth,
+              const Take& take) {
+    const auto stops = [&](bool isChange, double at) { return isChange && !take(at); };
     const double middle = 0.5 * (low + high), half = 0.5 * (high - low);
     const bool differ = lowInside != highInside;
     // A line in the zero set, or at a point of it, is told by its ends.
-    if (depth == 0 || slope_ == 0 || evaluations_ > kMostEvaluations)
-      return differ ? std::optional(middle) : std::nullopt;
+    if (depth == 0 || slope_ == 0 || evaluations_ > kMostEvaluations) return stops(differ, middle);
     const double v = value(middle);
     ++evaluations_;
     const bool inside = v < 0;
-    if (std::abs(v) > slope_ * half) {
-      if (lowInside != inside) return low;
-      return highInside != inside ? std::optional(high) : std::nullopt;
-    }
+    if (std::abs(v) > slope_ * half)
+      return stops(lowInside != inside, low) || stops(highInside != inside, high);
     if (std::abs(slope(middle)) > bend_ * half)
-      return differ ? std::optional(bisected(low, lowInside, high)) : std::nullopt;
-    if (const auto found = search(low, lowInside, middle, inside, depth - 1)) return found;
-    return search(middle, inside, high, highInside, depth - 1);
+      return differ && stops(true, bisected(low, lowInside, high));
+    return search(low, lowInside, middle, inside, depth - 1, take) ||
+           search(middle, inside, high, highInside, depth - 1, take);
   }
 
  private:
@@ -148,9 +151,21 @@ double SplineCell::value(const V3d& p) const {
 }
 
 std::optional<double> SplineCell::firstSignChange(const V3d& p, const V3d& q) const {
-  constexpr int kDepth = 40;
+  std::optional<double> first;
   LineSearch line(c_, p, q - p);
-  return line.search(0, value(p) < 0, 1, value(q) < 0, kDepth);
+  line.search(0, value(p) < 0, 1, value(q) < 0, kDepth, [&](double at) {
+    first = at;
+    return false;
+  });
+  return first;
+}
+
+void SplineCell::addSignChanges(const V3d& p, const V3d& q, std::vector<double>& found) const {
+  LineSearch line(c_, p, q - p);
+  line.search(0, value(p) < 0, 1, value(q) < 0, kDepth, [&](double at) {
+    found.push_back(at);
+    return true;
+  });
 }
 
 }  // namespace render

@@ -4,6 +4,7 @@
 // crosses its zero set, by bounds of its slopes.
 
 #include <optional>
+#include <vector>
 
 #include "levelset/vdb.h"
 #include "render/filter.h"
@@ -57,6 +58,8 @@ class SplineCell {
   /// slope cannot change its sign.
   [[nodiscard]] std::optional<double> firstSignChange(const Imath::V3d& p,
                                                       const Imath::V3d& q) const;
+  /// Appends all of them, in order. Each turns to the other side.
+  void addSignChanges(const Imath::V3d& p, const Imath::V3d& q, std::vector<double>& found) const;
 
  private:
   double c_[4][4][4];

@@ -105,6 +105,9 @@ struct BlockWalk {
   [[nodiscard]] BernsteinCubic restrictToRay(double exit, int exitAxis) const;
   [[nodiscard]] std::optional<double> splineRoot(const DrawnField& field, double exit,
                                                  int exitAxis) const;
+  /// @return is the ray inside where it enters the cell?
+  bool addSplineRoots(const DrawnField& field, double exit, int outAxis,
+                      std::vector<double>& shares) const;
 };
 
 /// False when the ray misses the block. Of planes met together the last counts as the entry, which
@@ -191,6 +194,17 @@ std::optional<double> BlockWalk::splineRoot(const DrawnField& field, double exit
   return spline.firstSignChange(V3d(p[0][0], p[0][1], p[0][2]), V3d(p[1][0], p[1][1], p[1][2]));
 }
 
+bool BlockWalk::addSplineRoots(const DrawnField& field, double exit, int outAxis,
+                               std::vector<double>& shares) const {
+  double p[2][3];
+  placesInCell(exit, outAxis, p);
+  const V3d start(p[0][0], p[0][1], p[0][2]);
+  const SplineCell spline(
+      SplineCoefficients<1>(field.tree, Coord(cell[0], cell[1], cell[2]), field.filter));
+  spline.addSignChanges(start, V3d(p[1][0], p[1][1], p[1][2]), shares);
+  return spline.value(start) < 0;
+}
+
 /// The interpolant between `t` and `exit`: the cubic's blossom at the two ends, since the
 /// interpolant is affine in each coordinate. On the faces the coordinate is 0 or 1 exactly.
 /// @param outAxis  of the face at `exit`; -1 when the ray ends within the cell
@@ -270,10 +284,14 @@ std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field) {
   return blocks;
 }
 
-std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& block,
-                                   const IndexRay& ray, double near, double far, Search search) {
-  BlockWalk walk{block, ray, near, far};
-  if (!walk.clip()) return std::nullopt;
+namespace {
+
+/// Takes the walk through the marked cells of its block, in their order.
+/// @param far    where the ray ends
+/// @param visit  of where the ray leaves the cell, and by which face; says whether to go on
+template <typename Visit>
+void walkCells(BlockWalk& walk, double far, const Visit& visit) {
+  if (!walk.clip()) return;
   walk.findFirstCell();
   for (;;) {
     double exit;
@@ -283,27 +301,62 @@ std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& 
       exit = far;
       exitAxis = -1;
     }
-    const int x = walk.cell[0] - block.origin[0];
-    const int bit = (walk.cell[1] - block.origin[1]) * 8 + walk.cell[2] - block.origin[2];
-    const bool isMarked = block.crossing[static_cast<std::size_t>(x)] >> bit & 1;
-    if (isMarked && field.filter != Filter::Trilinear) {
-      if (const auto s = walk.splineRoot(field, exit, exitAxis))
-        return walk.t + *s * (exit - walk.t);
-    } else if (isMarked) {
-      const BernsteinCubic cubic = walk.restrictToRay(exit, exitAxis);
-      if (search == Search::AnyCrossing) {
-        if (hasSignChange(cubic)) return walk.t;
-      } else if (const double s = firstSignChange(cubic); s >= 0) {
-        return walk.t + s * (exit - walk.t);
-      }
-    }
-    if (exitAxis < 0) return std::nullopt;
+    const int x = walk.cell[0] - walk.block.origin[0];
+    const int bit = (walk.cell[1] - walk.block.origin[1]) * 8 + walk.cell[2] - walk.block.origin[2];
+    const bool isMarked = walk.block.crossing[static_cast<std::size_t>(x)] >> bit & 1;
+    if (isMarked && !visit(exit, exitAxis)) return;
+    if (exitAxis < 0) return;
     walk.cell[stepAxis] += walk.isForward(stepAxis) ? 1 : -1;
-    const int local = walk.cell[stepAxis] - block.origin[stepAxis];
-    if (local < 0 || local > 7) return std::nullopt;
+    const int local = walk.cell[stepAxis] - walk.block.origin[stepAxis];
+    if (local < 0 || local > 7) return;
     walk.axis = stepAxis;
     walk.t = exit;
   }
+}
+
+}  // namespace
+
+std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& block,
+                                   const IndexRay& ray, double near, double far, Search search) {
+  BlockWalk walk{block, ray, near, far};
+  std::optional<double> found;
+  walkCells(walk, far, [&](double exit, int exitAxis) {
+    if (field.filter != Filter::Trilinear) {
+      if (const auto s = walk.splineRoot(field, exit, exitAxis))
+        found = walk.t + *s * (exit - walk.t);
+      return !found;
+    }
+    const BernsteinCubic cubic = walk.restrictToRay(exit, exitAxis);
+    if (search == Search::AnyCrossing) {
+      if (hasSignChange(cubic)) found = walk.t;
+    } else if (const double s = firstSignChange(cubic); s >= 0) {
+      found = walk.t + s * (exit - walk.t);
+    }
+    return !found;
+  });
+  return found;
+}
+
+void addCrossings(const DrawnField& field, const SurfaceBlock& block, const IndexRay& ray,
+                  double near, std::vector<SideChange>& found) {
+  BlockWalk walk{block, ray, near, std::numeric_limits<double>::infinity()};
+  std::vector<double> shares;
+  walkCells(walk, std::numeric_limits<double>::infinity(), [&](double exit, int exitAxis) {
+    shares.clear();
+    bool inside;
+    if (field.filter == Filter::Trilinear) {
+      const BernsteinCubic cubic = walk.restrictToRay(exit, exitAxis);
+      inside = cubic[0] < 0;
+      addSignChanges(cubic, shares);
+    } else {
+      inside = walk.addSplineRoots(field, exit, exitAxis, shares);
+    }
+    for (const double share : shares) {
+      found.push_back({walk.t + share * (exit - walk.t), !inside});
+      inside = !inside;
+    }
+    return true;
+  });
 }
 
 }  // namespace render

@@ -58,6 +58,12 @@ struct DrawnField {
 /// order. The tree must outlive the blocks.
 [[nodiscard]] std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field);
 
+/// Where a ray changes sides.
+struct SideChange {
+  double t;
+  bool goesIn;
+};
+
 enum class Search { FirstCrossing, AnyCrossing };
 
 /// First sign change of the field on [near, far] inside the block. For AnyCrossing
@@ -65,5 +71,9 @@ enum class Search { FirstCrossing, AnyCrossing };
 [[nodiscard]] std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& block,
                                                  const IndexRay& ray, double near, double far,
                                                  Search search);
+
+/// Appends all sign changes of the field from `near` on inside the block, in their order.
+void addCrossings(const DrawnField& field, const SurfaceBlock& block, const IndexRay& ray,
+                  double near, std::vector<SideChange>& found);
 
 }  // namespace render

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kGroup = 64;                 // invocations
 constexpr std::size_t kOneRun = 1u << 18;  // rays: short enough for any watchdog
-constexpr int kRayParts = 11, kHitParts = 5;
+constexpr int kRayParts = 12, kHitParts = 5;
 
 enum Binding : GLuint { kPages, kEntries, kMasks, kRays, kHits, kFirstValues };
 
@@ -77,8 +77,8 @@ void main() {
   int n = firstRay + int(gl_GlobalInvocationID.x);
   if (n >= rayCount) return;
   Ray ray = rayNumber(n);
-  Hit hit = trace(ray);
-  hits[n] = hit.found ? -1 : 0;
+  Hit hit = trace(ray, passingNumber(n));
+  hits[n] = hit.found ? (hit.goesIn ? kGoesIn : kGoesOut) : 0;
   hits[rayCount + n] = floatBitsToInt(hit.t);
   hits[2 * rayCount + n] = hit.x;
   hits[3 * rayCount + n] = hit.y;
@@ -89,6 +89,7 @@ void main() {
 
 constexpr const char* kPixelRays = R"GLSL(
 Ray rayNumber(int n) { return viewRay(rays[n], rays[rayCount + n]); }
+int passingNumber(int n) { return int(rays[2 * rayCount + n]); }
 
 void addShape(int n, Ray ray, Hit hit) {
   // llvmpipe runs through all branches, but leaves loops that no ray is in.
@@ -118,6 +119,7 @@ Ray rayNumber(int n) {
   ray.end = rays[10 * rayCount + n];
   return ray;
 }
+int passingNumber(int n) { return int(rays[11 * rayCount + n]); }
 
 void addShape(int n, Ray ray, Hit hit) {}
 )GLSL";
@@ -144,10 +146,11 @@ std::string shaderText(const char* rays, bool isSpline, int valueBlocks, int shi
   return fmt::format(
              "#version 450 core\nlayout(local_size_x = {}) in;\n"
              "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {}, kBlockOfEntry = {},\n"
-             "          kHitParts = {}, kShapeParts = {};\nconst bool isSpline = {};\n",
+             "          kHitParts = {}, kShapeParts = {}, kGoesIn = {}, kGoesOut = {};\n"
+             "const bool isSpline = {};\n",
              kGroup, BrickPool::kEdge, BrickPool::kValues,
              std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kBlockOfEntry,
-             kHitParts, ShapeBlock::kParts, isSpline) +
+             kHitParts, ShapeBlock::kParts, HitBlock::kGoesIn, HitBlock::kGoesOut, isSpline) +
          kDialect + valueText(valueBlocks, shift) + kRootsKernel + kWindowKernel + kSplineKernel +
          kTraceKernel + kShapeKernel + rays + kMain;
 }
@@ -362,6 +365,7 @@ void GpuTracer::trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlo
                       ShapeBlock& shapes) const {
   std::vector<float> input(pixels.x);
   input.insert(input.end(), pixels.y.begin(), pixels.y.end());
+  input.insert(input.end(), pixels.passing.begin(), pixels.passing.end());  // exact up to 2^24
   impl_->run(solid, input, pixels.size(), hits, &shapes);
 }
 
@@ -371,6 +375,7 @@ void GpuTracer::trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& 
   for (const auto* part : {&rays.ox, &rays.oy, &rays.oz, &rays.dx, &rays.dy, &rays.dz, &rays.ix,
                            &rays.iy, &rays.iz, &rays.start, &rays.end})
     input.insert(input.end(), part->begin(), part->end());
+  input.insert(input.end(), rays.passing.begin(), rays.passing.end());
   impl_->run(solid, input, rays.size, hits, nullptr);
 }
 

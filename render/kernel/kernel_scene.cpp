@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "levelset/vdb.h"
+#include "render/kernel/csg_walk.h"
 
 namespace render {
 namespace {
@@ -16,6 +17,7 @@ using Imath::V3d;
 constexpr double kBesideBox = 0.0625;  // lest rounding loses a crossing on a face of the box
 constexpr double kParallel = 1e30;
 constexpr std::size_t kRaysAtOnce = 1u << 18;
+constexpr double kNoEnd = 1e300;
 
 Imath::Box3d cellBox(const BrickPool& pool) {
   Imath::Box3d box;
@@ -45,26 +47,29 @@ Span clipped(const BrickPool& pool, const V3d& origin, const V3d& direction, dou
 /// Rays of a list that come near a solid, as its kernel takes them.
 struct PackedRays {
   std::vector<std::size_t> number;  // in the list
+  std::vector<double> enter;        // where they start, voxels along the ray
   RayBlock block{0};
 
-  /// Of those from `first` up to `last`.
+  /// @param asked   numbers of the rays
+  /// @param hasEnd  do they end at their reach, or go on as far as there is surface?
   PackedRays(const KernelSolid& solid, const std::vector<LightRay>& rays,
-             const std::vector<char>& isDone, std::size_t first, std::size_t last) {
+             const std::vector<std::size_t>& asked, bool hasEnd) {
     struct Ready {
       V3d origin, direction;
       Span span;
     };
     std::vector<Ready> ready;
-    for (std::size_t i = first; i < last; ++i) {
-      if (isDone[i]) continue;
+    for (const std::size_t i : asked) {
       // A step of t is a voxel, so that single precision suits whatever the unit is.
       V3d origin, direction;
       solid.worldToTable.multVecMatrix(rays[i].origin, origin);
       solid.worldToTable.multDirMatrix(rays[i].direction * solid.voxelSize, direction);
-      const Span span = clipped(solid.pool, origin, direction, rays[i].reach / solid.voxelSize);
+      const double reach = hasEnd ? rays[i].reach / solid.voxelSize : kParallel;
+      const Span span = clipped(solid.pool, origin, direction, reach);
       if (!(span.enter <= span.leave)) continue;
       ready.push_back({origin + direction * span.enter, direction, span});
       number.push_back(i);
+      enter.push_back(span.enter);
     }
     block = RayBlock(ready.size());
     for (std::size_t n = 0; n < ready.size(); ++n) {
@@ -101,6 +106,7 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter
   levelset::requireMemory(leaves * kBytesOfBlock, maxBytes, "render");
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
     const Solid& source = scene.solids[i];
+    if (!scene.csg.isEmpty() && !scene.csg.uses(i)) continue;
     KernelSolid solid;
     solid.pool = makeBricks(source.band, filter);
     if (solid.pool.brickCount() == 0) continue;
@@ -116,6 +122,9 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter
   }
   std::stable_sort(solids_.begin(), solids_.end(),
                    [](const KernelSolid& a, const KernelSolid& b) { return a.id < b.id; });
+  std::vector<int> numbers(scene.solids.size(), -1);
+  for (std::size_t s = 0; s < solids_.size(); ++s) numbers[solids_[s].index] = static_cast<int>(s);
+  csg_ = scene.csg.renumbered(numbers);
 }
 
 std::size_t KernelScene::bytes() const {
@@ -131,6 +140,10 @@ std::size_t KernelScene::blocksLeftOut() const {
 }
 
 PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const {
+  return csg_.isEmpty() ? castFirst(tracer, pixels) : castCsg(tracer, pixels);
+}
+
+PixelHits KernelScene::castFirst(const KernelTracer& tracer, const PixelBlock& pixels) const {
   PixelHits result(pixels.size());
   HitBlock hits(pixels.size());
   ShapeBlock shapes(pixels.size());
@@ -139,13 +152,59 @@ PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& 
     tracer.trace(solid, pixels, hits, shapes);
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       if (!hits.found[i]) continue;
-      const double depth =
-          solid.fan.depth + static_cast<double>(hits.t[i]) * solid.fan.depthPerStep;
+      const double depth = solid.fan.depthAt(hits.t[i]);
       if (result.solid[i] >= 0 && result.depth[i] <= depth) continue;
       result.depth[i] = depth;
       result.solid[i] = static_cast<std::int32_t>(s);
-      result.shapes.take(shapes, i);
+      result.shapes.take(i, shapes, i);
     }
+  }
+  return result;
+}
+
+PixelHits KernelScene::castCsg(const KernelTracer& tracer, const PixelBlock& pixels) const {
+  PixelHits result(pixels.size());
+  CsgWalk walk(csg_, solids_.size(), std::vector<double>(pixels.size(), kNoEnd));
+  struct Crossings {  // of one solid, the next of each ray
+    std::vector<double> depth;
+    ShapeBlock shapes;
+  };
+  std::vector<Crossings> next(solids_.size(),
+                              {std::vector<double>(pixels.size()), ShapeBlock(pixels.size())});
+  do {
+    for (std::size_t s = 0; s < solids_.size(); ++s) {
+      const KernelSolid& solid = solids_[s];
+      const std::vector<CsgWalk::Question> questions = walk.questionsAbout(s);
+      if (questions.empty()) continue;
+      PixelBlock asked(questions.size());
+      for (std::size_t n = 0; n < questions.size(); ++n) {
+        asked.x[n] = pixels.x[questions[n].ray];
+        asked.y[n] = pixels.y[questions[n].ray];
+        asked.passing[n] = questions[n].passing;
+      }
+      HitBlock hits(asked.size());
+      ShapeBlock shapes(asked.size());
+      tracer.trace(solid, asked, hits, shapes);
+      for (std::size_t n = 0; n < questions.size(); ++n) {
+        if (!hits.found[n]) {
+          walk.answerNone(s, questions[n]);
+          continue;
+        }
+        const std::size_t ray = questions[n].ray;
+        next[s].depth[ray] = solid.fan.depthAt(hits.t[n]);
+        next[s].shapes.take(ray, shapes, n);
+        walk.answer(s, questions[n], next[s].depth[ray], hits.found[n] == HitBlock::kGoesIn);
+      }
+    }
+  } while (walk.advance());
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const std::int32_t met = walk.solidMet(i);
+    if (met < 0) continue;
+    const auto s = static_cast<std::size_t>(met);
+    result.solid[i] = met;
+    result.depth[i] = next[s].depth[i];
+    result.turned[i] = walk.isTurned(i) ? 1 : 0;
+    result.shapes.take(i, next[s].shapes, i);
   }
   return result;
 }
@@ -155,15 +214,64 @@ std::vector<char> KernelScene::findBlocked(const KernelTracer& tracer,
   std::vector<char> blocked(rays.size(), 0);
   for (std::size_t first = 0; first < rays.size(); first += kRaysAtOnce) {
     const std::size_t last = std::min(rays.size(), first + kRaysAtOnce);
-    for (const KernelSolid& solid : solids_) {
-      const PackedRays packed(solid, rays, blocked, first, last);
-      HitBlock hits(packed.block.size);
-      tracer.trace(solid, packed.block, hits);
-      for (std::size_t n = 0; n < packed.number.size(); ++n)
-        if (hits.found[n]) blocked[packed.number[n]] = 1;
-    }
+    if (csg_.isEmpty())
+      blockFirst(tracer, rays, first, last, blocked);
+    else
+      blockCsg(tracer, rays, first, last, blocked);
   }
   return blocked;
+}
+
+void KernelScene::blockFirst(const KernelTracer& tracer, const std::vector<LightRay>& rays,
+                             std::size_t first, std::size_t last,
+                             std::vector<char>& blocked) const {
+  for (const KernelSolid& solid : solids_) {
+    std::vector<std::size_t> open;
+    for (std::size_t i = first; i < last; ++i)
+      if (!blocked[i]) open.push_back(i);
+    const PackedRays packed(solid, rays, open, true);
+    HitBlock hits(packed.block.size);
+    tracer.trace(solid, packed.block, hits);
+    for (std::size_t n = 0; n < packed.number.size(); ++n)
+      if (hits.found[n]) blocked[packed.number[n]] = 1;
+  }
+}
+
+void KernelScene::blockCsg(const KernelTracer& tracer, const std::vector<LightRay>& rays,
+                           std::size_t first, std::size_t last, std::vector<char>& blocked) const {
+  std::vector<double> reach;
+  for (std::size_t i = first; i < last; ++i) reach.push_back(rays[i].reach);
+  CsgWalk walk(csg_, solids_.size(), std::move(reach));
+  do {
+    for (std::size_t s = 0; s < solids_.size(); ++s) {
+      const KernelSolid& solid = solids_[s];
+      const std::vector<CsgWalk::Question> questions = walk.questionsAbout(s);
+      std::vector<std::size_t> asked;
+      for (const CsgWalk::Question& question : questions) asked.push_back(first + question.ray);
+      // To their end: where a ray ends inside a solid only what comes later tells that it is.
+      PackedRays packed(solid, rays, asked, false);
+      std::size_t n = 0;
+      for (const CsgWalk::Question& question : questions) {
+        if (n < packed.number.size() && packed.number[n] == first + question.ray)
+          packed.block.passing[n++] = question.passing;
+      }
+      HitBlock hits(packed.block.size);
+      if (!packed.number.empty()) tracer.trace(solid, packed.block, hits);
+      n = 0;
+      for (const CsgWalk::Question& question : questions) {
+        const bool isNear = n < packed.number.size() && packed.number[n] == first + question.ray;
+        if (isNear && hits.found[n])
+          walk.answer(s, question,
+                      (packed.enter[n] + static_cast<double>(hits.t[n])) * solid.voxelSize,
+                      hits.found[n] == HitBlock::kGoesIn);
+        else
+          walk.answerNone(s, question);
+        if (isNear) ++n;
+      }
+    }
+  } while (walk.advance());
+  for (std::size_t i = first; i < last; ++i)
+    if (walk.solidMet(i - first) >= 0) blocked[i] = 1;
 }
 
 }  // namespace render

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "levelset/memory_limit.h"
+#include "render/csg.h"
 #include "render/kernel/brick_pool.h"
 #include "render/kernel/ray_block.h"
 #include "render/kernel/ray_fan.h"
@@ -40,13 +41,15 @@ class KernelTracer {
 struct PixelHits {
   std::vector<double> depth;        ///< along the view axis, world units
   std::vector<std::int32_t> solid;  ///< index in KernelScene::solids(), or −1
+  std::vector<char> turned;         ///< is that solid's outside inside what the scene makes of it?
   ShapeBlock shapes;
 
-  explicit PixelHits(std::size_t size) : depth(size), solid(size, -1), shapes(size) {}
+  explicit PixelHits(std::size_t size)
+      : depth(size), solid(size, -1), turned(size, 0), shapes(size) {}
 };
 
 /// The surfaces of a scene made ready for the kernel, whoever runs it. Of two solids hit at the
-/// same depth the lower id counts.
+/// same depth the first one by id counts.
 class KernelScene {
  public:
   /// @param maxBytes  for what the kernel reads
@@ -68,7 +71,16 @@ class KernelScene {
                                               const std::vector<LightRay>& rays) const;
 
  private:
+  [[nodiscard]] PixelHits castFirst(const KernelTracer& tracer, const PixelBlock& pixels) const;
+  [[nodiscard]] PixelHits castCsg(const KernelTracer& tracer, const PixelBlock& pixels) const;
+  /// Those of the rays from `first` up to `last` that are blocked.
+  void blockFirst(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
+                  std::size_t last, std::vector<char>& blocked) const;
+  void blockCsg(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
+                std::size_t last, std::vector<char>& blocked) const;
+
   std::vector<KernelSolid> solids_;  // by id
+  CsgExpression csg_;                // of those
   Imath::Box3d bounds_;
 };
 

@@ -56,6 +56,7 @@ Hit KernelPainter::hitOf(const Camera::Ray& ray, const PixelHits& hits, std::siz
   hit.position = ray.origin + ray.direction * hit.distance;
   hit.id = solid.id;
   hit.solid = solid.index;
+  hit.isTurned = hits.turned[i] != 0;
   addNormals(hit, hits.shapes.at(i), solid.tableToWorld, ray.direction);
   hit.surfaceError += kCastError * solid.voxelSize;
   return hit;
@@ -77,7 +78,8 @@ void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixe
     layers_.setHit(number, scene_.camera, hitOf(ray, hits, i));
     if (options_.curvature) {
       const double h = surfaces_.solids()[static_cast<std::size_t>(hits.solid[i])].voxelSize;
-      layers_.setCurvature(number, curvaturesOf(hits.shapes.at(i), h));
+      const CurvatureSample sample = curvaturesOf(hits.shapes.at(i), h);
+      layers_.setCurvature(number, hits.turned[i] ? turned(sample) : sample);
     }
   }
 }

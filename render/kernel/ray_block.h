@@ -19,17 +19,19 @@ inline float rayInverse(float d) {
 struct RayBlock {
   static constexpr std::size_t kLanes = 16;
 
-  std::size_t size = 0;           ///< of the arrays
-  std::vector<float> ox, oy, oz;  ///< where t is 0
-  std::vector<float> dx, dy, dz;  ///< by t
-  std::vector<float> ix, iy, iz;  ///< rayInverse(d)
-  std::vector<float> start, end;  ///< of t
+  std::size_t size = 0;               ///< of the arrays
+  std::vector<float> ox, oy, oz;      ///< where t is 0
+  std::vector<float> dx, dy, dz;      ///< by t
+  std::vector<float> ix, iy, iz;      ///< rayInverse(d)
+  std::vector<float> start, end;      ///< of t
+  std::vector<std::int32_t> passing;  ///< how many crossings to pass over
 
   explicit RayBlock(std::size_t count) : size((count + kLanes - 1) / kLanes * kLanes) {
     for (auto* a : {&ox, &oy, &oz}) a->assign(size, 0);
     for (auto* a : {&dx, &dy, &dz, &ix, &iy, &iz}) a->assign(size, 1);
     start.assign(size, 0);
     end.assign(size, -1);
+    passing.assign(size, 0);
   }
 };
 
@@ -37,15 +39,19 @@ struct RayBlock {
 /// pixels. As many as a multiple of RayBlock::kLanes.
 struct PixelBlock {
   std::vector<float> x, y;
+  std::vector<std::int32_t> passing;  ///< how many crossings to pass over
 
   explicit PixelBlock(std::size_t count)
-      : x((count + RayBlock::kLanes - 1) / RayBlock::kLanes * RayBlock::kLanes), y(x.size()) {}
+      : x((count + RayBlock::kLanes - 1) / RayBlock::kLanes * RayBlock::kLanes),
+        y(x.size()),
+        passing(x.size()) {}
   [[nodiscard]] std::size_t size() const { return x.size(); }
 };
 
 /// What they meet.
 struct HitBlock {
-  std::vector<std::int32_t> found;  ///< −1, or 0
+  static constexpr std::int32_t kGoesIn = -1, kGoesOut = -2;
+  std::vector<std::int32_t> found;  ///< kGoesIn or kGoesOut, or 0
   std::vector<float> t;
   std::vector<std::int32_t> x, y, z;  ///< cell, in the table's space
 
@@ -62,8 +68,9 @@ struct ShapeBlock {
     for (std::vector<float>& p : part) p.resize(size);
   }
   [[nodiscard]] SurfaceShape at(std::size_t i) const;
-  void take(const ShapeBlock& from, std::size_t i) {
-    for (std::size_t p = 0; p < kParts; ++p) part[p][i] = from.part[p][i];
+  /// Number i of the other becomes number `to`.
+  void take(std::size_t to, const ShapeBlock& from, std::size_t i) {
+    for (std::size_t p = 0; p < kParts; ++p) part[p][to] = from.part[p][i];
   }
 };
 

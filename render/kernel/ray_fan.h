@@ -20,6 +20,9 @@ struct RayFan {
 
   double depth = 0;         ///< of the plane, world units along the view axis
   double depthPerStep = 0;  ///< what t = 1 is, world units
+  [[nodiscard]] double depthAt(float t) const {
+    return depth + static_cast<double>(t) * depthPerStep;
+  }
 };
 
 /// @param voxelSize  world units

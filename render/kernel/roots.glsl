@@ -78,11 +78,15 @@ Bool goOn(Bool open, Bool divides, INOUT(Whole) part, INOUT(Whole) halvings, INO
   return AND(open, OR(divide, halvings > 0));
 }
 
-// Finds the first part of [0, 1] in which the cubic changes sign once.
+// Finds the first part of [0, 1] in which the cubic changes sign once, but for `passing` that it
+// passes over, and counts them off.
 // @return where there is one
-Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Real) low, INOUT(Real) high) {
+Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Whole) passing, INOUT(Real) low,
+             INOUT(Real) high) {
   Whole changes = signChanges(b0, b1, b2, b3);
-  Bool found = AND(asked, changes == 1);
+  Bool single = AND(asked, changes == 1);
+  Bool found = AND(single, passing == 0);
+  passing = passing - bit(AND(single, NOT(found)), 1);
   Bool open = AND(asked, changes > 1);
   low = real(0.0f);
   high = real(1.0f);
@@ -98,7 +102,9 @@ Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Real) low, IN
     VAR c3 = blossom(b0, b1, b2, b3, w, w, w);
     Whole count = signChanges(c0, c1, c2, c3);
     Bool deepest = halvings == kMostHalvings;
-    Bool ends = AND(open, OR(count == 1, AND(deepest, differ(c0 < 0.0f, c3 < 0.0f))));
+    Bool crosses = AND(open, OR(count == 1, AND(deepest, differ(c0 < 0.0f, c3 < 0.0f))));
+    Bool ends = AND(crosses, passing == 0);
+    passing = passing - bit(AND(crosses, NOT(ends)), 1);
     low = select(ends, u, low);
     high = select(ends, w, high);
     found = OR(found, ends);
@@ -109,8 +115,8 @@ Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Real) low, IN
 }
 
 // The parameter in [low, high] at which the cubic changes sign, once there.
-Real bisect(Real b0, Real b1, Real b2, Real b3, Real low, Real high) {
-  Bool inside = blossom(b0, b1, b2, b3, low, low, low) < 0.0f;
+// @param inside  is it negative at low?
+Real bisect(Real b0, Real b1, Real b2, Real b3, Bool inside, Real low, Real high) {
   for (int i = 0; i < kBisections; ++i) {
     VAR middle = (low + high) * 0.5f;
     Bool same = NOT(differ(blossom(b0, b1, b2, b3, middle, middle, middle) < 0.0f, inside));
@@ -135,6 +141,7 @@ Real onSide(Real value, Bool inside) {
 
 struct Crossing {
   Bool found;
-  Real share;    // of the way through the cell
+  Real share;  // of the way through the cell
+  Bool goesIn;
   Bool endsInside;
 };

@@ -93,10 +93,13 @@ Real valueAt(IN_ARRAY(Real, b, 10), Real u) {
   return c[0];
 }
 
-// As isolate(): the first part of [0, 1] in which the polynomial changes sign once.
-Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Real) low, INOUT(Real) high) {
+// As isolate().
+Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Whole) passing, INOUT(Real) low,
+                   INOUT(Real) high) {
   Whole changes = countChanges(b);
-  Bool found = AND(asked, changes == 1);
+  Bool single = AND(asked, changes == 1);
+  Bool found = AND(single, passing == 0);
+  passing = passing - bit(AND(single, NOT(found)), 1);
   Bool open = AND(asked, changes > 1);
   low = real(0.0f);
   high = real(1.0f);
@@ -112,7 +115,9 @@ Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Real) low, INOUT(Rea
     }
     Whole count = countChanges(c);
     Bool deepest = halvings == kMostHalvings;
-    Bool ends = AND(open, OR(count == 1, AND(deepest, differ(c[0] < 0.0f, c[kDegree] < 0.0f))));
+    Bool crosses = AND(open, OR(count == 1, AND(deepest, differ(c[0] < 0.0f, c[kDegree] < 0.0f))));
+    Bool ends = AND(crosses, passing == 0);
+    passing = passing - bit(AND(crosses, NOT(ends)), 1);
     VAR u = toReal(part) * size;
     VAR w = toReal(part + 1) * size;
     low = select(ends, u, low);
@@ -126,8 +131,10 @@ Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Real) low, INOUT(Rea
 
 // What a ray does between two points of a cell, given from 0 to 1 on each axis.
 // @param carried, inside  is the side known on which the cell before ended, and is it the inside
+// @param passing          how many crossings to pass over, less those that the cell holds
 Crossing splineCrossingIn(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Real x0, Real y0,
-                          Real z0, Real x1, Real y1, Real z1, Bool carried, Bool inside) {
+                          Real z0, Real x1, Real y1, Real z1, Bool carried, Bool inside,
+                          INOUT(Whole) passing) {
   Window w = windowAt(asked, cellX, cellY, cellZ);
   VAR net[64];
   for (int i = 0; i < 4; ++i) {
@@ -167,11 +174,13 @@ Crossing splineCrossingIn(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Rea
   Crossing crossing;
   Real low;
   Real high;
-  crossing.found = isolateSpline(asked, b, low, high);
+  crossing.found = isolateSpline(asked, b, passing, low, high);
   crossing.endsInside = b[kDegree] < 0.0f;
   crossing.share = real(0.0f);
+  crossing.goesIn = no();
   if (any(crossing.found)) {
     Bool startsInside = valueAt(b, low) < 0.0f;
+    crossing.goesIn = NOT(startsInside);
     for (int i = 0; i < kBisections; ++i) {
       VAR middle = (low + high) * 0.5f;
       Bool same = NOT(differ(valueAt(b, middle) < 0.0f, startsInside));

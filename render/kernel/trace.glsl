@@ -1,13 +1,14 @@
-// The first crossing of a ray with the zero set of the interpolant. In the words and the space of
+// The crossings of a ray with the zero set of the interpolant. In the words and the space of
 // roots.glsl.
 
 // What a ray does between two points of a cell, given from 0 to 1 on each axis.
 // @param brick, corner   the cell's values
 // @param entered, left   axes of the faces, or kNone
 // @param carried, inside is the side known on which the cell before ended, and is it the inside
+// @param passing         how many crossings to pass over, less those that the cell holds
 Crossing crossingIn(Bool asked, Whole brick, Whole corner, Real x0, Real y0, Real z0, Real x1,
                     Real y1, Real z1, Whole entered, Whole left, Bool aheadX, Bool aheadY,
-                    Bool aheadZ, Bool carried, Bool inside) {
+                    Bool aheadZ, Bool carried, Bool inside, INOUT(Whole) passing) {
   Whole first = select(asked, brick * kBrickValues + corner, whole(0));
   Real f0 = loadValue(first);
   Real f1 = loadValue(first + 1);
@@ -71,10 +72,15 @@ Crossing crossingIn(Bool asked, Whole brick, Whole corner, Real x0, Real y0, Rea
   Crossing crossing;
   Real low;
   Real high;
-  crossing.found = isolate(asked, b0, b1, b2, b3, low, high);
+  crossing.found = isolate(asked, b0, b1, b2, b3, passing, low, high);
   crossing.endsInside = b3 < 0.0f;
   crossing.share = real(0.0f);
-  if (any(crossing.found)) crossing.share = bisect(b0, b1, b2, b3, low, high);
+  crossing.goesIn = no();
+  if (any(crossing.found)) {
+    Bool startsInside = blossom(b0, b1, b2, b3, low, low, low) < 0.0f;
+    crossing.share = bisect(b0, b1, b2, b3, startsInside, low, high);
+    crossing.goesIn = NOT(startsInside);
+  }
   return crossing;
 }
 
@@ -124,16 +130,19 @@ Ray viewRay(Real x, Real y) {
 
 struct Hit {
   Bool found;
+  Bool goesIn;
   Real t;
   Whole x, y, z;  // cell
 };
 
-Hit trace(Ray ray) {
+// The crossing after `passing` others.
+Hit trace(Ray ray, Whole passing) {
   Bool aheadX = ray.dx >= 0.0f;
   Bool aheadY = ray.dy >= 0.0f;
   Bool aheadZ = ray.dz >= 0.0f;
   Hit hit;
   hit.found = no();
+  hit.goesIn = no();
   hit.t = ray.start;
   Bool alive = ray.start <= ray.end;
   VAR t = ray.start;
@@ -228,13 +237,14 @@ Hit trace(Ray ray) {
       VAR z1 = smaller(larger(outZ, 0.0f), 1.0f);
       Crossing crossing;
       if (isSpline)
-        crossing = splineCrossingIn(asked, x, y, z, x0, y0, z0, x1, y1, z1, carried, inside);
+        crossing = splineCrossingIn(asked, x, y, z, x0, y0, z0, x1, y1, z1, carried, inside, passing);
       else
         crossing = crossingIn(asked, brick, corner, x0, y0, z0, x1, y1, z1, entered, axis, aheadX,
-                              aheadY, aheadZ, carried, inside);
+                              aheadY, aheadZ, carried, inside, passing);
       VAR place = t + crossing.share * (tExit - t);
       Bool hits = AND(asked, AND(crossing.found, place <= ray.end));
       hit.found = OR(hit.found, hits);
+      hit.goesIn = select(hits, crossing.goesIn, hit.goesIn);
       hit.t = select(hits, place, hit.t);
       solved = OR(solved, asked);
       inside = select(asked, crossing.endsInside, inside);

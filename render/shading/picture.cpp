@@ -107,10 +107,13 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene, Filter fi
                          solid.band.contentHash());
     voxelSizes += fmt::format("{}{}", comma, solid.band.voxelSize());
   }
-  return {{"ls:filter", filterName(filter)},
-          {"ls:normal", filter == Filter::BSpline ? "bspline" : "bspline-qi"},
-          {"ls:grid", grids},
-          {"ls:voxelSize", voxelSizes}};
+  std::map<std::string, std::string> attributes = {
+      {"ls:filter", filterName(filter)},
+      {"ls:normal", filter == Filter::BSpline ? "bspline" : "bspline-qi"},
+      {"ls:grid", grids},
+      {"ls:voxelSize", voxelSizes}};
+  if (!scene.csg.isEmpty()) attributes["ls:csg"] = scene.csg.text();
+  return attributes;
 }
 
 void addViewAttributes(Image& image, const Scene& scene, double extent) {

@@ -23,6 +23,10 @@ void addNormals(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToW
   indexToWorld.multDirMatrix(shape.gradient, smooth);
   hit.facetNormal = unitOr(facet, unitOr(smooth, -direction));
   hit.normal = unitOr(smooth, hit.facetNormal);
+  if (hit.isTurned) {
+    hit.facetNormal = -hit.facetNormal;
+    hit.normal = -hit.normal;
+  }
   hit.surfaceError = shape.interpolationError;
 }
 
@@ -47,6 +51,10 @@ CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
   const double gauss = gAg / (squared * squared) / (voxelSize * voxelSize);
   const double spread = std::sqrt(std::max(0.0, mean * mean - gauss));
   return {mean, gauss, mean + spread, mean - spread};
+}
+
+CurvatureSample turned(const CurvatureSample& sample) {
+  return {-sample.mean, sample.gauss, -sample.k2, -sample.k1};
 }
 
 }  // namespace render

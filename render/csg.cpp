@@ -1,0 +1,129 @@
+#include "render/csg.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <utility>
+
+#include "levelset/error.h"
+
+namespace render {
+namespace {
+
+constexpr std::size_t kMostPending = 64;  // bits of holds()' stack
+
+}  // namespace
+
+/// By recursive descent; leaves the steps in postfix order.
+class CsgParser {
+ public:
+  CsgParser(const std::string& text, const std::vector<std::string>& names, std::vector<int>& steps)
+      : text_(text), names_(names), steps_(steps) {}
+
+  void parse() {
+    chain(0);
+    skipBlanks();
+    if (at_ < text_.size()) refuse(fmt::format("'{}' does not belong there", text_[at_]));
+  }
+
+ private:
+  /// Operands of the operator of that level, looser ones first, and what joins them.
+  void chain(std::size_t level) {
+    static constexpr std::pair<char, CsgExpression::Step> kOperators[] = {
+        {'|', CsgExpression::kUnion},
+        {'&', CsgExpression::kIntersection},
+        {'-', CsgExpression::kDifference}};
+    if (level == std::size(kOperators)) return operand();
+    chain(level + 1);
+    while (take(kOperators[level].first)) {
+      chain(level + 1);
+      steps_.push_back(kOperators[level].second);
+      --pending_;
+    }
+  }
+
+  void operand() {
+    if (take('(')) {
+      if (++depth_ > kMostPending) refuse("its parentheses are nested too deeply");
+      chain(0);
+      --depth_;
+      if (!take(')')) refuse("a ')' is missing");
+      return;
+    }
+    skipBlanks();
+    const std::size_t first = at_;
+    while (at_ < text_.size() &&
+           (std::isalnum(static_cast<unsigned char>(text_[at_])) || text_[at_] == '_'))
+      ++at_;
+    const std::string name = text_.substr(first, at_ - first);
+    if (name.empty()) refuse("a name is missing");
+    const auto found = std::find(names_.begin(), names_.end(), name);
+    if (found == names_.end()) refuse(fmt::format("no solid is called '{}'", name));
+    if (++pending_ > kMostPending) refuse("it is nested too deeply");
+    steps_.push_back(static_cast<int>(found - names_.begin()));
+  }
+
+  void skipBlanks() {
+    while (at_ < text_.size() && std::isspace(static_cast<unsigned char>(text_[at_]))) ++at_;
+  }
+  bool take(char wanted) {
+    skipBlanks();
+    if (at_ >= text_.size() || text_[at_] != wanted) return false;
+    ++at_;
+    return true;
+  }
+  [[noreturn]] void refuse(const std::string& why) const {
+    std::string all;
+    for (const std::string& name : names_) all += (all.empty() ? "" : ", ") + name;
+    throw levelset::UsageError(
+        fmt::format("scene: the expression '{}' cannot be read at place {}: {}; write as in "
+                    "'(a | b) - c', with the names {}",
+                    text_, at_ + 1, why, all));
+  }
+
+  const std::string& text_;
+  const std::vector<std::string>& names_;
+  std::vector<int>& steps_;
+  std::size_t at_ = 0, depth_ = 0, pending_ = 0;
+};
+
+CsgExpression::CsgExpression(const std::string& text, const std::vector<std::string>& names)
+    : text_(text) {
+  CsgParser(text_, names, steps_).parse();
+}
+
+bool CsgExpression::holds(const char* inside) const {
+  std::uint64_t stack = 0;  // the newest is the lowest bit
+  for (const int step : steps_) {
+    if (step >= 0) {
+      stack = stack << 1 | (inside[step] != 0);
+      continue;
+    }
+    if (step == kNothing) {
+      stack <<= 1;
+      continue;
+    }
+    const bool b = stack & 1, a = stack >> 1 & 1;
+    const bool both = step == kUnion ? a || b : step == kIntersection ? a && b : a && !b;
+    stack = stack >> 2 << 1 | both;
+  }
+  return stack & 1;
+}
+
+CsgExpression CsgExpression::renumbered(const std::vector<int>& numbers) const {
+  CsgExpression result = *this;
+  for (int& step : result.steps_) {
+    if (step < 0) continue;
+    step = numbers[static_cast<std::size_t>(step)];
+    if (step < 0) step = kNothing;
+  }
+  return result;
+}
+
+bool CsgExpression::uses(std::size_t solid) const {
+  return std::find(steps_.begin(), steps_.end(), static_cast<int>(solid)) != steps_.end();
+}
+
+}  // namespace render

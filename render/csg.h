@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace render {
+
+/// A solid made of others, point by point: `a | b` what is in either, `a & b` in both, `a - b` in a
+/// alone, with parentheses. As in Python `-` binds closest, then `&`, then `|`.
+class CsgExpression {
+ public:
+  CsgExpression() = default;
+  /// @param names  of the solids, in their order: letters, digits and _, no digit first
+  /// @throws levelset::UsageError for a text that is no such expression or names none of them
+  CsgExpression(const std::string& text, const std::vector<std::string>& names);
+
+  [[nodiscard]] bool isEmpty() const { return steps_.empty(); }
+  [[nodiscard]] const std::string& text() const { return text_; }
+  /// @param inside  by solid: not 0 where it holds the point
+  [[nodiscard]] bool holds(const char* inside) const;
+  [[nodiscard]] bool uses(std::size_t solid) const;
+  /// The same of solids by other numbers. @param numbers  by solid; negative: it holds nothing
+  [[nodiscard]] CsgExpression renumbered(const std::vector<int>& numbers) const;
+
+ private:
+  friend class CsgParser;
+  enum Step : int { kUnion = -1, kIntersection = -2, kDifference = -3, kNothing = -4 };
+  std::vector<int> steps_;  // a solid's number to be pushed, or a Step
+  std::string text_;
+};
+
+}  // namespace render

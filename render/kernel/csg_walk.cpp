@@ -1,0 +1,87 @@
+#include "render/kernel/csg_walk.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+namespace render {
+namespace {
+
+constexpr double kNowhere = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+CsgWalk::CsgWalk(const CsgExpression& csg, std::size_t solids, std::vector<double> reach)
+    : csg_(csg), solids_(solids), reach_(std::move(reach)) {
+  const std::size_t rays = reach_.size();
+  place_.assign(rays * solids_, kNowhere);
+  passed_.assign(rays * solids_, 0);
+  inside_.assign(rays * solids_, 0);
+  asked_.assign(rays * solids_, 0);
+  met_.assign(rays, -1);
+  turned_.assign(rays, 0);
+  for (std::size_t i = 0; i < asked_.size(); ++i) asked_[i] = csg_.uses(i % solids_) ? 1 : 0;
+}
+
+std::vector<CsgWalk::Question> CsgWalk::questionsAbout(std::size_t solid) const {
+  std::vector<Question> questions;
+  for (std::size_t ray = 0; ray < reach_.size(); ++ray) {
+    const std::size_t i = ray * solids_ + solid;
+    if (asked_[i]) questions.push_back({ray, passed_[i]});
+  }
+  return questions;
+}
+
+void CsgWalk::answer(std::size_t solid, const Question& question, double place, bool goesIn) {
+  const std::size_t i = question.ray * solids_ + solid;
+  place_[i] = place;
+  inside_[i] = goesIn ? 0 : 1;
+  asked_[i] = 0;
+}
+
+void CsgWalk::answerNone(std::size_t solid, const Question& question) {
+  const std::size_t i = question.ray * solids_ + solid;
+  place_[i] = kNowhere;
+  asked_[i] = 0;
+}
+
+bool CsgWalk::advance() {
+  bool asks = false;
+  for (std::size_t ray = 0; ray < reach_.size(); ++ray) asks = advance(ray) || asks;
+  return asks;
+}
+
+// @return does the ray ask for anything?
+bool CsgWalk::advance(std::size_t ray) {
+  const auto row = [&](auto& all) {
+    return all.begin() + static_cast<std::ptrdiff_t>(ray * solids_);
+  };
+  const auto last = static_cast<std::ptrdiff_t>(solids_);
+  if (std::any_of(row(asked_), row(asked_) + last, [](char a) { return a != 0; })) return true;
+  const double place = *std::min_element(row(place_), row(place_) + last);
+  if (met_[ray] >= 0 || place == kNowhere || place > reach_[ray]) return false;
+  cross(ray, place);
+  return met_[ray] < 0;
+}
+
+// All surfaces at that place, which is the ray's next.
+void CsgWalk::cross(std::size_t ray, double place) {
+  char* inside = inside_.data() + ray * solids_;
+  const bool before = csg_.holds(inside);
+  std::size_t first = solids_;
+  for (std::size_t s = solids_; s-- > 0;) {
+    const std::size_t i = ray * solids_ + s;
+    if (place_[i] != place) continue;
+    inside[s] = inside[s] ? 0 : 1;
+    ++passed_[i];
+    asked_[i] = 1;
+    first = s;
+  }
+  const bool after = csg_.holds(inside);
+  if (before == after) return;
+  met_[ray] = static_cast<std::int32_t>(first);
+  turned_[ray] = (inside[first] != 0) != after ? 1 : 0;
+  for (std::size_t s = 0; s < solids_; ++s) asked_[ray * solids_ + s] = 0;
+}
+
+}  // namespace render
