@@ -60,7 +60,10 @@ class CsgParser {
     const std::string name = text_.substr(first, at_ - first);
     if (name.empty()) refuse("a name is missing");
     const auto found = std::find(names_.begin(), names_.end(), name);
-    if (found == names_.end()) refuse(fmt::format("no solid is called '{}'", name));
+    if (found == names_.end()) {
+      at_ = first;
+      refuse(fmt::format("no solid is called '{}'", name));
+    }
     if (++pending_ > kMostPending) refuse("it is nested too deeply");
     steps_.push_back(static_cast<int>(found - names_.begin()));
   }

@@ -248,6 +248,7 @@ class KindChecker {
     if (found == Kind::Surface)
       remedy = "; it has no inside, and is the base of patches and of 'texture --alone' only";
     if (found == Kind::Patch) remedy = "; 'texture' makes a level set with it";
+    if (found == Kind::Scene) remedy = "; 'render' draws it, 'write' saves it as .json";
     std::string kinds;
     for (std::size_t i = 0; i < allowed.size(); ++i)
       kinds += fmt::format("{}a {}",

@@ -53,6 +53,8 @@ class Invocation {
 
   // Operands, oldest first.
   std::vector<Value> operands;
+  /// What --as called them; empty where nobody did. As many, when it runs.
+  std::vector<std::string> operandNames;
   [[nodiscard]] const levelset::NarrowBand& band(std::size_t index = 0) const {
     return operands.at(index).band();
   }

@@ -165,6 +165,7 @@ const std::vector<Operator>& operators() {
     addGeneratorOperators(list);
     addFoldOperators(list);
     addInspectionOperators(list);
+    addSceneOperators(list);
     addPictureOperators(list);
     addRegressionOperators(list);
     return list;

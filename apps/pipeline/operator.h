@@ -115,6 +115,7 @@ void addAnimationOperators(std::vector<Operator>& all);
 void addGeneratorOperators(std::vector<Operator>& all);
 void addFoldOperators(std::vector<Operator>& all);
 void addInspectionOperators(std::vector<Operator>& all);
+void addSceneOperators(std::vector<Operator>& all);
 void addPictureOperators(std::vector<Operator>& all);
 void addRegressionOperators(std::vector<Operator>& all);
 

@@ -27,7 +27,8 @@ struct Slot {
 
 class Stack {
  public:
-  std::vector<Value> take(const Action& action) {
+  /// @param names  become what --as called the operands
+  std::vector<Value> take(const Action& action, std::vector<std::string>& names) {
     const Operator& op = *action.op;
     std::vector<Value> operands;
     const std::size_t named = action.operandNames.size();
@@ -37,11 +38,15 @@ class Stack {
       for (std::size_t i = slots_.size() - missing; i < slots_.size(); ++i) {
         markUsed(slots_[i]);
         operands.push_back(slots_[i].value);
+        names.push_back(slots_[i].name);
       }
       if (op.flow == Flow::Makes)
         slots_.resize(slots_.size() - missing, Slot{Value(Plan{}), {}, {}});
     }
-    for (const std::string& name : action.operandNames) operands.push_back(get(name));
+    for (const std::string& name : action.operandNames) {
+      operands.push_back(get(name));
+      names.push_back(name);
+    }
     return operands;
   }
 
@@ -180,7 +185,7 @@ void runAction(const Action& action, std::size_t index, const RunSettings& setti
   const Operator& op = *action.op;
   Invocation invocation(op, action.options);
   if (settings.begin) settings.begin(op.name);
-  invocation.operands = stack.take(action);
+  invocation.operands = stack.take(action, invocation.operandNames);
   for (const auto& [option, name] : action.named) invocation.named.emplace(option, stack.get(name));
   invocation.maxMemory = settings.maxMemory;
   invocation.dryRun = settings.dryRun;

@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "levelset/error.h"
 
 namespace pipeline {
@@ -21,6 +23,8 @@ const char* kindName(Kind kind) {
       return "field";
     case Kind::Surface:
       return "surface band";
+    case Kind::Scene:
+      return "scene";
   }
   return "";
 }
@@ -40,6 +44,8 @@ Value::Value(TriMesh mesh) : data_(std::make_shared<const TriMesh>(std::move(mes
 Value::Value(NarrowBand band) : data_(std::move(band)) {}
 Value::Value(PatchValue patch) : data_(std::make_shared<const PatchValue>(std::move(patch))) {}
 Value::Value(levelset::FieldGrid field) : data_(std::move(field)) {}
+Value::Value(render::ViewedScene scene)
+    : data_(std::make_shared<const render::ViewedScene>(std::move(scene))) {}
 Value::Value(Plan plan) : plan_(plan) {}
 
 Kind Value::kind() const {
@@ -52,6 +58,8 @@ Kind Value::kind() const {
       return Kind::Patch;
     case 4:
       return Kind::Field;
+    case 5:
+      return Kind::Scene;
     default:
       return plan_->kind;
   }
@@ -77,6 +85,10 @@ const PatchValue& Value::patch() const {
 }
 const levelset::FieldGrid& Value::field() const {
   return as<levelset::FieldGrid>(Kind::Field);
+}
+
+const render::ViewedScene& Value::scene() const {
+  return *as<std::shared_ptr<const render::ViewedScene>>(Kind::Scene);
 }
 
 const Plan& Value::plan() const {
@@ -105,6 +117,16 @@ const Plan& Value::plan() const {
       plan.bounds = field().bounds();
       plan.voxelSize = field().voxelSize();
       plan.fieldBytes = static_cast<double>(field().memoryUse());
+      break;
+    case Kind::Scene:
+      for (const render::Solid& solid : scene().scene.solids) {
+        plan.bounds.extendBy(solid.band.zeroSetBounds());
+        const double h = solid.band.voxelSize();
+        plan.voxelSize = plan.voxelSize > 0 ? std::min(plan.voxelSize, h) : h;
+        plan.halfWidth = solid.band.halfWidth();
+        plan.area +=
+            static_cast<double>(solid.band.activeVoxelCount()) * h * h / (2 * plan.halfWidth);
+      }
       break;
   }
   plan_ = plan;

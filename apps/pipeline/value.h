@@ -15,6 +15,7 @@
 #include "levelset/narrow_band.h"
 #include "mapping/animation/animation.h"
 #include "mapping/patches/patch.h"
+#include "render/scene_file.h"
 
 namespace pipeline {
 
@@ -23,7 +24,8 @@ enum class Kind {
   Band,
   Patch,
   Field,
-  Surface  ///< a band about an open surface: a base for patches
+  Surface,  ///< a band about an open surface: a base for patches
+  Scene
 };
 [[nodiscard]] const char* kindName(Kind kind);
 
@@ -77,6 +79,7 @@ class Value {
   explicit Value(levelset::NarrowBand band);
   explicit Value(PatchValue patch);
   explicit Value(levelset::FieldGrid field);
+  explicit Value(render::ViewedScene scene);
   explicit Value(Plan plan);
 
   [[nodiscard]] Kind kind() const;
@@ -86,6 +89,7 @@ class Value {
   [[nodiscard]] const levelset::NarrowBand& band() const;
   [[nodiscard]] const PatchValue& patch() const;
   [[nodiscard]] const levelset::FieldGrid& field() const;
+  [[nodiscard]] const render::ViewedScene& scene() const;
 
   /// Known, or read off the value and remembered.
   [[nodiscard]] const Plan& plan() const;
@@ -98,7 +102,8 @@ class Value {
   [[nodiscard]] const T& as(Kind wanted) const;
 
   std::variant<std::monostate, std::shared_ptr<const levelset::TriMesh>, levelset::NarrowBand,
-               std::shared_ptr<const PatchValue>, levelset::FieldGrid>
+               std::shared_ptr<const PatchValue>, levelset::FieldGrid,
+               std::shared_ptr<const render::ViewedScene>>
       data_;
   mutable std::optional<Plan> plan_;
 };

@@ -24,8 +24,9 @@ Kind fileKind(const Invocation& in) {
   if (levelset::isMeshFormat(name)) return Kind::Mesh;
   if (levelset::isBandFormat(name)) return Kind::Band;
   if (mapping::isPatchFormat(name)) return Kind::Patch;
+  if (render::isSceneFormat(name)) return Kind::Scene;
   throw UsageError(fmt::format(
-      "{}: '{}' is of no known format; use ply, obj, stl or off (also .gz), vdb{} or patch",
+      "{}: '{}' is of no known format; use ply, obj, stl or off (also .gz), vdb{}, patch or json",
       in.op().name, name, in.op().name == "write" ? ", nvdb" : ""));
 }
 
@@ -45,6 +46,14 @@ Value read(Invocation& in) {
   const std::filesystem::path file = in.text("file");
   if (fileKind(in) == Kind::Patch)
     return Value(PatchValue{.patches = mapping::readPatches(file, in.maxMemory)});
+  if (fileKind(in) == Kind::Scene) {
+    const auto warn = [&](const levelset::BandRepairs& repairs, const auto& source) {
+      for (const std::string& told : sentencesOf(repairs, source))
+        in.notes.warnings.push_back(told);
+    };
+    return Value(render::readScene(
+        file, {.maxMemory = in.maxMemory, .repairs = warn, .progress = in.progress}));
+  }
   if (fileKind(in) == Kind::Mesh) {
     std::vector<std::string> leftAside;
     Value mesh(levelset::readMesh(file, {.format = in.text("format"),
@@ -105,6 +114,9 @@ void validateRead(const Invocation& in) {
   if (kind != Kind::Band && in.given("grid"))
     throw UsageError(fmt::format(
         "read: --grid picks a grid of a .vdb, and this is a {}; leave it out", kindName(kind)));
+  if (kind == Kind::Scene && isStandardStream(in))
+    throw UsageError(
+        "read: a scene names other files by their place beside its own; give a file, not -");
 }
 
 void validateWrite(const Invocation& in) {
@@ -115,11 +127,14 @@ void validateWrite(const Invocation& in) {
                     held == Kind::Band    ? "put 'mesh' before it, or write .vdb"
                     : held == Kind::Field ? "write .vdb"
                     : held == Kind::Patch ? "write .patch, or put 'mesh' before it"
+                    : held == Kind::Scene ? "write .json"
                                           : "put 'level-set' before it, or write .ply"));
   }
-  if ((kind == Kind::Mesh || kind == Kind::Patch) && in.given("name"))
+  if ((kind == Kind::Mesh || kind == Kind::Patch || kind == Kind::Scene) && in.given("name"))
     throw UsageError(fmt::format("write: --name is that of a grid, and this is a {}; leave it out",
                                  kindName(kind)));
+  if (kind == Kind::Scene && levelset::isStandardOutput(in.text("file")))
+    throw UsageError("write: a scene has its level sets in files beside its own; give a file");
 }
 
 Value write(Invocation& in) {
@@ -129,6 +144,8 @@ Value write(Invocation& in) {
     if (value.patch().atHeight)
       throw UsageError("write: the texture is to tell this patch's height; give --height a length");
     mapping::writePatches(file, value.patch().patches);
+  } else if (value.kind() == Kind::Scene) {
+    render::writeScene(file, value.scene(), in.progress);
   } else if (value.kind() == Kind::Field) {
     levelset::writeField(file, value.field(),
                          {.name = in.given("name") ? in.text("name") : value.field().name(),
@@ -157,8 +174,8 @@ void addFileOperators(std::vector<Operator>& all) {
   all.push_back({
       .name = "read",
       .group = "Files",
-      .summary =
-          "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), patches (patch)",
+      .summary = "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), patches "
+                 "(patch), a scene (json)",
       .details =
           "A .vdb with more than one level set needs --grid. A grid that is no level set "
           "must be named too; it becomes a field: of numbers, or of vectors, staggered ones "
@@ -173,7 +190,7 @@ void addFileOperators(std::vector<Operator>& all) {
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
-                  .doc = "ply, obj, stl, off, vdb, patch; default: by extension"},
+                  .doc = "ply, obj, stl, off, vdb, patch, json; default: by extension"},
                  {.name = "grid", .type = ParamType::Text, .doc = "name of the grid in a .vdb"},
                  {.name = "bare",
                   .type = ParamType::Flag,
@@ -189,9 +206,10 @@ void addFileOperators(std::vector<Operator>& all) {
       .name = "write",
       .group = "Files",
       .summary = "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), "
-                 "patches (patch)",
+                 "patches (patch), a scene (json)",
       .details = "The file is written beside its target and renamed when whole; what was there "
                  "stays until then. "
+                 "A scene's level sets go to .vdb files beside it, named after it and them. "
                  "The value stays on the stack.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! write sphere.ply",
       .params = {{.name = "file",
@@ -201,12 +219,12 @@ void addFileOperators(std::vector<Operator>& all) {
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
-                  .doc = "ply, obj, stl, off, vdb, nvdb, patch; default: by extension"},
+                  .doc = "ply, obj, stl, off, vdb, nvdb, patch, json; default: by extension"},
                  {.name = "name",
                   .type = ParamType::Text,
                   .doc = "of the grid in a .vdb or .nvdb; a field keeps its own",
                   .fallback = "surface"}},
-      .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch}},
+      .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene}},
       .flow = Flow::PassesThrough,
       .run = write,
       .validate = validateWrite,

@@ -200,6 +200,15 @@ Json valueInfo(const Value& value) {
     json["active_voxels"] = field.activeVoxelCount();
     json["bytes"] = field.memoryUse();
     json["hash"] = fmt::format("{:016x}", field.contentHash());
+  } else if (value.kind() == Kind::Scene) {
+    const render::Scene& scene = value.scene().scene;
+    json["solids"] = Json::array();
+    for (const render::Solid& solid : scene.solids)
+      json["solids"].push_back({{"name", solid.name},
+                                {"id", solid.id},
+                                {"voxel_size", solid.band.voxelSize()},
+                                {"active_voxels", solid.band.activeVoxelCount()}});
+    if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
   } else {
     const std::vector<mapping::Patch>& patches = value.patch().patches;
     std::size_t particles = 0;
@@ -303,7 +312,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
                   .type = ParamType::Text,
                   .doc = "of the file; default: by extension"},
                  jsonParam()},
-      .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface, Kind::Scene}},
       .operandsOptional = true,
       .flow = Flow::PassesThrough,
       .run = info,

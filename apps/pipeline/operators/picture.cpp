@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "apps/pipeline/invocation.h"
+#include "apps/pipeline/operators/camera_options.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
@@ -20,33 +21,23 @@ namespace {
 
 using levelset::UsageError;
 
-render::Camera cameraOf(Invocation& in) {
-  const auto [width, height] = in.imageSize("size");
-  const double fov = in.radians("fov");
-  render::Camera camera;
-  if (in.given("from")) {
-    camera.from = in.point("from");
-    camera.to = in.given("to") ? in.point("to") : in.operands[0].plan().bounds.center();
-    camera.width = width;
-    camera.height = height;
-    camera.verticalFov = fov;
-    camera.up = in.point("up");
-  } else {
-    camera =
-        render::framingCamera(in.operands[0].plan().bounds, width, height, fov, in.point("up"));
-  }
-  if (in.given("ortho")) camera.orthoHeight = in.length("ortho");
-  render::validate(camera);
-  return camera;
+/// What the operand is of a scene, seen as the options ask.
+render::Scene sceneOf(Invocation& in) {
+  const Value& drawn = in.operands[0];
+  render::ViewedScene viewed;
+  if (drawn.kind() == Kind::Scene)
+    viewed = drawn.scene();
+  else
+    viewed.scene.solids.push_back({.band = drawn.band()});
+  viewed.scene.camera =
+      cameraOf(in, drawn.plan().bounds, viewed.hasCamera ? &viewed.scene.camera : nullptr);
+  return viewed.scene;
 }
 
 constexpr long kMostSamples = 4096;
 
 void validateDraw(const Invocation& in) {
-  if (in.given("to") && !in.given("from")) throw UsageError("render: --to needs --from beside it");
-  if (!(in.radians("fov") < 3.1))
-    throw UsageError(
-        fmt::format("render: --fov {} degrees is too wide; it must be below 177", in.text("fov")));
+  validateCamera(in);
   if (in.integer("samples") > kMostSamples)
     throw UsageError(fmt::format("render: --samples {} is too many; {} are the most",
                                  in.text("samples"), kMostSamples));
@@ -127,9 +118,7 @@ render::Filter filterOf(const Invocation& in) {
 }
 
 Value draw(Invocation& in) {
-  render::Scene scene;
-  scene.camera = cameraOf(in);
-  scene.solids.push_back({.band = in.band()});
+  const render::Scene scene = sceneOf(in);
   const std::string renderer = in.text("renderer");
   const bool isBoth = renderer == "both";
   render::RenderOptions options{.samples = static_cast<int>(in.integer("samples")),
@@ -166,7 +155,7 @@ Value draw(Invocation& in) {
 }
 
 Plan planDraw(Invocation& in) {
-  (void)cameraOf(in);
+  (void)cameraOf(in, in.operands[0].plan().bounds);
   return in.operands[0].plan();
 }
 
@@ -296,20 +285,23 @@ Operator compareImagesOperator() {
 }  // namespace
 
 void addPictureOperators(std::vector<Operator>& all) {
-  all.push_back({
+  Operator picture = {
       .name = "render",
       .group = "Pictures",
-      .summary = "draw a level set to an EXR with all layers, or a PNG",
-      .details = "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y "
-                 "N.Z, P.X P.Y P.Z, "
-                 "curvature.mean .gauss .k1 .k2, id. Without --from, a three-quarter view that "
-                 "frames the solid. 'gpu' and 'cpu' are one kernel in single precision, with the "
-                 "same bits; 'embree' finds places by code of its own in double precision. 'both' "
-                 "draws with the kernel, writes that, compares the layers with those of embree, "
-                 "and ends with exit code 5 where they differ by more than two correct renderers "
-                 "may.",
-      .example = "levelsmith torus --radius 2 --tube 0.8 --voxel 0.05 ! render torus.png --size "
-                 "320x240 --from 5,4,6 --to 0,0,0",
+      .summary = "draw a level set or a scene to an EXR with all layers, or a PNG",
+      .details =
+          "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y "
+          "N.Z, P.X P.Y P.Z, "
+          "curvature.mean .gauss .k1 .k2, id. Without --from, a three-quarter view that "
+          "frames the solid, or the scene's own. 'gpu' and 'cpu' are one kernel in single "
+          "precision, with the "
+          "same bits; 'embree' finds places by code of its own in double precision. 'both' "
+          "draws with the kernel, writes that, compares the layers with those of embree, "
+          "and ends with exit code 5 where they differ by more than two correct renderers "
+          "may.",
+      .example =
+          "levelsmith torus --radius 2 --tube 0.8 --voxel 0.05 ! render torus.png --size "
+          "320x240 --from 5,4,6 --to 0,0,0",
       .params =
           {{.name = "file",
             .type = ParamType::Path,
@@ -328,28 +320,13 @@ void addPictureOperators(std::vector<Operator>& all) {
                    "B-spline, which shrinks, or the one with corrected coefficients",
             .fallback = "trilinear",
             .choices = {"trilinear", "bspline", "bspline-qi"}},
-           {.name = "size", .type = ParamType::ImageSize, .doc = "pixels", .fallback = "1024x768"},
-           {.name = "from", .type = ParamType::Point, .doc = "where the eye is"},
-           {.name = "to",
-            .type = ParamType::Point,
-            .doc = "where it looks; default: the middle of the solid"},
-           {.name = "up", .type = ParamType::Point, .doc = "what is up", .fallback = "0,1,0"},
-           {.name = "fov",
-            .type = ParamType::Degrees,
-            .doc = "vertical field of view",
-            .fallback = "35",
-            .range = Range::Positive},
-           {.name = "ortho",
-            .type = ParamType::Length,
-            .doc = "orthographic; height of the view",
-            .range = Range::Positive},
            {.name = "samples",
             .type = ParamType::Integer,
             .doc = "of colour per pixel",
             .fallback = "4",
             .range = Range::Positive},
            {.name = "format", .type = ParamType::Text, .doc = "exr or png; default: by extension"}},
-      .operands = {{Kind::Band}},
+      .operands = {{Kind::Band, Kind::Scene}},
       .flow = Flow::PassesThrough,
       .run = draw,
       .plan = planDraw,
@@ -360,7 +337,9 @@ void addPictureOperators(std::vector<Operator>& all) {
             return levelset::isStandardOutput(in.text("file")) ||
                    (in.given("png") && levelset::isStandardOutput(in.text("png")));
           },
-  });
+  };
+  addCameraParams(picture.params);
+  all.push_back(std::move(picture));
   all.push_back(compareImagesOperator());
 }
 

@@ -1,0 +1,137 @@
+#include "render/scene_file.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "apps/pipeline/invocation.h"
+#include "apps/pipeline/operators/camera_options.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::UsageError;
+
+std::vector<std::string> wordsOf(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;) words.push_back(word);
+  return words;
+}
+
+/// By --names, else what --as called them, else solid1, solid2, …
+std::vector<std::string> solidNames(const Invocation& in) {
+  std::vector<std::string> names;
+  if (in.given("names")) {
+    names = wordsOf(in.text("names"));
+    if (names.size() != in.operands.size())
+      throw UsageError(fmt::format("scene: {} names for {} solids; give as many", names.size(),
+                                   in.operands.size()));
+  } else {
+    names = in.operandNames;
+    names.resize(in.operands.size());
+    for (std::size_t i = 0; i < names.size(); ++i)
+      if (names[i].empty()) names[i] = fmt::format("solid{}", i + 1);
+  }
+  render::requireSolidNames(names);
+  return names;
+}
+
+/// One for each solid, or as many as there are by turns.
+std::vector<Imath::C3f> solidColours(const Invocation& in) {
+  std::vector<Imath::C3f> colours;
+  if (in.given("colours")) {
+    for (const Imath::V3d& colour : in.points("colours")) {
+      for (int c = 0; c < 3; ++c)
+        if (!(colour[c] >= 0 && colour[c] <= 1))
+          throw UsageError(
+              fmt::format("scene: --colours {},{},{} is no colour; give red, green and blue from "
+                          "0 to 1",
+                          colour.x, colour.y, colour.z));
+      colours.emplace_back(colour);
+    }
+  } else {
+    colours = {{0.66f, 0.62f, 0.56f}, {0.35f, 0.50f, 0.66f}, {0.70f, 0.42f, 0.32f},
+               {0.42f, 0.58f, 0.40f}, {0.62f, 0.52f, 0.68f}, {0.72f, 0.62f, 0.32f}};
+  }
+  return colours;
+}
+
+Value makeScene(Invocation& in) {
+  const std::vector<std::string> names = solidNames(in);
+  const std::vector<Imath::C3f> colours = solidColours(in);
+  if (in.given("colours") && colours.size() != in.operands.size())
+    throw UsageError(fmt::format("scene: {} colours for {} solids; give as many", colours.size(),
+                                 in.operands.size()));
+  render::ViewedScene viewed;
+  Imath::Box3d bounds;
+  for (std::size_t i = 0; i < in.operands.size(); ++i) {
+    viewed.scene.solids.push_back({.band = in.band(i),
+                                   .colour = colours[i % colours.size()],
+                                   .id = static_cast<std::uint32_t>(i + 1),
+                                   .name = names[i]});
+    bounds.extendBy(in.operands[i].plan().bounds);
+  }
+  if (in.given("csg")) viewed.scene.csg = render::CsgExpression(in.text("csg"), names);
+  for (std::size_t i = 0; i < names.size() && in.given("csg"); ++i)
+    if (!viewed.scene.csg.uses(i))
+      in.notes.warnings.push_back(
+          fmt::format("scene: --csg does not name '{}', which is not drawn", names[i]));
+  viewed.hasCamera = givesCamera(in);
+  if (viewed.hasCamera) viewed.scene.camera = cameraOf(in, bounds);
+  return Value(std::move(viewed));
+}
+
+Plan planScene(Invocation& in) {
+  Plan plan{.kind = Kind::Scene};
+  for (const Value& operand : in.operands) {
+    const Plan& one = operand.plan();
+    plan.bounds.extendBy(one.bounds);
+    plan.area += one.area;
+    plan.halfWidth = std::max(plan.halfWidth, one.halfWidth);
+    plan.voxelSize = plan.voxelSize > 0 ? std::min(plan.voxelSize, one.voxelSize) : one.voxelSize;
+  }
+  return plan;
+}
+
+}  // namespace
+
+void addSceneOperators(std::vector<Operator>& all) {
+  Operator scene = {
+      .name = "scene",
+      .group = "Pictures",
+      .summary = "level sets to be drawn together, or what an expression makes of them",
+      .details =
+          "With --csg the rays of 'render' cut the solids as they go: a | b is what is in either, "
+          "a & b in both, a - b in a alone. Nothing is resampled, each keeps its voxels. The names "
+          "are those of --as. Surfaces of one and the same place on different grids are told apart "
+          "by rounding only: let what is taken away stick out. 'write scene.json' saves it, with "
+          "the level sets in files beside it.",
+      .example =
+          "levelsmith box --size 2,2,2 --voxel 0.05 --as b ! sphere --radius 1.3 --voxel "
+          "0.03 --as s ! scene @b @s --csg 'b - s' ! render cut.png --size 320x240",
+      .params = {{.name = "csg",
+                  .type = ParamType::Text,
+                  .doc = "what is drawn, as '(a | b) - c'; default: each of them"},
+                 {.name = "names",
+                  .type = ParamType::Text,
+                  .doc = "of the solids, blanks between them; default: those of --as"},
+                 {.name = "colours",
+                  .type = ParamType::Points,
+                  .doc = "of the solids: red,green,blue from 0 to 1, blanks between them"}},
+      .operands = {{Kind::Band}},
+      .takesMore = true,
+      .resultKind = [](const Invocation&) { return Kind::Scene; },
+      .run = makeScene,
+      .plan = planScene,
+      .validate = validateCamera,
+  };
+  addCameraParams(scene.params);
+  all.push_back(std::move(scene));
+}
+
+}  // namespace pipeline

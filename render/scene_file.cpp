@@ -1,0 +1,315 @@
+#include "render/scene_file.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <set>
+
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+#include "levelset/files/band_file.h"
+#include "levelset/solids/transform.h"
+
+namespace render {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFormat = "levelsmith scene";
+constexpr int kVersion = 1;
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kMostBytes = 1 << 24;  // of a file that only names others
+
+Json toJson(const V3d& v) {
+  return {v.x, v.y, v.z};
+}
+
+/// With as many digits as its floats tell apart.
+Json colourJson(const Imath::C3f& colour) {
+  const auto digits = [](float c) { return std::round(static_cast<double>(c) * 1e7) / 1e7; };
+  return {digits(colour.x), digits(colour.y), digits(colour.z)};
+}
+
+Json toJson(const Camera& camera) {
+  Json json = {{"from", toJson(camera.from)}, {"to", toJson(camera.to)}, {"up", toJson(camera.up)}};
+  if (camera.orthoHeight)
+    json["ortho"] = *camera.orthoHeight;
+  else
+    json["fov"] = camera.verticalFov / kDegree;
+  json["size"] = {camera.width, camera.height};
+  return json;
+}
+
+std::vector<std::string> namesOf(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const Solid& solid : scene.solids) names.push_back(solid.name);
+  return names;
+}
+
+/// Reads a document, knowing what it is for what it says when something is wrong.
+class Reader {
+ public:
+  explicit Reader(const std::filesystem::path& file) : file_(file.string()) {}
+
+  [[noreturn]] void refuse(const std::string& where, const std::string& what) const {
+    throw InvalidInput(fmt::format(
+        "read: {}: {} {}; docs/rendering.md tells how a scene is written", file_, where, what));
+  }
+
+  [[nodiscard]] const Json& member(const Json& json, const char* name,
+                                   const std::string& where) const {
+    if (!json.is_object() || !json.contains(name))
+      refuse(where, fmt::format("has no \"{}\"", name));
+    return json.at(name);
+  }
+
+  [[nodiscard]] std::string text(const Json& json, const char* name,
+                                 const std::string& where) const {
+    const Json& value = member(json, name, where);
+    if (!value.is_string()) refuse(where, fmt::format("has a \"{}\" that is no text", name));
+    return value.get<std::string>();
+  }
+
+  /// As many finite numbers as asked for.
+  [[nodiscard]] std::vector<double> numbers(const Json& json, const char* name, std::size_t count,
+                                            const std::string& where) const {
+    const Json& list = member(json, name, where);
+    std::vector<double> all;
+    const auto add = [&](const Json& value) {
+      if (value.is_number() && std::isfinite(value.get<double>()))
+        all.push_back(value.get<double>());
+    };
+    if (list.is_array())
+      for (const Json& value : list) add(value);
+    else
+      add(list);
+    const std::size_t given = list.is_array() ? list.size() : 1;
+    if (all.size() != count || given != count)
+      refuse(where, fmt::format("has a \"{}\" that is not {} number{}", name, count,
+                                count == 1 ? "" : "s"));
+    return all;
+  }
+  [[nodiscard]] V3d point(const Json& json, const char* name, const std::string& where) const {
+    const std::vector<double> all = numbers(json, name, 3, where);
+    return {all[0], all[1], all[2]};
+  }
+  [[nodiscard]] double number(const Json& json, const char* name, const std::string& where) const {
+    return numbers(json, name, 1, where)[0];
+  }
+
+  /// So that a word that is written wrongly is not passed over.
+  void requireKnown(const Json& json, const std::set<std::string>& known,
+                    const std::string& where) const {
+    if (!json.is_object()) refuse(where, "is no object");
+    for (const auto& [name, value] : json.items())
+      if (!known.contains(name)) refuse(where, fmt::format("has an unknown \"{}\"", name));
+  }
+
+  [[nodiscard]] Camera camera(const Json& json) const {
+    const std::string where = "the camera";
+    requireKnown(json, {"from", "to", "up", "fov", "ortho", "size"}, where);
+    Camera camera;
+    camera.from = point(json, "from", where);
+    camera.to = point(json, "to", where);
+    if (json.contains("up")) camera.up = point(json, "up", where);
+    if (json.contains("fov")) camera.verticalFov = number(json, "fov", where) * kDegree;
+    if (json.contains("ortho")) camera.orthoHeight = number(json, "ortho", where);
+    if (json.contains("size")) {
+      const std::vector<double> size = numbers(json, "size", 2, where);
+      for (const double pixels : size)
+        if (!(pixels >= 1 && pixels <= 1e6) || pixels != std::floor(pixels))
+          refuse(where, fmt::format("has a size of {} pixels", pixels));
+      camera.width = static_cast<int>(size[0]);
+      camera.height = static_cast<int>(size[1]);
+    }
+    return camera;
+  }
+
+  [[nodiscard]] Light light(const Json& json) const {
+    const std::string where = "the light";
+    requireKnown(json, {"direction", "strength", "softness"}, where);
+    Light light;
+    if (json.contains("direction")) light.direction = point(json, "direction", where);
+    if (json.contains("strength")) light.strength = number(json, "strength", where);
+    if (json.contains("softness")) light.softness = number(json, "softness", where) * kDegree;
+    return light;
+  }
+
+  /// But for its band.
+  [[nodiscard]] Solid solid(const Json& json, std::size_t number_, const std::string& where) const {
+    requireKnown(json, {"name", "file", "grid", "transform", "colour", "id"}, where);
+    Solid solid;
+    solid.name = text(json, "name", where);
+    solid.id = static_cast<std::uint32_t>(number_ + 1);
+    if (json.contains("id")) {
+      const double id = number(json, "id", where);
+      if (!(id >= 1 && id <= 4294967295.0) || id != std::floor(id))
+        refuse(where, "has an \"id\" that is no whole number from 1 to 4294967295");
+      solid.id = static_cast<std::uint32_t>(id);
+    }
+    if (json.contains("colour")) {
+      const V3d colour = point(json, "colour", where);
+      for (int c = 0; c < 3; ++c)
+        if (!(colour[c] >= 0 && colour[c] <= 1))
+          refuse(where, "has a \"colour\" that is not from 0 to 1");
+      solid.colour = Imath::C3f(colour);
+    }
+    return solid;
+  }
+
+  [[nodiscard]] Imath::M44d matrix(const Json& json, const std::string& where) const {
+    const std::vector<double> all = numbers(json, "transform", 16, where);
+    Imath::M44d matrix;
+    for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = all[static_cast<std::size_t>(i)];
+    return matrix;
+  }
+
+ private:
+  std::string file_;
+};
+
+Json documentOf(const std::filesystem::path& file) {
+  std::error_code failed;
+  if (std::filesystem::is_directory(file, failed))
+    throw levelset::IoError(
+        fmt::format("read: {} is a folder; give the file of a scene", file.string()));
+  const auto size = std::filesystem::file_size(file, failed);
+  if (!failed && static_cast<double>(size) > kMostBytes)
+    throw InvalidInput(fmt::format("read: {} is too large for a scene", file.string()));
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream)
+    throw levelset::IoError(
+        fmt::format("read: {} cannot be read; check its name and permissions", file.string()));
+  return Json::parse(text, nullptr, /*allow_exceptions=*/false);
+}
+
+}  // namespace
+
+bool isSceneFormat(const std::string& name) {
+  return name == "json" || std::filesystem::path(name).extension() == ".json";
+}
+
+void requireSolidNames(const std::vector<std::string>& names) {
+  std::set<std::string> seen;
+  for (const std::string& name : names) {
+    const auto isWord = [](unsigned char c) { return std::isalnum(c) || c == '_'; };
+    if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0])) ||
+        !std::all_of(name.begin(), name.end(), isWord))
+      throw levelset::UsageError(fmt::format(
+          "scene: '{}' cannot name a solid; take letters, digits and _, no digit first", name));
+    if (!seen.insert(name).second)
+      throw levelset::UsageError(
+          fmt::format("scene: two solids are called '{}'; give each a name of its own", name));
+  }
+}
+
+std::vector<std::filesystem::path> solidFiles(const std::filesystem::path& file,
+                                              const std::vector<std::string>& names) {
+  std::vector<std::filesystem::path> files;
+  for (const std::string& name : names)
+    files.push_back(file.parent_path() / (file.stem().string() + "-" + name + ".vdb"));
+  return files;
+}
+
+void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
+                const levelset::Progress& progress) {
+  const Scene& scene = viewed.scene;
+  const std::vector<std::string> names = namesOf(scene);
+  requireSolidNames(names);
+  const std::vector<std::filesystem::path> files = solidFiles(file, names);
+  Json json;
+  json["format"] = kFormat;
+  json["version"] = kVersion;
+  if (viewed.hasCamera) {
+    validate(scene.camera);
+    json["camera"] = toJson(scene.camera);
+  }
+  json["light"] = {{"direction", toJson(scene.key.direction)},
+                   {"strength", scene.key.strength},
+                   {"softness", scene.key.softness / kDegree}};
+  json["ambient"] = scene.ambient;
+  json["solids"] = Json::array();
+  for (std::size_t i = 0; i < scene.solids.size(); ++i) {
+    const Solid& solid = scene.solids[i];
+    json["solids"].push_back({{"name", solid.name},
+                              {"file", files[i].filename().string()},
+                              {"colour", colourJson(solid.colour)},
+                              {"id", solid.id}});
+  }
+  if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
+
+  levelset::FileTarget target(file);
+  for (std::size_t i = 0; i < files.size(); ++i)
+    levelset::writeBand(files[i], scene.solids[i].band,
+                        {.name = names[i],
+                         .progress = levelset::subProgress(
+                             progress, static_cast<double>(i) / static_cast<double>(files.size()),
+                             static_cast<double>(i + 1) / static_cast<double>(files.size()))});
+  {
+    std::ofstream stream(target.path(), std::ios::binary);
+    stream << json.dump(2) << '\n';
+    stream.flush();
+    if (!stream)
+      throw levelset::IoError(
+          fmt::format("write: {} cannot be written; is the disk full?", file.string()));
+  }
+  target.commit();
+}
+
+ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions& options) {
+  const Reader reader(file);
+  const Json json = documentOf(file);
+  const std::string whole = "the file";
+  if (json.is_discarded()) reader.refuse(whole, "is no JSON document, or was cut off");
+  if (reader.text(json, "format", whole) != kFormat) reader.refuse(whole, "holds no scene");
+  if (reader.number(json, "version", whole) != kVersion)
+    reader.refuse(whole, fmt::format("is not of version {}", kVersion));
+  reader.requireKnown(json, {"format", "version", "camera", "light", "ambient", "solids", "csg"},
+                      whole);
+  ViewedScene viewed;
+  Scene& scene = viewed.scene;
+  viewed.hasCamera = json.contains("camera");
+  if (viewed.hasCamera) scene.camera = reader.camera(json.at("camera"));
+  if (json.contains("light")) scene.key = reader.light(json.at("light"));
+  if (json.contains("ambient")) scene.ambient = reader.number(json, "ambient", whole);
+  const Json& solids = reader.member(json, "solids", whole);
+  if (!solids.is_array() || solids.empty()) reader.refuse(whole, "has no solids");
+  for (const Json& entry : solids) {
+    const std::string where = fmt::format("solid {}", scene.solids.size() + 1);
+    scene.solids.push_back(reader.solid(entry, scene.solids.size(), where));
+  }
+  const std::vector<std::string> names = namesOf(scene);
+  requireSolidNames(names);
+  if (json.contains("csg")) scene.csg = CsgExpression(reader.text(json, "csg", whole), names);
+
+  const auto count = static_cast<double>(scene.solids.size());
+  for (std::size_t i = 0; i < scene.solids.size(); ++i) {
+    const std::string where = fmt::format("solid {}", i + 1);
+    const std::filesystem::path source = file.parent_path() / reader.text(solids[i], "file", where);
+    levelset::BandRepairs repairs;
+    scene.solids[i].band = levelset::readBand(
+        source, {.grid = solids[i].contains("grid") ? reader.text(solids[i], "grid", where) : "",
+                 .maxMemory = options.maxMemory,
+                 .repairs = &repairs,
+                 .progress = levelset::subProgress(options.progress, static_cast<double>(i) / count,
+                                                   static_cast<double>(i + 1) / count)});
+    if (scene.solids[i].band.isOpenSurface())
+      reader.refuse(where, "is the band of an open surface, which holds no solid");
+    if (options.repairs) options.repairs(repairs, source);
+    if (solids[i].contains("transform"))
+      scene.solids[i].band =
+          levelset::transform(scene.solids[i].band, reader.matrix(solids[i], where));
+  }
+  return viewed;
+}
+
+}  // namespace render

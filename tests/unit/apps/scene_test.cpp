@@ -1,0 +1,101 @@
+// Scenes from the command line: made, saved, read again, drawn, refused.
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "tests/support/shell.h"
+
+namespace scene_test {
+
+using support::Outcome;
+using Json = nlohmann::json;
+
+const std::string kTwo =
+    "box --size 2,2,2 --voxel 0.1 --as b ! sphere --radius 1.3 --voxel 0.07 --as s ! scene @b @s ";
+
+class Scenes : public support::ShellTest {
+ protected:
+  void make() {
+    const Outcome made = levelsmith(
+        kTwo +
+        "--csg 'b - s' --from 4,3,5 --to 0,0,0 --size 64x48 ! write cut.json ! render a.exr "
+        "--samples 1 --renderer cpu");
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+  /// Exit code and complaint for the scene with one word put for another.
+  Outcome readChanged(const std::string& word, const std::string& other) {
+    std::string text = shell("cat cut.json").out;
+    const std::size_t at = text.find(word);
+    EXPECT_NE(at, std::string::npos) << word;
+    writeFile("bad.json", text.replace(at, word.size(), other));
+    return levelsmith("read bad.json ! info");
+  }
+};
+
+TEST_F(Scenes, AreTheSameAfterTheyWereSaved) {
+  make();
+  const Outcome again =
+      levelsmith("read cut.json ! render b.exr --samples 1 --renderer cpu ! info --json");
+  ASSERT_EQ(again.code, 0) << again.err;
+  const Outcome same = levelsmith("compare-images a.exr b.exr --exact");
+  EXPECT_EQ(same.code, 0) << same.out << same.err;
+  const Outcome judged = levelsmith("read cut.json ! render c.exr --renderer both --samples 1");
+  EXPECT_EQ(judged.code, 0) << judged.err;
+  const Outcome other = levelsmith("read cut.json ! render d.exr --size 32x32 --fov 20");
+  EXPECT_EQ(other.code, 0) << other.err;
+  EXPECT_NE(levelsmith("compare-images a.exr d.exr").code, 0);
+}
+
+TEST_F(Scenes, TellWhatIsInThem) {
+  const Outcome told = levelsmith(kTwo + "--csg 's | b' ! info --json");
+  ASSERT_EQ(told.code, 0) << told.err;
+  const Json json = Json::parse(told.out);
+  EXPECT_EQ(json["kind"], "scene");
+  EXPECT_EQ(json["csg"], "s | b");
+  EXPECT_EQ(json["solids"][1]["name"], "s");
+}
+
+TEST_F(Scenes, AreMovedByTheFile) {
+  make();
+  const Outcome moved =
+      readChanged("\"file\": \"cut-b.vdb\"",
+                  "\"file\": \"cut-b.vdb\", \"transform\": [1,0,0,0, 0,1,0,0, 0,0,1,0, 100,0,0,1]");
+  ASSERT_EQ(moved.code, 0) << moved.err;
+  EXPECT_NE(moved.out.find("100.9"), std::string::npos) << moved.out;
+}
+
+TEST_F(Scenes, ThatCannotBeAreRefused) {
+  EXPECT_EQ(levelsmith(kTwo + "--csg 'b - t' ! render a.png").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--csg 'b -' ! render a.png").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--names 'one' ! render a.png").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--names 'one one' ! render a.png").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--colours '1,0,0' ! render a.png").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--colours '1,0,0 0,0,7' ! render a.png").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "! write a.vdb").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "! write - --format json").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "! measure").code, 2);
+  EXPECT_EQ(levelsmith("read - --format json ! info").code, 2);
+  EXPECT_EQ(levelsmith("read nowhere.json ! info").code, 6);
+  const Outcome unused = levelsmith(kTwo + "--csg b ! info");
+  EXPECT_EQ(unused.code, 0);
+  EXPECT_NE(unused.err.find("'s', which is not drawn"), std::string::npos) << unused.err;
+}
+
+TEST_F(Scenes, FromBrokenFilesAreRefused) {
+  make();
+  EXPECT_EQ(readChanged("levelsmith scene", "levelsmith dream").code, 3);
+  EXPECT_EQ(readChanged("\"version\": 1", "\"version\": 2").code, 3);
+  EXPECT_EQ(readChanged("\"fov\"", "\"fow\"").code, 3);
+  EXPECT_EQ(readChanged("\"fov\": 35", "\"fov\": \"wide\"").code, 3);
+  EXPECT_EQ(readChanged("\"ambient\": 0.32", "\"ambient\": null").code, 3);
+  EXPECT_EQ(readChanged("b - s", "b - q").code, 2);
+  EXPECT_EQ(readChanged("cut-b.vdb", "nowhere.vdb").code, 6);
+  EXPECT_EQ(readChanged("cut-b.vdb", "bad.json").code, 3);
+  EXPECT_EQ(readChanged("\"id\": 1", "\"id\": -1").code, 3);
+  EXPECT_EQ(readChanged("\"solids\"", "\"solid\"").code, 3);
+  EXPECT_EQ(readChanged("{", "[").code, 3);
+}
+
+}  // namespace scene_test
