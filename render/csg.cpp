@@ -125,6 +125,27 @@ CsgExpression CsgExpression::renumbered(const std::vector<int>& numbers) const {
   return result;
 }
 
+Imath::Box3d CsgExpression::bounds(const std::vector<Imath::Box3d>& boxes) const {
+  std::vector<Imath::Box3d> stack;
+  for (const int step : steps_) {
+    if (step >= 0 || step == kNothing) {
+      stack.push_back(step >= 0 ? boxes[static_cast<std::size_t>(step)] : Imath::Box3d());
+      continue;
+    }
+    const Imath::Box3d b = stack.back();
+    stack.pop_back();
+    Imath::Box3d& a = stack.back();
+    if (step == kUnion) a.extendBy(b);
+    if (step != kIntersection) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      a.min[axis] = std::max(a.min[axis], b.min[axis]);
+      a.max[axis] = std::min(a.max[axis], b.max[axis]);
+    }
+    if (a.isEmpty()) a.makeEmpty();
+  }
+  return stack.empty() ? Imath::Box3d() : stack.back();
+}
+
 bool CsgExpression::uses(std::size_t solid) const {
   return std::find(steps_.begin(), steps_.end(), static_cast<int>(solid)) != steps_.end();
 }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Imath/ImathBox.h>
+
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -20,6 +22,8 @@ class CsgExpression {
   /// @param inside  by solid: not 0 where it holds the point
   [[nodiscard]] bool holds(const char* inside) const;
   [[nodiscard]] bool uses(std::size_t solid) const;
+  /// A box that holds what the expression makes of solids that lie in those boxes.
+  [[nodiscard]] Imath::Box3d bounds(const std::vector<Imath::Box3d>& boxes) const;
   /// The same of solids by other numbers. @param numbers  by solid; negative: it holds nothing
   [[nodiscard]] CsgExpression renumbered(const std::vector<int>& numbers) const;
 

@@ -7,22 +7,24 @@
 
 namespace render {
 
+struct CurvatureSample {
+  double mean = 0, gauss = 0, k1 = 0,
+         k2 = 0;  ///< per world unit (gauss: squared); spheres positive
+};
+
 /// Where a ray meets a surface; world units.
 struct Hit {
   bool found = false;
   double distance = 0;          ///< along the unit direction
   Imath::V3d position, normal;  ///< normal outwards, of unit length, from a tricubic B-spline
   Imath::V3d facetNormal;       ///< outwards, of the trilinear interpolant itself
+  CurvatureSample curvature;    ///< from the B-spline
+  double viewCurvature = 0;     ///< of the normal section along the ray, per world unit
   double surfaceError = 0;      ///< bound on the interpolant's distance from a smooth surface
   std::uint32_t id = 0;         ///< Solid::id
   std::size_t solid = 0;        ///< index in Scene::solids
-  bool isTurned = false;        ///< is that solid's outside inside what is drawn? Normals tell of
-                                ///< what is drawn
-};
-
-struct CurvatureSample {
-  double mean = 0, gauss = 0, k1 = 0,
-         k2 = 0;  ///< per world unit (gauss: squared); spheres positive
+  bool isTurned = false;        ///< is that solid's outside inside what is drawn? Normals and
+                                ///< curvatures tell of what is drawn
 };
 
 }  // namespace render

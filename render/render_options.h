@@ -4,6 +4,7 @@
 
 #include "levelset/progress.h"
 #include "render/filter.h"
+#include "render/shading/style.h"
 
 namespace render {
 
@@ -12,6 +13,7 @@ struct RenderOptions {
   int ambientSamples = 16;  ///< per colour sample; 0: no occlusion
   int shadowSamples = 4;    ///< per colour sample; 0: no shadows
   Filter filter = Filter::Trilinear;
+  StyleOptions style = {};                          ///< of the colours
   bool curvature = true;                            ///< layers curvature.mean .gauss .k1 .k2
   std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< for the image and the scene
   levelset::Progress progress = {};

@@ -33,6 +33,8 @@ struct Scene {
   double ambient = 0.32;  ///< weight of the ambient term, dimmed by occlusion
   std::vector<Solid> solids;
   CsgExpression csg = {};  ///< what is drawn of the solids; empty: each of them
+  /// A box that holds what is drawn; empty where nothing can be.
+  [[nodiscard]] Imath::Box3d bounds() const;
 };
 
 }  // namespace render

@@ -166,6 +166,7 @@ const std::vector<Operator>& operators() {
     addFoldOperators(list);
     addInspectionOperators(list);
     addSceneOperators(list);
+    addSliceOperators(list);
     addPictureOperators(list);
     addRegressionOperators(list);
     return list;

@@ -116,6 +116,7 @@ void addGeneratorOperators(std::vector<Operator>& all);
 void addFoldOperators(std::vector<Operator>& all);
 void addInspectionOperators(std::vector<Operator>& all);
 void addSceneOperators(std::vector<Operator>& all);
+void addSliceOperators(std::vector<Operator>& all);
 void addPictureOperators(std::vector<Operator>& all);
 void addRegressionOperators(std::vector<Operator>& all);
 

@@ -119,8 +119,8 @@ const Plan& Value::plan() const {
       plan.fieldBytes = static_cast<double>(field().memoryUse());
       break;
     case Kind::Scene:
+      plan.bounds = scene().scene.bounds();
       for (const render::Solid& solid : scene().scene.solids) {
-        plan.bounds.extendBy(solid.band.zeroSetBounds());
         const double h = solid.band.voxelSize();
         plan.voxelSize = plan.voxelSize > 0 ? std::min(plan.voxelSize, h) : h;
         plan.halfWidth = solid.band.halfWidth();

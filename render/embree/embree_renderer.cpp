@@ -46,7 +46,7 @@ struct PixelPainter {
     const Hit hit = rays.intersect(ray.origin, ray.direction);
     if (!hit.found) return;
     layers.setHit(i, scene.camera, hit);
-    if (options.curvature) layers.setCurvature(i, rays.curvatureAt(hit));
+    if (options.curvature) layers.setCurvature(i, hit.curvature);
   }
 
   /// The mean over the pixel's area.
@@ -95,7 +95,7 @@ Image renderEmbree(const Scene& scene, const RenderOptions& options) {
     const std::scoped_lock lock(reporting);
     levelset::report(options.progress, static_cast<double>(++done) / (across * down), "render");
   });
-  image.attributes = sceneAttributes(scene, options.filter);
+  image.attributes = sceneAttributes(scene, options);
   image.attributes["ls:renderer"] = fmt::format("embree {}", RTC_VERSION_STRING);
   image.attributes["ls:mode"] = "exact";
   addViewAttributes(image, scene, rays.bounds().size().length());

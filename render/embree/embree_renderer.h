@@ -37,8 +37,6 @@ class EmbreeScene {
   /// True when there is a hit in [near, far]. @throws as intersect()
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                                 double far) const;
-  /// At the position of a hit, from the Hessian of the tricubic B-spline.
-  [[nodiscard]] CurvatureSample curvatureAt(const Hit& hit) const;
   /// World-space box of the cells that hold surface; empty when there are none.
   [[nodiscard]] const Imath::Box3d& bounds() const;
 

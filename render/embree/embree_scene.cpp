@@ -337,7 +337,7 @@ void EmbreeScene::Impl::complete(Hit& hit, const RayQuery& query, const RaySolid
   hit.position = query.origin + query.direction * t;
   hit.id = solid.id;
   hit.solid = solid.index;
-  addNormals(hit, solid.shapeAt(hit.position), solid.indexToWorld, query.direction);
+  addShape(hit, solid.shapeAt(hit.position), solid.indexToWorld, query.direction);
 }
 
 EmbreeScene::EmbreeScene(const Scene& scene, Filter filter)
@@ -374,15 +374,6 @@ bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double nea
   if (!impl_->csg.isEmpty()) return impl_->findCsg(*query, ray).has_value();
   rtcOccluded1(impl_->scene, &query->embree, &ray);
   return ray.tfar < 0;
-}
-
-CurvatureSample EmbreeScene::curvatureAt(const Hit& hit) const {
-  const auto solid = std::find_if(impl_->solids.begin(), impl_->solids.end(),
-                                  [&](const RaySolid& s) { return s.index == hit.solid; });
-  if (!hit.found || solid == impl_->solids.end()) return {};
-  const CurvatureSample sample =
-      curvaturesOf(solid->shapeAt(hit.position), solid->band.voxelSize());
-  return hit.isTurned ? turned(sample) : sample;
 }
 
 const Box3d& EmbreeScene::bounds() const {

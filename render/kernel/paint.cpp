@@ -57,7 +57,7 @@ Hit KernelPainter::hitOf(const Camera::Ray& ray, const PixelHits& hits, std::siz
   hit.id = solid.id;
   hit.solid = solid.index;
   hit.isTurned = hits.turned[i] != 0;
-  addNormals(hit, hits.shapes.at(i), solid.tableToWorld, ray.direction);
+  addShape(hit, hits.shapes.at(i), solid.tableToWorld, ray.direction);
   hit.surfaceError += kCastError * solid.voxelSize;
   return hit;
 }
@@ -75,12 +75,9 @@ void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixe
     if (hits.solid[i] < 0) continue;
     const std::size_t number = numberOf(pixels[i]);
     const Camera::Ray ray = scene_.camera.ray(pixels[i].x + 0.5, pixels[i].y + 0.5);
-    layers_.setHit(number, scene_.camera, hitOf(ray, hits, i));
-    if (options_.curvature) {
-      const double h = surfaces_.solids()[static_cast<std::size_t>(hits.solid[i])].voxelSize;
-      const CurvatureSample sample = curvaturesOf(hits.shapes.at(i), h);
-      layers_.setCurvature(number, hits.turned[i] ? turned(sample) : sample);
-    }
+    const Hit hit = hitOf(ray, hits, i);
+    layers_.setHit(number, scene_.camera, hit);
+    if (options_.curvature) layers_.setCurvature(number, hit.curvature);
   }
 }
 
@@ -151,7 +148,7 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
     const std::scoped_lock lock(reporting);
     levelset::report(options.progress, static_cast<double>(++done) / (across * down), "render");
   });
-  image.attributes = sceneAttributes(scene, options.filter);
+  image.attributes = sceneAttributes(scene, options);
   image.attributes["ls:renderer"] = renderer;
   image.attributes["ls:mode"] = "exact";
   std::size_t bricks = 0, beside = 0;

@@ -79,6 +79,16 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
         "give finite numbers, none negative, and a softness below 1.5 radians",
         d.x, d.y, d.z, scene.key.strength, scene.key.softness, scene.ambient));
   }
+  const StyleOptions& style = options.style;
+  if (!(style.curvatureRange >= 0 && std::isfinite(style.curvatureRange)) ||
+      !(style.lineWidth >= 0 && style.lineWidth <= 1000)) {
+    throw levelset::UsageError(
+        fmt::format("render: curvatures up to {} and lines of {} pixels cannot be drawn; give a "
+                    "positive range, and lines up to 1000 pixels",
+                    style.curvatureRange, style.lineWidth));
+  }
+  if (style.style == Style::Matcap && !style.matcap)
+    throw levelset::UsageError("render: the style matcap needs a picture of a ball; name a PNG");
   constexpr double kReach = 2.99;  // voxels
   for (const Solid& solid : scene.solids) {
     if (options.filter == Filter::Trilinear || solid.band.isEmpty()) continue;
@@ -98,7 +108,9 @@ void refuseEmptyScene() {
       "render: there is no surface in the scene; give at least one solid with a zero set");
 }
 
-std::map<std::string, std::string> sceneAttributes(const Scene& scene, Filter filter) {
+std::map<std::string, std::string> sceneAttributes(const Scene& scene,
+                                                   const RenderOptions& options) {
+  const Filter filter = options.filter;
   std::string grids, voxelSizes;
   for (const Solid& solid : scene.solids) {
     if (solid.band.isEmpty()) continue;
@@ -112,6 +124,7 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene, Filter fi
       {"ls:normal", filter == Filter::BSpline ? "bspline" : "bspline-qi"},
       {"ls:grid", grids},
       {"ls:voxelSize", voxelSizes}};
+  attributes["ls:style"] = styleName(options.style.style);
   if (!scene.csg.isEmpty()) attributes["ls:csg"] = scene.csg.text();
   return attributes;
 }

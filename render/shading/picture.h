@@ -37,7 +37,8 @@ void requirePicture(const Scene& scene, const RenderOptions& options);
 [[noreturn]] void refuseEmptyScene();
 
 /// ls:grid (name and content hash of each solid), ls:voxelSize, and how layers are made.
-[[nodiscard]] std::map<std::string, std::string> sceneAttributes(const Scene& scene, Filter filter);
+[[nodiscard]] std::map<std::string, std::string> sceneAttributes(const Scene& scene,
+                                                                 const RenderOptions& options);
 
 /// Software, camera matrices, what Z is, and ls:extent.
 /// @param extent  diagonal of the surfaces' box, world units

@@ -12,7 +12,8 @@ using Imath::V2d;
 using Imath::V3d;
 
 constexpr double kOcclusionReach =
-    0.25;  // of the scene's diagonal: hollows darken, open sides do not
+    0.25;                             // of the scene's diagonal: hollows darken, open sides do not
+constexpr double kDefaultRange = 40;  // of curvatures, times the scene's diagonal
 constexpr std::uint64_t kAmbient = 1, kShadow = 2;
 
 std::uint64_t scramble(std::uint64_t x) {  // the finaliser of SplitMix64
@@ -73,11 +74,13 @@ V2d PixelSequence::at(int index) const {
 Shader::Shader(const Scene& scene, double diagonal, const RenderOptions& options)
     : scene_(scene), options_(options), diagonal_(diagonal) {
   const V3d forward = scene.camera.axis();
-  const V3d right = forward.cross(scene.camera.up).normalized();
-  up_ = right.cross(forward);
+  right_ = forward.cross(scene.camera.up).normalized();
+  up_ = right_.cross(forward);
   const V3d& d = scene.key.direction;
-  key_ = (right * d.x + up_ * d.y - forward * d.z).normalized();
-  fill_ = (right * -d.x + up_ * (0.3 * d.y) - forward * d.z).normalized();
+  key_ = (right_ * d.x + up_ * d.y - forward * d.z).normalized();
+  fill_ = (right_ * -d.x + up_ * (0.3 * d.y) - forward * d.z).normalized();
+  const double asked = options.style.curvatureRange;
+  curvatureRange_ = asked > 0 ? asked : kDefaultRange / diagonal;
 }
 
 Shader::Frame Shader::frameOf(const Hit& hit, const V3d& direction) const {
@@ -116,9 +119,10 @@ void Shader::addKeyRays(const Frame& frame, int x, int y, int sample,
 
 LightRays Shader::addRays(const Hit& hit, const V3d& direction, int x, int y, int sample,
                           std::vector<LightRay>& rays) const {
-  const Frame frame = frameOf(hit, direction);
   LightRays range;
   range.first = rays.size();
+  if (!usesLights(options_.style.style)) return range;
+  const Frame frame = frameOf(hit, direction);
   addSkyRays(frame, x, y, sample, rays);
   range.sky = rays.size() - range.first;
   addKeyRays(frame, x, y, sample, rays);
@@ -129,6 +133,16 @@ LightRays Shader::addRays(const Hit& hit, const V3d& direction, int x, int y, in
 C3f Shader::colour(const Hit& hit, const V3d& direction, const LightRays& range,
                    const std::vector<LightRay>& rays, const std::vector<char>& blocked) const {
   const Frame frame = frameOf(hit, direction);
+  switch (options_.style.style) {
+    case Style::Tone:
+      return toneColour(hit, frame, direction);
+    case Style::Ink:
+      return inkColour(hit, frame, direction);
+    case Style::Matcap:
+      return matcapColour(frame);
+    default:
+      break;
+  }
   const auto lightOf = [&](std::size_t first, std::size_t count) {
     double sum = 0;
     for (std::size_t i = first; i < first + count; ++i)
@@ -140,8 +154,28 @@ C3f Shader::colour(const Hit& hit, const V3d& direction, const LightRays& range,
   const double lit = options_.shadowSamples == 0
                          ? std::max(0.0, frame.normal.dot(key_))
                          : lightOf(range.first + range.sky, range.key) / options_.shadowSamples;
+  return litColour(hit, frame, direction, open, lit);
+}
 
-  const C3f& albedo = scene_.solids[hit.solid].colour;
+C3f Shader::albedoOf(const Hit& hit) const {
+  const C3f& own = scene_.solids[hit.solid].colour;
+  switch (options_.style.style) {
+    case Style::Mean:
+      return meanColour(hit.curvature, curvatureRange_);
+    case Style::Gauss:
+      return gaussColour(hit.curvature, curvatureRange_);
+    case Style::Principal:
+      return principalColour(hit.curvature, curvatureRange_);
+    case Style::Accessibility:
+      return scaled(own, accessibilityOf(hit.curvature, curvatureRange_));
+    default:
+      return own;
+  }
+}
+
+C3f Shader::litColour(const Hit& hit, const Frame& frame, const V3d& direction, double open,
+                      double lit) const {
+  const C3f albedo = albedoOf(hit);
   const double key = scene_.key.strength * lit;
   const double facing = std::clamp(-direction.dot(frame.normal), 0.0, 1.0);
   const double upward = 0.5 + 0.5 * frame.normal.dot(up_);
@@ -161,6 +195,46 @@ C3f Shader::colour(const Hit& hit, const V3d& direction, const LightRays& range,
   }
   result += scaled(C3f(0.82f, 0.92f, 1.10f), fill * open);
   return albedo * result + C3f(static_cast<float>(rim + gloss));
+}
+
+double Shader::lineAt(const Hit& hit, const Frame& frame, const V3d& direction) const {
+  const Camera& camera = scene_.camera;
+  const double depth = camera.orthoHeight ? 1 : (hit.position - camera.from).dot(camera.axis());
+  const double width = options_.style.lineWidth * camera.pixelSteps().right.length() * depth;
+  const double cosine = std::clamp(-direction.dot(frame.normal), 0.0, 1.0);
+  return silhouetteOf(cosine, hit.viewCurvature, width);
+}
+
+C3f Shader::toneColour(const Hit& hit, const Frame& frame, const V3d& direction) const {
+  const C3f& own = scene_.solids[hit.solid].colour;
+  const C3f cool = C3f(0.02f, 0.03f, 0.22f) + scaled(own, 0.25),
+            warm = C3f(0.16f, 0.13f, 0.0f) + scaled(own, 0.75);
+  const double share = 0.5 + 0.5 * frame.normal.dot(key_);
+  const V3d half = (key_ - direction).normalized();
+  const double gloss = 0.35 * std::pow(std::max(0.0, half.dot(frame.normal)), 64);
+  const C3f colour = cool + scaled(warm - cool, share) + C3f(static_cast<float>(gloss));
+  return scaled(colour, 1 - lineAt(hit, frame, direction));
+}
+
+C3f Shader::inkColour(const Hit& hit, const Frame& frame, const V3d& direction) const {
+  const C3f paper(0.86f, 0.83f, 0.75f), ink(0.02f, 0.02f, 0.03f), sepia(0.32f, 0.16f, 0.06f);
+  const double light = frame.normal.dot(key_);
+  C3f colour = scaled(paper, light > 0.35 ? 1 : light > -0.1 ? 0.82 : 0.62);
+  const auto mark = [&](const C3f& with, double amount) {
+    colour += scaled(with - colour, std::clamp(amount, 0.0, 1.0));
+  };
+  // A ridge bends one way alone, or that way most: corners are all of them.
+  const double ridge = hit.curvature.k1 / curvatureRange_,
+               valley = -hit.curvature.k2 / curvatureRange_;
+  mark(sepia, ridge > valley ? 1.5 * (ridge - 1) : 0);
+  mark(ink, valley > ridge ? 1.5 * (valley - 1) : 0);
+  mark(ink, lineAt(hit, frame, direction));
+  return colour;
+}
+
+C3f Shader::matcapColour(const Frame& frame) const {
+  return options_.style.matcap->at(0.5 + 0.49 * frame.normal.dot(right_),
+                                   0.5 - 0.49 * frame.normal.dot(up_));
 }
 
 }  // namespace render

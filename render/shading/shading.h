@@ -39,7 +39,8 @@ struct LightRays {
   std::size_t first = 0, sky = 0, key = 0;
 };
 
-/// Lights the surface: a soft key with shadows, a sky dimmed by occlusion, a cool fill, a thin rim.
+/// Lights the surface: a soft key with shadows, a sky dimmed by occlusion, a cool fill, a thin rim;
+/// or draws it in a style that needs no light.
 class Shader {
  public:
   /// @param diagonal  of the box of the surfaces, world units
@@ -63,10 +64,23 @@ class Shader {
   void addSkyRays(const Frame& frame, int x, int y, int sample, std::vector<LightRay>& rays) const;
   void addKeyRays(const Frame& frame, int x, int y, int sample, std::vector<LightRay>& rays) const;
 
+  [[nodiscard]] Imath::C3f albedoOf(const Hit& hit) const;
+  /// @param open, lit  how much of the sky and of the key light reaches the point
+  [[nodiscard]] Imath::C3f litColour(const Hit& hit, const Frame& frame,
+                                     const Imath::V3d& direction, double open, double lit) const;
+  [[nodiscard]] Imath::C3f toneColour(const Hit& hit, const Frame& frame,
+                                      const Imath::V3d& direction) const;
+  [[nodiscard]] Imath::C3f inkColour(const Hit& hit, const Frame& frame,
+                                     const Imath::V3d& direction) const;
+  [[nodiscard]] Imath::C3f matcapColour(const Frame& frame) const;
+  /// Of a silhouette's line, from 0 to 1.
+  [[nodiscard]] double lineAt(const Hit& hit, const Frame& frame,
+                              const Imath::V3d& direction) const;
+
   const Scene& scene_;
   const RenderOptions& options_;
-  Imath::V3d key_, fill_, up_;
-  double diagonal_;
+  Imath::V3d key_, fill_, up_, right_;
+  double diagonal_, curvatureRange_;
 };
 
 }  // namespace render

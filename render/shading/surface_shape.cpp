@@ -13,23 +13,23 @@ V3d unitOr(const V3d& v, const V3d& fallback) {
   return unit == V3d(0) ? fallback : unit;
 }
 
-}  // namespace
-
-void addNormals(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWorld,
-                const V3d& direction) {
-  // For a rotation with uniform scale, gradients turn as directions do.
-  V3d facet, smooth;
-  indexToWorld.multDirMatrix(shape.trilinearGradient, facet);
-  indexToWorld.multDirMatrix(shape.gradient, smooth);
-  hit.facetNormal = unitOr(facet, unitOr(smooth, -direction));
-  hit.normal = unitOr(smooth, hit.facetNormal);
-  if (hit.isTurned) {
-    hit.facetNormal = -hit.facetNormal;
-    hit.normal = -hit.normal;
-  }
-  hit.surfaceError = shape.interpolationError;
+V3d row(const Imath::M44d& m, int i) {
+  return {m[i][0], m[i][1], m[i][2]};
 }
 
+/// Of the normal section along a direction (index axes, of any length) on the tangent plane, per
+/// voxel; zero where the direction is the normal's.
+double curvatureAlong(const SurfaceShape& shape, const V3d& direction) {
+  const double length = shape.gradient.length();
+  if (!(length > 0)) return 0;
+  const V3d normal = shape.gradient / length;
+  const V3d along = direction - normal * direction.dot(normal);
+  if (!(along.length2() > 1e-12 * direction.length2())) return 0;
+  return along.dot(along * shape.hessian) / (length * along.length2());
+}
+
+/// From gradient and Hessian [Goldman05], per world unit: k1 ≥ k2. Zero where the gradient
+/// vanishes.
 CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
   const V3d& g = shape.gradient;
   const Imath::M33d& h = shape.hessian;
@@ -53,8 +53,33 @@ CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
   return {mean, gauss, mean + spread, mean - spread};
 }
 
+/// The same surface from its other side.
 CurvatureSample turned(const CurvatureSample& sample) {
   return {-sample.mean, sample.gauss, -sample.k2, -sample.k1};
+}
+
+}  // namespace
+
+void addShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWorld,
+              const V3d& direction) {
+  // For a rotation with uniform scale, gradients turn as directions do.
+  V3d facet, smooth;
+  indexToWorld.multDirMatrix(shape.trilinearGradient, facet);
+  indexToWorld.multDirMatrix(shape.gradient, smooth);
+  hit.facetNormal = unitOr(facet, unitOr(smooth, -direction));
+  hit.normal = unitOr(smooth, hit.facetNormal);
+  hit.surfaceError = shape.interpolationError;
+  const V3d axes[3] = {row(indexToWorld, 0), row(indexToWorld, 1), row(indexToWorld, 2)};
+  const double voxelSize = axes[0].length();
+  hit.curvature = curvaturesOf(shape, voxelSize);
+  hit.viewCurvature = curvatureAlong(shape, V3d(axes[0].dot(direction), axes[1].dot(direction),
+                                                axes[2].dot(direction))) /
+                      voxelSize;
+  if (!hit.isTurned) return;
+  hit.facetNormal = -hit.facetNormal;
+  hit.normal = -hit.normal;
+  hit.curvature = turned(hit.curvature);
+  hit.viewCurvature = -hit.viewCurvature;
 }
 
 }  // namespace render

@@ -16,17 +16,11 @@ struct SurfaceShape {
   double interpolationError = 0;    ///< bound on |trilinear − smooth|, from second differences
 };
 
-/// Fills in the normals of a hit, and how far the surface may be off. `isTurned` is known before.
+/// Fills in the normals and curvatures of a hit, and how far the surface may be off. `isTurned` is
+/// known before.
 /// @param indexToWorld  a rotation with uniform scale, and a translation
 /// @param direction     of the ray: what faces it is the normal where φ has no gradient
-void addNormals(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWorld,
-                const Imath::V3d& direction);
-
-/// From gradient and Hessian [Goldman05], per world unit: k1 ≥ k2, spheres positive. Zero where the
-/// gradient vanishes.
-[[nodiscard]] CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize);
-
-/// The same surface from its other side.
-[[nodiscard]] CurvatureSample turned(const CurvatureSample& sample);
+void addShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWorld,
+              const Imath::V3d& direction);
 
 }  // namespace render

@@ -41,6 +41,16 @@ void validateDraw(const Invocation& in) {
   if (in.integer("samples") > kMostSamples)
     throw UsageError(fmt::format("render: --samples {} is too many; {} are the most",
                                  in.text("samples"), kMostSamples));
+  const std::string style = in.text("style");
+  if ((style == "matcap") != in.given("matcap"))
+    throw UsageError(in.given("matcap")
+                         ? "render: --matcap is for --style matcap; leave it out, or give that"
+                         : "render: --style matcap needs --matcap with a PNG of a shaded ball");
+  if (in.given("line") && style != "tone" && style != "ink")
+    throw UsageError(fmt::format("render: the style {} draws no lines; leave --line out", style));
+  if (in.given("curvature-range") && (style == "lit" || style == "tone" || style == "matcap"))
+    throw UsageError(fmt::format(
+        "render: the style {} shows no curvatures; leave --curvature-range out", style));
   if (render::imageFormat(in.text("file"), in.text("format")).empty()) {
     throw UsageError(
         fmt::format("render: '{}' is of no known format; use .exr or .png, or --format",
@@ -117,12 +127,31 @@ render::Filter filterOf(const Invocation& in) {
   return render::Filter::Trilinear;
 }
 
+std::vector<std::string> styleNames() {
+  std::vector<std::string> names;
+  for (const render::Style style : render::kStyles) names.emplace_back(render::styleName(style));
+  return names;
+}
+
+render::StyleOptions styleOf(const Invocation& in) {
+  render::StyleOptions options;
+  for (const render::Style style : render::kStyles)
+    if (in.text("style") == render::styleName(style)) options.style = style;
+  if (in.given("curvature-range")) options.curvatureRange = in.number("curvature-range");
+  options.lineWidth = in.number("line");
+  if (in.given("matcap"))
+    options.matcap =
+        std::make_shared<const render::ColourImage>(render::readColourPng(in.text("matcap")));
+  return options;
+}
+
 Value draw(Invocation& in) {
   const render::Scene scene = sceneOf(in);
   const std::string renderer = in.text("renderer");
   const bool isBoth = renderer == "both";
   render::RenderOptions options{.samples = static_cast<int>(in.integer("samples")),
                                 .filter = filterOf(in),
+                                .style = styleOf(in),
                                 .maxBytes = in.maxMemory,
                                 .progress = in.progress};
   if (isBoth) options.progress = levelset::subProgress(in.progress, 0, 0.5);
@@ -320,6 +349,24 @@ void addPictureOperators(std::vector<Operator>& all) {
                    "B-spline, which shrinks, or the one with corrected coefficients",
             .fallback = "trilinear",
             .choices = {"trilinear", "bspline", "bspline-qi"}},
+           {.name = "style",
+            .type = ParamType::Choice,
+            .doc = "of the colours; mean, gauss and principal are curvatures",
+            .fallback = "lit",
+            .choices = styleNames()},
+           {.name = "matcap",
+            .type = ParamType::Path,
+            .doc = "a PNG of a shaded ball, for --style matcap"},
+           {.name = "curvature-range",
+            .type = ParamType::Number,
+            .doc = "per world unit: half way along the colours, and where ridges and valleys "
+                   "begin; default: 40 over the diagonal",
+            .range = Range::Positive},
+           {.name = "line",
+            .type = ParamType::Number,
+            .doc = "pixels: width of the silhouettes of tone and ink",
+            .fallback = "2",
+            .range = Range::NonNegative},
            {.name = "samples",
             .type = ParamType::Integer,
             .doc = "of colour per pixel",

@@ -68,13 +68,11 @@ Value makeScene(Invocation& in) {
     throw UsageError(fmt::format("scene: {} colours for {} solids; give as many", colours.size(),
                                  in.operands.size()));
   render::ViewedScene viewed;
-  Imath::Box3d bounds;
   for (std::size_t i = 0; i < in.operands.size(); ++i) {
     viewed.scene.solids.push_back({.band = in.band(i),
                                    .colour = colours[i % colours.size()],
                                    .id = static_cast<std::uint32_t>(i + 1),
                                    .name = names[i]});
-    bounds.extendBy(in.operands[i].plan().bounds);
   }
   if (in.given("csg")) viewed.scene.csg = render::CsgExpression(in.text("csg"), names);
   for (std::size_t i = 0; i < names.size() && in.given("csg"); ++i)
@@ -82,7 +80,7 @@ Value makeScene(Invocation& in) {
       in.notes.warnings.push_back(
           fmt::format("scene: --csg does not name '{}', which is not drawn", names[i]));
   viewed.hasCamera = givesCamera(in);
-  if (viewed.hasCamera) viewed.scene.camera = cameraOf(in, bounds);
+  if (viewed.hasCamera) viewed.scene.camera = cameraOf(in, viewed.scene.bounds());
   return Value(std::move(viewed));
 }
 

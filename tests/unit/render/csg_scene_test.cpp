@@ -67,6 +67,17 @@ TEST(CsgExpression, RefusesWhatItCannotRead) {
   EXPECT_THROW(CsgExpression("a - (" + closed + ")", kNames), levelset::UsageError);
 }
 
+TEST(CsgExpression, TellsWhereItIs) {
+  const auto box = [](double low, double high) { return Imath::Box3d(V3d(low), V3d(high)); };
+  const std::vector<Imath::Box3d> boxes = {box(0, 2), box(1, 5), box(7, 8)};
+  const auto boundsOf = [&](const char* text) { return CsgExpression(text, kNames).bounds(boxes); };
+  EXPECT_EQ(boundsOf("a | b"), box(0, 5));
+  EXPECT_EQ(boundsOf("a - b"), box(0, 2));
+  EXPECT_EQ(boundsOf("a & b"), box(1, 2));
+  EXPECT_TRUE(boundsOf("a & c").isEmpty());
+  EXPECT_EQ(boundsOf("a & c | b"), box(1, 5));
+}
+
 /// Two solids a and b, seen from where a scene of a alone is.
 Scene sceneOfTwo(const NarrowBand& a, const NarrowBand& b, const std::string& csg) {
   Scene scene = support::sceneOf(a);

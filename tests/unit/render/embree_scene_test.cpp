@@ -272,7 +272,7 @@ TEST(EmbreeScene, FollowsRotatedAndScaledGrids) {
     ASSERT_TRUE(hit.found);
     ASSERT_NEAR(hit.distance, 1.5, 0.5 * h * h + 1e-7);
     ASSERT_LT((hit.normal + d).length(), 0.01);
-    ASSERT_NEAR(scene.curvatureAt(hit).mean, 2, 0.05);
+    ASSERT_NEAR(hit.curvature.mean, 2, 0.05);
   }
 }
 
@@ -329,7 +329,7 @@ TEST(EmbreeScene, CurvatureOfATorus) {
     ASSERT_TRUE(hit.found);
     EXPECT_LT((hit.normal - n).length(), 2e-3);
     const double around = std::cos(v) / (ring + tube * std::cos(v)), across = 1 / tube;
-    const CurvatureSample c = scene.curvatureAt(hit);
+    const CurvatureSample c = hit.curvature;
     ASSERT_NEAR(c.k1, across, 0.02 * across);
     ASSERT_NEAR(c.k2, around, 0.02 * across);
     ASSERT_NEAR(c.mean, (across + around) / 2, 0.02 * across);

@@ -1,0 +1,15 @@
+#include "render/scene.h"
+
+namespace render {
+
+Imath::Box3d Scene::bounds() const {
+  std::vector<Imath::Box3d> boxes;
+  Imath::Box3d all;
+  for (const Solid& solid : solids) {
+    boxes.push_back(solid.band.isEmpty() ? Imath::Box3d() : solid.band.zeroSetBounds());
+    all.extendBy(boxes.back());
+  }
+  return csg.isEmpty() ? all : csg.bounds(boxes);
+}
+
+}  // namespace render

@@ -1,0 +1,154 @@
+#include "render/shading/style.h"
+
+#include <fmt/core.h>
+#include <png.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <numbers>
+
+#include "levelset/error.h"
+
+namespace render {
+namespace {
+
+using Imath::C3f;
+
+C3f mixed(const C3f& a, const C3f& b, double share) {
+  return a + (b - a) * static_cast<float>(share);
+}
+
+/// From −1 to 1, half of the way at ±range: nothing is cut off, whatever the scale.
+double squeezed(double curvature, double range) {
+  return 2 / std::numbers::pi * std::atan(curvature / range);
+}
+
+double ramp(double from, double to, double x) {
+  const double t = std::clamp((x - from) / (to - from), 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
+
+const C3f kNeutral(0.62f, 0.60f, 0.57f);
+
+/// Between two colours that differ by lightness as little as by the sign that they tell.
+C3f diverging(double value, const C3f& negative, const C3f& positive) {
+  return mixed(kNeutral, value < 0 ? negative : positive, std::abs(value));
+}
+
+float linearOf(std::uint8_t byte) {
+  const double x = byte / 255.0;
+  return static_cast<float>(x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4));
+}
+
+}  // namespace
+
+const char* styleName(Style style) {
+  switch (style) {
+    case Style::Tone:
+      return "tone";
+    case Style::Mean:
+      return "mean";
+    case Style::Gauss:
+      return "gauss";
+    case Style::Principal:
+      return "principal";
+    case Style::Accessibility:
+      return "accessibility";
+    case Style::Ink:
+      return "ink";
+    case Style::Matcap:
+      return "matcap";
+    default:
+      return "lit";
+  }
+}
+
+bool usesLights(Style style) {
+  return style != Style::Tone && style != Style::Ink && style != Style::Matcap;
+}
+
+C3f meanColour(const CurvatureSample& sample, double range) {
+  return diverging(squeezed(sample.mean, range), C3f(0.02f, 0.16f, 0.55f),
+                   C3f(0.62f, 0.06f, 0.02f));
+}
+
+C3f gaussColour(const CurvatureSample& sample, double range) {
+  // Of the size of a curvature, so that one range serves both.
+  const double k = std::copysign(std::sqrt(std::abs(sample.gauss)), sample.gauss);
+  return diverging(squeezed(k, range), C3f(0.02f, 0.30f, 0.10f), C3f(0.62f, 0.24f, 0.0f));
+}
+
+C3f principalColour(const CurvatureSample& sample, double range) {
+  // Corners and edges of the table, whose entries are k1 ≥ k2: bowl, groove, saddle, ridge, dome.
+  const double a = squeezed(sample.k1, range), b = squeezed(sample.k2, range);
+  const C3f dome(0.65f, 0.05f, 0.03f), ridge(0.75f, 0.48f, 0.04f), saddle(0.06f, 0.42f, 0.10f),
+      groove(0.03f, 0.40f, 0.52f), bowl(0.04f, 0.08f, 0.55f);
+  const double size = std::min(1.0, std::hypot(a, b));
+  if (size == 0) return kNeutral;
+  // −1 for bowls, −1/2 grooves, 0 saddles, 1/2 ridges, 1 domes [Koenderink92].
+  const double index = 2 / std::numbers::pi * std::atan2(a + b, a - b);
+  const C3f* table[5] = {&bowl, &groove, &saddle, &ridge, &dome};
+  const double place = std::clamp(2 * (index + 1), 0.0, 4.0);
+  const int cell = std::min(3, static_cast<int>(place));
+  return mixed(kNeutral, mixed(*table[cell], *table[cell + 1], place - cell), size);
+}
+
+double accessibilityOf(const CurvatureSample& sample, double range) {
+  return 1 - ramp(0, 1, squeezed(std::max(0.0, -sample.k2), range));
+}
+
+double silhouetteOf(double cosine, double viewCurvature, double width) {
+  // The line ends where the surface has bent away by its width; where it bends towards the eye
+  // there is no outline to be near to.
+  const double bend = std::clamp(width * viewCurvature, 0.0, 1.0);
+  const double limit = std::sqrt(bend * (2 - bend));
+  return limit > 0 && cosine <= limit ? 1 : 0;
+}
+
+C3f ColourImage::at(double x, double y) const {
+  const auto place = [](double unit, int size, int& cell) {
+    const double p = std::clamp(unit * size - 0.5, 0.0, static_cast<double>(size - 1));
+    cell = std::min(static_cast<int>(p), std::max(0, size - 2));
+    return p - cell;
+  };
+  int column, row;
+  const double u = place(x, width, column), v = place(y, height, row);
+  const auto pixel = [&](int dx, int dy) {
+    const auto r = static_cast<std::size_t>(std::min(row + dy, height - 1)),
+               c = static_cast<std::size_t>(std::min(column + dx, width - 1));
+    return pixels[r * static_cast<std::size_t>(width) + c];
+  };
+  return mixed(mixed(pixel(0, 0), pixel(1, 0), u), mixed(pixel(0, 1), pixel(1, 1), u), v);
+}
+
+ColourImage readColourPng(const std::filesystem::path& path) {
+  std::error_code failed;
+  if (!std::filesystem::is_regular_file(path, failed))
+    throw levelset::IoError(
+        fmt::format("read image: there is no file '{}'; check the name", path.string()));
+  png_image png = {};
+  png.version = PNG_IMAGE_VERSION;
+  if (!png_image_begin_read_from_file(&png, path.c_str()))
+    throw levelset::InvalidInput(
+        fmt::format("read image: {} is no PNG: {}", path.string(), png.message));
+  constexpr double kMostPixels = 1 << 26;
+  if (static_cast<double>(png.width) * png.height > kMostPixels) {
+    png_image_free(&png);
+    throw levelset::ResourceLimit(fmt::format("read image: {} has {}x{} pixels, more than 2^26",
+                                              path.string(), png.width, png.height));
+  }
+  png.format = PNG_FORMAT_RGB;
+  std::vector<std::uint8_t> bytes(PNG_IMAGE_SIZE(png));
+  const png_color black = {0, 0, 0};
+  if (!png_image_finish_read(&png, &black, bytes.data(), 0, nullptr))
+    throw levelset::InvalidInput(
+        fmt::format("read image: {} is damaged: {}", path.string(), png.message));
+  ColourImage image{static_cast<int>(png.width), static_cast<int>(png.height), {}};
+  for (std::size_t i = 0; i + 2 < bytes.size(); i += 3)
+    image.pixels.emplace_back(linearOf(bytes[i]), linearOf(bytes[i + 1]), linearOf(bytes[i + 2]));
+  return image;
+}
+
+}  // namespace render
