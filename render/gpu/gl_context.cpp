@@ -157,11 +157,11 @@ GlContext::GlContext() : egl_(std::make_unique<Egl>()) {
     return string ? std::string(reinterpret_cast<const char*>(string)) : std::string("unknown");
   };
   description_ = text(GL_RENDERER) + ", OpenGL " + text(GL_VERSION);
-  GLint64 bytes = 0, blocks = 0;
-  gl_.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
-  gl_.GetInteger64v(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, &blocks);
-  largestBlock_ = static_cast<std::size_t>(bytes);
-  blockCount_ = static_cast<int>(blocks);
+  GLint64 texels = 0, units = 0;
+  gl_.GetInteger64v(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
+  gl_.GetInteger64v(GL_MAX_COMPUTE_TEXTURE_IMAGE_UNITS, &units);
+  largestTable_ = static_cast<std::size_t>(texels) * 4;
+  tableCount_ = static_cast<int>(units);
 }
 
 GlContext::~GlContext() = default;

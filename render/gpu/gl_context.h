@@ -18,13 +18,16 @@ namespace render {
 #define LEVELSMITH_GL_FUNCTIONS(X)                           \
   X(PFNGLATTACHSHADERPROC, AttachShader)                     \
   X(PFNGLBINDBUFFERBASEPROC, BindBufferBase)                 \
+  X(PFNGLBINDTEXTUREUNITPROC, BindTextureUnit)               \
   X(PFNGLCOMPILESHADERPROC, CompileShader)                   \
   X(PFNGLCREATEBUFFERSPROC, CreateBuffers)                   \
   X(PFNGLCREATEPROGRAMPROC, CreateProgram)                   \
   X(PFNGLCREATESHADERPROC, CreateShader)                     \
+  X(PFNGLCREATETEXTURESPROC, CreateTextures)                 \
   X(PFNGLDELETEBUFFERSPROC, DeleteBuffers)                   \
   X(PFNGLDELETEPROGRAMPROC, DeleteProgram)                   \
   X(PFNGLDELETESHADERPROC, DeleteShader)                     \
+  X(PFNGLDELETETEXTURESPROC, DeleteTextures)                 \
   X(PFNGLDISPATCHCOMPUTEPROC, DispatchCompute)               \
   X(PFNGLFINISHPROC, Finish)                                 \
   X(PFNGLGETERRORPROC, GetError)                             \
@@ -41,6 +44,7 @@ namespace render {
   X(PFNGLMEMORYBARRIERPROC, MemoryBarrier)                   \
   X(PFNGLNAMEDBUFFERDATAPROC, NamedBufferData)               \
   X(PFNGLSHADERSOURCEPROC, ShaderSource)                     \
+  X(PFNGLTEXTUREBUFFERPROC, TextureBuffer)                   \
   X(PFNGLUNIFORM1FVPROC, Uniform1fv)                         \
   X(PFNGLUNIFORM1IPROC, Uniform1i)                           \
   X(PFNGLUSEPROGRAMPROC, UseProgram)
@@ -79,10 +83,10 @@ class GlContext {
   const GlFunctions& gl() const { return gl_; }
   /// Renderer and version as the driver tells them.
   [[nodiscard]] const std::string& description() const { return description_; }
-  /// Bytes of the largest storage block.
-  [[nodiscard]] std::size_t largestBlock() const { return largestBlock_; }
-  /// Storage blocks that a compute shader can see.
-  [[nodiscard]] int blockCount() const { return blockCount_; }
+  /// Bytes of the largest buffer of 32-bit texels.
+  [[nodiscard]] std::size_t largestTable() const { return largestTable_; }
+  /// Of those that a compute shader can see.
+  [[nodiscard]] int tableCount() const { return tableCount_; }
   /// @pre current  @throws levelset::ResourceLimit when the context was lost or OpenGL reports an
   ///                       error, with `what` was being done
   void check(const char* what) const;
@@ -92,8 +96,8 @@ class GlContext {
   std::unique_ptr<Egl> egl_;
   GlFunctions gl_;
   std::string description_;
-  std::size_t largestBlock_ = 0;
-  int blockCount_ = 0;
+  std::size_t largestTable_ = 0;
+  int tableCount_ = 0;
   mutable std::mutex mutex_;
 };
 

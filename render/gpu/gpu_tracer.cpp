@@ -18,7 +18,9 @@ constexpr int kGroup = 64;                 // invocations
 constexpr std::size_t kOneRun = 1u << 18;  // rays: short enough for any watchdog
 constexpr int kRayParts = 12, kHitParts = 5;
 
-enum Binding : GLuint { kPages, kEntries, kMasks, kRays, kHits, kFirstValues };
+/// Storage blocks, and texture units.
+enum Binding : GLuint { kRays, kHits };
+enum Unit : GLuint { kPages, kEntries, kMasks, kFirstValues };
 
 /// What the kernel's words are in GLSL.
 constexpr const char* kDialect = R"GLSL(
@@ -45,11 +47,11 @@ uniform Fan fan;
 uniform int pagesY, pagesZ, tableSizeX, tableSizeY, tableSizeZ;
 uniform int firstRay, rayCount;
 
-layout(std430, binding = 0) readonly buffer Pages { int pages[]; };
-layout(std430, binding = 1) readonly buffer Entries { int entries[]; };
-layout(std430, binding = 2) readonly buffer Masks { int masks[]; };
-layout(std430, binding = 3) readonly buffer Rays { float rays[]; };
-layout(std430, binding = 4) writeonly buffer Hits { int hits[]; };
+layout(binding = 0) uniform isamplerBuffer pages;
+layout(binding = 1) uniform isamplerBuffer entries;
+layout(binding = 2) uniform isamplerBuffer masks;
+layout(std430, binding = 0) readonly buffer Rays { float rays[]; };
+layout(std430, binding = 1) writeonly buffer Hits { int hits[]; };
 
 Real real(float v) { return v; }
 Whole whole(int v) { return v; }
@@ -67,9 +69,9 @@ Whole bit(Bool c, int n) { return c ? n : 0; }
 Bool differ(Bool a, Bool b) { return a != b; }
 Bool any(Bool c) { return c; }
 Bool many(Bool walking, Bool alive) { return walking; }
-Whole loadPage(Whole i) { return pages[i]; }
-Whole loadEntry(Whole i) { return entries[i]; }
-Whole loadMask(Whole i) { return masks[i]; }
+Whole loadPage(Whole i) { return texelFetch(pages, i).x; }
+Whole loadEntry(Whole i) { return texelFetch(entries, i).x; }
+Whole loadMask(Whole i) { return texelFetch(masks, i).x; }
 )GLSL";
 
 constexpr const char* kMain = R"GLSL(
@@ -124,21 +126,20 @@ int passingNumber(int n) { return int(rays[11 * rayCount + n]); }
 void addShape(int n, Ray ray, Hit hit) {}
 )GLSL";
 
-/// Values in one storage block, or in several of 2^shift floats each.
+/// Values in one buffer of texels, or in several of 2^shift floats each.
 std::string valueText(int blocks, int shift) {
   std::string text;
   for (int b = 0; b < blocks; ++b) {
-    text += fmt::format(
-        "layout(std430, binding = {}) readonly buffer Values{} {{ float values{}[]; }};\n",
-        static_cast<int>(kFirstValues) + b, b, b);
+    text += fmt::format("layout(binding = {}) uniform samplerBuffer values{};\n",
+                        static_cast<int>(kFirstValues) + b, b);
   }
   text += "Real loadValue(Whole i) {\n";
   for (int b = 0; b + 1 < blocks; ++b)
-    text += fmt::format("  if (i >> {} == {}) return values{}[i & {}];\n", shift, b, b,
-                        (1 << shift) - 1);
-  text += blocks == 1
-              ? "  return values0[i];\n}\n"
-              : fmt::format("  return values{}[i & {}];\n}}\n", blocks - 1, (1 << shift) - 1);
+    text += fmt::format("  if (i >> {} == {}) return texelFetch(values{}, i & {}).x;\n", shift, b,
+                        b, (1 << shift) - 1);
+  text += blocks == 1 ? "  return texelFetch(values0, i).x;\n}\n"
+                      : fmt::format("  return texelFetch(values{}, i & {}).x;\n}}\n", blocks - 1,
+                                    (1 << shift) - 1);
   return text;
 }
 
@@ -184,35 +185,44 @@ GLuint compileCompute(const GlContext& context, const std::string& text) {
 }
 
 struct GpuTracer::Impl {
+  /// A buffer that shaders read as a texture: Mesa's llvmpipe gathers those by vectors, and storage
+  /// blocks lane by lane.
+  struct Texels {
+    GLuint buffer = 0, texture = 0;
+  };
   struct Tables {
-    GLuint pages = 0, entries = 0, masks = 0;
-    std::vector<GLuint> values;
+    Texels pages, entries, masks;
+    std::vector<Texels> values;
   };
 
   const GlContext& context;
   const GlFunctions& gl;
-  const std::size_t largestBlock;
+  const std::size_t largestTable;
   int shift = 0;  // of the number of floats in a block of values
   std::map<const KernelSolid*, Tables> tables;
   GLuint rays = 0, hits = 0;
   /// By the number of blocks of values, and is it a spline?
   std::map<std::pair<int, bool>, GLuint> pixelPrograms, rayPrograms;
 
-  Impl(const GlContext& context_, std::size_t largestBlock_)
+  Impl(const GlContext& context_, std::size_t largestTable_)
       : context(context_),
         gl(context_.gl()),
-        largestBlock(largestBlock_ > 0 ? largestBlock_ : context_.largestBlock()) {
-    shift = static_cast<int>(std::bit_width(largestBlock / sizeof(float))) - 1;
+        largestTable(largestTable_ > 0 ? largestTable_ : context_.largestTable()) {
+    shift = static_cast<int>(std::bit_width(largestTable / sizeof(float))) - 1;
     shift = std::min(shift, 30);  // numbers of values are ints
     gl.CreateBuffers(1, &rays);
     gl.CreateBuffers(1, &hits);
   }
 
+  void release(const Texels& texels) {
+    gl.DeleteTextures(1, &texels.texture);
+    gl.DeleteBuffers(1, &texels.buffer);
+  }
   /// @pre the context is current
   void release() {
     for (auto& [solid, t] : tables) {
-      for (const GLuint buffer : {t.pages, t.entries, t.masks}) gl.DeleteBuffers(1, &buffer);
-      for (const GLuint buffer : t.values) gl.DeleteBuffers(1, &buffer);
+      for (const Texels& texels : {t.pages, t.entries, t.masks}) release(texels);
+      for (const Texels& texels : t.values) release(texels);
     }
     for (const GLuint buffer : {rays, hits}) gl.DeleteBuffers(1, &buffer);
     for (const auto* programs : {&pixelPrograms, &rayPrograms})
@@ -221,40 +231,43 @@ struct GpuTracer::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  GLuint bufferOf(const void* data, std::size_t bytes) {
-    if (bytes > largestBlock) {
+  Texels texelsOf(const void* data, std::size_t bytes, GLenum format) {
+    if (bytes > largestTable) {
       throw levelset::ResourceLimit(fmt::format(
-          "render: a table of {} MB does not fit into the {} MB that a storage block of {} has; "
+          "render: a table of {} MB does not fit into the {} MB that a buffer texture of {} has; "
           "use larger voxels, or draw with --renderer cpu",
-          bytes >> 20, largestBlock >> 20, context.description()));
+          bytes >> 20, largestTable >> 20, context.description()));
     }
-    GLuint buffer = 0;
-    gl.CreateBuffers(1, &buffer);
-    gl.NamedBufferData(buffer, static_cast<GLsizeiptr>(bytes), data, GL_STATIC_DRAW);
-    return buffer;
+    Texels texels;
+    gl.CreateBuffers(1, &texels.buffer);
+    gl.NamedBufferData(texels.buffer, static_cast<GLsizeiptr>(bytes), data, GL_STATIC_DRAW);
+    gl.CreateTextures(GL_TEXTURE_BUFFER, 1, &texels.texture);
+    gl.TextureBuffer(texels.texture, format, texels.buffer);
+    return texels;
   }
 
   void upload(const KernelSolid& solid) {
     const BrickPool& pool = solid.pool;
     const std::size_t perBlock = std::size_t{1} << shift;
     const std::size_t blocks = (pool.value.size() + perBlock - 1) / perBlock;
-    if (blocks + kFirstValues > static_cast<std::size_t>(context.blockCount())) {
-      throw levelset::ResourceLimit(fmt::format(
-          "render: {} MB of values need {} storage blocks, and {} leaves {}; use larger voxels, or "
-          "draw with --renderer cpu",
-          pool.value.size() * 4 >> 20, blocks, context.description(),
-          context.blockCount() - static_cast<int>(kFirstValues)));
+    if (blocks + kFirstValues > static_cast<std::size_t>(context.tableCount())) {
+      throw levelset::ResourceLimit(
+          fmt::format("render: {} MB of values need {} buffer textures, and {} leaves {}; use "
+                      "larger voxels, or "
+                      "draw with --renderer cpu",
+                      pool.value.size() * 4 >> 20, blocks, context.description(),
+                      context.tableCount() - static_cast<int>(kFirstValues)));
     }
     Tables& t = tables[&solid];
     const auto whole = [&](const auto& data) {
-      return bufferOf(data.data(), data.size() * sizeof data[0]);
+      return texelsOf(data.data(), data.size() * sizeof data[0], GL_R32I);
     };
     t.pages = whole(pool.page);
     t.entries = whole(pool.entry);
     t.masks = whole(pool.mask);
     for (std::size_t first = 0; first < pool.value.size(); first += perBlock)
-      t.values.push_back(
-          bufferOf(pool.value.data() + first, 4 * std::min(perBlock, pool.value.size() - first)));
+      t.values.push_back(texelsOf(pool.value.data() + first,
+                                  4 * std::min(perBlock, pool.value.size() - first), GL_R32F));
   }
 
   GLuint programFor(const KernelSolid& solid, bool isPixels) {
@@ -295,13 +308,13 @@ struct GpuTracer::Impl {
     const auto bindTo = [&](GLuint place, GLuint buffer) {
       gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, place, buffer);
     };
-    bindTo(kPages, t.pages);
-    bindTo(kEntries, t.entries);
-    bindTo(kMasks, t.masks);
+    gl.BindTextureUnit(kPages, t.pages.texture);
+    gl.BindTextureUnit(kEntries, t.entries.texture);
+    gl.BindTextureUnit(kMasks, t.masks.texture);
     bindTo(kRays, rays);
     bindTo(kHits, hits);
     for (std::size_t b = 0; b < t.values.size(); ++b)
-      bindTo(kFirstValues + static_cast<GLuint>(b), t.values[b]);
+      gl.BindTextureUnit(kFirstValues + static_cast<GLuint>(b), t.values[b].texture);
   }
 
   /// @param shapes  of pixels only
@@ -342,9 +355,9 @@ struct GpuTracer::Impl {
   }
 };
 
-GpuTracer::GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestBlock) {
+GpuTracer::GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestTable) {
   const GlContext::Current current(context);
-  impl_ = std::make_unique<Impl>(context, largestBlock);
+  impl_ = std::make_unique<Impl>(context, largestTable);
   try {
     for (const KernelSolid& solid : scene.solids()) impl_->upload(solid);
   } catch (...) {

@@ -15,9 +15,9 @@ namespace render {
 class GpuTracer : public KernelTracer {
  public:
   /// @param context       must outlive it
-  /// @param largestBlock  bytes of a storage block at most; 0: what the driver says
+  /// @param largestTable  bytes of a buffer of texels at most; 0: what the driver says
   /// @throws levelset::ResourceLimit where the tables do not fit, or the shader does not compile
-  GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestBlock = 0);
+  GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestTable = 0);
   ~GpuTracer() override;
 
   void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,
