@@ -2,16 +2,44 @@
 // coefficients f − ∇²f/6 [Sigg05], and the gradient of the trilinear interpolant. Where the grid holds
 // the coefficients of the spline that rays meet, it is that one. In the words and the space of
 // roots.glsl.
+//
+// The coefficients are not made: what they weigh, less a sixth of the weights' second differences, is
+// what the values weigh. So every value is read once and kept nowhere; Mesa 22.3 gathers from arrays.
 
 CONST_FLOAT kSixth = 0.16666666667f;
 CONST_FLOAT kEighth = 0.125f;
 
-// Of the four points from cell − 1 on, on one axis: the uniform cubic B-spline and its derivatives.
-struct Weights {
-  Real value[4], slope[4], bend[4];
+// On one axis, of the six points from cell − 2 on: the weights of the uniform cubic B-spline and of
+// its derivatives, which are 0 at either end, and a sixth of their second differences.
+struct Stencil {
+  Real value[6], slope[6], bend[6];
+  Real valueBend[6], slopeBend[6], bendBend[6];
 };
 
-Weights splineWeights(Real a) {
+void fillStencil(INOUT_ARRAY(Real, weight, 6), INOUT_ARRAY(Real, bend, 6), Real p0, Real p1, Real p2,
+                 Real p3) {
+  VAR sixth = real(isSpline ? 0.0f : kSixth);
+  VAR b0 = p0 * sixth;
+  VAR b1 = (p1 - (p0 + p0)) * sixth;
+  VAR b2 = ((p0 + p2) - (p1 + p1)) * sixth;
+  VAR b3 = ((p1 + p3) - (p2 + p2)) * sixth;
+  VAR b4 = (p2 - (p3 + p3)) * sixth;
+  VAR b5 = p3 * sixth;
+  weight[0] = real(0.0f);
+  weight[1] = p0;
+  weight[2] = p1;
+  weight[3] = p2;
+  weight[4] = p3;
+  weight[5] = real(0.0f);
+  bend[0] = b0;
+  bend[1] = b1;
+  bend[2] = b2;
+  bend[3] = b3;
+  bend[4] = b4;
+  bend[5] = b5;
+}
+
+Stencil stencilAt(Real a) {
   VAR b = 1.0f - a;
   VAR aa = a * a;
   VAR bb = b * b;
@@ -25,20 +53,109 @@ Weights splineWeights(Real a) {
   VAR s3 = aa * 0.5f;
   VAR b1 = 3.0f * a - 2.0f;
   VAR b2 = 3.0f * b - 2.0f;
-  Weights w;
-  w.value[0] = v0;
-  w.value[1] = v1;
-  w.value[2] = v2;
-  w.value[3] = v3;
-  w.slope[0] = s0;
-  w.slope[1] = s1;
-  w.slope[2] = s2;
-  w.slope[3] = s3;
-  w.bend[0] = b;
-  w.bend[1] = b1;
-  w.bend[2] = b2;
-  w.bend[3] = a;
+  Stencil w;
+  fillStencil(w.value, w.valueBend, v0, v1, v2, v3);
+  fillStencil(w.slope, w.slopeBend, s0, s1, s2, s3);
+  fillStencil(w.bend, w.bendBend, b, b1, b2, a);
   return w;
+}
+
+// Six values along z.
+struct Column {
+  Real f0, f1, f2, f3, f4, f5;
+};
+
+Column columnAt(IN(Window) w, int i, int j) {
+  Whole nearBlocks = firstAt(w, i, j, 0);
+  Whole farBlocks = firstAt(w, i, j, 1);
+  Column c;
+  c.f0 = loadValue(select(w.farZ[0], farBlocks, nearBlocks) + w.stepZ[0]);
+  c.f1 = loadValue(select(w.farZ[1], farBlocks, nearBlocks) + w.stepZ[1]);
+  c.f2 = loadValue(select(w.farZ[2], farBlocks, nearBlocks) + w.stepZ[2]);
+  c.f3 = loadValue(select(w.farZ[3], farBlocks, nearBlocks) + w.stepZ[3]);
+  c.f4 = loadValue(select(w.farZ[4], farBlocks, nearBlocks) + w.stepZ[4]);
+  c.f5 = loadValue(select(w.farZ[5], farBlocks, nearBlocks) + w.stepZ[5]);
+  return c;
+}
+
+// Without its ends, which are not held where i or j are one.
+Column shortColumnAt(IN(Window) w, int i, int j) {
+  Whole nearBlocks = firstAt(w, i, j, 0);
+  Whole farBlocks = firstAt(w, i, j, 1);
+  Column c;
+  c.f0 = real(0.0f);
+  c.f1 = loadValue(select(w.farZ[1], farBlocks, nearBlocks) + w.stepZ[1]);
+  c.f2 = loadValue(select(w.farZ[2], farBlocks, nearBlocks) + w.stepZ[2]);
+  c.f3 = loadValue(select(w.farZ[3], farBlocks, nearBlocks) + w.stepZ[3]);
+  c.f4 = loadValue(select(w.farZ[4], farBlocks, nearBlocks) + w.stepZ[4]);
+  c.f5 = real(0.0f);
+  return c;
+}
+
+Real inner(IN(Column) c, IN_ARRAY(Real, weight, 6)) {
+  VAR sum = (c.f1 * weight[1] + c.f2 * weight[2]) + (c.f3 * weight[3] + c.f4 * weight[4]);
+  return sum;
+}
+
+Real whole6(IN(Column) c, IN_ARRAY(Real, weight, 6)) {
+  VAR sum = (c.f0 * weight[0] + c.f5 * weight[5]) +
+            ((c.f1 * weight[1] + c.f2 * weight[2]) + (c.f3 * weight[3] + c.f4 * weight[4]));
+  return sum;
+}
+
+// Of a slab across x: derivatives along y and z by their orders, of the values; and of the
+// coefficients but for what x has to do with them.
+struct Slab {
+  Real r00, r10, r20, r01, r11, r02;
+  Real p00, p10, p20, p01, p11, p02;
+};
+
+Slab noSlab() {
+  Slab s;
+  s.r00 = s.r10 = s.r20 = s.r01 = s.r11 = s.r02 = real(0.0f);
+  s.p00 = s.p10 = s.p20 = s.p01 = s.p11 = s.p02 = real(0.0f);
+  return s;
+}
+
+Real plus(Real sum, Real a, Real b) {
+  VAR result = sum + a * b;
+  return result;
+}
+
+Real minus(Real sum, Real a, Real b) {
+  VAR result = sum - a * b;
+  return result;
+}
+
+void addValues(INOUT(Slab) s, IN(Column) c, IN(Stencil) y, IN(Stencil) z, int j) {
+  VAR v = inner(c, z.value);
+  VAR slope = inner(c, z.slope);
+  VAR bend = inner(c, z.bend);
+  s.r00 = plus(s.r00, y.value[j], v);
+  s.r10 = plus(s.r10, y.slope[j], v);
+  s.r20 = plus(s.r20, y.bend[j], v);
+  s.r01 = plus(s.r01, y.value[j], slope);
+  s.r11 = plus(s.r11, y.slope[j], slope);
+  s.r02 = plus(s.r02, y.value[j], bend);
+  s.p00 = minus(s.p00, y.valueBend[j], v);
+  s.p10 = minus(s.p10, y.slopeBend[j], v);
+  s.p20 = minus(s.p20, y.bendBend[j], v);
+  s.p01 = minus(s.p01, y.valueBend[j], slope);
+  s.p11 = minus(s.p11, y.slopeBend[j], slope);
+  s.p02 = minus(s.p02, y.valueBend[j], bend);
+}
+
+void addColumn(INOUT(Slab) s, IN(Column) c, IN(Stencil) y, IN(Stencil) z, int j) {
+  addValues(s, c, y, z, j);
+  VAR v = inner(c, z.value) - whole6(c, z.valueBend);
+  VAR slope = inner(c, z.slope) - whole6(c, z.slopeBend);
+  VAR bend = inner(c, z.bend) - whole6(c, z.bendBend);
+  s.p00 = plus(s.p00, y.value[j], v);
+  s.p10 = plus(s.p10, y.slope[j], v);
+  s.p20 = plus(s.p20, y.bend[j], v);
+  s.p01 = plus(s.p01, y.value[j], slope);
+  s.p11 = plus(s.p11, y.slope[j], slope);
+  s.p02 = plus(s.p02, y.value[j], bend);
 }
 
 struct Shape {
@@ -48,126 +165,141 @@ struct Shape {
   Real error;                         // bound on |trilinear − smooth|, from second differences
 };
 
+// What the values of a slab have to do with the coefficients of those beside it.
+void takeBeside(INOUT(Shape) shape, IN(Slab) s, Real value, Real slope, Real bend) {
+  shape.gx = minus(shape.gx, slope, s.r00);
+  shape.gy = minus(shape.gy, value, s.r10);
+  shape.gz = minus(shape.gz, value, s.r01);
+  shape.hxx = minus(shape.hxx, bend, s.r00);
+  shape.hxy = minus(shape.hxy, slope, s.r10);
+  shape.hxz = minus(shape.hxz, slope, s.r01);
+  shape.hyy = minus(shape.hyy, value, s.r20);
+  shape.hyz = minus(shape.hyz, value, s.r11);
+  shape.hzz = minus(shape.hzz, value, s.r02);
+}
+
+void addSlab(INOUT(Shape) shape, IN(Slab) s, Real value, Real slope, Real bend) {
+  shape.gx = plus(shape.gx, slope, s.p00);
+  shape.gy = plus(shape.gy, value, s.p10);
+  shape.gz = plus(shape.gz, value, s.p01);
+  shape.hxx = plus(shape.hxx, bend, s.p00);
+  shape.hxy = plus(shape.hxy, slope, s.p10);
+  shape.hxz = plus(shape.hxz, slope, s.p01);
+  shape.hyy = plus(shape.hyy, value, s.p20);
+  shape.hyz = plus(shape.hyz, value, s.p11);
+  shape.hzz = plus(shape.hzz, value, s.p02);
+}
+
 Real magnitude(Real v) { return select(v < 0.0f, 0.0f - v, v); }
+
+Real bendOf(Real before, Real at, Real after) {
+  VAR bend = (before + after) - (at + at);
+  return magnitude(bend);
+}
+
+// Four corners of the cell, and how much the values bend there along y and z.
+struct Corners {
+  Real f00, f01, f10, f11;
+  Real b00, b01, b10, b11;
+};
+
+Corners cornersOf(IN(Column) c1, IN(Column) c2, IN(Column) c3, IN(Column) c4) {
+  Corners c;
+  c.f00 = c2.f2;
+  c.f01 = c2.f3;
+  c.f10 = c3.f2;
+  c.f11 = c3.f3;
+  VAR b00 = bendOf(c1.f2, c2.f2, c3.f2) + bendOf(c2.f1, c2.f2, c2.f3);
+  VAR b01 = bendOf(c1.f3, c2.f3, c3.f3) + bendOf(c2.f2, c2.f3, c2.f4);
+  VAR b10 = bendOf(c2.f2, c3.f2, c4.f2) + bendOf(c3.f1, c3.f2, c3.f3);
+  VAR b11 = bendOf(c2.f3, c3.f3, c4.f3) + bendOf(c3.f2, c3.f3, c3.f4);
+  c.b00 = b00;
+  c.b01 = b01;
+  c.b10 = b10;
+  c.b11 = b11;
+  return c;
+}
+
+// A bound from the corners of one slab between those beside it.
+Real errorOf(IN(Corners) before, IN(Corners) at, IN(Corners) after) {
+  VAR e00 = bendOf(before.f00, at.f00, after.f00) + at.b00;
+  VAR e01 = bendOf(before.f01, at.f01, after.f01) + at.b01;
+  VAR e10 = bendOf(before.f10, at.f10, after.f10) + at.b10;
+  VAR e11 = bendOf(before.f11, at.f11, after.f11) + at.b11;
+  VAR most = larger(larger(e00, e01), larger(e10, e11)) * kEighth;
+  return most;
+}
+
+// The trilinear interpolant's, between two slabs.
+void addTrilinear(INOUT(Shape) shape, IN(Corners) low, IN(Corners) high, Real a, Real b, Real c) {
+  VAR ra = 1.0f - a;
+  VAR rb = 1.0f - b;
+  VAR rc = 1.0f - c;
+  // Across y and z, of each slab; then their slopes along y and along z.
+  VAR v0 = between(between(low.f00, low.f01, c, rc), between(low.f10, low.f11, c, rc), b, rb);
+  VAR v1 = between(between(high.f00, high.f01, c, rc), between(high.f10, high.f11, c, rc), b, rb);
+  VAR y0 = between(low.f10 - low.f00, low.f11 - low.f01, c, rc);
+  VAR y1 = between(high.f10 - high.f00, high.f11 - high.f01, c, rc);
+  VAR z0 = between(low.f01 - low.f00, low.f11 - low.f10, b, rb);
+  VAR z1 = between(high.f01 - high.f00, high.f11 - high.f10, b, rb);
+  VAR tx = v1 - v0;
+  shape.tx = tx;
+  shape.ty = between(y0, y1, a, ra);
+  shape.tz = between(z0, z1, a, ra);
+}
 
 // @param cell  that holds the place
 // @param a, b, c  the place in it, from 0 to 1
 Shape shapeAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Real a, Real b, Real c) {
   Window w = windowAt(asked, cellX, cellY, cellZ);
-  VAR f[216];
-  for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j) {
-      Whole nearBlocks = columnAt(w, i, j, 0);
-      Whole farBlocks = columnAt(w, i, j, 1);
-      for (int k = 0; k < 6; ++k) {
-        int rims = int(i == 0 || i == 5) + int(j == 0 || j == 5) + int(k == 0 || k == 5);
-        if (rims > 1) continue;  // nobody asks for those
-        f[36 * i + 6 * j + k] = loadValue(select(w.farZ[k], farBlocks, nearBlocks) + w.stepZ[k]);
-      }
+  Stencil x = stencilAt(a);
+  Stencil y = stencilAt(b);
+  Stencil z = stencilAt(c);
+  Shape shape;
+  shape.gx = shape.gy = shape.gz = shape.tx = shape.ty = shape.tz = real(0.0f);
+  shape.hxx = shape.hyy = shape.hzz = shape.hxy = shape.hxz = shape.hyz = real(0.0f);
+  shape.error = real(0.0f);
+  Corners before;
+  Corners last;
+  before.f00 = before.f01 = before.f10 = before.f11 = real(0.0f);
+  before.b00 = before.b01 = before.b10 = before.b11 = real(0.0f);
+  last = before;
+  for (int i = 1; i < 5; ++i) {
+    Column c1 = columnAt(w, i, 1);
+    Column c2 = columnAt(w, i, 2);
+    Column c3 = columnAt(w, i, 3);
+    Column c4 = columnAt(w, i, 4);
+    Slab s = noSlab();
+    if (!isSpline) {
+      addValues(s, shortColumnAt(w, i, 0), y, z, 0);
+      addValues(s, shortColumnAt(w, i, 5), y, z, 5);
     }
+    addColumn(s, c1, y, z, 1);
+    addColumn(s, c2, y, z, 2);
+    addColumn(s, c3, y, z, 3);
+    addColumn(s, c4, y, z, 4);
+    addSlab(shape, s, x.value[i], x.slope[i], x.bend[i]);
+    takeBeside(shape, s, x.valueBend[i], x.slopeBend[i], x.bendBend[i]);
+    Corners now = cornersOf(c1, c2, c3, c4);
+    if (i == 3) addTrilinear(shape, last, now, a, b, c);
+    if (i >= 3) shape.error = larger(shape.error, errorOf(before, last, now));
+    before = last;
+    last = now;
   }
-
-  Weights x = splineWeights(a);
-  Weights y = splineWeights(b);
-  Weights z = splineWeights(c);
-  VAR error = real(0.0f);
-  VAR gx = real(0.0f);
-  VAR gy = real(0.0f);
-  VAR gz = real(0.0f);
-  VAR hxx = real(0.0f);
-  VAR hyy = real(0.0f);
-  VAR hzz = real(0.0f);
-  VAR hxy = real(0.0f);
-  VAR hxz = real(0.0f);
-  VAR hyz = real(0.0f);
-  for (int i = 0; i < 4; ++i) {
-    // Of a slab across x: value and derivatives along y and z.
-    VAR p = real(0.0f);
-    VAR py = real(0.0f);
-    VAR pz = real(0.0f);
-    VAR pyy = real(0.0f);
-    VAR pyz = real(0.0f);
-    VAR pzz = real(0.0f);
-    for (int j = 0; j < 4; ++j) {
-      VAR q = real(0.0f);
-      VAR qz = real(0.0f);
-      VAR qzz = real(0.0f);
-      for (int k = 0; k < 4; ++k) {
-        int n = 36 * (i + 1) + 6 * (j + 1) + (k + 1);
-        VAR twice = f[n] + f[n];
-        VAR bendX = (f[n - 36] + f[n + 36]) - twice;
-        VAR bendY = (f[n - 6] + f[n + 6]) - twice;
-        VAR bendZ = (f[n - 1] + f[n + 1]) - twice;
-        VAR coefficient = f[n];
-        if (!isSpline) coefficient = f[n] - ((bendX + bendY) + bendZ) * kSixth;
-        q = q + coefficient * z.value[k];
-        qz = qz + coefficient * z.slope[k];
-        qzz = qzz + coefficient * z.bend[k];
-        if ((i == 1 || i == 2) && (j == 1 || j == 2) && (k == 1 || k == 2)) {
-          VAR most = ((magnitude(bendX) + magnitude(bendY)) + magnitude(bendZ)) * kEighth;
-          error = larger(error, most);
-        }
-      }
-      p = p + q * y.value[j];
-      py = py + q * y.slope[j];
-      pyy = pyy + q * y.bend[j];
-      pz = pz + qz * y.value[j];
-      pyz = pyz + qz * y.slope[j];
-      pzz = pzz + qzz * y.value[j];
-    }
-    gx = gx + p * x.slope[i];
-    gy = gy + py * x.value[i];
-    gz = gz + pz * x.value[i];
-    hxx = hxx + p * x.bend[i];
-    hxy = hxy + py * x.slope[i];
-    hxz = hxz + pz * x.slope[i];
-    hyy = hyy + pyy * x.value[i];
-    hyz = hyz + pyz * x.value[i];
-    hzz = hzz + pzz * x.value[i];
-  }
-
-  VAR tx = real(0.0f);
-  VAR ty = real(0.0f);
-  VAR tz = real(0.0f);
-  VAR ra = 1.0f - a;
-  VAR rb = 1.0f - b;
-  VAR rc = 1.0f - c;
-  for (int i = 0; i < 2; ++i) {
-    for (int j = 0; j < 2; ++j) {
-      for (int k = 0; k < 2; ++k) {
-        VAR corner = f[36 * (2 + i) + 6 * (2 + j) + (2 + k)];
-        VAR wx = i == 1 ? a : ra;
-        VAR wy = j == 1 ? b : rb;
-        VAR wz = k == 1 ? c : rc;
-        VAR onX = corner * wy * wz;
-        VAR onY = corner * wx * wz;
-        VAR onZ = corner * wx * wy;
-        tx = i == 1 ? tx + onX : tx - onX;
-        ty = j == 1 ? ty + onY : ty - onY;
-        tz = k == 1 ? tz + onZ : tz - onZ;
-      }
-    }
+  for (int i = isSpline ? 6 : 0; i < 6; i += 5) {
+    Slab s = noSlab();
+    addValues(s, shortColumnAt(w, i, 1), y, z, 1);
+    addValues(s, shortColumnAt(w, i, 2), y, z, 2);
+    addValues(s, shortColumnAt(w, i, 3), y, z, 3);
+    addValues(s, shortColumnAt(w, i, 4), y, z, 4);
+    takeBeside(shape, s, x.valueBend[i], x.slopeBend[i], x.bendBend[i]);
   }
   if (isSpline) {  // the surface that rays meet
-    tx = gx;
-    ty = gy;
-    tz = gz;
-    error = real(0.0f);
+    shape.tx = shape.gx;
+    shape.ty = shape.gy;
+    shape.tz = shape.gz;
+    shape.error = real(0.0f);
   }
-  Shape shape;
-  shape.gx = gx;
-  shape.gy = gy;
-  shape.gz = gz;
-  shape.tx = tx;
-  shape.ty = ty;
-  shape.tz = tz;
-  shape.hxx = hxx;
-  shape.hyy = hyy;
-  shape.hzz = hzz;
-  shape.hxy = hxy;
-  shape.hxz = hxz;
-  shape.hyz = hyz;
-  shape.error = error;
   return shape;
 }
 

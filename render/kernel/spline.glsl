@@ -139,8 +139,8 @@ Crossing splineCrossingIn(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Rea
   VAR net[64];
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) {
-      Whole nearBlocks = columnAt(w, i + 1, j + 1, 0);
-      Whole farBlocks = columnAt(w, i + 1, j + 1, 1);
+      Whole nearBlocks = firstAt(w, i + 1, j + 1, 0);
+      Whole farBlocks = firstAt(w, i + 1, j + 1, 1);
       for (int k = 0; k < 4; ++k)
         net[16 * i + 4 * j + k] =
             loadValue(select(w.farZ[k + 1], farBlocks, nearBlocks) + w.stepZ[k + 1]);

@@ -34,7 +34,7 @@ Window windowAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ) {
 }
 
 // Numbers of the values at (i, j, 0) and on, as long as they are in the near blocks or in the far.
-Whole columnAt(IN(Window) w, int i, int j, int far) {
+Whole firstAt(IN(Window) w, int i, int j, int far) {
   Whole near_ = select(w.farX[i], w.base[4 + far], w.base[far]);
   Whole beyond = select(w.farX[i], w.base[6 + far], w.base[2 + far]);
   return select(w.farY[j], beyond, near_) + (w.stepX[i] + w.stepY[j]);
