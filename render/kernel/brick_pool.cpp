@@ -106,50 +106,85 @@ struct SplineBlock {
           origin.offsetBy((b[0] - 1) * kBlock, (b[1] - 1) * kBlock, (b[2] - 1) * kBlock);
       const Leaf* leaf = accessor.probeConstLeaf(at);
       const float tile = leaf ? 0.0f : accessor.getValue(at);
+      const int z0 = kFirst[b[2]], z1 = kFirst[b[2] + 1];
       for (int x = kFirst[b[0]]; x < kFirst[b[0] + 1]; ++x)
-        for (int y = kFirst[b[1]]; y < kFirst[b[1] + 1]; ++y)
-          for (int z = kFirst[b[2]]; z < kFirst[b[2] + 1]; ++z)
-            c[x][y][z] = leaf ? leaf->getValue(static_cast<openvdb::Index>(
-                                    ((x - 1) & 7) << 6 | ((y - 1) & 7) << 3 | ((z - 1) & 7)))
-                              : tile;
+        for (int y = kFirst[b[1]]; y < kFirst[b[1] + 1]; ++y) {
+          if (!leaf) {
+            std::fill(c[x][y] + z0, c[x][y] + z1, tile);
+            continue;
+          }
+          const float* row = leaf->buffer().data() + (((x - 1) & 7) << 6 | ((y - 1) & 7) << 3);
+          std::copy_n(row + ((z0 - 1) & 7), z1 - z0, c[x][y] + z0);
+        }
     }
+  }
+
+  using SignRows = std::array<std::array<unsigned, kAround>, kAround>;
+  /// Bit z of row (x, y): is the coefficient negative?
+  [[nodiscard]] SignRows signRows() const {
+    SignRows rows;
+    for (std::size_t x = 0; x < kAround; ++x)
+      for (std::size_t y = 0; y < kAround; ++y) {
+        unsigned row = 0;
+        for (int z = 0; z < kAround; ++z) row |= static_cast<unsigned>(c[x][y][z] < 0) << z;
+        rows[x][y] = row;
+      }
+    return rows;
   }
 
   /// Bit z: do the coefficients of the cell (x, y, z) differ in sign? Where not the spline, which
   /// lies between them, crosses nothing.
-  [[nodiscard]] unsigned mixedCells(int x, int y) const {
+  [[nodiscard]] static unsigned mixedCells(const SignRows& rows, std::size_t x, std::size_t y) {
     unsigned any = 0, all = ~0u;
-    for (int i = x; i < x + 4; ++i)
-      for (int j = y; j < y + 4; ++j) {
-        unsigned row = 0;
-        for (int z = 0; z < kAround; ++z) row |= static_cast<unsigned>(c[i][j][z] < 0) << z;
-        any |= row;
-        all &= row;
+    for (std::size_t i = x; i < x + 4; ++i)
+      for (std::size_t j = y; j < y + 4; ++j) {
+        any |= rows[i][j];
+        all &= rows[i][j];
       }
     any |= any >> 1;
     all &= all >> 1;
     return (any | any >> 2) & ~(all & all >> 2) & 0xff;
   }
 
-  /// Is the spline in the middle of the cell nearer to zero than its slopes let it get from there?
-  [[nodiscard]] bool mayCross(int x, int y, int z) const {
+  /// Bit z: is the spline in the middle of the cell (x, y, z) nearer to zero than its slopes let it
+  /// get from there? For a row at a time, whose points along z stand side by side.
+  [[nodiscard]] unsigned openCells(int x, int y) const {
     constexpr float kMiddle[4] = {1.0f / 48, 23.0f / 48, 23.0f / 48, 1.0f / 48};
     constexpr float kRoom = 1e-5f;  // of the largest coefficient, for single precision
-    float middle = 0, most = 0, slope[3] = {};
+    Row middle{}, most{}, slopeX{}, slopeY{}, slopeZ{};  // of all points at that z
+    const auto widen = [](float& to, float v) { to = std::max(to, v); };
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j) {
-        const float* v = c[x + i][y + j] + z;
-        float row = 0;
-        for (int k = 0; k < 4; ++k) {
-          row += kMiddle[k] * v[k];
-          most = std::max(most, std::abs(v[k]));
-          if (i < 3) slope[0] = std::max(slope[0], std::abs(c[x + i + 1][y + j][z + k] - v[k]));
-          if (j < 3) slope[1] = std::max(slope[1], std::abs(c[x + i][y + j + 1][z + k] - v[k]));
-          if (k < 3) slope[2] = std::max(slope[2], std::abs(v[k + 1] - v[k]));
+        const auto& v = c[x + i][y + j];
+        const auto& nextX = c[std::min(x + i + 1, x + 3)][y + j];
+        const auto& nextY = c[x + i][std::min(y + j + 1, y + 3)];
+        for (std::size_t z = 0; z < kAround; ++z) {
+          middle[z] += kMiddle[i] * kMiddle[j] * v[z];
+          widen(most[z], std::abs(v[z]));
+          widen(slopeX[z], std::abs(nextX[z] - v[z]));
+          widen(slopeY[z], std::abs(nextY[z] - v[z]));
         }
-        middle += kMiddle[i] * kMiddle[j] * row;
+        for (std::size_t z = 0; z + 1 < kAround; ++z) widen(slopeZ[z], std::abs(v[z + 1] - v[z]));
       }
-    return std::abs(middle) <= 0.5f * (slope[0] + slope[1] + slope[2]) + kRoom * most;
+    for (Row* row : {&most, &slopeX, &slopeY}) takeLargest(*row, 4);
+    takeLargest(slopeZ, 3);
+    unsigned open = 0;
+    for (std::size_t z = 0; z < kBlock; ++z) {
+      float value = 0;
+      for (std::size_t k = 0; k < 4; ++k) value += kMiddle[k] * middle[z + k];
+      const float slope = slopeX[z] + slopeY[z] + slopeZ[z];
+      const bool isOpen = std::abs(value) <= 0.5f * slope + kRoom * most[z];
+      open |= static_cast<unsigned>(isOpen) << z;
+    }
+    return open;
+  }
+
+ private:
+  using Row = std::array<float, kAround>;
+  /// In each place that of it and those behind it, 3 or 4 in all.
+  static void takeLargest(Row& row, std::size_t count) {
+    for (std::size_t z = 0; z + 1 < kAround; ++z) row[z] = std::max(row[z], row[z + 1]);
+    for (std::size_t z = 0; z < kBlock; ++z) row[z] = std::max(row[z], row[z + count - 2]);
   }
 };
 
@@ -157,15 +192,16 @@ struct SplineBlock {
 template <typename Accessor>
 void findSplineCrossings(const Accessor& accessor, Brick& brick) {
   const SplineBlock block(accessor, brick.origin);
+  const SplineBlock::SignRows signs = block.signRows();
   brick.mask = {};
   for (int x = 0; x < kBlock; ++x)
-    for (int y = 0; y < kBlock; ++y)
-      for (unsigned cells = block.mixedCells(x, y); cells != 0; cells &= cells - 1) {
-        const int z = std::countr_zero(cells);
-        if (!block.mayCross(x, y, z)) continue;
-        const unsigned bit = static_cast<unsigned>(x << 6 | y << 3 | z);
-        brick.mask[bit >> 5] |= 1u << (bit & 31);
-      }
+    for (int y = 0; y < kBlock; ++y) {
+      const unsigned mixed =
+          SplineBlock::mixedCells(signs, static_cast<std::size_t>(x), static_cast<std::size_t>(y));
+      if (mixed == 0) continue;
+      const unsigned bit = static_cast<unsigned>(x << 6 | y << 3);
+      brick.mask[bit >> 5] |= (mixed & block.openCells(x, y)) << (bit & 31);
+    }
 }
 
 /// The spline's coefficients f − ∇²f/6 in the place of the values, in leaves.
