@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Imath/ImathColor.h>
 #include <Imath/ImathVec.h>
 
 #include <cstddef>
@@ -21,8 +22,10 @@ struct Hit {
   CurvatureSample curvature;    ///< from the B-spline
   double viewCurvature = 0;     ///< of the normal section along the ray, per world unit
   double surfaceError = 0;      ///< bound on the interpolant's distance from a smooth surface
-  std::uint32_t id = 0;         ///< Solid::id
-  std::size_t solid = 0;        ///< index in Scene::solids
+  Imath::C3f colour{0};         ///< of the surface, linear
+  std::uint32_t id = 0;         ///< Solid::id or MeshPart::id
+  bool isMesh = false;          ///< has no curvature then
+  std::size_t solid = 0;        ///< index in Scene::solids, or Scene::meshes
   bool isTurned = false;        ///< is that solid's outside inside what is drawn? Normals and
                                 ///< curvatures tell of what is drawn
 };

@@ -9,7 +9,9 @@ Imath::Box3d Scene::bounds() const {
     boxes.push_back(solid.band.isEmpty() ? Imath::Box3d() : solid.band.zeroSetBounds());
     all.extendBy(boxes.back());
   }
-  return csg.isEmpty() ? all : csg.bounds(boxes);
+  if (!csg.isEmpty()) all = csg.bounds(boxes);
+  for (const MeshPart& part : meshes) all.extendBy(levelset::bounds(*part.mesh));
+  return all;
 }
 
 }  // namespace render

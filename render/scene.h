@@ -4,9 +4,11 @@
 #include <Imath/ImathVec.h>
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
 #include "render/camera.h"
 #include "render/csg.h"
@@ -27,11 +29,21 @@ struct Solid {
   std::string name = {};  ///< for the expression
 };
 
+/// Triangles beside the solids: drawn, lit and lighted through like them, of no use to the
+/// expression. Flat unless the vertices have normals; of their colours (sRGB) if they have some.
+struct MeshPart {
+  std::shared_ptr<const levelset::TriMesh> mesh;
+  Imath::C3f colour{0.66f, 0.62f, 0.56f};
+  std::uint32_t id = 1;
+  std::string name = {};
+};
+
 struct Scene {
   Camera camera;
   Light key;
   double ambient = 0.32;  ///< weight of the ambient term, dimmed by occlusion
   std::vector<Solid> solids;
+  std::vector<MeshPart> meshes = {};
   CsgExpression csg = {};  ///< what is drawn of the solids; empty: each of them
   /// A box that holds what is drawn; empty where nothing can be.
   [[nodiscard]] Imath::Box3d bounds() const;

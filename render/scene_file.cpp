@@ -14,6 +14,7 @@
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
+#include "levelset/files/mesh_file.h"
 #include "levelset/solids/transform.h"
 
 namespace render {
@@ -48,10 +49,22 @@ Json toJson(const Camera& camera) {
   return json;
 }
 
-std::vector<std::string> namesOf(const Scene& scene) {
+std::vector<std::string> solidNames(const Scene& scene) {
   std::vector<std::string> names;
   for (const Solid& solid : scene.solids) names.push_back(solid.name);
   return names;
+}
+
+void requireNames(const Scene& scene) {
+  std::vector<std::string> names = solidNames(scene);
+  for (const MeshPart& part : scene.meshes) names.push_back(part.name);
+  requireSceneNames(names);
+}
+
+/// Of a part of a scene, beside its file.
+std::filesystem::path fileBeside(const std::filesystem::path& file, const std::string& name,
+                                 const char* extension) {
+  return file.parent_path() / (file.stem().string() + "-" + name + extension);
 }
 
 /// Reads a document, knowing what it is for what it says when something is wrong.
@@ -143,12 +156,12 @@ class Reader {
     return light;
   }
 
-  /// But for its band.
-  [[nodiscard]] Solid solid(const Json& json, std::size_t number_, const std::string& where) const {
-    requireKnown(json, {"name", "file", "grid", "transform", "colour", "id"}, where);
-    Solid solid;
+  /// What solids and meshes have in common. @param number_  of the part, from 1 on
+  template <typename Part>
+  void readPart(const Json& json, std::size_t number_, const std::string& where,
+                Part& solid) const {
     solid.name = text(json, "name", where);
-    solid.id = static_cast<std::uint32_t>(number_ + 1);
+    solid.id = static_cast<std::uint32_t>(number_);
     if (json.contains("id")) {
       const double id = number(json, "id", where);
       if (!(id >= 1 && id <= 4294967295.0) || id != std::floor(id))
@@ -162,7 +175,6 @@ class Reader {
           refuse(where, "has a \"colour\" that is not from 0 to 1");
       solid.colour = Imath::C3f(colour);
     }
-    return solid;
   }
 
   [[nodiscard]] Imath::M44d matrix(const Json& json, const std::string& where) const {
@@ -192,40 +204,82 @@ Json documentOf(const std::filesystem::path& file) {
   return Json::parse(text, nullptr, /*allow_exceptions=*/false);
 }
 
+/// The parts of a job that takes one after the other.
+class Parts {
+ public:
+  Parts(const levelset::Progress& progress, std::size_t count)
+      : progress_(progress), count_(static_cast<double>(count)) {}
+  [[nodiscard]] levelset::Progress next() {
+    const double first = done_++;
+    return levelset::subProgress(progress_, first / count_, done_ / count_);
+  }
+
+ private:
+  const levelset::Progress& progress_;
+  double count_, done_ = 0;
+};
+
+void readSolid(const Reader& reader, const Json& json, const std::filesystem::path& file,
+               const ReadSceneOptions& options, const levelset::Progress& progress, Scene& scene) {
+  const std::string where = fmt::format("solid {}", scene.solids.size() + 1);
+  reader.requireKnown(json, {"name", "file", "grid", "transform", "colour", "id"}, where);
+  Solid solid;
+  reader.readPart(json, scene.solids.size() + 1, where, solid);
+  const std::filesystem::path source = file.parent_path() / reader.text(json, "file", where);
+  levelset::BandRepairs repairs;
+  solid.band = levelset::readBand(
+      source, {.grid = json.contains("grid") ? reader.text(json, "grid", where) : "",
+               .maxMemory = options.maxMemory,
+               .repairs = &repairs,
+               .progress = progress});
+  if (solid.band.isOpenSurface())
+    reader.refuse(where, "is the band of an open surface, which holds no solid");
+  if (options.repairs) options.repairs(repairs, source);
+  if (json.contains("transform"))
+    solid.band = levelset::transform(solid.band, reader.matrix(json, where));
+  scene.solids.push_back(std::move(solid));
+}
+
+void readMeshPart(const Reader& reader, const Json& json, const std::filesystem::path& file,
+                  const ReadSceneOptions& options, const levelset::Progress& progress,
+                  Scene& scene) {
+  const std::string where = fmt::format("mesh {}", scene.meshes.size() + 1);
+  reader.requireKnown(json, {"name", "file", "transform", "colour", "id"}, where);
+  MeshPart part;
+  reader.readPart(json, scene.solids.size() + scene.meshes.size() + 1, where, part);
+  levelset::TriMesh mesh = levelset::readMesh(
+      file.parent_path() / reader.text(json, "file", where),
+      {.attributes = true, .maxMemory = options.maxMemory, .progress = progress});
+  if (json.contains("transform"))
+    mesh = levelset::transform(std::move(mesh), reader.matrix(json, where));
+  part.mesh = std::make_shared<const levelset::TriMesh>(std::move(mesh));
+  scene.meshes.push_back(std::move(part));
+}
+
 }  // namespace
 
 bool isSceneFormat(const std::string& name) {
   return name == "json" || std::filesystem::path(name).extension() == ".json";
 }
 
-void requireSolidNames(const std::vector<std::string>& names) {
+void requireSceneNames(const std::vector<std::string>& names) {
   std::set<std::string> seen;
   for (const std::string& name : names) {
     const auto isWord = [](unsigned char c) { return std::isalnum(c) || c == '_'; };
     if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0])) ||
         !std::all_of(name.begin(), name.end(), isWord))
       throw levelset::UsageError(fmt::format(
-          "scene: '{}' cannot name a solid; take letters, digits and _, no digit first", name));
+          "scene: '{}' cannot name a part; take letters, digits and _, no digit first", name));
     if (!seen.insert(name).second)
       throw levelset::UsageError(
-          fmt::format("scene: two solids are called '{}'; give each a name of its own", name));
+          fmt::format("scene: two parts are called '{}'; give each a name of its own", name));
   }
-}
-
-std::vector<std::filesystem::path> solidFiles(const std::filesystem::path& file,
-                                              const std::vector<std::string>& names) {
-  std::vector<std::filesystem::path> files;
-  for (const std::string& name : names)
-    files.push_back(file.parent_path() / (file.stem().string() + "-" + name + ".vdb"));
-  return files;
 }
 
 void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
                 const levelset::Progress& progress) {
   const Scene& scene = viewed.scene;
-  const std::vector<std::string> names = namesOf(scene);
-  requireSolidNames(names);
-  const std::vector<std::filesystem::path> files = solidFiles(file, names);
+  requireNames(scene);
   Json json;
   json["format"] = kFormat;
   json["version"] = kVersion;
@@ -237,23 +291,25 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
                    {"strength", scene.key.strength},
                    {"softness", scene.key.softness / kDegree}};
   json["ambient"] = scene.ambient;
+  const auto entryOf = [&](const auto& part, const char* extension) -> Json {
+    return {{"name", part.name},
+            {"file", fileBeside(file, part.name, extension).filename().string()},
+            {"colour", colourJson(part.colour)},
+            {"id", part.id}};
+  };
   json["solids"] = Json::array();
-  for (std::size_t i = 0; i < scene.solids.size(); ++i) {
-    const Solid& solid = scene.solids[i];
-    json["solids"].push_back({{"name", solid.name},
-                              {"file", files[i].filename().string()},
-                              {"colour", colourJson(solid.colour)},
-                              {"id", solid.id}});
-  }
+  for (const Solid& solid : scene.solids) json["solids"].push_back(entryOf(solid, ".vdb"));
+  for (const MeshPart& part : scene.meshes) json["meshes"].push_back(entryOf(part, ".ply"));
   if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
 
   levelset::FileTarget target(file);
-  for (std::size_t i = 0; i < files.size(); ++i)
-    levelset::writeBand(files[i], scene.solids[i].band,
-                        {.name = names[i],
-                         .progress = levelset::subProgress(
-                             progress, static_cast<double>(i) / static_cast<double>(files.size()),
-                             static_cast<double>(i + 1) / static_cast<double>(files.size()))});
+  Parts parts(progress, scene.solids.size() + scene.meshes.size());
+  for (const Solid& solid : scene.solids)
+    levelset::writeBand(fileBeside(file, solid.name, ".vdb"), solid.band,
+                        {.name = solid.name, .progress = parts.next()});
+  for (const MeshPart& part : scene.meshes)
+    levelset::writeMesh(fileBeside(file, part.name, ".ply"), *part.mesh,
+                        {.progress = parts.next()});
   {
     std::ofstream stream(target.path(), std::ios::binary);
     stream << json.dump(2) << '\n';
@@ -273,42 +329,25 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   if (reader.text(json, "format", whole) != kFormat) reader.refuse(whole, "holds no scene");
   if (reader.number(json, "version", whole) != kVersion)
     reader.refuse(whole, fmt::format("is not of version {}", kVersion));
-  reader.requireKnown(json, {"format", "version", "camera", "light", "ambient", "solids", "csg"},
-                      whole);
+  reader.requireKnown(
+      json, {"format", "version", "camera", "light", "ambient", "solids", "meshes", "csg"}, whole);
   ViewedScene viewed;
   Scene& scene = viewed.scene;
   viewed.hasCamera = json.contains("camera");
   if (viewed.hasCamera) scene.camera = reader.camera(json.at("camera"));
   if (json.contains("light")) scene.key = reader.light(json.at("light"));
   if (json.contains("ambient")) scene.ambient = reader.number(json, "ambient", whole);
-  const Json& solids = reader.member(json, "solids", whole);
-  if (!solids.is_array() || solids.empty()) reader.refuse(whole, "has no solids");
-  for (const Json& entry : solids) {
-    const std::string where = fmt::format("solid {}", scene.solids.size() + 1);
-    scene.solids.push_back(reader.solid(entry, scene.solids.size(), where));
-  }
-  const std::vector<std::string> names = namesOf(scene);
-  requireSolidNames(names);
-  if (json.contains("csg")) scene.csg = CsgExpression(reader.text(json, "csg", whole), names);
-
-  const auto count = static_cast<double>(scene.solids.size());
-  for (std::size_t i = 0; i < scene.solids.size(); ++i) {
-    const std::string where = fmt::format("solid {}", i + 1);
-    const std::filesystem::path source = file.parent_path() / reader.text(solids[i], "file", where);
-    levelset::BandRepairs repairs;
-    scene.solids[i].band = levelset::readBand(
-        source, {.grid = solids[i].contains("grid") ? reader.text(solids[i], "grid", where) : "",
-                 .maxMemory = options.maxMemory,
-                 .repairs = &repairs,
-                 .progress = levelset::subProgress(options.progress, static_cast<double>(i) / count,
-                                                   static_cast<double>(i + 1) / count)});
-    if (scene.solids[i].band.isOpenSurface())
-      reader.refuse(where, "is the band of an open surface, which holds no solid");
-    if (options.repairs) options.repairs(repairs, source);
-    if (solids[i].contains("transform"))
-      scene.solids[i].band =
-          levelset::transform(scene.solids[i].band, reader.matrix(solids[i], where));
-  }
+  const Json none = Json::array();
+  const Json& solids = json.contains("solids") ? json.at("solids") : none;
+  const Json& meshes = json.contains("meshes") ? json.at("meshes") : none;
+  if (!solids.is_array() || !meshes.is_array() || (solids.empty() && meshes.empty()))
+    reader.refuse(whole, "has no solids and no meshes");
+  Parts parts(options.progress, solids.size() + meshes.size());
+  for (const Json& entry : solids) readSolid(reader, entry, file, options, parts.next(), scene);
+  for (const Json& entry : meshes) readMeshPart(reader, entry, file, options, parts.next(), scene);
+  requireNames(scene);
+  if (json.contains("csg"))
+    scene.csg = CsgExpression(reader.text(json, "csg", whole), solidNames(scene));
   return viewed;
 }
 

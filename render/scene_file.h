@@ -11,7 +11,7 @@
 #include "levelset/progress.h"
 #include "render/scene.h"
 
-/// Scenes in files: JSON that names the level sets' own files, by paths from its folder.
+/// Scenes in files: JSON that names the files of level sets and meshes, by paths from its folder.
 namespace render {
 
 /// A scene, and whether somebody said where it is seen from.
@@ -23,11 +23,7 @@ struct ViewedScene {
 /// True for a name, or a format, that readScene understands: .json.
 [[nodiscard]] bool isSceneFormat(const std::string& name);
 
-/// The files beside `file` that writeScene makes, one for each solid.
-[[nodiscard]] std::vector<std::filesystem::path> solidFiles(const std::filesystem::path& file,
-                                                            const std::vector<std::string>& names);
-
-/// Writes the solids, then the scene.
+/// Writes the solids and meshes beside it, as FILE-NAME.vdb and FILE-NAME.ply, then the scene.
 /// @throws levelset::IoError; InvalidInput for a number that is not finite
 void writeScene(const std::filesystem::path& file, const ViewedScene& scene,
                 const levelset::Progress& progress = {});
@@ -44,8 +40,9 @@ struct ReadSceneOptions {
 [[nodiscard]] ViewedScene readScene(const std::filesystem::path& file,
                                     const ReadSceneOptions& options = {});
 
-/// @throws levelset::UsageError unless each has letters, digits and _ only, no digit first, and
-///         none is there twice
-void requireSolidNames(const std::vector<std::string>& names);
+/// Of solids and meshes. @throws levelset::UsageError unless each has letters, digits and _ only,
+/// no
+///         digit first, and none is there twice
+void requireSceneNames(const std::vector<std::string>& names);
 
 }  // namespace render

@@ -8,6 +8,7 @@
 
 #include "levelset/error.h"
 #include "render/embree/embree_renderer.h"
+#include "render/embree/mesh_rays.h"
 #include "render/embree/surface_blocks_vdb.h"
 #include "render/embree/surface_spline_vdb.h"
 #include "render/shading/surface_shape.h"
@@ -34,6 +35,7 @@ struct RaySolid {
   V3d centre;
   double scale;
   Filter filter;
+  Imath::C3f colour;
 
   [[nodiscard]] DrawnField field() const { return {levelset::vdb(band).tree(), filter}; }
   [[nodiscard]] SurfaceShape shapeAt(const V3d& world) const {
@@ -187,8 +189,10 @@ void requireRay(const V3d& origin, const V3d& direction) {
 struct EmbreeScene::Impl {
   std::vector<RaySolid> solids;
   CsgExpression csg;  // of those
-  Box3d bounds;       // of the crossing cells
-  Box3d rayBounds;    // a little larger: where rays may start
+  MeshRays meshes;
+  Box3d allBounds;  // with the meshes
+  Box3d bounds;     // of the crossing cells
+  Box3d rayBounds;  // a little larger: where rays may start
   V3d centre;
   double scale = 1;
   RTCDevice device = nullptr;
@@ -210,12 +214,17 @@ struct EmbreeScene::Impl {
                                   double& moved, RTCRay& ray) const;
   /// Of what the expression makes of the solids, up to `limit` of the query.
   std::optional<CsgChange> findCsg(RayQuery& query, RTCRay ray) const;
+  /// @pre the ray leads somewhere
+  [[nodiscard]] Hit intersectSolids(const V3d& origin, const V3d& direction, double near,
+                                    double far) const;
   void complete(Hit& hit, const RayQuery& query, const RaySolid& solid, double moved,
                 double t) const;
 };
 
-EmbreeScene::Impl::Impl(const Scene& source, Filter filter) {
+EmbreeScene::Impl::Impl(const Scene& source, Filter filter) : meshes(source) {
   gather(source, filter);
+  allBounds = bounds;
+  allBounds.extendBy(meshes.bounds());
   if (bounds.isEmpty()) return;
   try {
     build();
@@ -238,6 +247,7 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
     entry.blocks = surfaceBlocks(entry.field());
     entry.id = solid.id;
     entry.index = i;
+    entry.colour = solid.colour;
     for (const SurfaceBlock& block : entry.blocks)
       bounds.extendBy(Imath::transform(block.bounds(), entry.indexToWorld));
     if (!entry.blocks.empty()) solids.push_back(std::move(entry));
@@ -337,6 +347,7 @@ void EmbreeScene::Impl::complete(Hit& hit, const RayQuery& query, const RaySolid
   hit.position = query.origin + query.direction * t;
   hit.id = solid.id;
   hit.solid = solid.index;
+  hit.colour = solid.colour;
   addShape(hit, solid.shapeAt(hit.position), solid.indexToWorld, query.direction);
 }
 
@@ -345,28 +356,39 @@ EmbreeScene::EmbreeScene(const Scene& scene, Filter filter)
 EmbreeScene::~EmbreeScene() = default;
 EmbreeScene::EmbreeScene(EmbreeScene&&) noexcept = default;
 
-Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
+Hit EmbreeScene::Impl::intersectSolids(const V3d& origin, const V3d& direction, double near,
+                                       double far) const {
   Hit hit;
   double moved;
   RTCRayHit rayHit;
-  auto query = impl_->prepare(origin, direction, near, far, moved, rayHit.ray);
+  auto query = prepare(origin, direction, near, far, moved, rayHit.ray);
   if (!query) return hit;
-  if (!impl_->csg.isEmpty()) {
-    if (const auto change = impl_->findCsg(*query, rayHit.ray)) {
+  if (!csg.isEmpty()) {
+    if (const auto change = findCsg(*query, rayHit.ray)) {
       hit.isTurned = change->isTurned;
-      impl_->complete(hit, *query, impl_->solids[change->solid], moved, change->t);
+      complete(hit, *query, solids[change->solid], moved, change->t);
     }
     return hit;
   }
   rayHit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   rayHit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(impl_->scene, &query->embree, &rayHit);
-  if (query->solid) impl_->complete(hit, *query, *query->solid, moved, query->nearest);
+  rtcIntersect1(scene, &query->embree, &rayHit);
+  if (query->solid) complete(hit, *query, *query->solid, moved, query->nearest);
   return hit;
+}
+
+Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
+  const Hit onSolid = impl_->intersectSolids(origin, direction, near, far);
+  if (impl_->meshes.isEmpty()) return onSolid;
+  const double end = onSolid.found ? onSolid.distance : far;
+  Hit onMesh = impl_->meshes.intersect(origin + direction * near, direction, end - near);
+  onMesh.distance += near;
+  return onMesh.found ? onMesh : onSolid;
 }
 
 bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double near,
                              double far) const {
+  if (impl_->meshes.isOccluded(origin + direction * near, direction, far - near)) return true;
   double moved;
   RTCRay ray;
   auto query = impl_->prepare(origin, direction, near, far, moved, ray);
@@ -377,7 +399,7 @@ bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double nea
 }
 
 const Box3d& EmbreeScene::bounds() const {
-  return impl_->bounds;
+  return impl_->allBounds;
 }
 
 }  // namespace render

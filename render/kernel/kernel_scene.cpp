@@ -94,7 +94,8 @@ struct PackedRays {
 
 }  // namespace
 
-KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter) {
+KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter)
+    : meshes_(scene), bounds_(meshes_.bounds()) {
   // A block for each leaf; those the surface does not cross are built and dropped.
   double leaves = 0;
   for (const Solid& solid : scene.solids)
@@ -219,6 +220,9 @@ std::vector<char> KernelScene::findBlocked(const KernelTracer& tracer,
     else
       blockCsg(tracer, rays, first, last, blocked);
   }
+  for (std::size_t i = 0; i < rays.size() && !meshes_.isEmpty(); ++i)
+    if (!blocked[i] && meshes_.isOccluded(rays[i].origin, rays[i].direction, rays[i].reach))
+      blocked[i] = 1;
   return blocked;
 }
 

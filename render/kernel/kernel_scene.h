@@ -9,6 +9,7 @@
 
 #include "levelset/memory_limit.h"
 #include "render/csg.h"
+#include "render/embree/mesh_rays.h"
 #include "render/kernel/brick_pool.h"
 #include "render/kernel/ray_block.h"
 #include "render/kernel/ray_fan.h"
@@ -60,11 +61,13 @@ class KernelScene {
                        Filter filter = Filter::Trilinear);
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
-  /// World-space box of the cells that hold surface; empty when there are none.
+  /// World-space box of the cells that hold surface, and of the meshes; empty when there are none.
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
+  [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
   [[nodiscard]] std::size_t bytes() const;
   [[nodiscard]] std::size_t blocksLeftOut() const;
 
+  /// Of the solids; meshes() are for the caller.
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
   /// @return for each ray 1 if it meets something within its reach, else 0
   [[nodiscard]] std::vector<char> findBlocked(const KernelTracer& tracer,
@@ -81,6 +84,7 @@ class KernelScene {
 
   std::vector<KernelSolid> solids_;  // by id
   CsgExpression csg_;                // of those
+  MeshRays meshes_;
   Imath::Box3d bounds_;
 };
 

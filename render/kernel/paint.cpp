@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <limits>
 #include <mutex>
 
 #include "render/shading/surface_shape.h"
@@ -49,6 +50,14 @@ std::size_t KernelPainter::numberOf(const Pixel& pixel) const {
 }
 
 Hit KernelPainter::hitOf(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const {
+  const Hit onSolid = hits.solid[i] < 0 ? Hit() : hitOnSolid(ray, hits, i);
+  if (surfaces_.meshes().isEmpty()) return onSolid;
+  const double far = onSolid.found ? onSolid.distance : std::numeric_limits<double>::max();
+  const Hit onMesh = surfaces_.meshes().intersect(ray.origin, ray.direction, far);
+  return onMesh.found ? onMesh : onSolid;
+}
+
+Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const {
   const KernelSolid& solid = surfaces_.solids()[static_cast<std::size_t>(hits.solid[i])];
   Hit hit;
   hit.found = true;
@@ -56,6 +65,7 @@ Hit KernelPainter::hitOf(const Camera::Ray& ray, const PixelHits& hits, std::siz
   hit.position = ray.origin + ray.direction * hit.distance;
   hit.id = solid.id;
   hit.solid = solid.index;
+  hit.colour = scene_.solids[solid.index].colour;
   hit.isTurned = hits.turned[i] != 0;
   addShape(hit, hits.shapes.at(i), solid.tableToWorld, ray.direction);
   hit.surfaceError += kCastError * solid.voxelSize;
@@ -72,10 +82,10 @@ void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixe
   }
   const PixelHits hits = surfaces_.castPixels(tracer, at);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (hits.solid[i] < 0) continue;
     const std::size_t number = numberOf(pixels[i]);
     const Camera::Ray ray = scene_.camera.ray(pixels[i].x + 0.5, pixels[i].y + 0.5);
     const Hit hit = hitOf(ray, hits, i);
+    if (!hit.found) continue;
     layers_.setHit(number, scene_.camera, hit);
     if (options_.curvature) layers_.setCurvature(number, hit.curvature);
   }
@@ -118,11 +128,11 @@ void KernelPainter::paintColours(const KernelTracer& tracer,
     };
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       if (rays.size() > kMostLightRays) addColours();
-      if (hits.solid[i] < 0) continue;
+      const Camera::Ray ray = scene_.camera.ray(places[i].x, places[i].y);
       Lit point;
       point.pixel = i;
-      const Camera::Ray ray = scene_.camera.ray(places[i].x, places[i].y);
       point.hit = hitOf(ray, hits, i);
+      if (!point.hit.found) continue;
       point.direction = ray.direction;
       point.range = shader_.addRays(point.hit, point.direction, pixels[i].x, pixels[i].y, s, rays);
       points.push_back(point);

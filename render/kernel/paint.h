@@ -32,8 +32,9 @@ class KernelPainter {
   /// Neighbours next to each other: squares of four.
   [[nodiscard]] static std::vector<Pixel> pixelsOf(const PixelBox& box);
   [[nodiscard]] std::size_t numberOf(const Pixel& pixel) const;
-  /// What the ray meets at number i.
+  /// What the ray of number i meets first, if anything.
   [[nodiscard]] Hit hitOf(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
+  [[nodiscard]] Hit hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
   void paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
   void paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
 

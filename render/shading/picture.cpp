@@ -124,6 +124,11 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
       {"ls:normal", filter == Filter::BSpline ? "bspline" : "bspline-qi"},
       {"ls:grid", grids},
       {"ls:voxelSize", voxelSizes}};
+  std::string meshes;
+  for (const MeshPart& part : scene.meshes)
+    meshes +=
+        fmt::format("{}{} triangles", meshes.empty() ? "" : ", ", part.mesh->triangles.size());
+  if (!meshes.empty()) attributes["ls:mesh"] = meshes;
   attributes["ls:style"] = styleName(options.style.style);
   if (!scene.csg.isEmpty()) attributes["ls:csg"] = scene.csg.text();
   return attributes;

@@ -158,7 +158,7 @@ C3f Shader::colour(const Hit& hit, const V3d& direction, const LightRays& range,
 }
 
 C3f Shader::albedoOf(const Hit& hit) const {
-  const C3f& own = scene_.solids[hit.solid].colour;
+  const C3f& own = hit.colour;
   switch (options_.style.style) {
     case Style::Mean:
       return meanColour(hit.curvature, curvatureRange_);
@@ -206,7 +206,7 @@ double Shader::lineAt(const Hit& hit, const Frame& frame, const V3d& direction) 
 }
 
 C3f Shader::toneColour(const Hit& hit, const Frame& frame, const V3d& direction) const {
-  const C3f& own = scene_.solids[hit.solid].colour;
+  const C3f& own = hit.colour;
   const C3f cool = C3f(0.02f, 0.03f, 0.22f) + scaled(own, 0.25),
             warm = C3f(0.16f, 0.13f, 0.0f) + scaled(own, 0.75);
   const double share = 0.5 + 0.5 * frame.normal.dot(key_);

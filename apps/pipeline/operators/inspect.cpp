@@ -208,6 +208,9 @@ Json valueInfo(const Value& value) {
                                 {"id", solid.id},
                                 {"voxel_size", solid.band.voxelSize()},
                                 {"active_voxels", solid.band.activeVoxelCount()}});
+    for (const render::MeshPart& part : scene.meshes)
+      json["meshes"].push_back(
+          {{"name", part.name}, {"id", part.id}, {"triangles", part.mesh->triangles.size()}});
     if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
   } else {
     const std::vector<mapping::Patch>& patches = value.patch().patches;

@@ -27,6 +27,8 @@ render::Scene sceneOf(Invocation& in) {
   render::ViewedScene viewed;
   if (drawn.kind() == Kind::Scene)
     viewed = drawn.scene();
+  else if (drawn.kind() == Kind::Mesh)
+    viewed.scene.meshes.push_back({std::make_shared<const levelset::TriMesh>(drawn.mesh())});
   else
     viewed.scene.solids.push_back({.band = drawn.band()});
   viewed.scene.camera =
@@ -317,7 +319,7 @@ void addPictureOperators(std::vector<Operator>& all) {
   Operator picture = {
       .name = "render",
       .group = "Pictures",
-      .summary = "draw a level set or a scene to an EXR with all layers, or a PNG",
+      .summary = "draw a level set, a mesh or a scene to an EXR with all layers, or a PNG",
       .details =
           "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y "
           "N.Z, P.X P.Y P.Z, "
@@ -373,7 +375,7 @@ void addPictureOperators(std::vector<Operator>& all) {
             .fallback = "4",
             .range = Range::Positive},
            {.name = "format", .type = ParamType::Text, .doc = "exr or png; default: by extension"}},
-      .operands = {{Kind::Band, Kind::Scene}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Scene}},
       .flow = Flow::PassesThrough,
       .run = draw,
       .plan = planDraw,

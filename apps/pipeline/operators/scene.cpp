@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -23,26 +24,26 @@ std::vector<std::string> wordsOf(const std::string& text) {
   return words;
 }
 
-/// By --names, else what --as called them, else solid1, solid2, …
-std::vector<std::string> solidNames(const Invocation& in) {
+/// By --names, else what --as called them, else part1, part2, …
+std::vector<std::string> partNames(const Invocation& in) {
   std::vector<std::string> names;
   if (in.given("names")) {
     names = wordsOf(in.text("names"));
     if (names.size() != in.operands.size())
-      throw UsageError(fmt::format("scene: {} names for {} solids; give as many", names.size(),
+      throw UsageError(fmt::format("scene: {} names for {} parts; give as many", names.size(),
                                    in.operands.size()));
   } else {
     names = in.operandNames;
     names.resize(in.operands.size());
     for (std::size_t i = 0; i < names.size(); ++i)
-      if (names[i].empty()) names[i] = fmt::format("solid{}", i + 1);
+      if (names[i].empty()) names[i] = fmt::format("part{}", i + 1);
   }
-  render::requireSolidNames(names);
+  render::requireSceneNames(names);
   return names;
 }
 
-/// One for each solid, or as many as there are by turns.
-std::vector<Imath::C3f> solidColours(const Invocation& in) {
+/// One for each part, or as many as there are by turns.
+std::vector<Imath::C3f> partColours(const Invocation& in) {
   std::vector<Imath::C3f> colours;
   if (in.given("colours")) {
     for (const Imath::V3d& colour : in.points("colours")) {
@@ -62,23 +63,30 @@ std::vector<Imath::C3f> solidColours(const Invocation& in) {
 }
 
 Value makeScene(Invocation& in) {
-  const std::vector<std::string> names = solidNames(in);
-  const std::vector<Imath::C3f> colours = solidColours(in);
+  const std::vector<std::string> names = partNames(in);
+  const std::vector<Imath::C3f> colours = partColours(in);
   if (in.given("colours") && colours.size() != in.operands.size())
-    throw UsageError(fmt::format("scene: {} colours for {} solids; give as many", colours.size(),
+    throw UsageError(fmt::format("scene: {} colours for {} parts; give as many", colours.size(),
                                  in.operands.size()));
   render::ViewedScene viewed;
+  render::Scene& scene = viewed.scene;
+  std::vector<std::string> solids;
   for (std::size_t i = 0; i < in.operands.size(); ++i) {
-    viewed.scene.solids.push_back({.band = in.band(i),
-                                   .colour = colours[i % colours.size()],
-                                   .id = static_cast<std::uint32_t>(i + 1),
-                                   .name = names[i]});
+    const Imath::C3f& colour = colours[i % colours.size()];
+    const auto id = static_cast<std::uint32_t>(i + 1);
+    if (in.operands[i].kind() == Kind::Mesh) {
+      scene.meshes.push_back(
+          {std::make_shared<const levelset::TriMesh>(in.mesh(i)), colour, id, names[i]});
+      continue;
+    }
+    scene.solids.push_back({.band = in.band(i), .colour = colour, .id = id, .name = names[i]});
+    solids.push_back(names[i]);
   }
-  if (in.given("csg")) viewed.scene.csg = render::CsgExpression(in.text("csg"), names);
-  for (std::size_t i = 0; i < names.size() && in.given("csg"); ++i)
-    if (!viewed.scene.csg.uses(i))
+  if (in.given("csg")) scene.csg = render::CsgExpression(in.text("csg"), solids);
+  for (std::size_t i = 0; i < solids.size() && in.given("csg"); ++i)
+    if (!scene.csg.uses(i))
       in.notes.warnings.push_back(
-          fmt::format("scene: --csg does not name '{}', which is not drawn", names[i]));
+          fmt::format("scene: --csg does not name '{}', which is not drawn", solids[i]));
   viewed.hasCamera = givesCamera(in);
   if (viewed.hasCamera) viewed.scene.camera = cameraOf(in, viewed.scene.bounds());
   return Value(std::move(viewed));
@@ -102,13 +110,16 @@ void addSceneOperators(std::vector<Operator>& all) {
   Operator scene = {
       .name = "scene",
       .group = "Pictures",
-      .summary = "level sets to be drawn together, or what an expression makes of them",
+      .summary =
+          "level sets and meshes to be drawn together, or what an expression makes of solids",
       .details =
           "With --csg the rays of 'render' cut the solids as they go: a | b is what is in either, "
           "a & b in both, a - b in a alone. Nothing is resampled, each keeps its voxels. The names "
-          "are those of --as. Surfaces of one and the same place on different grids are told apart "
+          "are those of --as. Meshes stand beside, by their vertices' normals and colours if they "
+          "have "
+          "some. Surfaces of one and the same place on different grids are told apart "
           "by rounding only: let what is taken away stick out. 'write scene.json' saves it, with "
-          "the level sets in files beside it.",
+          "the parts in files beside it.",
       .example =
           "levelsmith box --size 2,2,2 --voxel 0.05 --as b ! sphere --radius 1.3 --voxel "
           "0.03 --as s ! scene @b @s --csg 'b - s' ! render cut.png --size 320x240",
@@ -117,11 +128,11 @@ void addSceneOperators(std::vector<Operator>& all) {
                   .doc = "what is drawn, as '(a | b) - c'; default: each of them"},
                  {.name = "names",
                   .type = ParamType::Text,
-                  .doc = "of the solids, blanks between them; default: those of --as"},
+                  .doc = "of the parts, blanks between them; default: those of --as"},
                  {.name = "colours",
                   .type = ParamType::Points,
-                  .doc = "of the solids: red,green,blue from 0 to 1, blanks between them"}},
-      .operands = {{Kind::Band}},
+                  .doc = "of the parts: red,green,blue from 0 to 1, blanks between them"}},
+      .operands = {{Kind::Band, Kind::Mesh}},
       .takesMore = true,
       .resultKind = [](const Invocation&) { return Kind::Scene; },
       .run = makeScene,

@@ -48,6 +48,25 @@ TEST_F(Scenes, AreTheSameAfterTheyWereSaved) {
   EXPECT_NE(levelsmith("compare-images a.exr d.exr").code, 0);
 }
 
+TEST_F(Scenes, HoldMeshesToo) {
+  const Outcome made =
+      levelsmith(kTwo.substr(0, kTwo.find("! scene")) +
+                 "! sphere --radius 0.4 --center 1,1,1 --voxel 0.1 ! mesh --as m ! scene @b @s @m "
+                 "--csg 'b - s' "
+                 "! write cut.json ! render a.exr --samples 1 --size 64x48 --renderer both");
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_TRUE(exists("cut-m.ply"));
+  const Outcome again = levelsmith(
+      "read cut.json ! render b.exr --samples 1 --size 64x48 --renderer gpu ! info --json");
+  ASSERT_EQ(again.code, 0) << again.err;
+  EXPECT_EQ(Json::parse(again.out)["meshes"][0]["id"], 3);
+  const Outcome same = levelsmith("compare-images a.exr b.exr");
+  EXPECT_EQ(same.code, 0) << same.out << same.err;
+  EXPECT_EQ(levelsmith("read cut-m.ply ! render m.png --size 64x48").code, 0);
+  EXPECT_EQ(readChanged("cut-m.ply", "cut-b.vdb").code, 2);
+  EXPECT_EQ(readChanged("b - s", "b - m").code, 2);  // a mesh is no solid
+}
+
 TEST_F(Scenes, TellWhatIsInThem) {
   const Outcome told = levelsmith(kTwo + "--csg 's | b' ! info --json");
   ASSERT_EQ(told.code, 0) << told.err;
