@@ -262,6 +262,12 @@ class Comparer {
            const double d = vectorDifference("P", i);
            return d > 0 && hasDepth ? d / std::max({depth(i), distance(i), extent}) : d;
          }});
+    // A ray that grazes a surface is within it for the square root of how far it dips in.
+    add({"thickness"}, {"thickness", "relative", {1e-5, 1e-2}, [this, extent](std::size_t i) {
+                          const double d =
+                              apart(value(a_, "thickness", i), value(b_, "thickness", i));
+                          return d > 0 ? d / std::max(depth(i), extent) : 0;
+                        }});
     // The angle between unit vectors, precise where it is small. Where a ray grazes the surface the
     // places stand off each other, and the normals by that times the curvature.
     add({"N.X", "N.Y", "N.Z"}, {"N", "radians", {2e-4, 1.7e-3}, [this](std::size_t i) {

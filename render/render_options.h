@@ -13,8 +13,9 @@ struct RenderOptions {
   int ambientSamples = 16;  ///< per colour sample; 0: no occlusion
   int shadowSamples = 4;    ///< per colour sample; 0: no shadows
   Filter filter = Filter::Trilinear;
-  StyleOptions style = {};                          ///< of the colours
-  bool curvature = true;                            ///< layers curvature.mean .gauss .k1 .k2
+  StyleOptions style = {};  ///< of the colours
+  bool thickness = false;   ///< layer thickness: how far the ray is within the solids
+  bool curvature = true;    ///< layers curvature.mean .gauss .k1 .k2
   std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< for the image and the scene
   levelset::Progress progress = {};
 };

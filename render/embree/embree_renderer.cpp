@@ -30,7 +30,7 @@ struct PixelPainter {
         rays(rays_),
         options(options_),
         shader(scene_, rays_.bounds().size().length(), options_),
-        layers(image, options_.curvature) {}
+        layers(image, options_) {}
 
   void paint(int x, int y) const {
     const std::size_t i =
@@ -43,6 +43,8 @@ struct PixelPainter {
   /// From the pixel's centre.
   void paintData(int x, int y, std::size_t i) const {
     const Camera::Ray ray = scene.camera.ray(x + 0.5, y + 0.5);
+    if (options.thickness)
+      layers.thickness[i] = static_cast<float>(rays.thickness(ray.origin, ray.direction));
     const Hit hit = rays.intersect(ray.origin, ray.direction);
     if (!hit.found) return;
     layers.setHit(i, scene.camera, hit);

@@ -23,6 +23,7 @@ using Imath::V3d;
 /// at its box. Then origin, direction and box carry errors of some 2^-24 each, and this covers
 /// them.
 constexpr double kFloatPad = 2e-6;
+constexpr double kNoEnd = 1e300;
 
 struct RaySolid {
   levelset::NarrowBand band;  // keeps the tree alive
@@ -212,6 +213,8 @@ struct EmbreeScene::Impl {
   /// the origin was moved towards the scene.
   std::optional<RayQuery> prepare(const V3d& origin, const V3d& direction, double near, double far,
                                   double& moved, RTCRay& ray) const;
+  /// Every change of sides of the ray, by solid, as far as there is surface.
+  [[nodiscard]] std::vector<std::vector<SideChange>> allChanges(RayQuery& query, RTCRay ray) const;
   /// Of what the expression makes of the solids, up to `limit` of the query.
   std::optional<CsgChange> findCsg(RayQuery& query, RTCRay ray) const;
   /// @pre the ray leads somewhere
@@ -326,7 +329,8 @@ std::optional<RayQuery> EmbreeScene::Impl::prepare(const V3d& origin, const V3d&
   return query;
 }
 
-std::optional<CsgChange> EmbreeScene::Impl::findCsg(RayQuery& query, RTCRay ray) const {
+std::vector<std::vector<SideChange>> EmbreeScene::Impl::allChanges(RayQuery& query,
+                                                                   RTCRay ray) const {
   std::vector<std::vector<SideChange>> changes(solids.size());
   query.changes = &changes;
   RTCRayHit all;
@@ -335,6 +339,12 @@ std::optional<CsgChange> EmbreeScene::Impl::findCsg(RayQuery& query, RTCRay ray)
   all.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   all.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(scene, &query.embree, &all);
+  query.changes = nullptr;
+  return changes;
+}
+
+std::optional<CsgChange> EmbreeScene::Impl::findCsg(RayQuery& query, RTCRay ray) const {
+  std::vector<std::vector<SideChange>> changes = allChanges(query, ray);
   auto change = firstChange(csg, changes);
   if (change && change->t > query.limit) change.reset();
   return change;
@@ -396,6 +406,35 @@ bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double nea
   if (!impl_->csg.isEmpty()) return impl_->findCsg(*query, ray).has_value();
   rtcOccluded1(impl_->scene, &query->embree, &ray);
   return ray.tfar < 0;
+}
+
+double EmbreeScene::thickness(const V3d& origin, const V3d& direction) const {
+  double moved;
+  RTCRay ray;
+  auto query = impl_->prepare(origin, direction, 0, kNoEnd, moved, ray);
+  if (!query) return 0;
+  auto changes = impl_->allChanges(*query, ray);
+  // Where nothing is said, what any of them holds.
+  const auto isWithin = [&](const std::vector<char>& inside) {
+    if (!impl_->csg.isEmpty()) return impl_->csg.holds(inside.data());
+    return std::find(inside.begin(), inside.end(), 1) != inside.end();
+  };
+  std::vector<char> inside(changes.size(), 0);
+  std::vector<std::pair<SideChange, std::size_t>> all;
+  for (std::size_t s = 0; s < changes.size(); ++s) {
+    putInOrder(changes[s]);
+    if (!changes[s].empty() && !changes[s][0].goesIn) inside[s] = 1;
+    for (const SideChange& change : changes[s]) all.emplace_back(change, s);
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.first.t < b.first.t; });
+  double length = 0, from = 0;
+  for (const auto& [change, solid] : all) {
+    if (isWithin(inside)) length += change.t - from;
+    from = change.t;
+    inside[solid] = change.goesIn ? 1 : 0;
+  }
+  return length;
 }
 
 const Box3d& EmbreeScene::bounds() const {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "levelset/vdb.h"
 #include "render/kernel/csg_walk.h"
@@ -208,6 +210,63 @@ PixelHits KernelScene::castCsg(const KernelTracer& tracer, const PixelBlock& pix
     result.shapes.take(i, next[s].shapes, i);
   }
   return result;
+}
+
+std::vector<double> KernelScene::thickness(const KernelTracer& tracer,
+                                           const PixelBlock& pixels) const {
+  struct Crossing {
+    double depth;
+    std::size_t solid;
+    bool goesIn;
+  };
+  std::vector<std::vector<Crossing>> crossings(pixels.size());
+  for (std::size_t s = 0; s < solids_.size(); ++s) {
+    std::vector<std::size_t> open(pixels.size());
+    std::iota(open.begin(), open.end(), std::size_t{0});
+    for (std::int32_t passing = 0; !open.empty(); ++passing) {
+      PixelBlock asked(open.size());
+      for (std::size_t n = 0; n < open.size(); ++n) {
+        asked.x[n] = pixels.x[open[n]];
+        asked.y[n] = pixels.y[open[n]];
+        asked.passing[n] = passing;
+      }
+      HitBlock hits(asked.size());
+      ShapeBlock shapes(asked.size());
+      tracer.trace(solids_[s], asked, hits, shapes);
+      std::vector<std::size_t> rest;
+      for (std::size_t n = 0; n < open.size(); ++n) {
+        if (!hits.found[n]) continue;
+        crossings[open[n]].push_back(
+            {solids_[s].fan.depthAt(hits.t[n]), s, hits.found[n] == HitBlock::kGoesIn});
+        rest.push_back(open[n]);
+      }
+      open = std::move(rest);
+    }
+  }
+  std::vector<double> lengths(pixels.size(), 0);
+  std::vector<char> inside(solids_.size()), known(solids_.size());
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    std::vector<Crossing>& all = crossings[i];
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Crossing& a, const Crossing& b) { return a.depth < b.depth; });
+    std::fill(inside.begin(), inside.end(), 0);
+    std::fill(known.begin(), known.end(), 0);
+    for (const Crossing& crossing : all)  // the first of each solid tells where the ray starts
+      if (!std::exchange(known[crossing.solid], 1))
+        inside[crossing.solid] = crossing.goesIn ? 0 : 1;
+    double from = 0;
+    for (const Crossing& crossing : all) {
+      if (isInside(inside)) lengths[i] += std::max(0.0, crossing.depth - from);
+      from = std::max(0.0, crossing.depth);
+      inside[crossing.solid] = crossing.goesIn ? 1 : 0;
+    }
+  }
+  return lengths;
+}
+
+bool KernelScene::isInside(const std::vector<char>& inside) const {
+  if (!csg_.isEmpty()) return csg_.holds(inside.data());
+  return std::any_of(inside.begin(), inside.end(), [](char in) { return in != 0; });
 }
 
 std::vector<char> KernelScene::findBlocked(const KernelTracer& tracer,

@@ -69,6 +69,10 @@ class KernelScene {
 
   /// Of the solids; meshes() are for the caller.
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
+  /// @return how far each ray is within what is drawn of the solids, along the view axis, world
+  /// units
+  [[nodiscard]] std::vector<double> thickness(const KernelTracer& tracer,
+                                              const PixelBlock& pixels) const;
   /// @return for each ray 1 if it meets something within its reach, else 0
   [[nodiscard]] std::vector<char> findBlocked(const KernelTracer& tracer,
                                               const std::vector<LightRay>& rays) const;
@@ -76,6 +80,8 @@ class KernelScene {
  private:
   [[nodiscard]] PixelHits castFirst(const KernelTracer& tracer, const PixelBlock& pixels) const;
   [[nodiscard]] PixelHits castCsg(const KernelTracer& tracer, const PixelBlock& pixels) const;
+  /// Is a place within what is drawn that those solids hold?
+  [[nodiscard]] bool isInside(const std::vector<char>& inside) const;
   /// Those of the rays from `first` up to `last` that are blocked.
   void blockFirst(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
                   std::size_t last, std::vector<char>& blocked) const;

@@ -27,7 +27,7 @@ KernelPainter::KernelPainter(const Scene& scene, const KernelScene& surfaces,
       surfaces_(surfaces),
       options_(options),
       shader_(scene, surfaces.bounds().size().length(), options),
-      layers_(image, options.curvature) {}
+      layers_(image, options) {}
 
 void KernelPainter::paint(const KernelTracer& tracer, const PixelBox& box) const {
   const std::vector<Pixel> pixels = pixelsOf(box);
@@ -79,6 +79,14 @@ void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixe
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     at.x[i] = static_cast<float>(pixels[i].x + 0.5 - middleX);
     at.y[i] = static_cast<float>(pixels[i].y + 0.5 - middleY);
+  }
+  if (options_.thickness) {
+    const std::vector<double> depths = surfaces_.thickness(tracer, at);
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      const Camera::Ray ray = scene_.camera.ray(pixels[i].x + 0.5, pixels[i].y + 0.5);
+      layers_.thickness[numberOf(pixels[i])] =
+          static_cast<float>(depths[i] / ray.direction.dot(scene_.camera.axis()));
+    }
   }
   const PixelHits hits = surfaces_.castPixels(tracer, at);
   for (std::size_t i = 0; i < pixels.size(); ++i) {

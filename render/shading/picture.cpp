@@ -17,7 +17,7 @@ constexpr int kMaxSamples = 65536;
 
 }  // namespace
 
-PictureLayers::PictureLayers(Image& image, bool withCurvature) {
+PictureLayers::PictureLayers(Image& image, const RenderOptions& options) {
   r = image.addChannel("R").data();
   g = image.addChannel("G").data();
   b = image.addChannel("B").data();
@@ -29,8 +29,9 @@ PictureLayers::PictureLayers(Image& image, bool withCurvature) {
     p[i] = image.addChannel(fmt::format("P.{}", axes[i])).data();
   }
   const char* kinds[4] = {"mean", "gauss", "k1", "k2"};
-  for (int i = 0; withCurvature && i < 4; ++i)
+  for (int i = 0; options.curvature && i < 4; ++i)
     curvature[i] = image.addChannel(fmt::format("curvature.{}", kinds[i])).data();
+  if (options.thickness) thickness = image.addChannel("thickness").data();
   auto& ids = image.ids["id"];
   ids.assign(image.pixelCount(), 0);
   id = ids.data();
@@ -99,7 +100,7 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
         filterName(options.filter), solid.band.halfWidth()));
   }
   const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
-  const double channels = options.curvature ? 16 : 12;
+  const double channels = 12 + (options.curvature ? 4 : 0) + (options.thickness ? 1 : 0);
   levelset::requireMemory(pixels * 4 * channels, options.maxBytes, "render");
 }
 

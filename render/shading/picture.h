@@ -18,9 +18,10 @@ struct PictureLayers {
   float *r, *g, *b, *a, *z;
   float *n[3], *p[3];
   float* curvature[4] = {};
+  float* thickness = nullptr;
   std::uint32_t* id;
 
-  PictureLayers(Image& image, bool withCurvature);
+  PictureLayers(Image& image, const RenderOptions& options);
   /// Of pixel `i`, from a hit whose normals are known.
   void setHit(std::size_t i, const Camera& camera, const Hit& hit) const;
   void setCurvature(std::size_t i, const CurvatureSample& sample) const;

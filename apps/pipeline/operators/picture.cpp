@@ -154,6 +154,7 @@ Value draw(Invocation& in) {
   render::RenderOptions options{.samples = static_cast<int>(in.integer("samples")),
                                 .filter = filterOf(in),
                                 .style = styleOf(in),
+                                .thickness = in.flag("thickness"),
                                 .maxBytes = in.maxMemory,
                                 .progress = in.progress};
   if (isBoth) options.progress = levelset::subProgress(in.progress, 0, 0.5);
@@ -369,6 +370,9 @@ void addPictureOperators(std::vector<Operator>& all) {
             .doc = "pixels: width of the silhouettes of tone and ink",
             .fallback = "2",
             .range = Range::NonNegative},
+           {.name = "thickness",
+            .type = ParamType::Flag,
+            .doc = "a layer more: how far the ray is within the solids"},
            {.name = "samples",
             .type = ParamType::Integer,
             .doc = "of colour per pixel",

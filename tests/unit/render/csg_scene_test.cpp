@@ -207,6 +207,65 @@ TEST(CsgScene, DarkensAHollowWhoseWallsAreFarWithinTheOtherSolid) {
   }
 }
 
+TEST(Thickness, IsThatOfTheExactSolids) {
+  // Through a ball, and through what a smaller one of another grid leaves of it.
+  const NarrowBand ball = levelset::makeSphere(20, V3d(0), 0.5),
+                   hole = levelset::makeSphere(8, V3d(0), 0.3);
+  RenderOptions options = kDataOnly;
+  options.thickness = true;
+  for (const char* csg : {"a", "a - b", "a & b"}) {
+    Scene scene = sceneOfTwo(ball, hole, csg);
+    scene.camera.from = V3d(0, 0, 100);
+    scene.camera.to = V3d(0);
+    scene.camera.orthoHeight = 50;
+    const Image cpu = renderCpu(scene, options), judge = renderEmbree(scene, options);
+    for (const Image* image : {&cpu, &judge}) {
+      for (int y = 0; y < image->height; ++y)
+        for (int x = 0; x < image->width; ++x) {
+          const double pixel = 50.0 / image->height;
+          const double r2 = (std::pow(x + 0.5 - 0.5 * image->width, 2) +
+                             std::pow(y + 0.5 - 0.5 * image->height, 2)) *
+                            pixel * pixel;
+          const auto chord = [&](double radius) {
+            return r2 < radius * radius ? 2 * std::sqrt(radius * radius - r2) : 0;
+          };
+          const bool isGrazing = std::abs(r2 - 400) < 20 || std::abs(r2 - 64) < 8;
+          if (isGrazing) continue;
+          const double exact = csg == std::string("a")       ? chord(20)
+                               : csg == std::string("a - b") ? chord(20) - chord(8)
+                                                             : chord(8);
+          const auto i = static_cast<std::size_t>(y) * static_cast<std::size_t>(image->width) +
+                         static_cast<std::size_t>(x);
+          ASSERT_NEAR(image->channels.at("thickness")[i], exact, 0.1) << csg;
+        }
+    }
+  }
+}
+
+TEST(Thickness, IsTheSameOfAllRenderersAndFromWithin) {
+  RenderOptions options = kDataOnly;
+  options.thickness = true;
+  Scene scene = support::sceneOf(support::rings());
+  for (const bool isWithin : {false, true}) {
+    if (isWithin) {
+      scene.camera.from = V3d(24, 0.1, 0.2);
+      scene.camera.to = V3d(20, 10, 1);
+    }
+    const Image cpu = renderCpu(scene, options);
+    EXPECT_TRUE(compareImages(cpu, renderGpu(scene, options), {.exact = true}).agrees());
+    const ImageComparison found = compareImages(cpu, renderEmbree(scene, options));
+    EXPECT_TRUE(found.agrees()) << found.reason();
+    for (const LayerComparison& layer : found.layers)
+      EXPECT_TRUE(layer.layer != "thickness" || layer.median < 1e-6) << layer.median;
+    if (!isWithin) continue;
+    // From within, all the way to the first wall at least.
+    for (std::size_t i = 0; i < cpu.pixelCount(); ++i)
+      if (std::isfinite(cpu.channels.at("Z")[i])) {
+        ASSERT_GE(cpu.channels.at("thickness")[i], cpu.channels.at("Z")[i] * 0.999f);
+      }
+  }
+}
+
 struct Crossing {
   double depth;
   bool goesIn;
