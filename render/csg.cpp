@@ -80,10 +80,10 @@ class CsgParser {
   [[noreturn]] void refuse(const std::string& why) const {
     std::string all;
     for (const std::string& name : names_) all += (all.empty() ? "" : ", ") + name;
-    throw levelset::UsageError(
-        fmt::format("scene: the expression '{}' cannot be read at place {}: {}; write as in "
-                    "'(a | b) - c', with the names {}",
-                    text_, at_ + 1, why, all));
+    throw levelset::UsageError(fmt::format(
+        "scene: the expression '{}' cannot be read at place {}: {}; {}", text_, at_ + 1, why,
+        all.empty() ? "give it level sets: meshes are of no use to it"
+                    : "write as in '(a | b) - c', with the names " + all));
   }
 
   const std::string& text_;

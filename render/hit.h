@@ -19,12 +19,11 @@ struct Hit {
   double distance = 0;          ///< along the unit direction
   Imath::V3d position, normal;  ///< normal outwards, of unit length, from a tricubic B-spline
   Imath::V3d facetNormal;       ///< outwards, of the trilinear interpolant itself
-  CurvatureSample curvature;    ///< from the B-spline
+  CurvatureSample curvature;    ///< from the B-spline; 0 on meshes
   double viewCurvature = 0;     ///< of the normal section along the ray, per world unit
   double surfaceError = 0;      ///< bound on the interpolant's distance from a smooth surface
   Imath::C3f colour{0};         ///< of the surface, linear
   std::uint32_t id = 0;         ///< Solid::id or MeshPart::id
-  bool isMesh = false;          ///< has no curvature then
   std::size_t solid = 0;        ///< index in Scene::solids, or Scene::meshes
   bool isTurned = false;        ///< is that solid's outside inside what is drawn? Normals and
                                 ///< curvatures tell of what is drawn

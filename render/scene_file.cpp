@@ -10,12 +10,14 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
+#include <string>
 
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
 #include "levelset/files/mesh_file.h"
 #include "levelset/solids/transform.h"
+#include "render/shading/picture.h"
 
 namespace render {
 namespace {
@@ -33,10 +35,10 @@ Json toJson(const V3d& v) {
   return {v.x, v.y, v.z};
 }
 
-/// With as many digits as its floats tell apart.
+/// By the shortest numbers that are these floats again.
 Json colourJson(const Imath::C3f& colour) {
-  const auto digits = [](float c) { return std::round(static_cast<double>(c) * 1e7) / 1e7; };
-  return {digits(colour.x), digits(colour.y), digits(colour.z)};
+  const auto shortest = [](float c) { return std::stod(fmt::format("{}", c)); };
+  return {shortest(colour.x), shortest(colour.y), shortest(colour.z)};
 }
 
 Json toJson(const Camera& camera) {
@@ -59,6 +61,14 @@ void requireNames(const Scene& scene) {
   std::vector<std::string> names = solidNames(scene);
   for (const MeshPart& part : scene.meshes) names.push_back(part.name);
   requireSceneNames(names);
+}
+
+void requireColour(const Imath::C3f& colour) {
+  for (int c = 0; c < 3; ++c)
+    if (!(colour[c] >= 0 && colour[c] <= 1))
+      throw InvalidInput(
+          fmt::format("write: a colour of {}, {}, {} is not from 0 to 1; give another", colour.x,
+                      colour.y, colour.z));
 }
 
 /// Of a part of a scene, beside its file.
@@ -177,6 +187,26 @@ class Reader {
     }
   }
 
+  /// Beside the scene's own file, unless it is told in full.
+  [[nodiscard]] std::filesystem::path partFile(const Json& json, const std::filesystem::path& file,
+                                               const std::string& where) const {
+    const std::string name = text(json, "file", where);
+    if (name == "-") refuse(where, "is to come from standard input, which a scene cannot");
+    return file.parent_path() / name;
+  }
+
+  /// What a job makes of numbers of the file; where it refuses them, so does this.
+  template <typename Job>
+  auto told(const std::string& where, const Job& job) const {
+    try {
+      return job();
+    } catch (const levelset::UsageError& error) {
+      refuse(where, fmt::format("cannot be used ({})", error.what()));
+    } catch (const InvalidInput& error) {
+      refuse(where, fmt::format("cannot be used ({})", error.what()));
+    }
+  }
+
   [[nodiscard]] Imath::M44d matrix(const Json& json, const std::string& where) const {
     const std::vector<double> all = numbers(json, "transform", 16, where);
     Imath::M44d matrix;
@@ -204,6 +234,17 @@ Json documentOf(const std::filesystem::path& file) {
   return Json::parse(text, nullptr, /*allow_exceptions=*/false);
 }
 
+/// Before anything is written: JSON holds UTF-8 only.
+std::string textOf(const Json& json, const std::filesystem::path& file) {
+  try {
+    return json.dump(2);
+  } catch (const Json::exception&) {
+    throw levelset::IoError(fmt::format(
+        "write: {} cannot be told in the file, since its name is not UTF-8; take another name",
+        file.string()));
+  }
+}
+
 /// The parts of a job that takes one after the other.
 class Parts {
  public:
@@ -225,7 +266,7 @@ void readSolid(const Reader& reader, const Json& json, const std::filesystem::pa
   reader.requireKnown(json, {"name", "file", "grid", "transform", "colour", "id"}, where);
   Solid solid;
   reader.readPart(json, scene.solids.size() + 1, where, solid);
-  const std::filesystem::path source = file.parent_path() / reader.text(json, "file", where);
+  const std::filesystem::path source = reader.partFile(json, file, where);
   levelset::BandRepairs repairs;
   solid.band = levelset::readBand(
       source, {.grid = json.contains("grid") ? reader.text(json, "grid", where) : "",
@@ -236,7 +277,8 @@ void readSolid(const Reader& reader, const Json& json, const std::filesystem::pa
     reader.refuse(where, "is the band of an open surface, which holds no solid");
   if (options.repairs) options.repairs(repairs, source);
   if (json.contains("transform"))
-    solid.band = levelset::transform(solid.band, reader.matrix(json, where));
+    solid.band = reader.told(
+        where, [&] { return levelset::transform(solid.band, reader.matrix(json, where)); });
   scene.solids.push_back(std::move(solid));
 }
 
@@ -251,7 +293,8 @@ void readMeshPart(const Reader& reader, const Json& json, const std::filesystem:
       file.parent_path() / reader.text(json, "file", where),
       {.attributes = true, .maxMemory = options.maxMemory, .progress = progress});
   if (json.contains("transform"))
-    mesh = levelset::transform(std::move(mesh), reader.matrix(json, where));
+    mesh = reader.told(
+        where, [&] { return levelset::transform(std::move(mesh), reader.matrix(json, where)); });
   part.mesh = std::make_shared<const levelset::TriMesh>(std::move(mesh));
   scene.meshes.push_back(std::move(part));
 }
@@ -280,6 +323,9 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
                 const levelset::Progress& progress) {
   const Scene& scene = viewed.scene;
   requireNames(scene);
+  requireLight(scene);
+  for (const Solid& solid : scene.solids) requireColour(solid.colour);
+  for (const MeshPart& part : scene.meshes) requireColour(part.colour);
   Json json;
   json["format"] = kFormat;
   json["version"] = kVersion;
@@ -302,6 +348,7 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
   for (const MeshPart& part : scene.meshes) json["meshes"].push_back(entryOf(part, ".ply"));
   if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
 
+  const std::string text = textOf(json, file);
   levelset::FileTarget target(file);
   Parts parts(progress, scene.solids.size() + scene.meshes.size());
   for (const Solid& solid : scene.solids)
@@ -312,7 +359,7 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
                         {.progress = parts.next()});
   {
     std::ofstream stream(target.path(), std::ios::binary);
-    stream << json.dump(2) << '\n';
+    stream << text << '\n';
     stream.flush();
     if (!stream)
       throw levelset::IoError(
@@ -334,9 +381,13 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   ViewedScene viewed;
   Scene& scene = viewed.scene;
   viewed.hasCamera = json.contains("camera");
-  if (viewed.hasCamera) scene.camera = reader.camera(json.at("camera"));
+  if (viewed.hasCamera) {
+    scene.camera = reader.camera(json.at("camera"));
+    reader.told("the camera", [&] { validate(scene.camera); });
+  }
   if (json.contains("light")) scene.key = reader.light(json.at("light"));
   if (json.contains("ambient")) scene.ambient = reader.number(json, "ambient", whole);
+  reader.told("the light", [&] { requireLight(scene); });
   const Json none = Json::array();
   const Json& solids = json.contains("solids") ? json.at("solids") : none;
   const Json& meshes = json.contains("meshes") ? json.at("meshes") : none;
@@ -345,7 +396,12 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   Parts parts(options.progress, solids.size() + meshes.size());
   for (const Json& entry : solids) readSolid(reader, entry, file, options, parts.next(), scene);
   for (const Json& entry : meshes) readMeshPart(reader, entry, file, options, parts.next(), scene);
-  requireNames(scene);
+  reader.told(whole, [&] { requireNames(scene); });
+  std::set<std::uint32_t> ids;
+  const auto isNew = [&](const auto& part) { return ids.insert(part.id).second; };
+  if (!std::all_of(scene.solids.begin(), scene.solids.end(), isNew) ||
+      !std::all_of(scene.meshes.begin(), scene.meshes.end(), isNew))
+    reader.refuse(whole, "gives two parts the same \"id\"");
   if (json.contains("csg"))
     scene.csg = CsgExpression(reader.text(json, "csg", whole), solidNames(scene));
   return viewed;

@@ -23,8 +23,9 @@ struct ViewedScene {
 /// True for a name, or a format, that readScene understands: .json.
 [[nodiscard]] bool isSceneFormat(const std::string& name);
 
-/// Writes the solids and meshes beside it, as FILE-NAME.vdb and FILE-NAME.ply, then the scene.
-/// @throws levelset::IoError; InvalidInput for a number that is not finite
+/// Writes the solids and meshes beside it, as FILE-NAME.vdb and FILE-NAME.ply, then the scene. What
+/// has those names is replaced.
+/// @throws levelset::IoError; InvalidInput for colours that are none
 void writeScene(const std::filesystem::path& file, const ViewedScene& scene,
                 const levelset::Progress& progress = {});
 

@@ -4,10 +4,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+#include <mutex>
 
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 #include "levelset/sample.h"
 #include "render/camera.h"
 
@@ -54,13 +55,12 @@ C3f mixed(const C3f& a, const C3f& b, double share) {
 
 class SlicePainter {
  public:
-  SlicePainter(const levelset::NarrowBand& band, const SliceOptions& options)
+  SlicePainter(const levelset::NarrowBand& band, const SliceOptions& options, const Frame& frame)
       : phi_(band),
         background_(band.halfWidth() * band.voxelSize()),
         step_(options.step > 0 ? options.step : band.voxelSize()),
-        frame_(frameOf(band.zeroSetBounds(), options)) {}
+        frame_(frame) {}
 
-  [[nodiscard]] const Frame& frame() const { return frame_; }
   [[nodiscard]] double phi(const V3d& p) const { return phi_.value(p); }
 
   [[nodiscard]] C3f colour(const V3d& p) const {
@@ -84,7 +84,7 @@ class SlicePainter {
  private:
   levelset::BandSampler phi_;
   double background_, step_;
-  Frame frame_;
+  const Frame& frame_;
 };
 
 void requireSlice(const levelset::NarrowBand& band, const SliceOptions& options) {
@@ -100,6 +100,9 @@ void requireSlice(const levelset::NarrowBand& band, const SliceOptions& options)
   if (static_cast<double>(options.width) * options.height > kMaxPixels)
     throw levelset::ResourceLimit(fmt::format("slice: {}x{} pixels are more than {:.0f}",
                                               options.width, options.height, kMaxPixels));
+  constexpr double kBytesOfPixel = 8 * 4;
+  levelset::requireMemory(kBytesOfPixel * options.width * options.height, options.maxBytes,
+                          "slice");
   if (band.isEmpty() || band.zeroSetBounds().isEmpty())
     throw levelset::InvalidInput("slice: the solid has no surface; give one with a zero set");
 }
@@ -115,24 +118,27 @@ Image drawSlice(const levelset::NarrowBand& band, const SliceOptions& options) {
   float* phi = image.addChannel("phi").data();
   float* places[3] = {image.addChannel("P.X").data(), image.addChannel("P.Y").data(),
                       image.addChannel("P.Z").data()};
-  std::atomic<int> done = 0;
+  const Frame frame = frameOf(band.zeroSetBounds(), options);
+  std::mutex reporting;
+  int done = 0;
   tbb::parallel_for(0, options.height, [&](int y) {
-    const SlicePainter painter(band, options);
+    const SlicePainter painter(band, options, frame);
     for (int x = 0; x < options.width; ++x) {
       const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(options.width) +
                             static_cast<std::size_t>(x);
       const double left = x - 0.5 * options.width, top = y - 0.5 * options.height;
       C3f sum(0);
       for (int n = 0; n < kAcross * kAcross; ++n)
-        sum += painter.colour(painter.frame().at(left + (n % kAcross + 0.5) / kAcross,
-                                                 top + (n / kAcross + 0.5) / kAcross));
-      const V3d middle = painter.frame().at(left + 0.5, top + 0.5);
+        sum += painter.colour(
+            frame.at(left + (n % kAcross + 0.5) / kAcross, top + (n / kAcross + 0.5) / kAcross));
+      const V3d middle = frame.at(left + 0.5, top + 0.5);
       for (int c = 0; c < 3; ++c) {
         colours[c][i] = sum[c] / (kAcross * kAcross);
         places[c][i] = static_cast<float>(middle[c]);
       }
       phi[i] = static_cast<float>(painter.phi(middle));
     }
+    const std::scoped_lock lock(reporting);
     levelset::report(options.progress, static_cast<double>(++done) / options.height, "slice");
   });
   return image;

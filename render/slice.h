@@ -2,6 +2,7 @@
 
 #include <Imath/ImathVec.h>
 
+#include "levelset/memory_limit.h"
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 #include "render/image.h"
@@ -13,6 +14,7 @@ struct SliceOptions {
   Imath::V3d point{0}, normal{0, 0, 1};  ///< seen from where the normal, of any length, points
   int width = 1024, height = 768;        ///< pixels
   double step = 0;  ///< world units from one contour line to the next; 0: a voxel
+  std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< for the image
   levelset::Progress progress = {};
 };
 

@@ -10,7 +10,8 @@
 #include "render/scene.h"
 
 /// The judge: first zero of the filter's function along each ray, solved in double precision on
-/// OpenVDB's own tree; Embree only finds the leaf blocks. It may be slow, it may not be wrong.
+/// OpenVDB's own tree; Embree only finds the leaf blocks,
+/// and the triangles of meshes. It may be slow, it may not be wrong.
 namespace render {
 
 /// Draws the scene. Pixels depend on the scene alone, not on the number of threads.

@@ -94,7 +94,7 @@ void intersectBlock(const RTCIntersectFunctionNArguments* args) {
   }
   const auto t = crossingOf(query, solid, args->primID, Search::FirstCrossing);
   if (!t || *t > query.nearest) return;
-  if (query.solid && *t == query.nearest && solid.id >= query.solid->id) return;
+  if (query.solid && *t == query.nearest && solid.number >= query.solid->number) return;
   query.nearest = *t;
   query.solid = &solid;
   // Blocks that could tie stay in Embree's sight.
@@ -255,6 +255,8 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
       bounds.extendBy(Imath::transform(block.bounds(), entry.indexToWorld));
     if (!entry.blocks.empty()) solids.push_back(std::move(entry));
   }
+  std::stable_sort(solids.begin(), solids.end(),
+                   [](const RaySolid& a, const RaySolid& b) { return a.id < b.id; });
   std::vector<int> numbers(source.solids.size(), -1);
   for (std::size_t s = 0; s < solids.size(); ++s) {
     solids[s].number = s;

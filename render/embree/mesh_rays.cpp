@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "levelset/error.h"
+#include "render/shading/style.h"
 
 namespace render {
 namespace {
@@ -40,10 +41,6 @@ std::optional<std::pair<double, double>> partIn(const Box3d& box, const V3d& ori
   return near <= far ? std::optional(std::pair(near, far)) : std::nullopt;
 }
 
-float linearOf(float srgb) {
-  return srgb <= 0.04045f ? srgb / 12.92f : std::pow((srgb + 0.055f) / 1.055f, 2.4f);
-}
-
 }  // namespace
 
 struct MeshRays::Impl {
@@ -64,7 +61,7 @@ struct MeshRays::Impl {
 
   void check() const;
   void build();
-  void add(const MeshPart& part);
+  void add(const MeshPart& part, unsigned number);
   /// How far it is to where the ray enters the box, with Embree's ray from there; nothing: it
   /// misses.
   std::optional<double> prepare(const V3d& origin, const V3d& direction, double far,
@@ -105,12 +102,13 @@ void MeshRays::Impl::build() {
   check();
   scene = rtcNewScene(device);
   rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
-  for (const MeshPart& part : parts) add(part);
+  for (std::size_t n = 0; n < parts.size(); ++n)
+    if (!parts[n].mesh->isEmpty()) add(parts[n], static_cast<unsigned>(n));
   rtcCommitScene(scene);
   check();
 }
 
-void MeshRays::Impl::add(const MeshPart& part) {
+void MeshRays::Impl::add(const MeshPart& part, unsigned number) {
   const levelset::TriMesh& mesh = *part.mesh;
   const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
@@ -125,7 +123,7 @@ void MeshRays::Impl::add(const MeshPart& part) {
     for (const auto& triangle : mesh.triangles)
       indices = std::copy(triangle.begin(), triangle.end(), indices);
     rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene, geometry);  // its number is that of the part
+    rtcAttachGeometryByID(scene, geometry, number);
   }
   rtcReleaseGeometry(geometry);
   check();
@@ -163,7 +161,6 @@ void MeshRays::Impl::complete(const RTCRayHit& found, const V3d& start, const V3
   // On its plane, unless the ray runs along it.
   const double t = std::abs(exact - rough) * scale < 1e-3 ? exact : rough;
   hit.found = true;
-  hit.isMesh = true;
   hit.distance = moved + t;
   hit.position = start + direction * t;
   hit.facetNormal = across.length() > 0 ? across.normalized() : -direction;
@@ -183,7 +180,7 @@ void MeshRays::Impl::complete(const RTCRayHit& found, const V3d& start, const V3
     Imath::V4f colour(0);
     for (std::size_t k = 0; k < 3; ++k)
       colour += mesh.attributes.colors[triangle[k]] * static_cast<float>(share[k]);
-    hit.colour = C3f(linearOf(colour.x), linearOf(colour.y), linearOf(colour.z));
+    hit.colour = C3f(linearFromSrgb(colour.x), linearFromSrgb(colour.y), linearFromSrgb(colour.z));
   }
 }
 

@@ -46,6 +46,7 @@ void CsgWalk::answerNone(std::size_t solid, const Question& question) {
 }
 
 bool CsgWalk::advance() {
+  if (solids_ == 0) return false;  // none has a surface
   bool asks = false;
   for (std::size_t ray = 0; ray < reach_.size(); ++ray) asks = advance(ray) || asks;
   return asks;

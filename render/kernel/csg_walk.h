@@ -9,8 +9,8 @@
 namespace render {
 
 /// Follows rays through solids, each to the first place where it enters or leaves what an
-/// expression makes of them. Asks for a ray's crossings with a solid one after another, and only
-/// for those that it has to know.
+/// expression makes of them. Asks for a ray's first crossing with each solid, and for others as it
+/// comes to them.
 ///
 /// Surfaces met at one and the same place are crossed together, and the lowest of their numbers is
 /// the one that is met.

@@ -60,16 +60,7 @@ void PictureLayers::setColour(std::size_t i, const Imath::C3f& sum, int covered,
   a[i] = static_cast<float>(covered) * weight;
 }
 
-void requirePicture(const Scene& scene, const RenderOptions& options) {
-  validate(scene.camera);
-  const auto inRange = [](int count, int low) { return count >= low && count <= kMaxSamples; };
-  if (!inRange(options.samples, 1) || !inRange(options.ambientSamples, 0) ||
-      !inRange(options.shadowSamples, 0)) {
-    throw levelset::UsageError(fmt::format(
-        "render: {} samples, {} ambient and {} shadow samples; give 1 to {} samples and 0 to {} of "
-        "the others",
-        options.samples, options.ambientSamples, options.shadowSamples, kMaxSamples, kMaxSamples));
-  }
+void requireLight(const Scene& scene) {
   const V3d& d = scene.key.direction;
   const double sum = d.x + d.y + d.z + scene.key.strength + scene.ambient;
   if (!std::isfinite(sum) || d == V3d(0) ||
@@ -80,6 +71,19 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
         "give finite numbers, none negative, and a softness below 1.5 radians",
         d.x, d.y, d.z, scene.key.strength, scene.key.softness, scene.ambient));
   }
+}
+
+void requirePicture(const Scene& scene, const RenderOptions& options) {
+  validate(scene.camera);
+  const auto inRange = [](int count, int low) { return count >= low && count <= kMaxSamples; };
+  if (!inRange(options.samples, 1) || !inRange(options.ambientSamples, 0) ||
+      !inRange(options.shadowSamples, 0)) {
+    throw levelset::UsageError(fmt::format(
+        "render: {} samples, {} ambient and {} shadow samples; give 1 to {} samples and 0 to {} of "
+        "the others",
+        options.samples, options.ambientSamples, options.shadowSamples, kMaxSamples, kMaxSamples));
+  }
+  requireLight(scene);
   const StyleOptions& style = options.style;
   if (!(style.curvatureRange >= 0 && std::isfinite(style.curvatureRange)) ||
       !(style.lineWidth >= 0 && style.lineWidth <= 1000)) {

@@ -34,6 +34,9 @@ struct PictureLayers {
 ///         levelset::InvalidInput for bands narrower than the filter reaches
 void requirePicture(const Scene& scene, const RenderOptions& options);
 
+/// @throws levelset::UsageError for a light that cannot shine
+void requireLight(const Scene& scene);
+
 /// @throws levelset::InvalidInput
 [[noreturn]] void refuseEmptyScene();
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
+#include <fstream>
 #include <numbers>
 
 #include "levelset/error.h"
@@ -35,11 +35,6 @@ const C3f kNeutral(0.62f, 0.60f, 0.57f);
 /// Between two colours that differ by lightness as little as by the sign that they tell.
 C3f diverging(double value, const C3f& negative, const C3f& positive) {
   return mixed(kNeutral, value < 0 ? negative : positive, std::abs(value));
-}
-
-float linearOf(std::uint8_t byte) {
-  const double x = byte / 255.0;
-  return static_cast<float>(x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4));
 }
 
 }  // namespace
@@ -107,6 +102,10 @@ double silhouetteOf(double cosine, double viewCurvature, double width) {
   return limit > 0 && cosine <= limit ? 1 : 0;
 }
 
+float linearFromSrgb(float x) {
+  return x <= 0.04045f ? x / 12.92f : std::pow((x + 0.055f) / 1.055f, 2.4f);
+}
+
 C3f ColourImage::at(double x, double y) const {
   const auto place = [](double unit, int size, int& cell) {
     const double p = std::clamp(unit * size - 0.5, 0.0, static_cast<double>(size - 1));
@@ -128,26 +127,32 @@ ColourImage readColourPng(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path, failed))
     throw levelset::IoError(
         fmt::format("read image: there is no file '{}'; check the name", path.string()));
-  png_image png = {};
+  if (!std::ifstream(path, std::ios::binary))
+    throw levelset::IoError(
+        fmt::format("read image: {} cannot be opened; check its permissions", path.string()));
+  struct Png {
+    png_image image = {};
+    ~Png() { png_image_free(&image); }
+  } owner;
+  png_image& png = owner.image;
   png.version = PNG_IMAGE_VERSION;
   if (!png_image_begin_read_from_file(&png, path.c_str()))
     throw levelset::InvalidInput(
         fmt::format("read image: {} is no PNG: {}", path.string(), png.message));
   constexpr double kMostPixels = 1 << 26;
-  if (static_cast<double>(png.width) * png.height > kMostPixels) {
-    png_image_free(&png);
+  if (static_cast<double>(png.width) * png.height > kMostPixels)
     throw levelset::ResourceLimit(fmt::format("read image: {} has {}x{} pixels, more than 2^26",
                                               path.string(), png.width, png.height));
-  }
-  png.format = PNG_FORMAT_RGB;
+  png.format = PNG_FORMAT_RGBA;
   std::vector<std::uint8_t> bytes(PNG_IMAGE_SIZE(png));
-  const png_color black = {0, 0, 0};
-  if (!png_image_finish_read(&png, &black, bytes.data(), 0, nullptr))
+  if (!png_image_finish_read(&png, nullptr, bytes.data(), 0, nullptr))
     throw levelset::InvalidInput(
         fmt::format("read image: {} is damaged: {}", path.string(), png.message));
   ColourImage image{static_cast<int>(png.width), static_cast<int>(png.height), {}};
-  for (std::size_t i = 0; i + 2 < bytes.size(); i += 3)
-    image.pixels.emplace_back(linearOf(bytes[i]), linearOf(bytes[i + 1]), linearOf(bytes[i + 2]));
+  image.pixels.reserve(bytes.size() / 4);
+  const auto linear = [](std::uint8_t byte) { return linearFromSrgb(byte / 255.0f); };
+  for (std::size_t i = 0; i < bytes.size(); i += 4)
+    image.pixels.emplace_back(linear(bytes[i]), linear(bytes[i + 1]), linear(bytes[i + 2]));
   return image;
 }
 

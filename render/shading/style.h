@@ -45,6 +45,9 @@ struct ColourImage {
 ///         damaged; ResourceLimit for more than 2^26 pixels
 [[nodiscard]] ColourImage readColourPng(const std::filesystem::path& path);
 
+/// Of a colour by the sRGB curve, 0 to 1.
+[[nodiscard]] float linearFromSrgb(float x);
+
 struct StyleOptions {
   Style style = Style::Lit;
   /// Per world unit: what is shown half way to the end of a colour map, and what is a ridge or a

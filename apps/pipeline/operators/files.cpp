@@ -209,7 +209,9 @@ void addFileOperators(std::vector<Operator>& all) {
                  "patches (patch), a scene (json)",
       .details = "The file is written beside its target and renamed when whole; what was there "
                  "stays until then. "
-                 "A scene's level sets go to .vdb files beside it, named after it and them. "
+                 "A scene's level sets and meshes go to .vdb and .ply files beside it, "
+                 "FILE-NAME.vdb for the "
+                 "level set NAME, and replace what has those names. "
                  "The value stays on the stack.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! write sphere.ply",
       .params = {{.name = "file",

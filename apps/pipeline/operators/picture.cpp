@@ -48,6 +48,8 @@ void validateDraw(const Invocation& in) {
     throw UsageError(in.given("matcap")
                          ? "render: --matcap is for --style matcap; leave it out, or give that"
                          : "render: --style matcap needs --matcap with a PNG of a shaded ball");
+  if (in.flag("thickness") && render::imageFormat(in.text("file"), in.text("format")) != "exr")
+    throw UsageError("render: a PNG has no layers, so --thickness is lost; name an .exr");
   if (in.given("line") && style != "tone" && style != "ink")
     throw UsageError(fmt::format("render: the style {} draws no lines; leave --line out", style));
   if (in.given("curvature-range") && (style == "lit" || style == "tone" || style == "matcap"))

@@ -62,7 +62,23 @@ std::vector<Imath::C3f> partColours(const Invocation& in) {
   return colours;
 }
 
+Plan planScene(Invocation& in) {
+  Plan plan{.kind = Kind::Scene};
+  for (const Value& operand : in.operands) {
+    const Plan& one = operand.plan();
+    plan.bounds.extendBy(one.bounds);
+    plan.area += one.area;
+    plan.halfWidth = std::max(plan.halfWidth, one.halfWidth);
+    if (one.voxelSize == 0) continue;  // a mesh
+    plan.voxelSize = plan.voxelSize > 0 ? std::min(plan.voxelSize, one.voxelSize) : one.voxelSize;
+  }
+  // Lengths count on all of them, whichever comes first.
+  in.setReference(plan.voxelSize, plan.bounds.isEmpty() ? 0 : plan.bounds.size().length());
+  return plan;
+}
+
 Value makeScene(Invocation& in) {
+  (void)planScene(in);
   const std::vector<std::string> names = partNames(in);
   const std::vector<Imath::C3f> colours = partColours(in);
   if (in.given("colours") && colours.size() != in.operands.size())
@@ -90,18 +106,6 @@ Value makeScene(Invocation& in) {
   viewed.hasCamera = givesCamera(in);
   if (viewed.hasCamera) viewed.scene.camera = cameraOf(in, viewed.scene.bounds());
   return Value(std::move(viewed));
-}
-
-Plan planScene(Invocation& in) {
-  Plan plan{.kind = Kind::Scene};
-  for (const Value& operand : in.operands) {
-    const Plan& one = operand.plan();
-    plan.bounds.extendBy(one.bounds);
-    plan.area += one.area;
-    plan.halfWidth = std::max(plan.halfWidth, one.halfWidth);
-    plan.voxelSize = plan.voxelSize > 0 ? std::min(plan.voxelSize, one.voxelSize) : one.voxelSize;
-  }
-  return plan;
 }
 
 }  // namespace

@@ -35,7 +35,8 @@ void validateSlice(const Invocation& in) {
 
 Value slice(Invocation& in) {
   const std::vector<Imath::V3d> plane = in.points("plane");
-  render::SliceOptions options{.point = plane[0], .normal = plane[1], .progress = in.progress};
+  render::SliceOptions options{
+      .point = plane[0], .normal = plane[1], .maxBytes = in.maxMemory, .progress = in.progress};
   std::tie(options.width, options.height) = in.imageSize("size");
   options.step = in.length("step");
   const render::Image image = render::drawSlice(in.band(), options);

@@ -18,10 +18,11 @@ const std::string kTwo =
 class Scenes : public support::ShellTest {
  protected:
   void make() {
-    const Outcome made = levelsmith(
-        kTwo +
-        "--csg 'b - s' --from 4,3,5 --to 0,0,0 --size 64x48 ! write cut.json ! render a.exr "
-        "--samples 1 --renderer cpu");
+    const Outcome made =
+        levelsmith(kTwo +
+                   "--colours '0.71234567,0.98765432,0.65432109 0.1,0.2,0.3' --csg 'b - s' --from "
+                   "4,3,5 --to 0,0,0 --size 64x48 ! write cut.json ! render a.exr "
+                   "--samples 1 --renderer cpu");
     ASSERT_EQ(made.code, 0) << made.err;
   }
   /// Exit code and complaint for the scene with one word put for another.
@@ -63,6 +64,11 @@ TEST_F(Scenes, HoldMeshesToo) {
   const Outcome same = levelsmith("compare-images a.exr b.exr");
   EXPECT_EQ(same.code, 0) << same.out << same.err;
   EXPECT_EQ(levelsmith("read cut-m.ply ! render m.png --size 64x48").code, 0);
+  const std::string dry =
+      "read cut-m.ply --as m ! sphere --radius 1 --voxel 0.2 --as b ! scene @m @b "
+      "--ortho 20vx ! render d.png --size 16x16 --ortho 20vx";
+  EXPECT_EQ(levelsmith("--dry-run " + dry).code, 0);
+  EXPECT_EQ(levelsmith(dry).code, 0);
   EXPECT_EQ(readChanged("cut-m.ply", "cut-b.vdb").code, 2);
   EXPECT_EQ(readChanged("b - s", "b - m").code, 2);  // a mesh is no solid
 }
@@ -96,6 +102,7 @@ TEST_F(Scenes, ThatCannotBeAreRefused) {
   EXPECT_EQ(levelsmith(kTwo + "! write - --format json").code, 2);
   EXPECT_EQ(levelsmith(kTwo + "! measure").code, 2);
   EXPECT_EQ(levelsmith("read - --format json ! info").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "! render a.png --thickness").code, 2);
   EXPECT_EQ(levelsmith("read nowhere.json ! info").code, 6);
   const Outcome unused = levelsmith(kTwo + "--csg b ! info");
   EXPECT_EQ(unused.code, 0);
@@ -111,6 +118,16 @@ TEST_F(Scenes, FromBrokenFilesAreRefused) {
   EXPECT_EQ(readChanged("\"ambient\": 0.32", "\"ambient\": null").code, 3);
   EXPECT_EQ(readChanged("b - s", "b - q").code, 2);
   EXPECT_EQ(readChanged("cut-b.vdb", "nowhere.vdb").code, 6);
+  EXPECT_EQ(readChanged("cut-b.vdb", "-").code, 3);
+  EXPECT_EQ(readChanged("\"id\": 1", "\"id\": 2").code, 3);
+  EXPECT_EQ(readChanged("\"name\": \"b\"", "\"name\": \"s\"").code, 3);
+  EXPECT_EQ(readChanged("\"fov\": 35", "\"fov\": 400").code, 3);
+  EXPECT_EQ(readChanged("\"strength\": 0.8", "\"strength\": -1").code, 3);
+  const Outcome flat = readChanged("\"id\": 1",
+                                   "\"id\": 1, \"transform\": "
+                                   "[1,0,0,0, 0,1,0,0, 0,0,0,0, 0,0,0,1]");
+  EXPECT_EQ(flat.code, 3);
+  EXPECT_NE(flat.err.find("solid 1"), std::string::npos) << flat.err;
   EXPECT_EQ(readChanged("cut-b.vdb", "bad.json").code, 3);
   EXPECT_EQ(readChanged("\"id\": 1", "\"id\": -1").code, 3);
   EXPECT_EQ(readChanged("\"solids\"", "\"solid\"").code, 3);

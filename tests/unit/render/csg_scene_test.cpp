@@ -131,6 +131,16 @@ TEST(CsgScene, IsTheSameOfTheProcessorTheGpuAndTheJudge) {
   }
 }
 
+TEST(CsgScene, OfFacesInOnePlaceShowsTheLowerId) {
+  const NarrowBand ball = levelset::makeSphere(20, V3d(0.1, 0.2, 0.3), 1);
+  Scene scene = sceneOfTwo(ball, ball, "a & b");
+  scene.solids[0].id = 9;
+  const Image cpu = renderCpu(scene, kDataOnly), judge = renderEmbree(scene, kDataOnly);
+  const ImageComparison found = compareImages(cpu, judge);
+  EXPECT_TRUE(found.agrees()) << found.reason();
+  EXPECT_EQ(cpu.ids.at("id")[cpu.pixelCount() / 2 + 80], 2u);
+}
+
 TEST(CsgScene, HasTheBitsOfTheGpuInItsShadowsToo) {
   const RenderOptions options = {.samples = 2, .ambientSamples = 3, .shadowSamples = 2};
   const Scene scene = bittenBall();

@@ -112,6 +112,15 @@ TEST(MeshScene, NeedsNoLevelSet) {
   }
 }
 
+TEST(MeshScene, StandsAloneWhereNoSolidOfTheExpressionHasASurface) {
+  Scene scene = leaningScene();
+  scene.solids[0].band = {};
+  scene.csg = CsgExpression("a", {"a"});
+  const RenderOptions options = {.samples = 1, .ambientSamples = 1, .shadowSamples = 1};
+  for (const Image& image : {renderCpu(scene, options), renderEmbree(scene, options)})
+    EXPECT_EQ(image.ids.at("id")[45 * 120 + 60], 2u);
+}
+
 TEST(MeshScene, CastsShadowsOnLevelSetsAndTakesTheirs) {
   const auto brightnessOf = [](const Scene& scene, std::uint32_t id) {
     const RenderOptions options = {.samples = 1, .ambientSamples = 0, .shadowSamples = 4};
