@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdint>
+#include <limits>
 #include <utility>
 
 #include "levelset/error.h"
@@ -113,6 +114,21 @@ bool CsgExpression::holds(const char* inside) const {
     stack = stack >> 2 << 1 | both;
   }
   return stack & 1;
+}
+
+double CsgExpression::phi(const double* phi) const {
+  std::vector<double> stack;
+  for (const int step : steps_) {
+    if (step >= 0 || step == kNothing) {
+      stack.push_back(step >= 0 ? phi[step] : std::numeric_limits<double>::infinity());
+      continue;
+    }
+    const double b = stack.back();
+    stack.pop_back();
+    double& a = stack.back();
+    a = step == kUnion ? std::min(a, b) : std::max(a, step == kIntersection ? b : -b);
+  }
+  return stack.empty() ? std::numeric_limits<double>::infinity() : stack.back();
 }
 
 CsgExpression CsgExpression::renumbered(const std::vector<int>& numbers) const {

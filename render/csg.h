@@ -21,6 +21,9 @@ class CsgExpression {
   [[nodiscard]] const std::string& text() const { return text_; }
   /// @param inside  by solid: not 0 where it holds the point
   [[nodiscard]] bool holds(const char* inside) const;
+  /// Of signed distances to the solids, by solid, one that has the sign of what the expression
+  /// makes and is nowhere larger in magnitude than the distance to it.
+  [[nodiscard]] double phi(const double* phi) const;
   [[nodiscard]] bool uses(std::size_t solid) const;
   /// A box that holds what the expression makes of solids that lie in those boxes.
   [[nodiscard]] Imath::Box3d bounds(const std::vector<Imath::Box3d>& boxes) const;

@@ -140,31 +140,11 @@ std::uint8_t toByte(double unit) {
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(unit, 0.0, 1.0)));
 }
 
-std::vector<char> encodePng(const Image& image) {
-  const std::vector<float>* colour[3];
-  const char* names[3] = {"R", "G", "B"};
-  for (int c = 0; c < 3; ++c) {
-    const auto found = image.channels.find(names[c]);
-    if (found == image.channels.end()) {
-      throw levelset::UsageError(fmt::format(
-          "write image: a PNG needs the channel {}, which this image does not have; write an EXR",
-          names[c]));
-    }
-    colour[c] = &found->second;
-  }
-  const auto alpha = image.channels.find("A");
-  std::vector<std::uint8_t> pixels(4 * image.pixelCount());
-  for (std::size_t i = 0; i < image.pixelCount(); ++i) {
-    const double a = alpha == image.channels.end() ? 1 : static_cast<double>(alpha->second[i]);
-    for (std::size_t c = 0; c < 3; ++c)
-      pixels[4 * i + c] = a > 0 ? toByte(toneCurve(static_cast<double>((*colour[c])[i]) / a)) : 0;
-    pixels[4 * i + 3] = toByte(std::isfinite(a) ? a : 0);
-  }
-
+std::vector<char> encodePng(int width, int height, const std::vector<std::uint8_t>& pixels) {
   png_image png = {};
   png.version = PNG_IMAGE_VERSION;
-  png.width = static_cast<png_uint_32>(image.width);
-  png.height = static_cast<png_uint_32>(image.height);
+  png.width = static_cast<png_uint_32>(width);
+  png.height = static_cast<png_uint_32>(height);
   png.format = PNG_FORMAT_RGBA;
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
   std::vector<char> bytes(size);
@@ -248,6 +228,34 @@ std::string imageFormat(const std::filesystem::path& path, const std::string& fo
   return kind == "exr" || kind == "png" ? kind : "";
 }
 
+std::vector<std::uint8_t> displayColours(const Image& image) {
+  const std::vector<float>* colour[3];
+  const char* names[3] = {"R", "G", "B"};
+  for (int c = 0; c < 3; ++c) {
+    const auto found = image.channels.find(names[c]);
+    if (found == image.channels.end()) {
+      throw levelset::UsageError(fmt::format(
+          "write image: a PNG needs the channel {}, which this image does not have; write an EXR",
+          names[c]));
+    }
+    colour[c] = &found->second;
+  }
+  const auto alpha = image.channels.find("A");
+  std::vector<std::uint8_t> pixels(4 * image.pixelCount());
+  for (std::size_t i = 0; i < image.pixelCount(); ++i) {
+    const double a = alpha == image.channels.end() ? 1 : static_cast<double>(alpha->second[i]);
+    for (std::size_t c = 0; c < 3; ++c)
+      pixels[4 * i + c] = a > 0 ? toByte(toneCurve(static_cast<double>((*colour[c])[i]) / a)) : 0;
+    pixels[4 * i + 3] = toByte(std::isfinite(a) ? a : 0);
+  }
+  return pixels;
+}
+
+void writePng(const std::filesystem::path& path, int width, int height,
+              const std::vector<std::uint8_t>& colours) {
+  writeBytes(path, encodePng(width, height, colours));
+}
+
 void writeImage(const std::filesystem::path& path, const Image& image, const std::string& format) {
   const std::string kind = imageFormat(path, format);
   if (kind.empty()) {
@@ -259,7 +267,8 @@ void writeImage(const std::filesystem::path& path, const Image& image, const std
   requireWhole(image);
   std::vector<char> bytes;
   try {
-    bytes = kind == "exr" ? encodeExr(image) : encodePng(image);
+    bytes = kind == "exr" ? encodeExr(image)
+                          : encodePng(image.width, image.height, displayColours(image));
   } catch (const levelset::Error&) {
     throw;
   } catch (const std::bad_alloc&) {

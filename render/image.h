@@ -45,6 +45,15 @@ struct Image {
 void writeImage(const std::filesystem::path& path, const Image& image,
                 const std::string& format = {});
 
+/// What a PNG shows of an image: red, green, blue and alpha of 8 bits for each pixel, as above.
+/// @throws levelset::UsageError for an image without R G B
+[[nodiscard]] std::vector<std::uint8_t> displayColours(const Image& image);
+
+/// Writes such colours as they are, likewise. @pre four for each pixel, at least one pixel
+/// @throws levelset::IoError when it cannot be written
+void writePng(const std::filesystem::path& path, int width, int height,
+              const std::vector<std::uint8_t>& colours);
+
 /// Reads channels of 16 or 32 bits of the first part, string and M44f attributes.
 /// @throws levelset::IoError when the file cannot be opened
 /// @throws levelset::InvalidInput when it is no EXR, damaged, or subsampled

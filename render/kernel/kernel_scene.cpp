@@ -96,8 +96,7 @@ struct PackedRays {
 
 }  // namespace
 
-KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter)
-    : meshes_(scene), bounds_(meshes_.bounds()) {
+KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter) : meshes_(scene) {
   // A block for each leaf; those the surface does not cross are built and dropped.
   double leaves = 0;
   for (const Solid& solid : scene.solids)
@@ -116,11 +115,6 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter
     solid.index = i;
     solid.id = source.id;
     solid.voxelSize = source.band.voxelSize();
-    const V3d corner(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]);
-    solid.tableToWorld = M44d().setTranslation(corner) * source.band.indexToWorld();
-    solid.worldToTable = solid.tableToWorld.inverse();
-    solid.fan = makeRayFan(scene.camera, solid.tableToWorld, solid.voxelSize, solid.pool);
-    bounds_.extendBy(Imath::transform(cellBox(solid.pool), solid.tableToWorld));
     solids_.push_back(std::move(solid));
   }
   std::stable_sort(solids_.begin(), solids_.end(),
@@ -128,6 +122,19 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter
   std::vector<int> numbers(scene.solids.size(), -1);
   for (std::size_t s = 0; s < solids_.size(); ++s) numbers[solids_[s].index] = static_cast<int>(s);
   csg_ = scene.csg.renumbered(numbers);
+  look(scene);
+}
+
+void KernelScene::look(const Scene& scene) {
+  bounds_ = meshes_.bounds();
+  for (KernelSolid& solid : solids_) {
+    const V3d corner(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]);
+    solid.tableToWorld =
+        M44d().setTranslation(corner) * scene.solids[solid.index].band.indexToWorld();
+    solid.worldToTable = solid.tableToWorld.inverse();
+    solid.fan = makeRayFan(scene.camera, solid.tableToWorld, solid.voxelSize, solid.pool);
+    bounds_.extendBy(Imath::transform(cellBox(solid.pool), solid.tableToWorld));
+  }
 }
 
 std::size_t KernelScene::bytes() const {

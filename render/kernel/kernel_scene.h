@@ -60,6 +60,11 @@ class KernelScene {
   explicit KernelScene(const Scene& scene, std::size_t maxBytes = levelset::kNoMemoryLimit,
                        Filter filter = Filter::Trilinear);
 
+  /// Takes the camera, and where the solids are, anew from a scene; tables and meshes
+  /// stay.
+  /// @pre the camera is valid; the scene has the solids and the expression that this was made of
+  void look(const Scene& scene);
+
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
   /// World-space box of the cells that hold surface, and of the meshes; empty when there are none.
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }

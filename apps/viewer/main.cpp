@@ -1,0 +1,96 @@
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "apps/cli/watch.h"
+#include "apps/viewer/arguments.h"
+#include "apps/viewer/script.h"
+#include "apps/viewer/viewer.h"
+#include "apps/viewer/window.h"
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+
+namespace {
+
+using levelset::ExitCode;
+
+/// Under the name of the program, which some sentences begin with.
+void tellOnStandardError(const std::string& sentence) {
+  constexpr const char* kName = "levelsmith-view: ";
+  fmt::print(stderr, "{}{}\n", sentence.starts_with(kName) ? "" : kName, sentence);
+}
+
+void runWindow(const viewer::Arguments& arguments) {
+  // What cannot be opened at all is said where it was asked for.
+  viewer::requireReadable(arguments.files);
+  viewer::Window window("Levelsmith", arguments.width, arguments.height, true);
+  viewer::Viewer viewer(arguments, window);
+  if (!arguments.files.empty()) viewer.open(arguments.files);
+  constexpr double kIdle = 0.25;  // seconds between looks at the files
+  constexpr double kAfterEvent = 0.02;
+  constexpr int kFramesAfterEvent = 3;  // that ImGui takes to settle
+  int frames = kFramesAfterEvent;
+  while (!window.isToClose()) {
+    const int width = window.width(), height = window.height();
+    viewer.update();
+    window.draw([&] { viewer.drawInterface(width, height); });
+    viewer.wantPicture(width, height);
+    viewer.writeInterfaceShot();
+    const bool isSettled = --frames <= 0 && !viewer.isBusy();
+    if (window.wait(isSettled ? kIdle : kAfterEvent)) frames = kFramesAfterEvent;
+  }
+}
+
+int levelsmithView(const std::vector<std::string>& words) {
+  const viewer::Arguments arguments = viewer::parseArguments(words);
+  if (arguments.asksHelp || arguments.asksVersion) {
+    const std::string text =
+        arguments.asksHelp ? viewer::viewerHelp() : "levelsmith-view " LEVELSMITH_VERSION "\n";
+    std::fputs(text.c_str(), stdout);
+    return static_cast<int>(ExitCode::Done);
+  }
+  cli::startWatch(levelset::kNoMemoryLimit);
+  if (arguments.isScript())
+    viewer::runScript(arguments);
+  else
+    runWindow(arguments);
+  return static_cast<int>(ExitCode::Done);
+}
+
+/// Says what went wrong. @return the exit code
+int tellWhatFailed(const std::exception_ptr& failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const levelset::Error& error) {
+    tellOnStandardError(error.what());
+    return static_cast<int>(error.exitCode());
+  } catch (const std::bad_alloc&) {
+    tellOnStandardError("memory ran out; show something smaller, or a smaller --resolution");
+    return static_cast<int>(ExitCode::Resource);
+  } catch (const std::exception& error) {
+    tellOnStandardError(fmt::format(
+        "unexpected failure: {}; please report it with the command that caused it", error.what()));
+  }
+  return static_cast<int>(ExitCode::Input);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  int code = 0;
+  try {
+    code = levelsmithView({argv + 1, argv + argc});
+  } catch (...) {
+    code = tellWhatFailed(std::current_exception());
+  }
+  std::fflush(stderr);
+  levelset::removeTemporaryFiles();
+  // Threads that watch or read may be anywhere; nothing is left to be torn down.
+  if (std::fflush(stdout) != 0 && code == 0) code = static_cast<int>(ExitCode::File);
+  _exit(code);
+}

@@ -1,0 +1,120 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/viewer/arguments.h"
+#include "apps/viewer/file_list.h"
+#include "apps/viewer/file_watch.h"
+#include "apps/viewer/loader.h"
+#include "apps/viewer/orbit_camera.h"
+#include "apps/viewer/pick.h"
+#include "apps/viewer/progressive_picture.h"
+#include "apps/viewer/window.h"
+
+namespace viewer {
+
+/// What the window shows, and what is done by hand in it.
+class Viewer {
+ public:
+  Viewer(const Arguments& arguments, Window& window);
+
+  /// Reads files in the background; what is shown stays until they are read.
+  void open(const std::vector<std::filesystem::path>& files, bool isReload = false);
+  /// Shows a model that was read. @param keepView  as seen before
+  void show(std::shared_ptr<const Model> model, bool keepView);
+
+  /// Takes up what came in from elsewhere: models, pictures, drops, changed files.
+  void update();
+  /// The window's interface, while it is drawn; acts upon what is done in it.
+  /// @param width, height  of the picture, pixels
+  void drawInterface(int width, int height);
+
+  /// Writes the picture of the whole window that was asked for in it, if one was.
+  void writeInterfaceShot();
+
+  /// Asks for the picture of what is shown. @param width, height  pixels
+  void wantPicture(int width, int height);
+  [[nodiscard]] const ProgressivePicture& picture() const { return picture_; }
+  [[nodiscard]] bool isBusy() const;
+  /// As if somebody had clicked there.
+  void addPick(const Picked& picked);
+
+ private:
+  static constexpr float kPanelWidth = 250;  // pixels
+
+  [[nodiscard]] bool isPanelShown() const;
+  void frameBesidePanel();
+  void takeModel();
+  void takeFrame();
+  void takeKeys();
+  void press(unsigned character);
+  void pressSpecial(const KeyPress& press);
+  void watchFiles();
+  void reload();
+
+  void useMouse(int width, int height);
+  void dragTo(const Imath::V2d& place, int width, int height);
+  void pickAt(const Imath::V2d& place, bool isForTarget);
+  void finishPick();
+  void copyPicks();
+  void saveScreenshot();
+  void tell(const std::string& sentence) { message_ = sentence; }
+  void tellFailure(const std::exception_ptr& failure, const std::string& instead);
+
+  // === The interface, viewer_panels.cpp
+  void drawPanel();
+  void drawFilePart();
+  void drawViewPart();
+  void drawLayerPart();
+  void drawClipPart();
+  void drawPatchPart();
+  void drawPointPart();
+  void drawStatus();
+  void drawMarks(int width, int height);
+  void drawScreenshotDialog();
+  void drawKeysDialog();
+
+  Arguments arguments_;
+  Window& window_;
+  Loader loader_;
+  ProgressivePicture picture_;
+  FileList fileList_;
+  FileWatch watch_;
+  double nextWatch_ = 0;  // seconds
+  bool wasMissing_ = false;
+
+  std::shared_ptr<const Model> model_;
+  OrbitCamera camera_;
+  ClipPlane clip_;
+  bool isClipped_ = false;
+  Display display_;
+  render::Style style_;
+  std::shared_ptr<const Frame> frame_;  // that the window has
+  int pictureWidth_ = 1, pictureHeight_ = 1;
+
+  enum class Drag { None, Orbit, Pan };
+  Drag drag_ = Drag::None;
+  Imath::V2d dragStart_, dragLast_;
+  double dragDepth_ = 1;
+  bool hasDragged_ = false;
+  std::optional<std::array<int, 2>> wantedPick_;
+  bool isPickForTarget_ = false;
+  std::vector<Picked> picks_;
+
+  // Keys for the dialog that is open: ImGui misses those that are let go at once.
+  bool isEntered_ = false, isEscaped_ = false;
+  std::string message_;
+  bool asksScreenshot_ = false, asksKeys_ = false;
+  std::array<char, 512> screenshotName_{};
+  bool isInterfaceShot_ = false;
+  bool wantsInterfaceShot_ = false;
+};
+
+}  // namespace viewer

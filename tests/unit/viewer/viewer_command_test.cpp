@@ -1,0 +1,198 @@
+// The viewer from the command line, in a window of a display in memory.
+
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/support/shell.h"
+
+namespace viewer_command_test {
+
+using support::Outcome;
+using Json = nlohmann::json;
+using Pixel = std::array<int, 4>;
+
+struct Picture {
+  int width = 0, height = 0;
+  std::vector<png_byte> bytes;
+  [[nodiscard]] Pixel at(int x, int y) const {
+    Pixel pixel;
+    for (std::size_t c = 0; c < 4; ++c)
+      pixel[c] = bytes[4 * static_cast<std::size_t>(y * width + x) + c];
+    return pixel;
+  }
+  [[nodiscard]] Pixel middle() const { return at(width / 2, height / 2); }
+};
+
+Picture readPng(const std::filesystem::path& file) {
+  png_image png = {};
+  png.version = PNG_IMAGE_VERSION;
+  Picture picture;
+  if (!png_image_begin_read_from_file(&png, file.c_str())) return picture;
+  png.format = PNG_FORMAT_RGBA;
+  picture.width = static_cast<int>(png.width);
+  picture.height = static_cast<int>(png.height);
+  picture.bytes.resize(PNG_IMAGE_SIZE(png));
+  if (!png_image_finish_read(&png, nullptr, picture.bytes.data(), 0, nullptr)) return {};
+  return picture;
+}
+
+int brightness(const Pixel& p) {
+  return p[0] + p[1] + p[2];
+}
+
+class ViewerCommand : public support::ShellTest {
+ protected:
+  void SetUp() override {
+    ShellTest::SetUp();
+    if (std::system("command -v xvfb-run >/dev/null 2>&1") == 0) return;
+    const char* ci = std::getenv("CI");
+    if (ci && std::string(ci) == "true")
+      FAIL() << "xvfb-run is not there, and the viewer has to be tested: install xvfb and xauth";
+    GTEST_SKIP() << "the viewer needs a display: install xvfb and xauth";
+  }
+
+  void makeBall() {
+    const Outcome made = levelsmith("sphere --radius 1 --voxel 0.05 ! write ball.vdb");
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+
+  /// One display for all lines, in which `view` is the viewer.
+  Outcome onDisplay(const std::string& lines) {
+    writeFile("lines.sh", "view() { '" LEVELSMITH_VIEWER_COMMAND "' \"$@\"; }\n" + lines);
+    return shell("xvfb-run -a bash lines.sh");
+  }
+
+  [[nodiscard]] Picture png(const std::string& name) const { return readPng(folder_ / name); }
+};
+
+TEST_F(ViewerCommand, DrawsPicksAndWritesWhatTheCommandDraws) {
+  makeBall();
+  const std::string camera = "--from 0.5,1,5 --to 0,0,0 --fov 30 --size 200x150";
+  const Outcome seen = onDisplay("set -e; view ball.vdb " + camera +
+                                 " --screenshot a.png --pick 100,75\n"
+                                 "view ball.vdb " +
+                                 camera +
+                                 " --screenshot w.png --interface\n"
+                                 "view ball.vdb --pick 0,0");
+  ASSERT_EQ(seen.code, 0) << seen.err;
+
+  const Picture picture = png("a.png");
+  ASSERT_EQ(picture.width, 200);
+  ASSERT_EQ(picture.height, 150);
+  EXPECT_GT(brightness(picture.middle()), 250);
+  EXPECT_EQ(picture.middle()[3], 255);
+  for (const int x : {0, 199})
+    for (const int y : {0, 149}) EXPECT_EQ(picture.at(x, y)[3], 0);
+  const Outcome drawn = levelsmith("read ball.vdb ! render b.png --renderer cpu " + camera);
+  ASSERT_EQ(drawn.code, 0) << drawn.err;
+  EXPECT_EQ(picture.bytes, png("b.png").bytes);
+
+  // The ray through the middle goes towards the origin.
+  const std::size_t end = seen.out.find('\n');
+  const Json json = Json::parse(seen.out.substr(0, end));
+  const double distance = std::sqrt(0.5 * 0.5 + 1 + 25);
+  const std::array<double, 3> truth = {0.5 / distance, 1 / distance, 5 / distance};
+  for (std::size_t a = 0; a < 3; ++a) {
+    EXPECT_NEAR(json["position"][a].get<double>(), truth[a], 0.01);
+    EXPECT_NEAR(json["normal"][a].get<double>(), truth[a], 0.01);
+  }
+  EXPECT_EQ(json["solid"], "ball");
+  EXPECT_EQ(seen.out.substr(end + 1), "null\n");
+
+  const Picture window = png("w.png");
+  ASSERT_EQ(window.bytes.size(), picture.bytes.size());
+  EXPECT_EQ(window.at(190, 10)[3], 255);
+  EXPECT_NE(window.bytes, picture.bytes);
+}
+
+TEST_F(ViewerCommand, ShowsLayersAndClipPlanes) {
+  makeBall();
+  const Outcome seen = onDisplay(
+      "set -e; camera='--from 0,0,5 --to 0,0,0 --size 120x90'\n"
+      "view ball.vdb $camera --layer normal --screenshot n.png\n"
+      "view ball.vdb $camera --layer mean --screenshot m.exr\n"
+      "view ball.vdb $camera --clip z=0.2 --screenshot c.png --pick 60,45");
+  ASSERT_EQ(seen.code, 0) << seen.err;
+  const Pixel normal = png("n.png").middle();
+  EXPECT_NEAR(normal[0], 128, 2);
+  EXPECT_NEAR(normal[1], 128, 2);
+  EXPECT_GE(normal[2], 254);
+  EXPECT_TRUE(exists("m.exr"));
+  const Pixel inside = png("c.png").middle();
+  EXPECT_GT(inside[2], inside[0] + 20);
+  EXPECT_NEAR(Json::parse(seen.out)["position"][2].get<double>(), 0.2, 1e-4);
+}
+
+TEST_F(ViewerCommand, OpensMeshesScenesAndPatches) {
+  const Outcome made = levelsmith(
+      "box --size 2,2,2 --voxel 0.1 --as b ! sphere --radius 1.2 --voxel 0.1 --as s "
+      "! mesh @s --as m ! scene @b @s @m --csg 'b - s' --from 0,0,6 --size 80x60 ! write cut.json "
+      "! scene @m --from 0,0,6 --size 80x60 ! write mesh.json ! mesh @b ! write b.ply "
+      "! patch @b --corners '-0.5,-0.5,1 0.5,-0.5,1 0.5,0.5,1 -0.5,0.5,1' --height 0.3 --levels 3 "
+      "! write p.patch");
+  ASSERT_EQ(made.code, 0) << made.err;
+  const Outcome seen = onDisplay(
+      "set -e; view cut.json --screenshot s.png --clip z=0.9 --pick 40,30\n"
+      "view mesh.json --pick 40,30\n"
+      "view b.ply --resolution 40 --from 0,0,6 --size 80x60 --screenshot m.png\n"
+      "view p.patch b.ply --resolution 40 --from 0,0,6 --size 80x60 --screenshot p.png\n"
+      "view p.patch --from 0,0,6 --size 80x60 --screenshot alone.png --pick 40,30");
+  ASSERT_EQ(seen.code, 0) << seen.err;
+  EXPECT_EQ(png("s.png").width, 80);  // as the scene says
+  EXPECT_GT(brightness(png("m.png").middle()), 250);
+  EXPECT_NE(png("p.png").bytes, png("m.png").bytes);
+  EXPECT_GT(png("alone.png").middle()[3], 0);
+  // The mesh stands out of the plane, which cuts solids only.
+  EXPECT_EQ(seen.out.find("\"solid\":\"m\"") != std::string::npos, true) << seen.out;
+  EXPECT_TRUE(seen.out.ends_with("\"solid\":\"m\"}\nnull\n")) << seen.out;
+}
+
+TEST_F(ViewerCommand, RefusesWhatItCannotDo) {
+  makeBall();
+  writeFile("broken.vdb", "no grid");
+  writeFile("broken.ply", "ply\n");
+  const Outcome seen = onDisplay(
+      "view missing.vdb --pick 1,1; echo $?; view missing.vdb; echo $?\n"
+      "view broken.vdb --pick 1,1; echo $?; view broken.ply --pick 1,1; echo $?\n"
+      "view '' --pick 1,1; echo $?; view ball.txt --pick 1,1; echo $?\n"
+      "view ball.vdb ball.vdb; echo $?\n"
+      "view ball.vdb --layer colours --pick 1,1; echo $?\n"
+      "view ball.vdb --pick 9,9 --size 9x9; echo $?\n"
+      "view ball.vdb --screenshot no/such/folder.png; echo $?\n"
+      "view ball.vdb --size 100000x100000 --screenshot a.png; echo $?\n"
+      "view ball.vdb --from 0,0,0 --to 0,0,0 --pick 1,1; echo $?\n");
+  EXPECT_EQ(seen.out, "6\n6\n3\n3\n2\n2\n2\n2\n2\n6\n4\n2\n") << seen.err;
+  std::size_t sentences = 0;
+  for (std::size_t at = 0; (at = seen.err.find("levelsmith-view: ", at)) != std::string::npos; ++at)
+    ++sentences;
+  EXPECT_EQ(sentences, 12u) << seen.err;
+  EXPECT_FALSE(exists("a.png"));
+}
+
+TEST_F(ViewerCommand, NeedsADisplayAndSaysSo) {
+  makeBall();
+  const Outcome seen =
+      shell("unset DISPLAY WAYLAND_DISPLAY; '" LEVELSMITH_VIEWER_COMMAND "' ball.vdb");
+  EXPECT_REFUSED(seen, 4, "levelsmith render");
+}
+
+TEST_F(ViewerCommand, StaysOpenUntilItIsEnded) {
+  makeBall();
+  // A window without a file, one whose file goes away, and one that is interrupted.
+  const Outcome seen = onDisplay("timeout --preserve-status -s INT 2 '" LEVELSMITH_VIEWER_COMMAND
+                                 "'; echo $?\n"
+                                 "(sleep 1; rm ball.vdb; sleep 1; echo garbage >ball.vdb) &\n"
+                                 "timeout --preserve-status -s INT 4 '" LEVELSMITH_VIEWER_COMMAND
+                                 "' ball.vdb --size 300x200; echo $?\n");
+  EXPECT_EQ(seen.out, "130\n130\n") << seen.err;
+  EXPECT_NE(seen.err.find("interrupted"), std::string::npos);
+}
+
+}  // namespace viewer_command_test
