@@ -8,6 +8,7 @@
 
 #include "levelset/error.h"
 #include "render/embree/embree_renderer.h"
+#include "render/embree/float_view.h"
 #include "render/embree/mesh_rays.h"
 #include "render/embree/surface_blocks_vdb.h"
 #include "render/embree/surface_spline_vdb.h"
@@ -19,10 +20,6 @@ namespace {
 using Imath::Box3d;
 using Imath::V3d;
 
-/// Embree's floats see the scene scaled to a diagonal of 1 around the origin, and rays that start
-/// at its box. Then origin, direction and box carry errors of some 2^-24 each, and this covers
-/// them.
-constexpr double kFloatPad = 2e-6;
 constexpr double kNoEnd = 1e300;
 
 struct RaySolid {
@@ -30,11 +27,9 @@ struct RaySolid {
   Imath::M44d indexToWorld, worldToIndex;
   std::vector<SurfaceBlock> blocks;
   std::uint32_t id;
-  std::size_t index;   // in the scene
-  std::size_t number;  // among those with a surface
-  // From world to Embree's box.
-  V3d centre;
-  double scale;
+  std::size_t index;      // in the scene
+  std::size_t number;     // among those with a surface
+  const FloatView* view;  // of the scene
   Filter filter;
   Imath::C3f colour;
 
@@ -72,8 +67,8 @@ std::optional<double> crossingOf(const RayQuery& query, const RaySolid& solid, u
 void boundBlock(const RTCBoundsFunctionArguments* args) {
   const auto& solid = *static_cast<const RaySolid*>(args->geometryUserPtr);
   const Box3d box = Imath::transform(solid.blocks[args->primID].bounds(), solid.indexToWorld);
-  const V3d low = (box.min - solid.centre) * solid.scale - V3d(kFloatPad);
-  const V3d high = (box.max - solid.centre) * solid.scale + V3d(kFloatPad);
+  const V3d low = (box.min - solid.view->centre) * solid.view->scale - V3d(FloatView::kPad);
+  const V3d high = (box.max - solid.view->centre) * solid.view->scale + V3d(FloatView::kPad);
   RTCBounds& bounds = *args->bounds_o;
   bounds.lower_x = static_cast<float>(low.x);
   bounds.lower_y = static_cast<float>(low.y);
@@ -99,8 +94,8 @@ void intersectBlock(const RTCIntersectFunctionNArguments* args) {
   query.solid = &solid;
   // Blocks that could tie stay in Embree's sight.
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, args->N);
-  RTCRayN_tfar(ray, args->N, 0) =
-      std::min(RTCRayN_tfar(ray, args->N, 0), static_cast<float>(*t * query.scale + kFloatPad));
+  RTCRayN_tfar(ray, args->N, 0) = std::min(RTCRayN_tfar(ray, args->N, 0),
+                                           static_cast<float>(*t * query.scale + FloatView::kPad));
   RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, args->N);
   RTCHitN_geomID(hit, args->N, 0) = args->geomID;
   RTCHitN_primID(hit, args->N, 0) = args->primID;
@@ -160,22 +155,6 @@ std::optional<CsgChange> firstChange(const CsgExpression& csg,
   }
 }
 
-/// Where the ray enters the box, at least `near`; nothing when it misses.
-std::optional<double> entryOf(const Box3d& box, const V3d& origin, const V3d& direction,
-                              double near, double far) {
-  for (int a = 0; a < 3; ++a) {
-    if (direction[a] == 0) {
-      if (origin[a] < box.min[a] || origin[a] > box.max[a]) return std::nullopt;
-      continue;
-    }
-    const double t0 = (box.min[a] - origin[a]) / direction[a];
-    const double t1 = (box.max[a] - origin[a]) / direction[a];
-    near = std::max(near, std::min(t0, t1));
-    far = std::min(far, std::max(t0, t1));
-  }
-  return near <= far ? std::optional(near) : std::nullopt;
-}
-
 void requireRay(const V3d& origin, const V3d& direction) {
   const double sum = origin.x + origin.y + origin.z + direction.x + direction.y + direction.z;
   if (std::isfinite(sum) && direction != V3d(0)) return;
@@ -193,9 +172,7 @@ struct EmbreeScene::Impl {
   MeshRays meshes;
   Box3d allBounds;  // with the meshes
   Box3d bounds;     // of the crossing cells
-  Box3d rayBounds;  // a little larger: where rays may start
-  V3d centre;
-  double scale = 1;
+  FloatView view;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
 
@@ -264,27 +241,16 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
   }
   csg = source.csg.renumbered(numbers);
   if (bounds.isEmpty()) return;
-  centre = bounds.center();
-  scale = 1 / bounds.size().length();
-  const V3d pad(1e-3 / scale);
-  rayBounds = {bounds.min - pad, bounds.max + pad};
+  view = FloatView(bounds);
 }
 
 void EmbreeScene::Impl::build() {
   device = rtcNewDevice(nullptr);
-  const auto check = [&] {
-    const RTCError error = rtcGetDeviceError(device);
-    if (error == RTC_ERROR_NONE) return;
-    throw levelset::ResourceLimit(fmt::format(
-        "render: Embree failed with its error {} ({}); use larger voxels or free memory",
-        static_cast<int>(error), error == RTC_ERROR_OUT_OF_MEMORY ? "out of memory" : "other"));
-  };
-  check();
+  requireEmbree(device);
   scene = rtcNewScene(device);
   rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
   for (RaySolid& solid : solids) {
-    solid.centre = centre;
-    solid.scale = scale;
+    solid.view = &view;
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(solid.blocks.size()));
     rtcSetGeometryUserData(geometry, &solid);
@@ -299,7 +265,7 @@ void EmbreeScene::Impl::build() {
     rtcReleaseGeometry(geometry);
   }
   rtcCommitScene(scene);
-  check();
+  requireEmbree(device);
 }
 
 std::optional<RayQuery> EmbreeScene::Impl::prepare(const V3d& origin, const V3d& direction,
@@ -307,7 +273,7 @@ std::optional<RayQuery> EmbreeScene::Impl::prepare(const V3d& origin, const V3d&
                                                    RTCRay& ray) const {
   requireRay(origin, direction);
   if (!scene) return std::nullopt;
-  const auto entry = entryOf(rayBounds, origin, direction, near, far);
+  const auto entry = view.entryOf(origin, direction, near, far);
   if (!entry) return std::nullopt;
   moved = *entry;
   RayQuery query;
@@ -315,19 +281,8 @@ std::optional<RayQuery> EmbreeScene::Impl::prepare(const V3d& origin, const V3d&
   query.origin = origin + direction * moved;
   query.direction = direction;
   query.limit = query.nearest = far - moved;
-  query.scale = scale;
-
-  const V3d start = (query.origin - centre) * scale;
-  ray = {};
-  ray.org_x = static_cast<float>(start.x);
-  ray.org_y = static_cast<float>(start.y);
-  ray.org_z = static_cast<float>(start.z);
-  ray.dir_x = static_cast<float>(direction.x);
-  ray.dir_y = static_cast<float>(direction.y);
-  ray.dir_z = static_cast<float>(direction.z);
-  // The scene has a diagonal of 1, so nothing lies beyond 2.
-  ray.tfar = static_cast<float>(std::min(2.0, query.limit * scale + kFloatPad));
-  ray.mask = ~0u;
+  query.scale = view.scale;
+  ray = view.rayFrom(query.origin, direction, query.limit);
   return query;
 }
 

@@ -28,10 +28,11 @@ configure no-render -DLEVELSMITH_RENDER=OFF ${without}_embree=ON ${without}_Open
 grep -q " mapping/" "$work/no-render.plan"
 lacks no-render render
 lacks no-render apps
-configure no-mapping -DLEVELSMITH_MAPPING=OFF ${without}_nlohmann_json=ON
+configure no-mapping -DLEVELSMITH_MAPPING=OFF
 grep -q " render/" "$work/no-mapping.plan"
 lacks no-mapping mapping
 lacks no-mapping apps
-configure levelset-alone -DLEVELSMITH_MAPPING=OFF -DLEVELSMITH_RENDER=OFF ${without}_embree=ON
+configure levelset-alone -DLEVELSMITH_MAPPING=OFF -DLEVELSMITH_RENDER=OFF ${without}_embree=ON \
+  ${without}_OpenEXR=ON ${without}_PNG=ON ${without}_nlohmann_json=ON
 lacks levelset-alone mapping
 lacks levelset-alone render
