@@ -12,6 +12,7 @@
 #include "levelset/narrow_band.h"
 #include "render/camera.h"
 #include "render/csg.h"
+#include "render/value_bits.h"
 
 namespace render {
 
@@ -27,6 +28,7 @@ struct Solid {
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
   std::string name = {};  ///< for the expression
+  ValueBits held = {};    ///< of the kernel's tables; the band has these values (coarsened())
 };
 
 /// Triangles beside the solids: drawn, lit and lighted through like them, of no use to the

@@ -10,7 +10,7 @@ namespace render {
 Image renderGpu(const Scene& scene, const RenderOptions& options) {
   requirePicture(scene, options);
   levelset::report(options.progress, 0, "render");
-  const KernelScene surfaces(scene, options.maxBytes, options.filter);
+  const KernelScene surfaces(scene, options);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();
   const GlContext context;
   const GpuTracer tracer(context, surfaces);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <map>
-#include <utility>
 #include <vector>
 
 #include "levelset/error.h"
@@ -126,34 +125,52 @@ int passingNumber(int n) { return int(rays[11 * rayCount + n]); }
 void addShape(int n, Ray ray, Hit hit) {}
 )GLSL";
 
-/// Values in one buffer of texels, or in several of 2^shift floats each.
-std::string valueText(int blocks, int shift) {
+/// What a shader is made for.
+struct Variant {
+  bool isPixels, isSpline;
+  int valueBits;
+  int blocks;  // of values, in a buffer of texels each
+  auto operator<=>(const Variant&) const = default;
+};
+
+/// Values in one buffer of texels, or in several of 2^shift values each.
+std::string valueText(const Variant& variant, int shift) {
+  const bool isCode = variant.valueBits != 32;
   std::string text;
-  for (int b = 0; b < blocks; ++b) {
-    text += fmt::format("layout(binding = {}) uniform samplerBuffer values{};\n",
-                        static_cast<int>(kFirstValues) + b, b);
+  for (int b = 0; b < variant.blocks; ++b) {
+    text += fmt::format("layout(binding = {}) uniform {}samplerBuffer values{};\n",
+                        static_cast<int>(kFirstValues) + b, isCode ? "u" : "", b);
   }
-  text += "Real loadValue(Whole i) {\n";
-  for (int b = 0; b + 1 < blocks; ++b)
+  text += fmt::format("{} loadHeld(Whole i) {{\n", isCode ? "uint" : "float");
+  for (int b = 0; b + 1 < variant.blocks; ++b)
     text += fmt::format("  if (i >> {} == {}) return texelFetch(values{}, i & {}).x;\n", shift, b,
                         b, (1 << shift) - 1);
-  text += blocks == 1 ? "  return texelFetch(values0, i).x;\n}\n"
-                      : fmt::format("  return texelFetch(values{}, i & {}).x;\n}}\n", blocks - 1,
-                                    (1 << shift) - 1);
-  return text;
+  text += variant.blocks == 1 ? "  return texelFetch(values0, i).x;\n}\n"
+                              : fmt::format("  return texelFetch(values{}, i & {}).x;\n}}\n",
+                                            variant.blocks - 1, (1 << shift) - 1);
+  if (!isCode) return text + "Real loadValue(Whole i) { return loadHeld(i); }\n";
+  return text + fmt::format(
+                    "uniform float valueStep;\n"
+                    "Real loadValue(Whole i) {{\n"
+                    "  VAR fromZero = float(int(loadHeld(i))) + {}.5;\n"
+                    "  VAR value = fromZero * valueStep;\n"
+                    "  return value;\n}}\n",
+                    1 - (1 << (variant.valueBits - 1)));
 }
 
-std::string shaderText(const char* rays, bool isSpline, int valueBlocks, int shift) {
+std::string shaderText(const Variant& variant, int shift) {
   return fmt::format(
              "#version 450 core\nlayout(local_size_x = {}) in;\n"
-             "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {}, kBlockOfEntry = {},\n"
+             "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {},\n"
+             "          kFirstOfEntry = {}, kStridesOfEntry = {}, kStrideShift = {},\n"
              "          kHitParts = {}, kShapeParts = {}, kGoesIn = {}, kGoesOut = {};\n"
              "const bool isSpline = {};\n",
              kGroup, BrickPool::kEdge, BrickPool::kValues,
-             std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kBlockOfEntry,
-             kHitParts, ShapeBlock::kParts, HitBlock::kGoesIn, HitBlock::kGoesOut, isSpline) +
-         kDialect + valueText(valueBlocks, shift) + kRootsKernel + kWindowKernel + kSplineKernel +
-         kTraceKernel + kShapeKernel + rays + kMain;
+             std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kFirstOfEntry,
+             BrickPool::kStridesOfEntry, BrickPool::kStrideShift, kHitParts, ShapeBlock::kParts,
+             HitBlock::kGoesIn, HitBlock::kGoesOut, variant.isSpline) +
+         kDialect + valueText(variant, shift) + kRootsKernel + kWindowKernel + kSplineKernel +
+         kTraceKernel + kShapeKernel + (variant.isPixels ? kPixelRays : kListedRays) + kMain;
 }
 
 }  // namespace
@@ -198,11 +215,10 @@ struct GpuTracer::Impl {
   const GlContext& context;
   const GlFunctions& gl;
   const std::size_t largestTable;
-  int shift = 0;  // of the number of floats in a block of values
+  int shift = 0;  // of the number of values in a block of them
   std::map<const KernelSolid*, Tables> tables;
   GLuint rays = 0, hits = 0;
-  /// By the number of blocks of values, and is it a spline?
-  std::map<std::pair<int, bool>, GLuint> pixelPrograms, rayPrograms;
+  std::map<Variant, GLuint> programs;
 
   Impl(const GlContext& context_, std::size_t largestTable_)
       : context(context_),
@@ -225,8 +241,7 @@ struct GpuTracer::Impl {
       for (const Texels& texels : t.values) release(texels);
     }
     for (const GLuint buffer : {rays, hits}) gl.DeleteBuffers(1, &buffer);
-    for (const auto* programs : {&pixelPrograms, &rayPrograms})
-      for (const auto& [blocks, program] : *programs) gl.DeleteProgram(program);
+    for (const auto& [variant, program] : programs) gl.DeleteProgram(program);
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -248,14 +263,19 @@ struct GpuTracer::Impl {
 
   void upload(const KernelSolid& solid) {
     const BrickPool& pool = solid.pool;
-    const std::size_t perBlock = std::size_t{1} << shift;
-    const std::size_t blocks = (pool.value.size() + perBlock - 1) / perBlock;
+    const auto size = static_cast<std::size_t>(pool.held.bits / 8);
+    const std::size_t perBlock = size << shift;
+    const std::uint8_t* values = pool.held.bits == 32
+                                     ? reinterpret_cast<const std::uint8_t*>(pool.value.data())
+                                     : pool.code.data();
+    const std::size_t bytes = pool.valueBytes();
+    const std::size_t blocks = (bytes + perBlock - 1) / perBlock;
     if (blocks + kFirstValues > static_cast<std::size_t>(context.tableCount())) {
       throw levelset::ResourceLimit(
           fmt::format("render: {} MB of values need {} buffer textures, and {} leaves {}; use "
                       "larger voxels, or "
                       "draw with --renderer cpu",
-                      pool.value.size() * 4 >> 20, blocks, context.description(),
+                      bytes >> 20, blocks, context.description(),
                       context.tableCount() - static_cast<int>(kFirstValues)));
     }
     Tables& t = tables[&solid];
@@ -265,25 +285,25 @@ struct GpuTracer::Impl {
     t.pages = whole(pool.page);
     t.entries = whole(pool.entry);
     t.masks = whole(pool.mask);
-    for (std::size_t first = 0; first < pool.value.size(); first += perBlock)
-      t.values.push_back(texelsOf(pool.value.data() + first,
-                                  4 * std::min(perBlock, pool.value.size() - first), GL_R32F));
+    const GLenum format = size == 4 ? GL_R32F : size == 2 ? GL_R16UI : GL_R8UI;
+    for (std::size_t first = 0; first < bytes; first += perBlock)
+      t.values.push_back(texelsOf(values + first, std::min(perBlock, bytes - first), format));
   }
 
   GLuint programFor(const KernelSolid& solid, bool isPixels) {
-    const int blocks = static_cast<int>(tables.at(&solid).values.size());
-    auto& programs = isPixels ? pixelPrograms : rayPrograms;
-    const bool isSpline = solid.pool.filter != Filter::Trilinear;
-    const auto known = programs.find({blocks, isSpline});
-    if (known != programs.end()) return known->second;
-    const char* rays_ = isPixels ? kPixelRays : kListedRays;
-    return programs[{blocks, isSpline}] =
-               compileCompute(context, shaderText(rays_, isSpline, blocks, shift));
+    const Variant variant{.isPixels = isPixels,
+                          .isSpline = solid.pool.filter != Filter::Trilinear,
+                          .valueBits = solid.pool.held.bits,
+                          .blocks = static_cast<int>(tables.at(&solid).values.size())};
+    GLuint& program = programs[variant];
+    if (program == 0) program = compileCompute(context, shaderText(variant, shift));
+    return program;
   }
 
   void setNumbers(GLuint program, const KernelSolid& solid) {
     const auto place = [&](const char* name) { return gl.GetUniformLocation(program, name); };
     const BrickPool& pool = solid.pool;
+    if (pool.held.bits != 32) gl.Uniform1fv(place("valueStep"), 1, &pool.held.step);
     gl.Uniform1i(place("pagesY"), pool.pages[1]);
     gl.Uniform1i(place("pagesZ"), pool.pages[2]);
     gl.Uniform1i(place("tableSizeX"), pool.pages[0] * BrickPool::kPage);

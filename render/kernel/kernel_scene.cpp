@@ -9,6 +9,7 @@
 
 #include "levelset/vdb.h"
 #include "render/kernel/csg_walk.h"
+#include "render/kernel/frame_need.h"
 
 namespace render {
 namespace {
@@ -21,11 +22,14 @@ constexpr double kParallel = 1e30;
 constexpr std::size_t kRaysAtOnce = 1u << 18;
 constexpr double kNoEnd = 1e300;
 
-Imath::Box3d cellBox(const BrickPool& pool) {
-  Imath::Box3d box;
-  for (const std::array<int, 3>& corner : {pool.low, pool.high})
-    box.extendBy(V3d(corner[0], corner[1], corner[2]));
-  return box;
+/// A box that holds all cells that the surface may cross, world units.
+Imath::Box3d leafBox(const levelset::NarrowBand& band) {
+  openvdb::CoordBBox leaves;
+  if (band.isEmpty() || !levelset::vdb(band).tree().evalLeafBoundingBox(leaves)) return {};
+  leaves.expand(BrickPool::kBlock);
+  return Imath::transform(Imath::Box3d(levelset::toImath(leaves.min().asVec3d()),
+                                       levelset::toImath(leaves.max().asVec3d())),
+                          band.indexToWorld());
 }
 
 /// A part of a ray, by its parameter.
@@ -97,21 +101,50 @@ struct PackedRays {
 }  // namespace
 
 KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter) : meshes_(scene) {
+  makeTables(scene, {.filter = filter, .maxBytes = maxBytes}, false);
+}
+
+KernelScene::KernelScene(const Scene& scene, const RenderOptions& options) : meshes_(scene) {
+  makeTables(scene, options, true);
+}
+
+void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, bool isPicture) {
   // A block for each leaf; those the surface does not cross are built and dropped.
   double leaves = 0;
-  for (const Solid& solid : scene.solids)
-    if (!solid.band.isEmpty())
-      leaves += static_cast<double>(levelset::vdb(solid.band).tree().leafCount());
+  Imath::Box3d box = meshes_.bounds();
+  for (const Solid& solid : scene.solids) {
+    if (solid.band.isEmpty()) continue;
+    leaves += static_cast<double>(levelset::vdb(solid.band).tree().leafCount());
+    box.extendBy(leafBox(solid.band));
+  }
   // And a copy of the leaves where the spline's coefficients are made of the values.
-  const double kCopies = filter == Filter::BSplineQi ? 4 * 512 : 0;
+  const double kCopies = options.filter == Filter::BSplineQi ? 4 * 512 : 0;
   const double kBytesOfBlock = 2 * 4 * (BrickPool::kValues + BrickPool::kMaskWords) + kCopies;
-  levelset::requireMemory(leaves * kBytesOfBlock, maxBytes, "render");
+  levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes, "render");
+  const FrameNeed need = isPicture && !box.isEmpty() ? FrameNeed(scene, options, box) : FrameNeed();
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
     const Solid& source = scene.solids[i];
-    if (!scene.csg.isEmpty() && !scene.csg.uses(i)) continue;
+    if (source.band.isEmpty() || (!scene.csg.isEmpty() && !scene.csg.uses(i))) continue;
+    const M44d toWorld = source.band.indexToWorld();
     KernelSolid solid;
-    solid.pool = makeBricks(source.band, filter);
-    if (solid.pool.brickCount() == 0) continue;
+    TableOptions tables{.filter = options.filter, .held = source.held};
+    if (isPicture)
+      tables.needs = [&](const V3d& centre, double radius) {
+        return need.needs(centre * toWorld, radius * source.band.voxelSize());
+      };
+    solid.pool = makeBricks(source.band, tables);
+    const BrickPool& pool = solid.pool;
+    counts_.leftOut += pool.blocksLeftOut;
+    counts_.unseen += pool.blocksUnseen;
+    if (pool.brickCount() + pool.blocksUnseen == 0) continue;
+    Extent& extent = extents_.emplace_back();
+    extent.index = i;
+    for (const std::array<int, 3>& corner : {pool.low, pool.high})
+      extent.inIndices.extendBy(
+          V3d(corner[0] + pool.origin[0], corner[1] + pool.origin[1], corner[2] + pool.origin[2]));
+    if (pool.brickCount() == 0) continue;
+    counts_.crossed += pool.brickCount();
+    counts_.beside += pool.besideCount;
     solid.index = i;
     solid.id = source.id;
     solid.voxelSize = source.band.voxelSize();
@@ -127,25 +160,21 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter
 
 void KernelScene::look(const Scene& scene) {
   bounds_ = meshes_.bounds();
+  for (const Extent& extent : extents_)
+    bounds_.extendBy(
+        Imath::transform(extent.inIndices, scene.solids[extent.index].band.indexToWorld()));
   for (KernelSolid& solid : solids_) {
     const V3d corner(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]);
     solid.tableToWorld =
         M44d().setTranslation(corner) * scene.solids[solid.index].band.indexToWorld();
     solid.worldToTable = solid.tableToWorld.inverse();
     solid.fan = makeRayFan(scene.camera, solid.tableToWorld, solid.voxelSize, solid.pool);
-    bounds_.extendBy(Imath::transform(cellBox(solid.pool), solid.tableToWorld));
   }
 }
 
 std::size_t KernelScene::bytes() const {
   std::size_t sum = 0;
   for (const KernelSolid& solid : solids_) sum += solid.pool.bytes();
-  return sum;
-}
-
-std::size_t KernelScene::blocksLeftOut() const {
-  std::size_t sum = 0;
-  for (const KernelSolid& solid : solids_) sum += solid.pool.blocksLeftOut;
   return sum;
 }
 

@@ -13,6 +13,7 @@
 #include "render/kernel/brick_pool.h"
 #include "render/kernel/ray_block.h"
 #include "render/kernel/ray_fan.h"
+#include "render/render_options.h"
 #include "render/scene.h"
 #include "render/shading/shading.h"
 
@@ -53,12 +54,14 @@ struct PixelHits {
 /// same depth the first one by id counts.
 class KernelScene {
  public:
-  /// @param maxBytes  for what the kernel reads
+  /// For any camera. @param maxBytes  for what the kernel reads
   /// @param filter    what is drawn of the grids
   /// @pre the camera is valid
   /// @throws levelset::ResourceLimit before anything is allocated; and as makeBricks()
   explicit KernelScene(const Scene& scene, std::size_t maxBytes = levelset::kNoMemoryLimit,
                        Filter filter = Filter::Trilinear);
+  /// For that picture: what it does not need is left out. @pre as above
+  KernelScene(const Scene& scene, const RenderOptions& options);
 
   /// Takes the camera, and where the solids are, anew from a scene; tables and meshes
   /// stay.
@@ -70,7 +73,13 @@ class KernelScene {
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
   [[nodiscard]] std::size_t bytes() const;
-  [[nodiscard]] std::size_t blocksLeftOut() const;
+  /// Blocks of the solids by what was done with them.
+  struct Counts {
+    std::size_t crossed = 0, beside = 0;  // held
+    std::size_t leftOut = 0;              // with those that are
+    std::size_t unseen = 0;               // crossed, out of what the picture needs
+  };
+  [[nodiscard]] const Counts& counts() const { return counts_; }
 
   /// Of the solids; meshes() are for the caller.
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
@@ -93,6 +102,16 @@ class KernelScene {
   void blockCsg(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
                 std::size_t last, std::vector<char>& blocked) const;
 
+  /// @param isPicture  leave out what it does not need
+  void makeTables(const Scene& scene, const RenderOptions& options, bool isPicture);
+
+  /// Where a surface is, of which the tables may hold a part or nothing.
+  struct Extent {
+    std::size_t index;       // in Scene::solids
+    Imath::Box3d inIndices;  // of the blocks that it crosses
+  };
+  std::vector<Extent> extents_;
+  Counts counts_;
   std::vector<KernelSolid> solids_;  // by id
   CsgExpression csg_;                // of those
   MeshRays meshes_;

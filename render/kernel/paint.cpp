@@ -169,16 +169,12 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
   image.attributes = sceneAttributes(scene, options);
   image.attributes["ls:renderer"] = renderer;
   image.attributes["ls:mode"] = "exact";
-  std::size_t bricks = 0, beside = 0;
-  for (const KernelSolid& solid : surfaces.solids()) {
-    bricks += solid.pool.brickCount();
-    beside += solid.pool.besideCount();
-  }
+  const KernelScene::Counts& counts = surfaces.counts();
   image.attributes["ls:read"] = fmt::format(
       "{} blocks of 8x8x8 cells that the surface crosses and {} beside them, for its curvature, "
-      "{:.1f} "
-      "MB; {} more were left out",
-      bricks, beside, static_cast<double>(surfaces.bytes()) * 1e-6, surfaces.blocksLeftOut());
+      "{:.1f} MB; {} more were left out, and {} of those that it crosses are out of sight",
+      counts.crossed, counts.beside, static_cast<double>(surfaces.bytes()) * 1e-6, counts.leftOut,
+      counts.unseen);
   addViewAttributes(image, scene, surfaces.bounds().size().length());
   return image;
 }

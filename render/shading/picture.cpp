@@ -97,6 +97,11 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   constexpr double kReach = 2.99;  // voxels
   for (const Solid& solid : scene.solids) {
     if (options.filter == Filter::Trilinear || solid.band.isEmpty()) continue;
+    if (options.filter == Filter::BSplineQi && solid.held.bits != 32)
+      throw levelset::UsageError(fmt::format(
+          "render: the filter bspline-qi draws from coefficients that {} bits do not hold; take 32 "
+          "bits, or another filter",
+          solid.held.bits));
     if (solid.band.halfWidth() >= kReach) continue;
     throw levelset::InvalidInput(fmt::format(
         "render: the filter {} reads values up to 3 voxels from the surface, and the band has a "
@@ -116,19 +121,21 @@ void refuseEmptyScene() {
 std::map<std::string, std::string> sceneAttributes(const Scene& scene,
                                                    const RenderOptions& options) {
   const Filter filter = options.filter;
-  std::string grids, voxelSizes;
+  std::string grids, voxelSizes, bits;
   for (const Solid& solid : scene.solids) {
     if (solid.band.isEmpty()) continue;
     const char* comma = grids.empty() ? "" : ", ";
     grids += fmt::format("{}{} {:016x}", comma, levelset::vdb(solid.band).getName(),
                          solid.band.contentHash());
     voxelSizes += fmt::format("{}{}", comma, solid.band.voxelSize());
+    bits += fmt::format("{}{}", comma, solid.held.bits);
   }
   std::map<std::string, std::string> attributes = {
       {"ls:filter", filterName(filter)},
       {"ls:normal", filter == Filter::BSpline ? "bspline" : "bspline-qi"},
       {"ls:grid", grids},
-      {"ls:voxelSize", voxelSizes}};
+      {"ls:voxelSize", voxelSizes},
+      {"ls:valueBits", bits}};
   std::string meshes;
   for (const MeshPart& part : scene.meshes)
     meshes +=

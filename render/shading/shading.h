@@ -26,6 +26,12 @@ class PixelSequence {
   Imath::V2d start_;
 };
 
+/// Unit vector towards the key light, in world space.
+[[nodiscard]] Imath::V3d keyDirection(const Scene& scene);
+/// How far rays go that tell how open a point is, world units.
+/// @param diagonal  of the box of the surfaces, world units
+[[nodiscard]] double skyReach(double diagonal);
+
 /// Is there anything between a point and a light?
 struct LightRay {
   Imath::V3d origin, direction;  ///< direction of unit length
