@@ -13,7 +13,7 @@ Image renderGpu(const Scene& scene, const RenderOptions& options) {
   const KernelScene surfaces(scene, options);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();
   const GlContext context;
-  const GpuTracer tracer(context, surfaces);
+  const GpuTracer tracer(context, surfaces, 0, options.fromNanoVdb ? &scene : nullptr);
   constexpr int kGpuTile = 64;  // pixels: enough rays for a run
   return paintPicture(scene, surfaces, tracer, kGpuTile, "gpu " + context.description(), options);
 }

@@ -8,16 +8,6 @@ struct Window {
   Whole stepX[6], stepY[6], stepZ[6];  // within the block
 };
 
-Whole blockOf(Bool asked, Whole x, Whole y, Whole z, INOUT(Whole) strides) {
-  Whole page = loadPage(select(asked, ((x >> kPageShift) * pagesY + (y >> kPageShift)) * pagesZ + (z >> kPageShift), whole(0)));
-  Bool full = AND(asked, page >= 0);
-  Whole slot = select(full, page + (((x >> 3) & 7) << 6 | ((y >> 3) & 7) << 3 | ((z >> 3) & 7)), whole(0));
-  Whole heldStrides = loadEntry(slot + kStridesOfEntry);
-  Whole first = loadEntry(slot + kFirstOfEntry);
-  strides = select(full, heldStrides, whole(0));
-  return select(full, first, whole(0));
-}
-
 Window windowAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ) {
   Window w;
   Whole x = cellX - 2;

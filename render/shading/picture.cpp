@@ -94,6 +94,9 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   }
   if (style.style == Style::Matcap && !style.matcap)
     throw levelset::UsageError("render: the style matcap needs a picture of a ball; name a PNG");
+  if (options.fromNanoVdb && options.filter != Filter::Trilinear)
+    throw levelset::UsageError(
+        "render: NanoVDB grids are drawn by the trilinear filter only; take that, or bricks");
   constexpr double kReach = 2.99;  // voxels
   for (const Solid& solid : scene.solids) {
     if (options.filter == Filter::Trilinear || solid.band.isEmpty()) continue;

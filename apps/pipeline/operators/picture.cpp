@@ -55,6 +55,17 @@ void validateDraw(const Invocation& in) {
     throw UsageError("render: a PNG has no layers, so --thickness is lost; name an .exr");
   if (in.given("line") && style != "tone" && style != "ink")
     throw UsageError(fmt::format("render: the style {} draws no lines; leave --line out", style));
+  if (in.text("tables") == "nanovdb") {
+    const std::string renderer = in.text("renderer");
+    if (renderer != "gpu" && renderer != "both")
+      throw UsageError(fmt::format(
+          "render: --renderer {} reads no NanoVDB grid; leave --tables out, or take gpu",
+          renderer));
+    if (in.text("filter") != "trilinear" || in.text("value-bits") != "32")
+      throw UsageError(
+          "render: a NanoVDB grid is drawn as it is, by the trilinear filter; leave --filter and "
+          "--value-bits out, or take --tables bricks");
+  }
   if (in.text("value-bits") != "32" && in.text("filter") == "bspline-qi")
     throw UsageError(
         "render: the filter bspline-qi draws from coefficients, which --value-bits does not hold; "
@@ -182,6 +193,7 @@ Value draw(Invocation& in) {
   const bool isBoth = renderer == "both";
   render::RenderOptions options{.samples = static_cast<int>(in.integer("samples")),
                                 .filter = filterOf(in),
+                                .fromNanoVdb = in.text("tables") == "nanovdb",
                                 .style = styleOf(in),
                                 .thickness = in.flag("thickness"),
                                 .maxBytes = in.maxMemory,
@@ -381,6 +393,12 @@ void addPictureOperators(std::vector<Operator>& all) {
                    "B-spline, which shrinks, or the one with corrected coefficients",
             .fallback = "trilinear",
             .choices = {"trilinear", "bspline", "bspline-qi"}},
+           {.name = "tables",
+            .type = ParamType::Choice,
+            .doc = "what the shader of gpu and both reads: bricks made for it, or the NanoVDB grid "
+                   "itself, which is slower and gives the same bits",
+            .fallback = "bricks",
+            .choices = {"bricks", "nanovdb"}},
            {.name = "value-bits",
             .type = ParamType::Choice,
             .doc =
