@@ -15,6 +15,7 @@
 #include "levelset/files/mesh_file.h"
 #include "levelset/solids/csg.h"
 #include "levelset/solids/shapes.h"
+#include "levelset/solids/transform.h"
 #include "mapping/generators/knurl.h"
 #include "mapping/patches/patch_grid.h"
 #include "mapping/textures/geometric_texture.h"
@@ -62,6 +63,26 @@ Scene csgScene(int width, int height) {
   Scene scene = support::sceneOf(cut, width, height);
   scene.solids.push_back({.band = levelset::makeSphere(12, V3d(5, 3, 12), 0.37), .id = 2});
   scene.solids.push_back({.band = support::rings(), .id = 3});
+  return scene;
+}
+
+/// A ball, a ring and a box of three voxel sizes, turned against each other, for an expression.
+Scene sceneAlongRays(const std::string& csg) {
+  const auto turned = [](const NarrowBand& band, const V3d& axis, double angle, double scale) {
+    return levelset::transform(
+        band, Imath::M44d().setScale(scale) * Imath::M44d().setAxisAngle(axis.normalized(), angle));
+  };
+  Scene scene = support::sceneOf(levelset::makeSphere(20, V3d(3, 1, 4), 0.55));
+  scene.solids.push_back({.band = turned(levelset::makeTorus(30, 11, V3d(0), V3d(0, 0, 1), 1),
+                                         V3d(1, 2, 0), 0.7, 0.83),
+                          .colour = Imath::C3f(0.35f, 0.5f, 0.66f),
+                          .id = 2});
+  scene.solids.push_back({.band = turned(levelset::makeBox(V3d(18, 44, 20), V3d(9, 2, 7), 0.37),
+                                         V3d(-1, 1, 3), -0.4, 1.1),
+                          .colour = Imath::C3f(0.7f, 0.42f, 0.32f),
+                          .id = 3});
+  scene.csg = CsgExpression(csg, {"a", "b", "c"});
+  scene.camera = framingCamera(scene.bounds(), 1024, 768);
   return scene;
 }
 
@@ -139,6 +160,10 @@ void expectProven(const Scene& scene, const std::string& what) {
 TEST(Agreement, OfBallsAndTheSolidsOfCsg) {
   expectProven(support::sceneOf(levelset::makeSphere(100, V3d(0.3, 0.2, 0.1), 1)), "ball");
   expectProven(csgScene(1024, 768), "csg");
+}
+
+TEST(Agreement, OfAnExpressionAlongTheRays) {
+  for (const char* csg : {"(a | b) - c", "a & b | c - a"}) expectProven(sceneAlongRays(csg), csg);
 }
 
 TEST(Agreement, OfATexturedSolid) {
