@@ -47,6 +47,8 @@ Json toJson(const Camera& camera) {
     json["ortho"] = *camera.orthoHeight;
   else
     json["fov"] = camera.verticalFov / kDegree;
+  if (camera.near > 0) json["near"] = camera.near;
+  if (camera.far) json["far"] = *camera.far;
   json["size"] = {camera.width, camera.height};
   return json;
 }
@@ -138,13 +140,15 @@ class Reader {
 
   [[nodiscard]] Camera camera(const Json& json) const {
     const std::string where = "the camera";
-    requireKnown(json, {"from", "to", "up", "fov", "ortho", "size"}, where);
+    requireKnown(json, {"from", "to", "up", "fov", "ortho", "near", "far", "size"}, where);
     Camera camera;
     camera.from = point(json, "from", where);
     camera.to = point(json, "to", where);
     if (json.contains("up")) camera.up = point(json, "up", where);
     if (json.contains("fov")) camera.verticalFov = number(json, "fov", where) * kDegree;
     if (json.contains("ortho")) camera.orthoHeight = number(json, "ortho", where);
+    if (json.contains("near")) camera.near = number(json, "near", where);
+    if (json.contains("far")) camera.far = number(json, "far", where);
     if (json.contains("size")) {
       const std::vector<double> size = numbers(json, "size", 2, where);
       for (const double pixels : size)

@@ -44,8 +44,9 @@ struct PixelPainter {
   void paintData(int x, int y, std::size_t i) const {
     const Camera::Ray ray = scene.camera.ray(x + 0.5, y + 0.5);
     if (options.thickness)
-      layers.thickness[i] = static_cast<float>(rays.thickness(ray.origin, ray.direction));
-    const Hit hit = rays.intersect(ray.origin, ray.direction);
+      layers.thickness[i] =
+          static_cast<float>(rays.thickness(ray.origin, ray.direction, ray.near, ray.far));
+    const Hit hit = rays.intersect(ray.origin, ray.direction, ray.near, ray.far);
     if (!hit.found) return;
     layers.setHit(i, scene.camera, hit);
     if (options.curvature) layers.setCurvature(i, hit.curvature);
@@ -61,7 +62,7 @@ struct PixelPainter {
     for (int s = 0; s < options.samples; ++s) {
       const V2d at = area.at(s);
       const Camera::Ray ray = scene.camera.ray(x + at.x, y + at.y);
-      const Hit hit = rays.intersect(ray.origin, ray.direction);
+      const Hit hit = rays.intersect(ray.origin, ray.direction, ray.near, ray.far);
       if (!hit.found) continue;
       lights.clear();
       const LightRays range = shader.addRays(hit, ray.direction, x, y, s, lights);

@@ -34,9 +34,11 @@ class EmbreeScene {
   /// First hit beyond `near`. A ray that starts inside hits where it leaves.
   /// @throws levelset::UsageError when origin or direction are not finite or the direction is zero
   [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction,
-                              double near = 0, double far = 1e300) const;
-  /// How far the ray is within what is drawn of the solids, world units. @throws as intersect()
-  [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction) const;
+                              double near = 0, double far = Camera::kNoDepth) const;
+  /// How far the ray is within what is drawn of the solids in [near, far], world units. @throws as
+  /// intersect()
+  [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction,
+                                 double near = 0, double far = Camera::kNoDepth) const;
   /// True when there is a hit in [near, far]. @throws as intersect()
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                                 double far) const;

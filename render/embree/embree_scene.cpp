@@ -20,8 +20,6 @@ namespace {
 using Imath::Box3d;
 using Imath::V3d;
 
-constexpr double kNoEnd = 1e300;
-
 struct RaySolid {
   levelset::NarrowBand band;  // keeps the tree alive
   Imath::M44d indexToWorld, worldToIndex;
@@ -348,8 +346,7 @@ Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near,
   const Hit onSolid = impl_->intersectSolids(origin, direction, near, far);
   if (impl_->meshes.isEmpty()) return onSolid;
   const double end = onSolid.found ? onSolid.distance : far;
-  Hit onMesh = impl_->meshes.intersect(origin + direction * near, direction, end - near);
-  onMesh.distance += near;
+  const Hit onMesh = impl_->meshes.intersect(origin, direction, near, end);
   return onMesh.found ? onMesh : onSolid;
 }
 
@@ -365,10 +362,11 @@ bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double nea
   return ray.tfar < 0;
 }
 
-double EmbreeScene::thickness(const V3d& origin, const V3d& direction) const {
+double EmbreeScene::thickness(const V3d& origin, const V3d& direction, double near,
+                              double far) const {
   double moved;
   RTCRay ray;
-  auto query = impl_->prepare(origin, direction, 0, kNoEnd, moved, ray);
+  auto query = impl_->prepare(origin, direction, near, far, moved, ray);
   if (!query) return 0;
   auto changes = impl_->allChanges(*query, ray);
   // Where nothing is said, what any of them holds.
@@ -387,8 +385,9 @@ double EmbreeScene::thickness(const V3d& origin, const V3d& direction) const {
                    [](const auto& a, const auto& b) { return a.first.t < b.first.t; });
   double length = 0, from = 0;
   for (const auto& [change, solid] : all) {
-    if (isWithin(inside)) length += change.t - from;
-    from = change.t;
+    const double to = std::min(change.t, query->limit);
+    if (isWithin(inside)) length += to - from;
+    from = to;
     inside[solid] = change.goesIn ? 1 : 0;
   }
   return length;

@@ -32,9 +32,9 @@ struct MeshRays::Impl {
 
   void build();
   void add(const MeshPart& part, unsigned number);
-  /// How far it is to where the ray enters the box, with Embree's ray from there; nothing: it
-  /// misses.
-  std::optional<double> prepare(const V3d& origin, const V3d& direction, double far,
+  /// How far it is to where the ray enters the box, `near` at least, with Embree's ray from there;
+  /// nothing: it misses.
+  std::optional<double> prepare(const V3d& origin, const V3d& direction, double near, double far,
                                 RTCRay& ray) const;
   void complete(const RTCRayHit& found, const V3d& start, const V3d& direction, double moved,
                 Hit& hit) const;
@@ -88,10 +88,10 @@ void MeshRays::Impl::add(const MeshPart& part, unsigned number) {
   requireEmbree(device);
 }
 
-std::optional<double> MeshRays::Impl::prepare(const V3d& origin, const V3d& direction, double far,
-                                              RTCRay& ray) const {
+std::optional<double> MeshRays::Impl::prepare(const V3d& origin, const V3d& direction, double near,
+                                              double far, RTCRay& ray) const {
   if (!scene) return std::nullopt;
-  const auto moved = view.entryOf(origin, direction, 0, far);
+  const auto moved = view.entryOf(origin, direction, near, far);
   if (moved) ray = view.rayFrom(origin + direction * *moved, direction, far - *moved);
   return moved;
 }
@@ -144,10 +144,10 @@ const Box3d& MeshRays::bounds() const {
   return impl_->bounds;
 }
 
-Hit MeshRays::intersect(const V3d& origin, const V3d& direction, double far) const {
+Hit MeshRays::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
   Hit hit;
   RTCRayHit found;
-  const auto moved = impl_->prepare(origin, direction, far, found.ray);
+  const auto moved = impl_->prepare(origin, direction, near, far, found.ray);
   if (!moved) return hit;
   found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
@@ -162,7 +162,7 @@ Hit MeshRays::intersect(const V3d& origin, const V3d& direction, double far) con
 
 bool MeshRays::isOccluded(const V3d& origin, const V3d& direction, double far) const {
   RTCRay ray;
-  if (!impl_->prepare(origin, direction, far, ray)) return false;
+  if (!impl_->prepare(origin, direction, 0, far, ray)) return false;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcOccluded1(impl_->scene, &context, &ray);

@@ -21,9 +21,9 @@ class MeshRays {
 
   [[nodiscard]] bool isEmpty() const;
   [[nodiscard]] const Imath::Box3d& bounds() const;
-  /// First triangle, of either side, in [0, far]; `solid` is the index in Scene::meshes, normals
+  /// First triangle, of either side, in [near, far]; `solid` is the index in Scene::meshes, normals
   /// are those of the vertices where the mesh has some.
-  [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction,
+  [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                               double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction,
                                 double far) const;

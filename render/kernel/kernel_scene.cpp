@@ -19,7 +19,6 @@ using Imath::V3d;
 constexpr double kBesideBox = 0.0625;  // lest rounding loses a crossing on a face of the box
 constexpr double kParallel = 1e30;
 constexpr std::size_t kRaysAtOnce = 1u << 18;
-constexpr double kNoEnd = 1e300;
 
 Imath::Box3d cellBox(const BrickPool& pool) {
   Imath::Box3d box;
@@ -126,6 +125,8 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter
 }
 
 void KernelScene::look(const Scene& scene) {
+  near_ = scene.camera.near;
+  far_ = scene.camera.farthest();
   bounds_ = meshes_.bounds();
   for (KernelSolid& solid : solids_) {
     const V3d corner(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]);
@@ -163,6 +164,7 @@ PixelHits KernelScene::castFirst(const KernelTracer& tracer, const PixelBlock& p
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       if (!hits.found[i]) continue;
       const double depth = solid.fan.depthAt(hits.t[i]);
+      if (depth > far_) continue;
       if (result.solid[i] >= 0 && result.depth[i] <= depth) continue;
       result.depth[i] = depth;
       result.solid[i] = static_cast<std::int32_t>(s);
@@ -174,7 +176,7 @@ PixelHits KernelScene::castFirst(const KernelTracer& tracer, const PixelBlock& p
 
 PixelHits KernelScene::castCsg(const KernelTracer& tracer, const PixelBlock& pixels) const {
   PixelHits result(pixels.size());
-  CsgWalk walk(csg_, solids_.size(), std::vector<double>(pixels.size(), kNoEnd));
+  CsgWalk walk(csg_, solids_.size(), std::vector<double>(pixels.size(), far_));
   struct Crossings {  // of one solid, the next of each ray
     std::vector<double> depth;
     ShapeBlock shapes;
@@ -261,10 +263,11 @@ std::vector<double> KernelScene::thickness(const KernelTracer& tracer,
     for (const Crossing& crossing : all)  // the first of each solid tells where the ray starts
       if (!std::exchange(known[crossing.solid], 1))
         inside[crossing.solid] = crossing.goesIn ? 0 : 1;
-    double from = 0;
+    double from = near_;
     for (const Crossing& crossing : all) {
-      if (isInside(inside)) lengths[i] += std::max(0.0, crossing.depth - from);
-      from = std::max(0.0, crossing.depth);
+      const double to = std::clamp(crossing.depth, near_, far_);
+      if (isInside(inside)) lengths[i] += std::max(0.0, to - from);
+      from = to;
       inside[crossing.solid] = crossing.goesIn ? 1 : 0;
     }
   }

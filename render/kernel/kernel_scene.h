@@ -74,8 +74,8 @@ class KernelScene {
 
   /// Of the solids; meshes() are for the caller.
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
-  /// @return how far each ray is within what is drawn of the solids, along the view axis, world
-  /// units
+  /// @return how far each ray is within what is drawn of the solids and is seen, along the view
+  /// axis, world units
   [[nodiscard]] std::vector<double> thickness(const KernelTracer& tracer,
                                               const PixelBlock& pixels) const;
   /// @return for each ray 1 if it meets something within its reach, else 0
@@ -97,6 +97,7 @@ class KernelScene {
   CsgExpression csg_;                // of those
   MeshRays meshes_;
   Imath::Box3d bounds_;
+  double near_ = 0, far_ = Camera::kNoDepth;  // depths that the camera sees
 };
 
 }  // namespace render

@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <limits>
 #include <mutex>
 
 #include "render/shading/surface_shape.h"
@@ -52,8 +51,8 @@ std::size_t KernelPainter::numberOf(const Pixel& pixel) const {
 Hit KernelPainter::hitOf(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const {
   const Hit onSolid = hits.solid[i] < 0 ? Hit() : hitOnSolid(ray, hits, i);
   if (surfaces_.meshes().isEmpty()) return onSolid;
-  const double far = onSolid.found ? onSolid.distance : std::numeric_limits<double>::max();
-  const Hit onMesh = surfaces_.meshes().intersect(ray.origin, ray.direction, far);
+  const double far = onSolid.found ? onSolid.distance : ray.far;
+  const Hit onMesh = surfaces_.meshes().intersect(ray.origin, ray.direction, ray.near, far);
   return onMesh.found ? onMesh : onSolid;
 }
 

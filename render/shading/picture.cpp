@@ -143,6 +143,8 @@ void addViewAttributes(Image& image, const Scene& scene, double extent) {
   image.attributes[kExtentAttribute] = fmt::format("{:.9g}", extent);
   image.attributes["software"] = "Levelsmith " LEVELSMITH_VERSION;
   image.attributes["depthType"] = "distance along the view axis";
+  if (scene.camera.near > 0) image.attributes["ls:near"] = fmt::format("{}", scene.camera.near);
+  if (scene.camera.far) image.attributes["ls:far"] = fmt::format("{}", *scene.camera.far);
   const auto floats = [](const Imath::M44d& m) {
     std::vector<float> values;
     for (int i = 0; i < 4; ++i)

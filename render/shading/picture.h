@@ -44,7 +44,7 @@ void requireLight(const Scene& scene);
 [[nodiscard]] std::map<std::string, std::string> sceneAttributes(const Scene& scene,
                                                                  const RenderOptions& options);
 
-/// Software, camera matrices, what Z is, and ls:extent.
+/// Software, camera matrices and depths (ls:near, ls:far, if set), what Z is, and ls:extent.
 /// @param extent  diagonal of the surfaces' box, world units
 void addViewAttributes(Image& image, const Scene& scene, double extent);
 
