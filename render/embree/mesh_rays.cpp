@@ -17,6 +17,7 @@ using Imath::V3d;
 
 struct MeshRays::Impl {
   std::vector<MeshPart> parts;
+  bool isOpaque;
   Box3d bounds;
   FloatView view;
   RTCDevice device = nullptr;
@@ -41,6 +42,8 @@ struct MeshRays::Impl {
 };
 
 MeshRays::Impl::Impl(const Scene& source) : parts(source.meshes) {
+  isOpaque = std::all_of(parts.begin(), parts.end(),
+                         [](const MeshPart& part) { return part.opacity == 1; });
   for (const MeshPart& part : parts)
     for (const auto& triangle : part.mesh->triangles)
       for (const std::uint32_t v : triangle) bounds.extendBy(part.mesh->positions[v]);
@@ -116,7 +119,9 @@ void MeshRays::Impl::complete(const RTCRayHit& found, const V3d& start, const V3
   hit.surfaceError = FloatView::kPad / view.scale;
   hit.id = part.id;
   hit.solid = found.hit.geomID;
+  hit.isOnMesh = true;
   hit.colour = part.colour;
+  hit.opacity = part.opacity;
   const double u = static_cast<double>(found.hit.u), v = static_cast<double>(found.hit.v);
   const double share[3] = {1 - u - v, u, v};
   if (!mesh.attributes.normals.empty()) {
@@ -167,6 +172,18 @@ bool MeshRays::isOccluded(const V3d& origin, const V3d& direction, double far) c
   rtcInitIntersectContext(&context);
   rtcOccluded1(impl_->scene, &context, &ray);
   return ray.tfar < 0;
+}
+
+double MeshRays::transmittance(const V3d& origin, const V3d& direction, double far) const {
+  if (impl_->isOpaque) return isOccluded(origin, direction, far) ? 0 : 1;
+  double share = 1, near = 0;
+  while (share >= kLeastTransmittance) {
+    const Hit hit = intersect(origin, direction, near, far);
+    if (!hit.found) break;
+    share *= 1 - hit.opacity;
+    near = hit.beyond();
+  }
+  return share;
 }
 
 }  // namespace render

@@ -27,6 +27,9 @@ class MeshRays {
                               double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction,
                                 double far) const;
+  /// Share of light that all triangles in [0, far] let through, or less than kLeastTransmittance.
+  [[nodiscard]] double transmittance(const Imath::V3d& origin, const Imath::V3d& direction,
+                                     double far) const;
 
  private:
   struct Impl;

@@ -91,6 +91,22 @@ TEST_F(Scenes, HoldMeshesToo) {
   EXPECT_EQ(readChanged("b - s", "b - m").code, 2);  // a mesh is no solid
 }
 
+TEST_F(Scenes, AreSeenThrough) {
+  const Outcome made = levelsmith(kTwo +
+                                  "--csg 'b - s' --opacities '1 0.25' --from 4,3,5 --to 0,0,0 "
+                                  "--size 64x48 ! write cut.json ! render a.exr --samples 2 "
+                                  "--renderer both");
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_NE(shell("cat cut.json").out.find("\"opacity\": 0.25"), std::string::npos);
+  EXPECT_EQ(levelsmith("read cut.json ! render b.exr --samples 2 --renderer cpu").code, 0);
+  EXPECT_EQ(levelsmith("compare-images a.exr b.exr --exact").code, 0);
+  EXPECT_EQ(readChanged("\"opacity\": 0.25", "\"opacity\": 0").code, 3);
+  EXPECT_EQ(readChanged("\"opacity\": 0.25", "\"opacity\": 1.5").code, 3);
+  EXPECT_EQ(levelsmith(kTwo + "--opacities '0.5' ! render a.png").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--opacities '0.5 0' ! render a.png").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--opacities '0.5 thin' ! render a.png").code, 2);
+}
+
 TEST_F(Scenes, TellWhatIsInThem) {
   const Outcome told = levelsmith(kTwo + "--csg 's | b' ! info --json");
   ASSERT_EQ(told.code, 0) << told.err;
