@@ -137,9 +137,13 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     if (pool.brickCount() + pool.blocksUnseen == 0) continue;
     Extent& extent = extents_.emplace_back();
     extent.index = i;
-    for (const std::array<int, 3>& corner : {pool.low, pool.high})
-      extent.inIndices.extendBy(
-          V3d(corner[0] + pool.origin[0], corner[1] + pool.origin[1], corner[2] + pool.origin[2]));
+    const V3d origin(pool.origin[0], pool.origin[1], pool.origin[2]);
+    const auto boxOf = [&](const std::array<int, 3>& low, const std::array<int, 3>& high) {
+      return Imath::Box3d(origin + V3d(low[0], low[1], low[2]),
+                          origin + V3d(high[0], high[1], high[2]));
+    };
+    extent.blocks = boxOf(pool.low, pool.high);
+    extent.cells = boxOf(pool.cellsLow, pool.cellsHigh);
     if (pool.brickCount() == 0) continue;
     counts_.crossed += pool.brickCount();
     counts_.beside += pool.besideCount;
@@ -159,10 +163,12 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
 void KernelScene::look(const Scene& scene) {
   near_ = scene.camera.near;
   far_ = scene.camera.farthest();
-  bounds_ = meshes_.bounds();
-  for (const Extent& extent : extents_)
-    bounds_.extendBy(
-        Imath::transform(extent.inIndices, scene.solids[extent.index].band.indexToWorld()));
+  bounds_ = tableBounds_ = meshes_.bounds();
+  for (const Extent& extent : extents_) {
+    const M44d toWorld = scene.solids[extent.index].band.indexToWorld();
+    bounds_.extendBy(Imath::transform(extent.cells, toWorld));
+    tableBounds_.extendBy(Imath::transform(extent.blocks, toWorld));
+  }
   for (KernelSolid& solid : solids_) {
     solid.opacity = scene.solids[solid.index].opacity;
     const V3d corner(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]);

@@ -83,6 +83,8 @@ class KernelScene {
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
   /// World-space box of the cells that hold surface, and of the meshes; empty when there are none.
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
+  /// The same of blocks: what places are as exact as, in single precision.
+  [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
   [[nodiscard]] std::size_t bytes() const;
   /// Blocks of the solids by what was done with them.
@@ -121,15 +123,15 @@ class KernelScene {
 
   /// Where a surface is, of which the tables may hold a part or nothing.
   struct Extent {
-    std::size_t index;       // in Scene::solids
-    Imath::Box3d inIndices;  // of the blocks that it crosses
+    std::size_t index;           // in Scene::solids
+    Imath::Box3d cells, blocks;  // that it crosses, in indices
   };
   std::vector<Extent> extents_;
   Counts counts_;
   std::vector<KernelSolid> solids_;  // by id
   CsgExpression csg_;                // of those
   MeshRays meshes_;
-  Imath::Box3d bounds_;
+  Imath::Box3d bounds_, tableBounds_;
   double near_ = 0, far_ = Camera::kNoDepth;  // depths that the camera sees
 };
 

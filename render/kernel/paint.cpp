@@ -199,7 +199,7 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
       "{:.1f} MB; {} more were left out, and {} of those that it crosses are out of sight",
       counts.crossed, counts.beside, static_cast<double>(surfaces.bytes()) * 1e-6, counts.leftOut,
       counts.unseen);
-  addViewAttributes(image, scene, surfaces.bounds().size().length());
+  addViewAttributes(image, scene, surfaces.tableBounds().size().length());
   return image;
 }
 
