@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 
+#include "apps/pipeline/graph_file.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/script.h"
 #include "apps/pipeline/units.h"
@@ -120,6 +121,14 @@ std::string operandName(const std::string& token, const std::string& who) {
   return token.substr(1);
 }
 
+/// An action as it was written.
+struct Action {
+  const Operator* op = nullptr;
+  std::map<std::string, std::string> options;  // by full name; a flag is "true"
+  std::vector<std::string> operandNames;       // `@NAME`, without the @
+  std::string resultName;                      // --as
+};
+
 Action readAction(Reader& reader) {
   Action action;
   action.op = &matchOperator(reader.tokens[reader.next++]);
@@ -161,9 +170,6 @@ Action readAction(Reader& reader) {
                                    param.name, valueForm(param)));
     }
   }
-  for (const auto& [name, text] : action.options)
-    if (const Param* param = op.find(name); param && namesValue(*param, text))
-      action.named.emplace(name, text.substr(1));
   if (const auto it = action.options.find("as"); it != action.options.end()) {
     action.resultName = it->second.starts_with('@') ? it->second.substr(1) : it->second;
     action.options.erase(it);
@@ -171,38 +177,34 @@ Action readAction(Reader& reader) {
   return action;
 }
 
-/// Follows the kinds of values through the chain, as the run will follow the values.
-class KindChecker {
+/// Follows values through the chain: they live on a stack, and by name for good.
+class ChainBuilder {
  public:
-  void visit(const Action& action) {
-    const Operator& op = *action.op;
-    const std::vector<Kind> operands = takeOperands(action);
-    for (std::size_t i = 0; i < operands.size(); ++i) {
-      const std::vector<Kind>& allowed = op.operands[std::min(i, op.operands.size() - 1)];
-      if (std::find(allowed.begin(), allowed.end(), operands[i]) == allowed.end())
-        throw UsageError(mismatch(op, i, operands[i], allowed));
+  explicit ChainBuilder(std::vector<Node>& nodes) : nodes_(nodes) {}
+
+  void add(const Action& action) {
+    Node node;
+    node.op = action.op;
+    node.options = action.options;
+    node.name = action.resultName;
+    node.inputs = takeOperands(action);
+    for (const auto& [option, text] : action.options)
+      if (const Param* param = action.op->find(option); param && namesValue(*param, text))
+        node.named.emplace(option, nodeOf(text.substr(1), *action.op));
+    node.kind = checkNode(node, nodes_);
+    if (node.makes()) {
+      stack_.push_back(nodes_.size());
+      if (!node.name.empty() && !names_.emplace(node.name, nodes_.size()).second) {
+        throw UsageError(
+            fmt::format("{}: the name '{}' is taken; values do not change, so choose another",
+                        node.op->name, node.name));
+      }
     }
-    for (const auto& [option, name] : action.named) {
-      const Kind kind = kindOf(name, op);
-      const bool isScalar = op.find(option)->type == ParamType::Scalar;
-      if (kind == Kind::Field || (isScalar && kind == Kind::Band)) continue;
-      throw UsageError(fmt::format("{}: --{}: '@{}' is a {}, a {} is needed", op.name, option, name,
-                                   kindName(kind), isScalar ? "field or a level set" : "field"));
-    }
-    if (op.validate) op.validate(probe(action, operands));
-    if (op.flow == Flow::PassesThrough) return;
-    const Kind result = op.resultKind ? op.resultKind(probe(action, operands)) : Kind::Band;
-    stack_.push_back(result);
-    if (action.resultName.empty()) return;
-    if (!names_.emplace(action.resultName, result).second) {
-      throw UsageError(
-          fmt::format("{}: the name '{}' is taken; values do not change, so choose another",
-                      op.name, action.resultName));
-    }
+    nodes_.push_back(std::move(node));
   }
 
  private:
-  [[nodiscard]] Kind kindOf(const std::string& name, const Operator& op) const {
+  [[nodiscard]] std::size_t nodeOf(const std::string& name, const Operator& op) const {
     const auto it = names_.find(name);
     if (it != names_.end()) return it->second;
     std::vector<std::string> known;
@@ -213,77 +215,42 @@ class KindChecker {
                                                : fmt::format("; did you mean '@{}'?", guess)));
   }
 
-  std::vector<Kind> takeOperands(const Action& action) {
-    const Operator& op = *action.op;
-    std::vector<Kind> named;
-    for (const std::string& name : action.operandNames) named.push_back(kindOf(name, op));
-    if (named.size() > op.operands.size() && !op.takesMore) {
-      throw UsageError(fmt::format("{}: takes {} operand{}, not {}", op.name, op.operands.size(),
-                                   op.operands.size() == 1 ? "" : "s", named.size()));
-    }
-    if (named.size() >= op.operands.size()) return named;
-    const std::size_t missing = op.operands.size() - named.size();
-    if (stack_.size() < missing) {
-      if (op.operandsOptional) return named;
-      throw UsageError(
-          fmt::format("{}: needs {} operand{} and finds {}; read or make {} first, or name {} with "
-                      "'@'",
-                      op.name, op.operands.size(), op.operands.size() == 1 ? "" : "s",
-                      stack_.size() + named.size(), missing == 1 ? "one" : "them",
-                      missing == 1 ? "it" : "them"));
-    }
-    std::vector<Kind> operands(stack_.end() - static_cast<std::ptrdiff_t>(missing), stack_.end());
-    if (op.flow == Flow::Makes) stack_.resize(stack_.size() - missing);
+  /// Those that are named come last; what is missing before them comes off the stack, and stays
+  /// there where the action passes it through.
+  std::vector<std::size_t> takeOperands(const Action& action) {
+    std::vector<std::size_t> named;
+    for (const std::string& name : action.operandNames) named.push_back(nodeOf(name, *action.op));
+    const std::size_t wanted = action.op->operands.size();
+    if (named.size() >= wanted) return named;
+    const std::size_t missing = wanted - named.size();
+    if (stack_.size() < missing && action.op->operandsOptional) return named;
+    const std::size_t taken = std::min(missing, stack_.size());
+    std::vector<std::size_t> operands(stack_.end() - static_cast<std::ptrdiff_t>(taken),
+                                      stack_.end());
+    if (action.op->flow == Flow::Makes) stack_.resize(stack_.size() - taken);
     operands.insert(operands.end(), named.begin(), named.end());
     return operands;
   }
 
-  static std::string mismatch(const Operator& op, std::size_t index, Kind found,
-                              const std::vector<Kind>& allowed) {
-    const char* remedy = "";
-    if (found == Kind::Mesh && allowed == std::vector{Kind::Band})
-      remedy = "; put 'level-set' before it";
-    if (found == Kind::Band && allowed == std::vector{Kind::Mesh})
-      remedy = "; put 'mesh' before it";
-    if (found == Kind::Surface)
-      remedy = "; it has no inside, and is the base of patches and of 'texture --alone' only";
-    if (found == Kind::Patch) remedy = "; 'texture' makes a level set with it";
-    if (found == Kind::Scene) remedy = "; 'render' draws it, 'write' saves it as .json";
-    std::string kinds;
-    for (std::size_t i = 0; i < allowed.size(); ++i)
-      kinds += fmt::format("{}a {}",
-                           i == 0                    ? ""
-                           : i + 1 == allowed.size() ? " or "
-                                                     : ", ",
-                           kindName(allowed[i]));
-    return fmt::format("{}: operand {} is a {}, {} is needed{}", op.name, index + 1,
-                       kindName(found), kinds, remedy);
-  }
-
-  static Invocation probe(const Action& action, const std::vector<Kind>& kinds) {
-    Invocation invocation(*action.op, action.options);
-    for (Kind kind : kinds) invocation.operands.emplace_back(Plan{.kind = kind});
-    return invocation;
-  }
-
-  std::vector<Kind> stack_;
-  std::map<std::string, Kind> names_;
+  std::vector<Node>& nodes_;
+  std::vector<std::size_t> stack_;
+  std::map<std::string, std::size_t> names_;
 };
 
 using StreamUse = std::function<bool(const Invocation&)> Operator::*;
 
 /// Two actions that claim the same standard stream for data would garble each other.
-void checkStandardStream(const Chain& chain, StreamUse use, const char* stream,
+void checkStandardStream(const Graph& graph, StreamUse use, const char* stream,
                          std::string firstUser) {
-  for (const Action& action : chain.actions) {
-    const auto& claims = action.op->*use;
-    if (!claims || !claims(Invocation(*action.op, action.options))) continue;
+  for (const Node& node : graph.nodes) {
+    const auto& claims = node.op->*use;
+    if (!claims || !claims(Invocation(*node.op, node.options))) continue;
     if (!firstUser.empty()) {
       throw UsageError(
           fmt::format("{}: standard {} is used already, by {}; use a file for one of them",
-                      action.op->name, stream, firstUser));
+                      node.op->name, stream, firstUser));
     }
-    firstUser = "'" + action.op->name + "'";
+    firstUser = "'" + node.op->name + "'";
   }
 }
 
@@ -291,10 +258,10 @@ void checkStandardStream(const Chain& chain, StreamUse use, const char* stream,
 
 namespace {
 
-Chain parse(Reader& reader, bool mayRun);
+Graph parse(Reader& reader, bool mayRun);
 
 /// `run FILE`: the chain that the file holds. Global options of the command line come first.
-Chain parseScript(Reader& reader, const Chain& before) {
+Graph parseScript(Reader& reader, const Graph& before) {
   const std::vector<std::string>& tokens = reader.tokens;
   if (reader.next + 2 != tokens.size()) {
     throw UsageError(
@@ -302,12 +269,17 @@ Chain parseScript(Reader& reader, const Chain& before) {
         "the file");
   }
   const std::string file = tokens[reader.next + 1];
+  if (isGraphFile(file)) {
+    Graph graph = readGraph(file);
+    graph.globals = before.globals;
+    return graph;
+  }
   const Script script = readScript(file);
   Reader inner{script.words};
   try {
-    Chain chain = parse(inner, false);
-    for (const auto& [name, value] : before.globals) chain.globals[name] = value;
-    return chain;
+    Graph graph = parse(inner, false);
+    for (const auto& [name, value] : before.globals) graph.globals[name] = value;
+    return graph;
   } catch (const UsageError& error) {
     // The reader stands behind the action that failed.
     const std::size_t word = std::min(inner.next, script.lines.size());
@@ -316,49 +288,48 @@ Chain parseScript(Reader& reader, const Chain& before) {
   }
 }
 
-Chain parse(Reader& reader, bool mayRun) {
+Graph parse(Reader& reader, bool mayRun) {
   const std::vector<std::string>& tokens = reader.tokens;
-  Chain chain;
+  Graph graph;
   while (!reader.atEnd() && isOption(tokens[reader.next]))
-    reader.readOption(globalParams(), "levelsmith", chain.globals);
+    reader.readOption(globalParams(), "levelsmith", graph.globals);
   if (!reader.atEnd() && tokens[reader.next] == runOperator().name) {
-    if (mayRun) return parseScript(reader, chain);
+    if (mayRun) return parseScript(reader, graph);
     throw UsageError("run: a file of actions cannot run another one; put its actions here");
   }
-  KindChecker kinds;
+  ChainBuilder builder(graph.nodes);
   while (!reader.atEnd()) {
     if (reader.atBang()) {
       throw UsageError(
           fmt::format("levelsmith: there is no action {} the '!' at word {}",
-                      reader.next == 0 || chain.actions.empty() ? "before" : "between this and",
+                      reader.next == 0 || graph.nodes.empty() ? "before" : "between this and",
                       reader.next + 1));
     }
-    chain.actions.push_back(readAction(reader));
-    kinds.visit(chain.actions.back());
+    builder.add(readAction(reader));
     if (reader.atBang()) {
       ++reader.next;
       if (reader.atEnd()) throw UsageError("levelsmith: an action must follow the last '!'");
     }
   }
-  if (chain.actions.empty())
+  if (graph.nodes.empty())
     throw UsageError("levelsmith: nothing to do; `levelsmith help` shows how to begin");
-  return chain;
+  return graph;
 }
 
 }  // namespace
 
-Chain parseChain(const std::vector<std::string>& tokens) {
+Graph parseChain(const std::vector<std::string>& tokens) {
   Reader reader{tokens};
-  const Chain chain = parse(reader, true);
-  const auto report = chain.globals.find("report");
+  const Graph graph = parse(reader, true);
+  const auto report = graph.globals.find("report");
   const bool reportsThere =
-      report != chain.globals.end() && levelset::isStandardOutput(report->second);
-  checkStandardStream(chain, &Operator::usesStandardOutput, "output",
+      report != graph.globals.end() && levelset::isStandardOutput(report->second);
+  checkStandardStream(graph, &Operator::usesStandardOutput, "output",
                       reportsThere ? "--report" : "");
   const bool scripted = tokens.size() >= 2 && tokens[tokens.size() - 2] == "run";
-  checkStandardStream(chain, &Operator::usesStandardInput, "input",
+  checkStandardStream(graph, &Operator::usesStandardInput, "input",
                       scripted && tokens.back() == "-" ? "'run'" : "");
-  return chain;
+  return graph;
 }
 
 }  // namespace pipeline

@@ -184,11 +184,12 @@ const Operator& runOperator() {
   static const Operator op{
       .name = "run",
       .group = "Chains in files",
-      .summary = "run the chain that a text file holds, one action a line",
+      .summary = "run what a file holds: a chain, one action a line, or a graph (.json)",
       .details =
           "No '!' between actions; # begins a comment; quotes and backslashes as in a "
           "shell. Lines of options before the first action are global options; those of the "
-          "command line win. Nothing stands behind the file.",
+          "command line win. Nothing stands behind the file. A .json is a graph that "
+          "--save-graph wrote.",
       .example = "levelsmith --threads 2 run chain.txt",
       .params = {{.name = "file",
                   .type = ParamType::Path,
@@ -215,6 +216,10 @@ const std::vector<Param>& globalParams() {
       {.name = "report",
        .type = ParamType::Path,
        .doc = "write what each step did and cost, as .json or .html"},
+      {.name = "save-graph",
+       .type = ParamType::Path,
+       .doc = "write what is asked for as a .json that `run` takes; with --dry-run nothing else is "
+              "done"},
       {.name = "progress",
        .type = ParamType::Choice,
        .doc = "bars on a terminal, lines of JSON, or nothing",

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/pipeline/chain.h"
+#include "apps/pipeline/graph.h"
 #include "apps/pipeline/invocation.h"
 
 namespace pipeline {
@@ -37,14 +37,17 @@ struct StepReport {
 };
 
 struct RunReport {
+  std::string graphJson;  ///< of all that was asked for
   std::vector<StepReport> steps;
-  std::vector<std::string> warnings;  ///< about the chain as a whole
+  std::vector<std::string> warnings;  ///< about the graph as a whole
+  std::vector<std::string> leftOut;   ///< actions that nothing needed
   std::string error;                  ///< the sentence that ended it, if one did
   int exitCode = 0;
   bool dryRun = false;
 };
 
-/// Runs the actions in order. A refusal is recorded in the report and then thrown on.
-void run(const Chain& chain, const RunSettings& settings, RunReport& report);
+/// Runs those nodes that are needed, in order, and lets values go once the last that takes them has
+/// run. A refusal is recorded in the report and then thrown on.
+void run(const Graph& graph, const RunSettings& settings, RunReport& report);
 
 }  // namespace pipeline
