@@ -27,6 +27,7 @@ struct Hit {
   std::size_t solid = 0;        ///< index in Scene::solids, or Scene::meshes
   bool isTurned = false;        ///< is that solid's outside inside what is drawn? Normals and
                                 ///< curvatures tell of what is drawn
+  bool isBeyondBand = false;    ///< has a field a part in it where its band knows no distance?
 };
 
 }  // namespace render

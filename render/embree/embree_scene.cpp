@@ -8,6 +8,7 @@
 
 #include "levelset/error.h"
 #include "render/embree/embree_renderer.h"
+#include "render/embree/field_march.h"
 #include "render/embree/float_view.h"
 #include "render/embree/mesh_rays.h"
 #include "render/embree/surface_blocks_vdb.h"
@@ -170,8 +171,9 @@ struct EmbreeScene::Impl {
   std::vector<RaySolid> solids;
   CsgExpression csg;  // of those
   MeshRays meshes;
-  Box3d allBounds;  // with the meshes
-  Box3d bounds;     // of the crossing cells
+  std::optional<FieldMarch> fields;  // of the solids, where the scene blends them
+  Box3d allBounds;                   // with the meshes
+  Box3d bounds;                      // of the crossing cells
   FloatView view;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
@@ -202,6 +204,11 @@ struct EmbreeScene::Impl {
 };
 
 EmbreeScene::Impl::Impl(const Scene& source, Filter filter) : meshes(source) {
+  if (source.isBlended()) {
+    fields.emplace(source);
+    allBounds = source.bounds();
+    return;
+  }
   gather(source, filter);
   allBounds = bounds;
   allBounds.extendBy(meshes.bounds());
@@ -232,8 +239,10 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
       bounds.extendBy(Imath::transform(block.bounds(), entry.indexToWorld));
     if (!entry.blocks.empty()) solids.push_back(std::move(entry));
   }
-  std::stable_sort(solids.begin(), solids.end(),
-                   [](const RaySolid& a, const RaySolid& b) { return a.id < b.id; });
+  std::stable_sort(solids.begin(), solids.end(), [](const RaySolid& a, const RaySolid& b) {
+    const double u = a.band.voxelSize(), v = b.band.voxelSize();
+    return u != v ? u < v : a.id < b.id;
+  });
   std::vector<int> numbers(source.solids.size(), -1);
   for (std::size_t s = 0; s < solids.size(); ++s) {
     solids[s].number = s;
@@ -325,6 +334,10 @@ EmbreeScene::EmbreeScene(EmbreeScene&&) noexcept = default;
 
 Hit EmbreeScene::Impl::intersectSolids(const V3d& origin, const V3d& direction, double near,
                                        double far) const {
+  if (fields) {
+    requireRay(origin, direction);
+    return fields->intersect(origin, direction, near, far);
+  }
   Hit hit;
   double moved;
   RTCRayHit rayHit;
@@ -356,6 +369,7 @@ Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near,
 bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double near,
                              double far) const {
   if (impl_->meshes.isOccluded(origin + direction * near, direction, far - near)) return true;
+  if (impl_->fields) return impl_->fields->isOccluded(origin, direction, near, far);
   double moved;
   RTCRay ray;
   auto query = impl_->prepare(origin, direction, near, far, moved, ray);
@@ -366,6 +380,7 @@ bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double nea
 }
 
 double EmbreeScene::thickness(const V3d& origin, const V3d& direction) const {
+  if (impl_->fields) return impl_->fields->thickness(origin, direction);
   double moved;
   RTCRay ray;
   auto query = impl_->prepare(origin, direction, 0, kNoEnd, moved, ray);

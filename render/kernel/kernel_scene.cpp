@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
 #include <utility>
 
 #include "levelset/vdb.h"
@@ -97,6 +98,11 @@ struct PackedRays {
 }  // namespace
 
 KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter) : meshes_(scene) {
+  if (scene.isBlended()) {
+    fields_.emplace(scene, maxBytes);
+    look(scene);
+    return;
+  }
   // A block for each leaf; those the surface does not cross are built and dropped.
   double leaves = 0;
   for (const Solid& solid : scene.solids)
@@ -117,8 +123,9 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter
     solid.voxelSize = source.band.voxelSize();
     solids_.push_back(std::move(solid));
   }
-  std::stable_sort(solids_.begin(), solids_.end(),
-                   [](const KernelSolid& a, const KernelSolid& b) { return a.id < b.id; });
+  std::stable_sort(solids_.begin(), solids_.end(), [](const KernelSolid& a, const KernelSolid& b) {
+    return std::tie(a.voxelSize, a.id) < std::tie(b.voxelSize, b.id);
+  });
   std::vector<int> numbers(scene.solids.size(), -1);
   for (std::size_t s = 0; s < solids_.size(); ++s) numbers[solids_[s].index] = static_cast<int>(s);
   csg_ = scene.csg.renumbered(numbers);
@@ -126,6 +133,11 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter
 }
 
 void KernelScene::look(const Scene& scene) {
+  if (fields_) {
+    bounds_ = scene.bounds();
+    fields_->place(scene);
+    return;
+  }
   bounds_ = meshes_.bounds();
   for (KernelSolid& solid : solids_) {
     const V3d corner(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]);
@@ -138,7 +150,7 @@ void KernelScene::look(const Scene& scene) {
 }
 
 std::size_t KernelScene::bytes() const {
-  std::size_t sum = 0;
+  std::size_t sum = fields_ ? fields_->bytes() : 0;
   for (const KernelSolid& solid : solids_) sum += solid.pool.bytes();
   return sum;
 }
@@ -279,7 +291,9 @@ bool KernelScene::isInside(const std::vector<char>& inside) const {
 std::vector<char> KernelScene::findBlocked(const KernelTracer& tracer,
                                            const std::vector<LightRay>& rays) const {
   std::vector<char> blocked(rays.size(), 0);
-  for (std::size_t first = 0; first < rays.size(); first += kRaysAtOnce) {
+  for (std::size_t i = 0; i < rays.size() && fields_; ++i)
+    blocked[i] = fields_->isOccluded(rays[i].origin, rays[i].direction, rays[i].reach) ? 1 : 0;
+  for (std::size_t first = 0; first < rays.size() && !fields_; first += kRaysAtOnce) {
     const std::size_t last = std::min(rays.size(), first + kRaysAtOnce);
     if (csg_.isEmpty())
       blockFirst(tracer, rays, first, last, blocked);

@@ -5,12 +5,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "levelset/memory_limit.h"
 #include "render/csg.h"
 #include "render/embree/mesh_rays.h"
 #include "render/kernel/brick_pool.h"
+#include "render/kernel/field_walk.h"
 #include "render/kernel/ray_block.h"
 #include "render/kernel/ray_fan.h"
 #include "render/scene.h"
@@ -50,7 +52,7 @@ struct PixelHits {
 };
 
 /// The surfaces of a scene made ready for the kernel, whoever runs it. Of two solids hit at the
-/// same depth the first one by id counts.
+/// same depth the one of the smaller voxels counts, of two such the first one by id.
 class KernelScene {
  public:
   /// @param maxBytes  for what the kernel reads
@@ -69,6 +71,9 @@ class KernelScene {
   /// World-space box of the cells that hold surface, and of the meshes; empty when there are none.
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
+  /// What is drawn of the solids where the scene blends them: then there are no solids(), and
+  /// castPixels() and thickness() find nothing; or null.
+  [[nodiscard]] const FieldWalk* fields() const { return fields_ ? &*fields_ : nullptr; }
   [[nodiscard]] std::size_t bytes() const;
   [[nodiscard]] std::size_t blocksLeftOut() const;
 
@@ -93,9 +98,10 @@ class KernelScene {
   void blockCsg(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
                 std::size_t last, std::vector<char>& blocked) const;
 
-  std::vector<KernelSolid> solids_;  // by id
+  std::vector<KernelSolid> solids_;  // by voxel size and id
   CsgExpression csg_;                // of those
   MeshRays meshes_;
+  std::optional<FieldWalk> fields_;
   Imath::Box3d bounds_;
 };
 

@@ -50,7 +50,9 @@ std::size_t KernelPainter::numberOf(const Pixel& pixel) const {
 }
 
 Hit KernelPainter::hitOf(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const {
-  const Hit onSolid = hits.solid[i] < 0 ? Hit() : hitOnSolid(ray, hits, i);
+  const Hit onSolid = surfaces_.fields()  ? surfaces_.fields()->intersect(ray.origin, ray.direction)
+                      : hits.solid[i] < 0 ? Hit()
+                                          : hitOnSolid(ray, hits, i);
   if (surfaces_.meshes().isEmpty()) return onSolid;
   const double far = onSolid.found ? onSolid.distance : std::numeric_limits<double>::max();
   const Hit onMesh = surfaces_.meshes().intersect(ray.origin, ray.direction, far);
@@ -84,8 +86,9 @@ void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixe
     const std::vector<double> depths = surfaces_.thickness(tracer, at);
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const Camera::Ray ray = scene_.camera.ray(pixels[i].x + 0.5, pixels[i].y + 0.5);
-      layers_.thickness[numberOf(pixels[i])] =
-          static_cast<float>(depths[i] / ray.direction.dot(scene_.camera.axis()));
+      layers_.thickness[numberOf(pixels[i])] = static_cast<float>(
+          surfaces_.fields() ? surfaces_.fields()->thickness(ray.origin, ray.direction)
+                             : depths[i] / ray.direction.dot(scene_.camera.axis()));
     }
   }
   const PixelHits hits = surfaces_.castPixels(tracer, at);
@@ -174,12 +177,18 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
     bricks += solid.pool.brickCount();
     beside += solid.pool.besideCount();
   }
-  image.attributes["ls:read"] = fmt::format(
-      "{} blocks of 8x8x8 cells that the surface crosses and {} beside them, for its curvature, "
-      "{:.1f} "
-      "MB; {} more were left out",
-      bricks, beside, static_cast<double>(surfaces.bytes()) * 1e-6, surfaces.blocksLeftOut());
+  if (surfaces.fields())
+    image.attributes["ls:read"] =
+        fmt::format("{} blocks of 8x8x8 cells where a field is not constant, {:.1f} MB",
+                    surfaces.fields()->blockCount(), static_cast<double>(surfaces.bytes()) * 1e-6);
+  else
+    image.attributes["ls:read"] = fmt::format(
+        "{} blocks of 8x8x8 cells that the surface crosses and {} beside them, for its curvature, "
+        "{:.1f} "
+        "MB; {} more were left out",
+        bricks, beside, static_cast<double>(surfaces.bytes()) * 1e-6, surfaces.blocksLeftOut());
   addViewAttributes(image, scene, surfaces.bounds().size().length());
+  painter.layers().addWarnings(image, scene);
   return image;
 }
 

@@ -24,6 +24,7 @@ class KernelPainter {
                 Image& image);
   /// Parts may be painted at the same time.
   void paint(const KernelTracer& tracer, const PixelBox& box) const;
+  [[nodiscard]] const PictureLayers& layers() const { return layers_; }
 
  private:
   struct Pixel {
