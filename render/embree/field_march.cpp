@@ -32,8 +32,7 @@ double steepestNear(const FloatTree& tree, const Coord& origin) {
   for (int x = 0; x < kPoints; ++x)
     for (int y = 0; y < kPoints; ++y)
       for (int z = 0; z < kPoints; ++z)
-        f[x][y][z] =
-            static_cast<double>(accessor.getValue(origin.offsetBy(x - 1, y - 1, z - 1)));
+        f[x][y][z] = static_cast<double>(accessor.getValue(origin.offsetBy(x - 1, y - 1, z - 1)));
   double steepest = 0;
   for (int x = 0; x + 1 < kPoints; ++x)
     for (int y = 0; y + 1 < kPoints; ++y)
@@ -134,7 +133,8 @@ class FieldMarch::Way {
       if ((value < 0) != inside) return t;
       const double safe = std::abs(value) / march_.steepest_, step = std::max(safe, least);
       // A ray in a face of the solid would never get on.
-      least = safe < least ? std::min(2 * least, kMostStepUp * march_.leastStep_) : march_.leastStep_;
+      least =
+          safe < least ? std::min(2 * least, kMostStepUp * march_.leastStep_) : march_.leastStep_;
       const double next = std::min(std::max(t + step, nextEntry(t)), end - begin);
       if (isInside(next) != inside) return between(t, next, inside);
       t = next;
@@ -208,7 +208,8 @@ FieldMarch::FieldMarch(const Scene& scene) : expression_(fieldExpression(scene))
     openvdb::CoordBBox leaves;
     tree.evalLeafBoundingBox(leaves);
     leaves.expand(1);
-    field.box = {levelset::toImath(leaves.min().asVec3d()), levelset::toImath(leaves.max().asVec3d())};
+    field.box = {levelset::toImath(leaves.min().asVec3d()),
+                 levelset::toImath(leaves.max().asVec3d())};
     steepest = std::max(steepest, steepestOf(tree) / field.band.voxelSize());
     finest = std::min(finest, field.band.voxelSize());
     fields_.push_back(std::move(field));

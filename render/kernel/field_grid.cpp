@@ -64,11 +64,10 @@ struct SplineTaps {
 
   explicit SplineTaps(double a) {
     const double b = 1 - a, sixth = 1.0 / 6;
-    const double weights[3][4] = {
-        {sixth * b * b * b, 2.0 / 3 - a * a * (1 - 0.5 * a), 2.0 / 3 - b * b * (1 - 0.5 * b),
-         sixth * a * a * a},
-        {-0.5 * b * b, a * (1.5 * a - 2), b * (2 - 1.5 * b), 0.5 * a * a},
-        {b, 3 * a - 2, 3 * b - 2, a}};
+    const double weights[3][4] = {{sixth * b * b * b, 2.0 / 3 - a * a * (1 - 0.5 * a),
+                                   2.0 / 3 - b * b * (1 - 0.5 * b), sixth * a * a * a},
+                                  {-0.5 * b * b, a * (1.5 * a - 2), b * (2 - 1.5 * b), 0.5 * a * a},
+                                  {b, 3 * a - 2, 3 * b - 2, a}};
     for (int d = 0; d < 3; ++d)
       for (int i = 0; i < 4; ++i) {
         own[d][i + 1] = weights[d][i];
@@ -85,7 +84,7 @@ double applied(const double (&taps)[6], const double* to, int stride) {
   return sum;
 }
 
-using FieldWindow = double[6][6][6];  // from two points before the cell's first corner on
+using FieldWindow = FieldGrid::FieldWindow;
 
 /// Derivatives of order p, q, r of Σ (f − ∇²f/6) B, an axis at a time: along each the spline of
 /// what is left, and beside it the same with the second differences of this axis and those before.
@@ -185,12 +184,13 @@ FieldGrid::FieldGrid(const levelset::NarrowBand& band) {
   for (std::size_t n = 0; n < origins.size(); ++n) {
     const Coord at = origins[n] - box.min();
     const int x = at[0] >> 3, y = at[1] >> 3, z = at[2] >> 3;
-    std::int32_t& entries = page_[static_cast<std::size_t>(
-        ((x >> 3) * pages_[1] + (y >> 3)) * pages_[2] + (z >> 3))];
+    std::int32_t& entries =
+        page_[static_cast<std::size_t>(((x >> 3) * pages_[1] + (y >> 3)) * pages_[2] + (z >> 3))];
     if (entries < 0) {
       entries = static_cast<std::int32_t>(entry_.size());
       for (int i = 0; i < 512; ++i)
-        entry_.push_back(constantAt(((x & ~7) + (i >> 6)) * kEdge, ((y & ~7) + (i >> 3 & 7)) * kEdge,
+        entry_.push_back(constantAt(((x & ~7) + (i >> 6)) * kEdge,
+                                    ((y & ~7) + (i >> 3 & 7)) * kEdge,
                                     ((z & ~7) + (i & 7)) * kEdge));
     }
     const float* from = all.data() + n * kValues;
@@ -221,13 +221,29 @@ Imath::Box3d FieldGrid::worldBox() const {
                           indexToWorld_);
 }
 
-double FieldGrid::value(int x, int y, int z) const {
-  const int at[3] = {x >> 3, y >> 3, z >> 3};
-  for (int a = 0; a < 3; ++a)
-    if (at[a] < 0 || at[a] >= size(a)) return background_;
-  const int number = block(at[0], at[1], at[2]);
-  if (number < 0) return constant(number);
-  return static_cast<double>(values(number)[((x & 7) * kPoints + (y & 7)) * kPoints + (z & 7)]);
+void FieldGrid::read(const std::array<int, 3>& low, FieldWindow& window) const {
+  constexpr int kWindow = 6;
+  // Block by block: a window lies in two along an axis, at most.
+  for (int n = 0; n < 8; ++n) {
+    int at[3], from[3], end[3];
+    bool isEmpty = false, isBeyond = false;
+    for (std::size_t a = 0; a < 3; ++a) {
+      at[a] = (low[a] >> 3) + (n >> a & 1);
+      from[a] = std::max(low[a], at[a] * kEdge);
+      end[a] = std::min(low[a] + kWindow, at[a] * kEdge + kEdge);
+      isEmpty = isEmpty || from[a] >= end[a];
+      isBeyond = isBeyond || at[a] < 0 || at[a] >= size_[a];
+    }
+    if (isEmpty) continue;
+    const int number = isBeyond ? kOutside : block(at[0], at[1], at[2]);
+    for (int x = from[0]; x < end[0]; ++x)
+      for (int y = from[1]; y < end[1]; ++y)
+        for (int z = from[2]; z < end[2]; ++z)
+          window[x - low[0]][y - low[1]][z - low[2]] =
+              number < 0 ? constant(number)
+                         : static_cast<double>(
+                               values(number)[((x & 7) * kPoints + (y & 7)) * kPoints + (z & 7)]);
+  }
 }
 
 FieldShape FieldGrid::shapeAt(const V3d& world) const {
@@ -236,11 +252,8 @@ FieldShape FieldGrid::shapeAt(const V3d& world) const {
   const V3d base(std::floor(place.x), std::floor(place.y), std::floor(place.z));
   const V3d a = place - base;
   FieldWindow f;
-  for (int x = 0; x < 6; ++x)
-    for (int y = 0; y < 6; ++y)
-      for (int z = 0; z < 6; ++z)
-        f[x][y][z] = value(static_cast<int>(base.x) + x - 2, static_cast<int>(base.y) + y - 2,
-                           static_cast<int>(base.z) + z - 2);
+  read({static_cast<int>(base.x) - 2, static_cast<int>(base.y) - 2, static_cast<int>(base.z) - 2},
+       f);
   double sum[3][3][3];
   splineDerivatives(f, a, sum);
   SurfaceShape shape;

@@ -23,6 +23,8 @@ class FieldGrid {
   struct Range {
     double low, high;
   };
+  /// Values about a cell, from two points before its first corner on.
+  using FieldWindow = double[6][6][6];
 
   /// Bytes that a band's blocks take, at most.
   [[nodiscard]] static double bytesOf(const levelset::NarrowBand& band);
@@ -44,9 +46,8 @@ class FieldGrid {
 
   /// Number of a block within the size; negative: the field is constant there.
   [[nodiscard]] int block(int x, int y, int z) const {
-    const int entries = page_[static_cast<std::size_t>(((x >> 3) * pages_[1] + (y >> 3)) *
-                                                           pages_[2] +
-                                                       (z >> 3))];
+    const int entries =
+        page_[static_cast<std::size_t>(((x >> 3) * pages_[1] + (y >> 3)) * pages_[2] + (z >> 3))];
     if (entries < 0) return entries;
     return entry_[static_cast<std::size_t>(entries + ((x & 7) << 6 | (y & 7) << 3 | (z & 7)))];
   }
@@ -69,7 +70,7 @@ class FieldGrid {
   [[nodiscard]] double constant(int block) const {
     return block == kInside ? -background_ : background_;
   }
-  [[nodiscard]] double value(int x, int y, int z) const;
+  void read(const std::array<int, 3>& low, FieldWindow& window) const;
 
   double background_ = 0;  // world units, as values are
   Imath::V3d corner_;      // of the table, in the band's index space

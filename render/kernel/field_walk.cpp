@@ -46,8 +46,7 @@ Range mixedSlope(const Range& share, const Range& a, const Range& b) {
 FieldBounds joinBounds(const FieldExpression& e, Join join, const FieldBounds& a,
                        const FieldBounds& b) {
   const Range value = joinRanges(e, join, a.value, b.value);
-  if (join == Join::Morph)
-    return {value, mixedSlope({1 - e.share, 1 - e.share}, a.slope, b.slope)};
+  if (join == Join::Morph) return {value, mixedSlope({1 - e.share, 1 - e.share}, a.slope, b.slope)};
   const bool isTurned = join == Join::Difference;
   const Range other = isTurned ? negated(b.value) : b.value;
   Range ahead{other.low - a.value.high, other.high - a.value.low};
@@ -171,8 +170,8 @@ struct GridWay {
   }
   void readCell() {
     constexpr int kPoints = FieldGrid::kPoints;
-    const float* from = grid->values(number) +
-                        ((cell[0] & 7) * kPoints + (cell[1] & 7)) * kPoints + (cell[2] & 7);
+    const float* from =
+        grid->values(number) + ((cell[0] & 7) * kPoints + (cell[1] & 7)) * kPoints + (cell[2] & 7);
     range = {kNever, -kNever};
     for (int n = 0; n < 8; ++n) {
       const int i = n >> 2, j = n >> 1 & 1, k = n & 1;
@@ -332,7 +331,8 @@ class FieldSearch {
     std::optional<bool> hasMovedA;
     for (int n = 0; n < kMostSteps && b - a > kExact; ++n) {
       const double share = fa / (fa - fb);
-      const double s = n % 4 == 3 || !(share > 0 && share < 1) ? 0.5 * (a + b) : a + (b - a) * share;
+      const double s =
+          n % 4 == 3 || !(share > 0 && share < 1) ? 0.5 * (a + b) : a + (b - a) * share;
       const double f = valueOf(cubics, s);
       const bool movesA = (f < 0) == (fa < 0);
       if (hasMovedA == movesA) (movesA ? fb : fa) *= 0.5;

@@ -43,8 +43,8 @@ FieldShape joinedShape(const JoinShape& step, const FieldShape& a, const FieldSh
   s.trilinearGradient = a.shape.trilinearGradient * step.a + b.shape.trilinearGradient * step.b;
   s.hessian = a.shape.hessian * step.a + b.shape.hessian * step.b +
               outer(a.shape.gradient - b.shape.gradient * step.signOfB) * step.bend;
-  s.interpolationError = std::abs(step.a) * a.shape.interpolationError +
-                         std::abs(step.b) * b.shape.interpolationError;
+  s.interpolationError =
+      std::abs(step.a) * a.shape.interpolationError + std::abs(step.b) * b.shape.interpolationError;
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -34,10 +35,11 @@ Scene blended(const std::vector<NarrowBand>& bands, const std::string& csg, doub
   std::vector<std::string> names;
   for (const NarrowBand& band : bands) {
     names.emplace_back(1, static_cast<char>('a' + names.size()));
-    scene.solids.push_back({.band = band,
-                            .colour = names.size() == 1 ? Imath::C3f(0.6f, 0, 0) : Imath::C3f(0, 0.6f, 0),
-                            .id = static_cast<std::uint32_t>(names.size()),
-                            .name = names.back()});
+    scene.solids.push_back(
+        {.band = band,
+         .colour = names.size() == 1 ? Imath::C3f(0.6f, 0, 0) : Imath::C3f(0, 0.6f, 0),
+         .id = static_cast<std::uint32_t>(names.size()),
+         .name = names.back()});
   }
   if (!csg.empty()) scene.csg = CsgExpression(csg, names);
   scene.softness = softness;
@@ -258,11 +260,13 @@ TEST(Morph, TellsWhereTheBandsEnd) {
 /// Grids of three resolutions, two of them turned.
 std::vector<NarrowBand> threeGrids() {
   const auto turn = [](const V3d& angles) { return Imath::M44d().rotate(angles); };
-  return {levelset::makeSphere(20, V3d(0.1, 0.2, 0.3), 1, {.halfWidth = 4}),
-          levelset::transform(levelset::makeBox(V3d(24, 18, 30), V3d(9, 7, 10), 0.61, {.halfWidth = 7}),
-                              turn(V3d(0.3, 0.5, 0.2))),
-          levelset::transform(levelset::makeTorus(14, 4, V3d(6, -8, 9), V3d(0, 0, 1), 0.37, {.halfWidth = 11}),
-                              turn(V3d(-0.4, 0.2, 0.7)))};
+  return {
+      levelset::makeSphere(20, V3d(0.1, 0.2, 0.3), 1, {.halfWidth = 4}),
+      levelset::transform(levelset::makeBox(V3d(24, 18, 30), V3d(9, 7, 10), 0.61, {.halfWidth = 7}),
+                          turn(V3d(0.3, 0.5, 0.2))),
+      levelset::transform(
+          levelset::makeTorus(14, 4, V3d(6, -8, 9), V3d(0, 0, 1), 0.37, {.halfWidth = 11}),
+          turn(V3d(-0.4, 0.2, 0.7)))};
 }
 
 TEST(FieldJudge, AgreesOnThreeGrids) {
@@ -312,6 +316,31 @@ TEST(FieldJudge, AgreesAlongTheLattice) {
   }
 }
 
+TEST(FieldJudge, AgreesOnNoise) {
+  // Cells that hold several sheets each, and slopes far from 1.
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> even(-1, 1);
+  const NarrowBand noise = support::sampleBand(
+      [&](const V3d& p) {
+        const double value = even(random);
+        return p.length() < 9 ? value : 4;
+      },
+      Imath::Box3d(V3d(-10), V3d(10)), 1);
+  for (const char* csg : {"a | b", "b - a"}) {
+    const Scene scene =
+        blended({noise, levelset::makeSphere(8, V3d(3, 2, 1), 0.7)}, csg, 0.8, 160, 120);
+    const Image ours = renderCpu(scene, kDataOnly), judge = renderEmbree(scene, kDataOnly);
+    std::size_t both = 0, unlike = 0;
+    for (std::size_t i = 0; i < ours.pixelCount(); ++i) {
+      const auto a = pixelOf(ours, i), b = pixelOf(judge, i);
+      both += a && b;
+      unlike += a.has_value() != b.has_value() || (a && (a->place - b->place).length() > 1e-4);
+    }
+    EXPECT_GT(both, 1500u) << csg;
+    EXPECT_EQ(unlike, 0u) << csg;
+  }
+}
+
 TEST(FieldJudge, AgreesInThicknessAndShadows) {
   RenderOptions options = kDataOnly;
   options.thickness = true;
@@ -341,7 +370,8 @@ TEST(FieldJudge, AgreesInThicknessAndShadows) {
 
 TEST(FieldScene, HasTheNormalsOfTheFinerGridWhereItIs) {
   // A coarse ball and a fine bump on it: the bump's normals are as good as alone.
-  const NarrowBand coarse = exactBall(V3d(0), 20, 2, 3), fine = exactBall(V3d(0, 0, 20), 3, 0.2, 10);
+  const NarrowBand coarse = exactBall(V3d(0), 20, 2, 3),
+                   fine = exactBall(V3d(0, 0, 20), 3, 0.2, 10);
   Scene scene = blended({coarse, fine}, "a | b", 1.5, 160, 120);
   scene.camera.from = V3d(0, 0, 60);
   scene.camera.to = V3d(0, 0, 20);
@@ -360,7 +390,8 @@ TEST(FieldScene, HasTheNormalsOfTheFinerGridWhereItIs) {
 }
 
 TEST(FieldScene, IsRefusedWhereItCannotBe) {
-  const NarrowBand ball = levelset::makeSphere(8, V3d(0), 1), fine = levelset::makeSphere(8, V3d(9, 0, 0), 0.5);
+  const NarrowBand ball = levelset::makeSphere(8, V3d(0), 1),
+                   fine = levelset::makeSphere(8, V3d(9, 0, 0), 0.5);
   EXPECT_NO_THROW((void)renderCpu(blended({ball, fine}, "a | b", 1.4, 8, 8), kDataOnly));
   for (const auto& draw : {renderCpu, renderEmbree, renderGpu}) {
     EXPECT_THROW((void)draw(blended({ball, fine}, "a | b", 1.6, 8, 8), kDataOnly),
