@@ -18,7 +18,7 @@ using Imath::V3d;
 using openvdb::Coord;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-constexpr double kWidestField = 1 << 15;  // voxels: 2^27 entries of the table
+constexpr double kWidestField = 1 << 14;  // voxels: 2^24 pages in the table
 constexpr int kPageCells = 64;
 
 /// A leaf reaches into the seven blocks below it, too.
@@ -32,12 +32,10 @@ std::vector<Coord> blockOrigins(const openvdb::FloatTree& tree) {
   return origins;
 }
 
-/// Values of the block's points. @return are they of more than one value?
-bool readBlock(const openvdb::FloatTree& tree, const Coord& origin, float* to) {
+/// Values of the block's points, from up to eight leaves.
+void readBlock(const openvdb::FloatTree& tree, const Coord& origin, float* to) {
   constexpr int kPoints = FieldGrid::kPoints;
   openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> accessor(tree);
-  bool differ = false;
-  float first = 0;
   for (int n = 0; n < 8; ++n) {
     const int from[3] = {8 * (n >> 2), 8 * (n >> 1 & 1), 8 * (n & 1)};
     const Coord at = origin.offsetBy(from[0], from[1], from[2]);
@@ -46,14 +44,10 @@ bool readBlock(const openvdb::FloatTree& tree, const Coord& origin, float* to) {
     const float tile = leaf ? 0 : accessor.getValue(at);
     for (int x = from[0]; x < (from[0] ? kPoints : 8); ++x)
       for (int y = from[1]; y < (from[1] ? kPoints : 8); ++y)
-        for (int z = from[2]; z < (from[2] ? kPoints : 8); ++z) {
-          const float v = values ? values[(x & 7) << 6 | (y & 7) << 3 | (z & 7)] : tile;
-          if (n == 0 && x + y + z == 0) first = v;
-          differ = differ || v != first;
-          to[(x * kPoints + y) * kPoints + z] = v;
-        }
+        for (int z = from[2]; z < (from[2] ? kPoints : 8); ++z)
+          to[(x * kPoints + y) * kPoints + z] =
+              values ? values[(x & 7) << 6 | (y & 7) << 3 | (z & 7)] : tile;
   }
-  return differ;
 }
 
 /// What the taps of six points about a cell, from two before its first corner on, make of a
@@ -143,8 +137,7 @@ double interpolate(const FieldWindow& f, const V3d& a, V3d& gradient) {
 
 double FieldGrid::bytesOf(const levelset::NarrowBand& band) {
   if (band.isEmpty()) return 0;
-  constexpr double kBlocksOfLeaf = 3;  // those below the outermost leaves among them
-  return static_cast<double>(levelset::vdb(band).tree().leafCount()) * kBlocksOfLeaf *
+  return static_cast<double>(blockOrigins(levelset::vdb(band).tree()).size()) *
          (4 * kValues + sizeof(Range) + sizeof(Coord));
 }
 
@@ -167,12 +160,14 @@ FieldGrid::FieldGrid(const levelset::NarrowBand& band) {
   corner_ = V3d(box.min()[0], box.min()[1], box.min()[2]);
   place(band);
 
-  std::vector<float> all(origins.size() * kValues);
-  std::vector<char> isVaried(origins.size());
+  std::vector<Range> found(origins.size());
   tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t n) {
-    isVaried[n] = readBlock(tree, origins[n], all.data() + n * kValues) ? 1 : 0;
+    std::array<float, kValues> values;
+    readBlock(tree, origins[n], values.data());
+    const auto [low, high] = std::minmax_element(values.begin(), values.end());
+    found[n] = {static_cast<double>(*low), static_cast<double>(*high)};
   });
-
+  std::vector<std::size_t> varied;
   openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
   const auto constantAt = [&](int x, int y, int z) {
     return accessor.getValue(box.min().offsetBy(x, y, z)) < 0 ? kInside : kOutside;
@@ -193,18 +188,20 @@ FieldGrid::FieldGrid(const levelset::NarrowBand& band) {
                                     ((y & ~7) + (i >> 3 & 7)) * kEdge,
                                     ((z & ~7) + (i & 7)) * kEdge));
     }
-    const float* from = all.data() + n * kValues;
     std::int32_t& entry =
         entry_[static_cast<std::size_t>(entries + ((x & 7) << 6 | (y & 7) << 3 | (z & 7)))];
-    if (!isVaried[n]) {
-      entry = from[0] < 0 ? kInside : kOutside;
+    if (found[n].low == found[n].high && std::abs(found[n].low) == background_) {
+      entry = found[n].low < 0 ? kInside : kOutside;
       continue;
     }
     entry = static_cast<std::int32_t>(ranges_.size());
-    const auto [low, high] = std::minmax_element(from, from + kValues);
-    ranges_.push_back({static_cast<double>(*low), static_cast<double>(*high)});
-    values_.insert(values_.end(), from, from + kValues);
+    ranges_.push_back(found[n]);
+    varied.push_back(n);
   }
+  values_.resize(varied.size() * kValues);
+  tbb::parallel_for(std::size_t{0}, varied.size(), [&](std::size_t n) {
+    readBlock(tree, origins[varied[n]], values_.data() + n * kValues);
+  });
 }
 
 void FieldGrid::place(const levelset::NarrowBand& band) {

@@ -393,6 +393,10 @@ TEST(FieldScene, IsRefusedWhereItCannotBe) {
   const NarrowBand ball = levelset::makeSphere(8, V3d(0), 1),
                    fine = levelset::makeSphere(8, V3d(9, 0, 0), 0.5);
   EXPECT_NO_THROW((void)renderCpu(blended({ball, fine}, "a | b", 1.4, 8, 8), kDataOnly));
+  // Five steps within each other may take up to 5/4 K off the narrower band's 1.5.
+  EXPECT_THROW(
+      (void)renderCpu(blended({ball, fine}, "a | b | a | b | a | b", 1.4, 8, 8), kDataOnly),
+      levelset::InvalidInput);
   for (const auto& draw : {renderCpu, renderEmbree, renderGpu}) {
     EXPECT_THROW((void)draw(blended({ball, fine}, "a | b", 1.6, 8, 8), kDataOnly),
                  levelset::InvalidInput);
