@@ -204,9 +204,11 @@ FieldGrid::FieldGrid(const levelset::NarrowBand& band) {
   });
 }
 
-void FieldGrid::place(const levelset::NarrowBand& band) {
+bool FieldGrid::place(const levelset::NarrowBand& band) {
+  const M44d before = indexToWorld_;
   indexToWorld_ = M44d().setTranslation(corner_) * band.indexToWorld();
   worldToIndex_ = indexToWorld_.inverse();
+  return indexToWorld_ != before;
 }
 
 std::size_t FieldGrid::bytes() const {

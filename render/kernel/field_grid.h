@@ -32,8 +32,9 @@ class FieldGrid {
   /// @throws levelset::ResourceLimit for a band that spans more than the table can hold
   explicit FieldGrid(const levelset::NarrowBand& band);
 
-  /// Takes where the band is anew. @pre it has the values that this was made of
-  void place(const levelset::NarrowBand& band);
+  /// Takes where the band is anew. @return has it moved? @pre it has the values that this was made
+  /// of
+  bool place(const levelset::NarrowBand& band);
 
   [[nodiscard]] const Imath::M44d& indexToWorld() const { return indexToWorld_; }
   [[nodiscard]] const Imath::M44d& worldToIndex() const { return worldToIndex_; }

@@ -385,12 +385,14 @@ FieldWalk::FieldWalk(const Scene& scene, std::size_t maxBytes)
   place(scene);
 }
 
-void FieldWalk::place(const Scene& scene) {
+bool FieldWalk::place(const Scene& scene) {
+  bool hasMoved = false;
   box_.makeEmpty();
   for (std::size_t i = 0; i < grids_.size(); ++i) {
-    grids_[i].place(scene.solids[expression_.operands[i].solid].band);
+    hasMoved = grids_[i].place(scene.solids[expression_.operands[i].solid].band) || hasMoved;
     box_.extendBy(grids_[i].worldBox());
   }
+  return hasMoved;
 }
 
 std::size_t FieldWalk::bytes() const {

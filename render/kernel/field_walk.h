@@ -22,8 +22,8 @@ class FieldWalk {
   /// @pre the scene is blended, and requireFields()
   /// @throws levelset::ResourceLimit for fields that take more than maxBytes, or are too wide
   FieldWalk(const Scene& scene, std::size_t maxBytes);
-  /// Takes where the solids are anew.
-  void place(const Scene& scene);
+  /// Takes where the solids are anew. @return has any moved?
+  bool place(const Scene& scene);
 
   [[nodiscard]] std::size_t bytes() const;
   [[nodiscard]] std::size_t blockCount() const;

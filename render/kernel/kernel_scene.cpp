@@ -100,7 +100,7 @@ struct PackedRays {
 KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter) : meshes_(scene) {
   if (scene.isBlended()) {
     fields_.emplace(scene, maxBytes);
-    look(scene);
+    bounds_ = scene.bounds();
     return;
   }
   // A block for each leaf; those the surface does not cross are built and dropped.
@@ -134,8 +134,7 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter
 
 void KernelScene::look(const Scene& scene) {
   if (fields_) {
-    bounds_ = scene.bounds();
-    fields_->place(scene);
+    if (fields_->place(scene)) bounds_ = scene.bounds();
     return;
   }
   bounds_ = meshes_.bounds();
