@@ -190,6 +190,13 @@ class Comparer {
   /// The first, where there are several solids.
   [[nodiscard]] double voxelSize() const { return lengthNamed("ls:voxelSize", 1); }
 
+  /// What curvatures change by over the 1e-3 voxel that places may be apart, per voxel: third
+  /// differences of values in few bits are up to eight steps of those in a band of three voxels.
+  [[nodiscard]] double curvatureStep() const {
+    const double bits = lengthNamed("ls:valueBits", 32);
+    return bits < 32 ? 1e-3 * 8 * 6 * std::exp2(-bits) : 0;
+  }
+
   [[nodiscard]] double vectorDifference(const std::string& name, std::size_t i) const {
     double squares = 0;
     for (const char* axis : {".X", ".Y", ".Z"}) {
@@ -238,14 +245,16 @@ class Comparer {
                             return most;
                           }});
     const double h = voxelSize();
+    const double rough = curvatureStep();
     for (const auto& [name, usual] : {std::pair{"mean", 1e-4}, {"k1", 1e-3}, {"k2", 1e-3}}) {
       const std::string channel = std::string("curvature.") + name;
-      add({channel}, {channel, "per voxel", {usual, kInfinite}, [this, channel, h](std::size_t i) {
-                        return h * apart(value(a_, channel, i), value(b_, channel, i));
-                      }});
+      add({channel},
+          {channel, "per voxel", {usual + rough, kInfinite}, [this, channel, h](std::size_t i) {
+             return h * apart(value(a_, channel, i), value(b_, channel, i));
+           }});
     }
     add({"curvature.gauss"},
-        {"curvature.gauss", "per voxel²", {1e-4, kInfinite}, [this, h](std::size_t i) {
+        {"curvature.gauss", "per voxel²", {1e-4 + rough, kInfinite}, [this, h](std::size_t i) {
            return h * h * apart(value(a_, "curvature.gauss", i), value(b_, "curvature.gauss", i));
          }});
     // From close by, places are known relative to the solid's size only.

@@ -142,6 +142,13 @@ FieldExpression fieldExpression(const Scene& scene) {
 void requireFields(const Scene& scene) {
   if (scene.morph) requireMorph(scene);
   requireSoftness(scene);
+  if (!scene.isBlended()) return;
+  for (const Solid& solid : scene.solids)
+    if (solid.opacity != 1)
+      throw levelset::UsageError(fmt::format(
+          "scene: an opacity of {} for '{}' has no place: soft expressions and morphs have one "
+          "surface, mixed of all solids; leave their opacities out",
+          solid.opacity, solid.name));
 }
 
 }  // namespace render

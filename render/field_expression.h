@@ -65,8 +65,9 @@ struct FieldExpression {
 
 /// Of any scene.
 /// @throws levelset::UsageError for a softness without an expression or below 0, a morph beyond
-///         [0, 1], beside an expression or of other than two solids; levelset::InvalidInput for a
-///         softness beyond what the bands know, and a morph of nothing
+///         [0, 1], beside an expression or of other than two solids, and solids of an opacity that
+///         are blended; levelset::InvalidInput for a softness beyond what the bands know, and a
+///         morph of nothing
 void requireFields(const Scene& scene);
 
 }  // namespace render

@@ -13,6 +13,8 @@ struct RenderOptions {
   int ambientSamples = 16;  ///< per colour sample; 0: no occlusion
   int shadowSamples = 4;    ///< per colour sample; 0: no shadows
   Filter filter = Filter::Trilinear;
+  /// renderGpu() reads the NanoVDB grids themselves: slower, and the same bits. Trilinear only.
+  bool fromNanoVdb = false;
   StyleOptions style = {};  ///< of the colours
   bool thickness = false;   ///< layer thickness: how far the ray is within the solids
   bool curvature = true;    ///< layers curvature.mean .gauss .k1 .k2

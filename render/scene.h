@@ -13,6 +13,7 @@
 #include "levelset/narrow_band.h"
 #include "render/camera.h"
 #include "render/csg.h"
+#include "render/value_bits.h"
 
 namespace render {
 
@@ -28,6 +29,8 @@ struct Solid {
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
   std::string name = {};  ///< for the expression
+  double opacity = 1;     ///< of each of its surfaces that a ray meets, (0, 1]
+  ValueBits held = {};    ///< of the kernel's tables; the band has these values (coarsened())
 };
 
 /// Triangles beside the solids: drawn, lit and lighted through like them, of no use to the
@@ -37,7 +40,11 @@ struct MeshPart {
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
   std::string name = {};
+  double opacity = 1;  ///< as of a Solid
 };
+
+/// What lets less light through than this is as good as opaque.
+inline constexpr double kLeastTransmittance = 1.0 / 512;
 
 struct Scene {
   Camera camera;
@@ -50,6 +57,8 @@ struct Scene {
   std::optional<double> morph = {};  ///< set: on the way from the one solid to the other, [0, 1]
   /// Is the zero set of one function of all fields drawn (render/field_expression.h)?
   [[nodiscard]] bool isBlended() const { return softness > 0 || morph; }
+  /// Is nothing seen through?
+  [[nodiscard]] bool isOpaque() const;
   /// A box that holds what is drawn; empty where nothing can be.
   [[nodiscard]] Imath::Box3d bounds() const;
 };

@@ -9,7 +9,7 @@ namespace render {
 Image renderCpu(const Scene& scene, const RenderOptions& options) {
   requirePicture(scene, options);
   levelset::report(options.progress, 0, "render");
-  const KernelScene surfaces(scene, options.maxBytes, options.filter);
+  const KernelScene surfaces(scene, options);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();
   constexpr int kCpuTile = 16;  // pixels
   return paintPicture(scene, surfaces, CpuTracer(), kCpuTile, "cpu", options);

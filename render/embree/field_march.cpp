@@ -243,8 +243,9 @@ bool FieldMarch::isOccluded(const V3d& origin, const V3d& direction, double near
   return !way.isEmpty() && way.nextCrossing(0, way.isInside(0));
 }
 
-double FieldMarch::thickness(const V3d& origin, const V3d& direction) const {
-  Way way(*this, origin, direction, 0, kEndless);
+double FieldMarch::thickness(const V3d& origin, const V3d& direction, double near,
+                             double far) const {
+  Way way(*this, origin, direction, near, far);
   if (way.isEmpty()) return 0;
   double length = 0, from = 0;
   for (bool inside = way.isInside(0);; inside = !inside) {

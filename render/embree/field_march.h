@@ -21,13 +21,14 @@ class FieldMarch {
   /// @pre the scene is blended, and requireFields()
   explicit FieldMarch(const Scene& scene);
 
-  /// First hit in [near, far]. A ray that starts inside hits where it leaves.
+  /// First hit in [near, far]. A ray that is inside at `near` hits where it leaves.
   [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                               double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                                 double far) const;
-  /// How far the ray is inside, world units.
-  [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction) const;
+  /// How far the ray is inside in [near, far], world units.
+  [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction, double near,
+                                 double far) const;
 
  private:
   struct MarchedField {

@@ -13,10 +13,10 @@ Image renderGpu(const Scene& scene, const RenderOptions& options) {
     throw levelset::UsageError(
         "render: the shader has no soft expressions and no morphs; take --renderer cpu");
   levelset::report(options.progress, 0, "render");
-  const KernelScene surfaces(scene, options.maxBytes, options.filter);
+  const KernelScene surfaces(scene, options);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();
   const GlContext context;
-  const GpuTracer tracer(context, surfaces);
+  const GpuTracer tracer(context, surfaces, 0, options.fromNanoVdb ? &scene : nullptr);
   constexpr int kGpuTile = 64;  // pixels: enough rays for a run
   return paintPicture(scene, surfaces, tracer, kGpuTile, "gpu " + context.description(), options);
 }

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <bit>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "levelset/error.h"
+#include "render/gpu/nano_grid.h"
 #include "render/kernel/trace_glsl.h"
 
 namespace render {
@@ -126,34 +128,63 @@ int passingNumber(int n) { return int(rays[11 * rayCount + n]); }
 void addShape(int n, Ray ray, Hit hit) {}
 )GLSL";
 
-/// Values in one buffer of texels, or in several of 2^shift floats each.
-std::string valueText(int blocks, int shift) {
+constexpr const char* kNanoText = R"GLSL(
+uniform int nanoRoot, nanoTiles, nanoFar, nanoOriginX, nanoOriginY, nanoOriginZ;
+)GLSL";
+
+/// What a shader is made for.
+struct Variant {
+  bool isPixels, isSpline, isNano;
+  int valueBits;
+  int blocks;  // of values, in a buffer of texels each
+  auto operator<=>(const Variant&) const = default;
+};
+
+/// Values in one buffer of texels, or in several of 2^shift values each.
+std::string valueText(const Variant& variant, int shift) {
+  const bool isCode = variant.valueBits != 32;
+  const char* prefix = isCode ? "u" : variant.isNano ? "i" : "";
+  const char* type = isCode ? "uint" : variant.isNano ? "int" : "float";
   std::string text;
-  for (int b = 0; b < blocks; ++b) {
-    text += fmt::format("layout(binding = {}) uniform samplerBuffer values{};\n",
-                        static_cast<int>(kFirstValues) + b, b);
+  for (int b = 0; b < variant.blocks; ++b) {
+    text += fmt::format("layout(binding = {}) uniform {}samplerBuffer values{};\n",
+                        static_cast<int>(kFirstValues) + b, prefix, b);
   }
-  text += "Real loadValue(Whole i) {\n";
-  for (int b = 0; b + 1 < blocks; ++b)
+  text += fmt::format("{} loadHeld(Whole i) {{\n", type);
+  for (int b = 0; b + 1 < variant.blocks; ++b)
     text += fmt::format("  if (i >> {} == {}) return texelFetch(values{}, i & {}).x;\n", shift, b,
                         b, (1 << shift) - 1);
-  text += blocks == 1 ? "  return texelFetch(values0, i).x;\n}\n"
-                      : fmt::format("  return texelFetch(values{}, i & {}).x;\n}}\n", blocks - 1,
-                                    (1 << shift) - 1);
-  return text;
+  text += variant.blocks == 1 ? "  return texelFetch(values0, i).x;\n}\n"
+                              : fmt::format("  return texelFetch(values{}, i & {}).x;\n}}\n",
+                                            variant.blocks - 1, (1 << shift) - 1);
+  // Numbers of the NanoVDB grid pass for floats nowhere: those may lose bits.
+  if (variant.isNano)
+    return text + "Real loadValue(Whole i) { return intBitsToFloat(loadHeld(i)); }\n";
+  if (!isCode) return text + "Real loadValue(Whole i) { return loadHeld(i); }\n";
+  return text + fmt::format(
+                    "uniform float valueStep;\n"
+                    "Real loadValue(Whole i) {{\n"
+                    "  VAR fromZero = float(int(loadHeld(i))) + {}.5;\n"
+                    "  VAR value = fromZero * valueStep;\n"
+                    "  return value;\n}}\n",
+                    1 - (1 << (variant.valueBits - 1)));
 }
 
-std::string shaderText(const char* rays, bool isSpline, int valueBlocks, int shift) {
+std::string shaderText(const Variant& variant, int shift) {
   return fmt::format(
              "#version 450 core\nlayout(local_size_x = {}) in;\n"
-             "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {}, kBlockOfEntry = {},\n"
+             "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {},\n"
+             "          kFirstOfEntry = {}, kStridesOfEntry = {}, kStrideShift = {},\n"
              "          kHitParts = {}, kShapeParts = {}, kGoesIn = {}, kGoesOut = {};\n"
              "const bool isSpline = {};\n",
              kGroup, BrickPool::kEdge, BrickPool::kValues,
-             std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kBlockOfEntry,
-             kHitParts, ShapeBlock::kParts, HitBlock::kGoesIn, HitBlock::kGoesOut, isSpline) +
-         kDialect + valueText(valueBlocks, shift) + kRootsKernel + kWindowKernel + kSplineKernel +
-         kTraceKernel + kShapeKernel + rays + kMain;
+             std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kFirstOfEntry,
+             BrickPool::kStridesOfEntry, BrickPool::kStrideShift, kHitParts, ShapeBlock::kParts,
+             HitBlock::kGoesIn, HitBlock::kGoesOut, variant.isSpline) +
+         kDialect + valueText(variant, shift) + kRootsKernel +
+         (variant.isNano ? kNanoText + NanoGrid::layout() + kNanoVdbKernel : kBricksKernel) +
+         kWindowKernel + kSplineKernel + kTraceKernel + kShapeKernel +
+         (variant.isPixels ? kPixelRays : kListedRays) + kMain;
 }
 
 }  // namespace
@@ -193,16 +224,16 @@ struct GpuTracer::Impl {
   struct Tables {
     Texels pages, entries, masks;
     std::vector<Texels> values;
+    std::optional<NanoGrid> nano;  // without its words: those are the values, and all there is
   };
 
   const GlContext& context;
   const GlFunctions& gl;
   const std::size_t largestTable;
-  int shift = 0;  // of the number of floats in a block of values
+  int shift = 0;  // of the number of values in a block of them
   std::map<const KernelSolid*, Tables> tables;
   GLuint rays = 0, hits = 0;
-  /// By the number of blocks of values, and is it a spline?
-  std::map<std::pair<int, bool>, GLuint> pixelPrograms, rayPrograms;
+  std::map<Variant, GLuint> programs;
 
   Impl(const GlContext& context_, std::size_t largestTable_)
       : context(context_),
@@ -225,8 +256,7 @@ struct GpuTracer::Impl {
       for (const Texels& texels : t.values) release(texels);
     }
     for (const GLuint buffer : {rays, hits}) gl.DeleteBuffers(1, &buffer);
-    for (const auto* programs : {&pixelPrograms, &rayPrograms})
-      for (const auto& [blocks, program] : *programs) gl.DeleteProgram(program);
+    for (const auto& [variant, program] : programs) gl.DeleteProgram(program);
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -246,18 +276,27 @@ struct GpuTracer::Impl {
     return texels;
   }
 
-  void upload(const KernelSolid& solid) {
-    const BrickPool& pool = solid.pool;
-    const std::size_t perBlock = std::size_t{1} << shift;
-    const std::size_t blocks = (pool.value.size() + perBlock - 1) / perBlock;
+  /// @param size    of a value, bytes
+  /// @param format  of it
+  void uploadValues(Tables& t, const void* values, std::size_t bytes, std::size_t size,
+                    GLenum format) {
+    const std::size_t perBlock = size << shift;
+    const std::size_t blocks = (bytes + perBlock - 1) / perBlock;
     if (blocks + kFirstValues > static_cast<std::size_t>(context.tableCount())) {
       throw levelset::ResourceLimit(
           fmt::format("render: {} MB of values need {} buffer textures, and {} leaves {}; use "
                       "larger voxels, or "
                       "draw with --renderer cpu",
-                      pool.value.size() * 4 >> 20, blocks, context.description(),
+                      bytes >> 20, blocks, context.description(),
                       context.tableCount() - static_cast<int>(kFirstValues)));
     }
+    for (std::size_t first = 0; first < bytes; first += perBlock)
+      t.values.push_back(texelsOf(static_cast<const std::uint8_t*>(values) + first,
+                                  std::min(perBlock, bytes - first), format));
+  }
+
+  void upload(const KernelSolid& solid) {
+    const BrickPool& pool = solid.pool;
     Tables& t = tables[&solid];
     const auto whole = [&](const auto& data) {
       return texelsOf(data.data(), data.size() * sizeof data[0], GL_R32I);
@@ -265,25 +304,47 @@ struct GpuTracer::Impl {
     t.pages = whole(pool.page);
     t.entries = whole(pool.entry);
     t.masks = whole(pool.mask);
-    for (std::size_t first = 0; first < pool.value.size(); first += perBlock)
-      t.values.push_back(texelsOf(pool.value.data() + first,
-                                  4 * std::min(perBlock, pool.value.size() - first), GL_R32F));
+    const std::size_t bytes = pool.valueBytes();
+    if (pool.held.bits == 32)
+      uploadValues(t, pool.value.data(), bytes, 4, GL_R32F);
+    else if (pool.held.bits == 16)
+      uploadValues(t, pool.code.data(), bytes, 2, GL_R16UI);
+    else
+      uploadValues(t, pool.code.data(), bytes, 1, GL_R8UI);
+  }
+
+  void upload(const KernelSolid& solid, const levelset::NarrowBand& band) {
+    Tables& t = tables[&solid];
+    NanoGrid nano = makeNanoGrid(band);
+    uploadValues(t, nano.words.data(), nano.words.size() * sizeof nano.words[0], 4, GL_R32I);
+    nano.words = {};
+    t.nano = std::move(nano);
   }
 
   GLuint programFor(const KernelSolid& solid, bool isPixels) {
-    const int blocks = static_cast<int>(tables.at(&solid).values.size());
-    auto& programs = isPixels ? pixelPrograms : rayPrograms;
-    const bool isSpline = solid.pool.filter != Filter::Trilinear;
-    const auto known = programs.find({blocks, isSpline});
-    if (known != programs.end()) return known->second;
-    const char* rays_ = isPixels ? kPixelRays : kListedRays;
-    return programs[{blocks, isSpline}] =
-               compileCompute(context, shaderText(rays_, isSpline, blocks, shift));
+    const Tables& t = tables.at(&solid);
+    const Variant variant{.isPixels = isPixels,
+                          .isSpline = solid.pool.filter != Filter::Trilinear,
+                          .isNano = t.nano.has_value(),
+                          .valueBits = t.nano ? 32 : solid.pool.held.bits,
+                          .blocks = static_cast<int>(t.values.size())};
+    GLuint& program = programs[variant];
+    if (program == 0) program = compileCompute(context, shaderText(variant, shift));
+    return program;
   }
 
   void setNumbers(GLuint program, const KernelSolid& solid) {
     const auto place = [&](const char* name) { return gl.GetUniformLocation(program, name); };
     const BrickPool& pool = solid.pool;
+    if (const std::optional<NanoGrid>& nano = tables.at(&solid).nano) {
+      gl.Uniform1i(place("nanoRoot"), nano->root);
+      gl.Uniform1i(place("nanoTiles"), nano->tiles);
+      gl.Uniform1i(place("nanoFar"), nano->far);
+      gl.Uniform1i(place("nanoOriginX"), pool.origin[0]);
+      gl.Uniform1i(place("nanoOriginY"), pool.origin[1]);
+      gl.Uniform1i(place("nanoOriginZ"), pool.origin[2]);
+    }
+    if (pool.held.bits != 32) gl.Uniform1fv(place("valueStep"), 1, &pool.held.step);
     gl.Uniform1i(place("pagesY"), pool.pages[1]);
     gl.Uniform1i(place("pagesZ"), pool.pages[2]);
     gl.Uniform1i(place("tableSizeX"), pool.pages[0] * BrickPool::kPage);
@@ -355,11 +416,17 @@ struct GpuTracer::Impl {
   }
 };
 
-GpuTracer::GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestTable) {
+GpuTracer::GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestTable,
+                     const Scene* grids) {
   const GlContext::Current current(context);
   impl_ = std::make_unique<Impl>(context, largestTable);
   try {
-    for (const KernelSolid& solid : scene.solids()) impl_->upload(solid);
+    for (const KernelSolid& solid : scene.solids()) {
+      if (grids)
+        impl_->upload(solid, grids->solids[solid.index].band);
+      else
+        impl_->upload(solid);
+    }
   } catch (...) {
     impl_->release();
     throw;

@@ -16,8 +16,14 @@ class GpuTracer : public KernelTracer {
  public:
   /// @param context       must outlive it
   /// @param largestTable  bytes of a buffer of texels at most; 0: what the driver says
+  /// @param grids         of which the scene was made: their NanoVDB grids are uploaded in the
+  /// place
+  ///                      of the tables, the reference that those are held against; none: the
+  ///                      tables
+  /// @pre with grids the filter is trilinear
   /// @throws levelset::ResourceLimit where the tables do not fit, or the shader does not compile
-  GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestTable = 0);
+  GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestTable = 0,
+            const Scene* grids = nullptr);
   ~GpuTracer() override;
 
   void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,

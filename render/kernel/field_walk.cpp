@@ -357,9 +357,9 @@ class FieldSearch {
 
 /// The part of a ray in a box.
 std::optional<Range> partWithin(const Imath::Box3d& box, const V3d& origin, const V3d& direction,
-                                double reach) {
+                                double near, double far) {
   if (box.isEmpty()) return std::nullopt;
-  Range part{0, reach};
+  Range part{near, far};
   for (int a = 0; a < 3; ++a) {
     if (direction[a] == 0) {
       if (origin[a] < box.min[a] || origin[a] > box.max[a]) return std::nullopt;
@@ -407,9 +407,9 @@ std::size_t FieldWalk::blockCount() const {
   return sum;
 }
 
-Hit FieldWalk::intersect(const V3d& origin, const V3d& direction) const {
+Hit FieldWalk::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
   Hit hit;
-  const std::optional<Range> part = partWithin(box_, origin, direction, kNever);
+  const std::optional<Range> part = partWithin(box_, origin, direction, near, far);
   if (!part) return hit;
   const FieldSearch found(expression_, grids_, origin + direction * part->low, direction,
                           part->high - part->low, false);
@@ -423,14 +423,15 @@ Hit FieldWalk::intersect(const V3d& origin, const V3d& direction) const {
 }
 
 bool FieldWalk::isOccluded(const V3d& origin, const V3d& direction, double reach) const {
-  const std::optional<Range> part = partWithin(box_, origin, direction, reach);
+  const std::optional<Range> part = partWithin(box_, origin, direction, 0, reach);
   return part && !FieldSearch(expression_, grids_, origin + direction * part->low, direction,
                               part->high - part->low, false)
                       .crossings.empty();
 }
 
-double FieldWalk::thickness(const V3d& origin, const V3d& direction) const {
-  const std::optional<Range> part = partWithin(box_, origin, direction, kNever);
+double FieldWalk::thickness(const V3d& origin, const V3d& direction, double near,
+                            double far) const {
+  const std::optional<Range> part = partWithin(box_, origin, direction, near, far);
   if (!part) return 0;
   const double end = part->high - part->low;
   const FieldSearch found(expression_, grids_, origin + direction * part->low, direction, end,

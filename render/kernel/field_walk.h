@@ -27,12 +27,14 @@ class FieldWalk {
 
   [[nodiscard]] std::size_t bytes() const;
   [[nodiscard]] std::size_t blockCount() const;
-  /// First hit from the origin on. A ray that starts inside hits where it leaves.
-  [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction) const;
+  /// First hit in [near, far]. A ray that is inside at `near` hits where it leaves.
+  [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near,
+                              double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction,
                                 double reach) const;
-  /// How far the ray is inside, world units.
-  [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction) const;
+  /// How far the ray is inside in [near, far], world units.
+  [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction, double near,
+                                 double far) const;
 
  private:
   FieldExpression expression_;

@@ -33,11 +33,23 @@ class KernelPainter {
   /// Neighbours next to each other: squares of four.
   [[nodiscard]] static std::vector<Pixel> pixelsOf(const PixelBox& box);
   [[nodiscard]] std::size_t numberOf(const Pixel& pixel) const;
-  /// What the ray of number i meets first, if anything.
-  [[nodiscard]] Hit hitOf(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
+  /// What the ray of number i meets first, if anything. @param meshNear  from there on of meshes
+  [[nodiscard]] Hit hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
+                          std::size_t i) const;
   [[nodiscard]] Hit hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
   void paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
   void paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
+  /// The ray of a pixel's sample.
+  struct Sight {
+    Camera::Ray ray;
+    double meshNear;  ///< behind the meshes that it met
+    double left = 1;  ///< transmittance of what it met; 0: it leaves the scene
+  };
+  /// Adds up what rays meet that see anything yet.
+  /// @return numbers of those that go on through a solid
+  std::vector<std::size_t> addSeen(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
+                                   int sample, const PixelHits& hits, std::vector<Sight>& sights,
+                                   std::vector<ColourSum>& sums) const;
 
   const Scene& scene_;
   const KernelScene& surfaces_;

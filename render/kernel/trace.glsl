@@ -2,25 +2,17 @@
 // roots.glsl.
 
 // What a ray does between two points of a cell, given from 0 to 1 on each axis.
-// @param brick, corner   the cell's values
+// @param brick, cellX …  the cell, as spotAt() found it
 // @param entered, left   axes of the faces, or kNone
 // @param carried, inside is the side known on which the cell before ended, and is it the inside
 // @param passing         how many crossings to pass over, less those that the cell holds
-Crossing crossingIn(Bool asked, Whole brick, Whole corner, Real x0, Real y0, Real z0, Real x1,
-                    Real y1, Real z1, Whole entered, Whole left, Bool aheadX, Bool aheadY,
-                    Bool aheadZ, Bool carried, Bool inside, INOUT(Whole) passing) {
-  Whole first = select(asked, brick * kBrickValues + corner, whole(0));
-  Real f0 = loadValue(first);
-  Real f1 = loadValue(first + 1);
-  Real f2 = loadValue(first + kBrickEdge);
-  Real f3 = loadValue(first + (kBrickEdge + 1));
-  Real f4 = loadValue(first + kBrickEdge * kBrickEdge);
-  Real f5 = loadValue(first + (kBrickEdge * kBrickEdge + 1));
-  Real f6 = loadValue(first + (kBrickEdge * kBrickEdge + kBrickEdge));
-  Real f7 = loadValue(first + (kBrickEdge * kBrickEdge + kBrickEdge + 1));
-  Whole signs = bit(f0 < 0.0f, 1) | bit(f1 < 0.0f, 2) | bit(f2 < 0.0f, 4) | bit(f3 < 0.0f, 8) |
-                bit(f4 < 0.0f, 16) | bit(f5 < 0.0f, 32) | bit(f6 < 0.0f, 64) |
-                bit(f7 < 0.0f, 128);
+Crossing crossingIn(Bool asked, Whole brick, Whole cellX, Whole cellY, Whole cellZ, Real x0, Real y0,
+                    Real z0, Real x1, Real y1, Real z1, Whole entered, Whole left, Bool aheadX,
+                    Bool aheadY, Bool aheadZ, Bool carried, Bool inside, INOUT(Whole) passing) {
+  CellValues f = cellValues(asked, brick, cellX, cellY, cellZ);
+  Whole signs = bit(f.f0 < 0.0f, 1) | bit(f.f1 < 0.0f, 2) | bit(f.f2 < 0.0f, 4) | bit(f.f3 < 0.0f, 8) |
+                bit(f.f4 < 0.0f, 16) | bit(f.f5 < 0.0f, 32) | bit(f.f6 < 0.0f, 64) |
+                bit(f.f7 < 0.0f, 128);
 
   // The trilinear interpolant along the way is a cubic; its coefficients are the blossom's values.
   VAR rx0 = 1.0f - x0;
@@ -29,14 +21,14 @@ Crossing crossingIn(Bool asked, Whole brick, Whole corner, Real x0, Real y0, Rea
   VAR rx1 = 1.0f - x1;
   VAR ry1 = 1.0f - y1;
   VAR rz1 = 1.0f - z1;
-  VAR g00 = between(f0, f4, x0, rx0);
-  VAR g01 = between(f1, f5, x0, rx0);
-  VAR g02 = between(f2, f6, x0, rx0);
-  VAR g03 = between(f3, f7, x0, rx0);
-  VAR g10 = between(f0, f4, x1, rx1);
-  VAR g11 = between(f1, f5, x1, rx1);
-  VAR g12 = between(f2, f6, x1, rx1);
-  VAR g13 = between(f3, f7, x1, rx1);
+  VAR g00 = between(f.f0, f.f4, x0, rx0);
+  VAR g01 = between(f.f1, f.f5, x0, rx0);
+  VAR g02 = between(f.f2, f.f6, x0, rx0);
+  VAR g03 = between(f.f3, f.f7, x0, rx0);
+  VAR g10 = between(f.f0, f.f4, x1, rx1);
+  VAR g11 = between(f.f1, f.f5, x1, rx1);
+  VAR g12 = between(f.f2, f.f6, x1, rx1);
+  VAR g13 = between(f.f3, f.f7, x1, rx1);
   VAR h000 = between(g00, g02, y0, ry0);
   VAR h001 = between(g01, g03, y0, ry0);
   VAR h010 = between(g00, g02, y1, ry1);
@@ -162,21 +154,12 @@ Hit trace(Ray ray, Whole passing) {
     // Walk to the next cell with a crossing.
     Bool walking = alive;
     Whole brick = whole(0);
-    Whole corner = whole(0);
     Whole axis = whole(kNone);
     VAR tExit = t;
     while (many(walking, alive)) {
-      Whole page = select(walking, ((x >> kPageShift) * pagesY + (y >> kPageShift)) * pagesZ + (z >> kPageShift), whole(0));
-      Whole entry = loadPage(page);
-      Bool full = AND(walking, entry >= 0);
-      Whole slot = select(full, entry + (((x >> 3) & 7) << 6 | ((y >> 3) & 7) << 3 | ((z >> 3) & 7)), whole(0));
-      Whole held = loadEntry(slot);
-      entry = select(full, held, entry);
-      Bool isBrick = AND(full, entry >= 0);
-      Whole cell = (x & 7) << 6 | (y & 7) << 3 | (z & 7);
-      Whole word = loadMask(select(isBrick, (entry << 4) + (cell >> 5), whole(0)));
-      Bool stop = AND(AND(isBrick, ((word >> (cell & 31)) & 1) != 0), NOT(solved));
-      Whole size = select(isBrick, whole(1), whole(0) - entry);
+      Spot spot = spotAt(walking, x, y, z);
+      Bool stop = AND(spot.crosses, NOT(solved));
+      Whole size = spot.size;
       Whole lowX = x & (whole(0) - size);
       Whole lowY = y & (whole(0) - size);
       Whole lowZ = z & (whole(0) - size);
@@ -189,8 +172,7 @@ Hit trace(Ray ray, Whole passing) {
       Whole out_ = select(byX, whole(0), select(byY, whole(1), whole(2)));
       VAR leaves = larger(t, select(byX, tx, select(byY, ty, tz)));
       Bool stopping = AND(walking, stop);
-      brick = select(stopping, entry, brick);
-      corner = select(stopping, ((x & 7) * kBrickEdge + (y & 7)) * kBrickEdge + (z & 7), corner);
+      brick = select(stopping, spot.brick, brick);
       axis = select(stopping, out_, axis);
       tExit = select(stopping, leaves, tExit);
       Bool moving = AND(walking, NOT(stop));
@@ -239,7 +221,7 @@ Hit trace(Ray ray, Whole passing) {
       if (isSpline)
         crossing = splineCrossingIn(asked, x, y, z, x0, y0, z0, x1, y1, z1, carried, inside, passing);
       else
-        crossing = crossingIn(asked, brick, corner, x0, y0, z0, x1, y1, z1, entered, axis, aheadX,
+        crossing = crossingIn(asked, brick, x, y, z, x0, y0, z0, x1, y1, z1, entered, axis, aheadX,
                               aheadY, aheadZ, carried, inside, passing);
       VAR place = t + crossing.share * (tExit - t);
       Bool hits = AND(asked, AND(crossing.found, place <= ray.end));

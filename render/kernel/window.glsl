@@ -2,18 +2,11 @@
 
 // The six grid points on each axis from cell − 2 on, which lie in one block or in two.
 struct Window {
-  Whole base[8];              // of the blocks, by bits x, y, z: their first values
+  Whole base[8];     // of the blocks, by bits x, y, z: where their first values are
+  Whole strides[8];  // and how far apart others
   Bool farX[6], farY[6], farZ[6];
   Whole stepX[6], stepY[6], stepZ[6];  // within the block
 };
-
-Whole blockOf(Bool asked, Whole x, Whole y, Whole z) {
-  Whole page = loadPage(select(asked, ((x >> kPageShift) * pagesY + (y >> kPageShift)) * pagesZ + (z >> kPageShift), whole(0)));
-  Bool full = AND(asked, page >= 0);
-  Whole slot = select(full, page + kBlockOfEntry + (((x >> 3) & 7) << 6 | ((y >> 3) & 7) << 3 | ((z >> 3) & 7)), whole(0));
-  Whole block = loadEntry(slot);
-  return select(full, block * kBrickValues, whole(0));
-}
 
 Window windowAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ) {
   Window w;
@@ -24,18 +17,20 @@ Window windowAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ) {
     w.farX[i] = (x & 7) + i > 7;
     w.farY[i] = (y & 7) + i > 7;
     w.farZ[i] = (z & 7) + i > 7;
-    w.stepX[i] = ((x + i) & 7) * (kBrickEdge * kBrickEdge);
-    w.stepY[i] = ((y + i) & 7) * kBrickEdge;
+    w.stepX[i] = (x + i) & 7;
+    w.stepY[i] = (y + i) & 7;
     w.stepZ[i] = (z + i) & 7;
   }
   for (int i = 0; i < 8; ++i)
-    w.base[i] = blockOf(asked, x + 5 * (i >> 2), y + 5 * ((i >> 1) & 1), z + 5 * (i & 1));
+    w.base[i] = blockOf(asked, x + 5 * (i >> 2), y + 5 * ((i >> 1) & 1), z + 5 * (i & 1), w.strides[i]);
   return w;
 }
 
 // Numbers of the values at (i, j, 0) and on, as long as they are in the near blocks or in the far.
 Whole firstAt(IN(Window) w, int i, int j, int far) {
-  Whole near_ = select(w.farX[i], w.base[4 + far], w.base[far]);
-  Whole beyond = select(w.farX[i], w.base[6 + far], w.base[2 + far]);
-  return select(w.farY[j], beyond, near_) + (w.stepX[i] + w.stepY[j]);
+  Whole base = select(w.farY[j], select(w.farX[i], w.base[6 + far], w.base[2 + far]),
+                      select(w.farX[i], w.base[4 + far], w.base[far]));
+  Whole strides = select(w.farY[j], select(w.farX[i], w.strides[6 + far], w.strides[2 + far]),
+                         select(w.farX[i], w.strides[4 + far], w.strides[far]));
+  return base + w.stepX[i] * (strides >> kStrideShift) + w.stepY[j] * (strides & ((1 << kStrideShift) - 1));
 }

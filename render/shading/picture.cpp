@@ -63,13 +63,25 @@ void PictureLayers::setCurvature(std::size_t i, const CurvatureSample& sample) c
   for (int k = 0; k < 4; ++k) curvature[k][i] = static_cast<float>(values[k]);
 }
 
-void PictureLayers::setColour(std::size_t i, const Imath::C3f& sum, int covered,
-                              int samples) const {
+void PictureLayers::setColour(std::size_t i, const ColourSum& sum, int samples) const {
   const float weight = 1.0f / static_cast<float>(samples);
-  r[i] = sum.x * weight;
-  g[i] = sum.y * weight;
-  b[i] = sum.z * weight;
-  a[i] = static_cast<float>(covered) * weight;
+  r[i] = sum.colour.x * weight;
+  g[i] = sum.colour.y * weight;
+  b[i] = sum.colour.z * weight;
+  a[i] = static_cast<float>(sum.coverage) * weight;
+}
+
+void requireOpacity(const Scene& scene) {
+  const auto require = [](const auto& parts) {
+    for (const auto& part : parts)
+      if (!(part.opacity > 0 && part.opacity <= 1))
+        throw levelset::UsageError(fmt::format(
+            "render: an opacity of {} cannot be drawn; give more than 0 and at most 1, or leave "
+            "the part out",
+            part.opacity));
+  };
+  require(scene.solids);
+  require(scene.meshes);
 }
 
 void requireLight(const Scene& scene) {
@@ -96,6 +108,7 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
         options.samples, options.ambientSamples, options.shadowSamples, kMaxSamples, kMaxSamples));
   }
   requireLight(scene);
+  requireOpacity(scene);
   const StyleOptions& style = options.style;
   if (!(style.curvatureRange >= 0 && std::isfinite(style.curvatureRange)) ||
       !(style.lineWidth >= 0 && style.lineWidth <= 1000)) {
@@ -106,15 +119,27 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   }
   if (style.style == Style::Matcap && !style.matcap)
     throw levelset::UsageError("render: the style matcap needs a picture of a ball; name a PNG");
+  if (options.fromNanoVdb && options.filter != Filter::Trilinear)
+    throw levelset::UsageError(
+        "render: NanoVDB grids are drawn by the trilinear filter only; take that, or bricks");
   requireFields(scene);
   if (scene.isBlended() && options.filter != Filter::Trilinear)
     throw levelset::UsageError(fmt::format(
         "render: soft expressions and morphs are of trilinear fields, and the filter is "
         "{}; leave it out",
         filterName(options.filter)));
+  if (scene.isBlended() && options.fromNanoVdb)
+    throw levelset::UsageError(
+        "render: soft expressions and morphs read tables of their own, and no NanoVDB grid; take "
+        "bricks");
   constexpr double kReach = 2.99;  // voxels
   for (const Solid& solid : scene.solids) {
     if (options.filter == Filter::Trilinear || solid.band.isEmpty()) continue;
+    if (options.filter == Filter::BSplineQi && solid.held.bits != 32)
+      throw levelset::UsageError(fmt::format(
+          "render: the filter bspline-qi draws from coefficients that {} bits do not hold; take 32 "
+          "bits, or another filter",
+          solid.held.bits));
     if (solid.band.halfWidth() >= kReach) continue;
     throw levelset::InvalidInput(fmt::format(
         "render: the filter {} reads values up to 3 voxels from the surface, and the band has a "
@@ -134,19 +159,21 @@ void refuseEmptyScene() {
 std::map<std::string, std::string> sceneAttributes(const Scene& scene,
                                                    const RenderOptions& options) {
   const Filter filter = options.filter;
-  std::string grids, voxelSizes;
+  std::string grids, voxelSizes, bits;
   for (const Solid& solid : scene.solids) {
     if (solid.band.isEmpty()) continue;
     const char* comma = grids.empty() ? "" : ", ";
     grids += fmt::format("{}{} {:016x}", comma, levelset::vdb(solid.band).getName(),
                          solid.band.contentHash());
     voxelSizes += fmt::format("{}{}", comma, solid.band.voxelSize());
+    bits += fmt::format("{}{}", comma, solid.held.bits);
   }
   std::map<std::string, std::string> attributes = {
       {"ls:filter", filterName(filter)},
       {"ls:normal", filter == Filter::BSpline ? "bspline" : "bspline-qi"},
       {"ls:grid", grids},
-      {"ls:voxelSize", voxelSizes}};
+      {"ls:voxelSize", voxelSizes},
+      {"ls:valueBits", bits}};
   std::string meshes;
   for (const MeshPart& part : scene.meshes)
     meshes +=
@@ -163,6 +190,8 @@ void addViewAttributes(Image& image, const Scene& scene, double extent) {
   image.attributes[kExtentAttribute] = fmt::format("{:.9g}", extent);
   image.attributes["software"] = "Levelsmith " LEVELSMITH_VERSION;
   image.attributes["depthType"] = "distance along the view axis";
+  if (scene.camera.near > 0) image.attributes["ls:near"] = fmt::format("{}", scene.camera.near);
+  if (scene.camera.far) image.attributes["ls:far"] = fmt::format("{}", *scene.camera.far);
   const auto floats = [](const Imath::M44d& m) {
     std::vector<float> values;
     for (int i = 0; i < 4; ++i)

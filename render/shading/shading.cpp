@@ -71,13 +71,24 @@ V2d PixelSequence::at(int index) const {
   return {x - std::floor(x), y - std::floor(y)};
 }
 
+V3d keyDirection(const Scene& scene) {
+  const V3d forward = scene.camera.axis();
+  const V3d right = forward.cross(scene.camera.up).normalized(), up = right.cross(forward);
+  const V3d& d = scene.key.direction;
+  return (right * d.x + up * d.y - forward * d.z).normalized();
+}
+
+double skyReach(double diagonal) {
+  return kOcclusionReach * diagonal;
+}
+
 Shader::Shader(const Scene& scene, double diagonal, const RenderOptions& options)
     : scene_(scene), options_(options), diagonal_(diagonal) {
   const V3d forward = scene.camera.axis();
   right_ = forward.cross(scene.camera.up).normalized();
   up_ = right_.cross(forward);
   const V3d& d = scene.key.direction;
-  key_ = (right_ * d.x + up_ * d.y - forward * d.z).normalized();
+  key_ = keyDirection(scene);
   fill_ = (right_ * -d.x + up_ * (0.3 * d.y) - forward * d.z).normalized();
   const double asked = options.style.curvatureRange;
   curvatureRange_ = asked > 0 ? asked : kDefaultRange / diagonal;
@@ -101,7 +112,7 @@ void Shader::addSkyRays(const Frame& frame, int x, int y, int sample,
     // The smooth normal's hemisphere dips below the facet's plane: mirror what does.
     const double below = d.dot(frame.facet);
     if (below < 0) d = (d - frame.facet * (2 * below)).normalized();
-    rays.push_back({frame.start, d, kOcclusionReach * diagonal_, 1});
+    rays.push_back({frame.start, d, skyReach(diagonal_), 1});
   }
 }
 
@@ -131,7 +142,8 @@ LightRays Shader::addRays(const Hit& hit, const V3d& direction, int x, int y, in
 }
 
 C3f Shader::colour(const Hit& hit, const V3d& direction, const LightRays& range,
-                   const std::vector<LightRay>& rays, const std::vector<char>& blocked) const {
+                   const std::vector<LightRay>& rays,
+                   const std::vector<double>& transmittances) const {
   const Frame frame = frameOf(hit, direction);
   switch (options_.style.style) {
     case Style::Tone:
@@ -145,8 +157,7 @@ C3f Shader::colour(const Hit& hit, const V3d& direction, const LightRays& range,
   }
   const auto lightOf = [&](std::size_t first, std::size_t count) {
     double sum = 0;
-    for (std::size_t i = first; i < first + count; ++i)
-      if (!blocked[i]) sum += rays[i].light;
+    for (std::size_t i = first; i < first + count; ++i) sum += rays[i].light * transmittances[i];
     return sum;
   };
   const double open =

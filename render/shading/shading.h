@@ -26,6 +26,12 @@ class PixelSequence {
   Imath::V2d start_;
 };
 
+/// Unit vector towards the key light, in world space.
+[[nodiscard]] Imath::V3d keyDirection(const Scene& scene);
+/// How far rays go that tell how open a point is, world units.
+/// @param diagonal  of the box of the surfaces, world units
+[[nodiscard]] double skyReach(double diagonal);
+
 /// Is there anything between a point and a light?
 struct LightRay {
   Imath::V3d origin, direction;  ///< direction of unit length
@@ -51,10 +57,10 @@ class Shader {
   [[nodiscard]] LightRays addRays(const Hit& hit, const Imath::V3d& direction, int x, int y,
                                   int sample, std::vector<LightRay>& rays) const;
 
-  /// Linear colour of the hit, once it is known which of all `rays` are blocked.
+  /// Linear colour of the hit, once it is known how much of the light of all `rays` comes through.
   [[nodiscard]] Imath::C3f colour(const Hit& hit, const Imath::V3d& direction,
                                   const LightRays& range, const std::vector<LightRay>& rays,
-                                  const std::vector<char>& blocked) const;
+                                  const std::vector<double>& transmittances) const;
 
  private:
   struct Frame {

@@ -77,7 +77,7 @@ void benchmark(const Scene& scene) {
   tell("prepare_s_per_million_voxels", (cpuSeconds() - start) / voxels * 1e6);
   const double nano = static_cast<double>(nanovdb::openToNanoVDB(levelset::vdb(band)).size());
   const BrickPool& pool = surfaces.solids()[0].pool;
-  const std::size_t beside = pool.besideCount() * BrickPool::kValues * 4;
+  const std::size_t beside = (pool.value.size() - pool.brickCount() * BrickPool::kValues) * 4;
   tell("crossed_of_nanovdb", static_cast<double>(pool.bytes() - beside) / nano);
   tell("tables_of_nanovdb", static_cast<double>(surfaces.bytes()) / nano);
 

@@ -1,7 +1,10 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <string>
+#include <utility>
 
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/camera_options.h"
@@ -52,6 +55,21 @@ void validateDraw(const Invocation& in) {
     throw UsageError("render: a PNG has no layers, so --thickness is lost; name an .exr");
   if (in.given("line") && style != "tone" && style != "ink")
     throw UsageError(fmt::format("render: the style {} draws no lines; leave --line out", style));
+  if (in.text("tables") == "nanovdb") {
+    const std::string renderer = in.text("renderer");
+    if (renderer != "gpu" && renderer != "both")
+      throw UsageError(fmt::format(
+          "render: --renderer {} reads no NanoVDB grid; leave --tables out, or take gpu",
+          renderer));
+    if (in.text("filter") != "trilinear" || in.text("value-bits") != "32")
+      throw UsageError(
+          "render: a NanoVDB grid is drawn as it is, by the trilinear filter; leave --filter and "
+          "--value-bits out, or take --tables bricks");
+  }
+  if (in.text("value-bits") != "32" && in.text("filter") == "bspline-qi")
+    throw UsageError(
+        "render: the filter bspline-qi draws from coefficients, which --value-bits does not hold; "
+        "leave it out, or take another filter");
   if (in.given("curvature-range") && (style == "lit" || style == "tone" || style == "matcap"))
     throw UsageError(fmt::format(
         "render: the style {} shows no curvatures; leave --curvature-range out", style));
@@ -151,14 +169,35 @@ render::StyleOptions styleOf(const Invocation& in) {
   return options;
 }
 
+/// In as few bits as asked for; how far the surfaces moved goes into a note.
+void coarsen(Invocation& in, render::Scene& scene) {
+  const int bits = std::stoi(in.text("value-bits"));
+  if (bits == 32) return;
+  render::SurfaceShift most;
+  for (render::Solid& solid : scene.solids) {
+    if (solid.band.isEmpty()) continue;
+    render::CoarseBand coarse = render::coarsened(solid.band, bits);
+    solid.band = std::move(coarse.band);
+    solid.held = coarse.held;
+    most.largest = std::max(most.largest, coarse.shift.largest);
+    most.rms = std::max(most.rms, coarse.shift.rms);
+  }
+  in.notes.notes.push_back(
+      fmt::format("render: values of {} bits moved the surface by {:.2g} voxel at most, {:.2g} in "
+                  "the mean (rms)",
+                  bits, most.largest, most.rms));
+}
+
 Value draw(Invocation& in) {
-  const render::Scene scene = sceneOf(in);
+  render::Scene scene = sceneOf(in);
+  coarsen(in, scene);
   // The judge of fields is slow.
   const std::string renderer =
       scene.isBlended() && !in.given("renderer") ? "cpu" : in.text("renderer");
   const bool isBoth = renderer == "both";
   render::RenderOptions options{.samples = static_cast<int>(in.integer("samples")),
                                 .filter = filterOf(in),
+                                .fromNanoVdb = in.text("tables") == "nanovdb",
                                 .style = styleOf(in),
                                 .thickness = in.flag("thickness"),
                                 .maxBytes = in.maxMemory,
@@ -361,6 +400,19 @@ void addPictureOperators(std::vector<Operator>& all) {
                    "B-spline, which shrinks, or the one with corrected coefficients",
             .fallback = "trilinear",
             .choices = {"trilinear", "bspline", "bspline-qi"}},
+           {.name = "tables",
+            .type = ParamType::Choice,
+            .doc = "what the shader of gpu and both reads: bricks made for it, or the NanoVDB grid "
+                   "itself, which is slower and gives the same bits",
+            .fallback = "bricks",
+            .choices = {"bricks", "nanovdb"}},
+           {.name = "value-bits",
+            .type = ParamType::Choice,
+            .doc =
+                "what the ray caster holds a value in; 16 and 8 save memory, and the report says "
+                "how far they move the surface",
+            .fallback = "32",
+            .choices = {"32", "16", "8"}},
            {.name = "style",
             .type = ParamType::Choice,
             .doc = "of the colours; mean, gauss and principal are curvatures",

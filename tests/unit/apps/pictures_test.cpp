@@ -51,6 +51,30 @@ TEST_F(Pictures, AreTheSameBitsByGpuAndProcessorAndJudgedByEmbree) {
   EXPECT_EQ(levelsmith("compare-images g.exr b.exr").code, 0);
 }
 
+TEST_F(Pictures, OfTheNanoVdbGridHaveTheSameBits) {
+  draw("torus --radius 1 --tube 0.4", "n.exr --renderer both --tables nanovdb --samples 1");
+  draw("torus --radius 1 --tube 0.4", "c.exr --renderer cpu --samples 1");
+  EXPECT_EQ(levelsmith("compare-images n.exr c.exr --exact").code, 0);
+  const std::string chain = "sphere --radius 1 --voxel 0.05 ! render r.exr --tables nanovdb ";
+  EXPECT_EQ(levelsmith(chain + "--renderer cpu").code, 2);
+  EXPECT_EQ(levelsmith(chain + "--renderer gpu --filter bspline").code, 2);
+  EXPECT_EQ(levelsmith(chain + "--renderer gpu --value-bits 8").code, 2);
+}
+
+TEST_F(Pictures, OfValuesInFewBitsTellHowFarTheSurfaceMoved) {
+  const std::string chain = "sphere --radius 1 --voxel 0.05 ! render v.exr --size 64x48 ";
+  for (const char* bits : {"16", "8"}) {
+    const Outcome drawn = levelsmith("-v " + chain + "--renderer both --value-bits " + bits);
+    EXPECT_EQ(drawn.code, 0) << drawn.err;
+    EXPECT_NE(drawn.err.find(std::string("values of ") + bits + " bits moved the surface by "),
+              std::string::npos)
+        << drawn.err;
+  }
+  EXPECT_EQ(levelsmith(chain + "--value-bits 12").code, 2);
+  EXPECT_EQ(levelsmith(chain + "--value-bits 16 --filter bspline-qi").code, 2);
+  EXPECT_EQ(levelsmith(chain + "--value-bits 16 --filter bspline --renderer both").code, 0);
+}
+
 TEST_F(Pictures, WithoutOpenGlAreRefusedOrDrawnByTheProcessor) {
   const std::string chain = "sphere --radius 1 --voxel 0.1 ! render o.exr --size 32x32 --renderer ";
   setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json", 1);

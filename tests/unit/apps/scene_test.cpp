@@ -49,6 +49,24 @@ TEST_F(Scenes, AreTheSameAfterTheyWereSaved) {
   EXPECT_NE(levelsmith("compare-images a.exr d.exr").code, 0);
 }
 
+TEST_F(Scenes, AreSeenBetweenTwoPlanes) {
+  const Outcome made =
+      levelsmith(kTwo +
+                 "--csg 'b - s' --from 0,0,5 --to 0,0,0 --near 4.5 --far 5.5 --size 64x48 "
+                 "! write cut.json ! render a.exr --samples 1 --renderer both");
+  ASSERT_EQ(made.code, 0) << made.err;
+  const std::string json = shell("cat cut.json").out;
+  EXPECT_NE(json.find("\"near\": 4.5"), std::string::npos) << json;
+  EXPECT_EQ(levelsmith("read cut.json ! render b.exr --samples 1 --renderer cpu").code, 0);
+  EXPECT_EQ(levelsmith("compare-images a.exr b.exr --exact").code, 0);
+  EXPECT_EQ(levelsmith("read cut.json ! render c.exr --samples 1 --near 4 --renderer cpu").code, 0);
+  EXPECT_NE(levelsmith("compare-images a.exr c.exr").code, 0);
+  EXPECT_EQ(levelsmith("read cut.json ! render c.exr --near 6").code, 2);
+  EXPECT_EQ(levelsmith("read cut.json ! render c.exr --near -1").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--near 3 --far 2 ! info").code, 2);
+  EXPECT_EQ(readChanged("\"near\": 4.5", "\"near\": 6").code, 3);
+}
+
 TEST_F(Scenes, HoldMeshesToo) {
   const Outcome made =
       levelsmith(kTwo.substr(0, kTwo.find("! scene")) +
@@ -91,6 +109,16 @@ TEST_F(Scenes, AreBlended) {
   EXPECT_EQ(shaded.code, 2);
   EXPECT_NE(shaded.err.find("--renderer cpu"), std::string::npos) << shaded.err;
   EXPECT_EQ(levelsmith("read soft.json ! render d.exr --filter bspline").code, 2);
+  for (const char* how : {"--near 4 --far 8 --thickness", "--value-bits 16", "--value-bits 8"}) {
+    const Outcome both =
+        levelsmith(std::string("read soft.json ! render d.exr --renderer both --samples 1 ") + how);
+    EXPECT_EQ(both.code, 0) << how << both.err;
+    EXPECT_NE(levelsmith("compare-images a.exr d.exr --exact").code, 0) << how;
+  }
+  EXPECT_EQ(levelsmith("read soft.json ! render d.exr --renderer both --tables nanovdb").code, 2);
+  const Outcome clear = levelsmith(wide + "--csg 'b - s' --soft 5vx --opacities '1 0.5' ! info");
+  EXPECT_EQ(clear.code, 2);
+  EXPECT_NE(clear.err.find("leave their opacities out"), std::string::npos) << clear.err;
 
   const Outcome morphed =
       levelsmith(wide + "--morph 0.25 ! info --json ! write m.json ! render m.png --size 64x48");
@@ -112,6 +140,24 @@ TEST_F(Scenes, AreBlended) {
   make();
   EXPECT_EQ(readChanged("\"csg\"", "\"soft\": 9, \"csg\"").code, 3);
   EXPECT_EQ(readChanged("\"csg\"", "\"morph\": 0.5, \"csg\"").code, 3);
+  shell("cp soft.json cut.json");
+  EXPECT_EQ(readChanged("\"id\": 1", "\"opacity\": 0.5, \"id\": 1").code, 3);
+}
+
+TEST_F(Scenes, AreSeenThrough) {
+  const Outcome made = levelsmith(kTwo +
+                                  "--csg 'b - s' --opacities '1 0.25' --from 4,3,5 --to 0,0,0 "
+                                  "--size 64x48 ! write cut.json ! render a.exr --samples 2 "
+                                  "--renderer both");
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_NE(shell("cat cut.json").out.find("\"opacity\": 0.25"), std::string::npos);
+  EXPECT_EQ(levelsmith("read cut.json ! render b.exr --samples 2 --renderer cpu").code, 0);
+  EXPECT_EQ(levelsmith("compare-images a.exr b.exr --exact").code, 0);
+  EXPECT_EQ(readChanged("\"opacity\": 0.25", "\"opacity\": 0").code, 3);
+  EXPECT_EQ(readChanged("\"opacity\": 0.25", "\"opacity\": 1.5").code, 3);
+  EXPECT_EQ(levelsmith(kTwo + "--opacities '0.5' ! render a.png").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--opacities '0.5 0' ! render a.png").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--opacities '0.5 thin' ! render a.png").code, 2);
 }
 
 TEST_F(Scenes, TellWhatIsInThem) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <random>
@@ -18,6 +19,7 @@
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"
 #include "render/kernel/kernel_scene.h"
+#include "render/value_bits.h"
 #include "tests/support/bands.h"
 #include "tests/support/render_scenes.h"
 
@@ -366,6 +368,206 @@ TEST(FieldJudge, AgreesInThicknessAndShadows) {
       unlike += std::abs(lightAt(cpu, x, y) - lightAt(judge, x, y)) > 1e-3;
   EXPECT_LE(unlike, cpu.pixelCount() / 200);
   EXPECT_LT(lightAt(cpu, 48, 36), 0.5 * lightAt(cpu, 48, 22));
+}
+
+/// A ball of radius 20 about the origin, half way between two others, seen along −z from 100.
+Scene halfWayBall(double near, std::optional<double> far) {
+  Scene scene = morphed(exactBall(V3d(0), 19.5, 0.5, 10), exactBall(V3d(0), 20.5, 0.4, 12), 0.5);
+  scene.camera.from = V3d(0, 0, 100);
+  scene.camera.to = V3d(0);
+  scene.camera.orthoHeight = 50;
+  scene.camera.near = near;
+  scene.camera.far = far;
+  return scene;
+}
+
+TEST(FieldDepths, CutABallBetweenTheirPlanes) {
+  struct Depths {
+    double near;
+    std::optional<double> far;
+  };
+  RenderOptions options = kDataOnly;
+  options.thickness = true;
+  for (const auto& [near, far] :
+       {Depths{0, {}}, {90, {}}, {100, {}}, {0, 90}, {88, 112}, {97, 103}, {121, {}}, {0, 79}}) {
+    const Scene scene = halfWayBall(near, far);
+    for (const Image& image : {renderCpu(scene, options), renderEmbree(scene, options)})
+      for (std::size_t i = 0; i < image.pixelCount(); ++i) {
+        const double x = (static_cast<double>(i % 160) + 0.5 - 80) * 50 / 120,
+                     y = (static_cast<double>(i / 160) + 0.5 - 60) * 50 / 120, r2 = x * x + y * y;
+        if (std::abs(r2 - 400) < 20) continue;
+        const double half = r2 < 400 ? std::sqrt(400 - r2) : 0, in = 100 - half, out = 100 + half,
+                     end = far.value_or(1e9);
+        // On a plane either is right.
+        if (std::min(std::min(std::abs(in - near), std::abs(in - end)),
+                     std::min(std::abs(out - near), std::abs(out - end))) < 0.1)
+          continue;
+        const bool seesFront = half > 0 && in > near && in<end, seesBack = half> 0 && in < near &&
+                               out > near && out < end;
+        ASSERT_NEAR(image.channels.at("thickness")[i],
+                    std::max(0.0, std::min(out, end) - std::max(in, near)), 0.05)
+            << near << ' ' << r2;
+        const auto pixel = pixelOf(image, i);
+        ASSERT_EQ(pixel.has_value(), seesFront || seesBack) << near << ' ' << r2;
+        if (!pixel) continue;
+        ASSERT_NEAR(image.channels.at("Z")[i], seesFront ? in : out, 0.02);
+        // Outwards, and convex, as from without.
+        ASSERT_NEAR(pixel->normal.z, (seesFront ? half : -half) / 20, 1e-3);
+        ASSERT_NEAR(image.channels.at("curvature.mean")[i], 0.05, 1e-3);
+      }
+  }
+}
+
+TEST(FieldDepths, AreJudged) {
+  for (const bool isOrtho : {false, true}) {
+    Scene scene = blended(threeGrids(), "(a | b) - c", 3, 160, 120);
+    const double away = (scene.camera.to - scene.camera.from).length();
+    if (isOrtho) scene.camera.orthoHeight = 70;
+    for (const auto& [near, far] : {std::pair{0.9, 2.0}, {1.0, 1.2}, {0.0, 1.0}, {0.8, 0.95}}) {
+      scene.camera.near = near * away;
+      scene.camera.far = far * away;
+      expectJudged(scene, "depths");
+      RenderOptions options = kDataOnly;
+      options.thickness = true;
+      const Image ours = renderCpu(scene, options);
+      const ImageComparison found = compareImages(ours, renderEmbree(scene, options));
+      EXPECT_TRUE(found.agrees()) << found.reason();
+      for (const float z : ours.channels.at("Z")) {
+        if (!std::isfinite(z)) continue;
+        ASSERT_GE(z, scene.camera.near * (1 - 1e-6));
+        ASSERT_LE(z, *scene.camera.far * (1 + 1e-6));
+      }
+    }
+  }
+}
+
+TEST(FieldDepths, LeaveShadowsAsTheyAre) {
+  // A roof before the near plane, between the ball and the light.
+  const NarrowBand ball = levelset::makeSphere(20, V3d(0), 1),
+                   roof = levelset::makeBox(V3d(80, 80, 4), V3d(0, 30, 50), 1);
+  for (const auto& draw : {renderCpu, renderEmbree}) {
+    double sums[2];
+    for (const bool hasRoof : {false, true}) {
+      Scene scene = blended({ball, roof}, hasRoof ? "a | b" : "a", 1, 160, 120);
+      scene.camera = halfWayBall(79, {}).camera;
+      const Image image = draw(scene, {.samples = 1, .ambientSamples = 0, .shadowSamples = 4});
+      double& sum = sums[hasRoof ? 1 : 0] = 0;
+      for (std::size_t i = 0; i < image.pixelCount(); ++i) {
+        EXPECT_NE(image.ids.at("id")[i], 2u);
+        sum += static_cast<double>(image.channels.at("R")[i]);
+      }
+    }
+    EXPECT_LT(sums[1], 0.8 * sums[0]);
+  }
+}
+
+std::shared_ptr<const levelset::TriMesh> sheet(double z) {
+  levelset::TriMesh mesh;
+  mesh.positions = {{-90, -90, z}, {90, -90, z}, {90, 90, z}, {-90, 90, z}};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return std::make_shared<const levelset::TriMesh>(mesh);
+}
+
+TEST(FieldScene, IsSeenThroughMeshesAndHidesThem) {
+  const std::size_t middle = 60 * 160 + 80;
+  const char* const colours[] = {"R", "G", "B", "A"};
+  const Scene ball = halfWayBall(0, {});
+  Scene meshAlone = ball;
+  meshAlone.solids.clear();
+  meshAlone.morph.reset();
+  meshAlone.meshes = {{sheet(30), {0.1f, 0.2f, 0.7f}, 3, "front"}};
+  const Image ofBall = renderCpu(ball, kDataOnly), ofMesh = renderCpu(meshAlone, kDataOnly);
+  // In front, within and behind.
+  Scene scene = ball;
+  for (const double z : {30.0, 0.0, -30.0}) {
+    scene.meshes = {{sheet(z), {0.1f, 0.2f, 0.7f}, 3, "sheet", 0.4}};
+    for (const Image& image : {renderCpu(scene, kDataOnly), renderEmbree(scene, kDataOnly)}) {
+      EXPECT_EQ(image.ids.at("id")[middle], z > 20 ? 3u : 1u);
+      for (const char* name : colours) {
+        const float share = z > 20 ? 0.4f : 0;
+        EXPECT_NEAR(image.channels.at(name)[middle],
+                    share * ofMesh.channels.at(name)[middle] +
+                        (1 - share) * ofBall.channels.at(name)[middle],
+                    1e-5);
+      }
+    }
+  }
+  // Cut off with the ball's front; within the ball; behind the wall that is seen from within.
+  scene.camera.near = 95;
+  scene.meshes = {{sheet(20), {}, 3, "cut", 0.4},
+                  {sheet(2), {0.1f, 0.2f, 0.7f}, 4, "within", 0.4},
+                  {sheet(-30), {}, 5, "behind", 0.4}};
+  RenderOptions lit = {.samples = 2, .ambientSamples = 3, .shadowSamples = 2};
+  for (const RenderOptions& options : {kDataOnly, lit}) {
+    const Image cpu = renderCpu(scene, options), judge = renderEmbree(scene, options);
+    EXPECT_EQ(cpu.ids.at("id")[middle], 4u);
+    EXPECT_NEAR(cpu.channels.at("A")[middle], 1, 1e-6);
+    for (const char* name : colours) {
+      std::size_t unlike = 0;
+      double ours = 0, theirs = 0;
+      for (std::size_t i = 0; i < cpu.pixelCount(); ++i) {
+        const float a = cpu.channels.at(name)[i], b = judge.channels.at(name)[i];
+        unlike += std::abs(a - b) > 1e-4f;
+        ours += static_cast<double>(a);
+        theirs += static_cast<double>(b);
+      }
+      EXPECT_NEAR(ours, theirs, 1e-3 * theirs) << name;
+      EXPECT_TRUE(options.shadowSamples > 0 || unlike <= cpu.pixelCount() / 1000)
+          << name << ": " << unlike;
+    }
+  }
+}
+
+TEST(FieldScene, IsLitThroughMeshes) {
+  // Light in its share through a sheet between it and the ball.
+  for (const auto& draw : {renderCpu, renderEmbree}) {
+    const auto brightness = [&](double opacity) {
+      Scene scene = halfWayBall(65, {});
+      if (opacity > 0) scene.meshes = {{sheet(40), {}, 3, "roof", opacity}};
+      const Image image = draw(scene, {.samples = 1, .ambientSamples = 0, .shadowSamples = 4});
+      double sum = 0;
+      for (const float r : image.channels.at("R")) sum += static_cast<double>(r);
+      return sum;
+    };
+    const double open = brightness(0), dark = brightness(1);
+    EXPECT_LT(dark, 0.95 * open);
+    EXPECT_NEAR(brightness(0.3), dark + (open - dark) * 0.7, 1e-4 * open);
+  }
+}
+
+TEST(FieldScene, HasNoOpacity) {
+  Scene scene = halfWayBall(0, {});
+  scene.solids[1].opacity = 0.5;
+  for (const auto& draw : {renderCpu, renderEmbree, renderGpu})
+    EXPECT_THROW((void)draw(scene, kDataOnly), levelset::UsageError);
+}
+
+TEST(FieldScene, IsDrawnOfCoarseValuesByBothRenderers) {
+  for (const int bits : {16, 8})
+    for (const bool isMorph : {false, true}) {
+      Scene scene = isMorph ? morphed(threeGrids()[0], threeGrids()[2], 0.4)
+                            : blended(threeGrids(), "(a | b) - c", 2.5, 160, 120);
+      const Image whole = renderCpu(scene, kDataOnly);
+      double step = 0;
+      for (Solid& solid : scene.solids) {
+        CoarseBand coarse = coarsened(solid.band, bits);
+        solid.band = std::move(coarse.band);
+        solid.held = coarse.held;
+        step = std::max(step, static_cast<double>(coarse.held.step));
+      }
+      expectJudged(scene, std::to_string(bits) + " bits");
+      const Image image = renderCpu(scene, kDataOnly);
+      EXPECT_EQ(image.attributes.at("ls:valueBits").substr(0, 2), bits == 16 ? "16" : "8,");
+      std::size_t moved = 0, both = 0;
+      for (std::size_t i = 0; i < image.pixelCount(); ++i) {
+        const auto a = pixelOf(image, i), b = pixelOf(whole, i);
+        if (!a || !b) continue;
+        ++both;
+        moved += std::abs((a->place - b->place).dot(b->normal)) > step;
+      }
+      EXPECT_GT(both, 1000u);
+      EXPECT_LE(moved, both / 100);
+    }
 }
 
 TEST(FieldScene, HasTheNormalsOfTheFinerGridWhereItIs) {

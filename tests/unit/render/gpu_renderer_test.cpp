@@ -63,6 +63,34 @@ TEST(GpuRenderer, HasTheBitsOfTheProcessorForSeveralSolids) {
   expectSameBits(scene, "three solids");
 }
 
+/// What the NanoVDB grids themselves give, without bricks.
+void expectTheBitsOfNanoVdb(const Scene& scene, const std::string& what) {
+  RenderOptions options = {.samples = 1, .ambientSamples = 1, .shadowSamples = 1};
+  const Image bricks = renderCpu(scene, options);
+  options.fromNanoVdb = true;
+  const ImageComparison found = compareImages(renderGpu(scene, options), bricks, {.exact = true});
+  EXPECT_GT(found.bothHit, 100u) << what;
+  EXPECT_TRUE(found.agrees()) << what << ": " << found.reason();
+}
+
+TEST(GpuRenderer, HasTheBitsOfTheNanoVdbGrid) {
+  expectTheBitsOfNanoVdb(sceneOf(levelset::makeSphere(20, V3d(0.3, 0.2, 0.1), 1)), "ball");
+  expectTheBitsOfNanoVdb(sceneOf(rings()), "rings");
+  expectTheBitsOfNanoVdb(sceneOf(levelset::makeBox(V3d(30, 30, 0.7), V3d(0.1, 0.2, 0.3), 1)),
+                         "sheet");
+  // Across the corners of nodes of all sizes, and beyond 2^20 voxels.
+  expectTheBitsOfNanoVdb(sceneOf(levelset::makeSphere(20, V3d(4096, 0, -4096), 1)), "root tiles");
+  expectTheBitsOfNanoVdb(sceneOf(levelset::makeSphere(20, V3d(-2e6, 9e6, 128), 1)), "far index");
+  Scene scene = sceneOf(rings());
+  scene.camera.from = V3d(24, 0.1, 0.2);
+  scene.camera.to = V3d(20, 10, 1);
+  expectTheBitsOfNanoVdb(scene, "from within");
+  expectTheBitsOfNanoVdb(support::seenFromFar(rings()), "far away");
+  for (const V3d& from : {V3d(100, 0, 0), V3d(0, 0, -100)})
+    expectTheBitsOfNanoVdb(support::alongTheLattice(support::latticeBox(), from),
+                           "box on the lattice");
+}
+
 TEST(GpuTracer, SplitsValuesOverStorageBlocks) {
   const Scene scene = sceneOf(levelset::makeSphere(30, V3d(0.3, 0.2, 0.1), 1));
   const KernelScene surfaces(scene);
@@ -108,8 +136,9 @@ TEST(GpuTracer, RefusesGridsThatDoNotFit) {
   const Scene scene = sceneOf(levelset::makeSphere(30, V3d(0.3, 0.2, 0.1), 1));
   const KernelScene surfaces(scene);
   const GlContext context;
-  EXPECT_NE(refusalOf([&] { GpuTracer(context, surfaces, 1u << 14); }).find("buffer textures"),
-            std::string::npos);
+  // A NanoVDB grid has no other tables that could be too large.
+  const std::string refusal = refusalOf([&] { GpuTracer(context, surfaces, 1u << 14, &scene); });
+  EXPECT_NE(refusal.find("buffer textures"), std::string::npos) << refusal;
   // The table of blocks alone is larger than that.
   EXPECT_NE(refusalOf([&] { GpuTracer(context, surfaces, 1u << 10); }).find("cpu"),
             std::string::npos);
