@@ -191,6 +191,7 @@ void addSceneOperators(std::vector<Operator>& all) {
                          "1 is seen through, in R G B A, and casts a weaker shadow"}},
       .operands = {{Kind::Band, Kind::Mesh}},
       .takesMore = true,
+      .readsNames = true,
       .resultKind = [](const Invocation&) { return Kind::Scene; },
       .run = makeScene,
       .plan = planScene,
