@@ -103,6 +103,16 @@ cli::ProgressStyle progressStyle(const pipeline::Chain& chain) {
   return cli::ProgressStyle::Bar;
 }
 
+/// Where the action that ended the run was written; empty when none ran, or on a command line.
+std::string placeOfFailure(const pipeline::Chain& chain, const pipeline::RunReport& report) {
+  std::size_t failed = report.steps.size();
+  if (report.exitCode == static_cast<int>(ExitCode::Numeric)) {  // of the first, told at the end
+    for (std::size_t i = report.steps.size(); i > 0; --i)
+      if (!report.steps[i - 1].notes.failure.empty()) failed = i;
+  }
+  return failed == 0 ? "" : chain.actions.at(failed - 1).place;
+}
+
 int runChain(const pipeline::Chain& chain) {
   const auto& globals = chain.globals;
   const std::size_t maxMemory = globals.contains("max-memory")
@@ -162,13 +172,16 @@ int runChain(const pipeline::Chain& chain) {
   };
   try {
     arena.execute([&] { pipeline::run(chain, settings, report); });
-  } catch (const std::exception&) {
+  } catch (const std::exception& failure) {
     // What went wrong first is what the user must hear.
     try {
       finish();
     } catch (const levelset::Error& error) {
       tell(error.what());
     }
+    const std::string place = placeOfFailure(chain, report);
+    const auto* refusal = dynamic_cast<const levelset::Error*>(&failure);
+    if (refusal && !place.empty()) pipeline::refuseAt(place, *refusal);
     throw;
   }
   finish();

@@ -59,6 +59,7 @@ const Param& matchParam(const std::vector<Param>& params, const std::string& nam
 
 struct Reader {
   const std::vector<std::string>& tokens;
+  const Script* script = nullptr;  // that the tokens are from
   std::size_t next = 0;
 
   [[nodiscard]] bool atEnd() const { return next >= tokens.size(); }
@@ -293,26 +294,53 @@ namespace {
 
 Chain parse(Reader& reader, bool mayRun);
 
+/// What stands behind `run`.
+struct ScriptCall {
+  std::string file;
+  std::map<std::string, std::string> settings;
+};
+
+ScriptCall readCall(Reader& reader) {
+  ScriptCall call;
+  for (++reader.next; !reader.atEnd();) {
+    const std::string& token = reader.tokens[reader.next];
+    if (isOption(token)) {
+      std::map<std::string, std::string> option;
+      reader.readOption(runOperator().params, "run", option);
+      const std::string text = option.at("set");
+      const std::size_t equals = std::min(text.find('='), text.size());
+      if (equals == 0 || equals == text.size())
+        throw UsageError(fmt::format("run: --set: '{}' is not NAME=VALUE", text));
+      if (!call.settings.emplace(text.substr(0, equals), text.substr(equals + 1)).second)
+        throw UsageError(fmt::format("run: --set: '{}' is given twice", text.substr(0, equals)));
+    } else if (call.file.empty() && token != "!") {
+      call.file = token;
+      ++reader.next;
+    } else {
+      throw UsageError(
+          "run: takes one file, and nothing behind it but --set NAME=VALUE; write the further "
+          "actions into the file");
+    }
+  }
+  if (call.file.empty())
+    throw UsageError("run: takes one file: `levelsmith run FILE`, or - for standard input");
+  return call;
+}
+
 /// `run FILE`: the chain that the file holds. Global options of the command line come first.
 Chain parseScript(Reader& reader, const Chain& before) {
-  const std::vector<std::string>& tokens = reader.tokens;
-  if (reader.next + 2 != tokens.size()) {
-    throw UsageError(
-        "run: takes one file, and nothing behind it; write the further actions into "
-        "the file");
-  }
-  const std::string file = tokens[reader.next + 1];
-  const Script script = readScript(file);
-  Reader inner{script.words};
+  const ScriptCall call = readCall(reader);
+  const Script script = readScript(call.file, call.settings);
+  Reader inner{script.words, &script};
   try {
     Chain chain = parse(inner, false);
     for (const auto& [name, value] : before.globals) chain.globals[name] = value;
+    chain.isFromStandardInput = call.file == "-";
     return chain;
   } catch (const UsageError& error) {
     // The reader stands behind the action that failed.
-    const std::size_t word = std::min(inner.next, script.lines.size());
-    throw UsageError(
-        fmt::format("{} ({}, line {})", error.what(), file, script.lines[word > 0 ? word - 1 : 0]));
+    const std::size_t word = std::min(inner.next, script.words.size());
+    throw UsageError(fmt::format("{} ({})", error.what(), script.place(word > 0 ? word - 1 : 0)));
   }
 }
 
@@ -333,7 +361,9 @@ Chain parse(Reader& reader, bool mayRun) {
                       reader.next == 0 || chain.actions.empty() ? "before" : "between this and",
                       reader.next + 1));
     }
+    const std::size_t first = reader.next;
     chain.actions.push_back(readAction(reader));
+    if (reader.script) chain.actions.back().place = reader.script->place(first);
     kinds.visit(chain.actions.back());
     if (reader.atBang()) {
       ++reader.next;
@@ -355,9 +385,8 @@ Chain parseChain(const std::vector<std::string>& tokens) {
       report != chain.globals.end() && levelset::isStandardOutput(report->second);
   checkStandardStream(chain, &Operator::usesStandardOutput, "output",
                       reportsThere ? "--report" : "");
-  const bool scripted = tokens.size() >= 2 && tokens[tokens.size() - 2] == "run";
   checkStandardStream(chain, &Operator::usesStandardInput, "input",
-                      scripted && tokens.back() == "-" ? "'run'" : "");
+                      chain.isFromStandardInput ? "'run'" : "");
   return chain;
 }
 

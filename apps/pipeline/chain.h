@@ -15,11 +15,13 @@ struct Action {
   std::vector<std::string> operandNames;       ///< `@NAME`, without the @
   std::map<std::string, std::string> named;    ///< option to the name in its `@NAME`
   std::string resultName;                      ///< --as
+  std::string place;                           ///< where it stood, if in a script
 };
 
 struct Chain {
   std::map<std::string, std::string> globals;
   std::vector<Action> actions;
+  bool isFromStandardInput = false;  ///< the script was `-`
 };
 
 /// Splits `global options ACTION args ! ACTION …`, and checks all that can be told before anything

@@ -188,13 +188,20 @@ const Operator& runOperator() {
       .details =
           "No '!' between actions; # begins a comment; quotes and backslashes as in a "
           "shell. Lines of options before the first action are global options; those of the "
-          "command line win. Nothing stands behind the file.",
-      .example = "levelsmith --threads 2 run chain.txt",
+          "command line win. ${NAME} is a variable: a line `set NAME VALUE` gives its default, "
+          "--set another value; ${NAME:stem}, :name and :dir are parts of a file's name. Actions "
+          "between `repeat COUNT` (it counts ${i} from 0) or `for NAME in LIST` and `end` are "
+          "repeated; a LIST is words, 0..10, 0..1 step 0.25, or *.ply. No action stands behind "
+          "the file.",
+      .example = "levelsmith --threads 2 run holes.pipeline --set voxel=0.3",
       .params = {{.name = "file",
                   .type = ParamType::Path,
                   .doc = "what to run, or -",
                   .required = true,
-                  .position = 0}},
+                  .position = 0},
+                 {.name = "set",
+                  .type = ParamType::Text,
+                  .doc = "NAME=VALUE of a variable of the file; as often as one likes"}},
       .flow = Flow::PassesThrough};
   return op;
 }

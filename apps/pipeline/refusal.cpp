@@ -22,10 +22,11 @@ bool isWantOfThreads(const std::exception& error) {
   return std::string_view(error.what()).starts_with("pthread_create");
 }
 
-void refuseAs(const std::string& who, const levelset::Error& error) {
+namespace {
+
+[[noreturn]] void refuse(levelset::ExitCode code, const std::string& sentence) {
   using levelset::ExitCode;
-  const std::string sentence = sentenceOf(who, error.what());
-  switch (error.exitCode()) {
+  switch (code) {
     case ExitCode::Usage:
       throw levelset::UsageError(sentence);
     case ExitCode::Resource:
@@ -41,6 +42,16 @@ void refuseAs(const std::string& who, const levelset::Error& error) {
       break;
   }
   throw levelset::InvalidInput(sentence);
+}
+
+}  // namespace
+
+void refuseAs(const std::string& who, const levelset::Error& error) {
+  refuse(error.exitCode(), sentenceOf(who, error.what()));
+}
+
+void refuseAt(const std::string& place, const levelset::Error& error) {
+  refuse(error.exitCode(), std::string(error.what()) + " (" + place + ")");
 }
 
 }  // namespace pipeline

@@ -19,5 +19,7 @@ inline constexpr const char* kWantOfThreads =
 
 /// A refusal from deeper down, told as one of what the user wrote: an action, or an option.
 [[noreturn]] void refuseAs(const std::string& who, const levelset::Error& error);
+/// The same refusal, with the place in a script behind it.
+[[noreturn]] void refuseAt(const std::string& place, const levelset::Error& error);
 
 }  // namespace pipeline
