@@ -53,8 +53,10 @@ Camera::Ray Camera::ray(double x, double y) const {
   const HalfExtent half = halfExtentOf(*this);
   const V3d shift =
       axes.right * ((2 * x / width - 1) * half.x) + axes.up * ((1 - 2 * y / height) * half.y);
-  if (orthoHeight) return {from + shift, axes.forward};
-  return {from, (axes.forward + shift).normalized()};
+  const double end = farthest();
+  if (orthoHeight) return {from + shift, axes.forward, near, end};
+  const V3d along = axes.forward + shift;  // a step of 1 in depth
+  return {from, along.normalized(), near * along.length(), far ? end * along.length() : end};
 }
 
 Camera::PixelSteps Camera::pixelSteps() const {
@@ -127,6 +129,13 @@ void validate(const Camera& camera) {
   } else if (!(camera.verticalFov > 0 && camera.verticalFov < std::numbers::pi)) {
     throw UsageError(fmt::format("camera: the field of view of {} degrees is not between 0 and 180",
                                  camera.verticalFov * 180 / std::numbers::pi));
+  }
+  if (!(camera.near >= 0) || !(camera.farthest() > camera.near) ||
+      !std::isfinite(camera.farthest())) {
+    throw UsageError(
+        fmt::format("camera: there is no depth from {} to {} to be seen; take a "
+                    "near plane at 0 or more, and a far one beyond it",
+                    camera.near, camera.farthest()));
   }
 }
 

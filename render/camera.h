@@ -10,16 +10,23 @@ namespace render {
 
 /// Looks from a point to a point; perspective with a vertical field of view, or orthographic.
 struct Camera {
+  static constexpr double kNoDepth = 1e300;  ///< farther than anything
   Imath::V3d from{0, 0, 5}, to{0, 0, 0}, up{0, 1, 0};
   double verticalFov = 0.6108652381980153;  ///< radians, (0, π)
   std::optional<double> orthoHeight = {};   ///< world units; set: orthographic
-  int width = 1024, height = 1024;          ///< pixels
+  /// World units along the view axis: what is nearer or farther is not seen, but lighted through.
+  /// 0 or more, and unset, which is no end, or beyond `near`.
+  double near = 0;
+  std::optional<double> far = {};
+  int width = 1024, height = 1024;  ///< pixels
 
   struct Ray {
-    Imath::V3d origin, direction;  ///< direction of unit length
+    Imath::V3d origin, direction;     ///< direction of unit length
+    double near = 0, far = kNoDepth;  ///< what of it sees, along the direction
   };
   /// Through image position (x, y) in pixels, (0, 0) the upper left corner, +y down.
   [[nodiscard]] Ray ray(double x, double y) const;
+  [[nodiscard]] double farthest() const { return far.value_or(kNoDepth); }
   /// Unit view axis, towards `to`.
   [[nodiscard]] Imath::V3d axis() const;
   /// What a pixel to the right and one down are on the plane at unit depth (perspective), or in
@@ -39,7 +46,8 @@ struct Camera {
 inline constexpr double kMaxPixels = 268435456;  // 2^28
 
 /// @throws levelset::UsageError when a number is not finite, from equals to, up is parallel to the
-///         view, the field of view or the height is out of range, or a size is not positive
+///         view, the field of view, the height or the depths are out of range, or a size is not
+///         positive
 /// @throws levelset::ResourceLimit for more than kMaxPixels
 void validate(const Camera& camera);
 

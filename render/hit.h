@@ -23,10 +23,14 @@ struct Hit {
   double viewCurvature = 0;     ///< of the normal section along the ray, per world unit
   double surfaceError = 0;      ///< bound on the interpolant's distance from a smooth surface
   Imath::C3f colour{0};         ///< of the surface, linear
+  double opacity = 1;           ///< of the surface, (0, 1]
   std::uint32_t id = 0;         ///< Solid::id or MeshPart::id
   std::size_t solid = 0;        ///< index in Scene::solids, or Scene::meshes
-  bool isTurned = false;        ///< is that solid's outside inside what is drawn? Normals and
-                                ///< curvatures tell of what is drawn
+  bool isOnMesh = false;
+  bool isTurned = false;  ///< is that solid's outside inside what is drawn? Normals and
+                          ///< curvatures tell of what is drawn
+  /// Where the ray goes on behind a mesh's surface, off the rounding of the hit.
+  [[nodiscard]] double beyond() const { return distance + 2 * surfaceError; }
 };
 
 }  // namespace render

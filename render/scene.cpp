@@ -1,6 +1,14 @@
 #include "render/scene.h"
 
+#include <algorithm>
+
 namespace render {
+
+bool Scene::isOpaque() const {
+  const auto hidesAll = [](const auto& part) { return part.opacity == 1; };
+  return std::all_of(solids.begin(), solids.end(), hidesAll) &&
+         std::all_of(meshes.begin(), meshes.end(), hidesAll);
+}
 
 Imath::Box3d Scene::bounds() const {
   std::vector<Imath::Box3d> boxes;

@@ -28,6 +28,7 @@ struct Solid {
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
   std::string name = {};  ///< for the expression
+  double opacity = 1;     ///< of each of its surfaces that a ray meets, (0, 1]
   ValueBits held = {};    ///< of the kernel's tables; the band has these values (coarsened())
 };
 
@@ -38,7 +39,11 @@ struct MeshPart {
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
   std::string name = {};
+  double opacity = 1;  ///< as of a Solid
 };
+
+/// What lets less light through than this is as good as opaque.
+inline constexpr double kLeastTransmittance = 1.0 / 512;
 
 struct Scene {
   Camera camera;
@@ -47,6 +52,8 @@ struct Scene {
   std::vector<Solid> solids;
   std::vector<MeshPart> meshes = {};
   CsgExpression csg = {};  ///< what is drawn of the solids; empty: each of them
+  /// Is nothing seen through?
+  [[nodiscard]] bool isOpaque() const;
   /// A box that holds what is drawn; empty where nothing can be.
   [[nodiscard]] Imath::Box3d bounds() const;
 };

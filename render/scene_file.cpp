@@ -47,6 +47,8 @@ Json toJson(const Camera& camera) {
     json["ortho"] = *camera.orthoHeight;
   else
     json["fov"] = camera.verticalFov / kDegree;
+  if (camera.near > 0) json["near"] = camera.near;
+  if (camera.far) json["far"] = *camera.far;
   json["size"] = {camera.width, camera.height};
   return json;
 }
@@ -138,13 +140,15 @@ class Reader {
 
   [[nodiscard]] Camera camera(const Json& json) const {
     const std::string where = "the camera";
-    requireKnown(json, {"from", "to", "up", "fov", "ortho", "size"}, where);
+    requireKnown(json, {"from", "to", "up", "fov", "ortho", "near", "far", "size"}, where);
     Camera camera;
     camera.from = point(json, "from", where);
     camera.to = point(json, "to", where);
     if (json.contains("up")) camera.up = point(json, "up", where);
     if (json.contains("fov")) camera.verticalFov = number(json, "fov", where) * kDegree;
     if (json.contains("ortho")) camera.orthoHeight = number(json, "ortho", where);
+    if (json.contains("near")) camera.near = number(json, "near", where);
+    if (json.contains("far")) camera.far = number(json, "far", where);
     if (json.contains("size")) {
       const std::vector<double> size = numbers(json, "size", 2, where);
       for (const double pixels : size)
@@ -185,6 +189,9 @@ class Reader {
           refuse(where, "has a \"colour\" that is not from 0 to 1");
       solid.colour = Imath::C3f(colour);
     }
+    if (json.contains("opacity")) solid.opacity = number(json, "opacity", where);
+    if (!(solid.opacity > 0 && solid.opacity <= 1))
+      refuse(where, "has an \"opacity\" that is not above 0 and up to 1");
   }
 
   /// Beside the scene's own file, unless it is told in full.
@@ -263,7 +270,8 @@ class Parts {
 void readSolid(const Reader& reader, const Json& json, const std::filesystem::path& file,
                const ReadSceneOptions& options, const levelset::Progress& progress, Scene& scene) {
   const std::string where = fmt::format("solid {}", scene.solids.size() + 1);
-  reader.requireKnown(json, {"name", "file", "grid", "transform", "colour", "id"}, where);
+  reader.requireKnown(json, {"name", "file", "grid", "transform", "colour", "opacity", "id"},
+                      where);
   Solid solid;
   reader.readPart(json, scene.solids.size() + 1, where, solid);
   const std::filesystem::path source = reader.partFile(json, file, where);
@@ -286,7 +294,7 @@ void readMeshPart(const Reader& reader, const Json& json, const std::filesystem:
                   const ReadSceneOptions& options, const levelset::Progress& progress,
                   Scene& scene) {
   const std::string where = fmt::format("mesh {}", scene.meshes.size() + 1);
-  reader.requireKnown(json, {"name", "file", "transform", "colour", "id"}, where);
+  reader.requireKnown(json, {"name", "file", "transform", "colour", "opacity", "id"}, where);
   MeshPart part;
   reader.readPart(json, scene.solids.size() + scene.meshes.size() + 1, where, part);
   levelset::TriMesh mesh = levelset::readMesh(
@@ -324,6 +332,7 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
   const Scene& scene = viewed.scene;
   requireNames(scene);
   requireLight(scene);
+  requireOpacity(scene);
   for (const Solid& solid : scene.solids) requireColour(solid.colour);
   for (const MeshPart& part : scene.meshes) requireColour(part.colour);
   Json json;
@@ -338,10 +347,12 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
                    {"softness", scene.key.softness / kDegree}};
   json["ambient"] = scene.ambient;
   const auto entryOf = [&](const auto& part, const char* extension) -> Json {
-    return {{"name", part.name},
-            {"file", fileBeside(file, part.name, extension).filename().string()},
-            {"colour", colourJson(part.colour)},
-            {"id", part.id}};
+    Json entry = {{"name", part.name},
+                  {"file", fileBeside(file, part.name, extension).filename().string()},
+                  {"colour", colourJson(part.colour)},
+                  {"id", part.id}};
+    if (part.opacity < 1) entry["opacity"] = part.opacity;
+    return entry;
   };
   json["solids"] = Json::array();
   for (const Solid& solid : scene.solids) json["solids"].push_back(entryOf(solid, ".vdb"));

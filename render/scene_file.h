@@ -25,7 +25,9 @@ struct ViewedScene {
 
 /// Writes the solids and meshes beside it, as FILE-NAME.vdb and FILE-NAME.ply, then the scene. What
 /// has those names is replaced.
-/// @throws levelset::IoError; InvalidInput for colours that are none
+/// @throws levelset::IoError; InvalidInput for colours that are none; UsageError for an opacity
+/// that
+///         is none
 void writeScene(const std::filesystem::path& file, const ViewedScene& scene,
                 const levelset::Progress& progress = {});
 

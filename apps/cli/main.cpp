@@ -15,6 +15,7 @@
 #include "apps/cli/progress_line.h"
 #include "apps/cli/watch.h"
 #include "apps/pipeline/chain.h"
+#include "apps/pipeline/graph_file.h"
 #include "apps/pipeline/help.h"
 #include "apps/pipeline/refusal.h"
 #include "apps/pipeline/report.h"
@@ -76,45 +77,43 @@ int tellFailure(const std::exception_ptr& failure) {
   _exit(tellFailure(std::current_exception()));
 }
 
-bool claimsStandardOutput(const pipeline::Chain& chain) {
-  const auto report = chain.globals.find("report");
-  if (report != chain.globals.end() && levelset::isStandardOutput(report->second)) return true;
-  for (const pipeline::Action& action : chain.actions) {
-    const auto& claims = action.op->usesStandardOutput;
-    if (claims && !action.options.contains("json") &&
-        claims(pipeline::Invocation(*action.op, action.options)))
+bool claimsStandardOutput(const pipeline::Graph& graph) {
+  const auto report = graph.globals.find("report");
+  if (report != graph.globals.end() && levelset::isStandardOutput(report->second)) return true;
+  for (const pipeline::Node& node : graph.nodes) {
+    const auto& claims = node.op->usesStandardOutput;
+    if (claims && !node.options.contains("json") &&
+        claims(pipeline::Invocation(*node.op, node.options)))
       return true;
   }
   return false;
 }
 
-bool claimsJson(const pipeline::Chain& chain) {
-  for (const pipeline::Action& action : chain.actions)
-    if (action.options.contains("json")) return true;
+bool claimsJson(const pipeline::Graph& graph) {
+  for (const pipeline::Node& node : graph.nodes)
+    if (node.options.contains("json")) return true;
   return false;
 }
 
-cli::ProgressStyle progressStyle(const pipeline::Chain& chain) {
-  const auto it = chain.globals.find("progress");
-  const std::string wanted = it == chain.globals.end() ? "auto" : it->second;
+cli::ProgressStyle progressStyle(const pipeline::Graph& graph) {
+  const auto it = graph.globals.find("progress");
+  const std::string wanted = it == graph.globals.end() ? "auto" : it->second;
   if (wanted == "json") return cli::ProgressStyle::Json;
-  if (wanted == "off" || chain.globals.contains("quiet") || !isatty(STDERR_FILENO))
+  if (wanted == "off" || graph.globals.contains("quiet") || !isatty(STDERR_FILENO))
     return cli::ProgressStyle::Off;
   return cli::ProgressStyle::Bar;
 }
 
 /// Where the action that ended the run was written; empty when none ran, or on a command line.
-std::string placeOfFailure(const pipeline::Chain& chain, const pipeline::RunReport& report) {
-  std::size_t failed = report.steps.size();
-  if (report.exitCode == static_cast<int>(ExitCode::Numeric)) {  // of the first, told at the end
-    for (std::size_t i = report.steps.size(); i > 0; --i)
-      if (!report.steps[i - 1].notes.failure.empty()) failed = i;
-  }
-  return failed == 0 ? "" : chain.actions.at(failed - 1).place;
+std::string placeOfFailure(const pipeline::RunReport& report) {
+  if (report.exitCode == static_cast<int>(ExitCode::Numeric))  // of the first, told at the end
+    for (const pipeline::StepReport& step : report.steps)
+      if (!step.notes.failure.empty()) return step.place;
+  return report.steps.empty() ? "" : report.steps.back().place;
 }
 
-int runChain(const pipeline::Chain& chain) {
-  const auto& globals = chain.globals;
+int runGraph(const pipeline::Graph& graph) {
+  const auto& globals = graph.globals;
   const std::size_t maxMemory = globals.contains("max-memory")
                                     ? pipeline::parseBytes(globals.at("max-memory"), "--max-memory")
                                     : cli::defaultMemoryLimit();
@@ -132,12 +131,13 @@ int runChain(const pipeline::Chain& chain) {
     arena.initialize(static_cast<int>(threads));  // more than there are cores, if asked
   }
   if (globals.contains("no-clobber")) levelset::setClobberDefault(false);
-  pipeline::checkReportTarget(chain);
+  pipeline::checkRunTargets(graph);
+  if (globals.contains("save-graph")) pipeline::writeGraph(globals.at("save-graph"), graph);
   const bool quiet = globals.contains("quiet"), verbose = globals.contains("verbose"),
              dryRun = globals.contains("dry-run");
-  const bool dataOnly = claimsStandardOutput(chain), json = claimsJson(chain);
+  const bool dataOnly = claimsStandardOutput(graph), json = claimsJson(graph);
 
-  cli::ProgressLine line(progressStyle(chain), chain.actions.size());
+  cli::ProgressLine line(progressStyle(graph), graph.nodes.size());
   pipeline::RunSettings settings;
   settings.dryRun = dryRun;
   settings.maxMemory = maxMemory;
@@ -171,7 +171,7 @@ int runChain(const pipeline::Chain& chain) {
     if (globals.contains("report")) pipeline::writeReport(globals.at("report"), report);
   };
   try {
-    arena.execute([&] { pipeline::run(chain, settings, report); });
+    arena.execute([&] { pipeline::run(graph, settings, report); });
   } catch (const std::exception& failure) {
     // What went wrong first is what the user must hear.
     try {
@@ -179,7 +179,7 @@ int runChain(const pipeline::Chain& chain) {
     } catch (const levelset::Error& error) {
       tell(error.what());
     }
-    const std::string place = placeOfFailure(chain, report);
+    const std::string place = placeOfFailure(report);
     const auto* refusal = dynamic_cast<const levelset::Error*>(&failure);
     if (refusal && !place.empty()) pipeline::refuseAt(place, *refusal);
     throw;
@@ -201,7 +201,7 @@ int levelsmith(const std::vector<std::string>& words) {
     printAll(pipeline::help({words.begin() + 1, words.end()}));
     return 0;
   }
-  return runChain(pipeline::parseChain(words));
+  return runGraph(pipeline::parseChain(words));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 
+#include "apps/pipeline/graph_file.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/script.h"
 #include "apps/pipeline/units.h"
@@ -60,6 +61,7 @@ const Param& matchParam(const std::vector<Param>& params, const std::string& nam
 struct Reader {
   const std::vector<std::string>& tokens;
   const Script* script = nullptr;  // that the tokens are from
+  bool isStandardInput = false;    // was a script read from there?
   std::size_t next = 0;
 
   [[nodiscard]] bool atEnd() const { return next >= tokens.size(); }
@@ -121,6 +123,15 @@ std::string operandName(const std::string& token, const std::string& who) {
   return token.substr(1);
 }
 
+/// An action as it was written.
+struct Action {
+  const Operator* op = nullptr;
+  std::map<std::string, std::string> options;  // by full name; a flag is "true"
+  std::vector<std::string> operandNames;       // `@NAME`, without the @
+  std::string resultName;                      // --as
+  std::string place;                           // in a script
+};
+
 Action readAction(Reader& reader) {
   Action action;
   action.op = &matchOperator(reader.tokens[reader.next++]);
@@ -162,9 +173,6 @@ Action readAction(Reader& reader) {
                                    param.name, valueForm(param)));
     }
   }
-  for (const auto& [name, text] : action.options)
-    if (const Param* param = op.find(name); param && namesValue(*param, text))
-      action.named.emplace(name, text.substr(1));
   if (const auto it = action.options.find("as"); it != action.options.end()) {
     action.resultName = it->second.starts_with('@') ? it->second.substr(1) : it->second;
     action.options.erase(it);
@@ -172,38 +180,35 @@ Action readAction(Reader& reader) {
   return action;
 }
 
-/// Follows the kinds of values through the chain, as the run will follow the values.
-class KindChecker {
+/// Follows values through the chain: they live on a stack, and by name for good.
+class ChainBuilder {
  public:
-  void visit(const Action& action) {
-    const Operator& op = *action.op;
-    const std::vector<Kind> operands = takeOperands(action);
-    for (std::size_t i = 0; i < operands.size(); ++i) {
-      const std::vector<Kind>& allowed = op.operands[std::min(i, op.operands.size() - 1)];
-      if (std::find(allowed.begin(), allowed.end(), operands[i]) == allowed.end())
-        throw UsageError(mismatch(op, i, operands[i], allowed));
+  explicit ChainBuilder(std::vector<Node>& nodes) : nodes_(nodes) {}
+
+  void add(const Action& action) {
+    Node node;
+    node.op = action.op;
+    node.options = action.options;
+    node.name = action.resultName;
+    node.place = action.place;
+    node.inputs = takeOperands(action);
+    for (const auto& [option, text] : action.options)
+      if (const Param* param = action.op->find(option); param && namesValue(*param, text))
+        node.named.emplace(option, nodeOf(text.substr(1), *action.op));
+    node.kind = checkNode(node, nodes_);
+    if (node.makes()) {
+      stack_.push_back(nodes_.size());
+      if (!node.name.empty() && !names_.emplace(node.name, nodes_.size()).second) {
+        throw UsageError(
+            fmt::format("{}: the name '{}' is taken; values do not change, so choose another",
+                        node.op->name, node.name));
+      }
     }
-    for (const auto& [option, name] : action.named) {
-      const Kind kind = kindOf(name, op);
-      const bool isScalar = op.find(option)->type == ParamType::Scalar;
-      if (kind == Kind::Field || (isScalar && kind == Kind::Band)) continue;
-      throw UsageError(fmt::format("{}: --{}: '@{}' is a {}, a {} is needed", op.name, option, name,
-                                   kindName(kind), isScalar ? "field or a level set" : "field"));
-    }
-    if (op.validate) op.validate(probe(action, operands));
-    if (op.flow == Flow::PassesThrough) return;
-    const Kind result = op.resultKind ? op.resultKind(probe(action, operands)) : Kind::Band;
-    stack_.push_back(result);
-    if (action.resultName.empty()) return;
-    if (!names_.emplace(action.resultName, result).second) {
-      throw UsageError(
-          fmt::format("{}: the name '{}' is taken; values do not change, so choose another",
-                      op.name, action.resultName));
-    }
+    nodes_.push_back(std::move(node));
   }
 
  private:
-  [[nodiscard]] Kind kindOf(const std::string& name, const Operator& op) const {
+  [[nodiscard]] std::size_t nodeOf(const std::string& name, const Operator& op) const {
     const auto it = names_.find(name);
     if (it != names_.end()) return it->second;
     std::vector<std::string> known;
@@ -214,77 +219,42 @@ class KindChecker {
                                                : fmt::format("; did you mean '@{}'?", guess)));
   }
 
-  std::vector<Kind> takeOperands(const Action& action) {
-    const Operator& op = *action.op;
-    std::vector<Kind> named;
-    for (const std::string& name : action.operandNames) named.push_back(kindOf(name, op));
-    if (named.size() > op.operands.size() && !op.takesMore) {
-      throw UsageError(fmt::format("{}: takes {} operand{}, not {}", op.name, op.operands.size(),
-                                   op.operands.size() == 1 ? "" : "s", named.size()));
-    }
-    if (named.size() >= op.operands.size()) return named;
-    const std::size_t missing = op.operands.size() - named.size();
-    if (stack_.size() < missing) {
-      if (op.operandsOptional) return named;
-      throw UsageError(
-          fmt::format("{}: needs {} operand{} and finds {}; read or make {} first, or name {} with "
-                      "'@'",
-                      op.name, op.operands.size(), op.operands.size() == 1 ? "" : "s",
-                      stack_.size() + named.size(), missing == 1 ? "one" : "them",
-                      missing == 1 ? "it" : "them"));
-    }
-    std::vector<Kind> operands(stack_.end() - static_cast<std::ptrdiff_t>(missing), stack_.end());
-    if (op.flow == Flow::Makes) stack_.resize(stack_.size() - missing);
+  /// Those that are named come last; what is missing before them comes off the stack, and stays
+  /// there where the action passes it through.
+  std::vector<std::size_t> takeOperands(const Action& action) {
+    std::vector<std::size_t> named;
+    for (const std::string& name : action.operandNames) named.push_back(nodeOf(name, *action.op));
+    const std::size_t wanted = action.op->operands.size();
+    if (named.size() >= wanted) return named;
+    const std::size_t missing = wanted - named.size();
+    if (stack_.size() < missing && action.op->operandsOptional) return named;
+    const std::size_t taken = std::min(missing, stack_.size());
+    std::vector<std::size_t> operands(stack_.end() - static_cast<std::ptrdiff_t>(taken),
+                                      stack_.end());
+    if (action.op->flow == Flow::Makes) stack_.resize(stack_.size() - taken);
     operands.insert(operands.end(), named.begin(), named.end());
     return operands;
   }
 
-  static std::string mismatch(const Operator& op, std::size_t index, Kind found,
-                              const std::vector<Kind>& allowed) {
-    const char* remedy = "";
-    if (found == Kind::Mesh && allowed == std::vector{Kind::Band})
-      remedy = "; put 'level-set' before it";
-    if (found == Kind::Band && allowed == std::vector{Kind::Mesh})
-      remedy = "; put 'mesh' before it";
-    if (found == Kind::Surface)
-      remedy = "; it has no inside, and is the base of patches and of 'texture --alone' only";
-    if (found == Kind::Patch) remedy = "; 'texture' makes a level set with it";
-    if (found == Kind::Scene) remedy = "; 'render' draws it, 'write' saves it as .json";
-    std::string kinds;
-    for (std::size_t i = 0; i < allowed.size(); ++i)
-      kinds += fmt::format("{}a {}",
-                           i == 0                    ? ""
-                           : i + 1 == allowed.size() ? " or "
-                                                     : ", ",
-                           kindName(allowed[i]));
-    return fmt::format("{}: operand {} is a {}, {} is needed{}", op.name, index + 1,
-                       kindName(found), kinds, remedy);
-  }
-
-  static Invocation probe(const Action& action, const std::vector<Kind>& kinds) {
-    Invocation invocation(*action.op, action.options);
-    for (Kind kind : kinds) invocation.operands.emplace_back(Plan{.kind = kind});
-    return invocation;
-  }
-
-  std::vector<Kind> stack_;
-  std::map<std::string, Kind> names_;
+  std::vector<Node>& nodes_;
+  std::vector<std::size_t> stack_;
+  std::map<std::string, std::size_t> names_;
 };
 
 using StreamUse = std::function<bool(const Invocation&)> Operator::*;
 
 /// Two actions that claim the same standard stream for data would garble each other.
-void checkStandardStream(const Chain& chain, StreamUse use, const char* stream,
+void checkStandardStream(const Graph& graph, StreamUse use, const char* stream,
                          std::string firstUser) {
-  for (const Action& action : chain.actions) {
-    const auto& claims = action.op->*use;
-    if (!claims || !claims(Invocation(*action.op, action.options))) continue;
+  for (const Node& node : graph.nodes) {
+    const auto& claims = node.op->*use;
+    if (!claims || !claims(Invocation(*node.op, node.options))) continue;
     if (!firstUser.empty()) {
       throw UsageError(
           fmt::format("{}: standard {} is used already, by {}; use a file for one of them",
-                      action.op->name, stream, firstUser));
+                      node.op->name, stream, firstUser));
     }
-    firstUser = "'" + action.op->name + "'";
+    firstUser = "'" + node.op->name + "'";
   }
 }
 
@@ -292,7 +262,7 @@ void checkStandardStream(const Chain& chain, StreamUse use, const char* stream,
 
 namespace {
 
-Chain parse(Reader& reader, bool mayRun);
+Graph parse(Reader& reader, bool mayRun);
 
 /// What stands behind `run`.
 struct ScriptCall {
@@ -328,15 +298,23 @@ ScriptCall readCall(Reader& reader) {
 }
 
 /// `run FILE`: the chain that the file holds. Global options of the command line come first.
-Chain parseScript(Reader& reader, const Chain& before) {
+Graph parseScript(Reader& reader, const Graph& before) {
   const ScriptCall call = readCall(reader);
+  if (isGraphFile(call.file)) {
+    if (!call.settings.empty())
+      throw UsageError(
+          fmt::format("run: --set says nothing to '{}'; a graph has no variables", call.file));
+    Graph graph = readGraph(call.file);
+    graph.globals = before.globals;
+    return graph;
+  }
   const Script script = readScript(call.file, call.settings);
   Reader inner{script.words, &script};
   try {
-    Chain chain = parse(inner, false);
-    for (const auto& [name, value] : before.globals) chain.globals[name] = value;
-    chain.isFromStandardInput = call.file == "-";
-    return chain;
+    Graph graph = parse(inner, false);
+    for (const auto& [name, value] : before.globals) graph.globals[name] = value;
+    reader.isStandardInput = call.file == "-";
+    return graph;
   } catch (const UsageError& error) {
     // The reader stands behind the action that failed.
     const std::size_t word = std::min(inner.next, script.words.size());
@@ -344,50 +322,50 @@ Chain parseScript(Reader& reader, const Chain& before) {
   }
 }
 
-Chain parse(Reader& reader, bool mayRun) {
+Graph parse(Reader& reader, bool mayRun) {
   const std::vector<std::string>& tokens = reader.tokens;
-  Chain chain;
+  Graph graph;
   while (!reader.atEnd() && isOption(tokens[reader.next]))
-    reader.readOption(globalParams(), "levelsmith", chain.globals);
+    reader.readOption(globalParams(), "levelsmith", graph.globals);
   if (!reader.atEnd() && tokens[reader.next] == runOperator().name) {
-    if (mayRun) return parseScript(reader, chain);
+    if (mayRun) return parseScript(reader, graph);
     throw UsageError("run: a file of actions cannot run another one; put its actions here");
   }
-  KindChecker kinds;
+  ChainBuilder builder(graph.nodes);
   while (!reader.atEnd()) {
     if (reader.atBang()) {
       throw UsageError(
           fmt::format("levelsmith: there is no action {} the '!' at word {}",
-                      reader.next == 0 || chain.actions.empty() ? "before" : "between this and",
+                      reader.next == 0 || graph.nodes.empty() ? "before" : "between this and",
                       reader.next + 1));
     }
     const std::size_t first = reader.next;
-    chain.actions.push_back(readAction(reader));
-    if (reader.script) chain.actions.back().place = reader.script->place(first);
-    kinds.visit(chain.actions.back());
+    Action action = readAction(reader);
+    if (reader.script) action.place = reader.script->place(first);
+    builder.add(action);
     if (reader.atBang()) {
       ++reader.next;
       if (reader.atEnd()) throw UsageError("levelsmith: an action must follow the last '!'");
     }
   }
-  if (chain.actions.empty())
+  if (graph.nodes.empty())
     throw UsageError("levelsmith: nothing to do; `levelsmith help` shows how to begin");
-  return chain;
+  return graph;
 }
 
 }  // namespace
 
-Chain parseChain(const std::vector<std::string>& tokens) {
+Graph parseChain(const std::vector<std::string>& tokens) {
   Reader reader{tokens};
-  const Chain chain = parse(reader, true);
-  const auto report = chain.globals.find("report");
+  const Graph graph = parse(reader, true);
+  const auto report = graph.globals.find("report");
   const bool reportsThere =
-      report != chain.globals.end() && levelset::isStandardOutput(report->second);
-  checkStandardStream(chain, &Operator::usesStandardOutput, "output",
+      report != graph.globals.end() && levelset::isStandardOutput(report->second);
+  checkStandardStream(graph, &Operator::usesStandardOutput, "output",
                       reportsThere ? "--report" : "");
-  checkStandardStream(chain, &Operator::usesStandardInput, "input",
-                      chain.isFromStandardInput ? "'run'" : "");
-  return chain;
+  checkStandardStream(graph, &Operator::usesStandardInput, "input",
+                      reader.isStandardInput ? "'run'" : "");
+  return graph;
 }
 
 }  // namespace pipeline

@@ -184,15 +184,15 @@ const Operator& runOperator() {
   static const Operator op{
       .name = "run",
       .group = "Chains in files",
-      .summary = "run the chain that a text file holds, one action a line",
+      .summary = "run what a file holds: a chain, one action a line, or a graph (.json)",
       .details =
           "No '!' between actions; # begins a comment; quotes and backslashes as in a "
           "shell. Lines of options before the first action are global options; those of the "
           "command line win. ${NAME} is a variable: a line `set NAME VALUE` gives its default, "
           "--set another value; ${NAME:stem}, :name and :dir are parts of a file's name. Actions "
           "between `repeat COUNT` (it counts ${i} from 0) or `for NAME in LIST` and `end` are "
-          "repeated; a LIST is words, 0..10, 0..1 step 0.25, or *.ply. No action stands behind "
-          "the file.",
+          "repeated; a LIST is words, 0..10, 0..1 step 0.25, or *.ply. A .json is a graph that "
+          "--save-graph wrote. No action stands behind the file.",
       .example = "levelsmith --threads 2 run holes.pipeline --set voxel=0.3",
       .params = {{.name = "file",
                   .type = ParamType::Path,
@@ -222,6 +222,10 @@ const std::vector<Param>& globalParams() {
       {.name = "report",
        .type = ParamType::Path,
        .doc = "write what each step did and cost, as .json or .html"},
+      {.name = "save-graph",
+       .type = ParamType::Path,
+       .doc = "write what is asked for as a .json that `run` takes; with --dry-run nothing else is "
+              "done"},
       {.name = "progress",
        .type = ParamType::Choice,
        .doc = "bars on a terminal, lines of JSON, or nothing",

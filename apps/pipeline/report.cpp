@@ -2,10 +2,13 @@
 
 #include <fmt/core.h>
 
-#include <cstdio>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "apps/pipeline/refusal.h"
+#include "apps/pipeline/text_file.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 
@@ -18,6 +21,7 @@ Json toJson(const StepReport& step) {
   Json json;
   json["action"] = step.action;
   if (!step.resultName.empty()) json["name"] = step.resultName;
+  if (!step.place.empty()) json["place"] = step.place;
   json["parameters"] = step.parameters;
   json["defaults"] = step.defaults;
   for (const Resolved& length : step.notes.lengths) {
@@ -103,8 +107,10 @@ std::string reportJson(const RunReport& report) {
   json["exit_code"] = report.exitCode;
   if (report.dryRun) json["dry_run"] = true;
   if (!report.error.empty()) json["error"] = report.error;
+  if (!report.graphJson.empty()) json["graph"] = Json::parse(report.graphJson);
   json["steps"] = Json::array();
   for (const StepReport& step : report.steps) json["steps"].push_back(toJson(step));
+  json["left_out"] = report.leftOut;
   json["warnings"] = report.warnings;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -138,46 +144,45 @@ std::string reportHtml(const RunReport& report) {
   return page;
 }
 
-void checkReportTarget(const Chain& chain) {
-  const auto wanted = chain.globals.find("report");
-  if (wanted == chain.globals.end()) return;
-  for (const Action& action : chain.actions) {
-    if (!action.op->targets) continue;
-    for (const std::string& target : action.op->targets(Invocation(*action.op, action.options))) {
-      if (!levelset::isSameFile(target, wanted->second)) continue;
-      throw levelset::UsageError(
-          fmt::format("--report: '{}' is what '{}' writes too; use another file for one of them",
-                      wanted->second, action.op->name));
-    }
-  }
-  const std::filesystem::path path = wanted->second;
-  const std::string extension = extensionOf(path);
-  std::error_code ignored;
-  const bool isDevice = std::filesystem::is_other(path, ignored);
-  if (!isDevice && !extension.empty() && extension != ".json" && !isHtml(path))
+void checkRunTargets(const Graph& graph) {
+  std::vector<std::pair<std::string, std::string>> wanted;  // option and file
+  for (const char* option : {"report", "save-graph"})
+    if (const auto it = graph.globals.find(option); it != graph.globals.end())
+      wanted.emplace_back(std::string("--") + option, it->second);
+  if (wanted.size() == 2 && levelset::isSameFile(wanted[0].second, wanted[1].second))
     throw levelset::UsageError(fmt::format(
-        "--report: '{}' is no kind of report; name a .json or .html file", wanted->second));
-  try {
-    const levelset::FileTarget probe(wanted->second);
-  } catch (const levelset::Error& error) {
-    refuseAs("--report", error);
+        "--save-graph: '{}' is what --report writes too; use another file for one of them",
+        wanted[1].second));
+  for (const auto& [option, file] : wanted) {
+    for (const Node& node : graph.nodes) {
+      if (!node.op->targets) continue;
+      for (const std::string& target : node.op->targets(Invocation(*node.op, node.options))) {
+        if (!levelset::isSameFile(target, file)) continue;
+        throw levelset::UsageError(
+            fmt::format("{}: '{}' is what '{}' writes too; use another file for one of them",
+                        option, file, node.op->name));
+      }
+    }
+    const std::filesystem::path path = file;
+    const std::string extension = extensionOf(path);
+    std::error_code ignored;
+    const bool isDevice = std::filesystem::is_other(path, ignored);
+    const bool isReport = option == "--report";
+    if (!isDevice && (!extension.empty() || !isReport) && extension != ".json" &&
+        !(isReport && isHtml(path)))
+      throw levelset::UsageError(fmt::format("{}: '{}' is no kind of {}; name a .json{} file",
+                                             option, file, isReport ? "report" : "graph",
+                                             isReport ? " or .html" : ""));
+    try {
+      const levelset::FileTarget probe(file);
+    } catch (const levelset::Error& error) {
+      refuseAs(option, error);
+    }
   }
 }
 
 void writeReport(const std::filesystem::path& path, const RunReport& report) {
-  const std::string text = isHtml(path) ? reportHtml(report) : reportJson(report);
-  try {
-    levelset::FileTarget target(path);
-    std::FILE* file = std::fopen(target.path().c_str(), "wb");
-    if (!file) throw levelset::IoError(fmt::format("cannot write '{}'", path.string()));
-    const bool whole = std::fwrite(text.data(), 1, text.size(), file) == text.size();
-    if (std::fclose(file) != 0 || !whole)
-      throw levelset::IoError(
-          fmt::format("'{}' cannot be written to the end; is the disk full?", path.string()));
-    target.commit();
-  } catch (const levelset::Error& error) {
-    refuseAs("--report", error);
-  }
+  writeText(path, isHtml(path) ? reportHtml(report) : reportJson(report), "--report");
 }
 
 std::string stepLine(const StepReport& step, bool dryRun) {

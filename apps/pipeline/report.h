@@ -7,13 +7,15 @@
 
 namespace pipeline {
 
-/// The report as JSON: an object with `version`, `steps`, `warnings`, `exit_code`, `error`.
+/// The report as JSON: an object with `version`, `graph` (which `run` takes, as a file of its own),
+/// `steps`, `left_out`, `warnings`, `exit_code`, `error`.
 [[nodiscard]] std::string reportJson(const RunReport& report);
 /// The same as a page.
 [[nodiscard]] std::string reportHtml(const RunReport& report);
-/// Refuses a --report that cannot be written before time is spent on what it should tell of.
+/// Refuses a --report or --save-graph that cannot be written before time is spent on what it should
+/// tell of.
 /// @throws levelset::IoError; UsageError when an action writes the same file
-void checkReportTarget(const Chain& chain);
+void checkRunTargets(const Graph& graph);
 /// By extension: .json or .html; "-" is JSON on standard output. Written beside the target and
 /// renamed.
 void writeReport(const std::filesystem::path& path, const RunReport& report);

@@ -7,8 +7,11 @@
 #include <cmath>
 #include <filesystem>
 #include <new>
+#include <optional>
 #include <set>
+#include <utility>
 
+#include "apps/pipeline/graph_file.h"
 #include "apps/pipeline/refusal.h"
 #include "apps/process_cost.h"
 #include "levelset/error.h"
@@ -19,70 +22,41 @@
 namespace pipeline {
 namespace {
 
-struct Slot {
-  Value value;
-  std::string name;
-  bool used = false;
-};
-
-class Stack {
+/// Values of nodes that have run, as long as something is to take them.
+class Values {
  public:
-  /// @param names  become what --as called the operands
-  std::vector<Value> take(const Action& action, std::vector<std::string>& names) {
-    const Operator& op = *action.op;
-    std::vector<Value> operands;
-    const std::size_t named = action.operandNames.size();
-    const std::size_t wanted = op.operands.size();
-    if (named < wanted && slots_.size() >= wanted - named) {
-      const std::size_t missing = wanted - named;
-      for (std::size_t i = slots_.size() - missing; i < slots_.size(); ++i) {
-        markUsed(slots_[i]);
-        operands.push_back(slots_[i].value);
-        names.push_back(slots_[i].name);
-      }
-      if (op.flow == Flow::Makes)
-        slots_.resize(slots_.size() - missing, Slot{Value(Plan{}), {}, {}});
-    }
-    for (const std::string& name : action.operandNames) {
-      operands.push_back(get(name));
-      names.push_back(name);
-    }
-    return operands;
-  }
+  /// @param uses  of each
+  explicit Values(std::vector<std::size_t> uses) : uses_(std::move(uses)), values_(uses_.size()) {}
 
-  const Value& get(const std::string& name) {
-    usedNames_[name] = true;
-    return named_.at(name);
+  void put(std::size_t node, Value value) {
+    if (uses_[node] > 0) values_[node] = std::move(value);
   }
-
-  void push(Value value, const std::string& name) {
-    if (!name.empty()) {
-      named_.emplace(name, value);
-      usedNames_[name] = false;
-    }
-    slots_.push_back({std::move(value), name, false});
-  }
-
-  [[nodiscard]] std::vector<std::string> unused() const {
-    std::vector<std::string> sentences;
-    for (const Slot& slot : slots_) {
-      if (slot.used || (!slot.name.empty() && usedNames_.at(slot.name))) continue;
-      sentences.push_back(fmt::format(
-          "the {}{} at the end of the chain is not used; write it, or leave it out",
-          kindName(slot.value.kind()), slot.name.empty() ? "" : " '" + slot.name + "'"));
-    }
-    return sentences;
+  /// The last that takes a value has it alone, and may work in its place.
+  Value take(std::size_t node) {
+    if (--uses_[node] > 0) return *values_[node];
+    Value last = std::move(*values_[node]);
+    values_[node].reset();
+    return last;
   }
 
  private:
-  void markUsed(Slot& slot) {
-    slot.used = true;
-    if (!slot.name.empty()) usedNames_[slot.name] = true;
-  }
-  std::vector<Slot> slots_;
-  std::map<std::string, Value> named_;
-  std::map<std::string, bool> usedNames_;
+  std::vector<std::size_t> uses_;
+  std::vector<std::optional<Value>> values_;
 };
+
+/// What was made, and that no other node takes.
+std::vector<std::string> unusedValues(const Graph& graph) {
+  const std::vector<std::size_t> uses = countUses(graph, std::vector<char>(graph.nodes.size(), 1));
+  std::vector<std::string> sentences;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    const Node& node = graph.nodes[i];
+    if (!node.makes() || uses[i] > 0) continue;
+    sentences.push_back(
+        fmt::format("the {}{} at the end of the chain is not used; write it, or leave it out",
+                    kindName(node.kind), node.name.empty() ? "" : " '" + node.name + "'"));
+  }
+  return sentences;
+}
 
 /// Ends a chain in which a step left its value behind without reaching what was asked.
 void tellFailures(const RunReport& report) {
@@ -91,7 +65,7 @@ void tellFailures(const RunReport& report) {
       throw levelset::NumericalError(step.action + ": " + step.notes.failure);
 }
 
-/// What the actions of a chain write.
+/// What the actions of a graph write.
 class Targets {
  public:
   /// @return was it named before? As isSameFile would find, in the time of one look
@@ -111,7 +85,7 @@ class Targets {
 
 /// Refuses targets that cannot be written before time is spent on what should go there.
 /// @param earlier  what the actions before write; grows
-void checkTargets(const Action& action, const RunSettings& settings, Targets& earlier,
+void checkTargets(const Node& action, const RunSettings& settings, Targets& earlier,
                   RunReport& report) {
   if (!action.op->targets) return;
   try {
@@ -180,13 +154,18 @@ Plan planOf(Invocation& invocation) {
 }
 
 /// @param stop  ends the timing of the step; what follows is the report's own work
-void runAction(const Action& action, std::size_t index, const RunSettings& settings, Stack& stack,
-               StepReport& step, const std::function<void()>& stop) {
-  const Operator& op = *action.op;
-  Invocation invocation(op, action.options);
+void runNode(const Graph& graph, std::size_t index, const RunSettings& settings, Values& values,
+             StepReport& step, const std::function<void()>& stop) {
+  const Node& node = graph.nodes[index];
+  const Operator& op = *node.op;
+  Invocation invocation(op, node.options);
   if (settings.begin) settings.begin(op.name);
-  invocation.operands = stack.take(action, invocation.operandNames);
-  for (const auto& [option, name] : action.named) invocation.named.emplace(option, stack.get(name));
+  for (const std::size_t input : node.inputs) {
+    invocation.operands.push_back(values.take(input));
+    invocation.operandNames.push_back(graph.nodes[input].name);
+  }
+  for (const auto& [option, input] : node.named)
+    invocation.named.emplace(option, values.take(input));
   invocation.maxMemory = settings.maxMemory;
   invocation.dryRun = settings.dryRun;
   if (settings.progress) {
@@ -211,7 +190,7 @@ void runAction(const Action& action, std::size_t index, const RunSettings& setti
       if (op.flow == Flow::Makes) {
         const Value value(plan);
         describeResult(value, true, step);
-        stack.push(value, action.resultName);
+        values.put(index, value);
       }
     } else {
       Value value = op.run(invocation);
@@ -219,7 +198,7 @@ void runAction(const Action& action, std::size_t index, const RunSettings& setti
         describeResult(value, false, step);
         stop();
         if (settings.measureErrors) estimateError(value, invocation, invocation.notes);
-        stack.push(std::move(value), action.resultName);
+        values.put(index, std::move(value));
       }
     }
   } catch (...) {
@@ -231,21 +210,28 @@ void runAction(const Action& action, std::size_t index, const RunSettings& setti
 
 }  // namespace
 
-void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
-  Stack stack;
+void run(const Graph& graph, const RunSettings& settings, RunReport& report) {
+  const std::vector<char> needed = neededNodes(graph);
+  Values values(countUses(graph, needed));
   report.dryRun = settings.dryRun;
+  report.graphJson = graphJson(graph);
   try {
     Targets targets;
-    for (const Action& action : chain.actions) checkTargets(action, settings, targets, report);
-    for (std::size_t i = 0; i < chain.actions.size(); ++i) {
-      const Action& action = chain.actions[i];
+    for (const Node& node : graph.nodes) checkTargets(node, settings, targets, report);
+    for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+      const Node& action = graph.nodes[i];
+      if (!needed[i]) {
+        report.leftOut.push_back(action.op->name + (action.name.empty() ? "" : " @" + action.name));
+        continue;
+      }
       StepReport& step = report.steps.emplace_back();
       step.action = action.op->name;
       step.parameters = action.options;
       for (const Param& param : action.op->params)
         if (!param.fallback.empty() && !action.options.contains(param.name))
           step.defaults[param.name] = param.fallback;
-      step.resultName = action.resultName;
+      step.resultName = action.name;
+      step.place = action.place;
       apps::resetPeakResident();
       const auto start = std::chrono::steady_clock::now();
       const double cpuStart = apps::processCpuSeconds();
@@ -259,7 +245,7 @@ void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
         step.peakBytes = apps::peakResidentBytes();
       };
       try {
-        runAction(action, i, settings, stack, step, stop);
+        runNode(graph, i, settings, values, step, stop);
         stop();
       } catch (const std::bad_alloc&) {
         stop();
@@ -277,7 +263,7 @@ void run(const Chain& chain, const RunSettings& settings, RunReport& report) {
         throw;
       }
     }
-    for (const std::string& sentence : stack.unused()) {
+    for (const std::string& sentence : unusedValues(graph)) {
       report.warnings.push_back(sentence);
       settings.warn(sentence);
     }

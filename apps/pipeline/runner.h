@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/pipeline/chain.h"
+#include "apps/pipeline/graph.h"
 #include "apps/pipeline/invocation.h"
 
 namespace pipeline {
@@ -32,19 +32,23 @@ struct StepReport {
   double wallSeconds = 0, cpuSeconds = 0;
   double peakBytes = 0;
   std::string resultName, resultKind;
+  std::string place;  ///< in a script
   double activeVoxels = 0, voxelSize = 0, halfWidth = 0;
   std::size_t triangles = 0;
 };
 
 struct RunReport {
+  std::string graphJson;  ///< of all that was asked for
   std::vector<StepReport> steps;
-  std::vector<std::string> warnings;  ///< about the chain as a whole
+  std::vector<std::string> warnings;  ///< about the graph as a whole
+  std::vector<std::string> leftOut;   ///< actions that nothing needed
   std::string error;                  ///< the sentence that ended it, if one did
   int exitCode = 0;
   bool dryRun = false;
 };
 
-/// Runs the actions in order. A refusal is recorded in the report and then thrown on.
-void run(const Chain& chain, const RunSettings& settings, RunReport& report);
+/// Runs those nodes that are needed, in order, and lets values go once the last that takes them has
+/// run. A refusal is recorded in the report and then thrown on.
+void run(const Graph& graph, const RunSettings& settings, RunReport& report);
 
 }  // namespace pipeline

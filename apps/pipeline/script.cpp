@@ -4,45 +4,22 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <iostream>
 #include <set>
-#include <sstream>
-#include <system_error>
 
 #include "apps/pipeline/script_list.h"
 #include "apps/pipeline/script_words.h"
+#include "apps/pipeline/text_file.h"
 #include "apps/pipeline/units.h"
 #include "levelset/error.h"
 
 namespace pipeline {
 namespace {
 
-using levelset::IoError;
 using levelset::UsageError;
 
 /// Actions of a script, and rounds of its loops: a chain is checked as a whole and held in memory.
 constexpr std::size_t kMostActions = 100'000;
-
-std::string textOf(const std::filesystem::path& file) {
-  std::ostringstream text;
-  if (file == "-") {
-    text << std::cin.rdbuf();
-    return text.str();
-  }
-  std::error_code error;
-  if (std::filesystem::is_directory(file, error))
-    throw IoError(fmt::format("run: '{}' is a directory; name a file", file.string()));
-  std::ifstream in(file, std::ios::binary);
-  if (!in) {
-    throw IoError(fmt::format("run: '{}' cannot be read: {}; check the name and its permissions",
-                              file.string(), std::strerror(errno)));
-  }
-  text << in.rdbuf();
-  return text.str();
-}
+constexpr std::size_t kMostScriptBytes = 1 << 26;
 
 bool isName(const std::string& text) {
   constexpr const char* kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_";
@@ -359,7 +336,9 @@ const std::string& Script::place(std::size_t word) const {
 
 Script readScript(const std::filesystem::path& file,
                   const std::map<std::string, std::string>& settings) {
-  return Expander(splitScript(textOf(file), file.string()), file.string(), settings).expand();
+  return Expander(splitScript(readText(file, "run", kMostScriptBytes), file.string()),
+                  file.string(), settings)
+      .expand();
 }
 
 }  // namespace pipeline

@@ -257,7 +257,8 @@ void ProgressivePicture::run() {
 
 bool isSame(const render::Camera& a, const render::Camera& b) {
   return a.from == b.from && a.to == b.to && a.up == b.up && a.verticalFov == b.verticalFov &&
-         a.orthoHeight == b.orthoHeight && a.width == b.width && a.height == b.height;
+         a.orthoHeight == b.orthoHeight && a.near == b.near && a.far == b.far &&
+         a.width == b.width && a.height == b.height;
 }
 
 bool isSame(const View& a, const View& b) {

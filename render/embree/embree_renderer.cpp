@@ -44,8 +44,9 @@ struct PixelPainter {
   void paintData(int x, int y, std::size_t i) const {
     const Camera::Ray ray = scene.camera.ray(x + 0.5, y + 0.5);
     if (options.thickness)
-      layers.thickness[i] = static_cast<float>(rays.thickness(ray.origin, ray.direction));
-    const Hit hit = rays.intersect(ray.origin, ray.direction);
+      layers.thickness[i] =
+          static_cast<float>(rays.thickness(ray.origin, ray.direction, ray.near, ray.far));
+    const Hit hit = rays.intersect(ray.origin, ray.direction, ray.near, ray.far);
     if (!hit.found) return;
     layers.setHit(i, scene.camera, hit);
     if (options.curvature) layers.setCurvature(i, hit.curvature);
@@ -55,24 +56,24 @@ struct PixelPainter {
   void paintColour(int x, int y, std::size_t i) const {
     const PixelSequence area = PixelSequence::overArea(x, y);
     std::vector<LightRay> lights;
-    std::vector<char> blocked;
-    Imath::C3f sum(0);
-    int covered = 0;
+    std::vector<double> transmittances;
+    ColourSum sum;
     for (int s = 0; s < options.samples; ++s) {
       const V2d at = area.at(s);
       const Camera::Ray ray = scene.camera.ray(x + at.x, y + at.y);
-      const Hit hit = rays.intersect(ray.origin, ray.direction);
-      if (!hit.found) continue;
-      lights.clear();
-      const LightRays range = shader.addRays(hit, ray.direction, x, y, s, lights);
-      blocked.resize(lights.size());
-      for (std::size_t n = 0; n < lights.size(); ++n)
-        blocked[n] =
-            rays.isOccluded(lights[n].origin, lights[n].direction, 0, lights[n].reach) ? 1 : 0;
-      sum += shader.colour(hit, ray.direction, range, lights, blocked);
-      ++covered;
+      double seen = 1;
+      for (const Hit& hit : rays.intersectSeen(ray.origin, ray.direction, ray.near, ray.far)) {
+        lights.clear();
+        const LightRays range = shader.addRays(hit, ray.direction, x, y, s, lights);
+        transmittances.clear();
+        for (const LightRay& light : lights)
+          transmittances.push_back(rays.transmittance(light.origin, light.direction, light.reach));
+        sum.add(shader.colour(hit, ray.direction, range, lights, transmittances),
+                seen * hit.opacity);
+        seen *= 1 - hit.opacity;
+      }
     }
-    layers.setColour(i, sum, covered, options.samples);
+    layers.setColour(i, sum, options.samples);
   }
 };
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "render/hit.h"
 #include "render/image.h"
@@ -34,9 +35,20 @@ class EmbreeScene {
   /// First hit beyond `near`. A ray that starts inside hits where it leaves.
   /// @throws levelset::UsageError when origin or direction are not finite or the direction is zero
   [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction,
-                              double near = 0, double far = 1e300) const;
-  /// How far the ray is within what is drawn of the solids, world units. @throws as intersect()
-  [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction) const;
+                              double near = 0, double far = Camera::kNoDepth) const;
+  /// Those in [near, far] that are seen: in their order, up to an opaque one or to where less than
+  /// kLeastTransmittance is left. @throws as intersect()
+  [[nodiscard]] std::vector<Hit> intersectSeen(const Imath::V3d& origin,
+                                               const Imath::V3d& direction, double near,
+                                               double far) const;
+  /// Share of light that comes through all that is in [0, far], or less than kLeastTransmittance.
+  /// @throws as intersect()
+  [[nodiscard]] double transmittance(const Imath::V3d& origin, const Imath::V3d& direction,
+                                     double far) const;
+  /// How far the ray is within what is drawn of the solids in [near, far], world units. @throws as
+  /// intersect()
+  [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction,
+                                 double near = 0, double far = Camera::kNoDepth) const;
   /// True when there is a hit in [near, far]. @throws as intersect()
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                                 double far) const;

@@ -20,8 +20,6 @@ namespace {
 using Imath::Box3d;
 using Imath::V3d;
 
-constexpr double kNoEnd = 1e300;
-
 struct RaySolid {
   levelset::NarrowBand band;  // keeps the tree alive
   Imath::M44d indexToWorld, worldToIndex;
@@ -32,6 +30,7 @@ struct RaySolid {
   const FloatView* view;  // of the scene
   Filter filter;
   Imath::C3f colour;
+  double opacity;
 
   [[nodiscard]] DrawnField field() const { return {levelset::vdb(band).tree(), filter}; }
   [[nodiscard]] SurfaceShape shapeAt(const V3d& world) const {
@@ -123,15 +122,18 @@ void putInOrder(std::vector<SideChange>& changes) {
   changes = std::move(kept);
 }
 
-/// Where a ray first changes sides of what an expression makes of the solids.
+/// Where a ray changes sides of what an expression makes of the solids.
 struct CsgChange {
   double t;
   std::size_t solid;
   bool isTurned;
 };
 
-std::optional<CsgChange> firstChange(const CsgExpression& csg,
-                                     std::vector<std::vector<SideChange>>& changes) {
+/// Calls visit(change) along the ray for as long as that asks for more; without an expression,
+/// where it changes sides of any solid.
+template <typename Visit>
+void walkChanges(const CsgExpression& csg, std::vector<std::vector<SideChange>>& changes,
+                 const Visit& visit) {
   std::vector<char> inside(changes.size(), 0);
   for (std::size_t s = 0; s < changes.size(); ++s) {
     putInOrder(changes[s]);
@@ -143,15 +145,15 @@ std::optional<CsgChange> firstChange(const CsgExpression& csg,
     for (std::size_t s = 0; s < changes.size(); ++s)
       if (next[s] < changes[s].size() && (!change || changes[s][next[s]].t < change->t))
         change = CsgChange{changes[s][next[s]].t, s, false};
-    if (!change) return std::nullopt;
+    if (!change) return;
     const bool before = csg.holds(inside.data());
     for (std::size_t s = 0; s < changes.size(); ++s)
       while (next[s] < changes[s].size() && changes[s][next[s]].t == change->t)
         inside[s] = changes[s][next[s]++].goesIn ? 1 : 0;
     const bool after = csg.holds(inside.data());
-    if (before == after) continue;
-    change->isTurned = (inside[change->solid] != 0) != after;
-    return change;
+    if (before == after && !csg.isEmpty()) continue;
+    change->isTurned = !csg.isEmpty() && (inside[change->solid] != 0) != after;
+    if (!visit(*change)) return;
   }
 }
 
@@ -170,6 +172,7 @@ struct EmbreeScene::Impl {
   std::vector<RaySolid> solids;
   CsgExpression csg;  // of those
   MeshRays meshes;
+  bool isOpaque;
   Box3d allBounds;  // with the meshes
   Box3d bounds;     // of the crossing cells
   FloatView view;
@@ -201,7 +204,8 @@ struct EmbreeScene::Impl {
                 double t) const;
 };
 
-EmbreeScene::Impl::Impl(const Scene& source, Filter filter) : meshes(source) {
+EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
+    : meshes(source), isOpaque(source.isOpaque()) {
   gather(source, filter);
   allBounds = bounds;
   allBounds.extendBy(meshes.bounds());
@@ -228,6 +232,7 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
     entry.id = solid.id;
     entry.index = i;
     entry.colour = solid.colour;
+    entry.opacity = solid.opacity;
     for (const SurfaceBlock& block : entry.blocks)
       bounds.extendBy(Imath::transform(block.bounds(), entry.indexToWorld));
     if (!entry.blocks.empty()) solids.push_back(std::move(entry));
@@ -302,9 +307,12 @@ std::vector<std::vector<SideChange>> EmbreeScene::Impl::allChanges(RayQuery& que
 
 std::optional<CsgChange> EmbreeScene::Impl::findCsg(RayQuery& query, RTCRay ray) const {
   std::vector<std::vector<SideChange>> changes = allChanges(query, ray);
-  auto change = firstChange(csg, changes);
-  if (change && change->t > query.limit) change.reset();
-  return change;
+  std::optional<CsgChange> first;
+  walkChanges(csg, changes, [&](const CsgChange& change) {
+    if (change.t <= query.limit) first = change;
+    return false;
+  });
+  return first;
 }
 
 void EmbreeScene::Impl::complete(Hit& hit, const RayQuery& query, const RaySolid& solid,
@@ -315,6 +323,7 @@ void EmbreeScene::Impl::complete(Hit& hit, const RayQuery& query, const RaySolid
   hit.id = solid.id;
   hit.solid = solid.index;
   hit.colour = solid.colour;
+  hit.opacity = solid.opacity;
   addShape(hit, solid.shapeAt(hit.position), solid.indexToWorld, query.direction);
 }
 
@@ -348,9 +357,53 @@ Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near,
   const Hit onSolid = impl_->intersectSolids(origin, direction, near, far);
   if (impl_->meshes.isEmpty()) return onSolid;
   const double end = onSolid.found ? onSolid.distance : far;
-  Hit onMesh = impl_->meshes.intersect(origin + direction * near, direction, end - near);
-  onMesh.distance += near;
+  const Hit onMesh = impl_->meshes.intersect(origin, direction, near, end);
   return onMesh.found ? onMesh : onSolid;
+}
+
+std::vector<Hit> EmbreeScene::intersectSeen(const V3d& origin, const V3d& direction, double near,
+                                            double far) const {
+  std::vector<Hit> hits;
+  if (impl_->isOpaque) {
+    const Hit hit = intersect(origin, direction, near, far);
+    if (hit.found) hits.push_back(hit);
+    return hits;
+  }
+  double share = 1;
+  // Those of meshes up to some place, and whether anything is seen beyond.
+  const auto addMeshes = [&](double end) {
+    while (share >= kLeastTransmittance) {
+      const Hit hit = impl_->meshes.intersect(origin, direction, near, end);
+      if (!hit.found) break;
+      hits.push_back(hit);
+      share *= 1 - hit.opacity;
+      near = hit.beyond();
+    }
+    return share >= kLeastTransmittance;
+  };
+  double moved;
+  RTCRay ray;
+  if (auto query = impl_->prepare(origin, direction, near, far, moved, ray)) {
+    std::vector<std::vector<SideChange>> changes = impl_->allChanges(*query, ray);
+    walkChanges(impl_->csg, changes, [&](const CsgChange& change) {
+      if (change.t > query->limit || !addMeshes(moved + change.t)) return false;
+      Hit hit;
+      hit.isTurned = change.isTurned;
+      impl_->complete(hit, *query, impl_->solids[change.solid], moved, change.t);
+      hits.push_back(hit);
+      share *= 1 - hit.opacity;
+      return share >= kLeastTransmittance;
+    });
+  }
+  addMeshes(far);
+  return hits;
+}
+
+double EmbreeScene::transmittance(const V3d& origin, const V3d& direction, double far) const {
+  if (impl_->isOpaque) return isOccluded(origin, direction, 0, far) ? 0 : 1;
+  double share = 1;
+  for (const Hit& hit : intersectSeen(origin, direction, 0, far)) share *= 1 - hit.opacity;
+  return share;
 }
 
 bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double near,
@@ -365,10 +418,11 @@ bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double nea
   return ray.tfar < 0;
 }
 
-double EmbreeScene::thickness(const V3d& origin, const V3d& direction) const {
+double EmbreeScene::thickness(const V3d& origin, const V3d& direction, double near,
+                              double far) const {
   double moved;
   RTCRay ray;
-  auto query = impl_->prepare(origin, direction, 0, kNoEnd, moved, ray);
+  auto query = impl_->prepare(origin, direction, near, far, moved, ray);
   if (!query) return 0;
   auto changes = impl_->allChanges(*query, ray);
   // Where nothing is said, what any of them holds.
@@ -387,8 +441,9 @@ double EmbreeScene::thickness(const V3d& origin, const V3d& direction) const {
                    [](const auto& a, const auto& b) { return a.first.t < b.first.t; });
   double length = 0, from = 0;
   for (const auto& [change, solid] : all) {
-    if (isWithin(inside)) length += change.t - from;
-    from = change.t;
+    const double to = std::min(change.t, query->limit);
+    if (isWithin(inside)) length += to - from;
+    from = to;
     inside[solid] = change.goesIn ? 1 : 0;
   }
   return length;

@@ -17,6 +17,7 @@ using Imath::V3d;
 
 struct MeshRays::Impl {
   std::vector<MeshPart> parts;
+  bool isOpaque;
   Box3d bounds;
   FloatView view;
   RTCDevice device = nullptr;
@@ -32,15 +33,17 @@ struct MeshRays::Impl {
 
   void build();
   void add(const MeshPart& part, unsigned number);
-  /// How far it is to where the ray enters the box, with Embree's ray from there; nothing: it
-  /// misses.
-  std::optional<double> prepare(const V3d& origin, const V3d& direction, double far,
+  /// How far it is to where the ray enters the box, `near` at least, with Embree's ray from there;
+  /// nothing: it misses.
+  std::optional<double> prepare(const V3d& origin, const V3d& direction, double near, double far,
                                 RTCRay& ray) const;
   void complete(const RTCRayHit& found, const V3d& start, const V3d& direction, double moved,
                 Hit& hit) const;
 };
 
 MeshRays::Impl::Impl(const Scene& source) : parts(source.meshes) {
+  isOpaque = std::all_of(parts.begin(), parts.end(),
+                         [](const MeshPart& part) { return part.opacity == 1; });
   for (const MeshPart& part : parts)
     for (const auto& triangle : part.mesh->triangles)
       for (const std::uint32_t v : triangle) bounds.extendBy(part.mesh->positions[v]);
@@ -88,10 +91,10 @@ void MeshRays::Impl::add(const MeshPart& part, unsigned number) {
   requireEmbree(device);
 }
 
-std::optional<double> MeshRays::Impl::prepare(const V3d& origin, const V3d& direction, double far,
-                                              RTCRay& ray) const {
+std::optional<double> MeshRays::Impl::prepare(const V3d& origin, const V3d& direction, double near,
+                                              double far, RTCRay& ray) const {
   if (!scene) return std::nullopt;
-  const auto moved = view.entryOf(origin, direction, 0, far);
+  const auto moved = view.entryOf(origin, direction, near, far);
   if (moved) ray = view.rayFrom(origin + direction * *moved, direction, far - *moved);
   return moved;
 }
@@ -116,7 +119,9 @@ void MeshRays::Impl::complete(const RTCRayHit& found, const V3d& start, const V3
   hit.surfaceError = FloatView::kPad / view.scale;
   hit.id = part.id;
   hit.solid = found.hit.geomID;
+  hit.isOnMesh = true;
   hit.colour = part.colour;
+  hit.opacity = part.opacity;
   const double u = static_cast<double>(found.hit.u), v = static_cast<double>(found.hit.v);
   const double share[3] = {1 - u - v, u, v};
   if (!mesh.attributes.normals.empty()) {
@@ -144,10 +149,10 @@ const Box3d& MeshRays::bounds() const {
   return impl_->bounds;
 }
 
-Hit MeshRays::intersect(const V3d& origin, const V3d& direction, double far) const {
+Hit MeshRays::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
   Hit hit;
   RTCRayHit found;
-  const auto moved = impl_->prepare(origin, direction, far, found.ray);
+  const auto moved = impl_->prepare(origin, direction, near, far, found.ray);
   if (!moved) return hit;
   found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
@@ -162,11 +167,23 @@ Hit MeshRays::intersect(const V3d& origin, const V3d& direction, double far) con
 
 bool MeshRays::isOccluded(const V3d& origin, const V3d& direction, double far) const {
   RTCRay ray;
-  if (!impl_->prepare(origin, direction, far, ray)) return false;
+  if (!impl_->prepare(origin, direction, 0, far, ray)) return false;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcOccluded1(impl_->scene, &context, &ray);
   return ray.tfar < 0;
+}
+
+double MeshRays::transmittance(const V3d& origin, const V3d& direction, double far) const {
+  if (impl_->isOpaque) return isOccluded(origin, direction, far) ? 0 : 1;
+  double share = 1, near = 0;
+  while (share >= kLeastTransmittance) {
+    const Hit hit = intersect(origin, direction, near, far);
+    if (!hit.found) break;
+    share *= 1 - hit.opacity;
+    near = hit.beyond();
+  }
+  return share;
 }
 
 }  // namespace render

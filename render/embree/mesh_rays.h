@@ -21,12 +21,15 @@ class MeshRays {
 
   [[nodiscard]] bool isEmpty() const;
   [[nodiscard]] const Imath::Box3d& bounds() const;
-  /// First triangle, of either side, in [0, far]; `solid` is the index in Scene::meshes, normals
+  /// First triangle, of either side, in [near, far]; `solid` is the index in Scene::meshes, normals
   /// are those of the vertices where the mesh has some.
-  [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction,
+  [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                               double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction,
                                 double far) const;
+  /// Share of light that all triangles in [0, far] let through, or less than kLeastTransmittance.
+  [[nodiscard]] double transmittance(const Imath::V3d& origin, const Imath::V3d& direction,
+                                     double far) const;
 
  private:
   struct Impl;

@@ -209,6 +209,8 @@ BrickPool makeBricks(const levelset::NarrowBand& band, const TableOptions& optio
     pool.origin[i] = box.min()[a];
     pool.low[i] = crossed.min()[a] - box.min()[a];
     pool.high[i] = crossed.max()[a] - box.min()[a] + BrickPool::kBlock;
+    pool.cellsLow[i] = bricks.cells.min()[a] - box.min()[a];
+    pool.cellsHigh[i] = bricks.cells.max()[a] + 1 - box.min()[a];
     pool.pages[i] =
         (box.max()[a] - box.min()[a] + BrickPool::kBlock + BrickPool::kPage - 1) / BrickPool::kPage;
   }

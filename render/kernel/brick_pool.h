@@ -55,8 +55,10 @@ struct BrickPool {
   /// In place of these, where they are held in fewer bits, the least first; and room behind the
   /// last one for a load of 32 bits.
   std::vector<std::uint8_t> code;
-  /// Points between which the crossing cells lie, in the table's space.
+  /// Points between which the blocks lie that the surface crosses, in the table's space.
   std::array<int, 3> low{}, high{};
+  /// And the cells that it crosses.
+  std::array<int, 3> cellsLow{}, cellsHigh{};
 
   std::size_t besideCount = 0;    ///< blocks of which some points are held
   std::size_t blocksLeftOut = 0;  ///< leaves of the band of which nothing is

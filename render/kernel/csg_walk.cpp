@@ -20,14 +20,15 @@ CsgWalk::CsgWalk(const CsgExpression& csg, std::size_t solids, std::vector<doubl
   asked_.assign(rays * solids_, 0);
   met_.assign(rays, -1);
   turned_.assign(rays, 0);
-  for (std::size_t i = 0; i < asked_.size(); ++i) asked_[i] = csg_.uses(i % solids_) ? 1 : 0;
+  for (std::size_t i = 0; i < asked_.size(); ++i)
+    asked_[i] = csg_.isEmpty() || csg_.uses(i % solids_) ? 1 : 0;
 }
 
 std::vector<CsgWalk::Question> CsgWalk::questionsAbout(std::size_t solid) const {
   std::vector<Question> questions;
   for (std::size_t ray = 0; ray < reach_.size(); ++ray) {
     const std::size_t i = ray * solids_ + solid;
-    if (asked_[i]) questions.push_back({ray, passed_[i]});
+    if (asked_[i] && met_[ray] < 0) questions.push_back({ray, passed_[i]});
   }
   return questions;
 }
@@ -54,13 +55,14 @@ bool CsgWalk::advance() {
 
 // @return does the ray ask for anything?
 bool CsgWalk::advance(std::size_t ray) {
+  if (met_[ray] >= 0) return false;
   const auto row = [&](auto& all) {
     return all.begin() + static_cast<std::ptrdiff_t>(ray * solids_);
   };
   const auto last = static_cast<std::ptrdiff_t>(solids_);
   if (std::any_of(row(asked_), row(asked_) + last, [](char a) { return a != 0; })) return true;
   const double place = *std::min_element(row(place_), row(place_) + last);
-  if (met_[ray] >= 0 || place == kNowhere || place > reach_[ray]) return false;
+  if (place == kNowhere || place > reach_[ray]) return false;
   cross(ray, place);
   return met_[ray] < 0;
 }
@@ -79,10 +81,9 @@ void CsgWalk::cross(std::size_t ray, double place) {
     first = s;
   }
   const bool after = csg_.holds(inside);
-  if (before == after) return;
+  if (before == after && !csg_.isEmpty()) return;
   met_[ray] = static_cast<std::int32_t>(first);
-  turned_[ray] = (inside[first] != 0) != after ? 1 : 0;
-  for (std::size_t s = 0; s < solids_; ++s) asked_[ray * solids_ + s] = 0;
+  turned_[ray] = !csg_.isEmpty() && (inside[first] != 0) != after ? 1 : 0;
 }
 
 }  // namespace render

@@ -9,8 +9,8 @@
 namespace render {
 
 /// Follows rays through solids, each to the first place where it enters or leaves what an
-/// expression makes of them. Asks for a ray's first crossing with each solid, and for others as it
-/// comes to them.
+/// expression makes of them, or without an expression any of them, and on to others. Asks for a
+/// ray's first crossing with each solid, and for others as it comes to them.
 ///
 /// Surfaces met at one and the same place are crossed together, and the lowest of their numbers is
 /// the one that is met.
@@ -32,6 +32,9 @@ class CsgWalk {
   void answerNone(std::size_t solid, const Question& question);
   /// Goes on along every ray as far as the answers tell. @return is there anything to ask?
   bool advance();
+
+  /// Lets a ray that met something go on to what it meets next.
+  void goOn(std::size_t ray) { met_[ray] = -1; }
 
   /// Number of the solid that the ray meets, or −1.
   [[nodiscard]] std::int32_t solidMet(std::size_t ray) const { return met_[ray]; }

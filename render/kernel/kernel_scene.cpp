@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "levelset/vdb.h"
-#include "render/kernel/csg_walk.h"
 #include "render/kernel/frame_need.h"
 
 namespace render {
@@ -20,7 +19,6 @@ using Imath::V3d;
 constexpr double kBesideBox = 0.0625;  // lest rounding loses a crossing on a face of the box
 constexpr double kParallel = 1e30;
 constexpr std::size_t kRaysAtOnce = 1u << 18;
-constexpr double kNoEnd = 1e300;
 
 /// A box that holds all cells that the surface may cross, world units.
 Imath::Box3d leafBox(const levelset::NarrowBand& band) {
@@ -139,9 +137,13 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     if (pool.brickCount() + pool.blocksUnseen == 0) continue;
     Extent& extent = extents_.emplace_back();
     extent.index = i;
-    for (const std::array<int, 3>& corner : {pool.low, pool.high})
-      extent.inIndices.extendBy(
-          V3d(corner[0] + pool.origin[0], corner[1] + pool.origin[1], corner[2] + pool.origin[2]));
+    const V3d origin(pool.origin[0], pool.origin[1], pool.origin[2]);
+    const auto boxOf = [&](const std::array<int, 3>& low, const std::array<int, 3>& high) {
+      return Imath::Box3d(origin + V3d(low[0], low[1], low[2]),
+                          origin + V3d(high[0], high[1], high[2]));
+    };
+    extent.blocks = boxOf(pool.low, pool.high);
+    extent.cells = boxOf(pool.cellsLow, pool.cellsHigh);
     if (pool.brickCount() == 0) continue;
     counts_.crossed += pool.brickCount();
     counts_.beside += pool.besideCount;
@@ -159,11 +161,16 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
 }
 
 void KernelScene::look(const Scene& scene) {
-  bounds_ = meshes_.bounds();
-  for (const Extent& extent : extents_)
-    bounds_.extendBy(
-        Imath::transform(extent.inIndices, scene.solids[extent.index].band.indexToWorld()));
+  near_ = scene.camera.near;
+  far_ = scene.camera.farthest();
+  bounds_ = tableBounds_ = meshes_.bounds();
+  for (const Extent& extent : extents_) {
+    const M44d toWorld = scene.solids[extent.index].band.indexToWorld();
+    bounds_.extendBy(Imath::transform(extent.cells, toWorld));
+    tableBounds_.extendBy(Imath::transform(extent.blocks, toWorld));
+  }
   for (KernelSolid& solid : solids_) {
+    solid.opacity = scene.solids[solid.index].opacity;
     const V3d corner(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]);
     solid.tableToWorld =
         M44d().setTranslation(corner) * scene.solids[solid.index].band.indexToWorld();
@@ -179,7 +186,9 @@ std::size_t KernelScene::bytes() const {
 }
 
 PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const {
-  return csg_.isEmpty() ? castFirst(tracer, pixels) : castCsg(tracer, pixels);
+  if (csg_.isEmpty()) return castFirst(tracer, pixels);
+  PixelWalk walk = walkFrom(pixels);
+  return castOn(tracer, walk);
 }
 
 PixelHits KernelScene::castFirst(const KernelTracer& tracer, const PixelBlock& pixels) const {
@@ -192,6 +201,7 @@ PixelHits KernelScene::castFirst(const KernelTracer& tracer, const PixelBlock& p
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       if (!hits.found[i]) continue;
       const double depth = solid.fan.depthAt(hits.t[i]);
+      if (depth > far_) continue;
       if (result.solid[i] >= 0 && result.depth[i] <= depth) continue;
       result.depth[i] = depth;
       result.solid[i] = static_cast<std::int32_t>(s);
@@ -201,15 +211,16 @@ PixelHits KernelScene::castFirst(const KernelTracer& tracer, const PixelBlock& p
   return result;
 }
 
-PixelHits KernelScene::castCsg(const KernelTracer& tracer, const PixelBlock& pixels) const {
+PixelWalk KernelScene::walkFrom(const PixelBlock& pixels) const {
+  const std::size_t rays = pixels.size();
+  return {pixels, CsgWalk(csg_, solids_.size(), std::vector<double>(rays, far_)),
+          std::vector<PixelWalk::Crossings>(solids_.size(),
+                                            {std::vector<double>(rays), ShapeBlock(rays)})};
+}
+
+PixelHits KernelScene::castOn(const KernelTracer& tracer, PixelWalk& way) const {
+  auto& [pixels, walk, next] = way;
   PixelHits result(pixels.size());
-  CsgWalk walk(csg_, solids_.size(), std::vector<double>(pixels.size(), kNoEnd));
-  struct Crossings {  // of one solid, the next of each ray
-    std::vector<double> depth;
-    ShapeBlock shapes;
-  };
-  std::vector<Crossings> next(solids_.size(),
-                              {std::vector<double>(pixels.size()), ShapeBlock(pixels.size())});
   do {
     for (std::size_t s = 0; s < solids_.size(); ++s) {
       const KernelSolid& solid = solids_[s];
@@ -290,10 +301,11 @@ std::vector<double> KernelScene::thickness(const KernelTracer& tracer,
     for (const Crossing& crossing : all)  // the first of each solid tells where the ray starts
       if (!std::exchange(known[crossing.solid], 1))
         inside[crossing.solid] = crossing.goesIn ? 0 : 1;
-    double from = 0;
+    double from = near_;
     for (const Crossing& crossing : all) {
-      if (isInside(inside)) lengths[i] += std::max(0.0, crossing.depth - from);
-      from = std::max(0.0, crossing.depth);
+      const double to = std::clamp(crossing.depth, near_, far_);
+      if (isInside(inside)) lengths[i] += std::max(0.0, to - from);
+      from = to;
       inside[crossing.solid] = crossing.goesIn ? 1 : 0;
     }
   }
@@ -305,42 +317,51 @@ bool KernelScene::isInside(const std::vector<char>& inside) const {
   return std::any_of(inside.begin(), inside.end(), [](char in) { return in != 0; });
 }
 
-std::vector<char> KernelScene::findBlocked(const KernelTracer& tracer,
-                                           const std::vector<LightRay>& rays) const {
-  std::vector<char> blocked(rays.size(), 0);
+std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
+                                                const std::vector<LightRay>& rays) const {
+  std::vector<double> light(rays.size(), 1);
   for (std::size_t first = 0; first < rays.size(); first += kRaysAtOnce) {
     const std::size_t last = std::min(rays.size(), first + kRaysAtOnce);
     if (csg_.isEmpty())
-      blockFirst(tracer, rays, first, last, blocked);
+      dimBySolids(tracer, rays, first, last, light);
     else
-      blockCsg(tracer, rays, first, last, blocked);
+      dimByCsg(tracer, rays, first, last, light);
   }
   for (std::size_t i = 0; i < rays.size() && !meshes_.isEmpty(); ++i)
-    if (!blocked[i] && meshes_.isOccluded(rays[i].origin, rays[i].direction, rays[i].reach))
-      blocked[i] = 1;
-  return blocked;
+    if (light[i] >= kLeastTransmittance)
+      light[i] *= meshes_.transmittance(rays[i].origin, rays[i].direction, rays[i].reach);
+  return light;
 }
 
-void KernelScene::blockFirst(const KernelTracer& tracer, const std::vector<LightRay>& rays,
-                             std::size_t first, std::size_t last,
-                             std::vector<char>& blocked) const {
+void KernelScene::dimBySolids(const KernelTracer& tracer, const std::vector<LightRay>& rays,
+                              std::size_t first, std::size_t last,
+                              std::vector<double>& light) const {
   for (const KernelSolid& solid : solids_) {
     std::vector<std::size_t> open;
     for (std::size_t i = first; i < last; ++i)
-      if (!blocked[i]) open.push_back(i);
-    const PackedRays packed(solid, rays, open, true);
-    HitBlock hits(packed.block.size);
-    tracer.trace(solid, packed.block, hits);
-    for (std::size_t n = 0; n < packed.number.size(); ++n)
-      if (hits.found[n]) blocked[packed.number[n]] = 1;
+      if (light[i] >= kLeastTransmittance) open.push_back(i);
+    for (std::int32_t passing = 0; !open.empty(); ++passing) {
+      PackedRays packed(solid, rays, open, true);
+      std::fill(packed.block.passing.begin(), packed.block.passing.end(), passing);
+      HitBlock hits(packed.block.size);
+      tracer.trace(solid, packed.block, hits);
+      open.clear();
+      for (std::size_t n = 0; n < packed.number.size(); ++n) {
+        if (!hits.found[n]) continue;
+        double& left = light[packed.number[n]];
+        left *= 1 - solid.opacity;
+        if (left >= kLeastTransmittance) open.push_back(packed.number[n]);
+      }
+    }
   }
 }
 
-void KernelScene::blockCsg(const KernelTracer& tracer, const std::vector<LightRay>& rays,
-                           std::size_t first, std::size_t last, std::vector<char>& blocked) const {
+void KernelScene::dimByCsg(const KernelTracer& tracer, const std::vector<LightRay>& rays,
+                           std::size_t first, std::size_t last, std::vector<double>& light) const {
   std::vector<double> reach;
   for (std::size_t i = first; i < last; ++i) reach.push_back(rays[i].reach);
   CsgWalk walk(csg_, solids_.size(), std::move(reach));
+  bool asks;
   do {
     for (std::size_t s = 0; s < solids_.size(); ++s) {
       const KernelSolid& solid = solids_[s];
@@ -368,9 +389,18 @@ void KernelScene::blockCsg(const KernelTracer& tracer, const std::vector<LightRa
         if (isNear) ++n;
       }
     }
-  } while (walk.advance());
-  for (std::size_t i = first; i < last; ++i)
-    if (walk.solidMet(i - first) >= 0) blocked[i] = 1;
+    asks = walk.advance();
+    // Only once no ray has anything to ask: those that met a surface then go on together.
+    if (asks) continue;
+    for (std::size_t i = first; i < last; ++i) {
+      const std::int32_t met = walk.solidMet(i - first);
+      if (met < 0 || light[i] < kLeastTransmittance) continue;
+      light[i] *= 1 - solids_[static_cast<std::size_t>(met)].opacity;
+      if (light[i] < kLeastTransmittance) continue;
+      walk.goOn(i - first);
+      asks = true;
+    }
+  } while (asks);
 }
 
 }  // namespace render

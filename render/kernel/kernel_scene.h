@@ -11,6 +11,7 @@
 #include "render/csg.h"
 #include "render/embree/mesh_rays.h"
 #include "render/kernel/brick_pool.h"
+#include "render/kernel/csg_walk.h"
 #include "render/kernel/ray_block.h"
 #include "render/kernel/ray_fan.h"
 #include "render/render_options.h"
@@ -23,7 +24,7 @@ namespace render {
 struct KernelSolid {
   std::size_t index = 0;  ///< in Scene::solids
   std::uint32_t id = 0;
-  double voxelSize = 1;
+  double voxelSize = 1, opacity = 1;
   BrickPool pool;
   RayFan fan;
   Imath::M44d tableToWorld, worldToTable;
@@ -50,6 +51,17 @@ struct PixelHits {
       : depth(size), solid(size, -1), turned(size, 0), shapes(size) {}
 };
 
+/// Rays of pixels on their way through the solids, from surface to surface.
+struct PixelWalk {
+  PixelBlock pixels;
+  CsgWalk solids;
+  struct Crossings {  ///< with one solid, the next of each ray
+    std::vector<double> depth;
+    ShapeBlock shapes;
+  };
+  std::vector<Crossings> next;
+};
+
 /// The surfaces of a scene made ready for the kernel, whoever runs it. Of two solids hit at the
 /// same depth the first one by id counts.
 class KernelScene {
@@ -63,7 +75,7 @@ class KernelScene {
   /// For that picture: what it does not need is left out. @pre as above
   KernelScene(const Scene& scene, const RenderOptions& options);
 
-  /// Takes the camera, and where the solids are, anew from a scene; tables and meshes
+  /// Takes the camera, where the solids are and how opaque, anew from a scene; tables and meshes
   /// stay.
   /// @pre the camera is valid; the scene has the solids and the expression that this was made of
   void look(const Scene& scene);
@@ -71,6 +83,8 @@ class KernelScene {
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
   /// World-space box of the cells that hold surface, and of the meshes; empty when there are none.
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
+  /// The same of blocks: what places are as exact as, in single precision.
+  [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
   [[nodiscard]] std::size_t bytes() const;
   /// Blocks of the solids by what was done with them.
@@ -83,39 +97,42 @@ class KernelScene {
 
   /// Of the solids; meshes() are for the caller.
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
-  /// @return how far each ray is within what is drawn of the solids, along the view axis, world
-  /// units
+  [[nodiscard]] PixelWalk walkFrom(const PixelBlock& pixels) const;
+  /// What rays meet next: those that were told to go on, the others what they met before.
+  [[nodiscard]] PixelHits castOn(const KernelTracer& tracer, PixelWalk& walk) const;
+  /// @return how far each ray is within what is drawn of the solids and is seen, along the view
+  /// axis, world units
   [[nodiscard]] std::vector<double> thickness(const KernelTracer& tracer,
                                               const PixelBlock& pixels) const;
-  /// @return for each ray 1 if it meets something within its reach, else 0
-  [[nodiscard]] std::vector<char> findBlocked(const KernelTracer& tracer,
-                                              const std::vector<LightRay>& rays) const;
+  /// @return for each ray the share of its light that what it meets within its reach lets through
+  [[nodiscard]] std::vector<double> transmittances(const KernelTracer& tracer,
+                                                   const std::vector<LightRay>& rays) const;
 
  private:
   [[nodiscard]] PixelHits castFirst(const KernelTracer& tracer, const PixelBlock& pixels) const;
-  [[nodiscard]] PixelHits castCsg(const KernelTracer& tracer, const PixelBlock& pixels) const;
   /// Is a place within what is drawn that those solids hold?
   [[nodiscard]] bool isInside(const std::vector<char>& inside) const;
-  /// Those of the rays from `first` up to `last` that are blocked.
-  void blockFirst(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
-                  std::size_t last, std::vector<char>& blocked) const;
-  void blockCsg(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
-                std::size_t last, std::vector<char>& blocked) const;
+  /// Dims the light of the rays from `first` up to `last`.
+  void dimBySolids(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
+                   std::size_t last, std::vector<double>& light) const;
+  void dimByCsg(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
+                std::size_t last, std::vector<double>& light) const;
 
   /// @param isPicture  leave out what it does not need
   void makeTables(const Scene& scene, const RenderOptions& options, bool isPicture);
 
   /// Where a surface is, of which the tables may hold a part or nothing.
   struct Extent {
-    std::size_t index;       // in Scene::solids
-    Imath::Box3d inIndices;  // of the blocks that it crosses
+    std::size_t index;           // in Scene::solids
+    Imath::Box3d cells, blocks;  // that it crosses, in indices
   };
   std::vector<Extent> extents_;
   Counts counts_;
   std::vector<KernelSolid> solids_;  // by id
   CsgExpression csg_;                // of those
   MeshRays meshes_;
-  Imath::Box3d bounds_;
+  Imath::Box3d bounds_, tableBounds_;
+  double near_ = 0, far_ = Camera::kNoDepth;  // depths that the camera sees
 };
 
 }  // namespace render

@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <limits>
 #include <mutex>
 
 #include "render/shading/surface_shape.h"
@@ -52,8 +51,8 @@ std::size_t KernelPainter::numberOf(const Pixel& pixel) const {
 Hit KernelPainter::hitOf(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const {
   const Hit onSolid = hits.solid[i] < 0 ? Hit() : hitOnSolid(ray, hits, i);
   if (surfaces_.meshes().isEmpty()) return onSolid;
-  const double far = onSolid.found ? onSolid.distance : std::numeric_limits<double>::max();
-  const Hit onMesh = surfaces_.meshes().intersect(ray.origin, ray.direction, far);
+  const double far = onSolid.found ? onSolid.distance : ray.far;
+  const Hit onMesh = surfaces_.meshes().intersect(ray.origin, ray.direction, ray.near, far);
   return onMesh.found ? onMesh : onSolid;
 }
 
@@ -66,6 +65,7 @@ Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std
   hit.id = solid.id;
   hit.solid = solid.index;
   hit.colour = scene_.solids[solid.index].colour;
+  hit.opacity = solid.opacity;
   hit.isTurned = hits.turned[i] != 0;
   addShape(hit, hits.shapes.at(i), solid.tableToWorld, ray.direction);
   hit.surfaceError += kCastError * solid.voxelSize;
@@ -103,52 +103,76 @@ void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixe
 void KernelPainter::paintColours(const KernelTracer& tracer,
                                  const std::vector<Pixel>& pixels) const {
   const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
-  std::vector<Imath::C3f> sums(pixels.size(), Imath::C3f(0));
-  std::vector<int> covered(pixels.size(), 0);
-  struct Lit {
-    std::size_t pixel;
-    Hit hit;
-    V3d direction;
-    LightRays range;
-  };
+  std::vector<ColourSum> sums(pixels.size());
   PixelBlock at(pixels.size());
   for (int s = 0; s < options_.samples; ++s) {
-    std::vector<V2d> places;
+    std::vector<Sight> sights;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const V2d shift = PixelSequence::overArea(pixels[i].x, pixels[i].y).at(s);
       // What single precision makes of the place is where the ray goes.
       at.x[i] = static_cast<float>(pixels[i].x + shift.x - middleX);
       at.y[i] = static_cast<float>(pixels[i].y + shift.y - middleY);
-      places.emplace_back(static_cast<double>(at.x[i]) + middleX,
-                          static_cast<double>(at.y[i]) + middleY);
+      sights.push_back({scene_.camera.ray(static_cast<double>(at.x[i]) + middleX,
+                                          static_cast<double>(at.y[i]) + middleY)});
     }
-    const PixelHits hits = surfaces_.castPixels(tracer, at);
-    std::vector<LightRay> rays;
-    std::vector<Lit> points;
-    const auto addColours = [&] {
-      const std::vector<char> blocked = surfaces_.findBlocked(tracer, rays);
-      for (const Lit& point : points) {
-        sums[point.pixel] += shader_.colour(point.hit, point.direction, point.range, rays, blocked);
-        ++covered[point.pixel];
-      }
-      rays.clear();
-      points.clear();
-    };
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      if (rays.size() > kMostLightRays) addColours();
-      const Camera::Ray ray = scene_.camera.ray(places[i].x, places[i].y);
-      Lit point;
-      point.pixel = i;
-      point.hit = hitOf(ray, hits, i);
-      if (!point.hit.found) continue;
-      point.direction = ray.direction;
-      point.range = shader_.addRays(point.hit, point.direction, pixels[i].x, pixels[i].y, s, rays);
-      points.push_back(point);
+    if (scene_.isOpaque()) {
+      addSeen(tracer, pixels, s, surfaces_.castPixels(tracer, at), sights, sums);
+      continue;
     }
-    addColours();
+    PixelWalk walk = surfaces_.walkFrom(at);
+    for (bool seesMore = true; seesMore;) {
+      const PixelHits hits = surfaces_.castOn(tracer, walk);
+      for (const std::size_t i : addSeen(tracer, pixels, s, hits, sights, sums))
+        walk.solids.goOn(i);
+      seesMore = std::any_of(sights.begin(), sights.end(),
+                             [](const Sight& sight) { return sight.left >= kLeastTransmittance; });
+    }
   }
   for (std::size_t i = 0; i < pixels.size(); ++i)
-    layers_.setColour(numberOf(pixels[i]), sums[i], covered[i], options_.samples);
+    layers_.setColour(numberOf(pixels[i]), sums[i], options_.samples);
+}
+
+std::vector<std::size_t> KernelPainter::addSeen(const KernelTracer& tracer,
+                                                const std::vector<Pixel>& pixels, int sample,
+                                                const PixelHits& hits, std::vector<Sight>& sights,
+                                                std::vector<ColourSum>& sums) const {
+  struct Lit {
+    std::size_t pixel;
+    Hit hit;
+    V3d direction;
+    double share;
+    LightRays range;
+  };
+  std::vector<std::size_t> throughSolids;
+  std::vector<LightRay> rays;
+  std::vector<Lit> points;
+  const auto addColours = [&] {
+    const std::vector<double> light = surfaces_.transmittances(tracer, rays);
+    for (const Lit& point : points)
+      sums[point.pixel].add(shader_.colour(point.hit, point.direction, point.range, rays, light),
+                            point.share);
+    rays.clear();
+    points.clear();
+  };
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    auto& [ray, left] = sights[i];
+    if (left < kLeastTransmittance) continue;
+    if (rays.size() > kMostLightRays) addColours();
+    const Hit hit = hitOf(ray, hits, i);
+    if (!hit.found) {
+      left = 0;
+      continue;
+    }
+    points.push_back({i, hit, ray.direction, left * hit.opacity,
+                      shader_.addRays(hit, ray.direction, pixels[i].x, pixels[i].y, sample, rays)});
+    left *= 1 - hit.opacity;
+    if (hit.isOnMesh)
+      ray.near = hit.beyond();
+    else if (left >= kLeastTransmittance)
+      throughSolids.push_back(i);
+  }
+  addColours();
+  return throughSolids;
 }
 
 Image paintPicture(const Scene& scene, const KernelScene& surfaces, const KernelTracer& tracer,
@@ -175,7 +199,7 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
       "{:.1f} MB; {} more were left out, and {} of those that it crosses are out of sight",
       counts.crossed, counts.beside, static_cast<double>(surfaces.bytes()) * 1e-6, counts.leftOut,
       counts.unseen);
-  addViewAttributes(image, scene, surfaces.bounds().size().length());
+  addViewAttributes(image, scene, surfaces.tableBounds().size().length());
   return image;
 }
 

@@ -37,6 +37,16 @@ class KernelPainter {
   [[nodiscard]] Hit hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
   void paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
   void paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
+  /// The ray of a pixel's sample, from `near` on for meshes.
+  struct Sight {
+    Camera::Ray ray;
+    double left = 1;  ///< transmittance of what it met; 0: it leaves the scene
+  };
+  /// Adds up what rays meet that see anything yet.
+  /// @return numbers of those that go on through a solid
+  std::vector<std::size_t> addSeen(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
+                                   int sample, const PixelHits& hits, std::vector<Sight>& sights,
+                                   std::vector<ColourSum>& sums) const;
 
   const Scene& scene_;
   const KernelScene& surfaces_;

@@ -27,7 +27,7 @@ RayFan makeRayFan(const Camera& camera, const M44d& tableToWorld, double voxelSi
   const V3d axis = camera.axis();
   const Camera::PixelSteps step = camera.pixelSteps();
 
-  // The nearest corner of the box, and not behind the camera.
+  // The nearest corner of the box, and not before the depth from which the camera sees.
   double depth = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 8; ++i) {
     const V3d p(i & 4 ? pool.high[0] : pool.low[0], i & 2 ? pool.high[1] : pool.low[1],
@@ -35,7 +35,7 @@ RayFan makeRayFan(const Camera& camera, const M44d& tableToWorld, double voxelSi
     depth = std::min(depth, (p * tableToWorld - camera.from).dot(axis));
   }
   // Off the faces of the box, where the surface may be.
-  depth = std::max(depth - 2 * voxelSize, 0.0);
+  depth = std::max(depth - 2 * voxelSize, camera.near);
 
   RayFan fan;
   fan.depth = depth;

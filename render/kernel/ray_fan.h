@@ -9,7 +9,7 @@ namespace render {
 
 /// The rays of a picture in the space of a BrickPool's table, so that single precision is enough
 /// for them however far away the camera is: t counts from a plane across the view just before the
-/// surface, and a step of 1 is a step of 1 in depth.
+/// surface, not before the camera's `near`, and a step of 1 is a step of 1 in depth.
 ///
 /// The ray of the pixel whose centre is (x, y) right of and below the picture's centre, in pixels:
 /// origin + x originX + y originY, direction + x directionX + y directionY.

@@ -190,6 +190,19 @@ void findSplineCrossings(const Accessor& accessor, Brick& brick) {
     }
 }
 
+/// Calls work(first, last) for each row of cells along z, from the first that is crossed to the
+/// last.
+template <typename Work>
+void overCrossedRows(const Brick& brick, const Work& work) {
+  for (int x = 0; x < kBlock; ++x)
+    for (int y = 0; y < kBlock; ++y) {
+      const unsigned bit = static_cast<unsigned>(x << 6 | y << 3);
+      const unsigned column = brick.mask[bit >> 5] >> (bit & 31) & 0xff;
+      if (column != 0)
+        work(Coord(x, y, std::countr_zero(column)), Coord(x, y, std::bit_width(column) - 1));
+    }
+}
+
 /// A block and the points of it that something takes.
 struct Part {
   Coord origin;
@@ -209,18 +222,13 @@ void addPartsBeside(const Brick& brick, std::vector<Part>& parts) {
           beside[static_cast<std::size_t>(((x + 1) * 3 + y + 1) * 3 + z + 1)].expand(part);
         }
   };
-  for (int x = 0; x < kBlock; ++x)
-    for (int y = 0; y < kBlock; ++y) {
-      const unsigned bit = static_cast<unsigned>(x << 6 | y << 3);
-      const unsigned column = brick.mask[bit >> 5] >> (bit & 31) & 0xff;
-      if (column == 0) continue;
-      const Coord first(x, y, std::countr_zero(column)), last(x, y, std::bit_width(column) - 1);
-      for (int a = 0; a < 3; ++a) {
-        Coord further(0);
-        further[a] = 1;
-        add(CoordBBox(first - Coord(1) - further, last + Coord(2) + further));
-      }
+  overCrossedRows(brick, [&](const Coord& first, const Coord& last) {
+    for (int a = 0; a < 3; ++a) {
+      Coord further(0);
+      further[a] = 1;
+      add(CoordBBox(first - Coord(1) - further, last + Coord(2) + further));
     }
+  });
   for (int n = 0; n < 27; ++n) {
     const CoordBBox& points = beside[static_cast<std::size_t>(n)];
     if (n == 13 || points.empty()) continue;
@@ -261,7 +269,7 @@ Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
   const std::vector<Coord> blocks = blocksOf(tree);
   std::vector<std::unique_ptr<Brick>> bricks(blocks.size());
   struct Sum {
-    CoordBBox crossed;
+    CoordBBox crossed, cells;
     std::size_t unneeded = 0;
   };
   tbb::enumerable_thread_specific<Sum> sums;
@@ -279,8 +287,12 @@ Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
         findSplineCrossings(accessor, *brick);
         if (brick->mask == decltype(brick->mask){}) continue;
       }
-      sum.crossed.expand(brick->origin);
       const Coord& origin = brick->origin;
+      sum.crossed.expand(origin);
+      overCrossedRows(*brick, [&](const Coord& first, const Coord& last) {
+        sum.cells.expand(origin + first);
+        sum.cells.expand(origin + last);
+      });
       if (options.needs &&
           !options.needs(Imath::V3d(origin.x(), origin.y(), origin.z()) + Imath::V3d(0.5 * kBlock),
                          kRadius)) {
@@ -296,6 +308,7 @@ Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
   result.needed = std::move(bricks);
   for (const Sum& sum : sums) {
     result.crossed.expand(sum.crossed);
+    result.cells.expand(sum.cells);
     result.unneeded += sum.unneeded;
   }
   return result;

@@ -34,6 +34,7 @@ struct BesideBlock {
 struct Bricks {
   std::vector<std::unique_ptr<Brick>> needed;  ///< in the order of their origins
   openvdb::CoordBBox crossed;                  ///< origins of all that are crossed
+  openvdb::CoordBBox cells;                    ///< that are, of all
   std::size_t unneeded = 0;
 };
 

@@ -51,13 +51,25 @@ void PictureLayers::setCurvature(std::size_t i, const CurvatureSample& sample) c
   for (int k = 0; k < 4; ++k) curvature[k][i] = static_cast<float>(values[k]);
 }
 
-void PictureLayers::setColour(std::size_t i, const Imath::C3f& sum, int covered,
-                              int samples) const {
+void PictureLayers::setColour(std::size_t i, const ColourSum& sum, int samples) const {
   const float weight = 1.0f / static_cast<float>(samples);
-  r[i] = sum.x * weight;
-  g[i] = sum.y * weight;
-  b[i] = sum.z * weight;
-  a[i] = static_cast<float>(covered) * weight;
+  r[i] = sum.colour.x * weight;
+  g[i] = sum.colour.y * weight;
+  b[i] = sum.colour.z * weight;
+  a[i] = static_cast<float>(sum.coverage) * weight;
+}
+
+void requireOpacity(const Scene& scene) {
+  const auto require = [](const auto& parts) {
+    for (const auto& part : parts)
+      if (!(part.opacity > 0 && part.opacity <= 1))
+        throw levelset::UsageError(fmt::format(
+            "render: an opacity of {} cannot be drawn; give more than 0 and at most 1, or leave "
+            "the part out",
+            part.opacity));
+  };
+  require(scene.solids);
+  require(scene.meshes);
 }
 
 void requireLight(const Scene& scene) {
@@ -84,6 +96,7 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
         options.samples, options.ambientSamples, options.shadowSamples, kMaxSamples, kMaxSamples));
   }
   requireLight(scene);
+  requireOpacity(scene);
   const StyleOptions& style = options.style;
   if (!(style.curvatureRange >= 0 && std::isfinite(style.curvatureRange)) ||
       !(style.lineWidth >= 0 && style.lineWidth <= 1000)) {
@@ -153,6 +166,8 @@ void addViewAttributes(Image& image, const Scene& scene, double extent) {
   image.attributes[kExtentAttribute] = fmt::format("{:.9g}", extent);
   image.attributes["software"] = "Levelsmith " LEVELSMITH_VERSION;
   image.attributes["depthType"] = "distance along the view axis";
+  if (scene.camera.near > 0) image.attributes["ls:near"] = fmt::format("{}", scene.camera.near);
+  if (scene.camera.far) image.attributes["ls:far"] = fmt::format("{}", *scene.camera.far);
   const auto floats = [](const Imath::M44d& m) {
     std::vector<float> values;
     for (int i = 0; i < 4; ++i)

@@ -13,6 +13,17 @@
 // What all renderers' pictures have in common.
 namespace render {
 
+/// Colours of what a pixel's rays meet, added up.
+struct ColourSum {
+  Imath::C3f colour{0};
+  double coverage = 0;
+  /// @param share  of the ray that ends there: its surface's opacity times what comes so far
+  void add(const Imath::C3f& seen, double share) {
+    colour += seen * static_cast<float>(share);
+    coverage += share;
+  }
+};
+
 /// The layers of a picture, as plain pointers for the tiles.
 struct PictureLayers {
   float *r, *g, *b, *a, *z;
@@ -25,14 +36,17 @@ struct PictureLayers {
   /// Of pixel `i`, from a hit whose normals are known.
   void setHit(std::size_t i, const Camera& camera, const Hit& hit) const;
   void setCurvature(std::size_t i, const CurvatureSample& sample) const;
-  /// From the sum over `samples` of which `covered` hit.
-  void setColour(std::size_t i, const Imath::C3f& sum, int covered, int samples) const;
+  /// From the sum over `samples`.
+  void setColour(std::size_t i, const ColourSum& sum, int samples) const;
 };
 
-/// @throws levelset::UsageError for a camera that cannot see, a light that cannot shine or sample
-///         counts out of range; levelset::ResourceLimit for an image too large;
-///         levelset::InvalidInput for bands narrower than the filter reaches
+/// @throws levelset::UsageError for a camera that cannot see, a light that cannot shine, parts that
+///         cannot be seen or sample counts out of range; levelset::ResourceLimit for an image too
+///         large; levelset::InvalidInput for bands narrower than the filter reaches
 void requirePicture(const Scene& scene, const RenderOptions& options);
+
+/// @throws levelset::UsageError for an opacity that is not in (0, 1]
+void requireOpacity(const Scene& scene);
 
 /// @throws levelset::UsageError for a light that cannot shine
 void requireLight(const Scene& scene);
@@ -44,7 +58,7 @@ void requireLight(const Scene& scene);
 [[nodiscard]] std::map<std::string, std::string> sceneAttributes(const Scene& scene,
                                                                  const RenderOptions& options);
 
-/// Software, camera matrices, what Z is, and ls:extent.
+/// Software, camera matrices and depths (ls:near, ls:far, if set), what Z is, and ls:extent.
 /// @param extent  diagonal of the surfaces' box, world units
 void addViewAttributes(Image& image, const Scene& scene, double extent);
 

@@ -142,7 +142,8 @@ LightRays Shader::addRays(const Hit& hit, const V3d& direction, int x, int y, in
 }
 
 C3f Shader::colour(const Hit& hit, const V3d& direction, const LightRays& range,
-                   const std::vector<LightRay>& rays, const std::vector<char>& blocked) const {
+                   const std::vector<LightRay>& rays,
+                   const std::vector<double>& transmittances) const {
   const Frame frame = frameOf(hit, direction);
   switch (options_.style.style) {
     case Style::Tone:
@@ -156,8 +157,7 @@ C3f Shader::colour(const Hit& hit, const V3d& direction, const LightRays& range,
   }
   const auto lightOf = [&](std::size_t first, std::size_t count) {
     double sum = 0;
-    for (std::size_t i = first; i < first + count; ++i)
-      if (!blocked[i]) sum += rays[i].light;
+    for (std::size_t i = first; i < first + count; ++i) sum += rays[i].light * transmittances[i];
     return sum;
   };
   const double open =

@@ -57,10 +57,10 @@ class Shader {
   [[nodiscard]] LightRays addRays(const Hit& hit, const Imath::V3d& direction, int x, int y,
                                   int sample, std::vector<LightRay>& rays) const;
 
-  /// Linear colour of the hit, once it is known which of all `rays` are blocked.
+  /// Linear colour of the hit, once it is known how much of the light of all `rays` comes through.
   [[nodiscard]] Imath::C3f colour(const Hit& hit, const Imath::V3d& direction,
                                   const LightRays& range, const std::vector<LightRay>& rays,
-                                  const std::vector<char>& blocked) const;
+                                  const std::vector<double>& transmittances) const;
 
  private:
   struct Frame {

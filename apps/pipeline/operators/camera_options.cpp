@@ -12,7 +12,12 @@ namespace {
 
 using levelset::UsageError;
 
-constexpr const char* kNames[] = {"size", "from", "to", "up", "fov", "ortho"};
+constexpr const char* kNames[] = {"size", "from", "to", "up", "fov", "ortho", "near", "far"};
+
+void setDepths(Invocation& in, render::Camera& camera) {
+  if (in.given("near")) camera.near = in.length("near");
+  if (in.given("far")) camera.far = in.length("far");
+}
 
 /// Those that are given, or all.
 void setOptions(Invocation& in, bool isAll, render::Camera& camera) {
@@ -24,6 +29,7 @@ void setOptions(Invocation& in, bool isAll, render::Camera& camera) {
   if (in.given("to")) camera.to = in.point("to");
   if (in.given("ortho")) camera.orthoHeight = in.length("ortho");
   if (in.given("fov") && !in.given("ortho")) camera.orthoHeight.reset();
+  setDepths(in, camera);
 }
 
 }  // namespace
@@ -44,6 +50,14 @@ void addCameraParams(std::vector<Param>& params) {
       {.name = "ortho",
        .type = ParamType::Length,
        .doc = "orthographic; height of the view",
+       .range = Range::Positive},
+      {.name = "near",
+       .type = ParamType::Length,
+       .doc = "along the view axis: what is nearer is cut off, though it casts shadows; default: 0",
+       .range = Range::NonNegative},
+      {.name = "far",
+       .type = ParamType::Length,
+       .doc = "what is farther is cut off; default: nothing",
        .range = Range::Positive}};
   params.insert(params.end(), camera.begin(), camera.end());
 }
@@ -65,6 +79,7 @@ render::Camera cameraOf(Invocation& in, const Imath::Box3d& bounds, const render
     const auto [width, height] = in.imageSize("size");
     camera = render::framingCamera(bounds, width, height, in.radians("fov"), in.point("up"));
     if (in.given("ortho")) camera.orthoHeight = in.length("ortho");
+    setDepths(in, camera);
   }
   render::validate(camera);
   return camera;

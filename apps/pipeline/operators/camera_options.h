@@ -11,7 +11,7 @@
 
 namespace pipeline {
 
-/// --size, --from, --to, --up, --fov, --ortho.
+/// --size, --from, --to, --up, --fov, --ortho, --near, --far.
 void addCameraParams(std::vector<Param>& params);
 
 [[nodiscard]] bool givesCamera(const Invocation& in);

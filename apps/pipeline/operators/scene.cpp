@@ -10,6 +10,7 @@
 
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/camera_options.h"
+#include "apps/pipeline/units.h"
 #include "levelset/error.h"
 
 namespace pipeline {
@@ -62,6 +63,23 @@ std::vector<Imath::C3f> partColours(const Invocation& in) {
   return colours;
 }
 
+/// One for each part.
+std::vector<double> partOpacities(const Invocation& in) {
+  std::vector<double> opacities(in.operands.size(), 1);
+  if (!in.given("opacities")) return opacities;
+  const std::vector<std::string> words = wordsOf(in.text("opacities"));
+  if (words.size() != opacities.size())
+    throw UsageError(fmt::format("scene: {} opacities for {} parts; give as many", words.size(),
+                                 opacities.size()));
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    opacities[i] = parseNumber(words[i], "scene: --opacities");
+    if (!(opacities[i] > 0 && opacities[i] <= 1))
+      throw UsageError(fmt::format(
+          "scene: --opacities {} is out of range; give more than 0 and at most 1", words[i]));
+  }
+  return opacities;
+}
+
 Plan planScene(Invocation& in) {
   Plan plan{.kind = Kind::Scene};
   for (const Value& operand : in.operands) {
@@ -81,6 +99,7 @@ Value makeScene(Invocation& in) {
   (void)planScene(in);
   const std::vector<std::string> names = partNames(in);
   const std::vector<Imath::C3f> colours = partColours(in);
+  const std::vector<double> opacities = partOpacities(in);
   if (in.given("colours") && colours.size() != in.operands.size())
     throw UsageError(fmt::format("scene: {} colours for {} parts; give as many", colours.size(),
                                  in.operands.size()));
@@ -91,11 +110,15 @@ Value makeScene(Invocation& in) {
     const Imath::C3f& colour = colours[i % colours.size()];
     const auto id = static_cast<std::uint32_t>(i + 1);
     if (in.operands[i].kind() == Kind::Mesh) {
-      scene.meshes.push_back(
-          {std::make_shared<const levelset::TriMesh>(in.mesh(i)), colour, id, names[i]});
+      scene.meshes.push_back({std::make_shared<const levelset::TriMesh>(in.mesh(i)), colour, id,
+                              names[i], opacities[i]});
       continue;
     }
-    scene.solids.push_back({.band = in.band(i), .colour = colour, .id = id, .name = names[i]});
+    scene.solids.push_back({.band = in.band(i),
+                            .colour = colour,
+                            .id = id,
+                            .name = names[i],
+                            .opacity = opacities[i]});
     solids.push_back(names[i]);
   }
   if (in.given("csg")) scene.csg = render::CsgExpression(in.text("csg"), solids);
@@ -135,7 +158,11 @@ void addSceneOperators(std::vector<Operator>& all) {
                   .doc = "of the parts, blanks between them; default: those of --as"},
                  {.name = "colours",
                   .type = ParamType::Points,
-                  .doc = "of the parts: red,green,blue from 0 to 1, blanks between them"}},
+                  .doc = "of the parts: red,green,blue from 0 to 1, blanks between them"},
+                 {.name = "opacities",
+                  .type = ParamType::Text,
+                  .doc = "of the parts' surfaces: above 0, up to 1, blanks between them; less than "
+                         "1 is seen through, in R G B A, and casts a weaker shadow"}},
       .operands = {{Kind::Band, Kind::Mesh}},
       .takesMore = true,
       .resultKind = [](const Invocation&) { return Kind::Scene; },

@@ -15,6 +15,7 @@
 #include "levelset/files/mesh_file.h"
 #include "levelset/solids/csg.h"
 #include "levelset/solids/shapes.h"
+#include "levelset/solids/transform.h"
 #include "mapping/generators/knurl.h"
 #include "mapping/patches/patch_grid.h"
 #include "mapping/textures/geometric_texture.h"
@@ -62,6 +63,26 @@ Scene csgScene(int width, int height) {
   Scene scene = support::sceneOf(cut, width, height);
   scene.solids.push_back({.band = levelset::makeSphere(12, V3d(5, 3, 12), 0.37), .id = 2});
   scene.solids.push_back({.band = support::rings(), .id = 3});
+  return scene;
+}
+
+/// A ball, a ring and a box of three voxel sizes, turned against each other, for an expression.
+Scene sceneAlongRays(const std::string& csg) {
+  const auto turned = [](const NarrowBand& band, const V3d& axis, double angle, double scale) {
+    return levelset::transform(
+        band, Imath::M44d().setScale(scale) * Imath::M44d().setAxisAngle(axis.normalized(), angle));
+  };
+  Scene scene = support::sceneOf(levelset::makeSphere(20, V3d(3, 1, 4), 0.55));
+  scene.solids.push_back({.band = turned(levelset::makeTorus(30, 11, V3d(0), V3d(0, 0, 1), 1),
+                                         V3d(1, 2, 0), 0.7, 0.83),
+                          .colour = Imath::C3f(0.35f, 0.5f, 0.66f),
+                          .id = 2});
+  scene.solids.push_back({.band = turned(levelset::makeBox(V3d(18, 44, 20), V3d(9, 2, 7), 0.37),
+                                         V3d(-1, 1, 3), -0.4, 1.1),
+                          .colour = Imath::C3f(0.7f, 0.42f, 0.32f),
+                          .id = 3});
+  scene.csg = CsgExpression(csg, {"a", "b", "c"});
+  scene.camera = framingCamera(scene.bounds(), 1024, 768);
   return scene;
 }
 
@@ -141,6 +162,10 @@ TEST(Agreement, OfBallsAndTheSolidsOfCsg) {
   expectProven(csgScene(1024, 768), "csg");
 }
 
+TEST(Agreement, OfAnExpressionAlongTheRays) {
+  for (const char* csg : {"(a | b) - c", "a & b | c - a"}) expectProven(sceneAlongRays(csg), csg);
+}
+
 TEST(Agreement, OfATexturedSolid) {
   expectProven(support::sceneOf(knurledCylinder()), "knurled cylinder");
 }
@@ -164,32 +189,60 @@ TEST(Agreement, OfTheDragon) {
   expectSameBits(support::seenFromFar(dragon), "dragon from 1e5 away");
 }
 
-TEST(Agreement, From200PlacesNothingLeaks) {
-  // A pixel that one hits and the other misses is a hole or a false hit, but along an outline,
-  // where rounding decides.
-  std::mt19937 random(5);
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> even(0, 1);
-  Scene scene = support::sceneOf(support::rings(), 96, 72);
-  scene.solids.push_back(
-      {.band = levelset::makeBox(V3d(70, 40, 0.7), V3d(0.1, 0.2, -13), 1), .id = 2});
-  std::size_t pixels = 0, hit = 0, atOutline = 0;
-  for (int n = 0; n < 200; ++n) {
-    const V3d way = V3d(normal(random), normal(random), normal(random)).normalized();
-    scene.camera.from = way * (20 + 100 * even(random));  // some within
-    scene.camera.to = V3d(even(random), even(random), even(random)) * 8;
-    scene.camera.verticalFov = 0.2 + 1.5 * even(random);
+/// Pictures of a scene from places all around it, some within.
+class ManyPlaces {
+ public:
+  /// @param change  made to the view, with a number in [0, 1)
+  template <typename Change>
+  void look(Scene& scene, const Change& change) {
+    const V3d way = V3d(normal_(random_), normal_(random_), normal_(random_)).normalized();
+    scene.camera.from = way * (20 + 100 * even_(random_));
+    scene.camera.to = V3d(even_(random_), even_(random_), even_(random_)) * 8;
+    scene.camera.verticalFov = 0.2 + 1.5 * even_(random_);
+    change(scene.camera, even_(random_));
     const ImageComparison found =
         compareImages(renderCpu(scene, kData), renderEmbree(scene, kData));
     EXPECT_EQ(found.unlikeElsewhere, 0u)
-        << "place " << n << ", pixel " << (found.unlike.empty() ? 0 : found.unlike[0].x) << ","
-        << (found.unlike.empty() ? 0 : found.unlike[0].y);
-    pixels += found.pixels;
-    hit += found.bothHit;
-    atOutline += found.unlikeAtOutline;
+        << "place " << places_ << ", pixel " << (found.unlike.empty() ? 0 : found.unlike[0].x)
+        << "," << (found.unlike.empty() ? 0 : found.unlike[0].y);
+    ++places_;
+    pixels_ += found.pixels;
+    hit_ += found.bothHit;
+    atOutline_ += found.unlikeAtOutline;
   }
-  EXPECT_GT(hit, pixels / 10);
-  EXPECT_LE(static_cast<double>(atOutline), 1e-5 * static_cast<double>(pixels));
+  /// A pixel that one hits and the other misses is a hole or a false hit, but along an outline,
+  /// where rounding decides.
+  void expectNoLeak() const {
+    EXPECT_GT(hit_, pixels_ / 10);
+    EXPECT_LE(static_cast<double>(atOutline_), 1e-5 * static_cast<double>(pixels_));
+  }
+
+ private:
+  std::mt19937 random_{5};
+  std::normal_distribution<double> normal_;
+  std::uniform_real_distribution<double> even_{0, 1};
+  std::size_t places_ = 0, pixels_ = 0, hit_ = 0, atOutline_ = 0;
+};
+
+TEST(Agreement, From200PlacesNothingLeaks) {
+  Scene scene = support::sceneOf(support::rings(), 96, 72);
+  scene.solids.push_back(
+      {.band = levelset::makeBox(V3d(70, 40, 0.7), V3d(0.1, 0.2, -13), 1), .id = 2});
+  ManyPlaces places;
+  for (int n = 0; n < 200; ++n) places.look(scene, [](Camera&, double) {});
+  places.expectNoLeak();
+}
+
+TEST(Agreement, OfAnExpressionBetweenTwoPlanesNothingLeaks) {
+  Scene scene = resized(sceneAlongRays("(a - b) & c | b - a"), 96, 72);
+  ManyPlaces places;
+  for (int n = 0; n < 60; ++n)
+    places.look(scene, [](Camera& camera, double share) {
+      const double away = (camera.to - camera.from).length();
+      camera.near = std::max(0.0, away + 30 * (share - 0.7));
+      camera.far = camera.near + 15 + 30 * share;
+    });
+  places.expectNoLeak();
 }
 
 }  // namespace agreement_test

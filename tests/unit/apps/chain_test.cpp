@@ -7,11 +7,11 @@
 namespace chain_test {
 
 using levelset::UsageError;
-using pipeline::Chain;
+using pipeline::Graph;
 using pipeline::parseChain;
 
 /// Splits at blanks; words in 'quotes' stay together.
-Chain parse(const std::string& line) {
+Graph parse(const std::string& line) {
   std::vector<std::string> words;
   std::string word;
   bool quoted = false;
@@ -39,28 +39,28 @@ std::string refusal(const std::string& line) {
   EXPECT_NE(refusal(line_).find(part_), std::string::npos) << refusal(line_)
 
 TEST(Chain, SplitsActionsOptionsAndGlobals) {
-  const Chain chain =
+  const Graph graph =
       parse("--threads 2 -v sphere --radius 1 --voxel=0.1 --as ball ! offset -2vx ! write out.vdb");
-  EXPECT_EQ(chain.globals.at("threads"), "2");
-  EXPECT_TRUE(chain.globals.contains("verbose"));
-  ASSERT_EQ(chain.actions.size(), 3u);
-  EXPECT_EQ(chain.actions[0].options.at("voxel"), "0.1");
-  EXPECT_EQ(chain.actions[0].resultName, "ball");
-  EXPECT_EQ(chain.actions[1].options.at("distance"), "-2vx");
-  EXPECT_EQ(chain.actions[2].options.at("file"), "out.vdb");
+  EXPECT_EQ(graph.globals.at("threads"), "2");
+  EXPECT_TRUE(graph.globals.contains("verbose"));
+  ASSERT_EQ(graph.nodes.size(), 3u);
+  EXPECT_EQ(graph.nodes[0].options.at("voxel"), "0.1");
+  EXPECT_EQ(graph.nodes[0].name, "ball");
+  EXPECT_EQ(graph.nodes[1].options.at("distance"), "-2vx");
+  EXPECT_EQ(graph.nodes[2].options.at("file"), "out.vdb");
 }
 
 TEST(Chain, TakesUniqueBeginningsOfOptions) {
-  EXPECT_EQ(parse("sphere --rad 1 --vox 0.1").actions[0].options.at("radius"), "1");
+  EXPECT_EQ(parse("sphere --rad 1 --vox 0.1").nodes[0].options.at("radius"), "1");
   EXPECT_REFUSAL("sphere --r 1 --voxel 0.1", "may mean");
 }
 
 TEST(Chain, TakesOperandsByName) {
-  const Chain chain = parse(
+  const Graph graph = parse(
       "sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 2 --voxel 0.1 --as b ! union @a @b ! "
       "difference @a");
-  EXPECT_EQ(chain.actions[2].operandNames, (std::vector<std::string>{"a", "b"}));
-  EXPECT_EQ(chain.actions[3].operandNames, std::vector<std::string>{"a"});
+  EXPECT_EQ(graph.nodes[2].inputs, (std::vector<std::size_t>{0, 1}));
+  EXPECT_EQ(graph.nodes[3].inputs, (std::vector<std::size_t>{2, 0}));
 }
 
 TEST(Chain, RefusesUnknownWords) {

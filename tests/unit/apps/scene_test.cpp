@@ -49,6 +49,24 @@ TEST_F(Scenes, AreTheSameAfterTheyWereSaved) {
   EXPECT_NE(levelsmith("compare-images a.exr d.exr").code, 0);
 }
 
+TEST_F(Scenes, AreSeenBetweenTwoPlanes) {
+  const Outcome made =
+      levelsmith(kTwo +
+                 "--csg 'b - s' --from 0,0,5 --to 0,0,0 --near 4.5 --far 5.5 --size 64x48 "
+                 "! write cut.json ! render a.exr --samples 1 --renderer both");
+  ASSERT_EQ(made.code, 0) << made.err;
+  const std::string json = shell("cat cut.json").out;
+  EXPECT_NE(json.find("\"near\": 4.5"), std::string::npos) << json;
+  EXPECT_EQ(levelsmith("read cut.json ! render b.exr --samples 1 --renderer cpu").code, 0);
+  EXPECT_EQ(levelsmith("compare-images a.exr b.exr --exact").code, 0);
+  EXPECT_EQ(levelsmith("read cut.json ! render c.exr --samples 1 --near 4 --renderer cpu").code, 0);
+  EXPECT_NE(levelsmith("compare-images a.exr c.exr").code, 0);
+  EXPECT_EQ(levelsmith("read cut.json ! render c.exr --near 6").code, 2);
+  EXPECT_EQ(levelsmith("read cut.json ! render c.exr --near -1").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--near 3 --far 2 ! info").code, 2);
+  EXPECT_EQ(readChanged("\"near\": 4.5", "\"near\": 6").code, 3);
+}
+
 TEST_F(Scenes, HoldMeshesToo) {
   const Outcome made =
       levelsmith(kTwo.substr(0, kTwo.find("! scene")) +
@@ -71,6 +89,22 @@ TEST_F(Scenes, HoldMeshesToo) {
   EXPECT_EQ(levelsmith(dry).code, 0);
   EXPECT_EQ(readChanged("cut-m.ply", "cut-b.vdb").code, 2);
   EXPECT_EQ(readChanged("b - s", "b - m").code, 2);  // a mesh is no solid
+}
+
+TEST_F(Scenes, AreSeenThrough) {
+  const Outcome made = levelsmith(kTwo +
+                                  "--csg 'b - s' --opacities '1 0.25' --from 4,3,5 --to 0,0,0 "
+                                  "--size 64x48 ! write cut.json ! render a.exr --samples 2 "
+                                  "--renderer both");
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_NE(shell("cat cut.json").out.find("\"opacity\": 0.25"), std::string::npos);
+  EXPECT_EQ(levelsmith("read cut.json ! render b.exr --samples 2 --renderer cpu").code, 0);
+  EXPECT_EQ(levelsmith("compare-images a.exr b.exr --exact").code, 0);
+  EXPECT_EQ(readChanged("\"opacity\": 0.25", "\"opacity\": 0").code, 3);
+  EXPECT_EQ(readChanged("\"opacity\": 0.25", "\"opacity\": 1.5").code, 3);
+  EXPECT_EQ(levelsmith(kTwo + "--opacities '0.5' ! render a.png").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--opacities '0.5 0' ! render a.png").code, 2);
+  EXPECT_EQ(levelsmith(kTwo + "--opacities '0.5 thin' ! render a.png").code, 2);
 }
 
 TEST_F(Scenes, TellWhatIsInThem) {

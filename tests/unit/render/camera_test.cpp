@@ -59,6 +59,23 @@ TEST(Camera, FieldOfViewIsVertical) {
   EXPECT_NEAR(std::acos(top.dot(camera.axis())), camera.verticalFov / 2, 1e-14);
 }
 
+TEST(Camera, SeesBetweenTwoPlanes) {
+  Camera camera = tiltedCamera();
+  EXPECT_EQ(camera.ray(3, 5).near, 0);
+  EXPECT_EQ(camera.ray(3, 5).far, Camera::kNoDepth);
+  camera.near = 2;
+  camera.far = 7;
+  for (const bool isOrtho : {false, true}) {
+    if (isOrtho) camera.orthoHeight = 3;
+    const Camera::Ray ray = camera.ray(3, 5);
+    const auto depthAt = [&](double t) {
+      return (ray.origin + ray.direction * t - camera.from).dot(camera.axis());
+    };
+    EXPECT_NEAR(depthAt(ray.near), 2, 1e-14);
+    EXPECT_NEAR(depthAt(ray.far), 7, 1e-14);
+  }
+}
+
 TEST(Camera, FramesABoxAtAnyAspect) {
   const Imath::Box3d boxes[] = {
       {V3d(-1), V3d(1)}, {V3d(10, 0, -3), V3d(11, 40, -2)}, {V3d(-500, 2, 7), V3d(500, 2.001, 9)}};
@@ -97,6 +114,12 @@ TEST(Camera, RefusesWhatCannotSee) {
   refused([](Camera& c) { c.verticalFov = std::numbers::pi; });
   refused([](Camera& c) { c.orthoHeight = -1; });
   refused([](Camera& c) { c.orthoHeight = std::numeric_limits<double>::quiet_NaN(); });
+  refused([](Camera& c) { c.near = -1; });
+  refused([](Camera& c) { c.near = std::numeric_limits<double>::infinity(); });
+  refused([](Camera& c) { c.near = std::numeric_limits<double>::quiet_NaN(); });
+  refused([](Camera& c) { c.far = 0; });
+  refused([](Camera& c) { c.far = std::numeric_limits<double>::infinity(); });
+  refused([](Camera& c) { c.near = 2, c.far = 2; });
   Camera huge = tiltedCamera();
   huge.width = huge.height = 1000000;
   EXPECT_THROW(validate(huge), levelset::ResourceLimit);

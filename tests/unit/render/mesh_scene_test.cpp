@@ -160,18 +160,18 @@ TEST(MeshRays, TakeNormalsAndColoursOfVertices) {
   scene.meshes.push_back({std::make_shared<const levelset::TriMesh>(mesh), {}, 7, "m"});
   const MeshRays rays(scene);
   for (const double x : {-0.8, 0.0, 0.5}) {
-    const Hit hit = rays.intersect(V3d(x, 0.1, 5), V3d(0, 0, -1), 100);
+    const Hit hit = rays.intersect(V3d(x, 0.1, 5), V3d(0, 0, -1), 0, 100);
     ASSERT_TRUE(hit.found);
     EXPECT_NEAR(hit.distance, 5, 1e-12);
     EXPECT_LT((hit.normal - V3d(x, 0, 1).normalized()).length(), 1e-5);
     EXPECT_EQ(hit.facetNormal, V3d(0, 0, 1));
     EXPECT_NEAR(hit.colour.x, std::pow(((1 - x) / 2 + 0.055) / 1.055, 2.4), 1e-4);
     EXPECT_EQ(hit.id, 7u);
-    EXPECT_FALSE(rays.intersect(V3d(x, 0.1, 5), V3d(0, 0, -1), 4.9).found);
+    EXPECT_FALSE(rays.intersect(V3d(x, 0.1, 5), V3d(0, 0, -1), 0, 4.9).found);
     EXPECT_TRUE(rays.isOccluded(V3d(x, 0.1, 5), V3d(0, 0, -1), 5.1));
     EXPECT_FALSE(rays.isOccluded(V3d(x, 0.1, 5), V3d(0, 0, -1), 4.9));
   }
-  EXPECT_FALSE(rays.intersect(V3d(3, 0, 5), V3d(0, 0, -1), 100).found);
+  EXPECT_FALSE(rays.intersect(V3d(3, 0, 5), V3d(0, 0, -1), 0, 100).found);
   EXPECT_TRUE(MeshRays(Scene()).isEmpty());
 }
 

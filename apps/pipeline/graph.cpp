@@ -1,0 +1,111 @@
+#include "apps/pipeline/graph.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "apps/pipeline/invocation.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::UsageError;
+
+std::string mismatch(const Operator& op, std::size_t index, Kind found,
+                     const std::vector<Kind>& allowed) {
+  const char* remedy = "";
+  if (found == Kind::Mesh && allowed == std::vector{Kind::Band})
+    remedy = "; put 'level-set' before it";
+  if (found == Kind::Band && allowed == std::vector{Kind::Mesh}) remedy = "; put 'mesh' before it";
+  if (found == Kind::Surface)
+    remedy = "; it has no inside, and is the base of patches and of 'texture --alone' only";
+  if (found == Kind::Patch) remedy = "; 'texture' makes a level set with it";
+  if (found == Kind::Scene) remedy = "; 'render' draws it, 'write' saves it as .json";
+  std::string kinds;
+  for (std::size_t i = 0; i < allowed.size(); ++i)
+    kinds += fmt::format("{}a {}",
+                         i == 0                    ? ""
+                         : i + 1 == allowed.size() ? " or "
+                                                   : ", ",
+                         kindName(allowed[i]));
+  return fmt::format("{}: operand {} is a {}, {} is needed{}", op.name, index + 1, kindName(found),
+                     kinds, remedy);
+}
+
+void checkOperands(const Node& node, const std::vector<Node>& before) {
+  const Operator& op = *node.op;
+  const std::size_t wanted = op.operands.size(), found = node.inputs.size();
+  if (found > wanted && !op.takesMore) {
+    throw UsageError(fmt::format("{}: takes {} operand{}, not {}", op.name, wanted,
+                                 wanted == 1 ? "" : "s", found));
+  }
+  if (found < wanted && !op.operandsOptional) {
+    throw UsageError(
+        fmt::format("{}: needs {} operand{} and finds {}; read or make {} first, or name {} with "
+                    "'@'",
+                    op.name, wanted, wanted == 1 ? "" : "s", found,
+                    wanted - found == 1 ? "one" : "them", wanted - found == 1 ? "it" : "them"));
+  }
+  for (std::size_t i = 0; i < found; ++i) {
+    const std::vector<Kind>& allowed = op.operands[std::min(i, wanted - 1)];
+    const Kind kind = before[node.inputs[i]].kind;
+    if (std::find(allowed.begin(), allowed.end(), kind) == allowed.end())
+      throw UsageError(mismatch(op, i, kind, allowed));
+  }
+}
+
+void checkNamed(const Node& node, const std::vector<Node>& before) {
+  for (const auto& [option, number] : node.named) {
+    const Node& value = before[number];
+    const bool isScalar = node.op->find(option)->type == ParamType::Scalar;
+    if (value.kind == Kind::Field || (isScalar && value.kind == Kind::Band)) continue;
+    throw UsageError(fmt::format("{}: --{}: '@{}' is a {}, a {} is needed", node.op->name, option,
+                                 value.name, kindName(value.kind),
+                                 isScalar ? "field or a level set" : "field"));
+  }
+}
+
+}  // namespace
+
+Kind checkNode(const Node& node, const std::vector<Node>& before) {
+  const Operator& op = *node.op;
+  checkOperands(node, before);
+  checkNamed(node, before);
+  Invocation probe(op, node.options);
+  for (const std::size_t input : node.inputs)
+    probe.operands.emplace_back(Plan{.kind = before[input].kind});
+  if (op.validate) op.validate(probe);
+  return node.makes() && op.resultKind ? op.resultKind(probe) : Kind::Band;
+}
+
+std::vector<char> neededNodes(const Graph& graph) {
+  const std::vector<Node>& nodes = graph.nodes;
+  // An operator that makes a value and writes files beside it is not there for the value alone.
+  const auto actsOutside = [](const Node& node) {
+    return !node.makes() ||
+           (node.op->targets && !node.op->targets(Invocation(*node.op, node.options)).empty());
+  };
+  std::vector<char> needed(nodes.size(), 0);
+  for (std::size_t i = 0; i < nodes.size(); ++i) needed[i] = actsOutside(nodes[i]) ? 1 : 0;
+  if (std::find(needed.begin(), needed.end(), 1) == needed.end())
+    return std::vector<char>(nodes.size(), 1);
+  for (std::size_t i = nodes.size(); i-- > 0;) {
+    if (!needed[i]) continue;
+    for (const std::size_t input : nodes[i].inputs) needed[input] = 1;
+    for (const auto& [option, input] : nodes[i].named) needed[input] = 1;
+  }
+  return needed;
+}
+
+std::vector<std::size_t> countUses(const Graph& graph, const std::vector<char>& needed) {
+  std::vector<std::size_t> uses(graph.nodes.size(), 0);
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    if (!needed[i]) continue;
+    for (const std::size_t input : graph.nodes[i].inputs) ++uses[input];
+    for (const auto& [option, input] : graph.nodes[i].named) ++uses[input];
+  }
+  return uses;
+}
+
+}  // namespace pipeline

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "apps/pipeline/operator.h"
+
+namespace pipeline {
+
+/// An action, its parameters checked, and what it takes.
+struct Node {
+  const Operator* op = nullptr;
+  std::map<std::string, std::string> options;  ///< by full name; a flag is "true"
+  std::vector<std::size_t> inputs;             ///< its operands: numbers of nodes before it
+  std::map<std::string, std::size_t> named;    ///< by option: the node of its `@NAME`
+  std::string name;                            ///< --as; empty: none
+  Kind kind = Kind::Band;                      ///< of its result, if it makes one
+  std::string place;                           ///< where it was written, if in a script
+
+  [[nodiscard]] bool makes() const { return op->flow == Flow::Makes; }
+};
+
+/// Values that are made of values: what is asked for, not yet computed. However it was written, as
+/// a chain, as a file, as JSON, the same graph comes of it.
+struct Graph {
+  std::map<std::string, std::string> globals;  ///< options of the run as a whole
+  std::vector<Node> nodes;                     ///< each behind what it takes
+};
+
+/// Checks what a node takes, and tells the kind of what it makes.
+/// @throws levelset::UsageError for operands that are too many, too few or of kinds that it does
+/// not
+///         take, and as Operator::validate
+[[nodiscard]] Kind checkNode(const Node& node, const std::vector<Node>& before);
+
+/// By node: is it needed for what the graph does outside itself, that is for what it writes, draws,
+/// prints or checks? Where it does nothing of that kind, everything is.
+[[nodiscard]] std::vector<char> neededNodes(const Graph& graph);
+
+/// By node: by how many others that are needed its value is taken.
+[[nodiscard]] std::vector<std::size_t> countUses(const Graph& graph,
+                                                 const std::vector<char>& needed);
+
+}  // namespace pipeline
