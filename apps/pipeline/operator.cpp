@@ -13,6 +13,48 @@ namespace pipeline {
 
 using levelset::UsageError;
 
+const char* typeName(ParamType type) {
+  switch (type) {
+    case ParamType::Flag:
+      return "flag";
+    case ParamType::Number:
+      return "number";
+    case ParamType::Integer:
+      return "integer";
+    case ParamType::Length:
+      return "length";
+    case ParamType::Lengths:
+      return "lengths";
+    case ParamType::Degrees:
+      return "degrees";
+    case ParamType::Numbers:
+      return "numbers";
+    case ParamType::Point:
+      return "point";
+    case ParamType::Points:
+      return "points";
+    case ParamType::Box:
+      return "box";
+    case ParamType::Matrix:
+      return "matrix";
+    case ParamType::Choice:
+      return "choice";
+    case ParamType::Text:
+      return "text";
+    case ParamType::Path:
+      return "path";
+    case ParamType::ImageSize:
+      return "image size";
+    case ParamType::Bytes:
+      return "bytes";
+    case ParamType::Scalar:
+      return "scalar field";
+    case ParamType::Velocity:
+      return "velocity";
+  }
+  return "";
+}
+
 std::string valueForm(const Param& param) {
   switch (param.type) {
     case ParamType::Flag:
