@@ -104,14 +104,6 @@ cli::ProgressStyle progressStyle(const pipeline::Graph& graph) {
   return cli::ProgressStyle::Bar;
 }
 
-/// Where the action that ended the run was written; empty when none ran, or on a command line.
-std::string placeOfFailure(const pipeline::RunReport& report) {
-  if (report.exitCode == static_cast<int>(ExitCode::Numeric))  // of the first, told at the end
-    for (const pipeline::StepReport& step : report.steps)
-      if (!step.notes.failure.empty()) return step.place;
-  return report.steps.empty() ? "" : report.steps.back().place;
-}
-
 int runGraph(const pipeline::Graph& graph) {
   const auto& globals = graph.globals;
   const std::size_t maxMemory = globals.contains("max-memory")
@@ -141,6 +133,7 @@ int runGraph(const pipeline::Graph& graph) {
   pipeline::RunSettings settings;
   settings.dryRun = dryRun;
   settings.maxMemory = maxMemory;
+  if (globals.contains("cache")) settings.cache = globals.at("cache");
   settings.measureErrors = verbose || globals.contains("report");
   settings.begin = [](const std::string& action) { cli::tellAction(action); };
   settings.progress = [&](std::size_t index, const std::string& action, double fraction) {
@@ -172,16 +165,13 @@ int runGraph(const pipeline::Graph& graph) {
   };
   try {
     arena.execute([&] { pipeline::run(graph, settings, report); });
-  } catch (const std::exception& failure) {
+  } catch (const std::exception&) {
     // What went wrong first is what the user must hear.
     try {
       finish();
     } catch (const levelset::Error& error) {
       tell(error.what());
     }
-    const std::string place = placeOfFailure(report);
-    const auto* refusal = dynamic_cast<const levelset::Error*>(&failure);
-    if (refusal && !place.empty()) pipeline::refuseAt(place, *refusal);
     throw;
   }
   finish();

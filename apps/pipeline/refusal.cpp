@@ -22,11 +22,14 @@ bool isWantOfThreads(const std::exception& error) {
   return std::string_view(error.what()).starts_with("pthread_create");
 }
 
-namespace {
+std::string withPlace(const std::string& sentence, const std::string& place) {
+  return place.empty() ? sentence : sentence + " (" + place + ")";
+}
 
-[[noreturn]] void refuse(levelset::ExitCode code, const std::string& sentence) {
+void refuseAs(const std::string& who, const levelset::Error& error, const std::string& place) {
   using levelset::ExitCode;
-  switch (code) {
+  const std::string sentence = withPlace(sentenceOf(who, error.what()), place);
+  switch (error.exitCode()) {
     case ExitCode::Usage:
       throw levelset::UsageError(sentence);
     case ExitCode::Resource:
@@ -42,16 +45,6 @@ namespace {
       break;
   }
   throw levelset::InvalidInput(sentence);
-}
-
-}  // namespace
-
-void refuseAs(const std::string& who, const levelset::Error& error) {
-  refuse(error.exitCode(), sentenceOf(who, error.what()));
-}
-
-void refuseAt(const std::string& place, const levelset::Error& error) {
-  refuse(error.exitCode(), std::string(error.what()) + " (" + place + ")");
 }
 
 }  // namespace pipeline

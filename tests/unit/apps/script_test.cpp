@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "apps/pipeline/operator.h"
 #include "levelset/error.h"
 #include "tests/support/shell.h"
@@ -194,6 +196,31 @@ TEST_F(Script, TellsTheRoundOfAMistake) {
   writeFile("a.ply", "ply\n");
   EXPECT_REFUSED(levelsmith("run run.txt"), 3, "(run.txt, line 2, f = a.ply)");
   EXPECT_EQ(levelsmith("read a.ply").err.find("("), std::string::npos);
+  // What shows before anything runs.
+  writeFile("to.txt", "sphere --radius 1 --voxel 0.5\nfor d in . no\nwrite ${d}/a.vdb\nend\n");
+  EXPECT_REFUSED(levelsmith("run to.txt"), 6, "(to.txt, line 3, d = no)");
+  EXPECT_FALSE(exists("a.vdb"));
+  writeFile("over.txt", "sphere --radius 1 --voxel 0.5\nrepeat 2\nwrite a.vdb\nend\n");
+  const auto over = levelsmith("run over.txt");
+  EXPECT_NE(over.err.find("only the last one stays; use another file (over.txt, line 3, i = 1)"),
+            std::string::npos)
+      << over.err;
+}
+
+TEST_F(Script, TellsTheRoundInReportsAndOfChecks) {
+  writeFile("loop.txt",
+            "for r in 1 2\n  sphere --radius ${r} --voxel 0.2 --as ball${r}\n"
+            "  offset ${r}vx\n  compare @ball${r} --tolerance 0.3\nend\n");
+  const auto outcome = levelsmith("--report r.json run loop.txt");
+  EXPECT_EQ(outcome.code, 5);
+  EXPECT_NE(outcome.err.find("(loop.txt, line 4, r = 2)"), std::string::npos) << outcome.err;
+  const auto report = nlohmann::json::parse(support::slurp(folder_ / "r.json"));
+  EXPECT_EQ(report["steps"][1]["place"], "loop.txt, line 3, r = 1");
+}
+
+TEST_F(Script, GivesNoVariablesToGraphs) {
+  ASSERT_EQ(levelsmith("--dry-run --save-graph g.json sphere --radius 1 --voxel 0.2").code, 0);
+  EXPECT_REFUSED(levelsmith("run g.json --set voxel=1"), 2, "a graph has no variables");
 }
 
 // Each round takes what the last one left.
