@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <random>
 
 #include "apps/pipeline/operator.h"
 #include "levelset/error.h"
@@ -176,6 +177,25 @@ TEST_F(Script, RefusesMalformedLoops) {
   EXPECT_TOLD(refusal("set a=1 2\nbox"), "'a=1' is not a name");
   EXPECT_TOLD(refusal("set a 1 2\nbox"), "quote what has blanks");
   EXPECT_TOLD(refusal("repeat 2\nset i 3\nbox\nend"), "the variable of a loop");
+}
+
+// Words or a refusal, whatever stands in a file.
+TEST_F(Script, SurvivesWhateverAFileHolds) {
+  const std::vector<std::string> parts = {
+      "repeat", "for",  "end", "set",  "in",  "as", "step", "x",    "i",       "2",  "0..2", "..",
+      "${",     "${x}", "$${", "${i:", "}",   "'",  "\"",   "\\",   "\n",      "\n", "\n",   " ",
+      " ",      " ",    "!",   "#",    "-.5", "@",  "?[",   "\r\n", "--voxel", ":",  "-",    "9e9"};
+  std::mt19937 random(1);
+  std::size_t accepted = 0;
+  for (int i = 0; i < 1000; ++i) {
+    std::string text = i % 2 ? "box\n" : "for x in 1 2\n";
+    for (auto n = random() % 24; n > 0; --n) text += parts[random() % parts.size()];
+    if (i % 2 == 0) text += "\nbox ${x}\nend\n";
+    const std::string sentence = refusal(text);
+    accepted += sentence == "accepted";
+    EXPECT_FALSE(sentence.empty()) << text;
+  }
+  EXPECT_GT(accepted, 20u);
 }
 
 TEST_F(Script, BoundsWhatLoopsComeTo) {
