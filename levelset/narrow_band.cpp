@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -228,6 +229,23 @@ float backgroundOf(double halfWidth, double voxelSize) {
   const auto background = static_cast<float>(width);
   // A float times the inverse of its factor is itself but for the last bits of a double.
   return background < width * (1 - 1e-12) ? std::nextafter(background, INFINITY) : background;
+}
+
+openvdb::CoordBBox blocksOf(const Imath::Box3d& world, const openvdb::math::Transform& transform) {
+  openvdb::BBoxd index;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Imath::V3d p((corner & 4) ? world.max.x : world.min.x,
+                       (corner & 2) ? world.max.y : world.min.y,
+                       (corner & 1) ? world.max.z : world.min.z);
+    index.expand(transform.worldToIndex(toVdb(p)));
+  }
+  const auto at = [](double x) { return static_cast<int>(std::clamp(x, -kIndexLimit, kIndexLimit)); };
+  openvdb::CoordBBox blocks;
+  for (int axis = 0; axis < 3; ++axis) {
+    blocks.min()[axis] = at(std::floor(index.min()[axis])) & ~7;
+    blocks.max()[axis] = at(std::ceil(index.max()[axis])) | 7;
+  }
+  return blocks;
 }
 
 void requireBackground(float background, double voxelSize, const char* action) {

@@ -63,6 +63,11 @@ struct VdbAccess {
 /// @throws InvalidInput when distances up to there leave the range of `float`
 void requireBackground(float background, double voxelSize, const char* action);
 
+/// The 8³ blocks of grid points that meet a world box, as far as there are indices: from the first
+/// point of the first to the last of the last.
+[[nodiscard]] openvdb::CoordBBox blocksOf(const Imath::Box3d& world,
+                                          const openvdb::math::Transform& transform);
+
 /// An empty level-set grid with that transform and background halfWidth × voxelSize.
 [[nodiscard]] openvdb::FloatGrid::Ptr emptyLevelSet(openvdb::math::Transform::Ptr transform,
                                                     double halfWidth);

@@ -91,29 +91,43 @@ class LeafCollector {
   tbb::enumerable_thread_specific<std::vector<std::unique_ptr<LeafNode>>> leaves_;
 };
 
+using Region = std::optional<openvdb::CoordBBox>;
+
 /// Signs of tiles. Their points lie at least a voxel from the surface, so neighbouring tiles agree:
-/// only the first of a row of them is looked up.
+/// only the first of a row of them is looked up. Of a tile that the region only meets, the part
+/// within: two neighbours have theirs side by side.
 template <typename Node>
-void signTiles(Node& node, const SignField& field, const V3i& origin, float background) {
+void signTiles(Node& node, const SignField& field, const V3i& origin, float background,
+               const Region& region) {
   constexpr openvdb::Index kZ = 1, kY = 1u << Node::LOG2DIM, kX = 1u << (2 * Node::LOG2DIM);
   std::vector<signed char> side(Node::NUM_VALUES, 0);  // 0: a child
   for (auto it = node.beginValueAll(); it; ++it) {
     const openvdb::Index n = it.pos();
     signed char& s = side[n];
+    Coord at = it.getCoord();
+    if (region) {
+      const Coord last = at.offsetBy(static_cast<int>(Node::ChildNodeType::DIM) - 1);
+      if (!region->hasOverlap({at, last})) {
+        it.setValue(background);
+        continue;
+      }
+      at.maxComponent(region->min());
+    }
     if (n % kY != 0) s = side[n - kZ];
     if (s == 0 && n % kX >= kY) s = side[n - kY];
     if (s == 0 && n >= kX) s = side[n - kX];
-    if (s == 0) s = field.isInside(toV3i(it.getCoord()) - origin) ? -1 : 1;
+    if (s == 0) s = field.isInside(toV3i(at) - origin) ? -1 : 1;
     it.setValue(s < 0 ? -background : background);
   }
 }
 
 template <typename Node>
-void signTilesOfAll(FloatTree& tree, const SignField& field, const V3i& origin, float background) {
+void signTilesOfAll(FloatTree& tree, const SignField& field, const V3i& origin, float background,
+                    const Region& region) {
   std::vector<Node*> nodes;
   tree.getNodes(nodes);
   tbb::parallel_for(std::size_t{0}, nodes.size(),
-                    [&](std::size_t i) { signTiles(*nodes[i], field, origin, background); });
+                    [&](std::size_t i) { signTiles(*nodes[i], field, origin, background, region); });
 }
 
 /// Interior tiles of the root: a row of them lies between two nodes that hold the surface.
@@ -134,23 +148,45 @@ void signRootTiles(FloatTree& tree, const SignField& field, const V3i& origin, f
   }
 }
 
+/// All that the region meets: a part of a solid may lie open anywhere.
+void signRootTilesIn(const openvdb::CoordBBox& region, FloatTree& tree, const SignField& field,
+                     const V3i& origin, float background) {
+  constexpr int kDim = static_cast<int>(Upper::DIM);
+  const Coord first = region.min() & ~(kDim - 1);
+  for (std::int64_t x = first.x(); x <= region.max().x(); x += kDim)
+    for (std::int64_t y = first.y(); y <= region.max().y(); y += kDim)
+      for (std::int64_t z = first.z(); z <= region.max().z(); z += kDim) {
+        const Coord at(static_cast<int>(x), static_cast<int>(y), static_cast<int>(z));
+        if (tree.probeConstNode<Upper>(at)) continue;
+        const Coord within(std::max(at.x(), region.min().x()), std::max(at.y(), region.min().y()),
+                           std::max(at.z(), region.min().z()));
+        if (field.isInside(toV3i(within) - origin)) tree.root().addTile(at, -background, false);
+      }
+}
+
 }  // namespace
 
 openvdb::FloatGrid::Ptr assembleBand(const LocalMesh& surface, const SignField& field,
                                      const V3i& origin, double voxelSize, double halfWidth,
+                                     const std::optional<openvdb::CoordBBox>& region,
                                      std::size_t maxMemory, const Progress& progress) {
+  std::optional<Imath::Box3i> visited;
+  if (region) visited = {toV3i(region->min()) - origin, toV3i(region->max()) - origin};
   LeafCollector collector(halfWidth, voxelSize, maxMemory);
   forEachBlock(
       surface, halfWidth,
       [&](const V3i& block, std::span<const std::uint32_t> candidates) {
         collector.add(surface, field, block, candidates, origin, halfWidth);
       },
-      progress);
+      progress, visited);
   openvdb::FloatGrid::Ptr grid = collector.finish(halfWidth);
   const float background = grid->background();
-  signTilesOfAll<Lower>(grid->tree(), field, origin, background);
-  signTilesOfAll<Upper>(grid->tree(), field, origin, background);
-  signRootTiles(grid->tree(), field, origin, background);
+  signTilesOfAll<Lower>(grid->tree(), field, origin, background, region);
+  signTilesOfAll<Upper>(grid->tree(), field, origin, background, region);
+  if (region)
+    signRootTilesIn(*region, grid->tree(), field, origin, background);
+  else
+    signRootTiles(grid->tree(), field, origin, background);
   return grid;
 }
 

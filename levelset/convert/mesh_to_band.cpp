@@ -178,7 +178,20 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
     addOpenSurface(local, field, options.halfWidth, maxMemory, subProgress(progress, 0.5, 0.6));
 
   // === Distances
-  const auto grid = convert::assembleBand(local, field, origin, voxelSize, options.halfWidth,
+  std::optional<openvdb::CoordBBox> region;
+  if (options.region && !field.isOpen()) {
+    Imath::Box3d reached = bounds(mesh);
+    const V3d rim((options.halfWidth + 1) * voxelSize);
+    reached = {reached.min - rim, reached.max + rim};
+    for (int axis = 0; axis < 3; ++axis) {
+      reached.min[axis] = std::max(reached.min[axis], options.region->min[axis]);
+      reached.max[axis] = std::min(reached.max[axis], options.region->max[axis]);
+    }
+    if (reached.isEmpty())
+      throw InvalidInput("level-set: the region that is asked for lies beyond the mesh");
+    region = blocksOf(reached, *uniformTransform(voxelSize));
+  }
+  const auto grid = convert::assembleBand(local, field, origin, voxelSize, options.halfWidth, region,
                                           maxMemory, subProgress(progress, 0.6, 1));
   certificate.ambiguousShare = convert::ambiguousShare(*grid, field, origin);
   if (options.certified) options.certified(certificate);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "levelset/mesh.h"
@@ -39,6 +40,9 @@ struct MeshToBandOptions {
   Nesting nesting = Nesting::Parity;    ///< read under Closed only
   bool signAnyway = false;              ///< accept a sign that is a guess, or no inside
   bool searchSelfIntersections = true;  ///< when false, Auto trusts the mesh to have none
+  /// World; distances are made only there, as cropped() leaves them, unless the mesh has holes: the
+  /// certificate tells of the whole of it.
+  std::optional<Imath::Box3d> region = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
   /// Told the certificate once it is whole, also when the mesh is refused after it.

@@ -25,8 +25,12 @@ struct Cell {
 class BlockWalk {
  public:
   BlockWalk(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
-            const Progress& progress)
-      : mesh_(mesh), reach_(reach), visit_(visit), gate_(progress, kShare, "level-set") {
+            const Progress& progress, const std::optional<Imath::Box3i>& region)
+      : mesh_(mesh),
+        reach_(reach),
+        visit_(visit),
+        gate_(progress, kShare, "level-set"),
+        region_(region) {
     boxes_.resize(mesh.triangles.size());
     for (std::size_t t = 0; t < boxes_.size(); ++t) boxes_[t] = boxOf(t);
   }
@@ -79,7 +83,17 @@ class BlockWalk {
     return frame.squaredDistance(low + V3d(last / 2)) <= range * range;
   }
 
+  [[nodiscard]] bool isInRegion(const Cell& cell) const {
+    if (!region_) return true;
+    const std::int64_t low[] = {cell.x, cell.y, cell.z};
+    for (int axis = 0; axis < 3; ++axis)
+      if (low[axis] > region_->max[axis] || low[axis] + cell.size <= region_->min[axis])
+        return false;
+    return true;
+  }
+
   void walk(const Cell& cell, const List& triangles, std::size_t share) {
+    if (!isInRegion(cell)) return gate_.advance(share);
     if (cell.size == kBlockDim) {
       visit_(V3i(static_cast<int>(cell.x), static_cast<int>(cell.y), static_cast<int>(cell.z)),
              triangles);
@@ -116,6 +130,7 @@ class BlockWalk {
   double reach_;
   const BlockVisitor& visit_;
   ProgressGate gate_;
+  std::optional<Imath::Box3i> region_;
   std::vector<Box> boxes_;
   tbb::task_group group_;
 };
@@ -123,8 +138,8 @@ class BlockWalk {
 }  // namespace
 
 void forEachBlock(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
-                  const Progress& progress) {
-  if (!mesh.triangles.empty()) BlockWalk(mesh, reach, visit, progress).run();
+                  const Progress& progress, const std::optional<Imath::Box3i>& region) {
+  if (!mesh.triangles.empty()) BlockWalk(mesh, reach, visit, progress, region).run();
 }
 
 }  // namespace levelset::convert

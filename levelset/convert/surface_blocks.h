@@ -1,9 +1,11 @@
 #pragma once
 
+#include <Imath/ImathBox.h>
 #include <Imath/ImathVec.h>
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -20,7 +22,8 @@ using BlockVisitor =
 /// Visits every 8³ block of grid points that may lie within `reach` voxels of the mesh. Space is
 /// halved from one cell down to the blocks, each cell passing on the triangles that reach its
 /// parts; large triangles are judged by their distance, not by their box.
+/// @param region  if any: the lowest grid point of the first block that is visited, and of the last
 void forEachBlock(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
-                  const Progress& progress);
+                  const Progress& progress, const std::optional<Imath::Box3i>& region = {});
 
 }  // namespace levelset::convert

@@ -24,6 +24,16 @@ Imath::Box3d worldBounds(const openvdb::FloatGrid& grid, const openvdb::CoordBBo
   return {toImath(world.min()), toImath(world.max())};
 }
 
+/// Of all grid points in the band or inside. A part of a solid need not have a band all around.
+openvdb::CoordBBox solidBounds(const openvdb::FloatGrid& grid) {
+  openvdb::CoordBBox bounds = grid.evalActiveVoxelBoundingBox();
+  openvdb::CoordBBox tile;
+  for (auto it = grid.tree().cbeginValueAll(); it; ++it)
+    if (it.getDepth() < openvdb::FloatTree::DEPTH - 1 && *it < 0 && it.getBoundingBox(tile))
+      bounds.expand(tile);
+  return bounds;
+}
+
 /// The solid's grid with the distance of a region of space, as far as the solid reaches.
 template <typename Distance>
 NarrowBand clipBy(const NarrowBand& solid, const Progress& progress, const Distance& distance) {
@@ -34,8 +44,7 @@ NarrowBand clipBy(const NarrowBand& solid, const Progress& progress, const Dista
   const auto phi = [&](double i, double j, double k) {
     return distance(toImath(grid.indexToWorld(openvdb::Vec3d(i, j, k))));
   };
-  if (!BlockFiller(*region, phi)
-           .fill(grid.evalActiveVoxelBoundingBox(), subProgress(progress, 0, 0.5), "clip"))
+  if (!BlockFiller(*region, phi).fill(solidBounds(grid), subProgress(progress, 0, 0.5), "clip"))
     throw nothingLeft();
   openvdb::FloatGrid::Ptr merged = mergePair(CsgOperation::Intersection, grid, *region);
   if (!hasInside(*merged)) throw nothingLeft();
@@ -59,21 +68,16 @@ NarrowBand clip(const NarrowBand& solid, const Imath::Box3d& box, const Progress
                     "must be below its upper one",
                     box.min[axis], box.max[axis], "xyz"[axis]));
   }
-  // Faces far beyond the band change nothing there; cut back, an infinite box is a finite one.
+  // A box beyond the band leaves nothing, and costs nothing to refuse.
   const openvdb::FloatGrid& grid = vdb(solid);
-  Imath::Box3d reach = worldBounds(grid, grid.evalActiveVoxelBoundingBox());
-  const double margin = 4 * static_cast<double>(grid.background());
-  V3d center, half;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double low = std::max(box.min[axis], reach.min[axis] - margin);
-    const double high = std::min(box.max[axis], reach.max[axis] + margin);
-    if (!(low < high)) throw nothingLeft();
-    center[axis] = (low + high) / 2;
-    half[axis] = (high - low) / 2;
-  }
+  const Imath::Box3d reach = worldBounds(grid, solidBounds(grid));
+  for (int axis = 0; axis < 3; ++axis)
+    if (box.min[axis] > reach.max[axis] || box.max[axis] < reach.min[axis]) throw nothingLeft();
+  // From each face by itself, so that a value does not depend on where the others are.
   return clipBy(solid, progress, [=](const V3d& p) {
-    const V3d q(std::abs(p.x - center.x) - half.x, std::abs(p.y - center.y) - half.y,
-                std::abs(p.z - center.z) - half.z);
+    const V3d q(std::max(box.min.x - p.x, p.x - box.max.x),
+                std::max(box.min.y - p.y, p.y - box.max.y),
+                std::max(box.min.z - p.z, p.z - box.max.z));
     const V3d outside(std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0));
     return outside.length() + std::min(std::max({q.x, q.y, q.z}), 0.0);
   });

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
+#include <set>
 #include <utility>
 
 #include "levelset/eikonal/distance_transform.h"
@@ -110,25 +112,64 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
   return result;
 }
 
+using Leaf = FloatTree::LeafNodeType;
+
 /// Gives grid points back what they had before a re-distancing where that was right, and the band
 /// its end where faces lie on grid points.
-void keepGoodValues(FloatGrid& made, const FloatGrid& before) {
+/// @param old  the leaf before, null where there was none
+void keepGoodValues(Leaf& leaf, const Leaf* old, float background, double voxelSize) {
   constexpr double kSame = 0.05;  // voxels: what re-distancing may be off along ridges
-  const auto same = static_cast<float>(kSame * made.voxelSize()[0]);
-  openvdb::tree::LeafManager<FloatTree> leaves(made.tree());
-  leaves.foreach ([&](FloatTree::LeafNodeType& leaf, std::size_t) {
-    const FloatTree::LeafNodeType* old = before.tree().probeConstLeaf(leaf.origin());
-    for (openvdb::Index n = 0; n < FloatTree::LeafNodeType::SIZE; ++n) {
-      if (!leaf.isValueOn(n)) continue;
-      const float value = leaf.getValue(n);
-      if (old && old->isValueOn(n)) {
-        if (std::abs(value - old->getValue(n)) <= same) leaf.setValueOnly(n, old->getValue(n));
-      } else if (std::abs(value) > made.background() - same) {
-        leaf.setValueOff(n, std::copysign(made.background(), value));
-      }
+  const auto same = static_cast<float>(kSame * voxelSize);
+  for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
+    if (!leaf.isValueOn(n)) continue;
+    const float value = leaf.getValue(n);
+    if (old && old->isValueOn(n)) {
+      if (std::abs(value - old->getValue(n)) <= same) leaf.setValueOnly(n, old->getValue(n));
+    } else if (std::abs(value) > background - same) {
+      leaf.setValueOff(n, std::copysign(background, value));
     }
-  });
-  openvdb::tools::pruneLevelSet(made.tree());
+  }
+}
+
+/// Blocks within `reach` blocks of others, along each axis by itself.
+std::set<openvdb::Coord> blocksAbout(const std::vector<openvdb::Coord>& blocks, int reach) {
+  std::set<openvdb::Coord> all(blocks.begin(), blocks.end());
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::vector<openvdb::Coord> before(all.begin(), all.end());
+    for (openvdb::Coord c : before) {
+      c[axis] -= reach * static_cast<int>(Leaf::DIM);
+      for (int i = 0; i <= 2 * reach; ++i, c[axis] += static_cast<int>(Leaf::DIM)) all.insert(c);
+    }
+  }
+  return all;
+}
+
+/// Makes distances again where faces that bound nothing were the nearest: about these only, so that
+/// what a solid is elsewhere changes nothing here, and costs nothing.
+void redistanceAbout(const std::vector<openvdb::Coord>& faces, FloatGrid& grid,
+                     const char* action) {
+  const double voxelSize = grid.voxelSize()[0];
+  const float background = grid.background();
+  eikonal::DistanceRequest request;
+  request.action = action;
+  request.halfWidth = static_cast<double>(background) / voxelSize;
+  const int reach = static_cast<int>(std::ceil((request.halfWidth + 1) / Leaf::DIM));
+  const std::set<openvdb::Coord> blocks = blocksAbout(faces, reach);
+  openvdb::CoordBBox region;
+  for (const openvdb::Coord& block : blocks)
+    region.expand(openvdb::CoordBBox::createCube(block, Leaf::DIM));
+  request.region = region;
+  const FloatGrid::Ptr made = eikonal::distanceTransform(grid, request);
+  for (const openvdb::Coord& block : blocks) {
+    if (const Leaf* leaf = made->tree().probeConstLeaf(block)) {
+      auto mended = std::make_unique<Leaf>(*leaf);
+      keepGoodValues(*mended, grid.tree().probeConstLeaf(block), background, voxelSize);
+      grid.tree().addLeaf(mended.release());
+    } else {
+      grid.tree().addTile(1, block, std::copysign(background, made->tree().getValue(block)), false);
+    }
+  }
+  openvdb::tools::pruneLevelSet(grid.tree());
 }
 
 }  // namespace
@@ -189,14 +230,9 @@ FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const F
   correctSeam(*result, a, b, signs);
   openvdb::tools::pruneLevelSet(result->tree());
   // Where they end at an edge of the result no plane tells how far it is.
-  if (hasCoincidentFaces(first, second, signs) && eikonal::hasZeroCrossing(result->tree())) {
-    eikonal::DistanceRequest request;
-    request.action = nameOf(operation);
-    request.halfWidth = static_cast<double>(result->background()) / result->voxelSize()[0];
-    FloatGrid::Ptr made = eikonal::distanceTransform(*result, request);
-    keepGoodValues(*made, *result);
-    return made;
-  }
+  const std::vector<openvdb::Coord> faces = coincidentFaces(first, second, signs);
+  if (!faces.empty() && eikonal::hasZeroCrossing(result->tree()))
+    redistanceAbout(faces, *result, nameOf(operation));
   return result;
 }
 

@@ -2,7 +2,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -130,19 +129,22 @@ bool isBesideBoth(const SignedPair& pair, const Coord& c) {
 
 }  // namespace
 
-bool hasCoincidentFaces(const FloatGrid& a, const FloatGrid& b, const CsgSigns& signs) {
+std::vector<Coord> coincidentFaces(const FloatGrid& a, const FloatGrid& b, const CsgSigns& signs) {
   std::vector<const Leaf*> shared;
   for (auto leaf = b.tree().cbeginLeaf(); leaf; ++leaf)
     if (a.tree().probeConstLeaf(leaf->origin())) shared.push_back(leaf.getLeaf());
-  std::atomic<bool> found = false;
+  std::vector<char> found(shared.size(), 0);
   const auto voxel = static_cast<float>(b.voxelSize()[0]);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, shared.size(), 16), [&](const auto& range) {
     const SignedPair pair(a, b, signs);
-    for (std::size_t i = range.begin(); i != range.end() && !found; ++i)
-      for (auto it = shared[i]->cbeginValueOn(); it && !found; ++it)
-        if (std::abs(*it) < voxel && isBesideBoth(pair, it.getCoord())) found = true;
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      for (auto it = shared[i]->cbeginValueOn(); it && !found[i]; ++it)
+        if (std::abs(*it) < voxel && isBesideBoth(pair, it.getCoord())) found[i] = 1;
   });
-  return found;
+  std::vector<Coord> leaves;
+  for (std::size_t i = 0; i < shared.size(); ++i)
+    if (found[i]) leaves.push_back(shared[i]->origin());
+  return leaves;
 }
 
 std::optional<ClosedPair> closeContacts(const FloatGrid& a, const FloatGrid& b,

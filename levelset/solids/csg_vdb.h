@@ -3,6 +3,7 @@
 // Steps of constructive solid geometry on grids, for our own .cpp files.
 
 #include <optional>
+#include <vector>
 
 #include "levelset/solids/csg.h"
 #include "levelset/vdb.h"
@@ -40,11 +41,12 @@ struct ClosedPair {
                                                       const openvdb::FloatGrid& b,
                                                       const CsgSigns& signs);
 
-/// Do the surfaces run through each other face to face somewhere, the inside of one where the
-/// outside of the other is? Their minimum is then zero, or nearly, along faces that bound nothing,
-/// and all distances about them are to these.
-[[nodiscard]] bool hasCoincidentFaces(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b,
-                                      const CsgSigns& signs);
+/// The leaf blocks where the surfaces run through each other face to face, the inside of one where
+/// the outside of the other is. Their minimum is then zero, or nearly, along faces that bound
+/// nothing, and all distances about them are to these.
+[[nodiscard]] std::vector<openvdb::Coord> coincidentFaces(const openvdb::FloatGrid& a,
+                                                          const openvdb::FloatGrid& b,
+                                                          const CsgSigns& signs);
 
 /// Corrects the minimum of two distances where it is a bound only. Inside a union, a point whose
 /// nearest point on one solid lies within the other is further from the surface than either

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "levelset/progress.h"
@@ -30,6 +31,9 @@ class BlockFiller {
         phi_(phi),
         voxelSize_(grid.voxelSize()[0]),
         background_(grid.background()) {}
+
+  /// Leaves are made of these blocks only.
+  void limitTo(const openvdb::CoordBBox& blocks) { limit_ = blocks; }
 
   /// Fills the 128³ blocks that meet `domain`; the rest stays as it was.
   /// @return whether any grid point lies inside
@@ -90,6 +94,7 @@ class BlockFiller {
   }
 
   void refine(const openvdb::Coord& origin, int edge, Filled& out) const {
+    if (limit_ && !limit_->hasOverlap(openvdb::CoordBBox::createCube(origin, edge))) return;
     const Side side = sideOf(origin, edge);
     if (side == Side::Outside) return;
     if (edge > kLeaf) {
@@ -144,6 +149,7 @@ class BlockFiller {
   const Phi& phi_;
   double voxelSize_;
   float background_;
+  std::optional<openvdb::CoordBBox> limit_;
   std::vector<openvdb::Coord> surfaceBlocks_;
   bool anyInside_ = false;
 };

@@ -33,7 +33,13 @@ NarrowBand makeShape(const ShapeExtent& extent, double voxelSize, const ShapeOpt
   const auto phi = [&](double i, double j, double k) {
     return distance(Imath::V3d(i * voxelSize, j * voxelSize, k * voxelSize));
   };
-  if (!BlockFiller(*grid, phi).fill(domain, options.progress, action)) {
+  BlockFiller filler(*grid, phi);
+  if (options.region) {
+    const openvdb::CoordBBox blocks = blocksOf(*options.region, grid->transform());
+    filler.limitTo(blocks);
+    domain.intersect(blocks);
+  }
+  if (!filler.fill(domain, options.progress, action)) {
     throw InvalidInput(
         fmt::format("{}: no grid point lies inside, the shape is too thin for voxels "
                     "of {}; use smaller voxels",

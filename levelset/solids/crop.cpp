@@ -1,0 +1,44 @@
+#include "levelset/solids/crop.h"
+
+#include <fmt/core.h>
+#include <openvdb/tools/Prune.h>
+
+#include <vector>
+
+#include "levelset/error.h"
+#include "levelset/solids/csg_vdb.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+
+NarrowBand cropped(NarrowBand band, const BandPart& part) {
+  using Leaf = openvdb::FloatTree::LeafNodeType;
+  if (part.halfWidth && !(*part.halfWidth >= 1))
+    throw UsageError(
+        fmt::format("crop: the half width is {} voxels; give at least 1", *part.halfWidth));
+  if (part.region && part.region->isEmpty())
+    throw UsageError("crop: the region is empty; give a box");
+  if (part.region) {
+    const openvdb::CoordBBox blocks = blocksOf(*part.region, vdb(band).transform());
+    std::vector<openvdb::Coord> beyond;
+    for (auto leaf = vdb(band).tree().cbeginLeaf(); leaf; ++leaf)
+      if (!blocks.isInside(leaf->origin())) beyond.push_back(leaf->origin());
+    if (!beyond.empty()) {
+      // Only what stays is copied.
+      const openvdb::FloatGrid& whole = vdb(band);
+      openvdb::FloatGrid::Ptr rest = openvdb::FloatGrid::create(whole.background());
+      rest->insertMeta(whole);
+      rest->setTransform(whole.transform().copy());
+      for (auto it = whole.tree().cbeginValueAll(); it; ++it)
+        if (it.getDepth() < openvdb::FloatTree::DEPTH - 1 && *it < 0)
+          rest->tree().addTile(openvdb::FloatTree::DEPTH - 1 - it.getDepth(), it.getCoord(), *it,
+                               false);
+      for (auto leaf = whole.tree().cbeginLeaf(); leaf; ++leaf)
+        if (blocks.isInside(leaf->origin())) rest->tree().addLeaf(new Leaf(*leaf));
+      band = makeBand(rest);
+    }
+  }
+  return part.halfWidth ? narrowed(std::move(band), *part.halfWidth) : band;
+}
+
+}  // namespace levelset

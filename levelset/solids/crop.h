@@ -1,0 +1,23 @@
+#pragma once
+
+#include <Imath/ImathBox.h>
+
+#include <optional>
+
+#include "levelset/narrow_band.h"
+
+namespace levelset {
+
+/// A part of a band: all that somebody is going to look at.
+struct BandPart {
+  std::optional<double> halfWidth = {};     ///< voxels; empty: as wide as it is
+  std::optional<Imath::Box3d> region = {};  ///< world; empty: everywhere
+};
+
+/// A band that holds the part as it was, to the bit, and little beside it. Beyond the region it
+/// may end anywhere, as if the solid were cut open there, and no sign is to be trusted.
+/// @param part  a half width that is no narrower changes nothing
+/// @throws UsageError for a half width below 1, or a region that is empty
+[[nodiscard]] NarrowBand cropped(NarrowBand band, const BandPart& part);
+
+}  // namespace levelset
