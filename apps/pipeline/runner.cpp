@@ -47,10 +47,11 @@ class Values {
 /// What was made, and that no other node takes.
 std::vector<std::string> unusedValues(const Graph& graph) {
   const std::vector<std::size_t> uses = countUses(graph, std::vector<char>(graph.nodes.size(), 1));
+  const std::set<std::size_t> results(graph.results.begin(), graph.results.end());
   std::vector<std::string> sentences;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     const Node& node = graph.nodes[i];
-    if (!node.makes() || uses[i] > 0) continue;
+    if (!node.makes() || uses[i] > 0 || results.contains(i)) continue;
     sentences.push_back(
         fmt::format("the {}{} at the end of the chain is not used; write it, or leave it out",
                     kindName(node.kind), node.name.empty() ? "" : " '" + node.name + "'"));
@@ -168,10 +169,10 @@ void runNode(const Graph& graph, std::size_t index, const RunSettings& settings,
     invocation.named.emplace(option, values.take(input));
   invocation.maxMemory = settings.maxMemory;
   invocation.dryRun = settings.dryRun;
-  if (settings.progress) {
+  if (settings.progress || settings.goesOn) {
     invocation.progress = [&, index](double fraction) {
-      settings.progress(index, op.name, fraction);
-      return true;
+      if (settings.progress) settings.progress(index, op.name, fraction);
+      return !settings.goesOn || settings.goesOn();
     };
   }
   const auto finish = [&] {
@@ -198,6 +199,7 @@ void runNode(const Graph& graph, std::size_t index, const RunSettings& settings,
         describeResult(value, false, step);
         stop();
         if (settings.measureErrors) estimateError(value, invocation, invocation.notes);
+        if (settings.made) settings.made(index, value);
         values.put(index, std::move(value));
       }
     }
@@ -222,6 +224,10 @@ void run(const Graph& graph, const RunSettings& settings, RunReport& report) {
       const Node& action = graph.nodes[i];
       if (!needed[i]) {
         report.leftOut.push_back(action.op->name + (action.name.empty() ? "" : " @" + action.name));
+        continue;
+      }
+      if (const auto given = graph.given.find(i); given != graph.given.end()) {
+        values.put(i, given->second);
         continue;
       }
       StepReport& step = report.steps.emplace_back();
