@@ -21,7 +21,8 @@ for x, y in ((3, 1.5), (3, -1.5)):
     body -= ls.cylinder(radius=0.5, height=3, center=(x, y, 0), voxel=voxel)
 body -= ls.cylinder(radius=0.7, height=4, center=(-1.5, 0, 4.5), axis=(0, 1, 0), voxel=voxel)
 
-body.render(os.path.join(folder, "blended_part.png"), size=(640, 480), from_=(14, -16, 13), to=(0, 0, 1.8), up=(0, 0, 1), fov=30)
+picture = os.path.join(folder, "blended_part.png")
+body.render(picture, size=(480, 360), samples=2, from_=(14, -16, 13), to=(0, 0, 1.8), up=(0, 0, 1), fov=30)
 body.mesh(sharp=True).save(os.path.join(folder, "blended_part.ply"))
 figures = body.measure()
 print(f"volume {figures['volume']:.4g}, area {figures['area']:.4g}, genus {1 - figures['euler'] // 2}")

@@ -13,7 +13,7 @@ import numpy
 import levelsmith as ls
 
 folder = sys.argv[1]
-resolution = int(sys.argv[2]) if len(sys.argv) > 2 else 200
+resolution = int(sys.argv[2]) if len(sys.argv) > 2 else 120
 here = os.path.dirname(os.path.abspath(__file__))
 model = sys.argv[3] if len(sys.argv) > 3 else os.path.join(here, "..", "data", "models", "bunny.obj")
 os.makedirs(folder, exist_ok=True)
@@ -24,8 +24,8 @@ else:
     body = ls.torus(radius=2, tube=0.8, axis=(1, 1, 3), resolution=resolution)
 
 low, high = body.bounds
-cell = (high - low).max() / 8
-wall = 3 * body.voxel
+cell = (high - low).max() / 6
+wall = 2 * body.voxel
 
 
 def gyroid(points):
@@ -41,9 +41,10 @@ filling = ls.from_function(gyroid, (low - margin, high + margin), body.voxel)
 part = body.shell(thickness=wall) | (body & filling)
 
 # Open it to look inside.
-cut = part.clip(plane=((low + high) / 2, (0, 0, -1)))
+cut = part.clip(plane=((low + high) / 2, (0, 0, 1)))
 span = numpy.linalg.norm(high - low)
 eye = (low + high) / 2 + span * numpy.array([0.5, 0.4, 1.4])
-cut.render(os.path.join(folder, "gyroid_bunny.png"), size=(640, 480), from_=eye, to=(low + high) / 2, up=(0, 1, 0))
+picture = os.path.join(folder, "gyroid_bunny.png")
+cut.render(picture, size=(480, 480), samples=1, from_=eye, to=(low + high) / 2, up=(0, 1, 0))
 share = part.measure()["volume"] / body.measure()["volume"]
 print(f"{100 * share:.0f} % of the solid's volume")

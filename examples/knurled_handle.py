@@ -9,7 +9,7 @@ import sys
 import levelsmith as ls
 
 folder = sys.argv[1]
-voxel = float(sys.argv[2]) if len(sys.argv) > 2 else 0.04
+voxel = float(sys.argv[2]) if len(sys.argv) > 2 else 0.06
 os.makedirs(folder, exist_ok=True)
 
 handle = ls.cylinder(radius=1, height=5, voxel=voxel)
@@ -26,6 +26,7 @@ tile[1, :2] -= overlap
 
 grip = handle.texture(knurl, tiles, texture_box=tile, sink=0.04)
 part = grip - ls.cylinder(radius=0.3, height=6, voxel=voxel)  # for the tang
-part.render(os.path.join(folder, "knurled_handle.png"), size=(480, 640), from_=(9, -9, 6), to=(0, 0, 0), up=(0, 0, 1), fov=28)
+picture = os.path.join(folder, "knurled_handle.png")
+part.render(picture, size=(360, 480), samples=2, from_=(9, -9, 6), to=(0, 0, 0), up=(0, 0, 1), fov=28)
 part.mesh().save(os.path.join(folder, "knurled_handle.ply"))
 print(f"volume {part.measure()['volume']:.4g}")

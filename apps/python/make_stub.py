@@ -71,7 +71,6 @@ MEMBERS = {
     @property
     def bounds(self) -> NDArray[numpy.float64]: ...
     def compute(self: _V, progress: Optional[Progress] = None) -> _V: ...
-    def save(self, file: Path, *, format: Optional[str] = None, name: str = "surface") -> None: ...
 ''',
     "Solid": '''
     @property
@@ -155,6 +154,8 @@ def members(cls):
         if operator["operands"] and cls.__name__ in operator["operands"][0]:
             if inspect.isfunction(own.get(_operators.python_name(operator))):
                 text += definition(operator, "    ", cls.__name__)
+                if operator["name"] == "write":
+                    text += definition({**operator, "name": "save"}, "    ", cls.__name__)
     return text or "    ...\n"
 
 

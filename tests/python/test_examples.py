@@ -1,5 +1,6 @@
 """Every example runs, coarsely, and leaves pictures that show something."""
 
+import re
 import subprocess
 import sys
 
@@ -7,6 +8,14 @@ import pytest
 from conftest import ROOT
 
 COARSE = {"knurled_handle": "0.08", "gyroid_bunny": "60", "blended_part": "0.15", "morph_sequence": "0.12"}
+
+
+def test_what_the_readme_shows(tmp_path, monkeypatch):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    exec(code, {})
+    assert (tmp_path / "part.npz").stat().st_size > 10000
 
 
 def test_all_examples_are_tested():

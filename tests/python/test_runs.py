@@ -60,7 +60,7 @@ def test_ctrl_c_ends_a_run_soon(ls):
         solid.compute()
     late = time.monotonic() - sent[0]
     print(f"KeyboardInterrupt after {late * 1e3:.0f} ms")
-    assert late < 2
+    assert late < 3
     assert not solid.is_computed
     ls.sphere(radius=1, voxel=0.1).compute()  # and all goes on
 

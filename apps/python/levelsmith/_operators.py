@@ -151,8 +151,10 @@ def install(package):
     """Adds the functions to the package, and methods to the classes of first operands."""
     for number, operator in enumerate(registry):
         name, call = python_name(operator), make(number, operator)
-        package[name] = call
+        package[name] = _values.operators[name] = call
         names.append(name)
         for kind in operator["operands"][0] if operator["operands"] else ():
             if name not in vars(_values.classes[kind]):
                 setattr(_values.classes[kind], name, call)
+            if name == "write":
+                _values.classes[kind].save = call

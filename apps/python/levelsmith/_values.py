@@ -13,6 +13,7 @@ from . import _core
 
 _log = logging.getLogger("levelsmith")
 _last = threading.local()
+operators = {}  # functions by name, see _operators.install
 
 
 class Warning(UserWarning):
@@ -105,11 +106,6 @@ class Value:
         """Two points: the box of the surface, or of the vertices, world units. Computes it."""
         return numpy.array(self._known().bounds)
 
-    def save(self, file, **options):
-        """Write it to a file; the extension tells the format. As `write`."""
-        write = globals_of_package()["write"]
-        write(self, file, **options)
-
     def _known(self):
         if not self._node.is_computed:
             run([self._node], level=4)
@@ -121,12 +117,6 @@ class Value:
         return f"<levelsmith.{type(self).__name__}{name} by {self._node.action}, {state}>"
 
 
-def globals_of_package():
-    import levelsmith
-
-    return vars(levelsmith)
-
-
 class _Drawn(Value):
     """What can be drawn."""
 
@@ -135,7 +125,7 @@ class _Drawn(Value):
     def _repr_png_(self):
         with tempfile.TemporaryDirectory() as folder:
             file = os.path.join(folder, "value.png")
-            globals_of_package()["render"](self, file, size=(320, 240), renderer="cpu", samples=1)
+            operators["render"](self, file, size=(320, 240), renderer="cpu", samples=1)
             with open(file, "rb") as picture:
                 return picture.read()
 
@@ -177,7 +167,7 @@ class Solid(_Drawn):
 def _combine(operator, a, b):
     if not isinstance(b, Value):
         return NotImplemented
-    return globals_of_package()[operator](a, b)
+    return operators[operator](a, b)
 
 
 class Volume(numpy.ndarray):
