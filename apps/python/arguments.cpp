@@ -44,7 +44,10 @@ std::optional<std::string> numberText(py::handle value) {
     if (whole) return py::str(whole).cast<std::string>();
     PyErr_Clear();  // an array is an index only when it holds one number
   }
-  if (!PySequence_Check(object) && PyNumber_Check(object)) {
+  // An array without dimensions is a number too, and no row of any.
+  const bool isRow = PySequence_Check(object) && PySequence_Size(object) >= 0;
+  PyErr_Clear();
+  if (!isRow && PyNumber_Check(object)) {
     const double number = PyFloat_AsDouble(object);
     if (!PyErr_Occurred()) return fmt::format("{}", number);
     PyErr_Clear();
@@ -184,7 +187,7 @@ class Call {
     if (value.is_none()) return;
     if (node_.options.contains(param.name)) throw UsageError(where + ": is given twice");
     if (param.type == ParamType::Flag) {
-      if (!PyBool_Check(value.ptr()) && !PyIndex_Check(value.ptr())) refuse(value, where);
+      if (!PyNumber_Check(value.ptr())) refuse(value, where);
       if (PyObject_IsTrue(value.ptr()) == 1) node_.options[param.name] = "true";
       return;
     }

@@ -62,7 +62,7 @@ class Run {
 
   pipeline::RunSettings settings() {
     pipeline::RunSettings settings;
-    settings.maxMemory = maxMemory > 0 ? maxMemory : cli::defaultMemoryLimit();
+    settings.maxMemory = memoryLimit();
     settings.begin = [this](const std::string& action) {
       if (!goesOn_) throw levelset::Cancelled(action + ": cancelled");
       tell(action, 0);
@@ -143,6 +143,10 @@ void setThreads(std::size_t count) {
 
 void setMaxMemory(std::size_t bytes) {
   maxMemory = bytes;
+}
+
+std::size_t memoryLimit() {
+  return maxMemory > 0 ? maxMemory : cli::defaultMemoryLimit();
 }
 
 }  // namespace python

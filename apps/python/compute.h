@@ -27,5 +27,6 @@ struct Outcome {
 /// what is free.
 void setThreads(std::size_t count);
 void setMaxMemory(std::size_t bytes);
+[[nodiscard]] std::size_t memoryLimit();
 
 }  // namespace python

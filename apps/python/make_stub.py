@@ -27,6 +27,7 @@ Point = Union[Sequence[float], ArrayLike, str]
 Points = Union[ArrayLike, str]
 Box = Points
 Matrix = Points
+Text = Union[str, float, Sequence[Union[str, float]]]
 Path = Union[str, os.PathLike]
 ImageSize = Union[Tuple[int, int], str]
 Bytes = Union[int, str]
@@ -106,21 +107,23 @@ def hint(param):
     return param["hint"]
 
 
-def result(operator):
+def result(operator, kind):
     if operator["result"]:
-        return operator["result"]
+        found = [operator["result"][kind]] if kind else operator["result"].values()
+        return union(list(dict.fromkeys(name for names in found for name in names)))
     return "Dict[str, Any]" if any(map(_operators.hidden, operator["params"])) else "None"
 
 
 def definition(operator, indent="", kind=None):
     params = {param["name"]: param for param in operator["params"]}
-    operands = iter(operator["operands"])
+    operands = iter([*operator["operands"], *operator["operands"][-1:]])
     parts, placed, starred = [], False, False
     for param in _operators.signature_of(operator).parameters.values():
         text = param.name
         if param.kind in (param.POSITIONAL_ONLY, param.VAR_POSITIONAL):
             text = f"{text}: {union(next(operands))}"
             if param.kind == param.VAR_POSITIONAL:
+                parts.append("/")
                 text, starred = "*" + text, True
             elif kind and not parts:
                 text = "self"
@@ -140,7 +143,7 @@ def definition(operator, indent="", kind=None):
         parts.append(text)
     if placed:
         parts.append("/")
-    return f"{indent}def {_operators.python_name(operator)}({', '.join(parts)}) -> {result(operator)}: ...\n"
+    return f"{indent}def {_operators.python_name(operator)}({', '.join(parts)}) -> {result(operator, kind)}: ...\n"
 
 
 def union(kinds):

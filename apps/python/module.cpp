@@ -3,8 +3,8 @@
 #include <pybind11/stl.h>
 
 #include <new>
+#include <set>
 
-#include "apps/cli/watch.h"
 #include "apps/pipeline/graph_file.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operator.h"
@@ -71,8 +71,9 @@ const char* hintOf(ParamType type) {
     case ParamType::Matrix:
       return "Matrix";
     case ParamType::Choice:
-    case ParamType::Text:
       return "str";
+    case ParamType::Text:
+      return "Text";
     case ParamType::Path:
       return "Path";
     case ParamType::ImageSize:
@@ -87,18 +88,44 @@ const char* hintOf(ParamType type) {
   return "";
 }
 
-/// The class of what an operator makes of what it is first made for; None where that depends.
-py::object resultClass(const Operator& op) {
-  if (op.flow != pipeline::Flow::Makes) return py::none();
-  if (!op.resultKind) return py::str(className(Kind::Band));
-  pipeline::Invocation probe(op, {});
-  for (const std::vector<Kind>& kinds : op.operands)
-    probe.operands.emplace_back(pipeline::Plan{.kind = kinds[0]});
-  try {
-    return py::str(className(op.resultKind(probe)));
-  } catch (const levelset::Error&) {  // its options tell
-    return py::str("Value");
+/// What an operator may make of operands whose first is of one kind, as far as one option at a time
+/// tells.
+std::set<Kind> resultKinds(const Operator& op, const Kind* first) {
+  if (!op.resultKind) return {Kind::Band};
+  std::set<Kind> kinds;
+  const auto probe = [&](std::map<std::string, std::string> options) {
+    pipeline::Invocation invocation(op, std::move(options));
+    for (std::size_t i = 0; i < op.operands.size(); ++i)
+      invocation.operands.emplace_back(
+          pipeline::Plan{.kind = i == 0 && first ? *first : op.operands[i][0]});
+    try {
+      kinds.insert(op.resultKind(invocation));
+    } catch (const levelset::Error&) {  // more options tell
+    }
+  };
+  probe({});
+  for (const Param& param : op.params) {
+    if (param.choices.empty()) probe({{param.name, "1"}});
+    for (const std::string& choice : param.choices) probe({{param.name, choice}});
   }
+  return kinds;
+}
+
+/// By class of the first operand ("" without operands), the classes of what is made; None of what
+/// makes nothing.
+py::object resultClasses(const Operator& op) {
+  if (op.flow != pipeline::Flow::Makes) return py::none();
+  py::dict result;
+  const auto add = [&](const char* operand, const Kind* first) {
+    py::list names;
+    for (const Kind kind : resultKinds(op, first)) names.append(className(kind));
+    if (names.empty()) names.append("Value");
+    result[operand] = names;
+  };
+  if (op.operands.empty()) add("", nullptr);
+  for (std::size_t i = 0; !op.operands.empty() && i < op.operands[0].size(); ++i)
+    add(className(op.operands[0][i]), &op.operands[0][i]);
+  return result;
 }
 
 py::dict describe(const Param& param) {
@@ -124,7 +151,7 @@ py::list describeOperators() {
     result["example"] = op.example;
     result["takes_more"] = op.takesMore;
     result["operands_optional"] = op.operandsOptional;
-    result["result"] = resultClass(op);
+    result["result"] = resultClasses(op);
     py::list operands, params;
     for (const std::vector<Kind>& kinds : op.operands) {
       py::list names;
@@ -276,12 +303,17 @@ PYBIND11_MODULE(_core, module) {
           [](const Handle& node, const std::string& name) { node.lazy()->setName(name); })
       .def_property_readonly("bounds",
                              [](const Handle& node) {
-                               const Imath::Box3d box = valueOf(node).plan().bounds;
+                               const pipeline::Value value = valueOf(node);
+                               {
+                                 const py::gil_scoped_release release;
+                                 (void)value.plan();
+                               }
+                               const Imath::Box3d& box = value.plan().bounds;
                                return py::make_tuple(Point{box.min.x, box.min.y, box.min.z},
                                                      Point{box.max.x, box.max.y, box.max.z});
                              })
       .def_property_readonly("voxel",
-                             [](const Handle& node) { return valueOf(node).plan().voxelSize; })
+                             [](const Handle& node) { return valueOf(node).band().voxelSize(); })
       .def("mesh_array",
            [](const py::object& self, const std::string& list) {
              // The array holds the mesh itself: the node may let it go.
@@ -294,7 +326,7 @@ PYBIND11_MODULE(_core, module) {
       .def("band_array", [](const Handle& node, const py::object& box) {
         const pipeline::Value value = valueOf(node);
         const python::DenseBand dense =
-            python::bandArray(value.band(), boxOf(box), cli::defaultMemoryLimit());
+            python::bandArray(value.band(), boxOf(box), python::memoryLimit());
         const Imath::V3d& o = dense.origin;
         return py::make_tuple(dense.values, Point{o.x, o.y, o.z}, value.band().voxelSize());
       });

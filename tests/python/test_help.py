@@ -39,7 +39,7 @@ def test_signatures(ls):
     assert str(inspect.signature(ls.sphere)) == (
         "(*, radius, center=(0, 0, 0), voxel=None, resolution=None, half_width=3)"
     )
-    assert str(inspect.signature(ls.union)).startswith("(solid_1, /, *more_solids")
+    assert str(inspect.signature(ls.union)) == "(solid_1, solid_2, /, *more_solids)"
     assert "from_" in inspect.signature(ls.capsule).parameters
     rod = ls.capsule(from_=(0, 0, 0), to=(1, 0, 0), radius=0.2, voxel=0.1)
     assert rod.measure()["components"] == 1
@@ -59,6 +59,11 @@ def test_the_stub_is_in_step_with_the_registry(ls):
         for kind in op["operands"][0] if op["operands"] else ():
             methods = {n.name for n in classes[kind].body if isinstance(n, ast.FunctionDef)}
             assert name in methods
+    solid = {n.name: n for n in classes["Solid"].body if isinstance(n, ast.FunctionDef)}
+    assert ast.unparse(solid["march"].returns) == "Union[Solid, Field]"
+    assert ast.unparse(functions["transform"].returns) == "Union[Solid, Mesh]"
+    assert ast.unparse(solid["transform"].returns) == "Solid"
+    assert all(n.args.posonlyargs + n.args.args for n in solid.values())
     public = {n for n in ls.__all__}
     known = set(functions) | set(classes)
     assert public <= known | {"__version__"}

@@ -3,6 +3,7 @@
 import gc
 import json
 import math
+from random import Random
 
 import numpy
 import pytest
@@ -97,6 +98,29 @@ def test_long_chains_neither_overflow_nor_leak(ls):
     gc.collect()
 
 
+def test_graphs_of_any_shape_and_order_give_what_they_should(ls):
+    """Balls about one centre, by unions, intersections and offsets; names come and go between runs."""
+    random = Random(3)
+    base = {r: ls.sphere(radius=r, voxel=0.2) for r in (1.0, 1.6)}
+    for _ in range(40):
+        pool = [(solid, radius) for radius, solid in base.items()]
+        for _ in range(random.randrange(1, 12)):
+            (a, ra), (b, rb) = random.choice(pool), random.choice(pool)
+            step = random.choice((-0.1, 0.15))
+            made = random.choice(((a | b, max(ra, rb)), (a & b, min(ra, rb)), (a.offset(step), ra + step)))
+            pool.append(made)
+            if random.random() < 0.3:
+                pool.pop(random.randrange(len(pool)))
+            if random.random() < 0.3:
+                random.choice(pool or [made])[0].compute()
+            pool = pool or [made]
+            del a, b, made
+        for solid, radius in pool:
+            assert solid.bounds[1] == pytest.approx([radius] * 3, abs=0.03)
+            steps = ls.compute(solid)["steps"]
+            assert steps == []
+
+
 def test_a_failed_run_keeps_what_it_made(ls, ball):
     bad = ball.offset(-5)
     with pytest.raises(ls.InputError):
@@ -130,6 +154,8 @@ def test_fields_are_given_as_values(ls, ball):
 
 
 def test_numpy_numbers_are_numbers(ls):
+    assert volume(ls.sphere(radius=numpy.array(1.0), voxel="0.1")) == pytest.approx(BALL, rel=1e-5)
+    assert len(ls.box(size=[1, 1, 1], voxel=0.1).mesh(sharp=numpy.bool_(True)).faces)
     ball = ls.sphere(radius=numpy.float32(1), center=numpy.array([1, 2, 3]), voxel=numpy.float64(0.1))
     assert ball.bounds.mean(axis=0) == pytest.approx([1, 2, 3], abs=1e-6)
     turned = ball.transform(matrix=numpy.diag([2.0, 2, 2, 1]))

@@ -20,7 +20,7 @@ def default_of(param):
     text = param["default"]
     if not text:
         return False if param["hint"] == "bool" else None
-    if param["hint"] == "str" or param["choices"]:
+    if param["hint"] in ("str", "Text") or param["choices"]:
         return text
     try:
         numbers = tuple(float(part) for part in text.split(","))
@@ -48,13 +48,13 @@ def operand_names(operator):
 def signature_of(operator):
     Parameter = inspect.Parameter
     params = []
-    for i, name in enumerate(operand_names(operator)):
-        last = i + 1 == len(operator["operands"])
-        if last and operator["takes_more"]:
-            params.append(Parameter("more_" + name.split("_")[0] + "s", Parameter.VAR_POSITIONAL))
-            continue
+    for name in operand_names(operator):
         default = None if operator["operands_optional"] else Parameter.empty
         params.append(Parameter(name, Parameter.POSITIONAL_ONLY, default=default))
+    if operator["takes_more"]:
+        kind = operator["operands"][-1][0].lower()
+        plural = kind + ("es" if kind.endswith("ch") else "s")
+        params.append(Parameter("more_" + plural, Parameter.VAR_POSITIONAL))
     placed = sorted((p for p in operator["params"] if p["position"] >= 0), key=lambda p: p["position"])
     named = [p for p in operator["params"] if p["position"] < 0 and not hidden(p)]
     optional = operator["operands_optional"]
@@ -74,6 +74,7 @@ FORMS = {
     "float": "number",
     "int": "whole number",
     "str": "text",
+    "Text": "text",
     "Length": "length",
     "Lengths": "lengths",
     "Numbers": "number, or three",
