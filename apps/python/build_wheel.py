@@ -1,13 +1,14 @@
 """Builds the wheel of levelsmith with CMake: what pip calls (PEP 517), without packages of its own.
 
 `--config-settings build-dir=build/ci` takes a tree that is configured already. Otherwise
-build/python is made, with as many jobs as CMAKE_BUILD_PARALLEL_LEVEL says.
+build/python is made, with as many jobs as CMAKE_BUILD_PARALLEL_LEVEL says, and what CMAKE_ARGS holds.
 """
 
 import base64
 import hashlib
 import os
 import re
+import shlex
 import subprocess
 import sys
 import sysconfig
@@ -47,7 +48,7 @@ def build(settings):
             ["cmake", "-S", ROOT, "-B", folder, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
              "-DLEVELSMITH_TESTS=OFF", "-DLEVELSMITH_VIEWER=OFF", "-DLEVELSMITH_PYTHON=ON",
              "-DCMAKE_UNITY_BUILD=ON", "-DCMAKE_UNITY_BUILD_BATCH_SIZE=16",
-             f"-DPython_EXECUTABLE={python()}"]
+             f"-DPython_EXECUTABLE={python()}", *shlex.split(os.environ.get("CMAKE_ARGS", ""))]
         )  # fmt: skip
     subprocess.check_call(["cmake", "--build", folder, "--target", "levelsmith_python"])
     return os.path.join(folder, "apps", "python", "levelsmith")

@@ -102,7 +102,7 @@ def test_graphs_of_any_shape_and_order_give_what_they_should(ls):
     """Balls about one centre, by unions, intersections and offsets; names come and go between runs."""
     random = Random(3)
     base = {r: ls.sphere(radius=r, voxel=0.2) for r in (1.0, 1.6)}
-    for _ in range(40):
+    for _ in range(12):
         pool = [(solid, radius) for radius, solid in base.items()]
         for _ in range(random.randrange(1, 12)):
             (a, ra), (b, rb) = random.choice(pool), random.choice(pool)
