@@ -130,6 +130,10 @@ void requireSolid(const NarrowBand& band, const char* action) {
                   action));
 }
 
+std::string NarrowBand::name() const {
+  return grid_ ? grid_->grid->getName() : "";
+}
+
 std::uint64_t NarrowBand::contentHash() const {
   return grid_ ? gridHash(*grid_->grid) : 0x4c4556454c534d54ull;
 }

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <string>
 
 namespace levelset {
 
@@ -50,6 +51,8 @@ class NarrowBand {
   /// Is it the band about a surface with a border (surfaceBand), cut off beyond that? It has two
   /// sides and no inside: a base for patches, and no solid.
   [[nodiscard]] bool isOpenSurface() const;
+  /// Of its grid, where it came from a file that gave one.
+  [[nodiscard]] std::string name() const;
   /// Hash of transform, topology and values: equal for equal trees, whatever made them.
   [[nodiscard]] std::uint64_t contentHash() const;
 

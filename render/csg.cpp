@@ -141,7 +141,7 @@ CsgExpression CsgExpression::renumbered(const std::vector<int>& numbers) const {
   return result;
 }
 
-Imath::Box3d CsgExpression::bounds(const std::vector<Imath::Box3d>& boxes) const {
+Imath::Box3d CsgExpression::bounds(const std::vector<Imath::Box3d>& boxes, double growth) const {
   std::vector<Imath::Box3d> stack;
   for (const int step : steps_) {
     if (step >= 0 || step == kNothing) {
@@ -151,7 +151,10 @@ Imath::Box3d CsgExpression::bounds(const std::vector<Imath::Box3d>& boxes) const
     const Imath::Box3d b = stack.back();
     stack.pop_back();
     Imath::Box3d& a = stack.back();
-    if (step == kUnion) a.extendBy(b);
+    if (step == kUnion) {
+      a.extendBy(b);
+      if (!a.isEmpty()) a = {a.min - Imath::V3d(growth), a.max + Imath::V3d(growth)};
+    }
     if (step != kIntersection) continue;
     for (int axis = 0; axis < 3; ++axis) {
       a.min[axis] = std::max(a.min[axis], b.min[axis]);

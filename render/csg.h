@@ -26,14 +26,19 @@ class CsgExpression {
   [[nodiscard]] double phi(const double* phi) const;
   [[nodiscard]] bool uses(std::size_t solid) const;
   /// A box that holds what the expression makes of solids that lie in those boxes.
-  [[nodiscard]] Imath::Box3d bounds(const std::vector<Imath::Box3d>& boxes) const;
+  /// @param growth  how far a union may reach beyond its operands, world units
+  [[nodiscard]] Imath::Box3d bounds(const std::vector<Imath::Box3d>& boxes,
+                                    double growth = 0) const;
   /// The same of solids by other numbers. @param numbers  by solid; negative: it holds nothing
   [[nodiscard]] CsgExpression renumbered(const std::vector<int>& numbers) const;
 
+  enum Step : int { kUnion = -1, kIntersection = -2, kDifference = -3, kNothing = -4 };
+  /// Operands before what joins them: a solid's number, or a Step.
+  [[nodiscard]] const std::vector<int>& postfix() const { return steps_; }
+
  private:
   friend class CsgParser;
-  enum Step : int { kUnion = -1, kIntersection = -2, kDifference = -3, kNothing = -4 };
-  std::vector<int> steps_;  // a solid's number to be pushed, or a Step
+  std::vector<int> steps_;
   std::string text_;
 };
 

@@ -17,7 +17,8 @@ Imath::Box3d Scene::bounds() const {
     boxes.push_back(solid.band.isEmpty() ? Imath::Box3d() : solid.band.zeroSetBounds());
     all.extendBy(boxes.back());
   }
-  if (!csg.isEmpty()) all = csg.bounds(boxes);
+  constexpr double kMostGrowth = 0.25;  // of a smooth minimum, in K
+  if (!csg.isEmpty()) all = csg.bounds(boxes, kMostGrowth * softness);
   for (const MeshPart& part : meshes) all.extendBy(levelset::bounds(*part.mesh));
   return all;
 }

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,10 @@ struct Scene {
   std::vector<Solid> solids;
   std::vector<MeshPart> meshes = {};
   CsgExpression csg = {};  ///< what is drawn of the solids; empty: each of them
+  double softness = 0;     ///< of the expression: K of the smooth minimum, world units; 0: none
+  std::optional<double> morph = {};  ///< set: on the way from the one solid to the other, [0, 1]
+  /// Is the zero set of one function of all fields drawn (render/field_expression.h)?
+  [[nodiscard]] bool isBlended() const { return softness > 0 || morph; }
   /// Is nothing seen through?
   [[nodiscard]] bool isOpaque() const;
   /// A box that holds what is drawn; empty where nothing can be.

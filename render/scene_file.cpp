@@ -17,6 +17,7 @@
 #include "levelset/files/band_file.h"
 #include "levelset/files/mesh_file.h"
 #include "levelset/solids/transform.h"
+#include "render/field_expression.h"
 #include "render/shading/picture.h"
 
 namespace render {
@@ -333,6 +334,7 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
   requireNames(scene);
   requireLight(scene);
   requireOpacity(scene);
+  requireFields(scene);
   for (const Solid& solid : scene.solids) requireColour(solid.colour);
   for (const MeshPart& part : scene.meshes) requireColour(part.colour);
   Json json;
@@ -358,6 +360,8 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
   for (const Solid& solid : scene.solids) json["solids"].push_back(entryOf(solid, ".vdb"));
   for (const MeshPart& part : scene.meshes) json["meshes"].push_back(entryOf(part, ".ply"));
   if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
+  if (scene.softness > 0) json["soft"] = scene.softness;
+  if (scene.morph) json["morph"] = *scene.morph;
 
   const std::string text = textOf(json, file);
   levelset::FileTarget target(file);
@@ -387,8 +391,10 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   if (reader.text(json, "format", whole) != kFormat) reader.refuse(whole, "holds no scene");
   if (reader.number(json, "version", whole) != kVersion)
     reader.refuse(whole, fmt::format("is not of version {}", kVersion));
-  reader.requireKnown(
-      json, {"format", "version", "camera", "light", "ambient", "solids", "meshes", "csg"}, whole);
+  reader.requireKnown(json,
+                      {"format", "version", "camera", "light", "ambient", "solids", "meshes", "csg",
+                       "soft", "morph"},
+                      whole);
   ViewedScene viewed;
   Scene& scene = viewed.scene;
   viewed.hasCamera = json.contains("camera");
@@ -415,6 +421,9 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
     reader.refuse(whole, "gives two parts the same \"id\"");
   if (json.contains("csg"))
     scene.csg = CsgExpression(reader.text(json, "csg", whole), solidNames(scene));
+  if (json.contains("soft")) scene.softness = reader.number(json, "soft", whole);
+  if (json.contains("morph")) scene.morph = reader.number(json, "morph", whole);
+  reader.told(whole, [&] { requireFields(scene); });
   return viewed;
 }
 

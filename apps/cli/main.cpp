@@ -133,6 +133,7 @@ int runGraph(const pipeline::Graph& graph) {
   pipeline::RunSettings settings;
   settings.dryRun = dryRun;
   settings.maxMemory = maxMemory;
+  if (globals.contains("cache")) settings.cache = globals.at("cache");
   settings.measureErrors = verbose || globals.contains("report");
   settings.begin = [](const std::string& action) { cli::tellAction(action); };
   settings.progress = [&](std::size_t index, const std::string& action, double fraction) {

@@ -70,7 +70,8 @@ void checkNamed(const Node& node, const std::vector<Node>& before) {
 
 const Operator& givenOperator() {
   static const Operator op{
-      .name = "given", .group = "", .summary = "a value that was made elsewhere"};
+      .name = "given", .group = "", .summary = "a value that was made elsewhere",
+      .isRepeatable = false};
   return op;
 }
 

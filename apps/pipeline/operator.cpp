@@ -169,6 +169,7 @@ const std::vector<Operator>& operators() {
     addSliceOperators(list);
     addPictureOperators(list);
     addRegressionOperators(list);
+    addCacheOperators(list);
     return list;
   }();
   return all;
@@ -220,6 +221,9 @@ const std::vector<Param>& globalParams() {
        .type = ParamType::Path,
        .doc = "write what is asked for as a .json that `run` takes; with --dry-run nothing else is "
               "done"},
+      {.name = "cache",
+       .type = ParamType::Path,
+       .doc = "a folder that keeps results: what is known there is not computed again"},
       {.name = "progress",
        .type = ParamType::Choice,
        .doc = "bars on a terminal, lines of JSON, or nothing",

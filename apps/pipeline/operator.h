@@ -74,6 +74,8 @@ struct Operator {
   std::vector<std::vector<Kind>> operands = {};  ///< kinds allowed at each place
   bool takesMore = false;         ///< further operands of the last place's kinds may follow
   bool operandsOptional = false;  ///< may run without any operand (`info FILE`)
+  bool readsNames = false;        ///< the result depends on what --as called the operands
+  bool isRepeatable = true;       ///< the same operands, options and files give the same result
   Flow flow = Flow::Makes;
   /// Kind of the result, told before anything runs.
   std::function<Kind(const Invocation&)> resultKind = {};
@@ -119,5 +121,6 @@ void addSceneOperators(std::vector<Operator>& all);
 void addSliceOperators(std::vector<Operator>& all);
 void addPictureOperators(std::vector<Operator>& all);
 void addRegressionOperators(std::vector<Operator>& all);
+void addCacheOperators(std::vector<Operator>& all);
 
 }  // namespace pipeline

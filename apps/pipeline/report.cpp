@@ -29,6 +29,7 @@ Json toJson(const StepReport& step) {
     entry["world"] = length.world;
     if (length.voxels) entry["voxels"] = *length.voxels;
   }
+  if (step.isKnown) json["known"] = true;
   json["wall_s"] = step.wallSeconds;
   json["cpu_s"] = step.cpuSeconds;
   json["peak_bytes"] = step.peakBytes;
@@ -186,7 +187,9 @@ void writeReport(const std::filesystem::path& path, const RunReport& report) {
 
 std::string stepLine(const StepReport& step, bool dryRun) {
   std::string line = fmt::format("{:<14}", step.action);
-  if (!dryRun)
+  if (step.isKnown)
+    line += " of an earlier run";
+  else if (!dryRun)
     line += fmt::format(" {:7.2f} s ({:.2f} s CPU), peak {:.0f} MB", step.wallSeconds,
                         step.cpuSeconds, step.peakBytes * 1e-6);
   if (step.voxelSize > 0) {

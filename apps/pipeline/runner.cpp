@@ -11,6 +11,8 @@
 #include <set>
 #include <utility>
 
+#include "apps/pipeline/cache.h"
+#include "apps/pipeline/cache_key.h"
 #include "apps/pipeline/graph_file.h"
 #include "apps/pipeline/refusal.h"
 #include "apps/process_cost.h"
@@ -28,6 +30,8 @@ class Values {
   /// @param uses  of each
   explicit Values(std::vector<std::size_t> uses) : uses_(std::move(uses)), values_(uses_.size()) {}
 
+  [[nodiscard]] bool has(std::size_t node) const { return values_[node].has_value(); }
+  void addUse(std::size_t node) { ++uses_[node]; }
   void put(std::size_t node, Value value) {
     if (uses_[node] > 0) values_[node] = std::move(value);
   }
@@ -154,120 +158,290 @@ Plan planOf(Invocation& invocation) {
   return plan;
 }
 
-/// @param stop  ends the timing of the step; what follows is the report's own work
-void runNode(const Graph& graph, std::size_t index, const RunSettings& settings, Values& values,
-             StepReport& step, const std::function<void()>& stop) {
-  const Node& node = graph.nodes[index];
-  const Operator& op = *node.op;
-  Invocation invocation(op, node.options);
-  if (settings.begin) settings.begin(op.name);
-  for (const std::size_t input : node.inputs) {
-    invocation.operands.push_back(values.take(input));
-    invocation.operandNames.push_back(graph.nodes[input].name);
+/// Measures a step until it is told to stop; what follows is the report's own work.
+class StepClock {
+ public:
+  explicit StepClock(StepReport& step)
+      : step_(step), start_(std::chrono::steady_clock::now()), cpu_(apps::processCpuSeconds()) {
+    apps::resetPeakResident();
   }
-  for (const auto& [option, input] : node.named)
-    invocation.named.emplace(option, values.take(input));
-  invocation.maxMemory = settings.maxMemory;
-  invocation.dryRun = settings.dryRun;
-  if (settings.progress || settings.goesOn) {
-    invocation.progress = [&, index](double fraction) {
-      if (settings.progress) settings.progress(index, op.name, fraction);
-      return !settings.goesOn || settings.goesOn();
-    };
+  ~StepClock() { stop(); }
+  StepClock(const StepClock&) = delete;
+  StepClock& operator=(const StepClock&) = delete;
+
+  void stop() {
+    if (std::exchange(isStopped_, true)) return;
+    step_.wallSeconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    step_.cpuSeconds = apps::processCpuSeconds() - cpu_;
+    step_.peakBytes = apps::peakResidentBytes();
   }
-  const auto finish = [&] {
-    step.notes = invocation.notes;
-    if (!invocation.output.empty() && settings.print) settings.print(invocation.output);
-    for (const std::string& text : step.notes.warnings) settings.warn(sentenceOf(op.name, text));
-    for (const std::string& text : step.notes.notes) settings.note(sentenceOf(op.name, text));
-    // Told at the end, and by the report where it belongs.
-    if (!step.notes.failure.empty()) step.notes.warnings.push_back(step.notes.failure);
-  };
-  try {
-    if (settings.dryRun) {
-      const Plan plan = planOf(invocation);
-      invocation.resolveLengths();
-      levelset::requireMemory(plan.bytes(), settings.maxMemory, op.name.c_str());
-      if (op.flow == Flow::Makes) {
-        const Value value(plan);
-        describeResult(value, true, step);
-        values.put(index, value);
-      }
-    } else {
-      Value value = op.run(invocation);
-      if (op.flow == Flow::Makes) {
-        describeResult(value, false, step);
-        stop();
-        if (settings.measureErrors) estimateError(value, invocation, invocation.notes);
-        if (settings.made) settings.made(index, value);
-        values.put(index, std::move(value));
+
+ private:
+  StepReport& step_;
+  std::chrono::steady_clock::time_point start_;
+  double cpu_;
+  bool isStopped_ = false;
+};
+
+/// One run of a graph.
+class GraphRun {
+ public:
+  GraphRun(const Graph& graph, const RunSettings& settings, RunReport& report)
+      : graph_(graph), settings_(settings), report_(report), values_(planned()) {}
+
+  void run() {
+    std::size_t known = 0, ran = 0;
+    for (std::size_t i = 0; i < graph_.nodes.size(); ++i) {
+      const Node& node = graph_.nodes[i];
+      if (fates_[i] == Fate::LeftOut) {
+        report_.leftOut.push_back(node.op->name + (node.name.empty() ? "" : " @" + node.name));
+      } else if (const auto given = graph_.given.find(i); given != graph_.given.end()) {
+        values_.put(i, given->second);
+      } else if (fates_[i] == Fate::Run) {
+        compute(i);
+        ++ran;
+      } else {
+        recall(i);
+        ++known;
       }
     }
-  } catch (...) {
-    finish();
-    throw;
+    if (known > 0)
+      settings_.note(
+          ran == 0
+              ? fmt::format("nothing was computed: all {} results are of an earlier run", known)
+              : fmt::format("{} of {} results are of an earlier run", known, known + ran));
   }
-  finish();
-}
+
+ private:
+  enum class Fate {
+    LeftOut,  // nothing needs it
+    Run,
+    Load,  // its value is known, and taken by one that runs
+    Known  // and not even that is needed
+  };
+
+  /// Decides on the fates. @return by node: how many that run take its value
+  std::vector<std::size_t> planned() {
+    const std::vector<char> needed = neededNodes(graph_);
+    fates_.resize(graph_.nodes.size());
+    for (std::size_t i = 0; i < fates_.size(); ++i)
+      fates_[i] = needed[i] ? Fate::Run : Fate::LeftOut;
+    if (!settings_.cache.empty() && !settings_.dryRun) useCache(needed);
+    std::vector<char> runs(fates_.size());
+    for (std::size_t i = 0; i < fates_.size(); ++i) runs[i] = fates_[i] == Fate::Run;
+    return countUses(graph_, runs);
+  }
+
+  void useCache(const std::vector<char>& needed) {
+    cache_.emplace(settings_.cache);
+    keys_ = CacheKeys(*cache_, settings_.maxMemory).of(graph_, needed);
+    std::vector<char> taken(graph_.nodes.size(), 0);
+    for (const std::size_t result : graph_.results) taken[result] = 1;
+    for (std::size_t i = graph_.nodes.size(); i-- > 0;) {
+      const Node& node = graph_.nodes[i];
+      if (!needed[i]) continue;
+      const bool isKnown = keys_[i] && cache_->has(*keys_[i]);
+      if (!node.makes()) {
+        if (isKnown && isUpToDate(*keys_[i])) fates_[i] = Fate::Known;
+      } else if (!taken[i] && hasTakers(i, needed)) {
+        fates_[i] = Fate::Known;
+      } else if (isKnown && Cache::canHold(node.kind)) {
+        fates_[i] = Fate::Load;
+      }
+      if (fates_[i] != Fate::Run) continue;
+      for (const std::size_t input : node.inputs) taken[input] = 1;
+      for (const auto& [option, input] : node.named) taken[input] = 1;
+    }
+  }
+
+  /// Is it there for others? What ends a chain is made for itself.
+  [[nodiscard]] bool hasTakers(std::size_t i, const std::vector<char>& needed) const {
+    return countUses(graph_, needed)[i] > 0;
+  }
+
+  /// Are the files there as they were left?
+  [[nodiscard]] bool isUpToDate(const std::string& key) const {
+    const std::optional<CachedStep> step = cache_->step(key);
+    return step && std::all_of(step->files.begin(), step->files.end(),
+                               [](const FileStamp& file) { return stampOf(file.path) == file; });
+  }
+
+  StepReport& begin(const Node& node) {
+    StepReport& step = report_.steps.emplace_back();
+    step.action = node.op->name;
+    step.parameters = node.options;
+    for (const Param& param : node.op->params)
+      if (!param.fallback.empty() && !node.options.contains(param.name))
+        step.defaults[param.name] = param.fallback;
+    step.resultName = node.name;
+    return step;
+  }
+
+  void tell(const Node& node, const std::string& output, StepReport& step) {
+    if (!output.empty() && settings_.print) settings_.print(output);
+    for (const std::string& text : step.notes.warnings)
+      settings_.warn(sentenceOf(node.op->name, text));
+    for (const std::string& text : step.notes.notes)
+      settings_.note(sentenceOf(node.op->name, text));
+    // Told at the end, and by the report where it belongs.
+    if (!step.notes.failure.empty()) step.notes.warnings.push_back(step.notes.failure);
+  }
+
+  /// What is known of a node is told again, and its value brought where one is taken.
+  void recall(std::size_t i) {
+    const Node& node = graph_.nodes[i];
+    std::optional<Value> value;
+    if (fates_[i] == Fate::Load) {
+      value = cache_->value(*keys_[i], settings_.maxMemory);
+      if (!value) return compute(i);
+    }
+    StepReport& step = begin(node);
+    step.isKnown = true;
+    std::string output;
+    if (keys_[i])
+      if (std::optional<CachedStep> known = cache_->step(*keys_[i])) {
+        step.notes = std::move(known->notes);
+        output = std::move(known->output);
+      }
+    if (value) {
+      describeResult(*value, false, step);
+      if (settings_.made) settings_.made(i, *value);
+      values_.put(i, std::move(*value));
+    }
+    tell(node, output, step);
+  }
+
+  /// Also where an entry of the cache was damaged, and what it was made of has to be made again.
+  void compute(std::size_t i) {
+    if (const auto given = graph_.given.find(i); given != graph_.given.end())
+      return values_.put(i, given->second);
+    const Node& node = graph_.nodes[i];
+    const bool isPlanned = fates_[i] == Fate::Run;  // its uses of others are counted
+    fates_[i] = Fate::Known;  // to those who may ask for it again, once its value was let go
+    if (!isPlanned) {
+      for (const std::size_t input : node.inputs) values_.addUse(input);
+      for (const auto& [option, input] : node.named) values_.addUse(input);
+    }
+    const auto bring = [&](std::size_t input) {
+      if (values_.has(input)) return;
+      if (cache_ && fates_[input] == Fate::Known && keys_[input] &&
+          Cache::canHold(graph_.nodes[input].kind) && cache_->has(*keys_[input]))
+        fates_[input] = Fate::Load;
+      if (fates_[input] == Fate::Load)
+        recall(input);
+      else
+        compute(input);
+    };
+    for (const std::size_t input : node.inputs) bring(input);
+    for (const auto& [option, input] : node.named) bring(input);
+    StepReport& step = begin(node);
+    StepClock clock(step);
+    try {
+      runNode(i, step, clock);
+    } catch (const std::bad_alloc&) {
+      throw levelset::ResourceLimit(
+          fmt::format("{}: memory ran out; use larger voxels or a narrower band", node.op->name));
+    } catch (const levelset::Error& error) {
+      refuseAs(node.op->name, error);
+    } catch (const std::exception& error) {
+      if (!isWantOfThreads(error)) throw;
+      throw levelset::ResourceLimit(node.op->name + kWantOfThreads);
+    }
+  }
+
+  void runNode(std::size_t index, StepReport& step, StepClock& clock) {
+    const Node& node = graph_.nodes[index];
+    const Operator& op = *node.op;
+    Invocation invocation(op, node.options);
+    if (settings_.begin) settings_.begin(op.name);
+    for (const std::size_t input : node.inputs) {
+      invocation.operands.push_back(values_.take(input));
+      invocation.operandNames.push_back(graph_.nodes[input].name);
+    }
+    for (const auto& [option, input] : node.named)
+      invocation.named.emplace(option, values_.take(input));
+    invocation.maxMemory = settings_.maxMemory;
+    invocation.dryRun = settings_.dryRun;
+    if (settings_.progress || settings_.goesOn) {
+      invocation.progress = [&, index](double fraction) {
+        if (settings_.progress) settings_.progress(index, op.name, fraction);
+        return !settings_.goesOn || settings_.goesOn();
+      };
+    }
+    const auto finish = [&] {
+      step.notes = invocation.notes;
+      tell(node, invocation.output, step);
+    };
+    try {
+      if (settings_.dryRun) {
+        const Plan plan = planOf(invocation);
+        invocation.resolveLengths();
+        levelset::requireMemory(plan.bytes(), settings_.maxMemory, op.name.c_str());
+        if (node.makes()) {
+          const Value value(plan);
+          describeResult(value, true, step);
+          values_.put(index, value);
+        }
+      } else {
+        Value value = op.run(invocation);
+        if (node.makes()) {
+          describeResult(value, false, step);
+          clock.stop();
+          if (settings_.measureErrors) estimateError(value, invocation, invocation.notes);
+        }
+        clock.stop();
+        keep(index, invocation, value);
+        if (node.makes()) {
+          if (settings_.made) settings_.made(index, value);
+          values_.put(index, std::move(value));
+        }
+      }
+    } catch (...) {
+      clock.stop();
+      finish();
+      throw;
+    }
+    finish();
+  }
+
+  /// For the next run. What did not reach what was asked is not kept, so that it is told again.
+  void keep(std::size_t i, const Invocation& invocation, const Value& value) {
+    if (!cache_ || !keys_[i] || !invocation.notes.failure.empty()) return;
+    const Node& node = graph_.nodes[i];
+    CachedStep step{.action = node.op->name,
+                    .notes = invocation.notes,
+                    .output = invocation.output,
+                    .files = {}};
+    if (node.op->targets)
+      for (const std::string& target : node.op->targets(Invocation(*node.op, node.options))) {
+        const std::optional<FileStamp> file = stampOf(target);
+        if (!file) return;
+        step.files.push_back(*file);
+      }
+    const bool isHeld = node.makes() && Cache::canHold(value.kind());
+    const std::string failure = cache_->put(*keys_[i], step, isHeld ? &value : nullptr);
+    if (!failure.empty()) settings_.warn(failure);
+  }
+
+  const Graph& graph_;
+  const RunSettings& settings_;
+  RunReport& report_;
+  std::vector<Fate> fates_;
+  std::optional<Cache> cache_;
+  std::vector<std::optional<std::string>> keys_;
+  Values values_;  // the last: planned() fills the others
+};
 
 }  // namespace
 
 void run(const Graph& graph, const RunSettings& settings, RunReport& report) {
-  const std::vector<char> needed = neededNodes(graph);
-  Values values(countUses(graph, needed));
   report.dryRun = settings.dryRun;
   report.graphJson = graphJson(graph);
   try {
     Targets targets;
     for (const Node& node : graph.nodes) checkTargets(node, settings, targets, report);
-    for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-      const Node& action = graph.nodes[i];
-      if (!needed[i]) {
-        report.leftOut.push_back(action.op->name + (action.name.empty() ? "" : " @" + action.name));
-        continue;
-      }
-      if (const auto given = graph.given.find(i); given != graph.given.end()) {
-        values.put(i, given->second);
-        continue;
-      }
-      StepReport& step = report.steps.emplace_back();
-      step.action = action.op->name;
-      step.parameters = action.options;
-      for (const Param& param : action.op->params)
-        if (!param.fallback.empty() && !action.options.contains(param.name))
-          step.defaults[param.name] = param.fallback;
-      step.resultName = action.name;
-      apps::resetPeakResident();
-      const auto start = std::chrono::steady_clock::now();
-      const double cpuStart = apps::processCpuSeconds();
-      bool stopped = false;
-      const auto stop = [&] {
-        if (stopped) return;
-        stopped = true;
-        step.wallSeconds =
-            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        step.cpuSeconds = apps::processCpuSeconds() - cpuStart;
-        step.peakBytes = apps::peakResidentBytes();
-      };
-      try {
-        runNode(graph, i, settings, values, step, stop);
-        stop();
-      } catch (const std::bad_alloc&) {
-        stop();
-        throw levelset::ResourceLimit(fmt::format(
-            "{}: memory ran out; use larger voxels or a narrower band", action.op->name));
-      } catch (const levelset::Error& error) {
-        stop();
-        refuseAs(action.op->name, error);
-      } catch (const std::exception& error) {
-        stop();
-        if (!isWantOfThreads(error)) throw;
-        throw levelset::ResourceLimit(action.op->name + kWantOfThreads);
-      } catch (...) {
-        stop();
-        throw;
-      }
-    }
+    GraphRun(graph, settings, report).run();
     for (const std::string& sentence : unusedValues(graph)) {
       report.warnings.push_back(sentence);
       settings.warn(sentence);

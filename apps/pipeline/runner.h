@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@ struct RunSettings {
   bool dryRun = false;
   bool measureErrors = false;  ///< estimate each result's error: costs a pass over it
   std::size_t maxMemory = levelset::kNoMemoryLimit;
+  std::filesystem::path cache = {};  ///< folder of earlier results; empty: none are kept
   /// Called with the name of each action before it runs.
   std::function<void(const std::string&)> begin = {};
   /// Called with the action's place in the chain, its name and the fraction done.
@@ -30,6 +32,7 @@ struct RunSettings {
 
 struct StepReport {
   std::string action;
+  bool isKnown = false;                           ///< the result is of an earlier run
   std::map<std::string, std::string> parameters;  ///< as written
   std::map<std::string, std::string> defaults;    ///< of those that were not
   StepNotes notes;
@@ -51,7 +54,8 @@ struct RunReport {
 };
 
 /// Runs those nodes that are needed, in order, and lets values go once the last that takes them has
-/// run. A refusal is recorded in the report and then thrown on.
+/// run. With a cache neither those whose results are known, nor what only they take. A refusal is
+/// recorded in the report and then thrown on.
 void run(const Graph& graph, const RunSettings& settings, RunReport& report);
 
 }  // namespace pipeline

@@ -113,7 +113,7 @@ void measureModel(Model& model) {
 }  // namespace
 
 bool Model::canCut() const {
-  return !solidBounds.isEmpty() && !scene.solids.empty() &&
+  return !solidBounds.isEmpty() && !scene.solids.empty() && !scene.isBlended() &&
          std::none_of(scene.solids.begin(), scene.solids.end(),
                       [](const render::Solid& solid) { return solid.band.isOpenSurface(); });
 }

@@ -25,7 +25,8 @@ struct Model {
   std::vector<std::filesystem::path> watched = {};  ///< those, and the ones that they name
 
   [[nodiscard]] double extent() const { return solidBounds.size().length(); }
-  /// Is there anything to cut, and does it have an inside to show?
+  /// Is there anything to cut, and does it have an inside to show? A plane that cuts blended fields
+  /// would be blended into them.
   [[nodiscard]] bool canCut() const;
 };
 

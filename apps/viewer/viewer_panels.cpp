@@ -112,7 +112,7 @@ void Viewer::drawLayerPart() {
 void Viewer::drawClipPart() {
   if (!beginPart("Clip plane")) return;
   if (model_ && !model_->canCut()) {
-    ImGui::TextWrapped("%s", "There is no inside to be shown.");
+    ImGui::TextWrapped("%s", "There is no inside that can be shown.");
     return;
   }
   ImGui::Checkbox("cut", &isClipped_);

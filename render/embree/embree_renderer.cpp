@@ -102,6 +102,7 @@ Image renderEmbree(const Scene& scene, const RenderOptions& options) {
   image.attributes["ls:renderer"] = fmt::format("embree {}", RTC_VERSION_STRING);
   image.attributes["ls:mode"] = "exact";
   addViewAttributes(image, scene, rays.bounds().size().length());
+  painter.layers.addWarnings(image, scene);
   return image;
 }
 

@@ -25,7 +25,8 @@ namespace render {
 [[nodiscard]] Image renderEmbree(const Scene& scene, const RenderOptions& options = {});
 
 /// The scene made ready for rays: thread-safe, results do not depend on the order of anything.
-/// Rays are unit directions; of two solids hit at the same distance the lower id counts.
+/// Rays are unit directions; of two solids hit at the same distance the one of the smaller voxels
+/// counts, of two such the lower id.
 class EmbreeScene {
  public:
   /// @throws levelset::ResourceLimit when Embree finds no memory

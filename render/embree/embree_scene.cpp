@@ -8,6 +8,7 @@
 
 #include "levelset/error.h"
 #include "render/embree/embree_renderer.h"
+#include "render/embree/field_march.h"
 #include "render/embree/float_view.h"
 #include "render/embree/mesh_rays.h"
 #include "render/embree/surface_blocks_vdb.h"
@@ -172,6 +173,7 @@ struct EmbreeScene::Impl {
   std::vector<RaySolid> solids;
   CsgExpression csg;  // of those
   MeshRays meshes;
+  std::optional<FieldMarch> fields;  // of the solids, where the scene blends them
   bool isOpaque;
   Box3d allBounds;  // with the meshes
   Box3d bounds;     // of the crossing cells
@@ -206,6 +208,11 @@ struct EmbreeScene::Impl {
 
 EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
     : meshes(source), isOpaque(source.isOpaque()) {
+  if (source.isBlended()) {
+    fields.emplace(source);
+    allBounds = source.bounds();
+    return;
+  }
   gather(source, filter);
   allBounds = bounds;
   allBounds.extendBy(meshes.bounds());
@@ -237,8 +244,10 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
       bounds.extendBy(Imath::transform(block.bounds(), entry.indexToWorld));
     if (!entry.blocks.empty()) solids.push_back(std::move(entry));
   }
-  std::stable_sort(solids.begin(), solids.end(),
-                   [](const RaySolid& a, const RaySolid& b) { return a.id < b.id; });
+  std::stable_sort(solids.begin(), solids.end(), [](const RaySolid& a, const RaySolid& b) {
+    const double u = a.band.voxelSize(), v = b.band.voxelSize();
+    return u != v ? u < v : a.id < b.id;
+  });
   std::vector<int> numbers(source.solids.size(), -1);
   for (std::size_t s = 0; s < solids.size(); ++s) {
     solids[s].number = s;
@@ -334,6 +343,10 @@ EmbreeScene::EmbreeScene(EmbreeScene&&) noexcept = default;
 
 Hit EmbreeScene::Impl::intersectSolids(const V3d& origin, const V3d& direction, double near,
                                        double far) const {
+  if (fields) {
+    requireRay(origin, direction);
+    return fields->intersect(origin, direction, near, far);
+  }
   Hit hit;
   double moved;
   RTCRayHit rayHit;
@@ -381,6 +394,11 @@ std::vector<Hit> EmbreeScene::intersectSeen(const V3d& origin, const V3d& direct
     }
     return share >= kLeastTransmittance;
   };
+  if (impl_->fields) {  // whose surface is opaque
+    const Hit onSolid = impl_->intersectSolids(origin, direction, near, far);
+    if (addMeshes(onSolid.found ? onSolid.distance : far) && onSolid.found) hits.push_back(onSolid);
+    return hits;
+  }
   double moved;
   RTCRay ray;
   if (auto query = impl_->prepare(origin, direction, near, far, moved, ray)) {
@@ -409,6 +427,10 @@ double EmbreeScene::transmittance(const V3d& origin, const V3d& direction, doubl
 bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double near,
                              double far) const {
   if (impl_->meshes.isOccluded(origin + direction * near, direction, far - near)) return true;
+  if (impl_->fields) {
+    requireRay(origin, direction);
+    return impl_->fields->isOccluded(origin, direction, near, far);
+  }
   double moved;
   RTCRay ray;
   auto query = impl_->prepare(origin, direction, near, far, moved, ray);
@@ -420,6 +442,10 @@ bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double nea
 
 double EmbreeScene::thickness(const V3d& origin, const V3d& direction, double near,
                               double far) const {
+  if (impl_->fields) {
+    requireRay(origin, direction);
+    return impl_->fields->thickness(origin, direction, near, far);
+  }
   double moved;
   RTCRay ray;
   auto query = impl_->prepare(origin, direction, near, far, moved, ray);

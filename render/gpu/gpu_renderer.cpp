@@ -9,6 +9,9 @@ namespace render {
 
 Image renderGpu(const Scene& scene, const RenderOptions& options) {
   requirePicture(scene, options);
+  if (scene.isBlended())
+    throw levelset::UsageError(
+        "render: the shader has no soft expressions and no morphs; take --renderer cpu");
   levelset::report(options.progress, 0, "render");
   const KernelScene surfaces(scene, options);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();

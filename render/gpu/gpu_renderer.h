@@ -14,9 +14,8 @@ struct NoOpenGl : levelset::ResourceLimit {
 
 /// Draws the scene by the kernel as an OpenGL 4.5 compute shader, without a display: the same bits
 /// as renderCpu() where the driver rounds as IEEE 754 has it (Mesa's llvmpipe does).
-/// @throws as renderCpu(); NoOpenGl; levelset::ResourceLimit also where the driver does not take
-/// the
-///         shader or the grids
+/// @throws as renderCpu(); levelset::UsageError for scenes that are blended; NoOpenGl;
+///         levelset::ResourceLimit also where the driver does not take the shader or the grids
 [[nodiscard]] Image renderGpu(const Scene& scene, const RenderOptions& options = {});
 
 }  // namespace render

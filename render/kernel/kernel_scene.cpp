@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
 #include <utility>
 
 #include "levelset/vdb.h"
@@ -107,6 +108,11 @@ KernelScene::KernelScene(const Scene& scene, const RenderOptions& options) : mes
 }
 
 void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, bool isPicture) {
+  if (scene.isBlended()) {
+    fields_.emplace(scene, options.maxBytes);
+    bounds_ = tableBounds_ = scene.bounds();
+    return;
+  }
   // A block for each leaf; those the surface does not cross are built and dropped.
   double leaves = 0;
   Imath::Box3d box = meshes_.bounds();
@@ -152,8 +158,9 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     solid.voxelSize = source.band.voxelSize();
     solids_.push_back(std::move(solid));
   }
-  std::stable_sort(solids_.begin(), solids_.end(),
-                   [](const KernelSolid& a, const KernelSolid& b) { return a.id < b.id; });
+  std::stable_sort(solids_.begin(), solids_.end(), [](const KernelSolid& a, const KernelSolid& b) {
+    return std::tie(a.voxelSize, a.id) < std::tie(b.voxelSize, b.id);
+  });
   std::vector<int> numbers(scene.solids.size(), -1);
   for (std::size_t s = 0; s < solids_.size(); ++s) numbers[solids_[s].index] = static_cast<int>(s);
   csg_ = scene.csg.renumbered(numbers);
@@ -161,6 +168,10 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
 }
 
 void KernelScene::look(const Scene& scene) {
+  if (fields_) {
+    if (fields_->place(scene)) bounds_ = tableBounds_ = scene.bounds();
+    return;
+  }
   near_ = scene.camera.near;
   far_ = scene.camera.farthest();
   bounds_ = tableBounds_ = meshes_.bounds();
@@ -180,7 +191,7 @@ void KernelScene::look(const Scene& scene) {
 }
 
 std::size_t KernelScene::bytes() const {
-  std::size_t sum = 0;
+  std::size_t sum = fields_ ? fields_->bytes() : 0;
   for (const KernelSolid& solid : solids_) sum += solid.pool.bytes();
   return sum;
 }
@@ -320,7 +331,9 @@ bool KernelScene::isInside(const std::vector<char>& inside) const {
 std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
                                                 const std::vector<LightRay>& rays) const {
   std::vector<double> light(rays.size(), 1);
-  for (std::size_t first = 0; first < rays.size(); first += kRaysAtOnce) {
+  for (std::size_t i = 0; i < rays.size() && fields_; ++i)
+    if (fields_->isOccluded(rays[i].origin, rays[i].direction, rays[i].reach)) light[i] = 0;
+  for (std::size_t first = 0; first < rays.size() && !fields_; first += kRaysAtOnce) {
     const std::size_t last = std::min(rays.size(), first + kRaysAtOnce);
     if (csg_.isEmpty())
       dimBySolids(tracer, rays, first, last, light);

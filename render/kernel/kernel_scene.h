@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "levelset/memory_limit.h"
@@ -12,6 +13,7 @@
 #include "render/embree/mesh_rays.h"
 #include "render/kernel/brick_pool.h"
 #include "render/kernel/csg_walk.h"
+#include "render/kernel/field_walk.h"
 #include "render/kernel/ray_block.h"
 #include "render/kernel/ray_fan.h"
 #include "render/render_options.h"
@@ -63,7 +65,7 @@ struct PixelWalk {
 };
 
 /// The surfaces of a scene made ready for the kernel, whoever runs it. Of two solids hit at the
-/// same depth the first one by id counts.
+/// same depth the one of the smaller voxels counts, of two such the first one by id.
 class KernelScene {
  public:
   /// For any camera. @param maxBytes  for what the kernel reads
@@ -86,6 +88,9 @@ class KernelScene {
   /// The same of blocks: what places are as exact as, in single precision.
   [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
+  /// What is drawn of the solids where the scene blends them: then there are no solids(), and
+  /// castPixels() and thickness() find nothing; or null.
+  [[nodiscard]] const FieldWalk* fields() const { return fields_ ? &*fields_ : nullptr; }
   [[nodiscard]] std::size_t bytes() const;
   /// Blocks of the solids by what was done with them.
   struct Counts {
@@ -128,9 +133,10 @@ class KernelScene {
   };
   std::vector<Extent> extents_;
   Counts counts_;
-  std::vector<KernelSolid> solids_;  // by id
+  std::vector<KernelSolid> solids_;  // by voxel size and id
   CsgExpression csg_;                // of those
   MeshRays meshes_;
+  std::optional<FieldWalk> fields_;
   Imath::Box3d bounds_, tableBounds_;
   double near_ = 0, far_ = Camera::kNoDepth;  // depths that the camera sees
 };

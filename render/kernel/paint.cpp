@@ -48,11 +48,17 @@ std::size_t KernelPainter::numberOf(const Pixel& pixel) const {
          static_cast<std::size_t>(pixel.x);
 }
 
-Hit KernelPainter::hitOf(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const {
-  const Hit onSolid = hits.solid[i] < 0 ? Hit() : hitOnSolid(ray, hits, i);
+Hit KernelPainter::hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
+                         std::size_t i) const {
+  const FieldWalk* fields = surfaces_.fields();
+  Hit onSolid;
+  if (fields)
+    onSolid = fields->intersect(ray.origin, ray.direction, ray.near, ray.far);
+  else if (hits.solid[i] >= 0)
+    onSolid = hitOnSolid(ray, hits, i);
   if (surfaces_.meshes().isEmpty()) return onSolid;
   const double far = onSolid.found ? onSolid.distance : ray.far;
-  const Hit onMesh = surfaces_.meshes().intersect(ray.origin, ray.direction, ray.near, far);
+  const Hit onMesh = surfaces_.meshes().intersect(ray.origin, ray.direction, meshNear, far);
   return onMesh.found ? onMesh : onSolid;
 }
 
@@ -84,15 +90,17 @@ void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixe
     const std::vector<double> depths = surfaces_.thickness(tracer, at);
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const Camera::Ray ray = scene_.camera.ray(pixels[i].x + 0.5, pixels[i].y + 0.5);
-      layers_.thickness[numberOf(pixels[i])] =
-          static_cast<float>(depths[i] / ray.direction.dot(scene_.camera.axis()));
+      layers_.thickness[numberOf(pixels[i])] = static_cast<float>(
+          surfaces_.fields()
+              ? surfaces_.fields()->thickness(ray.origin, ray.direction, ray.near, ray.far)
+              : depths[i] / ray.direction.dot(scene_.camera.axis()));
     }
   }
   const PixelHits hits = surfaces_.castPixels(tracer, at);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const std::size_t number = numberOf(pixels[i]);
     const Camera::Ray ray = scene_.camera.ray(pixels[i].x + 0.5, pixels[i].y + 0.5);
-    const Hit hit = hitOf(ray, hits, i);
+    const Hit hit = hitOf(ray, ray.near, hits, i);
     if (!hit.found) continue;
     layers_.setHit(number, scene_.camera, hit);
     if (options_.curvature) layers_.setCurvature(number, hit.curvature);
@@ -112,8 +120,9 @@ void KernelPainter::paintColours(const KernelTracer& tracer,
       // What single precision makes of the place is where the ray goes.
       at.x[i] = static_cast<float>(pixels[i].x + shift.x - middleX);
       at.y[i] = static_cast<float>(pixels[i].y + shift.y - middleY);
-      sights.push_back({scene_.camera.ray(static_cast<double>(at.x[i]) + middleX,
-                                          static_cast<double>(at.y[i]) + middleY)});
+      const Camera::Ray ray = scene_.camera.ray(static_cast<double>(at.x[i]) + middleX,
+                                                static_cast<double>(at.y[i]) + middleY);
+      sights.push_back({ray, ray.near});
     }
     if (scene_.isOpaque()) {
       addSeen(tracer, pixels, s, surfaces_.castPixels(tracer, at), sights, sums);
@@ -155,10 +164,10 @@ std::vector<std::size_t> KernelPainter::addSeen(const KernelTracer& tracer,
     points.clear();
   };
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    auto& [ray, left] = sights[i];
+    auto& [ray, meshNear, left] = sights[i];
     if (left < kLeastTransmittance) continue;
     if (rays.size() > kMostLightRays) addColours();
-    const Hit hit = hitOf(ray, hits, i);
+    const Hit hit = hitOf(ray, meshNear, hits, i);
     if (!hit.found) {
       left = 0;
       continue;
@@ -167,7 +176,7 @@ std::vector<std::size_t> KernelPainter::addSeen(const KernelTracer& tracer,
                       shader_.addRays(hit, ray.direction, pixels[i].x, pixels[i].y, sample, rays)});
     left *= 1 - hit.opacity;
     if (hit.isOnMesh)
-      ray.near = hit.beyond();
+      meshNear = hit.beyond();
     else if (left >= kLeastTransmittance)
       throughSolids.push_back(i);
   }
@@ -193,13 +202,20 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
   image.attributes = sceneAttributes(scene, options);
   image.attributes["ls:renderer"] = renderer;
   image.attributes["ls:mode"] = "exact";
-  const KernelScene::Counts& counts = surfaces.counts();
-  image.attributes["ls:read"] = fmt::format(
-      "{} blocks of 8x8x8 cells that the surface crosses and {} beside them, for its curvature, "
-      "{:.1f} MB; {} more were left out, and {} of those that it crosses are out of sight",
-      counts.crossed, counts.beside, static_cast<double>(surfaces.bytes()) * 1e-6, counts.leftOut,
-      counts.unseen);
+  if (surfaces.fields()) {
+    image.attributes["ls:read"] =
+        fmt::format("{} blocks of 8x8x8 cells where a field is not constant, {:.1f} MB",
+                    surfaces.fields()->blockCount(), static_cast<double>(surfaces.bytes()) * 1e-6);
+  } else {
+    const KernelScene::Counts& counts = surfaces.counts();
+    image.attributes["ls:read"] = fmt::format(
+        "{} blocks of 8x8x8 cells that the surface crosses and {} beside them, for its curvature, "
+        "{:.1f} MB; {} more were left out, and {} of those that it crosses are out of sight",
+        counts.crossed, counts.beside, static_cast<double>(surfaces.bytes()) * 1e-6, counts.leftOut,
+        counts.unseen);
+  }
   addViewAttributes(image, scene, surfaces.tableBounds().size().length());
+  painter.layers().addWarnings(image, scene);
   return image;
 }
 

@@ -24,6 +24,7 @@ class KernelPainter {
                 Image& image);
   /// Parts may be painted at the same time.
   void paint(const KernelTracer& tracer, const PixelBox& box) const;
+  [[nodiscard]] const PictureLayers& layers() const { return layers_; }
 
  private:
   struct Pixel {
@@ -32,14 +33,16 @@ class KernelPainter {
   /// Neighbours next to each other: squares of four.
   [[nodiscard]] static std::vector<Pixel> pixelsOf(const PixelBox& box);
   [[nodiscard]] std::size_t numberOf(const Pixel& pixel) const;
-  /// What the ray of number i meets first, if anything.
-  [[nodiscard]] Hit hitOf(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
+  /// What the ray of number i meets first, if anything. @param meshNear  from there on of meshes
+  [[nodiscard]] Hit hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
+                          std::size_t i) const;
   [[nodiscard]] Hit hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
   void paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
   void paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
-  /// The ray of a pixel's sample, from `near` on for meshes.
+  /// The ray of a pixel's sample.
   struct Sight {
     Camera::Ray ray;
+    double meshNear;  ///< behind the meshes that it met
     double left = 1;  ///< transmittance of what it met; 0: it leaves the scene
   };
   /// Adds up what rays meet that see anything yet.

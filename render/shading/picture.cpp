@@ -7,6 +7,7 @@
 
 #include "levelset/error.h"
 #include "levelset/vdb.h"
+#include "render/field_expression.h"
 
 namespace render {
 namespace {
@@ -44,6 +45,17 @@ void PictureLayers::setHit(std::size_t i, const Camera& camera, const Hit& hit) 
     p[axis][i] = static_cast<float>(hit.position[axis]);
   }
   id[i] = hit.id;
+  if (hit.isBeyondBand) ++beyondBand;
+}
+
+void PictureLayers::addWarnings(Image& image, const Scene& scene) const {
+  const std::size_t count = beyondBand;
+  if (count == 0) return;
+  image.attributes["ls:warning"] = fmt::format(
+      "{} pixel{} show{} the {} where a band knows no distance, so that it is another shape there; "
+      "widen the bands",
+      count, count == 1 ? "" : "s", count == 1 ? "s" : "",
+      scene.morph ? "morph" : "soft expression");
 }
 
 void PictureLayers::setCurvature(std::size_t i, const CurvatureSample& sample) const {
@@ -110,6 +122,16 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   if (options.fromNanoVdb && options.filter != Filter::Trilinear)
     throw levelset::UsageError(
         "render: NanoVDB grids are drawn by the trilinear filter only; take that, or bricks");
+  requireFields(scene);
+  if (scene.isBlended() && options.filter != Filter::Trilinear)
+    throw levelset::UsageError(fmt::format(
+        "render: soft expressions and morphs are of trilinear fields, and the filter is "
+        "{}; leave it out",
+        filterName(options.filter)));
+  if (scene.isBlended() && options.fromNanoVdb)
+    throw levelset::UsageError(
+        "render: soft expressions and morphs read tables of their own, and no NanoVDB grid; take "
+        "bricks");
   constexpr double kReach = 2.99;  // voxels
   for (const Solid& solid : scene.solids) {
     if (options.filter == Filter::Trilinear || solid.band.isEmpty()) continue;
@@ -159,6 +181,8 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
   if (!meshes.empty()) attributes["ls:mesh"] = meshes;
   attributes["ls:style"] = styleName(options.style.style);
   if (!scene.csg.isEmpty()) attributes["ls:csg"] = scene.csg.text();
+  if (scene.softness > 0) attributes["ls:soft"] = fmt::format("{}", scene.softness);
+  if (scene.morph) attributes["ls:morph"] = fmt::format("{}", *scene.morph);
   return attributes;
 }
 

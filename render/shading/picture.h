@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -31,18 +32,23 @@ struct PictureLayers {
   float* curvature[4] = {};
   float* thickness = nullptr;
   std::uint32_t* id;
+  mutable std::atomic<std::size_t> beyondBand = 0;  ///< how many hits are
 
   PictureLayers(Image& image, const RenderOptions& options);
   /// Of pixel `i`, from a hit whose normals are known.
   void setHit(std::size_t i, const Camera& camera, const Hit& hit) const;
   void setCurvature(std::size_t i, const CurvatureSample& sample) const;
+  /// Header attributes for what a user should know: ls:warning.
+  void addWarnings(Image& image, const Scene& scene) const;
   /// From the sum over `samples`.
   void setColour(std::size_t i, const ColourSum& sum, int samples) const;
 };
 
 /// @throws levelset::UsageError for a camera that cannot see, a light that cannot shine, parts that
 ///         cannot be seen or sample counts out of range; levelset::ResourceLimit for an image too
-///         large; levelset::InvalidInput for bands narrower than the filter reaches
+///         large; levelset::InvalidInput for bands narrower than the filter reaches; for blended
+///         scenes also as requireFields(), and levelset::UsageError for filters but the trilinear
+///         one and for NanoVDB grids
 void requirePicture(const Scene& scene, const RenderOptions& options);
 
 /// @throws levelset::UsageError for an opacity that is not in (0, 1]

@@ -56,16 +56,16 @@ Value read(Invocation& in) {
   }
   if (fileKind(in) == Kind::Mesh) {
     std::vector<std::string> leftAside;
-    Value mesh(levelset::readMesh(file, {.format = in.text("format"),
-                                         .attributes = !in.flag("bare"),
-                                         .maxMemory = in.maxMemory,
-                                         .leftAside = &leftAside,
-                                         .progress = in.progress}));
+    levelset::TriMesh mesh = levelset::readMesh(file, {.format = in.text("format"),
+                                                       .attributes = !in.flag("bare"),
+                                                       .maxMemory = in.maxMemory,
+                                                       .leftAside = &leftAside,
+                                                       .progress = in.progress});
     if (!leftAside.empty()) {
       in.notes.warnings.push_back(fmt::format("{}: left aside what no vertex can carry: {}",
                                               file.string(), fmt::join(leftAside, "; ")));
     }
-    return mesh;
+    return Value(std::move(mesh));
   }
   levelset::BandRepairs repairs;
   const levelset::ReadBandOptions options{.grid = in.text("grid"),

@@ -212,6 +212,8 @@ Json valueInfo(const Value& value) {
       json["meshes"].push_back(
           {{"name", part.name}, {"id", part.id}, {"triangles", part.mesh->triangles.size()}});
     if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
+    if (scene.softness > 0) json["soft"] = scene.softness;
+    if (scene.morph) json["morph"] = *scene.morph;
   } else {
     const std::vector<mapping::Patch>& patches = value.patch().patches;
     std::size_t particles = 0;

@@ -132,9 +132,11 @@ Json toJson(const render::ImageComparison& found) {
   return json;
 }
 
-/// The kernel's picture: by OpenGL, or by the processor where there is none.
+/// The kernel's picture: by OpenGL, or by the processor where there is none, or where the shader
+/// does not know what is drawn.
 render::Image drawByKernel(Invocation& in, const render::Scene& scene,
                            const render::RenderOptions& options) {
+  if (scene.isBlended()) return render::renderCpu(scene, options);
   try {
     return render::renderGpu(scene, options);
   } catch (const render::NoOpenGl& error) {
@@ -189,7 +191,9 @@ void coarsen(Invocation& in, render::Scene& scene) {
 Value draw(Invocation& in) {
   render::Scene scene = sceneOf(in);
   coarsen(in, scene);
-  const std::string renderer = in.text("renderer");
+  // The judge of fields is slow.
+  const std::string renderer =
+      scene.isBlended() && !in.given("renderer") ? "cpu" : in.text("renderer");
   const bool isBoth = renderer == "both";
   render::RenderOptions options{.samples = static_cast<int>(in.integer("samples")),
                                 .filter = filterOf(in),
@@ -205,6 +209,8 @@ Value draw(Invocation& in) {
                                                   : render::renderEmbree(scene, options);
   if (const auto read = image.attributes.find("ls:read"); read != image.attributes.end())
     in.notes.notes.push_back(fmt::format("render: {}", read->second));
+  if (const auto told = image.attributes.find("ls:warning"); told != image.attributes.end())
+    in.notes.warnings.push_back(fmt::format("render: {}", told->second));
   render::writeImage(in.text("file"), image, in.text("format"));
   if (in.given("png")) render::writeImage(in.text("png"), image, "png");
   if (isBoth) {
@@ -384,7 +390,8 @@ void addPictureOperators(std::vector<Operator>& all) {
            {.name = "png", .type = ParamType::Path, .doc = "write the colours to this .png too"},
            {.name = "renderer",
             .type = ParamType::Choice,
-            .doc = "which one draws; both: gpu and embree, compared",
+            .doc = "which one draws; both: gpu and embree, compared; soft expressions and morphs "
+                   "are drawn by cpu unless embree is asked for",
             .fallback = "embree",
             .choices = {"gpu", "cpu", "embree", "both"}},
            {.name = "filter",

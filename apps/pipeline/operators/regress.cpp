@@ -88,6 +88,7 @@ void addRegressionOperators(std::vector<Operator>& all) {
                  {.name = "list",
                   .type = ParamType::Flag,
                   .doc = "print the names of all cases and run none"}},
+      .isRepeatable = false,
       .flow = Flow::PassesThrough,
       .run = runRegression,
       .plan = [](Invocation&) { return Plan{}; },

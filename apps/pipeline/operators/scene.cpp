@@ -12,6 +12,7 @@
 #include "apps/pipeline/operators/camera_options.h"
 #include "apps/pipeline/units.h"
 #include "levelset/error.h"
+#include "render/field_expression.h"
 
 namespace pipeline {
 namespace {
@@ -126,9 +127,23 @@ Value makeScene(Invocation& in) {
     if (!scene.csg.uses(i))
       in.notes.warnings.push_back(
           fmt::format("scene: --csg does not name '{}', which is not drawn", solids[i]));
+  if (in.given("soft")) scene.softness = in.length("soft");
+  if (in.given("morph")) scene.morph = in.number("morph");
+  render::requireFields(scene);
   viewed.hasCamera = givesCamera(in);
   if (viewed.hasCamera) viewed.scene.camera = cameraOf(in, viewed.scene.bounds());
   return Value(std::move(viewed));
+}
+
+void validateScene(const Invocation& in) {
+  validateCamera(in);
+  if (in.given("soft") && !in.given("csg"))
+    throw UsageError("scene: --soft needs --csg with what is joined, as 'a | b'; give both");
+  if (!in.given("morph")) return;
+  if (in.given("csg"))
+    throw UsageError("scene: --morph goes from one solid to another, without --csg; give one");
+  if (in.number("morph") < 0 || in.number("morph") > 1)
+    throw UsageError(fmt::format("scene: --morph {} is not from 0 to 1", in.text("morph")));
 }
 
 }  // namespace
@@ -145,14 +160,25 @@ void addSceneOperators(std::vector<Operator>& all) {
           "are those of --as. Meshes stand beside, by their vertices' normals and colours if they "
           "have "
           "some. Surfaces of one and the same place on different grids are told apart "
-          "by rounding only: let what is taken away stick out. 'write scene.json' saves it, with "
-          "the parts in files beside it.",
+          "by rounding only: let what is taken away stick out. --soft blends the distances "
+          "themselves: "
+          "surfaces that are closer than that run into each other, --morph goes from one solid's "
+          "distances to another's; renderers are then cpu and embree. 'write scene.json' saves "
+          "it, with the parts in files beside it.",
       .example =
           "levelsmith box --size 2,2,2 --voxel 0.05 --as b ! sphere --radius 1.3 --voxel "
           "0.03 --as s ! scene @b @s --csg 'b - s' ! render cut.png --size 320x240",
       .params = {{.name = "csg",
                   .type = ParamType::Text,
                   .doc = "what is drawn, as '(a | b) - c'; default: each of them"},
+                 {.name = "soft",
+                  .type = ParamType::Length,
+                  .doc = "of --csg: how far from each other surfaces begin to blend, at most the "
+                         "half width of the narrowest band",
+                  .range = Range::NonNegative},
+                 {.name = "morph",
+                  .type = ParamType::Number,
+                  .doc = "of two solids: how far on the way from the first to the second, 0 to 1"},
                  {.name = "names",
                   .type = ParamType::Text,
                   .doc = "of the parts, blanks between them; default: those of --as"},
@@ -165,10 +191,11 @@ void addSceneOperators(std::vector<Operator>& all) {
                          "1 is seen through, in R G B A, and casts a weaker shadow"}},
       .operands = {{Kind::Band, Kind::Mesh}},
       .takesMore = true,
+      .readsNames = true,
       .resultKind = [](const Invocation&) { return Kind::Scene; },
       .run = makeScene,
       .plan = planScene,
-      .validate = validateCamera,
+      .validate = validateScene,
   };
   addCameraParams(scene.params);
   all.push_back(std::move(scene));

@@ -91,6 +91,59 @@ TEST_F(Scenes, HoldMeshesToo) {
   EXPECT_EQ(readChanged("b - s", "b - m").code, 2);  // a mesh is no solid
 }
 
+TEST_F(Scenes, AreBlended) {
+  const std::string wide =
+      "box --size 2,2,2 --voxel 0.1 --half-width 6 --as b ! sphere --radius 1.3 --voxel 0.07 "
+      "--half-width 9 --as s ! scene @b @s ";
+  const Outcome made = levelsmith(wide +
+                                  "--csg 'b - s' --soft 5vx --size 64x48 --from 4,3,5 ! write "
+                                  "soft.json ! render a.exr --samples 1 ! info --json");
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_DOUBLE_EQ(Json::parse(made.out)["soft"], 5 * 0.07);
+  const Outcome again = levelsmith("read soft.json ! render b.exr --samples 1 --renderer cpu");
+  ASSERT_EQ(again.code, 0) << again.err;
+  EXPECT_EQ(levelsmith("compare-images a.exr b.exr --exact").code, 0);
+  const Outcome judged = levelsmith("read soft.json ! render c.exr --renderer both --samples 1");
+  EXPECT_EQ(judged.code, 0) << judged.err;
+  const Outcome shaded = levelsmith("read soft.json ! render d.exr --renderer gpu");
+  EXPECT_EQ(shaded.code, 2);
+  EXPECT_NE(shaded.err.find("--renderer cpu"), std::string::npos) << shaded.err;
+  EXPECT_EQ(levelsmith("read soft.json ! render d.exr --filter bspline").code, 2);
+  for (const char* how : {"--near 4 --far 8 --thickness", "--value-bits 16", "--value-bits 8"}) {
+    const Outcome both =
+        levelsmith(std::string("read soft.json ! render d.exr --renderer both --samples 1 ") + how);
+    EXPECT_EQ(both.code, 0) << how << both.err;
+    EXPECT_NE(levelsmith("compare-images a.exr d.exr --exact").code, 0) << how;
+  }
+  EXPECT_EQ(levelsmith("read soft.json ! render d.exr --renderer both --tables nanovdb").code, 2);
+  const Outcome clear = levelsmith(wide + "--csg 'b - s' --soft 5vx --opacities '1 0.5' ! info");
+  EXPECT_EQ(clear.code, 2);
+  EXPECT_NE(clear.err.find("leave their opacities out"), std::string::npos) << clear.err;
+
+  const Outcome morphed =
+      levelsmith(wide + "--morph 0.25 ! info --json ! write m.json ! render m.png --size 64x48");
+  ASSERT_EQ(morphed.code, 0) << morphed.err;
+  EXPECT_EQ(Json::parse(morphed.out)["morph"], 0.25);
+  EXPECT_EQ(morphed.err.find("widen the bands"), std::string::npos) << morphed.err;
+  const Outcome far = levelsmith(
+      "sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 2 --voxel 0.1 --as b ! scene @a @b "
+      "--morph 0.3 ! render f.png --size 64x48");
+  ASSERT_EQ(far.code, 0) << far.err;
+  EXPECT_NE(far.err.find("widen the bands"), std::string::npos) << far.err;
+
+  EXPECT_EQ(levelsmith(wide + "--soft 0.1 ! info").code, 2);
+  EXPECT_EQ(levelsmith(wide + "--csg 'b | s' --soft -0.1 ! info").code, 2);
+  EXPECT_EQ(levelsmith(wide + "--csg 'b | s' --soft 0.7 ! info").code, 3);
+  EXPECT_EQ(levelsmith(wide + "--csg 'b | s' --morph 0.5 ! info").code, 2);
+  EXPECT_EQ(levelsmith(wide + "--morph 1.5 ! info").code, 2);
+  EXPECT_EQ(levelsmith(wide + "@b --morph 0.5 ! info").code, 2);
+  make();
+  EXPECT_EQ(readChanged("\"csg\"", "\"soft\": 9, \"csg\"").code, 3);
+  EXPECT_EQ(readChanged("\"csg\"", "\"morph\": 0.5, \"csg\"").code, 3);
+  shell("cp soft.json cut.json");
+  EXPECT_EQ(readChanged("\"id\": 1", "\"opacity\": 0.5, \"id\": 1").code, 3);
+}
+
 TEST_F(Scenes, AreSeenThrough) {
   const Outcome made = levelsmith(kTwo +
                                   "--csg 'b - s' --opacities '1 0.25' --from 4,3,5 --to 0,0,0 "

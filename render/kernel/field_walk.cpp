@@ -1,0 +1,449 @@
+#include "render/kernel/field_walk.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "levelset/progress.h"
+
+namespace render {
+namespace {
+
+using Imath::V3d;
+using Join = FieldExpression::Join;
+using Range = FieldGrid::Range;
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr int kMostHalvings = 44;  // of a part of a ray, to the spacing of its places
+constexpr double kNoise = 1e-13;   // of the backgrounds: values below are rounding's
+
+/// By Bernstein coefficients on a part of a ray.
+using FieldCubic = std::array<double, 4>;
+
+/// Of a value and of its derivative along a part of the ray.
+struct FieldBounds {
+  Range value, slope;
+};
+
+Range joinRanges(const FieldExpression& e, Join join, const Range& a, const Range& b) {
+  const bool isTurned = join == Join::Difference;
+  return {e.join(join, a.low, isTurned ? b.high : b.low),
+          e.join(join, a.high, isTurned ? b.low : b.high)};
+}
+
+Range negated(const Range& r) {
+  return {-r.high, -r.low};
+}
+
+/// Slopes of a and b by the share that a may have.
+Range mixedSlope(const Range& share, const Range& a, const Range& b) {
+  const auto at = [](double s, double u, double v) { return s * u + (1 - s) * v; };
+  return {std::min(at(share.low, a.low, b.low), at(share.high, a.low, b.low)),
+          std::max(at(share.low, a.high, b.high), at(share.high, a.high, b.high))};
+}
+
+FieldBounds joinBounds(const FieldExpression& e, Join join, const FieldBounds& a,
+                       const FieldBounds& b) {
+  const Range value = joinRanges(e, join, a.value, b.value);
+  if (join == Join::Morph) return {value, mixedSlope({1 - e.share, 1 - e.share}, a.slope, b.slope)};
+  const bool isTurned = join == Join::Difference;
+  const Range other = isTurned ? negated(b.value) : b.value;
+  Range ahead{other.low - a.value.high, other.high - a.value.low};
+  if (join != Join::Union) ahead = negated(ahead);
+  const auto shareAt = [&](double d) { return std::clamp(0.5 + 0.5 * d / e.softness, 0.0, 1.0); };
+  return {value, mixedSlope({shareAt(ahead.low), shareAt(ahead.high)}, a.slope,
+                            isTurned ? negated(b.slope) : b.slope)};
+}
+
+FieldBounds boundsOf(const FieldCubic& c) {
+  const double d[3] = {c[1] - c[0], c[2] - c[1], c[3] - c[2]};
+  return {{std::min(std::min(c[0], c[1]), std::min(c[2], c[3])),
+           std::max(std::max(c[0], c[1]), std::max(c[2], c[3]))},
+          {std::min(std::min(d[0], d[1]), d[2]), std::max(std::max(d[0], d[1]), d[2])}};
+}
+
+/// De Casteljau at one half.
+void halve(const FieldCubic& c, FieldCubic& left, FieldCubic& right) {
+  const double b01 = 0.5 * (c[0] + c[1]), b12 = 0.5 * (c[1] + c[2]), b23 = 0.5 * (c[2] + c[3]);
+  const double b012 = 0.5 * (b01 + b12), b123 = 0.5 * (b12 + b23), middle = 0.5 * (b012 + b123);
+  left = {c[0], b01, b012, middle};
+  right = {middle, b123, b23, c[3]};
+}
+
+double valueAt(const FieldCubic& c, double s) {
+  const double r = 1 - s;
+  return r * r * (r * c[0] + 3 * s * c[1]) + s * s * (3 * r * c[2] + s * c[3]);
+}
+
+/// A ray's way through a grid: the block it is in, and the cell of it.
+struct GridWay {
+  const FieldGrid* grid;
+  V3d origin, direction;  // index space, by the world's distance along the ray
+  double inverse[3];
+  int block[3] = {}, cell[3] = {};
+  int number = -1;  // of the block; negative where the field is constant
+  double blockExit = 0, cellExit = kNever;
+  int blockAxis = -1, cellAxis = -1;  // of the exit; −1: before the table
+  Range range{0, 0};                  // of the block, then of the cell
+  double corner[2][2][2];
+
+  GridWay(const FieldGrid& of, const V3d& start, const V3d& along) : grid(&of) {
+    of.worldToIndex().multVecMatrix(start, origin);
+    of.worldToIndex().multDirMatrix(along, direction);
+    for (int a = 0; a < 3; ++a) {
+      inverse[a] = 1 / direction[a];
+      if (!std::isfinite(inverse[a])) direction[a] = inverse[a] = 0;  // it meets no plane
+    }
+    beAway(entry());
+  }
+
+  /// The only such function: monotone in k, so that cells and blocks agree on their faces.
+  [[nodiscard]] double plane(int a, int k) const {
+    return (static_cast<double>(k) - origin[a]) * inverse[a];
+  }
+  [[nodiscard]] double entry() const {
+    double enter = 0, leave = kNever;
+    for (int a = 0; a < 3; ++a) {
+      const int high = grid->size(a) * FieldGrid::kEdge;
+      if (direction[a] == 0) {
+        if (origin[a] < 0 || origin[a] > high) return kNever;
+        continue;
+      }
+      enter = std::max(enter, plane(a, direction[a] > 0 ? 0 : high));
+      leave = std::min(leave, plane(a, direction[a] > 0 ? high : 0));
+    }
+    return enter < leave ? enter : kNever;
+  }
+  /// Outside the table, up to there.
+  void beAway(double until) {
+    number = -1;
+    blockAxis = -1;
+    blockExit = until;
+  }
+
+  [[nodiscard]] double exitOf(const int (&at)[3], int edge, int& axis) const {
+    double exit = kNever;
+    for (int a = 0; a < 3; ++a) {
+      if (direction[a] == 0) continue;
+      const double p = plane(a, (at[a] + (direction[a] > 0 ? 1 : 0)) * edge);
+      if (p < exit) {
+        exit = p;
+        axis = a;
+      }
+    }
+    return exit;
+  }
+  [[nodiscard]] int placeIn(int a, double t, int low, int high) const {
+    return static_cast<int>(std::clamp(std::floor(origin[a] + t * direction[a]),
+                                       static_cast<double>(low), static_cast<double>(high)));
+  }
+
+  void nextBlock(double t) {
+    if (blockAxis < 0) {
+      if (blockExit == kNever) return;
+      for (int a = 0; a < 3; ++a)
+        block[a] = placeIn(a, t, 0, grid->size(a) * FieldGrid::kEdge - 1) / FieldGrid::kEdge;
+    } else {
+      block[blockAxis] += direction[blockAxis] > 0 ? 1 : -1;
+      if (block[blockAxis] < 0 || block[blockAxis] >= grid->size(blockAxis)) return beAway(kNever);
+    }
+    number = grid->block(block[0], block[1], block[2]);
+    blockExit = exitOf(block, FieldGrid::kEdge, blockAxis);
+  }
+
+  void firstCell(double t) {
+    cellExit = kNever;
+    if (number < 0) return;
+    for (int a = 0; a < 3; ++a) {
+      const int low = block[a] * FieldGrid::kEdge;
+      cell[a] = placeIn(a, t, low, low + FieldGrid::kEdge - 1);
+    }
+    readCell();
+  }
+  void nextCell() {
+    cell[cellAxis] += direction[cellAxis] > 0 ? 1 : -1;
+    if (cell[cellAxis] / FieldGrid::kEdge == block[cellAxis] && cell[cellAxis] >= 0)
+      readCell();
+    else
+      cellExit = kNever;  // the block ends there too
+  }
+  void readCell() {
+    constexpr int kPoints = FieldGrid::kPoints;
+    const float* from =
+        grid->values(number) + ((cell[0] & 7) * kPoints + (cell[1] & 7)) * kPoints + (cell[2] & 7);
+    range = {kNever, -kNever};
+    for (int n = 0; n < 8; ++n) {
+      const int i = n >> 2, j = n >> 1 & 1, k = n & 1;
+      const auto v = static_cast<double>(from[(i * kPoints + j) * kPoints + k]);
+      corner[i][j][k] = v;
+      range = {std::min(range.low, v), std::max(range.high, v)};
+    }
+    cellExit = exitOf(cell, 1, cellAxis);
+  }
+
+  /// The field from t0 to t1, within the cell, by its blossom.
+  [[nodiscard]] FieldCubic cubic(double t0, double t1) const {
+    if (number < 0) return {range.low, range.low, range.low, range.low};
+    double p[2][3];
+    for (int a = 0; a < 3; ++a) {
+      p[0][a] = std::clamp(origin[a] + t0 * direction[a] - cell[a], 0.0, 1.0);
+      p[1][a] = std::clamp(origin[a] + t1 * direction[a] - cell[a], 0.0, 1.0);
+    }
+    double blossom[2][2][2];  // by the end taken along x, y, z
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 2; ++j) {
+        double line[2];
+        for (int k = 0; k < 2; ++k) {
+          const double low = corner[0][0][k] + (corner[1][0][k] - corner[0][0][k]) * p[i][0];
+          const double high = corner[0][1][k] + (corner[1][1][k] - corner[0][1][k]) * p[i][0];
+          line[k] = low + (high - low) * p[j][1];
+        }
+        for (int k = 0; k < 2; ++k) blossom[i][j][k] = line[0] + (line[1] - line[0]) * p[k][2];
+      }
+    return {blossom[0][0][0], (blossom[0][0][1] + blossom[0][1][0] + blossom[1][0][0]) / 3,
+            (blossom[0][1][1] + blossom[1][0][1] + blossom[1][1][0]) / 3, blossom[1][1][1]};
+  }
+};
+
+/// One ray's search for where it changes sides of the expression's zero set.
+class FieldSearch {
+ public:
+  std::vector<double> crossings;  // from the start
+  bool startsInside = false;
+
+  /// @param wantsAll  or the first alone
+  FieldSearch(const FieldExpression& expression, const std::vector<FieldGrid>& grids,
+              const V3d& start, const V3d& direction, double end, bool wantsAll)
+      : e_(expression),
+        end_(end),
+        wantsAll_(wantsAll),
+        values_(expression.valueCount()),
+        bounds_(expression.valueCount()),
+        ranges_(expression.valueCount()),
+        cubics_(grids.size() * (kMostHalvings + 1)) {
+    double largest = 0;
+    for (const FieldGrid& grid : grids) {
+      ways_.emplace_back(grid, start, direction);
+      largest = std::max(largest, grid.background());
+    }
+    noise_ = kNoise * largest;
+    walkBlocks();
+  }
+
+ private:
+  template <typename Value, typename JoinValues>
+  Value joined(std::vector<Value>& values, const JoinValues& join) const {
+    std::size_t n = ways_.size();
+    for (const FieldExpression::Step& step : e_.steps)
+      values[n++] = join(e_, step.join, values[step.a], values[step.b]);
+    return values[e_.drawn];
+  }
+
+  /// From t on the ray is on that side. @return does the search go on?
+  bool settle(bool isInside, double t) {
+    if (!inside_) startsInside = isInside;
+    const bool hasChanged = inside_ && *inside_ != isInside;
+    inside_ = isInside;
+    if (hasChanged) crossings.push_back(t);
+    return wantsAll_ || !hasChanged;
+  }
+
+  /// Where the grids' ranges leave no doubt. @return nothing: they do
+  std::optional<bool> sideByRanges() {
+    for (std::size_t i = 0; i < ways_.size(); ++i) ranges_[i] = ways_[i].range;
+    const Range all = joined(ranges_, joinRanges);
+    if (all.low >= 0) return false;
+    if (all.high < 0) return true;
+    return std::nullopt;
+  }
+
+  void walkBlocks() {
+    for (double t = 0; t < end_;) {
+      for (GridWay& way : ways_) {
+        while (way.blockExit <= t) way.nextBlock(t);
+        way.range = way.grid->range(way.number);
+      }
+      double next = end_;
+      for (const GridWay& way : ways_) next = std::min(next, way.blockExit);
+      const std::optional<bool> side = sideByRanges();
+      if (side ? !settle(*side, t) : !walkCells(t, next)) return;
+      t = next;
+    }
+  }
+
+  bool walkCells(double t, double end) {
+    for (GridWay& way : ways_) way.firstCell(t);
+    for (;;) {
+      for (GridWay& way : ways_)
+        while (way.cellExit <= t) way.nextCell();
+      double next = end;
+      for (const GridWay& way : ways_) next = std::min(next, way.cellExit);
+      const std::optional<bool> side = sideByRanges();
+      if (side ? !settle(*side, t) : !solve(t, next)) return false;
+      if (next == end) return true;
+      t = next;
+    }
+  }
+
+  bool solve(double t0, double t1) {
+    for (std::size_t i = 0; i < ways_.size(); ++i) cubics_[i] = ways_[i].cubic(t0, t1);
+    return search(0, t0, t1);
+  }
+
+  bool search(int level, double t0, double t1) {
+    const std::size_t count = ways_.size();
+    FieldCubic* cubics = cubics_.data() + static_cast<std::size_t>(level) * count;
+    for (std::size_t i = 0; i < count; ++i) bounds_[i] = boundsOf(cubics[i]);
+    const FieldBounds all = joined(bounds_, joinBounds);
+    if (all.value.low >= 0) return settle(false, t0);
+    if (all.value.high < 0) return settle(true, t0);
+    const bool isMonotone = all.slope.low >= 0 || all.slope.high <= 0;
+    const bool isFlat = std::max(-all.value.low, all.value.high) < noise_;
+    if (isMonotone || isFlat || level == kMostHalvings) {
+      const bool before = valueOf(cubics, 0) < 0, after = valueOf(cubics, 1) < 0;
+      if (!settle(before, t0)) return false;
+      return before == after || settle(after, t0 + (t1 - t0) * rootOf(cubics));
+    }
+    const double middle = 0.5 * (t0 + t1);
+    for (const bool isRight : {false, true}) {
+      FieldCubic other;
+      for (std::size_t i = 0; i < count; ++i)
+        halve(cubics[i], isRight ? other : cubics[count + i], isRight ? cubics[count + i] : other);
+      if (!search(level + 1, isRight ? middle : t0, isRight ? t1 : middle)) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] double valueOf(const FieldCubic* cubics, double s) {
+    for (std::size_t i = 0; i < ways_.size(); ++i) values_[i] = valueAt(cubics[i], s);
+    return joined(values_, [](const FieldExpression& e, Join join, double a, double b) {
+      return e.join(join, a, b);
+    });
+  }
+
+  /// Where the value changes its sign, between 0 and 1: secants that keep it between, an end that
+  /// stays twice counting half (the Illinois method), and halvings lest that is slow.
+  [[nodiscard]] double rootOf(const FieldCubic* cubics) {
+    constexpr int kMostSteps = 100;
+    constexpr double kExact = 0x1p-50;
+    double a = 0, b = 1, fa = valueOf(cubics, 0), fb = valueOf(cubics, 1);
+    std::optional<bool> hasMovedA;
+    for (int n = 0; n < kMostSteps && b - a > kExact; ++n) {
+      const double share = fa / (fa - fb);
+      const double s =
+          n % 4 == 3 || !(share > 0 && share < 1) ? 0.5 * (a + b) : a + (b - a) * share;
+      const double f = valueOf(cubics, s);
+      const bool movesA = (f < 0) == (fa < 0);
+      if (hasMovedA == movesA) (movesA ? fb : fa) *= 0.5;
+      hasMovedA = movesA;
+      (movesA ? a : b) = s;
+      (movesA ? fa : fb) = f;
+    }
+    return 0.5 * (a + b);
+  }
+
+  const FieldExpression& e_;
+  double end_;
+  bool wantsAll_;
+  double noise_ = 0;
+  std::vector<GridWay> ways_;
+  std::optional<bool> inside_;
+  std::vector<double> values_;
+  std::vector<FieldBounds> bounds_;
+  std::vector<Range> ranges_;
+  std::vector<FieldCubic> cubics_;  // of the grids, by halvings
+};
+
+/// The part of a ray in a box.
+std::optional<Range> partWithin(const Imath::Box3d& box, const V3d& origin, const V3d& direction,
+                                double near, double far) {
+  if (box.isEmpty()) return std::nullopt;
+  Range part{near, far};
+  for (int a = 0; a < 3; ++a) {
+    if (direction[a] == 0) {
+      if (origin[a] < box.min[a] || origin[a] > box.max[a]) return std::nullopt;
+      continue;
+    }
+    const double t0 = (box.min[a] - origin[a]) / direction[a],
+                 t1 = (box.max[a] - origin[a]) / direction[a];
+    part = {std::max(part.low, std::min(t0, t1)), std::min(part.high, std::max(t0, t1))};
+  }
+  return part.low < part.high ? std::optional(part) : std::nullopt;
+}
+
+}  // namespace
+
+FieldWalk::FieldWalk(const Scene& scene, std::size_t maxBytes)
+    : expression_(fieldExpression(scene)) {
+  double bytes = 0;
+  for (const FieldExpression::Operand& operand : expression_.operands)
+    bytes += FieldGrid::bytesOf(scene.solids[operand.solid].band);
+  levelset::requireMemory(bytes, maxBytes, "render");
+  for (const FieldExpression::Operand& operand : expression_.operands)
+    grids_.emplace_back(scene.solids[operand.solid].band);
+  place(scene);
+}
+
+bool FieldWalk::place(const Scene& scene) {
+  bool hasMoved = false;
+  box_.makeEmpty();
+  for (std::size_t i = 0; i < grids_.size(); ++i) {
+    hasMoved = grids_[i].place(scene.solids[expression_.operands[i].solid].band) || hasMoved;
+    box_.extendBy(grids_[i].worldBox());
+  }
+  return hasMoved;
+}
+
+std::size_t FieldWalk::bytes() const {
+  std::size_t sum = 0;
+  for (const FieldGrid& grid : grids_) sum += grid.bytes();
+  return sum;
+}
+
+std::size_t FieldWalk::blockCount() const {
+  std::size_t sum = 0;
+  for (const FieldGrid& grid : grids_) sum += grid.blockCount();
+  return sum;
+}
+
+Hit FieldWalk::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
+  Hit hit;
+  const std::optional<Range> part = partWithin(box_, origin, direction, near, far);
+  if (!part) return hit;
+  const FieldSearch found(expression_, grids_, origin + direction * part->low, direction,
+                          part->high - part->low, false);
+  if (found.crossings.empty()) return hit;
+  hit.distance = part->low + found.crossings[0];
+  hit.position = origin + direction * hit.distance;
+  std::vector<FieldShape> shapes;
+  for (const FieldGrid& grid : grids_) shapes.push_back(grid.shapeAt(hit.position));
+  addFieldShape(hit, expression_, shapes, direction);
+  return hit;
+}
+
+bool FieldWalk::isOccluded(const V3d& origin, const V3d& direction, double reach) const {
+  const std::optional<Range> part = partWithin(box_, origin, direction, 0, reach);
+  return part && !FieldSearch(expression_, grids_, origin + direction * part->low, direction,
+                              part->high - part->low, false)
+                      .crossings.empty();
+}
+
+double FieldWalk::thickness(const V3d& origin, const V3d& direction, double near,
+                            double far) const {
+  const std::optional<Range> part = partWithin(box_, origin, direction, near, far);
+  if (!part) return 0;
+  const double end = part->high - part->low;
+  const FieldSearch found(expression_, grids_, origin + direction * part->low, direction, end,
+                          true);
+  double length = 0, from = 0;
+  bool isInside = found.startsInside;
+  for (const double t : found.crossings) {
+    if (isInside) length += t - from;
+    from = t;
+    isInside = !isInside;
+  }
+  return isInside ? length + end - from : length;
+}
+
+}  // namespace render
