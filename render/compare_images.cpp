@@ -180,20 +180,20 @@ class Comparer {
     if (result_.unlike.size() > kShown) result_.unlike.resize(kShown);
   }
 
-  /// A positive length in the first picture's header.
-  [[nodiscard]] double lengthNamed(const char* name, double fallback) const {
-    const auto found = a_.attributes.find(name);
-    if (found == a_.attributes.end()) return fallback;
+  /// A positive length in a picture's header.
+  [[nodiscard]] static double lengthNamed(const Image& image, const char* name, double fallback) {
+    const auto found = image.attributes.find(name);
+    if (found == image.attributes.end()) return fallback;
     const double size = std::atof(found->second.c_str());
     return size > 0 && std::isfinite(size * size) ? size : fallback;
   }
   /// The first, where there are several solids.
-  [[nodiscard]] double voxelSize() const { return lengthNamed("ls:voxelSize", 1); }
+  [[nodiscard]] double voxelSize() const { return lengthNamed(a_, "ls:voxelSize", 1); }
 
   /// What curvatures change by over the 1e-3 voxel that places may be apart, per voxel: third
   /// differences of values in few bits are up to eight steps of those in a band of three voxels.
   [[nodiscard]] double curvatureStep() const {
-    const double bits = lengthNamed("ls:valueBits", 32);
+    const double bits = lengthNamed(a_, "ls:valueBits", 32);
     return bits < 32 ? 1e-3 * 8 * 6 * std::exp2(-bits) : 0;
   }
 
@@ -258,7 +258,8 @@ class Comparer {
            return h * h * apart(value(a_, "curvature.gauss", i), value(b_, "curvature.gauss", i));
          }});
     // From close by, places are known relative to the solid's size only.
-    const double extent = lengthNamed(kExtentAttribute, 0);
+    const double extent =
+        std::max(lengthNamed(a_, kExtentAttribute, 0), lengthNamed(b_, kExtentAttribute, 0));
     add({"Z"}, {"Z", "relative", {2e-6, kOneSurface}, [this, extent](std::size_t i) {
                   const double d = apart(value(a_, "Z", i), value(b_, "Z", i));
                   return d > 0 ? d / std::max(depth(i), extent) : 0;
@@ -337,7 +338,9 @@ class Comparer {
       };
       found.median = share(0.5);
       found.p99 = share(0.99);
-      found.p999 = share(0.999);
+      // Of fewer than a thousand pixels this would be the worst of all: one may pass it.
+      const std::size_t beyond = std::min<std::size_t>(1, sorted.size() / 100);
+      found.p999 = std::min(share(0.999), sorted[sorted.size() - 1 - beyond]);
       found.largest = sorted.back();
     }
     result_.layers.push_back(std::move(found));

@@ -99,7 +99,7 @@ void requireSoftness(const Scene& scene) {
     narrowest = std::min(narrowest, operand.background);
   // Each step takes up to K/4 off: far from all solids something must be left.
   const int depth = depthOf(expression);
-  const double most = narrowest * std::min(1.0, 4.0 / std::max(depth, 1));
+  const double most = narrowest * std::min(1.0, 3.999 / std::max(depth, 1));
   if (scene.softness <= most) return;
   throw levelset::InvalidInput(fmt::format(
       "scene: a softness of {:.6g} reaches beyond the bands, which know distances up to {:.6g}{}; "

@@ -69,6 +69,16 @@ Shifts shiftsOf(const openvdb::FloatTree& before, const openvdb::FloatTree& afte
       });
 }
 
+/// So that the largest value is one that is held, and a band stays as wide as it is; but for the
+/// last bit of it where no step does that.
+float stepOf(float largest, int bits) {
+  const float last = static_cast<float>(1 << (bits - 1)) - 0.5f;
+  const float step = largest / last;
+  for (const float near_ : {step, std::nextafter(step, 0.0f), std::nextafter(step, HUGE_VALF)})
+    if (last * near_ == largest) return near_;
+  return step;
+}
+
 }  // namespace
 
 int ValueBits::codeOf(float value) const {
@@ -84,7 +94,7 @@ float ValueBits::valueOf(int code) const {
 CoarseBand coarsened(const levelset::NarrowBand& band, int bits) {
   CoarseBand result{.band = band, .held = {.bits = bits}, .shift = {}};
   const openvdb::FloatTree& before = levelset::vdb(band).tree();
-  result.held.step = std::ldexp(largestOf(before), 1 - bits);
+  result.held.step = stepOf(largestOf(before), bits);
   openvdb::FloatTree& after = levelset::editVdb(result.band).tree();
   const auto held = [&](float value) { return result.held.valueOf(result.held.codeOf(value)); };
   openvdb::tools::changeBackground(after, held(before.background()));

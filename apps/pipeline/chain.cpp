@@ -60,6 +60,8 @@ const Param& matchParam(const std::vector<Param>& params, const std::string& nam
 
 struct Reader {
   const std::vector<std::string>& tokens;
+  const Script* script = nullptr;  // that the tokens are from
+  bool isStandardInput = false;    // was a script read from there?
   std::size_t next = 0;
 
   [[nodiscard]] bool atEnd() const { return next >= tokens.size(); }
@@ -127,6 +129,7 @@ struct Action {
   std::map<std::string, std::string> options;  // by full name; a flag is "true"
   std::vector<std::string> operandNames;       // `@NAME`, without the @
   std::string resultName;                      // --as
+  std::string place;                           // in a script
 };
 
 Action readAction(Reader& reader) {
@@ -187,6 +190,7 @@ class ChainBuilder {
     node.op = action.op;
     node.options = action.options;
     node.name = action.resultName;
+    node.place = action.place;
     node.inputs = takeOperands(action);
     for (const auto& [option, text] : action.options)
       if (const Param* param = action.op->find(option); param && namesValue(*param, text))
@@ -260,31 +264,61 @@ namespace {
 
 Graph parse(Reader& reader, bool mayRun);
 
+/// What stands behind `run`.
+struct ScriptCall {
+  std::string file;
+  std::map<std::string, std::string> settings;
+};
+
+ScriptCall readCall(Reader& reader) {
+  ScriptCall call;
+  for (++reader.next; !reader.atEnd();) {
+    const std::string& token = reader.tokens[reader.next];
+    if (isOption(token)) {
+      std::map<std::string, std::string> option;
+      reader.readOption(runOperator().params, "run", option);
+      const std::string text = option.at("set");
+      const std::size_t equals = std::min(text.find('='), text.size());
+      if (equals == 0 || equals == text.size())
+        throw UsageError(fmt::format("run: --set: '{}' is not NAME=VALUE", text));
+      if (!call.settings.emplace(text.substr(0, equals), text.substr(equals + 1)).second)
+        throw UsageError(fmt::format("run: --set: '{}' is given twice", text.substr(0, equals)));
+    } else if (call.file.empty() && token != "!") {
+      call.file = token;
+      ++reader.next;
+    } else {
+      throw UsageError(
+          "run: takes one file, and nothing behind it but --set NAME=VALUE; write the further "
+          "actions into the file");
+    }
+  }
+  if (call.file.empty())
+    throw UsageError("run: takes one file: `levelsmith run FILE`, or - for standard input");
+  return call;
+}
+
 /// `run FILE`: the chain that the file holds. Global options of the command line come first.
 Graph parseScript(Reader& reader, const Graph& before) {
-  const std::vector<std::string>& tokens = reader.tokens;
-  if (reader.next + 2 != tokens.size()) {
-    throw UsageError(
-        "run: takes one file, and nothing behind it; write the further actions into "
-        "the file");
-  }
-  const std::string file = tokens[reader.next + 1];
-  if (isGraphFile(file)) {
-    Graph graph = readGraph(file);
+  const ScriptCall call = readCall(reader);
+  if (isGraphFile(call.file)) {
+    if (!call.settings.empty())
+      throw UsageError(
+          fmt::format("run: --set says nothing to '{}'; a graph has no variables", call.file));
+    Graph graph = readGraph(call.file);
     graph.globals = before.globals;
     return graph;
   }
-  const Script script = readScript(file);
-  Reader inner{script.words};
+  const Script script = readScript(call.file, call.settings);
+  Reader inner{script.words, &script};
   try {
     Graph graph = parse(inner, false);
     for (const auto& [name, value] : before.globals) graph.globals[name] = value;
+    reader.isStandardInput = call.file == "-";
     return graph;
   } catch (const UsageError& error) {
     // The reader stands behind the action that failed.
-    const std::size_t word = std::min(inner.next, script.lines.size());
-    throw UsageError(
-        fmt::format("{} ({}, line {})", error.what(), file, script.lines[word > 0 ? word - 1 : 0]));
+    const std::size_t word = std::min(inner.next, script.words.size());
+    throw UsageError(fmt::format("{} ({})", error.what(), script.place(word > 0 ? word - 1 : 0)));
   }
 }
 
@@ -305,7 +339,10 @@ Graph parse(Reader& reader, bool mayRun) {
                       reader.next == 0 || graph.nodes.empty() ? "before" : "between this and",
                       reader.next + 1));
     }
-    builder.add(readAction(reader));
+    const std::size_t first = reader.next;
+    Action action = readAction(reader);
+    if (reader.script) action.place = reader.script->place(first);
+    builder.add(action);
     if (reader.atBang()) {
       ++reader.next;
       if (reader.atEnd()) throw UsageError("levelsmith: an action must follow the last '!'");
@@ -326,9 +363,8 @@ Graph parseChain(const std::vector<std::string>& tokens) {
       report != graph.globals.end() && levelset::isStandardOutput(report->second);
   checkStandardStream(graph, &Operator::usesStandardOutput, "output",
                       reportsThere ? "--report" : "");
-  const bool scripted = tokens.size() >= 2 && tokens[tokens.size() - 2] == "run";
   checkStandardStream(graph, &Operator::usesStandardInput, "input",
-                      scripted && tokens.back() == "-" ? "'run'" : "");
+                      reader.isStandardInput ? "'run'" : "");
   return graph;
 }
 

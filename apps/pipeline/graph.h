@@ -17,6 +17,7 @@ struct Node {
   std::map<std::string, std::size_t> named;    ///< by option: the node of its `@NAME`
   std::string name;                            ///< --as; empty: none
   Kind kind = Kind::Band;                      ///< of its result, if it makes one
+  std::string place;                           ///< where it was written, if in a script
 
   [[nodiscard]] bool makes() const { return op->flow == Flow::Makes; }
 };

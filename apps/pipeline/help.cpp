@@ -6,6 +6,9 @@
 #include <cctype>
 #include <nlohmann/json.hpp>
 
+#include "apps/pipeline/completion.h"
+#include "apps/pipeline/graph_schema.h"
+#include "apps/pipeline/reference.h"
 #include "apps/pipeline/units.h"
 #include "levelset/error.h"
 
@@ -27,6 +30,36 @@ std::string optionLine(const Param& param) {
   return line + "\n";
 }
 
+std::vector<const Operator*> helpTopics() {
+  std::vector<const Operator*> topics;
+  for (const HelpGroup& group : helpGroups())
+    topics.insert(topics.end(), group.actions.begin(), group.actions.end());
+  return topics;
+}
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+}  // namespace
+
+std::vector<HelpGroup> helpGroups() {
+  std::vector<HelpGroup> groups;
+  const auto add = [&](const Operator& op) {
+    const auto known = std::find_if(groups.begin(), groups.end(),
+                                    [&](const HelpGroup& group) { return group.name == op.group; });
+    if (known == groups.end())
+      groups.push_back({op.group, {&op}});
+    else
+      known->actions.push_back(&op);
+  };
+  for (const Operator& op : operators()) add(op);
+  add(runOperator());
+  return groups;
+}
+
 std::string operandText(const Operator& op) {
   if (op.operands.empty()) return "none";
   std::string text;
@@ -39,64 +72,6 @@ std::string operandText(const Operator& op) {
   return text;
 }
 
-/// What help knows of: every action, and `run`.
-std::vector<const Operator*> helpTopics() {
-  std::vector<const Operator*> topics;
-  for (const Operator& op : operators()) topics.push_back(&op);
-  topics.push_back(&runOperator());
-  return topics;
-}
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
-const char* typeName(ParamType type) {
-  switch (type) {
-    case ParamType::Flag:
-      return "flag";
-    case ParamType::Number:
-      return "number";
-    case ParamType::Integer:
-      return "integer";
-    case ParamType::Length:
-      return "length";
-    case ParamType::Lengths:
-      return "lengths";
-    case ParamType::Degrees:
-      return "degrees";
-    case ParamType::Numbers:
-      return "numbers";
-    case ParamType::Point:
-      return "point";
-    case ParamType::Points:
-      return "points";
-    case ParamType::Box:
-      return "box";
-    case ParamType::Matrix:
-      return "matrix";
-    case ParamType::Choice:
-      return "choice";
-    case ParamType::Text:
-      return "text";
-    case ParamType::Path:
-      return "path";
-    case ParamType::ImageSize:
-      return "image size";
-    case ParamType::Bytes:
-      return "bytes";
-    case ParamType::Scalar:
-      return "scalar field";
-    case ParamType::Velocity:
-      return "velocity";
-  }
-  return "";
-}
-
-}  // namespace
-
 std::string helpOverview() {
   std::string text =
       "levelsmith: level-set modelling on sparse grids\n\n"
@@ -105,15 +80,15 @@ std::string helpOverview() {
       "--as NAME names a\n"
       "result, @NAME takes it. Lengths are world units (0.5), voxels (2vx) or a share of the "
       "diagonal (1%).\n";
-  std::string group;
-  for (const Operator* op : helpTopics()) {
-    if (op->group != group) text += "\n" + op->group + "\n";
-    group = op->group;
-    text += fmt::format("  {:<14} {}\n", op->name, op->summary);
+  for (const HelpGroup& group : helpGroups()) {
+    text += "\n" + group.name + "\n";
+    for (const Operator* op : group.actions)
+      text += fmt::format("  {:<14} {}\n", op->name, op->summary);
   }
   text +=
       "\nHelp\n  help           this page; `help ACTION`, `help ACTION --json`, `help --search "
-      "WORD`\n\nGlobal options\n";
+      "WORD`\n                 `help --markdown` (docs/reference.md), `help --schema` (of graphs), "
+      "`help --completion bash|zsh`\n\nGlobal options\n";
   for (const Param& param : globalParams()) text += optionLine(param);
   text +=
       "  --version                      which levelsmith this is\n\n"
@@ -187,7 +162,25 @@ std::string helpSearch(const std::string& word) {
              : text;
 }
 
+namespace {
+
+/// The whole pages, which nothing stands beside; empty for other words.
+std::string wholePage(const std::vector<std::string>& words) {
+  if (words[0] == "--markdown" && words.size() == 1) return referencePage();
+  if (words[0] == "--schema" && words.size() == 1) return graphSchema();
+  if (words[0].starts_with("--completion=") && words.size() == 1)
+    return completionScript(words[0].substr(13));
+  if (words[0] == "--completion" && words.size() == 2) return completionScript(words[1]);
+  if (words[0] == "--completion" && words.size() == 1)
+    throw UsageError("help: --completion needs a shell: bash or zsh");
+  return "";
+}
+
+}  // namespace
+
 std::string help(const std::vector<std::string>& words) {
+  if (!words.empty())
+    if (const std::string page = wholePage(words); !page.empty()) return page;
   std::string name, search;
   bool json = false;
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -202,7 +195,9 @@ std::string help(const std::vector<std::string>& words) {
       name = words[i];
     } else {
       throw UsageError(fmt::format(
-          "help: what is '{}' for? use `help ACTION [--json]` or `help --search WORD`", words[i]));
+          "help: what is '{}' for? use `help ACTION [--json]`, `help --search WORD`, or one of "
+          "--markdown, --schema and --completion SHELL alone",
+          words[i]));
     }
   }
   if (!search.empty()) return helpSearch(search);

@@ -13,6 +13,48 @@ namespace pipeline {
 
 using levelset::UsageError;
 
+const char* typeName(ParamType type) {
+  switch (type) {
+    case ParamType::Flag:
+      return "flag";
+    case ParamType::Number:
+      return "number";
+    case ParamType::Integer:
+      return "integer";
+    case ParamType::Length:
+      return "length";
+    case ParamType::Lengths:
+      return "lengths";
+    case ParamType::Degrees:
+      return "degrees";
+    case ParamType::Numbers:
+      return "numbers";
+    case ParamType::Point:
+      return "point";
+    case ParamType::Points:
+      return "points";
+    case ParamType::Box:
+      return "box";
+    case ParamType::Matrix:
+      return "matrix";
+    case ParamType::Choice:
+      return "choice";
+    case ParamType::Text:
+      return "text";
+    case ParamType::Path:
+      return "path";
+    case ParamType::ImageSize:
+      return "image size";
+    case ParamType::Bytes:
+      return "bytes";
+    case ParamType::Scalar:
+      return "scalar field";
+    case ParamType::Velocity:
+      return "velocity";
+  }
+  return "";
+}
+
 std::string valueForm(const Param& param) {
   switch (param.type) {
     case ParamType::Flag:
@@ -189,14 +231,20 @@ const Operator& runOperator() {
       .details =
           "No '!' between actions; # begins a comment; quotes and backslashes as in a "
           "shell. Lines of options before the first action are global options; those of the "
-          "command line win. Nothing stands behind the file. A .json is a graph that "
-          "--save-graph wrote.",
-      .example = "levelsmith --threads 2 run chain.txt",
+          "command line win. ${NAME} is a variable: a line `set NAME VALUE` gives its default, "
+          "--set another value; ${NAME:stem}, :name and :dir are parts of a file's name. Actions "
+          "between `repeat COUNT` (it counts ${i} from 0) or `for NAME in LIST` and `end` are "
+          "repeated; a LIST is words, 0..10, 0..1 step 0.25, or *.ply. A .json is a graph that "
+          "--save-graph wrote. No action stands behind the file.",
+      .example = "levelsmith --threads 2 run holes.pipeline --set voxel=0.3",
       .params = {{.name = "file",
                   .type = ParamType::Path,
                   .doc = "what to run, or -",
                   .required = true,
-                  .position = 0}},
+                  .position = 0},
+                 {.name = "set",
+                  .type = ParamType::Text,
+                  .doc = "NAME=VALUE of a variable of the file; as often as one likes"}},
       .flow = Flow::PassesThrough};
   return op;
 }

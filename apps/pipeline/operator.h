@@ -50,6 +50,9 @@ struct Param {
   bool allowsAuto = false;   ///< Length: `auto` is an answer too
 };
 
+/// The type in words, e.g. "image size".
+[[nodiscard]] const char* typeName(ParamType type);
+
 /// The form of a value in help, e.g. "L" for a length.
 [[nodiscard]] std::string valueForm(const Param& param);
 

@@ -22,9 +22,13 @@ bool isWantOfThreads(const std::exception& error) {
   return std::string_view(error.what()).starts_with("pthread_create");
 }
 
-void refuseAs(const std::string& who, const levelset::Error& error) {
+std::string withPlace(const std::string& sentence, const std::string& place) {
+  return place.empty() ? sentence : sentence + " (" + place + ")";
+}
+
+void refuseAs(const std::string& who, const levelset::Error& error, const std::string& place) {
   using levelset::ExitCode;
-  const std::string sentence = sentenceOf(who, error.what());
+  const std::string sentence = withPlace(sentenceOf(who, error.what()), place);
   switch (error.exitCode()) {
     case ExitCode::Usage:
       throw levelset::UsageError(sentence);

@@ -17,7 +17,11 @@ inline constexpr const char* kWantOfThreads =
 /// reader deeper down becomes "info: 'x.ply' is empty".
 [[nodiscard]] std::string sentenceOf(const std::string& who, std::string sentence);
 
+/// `sentence`, and where in a script that was; as it is for an empty place.
+[[nodiscard]] std::string withPlace(const std::string& sentence, const std::string& place);
+
 /// A refusal from deeper down, told as one of what the user wrote: an action, or an option.
-[[noreturn]] void refuseAs(const std::string& who, const levelset::Error& error);
+[[noreturn]] void refuseAs(const std::string& who, const levelset::Error& error,
+                           const std::string& place = {});
 
 }  // namespace pipeline

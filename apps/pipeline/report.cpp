@@ -21,6 +21,7 @@ Json toJson(const StepReport& step) {
   Json json;
   json["action"] = step.action;
   if (!step.resultName.empty()) json["name"] = step.resultName;
+  if (!step.place.empty()) json["place"] = step.place;
   json["parameters"] = step.parameters;
   json["defaults"] = step.defaults;
   for (const Resolved& length : step.notes.lengths) {

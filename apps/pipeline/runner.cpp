@@ -56,9 +56,10 @@ std::vector<std::string> unusedValues(const Graph& graph) {
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     const Node& node = graph.nodes[i];
     if (!node.makes() || uses[i] > 0 || results.contains(i)) continue;
-    sentences.push_back(
+    sentences.push_back(withPlace(
         fmt::format("the {}{} at the end of the chain is not used; write it, or leave it out",
-                    kindName(node.kind), node.name.empty() ? "" : " '" + node.name + "'"));
+                    kindName(node.kind), node.name.empty() ? "" : " '" + node.name + "'"),
+        node.place));
   }
   return sentences;
 }
@@ -67,7 +68,8 @@ std::vector<std::string> unusedValues(const Graph& graph) {
 void tellFailures(const RunReport& report) {
   for (const StepReport& step : report.steps)
     if (!step.notes.failure.empty())
-      throw levelset::NumericalError(step.action + ": " + step.notes.failure);
+      throw levelset::NumericalError(
+          withPlace(step.action + ": " + step.notes.failure, step.place));
 }
 
 /// What the actions of a graph write.
@@ -102,14 +104,15 @@ void checkTargets(const Node& action, const RunSettings& settings, Targets& earl
             fmt::format("{}: '{}' is written by an action before, and --no-clobber forbids to "
                         "overwrite it; use another file",
                         action.op->name, target));
-      report.warnings.push_back(
+      report.warnings.push_back(withPlace(
           fmt::format("{}: '{}' is written by an action before, too, and only the last one stays; "
                       "use another file",
-                      action.op->name, target));
+                      action.op->name, target),
+          action.place));
       settings.warn(report.warnings.back());
     }
   } catch (const levelset::Error& error) {
-    refuseAs(action.op->name, error);
+    refuseAs(action.op->name, error, action.place);
   }
 }
 
@@ -275,13 +278,14 @@ class GraphRun {
       if (!param.fallback.empty() && !node.options.contains(param.name))
         step.defaults[param.name] = param.fallback;
     step.resultName = node.name;
+    step.place = node.place;
     return step;
   }
 
   void tell(const Node& node, const std::string& output, StepReport& step) {
     if (!output.empty() && settings_.print) settings_.print(output);
     for (const std::string& text : step.notes.warnings)
-      settings_.warn(sentenceOf(node.op->name, text));
+      settings_.warn(withPlace(sentenceOf(node.op->name, text), node.place));
     for (const std::string& text : step.notes.notes)
       settings_.note(sentenceOf(node.op->name, text));
     // Told at the end, and by the report where it belongs.
@@ -340,13 +344,13 @@ class GraphRun {
     try {
       runNode(i, step, clock);
     } catch (const std::bad_alloc&) {
-      throw levelset::ResourceLimit(
-          fmt::format("{}: memory ran out; use larger voxels or a narrower band", node.op->name));
+      throw levelset::ResourceLimit(withPlace(
+          node.op->name + ": memory ran out; use larger voxels or a narrower band", node.place));
     } catch (const levelset::Error& error) {
-      refuseAs(node.op->name, error);
+      refuseAs(node.op->name, error, node.place);
     } catch (const std::exception& error) {
       if (!isWantOfThreads(error)) throw;
-      throw levelset::ResourceLimit(node.op->name + kWantOfThreads);
+      throw levelset::ResourceLimit(withPlace(node.op->name + kWantOfThreads, node.place));
     }
   }
 

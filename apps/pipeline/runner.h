@@ -39,6 +39,7 @@ struct StepReport {
   double wallSeconds = 0, cpuSeconds = 0;
   double peakBytes = 0;
   std::string resultName, resultKind;
+  std::string place;  ///< in a script
   double activeVoxels = 0, voxelSize = 0, halfWidth = 0;
   std::size_t triangles = 0;
 };

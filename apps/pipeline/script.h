@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -9,15 +10,23 @@ namespace pipeline {
 /// The words of a chain that was written into a file, one action a line.
 struct Script {
   std::vector<std::string> words;  ///< as on the command line, with a `!` between actions
-  std::vector<std::size_t> lines;  ///< where each word stood, from 1
+  // By line, one that stands in a loop as often as it goes round:
+  std::vector<std::size_t> begins;  ///< its first word
+  std::vector<std::string> places;  ///< "FILE, line 4, i = 2"
+
+  /// Where a word stood.
+  [[nodiscard]] const std::string& place(std::size_t word) const;
 };
 
-/// Words are split at blanks; '…', "…" and backslashes quote as in a shell; # begins a comment; a
-/// backslash at the end of a line joins the next to it. Lines that hold only options, before the
-/// first action, are global options.
-/// @param file  or "-" for standard input
-/// @throws levelset::IoError when it cannot be read; levelset::UsageError for an open quote or a
-///         file without an action
-[[nodiscard]] Script readScript(const std::filesystem::path& file);
+/// Reads a script as splitScript() does, replaces its variables and goes through its loops: `set
+/// NAME VALUE`, `repeat COUNT [as NAME]` and `for NAME in LIST` up to `end`. Lines that hold only
+/// options, before the first action, are global options.
+/// @param file      or "-" for standard input
+/// @param settings  values of variables, which win over those of `set`
+/// @throws levelset::IoError when it cannot be read, or no file matches a pattern;
+///         levelset::UsageError for what cannot be understood, a variable without a value, a
+///         setting that no variable takes, a file without an action or with too many
+[[nodiscard]] Script readScript(const std::filesystem::path& file,
+                                const std::map<std::string, std::string>& settings = {});
 
 }  // namespace pipeline

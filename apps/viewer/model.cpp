@@ -113,7 +113,9 @@ void measureModel(Model& model) {
 }  // namespace
 
 bool Model::canCut() const {
-  return !solidBounds.isEmpty() && !scene.solids.empty() && !scene.isBlended() &&
+  // The cut is an expression, within which nothing is seen through.
+  const bool hidesNothing = scene.isOpaque() || !scene.csg.isEmpty();
+  return !solidBounds.isEmpty() && !scene.solids.empty() && !scene.isBlended() && hidesNothing &&
          std::none_of(scene.solids.begin(), scene.solids.end(),
                       [](const render::Solid& solid) { return solid.band.isOpenSurface(); });
 }

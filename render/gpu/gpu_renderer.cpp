@@ -15,6 +15,12 @@ Image renderGpu(const Scene& scene, const RenderOptions& options) {
   levelset::report(options.progress, 0, "render");
   const KernelScene surfaces(scene, options);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();
+  if (options.fromNanoVdb) {  // made, and copied into words
+    double bytes = 0;
+    for (const Solid& solid : scene.solids)
+      bytes += 2 * static_cast<double>(solid.band.memoryUse());
+    levelset::requireMemory(bytes, options.maxBytes, "render");
+  }
   const GlContext context;
   const GpuTracer tracer(context, surfaces, 0, options.fromNanoVdb ? &scene : nullptr);
   constexpr int kGpuTile = 64;  // pixels: enough rays for a run

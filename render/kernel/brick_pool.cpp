@@ -85,6 +85,10 @@ class Table {
     }
     std::int32_t& first = pool_.page[page];
     if (first < 0) {
+      if (pool_.entry.size() > kMostValues - kEntriesOfPage)
+        throw levelset::ResourceLimit(
+            "render: the surface is strewn over more of the table than an index can tell; use "
+            "larger voxels, or draw its parts apart");
       first = static_cast<std::int32_t>(pool_.entry.size());
       pool_.entry.resize(pool_.entry.size() + BrickPool::kBlocksOfPage, -BrickPool::kBlock);
       pool_.entry.resize(pool_.entry.size() + kEntriesOfPage - BrickPool::kBlocksOfPage, 0);

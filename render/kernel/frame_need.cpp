@@ -38,6 +38,13 @@ FrameNeed::FrameNeed(const Scene& scene, const RenderOptions& options, const Ima
         add(camera.from, axis * edge.length() - edge * (side / edge.length()));
     }
   if (!isLit) return;
+  // Shader starts them at twice the error of the surface that was hit. Three second differences of
+  // values up to the half width are twelve of these at most, over eight.
+  for (const Solid& solid : scene.solids)
+    if (!solid.band.isEmpty())
+      margin_ = std::max(margin_, (3.1 * solid.band.halfWidth() + 0.1) * solid.band.voxelSize());
+  // Of meshes by what single precision makes of their size; and its own share of the whole.
+  margin_ += 1e-5 * bounds.size().length();
   if (options.ambientSamples > 0) skyReach_ = skyReach(bounds.size().length());
   hasShadows_ = options.shadowSamples > 0;
   towardsKey_ = keyDirection(scene);
@@ -51,13 +58,13 @@ bool FrameNeed::needs(const V3d& centre, double radius) const {
       return plane.normal.dot(centre) - plane.offset >= -around;
     });
   };
-  if (isSeen(radius + skyReach_)) return true;
+  if (isSeen(radius + margin_ + skyReach_)) return true;
   if (!hasShadows_) return false;
   // From the ball away from the light, in a cone that widens: is any of it in the frame? The part
   // of the way that is before each plane is an interval.
   double from = 0, to = std::numeric_limits<double>::infinity();
   for (const Plane& plane : planes_) {
-    const double room = plane.normal.dot(centre) - plane.offset + radius;
+    const double room = plane.normal.dot(centre) - plane.offset + radius + margin_;
     const double slope = spread_ - plane.normal.dot(towardsKey_);  // of room, by the way
     if (slope > 0)
       from = std::max(from, -room / slope);

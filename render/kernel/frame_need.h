@@ -28,6 +28,7 @@ class FrameNeed {
     Imath::V3d normal;
     double offset;
   };
+  double margin_ = 0;          // of what is seen: rays to lights start that far off it, world units
   std::vector<Plane> planes_;  // of the frame and the bounds; none: all of space
   double skyReach_ = 0;        // of rays around what is seen, world units
   bool hasShadows_ = false;

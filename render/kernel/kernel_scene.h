@@ -79,7 +79,8 @@ class KernelScene {
 
   /// Takes the camera, where the solids are and how opaque, anew from a scene; tables and meshes
   /// stay.
-  /// @pre the camera is valid; the scene has the solids and the expression that this was made of
+  /// @pre made for any camera, not for a picture; the camera is valid; the scene has the solids and
+  /// the expression that this was made of
   void look(const Scene& scene);
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }

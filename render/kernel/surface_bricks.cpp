@@ -264,7 +264,7 @@ openvdb::FloatTree::Ptr quasiInterpolated(const openvdb::FloatTree& tree) {
 }
 
 Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
-  // Of a block, with what stencils reach about it, and rays to lights start off it.
+  // Of a block, with what stencils reach about it.
   constexpr double kRadius = 0.5 * kBlock * std::numbers::sqrt3 + 3;
   const std::vector<Coord> blocks = blocksOf(tree);
   std::vector<std::unique_ptr<Brick>> bricks(blocks.size());

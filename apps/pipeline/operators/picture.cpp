@@ -173,6 +173,10 @@ render::StyleOptions styleOf(const Invocation& in) {
 void coarsen(Invocation& in, render::Scene& scene) {
   const int bits = std::stoi(in.text("value-bits"));
   if (bits == 32) return;
+  double bytes = 0;
+  for (const render::Solid& solid : scene.solids)
+    bytes += static_cast<double>(solid.band.memoryUse());
+  levelset::requireMemory(bytes, in.maxMemory, "render");
   render::SurfaceShift most;
   for (render::Solid& solid : scene.solids) {
     if (solid.band.isEmpty()) continue;

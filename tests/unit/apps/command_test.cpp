@@ -186,7 +186,8 @@ TEST_F(Command, WarnsOfAFileThatIsWrittenTwice) {
 
 // A terminal made by script(1): bars come after a second, and are wiped away.
 TEST_F(Command, ShowsABarOnATerminal) {
-  const std::string slow = " torus --radius 2 --tube 0.8 --voxel 0.012 ! measure";
+  // Several seconds on any machine: the bar waits for one.
+  const std::string slow = " torus --radius 2 --tube 0.8 --voxel 0.006 ! measure";
   ASSERT_EQ(shell("script -qec '" + command() + slow + "' typed < /dev/null > /dev/null").code, 0);
   const std::string typed = support::slurp(folder_ / "typed");
   EXPECT_NE(typed.find('%'), std::string::npos) << typed;

@@ -64,6 +64,17 @@ TEST_F(Help, FindsWordsAndGuesses) {
   EXPECT_REFUSED(levelsmith("help ofset"), 2, "did you mean 'offset'");
 }
 
+TEST_F(Help, IsTheReference) {
+  const std::string page = levelsmith("help --markdown").out;
+  EXPECT_TRUE(page == support::slurp(LEVELSMITH_REFERENCE))
+      << "docs/reference.md is not what the program declares; renew it with\n  '" << command()
+      << "' help --markdown > '" << LEVELSMITH_REFERENCE << "'";
+  for (const auto& op : pipeline::operators())
+    EXPECT_NE(page.find("\n### " + op.name + "\n"), std::string::npos) << op.name;
+  EXPECT_NE(page.find("| `--voxel` | length | world, % |"), std::string::npos);
+  EXPECT_REFUSED(levelsmith("help offset --markdown"), 2, "alone");
+}
+
 /// As it stands in the README, on several lines.
 bool isInReadme(const std::string& example) {
   const auto words = [](const std::string& text) {

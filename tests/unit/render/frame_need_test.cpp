@@ -92,6 +92,22 @@ TEST(FrameNeed, KeepsWhatShadesFromOutsideTheFrame) {
           .agrees());
 }
 
+TEST(FrameNeed, KeepsWhatShadesTheStartOfARayOffACoarseSurface) {
+  // Rays to the light start far off the coarse ball, by voxels of the fine sheet that shades it.
+  Scene scene;
+  scene.solids.push_back({.band = levelset::makeSphere(4, V3d(0), 1), .id = 1});
+  scene.solids.push_back(
+      {.band = levelset::makeBox(V3d(0.05, 0.3, 1.2), V3d(-40, 3.14, 22.9), 0.005), .id = 2});
+  scene.solids.push_back({.band = levelset::makeSphere(1, V3d(0, 90, 0), 0.05), .id = 3});
+  scene.camera.width = scene.camera.height = 48;
+  scene.camera.from = V3d(0, 2.83, 32.83);
+  scene.camera.to = V3d(0, 2.83, 2.83);
+  scene.camera.orthoHeight = 0.2;
+  scene.key.direction = V3d(-1, 0, 0.5);
+  scene.key.softness = 0.01;
+  expectTheSame(scene, {.samples = 2, .ambientSamples = 0, .shadowSamples = 4}, 0.1, "coarse");
+}
+
 TEST(FrameNeed, LeavesNothingOutOfAnExpressionThatTellsInThePicture) {
   Scene scene = closeUp(V3d(560, 90, 10), V3d(550, 4, 0));
   scene.solids[0].name = "a";

@@ -51,7 +51,8 @@ TEST(ValueBits, MoveTheSurfaceByHalfAStepAtMost) {
     for (const int bits : {8, 16}) {
       const CoarseBand coarse = coarsened(band, bits);
       const double step = static_cast<double>(coarse.held.step) / voxel;
-      EXPECT_NEAR(step, 6 / std::exp2(bits), 1e-3 * step);  // a band of three voxels on each side
+      EXPECT_NEAR(step, 6 / (std::exp2(bits) - 1),
+                  1e-6 * step);  // a band of three voxels on each side
       EXPECT_LE(coarse.shift.largest, 0.5 * step * 1.01);
       EXPECT_GT(coarse.shift.largest, 0.4 * step);
       // Even over the step: a third of the half step, squared, less what two values average out.
@@ -60,6 +61,7 @@ TEST(ValueBits, MoveTheSurfaceByHalfAStepAtMost) {
       EXPECT_LT(coarse.shift.largest, last / 50);
       last = coarse.shift.largest;
       EXPECT_EQ(coarse.band.activeVoxelCount(), band.activeVoxelCount());
+      EXPECT_NEAR(coarse.band.halfWidth(), band.halfWidth(), 1e-6);
       EXPECT_EQ(coarsened(coarse.band, bits).band.activeVoxelCount(), band.activeVoxelCount());
     }
   }
@@ -105,6 +107,9 @@ TEST(ValueBits, AreDrawnAlikeByAllRenderers) {
 }
 
 TEST(ValueBits, HoldTheCoefficientsOfTheSplineThatAreValues) {
+  for (const int bits : {8, 16})
+    EXPECT_NO_THROW((void)renderCpu(coarseScene(levelset::makeSphere(9, V3d(0), 1), bits),
+                                    {.samples = 1, .filter = Filter::BSpline}));
   const Scene scene = coarseScene(levelset::makeSphere(20, V3d(0.3, 0.2, 0.1), 1), 16);
   const RenderOptions options = {
       .samples = 1, .ambientSamples = 0, .shadowSamples = 0, .filter = Filter::BSpline};
