@@ -1,11 +1,15 @@
 #include "apps/python/compute.h"
 
 #include <oneapi/tbb/global_control.h>
+#include <signal.h>
 
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <condition_variable>
+#include <cstdlib>
 #include <exception>
+#include <functional>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -14,6 +18,7 @@
 #include "apps/pipeline/report.h"
 #include "apps/pipeline/runner.h"
 #include "levelset/error.h"
+#include "levelset/file_target.h"
 
 namespace py = pybind11;
 
@@ -22,10 +27,28 @@ namespace {
 
 std::size_t maxMemory = 0;  // of all runs; 0: what is free tells
 
-/// A run in a thread of its own. Nothing here touches Python.
+/// Removes what processes that were killed left beside a file that they were to write.
+void removeLeftovers(const std::filesystem::path& target) {
+  std::error_code ignored;
+  const std::filesystem::path file = levelset::canonicalFile(target);
+  const std::string begin = "." + file.filename().string() + ".", end = ".tmp";
+  if (file.empty()) return;
+  for (const auto& item : std::filesystem::directory_iterator(file.parent_path(), ignored)) {
+    const std::string name = item.path().filename().string();
+    if (!name.starts_with(begin) || !name.ends_with(end)) continue;
+    const int process = std::atoi(name.c_str() + begin.size());
+    if (process > 0 && ::kill(process, 0) != 0 && errno == ESRCH)
+      std::filesystem::remove(item.path(), ignored);
+  }
+}
+
+using Made = std::function<void(std::size_t, const pipeline::Value&)>;
+
+/// A run in a thread of its own. Nothing there touches Python.
 class Run {
  public:
-  explicit Run(Request& request) : request_(request), thread_([this] { work(); }) {}
+  Run(const pipeline::Graph& graph, const RunOptions& options, Made made)
+      : graph_(graph), options_(options), made_(std::move(made)), thread_([this] { work(); }) {}
   ~Run() {
     end();
     if (thread_.joinable()) thread_.join();
@@ -44,25 +67,46 @@ class Run {
 
   // Once it is done.
   [[nodiscard]] Outcome& outcome() { return outcome_; }
+  [[nodiscard]] bool isWhole() const { return isWhole_; }
 
  private:
   void work() {
     pipeline::RunReport report;
     try {
-      pipeline::run(request_.graph(), settings(), report);
+      if (options_.isAgain)
+        for (const pipeline::Node& node : graph_.nodes)
+          if (node.op->targets)
+            for (const std::string& target :
+                 node.op->targets(pipeline::Invocation(*node.op, node.options)))
+              removeLeftovers(target);
+      pipeline::run(graph_, settings(), report);
     } catch (...) {
       outcome_.failure = std::current_exception();
     }
     outcome_.report = pipeline::reportJson(report);
+    writeReport(report);
     const std::lock_guard lock(mutex_);
     isDone_ = true;
-    if (!outcome_.failure) fraction_ = 1;
+    isWhole_ = !outcome_.failure;
+    if (isWhole_) fraction_ = 1;
     changed_.notify_all();
+  }
+
+  /// What went wrong first is what is told.
+  void writeReport(const pipeline::RunReport& report) {
+    if (options_.report.empty()) return;
+    try {
+      pipeline::writeReport(options_.report, report);
+    } catch (...) {
+      if (!outcome_.failure) outcome_.failure = std::current_exception();
+    }
   }
 
   pipeline::RunSettings settings() {
     pipeline::RunSettings settings;
-    settings.maxMemory = memoryLimit();
+    settings.maxMemory = options_.maxMemory > 0 ? options_.maxMemory : memoryLimit();
+    settings.cache = options_.cache;
+    settings.measureErrors = options_.measureErrors;
     settings.begin = [this](const std::string& action) {
       if (!goesOn_) throw levelset::Cancelled(action + ": cancelled");
       tell(action, 0);
@@ -71,9 +115,7 @@ class Run {
       tell(action, fraction);
     };
     settings.goesOn = [this] { return goesOn_.load(); };
-    settings.made = [this](std::size_t node, const pipeline::Value& value) {
-      request_.keep(node, value);
-    };
+    settings.made = made_;
     settings.print = [this](const std::string& text) { outcome_.printed += text; };
     settings.warn = [this](const std::string& text) { outcome_.warnings.push_back(text); };
     settings.note = [this](const std::string& text) { outcome_.notes.push_back(text); };
@@ -86,12 +128,14 @@ class Run {
     fraction_ = fraction;
   }
 
-  Request& request_;
+  const pipeline::Graph& graph_;
+  const RunOptions& options_;
+  const Made made_;
   Outcome outcome_;
   std::atomic<bool> goesOn_ = true;
   std::mutex mutex_;
   std::condition_variable changed_;
-  bool isDone_ = false;
+  bool isDone_ = false, isWhole_ = false;
   std::string action_;
   double fraction_ = 0;
   std::thread thread_;  // last: it begins at once
@@ -107,12 +151,9 @@ void attend(Run& run, const py::object& progress) {
   if (answer.ptr() == Py_False) run.end();
 }
 
-}  // namespace
-
-Outcome compute(const std::vector<LazyPtr>& values, const py::object& progress) {
+/// Waits for a run. @return what it left, with what Python raised meanwhile
+Outcome wait(Run& run, const py::object& progress) {
   constexpr std::chrono::milliseconds kInterval(50);
-  Request request(values);
-  Run run(request);
   std::exception_ptr raised;
   for (bool isDone = false; !isDone;) {
     {
@@ -127,10 +168,30 @@ Outcome compute(const std::vector<LazyPtr>& values, const py::object& progress) 
       run.end();
     }
   }
-  Outcome& outcome = run.outcome();
-  request.settle(!outcome.failure);
+  Outcome outcome = std::move(run.outcome());
   if (raised) outcome.failure = raised;
-  return std::move(outcome);
+  return outcome;
+}
+
+}  // namespace
+
+Outcome compute(const std::vector<LazyPtr>& values, const RunOptions& options) {
+  Request request(values);
+  Outcome outcome;
+  bool isDone = false;
+  {
+    Run run(request.graph(), options,
+            [&](std::size_t node, const pipeline::Value& value) { request.keep(node, value); });
+    outcome = wait(run, options.progress);
+    isDone = run.isWhole();
+  }
+  request.settle(isDone);
+  return outcome;
+}
+
+Outcome compute(const pipeline::Graph& graph, const RunOptions& options) {
+  Run run(graph, options, {});
+  return wait(run, options.progress);
 }
 
 void setThreads(std::size_t count) {

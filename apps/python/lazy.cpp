@@ -120,8 +120,11 @@ void Request::keep(std::size_t node, const Value& value) {
 }
 
 void Request::settle(bool isDone) {
-  for (std::size_t i = 0; i < nodes_.size(); ++i)
-    if (isDone || values_[i]) nodes_[i]->settle(std::move(values_[i]));
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    // With a cache what others made of a value may be known, and not the value itself.
+    const bool isMissing = isKept_[i] && !values_[i] && graph_.nodes[i].makes();
+    if (isDone ? !isMissing : values_[i].has_value()) nodes_[i]->settle(std::move(values_[i]));
+  }
 }
 
 }  // namespace python

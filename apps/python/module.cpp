@@ -12,6 +12,7 @@
 #include "apps/python/arguments.h"
 #include "apps/python/arrays.h"
 #include "apps/python/compute.h"
+#include "apps/python/jobs.h"
 #include "levelset/error.h"
 
 /// levelsmith._core: what the package levelsmith is made of.
@@ -234,8 +235,7 @@ const pipeline::Value& valueOf(const Handle& node) {
 }
 
 /// (report, printed, warnings, notes, exception or None)
-py::tuple compute(const py::iterable& nodes, const py::object& progress) {
-  python::Outcome outcome = python::compute(lazies(nodes), progress);
+py::tuple tupleOf(const python::Outcome& outcome) {
   py::object failure = py::none();
   try {
     if (outcome.failure) std::rethrow_exception(outcome.failure);
@@ -248,6 +248,49 @@ py::tuple compute(const py::iterable& nodes, const py::object& progress) {
         "levelsmith: memory ran out; use larger voxels or a narrower band");
   }
   return py::make_tuple(outcome.report, outcome.printed, outcome.warnings, outcome.notes, failure);
+}
+
+py::tuple compute(const py::iterable& nodes, const py::object& progress, const std::string& cache,
+                  bool isAgain) {
+  return tupleOf(
+      python::compute(lazies(nodes), {.progress = progress, .cache = cache, .isAgain = isAgain}));
+}
+
+using Texts = std::map<std::string, std::string>;
+
+/// (graph, places, globals)
+py::tuple makeJob(const std::string& text, const std::string& name, const Texts& settings,
+                  const std::string& folder) {
+  const python::Job job = python::makeJob(text, name, settings, folder);
+  return py::make_tuple(job.graph, job.places, job.globals);
+}
+
+/// As compute().
+py::tuple runJob(const std::string& graph, const std::vector<std::string>& places,
+                 const Texts& globals, const std::string& cache) {
+  const pipeline::Graph whole = python::graphOf({graph, places, globals});
+  const auto global = [&](const char* name) {
+    const auto it = globals.find(name);
+    return it == globals.end() ? std::string() : it->second;
+  };
+  const std::string memory = global("max-memory");
+  return tupleOf(python::compute(
+      whole, {.cache = cache.empty() ? global("cache") : cache,
+              .isAgain = true,
+              .report = global("report"),
+              .measureErrors = globals.contains("report") || globals.contains("verbose"),
+              .maxMemory = memory.empty() ? 0 : pipeline::parseBytes(memory, "--max-memory")}));
+}
+
+/// The kind of a node that was computed, and its value.
+py::tuple pack(const Handle& node) {
+  const pipeline::Value value = valueOf(node);
+  std::string bytes;
+  {
+    const py::gil_scoped_release release;
+    bytes = python::bytesOf(value);
+  }
+  return py::make_tuple(static_cast<int>(value.kind()), py::bytes(bytes));
 }
 
 std::string graphText(const py::iterable& nodes) {
@@ -347,6 +390,12 @@ PYBIND11_MODULE(_core, module) {
                            const py::array_t<std::int32_t, py::array::c_style>& inside) {
     return given(
         pipeline::Value(python::bandOfSamples(toImath(origin), voxel, blocks, values, inside)));
+  });
+  module.def("job", makeJob);
+  module.def("run_job", runJob);
+  module.def("pack", pack);
+  module.def("unpack", [](int kind, const std::string& bytes) {
+    return given(python::valueOf(static_cast<Kind>(kind), bytes));
   });
   module.def("set_threads", python::setThreads);
   module.def("set_max_memory", [](const std::string& text) {

@@ -34,9 +34,11 @@ from ._values import (
     compute,
     graph,
     last_report,
+    set_cache,
     set_max_memory,
     set_threads,
 )
+from ._map import map
 from ._samples import from_array, from_function
 from . import _operators
 
@@ -45,7 +47,7 @@ _operators.install(globals())
 __all__ = [
     "Cancelled", "Error", "FileError", "InputError", "NumericalError", "ResourceError", "UsageError",
     "Field", "Mesh", "Patch", "Scene", "Solid", "Surface", "Value", "Volume", "Warning",
-    "compute", "graph", "last_report", "set_max_memory", "set_threads",
+    "compute", "graph", "last_report", "map", "set_cache", "set_max_memory", "set_threads",
     "from_array", "from_function",
     *_operators.names,
 ]  # fmt: skip

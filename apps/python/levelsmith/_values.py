@@ -1,5 +1,6 @@
 """Lazy values, one class for each kind."""
 
+import hashlib
 import json
 import logging
 import os
@@ -12,7 +13,9 @@ import numpy
 from . import _core
 
 _log = logging.getLogger("levelsmith")
-_last = threading.local()
+_local = threading.local()  # of each thread: the report of its last run, and the job it is part of
+_limits = {"cache": "", "threads": None, "memory": None}  # as the user set them
+_share = None  # as share_machine set it
 operators = {}  # functions by name, see _operators.install
 
 
@@ -22,15 +25,40 @@ class Warning(UserWarning):
 
 def run(nodes, progress=None, level=3):
     """Compute nodes. Returns what was printed; warnings point `level` calls up."""
-    report, printed, told, notes, failure = _core.compute(nodes, progress)
-    _last.report = report
+    job = getattr(_local, "job", None)
+    return settle(_core.compute(nodes, progress, cache_folder(), job is not None), level + 1)
+
+
+def settle(outcome, level=3):
+    """Tells what a run told. Returns what it printed, or raises what ended it."""
+    report, printed, told, notes, failure = outcome
+    _local.report = report
     for text in notes:
         _log.info("%s", text)
+    job = getattr(_local, "job", None)
     for text in told:
-        warnings.warn(text, Warning, stacklevel=level)
+        if job:
+            job.told.append(text)
+        else:
+            warnings.warn(text, Warning, stacklevel=level)
     if failure is not None:
         raise failure
     return printed
+
+
+class Job:
+    """What this thread does for map(): results are kept in its folder, and warnings go with it."""
+
+    def __init__(self, cache):
+        self.cache, self.told = cache, []
+
+    def __enter__(self):
+        self.before = getattr(_local, "job", None)
+        _local.job = self
+        return self
+
+    def __exit__(self, *_):
+        _local.job = self.before
 
 
 def compute(*values, progress=None):
@@ -49,7 +77,7 @@ def compute(*values, progress=None):
 
 def last_report():
     """The report of this thread's last run: its steps, with parameters, times, notes and errors."""
-    return json.loads(_last.report) if hasattr(_last, "report") else None
+    return json.loads(_local.report) if hasattr(_local, "report") else None
 
 
 def graph(*values):
@@ -60,16 +88,51 @@ def graph(*values):
 def set_threads(count=0):
     """Threads to use from now on; 0: as many as there are cores. Results do not depend on it."""
     _core.set_threads(count)
+    _limits["threads"] = count
 
 
 def set_max_memory(size=""):
     """Refuse what would take more, e.g. "4G"; "": 80 % of what is free."""
     _core.set_max_memory(str(size))
+    _limits["memory"] = size
+
+
+def set_cache(folder=""):
+    """Keep results in a folder from now on, and take known ones from there; "": nowhere.
+
+    As `--cache` of the command line, with which it may be shared; see `cache` for what is in it.
+    """
+    _limits["cache"] = os.path.abspath(folder) if folder else ""
+
+
+def cache_folder():
+    """Of this thread; empty: none."""
+    job = getattr(_local, "job", None)
+    return job.cache if job else _limits["cache"]
+
+
+def share_machine(processes, memory):
+    """Limits for one of several processes, where the user set none. memory: bytes, or 0."""
+    global _share
+    if _share == (processes, memory):
+        return
+    _share = processes, memory
+    if _limits["threads"] is None:
+        _core.set_threads(max(1, len(os.sched_getaffinity(0)) // processes))
+    if _limits["memory"] is None and memory:
+        _core.set_max_memory(str(memory))
 
 
 def wrap(node):
     value = object.__new__(classes[node.kind])
     value._node = node
+    return value
+
+
+def unwrap(kind, content, name):
+    """What Value.__reduce__ took apart."""
+    value = wrap(_core.unpack(kind, content))
+    value.name = name
     return value
 
 
@@ -105,6 +168,19 @@ class Value:
     def bounds(self):
         """Two points: the box of the surface, or of the vertices, world units. Computes it."""
         return numpy.array(self._known().bounds)
+
+    def __reduce__(self):
+        return unwrap, (*_core.pack(self._known()), self.name)
+
+    def __copy__(self):
+        return self
+
+    def __deepcopy__(self, _):
+        return self
+
+    def __dask_tokenize__(self):
+        kind, content = _core.pack(self._known())
+        return kind, hashlib.sha256(content).hexdigest()
 
     def _known(self):
         if not self._node.is_computed:
