@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "apps/pipeline/digest.h"
+#include "apps/pipeline/mesh_bytes.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
@@ -138,11 +139,31 @@ std::optional<std::string> CacheKeys::keyOf(
   return digestOf(text);
 }
 
+std::optional<std::string> CacheKeys::keyOf(const Value& given) const {
+  std::string text;
+  add(text, "program", program_);
+  add(text, "given", kindName(given.kind()));
+  if (given.kind() == Kind::Mesh) {
+    add(text, "mesh", digestOf(bytesOf(given.mesh())));
+  } else if (given.kind() == Kind::Field) {
+    add(text, "field", fmt::format("{:016x}", given.field().contentHash()));
+  } else if (given.kind() == Kind::Band) {
+    add(text, "band", fmt::format("{:016x}", given.band().contentHash()));
+  } else {
+    return {};
+  }
+  return digestOf(text);
+}
+
 std::vector<std::optional<std::string>> CacheKeys::of(const Graph& graph,
                                                       const std::vector<char>& needed) const {
   std::vector<std::optional<std::string>> keys(graph.nodes.size());
-  for (std::size_t i = 0; i < graph.nodes.size(); ++i)
-    if (needed[i]) keys[i] = keyOf(graph, graph.nodes[i], keys);
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    if (!needed[i]) continue;
+    const auto given = graph.given.find(i);
+    keys[i] =
+        given == graph.given.end() ? keyOf(graph, graph.nodes[i], keys) : keyOf(given->second);
+  }
   return keys;
 }
 

@@ -29,6 +29,8 @@ class CacheKeys {
   [[nodiscard]] std::optional<std::string> keyOf(
       const Graph& graph, const Node& node,
       const std::vector<std::optional<std::string>>& before) const;
+  /// Of a value that was made elsewhere: by what it holds.
+  [[nodiscard]] std::optional<std::string> keyOf(const Value& given) const;
   [[nodiscard]] std::optional<std::string> contentOf(const std::filesystem::path& file,
                                                      const Node& node) const;
 

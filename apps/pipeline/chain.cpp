@@ -258,6 +258,16 @@ void checkStandardStream(const Graph& graph, StreamUse use, const char* stream,
   }
 }
 
+void checkStandardStreams(const Graph& graph, bool isScriptFromInput) {
+  const auto report = graph.globals.find("report");
+  const bool reportsThere =
+      report != graph.globals.end() && levelset::isStandardOutput(report->second);
+  checkStandardStream(graph, &Operator::usesStandardOutput, "output",
+                      reportsThere ? "--report" : "");
+  checkStandardStream(graph, &Operator::usesStandardInput, "input",
+                      isScriptFromInput ? "'run'" : "");
+}
+
 }  // namespace
 
 namespace {
@@ -297,8 +307,19 @@ ScriptCall readCall(Reader& reader) {
   return call;
 }
 
+Graph parseLines(const Script& script) {
+  Reader reader{script.words, &script};
+  try {
+    return parse(reader, false);
+  } catch (const UsageError& error) {
+    // The reader stands behind the action that failed.
+    const std::size_t word = std::min(reader.next, script.words.size());
+    throw UsageError(fmt::format("{} ({})", error.what(), script.place(word > 0 ? word - 1 : 0)));
+  }
+}
+
 /// `run FILE`: the chain that the file holds. Global options of the command line come first.
-Graph parseScript(Reader& reader, const Graph& before) {
+Graph parseFile(Reader& reader, const Graph& before) {
   const ScriptCall call = readCall(reader);
   if (isGraphFile(call.file)) {
     if (!call.settings.empty())
@@ -308,18 +329,10 @@ Graph parseScript(Reader& reader, const Graph& before) {
     graph.globals = before.globals;
     return graph;
   }
-  const Script script = readScript(call.file, call.settings);
-  Reader inner{script.words, &script};
-  try {
-    Graph graph = parse(inner, false);
-    for (const auto& [name, value] : before.globals) graph.globals[name] = value;
-    reader.isStandardInput = call.file == "-";
-    return graph;
-  } catch (const UsageError& error) {
-    // The reader stands behind the action that failed.
-    const std::size_t word = std::min(inner.next, script.words.size());
-    throw UsageError(fmt::format("{} ({})", error.what(), script.place(word > 0 ? word - 1 : 0)));
-  }
+  Graph graph = parseLines(readScript(call.file, call.settings));
+  for (const auto& [name, value] : before.globals) graph.globals[name] = value;
+  reader.isStandardInput = call.file == "-";
+  return graph;
 }
 
 Graph parse(Reader& reader, bool mayRun) {
@@ -328,7 +341,7 @@ Graph parse(Reader& reader, bool mayRun) {
   while (!reader.atEnd() && isOption(tokens[reader.next]))
     reader.readOption(globalParams(), "levelsmith", graph.globals);
   if (!reader.atEnd() && tokens[reader.next] == runOperator().name) {
-    if (mayRun) return parseScript(reader, graph);
+    if (mayRun) return parseFile(reader, graph);
     throw UsageError("run: a file of actions cannot run another one; put its actions here");
   }
   ChainBuilder builder(graph.nodes);
@@ -357,14 +370,14 @@ Graph parse(Reader& reader, bool mayRun) {
 
 Graph parseChain(const std::vector<std::string>& tokens) {
   Reader reader{tokens};
-  const Graph graph = parse(reader, true);
-  const auto report = graph.globals.find("report");
-  const bool reportsThere =
-      report != graph.globals.end() && levelset::isStandardOutput(report->second);
-  checkStandardStream(graph, &Operator::usesStandardOutput, "output",
-                      reportsThere ? "--report" : "");
-  checkStandardStream(graph, &Operator::usesStandardInput, "input",
-                      reader.isStandardInput ? "'run'" : "");
+  Graph graph = parse(reader, true);
+  checkStandardStreams(graph, reader.isStandardInput);
+  return graph;
+}
+
+Graph parseScript(const Script& script) {
+  Graph graph = parseLines(script);
+  checkStandardStreams(graph, false);
   return graph;
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "apps/pipeline/graph.h"
+#include "apps/pipeline/script.h"
 
 namespace pipeline {
 
@@ -11,5 +12,8 @@ namespace pipeline {
 /// runs: actions, options, numbers, ranges, operands and their kinds, who writes standard output.
 /// @throws levelset::UsageError
 [[nodiscard]] Graph parseChain(const std::vector<std::string>& tokens);
+
+/// The same of what a script comes to.
+[[nodiscard]] Graph parseScript(const Script& script);
 
 }  // namespace pipeline

@@ -336,9 +336,12 @@ const std::string& Script::place(std::size_t word) const {
 
 Script readScript(const std::filesystem::path& file,
                   const std::map<std::string, std::string>& settings) {
-  return Expander(splitScript(readText(file, "run", kMostScriptBytes), file.string()),
-                  file.string(), settings)
-      .expand();
+  return expandScript(readText(file, "run", kMostScriptBytes), file.string(), settings);
+}
+
+Script expandScript(const std::string& text, const std::string& name,
+                    const std::map<std::string, std::string>& settings) {
+  return Expander(splitScript(text, name), name, settings).expand();
 }
 
 }  // namespace pipeline

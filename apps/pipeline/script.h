@@ -28,5 +28,8 @@ struct Script {
 ///         setting that no variable takes, a file without an action or with too many
 [[nodiscard]] Script readScript(const std::filesystem::path& file,
                                 const std::map<std::string, std::string>& settings = {});
+/// The same of a text. @param name  of the script, for what is said about it
+[[nodiscard]] Script expandScript(const std::string& text, const std::string& name,
+                                  const std::map<std::string, std::string>& settings = {});
 
 }  // namespace pipeline

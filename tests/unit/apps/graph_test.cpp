@@ -11,7 +11,9 @@
 
 #include "apps/pipeline/chain.h"
 #include "apps/pipeline/graph_file.h"
+#include "apps/pipeline/runner.h"
 #include "levelset/error.h"
+#include "levelset/solids/shapes.h"
 #include "tests/support/shell.h"
 
 namespace graph_test {
@@ -42,6 +44,44 @@ TEST(Graph, KeepsWhatIsTakenOffTheStackAndByName) {
 TEST(Graph, NeedsAllOfAChainThatEndsInAValue) {
   const Graph graph = parseChain({"sphere", "--radius", "1", "--voxel", "0.1", "!", "offset", "1"});
   EXPECT_EQ(neededNodes(graph), (std::vector<char>{1, 1}));
+}
+
+TEST(Graph, NeedsResultsBesideWhatActsOutside) {
+  Graph graph = parseChain(kFork);
+  graph.results = {1};
+  EXPECT_EQ(neededNodes(graph), (std::vector<char>{1, 1, 0, 1, 1, 1}));
+  graph = parseChain({"sphere", "--radius", "1", "--voxel", "0.1", "!", "offset", "1"});
+  graph.results = {0};
+  EXPECT_EQ(neededNodes(graph), (std::vector<char>{1, 0}));
+}
+
+TEST(Graph, TakesValuesThatAreGivenAndHandsOutResults) {
+  Graph graph =
+      parseChain({"sphere", "--radius", "9", "--voxel", "0.1", "!", "offset", "0.5", "!", "mesh"});
+  graph.nodes[0].op = &pipeline::givenOperator();
+  graph.given.emplace(0, pipeline::Value(levelset::makeSphere(1, {0, 0, 0}, 0.1)));
+  graph.results = {1};
+  std::map<std::size_t, pipeline::Value> made;
+  std::vector<std::string> told;
+  pipeline::RunSettings settings;
+  settings.made = [&](std::size_t node, const pipeline::Value& value) {
+    made.emplace(node, value);
+  };
+  settings.warn = settings.note = [&](const std::string& text) { told.push_back(text); };
+  pipeline::RunReport report;
+  run(graph, settings, report);
+  ASSERT_EQ(report.steps.size(), 1u);
+  ASSERT_EQ(made.size(), 1u);
+  EXPECT_NEAR(made.at(1).plan().bounds.max.x, 1.5, 1e-3);
+}
+
+TEST(Graph, EndsAnActionThatIsNotToGoOn) {
+  const Graph graph = parseChain({"sphere", "--radius", "1", "--voxel", "0.02"});
+  pipeline::RunSettings settings;
+  settings.goesOn = [] { return false; };
+  pipeline::RunReport report;
+  EXPECT_THROW(run(graph, settings, report), levelset::Cancelled);
+  EXPECT_EQ(report.exitCode, 130);
 }
 
 TEST(Graph, IsTheSameFromJson) {

@@ -1,0 +1,154 @@
+#include "apps/python/arrays.h"
+
+#include <fmt/core.h>
+#include <openvdb/tools/Dense.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "levelset/error.h"
+#include "levelset/progress.h"
+#include "levelset/vdb.h"
+
+namespace py = pybind11;
+
+namespace python {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using levelset::TriMesh;
+using openvdb::Coord;
+
+std::string shapeText(const py::array& array) {
+  return py::str(array.attr("shape")).cast<std::string>() + " of " +
+         py::str(array.dtype()).cast<std::string>();
+}
+
+void requireRows(const py::array& array, const char* name, const char* kinds, const char* wanted) {
+  const bool isKind = std::strchr(kinds, array.dtype().kind()) != nullptr;
+  if (isKind && array.ndim() == 2 && array.shape(1) == 3) return;
+  throw InvalidInput(fmt::format("Mesh: {} are an array {}; give one of shape (n, 3) of {}", name,
+                                 shapeText(array), wanted));
+}
+
+/// A view of rows of plain numbers.
+template <typename Row, typename T, std::size_t columns>
+py::object rowsView(const py::object& owner, const std::vector<Row>& rows) {
+  static_assert(sizeof(Row) == columns * sizeof(T));
+  const auto* begin = rows.empty() ? nullptr : reinterpret_cast<const T*>(rows.data());
+  py::array_t<T> view(std::vector<py::ssize_t>{static_cast<py::ssize_t>(rows.size()), columns},
+                      begin, owner);
+  view.attr("setflags")(py::arg("write") = false);
+  return view;
+}
+
+}  // namespace
+
+TriMesh meshFromArrays(const py::array& vertices, const py::array& faces) {
+  requireRows(vertices, "vertices", "f", "float32 or float64");
+  requireRows(faces, "faces", "iu", "whole numbers");
+  const auto places = py::array_t<double, py::array::c_style | py::array::forcecast>(vertices);
+  const auto corners = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>(faces);
+  TriMesh mesh;
+  if (vertices.itemsize() < 8) mesh.precision = levelset::CoordinatePrecision::Float;
+  const py::ssize_t count = places.shape(0);
+  const double* p = places.data();
+  for (py::ssize_t i = 0; i < count; ++i, p += 3) {
+    const V3d position(p[0], p[1], p[2]);
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
+      throw InvalidInput(
+          fmt::format("Mesh: vertex {} is ({}, {}, {}); give finite numbers", i, p[0], p[1], p[2]));
+    mesh.positions.push_back(position);
+  }
+  const std::int64_t* c = corners.data();
+  for (py::ssize_t i = 0; i < corners.shape(0); ++i, c += 3) {
+    for (int k = 0; k < 3; ++k)
+      if (c[k] < 0 || c[k] >= count || c[k] > std::int64_t{0xffffffff})
+        throw InvalidInput(
+            fmt::format("Mesh: face {} takes vertex {}, and there are {}", i, c[k], count));
+    mesh.triangles.push_back({static_cast<std::uint32_t>(c[0]), static_cast<std::uint32_t>(c[1]),
+                              static_cast<std::uint32_t>(c[2])});
+  }
+  return mesh;
+}
+
+py::object meshArray(const py::object& owner, const TriMesh& mesh, const std::string& list) {
+  const levelset::MeshAttributes& attributes = mesh.attributes;
+  if (list == "vertices") return rowsView<V3d, double, 3>(owner, mesh.positions);
+  if (list == "faces")
+    return rowsView<std::array<std::uint32_t, 3>, std::uint32_t, 3>(owner, mesh.triangles);
+  if (list == "normals" && !attributes.normals.empty())
+    return rowsView<V3d, double, 3>(owner, attributes.normals);
+  if (list == "uvs" && !attributes.uvs.empty())
+    return rowsView<Imath::V2d, double, 2>(owner, attributes.uvs);
+  if (list == "colors" && !attributes.colors.empty())
+    return rowsView<Imath::V4f, float, 4>(owner, attributes.colors);
+  return py::none();
+}
+
+DenseBand bandArray(const levelset::NarrowBand& band, const std::optional<Imath::Box3d>& box,
+                    std::size_t maxMemory) {
+  const openvdb::FloatGrid& grid = levelset::vdb(band);
+  const Imath::M44d matrix = band.indexToWorld();
+  const double voxel = band.voxelSize();
+  for (int i = 0; i < 3; ++i)
+    if (std::abs(matrix[i][i] - voxel) > 1e-6 * voxel)
+      throw InvalidInput(
+          "array: the grid is turned against the axes; put 'resample' or 'transform' with bake "
+          "before it");
+  openvdb::CoordBBox range = grid.evalActiveVoxelBoundingBox();
+  if (box) {
+    const openvdb::Vec3d low = grid.worldToIndex(levelset::toVdb(box->min)),
+                         high = grid.worldToIndex(levelset::toVdb(box->max));
+    const openvdb::Vec3d slack(1e-6);
+    range = {Coord::ceil(low - slack), Coord::floor(high + slack)};
+  }
+  if (range.empty())
+    throw InvalidInput(box ? "array: no grid point lies in the box; give a larger one"
+                           : "array: the level set is empty; give a box");
+  const openvdb::Vec3d size = range.extents().asVec3d();
+  levelset::requireMemory(size[0] * size[1] * size[2] * sizeof(float), maxMemory, "array");
+  const Coord dim = range.dim();
+  py::array_t<float> values({dim.x(), dim.y(), dim.z()});
+  openvdb::tools::Dense<float> dense(range, values.mutable_data());  // z runs fastest
+  {
+    const py::gil_scoped_release release;
+    openvdb::tools::copyToDense(grid, dense);
+  }
+  return {std::move(values), levelset::toImath(grid.indexToWorld(range.min()))};
+}
+
+levelset::NarrowBand bandOfSamples(const V3d& origin, double voxel,
+                                   const py::array_t<std::int32_t>& blocks,
+                                   const py::array_t<float>& values,
+                                   const py::array_t<std::int32_t>& inside) {
+  using Leaf = openvdb::FloatTree::LeafNodeType;
+  auto transform = levelset::uniformTransform(voxel);
+  transform->postTranslate(levelset::toVdb(origin));
+  // Beyond all samples: a background says nothing of a surface.
+  auto largest = static_cast<float>(voxel);
+  for (py::ssize_t i = 0; i < values.size(); ++i)
+    largest = std::max(largest, std::abs(values.data()[i]));
+  const openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(2 * largest);
+  grid->setTransform(transform);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  openvdb::FloatTree& tree = grid->tree();
+  const auto coord = [](const auto& of, py::ssize_t i) {
+    constexpr auto kSide = static_cast<std::int32_t>(Leaf::DIM);
+    return Coord(kSide * of(i, 0), kSide * of(i, 1), kSide * of(i, 2));
+  };
+  const auto tiles = inside.unchecked<2>(), places = blocks.unchecked<2>();
+  for (py::ssize_t i = 0; i < tiles.shape(0); ++i)
+    tree.addTile(1, coord(tiles, i), -grid->background(), false);
+  const float* samples = values.data();
+  for (py::ssize_t i = 0; i < places.shape(0); ++i, samples += Leaf::SIZE) {
+    auto* leaf = new Leaf(coord(places, i), 0.0F, true);
+    std::copy(samples, samples + Leaf::SIZE, leaf->buffer().data());  // z runs fastest in both
+    tree.addLeaf(leaf);
+  }
+  return levelset::makeBand(grid);
+}
+
+}  // namespace python

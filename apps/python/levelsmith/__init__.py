@@ -1,0 +1,53 @@
+"""Level-set modelling on sparse grids.
+
+    import levelsmith as ls
+
+    part = ls.box(size=(4, 4, 2), voxel=0.1) - ls.cylinder(radius=1, height=3, voxel=0.1)
+    part.mesh().save("part.ply")
+
+Values are lazy: a call makes a node of a graph, and what is needed is computed once a result is
+asked for, by `save`, `render`, `measure`, `array`, `vertices` or `compute`. The operators are those
+of the command line; `help(ls.offset)` explains one. Lengths are world units (0.5), voxels ("2vx") or
+a share of the first operand's diagonal ("1%"). Solids are where distances are negative.
+"""
+
+from ._core import (
+    Cancelled,
+    Error,
+    FileError,
+    InputError,
+    NumericalError,
+    ResourceError,
+    UsageError,
+    version as __version__,
+)
+from ._values import (
+    Field,
+    Mesh,
+    Patch,
+    Scene,
+    Solid,
+    Surface,
+    Value,
+    Volume,
+    Warning,
+    compute,
+    graph,
+    last_report,
+    set_cache,
+    set_max_memory,
+    set_threads,
+)
+from ._map import map
+from ._samples import from_array, from_function
+from . import _operators
+
+_operators.install(globals())
+
+__all__ = [
+    "Cancelled", "Error", "FileError", "InputError", "NumericalError", "ResourceError", "UsageError",
+    "Field", "Mesh", "Patch", "Scene", "Solid", "Surface", "Value", "Volume", "Warning",
+    "compute", "graph", "last_report", "map", "set_cache", "set_max_memory", "set_threads",
+    "from_array", "from_function",
+    *_operators.names,
+]  # fmt: skip

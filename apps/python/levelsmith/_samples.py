@@ -1,0 +1,267 @@
+"""From arrays and functions to solids."""
+
+import numpy
+
+from . import _core, _operators, _values
+
+SIDE = 8  # grid points of a block along an axis, as in the tree
+HALF = SIDE // 2
+
+
+def _refuse(text, action):
+    raise _core.InputError(f"{action}: {text}")
+
+
+def _require(voxel, action):
+    voxel = float(voxel)
+    if not (numpy.isfinite(voxel) and voxel > 0):
+        raise _core.UsageError(f"{action}: the voxel is {voxel}; give a positive length")
+    return voxel
+
+
+def _point(point, name, action):
+    point = numpy.asarray(point, dtype=float)
+    if point.shape != (3,) or not numpy.isfinite(point).all():
+        raise _core.UsageError(f"{action}: {name} is no point; give three finite numbers")
+    return point
+
+
+def _solid(origin, voxel, blocks, values, inside, half_width, action):
+    if not (values < 0).any():
+        _refuse("nothing is inside; distances are negative there", action)
+    raw = _values.wrap(
+        _core.samples(
+            tuple(float(x) for x in origin),
+            voxel,
+            numpy.ascontiguousarray(blocks, numpy.int32),
+            numpy.ascontiguousarray(values, numpy.float32),
+            numpy.ascontiguousarray(inside, numpy.int32),
+        )
+    )
+    number = next(i for i, op in enumerate(_operators.registry) if op["name"] == "reinitialize")
+    return _values.wrap(_core.node(number, (raw,), {"half_width": half_width}))
+
+
+def _mixed(signs, axes):
+    """Does a sign change over blocks, or between them and a neighbour?"""
+    low, high = signs.min(axis=axes), signs.max(axis=axes)
+    mixed = low != high
+    for axis in range(3):
+        a, b = _sides(axis)
+        differ = (high[a] != high[b]) | (low[a] != low[b])
+        mixed[a] |= differ
+        mixed[b] |= differ
+    return mixed
+
+
+def _dilated(mask):
+    """With the neighbours of blocks, those over edges and corners among them."""
+    for axis in range(3):
+        near = mask.copy()
+        a, b = _sides(axis)
+        near[a] |= mask[b]
+        near[b] |= mask[a]
+        mask = near
+    return mask
+
+
+def from_array(phi, voxel, origin=(0, 0, 0), half_width=3):
+    """A solid from an array of signed distances, negative inside.
+
+    phi[i, j, k] is the value at origin + voxel * (i, j, k). Only signs and the values beside the
+    surface are read, and distances are made again from them; the array must hold the whole solid,
+    with positive values all around.
+    """
+    action = "from_array"
+    voxel, origin = _require(voxel, action), _point(origin, "the origin", action)
+    phi = numpy.asarray(phi)
+    if phi.ndim != 3 or phi.dtype.kind not in "fiu" or 0 in phi.shape:
+        _refuse(f"phi has shape {phi.shape} and type {phi.dtype}; give numbers in three dimensions", action)
+    bad = ~numpy.isfinite(phi)
+    if bad.any():
+        index = tuple(int(i) for i in numpy.argwhere(bad)[0])
+        _refuse(f"phi{list(index)} is {phi[index]}; give finite numbers", action)
+    for axis in range(3):
+        for end in (0, -1):
+            if (phi.take(end, axis) < 0).any():
+                _refuse(
+                    f"the solid reaches the {'end' if end else 'start'} of axis {axis}; "
+                    "give a larger array, positive all around",
+                    action,
+                )
+    count = [-(-n // SIDE) for n in phi.shape]
+    # Beyond the array it goes on as at its border.
+    padded = numpy.pad(
+        phi.astype(numpy.float32), [(0, c * SIDE - n) for c, n in zip(count, phi.shape)], mode="edge"
+    )
+    split = padded.reshape(count[0], SIDE, count[1], SIDE, count[2], SIDE).transpose(0, 2, 4, 1, 3, 5)
+    signs = split < 0
+    sampled = _dilated(_mixed(signs, (3, 4, 5)))
+    inside = numpy.argwhere(signs[..., 0, 0, 0] & ~sampled)
+    return _solid(origin, voxel, numpy.argwhere(sampled), split[sampled], inside, half_width, action)
+
+
+class _Sampler:
+    """A function at grid points, in calls of bounded size."""
+
+    CALL = 1 << 18
+
+    def __init__(self, function, origin, voxel):
+        self.function, self.origin, self.voxel = function, origin, voxel
+
+    def at(self, index):
+        """index: (n, 3) of whole numbers."""
+        values = numpy.empty(len(index), numpy.float64)
+        for start in range(0, len(index), self.CALL):
+            part = index[start : start + self.CALL]
+            points = self.origin + self.voxel * part
+            found = numpy.asarray(self.function(points))
+            if found.shape != (len(part),):
+                _refuse(
+                    f"the function returns shape {found.shape} for {len(part)} points; "
+                    f"return ({len(part)},)",
+                    "from_function",
+                )
+            bad = ~numpy.isfinite(found.astype(float))
+            if bad.any():
+                point = points[numpy.argmax(bad)]
+                _refuse(
+                    f"the function is {found[numpy.argmax(bad)]} at "
+                    f"({point[0]:g}, {point[1]:g}, {point[2]:g}); return finite numbers",
+                    "from_function",
+                )
+            values[start : start + self.CALL] = found
+        return values
+
+
+def from_function(f, bounds, voxel, half_width=3):
+    """A solid from a function of points, negative inside, that need not be a distance.
+
+    f takes an (n, 3) array of world points and returns (n,) numbers. bounds are two points between
+    which the whole solid lies. f is asked at every fourth grid point, at all grid points where its
+    sign changes or may change by how fast it varies there, and on along the surface. A part of the
+    solid is missed only where it lies between those grid points and f does not tell of it.
+    """
+    action = "from_function"
+    voxel = _require(voxel, action)
+    if numpy.shape(bounds) != (2, 3):
+        raise _core.UsageError(f"{action}: bounds are two points, ((x, y, z), (x, y, z))")
+    low, high = (_point(bounds[i], "a bound", action) for i in (0, 1))
+    if not (low < high).all():
+        raise _core.UsageError(f"{action}: the first bound must be below the second on every axis")
+    count = numpy.ceil((high - low) / (voxel * SIDE) + 1e-9)
+    if numpy.prod(2 * count + 1) > MOST_COARSE:
+        raise _core.ResourceError(f"{action}: the bounds hold too many voxels; use larger ones")
+    count = count.astype(int)
+    sampler = _Sampler(f, low, voxel)
+    wanted, is_inside = _coarse(sampler, count)
+    blocks = _Blocks(count, is_inside)
+    while wanted.any():
+        index = numpy.argwhere(wanted)
+        points = (SIDE * index[:, None, :] + OFFSETS[None]).reshape(-1, 3)
+        wanted = blocks.add(index, sampler.at(points).reshape(-1, SIDE, SIDE, SIDE))
+    index, samples = blocks.result()
+    inside = numpy.argwhere(is_inside & (blocks.number < 0))
+    if ((inside == 0) | (inside == count - 1)).any() or _meet_border(index, samples, count):
+        _refuse("the solid reaches the bounds; give larger ones", action)
+    scale = numpy.abs(samples).max(initial=0) or 1.0  # may be beyond the range of float
+    return _solid(low, voxel, index, samples / scale, inside, half_width, action)
+
+
+OFFSETS = numpy.indices((SIDE, SIDE, SIDE)).reshape(3, -1).T
+MOST_COARSE = 2**27
+
+
+def _coarse(sampler, count):
+    """By every fourth grid point: which blocks may hold a surface, and which begin inside?"""
+    shape = 2 * count + 1
+    values = sampler.at(HALF * numpy.indices(shape).reshape(3, -1).T).reshape(shape)
+    slopes = numpy.zeros_like(values)
+    for axis in range(3):
+        change = numpy.diff(values, axis=axis) ** 2
+        steepest = numpy.zeros_like(values)
+        for side in _sides(axis):
+            numpy.maximum(steepest[side], change, out=steepest[side])
+        slopes += steepest
+    slopes = numpy.sqrt(slopes)
+    nearest = numpy.full(count, numpy.inf)
+    slope, inside = numpy.zeros(count), numpy.zeros(count, int)
+    for i, j, k in numpy.ndindex(3, 3, 3):
+        part = tuple(slice(n, n + 2 * c - 1, 2) for n, c in zip((i, j, k), count))
+        numpy.minimum(nearest, numpy.abs(values[part]), out=nearest)
+        numpy.maximum(slope, slopes[part], out=slope)
+        inside += values[part] < 0
+    # A point is no farther from the next of them than 0.87 of the way from one to another.
+    wanted = (nearest <= 1.2 * slope) | ((inside > 0) & (inside < 27))
+    return wanted, inside == 27
+
+
+def _sides(axis):
+    """What lies before and behind each step along an axis."""
+    before, behind = [slice(None)] * 3, [slice(None)] * 3
+    before[axis], behind[axis] = slice(None, -1), slice(1, None)
+    return tuple(before), tuple(behind)
+
+
+class _Blocks:
+    """Blocks with samples, and which others are needed beside them."""
+
+    REACH = 3  # grid points that an interpolant reads beyond the surface
+
+    def __init__(self, count, is_inside):
+        self.count, self.is_inside = count, is_inside
+        self.number = numpy.full(count, -1)
+        self.index, self.samples = [], []
+        self.signs = numpy.zeros((0, SIDE, SIDE, SIDE), bool)
+
+    def add(self, index, samples):
+        """Returns the blocks that are wanted now."""
+        self.number[tuple(index.T)] = len(self.signs) + numpy.arange(len(index))
+        self.index.append(index)
+        self.samples.append(samples)
+        signs = samples < 0
+        self.signs = numpy.concatenate([self.signs, signs])
+        wanted = numpy.zeros(self.count, bool)
+        near = {-1: slice(None, self.REACH), 0: slice(None), 1: slice(-self.REACH, None)}
+        for step in numpy.ndindex(3, 3, 3):
+            step = numpy.array(step) - 1
+            part = signs[(slice(None), *(near[s] for s in step))].reshape(len(signs), -1)
+            self._want(index[part.any(axis=1) & ~part.all(axis=1)] + step, wanted)
+        for axis in range(3):
+            for side in (-1, 1):
+                step = numpy.zeros(3, int)
+                step[axis] = side
+                self._want_across(index, signs, axis, step, wanted)
+        return wanted & (self.number < 0)
+
+    def _want(self, index, wanted):
+        index = index[((index >= 0) & (index < self.count)).all(axis=1)]
+        wanted[tuple(index.T)] = True
+
+    def _want_across(self, index, signs, axis, step, wanted):
+        """All around where the sign changes from one block to the next."""
+        other = index + step
+        known = ((other >= 0) & (other < self.count)).all(axis=1)
+        index, signs, other = index[known], signs[known], other[known]
+        here = signs.take(-1 if step[axis] > 0 else 0, axis + 1)
+        number = self.number[tuple(other.T)]
+        there = self.is_inside[tuple(other.T)][:, None, None] & numpy.ones_like(here)
+        sampled = number >= 0
+        face = 0 if step[axis] > 0 else -1
+        there[sampled] = self.signs[number[sampled]].take(face, axis + 1)
+        crossed = index[(here != there).any(axis=(1, 2))]
+        for near in numpy.ndindex(3, 3, 3):
+            self._want(crossed + numpy.array(near) - 1, wanted)
+
+    def result(self):
+        if not self.index:
+            return numpy.zeros((0, 3), int), numpy.zeros((0, SIDE, SIDE, SIDE))
+        return numpy.concatenate(self.index), numpy.concatenate(self.samples)
+
+
+def _meet_border(index, samples, count):
+    return any(
+        (samples[index[:, axis] == number].take(face, axis + 1) < 0).any()
+        for axis in range(3)
+        for number, face in ((0, 0), (count[axis] - 1, SIDE - 1))
+    )

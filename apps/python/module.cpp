@@ -1,0 +1,404 @@
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <new>
+#include <set>
+
+#include "apps/pipeline/graph_file.h"
+#include "apps/pipeline/invocation.h"
+#include "apps/pipeline/operator.h"
+#include "apps/pipeline/units.h"
+#include "apps/python/arguments.h"
+#include "apps/python/arrays.h"
+#include "apps/python/compute.h"
+#include "apps/python/jobs.h"
+#include "levelset/error.h"
+
+/// levelsmith._core: what the package levelsmith is made of.
+
+namespace py = pybind11;
+
+namespace {
+
+using levelset::ExitCode;
+using pipeline::Kind;
+using pipeline::Operator;
+using pipeline::Param;
+using pipeline::ParamType;
+using python::Handle;
+using python::LazyPtr;
+
+/// The class of Python that stands for a kind.
+const char* className(Kind kind) {
+  switch (kind) {
+    case Kind::Mesh:
+      return "Mesh";
+    case Kind::Band:
+      return "Solid";
+    case Kind::Patch:
+      return "Patch";
+    case Kind::Field:
+      return "Field";
+    case Kind::Surface:
+      return "Surface";
+    case Kind::Scene:
+      return "Scene";
+  }
+  return "";
+}
+
+const char* hintOf(ParamType type) {
+  switch (type) {
+    case ParamType::Flag:
+      return "bool";
+    case ParamType::Number:
+    case ParamType::Degrees:
+      return "float";
+    case ParamType::Integer:
+      return "int";
+    case ParamType::Length:
+      return "Length";
+    case ParamType::Lengths:
+      return "Lengths";
+    case ParamType::Numbers:
+      return "Numbers";
+    case ParamType::Point:
+      return "Point";
+    case ParamType::Points:
+      return "Points";
+    case ParamType::Box:
+      return "Box";
+    case ParamType::Matrix:
+      return "Matrix";
+    case ParamType::Choice:
+      return "str";
+    case ParamType::Text:
+      return "Text";
+    case ParamType::Path:
+      return "Path";
+    case ParamType::ImageSize:
+      return "ImageSize";
+    case ParamType::Bytes:
+      return "Bytes";
+    case ParamType::Scalar:
+      return "Scalar";
+    case ParamType::Velocity:
+      return "Velocity";
+  }
+  return "";
+}
+
+/// What an operator may make of operands whose first is of one kind, as far as one option at a time
+/// tells.
+std::set<Kind> resultKinds(const Operator& op, const Kind* first) {
+  if (!op.resultKind) return {Kind::Band};
+  std::set<Kind> kinds;
+  const auto probe = [&](std::map<std::string, std::string> options) {
+    pipeline::Invocation invocation(op, std::move(options));
+    for (std::size_t i = 0; i < op.operands.size(); ++i)
+      invocation.operands.emplace_back(
+          pipeline::Plan{.kind = i == 0 && first ? *first : op.operands[i][0]});
+    try {
+      kinds.insert(op.resultKind(invocation));
+    } catch (const levelset::Error&) {  // more options tell
+    }
+  };
+  probe({});
+  for (const Param& param : op.params) {
+    if (param.choices.empty()) probe({{param.name, "1"}});
+    for (const std::string& choice : param.choices) probe({{param.name, choice}});
+  }
+  return kinds;
+}
+
+/// By class of the first operand ("" without operands), the classes of what is made; None of what
+/// makes nothing.
+py::object resultClasses(const Operator& op) {
+  if (op.flow != pipeline::Flow::Makes) return py::none();
+  py::dict result;
+  const auto add = [&](const char* operand, const Kind* first) {
+    py::list names;
+    for (const Kind kind : resultKinds(op, first)) names.append(className(kind));
+    if (names.empty()) names.append("Value");
+    result[operand] = names;
+  };
+  if (op.operands.empty()) add("", nullptr);
+  for (std::size_t i = 0; !op.operands.empty() && i < op.operands[0].size(); ++i)
+    add(className(op.operands[0][i]), &op.operands[0][i]);
+  return result;
+}
+
+py::dict describe(const Param& param) {
+  py::dict result;
+  result["name"] = python::pythonName(param.name);
+  result["hint"] = hintOf(param.type);
+  result["doc"] = param.doc;
+  result["default"] = param.fallback;
+  result["choices"] = param.choices;
+  result["required"] = param.required;
+  result["position"] = param.position;
+  return result;
+}
+
+py::list describeOperators() {
+  py::list all;
+  for (const Operator& op : pipeline::operators()) {
+    py::dict result;
+    result["name"] = op.name;
+    result["group"] = op.group;
+    result["summary"] = op.summary;
+    result["details"] = op.details;
+    result["example"] = op.example;
+    result["takes_more"] = op.takesMore;
+    result["operands_optional"] = op.operandsOptional;
+    result["result"] = resultClasses(op);
+    py::list operands, params;
+    for (const std::vector<Kind>& kinds : op.operands) {
+      py::list names;
+      for (const Kind kind : kinds) names.append(className(kind));
+      operands.append(names);
+    }
+    for (const Param& param : op.params) params.append(describe(param));
+    result["operands"] = operands;
+    result["params"] = params;
+    all.append(result);
+  }
+  return all;
+}
+
+/// The exceptions, by exit code.
+class Exceptions {
+ public:
+  explicit Exceptions(py::module_& module) {
+    error_ = add(module, "Error", 1, {PyExc_Exception}, "What levelsmith refuses or fails to do.");
+    usage_ = add(module, "UsageError", 2, {error_, PyExc_ValueError}, "The call itself is wrong.");
+    input_ = add(module, "InputError", 3, {error_}, "The data cannot be used as asked.");
+    resource_ =
+        add(module, "ResourceError", 4, {error_}, "It would pass a limit of memory or size.");
+    numeric_ = add(module, "NumericalError", 5, {error_}, "A numeric check failed.");
+    file_ =
+        add(module, "FileError", 6, {error_, PyExc_OSError}, "A file cannot be read or written.");
+    cancelled_ = add(module, "Cancelled", 130, {error_}, "Ended by the progress callback.");
+  }
+
+  [[nodiscard]] PyObject* of(ExitCode code) const {
+    switch (code) {
+      case ExitCode::Usage:
+        return usage_;
+      case ExitCode::Input:
+        return input_;
+      case ExitCode::Resource:
+        return resource_;
+      case ExitCode::Numeric:
+        return numeric_;
+      case ExitCode::File:
+        return file_;
+      case ExitCode::Interrupted:
+        return cancelled_;
+      case ExitCode::Done:
+        break;
+    }
+    return error_;
+  }
+
+ private:
+  static PyObject* add(py::module_& module, const std::string& name, int code,
+                       const std::vector<PyObject*>& bases, const char* doc) {
+    py::tuple parents(bases.size());
+    for (std::size_t i = 0; i < bases.size(); ++i)
+      parents[i] = py::reinterpret_borrow<py::object>(bases[i]);
+    py::dict members;
+    members["exit_code"] = code;
+    PyObject* type = PyErr_NewExceptionWithDoc(("levelsmith." + name).c_str(), doc, parents.ptr(),
+                                               members.ptr());
+    if (!type) throw py::error_already_set();
+    module.add_object(name.c_str(), type);
+    return type;
+  }
+
+  PyObject *error_, *usage_, *input_, *resource_, *numeric_, *file_, *cancelled_;
+};
+
+const Exceptions* exceptions = nullptr;
+
+std::vector<LazyPtr> lazies(const py::iterable& nodes) {
+  std::vector<LazyPtr> list;
+  for (const py::handle node : nodes) list.push_back(node.cast<const Handle&>().lazy());
+  return list;
+}
+
+/// What is in a node that was computed.
+const pipeline::Value& valueOf(const Handle& node) {
+  if (node.lazy()->value()) return *node.lazy()->value();
+  throw levelset::UsageError("levelsmith: the value is not computed yet; call compute()");
+}
+
+/// (report, printed, warnings, notes, exception or None)
+py::tuple tupleOf(const python::Outcome& outcome) {
+  py::object failure = py::none();
+  try {
+    if (outcome.failure) std::rethrow_exception(outcome.failure);
+  } catch (py::error_already_set& error) {
+    failure = error.value();
+  } catch (const levelset::Error& error) {
+    failure = py::reinterpret_borrow<py::object>(exceptions->of(error.exitCode()))(error.what());
+  } catch (const std::bad_alloc&) {
+    failure = py::reinterpret_borrow<py::object>(exceptions->of(ExitCode::Resource))(
+        "levelsmith: memory ran out; use larger voxels or a narrower band");
+  }
+  return py::make_tuple(outcome.report, outcome.printed, outcome.warnings, outcome.notes, failure);
+}
+
+py::tuple compute(const py::iterable& nodes, const py::object& progress, const std::string& cache,
+                  bool isAgain) {
+  return tupleOf(
+      python::compute(lazies(nodes), {.progress = progress, .cache = cache, .isAgain = isAgain}));
+}
+
+using Texts = std::map<std::string, std::string>;
+
+/// (graph, places, globals)
+py::tuple makeJob(const std::string& text, const std::string& name, const Texts& settings,
+                  const std::string& folder) {
+  const python::Job job = python::makeJob(text, name, settings, folder);
+  return py::make_tuple(job.graph, job.places, job.globals);
+}
+
+/// As compute().
+py::tuple runJob(const std::string& graph, const std::vector<std::string>& places,
+                 const Texts& globals, const std::string& cache) {
+  const pipeline::Graph whole = python::graphOf({graph, places, globals});
+  const auto global = [&](const char* name) {
+    const auto it = globals.find(name);
+    return it == globals.end() ? std::string() : it->second;
+  };
+  const std::string memory = global("max-memory");
+  return tupleOf(python::compute(
+      whole, {.cache = cache.empty() ? global("cache") : cache,
+              .isAgain = true,
+              .report = global("report"),
+              .measureErrors = globals.contains("report") || globals.contains("verbose"),
+              .maxMemory = memory.empty() ? 0 : pipeline::parseBytes(memory, "--max-memory")}));
+}
+
+/// The kind of a node that was computed, and its value.
+py::tuple pack(const Handle& node) {
+  const pipeline::Value value = valueOf(node);
+  std::string bytes;
+  {
+    const py::gil_scoped_release release;
+    bytes = python::bytesOf(value);
+  }
+  return py::make_tuple(static_cast<int>(value.kind()), py::bytes(bytes));
+}
+
+std::string graphText(const py::iterable& nodes) {
+  const python::Request request(lazies(nodes), python::Request::Depth::Whole);
+  for (const pipeline::Node& node : request.graph().nodes)
+    if (node.op == &pipeline::givenOperator())
+      throw levelset::UsageError(
+          "graph: it begins with an array, which a graph cannot hold; save that value and read it");
+  return graphJson(request.graph());
+}
+
+std::optional<Imath::Box3d> boxOf(const py::object& box) {
+  if (box.is_none()) return std::nullopt;
+  const auto corners = py::array_t<double, py::array::c_style | py::array::forcecast>(box);
+  if (corners.ndim() != 2 || corners.shape(0) != 2 || corners.shape(1) != 3)
+    throw levelset::UsageError("array: a box is two points, ((x, y, z), (x, y, z))");
+  const double* c = corners.data();
+  return Imath::Box3d({c[0], c[1], c[2]}, {c[3], c[4], c[5]});
+}
+
+using Point = std::array<double, 3>;
+
+Imath::V3d toImath(const Point& p) {
+  return {p[0], p[1], p[2]};
+}
+
+std::unique_ptr<Handle> given(pipeline::Value value) {
+  return std::make_unique<Handle>(std::make_shared<python::Lazy>(std::move(value)));
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_core, module) {
+  exceptions = new Exceptions(module);
+  py::register_exception_translator([](std::exception_ptr failure) {
+    try {
+      if (failure) std::rethrow_exception(failure);
+    } catch (const levelset::Error& error) {
+      PyErr_SetString(exceptions->of(error.exitCode()), error.what());
+    }
+  });
+  module.attr("version") = LEVELSMITH_VERSION;
+
+  py::class_<Handle>(module, "Node")
+      .def_property_readonly("kind",
+                             [](const Handle& node) { return className(node.lazy()->kind()); })
+      .def_property_readonly("is_computed",
+                             [](const Handle& node) { return node.lazy()->value().has_value(); })
+      .def_property_readonly("action",
+                             [](const Handle& node) { return node.lazy()->node().op->name; })
+      .def_property(
+          "name", [](const Handle& node) { return node.lazy()->node().name; },
+          [](const Handle& node, const std::string& name) { node.lazy()->setName(name); })
+      .def_property_readonly("bounds",
+                             [](const Handle& node) {
+                               const pipeline::Value value = valueOf(node);
+                               {
+                                 const py::gil_scoped_release release;
+                                 (void)value.plan();
+                               }
+                               const Imath::Box3d& box = value.plan().bounds;
+                               return py::make_tuple(Point{box.min.x, box.min.y, box.min.z},
+                                                     Point{box.max.x, box.max.y, box.max.z});
+                             })
+      .def_property_readonly("voxel",
+                             [](const Handle& node) { return valueOf(node).band().voxelSize(); })
+      .def("mesh_array",
+           [](const py::object& self, const std::string& list) {
+             // The array holds the mesh itself: the node may let it go.
+             const auto& value = valueOf(self.cast<const Handle&>());
+             const py::capsule owner(new pipeline::Value(value), [](void* held) {
+               delete static_cast<pipeline::Value*>(held);
+             });
+             return python::meshArray(owner, value.mesh(), list);
+           })
+      .def("band_array", [](const Handle& node, const py::object& box) {
+        const pipeline::Value value = valueOf(node);
+        const python::DenseBand dense =
+            python::bandArray(value.band(), boxOf(box), python::memoryLimit());
+        const Imath::V3d& o = dense.origin;
+        return py::make_tuple(dense.values, Point{o.x, o.y, o.z}, value.band().voxelSize());
+      });
+
+  module.def("operators", describeOperators);
+  module.def("node", [](std::size_t action, const py::tuple& args, const py::dict& options) {
+    return std::make_unique<Handle>(python::makeNode(action, py::reinterpret_borrow<py::args>(args),
+                                                     py::reinterpret_borrow<py::kwargs>(options)));
+  });
+  module.def("compute", compute);
+  module.def("graph", graphText);
+  module.def("mesh", [](const py::array& vertices, const py::array& faces) {
+    return given(pipeline::Value(python::meshFromArrays(vertices, faces)));
+  });
+  module.def("samples", [](const Point& origin, double voxel,
+                           const py::array_t<std::int32_t, py::array::c_style>& blocks,
+                           const py::array_t<float, py::array::c_style>& values,
+                           const py::array_t<std::int32_t, py::array::c_style>& inside) {
+    return given(
+        pipeline::Value(python::bandOfSamples(toImath(origin), voxel, blocks, values, inside)));
+  });
+  module.def("job", makeJob);
+  module.def("run_job", runJob);
+  module.def("pack", pack);
+  module.def("unpack", [](int kind, const std::string& bytes) {
+    return given(python::valueOf(static_cast<Kind>(kind), bytes));
+  });
+  module.def("set_threads", python::setThreads);
+  module.def("set_max_memory", [](const std::string& text) {
+    python::setMaxMemory(text.empty() ? 0 : pipeline::parseBytes(text, "max_memory"));
+  });
+}

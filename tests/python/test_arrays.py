@@ -1,0 +1,195 @@
+"""Between numpy and values."""
+
+import gc
+import math
+
+import numpy
+import pytest
+
+BALL = 4 / 3 * math.pi
+
+CUBE = numpy.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+FACES = numpy.array(
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+     [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+)  # fmt: skip
+
+
+def test_meshes_are_made_of_arrays(ls):
+    for places in (numpy.float32, numpy.float64):
+        for corners in (numpy.int32, numpy.int64, numpy.uint32, numpy.uint8):
+            mesh = ls.Mesh(CUBE.astype(places), FACES.astype(corners))
+            assert (mesh.vertices == CUBE).all() and (mesh.faces == FACES).all()
+            assert mesh.vertices.dtype == numpy.float64 and mesh.faces.dtype == numpy.uint32
+    assert mesh.measure()["volume"] == pytest.approx(1)
+    solid = mesh.level_set(voxel=0.05)
+    assert solid.measure()["volume"] == pytest.approx(1, rel=2e-2)
+    strided = numpy.zeros((8, 6))[:, ::2]
+    strided[:] = CUBE
+    assert (ls.Mesh(strided, FACES[:, ::-1]).faces == FACES[:, ::-1]).all()
+
+
+def test_views_share_memory_and_outlive_the_mesh(ls):
+    mesh = ls.Mesh(CUBE, FACES)
+    vertices, again = mesh.vertices, mesh.vertices
+    assert vertices.ctypes.data == again.ctypes.data and not vertices.flags.owndata
+    with pytest.raises(ValueError):
+        vertices[0, 0] = 5
+    del mesh, again
+    gc.collect()
+    assert (vertices == CUBE).all()
+    assert ls.Mesh(CUBE, FACES).normals is None
+
+
+@pytest.mark.parametrize(
+    "vertices, faces",
+    [
+        (CUBE[:, :2], FACES),
+        (CUBE.ravel(), FACES),
+        (CUBE.astype(int), FACES),
+        (CUBE, FACES[:, :2]),
+        (CUBE, FACES.astype(float)),
+        (CUBE, FACES + 1),
+        (CUBE, FACES - 1),
+        (CUBE, FACES.astype(numpy.int64) + 2**32),
+        (numpy.where(CUBE == 1, numpy.nan, CUBE), FACES),
+        (numpy.where(CUBE == 1, numpy.inf, CUBE), FACES),
+        (CUBE.astype(complex), FACES),
+        ([["a"] * 3] * 8, FACES),
+    ],
+)
+def test_other_arrays_are_refused(ls, vertices, faces):
+    with pytest.raises(ls.InputError, match="^Mesh: "):
+        ls.Mesh(vertices, faces)
+
+
+def test_arrays_of_a_solid_know_where_they_lie(ls, ball):
+    phi = ball.array()
+    assert phi.dtype == numpy.float32 and phi.voxel == 0.05
+    index = numpy.argwhere(numpy.abs(phi) < 0.1)
+    points = numpy.array(phi.origin) + phi.voxel * index
+    assert numpy.linalg.norm(points, axis=1) - 1 == pytest.approx(numpy.asarray(phi)[tuple(index.T)], abs=1e-6)
+    part = ball.array(box=((0, 0, 0), (0.5, 1.5, 0.12)))
+    assert part.shape == (11, 31, 3) and part.origin == pytest.approx((0, 0, 0))
+    assert part[0, 0, 0] == pytest.approx(-0.15) and part[0, 30, 0] == pytest.approx(0.15)
+    with pytest.raises(ls.InputError):
+        ball.transform(rotate=30).array()
+    with pytest.raises(ls.InputError):
+        ball.array(box=((0.01, 0.01, 0.01), (0.02, 0.02, 0.02)))
+    with pytest.raises(ls.ResourceError):
+        ball.array(box=((-1e4,) * 3, (1e4,) * 3))
+
+
+def test_arrays_go_round(ls, ball):
+    phi = ball.array()
+    again = ls.from_array(phi, phi.voxel, phi.origin)
+    assert not again.is_computed
+    assert ls.compare(ball, again)["hausdorff"] < 1e-6
+    assert (numpy.asarray(again.array(ball.bounds)) == ball.array(ball.bounds)).all()
+    cut = ball - ls.box(size=(4, 4, 4), center=(2, 2, 2), voxel=0.05)
+    phi = cut.array()
+    assert ls.compare(cut, ls.from_array(phi, phi.voxel, phi.origin))["hausdorff"] < 0.75 * 0.05
+
+
+def test_only_signs_and_slopes_beside_the_surface_matter(ls):
+    h = 0.1
+    x = numpy.stack(numpy.meshgrid(*[numpy.arange(-15, 16) * h] * 3, indexing="ij"), -1)
+    distance = numpy.linalg.norm(x, axis=-1) - 1
+    exact = ls.from_array(distance, h, origin=(-1.5,) * 3)
+    clipped = ls.from_array(numpy.clip(distance, -2 * h, 2 * h), h, origin=(-1.5,) * 3)
+    assert ls.compare(exact, clipped)["hausdorff"] < 1e-4
+    assert exact.measure()["volume"] == pytest.approx(BALL, rel=1e-4)
+    assert exact.check()["passed"]
+    wide = ls.from_array(distance, h, origin=(-1.5,) * 3, half_width=5)
+    assert wide.info()["half_width"] == 5
+
+
+def test_a_solid_larger_than_its_band_stays_full(ls):
+    """Blocks without samples are inside, too."""
+    phi = ls.box(size=(8, 8, 8), voxel=0.1).array()
+    solid = ls.from_array(phi, phi.voxel, phi.origin)
+    assert solid.measure()["volume"] == pytest.approx(512, rel=1e-3)
+    assert solid.measure()["cavities"] == 0
+    assert solid.array(((0, 0, 0), (0.1, 0.1, 0.1)))[0, 0, 0] < 0
+
+
+def test_arrays_that_are_no_solid_are_refused(ls):
+    good = numpy.full((20, 20, 20), 0.3)
+    good[5:15, 5:15, 5:15] = -0.3
+    ls.from_array(good, 0.1).compute()
+
+    def refuse(phi, voxel=0.1, kind=ls.InputError):
+        with pytest.raises(kind, match="^from_array: "):
+            ls.from_array(phi, voxel)
+
+    for number in (numpy.nan, numpy.inf):
+        bad = good.copy()
+        bad[3, 4, 5] = number
+        with pytest.raises(ls.InputError, match=r"phi\[3, 4, 5\] is"):
+            ls.from_array(bad, 0.1)
+    refuse(-good)
+    refuse(numpy.abs(good))
+    refuse(good[8:])
+    refuse(good[0])
+    refuse(good[:0])
+    refuse(good.astype(complex))
+    refuse(good, -0.1, ls.UsageError)
+    refuse(good, numpy.nan, ls.UsageError)
+
+
+def test_functions_become_solids(ls):
+    calls = []
+
+    def squares(p):
+        assert p.dtype == numpy.float64 and p.shape[1] == 3
+        calls.append(len(p))
+        return (p**2).sum(axis=1) - 1
+
+    solid = ls.from_function(squares, ((-1.2,) * 3, (1.3,) * 3), 0.02)
+    assert solid.measure()["volume"] == pytest.approx(BALL, rel=1e-5)
+    assert solid.check()["passed"]
+    assert sum(calls) < 0.7 * 125**3
+
+
+def test_functions_of_any_slope(ls):
+    def torus(p):
+        r = numpy.hypot(p[:, 0], p[:, 1]) - 2
+        return numpy.hypot(r, p[:, 2]) - 0.5
+
+    bounds = ((-2.7,) * 2 + (-0.7,), (2.7,) * 2 + (0.7,))
+    want = 2 * math.pi**2 * 2 * 0.25
+    for change in (lambda d: d, lambda d: 1000 * d, lambda d: 1e-6 * d, lambda d: numpy.tanh(5 * d)):
+        solid = ls.from_function(lambda p: change(torus(p)), bounds, 0.1)
+        assert solid.measure()["volume"] == pytest.approx(want, rel=2e-3)
+
+
+def test_thin_and_full_parts_of_functions_are_found(ls):
+    def plate(p):
+        return numpy.max(numpy.abs(p - [0, 0, 0.013]) - [1, 1, 0.06], axis=1)
+
+    thin = ls.from_function(plate, ((-1.3,) * 3, (1.3,) * 3), 0.04)
+    assert thin.measure()["volume"] == pytest.approx(4 * 0.12, rel=0.02)
+    cube = ls.from_function(lambda p: numpy.abs(p).max(axis=1) - 4, ((-5,) * 3, (5,) * 3), 0.1)
+    assert cube.measure()["volume"] == pytest.approx(512, rel=2e-3)
+
+
+def test_functions_that_cannot_be_used_are_refused(ls):
+    bounds = ((-2, -2, -2), (2, 2, 2))
+
+    def refuse(f, bounds=bounds, voxel=0.2, kind=ls.InputError):
+        with pytest.raises(kind, match="^from_function: "):
+            ls.from_function(f, bounds, voxel)
+
+    ball = lambda p: numpy.linalg.norm(p, axis=1) - 1
+    refuse(lambda p: numpy.full(len(p), numpy.nan))
+    refuse(lambda p: p)
+    refuse(lambda p: 1.0)
+    refuse(lambda p: ball(p) + 5)
+    refuse(lambda p: ball(p) - 1.5)
+    refuse(lambda p: ball(p) - 50)
+    refuse(ball, bounds[::-1], kind=ls.UsageError)
+    refuse(ball, ((0, 0), (1, 1)), kind=ls.UsageError)
+    refuse(ball, voxel=0, kind=ls.UsageError)
+    refuse(ball, voxel=1e-6, kind=ls.ResourceError)
+    with pytest.raises(ZeroDivisionError):
+        ls.from_function(lambda p: 1 // 0, bounds, 0.2)

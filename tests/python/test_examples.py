@@ -1,0 +1,58 @@
+"""Every example runs, coarsely, and leaves pictures that show something."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+from conftest import ROOT
+
+COARSE = {"knurled_handle": "0.08", "gyroid_bunny": "60", "blended_part": "0.15", "morph_sequence": "0.12"}
+
+
+def test_what_the_readme_shows(tmp_path, monkeypatch):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    exec(code, {})
+    assert (tmp_path / "part.npz").stat().st_size > 10000
+
+
+def test_what_the_documentation_shows(tmp_path):
+    pytest.importorskip("distributed")
+    text = (ROOT / "docs/python.md").read_text(encoding="utf-8")
+    script = tmp_path / "shown.py"
+    script.write_text("\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL)), encoding="utf-8")
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert len(list(tmp_path.glob("frame_*.png"))) == 8
+    check_tiles(tmp_path)
+
+
+def check_tiles(folder):
+    """They are the picture that one run draws, but for a few pixels of the outline."""
+    import levelsmith as ls
+    import matplotlib.image
+    import numpy
+
+    ring = ls.torus(radius=2, tube=0.8, voxel=0.05)
+    ring.render(folder / "whole.png", size=(480, 480), ortho=6, from_=(0, 0, 9), to=(0, 0, 0))
+    whole, tiled = (matplotlib.image.imread(folder / name) for name in ("whole.png", "torus.png"))
+    assert (numpy.abs(whole - tiled) > 0.02).any(axis=-1).mean() < 0.005
+
+
+def test_all_examples_are_tested():
+    assert {path.stem for path in (ROOT / "examples").glob("*.py")} == set(COARSE)
+
+
+@pytest.mark.parametrize("name", COARSE)
+def test_example(name, tmp_path):
+    script = ROOT / "examples" / f"{name}.py"
+    done = subprocess.run(
+        [sys.executable, "-W", "error", script, tmp_path, COARSE[name]], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    pictures = list(tmp_path.glob("*.png"))
+    assert len(pictures) == (5 if name == "morph_sequence" else 1)
+    for picture in pictures:
+        assert picture.stat().st_size > 5000
