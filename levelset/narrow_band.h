@@ -65,6 +65,13 @@ class NarrowBand {
   std::shared_ptr<VdbGrid> grid_;
 };
 
+/// A region that ends nowhere, and is it one?
+inline const Imath::Box3d kEverywhere(Imath::V3d(Imath::V3d::baseTypeLowest()),
+                                      Imath::V3d(Imath::V3d::baseTypeMax()));
+[[nodiscard]] inline bool isEverywhere(const Imath::Box3d& region) {
+  return region == kEverywhere;
+}
+
 /// What every operator on solids asks first.
 /// @throws InvalidInput for an open surface: "measure: the operand is an open surface, …"
 void requireSolid(const NarrowBand& band, const char* action);

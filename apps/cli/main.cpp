@@ -17,6 +17,7 @@
 #include "apps/pipeline/chain.h"
 #include "apps/pipeline/graph_file.h"
 #include "apps/pipeline/help.h"
+#include "apps/pipeline/planner.h"
 #include "apps/pipeline/refusal.h"
 #include "apps/pipeline/report.h"
 #include "apps/pipeline/runner.h"
@@ -129,10 +130,16 @@ int runGraph(const pipeline::Graph& graph) {
              dryRun = globals.contains("dry-run");
   const bool dataOnly = claimsStandardOutput(graph), json = claimsJson(graph);
 
+  if (globals.contains("explain")) {
+    printAll(pipeline::explain(graph, maxMemory, globals.contains("whole")));
+    return static_cast<int>(ExitCode::Done);
+  }
+
   cli::ProgressLine line(progressStyle(graph), graph.nodes.size());
   pipeline::RunSettings settings;
   settings.dryRun = dryRun;
   settings.maxMemory = maxMemory;
+  settings.wholeValues = globals.contains("whole");
   if (globals.contains("cache")) settings.cache = globals.at("cache");
   settings.measureErrors = verbose || globals.contains("report");
   settings.begin = [](const std::string& action) { cli::tellAction(action); };

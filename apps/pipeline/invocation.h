@@ -4,6 +4,7 @@
 #include <Imath/ImathMatrix.h>
 #include <Imath/ImathVec.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <map>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "apps/pipeline/operator.h"
 #include "apps/pipeline/value.h"
 #include "levelset/progress.h"
+#include "levelset/solids/crop.h"
 
 namespace pipeline {
 
@@ -96,6 +98,15 @@ class Invocation {
   [[nodiscard]] const Operator& op() const { return *op_; }
   [[nodiscard]] std::string where(const std::string& param) const {
     return op_->name + ": --" + param;
+  }
+
+  // What is needed of the result: run() may make no more than that.
+  levelset::BandPart part = {};
+  /// Of the whole result, where that was told before.
+  std::optional<Plan> planned = {};
+  /// The half width of what is made, where the whole has `whole`; voxels.
+  [[nodiscard]] double neededHalfWidth(double whole) const {
+    return std::min(whole, part.halfWidth);
   }
 
   // What comes from the run as a whole.

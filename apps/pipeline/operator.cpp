@@ -269,6 +269,9 @@ const std::vector<Param>& globalParams() {
        .type = ParamType::Path,
        .doc = "write what is asked for as a .json that `run` takes; with --dry-run nothing else is "
               "done"},
+      {.name = "whole",
+       .type = ParamType::Flag,
+       .doc = "make all of every value, also where less of it is needed: to compare, or to look"},
       {.name = "cache",
        .type = ParamType::Path,
        .doc = "a folder that keeps results: what is known there is not computed again"},
@@ -278,6 +281,10 @@ const std::vector<Param>& globalParams() {
        .fallback = "auto",
        .choices = {"auto", "json", "off"}},
       {.name = "no-clobber", .type = ParamType::Flag, .doc = "never overwrite a file"},
+      {.name = "explain",
+       .type = ParamType::Flag,
+       .doc = "tell what would run, what not and why, how much of each value is needed and what it "
+              "takes; without computing or writing anything"},
       {.name = "dry-run",
        .type = ParamType::Flag,
        .doc = "resolve every parameter and estimate cost, without computing or writing anything"},

@@ -11,6 +11,7 @@
 namespace pipeline {
 
 class Invocation;
+struct Demand;
 
 enum class ParamType {
   Flag,
@@ -67,6 +68,13 @@ enum class Flow {
   PassesThrough  ///< leaves its operand where it is: write, measure, check, info, render
 };
 
+/// What is known of the slope of the band that an operator makes.
+enum class Slope {
+  Any,        ///< it may be no distance
+  One,        ///< a distance
+  OfOperands  ///< a distance, if all operands are
+};
+
 struct Operator {
   std::string name;
   std::string group;         ///< heading in `help`
@@ -85,6 +93,13 @@ struct Operator {
   std::function<Value(Invocation&)> run = {};
   /// What `run` would return, for --dry-run; by default the plan of the first operand.
   std::function<Plan(Invocation&)> plan = {};
+  /// CPU time for each active voxel of the result, roughly (tests/bench/costs.sh); 0: not known.
+  double nanosecondsPerVoxel = 0;
+  Slope slope = Slope::Any;
+  /// What it reads of an operand for a part of its result; without it, the whole. The operands are
+  /// plans, and Invocation::planned is that of the whole result. Inside the part the result has to
+  /// be what it is of whole operands, to the bit.
+  std::function<Demand(Invocation&, std::size_t operand, const Demand& part)> reads = {};
   /// Refuses, before anything runs, what can be told from the options and the kinds of the
   /// operands: options that exclude each other, formats, what is missing.
   std::function<void(const Invocation&)> validate = {};

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
@@ -41,6 +42,11 @@ Json toJson(const StepReport& step) {
       result["voxel_size"] = step.voxelSize;
       result["half_width"] = step.halfWidth;
       result["active_voxels"] = step.activeVoxels;
+    }
+    if (!std::isinf(step.needed.halfWidth)) result["needed"]["half_width"] = step.needed.halfWidth;
+    if (!levelset::isEverywhere(step.needed.region)) {
+      const auto& [low, high] = step.needed.region;
+      result["needed"]["region"] = {{low.x, low.y, low.z}, {high.x, high.y, high.z}};
     }
     if (step.triangles > 0) result["triangles"] = step.triangles;
   }

@@ -13,7 +13,9 @@
 
 #include "apps/pipeline/cache.h"
 #include "apps/pipeline/cache_key.h"
+#include "apps/pipeline/demand.h"
 #include "apps/pipeline/graph_file.h"
+#include "apps/pipeline/planner.h"
 #include "apps/pipeline/refusal.h"
 #include "apps/process_cost.h"
 #include "levelset/error.h"
@@ -27,10 +29,13 @@ namespace {
 /// Values of nodes that have run, as long as something is to take them.
 class Values {
  public:
+  /// Makes `take` find nothing, so that it has to be put again.
+  void drop(std::size_t node) { values_[node].reset(); }
   /// @param uses  of each
   explicit Values(std::vector<std::size_t> uses) : uses_(std::move(uses)), values_(uses_.size()) {}
 
   [[nodiscard]] bool has(std::size_t node) const { return values_[node].has_value(); }
+  [[nodiscard]] const Value& peek(std::size_t node) const { return *values_[node]; }
   void addUse(std::size_t node) { ++uses_[node]; }
   void put(std::size_t node, Value value) {
     if (uses_[node] > 0) values_[node] = std::move(value);
@@ -153,14 +158,6 @@ void describeResult(const Value& value, bool dryRun, StepReport& step) {
   }
 }
 
-Plan planOf(Invocation& invocation) {
-  const Operator& op = invocation.op();
-  if (op.plan) return op.plan(invocation);
-  Plan plan = invocation.operands.at(0).plan();
-  if (op.resultKind) plan.kind = op.resultKind(invocation);
-  return plan;
-}
-
 /// Measures a step until it is told to stop; what follows is the report's own work.
 class StepClock {
  public:
@@ -194,6 +191,7 @@ class GraphRun {
       : graph_(graph), settings_(settings), report_(report), values_(planned()) {}
 
   void run() {
+    findDemands();
     std::size_t known = 0, ran = 0;
     for (std::size_t i = 0; i < graph_.nodes.size(); ++i) {
       const Node& node = graph_.nodes[i];
@@ -201,8 +199,8 @@ class GraphRun {
         report_.leftOut.push_back(node.op->name + (node.name.empty() ? "" : " @" + node.name));
       } else if (const auto given = graph_.given.find(i); given != graph_.given.end()) {
         values_.put(i, given->second);
-      } else if (fates_[i] == Fate::Run) {
-        compute(i);
+      } else if (fates_[i] == Fate::Run || wasEarly_[i]) {
+        if (!std::exchange(wasEarly_[i], 0)) compute(i);
         ++ran;
       } else {
         recall(i);
@@ -268,6 +266,47 @@ class GraphRun {
     const std::optional<CachedStep> step = cache_->step(key);
     return step && std::all_of(step->files.begin(), step->files.end(),
                                [](const FileStamp& file) { return stampOf(file.path) == file; });
+  }
+
+  /// Finds how much of each value is needed, so that no more is made. Values that others may ask for
+  /// later, out of a cache or of Python, are whole.
+  void findDemands() {
+    wasEarly_.resize(graph_.nodes.size());
+    demands_.resize(graph_.nodes.size());
+    plans_.resize(graph_.nodes.size());
+    std::vector<char> runs(graph_.nodes.size());
+    for (std::size_t i = 0; i < runs.size(); ++i) runs[i] = fates_[i] == Fate::Run;
+    if (settings_.wholeValues || cache_ || settings_.made || settings_.dryRun ||
+         !mayAskForLess(graph_, runs)) return;
+    plans_ = plansOf(graph_, runs, settings_.maxMemory, [&](std::size_t i) { return planEarly(i); });
+    demands_ = demandsOf(graph_, runs, plans_);
+    requireMemoryFor(graph_, plans_, demands_, settings_.maxMemory);
+  }
+
+  /// To plan a mesh is to read it: so it is made now.
+  std::optional<Plan> planEarly(std::size_t i) {
+    compute(i);
+    wasEarly_[i] = 1;
+    if (!values_.has(i)) return {};
+    return values_.peek(i).plan();
+  }
+
+  /// Did it take or make less than the whole?
+  [[nodiscard]] bool isPartial(std::size_t i) const {
+    const std::vector<std::size_t>& inputs = graph_.nodes[i].inputs;
+    return !demands_[i].isWhole() ||
+           std::any_of(inputs.begin(), inputs.end(),
+                       [&](std::size_t input) { return !demands_[input].isWhole(); });
+  }
+
+  /// From now on it and all that it is made of are whole.
+  void makeWhole(std::size_t i) {
+    const Node& node = graph_.nodes[i];
+    demands_[i] = {};
+    for (const std::size_t input : node.inputs) {
+      if (!demands_[input].isWhole()) values_.drop(input);
+      makeWhole(input);
+    }
   }
 
   StepReport& begin(const Node& node) {
@@ -340,9 +379,23 @@ class GraphRun {
     for (const std::size_t input : node.inputs) bring(input);
     for (const auto& [option, input] : node.named) bring(input);
     StepReport& step = begin(node);
+    step.needed = demands_[i].part;
     StepClock clock(step);
     try {
-      runNode(i, step, clock);
+      try {
+        runNode(i, step, clock);
+      } catch (const levelset::ResourceLimit&) {
+        throw;
+      } catch (const levelset::Cancelled&) {
+        throw;
+      } catch (const levelset::Error&) {
+        if (!isPartial(i)) throw;
+        // What is refused of a part may be right of the whole, and otherwise that has to be said.
+        makeWhole(i);
+        fates_[i] = Fate::Load;  // its uses of others have to be counted again
+        report_.steps.pop_back();
+        return compute(i);
+      }
     } catch (const std::bad_alloc&) {
       throw levelset::ResourceLimit(withPlace(
           node.op->name + ": memory ran out; use larger voxels or a narrower band", node.place));
@@ -365,6 +418,8 @@ class GraphRun {
     }
     for (const auto& [option, input] : node.named)
       invocation.named.emplace(option, values_.take(input));
+    invocation.part = demands_[index].part;
+    invocation.planned = plans_[index];
     invocation.maxMemory = settings_.maxMemory;
     invocation.dryRun = settings_.dryRun;
     if (settings_.progress || settings_.goesOn) {
@@ -389,6 +444,7 @@ class GraphRun {
         }
       } else {
         Value value = op.run(invocation);
+        if (!demands_[index].isWhole()) value = partOf(value, demands_[index]);
         if (node.makes()) {
           describeResult(value, false, step);
           clock.stop();
@@ -407,6 +463,15 @@ class GraphRun {
       throw;
     }
     finish();
+  }
+
+  /// @throws levelset::InvalidInput where there is no surface in the part
+  static Value partOf(const Value& value, const Demand& demand) {
+    if (value.kind() != Kind::Band) return value;
+    levelset::NarrowBand part = levelset::cropped(value.band(), demand.part);
+    if (part.isEmpty() && !levelset::isEverywhere(demand.part.region))
+      throw levelset::InvalidInput("no surface lies in the part that is needed");
+    return Value(std::move(part));
   }
 
   /// For the next run. What did not reach what was asked is not kept, so that it is told again.
@@ -434,6 +499,9 @@ class GraphRun {
   std::vector<Fate> fates_;
   std::optional<Cache> cache_;
   std::vector<std::optional<std::string>> keys_;
+  std::vector<Demand> demands_;
+  std::vector<std::optional<Plan>> plans_;  // of whole values, as far as they were told ahead
+  std::vector<char> wasEarly_;              // ran to be planned with
   Values values_;  // the last: planned() fills the others
 };
 

@@ -8,6 +8,7 @@
 
 #include "apps/pipeline/graph.h"
 #include "apps/pipeline/invocation.h"
+#include "levelset/solids/crop.h"
 
 namespace pipeline {
 
@@ -15,6 +16,7 @@ struct RunSettings {
   bool dryRun = false;
   bool measureErrors = false;  ///< estimate each result's error: costs a pass over it
   std::size_t maxMemory = levelset::kNoMemoryLimit;
+  bool wholeValues = false;    ///< make all of each value, also where a part of it would do
   std::filesystem::path cache = {};  ///< folder of earlier results; empty: none are kept
   /// Called with the name of each action before it runs.
   std::function<void(const std::string&)> begin = {};
@@ -41,6 +43,7 @@ struct StepReport {
   std::string resultName, resultKind;
   std::string place;  ///< in a script
   double activeVoxels = 0, voxelSize = 0, halfWidth = 0;
+  levelset::BandPart needed = {};  ///< of the result, by others; empty: all of it
   std::size_t triangles = 0;
 };
 

@@ -179,13 +179,13 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
 
   // === Distances
   std::optional<openvdb::CoordBBox> region;
-  if (options.region && !field.isOpen()) {
+  if (!isEverywhere(options.region) && !field.isOpen()) {
     Imath::Box3d reached = bounds(mesh);
     const V3d rim((options.halfWidth + 1) * voxelSize);
     reached = {reached.min - rim, reached.max + rim};
     for (int axis = 0; axis < 3; ++axis) {
-      reached.min[axis] = std::max(reached.min[axis], options.region->min[axis]);
-      reached.max[axis] = std::min(reached.max[axis], options.region->max[axis]);
+      reached.min[axis] = std::max(reached.min[axis], options.region.min[axis]);
+      reached.max[axis] = std::min(reached.max[axis], options.region.max[axis]);
     }
     if (reached.isEmpty())
       throw InvalidInput("level-set: the region that is asked for lies beyond the mesh");

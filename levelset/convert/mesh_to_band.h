@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <functional>
-#include <optional>
 #include <string>
 
 #include "levelset/mesh.h"
@@ -42,7 +41,7 @@ struct MeshToBandOptions {
   bool searchSelfIntersections = true;  ///< when false, Auto trusts the mesh to have none
   /// World; distances are made only there, as cropped() leaves them, unless the mesh has holes: the
   /// certificate tells of the whole of it.
-  std::optional<Imath::Box3d> region = {};
+  Imath::Box3d region = kEverywhere;
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
   /// Told the certificate once it is whole, also when the mesh is refused after it.

@@ -13,13 +13,13 @@ namespace levelset {
 
 NarrowBand cropped(NarrowBand band, const BandPart& part) {
   using Leaf = openvdb::FloatTree::LeafNodeType;
-  if (part.halfWidth && !(*part.halfWidth >= 1))
+  if (!(part.halfWidth >= 1))
     throw UsageError(
-        fmt::format("crop: the half width is {} voxels; give at least 1", *part.halfWidth));
-  if (part.region && part.region->isEmpty())
+        fmt::format("crop: the half width is {} voxels; give at least 1", part.halfWidth));
+  if (part.region.isEmpty())
     throw UsageError("crop: the region is empty; give a box");
-  if (part.region) {
-    const openvdb::CoordBBox blocks = blocksOf(*part.region, vdb(band).transform());
+  if (!isEverywhere(part.region)) {
+    const openvdb::CoordBBox blocks = blocksOf(part.region, vdb(band).transform());
     std::vector<openvdb::Coord> beyond;
     for (auto leaf = vdb(band).tree().cbeginLeaf(); leaf; ++leaf)
       if (!blocks.isInside(leaf->origin())) beyond.push_back(leaf->origin());
@@ -38,7 +38,7 @@ NarrowBand cropped(NarrowBand band, const BandPart& part) {
       band = makeBand(rest);
     }
   }
-  return part.halfWidth ? narrowed(std::move(band), *part.halfWidth) : band;
+  return part.halfWidth < band.halfWidth() ? narrowed(std::move(band), part.halfWidth) : band;
 }
 
 }  // namespace levelset

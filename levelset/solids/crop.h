@@ -2,7 +2,8 @@
 
 #include <Imath/ImathBox.h>
 
-#include <optional>
+#include <cmath>
+#include <limits>
 
 #include "levelset/narrow_band.h"
 
@@ -10,8 +11,10 @@ namespace levelset {
 
 /// A part of a band: all that somebody is going to look at.
 struct BandPart {
-  std::optional<double> halfWidth = {};     ///< voxels; empty: as wide as it is
-  std::optional<Imath::Box3d> region = {};  ///< world; empty: everywhere
+  double halfWidth = std::numeric_limits<double>::infinity();  ///< voxels
+  Imath::Box3d region = kEverywhere;                           ///< world
+
+  [[nodiscard]] bool isAll() const { return std::isinf(halfWidth) && isEverywhere(region); }
 };
 
 /// A band that holds the part as it was, to the bit, and little beside it. Beyond the region it

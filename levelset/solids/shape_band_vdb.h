@@ -34,8 +34,8 @@ NarrowBand makeShape(const ShapeExtent& extent, double voxelSize, const ShapeOpt
     return distance(Imath::V3d(i * voxelSize, j * voxelSize, k * voxelSize));
   };
   BlockFiller filler(*grid, phi);
-  if (options.region) {
-    const openvdb::CoordBBox blocks = blocksOf(*options.region, grid->transform());
+  if (!isEverywhere(options.region)) {
+    const openvdb::CoordBBox blocks = blocksOf(options.region, grid->transform());
     filler.limitTo(blocks);
     domain.intersect(blocks);
   }

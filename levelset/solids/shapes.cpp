@@ -63,8 +63,8 @@ void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions
   }
   // A surface patch of one leaf face meets the leaves within the band and about one leaf more.
   double leaves = extent.area / (64 * voxelSize * voxelSize) * (2 * options.halfWidth + 15) / 8;
-  if (options.region && !options.region->isEmpty()) {
-    const V3d blocks = options.region->size() / (8 * voxelSize) + V3d(2);
+  if (!isEverywhere(options.region)) {
+    const V3d blocks = options.region.size() / (8 * voxelSize) + V3d(2);
     leaves = std::min(leaves, blocks.x * blocks.y * blocks.z);
   }
   requireMemory(leaves * 2300 + 1e5, options.maxMemory, action);

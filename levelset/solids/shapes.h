@@ -3,8 +3,6 @@
 #include <Imath/ImathBox.h>
 #include <Imath/ImathVec.h>
 
-#include <optional>
-
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 
@@ -14,7 +12,7 @@ namespace levelset {
 
 struct ShapeOptions {
   double halfWidth = 3;  ///< voxels, at least 1
-  std::optional<Imath::Box3d> region = {};  ///< world; only there, as cropped() leaves it
+  Imath::Box3d region = kEverywhere;  ///< world; only there, as cropped() leaves it
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };

@@ -2,6 +2,7 @@
 
 // Parameters that several operators share.
 
+#include <Imath/ImathBox.h>
 #include <fmt/core.h>
 
 #include <filesystem>
@@ -38,6 +39,13 @@ inline std::vector<std::string> sentencesOf(const levelset::BandRepairs& repairs
         "to see whether the signs are right",
         repairs.inactiveValues, file.string()));
   return sentences;
+}
+
+/// @param box  everywhere stays so
+inline Imath::Box3d grown(Imath::Box3d box, double by) {
+  box.min -= Imath::V3d(by);
+  box.max += Imath::V3d(by);
+  return box;
 }
 
 inline Param voxelParam(const char* doc = "edge of a voxel") {

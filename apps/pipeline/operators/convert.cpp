@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "apps/pipeline/demand.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
 #include "levelset/convert/mesh_to_band.h"
@@ -39,9 +40,10 @@ double longestSide(const Value& value) {
 }
 
 Value levelSet(Invocation& in) {
-  levelset::MeshToBandOptions options{.halfWidth = in.number("half-width"),
+  levelset::MeshToBandOptions options{.halfWidth = in.neededHalfWidth(in.number("half-width")),
                                       .signAnyway = in.flag("sign-anyway"),
                                       .searchSelfIntersections = !in.flag("trust-mesh"),
+                                      .region = in.part.region,
                                       .maxMemory = in.maxMemory,
                                       .progress = in.progress};
   const std::string sign = in.text("sign");
@@ -128,6 +130,14 @@ Value mesh(Invocation& in) {
       {.adaptivity = in.number("adaptivity"), .sharp = in.flag("sharp"), .progress = in.progress}));
 }
 
+/// The ends of edges that the zero set crosses are less than a voxel from it; half a one is for
+/// distances that are not quite.
+Demand readOfMesh(Invocation& in, std::size_t, const Demand&) {
+  const bool isUniform = !in.flag("sharp") && in.number("adaptivity") == 0;
+  if (in.operands[0].kind() != Kind::Band || !isUniform) return {};
+  return {{.halfWidth = 1.5}};
+}
+
 }  // namespace
 
 void addConversionOperators(std::vector<Operator>& all) {
@@ -164,6 +174,7 @@ void addConversionOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Mesh}},
       .run = levelSet,
       .plan = planLevelSet,
+      .slope = Slope::One,
       .validate = requireVoxelSize,
   });
   all.push_back({
@@ -216,6 +227,7 @@ void addConversionOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band, Kind::Patch}},
       .resultKind = [](const Invocation&) { return Kind::Mesh; },
       .run = mesh,
+      .reads = readOfMesh,
       .validate =
           [](const Invocation& in) {
             const bool isPatch = in.operands[0].kind() == Kind::Patch;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/pipeline/demand.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
 #include "levelset/error.h"
@@ -34,6 +35,21 @@ void validateClip(const Invocation& in) {
         "clip: --plane needs a point and a normal, \"x,y,z x,y,z\"; what lies behind the plane "
         "stays");
   }
+}
+
+Demand readOfClip(Invocation& in, std::size_t, const Demand& of) {
+  Demand read = of;
+  if (!in.given("box")) return read;
+  const double voxel = in.planned->voxelSize;
+  const double width = std::min(of.part.halfWidth, in.planned->halfWidth);
+  // Further off the box itself is further than the band reaches, whatever is there.
+  Imath::Box3d box = grown(in.box("box"), (width + 2) * voxel);
+  for (int axis = 0; axis < 3; ++axis) {
+    box.min[axis] = std::max(box.min[axis], of.part.region.min[axis] - 2 * voxel);
+    box.max[axis] = std::min(box.max[axis], of.part.region.max[axis] + 2 * voxel);
+  }
+  read.part.region = box;
+  return read;
 }
 
 M44d rotationMatrix(const Invocation& in) {
@@ -129,17 +145,19 @@ Value transform(Invocation& in) {
   return Value(levelset::transform(std::move(band), matrix));
 }
 
+Imath::Box3d moved(const Imath::Box3d& box, const M44d& matrix) {
+  Imath::Box3d there;
+  for (int corner = 0; corner < 8 && !box.isEmpty(); ++corner)
+    there.extendBy(V3d((corner & 1) ? box.max.x : box.min.x, (corner & 2) ? box.max.y : box.min.y,
+                       (corner & 4) ? box.max.z : box.min.z) *
+                   matrix);
+  return there;
+}
+
 Plan planTransform(Invocation& in) {
   const M44d matrix = matrixOf(in);
   Plan plan = in.operands[0].plan();
-  const Imath::Box3d before = plan.bounds;
-  plan.bounds.makeEmpty();
-  for (int corner = 0; corner < 8 && !before.isEmpty(); ++corner) {
-    const V3d p((corner & 1) ? before.max.x : before.min.x,
-                (corner & 2) ? before.max.y : before.min.y,
-                (corner & 4) ? before.max.z : before.min.z);
-    plan.bounds.extendBy(p * matrix);
-  }
+  plan.bounds = moved(plan.bounds, matrix);
   const double scale = std::cbrt(std::abs(matrix.determinant()));
   plan.area *= scale * scale;
   if (!in.flag("bake"))
@@ -147,6 +165,15 @@ Plan planTransform(Invocation& in) {
   else if (in.given("voxel"))
     plan.voxelSize = in.length("voxel");
   return plan;
+}
+
+Demand readOfTransform(Invocation& in, std::size_t, const Demand& of) {
+  if (in.operands[0].kind() != Kind::Band || in.flag("bake")) return {};
+  Demand read = of;
+  if (!levelset::isEverywhere(of.part.region))
+    read.part.region =
+        grown(moved(of.part.region, matrixOf(in).inverse()), in.operands[0].plan().voxelSize);
+  return read;
 }
 
 levelset::ResampleOptions resampleOptions(Invocation& in) {
@@ -220,6 +247,8 @@ void addPlacementOperators(std::vector<Operator>& all) {
       .resultKind = sameKind,
       .run = transform,
       .plan = planTransform,
+      .slope = Slope::OfOperands,
+      .reads = readOfTransform,
       .validate = validateTransform,
   });
   all.push_back({
@@ -251,6 +280,8 @@ void addPlacementOperators(std::vector<Operator>& all) {
                   .doc = "point and normal: keep what lies behind"}},
       .operands = {{Kind::Band}},
       .run = clip,
+      .slope = Slope::OfOperands,
+      .reads = readOfClip,
       .validate = validateClip,
   });
 }

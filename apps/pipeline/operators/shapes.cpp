@@ -85,7 +85,10 @@ double voxelOf(Invocation& in, const Shape& shape) {
 }
 
 levelset::ShapeOptions optionsOf(const Invocation& in) {
-  return {.halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress};
+  return {.halfWidth = in.neededHalfWidth(in.number("half-width")),
+          .region = in.part.region,
+          .maxMemory = in.maxMemory,
+          .progress = in.progress};
 }
 
 template <Describe describe>
@@ -139,6 +142,7 @@ Operator shape(const char* name, const char* summary, const char* example,
           .params = std::move(params),
           .run = make<describe>,
           .plan = plan<describe>,
+          .slope = Slope::One,
           .validate = requireVoxelSize};
 }
 

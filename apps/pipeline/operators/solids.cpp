@@ -1,7 +1,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 
+#include "apps/pipeline/demand.h"
 #include "apps/pipeline/fields.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
@@ -24,6 +26,17 @@ std::vector<NarrowBand> bands(const Invocation& in) {
   std::vector<NarrowBand> all;
   for (const Value& value : in.operands) all.push_back(value.band());
   return all;
+}
+
+/// A seam is corrected as far as the band reaches, and about faces that touch whole blocks are made
+/// again from what lies as far beyond them.
+Demand readOfCsg(Invocation& in, std::size_t, const Demand& of) {
+  for (const Value& operand : in.operands)
+    if (operand.plan().voxelSize != in.planned->voxelSize) return {};  // one is resampled
+  Demand read = of;
+  const double width = std::min(of.part.halfWidth, in.planned->halfWidth);
+  read.part.region = grown(read.part.region, (2 * width + 24) * in.planned->voxelSize);
+  return read;
 }
 
 template <CsgOperation operation>
@@ -74,6 +87,20 @@ levelset::OffsetOptions offsetOptions(Invocation& in) {
   return options;
 }
 
+/// What the interpolant reads beside the surface, edges included, voxels.
+constexpr double kReadBySurface = 6;
+
+Demand readOfOffset(Invocation& in, std::size_t, const Demand& of) {
+  if (!in.given("distance") || in.given("mask")) return {};
+  const double voxel = in.operands[0].plan().voxelSize;
+  const double distance = in.length("distance");
+  if (distance == 0) return {};
+  const double width = std::min(of.part.halfWidth, in.planned->halfWidth);
+  return {{.halfWidth = kReadBySurface,
+           .region = grown(of.part.region,
+                           std::abs(distance) + (width + 2 * kReadBySurface) * voxel)}};
+}
+
 void validateOffset(const Invocation& in) {
   if (in.given("distance") == in.given("by"))
     throw levelset::UsageError(
@@ -82,7 +109,8 @@ void validateOffset(const Invocation& in) {
 }
 
 Value offset(Invocation& in) {
-  const levelset::OffsetOptions options = offsetOptions(in);
+  levelset::OffsetOptions options = offsetOptions(in);
+  if (in.planned) options.halfWidth = in.neededHalfWidth(in.planned->halfWidth);
   const std::optional<levelset::Mask> mask = maskOf(in);
   NarrowBand band = in.band();
   if (!mask && !in.given("by")) {
@@ -202,7 +230,9 @@ Operator csgOperator(const char* name, const char* summary, const char* example)
           .operands = {{Kind::Band}, {Kind::Band}},
           .takesMore = true,
           .run = csg<operation>,
-          .plan = planCsg};
+          .plan = planCsg,
+          .slope = Slope::OfOperands,
+          .reads = readOfCsg};
 }
 
 }  // namespace
@@ -282,6 +312,8 @@ void addSolidOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = offset,
       .plan = planOffset,
+      .slope = Slope::One,
+      .reads = readOfOffset,
       .validate = validateOffset,
   });
   const Param halfWidth = {.name = "half-width",

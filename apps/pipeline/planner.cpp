@@ -1,0 +1,182 @@
+#include "apps/pipeline/planner.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "apps/pipeline/refusal.h"
+#include "levelset/error.h"
+#include "levelset/progress.h"
+
+namespace pipeline {
+namespace {
+
+/// An action as people know it.
+std::string labelOf(const Node& node) {
+  return node.op->name + (node.name.empty() ? "" : " @" + node.name);
+}
+
+std::string reasonFor(const Graph& graph, std::size_t index, const std::vector<char>& runs) {
+  const Node& node = graph.nodes[index];
+  if (!runs[index]) return "left out: nothing that is asked for needs it";
+  std::vector<std::string> takers;
+  for (std::size_t i = index + 1; i < graph.nodes.size(); ++i) {
+    const Node& other = graph.nodes[i];
+    const bool takes =
+        std::count(other.inputs.begin(), other.inputs.end(), index) > 0 ||
+        std::any_of(other.named.begin(), other.named.end(),
+                    [&](const auto& named) { return named.second == index; });
+    if (runs[i] && takes) takers.push_back(labelOf(other));
+  }
+  std::vector<std::string> files;
+  if (node.op->targets) files = node.op->targets(Invocation(*node.op, node.options));
+  const auto joined = [](const std::vector<std::string>& all) {
+    std::string text;
+    for (const std::string& one : all) text += (text.empty() ? "" : ", ") + one;
+    return text;
+  };
+  if (!files.empty()) return "writes " + joined(files);
+  if (!takers.empty()) return "for " + joined(takers);
+  return node.makes() ? "ends the chain" : "asked for";
+}
+
+std::string needOf(const Demand& demand, const Plan& plan) {
+  std::string text;
+  if (demand.part.halfWidth < plan.halfWidth)
+    text += fmt::format("; {:.3g} of {:.3g} voxels of its band", demand.part.halfWidth,
+                        plan.halfWidth);
+  if (!levelset::isEverywhere(demand.part.region)) {
+    const Imath::Box3d& box = demand.part.region;
+    text += fmt::format("; only {:.4g},{:.4g},{:.4g} to {:.4g},{:.4g},{:.4g}", box.min.x, box.min.y,
+                        box.min.z, box.max.x, box.max.y, box.max.z);
+  }
+  return text;
+}
+
+/// Bytes held at once at most: values live from what makes them to the last that takes them.
+double peakBytes(const Graph& graph, const std::vector<char>& runs,
+                 const std::vector<double>& bytes) {
+  std::vector<std::size_t> uses = countUses(graph, runs);
+  double held = 0, peak = 0;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    if (!runs[i]) continue;
+    held += bytes[i];
+    peak = std::max(peak, held);
+    const auto release = [&](std::size_t input) {
+      if (--uses[input] == 0) held -= bytes[input];
+    };
+    for (const std::size_t input : graph.nodes[i].inputs) release(input);
+    for (const auto& [option, input] : graph.nodes[i].named) release(input);
+    if (uses[i] == 0) held -= bytes[i];
+  }
+  return peak;
+}
+
+}  // namespace
+
+Plan planOf(Invocation& invocation) {
+  const Operator& op = invocation.op();
+  if (op.plan) return op.plan(invocation);
+  Plan plan = invocation.operands.at(0).plan();
+  if (op.resultKind) plan.kind = op.resultKind(invocation);
+  return plan;
+}
+
+std::vector<std::optional<Plan>> plansOf(
+    const Graph& graph, const std::vector<char>& runs, std::size_t maxMemory,
+    const std::function<std::optional<Plan>(std::size_t)>& mesh) {
+  std::vector<std::optional<Plan>> plans(graph.nodes.size());
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    const Node& node = graph.nodes[i];
+    if (!runs[i] || !node.makes()) continue;
+    if (const auto given = graph.given.find(i); given != graph.given.end()) {
+      plans[i] = given->second.plan();
+      continue;
+    }
+    if (node.inputs.empty() && node.kind == Kind::Mesh) {
+      plans[i] = mesh(i);
+      continue;
+    }
+    Invocation invocation(*node.op, node.options);
+    bool isKnown = node.op->plan || !node.inputs.empty();
+    const auto know = [&](std::size_t input) {
+      isKnown = isKnown && plans[input];
+      return isKnown ? Value(*plans[input]) : Value(Plan{});
+    };
+    for (const std::size_t input : node.inputs) {
+      invocation.operands.push_back(know(input));
+      invocation.operandNames.push_back(graph.nodes[input].name);
+    }
+    for (const auto& [option, input] : node.named) invocation.named.emplace(option, know(input));
+    if (!isKnown) continue;
+    invocation.maxMemory = maxMemory;
+    invocation.dryRun = true;
+    try {
+      plans[i] = planOf(invocation);
+    } catch (const levelset::Cancelled&) {
+      throw;
+    } catch (const levelset::Error&) {
+      // It will be refused in its turn, by what it is really given.
+    }
+  }
+  return plans;
+}
+
+void requireMemoryFor(const Graph& graph, const std::vector<std::optional<Plan>>& plans,
+                      const std::vector<Demand>& demands, std::size_t maxMemory) {
+  for (std::size_t i = 0; i < plans.size(); ++i)
+    if (plans[i])
+      levelset::requireMemory(demanded(*plans[i], demands[i]).bytes(), maxMemory,
+                              graph.nodes[i].op->name.c_str());
+}
+
+std::string explain(const Graph& graph, std::size_t maxMemory, bool wholeValues) {
+  const std::vector<char> runs = neededNodes(graph);
+  const auto plans = plansOf(graph, runs, maxMemory, [&](std::size_t i) -> std::optional<Plan> {
+    const Node& node = graph.nodes[i];
+    Invocation invocation(*node.op, node.options);
+    invocation.maxMemory = maxMemory;
+    invocation.dryRun = true;
+    try {
+      return planOf(invocation);
+    } catch (const levelset::Error& error) {
+      refuseAs(node.op->name, error);
+    }
+  });
+  std::vector<Demand> demands(graph.nodes.size());
+  if (!wholeValues) demands = demandsOf(graph, runs, plans);
+  std::string text;
+  std::vector<double> bytes(graph.nodes.size(), 0);
+  double seconds = 0;
+  std::size_t untimed = 0;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    const Node& node = graph.nodes[i];
+    text += fmt::format("{:<20} {}", labelOf(node), reasonFor(graph, i, runs));
+    if (plans[i]) {
+      const Plan plan = demanded(*plans[i], demands[i]);
+      bytes[i] = plan.bytes();
+      text += needOf(demands[i], *plans[i]);
+      if (plan.voxelSize > 0)
+        text += fmt::format("; about {:.3g} voxels of {:.4g}, {:.3g} MB", plan.activeVoxels(),
+                            plan.voxelSize, bytes[i] * 1e-6);
+      if (node.op->nanosecondsPerVoxel > 0 && plan.voxelSize > 0) {
+        const double own = 1e-9 * node.op->nanosecondsPerVoxel * plan.activeVoxels();
+        seconds += own;
+        text += fmt::format(", {:.2g} s", own);
+      } else if (node.kind == Kind::Band) {
+        ++untimed;
+      }
+    } else if (runs[i] && node.makes()) {
+      text += "; its size cannot be told before it is made";
+    }
+    text += "\n";
+  }
+  text += fmt::format("at most about {:.3g} MB are held at once; about {:.2g} s of one core{}\n",
+                      peakBytes(graph, runs, bytes) * 1e-6, seconds,
+                      untimed > 0 ? fmt::format(", and {} actions that nobody has timed", untimed)
+                                  : std::string());
+  requireMemoryFor(graph, plans, demands, maxMemory);
+  return text;
+}
+
+}  // namespace pipeline
