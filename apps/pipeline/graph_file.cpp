@@ -7,6 +7,7 @@
 
 #include "apps/pipeline/text_file.h"
 #include "levelset/error.h"
+#include "levelset/files/json_depth.h"
 
 namespace pipeline {
 namespace {
@@ -176,7 +177,7 @@ std::string graphJson(const Graph& graph) {
 }
 
 Graph graphFromJson(const std::string& text, const std::string& name) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = levelset::isJsonTooDeep(text) ? Json() : Json::parse(text, nullptr, false);
   if (json.is_discarded() || !json.is_object() || json.value("format", Json()) != kFormat)
     throw InvalidInput(fmt::format(
         "run: '{}' is no graph; write one with --save-graph, or a text with one action a line",

@@ -10,12 +10,12 @@ namespace {
 void readPng(std::string_view bytes) {
   const std::filesystem::path file = scratchFile("picture.png", bytes);
   accepts([&] { static_cast<void>(render::readGreyPng(file, kMaxMemory)); });
-  accepts([&] { static_cast<void>(render::readColourPng(file)); });
+  accepts([&] { static_cast<void>(render::readColourPng(file, kMaxMemory)); });
 }
 
 void readExr(std::string_view bytes) {
   const std::filesystem::path file = scratchFile("picture.exr", bytes);
-  accepts([&] { static_cast<void>(render::readExr(file)); });
+  accepts([&] { static_cast<void>(render::readExr(file, kMaxMemory)); });
 }
 
 void readHeights(std::string_view bytes) {

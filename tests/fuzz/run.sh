@@ -5,6 +5,10 @@
 set -eu
 program=$1 reader=$2 seconds=$3
 shift 3
+if [ ! -x "$program" ] && ! command -v clang++ >/dev/null && [ "${CI:-}" != true ]; then
+  echo "'$reader' is not fuzzed: clang++ is missing; ./dev setup installs it." >&2
+  exit 77
+fi
 here=$(cd "$(dirname "$0")" && pwd)
 found=$(dirname "$program")/found/$reader
 mkdir -p "$found"
@@ -18,7 +22,10 @@ case $reader in
   formula) words=formula ;;
   *) words="" ;;
 esac
-for word in $words; do cat "$here/dictionaries/$word.dict"; done >"$found.dict"
+{
+  echo '"1e999"'  # a dictionary must not be empty
+  for word in $words; do cat "$here/dictionaries/$word.dict"; done
+} >"$found.dict"
 
 # What a reader may use is 64 MB (kMaxMemory). The sanitizers keep what was freed for a while, and
 # shadow all: the limits are of one piece, and of the whole process.
