@@ -117,7 +117,7 @@ class ExrHeaderReader {
       if (end == std::string::npos || end - at >= kLongestName) break;
       at = end + 1 + 16;
     }
-    if (at + 1 != value.size()) refuse("its list of channels does not end");
+    if (at + 1 != value.size() || value[at] != '\0') refuse("its list of channels does not end");
     return count;
   }
 
