@@ -27,9 +27,9 @@ esac
   for word in $words; do cat "$here/dictionaries/$word.dict"; done
 } >"$found.dict"
 
-# What a reader may use is 64 MB (kMaxMemory). The sanitizers keep what was freed for a while, and
-# shadow all: the limits are of one piece, and of the whole process.
-export ASAN_OPTIONS="quarantine_size_mb=32:detect_leaks=1:$(printf %s "${ASAN_OPTIONS:-}")"
-exec "$program" "--reader=$reader" -max_total_time="$seconds" -timeout=5 -malloc_limit_mb=160 -rss_limit_mb=1024 \
+# What a reader may use is 64 MB (kMaxMemory). The limits are of one piece, and of the whole process with
+# what the sanitizers shadow and keep: freed memory for a while, pages of it for longer.
+export ASAN_OPTIONS="quarantine_size_mb=32:allocator_release_to_os_interval_ms=200:detect_leaks=1:${ASAN_OPTIONS:-}"
+exec "$program" "--reader=$reader" -max_total_time="$seconds" -timeout=5 -malloc_limit_mb=160 -rss_limit_mb=2048 \
   -dict="$found.dict" -artifact_prefix="$found-" -print_final_stats=1 -verbosity="${VERBOSITY:-0}" "$@" \
   "$found" "$here/corpus/$reader" </dev/null
