@@ -47,6 +47,16 @@ TEST_P(FuzzCorpus, IsReadOrRefusedWhereverItIsCut) {
 INSTANTIATE_TEST_SUITE_P(Readers, FuzzCorpus, testing::ValuesIn(fuzz::readers()),
                          [](const auto& of) { return std::string(of.param.name); });
 
+/// Inputs that showed a defect and take long still: no seeds, or little else would be tried.
+TEST(FuzzReaders, ReadOrRefuseWhatIsCostly) {
+  for (const auto& folder : fs::directory_iterator(LEVELSMITH_FUZZ_COSTLY)) {
+    const fuzz::Reader* reader = fuzz::findReader(folder.path().filename().string());
+    ASSERT_NE(reader, nullptr) << folder.path();
+    for (const auto& file : fs::directory_iterator(folder.path()))
+      EXPECT_NO_THROW(reader->read(contentOf(file.path()))) << file.path();
+  }
+}
+
 TEST(FuzzReaders, HaveEachSeedsOfItsOwn) {
   std::set<std::string> folders, names;
   for (const auto& entry : fs::directory_iterator(LEVELSMITH_FUZZ_CORPUS))
