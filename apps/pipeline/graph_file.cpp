@@ -7,6 +7,7 @@
 
 #include "apps/pipeline/text_file.h"
 #include "levelset/error.h"
+#include "levelset/files/json_depth.h"
 
 namespace pipeline {
 namespace {
@@ -17,7 +18,7 @@ using levelset::UsageError;
 
 constexpr const char* kFormat = "levelsmith graph";
 constexpr int kVersion = 1;
-constexpr std::size_t kMostBytes = 1 << 26;
+constexpr std::size_t kMostBytes = 1 << 25;
 
 Json toJson(const Node& node) {
   Json json = {{"op", node.op->name}};
@@ -69,7 +70,10 @@ class GraphReader {
       throw UsageError(
           fmt::format("run: there is no action '{}'; `levelsmith help` lists them", op));
     readOptions(json, node);
-    for (const Json& input : listOf(json, "inputs")) node.inputs.push_back(numberOf(input));
+    if (json.contains("inputs")) {
+      if (!json["inputs"].is_array()) refuse("'inputs' is no list");
+      for (const Json& input : json["inputs"]) node.inputs.push_back(numberOf(input));
+    }
     readNamed(json, node);
     for (const Param& param : node.op->params)
       if (param.required && !node.options.contains(param.name))
@@ -143,11 +147,6 @@ class GraphReader {
     if (!json.contains(key) || !json[key].is_string()) refuse(fmt::format("has no text '{}'", key));
     return json[key].get<std::string>();
   }
-  [[nodiscard]] Json listOf(const Json& json, const char* key) const {
-    if (!json.contains(key)) return Json::array();
-    if (!json[key].is_array()) refuse(fmt::format("'{}' is no list", key));
-    return json[key];
-  }
   /// Of a node before this one, that makes a value.
   [[nodiscard]] std::size_t numberOf(const Json& json) const {
     if (!json.is_number_unsigned() || json.get<std::uint64_t>() >= at_)
@@ -176,7 +175,7 @@ std::string graphJson(const Graph& graph) {
 }
 
 Graph graphFromJson(const std::string& text, const std::string& name) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = levelset::isJsonTooDeep(text) ? Json() : Json::parse(text, nullptr, false);
   if (json.is_discarded() || !json.is_object() || json.value("format", Json()) != kFormat)
     throw InvalidInput(fmt::format(
         "run: '{}' is no graph; write one with --save-graph, or a text with one action a line",
@@ -186,10 +185,10 @@ Graph graphFromJson(const std::string& text, const std::string& name) {
         "run: '{}' is of version {}, and this program knows {}", name,
         json.value("version", Json()).dump(-1, ' ', false, Json::error_handler_t::replace),
         kVersion));
-  const Json nodes = json.value("nodes", Json());
-  if (!nodes.is_array() || nodes.empty())
+  const auto nodes = json.find("nodes");
+  if (nodes == json.end() || !nodes->is_array() || nodes->empty())
     throw InvalidInput(fmt::format("run: '{}' holds no nodes", name));
-  return GraphReader(nodes, name).read();
+  return GraphReader(*nodes, name).read();
 }
 
 bool isGraphFile(const std::filesystem::path& file) {
