@@ -68,6 +68,13 @@ void checkNamed(const Node& node, const std::vector<Node>& before) {
 
 }  // namespace
 
+const Operator& givenOperator() {
+  static const Operator op{
+      .name = "given", .group = "", .summary = "a value that was made elsewhere",
+      .isRepeatable = false};
+  return op;
+}
+
 Kind checkNode(const Node& node, const std::vector<Node>& before) {
   const Operator& op = *node.op;
   checkOperands(node, before);
@@ -88,6 +95,7 @@ std::vector<char> neededNodes(const Graph& graph) {
   };
   std::vector<char> needed(nodes.size(), 0);
   for (std::size_t i = 0; i < nodes.size(); ++i) needed[i] = actsOutside(nodes[i]) ? 1 : 0;
+  for (const std::size_t result : graph.results) needed[result] = 1;
   if (std::find(needed.begin(), needed.end(), 1) == needed.end())
     return std::vector<char>(nodes.size(), 1);
   for (std::size_t i = nodes.size(); i-- > 0;) {

@@ -27,7 +27,12 @@ struct Node {
 struct Graph {
   std::map<std::string, std::string> globals;  ///< options of the run as a whole
   std::vector<Node> nodes;                     ///< each behind what it takes
+  std::map<std::size_t, Value> given;          ///< by node: what was made elsewhere (givenOperator)
+  std::vector<std::size_t> results;  ///< nodes whose values are asked for, used by others or not
 };
+
+/// Of nodes whose values Graph::given holds. Nothing runs it, and no file can name it.
+[[nodiscard]] const Operator& givenOperator();
 
 /// Checks what a node takes, and tells the kind of what it makes.
 /// @throws levelset::UsageError for operands that are too many, too few or of kinds that it does
@@ -35,8 +40,9 @@ struct Graph {
 ///         take, and as Operator::validate
 [[nodiscard]] Kind checkNode(const Node& node, const std::vector<Node>& before);
 
-/// By node: is it needed for what the graph does outside itself, that is for what it writes, draws,
-/// prints or checks? Where it does nothing of that kind, everything is.
+/// By node: is it needed for the results that are asked for, or for what the graph does outside
+/// itself, that is for what it writes, draws, prints or checks? Where there is nothing of either
+/// kind, everything is.
 [[nodiscard]] std::vector<char> neededNodes(const Graph& graph);
 
 /// By node: by how many others that are needed its value is taken.

@@ -51,10 +51,11 @@ class Values {
 /// What was made, and that no other node takes.
 std::vector<std::string> unusedValues(const Graph& graph) {
   const std::vector<std::size_t> uses = countUses(graph, std::vector<char>(graph.nodes.size(), 1));
+  const std::set<std::size_t> results(graph.results.begin(), graph.results.end());
   std::vector<std::string> sentences;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     const Node& node = graph.nodes[i];
-    if (!node.makes() || uses[i] > 0) continue;
+    if (!node.makes() || uses[i] > 0 || results.contains(i)) continue;
     sentences.push_back(withPlace(
         fmt::format("the {}{} at the end of the chain is not used; write it, or leave it out",
                     kindName(node.kind), node.name.empty() ? "" : " '" + node.name + "'"),
@@ -198,6 +199,8 @@ class GraphRun {
       const Node& node = graph_.nodes[i];
       if (fates_[i] == Fate::LeftOut) {
         report_.leftOut.push_back(node.op->name + (node.name.empty() ? "" : " @" + node.name));
+      } else if (const auto given = graph_.given.find(i); given != graph_.given.end()) {
+        values_.put(i, given->second);
       } else if (fates_[i] == Fate::Run) {
         compute(i);
         ++ran;
@@ -237,6 +240,7 @@ class GraphRun {
     cache_.emplace(settings_.cache);
     keys_ = CacheKeys(*cache_, settings_.maxMemory).of(graph_, needed);
     std::vector<char> taken(graph_.nodes.size(), 0);
+    for (const std::size_t result : graph_.results) taken[result] = 1;
     for (std::size_t i = graph_.nodes.size(); i-- > 0;) {
       const Node& node = graph_.nodes[i];
       if (!needed[i]) continue;
@@ -306,6 +310,7 @@ class GraphRun {
       }
     if (value) {
       describeResult(*value, false, step);
+      if (settings_.made) settings_.made(i, *value);
       values_.put(i, std::move(*value));
     }
     tell(node, output, step);
@@ -313,6 +318,8 @@ class GraphRun {
 
   /// Also where an entry of the cache was damaged, and what it was made of has to be made again.
   void compute(std::size_t i) {
+    if (const auto given = graph_.given.find(i); given != graph_.given.end())
+      return values_.put(i, given->second);
     const Node& node = graph_.nodes[i];
     const bool isPlanned = fates_[i] == Fate::Run;  // its uses of others are counted
     fates_[i] = Fate::Known;  // to those who may ask for it again, once its value was let go
@@ -360,10 +367,10 @@ class GraphRun {
       invocation.named.emplace(option, values_.take(input));
     invocation.maxMemory = settings_.maxMemory;
     invocation.dryRun = settings_.dryRun;
-    if (settings_.progress) {
+    if (settings_.progress || settings_.goesOn) {
       invocation.progress = [&, index](double fraction) {
-        settings_.progress(index, op.name, fraction);
-        return true;
+        if (settings_.progress) settings_.progress(index, op.name, fraction);
+        return !settings_.goesOn || settings_.goesOn();
       };
     }
     const auto finish = [&] {
@@ -389,7 +396,10 @@ class GraphRun {
         }
         clock.stop();
         keep(index, invocation, value);
-        if (node.makes()) values_.put(index, std::move(value));
+        if (node.makes()) {
+          if (settings_.made) settings_.made(index, value);
+          values_.put(index, std::move(value));
+        }
       }
     } catch (...) {
       clock.stop();

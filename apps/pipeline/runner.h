@@ -20,6 +20,10 @@ struct RunSettings {
   std::function<void(const std::string&)> begin = {};
   /// Called with the action's place in the chain, its name and the fraction done.
   std::function<void(std::size_t, const std::string&, double)> progress = {};
+  /// Asked while an action runs, from any thread; false ends it with levelset::Cancelled.
+  std::function<bool()> goesOn = {};
+  /// Called with the value of each node that ran and makes one.
+  std::function<void(std::size_t, const Value&)> made = {};
   /// Text for people that an action prints.
   std::function<void(const std::string&)> print = {};
   /// One sentence beside the result.
