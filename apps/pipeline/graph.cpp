@@ -69,9 +69,10 @@ void checkNamed(const Node& node, const std::vector<Node>& before) {
 }  // namespace
 
 const Operator& givenOperator() {
-  static const Operator op{
-      .name = "given", .group = "", .summary = "a value that was made elsewhere",
-      .isRepeatable = false};
+  static const Operator op{.name = "given",
+                           .group = "",
+                           .summary = "a value that was made elsewhere",
+                           .isRepeatable = false};
   return op;
 }
 

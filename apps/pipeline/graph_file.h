@@ -9,8 +9,8 @@ namespace pipeline {
 
 /// A graph as JSON: `{"format": "levelsmith graph", "version": 1, "nodes": […]}`, each node
 /// `{"op": NAME, "options": {…}, "inputs": [numbers of nodes], "named": {option: number of a node},
-/// "as": NAME}`, of which all but the first may be left out. Of the options of the run `"tolerance"`
-/// is in it, beside the nodes: voxel sizes follow from it.
+/// "as": NAME}`, of which all but the first may be left out. Of the options of the run
+/// `"tolerance"` is in it, beside the nodes: voxel sizes follow from it.
 [[nodiscard]] std::string graphJson(const Graph& graph);
 
 /// Options may be texts as one would write them, numbers, or true for a flag.

@@ -48,7 +48,9 @@ std::string scaledVoxel(const std::string& text, double factor) {
 class PartFinder {
  public:
   explicit PartFinder(const Graph& graph)
-      : graph_(graph), needed_(neededNodes(graph)), isEnd_(graph.nodes.size(), 0),
+      : graph_(graph),
+        needed_(neededNodes(graph)),
+        isEnd_(graph.nodes.size(), 0),
         hasVoxels_(graph.nodes.size(), 0) {}
 
   ToleranceParts find() {
@@ -112,13 +114,11 @@ class PartFinder {
     std::vector<char> isTaken(graph_.nodes.size(), 0), lasts(graph_.nodes.size(), 0);
     for (std::size_t i = 0; i < graph_.nodes.size(); ++i)
       if (needed_[i])
-        forEachTaken(graph_.nodes[i], [&](std::size_t input) {
-          (isEnd_[i] ? lasts : isTaken)[input] = 1;
-        });
+        forEachTaken(graph_.nodes[i],
+                     [&](std::size_t input) { (isEnd_[i] ? lasts : isTaken)[input] = 1; });
     for (const std::size_t i : parts_.again) {
       const bool isLast = lasts[i] || !isTaken[i];
-      if (isLast && isJudged(graph_.nodes[i].kind) && followsChosen(i))
-        parts_.outputs.push_back(i);
+      if (isLast && isJudged(graph_.nodes[i].kind) && followsChosen(i)) parts_.outputs.push_back(i);
     }
     for (std::size_t i = 0; i < graph_.nodes.size(); ++i)
       if (needed_[i] && !isEnd_[i] && (lasts[i] || !isTaken[i])) parts_.lasting.push_back(i);

@@ -13,9 +13,9 @@ namespace pipeline {
 /// What a run with --tolerance does with the nodes of a graph that are needed. Numbers of nodes, in
 /// order.
 struct ToleranceParts {
-  std::vector<std::size_t> chosen;   ///< their voxel size follows from the tolerance
-  std::vector<std::size_t> fixed;    ///< theirs was given
-  std::vector<std::size_t> once;     ///< values that no voxel size has a part in, as meshes of files
+  std::vector<std::size_t> chosen;  ///< their voxel size follows from the tolerance
+  std::vector<std::size_t> fixed;   ///< theirs was given
+  std::vector<std::size_t> once;    ///< values that no voxel size has a part in, as meshes of files
   /// Of those, also where a cache makes them `again`.
   std::vector<std::size_t> constant;
   std::vector<std::size_t> again;    ///< values that are made at every voxel size that is tried

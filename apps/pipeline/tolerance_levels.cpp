@@ -128,8 +128,8 @@ void LevelRunner::planAt(double voxel, RunReport& report) const {
 Level LevelRunner::runAt(double voxel, double coarsening) {
   Graph sized = graph_;
   setVoxels(sized, parts_, voxel, coarsening);
-  PartGraph part = partGraph(
-      sized, joined(parts_.again, takenOf(graph_, parts_.once, parts_.again)), once_);
+  PartGraph part =
+      partGraph(sized, joined(parts_.again, takenOf(graph_, parts_.once, parts_.again)), once_);
   askFor(part, watched_);
   Level level;
   level.voxelSize = voxel * coarsening;
@@ -176,8 +176,7 @@ Level LevelRunner::runAt(double voxel, double coarsening) {
   return level;
 }
 
-LevelSurface LevelRunner::surfaceOf(std::size_t output,
-                                    const std::map<std::size_t, Value>& made,
+LevelSurface LevelRunner::surfaceOf(std::size_t output, const std::map<std::size_t, Value>& made,
                                     double voxel) const {
   const std::size_t node = parts_.outputs[output];
   const Value& value = made.at(node);
@@ -216,8 +215,7 @@ std::optional<double> LevelRunner::knownError(const Level& level, std::size_t ou
   if (exact == exact_.end()) return {};
   const LevelSurface& surface = level.surfaces[output];
   levelset::SurfaceDifferenceOptions options{.spacing = surface.voxelSize};
-  if (settings_.goesOn)
-    options.progress = [this](double) { return settings_.goesOn(); };
+  if (settings_.goesOn) options.progress = [this](double) { return settings_.goesOn(); };
   return levelset::surfaceDifference(surface.surface, exact->second, options).smooth;
 }
 
@@ -230,12 +228,11 @@ LevelDifference LevelRunner::difference(const Level& fine, const Level& coarse,
   const LevelSurface &near = fine.surfaces[output], &far = coarse.surfaces[output];
   levelset::SurfaceDifferenceOptions options{.spacing = near.voxelSize,
                                              .creaseReach = kCreaseReach * far.voxelSize};
-  if (settings_.goesOn)
-    options.progress = [this](double) { return settings_.goesOn(); };
+  if (settings_.goesOn) options.progress = [this](double) { return settings_.goesOn(); };
   const bool mayHaveCreases = hasCreases_ || near.heldEdge >= kFlatVoxels * far.voxelSize;
   if (mayHaveCreases && near.uniform.isValid() && far.uniform.isValid())
-    options.creases = levelset::findCreases(near.uniform.mesh(), near.voxelSize,
-                                            far.uniform.mesh(), far.voxelSize);
+    options.creases = levelset::findCreases(near.uniform.mesh(), near.voxelSize, far.uniform.mesh(),
+                                            far.voxelSize);
   const levelset::SurfaceDifference found =
       levelset::surfaceDifference(near.surface, far.surface, options);
   return {.smooth = found.smooth, .crease = found.crease, .creaseShare = found.creaseShare};

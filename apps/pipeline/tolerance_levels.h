@@ -15,8 +15,8 @@ namespace pipeline {
 struct LevelSurface {
   levelset::TriangleSurface surface = {};
   levelset::TriangleSurface uniform = {};  ///< of the level set that a mesh was made from, if any
-  double voxelSize = 0;               ///< of that level set, or of the result
-  double diagonal = 0;                ///< of its bounding box
+  double voxelSize = 0;                    ///< of that level set, or of the result
+  double diagonal = 0;                     ///< of its bounding box
   double heldEdge = 0;  ///< world units: how far from an edge meshes that it is made of are flat
 };
 
@@ -72,8 +72,7 @@ class LevelRunner {
  private:
   [[nodiscard]] PartGraph whole() const;
   [[nodiscard]] RunSettings settingsFor(const PartGraph& part) const;
-  [[nodiscard]] LevelSurface surfaceOf(std::size_t output,
-                                       const std::map<std::size_t, Value>& made,
+  [[nodiscard]] LevelSurface surfaceOf(std::size_t output, const std::map<std::size_t, Value>& made,
                                        double voxel) const;
 
   const Graph& graph_;
@@ -81,9 +80,9 @@ class LevelRunner {
   const RunSettings& settings_;
   std::vector<std::size_t> watched_;  ///< values that are looked at: outputs, what they came from
   std::map<std::size_t, Value> once_;
-  std::vector<std::size_t> meshes_;  ///< that level sets are made of
+  std::vector<std::size_t> meshes_;                         ///< that level sets are made of
   std::map<std::size_t, levelset::TriangleSurface> exact_;  ///< of those, where no voxel had a part
-  bool hasCreases_ = false;          ///< does an action make them, other than `level-set`?
+  bool hasCreases_ = false;  ///< does an action make them, other than `level-set`?
 };
 
 }  // namespace pipeline

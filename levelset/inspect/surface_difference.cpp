@@ -58,7 +58,8 @@ class SampleWalk {
   SampleWalk(const TriangleSurface& target, const eikonal::PointTree* creases, double reach)
       : target_(target), creases_(creases), reach_(reach) {}
 
-  void visit(const V3d& point) {
+  /// @return the distance; 0 beside a crease
+  double visit(const V3d& point) {
     const double limit =
         sums_.samples == 0 ? std::numeric_limits<double>::max() : last_ + (point - at_).length();
     last_ = target_.distance(point, limit);
@@ -67,9 +68,10 @@ class SampleWalk {
     if (creases_ && creases_->nearest(toVdb(point), reach_) != eikonal::PointTree::kNone) {
       sums_.crease = std::max(sums_.crease, last_);
       ++sums_.creaseSamples;
-    } else {
-      sums_.smooth = std::max(sums_.smooth, last_);
+      return 0;
     }
+    sums_.smooth = std::max(sums_.smooth, last_);
+    return last_;
   }
   [[nodiscard]] const DifferenceSums& sums() const { return sums_; }
 
@@ -82,47 +84,90 @@ class SampleWalk {
   DifferenceSums sums_;
 };
 
-void visitMiddles(const V3d& a, const V3d& b, const V3d& c, double spacing, SampleWalk& walk) {
-  const double longest = std::sqrt(std::max({(b - a).length2(), (c - b).length2(),
-                                             (a - c).length2()}));
+/// @return the largest distance
+double visitMiddles(const V3d& a, const V3d& b, const V3d& c, double spacing, SampleWalk& walk) {
+  const double longest =
+      std::sqrt(std::max({(b - a).length2(), (c - b).length2(), (a - c).length2()}));
   const int parts = static_cast<int>(std::clamp(std::ceil(longest / spacing), 1.0, kMostParts));
   const V3d u = (b - a) / parts, v = (c - a) / parts;
+  double largest = 0;
   for (int i = 0; i < parts; ++i)
     for (int j = 0; i + j < parts; ++j) {
-      walk.visit(a + u * (i + 1 / 3.0) + v * (j + 1 / 3.0));
-      if (i + j + 1 < parts) walk.visit(a + u * (i + 2 / 3.0) + v * (j + 2 / 3.0));
+      largest = std::max(largest, walk.visit(a + u * (i + 1 / 3.0) + v * (j + 1 / 3.0)));
+      if (i + j + 1 < parts)
+        largest = std::max(largest, walk.visit(a + u * (i + 2 / 3.0) + v * (j + 2 / 3.0)));
     }
+  return largest;
 }
 
-DifferenceSums differenceTo(const TriangleSurface& target, const TriangleSurface& surface,
-                            const eikonal::PointTree* creases,
-                            const SurfaceDifferenceOptions& options, const Progress& progress) {
-  const TriMesh& mesh = surface.mesh();
-  const std::size_t vertexChunks = (mesh.positions.size() + kDifferenceChunk - 1) / kDifferenceChunk;
-  const std::size_t chunks =
-      vertexChunks + (mesh.triangles.size() + kDifferenceChunk - 1) / kDifferenceChunk;
+/// Calls work(i, walk) for each i below `count`, in parallel, and adds up what is found.
+template <typename Work>
+DifferenceSums walkAll(std::size_t count, const SampleWalk& fresh, const Progress& progress,
+                       const Work& work) {
+  const std::size_t chunks = (count + kDifferenceChunk - 1) / kDifferenceChunk;
   std::vector<DifferenceSums> parts(chunks);
-  ProgressGate gate(progress, chunks, "tolerance");
+  ProgressGate gate(progress, std::max<std::size_t>(1, chunks), "tolerance");
   tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
-    SampleWalk walk(target, creases, options.creaseReach);
-    if (chunk < vertexChunks) {
-      const std::size_t first = chunk * kDifferenceChunk;
-      const std::size_t end = std::min(mesh.positions.size(), first + kDifferenceChunk);
-      for (std::size_t i = first; i < end; ++i) walk.visit(mesh.positions[i]);
-    } else {
-      const std::size_t first = (chunk - vertexChunks) * kDifferenceChunk;
-      const std::size_t end = std::min(mesh.triangles.size(), first + kDifferenceChunk);
-      for (std::size_t i = first; i < end; ++i) {
-        const auto& [a, b, c] = mesh.triangles[i];
-        visitMiddles(mesh.positions[a], mesh.positions[b], mesh.positions[c], options.spacing,
-                     walk);
-      }
-    }
+    SampleWalk walk = fresh;
+    const std::size_t end = std::min(count, (chunk + 1) * kDifferenceChunk);
+    for (std::size_t i = chunk * kDifferenceChunk; i < end; ++i) work(i, walk);
     parts[chunk] = walk.sums();
     gate.advance(1);
   });
   DifferenceSums sums;
   for (const DifferenceSums& part : parts) sums.add(part);
+  return sums;
+}
+
+/// The triangles with the largest distances, of those that come near to the largest of all.
+std::vector<std::uint32_t> farthest(const std::vector<float>& distances, double largest) {
+  constexpr double kNear = 0.75;
+  constexpr std::size_t kMost = 4096;
+  std::vector<std::uint32_t> numbers;
+  for (std::size_t i = 0; i < distances.size(); ++i)
+    if (distances[i] > 0 && distances[i] >= kNear * largest)
+      numbers.push_back(static_cast<std::uint32_t>(i));
+  if (numbers.size() > kMost) {
+    std::nth_element(numbers.begin(), numbers.begin() + kMost, numbers.end(),
+                     [&](std::uint32_t a, std::uint32_t b) {
+                       return distances[a] > distances[b] ||
+                              (distances[a] == distances[b] && a < b);
+                     });
+    numbers.resize(kMost);
+    std::sort(numbers.begin(), numbers.end());
+  }
+  return numbers;
+}
+
+/// Everywhere at the spacing that was asked for, and where distances are largest four times as
+/// densely, so that the largest is not missed by more than a hundredth or so.
+DifferenceSums differenceTo(const TriangleSurface& target, const TriangleSurface& surface,
+                            const eikonal::PointTree* creases,
+                            const SurfaceDifferenceOptions& options, const Progress& progress) {
+  constexpr double kDenser = 4;
+  const TriMesh& mesh = surface.mesh();
+  const SampleWalk fresh(target, creases, options.creaseReach);
+  std::vector<float> atVertices(mesh.positions.size()), ofTriangles(mesh.triangles.size());
+  DifferenceSums sums = walkAll(mesh.positions.size(), fresh, subProgress(progress, 0, 0.3),
+                                [&](std::size_t i, SampleWalk& walk) {
+                                  atVertices[i] = static_cast<float>(walk.visit(mesh.positions[i]));
+                                });
+  const auto visit = [&](std::size_t i, double spacing, SampleWalk& walk) {
+    const auto& [a, b, c] = mesh.triangles[i];
+    return visitMiddles(mesh.positions[a], mesh.positions[b], mesh.positions[c], spacing, walk);
+  };
+  sums.add(walkAll(mesh.triangles.size(), fresh, subProgress(progress, 0.3, 0.9),
+                   [&](std::size_t i, SampleWalk& walk) {
+                     const auto& [a, b, c] = mesh.triangles[i];
+                     ofTriangles[i] = std::max({static_cast<float>(visit(i, options.spacing, walk)),
+                                                atVertices[a], atVertices[b], atVertices[c]});
+                   }));
+  const std::vector<std::uint32_t> dense = farthest(ofTriangles, sums.smooth);
+  const DifferenceSums again = walkAll(
+      dense.size(), fresh, subProgress(progress, 0.9, 1),
+      [&](std::size_t i, SampleWalk& walk) { visit(dense[i], options.spacing / kDenser, walk); });
+  sums.smooth = std::max(sums.smooth, again.smooth);
+  sums.crease = std::max(sums.crease, again.crease);
   return sums;
 }
 
@@ -220,10 +265,10 @@ SurfaceDifference surfaceDifference(const TriangleSurface& a, const TriangleSurf
   const eikonal::PointTree* near = points.empty() ? nullptr : &creases;
   DifferenceSums sums = differenceTo(b, a, near, options, subProgress(options.progress, 0, 0.5));
   sums.add(differenceTo(a, b, near, options, subProgress(options.progress, 0.5, 1)));
-  return {.smooth = sums.smooth,
-          .crease = sums.crease,
-          .creaseShare =
-              static_cast<double>(sums.creaseSamples) / static_cast<double>(sums.samples)};
+  return {
+      .smooth = sums.smooth,
+      .crease = sums.crease,
+      .creaseShare = static_cast<double>(sums.creaseSamples) / static_cast<double>(sums.samples)};
 }
 
 std::vector<V3d> findCreases(const TriMesh& fine, double fineVoxel, const TriMesh& coarse,
@@ -277,9 +322,9 @@ double flatBesideEdges(const TriMesh& mesh) {
     const V3d a = areaVector(sides[i].triangle), b = areaVector(sides[i + 1].triangle);
     const double areas = a.length() * b.length();
     if (!(areas > 0) || a.dot(b) > areas * std::numbers::sqrt2 / 2) continue;
-    const double length = (mesh.positions[sides[i].edge >> 32] -
-                           mesh.positions[sides[i].edge & 0xffffffffu])
-                              .length();
+    const double length =
+        (mesh.positions[sides[i].edge >> 32] - mesh.positions[sides[i].edge & 0xffffffffu])
+            .length();
     widest = std::max(widest, std::min(a.length(), b.length()) / length);
   }
   return widest;
