@@ -7,7 +7,9 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
+#include <utility>
 
 #include "apps/pipeline/error_model.h"
 #include "apps/pipeline/graph_file.h"
@@ -176,7 +178,8 @@ class ToleranceRun {
         output.isMeasured = true;
         output.achieved = *known;
       }
-      if (!output.isReached()) open.push_back(i);
+      const bool canFall = output.isMeasured && measuredFalls(voxel, output.achieved, i);
+      if (!output.isReached() && !canFall) open.push_back(i);
     }
     if (!open.empty()) extrapolate(voxel, open, trial);
     trial.finest = std::numeric_limits<double>::max();
@@ -193,6 +196,30 @@ class ToleranceRun {
     trial.level.peakBytes = std::max(trial.level.peakBytes, apps::peakResidentBytes());
     trial.level.surfaces.clear();  // what is kept is the result
     return trial;
+  }
+
+  /// Does what is measured fall with the voxels? It does not where the mesh has parts inside of the
+  /// solid, or creases that are finer than the tolerance: estimates have to tell then.
+  bool measuredFalls(double voxel, double error, std::size_t output) {
+    const auto last = measured_.find(output);
+    if (last != measured_.end() && voxel < last->second.voxel) {
+      const double slowest = std::sqrt(voxel / last->second.voxel);
+      if (error > slowest * last->second.error) believesMeasured_ = false;
+    }
+    measured_[output] = {voxel, error};
+    return believesMeasured_;
+  }
+
+  /// What is measured counts no more where it is not small enough, and the best voxel size is tried
+  /// again. @return false where that is so already
+  bool turnToEstimates(double& voxel) {
+    const auto& outputs = best_->outputs;
+    const bool rests = std::any_of(outputs.begin(), outputs.end(), [](const ToleranceOutput& o) {
+      return o.isMeasured && !o.isReached();
+    });
+    if (!rests || !std::exchange(believesMeasured_, false)) return false;
+    voxel = best_->level.voxelSize;
+    return true;
   }
 
   /// Richardson: from runs with voxels twice and four times as large.
@@ -284,6 +311,7 @@ class ToleranceRun {
           continue;
         }
         told_.limit = told_.rounds.back().failure;
+        if (turnToEstimates(voxel)) continue;
         if (best_->ratio <= 1 || ++refusals > 2) return;
         voxel = rounded(std::sqrt(voxel * best_->level.voxelSize));
         if (voxel > 0.9 * best_->level.voxelSize) return;
@@ -308,6 +336,7 @@ class ToleranceRun {
         if (ratio <= 1) return;
         // As fine as memory allows, if that is worth a run.
         if (least > 0.85 * voxel) {
+          if (turnToEstimates(voxel)) continue;
           told_.limit = memorySentence(voxel * std::pow(kAim / ratio, 1 / order));
           return;
         }
@@ -428,6 +457,11 @@ class ToleranceRun {
   std::optional<double> reaching_, failing_;  ///< the coarsest that do, the finest that do not
   std::exception_ptr refusal_;
   int stalled_ = 0;
+  struct Measured {
+    double voxel = 0, error = 0;
+  };
+  std::map<std::size_t, Measured> measured_;  ///< by output
+  bool believesMeasured_ = true;
 };
 
 }  // namespace

@@ -121,11 +121,11 @@ DifferenceSums walkAll(std::size_t count, const SampleWalk& fresh, const Progres
 
 /// The triangles with the largest distances, of those that come near to the largest of all.
 std::vector<std::uint32_t> farthest(const std::vector<float>& distances, double largest) {
-  constexpr double kNear = 0.75;
+  constexpr double kLargePart = 0.75;
   constexpr std::size_t kMost = 4096;
   std::vector<std::uint32_t> numbers;
   for (std::size_t i = 0; i < distances.size(); ++i)
-    if (distances[i] > 0 && distances[i] >= kNear * largest)
+    if (distances[i] > 0 && distances[i] >= kLargePart * largest)
       numbers.push_back(static_cast<std::uint32_t>(i));
   if (numbers.size() > kMost) {
     std::nth_element(numbers.begin(), numbers.begin() + kMost, numbers.end(),
@@ -274,9 +274,10 @@ SurfaceDifference surfaceDifference(const TriangleSurface& a, const TriangleSurf
 std::vector<V3d> findCreases(const TriMesh& fine, double fineVoxel, const TriMesh& coarse,
                              double coarseVoxel) {
   // What two planes at 45 degrees leave beside the triangles that the mesh cuts their edge with.
-  constexpr double kLeastTurn = 38 * std::numbers::pi / 180;
-  // Half of a bend that is resolved is left; of an edge all, but for how it meets the grid.
-  constexpr float kLeastKept = 0.75f, kMostKept = 1.35f;
+  constexpr double kLeastTurn = 30 * std::numbers::pi / 180;
+  // A bend that is resolved turns twice as much in the coarse mesh, an edge as it happens to meet the
+  // grid: from 0.7 times to 1.2 times as much.
+  constexpr float kLeastKept = 0.5f, kMostKept = 1.35f;
   const std::vector<float> fineTurns = turnsOf(fine), coarseTurns = turnsOf(coarse);
   const double cell = 2 * std::max(fineVoxel, coarseVoxel);
   TurnGrid fineGrid(cell), coarseGrid(cell);

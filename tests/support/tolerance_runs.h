@@ -11,6 +11,7 @@
 #include "apps/pipeline/tolerance.h"
 #include "levelset/error.h"
 #include "levelset/files/mesh_file.h"
+#include "levelset/inspect/surface_difference.h"
 #include "tests/support/files.h"
 
 namespace support {

@@ -157,16 +157,25 @@ TEST(Tolerance, TellsCreasesApart) {
   EXPECT_GT(pair.output().crease, 0);
 }
 
-TEST(Tolerance, MeshesOfBoxesHaveCreasesToo) {
+TEST(Tolerance, OfAMeshIsMeasuredAgainstIt) {
   const support::TemporaryFolder folder;
   const std::string file = (folder / "cube.off").string();
   support::writeText(file,
                      "OFF\n8 6 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
                      "4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
-  const support::ToleranceRun cube =
-      runToTolerance("0.002", "read " + file + " ! level-set ! mesh");
-  ASSERT_EQ(cube.exitCode, 0) << cube.refusal;
-  EXPECT_GT(cube.output().crease, 0);
+  const std::string chain = "read " + file + " ! level-set ! mesh";
+  // Its edges included, as far as memory goes.
+  const support::ToleranceRun whole = runToTolerance("0.01", chain);
+  ASSERT_EQ(whole.exitCode, 0) << whole.refusal;
+  EXPECT_TRUE(whole.output().isMeasured);
+  EXPECT_LE(support::differenceOf(whole.mesh, levelset::readMesh(file), whole.told().voxelSize / 2),
+            0.01);
+  pipeline::RunSettings settings;
+  settings.maxMemory = std::size_t{180} << 20;
+  const support::ToleranceRun flat = runToTolerance("0.0005", chain, settings);
+  EXPECT_EQ(flat.exitCode, 0) << flat.refusal;
+  EXPECT_FALSE(flat.output().isMeasured);
+  EXPECT_GT(flat.output().crease, 0.0005);
 }
 
 TEST(Tolerance, CountsWhatDecimationAdds) {
