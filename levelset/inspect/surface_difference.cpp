@@ -275,8 +275,8 @@ std::vector<V3d> findCreases(const TriMesh& fine, double fineVoxel, const TriMes
                              double coarseVoxel) {
   // What two planes at 45 degrees leave beside the triangles that the mesh cuts their edge with.
   constexpr double kLeastTurn = 30 * std::numbers::pi / 180;
-  // A bend that is resolved turns twice as much in the coarse mesh, an edge as it happens to meet the
-  // grid: from 0.7 times to 1.2 times as much.
+  // A bend that is resolved turns twice as much in the coarse mesh, an edge as it happens to meet
+  // the grid: from 0.7 times to 1.2 times as much.
   constexpr float kLeastKept = 0.5f, kMostKept = 1.35f;
   const std::vector<float> fineTurns = turnsOf(fine), coarseTurns = turnsOf(coarse);
   const double cell = 2 * std::max(fineVoxel, coarseVoxel);

@@ -4,6 +4,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <chrono>
 #include <functional>
 #include <string>
@@ -42,11 +43,17 @@ Row exact(const std::string& name, const std::string& chain, const support::Exac
           }};
 }
 
+/// The mesh itself, or a finer run where that is nearer: a mesh may have parts inside of the solid.
 Row model(const std::string& name, const std::string& file) {
-  return {name, "read " + file + " ! level-set ! mesh",
-          [=](const levelset::TriMesh& result, double voxel) {
-            return support::differenceOf(result, levelset::readMesh(file), voxel);
-          }};
+  Row row = finer(name, "read " + file + " ! level-set HERE ! mesh");
+  row.truth = [finer = row.truth, file](const levelset::TriMesh& result, double voxel) {
+    const double error = support::differenceOf(result, levelset::readMesh(file), voxel / 2);
+    // Farther than half a percent: something inside that is no surface of the solid, or all is.
+    return error < 0.005 * levelset::bounds(result).size().length()
+               ? error
+               : std::min(error, finer(result, voxel));
+  };
+  return row;
 }
 
 }  // namespace
@@ -69,6 +76,8 @@ int main(int count, char** words) {
              "requested", "estimate", "true", "voxel", "rounds", "true/rq", "seconds");
   for (const Row& row : rows)
     for (const char* asked : {"2%", "0.5%", "0.1%"}) {
+      // A run with voxels of a quarter takes more memory than most machines have.
+      if (row.name.starts_with("dragon") && std::string(asked) != "2%") continue;
       const auto start = std::chrono::steady_clock::now();
       const support::ToleranceRun run = support::runToTolerance(asked, row.chain);
       const double seconds =
