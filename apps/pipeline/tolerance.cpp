@@ -327,7 +327,8 @@ class ToleranceRun {
       const double order = trial->order, ratio = trial->ratio;
       keepBest(std::move(*trial));
       if (!next || refusals > 2) return;
-      if (stalls && ++stalled_ > 1) {
+      // Once is a matter of chance, unless there is a reason.
+      if (stalls && (++stalled_ > 1 || !parts_.fixed.empty())) {
         told_.limit = stallSentence();
         return;
       }
