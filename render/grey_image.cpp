@@ -7,6 +7,7 @@
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <memory>
 #include <string>
 
@@ -79,6 +80,35 @@ double sampleAt(const png_byte* row, std::size_t index, bool isDeep) {
 
 }  // namespace
 
+void requirePngChunks(const std::filesystem::path& path) {
+  std::error_code failed;
+  const std::uintmax_t size = std::filesystem::file_size(path, failed);
+  if (failed) return;  // a pipe, which is read once only
+  std::ifstream in(path, std::ios::binary);
+  constexpr std::uintmax_t kSignature = 8, kAround = 12;  // a length, a type and a checksum
+  for (std::uintmax_t at = kSignature; at + kAround <= size;) {
+    unsigned char length[4] = {};
+    in.seekg(static_cast<std::streamoff>(at));
+    in.read(reinterpret_cast<char*>(length), sizeof length);
+    const std::uintmax_t bytes = static_cast<std::uintmax_t>(length[0]) << 24 |
+                                 static_cast<std::uintmax_t>(length[1]) << 16 |
+                                 static_cast<std::uintmax_t>(length[2]) << 8 | length[3];
+    if (!in || bytes > size - at - kAround)
+      refuseDamaged(path.string(), fmt::format("it is cut off behind byte {}", at));
+    at += kAround + bytes;
+  }
+}
+
+void requirePngPixels(const std::filesystem::path& path, double width, double height) {
+  constexpr double kMostPerByte = 8 * 1040;  // deflate packs 1032 to 1 at best, pixels of one bit
+  std::error_code failed;
+  const auto bytes = static_cast<double>(std::filesystem::file_size(path, failed));
+  if (failed || width * height <= bytes * kMostPerByte) return;
+  throw InvalidInput(
+      fmt::format("{}: {} promises {}x{} pixels, more than its {} bytes can hold; copy it again",
+                  kReadGrey, path.string(), width, height, bytes));
+}
+
 GreyImage readGreyPng(const std::filesystem::path& path, std::size_t maxMemory) {
   const std::string name = path.string();
   std::error_code ignored;
@@ -92,6 +122,7 @@ GreyImage readGreyPng(const std::filesystem::path& path, std::size_t maxMemory) 
   PngReader reader;
   if (!reader.png || !reader.info)
     throw levelset::ResourceLimit(fmt::format("{}: no memory to begin with {}", kReadGrey, name));
+  requirePngChunks(path);
   if (!reader.readHeader(file.get())) refuseDamaged(name, reader.error);
   const auto width = static_cast<std::size_t>(png_get_image_width(reader.png, reader.info)),
              height = static_cast<std::size_t>(png_get_image_height(reader.png, reader.info));
@@ -99,6 +130,7 @@ GreyImage readGreyPng(const std::filesystem::path& path, std::size_t maxMemory) 
     throw InvalidInput(fmt::format(
         "{}: {} has colours, of which none tells a height; convert it to grey", kReadGrey, name));
   }
+  requirePngPixels(path, static_cast<double>(width), static_cast<double>(height));
   if (!reader.prepare()) refuseDamaged(name, reader.error);
   const std::size_t rowBytes = png_get_rowbytes(reader.png, reader.info);
   levelset::requireMemory(

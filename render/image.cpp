@@ -23,6 +23,7 @@
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "render/camera.h"
+#include "render/exr_header.h"
 
 namespace render {
 namespace {
@@ -156,30 +157,16 @@ std::vector<char> encodePng(int width, int height, const std::vector<std::uint8_
 
 // === Reading
 
-/// ZIP packs about 1000 to 1 at best; a header that promises far more than the file holds is
-/// damaged.
-constexpr double kMaxCompression = 5000;
-
-Image readOpenExr(Imf::InputFile& file, const std::string& name, double fileBytes) {
+Image readOpenExr(Imf::InputFile& file, const std::string& name, std::size_t maxMemory) {
   const Imf::Header& header = file.header();
   const Imath::Box2i window = header.dataWindow();
-  const double width = static_cast<double>(window.max.x) - window.min.x + 1;
-  const double height = static_cast<double>(window.max.y) - window.min.y + 1;
-  if (!(width * height <= kMaxPixels)) {
-    throw levelset::ResourceLimit(
-        fmt::format("read image: {} has {:.0f}x{:.0f} pixels, which "
-                    "passes the limit of {:.0f} pixels",
-                    name, width, height, kMaxPixels));
-  }
+  // checkExrHeader() has seen to it that these are small enough.
+  const int width = window.max.x - window.min.x + 1, height = window.max.y - window.min.y + 1;
   double channelCount = 0;
   for (auto it = header.channels().begin(); it != header.channels().end(); ++it) ++channelCount;
-  if (width * height * channelCount * 2 > fileBytes * kMaxCompression) {
-    throw InvalidInput(
-        fmt::format("read image: {} promises {:.0f}x{:.0f} pixels in {:.0f} channels, "
-                    "more than its {:.0f} bytes can hold; copy it again",
-                    name, width, height, channelCount, fileBytes));
-  }
-  Image image(static_cast<int>(width), static_cast<int>(height));
+  levelset::requireMemory(static_cast<double>(width) * height * channelCount * sizeof(float),
+                          maxMemory, "read image");
+  Image image(width, height);
   Imf::FrameBuffer frame;
   for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
     const Imf::Channel& channel = it.channel();
@@ -279,7 +266,7 @@ void writeImage(const std::filesystem::path& path, const Image& image, const std
   writeBytes(path, bytes);
 }
 
-Image readExr(const std::filesystem::path& path) {
+Image readExr(const std::filesystem::path& path, std::size_t maxMemory) {
   const std::string name = path.string();
   std::error_code ignored;
   errno = 0;
@@ -290,8 +277,9 @@ Image readExr(const std::filesystem::path& path) {
                               probe ? "is a folder" : std::strerror(errno)));
   }
   try {
+    checkExrHeader(path);
     Imf::InputFile file(name.c_str(), 0);
-    return readOpenExr(file, name, static_cast<double>(std::filesystem::file_size(path)));
+    return readOpenExr(file, name, maxMemory);
   } catch (const levelset::Error&) {
     throw;
   } catch (const std::bad_alloc&) {

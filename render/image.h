@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "levelset/progress.h"
+
 /// Images with named channels, written as EXR (all channels) or PNG (R G B A through a tone curve).
 /// Colour is linear with premultiplied alpha, as OpenEXR has it.
 namespace render {
@@ -57,7 +59,8 @@ void writePng(const std::filesystem::path& path, int width, int height,
 /// Reads channels of 16 or 32 bits of the first part, string and M44f attributes.
 /// @throws levelset::IoError when the file cannot be opened
 /// @throws levelset::InvalidInput when it is no EXR, damaged, or subsampled
-/// @throws levelset::ResourceLimit for more than 2^28 pixels
-[[nodiscard]] Image readExr(const std::filesystem::path& path);
+/// @throws levelset::ResourceLimit for more than 2^28 pixels, or what passes `maxMemory`
+[[nodiscard]] Image readExr(const std::filesystem::path& path,
+                            std::size_t maxMemory = levelset::kNoMemoryLimit);
 
 }  // namespace render

@@ -15,6 +15,7 @@
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
+#include "levelset/files/json_depth.h"
 #include "levelset/files/mesh_file.h"
 #include "levelset/solids/transform.h"
 #include "render/field_expression.h"
@@ -239,6 +240,7 @@ Json documentOf(const std::filesystem::path& file) {
   if (!stream)
     throw levelset::IoError(
         fmt::format("read: {} cannot be read; check its name and permissions", file.string()));
+  if (levelset::isJsonTooDeep(text)) return Json(Json::value_t::discarded);
   return Json::parse(text, nullptr, /*allow_exceptions=*/false);
 }
 
@@ -291,6 +293,13 @@ void readSolid(const Reader& reader, const Json& json, const std::filesystem::pa
   scene.solids.push_back(std::move(solid));
 }
 
+std::size_t bytesOf(const levelset::TriMesh& mesh) {
+  const levelset::MeshAttributes& more = mesh.attributes;
+  return mesh.positions.size() * sizeof(mesh.positions[0]) +
+         mesh.triangles.size() * sizeof(mesh.triangles[0]) + more.normals.size() * sizeof(V3d) +
+         more.uvs.size() * sizeof(more.uvs[0]) + more.colors.size() * sizeof(more.colors[0]);
+}
+
 void readMeshPart(const Reader& reader, const Json& json, const std::filesystem::path& file,
                   const ReadSceneOptions& options, const levelset::Progress& progress,
                   Scene& scene) {
@@ -299,7 +308,7 @@ void readMeshPart(const Reader& reader, const Json& json, const std::filesystem:
   MeshPart part;
   reader.readPart(json, scene.solids.size() + scene.meshes.size() + 1, where, part);
   levelset::TriMesh mesh = levelset::readMesh(
-      file.parent_path() / reader.text(json, "file", where),
+      reader.partFile(json, file, where),
       {.attributes = true, .maxMemory = options.maxMemory, .progress = progress});
   if (json.contains("transform"))
     mesh = reader.told(
@@ -411,8 +420,19 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   if (!solids.is_array() || !meshes.is_array() || (solids.empty() && meshes.empty()))
     reader.refuse(whole, "has no solids and no meshes");
   Parts parts(options.progress, solids.size() + meshes.size());
-  for (const Json& entry : solids) readSolid(reader, entry, file, options, parts.next(), scene);
-  for (const Json& entry : meshes) readMeshPart(reader, entry, file, options, parts.next(), scene);
+  ReadSceneOptions rest = options;  // the limit is of all parts together
+  rest.maxMemory = levelset::memoryLimit(options.maxMemory);
+  const auto spend = [&rest](std::size_t bytes) {
+    rest.maxMemory -= std::min(rest.maxMemory, bytes);
+  };
+  for (const Json& entry : solids) {
+    readSolid(reader, entry, file, rest, parts.next(), scene);
+    spend(scene.solids.back().band.memoryUse());
+  }
+  for (const Json& entry : meshes) {
+    readMeshPart(reader, entry, file, rest, parts.next(), scene);
+    spend(bytesOf(*scene.meshes.back().mesh));
+  }
   reader.told(whole, [&] { requireNames(scene); });
   std::set<std::uint32_t> ids;
   const auto isNew = [&](const auto& part) { return ids.insert(part.id).second; };

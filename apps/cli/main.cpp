@@ -21,6 +21,7 @@
 #include "apps/pipeline/refusal.h"
 #include "apps/pipeline/report.h"
 #include "apps/pipeline/runner.h"
+#include "apps/pipeline/tolerance.h"
 #include "apps/pipeline/units.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
@@ -168,10 +169,18 @@ int runGraph(const pipeline::Graph& graph) {
     if (verbose || dryRun)
       for (const pipeline::StepReport& step : report.steps)
         fmt::print(stderr, "{}\n", pipeline::stepLine(step, dryRun));
+    if (report.tolerance && (verbose || dryRun))
+      for (const std::string& told : pipeline::toleranceLines(*report.tolerance))
+        fmt::print(stderr, "{}\n", told);
     if (globals.contains("report")) pipeline::writeReport(globals.at("report"), report);
   };
   try {
-    arena.execute([&] { pipeline::run(graph, settings, report); });
+    arena.execute([&] {
+      if (globals.contains("tolerance"))
+        pipeline::runToTolerance(graph, settings, report);
+      else
+        pipeline::run(graph, settings, report);
+    });
   } catch (const std::exception&) {
     // What went wrong first is what the user must hear.
     try {

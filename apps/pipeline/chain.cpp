@@ -183,7 +183,9 @@ Action readAction(Reader& reader) {
 /// Follows values through the chain: they live on a stack, and by name for good.
 class ChainBuilder {
  public:
-  explicit ChainBuilder(std::vector<Node>& nodes) : nodes_(nodes) {}
+  /// @param voxelsFollow  do voxel sizes that are left out follow from --tolerance?
+  ChainBuilder(std::vector<Node>& nodes, bool voxelsFollow)
+      : nodes_(nodes), voxelsFollow_(voxelsFollow) {}
 
   void add(const Action& action) {
     Node node;
@@ -195,6 +197,7 @@ class ChainBuilder {
     for (const auto& [option, text] : action.options)
       if (const Param* param = action.op->find(option); param && namesValue(*param, text))
         node.named.emplace(option, nodeOf(text.substr(1), *action.op));
+    if (voxelsFollow_) leaveVoxelOpen(node);
     node.kind = checkNode(node, nodes_);
     if (node.makes()) {
       stack_.push_back(nodes_.size());
@@ -237,6 +240,7 @@ class ChainBuilder {
   }
 
   std::vector<Node>& nodes_;
+  bool voxelsFollow_;
   std::vector<std::size_t> stack_;
   std::map<std::string, std::size_t> names_;
 };
@@ -272,7 +276,8 @@ void checkStandardStreams(const Graph& graph, bool isScriptFromInput) {
 
 namespace {
 
-Graph parse(Reader& reader, bool mayRun);
+/// @param outer  global options that stand before the `run` of these words, and win
+Graph parse(Reader& reader, bool mayRun, const std::map<std::string, std::string>& outer);
 
 /// What stands behind `run`.
 struct ScriptCall {
@@ -307,10 +312,10 @@ ScriptCall readCall(Reader& reader) {
   return call;
 }
 
-Graph parseLines(const Script& script) {
+Graph parseLines(const Script& script, const std::map<std::string, std::string>& outer) {
   Reader reader{script.words, &script};
   try {
-    return parse(reader, false);
+    return parse(reader, false, outer);
   } catch (const UsageError& error) {
     // The reader stands behind the action that failed.
     const std::size_t word = std::min(reader.next, script.words.size());
@@ -325,17 +330,14 @@ Graph parseFile(Reader& reader, const Graph& before) {
     if (!call.settings.empty())
       throw UsageError(
           fmt::format("run: --set says nothing to '{}'; a graph has no variables", call.file));
-    Graph graph = readGraph(call.file);
-    graph.globals = before.globals;
-    return graph;
+    return readGraph(call.file, before.globals);
   }
-  Graph graph = parseLines(readScript(call.file, call.settings));
-  for (const auto& [name, value] : before.globals) graph.globals[name] = value;
+  Graph graph = parseLines(readScript(call.file, call.settings), before.globals);
   reader.isStandardInput = call.file == "-";
   return graph;
 }
 
-Graph parse(Reader& reader, bool mayRun) {
+Graph parse(Reader& reader, bool mayRun, const std::map<std::string, std::string>& outer) {
   const std::vector<std::string>& tokens = reader.tokens;
   Graph graph;
   while (!reader.atEnd() && isOption(tokens[reader.next]))
@@ -344,7 +346,8 @@ Graph parse(Reader& reader, bool mayRun) {
     if (mayRun) return parseFile(reader, graph);
     throw UsageError("run: a file of actions cannot run another one; put its actions here");
   }
-  ChainBuilder builder(graph.nodes);
+  for (const auto& [name, value] : outer) graph.globals[name] = value;
+  ChainBuilder builder(graph.nodes, graph.globals.contains("tolerance"));
   while (!reader.atEnd()) {
     if (reader.atBang()) {
       throw UsageError(
@@ -370,13 +373,13 @@ Graph parse(Reader& reader, bool mayRun) {
 
 Graph parseChain(const std::vector<std::string>& tokens) {
   Reader reader{tokens};
-  Graph graph = parse(reader, true);
+  Graph graph = parse(reader, true, {});
   checkStandardStreams(graph, reader.isStandardInput);
   return graph;
 }
 
 Graph parseScript(const Script& script) {
-  Graph graph = parseLines(script);
+  Graph graph = parseLines(script, {});
   checkStandardStreams(graph, false);
   return graph;
 }

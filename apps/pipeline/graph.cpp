@@ -76,11 +76,18 @@ const Operator& givenOperator() {
   return op;
 }
 
+void leaveVoxelOpen(Node& node) {
+  const bool canBeTold = node.op->find("voxel") && node.op->find("resolution");
+  node.voxelFollows =
+      canBeTold && !node.options.contains("voxel") && !node.options.contains("resolution");
+}
+
 Kind checkNode(const Node& node, const std::vector<Node>& before) {
   const Operator& op = *node.op;
   checkOperands(node, before);
   checkNamed(node, before);
   Invocation probe(op, node.options);
+  probe.voxelFollows = node.voxelFollows;
   for (const std::size_t input : node.inputs)
     probe.operands.emplace_back(Plan{.kind = before[input].kind});
   if (op.validate) op.validate(probe);

@@ -18,6 +18,7 @@ struct Node {
   std::string name;                            ///< --as; empty: none
   Kind kind = Kind::Band;                      ///< of its result, if it makes one
   std::string place;                           ///< where it was written, if in a script
+  bool voxelFollows = false;  ///< --tolerance is to tell the voxel size that it was not given
 
   [[nodiscard]] bool makes() const { return op->flow == Flow::Makes; }
 };
@@ -39,6 +40,10 @@ struct Graph {
 /// not
 ///         take, and as Operator::validate
 [[nodiscard]] Kind checkNode(const Node& node, const std::vector<Node>& before);
+
+/// Leaves the voxel size of a node open, for --tolerance to tell: of one that needs it and gives
+/// none. Before checkNode().
+void leaveVoxelOpen(Node& node);
 
 /// By node: is it needed for the results that are asked for, or for what the graph does outside
 /// itself, that is for what it writes, draws, prints or checks? Where there is nothing of either

@@ -2,11 +2,13 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "apps/pipeline/text_file.h"
 #include "levelset/error.h"
+#include "levelset/files/json_depth.h"
 
 namespace pipeline {
 namespace {
@@ -16,8 +18,9 @@ using levelset::InvalidInput;
 using levelset::UsageError;
 
 constexpr const char* kFormat = "levelsmith graph";
+constexpr const char* kTolerance = "tolerance";
 constexpr int kVersion = 1;
-constexpr std::size_t kMostBytes = 1 << 26;
+constexpr std::size_t kMostBytes = 1 << 25;
 
 Json toJson(const Node& node) {
   Json json = {{"op", node.op->name}};
@@ -38,7 +41,10 @@ Json toJson(const Node& node) {
 /// Reads nodes one by one, and says which one it is about.
 class GraphReader {
  public:
-  GraphReader(const Json& nodes, std::string file) : all_(nodes), file_(std::move(file)) {}
+  GraphReader(const Json& nodes, std::string file, std::map<std::string, std::string> globals)
+      : all_(nodes), file_(std::move(file)) {
+    graph_.globals = std::move(globals);
+  }
 
   Graph read() {
     for (at_ = 0; at_ < all_.size(); ++at_) {
@@ -69,12 +75,16 @@ class GraphReader {
       throw UsageError(
           fmt::format("run: there is no action '{}'; `levelsmith help` lists them", op));
     readOptions(json, node);
-    for (const Json& input : listOf(json, "inputs")) node.inputs.push_back(numberOf(input));
+    if (json.contains("inputs")) {
+      if (!json["inputs"].is_array()) refuse("'inputs' is no list");
+      for (const Json& input : json["inputs"]) node.inputs.push_back(numberOf(input));
+    }
     readNamed(json, node);
     for (const Param& param : node.op->params)
       if (param.required && !node.options.contains(param.name))
         throw UsageError(fmt::format("{}: needs {} {}", op, param.name, valueForm(param)));
     if (json.contains("as")) setName(textOf(json, "as"), node);
+    if (graph_.globals.contains(kTolerance)) leaveVoxelOpen(node);
     node.kind = checkNode(node, graph_.nodes);
     graph_.nodes.push_back(std::move(node));
   }
@@ -143,11 +153,6 @@ class GraphReader {
     if (!json.contains(key) || !json[key].is_string()) refuse(fmt::format("has no text '{}'", key));
     return json[key].get<std::string>();
   }
-  [[nodiscard]] Json listOf(const Json& json, const char* key) const {
-    if (!json.contains(key)) return Json::array();
-    if (!json[key].is_array()) refuse(fmt::format("'{}' is no list", key));
-    return json[key];
-  }
   /// Of a node before this one, that makes a value.
   [[nodiscard]] std::size_t numberOf(const Json& json) const {
     if (!json.is_number_unsigned() || json.get<std::uint64_t>() >= at_)
@@ -167,16 +172,31 @@ class GraphReader {
   std::size_t at_ = 0;
 };
 
+std::string toleranceText(const Json& json, const std::string& file) {
+  if (!json.is_string() && !json.is_number())
+    throw InvalidInput(
+        fmt::format("run: '{}': its tolerance is neither a text nor a number", file));
+  const std::string text = json.is_string() ? json.get<std::string>() : json.dump();
+  const std::vector<Param>& all = globalParams();
+  const auto param = std::find_if(all.begin(), all.end(),
+                                  [](const Param& known) { return known.name == kTolerance; });
+  checkText(*param, text, fmt::format("run: '{}': tolerance", file));
+  return text;
+}
+
 }  // namespace
 
 std::string graphJson(const Graph& graph) {
   Json json = {{"format", kFormat}, {"version", kVersion}, {"nodes", Json::array()}};
+  if (const auto it = graph.globals.find(kTolerance); it != graph.globals.end())
+    json[kTolerance] = it->second;
   for (const Node& node : graph.nodes) json["nodes"].push_back(toJson(node));
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-Graph graphFromJson(const std::string& text, const std::string& name) {
-  const Json json = Json::parse(text, nullptr, false);
+Graph graphFromJson(const std::string& text, const std::string& name,
+                     const std::map<std::string, std::string>& globals) {
+  const Json json = levelset::isJsonTooDeep(text) ? Json() : Json::parse(text, nullptr, false);
   if (json.is_discarded() || !json.is_object() || json.value("format", Json()) != kFormat)
     throw InvalidInput(fmt::format(
         "run: '{}' is no graph; write one with --save-graph, or a text with one action a line",
@@ -186,19 +206,23 @@ Graph graphFromJson(const std::string& text, const std::string& name) {
         "run: '{}' is of version {}, and this program knows {}", name,
         json.value("version", Json()).dump(-1, ' ', false, Json::error_handler_t::replace),
         kVersion));
-  const Json nodes = json.value("nodes", Json());
-  if (!nodes.is_array() || nodes.empty())
+  const auto nodes = json.find("nodes");
+  if (nodes == json.end() || !nodes->is_array() || nodes->empty())
     throw InvalidInput(fmt::format("run: '{}' holds no nodes", name));
-  return GraphReader(nodes, name).read();
+  std::map<std::string, std::string> all = globals;
+  if (json.contains(kTolerance) && !all.contains(kTolerance))
+    all[kTolerance] = toleranceText(json[kTolerance], name);
+  return GraphReader(*nodes, name, std::move(all)).read();
 }
 
 bool isGraphFile(const std::filesystem::path& file) {
   return file.extension() == ".json" || file.extension() == ".JSON";
 }
 
-Graph readGraph(const std::filesystem::path& file) {
+Graph readGraph(const std::filesystem::path& file,
+                const std::map<std::string, std::string>& globals) {
   const std::string text = readText(file, "run", kMostBytes);
-  return graphFromJson(text, file.string());
+  return graphFromJson(text, file.string(), globals);
 }
 
 void writeGraph(const std::filesystem::path& file, const Graph& graph) {

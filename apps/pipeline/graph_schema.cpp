@@ -112,6 +112,13 @@ Json actionSchema(const Operator& op) {
           {"additionalProperties", false}};
 }
 
+/// The one option of the run that a graph holds.
+Json toleranceSchema() {
+  for (const Param& param : globalParams())
+    if (param.name == "tolerance") return valueSchema(param);
+  return Json::object();
+}
+
 }  // namespace
 
 std::string graphSchema() {
@@ -137,6 +144,7 @@ std::string graphSchema() {
       {"properties",
        {{"format", {{"const", "levelsmith graph"}}},
         {"version", {{"const", 1}}},
+        {"tolerance", toleranceSchema()},
         {"nodes", {{"type", "array"}, {"minItems", 1}, {"items", node}}}}},
       {"required", {"format", "version", "nodes"}},
       {"$defs", actions}};

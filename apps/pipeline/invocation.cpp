@@ -137,8 +137,10 @@ bool Invocation::asksVoxelSize() const {
 }
 
 void Invocation::requireVoxelSize() const {
-  if (!asksVoxelSize())
-    throw UsageError(fmt::format("{}: how fine? give --voxel L or --resolution N", op_->name));
+  if (!asksVoxelSize() && !voxelFollows)
+    throw UsageError(fmt::format(
+        "{}: how fine? give --voxel L or --resolution N, or --tolerance L before the first action",
+        op_->name));
 }
 
 double Invocation::voxelSize(double longestSide) {

@@ -87,7 +87,7 @@ class Invocation {
   [[nodiscard]] std::vector<double> lengths(const std::string& name);
   /// The voxel size asked by --voxel or --resolution; the latter needs the object's longest side.
   [[nodiscard]] double voxelSize(double longestSide);
-  /// Refuses a call that gives neither --voxel nor --resolution, or both.
+  /// Refuses a call that gives both --voxel and --resolution, or neither where it does not follow.
   void requireVoxelSize() const;
   /// True when --voxel or --resolution was given; both, or a `vx` beside --resolution, are refused.
   [[nodiscard]] bool asksVoxelSize() const;
@@ -113,6 +113,7 @@ class Invocation {
   levelset::Progress progress = {};
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   bool dryRun = false;
+  bool voxelFollows = false;  ///< the voxel size is told later (Node::voxelFollows)
   StepNotes notes;
   std::string output;  ///< text for people, printed when the operator is done
 

@@ -138,6 +138,12 @@ void checkText(const Param& param, const std::string& text, const std::string& w
     case ParamType::Length: {
       if (param.allowsAuto && text == "auto") return;
       const Length length = parseLength(text, where);
+      if (length.unit == Unit::Voxels && !param.allowsVoxels && param.name != "voxel") {
+        throw UsageError(
+            fmt::format("{}: cannot be given in voxels, whose size follows from it; write it in "
+                        "world units, or as a share of the diagonal, 0.2%",
+                        where));
+      }
       if (length.unit == Unit::Voxels && !param.allowsVoxels) {
         throw UsageError(
             fmt::format("{}: a voxel size cannot be given in voxels; write it in world units, "
@@ -258,6 +264,11 @@ const std::vector<Param>& globalParams() {
       {.name = "max-memory",
        .type = ParamType::Bytes,
        .doc = "refuse or stop what would take more, e.g. 4G; default: 80 % of what is free"},
+      {.name = "tolerance",
+       .type = ParamType::Length,
+       .doc = "largest error of the result, from which voxel sizes that are not given follow",
+       .range = Range::Positive,
+       .allowsVoxels = false},
       {.name = "quiet", .type = ParamType::Flag, .doc = "errors only"},
       {.name = "verbose",
        .type = ParamType::Flag,

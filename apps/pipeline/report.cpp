@@ -62,6 +62,38 @@ Json toJson(const StepReport& step) {
   return json;
 }
 
+Json toJson(const ToleranceOutput& output) {
+  return {{"name", output.name},
+          {"requested", output.requested},
+          {"achieved", output.achieved},
+          {"measured", output.isMeasured},
+          {"reached", output.isReached()},
+          {"crease_error", output.crease},
+          {"crease_share", output.creaseShare},
+          {"order", output.order}};
+}
+
+Json toJson(const ToleranceReport& tolerance) {
+  Json json;
+  json["written"] = tolerance.written;
+  json["reached"] = tolerance.isReached();
+  if (tolerance.modelVoxelSize > 0) json["model_voxel_size"] = tolerance.modelVoxelSize;
+  json["models"] = tolerance.models;
+  if (tolerance.voxelSize > 0) json["voxel_size"] = tolerance.voxelSize;
+  json["outputs"] = Json::array();
+  for (const ToleranceOutput& output : tolerance.outputs) json["outputs"].push_back(toJson(output));
+  json["rounds"] = Json::array();
+  for (const ToleranceRound& round : tolerance.rounds) {
+    Json entry = {{"voxel_size", round.voxelSize}, {"wall_s", round.seconds}};
+    entry["outputs"] = Json::array();
+    for (const ToleranceOutput& output : round.outputs) entry["outputs"].push_back(toJson(output));
+    if (!round.failure.empty()) entry["failure"] = round.failure;
+    json["rounds"].push_back(entry);
+  }
+  if (!tolerance.limit.empty()) json["limit"] = tolerance.limit;
+  return json;
+}
+
 std::string escaped(const std::string& text) {
   std::string result;
   for (char c : text) {
@@ -117,6 +149,7 @@ std::string reportJson(const RunReport& report) {
   if (!report.graphJson.empty()) json["graph"] = Json::parse(report.graphJson);
   json["steps"] = Json::array();
   for (const StepReport& step : report.steps) json["steps"].push_back(toJson(step));
+  if (report.tolerance) json["tolerance"] = toJson(*report.tolerance);
   json["left_out"] = report.leftOut;
   json["warnings"] = report.warnings;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
@@ -146,6 +179,9 @@ std::string reportHtml(const RunReport& report) {
         step.activeVoxels, escaped(errorText(step)), notes);
   }
   page += "</table>\n";
+  if (report.tolerance)
+    for (const std::string& line : toleranceLines(*report.tolerance))
+      page += "<p>" + escaped(line) + "</p>\n";
   for (const std::string& warning : report.warnings) page += "<p>" + escaped(warning) + "</p>\n";
   if (!report.error.empty()) page += "<p><b>" + escaped(report.error) + "</b></p>\n";
   return page;
@@ -190,6 +226,33 @@ void checkRunTargets(const Graph& graph) {
 
 void writeReport(const std::filesystem::path& path, const RunReport& report) {
   writeText(path, isHtml(path) ? reportHtml(report) : reportJson(report), "--report");
+}
+
+std::vector<std::string> toleranceLines(const ToleranceReport& tolerance) {
+  std::vector<std::string> lines;
+  for (const ToleranceRound& round : tolerance.rounds) {
+    std::string line =
+        fmt::format("tolerance: voxels of {:.4g}, {:.2f} s", round.voxelSize, round.seconds);
+    for (const ToleranceOutput& output : round.outputs)
+      line += fmt::format("; {} off by {:.3g}", output.name, output.achieved);
+    lines.push_back(line + (round.failure.empty() ? "" : "; " + round.failure));
+  }
+  for (const ToleranceOutput& output : tolerance.outputs) {
+    std::string line =
+        fmt::format("tolerance: {}: {:.4g} requested, {:.3g} {}, with voxels of {:.4g}",
+                    output.name, output.requested, output.achieved,
+                    output.isReached() ? "reached" : "reached only", tolerance.voxelSize);
+    if (output.crease > 0)
+      line += fmt::format("; beside creases, which the field cannot hold, {:.3g}", output.crease);
+    lines.push_back(line);
+  }
+  if (tolerance.outputs.empty())
+    lines.push_back(
+        tolerance.modelVoxelSize > 0
+            ? fmt::format("tolerance: the error models pick voxels of {:.4g}, before anything ran",
+                          tolerance.modelVoxelSize)
+            : "tolerance: the error models cannot tell the voxel size before anything ran");
+  return lines;
 }
 
 std::string stepLine(const StepReport& step, bool dryRun) {

@@ -2,16 +2,19 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "apps/pipeline/runner.h"
 
 namespace pipeline {
 
 /// The report as JSON: an object with `version`, `graph` (which `run` takes, as a file of its own),
-/// `steps`, `left_out`, `warnings`, `exit_code`, `error`.
+/// `steps`, `tolerance` where one was asked for, `left_out`, `warnings`, `exit_code`, `error`.
 [[nodiscard]] std::string reportJson(const RunReport& report);
 /// The same as a page.
 [[nodiscard]] std::string reportHtml(const RunReport& report);
+/// What was asked for and reached, and the voxel sizes that were tried, a line each.
+[[nodiscard]] std::vector<std::string> toleranceLines(const ToleranceReport& tolerance);
 /// Refuses a --report or --save-graph that cannot be written before time is spent on what it should
 /// tell of.
 /// @throws levelset::IoError; UsageError when an action writes the same file

@@ -440,6 +440,7 @@ class GraphRun {
         if (node.makes()) {
           const Value value(plan);
           describeResult(value, true, step);
+          if (settings_.made) settings_.made(index, value);
           values_.put(index, value);
         }
       } else {

@@ -3,11 +3,13 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/pipeline/graph.h"
 #include "apps/pipeline/invocation.h"
+#include "apps/pipeline/tolerance_report.h"
 #include "levelset/solids/crop.h"
 
 namespace pipeline {
@@ -24,7 +26,7 @@ struct RunSettings {
   std::function<void(std::size_t, const std::string&, double)> progress = {};
   /// Asked while an action runs, from any thread; false ends it with levelset::Cancelled.
   std::function<bool()> goesOn = {};
-  /// Called with the value of each node that ran and makes one.
+  /// Called with the value of each node that ran and makes one; in a dry run with its plan.
   std::function<void(std::size_t, const Value&)> made = {};
   /// Text for people that an action prints.
   std::function<void(const std::string&)> print = {};
@@ -55,6 +57,7 @@ struct RunReport {
   std::string error;                  ///< the sentence that ended it, if one did
   int exitCode = 0;
   bool dryRun = false;
+  std::optional<ToleranceReport> tolerance;  ///< of a run with --tolerance
 };
 
 /// Runs those nodes that are needed, in order, and lets values go once the last that takes them has

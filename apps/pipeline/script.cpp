@@ -19,7 +19,10 @@ using levelset::UsageError;
 
 /// Actions of a script, and rounds of its loops: a chain is checked as a whole and held in memory.
 constexpr std::size_t kMostActions = 100'000;
-constexpr std::size_t kMostScriptBytes = 1 << 26;
+constexpr std::size_t kMostScriptBytes = 1 << 24;
+/// Of all that the rounds of loops write: variables may double in each.
+constexpr std::size_t kMostExpandedBytes = 1 << 26;
+constexpr std::size_t kMostNested = 64;
 
 bool isName(const std::string& text) {
   constexpr const char* kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_";
@@ -89,6 +92,9 @@ class Expander {
       if (beginsLoop(line)) {
         checkLoop(line);
         open.push_back(i);
+        if (open.size() > kMostNested)
+          fail(line, fmt::format("{}: loops stand in loops, more than {} deep; split the script",
+                                 word, kMostNested));
       } else if (word == "end") {
         if (line.words.size() > 1) fail(line, "end: stands alone on its line");
         if (open.empty()) fail(line, "end: there is no loop to end; leave it out");
@@ -198,13 +204,14 @@ class Expander {
     }
     std::vector<std::string> values;
     for (long i = 0; i < count; ++i) values.push_back(std::to_string(i));
+    spend(line, values.size());
     return values;
   }
 
-  [[nodiscard]] std::vector<std::string> listOf(const ScriptLine& line) const {
+  [[nodiscard]] std::vector<std::string> listOf(const ScriptLine& line) {
     std::vector<ListWord> words;
     for (std::size_t i = 3; i < line.words.size(); ++i) addListWords(line, line.words[i], words);
-    return loopValues(words, kMostActions, placed(line, "for"));
+    return loopValues(words, {kMostActions, &budget_}, placed(line, "for"));
   }
 
   /// Variables that are not quoted are split at blanks, as in a shell.
@@ -219,6 +226,7 @@ class Expander {
     };
     for (const WordPart& part : word) {
       const std::string text = part.isVariable ? valueOf(line, part.text) : part.text;
+      spend(line, text.size());
       if (part.isQuoted && !inWord) words.emplace_back(), inWord = true;
       for (char c : text) {
         if (!part.isQuoted && (c == ' ' || c == '\t' || c == '\n')) {
@@ -250,9 +258,21 @@ class Expander {
 
   [[nodiscard]] std::string replaced(const ScriptLine& line, const ScriptWord& word) const {
     std::string text;
-    for (const WordPart& part : word)
-      text += part.isVariable ? valueOf(line, part.text) : part.text;
+    for (const WordPart& part : word) {
+      const std::string more = part.isVariable ? valueOf(line, part.text) : part.text;
+      spend(line, more.size());
+      text += more;
+    }
     return text;
+  }
+
+  /// Counts what is written before it is held.
+  void spend(const ScriptLine& line, std::size_t bytes) const {
+    expandedBytes_ += bytes;
+    if (expandedBytes_ > kMostExpandedBytes)
+      fail(line, fmt::format("the variables and loops of the script come to more than {} MB of "
+                             "text; split it",
+                             kMostExpandedBytes >> 20));
   }
 
   [[nodiscard]] std::string valueOf(const ScriptLine& line, const std::string& variable) const {
@@ -295,10 +315,14 @@ class Expander {
     std::vector<std::string>& words = script_.words;
     const std::size_t first = words.size();
     if (hasAction_ && plainText(line.words[0]) != "!" && words.back() != "!") words.push_back("!");
-    for (const ScriptWord& word : line.words) words.push_back(replaced(line, word));
+    for (const ScriptWord& word : line.words) {
+      spend(line, sizeof(std::string));
+      words.push_back(replaced(line, word));
+    }
     hasAction_ |= !words[first].starts_with("-");
     script_.begins.push_back(first);
     script_.places.push_back(placeOf(line));
+    spend(line, script_.places.back().size());
     if (script_.begins.size() > kMostActions)
       fail(line, fmt::format("the script comes to more than {} actions; split it", kMostActions));
   }
@@ -323,6 +347,8 @@ class Expander {
   std::map<std::string, std::string> values_;  // that lines have set so far
   std::vector<Round> rounds_;                  // of the loops that are open, outermost first
   std::size_t roundCount_ = 0;
+  FolderBudget budget_;
+  mutable std::size_t expandedBytes_ = 0;
   bool hasAction_ = false;
   Script script_;
 };

@@ -1,9 +1,12 @@
 #include "apps/pipeline/script_list.h"
 
+#include <dirent.h>
 #include <fmt/core.h>
 #include <glob.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <optional>
 
 #include "levelset/error.h"
@@ -104,11 +107,54 @@ std::vector<std::string> rangeValues(const std::string& range, const std::string
   return values;
 }
 
-std::vector<std::string> matchingFiles(const std::string& pattern, const std::string& where) {
+// glob() hands nothing on to the functions that it reads folders by.
+thread_local FolderBudget* globBudget = nullptr;
+
+void* openFolder(const char* name) {
+  errno = ENFILE;  // what refuseFolder() is told
+  if (globBudget->folders == 0 || globBudget->entries == 0) return nullptr;
+  --globBudget->folders;
+  return ::opendir(name);
+}
+
+dirent* nextEntry(void* folder) {
+  if (globBudget->entries == 0) return nullptr;
+  --globBudget->entries;
+  return ::readdir(static_cast<DIR*>(folder));
+}
+
+bool mayLookUp() {
+  if (globBudget->names == 0) return false;
+  --globBudget->names;
+  return true;
+}
+
+/// Of folders that cannot be read, only what passes the budget ends the search.
+int refuseFolder(const char*, int error) {
+  return error == ENFILE ? 1 : 0;
+}
+
+std::vector<std::string> matchingFiles(const std::string& pattern, FolderBudget* budget,
+                                       const std::string& where) {
   glob_t found{};
-  const int status = glob(pattern.c_str(), GLOB_NOSORT, nullptr, &found);
+  found.gl_opendir = openFolder;
+  found.gl_readdir = nextEntry;
+  found.gl_closedir = [](void* folder) { ::closedir(static_cast<DIR*>(folder)); };
+  found.gl_stat = [](const char* name, struct stat* about) {
+    return mayLookUp() ? ::stat(name, about) : -1;
+  };
+  found.gl_lstat = [](const char* name, struct stat* about) {
+    return mayLookUp() ? ::lstat(name, about) : -1;
+  };
+  globBudget = budget;
+  const int status = glob(pattern.c_str(), GLOB_NOSORT | GLOB_ALTDIRFUNC, refuseFolder, &found);
   std::vector<std::string> files(found.gl_pathv, found.gl_pathv + found.gl_pathc);
   globfree(&found);
+  if (status == GLOB_ABORTED || budget->entries == 0 || budget->names == 0)
+    throw UsageError(fmt::format(
+        "{}: '{}' makes the script look into too many folders and files; name the folder, and use "
+        "fewer patterns",
+        where, pattern));
   if (status == 0) {
     std::sort(files.begin(), files.end());  // by bytes, whatever the locale
     return files;
@@ -121,7 +167,7 @@ std::vector<std::string> matchingFiles(const std::string& pattern, const std::st
 
 }  // namespace
 
-std::vector<std::string> loopValues(const std::vector<ListWord>& words, std::size_t most,
+std::vector<std::string> loopValues(const std::vector<ListWord>& words, const ListLimits& limits,
                                     const std::string& where) {
   std::vector<std::string> values;
   const auto add = [&](const std::vector<std::string>& more) {
@@ -133,10 +179,10 @@ std::vector<std::string> loopValues(const std::vector<ListWord>& words, std::siz
       const bool hasStep =
           i + 1 < words.size() && words[i + 1].isBare && words[i + 1].text == "step";
       const std::string step = i + 2 < words.size() ? words[i + 2].text : "…";
-      add(rangeValues(range, hasStep ? step : "", most, where));
+      add(rangeValues(range, hasStep ? step : "", limits.mostNumbers, where));
       if (hasStep) i += 2;
     } else if (!words[i].pattern.empty()) {
-      add(matchingFiles(words[i].pattern, where));
+      add(matchingFiles(words[i].pattern, limits.budget, where));
     } else {
       values.push_back(words[i].text);
     }

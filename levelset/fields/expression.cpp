@@ -59,15 +59,12 @@ class Formula {
 class Formulas {
  public:
   Formulas(const std::string& text, const Variables& variables, int count, const char* action)
-      : perThread_(Formula(text, variables)) {
+      : perThread_(read(text, variables, action)) {
     int found = 0;
     try {
       perThread_.local().evaluate(V3d(0.5), 0.5, found);
     } catch (const mu::Parser::exception_type& error) {
-      throw UsageError(
-          fmt::format("{}: the formula '{}' cannot be read: {}; use {}, numbers and functions such "
-                      "as sin({})",
-                      action, text, error.GetMsg(), variables.names, variables.names[0]));
+      refuse(text, variables, action, error.GetMsg());
     }
     if (found != count) {
       throw UsageError(fmt::format("{}: '{}' holds {} formula{}; give {}", action, text, found,
@@ -81,6 +78,24 @@ class Formulas {
   }
 
  private:
+  /// The parser takes a text before it reads it, and refuses one that is too long.
+  static Formula read(const std::string& text, const Variables& variables, const char* action) {
+    try {
+      return {text, variables};
+    } catch (const mu::Parser::exception_type& error) {
+      refuse(text, variables, action, error.GetMsg());
+    }
+  }
+  [[noreturn]] static void refuse(const std::string& text, const Variables& variables,
+                                  const char* action, const std::string& why) {
+    constexpr std::size_t kMostShown = 200;
+    throw UsageError(
+        fmt::format("{}: the formula '{}' cannot be read: {}; use {}, numbers and functions such "
+                    "as sin({})",
+                    action, text.size() > kMostShown ? text.substr(0, kMostShown) + "…" : text, why,
+                    variables.names, variables.names[0]));
+  }
+
   oneapi::tbb::enumerable_thread_specific<Formula> perThread_;
 };
 

@@ -76,6 +76,11 @@ TriMesh readMesh(const fs::path& path, const ReadMeshOptions& options) {
     TriMesh mesh = builder.finish();
     if (builder.droppedAttributes())
       if (auto closed = withoutSeams(mesh, "read", options.maxMemory)) mesh = std::move(*closed);
+    if (mesh.isEmpty())
+      failFile(
+          inputName(path),
+          "holds triangles without area only, of which none is left when its seams are closed; "
+          "export the mesh again");
     report(options.progress, 1, "read");
     return mesh;
   } catch (const std::bad_alloc&) {

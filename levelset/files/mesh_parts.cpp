@@ -139,9 +139,10 @@ void MeshBuilder::addColor(const Imath::V4f& color, Place place) {
 }
 
 void MeshBuilder::noteIndex(std::uint64_t index, Place place) {
-  if (index < highestIndex_ || (index == highestIndex_ && highestPlace_.number != 0)) return;
+  if (index < highestIndex_ || (index == highestIndex_ && highestNumber_ != 0)) return;
   highestIndex_ = index;
-  highestPlace_ = place;
+  highestUnit_ = place.unit;
+  highestNumber_ = place.number;
 }
 
 std::uint64_t MeshBuilder::splitVertex(std::uint64_t vertex, Place place) {
@@ -191,7 +192,7 @@ void MeshBuilder::splitPolygons() {
     for (std::size_t i = 0; i + 2 < polygon.corners; ++i) corners.push_back(triangles[i][2]);
     if (!splitPolygon(corners, mesh_.positions, triangles)) {
       failAt(
-          name_, {highestPlace_.unit, polygon.place},
+          name_, {highestUnit_.c_str(), polygon.place},
           fmt::format("a face of {} corners is too intricate to split; triangulate the mesh before",
                       polygon.corners));
     }
@@ -207,7 +208,7 @@ TriMesh MeshBuilder::finish() {
                                 count));
   if (highestIndex_ >= count) {
     failAt(
-        name_, highestPlace_,
+        name_, {highestUnit_.c_str(), highestNumber_},
         fmt::format("a face names vertex {} (counted from 0) of {}; repair the mesh or export it "
                     "again",
                     highestIndex_, count));
@@ -255,6 +256,7 @@ void TextCursor::skipLine() {
 
 std::string_view TextCursor::token() {
   const char* begin = p_;
+  if (p_ != end_ && *p_ == '\\') ++p_;  // one that continues no line is part of a name
   while (!atBlank()) ++p_;
   return {begin, static_cast<std::size_t>(p_ - begin)};
 }

@@ -85,7 +85,8 @@ class MeshBuilder {
   std::vector<std::uint32_t> splitVertices_;  // of which vertex
   std::size_t readerBytes_ = 0;
   std::uint64_t highestIndex_ = 0;
-  Place highestPlace_{"line", 0};
+  std::string highestUnit_ = "line";  // of its own: what named it may be gone when it is told
+  std::size_t highestNumber_ = 0;
   std::size_t added_ = 0;
   bool precisionDeclared_ = false, droppedAttributes_ = false;
   bool allFloat_ = true;
@@ -114,10 +115,10 @@ class TextCursor {
   bool skipBlanks(char comment, bool continuation = false) {
     while (p_ != end_) {
       const char c = *p_;
-      if (c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v') {
-        ++p_;
-      } else if (c == '\n' || (comment && c == comment)) {
+      if (c == '\n' || (comment && c == comment)) {
         return false;
+      } else if (static_cast<unsigned char>(c) <= ' ') {  // what ends a token is stepped over
+        ++p_;
       } else if (c == '\\' && continuation && skipContinuation()) {
         continue;
       } else {
@@ -130,7 +131,7 @@ class TextCursor {
   bool skipToToken(char comment);
   /// To the beginning of the next line.
   void skipLine();
-  /// The token at the cursor, taken.
+  /// The token at the cursor, taken: one character at least, lest a reader stands still.
   [[nodiscard]] std::string_view token();
   /// The number at the cursor, taken; ± infinity when it is beyond a double. Fails at no number.
   [[nodiscard]] double number(const char* what);

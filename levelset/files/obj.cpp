@@ -161,10 +161,7 @@ class ObjReader {
     while (cursor_.skipBlanks('#', true)) skipToken();  // a continued line belongs to its statement
   }
 
-  /// A backslash that continues no line is part of a name.
-  void skipToken() {
-    if (cursor_.token().empty()) cursor_.take('\\');
-  }
+  void skipToken() { static_cast<void>(cursor_.token()); }
 
   double readNumber(const char* what) {
     cursor_.skipBlanks('#', true);

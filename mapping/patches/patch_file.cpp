@@ -13,6 +13,7 @@
 
 #include "levelset/error.h"
 #include "levelset/file_target.h"
+#include "levelset/files/json_depth.h"
 
 namespace mapping {
 namespace {
@@ -238,8 +239,9 @@ bool isPatchFormat(const std::string& name) {
 
 std::vector<Patch> readPatches(const std::filesystem::path& file, std::size_t maxMemory) {
   const Reader reader(file.string());
-  const Json json = Json::parse(textOf(file, maxMemory), nullptr, /*allow_exceptions=*/false);
-  const std::string whole = "the file";
+  const std::string whole = "the file", text = textOf(file, maxMemory);
+  if (levelset::isJsonTooDeep(text)) reader.refuse(whole, "has lists in lists, too many");
+  const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (json.is_discarded()) reader.refuse(whole, "is no JSON document, or was cut off");
   const Json& format = reader.member(json, "format", whole);
   if (format != kFormat) reader.refuse(whole, "holds no patches");

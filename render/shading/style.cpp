@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "levelset/error.h"
+#include "render/grey_image.h"
 
 namespace render {
 namespace {
@@ -122,7 +123,7 @@ C3f ColourImage::at(double x, double y) const {
   return mixed(mixed(pixel(0, 0), pixel(1, 0), u), mixed(pixel(0, 1), pixel(1, 1), u), v);
 }
 
-ColourImage readColourPng(const std::filesystem::path& path) {
+ColourImage readColourPng(const std::filesystem::path& path, std::size_t maxMemory) {
   std::error_code failed;
   if (!std::filesystem::is_regular_file(path, failed))
     throw levelset::IoError(
@@ -130,6 +131,7 @@ ColourImage readColourPng(const std::filesystem::path& path) {
   if (!std::ifstream(path, std::ios::binary))
     throw levelset::IoError(
         fmt::format("read image: {} cannot be opened; check its permissions", path.string()));
+  requirePngChunks(path);
   struct Png {
     png_image image = {};
     ~Png() { png_image_free(&image); }
@@ -143,6 +145,8 @@ ColourImage readColourPng(const std::filesystem::path& path) {
   if (static_cast<double>(png.width) * png.height > kMostPixels)
     throw levelset::ResourceLimit(fmt::format("read image: {} has {}x{} pixels, more than 2^26",
                                               path.string(), png.width, png.height));
+  requirePngPixels(path, png.width, png.height);
+  levelset::requireMemory((4.0 + sizeof(C3f)) * png.width * png.height, maxMemory, "read image");
   png.format = PNG_FORMAT_RGBA;
   std::vector<std::uint8_t> bytes(PNG_IMAGE_SIZE(png));
   if (!png_image_finish_read(&png, nullptr, bytes.data(), 0, nullptr))

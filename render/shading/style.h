@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "levelset/progress.h"
 #include "render/hit.h"
 
 /// What colours a surface, beside the light that falls on it.
@@ -42,8 +43,10 @@ struct ColourImage {
 
 /// Reads a PNG with colours by the sRGB curve; alpha is left aside.
 /// @throws levelset::IoError when it cannot be opened; InvalidInput for what is no PNG or is
-///         damaged; ResourceLimit for more than 2^26 pixels
-[[nodiscard]] ColourImage readColourPng(const std::filesystem::path& path);
+///         damaged; ResourceLimit, before it allocates, for more than 2^26 pixels, or one that
+///         passes `maxMemory`
+[[nodiscard]] ColourImage readColourPng(const std::filesystem::path& path,
+                                        std::size_t maxMemory = levelset::kNoMemoryLimit);
 
 /// Of a colour by the sRGB curve, 0 to 1.
 [[nodiscard]] float linearFromSrgb(float x);

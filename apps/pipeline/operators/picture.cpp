@@ -164,8 +164,8 @@ render::StyleOptions styleOf(const Invocation& in) {
   if (in.given("curvature-range")) options.curvatureRange = in.number("curvature-range");
   options.lineWidth = in.number("line");
   if (in.given("matcap"))
-    options.matcap =
-        std::make_shared<const render::ColourImage>(render::readColourPng(in.text("matcap")));
+    options.matcap = std::make_shared<const render::ColourImage>(
+        render::readColourPng(in.text("matcap"), in.maxMemory));
   return options;
 }
 
@@ -298,7 +298,8 @@ std::string asTable(const render::ImageComparison& found) {
 
 Value compareImages(Invocation& in) {
   const render::ImageComparison found =
-      render::compareImages(render::readExr(in.text("first")), render::readExr(in.text("second")),
+      render::compareImages(render::readExr(in.text("first"), in.maxMemory),
+                            render::readExr(in.text("second"), in.maxMemory),
                             {.exact = in.flag("exact"), .tolerances = tolerancesOf(in)});
   const Json json = toJson(found);
   in.notes.detailsJson = json.dump();

@@ -203,6 +203,20 @@ TEST_F(Script, BoundsWhatLoopsComeTo) {
   EXPECT_TOLD(refusal("box\nrepeat 1000\nrepeat 1000\nend\nend"), "round more than 100000 times");
   EXPECT_TOLD(refusal("repeat 100001\nbox\nend"), "no count from 0 to 100000");
   EXPECT_EQ(words("repeat 1000\nrepeat 90\nbox\nend\nend").size(), 2u * 90'000 - 1);
+  EXPECT_TOLD(refusal("set a xxxxxxxx\nrepeat 40\nset a ${a}${a}\nend\nread ${a}"),
+              "more than 64 MB of text");
+  std::string deep;
+  for (int i = 0; i < 65; ++i) deep = "repeat 1\n" + deep + "end\n";
+  EXPECT_TOLD(refusal("box\n" + deep), "more than 64 deep");
+}
+
+TEST_F(Script, BoundsWhereItsPatternsLook) {
+  for (const char* name : {"a", "b", "c", "d"}) std::filesystem::create_directory(folder_ / name);
+  std::string pattern = folder_.string();
+  for (int i = 0; i < 10; ++i) pattern += "/*/..";
+  EXPECT_TOLD(refusal("for f in " + pattern + "/*\nread ${f}\nend"), "too many folders");
+  EXPECT_EQ(words("for f in " + folder_.string() + "/*/../[ab]\nread ${f}\nend").size(),
+            8 * 3 - 1u);
 }
 
 TEST_F(Script, TellsTheRoundOfAMistake) {

@@ -42,6 +42,13 @@ TEST(Expression, RefusesWhatIsNoFormula) {
     EXPECT_THROW((void)timeExpression(text, "test"), UsageError) << text;
 }
 
+TEST(Expression, RefusesWhatIsTooLong) {
+  const std::string sentence = support::refusal<UsageError>(
+      [] { (void)scalarExpression(std::string(100'000, '-') + "x", "test"); });
+  EXPECT_SAYS(sentence, "cannot be read");
+  EXPECT_LT(sentence.size(), 1000u);
+}
+
 TEST(Expression, KnowsOnlyWhatHasAMeaning) {
   EXPECT_EQ(timeExpression("2*t + pi", "test")(0.5), 1 + M_PI);
   const std::string sentence =

@@ -558,6 +558,35 @@ TEST(MeshFile, TellsWhatHeadersSay) {
   EXPECT_THROW(static_cast<void>(info("missing.ply")), levelset::IoError);
 }
 
+TEST(MeshFile, StepsOverControlCharacters) {
+  const auto mesh = support::parse("a.obj", "v 0 0 0 \x02\nv 1 0 0\nv 0 1 0 \\ \nf 1 2 3 \x01\n",
+                                   {.attributes = false});
+  EXPECT_EQ(mesh.positions.size(), 3u);
+  EXPECT_EQ(mesh.triangles.size(), 1u);
+}
+
+TEST(MeshFile, NamesTheFaceThatGoesAstray) {
+  const std::string header =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar x\nproperty uchar y\n"
+      "property uchar z\nelement face 1\nproperty list uchar uchar vertex_indices\nend_header\n";
+  const auto sentence = refusal<levelset::InvalidInput>(
+      [&] { (void)parse("a.ply", header + std::string("\0\0\0\3\0\0\7", 7)); });
+  EXPECT_SAYS(sentence, "face 0: a face names vertex 7");
+}
+
+TEST(MeshFile, RefusesWhatItsSeamsHeldOpen) {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
+      "z\n"
+      "property float s\nproperty float t\nelement face 1\n"
+      "property list uchar int vertex_indices\nend_header\n";
+  const auto sentence = refusal<levelset::InvalidInput>([&] {
+    (void)parse("a.ply", header + "1 0 0 0 0\n1 0 0 0 1\n1 0 0 1 1\n3 0 1 2\n",
+                {.attributes = false});
+  });
+  EXPECT_SAYS(sentence, "none is left");
+}
+
 TEST(MeshFile, SaysThatTheDiskIsFull) {
   const auto sentence = refusal<levelset::IoError>(
       [] { levelset::writeMesh("/dev/full", tetrahedron(), {.format = "ply"}); });

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <filesystem>
+
+// Private to render: OpenEXR takes memory for whatever sizes a file claims.
+
+namespace render {
+
+/// Looks at the headers of an EXR file before OpenEXR does: every attribute must lie within the
+/// file, and what tables and pixels they promise must be such as a file of its size can hold.
+/// @throws levelset::InvalidInput for a file that is none or damaged
+/// @throws levelset::ResourceLimit for more than kMaxPixels
+void checkExrHeader(const std::filesystem::path& path);
+
+}  // namespace render

@@ -1,0 +1,64 @@
+#include <filesystem>
+
+#include "apps/pipeline/cache.h"
+#include "apps/pipeline/digest.h"
+#include "apps/pipeline/mesh_bytes.h"
+#include "levelset/files/band_file.h"
+#include "levelset/files/mesh_file.h"
+#include "levelset/solids/shapes.h"
+#include "mapping/patches/patch_file.h"
+#include "render/scene_file.h"
+#include "tests/fuzz/readers.h"
+
+namespace fuzz {
+namespace {
+
+void readPatch(std::string_view bytes) {
+  const std::filesystem::path file = scratchFile("some.patch", bytes);
+  accepts([&] {
+    for (const mapping::Patch& patch : mapping::readPatches(file, kMaxMemory))
+      require(patch.levels.size() >= 2, "a patch has levels");
+  });
+}
+
+/// The level set and the mesh that scenes of the corpus name.
+void writeSceneParts() {
+  const levelset::NarrowBand ball = levelset::makeSphere(1, Imath::V3d(0), 0.25);
+  levelset::writeBand(scratchFile("ball.vdb", ""), ball);
+  levelset::TriMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
+  levelset::writeMesh(scratchFile("corner.ply", ""), mesh);
+}
+
+void readScene(std::string_view bytes) {
+  static const bool areWritten = (writeSceneParts(), true);
+  static_cast<void>(areWritten);
+  const std::filesystem::path file = scratchFile("scene.json", bytes);
+  accepts([&] { static_cast<void>(render::readScene(file, {.maxMemory = kMaxMemory})); });
+}
+
+/// An entry's description, a zero byte, and the bytes of a mesh, whose digest is made here.
+void readCache(std::string_view bytes) {
+  static const std::filesystem::path folder = scratchFile("place", "").parent_path() / "cache";
+  static const pipeline::Cache cache(folder);
+  const std::size_t zero = std::min(bytes.find('\0'), bytes.size());
+  const std::string description(bytes.substr(0, zero)),
+      content(bytes.substr(std::min(zero + 1, bytes.size())));
+  static_cast<void>(scratchFile("cache/results/key.json", description));
+  static_cast<void>(scratchFile("cache/results/key.mesh", pipeline::digestOf(content) + content));
+  static_cast<void>(scratchFile("cache/results/key.vdb", content));
+  accepts([&] {
+    static_cast<void>(cache.step("key"));
+    static_cast<void>(cache.value("key", kMaxMemory));
+    static_cast<void>(cache.list());
+  });
+}
+
+}  // namespace
+
+std::vector<Reader> documentReaders() {
+  return {{"patch", readPatch}, {"scene", readScene}, {"cache", readCache}};
+}
+
+}  // namespace fuzz

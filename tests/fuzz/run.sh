@@ -1,0 +1,35 @@
+#!/bin/sh
+# One reader under libFuzzer. run.sh PROGRAM READER SECONDS [libFuzzer's options]
+# New inputs go to a folder beside the program, which is kept from run to run; an input that shows a
+# defect goes there too, and its name is printed.
+set -eu
+program=$1 reader=$2 seconds=$3
+shift 3
+if [ ! -x "$program" ] && ! command -v clang++ >/dev/null && [ "${CI:-}" != true ]; then
+  echo "'$reader' is not fuzzed: clang++ is missing; ./dev setup installs it." >&2
+  exit 77
+fi
+here=$(cd "$(dirname "$0")" && pwd)
+found=$(dirname "$program")/found/$reader
+mkdir -p "$found"
+case $reader in
+  ply|obj|stl|off|gzip) words=mesh ;;
+  vdb|nvdb) words=vdb ;;
+  png|exr) words=picture ;;
+  graph) words="json actions" ;;
+  patch|scene|cache) words=json ;;
+  script|chain) words="script actions" ;;
+  formula) words=formula ;;
+  *) words="" ;;
+esac
+{
+  echo '"1e999"'  # a dictionary must not be empty
+  for word in $words; do cat "$here/dictionaries/$word.dict"; done
+} >"$found.dict"
+
+# What a reader may use is 64 MB (kMaxMemory). The limits are of one piece, and of the whole process with
+# what the sanitizers shadow and keep: freed memory for a while, pages of it for longer.
+export ASAN_OPTIONS="quarantine_size_mb=32:allocator_release_to_os_interval_ms=200:detect_leaks=1:${ASAN_OPTIONS:-}"
+exec "$program" "--reader=$reader" -max_total_time="$seconds" -timeout=5 -malloc_limit_mb=160 -rss_limit_mb=2048 \
+  -dict="$found.dict" -artifact_prefix="$found-" -print_final_stats=1 -verbosity="${VERBOSITY:-0}" "$@" \
+  "$found" "$here/corpus/$reader" </dev/null

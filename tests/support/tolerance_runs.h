@@ -1,0 +1,86 @@
+#pragma once
+
+// Runs of chains with --tolerance, without files: what came of them, and how far off that is.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/pipeline/chain.h"
+#include "apps/pipeline/tolerance.h"
+#include "levelset/error.h"
+#include "levelset/files/mesh_file.h"
+#include "levelset/inspect/surface_difference.h"
+#include "tests/support/files.h"
+
+namespace support {
+
+struct ToleranceRun {
+  levelset::TriMesh mesh;  ///< that was written
+  pipeline::RunReport report;
+  std::string refusal;  ///< what was thrown in the end
+  int exitCode = 0;
+  [[nodiscard]] const pipeline::ToleranceReport& told() const { return *report.tolerance; }
+  [[nodiscard]] const pipeline::ToleranceOutput& output() const { return told().outputs.at(0); }
+};
+
+inline std::vector<std::string> wordsOf(const std::string& text) {
+  std::vector<std::string> words;
+  std::string word;
+  for (const char c : text + " ") {
+    if (c != ' ')
+      word += c;
+    else if (!word.empty())
+      words.push_back(std::exchange(word, ""));
+  }
+  return words;
+}
+
+/// The words of a command line, none with blanks; all are told nothing.
+inline pipeline::RunReport runWords(const std::string& line, pipeline::RunSettings settings = {}) {
+  settings.warn = settings.note = settings.print = [](const std::string&) {};
+  const pipeline::Graph graph = pipeline::parseChain(wordsOf(line));
+  pipeline::RunReport report;
+  if (graph.globals.contains("tolerance"))
+    pipeline::runToTolerance(graph, settings, report);
+  else
+    pipeline::run(graph, settings, report);
+  return report;
+}
+
+/// Runs `--tolerance TOLERANCE CHAIN ! write FILE`, the chain ending with a mesh.
+inline ToleranceRun runToTolerance(const std::string& tolerance, const std::string& chain,
+                                   pipeline::RunSettings settings = {}) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "result.ply").string();
+  settings.warn = settings.note = settings.print = [](const std::string&) {};
+  const pipeline::Graph graph =
+      pipeline::parseChain(wordsOf("--tolerance " + tolerance + " " + chain + " ! write " + file));
+  ToleranceRun run;
+  try {
+    pipeline::runToTolerance(graph, settings, run.report);
+  } catch (const levelset::Error& error) {
+    run.refusal = error.what();
+    run.exitCode = static_cast<int>(error.exitCode());
+  }
+  if (std::filesystem::exists(file)) run.mesh = levelset::readMesh(file);
+  return run;
+}
+
+/// The mesh that a chain without --tolerance ends with.
+inline levelset::TriMesh meshOf(const std::string& chain) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "result.ply").string();
+  (void)runWords(chain + " ! write " + file);
+  return levelset::readMesh(file);
+}
+
+/// With its edge cut into two parts of each voxel.
+inline double differenceOf(const levelset::TriMesh& a, const levelset::TriMesh& b, double voxel) {
+  return levelset::surfaceDifference(levelset::TriangleSurface(a), levelset::TriangleSurface(b),
+                                     {.spacing = voxel / 2})
+      .smooth;
+}
+
+}  // namespace support
