@@ -156,14 +156,16 @@ std::string explain(const Graph& graph, std::size_t maxMemory, bool wholeValues)
       const Plan plan = demanded(*plans[i], demands[i]);
       bytes[i] = plan.bytes();
       text += needOf(demands[i], *plans[i]);
-      if (plan.voxelSize > 0)
+      const bool isBand = plan.kind == Kind::Band && plan.voxelSize > 0;
+      if (!isBand && plan.kind != Kind::Field) bytes[i] = 0;  // not known
+      if (isBand)
         text += fmt::format("; about {:.3g} voxels of {:.4g}, {:.3g} MB", plan.activeVoxels(),
                             plan.voxelSize, bytes[i] * 1e-6);
-      if (node.op->nanosecondsPerVoxel > 0 && plan.voxelSize > 0) {
+      if (node.op->nanosecondsPerVoxel > 0 && isBand) {
         const double own = 1e-9 * node.op->nanosecondsPerVoxel * plan.activeVoxels();
         seconds += own;
         text += fmt::format(", {:.2g} s", own);
-      } else if (node.kind == Kind::Band) {
+      } else if (isBand) {
         ++untimed;
       }
     } else if (runs[i] && node.makes()) {

@@ -174,6 +174,7 @@ void addConversionOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Mesh}},
       .run = levelSet,
       .plan = planLevelSet,
+      .nanosecondsPerVoxel = 500,
       .slope = Slope::One,
       .validate = requireVoxelSize,
   });

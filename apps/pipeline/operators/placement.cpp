@@ -37,6 +37,26 @@ void validateClip(const Invocation& in) {
   }
 }
 
+Plan planClip(Invocation& in) {
+  Plan plan = in.operands[0].plan();
+  if (!in.given("box") || plan.bounds.isEmpty()) return plan;
+  const Imath::Box3d box = in.box("box");
+  Imath::Box3d left;
+  double share = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    left.min[axis] = std::max(plan.bounds.min[axis], box.min[axis]);
+    left.max[axis] = std::min(plan.bounds.max[axis], box.max[axis]);
+    const double side = plan.bounds.max[axis] - plan.bounds.min[axis];
+    if (side > 0) share *= std::clamp((left.max[axis] - left.min[axis]) / side, 0.0, 1.0);
+  }
+  if (left.isEmpty()) return plan;
+  const V3d size = left.size();
+  plan.bounds = left;
+  // Its own surface as if spread evenly, and the faces that close it.
+  plan.area = share * plan.area + 2 * (size.x * size.y + size.y * size.z + size.z * size.x);
+  return plan;
+}
+
 Demand readOfClip(Invocation& in, std::size_t, const Demand& of) {
   Demand read = of;
   if (!in.given("box")) return read;
@@ -247,6 +267,7 @@ void addPlacementOperators(std::vector<Operator>& all) {
       .resultKind = sameKind,
       .run = transform,
       .plan = planTransform,
+      .nanosecondsPerVoxel = 1,
       .slope = Slope::OfOperands,
       .reads = readOfTransform,
       .validate = validateTransform,
@@ -280,6 +301,8 @@ void addPlacementOperators(std::vector<Operator>& all) {
                   .doc = "point and normal: keep what lies behind"}},
       .operands = {{Kind::Band}},
       .run = clip,
+      .plan = planClip,
+      .nanosecondsPerVoxel = 300,
       .slope = Slope::OfOperands,
       .reads = readOfClip,
       .validate = validateClip,

@@ -110,6 +110,7 @@ void validateOffset(const Invocation& in) {
 
 Value offset(Invocation& in) {
   levelset::OffsetOptions options = offsetOptions(in);
+  options.region = in.part.region;
   if (in.planned) options.halfWidth = in.neededHalfWidth(in.planned->halfWidth);
   const std::optional<levelset::Mask> mask = maskOf(in);
   NarrowBand band = in.band();
@@ -231,6 +232,7 @@ Operator csgOperator(const char* name, const char* summary, const char* example)
           .takesMore = true,
           .run = csg<operation>,
           .plan = planCsg,
+          .nanosecondsPerVoxel = 300,
           .slope = Slope::OfOperands,
           .reads = readOfCsg};
 }
@@ -312,6 +314,7 @@ void addSolidOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = offset,
       .plan = planOffset,
+      .nanosecondsPerVoxel = 900,
       .slope = Slope::One,
       .reads = readOfOffset,
       .validate = validateOffset,
