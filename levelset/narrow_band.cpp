@@ -239,7 +239,9 @@ openvdb::CoordBBox blocksOf(const Imath::Box3d& world, const openvdb::math::Tran
                        (corner & 1) ? world.max.z : world.min.z);
     index.expand(transform.worldToIndex(toVdb(p)));
   }
-  const auto at = [](double x) { return static_cast<int>(std::clamp(x, -kIndexLimit, kIndexLimit)); };
+  const auto at = [](double x) {
+    return static_cast<int>(std::clamp(x, -kIndexLimit, kIndexLimit));
+  };
   openvdb::CoordBBox blocks;
   for (int axis = 0; axis < 3; ++axis) {
     blocks.min()[axis] = at(std::floor(index.min()[axis])) & ~7;

@@ -60,8 +60,8 @@ Demand simplified(Demand demand, const Plan& plan, bool isDistance) {
   Box3d& region = demand.part.region;
   const V3d rim(plan.halfWidth * plan.voxelSize);
   const Box3d all(plan.bounds.min - rim, plan.bounds.max + rim);
-  const bool isAll = !plan.bounds.isEmpty() && region.intersects(all.min) &&
-                     region.intersects(all.max);
+  const bool isAll =
+      !plan.bounds.isEmpty() && region.intersects(all.min) && region.intersects(all.max);
   if (region.isEmpty() || isAll) region = levelset::kEverywhere;
   return demand;
 }

@@ -195,7 +195,7 @@ std::string graphJson(const Graph& graph) {
 }
 
 Graph graphFromJson(const std::string& text, const std::string& name,
-                     const std::map<std::string, std::string>& globals) {
+                    const std::map<std::string, std::string>& globals) {
   const Json json = levelset::isJsonTooDeep(text) ? Json() : Json::parse(text, nullptr, false);
   if (json.is_discarded() || !json.is_object() || json.value("format", Json()) != kFormat)
     throw InvalidInput(fmt::format(

@@ -93,13 +93,15 @@ struct Operator {
   std::function<Value(Invocation&)> run = {};
   /// What `run` would return, for --dry-run; by default the plan of the first operand.
   std::function<Plan(Invocation&)> plan = {};
-  /// CPU time for each active voxel of the result, roughly (tests/bench/costs.sh); 0: not known.
+  /// CPU time for each active voxel of the result or of the operands, whichever are more; roughly,
+  /// as `-v` tells it of solids of some million voxels. 0: not known
   double nanosecondsPerVoxel = 0;
   Slope slope = Slope::Any;
   /// What it reads of an operand for a part of its result; without it, the whole. The operands are
   /// plans, and Invocation::planned is that of the whole result. Inside the part the result has to
-  /// be what it is of whole operands, to the bit.
+  /// be what it is of whole operands, to the bit or to `partTolerance`.
   std::function<Demand(Invocation&, std::size_t operand, const Demand& part)> reads = {};
+  double partTolerance = 0;  ///< voxels
   /// Refuses, before anything runs, what can be told from the options and the kinds of the
   /// operands: options that exclude each other, formats, what is missing.
   std::function<void(const Invocation&)> validate = {};

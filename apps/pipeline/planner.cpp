@@ -22,10 +22,9 @@ std::string reasonFor(const Graph& graph, std::size_t index, const std::vector<c
   std::vector<std::string> takers;
   for (std::size_t i = index + 1; i < graph.nodes.size(); ++i) {
     const Node& other = graph.nodes[i];
-    const bool takes =
-        std::count(other.inputs.begin(), other.inputs.end(), index) > 0 ||
-        std::any_of(other.named.begin(), other.named.end(),
-                    [&](const auto& named) { return named.second == index; });
+    const bool takes = std::count(other.inputs.begin(), other.inputs.end(), index) > 0 ||
+                       std::any_of(other.named.begin(), other.named.end(),
+                                   [&](const auto& named) { return named.second == index; });
     if (runs[i] && takes) takers.push_back(labelOf(other));
   }
   std::vector<std::string> files;
@@ -43,8 +42,8 @@ std::string reasonFor(const Graph& graph, std::size_t index, const std::vector<c
 std::string needOf(const Demand& demand, const Plan& plan) {
   std::string text;
   if (demand.part.halfWidth < plan.halfWidth)
-    text += fmt::format("; {:.3g} of {:.3g} voxels of its band", demand.part.halfWidth,
-                        plan.halfWidth);
+    text +=
+        fmt::format("; {:.3g} of {:.3g} voxels of its band", demand.part.halfWidth, plan.halfWidth);
   if (!levelset::isEverywhere(demand.part.region)) {
     const Imath::Box3d& box = demand.part.region;
     text += fmt::format("; only {:.4g},{:.4g},{:.4g} to {:.4g},{:.4g},{:.4g}", box.min.x, box.min.y,
@@ -162,7 +161,12 @@ std::string explain(const Graph& graph, std::size_t maxMemory, bool wholeValues)
         text += fmt::format("; about {:.3g} voxels of {:.4g}, {:.3g} MB", plan.activeVoxels(),
                             plan.voxelSize, bytes[i] * 1e-6);
       if (node.op->nanosecondsPerVoxel > 0 && isBand) {
-        const double own = 1e-9 * node.op->nanosecondsPerVoxel * plan.activeVoxels();
+        // What it makes or what it goes through, whichever is more.
+        double gone = 0;
+        for (const std::size_t input : node.inputs)
+          if (plans[input]) gone += demanded(*plans[input], demands[input]).activeVoxels();
+        const double own =
+            1e-9 * node.op->nanosecondsPerVoxel * std::max(gone, plan.activeVoxels());
         seconds += own;
         text += fmt::format(", {:.2g} s", own);
       } else if (isBand) {
@@ -173,10 +177,10 @@ std::string explain(const Graph& graph, std::size_t maxMemory, bool wholeValues)
     }
     text += "\n";
   }
-  text += fmt::format("at most about {:.3g} MB are held at once; about {:.2g} s of one core{}\n",
-                      peakBytes(graph, runs, bytes) * 1e-6, seconds,
-                      untimed > 0 ? fmt::format(", and {} actions that nobody has timed", untimed)
-                                  : std::string());
+  text += fmt::format(
+      "at most about {:.3g} MB are held at once; about {:.2g} s of one core{}\n",
+      peakBytes(graph, runs, bytes) * 1e-6, seconds,
+      untimed > 0 ? fmt::format(", and {} actions that nobody has timed", untimed) : std::string());
   requireMemoryFor(graph, plans, demands, maxMemory);
   return text;
 }

@@ -268,8 +268,8 @@ class GraphRun {
                                [](const FileStamp& file) { return stampOf(file.path) == file; });
   }
 
-  /// Finds how much of each value is needed, so that no more is made. Values that others may ask for
-  /// later, out of a cache or of Python, are whole.
+  /// Finds how much of each value is needed, so that no more is made. Values that others may ask
+  /// for later, out of a cache or of Python, are whole.
   void findDemands() {
     wasEarly_.resize(graph_.nodes.size());
     demands_.resize(graph_.nodes.size());
@@ -277,8 +277,10 @@ class GraphRun {
     std::vector<char> runs(graph_.nodes.size());
     for (std::size_t i = 0; i < runs.size(); ++i) runs[i] = fates_[i] == Fate::Run;
     if (settings_.wholeValues || cache_ || settings_.made || settings_.dryRun ||
-         !mayAskForLess(graph_, runs)) return;
-    plans_ = plansOf(graph_, runs, settings_.maxMemory, [&](std::size_t i) { return planEarly(i); });
+        !mayAskForLess(graph_, runs))
+      return;
+    plans_ =
+        plansOf(graph_, runs, settings_.maxMemory, [&](std::size_t i) { return planEarly(i); });
     demands_ = demandsOf(graph_, runs, plans_);
     requireMemoryFor(graph_, plans_, demands_, settings_.maxMemory);
   }
@@ -503,7 +505,7 @@ class GraphRun {
   std::vector<Demand> demands_;
   std::vector<std::optional<Plan>> plans_;  // of whole values, as far as they were told ahead
   std::vector<char> wasEarly_;              // ran to be planned with
-  Values values_;  // the last: planned() fills the others
+  Values values_;                           // the last: planned() fills the others
 };
 
 }  // namespace

@@ -18,7 +18,7 @@ struct RunSettings {
   bool dryRun = false;
   bool measureErrors = false;  ///< estimate each result's error: costs a pass over it
   std::size_t maxMemory = levelset::kNoMemoryLimit;
-  bool wholeValues = false;    ///< make all of each value, also where a part of it would do
+  bool wholeValues = false;          ///< make all of each value, also where a part of it would do
   std::filesystem::path cache = {};  ///< folder of earlier results; empty: none are kept
   /// Called with the name of each action before it runs.
   std::function<void(const std::string&)> begin = {};

@@ -126,8 +126,9 @@ void signTilesOfAll(FloatTree& tree, const SignField& field, const V3i& origin, 
                     const Region& region) {
   std::vector<Node*> nodes;
   tree.getNodes(nodes);
-  tbb::parallel_for(std::size_t{0}, nodes.size(),
-                    [&](std::size_t i) { signTiles(*nodes[i], field, origin, background, region); });
+  tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t i) {
+    signTiles(*nodes[i], field, origin, background, region);
+  });
 }
 
 /// Interior tiles of the root: a row of them lies between two nodes that hold the surface.

@@ -16,8 +16,7 @@ namespace levelset::convert {
                                                    const Imath::V3i& origin, double voxelSize,
                                                    double halfWidth,
                                                    const std::optional<openvdb::CoordBBox>& region,
-                                                   std::size_t maxMemory,
-                                                   const Progress& progress);
+                                                   std::size_t maxMemory, const Progress& progress);
 
 /// Of the grid points with a neighbour of opposite sign, the share with |w − 1/2| < 1/4.
 /// 0 for a closed surface, 1 where there are no such points.

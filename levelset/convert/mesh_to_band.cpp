@@ -191,8 +191,8 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
       throw InvalidInput("level-set: the region that is asked for lies beyond the mesh");
     region = blocksOf(reached, *uniformTransform(voxelSize));
   }
-  const auto grid = convert::assembleBand(local, field, origin, voxelSize, options.halfWidth, region,
-                                          maxMemory, subProgress(progress, 0.6, 1));
+  const auto grid = convert::assembleBand(local, field, origin, voxelSize, options.halfWidth,
+                                          region, maxMemory, subProgress(progress, 0.6, 1));
   certificate.ambiguousShare = convert::ambiguousShare(*grid, field, origin);
   if (options.certified) options.certified(certificate);
   checkResult(*grid, certificate, options);

@@ -16,8 +16,7 @@ NarrowBand cropped(NarrowBand band, const BandPart& part) {
   if (!(part.halfWidth >= 1))
     throw UsageError(
         fmt::format("crop: the half width is {} voxels; give at least 1", part.halfWidth));
-  if (part.region.isEmpty())
-    throw UsageError("crop: the region is empty; give a box");
+  if (part.region.isEmpty()) throw UsageError("crop: the region is empty; give a box");
   if (!isEverywhere(part.region)) {
     const openvdb::CoordBBox blocks = blocksOf(part.region, vdb(band).transform());
     std::vector<openvdb::Coord> beyond;

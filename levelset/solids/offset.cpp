@@ -35,14 +35,6 @@ void requireSurface(const NarrowBand& solid, const OffsetOptions& options) {
         "{}: the solid is empty, so there is no surface to move; give a solid", options.action));
 }
 
-/// Grid points of the region, and as many voxels around it.
-std::optional<openvdb::CoordBBox> regionOf(const OffsetOptions& options,
-                                           const openvdb::FloatGrid& field, double rim) {
-  if (isEverywhere(options.region)) return {};
-  const Imath::V3d around(rim * field.voxelSize()[0]);
-  return blocksOf({options.region.min - around, options.region.max + around}, field.transform());
-}
-
 /// Distances out to where the surface may go, kept beside it only.
 eikonal::DistanceRequest shellRequest(const OffsetOptions& options, double shift, double reach) {
   eikonal::DistanceRequest request;
@@ -59,7 +51,6 @@ NarrowBand distancesAgain(const openvdb::FloatGrid& field, double halfWidth,
   eikonal::DistanceRequest request;
   request.action = options.action;
   request.halfWidth = halfWidth;
-  request.region = regionOf(options, field, 0);
   request.maxMemory = options.maxMemory;
   request.progress = subProgress(options.progress, done, 1);
   return makeBand(eikonal::distanceTransform(field, request));
@@ -127,7 +118,6 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
   if (distance == 0) return distancesAgain(vdb(solid), halfWidth, options, 0);
 
   eikonal::DistanceRequest request = shellRequest(options, distance / solid.voxelSize(), 0);
-  request.region = regionOf(options, vdb(solid), halfWidth + 2 * kShell + 2);
   request.progress = subProgress(options.progress, 0, 0.6);
   const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
   if (!hasSurface(*moved))

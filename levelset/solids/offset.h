@@ -1,7 +1,5 @@
 #pragma once
 
-#include <Imath/ImathBox.h>
-
 #include <optional>
 
 #include "levelset/fields/field.h"
@@ -12,7 +10,6 @@ namespace levelset {
 
 struct OffsetOptions {
   std::optional<double> halfWidth = {};  ///< of the result, voxels; empty: as the operand
-  Imath::Box3d region = kEverywhere;     ///< world; offset() makes distances only there, and signs
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
   const char* action = "offset";  ///< in messages

@@ -11,7 +11,7 @@
 namespace levelset {
 
 struct ShapeOptions {
-  double halfWidth = 3;  ///< voxels, at least 1
+  double halfWidth = 3;               ///< voxels, at least 1
   Imath::Box3d region = kEverywhere;  ///< world; only there, as cropped() leaves it
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};

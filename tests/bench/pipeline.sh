@@ -27,7 +27,7 @@ alone=$(cost $needed $(three))
 of_twelve=$(cost $others $needed $(three))
 
 # A part of a large solid, made as far as it is needed and made whole (--whole).
-part="sphere --radius 2 --voxel 0.02 --half-width 20 ! offset 0.5 ! clip --box"
+part="sphere --radius 2 --voxel 0.01 --half-width 10 ! offset 0.1 ! clip --box"
 memory() { { /usr/bin/env time -f '%M' "$levelsmith" -q "$@" >/dev/null; } 2>&1 | tail -1; }
 needed_time=$(cost $part "1.5,-0.5,-0.5 3,0.5,0.5" ! mesh ! write part.ply)
 whole_time=$(cost --whole $part "1.5,-0.5,-0.5 3,0.5,0.5" ! mesh ! write whole.ply)

@@ -190,6 +190,7 @@ Plan planTransform(Invocation& in) {
 Demand readOfTransform(Invocation& in, std::size_t, const Demand& of) {
   if (in.operands[0].kind() != Kind::Band || in.flag("bake")) return {};
   Demand read = of;
+  read.part.halfWidth *= 1 + 1e-6;  // its end is rounded before it is scaled
   if (!levelset::isEverywhere(of.part.region))
     read.part.region =
         grown(moved(of.part.region, matrixOf(in).inverse()), in.operands[0].plan().voxelSize);

@@ -33,10 +33,9 @@ std::vector<NarrowBand> bands(const Invocation& in) {
 Demand readOfCsg(Invocation& in, std::size_t, const Demand& of) {
   for (const Value& operand : in.operands)
     if (operand.plan().voxelSize != in.planned->voxelSize) return {};  // one is resampled
-  Demand read = of;
-  const double width = std::min(of.part.halfWidth, in.planned->halfWidth);
-  read.part.region = grown(read.part.region, (2 * width + 24) * in.planned->voxelSize);
-  return read;
+  // A seam is corrected out to where the band ends, from all that lies there.
+  return {
+      {.region = grown(of.part.region, (2 * in.planned->halfWidth + 24) * in.planned->voxelSize)}};
 }
 
 template <CsgOperation operation>
@@ -95,10 +94,8 @@ Demand readOfOffset(Invocation& in, std::size_t, const Demand& of) {
   const double voxel = in.operands[0].plan().voxelSize;
   const double distance = in.length("distance");
   if (distance == 0) return {};
-  const double width = std::min(of.part.halfWidth, in.planned->halfWidth);
-  return {{.halfWidth = kReadBySurface,
-           .region = grown(of.part.region,
-                           std::abs(distance) + (width + 2 * kReadBySurface) * voxel)}};
+  const double reach = std::abs(distance) + (in.planned->halfWidth + 2 * kReadBySurface) * voxel;
+  return {{.halfWidth = kReadBySurface, .region = grown(of.part.region, reach)}};
 }
 
 void validateOffset(const Invocation& in) {
@@ -110,8 +107,8 @@ void validateOffset(const Invocation& in) {
 
 Value offset(Invocation& in) {
   levelset::OffsetOptions options = offsetOptions(in);
-  options.region = in.part.region;
-  if (in.planned) options.halfWidth = in.neededHalfWidth(in.planned->halfWidth);
+  // As wide as the whole: how far points travel shows in last bits.
+  if (in.planned) options.halfWidth = in.planned->halfWidth;
   const std::optional<levelset::Mask> mask = maskOf(in);
   NarrowBand band = in.band();
   if (!mask && !in.given("by")) {
@@ -317,6 +314,7 @@ void addSolidOperators(std::vector<Operator>& all) {
       .nanosecondsPerVoxel = 900,
       .slope = Slope::One,
       .reads = readOfOffset,
+      .partTolerance = 1e-6,  // Newton's method may start from another point beside it
       .validate = validateOffset,
   });
   const Param halfWidth = {.name = "half-width",
