@@ -25,8 +25,12 @@ def test_what_the_readme_shows(tmp_path, monkeypatch):
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     monkeypatch.chdir(tmp_path)
-    exec(code, {})
+    names = {}
+    exec(code, names)
     assert (tmp_path / "part.npz").stat().st_size > 10000
+    assert (tmp_path / "part.png").stat().st_size > 5000
+    assert names["part"].measure()["volume"] > 1.05 * names["base"].measure()["volume"]
+    assert names["part"].measure()["components"] == 1
 
 
 def test_what_the_documentation_shows(tmp_path):
