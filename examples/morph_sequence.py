@@ -1,10 +1,13 @@
-"""Two solids, and the ways between them: one picture for each step.
+"""Two solids, and the ways between them: a strip of pictures, one for each step.
 
 python3 examples/morph_sequence.py FOLDER [VOXEL]
 """
 
 import os
 import sys
+
+import matplotlib.image
+import numpy
 
 import levelsmith as ls
 
@@ -18,9 +21,10 @@ rods = [ls.capsule(from_=[-1.6 * (i == k) for k in range(3)], to=[1.6 * (i == k)
 cross = rods[0] | rods[1] | rods[2]
 
 steps = [ring] + [ring.morph(cross, until=share) for share in (0.25, 0.5, 0.75)] + [cross]
+pictures = []
 for number, step in enumerate(steps):
-    step.render(
-        os.path.join(folder, f"morph_{number}.png"), size=(240, 240), samples=1,
-        from_=(5, -6, 5), to=(0, 0, 0), up=(0, 0, 1), fov=32,
-    )
+    pictures.append(os.path.join(folder, f"morph_{number}.png"))
+    step.render(pictures[-1], size=(160, 160), samples=2, from_=(5, -6, 5), to=(0, 0, 0), up=(0, 0, 1), fov=29)
     print(f"step {number}: volume {step.measure()['volume']:.4g}")
+strip = numpy.hstack([matplotlib.image.imread(picture) for picture in pictures])
+matplotlib.image.imsave(os.path.join(folder, "morph_sequence.png"), strip)

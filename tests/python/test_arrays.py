@@ -104,6 +104,15 @@ def test_only_signs_and_slopes_beside_the_surface_matter(ls):
     assert wide.info()["half_width"] == 5
 
 
+@pytest.mark.parametrize("reach, radius", [(10, 0.998), (10, 0.92), (11, 1.05), (12, 1.1)])
+def test_surfaces_beside_the_border_stay_where_they_are(ls, reach, radius):
+    h = 0.1
+    x = numpy.stack(numpy.meshgrid(*[numpy.arange(-reach, reach + 1) * h] * 3, indexing="ij"), -1)
+    distance = numpy.linalg.norm(x, axis=-1) - radius
+    solid = ls.from_array(distance, h, x[0, 0, 0])
+    assert ls.compare(solid, ls.sphere(radius=radius, voxel=h))["hausdorff"] < 0.1 * h
+
+
 def test_a_solid_larger_than_its_band_stays_full(ls):
     """Blocks without samples are inside, too."""
     phi = ls.box(size=(8, 8, 8), voxel=0.1).array()

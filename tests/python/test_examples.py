@@ -7,15 +7,30 @@ import sys
 import pytest
 from conftest import ROOT
 
-COARSE = {"knurled_handle": "0.08", "gyroid_bunny": "60", "blended_part": "0.15", "morph_sequence": "0.12"}
+COARSE = {
+    "blended_part": ["0.15"],
+    "from_numpy": ["1.2"],
+    "gyroid_bunny": ["60"],
+    "island": ["0.12"],
+    "knurled_handle": ["0.08"],
+    "morph_sequence": ["0.12"],
+    "moulded_part": ["0.12"],
+    "parameter_sweep": ["0.2"],
+    "regression_plot": ["0.1"],
+    "scaled_dragon": ["60", "no model"],
+}
 
 
 def test_what_the_readme_shows(tmp_path, monkeypatch):
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     monkeypatch.chdir(tmp_path)
-    exec(code, {})
+    names = {}
+    exec(code, names)
     assert (tmp_path / "part.npz").stat().st_size > 10000
+    assert (tmp_path / "part.png").stat().st_size > 5000
+    assert names["part"].measure()["volume"] > 1.05 * names["base"].measure()["volume"]
+    assert names["part"].measure()["components"] == 1
 
 
 def test_what_the_documentation_shows(tmp_path):
@@ -41,18 +56,33 @@ def check_tiles(folder):
     assert (numpy.abs(whole - tiled) > 0.02).any(axis=-1).mean() < 0.005
 
 
-def test_all_examples_are_tested():
-    assert {path.stem for path in (ROOT / "examples").glob("*.py")} == set(COARSE)
+def test_all_examples_are_tested_and_shown():
+    folder = ROOT / "examples"
+    assert {path.stem for path in folder.glob("*.py")} == set(COARSE)
+    overview = (folder / "README.md").read_text(encoding="utf-8")
+    for name in COARSE:
+        assert f"({name}.py)" in overview and f"({name}.png)" in overview
+        assert 5000 < (folder / f"{name}.png").stat().st_size < 150000
 
 
 @pytest.mark.parametrize("name", COARSE)
 def test_example(name, tmp_path):
     script = ROOT / "examples" / f"{name}.py"
     done = subprocess.run(
-        [sys.executable, "-W", "error", script, tmp_path, COARSE[name]], capture_output=True, text=True
+        [sys.executable, "-W", "error", script, tmp_path, *COARSE[name]], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    pictures = list(tmp_path.glob("*.png"))
-    assert len(pictures) == (5 if name == "morph_sequence" else 1)
-    for picture in pictures:
-        assert picture.stat().st_size > 5000
+    assert done.stdout.strip()
+    assert (tmp_path / f"{name}.png").stat().st_size > 5000
+
+
+def test_the_sweep_with_workers_draws_the_same(tmp_path):
+    pytest.importorskip("distributed")
+    script = ROOT / "examples/parameter_sweep.py"
+    pictures = []
+    for workers in ("0", "2"):
+        folder = tmp_path / workers
+        done = subprocess.run([sys.executable, script, folder, "0.2", workers], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        pictures.append((folder / "parameter_sweep.png").read_bytes())
+    assert pictures[0] == pictures[1]

@@ -59,6 +59,12 @@ def test_the_stub_is_in_step_with_the_registry(ls):
         for kind in op["operands"][0] if op["operands"] else ():
             methods = {n.name for n in classes[kind].body if isinstance(n, ast.FunctionDef)}
             assert name in methods
+    for name in ("compute", "from_array", "from_function", "graph", "last_report", "map", "set_cache",
+                 "set_max_memory", "set_threads"):  # fmt: skip
+        hinted = functions[name].args
+        names = [a.arg for a in hinted.posonlyargs + hinted.args + hinted.kwonlyargs]
+        names += [hinted.vararg.arg] if hinted.vararg else []
+        assert sorted(names) == sorted(inspect.signature(getattr(ls, name)).parameters), name
     solid = {n.name: n for n in classes["Solid"].body if isinstance(n, ast.FunctionDef)}
     assert ast.unparse(solid["march"].returns) == "Union[Solid, Field]"
     assert ast.unparse(functions["transform"].returns) == "Union[Solid, Mesh]"

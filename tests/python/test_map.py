@@ -49,14 +49,14 @@ def printed(reports):
     return [report["printed"] for report in reports]
 
 
-def kill_one_that_works(client, killed):
+def kill_one_that_works(client, killed, is_over):
     """Ends a process in the middle of a job."""
 
     def running(dask_worker):
         return [key for key, task in dask_worker.state.tasks.items() if task.state == "executing"]
 
     pids = client.run(os.getpid)
-    while not killed:
+    while not is_over.is_set():
         before = client.run(running)
         time.sleep(0.3)
         after = client.run(running)
@@ -71,16 +71,15 @@ class Killer:
     """Kills a worker while a map runs."""
 
     def __init__(self, client):
-        self.killed = []
-        self.thread = threading.Thread(target=kill_one_that_works, args=(client, self.killed))
+        self.killed, self.is_over = [], threading.Event()
+        self.thread = threading.Thread(target=kill_one_that_works, args=(client, self.killed, self.is_over))
 
     def __enter__(self):
         self.thread.start()
         return self.killed
 
-    def __exit__(self, kind, *_):
-        if kind:
-            self.killed.append(None)
+    def __exit__(self, *_):
+        self.is_over.set()
         self.thread.join()
 
 
@@ -218,6 +217,22 @@ def test_refusals_come_back_from_a_cluster(ls, client, folder):
         ls.map("sphere --radius ${radius} --voxel 0.1\n", RADII[:1], client)
 
 
+def test_what_was_told_before_a_refusal_is_told(ls, client):
+    def work():
+        import levelsmith as ls
+
+        mesh = ls.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]], [[0, 1, 2]])
+        mesh.level_set(voxel=0.05, sign_anyway=True).compute()
+        raise ValueError("mine")
+
+    found = []
+    for where in (None, client):
+        with pytest.warns(ls.Warning) as told, pytest.raises((ls.Error, ValueError)) as caught:
+            ls.map(work, [{}], where)
+        found.append((str(caught.value), [str(each.message) for each in told if each.category is ls.Warning]))
+    assert found[0] == found[1] and found[0][1]
+
+
 def test_workers_share_a_cache(ls, client, folder):
     first = ls.map(PARTS, RADII, client, cache="kept")
     again = ls.map(PARTS, RADII, client, cache="kept")
@@ -242,7 +257,7 @@ def test_the_job_of_a_killed_worker_is_run_again(ls, client, tmp_path):
     sets = [{"i": i, "marks": marks} for i in range(4)]
     with Killer(client) as killed:
         solids = ls.map(work, sets, client)
-    (pid, _) = killed[0]
+    ((pid, _),) = killed
     begun = [path.name.split("-")[1:] for path in marks.glob("begun-*")]
     done = [path.name.split("-")[1:] for path in marks.glob("done-*")]
     cut = [i for i, process in begun if int(process) == pid and [i, process] not in done]
@@ -254,6 +269,13 @@ def test_the_job_of_a_killed_worker_is_run_again(ls, client, tmp_path):
     for i, (a, b) in enumerate(zip(solids, expected)):
         assert a.info()["hash"] == b.info()["hash"]
         assert (marks / f"solid-{i}.vdb").read_bytes() == (tmp_path / f"here/solid-{i}.vdb").read_bytes()
+
+
+def test_a_job_that_kills_every_worker_is_given_up(ls, client):
+    with pytest.raises(ls.ResourceError, match=r"every worker that took this job died.*\(parameters\[1\], i = 1\)"):
+        ls.map(lambda i: os.kill(os.getpid(), signal.SIGKILL) if i else i, [{"i": 0}, {"i": 1}], client)
+    client.wait_for_workers(3)
+    assert ls.map(lambda i: i, [{"i": 7}], client) == [7]
 
 
 def test_pipelines_survive_a_killed_worker(ls, client, tmp_path, monkeypatch):

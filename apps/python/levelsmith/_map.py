@@ -236,9 +236,10 @@ def _on_worker(job, folder, processes):
         # The processes of a machine share its cores; results do not depend on it.
         _values.share_machine(processes[host], _memory_of(worker))
     result, told, error = _run(job, folder)
-    if error is not None and not told:
-        raise error  # so that the cluster knows of it
-    return result, told, error
+    if error is not None:
+        error._told = told  # goes with it
+        raise error
+    return result, told
 
 
 def _memory_of(worker):
@@ -267,14 +268,14 @@ def _there(jobs, folder, client):
     try:
         for key in keys:
             try:
-                yield futures[key].result()
+                yield (*futures[key].result(), None)
             except KilledWorker:
                 yield None, [], _core.ResourceError(
                     "map: every worker that took this job died, perhaps for want of memory; use larger voxels, "
                     "or fewer workers with more memory each"
                 )
             except Exception as error:
-                yield None, [], error
+                yield None, getattr(error, "_told", []), error
     finally:
         for future in futures.values():
             future.release()  # nobody waits for the rest

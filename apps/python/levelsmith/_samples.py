@@ -89,16 +89,28 @@ def from_array(phi, voxel, origin=(0, 0, 0), half_width=3):
                     "give a larger array, positive all around",
                     action,
                 )
-    count = [-(-n // SIDE) for n in phi.shape]
-    # Beyond the array it goes on as at its border.
-    padded = numpy.pad(
-        phi.astype(numpy.float32), [(0, c * SIDE - n) for c, n in zip(count, phi.shape)], mode="edge"
-    )
+    padded, before = _padded(phi.astype(numpy.float32))
+    origin = origin - voxel * numpy.array(before)
+    count = [n // SIDE for n in padded.shape]
     split = padded.reshape(count[0], SIDE, count[1], SIDE, count[2], SIDE).transpose(0, 2, 4, 1, 3, 5)
     signs = split < 0
     sampled = _dilated(_mixed(signs, (3, 4, 5)))
     inside = numpy.argwhere(signs[..., 0, 0, 0] & ~sampled)
     return _solid(origin, voxel, numpy.argwhere(sampled), split[sampled], inside, half_width, action)
+
+
+def _padded(phi):
+    """To whole blocks, and with room where the surface is near the border. Returns also how many came before.
+
+    Beyond the array it goes on with its slope, and does not fall.
+    """
+    def room(axis, layers):
+        return HALF if (phi.take(layers, axis, mode="clip") < 0).any() else 0
+
+    near = [(room(a, range(HALF)), room(a, range(n - HALF, n))) for a, n in enumerate(phi.shape)]
+    widths = [(low, high + -(low + n + high) % SIDE) for (low, high), n in zip(near, phi.shape)]
+    sloped = numpy.pad(phi, widths, mode="reflect", reflect_type="odd")
+    return numpy.maximum(numpy.pad(phi, widths, mode="edge"), sloped), [low for low, _ in widths]
 
 
 class _Sampler:
