@@ -15,6 +15,7 @@
 #include <system_error>
 #include <utility>
 
+#include "apps/pipeline/digest.h"
 #include "apps/pipeline/mesh_bytes.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
@@ -25,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr int kCacheVersion = 1;
+constexpr int kCacheVersion = 2;
 constexpr const char* kEntry = ".json";
 constexpr const char* kGrid = ".vdb";
 constexpr const char* kMesh = ".mesh";
@@ -74,6 +75,25 @@ StepNotes notesOf(const Json& json) {
 std::string contentsOf(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+/// An entry as it is in its file: a digest of all behind it comes first, since a text that was
+/// damaged may still be one.
+std::string textOf(const Json& entry) {
+  const std::string text = entry.dump(1, ' ', false, Json::error_handler_t::replace);
+  return digestOf(text) + "\n" + text;
+}
+
+/// @throws std::exception for what is damaged, or not there
+Json readEntry(const fs::path& file) {
+  const std::string bytes = contentsOf(file);
+  const std::size_t end = std::min(bytes.find('\n'), bytes.size());
+  const std::string text = bytes.substr(std::min(end + 1, bytes.size()));
+  if (bytes.substr(0, end) != digestOf(text)) throw levelset::InvalidInput("cache: it is damaged");
+  Json entry = Json::parse(text);
+  if (entry.at("version") != kCacheVersion)
+    throw levelset::InvalidInput("cache: it is of another version");
+  return entry;
 }
 
 std::int64_t nanoseconds(const timespec& time) {
@@ -139,8 +159,7 @@ bool Cache::has(const std::string& key) const {
 
 std::optional<CachedStep> Cache::step(const std::string& key) const {
   try {
-    const Json json = Json::parse(contentsOf(place(key, kEntry)));
-    if (json.at("version") != kCacheVersion) return {};
+    const Json json = readEntry(place(key, kEntry));
     CachedStep step{.action = json.at("action").get<std::string>(),
                     .notes = notesOf(json.at("step")),
                     .output = json.at("output").get<std::string>(),
@@ -158,7 +177,7 @@ std::optional<CachedStep> Cache::step(const std::string& key) const {
 
 std::optional<Value> Cache::value(const std::string& key, std::size_t maxMemory) const {
   try {
-    const Json json = Json::parse(contentsOf(place(key, kEntry)));
+    const Json json = readEntry(place(key, kEntry));
     const std::string kind = json.at("kind").get<std::string>();
     if (kind == kindName(Kind::Mesh)) {
       levelset::TriMesh mesh;
@@ -217,7 +236,7 @@ std::string Cache::put(const std::string& key, const CachedStep& step, const Val
       fs::rename(whole, place(key, extension));
     }
     std::ofstream out(entry, std::ios::binary);
-    out << json.dump(1, ' ', false, Json::error_handler_t::replace);
+    out << textOf(json);
     out.close();
     if (!out) throw levelset::IoError("the disk is full");
     fs::rename(entry, place(key, kEntry));
@@ -270,8 +289,7 @@ std::vector<Cache::Entry> Cache::list() const {
         entry.bytes += static_cast<std::uint64_t>(about.st_size);
     const std::optional<CachedStep> known = [&]() -> std::optional<CachedStep> {
       try {
-        return CachedStep{
-            Json::parse(contentsOf(item.path())).at("action").get<std::string>(), {}, {}, {}};
+        return CachedStep{readEntry(item.path()).at("action").get<std::string>(), {}, {}, {}};
       } catch (const std::exception&) {
         return {};
       }

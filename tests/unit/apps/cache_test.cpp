@@ -3,6 +3,7 @@
 #include "apps/pipeline/cache.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -41,6 +42,26 @@ TEST(MeshBytes, BringTheMeshBackBitForBit) {
     EXPECT_FALSE(pipeline::readMeshBytes(damaged, again)) << i;
     EXPECT_FALSE(pipeline::readMeshBytes(bytes.substr(0, i), again)) << i;
   }
+}
+
+TEST(CacheEntry, IsAbsentWhateverByteOfItIsDamaged) {
+  const fs::path folder = fs::temp_directory_path() / ("cache-entry-" + std::to_string(::getpid()));
+  const pipeline::Cache cache(folder);
+  ASSERT_EQ(
+      cache.put("key", {.action = "measure", .notes = {}, .output = "volume 4.19\n", .files = {}},
+                nullptr),
+      "");
+  ASSERT_TRUE(cache.step("key"));
+  EXPECT_EQ(cache.step("key")->output, "volume 4.19\n");
+  const fs::path file = folder / "results" / "key.json";
+  const std::string bytes = support::slurp(file);
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    std::string damaged = bytes;
+    damaged[i] = static_cast<char>(damaged[i] ^ 16);
+    std::ofstream(file, std::ios::binary) << damaged;
+    EXPECT_FALSE(cache.step("key")) << i;
+  }
+  fs::remove_all(folder);
 }
 
 class CacheRun : public ShellTest {
