@@ -66,8 +66,8 @@ class NarrowBand {
 };
 
 /// A region that ends nowhere, and is it one?
-inline const Imath::Box3d kEverywhere(Imath::V3d(Imath::V3d::baseTypeLowest()),
-                                      Imath::V3d(Imath::V3d::baseTypeMax()));
+inline const Imath::Box3d kEverywhere{Imath::V3d{Imath::V3d::baseTypeLowest()},
+                                      Imath::V3d{Imath::V3d::baseTypeMax()}};
 [[nodiscard]] inline bool isEverywhere(const Imath::Box3d& region) {
   return region == kEverywhere;
 }
