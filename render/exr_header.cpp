@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -28,6 +29,8 @@ constexpr std::size_t kMostAttributeBytes = 1 << 24;  // of one; a preview pictu
 /// ZIP packs about 1000 to 1 at best; a header that promises far more than the file holds is
 /// damaged.
 constexpr double kMaxCompression = 5000;
+/// Of one chunk, by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
+constexpr std::array<double, 10> kChunkLines = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
 /// Of one chunk, under any compression; the file holds a number of 8 bytes for each chunk.
 constexpr double kMostLines = 256;
 constexpr double kChunkBytes = 8;
@@ -45,8 +48,9 @@ const std::map<std::string, std::size_t> kSizes = {
 /// Walks through a file, of which only the headers are read.
 class ExrHeaderReader {
  public:
-  explicit ExrHeaderReader(const std::filesystem::path& path)
+  ExrHeaderReader(const std::filesystem::path& path, std::size_t maxMemory)
       : name_(path.string()),
+        maxMemory_(static_cast<double>(maxMemory)),
         in_(path, std::ios::binary),
         left_(static_cast<std::size_t>(std::filesystem::file_size(path))),
         fileBytes_(static_cast<double>(left_)) {}
@@ -63,6 +67,7 @@ class ExrHeaderReader {
   struct Part {
     double width = 0, height = 0, channels = 0;
     double tileWidth = 0, tileHeight = 0;  // 0: rows
+    std::size_t compression = 0;
   };
 
   /// @return false at the empty header that ends those of a file of many parts
@@ -80,6 +85,8 @@ class ExrHeaderReader {
       checkSize(name, type, value);
       if (name == "dataWindow" && type == "box2i") readWindow(value, part);
       if (name == "tiles" && type == "tiledesc") readTiles(value, part);
+      if (name == "compression" && type == "compression")
+        part.compression = static_cast<unsigned char>(value[0]);
       if (type == "chlist") {
         const double count = channelCount(value);
         if (name == "channels") part.channels = count;
@@ -165,9 +172,22 @@ class ExrHeaderReader {
         refuse(fmt::format("it has tiles of {:.0f}x{:.0f} for {:.0f}x{:.0f} pixels", part.tileWidth,
                            part.tileHeight, part.width, part.height));
       requireChunks(pixels / (part.tileWidth * part.tileHeight));
+      requireChunkMemory(part, part.tileWidth * part.tileHeight);
     } else {
       requireChunks(part.height / kMostLines);
+      const bool isKnown = part.compression < kChunkLines.size();
+      requireChunkMemory(part, part.width * (isKnown ? kChunkLines[part.compression] : kMostLines));
     }
+  }
+
+  /// A chunk is held packed and unpacked, as large as it may be, however few lines there are.
+  void requireChunkMemory(const Part& part, double pixels) const {
+    const double bytes = 2 * 4 * pixels * part.channels;
+    if (bytes <= maxMemory_) return;
+    throw levelset::ResourceLimit(
+        fmt::format("read image: {} has chunks of {:.3g} MB, which pass the limit of {:.3g} MB; "
+                    "raise --max-memory",
+                    name_, bytes * 1e-6, maxMemory_ * 1e-6));
   }
 
   void requireChunks(double count) const {
@@ -206,6 +226,7 @@ class ExrHeaderReader {
   }
 
   std::string name_;
+  double maxMemory_;
   std::ifstream in_;
   std::size_t left_;
   double fileBytes_;
@@ -213,8 +234,8 @@ class ExrHeaderReader {
 
 }  // namespace
 
-void checkExrHeader(const std::filesystem::path& path) {
-  ExrHeaderReader(path).check();
+void checkExrHeader(const std::filesystem::path& path, std::size_t maxMemory) {
+  ExrHeaderReader(path, maxMemory).check();
 }
 
 }  // namespace render

@@ -277,7 +277,7 @@ Image readExr(const std::filesystem::path& path, std::size_t maxMemory) {
                               probe ? "is a folder" : std::strerror(errno)));
   }
   try {
-    checkExrHeader(path);
+    checkExrHeader(path, maxMemory);
     Imf::InputFile file(name.c_str(), 0);
     return readOpenExr(file, name, maxMemory);
   } catch (const levelset::Error&) {
