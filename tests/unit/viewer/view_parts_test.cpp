@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <fstream>
@@ -218,6 +219,11 @@ TEST(PatchOverlay, SurvivesWhatLiesBehindTheEyeAndBesideThePicture) {
       for (const PatchLines lines : {PatchLines::Outline, PatchLines::Base, PatchLines::All}) {
         Canvas canvas{7, 3, std::vector<std::uint8_t>(4 * 7 * 3, 0)};
         drawPatches({patch, mapping::Patch{}}, lines, camera, picture, 1e-3, canvas);
+        ASSERT_EQ(canvas.colours.size(), 4u * 7 * 3);
+        const bool isDrawn = std::any_of(canvas.colours.begin(), canvas.colours.end(),
+                                         [](std::uint8_t value) { return value > 0; });
+        EXPECT_TRUE(isDrawn || isOrtho || z != 5.0);
+        EXPECT_FALSE(isDrawn && !isOrtho && z < 0) << "behind the eye";
       }
     }
   }
