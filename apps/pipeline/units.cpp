@@ -85,10 +85,10 @@ Length parseLength(std::string_view text, std::string_view where) {
     length.unit = Unit::Voxels;
   } else if (unit == "%") {
     length.unit = Unit::Percent;
-  } else if (!unit.empty()) {
+  } else if (!unit.empty() && unit != "mm") {
     throw UsageError(
-        fmt::format("{}: '{}' has an unknown unit '{}'; a length is 0.5 (world units), 2vx "
-                    "(voxels) or 1% (of the diagonal)",
+        fmt::format("{}: '{}' has an unknown unit '{}'; a length is 0.5 or 0.5mm (world units), "
+                    "2vx (voxels) or 1% (of the diagonal)",
                     where, text, unit));
   }
   return length;

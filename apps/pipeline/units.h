@@ -16,7 +16,7 @@ namespace pipeline {
 
 enum class Unit { World, Voxels, Percent };
 
-/// A length as it was written: `0.5`, `2vx`, `1%`.
+/// A length as it was written: `0.5`, `2vx`, `1%`. A world unit may be written as `0.5mm`.
 struct Length {
   double number = 0;
   Unit unit = Unit::World;

@@ -18,6 +18,10 @@ TEST(Units, ReadsLengthsInThreeUnits) {
   EXPECT_EQ(parseLength("-1e-2%", "t").unit, Unit::Percent);
   EXPECT_DOUBLE_EQ(parseLength("-1e-2%", "t").number, -0.01);
   EXPECT_DOUBLE_EQ(parseLength("+3", "t").number, 3);
+  EXPECT_EQ(parseLength("0.1mm", "t").unit, Unit::World);
+  EXPECT_DOUBLE_EQ(parseLength("0.1mm", "t").number, 0.1);
+  for (const char* bad : {"1cm", "1m", "1mmm", "1MM", "mm", "1 mm"})
+    EXPECT_THROW((void)parseLength(bad, "t"), UsageError) << bad;
 }
 
 TEST(Units, UsesPointsWhateverTheLocale) {
