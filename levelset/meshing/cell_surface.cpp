@@ -147,6 +147,15 @@ void CellSurface::collectBlocks() {
     block.fill = fill;
     blocks_.push_back(block);
   }
+  // As a tree has its leaves: whether one is there changes with the width of the band, and the
+  // triangles are not to change with that.
+  std::sort(blocks_.begin(), blocks_.end(), [](const SurfaceBlock& a, const SurfaceBlock& b) {
+    for (const int nodeSide : {4096, 128, kSide}) {
+      const Coord first = a.origin & -nodeSide, second = b.origin & -nodeSide;
+      if (first != second) return first < second;
+    }
+    return false;
+  });
 }
 
 void CellSurface::linkBlocks() {
