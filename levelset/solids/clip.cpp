@@ -28,9 +28,10 @@ Imath::Box3d worldBounds(const openvdb::FloatGrid& grid, const openvdb::CoordBBo
 openvdb::CoordBBox solidBounds(const openvdb::FloatGrid& grid) {
   openvdb::CoordBBox bounds = grid.evalActiveVoxelBoundingBox();
   openvdb::CoordBBox tile;
-  for (auto it = grid.tree().cbeginValueAll(); it; ++it)
-    if (it.getDepth() < openvdb::FloatTree::DEPTH - 1 && *it < 0 && it.getBoundingBox(tile))
-      bounds.expand(tile);
+  auto it = grid.tree().cbeginValueAll();
+  it.setMaxDepth(openvdb::FloatTree::DEPTH - 2);
+  for (; it; ++it)
+    if (*it < 0 && it.getBoundingBox(tile)) bounds.expand(tile);
   return bounds;
 }
 

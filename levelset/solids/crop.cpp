@@ -1,7 +1,6 @@
 #include "levelset/solids/crop.h"
 
 #include <fmt/core.h>
-#include <openvdb/tools/Prune.h>
 
 #include <vector>
 
@@ -28,10 +27,12 @@ NarrowBand cropped(NarrowBand band, const BandPart& part) {
       openvdb::FloatGrid::Ptr rest = openvdb::FloatGrid::create(whole.background());
       rest->insertMeta(whole);
       rest->setTransform(whole.transform().copy());
-      for (auto it = whole.tree().cbeginValueAll(); it; ++it)
-        if (it.getDepth() < openvdb::FloatTree::DEPTH - 1 && *it < 0)
-          rest->tree().addTile(openvdb::FloatTree::DEPTH - 1 - it.getDepth(), it.getCoord(), *it,
-                               false);
+      auto tile = whole.tree().cbeginValueAll();
+      tile.setMaxDepth(openvdb::FloatTree::DEPTH - 2);
+      for (; tile; ++tile)
+        if (*tile < 0)
+          rest->tree().addTile(openvdb::FloatTree::DEPTH - 1 - tile.getDepth(), tile.getCoord(),
+                               *tile, false);
       for (auto leaf = whole.tree().cbeginLeaf(); leaf; ++leaf)
         if (blocks.isInside(leaf->origin())) rest->tree().addLeaf(new Leaf(*leaf));
       band = makeBand(rest);

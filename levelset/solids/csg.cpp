@@ -36,6 +36,47 @@ const char* nameOf(CsgOperation operation) {
   return "";
 }
 
+/// Replaces nodes by tiles where they are beyond the band and on one side of the surface. OpenVDB's
+/// pruneLevelSet() goes by a node's first value, which is right of closed bands alone: a part of
+/// one (crop.h) may end between the two sides.
+class PruneOneSided {
+ public:
+  explicit PruneOneSided(float background) : background_(background) {}
+
+  void operator()(FloatTree::RootNodeType& root) const {
+    for (auto child = root.beginChildOn(); child; ++child)
+      if (isOneSided(*child)) root.addTile(child.getCoord(), tileOf(*child), false);
+    root.eraseBackgroundTiles();
+  }
+  template <typename Node>
+  void operator()(Node& node) const {
+    for (auto child = node.beginChildOn(); child; ++child)
+      if (isOneSided(*child)) node.addTile(child.pos(), tileOf(*child), false);
+  }
+  void operator()(FloatTree::LeafNodeType&) const {}
+
+ private:
+  template <typename Node>
+  static bool isOneSided(const Node& node) {
+    if (!node.isInactive()) return false;
+    const bool isInside = node.getFirstValue() < 0;
+    for (auto value = node.cbeginValueOff(); value; ++value)
+      if ((*value < 0) != isInside) return false;
+    return !node.cbeginChildOn();
+  }
+  template <typename Node>
+  [[nodiscard]] float tileOf(const Node& node) const {
+    return std::copysign(background_, node.getFirstValue());
+  }
+
+  float background_;
+};
+
+void pruneOneSided(FloatTree& tree) {
+  openvdb::tree::NodeManager<FloatTree, FloatTree::DEPTH - 2> nodes(tree);
+  nodes.foreachBottomUp(PruneOneSided(tree.background()));
+}
+
 /// Cuts the band where |φ| passes `background`.
 void endBandAt(FloatGrid& grid, float background) {
   openvdb::tree::LeafManager<FloatTree> leaves(grid.tree());
@@ -50,7 +91,7 @@ void endBandAt(FloatGrid& grid, float background) {
   for (auto it = grid.tree().beginValueOff(); it; ++it)
     if (it.getDepth() < FloatTree::DEPTH - 1) it.setValue(std::copysign(background, *it));
   grid.tree().root().setBackground(background, /*updateChildNodes=*/false);
-  openvdb::tools::pruneLevelSet(grid.tree());
+  pruneOneSided(grid.tree());
 }
 
 /// Negative zero and zero compare equal but are not the same bits.
@@ -169,7 +210,7 @@ void redistanceAbout(const std::vector<openvdb::Coord>& faces, FloatGrid& grid,
       grid.tree().addTile(1, block, std::copysign(background, made->tree().getValue(block)), false);
     }
   }
-  openvdb::tools::pruneLevelSet(grid.tree());
+  pruneOneSided(grid.tree());
 }
 
 }  // namespace
@@ -228,7 +269,7 @@ FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const F
   }
   if (operation == CsgOperation::Difference) clearSignOfZeros(result->tree());
   correctSeam(*result, a, b, signs);
-  openvdb::tools::pruneLevelSet(result->tree());
+  pruneOneSided(result->tree());
   // Where they end at an edge of the result no plane tells how far it is.
   const std::vector<openvdb::Coord> faces = coincidentFaces(first, second, signs);
   if (!faces.empty() && eikonal::hasZeroCrossing(result->tree()))
