@@ -178,21 +178,25 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
     addOpenSurface(local, field, options.halfWidth, maxMemory, subProgress(progress, 0.5, 0.6));
 
   // === Distances
+  const BandPart part = field.isOpen() ? BandPart() : options.part;
+  const double halfWidth = std::min(options.halfWidth, part.halfWidth);
   std::optional<openvdb::CoordBBox> region;
-  if (!isEverywhere(options.region) && !field.isOpen()) {
+  if (!isEverywhere(part.region)) {
     Imath::Box3d reached = bounds(mesh);
-    const V3d rim((options.halfWidth + 1) * voxelSize);
+    const V3d rim((halfWidth + 1) * voxelSize);
     reached = {reached.min - rim, reached.max + rim};
     for (int axis = 0; axis < 3; ++axis) {
-      reached.min[axis] = std::max(reached.min[axis], options.region.min[axis]);
-      reached.max[axis] = std::min(reached.max[axis], options.region.max[axis]);
+      reached.min[axis] = std::max(reached.min[axis], part.region.min[axis]);
+      reached.max[axis] = std::min(reached.max[axis], part.region.max[axis]);
     }
     if (reached.isEmpty())
-      throw InvalidInput("level-set: the region that is asked for lies beyond the mesh");
+      throw InvalidInput(
+          "level-set: the region that is asked for lies beyond the mesh; ask for one that meets "
+          "it");
     region = blocksOf(reached, *uniformTransform(voxelSize));
   }
-  const auto grid = convert::assembleBand(local, field, origin, voxelSize, options.halfWidth,
-                                          region, maxMemory, subProgress(progress, 0.6, 1));
+  const auto grid = convert::assembleBand(local, field, origin, voxelSize, halfWidth, region,
+                                          maxMemory, subProgress(progress, 0.6, 1));
   certificate.ambiguousShare = convert::ambiguousShare(*grid, field, origin);
   if (options.certified) options.certified(certificate);
   checkResult(*grid, certificate, options);

@@ -7,6 +7,7 @@
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
+#include "levelset/solids/crop.h"
 
 /// Exact signed distances of a triangle mesh on the voxels of a band.
 namespace levelset {
@@ -39,9 +40,9 @@ struct MeshToBandOptions {
   Nesting nesting = Nesting::Parity;    ///< read under Closed only
   bool signAnyway = false;              ///< accept a sign that is a guess, or no inside
   bool searchSelfIntersections = true;  ///< when false, Auto trusts the mesh to have none
-  /// World; distances are made only there, as cropped() leaves them, unless the mesh has holes: the
-  /// certificate tells of the whole of it.
-  Imath::Box3d region = kEverywhere;
+  /// Distances are made only there, as cropped() leaves them, unless the mesh has holes. The
+  /// certificate tells of the whole mesh, but for the ambiguous share.
+  BandPart part = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
   /// Told the certificate once it is whole, also when the mesh is refused after it.

@@ -40,10 +40,10 @@ double longestSide(const Value& value) {
 }
 
 Value levelSet(Invocation& in) {
-  levelset::MeshToBandOptions options{.halfWidth = in.neededHalfWidth(in.number("half-width")),
+  levelset::MeshToBandOptions options{.halfWidth = in.number("half-width"),
                                       .signAnyway = in.flag("sign-anyway"),
                                       .searchSelfIntersections = !in.flag("trust-mesh"),
-                                      .region = in.part.region,
+                                      .part = in.part,
                                       .maxMemory = in.maxMemory,
                                       .progress = in.progress};
   const std::string sign = in.text("sign");
