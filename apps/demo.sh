@@ -1,13 +1,14 @@
 #!/bin/sh
-# The main job: a dragon stands on a bunny's back, as one solid. demo.sh COMMAND FOLDER
+# The main job: a dragon stands on a bunny's back, as one solid. demo.sh COMMAND FOLDER [GLOBAL OPTIONS]
 set -eu
 levelsmith=$1
 out=$2
+shift 2
 models=$(dirname "$0")/../data/models
 mkdir -p "$out"
 
 if [ -f "$models/bunny.obj" ] && [ -f "$models/dragon_vrip.ply.gz" ]; then
-  "$levelsmith" -v --report "$out/report.json" \
+  "$levelsmith" "$@" -v --report "$out/report.json" \
     read "$models/bunny.obj" ! level-set --resolution 400 --as bunny \
     ! read "$models/dragon_vrip.ply.gz" ! transform --rotate 90,0,0 ! level-set --resolution 400 --as dragon \
     ! patch @bunny --height 0.33 --levels 6 --as back \
@@ -19,7 +20,7 @@ if [ -f "$models/bunny.obj" ] && [ -f "$models/dragon_vrip.ply.gz" ]; then
     ! mesh ! write "$out/dragon-on-bunny.ply" ! measure > "$out/measure.txt"
 else
   echo "The scanned models are not in data/models (./dev fetch brings them): a knot of tubes stands on a ball instead."
-  "$levelsmith" -v --report "$out/report.json" \
+  "$levelsmith" "$@" -v --report "$out/report.json" \
     sphere --radius 20 --voxel 0.25 --as base \
     ! torus --radius 4 --tube 1.5 --voxel 0.125 ! torus --radius 4 --tube 1.5 --axis 1,0,0 --voxel 0.125 ! union --as knot \
     ! patch @base --at 0,20,0 --size 16,16 --height auto --as top \

@@ -132,7 +132,12 @@ int runGraph(const pipeline::Graph& graph) {
   const bool dataOnly = claimsStandardOutput(graph), json = claimsJson(graph);
 
   if (globals.contains("explain")) {
-    printAll(pipeline::explain(graph, maxMemory, globals.contains("whole")));
+    for (const char* option : {"tolerance", "report"})
+      if (globals.contains(option))
+        throw levelset::UsageError(fmt::format(
+            "--explain: nothing runs, so --{} has nothing to tell; leave one of them out", option));
+    pipeline::explain(graph, maxMemory, globals.contains("whole") || globals.contains("cache"),
+                      printAll);
     return static_cast<int>(ExitCode::Done);
   }
 

@@ -158,8 +158,9 @@ std::optional<std::string> CacheKeys::keyOf(const Value& given) const {
 std::vector<std::optional<std::string>> CacheKeys::of(const Graph& graph,
                                                       const std::vector<char>& needed) const {
   std::vector<std::optional<std::string>> keys(graph.nodes.size());
+  const auto writers = findWritersRead(graph, needed);
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-    if (!needed[i]) continue;
+    if (!needed[i] || writers[i]) continue;
     const auto given = graph.given.find(i);
     keys[i] =
         given == graph.given.end() ? keyOf(graph, graph.nodes[i], keys) : keyOf(given->second);

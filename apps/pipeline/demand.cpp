@@ -53,9 +53,9 @@ Demand readOf(const Node& node, std::size_t operand, const Demand& of,
 }
 
 /// Without what is no less than all.
-Demand simplified(Demand demand, const Plan& plan, bool isDistance) {
+Demand simplified(Demand demand, const Plan& plan, bool isDistance, double leastHalfWidth) {
   double& width = demand.part.halfWidth;
-  width = std::max(1.0, width);
+  width = std::max(leastHalfWidth, width);
   if (!isDistance || width >= plan.halfWidth) width = levelset::BandPart().halfWidth;
   Box3d& region = demand.part.region;
   const V3d rim(plan.halfWidth * plan.voxelSize);
@@ -73,14 +73,9 @@ void Demand::join(const Demand& other) {
   part.region.extendBy(other.part.region);
 }
 
-bool mayAskForLess(const Graph& graph, const std::vector<char>& runs) {
-  for (std::size_t i = 0; i < graph.nodes.size(); ++i)
-    if (runs[i] && graph.nodes[i].op->reads) return true;
-  return false;
-}
-
 std::vector<Demand> demandsOf(const Graph& graph, const std::vector<char>& runs,
-                              const std::vector<std::optional<Plan>>& plans) {
+                              const std::vector<std::optional<Plan>>& plans,
+                              double leastHalfWidth) {
   const std::vector<char> isDistance = findDistances(graph);
   std::vector<std::optional<Demand>> demands(graph.nodes.size());
   for (const std::size_t result : graph.results) demands[result] = Demand{};
@@ -88,7 +83,7 @@ std::vector<Demand> demandsOf(const Graph& graph, const std::vector<char>& runs,
     const Node& node = graph.nodes[i];
     if (!runs[i]) continue;
     if (demands[i] && node.kind == Kind::Band && plans[i])
-      demands[i] = simplified(*demands[i], *plans[i], isDistance[i] != 0);
+      demands[i] = simplified(*demands[i], *plans[i], isDistance[i] != 0, leastHalfWidth);
     else
       demands[i] = Demand{};
     const auto ask = [&](std::size_t input, const Demand& demand) {

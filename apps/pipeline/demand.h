@@ -21,12 +21,11 @@ struct Demand {
 /// What is read of each node's value, going backwards through those that run.
 /// @param runs   by node
 /// @param plans  of whole values; empty where nothing is known, and all is asked for
+/// @param leastHalfWidth  voxels, at least 1: what is read of each band in any case
 /// @return       whole for what runs not, and for what is no band
 [[nodiscard]] std::vector<Demand> demandsOf(const Graph& graph, const std::vector<char>& runs,
-                                            const std::vector<std::optional<Plan>>& plans);
-
-/// Might somebody read less than the whole of anything? If not, there is nothing to plan for.
-[[nodiscard]] bool mayAskForLess(const Graph& graph, const std::vector<char>& runs);
+                                            const std::vector<std::optional<Plan>>& plans,
+                                            double leastHalfWidth = 1);
 
 /// What a band of that plan is, as far as it is asked for.
 [[nodiscard]] Plan demanded(Plan plan, const Demand& demand);

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "apps/pipeline/invocation.h"
 #include "levelset/error.h"
@@ -66,6 +67,59 @@ void checkNamed(const Node& node, const std::vector<Node>& before) {
   }
 }
 
+std::vector<std::string> targetsOf(const Node& node) {
+  if (!node.op->targets) return {};
+  return node.op->targets(Invocation(*node.op, node.options));
+}
+
+std::vector<std::string> filesRead(const Node& node) {
+  const std::vector<std::string> targets = targetsOf(node);
+  std::vector<std::string> files;
+  for (const Param& param : node.op->params) {
+    if (param.type != ParamType::Path) continue;
+    const auto given = node.options.find(param.name);
+    if (given == node.options.end()) continue;
+    if (std::find(targets.begin(), targets.end(), given->second) == targets.end())
+      files.push_back(given->second);
+  }
+  return files;
+}
+
+/// A scene names files that it does not hold, and a '#' stands for numbers.
+bool standsForOthers(const std::filesystem::path& file) {
+  return file.extension() == ".json" || file.string().find('#') != std::string::npos;
+}
+
+/// What has been written by now, and by which node last.
+class Written {
+ public:
+  void add(const std::string& target, std::size_t writer) {
+    if (target == "-") return;
+    writers_[placeOf(target)] = writer;
+    last_ = writer;
+  }
+
+  /// Itself, or a folder that it is in.
+  [[nodiscard]] std::optional<std::size_t> find(const std::string& file) const {
+    if (!last_ || standsForOthers(file)) return last_;
+    std::optional<std::size_t> found;
+    for (std::filesystem::path place = placeOf(file);; place = place.parent_path()) {
+      if (const auto it = writers_.find(place); it != writers_.end())
+        found = std::max(found, std::optional(it->second));
+      if (!place.has_relative_path()) return found;
+    }
+  }
+
+ private:
+  static std::filesystem::path placeOf(const std::string& file) {
+    std::error_code ignored;
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(file, ignored), ignored);
+  }
+
+  std::map<std::filesystem::path, std::size_t> writers_;
+  std::optional<std::size_t> last_;
+};
+
 }  // namespace
 
 const Operator& givenOperator() {
@@ -98,8 +152,7 @@ std::vector<char> neededNodes(const Graph& graph) {
   const std::vector<Node>& nodes = graph.nodes;
   // An operator that makes a value and writes files beside it is not there for the value alone.
   const auto actsOutside = [](const Node& node) {
-    return !node.makes() ||
-           (node.op->targets && !node.op->targets(Invocation(*node.op, node.options)).empty());
+    return !node.makes() || !targetsOf(node).empty();
   };
   std::vector<char> needed(nodes.size(), 0);
   for (std::size_t i = 0; i < nodes.size(); ++i) needed[i] = actsOutside(nodes[i]) ? 1 : 0;
@@ -112,6 +165,19 @@ std::vector<char> neededNodes(const Graph& graph) {
     for (const auto& [option, input] : nodes[i].named) needed[input] = 1;
   }
   return needed;
+}
+
+std::vector<std::optional<std::size_t>> findWritersRead(const Graph& graph,
+                                                        const std::vector<char>& needed) {
+  std::vector<std::optional<std::size_t>> writers(graph.nodes.size());
+  Written written;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    if (!needed[i]) continue;
+    for (const std::string& file : filesRead(graph.nodes[i]))
+      writers[i] = std::max(writers[i], written.find(file));
+    for (const std::string& target : targetsOf(graph.nodes[i])) written.add(target, i);
+  }
+  return writers;
 }
 
 std::vector<std::size_t> countUses(const Graph& graph, const std::vector<char>& needed) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,11 @@ void leaveVoxelOpen(Node& node);
 /// itself, that is for what it writes, draws, prints or checks? Where there is nothing of either
 /// kind, everything is.
 [[nodiscard]] std::vector<char> neededNodes(const Graph& graph);
+
+/// By node: the last one before it that writes what it reads, if any does. Until that has run, what
+/// the file holds is something else.
+[[nodiscard]] std::vector<std::optional<std::size_t>> findWritersRead(
+    const Graph& graph, const std::vector<char>& needed);
 
 /// By node: by how many others that are needed its value is taken.
 [[nodiscard]] std::vector<std::size_t> countUses(const Graph& graph,

@@ -295,10 +295,11 @@ const std::vector<Param>& globalParams() {
       {.name = "explain",
        .type = ParamType::Flag,
        .doc = "tell what would run, what not and why, how much of each value is needed and what it "
-              "takes; without computing or writing anything"},
+              "takes; without computing anything or writing a result"},
       {.name = "dry-run",
        .type = ParamType::Flag,
-       .doc = "resolve every parameter and estimate cost, without computing or writing anything"},
+       .doc = "resolve every parameter and estimate cost, without computing anything or writing a "
+              "result"},
   };
   return params;
 }

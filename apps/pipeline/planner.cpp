@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "apps/pipeline/refusal.h"
 #include "levelset/error.h"
@@ -52,21 +53,48 @@ std::string needOf(const Demand& demand, const Plan& plan) {
   return text;
 }
 
+/// Does it read what can be read once only? Planning must not.
+bool readsOnce(const Node& node) {
+  const Invocation probe(*node.op, node.options);
+  if (node.op->usesStandardInput && node.op->usesStandardInput(probe)) return true;
+  return std::any_of(node.op->params.begin(), node.op->params.end(), [&](const Param& param) {
+    std::error_code ignored;
+    const auto given = node.options.find(param.name);
+    return param.type == ParamType::Path && given != node.options.end() &&
+           std::filesystem::is_other(std::filesystem::status(given->second, ignored));
+  });
+}
+
+/// Of its value, as far as that is needed. 0 where nobody knows.
+double bytesOf(const std::optional<Plan>& plan, const Demand& demand) {
+  if (!plan) return 0;
+  const bool isTold =
+      (plan->kind == Kind::Band && plan->voxelSize > 0) || plan->kind == Kind::Field;
+  return isTold ? demanded(*plan, demand).bytes() : 0;
+}
+
 /// Bytes held at once at most: values live from what makes them to the last that takes them.
-double peakBytes(const Graph& graph, const std::vector<char>& runs,
-                 const std::vector<double>& bytes) {
+struct Peak {
+  double bytes = 0;
+  std::size_t node = 0;  ///< that makes the last of them
+};
+
+Peak findPeak(const Graph& graph, const std::vector<char>& runs,
+              const std::vector<std::optional<Plan>>& plans, const std::vector<Demand>& demands) {
   std::vector<std::size_t> uses = countUses(graph, runs);
-  double held = 0, peak = 0;
+  const auto bytes = [&](std::size_t i) { return bytesOf(plans[i], demands[i]); };
+  double held = 0;
+  Peak peak;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     if (!runs[i]) continue;
-    held += bytes[i];
-    peak = std::max(peak, held);
+    held += bytes(i);
+    if (held > peak.bytes) peak = {held, i};
     const auto release = [&](std::size_t input) {
-      if (--uses[input] == 0) held -= bytes[input];
+      if (--uses[input] == 0) held -= bytes(input);
     };
     for (const std::size_t input : graph.nodes[i].inputs) release(input);
     for (const auto& [option, input] : graph.nodes[i].named) release(input);
-    if (uses[i] == 0) held -= bytes[i];
+    if (uses[i] == 0) held -= bytes(i);
   }
   return peak;
 }
@@ -81,13 +109,15 @@ Plan planOf(Invocation& invocation) {
   return plan;
 }
 
-std::vector<std::optional<Plan>> plansOf(
-    const Graph& graph, const std::vector<char>& runs, std::size_t maxMemory,
-    const std::function<std::optional<Plan>(std::size_t)>& mesh) {
-  std::vector<std::optional<Plan>> plans(graph.nodes.size());
+ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs,
+                   const std::function<std::optional<Plan>(std::size_t)>& mesh) {
+  ValuePlans all{std::vector<std::optional<Plan>>(graph.nodes.size()),
+                 std::vector<std::exception_ptr>(graph.nodes.size())};
+  std::vector<std::optional<Plan>>& plans = all.plans;
+  const auto writers = findWritersRead(graph, runs);
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     const Node& node = graph.nodes[i];
-    if (!runs[i] || !node.makes()) continue;
+    if (!runs[i] || !node.makes() || writers[i]) continue;
     if (const auto given = graph.given.find(i); given != graph.given.end()) {
       plans[i] = given->second.plan();
       continue;
@@ -97,7 +127,7 @@ std::vector<std::optional<Plan>> plansOf(
       continue;
     }
     Invocation invocation(*node.op, node.options);
-    bool isKnown = node.op->plan || !node.inputs.empty();
+    bool isKnown = (node.op->plan || !node.inputs.empty()) && !readsOnce(node);
     const auto know = [&](std::size_t input) {
       isKnown = isKnown && plans[input];
       return isKnown ? Value(*plans[input]) : Value(Plan{});
@@ -108,30 +138,37 @@ std::vector<std::optional<Plan>> plansOf(
     }
     for (const auto& [option, input] : node.named) invocation.named.emplace(option, know(input));
     if (!isKnown) continue;
-    invocation.maxMemory = maxMemory;
+    // Of the whole, which need not fit: requireMemoryFor() asks for the part that is made.
     invocation.dryRun = true;
     try {
       plans[i] = planOf(invocation);
     } catch (const levelset::Cancelled&) {
       throw;
     } catch (const levelset::Error&) {
-      // It will be refused in its turn, by what it is really given.
+      all.refusals[i] = std::current_exception();
     }
   }
-  return plans;
+  return all;
 }
 
-void requireMemoryFor(const Graph& graph, const std::vector<std::optional<Plan>>& plans,
+void requireMemoryFor(const Graph& graph, const std::vector<char>& runs,
+                      const std::vector<std::optional<Plan>>& plans,
                       const std::vector<Demand>& demands, std::size_t maxMemory) {
   for (std::size_t i = 0; i < plans.size(); ++i)
     if (plans[i])
       levelset::requireMemory(demanded(*plans[i], demands[i]).bytes(), maxMemory,
                               graph.nodes[i].op->name.c_str());
+  const Peak peak = findPeak(graph, runs, plans, demands);
+  if (peak.bytes > static_cast<double>(maxMemory))
+    levelset::requireMemory(
+        peak.bytes, maxMemory,
+        (graph.nodes[peak.node].op->name + " and the values held beside it").c_str());
 }
 
-std::string explain(const Graph& graph, std::size_t maxMemory, bool wholeValues) {
+void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
+             const std::function<void(const std::string&)>& tell) {
   const std::vector<char> runs = neededNodes(graph);
-  const auto plans = plansOf(graph, runs, maxMemory, [&](std::size_t i) -> std::optional<Plan> {
+  const ValuePlans all = plansOf(graph, runs, [&](std::size_t i) -> std::optional<Plan> {
     const Node& node = graph.nodes[i];
     Invocation invocation(*node.op, node.options);
     invocation.maxMemory = maxMemory;
@@ -139,13 +176,13 @@ std::string explain(const Graph& graph, std::size_t maxMemory, bool wholeValues)
     try {
       return planOf(invocation);
     } catch (const levelset::Error& error) {
-      refuseAs(node.op->name, error);
+      refuseAs(node.op->name, error, node.place);
     }
   });
+  const std::vector<std::optional<Plan>>& plans = all.plans;
   std::vector<Demand> demands(graph.nodes.size());
   if (!wholeValues) demands = demandsOf(graph, runs, plans);
   std::string text;
-  std::vector<double> bytes(graph.nodes.size(), 0);
   double seconds = 0;
   std::size_t untimed = 0;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
@@ -153,13 +190,11 @@ std::string explain(const Graph& graph, std::size_t maxMemory, bool wholeValues)
     text += fmt::format("{:<20} {}", labelOf(node), reasonFor(graph, i, runs));
     if (plans[i]) {
       const Plan plan = demanded(*plans[i], demands[i]);
-      bytes[i] = plan.bytes();
       text += needOf(demands[i], *plans[i]);
       const bool isBand = plan.kind == Kind::Band && plan.voxelSize > 0;
-      if (!isBand && plan.kind != Kind::Field) bytes[i] = 0;  // not known
       if (isBand)
         text += fmt::format("; about {:.3g} voxels of {:.4g}, {:.3g} MB", plan.activeVoxels(),
-                            plan.voxelSize, bytes[i] * 1e-6);
+                            plan.voxelSize, plan.bytes() * 1e-6);
       if (node.op->nanosecondsPerVoxel > 0 && isBand) {
         // What it makes or what it goes through, whichever is more.
         double gone = 0;
@@ -179,10 +214,18 @@ std::string explain(const Graph& graph, std::size_t maxMemory, bool wholeValues)
   }
   text += fmt::format(
       "at most about {:.3g} MB are held at once; about {:.2g} s of one core{}\n",
-      peakBytes(graph, runs, bytes) * 1e-6, seconds,
+      findPeak(graph, runs, plans, demands).bytes * 1e-6, seconds,
       untimed > 0 ? fmt::format(", and {} actions that nobody has timed", untimed) : std::string());
-  requireMemoryFor(graph, plans, demands, maxMemory);
-  return text;
+  tell(text);
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    if (!all.refusals[i]) continue;
+    try {
+      std::rethrow_exception(all.refusals[i]);
+    } catch (const levelset::Error& error) {
+      refuseAs(graph.nodes[i].op->name, error, graph.nodes[i].place);
+    }
+  }
+  requireMemoryFor(graph, runs, plans, demands, maxMemory);
 }
 
 }  // namespace pipeline

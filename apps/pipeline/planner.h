@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <exception>
 #include <functional>
 #include <optional>
 #include <string>
@@ -16,21 +17,30 @@ namespace pipeline {
 /// @throws levelset::Error for what it would refuse
 [[nodiscard]] Plan planOf(Invocation& invocation);
 
+/// What can be told of values before they are made.
+struct ValuePlans {
+  std::vector<std::optional<Plan>> plans;    ///< by node; empty: its size cannot be told
+  std::vector<std::exception_ptr> refusals;  ///< by node: why there is no plan, if that was refused
+};
+
 /// Plans of the values that those which run would make, as far as they can be told.
 /// @param runs  by node
 /// @param mesh  plans a node that reads or makes a mesh of nothing, which may take a while
-[[nodiscard]] std::vector<std::optional<Plan>> plansOf(
-    const Graph& graph, const std::vector<char>& runs, std::size_t maxMemory,
-    const std::function<std::optional<Plan>(std::size_t)>& mesh);
+[[nodiscard]] ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs,
+                                 const std::function<std::optional<Plan>(std::size_t)>& mesh);
 
-/// Refuses what would take more than there is, before anything is made.
+/// Refuses what would take more than there is, before anything is made: one value, or those that
+/// are held at once where they run one after another.
 /// @throws levelset::ResourceLimit, with the action
-void requireMemoryFor(const Graph& graph, const std::vector<std::optional<Plan>>& plans,
+void requireMemoryFor(const Graph& graph, const std::vector<char>& runs,
+                      const std::vector<std::optional<Plan>>& plans,
                       const std::vector<Demand>& demands, std::size_t maxMemory);
 
-/// What would run, and what is left out and why; how much of each value is needed; what it would
-/// take. Reads meshes, and makes and writes nothing.
+/// Tells what would run, and what is left out and why; how much of each value is needed; what it
+/// would take. Reads meshes, and makes and writes nothing.
+/// @param tell  gets the text, also where a refusal follows
 /// @throws as requireMemoryFor, and for what an operator would refuse
-[[nodiscard]] std::string explain(const Graph& graph, std::size_t maxMemory, bool wholeValues);
+void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
+             const std::function<void(const std::string&)>& tell);
 
 }  // namespace pipeline

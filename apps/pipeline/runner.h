@@ -20,9 +20,11 @@ struct RunSettings {
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   bool wholeValues = false;          ///< make all of each value, also where a part of it would do
   std::filesystem::path cache = {};  ///< folder of earlier results; empty: none are kept
+  // Branches run side by side: these are called from several threads, but for progress and goesOn
+  // never at the same time.
   /// Called with the name of each action before it runs.
   std::function<void(const std::string&)> begin = {};
-  /// Called with the action's place in the chain, its name and the fraction done.
+  /// Called with the action's place in the chain, its name and the fraction done, from any thread.
   std::function<void(std::size_t, const std::string&, double)> progress = {};
   /// Asked while an action runs, from any thread; false ends it with levelset::Cancelled.
   std::function<bool()> goesOn = {};
@@ -60,9 +62,10 @@ struct RunReport {
   std::optional<ToleranceReport> tolerance;  ///< of a run with --tolerance
 };
 
-/// Runs those nodes that are needed, in order, and lets values go once the last that takes them has
-/// run. With a cache neither those whose results are known, nor what only they take. A refusal is
-/// recorded in the report and then thrown on.
+/// Runs those nodes that are needed, as if one after another, and lets values go once the last that
+/// takes them has run. Branches run side by side as far as there are threads and memory; what
+/// writes or prints waits for all before it. With a cache neither those run whose results are
+/// known, nor what only they take. A refusal is recorded in the report and then thrown on.
 void run(const Graph& graph, const RunSettings& settings, RunReport& report);
 
 }  // namespace pipeline

@@ -48,6 +48,14 @@ inline Imath::Box3d grown(Imath::Box3d box, double by) {
   return box;
 }
 
+/// Voxels beside a part of a cut or joined solid that the part follows from: a seam is corrected as
+/// far as the band reaches, from all that lies there, and about faces that touch the blocks of 8³
+/// beside them are made again from what lies as far beyond those.
+inline double seamReach(double halfWidth) {
+  constexpr double kBlocks = 3 * 8;
+  return 2 * halfWidth + kBlocks;
+}
+
 inline Param voxelParam(const char* doc = "edge of a voxel") {
   return {.name = "voxel",
           .type = ParamType::Length,

@@ -6,8 +6,10 @@
 #include <string>
 #include <utility>
 
+#include "apps/pipeline/demand.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/camera_options.h"
+#include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
@@ -17,6 +19,7 @@
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"
 #include "render/image.h"
+#include "render/kernel/frame_need.h"
 #include "render/scene.h"
 
 namespace pipeline {
@@ -157,10 +160,15 @@ std::vector<std::string> styleNames() {
   return names;
 }
 
+render::Style styleNamed(const std::string& name) {
+  for (const render::Style style : render::kStyles)
+    if (name == render::styleName(style)) return style;
+  return render::Style::Lit;
+}
+
 render::StyleOptions styleOf(const Invocation& in) {
   render::StyleOptions options;
-  for (const render::Style style : render::kStyles)
-    if (in.text("style") == render::styleName(style)) options.style = style;
+  options.style = styleNamed(in.text("style"));
   if (in.given("curvature-range")) options.curvatureRange = in.number("curvature-range");
   options.lineWidth = in.number("line");
   if (in.given("matcap"))
@@ -235,6 +243,33 @@ Value draw(Invocation& in) {
                       found.reason()));
   }
   return in.operands[0];
+}
+
+/// What the frame sees, where that alone makes the picture: light comes from beside it too, and the
+/// view, the range of curvatures and coarse values are by the size of the whole.
+Demand readOfDraw(Invocation& in, std::size_t, const Demand&) {
+  const render::Style style = styleNamed(in.text("style"));
+  const bool isFramed = in.operands[0].kind() == Kind::Band && in.given("from") && in.given("to") &&
+                        in.text("value-bits") == "32";
+  const bool isOfFrame =
+      !render::usesLights(style) && (style != render::Style::Ink || in.given("curvature-range"));
+  if (!isFramed || !isOfFrame) return {};
+  const Plan plan = in.operands[0].plan();
+  const Imath::Box3d all = grown(plan.bounds, plan.halfWidth * plan.voxelSize);
+  render::Scene scene;
+  scene.camera = cameraOf(in, plan.bounds);
+  const render::FrameNeed need(scene, {.style = {.style = style}}, all);
+  constexpr int kCells = 24;
+  const Imath::V3d side = all.size() / kCells;
+  Imath::Box3d seen;
+  for (int i = 0; i < kCells * kCells * kCells; ++i) {
+    const Imath::V3d low =
+        all.min + side * Imath::V3d(i % kCells, i / kCells % kCells, i / (kCells * kCells));
+    if (need.needs(low + side / 2, side.length() / 2)) seen.extendBy(Imath::Box3d(low, low + side));
+  }
+  if (seen.isEmpty()) return {};  // nothing is seen, and that has to be told of the whole
+  constexpr double kRead = 8;     // voxels beside what is seen: by normals, curvatures and splines
+  return {{.region = grown(seen, kRead * plan.voxelSize)}};
 }
 
 Plan planDraw(Invocation& in) {
@@ -449,6 +484,7 @@ void addPictureOperators(std::vector<Operator>& all) {
       .flow = Flow::PassesThrough,
       .run = draw,
       .plan = planDraw,
+      .reads = readOfDraw,
       .validate = validateDraw,
       .targets = targetsOf,
       .usesStandardOutput =

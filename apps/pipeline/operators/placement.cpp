@@ -57,19 +57,19 @@ Plan planClip(Invocation& in) {
   return plan;
 }
 
+/// As of any intersection, and no further off the box than where that is further than the band
+/// reaches, whatever is there.
 Demand readOfClip(Invocation& in, std::size_t, const Demand& of) {
-  Demand read = of;
-  if (!in.given("box")) return read;
-  const double voxel = in.planned->voxelSize;
-  const double width = std::min(of.part.halfWidth, in.planned->halfWidth);
-  // Further off the box itself is further than the band reaches, whatever is there.
-  Imath::Box3d box = grown(in.box("box"), (width + 2) * voxel);
-  for (int axis = 0; axis < 3; ++axis) {
-    box.min[axis] = std::max(box.min[axis], of.part.region.min[axis] - 2 * voxel);
-    box.max[axis] = std::min(box.max[axis], of.part.region.max[axis] + 2 * voxel);
+  const double voxel = in.planned->voxelSize, width = in.planned->halfWidth;
+  Imath::Box3d asked = grown(of.part.region, seamReach(width) * voxel);
+  if (in.given("box")) {
+    const Imath::Box3d box = grown(in.box("box"), (width + 2) * voxel);
+    for (int axis = 0; axis < 3; ++axis) {
+      asked.min[axis] = std::max(asked.min[axis], box.min[axis]);
+      asked.max[axis] = std::min(asked.max[axis], box.max[axis]);
+    }
   }
-  read.part.region = box;
-  return read;
+  return {{.region = asked}};
 }
 
 M44d rotationMatrix(const Invocation& in) {

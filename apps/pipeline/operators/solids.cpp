@@ -28,14 +28,11 @@ std::vector<NarrowBand> bands(const Invocation& in) {
   return all;
 }
 
-/// A seam is corrected as far as the band reaches, and about faces that touch whole blocks are made
-/// again from what lies as far beyond them.
 Demand readOfCsg(Invocation& in, std::size_t, const Demand& of) {
+  const double voxel = in.planned->voxelSize;
   for (const Value& operand : in.operands)
-    if (operand.plan().voxelSize != in.planned->voxelSize) return {};  // one is resampled
-  // A seam is corrected out to where the band ends, from all that lies there.
-  return {
-      {.region = grown(of.part.region, (2 * in.planned->halfWidth + 24) * in.planned->voxelSize)}};
+    if (std::abs(operand.plan().voxelSize / voxel - 1) > 1e-9) return {};  // one is resampled
+  return {{.region = grown(of.part.region, seamReach(in.planned->halfWidth) * voxel)}};
 }
 
 template <CsgOperation operation>
@@ -107,8 +104,9 @@ void validateOffset(const Invocation& in) {
 
 Value offset(Invocation& in) {
   levelset::OffsetOptions options = offsetOptions(in);
-  // As wide as the whole: how far points travel shows in last bits.
-  if (in.planned) options.halfWidth = in.planned->halfWidth;
+  // Of a part, as wide as of the whole: how far points travel shows in last bits.
+  if (in.planned && in.band().halfWidth() < in.planned->halfWidth * (1 - 1e-5))
+    options.halfWidth = in.planned->halfWidth;
   const std::optional<levelset::Mask> mask = maskOf(in);
   NarrowBand band = in.band();
   if (!mask && !in.given("by")) {

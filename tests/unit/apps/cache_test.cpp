@@ -134,6 +134,20 @@ TEST_F(CacheRun, GoesByWhatFilesHold) {
   EXPECT_LE(ran(), 3u);
 }
 
+TEST_F(CacheRun, DoesNotTakeAFileForWhatAnActionBeforeMakesOfIt) {
+  const std::string ball = "sphere --radius 1 --voxel 0.1 ! write a.vdb",
+                    box = "box --size 1,2,3 --voxel 0.1 ! write a.vdb",
+                    rest = " ! read a.vdb ! offset 0.1 ! measure --json";
+  ASSERT_EQ(levelsmith(ball).code, 0);
+  const auto ofBox = levelsmith("--cache c " + box + rest);  // a ball is there before
+  ASSERT_EQ(ofBox.code, 0) << ofBox.err;
+  ASSERT_EQ(levelsmith(ball).code, 0);
+  const auto ofBall = levelsmith("--cache c " + rest.substr(3));
+  ASSERT_EQ(ofBall.code, 0) << ofBall.err;
+  EXPECT_NE(ofBall.out, ofBox.out);
+  EXPECT_EQ(ofBall.out, levelsmith(ball + rest).out);
+}
+
 TEST_F(CacheRun, KeepsFieldsNotesAndWarnings) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! mesh ! write s.ply").code, 0);
   const std::string line =

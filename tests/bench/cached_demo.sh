@@ -1,0 +1,20 @@
+#!/bin/sh
+# The main demo with a cache, twice: cached_demo.sh LEVELSMITH. Ends with 1 where the second run, which has
+# nothing to compute, takes a second or more, or leaves other files.
+set -eu
+levelsmith=$1
+demo=$(dirname "$0")/../../apps/demo.sh
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+took() {
+  begin=$(date +%s.%N)
+  "$demo" "$levelsmith" "$folder/out" --cache "$folder/cache" >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
+  echo "$begin $(date +%s.%N)" | awk '{ printf "%.2f", $2 - $1 }'
+}
+first=$(took)
+(cd "$folder/out" && md5sum -- *.vdb *.ply *.png *.exr measure.txt) >"$folder/first"
+second=$(took)
+(cd "$folder/out" && md5sum -- *.vdb *.ply *.png *.exr measure.txt) >"$folder/second"
+cmp "$folder/first" "$folder/second"
+grep -q "nothing was computed" "$folder/log"
+echo "$first $second" | awk '{ printf "the main demo: %.1f s, again from the cache %.2f s, bound < 1%s\n", $1, $2, $2 < 1 ? "" : "  missed"; exit $2 >= 1 }'
