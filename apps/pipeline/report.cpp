@@ -10,6 +10,7 @@
 
 #include "apps/pipeline/refusal.h"
 #include "apps/pipeline/text_file.h"
+#include "apps/pipeline/versions.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 
@@ -143,6 +144,7 @@ bool isHtml(const std::filesystem::path& path) {
 std::string reportJson(const RunReport& report) {
   Json json;
   json["version"] = LEVELSMITH_VERSION;
+  for (const auto& [name, version] : programVersions()) json["versions"][name] = version;
   json["exit_code"] = report.exitCode;
   if (report.dryRun) json["dry_run"] = true;
   if (!report.error.empty()) json["error"] = report.error;

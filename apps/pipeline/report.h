@@ -8,8 +8,8 @@
 
 namespace pipeline {
 
-/// The report as JSON: an object with `version`, `graph` (which `run` takes, as a file of its own),
-/// `steps`, `tolerance` where one was asked for, `left_out`, `warnings`, `exit_code`, `error`.
+/// The report as JSON: an object with `version`, `versions` of all libraries, `graph` (which
+/// `run` takes, as a file of its own), `steps`, `tolerance` where one was asked for, `left_out`, `warnings`, `exit_code`, `error`.
 [[nodiscard]] std::string reportJson(const RunReport& report);
 /// The same as a page.
 [[nodiscard]] std::string reportHtml(const RunReport& report);
