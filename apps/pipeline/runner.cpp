@@ -333,6 +333,9 @@ class GraphRun {
     if (!step.notes.failure.empty()) step.notes.warnings.push_back(step.notes.failure);
   }
 
+  /// Of the step that was begun last.
+  [[nodiscard]] bool asksThumbnail() const { return report_.steps.size() <= settings_.thumbnails; }
+
   /// What is known of a node is told again, and its value brought where one is taken.
   void recall(std::size_t i) {
     const Node& node = graph_.nodes[i];
@@ -351,6 +354,7 @@ class GraphRun {
       }
     if (value) {
       describeResult(*value, false, step);
+      if (asksThumbnail()) step.thumbnail = thumbnailOf(*value, settings_.maxMemory);
       if (settings_.made) settings_.made(i, *value);
       values_.put(i, std::move(*value));
     }
@@ -456,6 +460,7 @@ class GraphRun {
         clock.stop();
         keep(index, invocation, value);
         if (node.makes()) {
+          if (asksThumbnail()) step.thumbnail = thumbnailOf(value, settings_.maxMemory);
           if (settings_.made) settings_.made(index, value);
           values_.put(index, std::move(value));
         }
