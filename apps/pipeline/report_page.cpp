@@ -56,6 +56,7 @@ thead th { font-size: 12px; font-weight: 600; color: var(--faint); white-space: 
 tbody { border-top: 1px solid var(--line); }
 tbody th { font-weight: normal; min-width: 14rem; max-width: 30rem; }
 .n { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
+.w { white-space: nowrap; } .narrow { display: inline-block; max-width: 100%; }
 .faint { color: var(--faint); font-size: 13px; }
 .picture { width: 176px; padding-right: 0; }
 .picture img { display: block; background: var(--picture); border-radius: 6px; }
@@ -226,7 +227,8 @@ class StepTable {
           megabytes(step.peakBytes));
     const bool isBand = step.voxelSize > 0;
     text += fmt::format(
-        "<td class=\"n\">{}</td><td class=\"n\">{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+        "<td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"w\">{}</td><td "
+        "class=\"w\">{}</td><td>{}</td></tr>\n",
         sizeOf(step), isBand ? figure(step.voxelSize, 6) : "",
         isBand ? widthText(step.halfWidth, step.voxelSize) : "", neededOf(step), errorsOf(step));
     if (!more.empty()) text += "<tr class=\"more\"><td colspan=\"9\">" + more + "</td></tr>\n";
@@ -435,7 +437,7 @@ std::string toleranceSection(const ToleranceReport& tolerance) {
 
 std::string versionTable() {
   std::string text =
-      "<h2>Versions</h2>\n<div class=\"scroll\"><table>\n<caption>What the program is made "
+      "<h2>Versions</h2>\n<div class=\"scroll narrow\"><table>\n<caption>What the program is made "
       "of</caption>\n<thead><tr><th scope=\"col\">part</th><th "
       "scope=\"col\">version</th></tr></thead>\n<tbody>\n";
   for (const auto& [name, version] : programVersions())

@@ -40,7 +40,7 @@ std::string drawn(const Value& value, std::size_t maxBytes) {
   camera.height = kThumbnailHeight;
   const render::Image image = render::renderCpu(
       viewed.scene,
-      {.ambientSamples = 4, .shadowSamples = 1, .curvature = false, .maxBytes = maxBytes});
+      {.ambientSamples = 2, .shadowSamples = 1, .curvature = false, .maxBytes = maxBytes});
   const std::vector<float>& alpha = image.channels.at("A");
   if (std::none_of(alpha.begin(), alpha.end(), [](float a) { return a > 0; })) return {};
   const std::vector<char> bytes = render::pngBytes(image);

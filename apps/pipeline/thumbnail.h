@@ -9,7 +9,7 @@ namespace pipeline {
 
 inline constexpr int kThumbnailWidth = 160, kThumbnailHeight = 120;  ///< pixels
 /// So many steps of a run have one: a page of more is slow to open.
-inline constexpr std::size_t kMostThumbnails = 200;
+inline constexpr std::size_t kMostThumbnails = 100;
 
 /// A small picture of a value, for people who look through a report.
 struct Thumbnail {
