@@ -238,6 +238,11 @@ std::vector<std::uint8_t> displayColours(const Image& image) {
   return pixels;
 }
 
+std::vector<char> pngBytes(const Image& image) {
+  requireWhole(image);
+  return encodePng(image.width, image.height, displayColours(image));
+}
+
 void writePng(const std::filesystem::path& path, int width, int height,
               const std::vector<std::uint8_t>& colours) {
   writeBytes(path, encodePng(width, height, colours));
@@ -254,8 +259,7 @@ void writeImage(const std::filesystem::path& path, const Image& image, const std
   requireWhole(image);
   std::vector<char> bytes;
   try {
-    bytes = kind == "exr" ? encodeExr(image)
-                          : encodePng(image.width, image.height, displayColours(image));
+    bytes = kind == "exr" ? encodeExr(image) : pngBytes(image);
   } catch (const levelset::Error&) {
     throw;
   } catch (const std::bad_alloc&) {

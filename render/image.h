@@ -51,6 +51,10 @@ void writeImage(const std::filesystem::path& path, const Image& image,
 /// @throws levelset::UsageError for an image without R G B
 [[nodiscard]] std::vector<std::uint8_t> displayColours(const Image& image);
 
+/// The bytes of the PNG that writeImage() writes.
+/// @throws levelset::UsageError for an image without R G B; InvalidInput as writeImage()
+[[nodiscard]] std::vector<char> pngBytes(const Image& image);
+
 /// Writes such colours as they are, likewise. @pre four for each pixel, at least one pixel
 /// @throws levelset::IoError when it cannot be written
 void writePng(const std::filesystem::path& path, int width, int height,

@@ -148,6 +148,8 @@ int runGraph(const pipeline::Graph& graph) {
   settings.wholeValues = globals.contains("whole");
   if (globals.contains("cache")) settings.cache = globals.at("cache");
   settings.measureErrors = verbose || globals.contains("report");
+  if (globals.contains("report") && pipeline::isPage(globals.at("report")))
+    settings.thumbnails = pipeline::kMostThumbnails;
   settings.begin = [](const std::string& action) { cli::tellAction(action); };
   settings.progress = [&](std::size_t index, const std::string& action, double fraction) {
     line.update(index, action, fraction);

@@ -392,9 +392,12 @@ bool GraphRun::recallValue(std::size_t i) {
     value = cache_->value(*keys_[i], settings_.maxMemory);
     if (!value) return false;
   }
+  Thumbnail thumbnail;
+  if (value && asksThumbnail(i)) thumbnail = thumbnailOf(*value, settings_.maxMemory);
   const std::lock_guard lock(mutex_);
   StepReport& step = begin(i);
   step.isKnown = true;
+  step.thumbnail = std::move(thumbnail);
   std::string output;
   if (keys_[i])
     if (std::optional<CachedStep> known = cache_->step(*keys_[i])) {
@@ -509,6 +512,8 @@ void GraphRun::runNode(std::size_t i, StepReport& step, StepClock& clock, const 
       if (node.makes() && settings_.measureErrors)
         estimateError(value, invocation, invocation.notes);
       keep(i, invocation, value);
+      if (node.makes() && asksThumbnail(i))
+        step.thumbnail = thumbnailOf(value, settings_.maxMemory);
       finish(node.makes() ? &value : nullptr);
     }
   } catch (...) {

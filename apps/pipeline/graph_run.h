@@ -84,6 +84,7 @@ class GraphRun {
   [[nodiscard]] std::optional<double> workBytes(std::size_t i) const;
 
   [[nodiscard]] bool isGiven(std::size_t i) const { return graph_.given.contains(i); }
+  [[nodiscard]] bool asksThumbnail(std::size_t i) const { return i < settings_.thumbnails; }
   [[nodiscard]] bool isLimited() const { return settings_.maxMemory != levelset::kNoMemoryLimit; }
   StepReport& begin(std::size_t i);
   void fileSteps();

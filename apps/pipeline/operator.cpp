@@ -275,7 +275,7 @@ const std::vector<Param>& globalParams() {
        .doc = "time, memory and voxels of each step (also -v)"},
       {.name = "report",
        .type = ParamType::Path,
-       .doc = "write what each step did and cost, as .json or .html"},
+       .doc = "write what each step did and cost: as .json, or as a page with pictures (.html)"},
       {.name = "save-graph",
        .type = ParamType::Path,
        .doc = "write what is asked for as a .json that `run` takes; with --dry-run nothing else is "

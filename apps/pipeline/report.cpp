@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "apps/pipeline/refusal.h"
+#include "apps/pipeline/report_page.h"
 #include "apps/pipeline/text_file.h"
+#include "apps/pipeline/versions.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 
@@ -94,28 +96,6 @@ Json toJson(const ToleranceReport& tolerance) {
   return json;
 }
 
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (char c : text) {
-    if (c == '<')
-      result += "&lt;";
-    else if (c == '>')
-      result += "&gt;";
-    else if (c == '&')
-      result += "&amp;";
-    else
-      result += c;
-  }
-  return result;
-}
-
-std::string writtenAs(const StepReport& step) {
-  std::string text = step.action;
-  for (const auto& [name, value] : step.parameters)
-    text += value == "true" ? " --" + name : " --" + name + " " + value;
-  return text;
-}
-
 std::string errorText(const StepReport& step) {
   std::string text;
   for (const ErrorEstimate& error : step.notes.errors) {
@@ -134,15 +114,12 @@ std::string extensionOf(const std::filesystem::path& path) {
   return extension;
 }
 
-bool isHtml(const std::filesystem::path& path) {
-  return extensionOf(path) == ".html" || extensionOf(path) == ".htm";
-}
-
 }  // namespace
 
 std::string reportJson(const RunReport& report) {
   Json json;
   json["version"] = LEVELSMITH_VERSION;
+  for (const auto& [name, version] : programVersions()) json["versions"][name] = version;
   json["exit_code"] = report.exitCode;
   if (report.dryRun) json["dry_run"] = true;
   if (!report.error.empty()) json["error"] = report.error;
@@ -155,36 +132,8 @@ std::string reportJson(const RunReport& report) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-std::string reportHtml(const RunReport& report) {
-  std::string page =
-      "<!doctype html><meta charset=\"utf-8\"><title>levelsmith report</title>\n"
-      "<style>body{font:15px sans-serif;margin:2em}table{border-collapse:collapse}"
-      "td,th{padding:.3em .8em;border-bottom:1px solid #ccc;text-align:left;vertical-align:top}"
-      "td.n{text-align:right;font-variant-numeric:tabular-nums}</style>\n"
-      "<h1>levelsmith</h1>\n<table><tr><th>action<th>wall s<th>CPU s<th>peak MB<th>active "
-      "voxels<th>error<th>notes\n";
-  for (const StepReport& step : report.steps) {
-    std::string notes;
-    for (const Resolved& length : step.notes.lengths) {
-      notes += escaped(fmt::format("{} = {:.6g}", length.param, length.world));
-      if (length.voxels) notes += fmt::format(" ({:.4g} vx)", *length.voxels);
-      notes += "<br>";
-    }
-    for (const std::string& text : step.notes.notes) notes += escaped(text) + "<br>";
-    for (const std::string& text : step.notes.warnings) notes += "<b>" + escaped(text) + "</b><br>";
-    page += fmt::format(
-        "<tr><td><code>{}</code><td class=n>{:.2f}<td class=n>{:.2f}<td class=n>{:.0f}<td "
-        "class=n>{:.0f}<td>{}<td>{}\n",
-        escaped(writtenAs(step)), step.wallSeconds, step.cpuSeconds, step.peakBytes * 1e-6,
-        step.activeVoxels, escaped(errorText(step)), notes);
-  }
-  page += "</table>\n";
-  if (report.tolerance)
-    for (const std::string& line : toleranceLines(*report.tolerance))
-      page += "<p>" + escaped(line) + "</p>\n";
-  for (const std::string& warning : report.warnings) page += "<p>" + escaped(warning) + "</p>\n";
-  if (!report.error.empty()) page += "<p><b>" + escaped(report.error) + "</b></p>\n";
-  return page;
+bool isPage(const std::filesystem::path& path) {
+  return extensionOf(path) == ".html" || extensionOf(path) == ".htm";
 }
 
 void checkRunTargets(const Graph& graph) {
@@ -212,7 +161,7 @@ void checkRunTargets(const Graph& graph) {
     const bool isDevice = std::filesystem::is_other(path, ignored);
     const bool isReport = option == "--report";
     if (!isDevice && (!extension.empty() || !isReport) && extension != ".json" &&
-        !(isReport && isHtml(path)))
+        !(isReport && isPage(path)))
       throw levelset::UsageError(fmt::format("{}: '{}' is no kind of {}; name a .json{} file",
                                              option, file, isReport ? "report" : "graph",
                                              isReport ? " or .html" : ""));
@@ -225,7 +174,7 @@ void checkRunTargets(const Graph& graph) {
 }
 
 void writeReport(const std::filesystem::path& path, const RunReport& report) {
-  writeText(path, isHtml(path) ? reportHtml(report) : reportJson(report), "--report");
+  writeText(path, isPage(path) ? reportPage(report) : reportJson(report), "--report");
 }
 
 std::vector<std::string> toleranceLines(const ToleranceReport& tolerance) {

@@ -9,6 +9,7 @@
 
 #include "apps/pipeline/graph.h"
 #include "apps/pipeline/invocation.h"
+#include "apps/pipeline/thumbnail.h"
 #include "apps/pipeline/tolerance_report.h"
 #include "levelset/solids/crop.h"
 
@@ -19,6 +20,7 @@ struct RunSettings {
   bool measureErrors = false;  ///< estimate each result's error: costs a pass over it
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   bool wholeValues = false;          ///< make all of each value, also where a part of it would do
+  std::size_t thumbnails = 0;        ///< of so many steps, but in dry runs
   std::filesystem::path cache = {};  ///< folder of earlier results; empty: none are kept
   // Branches run side by side: these are called from several threads, but for progress and goesOn
   // never at the same time.
@@ -49,6 +51,7 @@ struct StepReport {
   double activeVoxels = 0, voxelSize = 0, halfWidth = 0;
   levelset::BandPart needed = {};  ///< of the result, by others; empty: all of it
   std::size_t triangles = 0;
+  Thumbnail thumbnail = {};  ///< of the result, where asked for
 };
 
 struct RunReport {

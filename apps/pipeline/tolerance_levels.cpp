@@ -136,6 +136,7 @@ Level LevelRunner::runAt(double voxel, double coarsening) {
   std::map<std::size_t, Value> made;
   RunSettings settings = settingsFor(part);
   settings.measureErrors = settings_.measureErrors && coarsening == 1;
+  if (coarsening != 1) settings.thumbnails = 0;
   settings.made = [&](std::size_t node, const Value& value) {
     if (std::binary_search(watched_.begin(), watched_.end(), part.origin[node]))
       made.insert_or_assign(part.origin[node], value);

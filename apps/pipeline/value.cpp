@@ -133,4 +133,16 @@ const Plan& Value::plan() const {
   return *plan_;
 }
 
+render::ViewedScene sceneOf(const Value& drawn) {
+  render::ViewedScene viewed;
+  if (drawn.kind() == Kind::Scene)
+    viewed = drawn.scene();
+  else if (drawn.kind() == Kind::Mesh)  // the value's own
+    viewed.scene.meshes.push_back(
+        {std::shared_ptr<const TriMesh>(std::shared_ptr<const void>(), &drawn.mesh())});
+  else
+    viewed.scene.solids.push_back({.band = drawn.band()});
+  return viewed;
+}
+
 }  // namespace pipeline

@@ -108,4 +108,7 @@ class Value {
   mutable std::optional<Plan> plan_;
 };
 
+/// A level set, a mesh or a scene as what is drawn of it. Not beyond the value's life.
+[[nodiscard]] render::ViewedScene sceneOf(const Value& drawn);
+
 }  // namespace pipeline

@@ -107,6 +107,7 @@ class Run {
     settings.maxMemory = options_.maxMemory > 0 ? options_.maxMemory : memoryLimit();
     settings.cache = options_.cache;
     settings.measureErrors = options_.measureErrors;
+    if (pipeline::isPage(options_.report)) settings.thumbnails = pipeline::kMostThumbnails;
     settings.begin = [this](const std::string& action) {
       if (!goesOn_) throw levelset::Cancelled(action + ": cancelled");
       tell(action, 0);

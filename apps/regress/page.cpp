@@ -5,21 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/html_text.h"
 #include "apps/regress/columns.h"
 
 namespace regress {
 namespace {
 
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text)
-    result += c == '<'   ? "&lt;"
-              : c == '>' ? "&gt;"
-              : c == '&' ? "&amp;"
-              : c == '"' ? "&quot;"
-                         : std::string(1, c);
-  return result;
-}
+using apps::escapedHtml;
 
 constexpr const char* kHead = R"HTML(<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>Level-set regression suite</title>
@@ -55,15 +47,15 @@ void appendSummary(const CaseResult& result, std::string& html) {
   const std::vector<const Column*> list = used(result.summary);
   html += "<div class=\"scroll\"><table><tr><th>variant</th><th>tool</th><th>resolution</th>";
   for (const Column* column : list)
-    html +=
-        fmt::format("<th title=\"{}\">{}</th>", escaped(column->meaning), escaped(column->heading));
+    html += fmt::format("<th title=\"{}\">{}</th>", escapedHtml(column->meaning),
+                        escapedHtml(column->heading));
   html += "</tr>\n";
   for (const Row& row : result.summary) {
     html += fmt::format("<tr><td class=\"t\">{}</td><td class=\"t\">{}</td><td>{}</td>",
-                        escaped(row.variant), escaped(row.tool), row.resolution);
+                        escapedHtml(row.variant), escapedHtml(row.tool), row.resolution);
     if (!row.failure.empty()) {
       html += fmt::format("<td class=\"t bad\" colspan=\"{}\">{}</td></tr>\n", list.size(),
-                          escaped(row.failure));
+                          escapedHtml(row.failure));
       continue;
     }
     for (const Column* column : list) {
@@ -85,9 +77,9 @@ void appendBounds(const CaseResult& result, std::string& html) {
     html += fmt::format(
         "<tr class=\"{}\"><td class=\"t\">{}</td><td class=\"t\">{}</td><td>{}</td><td>{} {}</td>"
         "<td>{}</td></tr>\n",
-        j.passed ? "good" : "bad", escaped(j.bound.variant), j.bound.figure, j.resolution,
+        j.passed ? "good" : "bad", escapedHtml(j.bound.variant), j.bound.figure, j.resolution,
         j.bound.sense == Sense::AtMost ? "≤" : "≥", number(j.bound.limit),
-        j.remark.empty() ? number(j.found) : escaped(j.remark));
+        j.remark.empty() ? number(j.found) : escapedHtml(j.remark));
   html += "</table>\n";
 }
 
@@ -98,7 +90,8 @@ void appendOutcomes(const CaseResult& result, std::string& html) {
     html += fmt::format(
         "<tr class=\"{}\"><td class=\"t\">{}</td><td class=\"t\">{}</td><td "
         "class=\"t\">{}</td></tr>\n",
-        o.passed ? "good" : "bad", escaped(o.variant), escaped(o.expected), escaped(o.found));
+        o.passed ? "good" : "bad", escapedHtml(o.variant), escapedHtml(o.expected),
+        escapedHtml(o.found));
   html += "</table>\n";
 }
 
@@ -118,7 +111,7 @@ std::string pageText(const SuiteResult& result, const std::vector<std::string>& 
               ? "<p class=\"good\">Every bound is met.</p>\n"
               : fmt::format("<p class=\"bad\">{} bounds are missed:</p><ul>\n", failed.size());
   for (const std::string& sentence : failed)
-    html += fmt::format("<li>{}</li>\n", escaped(sentence));
+    html += fmt::format("<li>{}</li>\n", escapedHtml(sentence));
   if (!failed.empty()) html += "</ul>\n";
   html += "<h2>Error against run time</h2>\n<div class=\"plots\">\n";
   for (const std::string& name : plots)
@@ -128,8 +121,8 @@ std::string pageText(const SuiteResult& result, const std::vector<std::string>& 
     html += fmt::format(
         "<h2 id=\"{0}\">{0}: {1}</h2>\n<p>{2}</p>\n<p>Source: {3}. {4:.1f} CPU seconds with all "
         "measuring.</p>\n",
-        escaped(c.of->name), escaped(c.of->title), escaped(c.of->definition),
-        escaped(c.of->citation), c.cpuSeconds);
+        escapedHtml(c.of->name), escapedHtml(c.of->title), escapedHtml(c.of->definition),
+        escapedHtml(c.of->citation), c.cpuSeconds);
     appendBounds(c, html);
     appendOutcomes(c, html);
     appendSummary(c, html);

@@ -110,6 +110,15 @@ def test_a_file_is_a_pipeline_or_a_graph(ls, folder):
         ls.map("ball.json", [{"radius": 1, "more": 2}])
 
 
+def test_a_page_of_a_pipeline_has_pictures(ls, tmp_path):
+    text = "--report ${file}\nsphere --radius 1 --voxel 0.1\noffset 0.1\nmeasure\n"
+    files = [tmp_path / "run.html", tmp_path / "run.json"]
+    ls.map(text, [{"file": str(file)} for file in files])
+    page, data = (file.read_text(encoding="utf-8") for file in files)
+    assert page.count('src="data:image/png;base64,') == 2
+    assert json.loads(data)["versions"]["OpenVDB"]
+
+
 def test_values_are_written_as_chains_have_them(ls, folder):
     text = "box --size ${size} --voxel ${voxel}\ntransform --translate ${to}\nmeasure --json\n"
     given = {"size": (1, 2, 1.5), "voxel": numpy.float32(0.125), "to": numpy.array([1, 2, 3.0])}

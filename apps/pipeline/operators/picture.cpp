@@ -30,13 +30,7 @@ using levelset::UsageError;
 /// What the operand is of a scene, seen as the options ask.
 render::Scene sceneOf(Invocation& in) {
   const Value& drawn = in.operands[0];
-  render::ViewedScene viewed;
-  if (drawn.kind() == Kind::Scene)
-    viewed = drawn.scene();
-  else if (drawn.kind() == Kind::Mesh)
-    viewed.scene.meshes.push_back({std::make_shared<const levelset::TriMesh>(drawn.mesh())});
-  else
-    viewed.scene.solids.push_back({.band = drawn.band()});
+  render::ViewedScene viewed = sceneOf(drawn);
   viewed.scene.camera =
       cameraOf(in, drawn.plan().bounds, viewed.hasCamera ? &viewed.scene.camera : nullptr);
   return viewed.scene;

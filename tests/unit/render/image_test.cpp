@@ -104,6 +104,15 @@ TEST_F(ImagePng, HoldsToneCurveAndAlpha) {
   EXPECT_EQ(pixel(5), (std::pair<std::uint8_t, std::uint8_t>{0, 0}));
 }
 
+TEST_F(ImagePng, IsTheSameInMemory) {
+  const Image image = gradientImage();
+  writeImage(file("a.png"), image);
+  const std::vector<char> bytes = pngBytes(image);
+  EXPECT_EQ(std::string(bytes.begin(), bytes.end()), bytesOf(file("a.png")));
+  EXPECT_THROW((void)pngBytes(Image(4, 4)), levelset::UsageError);
+  EXPECT_THROW((void)pngBytes(Image()), levelset::InvalidInput);
+}
+
 TEST_F(ImageFiles, RefusesWhatItCannotWrite) {
   const Image image = gradientImage();
   EXPECT_THROW(writeImage(file("a.jpg"), image), levelset::UsageError);
