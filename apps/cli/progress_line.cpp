@@ -12,12 +12,8 @@ void ProgressLine::update(std::size_t index, const std::string& action, double f
   if (style_ == ProgressStyle::Off) return;
   const std::lock_guard lock(mutex_);
   const auto now = std::chrono::steady_clock::now();
-  if (index != current_) {
-    current_ = index;
-    start_ = now;
-    shown_ = {};
-  }
-  if (now - shown_ < 100ms) return;
+  const auto [step, isNew] = starts_.try_emplace(index, now);
+  if (now - shown_ < 100ms && !isNew) return;
   if (style_ == ProgressStyle::Json) {
     fmt::print(stderr,
                "{{\"step\": {}, \"steps\": {}, \"action\": \"{}\", \"fraction\": {:.3f}}}\n",
@@ -25,7 +21,7 @@ void ProgressLine::update(std::size_t index, const std::string& action, double f
     shown_ = now;
     return;
   }
-  if (now - start_ < 1s) return;
+  if (now - step->second < 1s) return;
   constexpr int kWidth = 30;
   const int full = static_cast<int>(std::clamp(fraction, 0.0, 1.0) * kWidth);
   fmt::print(stderr, "\r[{}/{}] {:<14} [{}{}] {:3.0f} %", index + 1, actions_, action,

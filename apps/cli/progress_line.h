@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <map>
 #include <mutex>
 #include <string>
 
@@ -9,8 +10,8 @@ namespace cli {
 
 enum class ProgressStyle { Off, Bar, Json };
 
-/// Progress on standard error: a bar once an action has taken a second, or a line of JSON at most
-/// ten times a second.
+/// Progress on standard error: a bar once an action has taken a second, or lines of JSON, one as
+/// each action begins and ten a second at most.
 class ProgressLine {
  public:
   ProgressLine(ProgressStyle style, std::size_t actions) : style_(style), actions_(actions) {}
@@ -21,8 +22,8 @@ class ProgressLine {
  private:
   ProgressStyle style_;
   std::size_t actions_;
-  std::size_t current_ = static_cast<std::size_t>(-1);
-  std::chrono::steady_clock::time_point start_, shown_;
+  std::map<std::size_t, std::chrono::steady_clock::time_point> starts_;  // by place in the chain
+  std::chrono::steady_clock::time_point shown_;
   bool visible_ = false;
   std::mutex mutex_;
 };

@@ -72,38 +72,44 @@ std::vector<std::string> targetsOf(const Node& node) {
   return node.op->targets(Invocation(*node.op, node.options));
 }
 
-std::vector<std::string> filesRead(const Node& node) {
+struct FileRead {
+  std::string name;
+  bool standsForOthers = false;  ///< a scene names files that it does not hold, a '#' numbers
+};
+
+std::vector<FileRead> filesRead(const Node& node) {
   const std::vector<std::string> targets = targetsOf(node);
-  std::vector<std::string> files;
+  const auto format = node.options.find("format");
+  const bool isJson = format != node.options.end() && format->second == "json";
+  std::vector<FileRead> files;
   for (const Param& param : node.op->params) {
     if (param.type != ParamType::Path) continue;
     const auto given = node.options.find(param.name);
     if (given == node.options.end()) continue;
-    if (std::find(targets.begin(), targets.end(), given->second) == targets.end())
-      files.push_back(given->second);
+    const std::string& name = given->second;
+    if (std::find(targets.begin(), targets.end(), name) == targets.end())
+      files.push_back({name, isJson || std::filesystem::path(name).extension() == ".json" ||
+                                 name.find('#') != std::string::npos});
   }
   return files;
-}
-
-/// A scene names files that it does not hold, and a '#' stands for numbers.
-bool standsForOthers(const std::filesystem::path& file) {
-  return file.extension() == ".json" || file.string().find('#') != std::string::npos;
 }
 
 /// What has been written by now, and by which node last.
 class Written {
  public:
-  void add(const std::string& target, std::size_t writer) {
+  /// @param isScene  which has files of its solids beside it
+  void add(const std::string& target, bool isScene, std::size_t writer) {
     if (target == "-") return;
-    writers_[placeOf(target)] = writer;
+    const std::filesystem::path place = placeOf(target);
+    writers_[isScene ? place.parent_path() : place] = writer;
     last_ = writer;
   }
 
   /// Itself, or a folder that it is in.
-  [[nodiscard]] std::optional<std::size_t> find(const std::string& file) const {
-    if (!last_ || standsForOthers(file)) return last_;
+  [[nodiscard]] std::optional<std::size_t> find(const FileRead& file) const {
+    if (!last_ || file.standsForOthers) return last_;
     std::optional<std::size_t> found;
-    for (std::filesystem::path place = placeOf(file);; place = place.parent_path()) {
+    for (std::filesystem::path place = placeOf(file.name);; place = place.parent_path()) {
       if (const auto it = writers_.find(place); it != writers_.end())
         found = std::max(found, std::optional(it->second));
       if (!place.has_relative_path()) return found;
@@ -173,11 +179,26 @@ std::vector<std::optional<std::size_t>> findWritersRead(const Graph& graph,
   Written written;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     if (!needed[i]) continue;
-    for (const std::string& file : filesRead(graph.nodes[i]))
+    const Node& node = graph.nodes[i];
+    for (const FileRead& file : filesRead(node))
       writers[i] = std::max(writers[i], written.find(file));
-    for (const std::string& target : targetsOf(graph.nodes[i])) written.add(target, i);
+    const bool isScene =
+        std::any_of(node.inputs.begin(), node.inputs.end(),
+                    [&](std::size_t input) { return graph.nodes[input].kind == Kind::Scene; });
+    for (const std::string& target : targetsOf(node)) written.add(target, isScene, i);
   }
   return writers;
+}
+
+bool readsOnce(const Node& node) {
+  const Invocation probe(*node.op, node.options);
+  if (node.op->usesStandardInput && node.op->usesStandardInput(probe)) return true;
+  return std::any_of(node.op->params.begin(), node.op->params.end(), [&](const Param& param) {
+    std::error_code ignored;
+    const auto given = node.options.find(param.name);
+    return param.type == ParamType::Path && given != node.options.end() &&
+           std::filesystem::is_other(std::filesystem::status(given->second, ignored));
+  });
 }
 
 std::vector<std::size_t> countUses(const Graph& graph, const std::vector<char>& needed) {

@@ -56,6 +56,9 @@ void leaveVoxelOpen(Node& node);
 [[nodiscard]] std::vector<std::optional<std::size_t>> findWritersRead(
     const Graph& graph, const std::vector<char>& needed);
 
+/// Does it read what can be read once only, standard input or a pipe?
+[[nodiscard]] bool readsOnce(const Node& node);
+
 /// By node: by how many others that are needed its value is taken.
 [[nodiscard]] std::vector<std::size_t> countUses(const Graph& graph,
                                                  const std::vector<char>& needed);

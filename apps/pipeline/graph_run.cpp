@@ -5,6 +5,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
 #include <new>
 
 #include "apps/pipeline/cache_key.h"
@@ -36,6 +37,9 @@ bool isOfInput(const std::exception_ptr& failure) {
 
 /// Operators hold this many times what they take or make, at most, by the report's peaks.
 constexpr double kWorkingSpace = 4;
+
+/// Of meshes that are read to be planned with.
+constexpr double kMostEarlyBytes = 1 << 28;
 
 /// Voxels: what estimateError() reads of a band, up to the corners of cells beside those of the
 /// zero set.
@@ -75,7 +79,11 @@ void GraphRun::run() {
   try {
     runNodes();
   } catch (...) {
-    tellInOrder();
+    try {
+      tellInOrder();
+    } catch (const std::exception&) {
+      // What went wrong first is what the user must hear.
+    }
     fileSteps();
     throw;
   }
@@ -127,6 +135,7 @@ std::vector<std::size_t> GraphRun::decideFates() {
   const std::size_t count = graph_.nodes.size();
   const std::vector<char> needed = neededNodes(graph_);
   wasEarly_.resize(count);
+  earlyFailures_.resize(count);
   isRefused_.resize(count);
   demands_.resize(count);
   plans_.resize(count);
@@ -180,23 +189,39 @@ void GraphRun::planAhead() {
   std::vector<char> runs(graph_.nodes.size());
   for (std::size_t i = 0; i < runs.size(); ++i) runs[i] = fates_[i] == Fate::Run;
   if (settings_.dryRun) return;
-  plans_ = plansOf(graph_, runs, [&](std::size_t i) { return planEarly(i); }).plans;
+  plans_ =
+      plansOf(graph_, runs, settings_.maxMemory, [&](std::size_t i) { return planEarly(i); }).plans;
   if (!settings_.wholeValues && !cache_ && !settings_.made)
     demands_ = demandsOf(graph_, runs, plans_, settings_.measureErrors ? kMeasuredHalfWidth : 1);
+  if (std::any_of(demands_.begin(), demands_.end(),
+                  [](const Demand& demand) { return !demand.isWhole(); }))
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      if (!runs[i] || !readsOnce(graph_.nodes[i])) continue;
+      // It is there to be taken once more, where a part turns out not to do.
+      demands_[i] = {};
+      values_.addUse(i);
+    }
   requireMemoryFor(graph_, runs, plans_, demands_, settings_.maxMemory);
 }
 
-/// To plan a mesh is to read it: so it is made now, unless many are held already.
+/// To plan a mesh is to read it: so it is made now where a band is made of it, unless many are held
+/// already.
 std::optional<Plan> GraphRun::planEarly(std::size_t i) {
-  if (earlyBytes_ > static_cast<double>(settings_.maxMemory) / 8) return {};
+  const double most = std::min(kMostEarlyBytes, static_cast<double>(settings_.maxMemory) / 8);
+  const bool makesBand = std::any_of(graph_.nodes.begin() + static_cast<std::ptrdiff_t>(i),
+                                     graph_.nodes.end(), [&](const Node& node) {
+                                       return node.makes() && node.kind == Kind::Band &&
+                                              std::find(node.inputs.begin(), node.inputs.end(),
+                                                        i) != node.inputs.end();
+                                     });
+  if (!makesBand || earlyBytes_ > most) return {};
   try {
     compute(i);
   } catch (const levelset::Cancelled&) {
     throw;
   } catch (const levelset::Error&) {
-    fates_[i] = Fate::Run;  // it is refused in its turn
-    steps_[i].reset();
-    unspoken_[i].reset();
+    earlyFailures_[i] = std::current_exception();  // thrown in its turn
+    fates_[i] = Fate::Run;
     tellEnd_ = kNone;
     return {};
   }
@@ -316,7 +341,8 @@ bool GraphRun::fitsBeside(std::size_t i, const std::vector<std::size_t>& running
     if (!of) return false;
     bytes += *of;
   }
-  return bytes <= static_cast<double>(settings_.maxMemory);
+  // What runs is not told to the byte: half is left.
+  return bytes <= static_cast<double>(settings_.maxMemory) / 2;
 }
 
 /// Empty: nobody knows.
@@ -331,6 +357,8 @@ std::optional<double> GraphRun::workBytes(std::size_t i) const {
   };
   if (node.makes() && !add(i)) return {};
   if (!std::all_of(node.inputs.begin(), node.inputs.end(), add)) return {};
+  for (const auto& [option, input] : node.named)
+    if (!add(input)) return {};
   return bytes;
 }
 
@@ -354,8 +382,18 @@ StepReport& GraphRun::begin(std::size_t i) {
 }
 
 void GraphRun::fileSteps() {
-  for (std::optional<StepReport>& step : steps_)
-    if (step) report_.steps.push_back(std::move(*step));
+  for (std::size_t i = 0; i < std::min(steps_.size(), tellEnd_); ++i)
+    if (steps_[i]) report_.steps.push_back(std::move(*steps_[i]));
+}
+
+Thumbnail GraphRun::thumbnailFor(std::size_t i, const Value& value) {
+  if (settings_.thumbnails == 0) return {};
+  if (i >= settings_.thumbnails)
+    return {.png = {},
+            .missing = fmt::format("only the first {} actions have one", settings_.thumbnails)};
+  Thumbnail thumbnail = thumbnailOf(value, settings_.maxMemory);
+  running_.forgetPeak();
+  return thumbnail;
 }
 
 /// To be told in its turn.
@@ -371,7 +409,11 @@ void GraphRun::tellInOrder() {
     if (!unspoken_[i]) return;
     const Node& node = graph_.nodes[i];
     StepNotes& notes = steps_[i]->notes;
-    if (!unspoken_[i]->empty() && settings_.print) settings_.print(*unspoken_[i]);
+    try {
+      if (!unspoken_[i]->empty() && settings_.print) settings_.print(*unspoken_[i]);
+    } catch (const levelset::Error& error) {
+      refuseAs(node.op->name, error, node.place);
+    }
     for (const std::string& text : notes.warnings)
       settings_.warn(withPlace(sentenceOf(node.op->name, text), node.place));
     for (const std::string& text : notes.notes) settings_.note(sentenceOf(node.op->name, text));
@@ -393,7 +435,7 @@ bool GraphRun::recallValue(std::size_t i) {
     if (!value) return false;
   }
   Thumbnail thumbnail;
-  if (value && asksThumbnail(i)) thumbnail = thumbnailOf(*value, settings_.maxMemory);
+  if (value) thumbnail = thumbnailFor(i, *value);
   const std::lock_guard lock(mutex_);
   StepReport& step = begin(i);
   step.isKnown = true;
@@ -445,6 +487,11 @@ void GraphRun::compute(std::size_t i) {
 
 void GraphRun::attempt(std::size_t i, const GoesOn& goesOn, const ArenaCpu* arena) {
   const Node& node = graph_.nodes[i];
+  if (earlyFailures_[i]) {
+    const std::lock_guard lock(mutex_);
+    tellEnd_ = std::min(tellEnd_, i + 1);
+    std::rethrow_exception(earlyFailures_[i]);
+  }
   StepReport& step = begin(i);
   StepClock clock(step, running_, arena);
   try {
@@ -473,6 +520,8 @@ Invocation GraphRun::invocationOf(std::size_t i, const GoesOn& goesOn) {
     invocation.named.emplace(option, values_.take(input));
   invocation.part = demands_[i].part;
   invocation.planned = plans_[i];
+  invocation.isNarrowed =
+      !node.inputs.empty() && std::isfinite(demands_[node.inputs[0]].part.halfWidth);
   invocation.maxMemory = settings_.maxMemory;
   invocation.dryRun = settings_.dryRun;
   if (settings_.progress || settings_.goesOn || goesOn)
@@ -488,8 +537,9 @@ void GraphRun::runNode(std::size_t i, StepReport& step, StepClock& clock, const 
   const Node& node = graph_.nodes[i];
   const Operator& op = *node.op;
   Invocation invocation = invocationOf(i, goesOn);
-  const auto finish = [&](const Value* value) {
+  const auto finish = [&](const Value* value, bool isRefused = false) {
     const std::lock_guard lock(mutex_);
+    if (isRefused) tellEnd_ = std::min(tellEnd_, i + 1);
     if (value && settings_.made) settings_.made(i, *value);
     if (value) values_.put(i, *value);
     step.notes = invocation.notes;
@@ -512,16 +562,13 @@ void GraphRun::runNode(std::size_t i, StepReport& step, StepClock& clock, const 
       if (node.makes() && settings_.measureErrors)
         estimateError(value, invocation, invocation.notes);
       keep(i, invocation, value);
-      if (node.makes() && asksThumbnail(i))
-        step.thumbnail = thumbnailOf(value, settings_.maxMemory);
+      if (node.makes()) step.thumbnail = thumbnailFor(i, value);
       finish(node.makes() ? &value : nullptr);
     }
   } catch (...) {
     clock.stop();
     if (isPartial(i) && isOfInput(std::current_exception())) throw RefusedInPart();
-    finish(nullptr);
-    const std::lock_guard lock(mutex_);
-    tellEnd_ = std::min(tellEnd_, i + 1);
+    finish(nullptr, true);
     throw;
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -84,7 +85,7 @@ class GraphRun {
   [[nodiscard]] std::optional<double> workBytes(std::size_t i) const;
 
   [[nodiscard]] bool isGiven(std::size_t i) const { return graph_.given.contains(i); }
-  [[nodiscard]] bool asksThumbnail(std::size_t i) const { return i < settings_.thumbnails; }
+  Thumbnail thumbnailFor(std::size_t i, const Value& value);
   [[nodiscard]] bool isLimited() const { return settings_.maxMemory != levelset::kNoMemoryLimit; }
   StepReport& begin(std::size_t i);
   void fileSteps();
@@ -108,6 +109,7 @@ class GraphRun {
   std::vector<Demand> demands_;
   std::vector<std::optional<Plan>> plans_;  // of whole values, as far as they were told ahead
   std::vector<char> wasEarly_;              // ran to be planned with
+  std::vector<std::exception_ptr> earlyFailures_;
   double earlyBytes_ = 0;
   std::vector<char> isRefused_;  // of a part, and is to be tried of the whole
   RunningSteps running_;

@@ -104,6 +104,7 @@ class Invocation {
   levelset::BandPart part = {};
   /// Of the whole result, where that was told before.
   std::optional<Plan> planned = {};
+  bool isNarrowed = false;  ///< the first operand is narrower than its whole
   /// The half width of what is made, where the whole has `whole`; voxels.
   [[nodiscard]] double neededHalfWidth(double whole) const {
     return std::min(whole, part.halfWidth);

@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "apps/pipeline/refusal.h"
 #include "levelset/error.h"
@@ -53,18 +52,6 @@ std::string needOf(const Demand& demand, const Plan& plan) {
   return text;
 }
 
-/// Does it read what can be read once only? Planning must not.
-bool readsOnce(const Node& node) {
-  const Invocation probe(*node.op, node.options);
-  if (node.op->usesStandardInput && node.op->usesStandardInput(probe)) return true;
-  return std::any_of(node.op->params.begin(), node.op->params.end(), [&](const Param& param) {
-    std::error_code ignored;
-    const auto given = node.options.find(param.name);
-    return param.type == ParamType::Path && given != node.options.end() &&
-           std::filesystem::is_other(std::filesystem::status(given->second, ignored));
-  });
-}
-
 /// Of its value, as far as that is needed. 0 where nobody knows.
 double bytesOf(const std::optional<Plan>& plan, const Demand& demand) {
   if (!plan) return 0;
@@ -87,13 +74,18 @@ Peak findPeak(const Graph& graph, const std::vector<char>& runs,
   Peak peak;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     if (!runs[i]) continue;
-    held += bytes(i);
-    if (held > peak.bytes) peak = {held, i};
+    double released = 0, largest = 0;
     const auto release = [&](std::size_t input) {
-      if (--uses[input] == 0) held -= bytes(input);
+      if (--uses[input] > 0) return;
+      released += bytes(input);
+      largest = std::max(largest, bytes(input));
     };
     for (const std::size_t input : graph.nodes[i].inputs) release(input);
     for (const auto& [option, input] : graph.nodes[i].named) release(input);
+    // What is taken for the last time may be worked on in its place.
+    const double during = held + std::max(0.0, bytes(i) - largest);
+    if (during > peak.bytes) peak = {during, i};
+    held += bytes(i) - released;
     if (uses[i] == 0) held -= bytes(i);
   }
   return peak;
@@ -109,7 +101,7 @@ Plan planOf(Invocation& invocation) {
   return plan;
 }
 
-ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs,
+ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs, std::size_t maxMemory,
                    const std::function<std::optional<Plan>(std::size_t)>& mesh) {
   ValuePlans all{std::vector<std::optional<Plan>>(graph.nodes.size()),
                  std::vector<std::exception_ptr>(graph.nodes.size())};
@@ -127,7 +119,10 @@ ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs,
       continue;
     }
     Invocation invocation(*node.op, node.options);
-    bool isKnown = (node.op->plan || !node.inputs.empty()) && !readsOnce(node);
+    // A scene or a patch out of a file is read to be planned, which is as much as to make it.
+    const bool isHeavy =
+        node.inputs.empty() && (node.kind == Kind::Patch || node.kind == Kind::Scene);
+    bool isKnown = (node.op->plan || !node.inputs.empty()) && !isHeavy && !readsOnce(node);
     const auto know = [&](std::size_t input) {
       isKnown = isKnown && plans[input];
       return isKnown ? Value(*plans[input]) : Value(Plan{});
@@ -139,6 +134,11 @@ ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs,
     for (const auto& [option, input] : node.named) invocation.named.emplace(option, know(input));
     if (!isKnown) continue;
     // Of the whole, which need not fit: requireMemoryFor() asks for the part that is made.
+    const bool isRead =
+        std::any_of(node.op->params.begin(), node.op->params.end(), [&](const Param& param) {
+          return param.type == ParamType::Path && node.options.contains(param.name);
+        });
+    if (isRead) invocation.maxMemory = maxMemory;
     invocation.dryRun = true;
     try {
       plans[i] = planOf(invocation);
@@ -168,7 +168,7 @@ void requireMemoryFor(const Graph& graph, const std::vector<char>& runs,
 void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
              const std::function<void(const std::string&)>& tell) {
   const std::vector<char> runs = neededNodes(graph);
-  const ValuePlans all = plansOf(graph, runs, [&](std::size_t i) -> std::optional<Plan> {
+  const ValuePlans all = plansOf(graph, runs, maxMemory, [&](std::size_t i) -> std::optional<Plan> {
     const Node& node = graph.nodes[i];
     Invocation invocation(*node.op, node.options);
     invocation.maxMemory = maxMemory;
@@ -213,7 +213,8 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
     text += "\n";
   }
   text += fmt::format(
-      "at most about {:.3g} MB are held at once; about {:.2g} s of one core{}\n",
+      "at most about {:.3g} MB are held at once, one action after another; about {:.2g} s of one "
+      "core{}\n",
       findPeak(graph, runs, plans, demands).bytes * 1e-6, seconds,
       untimed > 0 ? fmt::format(", and {} actions that nobody has timed", untimed) : std::string());
   tell(text);

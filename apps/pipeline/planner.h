@@ -24,9 +24,11 @@ struct ValuePlans {
 };
 
 /// Plans of the values that those which run would make, as far as they can be told.
-/// @param runs  by node
+/// @param runs       by node
+/// @param maxMemory  for what has to be read to be planned
 /// @param mesh  plans a node that reads or makes a mesh of nothing, which may take a while
 [[nodiscard]] ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs,
+                                 std::size_t maxMemory,
                                  const std::function<std::optional<Plan>(std::size_t)>& mesh);
 
 /// Refuses what would take more than there is, before anything is made: one value, or those that

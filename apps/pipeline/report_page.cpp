@@ -201,7 +201,7 @@ class StepTable {
         "made</th><th scope=\"col\">needed of it</th><th scope=\"col\">error "
         "estimate</th></tr></thead>\n",
         report_.dryRun ? "What each step would make, as far as it can be told before it runs"
-                       : "What each step made and cost, in the order in which they ran",
+                       : "What each step made and cost, in the order of the graph",
         hasPictures_ ? "<th scope=\"col\">result</th>" : "");
     for (std::size_t i = 0; i < report_.steps.size(); ++i) text += row(report_.steps[i], i);
     return text + "</table></div>\n";
@@ -238,10 +238,8 @@ class StepTable {
   static std::string pictureOf(const StepReport& step, std::size_t index) {
     if (step.resultKind.empty()) return "";
     if (step.thumbnail.png.empty()) {
-      const std::string reason = !step.thumbnail.missing.empty() ? step.thumbnail.missing
-                                 : index >= kMostThumbnails
-                                     ? fmt::format("only {} steps have one", kMostThumbnails)
-                                     : "none was asked for";
+      const std::string reason =
+          step.thumbnail.missing.empty() ? "none was asked for" : step.thumbnail.missing;
       return "<span class=\"faint\">no picture: " + escapedHtml(reason) + "</span>";
     }
     return fmt::format(

@@ -23,7 +23,7 @@ class SideBySide {
   }
 
   JobsDone run() {
-    work(true);
+    work();
     for (std::thread& thread : threads_) thread.join();
     JobsDone all;
     for (const State state : states_) all.isDone.push_back(state == State::Done);
@@ -35,18 +35,20 @@ class SideBySide {
  private:
   enum class State { Waits, Runs, Done, Undone };
 
-  void work(bool isCaller) {
+  void work() {
     std::unique_lock lock(mutex_);
     for (;;) {
       const std::optional<std::size_t> job = next();
       if (!job) {
         if (running_.empty()) return changed_.notify_all();
+        ++idle_;
         changed_.wait(lock);
+        --idle_;
         continue;
       }
       states_[*job] = State::Runs;
       running_.push_back(*job);
-      if (isCaller) enlist();
+      enlist();
       lock.unlock();
       State end = State::Undone;
       std::exception_ptr failure;
@@ -71,9 +73,9 @@ class SideBySide {
 
   /// One more thread where there is something for it to do.
   void enlist() {
-    if (threads_.size() + 1 >= settings_.threads || !next()) return;
+    if (idle_ > 0 || threads_.size() + 1 >= settings_.threads || !next()) return;
     try {
-      threads_.emplace_back([this] { work(false); });
+      threads_.emplace_back([this] { work(); });
     } catch (const std::system_error&) {
       // Then those that there are do it.
     }
@@ -89,7 +91,8 @@ class SideBySide {
       // Those far ahead would hold their results for long.
       if (group_[i] >= group_[firstOpen_] + settings_.threads) break;
       if (states_[i] != State::Waits || !isReady(i)) continue;
-      if (!running_.empty() && !settings_.mayJoin(i, running_)) continue;
+      // Nor do later ones join: small ones would overtake a large one for ever.
+      if (!running_.empty() && !settings_.mayJoin(i, running_)) break;
       return i;
     }
     return {};
@@ -121,6 +124,7 @@ class SideBySide {
   std::vector<std::size_t> group_;  // by job: how many that wait for all come before it
   std::vector<std::size_t> running_;
   std::vector<std::thread> threads_;
+  std::size_t idle_ = 0;
   std::size_t firstOpen_ = 0;  // neither done nor left
   std::size_t firstLeft_ = static_cast<std::size_t>(-1);
   std::atomic<std::size_t> firstFailure_ = static_cast<std::size_t>(-1);

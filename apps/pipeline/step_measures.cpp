@@ -103,6 +103,11 @@ void RunningSteps::remove(StepClock& clock) {
   clocks_.erase(std::find(clocks_.begin(), clocks_.end(), &clock));
 }
 
+void RunningSteps::forgetPeak() {
+  const std::lock_guard lock(mutex_);
+  if (clocks_.empty()) apps::resetPeakResident();
+}
+
 void RunningSteps::tellPeak() {
   if (clocks_.empty()) return;
   const double peak = apps::peakResidentBytes();

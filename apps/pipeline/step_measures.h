@@ -44,6 +44,8 @@ class RunningSteps {
  public:
   void add(StepClock& clock);
   void remove(StepClock& clock);
+  /// What was taken until now is of none of those that run.
+  void forgetPeak();
 
  private:
   void tellPeak();

@@ -79,7 +79,6 @@ Thumbnail thumbnailOf(const Value& value, std::size_t maxMemory) {
   } catch (const std::exception&) {
     picture.missing = "there is no surface that can be drawn";
   }
-  apps::resetPeakResident();  // what is measured next is none of ours
   return picture;
 }
 

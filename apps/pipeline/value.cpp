@@ -30,7 +30,14 @@ const char* kindName(Kind kind) {
 }
 
 double Plan::activeVoxels() const {
-  return voxelSize > 0 ? area / (voxelSize * voxelSize) * 2 * halfWidth : 0;
+  if (!(voxelSize > 0)) return 0;
+  const double layer = area / (voxelSize * voxelSize) * 2 * halfWidth;
+  if (bounds.isEmpty()) return layer;
+  // However much surface there is, no grid point counts twice.
+  double all = 1;
+  for (int axis = 0; axis < 3; ++axis)
+    all *= (bounds.max[axis] - bounds.min[axis]) / voxelSize + 2 * halfWidth + 1;
+  return std::min(layer, all);
 }
 
 double Plan::bytes() const {

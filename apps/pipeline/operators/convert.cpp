@@ -1,6 +1,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "apps/pipeline/demand.h"
@@ -76,6 +79,14 @@ Plan planLevelSet(Invocation& in) {
   plan.voxelSize = in.voxelSize(longestSide(in.operands[0]));
   plan.halfWidth = in.number("half-width");
   levelset::checkVoxelSize(plan.voxelSize, longestSide(in.operands[0]));
+  double reach = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    reach = std::max({reach, std::abs(plan.bounds.min[axis]), std::abs(plan.bounds.max[axis])});
+  if (!(reach / plan.voxelSize < std::numeric_limits<std::int32_t>::max()))
+    throw levelset::ResourceLimit(
+        fmt::format("level-set: the mesh reaches {:.3g} voxels from the origin, more than can be "
+                    "counted; use larger voxels or move it",
+                    reach / plan.voxelSize));
   return plan;
 }
 

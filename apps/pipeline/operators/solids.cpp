@@ -43,14 +43,42 @@ Value csg(Invocation& in) {
   return Value(std::move(result.band));
 }
 
+/// Of the box, that also lies in the other. 1 where it has no volume
+double shareWithin(const Imath::Box3d& box, const Imath::Box3d& other) {
+  double share = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double side = box.max[axis] - box.min[axis];
+    if (!(side > 0)) return 1;
+    const double common =
+        std::min(box.max[axis], other.max[axis]) - std::max(box.min[axis], other.min[axis]);
+    share *= std::clamp(common / side, 0.0, 1.0);
+  }
+  return share;
+}
+
+/// Surfaces as if spread evenly over their boxes, where the result can have some.
+template <CsgOperation operation>
 Plan planCsg(Invocation& in) {
   Plan plan = in.operands[0].plan();
   for (std::size_t i = 1; i < in.operands.size(); ++i) {
-    const Plan& other = in.operands[i].plan();
+    const Plan other = in.operands[i].plan();
     plan.voxelSize = std::min(plan.voxelSize, other.voxelSize);
     plan.halfWidth = std::min(plan.halfWidth, other.halfWidth);
-    plan.area += other.area;
-    plan.bounds.extendBy(other.bounds);
+    if (operation == CsgOperation::Union) {
+      plan.area += other.area;
+      plan.bounds.extendBy(other.bounds);
+      continue;
+    }
+    const double within = other.area * shareWithin(other.bounds, plan.bounds);
+    if (operation == CsgOperation::Difference) {
+      plan.area += within;
+      continue;
+    }
+    plan.area = plan.area * shareWithin(plan.bounds, other.bounds) + within;
+    for (int axis = 0; axis < 3; ++axis) {  // an empty box stays one
+      plan.bounds.min[axis] = std::max(plan.bounds.min[axis], other.bounds.min[axis]);
+      plan.bounds.max[axis] = std::min(plan.bounds.max[axis], other.bounds.max[axis]);
+    }
   }
   return plan;
 }
@@ -104,9 +132,8 @@ void validateOffset(const Invocation& in) {
 
 Value offset(Invocation& in) {
   levelset::OffsetOptions options = offsetOptions(in);
-  // Of a part, as wide as of the whole: how far points travel shows in last bits.
-  if (in.planned && in.band().halfWidth() < in.planned->halfWidth * (1 - 1e-5))
-    options.halfWidth = in.planned->halfWidth;
+  // Of a narrower part as wide as of the whole: how far points travel shows in last bits.
+  if (in.isNarrowed) options.halfWidth = in.planned->halfWidth;
   const std::optional<levelset::Mask> mask = maskOf(in);
   NarrowBand band = in.band();
   if (!mask && !in.given("by")) {
@@ -226,7 +253,7 @@ Operator csgOperator(const char* name, const char* summary, const char* example)
           .operands = {{Kind::Band}, {Kind::Band}},
           .takesMore = true,
           .run = csg<operation>,
-          .plan = planCsg,
+          .plan = planCsg<operation>,
           .nanosecondsPerVoxel = 300,
           .slope = Slope::OfOperands,
           .reads = readOfCsg};
@@ -285,7 +312,7 @@ void addSolidOperators(std::vector<Operator>& all) {
                   .choices = {"both", "add", "remove"}}},
       .operands = {{Kind::Band}, {Kind::Band}},
       .run = blend,
-      .plan = planCsg,
+      .plan = planCsg<CsgOperation::Union>,
   });
   all.push_back({
       .name = "offset",

@@ -147,6 +147,7 @@ std::size_t tryOperator(const Operator& op, const std::function<Options(Random&)
     if (less.back().band().isEmpty()) return 0;  // it would be made whole
   }
   part.operands = less;
+  part.isNarrowed = less[0].band().halfWidth() < operands[0].band().halfWidth() * (1 - 1e-5);
   const std::string what = op.name + " " + std::to_string(seed) + ", half width " +
                            std::to_string(of.part.halfWidth) + " of " + std::to_string(halfWidth) +
                            (levelset::isEverywhere(of.part.region) ? "" : ", in a region");

@@ -214,7 +214,9 @@ TEST(ReportPage, ShowsWhatWasMadeBesideWhatWasNeeded) {
   const support::TemporaryFolder folder;
   const std::string file = (folder / "a.ply").string();
   const std::string chain =
-      "sphere --radius 1 --voxel 0.1 ! clip --box 0,0,0_2,2,2 ! mesh ! write " + file;
+      "sphere --radius 2 --voxel 0.1 --half-width 7 ! offset 0.1 ! clip --box 1,1,1_3,3,3 ! mesh ! "
+      "write " +
+      file;
   std::vector<std::string> words = support::wordsOf(chain);
   for (std::string& word : words) std::replace(word.begin(), word.end(), '_', ' ');
   pipeline::RunReport report;

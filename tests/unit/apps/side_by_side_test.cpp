@@ -62,6 +62,41 @@ TEST(SideBySide, RunsAtOnceWhatDoesNotWait) {
   EXPECT_FALSE(done.failed);
 }
 
+TEST(SideBySide, TakesAsManyThreadsAsThereAreJobs) {
+  Gate gate;
+  std::atomic<int> met = 0;
+  runSideBySide(std::vector<Job>(4), {.threads = 4,
+                                      .run =
+                                          [&](std::size_t, const GoesOn&) {
+                                            met += gate.pass(4);
+                                            return true;
+                                          },
+                                      .mayJoin = kAnyBeside});
+  EXPECT_EQ(met, 4);
+}
+
+/// One that may join nobody is not overtaken by all that come after it.
+TEST(SideBySide, WaitsForOneThatMayNotJoin) {
+  std::mutex mutex;
+  std::vector<std::size_t> order;
+  const auto isLarge = [](std::size_t job) { return job == 2; };
+  runSideBySide(
+      std::vector<Job>(8),
+      {.threads = 2,
+       .run =
+           [&](std::size_t job, const GoesOn&) {
+             {
+               const std::lock_guard lock(mutex);
+               order.push_back(job);
+             }
+             std::this_thread::sleep_for(milliseconds(job == 0 ? 20 : 1));
+             return true;
+           },
+       .mayJoin = [&](std::size_t job, const std::vector<std::size_t>&) { return !isLarge(job); }});
+  ASSERT_EQ(order.size(), 8u);
+  EXPECT_LE(std::find(order.begin(), order.end(), 2u) - order.begin(), 2);
+}
+
 TEST(SideBySide, KeepsToItsThreadsAndToWhatMayJoin) {
   for (const std::size_t threads : {1u, 2u, 3u}) {
     std::atomic<int> running = 0, most = 0, mostLarge = 0, large = 0;
@@ -230,6 +265,7 @@ TEST_F(Branches, EndAtTheFirstRefusalWithAllBeforeItDone) {
   const std::string chain = balls(3) +
                             " ! sphere --radius 1 --voxel 0.05 ! offset -2 ! write bad.vdb"
                             " ! sphere --radius 1 --voxel 0.05 ! write after.vdb";
+  std::vector<std::string> told;
   for (const char* threads : {"1", "4"}) {
     const auto ended =
         levelsmith("--report r.json --threads " + std::string(threads) + " " + chain);
@@ -240,8 +276,21 @@ TEST_F(Branches, EndAtTheFirstRefusalWithAllBeforeItDone) {
     }
     EXPECT_FALSE(exists("bad.vdb"));
     EXPECT_FALSE(exists("after.vdb"));
-    EXPECT_NE(ended.err.find("offset"), std::string::npos);
+    const auto report = nlohmann::json::parse(support::slurp(folder_ / "r.json"));
+    told.push_back(ended.err + report["error"].get<std::string>());
+    for (const auto& step : report["steps"]) told.back() += " " + step["action"].get<std::string>();
   }
+  EXPECT_EQ(told[0], told[1]);
+  EXPECT_NE(told[0].find("offset: "), std::string::npos) << told[0];
+}
+
+TEST_F(Branches, RunOneAfterAnotherWhereMemoryIsShort) {
+  std::string chain;
+  for (int i = 0; i < 4; ++i)
+    chain += (i == 0 ? "" : " ! ") + std::string("sphere --radius 1 --voxel 0.008 --as a") +
+             std::to_string(i) + " ! mesh @a" + std::to_string(i) + " ! measure";
+  const auto short_ = levelsmith("--max-memory 200M --threads 4 " + chain);
+  EXPECT_EQ(short_.code, 0) << short_.err;
 }
 
 TEST_F(Branches, AreReportedInTheOrderOfTheGraphWithTheirOwnCosts) {
@@ -263,6 +312,38 @@ TEST_F(Branches, AreReportedInTheOrderOfTheGraphWithTheirOwnCosts) {
   // that.
   EXPECT_LT(cpu, 1.7 * alone + 0.1);
   EXPECT_GT(cpu, 0.4 * alone);
+}
+
+TEST_F(Branches, ReadTheFilesOfASceneThatIsWrittenBefore) {
+  ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.05 ! write s-a.vdb").code, 0);
+  const std::string chain =
+      "sphere --radius 2 --voxel 0.05 --as a ! box --size 1,1,3 --voxel 0.05 --as b ! scene @a @b "
+      "! "
+      "write s.json ! read ./s-a.vdb ! measure --json";
+  const auto alone = levelsmith("--threads 1 " + chain),
+             beside = levelsmith("--threads 4 " + chain);
+  ASSERT_EQ(alone.code, 0) << alone.err;
+  EXPECT_NEAR(nlohmann::json::parse(alone.out)["volume"].get<double>(), 33.5, 0.1);
+  ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.05 ! write s-a.vdb").code, 0);
+  EXPECT_EQ(levelsmith("--threads 4 " + chain).out, alone.out);
+  EXPECT_EQ(beside.out, alone.out);
+}
+
+TEST_F(Branches, ReadPipesOnce) {
+  ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.05 ! mesh ! write s.ply").code, 0);
+  // What is refused of a part is tried whole, and the mesh cannot be read again.
+  const std::string apart =
+      "level-set --voxel 0.05 --as m ! sphere --radius 1 --center 5,0,0 --voxel 0.05 --as s ! "
+      "union "
+      "@m @s ! clip --box \"4.5,-.5,-.5 6.5,.5,.5\" ! mesh ! write o.ply";
+  const auto piped = levelsmith("read - --format ply ! " + apart + " < s.ply");
+  EXPECT_EQ(piped.code, 0) << piped.err;
+  EXPECT_EQ(levelsmith("read s.ply ! " + apart).code, 0);
+  const auto broken = levelsmith(
+      "read - --format ply ! level-set --voxel 0.05 ! mesh ! write o.ply "
+      "< <(head -c 300 s.ply)");
+  EXPECT_EQ(broken.code, 3);
+  EXPECT_EQ(broken.err.find("is empty"), std::string::npos) << broken.err;
 }
 
 TEST_F(Branches, ReadWhatThoseBeforeWrite) {
