@@ -152,6 +152,7 @@ std::vector<std::size_t> GraphRun::decideFates() {
 void GraphRun::useCache(const std::vector<char>& needed) {
   cache_.emplace(settings_.cache);
   keys_ = CacheKeys(*cache_, settings_.maxMemory).of(graph_, needed);
+  const std::vector<std::size_t> uses = countUses(graph_, needed);
   std::vector<char> taken(graph_.nodes.size(), 0);
   for (const std::size_t result : graph_.results) taken[result] = 1;
   for (std::size_t i = graph_.nodes.size(); i-- > 0;) {
@@ -160,7 +161,7 @@ void GraphRun::useCache(const std::vector<char>& needed) {
     const bool isKnown = keys_[i] && cache_->has(*keys_[i]);
     if (!node.makes()) {
       if (isKnown && isUpToDate(*keys_[i])) fates_[i] = Fate::Known;
-    } else if (!taken[i] && hasTakers(i, needed)) {
+    } else if (!taken[i] && uses[i] > 0) {  // what ends a chain is made for itself
       fates_[i] = Fate::Known;
     } else if (isKnown && Cache::canHold(node.kind)) {
       fates_[i] = Fate::Load;
@@ -169,11 +170,6 @@ void GraphRun::useCache(const std::vector<char>& needed) {
     for (const std::size_t input : node.inputs) taken[input] = 1;
     for (const auto& [option, input] : node.named) taken[input] = 1;
   }
-}
-
-/// Is it there for others? What ends a chain is made for itself.
-bool GraphRun::hasTakers(std::size_t i, const std::vector<char>& needed) const {
-  return countUses(graph_, needed)[i] > 0;
 }
 
 /// Are the files there as they were left?

@@ -67,7 +67,6 @@ class GraphRun {
 
   std::vector<std::size_t> decideFates();
   void useCache(const std::vector<char>& needed);
-  [[nodiscard]] bool hasTakers(std::size_t i, const std::vector<char>& needed) const;
   [[nodiscard]] bool isUpToDate(const std::string& key) const;
 
   void planAhead();

@@ -283,7 +283,7 @@ def test_the_job_of_a_killed_worker_is_run_again(ls, client, tmp_path):
 def test_a_job_that_kills_every_worker_is_given_up(ls, client):
     with pytest.raises(ls.ResourceError, match=r"every worker that took this job died.*\(parameters\[1\], i = 1\)"):
         ls.map(lambda i: os.kill(os.getpid(), signal.SIGKILL) if i else i, [{"i": 0}, {"i": 1}], client)
-    client.wait_for_workers(3)
+    client.wait_for_workers(2, timeout=60)  # of three: a nanny may give up on one that dies as it begins
     assert ls.map(lambda i: i, [{"i": 7}], client) == [7]
 
 
