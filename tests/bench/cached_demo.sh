@@ -2,7 +2,7 @@
 # The main demo with a cache, twice: cached_demo.sh LEVELSMITH. Ends with 1 where the second run, which has
 # nothing to compute, takes a second or more, or leaves other files.
 set -eu
-levelsmith=$1
+levelsmith=$(realpath "$1")
 demo=$(dirname "$0")/../../apps/demo.sh
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

@@ -6,7 +6,7 @@
 # - Branches side by side give the same files; how much sooner, beside one thread, is told.
 # - A step costs less than 1 ms beside its work.
 set -eu
-levelsmith=$1
+levelsmith=$(realpath "$1")
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 cd "$folder"
@@ -58,8 +58,9 @@ hundred=$(cost $many)
 awk -v needed="$needed_time" -v whole="$whole_time" -v part="$needed_memory" -v all="$whole_memory" 'BEGIN {
   time = whole / needed
   memory = all / part
-  printf "offset and clip: whole %.2f s of CPU and %.0f MB, what is needed %.2f s and %.0f MB: %.1f times and %.1f times, bound >= 2%s\n", whole, all / 1024, needed, part / 1024, time, memory, time >= 2 && memory >= 2 ? "" : "  missed"
-  exit time < 2 || memory < 2
+  met = (time >= 2) && (memory >= 2)
+  printf "offset and clip: whole %.2f s of CPU and %.0f MB, what is needed %.2f s and %.0f MB: %.1f times and %.1f times, bound >= 2%s\n", whole, all / 1024, needed, part / 1024, time, memory, met ? "" : "  missed"
+  exit !met
 }' || missed=1
 awk -v alone="$alone" -v twelve="$of_twelve" -v one="$one" -v hundred="$hundred" 'BEGIN {
   ratio = twelve / alone
