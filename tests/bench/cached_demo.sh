@@ -8,7 +8,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 took() {
   begin=$(date +%s.%N)
-  "$demo" "$levelsmith" "$folder/out" --cache "$folder/cache" >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
+  "$demo" "$levelsmith" "$folder/out" --cache "$folder/cache" >"$folder/log" 2>&1 || { cat "$folder/log" >&2; exit 1; }
   echo "$begin $(date +%s.%N)" | awk '{ printf "%.2f", $2 - $1 }'
 }
 first=$(took)
