@@ -11,7 +11,7 @@ namespace cli {
 enum class ProgressStyle { Off, Bar, Json };
 
 /// Progress on standard error: a bar once an action has taken a second, or lines of JSON, one as
-/// each action begins and ten a second at most.
+/// each action begins, and beside those ten a second at most.
 class ProgressLine {
  public:
   ProgressLine(ProgressStyle style, std::size_t actions) : style_(style), actions_(actions) {}

@@ -94,15 +94,21 @@ std::vector<FileRead> filesRead(const Node& node) {
   return files;
 }
 
-/// What has been written by now, and by which node last.
+/// What nodes write, and which of them was added last.
 class Written {
  public:
-  /// @param isScene  which has files of its solids beside it
-  void add(const std::string& target, bool isScene, std::size_t writer) {
-    if (target == "-") return;
-    const std::filesystem::path place = placeOf(target);
-    writers_[isScene ? place.parent_path() : place] = writer;
-    last_ = writer;
+  void add(const Graph& graph, std::size_t writer) {
+    const Node& node = graph.nodes[writer];
+    // A scene has files of its solids beside it.
+    const bool isScene =
+        std::any_of(node.inputs.begin(), node.inputs.end(),
+                    [&](std::size_t input) { return graph.nodes[input].kind == Kind::Scene; });
+    for (const std::string& target : targetsOf(node)) {
+      if (target == "-") continue;
+      const std::filesystem::path place = placeOf(target);
+      writers_[isScene ? place.parent_path() : place] = writer;
+      last_ = writer;
+    }
   }
 
   /// Itself, or a folder that it is in.
@@ -179,15 +185,23 @@ std::vector<std::optional<std::size_t>> findWritersRead(const Graph& graph,
   Written written;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     if (!needed[i]) continue;
-    const Node& node = graph.nodes[i];
-    for (const FileRead& file : filesRead(node))
+    for (const FileRead& file : filesRead(graph.nodes[i]))
       writers[i] = std::max(writers[i], written.find(file));
-    const bool isScene =
-        std::any_of(node.inputs.begin(), node.inputs.end(),
-                    [&](std::size_t input) { return graph.nodes[input].kind == Kind::Scene; });
-    for (const std::string& target : targetsOf(node)) written.add(target, isScene, i);
+    written.add(graph, i);
   }
   return writers;
+}
+
+std::vector<char> findOverwritten(const Graph& graph, const std::vector<char>& needed) {
+  std::vector<char> is(graph.nodes.size(), 0);
+  Written behind;
+  for (std::size_t i = graph.nodes.size(); i-- > 0;) {
+    if (!needed[i]) continue;
+    for (const FileRead& file : filesRead(graph.nodes[i]))
+      if (behind.find(file)) is[i] = 1;
+    behind.add(graph, i);
+  }
+  return is;
 }
 
 bool readsOnce(const Node& node) {

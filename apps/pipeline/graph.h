@@ -56,6 +56,10 @@ void leaveVoxelOpen(Node& node);
 [[nodiscard]] std::vector<std::optional<std::size_t>> findWritersRead(
     const Graph& graph, const std::vector<char>& needed);
 
+/// By node: does one behind it write what it reads? Once that has run, it is not to be read again.
+[[nodiscard]] std::vector<char> findOverwritten(const Graph& graph,
+                                                const std::vector<char>& needed);
+
 /// Does it read what can be read once only, standard input or a pipe?
 [[nodiscard]] bool readsOnce(const Node& node);
 

@@ -190,13 +190,15 @@ void GraphRun::planAhead() {
   if (!settings_.wholeValues && !cache_ && !settings_.made)
     demands_ = demandsOf(graph_, runs, plans_, settings_.measureErrors ? kMeasuredHalfWidth : 1);
   if (std::any_of(demands_.begin(), demands_.end(),
-                  [](const Demand& demand) { return !demand.isWhole(); }))
+                  [](const Demand& demand) { return !demand.isWhole(); })) {
+    const std::vector<char> isOverwritten = findOverwritten(graph_, runs);
     for (std::size_t i = 0; i < runs.size(); ++i) {
-      if (!runs[i] || !readsOnce(graph_.nodes[i])) continue;
+      if (!runs[i] || !(isOverwritten[i] || readsOnce(graph_.nodes[i]))) continue;
       // It is there to be taken once more, where a part turns out not to do.
       demands_[i] = {};
       values_.addUse(i);
     }
+  }
   requireMemoryFor(graph_, runs, plans_, demands_, settings_.maxMemory);
 }
 
@@ -211,6 +213,7 @@ std::optional<Plan> GraphRun::planEarly(std::size_t i) {
                                                         i) != node.inputs.end();
                                      });
   if (!makesBand || earlyBytes_ > most) return {};
+  const std::size_t toldBefore = tellEnd_;
   try {
     compute(i);
   } catch (const levelset::Cancelled&) {
@@ -218,7 +221,7 @@ std::optional<Plan> GraphRun::planEarly(std::size_t i) {
   } catch (const levelset::Error&) {
     earlyFailures_[i] = std::current_exception();  // thrown in its turn
     fates_[i] = Fate::Run;
-    tellEnd_ = kNone;
+    tellEnd_ = std::min(toldBefore, i + 1);
     return {};
   }
   wasEarly_[i] = 1;

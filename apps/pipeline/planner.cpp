@@ -213,8 +213,9 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
     text += "\n";
   }
   text += fmt::format(
-      "at most about {:.3g} MB are held at once, one action after another; about {:.2g} s of one "
-      "core{}\n",
+      "values of about {:.3g} MB are held at once, beside what actions work with; about {:.2g} s "
+      "of "
+      "one core{}\n",
       findPeak(graph, runs, plans, demands).bytes * 1e-6, seconds,
       untimed > 0 ? fmt::format(", and {} actions that nobody has timed", untimed) : std::string());
   tell(text);

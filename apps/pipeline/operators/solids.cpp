@@ -75,10 +75,7 @@ Plan planCsg(Invocation& in) {
       continue;
     }
     plan.area = plan.area * shareWithin(plan.bounds, other.bounds) + within;
-    for (int axis = 0; axis < 3; ++axis) {  // an empty box stays one
-      plan.bounds.min[axis] = std::max(plan.bounds.min[axis], other.bounds.min[axis]);
-      plan.bounds.max[axis] = std::min(plan.bounds.max[axis], other.bounds.max[axis]);
-    }
+    plan.bounds.extendBy(other.bounds);  // which are estimates: what they share may be too little
   }
   return plan;
 }

@@ -380,6 +380,23 @@ TEST_F(Demands, PlansAreRefusedAndToldBeforeAnythingRuns) {
   EXPECT_FALSE(exists("r.json"));
 }
 
+TEST_F(Demands, FilesThatAnActionBehindWritesAreNotReadAgain) {
+  // What is refused of a part is tried whole, when the file is another already.
+  const std::string file = "sphere --radius 2 --voxel .05 ! write a.vdb",
+                    chain =
+                        "read a.vdb --as m ! sphere --radius .3 --center 1.6,0,0 --voxel .05 "
+                        "--as s ! sphere --radius .5 --voxel .05 ! write a.vdb ! union @m @s ! "
+                        "clip --box \"0,-.1,-.1 1.3,.1,.1\" ! measure --json";
+  std::vector<std::string> told;
+  for (const char* options : {"--whole ", "", "--threads 4 "}) {
+    ASSERT_EQ(levelsmith(file).code, 0);
+    told.push_back(levelsmith(options + chain).out);
+  }
+  EXPECT_NE(told[0].find("volume"), std::string::npos);
+  EXPECT_EQ(told[1], told[0]);
+  EXPECT_EQ(told[2], told[0]);
+}
+
 TEST_F(Demands, FilesThatAnActionBeforeWritesAreReadAsItLeavesThem) {
   for (const char* file : {"a.ply", "a.vdb"}) {
     const std::string solid = std::string(file) == "a.vdb" ? " " : " ! mesh ";
