@@ -60,7 +60,7 @@ double bytesOf(const std::optional<Plan>& plan, const Demand& demand) {
   return isTold ? demanded(*plan, demand).bytes() : 0;
 }
 
-/// Bytes held at once at most: values live from what makes them to the last that takes them.
+/// Where values take most: they live from what makes them to the last that takes them.
 struct Peak {
   double bytes = 0;
   std::size_t node = 0;  ///< that makes the last of them
@@ -214,8 +214,7 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
   }
   text += fmt::format(
       "values of about {:.3g} MB are held at once, beside what actions work with; about {:.2g} s "
-      "of "
-      "one core{}\n",
+      "of one core{}\n",
       findPeak(graph, runs, plans, demands).bytes * 1e-6, seconds,
       untimed > 0 ? fmt::format(", and {} actions that nobody has timed", untimed) : std::string());
   tell(text);

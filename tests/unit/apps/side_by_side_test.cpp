@@ -245,8 +245,7 @@ TEST_F(Branches, LeaveWhatOneThreadLeaves) {
   const std::string chain =
       "sphere --radius 1 --voxel 0.03 --as a ! offset 0.1 ! offset -0.1 --as b ! box --size 1,1,3 "
       "--voxel 0.03 ! smooth --sigma 1vx --as c ! union @b @c ! clip --box \"-1,-1,0 1,1,2\" ! "
-      "write "
-      "o.vdb ! difference @a @c ! mesh ! write o.ply ! measure --json";
+      "write o.vdb ! difference @a @c ! mesh ! write o.ply ! measure --json";
   const auto alone = levelsmith("--threads 1 " + chain);
   ASSERT_EQ(alone.code, 0) << alone.err;
   const std::string grid = support::slurp(folder_ / "o.vdb"),
