@@ -83,19 +83,25 @@ class SideBySide {
 
   /// The first that can begin.
   std::optional<std::size_t> next() {
-    while (firstOpen_ < jobs_.size() &&
-           (states_[firstOpen_] == State::Done || states_[firstOpen_] == State::Undone))
-      ++firstOpen_;
     if (running_.size() >= settings_.threads) return {};
     for (std::size_t i = firstOpen_; i < std::min(jobs_.size(), firstFailure_.load()); ++i) {
+      const bool canBegin = states_[i] == State::Waits && isReady(i);
+      if (i == firstOpen_ && hasEnded(i)) {  // perhaps just now, left
+        ++firstOpen_;
+        continue;
+      }
       // Those far ahead would hold their results for long.
       if (group_[i] >= group_[firstOpen_] + settings_.threads) break;
-      if (states_[i] != State::Waits || !isReady(i)) continue;
+      if (!canBegin) continue;
       // Nor do later ones join: small ones would overtake a large one for ever.
       if (!running_.empty() && !settings_.mayJoin(i, running_)) break;
       return i;
     }
     return {};
+  }
+
+  [[nodiscard]] bool hasEnded(std::size_t i) const {
+    return states_[i] == State::Done || states_[i] == State::Undone;
   }
 
   /// Also finds what can never begin.
