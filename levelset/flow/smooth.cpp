@@ -28,6 +28,10 @@ constexpr double kGaussianReach = 4;
 constexpr double kStencil = 3;
 // Beyond this many σ the tails of both sides of the surface balance: the band may end there.
 constexpr double kKnownReach = 3;
+// A band that misses as little of a width counts as wide as that.
+constexpr double kWideEnough = 1.0001;
+// Around a part of the surface, its edges, and the faces that meet there.
+constexpr double kBesideEdges = 12;
 constexpr double kFieldsAlive = 5;
 // Values that a median may read in all: some thousand CPU seconds.
 constexpr double kMostReadings = 1e12;
@@ -312,7 +316,6 @@ void paste(const openvdb::FloatTree& source, const CoordBBox& box, openvdb::Floa
 struct Filtering {
   SmoothKind kind;
   double width;  ///< voxels
-  const SmoothOptions& options;
 
   [[nodiscard]] double passes() const { return kind == SmoothKind::Taubin ? 2 : 1; }
   /// How far from the surface distances have to be known, voxels.
@@ -327,8 +330,7 @@ struct Filtering {
 
 /// The solid smoothed in a box of grid points, or everywhere; none when no surface is left there.
 std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const NarrowBand& solid,
-                                     const Filtering& filtering) {
-  const SmoothOptions& options = filtering.options;
+                                     const Filtering& filtering, const SmoothOptions& options) {
   const double voxel = solid.voxelSize();
   eikonal::DistanceRequest request;
   request.action = kSmooth;
@@ -344,7 +346,7 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
   const double trusted = filtering.known(), own = 2 * solid.halfWidth() + 2;
   const double needed = trusted + std::max(filtering.reach(), own) + 2 * kStencil;
   openvdb::FloatGrid::Ptr field;
-  if (filtering.known() > solid.halfWidth() * 1.0001) {
+  if (filtering.known() > solid.halfWidth() * kWideEnough) {
     request.halfWidth = filtering.known() + kStencil;
     if (box) request.region = around(needed);
     request.progress = subProgress(options.progress, 0, kWidened);
@@ -391,6 +393,13 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
 
 }  // namespace
 
+double smoothingReach(SmoothKind kind, double sigma, double halfWidth) {
+  const Filtering filtering{kind, sigma};
+  const double distances =
+      filtering.known() > halfWidth * kWideEnough ? filtering.known() + kStencil + kBesideEdges : 0;
+  return distances + filtering.reach() + halfWidth + kBesideEdges;
+}
+
 NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothOptions& options) {
   if (!(sigma > 0) || !std::isfinite(sigma))
     throw UsageError(fmt::format("{}: sigma is {}; give a positive length", kSmooth, sigma));
@@ -399,15 +408,15 @@ NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothO
   if (solid.isEmpty())
     throw InvalidInput(fmt::format(
         "{}: the solid is empty, so there is no surface to smooth; give a solid", kSmooth));
-  const Filtering filtering{kind, sigma / solid.voxelSize(), options};
+  const Filtering filtering{kind, sigma / solid.voxelSize()};
   if (options.mask) {
     const CoordBBox box = changingBox(vdb(solid), *options.mask);
     if (box.empty()) return solid;
     // Without a surface near by, what is left elsewhere tells the distances.
     if (!box.isInside(vdb(solid).evalActiveVoxelBoundingBox()))
-      if (auto part = smoothedIn(box, solid, filtering)) return std::move(*part);
+      if (auto part = smoothedIn(box, solid, filtering, options)) return std::move(*part);
   }
-  if (auto whole = smoothedIn(std::nullopt, solid, filtering)) return std::move(*whole);
+  if (auto whole = smoothedIn(std::nullopt, solid, filtering, options)) return std::move(*whole);
   throw InvalidInput(
       fmt::format("{}: nothing is left of the solid with a sigma of {} world units; give a "
                   "smaller one",

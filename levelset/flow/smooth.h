@@ -21,6 +21,12 @@ struct SmoothOptions {
   Progress progress = {};
 };
 
+/// How far from a place the surface decides what smoothing makes of it there.
+/// @param sigma  of the filter, voxels
+/// @param halfWidth  of the solid, voxels
+/// @return voxels
+[[nodiscard]] double smoothingReach(SmoothKind kind, double sigma, double halfWidth);
+
 /// Smooths the surface: filters φ and makes distances of the result.
 /// @param sigma  world units
 /// @throws UsageError unless `sigma` is positive and finite; InvalidInput if `solid` is empty or

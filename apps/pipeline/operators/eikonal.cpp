@@ -1,7 +1,9 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "apps/pipeline/demand.h"
 #include "apps/pipeline/fields.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
@@ -19,6 +21,7 @@ using levelset::NarrowBand;
 Value redistanceTo(Invocation& in, std::optional<double> halfWidth) {
   levelset::RedistanceOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
   options.halfWidth = halfWidth;
+  if (in.isNarrowed) options.halfWidth = in.planned->halfWidth;
   NarrowBand band = in.band();
   in.operands.clear();
   return Value(levelset::redistance(std::move(band), options));
@@ -31,6 +34,13 @@ Value reinitialize(Invocation& in) {
 
 Value widen(Invocation& in) {
   return redistanceTo(in, in.number("half-width"));
+}
+
+/// What is a distance already is kept, so it is read as wide as it is asked for.
+Demand readOfRedistance(Invocation& in, std::size_t, const Demand& of) {
+  const double voxel = in.operands[0].plan().voxelSize;
+  return {{.halfWidth = std::max(kReadBySurface, of.part.halfWidth + 1),
+           .region = grown(of.part.region, distanceReach(in.planned->halfWidth) * voxel)}};
 }
 
 Plan planHalfWidth(Invocation& in) {
@@ -199,6 +209,9 @@ void addEikonalOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = reinitialize,
       .plan = planHalfWidth,
+      .slope = Slope::One,
+      .reads = readOfRedistance,
+      .partTolerance = kDistanceTolerance,
   });
   all.push_back({
       .name = "widen",
@@ -210,6 +223,9 @@ void addEikonalOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = widen,
       .plan = planHalfWidth,
+      .slope = Slope::One,
+      .reads = readOfRedistance,
+      .partTolerance = kDistanceTolerance,
   });
   all.push_back(frontOperator<FrontMethod::Marching>(
       "march", "arrival times and distances by fast marching",

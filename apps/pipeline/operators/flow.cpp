@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "apps/pipeline/demand.h"
 #include "apps/pipeline/fields.h"
 #include "apps/pipeline/file_row.h"
 #include "apps/pipeline/invocation.h"
@@ -56,18 +57,30 @@ Value curvatureFlow(Invocation& in) {
 
 // === smooth
 
-Value smooth(Invocation& in) {
+levelset::SmoothKind smoothKind(const Invocation& in) {
   const std::string kind = in.text("kind");
+  return kind == "mean"     ? levelset::SmoothKind::Mean
+         : kind == "median" ? levelset::SmoothKind::Median
+         : kind == "taubin" ? levelset::SmoothKind::Taubin
+                            : levelset::SmoothKind::Gaussian;
+}
+
+Value smooth(Invocation& in) {
   const double sigma = in.length("sigma");
-  const levelset::SmoothKind chosen = kind == "mean"     ? levelset::SmoothKind::Mean
-                                      : kind == "median" ? levelset::SmoothKind::Median
-                                      : kind == "taubin" ? levelset::SmoothKind::Taubin
-                                                         : levelset::SmoothKind::Gaussian;
   NarrowBand band = in.band();
   in.operands.clear();
   return Value(
-      levelset::smooth(std::move(band), chosen, sigma,
+      levelset::smooth(std::move(band), smoothKind(in), sigma,
                        {.mask = maskOf(in), .maxMemory = in.maxMemory, .progress = in.progress}));
+}
+
+Demand readOfSmooth(Invocation& in, std::size_t, const Demand& of) {
+  if (in.given("mask")) return {};
+  const Plan solid = in.operands[0].plan();
+  const double voxel = solid.voxelSize;
+  const double reach =
+      levelset::smoothingReach(smoothKind(in), in.length("sigma") / voxel, solid.halfWidth);
+  return {{.region = grown(of.part.region, reach * voxel)}};
 }
 
 // === morph
@@ -200,7 +213,10 @@ void addFlowOperators(std::vector<Operator>& all) {
                             .range = Range::Positive,
                             .required = true}}),
        .operands = {{Kind::Band}},
-       .run = smooth});
+       .run = smooth,
+       .slope = Slope::One,
+       .reads = readOfSmooth,
+       .partTolerance = kDistanceTolerance});
   all.push_back(
       {.name = "morph",
        .group = "Flow",

@@ -187,8 +187,27 @@ Plan planTransform(Invocation& in) {
   return plan;
 }
 
+/// Of a solid that is laid on another grid, and made distances of again there.
+/// @param toSource  from the world of the result to that of the operand
+Demand readOfSamples(const Invocation& in, const Demand& of, const M44d& toSource) {
+  const Plan source = in.operands[0].plan(), target = *in.planned;
+  double stretch = 0;  // of a length, at most
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) stretch += toSource[i][k] * toSource[i][k];
+  stretch = std::sqrt(stretch);
+  // The operand's band is made as wide as is sampled beside the surface.
+  constexpr double kSampled = 4;
+  const double wide =
+      source.halfWidth + kSampled + kSampled * stretch * target.voxelSize / source.voxelSize;
+  const Imath::Box3d about =
+      grown(of.part.region, distanceReach(target.halfWidth) * target.voxelSize);
+  if (levelset::isEverywhere(about)) return {};
+  return {{.region = grown(moved(about, toSource), distanceReach(wide) * source.voxelSize)}};
+}
+
 Demand readOfTransform(Invocation& in, std::size_t, const Demand& of) {
-  if (in.operands[0].kind() != Kind::Band || in.flag("bake")) return {};
+  if (in.operands[0].kind() != Kind::Band) return {};
+  if (in.flag("bake")) return readOfSamples(in, of, matrixOf(in).inverse());
   Demand read = of;
   read.part.halfWidth *= 1 + 1e-6;  // its end is rounded before it is scaled
   if (!levelset::isEverywhere(of.part.region))
@@ -211,6 +230,11 @@ double newVoxelSize(Invocation& in) {
 Value resample(Invocation& in) {
   const double voxel = newVoxelSize(in);
   return Value(levelset::resample(in.band(), voxel, resampleOptions(in)));
+}
+
+Demand readOfResample(Invocation& in, std::size_t, const Demand& of) {
+  if (in.given("resolution")) return {};  // of the whole
+  return readOfSamples(in, of, M44d());
 }
 
 Plan planResample(Invocation& in) {
@@ -288,6 +312,9 @@ void addPlacementOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = resample,
       .plan = planResample,
+      .slope = Slope::One,
+      .reads = readOfResample,
+      .partTolerance = kDistanceTolerance,
       .validate = requireVoxelSize,
   });
   all.push_back({

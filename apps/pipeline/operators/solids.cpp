@@ -108,15 +108,12 @@ levelset::OffsetOptions offsetOptions(Invocation& in) {
   return options;
 }
 
-/// What the interpolant reads beside the surface, edges included, voxels.
-constexpr double kReadBySurface = 6;
-
 Demand readOfOffset(Invocation& in, std::size_t, const Demand& of) {
   if (!in.given("distance") || in.given("mask")) return {};
   const double voxel = in.operands[0].plan().voxelSize;
   const double distance = in.length("distance");
   if (distance == 0) return {};
-  const double reach = std::abs(distance) + (in.planned->halfWidth + 2 * kReadBySurface) * voxel;
+  const double reach = std::abs(distance) + distanceReach(in.planned->halfWidth) * voxel;
   return {{.halfWidth = kReadBySurface, .region = grown(of.part.region, reach)}};
 }
 
@@ -198,6 +195,15 @@ Value close(Invocation& in) {
   });
 }
 
+/// Of a solid that is moved there and back again: both ways read what is beside them.
+Demand readOfMorphology(Invocation& in, std::size_t, const Demand& of) {
+  if (in.given("mask")) return {};
+  const Plan solid = in.operands[0].plan();
+  const double there = distanceReach(solid.halfWidth), back = distanceReach(in.planned->halfWidth);
+  const double reach = 2 * in.length("radius") + (there + back) * solid.voxelSize;
+  return {{.region = grown(of.part.region, reach)}};
+}
+
 Plan planMorphology(Invocation& in) {
   Plan plan = in.operands[0].plan();
   if (in.given("half-width")) plan.halfWidth = in.number("half-width");
@@ -215,6 +221,13 @@ Value shell(Invocation& in) {
   return masked(in, in.length("thickness"), [&](const levelset::OffsetOptions& options) {
     return levelset::shell(in.band(), in.length("thickness"), shellSide(in), options);
   });
+}
+
+Demand readOfShell(Invocation& in, std::size_t, const Demand& of) {
+  if (in.given("mask")) return {};
+  const double width = in.planned->halfWidth, voxel = in.operands[0].plan().voxelSize;
+  const double reach = in.length("thickness") + (distanceReach(width) + seamReach(width)) * voxel;
+  return {{.region = grown(of.part.region, reach)}};
 }
 
 Plan planShell(Invocation& in) {
@@ -336,7 +349,7 @@ void addSolidOperators(std::vector<Operator>& all) {
       .nanosecondsPerVoxel = 900,
       .slope = Slope::One,
       .reads = readOfOffset,
-      .partTolerance = 1e-6,  // Newton's method may start from another point beside it
+      .partTolerance = kDistanceTolerance,
       .validate = validateOffset,
   });
   const Param halfWidth = {.name = "half-width",
@@ -361,6 +374,9 @@ void addSolidOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = open,
       .plan = planMorphology,
+      .slope = Slope::OfOperands,
+      .reads = readOfMorphology,
+      .partTolerance = kDistanceTolerance,
   });
   all.push_back({
       .name = "close",
@@ -374,6 +390,9 @@ void addSolidOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = close,
       .plan = planMorphology,
+      .slope = Slope::OfOperands,
+      .reads = readOfMorphology,
+      .partTolerance = kDistanceTolerance,
   });
   all.push_back({
       .name = "shell",
@@ -395,6 +414,9 @@ void addSolidOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = shell,
       .plan = planShell,
+      .slope = Slope::OfOperands,
+      .reads = readOfShell,
+      .partTolerance = kDistanceTolerance,
   });
   all.push_back({
       .name = "keep",
