@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/pipeline/cost.h"
 #include "apps/pipeline/value.h"
 
 /// The registry: one declaration per operator. The command line, its help and its checks are made
@@ -93,9 +94,8 @@ struct Operator {
   std::function<Value(Invocation&)> run = {};
   /// What `run` would return, for --dry-run; by default the plan of the first operand.
   std::function<Plan(Invocation&)> plan = {};
-  /// CPU time for each active voxel of the result or of the operands, whichever are more; roughly,
-  /// as `-v` tells it of solids of some million voxels. 0: not known
-  double nanosecondsPerVoxel = 0;
+  /// What `run` takes beside its operands and its result; without it, nobody knows.
+  CostOf cost = {};
   Slope slope = Slope::Any;
   /// What it reads of an operand for a part of its result; without it, the whole. The operands are
   /// plans, and Invocation::planned is that of the whole result. Inside the part the result has to

@@ -1,6 +1,7 @@
 #include "apps/pipeline/planner.h"
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -67,7 +68,8 @@ struct Peak {
 };
 
 Peak findPeak(const Graph& graph, const std::vector<char>& runs,
-              const std::vector<std::optional<Plan>>& plans, const std::vector<Demand>& demands) {
+              const std::vector<std::optional<Plan>>& plans, const std::vector<Demand>& demands,
+              const std::vector<double>& worked = {}) {
   std::vector<std::size_t> uses = countUses(graph, runs);
   const auto bytes = [&](std::size_t i) { return bytesOf(plans[i], demands[i]); };
   double held = 0;
@@ -82,13 +84,36 @@ Peak findPeak(const Graph& graph, const std::vector<char>& runs,
     };
     for (const std::size_t input : graph.nodes[i].inputs) release(input);
     for (const auto& [option, input] : graph.nodes[i].named) release(input);
+    // What asks for the whole makes the whole, of which a part is kept then.
+    const bool isWhole = !graph.nodes[i].inputs.empty() && !graph.nodes[i].op->reads;
+    const double made = isWhole ? bytesOf(plans[i], {}) : bytes(i);
     // What is taken for the last time may be worked on in its place.
-    const double during = held + std::max(0.0, bytes(i) - largest);
+    double during = held + std::max(0.0, made - largest);
+    if (!worked.empty()) during = held + made + worked[i];
     if (during > peak.bytes) peak = {during, i};
     held += bytes(i) - released;
     if (uses[i] == 0) held -= bytes(i);
   }
   return peak;
+}
+
+/// Of what runs, where its own operands and its result are known.
+std::optional<Cost> costOf(const Graph& graph, std::size_t i,
+                           const std::vector<std::optional<Plan>>& plans,
+                           const std::vector<Demand>& demands) {
+  const Node& node = graph.nodes[i];
+  if (!node.op->cost) return {};
+  Invocation invocation(*node.op, node.options);
+  for (const std::size_t input : node.inputs) {
+    if (!plans[input]) return {};
+    invocation.operands.emplace_back(demanded(*plans[input], demands[input]));
+  }
+  if (node.makes()) {
+    if (!plans[i]) return {};
+    const bool isWhole = !node.inputs.empty() && !node.op->reads;
+    invocation.planned = isWhole ? *plans[i] : demanded(*plans[i], demands[i]);
+  }
+  return node.op->cost(invocation);
 }
 
 }  // namespace
@@ -184,39 +209,42 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
   if (!wholeValues) demands = demandsOf(graph, runs, plans);
   std::string text;
   double seconds = 0;
-  std::size_t untimed = 0;
+  std::vector<double> worked(graph.nodes.size(), 0);  // bytes, by node
+  std::vector<std::string> untimed;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     const Node& node = graph.nodes[i];
     text += fmt::format("{:<20} {}", labelOf(node), reasonFor(graph, i, runs));
     if (plans[i]) {
       const Plan plan = demanded(*plans[i], demands[i]);
       text += needOf(demands[i], *plans[i]);
-      const bool isBand = plan.kind == Kind::Band && plan.voxelSize > 0;
-      if (isBand)
+      if (plan.kind == Kind::Band && plan.voxelSize > 0)
         text += fmt::format("; about {:.3g} voxels of {:.4g}, {:.3g} MB", plan.activeVoxels(),
                             plan.voxelSize, plan.bytes() * 1e-6);
-      if (node.op->nanosecondsPerVoxel > 0 && isBand) {
-        // What it makes or what it goes through, whichever is more.
-        double gone = 0;
-        for (const std::size_t input : node.inputs)
-          if (plans[input]) gone += demanded(*plans[input], demands[input]).activeVoxels();
-        const double own =
-            1e-9 * node.op->nanosecondsPerVoxel * std::max(gone, plan.activeVoxels());
-        seconds += own;
-        text += fmt::format(", {:.2g} s", own);
-      } else if (isBand) {
-        ++untimed;
-      }
     } else if (runs[i] && node.makes()) {
       text += "; its size cannot be told before it is made";
     }
+    if (runs[i]) {
+      if (const std::optional<Cost> cost = costOf(graph, i, plans, demands)) {
+        seconds += cost->seconds;
+        worked[i] = cost->bytes;
+        if (cost->seconds > 0) text += fmt::format("; {:.2g} s", cost->seconds);
+        if (cost->bytes > 0) text += fmt::format(", works with {:.3g} MB", cost->bytes * 1e-6);
+      } else {
+        untimed.push_back(node.op->name);
+      }
+    }
     text += "\n";
   }
+  std::sort(untimed.begin(), untimed.end());
+  untimed.erase(std::unique(untimed.begin(), untimed.end()), untimed.end());
   text += fmt::format(
-      "values of about {:.3g} MB are held at once, beside what actions work with; about {:.2g} s "
-      "of one core{}\n",
-      findPeak(graph, runs, plans, demands).bytes * 1e-6, seconds,
-      untimed > 0 ? fmt::format(", and {} actions that nobody has timed", untimed) : std::string());
+      "values of about {:.3g} MB are held at once, about {:.2g} MB with what actions work with; "
+      "about {:.2g} s of one core{}\n",
+      findPeak(graph, runs, plans, demands).bytes * 1e-6,
+      findPeak(graph, runs, plans, demands, worked).bytes * 1e-6, seconds,
+      untimed.empty() ? ""
+                      : fmt::format(", and what {} take{}, which cannot be told before",
+                                    fmt::join(untimed, ", "), untimed.size() == 1 ? "s" : ""));
   tell(text);
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     if (!all.refusals[i]) continue;

@@ -106,6 +106,7 @@ const Plan& Value::plan() const {
     case Kind::Mesh:
       plan.bounds = bounds(mesh());
       plan.area = surfaceArea(mesh());
+      plan.triangles = static_cast<double>(mesh().triangles.size());
       break;
     case Kind::Band:
     case Kind::Surface:

@@ -37,6 +37,7 @@ struct Plan {
   double voxelSize = 0;      ///< bands only, of solids or surfaces
   double halfWidth = 0;      ///< voxels, bands only
   double fieldBytes = 0;     ///< fields only
+  double triangles = 0;      ///< meshes only; 0: not known
   /// Patches only: along u, along v, and the height, 0 where only the texture will tell.
   Imath::V3d patchSize = Imath::V3d(0);
   double patchCount = 1;

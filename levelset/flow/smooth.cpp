@@ -393,6 +393,10 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
 
 }  // namespace
 
+double smoothingWidth(SmoothKind kind, double sigma) {
+  return Filtering{kind, sigma}.known();
+}
+
 double smoothingReach(SmoothKind kind, double sigma, double halfWidth) {
   const Filtering filtering{kind, sigma};
   const double distances =

@@ -27,6 +27,11 @@ struct SmoothOptions {
 /// @return voxels
 [[nodiscard]] double smoothingReach(SmoothKind kind, double sigma, double halfWidth);
 
+/// How far from the surface a filter has to know distances: a narrower band is made as wide first.
+/// @param sigma  of the filter, voxels
+/// @return voxels
+[[nodiscard]] double smoothingWidth(SmoothKind kind, double sigma);
+
 /// Smooths the surface: filters φ and makes distances of the result.
 /// @param sigma  world units
 /// @throws UsageError unless `sigma` is positive and finite; InvalidInput if `solid` is empty or

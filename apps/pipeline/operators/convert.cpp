@@ -90,6 +90,11 @@ Plan planLevelSet(Invocation& in) {
   return plan;
 }
 
+Cost costOfLevelSet(Invocation& in) {
+  const double triangles = in.operands[0].plan().triangles, voxels = in.planned->activeVoxels();
+  return {1e-9 * (2800 * triangles + 500 * voxels), 60 * triangles + 4 * voxels};
+}
+
 Value surfaceBand(Invocation& in) {
   const levelset::SurfaceBandResult result = levelset::surfaceBand(
       in.mesh(), in.voxelSize(longestSide(in.operands[0])),
@@ -141,12 +146,29 @@ Value mesh(Invocation& in) {
       {.adaptivity = in.number("adaptivity"), .sharp = in.flag("sharp"), .progress = in.progress}));
 }
 
+Plan planMesh(Invocation& in) {
+  constexpr double kTrianglesPerCell =
+      3.35;  // of the surface, if one took a square of a voxel's side
+  Plan plan = in.operands[0].plan();
+  const bool isUniform = !in.flag("sharp") && in.number("adaptivity") == 0;
+  if (in.operands[0].kind() == Kind::Band && isUniform)
+    plan.triangles = kTrianglesPerCell * layerOf(plan);
+  plan.kind = Kind::Mesh;
+  return plan;
+}
+
 /// The ends of edges that the zero set crosses are less than a voxel from it; half a one is for
 /// distances that are not quite.
 Demand readOfMesh(Invocation& in, std::size_t, const Demand&) {
   const bool isUniform = !in.flag("sharp") && in.number("adaptivity") == 0;
   if (in.operands[0].kind() != Kind::Band || !isUniform) return {};
   return {{.halfWidth = 1.5}};
+}
+
+/// Its result counts as worked with.
+Cost costOfMesh(Invocation& in) {
+  const double layer = layerOf(in.operands[0].plan());
+  return {1e-9 * 330 * layer, 120 * layer};
 }
 
 }  // namespace
@@ -185,7 +207,7 @@ void addConversionOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Mesh}},
       .run = levelSet,
       .plan = planLevelSet,
-      .nanosecondsPerVoxel = 500,
+      .cost = costOfLevelSet,
       .slope = Slope::One,
       .validate = requireVoxelSize,
   });
@@ -239,6 +261,8 @@ void addConversionOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band, Kind::Patch}},
       .resultKind = [](const Invocation&) { return Kind::Mesh; },
       .run = mesh,
+      .plan = planMesh,
+      .cost = costOfMesh,
       .reads = readOfMesh,
       .validate =
           [](const Invocation& in) {

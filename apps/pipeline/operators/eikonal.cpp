@@ -43,6 +43,10 @@ Demand readOfRedistance(Invocation& in, std::size_t, const Demand& of) {
            .region = grown(of.part.region, distanceReach(in.planned->halfWidth) * voxel)}};
 }
 
+Cost costOfRedistance(Invocation& in) {
+  return costOfDistances(layerOf(in.operands[0].plan()), in.planned->halfWidth);
+}
+
 Plan planHalfWidth(Invocation& in) {
   Plan plan = in.operands[0].plan();
   if (in.given("half-width")) plan.halfWidth = in.number("half-width");
@@ -66,6 +70,13 @@ Value closestPoint(Invocation& in) {
 Plan planClosestPoint(Invocation& in) {
   const Plan plan = planHalfWidth(in);
   return planField(in, plan.halfWidth, 16);
+}
+
+Cost costOfClosestPoints(Invocation& in) {
+  const Plan solid = planHalfWidth(in);
+  Cost cost = costOfDistances(layerOf(solid), solid.halfWidth);
+  cost.bytes += planClosestPoint(in).fieldBytes;
+  return cost;
 }
 
 bool givesField(const Invocation& in) {
@@ -147,6 +158,13 @@ Plan planFront(Invocation& in) {
 }
 
 template <FrontMethod method>
+Cost costOfFront(Invocation& in) {
+  const Plan solid = in.operands[0].plan();
+  const double voxels = layerOf(solid) * 2 * in.length("to") / solid.voxelSize;
+  return {1e-9 * (method == FrontMethod::Marching ? 1400 : 550) * voxels, 12 * voxels};
+}
+
+template <FrontMethod method>
 Operator frontOperator(const char* name, const char* summary, const char* example) {
   return {
       .name = name,
@@ -183,6 +201,7 @@ Operator frontOperator(const char* name, const char* summary, const char* exampl
       .resultKind = [](const Invocation& in) { return givesField(in) ? Kind::Field : Kind::Band; },
       .run = runFront<method>,
       .plan = planFront,
+      .cost = costOfFront<method>,
       .validate = validateFront,
   };
 }
@@ -209,6 +228,7 @@ void addEikonalOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = reinitialize,
       .plan = planHalfWidth,
+      .cost = costOfRedistance,
       .slope = Slope::One,
       .reads = readOfRedistance,
       .partTolerance = kDistanceTolerance,
@@ -223,6 +243,7 @@ void addEikonalOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = widen,
       .plan = planHalfWidth,
+      .cost = costOfRedistance,
       .slope = Slope::One,
       .reads = readOfRedistance,
       .partTolerance = kDistanceTolerance,
@@ -244,6 +265,7 @@ void addEikonalOperators(std::vector<Operator>& all) {
       .resultKind = [](const Invocation&) { return Kind::Field; },
       .run = closestPoint,
       .plan = planClosestPoint,
+      .cost = costOfClosestPoints,
   });
 }
 

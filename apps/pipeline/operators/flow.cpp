@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "apps/pipeline/demand.h"
 #include "apps/pipeline/fields.h"
@@ -55,6 +56,14 @@ Value curvatureFlow(Invocation& in) {
   return Value(std::move(result.band));
 }
 
+/// Stages of stabilized steps grow with the root of the time.
+Cost costOfCurvatureFlow(Invocation& in) {
+  const Plan solid = in.operands[0].plan();
+  const double voxels = solid.activeVoxels();
+  const double stages = std::sqrt(in.number("time")) / solid.voxelSize;
+  return {1e-9 * voxels * (3400 + 540 * stages), 300 * voxels};
+}
+
 // === smooth
 
 levelset::SmoothKind smoothKind(const Invocation& in) {
@@ -81,6 +90,22 @@ Demand readOfSmooth(Invocation& in, std::size_t, const Demand& of) {
   const double reach =
       levelset::smoothingReach(smoothKind(in), in.length("sigma") / voxel, solid.halfWidth);
   return {{.region = grown(of.part.region, reach * voxel)}};
+}
+
+/// The band is made as wide as the filter reads, filtered, and made distances of again.
+Cost costOfSmooth(Invocation& in) {
+  const Plan solid = in.operands[0].plan();
+  const double layer = layerOf(solid), sigma = in.length("sigma") / solid.voxelSize;
+  const levelset::SmoothKind kind = smoothKind(in);
+  const double own = solid.halfWidth, read = levelset::smoothingWidth(kind, sigma);
+  const double width = std::max(own, read);
+  Cost cost;
+  if (read > own) cost = costOfDistances(layer, width);
+  const double taps = kind == levelset::SmoothKind::Median
+                          ? 8 * 4.2 * std::pow(std::max(1.0, sigma), 3)
+                          : 3 * (8 * sigma + 1) * (kind == levelset::SmoothKind::Taubin ? 2 : 1);
+  cost += {0.5e-9 * taps * 2 * width * layer, layer * (300 + 25 * 2 * width)};
+  return cost += costOfDistances(layer, own);
 }
 
 // === morph
@@ -191,7 +216,8 @@ void addFlowOperators(std::vector<Operator>& all) {
                             .doc = "longest step, world units squared",
                             .range = Range::Positive}}),
        .operands = {{Kind::Band}},
-       .run = curvatureFlow});
+       .run = curvatureFlow,
+       .cost = costOfCurvatureFlow});
   all.push_back(
       {.name = "smooth",
        .group = "Flow",
@@ -214,6 +240,7 @@ void addFlowOperators(std::vector<Operator>& all) {
                             .required = true}}),
        .operands = {{Kind::Band}},
        .run = smooth,
+       .cost = costOfSmooth,
        .slope = Slope::One,
        .reads = readOfSmooth,
        .partTolerance = kDistanceTolerance});

@@ -272,6 +272,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band, Kind::Mesh}},
       .flow = Flow::PassesThrough,
       .run = measure,
+      .cost = costPerVoxel(720, 130),
       .usesStandardOutput = asksJson,
   });
   all.push_back({
@@ -302,6 +303,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .flow = Flow::PassesThrough,
       .run = check,
+      .cost = costPerVoxel(75),
       .usesStandardOutput = asksJson,
   });
   all.push_back({
@@ -322,6 +324,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
       .flow = Flow::PassesThrough,
       .run = info,
       .plan = [](Invocation&) { return Plan{}; },
+      .cost = costPerVoxel(0),
       .validate = validateInfo,
       .usesStandardOutput = asksJson,
       .usesStandardInput = [](const Invocation& in) { return in.text("file") == "-"; },

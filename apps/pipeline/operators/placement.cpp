@@ -187,6 +187,23 @@ Plan planTransform(Invocation& in) {
   return plan;
 }
 
+// Samples reach as far beside the surface, in voxels of the grid that they are for.
+constexpr double kSampled = 4;
+
+Cost costOfSamples(Invocation& in) {
+  const Plan source = in.operands[0].plan(), target = *in.planned;
+  const double from = layerOf(source), to = layerOf(target);
+  Cost cost{1e-9 * (7600 * from + 8400 * to), 50 * from + 1030 * to};
+  const double sampled = kSampled * target.voxelSize / source.voxelSize;
+  if (sampled > source.halfWidth + kSampled) cost += costOfDistances(from, sampled);
+  return cost += costOfDistances(to, target.halfWidth);
+}
+
+Cost costOfTransform(Invocation& in) {
+  if (in.flag("bake")) return costOfSamples(in);
+  return {25e-9 * in.operands[0].plan().activeVoxels(), 0};
+}
+
 /// Of a solid that is laid on another grid, and made distances of again there.
 /// @param toSource  from the world of the result to that of the operand
 Demand readOfSamples(const Invocation& in, const Demand& of, const M44d& toSource) {
@@ -196,7 +213,6 @@ Demand readOfSamples(const Invocation& in, const Demand& of, const M44d& toSourc
     for (int k = 0; k < 3; ++k) stretch += toSource[i][k] * toSource[i][k];
   stretch = std::sqrt(stretch);
   // The operand's band is made as wide as is sampled beside the surface.
-  constexpr double kSampled = 4;
   const double wide =
       source.halfWidth + kSampled + kSampled * stretch * target.voxelSize / source.voxelSize;
   const Imath::Box3d about =
@@ -292,7 +308,7 @@ void addPlacementOperators(std::vector<Operator>& all) {
       .resultKind = sameKind,
       .run = transform,
       .plan = planTransform,
-      .nanosecondsPerVoxel = 1,
+      .cost = costOfTransform,
       .slope = Slope::OfOperands,
       .reads = readOfTransform,
       .validate = validateTransform,
@@ -312,6 +328,7 @@ void addPlacementOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = resample,
       .plan = planResample,
+      .cost = costOfSamples,
       .slope = Slope::One,
       .reads = readOfResample,
       .partTolerance = kDistanceTolerance,
@@ -330,7 +347,7 @@ void addPlacementOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = clip,
       .plan = planClip,
-      .nanosecondsPerVoxel = 300,
+      .cost = costPerVoxel(90, 15),
       .slope = Slope::OfOperands,
       .reads = readOfClip,
       .validate = validateClip,

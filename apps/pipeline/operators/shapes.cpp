@@ -142,7 +142,7 @@ Operator shape(const char* name, const char* summary, const char* example,
           .params = std::move(params),
           .run = make<describe>,
           .plan = plan<describe>,
-          .nanosecondsPerVoxel = 50,
+          .cost = costPerVoxel(55),
           .slope = Slope::One,
           .validate = requireVoxelSize};
 }

@@ -158,6 +158,19 @@ Plan planOffset(Invocation& in) {
   return plan;
 }
 
+Cost costOfMoving(Invocation& in) {
+  const Plan solid = in.operands[0].plan();
+  const double way = in.given("distance") ? in.length("distance") / solid.voxelSize : 0;
+  const double before = layerOf(solid), after = layerOf(*in.planned);
+  Cost cost = costOfOffset(before, after, way, in.planned->halfWidth);
+  // The lengths are looked up first, at the surface's own points.
+  if (in.given("by") || in.given("mask")) {
+    cost += costOfDistances(before, 12);
+    cost.bytes += 60 * solid.activeVoxels();
+  }
+  return cost;
+}
+
 constexpr double kBeyondMoved = 8;  // voxels: what is further off counts as that far
 
 /// What an operator makes of the operand, as far as --mask lets it.
@@ -230,6 +243,24 @@ Demand readOfShell(Invocation& in, std::size_t, const Demand& of) {
   return {{.region = grown(of.part.region, reach)}};
 }
 
+Cost costOfMorphology(Invocation& in) {
+  const Plan solid = in.operands[0].plan();
+  const double layer = layerOf(solid), way = in.length("radius") / solid.voxelSize;
+  Cost cost = costOfOffset(layer, layer, way, solid.halfWidth);
+  cost += costOfOffset(layer, layer, way, in.planned->halfWidth);
+  cost.bytes += solid.bytes();  // there, before it is back
+  return cost;
+}
+
+Cost costOfShell(Invocation& in) {
+  const Plan solid = in.operands[0].plan();
+  const double layer = layerOf(solid), way = in.length("thickness") / solid.voxelSize;
+  const double width = in.planned->halfWidth;
+  if (shellSide(in) != levelset::ShellSide::Both) return costOfOffset(layer, layer, way, width);
+  Cost cost = costOfOffset(layer, layer, way / 2, width);
+  return cost += costOfOffset(layer, layer, way / 2, width);
+}
+
 Plan planShell(Invocation& in) {
   Plan plan = planMorphology(in);
   const levelset::ShellSide side = shellSide(in);
@@ -264,7 +295,7 @@ Operator csgOperator(const char* name, const char* summary, const char* example)
           .takesMore = true,
           .run = csg<operation>,
           .plan = planCsg<operation>,
-          .nanosecondsPerVoxel = 300,
+          .cost = costPerVoxel(90, 8),
           .slope = Slope::OfOperands,
           .reads = readOfCsg};
 }
@@ -346,7 +377,7 @@ void addSolidOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = offset,
       .plan = planOffset,
-      .nanosecondsPerVoxel = 900,
+      .cost = costOfMoving,
       .slope = Slope::One,
       .reads = readOfOffset,
       .partTolerance = kDistanceTolerance,
@@ -374,6 +405,7 @@ void addSolidOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = open,
       .plan = planMorphology,
+      .cost = costOfMorphology,
       .slope = Slope::OfOperands,
       .reads = readOfMorphology,
       .partTolerance = kDistanceTolerance,
@@ -390,6 +422,7 @@ void addSolidOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = close,
       .plan = planMorphology,
+      .cost = costOfMorphology,
       .slope = Slope::OfOperands,
       .reads = readOfMorphology,
       .partTolerance = kDistanceTolerance,
@@ -414,6 +447,7 @@ void addSolidOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}},
       .run = shell,
       .plan = planShell,
+      .cost = costOfShell,
       .slope = Slope::OfOperands,
       .reads = readOfShell,
       .partTolerance = kDistanceTolerance,
@@ -431,6 +465,7 @@ void addSolidOperators(std::vector<Operator>& all) {
                   .required = true}},
       .operands = {{Kind::Band}},
       .run = keep,
+      .cost = costPerVoxel(200, 22),
   });
   all.push_back({
       .name = "fill-cavities",
@@ -444,6 +479,7 @@ void addSolidOperators(std::vector<Operator>& all) {
                   .range = Range::Positive}},
       .operands = {{Kind::Band}},
       .run = fillCavities,
+      .cost = costPerVoxel(200, 22),
   });
 }
 

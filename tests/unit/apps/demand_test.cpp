@@ -424,6 +424,41 @@ TEST_F(Demands, PlansAreRefusedAndToldBeforeAnythingRuns) {
   EXPECT_FALSE(exists("r.json"));
 }
 
+TEST_F(Demands, PlansTellWhatActionsTake) {
+  // What is made of a part takes less, and what takes its operand whole takes the same.
+  const auto plan = [&](const std::string& chain) {
+    const auto told = levelsmith("--explain " + chain);
+    EXPECT_EQ(told.code, 0) << told.err;
+    return told.out;
+  };
+  const auto figure = [](const std::string& text, const std::string& action,
+                         const std::string& before) {
+    const std::size_t row = text.find("\n" + action), end = text.find('\n', row + 1),
+                      at = text.find(before, row);
+    return row < at && at < end ? std::stod(text.substr(at + before.size())) : -1.0;
+  };
+  const std::string solid = "torus --radius 2 --tube 0.6 --voxel 0.02 ! ",
+                    end = "clip --box \"1.5,-1,-1 3,1,1\" ! write o.vdb";
+  for (const char* action : {"smooth --sigma 2vx", "offset 0.1", "open 0.1", "shell --thickness .2",
+                             "resample --voxel .02", "widen --half-width 9", "curvature-flow 0.01",
+                             "keep --largest 1"}) {
+    const std::string name = std::string(action).substr(0, std::string(action).find(' '));
+    const std::string whole = plan("--whole " + solid + action + " ! " + end),
+                      part = plan(solid + action + " ! " + end);
+    EXPECT_GT(figure(whole, name, " MB; "), 0.05) << whole;
+    EXPECT_GT(figure(whole, name, "works with "), 5) << whole;
+    const bool isWhole = name == "curvature-flow" || name == "keep";
+    for (const char* before : {" MB; ", "works with "}) {
+      const double of = figure(whole, name, before), is = figure(part, name, before);
+      EXPECT_TRUE(isWhole ? is == of : is < 0.5 * of) << before << ": " << is << " of " << of;
+    }
+    EXPECT_EQ(whole.find("cannot be told"), std::string::npos) << whole;
+  }
+  const std::string untimed =
+      plan(solid + "sphere --radius 1 --center 2,0,0 --voxel 0.02 ! blend --radius 0.2 ! measure");
+  EXPECT_NE(untimed.find("what blend takes,"), std::string::npos) << untimed;
+}
+
 TEST_F(Demands, FilesThatAnActionBehindWritesAreNotReadAgain) {
   // What is refused of a part is tried whole, when the file is another already.
   const std::string file = "sphere --radius 2 --voxel .05 ! write a.vdb",

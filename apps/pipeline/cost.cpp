@@ -1,0 +1,43 @@
+#include "apps/pipeline/cost.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "apps/pipeline/invocation.h"
+
+namespace pipeline {
+
+Cost& Cost::operator+=(const Cost& next) {
+  seconds += next.seconds;
+  bytes = std::max(bytes, next.bytes);
+  return *this;
+}
+
+CostOf costPerVoxel(double nanoseconds, double bytes) {
+  return [=](Invocation& in) {
+    double voxels = 0;
+    for (const Value& operand : in.operands) voxels += operand.plan().activeVoxels();
+    if (in.planned) voxels = std::max(voxels, in.planned->activeVoxels());
+    return Cost{1e-9 * nanoseconds * voxels, bytes * voxels};
+  };
+}
+
+double layerOf(const Plan& band) {
+  return band.voxelSize > 0 ? band.area / (band.voxelSize * band.voxelSize) : 0;
+}
+
+Cost costOfDistances(double layer, double halfWidth) {
+  // To find the surface, and then for each grid point to find its nearest point there. Between what
+  // smooth surfaces take and faceted ones, with edges everywhere: 0.6 and 1.7 of it.
+  return {1e-9 * layer * (1250 + 1060 * 2 * halfWidth), layer * (540 + 6 * 2 * halfWidth)};
+}
+
+Cost costOfOffset(double before, double after, double way, double halfWidth) {
+  constexpr double kShell = 3;  // of distances beside the moved surface, which are made again
+  Cost cost = costOfDistances(std::max(before, after), kShell);
+  cost.seconds += 1e-9 * before * 700 * std::abs(way);
+  cost.bytes += 15 * before * std::abs(way);
+  return cost += costOfDistances(after, halfWidth);
+}
+
+}  // namespace pipeline
