@@ -31,6 +31,7 @@ constexpr std::size_t kMostAttributeBytes = 1 << 24;  // of one; a preview pictu
 constexpr double kMaxCompression = 5000;
 /// Of one chunk, by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
 constexpr std::array<double, 10> kChunkLines = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
+constexpr std::size_t kZip = 3;
 /// Of one chunk, under any compression; the file holds a number of 8 bytes for each chunk.
 constexpr double kMostLines = 256;
 constexpr double kChunkBytes = 8;
@@ -67,7 +68,7 @@ class ExrHeaderReader {
   struct Part {
     double width = 0, height = 0, channels = 0;
     double tileWidth = 0, tileHeight = 0;  // 0: rows
-    std::size_t compression = 0;
+    std::size_t compression = kZip;        // what OpenEXR takes where none is told
   };
 
   /// @return false at the empty header that ends those of a file of many parts

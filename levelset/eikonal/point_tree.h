@@ -4,13 +4,13 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
+#include "levelset/box_tree.h"
 #include "levelset/vdb.h"
 
 namespace levelset::eikonal {
 
-/// A balanced k-d tree over points; the answers do not depend on how it was built.
+/// Points in a tree of bounding boxes; the answers do not depend on how it was built.
 class PointTree {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
@@ -21,12 +21,8 @@ class PointTree {
   [[nodiscard]] std::uint32_t nearest(const openvdb::Vec3d& query, double limit) const;
 
  private:
-  struct Search;
-  void build(std::size_t begin, std::size_t end);
-
   std::span<const openvdb::Vec3d> points_;
-  std::vector<std::uint32_t> order_;  ///< the middle of a range splits it
-  std::vector<std::uint8_t> axes_;    ///< along this axis
+  BoxTree tree_;
 };
 
 }  // namespace levelset::eikonal

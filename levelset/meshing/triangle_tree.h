@@ -3,9 +3,9 @@
 // Includes OpenVDB: for .cpp files only.
 
 #include <array>
-#include <cstdint>
 #include <vector>
 
+#include "levelset/box_tree.h"
 #include "levelset/vdb.h"
 
 namespace levelset {
@@ -28,16 +28,8 @@ class TriangleTree {
   [[nodiscard]] Hit nearest(const openvdb::Vec3d& from, double limit) const;
 
  private:
-  struct Node {
-    openvdb::Vec3f low, high;
-    std::uint32_t begin = 0, end = 0;  ///< triangles
-    std::uint32_t right = 0;           ///< second child; the first follows; 0: a leaf
-  };
-  struct Search;
-  std::uint32_t build(std::uint32_t begin, std::uint32_t end);
-
+  BoxTree tree_;
   std::vector<Triangle> triangles_;  ///< in the order of the tree's leaves
-  std::vector<Node> nodes_;
 };
 
 }  // namespace levelset

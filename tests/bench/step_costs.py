@@ -51,6 +51,7 @@ CHAINS = {
     "curvature-flow": TORUS + "curvature-flow --time 0.01",
     "measure": TORUS + "measure",
     "check": TORUS + "check",
+    "compare": TORUS + BOX + "compare",
 }
 
 

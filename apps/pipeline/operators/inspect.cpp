@@ -292,6 +292,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band}, {Kind::Band}},
       .flow = Flow::PassesThrough,
       .run = compare,
+      .cost = costPerVoxel(1500, 60),
       .usesStandardOutput = asksJson,
   });
   all.push_back({
