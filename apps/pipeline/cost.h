@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "apps/pipeline/value.h"
 
@@ -18,12 +19,13 @@ struct Cost {
   Cost& operator+=(const Cost& next);
 };
 
-/// Its operands are plans of what is read, and Invocation::planned, of a band, that of what is
-/// made.
-using CostOf = std::function<Cost(Invocation&)>;
+/// Its operands are plans of what is read, and Invocation::planned that of what is made. Empty
+/// where it cannot be told.
+using CostOf = std::function<std::optional<Cost>(Invocation&)>;
 
-/// For each active voxel of the operands together or of the result, whichever are more.
-[[nodiscard]] CostOf costPerVoxel(double nanoseconds, double bytes = 0);
+/// For each active voxel of bands, the operands together or the result, whichever are more.
+/// @param perTriangle  nanoseconds, of meshes; 0: not known. Nor is it of other values
+[[nodiscard]] CostOf costPerVoxel(double nanoseconds, double bytes = 0, double perTriangle = 0);
 
 /// Grid points of a layer one voxel thick all along the surface of a band.
 [[nodiscard]] double layerOf(const Plan& band);

@@ -102,6 +102,7 @@ struct Operator {
   /// be what it is of whole operands, to the bit or to `partTolerance`.
   std::function<Demand(Invocation&, std::size_t operand, const Demand& part)> reads = {};
   double partTolerance = 0;  ///< voxels
+  bool makesParts = false;   ///< of its operands as they are: `run` keeps to Invocation::part
   /// Refuses, before anything runs, what can be told from the options and the kinds of the
   /// operands: options that exclude each other, formats, what is missing.
   std::function<void(const Invocation&)> validate = {};

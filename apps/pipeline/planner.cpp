@@ -56,9 +56,15 @@ std::string needOf(const Demand& demand, const Plan& plan) {
 /// Of its value, as far as that is needed. 0 where nobody knows.
 double bytesOf(const std::optional<Plan>& plan, const Demand& demand) {
   if (!plan) return 0;
+  if (plan->kind == Kind::Mesh) return plan->bytes();
   const bool isTold =
       (plan->kind == Kind::Band && plan->voxelSize > 0) || plan->kind == Kind::Field;
   return isTold ? demanded(*plan, demand).bytes() : 0;
+}
+
+/// What asks for all of its operands makes all of its result, of which a part is kept then.
+bool makesWhole(const Node& node) {
+  return !node.inputs.empty() && !node.op->reads && !node.op->makesParts;
 }
 
 /// Where values take most: they live from what makes them to the last that takes them.
@@ -84,9 +90,7 @@ Peak findPeak(const Graph& graph, const std::vector<char>& runs,
     };
     for (const std::size_t input : graph.nodes[i].inputs) release(input);
     for (const auto& [option, input] : graph.nodes[i].named) release(input);
-    // What asks for the whole makes the whole, of which a part is kept then.
-    const bool isWhole = !graph.nodes[i].inputs.empty() && !graph.nodes[i].op->reads;
-    const double made = isWhole ? bytesOf(plans[i], {}) : bytes(i);
+    const double made = makesWhole(graph.nodes[i]) ? bytesOf(plans[i], {}) : bytes(i);
     // What is taken for the last time may be worked on in its place.
     double during = held + std::max(0.0, made - largest);
     if (!worked.empty()) during = held + made + worked[i];
@@ -95,6 +99,11 @@ Peak findPeak(const Graph& graph, const std::vector<char>& runs,
     if (uses[i] == 0) held -= bytes(i);
   }
   return peak;
+}
+
+/// Roughly, as it is known.
+std::string inSeconds(double seconds) {
+  return seconds < 100 ? fmt::format("{:.2g} s", seconds) : fmt::format("{:.0f} s", seconds);
 }
 
 /// Of what runs, where its own operands and its result are known.
@@ -110,8 +119,7 @@ std::optional<Cost> costOf(const Graph& graph, std::size_t i,
   }
   if (node.makes()) {
     if (!plans[i]) return {};
-    const bool isWhole = !node.inputs.empty() && !node.op->reads;
-    invocation.planned = isWhole ? *plans[i] : demanded(*plans[i], demands[i]);
+    invocation.planned = makesWhole(node) ? *plans[i] : demanded(*plans[i], demands[i]);
   }
   return node.op->cost(invocation);
 }
@@ -220,6 +228,9 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
       if (plan.kind == Kind::Band && plan.voxelSize > 0)
         text += fmt::format("; about {:.3g} voxels of {:.4g}, {:.3g} MB", plan.activeVoxels(),
                             plan.voxelSize, plan.bytes() * 1e-6);
+      if (plan.triangles > 0)
+        text +=
+            fmt::format("; about {:.3g} triangles, {:.3g} MB", plan.triangles, plan.bytes() * 1e-6);
     } else if (runs[i] && node.makes()) {
       text += "; its size cannot be told before it is made";
     }
@@ -227,7 +238,7 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
       if (const std::optional<Cost> cost = costOf(graph, i, plans, demands)) {
         seconds += cost->seconds;
         worked[i] = cost->bytes;
-        if (cost->seconds > 0) text += fmt::format("; {:.2g} s", cost->seconds);
+        if (cost->seconds > 0) text += "; " + inSeconds(cost->seconds);
         if (cost->bytes > 0) text += fmt::format(", works with {:.3g} MB", cost->bytes * 1e-6);
       } else {
         untimed.push_back(node.op->name);
@@ -238,10 +249,10 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
   std::sort(untimed.begin(), untimed.end());
   untimed.erase(std::unique(untimed.begin(), untimed.end()), untimed.end());
   text += fmt::format(
-      "values of about {:.3g} MB are held at once, about {:.2g} MB with what actions work with; "
-      "about {:.2g} s of one core{}\n",
+      "values of about {:.3g} MB are held at once, about {:.3g} MB with what actions work with; "
+      "about {} of one core{}\n",
       findPeak(graph, runs, plans, demands).bytes * 1e-6,
-      findPeak(graph, runs, plans, demands, worked).bytes * 1e-6, seconds,
+      findPeak(graph, runs, plans, demands, worked).bytes * 1e-6, inSeconds(seconds),
       untimed.empty() ? ""
                       : fmt::format(", and what {} take{}, which cannot be told before",
                                     fmt::join(untimed, ", "), untimed.size() == 1 ? "s" : ""));

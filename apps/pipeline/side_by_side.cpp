@@ -86,7 +86,7 @@ class SideBySide {
     if (running_.size() >= settings_.threads) return {};
     for (std::size_t i = firstOpen_; i < std::min(jobs_.size(), firstFailure_.load()); ++i) {
       const bool canBegin = states_[i] == State::Waits && isReady(i);
-      if (i == firstOpen_ && hasEnded(i)) {  // perhaps just now, left
+      if (i == firstOpen_ && hasEnded(i)) {  // isReady() may have left it just now
         ++firstOpen_;
         continue;
       }

@@ -42,6 +42,8 @@ double Plan::activeVoxels() const {
 
 double Plan::bytes() const {
   if (kind == Kind::Field) return fieldBytes;
+  // Of corners, and of a place for each two triangles.
+  if (kind == Kind::Mesh) return (3 * sizeof(std::uint32_t) + sizeof(Imath::V3d) / 2.0) * triangles;
   // A band fills about a third of its leaf blocks: 12 bytes for each active voxel, as measured.
   constexpr double kBytesPerVoxel = 12;
   return kBytesPerVoxel * activeVoxels();

@@ -61,9 +61,33 @@ std::uint32_t outermostVertex(const TriMesh& mesh) {
   return result;
 }
 
+/// Of the surface in the box, world units²: of triangles that reach out of it as much as of their
+/// own boxes, along the axis on which that is least.
+double areaWithin(const Imath::Box3d& box, const TriMesh& mesh) {
+  if (isEverywhere(box)) return surfaceArea(mesh);
+  double area = 0;
+  for (const auto& t : mesh.triangles) {
+    const V3d &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+    double share = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double low = std::min({a[axis], b[axis], c[axis]}),
+                   high = std::max({a[axis], b[axis], c[axis]}),
+                   within = std::min(high, box.max[axis]) - std::max(low, box.min[axis]);
+      if (within < 0) share = 0;
+      if (within >= 0 && high > low) share = std::min(share, within / (high - low));
+    }
+    area += share * (b - a).cross(c - a).length() / 2;
+  }
+  return area;
+}
+
 /// Bytes: some 12 per voxel of the band, and per triangle our copy, its box and its lists.
-double estimateMemory(const TriMesh& mesh, double voxelSize, double halfWidth) {
-  const double area = surfaceArea(mesh) / voxelSize / voxelSize;
+double estimateMemory(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
+  const double halfWidth = std::min(options.halfWidth, options.part.halfWidth);
+  Imath::Box3d box = options.part.region;
+  box.min -= V3d(halfWidth * voxelSize);
+  box.max += V3d(halfWidth * voxelSize);
+  const double area = areaWithin(box, mesh) / voxelSize / voxelSize;
   return 24 * halfWidth * area + 250.0 * static_cast<double>(mesh.triangles.size());
 }
 
@@ -103,8 +127,7 @@ void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptio
                     "bits; use larger voxels, or remove the vertex if it is astray",
                     action, outermost, text(mesh.positions[outermost]),
                     largest(mesh.positions[outermost]) / voxelSize));
-  requireMemory(estimateMemory(mesh, voxelSize, options.halfWidth), memoryLimit(options.maxMemory),
-                action);
+  requireMemory(estimateMemory(mesh, voxelSize, options), memoryLimit(options.maxMemory), action);
   checkPrecision(mesh, voxelSize, outermost, action);
 }
 

@@ -17,6 +17,17 @@ struct RedistanceOptions {
   Progress progress = {};
 };
 
+/// Voxels beside the surface that distances are made from, edges and the faces that meet there
+/// included.
+inline constexpr double kReadBySurface = 6;
+
+/// Voxels about a place that decide which distances are made there, of a surface and of those
+/// beside it.
+/// @param halfWidth  of the result, voxels
+[[nodiscard]] inline double distanceReach(double halfWidth) {
+  return halfWidth + 2 * kReadBySurface;
+}
+
 /// Makes a signed distance again out of a field that has the right zero set, without moving that.
 /// Beside the interface each grid point finds the closest point on a tricubic interpolant by
 /// Newton's method [Chopp01, Saye14]; from there closest points travel outwards block by block, and

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "levelset/eikonal/distance_transform.h"
+#include "levelset/eikonal/redistance.h"
 #include "levelset/error.h"
 #include "levelset/flow/band_blocks_vdb.h"
 
@@ -30,8 +31,6 @@ constexpr double kStencil = 3;
 constexpr double kKnownReach = 3;
 // A band that misses as little of a width counts as wide as that.
 constexpr double kWideEnough = 1.0001;
-// Around a part of the surface, its edges, and the faces that meet there.
-constexpr double kBesideEdges = 12;
 constexpr double kFieldsAlive = 5;
 // Values that a median may read in all: some thousand CPU seconds.
 constexpr double kMostReadings = 1e12;
@@ -399,9 +398,9 @@ double smoothingWidth(SmoothKind kind, double sigma) {
 
 double smoothingReach(SmoothKind kind, double sigma, double halfWidth) {
   const Filtering filtering{kind, sigma};
-  const double distances =
-      filtering.known() > halfWidth * kWideEnough ? filtering.known() + kStencil + kBesideEdges : 0;
-  return distances + filtering.reach() + halfWidth + kBesideEdges;
+  const double known = filtering.known(),
+               widened = known > halfWidth * kWideEnough ? distanceReach(known + kStencil) : 0;
+  return widened + filtering.reach() + distanceReach(halfWidth);
 }
 
 NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothOptions& options) {

@@ -103,6 +103,23 @@ void clearSignOfZeros(FloatTree& tree) {
   });
 }
 
+/// What is left to be pruned.
+FloatGrid::Ptr minimumOf(CsgOperation operation, const FloatGrid& a, const FloatGrid& b) {
+  FloatGrid::Ptr result = a.deepCopy();
+  {
+    openvdb::tree::DynamicNodeManager<FloatTree> nodes(result->tree());
+    const openvdb::DeepCopy tag;
+    if (operation == CsgOperation::Union)
+      nodes.foreachTopDown(openvdb::tools::CsgUnionOp<FloatTree>(b.tree(), tag));
+    else if (operation == CsgOperation::Intersection)
+      nodes.foreachTopDown(openvdb::tools::CsgIntersectionOp<FloatTree>(b.tree(), tag));
+    else
+      nodes.foreachTopDown(openvdb::tools::CsgDifferenceOp<FloatTree>(b.tree(), tag));
+  }
+  if (operation == CsgOperation::Difference) clearSignOfZeros(result->tree());
+  return result;
+}
+
 void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options,
                    const char* action) {
   if (solids.size() < 2) {
@@ -251,23 +268,18 @@ NarrowBand narrowed(NarrowBand band, double halfWidth) {
   return band;
 }
 
+FloatGrid::Ptr mergePlain(CsgOperation operation, const FloatGrid& a, const FloatGrid& b) {
+  const FloatGrid::Ptr result = minimumOf(operation, a, b);
+  pruneOneSided(result->tree());
+  return result;
+}
+
 FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const FloatGrid& second) {
   const CsgSigns signs = csgSigns(operation);
   const std::optional<ClosedPair> closed = closeContacts(first, second, signs);
   const FloatGrid& a = closed ? *closed->a : first;
   const FloatGrid& b = closed ? *closed->b : second;
-  FloatGrid::Ptr result = a.deepCopy();
-  {
-    openvdb::tree::DynamicNodeManager<FloatTree> nodes(result->tree());
-    const openvdb::DeepCopy tag;
-    if (operation == CsgOperation::Union)
-      nodes.foreachTopDown(openvdb::tools::CsgUnionOp<FloatTree>(b.tree(), tag));
-    else if (operation == CsgOperation::Intersection)
-      nodes.foreachTopDown(openvdb::tools::CsgIntersectionOp<FloatTree>(b.tree(), tag));
-    else
-      nodes.foreachTopDown(openvdb::tools::CsgDifferenceOp<FloatTree>(b.tree(), tag));
-  }
-  if (operation == CsgOperation::Difference) clearSignOfZeros(result->tree());
+  const FloatGrid::Ptr result = minimumOf(operation, a, b);
   correctSeam(*result, a, b, signs);
   pruneOneSided(result->tree());
   // Where they end at an edge of the result no plane tells how far it is.

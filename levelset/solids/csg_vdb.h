@@ -22,6 +22,12 @@ struct CsgSigns {
 [[nodiscard]] openvdb::FloatGrid::Ptr mergePair(CsgOperation operation, const openvdb::FloatGrid& a,
                                                 const openvdb::FloatGrid& b);
 
+/// a op b by minimum and maximum alone, whatever they are off the surface. Signs are those of the
+/// operands also where a band is cut: openvdb's own floods them from where a node begins.
+[[nodiscard]] openvdb::FloatGrid::Ptr mergePlain(CsgOperation operation,
+                                                 const openvdb::FloatGrid& a,
+                                                 const openvdb::FloatGrid& b);
+
 /// Index positions of `a` and `b` name the same places, as far as either solid reaches.
 [[nodiscard]] bool shareTransform(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b);
 

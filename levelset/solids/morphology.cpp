@@ -2,13 +2,12 @@
 
 #include <fmt/core.h>
 
-#include <openvdb/tools/Composite.h>
-
 #include <array>
 #include <cmath>
 
 #include "levelset/error.h"
 #include "levelset/solids/csg.h"
+#include "levelset/solids/csg_vdb.h"
 #include "levelset/vdb.h"
 
 namespace levelset {
@@ -26,8 +25,8 @@ NarrowBand thereAndBack(const NarrowBand& solid, double distance, const OffsetOp
   if (distance == 0) return back;
   second.progress = {};
   const NarrowBand start = offset(solid, 0, second);
-  return makeBand(distance > 0 ? openvdb::tools::csgUnionCopy(vdb(start), vdb(back))
-                               : openvdb::tools::csgIntersectionCopy(vdb(start), vdb(back)));
+  return makeBand(mergePlain(distance > 0 ? CsgOperation::Union : CsgOperation::Intersection,
+                             vdb(start), vdb(back)));
 }
 
 void checkRadiusOf(double radius, const char* action) {

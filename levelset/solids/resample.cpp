@@ -221,7 +221,7 @@ Placement placementOf(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
 /// support: the distances out there are made anew. They are inactive and not ± background.
 FloatGrid::Ptr supported(const NarrowBand& solid, const Placement& place, std::size_t maxMemory,
                          const Progress& progress) {
-  const double needed = kReadReach * place.targetVoxel / place.sourceVoxel + kTricubicReach;
+  const double needed = sampledWidth(place.targetVoxel / place.sourceVoxel);
   NarrowBand wide = solid;
   if (solid.halfWidth() + kThickened < needed || solid.halfWidth() < 2)
     wide = redistance(solid, {.halfWidth = std::max(needed - kThickened, 3.0),
@@ -335,6 +335,10 @@ NarrowBand resampleTo(const NarrowBand& solid, const Imath::M44d& indexToWorld,
   }
   return resampleField(solid, solid.indexToWorld(), indexToWorld, halfWidth, options.maxMemory,
                        options.progress, action);
+}
+
+double sampledWidth(double ratio) {
+  return kReadReach * ratio + kTricubicReach;
 }
 
 NarrowBand resample(const NarrowBand& solid, double voxelSize, const ResampleOptions& options) {

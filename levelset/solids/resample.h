@@ -15,6 +15,11 @@ struct ResampleOptions {
   Progress progress = {};
 };
 
+/// How far beside the surface a solid is sampled, in its own voxels: a band that is too narrow is
+/// made wider first.
+/// @param ratio  voxel of the result to that of the solid
+[[nodiscard]] double sampledWidth(double ratio);
+
 /// The same solid on the axis-aligned grid of integer multiples of `voxelSize`: tricubic
 /// (Catmull-Rom) where the source band allows, re-distanced towards the rim of the new band. Per
 /// leaf block, so the bits do not depend on the number of threads.

@@ -24,6 +24,7 @@ CHAINS = {
     "level-set": TORUS + "mesh ! level-set --voxel {v}",
     "level-set, coarse": TORUS + "mesh ! level-set --voxel {w}",
     "mesh": TORUS + "mesh",
+    "mesh --sharp": TORUS + "mesh --sharp",
     "union": TORUS + BOX + "union",
     "difference": TORUS + BOX + "difference",
     "offset": TORUS + "offset 0.05",
@@ -50,6 +51,7 @@ CHAINS = {
     "clip": TORUS + "clip --plane 0,0,0_1,0,0",
     "curvature-flow": TORUS + "curvature-flow --time 0.01",
     "measure": TORUS + "measure",
+    "measure, a mesh": TORUS + "mesh ! measure",
     "check": TORUS + "check",
     "compare": TORUS + BOX + "compare",
 }

@@ -56,16 +56,9 @@ inline double seamReach(double halfWidth) {
   return 2 * halfWidth + kBlocks;
 }
 
-/// Voxels beside the surface that distances are made from, edges included.
-inline constexpr double kReadBySurface = 6;
-/// Where distances are made of a part, Newton's method may start from another point than in the
-/// whole. Voxels.
-inline constexpr double kDistanceTolerance = 1e-6;
-
-/// Voxels about a part of new distances that they follow from.
-inline double distanceReach(double halfWidth) {
-  return halfWidth + 2 * kReadBySurface;
-}
+/// Where distances are made of a part, values that are right already may be kept where they are not
+/// of the whole, or the other way round. Voxels.
+inline constexpr double kDistanceTolerance = 1e-4;
 
 inline Param voxelParam(const char* doc = "edge of a voxel") {
   return {.name = "voxel",

@@ -90,9 +90,10 @@ Plan planLevelSet(Invocation& in) {
   return plan;
 }
 
-Cost costOfLevelSet(Invocation& in) {
+std::optional<Cost> costOfLevelSet(Invocation& in) {
   const double triangles = in.operands[0].plan().triangles, voxels = in.planned->activeVoxels();
-  return {1e-9 * (2800 * triangles + 500 * voxels), 60 * triangles + 4 * voxels};
+  if (triangles == 0) return {};
+  return Cost{1e-9 * (2800 * triangles + 500 * voxels), 60 * triangles + 4 * voxels};
 }
 
 Value surfaceBand(Invocation& in) {
@@ -147,13 +148,11 @@ Value mesh(Invocation& in) {
 }
 
 Plan planMesh(Invocation& in) {
-  constexpr double kTrianglesPerCell =
-      3.35;  // of the surface, if one took a square of a voxel's side
-  Plan plan = in.operands[0].plan();
-  const bool isUniform = !in.flag("sharp") && in.number("adaptivity") == 0;
-  if (in.operands[0].kind() == Kind::Band && isUniform)
-    plan.triangles = kTrianglesPerCell * layerOf(plan);
-  plan.kind = Kind::Mesh;
+  const Plan solid = in.operands[0].plan();
+  Plan plan{.kind = Kind::Mesh, .bounds = solid.bounds, .area = solid.area};
+  // Of a surface for each square of a voxel's side; no more with --sharp and --adaptivity.
+  constexpr double kTriangles = 3.35;
+  if (solid.kind == Kind::Band) plan.triangles = kTriangles * layerOf(solid);
   return plan;
 }
 
@@ -165,10 +164,12 @@ Demand readOfMesh(Invocation& in, std::size_t, const Demand&) {
   return {{.halfWidth = 1.5}};
 }
 
-/// Its result counts as worked with.
-Cost costOfMesh(Invocation& in) {
-  const double layer = layerOf(in.operands[0].plan());
-  return {1e-9 * 330 * layer, 120 * layer};
+std::optional<Cost> costOfMesh(Invocation& in) {
+  const Plan solid = in.operands[0].plan();
+  if (solid.kind != Kind::Band) return {};
+  const double layer = layerOf(solid);
+  if (in.flag("sharp")) return Cost{1e-9 * 1300 * layer, 420 * layer};
+  return Cost{1e-9 * 330 * layer, 40 * layer};
 }
 
 }  // namespace
@@ -209,6 +210,7 @@ void addConversionOperators(std::vector<Operator>& all) {
       .plan = planLevelSet,
       .cost = costOfLevelSet,
       .slope = Slope::One,
+      .makesParts = true,
       .validate = requireVoxelSize,
   });
   all.push_back({

@@ -39,11 +39,12 @@ Value widen(Invocation& in) {
 /// What is a distance already is kept, so it is read as wide as it is asked for.
 Demand readOfRedistance(Invocation& in, std::size_t, const Demand& of) {
   const double voxel = in.operands[0].plan().voxelSize;
-  return {{.halfWidth = std::max(kReadBySurface, of.part.halfWidth + 1),
-           .region = grown(of.part.region, distanceReach(in.planned->halfWidth) * voxel)}};
+  return {
+      {.halfWidth = std::max(levelset::kReadBySurface, of.part.halfWidth + 1),
+       .region = grown(of.part.region, levelset::distanceReach(in.planned->halfWidth) * voxel)}};
 }
 
-Cost costOfRedistance(Invocation& in) {
+std::optional<Cost> costOfRedistance(Invocation& in) {
   return costOfDistances(layerOf(in.operands[0].plan()), in.planned->halfWidth);
 }
 
@@ -72,7 +73,7 @@ Plan planClosestPoint(Invocation& in) {
   return planField(in, plan.halfWidth, 16);
 }
 
-Cost costOfClosestPoints(Invocation& in) {
+std::optional<Cost> costOfClosestPoints(Invocation& in) {
   const Plan solid = planHalfWidth(in);
   Cost cost = costOfDistances(layerOf(solid), solid.halfWidth);
   cost.bytes += planClosestPoint(in).fieldBytes;
@@ -158,10 +159,11 @@ Plan planFront(Invocation& in) {
 }
 
 template <FrontMethod method>
-Cost costOfFront(Invocation& in) {
+std::optional<Cost> costOfFront(Invocation& in) {
   const Plan solid = in.operands[0].plan();
-  const double voxels = layerOf(solid) * 2 * in.length("to") / solid.voxelSize;
-  return {1e-9 * (method == FrontMethod::Marching ? 1400 : 550) * voxels, 12 * voxels};
+  const double reach = in.length("to") / solid.voxelSize, voxels = layerOf(solid) * 2 * reach;
+  if (in.given("extend")) return costOfDistances(layerOf(solid), reach);
+  return Cost{1e-9 * (method == FrontMethod::Marching ? 1400 : 550) * voxels, 12 * voxels};
 }
 
 template <FrontMethod method>

@@ -199,7 +199,7 @@ void addFileOperators(std::vector<Operator>& all) {
       .resultKind = readKind,
       .run = read,
       .plan = planRead,
-      .cost = costPerVoxel(50),
+      .cost = costPerVoxel(50, 0, 250),
       .validate = validateRead,
       .usesStandardInput = isStandardStream,
   });
@@ -230,7 +230,7 @@ void addFileOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene}},
       .flow = Flow::PassesThrough,
       .run = write,
-      .cost = costPerVoxel(50),
+      .cost = costPerVoxel(50, 0, 20),
       .validate = validateWrite,
       .targets = [](const Invocation& in) { return std::vector{in.text("file")}; },
       .usesStandardOutput =

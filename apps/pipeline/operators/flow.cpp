@@ -57,11 +57,11 @@ Value curvatureFlow(Invocation& in) {
 }
 
 /// Stages of stabilized steps grow with the root of the time.
-Cost costOfCurvatureFlow(Invocation& in) {
+std::optional<Cost> costOfCurvatureFlow(Invocation& in) {
   const Plan solid = in.operands[0].plan();
   const double voxels = solid.activeVoxels();
   const double stages = std::sqrt(in.number("time")) / solid.voxelSize;
-  return {1e-9 * voxels * (3400 + 540 * stages), 300 * voxels};
+  return Cost{1e-9 * voxels * (3400 + 540 * stages), 300 * voxels};
 }
 
 // === smooth
@@ -93,7 +93,7 @@ Demand readOfSmooth(Invocation& in, std::size_t, const Demand& of) {
 }
 
 /// The band is made as wide as the filter reads, filtered, and made distances of again.
-Cost costOfSmooth(Invocation& in) {
+std::optional<Cost> costOfSmooth(Invocation& in) {
   const Plan solid = in.operands[0].plan();
   const double layer = layerOf(solid), sigma = in.length("sigma") / solid.voxelSize;
   const levelset::SmoothKind kind = smoothKind(in);

@@ -272,7 +272,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
       .operands = {{Kind::Band, Kind::Mesh}},
       .flow = Flow::PassesThrough,
       .run = measure,
-      .cost = costPerVoxel(720, 130),
+      .cost = costPerVoxel(720, 130, 520),
       .usesStandardOutput = asksJson,
   });
   all.push_back({
@@ -325,7 +325,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
       .flow = Flow::PassesThrough,
       .run = info,
       .plan = [](Invocation&) { return Plan{}; },
-      .cost = costPerVoxel(0),
+      .cost = [](Invocation&) { return Cost(); },
       .validate = validateInfo,
       .usesStandardOutput = asksJson,
       .usesStandardInput = [](const Invocation& in) { return in.text("file") == "-"; },

@@ -7,6 +7,7 @@
 #include "apps/pipeline/demand.h"
 #include "apps/pipeline/invocation.h"
 #include "apps/pipeline/operators/common.h"
+#include "levelset/eikonal/redistance.h"
 #include "levelset/error.h"
 #include "levelset/solids/clip.h"
 #include "levelset/solids/resample.h"
@@ -187,38 +188,38 @@ Plan planTransform(Invocation& in) {
   return plan;
 }
 
-// Samples reach as far beside the surface, in voxels of the grid that they are for.
-constexpr double kSampled = 4;
-
-Cost costOfSamples(Invocation& in) {
+/// @param in  a band is laid on another grid
+std::optional<Cost> costOfSamples(Invocation& in) {
   const Plan source = in.operands[0].plan(), target = *in.planned;
-  const double from = layerOf(source), to = layerOf(target);
+  const double from = layerOf(source), to = layerOf(target),
+               sampled = levelset::sampledWidth(target.voxelSize / source.voxelSize);
   Cost cost{1e-9 * (7600 * from + 8400 * to), 50 * from + 1030 * to};
-  const double sampled = kSampled * target.voxelSize / source.voxelSize;
-  if (sampled > source.halfWidth + kSampled) cost += costOfDistances(from, sampled);
+  if (sampled > source.halfWidth + 4) cost += costOfDistances(from, sampled);
   return cost += costOfDistances(to, target.halfWidth);
 }
 
-Cost costOfTransform(Invocation& in) {
+std::optional<Cost> costOfTransform(Invocation& in) {
+  const Plan plan = in.operands[0].plan();
+  if (plan.kind == Kind::Mesh) return Cost{25e-9 * plan.triangles};
   if (in.flag("bake")) return costOfSamples(in);
-  return {25e-9 * in.operands[0].plan().activeVoxels(), 0};
+  return Cost{25e-9 * plan.activeVoxels()};
 }
 
 /// Of a solid that is laid on another grid, and made distances of again there.
 /// @param toSource  from the world of the result to that of the operand
 Demand readOfSamples(const Invocation& in, const Demand& of, const M44d& toSource) {
   const Plan source = in.operands[0].plan(), target = *in.planned;
-  double stretch = 0;  // of a length, at most
+  double squares = 0;  // of the stretches along three axes: none is more than their root
   for (int i = 0; i < 3; ++i)
-    for (int k = 0; k < 3; ++k) stretch += toSource[i][k] * toSource[i][k];
-  stretch = std::sqrt(stretch);
-  // The operand's band is made as wide as is sampled beside the surface.
-  const double wide =
-      source.halfWidth + kSampled + kSampled * stretch * target.voxelSize / source.voxelSize;
+    for (int k = 0; k < 3; ++k) squares += toSource[i][k] * toSource[i][k];
+  const double sampled =
+      levelset::sampledWidth(std::sqrt(squares) * target.voxelSize / source.voxelSize);
   const Imath::Box3d about =
-      grown(of.part.region, distanceReach(target.halfWidth) * target.voxelSize);
+      grown(of.part.region, levelset::distanceReach(target.halfWidth) * target.voxelSize);
   if (levelset::isEverywhere(about)) return {};
-  return {{.region = grown(moved(about, toSource), distanceReach(wide) * source.voxelSize)}};
+  return {{.region = grown(
+               moved(about, toSource),
+               levelset::distanceReach(std::max(source.halfWidth, sampled)) * source.voxelSize)}};
 }
 
 Demand readOfTransform(Invocation& in, std::size_t, const Demand& of) {
@@ -311,6 +312,7 @@ void addPlacementOperators(std::vector<Operator>& all) {
       .cost = costOfTransform,
       .slope = Slope::OfOperands,
       .reads = readOfTransform,
+      .partTolerance = kDistanceTolerance,  // with --bake; else to the bit
       .validate = validateTransform,
   });
   all.push_back({

@@ -113,8 +113,8 @@ Demand readOfOffset(Invocation& in, std::size_t, const Demand& of) {
   const double voxel = in.operands[0].plan().voxelSize;
   const double distance = in.length("distance");
   if (distance == 0) return {};
-  const double reach = std::abs(distance) + distanceReach(in.planned->halfWidth) * voxel;
-  return {{.halfWidth = kReadBySurface, .region = grown(of.part.region, reach)}};
+  const double reach = std::abs(distance) + levelset::distanceReach(in.planned->halfWidth) * voxel;
+  return {{.halfWidth = levelset::kReadBySurface, .region = grown(of.part.region, reach)}};
 }
 
 void validateOffset(const Invocation& in) {
@@ -158,7 +158,7 @@ Plan planOffset(Invocation& in) {
   return plan;
 }
 
-Cost costOfMoving(Invocation& in) {
+std::optional<Cost> costOfMoving(Invocation& in) {
   const Plan solid = in.operands[0].plan();
   const double way = in.given("distance") ? in.length("distance") / solid.voxelSize : 0;
   const double before = layerOf(solid), after = layerOf(*in.planned);
@@ -212,7 +212,8 @@ Value close(Invocation& in) {
 Demand readOfMorphology(Invocation& in, std::size_t, const Demand& of) {
   if (in.given("mask")) return {};
   const Plan solid = in.operands[0].plan();
-  const double there = distanceReach(solid.halfWidth), back = distanceReach(in.planned->halfWidth);
+  const double there = levelset::distanceReach(solid.halfWidth),
+               back = levelset::distanceReach(in.planned->halfWidth);
   const double reach = 2 * in.length("radius") + (there + back) * solid.voxelSize;
   return {{.region = grown(of.part.region, reach)}};
 }
@@ -239,11 +240,13 @@ Value shell(Invocation& in) {
 Demand readOfShell(Invocation& in, std::size_t, const Demand& of) {
   if (in.given("mask")) return {};
   const double width = in.planned->halfWidth, voxel = in.operands[0].plan().voxelSize;
-  const double reach = in.length("thickness") + (distanceReach(width) + seamReach(width)) * voxel;
+  const double reach =
+      in.length("thickness") + (levelset::distanceReach(width) + seamReach(width)) * voxel;
   return {{.region = grown(of.part.region, reach)}};
 }
 
-Cost costOfMorphology(Invocation& in) {
+std::optional<Cost> costOfMorphology(Invocation& in) {
+  if (in.given("mask")) return {};
   const Plan solid = in.operands[0].plan();
   const double layer = layerOf(solid), way = in.length("radius") / solid.voxelSize;
   Cost cost = costOfOffset(layer, layer, way, solid.halfWidth);
@@ -252,7 +255,8 @@ Cost costOfMorphology(Invocation& in) {
   return cost;
 }
 
-Cost costOfShell(Invocation& in) {
+std::optional<Cost> costOfShell(Invocation& in) {
+  if (in.given("mask")) return {};
   const Plan solid = in.operands[0].plan();
   const double layer = layerOf(solid), way = in.length("thickness") / solid.voxelSize;
   const double width = in.planned->halfWidth;
