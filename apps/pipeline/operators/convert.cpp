@@ -75,6 +75,7 @@ Value levelSet(Invocation& in) {
 
 Plan planLevelSet(Invocation& in) {
   Plan plan = in.operands[0].plan();
+  plan.triangles = 0;
   plan.kind = Kind::Band;
   plan.voxelSize = in.voxelSize(longestSide(in.operands[0]));
   plan.halfWidth = in.number("half-width");
@@ -121,6 +122,7 @@ void validateSurfaceBand(const Invocation& in) {
 
 Plan planSurfaceBand(Invocation& in) {
   Plan plan = in.operands[0].plan();
+  plan.triangles = 0;
   plan.kind = Kind::Surface;
   plan.voxelSize = in.voxelSize(longestSide(in.operands[0]));
   plan.halfWidth = in.number("half-width");
