@@ -162,6 +162,7 @@ template <FrontMethod method>
 std::optional<Cost> costOfFront(Invocation& in) {
   const Plan solid = in.operands[0].plan();
   const double reach = in.length("to") / solid.voxelSize, voxels = layerOf(solid) * 2 * reach;
+  if (in.given("from")) return {};  // by how much there is about the points
   if (in.given("extend")) return costOfDistances(layerOf(solid), reach);
   return Cost{1e-9 * (method == FrontMethod::Marching ? 1400 : 550) * voxels, 12 * voxels};
 }
