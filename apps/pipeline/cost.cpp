@@ -39,8 +39,8 @@ double layerOf(const Plan& band) {
 }
 
 Cost costOfDistances(double layer, double halfWidth) {
-  // To find the surface, and then for each grid point to find its nearest point there. Between what
-  // smooth surfaces take and faceted ones, with edges everywhere: 0.6 and 1.7 of it.
+  // To find the surface, and then for each grid point to find its nearest point there. More than
+  // smooth surfaces take, and less than meshes of facets, with edges everywhere.
   return {1e-9 * layer * (1250 + 1060 * 2 * halfWidth), layer * (540 + 6 * 2 * halfWidth)};
 }
 

@@ -205,6 +205,9 @@ std::size_t tryOperator(const Operator& op, const std::function<Options(Random&)
     EXPECT_TRUE(all.mesh().triangles == made.mesh().triangles) << what;
     return all.mesh().triangles.size();
   }
+  // Thinner bands are made thicker, the part for itself.
+  constexpr double kOfThickBands = 1e-6;
+  if (halfWidth >= 3) tolerance = std::min(tolerance, kOfThickBands);
   return expectSamePart(all.band(), levelset::cropped(made.band(), of.part), of.part, tolerance,
                         what);
 }
@@ -218,7 +221,7 @@ TEST(Demand, EveryOperatorThatReadsAPartMakesThatPartTheSame) {
     const Operator& op = *pipeline::findOperator(name.substr(0, name.find(' ')));
     ASSERT_TRUE(op.reads) << name;
     const double tolerance = name == "transform" ? 0 : op.partTolerance;
-    const unsigned rounds = tolerance > 0 ? 6 : 20;  // those take longer
+    const unsigned rounds = tolerance == 0 || name == "offset" ? 20 : 6;  // others take longer
     unsigned compared = 0;
     for (unsigned seed = 0; seed < rounds; ++seed)
       compared += tryOperator(op, call, seed, tolerance) > 100 ? 1 : 0;

@@ -263,11 +263,11 @@ TEST(SideBySide, DoesNotRunFarAhead) {
 
 class Branches : public support::ShellTest {
  protected:
-  static std::string balls(int count, const std::string& between = "") {
+  static std::string balls(int count, const std::string& voxel = "0.05") {
     std::string chain;
     for (int i = 0; i < count; ++i)
-      chain += (i == 0 ? "" : " ! ") + std::string("sphere --radius 1 --voxel 0.05 ! offset 0.") +
-               std::to_string(i + 1) + " ! write o" + std::to_string(i) + ".vdb" + between;
+      chain += (i == 0 ? "" : " ! ") + std::string("sphere --radius 1 --voxel ") + voxel +
+               " ! offset 0." + std::to_string(i + 1) + " ! write o" + std::to_string(i) + ".vdb";
     return chain;
   }
 
@@ -350,7 +350,7 @@ TEST_F(Branches, AreToldInOrderWhereAMeshIsRefused) {
 
 TEST_F(Branches, AreReportedInTheOrderOfTheGraphWithTheirOwnCosts) {
   const double before = childrenCpuSeconds();
-  ASSERT_EQ(levelsmith("--report r.json --threads 4 " + balls(4)).code, 0);
+  ASSERT_EQ(levelsmith("--report r.json --threads 4 " + balls(4, "0.03")).code, 0);
   const auto report = nlohmann::json::parse(support::slurp(folder_ / "r.json"));
   ASSERT_EQ(report["steps"].size(), 12u);
   double cpu = 0;
@@ -364,7 +364,7 @@ TEST_F(Branches, AreReportedInTheOrderOfTheGraphWithTheirOwnCosts) {
   // what the process took.
   const double all = childrenCpuSeconds() - before;
   EXPECT_LT(cpu, all);
-  EXPECT_GT(cpu, 0.1 * all);
+  EXPECT_GT(cpu, 0.4 * all);  // the rest is start-up, mostly
 }
 
 TEST_F(Branches, ReadTheFilesOfASceneThatIsWrittenBefore) {
