@@ -1,7 +1,9 @@
-# levelsmith_module(NAME SOURCES … HEADERS … [PUBLIC libs…] [PRIVATE libs…])
+# levelsmith_module(NAME HEADERS … [PUBLIC libs…] [PRIVATE libs…])
 #
-# One library per top folder: alias Levelsmith::NAME, C++20, warnings, header self-check, install and
-# export. Paths are relative to the calling folder; headers are included from the repository root.
+# Makes one library from all .cpp files below the calling folder: alias Levelsmith::NAME, C++20,
+# warnings, header self-check, install and export. HEADERS are the public ones, relative to the calling
+# folder; they are included from the repository root. Sources are found by a glob, so that a new
+# operator needs no line in a list; public headers are listed, because each is a promise to users.
 
 include(GNUInstallDirs)
 
@@ -25,8 +27,9 @@ if(LEVELSMITH_SANITIZE)
 endif()
 
 function(levelsmith_module name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;PUBLIC;PRIVATE" ${ARGN})
-  add_library(${name} STATIC ${ARG_SOURCES})
+  cmake_parse_arguments(ARG "" "" "HEADERS;PUBLIC;PRIVATE" ${ARGN})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  add_library(${name} STATIC ${sources})
   add_library(Levelsmith::${name} ALIAS ${name})
   target_compile_features(${name} PUBLIC cxx_std_20)
   set_target_properties(${name} PROPERTIES

@@ -6,7 +6,7 @@
 
 #include <optional>
 
-#include "apps/pipeline/value.h"
+#include "apps/pipeline/values/value.h"
 
 /// Between values and numpy.
 namespace python {

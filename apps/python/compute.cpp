@@ -15,8 +15,8 @@
 #include <utility>
 
 #include "apps/cli/watch.h"
-#include "apps/pipeline/report.h"
-#include "apps/pipeline/runner.h"
+#include "apps/pipeline/report/report.h"
+#include "apps/pipeline/run/runner.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 

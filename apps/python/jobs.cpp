@@ -6,12 +6,12 @@
 #include <fstream>
 #include <iterator>
 
-#include "apps/pipeline/chain.h"
-#include "apps/pipeline/graph_file.h"
-#include "apps/pipeline/invocation.h"
-#include "apps/pipeline/mesh_bytes.h"
-#include "apps/pipeline/refusal.h"
-#include "apps/pipeline/script.h"
+#include "apps/pipeline/grammar/chain.h"
+#include "apps/pipeline/grammar/script.h"
+#include "apps/pipeline/graph/graph_file.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/values/mesh_bytes.h"
+#include "apps/pipeline/values/refusal.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/pipeline/graph.h"
-#include "apps/pipeline/value.h"
+#include "apps/pipeline/graph/graph.h"
+#include "apps/pipeline/values/value.h"
 
 /// What is handed to other processes: pipelines with their parameters, and values.
 namespace python {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/pipeline/graph.h"
+#include "apps/pipeline/graph/graph.h"
 
 /// Values that are asked for, as Python holds them. Everything here is called under the
 /// interpreter's lock.

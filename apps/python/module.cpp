@@ -5,14 +5,14 @@
 #include <new>
 #include <set>
 
-#include "apps/pipeline/graph_file.h"
-#include "apps/pipeline/invocation.h"
-#include "apps/pipeline/operator.h"
-#include "apps/pipeline/units.h"
-#include "apps/python/arguments.h"
+#include "apps/pipeline/graph/graph_file.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/registry/operator.h"
+#include "apps/pipeline/values/units.h"
 #include "apps/python/arrays.h"
 #include "apps/python/compute.h"
 #include "apps/python/jobs.h"
+#include "apps/python/python_arguments.h"
 #include "levelset/error.h"
 
 /// levelsmith._core: what the package levelsmith is made of.

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/regress/truth.h"
+#include "apps/regress/truth/truth.h"
 
 /// The regression suite: problems with exact answers, run at several resolutions and placements on
 /// the grid.

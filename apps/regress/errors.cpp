@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "apps/regress/gaps.h"
-#include "apps/regress/rays.h"
+#include "apps/regress/truth/gaps.h"
+#include "apps/regress/truth/rays.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"

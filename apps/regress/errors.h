@@ -1,7 +1,7 @@
 #pragma once
 
 #include "apps/regress/case.h"
-#include "apps/regress/rays.h"
+#include "apps/regress/truth/rays.h"
 #include "levelset/narrow_band.h"
 
 /// How far a band is from the truth.

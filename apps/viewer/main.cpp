@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "apps/cli/watch.h"
-#include "apps/viewer/arguments.h"
-#include "apps/viewer/script.h"
 #include "apps/viewer/viewer.h"
+#include "apps/viewer/viewer_arguments.h"
+#include "apps/viewer/viewer_script.h"
 #include "apps/viewer/window.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"

@@ -3,8 +3,8 @@
 #include <fmt/core.h>
 
 #include "levelset/error.h"
-#include "render/image.h"
-#include "render/shading/picture.h"
+#include "render/images/image.h"
+#include "render/views/picture.h"
 
 namespace viewer {
 

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "apps/viewer/progressive_picture.h"
+#include "apps/viewer/interaction/progressive_picture.h"
 
 namespace viewer {
 

@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "apps/viewer/arguments.h"
-#include "apps/viewer/file_list.h"
-#include "apps/viewer/file_watch.h"
-#include "apps/viewer/loader.h"
-#include "apps/viewer/orbit_camera.h"
-#include "apps/viewer/pick.h"
-#include "apps/viewer/progressive_picture.h"
+#include "apps/viewer/interaction/orbit_camera.h"
+#include "apps/viewer/interaction/pick.h"
+#include "apps/viewer/interaction/progressive_picture.h"
+#include "apps/viewer/model/file_list.h"
+#include "apps/viewer/model/file_watch.h"
+#include "apps/viewer/model/loader.h"
+#include "apps/viewer/viewer_arguments.h"
 #include "apps/viewer/window.h"
 
 namespace viewer {

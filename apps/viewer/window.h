@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/viewer/patch_overlay.h"
+#include "apps/viewer/interaction/patch_overlay.h"
 
 struct GLFWwindow;
 

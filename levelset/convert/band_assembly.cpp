@@ -9,7 +9,7 @@
 #include <memory>
 
 #include "levelset/convert/surface_blocks.h"
-#include "levelset/convert/triangle_distance.h"
+#include "levelset/mesh_sign/triangle_distance.h"
 
 namespace levelset::convert {
 namespace {

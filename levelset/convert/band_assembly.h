@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "levelset/convert/sign_field.h"
+#include "levelset/mesh_sign/sign_field.h"
 #include "levelset/vdb.h"
 
 namespace levelset::convert {

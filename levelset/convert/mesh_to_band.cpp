@@ -7,12 +7,12 @@
 
 #include "levelset/convert/band_assembly.h"
 #include "levelset/convert/mesh_to_band_input.h"
-#include "levelset/convert/open_surface.h"
-#include "levelset/convert/self_intersections.h"
-#include "levelset/convert/separating_surface.h"
 #include "levelset/convert/surface_blocks.h"
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
+#include "levelset/mesh_sign/open_surface.h"
+#include "levelset/mesh_sign/self_intersections.h"
+#include "levelset/mesh_sign/separating_surface.h"
 
 namespace levelset {
 namespace {

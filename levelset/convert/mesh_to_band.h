@@ -5,9 +5,10 @@
 #include <string>
 
 #include "levelset/mesh.h"
+#include "levelset/mesh_sign/mesh_queries.h"
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
-#include "levelset/solids/crop.h"
+#include "levelset/region_of_interest.h"
 
 /// Exact signed distances of a triangle mesh on the voxels of a band.
 namespace levelset {
@@ -74,12 +75,5 @@ struct MeshToBandResult {
 /// @param action  begins the message
 /// @throws InvalidInput for a voxel larger than the object
 void checkVoxelSize(double voxelSize, double longestSide, const char* action = "level-set");
-
-/// Pairs of triangles that cross each other, shared vertices and edges apart. Exact predicates.
-[[nodiscard]] std::size_t countSelfIntersections(const TriMesh& mesh,
-                                                 const Progress& progress = {});
-
-/// Generalised winding number of the mesh about `point`, by direct summation: the reference.
-[[nodiscard]] double windingNumber(const TriMesh& mesh, const Imath::V3d& point);
 
 }  // namespace levelset

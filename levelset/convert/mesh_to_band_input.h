@@ -2,8 +2,8 @@
 
 #include <cstddef>
 
-#include "levelset/convert/local_mesh.h"
 #include "levelset/convert/mesh_to_band.h"
+#include "levelset/mesh_sign/local_mesh.h"
 
 namespace levelset::convert {
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "levelset/convert/local_mesh.h"
+#include "levelset/mesh_sign/local_mesh.h"
 
 namespace levelset::convert {
 

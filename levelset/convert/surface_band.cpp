@@ -9,13 +9,13 @@
 #include <cmath>
 #include <memory>
 
-#include "levelset/closest_on_triangle.h"
 #include "levelset/convert/mesh_to_band_input.h"
 #include "levelset/convert/pseudonormals.h"
 #include "levelset/convert/surface_blocks.h"
-#include "levelset/convert/triangle_distance.h"
 #include "levelset/error.h"
+#include "levelset/geometry/closest_on_triangle.h"
 #include "levelset/memory_limit.h"
+#include "levelset/mesh_sign/triangle_distance.h"
 #include "levelset/vdb.h"
 
 namespace levelset {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "levelset/convert/triangle_distance.h"
+#include "levelset/mesh_sign/triangle_distance.h"
 #include "levelset/progress_gate.h"
 
 namespace levelset::convert {

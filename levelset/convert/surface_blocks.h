@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "levelset/convert/local_mesh.h"
+#include "levelset/mesh_sign/local_mesh.h"
 #include "levelset/progress.h"
 
 namespace levelset::convert {

@@ -7,12 +7,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "levelset/distance/signs.h"
 #include "levelset/eikonal/arrival_start.h"
 #include "levelset/eikonal/arrival_vdb.h"
-#include "levelset/eikonal/room.h"
-#include "levelset/eikonal/signs.h"
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
+#include "levelset/memory_estimate.h"
 
 namespace levelset {
 namespace eikonal {

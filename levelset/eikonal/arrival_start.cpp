@@ -6,7 +6,7 @@
 #include <cmath>
 #include <mutex>
 
-#include "levelset/eikonal/distance_transform.h"
+#include "levelset/distance/distance_transform.h"
 #include "levelset/memory_limit.h"
 
 namespace levelset::eikonal {

@@ -6,8 +6,8 @@
 #include <limits>
 #include <vector>
 
-#include "levelset/eikonal/point_tree.h"
 #include "levelset/eikonal/upwind.h"
+#include "levelset/geometry/point_tree.h"
 
 namespace levelset::eikonal {
 

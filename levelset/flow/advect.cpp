@@ -8,11 +8,11 @@
 #include "levelset/error.h"
 #include "levelset/flow/front.h"
 #include "levelset/flow/grid_schemes.h"
+#include "levelset/grids/sample.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/meshing/band_to_mesh.h"
-#include "levelset/sample.h"
+#include "levelset/placement/transform.h"
 #include "levelset/solids/offset.h"
-#include "levelset/solids/transform.h"
 #include "levelset/vdb.h"
 
 namespace levelset {

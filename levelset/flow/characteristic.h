@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "levelset/flow/journey.h"
+#include "levelset/flow/time_interval.h"
 
 namespace levelset::flow {
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "levelset/flow/journey.h"
+#include "levelset/flow/time_interval.h"
 #include "levelset/mesh.h"
 
 namespace levelset::flow {

@@ -9,8 +9,8 @@
 #include <cmath>
 #include <vector>
 
-#include "levelset/eikonal/distance_transform.h"
-#include "levelset/eikonal/interpolant.h"
+#include "levelset/distance/distance_transform.h"
+#include "levelset/distance/interpolant.h"
 #include "levelset/flow/characteristic.h"
 #include "levelset/vdb.h"
 

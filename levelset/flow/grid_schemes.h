@@ -2,7 +2,7 @@
 
 // For the .cpp files of levelset/flow only.
 
-#include "levelset/flow/journey.h"
+#include "levelset/flow/time_interval.h"
 #include "levelset/narrow_band.h"
 
 namespace levelset::flow {

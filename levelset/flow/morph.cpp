@@ -7,10 +7,10 @@
 #include <atomic>
 #include <cmath>
 
-#include "levelset/eikonal/distance_transform.h"
+#include "levelset/distance/distance_transform.h"
 #include "levelset/error.h"
 #include "levelset/inspect/compare.h"
-#include "levelset/solids/resample.h"
+#include "levelset/placement/resample.h"
 #include "levelset/vdb.h"
 
 namespace levelset {

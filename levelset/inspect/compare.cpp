@@ -7,17 +7,17 @@
 #include <limits>
 #include <vector>
 
-#include "levelset/eikonal/closest_point.h"
-#include "levelset/eikonal/point_tree.h"
-#include "levelset/eikonal/surface_points.h"
+#include "levelset/csg/csg_vdb.h"
+#include "levelset/distance/closest_point.h"
+#include "levelset/distance/surface_points.h"
 #include "levelset/error.h"
+#include "levelset/geometry/point_tree.h"
+#include "levelset/geometry/triangle_tree.h"
 #include "levelset/inspect/curved_surface.h"
 #include "levelset/inspect/symmetric_difference.h"
 #include "levelset/meshing/cell_surface.h"
-#include "levelset/meshing/triangle_tree.h"
+#include "levelset/placement/resample.h"
 #include "levelset/progress_gate.h"
-#include "levelset/solids/csg_vdb.h"
-#include "levelset/solids/resample.h"
 #include "levelset/vdb.h"
 
 namespace levelset {

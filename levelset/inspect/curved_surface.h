@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "levelset/eikonal/interpolant.h"
+#include "levelset/distance/interpolant.h"
 #include "levelset/meshing/cell_surface.h"
 
 namespace levelset {

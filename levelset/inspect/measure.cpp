@@ -7,8 +7,8 @@
 #include <tuple>
 #include <vector>
 
+#include "levelset/geometry/surface_components.h"
 #include "levelset/inspect/curved_surface.h"
-#include "levelset/inspect/shells.h"
 #include "levelset/memory_limit.h"
 #include "levelset/meshing/cell_surface.h"
 #include "levelset/progress_gate.h"

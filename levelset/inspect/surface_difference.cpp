@@ -8,9 +8,9 @@
 #include <numbers>
 #include <unordered_map>
 
-#include "levelset/eikonal/point_tree.h"
 #include "levelset/error.h"
-#include "levelset/meshing/triangle_tree.h"
+#include "levelset/geometry/point_tree.h"
+#include "levelset/geometry/triangle_tree.h"
 #include "levelset/progress_gate.h"
 #include "levelset/vdb.h"
 

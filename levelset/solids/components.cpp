@@ -10,10 +10,10 @@
 #include <set>
 #include <vector>
 
-#include "levelset/eikonal/redistance.h"
+#include "levelset/distance/redistance.h"
 #include "levelset/error.h"
+#include "levelset/grids/sample.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/sample.h"
 #include "levelset/solids/regions.h"
 
 namespace levelset {

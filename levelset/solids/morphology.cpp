@@ -5,9 +5,9 @@
 #include <array>
 #include <cmath>
 
+#include "levelset/csg/csg.h"
+#include "levelset/csg/csg_vdb.h"
 #include "levelset/error.h"
-#include "levelset/solids/csg.h"
-#include "levelset/solids/csg_vdb.h"
 #include "levelset/vdb.h"
 
 namespace levelset {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <mutex>
 
-#include "levelset/eikonal/distance_transform.h"
+#include "levelset/distance/distance_transform.h"
 #include "levelset/error.h"
 #include "levelset/vdb.h"
 

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <array>
 
-#include "levelset/disjoint_sets.h"
-#include "levelset/inspect/shells.h"
+#include "levelset/geometry/disjoint_sets.h"
+#include "levelset/geometry/surface_components.h"
 
 namespace levelset {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "levelset/error.h"
-#include "levelset/solids/fill_blocks_vdb.h"
+#include "levelset/grids/fill_blocks_vdb.h"
 #include "levelset/solids/shapes.h"
 #include "levelset/vdb.h"
 

@@ -12,7 +12,7 @@
 #include "levelset/error.h"
 #include "mapping/animation/frame_notes.h"
 #include "mapping/animation/patch_path.h"
-#include "mapping/patches/patch_levels.h"
+#include "mapping/layers/patch_layers.h"
 #include "mapping/textures/texture_placement.h"
 
 namespace mapping {

@@ -7,9 +7,10 @@
 
 #include "levelset/error.h"
 #include "mapping/animation/surface_frame.h"
-#include "mapping/patches/patch_levels.h"
-#include "mapping/surface/closest_point.h"
+#include "mapping/layers/patch_layers.h"
+#include "mapping/placement/make_patch.h"
 #include "mapping/surface/geodesic.h"
+#include "mapping/surface/surface_projection.h"
 #include "mapping/surface/surface_walk.h"
 
 namespace mapping {

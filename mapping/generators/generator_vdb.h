@@ -8,7 +8,7 @@
 #include <array>
 #include <cmath>
 
-#include "levelset/eikonal/redistance.h"
+#include "levelset/distance/redistance.h"
 #include "levelset/error.h"
 #include "levelset/solids/shape_band_vdb.h"
 #include "mapping/generators/tiling.h"

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "mapping/patches/level_resampling.h"
+#include "mapping/layers/layer_resampling.h"
 
 namespace mapping {
 namespace {

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "levelset/eikonal/redistance.h"
+#include "levelset/distance/redistance.h"
 #include "levelset/error.h"
+#include "levelset/grids/sample.h"
 #include "levelset/memory_limit.h"
-#include "levelset/sample.h"
-#include "levelset/solids/resample.h"
+#include "levelset/placement/resample.h"
 
 namespace mapping {
 namespace {

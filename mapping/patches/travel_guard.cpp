@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "levelset/disjoint_sets.h"
+#include "levelset/geometry/disjoint_sets.h"
 
 namespace mapping {
 namespace {

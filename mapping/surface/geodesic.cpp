@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mapping/surface/geodesic_search.h"
 #include "mapping/surface/surface_walk.h"
-#include "mapping/surface/way_search.h"
 
 namespace mapping {
 namespace {

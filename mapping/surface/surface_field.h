@@ -2,8 +2,8 @@
 
 #include <Imath/ImathVec.h>
 
+#include "levelset/grids/sample.h"
 #include "levelset/narrow_band.h"
-#include "levelset/sample.h"
 
 namespace mapping {
 

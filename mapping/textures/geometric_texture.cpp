@@ -11,16 +11,16 @@
 #include <memory>
 #include <span>
 
-#include "levelset/eikonal/redistance.h"
+#include "levelset/csg/blend.h"
+#include "levelset/csg/clip.h"
+#include "levelset/csg/csg.h"
+#include "levelset/distance/redistance.h"
 #include "levelset/error.h"
-#include "levelset/sample.h"
-#include "levelset/solids/blend.h"
-#include "levelset/solids/clip.h"
+#include "levelset/grids/sample.h"
+#include "levelset/placement/resample.h"
 #include "levelset/solids/components.h"
-#include "levelset/solids/csg.h"
-#include "levelset/solids/resample.h"
+#include "mapping/layers/layer_resampling.h"
 #include "mapping/maps/shell_map.h"
-#include "mapping/patches/level_resampling.h"
 #include "mapping/textures/shared_sides.h"
 #include "mapping/textures/texture_warp.h"
 

@@ -10,10 +10,10 @@
 
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
-#include "mapping/maps/distortion.h"
-#include "mapping/maps/fold_certificate.h"
-#include "mapping/maps/rbf_map.h"
+#include "mapping/distortion/distortion.h"
+#include "mapping/distortion/fold_certificate.h"
 #include "mapping/patches/patch.h"
+#include "mapping/rbf/rbf_map.h"
 
 /// Any solid laid onto a patch of any surface as a level set [Brodersen07 §8.3, §8.5].
 namespace mapping {

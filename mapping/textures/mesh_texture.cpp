@@ -11,7 +11,7 @@
 
 #include "levelset/error.h"
 #include "levelset/progress_gate.h"
-#include "mapping/maps/level_map.h"
+#include "mapping/maps/layer_map.h"
 #include "mapping/textures/texture_placement.h"
 
 namespace mapping {

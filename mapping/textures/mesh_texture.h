@@ -10,8 +10,8 @@
 
 #include "levelset/mesh.h"
 #include "levelset/progress.h"
-#include "mapping/maps/distortion.h"
-#include "mapping/maps/fold_certificate.h"
+#include "mapping/distortion/distortion.h"
+#include "mapping/distortion/fold_certificate.h"
 #include "mapping/patches/patch.h"
 
 namespace mapping {

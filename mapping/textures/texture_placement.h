@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "mapping/maps/distortion.h"
-#include "mapping/maps/fold_certificate.h"
+#include "mapping/distortion/distortion.h"
+#include "mapping/distortion/fold_certificate.h"
 
 namespace mapping {
 

@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "levelset/error.h"
+#include "levelset/grids/sample.h"
+#include "levelset/placement/resample_vdb.h"
 #include "levelset/progress_gate.h"
-#include "levelset/sample.h"
-#include "levelset/solids/resample_vdb.h"
 #include "levelset/vdb.h"
-#include "mapping/maps/level_map.h"
+#include "mapping/maps/layer_map.h"
 
 namespace mapping {
 namespace {

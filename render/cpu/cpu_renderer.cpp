@@ -3,7 +3,7 @@
 #include "render/cpu/cpu_tracer.h"
 #include "render/kernel/kernel_scene.h"
 #include "render/kernel/paint.h"
-#include "render/shading/picture.h"
+#include "render/views/picture.h"
 
 namespace render {
 Image renderCpu(const Scene& scene, const RenderOptions& options) {

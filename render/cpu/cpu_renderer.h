@@ -1,8 +1,8 @@
 #pragma once
 
-#include "render/image.h"
-#include "render/render_options.h"
-#include "render/scene.h"
+#include "render/images/image.h"
+#include "render/scene/scene.h"
+#include "render/shading/render_options.h"
 
 namespace render {
 

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "render/kernel/brick_pool.h"
+#include "render/bricks/brick_pool.h"
 #include "render/kernel/ray_block.h"
 #include "render/kernel/ray_fan.h"
 

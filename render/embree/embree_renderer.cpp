@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <mutex>
 
-#include "render/shading/picture.h"
 #include "render/shading/shading.h"
+#include "render/views/picture.h"
 
 namespace render {
 namespace {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "render/hit.h"
-#include "render/image.h"
-#include "render/render_options.h"
-#include "render/scene.h"
+#include "render/images/image.h"
+#include "render/scene/scene.h"
+#include "render/shading/render_options.h"
 
 /// The judge: first zero of the filter's function along each ray, solved in double precision on
 /// OpenVDB's own tree; Embree only finds the leaf blocks,

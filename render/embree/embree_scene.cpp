@@ -10,8 +10,8 @@
 #include "render/embree/embree_renderer.h"
 #include "render/embree/field_march.h"
 #include "render/embree/float_view.h"
+#include "render/embree/judge_blocks_vdb.h"
 #include "render/embree/mesh_rays.h"
-#include "render/embree/surface_blocks_vdb.h"
 #include "render/embree/surface_spline_vdb.h"
 #include "render/shading/surface_shape.h"
 

@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "render/field_expression.h"
 #include "render/hit.h"
-#include "render/scene.h"
+#include "render/scene/field_expression.h"
+#include "render/scene/scene.h"
 
 namespace render {
 

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "render/hit.h"
-#include "render/scene.h"
+#include "render/scene/scene.h"
 
 namespace render {
 

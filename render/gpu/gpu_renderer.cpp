@@ -3,7 +3,7 @@
 #include "render/gpu/gl_context.h"
 #include "render/gpu/gpu_tracer.h"
 #include "render/kernel/paint.h"
-#include "render/shading/picture.h"
+#include "render/views/picture.h"
 
 namespace render {
 

@@ -1,9 +1,9 @@
 #pragma once
 
 #include "levelset/error.h"
-#include "render/image.h"
-#include "render/render_options.h"
-#include "render/scene.h"
+#include "render/images/image.h"
+#include "render/scene/scene.h"
+#include "render/shading/render_options.h"
 
 namespace render {
 

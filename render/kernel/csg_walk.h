@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "render/csg.h"
+#include "render/scene/csg_expression.h"
 
 namespace render {
 

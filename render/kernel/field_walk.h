@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <vector>
 
-#include "render/field_expression.h"
+#include "render/bricks/field_grid.h"
 #include "render/hit.h"
-#include "render/kernel/field_grid.h"
-#include "render/scene.h"
+#include "render/scene/field_expression.h"
+#include "render/scene/scene.h"
 
 namespace render {
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "levelset/vdb.h"
-#include "render/kernel/frame_need.h"
+#include "render/kernel/frustum_culling.h"
 
 namespace render {
 namespace {

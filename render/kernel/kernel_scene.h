@@ -9,15 +9,15 @@
 #include <vector>
 
 #include "levelset/memory_limit.h"
-#include "render/csg.h"
+#include "render/bricks/brick_pool.h"
 #include "render/embree/mesh_rays.h"
-#include "render/kernel/brick_pool.h"
 #include "render/kernel/csg_walk.h"
 #include "render/kernel/field_walk.h"
 #include "render/kernel/ray_block.h"
 #include "render/kernel/ray_fan.h"
-#include "render/render_options.h"
-#include "render/scene.h"
+#include "render/scene/csg_expression.h"
+#include "render/scene/scene.h"
+#include "render/shading/render_options.h"
 #include "render/shading/shading.h"
 
 namespace render {

@@ -3,12 +3,12 @@
 #include <string>
 #include <vector>
 
-#include "render/image.h"
+#include "render/images/image.h"
 #include "render/kernel/kernel_scene.h"
-#include "render/render_options.h"
-#include "render/scene.h"
-#include "render/shading/picture.h"
+#include "render/scene/scene.h"
+#include "render/shading/render_options.h"
 #include "render/shading/shading.h"
+#include "render/views/picture.h"
 
 namespace render {
 

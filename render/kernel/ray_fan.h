@@ -2,8 +2,8 @@
 
 #include <Imath/ImathMatrix.h>
 
+#include "render/bricks/brick_pool.h"
 #include "render/camera.h"
-#include "render/kernel/brick_pool.h"
 
 namespace render {
 

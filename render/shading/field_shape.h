@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "render/field_expression.h"
 #include "render/hit.h"
+#include "render/scene/field_expression.h"
 #include "render/shading/surface_shape.h"
 
 namespace render {

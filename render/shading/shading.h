@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "render/hit.h"
-#include "render/render_options.h"
-#include "render/scene.h"
+#include "render/scene/scene.h"
+#include "render/shading/render_options.h"
 
 namespace render {
 

@@ -10,7 +10,7 @@
 #include <numbers>
 
 #include "levelset/error.h"
-#include "render/grey_image.h"
+#include "render/images/grey_image.h"
 
 namespace render {
 namespace {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/regress/peer.h"
+#include "apps/regress/peers/peer.h"
 #include "levelset/flow/advect.h"
 #include "levelset/flow/velocity.h"
 #include "levelset/inspect/measure.h"

@@ -3,8 +3,8 @@
 #include <benchmark/benchmark.h>
 #include <openvdb/tools/LevelSetFilter.h>
 
-#include "levelset/flow/curvature_flow.h"
-#include "levelset/flow/smooth.h"
+#include "levelset/curvature/curvature_flow.h"
+#include "levelset/curvature/smooth.h"
 #include "levelset/solids/shapes.h"
 #include "levelset/vdb.h"
 

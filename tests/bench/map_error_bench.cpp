@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "mapping/maps/shell_map.h"
+#include "mapping/placement/make_patch.h"
 #include "mapping/textures/geometric_texture.h"
 #include "tests/bench/wall.h"
 

@@ -22,8 +22,9 @@
 #include <span>
 #include <vector>
 
-#include "mapping/maps/level_map.h"
+#include "mapping/maps/layer_map.h"
 #include "mapping/maps/shell_map.h"
+#include "mapping/placement/make_patch.h"
 #include "mapping/textures/geometric_texture.h"
 #include "mapping/textures/mesh_texture.h"
 #include "tests/bench/wall.h"

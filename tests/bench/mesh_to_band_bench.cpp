@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "levelset/convert/mesh_to_band.h"
-#include "levelset/files/mesh_file.h"
+#include "levelset/mesh_files/mesh_file.h"
 
 namespace {
 

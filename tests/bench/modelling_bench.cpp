@@ -10,17 +10,17 @@
 
 #include <cmath>
 
-#include "levelset/eikonal/closest_points.h"
+#include "levelset/csg/blend.h"
+#include "levelset/curvature/smooth.h"
+#include "levelset/distance/closest_points.h"
 #include "levelset/flow/morph.h"
-#include "levelset/flow/smooth.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/solids/blend.h"
+#include "levelset/placement/resample.h"
 #include "levelset/solids/components.h"
 #include "levelset/solids/morphology.h"
 #include "levelset/solids/offset.h"
-#include "levelset/solids/resample.h"
 #include "levelset/solids/shapes.h"
 #include "levelset/vdb.h"
 

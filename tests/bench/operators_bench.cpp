@@ -10,10 +10,10 @@
 
 #include <array>
 
+#include "levelset/csg/csg.h"
+#include "levelset/distance/redistance.h"
 #include "levelset/eikonal/arrival.h"
-#include "levelset/eikonal/redistance.h"
 #include "levelset/meshing/band_to_mesh.h"
-#include "levelset/solids/csg.h"
 #include "levelset/solids/offset.h"
 #include "levelset/solids/shapes.h"
 #include "levelset/vdb.h"

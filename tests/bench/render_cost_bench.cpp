@@ -13,7 +13,7 @@
 #include <functional>
 #include <vector>
 
-#include "levelset/solids/csg.h"
+#include "levelset/csg/csg.h"
 #include "levelset/solids/shapes.h"
 #include "render/cpu/cpu_tracer.h"
 #include "render/kernel/kernel_scene.h"

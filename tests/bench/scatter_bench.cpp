@@ -11,7 +11,7 @@
 #include <ctime>
 
 #include "levelset/solids/shapes.h"
-#include "mapping/patches/scatter.h"
+#include "mapping/placement/scatter.h"
 #include "mapping/textures/geometric_texture.h"
 
 namespace {

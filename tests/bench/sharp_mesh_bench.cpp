@@ -9,7 +9,7 @@
 #include <limits>
 #include <random>
 
-#include "apps/regress/exact_band.h"
+#include "apps/regress/truth/exact_band.h"
 #include "levelset/meshing/sharp_surface.h"
 
 namespace {

@@ -1,13 +1,13 @@
 #include <filesystem>
 
-#include "apps/pipeline/cache.h"
-#include "apps/pipeline/digest.h"
-#include "apps/pipeline/mesh_bytes.h"
+#include "apps/pipeline/cache/cache.h"
+#include "apps/pipeline/values/digest.h"
+#include "apps/pipeline/values/mesh_bytes.h"
 #include "levelset/files/band_file.h"
-#include "levelset/files/mesh_file.h"
+#include "levelset/mesh_files/mesh_file.h"
 #include "levelset/solids/shapes.h"
 #include "mapping/patches/patch_file.h"
-#include "render/scene_file.h"
+#include "render/views/scene_file.h"
 #include "tests/fuzz/readers.h"
 
 namespace fuzz {

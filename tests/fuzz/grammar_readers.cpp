@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <string>
 
-#include "apps/pipeline/chain.h"
-#include "apps/pipeline/graph_file.h"
-#include "apps/pipeline/script.h"
+#include "apps/pipeline/grammar/chain.h"
+#include "apps/pipeline/grammar/script.h"
+#include "apps/pipeline/graph/graph_file.h"
 #include "levelset/fields/expression.h"
-#include "render/csg.h"
+#include "render/scene/csg_expression.h"
 #include "tests/fuzz/readers.h"
 
 namespace fuzz {

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "levelset/files/mesh_file.h"
+#include "levelset/mesh_files/mesh_file.h"
 #include "tests/fuzz/readers.h"
 
 namespace fuzz {

@@ -1,6 +1,6 @@
-#include "apps/pipeline/height_file.h"
-#include "render/grey_image.h"
-#include "render/image.h"
+#include "apps/pipeline/values/height_file.h"
+#include "render/images/grey_image.h"
+#include "render/images/image.h"
 #include "render/shading/style.h"
 #include "tests/fuzz/readers.h"
 

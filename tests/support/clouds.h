@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "mapping/maps/rbf_map.h"
+#include "mapping/rbf/rbf_map.h"
 
 namespace mapping {
 /// For the names of tests.

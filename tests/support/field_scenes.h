@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "render/compare_images.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
+#include "render/images/compare_images.h"
 #include "tests/support/bands.h"
 
 /// Scenes of soft CSG and of morphs, and what the judge has to say of them.

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "levelset/files/mesh_file.h"
+#include "levelset/mesh_files/mesh_file.h"
 #include "tests/support/files.h"
 
 namespace support {

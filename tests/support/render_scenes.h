@@ -1,9 +1,9 @@
 #pragma once
 
-#include "levelset/solids/csg.h"
+#include "levelset/csg/csg.h"
 #include "levelset/solids/shapes.h"
 #include "render/camera.h"
-#include "render/scene.h"
+#include "render/scene/scene.h"
 
 /// Small scenes that are hard for ray casters.
 namespace support {

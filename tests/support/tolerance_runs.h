@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "apps/pipeline/chain.h"
-#include "apps/pipeline/tolerance.h"
+#include "apps/pipeline/grammar/chain.h"
+#include "apps/pipeline/tolerance/tolerance.h"
 #include "levelset/error.h"
-#include "levelset/files/mesh_file.h"
 #include "levelset/inspect/surface_difference.h"
+#include "levelset/mesh_files/mesh_file.h"
 #include "tests/support/files.h"
 
 namespace support {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/pipeline/invocation.h"
-#include "apps/pipeline/operator.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/registry/operator.h"
 #include "levelset/error.h"
 #include "levelset/narrow_band.h"
 

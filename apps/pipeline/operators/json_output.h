@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "apps/pipeline/invocation.h"
-#include "apps/pipeline/operator.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/registry/operator.h"
 
 namespace pipeline {
 

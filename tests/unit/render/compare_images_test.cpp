@@ -1,4 +1,4 @@
-#include "render/compare_images.h"
+#include "render/images/compare_images.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include "levelset/error.h"
 #include "levelset/solids/shapes.h"
 #include "render/embree/embree_renderer.h"
-#include "render/scene.h"
+#include "render/scene/scene.h"
 
 namespace compare_images_test {
 

@@ -9,10 +9,10 @@
 #include <string>
 
 #include "levelset/error.h"
+#include "levelset/placement/transform.h"
 #include "levelset/solids/shapes.h"
-#include "levelset/solids/transform.h"
-#include "render/compare_images.h"
 #include "render/embree/embree_renderer.h"
+#include "render/images/compare_images.h"
 #include "tests/support/render_scenes.h"
 
 namespace cpu_renderer_test {

@@ -10,17 +10,17 @@
 #include <string>
 #include <vector>
 
+#include "levelset/csg/csg.h"
 #include "levelset/error.h"
-#include "levelset/solids/csg.h"
+#include "levelset/placement/transform.h"
 #include "levelset/solids/shapes.h"
-#include "levelset/solids/transform.h"
-#include "render/compare_images.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/cpu/cpu_tracer.h"
-#include "render/csg.h"
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"
+#include "render/images/compare_images.h"
 #include "render/kernel/kernel_scene.h"
+#include "render/scene/csg_expression.h"
 #include "tests/support/bands.h"
 #include "tests/support/render_scenes.h"
 

@@ -10,13 +10,13 @@
 #include <vector>
 
 #include "levelset/error.h"
+#include "levelset/placement/transform.h"
 #include "levelset/solids/shapes.h"
-#include "levelset/solids/transform.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"
+#include "render/images/value_bits.h"
 #include "render/kernel/kernel_scene.h"
-#include "render/value_bits.h"
 #include "tests/support/field_scenes.h"
 #include "tests/support/render_scenes.h"
 

@@ -9,15 +9,15 @@
 #include <cstdlib>
 #include <string>
 
+#include "levelset/csg/csg.h"
 #include "levelset/error.h"
-#include "levelset/solids/csg.h"
+#include "levelset/placement/transform.h"
 #include "levelset/solids/shapes.h"
-#include "levelset/solids/transform.h"
-#include "render/compare_images.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/cpu/cpu_trace.h"
 #include "render/gpu/gl_context.h"
 #include "render/gpu/gpu_tracer.h"
+#include "render/images/compare_images.h"
 #include "tests/support/render_scenes.h"
 
 namespace gpu_renderer_test {

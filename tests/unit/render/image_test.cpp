@@ -1,4 +1,4 @@
-#include "render/image.h"
+#include "render/images/image.h"
 
 #include <gtest/gtest.h>
 #include <png.h>

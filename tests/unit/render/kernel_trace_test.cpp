@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "levelset/solids/csg.h"
+#include "levelset/csg/csg.h"
 #include "levelset/solids/shapes.h"
 #include "levelset/vdb.h"
+#include "render/bricks/brick_pool.h"
 #include "render/cpu/cpu_trace.h"
 #include "render/embree/embree_renderer.h"
-#include "render/kernel/brick_pool.h"
 #include "render/kernel/ray_block.h"
 
 namespace kernel_trace_test {

@@ -8,11 +8,11 @@
 
 #include "levelset/mesh.h"
 #include "levelset/solids/shapes.h"
-#include "render/compare_images.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
 #include "render/embree/mesh_rays.h"
 #include "render/gpu/gpu_renderer.h"
+#include "render/images/compare_images.h"
 #include "tests/support/render_scenes.h"
 
 namespace mesh_scene_test {

@@ -1,6 +1,6 @@
 // Pictures of the distance in a plane.
 
-#include "render/slice.h"
+#include "render/views/slice.h"
 
 #include <gtest/gtest.h>
 

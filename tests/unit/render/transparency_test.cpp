@@ -10,10 +10,10 @@
 
 #include "levelset/error.h"
 #include "levelset/solids/shapes.h"
-#include "render/compare_images.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"
+#include "render/images/compare_images.h"
 #include "tests/support/render_scenes.h"
 
 namespace transparency_test {

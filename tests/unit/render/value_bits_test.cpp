@@ -1,6 +1,6 @@
 // Values in 16 and in 8 bits: the same surface for all renderers, as far off as is said.
 
-#include "render/value_bits.h"
+#include "render/images/value_bits.h"
 
 #include <gtest/gtest.h>
 
@@ -10,11 +10,11 @@
 #include "levelset/error.h"
 #include "levelset/solids/shapes.h"
 #include "levelset/vdb.h"
-#include "render/compare_images.h"
+#include "render/bricks/brick_pool.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"
-#include "render/kernel/brick_pool.h"
+#include "render/images/compare_images.h"
 #include "render/kernel/kernel_scene.h"
 #include "tests/support/render_scenes.h"
 

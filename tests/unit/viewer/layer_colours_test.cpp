@@ -1,4 +1,4 @@
-#include "apps/viewer/layer_colours.h"
+#include "apps/viewer/model/layer_colours.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "apps/viewer/orbit_camera.h"
+#include "apps/viewer/interaction/orbit_camera.h"
 
 #include <gtest/gtest.h>
 

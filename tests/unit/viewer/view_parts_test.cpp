@@ -9,13 +9,13 @@
 #include <limits>
 #include <thread>
 
-#include "apps/viewer/arguments.h"
-#include "apps/viewer/clip_plane.h"
-#include "apps/viewer/file_watch.h"
-#include "apps/viewer/model.h"
-#include "apps/viewer/patch_overlay.h"
-#include "apps/viewer/pick.h"
-#include "apps/viewer/progressive_picture.h"
+#include "apps/viewer/interaction/clip_plane.h"
+#include "apps/viewer/interaction/patch_overlay.h"
+#include "apps/viewer/interaction/pick.h"
+#include "apps/viewer/interaction/progressive_picture.h"
+#include "apps/viewer/model/file_watch.h"
+#include "apps/viewer/model/model.h"
+#include "apps/viewer/viewer_arguments.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
 #include "levelset/solids/shapes.h"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/shell.h"
+#include "tests/support/command_line.h"
 
 namespace viewer_command_test {
 

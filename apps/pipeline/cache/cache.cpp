@@ -1,0 +1,337 @@
+#include "apps/pipeline/cache/cache.h"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <system_error>
+#include <utility>
+
+#include "apps/pipeline/values/digest.h"
+#include "apps/pipeline/values/mesh_bytes.h"
+#include "levelset/error.h"
+#include "levelset/files/band_file.h"
+
+namespace pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr int kCacheVersion = 2;
+constexpr const char* kEntry = ".json";
+constexpr const char* kGrid = ".vdb";
+constexpr const char* kMesh = ".mesh";
+
+Json notesJson(const StepNotes& notes) {
+  Json json = {{"warnings", notes.warnings},
+               {"notes", notes.notes},
+               {"certificate", notes.certificateJson},
+               {"details", notes.detailsJson}};
+  json["lengths"] = Json::array();
+  for (const Resolved& length : notes.lengths)
+    json["lengths"].push_back({{"param", length.param},
+                               {"written", length.written},
+                               {"world", length.world},
+                               {"voxels", length.voxels ? Json(*length.voxels) : Json()}});
+  json["errors"] = Json::array();
+  for (const ErrorEstimate& error : notes.errors)
+    json["errors"].push_back(
+        {{"measure", error.measure}, {"value", error.value}, {"unit", error.unit}});
+  return json;
+}
+
+/// Infinities, which JSON has no numbers for, come back as nothing.
+double numberOf(const Json& json) {
+  return json.is_number() ? json.get<double>() : HUGE_VAL;
+}
+
+StepNotes notesOf(const Json& json) {
+  StepNotes notes;
+  notes.warnings = json.at("warnings").get<std::vector<std::string>>();
+  notes.notes = json.at("notes").get<std::vector<std::string>>();
+  notes.certificateJson = json.at("certificate").get<std::string>();
+  notes.detailsJson = json.at("details").get<std::string>();
+  for (const Json& l : json.at("lengths")) {
+    Resolved length{l.at("param").get<std::string>(), l.at("written").get<std::string>(),
+                    numberOf(l.at("world"))};
+    if (!l.at("voxels").is_null()) length.voxels = numberOf(l.at("voxels"));
+    notes.lengths.push_back(std::move(length));
+  }
+  for (const Json& e : json.at("errors"))
+    notes.errors.push_back({e.at("measure").get<std::string>(), numberOf(e.at("value")),
+                            e.at("unit").get<std::string>()});
+  return notes;
+}
+
+std::string contentsOf(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+/// An entry as it is in its file: a digest of all behind it comes first, since a text that was
+/// damaged may still be one.
+std::string textOf(const Json& entry) {
+  const std::string text = entry.dump(1, ' ', false, Json::error_handler_t::replace);
+  return digestOf(text) + "\n" + text;
+}
+
+/// @throws std::exception for what is damaged, or not there
+Json readEntry(const fs::path& file) {
+  const std::string bytes = contentsOf(file);
+  const std::size_t end = std::min(bytes.find('\n'), bytes.size());
+  const std::string text = bytes.substr(std::min(end + 1, bytes.size()));
+  if (bytes.substr(0, end) != digestOf(text)) throw levelset::InvalidInput("cache: it is damaged");
+  Json entry = Json::parse(text);
+  if (entry.at("version") != kCacheVersion)
+    throw levelset::InvalidInput("cache: it is of another version");
+  return entry;
+}
+
+std::int64_t nanoseconds(const timespec& time) {
+  return time.tv_sec * 1'000'000'000 + time.tv_nsec;
+}
+
+void touch(const fs::path& file) {
+  (void)::utimensat(AT_FDCWD, file.c_str(), nullptr, 0);
+}
+
+/// Of what a value is, to tell whether it came back whole.
+std::uint64_t hashOf(const Value& value) {
+  if (value.kind() == Kind::Band) return value.band().contentHash();
+  if (value.kind() == Kind::Field) return value.field().contentHash();
+  return 0;  // the bytes of a mesh hold their own
+}
+
+}  // namespace
+
+std::optional<FileStamp> stampOf(const fs::path& file) {
+  struct stat about;
+  if (::stat(file.c_str(), &about) != 0 || !S_ISREG(about.st_mode)) return {};
+  std::error_code error;
+  const fs::path absolute = fs::absolute(file, error);
+  return FileStamp{.path = (error ? file : absolute.lexically_normal()).string(),
+                   .size = static_cast<std::uint64_t>(about.st_size),
+                   .inode = about.st_ino,
+                   .device = about.st_dev,
+                   .changed = nanoseconds(about.st_mtim)};
+}
+
+Cache::Cache(fs::path folder) : folder_(std::move(folder)) {
+  std::error_code error;
+  for (const char* part : {"results", "files", "new"}) {
+    fs::create_directories(folder_ / part, error);
+    if (error)
+      throw levelset::IoError(
+          fmt::format("--cache: '{}' cannot be made: {}; name a folder that can be written",
+                      (folder_ / part).string(), error.message()));
+  }
+  if (::access((folder_ / "new").c_str(), W_OK) != 0)
+    throw levelset::IoError(
+        fmt::format("--cache: '{}' cannot be written to; name another folder", folder_.string()));
+}
+
+bool Cache::canHold(Kind kind) {
+  return kind == Kind::Band || kind == Kind::Field || kind == Kind::Mesh;
+}
+
+fs::path Cache::place(const std::string& key, const char* extension) const {
+  return folder_ / "results" / (key + extension);
+}
+
+fs::path Cache::temporary() const {
+  static std::atomic<unsigned> count{0};
+  return folder_ / "new" / fmt::format("{}-{}", ::getpid(), count++);
+}
+
+bool Cache::has(const std::string& key) const {
+  std::error_code error;
+  return fs::is_regular_file(place(key, kEntry), error);
+}
+
+std::optional<CachedStep> Cache::step(const std::string& key) const {
+  try {
+    const Json json = readEntry(place(key, kEntry));
+    CachedStep step{.action = json.at("action").get<std::string>(),
+                    .notes = notesOf(json.at("step")),
+                    .output = json.at("output").get<std::string>(),
+                    .files = {}};
+    for (const Json& f : json.at("files"))
+      step.files.push_back({f.at("path").get<std::string>(), f.at("size").get<std::uint64_t>(),
+                            f.at("inode").get<std::uint64_t>(), f.at("device").get<std::uint64_t>(),
+                            f.at("changed").get<std::int64_t>()});
+    touch(place(key, kEntry));
+    return step;
+  } catch (const std::exception&) {  // damaged
+    return {};
+  }
+}
+
+std::optional<Value> Cache::value(const std::string& key, std::size_t maxMemory) const {
+  try {
+    const Json json = readEntry(place(key, kEntry));
+    const std::string kind = json.at("kind").get<std::string>();
+    if (kind == kindName(Kind::Mesh)) {
+      levelset::TriMesh mesh;
+      if (!readMeshBytes(contentsOf(place(key, kMesh)), mesh)) return {};
+      return Value(std::move(mesh));
+    }
+    const levelset::ReadBandOptions options{.grid = json.at("grid").get<std::string>(),
+                                            .maxMemory = maxMemory};
+    Value value = kind == kindName(Kind::Field)
+                      ? Value(levelset::readField(place(key, kGrid), options))
+                      : Value(levelset::readBand(place(key, kGrid), options));
+    if (hashOf(value) != json.at("hash").get<std::uint64_t>()) return {};
+    return value;
+  } catch (const levelset::ResourceLimit&) {
+    throw;
+  } catch (const levelset::Cancelled&) {
+    throw;
+  } catch (const std::exception&) {  // damaged
+    return {};
+  }
+}
+
+std::string Cache::put(const std::string& key, const CachedStep& step, const Value* value) const {
+  const fs::path whole = temporary(), entry = temporary();
+  try {
+    Json json = {{"version", kCacheVersion},
+                 {"action", step.action},
+                 {"step", notesJson(step.notes)},
+                 {"output", step.output},
+                 {"files", Json::array()}};
+    for (const FileStamp& file : step.files)
+      json["files"].push_back({{"path", file.path},
+                               {"size", file.size},
+                               {"inode", file.inode},
+                               {"device", file.device},
+                               {"changed", file.changed}});
+    if (value) {
+      json["kind"] = kindName(value->kind());
+      json["hash"] = hashOf(*value);
+      const char* extension = kGrid;
+      if (value->kind() == Kind::Mesh) {
+        extension = kMesh;
+        std::ofstream out(whole, std::ios::binary);
+        const std::string bytes = bytesOf(value->mesh());
+        out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+        if (!out.flush()) throw levelset::IoError("the disk is full");
+      } else if (value->kind() == Kind::Field) {
+        json["grid"] = value->field().name();
+        levelset::writeField(whole, value->field(),
+                             {.name = value->field().name(), .format = "vdb"});
+      } else {
+        json["grid"] = value->band().name();
+        levelset::writeBand(whole, value->band(), {.name = value->band().name(), .format = "vdb"});
+      }
+      json["bytes"] = fs::file_size(whole);
+      fs::rename(whole, place(key, extension));
+    }
+    std::ofstream out(entry, std::ios::binary);
+    out << textOf(json);
+    out.close();
+    if (!out) throw levelset::IoError("the disk is full");
+    fs::rename(entry, place(key, kEntry));
+    return {};
+  } catch (const levelset::Cancelled&) {
+    std::error_code ignored;
+    fs::remove(whole, ignored);
+    throw;
+  } catch (const std::exception& error) {
+    std::error_code ignored;
+    fs::remove(whole, ignored);
+    fs::remove(entry, ignored);
+    return fmt::format("--cache: the result of '{}' was not kept: {}", step.action, error.what());
+  }
+}
+
+std::optional<std::string> Cache::memo(const std::string& name) const {
+  const fs::path file = folder_ / "files" / name;
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return {};
+  std::string text = contentsOf(file);
+  if (text.size() < 2 || text.back() != '\n') return {};  // cut off
+  text.pop_back();
+  return text;
+}
+
+void Cache::remember(const std::string& name, const std::string& text) const {
+  const fs::path file = temporary();
+  std::error_code ignored;
+  std::ofstream out(file, std::ios::binary);
+  out << text << '\n';
+  out.close();
+  if (out) fs::rename(file, folder_ / "files" / name, ignored);
+  fs::remove(file, ignored);
+}
+
+std::vector<Cache::Entry> Cache::list() const {
+  std::vector<Entry> entries;
+  std::error_code error;
+  for (const fs::directory_entry& item : fs::directory_iterator(folder_ / "results", error)) {
+    if (item.path().extension() != kEntry) continue;
+    Entry entry;
+    entry.key = item.path().stem().string();
+    struct stat about;
+    if (::stat(item.path().c_str(), &about) != 0) continue;  // gone meanwhile
+    entry.used = nanoseconds(about.st_mtim);
+    entry.bytes = static_cast<std::uint64_t>(about.st_size);
+    for (const char* extension : {kGrid, kMesh})
+      if (::stat(place(entry.key, extension).c_str(), &about) == 0)
+        entry.bytes += static_cast<std::uint64_t>(about.st_size);
+    const std::optional<CachedStep> known = [&]() -> std::optional<CachedStep> {
+      try {
+        return CachedStep{readEntry(item.path()).at("action").get<std::string>(), {}, {}, {}};
+      } catch (const std::exception&) {
+        return {};
+      }
+    }();
+    entry.action = known ? known->action : "damaged";
+    entries.push_back(std::move(entry));
+  }
+  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+    return a.used != b.used ? a.used > b.used : a.key < b.key;
+  });
+  return entries;
+}
+
+std::size_t Cache::shrink(std::uint64_t mostBytes) const {
+  std::error_code ignored;
+  std::uint64_t kept = 0;
+  std::size_t gone = 0;
+  for (const Entry& entry : list()) {
+    if (entry.action != "damaged" && kept + entry.bytes <= mostBytes) {
+      kept += entry.bytes;
+      continue;
+    }
+    for (const char* extension : {kEntry, kGrid, kMesh})
+      fs::remove(place(entry.key, extension), ignored);
+    ++gone;
+  }
+  // Values without an entry, and files of processes that are no more. Those that live may be about
+  // to write the entry: an hour is enough for that.
+  constexpr auto kLongEnough = std::chrono::hours(1);
+  const auto isOld = [&](const fs::path& file) {
+    const auto written = fs::last_write_time(file, ignored);
+    return !ignored && fs::file_time_type::clock::now() - written > kLongEnough;
+  };
+  for (const fs::directory_entry& item : fs::directory_iterator(folder_ / "results", ignored))
+    if (item.path().extension() != kEntry && !has(item.path().stem().string()) &&
+        isOld(item.path()))
+      fs::remove(item.path(), ignored);
+  for (const fs::directory_entry& item : fs::directory_iterator(folder_ / "new", ignored)) {
+    const int process = std::atoi(item.path().filename().c_str());
+    if (process > 0 && ::kill(process, 0) != 0 && errno == ESRCH) fs::remove(item.path(), ignored);
+  }
+  return gone;
+}
+
+}  // namespace pipeline

@@ -1,0 +1,171 @@
+#include "apps/pipeline/cache/cache_key.h"
+
+#include <dlfcn.h>
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
+#include "apps/pipeline/values/digest.h"
+#include "apps/pipeline/values/mesh_bytes.h"
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+#include "levelset/files/band_file.h"
+
+namespace pipeline {
+namespace {
+
+/// Texts that do not run into each other.
+void add(std::string& to, const std::string& what, const std::string& text) {
+  to += fmt::format("{}:{}:{}\n", what, text.size(), text);
+}
+
+std::string lowerExtension(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension;
+}
+
+std::optional<std::string> digestOfFile(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return {};
+  const std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  if (in.bad()) return {};
+  return digestOf(bytes);
+}
+
+std::string stampText(const FileStamp& stamp) {
+  return fmt::format("{} {} {} {}", stamp.size, stamp.inode, stamp.device, stamp.changed);
+}
+
+/// The file that this code is in: results of another program are another one's.
+std::filesystem::path programFile() {
+  Dl_info about;
+  const bool isKnown =
+      dladdr(reinterpret_cast<const void*>(&findOperator), &about) != 0 && about.dli_fname;
+  const std::filesystem::path file = isKnown ? about.dli_fname : "";
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(file, ignored) ? file : "/proc/self/exe";
+}
+
+}  // namespace
+
+CacheKeys::CacheKeys(const Cache& cache, std::size_t maxMemory)
+    : cache_(cache), maxMemory_(maxMemory) {
+  const std::filesystem::path file = programFile();
+  const std::optional<FileStamp> stamp = stampOf(file);
+  const std::string name = stamp ? "program-" + digestOf(stampText(*stamp)) : "";
+  if (stamp)
+    if (const auto known = cache.memo(name)) program_ = *known;
+  if (!program_.empty()) return;
+  program_ = digestOfFile(file).value_or(LEVELSMITH_VERSION);
+  if (stamp) cache.remember(name, program_);
+}
+
+std::optional<std::string> CacheKeys::contentOf(const std::filesystem::path& file,
+                                                const Node& node) const {
+  const std::optional<FileStamp> stamp = stampOf(file);
+  const std::string extension = lowerExtension(file);
+  if (!stamp || extension == ".json") return {};  // it names files that it does not hold
+  std::string about = stampText(*stamp);
+  const bool isGrid = extension == ".vdb";
+  const auto grid = node.options.find("grid");
+  if (isGrid && grid != node.options.end()) about += " " + grid->second;
+  const std::string name = digestOf(about);
+  if (auto known = cache_.memo(name)) return known;
+  std::optional<std::string> content;
+  if (isGrid) {
+    // Files of one tree differ wherever they were written.
+    try {
+      const levelset::BandOrField read = levelset::readGrid(
+          file, {.grid = grid == node.options.end() ? "" : grid->second, .maxMemory = maxMemory_});
+      content = std::visit(
+          [](const auto& of) { return fmt::format("grid {:016x}", of.contentHash()); }, read);
+    } catch (const levelset::Cancelled&) {
+      throw;
+    } catch (const levelset::Error&) {
+      return {};  // the action will say what is wrong with it
+    }
+  } else {
+    content = digestOfFile(file);
+  }
+  if (content) cache_.remember(name, *content);
+  return content;
+}
+
+std::optional<std::string> CacheKeys::keyOf(
+    const Graph& graph, const Node& node,
+    const std::vector<std::optional<std::string>>& before) const {
+  const Operator& op = *node.op;
+  if (!op.isRepeatable) return {};
+  const Invocation probe(op, node.options);
+  if (op.usesStandardInput && op.usesStandardInput(probe)) return {};
+  std::string text;
+  add(text, "program", program_);
+  add(text, "action", op.name);
+  std::vector<std::string> targets;
+  if (op.targets) targets = op.targets(probe);
+  if (node.makes() && !targets.empty()) return {};
+  for (const Param& param : op.params) {
+    const auto given = node.options.find(param.name);
+    if (given == node.options.end() || node.named.contains(param.name)) continue;
+    const std::string& value = given->second;
+    if (param.type != ParamType::Path) {
+      add(text, param.name, value);
+      continue;
+    }
+    if (std::find(targets.begin(), targets.end(), value) != targets.end()) {
+      const std::filesystem::path file = levelset::canonicalFile(value);
+      if (file.empty() || lowerExtension(file) == ".json") return {};
+      add(text, param.name, file.string());
+      continue;
+    }
+    const std::optional<std::string> content = contentOf(value, node);
+    if (!content) return {};
+    add(text, param.name, *content);
+    add(text, "of", lowerExtension(value));
+  }
+  for (const std::size_t input : node.inputs) {
+    if (!before[input]) return {};
+    add(text, "takes", *before[input]);
+    if (op.readsNames) add(text, "named", graph.nodes[input].name);
+  }
+  for (const auto& [option, input] : node.named) {
+    if (!before[input]) return {};
+    add(text, option + " takes", *before[input]);
+  }
+  return digestOf(text);
+}
+
+std::optional<std::string> CacheKeys::keyOf(const Value& given) const {
+  std::string text;
+  add(text, "program", program_);
+  add(text, "given", kindName(given.kind()));
+  if (given.kind() == Kind::Mesh) {
+    add(text, "mesh", digestOf(bytesOf(given.mesh())));
+  } else if (given.kind() == Kind::Field) {
+    add(text, "field", fmt::format("{:016x}", given.field().contentHash()));
+  } else if (given.kind() == Kind::Band) {
+    add(text, "band", fmt::format("{:016x}", given.band().contentHash()));
+  } else {
+    return {};
+  }
+  return digestOf(text);
+}
+
+std::vector<std::optional<std::string>> CacheKeys::of(const Graph& graph,
+                                                      const std::vector<char>& needed) const {
+  std::vector<std::optional<std::string>> keys(graph.nodes.size());
+  const auto writers = findWritersRead(graph, needed);
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    if (!needed[i] || writers[i]) continue;
+    const auto given = graph.given.find(i);
+    keys[i] =
+        given == graph.given.end() ? keyOf(graph, graph.nodes[i], keys) : keyOf(given->second);
+  }
+  return keys;
+}
+
+}  // namespace pipeline

@@ -1,0 +1,387 @@
+#include "apps/pipeline/grammar/chain.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+
+#include "apps/pipeline/grammar/script.h"
+#include "apps/pipeline/graph/graph_file.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/values/units.h"
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::UsageError;
+
+/// `--name`, but not a negative number, a bare `-` or an operand.
+bool isOption(const std::string& token) {
+  return token.size() > 1 && token[0] == '-' &&
+         !(token[1] == '.' || (token[1] >= '0' && token[1] <= '9'));
+}
+
+std::vector<std::string> namesOf(const std::vector<Param>& params) {
+  std::vector<std::string> names;
+  for (const Param& param : params) names.push_back(param.name);
+  return names;
+}
+
+bool findIn(const std::vector<Param>& params, const std::string& name) {
+  return std::any_of(params.begin(), params.end(), [&](const Param& p) { return p.name == name; });
+}
+
+/// By full name, or by a beginning that only one parameter has.
+const Param& matchParam(const std::vector<Param>& params, const std::string& name,
+                        const std::string& who) {
+  std::vector<const Param*> begun;
+  for (const Param& param : params) {
+    if (param.name == name) return param;
+    if (!name.empty() && param.name.starts_with(name)) begun.push_back(&param);
+  }
+  if (begun.size() == 1) return *begun[0];
+  std::string hint;
+  if (begun.size() > 1) {
+    hint = fmt::format("; it may mean --{} or --{}", begun[0]->name, begun[1]->name);
+  } else if (const std::string guess = didYouMean(name, namesOf(params)); !guess.empty()) {
+    hint = fmt::format("; did you mean --{}?", guess);
+  } else if (who != "levelsmith" && findIn(globalParams(), name)) {
+    hint = fmt::format("; --{} belongs before the first action", name);
+  } else if (who != "levelsmith") {
+    hint = fmt::format("; `levelsmith help {}` lists its options", who);
+  } else {
+    hint = "; `levelsmith help` lists the options";
+  }
+  throw UsageError(fmt::format("{}: there is no option --{}{}", who, name, hint));
+}
+
+struct Reader {
+  const std::vector<std::string>& tokens;
+  const Script* script = nullptr;  // that the tokens are from
+  bool isStandardInput = false;    // was a script read from there?
+  std::size_t next = 0;
+
+  [[nodiscard]] bool atEnd() const { return next >= tokens.size(); }
+  [[nodiscard]] bool atBang() const { return !atEnd() && tokens[next] == "!"; }
+
+  /// Reads `--name value`, `--name=value` or a flag into `options`.
+  void readOption(const std::vector<Param>& params, const std::string& who,
+                  std::map<std::string, std::string>& options) {
+    std::string token = tokens[next++];
+    if (token == "-v") token = "--verbose";
+    if (token == "-q") token = "--quiet";
+    if (!token.starts_with("--")) {
+      throw UsageError(
+          fmt::format("{}: '{}' is not an option; options begin with two dashes", who, token));
+    }
+    const std::size_t equals = token.find('=');
+    const Param& param =
+        matchParam(params, token.substr(2, equals == std::string::npos ? equals : equals - 2), who);
+    const std::string where = who + ": --" + param.name;
+    if (options.contains(param.name)) throw UsageError(where + ": is given twice");
+    if (param.type == ParamType::Flag) {
+      if (equals != std::string::npos) throw UsageError(where + ": is a flag and takes no value");
+      options[param.name] = "true";
+      return;
+    }
+    std::string value;
+    if (equals != std::string::npos) {
+      value = token.substr(equals + 1);
+    } else {
+      if (atEnd() || atBang() || tokens[next].starts_with("--")) {
+        throw UsageError(
+            fmt::format("{}: needs a value: --{} {}", where, param.name, valueForm(param)));
+      }
+      value = tokens[next++];
+    }
+    checkText(param, value, where);
+    options[param.name] = value;
+  }
+};
+
+const Operator& matchOperator(const std::string& name) {
+  if (const Operator* op = findOperator(name)) return *op;
+  std::vector<std::string> names{"help", "run"};
+  for (const Operator& op : operators()) names.push_back(op.name);
+  if (name == "help") {
+    throw UsageError(
+        "levelsmith: help stands alone: `levelsmith help` or `levelsmith help ACTION`");
+  }
+  if (name == runOperator().name)
+    throw UsageError("run: stands alone, behind global options only: `levelsmith run FILE`");
+  const std::string guess = didYouMean(name, names);
+  throw UsageError(fmt::format("levelsmith: there is no action '{}'{}", name,
+                               guess.empty() ? "; `levelsmith help` lists them"
+                                             : fmt::format("; did you mean '{}'?", guess)));
+}
+
+std::string operandName(const std::string& token, const std::string& who) {
+  if (token.size() < 2) throw UsageError(fmt::format("{}: '@' needs a name behind it", who));
+  return token.substr(1);
+}
+
+/// An action as it was written.
+struct Action {
+  const Operator* op = nullptr;
+  std::map<std::string, std::string> options;  // by full name; a flag is "true"
+  std::vector<std::string> operandNames;       // `@NAME`, without the @
+  std::string resultName;                      // --as
+  std::string place;                           // in a script
+};
+
+Action readAction(Reader& reader) {
+  Action action;
+  action.op = &matchOperator(reader.tokens[reader.next++]);
+  const Operator& op = *action.op;
+  std::vector<Param> params = op.params;
+  if (op.flow == Flow::Makes)
+    params.push_back({.name = "as", .type = ParamType::Text, .doc = "name the result"});
+  std::vector<std::string> positional;
+  while (!reader.atEnd() && !reader.atBang()) {
+    const std::string& token = reader.tokens[reader.next];
+    if (token.starts_with('@')) {
+      action.operandNames.push_back(operandName(token, op.name));
+      ++reader.next;
+    } else if (isOption(token)) {
+      reader.readOption(params, op.name, action.options);
+    } else {
+      positional.push_back(token);
+      ++reader.next;
+    }
+  }
+  for (std::size_t i = 0; i < positional.size(); ++i) {
+    const auto param = std::find_if(op.params.begin(), op.params.end(), [&](const Param& p) {
+      return p.position == static_cast<int>(i);
+    });
+    if (param == op.params.end()) {
+      throw UsageError(
+          fmt::format("{}: what is '{}' for? separate actions with a lone '!', name operands "
+                      "with '@'",
+                      op.name, positional[i]));
+    }
+    const std::string where = op.name + ": " + param->name;
+    if (action.options.contains(param->name)) throw UsageError(where + ": is given twice");
+    checkText(*param, positional[i], where);
+    action.options[param->name] = positional[i];
+  }
+  for (const Param& param : op.params) {
+    if (param.required && !action.options.contains(param.name)) {
+      throw UsageError(fmt::format("{}: needs {}{} {}", op.name, param.position >= 0 ? "" : "--",
+                                   param.name, valueForm(param)));
+    }
+  }
+  if (const auto it = action.options.find("as"); it != action.options.end()) {
+    action.resultName = it->second.starts_with('@') ? it->second.substr(1) : it->second;
+    action.options.erase(it);
+  }
+  return action;
+}
+
+/// Follows values through the chain: they live on a stack, and by name for good.
+class ChainBuilder {
+ public:
+  /// @param voxelsFollow  do voxel sizes that are left out follow from --tolerance?
+  ChainBuilder(std::vector<Node>& nodes, bool voxelsFollow)
+      : nodes_(nodes), voxelsFollow_(voxelsFollow) {}
+
+  void add(const Action& action) {
+    Node node;
+    node.op = action.op;
+    node.options = action.options;
+    node.name = action.resultName;
+    node.place = action.place;
+    node.inputs = takeOperands(action);
+    for (const auto& [option, text] : action.options)
+      if (const Param* param = action.op->find(option); param && namesValue(*param, text))
+        node.named.emplace(option, nodeOf(text.substr(1), *action.op));
+    if (voxelsFollow_) leaveVoxelOpen(node);
+    node.kind = checkNode(node, nodes_);
+    if (node.makes()) {
+      stack_.push_back(nodes_.size());
+      if (!node.name.empty() && !names_.emplace(node.name, nodes_.size()).second) {
+        throw UsageError(
+            fmt::format("{}: the name '{}' is taken; values do not change, so choose another",
+                        node.op->name, node.name));
+      }
+    }
+    nodes_.push_back(std::move(node));
+  }
+
+ private:
+  [[nodiscard]] std::size_t nodeOf(const std::string& name, const Operator& op) const {
+    const auto it = names_.find(name);
+    if (it != names_.end()) return it->second;
+    std::vector<std::string> known;
+    for (const auto& entry : names_) known.push_back(entry.first);
+    const std::string guess = didYouMean(name, known);
+    throw UsageError(fmt::format("{}: nothing is named '@{}'{}", op.name, name,
+                                 guess.empty() ? "; give an earlier result that name with --as"
+                                               : fmt::format("; did you mean '@{}'?", guess)));
+  }
+
+  /// Those that are named come last; what is missing before them comes off the stack, and stays
+  /// there where the action passes it through.
+  std::vector<std::size_t> takeOperands(const Action& action) {
+    std::vector<std::size_t> named;
+    for (const std::string& name : action.operandNames) named.push_back(nodeOf(name, *action.op));
+    const std::size_t wanted = action.op->operands.size();
+    if (named.size() >= wanted) return named;
+    const std::size_t missing = wanted - named.size();
+    if (stack_.size() < missing && action.op->operandsOptional) return named;
+    const std::size_t taken = std::min(missing, stack_.size());
+    std::vector<std::size_t> operands(stack_.end() - static_cast<std::ptrdiff_t>(taken),
+                                      stack_.end());
+    if (action.op->flow == Flow::Makes) stack_.resize(stack_.size() - taken);
+    operands.insert(operands.end(), named.begin(), named.end());
+    return operands;
+  }
+
+  std::vector<Node>& nodes_;
+  bool voxelsFollow_;
+  std::vector<std::size_t> stack_;
+  std::map<std::string, std::size_t> names_;
+};
+
+using StreamUse = std::function<bool(const Invocation&)> Operator::*;
+
+/// Two actions that claim the same standard stream for data would garble each other.
+void checkStandardStream(const Graph& graph, StreamUse use, const char* stream,
+                         std::string firstUser) {
+  for (const Node& node : graph.nodes) {
+    const auto& claims = node.op->*use;
+    if (!claims || !claims(Invocation(*node.op, node.options))) continue;
+    if (!firstUser.empty()) {
+      throw UsageError(
+          fmt::format("{}: standard {} is used already, by {}; use a file for one of them",
+                      node.op->name, stream, firstUser));
+    }
+    firstUser = "'" + node.op->name + "'";
+  }
+}
+
+void checkStandardStreams(const Graph& graph, bool isScriptFromInput) {
+  const auto report = graph.globals.find("report");
+  const bool reportsThere =
+      report != graph.globals.end() && levelset::isStandardOutput(report->second);
+  checkStandardStream(graph, &Operator::usesStandardOutput, "output",
+                      reportsThere ? "--report" : "");
+  checkStandardStream(graph, &Operator::usesStandardInput, "input",
+                      isScriptFromInput ? "'run'" : "");
+}
+
+}  // namespace
+
+namespace {
+
+/// @param outer  global options that stand before the `run` of these words, and win
+Graph parse(Reader& reader, bool mayRun, const std::map<std::string, std::string>& outer);
+
+/// What stands behind `run`.
+struct ScriptCall {
+  std::string file;
+  std::map<std::string, std::string> settings;
+};
+
+ScriptCall readCall(Reader& reader) {
+  ScriptCall call;
+  for (++reader.next; !reader.atEnd();) {
+    const std::string& token = reader.tokens[reader.next];
+    if (isOption(token)) {
+      std::map<std::string, std::string> option;
+      reader.readOption(runOperator().params, "run", option);
+      const std::string text = option.at("set");
+      const std::size_t equals = std::min(text.find('='), text.size());
+      if (equals == 0 || equals == text.size())
+        throw UsageError(fmt::format("run: --set: '{}' is not NAME=VALUE", text));
+      if (!call.settings.emplace(text.substr(0, equals), text.substr(equals + 1)).second)
+        throw UsageError(fmt::format("run: --set: '{}' is given twice", text.substr(0, equals)));
+    } else if (call.file.empty() && token != "!") {
+      call.file = token;
+      ++reader.next;
+    } else {
+      throw UsageError(
+          "run: takes one file, and nothing behind it but --set NAME=VALUE; write the further "
+          "actions into the file");
+    }
+  }
+  if (call.file.empty())
+    throw UsageError("run: takes one file: `levelsmith run FILE`, or - for standard input");
+  return call;
+}
+
+Graph parseLines(const Script& script, const std::map<std::string, std::string>& outer) {
+  Reader reader{script.words, &script};
+  try {
+    return parse(reader, false, outer);
+  } catch (const UsageError& error) {
+    // The reader stands behind the action that failed.
+    const std::size_t word = std::min(reader.next, script.words.size());
+    throw UsageError(fmt::format("{} ({})", error.what(), script.place(word > 0 ? word - 1 : 0)));
+  }
+}
+
+/// `run FILE`: the chain that the file holds. Global options of the command line come first.
+Graph parseFile(Reader& reader, const Graph& before) {
+  const ScriptCall call = readCall(reader);
+  if (isGraphFile(call.file)) {
+    if (!call.settings.empty())
+      throw UsageError(
+          fmt::format("run: --set says nothing to '{}'; a graph has no variables", call.file));
+    return readGraph(call.file, before.globals);
+  }
+  Graph graph = parseLines(readScript(call.file, call.settings), before.globals);
+  reader.isStandardInput = call.file == "-";
+  return graph;
+}
+
+Graph parse(Reader& reader, bool mayRun, const std::map<std::string, std::string>& outer) {
+  const std::vector<std::string>& tokens = reader.tokens;
+  Graph graph;
+  while (!reader.atEnd() && isOption(tokens[reader.next]))
+    reader.readOption(globalParams(), "levelsmith", graph.globals);
+  if (!reader.atEnd() && tokens[reader.next] == runOperator().name) {
+    if (mayRun) return parseFile(reader, graph);
+    throw UsageError("run: a file of actions cannot run another one; put its actions here");
+  }
+  for (const auto& [name, value] : outer) graph.globals[name] = value;
+  ChainBuilder builder(graph.nodes, graph.globals.contains("tolerance"));
+  while (!reader.atEnd()) {
+    if (reader.atBang()) {
+      throw UsageError(
+          fmt::format("levelsmith: there is no action {} the '!' at word {}",
+                      reader.next == 0 || graph.nodes.empty() ? "before" : "between this and",
+                      reader.next + 1));
+    }
+    const std::size_t first = reader.next;
+    Action action = readAction(reader);
+    if (reader.script) action.place = reader.script->place(first);
+    builder.add(action);
+    if (reader.atBang()) {
+      ++reader.next;
+      if (reader.atEnd()) throw UsageError("levelsmith: an action must follow the last '!'");
+    }
+  }
+  if (graph.nodes.empty())
+    throw UsageError("levelsmith: nothing to do; `levelsmith help` shows how to begin");
+  return graph;
+}
+
+}  // namespace
+
+Graph parseChain(const std::vector<std::string>& tokens) {
+  Reader reader{tokens};
+  Graph graph = parse(reader, true, {});
+  checkStandardStreams(graph, reader.isStandardInput);
+  return graph;
+}
+
+Graph parseScript(const Script& script) {
+  Graph graph = parseLines(script, {});
+  checkStandardStreams(graph, false);
+  return graph;
+}
+
+}  // namespace pipeline

@@ -1,0 +1,228 @@
+#include "apps/pipeline/graph/graph.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "apps/pipeline/registry/invocation.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::UsageError;
+
+std::string mismatch(const Operator& op, std::size_t index, Kind found,
+                     const std::vector<Kind>& allowed) {
+  const char* remedy = "";
+  if (found == Kind::Mesh && allowed == std::vector{Kind::Band})
+    remedy = "; put 'level-set' before it";
+  if (found == Kind::Band && allowed == std::vector{Kind::Mesh}) remedy = "; put 'mesh' before it";
+  if (found == Kind::Surface)
+    remedy = "; it has no inside, and is the base of patches and of 'texture --alone' only";
+  if (found == Kind::Patch) remedy = "; 'texture' makes a level set with it";
+  if (found == Kind::Scene) remedy = "; 'render' draws it, 'write' saves it as .json";
+  std::string kinds;
+  for (std::size_t i = 0; i < allowed.size(); ++i)
+    kinds += fmt::format("{}a {}",
+                         i == 0                    ? ""
+                         : i + 1 == allowed.size() ? " or "
+                                                   : ", ",
+                         kindName(allowed[i]));
+  return fmt::format("{}: operand {} is a {}, {} is needed{}", op.name, index + 1, kindName(found),
+                     kinds, remedy);
+}
+
+void checkOperands(const Node& node, const std::vector<Node>& before) {
+  const Operator& op = *node.op;
+  const std::size_t wanted = op.operands.size(), found = node.inputs.size();
+  if (found > wanted && !op.takesMore) {
+    throw UsageError(fmt::format("{}: takes {} operand{}, not {}", op.name, wanted,
+                                 wanted == 1 ? "" : "s", found));
+  }
+  if (found < wanted && !op.operandsOptional) {
+    throw UsageError(
+        fmt::format("{}: needs {} operand{} and finds {}; read or make {} first, or name {} with "
+                    "'@'",
+                    op.name, wanted, wanted == 1 ? "" : "s", found,
+                    wanted - found == 1 ? "one" : "them", wanted - found == 1 ? "it" : "them"));
+  }
+  for (std::size_t i = 0; i < found; ++i) {
+    const std::vector<Kind>& allowed = op.operands[std::min(i, wanted - 1)];
+    const Kind kind = before[node.inputs[i]].kind;
+    if (std::find(allowed.begin(), allowed.end(), kind) == allowed.end())
+      throw UsageError(mismatch(op, i, kind, allowed));
+  }
+}
+
+void checkNamed(const Node& node, const std::vector<Node>& before) {
+  for (const auto& [option, number] : node.named) {
+    const Node& value = before[number];
+    const bool isScalar = node.op->find(option)->type == ParamType::Scalar;
+    if (value.kind == Kind::Field || (isScalar && value.kind == Kind::Band)) continue;
+    throw UsageError(fmt::format("{}: --{}: '@{}' is a {}, a {} is needed", node.op->name, option,
+                                 value.name, kindName(value.kind),
+                                 isScalar ? "field or a level set" : "field"));
+  }
+}
+
+std::vector<std::string> targetsOf(const Node& node) {
+  if (!node.op->targets) return {};
+  return node.op->targets(Invocation(*node.op, node.options));
+}
+
+struct FileRead {
+  std::string name;
+  bool standsForOthers = false;  ///< a scene names files that it does not hold, a '#' numbers
+};
+
+std::vector<FileRead> filesRead(const Node& node) {
+  const std::vector<std::string> targets = targetsOf(node);
+  const auto format = node.options.find("format");
+  const bool isJson = format != node.options.end() && format->second == "json";
+  std::vector<FileRead> files;
+  for (const Param& param : node.op->params) {
+    if (param.type != ParamType::Path) continue;
+    const auto given = node.options.find(param.name);
+    if (given == node.options.end()) continue;
+    const std::string& name = given->second;
+    if (std::find(targets.begin(), targets.end(), name) == targets.end())
+      files.push_back({name, isJson || std::filesystem::path(name).extension() == ".json" ||
+                                 name.find('#') != std::string::npos});
+  }
+  return files;
+}
+
+/// What nodes write, and which of them was added last.
+class Written {
+ public:
+  void add(const Graph& graph, std::size_t writer) {
+    const Node& node = graph.nodes[writer];
+    // A scene has files of its solids beside it.
+    const bool isScene =
+        std::any_of(node.inputs.begin(), node.inputs.end(),
+                    [&](std::size_t input) { return graph.nodes[input].kind == Kind::Scene; });
+    for (const std::string& target : targetsOf(node)) {
+      if (target == "-") continue;
+      const std::filesystem::path place = placeOf(target);
+      writers_[isScene ? place.parent_path() : place] = writer;
+      last_ = writer;
+    }
+  }
+
+  /// Itself, or a folder that it is in.
+  [[nodiscard]] std::optional<std::size_t> find(const FileRead& file) const {
+    if (!last_ || file.standsForOthers) return last_;
+    std::optional<std::size_t> found;
+    for (std::filesystem::path place = placeOf(file.name);; place = place.parent_path()) {
+      if (const auto it = writers_.find(place); it != writers_.end())
+        found = std::max(found, std::optional(it->second));
+      if (!place.has_relative_path()) return found;
+    }
+  }
+
+ private:
+  static std::filesystem::path placeOf(const std::string& file) {
+    std::error_code ignored;
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(file, ignored), ignored);
+  }
+
+  std::map<std::filesystem::path, std::size_t> writers_;
+  std::optional<std::size_t> last_;
+};
+
+}  // namespace
+
+const Operator& givenOperator() {
+  static const Operator op{.name = "given",
+                           .group = "",
+                           .summary = "a value that was made elsewhere",
+                           .isRepeatable = false};
+  return op;
+}
+
+void leaveVoxelOpen(Node& node) {
+  const bool canBeTold = node.op->find("voxel") && node.op->find("resolution");
+  node.voxelFollows =
+      canBeTold && !node.options.contains("voxel") && !node.options.contains("resolution");
+}
+
+Kind checkNode(const Node& node, const std::vector<Node>& before) {
+  const Operator& op = *node.op;
+  checkOperands(node, before);
+  checkNamed(node, before);
+  Invocation probe(op, node.options);
+  probe.voxelFollows = node.voxelFollows;
+  for (const std::size_t input : node.inputs)
+    probe.operands.emplace_back(Plan{.kind = before[input].kind});
+  if (op.validate) op.validate(probe);
+  return node.makes() && op.resultKind ? op.resultKind(probe) : Kind::Band;
+}
+
+std::vector<char> neededNodes(const Graph& graph) {
+  const std::vector<Node>& nodes = graph.nodes;
+  // An operator that makes a value and writes files beside it is not there for the value alone.
+  const auto actsOutside = [](const Node& node) {
+    return !node.makes() || !targetsOf(node).empty();
+  };
+  std::vector<char> needed(nodes.size(), 0);
+  for (std::size_t i = 0; i < nodes.size(); ++i) needed[i] = actsOutside(nodes[i]) ? 1 : 0;
+  for (const std::size_t result : graph.results) needed[result] = 1;
+  if (std::find(needed.begin(), needed.end(), 1) == needed.end())
+    return std::vector<char>(nodes.size(), 1);
+  for (std::size_t i = nodes.size(); i-- > 0;) {
+    if (!needed[i]) continue;
+    for (const std::size_t input : nodes[i].inputs) needed[input] = 1;
+    for (const auto& [option, input] : nodes[i].named) needed[input] = 1;
+  }
+  return needed;
+}
+
+std::vector<std::optional<std::size_t>> findWritersRead(const Graph& graph,
+                                                        const std::vector<char>& needed) {
+  std::vector<std::optional<std::size_t>> writers(graph.nodes.size());
+  Written written;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    if (!needed[i]) continue;
+    for (const FileRead& file : filesRead(graph.nodes[i]))
+      writers[i] = std::max(writers[i], written.find(file));
+    written.add(graph, i);
+  }
+  return writers;
+}
+
+std::vector<char> findOverwritten(const Graph& graph, const std::vector<char>& needed) {
+  std::vector<char> is(graph.nodes.size(), 0);
+  Written behind;
+  for (std::size_t i = graph.nodes.size(); i-- > 0;) {
+    if (!needed[i]) continue;
+    for (const FileRead& file : filesRead(graph.nodes[i]))
+      if (behind.find(file)) is[i] = 1;
+    behind.add(graph, i);
+  }
+  return is;
+}
+
+bool readsOnce(const Node& node) {
+  const Invocation probe(*node.op, node.options);
+  if (node.op->usesStandardInput && node.op->usesStandardInput(probe)) return true;
+  return std::any_of(node.op->params.begin(), node.op->params.end(), [&](const Param& param) {
+    std::error_code ignored;
+    const auto given = node.options.find(param.name);
+    return param.type == ParamType::Path && given != node.options.end() &&
+           std::filesystem::is_other(std::filesystem::status(given->second, ignored));
+  });
+}
+
+std::vector<std::size_t> countUses(const Graph& graph, const std::vector<char>& needed) {
+  std::vector<std::size_t> uses(graph.nodes.size(), 0);
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    if (!needed[i]) continue;
+    for (const std::size_t input : graph.nodes[i].inputs) ++uses[input];
+    for (const auto& [option, input] : graph.nodes[i].named) ++uses[input];
+  }
+  return uses;
+}
+
+}  // namespace pipeline

@@ -1,0 +1,65 @@
+#include "apps/pipeline/operators/fields.h"
+
+#include <fmt/core.h>
+
+#include "levelset/error.h"
+#include "levelset/fields/expression.h"
+#include "levelset/fields/grid.h"
+
+namespace pipeline {
+
+levelset::ScalarField scalarField(const Invocation& in, const std::string& param) {
+  const std::string where = in.where(param);
+  const auto named = in.named.find(param);
+  if (named == in.named.end()) return levelset::scalarExpression(in.text(param), where.c_str());
+  if (named->second.kind() == Kind::Band) return levelset::asScalarField(named->second.band());
+  return levelset::asScalarField(named->second.field(), where.c_str());
+}
+
+levelset::VectorField vectorField(const Invocation& in, const std::string& param) {
+  const std::string where = in.where(param);
+  const auto named = in.named.find(param);
+  if (named == in.named.end()) return levelset::vectorExpression(in.text(param), where.c_str());
+  return levelset::asVectorField(named->second.field(), where.c_str());
+}
+
+std::vector<Param> maskParams() {
+  return {{.name = "mask",
+           .type = ParamType::Scalar,
+           .doc = "where to act: not below --mask-min, fully from --mask-max on"},
+          {.name = "mask-min",
+           .type = ParamType::Number,
+           .doc = "value of the mask up to which nothing changes",
+           .fallback = "0"},
+          {.name = "mask-max",
+           .type = ParamType::Number,
+           .doc = "value of the mask from which on it acts fully",
+           .fallback = "1"},
+          {.name = "mask-invert",
+           .type = ParamType::Flag,
+           .doc = "act where the mask would have kept, and the reverse"}};
+}
+
+std::vector<Param> withMask(std::vector<Param> params) {
+  for (Param& param : maskParams()) params.push_back(std::move(param));
+  return params;
+}
+
+std::optional<levelset::Mask> maskOf(const Invocation& in) {
+  if (!in.given("mask")) {
+    for (const char* param : {"mask-min", "mask-max", "mask-invert"}) {
+      if (in.given(param))
+        throw levelset::UsageError(fmt::format(
+            "{}: --{} shapes a mask, and there is none; give --mask", in.op().name, param));
+    }
+    return std::nullopt;
+  }
+  levelset::Mask mask{.field = scalarField(in, "mask"),
+                      .min = in.number("mask-min"),
+                      .max = in.number("mask-max"),
+                      .invert = in.flag("mask-invert")};
+  levelset::checkMask(mask, in.op().name.c_str());
+  return mask;
+}
+
+}  // namespace pipeline

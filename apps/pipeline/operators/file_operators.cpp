@@ -1,0 +1,241 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+#include "levelset/files/band_file.h"
+#include "levelset/mesh_files/mesh_file.h"
+#include "mapping/patches/patch_file.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::UsageError;
+
+bool isStandardStream(const Invocation& in) {
+  return in.text("file") == "-";
+}
+
+Kind fileKind(const Invocation& in) {
+  const std::string name = formatName(in);
+  if (levelset::isMeshFormat(name)) return Kind::Mesh;
+  if (levelset::isBandFormat(name)) return Kind::Band;
+  if (mapping::isPatchFormat(name)) return Kind::Patch;
+  if (render::isSceneFormat(name)) return Kind::Scene;
+  throw UsageError(fmt::format(
+      "{}: '{}' is of no known format; use ply, obj, stl or off (also .gz), vdb{}, patch or json",
+      in.op().name, name, in.op().name == "write" ? ", nvdb" : ""));
+}
+
+/// A grid that is named may be a field: its file tells, if it is there already.
+Kind readKind(const Invocation& in) {
+  const Kind kind = fileKind(in);
+  if (kind != Kind::Band || !in.given("grid") || isStandardStream(in)) return kind;
+  try {
+    for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file")))
+      if (grid.name == in.text("grid")) return grid.isLevelSet ? Kind::Band : Kind::Field;
+  } catch (const levelset::Error&) {  // the run will tell
+  }
+  return kind;
+}
+
+Value read(Invocation& in) {
+  const std::filesystem::path file = in.text("file");
+  if (fileKind(in) == Kind::Patch)
+    return Value(PatchValue{.patches = mapping::readPatches(file, in.maxMemory)});
+  if (fileKind(in) == Kind::Scene) {
+    const auto warn = [&](const levelset::BandRepairs& repairs, const auto& source) {
+      for (const std::string& told : sentencesOf(repairs, source))
+        in.notes.warnings.push_back(told);
+    };
+    return Value(render::readScene(
+        file, {.maxMemory = in.maxMemory, .repairs = warn, .progress = in.progress}));
+  }
+  if (fileKind(in) == Kind::Mesh) {
+    std::vector<std::string> leftAside;
+    levelset::TriMesh mesh = levelset::readMesh(file, {.format = in.text("format"),
+                                                       .attributes = !in.flag("bare"),
+                                                       .maxMemory = in.maxMemory,
+                                                       .leftAside = &leftAside,
+                                                       .progress = in.progress});
+    if (!leftAside.empty()) {
+      in.notes.warnings.push_back(fmt::format("{}: left aside what no vertex can carry: {}",
+                                              file.string(), fmt::join(leftAside, "; ")));
+    }
+    return Value(std::move(mesh));
+  }
+  levelset::BandRepairs repairs;
+  const levelset::ReadBandOptions options{.grid = in.text("grid"),
+                                          .maxMemory = in.maxMemory,
+                                          .repairs = &repairs,
+                                          .progress = in.progress};
+  Value value = in.given("grid") ? std::visit([](auto&& grid) { return Value(std::move(grid)); },
+                                              levelset::readGrid(file, options))
+                                 : Value(levelset::readBand(file, options));
+  const std::vector<std::string> told = sentencesOf(repairs, file);
+  in.notes.warnings.insert(in.notes.warnings.end(), told.begin(), told.end());
+  return value;
+}
+
+/// Meshes are read, since lengths resolve on their size; of bands the header is enough.
+Plan planRead(Invocation& in) {
+  if (fileKind(in) != Kind::Band) return read(in).plan();
+  for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file"))) {
+    if (in.given("grid") ? grid.name != in.text("grid") : !grid.isLevelSet) continue;
+    if (!grid.isLevelSet) {
+      Plan plan{.kind = Kind::Field, .voxelSize = grid.voxelSize};
+      plan.fieldBytes = static_cast<double>(grid.bytes);
+      return plan;
+    }
+    Plan plan{.kind = Kind::Band, .voxelSize = grid.voxelSize, .halfWidth = grid.halfWidth};
+    if (!grid.worldBounds.isEmpty()) {
+      // The zero set lies half a band's width inside of its voxels.
+      plan.bounds = grid.worldBounds;
+      const Imath::V3d rim(plan.halfWidth * plan.voxelSize);
+      if (Imath::Box3d inner(plan.bounds.min + rim, plan.bounds.max - rim); !inner.isEmpty())
+        plan.bounds = inner;
+    }
+    plan.area = static_cast<double>(grid.activeVoxels) * grid.voxelSize * grid.voxelSize /
+                (2 * plan.halfWidth);
+    return plan;
+  }
+  return read(in).plan();
+}
+
+void validateRead(const Invocation& in) {
+  const Kind kind = fileKind(in);
+  if (kind != Kind::Mesh && in.flag("bare"))
+    throw UsageError(
+        fmt::format("read: --bare leaves out what a mesh carries, and this is a {}; leave it out",
+                    kindName(kind)));
+  if (kind != Kind::Band && in.given("grid"))
+    throw UsageError(fmt::format(
+        "read: --grid picks a grid of a .vdb, and this is a {}; leave it out", kindName(kind)));
+  if (kind == Kind::Scene && isStandardStream(in))
+    throw UsageError(
+        "read: a scene names other files by their place beside its own; give a file, not -");
+}
+
+void validateWrite(const Invocation& in) {
+  const Kind kind = fileKind(in), held = in.operands[0].kind();
+  if (held != kind && !(held == Kind::Field && kind == Kind::Band)) {
+    throw UsageError(
+        fmt::format("write: a {} cannot be written as '{}'; {}", kindName(held), formatName(in),
+                    held == Kind::Band    ? "put 'mesh' before it, or write .vdb"
+                    : held == Kind::Field ? "write .vdb"
+                    : held == Kind::Patch ? "write .patch, or put 'mesh' before it"
+                    : held == Kind::Scene ? "write .json"
+                                          : "put 'level-set' before it, or write .ply"));
+  }
+  if ((kind == Kind::Mesh || kind == Kind::Patch || kind == Kind::Scene) && in.given("name"))
+    throw UsageError(fmt::format("write: --name is that of a grid, and this is a {}; leave it out",
+                                 kindName(kind)));
+  if (kind == Kind::Scene && levelset::isStandardOutput(in.text("file")))
+    throw UsageError("write: a scene has its level sets in files beside its own; give a file");
+}
+
+Value write(Invocation& in) {
+  const std::filesystem::path file = in.text("file");
+  const Value& value = in.operands[0];
+  if (value.kind() == Kind::Patch) {
+    if (value.patch().atHeight)
+      throw UsageError("write: the texture is to tell this patch's height; give --height a length");
+    mapping::writePatches(file, value.patch().patches);
+  } else if (value.kind() == Kind::Scene) {
+    render::writeScene(file, value.scene(), in.progress);
+  } else if (value.kind() == Kind::Field) {
+    levelset::writeField(file, value.field(),
+                         {.name = in.given("name") ? in.text("name") : value.field().name(),
+                          .format = in.text("format"),
+                          .progress = in.progress});
+  } else if (value.kind() == Kind::Mesh) {
+    levelset::writeMesh(
+        file, value.mesh(),
+        {.format = in.text("format"), .maxMemory = in.maxMemory, .progress = in.progress});
+    if (!value.mesh().attributes.isEmpty() && !levelset::holdsAttributes(formatName(in)))
+      in.notes.warnings.push_back(fmt::format(
+          "{} holds positions and triangles only: the {} were left out; write .ply or .obj to keep "
+          "them",
+          file.string(), describe(value.mesh().attributes)));
+  } else {
+    levelset::writeBand(
+        file, value.band(),
+        {.name = in.text("name"), .format = in.text("format"), .progress = in.progress});
+  }
+  return value;
+}
+
+}  // namespace
+
+void addFileOperators(std::vector<Operator>& all) {
+  all.push_back({
+      .name = "read",
+      .group = "Files",
+      .summary = "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), patches "
+                 "(patch), a scene (json)",
+      .details =
+          "A .vdb with more than one level set needs --grid. A grid that is no level set "
+          "must be named too; it becomes a field: of numbers, or of vectors, staggered ones "
+          "among them. Meshes keep the normals, texture coordinates and colours that PLY and "
+          "OBJ give their vertices. "
+          "'-' is standard input and needs --format.",
+      .example = "levelsmith read dragon.ply.gz ! info",
+      .params = {{.name = "file",
+                  .type = ParamType::Path,
+                  .doc = "what to read, or -",
+                  .required = true,
+                  .position = 0},
+                 {.name = "format",
+                  .type = ParamType::Text,
+                  .doc = "ply, obj, stl, off, vdb, patch, json; default: by extension"},
+                 {.name = "grid", .type = ParamType::Text, .doc = "name of the grid in a .vdb"},
+                 {.name = "bare",
+                  .type = ParamType::Flag,
+                  .doc = "of a mesh: positions and triangles only, no normals, texture coordinates "
+                         "and colours"}},
+      .resultKind = readKind,
+      .run = read,
+      .plan = planRead,
+      .cost = costPerVoxel(50, 0, 250),
+      .validate = validateRead,
+      .usesStandardInput = isStandardStream,
+  });
+  all.push_back({
+      .name = "write",
+      .group = "Files",
+      .summary = "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), "
+                 "patches (patch), a scene (json)",
+      .details = "The file is written beside its target and renamed when whole; what was there "
+                 "stays until then. "
+                 "A scene's level sets and meshes go to .vdb and .ply files beside it, "
+                 "FILE-NAME.vdb for the "
+                 "level set NAME, and replace what has those names. "
+                 "The value stays on the stack.",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! write sphere.ply",
+      .params = {{.name = "file",
+                  .type = ParamType::Path,
+                  .doc = "where to, or -",
+                  .required = true,
+                  .position = 0},
+                 {.name = "format",
+                  .type = ParamType::Text,
+                  .doc = "ply, obj, stl, off, vdb, nvdb, patch, json; default: by extension"},
+                 {.name = "name",
+                  .type = ParamType::Text,
+                  .doc = "of the grid in a .vdb or .nvdb; a field keeps its own",
+                  .fallback = "surface"}},
+      .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene}},
+      .flow = Flow::PassesThrough,
+      .run = write,
+      .cost = costPerVoxel(50, 0, 20),
+      .validate = validateWrite,
+      .targets = [](const Invocation& in) { return std::vector{in.text("file")}; },
+      .usesStandardOutput =
+          [](const Invocation& in) { return levelset::isStandardOutput(in.text("file")); },
+  });
+}
+
+}  // namespace pipeline

@@ -1,0 +1,335 @@
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "levelset/error.h"
+#include "levelset/files/band_file.h"
+#include "levelset/inspect/check.h"
+#include "levelset/inspect/compare.h"
+#include "levelset/inspect/measure.h"
+#include "levelset/mesh_files/mesh_file.h"
+
+namespace pipeline {
+namespace {
+
+Json toJson(const Imath::V3d& v) {
+  return Json::array({v.x, v.y, v.z});
+}
+Json toJson(const Imath::Box3d& box) {
+  if (box.isEmpty()) return nullptr;
+  return {{"min", toJson(box.min)}, {"max", toJson(box.max)}};
+}
+
+std::string coordinates(const Imath::V3d& v) {
+  return fmt::format("{:.6g},{:.6g},{:.6g}", v.x, v.y, v.z);
+}
+
+Value measure(Invocation& in) {
+  const Value& value = in.operands[0];
+  const levelset::Measurement m = value.kind() == Kind::Band
+                                      ? levelset::measure(value.band(), in.progress)
+                                      : levelset::measure(value.mesh(), in.progress);
+  Json json;
+  json["volume"] = m.volume;
+  json["area"] = m.area;
+  json["bounds"] = toJson(m.bounds);
+  json["active_voxels"] = m.activeVoxels;
+  json["voxel_size"] = m.voxelSize;
+  json["half_width"] = m.halfWidth;
+  json["components"] = m.components;
+  json["shells"] = m.shells;
+  json["cavities"] = m.cavities;
+  json["euler"] = m.euler;
+  json["centroid"] = toJson(m.centroid);
+  json["inertia"] = Json::array();
+  for (int i = 0; i < 3; ++i)
+    json["inertia"].push_back(
+        toJson(Imath::V3d(m.inertia[i][0], m.inertia[i][1], m.inertia[i][2])));
+  json["mean_curvature"] = m.meanCurvature;
+  if (value.kind() == Kind::Mesh) {
+    const levelset::Manifoldness manifold = levelset::manifoldness(value.mesh());
+    json["closed_manifold"] = manifold.isClosedManifold();
+    json["boundary_edges"] = manifold.boundaryEdges;
+    json["non_manifold_edges"] = manifold.nonManifoldEdges;
+    json["misoriented_edges"] = manifold.misorientedEdges;
+    json["non_manifold_vertices"] = manifold.nonManifoldVertices;
+    json["triangles"] = value.mesh().triangles.size();
+    json["vertices"] = value.mesh().positions.size();
+  }
+  in.notes.detailsJson = json.dump();
+  if (asksJson(in)) {
+    in.output = printed(json);
+    return value;
+  }
+  for (const auto& [key, entry] : json.items()) {
+    if (key == "bounds" && !m.bounds.isEmpty())
+      in.output += fmt::format("{:<22}{} to {}\n", key, coordinates(m.bounds.min),
+                               coordinates(m.bounds.max));
+    else
+      in.output += fmt::format(
+          "{:<22}{}\n", key,
+          entry.is_number_float() ? fmt::format("{:.9g}", entry.get<double>()) : entry.dump());
+  }
+  return value;
+}
+
+Value compare(Invocation& in) {
+  const levelset::Comparison c =
+      levelset::compare(in.band(0), in.band(1), {.progress = in.progress});
+  Json json;
+  json["hausdorff"] = c.hausdorff();
+  json["hausdorff_a_to_b"] = c.hausdorffAtoB;
+  json["hausdorff_b_to_a"] = c.hausdorffBtoA;
+  json["mean_a_to_b"] = c.meanAtoB;
+  json["mean_b_to_a"] = c.meanBtoA;
+  json["chamfer"] = c.chamfer();
+  json["symmetric_difference"] = c.symmetricDifference;
+  in.notes.detailsJson = json.dump();
+  if (asksJson(in)) {
+    in.output = printed(json);
+  } else {
+    for (const auto& [key, entry] : json.items())
+      in.output += fmt::format("{:<22}{:.9g}\n", key, entry.get<double>());
+  }
+  if (in.given("tolerance")) {
+    const double tolerance = in.length("tolerance");
+    if (c.hausdorff() > tolerance)
+      throw levelset::NumericalError(fmt::format(
+          "compare: the surfaces are up to {:.6g} apart, more than the tolerance of {:.6g}; look "
+          "at the figures, or allow more",
+          c.hausdorff(), tolerance));
+  }
+  return in.operands[1];
+}
+
+Value check(Invocation& in) {
+  const levelset::CheckReport report = levelset::check(in.band(), in.progress);
+  Json json;
+  json["passed"] = report.passed();
+  json["items"] = Json::array();
+  std::string failed;
+  for (const levelset::CheckItem& item : report.items) {
+    json["items"].push_back(
+        {{"name", item.name}, {"passed", item.passed}, {"detail", item.detail}});
+    if (!asksJson(in)) {
+      in.output += fmt::format("{:<6}{}{}{}\n", item.passed ? "ok" : "FAIL", item.name,
+                               item.detail.empty() ? "" : ": ", item.detail);
+    }
+    if (!item.passed && failed.empty())
+      failed = item.name + (item.detail.empty() ? "" : " (" + item.detail + ")");
+  }
+  json["eikonal_mean"] = report.eikonalMean;
+  json["eikonal_max"] = report.eikonalMax;
+  in.notes.detailsJson = json.dump();
+  in.notes.errors.push_back({"eikonal residual, mean", report.eikonalMean, ""});
+  if (asksJson(in))
+    in.output = printed(json);
+  else
+    in.output += fmt::format("eikonal residual: mean {:.3g}, largest {:.3g}\n", report.eikonalMean,
+                             report.eikonalMax);
+  if (!report.passed()) {
+    throw levelset::NumericalError(fmt::format(
+        "check: the level set fails: {}; make it again with 'resample', or from its mesh", failed));
+  }
+  return in.operands[0];
+}
+
+/// Counts that a header does not tell are 0 there.
+Json countOrNull(std::uint64_t count) {
+  return count > 0 ? Json(count) : Json(nullptr);
+}
+
+void validateInfo(const Invocation& in) {
+  if (!in.given("file")) return;
+  const std::string name = formatName(in);
+  if (levelset::isMeshFormat(name)) return;
+  if (levelset::isBandFormat(name) && !name.ends_with("nvdb")) return;
+  throw levelset::UsageError(fmt::format(
+      "info: '{}' is of no known format; it can tell of ply, obj, stl, off (also .gz) and vdb",
+      name));
+}
+
+Json fileInfo(const std::string& file, const std::string& format) {
+  Json json;
+  json["file"] = file;
+  const std::string name = format.empty() ? file : format;
+  if (levelset::isMeshFormat(name)) {
+    const levelset::MeshFileInfo info = levelset::meshFileInfo(file, format);
+    json["format"] = info.format;
+    json["vertices"] = countOrNull(info.vertices);
+    json["faces"] = countOrNull(info.faces);
+    if (!info.attributes.empty()) json["attributes"] = info.attributes;
+    return json;
+  }
+  json["grids"] = Json::array();
+  for (const levelset::GridInfo& grid : levelset::bandFileInfo(file)) {
+    Json entry{{"name", grid.name},
+               {"type", grid.type},
+               {"class", grid.gridClass},
+               {"voxel_size", grid.voxelSize},
+               {"active_voxels", countOrNull(grid.activeVoxels)},
+               {"bytes", countOrNull(grid.bytes)}};
+    entry["index_bounds"] = toJson(grid.indexBounds);
+    json["grids"].push_back(entry);
+  }
+  return json;
+}
+
+Json valueInfo(const Value& value) {
+  Json json;
+  json["kind"] = kindName(value.kind());
+  json["bounds"] = toJson(value.plan().bounds);
+  if (value.kind() == Kind::Band || value.kind() == Kind::Surface) {
+    json["voxel_size"] = value.band().voxelSize();
+    json["half_width"] = value.band().halfWidth();
+    json["active_voxels"] = value.band().activeVoxelCount();
+    json["bytes"] = value.band().memoryUse();
+    json["hash"] = fmt::format("{:016x}", value.band().contentHash());
+  } else if (value.kind() == Kind::Mesh) {
+    json["vertices"] = value.mesh().positions.size();
+    json["triangles"] = value.mesh().triangles.size();
+    if (!value.mesh().attributes.isEmpty()) json["attributes"] = describe(value.mesh().attributes);
+  } else if (value.kind() == Kind::Field) {
+    const levelset::FieldGrid& field = value.field();
+    json["values"] = field.isVector() ? "vectors" : "numbers";
+    json["class"] = field.gridClass();
+    json["voxel_size"] = field.voxelSize();
+    json["active_voxels"] = field.activeVoxelCount();
+    json["bytes"] = field.memoryUse();
+    json["hash"] = fmt::format("{:016x}", field.contentHash());
+  } else if (value.kind() == Kind::Scene) {
+    const render::Scene& scene = value.scene().scene;
+    json["solids"] = Json::array();
+    for (const render::Solid& solid : scene.solids)
+      json["solids"].push_back({{"name", solid.name},
+                                {"id", solid.id},
+                                {"voxel_size", solid.band.voxelSize()},
+                                {"active_voxels", solid.band.activeVoxelCount()}});
+    for (const render::MeshPart& part : scene.meshes)
+      json["meshes"].push_back(
+          {{"name", part.name}, {"id", part.id}, {"triangles", part.mesh->triangles.size()}});
+    if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
+    if (scene.softness > 0) json["soft"] = scene.softness;
+    if (scene.morph) json["morph"] = *scene.morph;
+  } else {
+    const std::vector<mapping::Patch>& patches = value.patch().patches;
+    std::size_t particles = 0;
+    for (const mapping::Patch& patch : patches) particles += patch.particleCount();
+    json["patches"] = patches.size();
+    json["levels"] = patches.front().levels.size();
+    json["particles"] = particles;
+  }
+  return json;
+}
+
+void appendText(const Json& json, const std::string& indent, std::string& text) {
+  for (const auto& [key, entry] : json.items()) {
+    if (entry.is_array() && !entry.empty() && entry[0].is_object()) {
+      for (const Json& item : entry) {
+        text += indent + key + ":\n";
+        appendText(item, indent + "  ", text);
+      }
+    } else if (!entry.is_null()) {
+      text += fmt::format("{}{:<16}{}\n", indent, key,
+                          entry.is_string()
+                              ? entry.get<std::string>()
+                              : entry.dump(-1, ' ', false, Json::error_handler_t::replace));
+    }
+  }
+}
+
+Value info(Invocation& in) {
+  Json json;
+  if (in.given("file")) {
+    json = fileInfo(in.text("file"), in.text("format"));
+  } else if (!in.operands.empty()) {
+    json = valueInfo(in.operands[0]);
+  } else {
+    throw levelset::UsageError(
+        "info: of what? name a file, or put it behind an action that makes something");
+  }
+  if (asksJson(in))
+    in.output = printed(json);
+  else
+    appendText(json, "", in.output);
+  return in.operands.empty() ? Value(Plan{}) : in.operands[0];
+}
+
+}  // namespace
+
+void addInspectionOperators(std::vector<Operator>& all) {
+  all.push_back({
+      .name = "measure",
+      .group = "Inspection",
+      .summary = "volume, area, bounds, topology, centroid, inertia, mean curvature",
+      .details = "Inertia is about the centroid for density 1; mean_curvature is the integral of "
+                 "(k1 + k2) / 2 over the surface; euler is V - E + F of the surface.",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! measure --json",
+      .params = {jsonParam()},
+      .operands = {{Kind::Band, Kind::Mesh}},
+      .flow = Flow::PassesThrough,
+      .run = measure,
+      .cost = costPerVoxel(720, 130, 520),
+      .usesStandardOutput = asksJson,
+  });
+  all.push_back({
+      .name = "compare",
+      .group = "Inspection",
+      .summary = "how far two solids differ: Hausdorff, mean and Chamfer distance, volume",
+      .details = "Both stay on the stack. hausdorff is the larger of both ways, chamfer the sum of "
+                 "both means, symmetric_difference the volume in one of the solids only. The grids "
+                 "need not be the same.",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! sphere --radius 1 --center 0.1,0,0 "
+                 "--voxel 0.05 ! compare --tolerance 0.11",
+      .params = {{.name = "tolerance",
+                  .type = ParamType::Length,
+                  .doc = "exit code 5 if the Hausdorff distance is larger",
+                  .range = Range::NonNegative},
+                 jsonParam()},
+      .operands = {{Kind::Band}, {Kind::Band}},
+      .flow = Flow::PassesThrough,
+      .run = compare,
+      .cost = costPerVoxel(1500, 60),
+      .usesStandardOutput = asksJson,
+  });
+  all.push_back({
+      .name = "check",
+      .group = "Inspection",
+      .summary = "is it a sound level set? exit code 5 if not",
+      .example = "levelsmith box --size 1,1,1 --voxel 0.05 ! check",
+      .params = {jsonParam()},
+      .operands = {{Kind::Band}},
+      .flow = Flow::PassesThrough,
+      .run = check,
+      .cost = costPerVoxel(75),
+      .usesStandardOutput = asksJson,
+  });
+  all.push_back({
+      .name = "info",
+      .group = "Inspection",
+      .summary = "what is in a file, without loading its voxels, or what is on the stack",
+      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! info",
+      .params = {{.name = "file",
+                  .type = ParamType::Path,
+                  .doc = "a mesh or .vdb file; default: the newest value",
+                  .position = 0},
+                 {.name = "format",
+                  .type = ParamType::Text,
+                  .doc = "of the file; default: by extension"},
+                 jsonParam()},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface, Kind::Scene}},
+      .operandsOptional = true,
+      .flow = Flow::PassesThrough,
+      .run = info,
+      .plan = [](Invocation&) { return Plan{}; },
+      .cost = [](Invocation&) { return Cost(); },
+      .validate = validateInfo,
+      .usesStandardOutput = asksJson,
+      .usesStandardInput = [](const Invocation& in) { return in.text("file") == "-"; },
+  });
+}
+
+}  // namespace pipeline

@@ -1,0 +1,554 @@
+#include <fmt/core.h>
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <utility>
+
+#include "apps/pipeline/operators/mapping/patch_options.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "levelset/error.h"
+#include "mapping/placement/decal.h"
+#include "mapping/placement/make_patch.h"
+#include "mapping/placement/patch_grid.h"
+
+namespace pipeline {
+namespace {
+
+using Imath::V3d;
+using levelset::UsageError;
+
+constexpr std::array<const char*, 4> kSides = {"side0", "side1", "side2", "side3"};
+
+/// --corners, or --at and --size.
+void validateOutline(const Invocation& in) {
+  const std::string& name = in.op().name;
+  if (in.given("at") && !in.given("size"))
+    throw UsageError(name + ": --at needs --size a,b beside it");
+  if (in.given("corners")) {
+    if (in.given("size") || in.given("rotate"))
+      throw UsageError(name + ": --size and --rotate go with --at, not with --corners");
+    const std::size_t count = in.points("corners").size();
+    if (count != 4)
+      throw UsageError(fmt::format("{}: --corners needs four points, not {}", name, count));
+  }
+  for (const char* side : kSides) {
+    if (in.given(side) && !in.given("corners"))
+      throw UsageError(fmt::format("{}: --{} goes with --corners", name, side));
+  }
+}
+
+void validatePatch(const Invocation& in) {
+  if (in.given("corners") == in.given("at"))
+    throw UsageError("patch: give either --corners \"p0 p1 p2 p3\" or --at p --size a,b");
+  validateOutline(in);
+  validateLevels(in);
+}
+
+/// "n,m", both whole and positive.
+std::array<std::size_t, 2> countOf(const Invocation& in) {
+  const std::string text = in.text("count");
+  std::array<std::size_t, 2> count = {0, 0};
+  const char *at = text.data(), *end = text.data() + text.size();
+  const auto first = std::from_chars(at, end, count[0]);
+  const bool hasComma = first.ec == std::errc() && first.ptr != end && *first.ptr == ',';
+  const auto second = hasComma ? std::from_chars(first.ptr + 1, end, count[1]) : first;
+  if (!hasComma || second.ec != std::errc() || second.ptr != end || count[0] == 0 || count[1] == 0)
+    throw UsageError(
+        fmt::format("{}: '{}' is no pair of counts; write 12,3", in.where("count"), text));
+  return count;
+}
+
+void validateGrid(const Invocation& in) {
+  const int ways = in.given("corners") + in.given("at") + in.given("around");
+  if (ways != 1) {
+    throw UsageError(
+        "patch-grid: give one of --corners \"p0 p1 p2 p3\", --at p --size a,b and "
+        "--around \"from to\"");
+  }
+  if (in.given("around")) {
+    const std::size_t count = in.points("around").size();
+    if (count != 2)
+      throw UsageError(
+          fmt::format("patch-grid: --around needs two points, where the tiles begin and end on the "
+                      "axis, not {}",
+                      count));
+    for (const char* other : {"size", "twist", "taper", "bend", "mirrored"})
+      if (in.given(other))
+        throw UsageError(fmt::format("patch-grid: --{} does not go with --around", other));
+    if (in.text("particles") == "spline")
+      throw UsageError("patch-grid: --particles spline does not go with --around");
+  }
+  validateOutline(in);
+  validateLevels(in);
+  (void)countOf(in);
+  const double shift = in.number("shift");
+  if (shift >= 1)
+    throw UsageError(fmt::format(
+        "patch-grid: --shift {} is out of range; give a share of a tile, 0 to below 1", shift));
+}
+
+std::array<V3d, 4> cornersOf(Invocation& in) {
+  if (in.given("corners")) {
+    const std::vector<V3d> points = in.points("corners");
+    return {points[0], points[1], points[2], points[3]};
+  }
+  const std::array<double, 2> size = patchSizeOf(in);
+  return mapping::cornersAround(in.band(), in.point("at"), size[0], size[1], in.radians("rotate"));
+}
+
+/// Corners about a point run the right way round, unless the surface bends too much between them.
+/// @return what to say then; empty where the caller gave the corners, or allowed it
+std::string whyMirrored(const Invocation& in, const mapping::PatchOptions& options) {
+  if (in.given("corners") || options.mirror) return "";
+  return fmt::format(
+      "{}: the surface bends too much about {} for a patch of size {}, it would be laid the wrong "
+      "way round; make it smaller, or lay it elsewhere",
+      in.op().name, in.text("at"), in.text("size"));
+}
+
+void requireUpright(const std::vector<mapping::Patch>& patches, const std::string& whyMirrored) {
+  if (!whyMirrored.empty() && patches.front().mirrored) throw levelset::InvalidInput(whyMirrored);
+}
+
+/// Where the surface bends, a patch whose diagonals are as asked has other sides.
+void requireSize(Invocation& in, const mapping::PatchReport& report) {
+  if (in.op().name != "patch" || !in.given("at")) return;
+  const std::array<double, 2> asked = patchSizeOf(in);
+  const double u = report.uLength / asked[0], v = report.vLength / asked[1];
+  const double least = std::min(u, v), most = std::max(u, v);
+  if (least < 0.5 || most > 2) {
+    throw levelset::InvalidInput(
+        fmt::format("patch: about {} the surface bends too much for a patch of size {}, its sides "
+                    "would be {:.4g} by {:.4g} long; make it smaller, or give its corners",
+                    in.text("at"), in.text("size"), report.uLength, report.vLength));
+  }
+  if (least < 0.9 || most > 1.1) {
+    in.notes.warnings.push_back(
+        fmt::format("patch: where the surface bends like this, a patch of size {} has sides of "
+                    "{:.4g} by {:.4g}; give its corners if these are not as wanted",
+                    in.text("size"), report.uLength, report.vLength));
+  }
+}
+
+/// Distortion and counts, for the report; warns of particles that were slowed.
+void tellPatches(Invocation& in, const mapping::PatchReport& report,
+                 const std::vector<mapping::Patch>& patches) {
+  std::size_t particles = 0;
+  for (const mapping::Patch& one : patches) particles += one.particleCount();
+  const std::size_t levels = patches.front().levels.size();
+  nlohmann::ordered_json json;
+  if (patches.size() > 1) json["patches"] = patches.size();
+  json["u_length"] = report.uLength;
+  json["v_length"] = report.vLength;
+  json["particles"] = particles;
+  json["levels"] = levels;
+  json["cell_area_variation"] = report.cellAreaVariation;
+  json["relax_iterations"] = report.relaxIterations;
+  json["relaxed"] = report.isRelaxed;
+  json["projection_distance"] = report.projectionDistance;
+  json["slowed"] = report.slowed;
+  in.notes.detailsJson = json.dump();
+  if (report.slowed > 0) {
+    in.notes.warnings.push_back(
+        fmt::format("{}: {} of its particles would meet their neighbours on the way, where the "
+                    "spline bends more narrowly than the patch is wide; they were slowed",
+                    in.op().name, report.slowed));
+  }
+  if (!report.isRelaxed) {
+    in.notes.warnings.push_back(fmt::format(
+        "{}: particles still moved after {} steps of relaxation, so the texture may be stretched "
+        "unevenly; make the patch smaller, its spacing wider or its place flatter",
+        in.op().name, report.relaxIterations));
+  }
+  in.notes.notes.push_back(fmt::format(
+      "{:.4g} by {:.4g} along the surface, {}{} particles in {} levels", report.uLength,
+      report.vLength, patches.size() > 1 ? fmt::format("{} patches, ", patches.size()) : "",
+      particles, levels));
+}
+
+/// Made at the height asked, and again once the texture has told one.
+/// @param make  of a height: patches and their report
+template <typename Make>
+Value patchesOf(Invocation& in, PatchRecipe recipe, const Make& make) {
+  const bool isAuto = in.text("height") == "auto";
+  // The texture will tell the height; one voxel is enough to know the patch's size until then.
+  auto [patches, report] = make(isAuto ? in.band().voxelSize() : in.length("height"), in.progress);
+  requireSize(in, report);
+  tellPatches(in, report, patches);
+  PatchValue value;
+  value.patches = std::move(patches);
+  tellOrigin(in, recipe);
+  value.recipe = std::make_shared<const PatchRecipe>(std::move(recipe));
+  if (isAuto) {
+    value.atHeight = [make](double h, const levelset::Progress& progress) {
+      return make(h, progress).patches;
+    };
+  }
+  return Value(std::move(value));
+}
+
+using levelset::Progress;
+using mapping::PatchGridResult;
+
+PatchGridResult asSet(mapping::PatchResult result) {
+  PatchGridResult set;
+  set.patches.push_back(std::move(result.patch));
+  set.report = result.report;
+  return set;
+}
+
+/// For a patch that stands elsewhere than it did: a spline and directions go with it, corners that
+/// have come to run the other way round are for the caller to judge.
+mapping::PatchOptions optionsElsewhere(mapping::PatchOptions options,
+                                       const mapping::Footprint& origin,
+                                       const mapping::Footprint& now, const Progress& progress) {
+  for (V3d& p : options.spline) p = mapping::movedAlong(origin, now, p);
+  for (V3d& d : options.directions)
+    d = mapping::movedAlong(origin, now, origin.centre + d) -
+        mapping::movedAlong(origin, now, origin.centre);
+  options.progress = progress;
+  return options;
+}
+
+std::string whyFixed(const Invocation& in) {
+  for (const char* side : kSides)
+    if (in.given(side))
+      return fmt::format("--{} of '{}' names points that stay where they are", side, in.op().name);
+  return "";
+}
+
+Value patch(Invocation& in) {
+  mapping::PatchOptions options = patchOptionsOf(in);
+  for (std::size_t side = 0; side < 4; ++side)
+    if (in.given(kSides[side])) options.sides[side] = in.points(kSides[side]);
+  PatchRecipe recipe{.outlines = outlinesOf, .fixed = whyFixed(in)};
+  recipe.make = [options](const levelset::NarrowBand& base,
+                          std::span<const mapping::Footprint> footprints,
+                          std::span<const mapping::Footprint> origins, const Progress& progress) {
+    mapping::PatchOptions now = optionsElsewhere(options, origins[0], footprints[0], progress);
+    now.mirror = true;
+    return std::vector{
+        mapping::makePatch(base, footprints[0].corners, footprints[0].height, now).patch};
+  };
+  return patchesOf(in, std::move(recipe),
+                   [base = in.band(), corners = cornersOf(in), options,
+                    why = whyMirrored(in, options)](double height, const Progress& progress) {
+                     mapping::PatchOptions now = options;
+                     now.progress = progress;
+                     now.mirror |= !why.empty();
+                     PatchGridResult set = asSet(mapping::makePatch(base, corners, height, now));
+                     requireUpright(set.patches, why);
+                     return set;
+                   });
+}
+
+/// Mean way along u and along v from the centre to the corners.
+double meanReach(const mapping::Footprint& footprint) {
+  double sum = 0;
+  for (const Imath::V2d& way : footprint.reach.value()) sum += std::abs(way.x) + std::abs(way.y);
+  return sum / 8;
+}
+
+Value decal(Invocation& in) {
+  const mapping::PatchOptions options = patchOptionsOf(in);
+  const V3d at = in.point("at"), direction = in.point("direction");
+  const double radius = in.length("radius");
+  PatchRecipe recipe{.isRigid = true};
+  recipe.outlines = [at, direction](const std::vector<mapping::Patch>& patches) {
+    std::vector<mapping::PatchOutline> outlines = outlinesOf(patches);
+    outlines.front().middle = at;
+    outlines.front().direction = direction;
+    return outlines;
+  };
+  recipe.make = [options, radius](const levelset::NarrowBand& base,
+                                  std::span<const mapping::Footprint> footprints,
+                                  std::span<const mapping::Footprint> origins,
+                                  const Progress& progress) {
+    const mapping::Footprint& now = footprints[0];
+    return std::vector{mapping::makeDecal(base, now.centre, now.direction,
+                                          radius * meanReach(now) / meanReach(origins[0]),
+                                          now.height,
+                                          optionsElsewhere(options, origins[0], now, progress))
+                           .patch};
+  };
+  return patchesOf(
+      in, std::move(recipe),
+      [base = in.band(), at, direction, radius, options](double height, const Progress& progress) {
+        mapping::PatchOptions now = options;
+        now.progress = progress;
+        return asSet(mapping::makeDecal(base, at, direction, radius, height, now));
+      });
+}
+
+Value gridAround(Invocation& in, const mapping::PatchGridOptions& grid,
+                 const mapping::PatchOptions& options) {
+  const auto make = [axis = in.points("around"), rotation = in.radians("rotate"), grid, options](
+                        const levelset::NarrowBand& base, double height, const Progress& progress) {
+    mapping::PatchOptions now = options;
+    now.progress = progress;
+    return mapping::makePatchGridAround(base, axis[0], axis[1], rotation, height, grid, now);
+  };
+  const PatchRecipe recipe{
+      .around = [make](const levelset::NarrowBand& base, double height, const Progress& progress) {
+        return make(base, height, progress).patches;
+      }};
+  return patchesOf(in, recipe, [make, base = in.band()](double height, const Progress& progress) {
+    return make(base, height, progress);
+  });
+}
+
+Value patchGrid(Invocation& in) {
+  const auto [columns, rows] = countOf(in);
+  const std::string mirror = in.text("mirror");
+  const mapping::PatchGridOptions grid = {.columns = columns,
+                                          .rows = rows,
+                                          .mirrorU = mirror == "u" || mirror == "both",
+                                          .mirrorV = mirror == "v" || mirror == "both",
+                                          .shift = in.number("shift")};
+  mapping::PatchOptions options = patchOptionsOf(in);
+  options.mirror = in.flag("mirrored");
+  if (in.given("around")) return gridAround(in, grid, options);
+  for (std::size_t side = 0; side < 4; ++side)
+    if (in.given(kSides[side])) options.sides[side] = in.points(kSides[side]);
+  const std::array<V3d, 4> corners = cornersOf(in);
+  PatchRecipe recipe{.fixed = whyFixed(in)};
+  // One outline to all tiles: their borders stay shared.
+  recipe.outlines = [corners](const std::vector<mapping::Patch>& patches) {
+    const mapping::Patch& middle = patches[patches.size() / 2];
+    return std::vector<mapping::PatchOutline>{
+        {.corners = corners, .middle = mapping::outlineOf(middle).middle, .height = middle.height}};
+  };
+  recipe.make = [grid, options](const levelset::NarrowBand& base,
+                                std::span<const mapping::Footprint> footprints,
+                                std::span<const mapping::Footprint> origins,
+                                const Progress& progress) {
+    mapping::PatchOptions now = optionsElsewhere(options, origins[0], footprints[0], progress);
+    now.mirror = true;
+    return mapping::makePatchGrid(base, footprints[0].corners, footprints[0].height, grid, now)
+        .patches;
+  };
+  return patchesOf(in, std::move(recipe),
+                   [base = in.band(), corners, grid, options, why = whyMirrored(in, options)](
+                       double height, const Progress& progress) {
+                     mapping::PatchOptions now = options;
+                     now.progress = progress;
+                     now.mirror |= !why.empty();
+                     PatchGridResult set = mapping::makePatchGrid(base, corners, height, grid, now);
+                     requireUpright(set.patches, why);
+                     return set;
+                   });
+}
+
+/// With a box that the patch's height is added to on all sides.
+Plan raisedPlan(Invocation& in, Plan plan, Imath::Box3d box) {
+  const bool isAuto = in.text("height") == "auto";
+  const double height = isAuto ? box.size().length() / 2 : in.length("height");
+  if (!isAuto) plan.patchSize.z = height;
+  box.min -= V3d(height);
+  box.max += V3d(height);
+  plan.bounds = box;
+  plan.area = 0;
+  return plan;
+}
+
+Plan planPatch(Invocation& in) {
+  Plan plan = in.operands[0].plan();
+  plan.kind = Kind::Patch;
+  Imath::Box3d box;
+  if (in.given("corners")) {
+    const std::vector<V3d> p = in.points("corners");
+    for (const V3d& corner : p) box.extendBy(corner);
+    plan.patchSize = {std::min((p[1] - p[0]).length(), (p[2] - p[3]).length()),
+                      std::min((p[3] - p[0]).length(), (p[2] - p[1]).length()), 0};
+  } else {
+    const std::vector<double> size = in.lengths("size");
+    plan.patchSize = {size[0], size[1], 0};
+    const double reach = std::hypot(size[0], size[1]) / 2;
+    box = {in.point("at") - V3d(reach), in.point("at") + V3d(reach)};
+  }
+  return raisedPlan(in, plan, box);
+}
+
+Plan planDecal(Invocation& in) {
+  Plan plan = in.operands[0].plan();
+  plan.kind = Kind::Patch;
+  const double radius = in.length("radius"), reach = radius * std::sqrt(2.0);
+  plan.patchSize = {2 * radius, 2 * radius, 0};
+  return raisedPlan(in, plan, {in.point("at") - V3d(reach), in.point("at") + V3d(reach)});
+}
+
+Plan planGrid(Invocation& in) {
+  if (!in.given("around")) {
+    Plan plan = planPatch(in);
+    const auto [columns, rows] = countOf(in);
+    plan.patchSize.x /= static_cast<double>(columns);
+    plan.patchSize.y /= static_cast<double>(rows);
+    return plan;
+  }
+  Plan plan = in.operands[0].plan();
+  plan.kind = Kind::Patch;
+  plan.patchSize = V3d(0);  // the surface will tell
+  return raisedPlan(in, plan, plan.bounds);
+}
+
+/// What all patches have above the surface.
+std::vector<Param> levelParams(const char* particles) {
+  std::vector<Param> params = withLevels({});
+  for (Param& param : params)
+    if (param.name == "particles") param.fallback = particles;
+  params.push_back({.name = "spline",
+                    .type = ParamType::Points,
+                    .doc = "with --particles spline: points that its curve passes from the patch's "
+                           "centre on; default: straight along the normal"});
+  params.push_back(
+      {.name = "fade",
+       .type = ParamType::Flag,
+       .doc = "with --particles spline: the surface's relief goes to nothing on the way"});
+  return params;
+}
+
+std::vector<Param> outlineParams() {
+  return {{.name = "corners", .type = ParamType::Points, .doc = "four points, \"p0 p1 p2 p3\""},
+          {.name = "at", .type = ParamType::Point, .doc = "centre of a patch of --size"},
+          {.name = "size",
+           .type = ParamType::Lengths,
+           .doc = "along u and v, on the surface",
+           .range = Range::Positive,
+           .count = 2},
+          {.name = "side0",
+           .type = ParamType::Points,
+           .doc = "points that the side from corner 0 to 1 passes on its shortest ways"},
+          {.name = "side1", .type = ParamType::Points, .doc = "the same from corner 1 to 2"},
+          {.name = "side2", .type = ParamType::Points, .doc = "the same from corner 3 to 2"},
+          {.name = "side3", .type = ParamType::Points, .doc = "the same from corner 0 to 3"}};
+}
+
+std::vector<Param> joinParams(std::vector<Param> a, const std::vector<Param>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+}  // namespace
+
+void addPatchOperators(std::vector<Operator>& all) {
+  all.push_back({
+      .name = "patch",
+      .group = "Texture mapping",
+      .summary = "lay a patch onto a surface: where a texture will stand",
+      .details = "Points are projected to the surface along the distance. u runs from corner 0 to "
+                 "1, v from corner 0 to 3, w outwards; corners run anticlockwise seen from "
+                 "outside. Sides are the shortest ways on the surface, through the points of "
+                 "--side0 to --side3 with a corner at each.",
+      .example = "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
+                 "--size 8,8 --height 3 --as p "
+                 "! torus --radius 4 --tube 1.5 --voxel 0.5 --as ring ! texture @ball @ring @p "
+                 "--blend 1 ! mesh ! write ring.ply",
+      .params = joinParams(
+          joinParams(outlineParams(), {{.name = "rotate",
+                                        .type = ParamType::Degrees,
+                                        .doc = "of u about the normal, with --at",
+                                        .fallback = "0"}}),
+          joinParams(levelParams("reduced"),
+                     {{.name = "directions",
+                       .type = ParamType::Points,
+                       .doc = "with --particles reduced: vectors in which the corners rise, one "
+                              "for all or \"d0 d1 d2 d3\"; default: along the distance"},
+                      {.name = "parallel",
+                       .type = ParamType::Flag,
+                       .doc = "the same, all along the normal at the patch's centre"},
+                      {.name = "mirror",
+                       .type = ParamType::Flag,
+                       .doc = "accept corners that run clockwise: the texture is mirrored"}})),
+      .operands = {{Kind::Band, Kind::Surface}},
+      .resultKind = [](const Invocation&) { return Kind::Patch; },
+      .run = patch,
+      .plan = planPatch,
+      .validate = validatePatch,
+  });
+  all.push_back({
+      .name = "decal",
+      .group = "Texture mapping",
+      .summary = "lay a square patch onto a surface about one point",
+      .details = "Distances and directions from the point are kept: every particle lies at the end "
+                 "of the straightest way that sets out in its direction. A decal that would fold, "
+                 "come round to itself or run off the surface is refused, with a radius that does.",
+      .example = "levelsmith cylinder --radius 8 --height 30 --voxel 0.4 --as post ! decal @post "
+                 "--at 8,0,0 --direction 0,1,0 --radius 6 --height 2 --as p "
+                 "! torus --radius 4 --tube 1 --voxel 0.3 --as ring ! texture @post @ring @p "
+                 "! mesh ! write post.ply",
+      .params = joinParams({{.name = "at",
+                             .type = ParamType::Point,
+                             .doc = "the centre, projected to the surface",
+                             .required = true},
+                            {.name = "direction",
+                             .type = ParamType::Point,
+                             .doc = "of u; its part along the surface counts",
+                             .required = true},
+                            {.name = "radius",
+                             .type = ParamType::Length,
+                             .doc = "half of the square's side, along the surface",
+                             .range = Range::Positive,
+                             .required = true}},
+                           joinParams(levelParams("reduced"),
+                                      {{.name = "mirror",
+                                        .type = ParamType::Flag,
+                                        .doc = "v runs the other way: the texture is mirrored"}})),
+      .operands = {{Kind::Band, Kind::Surface}},
+      .resultKind = [](const Invocation&) { return Kind::Patch; },
+      .run = decal,
+      .plan = planDecal,
+      .validate = validateLevels,
+  });
+  all.push_back({
+      .name = "patch-grid",
+      .group = "Texture mapping",
+      .summary = "tile a patch, or all around an axis, with patches whose textures meet",
+      .details = "Neighbours share the particles of their common border. With --around the tiles "
+                 "close: u runs around the axis, anticlockwise seen from its second point, v "
+                 "along it between the planes through the two points. A texture meets itself where "
+                 "it reaches the border of its box, see --texture-box.",
+      .example = "levelsmith cylinder --radius 5 --height 20 --voxel 0.2 --as grip ! patch-grid "
+                 "@grip --count 12,6 --around \"0,0,-6 0,0,6\" --height 0.8 --as p "
+                 "! box --size 1,1,1 --voxel 0.1 --as stud ! texture @grip @stud @p "
+                 "--texture-box \"-1,-1,-0.5 1,1,0.5\" ! mesh ! write grip.ply",
+      .params = joinParams(
+          joinParams({{.name = "count",
+                       .type = ParamType::Text,
+                       .doc = "n,m: tiles along u and along v",
+                       .required = true}},
+                     outlineParams()),
+          joinParams({{.name = "around",
+                       .type = ParamType::Points,
+                       .doc = "two points, \"from to\": all around the axis between them"},
+                      {.name = "rotate",
+                       .type = ParamType::Degrees,
+                       .doc = "of u about the normal with --at; of the first seam with --around",
+                       .fallback = "0"},
+                      {.name = "mirror",
+                       .type = ParamType::Choice,
+                       .doc = "every other tile is turned over along u, along v, or along both",
+                       .fallback = "none",
+                       .choices = {"none", "u", "v", "both"}},
+                      {.name = "shift",
+                       .type = ParamType::Number,
+                       .doc = "of every other row along u, in tiles; such a row has one tile less "
+                              "unless the tiles close",
+                       .fallback = "0",
+                       .range = Range::NonNegative},
+                      {.name = "mirrored",
+                       .type = ParamType::Flag,
+                       .doc = "accept corners that run clockwise: textures are mirrored"}},
+                     levelParams("conforming"))),
+      .operands = {{Kind::Band, Kind::Surface}},
+      .resultKind = [](const Invocation&) { return Kind::Patch; },
+      .run = patchGrid,
+      .plan = planGrid,
+      .validate = validateGrid,
+  });
+}
+
+}  // namespace pipeline

@@ -1,0 +1,136 @@
+#include "apps/pipeline/operators/mapping/patch_options.h"
+
+#include <fmt/core.h>
+
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::UsageError;
+
+constexpr long kMostLevels = 1000;
+
+mapping::LevelScheme schemeOf(const Invocation& in) {
+  const std::string name = in.text("particles");
+  if (name == "conforming") return mapping::LevelScheme::Conforming;
+  return name == "spline" ? mapping::LevelScheme::Spline : mapping::LevelScheme::Reduced;
+}
+
+}  // namespace
+
+std::vector<Param> withLevels(std::vector<Param> params) {
+  const std::vector<Param> levels = {
+      {.name = "height",
+       .type = ParamType::Length,
+       .doc = "of the texture; 'auto' keeps its proportions",
+       .range = Range::Positive,
+       .required = true,
+       .allowsAuto = true},
+      {.name = "levels",
+       .type = ParamType::Integer,
+       .doc = "of particles, 2 or more",
+       .fallback = "6",
+       .range = Range::Positive},
+      {.name = "particles",
+       .type = ParamType::Choice,
+       .doc = "how they are laid above the surface",
+       .fallback = "reduced",
+       .choices = {"reduced", "conforming", "spline"}},
+      {.name = "twist",
+       .type = ParamType::Degrees,
+       .doc = "of the top about the patch's axis, anticlockwise from outside",
+       .fallback = "0"},
+      {.name = "taper",
+       .type = ParamType::Number,
+       .doc = "width of the top over that of the surface",
+       .fallback = "1",
+       .range = Range::Positive},
+      {.name = "bend",
+       .type = ParamType::Degrees,
+       .doc = "that the axis leans towards u at the top",
+       .fallback = "0"},
+      {.name = "spacing",
+       .type = ParamType::Length,
+       .doc = "of particles; default: by patch and voxel size",
+       .range = Range::Positive}};
+  params.insert(params.end(), levels.begin(), levels.end());
+  return params;
+}
+
+void validateLevels(const Invocation& in) {
+  const std::string& name = in.op().name;
+  if (in.text("particles") != "spline" && (in.given("spline") || in.given("fade")))
+    throw UsageError(fmt::format("{}: --spline and --fade go with --particles spline", name));
+  for (const char* option : {"directions", "parallel"})
+    if (in.given(option) && in.text("particles") != "reduced")
+      throw UsageError(fmt::format("{}: --{} goes with --particles reduced", name, option));
+  if (in.given("directions") && in.given("parallel"))
+    throw UsageError(fmt::format("{}: give one of --directions and --parallel", name));
+  if (in.text("particles") == "spline" && in.text("height") == "auto") {
+    throw UsageError(fmt::format(
+        "{}: --height auto does not go with --particles spline; give the length along the spline",
+        name));
+  }
+  const long levels = in.integer("levels");
+  if (levels < 2 || levels > kMostLevels) {
+    throw UsageError(
+        fmt::format("{}: --levels {} is out of range; give 2 to {}", name, levels, kMostLevels));
+  }
+}
+
+mapping::PatchOptions patchOptionsOf(Invocation& in) {
+  mapping::PatchOptions options = {.levels = static_cast<std::size_t>(in.integer("levels")),
+                                   .scheme = schemeOf(in),
+                                   .fade = in.given("fade"),
+                                   .spacing = in.given("spacing") ? in.length("spacing") : 0,
+                                   .mirror = in.flag("mirror"),
+                                   .maxMemory = in.maxMemory,
+                                   .progress = in.progress};
+  if (in.given("spline")) options.spline = in.points("spline");
+  if (in.given("directions")) options.directions = in.points("directions");
+  options.parallel = in.given("parallel");
+  options.transform = {
+      .twist = in.radians("twist"), .taper = in.number("taper"), .bend = in.radians("bend")};
+  return options;
+}
+
+std::array<double, 2> patchSizeOf(Invocation& in) {
+  const std::vector<double> size = in.lengths("size");
+  for (const double side : size) {
+    if (side > 10 * in.operands[0].diagonal()) {
+      throw levelset::InvalidInput(fmt::format(
+          "{}: --size {} is over ten times the solid's diagonal of {:.6g}; make it smaller",
+          in.op().name, in.text("size"), in.operands[0].diagonal()));
+    }
+  }
+  return {size[0], size[1]};
+}
+
+std::vector<mapping::PatchOutline> outlinesOf(const std::vector<mapping::Patch>& patches) {
+  std::vector<mapping::PatchOutline> outlines;
+  for (const mapping::Patch& one : patches) outlines.push_back(mapping::outlineOf(one));
+  return outlines;
+}
+
+void tellOrigin(const Invocation& in, PatchRecipe& recipe) {
+  recipe.action = in.op().name;
+  const auto written = [&](const Param& param) -> std::string {
+    if (param.type == ParamType::Flag || param.type == ParamType::Points)
+      return in.given(param.name) ? "given" : "none";  // a spline lies elsewhere, as the patch does
+    if (param.type == ParamType::Number) return fmt::format("{}", in.number(param.name));
+    if (param.type == ParamType::Degrees) return fmt::format("{}", in.radians(param.name));
+    return in.given(param.name) || !param.fallback.empty() ? in.text(param.name) : "none";
+  };
+  const bool isGrid = recipe.action == "patch-grid";
+  for (const Param& param : in.op().params) {
+    const std::string& name = param.name;
+    const bool isShape = name == "twist" || name == "taper" || name == "bend" || name == "spline" ||
+                         name == "fade" || name == "directions" || name == "parallel" ||
+                         (isGrid && (name == "count" || name == "shift" || name == "mirror"));
+    if (isShape) recipe.shape[name] = written(param);
+    if (name == "particles" || name == "spacing") recipe.fineness[name] = written(param);
+  }
+}
+
+}  // namespace pipeline

@@ -1,0 +1,373 @@
+#include "apps/pipeline/operators/mapping/patch_quality_options.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "apps/pipeline/operators/common.h"
+#include "apps/process_cost.h"
+#include "levelset/error.h"
+#include "mapping/distortion/jacobian_field.h"
+#include "mapping/maps/layer_map.h"
+#include "mapping/maps/shell_map.h"
+#include "mapping/placement/shared_particles.h"
+#include "mapping/rbf/rbf_map.h"
+#include "mapping/textures/geometric_texture.h"
+#include "mapping/untangle/untangle.h"
+
+namespace pipeline {
+namespace {
+
+using Imath::V3d;
+using levelset::UsageError;
+
+nlohmann::ordered_json spreadOf(const mapping::Spread& spread) {
+  nlohmann::ordered_json json;
+  json["min"] = spread.least;
+  json["percent_1"] = spread.percent1;
+  json["median"] = spread.median;
+  json["percent_99"] = spread.percent99;
+  json["max"] = spread.most;
+  return json;
+}
+
+nlohmann::ordered_json foldsJson(const mapping::ShellFolds& folds) {
+  return {{"folded_cells", folds.folded},
+          {"cells", folds.cells},
+          {"min_jacobian", folds.leastJacobian}};
+}
+
+nlohmann::ordered_json energyJson(const mapping::ShellDistortion& distortion) {
+  return {{"energy", distortion.mean},
+          {"median", distortion.median},
+          {"percent_99", distortion.percent99},
+          {"max", distortion.most}};
+}
+
+const std::vector<std::string> kKernelNames = {"biharmonic", "triharmonic", "thin-plate",
+                                               "sum",        "laplacian",   "gaussian"};
+
+bool isRelaxed(const Invocation& in) {
+  return in.text("relax") != "none";
+}
+
+/// @param part, parts  which of the patches, for the progress
+mapping::ShellOptions shellOptions(const Invocation& in, const mapping::Patch& patch, double sink,
+                                   std::size_t part, std::size_t parts) {
+  const auto share = [&](std::size_t n) {
+    return static_cast<double>(n) / static_cast<double>(parts);
+  };
+  return {.sink = sink / patch.height,
+          .freeSides = in.text("sides") == "free",
+          .maxMemory = in.maxMemory,
+          .progress = levelset::subProgress(in.progress, share(part), share(part + 1))};
+}
+
+void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
+                   double sink) {
+  mapping::ShellFolds before, after;
+  before.leastJacobian = after.leastJacobian = HUGE_VAL;
+  const std::size_t parts = improved.patches.size() * (isRelaxed(in) ? 2 : 1);
+  for (mapping::Patch& patch : improved.patches) {
+    const auto part = static_cast<std::size_t>(&patch - improved.patches.data());
+    mapping::Unfolding result =
+        mapping::unfold(base, patch, shellOptions(in, patch, sink, part, parts));
+    improved.figures["unfold"].push_back({{"before", foldsJson(result.before)},
+                                          {"after", foldsJson(result.after)},
+                                          {"iterations", result.iterations},
+                                          {"farthest_move", result.farthestMove}});
+    before.folded += result.before.folded;
+    before.cells += result.before.cells;
+    before.leastJacobian = std::min(before.leastJacobian, result.before.leastJacobian);
+    after.folded += result.after.folded;
+    after.leastJacobian = std::min(after.leastJacobian, result.after.leastJacobian);
+    patch = std::move(result.patch);
+  }
+  if (before.folded == 0) {
+    in.notes.notes.push_back("--unfold: no cell of the patch folds, it stays as it is");
+  } else if (after.folded == 0) {
+    in.notes.notes.push_back(fmt::format(
+        "--unfold: {} of {} cells folded, none does now; the least Jacobian went from {:.3g} to "
+        "{:.3g}",
+        before.folded, before.cells, before.leastJacobian, after.leastJacobian));
+  } else {
+    in.notes.warnings.push_back(fmt::format(
+        "{}: --unfold cannot mend the patch, {} of {} cells fold where {} did; lower its height, "
+        "let its sides move with --sides free, or choose a flatter place",
+        in.op().name, after.folded, before.cells, before.folded));
+  }
+}
+
+void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
+                  double sink, const V3d& textureSize) {
+  double before = 0, after = 0;
+  const std::size_t first = in.flag("unfold") ? improved.patches.size() : 0;
+  const std::size_t parts = first + improved.patches.size();
+  for (mapping::Patch& patch : improved.patches) {
+    const auto part = first + static_cast<std::size_t>(&patch - improved.patches.data());
+    mapping::ShellOptions options = shellOptions(in, patch, sink, part, parts);
+    // What is left out afterwards need not be mended.
+    if (in.flag("skip-folds") && mapping::countFolds(patch, options.sink).folded > 0) {
+      improved.figures["relax"].push_back(nullptr);
+      continue;
+    }
+    if (in.text("relax") == "texture") options.proportions = textureSize;
+    mapping::DistortionGain result = mapping::minimiseDistortion(base, patch, options);
+    improved.figures["relax"].push_back({{"before", energyJson(result.before)},
+                                         {"after", energyJson(result.after)},
+                                         {"iterations", result.iterations},
+                                         {"farthest_move", result.farthestMove}});
+    const double share = 1 / static_cast<double>(improved.patches.size());
+    before += share * result.before.mean;
+    after += share * result.after.mean;
+    patch = std::move(result.patch);
+  }
+  in.notes.notes.push_back(
+      fmt::format("--relax: the energy of distortion went from {:.6g} to {:.6g}, where 6 is none",
+                  before, after));
+}
+
+/// A certificate, the distortion and the field of the map that --map names.
+struct JudgedMap {
+  mapping::FoldCertificate certificate;
+  mapping::Distortion distortion;
+  levelset::FieldGrid field;
+};
+
+JudgedMap judgeMap(Invocation& in, const mapping::Patch& patch, double sink, double voxel) {
+  mapping::JacobianFieldOptions options{
+      .voxelSize = voxel, .sink = sink / patch.height, .maxMemory = in.maxMemory};
+  const auto [u, v] = sidesOf(patch);  // in place of a texture's
+  const V3d size(u, v, patch.height);
+  const auto survey = [&](const std::vector<mapping::MapSample>& samples) {
+    return mapping::surveyDistortion(samples, size, patch.mirrored);
+  };
+  if (in.text("map") == "mesh") {
+    mapping::FoldCertificate certificate = mapping::certifyLevels(patch, options.sink);
+    levelset::FieldGrid field = mapping::jacobianField(patch, certificate, options);
+    return {std::move(certificate), survey(mapping::sampleLevelMap(patch, options.sink)),
+            std::move(field)};
+  }
+  if (in.text("map") == "shell") {
+    levelset::requireMemory(mapping::ShellMap::estimateBytes(patch), in.maxMemory, "folds");
+    const mapping::ShellMap map(patch, {.sink = options.sink});
+    mapping::FoldCertificate certificate = mapping::certifyShell(map, patch.mirrored);
+    levelset::FieldGrid field = mapping::jacobianField(patch, map, certificate, options);
+    return {std::move(certificate), survey(map.samples()), std::move(field)};
+  }
+  mapping::TextureCost cost;
+  mapping::JudgedRbf judged = mapping::judgedRbf(patch, options.sink,
+                                                 {.kernel = kernelOf(in),
+                                                  .lambdaNear = in.number("lambda-near"),
+                                                  .lambdaFar = in.number("lambda-far"),
+                                                  .maxMemory = in.maxMemory,
+                                                  .progress = in.progress},
+                                                 cost);
+  if (judged.isExtrapolated)
+    in.notes.notes.push_back(
+        "folds: where the texture is sunk no particles hold the map, since columns that go "
+        "straight "
+        "on would fold it");
+  levelset::FieldGrid field =
+      mapping::jacobianField(patch, *judged.map, judged.certificate, options);
+  return {std::move(judged.certificate), survey(judged.samples), std::move(field)};
+}
+
+std::string verdictSentence(const mapping::FoldCertificate& certificate) {
+  if (certificate.verdict() == mapping::FoldVerdict::Certified)
+    return fmt::format("certified: the map folds nowhere, its least Jacobian is {:.3g}",
+                       certificate.leastJacobian);
+  if (certificate.verdict() == mapping::FoldVerdict::Undecided)
+    return fmt::format("no fold was met, but {:.2g} of the volume is not certified",
+                       certificate.undecidedShare);
+  const mapping::FoldPlace& worst = certificate.worst.front();
+  return fmt::format(
+      "the map folds, most at ({:.6g}, {:.6g}, {:.6g}), u, v, w = {:.3g}, {:.3g}, {:.3g}",
+      worst.place.x, worst.place.y, worst.place.z, worst.uvw.x, worst.uvw.y, worst.uvw.z);
+}
+
+Value folds(Invocation& in) {
+  const PatchValue& onto = in.operands[1].patch();
+  if (onto.atHeight)
+    throw UsageError(
+        "folds: the patch has --height auto, which only its texture tells; give it a height");
+  if (onto.patches.size() != 1)
+    throw UsageError(fmt::format("folds: there are {} patches; give one", onto.patches.size()));
+  const double sink = in.length("sink");
+  const double voxel = in.given("voxel") ? in.length("voxel") : in.band(0).voxelSize();
+  // Relaxed towards the patch's own proportions, since there is no texture.
+  ImprovedPatches improved = improvedPatches(in, in.band(0), onto.patches, sink, V3d(1));
+  JudgedMap judged = judgeMap(in, improved.patches.front(), sink, voxel);
+  nlohmann::ordered_json json = std::move(improved.figures);
+  addDistortion(judged.distortion, json);
+  json["certificate"] = certificateJson(judged.certificate);
+  in.notes.detailsJson = json.dump();
+  in.notes.notes.push_back(verdictSentence(judged.certificate));
+  return Value(std::move(judged.field));
+}
+
+Plan planFolds(Invocation& in) {
+  const Plan &base = in.operands[0].plan(), &patch = in.operands[1].plan();
+  Plan plan;
+  plan.kind = Kind::Field;
+  plan.bounds = patch.bounds;
+  plan.voxelSize = in.given("voxel") ? in.length("voxel") : base.voxelSize;
+  const V3d& size = patch.patchSize;
+  constexpr double kBytesPerVoxel = 8;
+  plan.fieldBytes = plan.voxelSize > 0 ? kBytesPerVoxel * size.x * size.y * size.z /
+                                             (plan.voxelSize * plan.voxelSize * plan.voxelSize)
+                                       : 0;
+  return plan;
+}
+
+void validateFolds(const Invocation& in) {
+  validateShell(in);
+  if (in.text("relax") == "texture")
+    throw UsageError("folds: --relax texture needs a texture; give --relax patch");
+  for (const char* option : {"kernel", "lambda-near", "lambda-far"})
+    if (in.text("map") != "rbf" && in.given(option))
+      throw UsageError(fmt::format("folds: --{} says nothing to --map {}; leave it out", option,
+                                   in.text("map")));
+}
+
+}  // namespace
+
+std::array<double, 2> sidesOf(const mapping::Patch& patch) {
+  const mapping::ParticleLevel& level = patch.levels.front();
+  double u = 0, v = 0;
+  for (std::size_t row = 0; row < level.rows; ++row)
+    for (std::size_t column = 1; column < level.columns; ++column)
+      u += (level.at(column, row) - level.at(column - 1, row)).length();
+  for (std::size_t column = 0; column < level.columns; ++column)
+    for (std::size_t row = 1; row < level.rows; ++row)
+      v += (level.at(column, row) - level.at(column, row - 1)).length();
+  return {u / static_cast<double>(level.rows), v / static_cast<double>(level.columns)};
+}
+
+void addDistortion(const mapping::Distortion& distortion, nlohmann::ordered_json& json) {
+  json["folded"] = distortion.folded;
+  json["samples"] = distortion.samples;
+  json["min_jacobian"] = distortion.jacobian.least;
+  json["min_stretch"] = distortion.stretch.least;
+  json["max_stretch"] = distortion.stretch.most;
+  json["jacobian"] = spreadOf(distortion.jacobian);
+  json["stretch"] = spreadOf(distortion.stretch);
+}
+
+Param kernelParam() {
+  return {.name = "kernel",
+          .type = ParamType::Choice,
+          .doc = "with --map rbf: what a particle does at a distance",
+          .fallback = "biharmonic",
+          .choices = kKernelNames};
+}
+
+mapping::RbfKernel kernelOf(const Invocation& in) {
+  const auto name = std::find(kKernelNames.begin(), kKernelNames.end(), in.text("kernel"));
+  return static_cast<mapping::RbfKernel>(name - kKernelNames.begin());
+}
+
+std::vector<Param> withShell(std::vector<Param> params) {
+  params.push_back({.name = "unfold",
+                    .type = ParamType::Flag,
+                    .doc = "move particles of the patch until none of its cells folds"});
+  params.push_back({.name = "relax",
+                    .type = ParamType::Choice,
+                    .doc = "move particles to the least distortion of the whole patch, against its "
+                           "own proportions or the texture's",
+                    .fallback = "none",
+                    .choices = {"none", "patch", "texture"}});
+  params.push_back({.name = "sides",
+                    .type = ParamType::Choice,
+                    .doc = "with --unfold and --relax: the sides on the surface stay, or slide",
+                    .fallback = "fixed",
+                    .choices = {"fixed", "free"}});
+  return params;
+}
+
+bool improvesPatches(const Invocation& in) {
+  return in.flag("unfold") || isRelaxed(in);
+}
+
+void validateShell(const Invocation& in) {
+  if (in.given("sides") && !improvesPatches(in))
+    throw UsageError(
+        fmt::format("{}: --sides goes with --unfold or --relax; leave it out", in.op().name));
+}
+
+ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base,
+                                std::vector<mapping::Patch> patches, double sink,
+                                const V3d& textureSize) {
+  for (const mapping::Patch& patch : patches) mapping::requirePatchOn(base, patch);
+  ImprovedPatches improved{.patches = std::move(patches)};
+  if (!improvesPatches(in)) return improved;
+  const double start = apps::processCpuSeconds();
+  const std::vector<mapping::Patch> before = improved.patches;
+  if (in.flag("unfold")) unfoldPatches(in, base, improved, sink);
+  if (isRelaxed(in)) relaxPatches(in, base, improved, sink, textureSize);
+  mapping::joinSharedParticles(before, improved.patches);
+  improved.figures["improvement_cpu_s"] = apps::processCpuSeconds() - start;
+  return improved;
+}
+
+nlohmann::ordered_json certificateJson(const mapping::FoldCertificate& certificate) {
+  nlohmann::ordered_json json;
+  json["verdict"] = mapping::foldVerdictName(certificate.verdict());
+  json["min_jacobian"] = certificate.leastJacobian;
+  json["folded_share"] = certificate.foldedShare;
+  json["undecided_share"] = certificate.undecidedShare;
+  json["pieces"] = certificate.pieces;
+  json["worst"] = nlohmann::ordered_json::array();
+  for (const mapping::FoldPlace& fold : certificate.worst)
+    json["worst"].push_back({{"place", {fold.place.x, fold.place.y, fold.place.z}},
+                             {"uvw", {fold.uvw.x, fold.uvw.y, fold.uvw.z}},
+                             {"jacobian", fold.jacobian}});
+  return json;
+}
+
+void addFoldOperators(std::vector<Operator>& all) {
+  all.push_back({
+      .name = "folds",
+      .group = "Texture mapping",
+      .summary = "certify that a patch's map folds nowhere, and its Jacobian as a field",
+      .details =
+          "The operands are base and patch. The field holds the map's Jacobian on the grid "
+          "points of the patch: 1 where it is the median, 0 or less where the map turns "
+          "over. The certificate is in the report, and how lengths and volumes spread, against "
+          "the patch's own size.",
+      .example = "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
+                 "--size 8,8 --height 3 --as p ! folds @ball @p ! write jacobian.vdb",
+      .params = withShell({{.name = "map",
+                            .type = ParamType::Choice,
+                            .doc = "as of `texture`",
+                            .fallback = "rbf",
+                            .choices = {"rbf", "shell", "mesh"}},
+                           {.name = "sink",
+                            .type = ParamType::Length,
+                            .doc = "how deep the texture dips into the base",
+                            .fallback = "1vx",
+                            .range = Range::NonNegative},
+                           voxelParam("of the field; default: the base's"),
+                           kernelParam(),
+                           {.name = "lambda-near",
+                            .type = ParamType::Number,
+                            .doc = "as of `texture`",
+                            .fallback = "0.005",
+                            .range = Range::NonNegative},
+                           {.name = "lambda-far",
+                            .type = ParamType::Number,
+                            .doc = "as of `texture`",
+                            .fallback = "0.25",
+                            .range = Range::NonNegative}}),
+      .operands = {{Kind::Band, Kind::Surface}, {Kind::Patch}},
+      .resultKind = [](const Invocation&) { return Kind::Field; },
+      .run = folds,
+      .plan = planFolds,
+      .validate = validateFolds,
+  });
+}
+
+}  // namespace pipeline

@@ -1,0 +1,194 @@
+#include "mapping/placement/scatter.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/fields.h"
+#include "apps/pipeline/operators/mapping/patch_options.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "levelset/error.h"
+#include "mapping/placement/make_patch.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::UsageError;
+
+void validateScatter(const Invocation& in) {
+  if (in.given("count") == in.given("distance"))
+    throw UsageError("scatter: give either --count or --distance");
+  if (in.integer("seed") < 0)
+    throw UsageError(fmt::format("scatter: --seed {} is below 0", in.integer("seed")));
+  validateLevels(in);
+}
+
+mapping::ScatterOptions scatterOptions(Invocation& in) {
+  mapping::ScatterOptions options;
+  if (in.given("count")) {
+    options.density.count = static_cast<std::size_t>(in.integer("count"));
+  } else {
+    options.density.distance = in.length("distance");
+  }
+  if (in.given("scale")) options.density.scale = scalarField(in, "scale");
+  if (const std::optional<levelset::Mask> mask = maskOf(in))
+    options.density.weight = [mask = *mask](const Imath::V3d& p) { return mask.weight(p); };
+  options.density.seed = static_cast<std::uint64_t>(in.integer("seed"));
+  options.density.progress = in.progress;
+  options.density.maxMemory = in.maxMemory;
+  const std::array<double, 2> size = patchSizeOf(in);
+  options.uSize = size[0];
+  options.vSize = size[1];
+  if (in.given("along")) options.direction = vectorField(in, "along");
+  options.rotation = in.radians("rotate");
+  options.jitter = in.radians("jitter");
+  options.patch = patchOptionsOf(in);
+  options.patch.progress = {};
+  options.allowFolds = in.flag("allow-folds");
+  return options;
+}
+
+/// Each patch goes its own way, and keeps its scale.
+std::shared_ptr<const PatchRecipe> recipeOf(const Invocation& in,
+                                            const std::vector<mapping::PatchSite>& sites,
+                                            const mapping::PatchOptions& options) {
+  PatchRecipe recipe;
+  tellOrigin(in, recipe);
+  recipe.outlines = outlinesOf;
+  recipe.make = [sites, options](const levelset::NarrowBand& base,
+                                 std::span<const mapping::Footprint> footprints,
+                                 std::span<const mapping::Footprint>,
+                                 const levelset::Progress& progress) {
+    std::vector<mapping::Patch> patches;
+    for (std::size_t i = 0; i < footprints.size(); ++i) {
+      mapping::PatchOptions now = options;
+      now.spacing *= sites[i].scale;
+      now.mirror = true;
+      levelset::report(progress, static_cast<double>(i) / static_cast<double>(footprints.size()),
+                       "scatter");
+      patches.push_back(
+          mapping::makePatch(base, footprints[i].corners, footprints[i].height, now).patch);
+    }
+    return patches;
+  };
+  return std::make_shared<const PatchRecipe>(std::move(recipe));
+}
+
+Value scatter(Invocation& in) {
+  const mapping::ScatterOptions options = scatterOptions(in);
+  const bool isAuto = in.text("height") == "auto";
+  const double height = isAuto ? in.band().voxelSize() : in.length("height");
+  mapping::ScatterResult result = mapping::scatter(in.band(), height, options);
+  nlohmann::ordered_json json;
+  json["patches"] = result.patches.size();
+  json["left_out"] = result.leftOut;
+  if (std::isfinite(result.distance)) json["least_distance"] = result.distance;
+  in.notes.detailsJson = json.dump();
+  in.notes.notes.push_back(fmt::format(
+      "{} patches{}", result.patches.size(),
+      std::isfinite(result.distance) ? fmt::format(", {:.4g} or more apart{}", result.distance,
+                                                   in.given("scale") ? " at scale 1" : "")
+                                     : ""));
+  if (options.density.count > result.patches.size()) {
+    in.notes.warnings.push_back(
+        fmt::format("scatter: {} of {} patches found no place, the first because: {}",
+                    options.density.count - result.patches.size(), options.density.count,
+                    result.leftOut > 0 ? result.cause : "the mask leaves too little room"));
+  } else if (result.leftOut > 0) {
+    in.notes.notes.push_back(fmt::format("{} places bear no patch, the first because: {}",
+                                         result.leftOut, result.cause));
+  }
+  PatchValue value;
+  value.patches = std::move(result.patches);
+  value.recipe = recipeOf(in, result.sites, options.patch);
+  if (isAuto) {
+    value.atHeight = [base = in.band(), sites = std::move(result.sites), patch = options.patch](
+                         double h, const levelset::Progress& progress) {
+      mapping::PatchOptions now = patch;
+      now.progress = progress;
+      return mapping::makePatches(base, sites, h, now);
+    };
+  }
+  return Value(std::move(value));
+}
+
+Plan planScatter(Invocation& in) {
+  Plan plan = in.operands[0].plan();
+  plan.kind = Kind::Patch;
+  const std::vector<double> size = in.lengths("size");
+  const bool isAuto = in.text("height") == "auto";
+  plan.patchSize = {size[0], size[1], isAuto ? 0 : in.length("height")};
+  // Of discs in a plane that are thrown until there is no room, seven tenths of the densest packing
+  // find a place.
+  constexpr double kPacked = 0.7 / 0.866;
+  const double distance = in.given("distance") ? in.length("distance") : 0;
+  plan.patchCount = in.given("count") ? static_cast<double>(in.integer("count"))
+                                      : std::max(1.0, kPacked * plan.area / (distance * distance));
+  const double height = isAuto ? std::hypot(size[0], size[1]) : plan.patchSize.z;
+  plan.bounds.min -= Imath::V3d(height);
+  plan.bounds.max += Imath::V3d(height);
+  plan.area = 0;
+  return plan;
+}
+
+}  // namespace
+
+void addScatterOperators(std::vector<Operator>& all) {
+  all.push_back({
+      .name = "scatter",
+      .group = "Texture mapping",
+      .summary = "strew patches over a surface, evenly and at random",
+      .details = "Places are Poisson-disc samples of the surface. --scale makes patches and their "
+                 "distances larger or smaller from place to place, --along turns u, a mask thins "
+                 "out. Where the surface bears no patch, or the patch would fold, none is laid.",
+      .example =
+          "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! scatter @ball --count 12 "
+          "--size 4,4 --height 1.5 --levels 2 --as many ! torus --radius 2 --tube 0.6 "
+          "--voxel 0.3 --as ring ! texture @ball @ring @many --voxel 0.5 ! write studded.vdb",
+      .params = withMask(withLevels(
+          {{.name = "count",
+            .type = ParamType::Integer,
+            .doc = "how many patches",
+            .range = Range::Positive},
+           {.name = "distance",
+            .type = ParamType::Length,
+            .doc = "least distance of their centres along the surface; as many as there is room",
+            .range = Range::Positive},
+           {.name = "size",
+            .type = ParamType::Lengths,
+            .doc = "along u and v, on the surface",
+            .range = Range::Positive,
+            .required = true,
+            .count = 2},
+           {.name = "scale",
+            .type = ParamType::Scalar,
+            .doc = "of size, height and distance, from place to place; default: 1"},
+           {.name = "along",
+            .type = ParamType::Velocity,
+            .doc = "where u points, as far as the surface lets it"},
+           {.name = "rotate",
+            .type = ParamType::Degrees,
+            .doc = "of u about the normal",
+            .fallback = "0"},
+           {.name = "jitter",
+            .type = ParamType::Degrees,
+            .doc = "a random turn of up to this to either side; 180 is any",
+            .fallback = "0"},
+           {.name = "seed",
+            .type = ParamType::Integer,
+            .doc = "another number gives other places",
+            .fallback = "1"},
+           {.name = "allow-folds", .type = ParamType::Flag, .doc = "lay patches that fold"}})),
+      .operands = {{Kind::Band, Kind::Surface}},
+      .resultKind = [](const Invocation&) { return Kind::Patch; },
+      .run = scatter,
+      .plan = planScatter,
+      .validate = validateScatter,
+  });
+}
+
+}  // namespace pipeline

@@ -1,0 +1,163 @@
+#include <fmt/core.h>
+
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/mapping/patch_quality_options.h"
+#include "apps/pipeline/operators/mapping/texture_options.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "levelset/error.h"
+#include "mapping/patches/patch.h"
+#include "mapping/textures/geometric_texture.h"
+#include "mapping/textures/mesh_texture.h"
+
+namespace pipeline {
+namespace {
+
+void addSolve(const mapping::RbfSolveReport& solve, nlohmann::ordered_json& json) {
+  json["solved_by"] = solve.isIterative ? "iteration" : "factors";
+  json["iterations"] = solve.iterations;
+  json["solve_residual"] = solve.solveResidual;
+  json["condition"] = solve.condition;
+  json["regularized"] = solve.isRegularized;
+  json["directions"] = solve.directions;
+  json["merged"] = solve.merged;
+  json["averaged"] = solve.averaged;
+}
+
+nlohmann::ordered_json costJson(const mapping::TextureCost& cost) {
+  nlohmann::ordered_json json;
+  json["setup"] = cost.setup;
+  json["certificate"] = cost.certificate;
+  json["mapping"] = cost.mapping;
+  json["distance"] = cost.distance;
+  json["merging"] = cost.merging;
+  return json;
+}
+
+std::string detailsOf(const mapping::TextureReport& report, double height, bool isRbf,
+                      const nlohmann::ordered_json& improvement) {
+  nlohmann::ordered_json json;
+  json["voxel_size"] = report.voxelSize;
+  json["patches"] = report.patches;
+  json["skipped"] = report.skipped;
+  json["height"] = height;
+  json["particles"] = report.particles;
+  json["blocks_tested"] = report.blocksTested;
+  json["blocks_evaluated"] = report.blocksEvaluated;
+  json["operations_per_point"] = report.operationsPerPoint;
+  json["cpu_s"] = costJson(report.cost);
+  addDistortion(report.distortion, json);
+  json["map_residual"] = report.mapResidual;
+  json["map_error"] = report.mapError;
+  json["map_error_points"] = report.mapErrorPoints;
+  if (isRbf) addSolve(report.solve, json);
+  json["certificate"] = certificateJson(report.certificate);
+  json.update(improvement);
+  return json.dump();
+}
+
+std::size_t particlesOf(std::span<const mapping::Patch> patches) {
+  std::size_t particles = 0;
+  for (const mapping::Patch& patch : patches) particles += patch.particleCount();
+  return particles;
+}
+
+/// And as --unfold and --relax leave them.
+ImprovedPatches patchesFor(Invocation& in, const Imath::Box3d& textureBox) {
+  return improvedPatches(in, in.band(0), patchesAtHeight(in, in.operands[2].patch(), textureBox),
+                         in.length("sink"), textureBox.size());
+}
+
+Value textureMesh(Invocation& in) {
+  const ImprovedPatches improved = patchesFor(in, textureBoxOf(in));
+  const std::vector<mapping::Patch>& patches = improved.patches;
+  mapping::MeshTextureOptions options = meshTextureOptions(in);
+  options.progress = in.progress;
+  for (const mapping::Patch& patch : patches) mapping::requirePatchOn(in.band(0), patch);
+  mapping::MeshTextureResult result = mapping::mapMesh(in.mesh(1), patches, options);
+  nlohmann::ordered_json json;
+  json["patches"] = patches.size();
+  json["skipped"] = result.skipped;
+  json["height"] = patches.front().height;
+  json["particles"] = particlesOf(patches);
+  addDistortion(result.distortion, json);
+  json["certificate"] = certificateJson(result.certificate);
+  json.update(improved.figures);
+  in.notes.detailsJson = json.dump();
+  in.notes.notes.insert(in.notes.notes.end(), result.notes.begin(), result.notes.end());
+  in.notes.notes.push_back(fmt::format("{} vertices moved, smallest Jacobian {:.3g}",
+                                       result.mesh.positions.size(),
+                                       result.distortion.jacobian.least));
+  return Value(std::move(result.mesh));
+}
+
+/// Of the fast evaluation, where the map was evaluated directly beside it.
+void tellMapError(Invocation& in, const mapping::TextureReport& report, double tolerance) {
+  if (report.mapErrorPoints == 0) return;
+  in.notes.errors.push_back(
+      {fmt::format("map's fast evaluation at {} random points, largest", report.mapErrorPoints),
+       report.mapError, "texture voxels"});
+  constexpr double kRounding = 1e-6;
+  if (report.mapError > tolerance + kRounding) {
+    in.notes.warnings.push_back(fmt::format(
+        "{}: the map's fast evaluation is off by {:.3g} texture voxels, and {} was asked; this is "
+        "a defect, please report it",
+        in.op().name, report.mapError, tolerance));
+  }
+}
+
+Value texture(Invocation& in) {
+  if (mapsMesh(in)) return textureMesh(in);
+  mapping::TextureOptions options = textureOptions(in);
+  options.progress = in.progress;
+  const ImprovedPatches improved = patchesFor(in, textureBoxOf(in));
+  const std::vector<mapping::Patch>& patches = improved.patches;
+  mapping::TextureResult result = mapping::mapTexture(in.band(0), in.band(1), patches, options);
+  in.notes.detailsJson = detailsOf(result.report, patches.front().height,
+                                   options.map == mapping::TextureMap::Rbf, improved.figures);
+  in.notes.errors.push_back({"map residual at particles, largest",
+                             result.report.mapResidual / result.report.voxelSize, "voxels"});
+  tellMapError(in, result.report, options.mapTolerance);
+  in.notes.notes.insert(in.notes.notes.end(), result.report.notes.begin(),
+                        result.report.notes.end());
+  if (result.report.solve.isIterative) {
+    in.notes.notes.push_back(fmt::format(
+        "{} particles solved for in {} iterations, residual {:.2g}", result.report.particles,
+        result.report.solve.iterations, result.report.solve.solveResidual));
+  }
+  in.notes.notes.push_back(
+      fmt::format("smallest Jacobian {:.3g}, stretch {:.3g} to {:.3g}, {} of {} blocks evaluated",
+                  result.report.distortion.jacobian.least, result.report.distortion.stretch.least,
+                  result.report.distortion.stretch.most, result.report.blocksEvaluated,
+                  result.report.blocksTested));
+  return Value(std::move(result.band));
+}
+
+}  // namespace
+
+void addTextureOperators(std::vector<Operator>& all) {
+  all.push_back({
+      .name = "texture",
+      .group = "Texture mapping",
+      .summary = "map a solid onto a patch of a surface, and join the two",
+      .details = "The operands are base, texture and patch. The texture's zero-set box is the unit "
+                 "cube of u, v, w. A map that "
+                 "folds is refused with the place.",
+      .example =
+          "levelsmith box --size 40,40,10 --voxel 0.5 --as base ! torus --radius 4 --tube "
+          "1.5 --voxel 0.25 --as rings "
+          "! patch @base --corners \"-10,-10,5 10,-10,5 10,10,5 -10,10,5\" --height 8 "
+          "--levels 6 --as p "
+          "! texture @base @rings @p --map rbf --blend 1 ! write out.vdb ! mesh ! write out.ply",
+      .params = textureParams(),
+      .operands = {{Kind::Band, Kind::Surface}, {Kind::Band, Kind::Mesh}, {Kind::Patch}},
+      .resultKind = [](const Invocation& in) { return mapsMesh(in) ? Kind::Mesh : Kind::Band; },
+      .run = texture,
+      .plan = planTexture,
+      .validate = validateTextureOptions,
+  });
+}
+
+}  // namespace pipeline

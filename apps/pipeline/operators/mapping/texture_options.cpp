@@ -1,0 +1,187 @@
+#include "apps/pipeline/operators/mapping/texture_options.h"
+
+#include <fmt/core.h>
+
+#include <array>
+#include <cmath>
+#include <span>
+
+#include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/mapping/patch_quality_options.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+using Imath::V3d;
+using levelset::UsageError;
+
+/// Height that keeps the texture's proportions on patches of this size.
+double aspectHeight(std::span<const mapping::Patch> patches, const Imath::Box3d& textureBox) {
+  const V3d size = textureBox.size();
+  double sum = 0;
+  for (const mapping::Patch& patch : patches) {
+    const auto [u, v] = sidesOf(patch);
+    sum += size.z * std::sqrt(u / size.x * v / size.y);
+  }
+  return sum / static_cast<double>(patches.size());
+}
+
+/// How far the flattest map of the texture's box onto the patch squeezes: the run surveys the real
+/// one.
+double plannedStretch(const Invocation& in, const Plan& texture, const Plan& patch) {
+  const V3d box = in.given("texture-box") ? in.box("texture-box").size() : texture.bounds.size();
+  double stretch = HUGE_VAL;
+  for (int axis = 0; axis < 3; ++axis)
+    if (patch.patchSize[axis] > 0 && box[axis] > 0)
+      stretch = std::min(stretch, patch.patchSize[axis] / box[axis]);
+  return std::isfinite(stretch) ? stretch : 1;
+}
+
+}  // namespace
+
+bool mapsMesh(const Invocation& in) {
+  return in.text("map") == "mesh";
+}
+
+Imath::Box3d textureBoxOf(const Invocation& in) {
+  return in.given("texture-box") ? in.box("texture-box") : in.operands[1].plan().bounds;
+}
+
+std::vector<mapping::Patch> patchesAtHeight(Invocation& in, const PatchValue& onto,
+                                            const Imath::Box3d& textureBox) {
+  if (!onto.atHeight) return onto.patches;
+  const double height = aspectHeight(onto.patches, textureBox);
+  in.notes.notes.push_back(
+      fmt::format("--height auto: {:.6g} keeps the texture's proportions", height));
+  return onto.atHeight(height, in.progress);
+}
+
+mapping::TextureOptions textureOptions(Invocation& in) {
+  mapping::TextureOptions options;
+  if (in.flag("carve")) options.merge = mapping::TextureMerge::Carve;
+  if (in.flag("alone")) options.merge = mapping::TextureMerge::Alone;
+  options.sink = in.length("sink");
+  options.blend = in.length("blend");
+  if (in.given("texture-box")) options.textureBox = in.box("texture-box");
+  if (in.given("voxel")) options.voxelSize = in.length("voxel");
+  options.halfWidth = in.number("half-width");
+  if (in.text("map") == "shell") options.map = mapping::TextureMap::Shell;
+  options.mapTolerance = in.number("map-tolerance");
+  options.rbf.kernel = kernelOf(in);
+  options.rbf.lambdaNear = in.number("lambda-near");
+  options.rbf.lambdaFar = in.number("lambda-far");
+  options.allowFolds = in.flag("allow-folds");
+  options.skipFolds = in.flag("skip-folds");
+  options.maxMemory = in.maxMemory;
+  return options;
+}
+
+mapping::MeshTextureOptions meshTextureOptions(Invocation& in) {
+  mapping::MeshTextureOptions options;
+  options.sink = in.length("sink");
+  if (in.given("texture-box")) options.textureBox = in.box("texture-box");
+  options.allowFolds = in.flag("allow-folds");
+  options.skipFolds = in.flag("skip-folds");
+  options.maxMemory = in.maxMemory;
+  return options;
+}
+
+Plan planTexture(Invocation& in) {
+  if (mapsMesh(in)) {
+    Plan plan = in.operands[1].plan();
+    plan.bounds = in.operands[2].plan().bounds;
+    return plan;
+  }
+  Plan plan = in.operands[0].plan();
+  plan.kind = Kind::Band;
+  const Plan &texture = in.operands[1].plan(), &patch = in.operands[2].plan();
+  plan.voxelSize = in.given("voxel") ? in.length("voxel")
+                                     : mapping::resultVoxelSize(plan.voxelSize, texture.voxelSize,
+                                                                plannedStretch(in, texture, patch));
+  const double from = texture.bounds.size().length();
+  const double to = (patch.patchCount > 1 ? patch.patchSize : patch.bounds.size()).length();
+  const double scale = from > 0 ? to / from : 1;
+  plan.area = (in.flag("alone") ? 0 : plan.area) + patch.patchCount * texture.area * scale * scale;
+  plan.bounds.extendBy(patch.bounds);
+  return plan;
+}
+
+void validateTextureOptions(const Invocation& in) {
+  validateShell(in);
+  if (in.flag("carve") && in.flag("alone"))
+    throw UsageError(in.op().name + ": --carve and --alone exclude each other");
+  if (in.flag("allow-folds") && in.flag("skip-folds"))
+    throw UsageError(in.op().name + ": --allow-folds and --skip-folds exclude each other");
+  if (in.operands[0].kind() == Kind::Surface && !mapsMesh(in) && !in.flag("alone"))
+    throw UsageError(in.op().name +
+                     ": the base is a surface band, which has no inside to join; take the texture "
+                     "--alone, or move a mesh with --map mesh");
+  if (in.flag("alone") && in.given("blend"))
+    throw UsageError(in.op().name + ": --alone has no seam to blend; leave --blend out");
+  const Kind kind = in.operands[1].kind();
+  if (mapsMesh(in) && kind != Kind::Mesh)
+    throw UsageError(in.op().name +
+                     ": --map mesh moves the vertices of a mesh; give one, or `mesh` first");
+  if (!mapsMesh(in) && kind == Kind::Mesh) {
+    throw UsageError(in.op().name +
+                     ": the texture is a mesh; turn it into a solid with `level-set`, or move its "
+                     "vertices with --map mesh");
+  }
+  std::vector<const char*> unused;
+  if (in.text("map") != "rbf") unused = {"kernel", "map-tolerance", "lambda-near", "lambda-far"};
+  if (mapsMesh(in)) unused.insert(unused.end(), {"carve", "alone", "blend", "voxel", "half-width"});
+  for (const char* option : unused)
+    if (in.given(option))
+      throw UsageError(fmt::format("{}: --{} says nothing to --map {}; leave it out", in.op().name,
+                                   option, in.text("map")));
+}
+
+std::vector<Param> textureParams() {
+  return withShell(
+      {{.name = "map",
+        .type = ParamType::Choice,
+        .doc = "from patch to texture",
+        .fallback = "rbf",
+        .choices = {"rbf", "shell", "mesh"}},
+       kernelParam(),
+       {.name = "map-tolerance",
+        .type = ParamType::Number,
+        .doc = "how far the fast evaluation of the map may be off, texture voxels",
+        .fallback = "0.05",
+        .range = Range::NonNegative},
+       {.name = "sink",
+        .type = ParamType::Length,
+        .doc = "how deep the texture dips into the base",
+        .fallback = "1vx",
+        .range = Range::NonNegative},
+       {.name = "blend",
+        .type = ParamType::Length,
+        .doc = "radius along the seam",
+        .fallback = "0",
+        .range = Range::NonNegative},
+       {.name = "carve", .type = ParamType::Flag, .doc = "cut the texture out of the base"},
+       {.name = "alone", .type = ParamType::Flag, .doc = "only the mapped texture"},
+       {.name = "texture-box",
+        .type = ParamType::Box,
+        .doc = "what of the texture's space is mapped onto the patch"},
+       voxelParam("of the result; default: the finest of base and texture x smallest stretch"),
+       halfWidthParam(),
+       {.name = "lambda-near",
+        .type = ParamType::Number,
+        .doc = "relaxation of the map at the surface, in mean particle spacings; for other "
+               "kernels in their own units",
+        .fallback = "0.005",
+        .range = Range::NonNegative},
+       {.name = "lambda-far",
+        .type = ParamType::Number,
+        .doc = "the same above the surface",
+        .fallback = "0.25",
+        .range = Range::NonNegative},
+       {.name = "allow-folds", .type = ParamType::Flag, .doc = "map even where the map folds"},
+       {.name = "skip-folds",
+        .type = ParamType::Flag,
+        .doc = "of many patches, leave out those whose map folds"}});
+}
+
+}  // namespace pipeline

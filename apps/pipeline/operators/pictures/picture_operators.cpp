@@ -1,0 +1,495 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <utility>
+
+#include "apps/pipeline/graph/region_of_interest.h"
+#include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/operators/pictures/camera_options.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+#include "render/camera.h"
+#include "render/cpu/cpu_renderer.h"
+#include "render/embree/embree_renderer.h"
+#include "render/gpu/gpu_renderer.h"
+#include "render/images/compare_images.h"
+#include "render/images/image.h"
+#include "render/kernel/frustum_culling.h"
+#include "render/scene/scene.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::UsageError;
+
+/// What the operand is of a scene, seen as the options ask.
+render::Scene sceneOf(Invocation& in) {
+  const Value& drawn = in.operands[0];
+  render::ViewedScene viewed = sceneOf(drawn);
+  viewed.scene.camera =
+      cameraOf(in, drawn.plan().bounds, viewed.hasCamera ? &viewed.scene.camera : nullptr);
+  return viewed.scene;
+}
+
+constexpr long kMostSamples = 4096;
+
+void validateDraw(const Invocation& in) {
+  validateCamera(in);
+  if (in.integer("samples") > kMostSamples)
+    throw UsageError(fmt::format("render: --samples {} is too many; {} are the most",
+                                 in.text("samples"), kMostSamples));
+  const std::string style = in.text("style");
+  if ((style == "matcap") != in.given("matcap"))
+    throw UsageError(in.given("matcap")
+                         ? "render: --matcap is for --style matcap; leave it out, or give that"
+                         : "render: --style matcap needs --matcap with a PNG of a shaded ball");
+  if (in.flag("thickness") && render::imageFormat(in.text("file"), in.text("format")) != "exr")
+    throw UsageError("render: a PNG has no layers, so --thickness is lost; name an .exr");
+  if (in.given("line") && style != "tone" && style != "ink")
+    throw UsageError(fmt::format("render: the style {} draws no lines; leave --line out", style));
+  if (in.text("tables") == "nanovdb") {
+    const std::string renderer = in.text("renderer");
+    if (renderer != "gpu" && renderer != "both")
+      throw UsageError(fmt::format(
+          "render: --renderer {} reads no NanoVDB grid; leave --tables out, or take gpu",
+          renderer));
+    if (in.text("filter") != "trilinear" || in.text("value-bits") != "32")
+      throw UsageError(
+          "render: a NanoVDB grid is drawn as it is, by the trilinear filter; leave --filter and "
+          "--value-bits out, or take --tables bricks");
+  }
+  if (in.text("value-bits") != "32" && in.text("filter") == "bspline-qi")
+    throw UsageError(
+        "render: the filter bspline-qi draws from coefficients, which --value-bits does not hold; "
+        "leave it out, or take another filter");
+  if (in.given("curvature-range") && (style == "lit" || style == "tone" || style == "matcap"))
+    throw UsageError(fmt::format(
+        "render: the style {} shows no curvatures; leave --curvature-range out", style));
+  if (render::imageFormat(in.text("file"), in.text("format")).empty()) {
+    throw UsageError(
+        fmt::format("render: '{}' is of no known format; use .exr or .png, or --format",
+                    in.text(in.given("format") ? "format" : "file")));
+  }
+  if (!in.given("png")) return;
+  const std::string file = in.text("file"), png = in.text("png");
+  if (levelset::isStandardOutput(file) && levelset::isStandardOutput(png))
+    throw UsageError("render: two images cannot share standard output; use a file for one");
+  if (levelset::isSameFile(file, png))
+    throw UsageError(fmt::format(
+        "render: '{}' is named twice, for the image and for --png; name two files", file));
+}
+
+std::vector<std::string> targetsOf(const Invocation& in) {
+  std::vector<std::string> targets{in.text("file")};
+  if (in.given("png")) targets.push_back(in.text("png"));
+  return targets;
+}
+
+/// Infinity has no number in JSON.
+Json numberOrText(double value) {
+  return std::isfinite(value) ? Json(value) : Json("infinite");
+}
+
+Json pixelsOf(const std::vector<render::PixelDifference>& pixels) {
+  Json all = Json::array();
+  for (const render::PixelDifference& p : pixels)
+    all.push_back({{"x", p.x}, {"y", p.y}, {"difference", numberOrText(p.value)}});
+  return all;
+}
+
+Json toJson(const render::ImageComparison& found) {
+  Json json;
+  json["agrees"] = found.agrees();
+  json["exact"] = found.isExact;
+  json["pixels"] = found.pixels;
+  json["both_hit"] = found.bothHit;
+  json["unlike_at_outline"] = found.unlikeAtOutline;
+  json["unlike_elsewhere"] = found.unlikeElsewhere;
+  json["unlike"] = pixelsOf(found.unlike);
+  json["different_bits"] = found.differentBits;
+  json["only_one"] = found.onlyOne;
+  json["layers"] = Json::array();
+  for (const render::LayerComparison& layer : found.layers) {
+    Json entry = {{"layer", layer.layer}, {"measure", layer.measure}, {"compared", layer.compared}};
+    entry["median"] = numberOrText(layer.median);
+    entry["p99"] = numberOrText(layer.p99);
+    entry["p999"] = numberOrText(layer.p999);
+    entry["largest"] = numberOrText(layer.largest);
+    entry["allowed"] = {{"p999", numberOrText(layer.allowed.usual)},
+                        {"largest", numberOrText(layer.allowed.worst)}};
+    entry["agrees"] = layer.agrees();
+    entry["worst"] = pixelsOf(layer.worst);
+    json["layers"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+/// The kernel's picture: by OpenGL, or by the processor where there is none, or where the shader
+/// does not know what is drawn.
+render::Image drawByKernel(Invocation& in, const render::Scene& scene,
+                           const render::RenderOptions& options) {
+  if (scene.isBlended()) return render::renderCpu(scene, options);
+  try {
+    return render::renderGpu(scene, options);
+  } catch (const render::NoOpenGl& error) {
+    in.notes.warnings.push_back(fmt::format("{}; 'both' takes the processor now", error.what()));
+    return render::renderCpu(scene, options);
+  }
+}
+
+render::Filter filterOf(const Invocation& in) {
+  for (const render::Filter filter : {render::Filter::BSpline, render::Filter::BSplineQi})
+    if (in.text("filter") == render::filterName(filter)) return filter;
+  return render::Filter::Trilinear;
+}
+
+std::vector<std::string> styleNames() {
+  std::vector<std::string> names;
+  for (const render::Style style : render::kStyles) names.emplace_back(render::styleName(style));
+  return names;
+}
+
+render::Style styleNamed(const std::string& name) {
+  for (const render::Style style : render::kStyles)
+    if (name == render::styleName(style)) return style;
+  return render::Style::Lit;
+}
+
+render::StyleOptions styleOf(const Invocation& in) {
+  render::StyleOptions options;
+  options.style = styleNamed(in.text("style"));
+  if (in.given("curvature-range")) options.curvatureRange = in.number("curvature-range");
+  options.lineWidth = in.number("line");
+  if (in.given("matcap"))
+    options.matcap = std::make_shared<const render::ColourImage>(
+        render::readColourPng(in.text("matcap"), in.maxMemory));
+  return options;
+}
+
+/// In as few bits as asked for; how far the surfaces moved goes into a note.
+void coarsen(Invocation& in, render::Scene& scene) {
+  const int bits = std::stoi(in.text("value-bits"));
+  if (bits == 32) return;
+  double bytes = 0;
+  for (const render::Solid& solid : scene.solids)
+    bytes += static_cast<double>(solid.band.memoryUse());
+  levelset::requireMemory(bytes, in.maxMemory, "render");
+  render::SurfaceShift most;
+  for (render::Solid& solid : scene.solids) {
+    if (solid.band.isEmpty()) continue;
+    render::CoarseBand coarse = render::coarsened(solid.band, bits);
+    solid.band = std::move(coarse.band);
+    solid.held = coarse.held;
+    most.largest = std::max(most.largest, coarse.shift.largest);
+    most.rms = std::max(most.rms, coarse.shift.rms);
+  }
+  in.notes.notes.push_back(
+      fmt::format("render: values of {} bits moved the surface by {:.2g} voxel at most, {:.2g} in "
+                  "the mean (rms)",
+                  bits, most.largest, most.rms));
+}
+
+Value draw(Invocation& in) {
+  render::Scene scene = sceneOf(in);
+  coarsen(in, scene);
+  // The judge of fields is slow.
+  const std::string renderer =
+      scene.isBlended() && !in.given("renderer") ? "cpu" : in.text("renderer");
+  const bool isBoth = renderer == "both";
+  render::RenderOptions options{.samples = static_cast<int>(in.integer("samples")),
+                                .filter = filterOf(in),
+                                .fromNanoVdb = in.text("tables") == "nanovdb",
+                                .style = styleOf(in),
+                                .thickness = in.flag("thickness"),
+                                .maxBytes = in.maxMemory,
+                                .progress = in.progress};
+  if (isBoth) options.progress = levelset::subProgress(in.progress, 0, 0.5);
+  const render::Image image = renderer == "cpu"   ? render::renderCpu(scene, options)
+                              : renderer == "gpu" ? render::renderGpu(scene, options)
+                              : isBoth            ? drawByKernel(in, scene, options)
+                                                  : render::renderEmbree(scene, options);
+  if (const auto read = image.attributes.find("ls:read"); read != image.attributes.end())
+    in.notes.notes.push_back(fmt::format("render: {}", read->second));
+  if (const auto told = image.attributes.find("ls:warning"); told != image.attributes.end())
+    in.notes.warnings.push_back(fmt::format("render: {}", told->second));
+  render::writeImage(in.text("file"), image, in.text("format"));
+  if (in.given("png")) render::writeImage(in.text("png"), image, "png");
+  if (isBoth) {
+    // Layers alone are judged, and they are of the pixels' centres.
+    options.samples = 1;
+    options.ambientSamples = options.shadowSamples = 0;
+    options.progress = levelset::subProgress(in.progress, 0.5, 1);
+    const render::ImageComparison found =
+        render::compareImages(image, render::renderEmbree(scene, options));
+    in.notes.detailsJson = toJson(found).dump();
+    if (found.bothHit == 0)
+      in.notes.warnings.push_back(
+          "render: no pixel shows a surface in both pictures, so no layer was compared");
+    if (!found.agrees())
+      throw levelset::NumericalError(
+          fmt::format("render: the kernel's picture and the judge's differ: {}; draw both and look "
+                      "at them with compare-images",
+                      found.reason()));
+  }
+  return in.operands[0];
+}
+
+/// What the frame sees, where that alone makes the picture: light comes from beside it too, and the
+/// view, the range of curvatures and coarse values are by the size of the whole.
+Demand readOfDraw(Invocation& in, std::size_t, const Demand&) {
+  const render::Style style = styleNamed(in.text("style"));
+  const bool isFramed = in.operands[0].kind() == Kind::Band && in.given("from") && in.given("to") &&
+                        in.text("value-bits") == "32";
+  const bool isOfFrame =
+      !render::usesLights(style) && (style != render::Style::Ink || in.given("curvature-range"));
+  if (!isFramed || !isOfFrame) return {};
+  const Plan plan = in.operands[0].plan();
+  const Imath::Box3d all = grown(plan.bounds, plan.halfWidth * plan.voxelSize);
+  render::Scene scene;
+  scene.camera = cameraOf(in, plan.bounds);
+  const render::FrameNeed need(scene, {.style = {.style = style}}, all);
+  constexpr int kCells = 24;
+  const Imath::V3d side = all.size() / kCells;
+  Imath::Box3d seen;
+  for (int i = 0; i < kCells * kCells * kCells; ++i) {
+    const Imath::V3d low =
+        all.min + side * Imath::V3d(i % kCells, i / kCells % kCells, i / (kCells * kCells));
+    if (need.needs(low + side / 2, side.length() / 2)) seen.extendBy(Imath::Box3d(low, low + side));
+  }
+  if (seen.isEmpty()) return {};  // nothing is seen, and that has to be told of the whole
+  constexpr double kRead = 8;     // voxels beside what is seen: by normals, curvatures and splines
+  return {{.region = grown(seen, kRead * plan.voxelSize)}};
+}
+
+Plan planDraw(Invocation& in) {
+  (void)cameraOf(in, in.operands[0].plan().bounds);
+  return in.operands[0].plan();
+}
+
+/// "LAYER=USUAL,WORST …"
+std::map<std::string, render::LayerTolerance> tolerancesOf(const Invocation& in) {
+  std::map<std::string, render::LayerTolerance> all;
+  if (!in.given("tolerance")) return all;
+  std::istringstream words(in.text("tolerance"));
+  for (std::string word; words >> word;) {
+    const std::size_t equals = word.find('=');
+    std::istringstream numbers(equals == std::string::npos ? "" : word.substr(equals + 1));
+    render::LayerTolerance tolerance{};
+    char comma = 0;
+    if (!(numbers >> tolerance.usual >> comma >> tolerance.worst) || comma != ',' ||
+        !numbers.eof() || !(tolerance.usual >= 0) || !(tolerance.worst >= 0))
+      throw UsageError(
+          fmt::format("compare-images: --tolerance '{}' is not understood; write "
+                      "LAYER=USUAL,WORST, as Z=1e-6,1e-3, and blanks between several",
+                      word));
+    all[word.substr(0, equals)] = tolerance;
+  }
+  return all;
+}
+
+void validateComparison(const Invocation& in) {
+  (void)tolerancesOf(in);
+  if (in.flag("exact") && in.given("tolerance"))
+    throw UsageError(
+        "compare-images: --exact allows nothing, so --tolerance has no place; give one");
+  if (in.given("difference") &&
+      render::imageFormat(in.text("difference"), in.text("format")) != "exr")
+    throw UsageError("compare-images: --difference holds layers; name a file .exr");
+  for (const char* input : {"first", "second"})
+    if (in.given("difference") && levelset::isSameFile(in.text("difference"), in.text(input)))
+      throw UsageError(fmt::format(
+          "compare-images: '{}' is compared and named for --difference; name another file",
+          in.text(input)));
+}
+
+std::string asTable(const render::ImageComparison& found) {
+  std::string text = fmt::format(
+      "{} pixels, {} hit by both, {} by one along the outline and {} elsewhere, {} with other "
+      "bits\n",
+      found.pixels, found.bothHit, found.unlikeAtOutline, found.unlikeElsewhere,
+      found.differentBits);
+  text += fmt::format("{:<18}{:>10}{:>10}{:>10}{:>10}  {}\n", "layer", "median", "99 %", "99.9 %",
+                      "largest", "worst pixel");
+  for (const render::LayerComparison& l : found.layers) {
+    text += fmt::format(
+        "{:<18}{:>10.2g}{:>10.2g}{:>10.2g}{:>10.2g}  {}\n", l.layer, l.median, l.p99, l.p999,
+        l.largest, l.worst.empty() ? "none" : fmt::format("{},{}", l.worst[0].x, l.worst[0].y));
+  }
+  for (const std::string& name : found.onlyOne)
+    text += fmt::format("{} is in one picture only\n", name);
+  return text;
+}
+
+Value compareImages(Invocation& in) {
+  const render::ImageComparison found =
+      render::compareImages(render::readExr(in.text("first"), in.maxMemory),
+                            render::readExr(in.text("second"), in.maxMemory),
+                            {.exact = in.flag("exact"), .tolerances = tolerancesOf(in)});
+  const Json json = toJson(found);
+  in.notes.detailsJson = json.dump();
+  if (found.bothHit == 0)
+    in.notes.warnings.push_back(
+        "compare-images: no pixel shows a surface in both pictures, so no layer was compared");
+  in.output = asksJson(in) ? printed(json) : asTable(found);
+  if (in.given("difference"))
+    render::writeImage(in.text("difference"), found.difference, in.text("format"));
+  if (!found.agrees())
+    throw levelset::NumericalError(fmt::format(
+        "compare-images: the pictures differ: {}; look at the worst pixels, or at --difference{}",
+        found.reason(),
+        !found.isExact && found.coverageAgrees() ? ", or allow more with --tolerance" : ""));
+  return Value(Plan{});
+}
+
+Operator compareImagesOperator() {
+  return {
+      .name = "compare-images",
+      .group = "Pictures",
+      .summary = "compare two EXR pictures of one scene layer by layer",
+      .details =
+          "Shares of the differences and the worst pixels for each layer: Z and P relative to Z, "
+          "angles of N, curvatures by the voxel, id, colour. Exit code 5, after everything is "
+          "written, when they differ by more than two correct renderers may: pixels that only one "
+          "hits off the outline, or a layer that passes its tolerance.",
+      .example =
+          "levelsmith sphere --radius 1 --voxel 0.1 ! render a.exr --size 64x64 --samples 1 "
+          "! render b.exr --size 64x64 --samples 2 ! compare-images a.exr b.exr",
+      .params = {{.name = "first",
+                  .type = ParamType::Path,
+                  .doc = "an EXR with the layers of 'render'",
+                  .required = true,
+                  .position = 0},
+                 {.name = "second",
+                  .type = ParamType::Path,
+                  .doc = "another of the same size",
+                  .required = true,
+                  .position = 1},
+                 {.name = "exact", .type = ParamType::Flag, .doc = "ask for the same bits"},
+                 {.name = "tolerance",
+                  .type = ParamType::Text,
+                  .doc = "LAYER=USUAL,WORST: what 999 pixels of 1000 and all may differ by; blanks "
+                         "between several"},
+                 {.name = "difference",
+                  .type = ParamType::Path,
+                  .doc = "write the differences to this .exr, a channel for each layer"},
+                 {.name = "format", .type = ParamType::Text, .doc = "of the differences: exr"},
+                 jsonParam()},
+      .flow = Flow::PassesThrough,
+      .run = compareImages,
+      .plan = [](Invocation&) { return Plan{}; },
+      .validate = validateComparison,
+      .targets =
+          [](const Invocation& in) {
+            return in.given("difference") ? std::vector<std::string>{in.text("difference")}
+                                          : std::vector<std::string>{};
+          },
+      .usesStandardOutput =
+          [](const Invocation& in) {
+            return in.given("difference") && levelset::isStandardOutput(in.text("difference"));
+          },
+  };
+}
+
+}  // namespace
+
+void addPictureOperators(std::vector<Operator>& all) {
+  Operator picture = {
+      .name = "render",
+      .group = "Pictures",
+      .summary = "draw a level set, a mesh or a scene to an EXR with all layers, or a PNG",
+      .details =
+          "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y "
+          "N.Z, P.X P.Y P.Z, "
+          "curvature.mean .gauss .k1 .k2, id. Without --from, a three-quarter view that "
+          "frames the solid, or the scene's own. 'gpu' and 'cpu' are one kernel in single "
+          "precision, with the "
+          "same bits; 'embree' finds places by code of its own in double precision. 'both' "
+          "draws with the kernel, writes that, compares the layers with those of embree, "
+          "and ends with exit code 5 where they differ by more than two correct renderers "
+          "may.",
+      .example =
+          "levelsmith torus --radius 2 --tube 0.8 --voxel 0.05 ! render torus.png --size "
+          "320x240 --from 5,4,6 --to 0,0,0",
+      .params =
+          {{.name = "file",
+            .type = ParamType::Path,
+            .doc = ".exr or .png, or -",
+            .required = true,
+            .position = 0},
+           {.name = "png", .type = ParamType::Path, .doc = "write the colours to this .png too"},
+           {.name = "renderer",
+            .type = ParamType::Choice,
+            .doc = "which one draws; both: gpu and embree, compared; soft expressions and morphs "
+                   "are drawn by cpu unless embree is asked for",
+            .fallback = "embree",
+            .choices = {"gpu", "cpu", "embree", "both"}},
+           {.name = "filter",
+            .type = ParamType::Choice,
+            .doc = "what is drawn between grid points: the trilinear interpolant, the tricubic "
+                   "B-spline, which shrinks, or the one with corrected coefficients",
+            .fallback = "trilinear",
+            .choices = {"trilinear", "bspline", "bspline-qi"}},
+           {.name = "tables",
+            .type = ParamType::Choice,
+            .doc = "what the shader of gpu and both reads: bricks made for it, or the NanoVDB grid "
+                   "itself, which is slower and gives the same bits",
+            .fallback = "bricks",
+            .choices = {"bricks", "nanovdb"}},
+           {.name = "value-bits",
+            .type = ParamType::Choice,
+            .doc =
+                "what the ray caster holds a value in; 16 and 8 save memory, and the report says "
+                "how far they move the surface",
+            .fallback = "32",
+            .choices = {"32", "16", "8"}},
+           {.name = "style",
+            .type = ParamType::Choice,
+            .doc = "of the colours; mean, gauss and principal are curvatures",
+            .fallback = "lit",
+            .choices = styleNames()},
+           {.name = "matcap",
+            .type = ParamType::Path,
+            .doc = "a PNG of a shaded ball, for --style matcap"},
+           {.name = "curvature-range",
+            .type = ParamType::Number,
+            .doc = "per world unit: half way along the colours, and where ridges and valleys "
+                   "begin; default: 40 over the diagonal",
+            .range = Range::Positive},
+           {.name = "line",
+            .type = ParamType::Number,
+            .doc = "pixels: width of the silhouettes of tone and ink",
+            .fallback = "2",
+            .range = Range::NonNegative},
+           {.name = "thickness",
+            .type = ParamType::Flag,
+            .doc = "a layer more: how far the ray is within the solids"},
+           {.name = "samples",
+            .type = ParamType::Integer,
+            .doc = "of colour per pixel",
+            .fallback = "4",
+            .range = Range::Positive},
+           {.name = "format", .type = ParamType::Text, .doc = "exr or png; default: by extension"}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Scene}},
+      .flow = Flow::PassesThrough,
+      .run = draw,
+      .plan = planDraw,
+      .reads = readOfDraw,
+      .validate = validateDraw,
+      .targets = targetsOf,
+      .usesStandardOutput =
+          [](const Invocation& in) {
+            return levelset::isStandardOutput(in.text("file")) ||
+                   (in.given("png") && levelset::isStandardOutput(in.text("png")));
+          },
+  };
+  addCameraParams(picture.params);
+  all.push_back(std::move(picture));
+  all.push_back(compareImagesOperator());
+}
+
+}  // namespace pipeline

@@ -1,0 +1,204 @@
+#include "render/views/scene_file.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "apps/pipeline/operators/pictures/camera_options.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/values/units.h"
+#include "levelset/error.h"
+#include "render/scene/field_expression.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::UsageError;
+
+std::vector<std::string> wordsOf(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;) words.push_back(word);
+  return words;
+}
+
+/// By --names, else what --as called them, else part1, part2, …
+std::vector<std::string> partNames(const Invocation& in) {
+  std::vector<std::string> names;
+  if (in.given("names")) {
+    names = wordsOf(in.text("names"));
+    if (names.size() != in.operands.size())
+      throw UsageError(fmt::format("scene: {} names for {} parts; give as many", names.size(),
+                                   in.operands.size()));
+  } else {
+    names = in.operandNames;
+    names.resize(in.operands.size());
+    for (std::size_t i = 0; i < names.size(); ++i)
+      if (names[i].empty()) names[i] = fmt::format("part{}", i + 1);
+  }
+  render::requireSceneNames(names);
+  return names;
+}
+
+/// One for each part, or as many as there are by turns.
+std::vector<Imath::C3f> partColours(const Invocation& in) {
+  std::vector<Imath::C3f> colours;
+  if (in.given("colours")) {
+    for (const Imath::V3d& colour : in.points("colours")) {
+      for (int c = 0; c < 3; ++c)
+        if (!(colour[c] >= 0 && colour[c] <= 1))
+          throw UsageError(
+              fmt::format("scene: --colours {},{},{} is no colour; give red, green and blue from "
+                          "0 to 1",
+                          colour.x, colour.y, colour.z));
+      colours.emplace_back(colour);
+    }
+  } else {
+    colours = {{0.66f, 0.62f, 0.56f}, {0.35f, 0.50f, 0.66f}, {0.70f, 0.42f, 0.32f},
+               {0.42f, 0.58f, 0.40f}, {0.62f, 0.52f, 0.68f}, {0.72f, 0.62f, 0.32f}};
+  }
+  return colours;
+}
+
+/// One for each part.
+std::vector<double> partOpacities(const Invocation& in) {
+  std::vector<double> opacities(in.operands.size(), 1);
+  if (!in.given("opacities")) return opacities;
+  const std::vector<std::string> words = wordsOf(in.text("opacities"));
+  if (words.size() != opacities.size())
+    throw UsageError(fmt::format("scene: {} opacities for {} parts; give as many", words.size(),
+                                 opacities.size()));
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    opacities[i] = parseNumber(words[i], "scene: --opacities");
+    if (!(opacities[i] > 0 && opacities[i] <= 1))
+      throw UsageError(fmt::format(
+          "scene: --opacities {} is out of range; give more than 0 and at most 1", words[i]));
+  }
+  return opacities;
+}
+
+Plan planScene(Invocation& in) {
+  Plan plan{.kind = Kind::Scene};
+  for (const Value& operand : in.operands) {
+    const Plan& one = operand.plan();
+    plan.bounds.extendBy(one.bounds);
+    plan.area += one.area;
+    plan.halfWidth = std::max(plan.halfWidth, one.halfWidth);
+    if (one.voxelSize == 0) continue;  // a mesh
+    plan.voxelSize = plan.voxelSize > 0 ? std::min(plan.voxelSize, one.voxelSize) : one.voxelSize;
+  }
+  // Lengths count on all of them, whichever comes first.
+  in.setReference(plan.voxelSize, plan.bounds.isEmpty() ? 0 : plan.bounds.size().length());
+  return plan;
+}
+
+Value makeScene(Invocation& in) {
+  (void)planScene(in);
+  const std::vector<std::string> names = partNames(in);
+  const std::vector<Imath::C3f> colours = partColours(in);
+  const std::vector<double> opacities = partOpacities(in);
+  if (in.given("colours") && colours.size() != in.operands.size())
+    throw UsageError(fmt::format("scene: {} colours for {} parts; give as many", colours.size(),
+                                 in.operands.size()));
+  render::ViewedScene viewed;
+  render::Scene& scene = viewed.scene;
+  std::vector<std::string> solids;
+  for (std::size_t i = 0; i < in.operands.size(); ++i) {
+    const Imath::C3f& colour = colours[i % colours.size()];
+    const auto id = static_cast<std::uint32_t>(i + 1);
+    if (in.operands[i].kind() == Kind::Mesh) {
+      scene.meshes.push_back({std::make_shared<const levelset::TriMesh>(in.mesh(i)), colour, id,
+                              names[i], opacities[i]});
+      continue;
+    }
+    scene.solids.push_back({.band = in.band(i),
+                            .colour = colour,
+                            .id = id,
+                            .name = names[i],
+                            .opacity = opacities[i]});
+    solids.push_back(names[i]);
+  }
+  if (in.given("csg")) scene.csg = render::CsgExpression(in.text("csg"), solids);
+  for (std::size_t i = 0; i < solids.size() && in.given("csg"); ++i)
+    if (!scene.csg.uses(i))
+      in.notes.warnings.push_back(
+          fmt::format("scene: --csg does not name '{}', which is not drawn", solids[i]));
+  if (in.given("soft")) scene.softness = in.length("soft");
+  if (in.given("morph")) scene.morph = in.number("morph");
+  render::requireFields(scene);
+  viewed.hasCamera = givesCamera(in);
+  if (viewed.hasCamera) viewed.scene.camera = cameraOf(in, viewed.scene.bounds());
+  return Value(std::move(viewed));
+}
+
+void validateScene(const Invocation& in) {
+  validateCamera(in);
+  if (in.given("soft") && !in.given("csg"))
+    throw UsageError("scene: --soft needs --csg with what is joined, as 'a | b'; give both");
+  if (!in.given("morph")) return;
+  if (in.given("csg"))
+    throw UsageError("scene: --morph goes from one solid to another, without --csg; give one");
+  if (in.number("morph") < 0 || in.number("morph") > 1)
+    throw UsageError(fmt::format("scene: --morph {} is not from 0 to 1", in.text("morph")));
+}
+
+}  // namespace
+
+void addSceneOperators(std::vector<Operator>& all) {
+  Operator scene = {
+      .name = "scene",
+      .group = "Pictures",
+      .summary =
+          "level sets and meshes to be drawn together, or what an expression makes of solids",
+      .details =
+          "With --csg the rays of 'render' cut the solids as they go: a | b is what is in either, "
+          "a & b in both, a - b in a alone. Nothing is resampled, each keeps its voxels. The names "
+          "are those of --as. Meshes stand beside, by their vertices' normals and colours if they "
+          "have "
+          "some. Surfaces of one and the same place on different grids are told apart "
+          "by rounding only: let what is taken away stick out. --soft blends the distances "
+          "themselves: "
+          "surfaces that are closer than that run into each other, --morph goes from one solid's "
+          "distances to another's; renderers are then cpu and embree. 'write scene.json' saves "
+          "it, with the parts in files beside it.",
+      .example =
+          "levelsmith box --size 2,2,2 --voxel 0.05 --as b ! sphere --radius 1.3 --voxel "
+          "0.03 --as s ! scene @b @s --csg 'b - s' ! render cut.png --size 320x240",
+      .params = {{.name = "csg",
+                  .type = ParamType::Text,
+                  .doc = "what is drawn, as '(a | b) - c'; default: each of them"},
+                 {.name = "soft",
+                  .type = ParamType::Length,
+                  .doc = "of --csg: how far from each other surfaces begin to blend, at most the "
+                         "half width of the narrowest band",
+                  .range = Range::NonNegative},
+                 {.name = "morph",
+                  .type = ParamType::Number,
+                  .doc = "of two solids: how far on the way from the first to the second, 0 to 1"},
+                 {.name = "names",
+                  .type = ParamType::Text,
+                  .doc = "of the parts, blanks between them; default: those of --as"},
+                 {.name = "colours",
+                  .type = ParamType::Points,
+                  .doc = "of the parts: red,green,blue from 0 to 1, blanks between them"},
+                 {.name = "opacities",
+                  .type = ParamType::Text,
+                  .doc = "of the parts' surfaces: above 0, up to 1, blanks between them; less than "
+                         "1 is seen through, in R G B A, and casts a weaker shadow"}},
+      .operands = {{Kind::Band, Kind::Mesh}},
+      .takesMore = true,
+      .readsNames = true,
+      .resultKind = [](const Invocation&) { return Kind::Scene; },
+      .run = makeScene,
+      .plan = planScene,
+      .validate = validateScene,
+  };
+  addCameraParams(scene.params);
+  all.push_back(std::move(scene));
+}
+
+}  // namespace pipeline

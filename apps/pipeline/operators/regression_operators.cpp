@@ -1,0 +1,99 @@
+#include <fmt/core.h>
+
+#include <sstream>
+
+#include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/registry/operator.h"
+#include "apps/regress/suite.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+void listCases(std::string& text) {
+  for (const regress::Case& c : regress::cases())
+    text += fmt::format("{:<20}{}\n", c.name, c.title);
+}
+
+std::vector<std::string> caseNames(const Invocation& in) {
+  std::vector<std::string> all;
+  if (!in.given("case")) return all;
+  std::istringstream text(in.text("case"));
+  for (std::string name; std::getline(text, name, ',');) all.push_back(name);
+  return all;
+}
+
+void appendLine(const regress::CaseResult& result, std::string& text) {
+  const std::size_t missed = regress::failures(result).size();
+  text += fmt::format("{:<6}{:<20}{:>4} runs {:>4} bounds {:>8.1f} CPU s\n", missed ? "FAIL" : "ok",
+                      result.of->name, result.rows.size(),
+                      result.judgements.size() + result.outcomes.size(), result.cpuSeconds);
+}
+
+void validateRegression(const Invocation& in) {
+  regress::checkNames(caseNames(in));
+  if (!in.given("out") && !in.flag("list"))
+    throw levelset::UsageError("regress: --out is missing; name the folder for the results");
+}
+
+Value runRegression(Invocation& in) {
+  if (in.flag("list")) {
+    listCases(in.output);
+    return Value(Plan{});
+  }
+  regress::makeFolder(in.text("out"));
+  const regress::SuiteResult result = regress::runSuite(
+      {.names = caseNames(in),
+       .budget = in.text("budget") == "full" ? regress::Budget::Full : regress::Budget::Quick,
+       .progress = in.progress,
+       .finished = [&](const regress::CaseResult& c) { appendLine(c, in.output); }});
+  in.notes.notes = regress::writeResults(result, in.text("out"), !in.flag("no-plots"));
+  const std::vector<std::string> failed = regress::failures(result);
+  for (const std::string& sentence : failed) in.output += "missed: " + sentence + "\n";
+  if (!failed.empty())
+    throw levelset::NumericalError(
+        fmt::format("regress: {} of the bounds are missed, the first by {}; see index.html in '{}'",
+                    failed.size(), failed[0], in.text("out")));
+  return Value(Plan{});
+}
+
+}  // namespace
+
+void addRegressionOperators(std::vector<Operator>& all) {
+  all.push_back({
+      .name = "regress",
+      .group = "Inspection",
+      .summary = "run problems with exact answers and tell error against run time",
+      .details =
+          "Each case runs at several resolutions and at five placements between the grid points, "
+          "beside OpenVDB's own tool where it has one. The folder gets results.json, results.csv, "
+          "plots and index.html. Exit code 5 when an accuracy bound is missed, after everything "
+          "is written; times are shown, never judged.",
+      .example = "levelsmith regress --case empty-and-full --out regression",
+      .params = {{.name = "case",
+                  .type = ParamType::Text,
+                  .doc = "names of cases, between commas; default: all"},
+                 {.name = "budget",
+                  .type = ParamType::Choice,
+                  .doc = "under three minutes on two cores, or everything",
+                  .fallback = "quick",
+                  .choices = {"quick", "full"}},
+                 {.name = "out",
+                  .type = ParamType::Path,
+                  .doc = "folder for the results; made if it is missing"},
+                 {.name = "no-plots",
+                  .type = ParamType::Flag,
+                  .doc =
+                      "leave the plots out; plots.py in the folder draws them from an earlier run"},
+                 {.name = "list",
+                  .type = ParamType::Flag,
+                  .doc = "print the names of all cases and run none"}},
+      .isRepeatable = false,
+      .flow = Flow::PassesThrough,
+      .run = runRegression,
+      .plan = [](Invocation&) { return Plan{}; },
+      .validate = validateRegression,
+  });
+}
+
+}  // namespace pipeline

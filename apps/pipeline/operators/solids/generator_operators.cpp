@@ -1,0 +1,408 @@
+#include <fmt/core.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+
+#include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/values/height_file.h"
+#include "levelset/error.h"
+#include "mapping/generators/gyroid.h"
+#include "mapping/generators/heightmap.h"
+#include "mapping/generators/hexagons.h"
+#include "mapping/generators/knurl.h"
+#include "mapping/generators/ring.h"
+#include "mapping/generators/scales.h"
+
+namespace pipeline {
+namespace {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+using levelset::ShapeOptions;
+
+/// A texture once its lengths are world units.
+struct Generator {
+  levelset::ShapeExtent extent;
+  mapping::TileBox box;
+  std::function<void(double voxelSize, const ShapeOptions&)> check;
+  std::function<NarrowBand(double voxelSize, const ShapeOptions&)> make;
+};
+using Generate = Generator (*)(Invocation&);
+
+mapping::Tiling tilingOf(Invocation& in) {
+  return {.columns = static_cast<int>(in.integer("columns")),
+          .rows = static_cast<int>(in.integer("rows")),
+          .overlap = in.length("overlap")};
+}
+
+/// A length for which `auto` was not given.
+std::optional<double> lengthUnlessAuto(Invocation& in, const char* name) {
+  if (in.text(name) == "auto") return {};
+  return in.length(name);
+}
+
+void noteOddRows(Invocation& in, const mapping::Tiling& tiling) {
+  if (tiling.rows % 2 == 0) return;
+  in.notes.notes.push_back(fmt::format(
+      "{} rows: every second one stands aside, so that only an even number repeats along y",
+      tiling.rows));
+}
+
+Generator knurl(Invocation& in) {
+  mapping::Knurl knurl;
+  const std::string pattern = in.text("pattern");
+  if (pattern == "diagonal") knurl.pattern = mapping::KnurlPattern::Diagonal;
+  if (pattern == "straight") knurl.pattern = mapping::KnurlPattern::Straight;
+  knurl.pitch = in.length("pitch");
+  knurl.flankAngle = in.radians("flanks");
+  knurl.grooveAngle = in.radians("angle");
+  knurl.depth = lengthUnlessAuto(in, "depth").value_or(0);
+  knurl.base = lengthUnlessAuto(in, "base")
+                   .value_or(knurl.depth > 0 ? knurl.depth : mapping::sharpDepth(knurl));
+  knurl.tiling = tilingOf(in);
+  const V3d center = in.point("center");
+  return {mapping::knurlExtent(knurl, center), mapping::knurlBox(knurl, center),
+          [=](double voxel, const auto& options) {
+            mapping::checkKnurl(knurl, center, voxel, options);
+          },
+          [=](double voxel, const auto& options) {
+            return mapping::makeKnurl(knurl, center, voxel, options);
+          }};
+}
+
+Generator scales(Invocation& in) {
+  mapping::Scales scales;
+  scales.length = in.length("length");
+  scales.width = lengthUnlessAuto(in, "width").value_or(scales.length * 0.7);
+  scales.thickness = in.length("thickness");
+  scales.tilt = in.radians("tilt");
+  scales.step = lengthUnlessAuto(in, "step").value_or(0);
+  scales.tip = lengthUnlessAuto(in, "tip").value_or(0);
+  scales.rounding = in.length("rounding");
+  scales.base = lengthUnlessAuto(in, "base").value_or(scales.length * 0.2);
+  scales.tiling = tilingOf(in);
+  noteOddRows(in, scales.tiling);
+  const V3d center = in.point("center");
+  return {mapping::scalesExtent(scales, center), mapping::scalesBox(scales, center),
+          [=](double voxel, const auto& options) {
+            mapping::checkScales(scales, center, voxel, options);
+          },
+          [=](double voxel, const auto& options) {
+            return mapping::makeScales(scales, center, voxel, options);
+          }};
+}
+
+Generator hexagons(Invocation& in) {
+  mapping::Hexagons hexagons;
+  if (in.text("kind") == "honeycomb") hexagons.kind = mapping::HexagonKind::Honeycomb;
+  hexagons.size = in.length("size");
+  hexagons.gap = lengthUnlessAuto(in, "gap").value_or(hexagons.size * 0.2);
+  hexagons.height = lengthUnlessAuto(in, "height").value_or(hexagons.size * 0.4);
+  hexagons.base = lengthUnlessAuto(in, "base").value_or(hexagons.size * 0.2);
+  hexagons.rounding = in.length("rounding");
+  hexagons.tiling = tilingOf(in);
+  noteOddRows(in, hexagons.tiling);
+  const V3d center = in.point("center");
+  return {mapping::hexagonsExtent(hexagons, center), mapping::hexagonsBox(hexagons, center),
+          [=](double voxel, const auto& options) {
+            mapping::checkHexagons(hexagons, center, voxel, options);
+          },
+          [=](double voxel, const auto& options) {
+            return mapping::makeHexagons(hexagons, center, voxel, options);
+          }};
+}
+
+Generator ring(Invocation& in) {
+  mapping::Ring ring;
+  ring.radius = in.length("radius");
+  ring.tube = lengthUnlessAuto(in, "tube").value_or(ring.radius * 0.16);
+  if (in.given("section")) {
+    const std::vector<double> section = in.lengths("section");
+    ring.section = Imath::V2d(section[0], section[1]);
+  }
+  if (in.given("lean")) ring.lean = in.radians("lean");
+  ring.columns = static_cast<int>(in.integer("columns"));
+  ring.rows = static_cast<int>(in.integer("rows"));
+  if (in.given("spacing")) {
+    const std::vector<double> spacing = in.lengths("spacing");
+    ring.spacing = Imath::V2d(spacing[0], spacing[1]);
+  }
+  ring.clearance = in.length("clearance");
+  const V3d center = in.point("center");
+  return {
+      mapping::ringExtent(ring, center), mapping::ringBox(ring, center),
+      [=](double voxel, const auto& options) { mapping::checkRing(ring, center, voxel, options); },
+      [=](double voxel, const auto& options) {
+        return mapping::makeRing(ring, center, voxel, options);
+      }};
+}
+
+Generator gyroid(Invocation& in) {
+  mapping::Gyroid gyroid;
+  if (in.text("kind") == "network") gyroid.kind = mapping::GyroidKind::Network;
+  gyroid.cell = in.length("cell");
+  gyroid.thickness = lengthUnlessAuto(in, "thickness").value_or(gyroid.cell * 0.1);
+  gyroid.cells = {static_cast<int>(in.integer("columns")), static_cast<int>(in.integer("rows")),
+                  static_cast<int>(in.integer("layers"))};
+  const V3d center = in.point("center");
+  return {mapping::gyroidExtent(gyroid, center), mapping::gyroidBox(gyroid, center),
+          [=](double voxel, const auto& options) {
+            mapping::checkGyroid(gyroid, center, voxel, options);
+          },
+          [=](double voxel, const auto& options) {
+            return mapping::makeGyroid(gyroid, center, voxel, options);
+          }};
+}
+
+mapping::Heightmap heightmapOf(Invocation& in) {
+  mapping::Heightmap heightmap;
+  const std::vector<double> size = in.lengths("size");
+  heightmap.size = {size[0], size[1]};
+  heightmap.height = in.length("height");
+  heightmap.base = lengthUnlessAuto(in, "base").value_or(heightmap.height / 2);
+  if (in.text("interpolation") == "linear")
+    heightmap.interpolation = mapping::HeightInterpolation::Linear;
+  heightmap.grid = readHeights(in.text("image"), in.flag("invert"), in.maxMemory);
+  return heightmap;
+}
+
+Generator heightmap(Invocation& in) {
+  mapping::Heightmap heightmap = heightmapOf(in);
+  const V3d center = in.point("center");
+  const levelset::ShapeExtent extent = mapping::heightmapExtent(heightmap, center);
+  const mapping::TileBox box = mapping::heightmapBox(heightmap, center);
+  const auto shared = std::make_shared<const mapping::Heightmap>(std::move(heightmap));
+  return {extent, box,
+          [=](double voxel, const auto& options) {
+            mapping::checkHeightmap(*shared, center, voxel, options);
+          },
+          [=](double voxel, const auto& options) {
+            return mapping::makeHeightmap(*shared, center, voxel, options);
+          }};
+}
+
+/// The texture, its voxel size, and what the report says of both.
+std::pair<Generator, double> describeTexture(Invocation& in, Generate generate) {
+  if (in.asksVoxelSize() && in.given("voxel")) in.setReference(in.length("voxel"), 0);
+  Generator generator = generate(in);
+  const V3d size = generator.extent.bounds.size();
+  const double voxel = in.voxelSize(std::max({size.x, size.y, size.z}));
+  const Imath::Box3d& tile = generator.box.tile;
+  if (tile.min != generator.box.whole.min) {
+    in.notes.notes.push_back(fmt::format("what repeats is --texture-box \"{},{},{} {},{},{}\"",
+                                         tile.min.x, tile.min.y, tile.min.z, tile.max.x, tile.max.y,
+                                         tile.max.z));
+  }
+  return {std::move(generator), voxel};
+}
+
+ShapeOptions generatorOptions(const Invocation& in) {
+  return {.halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress};
+}
+
+template <Generate generate>
+Value makeTexture(Invocation& in) {
+  const auto [generator, voxel] = describeTexture(in, generate);
+  return Value(generator.make(voxel, generatorOptions(in)));
+}
+
+Value heightmapSheet(Invocation& in) {
+  if (in.asksVoxelSize() && in.given("voxel")) in.setReference(in.length("voxel"), 0);
+  const mapping::Heightmap map = heightmapOf(in);  // once: the picture may be a pipe
+  const V3d center = in.point("center");
+  const V3d size = mapping::heightmapExtent(map, center).bounds.size();
+  const double voxel = in.voxelSize(std::max({size.x, size.y, size.z}));
+  return Value(mapping::heightmapSheet(map, center, voxel, generatorOptions(in)));
+}
+
+template <Generate generate>
+Plan planTextureSolid(Invocation& in) {
+  const auto [generator, voxel] = describeTexture(in, generate);
+  generator.check(voxel, generatorOptions(in));
+  return {.kind = Kind::Band,
+          .bounds = generator.extent.bounds,
+          .area = generator.extent.area,
+          .voxelSize = voxel,
+          .halfWidth = in.number("half-width")};
+}
+
+Param size(const char* name, const char* doc) {
+  return {.name = name,
+          .type = ParamType::Length,
+          .doc = doc,
+          .range = Range::Positive,
+          .required = true};
+}
+Param size(const char* name, const char* doc, const char* fallback, Range range) {
+  return {.name = name,
+          .type = ParamType::Length,
+          .doc = doc,
+          .fallback = fallback,
+          .range = range,
+          .allowsAuto = std::string(fallback) == "auto"};
+}
+Param degrees(const char* name, const char* doc, const char* fallback) {
+  return {.name = name, .type = ParamType::Degrees, .doc = doc, .fallback = fallback};
+}
+Param count(const char* name, const char* doc, const char* fallback = "4") {
+  return {.name = name,
+          .type = ParamType::Integer,
+          .doc = doc,
+          .fallback = fallback,
+          .range = Range::Positive};
+}
+Param choice(const char* name, const char* doc, std::vector<std::string> choices) {
+  return {.name = name,
+          .type = ParamType::Choice,
+          .doc = doc,
+          .fallback = choices.front(),
+          .choices = choices};
+}
+Param pair(const char* name, const char* doc, bool isRequired = false) {
+  return {.name = name,
+          .type = ParamType::Lengths,
+          .doc = doc,
+          .range = Range::Positive,
+          .required = isRequired,
+          .count = 2};
+}
+
+std::vector<Param> tiled(std::vector<Param> params) {
+  params.push_back(count("columns", "of the tile, along x"));
+  params.push_back(count("rows", "of the tile, along y"));
+  params.push_back(size("overlap", "how far the pattern goes on beyond each side of its tile", "0",
+                        Range::NonNegative));
+  return params;
+}
+
+template <Generate generate>
+Operator generator(const char* name, const char* summary, const char* details, const char* example,
+                   std::vector<Param> params) {
+  params.push_back(
+      {.name = "center", .type = ParamType::Point, .doc = "of its box", .fallback = "0,0,0"});
+  params.push_back(voxelParam());
+  params.push_back(resolutionParam());
+  params.push_back(halfWidthParam());
+  return {.name = name,
+          .group = "Textures",
+          .summary = summary,
+          .details = details,
+          .example = example,
+          .params = std::move(params),
+          .run = makeTexture<generate>,
+          .plan = planTextureSolid<generate>,
+          .validate = requireVoxelSize};
+}
+
+}  // namespace
+
+void addGeneratorOperators(std::vector<Operator>& all) {
+  all.push_back(generator<knurl>(
+      "knurl", "make a plate with knurled grooves",
+      "V-grooves in the top of a plate, as knurling wheels press them. The tile goes on across its "
+      "sides as it begins on the other; a column and row of diamonds is pitch / cos(angle) wide "
+      "and pitch / sin(angle) long, of straight grooves a pitch both ways.",
+      "levelsmith knurl --pitch 2 --columns 3 --rows 2 --voxel 0.1 ! measure",
+      tiled({choice("pattern", "which grooves", {"diamond", "diagonal", "straight"}),
+             size("pitch", "of neighbouring grooves, across them"),
+             size("depth", "of the grooves; 'auto': until the crests are sharp", "auto",
+                  Range::Positive),
+             degrees("flanks", "between the two flanks of a groove", "90"),
+             degrees("angle", "of the grooves from y", "30"),
+             size("base", "of solid below the grooves; 'auto': as much as their depth", "auto",
+                  Range::NonNegative)})));
+  all.push_back(generator<scales>(
+      "scales", "make a plate of overlapping scales",
+      "Rows of tongues along x, tips towards +y, every second row half a width aside. An even "
+      "number of rows goes on across the tile's sides.",
+      "levelsmith scales --length 3 --columns 2 --rows 4 --voxel 0.1 ! measure",
+      tiled({size("length", "of a scale"),
+             size("width", "of a scale; 'auto': 0.7 of its length", "auto", Range::Positive),
+             size("thickness", "of a scale, with room under its tip; 0: solid down to the plate",
+                  "0", Range::NonNegative),
+             degrees("tilt", "of a scale against the plate", "20"),
+             size("step", "from row to row; 'auto': half a length", "auto", Range::Positive),
+             size("tip", "length of the pointed part; 'auto': half a width, which is round", "auto",
+                  Range::Positive),
+             size("rounding", "radius of the edges", "0", Range::NonNegative),
+             size("base", "thickness of the plate; 'auto': 0.2 of the length", "auto",
+                  Range::NonNegative)})));
+  all.push_back(generator<hexagons>(
+      "hexagons", "make a plate of raised hexagons, or a honeycomb",
+      "Hexagons with flats across x in rows along x, every second row half a spacing aside. "
+      "An even number of rows goes on across the tile's sides.",
+      "levelsmith hexagons --size 2 --kind honeycomb --columns 3 --rows 2 --voxel 0.1 ! measure",
+      tiled({choice("kind", "pillars with gaps, or walls between cells", {"raised", "honeycomb"}),
+             size("size", "of a hexagon across its flats"),
+             size("gap", "between hexagons, the honeycomb's walls; 'auto': 0.2 of the size", "auto",
+                  Range::Positive),
+             size("height", "above the plate; 'auto': 0.4 of the size", "auto", Range::Positive),
+             size("base", "thickness of the plate, 0: none; 'auto': 0.2 of the size", "auto",
+                  Range::NonNegative),
+             size("rounding", "radius of the upper edges", "0", Range::NonNegative)})));
+  all.push_back(generator<ring>(
+      "ring", "make a ring, or a sheet of chain mail",
+      "More than one column or row is European 4-in-1: each ring holds two of the row before and "
+      "two of the row behind, and none touch. Left to themselves, spacing and lean leave the most "
+      "room between wires.",
+      "levelsmith ring --radius 3 --columns 2 --rows 3 --voxel 0.15 ! measure",
+      {size("radius", "from the centre to the middle of the wire"),
+       size("tube", "radius of round wire; 'auto': 0.16 of the ring's", "auto", Range::Positive),
+       pair("section", "of flat wire, in place of --tube: across the ring, and along its axis"),
+       {.name = "lean",
+        .type = ParamType::Degrees,
+        .doc = "of rings about x, to the other side in every second row; default: 0 for one ring"},
+       count("columns", "of rings, along x", "1"),
+       count("rows", "of rings, along y", "1"),
+       pair("spacing", "of rings along a row, and of rows"),
+       size("clearance", "that must be left between wires", "0", Range::NonNegative)}));
+  all.push_back(generator<gyroid>(
+      "gyroid", "make a box of gyroid walls or struts",
+      "The surface sin x cos y + sin y cos z + sin z cos x = 0, thickened by its true distance and "
+      "cut off by the box of its cells, where small parts may come loose (`keep` drops them).",
+      "levelsmith gyroid --cell 5 --columns 1 --rows 1 --layers 1 --voxel 0.2 ! measure",
+      {choice("kind", "walls between two labyrinths, or the struts of one", {"sheet", "network"}),
+       size("cell", "edge of a cubic cell"),
+       size("thickness", "of walls, or of struts at their thinnest; 'auto': 0.1 cell", "auto",
+            Range::Positive),
+       count("columns", "of cells, along x", "2"), count("rows", "of cells, along y", "2"),
+       count("layers", "of cells, along z", "1")}));
+  all.push_back(generator<heightmap>(
+      "heightmap", "make a plate whose top is a picture",
+      "A grey PNG (black is low, white is high, what is transparent is low) or lines of numbers "
+      "(the least is low, the largest is high). The first row lies at the largest y.",
+      "levelsmith heightmap --image <(printf '0 1 0\\n1 2 1\\n0 1 0\\n') --size 4,4 --height 1 "
+      "--voxel 0.1 ! measure",
+      {{.name = "image",
+        .type = ParamType::Path,
+        .doc = "a grey .png, or a text file of numbers",
+        .required = true},
+       pair("size", "from the first to the last column and row", true),
+       size("height", "of white above black"),
+       size("base", "of solid below black; 'auto': half the height", "auto", Range::NonNegative),
+       choice("interpolation", "between pixels", {"cubic", "linear"}),
+       {.name = "invert", .type = ParamType::Flag, .doc = "black is high, white is low"},
+       {.name = "sheet",
+        .type = ParamType::Flag,
+        .doc = "its top alone, as an open mesh with a vertex every voxel: for 'surface-band'"}}));
+  all.back().resultKind = [](const Invocation& in) {
+    return in.flag("sheet") ? Kind::Mesh : Kind::Band;
+  };
+  all.back().run = [](Invocation& in) {
+    return in.flag("sheet") ? heightmapSheet(in) : makeTexture<heightmap>(in);
+  };
+  all.back().plan = [](Invocation& in) {
+    Plan plan = planTextureSolid<heightmap>(in);
+    if (in.flag("sheet")) plan.kind = Kind::Mesh;
+    return plan;
+  };
+  all.back().validate = [](const Invocation& in) {
+    in.requireVoxelSize();
+    if (in.flag("sheet") && in.given("half-width"))
+      throw levelset::UsageError("heightmap: a --sheet is a mesh and has no --half-width");
+  };
+}
+
+}  // namespace pipeline

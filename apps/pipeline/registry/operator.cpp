@@ -1,0 +1,307 @@
+#include "apps/pipeline/registry/operator.h"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "apps/pipeline/values/units.h"
+#include "levelset/error.h"
+#include "levelset/fields/expression.h"
+
+namespace pipeline {
+
+using levelset::UsageError;
+
+const char* typeName(ParamType type) {
+  switch (type) {
+    case ParamType::Flag:
+      return "flag";
+    case ParamType::Number:
+      return "number";
+    case ParamType::Integer:
+      return "integer";
+    case ParamType::Length:
+      return "length";
+    case ParamType::Lengths:
+      return "lengths";
+    case ParamType::Degrees:
+      return "degrees";
+    case ParamType::Numbers:
+      return "numbers";
+    case ParamType::Point:
+      return "point";
+    case ParamType::Points:
+      return "points";
+    case ParamType::Box:
+      return "box";
+    case ParamType::Matrix:
+      return "matrix";
+    case ParamType::Choice:
+      return "choice";
+    case ParamType::Text:
+      return "text";
+    case ParamType::Path:
+      return "path";
+    case ParamType::ImageSize:
+      return "image size";
+    case ParamType::Bytes:
+      return "bytes";
+    case ParamType::Scalar:
+      return "scalar field";
+    case ParamType::Velocity:
+      return "velocity";
+  }
+  return "";
+}
+
+std::string valueForm(const Param& param) {
+  switch (param.type) {
+    case ParamType::Flag:
+      return "";
+    case ParamType::Number:
+      return "X";
+    case ParamType::Integer:
+      return "N";
+    case ParamType::Length:
+      return "L";
+    case ParamType::Lengths:
+      return param.count == 2 ? "L,L" : "L,L,L";
+    case ParamType::Degrees:
+      return "DEG";
+    case ParamType::Numbers:
+      return "X|X,Y,Z";
+    case ParamType::Point:
+      return "x,y,z";
+    case ParamType::Points:
+      return "\"x,y,z …\"";
+    case ParamType::Box:
+      return "\"lo hi\"";
+    case ParamType::Matrix:
+      return "\"m00 m01 …\"";
+    case ParamType::Choice:
+      return fmt::format("{}", fmt::join(param.choices, "|"));
+    case ParamType::Text:
+      return "TEXT";
+    case ParamType::Path:
+      return "FILE";
+    case ParamType::ImageSize:
+      return "WxH";
+    case ParamType::Bytes:
+      return "SIZE";
+    case ParamType::Scalar:
+      return "X|FORMULA|@NAME";
+    case ParamType::Velocity:
+      return fmt::format("{}|\"FX, FY, FZ\"|@NAME", fmt::join(param.choices, "|"));
+  }
+  return "";
+}
+
+namespace {
+
+void checkRange(const Param& param, double number, const std::string& text,
+                const std::string& where) {
+  if (param.range == Range::Positive && !(number > 0))
+    throw UsageError(fmt::format("{}: '{}' must be positive", where, text));
+  if (param.range == Range::NonNegative && !(number >= 0))
+    throw UsageError(fmt::format("{}: '{}' must not be negative", where, text));
+}
+
+void checkField(const Param& param, const std::string& text, const std::string& where) {
+  if (text == "@") throw UsageError(fmt::format("{}: '@' needs a name behind it", where));
+  if (namesValue(param, text)) return;
+  const auto& known = param.choices;
+  if (std::find(known.begin(), known.end(), text) != known.end()) return;
+  if (param.type == ParamType::Scalar)
+    (void)levelset::scalarExpression(text, where.c_str());
+  else
+    (void)levelset::vectorExpression(text, where.c_str());
+}
+
+}  // namespace
+
+bool namesValue(const Param& param, const std::string& text) {
+  return (param.type == ParamType::Scalar || param.type == ParamType::Velocity) &&
+         text.starts_with('@');
+}
+
+void checkText(const Param& param, const std::string& text, const std::string& where) {
+  switch (param.type) {
+    case ParamType::Flag:
+      return;
+    case ParamType::Number:
+      return checkRange(param, parseNumber(text, where), text, where);
+    case ParamType::Degrees:
+      return checkRange(param, parseNumber(text, where), text, where);
+    case ParamType::Integer:
+      return checkRange(param, static_cast<double>(parseInteger(text, where)), text, where);
+    case ParamType::Length: {
+      if (param.allowsAuto && text == "auto") return;
+      const Length length = parseLength(text, where);
+      if (length.unit == Unit::Voxels && !param.allowsVoxels && param.name != "voxel") {
+        throw UsageError(
+            fmt::format("{}: cannot be given in voxels, whose size follows from it; write it in "
+                        "world units, or as a share of the diagonal, 0.2%",
+                        where));
+      }
+      if (length.unit == Unit::Voxels && !param.allowsVoxels) {
+        throw UsageError(
+            fmt::format("{}: a voxel size cannot be given in voxels; write it in world units, "
+                        "or use --resolution",
+                        where));
+      }
+      return checkRange(param, length.number, text, where);
+    }
+    case ParamType::Lengths:
+      for (const Length& length : parseLengths(text, param.count, where))
+        checkRange(param, length.number, text, where);
+      return;
+    case ParamType::Numbers:
+      for (double number : parseNumbers(text, where)) checkRange(param, number, text, where);
+      return;
+    case ParamType::Point:
+      for (int axis = 0; axis < 3; ++axis)
+        checkRange(param, parsePoint(text, where)[axis], text, where);
+      return;
+    case ParamType::Points:
+      return void(parsePoints(text, where));
+    case ParamType::Box:
+      return void(parseBox(text, where));
+    case ParamType::Matrix:
+      return void(parseMatrix(text, where));
+    case ParamType::Choice:
+      if (std::find(param.choices.begin(), param.choices.end(), text) == param.choices.end()) {
+        throw UsageError(
+            fmt::format("{}: '{}' is not one of {}", where, text, fmt::join(param.choices, ", ")));
+      }
+      return;
+    case ParamType::Text:
+    case ParamType::Path:
+      if (text.empty()) throw UsageError(fmt::format("{}: is empty", where));
+      return;
+    case ParamType::ImageSize:
+      return void(parseImageSize(text, where));
+    case ParamType::Bytes:
+      return void(parseBytes(text, where));
+    case ParamType::Scalar:
+    case ParamType::Velocity:
+      return checkField(param, text, where);
+  }
+}
+
+const Param* Operator::find(const std::string& param) const {
+  const auto it =
+      std::find_if(params.begin(), params.end(), [&](const Param& p) { return p.name == param; });
+  return it == params.end() ? nullptr : &*it;
+}
+
+const std::vector<Operator>& operators() {
+  static const std::vector<Operator> all = [] {
+    std::vector<Operator> list;
+    addFileOperators(list);
+    addShapeOperators(list);
+    addConversionOperators(list);
+    addSolidOperators(list);
+    addAdvectionOperators(list);
+    addEikonalOperators(list);
+    addFlowOperators(list);
+    addPlacementOperators(list);
+    addPatchOperators(list);
+    addScatterOperators(list);
+    addTextureOperators(list);
+    addAnimationOperators(list);
+    addGeneratorOperators(list);
+    addFoldOperators(list);
+    addInspectionOperators(list);
+    addSceneOperators(list);
+    addSliceOperators(list);
+    addPictureOperators(list);
+    addRegressionOperators(list);
+    addCacheOperators(list);
+    return list;
+  }();
+  return all;
+}
+
+const Operator* findOperator(const std::string& name) {
+  const auto it = std::find_if(operators().begin(), operators().end(),
+                               [&](const Operator& op) { return op.name == name; });
+  return it == operators().end() ? nullptr : &*it;
+}
+
+const Operator& runOperator() {
+  static const Operator op{
+      .name = "run",
+      .group = "Chains in files",
+      .summary = "run what a file holds: a chain, one action a line, or a graph (.json)",
+      .details =
+          "No '!' between actions; # begins a comment; quotes and backslashes as in a "
+          "shell. Lines of options before the first action are global options; those of the "
+          "command line win. ${NAME} is a variable: a line `set NAME VALUE` gives its default, "
+          "--set another value; ${NAME:stem}, :name and :dir are parts of a file's name. Actions "
+          "between `repeat COUNT` (it counts ${i} from 0) or `for NAME in LIST` and `end` are "
+          "repeated; a LIST is words, 0..10, 0..1 step 0.25, or *.ply. A .json is a graph that "
+          "--save-graph wrote. No action stands behind the file.",
+      .example = "levelsmith --threads 2 run holes.pipeline --set voxel=0.3",
+      .params = {{.name = "file",
+                  .type = ParamType::Path,
+                  .doc = "what to run, or -",
+                  .required = true,
+                  .position = 0},
+                 {.name = "set",
+                  .type = ParamType::Text,
+                  .doc = "NAME=VALUE of a variable of the file; as often as one likes"}},
+      .flow = Flow::PassesThrough};
+  return op;
+}
+
+const std::vector<Param>& globalParams() {
+  static const std::vector<Param> params = {
+      {.name = "threads",
+       .type = ParamType::Integer,
+       .doc = "threads to use; results do not depend on it",
+       .range = Range::Positive},
+      {.name = "max-memory",
+       .type = ParamType::Bytes,
+       .doc = "refuse or stop what would take more, e.g. 4G; default: 80 % of what is free"},
+      {.name = "tolerance",
+       .type = ParamType::Length,
+       .doc = "largest error of the result, from which voxel sizes that are not given follow",
+       .range = Range::Positive,
+       .allowsVoxels = false},
+      {.name = "quiet", .type = ParamType::Flag, .doc = "errors only"},
+      {.name = "verbose",
+       .type = ParamType::Flag,
+       .doc = "time, memory and voxels of each step (also -v)"},
+      {.name = "report",
+       .type = ParamType::Path,
+       .doc = "write what each step did and cost: as .json, or as a page with pictures (.html)"},
+      {.name = "save-graph",
+       .type = ParamType::Path,
+       .doc = "write what is asked for as a .json that `run` takes; with --dry-run nothing else is "
+              "done"},
+      {.name = "whole",
+       .type = ParamType::Flag,
+       .doc = "make all of every value, also where less of it is needed: to compare, or to look"},
+      {.name = "cache",
+       .type = ParamType::Path,
+       .doc = "a folder that keeps results: what is known there is not computed again"},
+      {.name = "progress",
+       .type = ParamType::Choice,
+       .doc = "bars on a terminal, lines of JSON, or nothing",
+       .fallback = "auto",
+       .choices = {"auto", "json", "off"}},
+      {.name = "no-clobber", .type = ParamType::Flag, .doc = "never overwrite a file"},
+      {.name = "explain",
+       .type = ParamType::Flag,
+       .doc = "tell what would run, what not and why, how much of each value is needed and what it "
+              "takes; without computing anything or writing a result"},
+      {.name = "dry-run",
+       .type = ParamType::Flag,
+       .doc = "resolve every parameter and estimate cost, without computing anything or writing a "
+              "result"},
+  };
+  return params;
+}
+
+}  // namespace pipeline

@@ -1,0 +1,271 @@
+#include "apps/pipeline/run/planner.h"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "apps/pipeline/values/refusal.h"
+#include "levelset/error.h"
+#include "levelset/progress.h"
+
+namespace pipeline {
+namespace {
+
+/// An action as people know it.
+std::string labelOf(const Node& node) {
+  return node.op->name + (node.name.empty() ? "" : " @" + node.name);
+}
+
+std::string reasonFor(const Graph& graph, std::size_t index, const std::vector<char>& runs) {
+  const Node& node = graph.nodes[index];
+  if (!runs[index]) return "left out: nothing that is asked for needs it";
+  std::vector<std::string> takers;
+  for (std::size_t i = index + 1; i < graph.nodes.size(); ++i) {
+    const Node& other = graph.nodes[i];
+    const bool takes = std::count(other.inputs.begin(), other.inputs.end(), index) > 0 ||
+                       std::any_of(other.named.begin(), other.named.end(),
+                                   [&](const auto& named) { return named.second == index; });
+    if (runs[i] && takes) takers.push_back(labelOf(other));
+  }
+  std::vector<std::string> files;
+  if (node.op->targets) files = node.op->targets(Invocation(*node.op, node.options));
+  const auto joined = [](const std::vector<std::string>& all) {
+    std::string text;
+    for (const std::string& one : all) text += (text.empty() ? "" : ", ") + one;
+    return text;
+  };
+  if (!files.empty()) return "writes " + joined(files);
+  if (!takers.empty()) return "for " + joined(takers);
+  return node.makes() ? "ends the chain" : "asked for";
+}
+
+std::string needOf(const Demand& demand, const Plan& plan) {
+  std::string text;
+  if (demand.part.halfWidth < plan.halfWidth)
+    text +=
+        fmt::format("; {:.3g} of {:.3g} voxels of its band", demand.part.halfWidth, plan.halfWidth);
+  if (!levelset::isEverywhere(demand.part.region)) {
+    const Imath::Box3d& box = demand.part.region;
+    text += fmt::format("; only {:.4g},{:.4g},{:.4g} to {:.4g},{:.4g},{:.4g}", box.min.x, box.min.y,
+                        box.min.z, box.max.x, box.max.y, box.max.z);
+  }
+  return text;
+}
+
+/// Of its value, as far as that is needed. 0 where nobody knows.
+double bytesOf(const std::optional<Plan>& plan, const Demand& demand) {
+  if (!plan) return 0;
+  if (plan->kind == Kind::Mesh) return plan->bytes();
+  const bool isTold =
+      (plan->kind == Kind::Band && plan->voxelSize > 0) || plan->kind == Kind::Field;
+  return isTold ? demanded(*plan, demand).bytes() : 0;
+}
+
+/// What asks for all of its operands makes all of its result, of which a part is kept then.
+bool makesWhole(const Node& node) {
+  return !node.inputs.empty() && !node.op->reads && !node.op->makesParts;
+}
+
+/// Where values take most: they live from what makes them to the last that takes them.
+struct Peak {
+  double bytes = 0;
+  std::size_t node = 0;  ///< that makes the last of them
+};
+
+Peak findPeak(const Graph& graph, const std::vector<char>& runs,
+              const std::vector<std::optional<Plan>>& plans, const std::vector<Demand>& demands,
+              const std::vector<double>& worked = {}) {
+  std::vector<std::size_t> uses = countUses(graph, runs);
+  const auto bytes = [&](std::size_t i) { return bytesOf(plans[i], demands[i]); };
+  double held = 0;
+  Peak peak;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    if (!runs[i]) continue;
+    double released = 0, largest = 0;
+    const auto release = [&](std::size_t input) {
+      if (--uses[input] > 0) return;
+      released += bytes(input);
+      largest = std::max(largest, bytes(input));
+    };
+    for (const std::size_t input : graph.nodes[i].inputs) release(input);
+    for (const auto& [option, input] : graph.nodes[i].named) release(input);
+    const double made = makesWhole(graph.nodes[i]) ? bytesOf(plans[i], {}) : bytes(i);
+    // What is taken for the last time may be worked on in its place.
+    double during = held + std::max(0.0, made - largest);
+    if (!worked.empty()) during = held + made + worked[i];
+    if (during > peak.bytes) peak = {during, i};
+    held += bytes(i) - released;
+    if (uses[i] == 0) held -= bytes(i);
+  }
+  return peak;
+}
+
+/// Roughly, as it is known.
+std::string inSeconds(double seconds) {
+  return seconds < 100 ? fmt::format("{:.2g} s", seconds) : fmt::format("{:.0f} s", seconds);
+}
+
+/// Of what runs, where its own operands and its result are known.
+std::optional<Cost> costOf(const Graph& graph, std::size_t i,
+                           const std::vector<std::optional<Plan>>& plans,
+                           const std::vector<Demand>& demands) {
+  const Node& node = graph.nodes[i];
+  if (!node.op->cost) return {};
+  Invocation invocation(*node.op, node.options);
+  for (const std::size_t input : node.inputs) {
+    if (!plans[input]) return {};
+    invocation.operands.emplace_back(demanded(*plans[input], demands[input]));
+  }
+  if (node.makes()) {
+    if (!plans[i]) return {};
+    invocation.planned = makesWhole(node) ? *plans[i] : demanded(*plans[i], demands[i]);
+  }
+  return node.op->cost(invocation);
+}
+
+}  // namespace
+
+Plan planOf(Invocation& invocation) {
+  const Operator& op = invocation.op();
+  if (op.plan) return op.plan(invocation);
+  Plan plan = invocation.operands.at(0).plan();
+  if (op.resultKind) plan.kind = op.resultKind(invocation);
+  return plan;
+}
+
+ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs, std::size_t maxMemory,
+                   const std::function<std::optional<Plan>(std::size_t)>& mesh) {
+  ValuePlans all{std::vector<std::optional<Plan>>(graph.nodes.size()),
+                 std::vector<std::exception_ptr>(graph.nodes.size())};
+  std::vector<std::optional<Plan>>& plans = all.plans;
+  const auto writers = findWritersRead(graph, runs);
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    const Node& node = graph.nodes[i];
+    if (!runs[i] || !node.makes() || writers[i]) continue;
+    if (const auto given = graph.given.find(i); given != graph.given.end()) {
+      plans[i] = given->second.plan();
+      continue;
+    }
+    if (node.inputs.empty() && node.kind == Kind::Mesh) {
+      plans[i] = mesh(i);
+      continue;
+    }
+    Invocation invocation(*node.op, node.options);
+    // A scene or a patch out of a file is read to be planned, which is as much as to make it.
+    const bool isHeavy =
+        node.inputs.empty() && (node.kind == Kind::Patch || node.kind == Kind::Scene);
+    bool isKnown = (node.op->plan || !node.inputs.empty()) && !isHeavy && !readsOnce(node);
+    const auto know = [&](std::size_t input) {
+      isKnown = isKnown && plans[input];
+      return isKnown ? Value(*plans[input]) : Value(Plan{});
+    };
+    for (const std::size_t input : node.inputs) {
+      invocation.operands.push_back(know(input));
+      invocation.operandNames.push_back(graph.nodes[input].name);
+    }
+    for (const auto& [option, input] : node.named) invocation.named.emplace(option, know(input));
+    if (!isKnown) continue;
+    // Of the whole, which need not fit: requireMemoryFor() asks for the part that is made.
+    const bool isRead =
+        std::any_of(node.op->params.begin(), node.op->params.end(), [&](const Param& param) {
+          return param.type == ParamType::Path && node.options.contains(param.name);
+        });
+    if (isRead) invocation.maxMemory = maxMemory;
+    invocation.dryRun = true;
+    try {
+      plans[i] = planOf(invocation);
+    } catch (const levelset::Cancelled&) {
+      throw;
+    } catch (const levelset::Error&) {
+      all.refusals[i] = std::current_exception();
+    }
+  }
+  return all;
+}
+
+void requireMemoryFor(const Graph& graph, const std::vector<char>& runs,
+                      const std::vector<std::optional<Plan>>& plans,
+                      const std::vector<Demand>& demands, std::size_t maxMemory) {
+  for (std::size_t i = 0; i < plans.size(); ++i)
+    if (plans[i])
+      levelset::requireMemory(demanded(*plans[i], demands[i]).bytes(), maxMemory,
+                              graph.nodes[i].op->name.c_str());
+  const Peak peak = findPeak(graph, runs, plans, demands);
+  if (peak.bytes > static_cast<double>(maxMemory))
+    levelset::requireMemory(
+        peak.bytes, maxMemory,
+        (graph.nodes[peak.node].op->name + " and the values held beside it").c_str());
+}
+
+void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
+             const std::function<void(const std::string&)>& tell) {
+  const std::vector<char> runs = neededNodes(graph);
+  const ValuePlans all = plansOf(graph, runs, maxMemory, [&](std::size_t i) -> std::optional<Plan> {
+    const Node& node = graph.nodes[i];
+    Invocation invocation(*node.op, node.options);
+    invocation.maxMemory = maxMemory;
+    invocation.dryRun = true;
+    try {
+      return planOf(invocation);
+    } catch (const levelset::Error& error) {
+      refuseAs(node.op->name, error, node.place);
+    }
+  });
+  const std::vector<std::optional<Plan>>& plans = all.plans;
+  std::vector<Demand> demands(graph.nodes.size());
+  if (!wholeValues) demands = demandsOf(graph, runs, plans);
+  std::string text;
+  double seconds = 0;
+  std::vector<double> worked(graph.nodes.size(), 0);  // bytes, by node
+  std::vector<std::string> untimed;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    const Node& node = graph.nodes[i];
+    text += fmt::format("{:<20} {}", labelOf(node), reasonFor(graph, i, runs));
+    if (plans[i]) {
+      const Plan plan = demanded(*plans[i], demands[i]);
+      text += needOf(demands[i], *plans[i]);
+      if (plan.kind == Kind::Band && plan.voxelSize > 0)
+        text += fmt::format("; about {:.3g} voxels of {:.4g}, {:.3g} MB", plan.activeVoxels(),
+                            plan.voxelSize, plan.bytes() * 1e-6);
+      if (plan.triangles > 0)
+        text +=
+            fmt::format("; about {:.3g} triangles, {:.3g} MB", plan.triangles, plan.bytes() * 1e-6);
+    } else if (runs[i] && node.makes()) {
+      text += "; its size cannot be told before it is made";
+    }
+    if (runs[i]) {
+      if (const std::optional<Cost> cost = costOf(graph, i, plans, demands)) {
+        seconds += cost->seconds;
+        worked[i] = cost->bytes;
+        if (cost->seconds > 0) text += "; " + inSeconds(cost->seconds);
+        if (cost->bytes > 0) text += fmt::format(", works with {:.3g} MB", cost->bytes * 1e-6);
+      } else {
+        untimed.push_back(node.op->name);
+      }
+    }
+    text += "\n";
+  }
+  std::sort(untimed.begin(), untimed.end());
+  untimed.erase(std::unique(untimed.begin(), untimed.end()), untimed.end());
+  text += fmt::format(
+      "values of about {:.3g} MB are held at once, about {:.3g} MB with what actions work with; "
+      "about {} of one core{}\n",
+      findPeak(graph, runs, plans, demands).bytes * 1e-6,
+      findPeak(graph, runs, plans, demands, worked).bytes * 1e-6, inSeconds(seconds),
+      untimed.empty() ? ""
+                      : fmt::format(", and what {} take{}, which cannot be told before",
+                                    fmt::join(untimed, ", "), untimed.size() == 1 ? "s" : ""));
+  tell(text);
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    if (!all.refusals[i]) continue;
+    try {
+      std::rethrow_exception(all.refusals[i]);
+    } catch (const levelset::Error& error) {
+      refuseAs(graph.nodes[i].op->name, error, graph.nodes[i].place);
+    }
+  }
+  requireMemoryFor(graph, runs, plans, demands, maxMemory);
+}
+
+}  // namespace pipeline

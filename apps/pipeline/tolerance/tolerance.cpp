@@ -1,0 +1,494 @@
+#include "apps/pipeline/tolerance/tolerance.h"
+
+#include <fmt/core.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "apps/pipeline/graph/graph_file.h"
+#include "apps/pipeline/tolerance/error_model.h"
+#include "apps/pipeline/tolerance/tolerance_graph.h"
+#include "apps/pipeline/tolerance/tolerance_levels.h"
+#include "apps/pipeline/values/units.h"
+#include "apps/process_cost.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+// === What the plan rests on
+/// Of the error estimated from runs, for the largest of a few distances is a matter of chance:
+/// where it is on one grid, it is not on the other. Without it, estimates are 1.0 to 2.1 times the
+/// true error over the cases of tests/bench/tolerance_bench.cpp.
+constexpr double kSafety = 1.25;
+/// Part of the tolerance that the next voxel size aims at.
+constexpr double kAim = 0.65;
+/// The same where the error is not estimated but measured.
+constexpr double kMeasuredAim = 0.8;
+/// Of what is measured, for what lies between samples: those at half the spacing find up to 1.06
+/// times as much on the bunny.
+constexpr double kMeasuredSafety = 1.1;
+/// An estimate below this part of the tolerance is worth a coarser run, which costs less in memory
+/// and in all that follows.
+constexpr double kWasteful = 0.25;
+/// Largest steps from one voxel size to the next: an extrapolation is as good as it is short.
+constexpr double kFinest = 1 / 3.0, kCoarsest = 4;
+/// Voxels along an object below which comparisons tell nothing: its coarsest run has a quarter.
+constexpr double kLeastVoxels = 8;
+/// Voxels along the longest side that the first voxel size does not pass, whatever models say.
+constexpr double kMostFirst = 64;
+/// Beside creases the error is about half a voxel. It is not judged, but does not get larger than
+/// a few times the tolerance where memory allows.
+constexpr double kCreaseVoxels = 4;
+constexpr int kMostRounds = 12;
+/// The least order that is believed: below, the difference of two runs counts as the error.
+constexpr double kLeastOrder = 1;
+constexpr int kPlanResolution = 16;
+
+class ToleranceRun {
+ public:
+  ToleranceRun(const Graph& graph, const RunSettings& settings, RunReport& report)
+      : graph_(graph),
+        settings_(settings),
+        report_(report),
+        tolerance_(parseLength(graph.globals.at("tolerance"), "--tolerance")),
+        parts_(withoutCacheUse(toleranceParts(graph), settings)),
+        model_(graphModel(graph, surfacesOf(graph, parts_))),
+        levels_(graph, parts_, settings) {
+    told_.written = graph.globals.at("tolerance");
+    for (const char* name : model_.cases) told_.models.emplace_back(name);
+  }
+
+  void run() {
+    for (const std::string& sentence : voxelLengths(graph_, parts_)) warn(sentence);
+    levels_.makeOnce(report_);
+    plan();
+    if (settings_.dryRun) {
+      if (told_.modelVoxelSize > 0) levels_.planAt(told_.modelVoxelSize, report_);
+    } else {
+      base_ = apps::processStatusBytes("VmRSS:");
+      search();
+      finish();
+    }
+  }
+
+  /// Also of a run that failed.
+  void tell() {
+    const std::vector<char> needed = neededNodes(graph_);
+    report_.leftOut.clear();
+    for (std::size_t i = 0; i < graph_.nodes.size(); ++i)
+      if (!needed[i])
+        report_.leftOut.push_back(graph_.nodes[i].op->name + (graph_.nodes[i].name.empty()
+                                                                  ? ""
+                                                                  : " @" + graph_.nodes[i].name));
+    report_.tolerance = told_;
+  }
+
+ private:
+  /// With a cache what is made once is one of the results that it knows; values that are given it
+  /// does not.
+  static ToleranceParts withoutCacheUse(ToleranceParts parts, const RunSettings& settings) {
+    if (settings.cache.empty() || settings.dryRun) return parts;
+    parts.again.insert(parts.again.end(), parts.once.begin(), parts.once.end());
+    std::sort(parts.again.begin(), parts.again.end());
+    parts.once.clear();
+    return parts;
+  }
+  static std::vector<std::size_t> surfacesOf(const Graph& graph, const ToleranceParts& parts) {
+    std::vector<std::size_t> nodes;
+    for (const std::size_t i : parts.again)
+      if (graph.nodes[i].kind == Kind::Band ||
+          (graph.nodes[i].kind == Kind::Mesh && graph.nodes[i].op->name != "read"))
+        nodes.push_back(i);
+    return nodes;
+  }
+
+  void warn(const std::string& sentence) {
+    report_.warnings.push_back(sentence);
+    settings_.warn(sentence);
+  }
+
+  [[nodiscard]] double requestedAt(double diagonal) const {
+    return tolerance_.unit == Unit::Percent ? tolerance_.number / 100 * diagonal
+                                            : tolerance_.number;
+  }
+
+  // === The first voxel size
+  /// By the error models, and by how large things are.
+  void plan() {
+    RunReport planned;
+    const std::map<std::size_t, Value> plans = levels_.planAll(kPlanResolution, planned);
+    for (const std::size_t i : parts_.chosen) {
+      const double side = kPlanResolution * plans.at(i).plan().voxelSize;
+      longestSide_ = std::max(longestSide_, side);
+      shortestSide_ = std::min(shortestSide_, side);
+    }
+    double requested = std::numeric_limits<double>::max();
+    for (const std::size_t i : parts_.outputs) {
+      const auto it = plans.find(i);
+      const double diagonal = it == plans.end() ? 0 : it->second.diagonal();
+      if (tolerance_.unit == Unit::Percent && !(diagonal > 0)) return;
+      requested = std::min(requested, requestedAt(diagonal));
+    }
+    double voxel = std::numeric_limits<double>::max();
+    for (const std::size_t i : parts_.chosen)
+      if (const double told = modelVoxelSize(graph_.nodes[i], kAim * requested); told > 0)
+        voxel = std::min(voxel, told);
+    if (model_.makesCreases) voxel = std::min(voxel, kCreaseVoxels * requested);
+    if (voxel < std::numeric_limits<double>::max())
+      told_.modelVoxelSize = rounded(std::min(voxel, coarsest()));
+  }
+
+  [[nodiscard]] double coarsest() const { return shortestSide_ / kLeastVoxels; }
+
+  /// To three digits, downwards: for people to read.
+  static double rounded(double voxel) {
+    const double unit = std::pow(10, std::floor(std::log10(voxel)) - 2);
+    const double steps = std::floor(voxel / unit * (1 + 1e-12));
+    return parseNumber(fmt::format("{:.3g}", steps * unit), "--tolerance");
+  }
+
+  // === Runs
+  /// Of one voxel size: the result, and what tells its error.
+  struct Trial {
+    Level level;
+    std::vector<ToleranceOutput> outputs = {};
+    double ratio = 0;  ///< largest of the errors to what was asked for
+    double order = 1;  ///< of that one
+    double aim = 1;    ///< part of what was asked for that the next one aims at
+    bool hasCreases = false;
+    double finest = 0;  ///< tolerance of the strictest output
+  };
+
+  Trial tryVoxel(double voxel) {
+    coarsePeak_ = base_;
+    Trial trial{.level = levels_.runAt(voxel, 1)};
+    trial.outputs.resize(parts_.outputs.size());
+    std::vector<std::size_t> open;  // outputs of which runs with larger voxels have to tell
+    for (std::size_t i = 0; i < parts_.outputs.size(); ++i) {
+      ToleranceOutput& output = trial.outputs[i];
+      output.name = nameOf(graph_.nodes[parts_.outputs[i]]);
+      output.requested = requestedAt(trial.level.surfaces[i].diagonal);
+      output.order = kLeastOrder;
+      output.achieved = std::numeric_limits<double>::max();
+      if (const std::optional<double> known = levels_.knownError(trial.level, i)) {
+        output.isMeasured = true;
+        output.achieved = kMeasuredSafety * *known;
+      }
+      const bool canFall = output.isMeasured && measuredFalls(voxel, output.achieved, i);
+      if (!output.isReached() && !canFall) open.push_back(i);
+    }
+    if (!open.empty()) extrapolate(voxel, open, trial);
+    trial.finest = std::numeric_limits<double>::max();
+    for (const ToleranceOutput& output : trial.outputs) {
+      const double ratio = output.achieved / output.requested;
+      if (ratio >= trial.ratio) {
+        trial.ratio = ratio;
+        trial.order = output.order;
+        trial.aim = output.isMeasured ? kMeasuredAim : kAim;
+      }
+      trial.hasCreases = trial.hasCreases || output.creaseShare > 0;
+      trial.finest = std::min(trial.finest, output.requested);
+    }
+    trial.level.peakBytes = std::max(trial.level.peakBytes, apps::peakResidentBytes());
+    trial.level.surfaces.clear();  // what is kept is the result
+    return trial;
+  }
+
+  /// Does what is measured fall with the voxels? It does not where the mesh has parts inside of the
+  /// solid, or creases that are finer than the tolerance: estimates have to tell then.
+  bool measuredFalls(double voxel, double error, std::size_t output) {
+    const auto last = measured_.find(output);
+    if (last != measured_.end() && voxel < last->second.voxel) {
+      const double slowest = std::sqrt(voxel / last->second.voxel);
+      if (error > slowest * last->second.error) believesMeasured_ = false;
+    }
+    measured_[output] = {voxel, error};
+    return believesMeasured_;
+  }
+
+  /// What is measured counts no more where it is not small enough, and the best voxel size is tried
+  /// again. @return false where that is so already
+  bool turnToEstimates(double& voxel) {
+    const auto& outputs = best_->outputs;
+    const bool rests = std::any_of(outputs.begin(), outputs.end(), [](const ToleranceOutput& o) {
+      return o.isMeasured && !o.isReached();
+    });
+    if (!rests || !std::exchange(believesMeasured_, false)) return false;
+    voxel = best_->level.voxelSize;
+    return true;
+  }
+
+  /// Richardson: from runs with voxels twice and four times as large.
+  void extrapolate(double voxel, const std::vector<std::size_t>& outputs, Trial& trial) {
+    std::optional<Level> coarser;
+    try {
+      coarser = levels_.runAt(voxel, 4);
+      coarser->values.clear();
+    } catch (const levelset::InvalidInput&) {  // it is no longer an object: the model has to do
+    }
+    Level coarse = levels_.runAt(voxel, 2);
+    coarse.values.clear();
+    coarsePeak_ = coarse.peakBytes;
+    for (const std::size_t i : outputs) {
+      const LevelDifference near = levels_.difference(trial.level, coarse, i);
+      const LevelDifference far =
+          coarser ? levels_.difference(coarse, *coarser, i) : LevelDifference{};
+      ToleranceOutput& output = trial.outputs[i];
+      const bool isObserved = near.smooth > 0 && far.smooth > 0;
+      const double order =
+          std::clamp(isObserved ? std::log2(far.smooth / near.smooth) : kLeastOrder, kLeastOrder,
+                     std::max(kLeastOrder, model_.order));
+      // The difference may be small by chance; the one before it then tells what to expect.
+      const double expected = far.smooth / std::exp2(order);
+      const double error = kSafety * std::max(near.smooth, expected) / (std::exp2(order) - 1);
+      output.creaseShare = near.creaseShare;
+      output.crease = kSafety * std::max(near.crease, far.crease / 2);
+      if (output.isMeasured && output.achieved <= error) continue;
+      output.isMeasured = false;
+      output.achieved = error;
+      output.order = order;
+    }
+  }
+
+  /// The least voxel size that memory allows, after a trial.
+  [[nodiscard]] double leastVoxel(const Trial& trial) const {
+    if (settings_.maxMemory == levelset::kNoMemoryLimit) return 0;
+    // What the operators allocate on the way, and what comparing takes, follows the surface.
+    constexpr double kVoxelBytes = 24, kTriangleBytes = 200, kUsable = 0.85;
+    const double h = trial.level.voxelSize, peak = trial.level.peakBytes;
+    const double least = kVoxelBytes * trial.level.voxels +
+                         kTriangleBytes * static_cast<double>(trial.level.triangles);
+    const double grown = std::max((peak - coarsePeak_) * 4 / 3, least);
+    const double fixed = std::max(base_, peak - grown);
+    const double room = kUsable * static_cast<double>(settings_.maxMemory) - fixed;
+    return room > 0 ? h * std::sqrt(grown / room) : std::numeric_limits<double>::max();
+  }
+
+  // === The search
+  /// The voxel size to try after a trial; none: it will do.
+  std::optional<double> nextVoxel(const Trial& trial) {
+    const double h = trial.level.voxelSize;
+    const double step = std::clamp(
+        std::pow(trial.aim / std::max(trial.ratio, 1e-9), 1 / trial.order), kFinest, kCoarsest);
+    double next = h * step;
+    if (trial.ratio > 1) {
+      failing_ = std::min(failing_.value_or(h), h);
+      next = std::min(next, 0.85 * h);
+      if (reaching_ && next < 1.05 * *reaching_) return {};
+    } else {
+      reaching_ = std::max(reaching_.value_or(h), h);
+      double most = coarsest();
+      if (trial.hasCreases) most = std::min(most, kCreaseVoxels * trial.finest);
+      if (trial.ratio >= kWasteful && h <= 1.2 * most) return {};
+      next = std::min(next, most);
+      if (failing_ && next > h && next > 0.95 * *failing_) next = std::sqrt(h * *failing_);
+      if (next > h / 1.2 && next < 1.2 * h) return {};
+      next = std::max(next, kFinest * h);
+    }
+    return rounded(next);
+  }
+
+  void search() {
+    double voxel = std::max(longestSide_ / kMostFirst / kCoarsest,
+                            std::min(told_.modelVoxelSize > 0
+                                         ? std::max(told_.modelVoxelSize, longestSide_ / kMostFirst)
+                                         : longestSide_ / kMostFirst,
+                                     coarsest()));
+    voxel = rounded(voxel);
+    int refusals = 0;
+    double before = 0, beforeRatio = 0;
+    for (int round = 0; round < kMostRounds; ++round) {
+      std::optional<Trial> trial = attempt(voxel);
+      if (!trial) {
+        if (!best_) {
+          // What is too coarse for one object may be asked for again; what is wrong with it not.
+          if (++refusals > 2) std::rethrow_exception(refusal_);
+          voxel = rounded(voxel / 4);
+          continue;
+        }
+        told_.limit = told_.rounds.back().failure;
+        if (turnToEstimates(voxel)) continue;
+        if (best_->ratio <= 1 || ++refusals > 2) return;
+        voxel = rounded(std::sqrt(voxel * best_->level.voxelSize));
+        if (voxel > 0.9 * best_->level.voxelSize) return;
+        continue;
+      }
+      if (trial->ratio <= 1 && refusals > 0) told_.limit.clear();
+      const bool stalls =
+          before > 1.4 * voxel && trial->ratio > 1 && trial->ratio > 0.85 * beforeRatio;
+      before = voxel;
+      beforeRatio = trial->ratio;
+      const std::optional<double> next = nextVoxel(*trial);
+      const double least = leastVoxel(*trial);
+      const double order = trial->order, ratio = trial->ratio;
+      keepBest(std::move(*trial));
+      if (!next || refusals > 2) return;
+      // Once is a matter of chance, unless there is a reason.
+      if (stalls && (++stalled_ > 1 || !parts_.fixed.empty())) {
+        told_.limit = stallSentence();
+        return;
+      }
+      double wanted = *next;
+      if (wanted < least) {
+        if (ratio <= 1) return;
+        // As fine as memory allows, if that is worth a run.
+        if (least > 0.85 * voxel) {
+          if (turnToEstimates(voxel)) continue;
+          told_.limit = memorySentence(voxel * std::pow(kAim / ratio, 1 / order));
+          return;
+        }
+        wanted = rounded(1.02 * least);
+      }
+      voxel = wanted;
+    }
+    if (best_->ratio > 1 && told_.limit.empty())
+      told_.limit = fmt::format("{} voxel sizes were tried", kMostRounds);
+  }
+
+  [[nodiscard]] std::string memorySentence(double voxel) const {
+    return fmt::format("voxels of about {:.2g} would take more than --max-memory, {:.0f} MB", voxel,
+                       static_cast<double>(settings_.maxMemory) * 1e-6);
+  }
+  [[nodiscard]] std::string stallSentence() const {
+    for (const std::size_t i : parts_.fixed) {
+      const std::map<std::string, std::string>& options = graph_.nodes[i].options;
+      const char* option = options.contains("voxel") ? "voxel" : "resolution";
+      return fmt::format("the error no longer falls with the voxels; '{}' has its own, --{} {}",
+                         nameOf(graph_.nodes[i]), option, options.at(option));
+    }
+    return "the error no longer falls with the voxels";
+  }
+
+  /// @return nothing where it was refused
+  std::optional<Trial> attempt(double voxel) {
+    malloc_trim(0);
+    ToleranceRound& round = told_.rounds.emplace_back();
+    round.voxelSize = voxel;
+    const auto start = std::chrono::steady_clock::now();
+    std::optional<Trial> trial;
+    try {
+      trial = tryVoxel(voxel);
+      round.outputs = trial->outputs;
+    } catch (const levelset::InvalidInput& error) {
+      refusal_ = std::current_exception();
+      round.failure = error.what();
+    } catch (const levelset::ResourceLimit& error) {
+      if (!best_) throw;
+      round.failure = error.what();
+    }
+    round.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return trial;
+  }
+
+  /// Of those that reach what was asked the coarsest, of the others the one that is nearest to it;
+  /// but where creases are, the finer of two that do.
+  void keepBest(Trial trial) {
+    const bool isBetter =
+        !best_ || (trial.ratio <= 1 ? best_->ratio > 1 || trial.hasCreases ||
+                                          trial.level.voxelSize > best_->level.voxelSize
+                                    : trial.ratio < best_->ratio);
+    if (isBetter) best_ = std::move(trial);
+  }
+
+  // === The end
+  void finish() {
+    Trial& best = *best_;
+    told_.voxelSize = best.level.voxelSize;
+    told_.outputs = best.outputs;
+    for (StepReport& step : best.level.report.steps) report_.steps.push_back(std::move(step));
+    for (const std::string& sentence : best.level.report.warnings)
+      report_.warnings.push_back(sentence);
+    for (const Told& text : best.level.told) {
+      if (text.kind == Told::Kind::Warn)
+        settings_.warn(text.text);
+      else if (text.kind == Told::Kind::Note)
+        settings_.note(text.text);
+      else if (settings_.print)
+        settings_.print(text.text);
+    }
+    std::exception_ptr failure;
+    try {
+      levels_.runEnds(best.level, report_);
+    } catch (const levelset::NumericalError&) {
+      failure = std::current_exception();
+    }
+    for (const ToleranceOutput& output : told_.outputs) settings_.note(sentenceOf(output));
+    if (!told_.isReached()) throw levelset::NumericalError(missSentence());
+    if (!best.level.failure.empty()) throw levelset::NumericalError(best.level.failure);
+    if (failure) std::rethrow_exception(failure);
+  }
+
+  [[nodiscard]] std::string sentenceOf(const ToleranceOutput& output) const {
+    std::string text =
+        fmt::format("{}: off by about {:.2g} with voxels of {:.3g}, where {:.4g} was asked for",
+                    output.name, output.achieved, told_.voxelSize, output.requested);
+    if (output.crease > output.requested)
+      text +=
+          fmt::format("; beside creases, which the field cannot hold, by {:.2g}", output.crease);
+    return text;
+  }
+
+  [[nodiscard]] std::string missSentence() const {
+    const auto worst =
+        std::max_element(told_.outputs.begin(), told_.outputs.end(),
+                         [](const ToleranceOutput& a, const ToleranceOutput& b) {
+                           return a.achieved / a.requested < b.achieved / b.requested;
+                         });
+    return fmt::format(
+        "--tolerance: {:.4g} was asked for and {:.2g} reached, by '{}' with voxels of {:.3g}; {}; "
+        "the best result is kept: ask for less, or give more memory",
+        worst->requested, worst->achieved, worst->name, told_.voxelSize, told_.limit);
+  }
+
+  const Graph& graph_;
+  const RunSettings& settings_;
+  RunReport& report_;
+  Length tolerance_;
+  ToleranceParts parts_;
+  GraphModel model_;
+  LevelRunner levels_;
+  ToleranceReport told_;
+  double longestSide_ = 0, shortestSide_ = std::numeric_limits<double>::max();
+  double base_ = 0, coarsePeak_ = 0;
+  std::optional<Trial> best_;
+  std::optional<double> reaching_, failing_;  ///< the coarsest that do, the finest that do not
+  std::exception_ptr refusal_;
+  int stalled_ = 0;
+  struct Measured {
+    double voxel = 0, error = 0;
+  };
+  std::map<std::size_t, Measured> measured_;  ///< by output
+  bool believesMeasured_ = true;
+};
+
+}  // namespace
+
+void runToTolerance(const Graph& graph, const RunSettings& settings, RunReport& report) {
+  std::optional<ToleranceRun> whole;
+  const auto tell = [&](const std::string& error, int code) {
+    report.dryRun = settings.dryRun;
+    report.graphJson = graphJson(graph);
+    report.error = error;
+    report.exitCode = code;
+    if (whole) whole->tell();
+  };
+  try {
+    whole.emplace(graph, settings, report).run();
+    tell("", 0);
+  } catch (const levelset::Error& error) {
+    tell(error.what(), static_cast<int>(error.exitCode()));
+    throw;
+  } catch (const std::exception& error) {
+    tell(error.what(), static_cast<int>(levelset::ExitCode::Input));
+    throw;
+  }
+}
+
+}  // namespace pipeline

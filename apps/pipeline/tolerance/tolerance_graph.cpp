@@ -1,0 +1,212 @@
+#include "apps/pipeline/tolerance/tolerance_graph.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/values/refusal.h"
+#include "apps/pipeline/values/units.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::UsageError;
+
+bool hasTargets(const Node& node) {
+  return node.op->targets && !node.op->targets(Invocation(*node.op, node.options)).empty();
+}
+
+bool readsStandardInput(const Node& node) {
+  return node.op->usesStandardInput &&
+         node.op->usesStandardInput(Invocation(*node.op, node.options));
+}
+
+bool isJudged(Kind kind) {
+  return kind == Kind::Band || kind == Kind::Mesh;
+}
+
+template <typename Visit>
+void forEachTaken(const Node& node, const Visit& visit) {
+  for (const std::size_t input : node.inputs) visit(input);
+  for (const auto& [option, input] : node.named) visit(input);
+}
+
+bool isLength(const Node& node, const std::string& option) {
+  const Param* param = node.op->find(option);
+  return param && (param->type == ParamType::Length || param->type == ParamType::Lengths);
+}
+
+std::string scaledVoxel(const std::string& text, double factor) {
+  const Length length = parseLength(text, "--voxel");
+  return fmt::format("{}{}", length.number * factor, length.unit == Unit::Percent ? "%" : "");
+}
+
+/// Sorts nodes into parts.
+class PartFinder {
+ public:
+  explicit PartFinder(const Graph& graph)
+      : graph_(graph),
+        needed_(neededNodes(graph)),
+        isEnd_(graph.nodes.size(), 0),
+        hasVoxels_(graph.nodes.size(), 0) {}
+
+  ToleranceParts find() {
+    for (std::size_t i = 0; i < graph_.nodes.size(); ++i)
+      if (needed_[i]) place(i);
+    if (parts_.chosen.empty())
+      throw UsageError(
+          "--tolerance: no action is left to choose a voxel size for; leave out --voxel and "
+          "--resolution where a level set is made, or leave out --tolerance");
+    findOutputs();
+    parts_.constant = parts_.once;
+    return std::move(parts_);
+  }
+
+ private:
+  void place(std::size_t i) {
+    const Node& node = graph_.nodes[i];
+    const bool isMaker = node.makes() && node.kind != Kind::Scene;
+    bool takesEnd = false;
+    forEachTaken(node, [&](std::size_t input) { takesEnd = takesEnd || isEnd_[input]; });
+    if (isMaker && (takesEnd || hasTargets(node)))
+      throw UsageError(withPlace(
+          fmt::format("{}: writes files while it makes its result, which --tolerance makes more "
+                      "than once; give voxel sizes, or leave out what it writes",
+                      node.op->name),
+          node.place));
+    if (!isMaker) {
+      isEnd_[i] = 1;
+      parts_.ends.push_back(i);
+      return;
+    }
+    if (node.voxelFollows) {
+      parts_.chosen.push_back(i);
+      hasVoxels_[i] = 1;
+      refuseVoxelLengths(node);
+    } else if (node.options.contains("voxel") || node.options.contains("resolution")) {
+      parts_.fixed.push_back(i);
+      hasVoxels_[i] = 1;
+    }
+    forEachTaken(node, [&](std::size_t input) { hasVoxels_[i] |= hasVoxels_[input]; });
+    if (hasVoxels_[i] && readsStandardInput(node))
+      throw UsageError(withPlace(
+          fmt::format("{}: standard input can be read once only, and --tolerance makes this more "
+                      "than once; give a file",
+                      node.op->name),
+          node.place));
+    (hasVoxels_[i] ? parts_.again : parts_.once).push_back(i);
+  }
+
+  void refuseVoxelLengths(const Node& node) const {
+    for (const auto& [option, text] : node.options)
+      if (isLength(node, option) && text.find("vx") != std::string::npos)
+        throw UsageError(withPlace(
+            fmt::format("{}: --{}: '{}' counts in voxels, and --tolerance is to choose their "
+                        "size; write it in world units",
+                        node.op->name, option, text),
+            node.place));
+  }
+
+  void findOutputs() {
+    std::vector<char> isTaken(graph_.nodes.size(), 0), lasts(graph_.nodes.size(), 0);
+    for (std::size_t i = 0; i < graph_.nodes.size(); ++i)
+      if (needed_[i])
+        forEachTaken(graph_.nodes[i],
+                     [&](std::size_t input) { (isEnd_[i] ? lasts : isTaken)[input] = 1; });
+    for (const std::size_t i : parts_.again) {
+      const bool isLast = lasts[i] || !isTaken[i];
+      if (isLast && isJudged(graph_.nodes[i].kind) && followsChosen(i)) parts_.outputs.push_back(i);
+    }
+    for (std::size_t i = 0; i < graph_.nodes.size(); ++i)
+      if (needed_[i] && !isEnd_[i] && (lasts[i] || !isTaken[i])) parts_.lasting.push_back(i);
+    if (parts_.outputs.empty())
+      throw UsageError(
+          "--tolerance: there is no level set and no mesh at the end whose error could be told; "
+          "end with one, or give voxel sizes");
+  }
+
+  [[nodiscard]] bool followsChosen(std::size_t i) const {
+    if (graph_.nodes[i].voxelFollows) return true;
+    bool follows = false;
+    forEachTaken(graph_.nodes[i],
+                 [&](std::size_t input) { follows = follows || followsChosen(input); });
+    return follows;
+  }
+
+  const Graph& graph_;
+  std::vector<char> needed_, isEnd_, hasVoxels_;
+  ToleranceParts parts_;
+};
+
+}  // namespace
+
+ToleranceParts toleranceParts(const Graph& graph) {
+  return PartFinder(graph).find();
+}
+
+std::vector<std::string> voxelLengths(const Graph& graph, const ToleranceParts& parts) {
+  std::vector<std::string> sentences;
+  for (const std::size_t i : parts.again) {
+    const Node& node = graph.nodes[i];
+    for (const auto& [option, text] : node.options)
+      if (isLength(node, option) && text.find("vx") != std::string::npos)
+        sentences.push_back(withPlace(
+            fmt::format("{}: --{}: '{}' counts in voxels, whose size --tolerance chooses; write it "
+                        "in world units if the surface depends on it",
+                        node.op->name, option, text),
+            node.place));
+  }
+  return sentences;
+}
+
+PartGraph partGraph(const Graph& graph, const std::vector<std::size_t>& keep,
+                    const std::map<std::size_t, Value>& given) {
+  PartGraph part;
+  std::map<std::size_t, std::size_t> number;
+  for (const std::size_t i : keep) {
+    Node node = graph.nodes[i];
+    if (const auto value = given.find(i); value != given.end()) {
+      node.op = &givenOperator();
+      node.options.clear();
+      node.inputs.clear();
+      node.named.clear();
+      part.graph.given.emplace(part.graph.nodes.size(), value->second);
+    }
+    for (std::size_t& input : node.inputs) input = number.at(input);
+    for (auto& [option, input] : node.named) input = number.at(input);
+    number[i] = part.graph.nodes.size();
+    part.graph.nodes.push_back(std::move(node));
+    part.origin.push_back(i);
+  }
+  return part;
+}
+
+void setVoxels(Graph& graph, const ToleranceParts& parts, double voxel, double coarsening) {
+  for (const std::size_t i : parts.chosen)
+    graph.nodes[i].options["voxel"] = fmt::format("{}", voxel * coarsening);
+  if (coarsening == 1) return;
+  for (const std::size_t i : parts.fixed) {
+    std::map<std::string, std::string>& options = graph.nodes[i].options;
+    if (const auto given = options.find("voxel"); given != options.end()) {
+      given->second = scaledVoxel(given->second, coarsening);
+    } else {
+      const double count =
+          static_cast<double>(parseInteger(options.at("resolution"), "--resolution"));
+      options["resolution"] = fmt::format("{}", std::max(1L, std::lround(count / coarsening)));
+    }
+  }
+}
+
+void setResolution(Graph& graph, const ToleranceParts& parts, int resolution) {
+  for (const std::size_t i : parts.chosen)
+    graph.nodes[i].options["resolution"] = fmt::format("{}", resolution);
+}
+
+std::string nameOf(const Node& node) {
+  return node.name.empty() ? node.op->name : "@" + node.name;
+}
+
+}  // namespace pipeline

@@ -1,0 +1,158 @@
+#include "apps/pipeline/values/value.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "levelset/error.h"
+
+namespace pipeline {
+
+using levelset::NarrowBand;
+using levelset::TriMesh;
+
+const char* kindName(Kind kind) {
+  switch (kind) {
+    case Kind::Mesh:
+      return "mesh";
+    case Kind::Band:
+      return "level set";
+    case Kind::Patch:
+      return "patch";
+    case Kind::Field:
+      return "field";
+    case Kind::Surface:
+      return "surface band";
+    case Kind::Scene:
+      return "scene";
+  }
+  return "";
+}
+
+double Plan::activeVoxels() const {
+  if (!(voxelSize > 0)) return 0;
+  const double layer = area / (voxelSize * voxelSize) * 2 * halfWidth;
+  if (bounds.isEmpty()) return layer;
+  // However much surface there is, no grid point counts twice.
+  double all = 1;
+  for (int axis = 0; axis < 3; ++axis)
+    all *= (bounds.max[axis] - bounds.min[axis]) / voxelSize + 2 * halfWidth + 1;
+  return std::min(layer, all);
+}
+
+double Plan::bytes() const {
+  if (kind == Kind::Field) return fieldBytes;
+  // Of corners, and of a place for each two triangles.
+  if (kind == Kind::Mesh) return (3 * sizeof(std::uint32_t) + sizeof(Imath::V3d) / 2.0) * triangles;
+  // A band fills about a third of its leaf blocks: 12 bytes for each active voxel, as measured.
+  constexpr double kBytesPerVoxel = 12;
+  return kBytesPerVoxel * activeVoxels();
+}
+
+Value::Value(TriMesh mesh) : data_(std::make_shared<const TriMesh>(std::move(mesh))) {}
+Value::Value(NarrowBand band) : data_(std::move(band)) {}
+Value::Value(PatchValue patch) : data_(std::make_shared<const PatchValue>(std::move(patch))) {}
+Value::Value(levelset::FieldGrid field) : data_(std::move(field)) {}
+Value::Value(render::ViewedScene scene)
+    : data_(std::make_shared<const render::ViewedScene>(std::move(scene))) {}
+Value::Value(Plan plan) : plan_(plan) {}
+
+Kind Value::kind() const {
+  switch (data_.index()) {
+    case 1:
+      return Kind::Mesh;
+    case 2:
+      return std::get<NarrowBand>(data_).isOpenSurface() ? Kind::Surface : Kind::Band;
+    case 3:
+      return Kind::Patch;
+    case 4:
+      return Kind::Field;
+    case 5:
+      return Kind::Scene;
+    default:
+      return plan_->kind;
+  }
+}
+
+template <typename T>
+const T& Value::as(Kind wanted) const {
+  if (const T* value = std::get_if<T>(&data_)) return *value;
+  throw levelset::UsageError(
+      fmt::format("levelsmith: a {} stands where a {} is needed; choose "
+                  "another operand, or another grid of the file",
+                  kindName(kind()), kindName(wanted)));
+}
+
+const TriMesh& Value::mesh() const {
+  return *as<std::shared_ptr<const TriMesh>>(Kind::Mesh);
+}
+const NarrowBand& Value::band() const {
+  return as<NarrowBand>(Kind::Band);
+}
+const PatchValue& Value::patch() const {
+  return *as<std::shared_ptr<const PatchValue>>(Kind::Patch);
+}
+const levelset::FieldGrid& Value::field() const {
+  return as<levelset::FieldGrid>(Kind::Field);
+}
+
+const render::ViewedScene& Value::scene() const {
+  return *as<std::shared_ptr<const render::ViewedScene>>(Kind::Scene);
+}
+
+const Plan& Value::plan() const {
+  if (plan_) return *plan_;
+  Plan plan;
+  plan.kind = kind();
+  switch (plan.kind) {
+    case Kind::Mesh:
+      plan.bounds = bounds(mesh());
+      plan.area = surfaceArea(mesh());
+      plan.triangles = static_cast<double>(mesh().triangles.size());
+      break;
+    case Kind::Band:
+    case Kind::Surface:
+      plan.bounds = band().zeroSetBounds();
+      plan.voxelSize = band().voxelSize();
+      plan.halfWidth = band().halfWidth();
+      plan.area = static_cast<double>(band().activeVoxelCount()) * plan.voxelSize * plan.voxelSize /
+                  (2 * plan.halfWidth);
+      break;
+    case Kind::Patch:
+      for (const mapping::Patch& one : patch().patches)
+        for (const mapping::ParticleLevel& level : one.levels)
+          for (const Imath::V3d& p : level.positions) plan.bounds.extendBy(p);
+      break;
+    case Kind::Field:
+      plan.bounds = field().bounds();
+      plan.voxelSize = field().voxelSize();
+      plan.fieldBytes = static_cast<double>(field().memoryUse());
+      break;
+    case Kind::Scene:
+      plan.bounds = scene().scene.bounds();
+      for (const render::Solid& solid : scene().scene.solids) {
+        const double h = solid.band.voxelSize();
+        plan.voxelSize = plan.voxelSize > 0 ? std::min(plan.voxelSize, h) : h;
+        plan.halfWidth = solid.band.halfWidth();
+        plan.area +=
+            static_cast<double>(solid.band.activeVoxelCount()) * h * h / (2 * plan.halfWidth);
+      }
+      break;
+  }
+  plan_ = plan;
+  return *plan_;
+}
+
+render::ViewedScene sceneOf(const Value& drawn) {
+  render::ViewedScene viewed;
+  if (drawn.kind() == Kind::Scene)
+    viewed = drawn.scene();
+  else if (drawn.kind() == Kind::Mesh)  // the value's own
+    viewed.scene.meshes.push_back(
+        {std::shared_ptr<const TriMesh>(std::shared_ptr<const void>(), &drawn.mesh())});
+  else
+    viewed.scene.solids.push_back({.band = drawn.band()});
+  return viewed;
+}
+
+}  // namespace pipeline

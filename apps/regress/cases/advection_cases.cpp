@@ -1,0 +1,290 @@
+#include <fmt/core.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "apps/regress/peers/peer.h"
+#include "apps/regress/recorder.h"
+#include "apps/regress/truth/carried.h"
+#include "apps/regress/truth/exact_band.h"
+#include "levelset/flow/advect.h"
+#include "levelset/flow/velocity.h"
+#include "levelset/inspect/compare.h"
+
+namespace regress {
+
+using Imath::V3d;
+using levelset::AdvectScheme;
+using levelset::NarrowBand;
+using levelset::VectorField;
+
+namespace {
+
+struct Scheme {
+  const char* name;
+  AdvectScheme scheme;
+};
+constexpr Scheme kSchemes[] = {{"front", AdvectScheme::Front},
+                               {"semi-Lagrangian", AdvectScheme::SemiLagrangian}};
+
+/// Volume of what is in one of the solids only, over that of the truth; nothing may be left of `a`.
+double symmetricDifference(const NarrowBand& a, const NarrowBand& b, const Truth& truth) {
+  if (a.isEmpty()) return 1;
+  return levelset::compare(a, b).symmetricDifference / *truth.volume;
+}
+
+/// After its time, a solid is where it was.
+struct Journey {
+  VectorField velocity;
+  double time;
+  bool turnsBack;  ///< at half the time
+};
+
+/// @param finestPeer  resolution up to which OpenVDB is asked, too
+void carry(Recorder& out, const std::string& variant, const Sample& at, const Truth& truth,
+           const Journey& journey, int finestPeer) {
+  const NarrowBand solid = exactBand(truth, at.voxelSize);
+  for (const Scheme& s : kSchemes) {
+    if (out.isQuick() && s.scheme != AdvectScheme::Front && !out.wantsRepeats(at)) continue;
+    const auto made = out.measure({variant + ", " + s.name, at, truth}, kOurs, [&] {
+      return levelset::advect(solid, journey.velocity, journey.time, {.scheme = s.scheme}).band;
+    });
+    if (made) out.set("value_error", symmetricDifference(*made, solid, truth));
+  }
+  if (!out.wantsPeer(at, finestPeer, 1)) return;
+  const auto theirs = out.measure({variant, at, truth}, peer::kAdvect, [&] {
+    return peer::advect(solid, journey.velocity, journey.time, journey.turnsBack);
+  });
+  if (theirs) out.set("value_error", symmetricDifference(*theirs, solid, truth));
+}
+
+/// At half the time, where nothing is at its start, against the solid made without a level set.
+void halfWay(Recorder& out, const std::string& variant, const Sample& at, const NarrowBand& solid,
+             const VectorField& velocity, const NarrowBand& reference) {
+  for (const Scheme& s : kSchemes)
+    out.measure(variant + " at T/2, " + s.name, at, reference, kOurs,
+                [&] { return levelset::advect(solid, velocity, 1.5, {.scheme = s.scheme}).band; });
+}
+
+void enright(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    const Truth truth = ball(V3d(0.35) + at.shift, 0.15);
+    const NarrowBand solid = exactBand(truth, at.voxelSize);
+    const VectorField velocity = levelset::enrightVelocity();
+    carry(out, "function", at, truth, {velocity, 3, true}, 20);
+    if (!out.wantsRepeats(at)) continue;
+    const VectorField gridded = peer::staggered(velocity, at.voxelSize);
+    const VectorField swinging = [=](const V3d& p, double t) {
+      return gridded(p, 0) * std::cos(std::numbers::pi * t / 3);
+    };
+    carry(out, "staggered grid", at, truth, {swinging, 3, true}, 0);
+    // Stopped and begun again from the band.
+    const auto halting = out.measure({"stopped at quarters", at, truth}, kOurs, [&] {
+      NarrowBand band = solid;
+      for (int quarter = 0; quarter < 4; ++quarter)
+        band = levelset::advect(band, velocity, 0.75, {.start = 0.75 * quarter}).band;
+      return band;
+    });
+    if (halting) out.set("value_error", symmetricDifference(*halting, solid, truth));
+    if (at.phase != kQuickPhase) continue;
+    const NarrowBand reference =
+        carriedBall(truth.centre, 0.15, velocity, 1.5, out.isQuick() ? 1.0 / 64 : 1.0 / 512);
+    halfWay(out, "function", at, solid, velocity, reference);
+    halfWay(out, "staggered grid", at, solid, swinging, reference);
+    if (out.wantsPeer(at, 20))
+      out.measure("function at T/2", at, reference, peer::kAdvect,
+                  [&] { return peer::advect(solid, velocity, 1.5, false); });
+  }
+}
+
+void vortex(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    const double period = out.isQuick() ? 2 : 8;
+    carry(out, "sphere", at, ball(V3d(0.5, 0.75, 0.5) + at.shift, 0.15),
+          {levelset::vortexVelocity(period), period, true}, 16);
+  }
+}
+
+/// A ball of radius 15 with a slot 5 wide from below up to y = 85, everything in hundredths. The
+/// distance is exact inside; beyond the slot's edges, where the sphere and the slot meet almost at
+/// right angles, it is so to a few per cent.
+Truth zalesakSphere(const V3d& centre) {
+  Truth truth;
+  truth.centre = centre;
+  truth.reach = 0.15;
+  truth.distance = [=](const V3d& p) {
+    const V3d q = p - centre;
+    const double a = q.length() - 0.15;
+    // Distance out of the slot |x| < 2.5, y < 10 about the centre.
+    const double x = std::abs(q.x) - 0.025, y = q.y - 0.10;
+    const double slot =
+        std::hypot(std::max(x, 0.0), std::max(y, 0.0)) + std::min(0.0, std::max(x, y));
+    return a > 0 && slot < 0 ? std::hypot(a, slot) : std::max(a, -slot);
+  };
+  // The slot's volume in the ball by midpoints: ∫ over |x| < 2.5, y < 10 of the chord along z.
+  constexpr int kSteps = 2000;
+  double volume = 0;
+  const double dx = 0.05 / kSteps * 20, dy = 0.25 / kSteps;
+  for (int i = 0; i < kSteps / 20; ++i)
+    for (int j = 0; j < kSteps; ++j) {
+      const double x = -0.025 + (i + 0.5) * dx, y = -0.15 + (j + 0.5) * dy;
+      volume += 2 * std::sqrt(std::max(0.0, 0.0225 - x * x - y * y)) * dx * dy;
+    }
+  truth.volume = *ball(centre, 0.15).volume - volume;
+  return truth;
+}
+
+void zalesak(Recorder& out) {
+  for (const Sample& at : out.samples())
+    carry(out, "slotted sphere", at, zalesakSphere(V3d(0.5, 0.75, 0.5) + at.shift),
+          {levelset::rotationVelocity(V3d(0.5, 0.5, 0.5), V3d(0, 0, 1), 628), 628, false}, 24);
+}
+
+void rotate(Recorder& out) {
+  const Journey turn{levelset::rotationVelocity(V3d(0), V3d(1, 2, 3), 1), 1, false};
+  for (const Sample& at : out.samples()) {
+    const V3d c = V3d(0.5, 0, 0) + at.shift;
+    carry(out, "cube", at, box(c, V3d(0.6)), turn, 8);
+    carry(out, "torus", at, torus(c, V3d(0, 0, 1), 0.35, 0.12), turn, 8);
+    carry(out, "plate of two voxels", at, box(c, V3d(0.6, 0.6, 2 * at.voxelSize)), turn, 8);
+  }
+}
+
+void badVelocities(Recorder& out) {
+  const double h = 1.0 / 16;
+  const NarrowBand solid = exactBand(ball(V3d(0.01, 0.02, 0.03), 1), h);
+  out.expectRefusal("velocity of NaN", levelset::ExitCode::Input, [&] {
+    (void)levelset::advect(
+        solid, [](const V3d&, double) { return V3d(std::nan("")); }, 1);
+  });
+  out.expect("velocity of 1e9 for 1e-9", "the sphere moved by 1, within 0.1 voxels", [&] {
+    const NarrowBand made = levelset::advect(
+                                solid, [](const V3d&, double) { return V3d(1e9, 0, 0); }, 1e-9)
+                                .band;
+    Figures figures;
+    addErrors(made, ball(V3d(1.01, 0.02, 0.03), 1), Mesher::Ours, figures);
+    const double error = figures["surface_linf_vx"];
+    const double missed = figures["missed_hits"];
+    return std::pair{
+        error <= 0.1 && missed <= kMostMissed,
+        fmt::format("surface L∞ {:.3g} voxels, {:.3g} of the hits missed", error, missed)};
+  });
+  // Nothing can follow it for long: thousands of turns a step, or memory for the spun sheet.
+  out.expectRefusal("velocity of 1e9 that winds up", levelset::ExitCode::Resource, [&] {
+    (void)levelset::advect(
+        solid, [](const V3d& p, double) { return V3d(-p.y, p.x, 0) * (1e9 * p.length2()); }, 1,
+        {.maxMemory = std::size_t{256} << 20});
+  });
+  // Along the jump the front stretches without end; a grid does not see that.
+  const VectorField jump = [](const V3d& p, double) { return V3d(0, p.x < 0.01 ? -1 : 1, 0); };
+  out.expectRefusal("velocity with a jump, front", levelset::ExitCode::Resource,
+                    [&] { (void)levelset::advect(solid, jump, 0.25); });
+  out.expect(
+      "velocity with a jump, semi-Lagrangian",
+      "halves moved apart by 0.5, a volume within 2 %, sound", [&] {
+        const NarrowBand made =
+            levelset::advect(solid, jump, 0.25, {.scheme = AdvectScheme::SemiLagrangian}).band;
+        Figures figures;
+        addInvariants(made, ball(V3d(0), 1), figures);
+        return std::pair{std::abs(figures["volume_error"]) <= 0.02 && figures["checks_failed"] == 0,
+                         "volume " + std::to_string(100 * figures["volume_error"]) + " %"};
+      });
+}
+
+std::vector<Bound> zalesakBounds() {
+  std::vector<Bound> bounds = {{"slotted sphere, front", "surface_linf_vx", 1},
+                               {"slotted sphere, front", "volume_error", 0.01, 100}};
+  allowAtEdges(bounds, "slotted sphere, front", 4, {24, 32, 50, 100});
+  return bounds;
+}
+
+std::vector<Bound> rotationBounds() {
+  std::vector<Bound> bounds = {{"cube, front", "surface_l1_vx", 0.1},
+                               {"torus, front", "surface_l1_vx", 0.1},
+                               {"plate of two voxels, front", "surface_l1_vx", 0.15},
+                               {"torus, front", "surface_linf_vx", 0.2}};
+  allowAtEdges(bounds, "cube, front", 1.2, {8, 12, 16, 32});
+  // A tube of a voxel's radius.
+  allowAtEdges(bounds, "torus, front", 0.8, {8});
+  allowAtEdges(bounds, "plate of two voxels, front", 1.8, {8, 12, 16, 32, 64});
+  return bounds;
+}
+
+}  // namespace
+
+void addAdvectionCases(std::vector<Case>& all) {
+  all.push_back(
+      {.name = "enright",
+       .group = "advection, Enright",
+       .title = "a sphere stretched to a sheet and back",
+       .definition =
+           "Sphere of radius 0.15 at (0.35, 0.35, 0.35) in LeVeque's deformation with T = 3, the "
+           "velocity given as a function and on a staggered grid of the same voxels. At T it is "
+           "the sphere again. value: volume of what is in one of start and end only, over the "
+           "start's. A run that is stopped and begun again from the band at every quarter of T "
+           "has no bound. At T/2, where the sheet is thinnest, the answer is a band of 512 voxels "
+           "per unit (64 in the quick budget) made from points of the sphere that were carried "
+           "there one by one; surface: mean and largest distance both ways.",
+       .citation = "LeVeque96, Enright02",
+       .quick = {20, 24, 28},
+       .full = {32, 64, 128},
+       .bounds = {{"function, front", "volume_error", 0.10},
+                  {"function, front", "value_error", 0.20},
+                  {"function, front", "surface_l1_vx", 0.5},
+                  {"function, front", "volume_error", 0.03, 128},
+                  {"function, front", "value_error", 0.06, 128},
+                  {"staggered grid, front", "volume_error", 0.10},
+                  {"staggered grid, front", "value_error", 0.20},
+                  {"staggered grid, front", "surface_l1_vx", 0.5},
+                  {"staggered grid, front", "volume_error", 0.03, 128},
+                  {"staggered grid, front", "value_error", 0.06, 128},
+                  {"function at T/2, front", "value_error", 0.20, 64},
+                  {"function at T/2, front", "value_error", 0.06, 128},
+                  {"staggered grid at T/2, front", "value_error", 0.20, 64},
+                  {"staggered grid at T/2, front", "value_error", 0.06, 128}},
+       .run = enright});
+  all.push_back({.name = "vortex",
+                 .group = "advection, vortex",
+                 .title = "a sphere in the single vortex and back",
+                 .definition =
+                     "Sphere of radius 0.15 at (0.5, 0.75, 0.5) in the vortex of the unit square, "
+                     "T = 8, 2 in the quick budget. value as for enright.",
+                 .citation = "Bell89, LeVeque96",
+                 .quick = {16, 20, 32},
+                 .full = {32, 64, 128},
+                 .bounds = {{"sphere, front", "volume_error", 0.05},
+                            {"sphere, front", "value_error", 0.05},
+                            {"sphere, front", "surface_linf_vx", 0.5}},
+                 .run = vortex});
+  all.push_back(
+      {.name = "zalesak",
+       .group = "advection, Zalesak",
+       .title = "a slotted sphere turns once",
+       .definition =
+           "Sphere of radius 15 at (50, 75, 50) with a slot 5 wide up to y = 85, one turn "
+           "about (50, 50) in 628; in hundredths here. value as for enright.",
+       .citation = "Zalesak79, Enright02",
+       .quick = {24, 32, 50},
+       .full = {50, 100, 200},
+       .bounds = zalesakBounds(),
+       .run = zalesak});
+  all.push_back({.name = "rigid-rotation",
+                 .group = "advection, rotation",
+                 .title = "cube, torus and thin plate turn once",
+                 .definition =
+                     "A cube of edge 0.6, a torus 0.35 / 0.12 and a plate two voxels thick, half a "
+                     "unit from the axis (1, 2, 3). value as for enright.",
+                 .citation = "closed form",
+                 .quick = {8, 12, 16},
+                 .full = {16, 32, 64},
+                 .bounds = rotationBounds(),
+                 .run = rotate});
+  all.push_back({.name = "bad-velocities",
+                 .group = "bad-velocities",
+                 .title = "velocities of 1e9, of NaN, with a jump",
+                 .definition = "What velocities from elsewhere may do.",
+                 .citation = "stated outcomes",
+                 .run = badVelocities});
+}
+
+}  // namespace regress

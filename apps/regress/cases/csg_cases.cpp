@@ -1,0 +1,130 @@
+#include "levelset/csg/csg.h"
+
+#include <array>
+
+#include "apps/regress/peers/peer.h"
+#include "apps/regress/recorder.h"
+#include "apps/regress/truth/exact_band.h"
+
+namespace regress {
+
+using Imath::V3d;
+using levelset::CsgOperation;
+using levelset::NarrowBand;
+
+namespace {
+
+struct Named {
+  CsgOperation operation;
+  const char* name;
+};
+constexpr std::array<Named, 3> kOperations = {{{CsgOperation::Union, "union"},
+                                               {CsgOperation::Intersection, "intersection"},
+                                               {CsgOperation::Difference, "difference"}}};
+
+const V3d kApart(0.9, 0.3, 0.2);
+
+/// The crease itself lies between grid points: what is nearer to it than 1.5 voxels is left out.
+Truth awayFromCrease(Truth truth, const V3d& a, const V3d& b, double radius, double voxelSize) {
+  const V3d middle = (a + b) / 2.0, axis = (b - a).normalized();
+  const double ring = std::sqrt(radius * radius - (b - a).length2() / 4);
+  truth.compared = [=](const V3d& p) {
+    const double along = (p - middle).dot(axis);
+    return std::hypot((p - middle - along * axis).length() - ring, along) > 1.5 * voxelSize;
+  };
+  return truth;
+}
+
+void combineBalls(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    const V3d a = at.shift, b = at.shift + kApart;
+    const NarrowBand first = exactBand(ball(a, 1), at.voxelSize),
+                     second = exactBand(ball(b, 1), at.voxelSize);
+    for (const Named& op : kOperations) {
+      const Truth truth = twoBalls(op.operation, a, 1, b, 1);
+      const Subject subject{op.name, at, awayFromCrease(truth, a, b, 1, at.voxelSize)};
+      const std::array<NarrowBand, 2> both{first, second};
+      out.measure(subject, kOurs, [&] { return levelset::combine(op.operation, both).band; });
+      if (out.wantsPeer(at, 16))
+        out.measure(subject, peer::kCsg,
+                    [&] { return peer::combine(op.operation, first, second); });
+    }
+  }
+}
+
+void laws(Recorder& out) {
+  using levelset::intersect, levelset::subtract, levelset::unite;
+  for (const Sample& at : out.samples()) {
+    const double h = at.voxelSize;
+    const NarrowBand a = exactBand(ball(at.shift, 1), h),
+                     b = exactBand(ball(at.shift + kApart, 1), h),
+                     all = exactBand(box(at.shift, V3d(4)), h);
+    const auto law = [&](const char* name, const NarrowBand& left, const NarrowBand& right) {
+      out.row(name, kOurs, at, {{"voxel_size", h}, {"deviation_vx", deviation(left, right)}});
+    };
+    law("A ∪ A = A", unite(a, a), a);
+    law("A ∩ A = A", intersect(a, a), a);
+    law("A ∪ B = B ∪ A", unite(a, b), unite(b, a));
+    law("A ∩ B = B ∩ A", intersect(a, b), intersect(b, a));
+    law("X \\ (A ∪ B) = (X \\ A) ∩ (X \\ B)", subtract(all, unite(a, b)),
+        intersect(subtract(all, a), subtract(all, b)));
+    law("X \\ (A ∩ B) = (X \\ A) ∪ (X \\ B)", subtract(all, intersect(a, b)),
+        unite(subtract(all, a), subtract(all, b)));
+    if (at.phase == kQuickPhase)
+      out.expectRefusal("A \\ A at " + std::to_string(at.resolution), levelset::ExitCode::Input,
+                        [&] { (void)subtract(a, a); });
+  }
+}
+
+std::vector<Bound> ballBounds() {
+  std::vector<Bound> bounds = {{"union", "band_in_linf_vx", 0.1},
+                               {"union", "band_out_linf_vx", 0.1}};
+  for (const Named& op : kOperations) {
+    // Where the crease is nearest, its place between the grid points is known to a third of a
+    // voxel.
+    bounds.push_back({op.name, "band_in_linf_vx", 0.4});
+    bounds.push_back({op.name, "band_out_linf_vx", 0.4});
+    bounds.push_back({op.name, "band_in_l1_vx", 0.01, 32});
+    bounds.push_back({op.name, "band_out_l1_vx", 0.01, 32});
+    bounds.push_back({op.name, "checks_failed", 0});
+    bounds.push_back({op.name, "volume_error", 2e-3, 64});
+  }
+  return bounds;
+}
+
+}  // namespace
+
+void addCsgCases(std::vector<Case>& all) {
+  all.push_back(
+      {.name = "csg-balls",
+       .group = "CSG",
+       .title = "union, intersection and difference of two balls as distances",
+       .definition =
+           "Two spheres of radius 1 whose centres are (0.9, 0.3, 0.2) apart. The exact distance "
+           "is that to the nearest of the two spheres' parts and of the circle between them; "
+           "volume and area are those of caps. Grid points nearer than 1.5 voxels to the circle "
+           "are left out of the band's errors.",
+       .citation = "closed form",
+       .quick = {12, 16, 32},
+       .full = {32, 64, 128, 256},
+       .bounds = ballBounds(),
+       .run = combineBalls});
+  all.push_back({.name = "csg-laws",
+                 .group = "CSG laws",
+                 .title = "idempotence, commutativity, De Morgan",
+                 .definition =
+                     "The same balls, and a box of edge 4 around them. deviation: largest "
+                     "difference of the two sides' bands, in voxels; none, to the bit.",
+                 .citation = "set algebra",
+                 .quick = {8, 12, 16},
+                 .full = {16, 32, 64},
+                 .bounds = {{"A ∪ A = A", "deviation_vx", 0},
+                            {"A ∩ A = A", "deviation_vx", 0},
+                            {"A ∪ B = B ∪ A", "deviation_vx", 0},
+                            {"A ∩ B = B ∩ A", "deviation_vx", 0},
+                            {"X \\ (A ∪ B) = (X \\ A) ∩ (X \\ B)", "deviation_vx", 0},
+                            {"X \\ (A ∩ B) = (X \\ A) ∪ (X \\ B)", "deviation_vx", 0}},
+                 .run = laws});
+}
+
+}  // namespace regress

@@ -1,0 +1,308 @@
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "apps/process_cost.h"
+#include "apps/regress/peers/peer.h"
+#include "apps/regress/recorder.h"
+#include "apps/regress/truth/exact_band.h"
+#include "apps/regress/truth/gaps.h"
+#include "levelset/distance/closest_points.h"
+#include "levelset/eikonal/arrival.h"
+#include "levelset/fields/grid_vdb.h"
+
+namespace regress {
+
+using Imath::V3d;
+using levelset::ArrivalOptions;
+using levelset::FrontMethod;
+using levelset::NarrowBand;
+
+namespace {
+
+struct Front {
+  const char* name;
+  FrontMethod method;
+  int order;
+};
+constexpr std::array<Front, 4> kFronts = {{{"marching, order 1", FrontMethod::Marching, 1},
+                                           {"marching, order 2", FrontMethod::Marching, 2},
+                                           {"sweeping, order 1", FrontMethod::Sweeping, 1},
+                                           {"sweeping, order 2", FrontMethod::Sweeping, 2}}};
+
+/// Where a front from a point must have come: all times but those that end within `margin` voxels,
+/// at speed 1, of the latest.
+Region reachedRegion(const Distance& exact, double until, const Sample& at, double margin,
+                     double fastest, double slowest) {
+  return {.value = exact,
+          .low = -1,
+          .high = until - margin * at.voxelSize,
+          .steepest = 1 / slowest,
+          .centre = at.shift,
+          .extent = until * fastest};
+}
+
+/// Errors of arrival times at active grid points, in voxels at speed 1, and how many of the
+/// region's have none.
+Figures timeErrors(const levelset::FieldGrid& times, const Region& region, double voxelSize) {
+  double sum = 0, largest = 0, count = 0;
+  const openvdb::FloatGrid& grid = *times.shared()->scalar;
+  for (auto it = grid.cbeginValueOn(); it; ++it) {
+    const double error =
+        std::abs(static_cast<double>(*it) -
+                 region.value(levelset::toImath(grid.indexToWorld(it.getCoord()))));
+    sum += error;
+    largest = std::max(largest, error);
+    ++count;
+  }
+  return {{"voxel_size", voxelSize},
+          {"active_voxels", count},
+          {"missing_band", missingShare(region, grid)},
+          {"band_out_l1", sum / count},
+          {"band_out_linf", largest},
+          {"band_out_l1_vx", sum / count / voxelSize},
+          {"band_out_linf_vx", largest / voxelSize}};
+}
+
+void measureTimes(Recorder& out, const std::string& variant, const Sample& at, const Region& region,
+                  const std::function<levelset::ArrivalTimes()>& work) {
+  std::optional<levelset::ArrivalTimes> made;
+  const apps::Cost cost = apps::costOf([&] { made = work(); });
+  Figures figures = timeErrors(made->times, region, at.voxelSize);
+  figures["cpu_s"] = cost.cpuSeconds;
+  figures["peak_bytes"] = cost.peakBytes;
+  out.row(variant, kOurs, at, std::move(figures));
+}
+
+void fromPoint(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    const NarrowBand lattice = exactBand(ball(V3d(0), 0.3), at.voxelSize);
+    const std::array<V3d, 1> source{at.shift};
+    const Region reached =
+        reachedRegion([&](const V3d& p) { return (p - at.shift).length(); }, 1, at, 1, 1, 1);
+    for (const Front& front : kFronts)
+      measureTimes(out, front.name, at, reached, [&] {
+        return levelset::arrivalTimesFromPoints(lattice, source, 1,
+                                                {.method = front.method, .order = front.order});
+      });
+  }
+}
+
+/// Speed 1 + g·(p − source): rays are arcs of circles.
+void fromPointWithGradient(Recorder& out) {
+  const V3d slope(0.5, 0.3, 0.2);
+  for (const Sample& at : out.samples()) {
+    const NarrowBand lattice = exactBand(ball(V3d(0), 0.3), at.voxelSize);
+    const std::array<V3d, 1> source{at.shift};
+    const auto speed = [&](const V3d& p) { return 1 + slope.dot(p - at.shift); };
+    const Distance exact = [&](const V3d& p) {
+      return std::acosh(1 + slope.length2() * (p - at.shift).length2() / (2 * speed(p))) /
+             slope.length();
+    };
+    // Straight ahead the front gets to (exp(0.8 |g|) − 1) / |g| = 1.03, and back to where the speed
+    // is 0.61; the blocks around that reach to 0.35.
+    const Region reached = reachedRegion(exact, 0.8, at, 1, 1.3, 0.35);
+    for (const Front& front : kFronts) {
+      const ArrivalOptions options{.method = front.method, .order = front.order, .speed = speed};
+      measureTimes(out, front.name, at, reached,
+                   [&] { return levelset::arrivalTimesFromPoints(lattice, source, 0.8, options); });
+    }
+  }
+}
+
+/// A point source at height −`depth` below a plane z = 0 beyond which the speed is `speed`, 1
+/// before: the quickest way crosses the plane where Snell's law holds. Convex in the place of
+/// crossing, so it is found by golden section; before the plane a faster medium beyond sends a head
+/// wave back.
+double quickest(double away, double z, double depth, double speed) {
+  const auto shortest = [&](const auto& cost) {
+    constexpr double kGolden = 0.6180339887498949;
+    double low = 0, high = away;
+    for (int i = 0; i < 60; ++i) {
+      const double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
+      (cost(a) < cost(b) ? high : low) = cost(a) < cost(b) ? b : a;
+    }
+    return cost(0.5 * (low + high));
+  };
+  if (z > 0)
+    return shortest(
+        [&](double x) { return std::hypot(x, depth) + std::hypot(away - x, z) / speed; });
+  const double direct = std::hypot(away, z + depth);
+  if (speed <= 1) return direct;
+  // Down to the plane under the critical angle, along it, and back under the same.
+  const double cosine = std::sqrt(1 - 1 / (speed * speed)), tangent = 1 / (speed * cosine);
+  const double along = away - (depth - z) * tangent;
+  return along < 0 ? direct : std::min(direct, (depth - z) / cosine + along / speed);
+}
+
+void throughMedia(Recorder& out) {
+  constexpr double kDepth = 0.25, kUntil = 0.6;
+  for (const Sample& at : out.samples()) {
+    const NarrowBand lattice = exactBand(ball(V3d(0), 0.3), at.voxelSize);
+    const std::array<V3d, 1> source{at.shift - V3d(0, 0, kDepth)};
+    for (const double speed : {0.5, 2.0}) {
+      const Distance exact = [&](const V3d& p) {
+        const V3d q = p - at.shift;
+        return quickest(std::hypot(q.x, q.y), q.z, kDepth, speed);
+      };
+      // The bound on times is 1.5 voxels.
+      Region reached =
+          reachedRegion(exact, kUntil, at, 2, std::max(1.0, speed), std::min(1.0, speed));
+      reached.centre = source[0];
+      for (const Front& front : kFronts) {
+        ArrivalOptions options{.method = front.method, .order = front.order};
+        options.speed = [&](const V3d& p) { return p.z > at.shift.z ? speed : 1.0; };
+        measureTimes(
+            out, std::string(speed < 1 ? "slow" : "fast") + " beyond, " + front.name, at, reached,
+            [&] { return levelset::arrivalTimesFromPoints(lattice, source, kUntil, options); });
+      }
+    }
+  }
+}
+
+void fromSurface(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    // As far as OpenVDB's: eight voxels beyond a band of three.
+    const double reach = 11 * at.voxelSize;
+    const auto measure = [&](const std::string& name, const Truth& truth) {
+      const NarrowBand solid = exactBand(truth, at.voxelSize);
+      for (const Front& front : kFronts)
+        out.measure({name + ", " + front.name, at, truth}, kOurs, [&] {
+          return levelset::frontDistance(solid, reach,
+                                         {.method = front.method, .order = front.order})
+              .band;
+        });
+      if (out.wantsPeer(at, 12))
+        out.measure({name, at, truth}, peer::kDilate, [&] { return peer::dilate(solid, 8); });
+    };
+    measure("sphere", ball(at.shift, 1));
+    // Fronts that meet half-way leave a crease.
+    measure("two spheres", apart(ball(at.shift, 0.6), ball(at.shift + V3d(1.3, 0.2, 0.1), 0.6)));
+  }
+}
+
+void closest(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    const auto measure = [&](const std::string& name, const Truth& truth, const auto& foot) {
+      const NarrowBand solid = exactBand(truth, at.voxelSize);
+      std::optional<levelset::FieldGrid> made;
+      const apps::Cost cost = apps::costOf([&] { made = levelset::closestPoints(solid); });
+      double offSurface = 0, sum = 0, astray = 0, count = 0;
+      const openvdb::Vec3SGrid& grid = *made->shared()->vector;
+      for (auto it = grid.cbeginValueOn(); it; ++it) {
+        const V3d point = levelset::toImath(openvdb::Vec3d(*it));
+        const V3d p = levelset::toImath(grid.indexToWorld(it.getCoord()));
+        const double error = std::abs(truth.distance(point));
+        offSurface = std::max(offSurface, error);
+        sum += error;
+        astray = std::max(astray, (point - foot(p)).length());
+        ++count;
+      }
+      out.row(
+          name, kOurs, at,
+          {{"voxel_size", at.voxelSize},
+           {"active_voxels", count},
+           {"missing_band", missingShare(bandRegion(truth, solid.halfWidth(), at.voxelSize), grid)},
+           {"surface_l1", sum / count},
+           {"surface_linf", offSurface},
+           {"surface_l1_vx", sum / count / at.voxelSize},
+           {"surface_linf_vx", offSurface / at.voxelSize},
+           {"value_error", astray / at.voxelSize},
+           {"cpu_s", cost.cpuSeconds},
+           {"peak_bytes", cost.peakBytes}});
+    };
+    const V3d c = at.shift;
+    measure("sphere", ball(c, 1), [&](const V3d& p) { return c + (p - c).normalized(); });
+    measure("torus", torus(c, V3d(0, 0, 1), 0.7, 0.3), [&](const V3d& p) {
+      const V3d q = p - c;
+      const V3d ring = V3d(q.x, q.y, 0).normalized() * 0.7;
+      return c + ring + (q - ring).normalized() * 0.3;
+    });
+  }
+}
+
+}  // namespace
+
+void addEikonalCases(std::vector<Case>& all) {
+  all.push_back({.name = "eikonal-point",
+                 .group = "eikonal, point source",
+                 .title = "arrival times from a point",
+                 .definition = "|∇T| = 1 from one point between the grid points, out to T = 1. The "
+                               "singularity at the source costs first-order schemes O(h log h); "
+                               "taken apart, it costs the second-order ones nothing.",
+                 .citation = "Sethian99, Zhao05, Treister16",
+                 .quick = {6, 8, 12},
+                 .full = {16, 32, 64},
+                 .bounds = {{"marching, order 2", "band_out_linf_vx", 1e-3},
+                            {"sweeping, order 2", "band_out_linf_vx", 1e-3}},
+                 .run = fromPoint});
+  all.push_back({.name = "eikonal-gradient",
+                 .group = "eikonal, gradient",
+                 .title = "arrival times from a point where the speed is linear",
+                 .definition =
+                     "F = 1 + (0.5, 0.3, 0.2)·(x − s) from one point s between the grid "
+                     "points, out to T = 0.8: T = acosh(1 + |g|² |x − s|² / (2 F)) / |g|.",
+                 .citation = "Treister16",
+                 .quick = {8, 12, 16},
+                 .full = {16, 32, 64},
+                 .bounds = {{"marching, order 2", "band_out_linf_vx", 0.1},
+                            {"sweeping, order 2", "band_out_linf_vx", 0.1},
+                            {"marching, order 2", "order_band_l1", 1.8, 64, Sense::AtLeast},
+                            {"sweeping, order 2", "order_band_l1", 1.8, 64, Sense::AtLeast}},
+                 .run = fromPointWithGradient});
+  all.push_back({.name = "eikonal-media",
+                 .group = "eikonal, two media",
+                 .title = "slow and fast inclusions",
+                 .definition =
+                     "A point source 0.25 below a plane beyond which the speed is 0.5 or 2, 1 "
+                     "before, out to T = 0.6. Exact by Fermat's principle: rays refracted by "
+                     "Snell's law, and the head wave that a faster medium sends back.",
+                 .citation = "Sethian99, Zhao05",
+                 .quick = {12, 16, 24},
+                 .full = {32, 64, 128},
+                 .bounds = {{"slow beyond, marching, order 2", "band_out_linf_vx", 1.5},
+                            {"slow beyond, sweeping, order 2", "band_out_linf_vx", 1.5},
+                            {"fast beyond, marching, order 2", "band_out_linf_vx", 1.5},
+                            {"fast beyond, sweeping, order 2", "band_out_linf_vx", 1.5}},
+                 .run = throughMedia});
+  all.push_back({.name = "eikonal-surface",
+                 .group = "eikonal, from a surface",
+                 .title = "a sphere and two spheres, widened by fronts by eight voxels",
+                 .definition =
+                     "The exact band of a sphere of radius 1, and of two of radius 0.6 whose "
+                     "fronts meet, half width 3, is continued by eight voxels to eleven on both "
+                     "sides.",
+                 .citation = "Sethian99, Zhao05",
+                 .quick = {8, 12, 24},
+                 .full = {16, 32, 64},
+                 .bounds = {{"sphere, marching, order 2", "band_out_linf_vx", 0.05},
+                            {"sphere, sweeping, order 2", "band_out_linf_vx", 0.05},
+                            {"two spheres, sweeping, order 2", "band_out_linf_vx", 0.15},
+                            {"sphere, sweeping, order 2", "band_in_linf_vx", 0.02, 64},
+                            {"sphere, sweeping, order 2", "band_out_linf_vx", 0.02, 64},
+                            {"two spheres, marching, order 2", "band_out_linf_vx", 0.15},
+                            {"sphere, marching, order 2", "band_in_linf_vx", 0.5},
+                            {"sphere, sweeping, order 2", "band_in_linf_vx", 0.5},
+                            {"two spheres, marching, order 2", "band_in_linf_vx", 0.5},
+                            {"two spheres, sweeping, order 2", "band_in_linf_vx", 0.5}},
+                 .run = fromSurface});
+  all.push_back({.name = "closest-point",
+                 .group = "closest point",
+                 .title = "closest points of a sphere and a torus",
+                 .definition =
+                     "Closest points at the grid points of a band. surface: their exact distance "
+                     "to the surface. value: largest distance to the exact closest point, voxels.",
+                 .citation = "Chopp01, Saye14",
+                 .quick = {8, 12, 24},
+                 .full = {16, 32, 64},
+                 .bounds = {{"sphere", "surface_linf_vx", 1e-3},
+                            {"sphere", "surface_linf_vx", 1e-4, 32},
+                            {"sphere", "surface_linf_vx", 1e-4, 64},
+                            {"sphere", "value_error", 0.05},
+                            {"sphere", "missing_band", 0},
+                            {"torus", "missing_band", 0},
+                            {"torus", "order_surface", 2.8, 32, Sense::AtLeast}},
+                 .run = closest});
+}
+
+}  // namespace regress

@@ -1,0 +1,231 @@
+#include <cmath>
+
+#include "apps/regress/recorder.h"
+#include "apps/regress/truth/exact_band.h"
+#include "levelset/csg/csg.h"
+#include "levelset/distance/redistance.h"
+#include "levelset/solids/offset.h"
+#include "levelset/solids/shapes.h"
+
+namespace regress {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+
+namespace {
+
+/// Sampled, re-distanced and grown by three voxels: the same errors in voxels wherever it lies and
+/// however large a voxel is. Radii are `at.resolution` voxels.
+void chainOfThree(Recorder& out, const std::string& variant, const Sample& at, double voxelSize,
+                  const V3d& centre) {
+  Sample here = at;
+  here.voxelSize = voxelSize;
+  const double radius = at.resolution * voxelSize;
+  out.measure({variant, here, ball(centre, radius + 3 * voxelSize)}, kOurs, [&] {
+    const NarrowBand solid = levelset::makeSphere(radius, centre, voxelSize);
+    return levelset::offset(levelset::redistance(solid), 3 * voxelSize);
+  });
+}
+
+void scales(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    const V3d off = at.shift / at.voxelSize;  // voxels
+    chainOfThree(out, "voxel 1", at, 1, off);
+    chainOfThree(out, "voxel 1e-6", at, 1e-6, off * 1e-6);
+    chainOfThree(out, "voxel 1e6", at, 1e6, off * 1e6);
+    chainOfThree(out, "1e6 voxels from the origin", at, 1, off + V3d(1e6, -1e6, 1e6));
+  }
+}
+
+std::vector<Bound> scaleBounds() {
+  std::vector<Bound> bounds;
+  for (const char* variant : {"voxel 1", "voxel 1e-6", "voxel 1e6", "1e6 voxels from the origin"})
+    for (const char* figure : {"band_in_linf_vx", "band_out_linf_vx"})
+      bounds.push_back({variant, figure, 0.05});
+  return bounds;
+}
+
+void halfWidths(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    for (const double width : {1.0, 1.5, 3.0, 50.0}) {
+      if (width > 3 && out.isQuick() && (at.phase != kQuickPhase || at.resolution > 6)) continue;
+      const Truth truth = ball(at.shift, 1);
+      const NarrowBand field = exactBand(truth, at.voxelSize, width);
+      std::string name = "half width " + std::to_string(width).substr(0, width > 9 ? 2 : 3);
+      // Beyond the centre every point of the sphere is as near.
+      out.measure({name, at, truth}, kOurs,
+                  [&] { return levelset::redistance(field, {.halfWidth = width}); });
+    }
+    // A band of three voxels on a background of ten: widened by re-distancing.
+    Truth truth = ball(at.shift, 1);
+    const NarrowBand narrow = exactBand(truth, at.voxelSize, 3);
+    out.measure({"background 10 voxels, band 3", at, truth}, kOurs, [&] {
+      NarrowBand widened = levelset::redistance(narrow, {.halfWidth = 10});
+      return levelset::redistance(widened, {.halfWidth = 3});
+    });
+  }
+}
+
+/// The torus 1 / 0.3 grown past its hole: the part of the torus 1 / 1.1 that lies outside of
+/// itself.
+Truth spindle(const V3d& centre, double radius, double tube) {
+  const double tip = std::sqrt(tube * tube - radius * radius);
+  Truth truth;
+  truth.centre = centre;
+  truth.reach = radius + tube;
+  truth.distance = [=](const V3d& p) {
+    const V3d q = p - centre;
+    const double away = std::hypot(q.x, q.y), up = std::abs(q.z);
+    const double toRing = std::hypot(away - radius, up);
+    if (toRing >= tube) return toRing - tube;
+    // Inside: the outer arc, if the foot on it is on this side of the axis, or the tip.
+    const double foot = toRing > 0 ? radius + (away - radius) / toRing * tube : radius + tube;
+    const double toTip = std::hypot(away, up - tip);
+    return -(foot >= 0 ? std::min(tube - toRing, toTip) : toTip);
+  };
+  return truth;
+}
+
+void pastTheAxis(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    const NarrowBand ring = exactBand(torus(at.shift, V3d(0, 0, 1), 0.6, 0.2), at.voxelSize);
+    Truth truth = spindle(at.shift, 0.6, 0.8);
+    const V3d tip(0, 0, std::sqrt(0.8 * 0.8 - 0.6 * 0.6));
+    truth.compared = [=](const V3d& p) {
+      const V3d q = p - at.shift;
+      return (q - tip).length() > 2 * at.voxelSize && (q + tip).length() > 2 * at.voxelSize;
+    };
+    out.measure({"torus closes its hole", at, truth}, kOurs,
+                [&] { return levelset::offset(ring, 0.6); });
+    const double gap = 0.3 * at.voxelSize;
+    for (const bool touching : {true, false}) {
+      const V3d a = at.shift, b = at.shift + V3d(1 + (touching ? 0 : gap), 0, 0);
+      const Truth pair = apart(ball(a, 0.5), ball(b, 0.5));
+      const std::string name = touching ? "balls that touch" : "balls 0.3 voxels apart";
+      const V3d middle = (a + b) / 2.0;
+      Truth judged = pair;
+      // Between the poles no grid point tells the two surfaces apart.
+      judged.compared = [=](const V3d& p) { return (p - middle).length() > 4 * at.voxelSize; };
+      out.measure({"union of " + name, at, judged}, kOurs, [&] {
+        return levelset::unite(exactBand(ball(a, 0.5), at.voxelSize),
+                               exactBand(ball(b, 0.5), at.voxelSize));
+      });
+    }
+    // Faces that lie in one plane, on and between grid points.
+    const V3d half(0.5, 1, 1), at0 = at.shift;
+    out.measure({"boxes that share a face, united", at, box(at0 + V3d(0.25, 0, 0), V3d(1, 1, 1))},
+                kOurs, [&] {
+                  return levelset::unite(exactBand(box(at0, half), at.voxelSize),
+                                         exactBand(box(at0 + V3d(0.5, 0, 0), half), at.voxelSize));
+                });
+    out.measure(
+        {"box cut by one with three faces in common", at, box(at0 + V3d(-0.25, 0, 0), half)}, kOurs,
+        [&] {
+          return levelset::subtract(
+              exactBand(box(at0, V3d(1)), at.voxelSize),
+              exactBand(box(at0 + V3d(0.25, 0, 0), V3d(0.5, 1, 1)), at.voxelSize));
+        });
+  }
+}
+
+void tenMillion(Recorder& out) {
+  // 4 π R² 2w voxels: ten million at R = 365, w = 3.
+  if (out.isQuick()) return;
+  const Sample at{365, 3, 1.0 / 365, subVoxelPhases()[3] / 365};
+  const Truth truth = ball(at.shift, 1);
+  const NarrowBand field = levelset::makeSphere(1, at.shift, at.voxelSize);
+  out.measure({"re-distanced", at, truth}, kOurs, [&] { return levelset::redistance(field); });
+  out.measure({"grown by 3 voxels", at, ball(at.shift, 1 + 3 * at.voxelSize)}, kOurs,
+              [&] { return levelset::offset(field, 3 * at.voxelSize); });
+}
+
+std::vector<Bound> contactBounds() {
+  std::vector<Bound> bounds = {
+      {"torus closes its hole", "surface_l1_vx", 0.02},
+      {"union of balls that touch", "band_out_linf_vx", 0.1},
+      {"union of balls that touch", "band_in_linf_vx", 0.1},
+      {"union of balls 0.3 voxels apart", "band_out_linf_vx", 0.1},
+      {"union of balls 0.3 voxels apart", "band_in_linf_vx", 0.1},
+      {"boxes that share a face, united", "volume_error", 0.02, 32},
+      {"boxes that share a face, united", "band_in_linf_vx", 0.75},
+      {"boxes that share a face, united", "band_out_linf_vx", 0.75},
+      {"boxes that share a face, united", "surface_linf_vx", 0.75},
+      {"boxes that share a face, united", "surface_l1_vx", 0.03},
+      {"box cut by one with three faces in common", "volume_error", 0.02, 32},
+      {"box cut by one with three faces in common", "band_in_linf_vx", 0.75},
+      {"box cut by one with three faces in common", "band_out_linf_vx", 0.75},
+      {"box cut by one with three faces in common", "surface_linf_vx", 0.75},
+      {"box cut by one with three faces in common", "surface_l1_vx", 0.03}};
+  for (const char* variant :
+       {"boxes that share a face, united", "box cut by one with three faces in common"})
+    allowAtEdges(bounds, variant, 1.2, {12, 16, 24, 32, 64});
+  return bounds;
+}
+
+}  // namespace
+
+void addExtremeCases(std::vector<Case>& all) {
+  all.push_back({.name = "scales",
+                 .group = "scales",
+                 .title = "tiny voxels, huge ones, and far from the origin",
+                 .definition =
+                     "A sphere is sampled, re-distanced and grown by three voxels: with voxels of "
+                     "1, 1e-6 and 1e6, and with its centre 1e6 voxels from the origin along each "
+                     "axis. Resolution is the radius in voxels; the errors must be the same.",
+                 .citation = "closed form",
+                 .quick = {6, 8, 12},
+                 .full = {16, 32, 64},
+                 .bounds = scaleBounds(),
+                 .run = scales});
+  all.push_back({.name = "half-widths",
+                 .group = "half widths",
+                 .title = "bands of 1 to 50 voxels",
+                 .definition =
+                     "A sphere of radius 1 with half widths of 1, 1.5, 3 and 50 voxels is "
+                     "re-distanced; a band of 3 is widened to 10 and narrowed again.",
+                 .citation = "closed form",
+                 .quick = {6, 8, 12},
+                 .full = {16, 32, 64},
+                 .bounds = {{"half width 1.0", "band_in_linf_vx", 0.05},
+                            {"half width 1.0", "band_out_linf_vx", 0.05},
+                            {"half width 1.0", "surface_linf_vx", 0.05},
+                            {"half width 1.5", "band_in_linf_vx", 0.05},
+                            {"half width 1.5", "band_out_linf_vx", 0.05},
+                            {"half width 3.0", "band_in_linf_vx", 0.05},
+                            {"half width 3.0", "band_out_linf_vx", 0.05},
+                            {"half width 50", "band_out_linf_vx", 0.05},
+                            {"half width 50", "checks_failed", 0},
+                            {"background 10 voxels, band 3", "band_in_linf_vx", 0.05},
+                            {"background 10 voxels, band 3", "band_out_linf_vx", 0.05}},
+                 .run = halfWidths});
+  all.push_back(
+      {.name = "contact",
+       .group = "contact",
+       .title = "surfaces that meet, touch and coincide",
+       .definition =
+           "A torus 0.6 / 0.2 grown by 0.6, past the axis, so that its hole closes; balls of "
+           "radius 0.5 that touch in a point or are 0.3 voxels apart, united, compared further "
+           "than 4 voxels from the place; boxes with a face or three in one plane, united and "
+           "subtracted.",
+       .citation = "closed form",
+       .quick = {12, 16, 24},
+       .full = {16, 32, 64},
+       .bounds = contactBounds(),
+       .run = pastTheAxis});
+  all.push_back({.name = "ten-million",
+                 .group = "ten million voxels",
+                 .title = "ten million active voxels within 4 GB",
+                 .definition =
+                     "A sphere of radius 365 voxels, half width 3, is re-distanced and grown. Full "
+                     "budget only.",
+                 .citation = "closed form",
+                 .full = {365},
+                 .bounds = {{"re-distanced", "peak_bytes", 4e9, 365},
+                            {"re-distanced", "band_in_linf_vx", 0.05, 365},
+                            {"re-distanced", "active_voxels", 1e7, 365, Sense::AtLeast},
+                            {"grown by 3 voxels", "peak_bytes", 4e9, 365},
+                            {"grown by 3 voxels", "band_out_linf_vx", 0.05, 365}},
+                 .run = tenMillion});
+}
+
+}  // namespace regress

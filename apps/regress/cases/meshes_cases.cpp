@@ -1,0 +1,157 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "apps/process_cost.h"
+#include "apps/regress/peers/peer.h"
+#include "apps/regress/recorder.h"
+#include "apps/regress/truth/exact_band.h"
+#include "levelset/convert/mesh_to_band.h"
+#include "levelset/mesh_sign/triangle_distance.h"
+#include "levelset/meshing/band_to_mesh.h"
+#include "levelset/placement/transform.h"
+
+namespace regress {
+
+using Imath::M44d;
+using Imath::V3d;
+using levelset::TriMesh;
+
+namespace {
+
+/// The cube of edge 1 about the origin, twelve triangles.
+TriMesh cubeMesh() {
+  TriMesh mesh;
+  for (int i = 0; i < 8; ++i)
+    mesh.positions.emplace_back((i & 1) - 0.5, ((i >> 1) & 1) - 0.5, ((i >> 2) & 1) - 0.5);
+  mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                    {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  return mesh;
+}
+
+M44d placement(const Sample& at, bool turned) {
+  M44d matrix = turned ? skewRotation() : M44d();
+  M44d shift;
+  shift.setTranslation(at.shift);
+  return matrix * shift;
+}
+
+Truth cubeTruth(const M44d& matrix) {
+  return moved(box(V3d(0), V3d(1)), matrix);
+}
+
+void convertMeshes(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    for (const bool turned : {false, true}) {
+      const M44d matrix = placement(at, turned);
+      const TriMesh mesh = levelset::transform(cubeMesh(), matrix);
+      const Subject subject{turned ? "rotated cube" : "cube", at, cubeTruth(matrix)};
+      out.measure(subject, kOurs, [&] { return levelset::meshToBand(mesh, at.voxelSize).band; });
+      if (out.wantsPeer(at, 16))
+        out.measure(subject, peer::kMesh, [&] { return peer::fromMesh(mesh, at.voxelSize); });
+    }
+    // To a mesh and back: the error is that of the mesh between.
+    const Truth ring = torus(at.shift, V3d(1, 2, 3), 0.35, 0.15);
+    const levelset::NarrowBand exact = exactBand(ring, at.voxelSize);
+    const Subject subject{"torus and back", at, ring};
+    out.measure(subject, kOurs, [&] {
+      return levelset::meshToBand(levelset::bandToMesh(exact), at.voxelSize).band;
+    });
+    if (out.wantsPeer(at, 16))
+      out.measure(subject, "OpenVDB volumeToMesh + meshToLevelSet",
+                  [&] { return peer::rebuild(exact); });
+  }
+}
+
+/// Distance of a point to a mesh, as far as `reach`.
+double distanceTo(const TriMesh& mesh, const V3d& point, double reach) {
+  double nearest = reach * reach;
+  for (const auto& t : mesh.triangles) {
+    const V3d &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+    const double longest = std::sqrt(std::max((b - a).length2(), (c - a).length2()));
+    if ((a - point).length() - longest > std::sqrt(nearest)) continue;
+    nearest = std::min(nearest, levelset::convert::TriangleFrame(a, b, c).squaredDistance(point));
+  }
+  return std::sqrt(nearest);
+}
+
+/// Largest distance of the cube's corners, and of points of its edges, to the mesh.
+double edgeError(const TriMesh& mesh, const M44d& matrix, double voxelSize) {
+  constexpr int kPieces = 16;
+  double largest = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side = 0; side < 4; ++side)
+      for (int k = 0; k <= kPieces; ++k) {
+        V3d p;
+        p[axis] = static_cast<double>(k) / kPieces - 0.5;
+        p[(axis + 1) % 3] = (side & 1) - 0.5;
+        p[(axis + 2) % 3] = (side >> 1) - 0.5;
+        largest = std::max(largest, distanceTo(mesh, p * matrix, 3 * voxelSize));
+      }
+  return largest / voxelSize;
+}
+
+void meshEdges(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    const M44d matrix = placement(at, true);
+    const levelset::NarrowBand band = exactBand(cubeTruth(matrix), at.voxelSize);
+    for (const bool sharp : {false, true}) {
+      TriMesh mesh;
+      const apps::Cost cost =
+          apps::costOf([&] { mesh = levelset::bandToMesh(band, {.sharp = sharp}); });
+      double farthest = 0;
+      const Truth truth = cubeTruth(matrix);
+      for (const V3d& p : mesh.positions)
+        farthest = std::max(farthest, std::abs(truth.distance(p)));
+      out.row(sharp ? "sharp" : "uniform", kOurs, at,
+              {{"voxel_size", at.voxelSize},
+               {"value_error", edgeError(mesh, matrix, at.voxelSize)},
+               {"mesh_linf_vx", farthest / at.voxelSize},
+               {"volume_error", levelset::signedVolume(mesh) - 1},
+               {"area_error", levelset::surfaceArea(mesh) / 6 - 1},
+               {"cpu_s", cost.cpuSeconds},
+               {"peak_bytes", cost.peakBytes}});
+    }
+  }
+}
+
+}  // namespace
+
+void addMeshCases(std::vector<Case>& all) {
+  all.push_back(
+      {.name = "mesh-round-trip",
+       .group = "mesh conversion",
+       .title = "meshes to distances, and distances to meshes and back",
+       .definition =
+           "A cube of edge 1 made of twelve triangles, aligned with the grid and rotated, becomes "
+           "a band: every distance is known exactly. An exact band of a torus 0.35 / 0.15 becomes "
+           "a mesh and a band again.",
+       .citation = "closed forms; Jones95",
+       .quick = {12, 16, 24},
+       .full = {32, 64, 128},
+       .bounds = {{"cube", "band_in_linf_vx", 1e-4},
+                  {"cube", "band_out_linf_vx", 1e-4},
+                  {"rotated cube", "band_in_linf_vx", 1e-4},
+                  {"rotated cube", "band_out_linf_vx", 1e-4},
+                  {"torus and back", "order_surface", 1.8, 24, Sense::AtLeast},
+                  {"torus and back", "order_surface", 1.8, 64, Sense::AtLeast},
+                  {"torus and back", "band_in_linf_vx", 0.25},
+                  {"torus and back", "band_out_linf_vx", 0.25},
+                  {"torus and back", "surface_l1_vx", 0.05}},
+       .run = convertMeshes});
+  all.push_back(
+      {.name = "sharp-mesh",
+       .group = "meshing",
+       .title = "edges and corners of a rotated cube",
+       .definition =
+           "The exact band of a rotated cube of edge 1 becomes a mesh, uniform and sharp. "
+           "value: largest distance of the cube's corners, and of 17 points on each "
+           "edge, to the mesh, in voxels.",
+       .citation = "Ju02",
+       .quick = {16, 24, 32},
+       .full = {32, 64, 128},
+       .bounds = {{"sharp", "value_error", 0.05}, {"sharp", "mesh_linf_vx", 0.05}},
+       .run = meshEdges});
+}
+
+}  // namespace regress

@@ -1,0 +1,113 @@
+#include "levelset/solids/morphology.h"
+
+#include <fmt/core.h>
+
+#include "apps/regress/peers/peer.h"
+#include "apps/regress/recorder.h"
+#include "apps/regress/truth/exact_band.h"
+#include "levelset/csg/csg.h"
+#include "levelset/inspect/check.h"
+#include "levelset/inspect/measure.h"
+
+namespace regress {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+
+namespace {
+
+void openAndClose(Recorder& out) {
+  constexpr double kRadius = 0.2;
+  const V3d size(1.2, 0.9, 0.7);
+  for (const Sample& at : out.samples()) {
+    const double h = at.voxelSize;
+    const Truth cuboid = box(at.shift, size);
+    const Truth rounded = box(at.shift, size - V3d(2 * kRadius), kRadius);
+    const NarrowBand solid = exactBand(cuboid, h);
+    out.measure({"opening of a box", at, rounded}, kOurs,
+                [&] { return levelset::opening(solid, kRadius); });
+    out.measure({"closing of a box", at, cuboid}, kOurs,
+                [&] { return levelset::closing(solid, kRadius); });
+    if (out.wantsPeer(at, 12, 1)) {
+      out.measure({"opening of a box", at, rounded}, peer::kFilter,
+                  [&] { return peer::offset(peer::offset(solid, -kRadius), kRadius); });
+      out.measure({"closing of a box", at, cuboid}, peer::kFilter,
+                  [&] { return peer::offset(peer::offset(solid, kRadius), -kRadius); });
+    }
+    // A bar thinner than the ball goes, the balls at its ends stay as they are.
+    const Truth one = ball(at.shift, 0.5), other = ball(at.shift + V3d(1.5, 0, 0), 0.5);
+    const NarrowBand joined =
+        levelset::unite(exactBand(apart(one, other), h),
+                        exactBand(capsule(at.shift, at.shift + V3d(1.5, 0, 0), 0.12), h));
+    out.measure({"opening of a dumb-bell", at, apart(one, other)}, kOurs,
+                [&] { return levelset::opening(joined, kRadius); });
+  }
+  for (const double h : {1.0 / 16, 1.0 / 32}) {
+    if (out.isQuick() && h < 1.0 / 16) continue;
+    const std::string where = fmt::format(", {} voxels per unit", std::lround(1 / h));
+    const NarrowBand pair =
+        exactBand(apart(box(V3d(0), V3d(0.6)), box(V3d(0.9, 0, 0), V3d(0.6))), h);
+    out.expect("closing fills a slot of 0.3" + where, "one sound solid, no cavity", [&] {
+      const NarrowBand made = levelset::closing(pair, kRadius);
+      const levelset::Measurement m = levelset::measure(made);
+      const bool sound = levelset::check(made).passed();
+      return std::pair{m.components == 1 && m.cavities == 0 && sound,
+                       fmt::format("{} solids, {} cavities, {}", m.components, m.cavities,
+                                   sound ? "sound" : "not sound")};
+    });
+    out.expectRefusal("opening by more than fits" + where, levelset::ExitCode::Input,
+                      [&] { (void)levelset::opening(pair, 0.4); });
+  }
+}
+
+void hollow(Recorder& out) {
+  constexpr double kThickness = 0.25;
+  for (const Sample& at : out.samples()) {
+    const NarrowBand solid = exactBand(ball(at.shift, 1), at.voxelSize);
+    const Truth outer = ball(at.shift, 1), inner = ball(at.shift, 1 - kThickness);
+    Truth wall = outer;
+    wall.distance = [=](const V3d& p) { return std::max(outer.distance(p), -inner.distance(p)); };
+    wall.volume = *outer.volume - *inner.volume;
+    wall.area = *outer.area + *inner.area;
+    out.measure({"wall of a sphere", at, wall}, kOurs,
+                [&] { return levelset::shell(solid, kThickness); });
+  }
+}
+
+}  // namespace
+
+void addMorphologyCases(std::vector<Case>& all) {
+  all.push_back({.name = "opening-closing",
+                 .group = "opening and closing",
+                 .title = "balls that fit inside and beside",
+                 .definition =
+                     "With a ball of radius 0.2: opening a box 1.2 × 0.9 × 0.7 rounds its edges, "
+                     "closing leaves it; opening two balls of radius 0.5 with a bar of radius "
+                     "0.12 leaves the balls, and the little that the opening ball reaches into the "
+                     "bar: the closed form has the balls alone, so only the mean is bounded.",
+                 .citation = "Serra82",
+                 .quick = {12, 16, 24},
+                 .full = {32, 64, 128},
+                 .bounds = {{"opening of a box", "surface_l1_vx", 0.05, 64},
+                            {"closing of a box", "surface_l1_vx", 0.05, 64},
+                            {"opening of a dumb-bell", "surface_l1_vx", 0.05, 64},
+                            {"opening of a box", "band_in_linf_vx", 0.1},
+                            {"opening of a box", "band_out_linf_vx", 0.1},
+                            {"opening of a box", "surface_l1_vx", 0.02},
+                            {"closing of a box", "band_in_linf_vx", 0.05},
+                            {"closing of a box", "band_out_linf_vx", 0.05}},
+                 .run = openAndClose});
+  all.push_back({.name = "shell",
+                 .group = "shell",
+                 .title = "the wall of a sphere",
+                 .definition = "A sphere of radius 1 hollowed to a wall of 0.25.",
+                 .citation = "closed form",
+                 .quick = {12, 16, 24},
+                 .full = {16, 32, 64},
+                 .bounds = {{"wall of a sphere", "surface_l1_vx", 0.002},
+                            {"wall of a sphere", "band_in_linf_vx", 0.05},
+                            {"wall of a sphere", "band_out_linf_vx", 0.05}},
+                 .run = hollow});
+}
+
+}  // namespace regress

@@ -1,0 +1,71 @@
+#include "levelset/placement/resample.h"
+
+#include "apps/regress/peers/peer.h"
+#include "apps/regress/recorder.h"
+#include "apps/regress/truth/exact_band.h"
+
+namespace regress {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+
+namespace {
+
+/// Ten times to voxels of 0.8 and back.
+template <typename Resample>
+NarrowBand chain(NarrowBand band, double voxelSize, int times, const Resample& resample) {
+  for (int i = 0; i < times; ++i) {
+    band = resample(band, 0.8 * voxelSize);
+    band = resample(band, voxelSize);
+  }
+  return band;
+}
+
+void chains(Recorder& out) {
+  const auto ours = [](const NarrowBand& b, double h) { return levelset::resample(b, h); };
+  for (const Sample& at : out.samples()) {
+    for (const int times : {1, 10}) {
+      if (times > 1 && !out.wantsRepeats(at)) continue;
+      const std::string name = std::to_string(times) + (times == 1 ? " time" : " times");
+      for (const bool round : {true, false}) {
+        const Truth truth = round ? torus(at.shift, V3d(1, 2, 3), 0.7, 0.3)
+                                  : moved(box(at.shift, V3d(1)), skewRotation());
+        const Subject subject{(round ? "torus, " : "rotated cube, ") + name, at, truth};
+        const NarrowBand solid = exactBand(truth, at.voxelSize);
+        out.measure(subject, kOurs, [&] { return chain(solid, at.voxelSize, times, ours); });
+        if (out.wantsPeer(at, 6, 1))
+          out.measure(subject, peer::kResample,
+                      [&] { return chain(solid, at.voxelSize, times, peer::resample); });
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void addResampleCases(std::vector<Case>& all) {
+  all.push_back({.name = "resample-chain",
+                 .group = "resampling",
+                 .title = "to finer voxels and back, again and again",
+                 .definition =
+                     "The exact band of a torus 0.7 / 0.3 about (1, 2, 3) and of a rotated cube of "
+                     "edge 1 is resampled to voxels of 0.8 times the size and back, once and ten "
+                     "times.",
+                 .citation = "closed form",
+                 .quick = {6, 8, 12},
+                 .full = {16, 32, 64},
+                 .bounds = {{"torus, 1 time", "order_surface", 1.8, 12, Sense::AtLeast},
+                            {"torus, 1 time", "order_surface", 1.8, 32, Sense::AtLeast},
+                            {"torus, 10 times", "order_surface", 1.8, 32, Sense::AtLeast},
+                            {"torus, 1 time", "band_in_linf_vx", 0.1},
+                            {"torus, 1 time", "band_out_linf_vx", 0.1},
+                            {"torus, 1 time", "surface_l1_vx", 0.02},
+                            {"torus, 10 times", "band_in_linf_vx", 0.25},
+                            {"torus, 10 times", "band_out_linf_vx", 0.25},
+                            {"torus, 10 times", "surface_l1_vx", 0.05},
+                            {"rotated cube, 1 time", "band_in_linf_vx", 1.25},
+                            {"rotated cube, 1 time", "band_out_linf_vx", 1.25}},
+                 .run = chains});
+}
+
+}  // namespace regress

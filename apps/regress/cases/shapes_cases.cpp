@@ -1,0 +1,70 @@
+#include "levelset/solids/shapes.h"
+
+#include "apps/regress/peers/peer.h"
+#include "apps/regress/recorder.h"
+
+namespace regress {
+
+using Imath::V3d;
+
+namespace {
+
+void sampleShapes(Recorder& out) {
+  const V3d axis(1, 2, 3);
+  for (const Sample& at : out.samples()) {
+    const V3d c = at.shift;
+    const double h = at.voxelSize;
+    const Subject sphere{"sphere", at, ball(c, 1)};
+    out.measure(sphere, kOurs, [&] { return levelset::makeSphere(1, c, h); });
+    if (out.wantsPeer(at, 16))
+      out.measure(sphere, peer::kShapes, [&] { return peer::sphere(1, c, h); });
+
+    const V3d size(1.6, 1.2, 0.8);
+    const Subject cuboid{"box", at, box(c, size)};
+    out.measure(cuboid, kOurs, [&] { return levelset::makeBox(size, c, h); });
+    if (out.wantsPeer(at, 16))
+      out.measure(cuboid, peer::kShapes, [&] { return peer::box(size, c, h); });
+
+    out.measure({"torus", at, torus(c, axis, 0.7, 0.3)}, kOurs,
+                [&] { return levelset::makeTorus(0.7, 0.3, c, axis, h); });
+    out.measure({"cylinder", at, cylinder(c, axis, 0.5, 1.2)}, kOurs,
+                [&] { return levelset::makeCylinder(0.5, 1.2, c, axis, h); });
+    const V3d from = c - axis * 0.12, to = c + axis * 0.12;
+    out.measure({"capsule", at, capsule(from, to, 0.4)}, kOurs,
+                [&] { return levelset::makeCapsule(from, to, 0.4, h); });
+  }
+}
+
+std::vector<Bound> shapeBounds() {
+  std::vector<Bound> bounds;
+  // Voxels hold floats: three voxels' distance is known to 2e-7 of itself.
+  for (const char* variant : {"sphere", "box", "torus", "cylinder", "capsule"})
+    for (const char* figure : {"band_in_linf_vx", "band_out_linf_vx"})
+      bounds.push_back({variant, figure, 2e-6});
+  // A sphere's is below what floats hold at these resolutions, and shows no order.
+  bounds.push_back({"sphere", "volume_error", 1e-6});
+  bounds.push_back({"torus", "order_volume", 1.8, 24, Sense::AtLeast});
+  bounds.push_back({"torus", "order_volume", 1.8, 32, Sense::AtLeast});
+  return bounds;
+}
+
+}  // namespace
+
+void addShapeCases(std::vector<Case>& all) {
+  all.push_back(
+      {.name = "shapes",
+       .group = "shapes",
+       .title = "sampled shapes hold exact distances",
+       .definition =
+           "Sphere of radius 1, box 1.6 × 1.2 × 0.8, and about the axis (1, 2, 3) a torus "
+           "0.7 / 0.3, a cylinder of radius 0.5 and height 1.2 and a capsule of radius "
+           "0.4, against their closed forms on both sides. What is left of the surface's "
+           "error is that of tricubic interpolation.",
+       .citation = "closed forms",
+       .quick = {8, 16, 24},
+       .full = {16, 32, 64},
+       .bounds = shapeBounds(),
+       .run = sampleShapes});
+}
+
+}  // namespace regress

@@ -1,0 +1,94 @@
+#include "apps/viewer/interaction/pick.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "levelset/grids/sample.h"
+
+namespace viewer {
+namespace {
+
+using Imath::V3d;
+
+std::size_t pixelAt(const render::Image& image, int x, int y) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
+         static_cast<std::size_t>(x);
+}
+
+V3d vectorAt(const render::Image& image, const char* name, std::size_t i) {
+  const auto part = [&](const char* axis) {
+    return static_cast<double>(image.channels.at(fmt::format("{}.{}", name, axis))[i]);
+  };
+  return {part("X"), part("Y"), part("Z")};
+}
+
+/// Of the solids with the number, the one whose surface is nearest; on a clip plane, whose number
+/// nobody has, the one that is deepest there.
+std::string nameAt(const render::Scene& scene, std::uint32_t id, const std::vector<double>& phi) {
+  std::string name;
+  double least = INFINITY;
+  const auto consider = [&](std::size_t i, double rank) {
+    if (rank >= least) return;
+    least = rank;
+    name = scene.solids[i].name;
+  };
+  for (std::size_t i = 0; i < phi.size(); ++i)
+    if (scene.solids[i].id == id) consider(i, std::abs(phi[i]));
+  for (const render::MeshPart& part : scene.meshes)
+    if (part.id == id && name.empty()) return part.name;
+  for (std::size_t i = 0; i < phi.size() && least == INFINITY; ++i) consider(i, phi[i]);
+  return name;
+}
+
+}  // namespace
+
+std::optional<Picked> pick(const Frame& frame, int x, int y) {
+  const render::Image& image = *frame.image;
+  if (x < 0 || y < 0 || x >= image.width || y >= image.height) return std::nullopt;
+  const std::size_t i = pixelAt(image, x, y);
+  if (!std::isfinite(image.channels.at("Z")[i])) return std::nullopt;
+  Picked picked{.position = vectorAt(image, "P", i), .normal = vectorAt(image, "N", i)};
+  const render::Scene& scene = frame.view.model->scene;
+  std::vector<double> values;
+  for (const render::Solid& solid : scene.solids)
+    values.push_back(levelset::BandSampler(solid.band).value(picked.position));
+  picked.phi = scenePhi(scene, values);
+  picked.solid = nameAt(scene, image.ids.at("id")[i], values);
+  return picked;
+}
+
+std::optional<double> depthSeen(const Frame& frame, double x, double y) {
+  const render::Image& image = *frame.image;
+  const auto place = [](double at, int window, int size) {
+    return std::clamp(static_cast<int>(at * size / window), 0, size - 1);
+  };
+  const render::Camera& camera = frame.view.camera;
+  const std::size_t i =
+      pixelAt(image, place(x, camera.width, image.width), place(y, camera.height, image.height));
+  const auto depth = static_cast<double>(image.channels.at("Z")[i]);
+  return std::isfinite(depth) ? std::optional(depth) : std::nullopt;
+}
+
+std::string pointText(const V3d& point) {
+  // As many digits as the picture's single precision tells apart; no negative zero.
+  const auto digits = [](double x) { return fmt::format("{:.8g}", x == 0 ? 0 : x); };
+  return fmt::format("{},{},{}", digits(point.x), digits(point.y), digits(point.z));
+}
+
+std::string pickedJson(const std::optional<Picked>& picked) {
+  if (!picked) return "null";
+  const auto list = [](const V3d& v) {  // no negative zeros
+    return nlohmann::ordered_json{v.x + 0.0, v.y + 0.0, v.z + 0.0};
+  };
+  const nlohmann::ordered_json json = {{"position", list(picked->position)},
+                                       {"normal", list(picked->normal)},
+                                       {"phi", picked->phi},
+                                       {"solid", picked->solid}};
+  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+}  // namespace viewer

@@ -1,0 +1,268 @@
+#include "apps/viewer/interaction/progressive_picture.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+
+#include "levelset/memory_limit.h"
+#include "render/cpu/cpu_tracer.h"
+#include "render/gpu/gl_context.h"
+#include "render/gpu/gpu_tracer.h"
+#include "render/kernel/kernel_scene.h"
+#include "render/kernel/paint.h"
+#include "render/views/picture.h"
+
+namespace viewer {
+namespace {
+
+/// A picture of a view, ever finer.
+struct Pass {
+  int pixelSize, samples, ambientSamples, shadowSamples;
+};
+constexpr std::array<Pass, 6> kPasses = {Pass{8, 1, 0, 0}, {4, 1, 0, 0},  {2, 1, 0, 0},
+                                         {1, 1, 0, 0},     {1, 1, 16, 4}, {1, 4, 16, 4}};
+
+constexpr int kCpuTileEdge = 16, kGpuTileEdge = 64;  // pixels: enough rays for a run of each
+constexpr double kOnSurface = 4e-3;  // of the extent: particles that far below it are on it
+
+render::Camera shrunk(render::Camera camera, int pixelSize) {
+  camera.width = std::max(1, (camera.width + pixelSize / 2) / pixelSize);
+  camera.height = std::max(1, (camera.height + pixelSize / 2) / pixelSize);
+  return camera;
+}
+
+}  // namespace
+
+/// What the thread keeps from picture to picture.
+struct ProgressivePicture::Worker {
+  const ProgressivePicture& owner;
+  View view;
+  Display display;
+  std::size_t pass = kPasses.size();  // the next one; none left
+  int pixelSize = kPasses[0].pixelSize;
+  std::shared_ptr<const render::Image> image;  // the last one that was finished, of this view
+
+  std::shared_ptr<const Model> preparedModel;  // that the tables are made of
+  std::optional<ClipPlane::Across> preparedCut;
+  std::unique_ptr<CutScene> cut;
+  std::unique_ptr<render::KernelScene> surfaces;
+  std::unique_ptr<render::GlContext> context;
+  std::unique_ptr<render::KernelTracer> tracer;
+  bool hasTriedGpu = false;
+  std::string name = "processor";
+
+  explicit Worker(const ProgressivePicture& owner_) : owner(owner_) {}
+
+  [[nodiscard]] bool isCut() const { return view.clip && view.model->canCut(); }
+  [[nodiscard]] PlacedPlane plane() const {
+    return placed(*view.clip, view.camera, view.model->solidBounds);
+  }
+  /// What is drawn of the view, by a camera for fewer pixels.
+  [[nodiscard]] render::Scene sceneFor(int edge) {
+    render::Scene scene = isCut() ? cut->at(plane()) : view.model->scene;
+    scene.camera = shrunk(view.camera, edge);
+    return scene;
+  }
+
+  void take(const Wanted& wanted) {
+    if (!view.model || !isSame(view, wanted.view)) {
+      view = wanted.view;
+      pass = 0;
+      image = nullptr;
+    }
+    display = wanted.display;
+  }
+
+  void findTracer() {
+    tracer = nullptr;
+    if (owner.renderer_ != Renderer::Cpu && !hasTriedGpu) {
+      hasTriedGpu = true;
+      try {
+        context = std::make_unique<render::GlContext>();
+        // A processor that plays a GPU is slower than one that does not.
+        const bool isSoftware = context->description().find("llvmpipe") != std::string::npos;
+        if (owner.renderer_ == Renderer::Auto && isSoftware) context = nullptr;
+      } catch (const levelset::ResourceLimit&) {
+        if (owner.renderer_ == Renderer::Gpu) throw;
+      }
+    }
+    if (context) {
+      try {
+        tracer = std::make_unique<render::GpuTracer>(*context, *surfaces);
+        name = context->description();
+      } catch (const levelset::ResourceLimit&) {  // its memory is smaller
+        if (owner.renderer_ == Renderer::Gpu) throw;
+      }
+    }
+    if (!tracer) {
+      tracer = std::make_unique<render::CpuTracer>();
+      name = "processor";
+    }
+  }
+
+  /// Makes the tables where they are not those of the view.
+  void prepare() {
+    const std::optional<ClipPlane::Across> wantedCut =
+        isCut() ? std::optional(view.clip->across) : std::nullopt;
+    if (surfaces && preparedModel == view.model && preparedCut == wantedCut) return;
+    tracer = nullptr;  // it reads the tables
+    surfaces = nullptr;
+    cut = nullptr;
+    if (wantedCut)
+      cut = std::make_unique<CutScene>(view.model->scene, view.model->solidBounds, *wantedCut);
+    const render::Scene scene = sceneFor(1);
+    render::validate(scene.camera);
+    surfaces = std::make_unique<render::KernelScene>(
+        scene, levelset::memoryLimit(levelset::kNoMemoryLimit));
+    preparedModel = view.model;
+    preparedCut = wantedCut;
+    findTracer();
+  }
+
+  /// @return the picture, or null when another one is wanted meanwhile
+  std::shared_ptr<const render::Image> draw(const Pass& how, std::atomic<double>& progress,
+                                            const std::atomic<bool>& isStale) {
+    const render::Scene scene = sceneFor(how.pixelSize);
+    render::RenderOptions options;
+    options.samples = how.samples;
+    options.ambientSamples = how.ambientSamples;
+    options.shadowSamples = how.shadowSamples;
+    options.style.style = view.style;
+    options.maxBytes = levelset::memoryLimit(levelset::kNoMemoryLimit);
+    render::requirePicture(scene, options);
+    surfaces->look(scene);
+    auto drawn = std::make_shared<render::Image>(scene.camera.width, scene.camera.height);
+    const render::KernelPainter painter(scene, *surfaces, options, *drawn);
+    const int edge = context && name != "processor" ? kGpuTileEdge : kCpuTileEdge;
+    const int across = (drawn->width + edge - 1) / edge, down = (drawn->height + edge - 1) / edge;
+    std::atomic<int> done = 0;
+    tbb::parallel_for(0, across * down, [&](int number) {
+      if (isStale) return;
+      const int left = number % across * edge, top = number / across * edge;
+      painter.paint(*tracer, {left, top, std::min(left + edge, drawn->width),
+                              std::min(top + edge, drawn->height)});
+      progress = static_cast<double>(++done) / (across * down);
+    });
+    if (isStale) return nullptr;
+    return drawn;
+  }
+
+  [[nodiscard]] std::shared_ptr<const Frame> shown() {
+    auto frame = std::make_shared<Frame>();
+    frame->view = view;
+    frame->pixelSize = pixelSize;
+    frame->isComplete = pass == kPasses.size();
+    frame->image = image;
+    Canvas& canvas = frame->canvas;
+    canvas = {image->width, image->height,
+              layerColours(*image, display.layer, view.model->extent(), display.curvatureRange)};
+    if (isCut() && display.contours)
+      paintPhi(*image, shrunk(view.camera, pixelSize), plane(), view.model->scene, canvas.colours);
+    if (display.patches != PatchLines::None && !view.model->patches.empty()) {
+      if (canvas.width != view.camera.width || canvas.height != view.camera.height)
+        canvas = stretched(canvas, view.camera.width, view.camera.height);
+      drawPatches(view.model->patches, display.patches, view.camera, *image,
+                  kOnSurface * view.model->bounds.size().length(), canvas);
+    }
+    return frame;
+  }
+};
+
+ProgressivePicture::ProgressivePicture(Renderer renderer, std::function<void()> wake)
+    : wake_(std::move(wake)), renderer_(renderer), thread_([this] { run(); }) {}
+
+ProgressivePicture::~ProgressivePicture() {
+  {
+    const std::scoped_lock lock(mutex_);
+    isEnding_ = true;
+    isStale_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void ProgressivePicture::want(const View& view, const Display& display) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (lastWanted_ && isSame(lastWanted_->view, view) && lastWanted_->display == display) return;
+    lastWanted_ = wanted_ = Wanted{view, display};
+    isStale_ = true;
+    failure_ = nullptr;
+  }
+  changed_.notify_all();
+}
+
+std::shared_ptr<const Frame> ProgressivePicture::frame() const {
+  const std::scoped_lock lock(mutex_);
+  return frame_;
+}
+
+std::exception_ptr ProgressivePicture::failure() const {
+  const std::scoped_lock lock(mutex_);
+  return failure_;
+}
+
+std::string ProgressivePicture::rendererName() const {
+  const std::scoped_lock lock(mutex_);
+  return rendererName_;
+}
+
+void ProgressivePicture::run() {
+  Worker worker(*this);
+  for (;;) {
+    bool isRecoloured = false;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [&] { return isEnding_ || wanted_ || worker.pass < kPasses.size(); });
+      if (isEnding_) return;
+      if (wanted_) {
+        worker.take(*wanted_);
+        isRecoloured = worker.image != nullptr;
+        wanted_.reset();
+        isStale_ = false;
+      }
+    }
+    std::shared_ptr<const Frame> frame;
+    std::exception_ptr failure;
+    try {
+      if (isRecoloured) {
+        frame = worker.shown();
+      } else {
+        worker.prepare();
+        const Pass& how = kPasses[worker.pass];
+        if (auto drawn = worker.draw(how, progress_, isStale_)) {
+          worker.image = std::move(drawn);
+          worker.pixelSize = how.pixelSize;
+          ++worker.pass;
+          frame = worker.shown();
+        }
+      }
+    } catch (...) {
+      failure = std::current_exception();
+      worker.pass = kPasses.size();
+      worker.surfaces = nullptr;
+    }
+    if (!frame && !failure) continue;
+    {
+      const std::scoped_lock lock(mutex_);
+      if (frame) frame_ = frame;
+      if (!wanted_) failure_ = failure;
+      rendererName_ = worker.name;
+      if (worker.pass == kPasses.size()) progress_ = 1;
+    }
+    if (wake_) wake_();
+  }
+}
+
+bool isSame(const render::Camera& a, const render::Camera& b) {
+  return a.from == b.from && a.to == b.to && a.up == b.up && a.verticalFov == b.verticalFov &&
+         a.orthoHeight == b.orthoHeight && a.near == b.near && a.far == b.far &&
+         a.width == b.width && a.height == b.height;
+}
+
+bool isSame(const View& a, const View& b) {
+  return a.model == b.model && a.clip == b.clip && a.style == b.style && isSame(a.camera, b.camera);
+}
+
+}  // namespace viewer

@@ -1,0 +1,179 @@
+#include "apps/viewer/model/model.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "levelset/convert/mesh_to_band.h"
+#include "levelset/error.h"
+#include "levelset/files/band_file.h"
+#include "levelset/mesh.h"
+#include "levelset/mesh_files/mesh_file.h"
+#include "mapping/patches/patch_file.h"
+#include "render/views/scene_file.h"
+
+namespace viewer {
+namespace {
+
+namespace fs = std::filesystem;
+using levelset::UsageError;
+
+constexpr const char* kFormats = "vdb, ply, obj, stl or off (also .gz), json or patch";
+
+enum class FileKind { Band, Mesh, Scene, Patch, Unknown };
+
+FileKind kindOf(const fs::path& file) {
+  if (mapping::isPatchFormat(file.string())) return FileKind::Patch;
+  if (render::isSceneFormat(file.string())) return FileKind::Scene;
+  if (levelset::isMeshFormat(file)) return FileKind::Mesh;
+  if (levelset::isBandFormat(file)) return FileKind::Band;
+  return FileKind::Unknown;
+}
+
+/// Letters, digits and _ of a file's name, as expressions of solids ask.
+std::string solidNameOf(const fs::path& file) {
+  const std::string stem = file.stem().string();
+  std::string name;
+  if (stem.empty() || std::isdigit(static_cast<unsigned char>(stem[0]))) name += '_';
+  for (const char c : stem) name += std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
+  return name;
+}
+
+levelset::NarrowBand bandOfMesh(const fs::path& file, const OpenOptions& options) {
+  const levelset::TriMesh mesh = levelset::readMesh(
+      file, {.attributes = false, .progress = levelset::subProgress(options.progress, 0, 0.2)});
+  const Imath::V3d size = levelset::bounds(mesh).size();
+  const double longest = std::max({size.x, size.y, size.z});
+  // A scan with holes is there to be looked at, too.
+  return levelset::meshToBand(mesh, longest / static_cast<double>(options.resolution),
+                              {.signAnyway = true,
+                               .searchSelfIntersections = false,
+                               .progress = levelset::subProgress(options.progress, 0.2, 1)})
+      .band;
+}
+
+/// Files of the level sets and meshes that a scene names; readScene() has judged it before.
+std::vector<fs::path> solidFilesOf(const fs::path& scene) {
+  std::vector<fs::path> files;
+  std::ifstream stream(scene);
+  const auto json = nlohmann::json::parse(stream, nullptr, false);
+  for (const char* list : {"solids", "meshes"}) {
+    if (!json.is_object() || !json.contains(list) || !json[list].is_array()) continue;
+    for (const auto& part : json[list])
+      if (part.is_object() && part.contains("file") && part["file"].is_string())
+        files.push_back(scene.parent_path() / part["file"].get<std::string>());
+  }
+  return files;
+}
+
+void readSolids(const fs::path& file, FileKind kind, const OpenOptions& options, Model& model) {
+  if (kind == FileKind::Scene) {
+    render::ViewedScene viewed = render::readScene(file, {.progress = options.progress});
+    if (viewed.hasCamera) model.camera = viewed.scene.camera;
+    model.scene = std::move(viewed.scene);
+    const std::vector<fs::path> named = solidFilesOf(file);
+    model.watched.insert(model.watched.end(), named.begin(), named.end());
+  } else {
+    levelset::NarrowBand band = kind == FileKind::Mesh
+                                    ? bandOfMesh(file, options)
+                                    : levelset::readBand(file, {.progress = options.progress});
+    model.scene.solids.push_back({.band = std::move(band), .name = solidNameOf(file)});
+  }
+}
+
+void measureModel(Model& model) {
+  std::size_t voxels = 0, particles = 0;
+  for (const render::Solid& solid : model.scene.solids) {
+    voxels += solid.band.activeVoxelCount();
+  }
+  model.solidBounds = model.scene.bounds();
+  model.bounds = model.solidBounds;
+  for (const mapping::Patch& patch : model.patches) {
+    for (const mapping::ParticleLevel& level : patch.levels)
+      for (const Imath::V3d& particle : level.positions) model.bounds.extendBy(particle);
+    particles += patch.particleCount();
+  }
+  if (!model.scene.solids.empty())
+    model.description =
+        fmt::format("{} solid{}, {:.2f} million voxels", model.scene.solids.size(),
+                    model.scene.solids.size() == 1 ? "" : "s", static_cast<double>(voxels) * 1e-6);
+  if (!model.scene.meshes.empty())
+    model.description +=
+        fmt::format("{}{} mesh{}", model.description.empty() ? "" : "; ", model.scene.meshes.size(),
+                    model.scene.meshes.size() == 1 ? "" : "es");
+  if (!model.patches.empty())
+    model.description +=
+        fmt::format("{}{} patch{}, {} particles", model.description.empty() ? "" : "; ",
+                    model.patches.size(), model.patches.size() == 1 ? "" : "es", particles);
+}
+
+}  // namespace
+
+bool Model::canCut() const {
+  // The cut is an expression, within which nothing is seen through.
+  const bool hidesNothing = scene.isOpaque() || !scene.csg.isEmpty();
+  return !solidBounds.isEmpty() && !scene.solids.empty() && !scene.isBlended() && hidesNothing &&
+         std::none_of(scene.solids.begin(), scene.solids.end(),
+                      [](const render::Solid& solid) { return solid.band.isOpenSurface(); });
+}
+
+bool canOpen(const fs::path& file) {
+  return kindOf(file) != FileKind::Unknown;
+}
+
+void requireReadable(const std::vector<fs::path>& files) {
+  const fs::path* solid = nullptr;
+  for (const fs::path& file : files) {
+    const FileKind kind = kindOf(file);
+    if (kind == FileKind::Unknown)
+      throw UsageError(fmt::format("open: '{}' is of no known format; give a file of {}",
+                                   file.string(), kFormats));
+    std::error_code wrong;
+    if (!fs::exists(file, wrong))
+      throw levelset::IoError(
+          fmt::format("open: '{}' does not exist; check its name", file.string()));
+    if (kind == FileKind::Patch) continue;
+    if (solid)
+      throw UsageError(
+          fmt::format("open: '{}' is a second solid beside '{}'; open one, or make a scene of both "
+                      "(levelsmith help scene)",
+                      file.string(), solid->string()));
+    solid = &file;
+  }
+}
+
+Model openModel(const std::vector<fs::path>& files, const OpenOptions& options) {
+  requireReadable(files);
+  Model model;
+  std::vector<fs::path> patchFiles;
+  for (const fs::path& file : files) {
+    const FileKind kind = kindOf(file);
+    if (kind == FileKind::Patch) {
+      patchFiles.push_back(file);
+      continue;
+    }
+    model.files.push_back(file);
+    model.watched.push_back(file);
+    readSolids(file, kind, options, model);
+  }
+  for (const fs::path& file : patchFiles) {
+    for (mapping::Patch& patch : mapping::readPatches(file))
+      model.patches.push_back(std::move(patch));
+    model.files.push_back(file);
+    model.watched.push_back(file);
+  }
+  measureModel(model);
+  return model;
+}
+
+std::vector<fs::path> filesWith(const std::vector<fs::path>& shown, const fs::path& file) {
+  if (kindOf(file) != FileKind::Patch) return {file};
+  std::vector<fs::path> files = shown;
+  if (std::find(files.begin(), files.end(), file) == files.end()) files.push_back(file);
+  return files;
+}
+
+}  // namespace viewer

@@ -1,0 +1,247 @@
+#include "apps/viewer/viewer_arguments.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <tuple>
+
+#include "apps/pipeline/values/units.h"
+#include "apps/viewer/screenshot.h"
+#include "levelset/error.h"
+
+namespace viewer {
+namespace {
+
+using levelset::UsageError;
+
+constexpr long kMostResolution = 4096;  // voxels: more than rays can tell from each other
+
+constexpr const char* kHelp = R"(levelsmith-view [FILE…] [options]
+Shows a level set (.vdb), a mesh (.ply .obj .stl .off, also .gz) or a scene (.json), and patches (.patch) with it.
+
+  --size WxH          of the picture, pixels                            [1280x800]
+  --from, --to X,Y,Z  where the eye is and where it looks               [all is seen]
+  --up X,Y,Z          what is up                                        [0,1,0]
+  --fov DEGREES       vertical field of view                            [35]
+  --ortho L           orthographic; height of the view, world units
+  --layer NAME        colour, normal, depth, position, mean, gauss, k1, k2 or id
+  --style NAME        of the colours: lit, tone, mean, gauss, principal, accessibility or ink
+  --range N           of curvatures, by the extent of what is drawn     [40]
+  --clip PLANE        cuts at x=0.1, y=0.1, z=0.1, or view=0.1 before the middle, and shows phi there
+  --patches LINES     none, outline, base or all levels of particles    [all]
+  --resolution N      of meshes: voxels along the longest side          [256]
+  --renderer NAME     auto, cpu or gpu                                  [auto]
+  --help, --version
+
+Without anybody looking, for scripts (a display is needed all the same, for example that of xvfb-run):
+  --screenshot FILE   writes the finished picture, .png or .exr, and ends
+  --interface         the screenshot shows the whole window
+  --pick X,Y          prints what is seen through a pixel as JSON, and ends
+
+Left button: turn; middle or right: move; wheel: come nearer; click: pick a point. docs/viewer.md lists the keys.
+)";
+
+std::string whereOf(const std::string& option) {
+  return "levelsmith-view: " + option;
+}
+
+std::array<int, 2> parsePixel(const std::string& text) {
+  const std::size_t comma = text.find(',');
+  if (comma == std::string::npos)
+    throw UsageError(
+        fmt::format("levelsmith-view: --pick '{}' is no pixel; give X,Y as 640,400", text));
+  const long x = pipeline::parseInteger(text.substr(0, comma), whereOf("--pick")),
+             y = pipeline::parseInteger(text.substr(comma + 1), whereOf("--pick"));
+  constexpr long kMost = 1L << 28;
+  if (x < 0 || y < 0 || x > kMost || y > kMost)
+    throw UsageError(fmt::format(
+        "levelsmith-view: --pick {} lies outside of any picture; 0,0 is the upper left", text));
+  return {static_cast<int>(x), static_cast<int>(y)};
+}
+
+double parsePositive(const std::string& text, const std::string& option) {
+  const double number = pipeline::parseNumber(text, whereOf(option));
+  if (!(number > 0)) throw UsageError(fmt::format("{} {} is not positive", whereOf(option), text));
+  return number;
+}
+
+render::Style styleNamed(const std::string& name) {
+  std::string all;
+  for (const render::Style style : render::kStyles) {
+    if (style == render::Style::Matcap) continue;  // it needs a picture of its own
+    if (render::styleName(style) == name) return style;
+    all += (all.empty() ? "" : ", ") + std::string(render::styleName(style));
+  }
+  throw UsageError(fmt::format("levelsmith-view: --style '{}' is none; give one of {}", name, all));
+}
+
+Renderer rendererNamed(const std::string& name) {
+  if (name == "auto") return Renderer::Auto;
+  if (name == "cpu") return Renderer::Cpu;
+  if (name == "gpu") return Renderer::Gpu;
+  throw UsageError(
+      fmt::format("levelsmith-view: --renderer '{}' is none; give auto, cpu or gpu", name));
+}
+
+using Setter = std::function<void(Arguments&, const std::string&)>;
+
+const std::map<std::string, Setter>& setters() {
+  static const std::map<std::string, Setter> all = {
+      {"--size",
+       [](Arguments& to, const std::string& text) {
+         std::tie(to.width, to.height) = pipeline::parseImageSize(text, whereOf("--size"));
+         to.hasSize = true;
+       }},
+      {"--from",
+       [](Arguments& to, const std::string& text) {
+         to.from = pipeline::parsePoint(text, whereOf("--from"));
+       }},
+      {"--to",
+       [](Arguments& to, const std::string& text) {
+         to.to = pipeline::parsePoint(text, whereOf("--to"));
+       }},
+      {"--up",
+       [](Arguments& to, const std::string& text) {
+         to.up = pipeline::parsePoint(text, whereOf("--up"));
+       }},
+      {"--fov",
+       [](Arguments& to, const std::string& text) {
+         to.verticalFov = parsePositive(text, "--fov") * std::numbers::pi / 180;
+       }},
+      {"--ortho", [](Arguments& to,
+                     const std::string& text) { to.orthoHeight = parsePositive(text, "--ortho"); }},
+      {"--layer",
+       [](Arguments& to, const std::string& text) { to.display.layer = layerNamed(text); }},
+      {"--style", [](Arguments& to, const std::string& text) { to.style = styleNamed(text); }},
+      {"--range",
+       [](Arguments& to, const std::string& text) {
+         to.display.curvatureRange = parsePositive(text, "--range");
+       }},
+      {"--clip", [](Arguments& to, const std::string& text) { to.clip = parseClipPlane(text); }},
+      {"--patches",
+       [](Arguments& to, const std::string& text) { to.display.patches = patchLinesNamed(text); }},
+      {"--resolution",
+       [](Arguments& to, const std::string& text) {
+         to.resolution = pipeline::parseInteger(text, whereOf("--resolution"));
+         if (to.resolution < 4 || to.resolution > kMostResolution)
+           throw UsageError(fmt::format("levelsmith-view: --resolution {} is not from 4 to {}",
+                                        text, kMostResolution));
+       }},
+      {"--renderer",
+       [](Arguments& to, const std::string& text) { to.renderer = rendererNamed(text); }},
+      {"--screenshot", [](Arguments& to, const std::string& text) { to.screenshot = text; }},
+      {"--pick", [](Arguments& to, const std::string& text) { to.pick = parsePixel(text); }},
+  };
+  return all;
+}
+
+const std::map<std::string, bool Arguments::*>& flags() {
+  static const std::map<std::string, bool Arguments::*> all = {
+      {"--interface", &Arguments::isInterface},
+      {"--help", &Arguments::asksHelp},
+      {"-h", &Arguments::asksHelp},
+      {"--version", &Arguments::asksVersion}};
+  return all;
+}
+
+[[noreturn]] void refuseOption(const std::string& option) {
+  std::vector<std::string> known;
+  for (const auto& [name, setter] : setters()) known.push_back(name);
+  for (const auto& [name, flag] : flags()) known.push_back(name);
+  const std::string meant = pipeline::didYouMean(option, known);
+  throw UsageError(fmt::format("levelsmith-view: there is no option {}; {}", option,
+                               meant.empty() ? "levelsmith-view --help lists them"
+                                             : fmt::format("did you mean {}?", meant)));
+}
+
+void requireSense(const Arguments& arguments) {
+  if (arguments.asksHelp || arguments.asksVersion) return;
+  if (arguments.screenshot) requireScreenshotName(*arguments.screenshot, arguments.isInterface);
+  if (arguments.isInterface && !arguments.screenshot)
+    throw UsageError(
+        "levelsmith-view: --interface says what a screenshot shows; give --screenshot "
+        "FILE beside it");
+  if (arguments.isScript() && arguments.files.empty())
+    throw UsageError("levelsmith-view: --screenshot and --pick need a file to show; give its name");
+  if (arguments.to && !arguments.from)
+    throw UsageError("levelsmith-view: --to needs --from beside it");
+  if (arguments.verticalFov && !(*arguments.verticalFov < std::numbers::pi))
+    throw UsageError("levelsmith-view: --fov is too wide; it must be below 180 degrees");
+  if (arguments.pick &&
+      ((*arguments.pick)[0] >= arguments.width || (*arguments.pick)[1] >= arguments.height) &&
+      arguments.hasSize)
+    throw UsageError(
+        fmt::format("levelsmith-view: --pick {},{} lies outside of the picture of {}x{} pixels",
+                    (*arguments.pick)[0], (*arguments.pick)[1], arguments.width, arguments.height));
+}
+
+}  // namespace
+
+Arguments parseArguments(const std::vector<std::string>& words) {
+  Arguments arguments;
+  bool areOptionsOver = false;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    if (areOptionsOver || word.size() < 2 || word[0] != '-') {
+      if (word.empty())
+        throw UsageError("levelsmith-view: the name of a file is empty; give one, or none");
+      arguments.files.emplace_back(word);
+      continue;
+    }
+    if (word == "--") {
+      areOptionsOver = true;
+      continue;
+    }
+    const std::size_t equals = word.find('=');
+    const std::string name = word.substr(0, equals);
+    if (const auto flag = flags().find(name);
+        flag != flags().end() && equals == std::string::npos) {
+      arguments.*flag->second = true;
+      continue;
+    }
+    const auto setter = setters().find(name);
+    if (setter == setters().end()) refuseOption(name);
+    if (equals == std::string::npos && i + 1 == words.size())
+      throw UsageError(fmt::format("levelsmith-view: {} needs a value behind it", name));
+    setter->second(arguments, equals == std::string::npos ? words[++i] : word.substr(equals + 1));
+  }
+  requireSense(arguments);
+  return arguments;
+}
+
+std::string viewerHelp() {
+  return kHelp;
+}
+
+render::Camera firstCamera(const Arguments& arguments, const Model& model, int width, int height) {
+  render::Camera camera;
+  const Imath::Box3d nothing(Imath::V3d(-1), Imath::V3d(1));
+  const Imath::Box3d& bounds = model.bounds.isEmpty() ? nothing : model.bounds;
+  if (model.camera && !arguments.from) {
+    camera = *model.camera;
+    if (arguments.up) camera.up = *arguments.up;
+    if (arguments.verticalFov) {
+      camera.verticalFov = *arguments.verticalFov;
+      camera.orthoHeight.reset();
+    }
+  } else if (arguments.from) {
+    camera.from = *arguments.from;
+    camera.to = arguments.to.value_or(bounds.center());
+    if (arguments.up) camera.up = *arguments.up;
+    if (arguments.verticalFov) camera.verticalFov = *arguments.verticalFov;
+  } else {
+    camera = render::framingCamera(bounds, width, height,
+                                   arguments.verticalFov.value_or(camera.verticalFov),
+                                   arguments.up.value_or(camera.up));
+  }
+  if (arguments.orthoHeight) camera.orthoHeight = arguments.orthoHeight;
+  camera.width = width;
+  camera.height = height;
+  render::validate(camera);
+  return camera;
+}
+
+}  // namespace viewer

@@ -1,0 +1,288 @@
+#include "levelset/csg/csg.h"
+
+#include <fmt/core.h>
+#include <openvdb/tools/Merge.h>
+#include <openvdb/tools/Prune.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "levelset/csg/csg_vdb.h"
+#include "levelset/distance/distance_transform.h"
+#include "levelset/error.h"
+#include "levelset/placement/resample.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+
+const char* nameOf(CsgOperation operation) {
+  switch (operation) {
+    case CsgOperation::Union:
+      return "union";
+    case CsgOperation::Intersection:
+      return "intersection";
+    case CsgOperation::Difference:
+      return "difference";
+  }
+  return "";
+}
+
+/// Negative zero and zero compare equal but are not the same bits.
+void clearSignOfZeros(FloatTree& tree) {
+  openvdb::tree::LeafManager<FloatTree> leaves(tree);
+  leaves.foreach ([](FloatTree::LeafNodeType& leaf, std::size_t) {
+    float* values = leaf.buffer().data();
+    for (openvdb::Index i = 0; i < FloatTree::LeafNodeType::SIZE; ++i) values[i] += 0.0f;
+  });
+}
+
+/// What is left to be pruned.
+FloatGrid::Ptr minimumOf(CsgOperation operation, const FloatGrid& a, const FloatGrid& b) {
+  FloatGrid::Ptr result = a.deepCopy();
+  {
+    openvdb::tree::DynamicNodeManager<FloatTree> nodes(result->tree());
+    const openvdb::DeepCopy tag;
+    if (operation == CsgOperation::Union)
+      nodes.foreachTopDown(openvdb::tools::CsgUnionOp<FloatTree>(b.tree(), tag));
+    else if (operation == CsgOperation::Intersection)
+      nodes.foreachTopDown(openvdb::tools::CsgIntersectionOp<FloatTree>(b.tree(), tag));
+    else
+      nodes.foreachTopDown(openvdb::tools::CsgDifferenceOp<FloatTree>(b.tree(), tag));
+  }
+  if (operation == CsgOperation::Difference) clearSignOfZeros(result->tree());
+  return result;
+}
+
+void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options,
+                   const char* action) {
+  if (solids.size() < 2) {
+    throw UsageError(fmt::format("{}: needs at least two solids, there {}", action,
+                                 solids.empty() ? "are none" : "is one"));
+  }
+  double bytes = 0;
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    requireSolid(solids[i], action);
+    if (solids[i].isEmpty()) {
+      throw InvalidInput(fmt::format("{}: operand {} has no surface; leave it out", action, i + 1));
+    }
+    bytes += static_cast<double>(solids[i].memoryUse());
+  }
+  requireMemory(2 * bytes, options.maxMemory, action);
+}
+
+/// All solids on the grid points of the finest, with the smallest half width.
+std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgOptions& options,
+                                  const char* action, std::vector<std::string>& notes) {
+  const auto finest = std::min_element(
+      solids.begin(), solids.end(),
+      [](const auto& a, const auto& b) { return a.voxelSize() < b.voxelSize() * (1 - 1e-9); });
+  double halfWidth = finest->halfWidth();
+  for (const NarrowBand& solid : solids) halfWidth = std::min(halfWidth, solid.halfWidth());
+  std::vector<NarrowBand> result;
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    if (shareTransform(vdb(*finest), vdb(solids[i]))) {
+      result.push_back(narrowed(solids[i], halfWidth));
+      // More than the last bits.
+      if (halfWidth < solids[i].halfWidth() * (1 - 1e-5))
+        notes.push_back(fmt::format("{}: operand {} cut to half width {:.6g} voxels", action, i + 1,
+                                    halfWidth));
+      continue;
+    }
+    result.push_back(resampleTo(solids[i], finest->indexToWorld(),
+                                {.halfWidth = halfWidth, .maxMemory = options.maxMemory}));
+    notes.push_back(fmt::format(
+        "{}: operand {} was resampled from voxels of {} to the grid of operand {} "
+        "with voxels of {}",
+        action, i + 1, solids[i].voxelSize(), finest - solids.begin() + 1, finest->voxelSize()));
+  }
+  // Of voxel sizes that differ in the last bits, the same half width ends in different places.
+  float background = vdb(result.front()).background();
+  for (const NarrowBand& solid : result) background = std::min(background, vdb(solid).background());
+  for (NarrowBand& solid : result)
+    if (vdb(solid).background() != background) endBandAt(editVdb(solid), background);
+  return result;
+}
+
+using Leaf = FloatTree::LeafNodeType;
+
+/// Gives grid points back what they had before a re-distancing where that was right, and the band
+/// its end where faces lie on grid points.
+/// @param old  the leaf before, null where there was none
+void keepGoodValues(Leaf& leaf, const Leaf* old, float background, double voxelSize) {
+  constexpr double kSame = 0.05;  // voxels: what re-distancing may be off along ridges
+  const auto same = static_cast<float>(kSame * voxelSize);
+  for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
+    if (!leaf.isValueOn(n)) continue;
+    const float value = leaf.getValue(n);
+    if (old && old->isValueOn(n)) {
+      if (std::abs(value - old->getValue(n)) <= same) leaf.setValueOnly(n, old->getValue(n));
+    } else if (std::abs(value) > background - same) {
+      leaf.setValueOff(n, std::copysign(background, value));
+    }
+  }
+}
+
+/// Blocks within `reach` blocks of others, along each axis by itself.
+std::set<openvdb::Coord> blocksAbout(const std::vector<openvdb::Coord>& blocks, int reach) {
+  std::set<openvdb::Coord> all(blocks.begin(), blocks.end());
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::vector<openvdb::Coord> before(all.begin(), all.end());
+    for (openvdb::Coord c : before) {
+      c[axis] -= reach * static_cast<int>(Leaf::DIM);
+      for (int i = 0; i <= 2 * reach; ++i, c[axis] += static_cast<int>(Leaf::DIM)) all.insert(c);
+    }
+  }
+  return all;
+}
+
+/// Makes distances again where faces that bound nothing were the nearest: about these only, so that
+/// what a solid is elsewhere changes nothing here, and costs nothing.
+void redistanceAbout(const std::vector<openvdb::Coord>& faces, FloatGrid& grid,
+                     const char* action) {
+  const double voxelSize = grid.voxelSize()[0];
+  const float background = grid.background();
+  eikonal::DistanceRequest request;
+  request.action = action;
+  request.halfWidth = static_cast<double>(background) / voxelSize;
+  const int reach = static_cast<int>(std::ceil((request.halfWidth + 1) / Leaf::DIM));
+  const std::set<openvdb::Coord> blocks = blocksAbout(faces, reach);
+  openvdb::CoordBBox region;
+  for (const openvdb::Coord& block : blocks)
+    region.expand(openvdb::CoordBBox::createCube(block, Leaf::DIM));
+  request.region = region;
+  const FloatGrid::Ptr made = eikonal::distanceTransform(grid, request);
+  for (const openvdb::Coord& block : blocks) {
+    if (const Leaf* leaf = made->tree().probeConstLeaf(block)) {
+      auto mended = std::make_unique<Leaf>(*leaf);
+      keepGoodValues(*mended, grid.tree().probeConstLeaf(block), background, voxelSize);
+      grid.tree().addLeaf(mended.release());
+    } else {
+      grid.tree().addTile(1, block, std::copysign(background, made->tree().getValue(block)), false);
+    }
+  }
+  pruneOneSided(grid.tree());
+}
+
+}  // namespace
+
+CsgSigns csgSigns(CsgOperation operation) {
+  switch (operation) {
+    case CsgOperation::Union:
+      return {1, 1, 1};
+    case CsgOperation::Intersection:
+      return {-1, -1, -1};
+    case CsgOperation::Difference:
+      return {-1, 1, -1};
+  }
+  return {1, 1, 1};
+}
+
+FloatGrid::Ptr mergePlain(CsgOperation operation, const FloatGrid& a, const FloatGrid& b) {
+  const FloatGrid::Ptr result = minimumOf(operation, a, b);
+  pruneOneSided(result->tree());
+  return result;
+}
+
+FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const FloatGrid& second) {
+  const CsgSigns signs = csgSigns(operation);
+  const std::optional<ClosedPair> closed = closeContacts(first, second, signs);
+  const FloatGrid& a = closed ? *closed->a : first;
+  const FloatGrid& b = closed ? *closed->b : second;
+  const FloatGrid::Ptr result = minimumOf(operation, a, b);
+  correctSeam(*result, a, b, signs);
+  pruneOneSided(result->tree());
+  // Where they end at an edge of the result no plane tells how far it is.
+  const std::vector<openvdb::Coord> faces = coincidentFaces(first, second, signs);
+  if (!faces.empty() && eikonal::hasZeroCrossing(result->tree()))
+    redistanceAbout(faces, *result, nameOf(operation));
+  return result;
+}
+
+namespace {
+
+/// Neighbours first, then what they make: with many small solids nothing large is copied for each.
+NarrowBand uniteAll(std::vector<NarrowBand> solids, const CsgOptions& options) {
+  const auto pairs = static_cast<double>(solids.size() - 1);
+  double done = 0;
+  while (solids.size() > 1) {
+    const std::size_t half = (solids.size() + 1) / 2;
+    for (std::size_t i = 0; i < half; ++i) {
+      const bool isPair = 2 * i + 1 < solids.size();
+      if (isPair) report(options.progress, done++ / pairs, nameOf(CsgOperation::Union));
+      solids[i] =
+          isPair
+              ? makeBand(mergePair(CsgOperation::Union, vdb(solids[2 * i]), vdb(solids[2 * i + 1])))
+              : std::move(solids[2 * i]);
+    }
+    solids.resize(half);
+  }
+  return std::move(solids.front());
+}
+
+}  // namespace
+
+CsgResult combine(CsgOperation operation, std::span<const NarrowBand> solids,
+                  const CsgOptions& options) {
+  const char* action = nameOf(operation);
+  requireSolids(solids, options, action);
+  CsgResult result;
+  std::vector<NarrowBand> operands = onOneGrid(solids, options, action, result.notes);
+  if (operation == CsgOperation::Union) {
+    result.band = uniteAll(std::move(operands), options);
+    report(options.progress, 1, action);
+    return result;
+  }
+  result.band = operands.front();
+  for (std::size_t i = 1; i < operands.size(); ++i) {
+    report(options.progress, static_cast<double>(i - 1) / static_cast<double>(operands.size() - 1),
+           action);
+    FloatGrid::Ptr merged = mergePair(operation, vdb(result.band), vdb(operands[i]));
+    if (!hasInside(*merged)) {
+      throw InvalidInput(
+          operation == CsgOperation::Intersection
+              ? fmt::format(
+                    "{}: nothing is left, operand {} does not overlap what is common to those "
+                    "before it; check where they are",
+                    action, i + 1)
+              : fmt::format("{}: nothing is left after operand {} is taken away; check which is "
+                            "subtracted from which",
+                            action, i + 1));
+    }
+    result.band = makeBand(std::move(merged));
+  }
+  report(options.progress, 1, action);
+  return result;
+}
+
+namespace {
+NarrowBand combinePair(CsgOperation operation, const NarrowBand& a, const NarrowBand& b) {
+  const std::array<NarrowBand, 2> solids = {a, b};
+  return combine(operation, solids).band;
+}
+}  // namespace
+
+NarrowBand unite(const NarrowBand& a, const NarrowBand& b) {
+  return combinePair(CsgOperation::Union, a, b);
+}
+NarrowBand intersect(const NarrowBand& a, const NarrowBand& b) {
+  return combinePair(CsgOperation::Intersection, a, b);
+}
+NarrowBand subtract(const NarrowBand& a, const NarrowBand& b) {
+  return combinePair(CsgOperation::Difference, a, b);
+}
+
+bool shareGrid(const NarrowBand& a, const NarrowBand& b) {
+  return a.shared() && b.shared() && shareTransform(vdb(a), vdb(b)) &&
+         vdb(a).background() == vdb(b).background();
+}
+
+}  // namespace levelset

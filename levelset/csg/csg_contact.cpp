@@ -1,0 +1,158 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "levelset/csg/csg_vdb.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::Vec3d;
+using Leaf = openvdb::FloatTree::LeafNodeType;
+
+/// Gap that counts as closed, voxels: what rounding leaves between faces made to touch.
+constexpr double kGap = 1e-3;
+
+struct Contact {
+  Coord at;
+  double depth;  ///< voxels, negative: the least deep of the neighbours inside
+};
+
+/// Both operands with their signs, in voxels.
+struct SignedPair {
+  FloatGrid::ConstAccessor a, b;
+  double first, second;
+
+  SignedPair(const FloatGrid& gridA, const FloatGrid& gridB, const CsgSigns& signs)
+      : a(gridA.getConstAccessor()),
+        b(gridB.getConstAccessor()),
+        first(static_cast<double>(signs.first) / gridA.voxelSize()[0]),
+        second(static_cast<double>(signs.second) / gridB.voxelSize()[0]) {}
+
+  [[nodiscard]] double u(const Coord& c) const {
+    return first * static_cast<double>(a.getValue(c));
+  }
+  [[nodiscard]] double v(const Coord& c) const {
+    return second * static_cast<double>(b.getValue(c));
+  }
+  [[nodiscard]] double least(const Coord& c) const { return std::min(u(c), v(c)); }
+  /// On both surfaces, inside of neither.
+  [[nodiscard]] bool isOnBoth(const Coord& c) const {
+    return least(c) >= 0 && std::max(u(c), v(c)) <= kGap;
+  }
+};
+
+Coord stepped(Coord c, int axis, int step) {
+  c[axis] += step;
+  return c;
+}
+
+/// A grid point between two faces that touch: opposite slopes, the inside of both on either hand,
+/// and more of the face along each other axis (two spheres that touch in a point stay two).
+bool isContact(const SignedPair& pair, const Coord& c, double& depth) {
+  if (!pair.isOnBoth(c)) return false;
+  Vec3d slopeU, slopeV;
+  depth = -std::numeric_limits<double>::max();
+  int through = 0;  // axes with the inside on both hands
+  for (int axis = 0; axis < 3; ++axis) {
+    const Coord up = stepped(c, axis, 1), down = stepped(c, axis, -1);
+    slopeU[axis] = pair.u(up) - pair.u(down);
+    slopeV[axis] = pair.v(up) - pair.v(down);
+    const bool isInsideUp = pair.least(up) < 0, isInsideDown = pair.least(down) < 0;
+    if (isInsideUp && isInsideDown) {
+      ++through;
+      depth = std::max({depth, pair.least(up), pair.least(down)});
+    } else if (!isInsideUp && !isInsideDown && !pair.isOnBoth(up) && !pair.isOnBoth(down)) {
+      return false;
+    }
+  }
+  return through > 0 && slopeU.dot(slopeV) < -0.5 * slopeU.length() * slopeV.length();
+}
+
+std::vector<Contact> findContacts(const FloatGrid& a, const FloatGrid& b, const CsgSigns& signs) {
+  std::vector<const Leaf*> shared;
+  for (auto leaf = b.tree().cbeginLeaf(); leaf; ++leaf)
+    if (a.tree().probeConstLeaf(leaf->origin())) shared.push_back(leaf.getLeaf());
+  const auto gap = static_cast<float>(kGap * b.voxelSize()[0]);
+  std::vector<std::vector<Contact>> found(shared.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, shared.size(), 16), [&](const auto& range) {
+    const SignedPair pair(a, b, signs);
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      for (auto it = shared[i]->cbeginValueOn(); it; ++it) {
+        if (std::abs(*it) > gap) continue;
+        double depth = 0;
+        if (isContact(pair, it.getCoord(), depth)) found[i].push_back({it.getCoord(), depth});
+      }
+  });
+  std::vector<Contact> all;
+  for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+FloatGrid::Ptr withContacts(const FloatGrid& grid, const std::vector<Contact>& contacts,
+                            float sign) {
+  FloatGrid::Ptr result = grid.deepCopy();
+  auto accessor = result->getAccessor();
+  const double perVoxel = static_cast<double>(sign) * grid.voxelSize()[0];
+  for (const Contact& contact : contacts)
+    accessor.setValueOn(contact.at, static_cast<float>(perVoxel * contact.depth));
+  return result;
+}
+
+/// Beside a face of both, whose slopes are opposite, and which goes on: round solids that touch are
+/// opposite in the point, and along the line through it, only.
+bool isBesideBoth(const SignedPair& pair, const Coord& c) {
+  const auto isOpposite = [&](const Coord& at) {
+    return std::abs(pair.u(at) + pair.v(at)) <= kGap;
+  };
+  if (!isOpposite(c)) return false;
+  int goesOn = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int step : {-2, 2}) goesOn += isOpposite(stepped(c, axis, step)) ? 1 : 0;
+  if (goesOn < 3) return false;
+  Vec3d slopeU, slopeV;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Coord up = stepped(c, axis, 1), down = stepped(c, axis, -1);
+    slopeU[axis] = pair.u(up) - pair.u(down);
+    slopeV[axis] = pair.v(up) - pair.v(down);
+  }
+  // Twice a unit slope; less at edges.
+  return slopeU.length() > 1.8 && slopeV.length() > 1.8 &&
+         slopeU.dot(slopeV) < -0.999 * slopeU.length() * slopeV.length();
+}
+
+}  // namespace
+
+std::vector<Coord> coincidentFaces(const FloatGrid& a, const FloatGrid& b, const CsgSigns& signs) {
+  std::vector<const Leaf*> shared;
+  for (auto leaf = b.tree().cbeginLeaf(); leaf; ++leaf)
+    if (a.tree().probeConstLeaf(leaf->origin())) shared.push_back(leaf.getLeaf());
+  std::vector<char> found(shared.size(), 0);
+  const auto voxel = static_cast<float>(b.voxelSize()[0]);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, shared.size(), 16), [&](const auto& range) {
+    const SignedPair pair(a, b, signs);
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      for (auto it = shared[i]->cbeginValueOn(); it && !found[i]; ++it)
+        if (std::abs(*it) < voxel && isBesideBoth(pair, it.getCoord())) found[i] = 1;
+  });
+  std::vector<Coord> leaves;
+  for (std::size_t i = 0; i < shared.size(); ++i)
+    if (found[i]) leaves.push_back(shared[i]->origin());
+  return leaves;
+}
+
+std::optional<ClosedPair> closeContacts(const FloatGrid& a, const FloatGrid& b,
+                                        const CsgSigns& signs) {
+  const std::vector<Contact> contacts = findContacts(a, b, signs);
+  if (contacts.empty()) return std::nullopt;
+  return ClosedPair{withContacts(a, contacts, signs.first),
+                    withContacts(b, contacts, signs.second)};
+}
+
+}  // namespace levelset

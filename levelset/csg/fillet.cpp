@@ -1,0 +1,274 @@
+#include "levelset/csg/fillet.h"
+
+#include <fmt/core.h>
+#include <openvdb/tools/Prune.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "levelset/csg/csg_vdb.h"
+#include "levelset/csg/seam_curve.h"
+#include "levelset/distance/distance_transform.h"
+#include "levelset/distance/interpolant.h"
+#include "levelset/memory_limit.h"
+
+namespace levelset::solids {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using openvdb::Vec3d;
+using LeafNode = FloatTree::LeafNodeType;
+
+constexpr double kLeastRadius = 0.5;  // voxels: a smaller ball leaves no trace on the grid
+// Surfaces whose normals are nearer than that to each other meet in no edge.
+constexpr double kSameCosine = 0.9995;
+constexpr int kSpineSteps = 16;
+constexpr double kSpineTolerance = 1e-3;  // voxels
+constexpr double kLongestSpineStep = 4;   // voxels
+// What is left of the way along the spine shrinks at least by this share of a step, where it has
+// one nearest point.
+constexpr double kLeastShrinkage = 0.05;
+constexpr double kStencil = 4;  // voxels beyond a point that its jet reads
+// How far from the seam the planes that the ball touches may meet, by the ball's radius and in
+// voxels: further off, the surfaces face each other without having met there.
+constexpr double kSeamShare = 0.75, kSeamSlack = 2;
+
+/// The ball at one place.
+struct Ball {
+  Vec3d centre, normalA, normalB;  ///< normals of the distances there
+  double cosine = 0, radius = 0;
+};
+
+/// Lengths in voxels.
+struct FilletSize {
+  double radius, reach;
+  double bound = HUGE_VAL;  ///< nothing that the ball touches is further from the seam
+
+  /// Of the ball that fits where the normals have that cosine: the middle of its arc is
+  /// r (1 / sin(θ/2) − 1) from the seam.
+  [[nodiscard]] double radiusAt(double cosine) const {
+    const double sine = std::sqrt(std::max(0.0, (1 + cosine) / 2));
+    return std::min(radius, reach * sine / (1 - sine));
+  }
+  /// How far from the seam the surface changes: r / tan(θ/2), largest where the reach binds first.
+  [[nodiscard]] double extent() const {
+    const double sine = radius / (reach + radius);
+    return std::min(bound, radius * std::sqrt(1 - sine * sine) / sine);
+  }
+};
+
+/// How far from the seam both solids are within reach of one ball: the seam lies in both their
+/// boxes, and so does, up to the ball, what it touches. Voxels.
+double boundOf(const FloatGrid& a, const FloatGrid& b, const FilletSize& size, double halfWidth) {
+  openvdb::CoordBBox common = a.evalActiveVoxelBoundingBox();
+  common.intersect(b.evalActiveVoxelBoundingBox());
+  const double margin = 2 * size.radius + halfWidth + kStencil + 1;
+  return (common.extents().asVec3d() + Vec3d(2 * margin)).length();
+}
+
+/// Distances in voxels, positive where the ball rolls.
+FloatGrid::Ptr widened(const NarrowBand& solid, float sign, const eikonal::PointTree& curve,
+                       const FilletSize& size, double halfWidth, const BlendOptions& options) {
+  FloatGrid::Ptr part = cutOut(vdb(solid), curve, 2 * (size.extent() + halfWidth));
+  eikonal::DistanceRequest request;
+  request.action = "blend";
+  request.halfWidth = 2 * size.radius + halfWidth + kStencil + 1;
+  request.maxMemory = options.maxMemory;
+  request.progress = options.progress;
+  part = eikonal::distanceTransform(*part, request);
+  if (sign > 0) return part;
+  for (auto it = part->beginValueAll(); it; ++it) it.setValue(-*it);
+  return part;
+}
+
+class BallRoller {
+ public:
+  BallRoller(const FloatGrid& a, const FloatGrid& b, const FilletSize& size,
+             const eikonal::PointTree& curve)
+      : readA_(a.getConstAccessor()),
+        readB_(b.getConstAccessor()),
+        a_(a.tree()),
+        b_(b.tree()),
+        known_(static_cast<double>(a.background()) - kStencil),
+        size_(size),
+        curve_(curve) {}
+
+  /// The distance to the fillet at a grid point, if that is where the surface is nearest.
+  std::optional<double> distance(const Coord& point, double halfWidth) {
+    const double a = static_cast<double>(readA_.getValue(point)),
+                 b = static_cast<double>(readB_.getValue(point));
+    const double least = -halfWidth - 1, most = 2 * size_.radius + halfWidth + 1;
+    if (a < least || b < least || a > most || b > most) return {};
+    const Vec3d x = point.asVec3d();
+    Ball ball;
+    if (!findBall(x, ball)) return {};
+    const Vec3d toCentre = ball.centre - x;
+    const double p = toCentre.dot(ball.normalA), q = toCentre.dot(ball.normalB);
+    if (p < ball.cosine * q || q < ball.cosine * p) return {};  // not between the radii
+    const Vec3d edge =
+        ball.centre - (ball.normalA + ball.normalB) * (ball.radius / (1 + ball.cosine));
+    if (curve_.nearest(edge, kSeamShare * ball.radius + kSeamSlack) == eikonal::PointTree::kNone)
+      return {};
+    return ball.radius - toCentre.length();
+  }
+
+ private:
+  static eikonal::Jet jetAt(eikonal::DenseBlockCache& cache, const Vec3d& p) {
+    const eikonal::DenseBlock& block = cache.around(p);
+    return block.jet(p - block.origin().asVec3d());
+  }
+
+  /// Newton's method on a(s) = b(s) = r and, along the curve, the secant method on the way to x:
+  /// where the curve bends around x, that way shrinks by less than what is gone.
+  bool findBall(const Vec3d& x, Ball& ball) {
+    ball.centre = x;
+    double before = 0, gone = 0, shrinks = 1;
+    for (int step = 0; step < kSpineSteps; ++step) {
+      const eikonal::Jet a = jetAt(a_, ball.centre), b = jetAt(b_, ball.centre);
+      if (std::abs(a.value) > known_ || std::abs(b.value) > known_) return false;
+      ball.normalA = a.gradient;
+      ball.normalB = b.gradient;
+      if (!ball.normalA.normalize() || !ball.normalB.normalize()) return false;
+      ball.cosine = ball.normalA.dot(ball.normalB);
+      if (ball.cosine > kSameCosine) return false;
+      ball.radius = size_.radiusAt(ball.cosine);
+      if (ball.radius < kLeastRadius) return false;
+      const double squaredSine = 1 - ball.cosine * ball.cosine;
+      const double da = ball.radius - a.value, db = ball.radius - b.value;
+      const Vec3d along = ball.normalA.cross(ball.normalB) / std::sqrt(squaredSine);
+      const double way = along.dot(x - ball.centre);
+      if (std::abs(gone) > kSpineTolerance)
+        shrinks = std::clamp((before - way) / gone, kLeastShrinkage, 2.0);
+      Vec3d move = ball.normalA * ((da - ball.cosine * db) / squaredSine) +
+                   ball.normalB * ((db - ball.cosine * da) / squaredSine) + along * (way / shrinks);
+      const double length = move.length();
+      if (!std::isfinite(length)) return false;
+      if (length > kLongestSpineStep) move *= kLongestSpineStep / length;
+      ball.centre += move;
+      before = way;
+      gone = along.dot(move);
+      if (length < kSpineTolerance) return true;
+    }
+    return false;
+  }
+
+  FloatGrid::ConstAccessor readA_, readB_;
+  eikonal::DenseBlockCache a_, b_;
+  double known_;  ///< distances up to there are told by their interpolant
+  FilletSize size_;
+  const eikonal::PointTree& curve_;
+};
+
+/// Leaf blocks that come within `extent` of the curve and in which both distances are known, in
+/// order: where one is not, no ball touches both.
+std::vector<Coord> blocksBeside(const FloatTree& a, const FloatTree& b,
+                                const eikonal::PointTree& curve, double extent) {
+  std::vector<Coord> both;
+  for (auto leaf = a.cbeginLeaf(); leaf; ++leaf)
+    if (!leaf->isEmpty() && b.probeConstLeaf(leaf->origin())) both.push_back(leaf->origin());
+  std::vector<char> isNear(both.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, both.size(), 64), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      const Vec3d centre = both[i].asVec3d() + Vec3d(3.5);
+      isNear[i] = curve.nearest(centre, extent + 6.1) != eikonal::PointTree::kNone;
+    }
+  });
+  std::vector<Coord> found;
+  for (std::size_t i = 0; i < both.size(); ++i)
+    if (isNear[i]) found.push_back(both[i]);
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+struct FilletBlock {
+  Coord origin;
+  std::vector<std::pair<openvdb::Index, float>> values;  ///< voxels, with the result's sign
+};
+// With all its values, as a vector grows, and the leaf that they go to.
+constexpr double kBytesPerBlock = sizeof(FilletBlock) + 2 * 512 * 8 + 2300;
+
+void putFillet(const std::vector<FilletBlock>& blocks, FloatGrid& solid) {
+  const float background = solid.background();
+  const auto scale = static_cast<float>(solid.voxelSize()[0]);
+  for (const FilletBlock& block : blocks) {
+    if (block.values.empty()) continue;
+    LeafNode* leaf = solid.tree().touchLeaf(block.origin);
+    for (const auto& [n, value] : block.values) {
+      const float scaled = value * scale;
+      if (std::abs(scaled) < background)
+        leaf->setValueOn(n, scaled);
+      else
+        leaf->setValueOff(n, std::copysign(background, scaled));
+    }
+  }
+  openvdb::tools::pruneLevelSet(solid.tree());
+}
+
+}  // namespace
+
+void addFillet(CsgOperation operation, const SeamOperands& operands, double radius,
+               const BlendOptions& options, CsgResult& result) {
+  const bool adds = operation == CsgOperation::Union;
+  if (options.side == (adds ? BlendSide::Remove : BlendSide::Add)) {
+    result.notes.emplace_back(adds ? "blend: the fillet of a union only adds material"
+                                   : "blend: this fillet only removes material");
+    return;
+  }
+  const double voxelSize = result.band.voxelSize(), halfWidth = result.band.halfWidth();
+  FilletSize size{radius / voxelSize, options.reach.value_or(2 * radius) / voxelSize};
+  size.bound = boundOf(vdb(operands.a), vdb(operands.b), size, halfWidth);
+  const std::vector<Vec3d> curve = seamCurve(vdb(operands.a).tree(), vdb(operands.b).tree());
+  if (curve.empty()) {
+    result.notes.emplace_back("blend: the surfaces do not meet, so there is no crease to round");
+    return;
+  }
+  if (size.radius < 1.5)
+    result.notes.push_back(fmt::format(
+        "blend: a radius of {:.3g} voxels is below what the grid can show; use smaller voxels",
+        size.radius));
+
+  // === Distances as far as the ball is wide
+  const eikonal::PointTree tree(curve);
+  const CsgSigns signs = csgSigns(operation);
+  const auto within = [&](double from, double to) {
+    BlendOptions part = options;
+    part.progress = subProgress(options.progress, from, to);
+    return part;
+  };
+  const FloatGrid::Ptr a =
+      widened(operands.a, signs.first, tree, size, halfWidth, within(0.4, 0.6));
+  const FloatGrid::Ptr b =
+      widened(operands.b, signs.second, tree, size, halfWidth, within(0.6, 0.8));
+
+  // === The ball at each grid point beside the seam
+  const std::vector<Coord> origins =
+      blocksBeside(a->tree(), b->tree(), tree, size.extent() + halfWidth + 1);
+  requireMemory(static_cast<double>(origins.size()) * kBytesPerBlock,
+                memoryLimit(options.maxMemory), "blend");
+  std::vector<FilletBlock> blocks(origins.size());
+  constexpr std::size_t kBatch = 512;
+  for (std::size_t begin = 0; begin < origins.size(); begin += kBatch) {
+    const std::size_t end = std::min(origins.size(), begin + kBatch);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 8), [&](const auto& range) {
+      BallRoller roller(*a, *b, size, tree);
+      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+        blocks[i].origin = origins[i];
+        for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
+          const Coord c = origins[i] + LeafNode::offsetToLocalCoord(n);
+          if (const std::optional<double> found = roller.distance(c, halfWidth))
+            blocks[i].values.emplace_back(n, signs.result * static_cast<float>(*found));
+        }
+      }
+    });
+    report(options.progress,
+           0.8 + 0.2 * static_cast<double>(end) / static_cast<double>(origins.size()), "blend");
+  }
+  putFillet(blocks, editVdb(result.band));
+}
+
+}  // namespace levelset::solids

@@ -1,0 +1,88 @@
+#include "levelset/csg/seam_operands.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <set>
+
+#include "levelset/csg/csg_vdb.h"
+#include "levelset/placement/resample.h"
+
+namespace levelset::solids {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using openvdb::Vec3d;
+using LeafNode = FloatTree::LeafNodeType;
+
+// Voxels around the part that changes that hold the surface it hangs on.
+constexpr double kSurfaceMargin = 8;
+
+/// A block that holds no distances, only signs.
+void addSigns(const FloatTree& source, const Coord& origin, FloatTree& target) {
+  const float background = target.background();
+  const LeafNode* leaf = source.probeConstLeaf(origin);
+  if (!leaf) {
+    const float tile = source.getValue(origin) < 0 ? -background : background;
+    target.addTile(1, origin, tile, false);
+    return;
+  }
+  auto* signs = new LeafNode(origin, background, false);
+  for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n)
+    if (leaf->getValue(n) < 0) signs->setValueOnly(n, -background);
+  target.addLeaf(signs);
+}
+
+/// The inside that holds no blocks: however deep, a ball asks on which side it is.
+void copyInsideTiles(const FloatTree& source, FloatTree& target) {
+  auto tile = source.cbeginValueOff();
+  tile.setMaxDepth(FloatTree::ValueOffCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile)
+    if (*tile < 0) target.addTile(tile.getLevel(), tile.getCoord(), -target.background(), false);
+}
+
+}  // namespace
+
+SeamOperands onOneGrid(const NarrowBand& a, const NarrowBand& b, const BlendOptions& options) {
+  if (shareTransform(vdb(a), vdb(b))) return {a, b, {}};
+  const bool firstIsFiner = a.voxelSize() <= b.voxelSize();
+  const NarrowBand& fine = firstIsFiner ? a : b;
+  const NarrowBand& coarse = firstIsFiner ? b : a;
+  ResampleOptions resampling;
+  resampling.halfWidth = std::min(fine.halfWidth(), coarse.halfWidth());
+  resampling.maxMemory = options.maxMemory;
+  resampling.progress = subProgress(options.progress, 0, 0.2);
+  const NarrowBand moved = resampleTo(coarse, fine.indexToWorld(), resampling);
+  std::string note = fmt::format(
+      "blend: the {} operand was resampled from voxels of {:.4g} to the other's grid of {:.4g}",
+      firstIsFiner ? "second" : "first", coarse.voxelSize(), fine.voxelSize());
+  return {firstIsFiner ? fine : moved, firstIsFiner ? moved : fine, {std::move(note)}};
+}
+
+FloatGrid::Ptr cutOut(const FloatGrid& solid, const eikonal::PointTree& curve, double radius) {
+  const auto scale = static_cast<float>(1 / solid.voxelSize()[0]);
+  FloatGrid::Ptr part = FloatGrid::create(solid.background() * scale);
+  FloatTree& tree = part->tree();
+  copyInsideTiles(solid.tree(), tree);
+  std::set<Coord> inner, rim;
+  for (auto leaf = solid.tree().cbeginLeaf(); leaf; ++leaf) {
+    const Vec3d centre = leaf->origin().asVec3d() + Vec3d(3.5);
+    const double reach = radius + kSurfaceMargin + 6.1;  // to the corners of the block
+    if (curve.nearest(centre, reach) == eikonal::PointTree::kNone) continue;
+    inner.insert(leaf->origin());
+    auto copy = std::make_unique<LeafNode>(*leaf);
+    for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n)
+      copy->setValueOnly(n, leaf->getValue(n) * scale);
+    tree.addLeaf(copy.release());
+  }
+  for (const Coord& origin : inner)
+    for (int i = 0; i < 27; ++i)
+      rim.insert(origin.offsetBy(8 * (i / 9 - 1), 8 * (i / 3 % 3 - 1), 8 * (i % 3 - 1)));
+  for (const Coord& origin : rim)
+    if (!inner.count(origin)) addSigns(solid.tree(), origin, tree);
+  return part;
+}
+
+}  // namespace levelset::solids

@@ -1,0 +1,278 @@
+#include "levelset/curvature/curvature_flow.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "levelset/curvature/curvature_rate_vdb.h"
+#include "levelset/curvature/curvature_steps_vdb.h"
+#include "levelset/distance/distance_transform.h"
+#include "levelset/error.h"
+
+namespace levelset {
+namespace {
+
+using flow::CurvatureState;
+using flow::CurvatureSteps;
+using flow::NearSurface;
+
+constexpr const char* kAction = "curvature-flow";
+// Without a tolerance, voxels over the whole time.
+constexpr double kDefaultTolerance = 0.02;
+// Steps grow and shrink by no more than this, and stay this far below what the estimate allows.
+constexpr double kMostGrowth = 3, kMostShrinkage = 0.2, kSafety = 0.8;
+// A first step, before there is an estimate, voxels².
+constexpr double kFirstStep = 10 * flow::kExplicitStep;
+// Distances are made again when less than this share of the wanted step is left in the band.
+constexpr double kLeastShare = 0.4;
+// Blocks of fields that are alive during a step, and the part of a band's blocks that is active.
+constexpr double kFields = 9, kFilled = 0.45;
+constexpr double kVolumeTolerance = 1e-6;  // of the volume
+constexpr std::size_t kMostFlowSteps = 100000;
+// A surface that keeps its volume has come to rest when it would move no further than this, at its
+// pace, in the time in which it rounds itself, voxels.
+constexpr double kRestMove = 0.05;
+
+void checkPositive(double value, const char* what, const char* unit) {
+  if (!(value > 0) || !std::isfinite(value))
+    throw UsageError(
+        fmt::format("{}: the {} is {}; give a positive number of {}", kAction, what, value, unit));
+}
+
+void checkArguments(const NarrowBand& solid, double time, const CurvatureFlowOptions& options) {
+  if (!(time >= 0) || !std::isfinite(time))
+    throw UsageError(
+        fmt::format("{}: the time is {}; give world units squared, 0 or more", kAction, time));
+  if (options.tolerance) checkPositive(*options.tolerance, "tolerance", "world units");
+  if (options.step) checkPositive(*options.step, "step", "world units squared");
+  if (options.mask) checkMask(*options.mask, kAction);
+  requireSolid(solid, kAction);
+  if (solid.isEmpty())
+    throw InvalidInput(fmt::format(
+        "{}: the solid is empty, so there is no surface to move; give a solid", kAction));
+  if (options.step && time / *options.step > static_cast<double>(kMostFlowSteps))
+    throw ResourceLimit(fmt::format(
+        "{}: a time of {} in steps of {} makes {:.3g} of them, and {} are the most; ask "
+        "for longer steps or a shorter time",
+        kAction, time, *options.step, time / *options.step, kMostFlowSteps));
+}
+
+/// After that time, voxels squared, the corners of a cube have moved by a voxel.
+constexpr double kEdgesGone = 0.5;
+
+/// One flow, in voxels.
+class CurvatureFlow {
+ public:
+  CurvatureFlow(const NarrowBand& solid, double time, const CurvatureFlowOptions& options)
+      : options_(options),
+        voxel_(solid.voxelSize()),
+        time_(time / voxel_ / voxel_),
+        tolerance_(options.tolerance ? *options.tolerance / voxel_ : kDefaultTolerance),
+        longest_(options.step ? *options.step / voxel_ / voxel_ : time_) {}
+
+  CurvatureFlowResult run(const NarrowBand& solid) {
+    openvdb::FloatGrid::Ptr grid = distances(vdb(solid), flow::kFlowWidth);
+    while (now_ < time_) {
+      requireRoom(*grid);
+      grid = runOn(*grid);
+      requireSurface(*grid);
+      if (now_ < time_) grid = distances(*grid, flow::kFlowWidth);
+    }
+    result_.band = makeBand(distances(*grid, solid.halfWidth()));
+    result_.errorEstimate = error_ * voxel_;
+    result_.shortestStep = flow::kExplicitStep * voxel_ * voxel_;
+    result_.longestStep = longestTaken_ * voxel_ * voxel_;
+    result_.scheme = *std::max_element(kSchemes.begin(), kSchemes.end(), [&](auto a, auto b) {
+      return spent_[index(a)] < spent_[index(b)];
+    });
+    if (result_.steps == 0) result_.scheme = FlowScheme::Auto;
+    report(options_.progress, 1, kAction);
+    return std::move(result_);
+  }
+
+ private:
+  static constexpr std::array<FlowScheme, 3> kSchemes = {
+      FlowScheme::Explicit, FlowScheme::Stabilized, FlowScheme::Implicit};
+  static std::size_t index(FlowScheme scheme) { return static_cast<std::size_t>(scheme); }
+
+  void tell() const { report(options_.progress, 0.99 * now_ / time_, kAction); }
+
+  openvdb::FloatGrid::Ptr distances(const openvdb::FloatGrid& field, double halfWidth) {
+    eikonal::DistanceRequest request;
+    request.action = kAction;
+    request.halfWidth = halfWidth;
+    request.mayHaveEdges = now_ < kEdgesGone || options_.mask;
+    request.maxMemory = options_.maxMemory;
+    const double done = time_ > 0 ? 0.99 * now_ / time_ : 0;
+    request.progress = subProgress(options_.progress, done, done);
+    ++result_.redistances;
+    return eikonal::distanceTransform(field, request);
+  }
+
+  void requireRoom(const openvdb::FloatGrid& grid) const {
+    const double blocks = static_cast<double>(grid.tree().leafCount());
+    requireMemory(blocks * sizeof(flow::Values) * kFields, options_.maxMemory, kAction);
+  }
+
+  void requireSurface(const openvdb::FloatGrid& grid) const {
+    if (eikonal::hasZeroCrossing(grid.tree())) return;
+    throw InvalidInput(
+        fmt::format("{}: the solid vanishes after a time of {:.4g} world units squared, before the "
+                    "{:.4g} asked for; give a shorter time",
+                    kAction, now_ * voxel_ * voxel_, time_ * voxel_ * voxel_));
+  }
+
+  /// Flows until distances are due, the surface is gone or the time is over.
+  openvdb::FloatGrid::Ptr runOn(const openvdb::FloatGrid& grid) {
+    CurvatureState state(grid, options_.mask);
+    CurvatureSteps steps(state, [&] { tell(); });
+    if (options_.preservesVolume) prepareVolume(grid, state, steps);
+    const double begun = now_;
+    for (bool first = true; now_ < time_; first = false) {
+      const NearSurface near = flow::lookNearSurface(state, steps.rate());
+      if (near.count == 0) break;
+      if (options_.preservesVolume && isAtRest(state, near, steps.shift, now_ - begun)) {
+        result_.restedAfter = now_ * voxel_ * voxel_;
+        now_ = time_;
+        break;
+      }
+      const double left = time_ - now_;
+      const double wanted = std::min({wanted_, longest_, left});
+      const double onSurface =
+          near.fastest > 0 ? std::max(0.0, flow::kFlowRoom - near.displaced) / near.fastest : left;
+      const double whole = onSurface + (near.fastest > 0 ? near.displaced / near.fastest : 0);
+      const double room = std::min(onSurface, near.clear);
+      if (!first && room < kLeastShare * std::min(wanted, whole)) break;
+      // As long as an explicit step is always possible, the flow never stands still.
+      double dt = std::min(wanted, std::max(room, flow::kExplicitStep));
+      if (dt > 0.999 * left) dt = left;
+      step(state, steps, first ? std::min(dt, kFirstStep) : dt, first);
+    }
+    result_.evaluations += steps.evaluations();
+    return state.toGrid(grid);
+  }
+
+  /// By the pace of the moment, or, since what long steps and new distances leave behind may be
+  /// rougher than that, by the way since distances were made, `elapsed` ago.
+  static bool isAtRest(const CurvatureState& state, const NearSurface& near, double meanCurvature,
+                       double elapsed) {
+    const double rounding = meanCurvature * meanCurvature;
+    if (near.unevenness() < kRestMove * rounding) return true;
+    if (elapsed * rounding < 1) return false;
+    flow::Field moved = state.value;
+    for (std::size_t i = 0; i < moved.size(); ++i)
+      for (std::size_t n = 0; n < 512; ++n) moved[i][n] -= state.start()[i][n];
+    return flow::lookNearSurface(state, moved).unevenness() < kRestMove * rounding * elapsed;
+  }
+
+  /// What the error of the steps is spread over. One that keeps its volume forgets its errors while
+  /// it rounds itself: the slowest wave on a ball dies with the square of its mean curvature.
+  double errorSpan(double meanCurvature) const {
+    if (!options_.preservesVolume || meanCurvature == 0) return time_;
+    return std::min(time_, 1 / (meanCurvature * meanCurvature));
+  }
+
+  void requireEnd(double dt) const {
+    if (result_.steps < kMostFlowSteps && now_ + dt > now_) return;
+    throw ResourceLimit(
+        fmt::format("{}: {} steps have come to a time of {:.4g} world units squared, and the next "
+                    "is of {:.3g}, so the {:.4g} asked for is out of reach; ask for a shorter time "
+                    "or use larger voxels",
+                    kAction, result_.steps, now_ * voxel_ * voxel_, dt * voxel_ * voxel_,
+                    time_ * voxel_ * voxel_));
+  }
+
+  FlowScheme cheapest(double dt, double left) const {
+    if (options_.scheme != FlowScheme::Auto) return options_.scheme;
+    // What is left of the time, at this pace.
+    const auto cost = [&](FlowScheme scheme) {
+      return scheme == FlowScheme::Explicit ? flow::predictedCost(scheme, left)
+                                            : left / dt * flow::predictedCost(scheme, dt);
+    };
+    return *std::min_element(kSchemes.begin(), kSchemes.end(),
+                             [&](auto a, auto b) { return cost(a) < cost(b); });
+  }
+
+  /// One step of dt or less. The first after distances were made smooths away their rounding, of
+  /// which an estimate would see nothing else.
+  void step(CurvatureState& state, CurvatureSteps& steps, double dt, bool first) {
+    const FlowScheme scheme = cheapest(dt, time_ - now_);
+    if (scheme == FlowScheme::Explicit) dt = std::min(dt, flow::kExplicitStep);
+    requireEnd(dt);
+    const double span = errorSpan(steps.shift);
+    const double power = 1.0 / CurvatureSteps::errorOrder(scheme);
+    for (;;) {
+      const double error = steps.take(scheme, dt);
+      if (first) break;
+      const double allowed = tolerance_ * dt / span;
+      const double factor = error > 0 ? std::clamp(kSafety * std::pow(allowed / error, power),
+                                                   kMostShrinkage, kMostGrowth)
+                                      : kMostGrowth;
+      const bool isShortest = dt <= 1.001 * flow::kExplicitStep;
+      if (error > allowed && !isShortest) {
+        steps.undo();
+        dt = std::max(flow::kExplicitStep, dt * std::min(factor, 0.7));
+        wanted_ = dt;
+        continue;
+      }
+      // A step that was cut short says little of how far one may go.
+      wanted_ = std::max({flow::kExplicitStep, dt * factor, factor > 1 ? wanted_ : 0.0});
+      if (span < time_) error_ *= std::exp(-dt / span);
+      error_ += error;
+      break;
+    }
+    now_ = dt >= time_ - now_ ? time_ : now_ + dt;
+    spent_[index(scheme)] += dt;
+    longestTaken_ = std::max(longestTaken_, dt);
+    ++result_.steps;
+    if (options_.preservesVolume) keepVolume(state, steps);
+    tell();
+  }
+
+  // === Volume
+
+  void prepareVolume(const openvdb::FloatGrid& grid, CurvatureState& state, CurvatureSteps& steps) {
+    inactive_ = flow::inactiveContent(grid.tree());
+    if (!volume_) volume_ = inactive_ + flow::contentOf(state, steps.rate(), steps.shift).volume;
+    keepVolume(state, steps);
+  }
+
+  /// Moves the surface as a whole until the volume is what it was, and takes from now on the mean
+  /// curvature off the rate.
+  void keepVolume(CurvatureState& state, CurvatureSteps& steps) {
+    constexpr int kMostCorrections = 4;
+    for (int i = 0; i < kMostCorrections; ++i) {
+      const flow::Content content = flow::contentOf(state, steps.rate(), steps.shift);
+      const double excess = inactive_ + content.volume - *volume_;
+      if (!(content.area > 0) || std::abs(excess) < kVolumeTolerance * *volume_) break;
+      steps.raise(excess / content.area);
+    }
+    steps.refreshRate();
+    const NearSurface near = flow::lookNearSurface(state, steps.rate());
+    if (near.weights > 0) steps.shift += near.rates / near.weights;
+    steps.refreshRate();
+  }
+
+  const CurvatureFlowOptions& options_;
+  double voxel_;
+  double time_, tolerance_, longest_;
+  double now_ = 0, wanted_ = kFirstStep;
+  double error_ = 0, longestTaken_ = 0;
+  std::array<double, 4> spent_{};
+  std::optional<double> volume_;
+  double inactive_ = 0;
+  CurvatureFlowResult result_;
+};
+
+}  // namespace
+
+CurvatureFlowResult curvatureFlow(NarrowBand solid, double time,
+                                  const CurvatureFlowOptions& options) {
+  checkArguments(solid, time, options);
+  if (time == 0) return {.band = std::move(solid)};
+  return CurvatureFlow(solid, time, options).run(solid);
+}
+
+}  // namespace levelset

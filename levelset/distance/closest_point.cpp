@@ -1,0 +1,113 @@
+#include "levelset/distance/closest_point.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace levelset::eikonal {
+namespace {
+
+using openvdb::Vec3d;
+
+constexpr int kMaxIterations = 8;
+constexpr double kFootReach = 2;    // voxels from the start
+constexpr double kLongestStep = 1;  // voxels
+// A step is the last when what it leaves, about the cube of its length by the square of the
+// curvature, is below this part of a voxel.
+constexpr double kTolerance = 2e-5;
+constexpr double kLongestLastStep = 0.6;
+constexpr double kLeastCurvature = 0.1;  // of the distance along the surface, against 1 on a plane
+
+/// Two unit vectors perpendicular to a unit vector and to each other.
+void tangents(const Vec3d& n, Vec3d& t1, Vec3d& t2) {
+  // [Duff17], without a branch that loses precision.
+  const double sign = std::copysign(1.0, n.z());
+  const double a = -1 / (sign + n.z()), b = n.x() * n.y() * a;
+  t1 = Vec3d(1 + sign * n.x() * n.x() * a, sign * b, -sign * n.x());
+  t2 = Vec3d(b, sign + n.y() * n.y() * a, -n.y());
+}
+
+struct NewtonStep {
+  Vec3d along;  ///< the step
+  double length = 0;
+  double remains = 0;  ///< estimate of the distance to the solution after it, voxels
+};
+
+/// One Newton step of the constrained problem: along the normal to φ = 0, along the tangents to
+/// where the distance to `from` is stationary. The normal part includes the second order.
+NewtonStep newtonStep(const Jet& jet, double slope, const Vec3d& toFrom) {
+  const Vec3d n = jet.gradient / slope;
+  const double along = -jet.value / slope;
+  const double lambda = (toFrom.dot(n) - along) / slope;
+  Vec3d t1, t2;
+  tangents(n, t1, t2);
+  const Vec3d h1 = jet.hessianTimes(t1), h2 = jet.hessianTimes(t2);
+  double a11 = 1 + lambda * h1.dot(t1), a12 = lambda * h1.dot(t2), a22 = 1 + lambda * h2.dot(t2);
+  const double b1 = toFrom.dot(t1) - lambda * along * h1.dot(n);
+  const double b2 = toFrom.dot(t2) - lambda * along * h2.dot(n);
+  // Past the centre of curvature the stationary point is a maximum: lift the eigenvalues.
+  const double mean = (a11 + a22) / 2, half = (a11 - a22) / 2;
+  const double least = mean - std::sqrt(half * half + a12 * a12);
+  if (least < kLeastCurvature) {
+    a11 += kLeastCurvature - least;
+    a22 += kLeastCurvature - least;
+  }
+  const double scale = 1 / (a11 * a22 - a12 * a12);
+  NewtonStep step;
+  step.along =
+      n * along + t1 * (scale * (a22 * b1 - a12 * b2)) + t2 * (scale * (a11 * b2 - a12 * b1));
+  const double squared = step.along.lengthSqr();
+  step.length = std::sqrt(squared);
+  const double curvature = (h1.length() + h2.length()) / slope;
+  step.remains = curvature * curvature * squared * step.length;
+  if (step.length <= kLongestLastStep)
+    step.along -= n * (step.along.dot(jet.hessianTimes(step.along)) / (2 * slope));
+  return step;
+}
+
+}  // namespace
+
+Foot closestPoint(const DenseBlock& block, const Vec3d& from, const Vec3d& start) {
+  Foot foot{start, (from - start).length(), false, false};
+  Vec3d y = start;
+  for (int i = 0; i < kMaxIterations; ++i) {
+    if (!DenseBlock::contains(y)) return foot;
+    const Jet jet = block.jet(y);
+    const double slope = jet.gradient.length();
+    if (!(slope > 0)) return foot;
+    const NewtonStep step = newtonStep(jet, slope, from - y);
+    if (!std::isfinite(step.length)) return foot;
+    y += step.length > kLongestStep ? step.along * (kLongestStep / step.length) : step.along;
+    if ((y - start).lengthSqr() > kFootReach * kFootReach)
+      return Foot{y, foot.distance, false, true};
+    if (step.length <= kLongestLastStep && step.remains < kTolerance)
+      return Foot{y, (from - y).length(), true, false};
+  }
+  return foot;
+}
+
+Foot closestPointByOneStep(const Jet& jet, const Vec3d& from, const Vec3d& start) {
+  const double slope = jet.gradient.length();
+  if (!(slope > 0)) return {};
+  const NewtonStep step = newtonStep(jet, slope, from - start);
+  if (!(step.length <= kLongestLastStep) || !(step.remains < kTolerance)) return {};
+  const Vec3d point = start + step.along;
+  return {point, (from - point).length(), true, false};
+}
+
+bool changesSignAround(const DenseBlock& block, const Vec3d& point) {
+  // A curved surface bulges by this much through the face of a cell before a corner sees it.
+  constexpr double kBulge = 0.25;
+  int low[3], high[3];
+  for (int i = 0; i < 3; ++i) {
+    low[i] = static_cast<int>(std::floor(point[i] - kBulge));
+    high[i] = static_cast<int>(std::floor(point[i] + kBulge)) + 1;
+  }
+  const bool inside = block.at(low[0], low[1], low[2]) < 0;
+  for (int x = low[0]; x <= high[0]; ++x)
+    for (int y = low[1]; y <= high[1]; ++y)
+      for (int z = low[2]; z <= high[2]; ++z)
+        if ((block.at(x, y, z) < 0) != inside) return true;
+  return false;
+}
+
+}  // namespace levelset::eikonal

@@ -1,0 +1,116 @@
+#include "levelset/distance/interpolant.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace levelset::eikonal {
+namespace {
+
+using openvdb::Coord;
+using openvdb::Vec3d;
+using LeafNode = openvdb::FloatTree::LeafNodeType;
+using Float4 = float __attribute__((vector_size(16)));
+
+Float4 load4(const float* values) {
+  Float4 result;
+  std::memcpy(&result, values, sizeof(result));
+  return result;
+}
+
+/// Catmull-Rom weights of four samples at -1, 0, 1, 2 and their two derivatives.
+struct Weights {
+  float w[4], d[4], dd[4];
+  explicit Weights(double t) {
+    const auto f = [](double x) { return static_cast<float>(x); };
+    w[0] = f(((-0.5 * t + 1) * t - 0.5) * t);
+    w[1] = f((1.5 * t - 2.5) * t * t + 1);
+    w[2] = f(((-1.5 * t + 2) * t + 0.5) * t);
+    w[3] = f((0.5 * t - 0.5) * t * t);
+    d[0] = f((-1.5 * t + 2) * t - 0.5);
+    d[1] = f((4.5 * t - 5) * t);
+    d[2] = f((-4.5 * t + 4) * t + 0.5);
+    d[3] = f((1.5 * t - 1) * t);
+    dd[0] = f(2 - 3 * t);
+    dd[1] = f(9 * t - 5);
+    dd[2] = f(4 - 9 * t);
+    dd[3] = f(3 * t - 1);
+  }
+};
+
+Float4 combine(const float (&w)[4], const Float4 (&rows)[4]) {
+  return w[0] * rows[0] + w[1] * rows[1] + w[2] * rows[2] + w[3] * rows[3];
+}
+
+double dot(const float (&w)[4], const Float4& v) {
+  return static_cast<double>((w[0] * v[0] + w[1] * v[1]) + (w[2] * v[2] + w[3] * v[3]));
+}
+
+}  // namespace
+
+void DenseBlock::load(const openvdb::FloatGrid::ConstAccessor& accessor, const Coord& origin) {
+  origin_ = origin;
+  // Per axis: the pad before the leaf, the leaf, the pad after it.
+  constexpr int kFrom[3] = {-kPad, 0, 8}, kTo[3] = {0, 8, 8 + kPad};
+  for (int bx = 0; bx < 3; ++bx)
+    for (int by = 0; by < 3; ++by)
+      for (int bz = 0; bz < 3; ++bz) {
+        const Coord neighbour = origin.offsetBy(8 * (bx - 1), 8 * (by - 1), 8 * (bz - 1));
+        const LeafNode* leaf = accessor.probeConstLeaf(neighbour);
+        const float* source = leaf ? leaf->buffer().data() : nullptr;
+        const float tile = leaf ? 0.0f : accessor.getValue(neighbour);
+        const auto count = static_cast<std::size_t>(kTo[bz] - kFrom[bz]);
+        for (int x = kFrom[bx]; x < kTo[bx]; ++x)
+          for (int y = kFrom[by]; y < kTo[by]; ++y) {
+            float* target = &values_[static_cast<std::size_t>(
+                ((x + kPad) * kSide + y + kPad) * kSide + kFrom[bz] + kPad)];
+            if (source)
+              std::memcpy(target, source + ((x & 7) << 6) + ((y & 7) << 3) + (kFrom[bz] & 7),
+                          count * sizeof(float));
+            else
+              std::fill_n(target, count, tile);
+          }
+      }
+}
+
+Jet DenseBlock::jet(const Vec3d& p) const {
+  const int cx = static_cast<int>(std::floor(p.x())), cy = static_cast<int>(std::floor(p.y())),
+            cz = static_cast<int>(std::floor(p.z()));
+  const Weights wx(p.x() - cx), wy(p.y() - cy), wz(p.z() - cz);
+  const float* corner = &values_[static_cast<std::size_t>(
+      ((cx + kPad - 1) * kSide + cy + kPad - 1) * kSide + cz + kPad - 1)];
+  Float4 v[4], dx[4], dxx[4];  // rows along z, summed over x
+  for (int j = 0; j < 4; ++j) {
+    Float4 rows[4];
+    for (int i = 0; i < 4; ++i) rows[i] = load4(corner + (i * kSide + j) * kSide);
+    v[j] = combine(wx.w, rows);
+    dx[j] = combine(wx.d, rows);
+    dxx[j] = combine(wx.dd, rows);
+  }
+  const Float4 value = combine(wy.w, v), dy = combine(wy.d, v), dyy = combine(wy.dd, v);
+  const Float4 gx = combine(wy.w, dx), gxy = combine(wy.d, dx), gxx = combine(wy.w, dxx);
+  Jet jet;
+  jet.value = dot(wz.w, value);
+  jet.gradient = Vec3d(dot(wz.w, gx), dot(wz.w, dy), dot(wz.d, value));
+  jet.xx = dot(wz.w, gxx);
+  jet.yy = dot(wz.w, dyy);
+  jet.zz = dot(wz.dd, value);
+  jet.xy = dot(wz.w, gxy);
+  jet.xz = dot(wz.d, gx);
+  jet.yz = dot(wz.d, dy);
+  return jet;
+}
+
+const DenseBlock& DenseBlockCache::around(const Vec3d& position) {
+  const Coord origin = leafOrigin(position);
+  const auto hash = static_cast<std::size_t>((origin.x() >> 3) & 3) * 16 +
+                    static_cast<std::size_t>((origin.y() >> 3) & 3) * 4 +
+                    static_cast<std::size_t>((origin.z() >> 3) & 3);
+  Slot& slot = slots_[hash % kSlots];
+  if (!slot.used || slot.block.origin() != origin) {
+    slot.block.load(accessor_, origin);
+    slot.used = true;
+  }
+  return slot.block;
+}
+
+}  // namespace levelset::eikonal

@@ -1,0 +1,53 @@
+#include "levelset/distance/redistance.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "levelset/distance/distance_transform.h"
+#include "levelset/error.h"
+
+namespace levelset {
+namespace {
+
+/// The smallest box of grid points that holds a world box.
+openvdb::CoordBBox gridBox(const openvdb::math::Transform& transform, const Imath::Box3d& box) {
+  openvdb::BBoxd index;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Imath::V3d p(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
+                       corner & 4 ? box.max.z : box.min.z);
+    index.expand(transform.worldToIndex(toVdb(p)));
+  }
+  // What rounding adds must not add a layer.
+  const openvdb::Vec3d slack(1e-6);
+  return {openvdb::Coord::floor(index.min() + slack), openvdb::Coord::ceil(index.max() - slack)};
+}
+
+bool isFinite(const Imath::Box3d& box) {
+  for (int i = 0; i < 3; ++i)
+    if (!std::isfinite(box.min[i]) || !std::isfinite(box.max[i])) return false;
+  return true;
+}
+
+}  // namespace
+
+NarrowBand redistance(NarrowBand field, const RedistanceOptions& options) {
+  requireSolid(field, "redistance");
+  if (field.isEmpty())
+    throw InvalidInput("redistance: the field has no zero crossing, it is empty; give a solid");
+  eikonal::DistanceRequest request;
+  request.halfWidth = options.halfWidth.value_or(field.halfWidth());
+  if (!std::isfinite(request.halfWidth) || request.halfWidth < 1)
+    throw UsageError(
+        fmt::format("redistance: the half width is {} voxels; give at least 1", request.halfWidth));
+  if (options.region) {
+    if (options.region->isEmpty() || !isFinite(*options.region))
+      throw UsageError("redistance: the region is empty or not finite; give a box");
+    request.region = gridBox(vdb(field).transform(), *options.region);
+  }
+  request.maxMemory = options.maxMemory;
+  request.progress = options.progress;
+  return makeBand(eikonal::distanceTransform(vdb(field), request));
+}
+
+}  // namespace levelset

@@ -1,0 +1,185 @@
+#include "levelset/distance/sharp_patches.h"
+
+#include <openvdb/tools/Morphology.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <tuple>
+
+#include "levelset/distance/interpolant.h"
+#include "levelset/meshing/sharp_surface.h"
+
+namespace levelset::eikonal {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using openvdb::Vec3d;
+using LeafNode = FloatTree::LeafNodeType;
+
+// Second differences of unit slope beyond which a grid point may lie beside an edge, voxels.
+constexpr double kSharpBend = 0.15;
+// The interpolant of a cell sees an edge up to this many cells away, and the bisectors of its
+// faces.
+constexpr int kZone = 3;
+// Where another sheet faces away this near to an edge, in voxels, the values between both belong to
+// either, and the planes that they tell lie on neither.
+constexpr double kThin = 2;
+// Normals with a smaller scalar product face away from each other. So do the faces of a knife edge
+// of less than 26°, which looks like the rim of a plate and is left to the interpolant like that.
+constexpr double kFacesAway = -0.9;
+
+/// Is there a sharp bend at a grid point beside the surface?
+bool bends(const DenseBlock& block, double limit) {
+  constexpr int kSteps[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int x = 0; x < 8; ++x)
+    for (int y = 0; y < 8; ++y)
+      for (int z = 0; z < 8; ++z) {
+        const float here = block.at(x, y, z);
+        float bend = 0;
+        bool beside = false;
+        for (const auto& s : kSteps) {
+          const float a = block.at(x - s[0], y - s[1], z - s[2]),
+                      b = block.at(x + s[0], y + s[1], z + s[2]);
+          beside = beside || (a < 0) != (here < 0) || (b < 0) != (here < 0);
+          bend = std::max(bend, std::abs(a + b - 2 * here));
+        }
+        if (beside && static_cast<double>(bend) > limit) return true;
+      }
+  return false;
+}
+
+/// The leaves where the field bends beside the surface, and all around them.
+FloatGrid::Ptr bentPart(const FloatGrid& field, const std::optional<CoordBBox>& within) {
+  std::vector<const LeafNode*> leaves;
+  for (auto it = field.tree().cbeginLeaf(); it; ++it)
+    if (!within || within->hasOverlap(it->getNodeBoundingBox())) leaves.push_back(it.getLeaf());
+  std::vector<char> isBent(leaves.size(), 0);
+  const double limit = kSharpBend * field.voxelSize()[0];
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 64), [&](const auto& range) {
+    const FloatGrid::ConstAccessor accessor(field.tree());
+    const auto block = std::make_unique<DenseBlock>();
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      block->load(accessor, leaves[i]->origin());
+      isBent[i] = bends(*block, limit);
+    }
+  });
+  auto part = FloatGrid::create(field.background());
+  part->setTransform(field.transform().copy());
+  auto target = part->getAccessor();
+  auto source = field.getConstAccessor();
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    if (!isBent[i]) continue;
+    for (int k = 0; k < 27; ++k) {
+      const Coord origin =
+          leaves[i]->origin().offsetBy(8 * (k / 9 - 1), 8 * (k / 3 % 3 - 1), 8 * (k % 3 - 1));
+      if (target.probeConstLeaf(origin)) continue;
+      if (const LeafNode* leaf = source.probeConstLeaf(origin))
+        target.addLeaf(new LeafNode(*leaf));
+      else
+        target.addTile(1, origin, source.getValue(origin), false);
+    }
+  }
+  return part;
+}
+
+/// The triangles of a mesh by the cells that their centroids lie in, to find thin places.
+class SheetTable {
+ public:
+  explicit SheetTable(const SharpMesh& mesh) {
+    openvdb::MaskTree near;  // leaves within reach of a feature
+    for (std::size_t v = 0; v < mesh.sheets.size(); ++v)
+      for (int corner = 0; corner < 8 && mesh.sheets[v].count > 1; ++corner)
+        near.touchLeaf(Coord::floor(mesh.positions[v] + Vec3d(corner & 4 ? kThin : -kThin,
+                                                              corner & 2 ? kThin : -kThin,
+                                                              corner & 1 ? kThin : -kThin)));
+    const openvdb::tree::ValueAccessor<const openvdb::MaskTree> isNear(near);
+    for (const auto& [a, b, c] : mesh.triangles) {
+      const Vec3d &p = mesh.positions[a], &q = mesh.positions[b], &r = mesh.positions[c];
+      const Vec3d centroid = (p + q + r) / 3.0;
+      if (!isNear.probeConstLeaf(Coord::floor(centroid))) continue;
+      Vec3d normal = (q - p).cross(r - p);
+      if (!normal.normalize()) continue;
+      sheets_.push_back({Coord::floor(centroid), centroid, normal});
+    }
+    std::sort(sheets_.begin(), sheets_.end(), [](const Sheet& s, const Sheet& t) {
+      return std::tie(s.cell, s.centroid) < std::tie(t.cell, t.centroid);
+    });
+  }
+  [[nodiscard]] bool isThinAt(const Vec3d& point, const VertexSheets& own) const {
+    const Coord low = Coord::floor(point - Vec3d(kThin)), high = Coord::floor(point + Vec3d(kThin));
+    for (int x = low.x(); x <= high.x(); ++x)
+      for (int y = low.y(); y <= high.y(); ++y) {
+        const auto first = std::lower_bound(
+            sheets_.begin(), sheets_.end(), Coord(x, y, low.z()),
+            [](const Sheet& sheet, const Coord& cell) { return sheet.cell < cell; });
+        for (auto it = first; it != sheets_.end() && it->cell <= Coord(x, y, high.z()); ++it)
+          if ((it->centroid - point).lengthSqr() < kThin * kThin && facesAway(it->normal, own))
+            return true;
+      }
+    return false;
+  }
+
+ private:
+  struct Sheet {
+    Coord cell;
+    Vec3d centroid, normal;
+  };
+  [[nodiscard]] static bool facesAway(const Vec3d& normal, const VertexSheets& own) {
+    for (std::size_t i = 0; i < own.count; ++i)
+      if (normal.dot(sheetNormal(own, i)) < kFacesAway) return true;
+    return false;
+  }
+
+  std::vector<Sheet> sheets_;
+};
+
+}  // namespace
+
+SharpPatches::SharpPatches(const FloatGrid& field, const std::optional<CoordBBox>& within,
+                           const Progress& progress) {
+  const FloatGrid::Ptr part = bentPart(field, within);
+  if (part->tree().leafCount() == 0) return;
+  const CellSurface surface(*part);
+  const SharpMesh mesh = sharpSurface(surface, *part, progress);
+
+  // === Where an edge is sure
+  const bool hasFeatures = std::any_of(mesh.sheets.begin(), mesh.sheets.end(),
+                                       [](const VertexSheets& s) { return s.count > 1; });
+  if (!hasFeatures) return;
+  const SheetTable table(mesh);
+  for (std::size_t v = 0; v < mesh.sheets.size(); ++v) {
+    if (mesh.sheets[v].count < 2 || table.isThinAt(mesh.positions[v], mesh.sheets[v])) continue;
+    features_.push_back(mesh.positions[v]);
+    zone_.setValueOn(Coord::floor(mesh.positions[v]));
+  }
+  if (zone_.empty()) return;
+  openvdb::tools::dilateActiveValues(zone_, kZone, openvdb::tools::NN_FACE_EDGE_VERTEX,
+                                     openvdb::tools::IGNORE_TILES);
+
+  // === What is used there
+  border_.topologyUnion(zone_);
+  openvdb::tools::dilateActiveValues(border_, 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
+                                     openvdb::tools::IGNORE_TILES);
+  // Beyond the zone too: a point at its border must find the surface that goes on there nearer than
+  // the last triangle that touches the zone.
+  openvdb::MaskTree around(border_);
+  openvdb::tools::dilateActiveValues(around, 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
+                                     openvdb::tools::IGNORE_TILES);
+  const openvdb::tree::ValueAccessor<const openvdb::MaskTree> used(around);
+  std::vector<TriangleTree::Triangle> triangles;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const TriangleTree::Triangle t{mesh.positions[a], mesh.positions[b], mesh.positions[c]};
+    if (std::any_of(t.begin(), t.end(),
+                    [&](const Vec3d& p) { return used.isValueOn(Coord::floor(p)); }))
+      triangles.push_back(t);
+  }
+  surface_ = TriangleTree(std::move(triangles));
+}
+
+}  // namespace levelset::eikonal

@@ -1,0 +1,247 @@
+#include "levelset/distance/surface_points.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+
+#include "levelset/distance/closest_point.h"
+#include "levelset/distance/distance_transform.h"
+
+namespace levelset::eikonal {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using openvdb::Vec3d;
+using LeafNode = FloatTree::LeafNodeType;
+
+constexpr std::array<std::array<int, 3>, 6> kDirections = {
+    {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}}};
+
+// Linear crossings stand off the interpolant's by up to about this much.
+constexpr double kCrossingTolerance = 0.05;
+// A sharp surface stands off the linear crossings by up to about this much.
+constexpr double kSharpTolerance = 0.5;
+
+Vec3d vectorOf(const std::array<int, 3>& d) {
+  return Vec3d(d[0], d[1], d[2]);
+}
+
+/// Where linear interpolation puts the crossings on the six edges at a grid point; 2 = no crossing.
+struct Crossings {
+  std::array<double, 6> at;
+  int nearest = 0;
+
+  Crossings(const DenseBlock& block, int x, int y, int z, float background) {
+    const float here = block.at(x, y, z);
+    for (int i = 0; i < 6; ++i) {
+      const auto& d = kDirections[static_cast<std::size_t>(i)];
+      const float there = block.at(x + d[0], y + d[1], z + d[2]);
+      const bool informs = std::abs(here) < background || std::abs(there) < background;
+      const double a = here, b = there;
+      at[static_cast<std::size_t>(i)] = (here < 0) != (there < 0) && informs ? a / (a - b) : 2;
+      if (at[static_cast<std::size_t>(i)] < at[static_cast<std::size_t>(nearest)]) nearest = i;
+    }
+  }
+  [[nodiscard]] double nearestDistance() const { return at[static_cast<std::size_t>(nearest)]; }
+  [[nodiscard]] Vec3d offset(int i) const {
+    return vectorOf(kDirections[static_cast<std::size_t>(i)]) * at[static_cast<std::size_t>(i)];
+  }
+};
+
+/// The gradient's guess where it is plausible, else the nearest crossing.
+Vec3d firstGuess(const DenseBlock& block, int x, int y, int z, const Crossings& crossings) {
+  const auto difference = [&](int dx, int dy, int dz) {
+    const double ahead = block.at(x + dx, y + dy, z + dz),
+                 behind = block.at(x - dx, y - dy, z - dz);
+    return (ahead - behind) / 2;
+  };
+  const Vec3d gradient(difference(1, 0, 0), difference(0, 1, 0), difference(0, 0, 1));
+  const double squared = gradient.lengthSqr();
+  if (squared > 0) {
+    const Vec3d step = gradient * (-static_cast<double>(block.at(x, y, z)) / squared);
+    if (step.length() <= crossings.nearestDistance() + kCrossingTolerance) return step;
+  }
+  return crossings.offset(crossings.nearest);
+}
+
+/// Closest point of the zero set to a grid point beside it. Each crossing nearer than what Newton's
+/// method found is a start of its own, so both walls of a narrow gap are seen.
+Vec3d findFoot(const DenseBlock& block, int x, int y, int z, const Crossings& crossings) {
+  const Vec3d from(x, y, z);
+  Foot best = closestPoint(block, from, from + firstGuess(block, x, y, z, crossings));
+  for (int i = 0; i < 6; ++i) {
+    const double distance = crossings.at[static_cast<std::size_t>(i)];
+    if (distance > 1 || (best.converged && distance > best.distance - kCrossingTolerance)) continue;
+    const Foot other = closestPoint(block, from, from + crossings.offset(i));
+    if (other.converged && (!best.converged || other.distance < best.distance)) best = other;
+  }
+  // On creases the method may find no rest; the crossing does lie on the surface.
+  const bool plausible = best.converged && changesSignAround(block, best.point) &&
+                         best.distance <= crossings.nearestDistance() + 4 * kCrossingTolerance;
+  return plausible ? best.point : from + crossings.offset(crossings.nearest);
+}
+
+template <typename Visit>
+void forEachPointBeside(const DenseBlock& block, float background, const Visit& visit) {
+  for (int x = 0; x < 8; ++x)
+    for (int y = 0; y < 8; ++y)
+      for (int z = 0; z < 8; ++z) {
+        const bool inside = block.at(x, y, z) < 0;
+        const bool beside =
+            (block.at(x - 1, y, z) < 0) != inside || (block.at(x + 1, y, z) < 0) != inside ||
+            (block.at(x, y - 1, z) < 0) != inside || (block.at(x, y + 1, z) < 0) != inside ||
+            (block.at(x, y, z - 1) < 0) != inside || (block.at(x, y, z + 1) < 0) != inside;
+        if (!beside) continue;
+        const Crossings crossings(block, x, y, z, background);
+        if (crossings.nearestDistance() <= 1) visit(x, y, z, crossings);
+      }
+}
+
+std::vector<const LeafNode*> leavesOf(const FloatTree& tree,
+                                      const std::optional<openvdb::CoordBBox>& within) {
+  std::vector<const LeafNode*> leaves;
+  for (auto it = tree.cbeginLeaf(); it; ++it)
+    if (!within || within->hasOverlap(it->getNodeBoundingBox())) leaves.push_back(it.getLeaf());
+  return leaves;
+}
+
+/// Calls work(leaf number, dense block around it) for all, in parallel.
+template <typename Work>
+void forEachBlock(const FloatTree& tree, const std::vector<const LeafNode*>& leaves,
+                  const Work& work) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16), [&](const auto& range) {
+    const FloatGrid::ConstAccessor accessor(tree);
+    const auto block = std::make_unique<DenseBlock>();
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      block->load(accessor, leaves[i]->origin());
+      work(i, *block);
+    }
+  });
+}
+
+/// Extrapolation to a grid point that holds the bare background, from what lies behind it along
+/// each axis: the mean of what they say, beyond the background. 0 = there is nothing behind it.
+/// Quadratic where that bends the line only gently, so that smooth fields keep their order.
+float extrapolate(const DenseBlock& block, int x, int y, int z, float background) {
+  constexpr float kGentle = 0.25f;
+  const float sign = block.at(x, y, z) < 0 ? -1.0f : 1.0f;
+  float sum = 0, count = 0;
+  for (const auto& d : kDirections) {
+    const auto behind = [&](int k) {
+      return sign * block.at(x + k * d[0], y + k * d[1], z + k * d[2]);
+    };
+    const float near = behind(1), far = behind(2), farther = behind(3);
+    if (std::abs(near) == background || std::abs(far) == background || near < far) continue;
+    const float slope = near - far, bend = slope - (far - farther);
+    const bool isSmooth = std::abs(farther) != background && std::abs(bend) < kGentle * slope;
+    sum += std::max(background * 1.000001f, near + slope + (isSmooth ? bend : 0));
+    ++count;
+  }
+  return count > 0 ? sign * sum / count : 0;
+}
+
+void addLayer(FloatTree& tree) {
+  const float background = tree.background();
+  std::vector<Coord> origins;
+  for (const LeafNode* leaf : leavesOf(tree, {})) origins.push_back(leaf->origin());
+  for (const Coord& o : origins)
+    for (const auto& d : kDirections) tree.touchLeaf(o.offsetBy(8 * d[0], 8 * d[1], 8 * d[2]));
+  const std::vector<const LeafNode*> leaves = leavesOf(tree, {});
+  std::vector<std::vector<std::pair<openvdb::Index, float>>> additions(leaves.size());
+  forEachBlock(tree, leaves, [&](std::size_t i, const DenseBlock& block) {
+    for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
+      const Coord c = LeafNode::offsetToLocalCoord(n);
+      if (std::abs(block.at(c.x(), c.y(), c.z())) != background) continue;
+      const float value = extrapolate(block, c.x(), c.y(), c.z(), background);
+      if (value != 0) additions[i].emplace_back(n, value);
+    }
+  });
+  std::size_t i = 0;
+  for (auto leaf = tree.beginLeaf(); leaf; ++leaf, ++i)
+    for (const auto& [n, value] : additions[i]) leaf->setValueOnly(n, value);
+}
+
+/// Does the interpolant beside this grid point read values that were cut off at the background?
+bool isThinAt(const DenseBlock& block, int x, int y, int z, float background) {
+  const float here = std::abs(block.at(x, y, z));
+  for (const auto& d : kDirections) {
+    const float one = std::abs(block.at(x + d[0], y + d[1], z + d[2]));
+    const float two = std::abs(block.at(x + 2 * d[0], y + 2 * d[1], z + 2 * d[2]));
+    // What lies further than a straight continuation says was not cut off.
+    if (one >= background || (two >= background && 2 * one - here > 1.02f * background))
+      return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+SurfacePoints findSurfacePoints(const FloatTree& field,
+                                const std::optional<openvdb::CoordBBox>& within,
+                                const SharpPatches& patches) {
+  const std::vector<const LeafNode*> leaves = leavesOf(field, within);
+  const float background = field.background();
+  std::vector<SurfacePoints> found(leaves.size());
+  forEachBlock(field, leaves, [&](std::size_t i, const DenseBlock& block) {
+    forEachPointBeside(block, background, [&](int x, int y, int z, const Crossings& crossings) {
+      const Vec3d origin = block.origin().asVec3d();
+      const Coord gridPoint = block.origin().offsetBy(x, y, z);
+      TriangleTree::Hit hit;
+      if (patches.touches(gridPoint))
+        hit = patches.nearest(gridPoint.asVec3d(), crossings.nearestDistance() + kSharpTolerance);
+      const bool isSharp = hit.found && patches.covers(Coord::floor(hit.point));
+      if (!isSharp) hit.point = origin + findFoot(block, x, y, z, crossings);
+      const Vec3d local = hit.point - origin;
+      found[i].positions.push_back(hit.point);
+      found[i].jets.push_back(!isSharp && DenseBlock::contains(local) ? CompactJet(block.jet(local))
+                                                                      : CompactJet());
+      found[i].gridPoints.push_back(gridPoint);
+      found[i].sharp.push_back(isSharp);
+      found[i].thin = found[i].thin || isThinAt(block, x, y, z, background);
+    });
+  });
+  SurfacePoints all;
+  std::size_t count = 0;
+  for (const SurfacePoints& part : found) count += part.size();
+  all.positions.reserve(count);
+  all.gridPoints.reserve(count);
+  all.jets.reserve(count);
+  all.sharp.reserve(count);
+  for (const SurfacePoints& part : found) {
+    all.positions.insert(all.positions.end(), part.positions.begin(), part.positions.end());
+    all.gridPoints.insert(all.gridPoints.end(), part.gridPoints.begin(), part.gridPoints.end());
+    all.jets.insert(all.jets.end(), part.jets.begin(), part.jets.end());
+    all.sharp.insert(all.sharp.end(), part.sharp.begin(), part.sharp.end());
+    all.thin = all.thin || part.thin;
+  }
+  for (const Vec3d& feature : patches.features())
+    if (!within || within->isInside(Coord::floor(feature))) all.positions.push_back(feature);
+  all.jets.resize(all.positions.size());
+  all.sharp.resize(all.positions.size(), 1);
+  return all;
+}
+
+bool hasZeroCrossing(const FloatTree& field) {
+  std::atomic<bool> found = false;
+  forEachBlock(field, leavesOf(field, {}), [&](std::size_t, const DenseBlock& block) {
+    if (!found)
+      forEachPointBeside(block, field.background(),
+                         [&](int, int, int, const Crossings&) { found = true; });
+  });
+  return found;
+}
+
+FloatTree::Ptr thicken(const FloatTree& field) {
+  auto result = std::make_shared<FloatTree>(field);
+  addLayer(*result);
+  addLayer(*result);
+  return result;
+}
+
+}  // namespace levelset::eikonal

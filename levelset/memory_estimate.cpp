@@ -1,0 +1,39 @@
+#include "levelset/memory_estimate.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/error.h"
+#include "levelset/memory_limit.h"
+#include "levelset/progress.h"
+
+namespace levelset::eikonal {
+
+void requireRoom(const Room& room, std::size_t maxMemory, const char* action) {
+  // Inwards there is never more than the solid's own box.
+  const double out = room.outside + 1;
+  double reached = 1, longest = 0;
+  for (int i = 0; i < 3; ++i) {
+    double from = room.surface.min()[i] - out, to = room.surface.max()[i] + out;
+    if (from < -kIndexLimit || to > kIndexLimit)
+      throw ResourceLimit(
+          fmt::format("{}: distances up to {:.4g} voxels pass the range of 32-bit indices; use a "
+                      "smaller distance or larger voxels",
+                      action, out));
+    if (room.region) {
+      from = std::max<double>(from, room.region->min()[i]);
+      to = std::min<double>(to, room.region->max()[i]);
+    }
+    reached *= std::max(0.0, to - from + 1);
+    longest = std::max(longest, static_cast<double>(room.surface.dim()[i]));
+  }
+  // Steiner's formula for a convex body, or the whole box.
+  const double steiner = room.area * (std::min(room.inside, longest / 2) + out) +
+                         2 * M_PI * longest * out * out + 4.0 / 3 * M_PI * out * out * out;
+  const double bytes = std::min(reached, steiner) * room.bytesPerGridPoint;
+  requireMemory(bytes, memoryLimit(maxMemory), action);
+}
+
+}  // namespace levelset::eikonal

@@ -1,0 +1,138 @@
+#include "levelset/mesh_files/mesh_file.h"
+
+#include <fmt/core.h>
+
+#include <new>
+#include <optional>
+
+#include "levelset/error.h"
+#include "levelset/mesh_files/mesh_parts.h"
+
+namespace levelset {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kInfoBytes = 1 << 20;
+
+struct MeshFormat {
+  const char* extension;
+  void (*read)(std::string_view, MeshBuilder&);
+  void (*write)(ByteWriter&, const TriMesh&, const Progress&);
+  bool attributes;
+};
+
+constexpr MeshFormat kFormats[] = {{"ply", readPly, writePly, true},
+                                   {"obj", readObj, writeObj, true},
+                                   {"stl", readStl, writeStl, false},
+                                   {"off", readOff, writeOff, false}};
+
+struct FormatChoice {
+  const MeshFormat* format;
+  bool compressed;
+};
+
+std::optional<FormatChoice> findFormat(const fs::path& nameOrFormat) {
+  std::string text = nameOrFormat.filename().string();
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c | 0x20);
+  const bool compressed = text.ends_with(".gz");
+  if (compressed) text.resize(text.size() - 3);
+  const std::string extension = text.substr(text.rfind('.') + 1);  // all of it without a point
+  for (const MeshFormat& format : kFormats)
+    if (extension == format.extension) return FormatChoice{&format, compressed};
+  return std::nullopt;
+}
+
+FormatChoice meshFormat(const fs::path& path, const std::string& given, const char* action) {
+  if (!given.empty()) {
+    if (const auto choice = findFormat(given)) return *choice;
+    throw UsageError(
+        fmt::format("{}: the mesh format '{}' is not known; use ply, obj, stl or off, "
+                    "with .gz behind it if compressed",
+                    action, given));
+  }
+  if (const auto choice = findFormat(path)) return *choice;
+  if (path == "-") {
+    throw UsageError(fmt::format(
+        "{}: standard {} has no name that tells its format; give --format ply, obj, stl or off",
+        action, action[0] == 'r' ? "input" : "output"));
+  }
+  throw UsageError(
+      fmt::format("{}: the name '{}' tells no mesh format; end it in .ply, .obj, .stl or "
+                  ".off, or give --format",
+                  action, path.string()));
+}
+
+}  // namespace
+
+TriMesh readMesh(const fs::path& path, const ReadMeshOptions& options) {
+  const FormatChoice choice = meshFormat(path, options.format, "read");
+  report(options.progress, 0, "read");
+  try {
+    const Bytes bytes = readBytes(path, options.maxMemory);
+    MeshBuilder builder(inputName(path), options, bytes.view());
+    choice.format->read(bytes.view(), builder);
+    TriMesh mesh = builder.finish();
+    if (builder.droppedAttributes())
+      if (auto closed = withoutSeams(mesh, "read", options.maxMemory)) mesh = std::move(*closed);
+    if (mesh.isEmpty())
+      failFile(
+          inputName(path),
+          "holds triangles without area only, of which none is left when its seams are closed; "
+          "export the mesh again");
+    report(options.progress, 1, "read");
+    return mesh;
+  } catch (const std::bad_alloc&) {
+    throw ResourceLimit(fmt::format(
+        "read: {} does not fit into memory; use a smaller mesh or free memory", inputName(path)));
+  }
+}
+
+void writeMesh(const fs::path& path, const TriMesh& mesh, const WriteMeshOptions& options) {
+  const FormatChoice choice = meshFormat(path, options.format, "write");
+  requireAttributes(mesh, "write");
+  report(options.progress, 0, "write");
+  // Without the attributes that they are for, seams would be slits.
+  std::optional<TriMesh> closed;
+  if (!choice.format->attributes && !mesh.attributes.isEmpty())
+    closed = withoutSeams(mesh, "write", options.maxMemory);
+  ByteWriter out(path, choice.compressed);
+  choice.format->write(out, closed ? *closed : mesh, options.progress);
+  out.commit();
+  report(options.progress, 1, "write");
+}
+
+bool holdsAttributes(const fs::path& nameOrFormat) {
+  const auto choice = findFormat(nameOrFormat);
+  return choice && choice->format->attributes;
+}
+
+bool isMeshFormat(const fs::path& nameOrFormat) {
+  return findFormat(nameOrFormat).has_value();
+}
+
+MeshFileInfo meshFileInfo(const fs::path& path, const std::string& format) {
+  const FormatChoice choice = meshFormat(path, format, "info");
+  const std::string name = inputName(path);
+  const FirstBytes first = readFirstBytes(path, kInfoBytes);
+  const std::string_view head = first.bytes.view();
+  if (head.empty()) failFile(name, "is empty; fetch or make the file again");
+  MeshFileInfo info;
+  if (choice.format->read == readPly) {
+    info = plyInfo(head, first.whole, name);
+    const bool isMesh = info.vertices > 0 && info.faces > 0, isKnown = first.whole > 0;
+    if (isMesh && isKnown && path != "-" && !plyHoldsTriangles(head, first.whole, name))
+      (void)readMesh(path, {.format = format});  // which tells where it ends
+  } else if (choice.format->read == readStl) {
+    info = stlInfo(head, first.whole, name);
+  } else if (choice.format->read == readOff) {
+    info = offInfo(head, first.whole, name);
+  } else {
+    info.format = choice.format->extension;
+  }
+  if (choice.compressed) info.format += ", compressed";
+  return info;
+}
+
+}  // namespace levelset

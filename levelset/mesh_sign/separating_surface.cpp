@@ -1,0 +1,357 @@
+#include "levelset/mesh_sign/separating_surface.h"
+
+#include <Imath/ImathBox.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <span>
+
+#include "levelset/geometry/disjoint_sets.h"
+#include "levelset/geometry/exact_predicates.h"
+#include "levelset/mesh_sign/near_surface.h"
+#include "levelset/mesh_sign/winding.h"
+#include "levelset/progress_gate.h"
+
+namespace levelset::convert {
+namespace {
+
+using Imath::V3d;
+using Polygon = std::vector<V3d>;
+/// Polygons that are kept, or not, as a whole.
+using Sheet = std::vector<Polygon>;
+
+constexpr const char* kAction = "level-set";
+/// With more points to judge than this, the winding number is summed over a tree.
+constexpr std::size_t kFewPoints = 16;
+/// Of a polygon's size: corners nearer to a plane count as on it.
+constexpr double kOnPlane = 1e-12;
+/// Voxels: folds no deeper than this stay as they are. No grid shows what they hide, and distances
+/// stay those to the mesh as it was given.
+constexpr double kShallow = 0.25;
+
+/// The directed edges of triangles, to find those that share one with a single neighbour.
+struct HalfEdge {
+  std::uint32_t low, high, triangle;
+  bool rising;
+  bool operator<(const HalfEdge& other) const {
+    if (low != other.low) return low < other.low;
+    if (high != other.high) return high < other.high;
+    return triangle < other.triangle;
+  }
+};
+
+V3d areaVector(std::span<const V3d> polygon) {
+  V3d sum(0);
+  for (std::size_t i = 2; i < polygon.size(); ++i)
+    sum += (polygon[i - 1] - polygon[0]).cross(polygon[i] - polygon[0]);
+  return sum / 2;
+}
+
+V3d centroid(std::span<const V3d> polygon) {
+  V3d sum(0);
+  for (const V3d& p : polygon) sum += p;
+  return sum / static_cast<double>(polygon.size());
+}
+
+/// Cuts a convex polygon by the plane through `point`; a part without corners off the plane is left
+/// out.
+void cut(const Polygon& polygon, const V3d& point, const V3d& normal, std::vector<Polygon>& out) {
+  double size = 0;
+  for (const V3d& p : polygon) size = std::max(size, (p - polygon[0]).length());
+  const double margin = kOnPlane * size * normal.length();
+  std::vector<double> height;
+  bool above = false, below = false;
+  for (const V3d& p : polygon) {
+    const double h = normal.dot(p - point);
+    height.push_back(std::abs(h) <= margin ? 0 : h);
+    above = above || height.back() > 0;
+    below = below || height.back() < 0;
+  }
+  if (!above || !below) {
+    out.push_back(polygon);
+    return;
+  }
+  for (const double side : {1.0, -1.0}) {
+    Polygon part;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const std::size_t next = (i + 1) % polygon.size();
+      const double from = side * height[i], to = side * height[next];
+      if (from >= 0) part.push_back(polygon[i]);
+      if (from * to < 0)
+        part.push_back(polygon[i] + (polygon[next] - polygon[i]) * (from / (from - to)));
+    }
+    out.push_back(std::move(part));
+  }
+}
+
+class SeparatingSurface {
+ public:
+  SeparatingSurface(const LocalMesh& mesh, std::span<const TrianglePair> pairs, double flip,
+                    const Progress& progress)
+      : mesh_(mesh),
+        pairs_(pairs),
+        flip_(flip),
+        progress_(progress),
+        groups_(mesh.triangles.size()) {}
+
+  LocalMesh find() {
+    findPartners();
+    findPatches();
+    report(progress_, 0.3, kAction);
+    std::vector<std::uint32_t> patches;  // by their largest triangle
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+      if (largest_[t] != kNone) patches.push_back(t);
+    if (pairs_.empty() && patches.size() <= 1) return mesh_;
+    if (!pairs_.empty() || patches.size() > kFewPoints) buildField();
+    report(progress_, 0.6, kAction);
+    std::vector<char> kept(mesh_.triangles.size(), 0);  // by patch
+    tbb::parallel_for(std::size_t{0}, patches.size(), [&](std::size_t i) {
+      const std::uint32_t t = largest_[patches[i]];
+      kept[patches[i]] = separates(t, corners(t));
+    });
+    LocalMesh result{mesh_.points, {}};
+    std::map<std::uint32_t, Sheet> dropped;  // by patch
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+      if (isCrossed(t)) continue;
+      const std::uint32_t patch = groups_.find(t);
+      if (kept[patch]) {
+        result.triangles.push_back(mesh_.triangles[t]);
+      } else {
+        const auto c = corners(t);
+        dropped[patch].emplace_back(c.begin(), c.end());
+      }
+    }
+    std::vector<Sheet> sheets;
+    for (auto& [patch, sheet] : dropped) sheets.push_back(std::move(sheet));
+    addPieces(result, sheets);
+    addShallow(sheets, result);
+    return result;
+  }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  [[nodiscard]] std::array<V3d, 3> corners(std::uint32_t t) const {
+    return {mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)};
+  }
+  [[nodiscard]] bool isCrossed(std::uint32_t t) const { return first_[t] != first_[t + 1]; }
+  [[nodiscard]] std::span<const std::uint32_t> partners(std::uint32_t t) const {
+    return {partners_.data() + first_[t], partners_.data() + first_[t + 1]};
+  }
+
+  void findPartners() {
+    first_.assign(mesh_.triangles.size() + 1, 0);
+    for (const auto& [i, j] : pairs_) ++first_[i + 1], ++first_[j + 1];
+    std::partial_sum(first_.begin(), first_.end(), first_.begin());
+    partners_.resize(2 * pairs_.size());
+    std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
+    for (const auto& [i, j] : pairs_) partners_[next[i]++] = j, partners_[next[j]++] = i;
+  }
+
+  /// Triangles that no other crosses, joined over edges that two of them share: the winding numbers
+  /// of both sides are the same all over such a patch.
+  void findPatches() {
+    std::vector<HalfEdge> edges;
+    edges.reserve(3 * mesh_.triangles.size());
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t from = mesh_.triangles[t][k], to = mesh_.triangles[t][(k + 1) % 3];
+        edges.push_back({std::min(from, to), std::max(from, to), t, from < to});
+      }
+    std::sort(edges.begin(), edges.end());
+    for (std::size_t i = 0; i < edges.size();) {
+      std::size_t end = i + 1;
+      while (end < edges.size() && edges[end].low == edges[i].low &&
+             edges[end].high == edges[i].high)
+        ++end;
+      if (end - i == 2 && edges[i].rising != edges[i + 1].rising && !isCrossed(edges[i].triangle) &&
+          !isCrossed(edges[i + 1].triangle))
+        groups_.join(edges[i].triangle, edges[i + 1].triangle);
+      i = end;
+    }
+    largest_.assign(mesh_.triangles.size(), kNone);
+    std::vector<double> area(mesh_.triangles.size(), -1);
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+      if (isCrossed(t)) continue;
+      const std::uint32_t patch = groups_.find(t);
+      const double own = areaVector(corners(t)).length();
+      if (own > area[patch]) area[patch] = own, largest_[patch] = t;
+    }
+  }
+
+  void buildField() {
+    std::vector<WeightedTriangle> all;
+    all.reserve(mesh_.triangles.size());
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) all.push_back({corners(t), 1});
+    field_ = WindingField(std::move(all));
+  }
+
+  /// Without the triangles in whose plane the point lies, which have no winding number there.
+  [[nodiscard]] double windingAt(const V3d& point, std::span<const std::uint32_t> without) const {
+    double w = 0;
+    if (field_.isEmpty()) {
+      for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) w += turnsOf(t, point);
+    } else {
+      w = field_.within(0.05, point);
+    }
+    for (const std::uint32_t t : without) w -= turnsOf(t, point);
+    return w;
+  }
+  [[nodiscard]] double turnsOf(std::uint32_t t, const V3d& point) const {
+    return solidAngle(mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2), point);
+  }
+
+  [[nodiscard]] bool isCoplanar(std::uint32_t s, std::uint32_t t) const {
+    for (std::size_t k = 0; k < 3; ++k)
+      if (orient3d(mesh_.corner(s, 0), mesh_.corner(s, 1), mesh_.corner(s, 2), mesh_.corner(t, k)))
+        return false;
+    return true;
+  }
+
+  /// The point, of the triangle's plane, lies in it.
+  [[nodiscard]] bool covers(std::uint32_t t, const V3d& point) const {
+    const std::array<V3d, 3> c = corners(t);
+    const V3d normal = areaVector(c);
+    for (std::size_t k = 0; k < 3; ++k)
+      if (normal.dot((c[(k + 1) % 3] - c[k]).cross(point - c[k])) < 0) return false;
+    return true;
+  }
+
+  /// A polygon of triangle t that nothing crosses has the solid on one side only.
+  [[nodiscard]] bool separates(std::uint32_t t, std::span<const V3d> polygon) const {
+    const V3d point = centroid(polygon), normal = areaVector(corners(t));
+    std::vector<std::uint32_t> inPlane = {t};
+    double jump = 1;  // of the winding number, from the front to the back
+    for (const std::uint32_t other : partners(t)) {
+      if (!isCoplanar(t, other)) continue;
+      inPlane.push_back(other);
+      if (covers(other, point)) jump += normal.dot(areaVector(corners(other))) > 0 ? 1 : -1;
+    }
+    const double middle = windingAt(point, inPlane);
+    const double back = flip_ * (middle + jump / 2), front = flip_ * (middle - jump / 2);
+    return (back > 0.5) != (front > 0.5);
+  }
+
+  /// The triangle cut along all that cross it, a part only by those near it.
+  [[nodiscard]] std::vector<Polygon> pieces(std::uint32_t t) const {
+    const std::array<V3d, 3> own = corners(t);
+    std::vector<Polygon> parts = {Polygon(own.begin(), own.end())};
+    for (const std::uint32_t other : partners(t)) {
+      const std::array<V3d, 3> c = corners(other);
+      const V3d normal = areaVector(c);
+      if (!isCoplanar(other, t)) {
+        parts = cutAll(parts, c, c[0], normal);
+        continue;
+      }
+      for (std::size_t k = 0; k < 3; ++k)
+        parts = cutAll(parts, c, c[k], (c[(k + 1) % 3] - c[k]).cross(normal));
+    }
+    return parts;
+  }
+
+  [[nodiscard]] static std::vector<Polygon> cutAll(const std::vector<Polygon>& parts,
+                                                   const std::array<V3d, 3>& by, const V3d& point,
+                                                   const V3d& normal) {
+    Imath::Box3d reach;
+    for (const V3d& p : by) reach.extendBy(p);
+    std::vector<Polygon> result;
+    for (const Polygon& part : parts) {
+      Imath::Box3d box;
+      for (const V3d& p : part) box.extendBy(p);
+      if (box.intersects(reach))
+        cut(part, point, normal, result);
+      else
+        result.push_back(part);
+    }
+    return result;
+  }
+
+  static void add(const Polygon& polygon, LocalMesh& result) {
+    const auto first = static_cast<std::uint32_t>(result.points.size());
+    result.points.insert(result.points.end(), polygon.begin(), polygon.end());
+    for (std::uint32_t k = 2; k < polygon.size(); ++k)
+      result.triangles.push_back({first, first + k - 1, first + k});
+  }
+
+  /// What separates goes to the result, the rest to the sheets.
+  void addPieces(LocalMesh& result, std::vector<Sheet>& sheets) const {
+    std::vector<std::uint32_t> crossed;
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+      if (isCrossed(t)) crossed.push_back(t);
+    struct Found {
+      std::vector<Polygon> kept, dropped;
+    };
+    std::vector<Found> found(crossed.size());
+    const Progress last = subProgress(progress_, 0.6, 1);
+    ProgressGate gate(last, crossed.size(), kAction);
+    tbb::parallel_for(std::size_t{0}, crossed.size(), [&](std::size_t i) {
+      for (Polygon& piece : pieces(crossed[i]))
+        (separates(crossed[i], piece) ? found[i].kept : found[i].dropped)
+            .push_back(std::move(piece));
+      gate.advance(1);
+    });
+    for (Found& list : found) {
+      for (const Polygon& piece : list.kept) add(piece, result);
+      for (Polygon& piece : list.dropped) sheets.push_back({std::move(piece)});
+    }
+  }
+
+  /// Gives back the sheets that lie within kShallow of the result all over.
+  static void addShallow(const std::vector<Sheet>& sheets, LocalMesh& result) {
+    // One point of each tells the deep ones.
+    std::vector<V3d> points;
+    for (const Sheet& sheet : sheets) {
+      const auto largest =
+          std::max_element(sheet.begin(), sheet.end(), [](const Polygon& a, const Polygon& b) {
+            return areaVector(a).length2() < areaVector(b).length2();
+          });
+      points.push_back(centroid(*largest));
+    }
+    const std::vector<char> isNear = areNear(result, points, kShallow);
+    points.clear();
+    std::vector<std::size_t> candidates, ends;
+    for (std::size_t i = 0; i < sheets.size(); ++i) {
+      if (!isNear[i]) continue;
+      for (const Polygon& polygon : sheets[i]) addSamples(polygon, points);
+      candidates.push_back(i);
+      ends.push_back(points.size());
+    }
+    const std::vector<char> areSamplesNear = areNear(result, points, kShallow);
+    for (std::size_t k = 0, from = 0; k < candidates.size(); from = ends[k++]) {
+      const auto first = areSamplesNear.begin();
+      if (std::all_of(first + static_cast<std::ptrdiff_t>(from),
+                      first + static_cast<std::ptrdiff_t>(ends[k]), [](char near) { return near; }))
+        for (const Polygon& polygon : sheets[candidates[k]]) add(polygon, result);
+    }
+  }
+
+  static void addSamples(const Polygon& polygon, std::vector<V3d>& points) {
+    points.push_back(centroid(polygon));
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      points.push_back(polygon[i]);
+      points.push_back((polygon[i] + polygon[(i + 1) % polygon.size()]) / 2);
+    }
+  }
+
+  const LocalMesh& mesh_;
+  std::span<const TrianglePair> pairs_;
+  double flip_;
+  const Progress& progress_;
+  std::vector<std::size_t> first_;       // of each triangle's partners
+  std::vector<std::uint32_t> partners_;  // triangles that meet it
+  DisjointSets groups_;
+  std::vector<std::uint32_t> largest_;  // triangle of each patch, by the patch's lowest
+  WindingField field_;
+};
+
+}  // namespace
+
+LocalMesh separatingSurface(const LocalMesh& mesh, std::span<const TrianglePair> pairs, double flip,
+                            const Progress& progress) {
+  return SeparatingSurface(mesh, pairs, flip, progress).find();
+}
+
+}  // namespace levelset::convert

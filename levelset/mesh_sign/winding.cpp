@@ -1,0 +1,183 @@
+#include "levelset/mesh_sign/winding.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "levelset/mesh_sign/mesh_queries.h"
+
+namespace levelset {
+
+double windingNumber(const TriMesh& mesh, const Imath::V3d& point) {
+  double sum = 0;
+  for (const auto& t : mesh.triangles)
+    sum += convert::solidAngle(mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]],
+                               point);
+  return sum;
+}
+
+namespace convert {
+namespace {
+
+using Imath::V3d;
+
+constexpr std::size_t kLeafSize = 8;
+constexpr double kQuarterPi = 0.25 / std::numbers::pi;  // 1 / 4π
+
+V3d areaVector(const WeightedTriangle& t) {
+  return (t.corners[1] - t.corners[0]).cross(t.corners[2] - t.corners[0]) * (t.weight / 2);
+}
+
+V3d centroid(const WeightedTriangle& t) {
+  return (t.corners[0] + t.corners[1] + t.corners[2]) / 3;
+}
+
+/// The triangle's area over the smallest squared distance that any point of the ball may have.
+double boundOf(const WeightedTriangle& t, const V3d& centre, double radius) {
+  const V3d middle = centroid(t);
+  double reach = 0;
+  for (const V3d& p : t.corners) reach = std::max(reach, (p - middle).length());
+  const double gap = (middle - centre).length() - reach - radius;
+  if (gap <= 0) return std::numeric_limits<double>::infinity();
+  return kQuarterPi * areaVector(t).length() / (gap * gap);
+}
+
+double turns(const WeightedTriangle& t, const V3d& point) {
+  return t.weight * solidAngle(t.corners[0], t.corners[1], t.corners[2], point);
+}
+
+}  // namespace
+
+double solidAngle(const V3d& a, const V3d& b, const V3d& c, const V3d& point) {
+  const V3d u = a - point, v = b - point, w = c - point;
+  const double lu = u.length(), lv = v.length(), lw = w.length();
+  const double numerator = u.dot(v.cross(w));
+  const double denominator = lu * lv * lw + u.dot(v) * lw + v.dot(w) * lu + w.dot(u) * lv;
+  if (numerator == 0 && denominator <= 0) return 0;  // on the triangle: between its two sides
+  return std::atan2(numerator, denominator) * 2 * kQuarterPi;
+}
+
+WindingField::WindingField(std::vector<WeightedTriangle> triangles)
+    : triangles_(std::move(triangles)) {
+  if (!triangles_.empty()) build(0, triangles_.size());
+}
+
+WindingField::Node WindingField::summarise(std::size_t begin, std::size_t end) const {
+  Node node;
+  node.begin = begin, node.end = end;
+  V3d plain(0), weighted(0);
+  for (std::size_t i = begin; i < end; ++i) {
+    const double area = areaVector(triangles_[i]).length();
+    node.area += area;
+    weighted += centroid(triangles_[i]) * area;
+    plain += centroid(triangles_[i]);
+  }
+  node.centre = node.area > 0 ? weighted / node.area : plain / static_cast<double>(end - begin);
+  node.dipole = V3d(0);
+  node.moment = {V3d(0), V3d(0), V3d(0)};
+  for (std::size_t i = begin; i < end; ++i) {
+    const V3d normal = areaVector(triangles_[i]), arm = centroid(triangles_[i]) - node.centre;
+    node.dipole += normal;
+    for (unsigned k = 0; k < 3; ++k) node.moment[k] += normal * arm[static_cast<int>(k)];
+    double reach = 0;
+    for (const V3d& p : triangles_[i].corners) reach = std::max(reach, (p - node.centre).length2());
+    node.spread += normal.length() * reach;
+    node.radius = std::max(node.radius, std::sqrt(reach));
+  }
+  return node;
+}
+
+void WindingField::build(std::size_t begin, std::size_t end) {
+  const std::size_t self = nodes_.size();
+  nodes_.push_back(summarise(begin, end));
+  if (end - begin <= kLeafSize) return;
+  V3d low = centroid(triangles_[begin]), high = low;
+  for (std::size_t i = begin; i < end; ++i)
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], centroid(triangles_[i])[axis]);
+      high[axis] = std::max(high[axis], centroid(triangles_[i])[axis]);
+    }
+  const V3d size = high - low;
+  const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
+  const auto at = [&](std::size_t i) {
+    return triangles_.begin() + static_cast<std::ptrdiff_t>(i);
+  };
+  const std::size_t middle = begin + (end - begin) / 2;
+  std::nth_element(at(begin), at(middle), at(end), [axis](const auto& s, const auto& t) {
+    return centroid(s)[axis] < centroid(t)[axis];
+  });
+  build(begin, middle);
+  nodes_[self].right = nodes_.size();
+  build(middle, end);
+}
+
+/// First-order expansion of ∫ n · (y − x) / |y − x|³ about the node's centre.
+double WindingField::far(const Node& node, const V3d& point) const {
+  const V3d r = node.centre - point;
+  const double inverse2 = 1 / r.length2(), inverse3 = inverse2 * std::sqrt(inverse2);
+  double sum = r.dot(node.dipole);
+  for (unsigned k = 0; k < 3; ++k) {
+    const int axis = static_cast<int>(k);
+    sum += node.moment[k][axis] - 3 * inverse2 * r[axis] * r.dot(node.moment[k]);
+  }
+  return kQuarterPi * inverse3 * sum;
+}
+
+double WindingField::exact(const V3d& point) const {
+  double sum = 0;
+  for (const WeightedTriangle& t : triangles_) sum += turns(t, point);
+  return sum;
+}
+
+double WindingField::within(double tolerance, const V3d& point) const {
+  if (nodes_.empty() || nodes_[0].area <= 0) return 0;
+  const double perArea = tolerance / nodes_[0].area;
+  double sum = 0;
+  std::array<std::size_t, 128> stack;
+  std::size_t top = 0;
+  stack[top++] = 0;
+  while (top > 0) {
+    const std::size_t index = stack[--top];
+    const Node& node = nodes_[index];
+    const double gap = (node.centre - point).length() - node.radius;
+    // Second derivatives of r / |r|³ are at most 6 / |r|⁴; the nodes' errors share the tolerance by
+    // their areas.
+    const double error = 3 * kQuarterPi * node.spread;
+    if (gap > 0 && error <= perArea * node.area * (gap * gap) * (gap * gap)) {
+      sum += far(node, point);
+    } else if (node.right == 0) {
+      for (std::size_t i = node.begin; i < node.end; ++i) sum += turns(triangles_[i], point);
+    } else {
+      stack[top++] = node.right;
+      stack[top++] = index + 1;
+    }
+  }
+  return sum;
+}
+
+double WindingField::bound(const V3d& centre, double radius) const {
+  if (nodes_.empty()) return 0;
+  double sum = 0;
+  std::array<std::size_t, 128> stack;
+  std::size_t top = 0;
+  stack[top++] = 0;
+  while (top > 0) {
+    const std::size_t index = stack[--top];
+    const Node& node = nodes_[index];
+    const double gap = (node.centre - centre).length() - node.radius - radius;
+    if (gap > node.radius + radius) {
+      sum += kQuarterPi * node.area / (gap * gap);
+    } else if (node.right == 0) {
+      for (std::size_t i = node.begin; i < node.end; ++i)
+        sum += boundOf(triangles_[i], centre, radius);
+    } else {
+      stack[top++] = node.right;
+      stack[top++] = index + 1;
+    }
+  }
+  return sum;
+}
+
+}  // namespace convert
+}  // namespace levelset

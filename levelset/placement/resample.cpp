@@ -1,0 +1,357 @@
+#include "levelset/placement/resample.h"
+
+#include <fmt/core.h>
+#include <openvdb/tools/Prune.h>
+#include <openvdb/tree/LeafManager.h>
+#include <openvdb/tree/NodeManager.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "levelset/distance/redistance.h"
+#include "levelset/distance/surface_points.h"
+#include "levelset/error.h"
+#include "levelset/grids/crease_limiter.h"
+#include "levelset/grids/grid_queries_vdb.h"
+#include "levelset/grids/interpolate_vdb.h"
+#include "levelset/placement/resample_vdb.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using openvdb::Vec3d;
+using Leaf = FloatTree::LeafNodeType;
+
+const double kCubeDiagonal = std::sqrt(3.0);
+/// Furthest of the 64 samples from a position, voxels.
+const double kTricubicReach = 2 * kCubeDiagonal;
+/// Voxels from the surface to which re-distancing reads: two grid points beside it, and their
+/// samples.
+constexpr double kReadReach = 3.5;
+/// Layers added to each side of a band by thickening it twice.
+constexpr double kThickened = 4;
+
+/// Target index to source index, and what a source value is worth in the target's world.
+struct Placement {
+  Imath::M44d targetToSource, sourceToTarget;
+  double scale;        ///< least stretch: the scaled value is no more than the distance
+  double targetVoxel;  ///< world
+  double sourceVoxel;  ///< world, smallest
+
+  [[nodiscard]] Vec3d toSource(const Vec3d& target) const { return map(targetToSource, target); }
+  [[nodiscard]] Vec3d toTarget(const Vec3d& source) const { return map(sourceToTarget, source); }
+
+ private:
+  static Vec3d map(const Imath::M44d& matrix, const Vec3d& p) {
+    Imath::V3d result;
+    matrix.multVecMatrix(toImath(p), result);
+    return toVdb(result);
+  }
+};
+
+class ResampleKernel {
+ public:
+  ResampleKernel(const FloatGrid& source, FloatGrid& target, const Placement& placement)
+      : source_(source),
+        target_(target),
+        place_(placement),
+        kink_(static_cast<float>(kKinkBend * placement.sourceVoxel / placement.scale)) {}
+
+  /// Makes the target's leaves that can hold voxels of the source's band.
+  void addLeaves(const char* action) {
+    std::vector<const Leaf*> leaves;
+    source_.tree().getNodes(leaves);
+    std::vector<std::vector<Coord>> found(leaves.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16),
+                      [&](const auto& range) {
+                        const auto accessor = source_.getConstAccessor();
+                        for (std::size_t i = range.begin(); i != range.end(); ++i)
+                          found[i] = blocksNear(*leaves[i], accessor, action);
+                      });
+    std::size_t count = 0;
+    for (const auto& part : found) count += part.size();
+    std::vector<Coord> origins;
+    origins.reserve(count);
+    for (const auto& part : found) origins.insert(origins.end(), part.begin(), part.end());
+    std::sort(origins.begin(), origins.end());
+    origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
+    for (const Coord& origin : origins) target_.tree().touchLeaf(origin);
+  }
+
+  void fillLeaves() {
+    openvdb::tree::LeafManager<FloatTree> leaves(target_.tree());
+    leaves.foreach ([this](Leaf& leaf, std::size_t) {
+      const auto accessor = source_.getConstAccessor();
+      for (openvdb::Index n = 0; n < Leaf::SIZE; ++n)
+        fillVoxel(leaf, n, place_.toSource(leaf.offsetToGlobalCoord(n).asVec3d()), accessor);
+    });
+  }
+
+  /// No tile meets the surface: its centre has the sign of all of it.
+  void fillTiles() {
+    openvdb::tree::NodeManager<FloatTree, FloatTree::RootNodeType::LEVEL - 1> nodes(target_.tree());
+    nodes.foreachTopDown([this](auto& node, std::size_t = 0) { fillTilesOf(node); });
+  }
+
+ private:
+  using Accessor = FloatGrid::ConstAccessor;
+
+  [[nodiscard]] std::vector<Coord> blocksNear(const Leaf& leaf, const Accessor& accessor,
+                                              const char* action) const {
+    Vec3d low(std::numeric_limits<double>::max()), high(-std::numeric_limits<double>::max());
+    const openvdb::CoordBBox box = leaf.getNodeBoundingBox();
+    for (int i = 0; i < 8; ++i) {
+      // A voxel around the leaf: cells reach over its faces.
+      const Vec3d corner((i & 4) ? box.max()[0] + 1 : box.min()[0] - 1,
+                         (i & 2) ? box.max()[1] + 1 : box.min()[1] - 1,
+                         (i & 1) ? box.max()[2] + 1 : box.min()[2] - 1);
+      const Vec3d p = place_.toTarget(corner);
+      low = openvdb::math::minComponent(low, p);
+      high = openvdb::math::maxComponent(high, p);
+    }
+    Coord first, last;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(std::max(std::abs(low[axis]), std::abs(high[axis])) < kIndexLimit)) {
+        throw ResourceLimit(fmt::format(
+            "{}: the result reaches grid index {:.3g}, beyond 32 bits; use larger voxels", action,
+            std::max(std::abs(low[axis]), std::abs(high[axis]))));
+      }
+      first[axis] = static_cast<int>(std::floor(low[axis])) & ~7;
+      last[axis] = static_cast<int>(std::ceil(high[axis])) & ~7;
+    }
+    std::vector<Coord> result;
+    for (int x = first[0]; x <= last[0]; x += 8)
+      for (int y = first[1]; y <= last[1]; y += 8)
+        for (int z = first[2]; z <= last[2]; z += 8)
+          if (isNearBand(Coord(x, y, z), accessor)) result.emplace_back(x, y, z);
+    return result;
+  }
+
+  /// By the Lipschitz bound from the block's centre: can a voxel of it be in the target's band?
+  [[nodiscard]] bool isNearBand(const Coord& origin, const Accessor& accessor) const {
+    const Vec3d p = place_.toSource(origin.asVec3d() + Vec3d(3.5));
+    const Coord cell = Coord::round(p);
+    // A source voxel's world distance from the block's centre changes the value by no more.
+    const double offset = (p - cell.asVec3d()).length() * place_.sourceVoxel;
+    const double here = std::abs(static_cast<double>(accessor.getValue(cell))) * place_.scale;
+    const double halfDiagonal = 3.5 * kCubeDiagonal * place_.targetVoxel;
+    return here - offset - halfDiagonal < static_cast<double>(target_.background());
+  }
+
+  void fillVoxel(Leaf& leaf, openvdb::Index n, const Vec3d& p, const Accessor& accessor) const {
+    const float background = target_.background();
+    const auto take = [&](double sample) {
+      const auto value = static_cast<float>(sample * place_.scale);
+      if (std::abs(value) < background)
+        leaf.setValueOn(n, value);
+      else
+        leaf.setValueOff(n, std::copysign(background, value));
+    };
+    // By the nearest sample alone, most of a leaf is out of the band.
+    const Coord nearest = Coord::round(p);
+    const double offset = (p - nearest.asVec3d()).length() * place_.sourceVoxel;
+    const float sample = accessor.getValue(nearest);
+    if (std::abs(static_cast<double>(sample)) * place_.scale >
+        1.1 * (static_cast<double>(background) + offset)) {
+      leaf.setValueOff(n, std::copysign(background, sample));
+      return;
+    }
+    const SampleBlock<2> cell(accessor, p);
+    if (cell.touches(source_.background())) {
+      leaf.setValueOff(n, signAt(p, accessor));
+      return;
+    }
+    SampleBlock<4> block(accessor, p);
+    if (block.touches(source_.background())) {
+      take(cell.value());
+      return;
+    }
+    leaveOutKinks(block.values, kink_);
+    take(block.value());
+  }
+
+  /// ± background, by the nearest sample: the position is at the rim of the band or beyond.
+  [[nodiscard]] float signAt(const Vec3d& p, const Accessor& accessor) const {
+    return std::copysign(target_.background(), accessor.getValue(Coord::round(p)));
+  }
+
+  void fillTilesOf(FloatTree::RootNodeType& root) const {
+    for (auto it = root.beginValueAll(); it; ++it) it.setValue(signAtCenter(it.getCoord(), 4096));
+  }
+  template <typename Node>
+  void fillTilesOf(Node& node) const {
+    const auto accessor = source_.getConstAccessor();
+    for (auto it = node.beginValueAll(); it; ++it) {
+      const double half = 0.5 * (Node::ChildNodeType::DIM - 1);
+      it.setValue(signAt(place_.toSource(it.getCoord().asVec3d() + Vec3d(half)), accessor));
+    }
+  }
+  [[nodiscard]] float signAtCenter(const Coord& origin, int edge) const {
+    return signAt(place_.toSource(origin.asVec3d() + Vec3d(0.5 * (edge - 1))),
+                  source_.getConstAccessor());
+  }
+
+  const FloatGrid& source_;
+  FloatGrid& target_;
+  const Placement& place_;
+  float kink_;
+};
+
+Placement placementOf(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
+                      const Imath::M44d& targetToWorld) {
+  Placement place;
+  place.targetToSource = targetToWorld * sourceToWorld.inverse();
+  place.sourceToTarget = sourceToWorld * targetToWorld.inverse();
+  const Stretch source = stretchOf(sourceToWorld);
+  place.scale = source.least / solid.voxelSize();
+  place.sourceVoxel = source.least;
+  place.targetVoxel = stretchOf(targetToWorld).least;
+  return place;
+}
+
+/// The source with values as far out as sampling and re-distancing read. Extrapolated ones are only
+/// support: the distances out there are made anew. They are inactive and not ± background.
+FloatGrid::Ptr supported(const NarrowBand& solid, const Placement& place, std::size_t maxMemory,
+                         const Progress& progress) {
+  const double needed = sampledWidth(place.targetVoxel / place.sourceVoxel);
+  NarrowBand wide = solid;
+  if (solid.halfWidth() + kThickened < needed || solid.halfWidth() < 2)
+    wide = redistance(solid, {.halfWidth = std::max(needed - kThickened, 3.0),
+                              .maxMemory = maxMemory,
+                              .progress = progress});
+  const FloatGrid& grid = vdb(wide);
+  return FloatGrid::create(eikonal::thicken(*eikonal::thicken(grid.tree())));
+}
+
+/// Before any block is looked at.
+/// @param refinement  target voxels along a source voxel
+void requireRoom(const NarrowBand& solid, double refinement, double halfWidth,
+                 std::size_t maxMemory, const char* action) {
+  // Source voxels beside the surface, then the leaves of the target, as they are twice: sampled and
+  // made distances again.
+  const double surface = static_cast<double>(solid.activeVoxelCount()) / (2 * solid.halfWidth());
+  const double leaves = surface * refinement * refinement / 64 * (2 * halfWidth + 15) / 8;
+  requireMemory(leaves * 2 * 2300, maxMemory, action);
+}
+
+/// The target's voxels must be smaller than the solid, before anything is widened for their sake.
+void requireSmallerVoxels(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
+                          const Placement& place, const char* action) {
+  const Imath::V3d size = solid.zeroSetBounds().size();
+  const double longest =
+      std::max({size.x, size.y, size.z}) / solid.voxelSize() * stretchOf(sourceToWorld).greatest;
+  if (place.targetVoxel <= longest) return;
+  throw InvalidInput(
+      fmt::format("{}: voxels of {} are larger than the whole solid, whose longest side "
+                  "is about {:.3g}; use smaller ones",
+                  action, place.targetVoxel, longest));
+}
+
+}  // namespace
+
+Stretch stretchOf(const Imath::M44d& matrix) {
+  Eigen::Matrix3d linear;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) linear(i, j) = matrix[i][j];
+  const Eigen::Vector3d values = Eigen::JacobiSVD<Eigen::Matrix3d>(linear).singularValues();
+  return {values[2], values[0]};
+}
+
+openvdb::math::Transform::Ptr transformOf(const Imath::M44d& indexToWorld, const char* action) {
+  const double scale = indexToWorld[0][0];
+  if (scale > 0 && indexToWorld == axisAligned(scale)) return uniformTransform(scale);
+  // OpenVDB refuses a matrix whose determinant is 3e-15 or less.
+  if (!(Imath::M44d(indexToWorld).determinant() > 1e-14)) {
+    throw ResourceLimit(
+        fmt::format("{}: voxels of {:.3g} are too small for a grid that is turned or "
+                    "moved; use larger units",
+                    action, stretchOf(indexToWorld).least));
+  }
+  return openvdb::math::Transform::createLinearTransform(openvdb::math::Mat4d(&indexToWorld[0][0]));
+}
+
+Imath::M44d axisAligned(double voxelSize) {
+  return Imath::M44d().setScale(voxelSize);
+}
+
+void requireVoxelSize(double voxelSize, const char* action) {
+  if (voxelSize > 0 && std::isfinite(voxelSize)) return;
+  throw UsageError(fmt::format("{}: the voxel size is {}, it must be a positive, finite length",
+                               action, voxelSize));
+}
+
+NarrowBand resampleField(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
+                         const Imath::M44d& targetToWorld, double halfWidth, std::size_t maxMemory,
+                         const Progress& progress, const char* action) {
+  requireSolid(solid, action);
+  if (solid.isEmpty()) throw InvalidInput(fmt::format("{}: the solid has no surface", action));
+  if (!(halfWidth >= 1) || !std::isfinite(halfWidth)) {
+    throw UsageError(
+        fmt::format("{}: the half width is {} voxels, it must be at least 1", action, halfWidth));
+  }
+  const Placement place = placementOf(solid, sourceToWorld, targetToWorld);
+  requireSmallerVoxels(solid, sourceToWorld, place, action);
+  requireRoom(solid, stretchOf(sourceToWorld).greatest / place.targetVoxel, halfWidth, maxMemory,
+              action);
+  report(progress, 0, action);
+  const auto target = emptyLevelSet(transformOf(targetToWorld, action), halfWidth);
+  const FloatGrid::Ptr source = supported(solid, place, maxMemory, subProgress(progress, 0, 0.4));
+  ResampleKernel kernel(*source, *target, place);
+  kernel.addLeaves(action);
+  report(progress, 0.45, action);
+  kernel.fillLeaves();
+  kernel.fillTiles();
+  report(progress, 0.6, action);
+  if (!hasInside(*target)) {
+    throw InvalidInput(
+        fmt::format("{}: no grid point lies inside, voxels of {} are too large for this "
+                    "solid; use smaller ones",
+                    action, place.targetVoxel));
+  }
+  return redistance(
+      makeBand(target),
+      {.halfWidth = halfWidth, .maxMemory = maxMemory, .progress = subProgress(progress, 0.6, 1)});
+}
+
+NarrowBand resampleTo(const NarrowBand& solid, const Imath::M44d& indexToWorld,
+                      const ResampleOptions& options) {
+  const char* action = "resample";
+  const double halfWidth = options.halfWidth.value_or(solid.halfWidth());
+  const Stretch stretch = stretchOf(indexToWorld);
+  if (!(stretch.least > 0) || !(stretch.greatest < stretch.least * (1 + 1e-6)) ||
+      !(Imath::M44d(indexToWorld).determinant() > 0)) {
+    throw InvalidInput(
+        fmt::format("{}: the new grid's transform shears, mirrors or scales its axes "
+                    "differently; give it a rotation, a uniform scale and a translation",
+                    action));
+  }
+  return resampleField(solid, solid.indexToWorld(), indexToWorld, halfWidth, options.maxMemory,
+                       options.progress, action);
+}
+
+double sampledWidth(double ratio) {
+  return kReadReach * ratio + kTricubicReach;
+}
+
+NarrowBand resample(const NarrowBand& solid, double voxelSize, const ResampleOptions& options) {
+  requireVoxelSize(voxelSize, "resample");
+  return resampleTo(solid, axisAligned(voxelSize), options);
+}
+
+NarrowBand resampleLike(const NarrowBand& solid, const NarrowBand& like,
+                        const ResampleOptions& options) {
+  ResampleOptions chosen = options;
+  if (!chosen.halfWidth) chosen.halfWidth = like.halfWidth();
+  if (solid.shared() && like.shared() && shareGrid(solid, like)) return solid;
+  return resampleTo(solid, like.indexToWorld(), chosen);
+}
+
+}  // namespace levelset

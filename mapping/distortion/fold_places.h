@@ -1,0 +1,59 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "mapping/distortion/fold_certificate.h"
+
+namespace mapping {
+
+/// The worst first, and no more than are told.
+inline void keepWorst(std::vector<FoldPlace>& places) {
+  std::stable_sort(places.begin(), places.end(),
+                   [](const FoldPlace& a, const FoldPlace& b) { return a.jacobian < b.jacobian; });
+  places.resize(std::min(places.size(), FoldCertificate::kMostPlaces));
+}
+
+/// Adds up what is known of the parts of a map, in their order.
+struct FoldTally {
+  FoldCertificate certificate = {};
+
+  void addVolume(double size, double folded, double undecided) {
+    size_ += size, folded_ += folded, undecided_ += undecided;
+  }
+  /// @param typical  of a part, for the median; @param least  of the same part
+  void addDeterminant(double typical, double least) {
+    if (typical > 0) typical_.push_back(typical);
+    least_ = std::min(least_, least);
+  }
+  void addFold(const FoldPlace& fold) { certificate.worst.push_back(fold); }
+
+  /// Determinants become shares of the median of those that are positive; the worst folds are kept.
+  [[nodiscard]] FoldCertificate finish() {
+    double unit = 1;
+    if (!typical_.empty()) {
+      const auto middle = typical_.begin() + static_cast<std::ptrdiff_t>(typical_.size() / 2);
+      std::nth_element(typical_.begin(), middle, typical_.end());
+      unit = *middle;
+    }
+    std::vector<FoldPlace>& worst = certificate.worst;
+    keepWorst(worst);
+    for (FoldPlace& fold : worst) fold.jacobian /= unit;
+    certificate.unit = unit;
+    if (size_ > 0) {
+      certificate.foldedShare = folded_ / size_;
+      certificate.undecidedShare = undecided_ / size_;
+    }
+    certificate.leastJacobian = std::min(least_, std::numeric_limits<double>::max()) / unit;
+    return std::move(certificate);
+  }
+
+ private:
+  double size_ = 0, folded_ = 0, undecided_ = 0;
+  double least_ = std::numeric_limits<double>::infinity();
+  std::vector<double> typical_;
+};
+
+}  // namespace mapping

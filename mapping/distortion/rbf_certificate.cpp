@@ -1,0 +1,381 @@
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "mapping/distortion/distortion.h"
+#include "mapping/distortion/fold_certificate.h"
+#include "mapping/distortion/fold_places.h"
+#include "mapping/maps/cell_tree.h"
+#include "mapping/maps/dual_basis.h"
+#include "mapping/maps/layer_map.h"
+#include "mapping/rbf/rbf_map.h"
+#include "mapping/rbf/rbf_taylor.h"
+#include "mapping/untangle/shell_cells.h"
+
+namespace mapping {
+namespace {
+
+using Imath::Box3d;
+using Imath::M33d;
+using Imath::V3d;
+
+// Of the slopes of a map that keeps all lengths.
+constexpr double kProofTolerance = 1e-2;
+constexpr double kSlopeTolerance = 1e-5;
+// What rounding may take from a bound.
+constexpr double kProofRounding = 1e-9;
+// Cubes that are judged within one of the size of a particle's cell: at first, and where that left
+// something undecided though no fold was met.
+constexpr std::size_t kFewCubes = 80, kMostCubes = 800;
+constexpr double kSmallestCube = 1.0 / 32;  // mean particle spacings
+
+V3d rowOf(const M33d& m, int k) {
+  return {m[k][0], m[k][1], m[k][2]};
+}
+
+/// Second derivatives of three functions: xx, yy, zz, xy, xz, yz of each as a vector.
+using Curvature = std::array<V3d, 6>;
+
+/// Slopes change by this from the middle of a cube to `s`, column by column.
+std::array<V3d, 3> changeAt(const Curvature& h, const V3d& s) {
+  return {h[0] * s.x + h[3] * s.y + h[4] * s.z, h[3] * s.x + h[1] * s.y + h[5] * s.z,
+          h[4] * s.x + h[5] * s.y + h[2] * s.z};
+}
+
+/// A smooth map in a cube: slopes and curvature in its middle, and how far slopes may stray.
+struct CubeSlopes {
+  M33d slopes;
+  Curvature curvature{};
+  V3d value{0};
+  V3d rowStray{0};      ///< of the rows of the slopes, how far they change
+  double relative = 0;  ///< bound of |slopes⁻¹ (slopes elsewhere) − 1|
+  double determinant = 0;
+};
+
+/// How far the direction to a particle may turn in a ball, and what is taken for its middle.
+struct KinkBound {
+  enum class Kind { Curved, Straight, Any } kind = Kind::Any;
+  double error = 1;
+};
+
+KinkBound kinkBound(double ratio) {
+  // Beyond the second derivative the series of RbfCubes's bound begins with |s|² / |x|².
+  constexpr double kCurved = 0.45, kStraight = 0.86, kSecond = 1.2247448713915890;
+  if (ratio < kCurved) return {KinkBound::Kind::Curved, kSecond * ratio * ratio / (1 - ratio)};
+  if (ratio < kStraight) return {KinkBound::Kind::Straight, 2 * std::sin(0.5 * std::asin(ratio))};
+  return {};
+}
+
+V3d applyColumns(const std::array<V3d, 3>& columns, const V3d& x) {
+  return columns[0] * x.x + columns[1] * x.y + columns[2] * x.z;
+}
+
+CubeSlopes slopesIn(const RbfCubes& cubes, const RbfCube& cube) {
+  CubeSlopes result;
+  const TaylorPolynomial& far = cube.far;
+  result.value = far[0];
+  for (int k = 0; k < 3; ++k)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      result.slopes[k][static_cast<int>(axis)] = far[1 + axis][k];
+  // Terms 4 to 9: xx, xy, xz, yy, yz, zz.
+  result.curvature = {far[4] * 2.0, far[7] * 2.0, far[9] * 2.0, far[5], far[6], far[8]};
+  const double radius = cube.radius();
+  for (const std::uint32_t i : cube.near) {
+    const RbfParticle& particle = cubes.particles()[i];
+    const V3d way = cube.center - particle.position;
+    const double distance = way.length();
+    result.value += particle.weight * distance;
+    if (!(distance > 0)) continue;
+    const KinkBound bound = kinkBound(radius / distance);
+    if (bound.kind == KinkBound::Kind::Any) continue;
+    const V3d n = way / distance;
+    for (int k = 0; k < 3; ++k)
+      for (int axis = 0; axis < 3; ++axis) result.slopes[k][axis] += particle.weight[k] * n[axis];
+    if (bound.kind != KinkBound::Kind::Curved) continue;
+    const V3d weight = particle.weight / distance;
+    result.curvature[0] += weight * (1 - n.x * n.x);
+    result.curvature[1] += weight * (1 - n.y * n.y);
+    result.curvature[2] += weight * (1 - n.z * n.z);
+    result.curvature[3] -= weight * (n.x * n.y);
+    result.curvature[4] -= weight * (n.x * n.z);
+    result.curvature[5] -= weight * (n.y * n.z);
+  }
+  return result;
+}
+
+/// Fills in the bounds: the inverse of the slopes in the middle takes out what they have in common.
+void boundSlopes(const RbfCubes& cubes, const RbfCube& cube, CubeSlopes& at) {
+  at.determinant = at.slopes.determinant();
+  const std::array<V3d, 3> inverse =
+      dualBasis(rowOf(at.slopes, 0), rowOf(at.slopes, 1), rowOf(at.slopes, 2));
+  double norm = 0;
+  for (const V3d& column : inverse) norm += column.length2();
+  norm = std::sqrt(norm);
+  double stray = cube.slopeError * norm;
+  for (int k = 0; k < 3; ++k) at.rowStray[k] = cube.slopeError;
+  for (const std::uint32_t i : cube.near) {
+    const RbfParticle& particle = cubes.particles()[i];
+    const double distance = (cube.center - particle.position).length();
+    const KinkBound bound = distance > 0 ? kinkBound(cube.radius() / distance) : KinkBound{};
+    stray += applyColumns(inverse, particle.weight).length() * bound.error;
+    for (int k = 0; k < 3; ++k) at.rowStray[k] += std::abs(particle.weight[k]) * bound.error;
+  }
+  // Beyond its curvature the polynomial's slopes are no larger than the sum of their terms.
+  for (std::size_t n = 10; n < TaylorPolynomial::kTerms; ++n) {
+    const auto& p = TaylorPolynomial::powers()[n];
+    const double power = std::pow(cube.half, p.total() - 1);
+    const double slope = power * std::sqrt(static_cast<double>(p.x * p.x + p.y * p.y + p.z * p.z));
+    stray += applyColumns(inverse, cube.far[n]).length() * slope;
+    for (int k = 0; k < 3; ++k) at.rowStray[k] += std::abs(cube.far[n][k]) * slope;
+  }
+  // What is linear is largest in a corner; opposite ones are alike.
+  double bend = 0;
+  V3d rowBend(0);
+  for (int corner = 0; corner < 4; ++corner) {
+    const V3d s(corner & 1 ? cube.half : -cube.half, corner & 2 ? cube.half : -cube.half,
+                cube.half);
+    double squares = 0;
+    V3d rows(0);
+    for (const V3d& column : changeAt(at.curvature, s)) {
+      squares += applyColumns(inverse, column).length2();
+      rows += column * column;
+    }
+    bend = std::max(bend, std::sqrt(squares));
+    for (int k = 0; k < 3; ++k) rowBend[k] = std::max(rowBend[k], std::sqrt(rows[k]));
+  }
+  at.rowStray += rowBend;
+  at.relative = stray + bend + kProofRounding;
+  if (!std::isfinite(at.relative)) at.relative = HUGE_VAL;
+}
+
+/// What is looked at, shared by all cubes.
+struct ProofScene {
+  const RbfMap& map;
+  const RbfCubes& cubes;
+  const CellTree& tree;
+  V3d origin, sizes;
+  Box3d wanted;  ///< of u, v and w
+  double hand, smallest;
+
+  /// Do cells of the particles reach into the cube?
+  [[nodiscard]] bool isInPatch(const RbfCube& cube, double half) const {
+    const V3d middle = cube.center + origin;
+    return tree.visit({middle - V3d(half), middle + V3d(half)},
+                      [](const std::array<int, 3>&) { return true; });
+  }
+  [[nodiscard]] bool reachesTexture(const RbfCube& cube, const CubeSlopes& at) const {
+    for (int k = 0; k < 3; ++k) {
+      const V3d row = rowOf(at.slopes, k);
+      const double extent = (std::abs(row.x) + std::abs(row.y) + std::abs(row.z)) * cube.half +
+                            at.rowStray[k] * cube.radius() + cube.valueError + kProofRounding;
+      if (at.value[k] + extent < wanted.min[k] * sizes[k]) return false;
+      if (at.value[k] - extent > wanted.max[k] * sizes[k]) return false;
+    }
+    return true;
+  }
+};
+
+/// What is known of a cube of the size of a particle's cell.
+struct CubeProof {
+  double size = 0, folded = 0, undecided = 0;
+  std::vector<double> determinants;
+  double least = std::numeric_limits<double>::infinity();
+  bool folds = false;
+  FoldPlace worst;
+  std::size_t pieces = 0;
+};
+
+/// Is the middle of a cube in the patch, and does it go into the texture?
+bool isCenterWanted(const ProofScene& scene, const RbfCube& cube, const CubeSlopes& at) {
+  return scene.wanted.intersects(at.value / scene.sizes) && scene.isInPatch(cube, 0);
+}
+
+/// The middle of a cube. @pre isCenterWanted
+void lookAtCenter(const ProofScene& scene, const RbfCube& cube, const CubeSlopes& at,
+                  CubeProof& proof) {
+  const V3d uvw = at.value / scene.sizes;
+  const V3d place = cube.center + scene.origin;
+  const double volume = scene.hand * scene.sizes.x * scene.sizes.y * scene.sizes.z;
+  double determinant = scene.hand * scene.cubes.slopes(cube, cube.center).determinant();
+  // The polynomial's error must not make the fold.
+  if (!(determinant > 0)) determinant = volume * scene.map.jacobian(place).determinant();
+  if (determinant > 0) proof.determinants.push_back(determinant);
+  if (!(determinant < proof.least)) return;
+  proof.least = determinant;
+  if (determinant > 0) return;
+  proof.folds = true;
+  proof.worst = {place, uvw, determinant};
+}
+
+CubeProof proveCube(const ProofScene& scene, const RbfCube& start, std::size_t mostCubes) {
+  CubeProof proof;
+  std::vector<RbfCube> queue = {start};
+  for (std::size_t n = 0; n < queue.size(); ++n) {
+    const RbfCube cube = std::move(queue[n]);
+    if (!scene.isInPatch(cube, cube.half)) continue;
+    CubeSlopes at = slopesIn(scene.cubes, cube);
+    boundSlopes(scene.cubes, cube, at);
+    if (!scene.reachesTexture(cube, at)) continue;
+    ++proof.pieces;
+    // One that turns over folds the texture only where it is part of it: of a cube across the
+    // border a part outside may be what does.
+    const bool isWanted = isCenterWanted(scene, cube, at);
+    const bool isPositive = scene.hand * at.determinant > 0;
+    const bool isDecided = at.relative < 1 && (isPositive || isWanted);
+    const bool canHalve = cube.half > scene.smallest && queue.size() + 8 <= mostCubes;
+    if (!isDecided && canHalve) {
+      for (int bits = 0; bits < 8; ++bits) queue.push_back(scene.cubes.octant(cube, bits));
+      continue;
+    }
+    if (isWanted) lookAtCenter(scene, cube, at, proof);
+    const double volume = 8 * cube.half * cube.half * cube.half;
+    proof.size += volume;
+    if (!isDecided)
+      proof.undecided += volume;
+    else if (!isPositive)
+      proof.folded += volume;
+  }
+  return proof;
+}
+
+/// Cubes of about a particle's cell that hold all of the patch.
+std::vector<RbfCube> startingCubes(const ProofScene& scene, const Box3d& box, double spacing) {
+  const V3d sides = box.size();
+  const double half = 0.5 * std::max({sides.x, sides.y, sides.z}) * (1 + 1e-9);
+  std::vector<RbfCube> cubes = {scene.cubes.root(box.center() - scene.origin, half)};
+  while (cubes.front().half > spacing) {
+    std::vector<std::array<RbfCube, 8>> parts(cubes.size());
+    tbb::parallel_for(std::size_t{0}, cubes.size(), [&](std::size_t n) {
+      for (int bits = 0; bits < 8; ++bits) {
+        RbfCube& part = parts[n][static_cast<std::size_t>(bits)];
+        part.half = cubes[n].half / 2;
+        part.center = cubes[n].center;
+        for (int axis = 0; axis < 3; ++axis)
+          part.center[axis] += bits >> axis & 1 ? part.half : -part.half;
+        if (scene.isInPatch(part, part.half))
+          part = scene.cubes.octant(cubes[n], bits);
+        else
+          part.half = 0;
+      }
+    });
+    std::vector<RbfCube> next;
+    for (auto& eight : parts)
+      for (RbfCube& part : eight)
+        if (part.half > 0) next.push_back(std::move(part));
+    cubes.swap(next);
+    if (cubes.empty()) break;
+  }
+  return cubes;
+}
+
+Box3d worldBoxOf(const Lattice& lattice) {
+  Box3d box;
+  const auto cells = lattice.cells();
+  for (int k = 0; k < cells[2]; ++k)
+    for (int j = 0; j < cells[1]; ++j)
+      for (int i = 0; i < cells[0]; ++i) box.extendBy(lattice.worldBox({i, j, k}));
+  return box;
+}
+
+/// Cuts the samples into those of each octant until few are left, and looks at them there.
+void fillWithin(const RbfCubes& cubes, const V3d& origin, const V3d& sizes, const RbfCube& cube,
+                std::vector<std::uint32_t> chosen, std::vector<MapSample>& samples) {
+  constexpr std::size_t kFewSamples = 16;
+  if (chosen.empty()) return;
+  if (chosen.size() > kFewSamples && cube.near.size() > kFewSamples) {
+    std::array<std::vector<std::uint32_t>, 8> parts;
+    for (const std::uint32_t n : chosen) {
+      const V3d way = samples[n].place - origin - cube.center;
+      parts[(way.x > 0 ? 1u : 0u) + (way.y > 0 ? 2u : 0u) + (way.z > 0 ? 4u : 0u)].push_back(n);
+    }
+    tbb::parallel_for(0, 8, [&](int bits) {
+      auto& part = parts[static_cast<std::size_t>(bits)];
+      if (!part.empty())
+        fillWithin(cubes, origin, sizes, cubes.octant(cube, bits), std::move(part), samples);
+    });
+    return;
+  }
+  for (const std::uint32_t n : chosen) {
+    samples[n].uvw = cubes.value(cube, samples[n].place - origin) / sizes;
+    M33d slopes = cubes.slopes(cube, samples[n].place - origin);
+    for (int k = 0; k < 3; ++k)
+      for (int axis = 0; axis < 3; ++axis) slopes[k][axis] /= sizes[k];
+    samples[n].jacobian = slopes;
+  }
+}
+
+}  // namespace
+
+FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double sink) {
+  if (map.kernel() != RbfKernel::Biharmonic) {
+    FoldCertificate nothing;
+    nothing.undecidedShare = 1;
+    nothing.leastJacobian = std::numeric_limits<double>::quiet_NaN();
+    return nothing;
+  }
+  const V3d sizes = shellSizes(patch);
+  const RbfCubes cubes(map, sizes, kProofTolerance);
+  const Lattice lattice(patch, {.sink = sink, .rim = 0});
+  const CellTree tree(lattice);
+  const ProofScene scene{map,
+                         cubes,
+                         tree,
+                         map.origin(),
+                         sizes,
+                         {V3d(0, 0, -std::max(0.0, sink)), V3d(1, 1, 1 + std::max(0.0, -sink))},
+                         patch.mirrored ? -1.0 : 1.0,
+                         kSmallestCube * map.meanSpacing()};
+  const std::vector<RbfCube> starts = startingCubes(scene, worldBoxOf(lattice), map.meanSpacing());
+  std::vector<CubeProof> proofs(starts.size());
+  tbb::parallel_for(std::size_t{0}, starts.size(),
+                    [&](std::size_t n) { proofs[n] = proveCube(scene, starts[n], kFewCubes); });
+  if (std::none_of(proofs.begin(), proofs.end(), [](const CubeProof& p) { return p.folds; }))
+    tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t n) {
+      if (proofs[n].undecided > 0) proofs[n] = proveCube(scene, starts[n], kMostCubes);
+    });
+  FoldTally tally;
+  for (const CubeProof& proof : proofs) {
+    tally.addVolume(proof.size, proof.folded, proof.undecided);
+    for (const double determinant : proof.determinants)
+      tally.addDeterminant(determinant, proof.least);
+    tally.addDeterminant(0, proof.least);
+    if (proof.folds) tally.addFold(proof.worst);
+    tally.certificate.pieces += proof.pieces;
+  }
+  FoldCertificate certificate = tally.finish();
+  certificate.unit /= sizes.x * sizes.y * sizes.z;
+  return certificate;
+}
+
+void evaluateRbf(const RbfMap& map, const Patch& patch, std::vector<MapSample>& samples) {
+  if (samples.empty()) return;
+  const V3d sizes = shellSizes(patch);
+  const RbfCubes cubes(map, sizes, kSlopeTolerance);
+  Box3d box;
+  for (const MapSample& sample : samples) box.extendBy(sample.place);
+  const V3d sides = box.size();
+  std::vector<std::uint32_t> all(samples.size());
+  for (std::size_t n = 0; n < all.size(); ++n) all[n] = static_cast<std::uint32_t>(n);
+  const RbfCube root = cubes.root(box.center() - map.origin(),
+                                  0.5 * std::max({sides.x, sides.y, sides.z}) * (1 + 1e-9));
+  fillWithin(cubes, map.origin(), sizes, root, std::move(all), samples);
+}
+
+std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch, double sink) {
+  constexpr std::size_t kManyParticles = 4000;
+  if (map.size() < kManyParticles || map.kernel() != RbfKernel::Biharmonic)
+    return sampleMap(map, patch, sink);
+  const std::vector<V3d> places = samplePlaces(patch, sink);
+  std::vector<MapSample> samples(places.size());
+  for (std::size_t n = 0; n < places.size(); ++n)
+    samples[n].place = levelPosition(patch, places[n]);
+  evaluateRbf(map, patch, samples);
+  for (std::size_t n = 0; n < places.size(); ++n) samples[n].uvw = places[n];
+  return samples;
+}
+
+}  // namespace mapping

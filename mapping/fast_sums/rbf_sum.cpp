@@ -1,0 +1,82 @@
+// Compiled with -O3 -fno-math-errno -fno-trapping-math, so that plain loops become vector code; no
+// flag changes a bit of the results, since each point's sum runs over the particles in one order.
+
+#include "mapping/fast_sums/rbf_sum.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <type_traits>
+
+#include "mapping/fast_sums/rbf_adders.h"
+
+namespace mapping {
+namespace {
+
+constexpr std::size_t kTile = 64;  // points, few enough for the first-level cache
+
+const double kScale = rbf::kLaplacian.scale, kA = rbf::kLaplacian.a, kB = rbf::kLaplacian.b,
+             kFast = rbf::kLaplacian.fast, kSlow = rbf::kLaplacian.slow;
+
+namespace plain {
+#include "mapping/maps/rbf_sum_tile.inc"
+}
+#if defined(__x86_64__)
+#pragma GCC push_options
+#pragma GCC target("avx2")
+namespace avx2 {
+#include "mapping/maps/rbf_sum_tile.inc"
+}
+#pragma GCC pop_options
+#pragma GCC push_options
+#pragma GCC target("avx512f,avx512vl,avx512dq,prefer-vector-width=512")
+namespace avx512 {
+#include "mapping/maps/rbf_sum_tile.inc"
+}
+#pragma GCC pop_options
+#endif
+
+struct Supported {
+  std::array<RbfAdders, 3> adders;
+  std::size_t count = 0;
+  void add(const char* name, const RbfAdder* each) { adders[count++] = {name, each}; }
+};
+
+Supported findSupported() {
+  Supported found;
+  found.add("plain", plain::kAdders);
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2")) found.add("avx2", avx2::kAdders);
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+      __builtin_cpu_supports("avx512dq"))
+    found.add("avx512", avx512::kAdders);
+#endif
+  return found;
+}
+
+static_assert(sizeof(RbfParticle) == 6 * sizeof(double) && std::is_standard_layout_v<RbfParticle>);
+
+}  // namespace
+
+std::span<const RbfAdders> supportedRbfAdders() {
+  static const Supported supported = findSupported();
+  return {supported.adders.data(), supported.count};
+}
+
+void addRbfSums(const RbfAdders& adders, RbfKernel kernel, std::span<const RbfParticle> particles,
+                std::span<const std::uint32_t> chosen, RbfPoints& points) {
+  if (particles.empty()) return;
+  const RbfAdder add = adders.each[static_cast<std::size_t>(kernel)];
+  const double* numbers = &particles.front().position.x;
+  for (std::size_t i = 0; i < points.size(); i += kTile)
+    add(numbers, chosen.data(), chosen.size(), &points.x[i], &points.y[i], &points.z[i],
+        &points.u[i], &points.v[i], &points.w[i], std::min(kTile, points.size() - i));
+}
+
+void addRbfSums(RbfKernel kernel, std::span<const RbfParticle> particles,
+                std::span<const std::uint32_t> chosen, RbfPoints& points) {
+  static const RbfAdders& widest = supportedRbfAdders().back();
+  addRbfSums(widest, kernel, particles, chosen, points);
+}
+
+}  // namespace mapping

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "mapping/fast_sums/rbf_kernel.h"
+
+namespace mapping {
+
+/// A particle's position, in mean particle spacings, and its weights for u, v and w.
+struct RbfParticle {
+  Imath::V3d position, weight;
+};
+
+/// Positions and sums of some points, one array for each component: plain loops over them become
+/// vector code, by what the processor can do when the program runs, and to the same bits.
+struct RbfPoints {
+  std::vector<double> x, y, z, u, v, w;
+  explicit RbfPoints(std::size_t count)
+      : x(count), y(count), z(count), u(count), v(count), w(count) {}
+  [[nodiscard]] std::size_t size() const { return x.size(); }
+};
+
+/// Adds Σ ω_i φ(|x − p_i|) over the chosen particles at each point, in the order of `chosen`.
+void addRbfSums(RbfKernel kernel, std::span<const RbfParticle> particles,
+                std::span<const std::uint32_t> chosen, RbfPoints& points);
+
+}  // namespace mapping

@@ -1,0 +1,130 @@
+#include "mapping/layers/layer_resampling.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+
+/// Of a row of positions, at x = 0 … count − 1; beyond, straight on.
+template <typename At>
+V3d along(const At& at, std::size_t count, double x) {
+  const double last = static_cast<double>(count - 1);
+  if (x < 0) return at(0) + (at(1) - at(0)) * x;
+  if (x > last) return at(count - 1) + (at(count - 1) - at(count - 2)) * (x - last);
+  const double cell = std::min(std::floor(x), last - 1);
+  const auto i = static_cast<std::size_t>(cell);
+  const double f = x - cell;
+  const V3d b = at(i), c = at(i + 1);
+  // What would come next on a parabola through the three at an end.
+  const auto beyond = [&](const V3d& end, const V3d& next, std::size_t third) {
+    return count > 2 ? (end - next) * 3.0 + at(third) : end * 2.0 - next;
+  };
+  const V3d a = i > 0 ? at(i - 1) : beyond(b, c, 2),
+            d = i + 2 < count ? at(i + 2) : beyond(c, b, count - 3);
+  return b + (c - a) * (0.5 * f) + (a * 2.0 - b * 5.0 + c * 4.0 - d) * (0.5 * f * f) +
+         (b * 3.0 - a - c * 3.0 + d) * (0.5 * f * f * f);
+}
+
+V3d placeAt(const ParticleLevel& level, double x, double y) {
+  const auto row = [&](std::size_t j) {
+    return along([&](std::size_t i) { return level.at(i, j); }, level.columns, x);
+  };
+  return along(row, level.rows, y);
+}
+
+/// Its rim as rows and columns like the others, so that a place is one further along each axis.
+ParticleLevel withRimInside(const ParticleLevel& level) {
+  ParticleLevel wide;
+  wide.columns = level.columns + 2;
+  wide.rows = level.rows + 2;
+  for (int j = -1; j <= static_cast<int>(level.rows); ++j)
+    for (int i = -1; i <= static_cast<int>(level.columns); ++i)
+      wide.positions.push_back(level.beyond(i, j));
+  return wide;
+}
+
+}  // namespace
+
+ParticleLevel withCounts(const ParticleLevel& level, std::size_t columns, std::size_t rows) {
+  if (level.columns == columns && level.rows == rows) return level;
+  ParticleLevel result{.columns = columns,
+                       .rows = rows,
+                       .w = level.w,
+                       .height = level.height,
+                       .positions = {},
+                       .rim = {}};
+  const auto stride = [](std::size_t from, std::size_t to) {
+    return static_cast<double>(from - 1) / static_cast<double>(to - 1);
+  };
+  const double across = stride(level.columns, columns), up = stride(level.rows, rows);
+  if (!level.hasRim()) {
+    for (std::size_t j = 0; j < rows; ++j)
+      for (std::size_t i = 0; i < columns; ++i)
+        result.positions.push_back(
+            placeAt(level, static_cast<double>(i) * across, static_cast<double>(j) * up));
+    return result;
+  }
+  const ParticleLevel wide = withRimInside(level);
+  const auto place = [&](int i, int j) { return placeAt(wide, 1 + i * across, 1 + j * up); };
+  result.rim.resize(2 * (columns + rows) + 4);
+  const auto right = static_cast<int>(columns), top = static_cast<int>(rows);
+  for (int j = -1; j <= top; ++j)
+    for (int i = -1; i <= right; ++i) {
+      const bool isInside = i >= 0 && i < right && j >= 0 && j < top;
+      if (isInside)
+        result.positions.push_back(place(i, j));
+      else
+        result.rim[result.rimIndex(i, j)] = place(i, j);
+    }
+  return result;
+}
+
+std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink) {
+  // Of the distance to a neighbour on the last level what must be left of it.
+  constexpr double kLeastShare = 0.25;
+  constexpr double kWidest = 1.1;  // steps of the levels from layer to layer
+  std::vector<SunkParticle> particles;
+  if (sink == 0 || patch.levels.size() < 2) return particles;
+  const bool isBelow = sink > 0;
+  const ParticleLevel& last = isBelow ? patch.levels.front() : patch.levels.back();
+  const ParticleLevel before =
+      withCounts(isBelow ? patch.levels[1] : *(patch.levels.end() - 2), last.columns, last.rows);
+  const int rim = last.hasRim() && before.hasRim() ? 1 : 0;
+  const auto right = static_cast<int>(last.columns), top = static_cast<int>(last.rows);
+  const auto isThere = [&](int i, int j) {
+    return i >= -rim && i < right + rim && j >= -rim && j < top + rim;
+  };
+  const double step = std::abs(last.w - before.w);
+  // A smooth map errs most beside its last particles: they lie deeper than the texture, by as much
+  // again or by a step. Columns are straight, so that layers may lie wider apart than levels, and
+  // the wider the deeper.
+  const double reach = std::abs(sink) + std::min(std::abs(sink), step);
+  const double most = 2.0 * static_cast<double>(patch.levels.size());
+  const auto layers = static_cast<int>(std::min(most, std::ceil(reach / (kWidest * step))));
+  for (int n = 1; n <= layers; ++n) {
+    const double depth = reach * n / layers, share = depth / step;
+    const auto keepsApart = [&](int i, int j, int u, int v) {
+      if (!isThere(u, v)) return true;
+      const V3d way = last.beyond(u, v) - last.beyond(i, j);
+      const V3d turn = way - (before.beyond(u, v) - before.beyond(i, j));
+      return (way + turn * share).dot(way) >= kLeastShare * way.length2();
+    };
+    for (int j = -rim; j < top + rim; ++j)
+      for (int i = -rim; i < right + rim; ++i) {
+        if (!keepsApart(i, j, i - 1, j) || !keepsApart(i, j, i + 1, j) ||
+            !keepsApart(i, j, i, j - 1) || !keepsApart(i, j, i, j + 1))
+          continue;
+        const V3d place = last.beyond(i, j);
+        particles.push_back(
+            {place + (place - before.beyond(i, j)) * share,
+             {static_cast<double>(i) / (right - 1), static_cast<double>(j) / (top - 1),
+              last.w + (isBelow ? -depth : depth)}});
+      }
+  }
+  return particles;
+}
+
+}  // namespace mapping

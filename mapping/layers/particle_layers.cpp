@@ -1,0 +1,256 @@
+#include "mapping/layers/particle_layers.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <optional>
+
+#include "levelset/error.h"
+#include "mapping/surface/geodesic.h"
+#include "mapping/surface/surface_field.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+
+std::string text(const V3d& p) {
+  return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z);
+}
+
+/// Coons' patch: opposite sides blended, less what the corners count twice. Exact on planes, and
+/// nearly so on quadrics.
+V3d coons(const PatchSides& border, const ParticleLevel& level, std::size_t column,
+          std::size_t row) {
+  const double u = static_cast<double>(column) / static_cast<double>(level.columns - 1);
+  const double v = static_cast<double>(row) / static_cast<double>(level.rows - 1);
+  const V3d &c0 = border[0].front(), &c1 = border[0].back(), &c2 = border[2].back(),
+            &c3 = border[2].front();
+  return border[0][column] * (1 - v) + border[2][column] * v + border[3][row] * (1 - u) +
+         border[1][row] * u -
+         (c0 * ((1 - u) * (1 - v)) + c1 * (u * (1 - v)) + c2 * (u * v) + c3 * ((1 - u) * v));
+}
+
+/// True when neighbours in the rows lie no further apart than the sides give reason for: the
+/// blended start has not slipped to another part of the surface.
+bool isUnbroken(const ParticleLevel& level, double longestU, double longestV) {
+  for (std::size_t j = 0; j < level.rows; ++j)
+    for (std::size_t i = 0; i < level.columns; ++i) {
+      if (i > 0 && (level.at(i, j) - level.at(i - 1, j)).length() > longestU) return false;
+      if (j > 0 && (level.at(i, j) - level.at(i, j - 1)).length() > longestV) return false;
+    }
+  return true;
+}
+
+bool sweepBlended(const SurfaceField& field, const SurfaceField& guide, const PatchSides& border,
+                  ParticleLevel& level) {
+  for (std::size_t j = 1; j + 1 < level.rows; ++j)
+    for (std::size_t i = 1; i + 1 < level.columns; ++i) {
+      V3d p = coons(border, level, i, j);
+      if (!guide.project(p, level.height) || !field.project(p, level.height)) return false;
+      level.positions[j * level.columns + i] = p;
+    }
+  const double u = std::max(pathLength(border[0]), pathLength(border[2]));
+  const double v = std::max(pathLength(border[1]), pathLength(border[3]));
+  return isUnbroken(level, 4 * u / static_cast<double>(level.columns - 1),
+                    4 * v / static_cast<double>(level.rows - 1));
+}
+
+/// Geodesics that join opposite subdivision points: they never leave the surface.
+void sweepGeodesics(const SurfaceField& field, const std::vector<V3d>& firstRow,
+                    ParticleLevel& level) {
+  std::vector<V3d> path = firstRow;
+  for (std::size_t j = 1; j + 1 < level.rows; ++j) {
+    const V3d a = level.at(0, j), b = level.at(level.columns - 1, j);
+    // Rows that lie side by side run alike, also where two ways are equally long.
+    path = geodesicLike(field, level.height, a, b, path);
+    if (path.empty()) path = geodesic(field, level.height, a, b);
+    if (path.empty()) {
+      throw InvalidInput(
+          fmt::format("patch: no path on the surface joins {} and {}; move the corners "
+                      "closer together",
+                      text(a), text(b)));
+    }
+    const std::vector<V3d> row = sampleByArcLength(path, level.columns);
+    for (std::size_t i = 1; i + 1 < level.columns; ++i) {
+      V3d p = row[i];
+      (void)field.project(p, level.height);
+      level.positions[j * level.columns + i] = p;
+    }
+  }
+}
+
+/// Through all knots, each stretch the shortest way.
+/// @param longest  of a stretch
+/// @return empty when two knots are not joined, or by too long a way; the first of them in `gap`
+std::vector<V3d> sideThrough(const SurfaceField& field, double height,
+                             const std::vector<V3d>& knots, const std::vector<V3d>* below,
+                             double longest, std::size_t& gap) {
+  if (below && knots.size() == 2) {
+    std::vector<V3d> path = geodesicLike(field, height, knots[0], knots[1], *below);
+    if (!path.empty()) return path;
+  }
+  std::vector<V3d> side = {knots.front()};
+  for (std::size_t i = 1; i < knots.size(); ++i) {
+    const std::vector<V3d> path = geodesic(field, height, knots[i - 1], knots[i], longest);
+    gap = i - 1;
+    if (path.empty()) return {};
+    side.insert(side.end(), path.begin() + 1, path.end());
+  }
+  return side;
+}
+
+}  // namespace
+
+PatchSides makeSides(const levelset::NarrowBand& band, double height,
+                     const std::array<V3d, 4>& corners, const PatchSides& between,
+                     const PatchSides* below, const PatchSides* ground) {
+  const SurfaceField field(band);
+  // Half a turn in the way of a side adds π times the height.
+  constexpr double kMostGrowth = 4;
+  constexpr std::array<std::array<std::size_t, 2>, 4> kEnds = {{{0, 1}, {1, 2}, {3, 2}, {0, 3}}};
+  PatchSides sides;
+  for (std::size_t side = 0; side < 4; ++side) {
+    std::vector<V3d> knots = {corners[kEnds[side][0]]};
+    knots.insert(knots.end(), between[side].begin(), between[side].end());
+    knots.push_back(corners[kEnds[side][1]]);
+    std::size_t gap = 0;
+    const double longest = ground ? kMostGrowth * (pathLength((*ground)[side]) + height) : HUGE_VAL;
+    sides[side] =
+        sideThrough(field, height, knots, below ? &(*below)[side] : nullptr, longest, gap);
+    if (!sides[side].empty()) continue;
+    const std::string ends =
+        fmt::format("joins {} and {}, between corners {} and {}, at height {:.6g}",
+                    text(knots[gap]), text(knots[gap + 1]), kEnds[side][0], kEnds[side][1], height);
+    if (ground) {
+      throw InvalidInput(
+          fmt::format("patch: no way shorter than {:.6g} {}: they have come apart above the "
+                      "surface; lower the height, or move the corners closer together",
+                      longest, ends));
+    }
+    throw InvalidInput(fmt::format(
+        "patch: no path on the surface {}; put all points on one part of the base", ends));
+  }
+  return sides;
+}
+
+double sideLengthU(const PatchSides& sides) {
+  return 0.5 * (pathLength(sides[0]) + pathLength(sides[2]));
+}
+
+double sideLengthV(const PatchSides& sides) {
+  return 0.5 * (pathLength(sides[1]) + pathLength(sides[3]));
+}
+
+Relaxation fillLevel(const levelset::NarrowBand& band, const levelset::NarrowBand& guide,
+                     const PatchSides& sides, ParticleLevel& level) {
+  const SurfaceField field(band);
+  PatchSides border;
+  for (std::size_t side = 0; side < 4; ++side) {
+    border[side] = sampleByArcLength(sides[side], side % 2 == 0 ? level.columns : level.rows);
+    for (std::size_t i = 1; i + 1 < border[side].size(); ++i)
+      (void)field.project(border[side][i], level.height);
+  }
+  level.positions.assign(level.columns * level.rows, V3d(0));
+  for (std::size_t i = 0; i < level.columns; ++i) {
+    level.positions[i] = border[0][i];
+    level.positions[(level.rows - 1) * level.columns + i] = border[2][i];
+  }
+  for (std::size_t j = 0; j < level.rows; ++j) {
+    level.positions[j * level.columns] = border[3][j];
+    level.positions[j * level.columns + level.columns - 1] = border[1][j];
+  }
+  if (!sweepBlended(field, SurfaceField(guide), border, level))
+    sweepGeodesics(field, sides[0], level);
+  const Relaxation relaxation = relax(band, level);
+  addRim(band, level);
+  return relaxation;
+}
+
+void addRim(const levelset::NarrowBand& band, ParticleLevel& level) {
+  const SurfaceField field(band);
+  const auto columns = static_cast<int>(level.columns), rows = static_cast<int>(level.rows);
+  level.rim.assign(2 * (level.columns + level.rows) + 4, V3d(0));
+  const auto onwards = [&](const V3d& last, const V3d& before) {
+    const V3d way = last - before;
+    constexpr double kMostTurn = 0.5;  // cosine
+    const std::optional<V3d> end = walkStraight(field, level.height, last, way, way.length());
+    const bool isAhead = end && field.normal(last).dot(field.normal(*end)) > kMostTurn;
+    return isAhead ? *end : last + way;
+  };
+  for (int j = 0; j < rows; ++j) {
+    level.rim[level.rimIndex(-1, j)] = onwards(level.beyond(0, j), level.beyond(1, j));
+    level.rim[level.rimIndex(columns, j)] =
+        onwards(level.beyond(columns - 1, j), level.beyond(columns - 2, j));
+  }
+  for (int i = 0; i < columns; ++i) {
+    level.rim[level.rimIndex(i, -1)] = onwards(level.beyond(i, 0), level.beyond(i, 1));
+    level.rim[level.rimIndex(i, rows)] =
+        onwards(level.beyond(i, rows - 1), level.beyond(i, rows - 2));
+  }
+  for (const int i : {-1, columns})
+    for (const int j : {-1, rows}) {
+      const int a = i < 0 ? 0 : columns - 1, b = j < 0 ? 0 : rows - 1;
+      const V3d straight = level.beyond(i, b) + level.beyond(a, j) - level.beyond(a, b);
+      V3d p = straight;
+      level.rim[level.rimIndex(i, j)] = field.project(p, level.height) ? p : straight;
+    }
+}
+
+void advectPoints(const levelset::NarrowBand& band, double from, double to, std::span<V3d> points) {
+  const SurfaceField field(band);
+  const double steps = std::max(1.0, std::ceil(std::abs(to - from) / (0.5 * field.voxelSize())));
+  const double step = (to - from) / steps;
+  for (V3d& point : points) {
+    V3d p = point;
+    for (int i = 0; i < static_cast<int>(steps); ++i)
+      p += field.normal(p + field.normal(p) * (0.5 * step)) * step;
+    if (!field.project(p, to)) {
+      throw InvalidInput(
+          fmt::format("patch: above the point {} the distance to the base does not reach {:.6g}, "
+                      "other parts of it "
+                      "come too near at {}; lower the height or move the patch",
+                      text(point), to, text(p)));
+    }
+    point = p;
+  }
+}
+
+void raisePoints(const levelset::NarrowBand& band, double height, std::span<const V3d> directions,
+                 std::span<V3d> points) {
+  constexpr double kFarthest = 10;  // times the difference: a direction that leans by 84 degrees
+  constexpr int kHalvings = 40;
+  const SurfaceField field(band);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double rise = height - field.value(points[i]), step = 0.5 * field.voxelSize();
+    const auto isAbove = [&](double t) {
+      return field.value(points[i] + directions[i] * t) >= height;
+    };
+    double above = 0;
+    while (!isAbove(above)) {
+      above += step;
+      if (above > kFarthest * rise + step) {
+        throw InvalidInput(fmt::format(
+            "patch: from {} along {} the distance to the base does not come to {:.6g}; let the "
+            "direction lean less, or lower the height",
+            text(points[i]), text(directions[i]), height));
+      }
+    }
+    double below = std::max(0.0, above - step);
+    for (int k = 0; k < kHalvings; ++k) {
+      const double middle = 0.5 * (below + above);
+      (isAbove(middle) ? above : below) = middle;
+    }
+    // At the end of the room that was swept values jump.
+    if (field.value(points[i] + directions[i] * above) - height > 0.1 * field.voxelSize()) {
+      throw InvalidInput(fmt::format(
+          "patch: from {} along {} the way leaves the room above the patch before the distance to "
+          "the base comes to {:.6g}; let the direction lean less, or lower the height",
+          text(points[i]), text(directions[i]), height));
+    }
+    points[i] += directions[i] * (0.5 * (below + above));
+  }
+}
+
+}  // namespace mapping

@@ -1,0 +1,313 @@
+#include "mapping/layers/patch_layers.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/error.h"
+#include "mapping/layers/layer_resampling.h"
+#include "mapping/layers/layer_schemes.h"
+#include "mapping/layers/relaxation.h"
+#include "mapping/patches/patch_space.h"
+#include "mapping/surface/surface_field.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+using levelset::UsageError;
+
+constexpr const char* kPatchLevels = "patch";
+// The map's system is dense: n³ / 3 operations and n² numbers. This many particles cost a second or
+// two, and lie some five to ten voxels apart on a patch of a hundred or two.
+constexpr double kParticleBudget = 2000;
+constexpr double kSmallestSpacing = 1.5;  // voxels; closer ones say the same thing twice
+constexpr std::size_t kFewest = 4;        // particles along a side
+constexpr double kMostParticles = 1e6;
+
+/// The middle of a level, and directions there.
+struct Axis {
+  V3d origin, normal, u;
+};
+
+Axis axisOf(const NarrowBand& base, const ParticleLevel& surface) {
+  const std::size_t i = (surface.columns - 1) / 2, j = (surface.rows - 1) / 2;
+  const std::size_t right = surface.columns / 2, above = surface.rows / 2;
+  Axis axis;
+  axis.origin =
+      (surface.at(i, j) + surface.at(right, j) + surface.at(i, above) + surface.at(right, above)) /
+      4.0;
+  const SurfaceField field(base);
+  (void)field.project(axis.origin, 0);
+  axis.normal = field.normal(axis.origin);
+  const V3d u = surface.at(i + 1, j) - surface.at(i, j);
+  axis.u = (u - axis.normal * axis.normal.dot(u)).normalized();
+  return axis;
+}
+
+std::vector<ParticleLevel> transformed(const NarrowBand& base, std::vector<ParticleLevel> levels,
+                                       double height, const LevelTransform& transform) {
+  if (transform.isIdentity()) return levels;
+  const Axis axis = axisOf(base, levels.front());
+  transformLevels(levels, transform, axis.origin, axis.normal, axis.u, height);
+  return levels;
+}
+
+struct Counts {
+  std::size_t columns, rows;
+};
+
+/// Calls refit(level, counts) for each level above the surface whose particles lie over a quarter
+/// closer or farther apart than on the surface, along u or v; than the spacing that all levels
+/// together would be given, where that is wider and none is asked for.
+/// @throws ResourceLimit as checkParticleCount does
+template <typename Refit>
+void keepDensity(const NarrowBand& base, std::vector<ParticleLevel>& levels, double height,
+                 const PatchOptions& options, const Refit& refit) {
+  constexpr double kTolerated = 1.25;
+  std::vector<LevelSize> sizes;
+  for (const ParticleLevel& level : transformed(base, levels, height, options.transform))
+    sizes.push_back(sizeOf(level));
+  const ParticleLevel& surface = levels.front();
+  const auto across = static_cast<double>(surface.columns - 1),
+             up = static_cast<double>(surface.rows - 1);
+  const double spacing = 0.5 * (sizes[0].u / across + sizes[0].v / up);
+  const double wider =
+      options.spacing > 0 ? 1 : std::max(1.0, chooseSpacing(base.voxelSize(), sizes) / spacing);
+  const auto count = [&](double cells, double stretch) {
+    const double share = stretch / wider;
+    const bool isFit = share <= kTolerated && share * kTolerated >= 1;
+    return countAlong(isFit ? cells : cells * share, 1);
+  };
+  std::vector<Counts> counts;
+  double total = 0;
+  for (const LevelSize& size : sizes) {
+    const Counts n = {count(across, size.u / sizes[0].u), count(up, size.v / sizes[0].v)};
+    total += static_cast<double>(n.columns + 2) * static_cast<double>(n.rows + 2);
+    counts.push_back(n);
+  }
+  checkParticleCount(total, spacing, options);
+  for (std::size_t k = 1; k < levels.size(); ++k)
+    if (counts[k].columns != levels[k].columns || counts[k].rows != levels[k].rows)
+      refit(levels[k], counts[k]);
+}
+
+}  // namespace
+
+std::string pointAsOption(const V3d& p) {
+  return fmt::format("{},{},{}", p.x, p.y, p.z);
+}
+
+void checkPatchOptions(const char* action, double height, const PatchOptions& options) {
+  if (!(height > 0) || !std::isfinite(height)) {
+    throw UsageError(fmt::format("{}: the height is {}; give a positive length", action, height));
+  }
+  if (options.levels < 2) {
+    throw UsageError(
+        fmt::format("{}: {} levels of particles; give at least 2", action, options.levels));
+  }
+  if (!(options.spacing >= 0) || !std::isfinite(options.spacing)) {
+    throw UsageError(fmt::format("{}: the spacing of particles is {}; give a positive length",
+                                 action, options.spacing));
+  }
+  const auto [across, up] = options.cells;
+  if ((across == 0) != (up == 0) || (across > 0 && std::min(across, up) < 3)) {
+    throw UsageError(
+        fmt::format("{}: {} by {} cells; give at least 3 along u and along v", action, across, up));
+  }
+  const LevelTransform& t = options.transform;
+  if (!std::isfinite(t.twist) || !std::isfinite(t.bend) || !(t.taper > 0) ||
+      !std::isfinite(t.taper)) {
+    throw UsageError(
+        fmt::format("{}: twist {}, taper {} and bend {}; give two angles and a positive scale",
+                    action, t.twist, t.taper, t.bend));
+  }
+  if (options.scheme != LevelScheme::Spline && (!options.spline.empty() || options.fade)) {
+    throw UsageError(
+        fmt::format("{}: a spline and its fading go with the spline scheme only", action));
+  }
+  if (options.scheme != LevelScheme::Reduced && (options.parallel || !options.directions.empty())) {
+    throw UsageError(
+        fmt::format("{}: directions of the corners go with the reduced scheme only", action));
+  }
+  if (options.parallel && !options.directions.empty()) {
+    throw UsageError(fmt::format(
+        "{}: the corners are to rise in directions of their own and in parallel; choose one",
+        action));
+  }
+  if (options.directions.size() > 1 && options.directions.size() != 4) {
+    throw UsageError(fmt::format("{}: {} directions of corners; give one for all, or four", action,
+                                 options.directions.size()));
+  }
+  for (const V3d& d : options.directions) {
+    if (!std::isfinite(d.x) || !std::isfinite(d.y) || !std::isfinite(d.z) || !(d.length() > 0)) {
+      throw UsageError(fmt::format("{}: the direction {} leads nowhere", action, pointAsOption(d)));
+    }
+  }
+  for (const V3d& p : options.spline) {
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+      throw UsageError(
+          fmt::format("{}: the spline's point {} is not finite", action, pointAsOption(p)));
+    }
+  }
+  for (std::size_t side = 0; side < 4; ++side)
+    for (const V3d& p : options.sides[side]) {
+      if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+        throw UsageError(fmt::format("{}: the point {} of side {} is not finite", action,
+                                     pointAsOption(p), side));
+      }
+    }
+}
+
+LevelSize sizeOf(const ParticleLevel& level) {
+  LevelSize size{0, 0};
+  for (std::size_t j = 0; j < level.rows; ++j)
+    for (std::size_t i = 0; i < level.columns; ++i) {
+      if (i > 0) size.u += (level.at(i, j) - level.at(i - 1, j)).length();
+      if (j > 0) size.v += (level.at(i, j) - level.at(i, j - 1)).length();
+    }
+  size.u /= static_cast<double>(level.rows);
+  size.v /= static_cast<double>(level.columns);
+  return size;
+}
+
+double particlesAt(double spacing, std::span<const LevelSize> levels) {
+  double count = 0;
+  for (const LevelSize& level : levels) count += (level.u / spacing + 3) * (level.v / spacing + 3);
+  return count;
+}
+
+double chooseSpacing(double voxelSize, std::span<const LevelSize> levels, std::size_t times) {
+  double sum = 0, product = 0;
+  for (const LevelSize& level : levels) {
+    sum += level.u + level.v;
+    product += level.u * level.v;
+  }
+  sum *= static_cast<double>(times);
+  product *= static_cast<double>(times);
+  const double count = static_cast<double>(levels.size() * times);
+  const double rest = std::max(kParticleBudget, 36 * count) - 9 * count;
+  const double spacing = (3 * sum + std::sqrt(9 * sum * sum + 4 * rest * product)) / (2 * rest);
+  return std::max(spacing, kSmallestSpacing * voxelSize);
+}
+
+std::size_t countAlong(double length, double spacing) {
+  const double cells = std::round(length / spacing);
+  if (!(cells < kMostParticles)) {
+    throw levelset::ResourceLimit(fmt::format(
+        "{}: {:.3g} particles lie along a side, more than {:.0g}; take a wider spacing, "
+        "or less taper",
+        kPatchLevels, cells, kMostParticles));
+  }
+  return std::max(kFewest, static_cast<std::size_t>(cells) + 1);
+}
+
+void checkParticleCount(double count, double spacing, const PatchOptions& options) {
+  levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kPatchLevels);
+  if (!(count <= kMostParticles)) {
+    throw levelset::ResourceLimit(fmt::format(
+        "{}: a spacing of {:.6g} would make {:.3g} particles, more than {:.0g}; take a wider "
+        "one",
+        kPatchLevels, spacing, count, kMostParticles));
+  }
+}
+
+NarrowBand sweepAbove(const NarrowBand& base, std::span<const V3d> outline, const LevelSize& size,
+                      double height, const PatchOptions& options, double lean) {
+  // Inner particles may lie outside the box of the sides: a patch may bulge by a quarter of its
+  // width.
+  const double bulge = 0.25 * std::min(size.u, size.v) + lean;
+  return sweepPatchSpace(base, outline, bulge, height,
+                         {.shared = options.space,
+                          .maxMemory = options.maxMemory,
+                          .progress = levelset::subProgress(options.progress, 0.1, 0.5)});
+}
+
+std::vector<ParticleLevel> levelsFromSurface(const NarrowBand& base, const ParticleLevel& surface,
+                                             std::span<const V3d> outline, const LevelSize& size,
+                                             double height, const PatchOptions& options,
+                                             PatchReport& report) {
+  if (options.scheme == LevelScheme::Conforming) {
+    const NarrowBand space = sweepAbove(base, outline, size, height, options);
+    std::vector<ParticleLevel> levels = conformingLevels(space, surface, height, options.levels);
+    if (options.cells[0] == 0) {
+      keepDensity(base, levels, height, options, [&](ParticleLevel& level, const Counts& n) {
+        // New particles start on the surface like the others, wherever it has relief between them.
+        ParticleLevel start = withCounts(surface, n.columns, n.rows);
+        const SurfaceField field(base);
+        for (V3d& p : start.positions) (void)field.project(p, 0);
+        for (V3d& p : start.rim) (void)field.project(p, 0);
+        level = conformingLevel(space, start, height, level.w);
+      });
+    }
+    return levels;
+  }
+  const Axis axis = axisOf(base, surface);
+  std::vector<V3d> points = {axis.origin};
+  points.insert(points.end(), options.spline.begin(), options.spline.end());
+  if (options.spline.empty()) points.push_back(axis.origin + axis.normal * height);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    if ((points[i] - points[i - 1]).length() < 1e-6 * base.voxelSize()) {
+      throw UsageError(fmt::format("{}: the spline stands still at {}; leave one point out{}",
+                                   kPatchLevels, pointAsOption(points[i]),
+                                   i == 1 ? ", it begins at the patch's centre by itself" : ""));
+    }
+  }
+  const SweepCurve curve(points);
+  if (height > curve.length() * (1 + 1e-9)) {
+    throw UsageError(
+        fmt::format("{}: the height is {:.6g} and the spline only {:.6g} long; lower the height or "
+                    "lengthen the spline",
+                    kPatchLevels, height, curve.length()));
+  }
+  SplineSweep sweep = splineLevels(surface, curve, height, options.levels, options.fade);
+  report.slowed = sweep.slowed;
+  if (options.cells[0] == 0) {
+    keepDensity(base, sweep.levels, height, options, [](ParticleLevel& level, const Counts& n) {
+      level = withCounts(level, n.columns, n.rows);
+    });
+  }
+  return std::move(sweep.levels);
+}
+
+void requireCovered(const NarrowBand& base, const ParticleLevel& level) {
+  if (!base.isOpenSurface()) return;
+  const SurfaceField field(base);
+  const auto require = [&](const V3d& place) {
+    V3d p = place;
+    if (field.project(p, 0) && !field.isBeyondBorder(p)) return;
+    throw levelset::InvalidInput(fmt::format(
+        "{}: the surface breaks off at ({:.6g}, {:.6g}, {:.6g}), within the patch; keep to "
+        "one side of its border, and off its holes",
+        kPatchLevels, place.x, place.y, place.z));
+  };
+  for (const V3d& p : level.positions) require(p);
+  constexpr double kStepVoxels = 1;  // a slit of four shows in the middle two of them
+  const auto steps = [&](const V3d& along) {
+    return std::ceil(along.length() / (kStepVoxels * base.voxelSize()));
+  };
+  for (std::size_t j = 0; j + 1 < level.rows; ++j)
+    for (std::size_t i = 0; i + 1 < level.columns; ++i) {
+      const V3d &a = level.at(i, j), &b = level.at(i + 1, j), &c = level.at(i, j + 1),
+                &d = level.at(i + 1, j + 1);
+      const double across = steps(b - a), up = steps(c - a);
+      for (double s = 0.5; s < across; ++s)
+        for (double t = 0.5; t < up; ++t) {
+          const double u = s / across, v = t / up;
+          require((a * (1 - u) + b * u) * (1 - v) + (c * (1 - u) + d * u) * v);
+        }
+    }
+}
+
+void finishPatch(const NarrowBand& base, const PatchOptions& options, Patch& patch,
+                 PatchReport& report) {
+  requireCovered(base, patch.levels.front());
+  patch.levels = transformed(base, std::move(patch.levels), patch.height, options.transform);
+  patch.spacing = meanSpacing(patch);
+  patch.scheme = options.scheme;
+  report.cellAreaVariation = cellAreaVariation(patch.levels.front());
+}
+
+}  // namespace mapping

@@ -1,0 +1,238 @@
+#include "mapping/layers/relaxation.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "mapping/surface/surface_field.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+
+constexpr std::size_t kMaxIterations = 1000;
+constexpr double kAtRest = 1e-3;  // voxels an iteration
+// Twelve springs of unit stiffness pull at a particle: 1/12 is the longest step that cannot
+// overshoot by more than the momentum takes back.
+constexpr double kStep = 1.0 / 12;
+constexpr double kMomentum = 0.8;
+
+double fractionOf(std::size_t k, std::size_t count) {
+  return static_cast<double>(k) / static_cast<double>(count - 1);
+}
+
+/// A place between four particles of a level, at shares of its columns and rows.
+struct Between {
+  std::size_t corner, columns;
+  double s, t;
+
+  Between(const ParticleLevel& level, double u, double v) : columns(level.columns) {
+    const auto split = [](double share, std::size_t count, double& rest) {
+      const double x = share * static_cast<double>(count - 1);
+      const auto first = std::min(static_cast<std::size_t>(x), count - 2);
+      rest = x - static_cast<double>(first);
+      return first;
+    };
+    const std::size_t i = split(u, level.columns, s), j = split(v, level.rows, t);
+    corner = j * columns + i;
+  }
+  [[nodiscard]] V3d of(const std::vector<V3d>& values) const {
+    const V3d low = values[corner] * (1 - s) + values[corner + 1] * s;
+    const V3d high = values[corner + columns] * (1 - s) + values[corner + columns + 1] * s;
+    return low * (1 - t) + high * t;
+  }
+};
+
+struct Spring {
+  int columns, rows;  // to the neighbour
+};
+constexpr std::array<Spring, 12> kSprings = {{{1, 0},
+                                              {-1, 0},
+                                              {0, 1},
+                                              {0, -1},  // structural
+                                              {1, 1},
+                                              {-1, 1},
+                                              {1, -1},
+                                              {-1, -1},  // shear
+                                              {2, 0},
+                                              {-2, 0},
+                                              {0, 2},
+                                              {0, -2}}};  // flexion
+
+/// Lengths at rest: between the borders, the chords go over from one border's mean to the other's.
+struct RestLengths {
+  /// Of neighbours, and of those two apart: on a bent surface these are less than twice as long.
+  std::array<std::vector<double>, 2> along;   // in u, of each row
+  std::array<std::vector<double>, 2> across;  // in v, of each column
+
+  explicit RestLengths(const ParticleLevel& level) {
+    const auto rowChord = [&](std::size_t row, std::size_t apart) {
+      double sum = 0;
+      for (std::size_t i = apart; i < level.columns; ++i)
+        sum += (level.at(i, row) - level.at(i - apart, row)).length();
+      return sum / static_cast<double>(level.columns - apart);
+    };
+    const auto columnChord = [&](std::size_t column, std::size_t apart) {
+      double sum = 0;
+      for (std::size_t j = apart; j < level.rows; ++j)
+        sum += (level.at(column, j) - level.at(column, j - apart)).length();
+      return sum / static_cast<double>(level.rows - apart);
+    };
+    for (const std::size_t apart : {1u, 2u}) {
+      along[apart - 1] = between(rowChord(0, apart), rowChord(level.rows - 1, apart), level.rows);
+      across[apart - 1] =
+          between(columnChord(0, apart), columnChord(level.columns - 1, apart), level.columns);
+    }
+  }
+
+  [[nodiscard]] double of(const Spring& spring, std::size_t column, std::size_t row) const {
+    const auto length = [](int apart, const std::array<std::vector<double>, 2>& chords,
+                           std::size_t n) {
+      return apart == 0 ? 0 : chords[apart * apart > 1 ? 1 : 0][n];
+    };
+    return std::hypot(length(spring.columns, along, row), length(spring.rows, across, column));
+  }
+
+  static std::vector<double> between(double first, double last, std::size_t count) {
+    std::vector<double> result(count);
+    for (std::size_t i = 0; i < count; ++i)
+      result[i] = std::lerp(first, last, fractionOf(i, count));
+    return result;
+  }
+};
+
+V3d springForce(const ParticleLevel& level, const RestLengths& rest, std::size_t column,
+                std::size_t row, bool isRing) {
+  const long around = static_cast<long>(level.columns) - 1;
+  const V3d p = level.at(column, row);
+  V3d force(0);
+  for (const Spring& spring : kSprings) {
+    long i = static_cast<long>(column) + spring.columns;
+    const long j = static_cast<long>(row) + spring.rows;
+    if (isRing) i = (i + around) % around;
+    if (i < 0 || j < 0 || i >= static_cast<long>(level.columns) ||
+        j >= static_cast<long>(level.rows))
+      continue;
+    const V3d way = level.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j)) - p;
+    const double length = way.length();
+    if (length == 0) continue;
+    force += way * (1 - rest.of(spring, column, row) / length);
+  }
+  return force;
+}
+
+/// A level with half as many rows and columns of particles, between those of the fine one.
+ParticleLevel coarsened(const SurfaceField& field, const ParticleLevel& fine) {
+  ParticleLevel coarse = fine;
+  coarse.rim.clear();
+  coarse.columns = (fine.columns + 1) / 2;
+  coarse.rows = (fine.rows + 1) / 2;
+  coarse.positions.assign(coarse.columns * coarse.rows, V3d(0));
+  for (std::size_t j = 0; j < coarse.rows; ++j)
+    for (std::size_t i = 0; i < coarse.columns; ++i) {
+      const Between place(fine, fractionOf(i, coarse.columns), fractionOf(j, coarse.rows));
+      V3d& p = coarse.positions[j * coarse.columns + i];
+      p = place.of(fine.positions);
+      V3d projected = p;
+      if (field.project(projected, fine.height)) p = projected;
+    }
+  return coarse;
+}
+
+/// The last column is the first one again.
+void closeRing(std::vector<V3d>& positions, std::size_t columns) {
+  for (std::size_t n = 0; n < positions.size(); n += columns)
+    positions[n + columns - 1] = positions[n];
+}
+
+Relaxation settle(const levelset::NarrowBand& band, ParticleLevel& level, bool isRing);
+
+/// What is out of place over many particles is put right where it is over few: springs alone hand
+/// it on by one particle an iteration.
+void settleCoarsely(const levelset::NarrowBand& band, ParticleLevel& level, bool isRing) {
+  constexpr std::size_t kFewestToCoarsen = 8;
+  if (std::min(level.columns, level.rows) < kFewestToCoarsen) return;
+  const SurfaceField field(band);
+  ParticleLevel coarse = coarsened(field, level);
+  std::vector<V3d> moves = coarse.positions;
+  settleCoarsely(band, coarse, isRing);
+  (void)settle(band, coarse, isRing);
+  for (std::size_t n = 0; n < moves.size(); ++n) moves[n] = coarse.positions[n] - moves[n];
+  for (std::size_t j = 1; j + 1 < level.rows; ++j)
+    for (std::size_t i = isRing ? 0 : 1; i + 1 < level.columns; ++i) {
+      const Between place(coarse, fractionOf(i, level.columns), fractionOf(j, level.rows));
+      V3d& p = level.positions[j * level.columns + i];
+      V3d moved = p + place.of(moves);
+      if (field.project(moved, level.height)) p = moved;
+    }
+  if (isRing) closeRing(level.positions, level.columns);
+}
+
+Relaxation settle(const levelset::NarrowBand& band, ParticleLevel& level, bool isRing) {
+  Relaxation result;
+  const RestLengths rest(level);
+  const double voxel = band.voxelSize();
+  const std::size_t count = level.positions.size();
+  const double longest =
+      0.25 * std::min(*std::min_element(rest.along[0].begin(), rest.along[0].end()),
+                      *std::min_element(rest.across[0].begin(), rest.across[0].end()));
+  std::vector<V3d> previous = level.positions, next = level.positions;
+  while (result.iterations < kMaxIterations && !result.isConverged) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 64), [&](const auto& range) {
+      const SurfaceField field(band);
+      for (std::size_t n = range.begin(); n != range.end(); ++n) {
+        const std::size_t column = n % level.columns, row = n / level.columns;
+        if (row == 0 || row + 1 == level.rows || column + 1 == level.columns) continue;
+        if (column == 0 && !isRing) continue;
+        const V3d p = level.positions[n];
+        V3d move =
+            springForce(level, rest, column, row, isRing) * kStep + (p - previous[n]) * kMomentum;
+        const V3d normal = field.normal(p);
+        move -= normal * move.dot(normal);
+        const double length = move.length();
+        if (length > longest) move *= longest / length;
+        V3d moved = p + move;
+        next[n] = field.project(moved, level.height) ? moved : p;
+      }
+    });
+    if (isRing) closeRing(next, level.columns);
+    result.lastMove = 0;
+    for (std::size_t n = 0; n < count; ++n)
+      result.lastMove = std::max(result.lastMove, (next[n] - level.positions[n]).length() / voxel);
+    previous.swap(level.positions);
+    level.positions.swap(next);
+    ++result.iterations;
+    result.isConverged = result.lastMove <= kAtRest;
+  }
+  return result;
+}
+
+}  // namespace
+
+Relaxation relax(const levelset::NarrowBand& band, ParticleLevel& level, bool isRing) {
+  if (level.columns < 3 || level.rows < 3) return {.isConverged = true};
+  settleCoarsely(band, level, isRing);
+  return settle(band, level, isRing);
+}
+
+double cellAreaVariation(const ParticleLevel& level) {
+  double sum = 0, squares = 0, count = 0;
+  for (std::size_t j = 0; j + 1 < level.rows; ++j)
+    for (std::size_t i = 0; i + 1 < level.columns; ++i) {
+      const double area = 0.5 * (level.at(i + 1, j + 1) - level.at(i, j))
+                                    .cross(level.at(i, j + 1) - level.at(i + 1, j))
+                                    .length();
+      sum += area;
+      squares += area * area;
+      ++count;
+    }
+  const double mean = sum / count;
+  return mean > 0 ? std::sqrt(std::max(0.0, squares / count - mean * mean)) / mean : 0;
+}
+
+}  // namespace mapping

@@ -1,0 +1,359 @@
+#include "mapping/placement/decal.h"
+
+#include <fmt/core.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <tuple>
+#include <utility>
+
+#include "levelset/error.h"
+#include "mapping/layers/particle_layers.h"
+#include "mapping/layers/patch_layers.h"
+#include "mapping/placement/make_patch.h"
+#include "mapping/surface/geodesic.h"
+#include "mapping/surface/surface_field.h"
+#include "mapping/surface/surface_projection.h"
+#include "mapping/surface/surface_walk.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using levelset::NarrowBand;
+using levelset::UsageError;
+
+constexpr const char* kDecal = "decal";
+constexpr double kLeastTangent = 0.02;  // of a direction: 1.1 degrees from the normal
+
+/// Where a level's map begins, and the directions of u and v there, unit.
+struct DecalFrame {
+  V3d center, u, v;
+};
+
+DecalFrame frameAt(const SurfaceField& field, const V3d& center, const V3d& direction,
+                   bool isMirrored) {
+  const V3d normal = field.normal(center);
+  const double length = direction.length();
+  const V3d tangent = direction - normal * normal.dot(direction);
+  if (!(tangent.length() > kLeastTangent * length)) {
+    throw UsageError(fmt::format(
+        "{}: the direction {} stands on the surface at {}, whose normal is {:.3g},{:.3g},{:.3g}; "
+        "give one that runs along the surface",
+        kDecal, pointAsOption(direction), pointAsOption(center), normal.x, normal.y, normal.z));
+  }
+  const V3d u = tangent.normalized(), v = normal.cross(u);
+  return {center, u, isMirrored ? -v : v};
+}
+
+/// −1 … 1 along a row or column.
+double signedShare(std::size_t i, std::size_t count) {
+  return 2 * static_cast<double>(i) / static_cast<double>(count - 1) - 1;
+}
+
+/// Half the side of a square about the centre that does not hold what lies at (u, v) of ±1.
+double squareRadius(const ParticleLevel& level, std::size_t index, double radius) {
+  return radius * std::max(std::abs(signedShare(index % level.columns, level.columns)),
+                           std::abs(signedShare(index / level.columns, level.rows)));
+}
+
+std::string smallerRadius(double radius) {
+  return fmt::format("take a radius below {:.4g}", radius);
+}
+
+/// Sends a walk to each particle of the level.
+/// @throws InvalidInput where the surface breaks off
+void walkToParticles(const NarrowBand& band, const DecalFrame& frame, double radius,
+                     ParticleLevel& level) {
+  level.positions.assign(level.columns * level.rows, frame.center);
+  std::vector<double> missing(level.positions.size(), 0);  // of the way
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, level.positions.size(), 16), [&](const auto& range) {
+        const SurfaceField field(band);
+        for (std::size_t n = range.begin(); n != range.end(); ++n) {
+          const V3d way = frame.u * (radius * signedShare(n % level.columns, level.columns)) +
+                          frame.v * (radius * signedShare(n / level.columns, level.rows));
+          const double length = way.length();
+          if (length < 1e-9 * radius) continue;
+          SurfaceWalk walk(field, level.height, frame.center, way);
+          if (!walk.advance(length)) missing[n] = length - walk.walked();
+          level.positions[n] = walk.position();
+        }
+      });
+  double most = std::numeric_limits<double>::infinity();
+  std::size_t first = 0;
+  for (std::size_t n = 0; n < missing.size(); ++n) {
+    if (missing[n] == 0) continue;
+    const double u = signedShare(n % level.columns, level.columns),
+                 v = signedShare(n / level.columns, level.rows);
+    const double length = radius * std::hypot(u, v);
+    const double reached = squareRadius(level, n, radius) * (1 - missing[n] / length);
+    if (reached >= most) continue;
+    most = reached;
+    first = n;
+  }
+  if (!std::isfinite(most)) return;
+  throw InvalidInput(fmt::format(
+      "{}: the surface breaks off or is too sharp to be followed at {}, {:.4g} from the centre {}; "
+      "{}",
+      kDecal, pointAsOption(level.positions[first]),
+      radius * std::hypot(signedShare(first % level.columns, level.columns),
+                          signedShare(first / level.columns, level.rows)) -
+          missing[first],
+      pointAsOption(frame.center), smallerRadius(most)));
+}
+
+std::vector<V3d> particleNormals(const NarrowBand& band, const ParticleLevel& level) {
+  const SurfaceField field(band);
+  std::vector<V3d> normals;
+  for (const V3d& p : level.positions) normals.push_back(field.normal(p));
+  return normals;
+}
+
+/// Half of a cell's vector of area: positive along the normals where the cell lies as it should.
+double facing(const ParticleLevel& level, const std::vector<V3d>& normals, std::size_t column,
+              std::size_t row) {
+  const std::size_t a = row * level.columns + column, b = a + 1, c = a + level.columns, d = c + 1;
+  const V3d area =
+      (level.positions[d] - level.positions[a]).cross(level.positions[c] - level.positions[b]);
+  return area.dot(normals[a] + normals[b] + normals[c] + normals[d]);
+}
+
+/// What is wrong with a level, and half the side of the square that ends before it.
+struct Trouble {
+  double radius = std::numeric_limits<double>::infinity();
+  V3d place{0};
+  const char* sentence = "";  ///< with a gap for the place
+  void note(double at, const V3d& where, const char* what) {
+    if (at < radius) *this = {at, where, what};
+  }
+};
+
+/// Cells that turn over, or pass through the solid.
+void findFolds(const ParticleLevel& level, const std::vector<V3d>& normals, double radius,
+               bool isMirrored, Trouble& trouble) {
+  constexpr double kOpposite = -0.5;
+  for (std::size_t j = 0; j + 1 < level.rows; ++j)
+    for (std::size_t i = 0; i + 1 < level.columns; ++i) {
+      const std::size_t a = j * level.columns + i;
+      double at = 0;
+      for (const std::size_t n : {a, a + 1, a + level.columns, a + level.columns + 1})
+        at = std::max(at, squareRadius(level, n, radius));
+      const bool isOpposite = normals[a].dot(normals[a + 1]) < kOpposite ||
+                              normals[a].dot(normals[a + level.columns]) < kOpposite;
+      if (isOpposite) {
+        trouble.note(at, level.positions[a],
+                     "goes around a part at {} that is thinner than its particles are apart; take "
+                     "them closer with --spacing, or ");
+      }
+      const double area = facing(level, normals, i, j);
+      if ((isMirrored ? -area : area) <= 0) {
+        trouble.note(at, level.positions[a],
+                     "folds at {}, where ways from its centre have crossed; ");
+      }
+    }
+}
+
+/// Particles that are no neighbours and lie upon each other.
+void findOverlaps(const ParticleLevel& level, const std::vector<V3d>& normals, double radius,
+                  Trouble& trouble) {
+  constexpr double kNear = 0.75;  // spacings
+  constexpr long kNeighbours = 3;
+  const double spacing = 2 * radius / static_cast<double>(level.columns - 1);
+  using Bucket = std::tuple<long, long, long>;
+  const auto cellOf = [&](const V3d& p) {
+    return Bucket(std::lround(p.x / spacing), std::lround(p.y / spacing),
+                  std::lround(p.z / spacing));
+  };
+  std::map<Bucket, std::vector<std::size_t>> cells;
+  for (std::size_t n = 0; n < level.positions.size(); ++n)
+    cells[cellOf(level.positions[n])].push_back(n);
+  const auto look = [&](std::size_t n, std::size_t m) {
+    const auto apart = [](std::size_t x, std::size_t y) {
+      return std::abs(static_cast<long>(x) - static_cast<long>(y));
+    };
+    if (std::max(apart(n % level.columns, m % level.columns),
+                 apart(n / level.columns, m / level.columns)) < kNeighbours)
+      return;
+    if ((level.positions[n] - level.positions[m]).length() > kNear * spacing ||
+        normals[n].dot(normals[m]) < 0)
+      return;
+    trouble.note(std::max(squareRadius(level, n, radius), squareRadius(level, m, radius)),
+                 level.positions[n], "comes round to itself at {}; ");
+  };
+  for (std::size_t n = 0; n < level.positions.size(); ++n) {
+    const auto [x, y, z] = cellOf(level.positions[n]);
+    for (int k = 0; k < 27; ++k) {
+      const auto found = cells.find({x + k / 9 - 1, y + k / 3 % 3 - 1, z + k % 3 - 1});
+      if (found == cells.end()) continue;
+      for (const std::size_t m : found->second)
+        if (m > n) look(n, m);
+    }
+  }
+}
+
+/// @throws InvalidInput where the level folds, lies upon itself or passes through the solid
+void requireSound(const NarrowBand& band, const ParticleLevel& level, double radius,
+                  bool isMirrored) {
+  const std::vector<V3d> normals = particleNormals(band, level);
+  Trouble trouble;
+  findFolds(level, normals, radius, isMirrored, trouble);
+  findOverlaps(level, normals, radius, trouble);
+  if (!std::isfinite(trouble.radius)) return;
+  throw InvalidInput(
+      fmt::format("{}: it {}{}", kDecal,
+                  fmt::format(fmt::runtime(trouble.sentence), pointAsOption(trouble.place)),
+                  smallerRadius(0.95 * trouble.radius)));
+}
+
+/// One exponential map on φ = height.
+ParticleLevel decalLevel(const NarrowBand& band, const DecalFrame& frame, double radius,
+                         double height, double w, std::size_t count, bool isMirrored) {
+  ParticleLevel level;
+  level.columns = level.rows = count;
+  level.w = w;
+  level.height = height;
+  walkToParticles(band, frame, radius, level);
+  requireSound(band, level, radius, isMirrored);
+  addRim(band, level);
+  return level;
+}
+
+/// From the centre to the middles of the sides.
+std::vector<std::vector<V3d>> spokes(const NarrowBand& band, const DecalFrame& frame,
+                                     double radius) {
+  const SurfaceField field(band);
+  std::vector<std::vector<V3d>> result;
+  for (const V3d& way : {frame.u, -frame.u, frame.v, -frame.v}) {
+    SurfaceWalk walk(field, 0, frame.center, way);
+    std::vector<V3d> path = {frame.center};
+    const double pieces = std::ceil(radius / band.voxelSize());
+    for (int i = 0; i < static_cast<int>(pieces) && walk.advance(radius / pieces); ++i)
+      path.push_back(walk.position());
+    result.push_back(std::move(path));
+  }
+  return result;
+}
+
+/// The same frame, one level up: its centre and spokes are carried along ∇φ.
+/// @return how much longer the spokes have become, on the average
+double raiseFrame(const NarrowBand& space, double from, double to, DecalFrame& frame,
+                  std::vector<std::vector<V3d>>& paths) {
+  std::vector<V3d> points = {frame.center};
+  for (const std::vector<V3d>& path : paths) points.push_back(path.back());
+  advectPoints(space, from, to, points);
+  const SurfaceField field(space);
+  const V3d before = field.normal(frame.center), after = field.normal(points[0]);
+  frame = {points[0], carried(frame.u, before, after), carried(frame.v, before, after)};
+  double growth = 0;
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    const double length = pathLength(paths[i]);
+    std::vector<V3d> path = geodesicLike(field, to, frame.center, points[i + 1], paths[i]);
+    if (path.empty()) path = geodesic(field, to, frame.center, points[i + 1]);
+    if (path.empty()) {
+      throw InvalidInput(fmt::format(
+          "{}: at height {:.4g} the surface no longer joins its centre and sides; lower the height "
+          "or take the conforming particles",
+          kDecal, to));
+    }
+    growth += pathLength(path) / length / static_cast<double>(paths.size());
+    paths[i] = std::move(path);
+  }
+  return growth;
+}
+
+std::vector<ParticleLevel> reducedDecal(const NarrowBand& base, DecalFrame frame, double radius,
+                                        const ParticleLevel& surface, double height,
+                                        const PatchOptions& options) {
+  const NarrowBand space =
+      sweepAbove(base, surface.positions, {2 * radius, 2 * radius}, height, options);
+  std::vector<std::vector<V3d>> paths = spokes(base, frame, radius);
+  std::vector<ParticleLevel> levels = {surface};
+  for (std::size_t k = 1; k < options.levels; ++k) {
+    const double w = static_cast<double>(k) / static_cast<double>(options.levels - 1);
+    radius *= raiseFrame(space, levels.back().height, w * height, frame, paths);
+    levels.push_back(
+        decalLevel(space, frame, radius, w * height, w, surface.columns, options.mirror));
+    levelset::report(options.progress, 0.5 + 0.5 * w, kDecal);
+  }
+  return levels;
+}
+
+void checkDecalArguments(const NarrowBand& base, const V3d& direction, double radius, double height,
+                         const PatchOptions& options) {
+  checkPatchOptions(kDecal, height, options);
+  if (!(radius > 0) || !std::isfinite(radius))
+    throw UsageError(fmt::format("{}: the radius is {}; give a positive length", kDecal, radius));
+  if (!std::isfinite(direction.x) || !std::isfinite(direction.y) || !std::isfinite(direction.z) ||
+      direction.length() == 0) {
+    throw UsageError(
+        fmt::format("{}: the direction {} shows nowhere; give one that runs along the "
+                    "surface",
+                    kDecal, pointAsOption(direction)));
+  }
+  for (const std::vector<V3d>& side : options.sides)
+    if (!side.empty())
+      throw UsageError(
+          fmt::format("{}: points along sides go with the corners of a patch", kDecal));
+  if (radius < 2 * base.voxelSize()) {
+    throw InvalidInput(
+        fmt::format("{}: the radius {:.4g} is under two voxels of {:.4g}; take a "
+                    "larger one, or resample the base",
+                    kDecal, radius, base.voxelSize()));
+  }
+  const double diagonal = base.zeroSetBounds().size().length();
+  if (radius > 10 * diagonal) {
+    throw InvalidInput(
+        fmt::format("{}: the radius {:.4g} is over ten times the base's diagonal of {:.4g}; make "
+                    "it smaller",
+                    kDecal, radius, diagonal));
+  }
+}
+
+}  // namespace
+
+PatchResult makeDecal(const NarrowBand& base, const V3d& at, const V3d& direction, double radius,
+                      double height, const PatchOptions& options) {
+  if (base.isEmpty()) {
+    throw InvalidInput(
+        fmt::format("{}: the base has no surface; give a solid with at least one voxel", kDecal));
+  }
+  checkDecalArguments(base, direction, radius, height, options);
+  PatchResult result;
+  const V3d center = closestSurfacePoint(base, at, kDecal);
+  result.report.projectionDistance = (center - at).length();
+  const DecalFrame frame =
+      frameAt(SurfaceField(base), center, direction.normalized(), options.mirror);
+
+  const LevelSize size{2 * radius, 2 * radius};
+  const double spacing = options.spacing > 0
+                             ? options.spacing
+                             : chooseSpacing(base.voxelSize(), {{size}}, options.levels);
+  checkParticleCount(particlesAt(spacing, {{size}}) * static_cast<double>(options.levels), spacing,
+                     options);
+  const ParticleLevel surface =
+      decalLevel(base, frame, radius, 0, 0, countAlong(2 * radius, spacing), options.mirror);
+  levelset::report(options.progress, 0.1, kDecal);
+
+  Patch& patch = result.patch;
+  patch.height = height;
+  patch.mirrored = options.mirror;
+  const std::size_t last = surface.columns - 1;
+  patch.corners = {surface.at(0, 0), surface.at(last, 0), surface.at(last, last),
+                   surface.at(0, last)};
+  patch.levels = options.scheme == LevelScheme::Reduced
+                     ? reducedDecal(base, frame, radius, surface, height, options)
+                     : levelsFromSurface(base, surface, surface.positions, size, height, options,
+                                         result.report);
+  result.report.uLength = size.u;
+  result.report.vLength = size.v;
+  finishPatch(base, options, patch, result.report);
+  return result;
+}
+
+}  // namespace mapping

@@ -1,0 +1,355 @@
+#include "mapping/placement/make_patch.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/error.h"
+#include "mapping/layers/particle_layers.h"
+#include "mapping/layers/patch_layers.h"
+#include "mapping/surface/geodesic.h"
+#include "mapping/surface/surface_field.h"
+#include "mapping/surface/surface_projection.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using levelset::NarrowBand;
+using levelset::UsageError;
+
+constexpr const char* kPatch = "patch";
+void checkPatchArguments(const std::array<V3d, 4>& corners, double height,
+                         const PatchOptions& options) {
+  checkPatchOptions(kPatch, height, options);
+  for (const V3d& c : corners) {
+    if (!std::isfinite(c.x) || !std::isfinite(c.y) || !std::isfinite(c.z))
+      throw UsageError(fmt::format("{}: the corner {} is not finite", kPatch, pointAsOption(c)));
+  }
+}
+
+struct Outline {
+  std::array<V3d, 4> corners;
+  PatchSides between;  ///< points that the sides pass
+};
+
+void checkApart(const NarrowBand& base, const Outline& outline) {
+  const std::array<V3d, 4>& corners = outline.corners;
+  for (std::size_t i = 0; i < 4; ++i)
+    for (std::size_t j = i + 1; j < 4; ++j) {
+      const double distance = (corners[i] - corners[j]).length();
+      if (distance < 2 * base.voxelSize()) {
+        throw InvalidInput(fmt::format(
+            "{}: corners {} and {} both fall on {}, {:.3g} voxels apart; a patch needs sides of at "
+            "least two voxels",
+            kPatch, i, j, pointAsOption(corners[i]), distance / base.voxelSize()));
+      }
+    }
+  constexpr std::array<std::array<std::size_t, 2>, 4> kEnds = {{{0, 1}, {1, 2}, {3, 2}, {0, 3}}};
+  for (std::size_t side = 0; side < 4; ++side) {
+    std::vector<V3d> knots = {corners[kEnds[side][0]]};
+    knots.insert(knots.end(), outline.between[side].begin(), outline.between[side].end());
+    knots.push_back(corners[kEnds[side][1]]);
+    for (std::size_t i = 1; i < knots.size(); ++i) {
+      if ((knots[i] - knots[i - 1]).length() >= 2 * base.voxelSize()) continue;
+      throw InvalidInput(fmt::format(
+          "{}: two points of side {} both fall on {}; the side begins and ends at corners by "
+          "itself, leave one point out",
+          kPatch, side, pointAsOption(knots[i])));
+    }
+  }
+}
+
+/// Positive when the corners run anticlockwise seen from outside: twice the area that each corner
+/// spans with its neighbours, against the normal there.
+double handedness(const NarrowBand& base, const std::array<V3d, 4>& corners) {
+  const SurfaceField field(base);
+  double sum = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const V3d &p = corners[i], &next = corners[(i + 1) % 4], &last = corners[(i + 3) % 4];
+    sum += (next - p).cross(last - p).dot(field.normal(p));
+  }
+  return sum;
+}
+
+/// The same by the directions in which sides leave the corners: it tells also where a patch is
+/// wrapped around an edge, so that its corners lie above each other.
+double handednessOfSides(const NarrowBand& base, const PatchSides& sides) {
+  const SurfaceField field(base);
+  // A tenth of the way along.
+  const auto leaving = [](const std::vector<V3d>& side, bool isReversed) {
+    const std::vector<V3d> tenths = sampleByArcLength(side, 11);
+    return isReversed ? (tenths[9] - tenths[10]).normalized()
+                      : (tenths[1] - tenths[0]).normalized();
+  };
+  const std::array<std::array<V3d, 2>, 4> ways = {
+      {{leaving(sides[0], false), leaving(sides[3], false)},
+       {leaving(sides[1], false), leaving(sides[0], true)},
+       {leaving(sides[2], true), leaving(sides[1], true)},
+       {leaving(sides[3], true), leaving(sides[2], false)}}};
+  const std::array<V3d, 4> corners = {sides[0].front(), sides[0].back(), sides[2].back(),
+                                      sides[2].front()};
+  double sum = 0;
+  for (std::size_t i = 0; i < 4; ++i)
+    sum += ways[i][0].cross(ways[i][1]).dot(field.normal(corners[i]));
+  return sum;
+}
+
+/// @return true when mirrored
+bool checkOrientation(const NarrowBand& base, const std::array<V3d, 4>& given,
+                      const PatchSides& sides, bool mirror) {
+  const std::array<V3d, 4> corners = {sides[0].front(), sides[0].back(), sides[2].back(),
+                                      sides[2].front()};
+  constexpr double kFlat = 1e-3;
+  double area = handedness(base, corners), scale = 0;
+  for (std::size_t i = 0; i < 4; ++i) scale += (corners[(i + 1) % 4] - corners[i]).length2();
+  if (std::abs(area) < kFlat * scale) area = handednessOfSides(base, sides) * scale / 4;
+  if (std::abs(area) < kFlat * scale) {
+    throw InvalidInput(
+        fmt::format("{}: the corners {}, {}, {} and {} span no area; move one of them", kPatch,
+                    pointAsOption(corners[0]), pointAsOption(corners[1]), pointAsOption(corners[2]),
+                    pointAsOption(corners[3])));
+  }
+  if (area < 0 && !mirror) {
+    throw UsageError(
+        fmt::format("{}: the corners run clockwise seen from outside, which would mirror the "
+                    "texture; give them as "
+                    "\"{} {} {} {}\" or ask for --mirror",
+                    kPatch, pointAsOption(given[0]), pointAsOption(given[3]),
+                    pointAsOption(given[2]), pointAsOption(given[1])));
+  }
+  return area < 0;
+}
+
+struct LevelSides {
+  double height;
+  PatchSides sides;
+  LevelSize size;
+  [[nodiscard]] std::vector<V3d> outline() const {
+    std::vector<V3d> all;
+    for (const std::vector<V3d>& side : sides) all.insert(all.end(), side.begin(), side.end());
+    return all;
+  }
+};
+
+LevelSides makeLevelSides(const NarrowBand& band, double height, const std::array<V3d, 4>& corners,
+                          const PatchSides& between, const PatchSides* below = nullptr,
+                          const PatchSides* ground = nullptr) {
+  LevelSides level{height, makeSides(band, height, corners, between, below, ground), {}};
+  level.size = {sideLengthU(level.sides), sideLengthV(level.sides)};
+  return level;
+}
+
+/// Corners and points between them, projected to the surface.
+Outline projectOutline(const NarrowBand& base, const std::array<V3d, 4>& corners,
+                       const PatchOptions& options, PatchReport& report) {
+  Outline outline;
+  const auto projected = [&](const V3d& p) {
+    const V3d foot = closestSurfacePoint(base, p, kPatch);
+    report.projectionDistance = std::max(report.projectionDistance, (foot - p).length());
+    return foot;
+  };
+  for (std::size_t side = 0; side < 4; ++side) {
+    outline.corners[side] = projected(corners[side]);
+    for (const V3d& p : options.sides[side]) outline.between[side].push_back(projected(p));
+  }
+  return outline;
+}
+
+/// Counts by the spacing; positions between the sides.
+ParticleLevel filledLevel(const NarrowBand& band, const NarrowBand& guide, const LevelSides& border,
+                          double height, double spacing, const PatchOptions& options,
+                          PatchReport& report) {
+  ParticleLevel level;
+  level.height = border.height;
+  level.w = border.height / height;
+  level.columns = options.cells[0] > 0 ? options.cells[0] + 1 : countAlong(border.size.u, spacing);
+  level.rows = options.cells[1] > 0 ? options.cells[1] + 1 : countAlong(border.size.v, spacing);
+  const Relaxation relaxation = fillLevel(band, guide, border.sides, level);
+  report.relaxIterations += relaxation.iterations;
+  report.isRelaxed = report.isRelaxed && relaxation.isConverged;
+  return level;
+}
+
+/// In which corners, and the points between them, rise; empty: along ∇φ.
+struct Rise {
+  std::vector<V3d> corners;
+  std::array<std::vector<V3d>, 4> between;
+  double lean = 0;  ///< how far they lead away sideways for each length of height
+};
+
+/// The unit direction of each corner.
+/// @throws UsageError for one that hardly leads away from the surface
+std::vector<V3d> cornerDirections(const NarrowBand& base, const Outline& outline,
+                                  const PatchOptions& options) {
+  const SurfaceField field(base);
+  std::vector<V3d> directions = options.directions;
+  if (options.parallel) {
+    const V3d middle =
+        (outline.corners[0] + outline.corners[1] + outline.corners[2] + outline.corners[3]) / 4.0;
+    directions = {field.normal(closestSurfacePoint(base, middle, kPatch))};
+  }
+  if (directions.size() == 1) directions.resize(4, directions.front());
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    directions[i].normalize();
+    constexpr double kLeastCosine = 0.2;  // 78 degrees
+    if (directions[i].dot(field.normal(outline.corners[i])) >= kLeastCosine) continue;
+    throw UsageError(fmt::format(
+        "{}: the direction {} hardly leads away from the surface at corner {}, {}; let it lean by "
+        "less than 78 degrees",
+        kPatch, pointAsOption(directions[i]), i, pointAsOption(outline.corners[i])));
+  }
+  return directions;
+}
+
+Rise riseOf(const NarrowBand& base, const Outline& outline, const PatchOptions& options) {
+  Rise rise{.corners = cornerDirections(base, outline, options), .between = {}};
+  if (rise.corners.empty()) return rise;
+  const SurfaceField field(base);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double cosine = rise.corners[i].dot(field.normal(outline.corners[i]));
+    rise.lean = std::max(rise.lean, std::sqrt(std::max(0.0, 1 - cosine * cosine)) / cosine);
+  }
+  constexpr std::array<std::array<std::size_t, 2>, 4> kEnds = {{{0, 1}, {1, 2}, {3, 2}, {0, 3}}};
+  for (std::size_t side = 0; side < 4; ++side) {
+    const V3d &first = rise.corners[kEnds[side][0]], &last = rise.corners[kEnds[side][1]];
+    const std::size_t count = outline.between[side].size();
+    for (std::size_t i = 1; i <= count; ++i) {
+      const double share = static_cast<double>(i) / static_cast<double>(count + 1);
+      rise.between[side].push_back((first * (1 - share) + last * share).normalized());
+    }
+  }
+  return rise;
+}
+
+/// Brings corners and points between them from one level to the next.
+void raiseOutline(const NarrowBand& space, const Rise& rise, double from, double to,
+                  Outline& outline) {
+  if (rise.corners.empty()) {
+    advectPoints(space, from, to, outline.corners);
+    for (std::vector<V3d>& points : outline.between) advectPoints(space, from, to, points);
+    return;
+  }
+  raisePoints(space, to, rise.corners, outline.corners);
+  for (std::size_t side = 0; side < 4; ++side)
+    raisePoints(space, to, rise.between[side], outline.between[side]);
+}
+
+/// Scheme B: the sides of each level from its own advected corners, and a complete patch between
+/// them.
+std::vector<ParticleLevel> reducedLevels(const NarrowBand& base, Outline outline,
+                                         std::vector<LevelSides> sides, double height,
+                                         const PatchOptions& options, PatchReport& report) {
+  const Rise rise = riseOf(base, outline, options);
+  const NarrowBand space = sweepAbove(base, sides.front().outline(), sides.front().size, height,
+                                      options, rise.lean * height);
+  for (std::size_t k = 1; k < options.levels; ++k) {
+    const double level = height * static_cast<double>(k) / static_cast<double>(options.levels - 1);
+    raiseOutline(space, rise, sides.back().height, level, outline);
+    sides.push_back(makeLevelSides(space, level, outline.corners, outline.between,
+                                   &sides.back().sides, &sides.front().sides));
+  }
+  // As large as taper leaves them.
+  const auto scaleOf = [&](const LevelSides& border) {
+    return std::lerp(1.0, options.transform.taper, border.height / height);
+  };
+  std::vector<LevelSize> sizes;
+  for (const LevelSides& border : sides)
+    sizes.push_back({border.size.u * scaleOf(border), border.size.v * scaleOf(border)});
+  const double spacing =
+      options.spacing > 0 ? options.spacing : chooseSpacing(base.voxelSize(), sizes);
+  if (options.cells[0] == 0) checkParticleCount(particlesAt(spacing, sizes), spacing, options);
+  std::vector<ParticleLevel> levels;
+  for (const LevelSides& border : sides) {
+    levels.push_back(filledLevel(levels.empty() ? base : space, space, border, height,
+                                 spacing / scaleOf(border), options, report));
+    const double done = static_cast<double>(levels.size()) / static_cast<double>(sides.size());
+    levelset::report(options.progress, 0.5 + 0.5 * done, kPatch);
+  }
+  return levels;
+}
+
+/// Schemes A and C: one patch on the surface, whose particles travel.
+std::vector<ParticleLevel> travellingLevels(const NarrowBand& base, const LevelSides& sides,
+                                            double height, const PatchOptions& options,
+                                            PatchReport& report) {
+  const double spacing = options.spacing > 0
+                             ? options.spacing
+                             : chooseSpacing(base.voxelSize(), {{sides.size}}, options.levels);
+  const ParticleLevel surface = filledLevel(base, base, sides, height, spacing, options, report);
+  levelset::report(options.progress, 0.2, kPatch);
+  return levelsFromSurface(base, surface, sides.outline(), sides.size, height, options, report);
+}
+
+}  // namespace
+
+PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners, double height,
+                      const PatchOptions& options) {
+  checkPatchArguments(corners, height, options);
+  PatchResult result;
+  Patch& patch = result.patch;
+  PatchReport& report = result.report;
+
+  // === The quadrilateral on the surface
+  const Outline outline = projectOutline(base, corners, options, report);
+  patch.corners = outline.corners;
+  checkApart(base, outline);
+  patch.height = height;
+  std::vector<LevelSides> sides = {makeLevelSides(base, 0, patch.corners, outline.between)};
+  patch.mirrored = checkOrientation(base, corners, sides.front().sides, options.mirror);
+  const LevelSize size = sides.front().size;
+  if (options.spacing > 0)
+    checkParticleCount(particlesAt(options.spacing, {{size}}) * static_cast<double>(options.levels),
+                       options.spacing, options);
+  levelset::report(options.progress, 0.1, kPatch);
+
+  // === Levels above it
+  patch.levels = options.scheme == LevelScheme::Reduced
+                     ? reducedLevels(base, outline, std::move(sides), height, options, report)
+                     : travellingLevels(base, sides.front(), height, options, report);
+  report.uLength = size.u;
+  report.vLength = size.v;
+  finishPatch(base, options, patch, report);
+  return result;
+}
+
+V3d eastOf(const V3d& normal) {
+  const V3d reference = std::abs(normal.x) < 0.9 ? V3d(1, 0, 0) : V3d(0, 1, 0);
+  return (reference - normal * normal.dot(reference)).normalized();
+}
+
+std::array<V3d, 4> cornersAround(const NarrowBand& base, const V3d& point, double a, double b,
+                                 double rotation) {
+  for (const double size : {a, b}) {
+    if (!(size > 0) || !std::isfinite(size)) {
+      throw UsageError(fmt::format("{}: the size is {}; give two positive lengths", kPatch, size));
+    }
+  }
+  if (!std::isfinite(rotation)) {
+    throw UsageError(fmt::format("{}: the rotation is {}; give an angle", kPatch, rotation));
+  }
+  const V3d center = closestSurfacePoint(base, point, kPatch);
+  const SurfaceField field(base);
+  const V3d normal = field.normal(center);
+  const V3d east = eastOf(normal);
+  const V3d north = normal.cross(east);
+  const V3d u = east * std::cos(rotation) + north * std::sin(rotation), v = normal.cross(u);
+  constexpr std::array<std::array<double, 2>, 4> kSigns = {{{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}};
+  std::array<V3d, 4> corners;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const V3d way = u * (0.5 * a * kSigns[i][0]) + v * (0.5 * b * kSigns[i][1]);
+    const std::optional<V3d> corner = walkStraight(field, 0, center, way, way.length());
+    if (!corner) {
+      throw InvalidInput(fmt::format(
+          "{}: the surface breaks off on the way from {} to corner {}; choose a smaller "
+          "size or give the corners",
+          kPatch, pointAsOption(center), i));
+    }
+    corners[i] = *corner;
+  }
+  return corners;
+}
+
+}  // namespace mapping

@@ -1,0 +1,341 @@
+#include "mapping/placement/patch_grid.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "levelset/error.h"
+#include "mapping/layers/layer_schemes.h"
+#include "mapping/layers/particle_layers.h"
+#include "mapping/layers/patch_layers.h"
+#include "mapping/layers/relaxation.h"
+#include "mapping/placement/make_patch.h"
+#include "mapping/surface/geodesic.h"
+#include "mapping/surface/surface_field.h"
+#include "mapping/surface/surface_projection.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using levelset::NarrowBand;
+using levelset::UsageError;
+
+constexpr const char* kGrid = "patch-grid";
+constexpr double kMostPerTile = 2000;    // particles, as many as a single patch has
+constexpr double kMostPerGrid = 20000;   // all levels; relaxing takes the longer the more there are
+constexpr std::size_t kFewestCells = 4;  // of a tile, along a side
+
+void checkGrid(const PatchGridOptions& grid) {
+  constexpr std::size_t kMostTiles = 100'000;
+  if (grid.columns == 0 || grid.rows == 0 || grid.columns > kMostTiles || grid.rows > kMostTiles ||
+      grid.columns * grid.rows > kMostTiles) {
+    throw UsageError(fmt::format("{}: {} by {} tiles; give 1 to {} in all", kGrid, grid.columns,
+                                 grid.rows, kMostTiles));
+  }
+  if (!(grid.shift >= 0 && grid.shift < 1)) {
+    throw UsageError(fmt::format("{}: the shift is {}; give a share of a tile, 0 to below 1", kGrid,
+                                 grid.shift));
+  }
+}
+
+/// How many cells a tile has along u and v.
+std::array<std::size_t, 2> cellsPerTile(const NarrowBand& base, const LevelSize& whole,
+                                        const PatchGridOptions& grid, const PatchOptions& options) {
+  if (options.cells[0] > 0) return options.cells;
+  const double tiles = static_cast<double>(grid.columns * grid.rows);
+  const double u = whole.u / static_cast<double>(grid.columns),
+               v = whole.v / static_cast<double>(grid.rows);
+  const double perLevel =
+      std::min(kMostPerTile, kMostPerGrid / tiles) / static_cast<double>(options.levels);
+  const double spacing = options.spacing > 0
+                             ? options.spacing
+                             : std::max(std::sqrt(u * v / perLevel), 1.5 * base.voxelSize());
+  const auto cells = [&](double length) {
+    return std::max(kFewestCells, static_cast<std::size_t>(std::lround(length / spacing)));
+  };
+  const std::array<std::size_t, 2> result = {cells(u), cells(v)};
+  checkParticleCount(static_cast<double>((result[0] + 3) * (result[1] + 3)) * tiles *
+                         static_cast<double>(options.levels),
+                     spacing, options);
+  return result;
+}
+
+/// Levels of particles that are cut into tiles.
+struct Sheet {
+  std::vector<ParticleLevel> levels;  ///< of equal counts
+  bool isRing = false;                ///< the last column is the first one again
+  double height = 0;
+  bool isMirrored = false;
+  LevelScheme scheme = LevelScheme::Reduced;
+};
+
+struct Tile {
+  std::size_t column, row;    ///< of its first particle
+  std::size_t columns, rows;  ///< of its cells
+  bool isTurnedU, isTurnedV;
+};
+
+/// The part of a level under a tile; its rim lies on the neighbours' particles.
+ParticleLevel cut(const ParticleLevel& whole, const Tile& tile, bool isRing) {
+  ParticleLevel part;
+  part.columns = tile.columns + 1;
+  part.rows = tile.rows + 1;
+  part.w = whole.w;
+  part.height = whole.height;
+  const auto across = static_cast<int>(tile.columns), up = static_cast<int>(tile.rows);
+  const auto around = static_cast<int>(whole.columns) - 1;
+  const auto at = [&](int i, int j) {
+    int column = static_cast<int>(tile.column) + (tile.isTurnedU ? across - i : i);
+    const int row = static_cast<int>(tile.row) + (tile.isTurnedV ? up - j : j);
+    if (isRing) column = (column + around) % around;
+    return whole.beyond(column, row);
+  };
+  for (int j = 0; j <= up; ++j)
+    for (int i = 0; i <= across; ++i) part.positions.push_back(at(i, j));
+  if (!whole.hasRim()) return part;
+  part.rim.resize(2 * (part.columns + part.rows) + 4);
+  for (int j = -1; j <= up + 1; ++j)
+    for (int i = -1; i <= across + 1; ++i)
+      if (i < 0 || j < 0 || i > across || j > up) part.rim[part.rimIndex(i, j)] = at(i, j);
+  return part;
+}
+
+Patch tilePatch(const Sheet& sheet, const Tile& tile) {
+  Patch patch;
+  patch.height = sheet.height;
+  patch.mirrored = sheet.isMirrored != (tile.isTurnedU != tile.isTurnedV);
+  for (const ParticleLevel& level : sheet.levels)
+    patch.levels.push_back(cut(level, tile, sheet.isRing));
+  const ParticleLevel& surface = patch.levels.front();
+  const std::size_t right = tile.columns, top = tile.rows;
+  patch.corners = {surface.at(0, 0), surface.at(right, 0), surface.at(right, top),
+                   surface.at(0, top)};
+  patch.spacing = meanSpacing(patch);
+  patch.scheme = sheet.scheme;
+  return patch;
+}
+
+std::vector<Patch> cutTiles(const Sheet& sheet, const PatchGridOptions& grid) {
+  const std::size_t across = (sheet.levels.front().columns - 1) / grid.columns,
+                    up = (sheet.levels.front().rows - 1) / grid.rows;
+  const auto moved =
+      static_cast<std::size_t>(std::lround(grid.shift * static_cast<double>(across)));
+  std::vector<Patch> patches;
+  for (std::size_t j = 0; j < grid.rows; ++j) {
+    const std::size_t first = j % 2 == 1 ? moved : 0;
+    const std::size_t count = first > 0 && !sheet.isRing ? grid.columns - 1 : grid.columns;
+    for (std::size_t i = 0; i < count; ++i)
+      patches.push_back(tilePatch(sheet, {first + i * across, j * up, across, up,
+                                          grid.mirrorU && i % 2 == 1, grid.mirrorV && j % 2 == 1}));
+  }
+  return patches;
+}
+
+/// An axis and directions across it: `out` at the first seam, and `side` a quarter turn on.
+struct RoundFrame {
+  V3d from, along, out, side;
+  double length;
+  [[nodiscard]] V3d direction(double angle) const {
+    return out * std::cos(angle) + side * std::sin(angle);
+  }
+  [[nodiscard]] V3d place(double share) const { return from + along * (length * share); }
+};
+
+RoundFrame roundFrame(const NarrowBand& base, const V3d& from, const V3d& to, double rotation) {
+  const V3d way = to - from;
+  if (!(way.length() >= 2 * base.voxelSize()) || !std::isfinite(way.length())) {
+    throw UsageError(
+        fmt::format("{}: the axis from {} to {} is under two voxels long; give two "
+                    "points on it that are apart",
+                    kGrid, pointAsOption(from), pointAsOption(to)));
+  }
+  if (!std::isfinite(rotation))
+    throw UsageError(fmt::format("{}: the rotation is {}; give an angle", kGrid, rotation));
+  const V3d along = way.normalized();
+  const V3d reference = std::abs(along.x) < 0.9 ? V3d(1, 0, 0) : V3d(0, 1, 0);
+  const V3d east = (reference - along * along.dot(reference)).normalized();
+  const V3d north = along.cross(east);
+  const V3d out = east * std::cos(rotation) + north * std::sin(rotation);
+  return {from, along, out, along.cross(out), way.length()};
+}
+
+/// Where a line from outside to the axis meets the surface first.
+/// @throws InvalidInput when it does not
+V3d seenFromOutside(const SurfaceField& field, const V3d& axis, const V3d& direction, double far,
+                    double background) {
+  double outer = far, inner = far;
+  while (inner > 0) {
+    const double phi = field.value(axis + direction * inner);
+    if (phi <= 0) break;
+    outer = inner;
+    inner -= std::max(0.9 * std::min(phi, background), 0.1 * field.voxelSize());
+  }
+  if (inner <= 0 || inner == far) {
+    throw InvalidInput(fmt::format(
+        "{}: from the axis at {} no surface is met along {:.3g},{:.3g},{:.3g}; let the axis run "
+        "inside the base and end before the base does",
+        kGrid, pointAsOption(axis), direction.x, direction.y, direction.z));
+  }
+  for (int i = 0; i < 50; ++i) {
+    const double middle = 0.5 * (inner + outer);
+    (field.value(axis + direction * middle) > 0 ? outer : inner) = middle;
+  }
+  return axis + direction * (0.5 * (inner + outer));
+}
+
+/// The first and last row evenly along their rings, those between by equal angles.
+ParticleLevel roundLevel(const NarrowBand& base, const RoundFrame& frame, std::size_t columns,
+                         std::size_t rows) {
+  const SurfaceField field(base);
+  const Imath::Box3d box = base.zeroSetBounds();
+  const double far = box.size().length() + (frame.from - box.center()).length() + frame.length;
+  const double background = base.halfWidth() * base.voxelSize();
+  ParticleLevel level;
+  level.columns = columns + 1;
+  level.rows = rows + 1;
+  for (std::size_t j = 0; j <= rows; ++j) {
+    const V3d axis = frame.place(static_cast<double>(j) / static_cast<double>(rows));
+    const bool isBorder = j == 0 || j == rows;
+    const std::size_t count = isBorder ? 4 * columns : columns;
+    std::vector<V3d> ring;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double angle =
+          2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(count);
+      ring.push_back(seenFromOutside(field, axis, frame.direction(angle), far, background));
+    }
+    ring.push_back(ring.front());
+    if (isBorder) {
+      ring = sampleByArcLength(ring, columns + 1);
+      for (std::size_t i = 1; i < columns; ++i) (void)field.project(ring[i], 0);
+    }
+    level.positions.insert(level.positions.end(), ring.begin(), ring.end());
+  }
+  return level;
+}
+
+/// @throws InvalidInput where neighbours lie so far apart that the surface is not one sheet
+void requireOneSheet(const ParticleLevel& level) {
+  constexpr double kFarthest = 4;  // times the mean of all along u, or along v
+  for (const auto& [across, up] : {std::pair<std::size_t, std::size_t>{1, 0}, {0, 1}}) {
+    std::vector<std::pair<double, V3d>> steps;
+    double sum = 0;
+    for (std::size_t j = up; j < level.rows; ++j)
+      for (std::size_t i = across; i < level.columns; ++i) {
+        const V3d& p = level.at(i, j);
+        steps.emplace_back((p - level.at(i - across, j - up)).length(), p);
+        sum += steps.back().first;
+      }
+    for (const auto& [length, place] : steps) {
+      if (length <= kFarthest * sum / static_cast<double>(steps.size())) continue;
+      throw InvalidInput(fmt::format(
+          "{}: seen from the axis the surface jumps at {}; move the axis or its ends so that each "
+          "line out from it meets one sheet",
+          kGrid, pointAsOption(place)));
+    }
+  }
+}
+
+/// The rim goes on around, and straight on at the two ends.
+void addRoundRim(const NarrowBand& band, ParticleLevel& level) {
+  addRim(band, level);
+  const auto last = static_cast<int>(level.columns) - 1, rows = static_cast<int>(level.rows);
+  for (const int row : {-1, rows}) level.rim[level.rimIndex(last, row)] = level.beyond(0, row);
+  for (int row = -1; row <= rows; ++row) {
+    level.rim[level.rimIndex(-1, row)] = level.beyond(last - 1, row);
+    level.rim[level.rimIndex(last + 1, row)] = level.beyond(1, row);
+  }
+}
+
+void settleRound(const NarrowBand& band, ParticleLevel& level, PatchReport& report) {
+  const Relaxation relaxation = relax(band, level, true);
+  report.relaxIterations += relaxation.iterations;
+  report.isRelaxed = report.isRelaxed && relaxation.isConverged;
+  addRoundRim(band, level);
+}
+
+std::vector<ParticleLevel> roundLevels(const NarrowBand& base, ParticleLevel surface,
+                                       const LevelSize& size, double height,
+                                       const PatchOptions& options, PatchReport& report) {
+  const NarrowBand space = sweepAbove(base, surface.positions, size, height, options);
+  if (options.scheme == LevelScheme::Conforming)
+    return conformingLevels(space, surface, height, options.levels);
+  std::vector<ParticleLevel> levels = {std::move(surface)};
+  for (std::size_t k = 1; k < options.levels; ++k) {
+    ParticleLevel level = levels.back();
+    level.w = static_cast<double>(k) / static_cast<double>(options.levels - 1);
+    level.height = level.w * height;
+    advectPoints(space, levels.back().height, level.height, level.positions);
+    settleRound(space, level, report);
+    levels.push_back(std::move(level));
+    levelset::report(options.progress, 0.5 + 0.5 * level.w, kGrid);
+  }
+  return levels;
+}
+
+}  // namespace
+
+PatchGridResult makePatchGrid(const NarrowBand& base, const std::array<V3d, 4>& corners,
+                              double height, const PatchGridOptions& grid,
+                              const PatchOptions& options) {
+  checkGrid(grid);
+  checkPatchOptions(kGrid, height, options);
+  std::array<V3d, 4> feet;
+  for (std::size_t i = 0; i < 4; ++i) feet[i] = closestSurfacePoint(base, corners[i], kGrid);
+  const LevelSize straight = {0.5 * ((feet[1] - feet[0]).length() + (feet[2] - feet[3]).length()),
+                              0.5 * ((feet[3] - feet[0]).length() + (feet[2] - feet[1]).length())};
+  PatchOptions whole = options;
+  const auto [across, up] = cellsPerTile(base, straight, grid, options);
+  whole.cells = {across * grid.columns, up * grid.rows};
+  PatchResult result = makePatch(base, corners, height, whole);
+  const Sheet sheet{std::move(result.patch.levels), false, height, result.patch.mirrored,
+                    options.scheme};
+  return {cutTiles(sheet, grid), result.report};
+}
+
+PatchGridResult makePatchGridAround(const NarrowBand& base, const V3d& from, const V3d& to,
+                                    double rotation, double height, const PatchGridOptions& grid,
+                                    const PatchOptions& options) {
+  if (base.isEmpty()) {
+    throw InvalidInput(
+        fmt::format("{}: the base has no surface; give a solid with at least one voxel", kGrid));
+  }
+  checkGrid(grid);
+  checkPatchOptions(kGrid, height, options);
+  if (grid.columns < 3)
+    throw UsageError(fmt::format("{}: {} tiles around; give at least 3", kGrid, grid.columns));
+  if (grid.mirrorU && grid.columns % 2 == 1) {
+    throw UsageError(fmt::format(
+        "{}: of {} tiles around, every other one mirrored, the last would not meet the first; give "
+        "an even number",
+        kGrid, grid.columns));
+  }
+  if (options.scheme == LevelScheme::Spline || !options.transform.isIdentity() || options.mirror) {
+    throw UsageError(fmt::format(
+        "{}: splines, twist, taper, bend and mirrored corners do not go with tiles around an axis",
+        kGrid));
+  }
+  const RoundFrame frame = roundFrame(base, from, to, rotation);
+  PatchGridResult result;
+  const LevelSize rough = sizeOf(roundLevel(base, frame, 64, 16));
+  const auto [across, up] = cellsPerTile(base, rough, grid, options);
+  ParticleLevel surface = roundLevel(base, frame, across * grid.columns, up * grid.rows);
+  requireOneSheet(surface);
+  requireCovered(base, surface);
+  settleRound(base, surface, result.report);
+  const LevelSize size = sizeOf(surface);
+  result.report.uLength = size.u;
+  result.report.vLength = size.v;
+  result.report.cellAreaVariation = cellAreaVariation(surface);
+  levelset::report(options.progress, 0.1, kGrid);
+  const Sheet sheet{roundLevels(base, std::move(surface), size, height, options, result.report),
+                    true, height, false, options.scheme};
+  result.patches = cutTiles(sheet, grid);
+  return result;
+}
+
+}  // namespace mapping

@@ -1,0 +1,232 @@
+#include "mapping/placement/scatter.h"
+
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "levelset/error.h"
+#include "levelset/progress_gate.h"
+#include "mapping/distortion/distortion.h"
+#include "mapping/layers/patch_layers.h"
+#include "mapping/maps/layer_map.h"
+#include "mapping/patches/patch_space.h"
+#include "mapping/placement/make_patch.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using levelset::NarrowBand;
+
+constexpr const char* kScatter = "scatter";
+// Places that are tried for each patch that is asked for, before fewer will have to do.
+constexpr std::size_t kTriesPerPatch = 3;
+// A patch that fills a gap may be this much nearer to the others than those are to each other.
+constexpr double kGapShare = 0.75;
+
+/// A number in [−1, 1) that belongs to a place, whichever of the others are taken.
+double luckAt(std::uint64_t seed, std::size_t index) {
+  std::uint64_t z = seed + (index + 1) * 0x9e3779b97f4a7c15;  // splitmix64
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
+  z ^= z >> 31;
+  return 2 * (static_cast<double>(z >> 11) * 0x1p-53) - 1;
+}
+
+/// The angle from where cornersAround lays u to a direction, about the normal.
+double angleTowards(const SurfacePoint& point, const V3d& direction) {
+  const V3d flat = direction - point.normal * point.normal.dot(direction);
+  if (!(flat.length() > 1e-6 * direction.length()) || !(direction.length() > 0)) return 0;
+  const V3d east = eastOf(point.normal), north = point.normal.cross(east);
+  return std::atan2(flat.dot(north), flat.dot(east));
+}
+
+PatchSite siteAt(const NarrowBand& base, const SurfacePoint& point, std::size_t index,
+                 const ScatterOptions& options) {
+  double rotation = options.rotation + options.jitter * luckAt(options.density.seed, index);
+  if (options.direction) {
+    const V3d direction = options.direction(point.place, 0);
+    if (!std::isfinite(direction.length())) {
+      throw levelset::UsageError(
+          fmt::format("{}: the direction at ({:.6g}, {:.6g}, {:.6g}) is not finite", kScatter,
+                      point.place.x, point.place.y, point.place.z));
+    }
+    rotation += angleTowards(point, direction);
+  }
+  return {cornersAround(base, point.place, options.uSize * point.scale, options.vSize * point.scale,
+                        rotation),
+          point.scale};
+}
+
+PatchOptions atScale(const PatchOptions& options, double scale) {
+  PatchOptions result = options;
+  result.spacing *= scale;
+  return result;
+}
+
+bool doesFold(const Patch& patch) {
+  return surveyDistortion(sampleLevelMap(patch, 0), V3d(1), patch.mirrored).folded > 0;
+}
+
+/// A patch, or why there is none.
+struct Attempt {
+  std::optional<Patch> patch;
+  PatchSite site = {};
+  std::string cause;
+};
+
+Attempt tryAt(const NarrowBand& base, const SurfacePoint& point, std::size_t index, double height,
+              const ScatterOptions& options) {
+  Attempt attempt;
+  try {
+    attempt.site = siteAt(base, point, index, options);
+    PatchOptions part = atScale(options.patch, point.scale);
+    part.mirror = true;  // corners in the wrong order are no mistake of the caller's here
+    PatchResult made = makePatch(base, attempt.site.corners, height * point.scale, part);
+    Patch& patch = made.patch;
+    const auto isHalf = [&](double length, double asked) {
+      return length < 0.5 * asked * point.scale;
+    };
+    if (patch.mirrored || isHalf(made.report.uLength, options.uSize) ||
+        isHalf(made.report.vLength, options.vSize)) {
+      attempt.cause = "the surface is too bent for a patch of this size";
+      return attempt;
+    }
+    if (!options.allowFolds && doesFold(patch)) {
+      attempt.cause = "the patch would fold";
+    } else {
+      attempt.patch = std::move(patch);
+    }
+  } catch (const InvalidInput& error) {
+    attempt.cause = error.what();
+  }
+  return attempt;
+}
+
+/// Splines are followed without distances.
+std::optional<NarrowBand> sweepFor(const NarrowBand& base, const PatchCrowd& crowd,
+                                   const PatchOptions& options) {
+  if (options.scheme == LevelScheme::Spline) return {};
+  return sweepSharedSpace(base, crowd,
+                          {.maxMemory = options.maxMemory, .progress = options.progress});
+}
+
+/// Places beyond the best so many are not tried.
+std::size_t triesOf(const ScatteredPoints& points) {
+  return std::min(points.points.size(), kTriesPerPatch * points.wanted);
+}
+
+PatchCrowd crowdOf(const ScatteredPoints& points, double height, const ScatterOptions& options) {
+  double smallest = HUGE_VAL, largest = 0;
+  for (std::size_t n = 0; n < triesOf(points); ++n) {
+    smallest = std::min(smallest, points.points[n].scale);
+    largest = std::max(largest, points.points[n].scale);
+  }
+  return {points.wanted, options.uSize * largest, options.vSize * largest, height * smallest,
+          height * largest};
+}
+
+PatchCrowd crowdOf(const std::vector<PatchSite>& sites, double height) {
+  double u = 0, v = 0, smallest = HUGE_VAL, largest = 0;
+  for (const PatchSite& site : sites) {
+    const auto& [a, b, c, d] = site.corners;
+    u = std::max({u, (b - a).length(), (c - d).length()});
+    v = std::max({v, (d - a).length(), (c - b).length()});
+    smallest = std::min(smallest, site.scale);
+    largest = std::max(largest, site.scale);
+  }
+  return {sites.size(), u, v, height * smallest, height * largest};
+}
+
+bool isFarFrom(const SurfacePoint& point, std::span<const SurfacePoint> others, double distance) {
+  return std::all_of(others.begin(), others.end(), [&](const SurfacePoint& other) {
+    const double kept = distance * 0.5 * (point.scale + other.scale);
+    return !(surfaceDistance(point, other, 0.25 * kept) < kept);
+  });
+}
+
+}  // namespace
+
+ScatterResult scatter(const NarrowBand& base, double height, const ScatterOptions& options) {
+  checkPatchOptions(kScatter, height, options.patch);
+  ScatterOptions parts = options;
+  parts.density.progress = levelset::subProgress(options.density.progress, 0, 0.2);
+  parts.patch.progress = {};
+  const ScatteredPoints points = scatterPoints(base, parts.density);
+  ScatterResult result;
+
+  parts.patch.progress = levelset::subProgress(options.density.progress, 0.2, 0.4);
+  const std::optional<NarrowBand> space =
+      sweepFor(base, crowdOf(points, height, options), parts.patch);
+  parts.patch.progress = {};
+  parts.patch.space = space ? &*space : nullptr;
+
+  // === The places that were chosen
+  std::vector<Attempt> attempts(points.wanted);
+  const levelset::Progress progress = levelset::subProgress(options.density.progress, 0.4, 0.9);
+  levelset::ProgressGate gate(progress, points.wanted, kScatter);
+  tbb::parallel_for(std::size_t{0}, points.wanted, [&](std::size_t n) {
+    attempts[n] = tryAt(base, points.points[n], n, height, parts);
+    gate.advance(1);
+  });
+  std::vector<SurfacePoint> taken;
+  const auto take = [&](Attempt& attempt, const SurfacePoint& point) {
+    if (attempt.patch) {
+      result.patches.push_back(std::move(*attempt.patch));
+      result.sites.push_back(attempt.site);
+      taken.push_back(point);
+    } else if (result.leftOut++ == 0) {
+      result.cause = attempt.cause;
+    }
+  };
+  for (std::size_t n = 0; n < points.wanted; ++n) take(attempts[n], points.points[n]);
+
+  // === The next best in the gaps of those that bear no patch
+  const std::size_t tries = triesOf(points);
+  const double kept = std::isfinite(points.distance) ? points.distance : 0;
+  for (std::size_t n = points.wanted; n < tries && taken.size() < points.wanted; ++n) {
+    const SurfacePoint& point = points.points[n];
+    if (!isFarFrom(point, taken, kGapShare * kept)) continue;
+    Attempt attempt = tryAt(base, point, n, height, parts);
+    take(attempt, point);
+    levelset::report(options.density.progress, 0.9, kScatter);
+  }
+  if (result.patches.empty()) {
+    throw InvalidInput(fmt::format("{}: none of {} places bears a patch, at the first because: {}",
+                                   kScatter, result.leftOut, result.cause));
+  }
+  result.distance = leastDistance(taken, base.zeroSetBounds().size().length(), kept);
+  levelset::report(options.density.progress, 1, kScatter);
+  return result;
+}
+
+std::vector<Patch> makePatches(const NarrowBand& base, const std::vector<PatchSite>& sites,
+                               double height, const PatchOptions& options) {
+  checkPatchOptions(kScatter, height, options);
+  constexpr double kSweep = 0.3;
+  PatchOptions sweeping = options;
+  sweeping.progress = levelset::subProgress(options.progress, 0, kSweep);
+  const std::optional<NarrowBand> space = sweepFor(base, crowdOf(sites, height), sweeping);
+  std::vector<Patch> patches;
+  patches.reserve(sites.size());
+  for (const PatchSite& site : sites) {
+    PatchOptions scaled = atScale(options, site.scale);
+    scaled.space = space ? &*space : nullptr;
+    const auto share = [&](double n) {
+      return kSweep + (1 - kSweep) * n / static_cast<double>(sites.size());
+    };
+    const auto done = static_cast<double>(patches.size());
+    scaled.progress = levelset::subProgress(options.progress, share(done), share(done + 1));
+    patches.push_back(makePatch(base, site.corners, height * site.scale, scaled).patch);
+  }
+  return patches;
+}
+
+}  // namespace mapping

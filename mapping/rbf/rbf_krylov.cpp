@@ -1,0 +1,265 @@
+#include "mapping/rbf/rbf_krylov.h"
+
+#include <fmt/core.h>
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "levelset/error.h"
+#include "mapping/fast_sums/cluster_tree.h"
+#include "mapping/fast_sums/rbf_cluster_sum.h"
+#include "mapping/rbf/rbf_map.h"
+#include "mapping/rbf/rbf_precondition.h"
+
+namespace mapping {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Imath::V3d;
+
+constexpr const char* kKrylov = "rbf map";
+constexpr std::size_t kSolveLeaf = 128;
+constexpr Index kMostSteps = 40;  // between restarts
+constexpr int kMostRestarts = 30;
+// A restart that leaves more than this of the residual stands still.
+constexpr double kStill = 0.7;
+// The fast sum is not right to more digits, so a restart does not ask for them.
+constexpr double kLeastReduction = 1e-3;
+
+/// Does what is far weigh so much more than what is near that the fast sum's digits do not do?
+bool growsFast(RbfKernel kernel) {
+  return kernel == RbfKernel::Triharmonic || kernel == RbfKernel::ThinPlate ||
+         kernel == RbfKernel::Sum;
+}
+
+/// The particles in the order of a tree, so that those of a box lie in a row.
+RbfCloud inOrder(const RbfCloud& cloud, std::span<const std::uint32_t> order) {
+  RbfCloud result = cloud;
+  for (std::size_t n = 0; n < order.size(); ++n) {
+    result.points[n] = cloud.points[order[n]];
+    result.targets[n] = cloud.targets[order[n]];
+    result.lambda[n] = cloud.lambda[order[n]];
+  }
+  return result;
+}
+
+template <typename Matrix>
+Matrix rowsInOrder(const Matrix& matrix, std::span<const std::uint32_t> order) {
+  Matrix result(matrix.rows(), matrix.cols());
+  for (std::size_t n = 0; n < order.size(); ++n)
+    result.row(static_cast<Index>(n)) = matrix.row(order[n]);
+  return result;
+}
+
+/// The least-squares problem of one right-hand side, as columns come.
+class Hessenberg {
+ public:
+  explicit Hessenberg(double residual) : right_(Eigen::VectorXd::Zero(kMostSteps + 1)) {
+    right_[0] = residual;
+  }
+  /// @param column  the products with the basis and the length of what they leave, steps + 2
+  void push(Eigen::VectorXd column) {
+    plain_.topRows(column.size()).col(steps_) = column;
+    for (Index i = 0; i < steps_; ++i) rotate(i, column[i], column[i + 1]);
+    const double length = std::hypot(column[steps_], column[steps_ + 1]);
+    cosine_[steps_] = length > 0 ? column[steps_] / length : 1;
+    sine_[steps_] = length > 0 ? column[steps_ + 1] / length : 0;
+    rotate(steps_, column[steps_], column[steps_ + 1]);
+    rotate(steps_, right_[steps_], right_[steps_ + 1]);
+    triangle_.topRows(steps_ + 1).col(steps_) = column.head(steps_ + 1);
+    ++steps_;
+  }
+  [[nodiscard]] double residual() const { return std::abs(right_[steps_]); }
+  [[nodiscard]] Eigen::VectorXd solve() const {
+    Eigen::VectorXd result = right_.head(steps_);
+    for (Index i = steps_; i-- > 0;) {
+      for (Index j = i + 1; j < steps_; ++j) result[i] -= triangle_(i, j) * result[j];
+      // What a solution does not need, once it is found, has no length.
+      result[i] = triangle_(i, i) != 0 ? result[i] / triangle_(i, i) : 0;
+    }
+    return result;
+  }
+  /// Largest over smallest singular value: the condition on the space searched.
+  [[nodiscard]] double condition() const {
+    const Eigen::JacobiSVD<MatrixXd> svd(plain_.topLeftCorner(steps_ + 1, steps_));
+    const auto& values = svd.singularValues();
+    return values[steps_ - 1] > 0 ? values[0] / values[steps_ - 1] : 0;
+  }
+
+ private:
+  void rotate(Index i, double& a, double& b) const {
+    const double first = cosine_[i] * a + sine_[i] * b;
+    b = cosine_[i] * b - sine_[i] * a;
+    a = first;
+  }
+  Index steps_ = 0;
+  Eigen::VectorXd right_;
+  MatrixXd plain_ = MatrixXd::Zero(kMostSteps + 1, kMostSteps),
+           triangle_ = MatrixXd::Zero(kMostSteps + 1, kMostSteps);
+  std::array<double, kMostSteps> cosine_{}, sine_{};
+};
+
+/// Flexible GMRES for u, v and w in step.
+class KrylovSolver {
+ public:
+  KrylovSolver(const RbfCloud& cloud, const RbfMapOptions& options, const MatrixXd& q,
+               const PointTree& tree, RbfSolveReport& report)
+      : cloud_(cloud),
+        options_(options),
+        q_(q),
+        sign_(withKernel(options.kernel, [](auto k) { return decltype(k)::kSign; })),
+        sum_(options.kernel, cloud.points, tree.nodes()),
+        inverse_(cloud, options.kernel, tree, q),
+        isDirect_(growsFast(options.kernel)),
+        report_(report) {}
+
+  /// @param tolerance  of the residual's largest number
+  RbfFit solve(const RbfColumns& values, double tolerance) {
+    const RbfColumns right = project(values), zero = RbfColumns::Zero(values.rows(), 3);
+    RbfFit fit{zero, zero};
+    RbfColumns residual = right;
+    double worst = residual.cwiseAbs().maxCoeff();
+    for (int restart = 0; worst > tolerance; ++restart) {
+      fit.weights += correct(residual, std::max(kLeastReduction, 0.3 * tolerance / worst));
+      fit.image = multiplyDirectly(cloud_, options_.kernel, fit.weights);
+      residual = right - project(fit.image);
+      const double before = worst;
+      worst = residual.cwiseAbs().maxCoeff();
+      if (worst <= tolerance) break;
+      const bool isStill = !(worst < kStill * before);
+      if ((isStill && isDirect_) || restart >= kMostRestarts) refuse(worst, tolerance);
+      if (isStill) isDirect_ = true;  // by the fast sum's errors, perhaps
+    }
+    return fit;
+  }
+
+ private:
+  [[noreturn]] void refuse(double worst, double tolerance) const {
+    throw levelset::NumericalError(fmt::format(
+        "{}: after {} iterations for {} particles the residual stands still at {:.3g} in texture "
+        "coordinates, {:.3g} is asked for; take a larger λ, particles of more even spacing, the "
+        "biharmonic kernel or a larger tolerance",
+        kKrylov, report_.iterations, cloud_.points.size(), worst, tolerance));
+  }
+
+  [[nodiscard]] RbfColumns project(const RbfColumns& values) const {
+    return values - q_ * (q_.transpose() * values);
+  }
+
+  [[nodiscard]] RbfColumns multiply(const RbfColumns& weights) const {
+    if (isDirect_) return project(multiplyDirectly(cloud_, options_.kernel, weights));
+    const std::size_t n = cloud_.points.size();
+    std::vector<V3d> rows(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto row = weights.row(static_cast<Index>(i));
+      rows[i] = V3d(row[0], row[1], row[2]);
+    }
+    const std::vector<V3d> sums = sum_(rows);
+    RbfColumns result(weights.rows(), 3);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto row = static_cast<Index>(i);
+      for (int k = 0; k < 3; ++k)
+        result(row, k) = sign_ * sums[i][k] + cloud_.lambda[i] * weights(row, k);
+    }
+    return project(result);
+  }
+
+  /// Weights that take all but about `reduction` of the residual away.
+  RbfColumns correct(const RbfColumns& residual, double reduction) {
+    std::vector<RbfColumns> basis = {residual}, searched;
+    std::vector<Hessenberg> problems;
+    std::array<double, 3> goal{};
+    for (int k = 0; k < 3; ++k) {
+      const double length = residual.col(k).norm();
+      problems.emplace_back(length);
+      goal[static_cast<std::size_t>(k)] = reduction * length;
+      if (length > 0) basis[0].col(k) /= length;
+    }
+    const auto isDone = [&] {
+      for (std::size_t k = 0; k < 3; ++k)
+        if (problems[k].residual() > goal[k]) return false;
+      return true;
+    };
+    while (!isDone() && static_cast<Index>(searched.size()) < kMostSteps) {
+      searched.push_back(inverse_(basis.back()));
+      basis.push_back(multiply(searched.back()));
+      for (int k = 0; k < 3; ++k)
+        problems[static_cast<std::size_t>(k)].push(orthogonalize(basis, k));
+      ++report_.iterations;
+      const double way = static_cast<double>(report_.iterations);
+      levelset::report(options_.progress, 0.1 + 0.8 * way / (way + 20), kKrylov);
+    }
+    return combine(searched, problems);
+  }
+
+  /// Makes column k of the last orthogonal to those before, twice, and of length 1.
+  static Eigen::VectorXd orthogonalize(std::vector<RbfColumns>& basis, int k) {
+    const std::size_t last = basis.size() - 1;
+    Eigen::VectorXd products = Eigen::VectorXd::Zero(static_cast<Index>(last) + 1);
+    auto column = basis[last].col(k);
+    for (int pass = 0; pass < 2; ++pass)
+      for (std::size_t j = 0; j < last; ++j) {
+        const double product = basis[j].col(k).dot(column);
+        products[static_cast<Index>(j)] += product;
+        column -= product * basis[j].col(k);
+      }
+    const double length = column.norm();
+    products[static_cast<Index>(last)] = length;
+    if (length > 0) column /= length;
+    return products;
+  }
+
+  RbfColumns combine(const std::vector<RbfColumns>& searched,
+                     const std::vector<Hessenberg>& problems) {
+    RbfColumns weights = RbfColumns::Zero(q_.rows(), 3);
+    for (int k = 0; k < 3 && !searched.empty(); ++k) {
+      const Hessenberg& problem = problems[static_cast<std::size_t>(k)];
+      const Eigen::VectorXd share = problem.solve();
+      for (std::size_t j = 0; j < searched.size(); ++j)
+        weights.col(k) += share[static_cast<Index>(j)] * searched[j].col(k);
+      report_.condition = std::max(report_.condition, problem.condition());
+    }
+    return weights;
+  }
+
+  const RbfCloud& cloud_;
+  const RbfMapOptions& options_;
+  const MatrixXd& q_;
+  double sign_;
+  RbfClusterSum sum_;
+  RbfPreconditioner inverse_;
+  bool isDirect_;  ///< are products direct sums?
+  RbfSolveReport& report_;
+};
+
+}  // namespace
+
+RbfFit solveIteratively(const RbfCloud& cloud, const RbfMapOptions& options, const MatrixXd& q,
+                        const RbfColumns& values, RbfSolveReport& report) {
+  const auto n = static_cast<double>(cloud.points.size());
+  const double basis = 2.0 * kMostSteps * sizeof(double) * 3;
+  constexpr double kSumBytes = 500;  // a particle's share of the nodes of the fast sum
+  levelset::requireMemory(n * (basis + kSumBytes) + RbfPreconditioner::estimateBytes(n),
+                          options.maxMemory, kKrylov);
+  const PointTree first(cloud.points, kSolveLeaf);
+  const std::vector<std::uint32_t> order(first.order().begin(), first.order().end());
+  const RbfCloud ordered = inOrder(cloud, order);
+  const MatrixXd orderedQ = rowsInOrder(q, order);
+  const PointTree tree = first.inOrder(ordered.points);
+  const Eigen::RowVector3d mean = values.colwise().mean();
+  const double extent = (values.rowwise() - mean).cwiseAbs().maxCoeff();
+  KrylovSolver solver(ordered, options, orderedQ, tree, report);
+  const RbfFit fit = solver.solve(rowsInOrder(values, order), options.solveTolerance * extent);
+  RbfFit result{RbfColumns(fit.weights.rows(), 3), RbfColumns(fit.weights.rows(), 3)};
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    result.weights.row(order[i]) = fit.weights.row(static_cast<Index>(i));
+    result.image.row(order[i]) = fit.image.row(static_cast<Index>(i));
+  }
+  return result;
+}
+
+}  // namespace mapping

@@ -1,0 +1,238 @@
+#include "mapping/surface/geodesic_search.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <queue>
+#include <unordered_map>
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using Way = std::vector<V3d>;
+
+constexpr std::size_t kMaxSearchNodes = 4'000'000;
+// Grid points this near to the surface are joined by their 26 neighbours, on planes of any slope.
+constexpr double kBesideVoxels = 0.75;
+// A step that turns the normal by more than a right angle leads through a thin sheet, not around.
+constexpr double kLeastNormalCosine = 0;
+constexpr double kGridExcess = 1.15;  // of ways over the grid; 1.128 for the least handy direction
+constexpr std::size_t kMostWays = 40;
+
+using Key = std::uint64_t;
+using Cell = std::array<int, 3>;
+constexpr int kBias = 1 << 20;
+
+Key packCell(const Cell& c) {
+  Key key = 0;
+  for (const int x : c) key = key << 21 | static_cast<Key>(x + kBias);
+  return key;
+}
+
+Cell unpackCell(Key key) {
+  Cell c;
+  for (int axis = 2; axis >= 0; --axis, key >>= 21)
+    c[static_cast<std::size_t>(axis)] = static_cast<int>(key & 0x1fffff) - kBias;
+  return c;
+}
+
+/// The grid points beside φ = height, found out as they are asked for, with what the searches from
+/// the one end and from the other know of them. Cell (0, 0, 0) is the point a.
+class WayGraph {
+ public:
+  struct Node {
+    std::array<double, 2> cost = {HUGE_VAL, HUGE_VAL};  // from a, from b
+    std::array<Key, 2> from = {};
+    std::array<bool, 2> isClosed = {};
+    bool isBeside = false;
+    V3d normal{0};
+  };
+
+  WayGraph(const SurfaceField& field, double height, const V3d& a, const V3d& b)
+      : field_(field), height_(height), ends_{a, b}, step_(field.voxelSize()) {}
+
+  [[nodiscard]] V3d place(Key key) const {
+    const Cell c = unpackCell(key);
+    return ends_[0] + V3d(c[0], c[1], c[2]) * step_;
+  }
+  [[nodiscard]] double step() const { return step_; }
+  [[nodiscard]] std::size_t size() const { return nodes_.size(); }
+  [[nodiscard]] const std::unordered_map<Key, Node>& nodes() const { return nodes_; }
+  Node& node(Key key) { return nodes_.at(key); }
+
+  /// Dijkstra's algorithm from an end; A* with an estimate of the rest.
+  /// @param mayLie  of a place and the cost to come there; others are left out
+  /// @param isGoal  stop there
+  /// @return the goal's key, or nothing
+  template <typename MayLie, typename Estimate, typename IsGoal>
+  std::optional<Key> search(std::size_t end, const MayLie& mayLie, const Estimate& estimate,
+                            const IsGoal& isGoal) {
+    open_ = {};
+    start(end, estimate);
+    while (!open_.empty() && nodes_.size() < kMaxSearchNodes) {
+      const Key key = open_.top().second;
+      open_.pop();
+      Node& current = nodes_.at(key);
+      if (current.isClosed[end]) continue;
+      current.isClosed[end] = true;
+      if (isGoal(key, current)) return key;
+      expand(end, key, mayLie, estimate);
+    }
+    return {};
+  }
+
+  [[nodiscard]] bool isBesideEnd(std::size_t end, const V3d& p, const V3d& normal) const {
+    return (p - ends_[end]).length() <= 1.01 * step_ &&
+           normal.dot(field_.normal(ends_[end])) > kLeastNormalCosine;
+  }
+
+  /// From a node back to where the search from `end` began; projected.
+  [[nodiscard]] Way trace(std::size_t end, Key key) {
+    Way way;
+    for (;; key = nodes_.at(key).from[end]) {
+      V3d p = place(key);
+      if (field_.project(p, height_)) way.push_back(p);
+      if (nodes_.at(key).from[end] == key) break;
+    }
+    way.push_back(ends_[end]);
+    return way;
+  }
+
+ private:
+  using Entry = std::pair<double, Key>;
+
+  Node& visit(Key key) {
+    const auto [it, isNew] = nodes_.try_emplace(key);
+    if (isNew) {
+      const V3d p = place(key);
+      it->second.isBeside = std::abs(field_.value(p) - height_) <= kBesideVoxels * step_;
+      if (it->second.isBeside) it->second.normal = field_.normal(p);
+    }
+    return it->second;
+  }
+
+  /// The nodes about an end, from which the way to it is straight.
+  template <typename Estimate>
+  void start(std::size_t end, const Estimate& estimate) {
+    const V3d offset = (ends_[end] - ends_[0]) / step_;
+    const Cell middle = {static_cast<int>(std::lround(offset.x)),
+                         static_cast<int>(std::lround(offset.y)),
+                         static_cast<int>(std::lround(offset.z))};
+    for (int n = 0; n < 27; ++n) {
+      const Key key =
+          packCell({middle[0] + n / 9 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n % 3 - 1});
+      Node& near = visit(key);
+      const V3d p = place(key);
+      if (!near.isBeside || !isBesideEnd(end, p, near.normal)) continue;
+      near.cost[end] = (p - ends_[end]).length();
+      near.from[end] = key;
+      open_.push({near.cost[end] + estimate(p), key});
+    }
+  }
+
+  template <typename MayLie, typename Estimate>
+  void expand(std::size_t end, Key key, const MayLie& mayLie, const Estimate& estimate) {
+    const Cell c = unpackCell(key);
+    const Node current = nodes_.at(key);  // the map may move it
+    for (int n = 0; n < 27; ++n) {
+      const Cell d = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
+      if (n == 13) continue;
+      const Key nextKey = packCell({c[0] + d[0], c[1] + d[1], c[2] + d[2]});
+      Node& next = visit(nextKey);
+      if (!next.isBeside || next.isClosed[end]) continue;
+      if (next.normal.dot(current.normal) <= kLeastNormalCosine) continue;
+      const double cost =
+          current.cost[end] +
+          step_ * std::sqrt(static_cast<double>(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
+      const V3d p = place(nextKey);
+      if (cost >= next.cost[end] || !mayLie(p, cost)) continue;
+      next.cost[end] = cost;
+      next.from[end] = key;
+      open_.push({cost + estimate(p), nextKey});
+    }
+  }
+
+  const SurfaceField& field_;
+  double height_;
+  std::array<V3d, 2> ends_;
+  double step_;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open_;
+  std::unordered_map<Key, Node> nodes_;
+};
+
+struct Meeting {
+  double cost;
+  Key key;
+};
+
+/// Nodes about as far from the one end as from the other, the best first.
+std::vector<Meeting> meetings(const WayGraph& graph) {
+  std::vector<Meeting> result;
+  for (const auto& [key, node] : graph.nodes()) {
+    if (!node.isBeside || std::abs(node.cost[0] - node.cost[1]) > 1.8 * graph.step()) continue;
+    const double cost = node.cost[0] + node.cost[1];
+    if (std::isfinite(cost)) result.push_back({cost, key});
+  }
+  std::sort(result.begin(), result.end(), [](const Meeting& x, const Meeting& y) {
+    return x.cost != y.cost ? x.cost < y.cost : x.key < y.key;
+  });
+  return result;
+}
+
+}  // namespace
+
+Way WaySearch::shortest() const {
+  WayGraph graph(field_, height_, a_, b_);
+  const auto goal = graph.search(
+      0, [](const V3d&, double) { return true; }, [&](const V3d& p) { return (p - b_).length(); },
+      [&](Key key, const WayGraph::Node& node) {
+        return graph.isBesideEnd(1, graph.place(key), node.normal);
+      });
+  if (!goal) return {};
+  Way way = graph.trace(0, *goal);
+  std::reverse(way.begin(), way.end());
+  way.push_back(b_);
+  return way;
+}
+
+std::vector<Way> WaySearch::alternatives(double longest) const {
+  WayGraph graph(field_, height_, a_, b_);
+  const double most = kGridExcess * longest, slack = 4 * graph.step();
+  for (const std::size_t end : {0u, 1u}) {
+    const V3d& from = end == 0 ? a_ : b_;
+    const V3d& to = end == 0 ? b_ : a_;
+    (void)graph.search(
+        end,
+        [&](const V3d& p, double cost) {
+          return cost <= 0.5 * most + slack &&
+                 (p - from).length() + (p - to).length() <= longest + slack;
+        },
+        [](const V3d&) { return 0.0; }, [](Key, const WayGraph::Node&) { return false; });
+  }
+  // Meetings close to each other belong to the same way.
+  const double apart = std::max(3 * graph.step(), 0.025 * longest);
+  std::vector<Way> ways;
+  std::vector<std::pair<V3d, V3d>> taken;  // places and normals
+  const std::vector<Meeting> all = meetings(graph);
+  for (const Meeting& meeting : all) {
+    if (ways.size() == kMostWays || meeting.cost > kGridExcess * all.front().cost) break;
+    const V3d p = graph.place(meeting.key), normal = graph.node(meeting.key).normal;
+    const bool isNew = std::none_of(taken.begin(), taken.end(), [&](const auto& other) {
+      // The two faces of a thin sheet are two ways, however near.
+      return (p - other.first).length() < apart && normal.dot(other.second) > 0;
+    });
+    if (!isNew) continue;
+    taken.emplace_back(p, normal);
+    Way way = graph.trace(0, meeting.key);
+    std::reverse(way.begin(), way.end());
+    const Way rest = graph.trace(1, meeting.key);
+    way.insert(way.end(), rest.begin() + 1, rest.end());
+    ways.push_back(std::move(way));
+  }
+  return ways;
+}
+
+}  // namespace mapping

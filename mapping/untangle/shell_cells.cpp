@@ -1,0 +1,127 @@
+#include "mapping/untangle/shell_cells.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+
+// Ends of the cells of unlike levels are further apart than this, whatever a million particles may
+// be laid out as, and rounding is far below.
+constexpr double kSameEnd = 1e-9;
+
+void addEnds(std::vector<double>& ends, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i)
+    ends.push_back(static_cast<double>(i) / static_cast<double>(count - 1));
+}
+
+std::vector<double> endsOf(std::size_t below, std::size_t above) {
+  std::vector<double> ends;
+  addEnds(ends, below);
+  if (above != below) addEnds(ends, above);
+  std::sort(ends.begin(), ends.end());
+  ends.erase(
+      std::unique(ends.begin(), ends.end(), [](double a, double b) { return b - a < kSameEnd; }),
+      ends.end());
+  return ends;
+}
+
+struct Share {
+  std::size_t index;
+  double fraction;  ///< of the next one
+};
+
+Share shareAt(double t, std::size_t count) {
+  double x = t * static_cast<double>(count - 1);
+  if (std::abs(x - std::round(x)) < kSameEnd * static_cast<double>(count)) x = std::round(x);
+  const double cell = std::clamp(std::floor(x), 0.0, static_cast<double>(count - 2));
+  return {static_cast<std::size_t>(cell), x - cell};
+}
+
+}  // namespace
+
+ShellCells::ShellCells(const Patch& patch, double sink) {
+  std::size_t particles = 0, cells = 0;
+  for (const ParticleLevel& level : patch.levels) {
+    levels_.push_back({level.columns, level.rows, particles});
+    w_.push_back(level.w);
+    particles += level.positions.size();
+  }
+  for (std::size_t k = 0; k + 1 < levels_.size(); ++k) {
+    Slab slab{k,
+              cells,
+              w_[k],
+              w_[k + 1],
+              endsOf(levels_[k][0], levels_[k + 1][0]),
+              endsOf(levels_[k][1], levels_[k + 1][1])};
+    if (k == 0 && sink > 0) slab.from = -sink;
+    if (k + 2 == levels_.size() && sink < 0) slab.to -= sink;
+    cells += slab.count();
+    slabs_.push_back(std::move(slab));
+  }
+}
+
+void ShellCells::addLevel(ParticleSum& sum, std::size_t level, double u, double v,
+                          double share) const {
+  if (share == 0) return;
+  const auto& [columns, rows, first] = levels_[level];
+  const Share i = shareAt(u, columns), j = shareAt(v, rows);
+  for (const std::size_t b : {0u, 1u})
+    for (const std::size_t a : {0u, 1u}) {
+      const double weight =
+          share * (a ? i.fraction : 1 - i.fraction) * (b ? j.fraction : 1 - j.fraction);
+      if (weight == 0) continue;
+      const std::size_t particle = first + (j.index + b) * columns + i.index + a;
+      sum.terms[sum.count++] = {static_cast<std::uint32_t>(particle), weight};
+    }
+}
+
+ShellCell ShellCells::at(std::size_t index) const {
+  const auto slab =
+      std::prev(std::upper_bound(slabs_.begin(), slabs_.end(), index,
+                                 [](std::size_t i, const Slab& s) { return i < s.first; }));
+  const std::size_t rest = index - slab->first, columns = slab->u.size() - 1;
+  const std::size_t i = rest % columns, j = rest / columns;
+  ShellCell cell;
+  cell.box = {V3d(slab->u[i], slab->v[j], slab->from),
+              V3d(slab->u[i + 1], slab->v[j + 1], slab->to)};
+  const double below = w_[slab->lower], above = w_[slab->lower + 1];
+  for (std::size_t corner = 0; corner < 8; ++corner) {
+    const double u = slab->u[i + (corner & 1)], v = slab->v[j + (corner >> 1 & 1)];
+    const double share = ((corner & 4 ? slab->to : slab->from) - below) / (above - below);
+    addLevel(cell.corners[corner], slab->lower, u, v, 1 - share);
+    addLevel(cell.corners[corner], slab->lower + 1, u, v, share);
+  }
+  return cell;
+}
+
+V3d shellSizes(const Patch& patch) {
+  const ParticleLevel& level = patch.levels.front();
+  double u = 0, v = 0;
+  for (std::size_t j = 0; j < level.rows; ++j)
+    for (std::size_t i = 1; i < level.columns; ++i)
+      u += (level.at(i, j) - level.at(i - 1, j)).length();
+  for (std::size_t j = 1; j < level.rows; ++j)
+    for (std::size_t i = 0; i < level.columns; ++i)
+      v += (level.at(i, j) - level.at(i, j - 1)).length();
+  return {u / static_cast<double>(level.rows), v / static_cast<double>(level.columns),
+          patch.height};
+}
+
+std::vector<V3d> particlePositions(const Patch& patch) {
+  std::vector<V3d> positions;
+  for (const ParticleLevel& level : patch.levels)
+    positions.insert(positions.end(), level.positions.begin(), level.positions.end());
+  return positions;
+}
+
+V3d positionOf(const ParticleSum& sum, const std::vector<V3d>& positions) {
+  V3d result = positions[sum.terms[0].particle] * sum.terms[0].weight;
+  for (std::size_t n = 1; n < sum.count; ++n)
+    result += positions[sum.terms[n].particle] * sum.terms[n].weight;
+  return result;
+}
+
+}  // namespace mapping

@@ -1,0 +1,322 @@
+#include "mapping/untangle/untangle.h"
+
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "levelset/error.h"
+#include "mapping/layers/trilinear_volume.h"
+#include "mapping/surface/surface_field.h"
+#include "mapping/untangle/shell_cells.h"
+#include "mapping/untangle/shell_energy.h"
+#include "mapping/untangle/shell_solver.h"
+
+namespace mapping {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using levelset::NarrowBand;
+
+void checkShell(const NarrowBand& base, const Patch& patch, const ShellOptions& options,
+                const char* action) {
+  if (patch.levels.size() < 2 || !(patch.height > 0)) {
+    throw InvalidInput(
+        fmt::format("{}: the patch has no levels of particles; make it with `patch`", action));
+  }
+  if (!std::isfinite(options.sink)) {
+    throw levelset::UsageError(
+        fmt::format("{}: the sink is {}; give a length", action, options.sink));
+  }
+  if (options.proportions) {
+    const V3d& p = *options.proportions;
+    const double volume = p.x * p.y * p.z;
+    if (!(p.x > 0 && p.y > 0 && p.z > 0 && volume > 0) || !std::isfinite(volume)) {
+      throw levelset::UsageError(
+          fmt::format("{}: the proportions are {} × {} × {}; give three positive lengths", action,
+                      p.x, p.y, p.z));
+    }
+  }
+  for (const ParticleLevel& level : patch.levels)
+    for (const V3d& p : level.positions)
+      if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+        throw InvalidInput(
+            fmt::format("{}: the particle at ({}, {}, {}) is not finite; make the "
+                        "patch again",
+                        action, p.x, p.y, p.z));
+      }
+  const SurfaceField field(base);
+  for (const V3d& p : patch.levels.front().positions) {
+    const double distance = std::abs(field.value(p)) / base.voxelSize();
+    if (!(distance <= 1)) {
+      throw InvalidInput(
+          fmt::format("{}: the patch does not lie on the base, at ({:.6g}, {:.6g}, {:.6g}) they "
+                      "are {:.3g} voxels or more apart; make the patch on this base",
+                      action, p.x, p.y, p.z, distance));
+    }
+  }
+  levelset::requireMemory(ShellElements::estimateBytes(patch), options.maxMemory, action);
+}
+
+/// Above the surface all are free; on it those inside slide.
+std::vector<ParticleHold> holdsOf(const Patch& patch, bool freeSides) {
+  std::vector<ParticleHold> holds;
+  for (std::size_t k = 0; k < patch.levels.size(); ++k) {
+    const ParticleLevel& level = patch.levels[k];
+    for (std::size_t j = 0; j < level.rows; ++j)
+      for (std::size_t i = 0; i < level.columns; ++i) {
+        const bool isSide = i == 0 || j == 0 || i + 1 == level.columns || j + 1 == level.rows;
+        holds.push_back(k > 0                  ? ParticleHold::Free
+                        : isSide && !freeSides ? ParticleHold::Fixed
+                                               : ParticleHold::Slides);
+      }
+  }
+  return holds;
+}
+
+/// A particle of the rim stays as far ahead of the last one as the one before that stays behind.
+void moveRim(const ParticleLevel& old, ParticleLevel& level) {
+  const auto columns = static_cast<int>(level.columns), rows = static_cast<int>(level.rows);
+  const auto moved = [&](int i, int j) { return level.beyond(i, j) - old.beyond(i, j); };
+  const auto follow = [&](int i, int j) {
+    const int a = std::clamp(i, 0, columns - 1), b = std::clamp(j, 0, rows - 1);
+    level.rim[level.rimIndex(i, j)] += moved(a, b) * 2.0 - moved(2 * a - i, 2 * b - j);
+  };
+  for (int i = -1; i <= columns; ++i)
+    for (const int j : {-1, rows}) follow(i, j);
+  for (int j = 0; j < rows; ++j)
+    for (const int i : {-1, columns}) follow(i, j);
+}
+
+Patch withPositions(const NarrowBand& base, const Patch& patch, const std::vector<V3d>& positions) {
+  Patch result = patch;
+  auto from = positions.begin();
+  const SurfaceField field(base);
+  for (std::size_t k = 0; k < result.levels.size(); ++k) {
+    ParticleLevel& level = result.levels[k];
+    const auto to = from + static_cast<std::ptrdiff_t>(level.positions.size());
+    level.positions.assign(from, to);
+    from = to;
+    if (!level.hasRim()) continue;
+    moveRim(patch.levels[k], level);
+    if (k > 0) continue;
+    for (std::size_t n = 0; n < level.rim.size(); ++n) {
+      V3d p = level.rim[n];
+      if (p != patch.levels[k].rim[n] && field.project(p, 0)) level.rim[n] = p;
+    }
+  }
+  const std::size_t columns = result.levels.front().columns, rows = result.levels.front().rows;
+  const ParticleLevel& surface = result.levels.front();
+  result.corners = {surface.at(0, 0), surface.at(columns - 1, 0), surface.at(columns - 1, rows - 1),
+                    surface.at(0, rows - 1)};
+  result.spacing = meanSpacing(result);
+  return result;
+}
+
+double farthest(const std::vector<V3d>& a, const std::vector<V3d>& b) {
+  double most = 0;
+  for (std::size_t n = 0; n < a.size(); ++n) most = std::max(most, (a[n] - b[n]).length());
+  return most;
+}
+
+std::array<V3d, 8> cornersOfCell(const ShellCell& cell, const std::vector<V3d>& positions) {
+  std::array<V3d, 8> corners;
+  for (std::size_t n = 0; n < 8; ++n) corners[n] = positionOf(cell.corners[n], positions);
+  return corners;
+}
+
+/// Elements come cell by cell.
+constexpr std::size_t kElementsPerCell = 14;
+
+ShellFolds foldsAt(const Patch& patch, const ShellElements& elements, double sink,
+                   const std::vector<V3d>& positions) {
+  const ShellCells cells(patch, sink);
+  std::vector<char> folds(cells.size());
+  std::vector<double> least(cells.size());
+  tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t n) {
+    least[n] = std::numeric_limits<double>::infinity();
+    for (std::size_t e = n * kElementsPerCell; e < (n + 1) * kElementsPerCell; ++e)
+      least[n] = std::min(least[n], determinantOf(elements.slopes(e, positions)));
+    folds[n] = !(least[n] > 0);
+    if (folds[n]) return;
+    const VolumeSign sign =
+        signOfTrilinear(cornersOfCell(cells.at(n), positions), 0, patch.mirrored ? -1 : 1);
+    folds[n] = sign.folds || sign.undecided > 0;
+  });
+  ShellFolds result;
+  result.cells = cells.size();
+  result.leastJacobian = *std::min_element(least.begin(), least.end());
+  for (const char isFolded : folds) result.folded += isFolded ? 1 : 0;
+  return result;
+}
+
+constexpr std::size_t kSettling = 100;  // iterations
+
+/// Runs down ε until no element is turned over [Garanzha21, §3], and on with as small an ε until
+/// no cell folds between its elements either.
+/// @return iterations
+std::size_t untangle(ShellSolver& solver, const ShellOptions& options,
+                     const std::function<bool()>& isDone) {
+  constexpr std::size_t kRound = 20;  // iterations at one ε
+  constexpr double kSlowest = 0.2;    // of the way to no fold, at the least
+  constexpr int kMostStuck = 10;      // rounds that bring nothing
+  double epsilon = 1, last = -std::numeric_limits<double>::infinity();
+  std::size_t iterations = 0;
+  int stuck = 0;
+  while (iterations < options.mostIterations && stuck < kMostStuck) {
+    levelset::report(options.progress,
+                     static_cast<double>(iterations) / static_cast<double>(options.mostIterations),
+                     "unfold");
+    const auto density = [epsilon](const ShellSlopes& f) { return foldoverEnergy(f, epsilon); };
+    const double energy = solver.energy(density);
+    const std::size_t taken = solver.minimise(density, kRound);
+    iterations += std::max<std::size_t>(taken, 1);
+    const double least = solver.leastDeterminant();
+    if (least > 0 && isDone()) break;
+    const double sigma = std::max(kSlowest, 1 - solver.energy(density) / energy);
+    const double chi = 0.5 * (least + std::hypot(epsilon, least));
+    const double mu = (1 - sigma) * chi;
+    constexpr double kLeastEpsilon = 1e-6;
+    epsilon = least < mu ? 2 * std::sqrt(mu * (mu - least)) : kLeastEpsilon;
+    epsilon = std::clamp(epsilon, kLeastEpsilon, 1e3);
+    stuck = least > last + 0.01 * std::abs(last) ? 0 : stuck + 1;
+    last = std::max(last, least);
+  }
+  return iterations;
+}
+
+/// Mean lengths of opposite sides on the surface, and the height.
+V3d sideLengths(const Patch& patch) {
+  const ParticleLevel& level = patch.levels.front();
+  double u = 0, v = 0;
+  for (const std::size_t j : {std::size_t{0}, level.rows - 1})
+    for (std::size_t i = 1; i < level.columns; ++i)
+      u += 0.5 * (level.at(i, j) - level.at(i - 1, j)).length();
+  for (const std::size_t i : {std::size_t{0}, level.columns - 1})
+    for (std::size_t j = 1; j < level.rows; ++j)
+      v += 0.5 * (level.at(i, j) - level.at(i, j - 1)).length();
+  return {u, v, patch.height};
+}
+
+/// The energy of an element whose rest is `scale` times as large.
+ElementEnergy scaledDirichlet(ShellSlopes slopes, double scale) {
+  for (V3d& column : slopes) column /= scale;
+  ElementEnergy energy = symmetricDirichlet(slopes);
+  for (V3d& column : energy.stress) column /= scale;
+  return energy;
+}
+
+/// The size of the rest at which the energy is least: |F|² and |F⁻¹|² go with its inverse square
+/// and its square.
+double bestRestScale(const ShellElements& elements, const std::vector<V3d>& positions) {
+  double stretch = 0, squeeze = 0;
+  for (std::size_t e = 0; e < elements.size(); ++e) {
+    const ShellSlopes f = elements.slopes(e, positions);
+    const double squares = f[0].length2() + f[1].length2() + f[2].length2();
+    stretch += elements.weight(e) * squares;
+    squeeze += elements.weight(e) * (symmetricDirichlet(f).value - squares);
+  }
+  return std::sqrt(std::sqrt(stretch / squeeze));
+}
+
+ShellDistortion distortionAt(const ShellElements& elements, const std::vector<V3d>& positions) {
+  ShellDistortion result;
+  const double scale = bestRestScale(elements, positions);
+  std::vector<double> values(elements.size());
+  for (std::size_t e = 0; e < values.size(); ++e) {
+    values[e] = scaledDirichlet(elements.slopes(e, positions), scale).value;
+    result.mean += elements.weight(e) * values[e];
+  }
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double share) {
+    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+  };
+  result.median = at(0.5);
+  result.percent99 = at(0.99);
+  result.most = values.back();
+  return result;
+}
+
+}  // namespace
+
+ShellFolds countFolds(const Patch& patch, double sink) {
+  const ShellElements elements(patch, shellSizes(patch), sink);
+  return foldsAt(patch, elements, sink, particlePositions(patch));
+}
+
+Unfolding unfold(const NarrowBand& base, const Patch& patch, const ShellOptions& options) {
+  checkShell(base, patch, options, "unfold");
+  const ShellElements elements(patch, options.proportions.value_or(shellSizes(patch)),
+                               options.sink);
+  const std::vector<V3d> start = particlePositions(patch);
+  Unfolding result;
+  result.before = result.after = foldsAt(patch, elements, options.sink, start);
+  result.patch = patch;
+  if (result.isUnfolded()) return result;
+  ShellSolver solver(base, elements, holdsOf(patch, options.freeSides), start);
+  const auto isDone = [&] {
+    return foldsAt(patch, elements, options.sink, solver.positions()).folded == 0;
+  };
+  result.iterations = untangle(solver, options, isDone);
+  std::vector<V3d> found = solver.positions();
+  ShellFolds after = foldsAt(patch, elements, options.sink, found);
+  if (after.folded == 0) {
+    // Cells that just do not fold are too flat for a map that is smoothed.
+    result.iterations += solver.minimise(symmetricDirichlet, kSettling);
+    const ShellFolds settled = foldsAt(patch, elements, options.sink, solver.positions());
+    if (settled.folded == 0) after = settled, found = solver.positions();
+  }
+  if (after.folded >= result.before.folded) return result;
+  result.after = after;
+  result.farthestMove = farthest(found, start);
+  result.patch = withPositions(base, patch, found);
+  return result;
+}
+
+DistortionGain minimiseDistortion(const NarrowBand& base, const Patch& patch,
+                                  const ShellOptions& options) {
+  constexpr const char* kRelax = "relax";
+  checkShell(base, patch, options, kRelax);
+  const ShellElements elements(patch, options.proportions.value_or(sideLengths(patch)),
+                               options.sink);
+  const std::vector<V3d> start = particlePositions(patch);
+  const ShellFolds folds = foldsAt(patch, elements, options.sink, start);
+  if (folds.folded > 0) {
+    throw InvalidInput(
+        fmt::format("{}: the patch folds in {} of {} cells of its particles; unfold it first",
+                    kRelax, folds.folded, folds.cells));
+  }
+  DistortionGain result;
+  result.before = distortionAt(elements, start);
+  ShellSolver solver(base, elements, holdsOf(patch, options.freeSides), start);
+  std::vector<V3d> found = start;
+  constexpr std::size_t kRound = 20;
+  while (result.iterations < options.mostIterations) {
+    levelset::report(
+        options.progress,
+        static_cast<double>(result.iterations) / static_cast<double>(options.mostIterations),
+        kRelax);
+    const std::size_t wanted = std::min(kRound, options.mostIterations - result.iterations);
+    const double scale = bestRestScale(elements, found);
+    const auto density = [scale](const ShellSlopes& f) { return scaledDirichlet(f, scale); };
+    const double energy = solver.energy(density);
+    const std::size_t taken = solver.minimise(density, wanted);
+    result.iterations += taken;
+    // The energy forbids folds at the corners of cells; between them they are very rare.
+    if (foldsAt(patch, elements, options.sink, solver.positions()).folded > 0) break;
+    found = solver.positions();
+    constexpr double kLeastGain = 1e-7;  // of the energy, in a round
+    if (energy - solver.energy(density) < kLeastGain * energy) break;
+  }
+  result.after = distortionAt(elements, found);
+  result.farthestMove = farthest(found, start);
+  result.patch = result.farthestMove > 0 ? withPositions(base, patch, found) : patch;
+  return result;
+}
+
+}  // namespace mapping

@@ -1,0 +1,233 @@
+#include "render/bricks/brick_pool.h"
+
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "levelset/error.h"
+#include "levelset/vdb.h"
+#include "render/bricks/surface_bricks_vdb.h"
+
+namespace render {
+namespace {
+
+using openvdb::Coord;
+
+constexpr std::size_t kEntriesOfPage = 3 * BrickPool::kBlocksOfPage;
+constexpr int kMostEmptyPages = 1 << 10;  // pages along the edge of an empty cube
+// Single precision tells a place this far from the table's corner to 5e-4 voxel.
+constexpr double kWidest = 8192;  // voxels
+constexpr std::size_t kMostValues = std::numeric_limits<std::int32_t>::max();
+
+/// Writes into the empty items of a cubic table the edges of the largest aligned empty cubes.
+/// @param size    items along each axis
+/// @param isEmpty of an item's number
+/// @param edge    of an item
+template <typename IsEmpty, typename Set>
+void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty, const Set& set) {
+  const auto number = [&](const std::array<int, 3>& size_, int x, int y, int z) {
+    return (static_cast<std::size_t>(x) * static_cast<std::size_t>(size_[1]) +
+            static_cast<std::size_t>(y)) *
+               static_cast<std::size_t>(size_[2]) +
+           static_cast<std::size_t>(z);
+  };
+  // A pyramid, finest first: is all below empty?
+  std::vector<std::array<int, 3>> sizes{size};
+  std::vector<std::vector<char>> levels(1);
+  levels[0].resize(number(size, size[0] - 1, size[1] - 1, size[2] - 1) + 1);
+  for (std::size_t i = 0; i < levels[0].size(); ++i) levels[0][i] = isEmpty(i);
+  for (int edge = 2; edge <= most; edge *= 2) {
+    const std::array<int, 3> below = sizes.back();
+    std::array<int, 3> here;
+    for (std::size_t a = 0; a < 3; ++a) here[a] = (below[a] + 1) / 2;
+    std::vector<char> level(number(here, here[0] - 1, here[1] - 1, here[2] - 1) + 1, 1);
+    for (int x = 0; x < below[0]; ++x)
+      for (int y = 0; y < below[1]; ++y)
+        for (int z = 0; z < below[2]; ++z)
+          if (!levels.back()[number(below, x, y, z)]) level[number(here, x / 2, y / 2, z / 2)] = 0;
+    sizes.push_back(here);
+    levels.push_back(std::move(level));
+    if (here == std::array<int, 3>{1, 1, 1}) break;
+  }
+  for (int x = 0; x < size[0]; ++x)
+    for (int y = 0; y < size[1]; ++y)
+      for (int z = 0; z < size[2]; ++z) {
+        const std::size_t i = number(size, x, y, z);
+        if (!levels[0][i]) continue;
+        std::size_t level = 0;
+        while (level + 1 < levels.size() &&
+               levels[level + 1][number(sizes[level + 1], x >> (level + 1), y >> (level + 1),
+                                        z >> (level + 1))])
+          ++level;
+        set(i, 1 << level);
+      }
+}
+
+/// Where the entry of the block with that origin is.
+class Table {
+ public:
+  explicit Table(BrickPool& pool) : pool_(pool) {
+    std::size_t count = 1;
+    for (const int n : pool.pages) count *= static_cast<std::size_t>(n);
+    pool.page.assign(count, -BrickPool::kPage);
+  }
+  /// Makes the page if there is none.
+  std::size_t slotOf(const Coord& origin) {
+    std::size_t page = 0, block = 0;
+    for (int a = 0; a < 3; ++a) {
+      const auto i = static_cast<std::size_t>(a);
+      const int at = origin[a] - pool_.origin[i];
+      page = page * static_cast<std::size_t>(pool_.pages[i]) +
+             static_cast<std::size_t>(at / BrickPool::kPage);
+      block = block << 3 | static_cast<std::size_t>((at >> 3) & 7);
+    }
+    std::int32_t& first = pool_.page[page];
+    if (first < 0) {
+      if (pool_.entry.size() > kMostValues - kEntriesOfPage)
+        throw levelset::ResourceLimit(
+            "render: the surface is strewn over more of the table than an index can tell; use "
+            "larger voxels, or draw its parts apart");
+      first = static_cast<std::int32_t>(pool_.entry.size());
+      pool_.entry.resize(pool_.entry.size() + BrickPool::kBlocksOfPage, -BrickPool::kBlock);
+      pool_.entry.resize(pool_.entry.size() + kEntriesOfPage - BrickPool::kBlocksOfPage, 0);
+    }
+    return static_cast<std::size_t>(first) + block;
+  }
+
+ private:
+  BrickPool& pool_;
+};
+
+void markEmptyCubes(BrickPool& pool) {
+  for (std::size_t first = 0; first < pool.entry.size(); first += kEntriesOfPage) {
+    std::int32_t* entries = pool.entry.data() + first;
+    markEmpty(
+        {8, 8, 8}, 4, [&](std::size_t i) { return entries[i] < 0; },
+        [&](std::size_t i, int edge) { entries[i] = -BrickPool::kBlock * edge; });
+  }
+  markEmpty(
+      pool.pages, kMostEmptyPages, [&](std::size_t i) { return pool.page[i] < 0; },
+      [&](std::size_t i, int edge) { pool.page[i] = -BrickPool::kPage * edge; });
+}
+
+/// The bricks, then what is held of the blocks beside them, then a row of values that are far
+/// outside and one of those far inside.
+void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks,
+              const std::vector<BesideBlock>& beside, float background) {
+  constexpr int kEdge = BrickPool::kEdge;
+  Table table(pool);
+  const auto hold = [&](std::size_t slot, std::size_t first, int strideX, int strideY) {
+    pool.entry[slot + BrickPool::kFirstOfEntry] = static_cast<std::int32_t>(first);
+    pool.entry[slot + BrickPool::kStridesOfEntry] = strideX << BrickPool::kStrideShift | strideY;
+  };
+  std::size_t held = 0;
+  for (std::size_t i = 0; i < bricks.size(); ++i, held += BrickPool::kValues) {
+    const std::size_t slot = table.slotOf(bricks[i]->origin);
+    pool.entry[slot] = static_cast<std::int32_t>(i);
+    hold(slot, held, kEdge * kEdge, kEdge);
+  }
+  for (const BesideBlock& block : beside) {
+    if (block.value.empty()) continue;
+    const Coord low = block.points.min(), size = block.points.dim();
+    const int strideY = size.z(), strideX = size.y() * strideY;
+    const auto before = static_cast<std::size_t>(low.x() * strideX + low.y() * strideY + low.z());
+    hold(table.slotOf(block.origin), held - before, strideX, strideY);
+    held += block.value.size();
+    ++pool.besideCount;
+  }
+  for (const BesideBlock& block : beside)
+    if (block.value.empty())
+      hold(table.slotOf(block.origin), held + (block.isInside ? BrickPool::kBlock : 0), 0, 0);
+  held += 2 * BrickPool::kBlock;
+  if (held > kMostValues) {
+    throw levelset::ResourceLimit(
+        fmt::format("render: the surface takes {} values, and {} are the most; use larger voxels",
+                    held, kMostValues));
+  }
+  markEmptyCubes(pool);
+  pool.value.resize(bricks.size() * BrickPool::kValues);
+  pool.value.reserve(held);
+  pool.mask.resize(bricks.size() * BrickPool::kMaskWords);
+  tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) {
+    std::copy(bricks[i]->value.begin(), bricks[i]->value.end(),
+              pool.value.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kValues));
+    std::copy(bricks[i]->mask.begin(), bricks[i]->mask.end(),
+              pool.mask.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kMaskWords));
+  });
+  for (const BesideBlock& block : beside)
+    pool.value.insert(pool.value.end(), block.value.begin(), block.value.end());
+  pool.value.insert(pool.value.end(), BrickPool::kBlock, background);
+  pool.value.insert(pool.value.end(), BrickPool::kBlock, -background);
+}
+
+/// Turns the values into codes.
+void encode(BrickPool& pool, const ValueBits& held) {
+  pool.held = held;
+  const auto size = static_cast<std::size_t>(held.bits / 8);
+  pool.code.assign(pool.value.size() * size + BrickPool::kCodeRoom, 0);
+  tbb::parallel_for(std::size_t{0}, pool.value.size(), [&](std::size_t i) {
+    const int code = held.codeOf(pool.value[i]);
+    for (std::size_t b = 0; b < size; ++b)
+      pool.code[i * size + b] = static_cast<std::uint8_t>(code >> (8 * b));
+  });
+  pool.value = {};
+}
+
+/// @param crossed  origins of the bricks
+void requireNarrow(const openvdb::CoordBBox& crossed) {
+  std::array<double, 3> spans{};
+  for (int a = 0; a < 3; ++a)
+    spans[static_cast<std::size_t>(a)] =
+        static_cast<double>(crossed.max()[a]) - crossed.min()[a] + BrickPool::kBlock;
+  if (*std::max_element(spans.begin(), spans.end()) <= kWidest) return;
+  throw levelset::ResourceLimit(fmt::format(
+      "render: the surface spans {:.6g} x {:.6g} x {:.6g} voxels, and {:.0f} are the most in "
+      "single precision; draw with --renderer embree, use larger voxels, or draw its parts apart",
+      spans[0], spans[1], spans[2], kWidest));
+}
+
+}  // namespace
+
+std::size_t BrickPool::bytes() const {
+  return 4 * (page.size() + entry.size() + mask.size()) + valueBytes();
+}
+
+BrickPool makeBricks(const levelset::NarrowBand& band, const TableOptions& options) {
+  BrickPool pool;
+  pool.filter = options.filter;
+  if (band.isEmpty()) return pool;
+  openvdb::FloatTree::ConstPtr coefficients;
+  if (options.filter == Filter::BSplineQi)
+    coefficients = quasiInterpolated(levelset::vdb(band).tree());
+  const openvdb::FloatTree& tree = coefficients ? *coefficients : levelset::vdb(band).tree();
+  const Bricks bricks = bricksOf(tree, options);
+  const openvdb::CoordBBox& crossed = bricks.crossed;
+  if (crossed.empty()) return pool;
+  requireNarrow(crossed);
+  openvdb::CoordBBox box = crossed;
+  box.expand(BrickPool::kBlock);  // so that stencils look at no block outside the table
+  for (std::size_t i = 0; i < 3; ++i) {
+    const int a = static_cast<int>(i);
+    pool.origin[i] = box.min()[a];
+    pool.low[i] = crossed.min()[a] - box.min()[a];
+    pool.high[i] = crossed.max()[a] - box.min()[a] + BrickPool::kBlock;
+    pool.cellsLow[i] = bricks.cells.min()[a] - box.min()[a];
+    pool.cellsHigh[i] = bricks.cells.max()[a] + 1 - box.min()[a];
+    pool.pages[i] =
+        (box.max()[a] - box.min()[a] + BrickPool::kBlock + BrickPool::kPage - 1) / BrickPool::kPage;
+  }
+  pool.blocksUnseen = bricks.unneeded;
+  pool.blocksLeftOut = tree.leafCount();
+  if (bricks.needed.empty()) return pool;
+  fillPool(pool, bricks.needed, blocksBeside(tree, bricks.needed),
+           levelset::vdb(band).background());
+  pool.blocksLeftOut -= pool.besideCount;
+  for (const auto& brick : bricks.needed)
+    pool.blocksLeftOut -= tree.probeConstLeaf(brick->origin) != nullptr;
+  if (options.held.bits != 32) encode(pool, options.held);
+  return pool;
+}
+
+}  // namespace render

@@ -1,0 +1,349 @@
+#include "render/bricks/surface_bricks_vdb.h"
+
+#include <openvdb/tree/LeafManager.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace render {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using Leaf = openvdb::FloatTree::LeafNodeType;
+
+constexpr int kBlock = BrickPool::kBlock;
+
+/// Origins of the blocks that can hold a crossing cell: those of leaves, and those before them,
+/// whose last cells reach into them. In tree order of no importance, each once.
+std::vector<Coord> blocksOf(const openvdb::FloatTree& tree) {
+  std::vector<Coord> blocks;
+  blocks.reserve(tree.leafCount() * 2);
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
+    for (int i = 0; i < 8; ++i)
+      blocks.push_back(
+          leaf->origin().offsetBy(i & 4 ? -kBlock : 0, i & 2 ? -kBlock : 0, i & 1 ? -kBlock : 0));
+  std::sort(blocks.begin(), blocks.end());
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+  return blocks;
+}
+
+/// The values of the 9³ points from a block's origin on, from up to eight leaves.
+/// @return do they differ in sign?
+template <typename Accessor>
+bool fill(const Accessor& accessor, Brick& brick) {
+  constexpr int kEdge = BrickPool::kEdge;
+  bool anyInside = false, anyOutside = false;
+  for (int i = 0; i < 8; ++i) {
+    const int fromX = i & 4 ? kBlock : 0, fromY = i & 2 ? kBlock : 0, fromZ = i & 1 ? kBlock : 0;
+    const Coord at = brick.origin.offsetBy(fromX, fromY, fromZ);
+    const Leaf* leaf = accessor.probeConstLeaf(at);
+    const float* values = leaf ? leaf->buffer().data() : nullptr;
+    const float tile = leaf ? 0.0f : accessor.getValue(at);
+    for (int x = fromX; x < (fromX ? kEdge : kBlock); ++x)
+      for (int y = fromY; y < (fromY ? kEdge : kBlock); ++y)
+        for (int z = fromZ; z < (fromZ ? kEdge : kBlock); ++z) {
+          const float v = values ? values[(x - fromX) << 6 | (y - fromY) << 3 | (z - fromZ)] : tile;
+          brick.value[static_cast<std::size_t>((x * kEdge + y) * kEdge + z)] = v;
+          (v < 0 ? anyInside : anyOutside) = true;
+        }
+  }
+  return anyInside && anyOutside;
+}
+
+/// Marks the cells whose corners differ in sign.
+void findCrossings(Brick& brick) {
+  constexpr int kEdge = BrickPool::kEdge;
+  brick.mask = {};
+  for (int x = 0; x < kBlock; ++x)
+    for (int y = 0; y < kBlock; ++y) {
+      // Bit z: are the four points at z of this column of cells inside, all or any?
+      unsigned all = 0, any = 0;
+      for (int z = 0; z < kEdge; ++z) {
+        const auto isInside = [&](int i, int j) {
+          return brick.value[static_cast<std::size_t>(((x + i) * kEdge + y + j) * kEdge + z)] < 0;
+        };
+        const bool a = isInside(0, 0), b = isInside(0, 1), c = isInside(1, 0), d = isInside(1, 1);
+        all |= static_cast<unsigned>(a && b && c && d) << z;
+        any |= static_cast<unsigned>(a || b || c || d) << z;
+      }
+      const unsigned crossing = (any | any >> 1) & ~(all & all >> 1) & 0xff;
+      const unsigned bit = static_cast<unsigned>(x << 6 | y << 3);
+      brick.mask[bit >> 5] |= crossing << (bit & 31);
+    }
+}
+
+/// The coefficients that the cells of a block need, from the point before the first one on.
+struct SplineBlock {
+  static constexpr int kAround = kBlock + 3;
+  float c[kAround][kAround][kAround];
+
+  template <typename Accessor>
+  SplineBlock(const Accessor& accessor, const Coord& origin) {
+    constexpr int kFirst[4] = {0, 1, kBlock + 1, kAround};  // of the blocks before, here and behind
+    for (int n = 0; n < 27; ++n) {
+      const int b[3] = {n / 9, n / 3 % 3, n % 3};
+      const Coord at =
+          origin.offsetBy((b[0] - 1) * kBlock, (b[1] - 1) * kBlock, (b[2] - 1) * kBlock);
+      const Leaf* leaf = accessor.probeConstLeaf(at);
+      const float tile = leaf ? 0.0f : accessor.getValue(at);
+      const int z0 = kFirst[b[2]], z1 = kFirst[b[2] + 1];
+      for (int x = kFirst[b[0]]; x < kFirst[b[0] + 1]; ++x)
+        for (int y = kFirst[b[1]]; y < kFirst[b[1] + 1]; ++y) {
+          if (!leaf) {
+            std::fill(c[x][y] + z0, c[x][y] + z1, tile);
+            continue;
+          }
+          const float* row = leaf->buffer().data() + (((x - 1) & 7) << 6 | ((y - 1) & 7) << 3);
+          std::copy_n(row + ((z0 - 1) & 7), z1 - z0, c[x][y] + z0);
+        }
+    }
+  }
+
+  using SignRows = std::array<std::array<unsigned, kAround>, kAround>;
+  /// Bit z of row (x, y): is the coefficient negative?
+  [[nodiscard]] SignRows signRows() const {
+    SignRows rows;
+    for (std::size_t x = 0; x < kAround; ++x)
+      for (std::size_t y = 0; y < kAround; ++y) {
+        unsigned row = 0;
+        for (int z = 0; z < kAround; ++z) row |= static_cast<unsigned>(c[x][y][z] < 0) << z;
+        rows[x][y] = row;
+      }
+    return rows;
+  }
+
+  /// Bit z: do the coefficients of the cell (x, y, z) differ in sign? Where not the spline, which
+  /// lies between them, crosses nothing.
+  [[nodiscard]] static unsigned mixedCells(const SignRows& rows, std::size_t x, std::size_t y) {
+    unsigned any = 0, all = ~0u;
+    for (std::size_t i = x; i < x + 4; ++i)
+      for (std::size_t j = y; j < y + 4; ++j) {
+        any |= rows[i][j];
+        all &= rows[i][j];
+      }
+    any |= any >> 1;
+    all &= all >> 1;
+    return (any | any >> 2) & ~(all & all >> 2) & 0xff;
+  }
+
+  /// Bit z: is the spline in the middle of the cell (x, y, z) nearer to zero than its slopes let it
+  /// get from there? For a row at a time, whose points along z stand side by side.
+  [[nodiscard]] unsigned openCells(int x, int y) const {
+    constexpr float kMiddle[4] = {1.0f / 48, 23.0f / 48, 23.0f / 48, 1.0f / 48};
+    constexpr float kRoom = 1e-5f;  // of the largest coefficient, for single precision
+    Row middle{}, most{}, slopeX{}, slopeY{}, slopeZ{};  // of all points at that z
+    const auto widen = [](float& to, float v) { to = std::max(to, v); };
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) {
+        const auto& v = c[x + i][y + j];
+        const auto& nextX = c[std::min(x + i + 1, x + 3)][y + j];
+        const auto& nextY = c[x + i][std::min(y + j + 1, y + 3)];
+        for (std::size_t z = 0; z < kAround; ++z) {
+          middle[z] += kMiddle[i] * kMiddle[j] * v[z];
+          widen(most[z], std::abs(v[z]));
+          widen(slopeX[z], std::abs(nextX[z] - v[z]));
+          widen(slopeY[z], std::abs(nextY[z] - v[z]));
+        }
+        for (std::size_t z = 0; z + 1 < kAround; ++z) widen(slopeZ[z], std::abs(v[z + 1] - v[z]));
+      }
+    for (Row* row : {&most, &slopeX, &slopeY}) takeLargest(*row, 4);
+    takeLargest(slopeZ, 3);
+    unsigned open = 0;
+    for (std::size_t z = 0; z < kBlock; ++z) {
+      float value = 0;
+      for (std::size_t k = 0; k < 4; ++k) value += kMiddle[k] * middle[z + k];
+      const float slope = slopeX[z] + slopeY[z] + slopeZ[z];
+      const bool isOpen = std::abs(value) <= 0.5f * slope + kRoom * most[z];
+      open |= static_cast<unsigned>(isOpen) << z;
+    }
+    return open;
+  }
+
+ private:
+  using Row = std::array<float, kAround>;
+  /// In each place that of it and those behind it, 3 or 4 in all.
+  static void takeLargest(Row& row, std::size_t count) {
+    for (std::size_t z = 0; z + 1 < kAround; ++z) row[z] = std::max(row[z], row[z + 1]);
+    for (std::size_t z = 0; z < kBlock; ++z) row[z] = std::max(row[z], row[z + count - 2]);
+  }
+};
+
+/// Marks the cells in which the spline may cross zero.
+template <typename Accessor>
+void findSplineCrossings(const Accessor& accessor, Brick& brick) {
+  const SplineBlock block(accessor, brick.origin);
+  const SplineBlock::SignRows signs = block.signRows();
+  brick.mask = {};
+  for (int x = 0; x < kBlock; ++x)
+    for (int y = 0; y < kBlock; ++y) {
+      const unsigned mixed =
+          SplineBlock::mixedCells(signs, static_cast<std::size_t>(x), static_cast<std::size_t>(y));
+      if (mixed == 0) continue;
+      const unsigned bit = static_cast<unsigned>(x << 6 | y << 3);
+      brick.mask[bit >> 5] |= (mixed & block.openCells(x, y)) << (bit & 31);
+    }
+}
+
+/// Calls work(first, last) for each row of cells along z, from the first that is crossed to the
+/// last.
+template <typename Work>
+void overCrossedRows(const Brick& brick, const Work& work) {
+  for (int x = 0; x < kBlock; ++x)
+    for (int y = 0; y < kBlock; ++y) {
+      const unsigned bit = static_cast<unsigned>(x << 6 | y << 3);
+      const unsigned column = brick.mask[bit >> 5] >> (bit & 31) & 0xff;
+      if (column != 0)
+        work(Coord(x, y, std::countr_zero(column)), Coord(x, y, std::bit_width(column) - 1));
+    }
+}
+
+/// A block and the points of it that something takes.
+struct Part {
+  Coord origin;
+  CoordBBox points;  ///< from the origin on
+};
+
+/// Of the blocks around a brick: what tells the surface's shape in its cells. The stencil of a cell
+/// goes from one point before it to two behind on each axis, and a point further on one of them.
+void addPartsBeside(const Brick& brick, std::vector<Part>& parts) {
+  std::array<CoordBBox, 27> beside;
+  const auto add = [&](const CoordBBox& points) {
+    for (int x = points.min().x() >> 3; x <= points.max().x() >> 3; ++x)
+      for (int y = points.min().y() >> 3; y <= points.max().y() >> 3; ++y)
+        for (int z = points.min().z() >> 3; z <= points.max().z() >> 3; ++z) {
+          CoordBBox part = CoordBBox::createCube(Coord(x, y, z) << 3, kBlock);
+          part.intersect(points);
+          beside[static_cast<std::size_t>(((x + 1) * 3 + y + 1) * 3 + z + 1)].expand(part);
+        }
+  };
+  overCrossedRows(brick, [&](const Coord& first, const Coord& last) {
+    for (int a = 0; a < 3; ++a) {
+      Coord further(0);
+      further[a] = 1;
+      add(CoordBBox(first - Coord(1) - further, last + Coord(2) + further));
+    }
+  });
+  for (int n = 0; n < 27; ++n) {
+    const CoordBBox& points = beside[static_cast<std::size_t>(n)];
+    if (n == 13 || points.empty()) continue;
+    const Coord corner = Coord(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1) << 3;
+    parts.push_back(
+        {brick.origin + corner, CoordBBox(points.min() - corner, points.max() - corner)});
+  }
+}
+
+}  // namespace
+
+/// The spline's coefficients f − ∇²f/6 in the place of the values, in leaves.
+openvdb::FloatTree::Ptr quasiInterpolated(const openvdb::FloatTree& tree) {
+  openvdb::FloatTree::Ptr result(new openvdb::FloatTree(tree));
+  openvdb::tree::LeafManager<openvdb::FloatTree> leaves(*result);
+  leaves.foreach ([&](Leaf& leaf, std::size_t) {
+    const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
+    const SplineBlock f(accessor, leaf.origin());
+    float* values = leaf.buffer().data();
+    for (int x = 1; x <= kBlock; ++x)
+      for (int y = 1; y <= kBlock; ++y)
+        for (int z = 1; z <= kBlock; ++z) {
+          const auto at = [&](int i, int j, int k) {
+            return static_cast<double>(f.c[x + i][y + j][z + k]);
+          };
+          const double own = at(0, 0, 0);
+          const double bend = at(-1, 0, 0) + at(1, 0, 0) + at(0, -1, 0) + at(0, 1, 0) +
+                              at(0, 0, -1) + at(0, 0, 1) - 6 * own;
+          values[(x - 1) << 6 | (y - 1) << 3 | (z - 1)] = static_cast<float>(own - bend / 6);
+        }
+  });
+  return result;
+}
+
+Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
+  // Of a block, with what stencils reach about it.
+  constexpr double kRadius = 0.5 * kBlock * std::numbers::sqrt3 + 3;
+  const std::vector<Coord> blocks = blocksOf(tree);
+  std::vector<std::unique_ptr<Brick>> bricks(blocks.size());
+  struct Sum {
+    CoordBBox crossed, cells;
+    std::size_t unneeded = 0;
+  };
+  tbb::enumerable_thread_specific<Sum> sums;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 64), [&](const auto& range) {
+    const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
+    Sum& sum = sums.local();
+    auto brick = std::make_unique<Brick>();
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      brick->origin = blocks[i];
+      const bool differ = fill(accessor, *brick);
+      if (options.filter == Filter::Trilinear) {
+        if (!differ) continue;
+        findCrossings(*brick);
+      } else {
+        findSplineCrossings(accessor, *brick);
+        if (brick->mask == decltype(brick->mask){}) continue;
+      }
+      const Coord& origin = brick->origin;
+      sum.crossed.expand(origin);
+      overCrossedRows(*brick, [&](const Coord& first, const Coord& last) {
+        sum.cells.expand(origin + first);
+        sum.cells.expand(origin + last);
+      });
+      if (options.needs &&
+          !options.needs(Imath::V3d(origin.x(), origin.y(), origin.z()) + Imath::V3d(0.5 * kBlock),
+                         kRadius)) {
+        ++sum.unneeded;
+        continue;
+      }
+      bricks[i] = std::move(brick);
+      brick = std::make_unique<Brick>();
+    }
+  });
+  Bricks result;
+  std::erase(bricks, nullptr);
+  result.needed = std::move(bricks);
+  for (const Sum& sum : sums) {
+    result.crossed.expand(sum.crossed);
+    result.cells.expand(sum.cells);
+    result.unneeded += sum.unneeded;
+  }
+  return result;
+}
+
+std::vector<BesideBlock> blocksBeside(const openvdb::FloatTree& tree,
+                                      const std::vector<std::unique_ptr<Brick>>& bricks) {
+  std::vector<Part> parts;
+  for (const auto& brick : bricks) addPartsBeside(*brick, parts);
+  std::sort(parts.begin(), parts.end(),
+            [](const Part& a, const Part& b) { return a.origin < b.origin; });
+  std::vector<BesideBlock> blocks;
+  auto brick = bricks.begin();
+  for (const Part& part : parts) {
+    while (brick != bricks.end() && (*brick)->origin < part.origin) ++brick;
+    if (brick != bricks.end() && (*brick)->origin == part.origin) continue;
+    if (blocks.empty() || blocks.back().origin != part.origin)
+      blocks.emplace_back().origin = part.origin;
+    blocks.back().points.expand(part.points);
+  }
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 64), [&](const auto& range) {
+    const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      BesideBlock& block = blocks[i];
+      const Leaf* leaf = accessor.probeConstLeaf(block.origin);
+      if (!leaf) {
+        block.isInside = accessor.getValue(block.origin) < 0;
+        continue;
+      }
+      block.value.reserve(block.points.volume());
+      for (const Coord& point : block.points)
+        block.value.push_back(leaf->buffer().data()[Leaf::coordToOffset(point)]);
+    }
+  });
+  return blocks;
+}
+
+}  // namespace render

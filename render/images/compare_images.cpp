@@ -1,0 +1,417 @@
+#include "render/images/compare_images.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <functional>
+#include <limits>
+#include <set>
+
+#include "levelset/error.h"
+
+namespace render {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr std::size_t kShown = 5;
+// Of all pixels: where a ray passes an outline within a rounding error, either answer is right.
+constexpr double kOutlineShare = 1e-5;
+// What Z of one surface may differ by at most, relative.
+constexpr double kOneSurface = 1e-3;
+enum : char { kMissed, kHit, kBroken };
+
+using Difference = std::function<double(std::size_t)>;
+
+/// How a layer is compared, and what may lie between two correct renderers: one in single and one
+/// in double precision. docs/rendering.md derives the numbers.
+struct Layer {
+  std::string name, measure;
+  LayerTolerance allowed;
+  Difference at;
+};
+
+double apart(double a, double b) {
+  if (a == b) return 0;
+  const double difference = std::abs(a - b);
+  return std::isnan(difference) ? kInfinite : difference;
+}
+
+class Comparer {
+ public:
+  Comparer(const Image& first, const Image& second, const ImageComparisonOptions& options)
+      : a_(first), b_(second), options_(options) {
+    if (a_.width != b_.width || a_.height != b_.height)
+      throw levelset::InvalidInput(fmt::format(
+          "compare-images: the pictures have {} × {} and {} × {} pixels; draw both at one size",
+          a_.width, a_.height, b_.width, b_.height));
+    for (const auto& [name, tolerance] : options_.tolerances)
+      if (!(tolerance.usual >= 0) || !(tolerance.worst >= 0))
+        throw levelset::UsageError(fmt::format(
+            "compare-images: the tolerance of {} is {}, {}; give two numbers, 0 or more", name,
+            tolerance.usual, tolerance.worst));
+  }
+
+  ImageComparison run() {
+    result_.isExact = options_.exact;
+    result_.pixels = a_.pixelCount();
+    result_.difference = Image(a_.width, a_.height);
+    findHits();
+    compareCoverage();
+    const std::vector<Layer> all = layers();
+    for (const auto& [name, tolerance] : options_.tolerances)
+      if (std::none_of(all.begin(), all.end(), [&](const Layer& l) { return l.name == name; }))
+        throw levelset::UsageError(
+            fmt::format("compare-images: there is no layer '{}' in both pictures; they have {}",
+                        name, namesOf(all)));
+    for (const Layer& layer : all) compare(layer);
+    compareBits();
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] bool has(const std::string& name) const {
+    return a_.channels.count(name) && b_.channels.count(name);
+  }
+  [[nodiscard]] static double value(const Image& image, const std::string& name, std::size_t i) {
+    return static_cast<double>(image.channels.at(name)[i]);
+  }
+  static std::string namesOf(const std::vector<Layer>& layers) {
+    std::string names;
+    for (const Layer& layer : layers) names += (names.empty() ? "" : ", ") + layer.name;
+    return names.empty() ? "none" : names;
+  }
+
+  void findHits() {
+    const bool byDepth = has("Z");
+    if (!byDepth && !has("A"))
+      throw levelset::InvalidInput(
+          "compare-images: the pictures have neither Z nor A in common, so nothing tells what they "
+          "hit; draw them with 'render FILE.exr'");
+    const auto hits = [&](const Image& image) {
+      const std::vector<float>& channel = image.channels.at(byDepth ? "Z" : "A");
+      std::vector<char> hit(channel.size());
+      for (std::size_t i = 0; i < hit.size(); ++i) {
+        const float z = channel[i];
+        const bool isMiss = byDepth ? z == std::numeric_limits<float>::infinity() : z <= 0;
+        hit[i] = std::isnan(z) || (byDepth && std::isinf(z) && !isMiss) ? kBroken
+                 : isMiss                                               ? kMissed
+                                                                        : kHit;
+      }
+      return hit;
+    };
+    hitA_ = hits(a_);
+    hitB_ = hits(b_);
+    isCompared_.assign(result_.pixels, 0);
+  }
+
+  /// Calls visit(index) for a pixel and those around it.
+  template <typename Visit>
+  void forEachWithinOne(int x, int y, const Visit& visit) const {
+    for (int v = std::max(0, y - 1); v <= std::min(a_.height - 1, y + 1); ++v)
+      for (int u = std::max(0, x - 1); u <= std::min(a_.width - 1, x + 1); ++u) visit(index(u, v));
+  }
+
+  /// Both a hit and a miss within one pixel.
+  [[nodiscard]] bool isOutline(const std::vector<char>& hit, int x, int y) const {
+    bool any = false, all = true;
+    forEachWithinOne(x, y, [&](std::size_t i) {
+      any = any || hit[i] == kHit;
+      all = all && hit[i] == kHit;
+    });
+    return any && !all;
+  }
+
+  /// One picture sees the front of two surfaces, the other the one behind: Z differs by more than
+  /// one surface allows, and each lies within what the other has within one pixel.
+  [[nodiscard]] bool isInnerOutline(int x, int y) const {
+    if (!has("Z")) return false;
+    const std::size_t i = index(x, y);
+    const double a = value(a_, "Z", i), b = value(b_, "Z", i);
+    if (!(std::abs(a - b) > kOneSurface * std::max(std::abs(a), std::abs(b)))) return false;
+    const auto holds = [&](const Image& image, const std::vector<char>& hit, double z) {
+      double low = kInfinite, high = -kInfinite;
+      forEachWithinOne(x, y, [&](std::size_t n) {
+        if (hit[n] != kHit) return;
+        low = std::min(low, value(image, "Z", n));
+        high = std::max(high, value(image, "Z", n));
+      });
+      const double slack = kOneSurface * std::abs(z);
+      return z >= low - slack && z <= high + slack;
+    };
+    return holds(a_, hitA_, b) && holds(b_, hitB_, a);
+  }
+  [[nodiscard]] std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(a_.width) +
+           static_cast<std::size_t>(x);
+  }
+  [[nodiscard]] PixelDifference pixel(std::size_t i, double value) const {
+    const auto width = static_cast<std::size_t>(a_.width);
+    return {static_cast<int>(i % width), static_cast<int>(i / width), value};
+  }
+
+  void compareCoverage() {
+    result_.outlineAllowed =
+        static_cast<std::size_t>(std::ceil(kOutlineShare * static_cast<double>(result_.pixels)));
+    std::vector<PixelDifference> atOutline;
+    std::vector<float>& shown = result_.difference.addChannel("coverage");
+    for (int y = 0; y < a_.height; ++y)
+      for (int x = 0; x < a_.width; ++x) {
+        const std::size_t i = index(x, y);
+        const bool isBroken = hitA_[i] == kBroken || hitB_[i] == kBroken;
+        const bool areHit = hitA_[i] == kHit && hitB_[i] == kHit;
+        const bool isInner = areHit && isInnerOutline(x, y);
+        result_.bothHit += areHit && !isInner;
+        isCompared_[i] = areHit && !isInner;
+        if (hitA_[i] == hitB_[i] && !isBroken && !isInner) continue;
+        shown[i] = hitB_[i] == kHit && !isInner ? -1 : 1;
+        // An outline of both: a leak is one of its own picture only.
+        const bool excused =
+            isInner || (!isBroken && isOutline(hitA_, x, y) && isOutline(hitB_, x, y));
+        ++(excused ? result_.unlikeAtOutline : result_.unlikeElsewhere);
+        std::vector<PixelDifference>& list = excused ? atOutline : result_.unlike;
+        if (list.size() < kShown) list.push_back({x, y, 1});
+      }
+    result_.unlike.insert(result_.unlike.end(), atOutline.begin(), atOutline.end());
+    if (result_.unlike.size() > kShown) result_.unlike.resize(kShown);
+  }
+
+  /// A positive length in a picture's header.
+  [[nodiscard]] static double lengthNamed(const Image& image, const char* name, double fallback) {
+    const auto found = image.attributes.find(name);
+    if (found == image.attributes.end()) return fallback;
+    const double size = std::atof(found->second.c_str());
+    return size > 0 && std::isfinite(size * size) ? size : fallback;
+  }
+  /// The first, where there are several solids.
+  [[nodiscard]] double voxelSize() const { return lengthNamed(a_, "ls:voxelSize", 1); }
+
+  /// What curvatures change by over the 1e-3 voxel that places may be apart, per voxel: third
+  /// differences of values in few bits are up to eight steps of those in a band of three voxels.
+  [[nodiscard]] double curvatureStep() const {
+    const double bits = lengthNamed(a_, "ls:valueBits", 32);
+    return bits < 32 ? 1e-3 * 8 * 6 * std::exp2(-bits) : 0;
+  }
+
+  [[nodiscard]] double vectorDifference(const std::string& name, std::size_t i) const {
+    double squares = 0;
+    for (const char* axis : {".X", ".Y", ".Z"}) {
+      const double d = apart(value(a_, name + axis, i), value(b_, name + axis, i));
+      squares += d * d;
+    }
+    return std::sqrt(squares);
+  }
+  /// Radians by which the surface turns from the place of one picture to the other's; 0 where
+  /// layers that tell it are missing.
+  [[nodiscard]] double turnBetweenPlaces(std::size_t i) const {
+    if (!has("P.X") || !has("P.Y") || !has("P.Z")) return 0;
+    constexpr double kMostTurn = 1.7e-3;  // as much as is allowed without
+    double curvature[2] = {};
+    for (const char* name : {"curvature.k1", "curvature.k2"}) {
+      if (!has(name)) continue;
+      curvature[0] = std::max(curvature[0], std::abs(value(a_, name, i)));
+      curvature[1] = std::max(curvature[1], std::abs(value(b_, name, i)));
+    }
+    const double turn = vectorDifference("P", i) * std::min(curvature[0], curvature[1]);
+    return std::isfinite(turn) ? std::min(turn, kMostTurn) : 0;
+  }
+  /// Of P from the origin: it is stored in so many bits.
+  [[nodiscard]] double distance(std::size_t i) const {
+    const double d = std::hypot(value(a_, "P.X", i), value(a_, "P.Y", i), value(a_, "P.Z", i));
+    return std::isfinite(d) ? d : 0;
+  }
+  [[nodiscard]] double depth(std::size_t i) const {
+    return std::max(std::abs(value(a_, "Z", i)), std::abs(value(b_, "Z", i)));
+  }
+
+  std::vector<Layer> layers() {
+    std::vector<Layer> all;
+    std::set<std::string> told;  // channels that some layer compares
+    const auto add = [&](const std::vector<std::string>& channels, Layer layer) {
+      if (!std::all_of(channels.begin(), channels.end(), [&](const auto& c) { return has(c); }))
+        return;
+      told.insert(channels.begin(), channels.end());
+      all.push_back(std::move(layer));
+    };
+    const bool hasDepth = has("Z");
+    add({"R", "G", "B"}, {"colour", "absolute", {kInfinite, kInfinite}, [this](std::size_t i) {
+                            double most = 0;
+                            for (const char* c : {"R", "G", "B"})
+                              most = std::max(most, apart(value(a_, c, i), value(b_, c, i)));
+                            return most;
+                          }});
+    const double h = voxelSize();
+    const double rough = curvatureStep();
+    for (const auto& [name, usual] : {std::pair{"mean", 1e-4}, {"k1", 1e-3}, {"k2", 1e-3}}) {
+      const std::string channel = std::string("curvature.") + name;
+      add({channel},
+          {channel, "per voxel", {usual + rough, kInfinite}, [this, channel, h](std::size_t i) {
+             return h * apart(value(a_, channel, i), value(b_, channel, i));
+           }});
+    }
+    add({"curvature.gauss"},
+        {"curvature.gauss", "per voxel²", {1e-4 + rough, kInfinite}, [this, h](std::size_t i) {
+           return h * h * apart(value(a_, "curvature.gauss", i), value(b_, "curvature.gauss", i));
+         }});
+    // From close by, places are known relative to the solid's size only.
+    const double extent =
+        std::max(lengthNamed(a_, kExtentAttribute, 0), lengthNamed(b_, kExtentAttribute, 0));
+    add({"Z"}, {"Z", "relative", {2e-6, kOneSurface}, [this, extent](std::size_t i) {
+                  const double d = apart(value(a_, "Z", i), value(b_, "Z", i));
+                  return d > 0 ? d / std::max(depth(i), extent) : 0;
+                }});
+    add({"P.X", "P.Y", "P.Z"},
+        {"P",
+         hasDepth ? "relative to Z" : "absolute",
+         {hasDepth ? 2e-6 : kInfinite, hasDepth ? 1e-3 : kInfinite},
+         [this, hasDepth, extent](std::size_t i) {
+           const double d = vectorDifference("P", i);
+           return d > 0 && hasDepth ? d / std::max({depth(i), distance(i), extent}) : d;
+         }});
+    // A ray that grazes a surface is within it for the square root of how far it dips in.
+    add({"thickness"}, {"thickness", "relative", {1e-5, 1e-2}, [this, extent](std::size_t i) {
+                          const double d =
+                              apart(value(a_, "thickness", i), value(b_, "thickness", i));
+                          return d > 0 ? d / std::max(depth(i), extent) : 0;
+                        }});
+    // The angle between unit vectors, precise where it is small. Where a ray grazes the surface the
+    // places stand off each other, and the normals by that times the curvature.
+    add({"N.X", "N.Y", "N.Z"}, {"N", "radians", {2e-4, 1.7e-3}, [this](std::size_t i) {
+                                  const double d = vectorDifference("N", i);
+                                  const double angle = d <= 2 ? 2 * std::asin(d / 2) : kInfinite;
+                                  return std::max(0.0, angle - turnBetweenPlaces(i));
+                                }});
+    for (const auto& [name, channel] : a_.channels) {
+      if (told.count(name) || name == "A" || !has(name)) continue;
+      add({name}, {name, "absolute", {kInfinite, kInfinite}, [this, name = name](std::size_t i) {
+                     return apart(value(a_, name, i), value(b_, name, i));
+                   }});
+    }
+    for (const auto& [name, channel] : a_.ids) {
+      if (!b_.ids.count(name)) continue;
+      all.push_back({name, "unlike", {0, 0}, [this, name = name](std::size_t i) {
+                       return a_.ids.at(name)[i] == b_.ids.at(name)[i] ? 0.0 : 1.0;
+                     }});
+    }
+    for (Layer& layer : all) {
+      const auto given = options_.tolerances.find(layer.name);
+      if (given != options_.tolerances.end()) layer.allowed = given->second;
+    }
+    std::sort(all.begin(), all.end(),
+              [](const Layer& l, const Layer& m) { return l.name < m.name; });
+    return all;
+  }
+
+  void compare(const Layer& layer) {
+    LayerComparison found;
+    found.layer = layer.name;
+    found.measure = layer.measure;
+    found.allowed = layer.allowed;
+    std::vector<float>& shown = result_.difference.addChannel(layer.name);
+    std::vector<double> sorted;
+    sorted.reserve(result_.bothHit);
+    const auto larger = [](const PixelDifference& p, const PixelDifference& q) {
+      return p.value > q.value;
+    };
+    for (std::size_t i = 0; i < result_.pixels; ++i) {
+      if (!isCompared_[i]) continue;
+      const double difference = layer.at(i);
+      shown[i] = static_cast<float>(difference);
+      sorted.push_back(difference);
+      if (!(difference > 0)) continue;
+      if (found.worst.size() == kShown && !(difference > found.worst.back().value)) continue;
+      const PixelDifference here = pixel(i, difference);
+      found.worst.insert(std::upper_bound(found.worst.begin(), found.worst.end(), here, larger),
+                         here);
+      if (found.worst.size() > kShown) found.worst.pop_back();
+    }
+    found.compared = sorted.size();
+    if (!sorted.empty()) {
+      std::sort(sorted.begin(), sorted.end());
+      const auto share = [&](double part) {
+        return sorted[static_cast<std::size_t>(
+            std::ceil(part * static_cast<double>(sorted.size())) - 1)];
+      };
+      found.median = share(0.5);
+      found.p99 = share(0.99);
+      // Of fewer than a thousand pixels this would be the worst of all: one may pass it.
+      const std::size_t beyond = std::min<std::size_t>(1, sorted.size() / 100);
+      found.p999 = std::min(share(0.999), sorted[sorted.size() - 1 - beyond]);
+      found.largest = sorted.back();
+    }
+    result_.layers.push_back(std::move(found));
+  }
+
+  /// Of all channels that both have, whether hit or not; lists those of one.
+  void compareBits() {
+    std::vector<char> differs(result_.pixels, 0);
+    const auto pass = [&](const auto& mine, const auto& others, const auto& differ) {
+      for (const auto& [name, values] : mine) {
+        const auto found = others.find(name);
+        if (found == others.end()) {
+          result_.onlyOne.push_back(name);
+          continue;
+        }
+        for (std::size_t i = 0; i < differs.size(); ++i)
+          if (differ(values[i], found->second[i])) differs[i] = 1;
+      }
+    };
+    const auto floats = [](float x, float y) {
+      return std::bit_cast<std::uint32_t>(x) != std::bit_cast<std::uint32_t>(y);
+    };
+    pass(a_.channels, b_.channels, floats);
+    pass(a_.ids, b_.ids, std::not_equal_to<>());
+    for (const auto& [name, values] : b_.channels)
+      if (!a_.channels.count(name)) result_.onlyOne.push_back(name);
+    for (const auto& [name, values] : b_.ids)
+      if (!a_.ids.count(name)) result_.onlyOne.push_back(name);
+    std::sort(result_.onlyOne.begin(), result_.onlyOne.end());
+    result_.differentBits = static_cast<std::size_t>(std::count(differs.begin(), differs.end(), 1));
+  }
+
+  const Image &a_, &b_;
+  const ImageComparisonOptions& options_;
+  std::vector<char> hitA_, hitB_;
+  std::vector<char> isCompared_;  // both hit, and the same surface
+  ImageComparison result_;
+};
+
+}  // namespace
+
+bool ImageComparison::agrees() const {
+  return reason().empty();
+}
+
+std::string ImageComparison::reason() const {
+  if (isExact) {
+    if (!onlyOne.empty()) return fmt::format("only one has the channel {}", onlyOne[0]);
+    return differentBits > 0 ? fmt::format("{} pixels have other bits", differentBits) : "";
+  }
+  if (!coverageAgrees()) {
+    return fmt::format(
+        "one hits and the other misses in {} pixels off the outline (0 allowed) and {} along it "
+        "({} allowed), the first at {},{}",
+        unlikeElsewhere, unlikeAtOutline, outlineAllowed, unlike[0].x, unlike[0].y);
+  }
+  for (const LayerComparison& layer : layers) {
+    if (layer.agrees()) continue;
+    return fmt::format(
+        "{} differs by {:.3g} ({}) in one pixel of 1000 ({:.3g} allowed) and {:.3g} at most "
+        "({:.3g} "
+        "allowed), the worst at {},{}",
+        layer.layer, layer.p999, layer.measure, layer.allowed.usual, layer.largest,
+        layer.allowed.worst, layer.worst[0].x, layer.worst[0].y);
+  }
+  return "";
+}
+
+ImageComparison compareImages(const Image& first, const Image& second,
+                              const ImageComparisonOptions& options) {
+  return Comparer(first, second, options).run();
+}
+
+}  // namespace render

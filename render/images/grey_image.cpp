@@ -1,0 +1,160 @@
+#include "render/images/grey_image.h"
+
+#include <fmt/core.h>
+#include <png.h>
+
+#include <cerrno>
+#include <csetjmp>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <string>
+
+#include "levelset/error.h"
+
+namespace render {
+namespace {
+
+using levelset::InvalidInput;
+using levelset::IoError;
+
+constexpr const char* kReadGrey = "read image";
+
+/// libpng leaves a call by longjmp, past destructors: what it needs lives out here.
+struct PngReader {
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+  std::string error;
+
+  PngReader() {
+    png = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, &fail, &ignore);
+    if (png) info = png_create_info_struct(png);
+  }
+  ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
+  PngReader(const PngReader&) = delete;
+  PngReader& operator=(const PngReader&) = delete;
+
+  /// Everything up to the rows. @return false, with `error`, when the file is not as it should be
+  bool readHeader(std::FILE* file) {
+    if (setjmp(png_jmpbuf(png))) return false;
+    png_init_io(png, file);
+    png_read_info(png, info);
+    return true;
+  }
+
+  /// Rows of 16 bits, or 8 where the file has no more, with alpha where it has some.
+  bool prepare() {
+    if (setjmp(png_jmpbuf(png))) return false;
+    if (png_get_bit_depth(png, info) < 8) png_set_expand_gray_1_2_4_to_8(png);
+    if (png_get_valid(png, info, PNG_INFO_tRNS)) png_set_tRNS_to_alpha(png);
+    png_set_interlace_handling(png);
+    png_read_update_info(png, info);
+    return true;
+  }
+
+  bool readRows(png_bytepp rows) {
+    if (setjmp(png_jmpbuf(png))) return false;
+    png_read_image(png, rows);
+    png_read_end(png, nullptr);
+    return true;
+  }
+
+ private:
+  static void fail(png_structp png, png_const_charp message) {
+    static_cast<PngReader*>(png_get_error_ptr(png))->error = message;
+    png_longjmp(png, 1);
+  }
+  static void ignore(png_structp, png_const_charp) {}
+};
+
+[[noreturn]] void refuseDamaged(const std::string& name, const std::string& why) {
+  throw InvalidInput(fmt::format("{}: {} is no whole PNG image: {}", kReadGrey, name, why));
+}
+
+/// Of 8 or 16 bits, the larger byte first.
+double sampleAt(const png_byte* row, std::size_t index, bool isDeep) {
+  if (!isDeep) return row[index] / 255.0;
+  return (row[2 * index] * 256 + row[2 * index + 1]) / 65535.0;
+}
+
+}  // namespace
+
+void requirePngChunks(const std::filesystem::path& path) {
+  std::error_code failed;
+  const std::uintmax_t size = std::filesystem::file_size(path, failed);
+  if (failed) return;  // a pipe, which is read once only
+  std::ifstream in(path, std::ios::binary);
+  constexpr std::uintmax_t kSignature = 8, kAround = 12;  // a length, a type and a checksum
+  for (std::uintmax_t at = kSignature; at + kAround <= size;) {
+    unsigned char length[4] = {};
+    in.seekg(static_cast<std::streamoff>(at));
+    in.read(reinterpret_cast<char*>(length), sizeof length);
+    const std::uintmax_t bytes = static_cast<std::uintmax_t>(length[0]) << 24 |
+                                 static_cast<std::uintmax_t>(length[1]) << 16 |
+                                 static_cast<std::uintmax_t>(length[2]) << 8 | length[3];
+    if (!in || bytes > size - at - kAround)
+      refuseDamaged(path.string(), fmt::format("it is cut off behind byte {}", at));
+    at += kAround + bytes;
+  }
+}
+
+void requirePngPixels(const std::filesystem::path& path, double width, double height) {
+  constexpr double kMostPerByte = 8 * 1040;  // deflate packs 1032 to 1 at best, pixels of one bit
+  std::error_code failed;
+  const auto bytes = static_cast<double>(std::filesystem::file_size(path, failed));
+  if (failed || width * height <= bytes * kMostPerByte) return;
+  throw InvalidInput(
+      fmt::format("{}: {} promises {}x{} pixels, more than its {} bytes can hold; copy it again",
+                  kReadGrey, path.string(), width, height, bytes));
+}
+
+GreyImage readGreyPng(const std::filesystem::path& path, std::size_t maxMemory) {
+  const std::string name = path.string();
+  std::error_code ignored;
+  errno = 0;
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"),
+                                                             &std::fclose);
+  if (!file || std::filesystem::is_directory(path, ignored)) {
+    throw IoError(fmt::format("{}: {}: {}; check the path", kReadGrey, name,
+                              file ? "is a folder" : std::strerror(errno)));
+  }
+  PngReader reader;
+  if (!reader.png || !reader.info)
+    throw levelset::ResourceLimit(fmt::format("{}: no memory to begin with {}", kReadGrey, name));
+  requirePngChunks(path);
+  if (!reader.readHeader(file.get())) refuseDamaged(name, reader.error);
+  const auto width = static_cast<std::size_t>(png_get_image_width(reader.png, reader.info)),
+             height = static_cast<std::size_t>(png_get_image_height(reader.png, reader.info));
+  if (png_get_color_type(reader.png, reader.info) & PNG_COLOR_MASK_COLOR) {
+    throw InvalidInput(fmt::format(
+        "{}: {} has colours, of which none tells a height; convert it to grey", kReadGrey, name));
+  }
+  requirePngPixels(path, static_cast<double>(width), static_cast<double>(height));
+  if (!reader.prepare()) refuseDamaged(name, reader.error);
+  const std::size_t rowBytes = png_get_rowbytes(reader.png, reader.info);
+  levelset::requireMemory(
+      static_cast<double>(height) *
+          (static_cast<double>(rowBytes) + 2.0 * sizeof(double) * static_cast<double>(width)),
+      maxMemory, kReadGrey);
+  std::vector<png_byte> bytes(rowBytes * height);
+  std::vector<png_bytep> rows(height);
+  for (std::size_t j = 0; j < height; ++j) rows[j] = bytes.data() + j * rowBytes;
+  if (!reader.readRows(rows.data())) refuseDamaged(name, reader.error);
+
+  const bool isDeep = png_get_bit_depth(reader.png, reader.info) == 16;
+  const std::size_t channels = png_get_channels(reader.png, reader.info);
+  GreyImage image;
+  image.width = static_cast<int>(width);
+  image.height = static_cast<int>(height);
+  image.values.resize(width * height);
+  if (channels == 2) image.alpha.resize(width * height);
+  for (std::size_t n = 0; n < width * height; ++n) {
+    const std::size_t first = n % width * channels;
+    image.values[n] = sampleAt(rows[n / width], first, isDeep);
+    if (channels == 2) image.alpha[n] = sampleAt(rows[n / width], first + 1, isDeep);
+  }
+  return image;
+}
+
+}  // namespace render

@@ -1,0 +1,79 @@
+#include "render/kernel/frustum_culling.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "render/shading/shading.h"
+
+namespace render {
+
+using Imath::V3d;
+
+FrameNeed::FrameNeed(const Scene& scene, const RenderOptions& options, const Imath::Box3d& bounds) {
+  const Camera& camera = scene.camera;
+  const bool isLit = usesLights(options.style.style);
+  // Rays through an expression go on to where they leave the last solid, in all directions.
+  if (isLit && options.ambientSamples > 0 && !scene.csg.isEmpty()) return;
+
+  const V3d axis = camera.axis();
+  const auto add = [&](const V3d& through, const V3d& normal) {
+    const V3d n = normal.normalized();
+    planes_.push_back({n, n.dot(through)});
+  };
+  for (int a = 0; a < 3; ++a) {
+    V3d along(0);
+    along[a] = 1;
+    add(bounds.min, along);
+    add(bounds.max, -along);
+  }
+  add(camera.from, axis);
+  const Camera::PixelSteps step = camera.pixelSteps();
+  for (const V3d& edge : {step.right * (0.5 * camera.width), step.down * (0.5 * camera.height)})
+    for (const double side : {-1.0, 1.0}) {
+      if (camera.orthoHeight)
+        add(camera.from + edge * side, edge * -side);
+      else  // edge is where the frame ends at a distance of 1
+        add(camera.from, axis * edge.length() - edge * (side / edge.length()));
+    }
+  if (!isLit) return;
+  // Shader starts them at twice the error of the surface that was hit. Three second differences of
+  // values up to the half width are twelve of these at most, over eight.
+  for (const Solid& solid : scene.solids)
+    if (!solid.band.isEmpty())
+      margin_ = std::max(margin_, (3.1 * solid.band.halfWidth() + 0.1) * solid.band.voxelSize());
+  // Of meshes by what single precision makes of their size; and its own share of the whole.
+  margin_ += 1e-5 * bounds.size().length();
+  if (options.ambientSamples > 0) skyReach_ = skyReach(bounds.size().length());
+  hasShadows_ = options.shadowSamples > 0;
+  towardsKey_ = keyDirection(scene);
+  spread_ = scene.key.softness < std::numbers::pi / 2 ? std::tan(scene.key.softness)
+                                                      : std::numeric_limits<double>::infinity();
+}
+
+bool FrameNeed::needs(const V3d& centre, double radius) const {
+  const auto isSeen = [&](double around) {
+    return std::all_of(planes_.begin(), planes_.end(), [&](const Plane& plane) {
+      return plane.normal.dot(centre) - plane.offset >= -around;
+    });
+  };
+  if (isSeen(radius + margin_ + skyReach_)) return true;
+  if (!hasShadows_) return false;
+  // From the ball away from the light, in a cone that widens: is any of it in the frame? The part
+  // of the way that is before each plane is an interval.
+  double from = 0, to = std::numeric_limits<double>::infinity();
+  for (const Plane& plane : planes_) {
+    const double room = plane.normal.dot(centre) - plane.offset + radius + margin_;
+    const double slope = spread_ - plane.normal.dot(towardsKey_);  // of room, by the way
+    if (slope > 0)
+      from = std::max(from, -room / slope);
+    else if (slope < 0)
+      to = std::min(to, -room / slope);
+    else if (room < 0)
+      return false;
+  }
+  return from <= to;
+}
+
+}  // namespace render

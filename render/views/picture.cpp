@@ -1,0 +1,205 @@
+#include "render/views/picture.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <limits>
+
+#include "levelset/error.h"
+#include "levelset/vdb.h"
+#include "render/scene/field_expression.h"
+
+namespace render {
+namespace {
+
+using Imath::V3d;
+
+constexpr int kMaxSamples = 65536;
+
+}  // namespace
+
+PictureLayers::PictureLayers(Image& image, const RenderOptions& options) {
+  r = image.addChannel("R").data();
+  g = image.addChannel("G").data();
+  b = image.addChannel("B").data();
+  a = image.addChannel("A").data();
+  z = image.addChannel("Z", std::numeric_limits<float>::infinity()).data();
+  const char* axes[3] = {"X", "Y", "Z"};
+  for (int i = 0; i < 3; ++i) {
+    n[i] = image.addChannel(fmt::format("N.{}", axes[i])).data();
+    p[i] = image.addChannel(fmt::format("P.{}", axes[i])).data();
+  }
+  const char* kinds[4] = {"mean", "gauss", "k1", "k2"};
+  for (int i = 0; options.curvature && i < 4; ++i)
+    curvature[i] = image.addChannel(fmt::format("curvature.{}", kinds[i])).data();
+  if (options.thickness) thickness = image.addChannel("thickness").data();
+  auto& ids = image.ids["id"];
+  ids.assign(image.pixelCount(), 0);
+  id = ids.data();
+}
+
+void PictureLayers::setHit(std::size_t i, const Camera& camera, const Hit& hit) const {
+  z[i] = static_cast<float>((hit.position - camera.from).dot(camera.axis()));
+  for (int axis = 0; axis < 3; ++axis) {
+    n[axis][i] = static_cast<float>(hit.normal[axis]);
+    p[axis][i] = static_cast<float>(hit.position[axis]);
+  }
+  id[i] = hit.id;
+  if (hit.isBeyondBand) ++beyondBand;
+}
+
+void PictureLayers::addWarnings(Image& image, const Scene& scene) const {
+  const std::size_t count = beyondBand;
+  if (count == 0) return;
+  image.attributes["ls:warning"] = fmt::format(
+      "{} pixel{} show{} the {} where a band knows no distance, so that it is another shape there; "
+      "widen the bands",
+      count, count == 1 ? "" : "s", count == 1 ? "s" : "",
+      scene.morph ? "morph" : "soft expression");
+}
+
+void PictureLayers::setCurvature(std::size_t i, const CurvatureSample& sample) const {
+  const double values[4] = {sample.mean, sample.gauss, sample.k1, sample.k2};
+  for (int k = 0; k < 4; ++k) curvature[k][i] = static_cast<float>(values[k]);
+}
+
+void PictureLayers::setColour(std::size_t i, const ColourSum& sum, int samples) const {
+  const float weight = 1.0f / static_cast<float>(samples);
+  r[i] = sum.colour.x * weight;
+  g[i] = sum.colour.y * weight;
+  b[i] = sum.colour.z * weight;
+  a[i] = static_cast<float>(sum.coverage) * weight;
+}
+
+void requireOpacity(const Scene& scene) {
+  const auto require = [](const auto& parts) {
+    for (const auto& part : parts)
+      if (!(part.opacity > 0 && part.opacity <= 1))
+        throw levelset::UsageError(fmt::format(
+            "render: an opacity of {} cannot be drawn; give more than 0 and at most 1, or leave "
+            "the part out",
+            part.opacity));
+  };
+  require(scene.solids);
+  require(scene.meshes);
+}
+
+void requireLight(const Scene& scene) {
+  const V3d& d = scene.key.direction;
+  const double sum = d.x + d.y + d.z + scene.key.strength + scene.ambient;
+  if (!std::isfinite(sum) || d == V3d(0) ||
+      !(scene.key.softness >= 0 && scene.key.softness < 1.5) || scene.key.strength < 0 ||
+      scene.ambient < 0) {
+    throw levelset::UsageError(fmt::format(
+        "render: a light towards {},{},{} of strength {}, softness {} and ambient {} cannot shine; "
+        "give finite numbers, none negative, and a softness below 1.5 radians",
+        d.x, d.y, d.z, scene.key.strength, scene.key.softness, scene.ambient));
+  }
+}
+
+void requirePicture(const Scene& scene, const RenderOptions& options) {
+  validate(scene.camera);
+  const auto inRange = [](int count, int low) { return count >= low && count <= kMaxSamples; };
+  if (!inRange(options.samples, 1) || !inRange(options.ambientSamples, 0) ||
+      !inRange(options.shadowSamples, 0)) {
+    throw levelset::UsageError(fmt::format(
+        "render: {} samples, {} ambient and {} shadow samples; give 1 to {} samples and 0 to {} of "
+        "the others",
+        options.samples, options.ambientSamples, options.shadowSamples, kMaxSamples, kMaxSamples));
+  }
+  requireLight(scene);
+  requireOpacity(scene);
+  const StyleOptions& style = options.style;
+  if (!(style.curvatureRange >= 0 && std::isfinite(style.curvatureRange)) ||
+      !(style.lineWidth >= 0 && style.lineWidth <= 1000)) {
+    throw levelset::UsageError(
+        fmt::format("render: curvatures up to {} and lines of {} pixels cannot be drawn; give a "
+                    "positive range, and lines up to 1000 pixels",
+                    style.curvatureRange, style.lineWidth));
+  }
+  if (style.style == Style::Matcap && !style.matcap)
+    throw levelset::UsageError("render: the style matcap needs a picture of a ball; name a PNG");
+  if (options.fromNanoVdb && options.filter != Filter::Trilinear)
+    throw levelset::UsageError(
+        "render: NanoVDB grids are drawn by the trilinear filter only; take that, or bricks");
+  requireFields(scene);
+  if (scene.isBlended() && options.filter != Filter::Trilinear)
+    throw levelset::UsageError(fmt::format(
+        "render: soft expressions and morphs are of trilinear fields, and the filter is "
+        "{}; leave it out",
+        filterName(options.filter)));
+  if (scene.isBlended() && options.fromNanoVdb)
+    throw levelset::UsageError(
+        "render: soft expressions and morphs read tables of their own, and no NanoVDB grid; take "
+        "bricks");
+  constexpr double kReach = 2.99;  // voxels
+  for (const Solid& solid : scene.solids) {
+    if (options.filter == Filter::Trilinear || solid.band.isEmpty()) continue;
+    if (options.filter == Filter::BSplineQi && solid.held.bits != 32)
+      throw levelset::UsageError(fmt::format(
+          "render: the filter bspline-qi draws from coefficients that {} bits do not hold; take 32 "
+          "bits, or another filter",
+          solid.held.bits));
+    if (solid.band.halfWidth() >= kReach) continue;
+    throw levelset::InvalidInput(fmt::format(
+        "render: the filter {} reads values up to 3 voxels from the surface, and the band has a "
+        "half width of {:.3g}; widen it first, or take the trilinear filter",
+        filterName(options.filter), solid.band.halfWidth()));
+  }
+  const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
+  const double channels = 12 + (options.curvature ? 4 : 0) + (options.thickness ? 1 : 0);
+  levelset::requireMemory(pixels * 4 * channels, options.maxBytes, "render");
+}
+
+void refuseEmptyScene() {
+  throw levelset::InvalidInput(
+      "render: there is no surface in the scene; give at least one solid with a zero set");
+}
+
+std::map<std::string, std::string> sceneAttributes(const Scene& scene,
+                                                   const RenderOptions& options) {
+  const Filter filter = options.filter;
+  std::string grids, voxelSizes, bits;
+  for (const Solid& solid : scene.solids) {
+    if (solid.band.isEmpty()) continue;
+    const char* comma = grids.empty() ? "" : ", ";
+    grids += fmt::format("{}{} {:016x}", comma, levelset::vdb(solid.band).getName(),
+                         solid.band.contentHash());
+    voxelSizes += fmt::format("{}{}", comma, solid.band.voxelSize());
+    bits += fmt::format("{}{}", comma, solid.held.bits);
+  }
+  std::map<std::string, std::string> attributes = {
+      {"ls:filter", filterName(filter)},
+      {"ls:normal", filter == Filter::BSpline ? "bspline" : "bspline-qi"},
+      {"ls:grid", grids},
+      {"ls:voxelSize", voxelSizes},
+      {"ls:valueBits", bits}};
+  std::string meshes;
+  for (const MeshPart& part : scene.meshes)
+    meshes +=
+        fmt::format("{}{} triangles", meshes.empty() ? "" : ", ", part.mesh->triangles.size());
+  if (!meshes.empty()) attributes["ls:mesh"] = meshes;
+  attributes["ls:style"] = styleName(options.style.style);
+  if (!scene.csg.isEmpty()) attributes["ls:csg"] = scene.csg.text();
+  if (scene.softness > 0) attributes["ls:soft"] = fmt::format("{}", scene.softness);
+  if (scene.morph) attributes["ls:morph"] = fmt::format("{}", *scene.morph);
+  return attributes;
+}
+
+void addViewAttributes(Image& image, const Scene& scene, double extent) {
+  image.attributes[kExtentAttribute] = fmt::format("{:.9g}", extent);
+  image.attributes["software"] = "Levelsmith " LEVELSMITH_VERSION;
+  image.attributes["depthType"] = "distance along the view axis";
+  if (scene.camera.near > 0) image.attributes["ls:near"] = fmt::format("{}", scene.camera.near);
+  if (scene.camera.far) image.attributes["ls:far"] = fmt::format("{}", *scene.camera.far);
+  const auto floats = [](const Imath::M44d& m) {
+    std::vector<float> values;
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) values.push_back(static_cast<float>(m[i][j]));
+    return values;
+  };
+  image.matrices["worldToCamera"] = floats(scene.camera.worldToCamera());
+  image.matrices["worldToNDC"] = floats(scene.camera.worldToNdc());
+}
+
+}  // namespace render

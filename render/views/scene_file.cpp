@@ -1,0 +1,450 @@
+#include "render/views/scene_file.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <set>
+#include <string>
+
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+#include "levelset/files/band_file.h"
+#include "levelset/files/json_depth.h"
+#include "levelset/mesh_files/mesh_file.h"
+#include "levelset/placement/transform.h"
+#include "render/scene/field_expression.h"
+#include "render/views/picture.h"
+
+namespace render {
+namespace {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFormat = "levelsmith scene";
+constexpr int kVersion = 1;
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kMostBytes = 1 << 24;  // of a file that only names others
+
+Json toJson(const V3d& v) {
+  return {v.x, v.y, v.z};
+}
+
+/// By the shortest numbers that are these floats again.
+Json colourJson(const Imath::C3f& colour) {
+  const auto shortest = [](float c) { return std::stod(fmt::format("{}", c)); };
+  return {shortest(colour.x), shortest(colour.y), shortest(colour.z)};
+}
+
+Json toJson(const Camera& camera) {
+  Json json = {{"from", toJson(camera.from)}, {"to", toJson(camera.to)}, {"up", toJson(camera.up)}};
+  if (camera.orthoHeight)
+    json["ortho"] = *camera.orthoHeight;
+  else
+    json["fov"] = camera.verticalFov / kDegree;
+  if (camera.near > 0) json["near"] = camera.near;
+  if (camera.far) json["far"] = *camera.far;
+  json["size"] = {camera.width, camera.height};
+  return json;
+}
+
+std::vector<std::string> solidNames(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const Solid& solid : scene.solids) names.push_back(solid.name);
+  return names;
+}
+
+void requireNames(const Scene& scene) {
+  std::vector<std::string> names = solidNames(scene);
+  for (const MeshPart& part : scene.meshes) names.push_back(part.name);
+  requireSceneNames(names);
+}
+
+void requireColour(const Imath::C3f& colour) {
+  for (int c = 0; c < 3; ++c)
+    if (!(colour[c] >= 0 && colour[c] <= 1))
+      throw InvalidInput(
+          fmt::format("write: a colour of {}, {}, {} is not from 0 to 1; give another", colour.x,
+                      colour.y, colour.z));
+}
+
+/// Of a part of a scene, beside its file.
+std::filesystem::path fileBeside(const std::filesystem::path& file, const std::string& name,
+                                 const char* extension) {
+  return file.parent_path() / (file.stem().string() + "-" + name + extension);
+}
+
+/// Reads a document, knowing what it is for what it says when something is wrong.
+class Reader {
+ public:
+  explicit Reader(const std::filesystem::path& file) : file_(file.string()) {}
+
+  [[noreturn]] void refuse(const std::string& where, const std::string& what) const {
+    throw InvalidInput(fmt::format(
+        "read: {}: {} {}; docs/rendering.md tells how a scene is written", file_, where, what));
+  }
+
+  [[nodiscard]] const Json& member(const Json& json, const char* name,
+                                   const std::string& where) const {
+    if (!json.is_object() || !json.contains(name))
+      refuse(where, fmt::format("has no \"{}\"", name));
+    return json.at(name);
+  }
+
+  [[nodiscard]] std::string text(const Json& json, const char* name,
+                                 const std::string& where) const {
+    const Json& value = member(json, name, where);
+    if (!value.is_string()) refuse(where, fmt::format("has a \"{}\" that is no text", name));
+    return value.get<std::string>();
+  }
+
+  /// As many finite numbers as asked for.
+  [[nodiscard]] std::vector<double> numbers(const Json& json, const char* name, std::size_t count,
+                                            const std::string& where) const {
+    const Json& list = member(json, name, where);
+    std::vector<double> all;
+    const auto add = [&](const Json& value) {
+      if (value.is_number() && std::isfinite(value.get<double>()))
+        all.push_back(value.get<double>());
+    };
+    if (list.is_array())
+      for (const Json& value : list) add(value);
+    else
+      add(list);
+    const std::size_t given = list.is_array() ? list.size() : 1;
+    if (all.size() != count || given != count)
+      refuse(where, fmt::format("has a \"{}\" that is not {} number{}", name, count,
+                                count == 1 ? "" : "s"));
+    return all;
+  }
+  [[nodiscard]] V3d point(const Json& json, const char* name, const std::string& where) const {
+    const std::vector<double> all = numbers(json, name, 3, where);
+    return {all[0], all[1], all[2]};
+  }
+  [[nodiscard]] double number(const Json& json, const char* name, const std::string& where) const {
+    return numbers(json, name, 1, where)[0];
+  }
+
+  /// So that a word that is written wrongly is not passed over.
+  void requireKnown(const Json& json, const std::set<std::string>& known,
+                    const std::string& where) const {
+    if (!json.is_object()) refuse(where, "is no object");
+    for (const auto& [name, value] : json.items())
+      if (!known.contains(name)) refuse(where, fmt::format("has an unknown \"{}\"", name));
+  }
+
+  [[nodiscard]] Camera camera(const Json& json) const {
+    const std::string where = "the camera";
+    requireKnown(json, {"from", "to", "up", "fov", "ortho", "near", "far", "size"}, where);
+    Camera camera;
+    camera.from = point(json, "from", where);
+    camera.to = point(json, "to", where);
+    if (json.contains("up")) camera.up = point(json, "up", where);
+    if (json.contains("fov")) camera.verticalFov = number(json, "fov", where) * kDegree;
+    if (json.contains("ortho")) camera.orthoHeight = number(json, "ortho", where);
+    if (json.contains("near")) camera.near = number(json, "near", where);
+    if (json.contains("far")) camera.far = number(json, "far", where);
+    if (json.contains("size")) {
+      const std::vector<double> size = numbers(json, "size", 2, where);
+      for (const double pixels : size)
+        if (!(pixels >= 1 && pixels <= 1e6) || pixels != std::floor(pixels))
+          refuse(where, fmt::format("has a size of {} pixels", pixels));
+      camera.width = static_cast<int>(size[0]);
+      camera.height = static_cast<int>(size[1]);
+    }
+    return camera;
+  }
+
+  [[nodiscard]] Light light(const Json& json) const {
+    const std::string where = "the light";
+    requireKnown(json, {"direction", "strength", "softness"}, where);
+    Light light;
+    if (json.contains("direction")) light.direction = point(json, "direction", where);
+    if (json.contains("strength")) light.strength = number(json, "strength", where);
+    if (json.contains("softness")) light.softness = number(json, "softness", where) * kDegree;
+    return light;
+  }
+
+  /// What solids and meshes have in common. @param number_  of the part, from 1 on
+  template <typename Part>
+  void readPart(const Json& json, std::size_t number_, const std::string& where,
+                Part& solid) const {
+    solid.name = text(json, "name", where);
+    solid.id = static_cast<std::uint32_t>(number_);
+    if (json.contains("id")) {
+      const double id = number(json, "id", where);
+      if (!(id >= 1 && id <= 4294967295.0) || id != std::floor(id))
+        refuse(where, "has an \"id\" that is no whole number from 1 to 4294967295");
+      solid.id = static_cast<std::uint32_t>(id);
+    }
+    if (json.contains("colour")) {
+      const V3d colour = point(json, "colour", where);
+      for (int c = 0; c < 3; ++c)
+        if (!(colour[c] >= 0 && colour[c] <= 1))
+          refuse(where, "has a \"colour\" that is not from 0 to 1");
+      solid.colour = Imath::C3f(colour);
+    }
+    if (json.contains("opacity")) solid.opacity = number(json, "opacity", where);
+    if (!(solid.opacity > 0 && solid.opacity <= 1))
+      refuse(where, "has an \"opacity\" that is not above 0 and up to 1");
+  }
+
+  /// Beside the scene's own file, unless it is told in full.
+  [[nodiscard]] std::filesystem::path partFile(const Json& json, const std::filesystem::path& file,
+                                               const std::string& where) const {
+    const std::string name = text(json, "file", where);
+    if (name == "-") refuse(where, "is to come from standard input, which a scene cannot");
+    return file.parent_path() / name;
+  }
+
+  /// What a job makes of numbers of the file; where it refuses them, so does this.
+  template <typename Job>
+  auto told(const std::string& where, const Job& job) const {
+    try {
+      return job();
+    } catch (const levelset::UsageError& error) {
+      refuse(where, fmt::format("cannot be used ({})", error.what()));
+    } catch (const InvalidInput& error) {
+      refuse(where, fmt::format("cannot be used ({})", error.what()));
+    }
+  }
+
+  [[nodiscard]] Imath::M44d matrix(const Json& json, const std::string& where) const {
+    const std::vector<double> all = numbers(json, "transform", 16, where);
+    Imath::M44d matrix;
+    for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = all[static_cast<std::size_t>(i)];
+    return matrix;
+  }
+
+ private:
+  std::string file_;
+};
+
+Json documentOf(const std::filesystem::path& file) {
+  std::error_code failed;
+  if (std::filesystem::is_directory(file, failed))
+    throw levelset::IoError(
+        fmt::format("read: {} is a folder; give the file of a scene", file.string()));
+  const auto size = std::filesystem::file_size(file, failed);
+  if (!failed && static_cast<double>(size) > kMostBytes)
+    throw InvalidInput(fmt::format("read: {} is too large for a scene", file.string()));
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream)
+    throw levelset::IoError(
+        fmt::format("read: {} cannot be read; check its name and permissions", file.string()));
+  if (levelset::isJsonTooDeep(text)) return Json(Json::value_t::discarded);
+  return Json::parse(text, nullptr, /*allow_exceptions=*/false);
+}
+
+/// Before anything is written: JSON holds UTF-8 only.
+std::string textOf(const Json& json, const std::filesystem::path& file) {
+  try {
+    return json.dump(2);
+  } catch (const Json::exception&) {
+    throw levelset::IoError(fmt::format(
+        "write: {} cannot be told in the file, since its name is not UTF-8; take another name",
+        file.string()));
+  }
+}
+
+/// The parts of a job that takes one after the other.
+class Parts {
+ public:
+  Parts(const levelset::Progress& progress, std::size_t count)
+      : progress_(progress), count_(static_cast<double>(count)) {}
+  [[nodiscard]] levelset::Progress next() {
+    const double first = done_++;
+    return levelset::subProgress(progress_, first / count_, done_ / count_);
+  }
+
+ private:
+  const levelset::Progress& progress_;
+  double count_, done_ = 0;
+};
+
+void readSolid(const Reader& reader, const Json& json, const std::filesystem::path& file,
+               const ReadSceneOptions& options, const levelset::Progress& progress, Scene& scene) {
+  const std::string where = fmt::format("solid {}", scene.solids.size() + 1);
+  reader.requireKnown(json, {"name", "file", "grid", "transform", "colour", "opacity", "id"},
+                      where);
+  Solid solid;
+  reader.readPart(json, scene.solids.size() + 1, where, solid);
+  const std::filesystem::path source = reader.partFile(json, file, where);
+  levelset::BandRepairs repairs;
+  solid.band = levelset::readBand(
+      source, {.grid = json.contains("grid") ? reader.text(json, "grid", where) : "",
+               .maxMemory = options.maxMemory,
+               .repairs = &repairs,
+               .progress = progress});
+  if (solid.band.isOpenSurface())
+    reader.refuse(where, "is the band of an open surface, which holds no solid");
+  if (options.repairs) options.repairs(repairs, source);
+  if (json.contains("transform"))
+    solid.band = reader.told(
+        where, [&] { return levelset::transform(solid.band, reader.matrix(json, where)); });
+  scene.solids.push_back(std::move(solid));
+}
+
+std::size_t bytesOf(const levelset::TriMesh& mesh) {
+  const levelset::MeshAttributes& more = mesh.attributes;
+  return mesh.positions.size() * sizeof(mesh.positions[0]) +
+         mesh.triangles.size() * sizeof(mesh.triangles[0]) + more.normals.size() * sizeof(V3d) +
+         more.uvs.size() * sizeof(more.uvs[0]) + more.colors.size() * sizeof(more.colors[0]);
+}
+
+void readMeshPart(const Reader& reader, const Json& json, const std::filesystem::path& file,
+                  const ReadSceneOptions& options, const levelset::Progress& progress,
+                  Scene& scene) {
+  const std::string where = fmt::format("mesh {}", scene.meshes.size() + 1);
+  reader.requireKnown(json, {"name", "file", "transform", "colour", "opacity", "id"}, where);
+  MeshPart part;
+  reader.readPart(json, scene.solids.size() + scene.meshes.size() + 1, where, part);
+  levelset::TriMesh mesh = levelset::readMesh(
+      reader.partFile(json, file, where),
+      {.attributes = true, .maxMemory = options.maxMemory, .progress = progress});
+  if (json.contains("transform"))
+    mesh = reader.told(
+        where, [&] { return levelset::transform(std::move(mesh), reader.matrix(json, where)); });
+  part.mesh = std::make_shared<const levelset::TriMesh>(std::move(mesh));
+  scene.meshes.push_back(std::move(part));
+}
+
+}  // namespace
+
+bool isSceneFormat(const std::string& name) {
+  return name == "json" || std::filesystem::path(name).extension() == ".json";
+}
+
+void requireSceneNames(const std::vector<std::string>& names) {
+  std::set<std::string> seen;
+  for (const std::string& name : names) {
+    const auto isWord = [](unsigned char c) { return std::isalnum(c) || c == '_'; };
+    if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0])) ||
+        !std::all_of(name.begin(), name.end(), isWord))
+      throw levelset::UsageError(fmt::format(
+          "scene: '{}' cannot name a part; take letters, digits and _, no digit first", name));
+    if (!seen.insert(name).second)
+      throw levelset::UsageError(
+          fmt::format("scene: two parts are called '{}'; give each a name of its own", name));
+  }
+}
+
+void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
+                const levelset::Progress& progress) {
+  const Scene& scene = viewed.scene;
+  requireNames(scene);
+  requireLight(scene);
+  requireOpacity(scene);
+  requireFields(scene);
+  for (const Solid& solid : scene.solids) requireColour(solid.colour);
+  for (const MeshPart& part : scene.meshes) requireColour(part.colour);
+  Json json;
+  json["format"] = kFormat;
+  json["version"] = kVersion;
+  if (viewed.hasCamera) {
+    validate(scene.camera);
+    json["camera"] = toJson(scene.camera);
+  }
+  json["light"] = {{"direction", toJson(scene.key.direction)},
+                   {"strength", scene.key.strength},
+                   {"softness", scene.key.softness / kDegree}};
+  json["ambient"] = scene.ambient;
+  const auto entryOf = [&](const auto& part, const char* extension) -> Json {
+    Json entry = {{"name", part.name},
+                  {"file", fileBeside(file, part.name, extension).filename().string()},
+                  {"colour", colourJson(part.colour)},
+                  {"id", part.id}};
+    if (part.opacity < 1) entry["opacity"] = part.opacity;
+    return entry;
+  };
+  json["solids"] = Json::array();
+  for (const Solid& solid : scene.solids) json["solids"].push_back(entryOf(solid, ".vdb"));
+  for (const MeshPart& part : scene.meshes) json["meshes"].push_back(entryOf(part, ".ply"));
+  if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
+  if (scene.softness > 0) json["soft"] = scene.softness;
+  if (scene.morph) json["morph"] = *scene.morph;
+
+  const std::string text = textOf(json, file);
+  levelset::FileTarget target(file);
+  Parts parts(progress, scene.solids.size() + scene.meshes.size());
+  for (const Solid& solid : scene.solids)
+    levelset::writeBand(fileBeside(file, solid.name, ".vdb"), solid.band,
+                        {.name = solid.name, .progress = parts.next()});
+  for (const MeshPart& part : scene.meshes)
+    levelset::writeMesh(fileBeside(file, part.name, ".ply"), *part.mesh,
+                        {.progress = parts.next()});
+  {
+    std::ofstream stream(target.path(), std::ios::binary);
+    stream << text << '\n';
+    stream.flush();
+    if (!stream)
+      throw levelset::IoError(
+          fmt::format("write: {} cannot be written; is the disk full?", file.string()));
+  }
+  target.commit();
+}
+
+ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions& options) {
+  const Reader reader(file);
+  const Json json = documentOf(file);
+  const std::string whole = "the file";
+  if (json.is_discarded()) reader.refuse(whole, "is no JSON document, or was cut off");
+  if (reader.text(json, "format", whole) != kFormat) reader.refuse(whole, "holds no scene");
+  if (reader.number(json, "version", whole) != kVersion)
+    reader.refuse(whole, fmt::format("is not of version {}", kVersion));
+  reader.requireKnown(json,
+                      {"format", "version", "camera", "light", "ambient", "solids", "meshes", "csg",
+                       "soft", "morph"},
+                      whole);
+  ViewedScene viewed;
+  Scene& scene = viewed.scene;
+  viewed.hasCamera = json.contains("camera");
+  if (viewed.hasCamera) {
+    scene.camera = reader.camera(json.at("camera"));
+    reader.told("the camera", [&] { validate(scene.camera); });
+  }
+  if (json.contains("light")) scene.key = reader.light(json.at("light"));
+  if (json.contains("ambient")) scene.ambient = reader.number(json, "ambient", whole);
+  reader.told("the light", [&] { requireLight(scene); });
+  const Json none = Json::array();
+  const Json& solids = json.contains("solids") ? json.at("solids") : none;
+  const Json& meshes = json.contains("meshes") ? json.at("meshes") : none;
+  if (!solids.is_array() || !meshes.is_array() || (solids.empty() && meshes.empty()))
+    reader.refuse(whole, "has no solids and no meshes");
+  Parts parts(options.progress, solids.size() + meshes.size());
+  ReadSceneOptions rest = options;  // the limit is of all parts together
+  rest.maxMemory = levelset::memoryLimit(options.maxMemory);
+  const auto spend = [&rest](std::size_t bytes) {
+    rest.maxMemory -= std::min(rest.maxMemory, bytes);
+  };
+  for (const Json& entry : solids) {
+    readSolid(reader, entry, file, rest, parts.next(), scene);
+    spend(scene.solids.back().band.memoryUse());
+  }
+  for (const Json& entry : meshes) {
+    readMeshPart(reader, entry, file, rest, parts.next(), scene);
+    spend(bytesOf(*scene.meshes.back().mesh));
+  }
+  reader.told(whole, [&] { requireNames(scene); });
+  std::set<std::uint32_t> ids;
+  const auto isNew = [&](const auto& part) { return ids.insert(part.id).second; };
+  if (!std::all_of(scene.solids.begin(), scene.solids.end(), isNew) ||
+      !std::all_of(scene.meshes.begin(), scene.meshes.end(), isNew))
+    reader.refuse(whole, "gives two parts the same \"id\"");
+  if (json.contains("csg"))
+    scene.csg = CsgExpression(reader.text(json, "csg", whole), solidNames(scene));
+  if (json.contains("soft")) scene.softness = reader.number(json, "soft", whole);
+  if (json.contains("morph")) scene.morph = reader.number(json, "morph", whole);
+  reader.told(whole, [&] { requireFields(scene); });
+  return viewed;
+}
+
+}  // namespace render

@@ -1,0 +1,147 @@
+#include "render/views/slice.h"
+
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+#include "levelset/error.h"
+#include "levelset/grids/sample.h"
+#include "levelset/memory_limit.h"
+#include "render/camera.h"
+
+namespace render {
+namespace {
+
+using Imath::C3f;
+using Imath::V3d;
+
+constexpr double kMargin = 1.08;     // of the frame about the solid
+constexpr double kLine = 1.2;        // pixels
+constexpr double kZeroLine = 2.4;    // pixels
+constexpr double kFaintLine = 0.45;  // darkness of the contours
+constexpr int kAcross = 4;           // samples along a pixel's side
+
+/// Where the pixels are.
+struct Frame {
+  V3d centre, right, down;  ///< the last two by a pixel
+  [[nodiscard]] V3d at(double x, double y) const { return centre + right * x + down * y; }
+};
+
+Frame frameOf(const Imath::Box3d& bounds, const SliceOptions& options) {
+  const V3d normal = options.normal.normalized();
+  const bool isAlongZ = std::abs(normal.z) > 0.999;
+  const V3d right = (isAlongZ ? V3d(0, 1, 0) : V3d(0, 0, 1)).cross(normal).normalized();
+  const V3d up = normal.cross(right);
+  const V3d middle = bounds.center();
+  Frame frame;
+  frame.centre = middle - normal * (middle - options.point).dot(normal);
+  const V3d half = bounds.size() * 0.5;
+  const auto reach = [&](const V3d& axis) {
+    return std::abs(axis.x) * half.x + std::abs(axis.y) * half.y + std::abs(axis.z) * half.z;
+  };
+  const double pixel =
+      2 * kMargin * std::max(reach(right) / options.width, reach(up) / options.height);
+  frame.right = right * pixel;
+  frame.down = -up * pixel;
+  return frame;
+}
+
+C3f mixed(const C3f& a, const C3f& b, double share) {
+  return a + (b - a) * static_cast<float>(std::clamp(share, 0.0, 1.0));
+}
+
+class SlicePainter {
+ public:
+  SlicePainter(const levelset::NarrowBand& band, const SliceOptions& options, const Frame& frame)
+      : phi_(band),
+        background_(band.halfWidth() * band.voxelSize()),
+        step_(options.step > 0 ? options.step : band.voxelSize()),
+        frame_(frame) {}
+
+  [[nodiscard]] double phi(const V3d& p) const { return phi_.value(p); }
+
+  [[nodiscard]] C3f colour(const V3d& p) const {
+    const double phi = phi_.value(p);
+    const bool isFar = std::abs(phi) >= background_ * (1 - 1e-6);
+    const double depth = std::abs(phi) / background_;
+    C3f result = phi < 0 ? mixed(C3f(0.55f, 0.72f, 0.88f), C3f(0.10f, 0.25f, 0.52f), depth)
+                         : mixed(C3f(0.94f, 0.82f, 0.62f), C3f(0.62f, 0.40f, 0.18f), depth);
+    if (isFar) return phi < 0 ? C3f(0.16f, 0.20f, 0.28f) : C3f(0.80f, 0.80f, 0.80f);
+    // A line is as many pixels wide as φ changes in the plane.
+    const V3d gradient = phi_.gradient(p);
+    const double perPixel = std::hypot(gradient.dot(frame_.right), gradient.dot(frame_.down));
+    const double toLine = std::abs(phi - std::round(phi / step_) * step_);
+    const bool isEnd = std::abs(phi) > background_ - 0.25 * step_;  // where the band is cut off
+    if (!isEnd && toLine < 0.5 * kLine * perPixel && 4 * kLine * perPixel < step_)
+      result = mixed(result, C3f(0), kFaintLine);
+    if (std::abs(phi) < 0.5 * kZeroLine * perPixel) result = C3f(0.01f);
+    return result;
+  }
+
+ private:
+  levelset::BandSampler phi_;
+  double background_, step_;
+  const Frame& frame_;
+};
+
+void requireSlice(const levelset::NarrowBand& band, const SliceOptions& options) {
+  const V3d sum = options.point + options.normal;
+  if (!std::isfinite(sum.x + sum.y + sum.z) || !(options.normal.length() > 0))
+    throw levelset::UsageError(
+        "slice: the plane has no direction; give a point and a normal of finite numbers");
+  if (options.width < 1 || options.height < 1 || !(options.step >= 0) ||
+      !std::isfinite(options.step))
+    throw levelset::UsageError(fmt::format(
+        "slice: {}x{} pixels with a contour every {} cannot be drawn; give positive numbers",
+        options.width, options.height, options.step));
+  if (static_cast<double>(options.width) * options.height > kMaxPixels)
+    throw levelset::ResourceLimit(fmt::format("slice: {}x{} pixels are more than {:.0f}",
+                                              options.width, options.height, kMaxPixels));
+  constexpr double kBytesOfPixel = 8 * 4;
+  levelset::requireMemory(kBytesOfPixel * options.width * options.height, options.maxBytes,
+                          "slice");
+  if (band.isEmpty() || band.zeroSetBounds().isEmpty())
+    throw levelset::InvalidInput("slice: the solid has no surface; give one with a zero set");
+}
+
+}  // namespace
+
+Image drawSlice(const levelset::NarrowBand& band, const SliceOptions& options) {
+  requireSlice(band, options);
+  Image image(options.width, options.height);
+  float* colours[3] = {image.addChannel("R").data(), image.addChannel("G").data(),
+                       image.addChannel("B").data()};
+  image.addChannel("A", 1);
+  float* phi = image.addChannel("phi").data();
+  float* places[3] = {image.addChannel("P.X").data(), image.addChannel("P.Y").data(),
+                      image.addChannel("P.Z").data()};
+  const Frame frame = frameOf(band.zeroSetBounds(), options);
+  std::mutex reporting;
+  int done = 0;
+  tbb::parallel_for(0, options.height, [&](int y) {
+    const SlicePainter painter(band, options, frame);
+    for (int x = 0; x < options.width; ++x) {
+      const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(options.width) +
+                            static_cast<std::size_t>(x);
+      const double left = x - 0.5 * options.width, top = y - 0.5 * options.height;
+      C3f sum(0);
+      for (int n = 0; n < kAcross * kAcross; ++n)
+        sum += painter.colour(
+            frame.at(left + (n % kAcross + 0.5) / kAcross, top + (n / kAcross + 0.5) / kAcross));
+      const V3d middle = frame.at(left + 0.5, top + 0.5);
+      for (int c = 0; c < 3; ++c) {
+        colours[c][i] = sum[c] / (kAcross * kAcross);
+        places[c][i] = static_cast<float>(middle[c]);
+      }
+      phi[i] = static_cast<float>(painter.phi(middle));
+    }
+    const std::scoped_lock lock(reporting);
+    levelset::report(options.progress, static_cast<double>(++done) / options.height, "slice");
+  });
+  return image;
+}
+
+}  // namespace render

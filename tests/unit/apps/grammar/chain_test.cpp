@@ -1,0 +1,139 @@
+#include "apps/pipeline/grammar/chain.h"
+
+#include <gtest/gtest.h>
+
+#include "levelset/error.h"
+
+namespace chain_test {
+
+using levelset::UsageError;
+using pipeline::Graph;
+using pipeline::parseChain;
+
+/// Splits at blanks; words in 'quotes' stay together.
+Graph parse(const std::string& line) {
+  std::vector<std::string> words;
+  std::string word;
+  bool quoted = false;
+  for (char c : line + " ") {
+    if (c == '\'')
+      quoted = !quoted;
+    else if (c != ' ' || quoted)
+      word += c;
+    else if (!word.empty())
+      words.push_back(std::exchange(word, ""));
+  }
+  return parseChain(words);
+}
+
+std::string refusal(const std::string& line) {
+  try {
+    (void)parse(line);
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+#define EXPECT_REFUSAL(line_, part_) \
+  EXPECT_NE(refusal(line_).find(part_), std::string::npos) << refusal(line_)
+
+TEST(Chain, SplitsActionsOptionsAndGlobals) {
+  const Graph graph =
+      parse("--threads 2 -v sphere --radius 1 --voxel=0.1 --as ball ! offset -2vx ! write out.vdb");
+  EXPECT_EQ(graph.globals.at("threads"), "2");
+  EXPECT_TRUE(graph.globals.contains("verbose"));
+  ASSERT_EQ(graph.nodes.size(), 3u);
+  EXPECT_EQ(graph.nodes[0].options.at("voxel"), "0.1");
+  EXPECT_EQ(graph.nodes[0].name, "ball");
+  EXPECT_EQ(graph.nodes[1].options.at("distance"), "-2vx");
+  EXPECT_EQ(graph.nodes[2].options.at("file"), "out.vdb");
+}
+
+TEST(Chain, TakesUniqueBeginningsOfOptions) {
+  EXPECT_EQ(parse("sphere --rad 1 --vox 0.1").nodes[0].options.at("radius"), "1");
+  EXPECT_REFUSAL("sphere --r 1 --voxel 0.1", "may mean");
+}
+
+TEST(Chain, TakesOperandsByName) {
+  const Graph graph = parse(
+      "sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 2 --voxel 0.1 --as b ! union @a @b ! "
+      "difference @a");
+  EXPECT_EQ(graph.nodes[2].inputs, (std::vector<std::size_t>{0, 1}));
+  EXPECT_EQ(graph.nodes[3].inputs, (std::vector<std::size_t>{2, 0}));
+}
+
+TEST(Chain, RefusesUnknownWords) {
+  EXPECT_REFUSAL("spere --radius 1", "did you mean 'sphere'");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! run chain.txt", "run: stands alone");
+  EXPECT_REFUSAL("sphere --raduis 1 --voxel 0.1", "did you mean --radius");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 --threads 2", "before the first action");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! offset 1 2", "what is '2' for");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! union @nobody @else",
+                 "nothing is named '@nobody'");
+}
+
+TEST(Chain, RefusesMalformedChains) {
+  EXPECT_REFUSAL("", "nothing to do");
+  EXPECT_REFUSAL("! sphere --radius 1", "no action");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 !", "an action must follow");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! ! measure", "no action");
+  EXPECT_REFUSAL("sphere --radius --voxel 0.1", "needs a value");
+  EXPECT_REFUSAL("sphere --radius 1 --radius 2 --voxel 0.1", "given twice");
+  EXPECT_REFUSAL("sphere --voxel 0.1", "needs --radius");
+}
+
+TEST(Chain, RefusesNumbersBeforeAnythingRuns) {
+  for (const char* bad : {"nan", "inf", "-1", "0", "abc", "1e999", "1,5", "", "0x10"})
+    EXPECT_NE(refusal(std::string("sphere --voxel 0.1 --radius=") + bad), "accepted") << bad;
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 2vx", "cannot be given in voxels");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 1 ! offset 2cm", "unknown unit");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 1 ! render a.png --size 0x0", "nothing to show");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 1 --center 1,2", "not a point");
+}
+
+TEST(Chain, ChecksOperandsAndTheirKinds) {
+  EXPECT_REFUSAL("offset 1", "needs 1 operand");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! union", "needs 2 operands and finds 1");
+  EXPECT_REFUSAL("read a.ply ! offset 1", "put 'level-set' before it");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! level-set --voxel 1", "put 'mesh' before it");
+  EXPECT_REFUSAL(
+      "sphere --radius 1 --voxel 0.1 ! patch --at 0,0,1 --size 1,1 --height 1 ! write p.vdb",
+      "a patch cannot be written as 'p.vdb'; write .patch, or put 'mesh' before it");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! write p.patch", "cannot be written as 'p.patch'");
+  EXPECT_REFUSAL(
+      "sphere --radius 1 --voxel 0.1 ! patch --at 0,0,1 --size 1,1 --height 1 ! offset 1",
+      "is a patch, a level set is needed; 'texture' makes");
+  const std::string onto =
+      "sphere --radius 3 --voxel 0.2 --as b ! patch @b --at 0,0,3 --size 2,2 --height 1 --as p ! ";
+  EXPECT_REFUSAL(onto + "read a.ply --as t ! texture @b @t @p", "with `level-set`, or move its");
+  EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map mesh",
+                 "moves the vertices of a mesh");
+  EXPECT_REFUSAL(onto + "read a.ply --as t ! texture @b @t @p --map mesh --blend 1",
+                 "says nothing to --map mesh");
+  EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map-tolerance -1",
+                 "map-tolerance");
+  EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --kernel cubic",
+                 "thin-plate");
+  EXPECT_REFUSAL(
+      onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map shell --kernel sum",
+      "--kernel says nothing to --map shell");
+  EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --sides free",
+                 "goes with --unfold or --relax");
+  EXPECT_REFUSAL(onto + "folds @b @p --relax texture", "needs a texture");
+  EXPECT_REFUSAL(onto + "folds @b @p --map mesh --lambda-near 1", "says nothing to --map mesh");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 1 --voxel 0.1 --as a",
+                 "is taken");
+}
+
+TEST(Chain, GivesStandardStreamsToOneUserOnly) {
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 1 ! write - --format vdb ! measure --json",
+                 "standard output is used already");
+  EXPECT_REFUSAL("--report - sphere --radius 1 --voxel 1 ! measure --json", "--report");
+  EXPECT_REFUSAL("read - --format ply ! read - --format ply", "standard input is used already");
+  EXPECT_REFUSAL("info -", "info: '-' has no extension to tell the format; give --format");
+  EXPECT_REFUSAL("info a.xyz", "no known format");
+  EXPECT_EQ(refusal("sphere --radius 1 --voxel 1 ! measure ! check"), "accepted");
+}
+
+}  // namespace chain_test

@@ -1,0 +1,248 @@
+// The renderers against each other on models that are not made of formulas: the kernel on the
+// processor and as a shader to the bit, both against the judge within what a picture may differ by.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "levelset/convert/mesh_to_band.h"
+#include "levelset/csg/csg.h"
+#include "levelset/mesh_files/mesh_file.h"
+#include "levelset/placement/transform.h"
+#include "levelset/solids/shapes.h"
+#include "mapping/generators/knurl.h"
+#include "mapping/placement/patch_grid.h"
+#include "mapping/textures/geometric_texture.h"
+#include "render/cpu/cpu_renderer.h"
+#include "render/embree/embree_renderer.h"
+#include "render/gpu/gpu_renderer.h"
+#include "render/images/compare_images.h"
+#include "tests/support/render_scenes.h"
+
+namespace agreement_test {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+using namespace render;
+
+std::filesystem::path modelPath(const char* name) {
+  return std::filesystem::path(LEVELSMITH_DATA_DIR) / "models" / name;
+}
+
+/// @param resolution  voxels along the longest side
+NarrowBand model(const char* name, double resolution) {
+  const levelset::TriMesh mesh = levelset::readMesh(modelPath(name));
+  const V3d size = levelset::bounds(mesh).size();
+  return levelset::meshToBand(mesh, std::max({size.x, size.y, size.z}) / resolution).band;
+}
+
+/// A cylinder with a knurl rolled around it.
+NarrowBand knurledCylinder() {
+  const NarrowBand base = levelset::makeCylinder(1, 3.05, V3d(0), V3d(0, 0, 1), 0.05);
+  const mapping::Knurl knurl{.depth = 0.2, .flankAngle = 2, .base = 0.3, .tiling = {2, 1, 0.15}};
+  const mapping::PatchGridResult grid = mapping::makePatchGridAround(
+      base, V3d(0, 0, -0.6), V3d(0, 0, 0.6), 0, 0.2, {.columns = 4, .rows = 2},
+      {.levels = 3, .scheme = mapping::LevelScheme::Conforming, .spacing = 0.15});
+  return mapping::mapTexture(
+             base, mapping::makeKnurl(knurl, V3d(0), 0.04), grid.patches,
+             {.sink = 0.05, .textureBox = mapping::knurlBox(knurl, V3d(0)).tile, .voxelSize = 0.02})
+      .band;
+}
+
+/// Three bands of different voxels in one picture, and a box with a bite out of it.
+Scene csgScene(int width, int height) {
+  const NarrowBand cut =
+      levelset::subtract(levelset::makeBox(V3d(60, 40, 30), V3d(0), 1),
+                         levelset::makeTorus(20, 9, V3d(5, 3, 14), V3d(0, 0, 1), 1));
+  Scene scene = support::sceneOf(cut, width, height);
+  scene.solids.push_back({.band = levelset::makeSphere(12, V3d(5, 3, 12), 0.37), .id = 2});
+  scene.solids.push_back({.band = support::rings(), .id = 3});
+  return scene;
+}
+
+/// A ball, a ring and a box of three voxel sizes, turned against each other, for an expression.
+Scene sceneAlongRays(const std::string& csg) {
+  const auto turned = [](const NarrowBand& band, const V3d& axis, double angle, double scale) {
+    return levelset::transform(
+        band, Imath::M44d().setScale(scale) * Imath::M44d().setAxisAngle(axis.normalized(), angle));
+  };
+  Scene scene = support::sceneOf(levelset::makeSphere(20, V3d(3, 1, 4), 0.55));
+  scene.solids.push_back({.band = turned(levelset::makeTorus(30, 11, V3d(0), V3d(0, 0, 1), 1),
+                                         V3d(1, 2, 0), 0.7, 0.83),
+                          .colour = Imath::C3f(0.35f, 0.5f, 0.66f),
+                          .id = 2});
+  scene.solids.push_back({.band = turned(levelset::makeBox(V3d(18, 44, 20), V3d(9, 2, 7), 0.37),
+                                         V3d(-1, 1, 3), -0.4, 1.1),
+                          .colour = Imath::C3f(0.7f, 0.42f, 0.32f),
+                          .id = 3});
+  scene.csg = CsgExpression(csg, {"a", "b", "c"});
+  scene.camera = framingCamera(scene.bounds(), 1024, 768);
+  return scene;
+}
+
+const RenderOptions kData = {.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
+
+/// Neither an outline nor so steep that a pixel spans voxels.
+bool isOffOutlines(const Image& image, const Scene& scene, int x, int y) {
+  constexpr double kSteep = 0.1;
+  const auto index = [&](int u, int v) {
+    return static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) +
+           static_cast<std::size_t>(u);
+  };
+  for (int v = std::max(0, y - 1); v <= std::min(image.height - 1, y + 1); ++v)
+    for (int u = std::max(0, x - 1); u <= std::min(image.width - 1, x + 1); ++u)
+      if (!std::isfinite(image.channels.at("Z")[index(u, v)])) return false;
+  const std::size_t i = index(x, y);
+  const V3d normal(image.channels.at("N.X")[i], image.channels.at("N.Y")[i],
+                   image.channels.at("N.Z")[i]);
+  return -normal.dot(scene.camera.ray(x + 0.5, y + 0.5).direction) > kSteep;
+}
+
+/// What the issue of the ray-caster asks for at 1024x768.
+void expectAgreement(const Scene& scene, const std::string& what) {
+  const Image ours = renderCpu(scene, kData), judge = renderEmbree(scene, kData);
+  const ImageComparison found = compareImages(ours, judge);
+  EXPECT_TRUE(found.agrees()) << what << ": " << found.reason();
+  EXPECT_GT(found.bothHit, found.pixels / 10) << what;
+  EXPECT_EQ(found.unlikeElsewhere, 0u) << what;
+  EXPECT_LE(static_cast<double>(found.unlikeAtOutline), 1e-5 * static_cast<double>(found.pixels))
+      << what;
+  double voxel = HUGE_VAL;
+  for (const Solid& solid : scene.solids) voxel = std::min(voxel, solid.band.voxelSize());
+  std::size_t compared = 0, beyond = 0;
+  double deepest = 0, turned = 0;
+  for (int y = 0; y < ours.height; ++y)
+    for (int x = 0; x < ours.width; ++x) {
+      const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(ours.width) +
+                            static_cast<std::size_t>(x);
+      const double a = ours.channels.at("Z")[i], b = judge.channels.at("Z")[i];
+      if (!std::isfinite(a) || !std::isfinite(b)) continue;
+      ++compared;
+      beyond += std::abs(a - b) > 1e-3 * voxel;
+      if (!isOffOutlines(judge, scene, x, y)) continue;
+      deepest = std::max(deepest, std::abs(a - b) / voxel);
+      const auto normal = [&](const Image& image) {
+        return V3d(image.channels.at("N.X")[i], image.channels.at("N.Y")[i],
+                   image.channels.at("N.Z")[i]);
+      };
+      turned = std::max(turned, 2 * std::asin((normal(ours) - normal(judge)).length() / 2));
+    }
+  EXPECT_LE(static_cast<double>(beyond), 1e-4 * static_cast<double>(compared)) << what;
+  EXPECT_LE(deepest, 2e-3) << what;
+  EXPECT_LE(turned, 0.1 * std::numbers::pi / 180) << what;
+}
+
+void expectSameBits(const Scene& scene, const std::string& what) {
+  const RenderOptions options = {.samples = 2, .ambientSamples = 2, .shadowSamples = 1};
+  const ImageComparison found =
+      compareImages(renderGpu(scene, options), renderCpu(scene, options), {.exact = true});
+  EXPECT_GT(found.bothHit, 500u) << what;
+  EXPECT_EQ(found.differentBits, 0u) << what << ": " << found.reason();
+}
+
+Scene resized(Scene scene, int width, int height) {
+  scene.camera.width = width;
+  scene.camera.height = height;
+  return scene;
+}
+
+void expectProven(const Scene& scene, const std::string& what) {
+  expectAgreement(resized(scene, 1024, 768), what);
+  expectSameBits(resized(scene, 320, 240), what);
+}
+
+TEST(Agreement, OfBallsAndTheSolidsOfCsg) {
+  expectProven(support::sceneOf(levelset::makeSphere(100, V3d(0.3, 0.2, 0.1), 1)), "ball");
+  expectProven(csgScene(1024, 768), "csg");
+}
+
+TEST(Agreement, OfAnExpressionAlongTheRays) {
+  for (const char* csg : {"(a | b) - c", "a & b | c - a"}) expectProven(sceneAlongRays(csg), csg);
+}
+
+TEST(Agreement, OfATexturedSolid) {
+  expectProven(support::sceneOf(knurledCylinder()), "knurled cylinder");
+}
+
+TEST(Agreement, OfTheBunny) {
+  if (!std::filesystem::exists(modelPath("bunny.obj"))) GTEST_SKIP() << "no models";
+  const NarrowBand bunny = model("bunny.obj", 256);
+  expectProven(support::sceneOf(bunny), "bunny");
+  // From within: an ear before the eye.
+  Scene scene = support::sceneOf(bunny, 320, 240);
+  const Imath::Box3d box = bunny.zeroSetBounds();
+  scene.camera.from = box.center();
+  scene.camera.to = V3d(box.min.x, box.max.y, box.center().z);
+  expectSameBits(scene, "from within the bunny");
+}
+
+TEST(Agreement, OfTheDragon) {
+  if (!std::filesystem::exists(modelPath("dragon_vrip_res2.ply.gz"))) GTEST_SKIP() << "no models";
+  const NarrowBand dragon = model("dragon_vrip_res2.ply.gz", 512);
+  expectProven(support::sceneOf(dragon), "dragon");
+  expectSameBits(support::seenFromFar(dragon), "dragon from 1e5 away");
+}
+
+/// Pictures of a scene from places all around it, some within.
+class ManyPlaces {
+ public:
+  /// @param change  made to the view, with a number in [0, 1)
+  template <typename Change>
+  void look(Scene& scene, const Change& change) {
+    const V3d way = V3d(normal_(random_), normal_(random_), normal_(random_)).normalized();
+    scene.camera.from = way * (20 + 100 * even_(random_));
+    scene.camera.to = V3d(even_(random_), even_(random_), even_(random_)) * 8;
+    scene.camera.verticalFov = 0.2 + 1.5 * even_(random_);
+    change(scene.camera, even_(random_));
+    const ImageComparison found =
+        compareImages(renderCpu(scene, kData), renderEmbree(scene, kData));
+    EXPECT_EQ(found.unlikeElsewhere, 0u)
+        << "place " << places_ << ", pixel " << (found.unlike.empty() ? 0 : found.unlike[0].x)
+        << "," << (found.unlike.empty() ? 0 : found.unlike[0].y);
+    ++places_;
+    pixels_ += found.pixels;
+    hit_ += found.bothHit;
+    atOutline_ += found.unlikeAtOutline;
+  }
+  /// A pixel that one hits and the other misses is a hole or a false hit, but along an outline,
+  /// where rounding decides.
+  void expectNoLeak() const {
+    EXPECT_GT(hit_, pixels_ / 10);
+    EXPECT_LE(static_cast<double>(atOutline_), 1e-5 * static_cast<double>(pixels_));
+  }
+
+ private:
+  std::mt19937 random_{5};
+  std::normal_distribution<double> normal_;
+  std::uniform_real_distribution<double> even_{0, 1};
+  std::size_t places_ = 0, pixels_ = 0, hit_ = 0, atOutline_ = 0;
+};
+
+TEST(Agreement, From200PlacesNothingLeaks) {
+  Scene scene = support::sceneOf(support::rings(), 96, 72);
+  scene.solids.push_back(
+      {.band = levelset::makeBox(V3d(70, 40, 0.7), V3d(0.1, 0.2, -13), 1), .id = 2});
+  ManyPlaces places;
+  for (int n = 0; n < 200; ++n) places.look(scene, [](Camera&, double) {});
+  places.expectNoLeak();
+}
+
+TEST(Agreement, OfAnExpressionBetweenTwoPlanesNothingLeaks) {
+  Scene scene = resized(sceneAlongRays("(a - b) & c | b - a"), 96, 72);
+  ManyPlaces places;
+  for (int n = 0; n < 60; ++n)
+    places.look(scene, [](Camera& camera, double share) {
+      const double away = (camera.to - camera.from).length();
+      camera.near = std::max(0.0, away + 30 * (share - 0.7));
+      camera.far = camera.near + 15 + 30 * share;
+    });
+  places.expectNoLeak();
+}
+
+}  // namespace agreement_test

@@ -1,0 +1,129 @@
+// Pictures from the command line, and what is the same between them.
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/command_line.h"
+
+namespace pictures_test {
+
+using support::Outcome;
+using Json = nlohmann::json;
+
+class Pictures : public support::ShellTest {
+ protected:
+  void draw(const std::string& solid, const std::string& options) {
+    const Outcome drawn = levelsmith(solid + " --voxel 0.1 ! render " + options + " --size 48x48");
+    ASSERT_EQ(drawn.code, 0) << drawn.err;
+  }
+};
+
+TEST_F(Pictures, OfTheSameSolidAgreeButForTheColour) {
+  draw("sphere --radius 1", "a.exr --samples 1");
+  draw("sphere --radius 1", "b.exr --samples 2");
+  const Outcome same = levelsmith("compare-images a.exr b.exr --json --difference d.exr");
+  EXPECT_EQ(same.code, 0) << same.err;
+  const Json json = Json::parse(same.out);
+  EXPECT_TRUE(json["agrees"]);
+  EXPECT_EQ(json["unlike_elsewhere"], 0);
+  EXPECT_GT(json["both_hit"], 500);
+  for (const Json& layer : json["layers"]) {
+    if (layer["layer"] == "colour") continue;
+    EXPECT_EQ(layer["largest"], 0) << layer["layer"];
+  }
+  EXPECT_TRUE(exists("d.exr"));
+  EXPECT_EQ(levelsmith("compare-images a.exr b.exr --exact").code, 5);
+  EXPECT_EQ(levelsmith("compare-images a.exr a.exr --exact").code, 0);
+}
+
+TEST_F(Pictures, AreTheSameBitsByGpuAndProcessorAndJudgedByEmbree) {
+  draw("torus --radius 1 --tube 0.4", "g.exr --samples 2 --renderer gpu");
+  draw("torus --radius 1 --tube 0.4", "c.exr --samples 2 --renderer cpu");
+  draw("torus --radius 1 --tube 0.4", "e.exr --renderer embree");
+  const Outcome same = levelsmith("compare-images g.exr c.exr --exact");
+  EXPECT_EQ(same.code, 0) << same.err;
+  const Outcome judged = levelsmith("compare-images g.exr e.exr");
+  EXPECT_EQ(judged.code, 0) << judged.err;
+  draw("torus --radius 1 --tube 0.4", "b.exr --png b.png --renderer both");
+  EXPECT_TRUE(exists("b.png"));
+  EXPECT_EQ(levelsmith("compare-images g.exr b.exr").code, 0);
+}
+
+TEST_F(Pictures, OfTheNanoVdbGridHaveTheSameBits) {
+  draw("torus --radius 1 --tube 0.4", "n.exr --renderer both --tables nanovdb --samples 1");
+  draw("torus --radius 1 --tube 0.4", "c.exr --renderer cpu --samples 1");
+  EXPECT_EQ(levelsmith("compare-images n.exr c.exr --exact").code, 0);
+  const std::string chain = "sphere --radius 1 --voxel 0.05 ! render r.exr --tables nanovdb ";
+  EXPECT_EQ(levelsmith(chain + "--renderer cpu").code, 2);
+  EXPECT_EQ(levelsmith(chain + "--renderer gpu --filter bspline").code, 2);
+  EXPECT_EQ(levelsmith(chain + "--renderer gpu --value-bits 8").code, 2);
+}
+
+TEST_F(Pictures, OfValuesInFewBitsTellHowFarTheSurfaceMoved) {
+  const std::string chain = "sphere --radius 1 --voxel 0.05 ! render v.exr --size 64x48 ";
+  for (const char* bits : {"16", "8"}) {
+    const Outcome drawn = levelsmith("-v " + chain + "--renderer both --value-bits " + bits);
+    EXPECT_EQ(drawn.code, 0) << drawn.err;
+    EXPECT_NE(drawn.err.find(std::string("values of ") + bits + " bits moved the surface by "),
+              std::string::npos)
+        << drawn.err;
+  }
+  EXPECT_EQ(levelsmith(chain + "--value-bits 12").code, 2);
+  EXPECT_EQ(levelsmith(chain + "--value-bits 16 --filter bspline-qi").code, 2);
+  EXPECT_EQ(levelsmith(chain + "--value-bits 16 --filter bspline --renderer both").code, 0);
+}
+
+TEST_F(Pictures, WithoutOpenGlAreRefusedOrDrawnByTheProcessor) {
+  const std::string chain = "sphere --radius 1 --voxel 0.1 ! render o.exr --size 32x32 --renderer ";
+  setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json", 1);
+  const Outcome refused = levelsmith(chain + "gpu"), both = levelsmith(chain + "both");
+  unsetenv("__EGL_VENDOR_LIBRARY_FILENAMES");
+  EXPECT_EQ(refused.code, 4) << refused.err;
+  EXPECT_NE(refused.err.find("--renderer cpu"), std::string::npos) << refused.err;
+  EXPECT_EQ(both.code, 0) << both.err;
+  EXPECT_NE(both.err.find("takes the processor"), std::string::npos) << both.err;
+  EXPECT_TRUE(exists("o.exr"));
+}
+
+TEST_F(Pictures, OfOthersDifferAndEverythingIsWritten) {
+  const std::string view = " --from 0,0,6 --to 0,0,0";
+  draw("sphere --radius 1", "a.exr" + view);
+  draw("sphere --radius 1.02", "b.exr" + view);
+  const Outcome unlike =
+      levelsmith("--report r.json compare-images a.exr b.exr --difference d.exr");
+  EXPECT_EQ(unlike.code, 5);
+  EXPECT_NE(unlike.err.find("compare-images: the pictures differ"), std::string::npos);
+  EXPECT_NE(unlike.out.find("curvature.mean"), std::string::npos);
+  EXPECT_TRUE(exists("d.exr"));
+  EXPECT_TRUE(exists("r.json"));
+  // The difference is a picture itself.
+  EXPECT_EQ(levelsmith("compare-images d.exr a.exr").code, 5);
+}
+
+TEST_F(Pictures, AreRefusedBeforeAnythingIsWritten) {
+  draw("sphere --radius 1", "a.exr");
+  ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! render small.exr --size 32x48").code, 0);
+  writeFile("broken.exr", "no picture");
+  const std::size_t files = fileCount();
+  const std::pair<const char*, int> lines[] = {
+      {"compare-images a.exr", 2},
+      {"compare-images a.exr nothing.exr --difference d.exr", 6},
+      {"compare-images a.exr broken.exr --difference d.exr", 3},
+      {"compare-images a.exr small.exr --difference d.exr", 3},
+      {"compare-images a.exr a.exr --difference d.png", 2},
+      {"compare-images a.exr a.exr --difference ./a.exr", 2},
+      {"compare-images a.exr a.exr --tolerance Z=1", 2},
+      {"compare-images a.exr a.exr --tolerance Z=1,-1", 2},
+      {"compare-images a.exr a.exr --tolerance depth=1,1 --difference d.exr", 2},
+      {"compare-images a.exr a.exr --tolerance Z=1,1 --exact", 2}};
+  for (const auto& [line, code] : lines) {
+    const Outcome refused = levelsmith(line);
+    EXPECT_EQ(refused.code, code) << line;
+    EXPECT_NE(refused.err.find("compare-images"), std::string::npos) << refused.err;
+    EXPECT_EQ(fileCount(), files) << line;
+  }
+}
+
+}  // namespace pictures_test

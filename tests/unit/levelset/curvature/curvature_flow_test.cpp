@@ -1,0 +1,291 @@
+#include "levelset/curvature/curvature_flow.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/tools/Diagnostics.h>
+
+#include <limits>
+
+#include "levelset/distance/redistance.h"
+#include "levelset/error.h"
+#include "levelset/grids/interpolate_vdb.h"
+#include "levelset/inspect/compare.h"
+#include "levelset/inspect/measure.h"
+#include "levelset/solids/shapes.h"
+#include "tests/support/bands.h"
+#include "tests/support/threads.h"
+
+namespace curvature_flow_test {
+
+using namespace levelset;
+using Imath::V3d;
+
+const V3d kCentre(0.31, -0.17, 0.43);
+
+NarrowBand ball(double radius) {
+  return makeSphere(radius, kCentre, 1);
+}
+
+/// Mean and greatest distance of the zero set from a centre, less `radius`, along fixed rays.
+struct RadiusError {
+  double mean = 0, worst = 0;
+};
+RadiusError radiusError(const NarrowBand& band, double radius) {
+  auto accessor = vdb(band).getConstAccessor();
+  RadiusError error;
+  constexpr int kRays = 500;
+  for (int i = 0; i < kRays; ++i) {
+    const double z = 1 - 2 * (i + 0.5) / kRays, angle = i * 2.399963, r = std::sqrt(1 - z * z);
+    const V3d direction(r * std::cos(angle), r * std::sin(angle), z);
+    double t = radius;
+    for (int k = 0; k < 8; ++k) {
+      const SampleBlock<4> block(accessor, toVdb((kCentre + direction * t) / band.voxelSize()));
+      t -= block.value() / (block.gradient().dot(toVdb(direction)) / band.voxelSize());
+    }
+    error.mean += (t - radius) / kRays;
+    error.worst = std::max(error.worst, std::abs(t - radius));
+  }
+  return error;
+}
+
+TEST(CurvatureFlow, ShrinksABallBySquares) {
+  for (const double time : {5.0, 40.0}) {
+    const CurvatureFlowResult result = curvatureFlow(ball(20), time);
+    const double radius = std::sqrt(400 - 4 * time);
+    EXPECT_LE(std::abs(radiusError(result.band, radius).mean), 1e-3 * radius) << time;
+    EXPECT_LE(radiusError(result.band, radius).worst, 0.05) << time;
+    EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(result.band), 6), "");
+    EXPECT_EQ(result.scheme, FlowScheme::Stabilized);
+  }
+}
+
+// At first, edges are where they were; when they are no longer looked for, corners are a voxel off.
+TEST(CurvatureFlow, BeginsWhereTheSolidIs) {
+  const NarrowBand cube = makeBox(V3d(20), kCentre, 1);
+  double before = 0;
+  for (const double time : {1e-6, 0.01, 0.1}) {
+    const double change = compare(curvatureFlow(cube, time).band, cube).symmetricDifference;
+    EXPECT_GT(change, before) << time;
+    before = change;
+    if (time < 1e-5) {
+      EXPECT_LT(change, 1) << "of an area of 2400";
+    }
+  }
+  EXPECT_GT(compare(curvatureFlow(cube, 0.5).band, cube).hausdorff(), 1);
+}
+
+TEST(SlowCurvatureFlow, HalvesTheRadiusOfABall) {
+  const CurvatureFlowResult result = curvatureFlow(ball(32), 192);
+  EXPECT_LE(std::abs(radiusError(result.band, 16).mean), 1e-3 * 16);
+}
+
+TEST(CurvatureFlow, MeasuresTimeInWorldUnits) {
+  const double h = 0.01;
+  const NarrowBand band = makeSphere(12 * h, kCentre * h, h);
+  const NarrowBand flowed = curvatureFlow(band, 20 * h * h).band;
+  const double radius = std::sqrt(144.0 - 80) * h;
+  EXPECT_NEAR(std::cbrt(3 * measure(flowed).volume / (4 * M_PI)), radius, 3e-3 * radius);
+}
+
+TEST(CurvatureFlow, ConvergesWithTheVoxel) {
+  // One ball, the same time, three resolutions, steps that err by next to nothing. The differences
+  // are of higher order; what is left comes of re-distancing, as often as the voxels grow finer.
+  for (const double tolerance : {1e-3, 5e-4}) {
+    std::vector<double> errors;  // in parts of the radius
+    for (const double n : {8.0, 16.0, 32.0}) {
+      const NarrowBand flowed = curvatureFlow(ball(n), n * n / 16, {.tolerance = tolerance}).band;
+      const double worst = radiusError(flowed, n * std::sqrt(0.75)).worst;
+      EXPECT_LE(worst, 2.5e-3) << n;
+      errors.push_back(worst / n);
+    }
+    EXPECT_GE(std::log2(errors[0] / errors[2]) / 2, 1.5) << tolerance;
+    EXPECT_LE(errors[2], errors[1]) << tolerance;
+    // The shorter the steps, the more of the finest's error is re-distancing's.
+    if (tolerance == 1e-3) {
+      EXPECT_GE(std::log2(errors[0] / errors[1]), 0.8);
+      EXPECT_GE(std::log2(errors[1] / errors[2]), 0.8);
+    }
+  }
+}
+
+// Far from the surface level sets follow those nearer to it as parallel surfaces do: when all went
+// alike, halving this radius left 0.044 voxels, six times what the estimate said.
+TEST(CurvatureFlow, ErrsByWhatItEstimates) {
+  const CurvatureFlowResult result = curvatureFlow(ball(16), 48);
+  EXPECT_LE(radiusError(result.band, 8).worst, 0.015);
+  EXPECT_LE(std::abs(radiusError(result.band, 8).mean), 1.6 * result.errorEstimate);
+}
+
+TEST(CurvatureFlow, AllSchemesAgree) {
+  const double time = 12, radius = std::sqrt(144 - 4 * time);
+  for (const FlowScheme scheme :
+       {FlowScheme::Explicit, FlowScheme::Stabilized, FlowScheme::Implicit}) {
+    const CurvatureFlowResult result = curvatureFlow(ball(12), time, {.scheme = scheme});
+    EXPECT_EQ(result.scheme, scheme);
+    EXPECT_NEAR(radiusError(result.band, radius).mean, 0, 0.03) << static_cast<int>(scheme);
+  }
+}
+
+TEST(CurvatureFlow, IsStableWhateverStepIsAsked) {
+  for (const FlowScheme scheme : {FlowScheme::Stabilized, FlowScheme::Implicit}) {
+    const NarrowBand flowed =
+        curvatureFlow(ball(16), 30, {.scheme = scheme, .tolerance = 100, .step = 160}).band;
+    EXPECT_LE(radiusError(flowed, std::sqrt(256.0 - 120)).worst, 0.3);
+  }
+}
+
+TEST(CurvatureFlow, IsExactInLongSteps) {
+  // Whatever long steps find wrong in the rates at the band's edge comes to the surface.
+  const double radius = std::sqrt(100.0 * 100 - 4 * 150);
+  for (const FlowScheme scheme : {FlowScheme::Stabilized, FlowScheme::Implicit}) {
+    const NarrowBand flowed =
+        curvatureFlow(ball(100), 150, {.scheme = scheme, .tolerance = 100, .step = 160}).band;
+    EXPECT_LE(radiusError(flowed, radius).worst, scheme == FlowScheme::Implicit ? 0.02 : 0.002);
+  }
+}
+
+TEST(CurvatureFlow, ShrinksACylinderByItsOneCurvature) {
+  // Long enough for its middle not to know of the ends.
+  const NarrowBand rod = makeCylinder(10, 80, kCentre, V3d(0, 0, 1), 1);
+  const NarrowBand flowed = curvatureFlow(rod, 18).band;
+  auto accessor = vdb(flowed).getConstAccessor();
+  for (const double angle : {0.0, 0.4, 1.1, 2.9, 4.0}) {
+    const V3d p = kCentre + V3d(std::cos(angle), std::sin(angle), 0) * 8;
+    EXPECT_NEAR(SampleBlock<4>(accessor, toVdb(p)).value(), 0, 0.02) << angle;
+  }
+}
+
+/// Two balls of radius 12 with a neck of radius 3.
+NarrowBand dumbBell() {
+  return support::sampleBand(
+      [](const V3d& p) {
+        const V3d q(std::abs(p.x) - 20, p.y, p.z);
+        const double rod = std::max(std::hypot(p.y - 0.3, p.z - 0.2) - 3, std::abs(p.x) - 20);
+        return std::min(q.length() - 12, rod);
+      },
+      {V3d(-33, -13, -13), V3d(33, 13, 13)}, 1);
+}
+
+TEST(CurvatureFlow, PinchesADumbBell) {
+  const NarrowBand flowed = curvatureFlow(dumbBell(), 8).band;
+  const Measurement after = measure(flowed);
+  EXPECT_EQ(measure(dumbBell()).components, 1u);
+  EXPECT_EQ(after.components, 2u);
+  EXPECT_NEAR(after.volume, 2 * 4.0 / 3 * M_PI * std::pow(144 - 32, 1.5), 0.05 * after.volume);
+}
+
+TEST(CurvatureFlow, KeepsThePlateOfOneVoxelFlat) {
+  // It has no curvature but at its rim.
+  const NarrowBand plate = support::sampleBand(
+      [](const V3d& p) {
+        const V3d q(std::abs(p.x) - 20, std::abs(p.y) - 20, std::abs(p.z - 0.2) - 0.5);
+        return std::max({q.x, q.y, q.z});
+      },
+      {V3d(-20, -20, -1), V3d(20, 20, 1)}, 1);
+  // Against what making distances before and after the flow does to so thin a plate: the
+  // interpolant reads across it, and each time moves its faces by a tenth of a voxel.
+  const NarrowBand still = redistance(redistance(plate)), flowed = curvatureFlow(plate, 1).band;
+  auto before = vdb(still).getConstAccessor(), after = vdb(flowed).getConstAccessor();
+  for (const int x : {-8, 0, 7})
+    for (const int z : {-1, 0, 1}) {
+      const openvdb::Coord c(x, 3, z);
+      EXPECT_NEAR(after.getValue(c), before.getValue(c), 0.05) << x << " " << z;
+    }
+}
+
+TEST(CurvatureFlow, KeepsTheVolumeAskedFor) {
+  // Smooth from the start: measure() cuts edges, and would see them come and go.
+  const NarrowBand rod = makeCapsule(kCentre - V3d(12, 0, 0), kCentre + V3d(12, 0, 0), 12, 1);
+  const double before = measure(rod).volume;
+  const NarrowBand flowed = curvatureFlow(rod, 40, {.preservesVolume = true}).band;
+  EXPECT_NEAR(measure(flowed).volume, before, 1e-3 * before);
+  EXPECT_LT(measure(flowed).area, 0.99 * measure(rod).area);
+}
+
+// While the surface is almost at rest the level sets within it shrink: left alone, they would leave
+// a cavity where they vanish.
+TEST(CurvatureFlow, LetsNoOtherLevelSetComeUpToTheSurface) {
+  const NarrowBand rod = makeCapsule(kCentre - V3d(1, 0, 0), kCentre + V3d(1, 0, 0), 12, 1);
+  const double before = measure(rod).volume;
+  for (const FlowScheme scheme : {FlowScheme::Stabilized, FlowScheme::Implicit}) {
+    const NarrowBand flowed =
+        curvatureFlow(rod, 60,
+                      {.scheme = scheme, .preservesVolume = true, .tolerance = 100, .step = 160})
+            .band;
+    const Measurement after = measure(flowed);
+    EXPECT_EQ(after.shells, 1u) << static_cast<int>(scheme);
+    EXPECT_NEAR(after.volume, before, 1e-3 * before) << static_cast<int>(scheme);
+  }
+}
+
+TEST(CurvatureFlow, EndsWhenWhatKeepsItsVolumeIsRound) {
+  const NarrowBand rod = makeCapsule(V3d(-10.69, -0.17, 0.43), V3d(13.31, -0.17, 0.43), 10, 1);
+  const CurvatureFlowResult rested = curvatureFlow(rod, 1e9, {.preservesVolume = true});
+  ASSERT_TRUE(rested.restedAfter.has_value());
+  EXPECT_LT(*rested.restedAfter, 1000);
+  // A ball has the least area of all that hold as much.
+  const Measurement round = measure(rested.band);
+  EXPECT_NEAR(round.volume, measure(rod).volume, 2e-3 * round.volume);  // 0.01 voxels of radius
+  EXPECT_NEAR(round.area, std::cbrt(36 * M_PI * round.volume * round.volume), 2e-3 * round.area);
+  EXPECT_FALSE(curvatureFlow(rod, 5, {.preservesVolume = true}).restedAfter.has_value());
+}
+
+TEST(CurvatureFlow, RefusesStepsWithoutEnd) {
+  EXPECT_THROW((void)curvatureFlow(ball(6), 1, {.step = 1e-18}), ResourceLimit);
+  EXPECT_THROW((void)curvatureFlow(ball(6), 1, {.preservesVolume = true, .step = 1e-18}),
+               ResourceLimit);
+}
+
+TEST(CurvatureFlow, LeavesWhatTheMaskLeaves) {
+  const Mask right{.field = [](const V3d& p) { return p.x; }, .min = 0, .max = 1};
+  const NarrowBand flowed = curvatureFlow(ball(16), 20, {.mask = right}).band;
+  auto accessor = vdb(flowed).getConstAccessor();
+  const double free = std::sqrt(256.0 - 80);
+  EXPECT_NEAR(SampleBlock<4>(accessor, toVdb(kCentre - V3d(16, 0, 0))).value(), 0, 5e-3);
+  EXPECT_NEAR(SampleBlock<4>(accessor, toVdb(kCentre + V3d(free, 0, 0))).value(), 0, 0.05);
+}
+
+TEST(CurvatureFlow, TellsWhenTheSolidVanishes) {
+  try {
+    (void)curvatureFlow(ball(4), 10);
+    FAIL() << "a ball of radius 4 lives for a time of 4";
+  } catch (const InvalidInput& error) {
+    const std::string sentence = error.what();
+    const std::string before = "after a time of ";
+    const auto at = sentence.find(before);
+    ASSERT_NE(at, std::string::npos) << sentence;
+    EXPECT_NEAR(std::stod(sentence.substr(at + before.size())), 4, 1) << sentence;
+  }
+  const NarrowBand needle = makeCylinder(0.7, 12, kCentre, V3d(0, 0, 1), 1);
+  EXPECT_THROW((void)curvatureFlow(needle, 5), InvalidInput);
+}
+
+TEST(CurvatureFlow, DoesNothingInNoTime) {
+  EXPECT_EQ(curvatureFlow(ball(6), 0).band.contentHash(), ball(6).contentHash());
+}
+
+TEST(CurvatureFlow, DoesNotDependOnThreads) {
+  std::uint64_t hashes[3];
+  for (const std::size_t threads : {1, 2, 4}) {
+    hashes[threads / 2] = support::onThreads(threads, [] {
+      return curvatureFlow(ball(8), 3, {.preservesVolume = true}).band.contentHash() +
+             curvatureFlow(ball(8), 3, {.scheme = FlowScheme::Implicit}).band.contentHash();
+    });
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+  EXPECT_EQ(hashes[0], hashes[2]);
+}
+
+TEST(CurvatureFlow, Refuses) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const NarrowBand b = ball(6);
+  EXPECT_THROW((void)curvatureFlow(b, nan), UsageError);
+  EXPECT_THROW((void)curvatureFlow(b, -1), UsageError);
+  EXPECT_THROW((void)curvatureFlow(b, 1, {.tolerance = 0}), UsageError);
+  EXPECT_THROW((void)curvatureFlow(b, 1, {.step = nan}), UsageError);
+  EXPECT_THROW((void)curvatureFlow(b, 1, {.mask = Mask{}}), UsageError);
+  EXPECT_THROW((void)curvatureFlow(NarrowBand(), 1), InvalidInput);
+  EXPECT_THROW((void)curvatureFlow(b, 1, {.maxMemory = 10000}), ResourceLimit);
+  EXPECT_THROW((void)curvatureFlow(b, 1, {.progress = [](double) { return false; }}), Cancelled);
+}
+
+}  // namespace curvature_flow_test

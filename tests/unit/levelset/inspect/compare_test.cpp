@@ -1,0 +1,121 @@
+#include "levelset/inspect/compare.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "levelset/error.h"
+#include "levelset/placement/resample.h"
+#include "levelset/placement/transform.h"
+#include "levelset/solids/shapes.h"
+#include "tests/support/bands.h"
+
+namespace compare_test {
+
+using namespace levelset;
+using Imath::V3d;
+using std::numbers::pi;
+
+NarrowBand ball(double radius, const V3d& centre, double voxelSize, double halfWidth = 3) {
+  return support::sampleBand([=](const V3d& p) { return (p - centre).length() - radius; },
+                             {centre - V3d(radius), centre + V3d(radius)}, voxelSize, halfWidth);
+}
+
+NarrowBand block(const V3d& half, const V3d& centre, double voxelSize) {
+  return support::sampleBand(
+      [=](const V3d& p) {
+        const V3d q(std::abs(p.x - centre.x) - half.x, std::abs(p.y - centre.y) - half.y,
+                    std::abs(p.z - centre.z) - half.z);
+        const V3d outer(std::max(q.x, 0.), std::max(q.y, 0.), std::max(q.z, 0.));
+        return outer.length() + std::min(std::max({q.x, q.y, q.z}), 0.);
+      },
+      {centre - half, centre + half}, voxelSize);
+}
+
+TEST(Compare, FindsNothingBetweenEquals) {
+  const NarrowBand a = ball(12, V3d(0.3, 0.1, -0.2), 1);
+  const Comparison c = compare(a, a);
+  EXPECT_LT(c.hausdorff(), 1e-3);
+  EXPECT_LT(c.chamfer(), 1e-3);
+  EXPECT_LT(c.symmetricDifference, 1e-9);
+}
+
+TEST(Compare, FindsNothingBetweenEqualsWithEdges) {
+  for (const V3d& centre : {V3d(0), V3d(0.31, -0.17, 0.43)}) {
+    const NarrowBand cube = block(V3d(10), centre, 1);
+    NarrowBand turned = transform(cube, Imath::M44d().setEulerAngles(V3d(0.3, 0.5, 0.7)));
+    turned = resample(turned, 1);
+    for (const NarrowBand& solid : {cube, turned}) {
+      const Comparison c = compare(solid, solid);
+      EXPECT_LT(c.hausdorff(), 1e-3);
+      EXPECT_LT(c.chamfer(), 1e-4);
+    }
+  }
+}
+
+TEST(Compare, KnowsConcentricSpheres) {
+  for (const double gap : {0.01, 0.4, 6.0}) {
+    const Comparison c = compare(ball(20, V3d(0.2), 1), ball(20 + gap, V3d(0.2), 1));
+    for (const double found : {c.hausdorffAtoB, c.hausdorffBtoA, c.meanAtoB, c.meanBtoA})
+      EXPECT_NEAR(found, gap, 2e-3);
+    const double exact = 4 * pi / 3 * (std::pow(20 + gap, 3) - 8000);
+    EXPECT_NEAR(c.symmetricDifference, exact, 0.01 * exact);
+  }
+}
+
+TEST(Compare, KnowsShiftedSpheresOnDifferentGrids) {
+  // ∫ |‖R n + d‖ − R| over a sphere: R² − …; Hausdorff both ways is the shift.
+  const double radius = 10, shift = 2.5;
+  const NarrowBand a = ball(radius, V3d(0), 0.5);
+  for (const double voxelSize : {0.5, 0.4, 0.8}) {
+    const Comparison c = compare(a, ball(radius, V3d(shift, 0, 0), voxelSize));
+    EXPECT_NEAR(c.hausdorffAtoB, shift, 0.01);
+    EXPECT_NEAR(c.hausdorffBtoA, shift, 0.01);
+    // Both means: |√(R² + s² − 2 R s u) − R| for u uniform in [−1, 1], by substitution.
+    const auto part = [&](double u) {
+      const double r = std::sqrt(radius * radius + shift * shift - 2 * radius * shift * u);
+      return -(r * r * r / 3 - radius * r * r / 2) / (radius * shift);
+    };
+    const double middle = shift / (2 * radius);  // where r = R
+    const double mean = (part(middle) - part(-1) - (part(1) - part(middle))) / 2;
+    EXPECT_NEAR(c.meanAtoB, mean, 5e-3);
+    EXPECT_NEAR(c.meanBtoA, mean, 5e-3);
+    const double lens =
+        pi * std::pow(2 * radius - shift, 2) * (shift * shift + 4 * shift * radius) / (12 * shift);
+    const double exact = 2 * (4 * pi / 3 * std::pow(radius, 3) - lens);
+    EXPECT_NEAR(c.symmetricDifference, exact, 0.01 * exact);
+  }
+}
+
+TEST(Compare, TellsDirectionsApart) {
+  // A box and the same with a spike on top: all of the first is near the second.
+  const NarrowBand a = block(V3d(10), V3d(0), 0.5), b = block(V3d(10, 10, 14), V3d(0, 0, 4), 0.5);
+  const Comparison c = compare(a, b);
+  EXPECT_NEAR(c.hausdorffAtoB, 8, 0.05);  // its top, from inside the second's: to the walls or top
+  EXPECT_NEAR(c.hausdorffBtoA, 8, 0.05);
+  EXPECT_NEAR(c.symmetricDifference, 8 * 20 * 20, 0.01 * 8 * 20 * 20);
+  const NarrowBand small = ball(1.5, V3d(20, 0, 0), 0.5);
+  const Comparison apart = compare(a, small);
+  EXPECT_NEAR(apart.hausdorffBtoA, 11.5, 0.05);  // between two samples of a small ball
+  EXPECT_NEAR(apart.hausdorffAtoB, V3d(30, 10, 10).length() - 1.5, 0.6);
+  EXPECT_NEAR(apart.symmetricDifference, 8000 + 4 * pi / 3 * 3.375, 0.002 * 8000);
+}
+
+TEST(Compare, HoldsInNarrowBands) {
+  const Comparison c = compare(ball(15, V3d(0.1), 1, 1), ball(15.5, V3d(0.1), 1, 1.5));
+  EXPECT_NEAR(c.hausdorffAtoB, 0.5, 0.02);
+  EXPECT_NEAR(c.hausdorffBtoA, 0.5, 0.02);
+}
+
+TEST(Compare, Refuses) {
+  const NarrowBand a = ball(5, V3d(0), 1);
+  EXPECT_THROW((void)compare(a, NarrowBand()), InvalidInput);
+  EXPECT_THROW((void)compare(NarrowBand(), a), InvalidInput);
+  auto outside = emptyLevelSet(uniformTransform(1), 3);
+  outside->tree().setValueOn(openvdb::Coord(0), 1.f);
+  EXPECT_THROW((void)compare(a, makeBand(outside)), InvalidInput);
+  EXPECT_THROW((void)compare(a, a, {.progress = [](double) { return false; }}), Cancelled);
+}
+
+}  // namespace compare_test

@@ -1,0 +1,599 @@
+#include "levelset/mesh_files/mesh_file.h"
+
+#include <fmt/core.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "levelset/error.h"
+#include "tests/support/files.h"
+#include "tests/support/mesh_files.h"
+
+namespace mesh_file_test {
+
+using levelset::CoordinatePrecision;
+using levelset::InvalidInput;
+using levelset::readMesh;
+using levelset::TriMesh;
+using support::parse;
+using support::refusal;
+using support::says;
+using support::TemporaryFolder;
+using support::writeText;
+
+std::string refused(const std::string& name, const std::string& text) {
+  return refusal<InvalidInput>([&] { static_cast<void>(parse(name, text)); });
+}
+
+TriMesh tetrahedron(CoordinatePrecision precision = CoordinatePrecision::Float) {
+  TriMesh mesh;
+  const double third =
+      precision == CoordinatePrecision::Float ? static_cast<double>(1.f / 3) : 1.0 / 3;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, third, -2.25}};
+  mesh.triangles = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
+  mesh.precision = precision;
+  return mesh;
+}
+
+/// Each triangle as nine numbers, rotated so that the least corner leads, sorted.
+std::vector<std::array<double, 9>> canonical(const TriMesh& mesh) {
+  std::vector<std::array<double, 9>> result;
+  for (const auto& t : mesh.triangles) {
+    std::array<std::array<double, 3>, 3> corners;
+    for (std::size_t k = 0; k < 3; ++k)
+      corners[k] = {mesh.positions[t[k]].x, mesh.positions[t[k]].y, mesh.positions[t[k]].z};
+    std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
+    std::array<double, 9> flat;
+    for (std::size_t k = 0; k < 9; ++k) flat[k] = corners[k / 3][k % 3];
+    result.push_back(flat);
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+// === Round trips
+
+TEST(MeshFile, WritesWhatItReads) {
+  const TemporaryFolder folder;
+  for (const auto precision : {CoordinatePrecision::Float, CoordinatePrecision::Double}) {
+    const TriMesh mesh = tetrahedron(precision);
+    for (const std::string name : {"a.ply", "a.obj", "a.off", "a.ply.gz", "A.OBJ.GZ", "a.off.gz"}) {
+      levelset::writeMesh(folder / name, mesh);
+      const TriMesh again = readMesh(folder / name);
+      EXPECT_EQ(again.positions, mesh.positions) << name;
+      EXPECT_EQ(again.triangles, mesh.triangles) << name;
+      EXPECT_EQ(again.precision, precision) << name;
+    }
+  }
+}
+
+TEST(MeshFile, WritesStlAndMergesItsVertices) {
+  const TemporaryFolder folder;
+  for (const std::string name : {"a.stl", "a.stl.gz"}) {
+    levelset::writeMesh(folder / name, tetrahedron());
+    const TriMesh again = readMesh(folder / name);
+    EXPECT_EQ(again.positions.size(), 4u) << name;
+    EXPECT_EQ(canonical(again), canonical(tetrahedron())) << name;
+    EXPECT_EQ(again.precision, CoordinatePrecision::Float) << name;
+  }
+  EXPECT_EQ(std::filesystem::file_size(folder / "a.stl"), 84u + 4 * 50);
+}
+
+TEST(MeshFile, RefusesStlWhereSinglePrecisionIsTooCoarse) {
+  const TemporaryFolder folder;
+  TriMesh far = tetrahedron(CoordinatePrecision::Double);
+  for (auto& p : far.positions) p.x += 1e8;
+  TriMesh huge = tetrahedron(CoordinatePrecision::Double);
+  for (auto& p : huge.positions) p *= 1e90;
+  for (const TriMesh* mesh : {&far, &huge}) {
+    EXPECT_THROW(levelset::writeMesh(folder / "far.stl", *mesh), levelset::InvalidInput);
+    EXPECT_FALSE(std::filesystem::exists(folder / "far.stl"));
+  }
+  // What came from single precision goes back as it was.
+  far.precision = CoordinatePrecision::Float;
+  levelset::writeMesh(folder / "far.stl", far);
+  EXPECT_TRUE(std::filesystem::exists(folder / "far.stl"));
+}
+
+TEST(MeshFile, WritesTheSameBytesTwice) {
+  const TemporaryFolder folder;
+  for (const std::string name : {"a.ply", "a.ply.gz", "a.obj", "a.stl"}) {
+    levelset::writeMesh(folder / name, tetrahedron());
+    const std::string first = support::readText(folder / name);
+    levelset::writeMesh(folder / name, tetrahedron());
+    EXPECT_EQ(support::readText(folder / name), first) << name;
+  }
+}
+
+TEST(MeshFile, ReadsLargeFilesThroughManyBuffers) {
+  TriMesh mesh;
+  for (std::uint32_t i = 0; i < 200000; ++i) {
+    mesh.positions.emplace_back(i, 0.25 * i, i % 7);
+    if (i >= 2) mesh.triangles.push_back({i - 2, i - 1, i});
+  }
+  mesh.precision = CoordinatePrecision::Float;
+  const TemporaryFolder folder;
+  for (const std::string name : {"a.ply", "a.obj.gz", "a.stl", "a.off"}) {
+    levelset::writeMesh(folder / name, mesh);
+    const TriMesh again = readMesh(folder / name);
+    EXPECT_EQ(again.positions, mesh.positions) << name;
+    EXPECT_EQ(again.triangles, mesh.triangles) << name;
+  }
+}
+
+// === PLY
+
+template <typename T>
+void append(std::string& bytes, T value, bool bigEndian) {
+  char raw[sizeof(T)];
+  std::memcpy(raw, &value, sizeof(T));
+  if (bigEndian) std::reverse(raw, raw + sizeof(T));
+  bytes.append(raw, sizeof(T));
+}
+
+void appendAs(std::string& bytes, const std::string& type, double value, bool bigEndian) {
+  if (type == "char") return append(bytes, static_cast<std::int8_t>(value), bigEndian);
+  if (type == "uchar") return append(bytes, static_cast<std::uint8_t>(value), bigEndian);
+  if (type == "short") return append(bytes, static_cast<std::int16_t>(value), bigEndian);
+  if (type == "uint16") return append(bytes, static_cast<std::uint16_t>(value), bigEndian);
+  if (type == "int") return append(bytes, static_cast<std::int32_t>(value), bigEndian);
+  if (type == "uint32") return append(bytes, static_cast<std::uint32_t>(value), bigEndian);
+  if (type == "float") return append(bytes, static_cast<float>(value), bigEndian);
+  if (type == "float64") return append(bytes, value, bigEndian);
+  ADD_FAILURE() << "unknown type " << type;
+}
+
+/// The tetrahedron with a stranger's properties, another element before the faces, and one of its
+/// faces joined to a list of no corners.
+std::string strangePly(const std::string& count, const std::string& index, const std::string& real,
+                       bool bigEndian) {
+  std::string ply = fmt::format(
+      "ply\r\nformat {} 1.0\r\ncomment made by hand\r\nelement vertex 4\r\nproperty uchar red\r\n"
+      "property {} z\r\nproperty list uchar short tags\r\nproperty {} x\r\nproperty {} y\r\n"
+      "element edge 2\r\nproperty list {} double weights\r\nelement face 5\r\nproperty uchar "
+      "flags\r\n"
+      "property list {} {} vertex_index\r\nproperty float quality\r\nend_header\r\n",
+      bigEndian ? "binary_big_endian" : "binary_little_endian", real, real, real, count, count,
+      index);
+  const TriMesh mesh = tetrahedron();
+  for (const Imath::V3d& p : mesh.positions) {
+    ply += '\xFF';
+    appendAs(ply, real, p.z, bigEndian);
+    append(ply, std::uint8_t{2}, bigEndian);
+    append(ply, std::int32_t{-1}, bigEndian);
+    appendAs(ply, real, p.x, bigEndian);
+    appendAs(ply, real, p.y, bigEndian);
+  }
+  for (const int weights : {1, 0}) {
+    appendAs(ply, count, weights, bigEndian);
+    ply.append(static_cast<std::size_t>(weights) * 8, 'w');
+  }
+  for (int i = 0; i < 5; ++i) {
+    ply += 'f';
+    appendAs(ply, count, i < 4 ? 3 : 0, bigEndian);
+    if (i < 4)
+      for (const std::uint32_t corner : mesh.triangles[static_cast<std::size_t>(i)])
+        appendAs(ply, index, corner, bigEndian);
+    append(ply, 0.5f, bigEndian);
+  }
+  return ply;
+}
+
+TEST(MeshFile, ReadsPlyListsOfAnyTypeInBothByteOrders) {
+  const std::string types[] = {"char", "uchar",  "short", "uint16",
+                               "int",  "uint32", "float", "float64"};
+  for (const bool bigEndian : {false, true}) {
+    for (const std::string& count : types) {
+      for (const std::string& index : types) {
+        const TriMesh mesh = parse("a.ply", strangePly(count, index, "float", bigEndian));
+        ASSERT_EQ(mesh.positions, tetrahedron().positions) << count << " " << index << bigEndian;
+        ASSERT_EQ(mesh.triangles, tetrahedron().triangles) << count << " " << index << bigEndian;
+      }
+    }
+    EXPECT_EQ(parse("a.ply", strangePly("uchar", "int", "float", bigEndian)).precision,
+              CoordinatePrecision::Float);
+    EXPECT_EQ(parse("a.ply", strangePly("uchar", "int", "float64", bigEndian)).precision,
+              CoordinatePrecision::Double);
+  }
+}
+
+const std::string kAsciiPly =
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
+    "z\n"
+    "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
+
+TEST(MeshFile, ReadsAsciiPly) {
+  const TriMesh mesh = parse("a.ply", kAsciiPly);
+  EXPECT_EQ(mesh.positions[2], Imath::V3d(1, 1, 0));
+  EXPECT_EQ(mesh.triangles[1], (std::array<std::uint32_t, 3>{0, 2, 3}));
+  EXPECT_EQ(parse("a.ply", kAsciiPly.substr(0, kAsciiPly.size() - 1)).triangles, mesh.triangles);
+}
+
+TEST(MeshFile, RefusesWhatGoesOnBehindItsHeader) {
+  const std::string binary = strangePly("uchar", "int", "float", false);
+  for (const std::string& ply : {kAsciiPly, binary}) {
+    EXPECT_SAYS(refused("a.ply", ply + "junk"), "goes on behind the elements");
+    EXPECT_NO_THROW((void)parse("a.ply", ply + " \t\r\n\n"));
+  }
+  std::string ply = binary;
+  ply.replace(ply.find("face 5"), 6, "face 4");
+  EXPECT_SAYS(refused("a.ply", ply), "goes on behind the elements");
+  ply = kAsciiPly;
+  ply.replace(ply.find("face 2"), 6, "face 1");
+  EXPECT_SAYS(refused("a.ply", ply), "goes on behind the elements");
+  // Elements that no mesh needs are read to find the end.
+  ply = kAsciiPly + "1 2\n3\n";
+  ply.replace(ply.find("end_header"), 10, "element tag 2\nproperty list int int marks\nend_header");
+  EXPECT_SAYS(refused("a.ply", ply), "the file ends within the elements 'tag'");
+  EXPECT_EQ(parse("a.ply", ply + "5 6 7\n").triangles.size(), 2u);
+  const std::string off = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  EXPECT_SAYS(refused("a.off", off + "3 0 2 1\n"), "goes on behind the 3 vertices and 1 faces");
+  EXPECT_NO_THROW((void)parse("a.off", off + "\n # the end\n\n"));
+}
+
+TEST(MeshFile, ReadsTextBehindAByteOrderMark) {
+  const std::string mark = "\xEF\xBB\xBF";
+  EXPECT_EQ(parse("a.ply", mark + kAsciiPly).triangles.size(), 2u);
+  EXPECT_EQ(parse("a.ply", mark + strangePly("int", "int", "float", true)).triangles.size(), 4u);
+  EXPECT_EQ(parse("a.obj", mark + "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").triangles.size(), 1u);
+  EXPECT_EQ(parse("a.off", mark + "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").triangles.size(),
+            1u);
+  EXPECT_EQ(
+      parse("a.stl", mark + "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+                            "vertex 0 1 0\nendloop\nendfacet\nendsolid x\n")
+          .triangles.size(),
+      1u);
+  // Of other encodings none is read.
+  EXPECT_SAYS(refused("a.ply", std::string("\xFF\xFEp\0l\0y\0\n\0", 10)),
+              "does not begin with 'ply'");
+  EXPECT_SAYS(refused("a.obj", std::string("\xFF\xFEv\0 \0", 6)), "binary data");
+}
+
+TEST(MeshFile, RefusesAnyCutOfPly) {
+  const std::string whole = strangePly("uchar", "int", "float", false);
+  for (std::size_t size = 1; size < whole.size() - 4; ++size)  // without the last quality
+    ASSERT_FALSE(refused("a.ply", whole.substr(0, size)).empty()) << size;
+  for (std::size_t size = 1; size + 2 < kAsciiPly.size(); ++size)
+    ASSERT_FALSE(refused("a.ply", kAsciiPly.substr(0, size)).empty()) << size;
+}
+
+TEST(MeshFile, RefusesPlyThatPromisesTooMuch) {
+  for (const std::string count : {"5000000000", "18446744073709551615", "99"}) {
+    std::string ply = kAsciiPly;
+    ply.replace(ply.find("vertex 4"), 8, "vertex " + count);
+    EXPECT_SAYS(refused("a.ply", ply), "promises " + count);
+    ply = strangePly("uchar", "int", "float", false);
+    ply.replace(ply.find("face 5"), 6, "face " + count);
+    EXPECT_SAYS(refused("a.ply", ply), "promises " + count);
+  }
+  std::string ply = kAsciiPly;
+  ply.replace(ply.find("vertex 4"), 8, "vertex -4");
+  EXPECT_SAYS(refused("a.ply", ply), "no count");
+}
+
+TEST(MeshFile, RefusesBrokenPly) {
+  const auto with = [](const std::string& from, const std::string& to) {
+    std::string ply = kAsciiPly;
+    ply.replace(ply.find(from), from.size(), to);
+    return refused("a.ply", ply);
+  };
+  EXPECT_SAYS(with("3 0 2 3", "3 0 2 4"), "line 15: a face names vertex 4");
+  EXPECT_SAYS(with("3 0 2 3", "3 0 -2 3"), "line 15: the index of a vertex is -2");
+  EXPECT_SAYS(with("3 0 2 3", "3 0 2.5 3"), "the index of a vertex is 2.5");
+  EXPECT_SAYS(with("3 0 2 3", "-3 0 2 3"), "the length of a list is -3");
+  EXPECT_SAYS(with("3 0 2 3", "900000000 0 2 3"), "the file ends");
+  EXPECT_SAYS(with("1 1 0", "1 nan 0"), "line 12: the coordinate nan is not a finite number");
+  EXPECT_SAYS(with("1 1 0", "1 1e400 0"), "line 12: the coordinate inf");
+  EXPECT_SAYS(with("1 1 0", "1 -1e39 0"), "beyond the range of float");
+  EXPECT_SAYS(with("1 1 0", "1 1 0 7"), "line 12: there are more values");
+  EXPECT_SAYS(with("1 1 0", "1 1,5 0"), "line 12: '1,5' stands where a number should");
+  EXPECT_SAYS(with("property float y", "property real y"), "the type 'real'");
+  EXPECT_SAYS(with("property float y\n", ""), "no element 'vertex' with x, y and z");
+  EXPECT_SAYS(with("vertex_indices", "something"), "no element 'face'");
+  EXPECT_SAYS(with("property float y", "property float x"), "comes twice");
+  EXPECT_SAYS(with("ascii", "ebcdic"), "'ebcdic'");
+  EXPECT_SAYS(with("end_header", "property x"), "needs a type and a name");
+  EXPECT_SAYS(with("ply", "plx"), "does not begin with 'ply'");
+  EXPECT_SAYS(with("element face 2", "element face 0"), "goes on behind the elements");
+}
+
+TEST(MeshFile, KeepsExtremeButFiniteCoordinates) {
+  std::string ply = kAsciiPly;
+  ply.replace(ply.find("1 1 0"), 5, "+1e30 1e-400 -1.4e-45");
+  const TriMesh mesh = parse("a.ply", ply);
+  EXPECT_EQ(mesh.positions[2], Imath::V3d(1e30f, 0, -0x1p-149));
+}
+
+// === OBJ
+
+TEST(MeshFile, ReadsObjInAllItsForms) {
+  const std::string text =
+      "\xEF\xBB\xBF# made by hand\r\nmtllib a.mtl\r\no thing\\\r\n\r\n"
+      "v 0 0 0\r\nv 1 0 0 0.5 0.5 0.5\r\n v\t1 \\\r\n 1 0 # corner\r\nv 0 1 0 1\r\n"
+      "vt 0 0\r\nvn 0 0 1\r\ns off\r\n"
+      "f 1 2 3\r\nf 1/1 2/1 3/1\r\nf 1//1 2//1 3//1\r\nf 1/1/1 2/1/1 3/1/1\r\n"
+      "f -4 -3 -2\r\nf 1 2 \\\r\n3\r\nf -1/-1/-1 1// 3/\r\nf 1 2\r\nf\r\n"
+      "f 1 2 3 4 # quad\r\nl 1 2\r\nf 1 2 3";
+  // Two of the first three vertices' pairs of vt and vn are others than the first.
+  const TriMesh whole = parse("a.obj", text), mesh = parse("a.obj", text, {.attributes = false});
+  ASSERT_EQ(whole.positions.size(), 4u + 3 * 2);
+  ASSERT_EQ(whole.triangles.size(), mesh.triangles.size());
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_EQ(whole.positions[whole.triangles[i][k]], mesh.positions[mesh.triangles[i][k]]) << i;
+  ASSERT_EQ(mesh.positions.size(), 4u);
+  EXPECT_EQ(mesh.positions[2], Imath::V3d(1, 1, 0));
+  ASSERT_EQ(mesh.triangles.size(), 10u);
+  for (const std::size_t i : {0, 1, 2, 3, 4, 5, 7, 9})
+    EXPECT_EQ(mesh.triangles[i], (std::array<std::uint32_t, 3>{0, 1, 2})) << i;
+  EXPECT_EQ(mesh.triangles[6], (std::array<std::uint32_t, 3>{3, 0, 2}));
+  EXPECT_EQ(mesh.triangles[8], (std::array<std::uint32_t, 3>{0, 2, 3}));
+}
+
+TEST(MeshFile, ReadsObjWithFacesFirstAndLongLines) {
+  EXPECT_EQ(parse("a.obj", "f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n").triangles.size(), 1u);
+  const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\n# " + std::string(3000000, 'x') + "\nf 1 2" +
+                          std::string(1000000, ' ') + "3\n";
+  EXPECT_EQ(parse("a.obj", obj).triangles.size(), 1u);
+}
+
+TEST(MeshFile, RefusesBrokenObj) {
+  const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 4\n"), "line 4: a face names vertex 3");
+  EXPECT_SAYS(refused("a.obj", vertices + "f 0 1 2\n"), "line 4: a face names vertex 0");
+  EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 -4\n"), "line 4: a face names vertex -4");
+  EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 99999999999\n"), "vertex 99999999998");
+  EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 9999999999999999999999\n"), "line 4");
+  EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 x\n"), "line 4: 'x' stands where the index");
+  EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 3.5\n"), "line 4");
+  EXPECT_SAYS(refused("a.obj", "v 0 0\n" + vertices + "f 1 2 3\n"),
+              "line 1: a coordinate is missing");
+  EXPECT_SAYS(refused("a.obj", "v 0 0 inf\n" + vertices + "f 1 2 3\n"),
+              "line 1: the coordinate inf");
+  EXPECT_SAYS(refused("a.obj", vertices), "3 vertices and no triangle");
+  EXPECT_SAYS(refused("a.obj", "hello\n"), "no triangle");
+  EXPECT_SAYS(refused("a.obj", std::string("v 0 0 0\n\0\1", 10)), "binary data");
+}
+
+TEST(MeshFile, TellsThePrecisionOfText) {
+  const std::string rest = "v 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  EXPECT_EQ(parse("a.obj", "v 0.5 0 0\n" + rest).precision, CoordinatePrecision::Float);
+  EXPECT_EQ(parse("a.obj", "v 0.1 0 0\n" + rest).precision, CoordinatePrecision::Double);
+}
+
+// === STL
+
+const std::string kAsciiStl =
+    "solid a thing\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n"
+    "   vertex 0 1 -0.0\n  endloop\n endfacet\n FACET NORMAL nan nan nan\n  OUTER LOOP\n"
+    "   VERTEX -0 -0 0\n   VERTEX 0 1 0\n   VERTEX 0 0 1\n  ENDLOOP\n ENDFACET\nendsolid a thing\n";
+
+std::string binaryStl(const std::string& header, const std::vector<std::array<float, 9>>& triangles,
+                      std::uint32_t promised) {
+  std::string stl = header;
+  stl.resize(80, '\0');
+  append(stl, promised, false);
+  for (const auto& triangle : triangles) {
+    stl.append(12, '\0');
+    for (const float number : triangle) append(stl, number, false);
+    stl.append(2, '\0');
+  }
+  return stl;
+}
+
+TEST(MeshFile, ReadsAsciiStl) {
+  const TriMesh mesh = parse("a.stl", kAsciiStl);
+  EXPECT_EQ(mesh.positions.size(), 4u);  // −0 is 0
+  EXPECT_EQ(mesh.triangles.size(), 2u);
+  EXPECT_FALSE(std::signbit(mesh.positions[2].z));
+  EXPECT_EQ(parse("a.stl", kAsciiStl + kAsciiStl).triangles.size(), 4u);
+}
+
+TEST(MeshFile, ReadsBinaryStlWhateverItsHeader) {
+  const std::array<float, 9> triangle = {0, 0, 0, 1, 0, 0, 0, 1, -0.f};
+  for (const std::string header : {"made by hand", "solid made by hand", "solid a\nfacet normal"}) {
+    const TriMesh mesh = parse("a.stl", binaryStl(header, {triangle, triangle}, 2));
+    EXPECT_EQ(mesh.positions.size(), 3u) << header;
+    EXPECT_EQ(mesh.triangles.size(), 2u) << header;
+    EXPECT_EQ(parse("a.stl", binaryStl(header, {triangle, triangle}, 2) + "\r\n").triangles.size(),
+              2u);
+    EXPECT_SAYS(refused("a.stl", binaryStl(header, {triangle, triangle}, 2) + "tail"),
+                "goes on behind the 2 triangles");
+    EXPECT_SAYS(refused("a.stl", binaryStl(header, {triangle, triangle}, 1)),
+                "goes on behind the 1 triangles that its header promises (it has room for 2)");
+  }
+}
+
+TEST(MeshFile, RefusesBrokenStl) {
+  const std::array<float, 9> triangle = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  EXPECT_SAYS(refused("a.stl", binaryStl("x", {triangle}, 2)), "promises 2 triangles and holds 1");
+  EXPECT_SAYS(refused("a.stl", binaryStl("solid", {triangle}, 4000000000u)), "promises 4000000000");
+  EXPECT_SAYS(refused("a.stl", binaryStl("x", {}, 0)), "no triangle");
+  EXPECT_SAYS(refused("a.stl", "short"), "neither text");
+  auto bad = triangle;
+  bad[4] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_SAYS(refused("a.stl", binaryStl("x", {triangle, bad}, 2)),
+              "triangle 1: the coordinate nan");
+  bad[4] = -std::numeric_limits<float>::infinity();
+  EXPECT_SAYS(refused("a.stl", binaryStl("x", {bad}, 1)), "triangle 0: the coordinate -inf");
+  for (std::size_t size = 1; size + 15 < kAsciiStl.size(); ++size)
+    ASSERT_FALSE(refused("a.stl", kAsciiStl.substr(0, size)).empty()) << size;
+  EXPECT_SAYS(refused("a.stl", "solid x\nfacette\n"), "line 2: 'facette' is no word");
+}
+
+// === OFF
+
+TEST(MeshFile, ReadsOff) {
+  const std::string body =
+      "# counts\n4 2 0\n0 0 0 # first\n1 0 0 255 0 0\n\n1 1 0\n0 1 0\n"
+      "3 0 1 2 0.5 0.5 0.5\n4 0 1 2 3\n";
+  for (const std::string keyword : {"OFF\n", "OFF ", "COFF\r\n", "NOFF\n", "STCNOFF\n"}) {
+    if (keyword.size() > 7) continue;
+    const TriMesh mesh = parse("a.off", keyword + body);
+    EXPECT_EQ(mesh.positions.size(), 4u) << keyword;
+    EXPECT_EQ(mesh.positions[2], Imath::V3d(1, 1, 0)) << keyword;
+    EXPECT_EQ(mesh.triangles.size(), 3u) << keyword;
+  }
+}
+
+TEST(MeshFile, RefusesBrokenOff) {
+  const std::string body = "\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  EXPECT_EQ(parse("a.off", "OFF" + body).triangles.size(), 1u);
+  EXPECT_SAYS(refused("a.off", "4OFF" + body), "another dimension");
+  EXPECT_SAYS(refused("a.off", "OFF BINARY" + body), "binary OFF");
+  EXPECT_SAYS(refused("a.off", body), "does not begin with 'OFF'");
+  EXPECT_SAYS(refused("a.off", "OFF\n3000000000 1 0\n0 0 0\n"), "promises 3000000000 vertices");
+  EXPECT_SAYS(refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"), "names vertex 3");
+  EXPECT_SAYS(refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 -1 2\n"), "whole number");
+  EXPECT_SAYS(refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1"), "the file ends");
+}
+
+// === Any format
+
+TEST(MeshFile, RefusesEmptyMissingAndUnreadable) {
+  const TemporaryFolder folder;
+  for (const std::string extension : {"ply", "obj", "stl", "off", "ply.gz"}) {
+    EXPECT_SAYS(refused("a." + extension, ""), "is empty") << extension;
+    const auto sentence = refusal<levelset::IoError>(
+        [&] { static_cast<void>(readMesh(folder / ("missing." + extension))); });
+    EXPECT_SAYS(sentence, "there is no file");
+  }
+  std::filesystem::create_directory(folder / "folder.ply");
+  EXPECT_SAYS(
+      refusal<levelset::IoError>([&] { static_cast<void>(readMesh(folder / "folder.ply")); }),
+      "is a directory");
+  EXPECT_THROW(static_cast<void>(readMesh(folder / "a.xyz")), levelset::UsageError);
+  EXPECT_THROW(static_cast<void>(readMesh("-")), levelset::UsageError);
+  EXPECT_THROW(static_cast<void>(parse("a.ply", kAsciiPly, {.format = "xyz"})),
+               levelset::UsageError);
+}
+
+TEST(MeshFile, ReadsByTheFormatGiven) {
+  EXPECT_EQ(parse("noname", kAsciiPly, {.format = "ply"}).triangles.size(), 2u);
+  EXPECT_EQ(parse("a.obj", kAsciiPly, {.format = "ply.gz"}).triangles.size(), 2u);
+}
+
+TEST(MeshFile, TellsFormatsByName) {
+  for (const char* name : {"x.ply", "x.PLY.gz", "ply", "dir.x/a.obj", "stl.gz", "a.b.off"})
+    EXPECT_TRUE(levelset::isMeshFormat(name)) << name;
+  for (const char* name : {"x.vdb", "x.ply.bz2", "", "x", "x.gz", "a.ply/x"})
+    EXPECT_FALSE(levelset::isMeshFormat(name)) << name;
+}
+
+std::string gzip(const std::string& text) {
+  const TemporaryFolder folder;
+  const gzFile file = gzopen((folder / "a.gz").c_str(), "wb");
+  EXPECT_EQ(gzwrite(file, text.data(), static_cast<unsigned>(text.size())),
+            static_cast<int>(text.size()));
+  gzclose(file);
+  return support::readText(folder / "a.gz");
+}
+
+TEST(MeshFile, RefusesDamagedCompression) {
+  const std::string whole = gzip(kAsciiPly);
+  EXPECT_EQ(parse("a.ply.gz", whole).triangles.size(), 2u);
+  EXPECT_EQ(parse("a.ply.gz", gzip(kAsciiPly.substr(0, 50)) + gzip(kAsciiPly.substr(50)))
+                .triangles.size(),
+            2u);
+  EXPECT_EQ(parse("a.ply.gz", whole + std::string(512, '\0')).triangles.size(), 2u);
+  for (std::size_t size = 2; size < whole.size(); ++size)
+    ASSERT_PRED2(says, refused("a.ply.gz", whole.substr(0, size)), "compressed data");
+  std::string damaged = whole;
+  damaged[whole.size() - 6] = static_cast<char>(damaged[whole.size() - 6] ^ 1);  // the checksum
+  EXPECT_SAYS(refused("a.ply.gz", damaged), "is damaged");
+}
+
+TEST(MeshFile, EndsAGzipBombAtTheMemoryLimit) {
+  const std::string bomb = gzip(std::string(64 << 20, '\n'));
+  EXPECT_LT(bomb.size(), 100000u);
+  const auto sentence = refusal<levelset::ResourceLimit>(
+      [&] { static_cast<void>(parse("a.obj.gz", bomb, {.maxMemory = 16 << 20})); });
+  EXPECT_SAYS(sentence, "when decompressed passes the memory limit");
+}
+
+TEST(MeshFile, KeepsToTheMemoryLimit) {
+  std::string obj;
+  for (int i = 0; i < 200000; ++i) obj += "v 0 0 0\n";
+  obj += "f 1 2 3\n";
+  EXPECT_EQ(parse("a.obj", obj).positions.size(), 200000u);
+  EXPECT_THROW(static_cast<void>(parse("a.obj", obj, {.maxMemory = 3000000})),
+               levelset::ResourceLimit);
+  EXPECT_THROW(static_cast<void>(parse("a.obj", obj, {.maxMemory = 1000})),
+               levelset::ResourceLimit);
+}
+
+TEST(MeshFile, ReportsProgressAndCancels) {
+  std::string obj;
+  for (int i = 0; i < 300000; ++i) obj += "v 0 0 0\n";
+  obj += "f 1 2 3\n";
+  std::vector<double> seen;
+  static_cast<void>(parse("a.obj", obj, {.progress = [&](double fraction) {
+                            seen.push_back(fraction);
+                            return true;
+                          }}));
+  EXPECT_GE(seen.size(), 5u);
+  EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end()));
+  EXPECT_EQ(seen.back(), 1);
+  EXPECT_THROW(
+      static_cast<void>(parse("a.obj", obj, {.progress = [](double f) { return f < 0.5; }})),
+      levelset::Cancelled);
+}
+
+TEST(MeshFile, TellsWhatHeadersSay) {
+  const TemporaryFolder folder;
+  const auto info = [&](const std::string& name) { return levelset::meshFileInfo(folder / name); };
+  for (const std::string name : {"a.ply", "a.ply.gz", "a.stl", "a.obj", "a.off"})
+    levelset::writeMesh(folder / name, tetrahedron());
+  EXPECT_EQ(info("a.ply").format, "ply, binary little endian");
+  EXPECT_EQ(info("a.ply.gz").vertices, 4u);
+  EXPECT_EQ(info("a.stl").format, "stl, binary");
+  EXPECT_EQ(info("a.stl").faces, 4u);
+  EXPECT_EQ(info("a.off").vertices, 4u);
+  EXPECT_EQ(info("a.obj").vertices, 0u);
+  EXPECT_THROW(static_cast<void>(info("missing.ply")), levelset::IoError);
+}
+
+TEST(MeshFile, StepsOverControlCharacters) {
+  const auto mesh = support::parse("a.obj", "v 0 0 0 \x02\nv 1 0 0\nv 0 1 0 \\ \nf 1 2 3 \x01\n",
+                                   {.attributes = false});
+  EXPECT_EQ(mesh.positions.size(), 3u);
+  EXPECT_EQ(mesh.triangles.size(), 1u);
+}
+
+TEST(MeshFile, NamesTheFaceThatGoesAstray) {
+  const std::string header =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar x\nproperty uchar y\n"
+      "property uchar z\nelement face 1\nproperty list uchar uchar vertex_indices\nend_header\n";
+  const auto sentence = refusal<levelset::InvalidInput>(
+      [&] { (void)parse("a.ply", header + std::string("\0\0\0\3\0\0\7", 7)); });
+  EXPECT_SAYS(sentence, "face 0: a face names vertex 7");
+}
+
+TEST(MeshFile, RefusesWhatItsSeamsHeldOpen) {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
+      "z\n"
+      "property float s\nproperty float t\nelement face 1\n"
+      "property list uchar int vertex_indices\nend_header\n";
+  const auto sentence = refusal<levelset::InvalidInput>([&] {
+    (void)parse("a.ply", header + "1 0 0 0 0\n1 0 0 0 1\n1 0 0 1 1\n3 0 1 2\n",
+                {.attributes = false});
+  });
+  EXPECT_SAYS(sentence, "none is left");
+}
+
+TEST(MeshFile, SaysThatTheDiskIsFull) {
+  const auto sentence = refusal<levelset::IoError>(
+      [] { levelset::writeMesh("/dev/full", tetrahedron(), {.format = "ply"}); });
+  EXPECT_SAYS(sentence, "No space left");
+  const TemporaryFolder folder;
+  EXPECT_THROW(levelset::writeMesh(folder / "missing/a.ply", tetrahedron()), levelset::IoError);
+  EXPECT_THROW(levelset::writeMesh(folder / "a.xyz", tetrahedron()), levelset::UsageError);
+}
+
+}  // namespace mesh_file_test

@@ -1,0 +1,270 @@
+#include "mapping/placement/decal.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "levelset/error.h"
+#include "levelset/solids/shapes.h"
+#include "mapping/maps/shell_map.h"
+#include "mapping/placement/make_patch.h"
+#include "mapping/surface/surface_walk.h"
+#include "tests/support/files.h"
+#include "tests/support/patches.h"
+#include "tests/support/threads.h"
+
+namespace decal_test {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+using mapping::LevelScheme;
+using mapping::makeDecal;
+using mapping::ParticleLevel;
+using mapping::PatchOptions;
+using mapping::PatchResult;
+
+constexpr double kPi = std::numbers::pi;
+const PatchOptions kThin = {.levels = 2, .scheme = LevelScheme::Conforming};
+
+/// −1 … 1.
+double shareOf(std::size_t i, std::size_t count) {
+  return 2 * static_cast<double>(i) / static_cast<double>(count - 1) - 1;
+}
+
+/// Calls visit(u, v, position), u and v from −radius to radius.
+template <typename Visit>
+void forEachParticle(const ParticleLevel& level, double radius, const Visit& visit) {
+  for (std::size_t j = 0; j < level.rows; ++j)
+    for (std::size_t i = 0; i < level.columns; ++i)
+      visit(radius * shareOf(i, level.columns), radius * shareOf(j, level.rows), level.at(i, j));
+}
+
+NarrowBand slab(double voxel = 0.1) {
+  return support::sampleBand([](const V3d& p) { return p.z; }, {V3d(-2, -2, -0.4), V3d(2, 2, 0.4)},
+                             voxel, 6);
+}
+
+TEST(Decal, IsTheIdentityOnAPlane) {
+  const PatchResult result = makeDecal(slab(), V3d(0.2, -0.1, 0.3), V3d(3, 4, 7), 0.7, 0.3,
+                                       {.levels = 3, .scheme = LevelScheme::Conforming});
+  for (const ParticleLevel& level : result.patch.levels)
+    forEachParticle(level, 0.7, [&](double u, double v, const V3d& p) {
+      const V3d exact = V3d(0.2, -0.1, level.height) + V3d(0.6, 0.8, 0) * u + V3d(-0.8, 0.6, 0) * v;
+      EXPECT_LT((p - exact).length(), 1e-5);
+    });
+  EXPECT_NEAR(result.report.uLength, 1.4, 1e-12);
+  EXPECT_FALSE(result.patch.mirrored);
+}
+
+TEST(Decal, KeepsDistancesAndAnglesOnASphere) {
+  // Up to 115 degrees from the centre, in the corners.
+  for (const double voxel : {0.1, 0.05}) {
+    const NarrowBand ball = support::makeBall(1, voxel);
+    const V3d at = V3d(1, 2, 2) / 3.0, direction(1, 0.5, -1);  // at right angles
+    const double radius = 1.42;
+    const PatchResult result = makeDecal(ball, at, direction, radius, 0.2, kThin);
+    const V3d u = direction.normalized(), v = at.cross(u);
+    double distance = 0, angle = 0;
+    forEachParticle(result.patch.levels.front(), radius, [&](double x, double y, const V3d& p) {
+      const double length = std::hypot(x, y);
+      if (length < 1e-9) return;
+      distance = std::max(distance, std::abs(std::acos(p.dot(at)) / length - 1));
+      const V3d exact = at * std::cos(length) + (u * x + v * y) * (std::sin(length) / length);
+      angle = std::max(angle, std::acos(std::min(1.0, p.dot(exact) / p.length())) / length);
+    });
+    EXPECT_LT(distance, 0.005 * voxel * voxel / 0.01) << voxel;  // second order
+    EXPECT_LT(angle, 0.005 * voxel * voxel / 0.01) << voxel;
+  }
+}
+
+TEST(Decal, UnrollsACylinder) {
+  const NarrowBand pipe = support::sampleBand([](const V3d& p) { return std::hypot(p.x, p.y) - 1; },
+                                              {V3d(-1, -1, -4), V3d(1, 1, 4)}, 0.1);
+  const double c = std::cos(0.3), s = std::sin(0.3);
+  const PatchResult result = makeDecal(pipe, V3d(1, 0, 0), V3d(0.4, c, s), 2.2, 0.2, kThin);
+  forEachParticle(result.patch.levels.front(), 2.2, [&](double u, double v, const V3d& p) {
+    const double around = u * c - v * s, along = u * s + v * c;
+    EXPECT_LT((p - V3d(std::cos(around), std::sin(around), along)).length(), 0.005);
+  });
+}
+
+TEST(Decal, UnfoldsAnEdge) {
+  // A roof with a right angle along y: beyond the edge the plane goes on as if it were flat.
+  const NarrowBand roof = support::sampleBand(
+      [](const V3d& p) { return std::max(p.x + p.z, p.z - p.x) * std::sqrt(0.5); },
+      {V3d(-2), V3d(2)}, 0.05);
+  const double h = std::sqrt(0.5), away = 0.4, radius = 0.8;
+  const V3d at(-away * h, 0, -away * h), up(h, 0, h);
+  const double c = std::cos(0.5), s = std::sin(0.5);
+  const PatchResult result =
+      makeDecal(roof, at, up * c + V3d(0, s, 0), radius, 0.2,
+                {.levels = 2, .scheme = LevelScheme::Spline, .spacing = 0.1});
+  double worst = 0;
+  forEachParticle(result.patch.levels.front(), radius, [&](double u, double v, const V3d& p) {
+    const double across = u * c - v * s, along = u * s + v * c;
+    const double beyond = across - away;
+    V3d exact = at + up * across + V3d(0, along, 0);
+    if (beyond > 0) exact = at + up * away + V3d(h, 0, -h) * beyond + V3d(0, along, 0);
+    worst = std::max(worst, (p - exact).length());
+  });
+  EXPECT_LT(worst, 0.25 * 0.05);
+}
+
+TEST(Decal, CarriesItsFrameByTheLeastTurn) {
+  // Around a right-angled corner of a box the angles of the faces are kept.
+  const V3d x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
+  const double c = std::cos(0.4), s = std::sin(0.4);
+  const V3d over = mapping::carried(x * c + y * s, z, x);
+  EXPECT_LT((over - (-z * c + y * s)).length(), 1e-12);
+  EXPECT_LT((mapping::carried(x, z, z) - x).length(), 1e-12);
+}
+
+TEST(Decal, LevelsOfReducedDistortionGrowWithTheSurface) {
+  const NarrowBand ball = support::makeBall(1, 0.05, 16);
+  const PatchResult result = makeDecal(ball, V3d(0, 0, 1), V3d(1, 0, 0), 0.6, 0.5, {.levels = 3});
+  ASSERT_EQ(result.patch.levels.size(), 3u);
+  for (const ParticleLevel& level : result.patch.levels) {
+    EXPECT_NEAR(level.height, 0.5 * level.w, 1e-12);
+    const double r = 1 + level.height;
+    forEachParticle(level, 0.6 * r, [&](double u, double v, const V3d& p) {
+      const double length = std::hypot(u, v);
+      EXPECT_NEAR(p.length(), r, 0.01 * 0.05);
+      EXPECT_NEAR(std::acos(std::min(1.0, p.z / p.length())) * r, length, 0.003 * r);
+    });
+  }
+}
+
+TEST(Decal, MirroredRunsTheOtherWayRound) {
+  PatchOptions options = kThin;
+  const PatchResult straight = makeDecal(slab(), V3d(0), V3d(1, 0, 0), 0.6, 0.3, options);
+  options.mirror = true;
+  const PatchResult mirrored = makeDecal(slab(), V3d(0), V3d(1, 0, 0), 0.6, 0.3, options);
+  EXPECT_TRUE(mirrored.patch.mirrored);
+  const ParticleLevel &a = straight.patch.levels[0], &b = mirrored.patch.levels[0];
+  EXPECT_LT((a.at(0, 0) - b.at(0, b.rows - 1)).length(), 1e-9);
+}
+
+TEST(Decal, CarriesMapsLikeAnyPatch) {
+  const PatchResult result = makeDecal(support::makeBall(1, 0.05, 12), V3d(0, 0, 1), V3d(1, 0, 0),
+                                       0.5, 0.3, {.levels = 4, .spacing = 0.1});
+  const mapping::ShellMap map(result.patch, {});
+  const ParticleLevel& level = result.patch.levels[1];
+  forEachParticle(level, 1, [&](double u, double v, const V3d& p) {
+    if (std::max(std::abs(u), std::abs(v)) > 0.99) return;  // the border belongs to two cells
+    EXPECT_LT((map(p) - V3d((u + 1) / 2, (v + 1) / 2, level.w)).length(), 1e-6);
+  });
+}
+
+TEST(Decal, GivesTheSameBitsForAnyNumberOfThreads) {
+  const NarrowBand ball = support::makeBall(1, 0.1);
+  const auto make = [&] { return makeDecal(ball, V3d(0, 0, 1), V3d(1, 1, 0), 0.8, 0.2, kThin); };
+  const PatchResult many = support::onThreads(8, make);
+  const PatchResult one = support::onThreads(1, make);
+  EXPECT_EQ(many.patch.levels[1].positions, one.patch.levels[1].positions);
+  EXPECT_EQ(many.patch.levels[1].rim, one.patch.levels[1].rim);
+}
+
+TEST(Decal, LiesFarFromTheOriginAsItDoesThere) {
+  const V3d away(1e6, -1e6, 1e6);
+  const NarrowBand near = levelset::makeSphere(10, V3d(0), 1),
+                   far = levelset::makeSphere(10, away, 1);
+  const ParticleLevel a = makeDecal(near, V3d(0, 0, 10), V3d(1, 0, 0), 9, 2, kThin).patch.levels[0];
+  const ParticleLevel b =
+      makeDecal(far, away + V3d(0, 0, 10), V3d(1, 0, 0), 9, 2, kThin).patch.levels[0];
+  ASSERT_EQ(a.positions.size(), b.positions.size());
+  for (std::size_t n = 0; n < a.positions.size(); ++n)
+    EXPECT_LT((b.positions[n] - away - a.positions[n]).length(), 1e-5);
+}
+
+TEST(Decal, RefusesADirectionAlongTheNormal) {
+  const NarrowBand band = slab();
+  EXPECT_THROW((void)makeDecal(band, V3d(0), V3d(0, 0, 1), 0.5, 0.2), levelset::UsageError);
+  EXPECT_THROW((void)makeDecal(band, V3d(0), V3d(0.01, 0, -1), 0.5, 0.2), levelset::UsageError);
+  EXPECT_THROW((void)makeDecal(band, V3d(0), V3d(0), 0.5, 0.2), levelset::UsageError);
+  EXPECT_THROW((void)makeDecal(band, V3d(0), V3d(NAN, 1, 0), 0.5, 0.2), levelset::UsageError);
+  EXPECT_THROW((void)makeDecal(band, V3d(NAN), V3d(1, 0, 0), 0.5, 0.2), levelset::UsageError);
+}
+
+TEST(Decal, RefusesLengthsThatMakeNone) {
+  const NarrowBand band = slab();
+  const V3d x(1, 0, 0);
+  for (const double bad : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
+    EXPECT_THROW((void)makeDecal(band, V3d(0), x, bad, 0.2), levelset::UsageError);
+    EXPECT_THROW((void)makeDecal(band, V3d(0), x, 0.5, bad), levelset::UsageError);
+  }
+  EXPECT_THROW((void)makeDecal(band, V3d(0), x, 0.15, 0.2), levelset::InvalidInput);
+  EXPECT_THROW((void)makeDecal(band, V3d(0), x, 1e3, 0.2), levelset::InvalidInput);
+  EXPECT_THROW((void)makeDecal(NarrowBand(), V3d(0), x, 0.5, 0.2), levelset::InvalidInput);
+  EXPECT_THROW((void)makeDecal(band, V3d(0), x, 0.5, 0.2, {.spacing = 1e-5}),
+               levelset::ResourceLimit);
+}
+
+/// The radius that a refusal names last.
+double advisedRadius(const std::string& message) {
+  const std::string words = "take a radius below ";
+  const std::size_t at = message.rfind(words);
+  return at == std::string::npos ? 0 : std::stod(message.substr(at + words.size()));
+}
+
+TEST(Decal, RefusesToGoBeyondTheCutLocus) {
+  // On a ball the ways from a pole meet at the other one, half a circle away.
+  PatchOptions options = kThin;
+  options.spacing = 0.2;
+  const NarrowBand ball = support::makeBall(1, 0.1);
+  const V3d z(0, 0, 1), x(1, 0, 0);
+  EXPECT_NO_THROW((void)makeDecal(ball, z, x, 2.0, 0.1, options));
+  const std::string fold =
+      support::refusal<levelset::Error>([&] { (void)makeDecal(ball, z, x, 2.6, 0.1, options); });
+  EXPECT_GT(advisedRadius(fold), 1.5) << fold;
+  EXPECT_NO_THROW((void)makeDecal(ball, z, x, 0.99 * advisedRadius(fold), 0.1, options)) << fold;
+
+  // On a pipe they do not cross, but come round.
+  const NarrowBand pipe = support::sampleBand([](const V3d& p) { return std::hypot(p.x, p.y) - 1; },
+                                              {V3d(-1, -1, -5), V3d(1, 1, 5)}, 0.1);
+  EXPECT_NO_THROW((void)makeDecal(pipe, x, V3d(0, 1, 0), 0.93 * kPi, 0.1, options));
+  const std::string round = support::refusal<levelset::Error>(
+      [&] { (void)makeDecal(pipe, x, V3d(0, 1, 0), 1.15 * kPi, 0.1, options); });
+  EXPECT_NE(round.find("comes round to itself"), std::string::npos) << round;
+  EXPECT_GT(advisedRadius(round), 0.75 * kPi) << round;
+  EXPECT_NO_THROW((void)makeDecal(pipe, x, V3d(0, 1, 0), 0.99 * advisedRadius(round), 0.1, options))
+      << round;
+}
+
+TEST(Decal, RefusesToRunOffTheSurface) {
+  const NarrowBand band = slab();  // ends at x, y = ±2 and some voxels
+  const std::string message = support::refusal<levelset::Error>(
+      [&] { (void)makeDecal(band, V3d(0), V3d(1, 0, 0), 3, 0.2, kThin); });
+  EXPECT_NE(message.find("breaks off"), std::string::npos) << message;
+  const double advised = advisedRadius(message);
+  EXPECT_GT(advised, 1.5) << message;
+  EXPECT_LT(advised, 2.9) << message;
+  EXPECT_NO_THROW((void)makeDecal(band, V3d(0), V3d(1, 0, 0), 0.95 * advised, 0.2, kThin));
+}
+
+TEST(Decal, GoesAroundAnEarThatItsParticlesResolve) {
+  // A plate of thickness 6 voxels with a round edge, the centre 0.4 from where the edge begins.
+  const double voxel = 0.05, half = 0.15;
+  const NarrowBand plate = support::sampleBand(
+      [=](const V3d& p) {
+        const V3d q(std::max(0.0, p.x - 1), 0, p.z);
+        return q.length() - half;
+      },
+      {V3d(-2, -1.5, -half), V3d(1.2, 1.5, half)}, voxel);
+  const V3d at(0.6, 0, half), x(1, 0, 0);
+  const PatchResult fine = makeDecal(
+      plate, at, x, 1.2, 0.05, {.levels = 2, .scheme = LevelScheme::Conforming, .spacing = 0.06});
+  const ParticleLevel& level = fine.patch.levels.front();
+  const V3d end = level.at(level.columns - 1, level.rows / 2);
+  // 0.4 to the edge, half a circle around it, the rest back below.
+  EXPECT_NEAR(end.z, -half, 0.01);
+  EXPECT_NEAR(end.x, 1 - (1.2 - 0.4 - kPi * half), 0.01);
+  const std::string coarse = support::refusal<levelset::Error>([&] {
+    (void)makeDecal(plate, at, x, 1, 0.05,
+                    {.levels = 2, .scheme = LevelScheme::Conforming, .spacing = 0.5});
+  });
+  EXPECT_NE(coarse.find("thinner than its particles are apart"), std::string::npos) << coarse;
+}
+
+}  // namespace decal_test

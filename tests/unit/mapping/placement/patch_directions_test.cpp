@@ -1,0 +1,116 @@
+// Corners that rise in directions of their own [Brodersen07 fig. 8.4].
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "levelset/error.h"
+#include "mapping/placement/make_patch.h"
+#include "tests/support/files.h"
+#include "tests/support/patches.h"
+
+namespace patch_directions_test {
+
+using Imath::V3d;
+using levelset::UsageError;
+using mapping::LevelScheme;
+using mapping::makePatch;
+using mapping::ParticleLevel;
+using mapping::Patch;
+using mapping::PatchOptions;
+
+constexpr double kVoxel = 0.05, kHeight = 0.4;
+
+levelset::NarrowBand ball() {
+  return support::makeBall(1, kVoxel);
+}
+
+std::array<V3d, 4> corners() {
+  const double side = 0.5, up = std::sqrt(1 - 2 * side * side);
+  return support::square(side, up);
+}
+
+std::array<V3d, 4> cornersOf(const ParticleLevel& level) {
+  return {level.at(0, 0), level.at(level.columns - 1, 0),
+          level.at(level.columns - 1, level.rows - 1), level.at(0, level.rows - 1)};
+}
+
+void expectCornersRise(const Patch& patch, const std::array<V3d, 4>& directions) {
+  for (const ParticleLevel& level : patch.levels) {
+    const std::array<V3d, 4> at = cornersOf(level);
+    for (std::size_t i = 0; i < 4; ++i) {
+      EXPECT_NEAR(at[i].length(), 1 + level.height, 2e-3 * kHeight) << i;
+      const V3d way = at[i] - patch.corners[i], unit = directions[i].normalized();
+      EXPECT_LE((way - unit * way.dot(unit)).length(), 1e-4) << i << " at " << level.height;
+    }
+  }
+}
+
+TEST(PatchDirections, ParallelCornersRiseAlongTheMiddlesNormal) {
+  const Patch patch = makePatch(ball(), corners(), kHeight, {.parallel = true}).patch;
+  const V3d up(0, 0, 1);
+  expectCornersRise(patch, {up, up, up, up});
+  // The levels do not spread: their corners stay above each other, where by themselves they would
+  // be 1.4 times as far apart.
+  const Patch spread = makePatch(ball(), corners(), kHeight).patch;
+  const auto width = [](const Patch& p) {
+    const std::array<V3d, 4> at = cornersOf(p.levels.back());
+    return (at[1] - at[0]).length();
+  };
+  EXPECT_NEAR(width(patch), 1, 2e-3);
+  EXPECT_NEAR(width(spread), 1 + kHeight, 2e-3);
+}
+
+TEST(PatchDirections, OneForAllAndOneEach) {
+  const V3d leaning(0.3, -0.1, 1);
+  expectCornersRise(makePatch(ball(), corners(), kHeight, {.directions = {leaning}}).patch,
+                    {leaning, leaning, leaning, leaning});
+  const std::array<V3d, 4> own = {V3d(-0.2, 0, 1), V3d(1, -1, 1), V3d(0.4, 0.6, 0.7),
+                                  V3d(0, 0.2, 2)};
+  expectCornersRise(
+      makePatch(ball(), corners(), kHeight, {.directions = {own[0], own[1], own[2], own[3]}}).patch,
+      own);
+}
+
+TEST(PatchDirections, ShearAPlane) {
+  const levelset::NarrowBand plane = support::sampleBand([](const V3d& p) { return p.z; },
+                                                         {V3d(-2, -2, -0.5), V3d(2, 2, 0.5)}, 0.1);
+  const Patch patch =
+      makePatch(plane, support::square(0.5), 0.8, {.directions = {V3d(0.5, 0, 1)}}).patch;
+  const ParticleLevel& ground = patch.levels.front();
+  for (const ParticleLevel& level : patch.levels) {
+    ASSERT_EQ(level.columns, ground.columns);
+    for (std::size_t n = 0; n < level.positions.size(); ++n)
+      EXPECT_LE((level.positions[n] - ground.positions[n] - V3d(0.5, 0, 1) * level.height).length(),
+                2e-3);
+  }
+}
+
+TEST(PatchDirections, TakePointsOnTheSidesAlong) {
+  PatchOptions options{.parallel = true};
+  options.sides[0] = {V3d(0, -0.75, std::sqrt(1 - 0.75 * 0.75))};
+  const Patch patch = makePatch(ball(), corners(), kHeight, options).patch;
+  const ParticleLevel& top = patch.levels.back();
+  double nearest = HUGE_VAL;
+  for (std::size_t i = 0; i < top.columns; ++i)
+    nearest = std::min(nearest, std::hypot(top.at(i, 0).x, top.at(i, 0).y + 0.75));
+  EXPECT_LE(nearest, patch.spacing);
+}
+
+TEST(PatchDirections, RefuseWhatLeadsNowhere) {
+  const auto refusal = [](const PatchOptions& options) {
+    return support::refusal<UsageError>(
+        [&] { (void)makePatch(ball(), corners(), kHeight, options); });
+  };
+  EXPECT_NE(refusal({.directions = {V3d(0)}}).find("leads nowhere"), std::string::npos);
+  EXPECT_NE(refusal({.directions = {V3d(0, NAN, 1)}}).find("leads nowhere"), std::string::npos);
+  EXPECT_NE(refusal({.directions = {V3d(1, 0, 0)}}).find("at corner 0"), std::string::npos);
+  EXPECT_NE(refusal({.directions = {V3d(0, 0, 1), V3d(0, 0, 1)}}).find("four"), std::string::npos);
+  EXPECT_NE(refusal({.directions = {V3d(0, 0, 1)}, .parallel = true}).find("choose one"),
+            std::string::npos);
+  EXPECT_NE(refusal({.scheme = LevelScheme::Conforming, .parallel = true}).find("reduced"),
+            std::string::npos);
+}
+
+}  // namespace patch_directions_test

@@ -1,0 +1,294 @@
+#include "mapping/placement/make_patch.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "levelset/error.h"
+#include "mapping/surface/geodesic.h"
+#include "tests/support/files.h"
+#include "tests/support/patches.h"
+
+namespace patch_test {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+using mapping::makePatch;
+using mapping::ParticleLevel;
+using mapping::PatchResult;
+using support::cap;
+
+constexpr double kVoxel = 0.05;
+
+/// Distances as far as `reach` in all of the box: what redistance makes for patch space.
+NarrowBand wideBand(const std::function<double(const V3d&)>& phi, const Imath::Box3d& box,
+                    double reach, double voxel = kVoxel) {
+  return support::sampleBand(phi, box, voxel, reach / voxel);
+}
+
+NarrowBand sphere(double reach = 0.8) {
+  return wideBand([](const V3d& p) { return p.length() - 1; }, {V3d(-1), V3d(1)}, reach);
+}
+
+NarrowBand slab(double reach = 1) {
+  return wideBand([](const V3d& p) { return p.z; }, {V3d(-2, -2, -0.5), V3d(2, 2, 0.5)}, reach,
+                  0.1);
+}
+
+TEST(Patch, IsALatticeOnAPlane) {
+  const PatchResult result =
+      makePatch(slab(), {V3d(-1, -0.5, 0), V3d(1, -0.5, 0), V3d(1, 0.5, 0), V3d(-1, 0.5, 0)}, 0.6,
+                {.levels = 4});
+  ASSERT_EQ(result.patch.levels.size(), 4u);
+  for (const ParticleLevel& level : result.patch.levels) {
+    EXPECT_NEAR(level.height, 0.6 * level.w, 1e-12);
+    for (std::size_t j = 0; j < level.rows; ++j)
+      for (std::size_t i = 0; i < level.columns; ++i) {
+        const V3d p = level.at(i, j);
+        EXPECT_NEAR(p.x, -1 + 2.0 * static_cast<double>(i) / static_cast<double>(level.columns - 1),
+                    1e-4 * 0.1);
+        EXPECT_NEAR(p.y, -0.5 + static_cast<double>(j) / static_cast<double>(level.rows - 1),
+                    1e-4 * 0.1);
+        EXPECT_NEAR(p.z, level.height, 1e-4 * 0.1);
+      }
+  }
+  EXPECT_NEAR(result.report.uLength, 2, 1e-5);
+  EXPECT_NEAR(result.report.vLength, 1, 1e-5);
+  EXPECT_LT(result.report.cellAreaVariation, 1e-4);
+  EXPECT_TRUE(result.report.isRelaxed);
+  EXPECT_LE(result.patch.particleCount(), 2600u);
+}
+
+/// All four sides of a level about a ball's centre, in steps of one length.
+void expectEvenGreatCircles(const ParticleLevel& level) {
+  std::array<std::vector<V3d>, 4> sides;
+  for (std::size_t i = 0; i < level.columns; ++i) {
+    sides[0].push_back(level.at(i, 0));
+    sides[1].push_back(level.at(i, level.rows - 1));
+  }
+  for (std::size_t j = 0; j < level.rows; ++j) {
+    sides[2].push_back(level.at(0, j));
+    sides[3].push_back(level.at(level.columns - 1, j));
+  }
+  for (const std::vector<V3d>& side : sides) {
+    const V3d pole = side.front().cross(side.back()).normalized();
+    double least = HUGE_VAL, largest = 0;
+    for (std::size_t n = 0; n < side.size(); ++n) {
+      EXPECT_NEAR(side[n].dot(pole), 0, 0.02 * kVoxel) << "level " << level.w;
+      if (n == 0) continue;
+      const V3d a = side[n - 1].normalized(), b = side[n].normalized();
+      const double step = std::atan2(a.cross(b).length(), a.dot(b));
+      least = std::min(least, step), largest = std::max(largest, step);
+    }
+    EXPECT_GE(least, 0.99 * largest) << "level " << level.w;
+  }
+}
+
+TEST(Patch, LevelsOnASphereAreConcentricAndSymmetric) {
+  const PatchResult result = makePatch(sphere(), cap(0.6), 0.5, {.levels = 4, .spacing = 0.09});
+  EXPECT_FALSE(result.patch.mirrored);
+  for (const ParticleLevel& level : result.patch.levels) {
+    ASSERT_EQ(level.rows, level.columns);  // a quarter turn maps the grid to itself
+    for (std::size_t j = 0; j < level.rows; ++j)
+      for (std::size_t i = 0; i < level.columns; ++i) {
+        const V3d p = level.at(i, j);
+        EXPECT_NEAR(p.length() - 1, level.height, 0.01 * kVoxel);
+        const V3d mirrored = level.at(level.columns - 1 - i, j);
+        EXPECT_LT((p - V3d(-mirrored.x, mirrored.y, mirrored.z)).length(), 0.05 * kVoxel);
+        const V3d turned = level.at(level.rows - 1 - j, i);
+        EXPECT_LT((p - V3d(turned.y, -turned.x, turned.z)).length(), 0.05 * kVoxel);
+      }
+    expectEvenGreatCircles(level);
+  }
+  const double angle = std::acos(V3d(cap(0.6)[0]).dot(cap(0.6)[1]));
+  EXPECT_NEAR(result.report.uLength, angle, 1e-3 * angle);
+  EXPECT_NEAR(result.report.vLength, angle, 1e-3 * angle);
+}
+
+TEST(Patch, RelaxationMakesCellsEven) {
+  const PatchResult result = makePatch(sphere(), cap(0.7), 0.3, {.levels = 2, .spacing = 0.08});
+  EXPECT_TRUE(result.report.isRelaxed);
+  EXPECT_LT(result.report.cellAreaVariation, 0.12);
+}
+
+TEST(Patch, KeepsDensityFromLevelToLevel) {
+  const PatchResult result = makePatch(sphere(), cap(0.6), 0.6, {.levels = 3, .spacing = 0.08});
+  const ParticleLevel &low = result.patch.levels.front(), &high = result.patch.levels.back();
+  EXPECT_GT(high.columns, low.columns);
+  EXPECT_NEAR(static_cast<double>(high.columns - 1) / static_cast<double>(low.columns - 1), 1.6,
+              0.15);
+  EXPECT_NEAR(result.patch.spacing, 0.08, 0.01);
+}
+
+TEST(Patch, SidesRunOverAnEdge) {
+  // Two corners on top of a box, two on its side: the sides go over the edge, not through the box.
+  const auto box = [](const V3d& p) {
+    const V3d d(std::abs(p.x) - 1, std::abs(p.y) - 1, std::abs(p.z) - 1);
+    const V3d out(std::max(d.x, 0.0), std::max(d.y, 0.0), std::max(d.z, 0.0));
+    return out.length() + std::min(std::max({d.x, d.y, d.z}), 0.0);
+  };
+  const NarrowBand band = wideBand(box, {V3d(-1), V3d(1)}, 0.7);
+  const PatchResult result =
+      makePatch(band, {V3d(-0.5, -0.4, 1), V3d(1, -0.4, 0.5), V3d(1, 0.4, 0.5), V3d(-0.5, 0.4, 1)},
+                0.3, {.levels = 3, .spacing = 0.1});
+  EXPECT_NEAR(result.report.uLength, 2, 0.05);
+  EXPECT_NEAR(result.report.vLength, 0.8, 0.01);
+  // A tricubic's zero set has a bead 0.1012 voxel high along an edge.
+  for (const V3d& p : result.patch.levels.front().positions)
+    EXPECT_LT(std::abs(box(p)), 0.1015 * kVoxel);
+}
+
+TEST(Patch, ProjectsCornersFromFarAway) {
+  // Three voxels of band; the corners are given twelve voxels off.
+  const NarrowBand thin = sphere(3 * kVoxel);
+  const V3d far(0.2, 0.3, 1.5);
+  const auto corners = mapping::cornersAround(thin, far, 0.3, 0.2);
+  V3d middle(0);
+  for (const V3d& c : corners) {
+    EXPECT_NEAR(c.length(), 1, 0.02 * kVoxel);
+    middle += c * 0.25;
+  }
+  EXPECT_LT((middle.normalized() - far.normalized()).length(), 0.05 * kVoxel);
+  EXPECT_THROW((void)mapping::cornersAround(thin, V3d(0, 0, 9), 0.3, 0.2), levelset::InvalidInput);
+}
+
+TEST(Patch, CornersAroundAPointHaveTheSizeAsked) {
+  const NarrowBand band = slab(0.3);
+  const auto straight = mapping::cornersAround(band, V3d(0.1, 0.2, 0.05), 1, 0.6);
+  EXPECT_LT((straight[0] - V3d(-0.4, -0.1, 0)).length(), 1e-3 * 0.1);
+  EXPECT_LT((straight[2] - V3d(0.6, 0.5, 0)).length(), 1e-3 * 0.1);
+  const auto turned =
+      mapping::cornersAround(band, V3d(0.1, 0.2, 0.05), 1, 0.6, std::acos(-1.0) / 2);
+  EXPECT_LT((turned[0] - V3d(0.4, -0.3, 0)).length(), 1e-3 * 0.1);
+  EXPECT_THROW((void)mapping::cornersAround(band, V3d(0), 0, 1), levelset::UsageError);
+  EXPECT_THROW((void)mapping::cornersAround(band, V3d(0), 1, 1, NAN), levelset::UsageError);
+}
+
+TEST(Patch, RefusesCornersThatRunClockwise) {
+  const NarrowBand band = slab();
+  const std::array<V3d, 4> clockwise = {V3d(-1, -0.5, 0), V3d(-1, 0.5, 0), V3d(1, 0.5, 0),
+                                        V3d(1, -0.5, 0)};
+  EXPECT_THROW((void)makePatch(band, clockwise, 0.3), levelset::UsageError);
+  const std::string message =
+      support::refusal<levelset::UsageError>([&] { (void)makePatch(band, clockwise, 0.3); });
+  EXPECT_NE(message.find("\"-1,-0.5,0 1,-0.5,0 1,0.5,0 -1,0.5,0\""), std::string::npos) << message;
+  const PatchResult mirrored = makePatch(band, clockwise, 0.3, {.levels = 2, .mirror = true});
+  EXPECT_TRUE(mirrored.patch.mirrored);
+}
+
+TEST(Patch, RefusesWhatSpansNoPatch) {
+  const NarrowBand band = slab();
+  const std::array<V3d, 4> sound = {V3d(-1, -0.5, 0), V3d(1, -0.5, 0), V3d(1, 0.5, 0),
+                                    V3d(-1, 0.5, 0)};
+  for (const double height : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(),
+                              std::numeric_limits<double>::infinity()})
+    EXPECT_THROW((void)makePatch(band, sound, height), levelset::UsageError);
+  EXPECT_THROW((void)makePatch(band, sound, 0.3, {.levels = 1}), levelset::UsageError);
+  EXPECT_THROW((void)makePatch(band, sound, 0.3, {.spacing = -1}), levelset::UsageError);
+  EXPECT_THROW((void)makePatch(band, sound, 0.3, {.spacing = 1e-7}), levelset::ResourceLimit);
+
+  std::array<V3d, 4> twice = sound;
+  twice[2] = twice[1];
+  EXPECT_THROW((void)makePatch(band, twice, 0.3), levelset::InvalidInput);
+  std::array<V3d, 4> straight = sound;
+  straight[2] = V3d(0.5, -0.5, 0), straight[3] = V3d(-0.5, -0.5, 0);
+  EXPECT_THROW((void)makePatch(band, straight, 0.3), levelset::InvalidInput);
+  std::array<V3d, 4> far = sound;
+  far[0] = V3d(-90, -80, 70);
+  EXPECT_THROW((void)makePatch(band, far, 0.3), levelset::InvalidInput);
+  std::array<V3d, 4> nan = sound;
+  nan[3].x = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW((void)makePatch(band, nan, 0.3), levelset::UsageError);
+  EXPECT_THROW((void)makePatch(NarrowBand(), sound, 0.3), levelset::InvalidInput);
+}
+
+TEST(Patch, RefusesCornersOnSeparateParts) {
+  const NarrowBand two = wideBand(
+      [](const V3d& p) {
+        return std::min((p - V3d(-0.8, 0, 0)).length(), (p - V3d(0.8, 0, 0)).length()) - 0.5;
+      },
+      {V3d(-1.3, -0.5, -0.5), V3d(1.3, 0.5, 0.5)}, 0.15);
+  const std::array<V3d, 4> across = {V3d(-0.8, -0.3, 0.4), V3d(0.8, -0.3, 0.4), V3d(0.8, 0.3, 0.4),
+                                     V3d(-0.8, 0.3, 0.4)};
+  EXPECT_THROW((void)makePatch(two, across, 0.1), levelset::InvalidInput);
+}
+
+TEST(Patch, RefusesHeightsBeyondTheMedialAxis) {
+  // In a trough of radius 1 no point is further from the wall than 1.
+  const NarrowBand trough = wideBand([](const V3d& p) { return 1 - std::hypot(p.y, p.z); },
+                                     {V3d(-1, -1, -1), V3d(1, 1, 1)}, 1.3);
+  const double y = 0.5, z = -std::sqrt(0.75);
+  const std::array<V3d, 4> corners = {V3d(-0.5, -y, z), V3d(0.5, -y, z), V3d(0.5, y, z),
+                                      V3d(-0.5, y, z)};
+  EXPECT_NO_THROW((void)makePatch(trough, corners, 0.5, {.levels = 3, .spacing = 0.15}));
+  EXPECT_THROW((void)makePatch(trough, corners, 1.15, {.levels = 3, .spacing = 0.15}),
+               levelset::InvalidInput);
+}
+
+TEST(Patch, SidesPassThePointsGiven) {
+  const std::array<V3d, 4> corners = {V3d(-1, -0.5, 0), V3d(1, -0.5, 0), V3d(1, 0.5, 0),
+                                      V3d(-1, 0.5, 0)};
+  mapping::PatchOptions options{.levels = 2, .spacing = 0.1};
+  options.sides[0] = {V3d(0, -1, 0.3)};  // projected: beside the surface
+  options.sides[1] = {V3d(1.3, -0.2, 0), V3d(1.3, 0.2, 0)};
+  const PatchResult result = makePatch(slab(), corners, 0.4, options);
+  for (const ParticleLevel& level : result.patch.levels) {
+    const V3d tip(0, -1, level.height);
+    double nearest = 9;
+    for (std::size_t i = 0; i < level.columns; ++i) {
+      const V3d p = level.at(i, 0);
+      EXPECT_NEAR(p.y, -1 + 0.5 * std::abs(p.x), 1e-3);
+      nearest = std::min(nearest, (p - tip).length());
+    }
+    EXPECT_LT(nearest, 0.06);
+    for (std::size_t j = 0; j < level.rows; ++j) {
+      const V3d p = level.at(level.columns - 1, j);
+      EXPECT_NEAR(p.x, 1 + std::min(0.3, 0.5 - std::abs(p.y)), 1e-3);
+    }
+  }
+  EXPECT_NEAR(result.report.vLength, 0.5 * (1 + 0.4 + 2 * std::hypot(0.3, 0.3)), 1e-3);
+  options.sides[2] = {V3d(1, 0.5, 0)};  // where the side ends anyway
+  EXPECT_THROW((void)makePatch(slab(), corners, 0.4, options), levelset::InvalidInput);
+  options.sides[2] = {V3d(NAN, 0, 0)};
+  EXPECT_THROW((void)makePatch(slab(), corners, 0.4, options), levelset::UsageError);
+}
+
+TEST(Patch, WrapsAThinEar) {
+  // A plate of six voxels with a round edge: two corners above, two below.
+  const double half = 0.15;
+  const NarrowBand plate =
+      wideBand([=](const V3d& p) { return V3d(std::max(0.0, p.x - 1), 0, p.z).length() - half; },
+               {V3d(-1.5, -1.5, -half), V3d(1.2, 1.5, half)}, 0.4);
+  const PatchResult result = makePatch(
+      plate,
+      {V3d(0.4, -0.4, half), V3d(0.4, -0.4, -half), V3d(0.4, 0.4, -half), V3d(0.4, 0.4, half)}, 0.2,
+      {.levels = 2, .spacing = 0.1});
+  EXPECT_NEAR(result.report.uLength, 1.2 + std::acos(-1.0) * half, 0.01);
+  EXPECT_NEAR(result.report.vLength, 0.8, 0.01);
+  EXPECT_TRUE(std::any_of(result.patch.levels[1].positions.begin(),
+                          result.patch.levels[1].positions.end(),
+                          [](const V3d& p) { return p.x > 1.3; }));
+}
+
+TEST(Patch, HasAsManyCellsAsAsked) {
+  const PatchResult result = makePatch(sphere(), cap(0.6), 0.4, {.levels = 3, .cells = {7, 5}});
+  for (const ParticleLevel& level : result.patch.levels) {
+    EXPECT_EQ(level.columns, 8u);
+    EXPECT_EQ(level.rows, 6u);
+  }
+  EXPECT_THROW((void)makePatch(sphere(), cap(0.6), 0.4, {.cells = {7, 0}}), levelset::UsageError);
+}
+
+TEST(Patch, StopsWhenCancelled) {
+  EXPECT_THROW(
+      (void)makePatch(slab(), {V3d(-1, -0.5, 0), V3d(1, -0.5, 0), V3d(1, 0.5, 0), V3d(-1, 0.5, 0)},
+                      0.3, {.progress = [](double) { return false; }}),
+      levelset::Cancelled);
+}
+
+}  // namespace patch_test

@@ -1,0 +1,351 @@
+#include "mapping/placement/scatter.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "levelset/error.h"
+#include "levelset/grids/sample.h"
+#include "levelset/inspect/measure.h"
+#include "mapping/patches/patch_space.h"
+#include "mapping/placement/make_patch.h"
+#include "mapping/textures/geometric_texture.h"
+#include "tests/support/patches.h"
+#include "tests/support/threads.h"
+
+namespace scatter_test {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using levelset::NarrowBand;
+using levelset::UsageError;
+using mapping::Patch;
+using mapping::ScatterDensity;
+using mapping::scatterPoints;
+using mapping::SurfacePoint;
+
+constexpr double kRadius = 2;
+
+NarrowBand ball() {
+  return support::makeBall(kRadius, 0.1);
+}
+
+double greatCircle(const V3d& a, const V3d& b) {
+  return kRadius * std::atan2(a.cross(b).length(), a.dot(b));
+}
+
+double leastApart(const std::vector<SurfacePoint>& points, std::size_t count) {
+  double least = HUGE_VAL;
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      least = std::min(least, greatCircle(points[i].place, points[j].place));
+  return least;
+}
+
+TEST(ScatteredPoints, LieOnTheSurface) {
+  const auto points = scatterPoints(ball(), {.count = 200}).points;
+  for (const SurfacePoint& p : points) {
+    EXPECT_NEAR(p.place.length(), kRadius, 1e-3);
+    EXPECT_GT(p.normal.dot(p.place) / kRadius, 1 - 1e-4);
+  }
+}
+
+TEST(ScatteredPoints, KeepTheirDistanceAndLeaveNoRoom) {
+  const double distance = 0.5;
+  const auto result = scatterPoints(ball(), {.distance = distance});
+  ASSERT_EQ(result.points.size(), result.wanted);
+  const double least = leastApart(result.points, result.wanted);
+  EXPECT_GE(least, distance * (1 - 2e-3));
+  EXPECT_NEAR(result.distance, least, 2e-3 * least);
+  // Nowhere is there room for a disc of twice the distance.
+  for (int n = 0; n < 2000; ++n) {
+    const double z = 2 * (n + 0.5) / 2000 - 1, angle = 2.399963 * n, r = std::sqrt(1 - z * z);
+    const V3d place = V3d(r * std::cos(angle), r * std::sin(angle), z) * kRadius;
+    double nearest = HUGE_VAL;
+    for (const SurfacePoint& p : result.points)
+      nearest = std::min(nearest, greatCircle(place, p.place));
+    EXPECT_LT(nearest, 1.3 * distance);
+  }
+}
+
+TEST(ScatteredPoints, OfACountAreSpreadAsDiscsAre) {
+  // Blue noise keeps at least 0.65 of the distance that the densest packing has.
+  for (const std::size_t count : {20u, 100u, 400u}) {
+    const auto result = scatterPoints(ball(), {.count = count});
+    ASSERT_EQ(result.wanted, count);
+    const double densest =
+        std::sqrt(4 * M_PI * kRadius * kRadius * 2 / (std::sqrt(3.0) * static_cast<double>(count)));
+    EXPECT_GT(leastApart(result.points, count), 0.65 * densest) << count;
+    // By area: as many above as below.
+    const auto above = std::count_if(result.points.begin(),
+                                     result.points.begin() + static_cast<std::ptrdiff_t>(count),
+                                     [](const SurfacePoint& p) { return p.place.z > 0; });
+    EXPECT_NEAR(static_cast<double>(above), 0.5 * static_cast<double>(count),
+                2 + 0.05 * static_cast<double>(count));
+  }
+}
+
+TEST(ScatteredPoints, FollowScaleAndWeight) {
+  const auto scale = [](const V3d& p) { return p.z > 0 ? 1.0 : 2.0; };
+  const auto points = scatterPoints(ball(), {.distance = 0.3, .scale = scale}).points;
+  double above = 0, below = 0;
+  for (const SurfacePoint& p : points) (p.place.z > 0 ? above : below) += 1;
+  EXPECT_NEAR(above / below, 4, 0.6);  // discs of half the radius
+  // A small place at a small scale has room for as many as it has with that scale everywhere.
+  const auto inCap = [](const std::vector<SurfacePoint>& all) {
+    return static_cast<double>(
+        std::count_if(all.begin(), all.end(), [](const auto& p) { return p.place.x > 1.8; }));
+  };
+  const auto fine = [](const V3d&) { return 0.1; };
+  const auto fineInCap = [](const V3d& p) { return p.x > 1.8 ? 0.1 : 1.0; };
+  const auto onlyCap = [](const V3d& p) { return p.x > 1.8 ? 1.0 : 0.0; };
+  const double some = inCap(scatterPoints(ball(), {.distance = 1, .scale = fineInCap}).points);
+  const double full =
+      inCap(scatterPoints(ball(), {.distance = 1, .scale = fine, .weight = onlyCap}).points);
+  EXPECT_NEAR(some, full, 0.1 * full);
+  const auto weighted = scatterPoints(
+      ball(), {.count = 50, .weight = [](const V3d& p) { return p.x > 1.5 ? 1.0 : 0.0; }});
+  ASSERT_EQ(weighted.wanted, 50u);
+  for (const SurfacePoint& p : weighted.points) EXPECT_GT(p.place.x, 1.49);
+}
+
+TEST(ScatteredPoints, AreThoseOfTheirSeed) {
+  const auto places = [](std::uint64_t seed) {
+    std::vector<double> result;
+    for (const SurfacePoint& p : scatterPoints(ball(), {.count = 30, .seed = seed}).points)
+      result.push_back(p.place.x);
+    return result;
+  };
+  EXPECT_EQ(places(1), places(1));
+  EXPECT_NE(places(1), places(2));
+  EXPECT_EQ(support::onThreads(1, [&] { return places(1); }),
+            support::onThreads(5, [&] { return places(1); }));
+}
+
+TEST(ScatteredPoints, DoNotSeeThroughThinWalls) {
+  // Both sides of a plate of two voxels get their own.
+  const NarrowBand plate = support::sampleBand(
+      [](const V3d& p) {
+        return std::max({std::abs(p.x) - 2, std::abs(p.y) - 2, std::abs(p.z) - 0.1});
+      },
+      {V3d(-2, -2, -0.1), V3d(2, 2, 0.1)}, 0.1);
+  const auto result = scatterPoints(plate, {.distance = 1});
+  double near = HUGE_VAL;
+  for (const SurfacePoint& a : result.points)
+    for (const SurfacePoint& b : result.points)
+      if (a.normal.z > 0.9 && b.normal.z < -0.9)
+        near = std::min(near, std::hypot(a.place.x - b.place.x, a.place.y - b.place.y));
+  EXPECT_LT(near, 0.9);
+}
+
+TEST(ScatteredPoints, RefuseWhatMakesNoSense) {
+  EXPECT_THROW((void)scatterPoints(ball(), {}), UsageError);
+  EXPECT_THROW((void)scatterPoints(ball(), {.count = 3, .distance = 1}), UsageError);
+  EXPECT_THROW((void)scatterPoints(ball(), {.distance = std::nan("")}), UsageError);
+  EXPECT_THROW((void)scatterPoints(ball(), {.distance = 1e-6}), levelset::ResourceLimit);
+  EXPECT_THROW((void)scatterPoints({}, {.count = 3}), InvalidInput);
+  EXPECT_THROW((void)scatterPoints(ball(), {.count = 3, .scale = [](const V3d&) { return 0.0; }}),
+               UsageError);
+  EXPECT_THROW((void)scatterPoints(ball(), {.count = 3, .weight = [](const V3d&) { return 0.0; }}),
+               InvalidInput);
+  EXPECT_THROW((void)scatterPoints(ball(), {.count = 3, .progress = [](double) { return false; }}),
+               levelset::Cancelled);
+  EXPECT_EQ(scatterPoints(ball(), {.count = 1}).wanted, 1u);
+  EXPECT_EQ(scatterPoints(ball(), {.distance = 12}).wanted, 1u);
+}
+
+mapping::ScatterOptions small(std::size_t count) {
+  return {.density = {.count = count},
+          .uSize = 0.8,
+          .vSize = 0.6,
+          .patch = {.levels = 2, .spacing = 0.2}};
+}
+
+TEST(Scatter, LaysPatchesOfTheSizeAsked) {
+  mapping::ScatterOptions options = small(12);
+  options.direction = [](const V3d&, double) { return V3d(0, 0, 1); };
+  const auto result = mapping::scatter(ball(), 0.3, options);
+  ASSERT_EQ(result.patches.size(), 12u);
+  EXPECT_EQ(result.leftOut, 0u);
+  for (const Patch& patch : result.patches) {
+    const mapping::ParticleLevel& level = patch.levels.front();
+    const V3d first = level.at(0, 0), last = level.at(level.columns - 1, 0);
+    EXPECT_NEAR(greatCircle(first, last), 0.8, 0.05);
+    // u runs towards the pole, if that is not too near.
+    const V3d center = level.at(level.columns / 2, level.rows / 2);
+    if (std::abs(center.z) > 1.6) continue;
+    const V3d u = (level.at(level.columns - 1, level.rows / 2) - level.at(0, level.rows / 2));
+    const V3d normal = center.normalized();
+    const V3d pole = (V3d(0, 0, 1) - normal * normal.z).normalized();
+    EXPECT_GT(u.normalized().dot(pole), 0.97);
+  }
+}
+
+TEST(Scatter, RefusesDirectionsThatAreNone) {
+  mapping::ScatterOptions options = small(3);
+  options.direction = [](const V3d&, double) { return V3d(std::nan(""), 0, 0); };
+  EXPECT_THROW((void)mapping::scatter(ball(), 0.3, options), UsageError);
+}
+
+TEST(Scatter, ScalesPatchesAndTurnsThem) {
+  mapping::ScatterOptions options = small(10);
+  options.density.scale = [](const V3d& p) { return p.x > 0 ? 1.0 : 0.5; };
+  options.jitter = M_PI;
+  const auto result = mapping::scatter(ball(), 0.3, options);
+  for (const Patch& patch : result.patches) {
+    const mapping::ParticleLevel& level = patch.levels.front();
+    const double scale = level.at(level.columns / 2, level.rows / 2).x > 0 ? 1.0 : 0.5;
+    EXPECT_NEAR(greatCircle(level.at(0, 0), level.at(level.columns - 1, 0)), 0.8 * scale,
+                0.1 * scale);
+    EXPECT_DOUBLE_EQ(patch.height, 0.3 * scale);
+  }
+  // Known sites give the same patches again.
+  const std::vector<Patch> again = mapping::makePatches(ball(), result.sites, 0.3, options.patch);
+  ASSERT_EQ(again.size(), result.patches.size());
+  for (std::size_t n = 0; n < again.size(); ++n)
+    EXPECT_EQ(again[n].levels.front().positions, result.patches[n].levels.front().positions);
+}
+
+TEST(Scatter, LeavesOutWhatBearsNoPatchAndFillsTheGaps) {
+  // Beside a ball, a ball too small for the patches.
+  const NarrowBand two = support::sampleBand(
+      [](const V3d& p) {
+        return std::min(p.length() - kRadius, (p - V3d(4, 0, 0)).length() - 0.2);
+      },
+      {V3d(-2, -2, -2), V3d(4.4, 2, 2)}, 0.1);
+  mapping::ScatterOptions options = small(20);
+  options.density.scale = [](const V3d& p) { return p.x > 3 ? 0.4 : 1; };  // not to miss it
+  options.uSize = options.vSize = 2;
+  const auto result = mapping::scatter(two, 0.3, options);
+  EXPECT_GT(result.leftOut, 0u);
+  EXPECT_FALSE(result.cause.empty());
+  EXPECT_EQ(result.patches.size(), 20u);
+  for (const Patch& patch : result.patches) EXPECT_LT(patch.corners[0].x, 2.1);
+  options = small(1);
+  options.uSize = options.vSize = 10;
+  EXPECT_THROW((void)mapping::scatter(ball(), 0.3, options), InvalidInput);
+}
+
+TEST(Scatter, SkipsPatchesThatFold) {
+  const NarrowBand base = ball(), stud = support::makeBall(0.5, 0.1);
+  std::vector<Patch> patches = mapping::scatter(base, 0.3, small(4)).patches;
+  for (V3d& p : patches[1].levels.back().positions) p *= 0.5;
+  const mapping::TextureOptions options = {.merge = mapping::TextureMerge::Alone, .voxelSize = 0.1};
+  EXPECT_THROW((void)mapping::mapTexture(base, stud, patches, options), InvalidInput);
+  mapping::TextureOptions skipping = options;
+  skipping.skipFolds = true;
+  const auto result = mapping::mapTexture(base, stud, patches, skipping);
+  EXPECT_EQ(result.report.skipped, 1u);
+  EXPECT_EQ(result.report.patches, 3u);
+  EXPECT_EQ(levelset::measure(result.band).components, 3u);
+  EXPECT_THROW((void)mapping::mapTexture(base, stud, patches[1], skipping), InvalidInput);
+}
+
+/// Between corners of levels: the counts between them may be rounded another way.
+double worstApart(const Patch& one, const Patch& other) {
+  if (one.levels.size() != other.levels.size()) return HUGE_VAL;
+  const auto cornersOf = [](const mapping::ParticleLevel& level) {
+    const std::size_t u = level.columns - 1, v = level.rows - 1;
+    return std::array{level.at(0, 0), level.at(u, 0), level.at(u, v), level.at(0, v)};
+  };
+  double worst = 0;
+  for (std::size_t k = 0; k < one.levels.size(); ++k) {
+    const auto a = cornersOf(one.levels[k]), b = cornersOf(other.levels[k]);
+    for (std::size_t i = 0; i < 4; ++i) worst = std::max(worst, (a[i] - b[i]).length());
+  }
+  return worst;
+}
+
+TEST(Scatter, PatchesThatShareDistancesStandAsThoseAlone) {
+  const NarrowBand base = ball();
+  mapping::ScatterOptions options;
+  options.density.count = 16;
+  options.density.scale = [](const V3d& p) { return p.x > 0 ? 1.0 : 0.5; };
+  options.uSize = options.vSize = 1;
+  options.patch.levels = 4;
+  for (const auto& [scheme, height] : {std::pair(mapping::LevelScheme::Reduced, 1.0),
+                                       std::pair(mapping::LevelScheme::Reduced, 4.5),
+                                       std::pair(mapping::LevelScheme::Conforming, 1.0)}) {
+    options.patch.scheme = scheme;
+    const auto together = mapping::scatter(base, height, options);
+    ASSERT_EQ(together.patches.size(), 16u) << together.cause;
+    for (std::size_t n = 0; n < together.patches.size(); n += 8) {
+      const mapping::PatchSite& site = together.sites[n];
+      const Patch alone =
+          mapping::makePatch(base, site.corners, height * site.scale, options.patch).patch;
+      // The tall ones alone take voxels of twice the size; together, those of the lowest.
+      const double voxel = (height > 4 ? 2 : 1) * base.voxelSize();
+      EXPECT_LT(worstApart(alone, together.patches[n]), 0.02 * voxel) << height;
+    }
+  }
+}
+
+TEST(PatchSpace, IsSharedWhereThatCostsLess) {
+  const NarrowBand base = ball();
+  const auto isShared = [&](std::size_t count, double lowest, double highest,
+                            std::size_t maxMemory = levelset::kNoMemoryLimit) {
+    return mapping::sweepSharedSpace(base, {count, 0.5, 0.5, lowest, highest},
+                                     {.maxMemory = maxMemory});
+  };
+  const auto many = isShared(40, 1, 1);
+  ASSERT_TRUE(many);
+  EXPECT_DOUBLE_EQ(many->voxelSize(), base.voxelSize());
+  EXPECT_GE(many->halfWidth() * many->voxelSize(), 1.6 - 1e-9);
+  EXPECT_FALSE(isShared(1, 1, 1));
+  EXPECT_FALSE(isShared(40, 1, 1, 1000));
+  EXPECT_FALSE(isShared(40, 0.1, -1));  // reached as it is
+  // As coarse as the lowest of them may be, and no coarser.
+  const auto tall = isShared(40, 4.5, 6);
+  ASSERT_TRUE(tall);
+  EXPECT_DOUBLE_EQ(tall->voxelSize(), 2 * base.voxelSize());
+  const auto mixed = isShared(40, 1, 6);
+  ASSERT_TRUE(mixed);
+  EXPECT_DOUBLE_EQ(mixed->voxelSize(), base.voxelSize());
+}
+
+TEST(PatchSpace, IsItsOwnWhereTheSharedOneDoesNotDo) {
+  const NarrowBand base = ball();
+  const std::vector<V3d> border = {V3d(0, 0, kRadius), V3d(0.3, 0, std::sqrt(4 - 0.09))};
+  const auto voxelOf = [&](const NarrowBand& shared, double height) {
+    return mapping::sweepPatchSpace(base, border, 0.1, height, {.shared = &shared}).voxelSize();
+  };
+  const NarrowBand wide = mapping::sweepSharedSpace(base, {40, 0.5, 0.5, 4.5, 6}, {}).value();
+  EXPECT_DOUBLE_EQ(voxelOf(wide, 5), wide.voxelSize());
+  EXPECT_DOUBLE_EQ(voxelOf(wide, 1), base.voxelSize());  // too coarse
+  const NarrowBand low = mapping::sweepSharedSpace(base, {40, 0.5, 0.5, 1, 1}, {}).value();
+  const NarrowBand made = mapping::sweepPatchSpace(base, border, 0.1, 1.5, {.shared = &low});
+  EXPECT_GE(made.halfWidth() * made.voxelSize(), 2.1 - 1e-9);  // it does not reach
+}
+
+TEST(PatchSpace, IsSweptAboutThePatchOnly) {
+  const NarrowBand base = ball();
+  const double height = 0.8, bulge = 0.1;
+  const auto at = [](double x, double y) {
+    return V3d(x, y, std::sqrt(kRadius * kRadius - x * x - y * y));
+  };
+  const NarrowBand own = mapping::sweepPatchSpace(
+      base, std::vector<V3d>{at(-0.3, -0.3), at(0.3, -0.3), at(0.3, 0.3), at(-0.3, 0.3)}, bulge,
+      height);
+  const levelset::BandSampler sampler(own);
+  // As far as patch space reaches, and no further than what the sweep has to look at.
+  EXPECT_NEAR(sampler.value(V3d(0.4, 0, kRadius + height)),
+              V3d(0.4, 0, kRadius + height).length() - kRadius, 0.01);
+  const NarrowBand all =
+      mapping::sweepSharedSpace(base, {40, 0.5, 0.5, height, height}, {}).value();
+  // The box is 0.6 + 2 (height + bulge) = 2.4 wide: of the ball's 4π 2² seen from above, a ninth;
+  // the room above it spreads to about twice that.
+  EXPECT_LT(static_cast<double>(own.activeVoxelCount()),
+            0.25 * static_cast<double>(all.activeVoxelCount()));
+}
+
+TEST(Scatter, RefusesAHeightThatIsNoneBeforeItSweeps) {
+  for (const double height : {-1.0, std::nan(""), HUGE_VAL})
+    EXPECT_THROW((void)mapping::scatter(ball(), height, small(40)), UsageError);
+}
+
+}  // namespace scatter_test

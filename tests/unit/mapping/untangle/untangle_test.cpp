@@ -1,0 +1,379 @@
+#include "mapping/untangle/untangle.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "levelset/error.h"
+#include "mapping/distortion/fold_certificate.h"
+#include "mapping/maps/shell_map.h"
+#include "mapping/placement/make_patch.h"
+#include "mapping/untangle/shell_energy.h"
+#include "tests/support/component_counts.h"
+#include "tests/support/threads.h"
+
+namespace unfold_test {
+
+using Imath::V3d;
+using levelset::NarrowBand;
+using mapping::DistortionGain;
+using mapping::FoldVerdict;
+using mapping::minimiseDistortion;
+using mapping::Patch;
+using mapping::ShellSlopes;
+using mapping::unfold;
+using mapping::Unfolding;
+using support::makeSlab;
+using support::patchAt;
+
+/// Two by two, one high, on a slab.
+Patch flatPatch(std::size_t columns, std::size_t levels, double scale = 1) {
+  return patchAt([=](const V3d& t) { return V3d(2 * t.x - 1, 2 * t.y - 1, t.z) * scale; }, columns,
+                 columns, levels, scale);
+}
+
+void expectCertified(const Patch& patch) {
+  EXPECT_EQ(mapping::certifyLevels(patch, 0).verdict(), FoldVerdict::Certified);
+  EXPECT_EQ(mapping::certifyShell(mapping::ShellMap(patch, {}), patch.mirrored).verdict(),
+            FoldVerdict::Certified);
+}
+
+/// How far the surface's particles are from where a formula has them.
+double farthestFrom(const Patch& a, const Patch& b) {
+  double most = 0;
+  for (std::size_t k = 0; k < a.levels.size(); ++k)
+    for (std::size_t n = 0; n < a.levels[k].positions.size(); ++n)
+      most = std::max(most, (a.levels[k].positions[n] - b.levels[k].positions[n]).length());
+  return most;
+}
+
+TEST(ShellEnergy, StressIsTheDerivativeOfTheEnergy) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int trial = 0; trial < 40; ++trial) {
+    ShellSlopes f = {V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)};
+    for (V3d& column : f) column += V3d(unit(random), unit(random), unit(random)) * 0.8;
+    const auto check = [&](const auto& density, double bound) {
+      const mapping::ElementEnergy at = density(f);
+      if (!std::isfinite(at.value)) return;
+      for (std::size_t i = 0; i < 3; ++i)
+        for (int axis = 0; axis < 3; ++axis) {
+          ShellSlopes ahead = f, behind = f;
+          ahead[i][axis] += 1e-6, behind[i][axis] -= 1e-6;
+          const double slope = (density(ahead).value - density(behind).value) / 2e-6;
+          EXPECT_NEAR(at.stress[i][axis], slope, bound * (1 + std::abs(slope)));
+        }
+    };
+    if (mapping::determinantOf(f) > 0.1) check(mapping::symmetricDirichlet, 1e-5);
+    for (const double epsilon : {1.0, 0.3})
+      check([=](const ShellSlopes& g) { return mapping::foldoverEnergy(g, epsilon); }, 1e-5);
+  }
+}
+
+TEST(ShellEnergy, RotationsHaveNoDistortionAndFoldsAreForbidden) {
+  const double c = std::cos(0.7), s = std::sin(0.7);
+  const ShellSlopes turned = {V3d(c, s, 0), V3d(-s, c, 0), V3d(0, 0, 1)};
+  EXPECT_NEAR(mapping::symmetricDirichlet(turned).value, 6, 1e-14);
+  for (const V3d& column : mapping::symmetricDirichlet(turned).stress)
+    EXPECT_LE(column.length(), 1e-14);
+  // 2² + 1 + 1 and its reciprocals.
+  EXPECT_NEAR(mapping::symmetricDirichlet({V3d(2, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)}).value,
+              6 + 2.25, 1e-14);
+  const ShellSlopes mirrored = {V3d(-1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)};
+  EXPECT_EQ(mapping::symmetricDirichlet(mirrored).value, std::numeric_limits<double>::infinity());
+  // The other energy goes to that of a box, 3 + 2, and without bounds at a fold.
+  EXPECT_NEAR(mapping::foldoverEnergy(turned, 1e-9).value, 5, 1e-9);
+  EXPECT_GT(mapping::foldoverEnergy(mirrored, 1e-3).value, 1e5);
+  EXPECT_TRUE(std::isfinite(mapping::foldoverEnergy(mirrored, 1e-3).value));
+}
+
+TEST(Unfold, APatchThatDoesNotFoldStays) {
+  const Patch patch = flatPatch(7, 4);
+  const Unfolding result = unfold(makeSlab(2, 0.1), patch);
+  EXPECT_EQ(result.before.folded, 0u);
+  EXPECT_NEAR(result.before.leastJacobian, 1, 1e-12);
+  EXPECT_EQ(result.iterations, 0u);
+  EXPECT_EQ(farthestFrom(result.patch, patch), 0);
+}
+
+TEST(Unfold, MendsParticlesThatWentThroughTheirNeighbours) {
+  Patch patch = flatPatch(9, 4);
+  patch.levels[1].positions[4 * 9 + 4] += V3d(0.9, 0.4, 0.5);
+  patch.levels[3].positions[2 * 9 + 6] += V3d(-0.2, 0.6, -0.9);
+  patch.levels[0].positions[3 * 9 + 3] += V3d(0.6, 0, 0);
+  const NarrowBand base = makeSlab(2, 0.1);
+  const Unfolding result = unfold(base, patch);
+  EXPECT_GT(result.before.folded, 3u);
+  EXPECT_LT(result.before.leastJacobian, -0.5);
+  ASSERT_TRUE(result.isUnfolded());
+  EXPECT_GT(result.after.leastJacobian, 0.3);
+  EXPECT_GT(result.farthestMove, 0.2);
+  expectCertified(result.patch);
+  // The sides on the surface stay, and all that was on it.
+  const mapping::ParticleLevel &surface = result.patch.levels[0], &before = patch.levels[0];
+  for (std::size_t i = 0; i < 9; ++i) {
+    EXPECT_EQ(surface.at(i, 0), before.at(i, 0));
+    EXPECT_EQ(surface.at(8, i), before.at(8, i));
+  }
+  for (const V3d& p : surface.positions) EXPECT_NEAR(p.z, 0, 1e-5);
+}
+
+TEST(Unfold, MendsOffsetsPastTheMedialAxis) {
+  // Above the axis of a trough of radius 1 the sides have crossed.
+  const NarrowBand trough = support::sampleBand(
+      [](const V3d& p) { return std::max(1 - std::hypot(p.y, p.z + 1e-9), -0.5); },
+      {V3d(-1, -1, -1), V3d(1, 1, 1)}, 0.05);
+  const Patch patch = patchAt(
+      [](const V3d& t) {
+        const double angle = 1.5 * (t.y - 0.5), r = 1 - 1.4 * t.z;
+        return V3d(t.x - 0.5, r * std::sin(angle), -r * std::cos(angle));
+      },
+      7, 9, 5, 1.4);
+  const Unfolding result = unfold(trough, patch);
+  EXPECT_GT(result.before.folded, 40u);
+  ASSERT_TRUE(result.isUnfolded());
+  EXPECT_GT(result.after.leastJacobian, 0.05);
+  expectCertified(result.patch);
+  for (const V3d& p : result.patch.levels[0].positions) EXPECT_NEAR(std::hypot(p.y, p.z), 1, 1e-3);
+}
+
+TEST(Unfold, SaysWhereItCannot) {
+  // Two sides cross on the surface itself, and they stay.
+  const auto crossed = [](const V3d& t) {
+    return V3d((2 * t.x - 1) * (1 - 2 * t.y), 2 * t.y - 1, t.z);
+  };
+  const Patch patch = patchAt(crossed, 5, 6, 3);
+  const NarrowBand base = makeSlab(2, 0.1);
+  const Unfolding result = unfold(base, patch, {.mostIterations = 200});
+  EXPECT_FALSE(result.isUnfolded());
+  EXPECT_GT(result.after.folded, 0u);
+  EXPECT_LE(result.after.folded, result.before.folded);
+  EXPECT_EQ(mapping::countFolds(result.patch).folded, result.after.folded);
+}
+
+TEST(Unfold, CellsWithoutVolumeAndClockwisePatches) {
+  const NarrowBand base = makeSlab(2, 0.1);
+  // All of the top lies upon the level below it.
+  Patch flat = flatPatch(5, 3);
+  flat.levels[2].positions = flat.levels[1].positions;
+  const Unfolding raised = unfold(base, flat);
+  EXPECT_EQ(raised.before.folded, 16u);
+  EXPECT_TRUE(raised.isUnfolded());
+  expectCertified(raised.patch);
+
+  Patch clockwise =
+      patchAt([](const V3d& t) { return V3d(1 - 2 * t.x, 2 * t.y - 1, t.z); }, 6, 6, 3);
+  clockwise.mirrored = true;
+  EXPECT_EQ(mapping::countFolds(clockwise).folded, 0u);
+  clockwise.levels[1].positions[2 * 6 + 2] += V3d(0.7, 0.5, 0);
+  const Unfolding mended = unfold(base, clockwise);
+  EXPECT_GT(mended.before.folded, 0u);
+  EXPECT_TRUE(mended.isUnfolded());
+  expectCertified(mended.patch);
+
+  Patch smallest = flatPatch(2, 2);
+  std::swap(smallest.levels[1].positions[0], smallest.levels[1].positions[3]);
+  std::swap(smallest.levels[1].positions[1], smallest.levels[1].positions[2]);
+  const Unfolding turned = unfold(base, smallest);
+  EXPECT_EQ(turned.before.folded, 1u);
+  EXPECT_TRUE(turned.isUnfolded());
+}
+
+TEST(Unfold, RimsFollowTheirNeighbours) {
+  // A patch with rims is moved as a whole where it is mended, and its rims with it.
+  const NarrowBand base = support::makeBall(2, 0.1);
+  Patch patch = mapping::makePatch(base, support::cap(0.5, 2), 0.5, {.spacing = 0.3}).patch;
+  ASSERT_TRUE(patch.levels[3].hasRim());
+  const std::size_t columns = patch.levels[3].columns;
+  patch.levels[3].positions[2 * columns + 1] += V3d(0.5, 0.4, 0);
+  const Unfolding result = unfold(base, patch);
+  ASSERT_TRUE(result.isUnfolded());
+  for (std::size_t k = 0; k < patch.levels.size(); ++k) {
+    const mapping::ParticleLevel &level = result.patch.levels[k], &old = patch.levels[k];
+    const int rows = static_cast<int>(level.rows);
+    for (int j = 0; j < rows; ++j) {
+      const V3d expected = old.beyond(-1, j) + (level.beyond(0, j) - old.beyond(0, j)) * 2.0 -
+                           (level.beyond(1, j) - old.beyond(1, j));
+      EXPECT_LE((level.beyond(-1, j) - expected).length(), k == 0 ? 0.05 : 1e-12);
+    }
+  }
+}
+
+TEST(Unfold, SameBitsForAnyNumberOfThreadsAndScale) {
+  const auto run = [](double scale) {
+    Patch patch = flatPatch(6, 3, scale);
+    patch.levels[1].positions[14] += V3d(0.8, 0.3, 0.1) * scale;
+    return unfold(makeSlab(2 * scale, 0.1 * scale), patch).patch;
+  };
+  const Patch one = support::onThreads(1, [&] { return run(1); });
+  const Patch three = support::onThreads(3, [&] { return run(1); });
+  EXPECT_EQ(farthestFrom(one, three), 0);
+  // Powers of two change no bit of a mantissa.
+  Patch large = run(1024);
+  for (auto& level : large.levels)
+    for (V3d& p : level.positions) p /= 1024;
+  EXPECT_LE(farthestFrom(one, large), 1e-9);
+}
+
+TEST(MinimiseDistortion, IsometriesStay) {
+  const Patch patch = flatPatch(8, 4);
+  const DistortionGain result = minimiseDistortion(makeSlab(2, 0.1), patch);
+  EXPECT_NEAR(result.before.mean, 6, 1e-12);
+  EXPECT_EQ(farthestFrom(result.patch, patch), 0);
+  // The surface of a cylinder, and as thin a shell upon it that its top is no longer either.
+  const double height = 1e-3;
+  const NarrowBand rod = support::sampleBand([](const V3d& p) { return std::hypot(p.x, p.z) - 1; },
+                                             {V3d(-1, -1, -1), V3d(1, 1, 1)}, 0.05);
+  const Patch bent = patchAt(
+      [=](const V3d& t) {
+        const double angle = 1.2 * (t.x - 0.5), r = 1 + height * t.z;
+        return V3d(r * std::sin(angle), t.y - 0.5, r * std::cos(angle));
+      },
+      13, 9, 3, height);
+  const DistortionGain thin = minimiseDistortion(rod, bent);
+  // The chords of twelve cells lean by a twenty-fourth of the angle against what stands on them.
+  EXPECT_NEAR(thin.before.mean, 6 + 2 * 0.05 * 0.05, 1e-3);
+  EXPECT_LE(thin.after.mean, thin.before.mean);
+  for (std::size_t n = 0; n < bent.levels[0].positions.size(); ++n)
+    EXPECT_LE((thin.patch.levels[0].positions[n] - bent.levels[0].positions[n]).length(),
+              5 * height);
+}
+
+TEST(MinimiseDistortion, ADistortedPlaneBecomesUniformAgain) {
+  const Patch uniform = flatPatch(9, 4);
+  Patch distorted = uniform;
+  for (auto& level : distorted.levels)
+    for (V3d& p : level.positions) {
+      const double inside = (1 - p.x * p.x) * (1 - p.y * p.y);
+      p += V3d(0.25 * inside * std::cos(2 * p.y), 0.2 * inside * std::sin(3 * p.x), 0);
+    }
+  const NarrowBand base = makeSlab(2, 0.1);
+  const DistortionGain result = minimiseDistortion(base, distorted);
+  EXPECT_GT(result.before.mean, 6.1);
+  EXPECT_LE(result.after.mean, 6 + 1e-5);
+  EXPECT_LE(result.after.most, 6 + 1e-3);
+  EXPECT_LE(farthestFrom(result.patch, uniform), 0.01);
+  EXPECT_NEAR(result.farthestMove, farthestFrom(result.patch, distorted), 1e-12);
+}
+
+TEST(MinimiseDistortion, TheEnergyOnlyFalls) {
+  const NarrowBand base = support::makeBall(2, 0.1);
+  const Patch patch = mapping::makePatch(base, support::cap(0.6, 2), 1, {.spacing = 0.3}).patch;
+  double last = HUGE_VAL;
+  for (const std::size_t iterations : {0u, 1u, 2u, 4u, 8u, 16u}) {
+    const DistortionGain result = minimiseDistortion(base, patch, {.mostIterations = iterations});
+    EXPECT_LE(result.after.mean, result.before.mean);
+    EXPECT_LT(result.after.mean, last) << iterations;
+    last = result.after.mean;
+    EXPECT_EQ(mapping::countFolds(result.patch).folded, 0u);
+  }
+}
+
+TEST(MinimiseDistortion, ACapGains) {
+  // A shell half as high as the ball's radius over a cap of 0.6 loses three fifths of its
+  // distortion.
+  const NarrowBand base = support::makeBall(2, 0.1);
+  const Patch patch =
+      mapping::makePatch(base, support::cap(0.6, 2), 1, {.levels = 4, .spacing = 0.4}).patch;
+  const DistortionGain fixed = minimiseDistortion(base, patch);
+  const DistortionGain free = minimiseDistortion(base, patch, {.freeSides = true});
+  EXPECT_LE(fixed.after.mean - 6, 0.4 * (fixed.before.mean - 6));
+  EXPECT_LE(free.after.mean, fixed.after.mean + 1e-6);
+  EXPECT_LT(fixed.after.percent99, fixed.before.percent99);
+  expectCertified(fixed.patch);
+  expectCertified(free.patch);
+  for (const Patch* relaxed : {&fixed.patch, &free.patch})
+    for (const V3d& p : relaxed->levels[0].positions) EXPECT_NEAR(p.length(), 2, 1e-3);
+}
+
+TEST(MinimiseDistortion, OverACreaseItGainsAndStaysOnBothSides) {
+  // The crease lies between rows of particles.
+  const auto corner = [](const V3d& p) {
+    const double x = p.x, z = p.z;
+    return x > 0 && z > 0 ? std::hypot(x, z) : std::max(x, z);
+  };
+  const NarrowBand base =
+      support::sampleBand(corner, {V3d(-1.5, -1, -1.5), V3d(0.5, 1, 0.5)}, 0.05);
+  const Patch patch =
+      mapping::makePatch(
+          base, {V3d(-0.6, -0.6, 0), V3d(0, -0.6, -0.6), V3d(0, 0.6, -0.6), V3d(-0.6, 0.6, 0)}, 0.4,
+          {.levels = 4, .spacing = 0.1})
+          .patch;
+  const DistortionGain result = minimiseDistortion(base, patch);
+  EXPECT_LT(result.after.mean - 6, 0.6 * (result.before.mean - 6));
+  expectCertified(result.patch);
+  for (const V3d& p : result.patch.levels[0].positions) EXPECT_NEAR(corner(p), 0, 0.02);
+}
+
+TEST(MinimiseDistortion, ThinEarsKeepTheirSides) {
+  // A plate three voxels thick, whose other side is nearer than the next particle.
+  const auto plate = [](const V3d& p) {
+    const V3d d(std::abs(p.x) - 5, std::abs(p.y) - 5, std::abs(p.z) - 0.375);
+    return std::max({d.x, d.y, d.z});
+  };
+  const NarrowBand base = support::sampleBand(plate, {V3d(-5, -5, -0.375), V3d(5, 5, 0.375)}, 0.25);
+  Patch patch =
+      patchAt([](const V3d& t) { return V3d(9 * t.x - 4.5, 9 * t.y - 4.5, 0.375 + 1.5 * t.z); }, 7,
+              7, 3, 1.5);
+  patch.levels[0].positions[3 * 7 + 3] += V3d(2.2, 0.4, 0);
+  const Unfolding mended = unfold(base, patch);
+  EXPECT_GT(mended.before.folded, 0u);
+  ASSERT_TRUE(mended.isUnfolded());
+  const DistortionGain relaxed = minimiseDistortion(base, mended.patch);
+  EXPECT_LE(relaxed.after.mean, 6 + 1e-4);
+  for (const Patch* found : {&mended.patch, &relaxed.patch})
+    for (const V3d& p : found->levels[0].positions) EXPECT_NEAR(p.z, 0.375, 1e-4);
+}
+
+TEST(MinimiseDistortion, ProportionsScaleAndThreads) {
+  const NarrowBand base = makeSlab(2, 0.1);
+  const Patch patch = flatPatch(7, 3);
+  // Only proportions count, and those of the patch itself are no distortion.
+  for (const double scale : {0.01, 100.0}) {
+    const DistortionGain same =
+        minimiseDistortion(base, patch, {.proportions = V3d(2, 2, 1) * scale});
+    EXPECT_NEAR(same.before.mean, 6, 1e-12);
+    EXPECT_LE(farthestFrom(same.patch, patch), 1e-6);
+  }
+  // A texture that is twice as high pulls the top up.
+  const DistortionGain higher = minimiseDistortion(base, patch, {.proportions = V3d(2, 2, 2)});
+  EXPECT_LT(higher.after.mean, higher.before.mean);
+  EXPECT_GT(higher.patch.levels[2].at(3, 3).z, 1.2);
+
+  const auto run = [](double scale) {
+    Patch wavy = flatPatch(7, 3, scale);
+    wavy.levels[1].positions[24] += V3d(0.1, 0.05, 0.1) * scale;
+    return minimiseDistortion(makeSlab(2 * scale, 0.1 * scale), wavy);
+  };
+  const DistortionGain one = support::onThreads(1, [&] { return run(1); });
+  const DistortionGain three = support::onThreads(3, [&] { return run(1); });
+  EXPECT_EQ(farthestFrom(one.patch, three.patch), 0);
+  EXPECT_EQ(one.after.mean, three.after.mean);
+  EXPECT_NEAR(run(1e-5).after.mean, one.after.mean, 1e-6);
+  EXPECT_NEAR(run(1e5).after.mean, one.after.mean, 1e-6);
+}
+
+TEST(MinimiseDistortion, RefusesWhatItCannotRelax) {
+  const NarrowBand base = makeSlab(2, 0.1);
+  Patch folded = flatPatch(5, 3);
+  folded.levels[1].positions[12] += V3d(1, 1, 0);
+  EXPECT_THROW((void)minimiseDistortion(base, folded), levelset::InvalidInput);
+  EXPECT_THROW((void)minimiseDistortion(base, {}), levelset::InvalidInput);
+  const Patch patch = flatPatch(5, 3);
+  EXPECT_THROW((void)minimiseDistortion(makeSlab(2, 0.1, 0.5), patch), levelset::InvalidInput);
+  EXPECT_THROW((void)minimiseDistortion(base, patch, {.sink = std::nan("")}), levelset::UsageError);
+  EXPECT_THROW((void)minimiseDistortion(base, patch, {.proportions = V3d(1, 1, 0)}),
+               levelset::UsageError);
+  EXPECT_THROW((void)minimiseDistortion(base, patch, {.maxMemory = 1000}), levelset::ResourceLimit);
+  Patch broken = patch;
+  broken.levels[2].positions[3].x = std::nan("");
+  EXPECT_THROW((void)unfold(base, broken), levelset::InvalidInput);
+  Patch mended = folded;
+  EXPECT_THROW((void)unfold(base, mended, {.progress = [](double) { return false; }}),
+               levelset::Cancelled);
+}
+
+}  // namespace unfold_test
