@@ -11,7 +11,7 @@
 
 namespace levelset::eikonal {
 
-void requireRoom(const Room& room, std::size_t maxMemory, const char* action) {
+void checkMemory(const MemoryEstimate& room, std::size_t maxMemory, const char* action) {
   // Inwards there is never more than the solid's own box.
   const double out = room.outside + 1;
   double reached = 1, longest = 0;

@@ -9,7 +9,7 @@
 namespace levelset::eikonal {
 
 /// What is asked for around a surface, in voxels.
-struct Room {
+struct MemoryEstimate {
   openvdb::CoordBBox surface;
   double area = 0;
   double inside = 0, outside = 0;  ///< distances
@@ -20,6 +20,6 @@ struct Room {
 /// Refuses what cannot fit before anything is allocated.
 /// @throws ResourceLimit when the grid points reached take more than `maxMemory` or than there is,
 ///         or pass the range of indices
-void requireRoom(const Room& room, std::size_t maxMemory, const char* action);
+void checkMemory(const MemoryEstimate& room, std::size_t maxMemory, const char* action);
 
 }  // namespace levelset::eikonal

@@ -2,6 +2,7 @@
 
 #include <Imath/ImathBox.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -9,12 +10,18 @@
 
 namespace levelset {
 
-/// A part of a band: all that somebody is going to look at.
-struct BandPart {
+/// The part of a band that its consumers read: a half width and a box.
+struct RegionOfInterest {
   double halfWidth = std::numeric_limits<double>::infinity();  ///< voxels
-  Imath::Box3d region = kEverywhere;                           ///< world
+  Imath::Box3d region = kEverywhere;                           ///< world units
 
-  [[nodiscard]] bool isAll() const { return std::isinf(halfWidth) && isEverywhere(region); }
+  [[nodiscard]] bool isWhole() const { return std::isinf(halfWidth) && isEverywhere(region); }
+
+  /// Grows to what either of two consumers reads.
+  void join(const RegionOfInterest& other) {
+    halfWidth = std::max(halfWidth, other.halfWidth);
+    region.extendBy(other.region);
+  }
 };
 
 }  // namespace levelset

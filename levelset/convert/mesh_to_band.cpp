@@ -178,7 +178,7 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
     addOpenSurface(local, field, options.halfWidth, maxMemory, subProgress(progress, 0.5, 0.6));
 
   // === Distances
-  const BandPart part = field.isOpen() ? BandPart() : options.part;
+  const RegionOfInterest part = field.isOpen() ? RegionOfInterest() : options.roi;
   const double halfWidth = std::min(options.halfWidth, part.halfWidth);
   std::optional<openvdb::CoordBBox> region;
   if (!isEverywhere(part.region)) {

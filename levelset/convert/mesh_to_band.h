@@ -43,7 +43,7 @@ struct MeshToBandOptions {
   bool searchSelfIntersections = true;  ///< when false, Auto trusts the mesh to have none
   /// Distances are made only there, as cropped() leaves them, unless the mesh has holes. The
   /// certificate tells of the whole mesh, but for the ambiguous share.
-  BandPart part = {};
+  RegionOfInterest roi = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
   /// Told the certificate once it is whole, also when the mesh is refused after it.

@@ -83,8 +83,8 @@ double areaWithin(const Imath::Box3d& box, const TriMesh& mesh) {
 
 /// Bytes: some 12 per voxel of the band, and per triangle our copy, its box and its lists.
 double estimateMemory(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
-  const double halfWidth = std::min(options.halfWidth, options.part.halfWidth);
-  Imath::Box3d box = options.part.region;
+  const double halfWidth = std::min(options.halfWidth, options.roi.halfWidth);
+  Imath::Box3d box = options.roi.region;
   box.min -= V3d(halfWidth * voxelSize);
   box.max += V3d(halfWidth * voxelSize);
   const double area = areaWithin(box, mesh) / voxelSize / voxelSize;

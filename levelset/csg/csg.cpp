@@ -280,9 +280,4 @@ NarrowBand subtract(const NarrowBand& a, const NarrowBand& b) {
   return combinePair(CsgOperation::Difference, a, b);
 }
 
-bool shareGrid(const NarrowBand& a, const NarrowBand& b) {
-  return a.shared() && b.shared() && shareTransform(vdb(a), vdb(b)) &&
-         vdb(a).background() == vdb(b).background();
-}
-
 }  // namespace levelset

@@ -35,7 +35,4 @@ struct CsgResult {
 [[nodiscard]] NarrowBand intersect(const NarrowBand& a, const NarrowBand& b);
 [[nodiscard]] NarrowBand subtract(const NarrowBand& a, const NarrowBand& b);
 
-/// True when both bands sit on the same grid points with the same half width.
-[[nodiscard]] bool shareGrid(const NarrowBand& a, const NarrowBand& b);
-
 }  // namespace levelset

@@ -75,7 +75,7 @@ class CurvatureFlow {
   CurvatureFlowResult run(const NarrowBand& solid) {
     openvdb::FloatGrid::Ptr grid = distances(vdb(solid), flow::kFlowWidth);
     while (now_ < time_) {
-      requireRoom(*grid);
+      checkMemory(*grid);
       grid = runOn(*grid);
       requireSurface(*grid);
       if (now_ < time_) grid = distances(*grid, flow::kFlowWidth);
@@ -111,7 +111,7 @@ class CurvatureFlow {
     return eikonal::distanceTransform(field, request);
   }
 
-  void requireRoom(const openvdb::FloatGrid& grid) const {
+  void checkMemory(const openvdb::FloatGrid& grid) const {
     const double blocks = static_cast<double>(grid.tree().leafCount());
     requireMemory(blocks * sizeof(flow::Values) * kFields, options_.maxMemory, kAction);
   }

@@ -256,7 +256,7 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
         fmt::format("{}: more than 2^32 grid points lie beside the surface; use larger "
                     "voxels",
                     request.action));
-  Room room;
+  MemoryEstimate room;
   for (const Coord& c : points.gridPoints) room.surface.expand(c);
   // There are at least 1.15 points to a unit of area.
   room.area = static_cast<double>(points.size()) / 1.15;
@@ -264,7 +264,7 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   room.outside = reach.outside;
   room.region = request.region;
   room.bytesPerGridPoint = 25;  // state and result, with the unused part of blocks
-  requireRoom(room, request.maxMemory, request.action);
+  checkMemory(room, request.maxMemory, request.action);
   report(request.progress, 0.3, request.action);
 
   // === Nearest of them for each grid point

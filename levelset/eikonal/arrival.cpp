@@ -153,12 +153,12 @@ void checkRoom(const std::vector<StartTime>& start, const FloatGrid& field,
                const ArrivalRequest& request) {
   // How far another speed goes is seen on the way, block by block.
   if (request.options.speed) return;
-  Room room;
+  MemoryEstimate room;
   for (const StartTime& s : start) room.surface.expand(s.gridPoint);
   room.area = static_cast<double>(start.size()) / (2 * kStartWidth);
   room.inside = room.outside = request.until / field.voxelSize()[0];
   room.bytesPerGridPoint = kBytesPerGridPoint;
-  requireRoom(room, request.options.maxMemory, request.action);
+  checkMemory(room, request.options.maxMemory, request.action);
 }
 
 ArrivalStart startOf(const ArrivalRequest& request, const Slowness& slowness) {

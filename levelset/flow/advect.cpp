@@ -136,13 +136,13 @@ struct Advection::Impl {
     const double end = time + duration;
     requireTime(end, "final time");
     const flow::Velocity speed = inVoxels(velocity);
-    const flow::Journey journey{.velocity = speed,
-                                .from = time,
-                                .to = end,
-                                .action = kAdvectAction,
-                                .toWorld = band.indexToWorld(),
-                                .maxMemory = options.maxMemory,
-                                .progress = subProgress(options.progress, kMeshed, kMoved)};
+    const flow::TimeInterval journey{.velocity = speed,
+                                     .from = time,
+                                     .to = end,
+                                     .action = kAdvectAction,
+                                     .toWorld = band.indexToWorld(),
+                                     .maxMemory = options.maxMemory,
+                                     .progress = subProgress(options.progress, kMeshed, kMoved)};
     if (front)
       steps += front->advance(journey);
     else if (options.scheme == AdvectScheme::SemiLagrangian)

@@ -61,7 +61,7 @@ Characteristic::Characteristic(const Velocity& velocity, const V3d& from, double
   second = (k[1] - k[0] - (k[2] - k[0]) * (2.0 / 3)).length() * std::abs(dt);
 }
 
-void requireFiniteWay(const Journey& journey, const V3d& from, double time, double to) {
+void requireFiniteWay(const TimeInterval& journey, const V3d& from, double time, double to) {
   (void)velocitiesOn(
       journey.velocity, from, time, to,
       [&](const V3d& u, const V3d& place, double at) { requireFinite(journey, u, place, at); });

@@ -28,6 +28,6 @@ struct Characteristic {
 
 /// @throws InvalidInput, telling place and time, unless every velocity that the step looks at is
 ///         finite
-void requireFiniteWay(const Journey& journey, const Imath::V3d& from, double time, double to);
+void requireFiniteWay(const TimeInterval& journey, const Imath::V3d& from, double time, double to);
 
 }  // namespace levelset::flow

@@ -188,7 +188,7 @@ struct Largest {
 
 }  // namespace
 
-double Front::firstStep(const Journey& journey) const {
+double Front::firstStep(const TimeInterval& journey) const {
   const double fastest = tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, mesh_.positions.size(), 256), 0.0,
       [&](const auto& range, double largest) {
@@ -204,7 +204,7 @@ double Front::firstStep(const Journey& journey) const {
   return kFarthestMove / fastest;
 }
 
-double Front::tryStep(const Journey& journey, double from, double to) {
+double Front::tryStep(const TimeInterval& journey, double from, double to) {
   moved_.resize(mesh_.positions.size());
   const Largest largest = tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, mesh_.positions.size(), 256), Largest{},
@@ -256,7 +256,7 @@ double Front::mostStrain() const {
   return std::sqrt(squared);
 }
 
-StepMade Front::step(const Journey& journey, double from, double longest) {
+StepMade Front::step(const TimeInterval& journey, double from, double longest) {
   const double left = std::abs(journey.to - from), sign = journey.to < from ? -1 : 1;
   constexpr double kSlack = 1.05, kMargin = 0.9, kGrowth = 4;
   double dt = longest;
@@ -277,7 +277,7 @@ StepMade Front::step(const Journey& journey, double from, double longest) {
   }
 }
 
-std::size_t Front::advance(const Journey& journey) {
+std::size_t Front::advance(const TimeInterval& journey) {
   return walk(journey, [&](double from, double longest) {
     const StepMade made = step(journey, from, longest);
     splitLongEdges(journey.maxMemory, journey.action);

@@ -57,7 +57,7 @@ double longestStep(FloatGrid& grid, const Limit& limit) {
   return result;
 }
 
-FloatGrid::Ptr distanceOf(const FloatGrid& field, double halfWidth, const Journey& journey) {
+FloatGrid::Ptr distanceOf(const FloatGrid& field, double halfWidth, const TimeInterval& journey) {
   eikonal::DistanceRequest request;
   request.action = journey.action;
   request.halfWidth = halfWidth;
@@ -71,7 +71,8 @@ FloatGrid::Ptr distanceOf(const FloatGrid& field, double halfWidth, const Journe
 constexpr double kFootError = 1e-3;
 constexpr int kMostHalvings = 6;
 
-V3d footOf(const Journey& journey, const V3d& place, double from, double to, int halvings = 0) {
+V3d footOf(const TimeInterval& journey, const V3d& place, double from, double to,
+           int halvings = 0) {
   const Characteristic way(journey.velocity, place, from, to);
   if (!way.isFinite()) requireFiniteWay(journey, place, from, to);
   if (!(way.error.length() > kFootError) || halvings == kMostHalvings) return place + way.move;
@@ -80,7 +81,7 @@ V3d footOf(const Journey& journey, const V3d& place, double from, double to, int
                 halvings + 1);
 }
 
-FloatGrid::Ptr semiLagrangeStep(const FloatGrid& before, const Journey& journey, double from,
+FloatGrid::Ptr semiLagrangeStep(const FloatGrid& before, const TimeInterval& journey, double from,
                                 double to) {
   const FloatGrid::Ptr after = before.deepCopy();
   openvdb::tools::dilateActiveValues(after->tree(), static_cast<int>(kFarthestFoot) + 1,
@@ -136,7 +137,7 @@ double upwindDerivative(const eikonal::DenseBlock& block, const Coord& c, int ax
 
 /// result = share · start + (1 − share) · (field − dt u·∇field) on the active grid points.
 void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, double time,
-                double dt, const Journey& journey, FloatGrid& result) {
+                double dt, const TimeInterval& journey, FloatGrid& result) {
   const std::vector<LeafNode*> leaves = leavesOf(result.tree());
   const double h = result.voxelSize()[0], background = static_cast<double>(result.background());
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
@@ -162,7 +163,8 @@ void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, do
 }
 
 /// Third-order TVD Runge-Kutta [Shu88].
-FloatGrid::Ptr upwindStep(const FloatGrid& start, const Journey& journey, double from, double to) {
+FloatGrid::Ptr upwindStep(const FloatGrid& start, const TimeInterval& journey, double from,
+                          double to) {
   const double dt = to - from;
   const FloatGrid::Ptr one = start.deepCopy(), two = start.deepCopy(), three = start.deepCopy();
   eulerStage(start, start, 0, from, dt, journey, *one);
@@ -173,7 +175,7 @@ FloatGrid::Ptr upwindStep(const FloatGrid& start, const Journey& journey, double
 
 }  // namespace
 
-std::size_t carryBySemiLagrange(NarrowBand& band, const Journey& journey) {
+std::size_t carryBySemiLagrange(NarrowBand& band, const TimeInterval& journey) {
   const double halfWidth = band.halfWidth(), width = std::max(halfWidth, kFootWidth);
   FloatGrid::Ptr grid =
       width > halfWidth ? distanceOf(vdb(band), width, journey) : vdb(band).deepCopy();
@@ -197,7 +199,7 @@ std::size_t carryBySemiLagrange(NarrowBand& band, const Journey& journey) {
   return steps;
 }
 
-std::size_t carryUpwind(NarrowBand& band, const Journey& journey) {
+std::size_t carryUpwind(NarrowBand& band, const TimeInterval& journey) {
   const double halfWidth = band.halfWidth();
   FloatGrid::Ptr grid = distanceOf(vdb(band), std::max(halfWidth, kUpwindWidth), journey);
   double travelled = 0, fastest = 0;

@@ -12,7 +12,8 @@ namespace levelset::flow {
 
 using Imath::V3d;
 
-void requireFinite(const Journey& journey, const V3d& velocity, const V3d& place, double time) {
+void requireFinite(const TimeInterval& journey, const V3d& velocity, const V3d& place,
+                   double time) {
   if (std::isfinite(velocity.x) && std::isfinite(velocity.y) && std::isfinite(velocity.z)) return;
   V3d world;
   journey.toWorld.multVecMatrix(place, world);
@@ -22,7 +23,7 @@ void requireFinite(const Journey& journey, const V3d& velocity, const V3d& place
       journey.action, world.x, world.y, world.z, time));
 }
 
-std::size_t walk(const Journey& journey, const std::function<StepMade(double, double)>& step) {
+std::size_t walk(const TimeInterval& journey, const std::function<StepMade(double, double)>& step) {
   const double to = journey.to, whole = std::abs(to - journey.from);
   double time = journey.from, dt = kFirstShare * whole;
   std::size_t done = 0;
@@ -50,7 +51,7 @@ std::size_t walk(const Journey& journey, const std::function<StepMade(double, do
   return done;
 }
 
-std::size_t walk(const Journey& journey, const std::function<double(double)>& longest,
+std::size_t walk(const TimeInterval& journey, const std::function<double(double)>& longest,
                  const std::function<void(double, double)>& step) {
   const double to = journey.to, sign = to < journey.from ? -1 : 1;
   // Uneven parts of a step, so as not to fall in step with what comes and goes.

@@ -15,7 +15,7 @@ namespace levelset::flow {
 using Velocity = std::function<Imath::V3d(const Imath::V3d& place, double time)>;
 
 /// What is carried from when to when.
-struct Journey {
+struct TimeInterval {
   const Velocity& velocity;
   double from, to;
   const char* action;   ///< for messages
@@ -38,17 +38,17 @@ struct StepMade {
 /// @param step  makes a step from a time towards journey.to, no longer than it is told (positive)
 /// @return      the number of steps
 /// @throws ResourceLimit when it sees more steps coming than anybody waits for
-std::size_t walk(const Journey& journey,
+std::size_t walk(const TimeInterval& journey,
                  const std::function<StepMade(double from, double longest)>& step);
 
 /// Walks in steps that are short enough at their beginning, on the way and at their end.
 /// @param longest  longest step at a time, positive or infinite
 /// @param step     makes the step between two times
-std::size_t walk(const Journey& journey, const std::function<double(double)>& longest,
+std::size_t walk(const TimeInterval& journey, const std::function<double(double)>& longest,
                  const std::function<void(double, double)>& step);
 
 /// @throws InvalidInput, telling place and time, unless the velocity is finite
-void requireFinite(const Journey& journey, const Imath::V3d& velocity, const Imath::V3d& place,
+void requireFinite(const TimeInterval& journey, const Imath::V3d& velocity, const Imath::V3d& place,
                    double time);
 
 }  // namespace levelset::flow

@@ -11,19 +11,19 @@
 /// The connected surfaces of a triangle mesh, for any vector type with [] (internal).
 namespace levelset {
 
-struct ShellFigures {
+struct ComponentFigures {
   double volume = 0;  ///< signed: negative for the wall of a cavity
   double area = 0;
   long euler = 0;  ///< V − E + F, where each edge has two triangles
 };
 
-struct Shells {
-  std::vector<ShellFigures> figures;         ///< in the order of their first vertices
-  std::vector<std::uint32_t> shellOfVertex;  ///< kNoShell: no triangle there
-  static constexpr std::uint32_t kNoShell = 0xffffffffu;
+struct SurfaceComponents {
+  std::vector<ComponentFigures> figures;         ///< in the order of their first vertices
+  std::vector<std::uint32_t> componentOfVertex;  ///< kNoComponent: no triangle there
+  static constexpr std::uint32_t kNoComponent = 0xffffffffu;
 };
 
-namespace shells_detail {
+namespace components_detail {
 
 using Triple = std::array<double, 3>;
 
@@ -40,37 +40,38 @@ inline double dot(const Triple& a, const Triple& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-}  // namespace shells_detail
+}  // namespace components_detail
 
 /// Volumes are taken about a vertex of each shell and summed in the order of triangles.
 template <typename Vector>
-Shells findShells(const std::vector<Vector>& positions,
-                  const std::vector<std::array<std::uint32_t, 3>>& triangles) {
-  using namespace shells_detail;
+SurfaceComponents findSurfaceComponents(
+    const std::vector<Vector>& positions,
+    const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  using namespace components_detail;
   DisjointSets sets(positions.size());
-  Shells shells;
-  shells.shellOfVertex.assign(positions.size(), Shells::kNoShell);
+  SurfaceComponents shells;
+  shells.componentOfVertex.assign(positions.size(), SurfaceComponents::kNoComponent);
   for (const auto& t : triangles) {
     sets.join(t[0], t[1]);
     sets.join(t[0], t[2]);
-    for (const std::uint32_t v : t) shells.shellOfVertex[v] = 0;  // in use
+    for (const std::uint32_t v : t) shells.componentOfVertex[v] = 0;  // in use
   }
   std::vector<std::uint32_t> anchors;
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
-    if (shells.shellOfVertex[v] == Shells::kNoShell) continue;
+    if (shells.componentOfVertex[v] == SurfaceComponents::kNoComponent) continue;
     const std::uint32_t top = sets.find(v);  // its lowest vertex, numbered before
     if (top == v) {
-      shells.shellOfVertex[v] = static_cast<std::uint32_t>(anchors.size());
+      shells.componentOfVertex[v] = static_cast<std::uint32_t>(anchors.size());
       anchors.push_back(v);
       shells.figures.emplace_back();
     } else {
-      shells.shellOfVertex[v] = shells.shellOfVertex[top];
+      shells.componentOfVertex[v] = shells.componentOfVertex[top];
     }
-    ++shells.figures[shells.shellOfVertex[v]].euler;
+    ++shells.figures[shells.componentOfVertex[v]].euler;
   }
   std::vector<std::size_t> faces(anchors.size(), 0);
   for (const auto& t : triangles) {
-    const std::uint32_t shell = shells.shellOfVertex[t[0]];
+    const std::uint32_t shell = shells.componentOfVertex[t[0]];
     const Vector& anchor = positions[anchors[shell]];
     const Triple a = difference(positions[t[0]], anchor),
                  ab = difference(positions[t[1]], positions[t[0]]),

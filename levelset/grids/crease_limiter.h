@@ -9,16 +9,16 @@
 namespace levelset {
 
 /// Second difference, voxels, from which on a sample may lie beyond a kink …
-inline constexpr double kKinkBend = 0.3;
+inline constexpr double kCreaseBend = 0.3;
 /// … which it does if there is so much less of it on the other side: never on a curved surface.
-inline constexpr float kKinkOneSided = 3;
+inline constexpr float kCreaseOneSided = 3;
 
 /// Replaces the outer one of four samples that lies beyond a kink by what the others go on to.
-inline void leaveOutKink(float& v0, float v1, float v2, float& v3, float kink) {
+inline void limitAtCrease(float& v0, float v1, float v2, float& v3, float kink) {
   const float before = v0 - 2 * v1 + v2, after = v1 - 2 * v2 + v3;
-  if (std::abs(before) > kink && std::abs(before) > kKinkOneSided * std::abs(after))
+  if (std::abs(before) > kink && std::abs(before) > kCreaseOneSided * std::abs(after))
     v0 = 3 * (v1 - v2) + v3;
-  else if (std::abs(after) > kink && std::abs(after) > kKinkOneSided * std::abs(before))
+  else if (std::abs(after) > kink && std::abs(after) > kCreaseOneSided * std::abs(before))
     v3 = 3 * (v2 - v1) + v0;
 }
 
@@ -40,17 +40,17 @@ inline bool bendsMoreThan(const std::array<float, 64>& s, float kink) {
 /// non-oscillatory schemes choose their stencils [Harten87]. What the face between two cells is
 /// interpolated from depends on the samples in its plane alone, so that both agree there: the whole
 /// stays continuous.
-/// @param kink  kKinkBend in the units of the samples
-inline void leaveOutKinks(std::array<float, 64>& s, float kink) {
+/// @param kink  kCreaseBend in the units of the samples
+inline void limitAtCreases(std::array<float, 64>& s, float kink) {
   if (!bendsMoreThan(s, kink)) return;
-  for (std::size_t i = 0; i < 16; ++i) leaveOutKink(s[i], s[i + 16], s[i + 32], s[i + 48], kink);
+  for (std::size_t i = 0; i < 16; ++i) limitAtCrease(s[i], s[i + 16], s[i + 32], s[i + 48], kink);
   for (std::size_t i = 0; i < 16; ++i) {
     float* line = &s[(i / 4) * 16 + i % 4];
-    leaveOutKink(line[0], line[4], line[8], line[12], kink);
+    limitAtCrease(line[0], line[4], line[8], line[12], kink);
   }
   for (std::size_t i = 0; i < 16; ++i) {
     float* line = &s[4 * i];
-    leaveOutKink(line[0], line[1], line[2], line[3], kink);
+    limitAtCrease(line[0], line[1], line[2], line[3], kink);
   }
 }
 

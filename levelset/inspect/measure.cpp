@@ -54,21 +54,22 @@ std::vector<SurfaceMoments> sumShells(const std::vector<std::uint32_t>& shellOfT
 
 /// A vertex of each shell: near to all of it, however far the shells are from each other.
 template <typename Vector>
-std::vector<Vec3d> shellAnchors(const Shells& shells, const std::vector<Vector>& positions) {
+std::vector<Vec3d> shellAnchors(const SurfaceComponents& shells,
+                                const std::vector<Vector>& positions) {
   std::vector<Vec3d> anchors(shells.figures.size());
   for (std::size_t v = positions.size(); v-- > 0;) {
-    const std::uint32_t shell = shells.shellOfVertex[v];
-    if (shell != Shells::kNoShell)
+    const std::uint32_t shell = shells.componentOfVertex[v];
+    if (shell != SurfaceComponents::kNoComponent)
       anchors[shell] = Vec3d(positions[v][0], positions[v][1], positions[v][2]);
   }
   return anchors;
 }
 
 std::vector<std::uint32_t> shellsOfTriangles(
-    const Shells& shells, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+    const SurfaceComponents& shells, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   std::vector<std::uint32_t> result;
   result.reserve(triangles.size());
-  for (const auto& t : triangles) result.push_back(shells.shellOfVertex[t[0]]);
+  for (const auto& t : triangles) result.push_back(shells.componentOfVertex[t[0]]);
   return result;
 }
 
@@ -93,7 +94,7 @@ void describeMoments(const SurfaceMoments& whole, const Vec3d& anchor, const Ima
     for (int j = 0; j < 3; ++j) result.inertia[i][j] = (i == j ? trace : 0) - turned[i][j];
 }
 
-void describeShells(const Shells& shells, const std::vector<SurfaceMoments>& sums,
+void describeShells(const SurfaceComponents& shells, const std::vector<SurfaceMoments>& sums,
                     const std::vector<Vec3d>& anchors, const Imath::M44d& toWorld, double scale,
                     Measurement& result) {
   if (anchors.empty()) return;
@@ -166,7 +167,7 @@ Measurement measure(const NarrowBand& solid, const Progress& progress) {
   if (solid.isEmpty()) return result;
   const IndexMesh mesh = marchCells(CellSurface(vdb(solid)));
   report(progress, 0.2, kMeasure);
-  const Shells shells = findShells(mesh.positions, mesh.triangles);
+  const SurfaceComponents shells = findSurfaceComponents(mesh.positions, mesh.triangles);
   const std::vector<Vec3d> anchors = shellAnchors(shells, mesh.positions);
   report(progress, 0.3, kMeasure);
   const CurvedSurface surface(mesh, vdb(solid));
@@ -186,7 +187,7 @@ Measurement measure(const TriMesh& mesh, const Progress& progress) {
   report(progress, 0, kMeasure);
   if (const auto closed = withoutItsSeams(mesh)) return measure(*closed, progress);
   Measurement result;
-  const Shells shells = findShells(mesh.positions, mesh.triangles);
+  const SurfaceComponents shells = findSurfaceComponents(mesh.positions, mesh.triangles);
   const std::vector<Vec3d> anchors = shellAnchors(shells, mesh.positions);
   const Progress middle = subProgress(progress, 0.3, 0.6);
   const std::vector<SurfaceMoments> sums = sumShells(

@@ -10,7 +10,7 @@
 
 namespace levelset {
 
-NarrowBand cropped(NarrowBand band, const BandPart& part) {
+NarrowBand cropped(NarrowBand band, const RegionOfInterest& part) {
   using Leaf = openvdb::FloatTree::LeafNodeType;
   if (!(part.halfWidth >= 1))
     throw UsageError(

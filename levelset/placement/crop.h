@@ -9,6 +9,6 @@ namespace levelset {
 /// may end anywhere, as if the solid were cut open there, and no sign is to be trusted.
 /// @param part  a half width that is no narrower changes nothing
 /// @throws UsageError for a half width below 1, or a region that is empty
-[[nodiscard]] NarrowBand cropped(NarrowBand band, const BandPart& part);
+[[nodiscard]] NarrowBand cropped(NarrowBand band, const RegionOfInterest& part);
 
 }  // namespace levelset

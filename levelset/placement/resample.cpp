@@ -63,7 +63,7 @@ class ResampleKernel {
       : source_(source),
         target_(target),
         place_(placement),
-        kink_(static_cast<float>(kKinkBend * placement.sourceVoxel / placement.scale)) {}
+        kink_(static_cast<float>(kCreaseBend * placement.sourceVoxel / placement.scale)) {}
 
   /// Makes the target's leaves that can hold voxels of the source's band.
   void addLeaves(const char* action) {
@@ -174,7 +174,7 @@ class ResampleKernel {
       take(cell.value());
       return;
     }
-    leaveOutKinks(block.values, kink_);
+    limitAtCreases(block.values, kink_);
     take(block.value());
   }
 
@@ -233,7 +233,7 @@ FloatGrid::Ptr supported(const NarrowBand& solid, const Placement& place, std::s
 
 /// Before any block is looked at.
 /// @param refinement  target voxels along a source voxel
-void requireRoom(const NarrowBand& solid, double refinement, double halfWidth,
+void checkMemory(const NarrowBand& solid, double refinement, double halfWidth,
                  std::size_t maxMemory, const char* action) {
   // Source voxels beside the surface, then the leaves of the target, as they are twice: sampled and
   // made distances again.
@@ -299,7 +299,7 @@ NarrowBand resampleField(const NarrowBand& solid, const Imath::M44d& sourceToWor
   }
   const Placement place = placementOf(solid, sourceToWorld, targetToWorld);
   requireSmallerVoxels(solid, sourceToWorld, place, action);
-  requireRoom(solid, stretchOf(sourceToWorld).greatest / place.targetVoxel, halfWidth, maxMemory,
+  checkMemory(solid, stretchOf(sourceToWorld).greatest / place.targetVoxel, halfWidth, maxMemory,
               action);
   report(progress, 0, action);
   const auto target = emptyLevelSet(transformOf(targetToWorld, action), halfWidth);
@@ -352,6 +352,11 @@ NarrowBand resampleLike(const NarrowBand& solid, const NarrowBand& like,
   if (!chosen.halfWidth) chosen.halfWidth = like.halfWidth();
   if (solid.shared() && like.shared() && shareGrid(solid, like)) return solid;
   return resampleTo(solid, like.indexToWorld(), chosen);
+}
+
+bool shareGrid(const NarrowBand& a, const NarrowBand& b) {
+  return a.shared() && b.shared() && shareTransform(vdb(a), vdb(b)) &&
+         vdb(a).background() == vdb(b).background();
 }
 
 }  // namespace levelset

@@ -34,4 +34,7 @@ struct ResampleOptions {
 [[nodiscard]] NarrowBand resampleLike(const NarrowBand& solid, const NarrowBand& like,
                                       const ResampleOptions& options = {});
 
+/// True when both bands sit on the same grid points with the same half width.
+[[nodiscard]] bool shareGrid(const NarrowBand& a, const NarrowBand& b);
+
 }  // namespace levelset

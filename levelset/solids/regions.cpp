@@ -122,7 +122,7 @@ RegionMap::RegionMap(const FloatGrid& grid, const Progress& progress, const char
   report(progress, 0.6, action);
   numberRegions(grid, linker);
   report(progress, 0.7, action);
-  findShells(surface);
+  findSurfaceComponents(surface);
   report(progress, 1, action);
 }
 
@@ -271,17 +271,17 @@ void RegionMap::numberRegions(const FloatGrid& grid, Linker& linker) {
   }
 }
 
-void RegionMap::findShells(const CellSurface& surface) {
+void RegionMap::findSurfaceComponents(const CellSurface& surface) {
   const IndexMesh mesh = marchCells(surface);
-  const Shells found = levelset::findShells(mesh.positions, mesh.triangles);
+  const SurfaceComponents found = levelset::findSurfaceComponents(mesh.positions, mesh.triangles);
   shells_.resize(found.figures.size());
   std::vector<bool> seen(shells_.size(), false);
   openvdb::tree::ValueAccessor<const Int32Tree> labels(labels_);
   std::size_t vertex = 0;
   for (const SurfaceBlock& block : surface.blocks()) {
-    std::uint32_t last = Shells::kNoShell;
+    std::uint32_t last = SurfaceComponents::kNoComponent;
     CellSurface::forEachVertex(block, [&](int x, int y, int z, int axis) {
-      const std::uint32_t shell = found.shellOfVertex[vertex++];
+      const std::uint32_t shell = found.componentOfVertex[vertex++];
       if (shell != last) shellBlocks_.emplace_back(block.origin, last = shell);
       if (seen[shell]) return;
       seen[shell] = true;

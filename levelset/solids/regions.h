@@ -52,7 +52,7 @@ class RegionMap {
   void joinTiles(const openvdb::FloatGrid& grid, Linker& linker) const;
   void joinDiagonals(const CellSurface& surface, Linker& linker) const;
   void numberRegions(const openvdb::FloatGrid& grid, Linker& linker);
-  void findShells(const CellSurface& surface);
+  void findSurfaceComponents(const CellSurface& surface);
 
   openvdb::Int32Tree labels_;
   std::vector<Region> regions_;

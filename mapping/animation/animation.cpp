@@ -53,15 +53,15 @@ auto atFrame(std::size_t frame, const Call& call) {
   }
 }
 
-bool isSameLevel(const ParticleLevel& a, const ParticleLevel& b) {
+bool isSameLayer(const ParticleLayer& a, const ParticleLayer& b) {
   return a.columns == b.columns && a.rows == b.rows && a.w == b.w && a.height == b.height &&
          a.positions == b.positions && a.rim == b.rim;
 }
 
 bool isSamePatch(const Patch& a, const Patch& b) {
   return a.corners == b.corners && a.height == b.height && a.mirrored == b.mirrored &&
-         std::equal(a.levels.begin(), a.levels.end(), b.levels.begin(), b.levels.end(),
-                    isSameLevel);
+         std::equal(a.layers.begin(), a.layers.end(), b.layers.begin(), b.layers.end(),
+                    isSameLayer);
 }
 
 void checkKeys(const std::vector<AnimationKey>& keys, const AnimationOptions& options) {
@@ -147,7 +147,7 @@ class Animation {
 
   AnimationReport run() {
     for (std::size_t k = 1; k < keys_.size(); ++k) {
-      warnOfLevels(k);
+      warnOfLayers(k);
       // On bases that move, when the way to the key is looked for.
       if (!bases_.areMoving()) atFrame(keys_[k].frame, [&] { requireOn(bases_.at(0), k); });
     }
@@ -163,14 +163,14 @@ class Animation {
   }
 
  private:
-  void warnOfLevels(std::size_t k) {
-    const std::size_t levels = keys_[k].patches.front().levels.size(),
-                      first = keys_.front().patches.front().levels.size();
-    if (levels == first) return;
+  void warnOfLayers(std::size_t k) {
+    const std::size_t layers = keys_[k].patches.front().layers.size(),
+                      first = keys_.front().patches.front().layers.size();
+    if (layers == first) return;
     report_.warnings.push_back(
-        fmt::format("{}: patch {} has {} levels and the first {}; the frames between follow the "
+        fmt::format("{}: patch {} has {} layers and the first {}; the frames between follow the "
                     "first, so give all the same --levels",
-                    kAnimation, k + 1, levels, first));
+                    kAnimation, k + 1, layers, first));
   }
 
   void requireOn(const NarrowBand& base, std::size_t key) const {
@@ -437,15 +437,15 @@ class Animation {
 }  // namespace
 
 PatchOptions optionsLike(const Patch& patch) {
-  const ParticleLevel& surface = patch.levels.front();
+  const ParticleLayer& surface = patch.layers.front();
   const bool areAlike =
-      std::all_of(patch.levels.begin(), patch.levels.end(), [&](const ParticleLevel& level) {
-        return level.columns == surface.columns && level.rows == surface.rows;
+      std::all_of(patch.layers.begin(), patch.layers.end(), [&](const ParticleLayer& layer) {
+        return layer.columns == surface.columns && layer.rows == surface.rows;
       });
-  // Levels that differ in their counts tell what an older file does not.
-  const bool isTravelling = patch.scheme ? *patch.scheme != LevelScheme::Reduced : areAlike;
-  PatchOptions options{.levels = std::max<std::size_t>(2, patch.levels.size()),
-                       .scheme = isTravelling ? LevelScheme::Conforming : LevelScheme::Reduced,
+  // Layers that differ in their counts tell what an older file does not.
+  const bool isTravelling = patch.scheme ? *patch.scheme != LayerScheme::Reduced : areAlike;
+  PatchOptions options{.layers = std::max<std::size_t>(2, patch.layers.size()),
+                       .scheme = isTravelling ? LayerScheme::Conforming : LayerScheme::Reduced,
                        .spacing = patch.spacing,
                        .mirror = true};
   if (areAlike && surface.columns > 3 && surface.rows > 3)

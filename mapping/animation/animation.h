@@ -25,7 +25,7 @@ using PatchMaker = std::function<std::vector<Patch>(
     std::span<const Footprint> origins, const levelset::Progress& progress)>;
 
 /// Remakes a patch of which nothing is known but its particles, with as many of them: along ∇φ
-/// where all levels have equal counts, on a relaxed net of its own on each level otherwise.
+/// where all layers have equal counts, on a relaxed net of its own on each layer otherwise.
 [[nodiscard]] PatchOptions optionsLike(const Patch& patch);
 
 /// Patches as they stand at one frame, on the base of that frame.

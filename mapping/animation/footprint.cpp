@@ -78,7 +78,7 @@ std::optional<std::array<V3d, 4>> cornersFrom(const SurfaceField& field, const S
 }
 
 PatchOutline outlineOf(const Patch& patch) {
-  const ParticleLevel& surface = patch.levels.front();
+  const ParticleLayer& surface = patch.layers.front();
   const std::size_t i = (surface.columns - 1) / 2, j = (surface.rows - 1) / 2;
   const std::size_t right = surface.columns / 2, above = surface.rows / 2;
   return {.corners = patch.corners,

@@ -44,8 +44,8 @@ Spread spreadOf(std::vector<double> values) {
 
 std::vector<V3d> samplePlaces(const Patch& patch, double sink) {
   std::vector<V3d> places;
-  if (sink != 0) {  // below the surface, or above the last level
-    const ParticleLevel& end = sink > 0 ? patch.levels.front() : patch.levels.back();
+  if (sink != 0) {  // below the surface, or above the last layer
+    const ParticleLayer& end = sink > 0 ? patch.layers.front() : patch.layers.back();
     for (std::size_t j = 0; j < end.rows; ++j)
       for (std::size_t i = 0; i < end.columns; ++i)
         for (const double share : {1.0, 0.5})
@@ -53,19 +53,19 @@ std::vector<V3d> samplePlaces(const Patch& patch, double sink) {
                             static_cast<double>(j) / static_cast<double>(end.rows - 1),
                             end.w - share * sink});
   }
-  for (std::size_t k = 0; k < patch.levels.size(); ++k) {
-    const ParticleLevel& level = patch.levels[k];
-    const double columns = static_cast<double>(level.columns - 1);
-    const double rows = static_cast<double>(level.rows - 1);
-    for (std::size_t j = 0; j < level.rows; ++j)
-      for (std::size_t i = 0; i < level.columns; ++i) {
+  for (std::size_t k = 0; k < patch.layers.size(); ++k) {
+    const ParticleLayer& layer = patch.layers[k];
+    const double columns = static_cast<double>(layer.columns - 1);
+    const double rows = static_cast<double>(layer.rows - 1);
+    for (std::size_t j = 0; j < layer.rows; ++j)
+      for (std::size_t i = 0; i < layer.columns; ++i) {
         const double u = static_cast<double>(i), v = static_cast<double>(j);
-        places.push_back({u / columns, v / rows, level.w});
-        if (i + 1 == level.columns || j + 1 == level.rows) continue;
-        places.push_back({(u + 0.5) / columns, (v + 0.5) / rows, level.w});
-        if (k + 1 < patch.levels.size())
+        places.push_back({u / columns, v / rows, layer.w});
+        if (i + 1 == layer.columns || j + 1 == layer.rows) continue;
+        places.push_back({(u + 0.5) / columns, (v + 0.5) / rows, layer.w});
+        if (k + 1 < patch.layers.size())
           places.push_back(
-              {(u + 0.5) / columns, (v + 0.5) / rows, 0.5 * (level.w + patch.levels[k + 1].w)});
+              {(u + 0.5) / columns, (v + 0.5) / rows, 0.5 * (layer.w + patch.layers[k + 1].w)});
       }
   }
   return places;
@@ -75,7 +75,7 @@ std::vector<MapSample> sampleMap(const PatchMap& map, const Patch& patch, double
   const std::vector<V3d> places = samplePlaces(patch, sink);
   std::vector<MapSample> samples(places.size());
   tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t n) {
-    const V3d place = levelPosition(patch, places[n]);
+    const V3d place = layerPosition(patch, places[n]);
     samples[n] = {place, places[n], map.jacobian(place)};
   });
   return samples;

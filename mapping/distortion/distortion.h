@@ -27,7 +27,7 @@ struct Distortion {
   double meanStretch = 0;  ///< third root of the median volume ratio
 };
 
-/// Texture coordinates of the particles, of the middles of their cells, between the levels, and of
+/// Texture coordinates of the particles, of the middles of their cells, between the layers, and of
 /// places below the surface. @param sink  how deep to look there, in w
 [[nodiscard]] std::vector<Imath::V3d> samplePlaces(const Patch& patch, double sink);
 

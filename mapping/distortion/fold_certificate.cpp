@@ -113,7 +113,7 @@ FoldCertificate certifyShell(const ShellMap& map, bool isMirrored) {
   return certificateOf(cells);
 }
 
-FoldCertificate certifyLevels(const Patch& patch, double sink) {
+FoldCertificate certifyLayers(const Patch& patch, double sink) {
   const ShellCells shell(patch, sink);
   const std::vector<V3d> positions = particlePositions(patch);
   std::vector<CellVolume> cells(shell.size());
@@ -137,7 +137,7 @@ FoldCertificate certifyLevels(const Patch& patch, double sink) {
     result.folds = sign.folds;
     result.pieces = sign.pieces;
     const V3d uvw = cell.box.min + sides * sign.at;
-    result.least = {levelPosition(patch, uvw), uvw, sign.least / size};
+    result.least = {layerPosition(patch, uvw), uvw, sign.least / size};
     const V3d u = corners[1] + corners[3] + corners[5] + corners[7] - corners[0] - corners[2] -
                   corners[4] - corners[6],
               v = corners[2] + corners[3] + corners[6] + corners[7] - corners[0] - corners[1] -

@@ -51,10 +51,10 @@ struct FoldCertificate {
 /// Of the map that is straight in tetrahedra: the exact sign of each [Shewchuk97].
 [[nodiscard]] FoldCertificate certifyShell(const ShellMap& map, bool isMirrored);
 
-/// Of the map that is straight between particles (see level_map.h): Bernstein coefficients of the
+/// Of the map that is straight between particles (see layer_map.h): Bernstein coefficients of the
 /// determinant of each trilinear cell. What cannot be told from zero by rounding folds.
 /// @param sink  in w, see ShellCells
-[[nodiscard]] FoldCertificate certifyLevels(const Patch& patch, double sink);
+[[nodiscard]] FoldCertificate certifyLayers(const Patch& patch, double sink);
 
 /// Of the smooth map: in a box about c the slopes are J(c) (I + E) with |E| bounded through the
 /// Taylor polynomials of the particles that are far and the kinks of those that are near; where

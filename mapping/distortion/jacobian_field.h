@@ -26,7 +26,7 @@ struct JacobianFieldOptions {
 [[nodiscard]] levelset::FieldGrid jacobianField(const Patch& patch, const ShellMap& map,
                                                 const FoldCertificate& certificate,
                                                 const JacobianFieldOptions& options);
-/// Of the map that is straight between the particles, see level_map.h.
+/// Of the map that is straight between the particles, see layer_map.h.
 [[nodiscard]] levelset::FieldGrid jacobianField(const Patch& patch,
                                                 const FoldCertificate& certificate,
                                                 const JacobianFieldOptions& options);

@@ -372,7 +372,7 @@ std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch, double s
   const std::vector<V3d> places = samplePlaces(patch, sink);
   std::vector<MapSample> samples(places.size());
   for (std::size_t n = 0; n < places.size(); ++n)
-    samples[n].place = levelPosition(patch, places[n]);
+    samples[n].place = layerPosition(patch, places[n]);
   evaluateRbf(map, patch, samples);
   for (std::size_t n = 0; n < places.size(); ++n) samples[n].uvw = places[n];
   return samples;

@@ -13,7 +13,7 @@
 namespace mapping {
 namespace {
 
-constexpr std::size_t kTile = 64;  // points, few enough for the first-level cache
+constexpr std::size_t kTile = 64;  // points, few enough for the first-layer cache
 
 const double kScale = rbf::kLaplacian.scale, kA = rbf::kLaplacian.a, kB = rbf::kLaplacian.b,
              kFast = rbf::kLaplacian.fast, kSlow = rbf::kLaplacian.slow;

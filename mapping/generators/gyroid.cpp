@@ -129,7 +129,7 @@ class GyroidField {
   GyroidField(const Gyroid& gyroid, const V3d& corner, double reach)
       : isSheet_(gyroid.kind == GyroidKind::Sheet),
         // The solid is where the distance (from the surface or signed) is below this.
-        level_(isSheet_ ? gyroid.thickness / 2 : gyroid.thickness / 2 - kNeck * gyroid.cell),
+        layer_(isSheet_ ? gyroid.thickness / 2 : gyroid.thickness / 2 - kNeck * gyroid.cell),
         cell_(gyroid.cell),
         corner_(corner),
         reach_(reach) {}
@@ -140,15 +140,15 @@ class GyroidField {
     // What the distance is at least, by the steepest slope.
     double least = value / kSteepest * cell_ / kTurn;
     if (isSheet_) least = std::abs(least);
-    if (least - level_ > reach_ || (!isSheet_ && least - level_ < -reach_ && least < 0))
-      return least - level_;
+    if (least - layer_ > reach_ || (!isSheet_ && least - layer_ < -reach_ && least < 0))
+      return least - layer_;
     const double distance = gyroidDistance(p, cell_);
-    return (isSheet_ ? std::abs(distance) : distance) - level_;
+    return (isSheet_ ? std::abs(distance) : distance) - layer_;
   }
 
  private:
   bool isSheet_;
-  double level_, cell_;
+  double layer_, cell_;
   V3d corner_;
   double reach_;
 };

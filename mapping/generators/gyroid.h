@@ -15,7 +15,7 @@ enum class GyroidKind {
   Network  ///< the struts of one labyrinth
 };
 
-/// The level surface sin x cos y + sin y cos z + sin z cos x = 0, which is near Schoen's minimal
+/// The layer surface sin x cos y + sin y cos z + sin z cos x = 0, which is near Schoen's minimal
 /// surface [Schoen70, Wohlgemuth01], cut off by the box of its cells.
 struct Gyroid {
   GyroidKind kind = GyroidKind::Sheet;

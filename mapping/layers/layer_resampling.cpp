@@ -28,46 +28,46 @@ V3d along(const At& at, std::size_t count, double x) {
          (b * 3.0 - a - c * 3.0 + d) * (0.5 * f * f * f);
 }
 
-V3d placeAt(const ParticleLevel& level, double x, double y) {
+V3d placeAt(const ParticleLayer& layer, double x, double y) {
   const auto row = [&](std::size_t j) {
-    return along([&](std::size_t i) { return level.at(i, j); }, level.columns, x);
+    return along([&](std::size_t i) { return layer.at(i, j); }, layer.columns, x);
   };
-  return along(row, level.rows, y);
+  return along(row, layer.rows, y);
 }
 
 /// Its rim as rows and columns like the others, so that a place is one further along each axis.
-ParticleLevel withRimInside(const ParticleLevel& level) {
-  ParticleLevel wide;
-  wide.columns = level.columns + 2;
-  wide.rows = level.rows + 2;
-  for (int j = -1; j <= static_cast<int>(level.rows); ++j)
-    for (int i = -1; i <= static_cast<int>(level.columns); ++i)
-      wide.positions.push_back(level.beyond(i, j));
+ParticleLayer withRimInside(const ParticleLayer& layer) {
+  ParticleLayer wide;
+  wide.columns = layer.columns + 2;
+  wide.rows = layer.rows + 2;
+  for (int j = -1; j <= static_cast<int>(layer.rows); ++j)
+    for (int i = -1; i <= static_cast<int>(layer.columns); ++i)
+      wide.positions.push_back(layer.beyond(i, j));
   return wide;
 }
 
 }  // namespace
 
-ParticleLevel withCounts(const ParticleLevel& level, std::size_t columns, std::size_t rows) {
-  if (level.columns == columns && level.rows == rows) return level;
-  ParticleLevel result{.columns = columns,
+ParticleLayer withCounts(const ParticleLayer& layer, std::size_t columns, std::size_t rows) {
+  if (layer.columns == columns && layer.rows == rows) return layer;
+  ParticleLayer result{.columns = columns,
                        .rows = rows,
-                       .w = level.w,
-                       .height = level.height,
+                       .w = layer.w,
+                       .height = layer.height,
                        .positions = {},
                        .rim = {}};
   const auto stride = [](std::size_t from, std::size_t to) {
     return static_cast<double>(from - 1) / static_cast<double>(to - 1);
   };
-  const double across = stride(level.columns, columns), up = stride(level.rows, rows);
-  if (!level.hasRim()) {
+  const double across = stride(layer.columns, columns), up = stride(layer.rows, rows);
+  if (!layer.hasRim()) {
     for (std::size_t j = 0; j < rows; ++j)
       for (std::size_t i = 0; i < columns; ++i)
         result.positions.push_back(
-            placeAt(level, static_cast<double>(i) * across, static_cast<double>(j) * up));
+            placeAt(layer, static_cast<double>(i) * across, static_cast<double>(j) * up));
     return result;
   }
-  const ParticleLevel wide = withRimInside(level);
+  const ParticleLayer wide = withRimInside(layer);
   const auto place = [&](int i, int j) { return placeAt(wide, 1 + i * across, 1 + j * up); };
   result.rim.resize(2 * (columns + rows) + 4);
   const auto right = static_cast<int>(columns), top = static_cast<int>(rows);
@@ -83,15 +83,15 @@ ParticleLevel withCounts(const ParticleLevel& level, std::size_t columns, std::s
 }
 
 std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink) {
-  // Of the distance to a neighbour on the last level what must be left of it.
+  // Of the distance to a neighbour on the last layer what must be left of it.
   constexpr double kLeastShare = 0.25;
-  constexpr double kWidest = 1.1;  // steps of the levels from layer to layer
+  constexpr double kWidest = 1.1;  // steps of the layers from layer to layer
   std::vector<SunkParticle> particles;
-  if (sink == 0 || patch.levels.size() < 2) return particles;
+  if (sink == 0 || patch.layers.size() < 2) return particles;
   const bool isBelow = sink > 0;
-  const ParticleLevel& last = isBelow ? patch.levels.front() : patch.levels.back();
-  const ParticleLevel before =
-      withCounts(isBelow ? patch.levels[1] : *(patch.levels.end() - 2), last.columns, last.rows);
+  const ParticleLayer& last = isBelow ? patch.layers.front() : patch.layers.back();
+  const ParticleLayer before =
+      withCounts(isBelow ? patch.layers[1] : *(patch.layers.end() - 2), last.columns, last.rows);
   const int rim = last.hasRim() && before.hasRim() ? 1 : 0;
   const auto right = static_cast<int>(last.columns), top = static_cast<int>(last.rows);
   const auto isThere = [&](int i, int j) {
@@ -99,10 +99,10 @@ std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink) {
   };
   const double step = std::abs(last.w - before.w);
   // A smooth map errs most beside its last particles: they lie deeper than the texture, by as much
-  // again or by a step. Columns are straight, so that layers may lie wider apart than levels, and
+  // again or by a step. Columns are straight, so that layers may lie wider apart than layers, and
   // the wider the deeper.
   const double reach = std::abs(sink) + std::min(std::abs(sink), step);
-  const double most = 2.0 * static_cast<double>(patch.levels.size());
+  const double most = 2.0 * static_cast<double>(patch.layers.size());
   const auto layers = static_cast<int>(std::min(most, std::ceil(reach / (kWidest * step))));
   for (int n = 1; n <= layers; ++n) {
     const double depth = reach * n / layers, share = depth / step;

@@ -5,17 +5,17 @@
 
 #include "mapping/patches/patch.h"
 
-/// Other counts of particles on the same smooth surface through a level's.
+/// Other counts of particles on the same smooth surface through a layer's.
 namespace mapping {
 
-/// A level of other counts on the smooth surface (Catmull-Rom) through the given one and its rim; a
+/// A layer of other counts on the smooth surface (Catmull-Rom) through the given one and its rim; a
 /// rim comes to lie one of the new spacings outside, straight on if that is beyond the given one.
-/// The given level for its own counts.
+/// The given layer for its own counts.
 /// @param columns, rows  each at least 2
-[[nodiscard]] ParticleLevel withCounts(const ParticleLevel& level, std::size_t columns,
+[[nodiscard]] ParticleLayer withCounts(const ParticleLayer& layer, std::size_t columns,
                                        std::size_t rows);
 
-/// A particle below the levels of a patch, or above them.
+/// A particle below the layers of a patch, or above them.
 struct SunkParticle {
   Imath::V3d place, uvw;
 };

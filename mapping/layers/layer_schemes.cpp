@@ -21,11 +21,11 @@ double shareOf(std::size_t k, std::size_t count) {
 }
 
 /// The same counts and rim, at another height.
-ParticleLevel levelLike(const ParticleLevel& surface, double w, double height) {
-  ParticleLevel level = surface;
-  level.w = w;
-  level.height = height;
-  return level;
+ParticleLayer layerLike(const ParticleLayer& surface, double w, double height) {
+  ParticleLayer layer = surface;
+  layer.w = w;
+  layer.height = height;
+  return layer;
 }
 
 /// v turned by the least rotation that takes one unit vector to another.
@@ -43,26 +43,26 @@ V3d rotated(const V3d& v, const V3d& axis, double angle) {
 }
 
 template <typename Work>
-void forEachParticle(ParticleLevel& level, const Work& work) {
-  for (V3d& p : level.positions) work(p);
-  for (V3d& p : level.rim) work(p);
+void forEachParticle(ParticleLayer& layer, const Work& work) {
+  for (V3d& p : layer.positions) work(p);
+  for (V3d& p : layer.rim) work(p);
 }
 
-std::vector<V3d> particlesOf(const ParticleLevel& level) {
-  std::vector<V3d> all = level.positions;
-  all.insert(all.end(), level.rim.begin(), level.rim.end());
+std::vector<V3d> particlesOf(const ParticleLayer& layer) {
+  std::vector<V3d> all = layer.positions;
+  all.insert(all.end(), layer.rim.begin(), layer.rim.end());
   return all;
 }
 
-void setParticles(const std::vector<V3d>& all, ParticleLevel& level) {
-  const auto rim = all.begin() + static_cast<std::ptrdiff_t>(level.positions.size());
-  std::copy(all.begin(), rim, level.positions.begin());
-  std::copy(rim, all.end(), level.rim.begin());
+void setParticles(const std::vector<V3d>& all, ParticleLayer& layer) {
+  const auto rim = all.begin() + static_cast<std::ptrdiff_t>(layer.positions.size());
+  std::copy(all.begin(), rim, layer.positions.begin());
+  std::copy(rim, all.end(), layer.rim.begin());
 }
 
-ParticleLevel advected(const levelset::NarrowBand& space, const ParticleLevel& surface,
+ParticleLayer advected(const levelset::NarrowBand& space, const ParticleLayer& surface,
                        double height) {
-  ParticleLevel top = levelLike(surface, 1, height);
+  ParticleLayer top = layerLike(surface, 1, height);
   const auto follow = [&](std::vector<V3d>& particles) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, particles.size(), 64),
                       [&](const auto& range) {
@@ -83,18 +83,18 @@ ParticleLevel advected(const levelset::NarrowBand& space, const ParticleLevel& s
 }
 
 /// Evenly on the straight ways from the surface to the top.
-ParticleLevel between(const ParticleLevel& surface, const ParticleLevel& top, double height,
+ParticleLayer between(const ParticleLayer& surface, const ParticleLayer& top, double height,
                       double w) {
-  ParticleLevel level = levelLike(surface, w, w * height);
-  for (std::size_t n = 0; n < level.positions.size(); ++n)
-    level.positions[n] += (top.positions[n] - surface.positions[n]) * w;
-  for (std::size_t n = 0; n < level.rim.size(); ++n)
-    level.rim[n] += (top.rim[n] - surface.rim[n]) * w;
-  return level;
+  ParticleLayer layer = layerLike(surface, w, w * height);
+  for (std::size_t n = 0; n < layer.positions.size(); ++n)
+    layer.positions[n] += (top.positions[n] - surface.positions[n]) * w;
+  for (std::size_t n = 0; n < layer.rim.size(); ++n)
+    layer.rim[n] += (top.rim[n] - surface.rim[n]) * w;
+  return layer;
 }
 
 /// Spheres of a twentieth of the least distance between neighbours.
-TravelGuard guardOf(const ParticleLevel& surface) {
+TravelGuard guardOf(const ParticleLayer& surface) {
   constexpr double kShare = 0.05;
   double least = HUGE_VAL;
   const auto meet = [&](const V3d& a, const V3d& b) { least = std::min(least, (a - b).length()); };
@@ -111,17 +111,17 @@ TravelGuard guardOf(const ParticleLevel& surface) {
 
 }  // namespace
 
-std::vector<ParticleLevel> conformingLevels(const levelset::NarrowBand& space,
-                                            const ParticleLevel& surface, double height,
+std::vector<ParticleLayer> conformingLayers(const levelset::NarrowBand& space,
+                                            const ParticleLayer& surface, double height,
                                             std::size_t count) {
-  const ParticleLevel top = advected(space, surface, height);
-  std::vector<ParticleLevel> levels;
+  const ParticleLayer top = advected(space, surface, height);
+  std::vector<ParticleLayer> layers;
   for (std::size_t k = 0; k < count; ++k)
-    levels.push_back(between(surface, top, height, shareOf(k, count)));
-  return levels;
+    layers.push_back(between(surface, top, height, shareOf(k, count)));
+  return layers;
 }
 
-ParticleLevel conformingLevel(const levelset::NarrowBand& space, const ParticleLevel& surface,
+ParticleLayer conformingLayer(const levelset::NarrowBand& space, const ParticleLayer& surface,
                               double height, double w) {
   return between(surface, advected(space, surface, height), height, w);
 }
@@ -179,13 +179,13 @@ V3d SweepCurve::tangent(double length) const {
   return (direction(i) * (1 - t) + direction(j) * t).normalized();
 }
 
-SplineSweep splineLevels(const ParticleLevel& surface, const SweepCurve& curve, double height,
+SplineSweep splineLayers(const ParticleLayer& surface, const SweepCurve& curve, double height,
                          std::size_t count, bool isFaded) {
-  constexpr std::size_t kSteps = 32;  // from level to level
+  constexpr std::size_t kSteps = 32;  // from layer to layer
   constexpr double kCrawl = 0.02;     // of the way that the curve goes
   SplineSweep sweep;
-  sweep.levels.push_back(levelLike(surface, 0, 0));
-  ParticleLevel level = surface;
+  sweep.layers.push_back(layerLike(surface, 0, 0));
+  ParticleLayer layer = surface;
   std::vector<V3d> places = particlesOf(surface), moves(places.size());
   TravelGuard guard = guardOf(surface);
   std::vector<char> isSlowed(places.size(), 0);
@@ -217,18 +217,18 @@ SplineSweep splineLevels(const ParticleLevel& surface, const SweepCurve& curve, 
     before = now;
     if (step % kSteps != 0) continue;
     const double w = shareOf(step / kSteps, count);
-    setParticles(places, level);
-    sweep.levels.push_back(levelLike(level, w, w * height));
+    setParticles(places, layer);
+    sweep.layers.push_back(layerLike(layer, w, w * height));
   }
   for (std::size_t n = 0; n < surface.positions.size(); ++n)
     sweep.slowed += guard.slowed()[n] || isSlowed[n];
   return sweep;
 }
 
-void transformLevels(std::vector<ParticleLevel>& levels, const LevelTransform& transform,
+void transformLayers(std::vector<ParticleLayer>& layers, const LayerTransform& transform,
                      const V3d& origin, const V3d& axis, const V3d& side, double height) {
-  for (ParticleLevel& level : levels) {
-    const double w = level.w, scale = std::lerp(1.0, transform.taper, w);
+  for (ParticleLayer& layer : layers) {
+    const double w = layer.w, scale = std::lerp(1.0, transform.taper, w);
     const double lean = transform.bend * w;
     // The straight axis as an arc of the same length.
     const double radius = transform.bend != 0 ? height / transform.bend : 0;
@@ -237,7 +237,7 @@ void transformLevels(std::vector<ParticleLevel>& levels, const LevelTransform& t
                                                side * (radius * (1 - std::cos(lean)))
                                          : foot;
     const V3d hinge = axis.cross(side);
-    forEachParticle(level, [&](V3d& p) {
+    forEachParticle(layer, [&](V3d& p) {
       V3d local = p - foot;
       const double up = local.dot(axis);
       local = axis * up + (local - axis * up) * scale;

@@ -9,22 +9,22 @@
 #include "levelset/narrow_band.h"
 #include "mapping/patches/patch.h"
 
-/// Levels of particles that are made from those on the surface, see also particle_levels.h.
+/// Layers of particles that are made from those on the surface, see also particle_layers.h.
 namespace mapping {
 
-/// Scheme A: each particle follows ∇φ for as long as the height is high, and the levels between lie
+/// Scheme A: each particle follows ∇φ for as long as the height is high, and the layers between lie
 /// on its straight way [Brodersen07 §8.2]. The particles spread over what is convex and crowd where
 /// it is concave; towards the medial axis they slow down. Ways along a gradient do not cross.
 /// @param space    distances throughout patch space
-/// @param surface  the level w = 0
-/// @return         `count` levels, the surface first
-[[nodiscard]] std::vector<ParticleLevel> conformingLevels(const levelset::NarrowBand& space,
-                                                          const ParticleLevel& surface,
+/// @param surface  the layer w = 0
+/// @return         `count` layers, the surface first
+[[nodiscard]] std::vector<ParticleLayer> conformingLayers(const levelset::NarrowBand& space,
+                                                          const ParticleLayer& surface,
                                                           double height, std::size_t count);
 
 /// The one of them at w alone.
-[[nodiscard]] ParticleLevel conformingLevel(const levelset::NarrowBand& space,
-                                            const ParticleLevel& surface, double height, double w);
+[[nodiscard]] ParticleLayer conformingLayer(const levelset::NarrowBand& space,
+                                            const ParticleLayer& surface, double height, double w);
 
 /// A curve through points, smooth and with tangents (Catmull-Rom by chord lengths), as a polyline
 /// that is dense enough to measure lengths on.
@@ -44,7 +44,7 @@ class SweepCurve {
 };
 
 struct SplineSweep {
-  std::vector<ParticleLevel> levels;
+  std::vector<ParticleLayer> layers;
   /// Particles that would have met their neighbours, see TravelGuard, or gone backwards.
   std::size_t slowed = 0;
 };
@@ -55,13 +55,13 @@ struct SplineSweep {
 /// @param height  how far along the curve, no more than its length
 /// @param isFaded let what stands above or below the plane across the curve go to nothing at the
 ///                end
-[[nodiscard]] SplineSweep splineLevels(const ParticleLevel& surface, const SweepCurve& curve,
+[[nodiscard]] SplineSweep splineLayers(const ParticleLayer& surface, const SweepCurve& curve,
                                        double height, std::size_t count, bool isFaded);
 
-/// Turns, scales and bends the levels about an axis, more with growing w.
+/// Turns, scales and bends the layers about an axis, more with growing w.
 /// @param origin, axis  of the patch: its centre and unit normal; @param side  unit, the direction
 ///        that a bend leans to
-void transformLevels(std::vector<ParticleLevel>& levels, const LevelTransform& transform,
+void transformLayers(std::vector<ParticleLayer>& layers, const LayerTransform& transform,
                      const Imath::V3d& origin, const Imath::V3d& axis, const Imath::V3d& side,
                      double height);
 

@@ -21,10 +21,10 @@ std::string text(const V3d& p) {
 
 /// Coons' patch: opposite sides blended, less what the corners count twice. Exact on planes, and
 /// nearly so on quadrics.
-V3d coons(const PatchSides& border, const ParticleLevel& level, std::size_t column,
+V3d coons(const PatchSides& border, const ParticleLayer& layer, std::size_t column,
           std::size_t row) {
-  const double u = static_cast<double>(column) / static_cast<double>(level.columns - 1);
-  const double v = static_cast<double>(row) / static_cast<double>(level.rows - 1);
+  const double u = static_cast<double>(column) / static_cast<double>(layer.columns - 1);
+  const double v = static_cast<double>(row) / static_cast<double>(layer.rows - 1);
   const V3d &c0 = border[0].front(), &c1 = border[0].back(), &c2 = border[2].back(),
             &c3 = border[2].front();
   return border[0][column] * (1 - v) + border[2][column] * v + border[3][row] * (1 - u) +
@@ -34,49 +34,49 @@ V3d coons(const PatchSides& border, const ParticleLevel& level, std::size_t colu
 
 /// True when neighbours in the rows lie no further apart than the sides give reason for: the
 /// blended start has not slipped to another part of the surface.
-bool isUnbroken(const ParticleLevel& level, double longestU, double longestV) {
-  for (std::size_t j = 0; j < level.rows; ++j)
-    for (std::size_t i = 0; i < level.columns; ++i) {
-      if (i > 0 && (level.at(i, j) - level.at(i - 1, j)).length() > longestU) return false;
-      if (j > 0 && (level.at(i, j) - level.at(i, j - 1)).length() > longestV) return false;
+bool isUnbroken(const ParticleLayer& layer, double longestU, double longestV) {
+  for (std::size_t j = 0; j < layer.rows; ++j)
+    for (std::size_t i = 0; i < layer.columns; ++i) {
+      if (i > 0 && (layer.at(i, j) - layer.at(i - 1, j)).length() > longestU) return false;
+      if (j > 0 && (layer.at(i, j) - layer.at(i, j - 1)).length() > longestV) return false;
     }
   return true;
 }
 
 bool sweepBlended(const SurfaceField& field, const SurfaceField& guide, const PatchSides& border,
-                  ParticleLevel& level) {
-  for (std::size_t j = 1; j + 1 < level.rows; ++j)
-    for (std::size_t i = 1; i + 1 < level.columns; ++i) {
-      V3d p = coons(border, level, i, j);
-      if (!guide.project(p, level.height) || !field.project(p, level.height)) return false;
-      level.positions[j * level.columns + i] = p;
+                  ParticleLayer& layer) {
+  for (std::size_t j = 1; j + 1 < layer.rows; ++j)
+    for (std::size_t i = 1; i + 1 < layer.columns; ++i) {
+      V3d p = coons(border, layer, i, j);
+      if (!guide.project(p, layer.height) || !field.project(p, layer.height)) return false;
+      layer.positions[j * layer.columns + i] = p;
     }
   const double u = std::max(pathLength(border[0]), pathLength(border[2]));
   const double v = std::max(pathLength(border[1]), pathLength(border[3]));
-  return isUnbroken(level, 4 * u / static_cast<double>(level.columns - 1),
-                    4 * v / static_cast<double>(level.rows - 1));
+  return isUnbroken(layer, 4 * u / static_cast<double>(layer.columns - 1),
+                    4 * v / static_cast<double>(layer.rows - 1));
 }
 
 /// Geodesics that join opposite subdivision points: they never leave the surface.
 void sweepGeodesics(const SurfaceField& field, const std::vector<V3d>& firstRow,
-                    ParticleLevel& level) {
+                    ParticleLayer& layer) {
   std::vector<V3d> path = firstRow;
-  for (std::size_t j = 1; j + 1 < level.rows; ++j) {
-    const V3d a = level.at(0, j), b = level.at(level.columns - 1, j);
+  for (std::size_t j = 1; j + 1 < layer.rows; ++j) {
+    const V3d a = layer.at(0, j), b = layer.at(layer.columns - 1, j);
     // Rows that lie side by side run alike, also where two ways are equally long.
-    path = geodesicLike(field, level.height, a, b, path);
-    if (path.empty()) path = geodesic(field, level.height, a, b);
+    path = geodesicLike(field, layer.height, a, b, path);
+    if (path.empty()) path = geodesic(field, layer.height, a, b);
     if (path.empty()) {
       throw InvalidInput(
           fmt::format("patch: no path on the surface joins {} and {}; move the corners "
                       "closer together",
                       text(a), text(b)));
     }
-    const std::vector<V3d> row = sampleByArcLength(path, level.columns);
-    for (std::size_t i = 1; i + 1 < level.columns; ++i) {
+    const std::vector<V3d> row = sampleByArcLength(path, layer.columns);
+    for (std::size_t i = 1; i + 1 < layer.columns; ++i) {
       V3d p = row[i];
-      (void)field.project(p, level.height);
-      level.positions[j * level.columns + i] = p;
+      (void)field.project(p, layer.height);
+      layer.positions[j * layer.columns + i] = p;
     }
   }
 }
@@ -143,58 +143,58 @@ double sideLengthV(const PatchSides& sides) {
   return 0.5 * (pathLength(sides[1]) + pathLength(sides[3]));
 }
 
-Relaxation fillLevel(const levelset::NarrowBand& band, const levelset::NarrowBand& guide,
-                     const PatchSides& sides, ParticleLevel& level) {
+Relaxation fillLayer(const levelset::NarrowBand& band, const levelset::NarrowBand& guide,
+                     const PatchSides& sides, ParticleLayer& layer) {
   const SurfaceField field(band);
   PatchSides border;
   for (std::size_t side = 0; side < 4; ++side) {
-    border[side] = sampleByArcLength(sides[side], side % 2 == 0 ? level.columns : level.rows);
+    border[side] = sampleByArcLength(sides[side], side % 2 == 0 ? layer.columns : layer.rows);
     for (std::size_t i = 1; i + 1 < border[side].size(); ++i)
-      (void)field.project(border[side][i], level.height);
+      (void)field.project(border[side][i], layer.height);
   }
-  level.positions.assign(level.columns * level.rows, V3d(0));
-  for (std::size_t i = 0; i < level.columns; ++i) {
-    level.positions[i] = border[0][i];
-    level.positions[(level.rows - 1) * level.columns + i] = border[2][i];
+  layer.positions.assign(layer.columns * layer.rows, V3d(0));
+  for (std::size_t i = 0; i < layer.columns; ++i) {
+    layer.positions[i] = border[0][i];
+    layer.positions[(layer.rows - 1) * layer.columns + i] = border[2][i];
   }
-  for (std::size_t j = 0; j < level.rows; ++j) {
-    level.positions[j * level.columns] = border[3][j];
-    level.positions[j * level.columns + level.columns - 1] = border[1][j];
+  for (std::size_t j = 0; j < layer.rows; ++j) {
+    layer.positions[j * layer.columns] = border[3][j];
+    layer.positions[j * layer.columns + layer.columns - 1] = border[1][j];
   }
-  if (!sweepBlended(field, SurfaceField(guide), border, level))
-    sweepGeodesics(field, sides[0], level);
-  const Relaxation relaxation = relax(band, level);
-  addRim(band, level);
+  if (!sweepBlended(field, SurfaceField(guide), border, layer))
+    sweepGeodesics(field, sides[0], layer);
+  const Relaxation relaxation = relax(band, layer);
+  addRim(band, layer);
   return relaxation;
 }
 
-void addRim(const levelset::NarrowBand& band, ParticleLevel& level) {
+void addRim(const levelset::NarrowBand& band, ParticleLayer& layer) {
   const SurfaceField field(band);
-  const auto columns = static_cast<int>(level.columns), rows = static_cast<int>(level.rows);
-  level.rim.assign(2 * (level.columns + level.rows) + 4, V3d(0));
+  const auto columns = static_cast<int>(layer.columns), rows = static_cast<int>(layer.rows);
+  layer.rim.assign(2 * (layer.columns + layer.rows) + 4, V3d(0));
   const auto onwards = [&](const V3d& last, const V3d& before) {
     const V3d way = last - before;
     constexpr double kMostTurn = 0.5;  // cosine
-    const std::optional<V3d> end = walkStraight(field, level.height, last, way, way.length());
+    const std::optional<V3d> end = walkStraight(field, layer.height, last, way, way.length());
     const bool isAhead = end && field.normal(last).dot(field.normal(*end)) > kMostTurn;
     return isAhead ? *end : last + way;
   };
   for (int j = 0; j < rows; ++j) {
-    level.rim[level.rimIndex(-1, j)] = onwards(level.beyond(0, j), level.beyond(1, j));
-    level.rim[level.rimIndex(columns, j)] =
-        onwards(level.beyond(columns - 1, j), level.beyond(columns - 2, j));
+    layer.rim[layer.rimIndex(-1, j)] = onwards(layer.beyond(0, j), layer.beyond(1, j));
+    layer.rim[layer.rimIndex(columns, j)] =
+        onwards(layer.beyond(columns - 1, j), layer.beyond(columns - 2, j));
   }
   for (int i = 0; i < columns; ++i) {
-    level.rim[level.rimIndex(i, -1)] = onwards(level.beyond(i, 0), level.beyond(i, 1));
-    level.rim[level.rimIndex(i, rows)] =
-        onwards(level.beyond(i, rows - 1), level.beyond(i, rows - 2));
+    layer.rim[layer.rimIndex(i, -1)] = onwards(layer.beyond(i, 0), layer.beyond(i, 1));
+    layer.rim[layer.rimIndex(i, rows)] =
+        onwards(layer.beyond(i, rows - 1), layer.beyond(i, rows - 2));
   }
   for (const int i : {-1, columns})
     for (const int j : {-1, rows}) {
       const int a = i < 0 ? 0 : columns - 1, b = j < 0 ? 0 : rows - 1;
-      const V3d straight = level.beyond(i, b) + level.beyond(a, j) - level.beyond(a, b);
+      const V3d straight = layer.beyond(i, b) + layer.beyond(a, j) - layer.beyond(a, b);
       V3d p = straight;
-      level.rim[level.rimIndex(i, j)] = field.project(p, level.height) ? p : straight;
+      layer.rim[layer.rimIndex(i, j)] = field.project(p, layer.height) ? p : straight;
     }
 }
 

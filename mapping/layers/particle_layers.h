@@ -10,15 +10,15 @@
 #include "mapping/layers/relaxation.h"
 #include "mapping/patches/patch.h"
 
-/// Particles of a patch, level by level [Brodersen07 §8.2].
+/// Particles of a patch, layer by layer [Brodersen07 §8.2].
 namespace mapping {
 
-/// Sides of a patch on one level: 0 → 1, 1 → 2, 3 → 2 and 0 → 3, so that opposite sides run alike.
+/// Sides of a patch on one layer: 0 → 1, 1 → 2, 3 → 2 and 0 → 3, so that opposite sides run alike.
 using PatchSides = std::array<std::vector<Imath::V3d>, 4>;
 
 /// Geodesics between the corners on φ = height, and through the points between them.
 /// @param between  points on φ = height that a side passes on its way; often none
-/// @param below    the sides on the level below, which these run like where they can; or nullptr
+/// @param below    the sides on the layer below, which these run like where they can; or nullptr
 /// @param ground   the sides on the surface, or nullptr: a side that is over four times as long as
 /// its own there and the height is none
 /// @throws InvalidInput when two corners are not joined, or by such a side only
@@ -32,17 +32,17 @@ using PatchSides = std::array<std::vector<Imath::V3d>, 4>;
 [[nodiscard]] double sideLengthU(const PatchSides& sides);
 [[nodiscard]] double sideLengthV(const PatchSides& sides);
 
-/// A grid of particles swept between the sides onto φ = level.height and relaxed, and the rim
+/// A grid of particles swept between the sides onto φ = layer.height and relaxed, and the rim
 /// around it.
-/// @param level  with its counts, w and height; its positions are made
+/// @param layer  with its counts, w and height; its positions are made
 /// @param guide  distances, perhaps coarser, that reach where the blend of the sides may lie
 /// @throws InvalidInput where the surface cannot be followed
-Relaxation fillLevel(const levelset::NarrowBand& band, const levelset::NarrowBand& guide,
-                     const PatchSides& sides, ParticleLevel& level);
+Relaxation fillLayer(const levelset::NarrowBand& band, const levelset::NarrowBand& guide,
+                     const PatchSides& sides, ParticleLayer& layer);
 
 /// Makes the rim: rows and columns go on by their last spacing; straight through space where the
 /// surface ends or turns away, so that no particle comes to lie behind others.
-void addRim(const levelset::NarrowBand& band, ParticleLevel& level);
+void addRim(const levelset::NarrowBand& band, ParticleLayer& layer);
 
 /// Carries points along ∇φ from one height to another, in steps of at most half a voxel (RK2).
 /// @throws InvalidInput where one meets the medial axis of the base before that height

@@ -19,7 +19,7 @@ using Imath::V3d;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-constexpr const char* kPatchLevels = "patch";
+constexpr const char* kPatchLayers = "patch";
 // The map's system is dense: n³ / 3 operations and n² numbers. This many particles cost a second or
 // two, and lie some five to ten voxels apart on a patch of a hundred or two.
 constexpr double kParticleBudget = 2000;
@@ -27,12 +27,12 @@ constexpr double kSmallestSpacing = 1.5;  // voxels; closer ones say the same th
 constexpr std::size_t kFewest = 4;        // particles along a side
 constexpr double kMostParticles = 1e6;
 
-/// The middle of a level, and directions there.
+/// The middle of a layer, and directions there.
 struct Axis {
   V3d origin, normal, u;
 };
 
-Axis axisOf(const NarrowBand& base, const ParticleLevel& surface) {
+Axis axisOf(const NarrowBand& base, const ParticleLayer& surface) {
   const std::size_t i = (surface.columns - 1) / 2, j = (surface.rows - 1) / 2;
   const std::size_t right = surface.columns / 2, above = surface.rows / 2;
   Axis axis;
@@ -47,30 +47,30 @@ Axis axisOf(const NarrowBand& base, const ParticleLevel& surface) {
   return axis;
 }
 
-std::vector<ParticleLevel> transformed(const NarrowBand& base, std::vector<ParticleLevel> levels,
-                                       double height, const LevelTransform& transform) {
-  if (transform.isIdentity()) return levels;
-  const Axis axis = axisOf(base, levels.front());
-  transformLevels(levels, transform, axis.origin, axis.normal, axis.u, height);
-  return levels;
+std::vector<ParticleLayer> transformed(const NarrowBand& base, std::vector<ParticleLayer> layers,
+                                       double height, const LayerTransform& transform) {
+  if (transform.isIdentity()) return layers;
+  const Axis axis = axisOf(base, layers.front());
+  transformLayers(layers, transform, axis.origin, axis.normal, axis.u, height);
+  return layers;
 }
 
 struct Counts {
   std::size_t columns, rows;
 };
 
-/// Calls refit(level, counts) for each level above the surface whose particles lie over a quarter
-/// closer or farther apart than on the surface, along u or v; than the spacing that all levels
+/// Calls refit(layer, counts) for each layer above the surface whose particles lie over a quarter
+/// closer or farther apart than on the surface, along u or v; than the spacing that all layers
 /// together would be given, where that is wider and none is asked for.
 /// @throws ResourceLimit as checkParticleCount does
 template <typename Refit>
-void keepDensity(const NarrowBand& base, std::vector<ParticleLevel>& levels, double height,
+void keepDensity(const NarrowBand& base, std::vector<ParticleLayer>& layers, double height,
                  const PatchOptions& options, const Refit& refit) {
   constexpr double kTolerated = 1.25;
-  std::vector<LevelSize> sizes;
-  for (const ParticleLevel& level : transformed(base, levels, height, options.transform))
-    sizes.push_back(sizeOf(level));
-  const ParticleLevel& surface = levels.front();
+  std::vector<LayerSize> sizes;
+  for (const ParticleLayer& layer : transformed(base, layers, height, options.transform))
+    sizes.push_back(sizeOf(layer));
+  const ParticleLayer& surface = layers.front();
   const auto across = static_cast<double>(surface.columns - 1),
              up = static_cast<double>(surface.rows - 1);
   const double spacing = 0.5 * (sizes[0].u / across + sizes[0].v / up);
@@ -83,15 +83,15 @@ void keepDensity(const NarrowBand& base, std::vector<ParticleLevel>& levels, dou
   };
   std::vector<Counts> counts;
   double total = 0;
-  for (const LevelSize& size : sizes) {
+  for (const LayerSize& size : sizes) {
     const Counts n = {count(across, size.u / sizes[0].u), count(up, size.v / sizes[0].v)};
     total += static_cast<double>(n.columns + 2) * static_cast<double>(n.rows + 2);
     counts.push_back(n);
   }
   checkParticleCount(total, spacing, options);
-  for (std::size_t k = 1; k < levels.size(); ++k)
-    if (counts[k].columns != levels[k].columns || counts[k].rows != levels[k].rows)
-      refit(levels[k], counts[k]);
+  for (std::size_t k = 1; k < layers.size(); ++k)
+    if (counts[k].columns != layers[k].columns || counts[k].rows != layers[k].rows)
+      refit(layers[k], counts[k]);
 }
 
 }  // namespace
@@ -104,9 +104,9 @@ void checkPatchOptions(const char* action, double height, const PatchOptions& op
   if (!(height > 0) || !std::isfinite(height)) {
     throw UsageError(fmt::format("{}: the height is {}; give a positive length", action, height));
   }
-  if (options.levels < 2) {
+  if (options.layers < 2) {
     throw UsageError(
-        fmt::format("{}: {} levels of particles; give at least 2", action, options.levels));
+        fmt::format("{}: {} layers of particles; give at least 2", action, options.layers));
   }
   if (!(options.spacing >= 0) || !std::isfinite(options.spacing)) {
     throw UsageError(fmt::format("{}: the spacing of particles is {}; give a positive length",
@@ -117,18 +117,18 @@ void checkPatchOptions(const char* action, double height, const PatchOptions& op
     throw UsageError(
         fmt::format("{}: {} by {} cells; give at least 3 along u and along v", action, across, up));
   }
-  const LevelTransform& t = options.transform;
+  const LayerTransform& t = options.transform;
   if (!std::isfinite(t.twist) || !std::isfinite(t.bend) || !(t.taper > 0) ||
       !std::isfinite(t.taper)) {
     throw UsageError(
         fmt::format("{}: twist {}, taper {} and bend {}; give two angles and a positive scale",
                     action, t.twist, t.taper, t.bend));
   }
-  if (options.scheme != LevelScheme::Spline && (!options.spline.empty() || options.fade)) {
+  if (options.scheme != LayerScheme::Spline && (!options.spline.empty() || options.fade)) {
     throw UsageError(
         fmt::format("{}: a spline and its fading go with the spline scheme only", action));
   }
-  if (options.scheme != LevelScheme::Reduced && (options.parallel || !options.directions.empty())) {
+  if (options.scheme != LayerScheme::Reduced && (options.parallel || !options.directions.empty())) {
     throw UsageError(
         fmt::format("{}: directions of the corners go with the reduced scheme only", action));
   }
@@ -161,33 +161,33 @@ void checkPatchOptions(const char* action, double height, const PatchOptions& op
     }
 }
 
-LevelSize sizeOf(const ParticleLevel& level) {
-  LevelSize size{0, 0};
-  for (std::size_t j = 0; j < level.rows; ++j)
-    for (std::size_t i = 0; i < level.columns; ++i) {
-      if (i > 0) size.u += (level.at(i, j) - level.at(i - 1, j)).length();
-      if (j > 0) size.v += (level.at(i, j) - level.at(i, j - 1)).length();
+LayerSize sizeOf(const ParticleLayer& layer) {
+  LayerSize size{0, 0};
+  for (std::size_t j = 0; j < layer.rows; ++j)
+    for (std::size_t i = 0; i < layer.columns; ++i) {
+      if (i > 0) size.u += (layer.at(i, j) - layer.at(i - 1, j)).length();
+      if (j > 0) size.v += (layer.at(i, j) - layer.at(i, j - 1)).length();
     }
-  size.u /= static_cast<double>(level.rows);
-  size.v /= static_cast<double>(level.columns);
+  size.u /= static_cast<double>(layer.rows);
+  size.v /= static_cast<double>(layer.columns);
   return size;
 }
 
-double particlesAt(double spacing, std::span<const LevelSize> levels) {
+double particlesAt(double spacing, std::span<const LayerSize> layers) {
   double count = 0;
-  for (const LevelSize& level : levels) count += (level.u / spacing + 3) * (level.v / spacing + 3);
+  for (const LayerSize& layer : layers) count += (layer.u / spacing + 3) * (layer.v / spacing + 3);
   return count;
 }
 
-double chooseSpacing(double voxelSize, std::span<const LevelSize> levels, std::size_t times) {
+double chooseSpacing(double voxelSize, std::span<const LayerSize> layers, std::size_t times) {
   double sum = 0, product = 0;
-  for (const LevelSize& level : levels) {
-    sum += level.u + level.v;
-    product += level.u * level.v;
+  for (const LayerSize& layer : layers) {
+    sum += layer.u + layer.v;
+    product += layer.u * layer.v;
   }
   sum *= static_cast<double>(times);
   product *= static_cast<double>(times);
-  const double count = static_cast<double>(levels.size() * times);
+  const double count = static_cast<double>(layers.size() * times);
   const double rest = std::max(kParticleBudget, 36 * count) - 9 * count;
   const double spacing = (3 * sum + std::sqrt(9 * sum * sum + 4 * rest * product)) / (2 * rest);
   return std::max(spacing, kSmallestSpacing * voxelSize);
@@ -199,22 +199,22 @@ std::size_t countAlong(double length, double spacing) {
     throw levelset::ResourceLimit(fmt::format(
         "{}: {:.3g} particles lie along a side, more than {:.0g}; take a wider spacing, "
         "or less taper",
-        kPatchLevels, cells, kMostParticles));
+        kPatchLayers, cells, kMostParticles));
   }
   return std::max(kFewest, static_cast<std::size_t>(cells) + 1);
 }
 
 void checkParticleCount(double count, double spacing, const PatchOptions& options) {
-  levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kPatchLevels);
+  levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kPatchLayers);
   if (!(count <= kMostParticles)) {
     throw levelset::ResourceLimit(fmt::format(
         "{}: a spacing of {:.6g} would make {:.3g} particles, more than {:.0g}; take a wider "
         "one",
-        kPatchLevels, spacing, count, kMostParticles));
+        kPatchLayers, spacing, count, kMostParticles));
   }
 }
 
-NarrowBand sweepAbove(const NarrowBand& base, std::span<const V3d> outline, const LevelSize& size,
+NarrowBand sweepAbove(const NarrowBand& base, std::span<const V3d> outline, const LayerSize& size,
                       double height, const PatchOptions& options, double lean) {
   // Inner particles may lie outside the box of the sides: a patch may bulge by a quarter of its
   // width.
@@ -225,24 +225,24 @@ NarrowBand sweepAbove(const NarrowBand& base, std::span<const V3d> outline, cons
                           .progress = levelset::subProgress(options.progress, 0.1, 0.5)});
 }
 
-std::vector<ParticleLevel> levelsFromSurface(const NarrowBand& base, const ParticleLevel& surface,
-                                             std::span<const V3d> outline, const LevelSize& size,
+std::vector<ParticleLayer> layersFromSurface(const NarrowBand& base, const ParticleLayer& surface,
+                                             std::span<const V3d> outline, const LayerSize& size,
                                              double height, const PatchOptions& options,
                                              PatchReport& report) {
-  if (options.scheme == LevelScheme::Conforming) {
+  if (options.scheme == LayerScheme::Conforming) {
     const NarrowBand space = sweepAbove(base, outline, size, height, options);
-    std::vector<ParticleLevel> levels = conformingLevels(space, surface, height, options.levels);
+    std::vector<ParticleLayer> layers = conformingLayers(space, surface, height, options.layers);
     if (options.cells[0] == 0) {
-      keepDensity(base, levels, height, options, [&](ParticleLevel& level, const Counts& n) {
+      keepDensity(base, layers, height, options, [&](ParticleLayer& layer, const Counts& n) {
         // New particles start on the surface like the others, wherever it has relief between them.
-        ParticleLevel start = withCounts(surface, n.columns, n.rows);
+        ParticleLayer start = withCounts(surface, n.columns, n.rows);
         const SurfaceField field(base);
         for (V3d& p : start.positions) (void)field.project(p, 0);
         for (V3d& p : start.rim) (void)field.project(p, 0);
-        level = conformingLevel(space, start, height, level.w);
+        layer = conformingLayer(space, start, height, layer.w);
       });
     }
-    return levels;
+    return layers;
   }
   const Axis axis = axisOf(base, surface);
   std::vector<V3d> points = {axis.origin};
@@ -251,7 +251,7 @@ std::vector<ParticleLevel> levelsFromSurface(const NarrowBand& base, const Parti
   for (std::size_t i = 1; i < points.size(); ++i) {
     if ((points[i] - points[i - 1]).length() < 1e-6 * base.voxelSize()) {
       throw UsageError(fmt::format("{}: the spline stands still at {}; leave one point out{}",
-                                   kPatchLevels, pointAsOption(points[i]),
+                                   kPatchLayers, pointAsOption(points[i]),
                                    i == 1 ? ", it begins at the patch's centre by itself" : ""));
     }
   }
@@ -260,19 +260,19 @@ std::vector<ParticleLevel> levelsFromSurface(const NarrowBand& base, const Parti
     throw UsageError(
         fmt::format("{}: the height is {:.6g} and the spline only {:.6g} long; lower the height or "
                     "lengthen the spline",
-                    kPatchLevels, height, curve.length()));
+                    kPatchLayers, height, curve.length()));
   }
-  SplineSweep sweep = splineLevels(surface, curve, height, options.levels, options.fade);
+  SplineSweep sweep = splineLayers(surface, curve, height, options.layers, options.fade);
   report.slowed = sweep.slowed;
   if (options.cells[0] == 0) {
-    keepDensity(base, sweep.levels, height, options, [](ParticleLevel& level, const Counts& n) {
-      level = withCounts(level, n.columns, n.rows);
+    keepDensity(base, sweep.layers, height, options, [](ParticleLayer& layer, const Counts& n) {
+      layer = withCounts(layer, n.columns, n.rows);
     });
   }
-  return std::move(sweep.levels);
+  return std::move(sweep.layers);
 }
 
-void requireCovered(const NarrowBand& base, const ParticleLevel& level) {
+void requireCovered(const NarrowBand& base, const ParticleLayer& layer) {
   if (!base.isOpenSurface()) return;
   const SurfaceField field(base);
   const auto require = [&](const V3d& place) {
@@ -281,17 +281,17 @@ void requireCovered(const NarrowBand& base, const ParticleLevel& level) {
     throw levelset::InvalidInput(fmt::format(
         "{}: the surface breaks off at ({:.6g}, {:.6g}, {:.6g}), within the patch; keep to "
         "one side of its border, and off its holes",
-        kPatchLevels, place.x, place.y, place.z));
+        kPatchLayers, place.x, place.y, place.z));
   };
-  for (const V3d& p : level.positions) require(p);
+  for (const V3d& p : layer.positions) require(p);
   constexpr double kStepVoxels = 1;  // a slit of four shows in the middle two of them
   const auto steps = [&](const V3d& along) {
     return std::ceil(along.length() / (kStepVoxels * base.voxelSize()));
   };
-  for (std::size_t j = 0; j + 1 < level.rows; ++j)
-    for (std::size_t i = 0; i + 1 < level.columns; ++i) {
-      const V3d &a = level.at(i, j), &b = level.at(i + 1, j), &c = level.at(i, j + 1),
-                &d = level.at(i + 1, j + 1);
+  for (std::size_t j = 0; j + 1 < layer.rows; ++j)
+    for (std::size_t i = 0; i + 1 < layer.columns; ++i) {
+      const V3d &a = layer.at(i, j), &b = layer.at(i + 1, j), &c = layer.at(i, j + 1),
+                &d = layer.at(i + 1, j + 1);
       const double across = steps(b - a), up = steps(c - a);
       for (double s = 0.5; s < across; ++s)
         for (double t = 0.5; t < up; ++t) {
@@ -303,11 +303,11 @@ void requireCovered(const NarrowBand& base, const ParticleLevel& level) {
 
 void finishPatch(const NarrowBand& base, const PatchOptions& options, Patch& patch,
                  PatchReport& report) {
-  requireCovered(base, patch.levels.front());
-  patch.levels = transformed(base, std::move(patch.levels), patch.height, options.transform);
+  requireCovered(base, patch.layers.front());
+  patch.layers = transformed(base, std::move(patch.layers), patch.height, options.transform);
   patch.spacing = meanSpacing(patch);
   patch.scheme = options.scheme;
-  report.cellAreaVariation = cellAreaVariation(patch.levels.front());
+  report.cellAreaVariation = cellAreaVariation(patch.layers.front());
 }
 
 }  // namespace mapping

@@ -26,19 +26,19 @@ double fractionOf(std::size_t k, std::size_t count) {
   return static_cast<double>(k) / static_cast<double>(count - 1);
 }
 
-/// A place between four particles of a level, at shares of its columns and rows.
+/// A place between four particles of a layer, at shares of its columns and rows.
 struct Between {
   std::size_t corner, columns;
   double s, t;
 
-  Between(const ParticleLevel& level, double u, double v) : columns(level.columns) {
+  Between(const ParticleLayer& layer, double u, double v) : columns(layer.columns) {
     const auto split = [](double share, std::size_t count, double& rest) {
       const double x = share * static_cast<double>(count - 1);
       const auto first = std::min(static_cast<std::size_t>(x), count - 2);
       rest = x - static_cast<double>(first);
       return first;
     };
-    const std::size_t i = split(u, level.columns, s), j = split(v, level.rows, t);
+    const std::size_t i = split(u, layer.columns, s), j = split(v, layer.rows, t);
     corner = j * columns + i;
   }
   [[nodiscard]] V3d of(const std::vector<V3d>& values) const {
@@ -70,23 +70,23 @@ struct RestLengths {
   std::array<std::vector<double>, 2> along;   // in u, of each row
   std::array<std::vector<double>, 2> across;  // in v, of each column
 
-  explicit RestLengths(const ParticleLevel& level) {
+  explicit RestLengths(const ParticleLayer& layer) {
     const auto rowChord = [&](std::size_t row, std::size_t apart) {
       double sum = 0;
-      for (std::size_t i = apart; i < level.columns; ++i)
-        sum += (level.at(i, row) - level.at(i - apart, row)).length();
-      return sum / static_cast<double>(level.columns - apart);
+      for (std::size_t i = apart; i < layer.columns; ++i)
+        sum += (layer.at(i, row) - layer.at(i - apart, row)).length();
+      return sum / static_cast<double>(layer.columns - apart);
     };
     const auto columnChord = [&](std::size_t column, std::size_t apart) {
       double sum = 0;
-      for (std::size_t j = apart; j < level.rows; ++j)
-        sum += (level.at(column, j) - level.at(column, j - apart)).length();
-      return sum / static_cast<double>(level.rows - apart);
+      for (std::size_t j = apart; j < layer.rows; ++j)
+        sum += (layer.at(column, j) - layer.at(column, j - apart)).length();
+      return sum / static_cast<double>(layer.rows - apart);
     };
     for (const std::size_t apart : {1u, 2u}) {
-      along[apart - 1] = between(rowChord(0, apart), rowChord(level.rows - 1, apart), level.rows);
+      along[apart - 1] = between(rowChord(0, apart), rowChord(layer.rows - 1, apart), layer.rows);
       across[apart - 1] =
-          between(columnChord(0, apart), columnChord(level.columns - 1, apart), level.columns);
+          between(columnChord(0, apart), columnChord(layer.columns - 1, apart), layer.columns);
     }
   }
 
@@ -106,19 +106,19 @@ struct RestLengths {
   }
 };
 
-V3d springForce(const ParticleLevel& level, const RestLengths& rest, std::size_t column,
+V3d springForce(const ParticleLayer& layer, const RestLengths& rest, std::size_t column,
                 std::size_t row, bool isRing) {
-  const long around = static_cast<long>(level.columns) - 1;
-  const V3d p = level.at(column, row);
+  const long around = static_cast<long>(layer.columns) - 1;
+  const V3d p = layer.at(column, row);
   V3d force(0);
   for (const Spring& spring : kSprings) {
     long i = static_cast<long>(column) + spring.columns;
     const long j = static_cast<long>(row) + spring.rows;
     if (isRing) i = (i + around) % around;
-    if (i < 0 || j < 0 || i >= static_cast<long>(level.columns) ||
-        j >= static_cast<long>(level.rows))
+    if (i < 0 || j < 0 || i >= static_cast<long>(layer.columns) ||
+        j >= static_cast<long>(layer.rows))
       continue;
-    const V3d way = level.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j)) - p;
+    const V3d way = layer.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j)) - p;
     const double length = way.length();
     if (length == 0) continue;
     force += way * (1 - rest.of(spring, column, row) / length);
@@ -126,9 +126,9 @@ V3d springForce(const ParticleLevel& level, const RestLengths& rest, std::size_t
   return force;
 }
 
-/// A level with half as many rows and columns of particles, between those of the fine one.
-ParticleLevel coarsened(const SurfaceField& field, const ParticleLevel& fine) {
-  ParticleLevel coarse = fine;
+/// A layer with half as many rows and columns of particles, between those of the fine one.
+ParticleLayer coarsened(const SurfaceField& field, const ParticleLayer& fine) {
+  ParticleLayer coarse = fine;
   coarse.rim.clear();
   coarse.columns = (fine.columns + 1) / 2;
   coarse.rows = (fine.rows + 1) / 2;
@@ -150,62 +150,62 @@ void closeRing(std::vector<V3d>& positions, std::size_t columns) {
     positions[n + columns - 1] = positions[n];
 }
 
-Relaxation settle(const levelset::NarrowBand& band, ParticleLevel& level, bool isRing);
+Relaxation settle(const levelset::NarrowBand& band, ParticleLayer& layer, bool isRing);
 
 /// What is out of place over many particles is put right where it is over few: springs alone hand
 /// it on by one particle an iteration.
-void settleCoarsely(const levelset::NarrowBand& band, ParticleLevel& level, bool isRing) {
+void settleCoarsely(const levelset::NarrowBand& band, ParticleLayer& layer, bool isRing) {
   constexpr std::size_t kFewestToCoarsen = 8;
-  if (std::min(level.columns, level.rows) < kFewestToCoarsen) return;
+  if (std::min(layer.columns, layer.rows) < kFewestToCoarsen) return;
   const SurfaceField field(band);
-  ParticleLevel coarse = coarsened(field, level);
+  ParticleLayer coarse = coarsened(field, layer);
   std::vector<V3d> moves = coarse.positions;
   settleCoarsely(band, coarse, isRing);
   (void)settle(band, coarse, isRing);
   for (std::size_t n = 0; n < moves.size(); ++n) moves[n] = coarse.positions[n] - moves[n];
-  for (std::size_t j = 1; j + 1 < level.rows; ++j)
-    for (std::size_t i = isRing ? 0 : 1; i + 1 < level.columns; ++i) {
-      const Between place(coarse, fractionOf(i, level.columns), fractionOf(j, level.rows));
-      V3d& p = level.positions[j * level.columns + i];
+  for (std::size_t j = 1; j + 1 < layer.rows; ++j)
+    for (std::size_t i = isRing ? 0 : 1; i + 1 < layer.columns; ++i) {
+      const Between place(coarse, fractionOf(i, layer.columns), fractionOf(j, layer.rows));
+      V3d& p = layer.positions[j * layer.columns + i];
       V3d moved = p + place.of(moves);
-      if (field.project(moved, level.height)) p = moved;
+      if (field.project(moved, layer.height)) p = moved;
     }
-  if (isRing) closeRing(level.positions, level.columns);
+  if (isRing) closeRing(layer.positions, layer.columns);
 }
 
-Relaxation settle(const levelset::NarrowBand& band, ParticleLevel& level, bool isRing) {
+Relaxation settle(const levelset::NarrowBand& band, ParticleLayer& layer, bool isRing) {
   Relaxation result;
-  const RestLengths rest(level);
+  const RestLengths rest(layer);
   const double voxel = band.voxelSize();
-  const std::size_t count = level.positions.size();
+  const std::size_t count = layer.positions.size();
   const double longest =
       0.25 * std::min(*std::min_element(rest.along[0].begin(), rest.along[0].end()),
                       *std::min_element(rest.across[0].begin(), rest.across[0].end()));
-  std::vector<V3d> previous = level.positions, next = level.positions;
+  std::vector<V3d> previous = layer.positions, next = layer.positions;
   while (result.iterations < kMaxIterations && !result.isConverged) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 64), [&](const auto& range) {
       const SurfaceField field(band);
       for (std::size_t n = range.begin(); n != range.end(); ++n) {
-        const std::size_t column = n % level.columns, row = n / level.columns;
-        if (row == 0 || row + 1 == level.rows || column + 1 == level.columns) continue;
+        const std::size_t column = n % layer.columns, row = n / layer.columns;
+        if (row == 0 || row + 1 == layer.rows || column + 1 == layer.columns) continue;
         if (column == 0 && !isRing) continue;
-        const V3d p = level.positions[n];
+        const V3d p = layer.positions[n];
         V3d move =
-            springForce(level, rest, column, row, isRing) * kStep + (p - previous[n]) * kMomentum;
+            springForce(layer, rest, column, row, isRing) * kStep + (p - previous[n]) * kMomentum;
         const V3d normal = field.normal(p);
         move -= normal * move.dot(normal);
         const double length = move.length();
         if (length > longest) move *= longest / length;
         V3d moved = p + move;
-        next[n] = field.project(moved, level.height) ? moved : p;
+        next[n] = field.project(moved, layer.height) ? moved : p;
       }
     });
-    if (isRing) closeRing(next, level.columns);
+    if (isRing) closeRing(next, layer.columns);
     result.lastMove = 0;
     for (std::size_t n = 0; n < count; ++n)
-      result.lastMove = std::max(result.lastMove, (next[n] - level.positions[n]).length() / voxel);
-    previous.swap(level.positions);
-    level.positions.swap(next);
+      result.lastMove = std::max(result.lastMove, (next[n] - layer.positions[n]).length() / voxel);
+    previous.swap(layer.positions);
+    layer.positions.swap(next);
     ++result.iterations;
     result.isConverged = result.lastMove <= kAtRest;
   }
@@ -214,18 +214,18 @@ Relaxation settle(const levelset::NarrowBand& band, ParticleLevel& level, bool i
 
 }  // namespace
 
-Relaxation relax(const levelset::NarrowBand& band, ParticleLevel& level, bool isRing) {
-  if (level.columns < 3 || level.rows < 3) return {.isConverged = true};
-  settleCoarsely(band, level, isRing);
-  return settle(band, level, isRing);
+Relaxation relax(const levelset::NarrowBand& band, ParticleLayer& layer, bool isRing) {
+  if (layer.columns < 3 || layer.rows < 3) return {.isConverged = true};
+  settleCoarsely(band, layer, isRing);
+  return settle(band, layer, isRing);
 }
 
-double cellAreaVariation(const ParticleLevel& level) {
+double cellAreaVariation(const ParticleLayer& layer) {
   double sum = 0, squares = 0, count = 0;
-  for (std::size_t j = 0; j + 1 < level.rows; ++j)
-    for (std::size_t i = 0; i + 1 < level.columns; ++i) {
-      const double area = 0.5 * (level.at(i + 1, j + 1) - level.at(i, j))
-                                    .cross(level.at(i, j + 1) - level.at(i + 1, j))
+  for (std::size_t j = 0; j + 1 < layer.rows; ++j)
+    for (std::size_t i = 0; i + 1 < layer.columns; ++i) {
+      const double area = 0.5 * (layer.at(i + 1, j + 1) - layer.at(i, j))
+                                    .cross(layer.at(i, j + 1) - layer.at(i + 1, j))
                                     .length();
       sum += area;
       squares += area * area;

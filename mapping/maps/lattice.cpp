@@ -21,25 +21,25 @@ std::vector<double> evenly(std::size_t count) {
 }
 
 /// Mean distance of the outermost particles to those before them, along columns and along rows.
-std::array<double, 2> endSpacings(const ParticleLevel& level) {
+std::array<double, 2> endSpacings(const ParticleLayer& layer) {
   std::array<double, 2> sum{};
-  for (std::size_t j = 0; j < level.rows; ++j)
-    sum[0] += (level.at(1, j) - level.at(0, j)).length() +
-              (level.at(level.columns - 1, j) - level.at(level.columns - 2, j)).length();
-  for (std::size_t i = 0; i < level.columns; ++i)
-    sum[1] += (level.at(i, 1) - level.at(i, 0)).length() +
-              (level.at(i, level.rows - 1) - level.at(i, level.rows - 2)).length();
-  return {sum[0] / (2 * static_cast<double>(level.rows)),
-          sum[1] / (2 * static_cast<double>(level.columns))};
+  for (std::size_t j = 0; j < layer.rows; ++j)
+    sum[0] += (layer.at(1, j) - layer.at(0, j)).length() +
+              (layer.at(layer.columns - 1, j) - layer.at(layer.columns - 2, j)).length();
+  for (std::size_t i = 0; i < layer.columns; ++i)
+    sum[1] += (layer.at(i, 1) - layer.at(i, 0)).length() +
+              (layer.at(i, layer.rows - 1) - layer.at(i, layer.rows - 2)).length();
+  return {sum[0] / (2 * static_cast<double>(layer.rows)),
+          sum[1] / (2 * static_cast<double>(layer.columns))};
 }
 
 }  // namespace
 
 Lattice::Lattice(const Patch& patch, const LatticeBorder& border) {
   std::size_t columns = 2, rows = 2;
-  for (const ParticleLevel& level : patch.levels) {
-    columns = std::max(columns, level.columns);
-    rows = std::max(rows, level.rows);
+  for (const ParticleLayer& layer : patch.layers) {
+    columns = std::max(columns, layer.columns);
+    rows = std::max(rows, layer.rows);
   }
   const int around = border.rim > 0 ? 1 : 0;
   coordinates_[0] = evenly(columns);
@@ -48,7 +48,7 @@ Lattice::Lattice(const Patch& patch, const LatticeBorder& border) {
   std::array<double, 2> wide = {1, 1};
   if (around) {
     const std::array<double, 2> spacing =
-        endSpacings(withCounts(patch.levels.front(), columns, rows));
+        endSpacings(withCounts(patch.layers.front(), columns, rows));
     for (std::size_t axis = 0; axis < 2; ++axis) {
       std::vector<double>& at = coordinates_[axis];
       wide[axis] = std::max(1.0, border.rim / spacing[axis]);
@@ -63,8 +63,8 @@ Lattice::Lattice(const Patch& patch, const LatticeBorder& border) {
   if (rim > 0) w.push_back(-sink - rim);
   if (sink > 0) w.push_back(-sink);
   const auto below = static_cast<int>(w.size());
-  for (const ParticleLevel& level : patch.levels) w.push_back(level.w);
-  const auto lastLevel = static_cast<int>(w.size()) - 1;
+  for (const ParticleLayer& layer : patch.layers) w.push_back(layer.w);
+  const auto lastLayer = static_cast<int>(w.size()) - 1;
   if (lift > 0) w.push_back(1 + lift);
   if (rim > 0) w.push_back(1 + lift + rim);
   for (std::size_t axis = 0; axis < 3; ++axis)
@@ -75,19 +75,19 @@ Lattice::Lattice(const Patch& patch, const LatticeBorder& border) {
     const V3d a = positions_[nodeIndex(near)], b = positions_[nodeIndex(far)];
     positions_[nodeIndex(to)] = a + (a - b) * share;
   };
-  for (int k = below; k <= lastLevel; ++k) {
-    const ParticleLevel level =
-        withCounts(patch.levels[static_cast<std::size_t>(k - below)], columns, rows);
+  for (int k = below; k <= lastLayer; ++k) {
+    const ParticleLayer layer =
+        withCounts(patch.layers[static_cast<std::size_t>(k - below)], columns, rows);
     for (int j = 0; j < static_cast<int>(rows); ++j)
       for (int i = 0; i < static_cast<int>(columns); ++i)
         positions_[nodeIndex({i + around, j + around, k})] =
-            level.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
+            layer.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
     if (!around) continue;
     // The particles of the rim tell the direction, if there are any.
     const auto end = [&](const Node& to, const Node& near, const Node& far, double share) {
-      if (!level.hasRim()) return straight(to, near, far, share);
+      if (!layer.hasRim()) return straight(to, near, far, share);
       const V3d p = positions_[nodeIndex(near)];
-      positions_[nodeIndex(to)] = p + (level.beyond(to[0] - 1, to[1] - 1) - p) * share;
+      positions_[nodeIndex(to)] = p + (layer.beyond(to[0] - 1, to[1] - 1) - p) * share;
     };
     for (int j = 1; j <= static_cast<int>(rows); ++j) {
       end({0, j, k}, {1, j, k}, {2, j, k}, wide[0]);
@@ -112,7 +112,7 @@ Lattice::Lattice(const Patch& patch, const LatticeBorder& border) {
       for (int i = 0; i <= cells_[0]; ++i) straight({i, j, to}, {i, j, near}, {i, j, far}, share);
   };
   for (int k = below - 1; k >= 0; --k) onwards(k, below, below + 1);
-  for (int k = lastLevel + 1; k <= cells_[2]; ++k) onwards(k, lastLevel, lastLevel - 1);
+  for (int k = lastLayer + 1; k <= cells_[2]; ++k) onwards(k, lastLayer, lastLayer - 1);
 }
 
 std::size_t Lattice::cellCount() const {

@@ -25,7 +25,7 @@ struct Tetrahedron {
   int order = 0;  ///< 0 … 5, see Lattice::kOrders
 };
 
-/// The particles of a patch as a grid of nodes with the same counts on every level, split into
+/// The particles of a patch as a grid of nodes with the same counts on every layer, split into
 /// tetrahedra, with layers around it that go on straight.
 class Lattice {
  public:
@@ -34,8 +34,8 @@ class Lattice {
       {{0, 1, 2}, {0, 2, 1}, {2, 0, 1}, {1, 0, 2}, {1, 2, 0}, {2, 1, 0}}};
   using Corners = std::array<Imath::V3d, 4>;
 
-  /// Levels of fewer particles are refined on a smooth surface through them.
-  /// @param border  beyond the levels and sides cells go straight on; around, by one cell at least
+  /// Layers of fewer particles are refined on a smooth surface through them.
+  /// @param border  beyond the layers and sides cells go straight on; around, by one cell at least
   Lattice(const Patch& patch, const LatticeBorder& border);
 
   [[nodiscard]] const std::array<int, 3>& cells() const { return cells_; }

@@ -213,14 +213,14 @@ ShellMap::ShellMap(const Patch& patch, const LatticeBorder& border)
 
 double ShellMap::estimateBytes(const Patch& patch) {
   double columns = 0, rows = 0;
-  for (const ParticleLevel& level : patch.levels) {
-    columns = std::max(columns, static_cast<double>(level.columns));
-    rows = std::max(rows, static_cast<double>(level.rows));
+  for (const ParticleLayer& layer : patch.layers) {
+    columns = std::max(columns, static_cast<double>(layer.columns));
+    rows = std::max(rows, static_cast<double>(layer.rows));
   }
   // Nodes, boxes, samples and what is told from these, for each cell.
   constexpr double kBytesPerCell = 1200;
   return kBytesPerCell * (columns + 1) * (rows + 1) *
-         (static_cast<double>(patch.levels.size()) + 3);
+         (static_cast<double>(patch.layers.size()) + 3);
 }
 
 Box3d ShellMap::aroundPoint(const V3d& x) const {

@@ -12,7 +12,7 @@
 
 namespace mapping {
 
-/// The map that is straight in each tetrahedron of a patch's lattice, the hybrid of particle levels
+/// The map that is straight in each tetrahedron of a patch's lattice, the hybrid of particle layers
 /// and shell maps [Brodersen07 §9; Porumbescu05]. Continuous, defined in the lattice only, and
 /// where no tetrahedron is turned over it goes both ways.
 class ShellMap final : public PatchMap {

@@ -4,17 +4,17 @@ namespace mapping {
 
 std::size_t Patch::particleCount() const {
   std::size_t count = 0;
-  for (const ParticleLevel& level : levels) count += level.positions.size() + level.rim.size();
+  for (const ParticleLayer& layer : layers) count += layer.positions.size() + layer.rim.size();
   return count;
 }
 
 double meanSpacing(const Patch& patch) {
   double sum = 0, count = 0;
-  for (const ParticleLevel& level : patch.levels)
-    for (std::size_t j = 0; j < level.rows; ++j)
-      for (std::size_t i = 0; i < level.columns; ++i) {
-        if (i > 0) sum += (level.at(i, j) - level.at(i - 1, j)).length(), ++count;
-        if (j > 0) sum += (level.at(i, j) - level.at(i, j - 1)).length(), ++count;
+  for (const ParticleLayer& layer : patch.layers)
+    for (std::size_t j = 0; j < layer.rows; ++j)
+      for (std::size_t i = 0; i < layer.columns; ++i) {
+        if (i > 0) sum += (layer.at(i, j) - layer.at(i - 1, j)).length(), ++count;
+        if (j > 0) sum += (layer.at(i, j) - layer.at(i, j - 1)).length(), ++count;
       }
   return sum / count;
 }

@@ -14,10 +14,10 @@
 /// carry texture coordinates [Brodersen07 §8.2].
 namespace mapping {
 
-/// One level of particles: an iso-surface φ = height of the base, sampled on a grid of u and v.
-struct ParticleLevel {
+/// One layer of particles: an iso-surface φ = height of the base, sampled on a grid of u and v.
+struct ParticleLayer {
   std::size_t columns = 0, rows = 0;  ///< along u, along v; each at least 2
-  double w = 0;                       ///< texture coordinate of the level
+  double w = 0;                       ///< texture coordinate of the layer
   double height = 0;                  ///< distance from the base surface, world units
   std::vector<Imath::V3d> positions;  ///< rows × columns, row major: index = row * columns + column
   /// One more particle at each end of the rows and columns, which go on straight on the surface,
@@ -46,9 +46,9 @@ struct ParticleLevel {
   [[nodiscard]] bool hasRim() const { return !rim.empty(); }
 };
 
-enum class LevelScheme {
-  Reduced,     ///< scheme B: one relaxed patch per offset level, from its own advected corners
-  Conforming,  ///< scheme A: every particle follows ∇φ, the levels between on its straight way
+enum class LayerScheme {
+  Reduced,     ///< scheme B: one relaxed patch per offset layer, from its own advected corners
+  Conforming,  ///< scheme A: every particle follows ∇φ, the layers between on its straight way
   Spline       ///< scheme C: the surface's particles travel along a curve and turn with it
 };
 
@@ -56,21 +56,21 @@ struct Patch {
   std::array<Imath::V3d, 4> corners;  ///< on the base surface, anticlockwise seen from outside
   double height = 0;                  ///< world units
   bool mirrored = false;
-  std::vector<ParticleLevel> levels;  ///< from the surface (w = 0) outwards (w = 1)
+  std::vector<ParticleLayer> layers;  ///< from the surface (w = 0) outwards (w = 1)
   double spacing = 0;                 ///< mean distance of neighbouring particles, world units
-  /// How its levels were made; none: an older file does not say.
-  std::optional<LevelScheme> scheme = {};
+  /// How its layers were made; none: an older file does not say.
+  std::optional<LayerScheme> scheme = {};
   [[nodiscard]] std::size_t particleCount() const;
 };
 
-/// Mean distance of neighbouring particles within the levels.
+/// Mean distance of neighbouring particles within the layers.
 [[nodiscard]] double meanSpacing(const Patch& patch);
 
 /// How the sides and rows of a patch turned out.
 struct PatchReport {
   double uLength = 0, vLength = 0;  ///< mean length of the rows and columns at w = 0
   double cellAreaVariation = 0;     ///< standard deviation / mean of the cells' areas at w = 0
-  std::size_t relaxIterations = 0;  ///< of all levels together
+  std::size_t relaxIterations = 0;  ///< of all layers together
   bool isRelaxed = true;            ///< the last step moved no particle by more than 1e-3 voxel
   double projectionDistance = 0;    ///< the farthest corner's way to the surface
   std::size_t slowed =
@@ -78,7 +78,7 @@ struct PatchReport {
 };
 
 /// What grows with w, about the axis of the patch.
-struct LevelTransform {
+struct LayerTransform {
   double twist = 0;  ///< radians, anticlockwise seen from outside, at w = 1
   double taper = 1;  ///< scale across the axis at w = 1, positive
   double bend = 0;   ///< radians that the axis leans towards u at w = 1
@@ -86,23 +86,23 @@ struct LevelTransform {
 };
 
 struct PatchOptions {
-  std::size_t levels = 6;  ///< at least 2
-  LevelScheme scheme = LevelScheme::Reduced;
+  std::size_t layers = 6;  ///< at least 2
+  LayerScheme scheme = LayerScheme::Reduced;
   /// Spline only: points that the curve passes after the patch's centre; none: straight along the
   /// normal there. The height is measured along the curve.
   std::vector<Imath::V3d> spline = {};
   bool fade = false;  ///< Spline only: the surface's own relief goes to nothing on the way
-  LevelTransform transform = {};
+  LayerTransform transform = {};
   /// Points near the surface that the sides 0 → 1, 1 → 2, 3 → 2 and 0 → 3 pass in this order: a
   /// side is the shortest way from point to point and has a corner at each.
   std::array<std::vector<Imath::V3d>, 4> sides = {};
   /// Reduced only: in which the corners rise, straight, instead of along ∇φ: one for all, or one
   /// each; the corners of points on the sides lie between. Where a surface bends much, parallel
-  /// ones keep the upper levels from spreading [Brodersen07 fig. 8.4].
+  /// ones keep the upper layers from spreading [Brodersen07 fig. 8.4].
   std::vector<Imath::V3d> directions = {};
   bool parallel = false;  ///< Reduced only: all in that of the normal at the patch's centre
   double spacing = 0;     ///< of particles, world units; 0: chosen from patch and voxel size
-  /// Of cells along u and v, the same on all levels, each at least 3; 0, 0: as the spacing asks.
+  /// Of cells along u and v, the same on all layers, each at least 3; 0, 0: as the spacing asks.
   std::array<std::size_t, 2> cells = {0, 0};
   bool mirror = false;  ///< accept corners that run clockwise seen from outside
   /// Of sweepSharedSpace, where many patches share distances to the base; it must outlive the call.

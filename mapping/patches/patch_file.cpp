@@ -59,16 +59,16 @@ Json toJson(const Patch& patch) {
   json["spacing"] = patch.spacing;
   if (patch.scheme) json["scheme"] = kSchemeNames[static_cast<std::size_t>(*patch.scheme)];
   json["levels"] = Json::array();
-  for (const ParticleLevel& level : patch.levels) {
-    requireFinite(level.w, "w of a level");
-    requireFinite(level.height, "height of a level");
+  for (const ParticleLayer& layer : patch.layers) {
+    requireFinite(layer.w, "w of a layer");
+    requireFinite(layer.height, "height of a layer");
     Json entry;
-    entry["columns"] = level.columns;
-    entry["rows"] = level.rows;
-    entry["w"] = level.w;
-    entry["height"] = level.height;
-    entry["positions"] = toJson(level.positions);
-    entry["rim"] = toJson(level.rim);
+    entry["columns"] = layer.columns;
+    entry["rows"] = layer.rows;
+    entry["w"] = layer.w;
+    entry["height"] = layer.height;
+    entry["positions"] = toJson(layer.positions);
+    entry["rim"] = toJson(layer.rim);
     json["levels"].push_back(std::move(entry));
   }
   return json;
@@ -125,21 +125,21 @@ class Reader {
     return result;
   }
 
-  [[nodiscard]] ParticleLevel level(const Json& json, const std::string& where) const {
-    ParticleLevel level;
-    level.columns = count(json, "columns", where);
-    level.rows = count(json, "rows", where);
-    level.w = number(json, "w", where);
-    level.height = number(json, "height", where);
-    level.positions = points(json, "positions", where);
-    level.rim = points(json, "rim", where);
-    if (level.positions.size() != level.columns * level.rows)
+  [[nodiscard]] ParticleLayer layer(const Json& json, const std::string& where) const {
+    ParticleLayer layer;
+    layer.columns = count(json, "columns", where);
+    layer.rows = count(json, "rows", where);
+    layer.w = number(json, "w", where);
+    layer.height = number(json, "height", where);
+    layer.positions = points(json, "positions", where);
+    layer.rim = points(json, "rim", where);
+    if (layer.positions.size() != layer.columns * layer.rows)
       refuse(where, fmt::format("has {} positions for {} columns and {} rows",
-                                level.positions.size(), level.columns, level.rows));
-    const std::size_t rim = 2 * (level.columns + level.rows) + 4;
-    if (level.hasRim() && level.rim.size() != rim)
-      refuse(where, fmt::format("has a rim of {} particles, not {}", level.rim.size(), rim));
-    return level;
+                                layer.positions.size(), layer.columns, layer.rows));
+    const std::size_t rim = 2 * (layer.columns + layer.rows) + 4;
+    if (layer.hasRim() && layer.rim.size() != rim)
+      refuse(where, fmt::format("has a rim of {} particles, not {}", layer.rim.size(), rim));
+    return layer;
   }
 
   [[nodiscard]] Patch patch(const Json& json, const std::string& where) const {
@@ -157,24 +157,24 @@ class Reader {
     if (json.contains("scheme")) {
       const auto name = std::find(kSchemeNames.begin(), kSchemeNames.end(), json.at("scheme"));
       if (name == kSchemeNames.end()) refuse(where, "has a \"scheme\" that is none");
-      patch.scheme = static_cast<LevelScheme>(name - kSchemeNames.begin());
+      patch.scheme = static_cast<LayerScheme>(name - kSchemeNames.begin());
     }
-    const Json& levels = member(json, "levels", where);
-    if (!levels.is_array() || levels.size() < 2) refuse(where, "has fewer than two levels");
-    for (const Json& entry : levels) {
-      const std::string place = fmt::format("{}, level {}", where, patch.levels.size());
-      patch.levels.push_back(level(entry, place));
-      const bool isFirst = patch.levels.size() == 1;
-      const double below = isFirst ? 0 : patch.levels[patch.levels.size() - 2].w;
-      const double w = patch.levels.back().w;
+    const Json& layers = member(json, "levels", where);
+    if (!layers.is_array() || layers.size() < 2) refuse(where, "has fewer than two layers");
+    for (const Json& entry : layers) {
+      const std::string place = fmt::format("{}, layer {}", where, patch.layers.size());
+      patch.layers.push_back(layer(entry, place));
+      const bool isFirst = patch.layers.size() == 1;
+      const double below = isFirst ? 0 : patch.layers[patch.layers.size() - 2].w;
+      const double w = patch.layers.back().w;
       if (isFirst ? w != 0 : !(w > below))
-        refuse(place, fmt::format("is at w = {}; levels go from 0 up to 1", w));
+        refuse(place, fmt::format("is at w = {}; layers go from 0 up to 1", w));
     }
-    if (patch.levels.back().w != 1) refuse(where, "ends below w = 1");
-    const auto last = static_cast<double>(patch.levels.size() - 1);
-    for (std::size_t k = 0; k < patch.levels.size(); ++k)
-      if (std::abs(patch.levels[k].w - static_cast<double>(k) / last) > 1e-9)
-        refuse(where, "has levels that are not evenly spaced in w");
+    if (patch.layers.back().w != 1) refuse(where, "ends below w = 1");
+    const auto last = static_cast<double>(patch.layers.size() - 1);
+    for (std::size_t k = 0; k < patch.layers.size(); ++k)
+      if (std::abs(patch.layers[k].w - static_cast<double>(k) / last) > 1e-9)
+        refuse(where, "has layers that are not evenly spaced in w");
     return patch;
   }
 

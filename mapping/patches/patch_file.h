@@ -7,7 +7,7 @@
 
 #include "mapping/patches/patch.h"
 
-/// Patches in files: JSON with the particles of every level, to the last bit.
+/// Patches in files: JSON with the particles of every layer, to the last bit.
 namespace mapping {
 
 /// @throws InvalidInput when a number is not finite; IoError when the file cannot be made

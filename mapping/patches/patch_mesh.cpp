@@ -11,16 +11,16 @@ namespace {
 using levelset::TriMesh;
 using VertexIndex = std::uint32_t;
 
-/// Vertices of a level's particles in a mesh: that of particle 0, and the counts.
+/// Vertices of a layer's particles in a mesh: that of particle 0, and the counts.
 struct SheetIndex {
   VertexIndex first;
-  const ParticleLevel* level;
+  const ParticleLayer* layer;
   [[nodiscard]] VertexIndex at(std::size_t column, std::size_t row) const {
-    return first + static_cast<VertexIndex>(row * level->columns + column);
+    return first + static_cast<VertexIndex>(row * layer->columns + column);
   }
   /// Anticlockwise seen from above, from corner 0 back to it.
   [[nodiscard]] std::vector<VertexIndex> side(int n) const {
-    const std::size_t right = level->columns - 1, top = level->rows - 1;
+    const std::size_t right = layer->columns - 1, top = layer->rows - 1;
     std::vector<VertexIndex> result;
     for (std::size_t i = 0; i <= (n % 2 == 0 ? right : top); ++i) {
       if (n == 0) result.push_back(at(i, 0));
@@ -32,9 +32,9 @@ struct SheetIndex {
   }
 };
 
-SheetIndex addSheet(const ParticleLevel& level, TriMesh& mesh) {
-  const SheetIndex sheet{static_cast<VertexIndex>(mesh.positions.size()), &level};
-  mesh.positions.insert(mesh.positions.end(), level.positions.begin(), level.positions.end());
+SheetIndex addSheet(const ParticleLayer& layer, TriMesh& mesh) {
+  const SheetIndex sheet{static_cast<VertexIndex>(mesh.positions.size()), &layer};
+  mesh.positions.insert(mesh.positions.end(), layer.positions.begin(), layer.positions.end());
   return sheet;
 }
 
@@ -46,8 +46,8 @@ void addCells(const SheetIndex& sheet, bool isUp, TriMesh& mesh) {
     else
       mesh.triangles.push_back({a, c, b});
   };
-  for (std::size_t j = 0; j + 1 < sheet.level->rows; ++j)
-    for (std::size_t i = 0; i + 1 < sheet.level->columns; ++i) {
+  for (std::size_t j = 0; j + 1 < sheet.layer->rows; ++j)
+    for (std::size_t i = 0; i + 1 < sheet.layer->columns; ++i) {
       add(sheet.at(i, j), sheet.at(i + 1, j), sheet.at(i + 1, j + 1));
       add(sheet.at(i, j), sheet.at(i + 1, j + 1), sheet.at(i, j + 1));
     }
@@ -76,27 +76,27 @@ void addWall(const std::vector<VertexIndex>& low, const std::vector<VertexIndex>
 TriMesh patchMesh(const Patch& patch, PatchMeshKind kind) {
   TriMesh mesh;
   if (kind == PatchMeshKind::Sheets) {
-    for (const ParticleLevel& level : patch.levels) addCells(addSheet(level, mesh), true, mesh);
+    for (const ParticleLayer& layer : patch.layers) addCells(addSheet(layer, mesh), true, mesh);
   } else {
     // Between bottom and top only the borders count: a vertex inside would have no triangle.
     std::vector<std::array<std::vector<VertexIndex>, 4>> borders;
-    for (const ParticleLevel& level : patch.levels) {
-      const bool isEnd = &level == &patch.levels.front() || &level == &patch.levels.back();
+    for (const ParticleLayer& layer : patch.layers) {
+      const bool isEnd = &layer == &patch.layers.front() || &layer == &patch.layers.back();
       std::array<std::vector<VertexIndex>, 4> border;
       if (isEnd) {
-        const SheetIndex sheet = addSheet(level, mesh);
-        addCells(sheet, &level == &patch.levels.back(), mesh);
+        const SheetIndex sheet = addSheet(layer, mesh);
+        addCells(sheet, &layer == &patch.layers.back(), mesh);
         for (int n = 0; n < 4; ++n) border[static_cast<std::size_t>(n)] = sheet.side(n);
       } else {
-        const SheetIndex inLevel{0, &level};
+        const SheetIndex inLayer{0, &layer};
         const auto first = static_cast<VertexIndex>(mesh.positions.size());
         for (int n = 0; n < 4; ++n) {
-          const std::vector<VertexIndex> side = inLevel.side(n);
+          const std::vector<VertexIndex> side = inLayer.side(n);
           for (std::size_t i = 0; i < side.size(); ++i) {
             const bool isLast = i + 1 == side.size();  // where the next side begins
             border[static_cast<std::size_t>(n)].push_back(
                 isLast && n == 3 ? first : static_cast<VertexIndex>(mesh.positions.size()));
-            if (!isLast) mesh.positions.push_back(level.positions[side[i]]);
+            if (!isLast) mesh.positions.push_back(layer.positions[side[i]]);
           }
         }
       }

@@ -17,8 +17,8 @@ namespace {
 using Imath::V3d;
 using levelset::NarrowBand;
 
-constexpr double kMarginVoxels = 6;   // of distances beyond the highest level, for the filters
-constexpr double kCoarseVoxels = 20;  // that a height is worth; with fewer, levels would be inexact
+constexpr double kMarginVoxels = 6;   // of distances beyond the highest layer, for the filters
+constexpr double kCoarseVoxels = 20;  // that a height is worth; with fewer, layers would be inexact
 constexpr double kCoarsest = 4;       // times the base's voxel
 constexpr double kThinnest = 12;      // coarse voxels through the base's box
 constexpr double kFaithful = 0.25;    // coarse voxels by which a coarse surface may be off
@@ -30,7 +30,7 @@ bool isFaithful(const NarrowBand& coarse, std::span<const V3d> border) {
   });
 }
 
-/// How many times coarser a grid may be for levels up to a height.
+/// How many times coarser a grid may be for layers up to a height.
 double coarsestFactor(const NarrowBand& base, double height) {
   if (height < 2 * kCoarseVoxels * base.voxelSize()) return 1;
   const V3d extent = base.zeroSetBounds().size();

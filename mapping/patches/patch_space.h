@@ -21,7 +21,7 @@ struct PatchSpaceOptions {
 
 /// Distances to the base as far as `height` above a patch, swept out of the narrow band in a box
 /// about it [Brodersen07 §8.2]. Where that is many voxels, a grid of up to a quarter of the
-/// resolution does: levels of φ grow smooth with their height, and the surface itself is left to
+/// resolution does: layers of φ grow smooth with their height, and the surface itself is left to
 /// the base's own band.
 /// @throws InvalidInput for an open surface whose band does not reach far enough: it cannot be
 /// swept

@@ -11,10 +11,10 @@ namespace mapping {
 namespace {
 
 using Imath::V3d;
-using Cell = std::array<std::int64_t, 3>;
+using GuardCell = std::array<std::int64_t, 3>;
 
 struct Entry {
-  Cell cell;
+  GuardCell cell;
   std::size_t particle;
   bool operator<(const Entry& other) const { return cell < other.cell; }
 };
@@ -57,8 +57,8 @@ void forEachNear(std::span<const V3d> places, std::span<const V3d> moves, double
     for (auto b = a + 1; b != entries.end() && b->cell == a->cell; ++b)
       meet(a->particle, b->particle);
     for (int n = 14; n < 27; ++n) {  // the neighbours that come later in the order
-      const Cell cell = {a->cell[0] + n / 9 - 1, a->cell[1] + n / 3 % 3 - 1,
-                         a->cell[2] + n % 3 - 1};
+      const GuardCell cell = {a->cell[0] + n / 9 - 1, a->cell[1] + n / 3 % 3 - 1,
+                              a->cell[2] + n % 3 - 1};
       for (auto b = std::lower_bound(a, entries.end(), Entry{cell, 0});
            b != entries.end() && b->cell == cell; ++b)
         meet(a->particle, b->particle);

@@ -31,7 +31,7 @@ using levelset::UsageError;
 constexpr const char* kDecal = "decal";
 constexpr double kLeastTangent = 0.02;  // of a direction: 1.1 degrees from the normal
 
-/// Where a level's map begins, and the directions of u and v there, unit.
+/// Where a layer's map begins, and the directions of u and v there, unit.
 struct DecalFrame {
   V3d center, u, v;
 };
@@ -57,42 +57,42 @@ double signedShare(std::size_t i, std::size_t count) {
 }
 
 /// Half the side of a square about the centre that does not hold what lies at (u, v) of ±1.
-double squareRadius(const ParticleLevel& level, std::size_t index, double radius) {
-  return radius * std::max(std::abs(signedShare(index % level.columns, level.columns)),
-                           std::abs(signedShare(index / level.columns, level.rows)));
+double squareRadius(const ParticleLayer& layer, std::size_t index, double radius) {
+  return radius * std::max(std::abs(signedShare(index % layer.columns, layer.columns)),
+                           std::abs(signedShare(index / layer.columns, layer.rows)));
 }
 
 std::string smallerRadius(double radius) {
   return fmt::format("take a radius below {:.4g}", radius);
 }
 
-/// Sends a walk to each particle of the level.
+/// Sends a walk to each particle of the layer.
 /// @throws InvalidInput where the surface breaks off
 void walkToParticles(const NarrowBand& band, const DecalFrame& frame, double radius,
-                     ParticleLevel& level) {
-  level.positions.assign(level.columns * level.rows, frame.center);
-  std::vector<double> missing(level.positions.size(), 0);  // of the way
+                     ParticleLayer& layer) {
+  layer.positions.assign(layer.columns * layer.rows, frame.center);
+  std::vector<double> missing(layer.positions.size(), 0);  // of the way
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, level.positions.size(), 16), [&](const auto& range) {
+      tbb::blocked_range<std::size_t>(0, layer.positions.size(), 16), [&](const auto& range) {
         const SurfaceField field(band);
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
-          const V3d way = frame.u * (radius * signedShare(n % level.columns, level.columns)) +
-                          frame.v * (radius * signedShare(n / level.columns, level.rows));
+          const V3d way = frame.u * (radius * signedShare(n % layer.columns, layer.columns)) +
+                          frame.v * (radius * signedShare(n / layer.columns, layer.rows));
           const double length = way.length();
           if (length < 1e-9 * radius) continue;
-          SurfaceWalk walk(field, level.height, frame.center, way);
+          SurfaceWalk walk(field, layer.height, frame.center, way);
           if (!walk.advance(length)) missing[n] = length - walk.walked();
-          level.positions[n] = walk.position();
+          layer.positions[n] = walk.position();
         }
       });
   double most = std::numeric_limits<double>::infinity();
   std::size_t first = 0;
   for (std::size_t n = 0; n < missing.size(); ++n) {
     if (missing[n] == 0) continue;
-    const double u = signedShare(n % level.columns, level.columns),
-                 v = signedShare(n / level.columns, level.rows);
+    const double u = signedShare(n % layer.columns, layer.columns),
+                 v = signedShare(n / layer.columns, layer.rows);
     const double length = radius * std::hypot(u, v);
-    const double reached = squareRadius(level, n, radius) * (1 - missing[n] / length);
+    const double reached = squareRadius(layer, n, radius) * (1 - missing[n] / length);
     if (reached >= most) continue;
     most = reached;
     first = n;
@@ -101,30 +101,30 @@ void walkToParticles(const NarrowBand& band, const DecalFrame& frame, double rad
   throw InvalidInput(fmt::format(
       "{}: the surface breaks off or is too sharp to be followed at {}, {:.4g} from the centre {}; "
       "{}",
-      kDecal, pointAsOption(level.positions[first]),
-      radius * std::hypot(signedShare(first % level.columns, level.columns),
-                          signedShare(first / level.columns, level.rows)) -
+      kDecal, pointAsOption(layer.positions[first]),
+      radius * std::hypot(signedShare(first % layer.columns, layer.columns),
+                          signedShare(first / layer.columns, layer.rows)) -
           missing[first],
       pointAsOption(frame.center), smallerRadius(most)));
 }
 
-std::vector<V3d> particleNormals(const NarrowBand& band, const ParticleLevel& level) {
+std::vector<V3d> particleNormals(const NarrowBand& band, const ParticleLayer& layer) {
   const SurfaceField field(band);
   std::vector<V3d> normals;
-  for (const V3d& p : level.positions) normals.push_back(field.normal(p));
+  for (const V3d& p : layer.positions) normals.push_back(field.normal(p));
   return normals;
 }
 
 /// Half of a cell's vector of area: positive along the normals where the cell lies as it should.
-double facing(const ParticleLevel& level, const std::vector<V3d>& normals, std::size_t column,
+double facing(const ParticleLayer& layer, const std::vector<V3d>& normals, std::size_t column,
               std::size_t row) {
-  const std::size_t a = row * level.columns + column, b = a + 1, c = a + level.columns, d = c + 1;
+  const std::size_t a = row * layer.columns + column, b = a + 1, c = a + layer.columns, d = c + 1;
   const V3d area =
-      (level.positions[d] - level.positions[a]).cross(level.positions[c] - level.positions[b]);
+      (layer.positions[d] - layer.positions[a]).cross(layer.positions[c] - layer.positions[b]);
   return area.dot(normals[a] + normals[b] + normals[c] + normals[d]);
 }
 
-/// What is wrong with a level, and half the side of the square that ends before it.
+/// What is wrong with a layer, and half the side of the square that ends before it.
 struct Trouble {
   double radius = std::numeric_limits<double>::infinity();
   V3d place{0};
@@ -135,59 +135,59 @@ struct Trouble {
 };
 
 /// Cells that turn over, or pass through the solid.
-void findFolds(const ParticleLevel& level, const std::vector<V3d>& normals, double radius,
+void findFolds(const ParticleLayer& layer, const std::vector<V3d>& normals, double radius,
                bool isMirrored, Trouble& trouble) {
   constexpr double kOpposite = -0.5;
-  for (std::size_t j = 0; j + 1 < level.rows; ++j)
-    for (std::size_t i = 0; i + 1 < level.columns; ++i) {
-      const std::size_t a = j * level.columns + i;
+  for (std::size_t j = 0; j + 1 < layer.rows; ++j)
+    for (std::size_t i = 0; i + 1 < layer.columns; ++i) {
+      const std::size_t a = j * layer.columns + i;
       double at = 0;
-      for (const std::size_t n : {a, a + 1, a + level.columns, a + level.columns + 1})
-        at = std::max(at, squareRadius(level, n, radius));
+      for (const std::size_t n : {a, a + 1, a + layer.columns, a + layer.columns + 1})
+        at = std::max(at, squareRadius(layer, n, radius));
       const bool isOpposite = normals[a].dot(normals[a + 1]) < kOpposite ||
-                              normals[a].dot(normals[a + level.columns]) < kOpposite;
+                              normals[a].dot(normals[a + layer.columns]) < kOpposite;
       if (isOpposite) {
-        trouble.note(at, level.positions[a],
+        trouble.note(at, layer.positions[a],
                      "goes around a part at {} that is thinner than its particles are apart; take "
                      "them closer with --spacing, or ");
       }
-      const double area = facing(level, normals, i, j);
+      const double area = facing(layer, normals, i, j);
       if ((isMirrored ? -area : area) <= 0) {
-        trouble.note(at, level.positions[a],
+        trouble.note(at, layer.positions[a],
                      "folds at {}, where ways from its centre have crossed; ");
       }
     }
 }
 
 /// Particles that are no neighbours and lie upon each other.
-void findOverlaps(const ParticleLevel& level, const std::vector<V3d>& normals, double radius,
+void findOverlaps(const ParticleLayer& layer, const std::vector<V3d>& normals, double radius,
                   Trouble& trouble) {
   constexpr double kNear = 0.75;  // spacings
   constexpr long kNeighbours = 3;
-  const double spacing = 2 * radius / static_cast<double>(level.columns - 1);
+  const double spacing = 2 * radius / static_cast<double>(layer.columns - 1);
   using Bucket = std::tuple<long, long, long>;
   const auto cellOf = [&](const V3d& p) {
     return Bucket(std::lround(p.x / spacing), std::lround(p.y / spacing),
                   std::lround(p.z / spacing));
   };
   std::map<Bucket, std::vector<std::size_t>> cells;
-  for (std::size_t n = 0; n < level.positions.size(); ++n)
-    cells[cellOf(level.positions[n])].push_back(n);
+  for (std::size_t n = 0; n < layer.positions.size(); ++n)
+    cells[cellOf(layer.positions[n])].push_back(n);
   const auto look = [&](std::size_t n, std::size_t m) {
     const auto apart = [](std::size_t x, std::size_t y) {
       return std::abs(static_cast<long>(x) - static_cast<long>(y));
     };
-    if (std::max(apart(n % level.columns, m % level.columns),
-                 apart(n / level.columns, m / level.columns)) < kNeighbours)
+    if (std::max(apart(n % layer.columns, m % layer.columns),
+                 apart(n / layer.columns, m / layer.columns)) < kNeighbours)
       return;
-    if ((level.positions[n] - level.positions[m]).length() > kNear * spacing ||
+    if ((layer.positions[n] - layer.positions[m]).length() > kNear * spacing ||
         normals[n].dot(normals[m]) < 0)
       return;
-    trouble.note(std::max(squareRadius(level, n, radius), squareRadius(level, m, radius)),
-                 level.positions[n], "comes round to itself at {}; ");
+    trouble.note(std::max(squareRadius(layer, n, radius), squareRadius(layer, m, radius)),
+                 layer.positions[n], "comes round to itself at {}; ");
   };
-  for (std::size_t n = 0; n < level.positions.size(); ++n) {
-    const auto [x, y, z] = cellOf(level.positions[n]);
+  for (std::size_t n = 0; n < layer.positions.size(); ++n) {
+    const auto [x, y, z] = cellOf(layer.positions[n]);
     for (int k = 0; k < 27; ++k) {
       const auto found = cells.find({x + k / 9 - 1, y + k / 3 % 3 - 1, z + k % 3 - 1});
       if (found == cells.end()) continue;
@@ -197,13 +197,13 @@ void findOverlaps(const ParticleLevel& level, const std::vector<V3d>& normals, d
   }
 }
 
-/// @throws InvalidInput where the level folds, lies upon itself or passes through the solid
-void requireSound(const NarrowBand& band, const ParticleLevel& level, double radius,
+/// @throws InvalidInput where the layer folds, lies upon itself or passes through the solid
+void requireSound(const NarrowBand& band, const ParticleLayer& layer, double radius,
                   bool isMirrored) {
-  const std::vector<V3d> normals = particleNormals(band, level);
+  const std::vector<V3d> normals = particleNormals(band, layer);
   Trouble trouble;
-  findFolds(level, normals, radius, isMirrored, trouble);
-  findOverlaps(level, normals, radius, trouble);
+  findFolds(layer, normals, radius, isMirrored, trouble);
+  findOverlaps(layer, normals, radius, trouble);
   if (!std::isfinite(trouble.radius)) return;
   throw InvalidInput(
       fmt::format("{}: it {}{}", kDecal,
@@ -212,16 +212,16 @@ void requireSound(const NarrowBand& band, const ParticleLevel& level, double rad
 }
 
 /// One exponential map on φ = height.
-ParticleLevel decalLevel(const NarrowBand& band, const DecalFrame& frame, double radius,
+ParticleLayer decalLayer(const NarrowBand& band, const DecalFrame& frame, double radius,
                          double height, double w, std::size_t count, bool isMirrored) {
-  ParticleLevel level;
-  level.columns = level.rows = count;
-  level.w = w;
-  level.height = height;
-  walkToParticles(band, frame, radius, level);
-  requireSound(band, level, radius, isMirrored);
-  addRim(band, level);
-  return level;
+  ParticleLayer layer;
+  layer.columns = layer.rows = count;
+  layer.w = w;
+  layer.height = height;
+  walkToParticles(band, frame, radius, layer);
+  requireSound(band, layer, radius, isMirrored);
+  addRim(band, layer);
+  return layer;
 }
 
 /// From the centre to the middles of the sides.
@@ -240,7 +240,7 @@ std::vector<std::vector<V3d>> spokes(const NarrowBand& band, const DecalFrame& f
   return result;
 }
 
-/// The same frame, one level up: its centre and spokes are carried along ∇φ.
+/// The same frame, one layer up: its centre and spokes are carried along ∇φ.
 /// @return how much longer the spokes have become, on the average
 double raiseFrame(const NarrowBand& space, double from, double to, DecalFrame& frame,
                   std::vector<std::vector<V3d>>& paths) {
@@ -267,21 +267,21 @@ double raiseFrame(const NarrowBand& space, double from, double to, DecalFrame& f
   return growth;
 }
 
-std::vector<ParticleLevel> reducedDecal(const NarrowBand& base, DecalFrame frame, double radius,
-                                        const ParticleLevel& surface, double height,
+std::vector<ParticleLayer> reducedDecal(const NarrowBand& base, DecalFrame frame, double radius,
+                                        const ParticleLayer& surface, double height,
                                         const PatchOptions& options) {
   const NarrowBand space =
       sweepAbove(base, surface.positions, {2 * radius, 2 * radius}, height, options);
   std::vector<std::vector<V3d>> paths = spokes(base, frame, radius);
-  std::vector<ParticleLevel> levels = {surface};
-  for (std::size_t k = 1; k < options.levels; ++k) {
-    const double w = static_cast<double>(k) / static_cast<double>(options.levels - 1);
-    radius *= raiseFrame(space, levels.back().height, w * height, frame, paths);
-    levels.push_back(
-        decalLevel(space, frame, radius, w * height, w, surface.columns, options.mirror));
+  std::vector<ParticleLayer> layers = {surface};
+  for (std::size_t k = 1; k < options.layers; ++k) {
+    const double w = static_cast<double>(k) / static_cast<double>(options.layers - 1);
+    radius *= raiseFrame(space, layers.back().height, w * height, frame, paths);
+    layers.push_back(
+        decalLayer(space, frame, radius, w * height, w, surface.columns, options.mirror));
     levelset::report(options.progress, 0.5 + 0.5 * w, kDecal);
   }
-  return levels;
+  return layers;
 }
 
 void checkDecalArguments(const NarrowBand& base, const V3d& direction, double radius, double height,
@@ -330,14 +330,14 @@ PatchResult makeDecal(const NarrowBand& base, const V3d& at, const V3d& directio
   const DecalFrame frame =
       frameAt(SurfaceField(base), center, direction.normalized(), options.mirror);
 
-  const LevelSize size{2 * radius, 2 * radius};
+  const LayerSize size{2 * radius, 2 * radius};
   const double spacing = options.spacing > 0
                              ? options.spacing
-                             : chooseSpacing(base.voxelSize(), {{size}}, options.levels);
-  checkParticleCount(particlesAt(spacing, {{size}}) * static_cast<double>(options.levels), spacing,
+                             : chooseSpacing(base.voxelSize(), {{size}}, options.layers);
+  checkParticleCount(particlesAt(spacing, {{size}}) * static_cast<double>(options.layers), spacing,
                      options);
-  const ParticleLevel surface =
-      decalLevel(base, frame, radius, 0, 0, countAlong(2 * radius, spacing), options.mirror);
+  const ParticleLayer surface =
+      decalLayer(base, frame, radius, 0, 0, countAlong(2 * radius, spacing), options.mirror);
   levelset::report(options.progress, 0.1, kDecal);
 
   Patch& patch = result.patch;
@@ -346,9 +346,9 @@ PatchResult makeDecal(const NarrowBand& base, const V3d& at, const V3d& directio
   const std::size_t last = surface.columns - 1;
   patch.corners = {surface.at(0, 0), surface.at(last, 0), surface.at(last, last),
                    surface.at(0, last)};
-  patch.levels = options.scheme == LevelScheme::Reduced
+  patch.layers = options.scheme == LayerScheme::Reduced
                      ? reducedDecal(base, frame, radius, surface, height, options)
-                     : levelsFromSurface(base, surface, surface.positions, size, height, options,
+                     : layersFromSurface(base, surface, surface.positions, size, height, options,
                                          result.report);
   result.report.uLength = size.u;
   result.report.vLength = size.v;

@@ -12,7 +12,7 @@ namespace mapping {
 /// long as it is far in the (u, v) plane: the exponential map. So distances and directions from the
 /// centre are kept, whatever lies between, and surfaces that unfold are mapped without distortion.
 /// Each way is followed by itself (see SurfaceWalk); carrying coordinates from neighbour to
-/// neighbour [Schmidt06] adds up errors. With LevelScheme::Reduced each level has an exponential
+/// neighbour [Schmidt06] adds up errors. With LayerScheme::Reduced each layer has an exponential
 /// map of its own, about the centre carried along ∇φ, as much wider as the ways from the centre to
 /// the middles of the sides have grown.
 /// @param at         projected along φ to the zero set

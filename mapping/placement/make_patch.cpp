@@ -123,10 +123,10 @@ bool checkOrientation(const NarrowBand& base, const std::array<V3d, 4>& given,
   return area < 0;
 }
 
-struct LevelSides {
+struct LayerSides {
   double height;
   PatchSides sides;
-  LevelSize size;
+  LayerSize size;
   [[nodiscard]] std::vector<V3d> outline() const {
     std::vector<V3d> all;
     for (const std::vector<V3d>& side : sides) all.insert(all.end(), side.begin(), side.end());
@@ -134,12 +134,12 @@ struct LevelSides {
   }
 };
 
-LevelSides makeLevelSides(const NarrowBand& band, double height, const std::array<V3d, 4>& corners,
+LayerSides makeLayerSides(const NarrowBand& band, double height, const std::array<V3d, 4>& corners,
                           const PatchSides& between, const PatchSides* below = nullptr,
                           const PatchSides* ground = nullptr) {
-  LevelSides level{height, makeSides(band, height, corners, between, below, ground), {}};
-  level.size = {sideLengthU(level.sides), sideLengthV(level.sides)};
-  return level;
+  LayerSides layer{height, makeSides(band, height, corners, between, below, ground), {}};
+  layer.size = {sideLengthU(layer.sides), sideLengthV(layer.sides)};
+  return layer;
 }
 
 /// Corners and points between them, projected to the surface.
@@ -159,18 +159,18 @@ Outline projectOutline(const NarrowBand& base, const std::array<V3d, 4>& corners
 }
 
 /// Counts by the spacing; positions between the sides.
-ParticleLevel filledLevel(const NarrowBand& band, const NarrowBand& guide, const LevelSides& border,
+ParticleLayer filledLayer(const NarrowBand& band, const NarrowBand& guide, const LayerSides& border,
                           double height, double spacing, const PatchOptions& options,
                           PatchReport& report) {
-  ParticleLevel level;
-  level.height = border.height;
-  level.w = border.height / height;
-  level.columns = options.cells[0] > 0 ? options.cells[0] + 1 : countAlong(border.size.u, spacing);
-  level.rows = options.cells[1] > 0 ? options.cells[1] + 1 : countAlong(border.size.v, spacing);
-  const Relaxation relaxation = fillLevel(band, guide, border.sides, level);
+  ParticleLayer layer;
+  layer.height = border.height;
+  layer.w = border.height / height;
+  layer.columns = options.cells[0] > 0 ? options.cells[0] + 1 : countAlong(border.size.u, spacing);
+  layer.rows = options.cells[1] > 0 ? options.cells[1] + 1 : countAlong(border.size.v, spacing);
+  const Relaxation relaxation = fillLayer(band, guide, border.sides, layer);
   report.relaxIterations += relaxation.iterations;
   report.isRelaxed = report.isRelaxed && relaxation.isConverged;
-  return level;
+  return layer;
 }
 
 /// In which corners, and the points between them, rise; empty: along ∇φ.
@@ -224,7 +224,7 @@ Rise riseOf(const NarrowBand& base, const Outline& outline, const PatchOptions& 
   return rise;
 }
 
-/// Brings corners and points between them from one level to the next.
+/// Brings corners and points between them from one layer to the next.
 void raiseOutline(const NarrowBand& space, const Rise& rise, double from, double to,
                   Outline& outline) {
   if (rise.corners.empty()) {
@@ -237,50 +237,50 @@ void raiseOutline(const NarrowBand& space, const Rise& rise, double from, double
     raisePoints(space, to, rise.between[side], outline.between[side]);
 }
 
-/// Scheme B: the sides of each level from its own advected corners, and a complete patch between
+/// Scheme B: the sides of each layer from its own advected corners, and a complete patch between
 /// them.
-std::vector<ParticleLevel> reducedLevels(const NarrowBand& base, Outline outline,
-                                         std::vector<LevelSides> sides, double height,
+std::vector<ParticleLayer> reducedLayers(const NarrowBand& base, Outline outline,
+                                         std::vector<LayerSides> sides, double height,
                                          const PatchOptions& options, PatchReport& report) {
   const Rise rise = riseOf(base, outline, options);
   const NarrowBand space = sweepAbove(base, sides.front().outline(), sides.front().size, height,
                                       options, rise.lean * height);
-  for (std::size_t k = 1; k < options.levels; ++k) {
-    const double level = height * static_cast<double>(k) / static_cast<double>(options.levels - 1);
-    raiseOutline(space, rise, sides.back().height, level, outline);
-    sides.push_back(makeLevelSides(space, level, outline.corners, outline.between,
+  for (std::size_t k = 1; k < options.layers; ++k) {
+    const double layer = height * static_cast<double>(k) / static_cast<double>(options.layers - 1);
+    raiseOutline(space, rise, sides.back().height, layer, outline);
+    sides.push_back(makeLayerSides(space, layer, outline.corners, outline.between,
                                    &sides.back().sides, &sides.front().sides));
   }
   // As large as taper leaves them.
-  const auto scaleOf = [&](const LevelSides& border) {
+  const auto scaleOf = [&](const LayerSides& border) {
     return std::lerp(1.0, options.transform.taper, border.height / height);
   };
-  std::vector<LevelSize> sizes;
-  for (const LevelSides& border : sides)
+  std::vector<LayerSize> sizes;
+  for (const LayerSides& border : sides)
     sizes.push_back({border.size.u * scaleOf(border), border.size.v * scaleOf(border)});
   const double spacing =
       options.spacing > 0 ? options.spacing : chooseSpacing(base.voxelSize(), sizes);
   if (options.cells[0] == 0) checkParticleCount(particlesAt(spacing, sizes), spacing, options);
-  std::vector<ParticleLevel> levels;
-  for (const LevelSides& border : sides) {
-    levels.push_back(filledLevel(levels.empty() ? base : space, space, border, height,
+  std::vector<ParticleLayer> layers;
+  for (const LayerSides& border : sides) {
+    layers.push_back(filledLayer(layers.empty() ? base : space, space, border, height,
                                  spacing / scaleOf(border), options, report));
-    const double done = static_cast<double>(levels.size()) / static_cast<double>(sides.size());
+    const double done = static_cast<double>(layers.size()) / static_cast<double>(sides.size());
     levelset::report(options.progress, 0.5 + 0.5 * done, kPatch);
   }
-  return levels;
+  return layers;
 }
 
 /// Schemes A and C: one patch on the surface, whose particles travel.
-std::vector<ParticleLevel> travellingLevels(const NarrowBand& base, const LevelSides& sides,
+std::vector<ParticleLayer> travellingLayers(const NarrowBand& base, const LayerSides& sides,
                                             double height, const PatchOptions& options,
                                             PatchReport& report) {
   const double spacing = options.spacing > 0
                              ? options.spacing
-                             : chooseSpacing(base.voxelSize(), {{sides.size}}, options.levels);
-  const ParticleLevel surface = filledLevel(base, base, sides, height, spacing, options, report);
+                             : chooseSpacing(base.voxelSize(), {{sides.size}}, options.layers);
+  const ParticleLayer surface = filledLayer(base, base, sides, height, spacing, options, report);
   levelset::report(options.progress, 0.2, kPatch);
-  return levelsFromSurface(base, surface, sides.outline(), sides.size, height, options, report);
+  return layersFromSurface(base, surface, sides.outline(), sides.size, height, options, report);
 }
 
 }  // namespace
@@ -297,18 +297,18 @@ PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners,
   patch.corners = outline.corners;
   checkApart(base, outline);
   patch.height = height;
-  std::vector<LevelSides> sides = {makeLevelSides(base, 0, patch.corners, outline.between)};
+  std::vector<LayerSides> sides = {makeLayerSides(base, 0, patch.corners, outline.between)};
   patch.mirrored = checkOrientation(base, corners, sides.front().sides, options.mirror);
-  const LevelSize size = sides.front().size;
+  const LayerSize size = sides.front().size;
   if (options.spacing > 0)
-    checkParticleCount(particlesAt(options.spacing, {{size}}) * static_cast<double>(options.levels),
+    checkParticleCount(particlesAt(options.spacing, {{size}}) * static_cast<double>(options.layers),
                        options.spacing, options);
   levelset::report(options.progress, 0.1, kPatch);
 
-  // === Levels above it
-  patch.levels = options.scheme == LevelScheme::Reduced
-                     ? reducedLevels(base, outline, std::move(sides), height, options, report)
-                     : travellingLevels(base, sides.front(), height, options, report);
+  // === Layers above it
+  patch.layers = options.scheme == LayerScheme::Reduced
+                     ? reducedLayers(base, outline, std::move(sides), height, options, report)
+                     : travellingLayers(base, sides.front(), height, options, report);
   report.uLength = size.u;
   report.vLength = size.v;
   finishPatch(base, options, patch, report);

@@ -27,7 +27,7 @@ using levelset::UsageError;
 
 constexpr const char* kGrid = "patch-grid";
 constexpr double kMostPerTile = 2000;    // particles, as many as a single patch has
-constexpr double kMostPerGrid = 20000;   // all levels; relaxing takes the longer the more there are
+constexpr double kMostPerGrid = 20000;   // all layers; relaxing takes the longer the more there are
 constexpr std::size_t kFewestCells = 4;  // of a tile, along a side
 
 void checkGrid(const PatchGridOptions& grid) {
@@ -44,34 +44,34 @@ void checkGrid(const PatchGridOptions& grid) {
 }
 
 /// How many cells a tile has along u and v.
-std::array<std::size_t, 2> cellsPerTile(const NarrowBand& base, const LevelSize& whole,
+std::array<std::size_t, 2> cellsPerTile(const NarrowBand& base, const LayerSize& whole,
                                         const PatchGridOptions& grid, const PatchOptions& options) {
   if (options.cells[0] > 0) return options.cells;
   const double tiles = static_cast<double>(grid.columns * grid.rows);
   const double u = whole.u / static_cast<double>(grid.columns),
                v = whole.v / static_cast<double>(grid.rows);
-  const double perLevel =
-      std::min(kMostPerTile, kMostPerGrid / tiles) / static_cast<double>(options.levels);
+  const double perLayer =
+      std::min(kMostPerTile, kMostPerGrid / tiles) / static_cast<double>(options.layers);
   const double spacing = options.spacing > 0
                              ? options.spacing
-                             : std::max(std::sqrt(u * v / perLevel), 1.5 * base.voxelSize());
+                             : std::max(std::sqrt(u * v / perLayer), 1.5 * base.voxelSize());
   const auto cells = [&](double length) {
     return std::max(kFewestCells, static_cast<std::size_t>(std::lround(length / spacing)));
   };
   const std::array<std::size_t, 2> result = {cells(u), cells(v)};
   checkParticleCount(static_cast<double>((result[0] + 3) * (result[1] + 3)) * tiles *
-                         static_cast<double>(options.levels),
+                         static_cast<double>(options.layers),
                      spacing, options);
   return result;
 }
 
-/// Levels of particles that are cut into tiles.
+/// Layers of particles that are cut into tiles.
 struct Sheet {
-  std::vector<ParticleLevel> levels;  ///< of equal counts
+  std::vector<ParticleLayer> layers;  ///< of equal counts
   bool isRing = false;                ///< the last column is the first one again
   double height = 0;
   bool isMirrored = false;
-  LevelScheme scheme = LevelScheme::Reduced;
+  LayerScheme scheme = LayerScheme::Reduced;
 };
 
 struct Tile {
@@ -80,9 +80,9 @@ struct Tile {
   bool isTurnedU, isTurnedV;
 };
 
-/// The part of a level under a tile; its rim lies on the neighbours' particles.
-ParticleLevel cut(const ParticleLevel& whole, const Tile& tile, bool isRing) {
-  ParticleLevel part;
+/// The part of a layer under a tile; its rim lies on the neighbours' particles.
+ParticleLayer cut(const ParticleLayer& whole, const Tile& tile, bool isRing) {
+  ParticleLayer part;
   part.columns = tile.columns + 1;
   part.rows = tile.rows + 1;
   part.w = whole.w;
@@ -109,9 +109,9 @@ Patch tilePatch(const Sheet& sheet, const Tile& tile) {
   Patch patch;
   patch.height = sheet.height;
   patch.mirrored = sheet.isMirrored != (tile.isTurnedU != tile.isTurnedV);
-  for (const ParticleLevel& level : sheet.levels)
-    patch.levels.push_back(cut(level, tile, sheet.isRing));
-  const ParticleLevel& surface = patch.levels.front();
+  for (const ParticleLayer& layer : sheet.layers)
+    patch.layers.push_back(cut(layer, tile, sheet.isRing));
+  const ParticleLayer& surface = patch.layers.front();
   const std::size_t right = tile.columns, top = tile.rows;
   patch.corners = {surface.at(0, 0), surface.at(right, 0), surface.at(right, top),
                    surface.at(0, top)};
@@ -121,8 +121,8 @@ Patch tilePatch(const Sheet& sheet, const Tile& tile) {
 }
 
 std::vector<Patch> cutTiles(const Sheet& sheet, const PatchGridOptions& grid) {
-  const std::size_t across = (sheet.levels.front().columns - 1) / grid.columns,
-                    up = (sheet.levels.front().rows - 1) / grid.rows;
+  const std::size_t across = (sheet.layers.front().columns - 1) / grid.columns,
+                    up = (sheet.layers.front().rows - 1) / grid.rows;
   const auto moved =
       static_cast<std::size_t>(std::lround(grid.shift * static_cast<double>(across)));
   std::vector<Patch> patches;
@@ -189,15 +189,15 @@ V3d seenFromOutside(const SurfaceField& field, const V3d& axis, const V3d& direc
 }
 
 /// The first and last row evenly along their rings, those between by equal angles.
-ParticleLevel roundLevel(const NarrowBand& base, const RoundFrame& frame, std::size_t columns,
+ParticleLayer roundLayer(const NarrowBand& base, const RoundFrame& frame, std::size_t columns,
                          std::size_t rows) {
   const SurfaceField field(base);
   const Imath::Box3d box = base.zeroSetBounds();
   const double far = box.size().length() + (frame.from - box.center()).length() + frame.length;
   const double background = base.halfWidth() * base.voxelSize();
-  ParticleLevel level;
-  level.columns = columns + 1;
-  level.rows = rows + 1;
+  ParticleLayer layer;
+  layer.columns = columns + 1;
+  layer.rows = rows + 1;
   for (std::size_t j = 0; j <= rows; ++j) {
     const V3d axis = frame.place(static_cast<double>(j) / static_cast<double>(rows));
     const bool isBorder = j == 0 || j == rows;
@@ -213,21 +213,21 @@ ParticleLevel roundLevel(const NarrowBand& base, const RoundFrame& frame, std::s
       ring = sampleByArcLength(ring, columns + 1);
       for (std::size_t i = 1; i < columns; ++i) (void)field.project(ring[i], 0);
     }
-    level.positions.insert(level.positions.end(), ring.begin(), ring.end());
+    layer.positions.insert(layer.positions.end(), ring.begin(), ring.end());
   }
-  return level;
+  return layer;
 }
 
 /// @throws InvalidInput where neighbours lie so far apart that the surface is not one sheet
-void requireOneSheet(const ParticleLevel& level) {
+void requireOneSheet(const ParticleLayer& layer) {
   constexpr double kFarthest = 4;  // times the mean of all along u, or along v
   for (const auto& [across, up] : {std::pair<std::size_t, std::size_t>{1, 0}, {0, 1}}) {
     std::vector<std::pair<double, V3d>> steps;
     double sum = 0;
-    for (std::size_t j = up; j < level.rows; ++j)
-      for (std::size_t i = across; i < level.columns; ++i) {
-        const V3d& p = level.at(i, j);
-        steps.emplace_back((p - level.at(i - across, j - up)).length(), p);
+    for (std::size_t j = up; j < layer.rows; ++j)
+      for (std::size_t i = across; i < layer.columns; ++i) {
+        const V3d& p = layer.at(i, j);
+        steps.emplace_back((p - layer.at(i - across, j - up)).length(), p);
         sum += steps.back().first;
       }
     for (const auto& [length, place] : steps) {
@@ -241,40 +241,40 @@ void requireOneSheet(const ParticleLevel& level) {
 }
 
 /// The rim goes on around, and straight on at the two ends.
-void addRoundRim(const NarrowBand& band, ParticleLevel& level) {
-  addRim(band, level);
-  const auto last = static_cast<int>(level.columns) - 1, rows = static_cast<int>(level.rows);
-  for (const int row : {-1, rows}) level.rim[level.rimIndex(last, row)] = level.beyond(0, row);
+void addRoundRim(const NarrowBand& band, ParticleLayer& layer) {
+  addRim(band, layer);
+  const auto last = static_cast<int>(layer.columns) - 1, rows = static_cast<int>(layer.rows);
+  for (const int row : {-1, rows}) layer.rim[layer.rimIndex(last, row)] = layer.beyond(0, row);
   for (int row = -1; row <= rows; ++row) {
-    level.rim[level.rimIndex(-1, row)] = level.beyond(last - 1, row);
-    level.rim[level.rimIndex(last + 1, row)] = level.beyond(1, row);
+    layer.rim[layer.rimIndex(-1, row)] = layer.beyond(last - 1, row);
+    layer.rim[layer.rimIndex(last + 1, row)] = layer.beyond(1, row);
   }
 }
 
-void settleRound(const NarrowBand& band, ParticleLevel& level, PatchReport& report) {
-  const Relaxation relaxation = relax(band, level, true);
+void settleRound(const NarrowBand& band, ParticleLayer& layer, PatchReport& report) {
+  const Relaxation relaxation = relax(band, layer, true);
   report.relaxIterations += relaxation.iterations;
   report.isRelaxed = report.isRelaxed && relaxation.isConverged;
-  addRoundRim(band, level);
+  addRoundRim(band, layer);
 }
 
-std::vector<ParticleLevel> roundLevels(const NarrowBand& base, ParticleLevel surface,
-                                       const LevelSize& size, double height,
+std::vector<ParticleLayer> roundLayers(const NarrowBand& base, ParticleLayer surface,
+                                       const LayerSize& size, double height,
                                        const PatchOptions& options, PatchReport& report) {
   const NarrowBand space = sweepAbove(base, surface.positions, size, height, options);
-  if (options.scheme == LevelScheme::Conforming)
-    return conformingLevels(space, surface, height, options.levels);
-  std::vector<ParticleLevel> levels = {std::move(surface)};
-  for (std::size_t k = 1; k < options.levels; ++k) {
-    ParticleLevel level = levels.back();
-    level.w = static_cast<double>(k) / static_cast<double>(options.levels - 1);
-    level.height = level.w * height;
-    advectPoints(space, levels.back().height, level.height, level.positions);
-    settleRound(space, level, report);
-    levels.push_back(std::move(level));
-    levelset::report(options.progress, 0.5 + 0.5 * level.w, kGrid);
+  if (options.scheme == LayerScheme::Conforming)
+    return conformingLayers(space, surface, height, options.layers);
+  std::vector<ParticleLayer> layers = {std::move(surface)};
+  for (std::size_t k = 1; k < options.layers; ++k) {
+    ParticleLayer layer = layers.back();
+    layer.w = static_cast<double>(k) / static_cast<double>(options.layers - 1);
+    layer.height = layer.w * height;
+    advectPoints(space, layers.back().height, layer.height, layer.positions);
+    settleRound(space, layer, report);
+    layers.push_back(std::move(layer));
+    levelset::report(options.progress, 0.5 + 0.5 * layer.w, kGrid);
   }
-  return levels;
+  return layers;
 }
 
 }  // namespace
@@ -286,13 +286,13 @@ PatchGridResult makePatchGrid(const NarrowBand& base, const std::array<V3d, 4>& 
   checkPatchOptions(kGrid, height, options);
   std::array<V3d, 4> feet;
   for (std::size_t i = 0; i < 4; ++i) feet[i] = closestSurfacePoint(base, corners[i], kGrid);
-  const LevelSize straight = {0.5 * ((feet[1] - feet[0]).length() + (feet[2] - feet[3]).length()),
+  const LayerSize straight = {0.5 * ((feet[1] - feet[0]).length() + (feet[2] - feet[3]).length()),
                               0.5 * ((feet[3] - feet[0]).length() + (feet[2] - feet[1]).length())};
   PatchOptions whole = options;
   const auto [across, up] = cellsPerTile(base, straight, grid, options);
   whole.cells = {across * grid.columns, up * grid.rows};
   PatchResult result = makePatch(base, corners, height, whole);
-  const Sheet sheet{std::move(result.patch.levels), false, height, result.patch.mirrored,
+  const Sheet sheet{std::move(result.patch.layers), false, height, result.patch.mirrored,
                     options.scheme};
   return {cutTiles(sheet, grid), result.report};
 }
@@ -314,25 +314,25 @@ PatchGridResult makePatchGridAround(const NarrowBand& base, const V3d& from, con
         "an even number",
         kGrid, grid.columns));
   }
-  if (options.scheme == LevelScheme::Spline || !options.transform.isIdentity() || options.mirror) {
+  if (options.scheme == LayerScheme::Spline || !options.transform.isIdentity() || options.mirror) {
     throw UsageError(fmt::format(
         "{}: splines, twist, taper, bend and mirrored corners do not go with tiles around an axis",
         kGrid));
   }
   const RoundFrame frame = roundFrame(base, from, to, rotation);
   PatchGridResult result;
-  const LevelSize rough = sizeOf(roundLevel(base, frame, 64, 16));
+  const LayerSize rough = sizeOf(roundLayer(base, frame, 64, 16));
   const auto [across, up] = cellsPerTile(base, rough, grid, options);
-  ParticleLevel surface = roundLevel(base, frame, across * grid.columns, up * grid.rows);
+  ParticleLayer surface = roundLayer(base, frame, across * grid.columns, up * grid.rows);
   requireOneSheet(surface);
   requireCovered(base, surface);
   settleRound(base, surface, result.report);
-  const LevelSize size = sizeOf(surface);
+  const LayerSize size = sizeOf(surface);
   result.report.uLength = size.u;
   result.report.vLength = size.v;
   result.report.cellAreaVariation = cellAreaVariation(surface);
   levelset::report(options.progress, 0.1, kGrid);
-  const Sheet sheet{roundLevels(base, std::move(surface), size, height, options, result.report),
+  const Sheet sheet{roundLayers(base, std::move(surface), size, height, options, result.report),
                     true, height, false, options.scheme};
   result.patches = cutTiles(sheet, grid);
   return result;

@@ -28,7 +28,7 @@ struct PatchGridResult {
 
 /// Tiles of one patch between four corners, see makePatch. Neighbours share the particles of their
 /// common border, bit for bit, and each tile's rim lies on its neighbours' particles: textures that
-/// meet at the borders of their boxes meet on the surface. Levels have equal counts of particles.
+/// meet at the borders of their boxes meet on the surface. Layers have equal counts of particles.
 /// @throws as makePatch; UsageError for counts of 0, and a shift out of range
 [[nodiscard]] PatchGridResult makePatchGrid(const levelset::NarrowBand& base,
                                             const std::array<Imath::V3d, 4>& corners, double height,

@@ -72,7 +72,7 @@ PatchOptions atScale(const PatchOptions& options, double scale) {
 }
 
 bool doesFold(const Patch& patch) {
-  return surveyDistortion(sampleLevelMap(patch, 0), V3d(1), patch.mirrored).folded > 0;
+  return surveyDistortion(sampleLayerMap(patch, 0), V3d(1), patch.mirrored).folded > 0;
 }
 
 /// A patch, or why there is none.
@@ -113,7 +113,7 @@ Attempt tryAt(const NarrowBand& base, const SurfacePoint& point, std::size_t ind
 /// Splines are followed without distances.
 std::optional<NarrowBand> sweepFor(const NarrowBand& base, const PatchCrowd& crowd,
                                    const PatchOptions& options) {
-  if (options.scheme == LevelScheme::Spline) return {};
+  if (options.scheme == LayerScheme::Spline) return {};
   return sweepSharedSpace(base, crowd,
                           {.maxMemory = options.maxMemory, .progress = options.progress});
 }

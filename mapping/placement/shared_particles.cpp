@@ -13,13 +13,13 @@ namespace {
 using Imath::V3d;
 
 struct SideParticle {
-  std::size_t level;
+  std::size_t layer;
   V3d before;
   double tolerance;
   V3d* after;
 };
 
-void addSides(std::size_t number, const ParticleLevel& before, ParticleLevel& after,
+void addSides(std::size_t number, const ParticleLayer& before, ParticleLayer& after,
               double tolerance, std::vector<SideParticle>& particles) {
   for (std::size_t j = 0; j < before.rows; ++j)
     for (std::size_t i = 0; i < before.columns; ++i) {
@@ -36,18 +36,18 @@ void joinSharedParticles(std::span<const Patch> before, std::span<Patch> after) 
   constexpr double kTolerance = 1e-3;  // spacings
   std::vector<SideParticle> particles;
   for (std::size_t p = 0; p < before.size(); ++p)
-    for (std::size_t k = 0; k < before[p].levels.size(); ++k)
-      addSides(k, before[p].levels[k], after[p].levels[k], kTolerance * before[p].spacing,
+    for (std::size_t k = 0; k < before[p].layers.size(); ++k)
+      addSides(k, before[p].layers[k], after[p].layers[k], kTolerance * before[p].spacing,
                particles);
   std::stable_sort(particles.begin(), particles.end(),
                    [](const SideParticle& a, const SideParticle& b) {
-                     return std::pair(a.level, a.before.x) < std::pair(b.level, b.before.x);
+                     return std::pair(a.layer, a.before.x) < std::pair(b.layer, b.before.x);
                    });
   levelset::DisjointSets sets(particles.size());
   for (std::size_t a = 0; a < particles.size(); ++a) {
     const double tolerance = particles[a].tolerance;
     for (std::size_t b = a + 1; b < particles.size(); ++b) {
-      if (particles[b].level != particles[a].level ||
+      if (particles[b].layer != particles[a].layer ||
           particles[b].before.x - particles[a].before.x > tolerance)
         break;
       if ((particles[b].before - particles[a].before).length() <= tolerance)

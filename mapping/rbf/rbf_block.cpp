@@ -70,7 +70,7 @@ double farError(double halfEdge, double gap) {
   return std::min(cube, Kernel::farBound(gap) * (1 + kLebesgue * kLebesgue * kLebesgue));
 }
 
-/// Room for what a tangent at the middle of a ball leaves out.
+/// MemoryEstimate for what a tangent at the middle of a ball leaves out.
 template <typename Kernel>
 double beyondTangent(double distance, double radius) {
   const double lo = std::max(distance - radius, 0.0), hi = distance + radius;

@@ -10,7 +10,7 @@
 
 namespace mapping {
 
-/// An approximate inverse of s φ + λ in two levels [Beatson00]: the particles of each leaf of a
+/// An approximate inverse of s φ + λ in two layers [Beatson00]: the particles of each leaf of a
 /// tree, with those around them, are solved for apart, and of each solution only the leaf's own
 /// weights are kept; what that leaves at a coarse choice of particles is then solved for. It refers
 /// to the cloud and the tree.

@@ -210,7 +210,7 @@ std::vector<V3d> straighten(const SurfaceField& field, double height, std::vecto
 
 std::vector<V3d> geodesic(const SurfaceField& field, double height, const V3d& a, const V3d& b,
                           double longest) {
-  const WaySearch search(field, height, a, b);
+  const GeodesicSearch search(field, height, a, b);
   std::vector<V3d> path = walkTowards(field, height, a, b);
   if (path.empty() || pathLength(path) > longest) path = search.shortest();
   if (path.empty() || pathLength(path) > longest) return {};

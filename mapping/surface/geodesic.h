@@ -9,7 +9,7 @@
 
 #include "mapping/surface/surface_field.h"
 
-/// Curves on a level φ = height of a base.
+/// Curves on a layer φ = height of a base.
 namespace mapping {
 
 /// The shortest way from a to b, points about a voxel apart and closer where the surface turns: a
@@ -26,7 +26,7 @@ namespace mapping {
                                                const Imath::V3d& a, const Imath::V3d& b,
                                                double longest = HUGE_VAL);
 
-/// The geodesic from a to b that runs as a path nearby does, perhaps one on another level: its
+/// The geodesic from a to b that runs as a path nearby does, perhaps one on another layer: its
 /// points are moved over, and straightened.
 /// @return empty when the path cannot be moved over without breaking
 [[nodiscard]] std::vector<Imath::V3d> geodesicLike(const SurfaceField& field, double height,

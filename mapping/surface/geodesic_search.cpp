@@ -23,24 +23,24 @@ constexpr double kGridExcess = 1.15;  // of ways over the grid; 1.128 for the le
 constexpr std::size_t kMostWays = 40;
 
 using Key = std::uint64_t;
-using Cell = std::array<int, 3>;
+using GridCell = std::array<int, 3>;
 constexpr int kBias = 1 << 20;
 
-Key packCell(const Cell& c) {
+Key packCell(const GridCell& c) {
   Key key = 0;
   for (const int x : c) key = key << 21 | static_cast<Key>(x + kBias);
   return key;
 }
 
-Cell unpackCell(Key key) {
-  Cell c;
+GridCell unpackCell(Key key) {
+  GridCell c;
   for (int axis = 2; axis >= 0; --axis, key >>= 21)
     c[static_cast<std::size_t>(axis)] = static_cast<int>(key & 0x1fffff) - kBias;
   return c;
 }
 
 /// The grid points beside φ = height, found out as they are asked for, with what the searches from
-/// the one end and from the other know of them. Cell (0, 0, 0) is the point a.
+/// the one end and from the other know of them. GridCell (0, 0, 0) is the point a.
 class WayGraph {
  public:
   struct Node {
@@ -55,7 +55,7 @@ class WayGraph {
       : field_(field), height_(height), ends_{a, b}, step_(field.voxelSize()) {}
 
   [[nodiscard]] V3d place(Key key) const {
-    const Cell c = unpackCell(key);
+    const GridCell c = unpackCell(key);
     return ends_[0] + V3d(c[0], c[1], c[2]) * step_;
   }
   [[nodiscard]] double step() const { return step_; }
@@ -118,9 +118,9 @@ class WayGraph {
   template <typename Estimate>
   void start(std::size_t end, const Estimate& estimate) {
     const V3d offset = (ends_[end] - ends_[0]) / step_;
-    const Cell middle = {static_cast<int>(std::lround(offset.x)),
-                         static_cast<int>(std::lround(offset.y)),
-                         static_cast<int>(std::lround(offset.z))};
+    const GridCell middle = {static_cast<int>(std::lround(offset.x)),
+                             static_cast<int>(std::lround(offset.y)),
+                             static_cast<int>(std::lround(offset.z))};
     for (int n = 0; n < 27; ++n) {
       const Key key =
           packCell({middle[0] + n / 9 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n % 3 - 1});
@@ -135,10 +135,10 @@ class WayGraph {
 
   template <typename MayLie, typename Estimate>
   void expand(std::size_t end, Key key, const MayLie& mayLie, const Estimate& estimate) {
-    const Cell c = unpackCell(key);
+    const GridCell c = unpackCell(key);
     const Node current = nodes_.at(key);  // the map may move it
     for (int n = 0; n < 27; ++n) {
-      const Cell d = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
+      const GridCell d = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
       if (n == 13) continue;
       const Key nextKey = packCell({c[0] + d[0], c[1] + d[1], c[2] + d[2]});
       Node& next = visit(nextKey);
@@ -184,7 +184,7 @@ std::vector<Meeting> meetings(const WayGraph& graph) {
 
 }  // namespace
 
-Way WaySearch::shortest() const {
+Way GeodesicSearch::shortest() const {
   WayGraph graph(field_, height_, a_, b_);
   const auto goal = graph.search(
       0, [](const V3d&, double) { return true; }, [&](const V3d& p) { return (p - b_).length(); },
@@ -198,7 +198,7 @@ Way WaySearch::shortest() const {
   return way;
 }
 
-std::vector<Way> WaySearch::alternatives(double longest) const {
+std::vector<Way> GeodesicSearch::alternatives(double longest) const {
   WayGraph graph(field_, height_, a_, b_);
   const double most = kGridExcess * longest, slack = 4 * graph.step();
   for (const std::size_t end : {0u, 1u}) {

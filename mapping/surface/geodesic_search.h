@@ -12,9 +12,9 @@ namespace mapping {
 /// another side: the shortest, and others that pass its middle elsewhere. Ways over a grid are up
 /// to 13 % too long; the true shortest comes out of one of these once they are straightened.
 /// @param a, b  on φ = height
-class WaySearch {
+class GeodesicSearch {
  public:
-  WaySearch(const SurfaceField& field, double height, const Imath::V3d& a, const Imath::V3d& b)
+  GeodesicSearch(const SurfaceField& field, double height, const Imath::V3d& a, const Imath::V3d& b)
       : field_(field), height_(height), a_(a), b_(b) {}
 
   /// The shortest over the grid, by A*; empty when the surface does not join a and b.

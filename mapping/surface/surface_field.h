@@ -7,7 +7,7 @@
 
 namespace mapping {
 
-/// The levels φ = height of a base as surfaces to walk on. Cheap to make, one per thread.
+/// The layers φ = height of a base as surfaces to walk on. Cheap to make, one per thread.
 class SurfaceField {
  public:
   explicit SurfaceField(const levelset::NarrowBand& band);

@@ -103,9 +103,9 @@ void checkArguments(const NarrowBand& base, const NarrowBand& texture,
   if (patches.empty())
     throw UsageError(fmt::format("{}: there is no patch; make one with `patch`", kTexture));
   for (const Patch& patch : patches) {
-    if (patch.levels.size() < 2 || !(patch.height > 0)) {
+    if (patch.layers.size() < 2 || !(patch.height > 0)) {
       throw InvalidInput(
-          fmt::format("{}: the patch has no levels of particles; make it with `patch`", kTexture));
+          fmt::format("{}: the patch has no layers of particles; make it with `patch`", kTexture));
     }
     requirePatchOn(base, patch);
   }
@@ -166,9 +166,9 @@ class TextureParts {
     constexpr double kBeyond = 2;  // voxels
     double u = HUGE_VAL, v = HUGE_VAL;
     for (const Patch& patch : patches) {
-      const ParticleLevel& level = patch.levels.front();
-      u = std::min(u, patch.spacing * static_cast<double>(level.columns - 1));
-      v = std::min(v, patch.spacing * static_cast<double>(level.rows - 1));
+      const ParticleLayer& layer = patch.layers.front();
+      u = std::min(u, patch.spacing * static_cast<double>(layer.columns - 1));
+      v = std::min(v, patch.spacing * static_cast<double>(layer.rows - 1));
     }
     const double alongU = kBeyond * voxelSize / u * box.size().x,
                  alongV = kBeyond * voxelSize / v * box.size().y;
@@ -418,7 +418,7 @@ double resultVoxelSize(double base, double texture, double minStretch) {
 
 void requirePatchOn(const NarrowBand& base, const Patch& patch) {
   const levelset::BandSampler sampler(base);
-  for (const V3d& p : patch.levels.front().positions) {
+  for (const V3d& p : patch.layers.front().positions) {
     const double distance = std::abs(sampler.value(p)) / base.voxelSize();
     if (distance > 1) {
       throw InvalidInput(
@@ -433,15 +433,15 @@ void requirePatchOn(const NarrowBand& base, const Patch& patch) {
 RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options, double sink) {
   std::vector<V3d> points, targets;
   std::vector<char> near;
-  for (const ParticleLevel& level : patch.levels) {
-    const int rim = level.hasRim() ? 1 : 0;
-    const auto columns = static_cast<int>(level.columns), rows = static_cast<int>(level.rows);
+  for (const ParticleLayer& layer : patch.layers) {
+    const int rim = layer.hasRim() ? 1 : 0;
+    const auto columns = static_cast<int>(layer.columns), rows = static_cast<int>(layer.rows);
     for (int j = -rim; j < rows + rim; ++j)
       for (int i = -rim; i < columns + rim; ++i) {
-        points.push_back(level.beyond(i, j));
+        points.push_back(layer.beyond(i, j));
         targets.emplace_back(static_cast<double>(i) / (columns - 1),
-                             static_cast<double>(j) / (rows - 1), level.w);
-        near.push_back(level.w == 0);
+                             static_cast<double>(j) / (rows - 1), layer.w);
+        near.push_back(layer.w == 0);
       }
   }
   for (const SunkParticle& particle : sunkParticles(patch, sink)) {

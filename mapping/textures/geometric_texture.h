@@ -88,9 +88,9 @@ struct TextureResult {
 
 /// The map of a patch: through its particles, those of its rims too, to their texture coordinates,
 /// λ near for w = 0. Without the rims the map errs most beside the patch's sides; and beyond its
-/// first and last level, so that where the texture is sunk columns go straight on by as many
-/// levels.
-/// @param sink  as a share of the patch's height; negative: beyond the last level
+/// first and last layer, so that where the texture is sunk columns go straight on by as many
+/// layers.
+/// @param sink  as a share of the patch's height; negative: beyond the last layer
 [[nodiscard]] RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options = {},
                                     double sink = 0);
 

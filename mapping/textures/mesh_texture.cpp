@@ -47,7 +47,7 @@ void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           const V3d uvw = placement.toUvw(texture.positions[i]);
           if constexpr (kNormals) {
-            const LevelFrame frame = levelFrame(patch, uvw);
+            const LayerFrame frame = layerFrame(patch, uvw);
             mesh.positions[i] = frame.position;
             mesh.attributes.normals[i] =
                 levelset::carriedNormal(texture.attributes.normals[i],
@@ -55,7 +55,7 @@ void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
                                          frame.slopes[2] * perSize.z},
                                         hand);
           } else {
-            mesh.positions[i] = levelPosition(patch, uvw);
+            mesh.positions[i] = layerPosition(patch, uvw);
           }
         }
         gate.advance(range.size());
@@ -81,9 +81,9 @@ MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
         fmt::format("{}: the mesh has no triangles; give one with some", kMapMesh));
   }
   requireAttributes(texture, kMapMesh);
-  if (patch.levels.size() < 2 || !(patch.height > 0)) {
+  if (patch.layers.size() < 2 || !(patch.height > 0)) {
     throw levelset::InvalidInput(
-        fmt::format("{}: the patch has no levels of particles; make it with `patch`", kMapMesh));
+        fmt::format("{}: the patch has no layers of particles; make it with `patch`", kMapMesh));
   }
   const double sink = options.sink / patch.height;
   const TexturePlacement placement{chooseTextureBox(levelset::bounds(texture), options.textureBox),
@@ -97,8 +97,8 @@ MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
       options.maxMemory, kMapMesh);
   levelset::report(options.progress, 0, kMapMesh);
   result.distortion =
-      surveyDistortion(sampleLevelMap(patch, sink), placement.box.size(), patch.mirrored);
-  result.certificate = certifyLevels(patch, sink);
+      surveyDistortion(sampleLayerMap(patch, sink), placement.box.size(), patch.mirrored);
+  result.certificate = certifyLayers(patch, sink);
   result.notes = judgeFolds(result.distortion, result.certificate, options.allowFolds);
 
   levelset::TriMesh& mesh = result.mesh;

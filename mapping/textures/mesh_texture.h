@@ -36,7 +36,7 @@ struct MeshTextureResult {
 };
 
 /// Moves the vertices of a mesh from texture space onto a patch, straight between its particles:
-/// within the two levels about w first, then from one to the other [Brodersen07 §8.4]. Any mesh
+/// within the two layers about w first, then from one to the other [Brodersen07 §8.4]. Any mesh
 /// will do, closed or not; its triangles stay, turned over where the patch is mirrored so that they
 /// face as before. Beyond the unit cube the outermost cells go on.
 /// Normals follow by the inverse transpose of the map's derivatives in the cell of their vertex (on

@@ -23,18 +23,18 @@ struct Side {
 
 /// In the order of SharedSides.
 std::array<Side, 4> sidesOf(const Patch& patch, std::size_t number) {
-  const ParticleLevel& level = patch.levels.front();
-  const std::size_t right = level.columns - 1, top = level.rows - 1;
+  const ParticleLayer& layer = patch.layers.front();
+  const std::size_t right = layer.columns - 1, top = layer.rows - 1;
   const auto alongV = [&](std::size_t column) {
-    return (level.at(column, top / 2) + level.at(column, (top + 1) / 2)) / 2.0;
+    return (layer.at(column, top / 2) + layer.at(column, (top + 1) / 2)) / 2.0;
   };
   const auto alongU = [&](std::size_t row) {
-    return (level.at(right / 2, row) + level.at((right + 1) / 2, row)) / 2.0;
+    return (layer.at(right / 2, row) + layer.at((right + 1) / 2, row)) / 2.0;
   };
-  return {{{level.at(0, 0), alongV(0), level.at(0, top), number, 0},
-           {level.at(right, 0), alongV(right), level.at(right, top), number, 1},
-           {level.at(0, 0), alongU(0), level.at(right, 0), number, 2},
-           {level.at(0, top), alongU(top), level.at(right, top), number, 3}}};
+  return {{{layer.at(0, 0), alongV(0), layer.at(0, top), number, 0},
+           {layer.at(right, 0), alongV(right), layer.at(right, top), number, 1},
+           {layer.at(0, 0), alongU(0), layer.at(right, 0), number, 2},
+           {layer.at(0, top), alongU(top), layer.at(right, top), number, 3}}};
 }
 
 }  // namespace

@@ -246,7 +246,7 @@ class TextureWarp {
       for (int j = 0; j <= kSamples; ++j)
         for (int k = 0; k <= kSamples; ++k) {
           const V3d t = uvw.min + uvw.size() * V3d(i, j, k) / kSamples;
-          box.expand(transform_->worldToIndex(levelset::toVdb(levelPosition(patch_, t))));
+          box.expand(transform_->worldToIndex(levelset::toVdb(layerPosition(patch_, t))));
         }
     box.expand(ghostDistance_ / transform_->voxelSize()[0]);
     constexpr double kMostIndex = 1e9;
@@ -343,7 +343,7 @@ class TextureWarp {
   /// Far from the particles the map may return to the texture; going there through the particles
   /// shows that this is another place.
   bool isGhost(const V3d& place, const V3d& uvw) const {
-    return !map_.isLocal() && (levelPosition(patch_, uvw) - place).length() > ghostDistance_;
+    return !map_.isLocal() && (layerPosition(patch_, uvw) - place).length() > ghostDistance_;
   }
 
   void fillLeaf(LeafNode& leaf, const BlockMap& map, const Samplers& samplers, Piece& piece) const {

@@ -8,7 +8,7 @@ namespace {
 
 using Imath::V3d;
 
-// Ends of the cells of unlike levels are further apart than this, whatever a million particles may
+// Ends of the cells of unlike layers are further apart than this, whatever a million particles may
 // be laid out as, and rounding is far below.
 constexpr double kSameEnd = 1e-9;
 
@@ -44,29 +44,29 @@ Share shareAt(double t, std::size_t count) {
 
 ShellCells::ShellCells(const Patch& patch, double sink) {
   std::size_t particles = 0, cells = 0;
-  for (const ParticleLevel& level : patch.levels) {
-    levels_.push_back({level.columns, level.rows, particles});
-    w_.push_back(level.w);
-    particles += level.positions.size();
+  for (const ParticleLayer& layer : patch.layers) {
+    layers_.push_back({layer.columns, layer.rows, particles});
+    w_.push_back(layer.w);
+    particles += layer.positions.size();
   }
-  for (std::size_t k = 0; k + 1 < levels_.size(); ++k) {
+  for (std::size_t k = 0; k + 1 < layers_.size(); ++k) {
     Slab slab{k,
               cells,
               w_[k],
               w_[k + 1],
-              endsOf(levels_[k][0], levels_[k + 1][0]),
-              endsOf(levels_[k][1], levels_[k + 1][1])};
+              endsOf(layers_[k][0], layers_[k + 1][0]),
+              endsOf(layers_[k][1], layers_[k + 1][1])};
     if (k == 0 && sink > 0) slab.from = -sink;
-    if (k + 2 == levels_.size() && sink < 0) slab.to -= sink;
+    if (k + 2 == layers_.size() && sink < 0) slab.to -= sink;
     cells += slab.count();
     slabs_.push_back(std::move(slab));
   }
 }
 
-void ShellCells::addLevel(ParticleSum& sum, std::size_t level, double u, double v,
+void ShellCells::addLayer(ParticleSum& sum, std::size_t layer, double u, double v,
                           double share) const {
   if (share == 0) return;
-  const auto& [columns, rows, first] = levels_[level];
+  const auto& [columns, rows, first] = layers_[layer];
   const Share i = shareAt(u, columns), j = shareAt(v, rows);
   for (const std::size_t b : {0u, 1u})
     for (const std::size_t a : {0u, 1u}) {
@@ -91,29 +91,29 @@ ShellCell ShellCells::at(std::size_t index) const {
   for (std::size_t corner = 0; corner < 8; ++corner) {
     const double u = slab->u[i + (corner & 1)], v = slab->v[j + (corner >> 1 & 1)];
     const double share = ((corner & 4 ? slab->to : slab->from) - below) / (above - below);
-    addLevel(cell.corners[corner], slab->lower, u, v, 1 - share);
-    addLevel(cell.corners[corner], slab->lower + 1, u, v, share);
+    addLayer(cell.corners[corner], slab->lower, u, v, 1 - share);
+    addLayer(cell.corners[corner], slab->lower + 1, u, v, share);
   }
   return cell;
 }
 
 V3d shellSizes(const Patch& patch) {
-  const ParticleLevel& level = patch.levels.front();
+  const ParticleLayer& layer = patch.layers.front();
   double u = 0, v = 0;
-  for (std::size_t j = 0; j < level.rows; ++j)
-    for (std::size_t i = 1; i < level.columns; ++i)
-      u += (level.at(i, j) - level.at(i - 1, j)).length();
-  for (std::size_t j = 1; j < level.rows; ++j)
-    for (std::size_t i = 0; i < level.columns; ++i)
-      v += (level.at(i, j) - level.at(i, j - 1)).length();
-  return {u / static_cast<double>(level.rows), v / static_cast<double>(level.columns),
+  for (std::size_t j = 0; j < layer.rows; ++j)
+    for (std::size_t i = 1; i < layer.columns; ++i)
+      u += (layer.at(i, j) - layer.at(i - 1, j)).length();
+  for (std::size_t j = 1; j < layer.rows; ++j)
+    for (std::size_t i = 0; i < layer.columns; ++i)
+      v += (layer.at(i, j) - layer.at(i, j - 1)).length();
+  return {u / static_cast<double>(layer.rows), v / static_cast<double>(layer.columns),
           patch.height};
 }
 
 std::vector<V3d> particlePositions(const Patch& patch) {
   std::vector<V3d> positions;
-  for (const ParticleLevel& level : patch.levels)
-    positions.insert(positions.end(), level.positions.begin(), level.positions.end());
+  for (const ParticleLayer& layer : patch.layers)
+    positions.insert(positions.end(), layer.positions.begin(), layer.positions.end());
   return positions;
 }
 

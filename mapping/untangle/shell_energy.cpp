@@ -71,7 +71,7 @@ ElementEnergy foldoverEnergy(const ShellSlopes& f, double epsilon) {
 }
 
 ShellElements::ShellElements(const Patch& patch, const V3d& rest, double sink) {
-  for (const ParticleLevel& level : patch.levels) particles_ += level.positions.size();
+  for (const ParticleLayer& layer : patch.layers) particles_ += layer.positions.size();
   const ShellCells cells(patch, sink);
   double volume = 0;
   for (std::size_t n = 0; n < cells.size(); ++n) {

@@ -25,9 +25,9 @@ using levelset::NarrowBand;
 
 void checkShell(const NarrowBand& base, const Patch& patch, const ShellOptions& options,
                 const char* action) {
-  if (patch.levels.size() < 2 || !(patch.height > 0)) {
+  if (patch.layers.size() < 2 || !(patch.height > 0)) {
     throw InvalidInput(
-        fmt::format("{}: the patch has no levels of particles; make it with `patch`", action));
+        fmt::format("{}: the patch has no layers of particles; make it with `patch`", action));
   }
   if (!std::isfinite(options.sink)) {
     throw levelset::UsageError(
@@ -42,8 +42,8 @@ void checkShell(const NarrowBand& base, const Patch& patch, const ShellOptions& 
                       p.x, p.y, p.z));
     }
   }
-  for (const ParticleLevel& level : patch.levels)
-    for (const V3d& p : level.positions)
+  for (const ParticleLayer& layer : patch.layers)
+    for (const V3d& p : layer.positions)
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
         throw InvalidInput(
             fmt::format("{}: the particle at ({}, {}, {}) is not finite; make the "
@@ -51,7 +51,7 @@ void checkShell(const NarrowBand& base, const Patch& patch, const ShellOptions& 
                         action, p.x, p.y, p.z));
       }
   const SurfaceField field(base);
-  for (const V3d& p : patch.levels.front().positions) {
+  for (const V3d& p : patch.layers.front().positions) {
     const double distance = std::abs(field.value(p)) / base.voxelSize();
     if (!(distance <= 1)) {
       throw InvalidInput(
@@ -66,11 +66,11 @@ void checkShell(const NarrowBand& base, const Patch& patch, const ShellOptions& 
 /// Above the surface all are free; on it those inside slide.
 std::vector<ParticleHold> holdsOf(const Patch& patch, bool freeSides) {
   std::vector<ParticleHold> holds;
-  for (std::size_t k = 0; k < patch.levels.size(); ++k) {
-    const ParticleLevel& level = patch.levels[k];
-    for (std::size_t j = 0; j < level.rows; ++j)
-      for (std::size_t i = 0; i < level.columns; ++i) {
-        const bool isSide = i == 0 || j == 0 || i + 1 == level.columns || j + 1 == level.rows;
+  for (std::size_t k = 0; k < patch.layers.size(); ++k) {
+    const ParticleLayer& layer = patch.layers[k];
+    for (std::size_t j = 0; j < layer.rows; ++j)
+      for (std::size_t i = 0; i < layer.columns; ++i) {
+        const bool isSide = i == 0 || j == 0 || i + 1 == layer.columns || j + 1 == layer.rows;
         holds.push_back(k > 0                  ? ParticleHold::Free
                         : isSide && !freeSides ? ParticleHold::Fixed
                                                : ParticleHold::Slides);
@@ -80,12 +80,12 @@ std::vector<ParticleHold> holdsOf(const Patch& patch, bool freeSides) {
 }
 
 /// A particle of the rim stays as far ahead of the last one as the one before that stays behind.
-void moveRim(const ParticleLevel& old, ParticleLevel& level) {
-  const auto columns = static_cast<int>(level.columns), rows = static_cast<int>(level.rows);
-  const auto moved = [&](int i, int j) { return level.beyond(i, j) - old.beyond(i, j); };
+void moveRim(const ParticleLayer& old, ParticleLayer& layer) {
+  const auto columns = static_cast<int>(layer.columns), rows = static_cast<int>(layer.rows);
+  const auto moved = [&](int i, int j) { return layer.beyond(i, j) - old.beyond(i, j); };
   const auto follow = [&](int i, int j) {
     const int a = std::clamp(i, 0, columns - 1), b = std::clamp(j, 0, rows - 1);
-    level.rim[level.rimIndex(i, j)] += moved(a, b) * 2.0 - moved(2 * a - i, 2 * b - j);
+    layer.rim[layer.rimIndex(i, j)] += moved(a, b) * 2.0 - moved(2 * a - i, 2 * b - j);
   };
   for (int i = -1; i <= columns; ++i)
     for (const int j : {-1, rows}) follow(i, j);
@@ -97,21 +97,21 @@ Patch withPositions(const NarrowBand& base, const Patch& patch, const std::vecto
   Patch result = patch;
   auto from = positions.begin();
   const SurfaceField field(base);
-  for (std::size_t k = 0; k < result.levels.size(); ++k) {
-    ParticleLevel& level = result.levels[k];
-    const auto to = from + static_cast<std::ptrdiff_t>(level.positions.size());
-    level.positions.assign(from, to);
+  for (std::size_t k = 0; k < result.layers.size(); ++k) {
+    ParticleLayer& layer = result.layers[k];
+    const auto to = from + static_cast<std::ptrdiff_t>(layer.positions.size());
+    layer.positions.assign(from, to);
     from = to;
-    if (!level.hasRim()) continue;
-    moveRim(patch.levels[k], level);
+    if (!layer.hasRim()) continue;
+    moveRim(patch.layers[k], layer);
     if (k > 0) continue;
-    for (std::size_t n = 0; n < level.rim.size(); ++n) {
-      V3d p = level.rim[n];
-      if (p != patch.levels[k].rim[n] && field.project(p, 0)) level.rim[n] = p;
+    for (std::size_t n = 0; n < layer.rim.size(); ++n) {
+      V3d p = layer.rim[n];
+      if (p != patch.layers[k].rim[n] && field.project(p, 0)) layer.rim[n] = p;
     }
   }
-  const std::size_t columns = result.levels.front().columns, rows = result.levels.front().rows;
-  const ParticleLevel& surface = result.levels.front();
+  const std::size_t columns = result.layers.front().columns, rows = result.layers.front().rows;
+  const ParticleLayer& surface = result.layers.front();
   result.corners = {surface.at(0, 0), surface.at(columns - 1, 0), surface.at(columns - 1, rows - 1),
                     surface.at(0, rows - 1)};
   result.spacing = meanSpacing(result);
@@ -192,14 +192,14 @@ std::size_t untangle(ShellSolver& solver, const ShellOptions& options,
 
 /// Mean lengths of opposite sides on the surface, and the height.
 V3d sideLengths(const Patch& patch) {
-  const ParticleLevel& level = patch.levels.front();
+  const ParticleLayer& layer = patch.layers.front();
   double u = 0, v = 0;
-  for (const std::size_t j : {std::size_t{0}, level.rows - 1})
-    for (std::size_t i = 1; i < level.columns; ++i)
-      u += 0.5 * (level.at(i, j) - level.at(i - 1, j)).length();
-  for (const std::size_t i : {std::size_t{0}, level.columns - 1})
-    for (std::size_t j = 1; j < level.rows; ++j)
-      v += 0.5 * (level.at(i, j) - level.at(i, j - 1)).length();
+  for (const std::size_t j : {std::size_t{0}, layer.rows - 1})
+    for (std::size_t i = 1; i < layer.columns; ++i)
+      u += 0.5 * (layer.at(i, j) - layer.at(i - 1, j)).length();
+  for (const std::size_t i : {std::size_t{0}, layer.columns - 1})
+    for (std::size_t j = 1; j < layer.rows; ++j)
+      v += 0.5 * (layer.at(i, j) - layer.at(i, j - 1)).length();
   return {u, v, patch.height};
 }
 

@@ -45,7 +45,7 @@ struct Unfolding {
 /// them in the limit [Garanzha21]. Where the sides of the patch themselves cross on the surface, no
 /// place of the other particles mends that: the patch with the fewest folds is returned.
 /// @param base  the solid that the patch was made on
-/// @throws InvalidInput for a patch without levels, with particles that are not finite, or one that
+/// @throws InvalidInput for a patch without layers, with particles that are not finite, or one that
 ///         does not lie on the base; ResourceLimit; Cancelled
 [[nodiscard]] Unfolding unfold(const levelset::NarrowBand& base, const Patch& patch,
                                const ShellOptions& options = {});

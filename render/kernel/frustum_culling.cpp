@@ -11,7 +11,8 @@ namespace render {
 
 using Imath::V3d;
 
-FrameNeed::FrameNeed(const Scene& scene, const RenderOptions& options, const Imath::Box3d& bounds) {
+FrustumCulling::FrustumCulling(const Scene& scene, const RenderOptions& options,
+                               const Imath::Box3d& bounds) {
   const Camera& camera = scene.camera;
   const bool isLit = usesLights(options.style.style);
   // Rays through an expression go on to where they leave the last solid, in all directions.
@@ -52,7 +53,7 @@ FrameNeed::FrameNeed(const Scene& scene, const RenderOptions& options, const Ima
                                                       : std::numeric_limits<double>::infinity();
 }
 
-bool FrameNeed::needs(const V3d& centre, double radius) const {
+bool FrustumCulling::needs(const V3d& centre, double radius) const {
   const auto isSeen = [&](double around) {
     return std::all_of(planes_.begin(), planes_.end(), [&](const Plane& plane) {
       return plane.normal.dot(centre) - plane.offset >= -around;

@@ -12,12 +12,12 @@ namespace render {
 
 /// The part of space that a picture is made from: what the camera may see, and what may come
 /// between that and its lights.
-class FrameNeed {
+class FrustumCulling {
  public:
-  FrameNeed() = default;  ///< all of space
+  FrustumCulling() = default;  ///< all of space
   /// @param bounds  a box that holds the surfaces, world units, not empty
   /// @pre the camera is valid
-  FrameNeed(const Scene& scene, const RenderOptions& options, const Imath::Box3d& bounds);
+  FrustumCulling(const Scene& scene, const RenderOptions& options, const Imath::Box3d& bounds);
 
   /// Is anything in that ball needed? Errs towards yes.
   /// @param centre, radius  world units

@@ -125,7 +125,8 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
   const double kCopies = options.filter == Filter::BSplineQi ? 4 * 512 : 0;
   const double kBytesOfBlock = 2 * 4 * (BrickPool::kValues + BrickPool::kMaskWords) + kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes, "render");
-  const FrameNeed need = isPicture && !box.isEmpty() ? FrameNeed(scene, options, box) : FrameNeed();
+  const FrustumCulling need =
+      isPicture && !box.isEmpty() ? FrustumCulling(scene, options, box) : FrustumCulling();
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
     const Solid& source = scene.solids[i];
     if (source.band.isEmpty() || (!scene.csg.isEmpty() && !scene.csg.uses(i))) continue;

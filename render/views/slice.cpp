@@ -49,7 +49,7 @@ Frame frameOf(const Imath::Box3d& bounds, const SliceOptions& options) {
   return frame;
 }
 
-C3f mixed(const C3f& a, const C3f& b, double share) {
+C3f mixedColour(const C3f& a, const C3f& b, double share) {
   return a + (b - a) * static_cast<float>(std::clamp(share, 0.0, 1.0));
 }
 
@@ -67,8 +67,8 @@ class SlicePainter {
     const double phi = phi_.value(p);
     const bool isFar = std::abs(phi) >= background_ * (1 - 1e-6);
     const double depth = std::abs(phi) / background_;
-    C3f result = phi < 0 ? mixed(C3f(0.55f, 0.72f, 0.88f), C3f(0.10f, 0.25f, 0.52f), depth)
-                         : mixed(C3f(0.94f, 0.82f, 0.62f), C3f(0.62f, 0.40f, 0.18f), depth);
+    C3f result = phi < 0 ? mixedColour(C3f(0.55f, 0.72f, 0.88f), C3f(0.10f, 0.25f, 0.52f), depth)
+                         : mixedColour(C3f(0.94f, 0.82f, 0.62f), C3f(0.62f, 0.40f, 0.18f), depth);
     if (isFar) return phi < 0 ? C3f(0.16f, 0.20f, 0.28f) : C3f(0.80f, 0.80f, 0.80f);
     // A line is as many pixels wide as φ changes in the plane.
     const V3d gradient = phi_.gradient(p);
@@ -76,7 +76,7 @@ class SlicePainter {
     const double toLine = std::abs(phi - std::round(phi / step_) * step_);
     const bool isEnd = std::abs(phi) > background_ - 0.25 * step_;  // where the band is cut off
     if (!isEnd && toLine < 0.5 * kLine * perPixel && 4 * kLine * perPixel < step_)
-      result = mixed(result, C3f(0), kFaintLine);
+      result = mixedColour(result, C3f(0), kFaintLine);
     if (std::abs(phi) < 0.5 * kZeroLine * perPixel) result = C3f(0.01f);
     return result;
   }

@@ -39,7 +39,7 @@ using wall::kTolerance;
 using wall::now;
 
 constexpr unsigned kDirectShare = 100, kSeed = 7;
-constexpr double kLevels = 6;
+constexpr double kLayers = 6;
 
 struct Cost {
   double points = 0, seconds = 0, directPoints = 0, directSeconds = 0, operations = 0, worst = 0;
@@ -84,7 +84,7 @@ void report(const char* name, const Cost& cost) {
 void compareKernels(double points) {
   constexpr std::array kNames = {"biharmonic", "triharmonic", "thin-plate",
                                  "sum",        "laplacian",   "gaussian"};
-  const mapping::Patch patch = wall::makePatch(2000, kLevels);
+  const mapping::Patch patch = wall::makePatch(2000, kLayers);
   const std::vector<GridBlock> grid = wall::rootsOf(points);
   for (std::size_t n = 0; n < kNames.size(); ++n) {
     const mapping::RbfMap map =
@@ -95,7 +95,7 @@ void compareKernels(double points) {
 }
 
 void solveMany(std::size_t particles) {
-  const mapping::Patch patch = wall::makePatch(static_cast<double>(particles), kLevels);
+  const mapping::Patch patch = wall::makePatch(static_cast<double>(particles), kLayers);
   const double start = now();
   const auto wallStart = std::chrono::steady_clock::now();
   const mapping::RbfMap map = patchToTexture(patch, {.denseLimit = 0});
@@ -114,7 +114,7 @@ int main(int argc, char** argv) {
   oneThread.emplace(tbb::global_control::max_allowed_parallelism, 1);
   const auto particles = static_cast<std::size_t>(argc > 1 ? std::atol(argv[1]) : 10000);
   const double points = argc > 2 ? std::atof(argv[2]) : 1e7;
-  const mapping::Patch patch = wall::makePatch(static_cast<double>(particles), kLevels);
+  const mapping::Patch patch = wall::makePatch(static_cast<double>(particles), kLayers);
   const std::vector<GridBlock> grid = wall::rootsOf(points);
 
   double start = now();
@@ -160,7 +160,7 @@ int main(int argc, char** argv) {
   V3d sum(0);
   for (int i = 0; i < kVertices; ++i) {
     const double t = static_cast<double>(i) / kVertices;
-    sum += mapping::levelPosition(patch, {t, std::fmod(37 * t, 1), std::fmod(1009 * t, 1)});
+    sum += mapping::layerPosition(patch, {t, std::fmod(37 * t, 1), std::fmod(1009 * t, 1)});
   }
   fmt::print("vertices {:.3g} million a second (5 wanted){}\n", kVertices / (now() - start) / 1e6,
              sum.x == 0.5 ? " " : "");

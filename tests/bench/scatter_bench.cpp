@@ -31,7 +31,7 @@ int main() {
   const levelset::NarrowBand base = levelset::makeSphere(8, V3d(0), kVoxel);
   const levelset::NarrowBand stud = levelset::makeSphere(0.8, V3d(0), kVoxel);
   mapping::ScatterOptions options = {
-      .density = {.count = 1}, .uSize = 1.6, .vSize = 1.6, .patch = {.levels = 3, .spacing = 0.25}};
+      .density = {.count = 1}, .uSize = 1.6, .vSize = 1.6, .patch = {.layers = 3, .spacing = 0.25}};
   const auto costOf = [&](std::size_t count) {
     options.density.count = count;
     double start = now();

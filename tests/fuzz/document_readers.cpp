@@ -17,7 +17,7 @@ void readPatch(std::string_view bytes) {
   const std::filesystem::path file = scratchFile("some.patch", bytes);
   accepts([&] {
     for (const mapping::Patch& patch : mapping::readPatches(file, kMaxMemory))
-      require(patch.levels.size() >= 2, "a patch has levels");
+      require(patch.layers.size() >= 2, "a patch has levels");
   });
 }
 

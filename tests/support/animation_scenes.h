@@ -17,7 +17,7 @@ inline constexpr double kStageVoxel = 0.1;
 
 inline const mapping::PatchOptions& thinPatch() {
   static const mapping::PatchOptions options = {
-      .levels = 2, .scheme = mapping::LevelScheme::Conforming, .spacing = 0.3};
+      .layers = 2, .scheme = mapping::LayerScheme::Conforming, .spacing = 0.3};
   return options;
 }
 

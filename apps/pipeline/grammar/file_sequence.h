@@ -8,9 +8,9 @@ namespace pipeline {
 
 /// A row of files of one folder whose names differ by their number: the first '#'s of the name
 /// stand for it, with that many digits (step_###.vdb). Those of folders stand for themselves.
-class FileRow {
+class FileSequence {
  public:
-  explicit FileRow(std::string pattern) : pattern_(std::move(pattern)) {}
+  explicit FileSequence(std::string pattern) : pattern_(std::move(pattern)) {}
   [[nodiscard]] bool hasNumber() const { return numberAt() != std::string::npos; }
   [[nodiscard]] const std::string& pattern() const { return pattern_; }
   /// @pre hasNumber()

@@ -35,9 +35,10 @@ std::vector<char> findDistances(const Graph& graph) {
 }
 
 /// What a node reads of an operand, whose plan is known.
-Demand readOf(const Node& node, std::size_t operand, const Demand& of,
-              const std::vector<std::optional<Plan>>& plans, const std::optional<Plan>& own) {
-  if (!node.op->reads) return {};
+RegionOfInterest readOf(const Node& node, std::size_t operand, const RegionOfInterest& of,
+                        const std::vector<std::optional<Plan>>& plans,
+                        const std::optional<Plan>& own) {
+  if (!node.op->regionOfInterest) return {};
   Invocation planned(*node.op, node.options);
   for (const std::size_t input : node.inputs) {
     if (!plans[input]) return {};
@@ -47,69 +48,65 @@ Demand readOf(const Node& node, std::size_t operand, const Demand& of,
     if (!own) return {};
     planned.planned = own;
   }
-  Demand read = node.op->reads(planned, operand, of);
-  if (asksForSize(node)) read.part.region = levelset::kEverywhere;
+  RegionOfInterest read = node.op->regionOfInterest(planned, operand, of);
+  if (asksForSize(node)) read.region = levelset::kEverywhere;
   return read;
 }
 
 /// Without what is no less than all.
-Demand simplified(Demand demand, const Plan& plan, bool isDistance, double leastHalfWidth) {
-  double& width = demand.part.halfWidth;
+RegionOfInterest simplified(RegionOfInterest roi, const Plan& plan, bool isDistance,
+                            double leastHalfWidth) {
+  double& width = roi.halfWidth;
   width = std::max(leastHalfWidth, width);
-  if (!isDistance || width >= plan.halfWidth) width = levelset::BandPart().halfWidth;
-  Box3d& region = demand.part.region;
+  if (!isDistance || width >= plan.halfWidth) width = RegionOfInterest().halfWidth;
+  Box3d& region = roi.region;
   const V3d rim(plan.halfWidth * plan.voxelSize);
   const Box3d all(plan.bounds.min - rim, plan.bounds.max + rim);
   const bool isAll =
       !plan.bounds.isEmpty() && region.intersects(all.min) && region.intersects(all.max);
   if (region.isEmpty() || isAll) region = levelset::kEverywhere;
-  return demand;
+  return roi;
 }
 
 }  // namespace
 
-void Demand::join(const Demand& other) {
-  part.halfWidth = std::max(part.halfWidth, other.part.halfWidth);
-  part.region.extendBy(other.part.region);
-}
-
-std::vector<Demand> demandsOf(const Graph& graph, const std::vector<char>& runs,
-                              const std::vector<std::optional<Plan>>& plans,
-                              double leastHalfWidth) {
+std::vector<RegionOfInterest> regionsOfInterest(const Graph& graph, const std::vector<char>& runs,
+                                                const std::vector<std::optional<Plan>>& plans,
+                                                double leastHalfWidth) {
   const std::vector<char> isDistance = findDistances(graph);
-  std::vector<std::optional<Demand>> demands(graph.nodes.size());
-  for (const std::size_t result : graph.results) demands[result] = Demand{};
+  std::vector<std::optional<RegionOfInterest>> regions(graph.nodes.size());
+  for (const std::size_t result : graph.results) regions[result] = RegionOfInterest{};
   for (std::size_t i = graph.nodes.size(); i-- > 0;) {
     const Node& node = graph.nodes[i];
     if (!runs[i]) continue;
-    if (demands[i] && node.kind == Kind::Band && plans[i])
-      demands[i] = simplified(*demands[i], *plans[i], isDistance[i] != 0, leastHalfWidth);
+    if (regions[i] && node.kind == Kind::Band && plans[i])
+      regions[i] = simplified(*regions[i], *plans[i], isDistance[i] != 0, leastHalfWidth);
     else
-      demands[i] = Demand{};
-    const auto ask = [&](std::size_t input, const Demand& demand) {
-      if (demands[input])
-        demands[input]->join(demand);
+      regions[i] = RegionOfInterest{};
+    const auto ask = [&](std::size_t input, const RegionOfInterest& roi) {
+      if (regions[input])
+        regions[input]->join(roi);
       else
-        demands[input] = demand;
+        regions[input] = roi;
     };
     for (std::size_t k = 0; k < node.inputs.size(); ++k)
-      ask(node.inputs[k], readOf(node, k, *demands[i], plans, plans[i]));
+      ask(node.inputs[k], readOf(node, k, *regions[i], plans, plans[i]));
     for (const auto& [option, input] : node.named) ask(input, {});
   }
-  std::vector<Demand> all(graph.nodes.size());
+  std::vector<RegionOfInterest> all(graph.nodes.size());
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (demands[i]) all[i] = *demands[i];
+    if (regions[i]) all[i] = *regions[i];
   return all;
 }
 
-Plan demanded(Plan plan, const Demand& demand) {
-  plan.halfWidth = std::min(plan.halfWidth, demand.part.halfWidth);
+Plan restricted(Plan plan, const RegionOfInterest& roi) {
+  plan.halfWidth = std::min(plan.halfWidth, roi.halfWidth);
   if (plan.bounds.isEmpty()) return plan;
   // As if the surface were spread evenly over its box.
   double share = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    const double low = std::max(plan.bounds.min[axis], demand.part.region.min[axis]),
-                 high = std::min(plan.bounds.max[axis], demand.part.region.max[axis]),
+    const double low = std::max(plan.bounds.min[axis], roi.region.min[axis]),
+                 high = std::min(plan.bounds.max[axis], roi.region.max[axis]),
                  side = plan.bounds.max[axis] - plan.bounds.min[axis];
     if (side > 0) share *= std::clamp((high - low) / side, 0.0, 1.0);
   }

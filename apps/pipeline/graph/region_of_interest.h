@@ -5,29 +5,22 @@
 #include <vector>
 
 #include "apps/pipeline/graph/graph.h"
-#include "levelset/placement/crop.h"
+#include "levelset/region_of_interest.h"
 
 namespace pipeline {
 
-/// What those who take a value read of it: all of it, unless the part says less.
-struct Demand {
-  levelset::BandPart part = {};
+using levelset::RegionOfInterest;
 
-  [[nodiscard]] bool isWhole() const { return part.isAll(); }
-  /// What either of two reads.
-  void join(const Demand& other);
-};
+/// Finds the region of interest of each node's value, going backwards through the nodes that run.
+/// @param runs   one flag per node
+/// @param plans  of whole values; an empty one means that all of the value is read
+/// @param leastHalfWidth  voxels, at least 1: read of each band in any case
+/// @return       one per node; the whole for nodes that do not run and for values that are no bands
+[[nodiscard]] std::vector<RegionOfInterest> regionsOfInterest(
+    const Graph& graph, const std::vector<char>& runs,
+    const std::vector<std::optional<Plan>>& plans, double leastHalfWidth = 1);
 
-/// What is read of each node's value, going backwards through those that run.
-/// @param runs   by node
-/// @param plans  of whole values; empty where nothing is known, and all is asked for
-/// @param leastHalfWidth  voxels, at least 1: what is read of each band in any case
-/// @return       whole for what runs not, and for what is no band
-[[nodiscard]] std::vector<Demand> demandsOf(const Graph& graph, const std::vector<char>& runs,
-                                            const std::vector<std::optional<Plan>>& plans,
-                                            double leastHalfWidth = 1);
-
-/// What a band of that plan is, as far as it is asked for.
-[[nodiscard]] Plan demanded(Plan plan, const Demand& demand);
+/// The plan of a band that is restricted to a region of interest.
+[[nodiscard]] Plan restricted(Plan plan, const RegionOfInterest& roi);
 
 }  // namespace pipeline

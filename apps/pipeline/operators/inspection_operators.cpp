@@ -219,7 +219,7 @@ Json valueInfo(const Value& value) {
     std::size_t particles = 0;
     for (const mapping::Patch& patch : patches) particles += patch.particleCount();
     json["patches"] = patches.size();
-    json["levels"] = patches.front().levels.size();
+    json["levels"] = patches.front().layers.size();
     json["particles"] = particles;
   }
   return json;

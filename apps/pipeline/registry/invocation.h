@@ -13,8 +13,8 @@
 
 #include "apps/pipeline/registry/operator.h"
 #include "apps/pipeline/values/value.h"
-#include "levelset/placement/crop.h"
 #include "levelset/progress.h"
+#include "levelset/region_of_interest.h"
 
 namespace pipeline {
 
@@ -101,13 +101,13 @@ class Invocation {
   }
 
   // What is needed of the result: run() may make no more than that.
-  levelset::BandPart part = {};
+  levelset::RegionOfInterest roi = {};
   /// Of the whole result, where that was told before.
   std::optional<Plan> planned = {};
-  bool isNarrowed = false;  ///< the first operand is narrower than its whole
+  bool isPartial = false;  ///< the first operand is narrower than its whole
   /// The half width of what is made, where the whole has `whole`; voxels.
   [[nodiscard]] double neededHalfWidth(double whole) const {
-    return std::min(whole, part.halfWidth);
+    return std::min(whole, roi.halfWidth);
   }
 
   // What comes from the run as a whole.

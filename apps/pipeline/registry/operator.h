@@ -6,13 +6,13 @@
 
 #include "apps/pipeline/registry/cost.h"
 #include "apps/pipeline/values/value.h"
+#include "levelset/region_of_interest.h"
 
 /// The registry: one declaration per operator. The command line, its help and its checks are made
 /// from it.
 namespace pipeline {
 
 class Invocation;
-struct Demand;
 
 enum class ParamType {
   Flag,
@@ -97,12 +97,14 @@ struct Operator {
   /// What `run` takes beside its operands and its result; without it, nobody knows.
   CostOf cost = {};
   Slope slope = Slope::Any;
-  /// What it reads of an operand for a part of its result; without it, the whole. The operands are
-  /// plans, and Invocation::planned is that of the whole result. Inside the part the result has to
-  /// be what it is of whole operands, to the bit or to `partTolerance`.
-  std::function<Demand(Invocation&, std::size_t operand, const Demand& part)> reads = {};
+  /// The region of interest of an operand, given that of the result; without it, the whole. The
+  /// operands are plans, and Invocation::planned is that of the whole result. Inside the part the
+  /// result has to be what it is of whole operands, to the bit or to `partTolerance`.
+  std::function<levelset::RegionOfInterest(Invocation&, std::size_t operand,
+                                           const levelset::RegionOfInterest& of)>
+      regionOfInterest = {};
   double partTolerance = 0;  ///< voxels
-  bool makesParts = false;   ///< of its operands as they are: `run` keeps to Invocation::part
+  bool makesParts = false;   ///< of its operands as they are: `run` keeps to Invocation::roi
   /// Refuses, before anything runs, what can be told from the options and the kinds of the
   /// operands: options that exclude each other, formats, what is missing.
   std::function<void(const Invocation&)> validate = {};

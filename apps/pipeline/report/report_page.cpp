@@ -271,7 +271,7 @@ class StepTable {
   }
 
   static std::string neededOf(const StepReport& step) {
-    if (step.needed.isAll()) return step.voxelSize > 0 ? "all" : "";
+    if (step.needed.isWhole()) return step.voxelSize > 0 ? "all" : "";
     std::string text;
     if (!std::isinf(step.needed.halfWidth))
       text = step.voxelSize > 0 ? widthText(step.needed.halfWidth, step.voxelSize)

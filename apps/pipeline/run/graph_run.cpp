@@ -13,6 +13,7 @@
 #include "apps/pipeline/values/refusal.h"
 #include "apps/process_cost.h"
 #include "levelset/error.h"
+#include "levelset/placement/crop.h"
 
 namespace pipeline {
 namespace {
@@ -46,10 +47,10 @@ constexpr double kMostEarlyBytes = 1 << 28;
 constexpr double kMeasuredHalfWidth = 4;
 
 /// @throws levelset::InvalidInput where there is no surface in the part
-Value partOf(const Value& value, const Demand& demand) {
+Value partOf(const Value& value, const RegionOfInterest& roi) {
   if (value.kind() != Kind::Band) return value;
-  levelset::NarrowBand part = levelset::cropped(value.band(), demand.part);
-  if (part.isEmpty() && !levelset::isEverywhere(demand.part.region))
+  levelset::NarrowBand part = levelset::cropped(value.band(), roi);
+  if (part.isEmpty() && !levelset::isEverywhere(roi.region))
     throw levelset::InvalidInput("no surface lies in the part that is needed");
   return Value(std::move(part));
 }
@@ -73,7 +74,7 @@ GraphRun::GraphRun(const Graph& graph, const RunSettings& settings, RunReport& r
       threads_(std::min(
           static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()),
           tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism))),
-      values_(decideFates()) {}
+      values_(decideStates()) {}
 
 void GraphRun::run() {
   try {
@@ -93,22 +94,22 @@ void GraphRun::run() {
 void GraphRun::runNodes() {
   const auto count = [&](auto... fates) {
     std::size_t sum = 0;
-    for (std::size_t i = 0; i < fates_.size(); ++i)
-      sum += !isGiven(i) && ((fates_[i] == fates) || ...);
+    for (std::size_t i = 0; i < states_.size(); ++i)
+      sum += !isGiven(i) && ((states_[i] == fates) || ...);
     return sum;
   };
-  const std::size_t known = count(Fate::Load, Fate::Known), ran = count(Fate::Run);
+  const std::size_t known = count(NodeState::Load, NodeState::Known), ran = count(NodeState::Run);
   planAhead();
   for (std::size_t i = 0; i < graph_.nodes.size(); ++i) {
     const Node& node = graph_.nodes[i];
-    if (fates_[i] == Fate::LeftOut)
+    if (states_[i] == NodeState::LeftOut)
       report_.leftOut.push_back(node.op->name + (node.name.empty() ? "" : " @" + node.name));
     else if (const auto given = graph_.given.find(i); given != graph_.given.end())
       values_.put(i, given->second);
   }
   const std::size_t all = graph_.nodes.size();
   JobsDone done{.isDone = std::vector<char>(all, 0)};
-  if (threads_ > 1 && !settings_.dryRun && isBranched()) done = runSideBySide();
+  if (threads_ > 1 && !settings_.dryRun && isBranched()) done = scheduleTasks();
   runInOrder(done.isDone, done.failed.value_or(all));
   if (done.failure) std::rethrow_exception(done.failure);
   if (known > 0)
@@ -120,9 +121,9 @@ void GraphRun::runNodes() {
 void GraphRun::runInOrder(const std::vector<char>& isDone, std::size_t end) {
   for (std::size_t i = 0; i < end; ++i) {
     tellInOrder();
-    if (isDone[i] || wasEarly_[i] || isGiven(i) || fates_[i] == Fate::LeftOut) continue;
+    if (isDone[i] || wasEarly_[i] || isGiven(i) || states_[i] == NodeState::LeftOut) continue;
     if (isRefused_[i]) makeWhole(i);
-    if (isRefused_[i] || fates_[i] == Fate::Run)
+    if (isRefused_[i] || states_[i] == NodeState::Run)
       compute(i);
     else
       recall(i);
@@ -131,21 +132,22 @@ void GraphRun::runInOrder(const std::vector<char>& isDone, std::size_t end) {
 }
 
 /// @return by node: how many that run take its value
-std::vector<std::size_t> GraphRun::decideFates() {
+std::vector<std::size_t> GraphRun::decideStates() {
   const std::size_t count = graph_.nodes.size();
   const std::vector<char> needed = neededNodes(graph_);
   wasEarly_.resize(count);
   earlyFailures_.resize(count);
   isRefused_.resize(count);
-  demands_.resize(count);
+  regions_.resize(count);
   plans_.resize(count);
   steps_.resize(count);
   unspoken_.resize(count);
-  fates_.resize(count);
-  for (std::size_t i = 0; i < count; ++i) fates_[i] = needed[i] ? Fate::Run : Fate::LeftOut;
+  states_.resize(count);
+  for (std::size_t i = 0; i < count; ++i)
+    states_[i] = needed[i] ? NodeState::Run : NodeState::LeftOut;
   if (!settings_.cache.empty() && !settings_.dryRun) useCache(needed);
   std::vector<char> runs(count);
-  for (std::size_t i = 0; i < count; ++i) runs[i] = fates_[i] == Fate::Run;
+  for (std::size_t i = 0; i < count; ++i) runs[i] = states_[i] == NodeState::Run;
   return countUses(graph_, runs);
 }
 
@@ -160,13 +162,13 @@ void GraphRun::useCache(const std::vector<char>& needed) {
     if (!needed[i]) continue;
     const bool isKnown = keys_[i] && cache_->has(*keys_[i]);
     if (!node.makes()) {
-      if (isKnown && isUpToDate(*keys_[i])) fates_[i] = Fate::Known;
+      if (isKnown && isUpToDate(*keys_[i])) states_[i] = NodeState::Known;
     } else if (!taken[i] && uses[i] > 0) {  // what ends a chain is made for itself
-      fates_[i] = Fate::Known;
+      states_[i] = NodeState::Known;
     } else if (isKnown && Cache::canHold(node.kind)) {
-      fates_[i] = Fate::Load;
+      states_[i] = NodeState::Load;
     }
-    if (fates_[i] != Fate::Run) continue;
+    if (states_[i] != NodeState::Run) continue;
     for (const std::size_t input : node.inputs) taken[input] = 1;
     for (const auto& [option, input] : node.named) taken[input] = 1;
   }
@@ -183,23 +185,24 @@ bool GraphRun::isUpToDate(const std::string& key) const {
 /// others may ask for later, out of a cache or of Python, are whole.
 void GraphRun::planAhead() {
   std::vector<char> runs(graph_.nodes.size());
-  for (std::size_t i = 0; i < runs.size(); ++i) runs[i] = fates_[i] == Fate::Run;
+  for (std::size_t i = 0; i < runs.size(); ++i) runs[i] = states_[i] == NodeState::Run;
   if (settings_.dryRun) return;
   plans_ =
       plansOf(graph_, runs, settings_.maxMemory, [&](std::size_t i) { return planEarly(i); }).plans;
   if (!settings_.wholeValues && !cache_ && !settings_.made)
-    demands_ = demandsOf(graph_, runs, plans_, settings_.measureErrors ? kMeasuredHalfWidth : 1);
-  if (std::any_of(demands_.begin(), demands_.end(),
-                  [](const Demand& demand) { return !demand.isWhole(); })) {
+    regions_ =
+        regionsOfInterest(graph_, runs, plans_, settings_.measureErrors ? kMeasuredHalfWidth : 1);
+  if (std::any_of(regions_.begin(), regions_.end(),
+                  [](const RegionOfInterest& roi) { return !roi.isWhole(); })) {
     const std::vector<char> isOverwritten = findOverwritten(graph_, runs);
     for (std::size_t i = 0; i < runs.size(); ++i) {
       if (!runs[i] || !(isOverwritten[i] || readsOnce(graph_.nodes[i]))) continue;
       // It is there to be taken once more, where a part turns out not to do.
-      demands_[i] = {};
+      regions_[i] = {};
       values_.addUse(i);
     }
   }
-  requireMemoryFor(graph_, runs, plans_, demands_, settings_.maxMemory);
+  requireMemoryFor(graph_, runs, plans_, regions_, settings_.maxMemory);
 }
 
 /// To plan a mesh is to read it: so it is made now where a band is made of it, unless many are held
@@ -220,7 +223,7 @@ std::optional<Plan> GraphRun::planEarly(std::size_t i) {
     throw;
   } catch (const levelset::Error&) {
     earlyFailures_[i] = std::current_exception();  // thrown in its turn
-    fates_[i] = Fate::Run;
+    states_[i] = NodeState::Run;
     tellEnd_ = std::min(toldBefore, i + 1);
     return {};
   }
@@ -235,9 +238,9 @@ std::optional<Plan> GraphRun::planEarly(std::size_t i) {
 /// Did it take or make less than the whole?
 bool GraphRun::isPartial(std::size_t i) const {
   const std::vector<std::size_t>& inputs = graph_.nodes[i].inputs;
-  return !demands_[i].isWhole() ||
+  return !regions_[i].isWhole() ||
          std::any_of(inputs.begin(), inputs.end(),
-                     [&](std::size_t input) { return !demands_[input].isWhole(); });
+                     [&](std::size_t input) { return !regions_[input].isWhole(); });
 }
 
 /// From now on it and all that it is made of are whole.
@@ -246,9 +249,9 @@ void GraphRun::makeWhole(std::size_t i) {
   isAsked[i] = 1;
   for (std::size_t k = i + 1; k-- > 0;) {
     if (!isAsked[k]) continue;
-    demands_[k] = {};
+    regions_[k] = {};
     for (const std::size_t input : graph_.nodes[k].inputs) {
-      if (!demands_[input].isWhole()) values_.drop(input);
+      if (!regions_[input].isWhole()) values_.drop(input);
       isAsked[input] = 1;
     }
   }
@@ -258,7 +261,7 @@ void GraphRun::makeWhole(std::size_t i) {
 bool GraphRun::isBranched() const {
   std::optional<std::size_t> before;
   for (std::size_t i = 0; i < graph_.nodes.size(); ++i) {
-    if (fates_[i] == Fate::LeftOut || isGiven(i)) continue;
+    if (states_[i] == NodeState::LeftOut || isGiven(i)) continue;
     const Node& node = graph_.nodes[i];
     const auto& inputs = node.inputs;
     const bool takesIt = before && std::find(inputs.begin(), inputs.end(), *before) != inputs.end();
@@ -270,7 +273,7 @@ bool GraphRun::isBranched() const {
 
 std::vector<Job> GraphRun::jobs() const {
   std::vector<char> needed(graph_.nodes.size());
-  for (std::size_t i = 0; i < needed.size(); ++i) needed[i] = fates_[i] != Fate::LeftOut;
+  for (std::size_t i = 0; i < needed.size(); ++i) needed[i] = states_[i] != NodeState::LeftOut;
   const auto writers = findWritersRead(graph_, needed);
   std::vector<Job> jobs(graph_.nodes.size());
   for (std::size_t i = 0; i < jobs.size(); ++i) {
@@ -278,14 +281,14 @@ std::vector<Job> GraphRun::jobs() const {
     const Node& node = graph_.nodes[i];
     jobs[i].waitsForAll = isOrdered(node);
     if (writers[i]) jobs[i].waitsFor.push_back(*writers[i]);
-    if (fates_[i] != Fate::Run) continue;
+    if (states_[i] != NodeState::Run) continue;
     for (const std::size_t input : node.inputs) jobs[i].waitsFor.push_back(input);
     for (const auto& [option, input] : node.named) jobs[i].waitsFor.push_back(input);
   }
   return jobs;
 }
 
-JobsDone GraphRun::runSideBySide() {
+JobsDone GraphRun::scheduleTasks() {
   JobSettings settings{.threads = threads_};
   settings.run = [&](std::size_t i, const GoesOn& goesOn) {
     const bool isDone = runBeside(i, goesOn);
@@ -297,26 +300,26 @@ JobsDone GraphRun::runSideBySide() {
     const std::lock_guard lock(mutex_);
     return fitsBeside(i, running);
   };
-  return pipeline::runSideBySide(jobs(), settings);
+  return pipeline::scheduleTasks(jobs(), settings);
 }
 
 /// @return false: it has to be done without others beside it
 bool GraphRun::runBeside(std::size_t i, const GoesOn& goesOn) {
-  Fate fate = Fate::LeftOut;
+  NodeState fate = NodeState::LeftOut;
   {
     const std::lock_guard lock(mutex_);
-    fate = fates_[i];
-    if (fate == Fate::LeftOut || wasEarly_[i] || isGiven(i)) return true;
+    fate = states_[i];
+    if (fate == NodeState::LeftOut || wasEarly_[i] || isGiven(i)) return true;
     const Node& node = graph_.nodes[i];
     const auto isThere = [&](std::size_t input) { return values_.has(input); };
-    if (fate == Fate::Run &&
+    if (fate == NodeState::Run &&
         !(std::all_of(node.inputs.begin(), node.inputs.end(), isThere) &&
           std::all_of(node.named.begin(), node.named.end(),
                       [&](const auto& named) { return isThere(named.second); })))
       return false;
-    if (fate == Fate::Run) fates_[i] = Fate::Known;
+    if (fate == NodeState::Run) states_[i] = NodeState::Known;
   }
-  if (fate != Fate::Run) return recallValue(i);
+  if (fate != NodeState::Run) return recallValue(i);
   tbb::task_arena arena(static_cast<int>(threads_));
   const ArenaCpu cpu(arena);
   try {
@@ -346,12 +349,12 @@ bool GraphRun::fitsBeside(std::size_t i, const std::vector<std::size_t>& running
 
 /// Empty: nobody knows.
 std::optional<double> GraphRun::workBytes(std::size_t i) const {
-  if (isGiven(i) || fates_[i] == Fate::LeftOut || wasEarly_[i]) return 0;
+  if (isGiven(i) || states_[i] == NodeState::LeftOut || wasEarly_[i]) return 0;
   const Node& node = graph_.nodes[i];
   double bytes = 0;
   const auto add = [&](std::size_t of) {
     if (!plans_[of]) return false;
-    bytes += kWorkingSpace * demanded(*plans_[of], demands_[of]).bytes();
+    bytes += kWorkingSpace * restricted(*plans_[of], regions_[of]).bytes();
     return true;
   };
   if (node.makes() && !add(i)) return {};
@@ -376,7 +379,7 @@ StepReport& GraphRun::begin(std::size_t i) {
       step.defaults[param.name] = param.fallback;
   step.resultName = node.name;
   step.place = node.place;
-  step.needed = demands_[i].part;
+  step.needed = regions_[i];
   return steps_[i].emplace(std::move(step));
 }
 
@@ -402,9 +405,9 @@ void GraphRun::tell(std::size_t i, const std::string& output) {
 
 /// What comes first in the graph is told first, whatever ended first.
 void GraphRun::tellInOrder() {
-  for (; nextTold_ < std::min(fates_.size(), tellEnd_); ++nextTold_) {
+  for (; nextTold_ < std::min(states_.size(), tellEnd_); ++nextTold_) {
     const std::size_t i = nextTold_;
-    if (isGiven(i) || fates_[i] == Fate::LeftOut) continue;
+    if (isGiven(i) || states_[i] == NodeState::LeftOut) continue;
     if (!unspoken_[i]) return;
     const Node& node = graph_.nodes[i];
     StepNotes& notes = steps_[i]->notes;
@@ -429,7 +432,7 @@ void GraphRun::recall(std::size_t i) {
 /// @return false: its entry is damaged
 bool GraphRun::recallValue(std::size_t i) {
   std::optional<Value> value;
-  if (fates_[i] == Fate::Load) {
+  if (states_[i] == NodeState::Load) {
     value = cache_->value(*keys_[i], settings_.maxMemory);
     if (!value) return false;
   }
@@ -458,18 +461,18 @@ bool GraphRun::recallValue(std::size_t i) {
 void GraphRun::compute(std::size_t i) {
   if (isGiven(i)) return values_.put(i, graph_.given.at(i));
   const Node& node = graph_.nodes[i];
-  const bool isPlanned = fates_[i] == Fate::Run;  // its uses of others are counted
-  fates_[i] = Fate::Known;  // to those who may ask for it again, once its value was let go
+  const bool isPlanned = states_[i] == NodeState::Run;  // its uses of others are counted
+  states_[i] = NodeState::Known;  // to those who may ask for it again, once its value was let go
   if (!isPlanned) {
     for (const std::size_t input : node.inputs) values_.addUse(input);
     for (const auto& [option, input] : node.named) values_.addUse(input);
   }
   const auto bring = [&](std::size_t input) {
     if (values_.has(input)) return;
-    if (cache_ && fates_[input] == Fate::Known && keys_[input] &&
+    if (cache_ && states_[input] == NodeState::Known && keys_[input] &&
         Cache::canHold(graph_.nodes[input].kind) && cache_->has(*keys_[input]))
-      fates_[input] = Fate::Load;
-    if (fates_[input] == Fate::Load)
+      states_[input] = NodeState::Load;
+    if (states_[input] == NodeState::Load)
       recall(input);
     else
       compute(input);
@@ -517,10 +520,9 @@ Invocation GraphRun::invocationOf(std::size_t i, const GoesOn& goesOn) {
   }
   for (const auto& [option, input] : node.named)
     invocation.named.emplace(option, values_.take(input));
-  invocation.part = demands_[i].part;
+  invocation.roi = regions_[i];
   invocation.planned = plans_[i];
-  invocation.isNarrowed =
-      !node.inputs.empty() && std::isfinite(demands_[node.inputs[0]].part.halfWidth);
+  invocation.isPartial = !node.inputs.empty() && std::isfinite(regions_[node.inputs[0]].halfWidth);
   invocation.maxMemory = settings_.maxMemory;
   invocation.dryRun = settings_.dryRun;
   if (settings_.progress || settings_.goesOn || goesOn)
@@ -555,7 +557,7 @@ void GraphRun::runNode(std::size_t i, StepReport& step, StepClock& clock, const 
       finish(node.makes() ? &value : nullptr);
     } else {
       Value value = op.run(invocation);
-      if (!demands_[i].isWhole()) value = partOf(value, demands_[i]);
+      if (!regions_[i].isWhole()) value = partOf(value, regions_[i]);
       if (node.makes()) describeResult(value, false, step);
       clock.stop();
       if (node.makes() && settings_.measureErrors)

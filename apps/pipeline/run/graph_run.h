@@ -56,7 +56,7 @@ class GraphRun {
   void run();
 
  private:
-  enum class Fate {
+  enum class NodeState {
     LeftOut,  // nothing needs it
     Run,
     Load,  // its value is known, and taken by one that runs
@@ -65,7 +65,7 @@ class GraphRun {
   using GoesOn = std::function<bool()>;
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
-  std::vector<std::size_t> decideFates();
+  std::vector<std::size_t> decideStates();
   void useCache(const std::vector<char>& needed);
   [[nodiscard]] bool isUpToDate(const std::string& key) const;
 
@@ -78,7 +78,7 @@ class GraphRun {
   void runInOrder(const std::vector<char>& isDone, std::size_t end);
   [[nodiscard]] bool isBranched() const;
   [[nodiscard]] std::vector<Job> jobs() const;
-  JobsDone runSideBySide();
+  JobsDone scheduleTasks();
   bool runBeside(std::size_t i, const GoesOn& goesOn);
   [[nodiscard]] bool fitsBeside(std::size_t i, const std::vector<std::size_t>& running) const;
   [[nodiscard]] std::optional<double> workBytes(std::size_t i) const;
@@ -102,10 +102,10 @@ class GraphRun {
   const RunSettings& settings_;
   RunReport& report_;
   const std::size_t threads_;
-  std::vector<Fate> fates_;
+  std::vector<NodeState> states_;
   std::optional<Cache> cache_;
   std::vector<std::optional<std::string>> keys_;
-  std::vector<Demand> demands_;
+  std::vector<RegionOfInterest> regions_;
   std::vector<std::optional<Plan>> plans_;  // of whole values, as far as they were told ahead
   std::vector<char> wasEarly_;              // ran to be planned with
   std::vector<std::exception_ptr> earlyFailures_;
@@ -116,7 +116,7 @@ class GraphRun {
   std::vector<std::optional<std::string>> unspoken_;  // what ended, and is told in its turn
   std::size_t nextTold_ = 0, tellEnd_ = kNone;
   std::mutex mutex_;  // of the values, the fates, what is told, and the settings' functions
-  Values values_;     // the last: decideFates() fills the others
+  Values values_;     // the last: decideStates() fills the others
 };
 
 }  // namespace pipeline

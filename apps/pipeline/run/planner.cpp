@@ -40,13 +40,12 @@ std::string reasonFor(const Graph& graph, std::size_t index, const std::vector<c
   return node.makes() ? "ends the chain" : "asked for";
 }
 
-std::string needOf(const Demand& demand, const Plan& plan) {
+std::string needOf(const RegionOfInterest& roi, const Plan& plan) {
   std::string text;
-  if (demand.part.halfWidth < plan.halfWidth)
-    text +=
-        fmt::format("; {:.3g} of {:.3g} voxels of its band", demand.part.halfWidth, plan.halfWidth);
-  if (!levelset::isEverywhere(demand.part.region)) {
-    const Imath::Box3d& box = demand.part.region;
+  if (roi.halfWidth < plan.halfWidth)
+    text += fmt::format("; {:.3g} of {:.3g} voxels of its band", roi.halfWidth, plan.halfWidth);
+  if (!levelset::isEverywhere(roi.region)) {
+    const Imath::Box3d& box = roi.region;
     text += fmt::format("; only {:.4g},{:.4g},{:.4g} to {:.4g},{:.4g},{:.4g}", box.min.x, box.min.y,
                         box.min.z, box.max.x, box.max.y, box.max.z);
   }
@@ -54,17 +53,17 @@ std::string needOf(const Demand& demand, const Plan& plan) {
 }
 
 /// Of its value, as far as that is needed. 0 where nobody knows.
-double bytesOf(const std::optional<Plan>& plan, const Demand& demand) {
+double bytesOf(const std::optional<Plan>& plan, const RegionOfInterest& roi) {
   if (!plan) return 0;
   if (plan->kind == Kind::Mesh) return plan->bytes();
   const bool isTold =
       (plan->kind == Kind::Band && plan->voxelSize > 0) || plan->kind == Kind::Field;
-  return isTold ? demanded(*plan, demand).bytes() : 0;
+  return isTold ? restricted(*plan, roi).bytes() : 0;
 }
 
 /// What asks for all of its operands makes all of its result, of which a part is kept then.
 bool makesWhole(const Node& node) {
-  return !node.inputs.empty() && !node.op->reads && !node.op->makesParts;
+  return !node.inputs.empty() && !node.op->regionOfInterest && !node.op->makesParts;
 }
 
 /// Where values take most: they live from what makes them to the last that takes them.
@@ -74,10 +73,11 @@ struct Peak {
 };
 
 Peak findPeak(const Graph& graph, const std::vector<char>& runs,
-              const std::vector<std::optional<Plan>>& plans, const std::vector<Demand>& demands,
+              const std::vector<std::optional<Plan>>& plans,
+              const std::vector<RegionOfInterest>& regions,
               const std::vector<double>& worked = {}) {
   std::vector<std::size_t> uses = countUses(graph, runs);
-  const auto bytes = [&](std::size_t i) { return bytesOf(plans[i], demands[i]); };
+  const auto bytes = [&](std::size_t i) { return bytesOf(plans[i], regions[i]); };
   double held = 0;
   Peak peak;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
@@ -109,17 +109,17 @@ std::string inSeconds(double seconds) {
 /// Of what runs, where its own operands and its result are known.
 std::optional<Cost> costOf(const Graph& graph, std::size_t i,
                            const std::vector<std::optional<Plan>>& plans,
-                           const std::vector<Demand>& demands) {
+                           const std::vector<RegionOfInterest>& regions) {
   const Node& node = graph.nodes[i];
   if (!node.op->cost) return {};
   Invocation invocation(*node.op, node.options);
   for (const std::size_t input : node.inputs) {
     if (!plans[input]) return {};
-    invocation.operands.emplace_back(demanded(*plans[input], demands[input]));
+    invocation.operands.emplace_back(restricted(*plans[input], regions[input]));
   }
   if (node.makes()) {
     if (!plans[i]) return {};
-    invocation.planned = makesWhole(node) ? *plans[i] : demanded(*plans[i], demands[i]);
+    invocation.planned = makesWhole(node) ? *plans[i] : restricted(*plans[i], regions[i]);
   }
   return node.op->cost(invocation);
 }
@@ -186,12 +186,12 @@ ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs, std::size_
 
 void requireMemoryFor(const Graph& graph, const std::vector<char>& runs,
                       const std::vector<std::optional<Plan>>& plans,
-                      const std::vector<Demand>& demands, std::size_t maxMemory) {
+                      const std::vector<RegionOfInterest>& regions, std::size_t maxMemory) {
   for (std::size_t i = 0; i < plans.size(); ++i)
     if (plans[i])
-      levelset::requireMemory(demanded(*plans[i], demands[i]).bytes(), maxMemory,
+      levelset::requireMemory(restricted(*plans[i], regions[i]).bytes(), maxMemory,
                               graph.nodes[i].op->name.c_str());
-  const Peak peak = findPeak(graph, runs, plans, demands);
+  const Peak peak = findPeak(graph, runs, plans, regions);
   if (peak.bytes > static_cast<double>(maxMemory))
     levelset::requireMemory(
         peak.bytes, maxMemory,
@@ -213,8 +213,8 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
     }
   });
   const std::vector<std::optional<Plan>>& plans = all.plans;
-  std::vector<Demand> demands(graph.nodes.size());
-  if (!wholeValues) demands = demandsOf(graph, runs, plans);
+  std::vector<RegionOfInterest> regions(graph.nodes.size());
+  if (!wholeValues) regions = regionsOfInterest(graph, runs, plans);
   std::string text;
   double seconds = 0;
   std::vector<double> worked(graph.nodes.size(), 0);  // bytes, by node
@@ -223,8 +223,8 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
     const Node& node = graph.nodes[i];
     text += fmt::format("{:<20} {}", labelOf(node), reasonFor(graph, i, runs));
     if (plans[i]) {
-      const Plan plan = demanded(*plans[i], demands[i]);
-      text += needOf(demands[i], *plans[i]);
+      const Plan plan = restricted(*plans[i], regions[i]);
+      text += needOf(regions[i], *plans[i]);
       if (plan.kind == Kind::Band && plan.voxelSize > 0)
         text += fmt::format("; about {:.3g} voxels of {:.4g}, {:.3g} MB", plan.activeVoxels(),
                             plan.voxelSize, plan.bytes() * 1e-6);
@@ -235,7 +235,7 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
       text += "; its size cannot be told before it is made";
     }
     if (runs[i]) {
-      if (const std::optional<Cost> cost = costOf(graph, i, plans, demands)) {
+      if (const std::optional<Cost> cost = costOf(graph, i, plans, regions)) {
         seconds += cost->seconds;
         worked[i] = cost->bytes;
         if (cost->seconds > 0) text += "; " + inSeconds(cost->seconds);
@@ -251,8 +251,8 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
   text += fmt::format(
       "values of about {:.3g} MB are held at once, about {:.3g} MB with what actions work with; "
       "about {} of one core{}\n",
-      findPeak(graph, runs, plans, demands).bytes * 1e-6,
-      findPeak(graph, runs, plans, demands, worked).bytes * 1e-6, inSeconds(seconds),
+      findPeak(graph, runs, plans, regions).bytes * 1e-6,
+      findPeak(graph, runs, plans, regions, worked).bytes * 1e-6, inSeconds(seconds),
       untimed.empty() ? ""
                       : fmt::format(", and what {} take{}, which cannot be told before",
                                     fmt::join(untimed, ", "), untimed.size() == 1 ? "s" : ""));
@@ -265,7 +265,7 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
       refuseAs(graph.nodes[i].op->name, error, graph.nodes[i].place);
     }
   }
-  requireMemoryFor(graph, runs, plans, demands, maxMemory);
+  requireMemoryFor(graph, runs, plans, regions, maxMemory);
 }
 
 }  // namespace pipeline

@@ -36,7 +36,7 @@ struct ValuePlans {
 /// @throws levelset::ResourceLimit, with the action
 void requireMemoryFor(const Graph& graph, const std::vector<char>& runs,
                       const std::vector<std::optional<Plan>>& plans,
-                      const std::vector<Demand>& demands, std::size_t maxMemory);
+                      const std::vector<RegionOfInterest>& regions, std::size_t maxMemory);
 
 /// Tells what would run, and what is left out and why; how much of each value is needed; what it
 /// would take. Reads meshes, and makes and writes nothing.

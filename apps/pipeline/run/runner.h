@@ -11,7 +11,7 @@
 #include "apps/pipeline/registry/invocation.h"
 #include "apps/pipeline/run/thumbnail.h"
 #include "apps/pipeline/run/tolerance_report.h"
-#include "levelset/placement/crop.h"
+#include "levelset/region_of_interest.h"
 
 namespace pipeline {
 
@@ -49,7 +49,7 @@ struct StepReport {
   std::string resultName, resultKind;
   std::string place;  ///< in a script
   double activeVoxels = 0, voxelSize = 0, halfWidth = 0;
-  levelset::BandPart needed = {};  ///< of the result, by others; empty: all of it
+  levelset::RegionOfInterest needed = {};  ///< of the result, by others; empty: all of it
   std::size_t triangles = 0;
   Thumbnail thumbnail = {};  ///< of the result, where asked for
 };

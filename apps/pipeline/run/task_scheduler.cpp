@@ -139,7 +139,7 @@ class SideBySide {
 
 }  // namespace
 
-JobsDone runSideBySide(const std::vector<Job>& jobs, const JobSettings& settings) {
+JobsDone scheduleTasks(const std::vector<Job>& jobs, const JobSettings& settings) {
   return SideBySide(jobs, settings).run();
 }
 

@@ -32,6 +32,6 @@ struct JobsDone {
 };
 
 /// Runs jobs, on the caller's thread and on more where several can begin, the first ones first.
-JobsDone runSideBySide(const std::vector<Job>& jobs, const JobSettings& settings);
+JobsDone scheduleTasks(const std::vector<Job>& jobs, const JobSettings& settings);
 
 }  // namespace pipeline

@@ -120,8 +120,8 @@ const Plan& Value::plan() const {
       break;
     case Kind::Patch:
       for (const mapping::Patch& one : patch().patches)
-        for (const mapping::ParticleLevel& level : one.levels)
-          for (const Imath::V3d& p : level.positions) plan.bounds.extendBy(p);
+        for (const mapping::ParticleLayer& layer : one.layers)
+          for (const Imath::V3d& p : layer.positions) plan.bounds.extendBy(p);
       break;
     case Kind::Field:
       plan.bounds = field().bounds();

@@ -34,7 +34,7 @@ double symmetricDifference(const NarrowBand& a, const NarrowBand& b, const Truth
 }
 
 /// After its time, a solid is where it was.
-struct Journey {
+struct TimeInterval {
   VectorField velocity;
   double time;
   bool turnsBack;  ///< at half the time
@@ -42,7 +42,7 @@ struct Journey {
 
 /// @param finestPeer  resolution up to which OpenVDB is asked, too
 void carry(Recorder& out, const std::string& variant, const Sample& at, const Truth& truth,
-           const Journey& journey, int finestPeer) {
+           const TimeInterval& journey, int finestPeer) {
   const NarrowBand solid = exactBand(truth, at.voxelSize);
   for (const Scheme& s : kSchemes) {
     if (out.isQuick() && s.scheme != AdvectScheme::Front && !out.wantsRepeats(at)) continue;
@@ -141,7 +141,7 @@ void zalesak(Recorder& out) {
 }
 
 void rotate(Recorder& out) {
-  const Journey turn{levelset::rotationVelocity(V3d(0), V3d(1, 2, 3), 1), 1, false};
+  const TimeInterval turn{levelset::rotationVelocity(V3d(0), V3d(1, 2, 3), 1), 1, false};
   for (const Sample& at : out.samples()) {
     const V3d c = V3d(0.5, 0, 0) + at.shift;
     carry(out, "cube", at, box(c, V3d(0.6)), turn, 8);

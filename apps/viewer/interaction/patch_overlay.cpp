@@ -18,7 +18,7 @@ using Imath::V3d;
 constexpr std::array<const char*, 4> kLinesNames = {"none", "outline", "base", "all"};
 constexpr double kBehind = 0.12;  // how much of a line is seen behind a surface
 
-DisplayColour levelColour(double w) {
+DisplayColour layerColour(double w) {
   constexpr DisplayColour kLow = {0.05, 0.62, 0.60}, kHigh = {0.95, 0.52, 0.10};
   const double share = std::clamp(w, 0.0, 1.0);
   DisplayColour colour;
@@ -131,37 +131,37 @@ class Pen {
   double scaleX_ = 1, scaleY_ = 1;
 };
 
-void drawLevel(const Pen& pen, const mapping::ParticleLevel& level) {
-  const DisplayColour colour = levelColour(level.w);
-  for (std::size_t r = 0; r < level.rows; ++r)
-    for (std::size_t c = 0; c < level.columns; ++c) {
-      if (c + 1 < level.columns) pen.line(level.at(c, r), level.at(c + 1, r), colour);
-      if (r + 1 < level.rows) pen.line(level.at(c, r), level.at(c, r + 1), colour);
+void drawLayer(const Pen& pen, const mapping::ParticleLayer& layer) {
+  const DisplayColour colour = layerColour(layer.w);
+  for (std::size_t r = 0; r < layer.rows; ++r)
+    for (std::size_t c = 0; c < layer.columns; ++c) {
+      if (c + 1 < layer.columns) pen.line(layer.at(c, r), layer.at(c + 1, r), colour);
+      if (r + 1 < layer.rows) pen.line(layer.at(c, r), layer.at(c, r + 1), colour);
     }
-  for (const V3d& particle : level.positions) pen.dot(particle, colour);
+  for (const V3d& particle : layer.positions) pen.dot(particle, colour);
 }
 
-void drawBorder(const Pen& pen, const mapping::ParticleLevel& level) {
-  const DisplayColour colour = levelColour(level.w);
-  const std::size_t lastColumn = level.columns - 1, lastRow = level.rows - 1;
+void drawBorder(const Pen& pen, const mapping::ParticleLayer& layer) {
+  const DisplayColour colour = layerColour(layer.w);
+  const std::size_t lastColumn = layer.columns - 1, lastRow = layer.rows - 1;
   for (std::size_t c = 0; c < lastColumn; ++c)
     for (const std::size_t r : {std::size_t{0}, lastRow})
-      pen.line(level.at(c, r), level.at(c + 1, r), colour);
+      pen.line(layer.at(c, r), layer.at(c + 1, r), colour);
   for (std::size_t r = 0; r < lastRow; ++r)
     for (const std::size_t c : {std::size_t{0}, lastColumn})
-      pen.line(level.at(c, r), level.at(c, r + 1), colour);
+      pen.line(layer.at(c, r), layer.at(c, r + 1), colour);
 }
 
 void drawOutline(const Pen& pen, const mapping::Patch& patch) {
-  drawBorder(pen, patch.levels.front());
-  drawBorder(pen, patch.levels.back());
-  for (std::size_t l = 0; l + 1 < patch.levels.size(); ++l) {
-    const mapping::ParticleLevel &a = patch.levels[l], &b = patch.levels[l + 1];
+  drawBorder(pen, patch.layers.front());
+  drawBorder(pen, patch.layers.back());
+  for (std::size_t l = 0; l + 1 < patch.layers.size(); ++l) {
+    const mapping::ParticleLayer &a = patch.layers[l], &b = patch.layers[l + 1];
     for (const bool isLastColumn : {false, true})
       for (const bool isLastRow : {false, true})
         pen.line(a.at(isLastColumn ? a.columns - 1 : 0, isLastRow ? a.rows - 1 : 0),
                  b.at(isLastColumn ? b.columns - 1 : 0, isLastRow ? b.rows - 1 : 0),
-                 levelColour(a.w));
+                 layerColour(a.w));
   }
 }
 
@@ -223,11 +223,11 @@ void drawPatches(const std::vector<mapping::Patch>& patches, PatchLines lines,
   if (lines == PatchLines::None) return;
   const Pen pen(camera, picture, tolerance, canvas);
   for (const mapping::Patch& patch : patches) {
-    if (patch.levels.empty()) continue;
+    if (patch.layers.empty()) continue;
     if (lines == PatchLines::Outline) drawOutline(pen, patch);
-    if (lines == PatchLines::Base) drawLevel(pen, patch.levels.front());
+    if (lines == PatchLines::Base) drawLayer(pen, patch.layers.front());
     if (lines == PatchLines::All)
-      for (const mapping::ParticleLevel& level : patch.levels) drawLevel(pen, level);
+      for (const mapping::ParticleLayer& layer : patch.layers) drawLayer(pen, layer);
   }
 }
 

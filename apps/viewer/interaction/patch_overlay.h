@@ -15,7 +15,7 @@ enum class PatchLines {
   None,
   Outline,  ///< the edges of the space above each
   Base,     ///< the particles on the surface and the lines between them
-  All       ///< those of every level
+  All       ///< those of every layer
 };
 
 /// @throws levelset::UsageError for a name other than none, outline, base and all

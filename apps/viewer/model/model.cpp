@@ -92,7 +92,7 @@ void measureModel(Model& model) {
   model.solidBounds = model.scene.bounds();
   model.bounds = model.solidBounds;
   for (const mapping::Patch& patch : model.patches) {
-    for (const mapping::ParticleLevel& level : patch.levels)
+    for (const mapping::ParticleLayer& level : patch.layers)
       for (const Imath::V3d& particle : level.positions) model.bounds.extendBy(particle);
     particles += patch.particleCount();
   }

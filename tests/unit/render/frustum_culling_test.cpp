@@ -60,7 +60,7 @@ void expectTheSame(const Scene& scene, const RenderOptions& options, double unse
   EXPECT_TRUE(found.agrees()) << what << ": " << found.reason();
 }
 
-TEST(FrameNeed, LeavesNothingOutThatTellsInThePicture) {
+TEST(FrustumCulling, LeavesNothingOutThatTellsInThePicture) {
   const RenderOptions options = {.samples = 2, .ambientSamples = 4, .shadowSamples = 4};
   Scene scene = closeUp(V3d(560, 90, 10), V3d(550, 4, 0));
   scene.key.direction = seenBy(scene.camera, V3d(0.5, 1, 0.1));
@@ -77,7 +77,7 @@ TEST(FrameNeed, LeavesNothingOutThatTellsInThePicture) {
                 "from within");
 }
 
-TEST(FrameNeed, KeepsWhatShadesFromOutsideTheFrame) {
+TEST(FrustumCulling, KeepsWhatShadesFromOutsideTheFrame) {
   // The wall is out of the frame, and its shadow is not.
   Scene scene = closeUp(V3d(540, 90, 0), V3d(539, 4, 0));
   scene.camera.verticalFov = 0.3;
@@ -92,7 +92,7 @@ TEST(FrameNeed, KeepsWhatShadesFromOutsideTheFrame) {
           .agrees());
 }
 
-TEST(FrameNeed, KeepsWhatShadesTheStartOfARayOffACoarseSurface) {
+TEST(FrustumCulling, KeepsWhatShadesTheStartOfARayOffACoarseSurface) {
   // Rays to the light start far off the coarse ball, by voxels of the fine sheet that shades it.
   Scene scene;
   scene.solids.push_back({.band = levelset::makeSphere(4, V3d(0), 1), .id = 1});
@@ -108,7 +108,7 @@ TEST(FrameNeed, KeepsWhatShadesTheStartOfARayOffACoarseSurface) {
   expectTheSame(scene, {.samples = 2, .ambientSamples = 0, .shadowSamples = 4}, 0.1, "coarse");
 }
 
-TEST(FrameNeed, LeavesNothingOutOfAnExpressionThatTellsInThePicture) {
+TEST(FrustumCulling, LeavesNothingOutOfAnExpressionThatTellsInThePicture) {
   Scene scene = closeUp(V3d(560, 90, 10), V3d(550, 4, 0));
   scene.solids[0].name = "a";
   scene.solids.push_back(
@@ -123,7 +123,7 @@ TEST(FrameNeed, LeavesNothingOutOfAnExpressionThatTellsInThePicture) {
   EXPECT_EQ(KernelScene(scene, open).counts().unseen, 0u);
 }
 
-TEST(FrameNeed, HoldsNothingOfASolidBehindTheCamera) {
+TEST(FrustumCulling, HoldsNothingOfASolidBehindTheCamera) {
   Scene scene = closeUp(V3d(560, 90, 10), V3d(550, 4, 0));
   scene.solids.push_back({.band = levelset::makeSphere(20, V3d(600, 300, 40), 1), .id = 2});
   const RenderOptions unlit = {.samples = 1, .ambientSamples = 0, .shadowSamples = 0};

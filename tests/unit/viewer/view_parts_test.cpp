@@ -174,13 +174,13 @@ mapping::Patch flatPatch() {
   mapping::Patch patch;
   patch.height = 0.5;
   for (const double w : {0.0, 1.0}) {
-    mapping::ParticleLevel level;
-    level.columns = level.rows = 3;
-    level.w = w;
+    mapping::ParticleLayer layer;
+    layer.columns = layer.rows = 3;
+    layer.w = w;
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c)
-        level.positions.emplace_back(0.5 * c - 0.5, 0.5 * r - 0.5, 0.5 * w);
-    patch.levels.push_back(level);
+        layer.positions.emplace_back(0.5 * c - 0.5, 0.5 * r - 0.5, 0.5 * w);
+    patch.layers.push_back(layer);
   }
   return patch;
 }
@@ -206,8 +206,8 @@ TEST(PatchOverlay, SurvivesWhatLiesBehindTheEyeAndBesideThePicture) {
   render::Image picture(1, 1);
   picture.addChannel("Z", std::numeric_limits<float>::infinity());
   mapping::Patch patch = flatPatch();
-  patch.levels[1].positions[4] = {1e30, -1e30, 1e30};
-  patch.levels[0].positions[4] = {0, 0, 4.999999999};
+  patch.layers[1].positions[4] = {1e30, -1e30, 1e30};
+  patch.layers[0].positions[4] = {0, 0, 4.999999999};
   for (const double z : {0.1, 0.25, 5.0, -1e9}) {
     render::Camera camera;
     camera.from = {0, 0.1, z};

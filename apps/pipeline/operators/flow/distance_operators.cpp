@@ -21,7 +21,7 @@ using levelset::NarrowBand;
 Value redistanceTo(Invocation& in, std::optional<double> halfWidth) {
   levelset::RedistanceOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
   options.halfWidth = halfWidth;
-  if (in.isNarrowed) options.halfWidth = in.planned->halfWidth;
+  if (in.isPartial) options.halfWidth = in.planned->halfWidth;
   NarrowBand band = in.band();
   in.operands.clear();
   return Value(levelset::redistance(std::move(band), options));
@@ -37,11 +37,10 @@ Value widen(Invocation& in) {
 }
 
 /// What is a distance already is kept, so it is read as wide as it is asked for.
-Demand readOfRedistance(Invocation& in, std::size_t, const Demand& of) {
+RegionOfInterest roiOfRedistance(Invocation& in, std::size_t, const RegionOfInterest& of) {
   const double voxel = in.operands[0].plan().voxelSize;
-  return {
-      {.halfWidth = std::max(levelset::kReadBySurface, of.part.halfWidth + 1),
-       .region = grown(of.part.region, levelset::distanceReach(in.planned->halfWidth) * voxel)}};
+  return {.halfWidth = std::max(levelset::kReadBySurface, of.halfWidth + 1),
+          .region = grown(of.region, levelset::distanceReach(in.planned->halfWidth) * voxel)};
 }
 
 std::optional<Cost> costOfRedistance(Invocation& in) {
@@ -174,7 +173,8 @@ Operator frontOperator(const char* name, const char* summary, const char* exampl
       .group = "Distances",
       .summary = summary,
       .details =
-          "Solves |grad T| F = 1 from the surface to both sides (negative inside) or from points. "
+          "Solves |grad T| F = 1 from the surface to both sides (negative inside) or from "
+          "points. "
           "Without --speed, --from and --extend the times are distances and the result is a band "
           "again; `widen` makes the same by closest points, which is more exact. Otherwise the "
           "result is a field. Where the speed is zero, negative or no number, nothing passes.",
@@ -233,7 +233,7 @@ void addEikonalOperators(std::vector<Operator>& all) {
       .plan = planHalfWidth,
       .cost = costOfRedistance,
       .slope = Slope::One,
-      .reads = readOfRedistance,
+      .regionOfInterest = roiOfRedistance,
       .partTolerance = kDistanceTolerance,
   });
   all.push_back({
@@ -248,7 +248,7 @@ void addEikonalOperators(std::vector<Operator>& all) {
       .plan = planHalfWidth,
       .cost = costOfRedistance,
       .slope = Slope::One,
-      .reads = readOfRedistance,
+      .regionOfInterest = roiOfRedistance,
       .partTolerance = kDistanceTolerance,
   });
   all.push_back(frontOperator<FrontMethod::Marching>(

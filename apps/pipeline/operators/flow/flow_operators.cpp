@@ -83,13 +83,13 @@ Value smooth(Invocation& in) {
                        {.mask = maskOf(in), .maxMemory = in.maxMemory, .progress = in.progress}));
 }
 
-Demand readOfSmooth(Invocation& in, std::size_t, const Demand& of) {
+RegionOfInterest roiOfSmooth(Invocation& in, std::size_t, const RegionOfInterest& of) {
   if (in.given("mask")) return {};
   const Plan solid = in.operands[0].plan();
   const double voxel = solid.voxelSize;
   const double reach =
       levelset::smoothingReach(smoothKind(in), in.length("sigma") / voxel, solid.halfWidth);
-  return {{.region = grown(of.part.region, reach * voxel)}};
+  return {.region = grown(of.region, reach * voxel)};
 }
 
 /// The band is made as wide as the filter reads, filtered, and made distances of again.
@@ -110,9 +110,9 @@ std::optional<Cost> costOfSmooth(Invocation& in) {
 
 // === morph
 
-FileRow stepRow(const Invocation& in) {
+FileSequence stepRow(const Invocation& in) {
   const std::string pattern = in.text("keep-steps");
-  FileRow row(pattern);
+  FileSequence row(pattern);
   if (!row.hasNumber() || !levelset::isBandFormat(pattern))
     throw UsageError(
         fmt::format("{}: '{}' names no row of .vdb files; put # where the number goes, as in "
@@ -138,7 +138,7 @@ double partOfTheWay(const Invocation& in) {
 std::vector<std::string> stepFiles(const Invocation& in) {
   std::vector<std::string> files;
   if (!in.given("keep-steps")) return files;
-  const FileRow row = stepRow(in);
+  const FileSequence row = stepRow(in);
   const auto steps = static_cast<std::size_t>(in.integer("steps"));
   for (std::size_t i = 1; i <= steps; ++i) files.push_back(row.file(i).string());
   return files;
@@ -242,7 +242,7 @@ void addFlowOperators(std::vector<Operator>& all) {
        .run = smooth,
        .cost = costOfSmooth,
        .slope = Slope::One,
-       .reads = readOfSmooth,
+       .regionOfInterest = roiOfSmooth,
        .partTolerance = kDistanceTolerance});
   all.push_back(
       {.name = "morph",

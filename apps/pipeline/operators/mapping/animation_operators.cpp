@@ -46,46 +46,46 @@ std::size_t keyCount(const Invocation& in) {
 
 /// @param what  of their content
 /// @param isKnown  is the format one that holds it?
-FileRow rowOf(const Invocation& in, const char* option, const char* example, bool isKnown) {
-  FileRow row(in.text(option));
+FileSequence rowOf(const Invocation& in, const char* option, const char* example, bool isKnown) {
+  FileSequence row(in.text(option));
   if (row.hasNumber() && isKnown) return row;
   throw UsageError(
       fmt::format("{}: '{}' names no row of such files; put # where the number goes, as in {}",
                   in.where(option), row.pattern(), example));
 }
 
-FileRow outRow(const Invocation& in) {
+FileSequence outRow(const Invocation& in) {
   const std::string pattern = in.text("out");
   const bool isMesh = levelset::isMeshFormat(pattern);
   return rowOf(in, "out", mapsMesh(in) ? "frame_###.ply" : "frame_###.vdb",
                isMesh || (levelset::isBandFormat(pattern) && !mapsMesh(in)));
 }
 
-FileRow baseRow(const Invocation& in) {
+FileSequence baseRow(const Invocation& in) {
   return rowOf(in, "base-frames", "base_###.vdb", levelset::isBandFormat(in.text("base-frames")));
 }
 
-FileRow textureRow(const Invocation& in) {
+FileSequence textureRow(const Invocation& in) {
   const std::string pattern = in.text("texture-frames");
   return rowOf(in, "texture-frames", mapsMesh(in) ? "texture_###.ply" : "texture_###.vdb",
                mapsMesh(in) ? levelset::isMeshFormat(pattern) : levelset::isBandFormat(pattern));
 }
 
 /// The file of a frame, 1 or more.
-std::filesystem::path frameFile(const Invocation& in, const FileRow& row, const char* first,
+std::filesystem::path frameFile(const Invocation& in, const FileSequence& row, const char* first,
                                 std::size_t frame) {
   return row.file(static_cast<std::size_t>(in.integer(first)) + frame - 1);
 }
 
 std::vector<std::string> outFiles(const Invocation& in) {
   std::vector<std::string> files;
-  const FileRow row = outRow(in);
+  const FileSequence row = outRow(in);
   for (std::size_t f = 0; f < framesOf(in); ++f) files.push_back(row.file(f).string());
   return files;
 }
 
 /// Refuses what is missing before anything is computed.
-void requireFrames(const Invocation& in, const FileRow& row, const char* first) {
+void requireFrames(const Invocation& in, const FileSequence& row, const char* first) {
   for (std::size_t f = 1; f < framesOf(in); ++f) {
     const std::filesystem::path file = frameFile(in, row, first, f);
     if (levelset::isMeshFormat(file)) {
@@ -99,7 +99,7 @@ void requireFrames(const Invocation& in, const FileRow& row, const char* first) 
 void requireApart(const Invocation& in, const char* row, const char* first) {
   if (!in.given(row)) return;
   std::set<std::filesystem::path> read;
-  const FileRow files(in.text(row));
+  const FileSequence files(in.text(row));
   for (std::size_t f = 1; f < framesOf(in); ++f)
     read.insert(levelset::canonicalFile(frameFile(in, files, first, f)));
   for (const std::string& file : outFiles(in)) {
@@ -265,12 +265,12 @@ mapping::AnimationOptions animationOptions(Invocation& in,
     options.make = makerLike(keys.front().patches);
     const Patch& patch = keys.front().patches.front();
     const bool isConforming =
-        mapping::optionsLike(patch).scheme == mapping::LevelScheme::Conforming;
+        mapping::optionsLike(patch).scheme == mapping::LayerScheme::Conforming;
     if (isMoved)
       in.notes.notes.push_back(fmt::format(
           "how the first patch was made is not in its file; where it moves it is made again with "
-          "{} levels, {:.4g} between {} particles",
-          patch.levels.size(), patch.spacing, isConforming ? "conforming" : "reduced"));
+          "{} layers, {:.4g} between {} particles",
+          patch.layers.size(), patch.spacing, isConforming ? "conforming" : "reduced"));
   } else if (first.recipe->around) {
     options.make = [around = first.recipe->around, height = keys.front().patches.front().height](
                        const NarrowBand& base, std::span<const mapping::Footprint>,
@@ -368,7 +368,7 @@ class MeshWriter {
 
  private:
   Invocation& in_;
-  FileRow out_;
+  FileSequence out_;
   bool isTold_ = false;
 };
 
@@ -447,7 +447,7 @@ Value animate(Invocation& in) {
       return readFrame(in, frame, frameFile(in, row, "texture-first", frame), told);
     };
   }
-  const FileRow out = outRow(in);
+  const FileSequence out = outRow(in);
   MeshWriter writer(in);
   levelset::TriMesh mesh;  // of the frame before, where that is what is written
   NarrowBand last;

@@ -45,7 +45,7 @@ void validatePatch(const Invocation& in) {
   if (in.given("corners") == in.given("at"))
     throw UsageError("patch: give either --corners \"p0 p1 p2 p3\" or --at p --size a,b");
   validateOutline(in);
-  validateLevels(in);
+  validateLayers(in);
 }
 
 /// "n,m", both whole and positive.
@@ -83,7 +83,7 @@ void validateGrid(const Invocation& in) {
       throw UsageError("patch-grid: --particles spline does not go with --around");
   }
   validateOutline(in);
-  validateLevels(in);
+  validateLayers(in);
   (void)countOf(in);
   const double shift = in.number("shift");
   if (shift >= 1)
@@ -139,13 +139,13 @@ void tellPatches(Invocation& in, const mapping::PatchReport& report,
                  const std::vector<mapping::Patch>& patches) {
   std::size_t particles = 0;
   for (const mapping::Patch& one : patches) particles += one.particleCount();
-  const std::size_t levels = patches.front().levels.size();
+  const std::size_t layers = patches.front().layers.size();
   nlohmann::ordered_json json;
   if (patches.size() > 1) json["patches"] = patches.size();
   json["u_length"] = report.uLength;
   json["v_length"] = report.vLength;
   json["particles"] = particles;
-  json["levels"] = levels;
+  json["levels"] = layers;
   json["cell_area_variation"] = report.cellAreaVariation;
   json["relax_iterations"] = report.relaxIterations;
   json["relaxed"] = report.isRelaxed;
@@ -165,9 +165,9 @@ void tellPatches(Invocation& in, const mapping::PatchReport& report,
         in.op().name, report.relaxIterations));
   }
   in.notes.notes.push_back(fmt::format(
-      "{:.4g} by {:.4g} along the surface, {}{} particles in {} levels", report.uLength,
+      "{:.4g} by {:.4g} along the surface, {}{} particles in {} layers", report.uLength,
       report.vLength, patches.size() > 1 ? fmt::format("{} patches, ", patches.size()) : "",
-      particles, levels));
+      particles, layers));
 }
 
 /// Made at the height asked, and again once the texture has told one.
@@ -396,8 +396,8 @@ Plan planGrid(Invocation& in) {
 }
 
 /// What all patches have above the surface.
-std::vector<Param> levelParams(const char* particles) {
-  std::vector<Param> params = withLevels({});
+std::vector<Param> layerParams(const char* particles) {
+  std::vector<Param> params = withLayers({});
   for (Param& param : params)
     if (param.name == "particles") param.fallback = particles;
   params.push_back({.name = "spline",
@@ -452,7 +452,7 @@ void addPatchOperators(std::vector<Operator>& all) {
                                         .type = ParamType::Degrees,
                                         .doc = "of u about the normal, with --at",
                                         .fallback = "0"}}),
-          joinParams(levelParams("reduced"),
+          joinParams(layerParams("reduced"),
                      {{.name = "directions",
                        .type = ParamType::Points,
                        .doc = "with --particles reduced: vectors in which the corners rise, one "
@@ -493,7 +493,7 @@ void addPatchOperators(std::vector<Operator>& all) {
                              .doc = "half of the square's side, along the surface",
                              .range = Range::Positive,
                              .required = true}},
-                           joinParams(levelParams("reduced"),
+                           joinParams(layerParams("reduced"),
                                       {{.name = "mirror",
                                         .type = ParamType::Flag,
                                         .doc = "v runs the other way: the texture is mirrored"}})),
@@ -501,7 +501,7 @@ void addPatchOperators(std::vector<Operator>& all) {
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = decal,
       .plan = planDecal,
-      .validate = validateLevels,
+      .validate = validateLayers,
   });
   all.push_back({
       .name = "patch-grid",
@@ -542,7 +542,7 @@ void addPatchOperators(std::vector<Operator>& all) {
                       {.name = "mirrored",
                        .type = ParamType::Flag,
                        .doc = "accept corners that run clockwise: textures are mirrored"}},
-                     levelParams("conforming"))),
+                     layerParams("conforming"))),
       .operands = {{Kind::Band, Kind::Surface}},
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = patchGrid,

@@ -9,18 +9,18 @@ namespace {
 
 using levelset::UsageError;
 
-constexpr long kMostLevels = 1000;
+constexpr long kMostLayers = 1000;
 
-mapping::LevelScheme schemeOf(const Invocation& in) {
+mapping::LayerScheme schemeOf(const Invocation& in) {
   const std::string name = in.text("particles");
-  if (name == "conforming") return mapping::LevelScheme::Conforming;
-  return name == "spline" ? mapping::LevelScheme::Spline : mapping::LevelScheme::Reduced;
+  if (name == "conforming") return mapping::LayerScheme::Conforming;
+  return name == "spline" ? mapping::LayerScheme::Spline : mapping::LayerScheme::Reduced;
 }
 
 }  // namespace
 
-std::vector<Param> withLevels(std::vector<Param> params) {
-  const std::vector<Param> levels = {
+std::vector<Param> withLayers(std::vector<Param> params) {
+  const std::vector<Param> layers = {
       {.name = "height",
        .type = ParamType::Length,
        .doc = "of the texture; 'auto' keeps its proportions",
@@ -54,11 +54,11 @@ std::vector<Param> withLevels(std::vector<Param> params) {
        .type = ParamType::Length,
        .doc = "of particles; default: by patch and voxel size",
        .range = Range::Positive}};
-  params.insert(params.end(), levels.begin(), levels.end());
+  params.insert(params.end(), layers.begin(), layers.end());
   return params;
 }
 
-void validateLevels(const Invocation& in) {
+void validateLayers(const Invocation& in) {
   const std::string& name = in.op().name;
   if (in.text("particles") != "spline" && (in.given("spline") || in.given("fade")))
     throw UsageError(fmt::format("{}: --spline and --fade go with --particles spline", name));
@@ -72,15 +72,15 @@ void validateLevels(const Invocation& in) {
         "{}: --height auto does not go with --particles spline; give the length along the spline",
         name));
   }
-  const long levels = in.integer("levels");
-  if (levels < 2 || levels > kMostLevels) {
+  const long layers = in.integer("levels");
+  if (layers < 2 || layers > kMostLayers) {
     throw UsageError(
-        fmt::format("{}: --levels {} is out of range; give 2 to {}", name, levels, kMostLevels));
+        fmt::format("{}: --levels {} is out of range; give 2 to {}", name, layers, kMostLayers));
   }
 }
 
 mapping::PatchOptions patchOptionsOf(Invocation& in) {
-  mapping::PatchOptions options = {.levels = static_cast<std::size_t>(in.integer("levels")),
+  mapping::PatchOptions options = {.layers = static_cast<std::size_t>(in.integer("levels")),
                                    .scheme = schemeOf(in),
                                    .fade = in.given("fade"),
                                    .spacing = in.given("spacing") ? in.length("spacing") : 0,

@@ -7,13 +7,13 @@
 #include "mapping/animation/footprint.h"
 #include "mapping/patches/patch.h"
 
-/// What all actions that make patches have in common: height and levels of particles.
+/// What all actions that make patches have in common: height and layers of particles.
 namespace pipeline {
 
 /// `params` and --height, --levels, --particles, --twist, --taper, --bend, --spacing.
-[[nodiscard]] std::vector<Param> withLevels(std::vector<Param> params);
+[[nodiscard]] std::vector<Param> withLayers(std::vector<Param> params);
 /// @throws levelset::UsageError for options that exclude each other or are out of range
-void validateLevels(const Invocation& in);
+void validateLayers(const Invocation& in);
 [[nodiscard]] mapping::PatchOptions patchOptionsOf(Invocation& in);
 /// Of --size: along u, along v, world units. @throws levelset::InvalidInput for far too large ones
 [[nodiscard]] std::array<double, 2> patchSizeOf(Invocation& in);

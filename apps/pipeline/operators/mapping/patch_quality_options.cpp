@@ -146,9 +146,9 @@ JudgedMap judgeMap(Invocation& in, const mapping::Patch& patch, double sink, dou
     return mapping::surveyDistortion(samples, size, patch.mirrored);
   };
   if (in.text("map") == "mesh") {
-    mapping::FoldCertificate certificate = mapping::certifyLevels(patch, options.sink);
+    mapping::FoldCertificate certificate = mapping::certifyLayers(patch, options.sink);
     levelset::FieldGrid field = mapping::jacobianField(patch, certificate, options);
-    return {std::move(certificate), survey(mapping::sampleLevelMap(patch, options.sink)),
+    return {std::move(certificate), survey(mapping::sampleLayerMap(patch, options.sink)),
             std::move(field)};
   }
   if (in.text("map") == "shell") {
@@ -236,15 +236,15 @@ void validateFolds(const Invocation& in) {
 }  // namespace
 
 std::array<double, 2> sidesOf(const mapping::Patch& patch) {
-  const mapping::ParticleLevel& level = patch.levels.front();
+  const mapping::ParticleLayer& layer = patch.layers.front();
   double u = 0, v = 0;
-  for (std::size_t row = 0; row < level.rows; ++row)
-    for (std::size_t column = 1; column < level.columns; ++column)
-      u += (level.at(column, row) - level.at(column - 1, row)).length();
-  for (std::size_t column = 0; column < level.columns; ++column)
-    for (std::size_t row = 1; row < level.rows; ++row)
-      v += (level.at(column, row) - level.at(column, row - 1)).length();
-  return {u / static_cast<double>(level.rows), v / static_cast<double>(level.columns)};
+  for (std::size_t row = 0; row < layer.rows; ++row)
+    for (std::size_t column = 1; column < layer.columns; ++column)
+      u += (layer.at(column, row) - layer.at(column - 1, row)).length();
+  for (std::size_t column = 0; column < layer.columns; ++column)
+    for (std::size_t row = 1; row < layer.rows; ++row)
+      v += (layer.at(column, row) - layer.at(column, row - 1)).length();
+  return {u / static_cast<double>(layer.rows), v / static_cast<double>(layer.columns)};
 }
 
 void addDistortion(const mapping::Distortion& distortion, nlohmann::ordered_json& json) {

@@ -24,7 +24,7 @@ void validateScatter(const Invocation& in) {
     throw UsageError("scatter: give either --count or --distance");
   if (in.integer("seed") < 0)
     throw UsageError(fmt::format("scatter: --seed {} is below 0", in.integer("seed")));
-  validateLevels(in);
+  validateLayers(in);
 }
 
 mapping::ScatterOptions scatterOptions(Invocation& in) {
@@ -149,7 +149,7 @@ void addScatterOperators(std::vector<Operator>& all) {
           "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! scatter @ball --count 12 "
           "--size 4,4 --height 1.5 --levels 2 --as many ! torus --radius 2 --tube 0.6 "
           "--voxel 0.3 --as ring ! texture @ball @ring @many --voxel 0.5 ! write studded.vdb",
-      .params = withMask(withLevels(
+      .params = withMask(withLayers(
           {{.name = "count",
             .type = ParamType::Integer,
             .doc = "how many patches",

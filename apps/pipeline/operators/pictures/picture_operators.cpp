@@ -241,7 +241,7 @@ Value draw(Invocation& in) {
 
 /// What the frame sees, where that alone makes the picture: light comes from beside it too, and the
 /// view, the range of curvatures and coarse values are by the size of the whole.
-Demand readOfDraw(Invocation& in, std::size_t, const Demand&) {
+RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&) {
   const render::Style style = styleNamed(in.text("style"));
   const bool isFramed = in.operands[0].kind() == Kind::Band && in.given("from") && in.given("to") &&
                         in.text("value-bits") == "32";
@@ -252,7 +252,7 @@ Demand readOfDraw(Invocation& in, std::size_t, const Demand&) {
   const Imath::Box3d all = grown(plan.bounds, plan.halfWidth * plan.voxelSize);
   render::Scene scene;
   scene.camera = cameraOf(in, plan.bounds);
-  const render::FrameNeed need(scene, {.style = {.style = style}}, all);
+  const render::FrustumCulling need(scene, {.style = {.style = style}}, all);
   constexpr int kCells = 24;
   const Imath::V3d side = all.size() / kCells;
   Imath::Box3d seen;
@@ -263,7 +263,7 @@ Demand readOfDraw(Invocation& in, std::size_t, const Demand&) {
   }
   if (seen.isEmpty()) return {};  // nothing is seen, and that has to be told of the whole
   constexpr double kRead = 8;     // voxels beside what is seen: by normals, curvatures and splines
-  return {{.region = grown(seen, kRead * plan.voxelSize)}};
+  return {.region = grown(seen, kRead * plan.voxelSize)};
 }
 
 Plan planDraw(Invocation& in) {
@@ -478,7 +478,7 @@ void addPictureOperators(std::vector<Operator>& all) {
       .flow = Flow::PassesThrough,
       .run = draw,
       .plan = planDraw,
-      .reads = readOfDraw,
+      .regionOfInterest = roiOfDraw,
       .validate = validateDraw,
       .targets = targetsOf,
       .usesStandardOutput =

@@ -46,7 +46,7 @@ Value levelSet(Invocation& in) {
   levelset::MeshToBandOptions options{.halfWidth = in.number("half-width"),
                                       .signAnyway = in.flag("sign-anyway"),
                                       .searchSelfIntersections = !in.flag("trust-mesh"),
-                                      .part = in.part,
+                                      .roi = in.roi,
                                       .maxMemory = in.maxMemory,
                                       .progress = in.progress};
   const std::string sign = in.text("sign");
@@ -160,10 +160,10 @@ Plan planMesh(Invocation& in) {
 
 /// The ends of edges that the zero set crosses are less than a voxel from it; half a one is for
 /// distances that are not quite.
-Demand readOfMesh(Invocation& in, std::size_t, const Demand&) {
+RegionOfInterest roiOfMesh(Invocation& in, std::size_t, const RegionOfInterest&) {
   const bool isUniform = !in.flag("sharp") && in.number("adaptivity") == 0;
   if (in.operands[0].kind() != Kind::Band || !isUniform) return {};
-  return {{.halfWidth = 1.5}};
+  return {.halfWidth = 1.5};
 }
 
 std::optional<Cost> costOfMesh(Invocation& in) {
@@ -267,7 +267,7 @@ void addConversionOperators(std::vector<Operator>& all) {
       .run = mesh,
       .plan = planMesh,
       .cost = costOfMesh,
-      .reads = readOfMesh,
+      .regionOfInterest = roiOfMesh,
       .validate =
           [](const Invocation& in) {
             const bool isPatch = in.operands[0].kind() == Kind::Patch;

@@ -60,9 +60,9 @@ Plan planClip(Invocation& in) {
 
 /// As of any intersection, and no further off the box than where that is further than the band
 /// reaches, whatever is there.
-Demand readOfClip(Invocation& in, std::size_t, const Demand& of) {
+RegionOfInterest roiOfClip(Invocation& in, std::size_t, const RegionOfInterest& of) {
   const double voxel = in.planned->voxelSize, width = in.planned->halfWidth;
-  Imath::Box3d asked = grown(of.part.region, seamReach(width) * voxel);
+  Imath::Box3d asked = grown(of.region, seamReach(width) * voxel);
   if (in.given("box")) {
     const Imath::Box3d box = grown(in.box("box"), (width + 2) * voxel);
     for (int axis = 0; axis < 3; ++axis) {
@@ -70,7 +70,7 @@ Demand readOfClip(Invocation& in, std::size_t, const Demand& of) {
       asked.max[axis] = std::min(asked.max[axis], box.max[axis]);
     }
   }
-  return {{.region = asked}};
+  return {.region = asked};
 }
 
 M44d rotationMatrix(const Invocation& in) {
@@ -207,7 +207,8 @@ std::optional<Cost> costOfTransform(Invocation& in) {
 
 /// Of a solid that is laid on another grid, and made distances of again there.
 /// @param toSource  from the world of the result to that of the operand
-Demand readOfSamples(const Invocation& in, const Demand& of, const M44d& toSource) {
+RegionOfInterest roiOfSamples(const Invocation& in, const RegionOfInterest& of,
+                              const M44d& toSource) {
   const Plan source = in.operands[0].plan(), target = *in.planned;
   double squares = 0;  // of the stretches along three axes: none is more than their root
   for (int i = 0; i < 3; ++i)
@@ -215,21 +216,20 @@ Demand readOfSamples(const Invocation& in, const Demand& of, const M44d& toSourc
   const double sampled =
       levelset::sampledWidth(std::sqrt(squares) * target.voxelSize / source.voxelSize);
   const Imath::Box3d about =
-      grown(of.part.region, levelset::distanceReach(target.halfWidth) * target.voxelSize);
+      grown(of.region, levelset::distanceReach(target.halfWidth) * target.voxelSize);
   if (levelset::isEverywhere(about)) return {};
-  return {{.region = grown(
-               moved(about, toSource),
-               levelset::distanceReach(std::max(source.halfWidth, sampled)) * source.voxelSize)}};
+  return {.region = grown(
+              moved(about, toSource),
+              levelset::distanceReach(std::max(source.halfWidth, sampled)) * source.voxelSize)};
 }
 
-Demand readOfTransform(Invocation& in, std::size_t, const Demand& of) {
+RegionOfInterest roiOfTransform(Invocation& in, std::size_t, const RegionOfInterest& of) {
   if (in.operands[0].kind() != Kind::Band) return {};
-  if (in.flag("bake")) return readOfSamples(in, of, matrixOf(in).inverse());
-  Demand read = of;
-  read.part.halfWidth *= 1 + 1e-6;  // its end is rounded before it is scaled
-  if (!levelset::isEverywhere(of.part.region))
-    read.part.region =
-        grown(moved(of.part.region, matrixOf(in).inverse()), in.operands[0].plan().voxelSize);
+  if (in.flag("bake")) return roiOfSamples(in, of, matrixOf(in).inverse());
+  RegionOfInterest read = of;
+  read.halfWidth *= 1 + 1e-6;  // its end is rounded before it is scaled
+  if (!levelset::isEverywhere(of.region))
+    read.region = grown(moved(of.region, matrixOf(in).inverse()), in.operands[0].plan().voxelSize);
   return read;
 }
 
@@ -249,9 +249,9 @@ Value resample(Invocation& in) {
   return Value(levelset::resample(in.band(), voxel, resampleOptions(in)));
 }
 
-Demand readOfResample(Invocation& in, std::size_t, const Demand& of) {
+RegionOfInterest roiOfResample(Invocation& in, std::size_t, const RegionOfInterest& of) {
   if (in.given("resolution")) return {};  // of the whole
-  return readOfSamples(in, of, M44d());
+  return roiOfSamples(in, of, M44d());
 }
 
 Plan planResample(Invocation& in) {
@@ -311,7 +311,7 @@ void addPlacementOperators(std::vector<Operator>& all) {
       .plan = planTransform,
       .cost = costOfTransform,
       .slope = Slope::OfOperands,
-      .reads = readOfTransform,
+      .regionOfInterest = roiOfTransform,
       .partTolerance = kDistanceTolerance,  // with --bake; else to the bit
       .validate = validateTransform,
   });
@@ -332,7 +332,7 @@ void addPlacementOperators(std::vector<Operator>& all) {
       .plan = planResample,
       .cost = costOfSamples,
       .slope = Slope::One,
-      .reads = readOfResample,
+      .regionOfInterest = roiOfResample,
       .partTolerance = kDistanceTolerance,
       .validate = requireVoxelSize,
   });
@@ -351,7 +351,7 @@ void addPlacementOperators(std::vector<Operator>& all) {
       .plan = planClip,
       .cost = costPerVoxel(90, 15),
       .slope = Slope::OfOperands,
-      .reads = readOfClip,
+      .regionOfInterest = roiOfClip,
       .validate = validateClip,
   });
 }

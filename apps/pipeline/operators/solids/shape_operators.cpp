@@ -86,7 +86,7 @@ double voxelOf(Invocation& in, const Shape& shape) {
 
 levelset::ShapeOptions optionsOf(const Invocation& in) {
   return {.halfWidth = in.neededHalfWidth(in.number("half-width")),
-          .region = in.part.region,
+          .region = in.roi.region,
           .maxMemory = in.maxMemory,
           .progress = in.progress};
 }

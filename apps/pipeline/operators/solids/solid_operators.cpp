@@ -28,11 +28,11 @@ std::vector<NarrowBand> bands(const Invocation& in) {
   return all;
 }
 
-Demand readOfCsg(Invocation& in, std::size_t, const Demand& of) {
+RegionOfInterest roiOfCsg(Invocation& in, std::size_t, const RegionOfInterest& of) {
   const double voxel = in.planned->voxelSize;
   for (const Value& operand : in.operands)
     if (std::abs(operand.plan().voxelSize / voxel - 1) > 1e-9) return {};  // one is resampled
-  return {{.region = grown(of.part.region, seamReach(in.planned->halfWidth) * voxel)}};
+  return {.region = grown(of.region, seamReach(in.planned->halfWidth) * voxel)};
 }
 
 template <CsgOperation operation>
@@ -108,13 +108,13 @@ levelset::OffsetOptions offsetOptions(Invocation& in) {
   return options;
 }
 
-Demand readOfOffset(Invocation& in, std::size_t, const Demand& of) {
+RegionOfInterest roiOfOffset(Invocation& in, std::size_t, const RegionOfInterest& of) {
   if (!in.given("distance") || in.given("mask")) return {};
   const double voxel = in.operands[0].plan().voxelSize;
   const double distance = in.length("distance");
   if (distance == 0) return {};
   const double reach = std::abs(distance) + levelset::distanceReach(in.planned->halfWidth) * voxel;
-  return {{.halfWidth = levelset::kReadBySurface, .region = grown(of.part.region, reach)}};
+  return {.halfWidth = levelset::kReadBySurface, .region = grown(of.region, reach)};
 }
 
 void validateOffset(const Invocation& in) {
@@ -127,7 +127,7 @@ void validateOffset(const Invocation& in) {
 Value offset(Invocation& in) {
   levelset::OffsetOptions options = offsetOptions(in);
   // Of a narrower part as wide as of the whole: how far points travel shows in last bits.
-  if (in.isNarrowed) options.halfWidth = in.planned->halfWidth;
+  if (in.isPartial) options.halfWidth = in.planned->halfWidth;
   const std::optional<levelset::Mask> mask = maskOf(in);
   NarrowBand band = in.band();
   if (!mask && !in.given("by")) {
@@ -209,13 +209,13 @@ Value close(Invocation& in) {
 }
 
 /// Of a solid that is moved there and back again: both ways read what is beside them.
-Demand readOfMorphology(Invocation& in, std::size_t, const Demand& of) {
+RegionOfInterest roiOfMorphology(Invocation& in, std::size_t, const RegionOfInterest& of) {
   if (in.given("mask")) return {};
   const Plan solid = in.operands[0].plan();
   const double there = levelset::distanceReach(solid.halfWidth),
                back = levelset::distanceReach(in.planned->halfWidth);
   const double reach = 2 * in.length("radius") + (there + back) * solid.voxelSize;
-  return {{.region = grown(of.part.region, reach)}};
+  return {.region = grown(of.region, reach)};
 }
 
 Plan planMorphology(Invocation& in) {
@@ -237,12 +237,12 @@ Value shell(Invocation& in) {
   });
 }
 
-Demand readOfShell(Invocation& in, std::size_t, const Demand& of) {
+RegionOfInterest roiOfShell(Invocation& in, std::size_t, const RegionOfInterest& of) {
   if (in.given("mask")) return {};
   const double width = in.planned->halfWidth, voxel = in.operands[0].plan().voxelSize;
   const double reach =
       in.length("thickness") + (levelset::distanceReach(width) + seamReach(width)) * voxel;
-  return {{.region = grown(of.part.region, reach)}};
+  return {.region = grown(of.region, reach)};
 }
 
 std::optional<Cost> costOfMorphology(Invocation& in) {
@@ -301,7 +301,7 @@ Operator csgOperator(const char* name, const char* summary, const char* example)
           .plan = planCsg<operation>,
           .cost = costPerVoxel(90, 8),
           .slope = Slope::OfOperands,
-          .reads = readOfCsg};
+          .regionOfInterest = roiOfCsg};
 }
 
 }  // namespace
@@ -383,7 +383,7 @@ void addSolidOperators(std::vector<Operator>& all) {
       .plan = planOffset,
       .cost = costOfMoving,
       .slope = Slope::One,
-      .reads = readOfOffset,
+      .regionOfInterest = roiOfOffset,
       .partTolerance = kDistanceTolerance,
       .validate = validateOffset,
   });
@@ -411,7 +411,7 @@ void addSolidOperators(std::vector<Operator>& all) {
       .plan = planMorphology,
       .cost = costOfMorphology,
       .slope = Slope::OfOperands,
-      .reads = readOfMorphology,
+      .regionOfInterest = roiOfMorphology,
       .partTolerance = kDistanceTolerance,
   });
   all.push_back({
@@ -428,7 +428,7 @@ void addSolidOperators(std::vector<Operator>& all) {
       .plan = planMorphology,
       .cost = costOfMorphology,
       .slope = Slope::OfOperands,
-      .reads = readOfMorphology,
+      .regionOfInterest = roiOfMorphology,
       .partTolerance = kDistanceTolerance,
   });
   all.push_back({
@@ -453,7 +453,7 @@ void addSolidOperators(std::vector<Operator>& all) {
       .plan = planShell,
       .cost = costOfShell,
       .slope = Slope::OfOperands,
-      .reads = readOfShell,
+      .regionOfInterest = roiOfShell,
       .partTolerance = kDistanceTolerance,
   });
   all.push_back({

@@ -48,7 +48,7 @@ NarrowBand knurledCylinder() {
   const mapping::Knurl knurl{.depth = 0.2, .flankAngle = 2, .base = 0.3, .tiling = {2, 1, 0.15}};
   const mapping::PatchGridResult grid = mapping::makePatchGridAround(
       base, V3d(0, 0, -0.6), V3d(0, 0, 0.6), 0, 0.2, {.columns = 4, .rows = 2},
-      {.levels = 3, .scheme = mapping::LevelScheme::Conforming, .spacing = 0.15});
+      {.layers = 3, .scheme = mapping::LayerScheme::Conforming, .spacing = 0.15});
   return mapping::mapTexture(
              base, mapping::makeKnurl(knurl, V3d(0), 0.04), grid.patches,
              {.sink = 0.05, .textureBox = mapping::knurlBox(knurl, V3d(0)).tile, .voxelSize = 0.02})

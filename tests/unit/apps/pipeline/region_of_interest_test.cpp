@@ -19,6 +19,7 @@
 #include "levelset/csg/csg.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
+#include "levelset/placement/crop.h"
 #include "levelset/solids/shapes.h"
 #include "levelset/vdb.h"
 #include "render/images/compare_images.h"
@@ -29,11 +30,11 @@ namespace demand_test {
 
 using Imath::Box3d;
 using Imath::V3d;
-using levelset::BandPart;
 using levelset::NarrowBand;
-using pipeline::Demand;
+using levelset::RegionOfInterest;
 using pipeline::Graph;
 using pipeline::Operator;
+using pipeline::RegionOfInterest;
 using pipeline::Value;
 using Random = std::mt19937;
 
@@ -129,8 +130,9 @@ const std::map<std::string, std::function<Options(Random&)>> kCalls = {
 /// The part of two bands is the same, voxel by voxel.
 /// @param tolerance  voxels
 /// @return how many were compared
-std::size_t expectSamePart(const NarrowBand& whole, const NarrowBand& made, const BandPart& part,
-                           double tolerance, const std::string& what) {
+std::size_t expectSamePart(const NarrowBand& whole, const NarrowBand& made,
+                           const RegionOfInterest& part, double tolerance,
+                           const std::string& what) {
   const NarrowBand wanted = levelset::cropped(whole, {.halfWidth = part.halfWidth});
   EXPECT_EQ(vdb(wanted).background(), vdb(made).background()) << what;
   const openvdb::CoordBBox box = vdb(whole).evalActiveVoxelBoundingBox();
@@ -170,30 +172,30 @@ std::size_t tryOperator(const Operator& op, const std::function<Options(Random&)
   } catch (const levelset::InvalidInput&) {
     return 0;  // nothing is left of it
   }
-  Demand of;
+  RegionOfInterest of;
   if (all.kind() == pipeline::Kind::Band) {
-    if (random() % 2) of.part.halfWidth = between(random, 1, halfWidth);
+    if (random() % 2) of.halfWidth = between(random, 1, halfWidth);
     if (random() % 4) {
       const Box3d bounds = all.plan().bounds;
       const V3d low = bounds.min + (bounds.size() * pointIn(random, 0.5) + bounds.size() / 2) * 0.8;
-      of.part.region = Box3d(low, low + bounds.size() * between(random, 0.2, 0.6));
+      of.region = Box3d(low, low + bounds.size() * between(random, 0.2, 0.6));
     }
   }
   pipeline::Invocation part(op, options);
   part.operands = operands;
   part.planned = all.plan();
-  part.part = of.part;
+  part.roi = of;
   std::vector<Value> less;
   for (std::size_t i = 0; i < operands.size(); ++i) {
-    const Demand read = op.reads(part, i, of);
-    less.emplace_back(levelset::cropped(operands[i].band(), read.part));
+    const RegionOfInterest read = op.regionOfInterest(part, i, of);
+    less.emplace_back(levelset::cropped(operands[i].band(), read));
     if (less.back().band().isEmpty()) return 0;  // it would be made whole
   }
   part.operands = less;
-  part.isNarrowed = less[0].band().halfWidth() < operands[0].band().halfWidth() * (1 - 1e-5);
+  part.isPartial = less[0].band().halfWidth() < operands[0].band().halfWidth() * (1 - 1e-5);
   const std::string what = op.name + " " + std::to_string(seed) + ", half width " +
-                           std::to_string(of.part.halfWidth) + " of " + std::to_string(halfWidth) +
-                           (levelset::isEverywhere(of.part.region) ? "" : ", in a region");
+                           std::to_string(of.halfWidth) + " of " + std::to_string(halfWidth) +
+                           (levelset::isEverywhere(of.region) ? "" : ", in a region");
   Value made = all;
   try {
     made = op.run(part);
@@ -208,18 +210,17 @@ std::size_t tryOperator(const Operator& op, const std::function<Options(Random&)
   // Thinner bands are made thicker, the part for itself.
   constexpr double kOfThickBands = 1e-6;
   if (halfWidth >= 3) tolerance = std::min(tolerance, kOfThickBands);
-  return expectSamePart(all.band(), levelset::cropped(made.band(), of.part), of.part, tolerance,
-                        what);
+  return expectSamePart(all.band(), levelset::cropped(made.band(), of), of, tolerance, what);
 }
 
-TEST(Demand, EveryOperatorThatReadsAPartMakesThatPartTheSame) {
+TEST(RegionOfInterest, EveryOperatorThatReadsAPartMakesThatPartTheSame) {
   for (const Operator& op : pipeline::operators()) {
-    if (!op.reads || op.flow == pipeline::Flow::PassesThrough) continue;  // those: below
+    if (!op.regionOfInterest || op.flow == pipeline::Flow::PassesThrough) continue;  // those: below
     ASSERT_TRUE(kCalls.contains(op.name)) << op.name << " reads parts, and no call of it is tried";
   }
   for (const auto& [name, call] : kCalls) {
     const Operator& op = *pipeline::findOperator(name.substr(0, name.find(' ')));
-    ASSERT_TRUE(op.reads) << name;
+    ASSERT_TRUE(op.regionOfInterest) << name;
     const double tolerance = name == "transform" ? 0 : op.partTolerance;
     const unsigned rounds = tolerance == 0 || name == "offset" ? 20 : 6;  // others take longer
     unsigned compared = 0;
@@ -289,7 +290,7 @@ TEST_F(Demands, OffsetAndClipAskForTheBoxAndTheBandThatTheyRead) {
   EXPECT_EQ(report.steps[1].needed.region,
             Box3d(V3d(1.5, -0.5, -0.5) - V3d(rim), V3d(3, 0.5, 0.5) + V3d(rim)));
   EXPECT_EQ(report.steps[2].halfWidth, 1.5);
-  EXPECT_TRUE(report.steps[3].needed.isAll());
+  EXPECT_TRUE(report.steps[3].needed.isWhole());
   const pipeline::RunReport whole = run("sphere --radius 2 --voxel 0.05 --half-width 20", true);
   EXPECT_LT(report.steps[0].activeVoxels, 0.3 * whole.steps[0].activeVoxels);
 }
@@ -317,7 +318,7 @@ TEST_F(Demands, PartsOfLargeSolidsKeepTheirInsides) {
         "-0.8,-0.3,-0.3_0.3,0.4,0.3 ! mesh"}) {
     const pipeline::RunReport report = expectSame(chain, ".ply");
     EXPECT_TRUE(std::any_of(report.steps.begin(), report.steps.end(), [](const auto& step) {
-      return !step.needed.isAll();
+      return !step.needed.isWhole();
     })) << chain;
   }
 }

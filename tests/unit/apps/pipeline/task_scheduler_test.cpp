@@ -25,7 +25,7 @@ namespace side_by_side_test {
 
 using pipeline::Job;
 using pipeline::JobsDone;
-using pipeline::runSideBySide;
+using pipeline::scheduleTasks;
 using std::chrono::milliseconds;
 using GoesOn = std::function<bool()>;
 
@@ -67,7 +67,7 @@ TEST(SideBySide, RunsAtOnceWhatDoesNotWait) {
   Gate gate;
   std::atomic<int> met = 0;
   const JobsDone done =
-      runSideBySide({Job{}, Job{}, Job{{0, 1}}}, {.threads = 2,
+      scheduleTasks({Job{}, Job{}, Job{{0, 1}}}, {.threads = 2,
                                                   .run =
                                                       [&](std::size_t job, const GoesOn&) {
                                                         if (job < 2) met += gate.pass(2);
@@ -82,7 +82,7 @@ TEST(SideBySide, RunsAtOnceWhatDoesNotWait) {
 TEST(SideBySide, TakesAsManyThreadsAsThereAreJobs) {
   Gate gate;
   std::atomic<int> met = 0;
-  runSideBySide(std::vector<Job>(4), {.threads = 4,
+  scheduleTasks(std::vector<Job>(4), {.threads = 4,
                                       .run =
                                           [&](std::size_t, const GoesOn&) {
                                             met += gate.pass(4);
@@ -97,7 +97,7 @@ TEST(SideBySide, WaitsForOneThatMayNotJoin) {
   const auto isLarge = [](std::size_t job) { return job == 2; };
   Gate asked, large;
   std::atomic<int> overtaken = 0;
-  const JobsDone done = runSideBySide(std::vector<Job>(8),
+  const JobsDone done = scheduleTasks(std::vector<Job>(8),
                                       {.threads = 2,
                                        .run =
                                            [&](std::size_t job, const GoesOn&) {
@@ -119,7 +119,7 @@ TEST(SideBySide, KeepsToItsThreadsAndToWhatMayJoin) {
   for (const std::size_t threads : {1u, 2u, 3u}) {
     std::atomic<int> running = 0, most = 0, mostLarge = 0, large = 0;
     const auto isLarge = [](std::size_t job) { return job % 2 == 0; };
-    const JobsDone done = runSideBySide(
+    const JobsDone done = scheduleTasks(
         std::vector<Job>(40), {.threads = threads,
                                .run =
                                    [&](std::size_t job, const GoesOn&) {
@@ -158,7 +158,7 @@ TEST(SideBySide, KeepsEveryOrderThatIsAsked) {
     const std::size_t threads = 1 + random() % 4;
     std::mutex mutex;
     std::vector<char> ended(count, 0), began(count, 0);
-    const JobsDone done = runSideBySide(
+    const JobsDone done = scheduleTasks(
         jobs, {.threads = threads,
                .run =
                    [&](std::size_t i, const GoesOn&) {
@@ -206,7 +206,7 @@ TEST(SideBySide, KeepsEveryOrderThatIsAsked) {
 TEST(SideBySide, GoesOnBehindWhatIsLeft) {
   for (const std::size_t threads : {1u, 2u}) {
     const JobsDone done =
-        runSideBySide({Job{}, Job{{}, true}, Job{{1}}, Job{}, Job{{3}}},
+        scheduleTasks({Job{}, Job{{}, true}, Job{{1}}, Job{}, Job{{3}}},
                       {.threads = threads,
                        .run = [](std::size_t job, const GoesOn&) { return job != 0; },
                        .mayJoin = kAnyBeside});
@@ -217,7 +217,7 @@ TEST(SideBySide, GoesOnBehindWhatIsLeft) {
 TEST(SideBySide, TellsThoseBehindAFailureToEnd) {
   Gate gate;
   std::atomic<bool> wasTold = false;
-  const JobsDone done = runSideBySide(
+  const JobsDone done = scheduleTasks(
       {Job{}, Job{}, Job{}}, {.threads = 2,
                               .run =
                                   [&](std::size_t job, const GoesOn& goesOn) {
@@ -244,7 +244,7 @@ TEST(SideBySide, DoesNotRunFarAhead) {
     jobs.push_back({.waitsFor = {2 * i}, .waitsForAll = true});
   }
   std::atomic<int> made = 0, taken = 0, most = 0;
-  runSideBySide(jobs, {.threads = 2,
+  scheduleTasks(jobs, {.threads = 2,
                        .run =
                            [&](std::size_t job, const GoesOn&) {
                              if (job == 0) std::this_thread::sleep_for(milliseconds(50));

@@ -266,8 +266,8 @@ TEST(AnimatePatches, BeginsAndEndsOnItsKeysToTheBit) {
   ASSERT_EQ(played.patches.size(), 6u);
   const std::pair<std::size_t, const Patch*> ends[] = {{0, &a}, {2, &b}, {5, &c}};
   for (const auto& [frame, patch] : ends)
-    for (std::size_t level = 0; level < 2; ++level)
-      EXPECT_EQ(played.patches[frame].levels[level].positions, patch->levels[level].positions);
+    for (std::size_t layer = 0; layer < 2; ++layer)
+      EXPECT_EQ(played.patches[frame].layers[layer].positions, patch->layers[layer].positions);
   EXPECT_EQ(played.report.patchesMade, 3u);
   EXPECT_TRUE(played.report.warnings.empty());
   // Half way from the first to the second.
@@ -292,7 +292,7 @@ TEST(AnimatePatches, CarriesBothWaysOnAGrowingBase) {
               0.25 * kVoxel)
         << f;
   }
-  EXPECT_EQ(played.patches[4].levels[0].positions, b.levels[0].positions);
+  EXPECT_EQ(played.patches[4].layers[0].positions, b.layers[0].positions);
 }
 
 TEST(AnimatePatches, MakesNothingAgainThatStands) {
@@ -305,7 +305,7 @@ TEST(AnimatePatches, MakesNothingAgainThatStands) {
   EXPECT_EQ(played.report.reused, 2u);
   EXPECT_FALSE(played.report.frames[1].isRemade);
   EXPECT_TRUE(played.report.frames[2].isRemade);
-  EXPECT_EQ(played.patches[1].levels[1].positions, a.levels[1].positions);
+  EXPECT_EQ(played.patches[1].layers[1].positions, a.layers[1].positions);
   // Held between two keys that are one.
   const Played held = play(ball, {keyOf(a), keyOf(a, 3)}, {.frames = 4});
   EXPECT_EQ(held.report.patchesMade, 0u);
@@ -408,13 +408,13 @@ TEST(AnimatePatches, RefusesKeysThatDoNotGoTogether) {
   others.patches.push_back(a);
   others.patches[1].mirrored = true;
   EXPECT_NE(refusal({tiles, others}).find("in member 2"), std::string::npos);
-  // Of another number of levels: the frames between jump, so it is told.
+  // Of another number of layers: the frames between jump, so it is told.
   mapping::PatchOptions finer = support::thinPatch();
-  finer.levels = 3;
+  finer.layers = 3;
   const Patch b = makePatch(ball, a.corners, a.height, finer).patch;
   const Played played = play(ball, {keyOf(a), keyOf(b, 3)}, {.frames = 4});
   ASSERT_EQ(played.report.warnings.size(), 1u);
-  EXPECT_NE(played.report.warnings[0].find("3 levels and the first 2"), std::string::npos);
+  EXPECT_NE(played.report.warnings[0].find("3 layers and the first 2"), std::string::npos);
 }
 
 TEST(AnimatePatches, RefusesKeysOfAnotherBaseBeforeAFrameIsMade) {
@@ -531,7 +531,7 @@ TEST(AnimatePatches, MakesReadPatchesWithAsManyParticles) {
   const Patch a = patchAt(ball, V3d(0, 0, 1), 0.8);
   const mapping::PatchOptions like = mapping::optionsLike(a);
   const Patch again = makePatch(ball, a.corners, a.height, like).patch;
-  EXPECT_EQ(again.levels.size(), a.levels.size());
+  EXPECT_EQ(again.layers.size(), a.layers.size());
   EXPECT_EQ(again.particleCount(), a.particleCount());
 }
 

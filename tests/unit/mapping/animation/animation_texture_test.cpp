@@ -170,7 +170,7 @@ TEST(AnimateTexture, TellsWhatItsFramesSay) {
   const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
   const Patch a = patchAt(ball, V3d(0, 0, 1));
   Patch folded = patchAt(ball, V3d(1, 0, 0));
-  for (V3d& p : folded.levels.back().positions) p *= 0.5;
+  for (V3d& p : folded.layers.back().positions) p *= 0.5;
   AnimationKey key{{a, folded}, {mapping::outlineOf(a), mapping::outlineOf(folded)}, 0};
   mapping::TextureAnimationOptions options{.animation = {.frames = 3}, .texture = coarse()};
   options.texture.skipFolds = true;

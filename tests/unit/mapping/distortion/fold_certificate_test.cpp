@@ -29,7 +29,7 @@
 namespace fold_certificate_test {
 
 using Imath::V3d;
-using mapping::certifyLevels;
+using mapping::certifyLayers;
 using mapping::certifyRbf;
 using mapping::certifyShell;
 using mapping::FoldCertificate;
@@ -126,7 +126,7 @@ TEST(TrilinearVolume, AFlatCubeFolds) {
 TEST(FoldCertificate, TetrahedraAreJudgedExactly) {
   // One particle goes through the face opposite of it, and by how little does not matter.
   Patch patch = patchAt(box, 3, 3, 3);
-  V3d& p = patch.levels[1].positions[4];
+  V3d& p = patch.layers[1].positions[4];
   p = V3d(0.5, 0.5, 0);
   for (const double way : {2 * kEps, -2 * kEps}) {
     p.z = way;
@@ -147,7 +147,7 @@ TEST(FoldCertificate, CertifiesBoxesAndWhatIsBentGently) {
     const Patch patch = patchAt(place, 9, 7, 4);
     for (const double sink : {0.0, 0.1, -0.1}) {
       for (const FoldCertificate& certificate :
-           {shellOf(patch, sink), certifyLevels(patch, sink), rbfOf(patch, sink)}) {
+           {shellOf(patch, sink), certifyLayers(patch, sink), rbfOf(patch, sink)}) {
         EXPECT_EQ(certificate.verdict(), FoldVerdict::Certified);
         EXPECT_EQ(certificate.undecidedShare, 0);
         EXPECT_EQ(certificate.foldedShare, 0);
@@ -165,7 +165,7 @@ TEST(FoldCertificate, LeastJacobianOfACylinderIsThatOfItsFormula) {
     return V3d(r * std::sin(angle), 3 * t.y, r * std::cos(angle));
   };
   const Patch patch = patchAt(bent, 65, 5, 33);
-  EXPECT_NEAR(certifyLevels(patch, 0).leastJacobian, 2 / 2.5, 0.01);
+  EXPECT_NEAR(certifyLayers(patch, 0).leastJacobian, 2 / 2.5, 0.01);
   EXPECT_NEAR(shellOf(patch).leastJacobian, 2 / 2.5, 0.01);
 }
 
@@ -173,10 +173,10 @@ TEST(FoldCertificate, TellsThePlaceOfAFold) {
   // One cell's corner is pushed through the cell.
   const auto pushed = [](double way) {
     Patch patch = patchAt([](const V3d& t) { return V3d(4 * t.x, 4 * t.y, t.z); }, 9, 9, 3);
-    patch.levels[1].positions[4 * 9 + 4] += V3d(way, way, 0);
+    patch.layers[1].positions[4 * 9 + 4] += V3d(way, way, 0);
     return patch;
   };
-  for (const FoldCertificate& certificate : {shellOf(pushed(0.8)), certifyLevels(pushed(0.8), 0)}) {
+  for (const FoldCertificate& certificate : {shellOf(pushed(0.8)), certifyLayers(pushed(0.8), 0)}) {
     ASSERT_EQ(certificate.verdict(), FoldVerdict::Folds);
     ASSERT_FALSE(certificate.worst.empty());
     EXPECT_LE(certificate.worst.size(), FoldCertificate::kMostPlaces);
@@ -187,7 +187,7 @@ TEST(FoldCertificate, TellsThePlaceOfAFold) {
     EXPECT_GT(certificate.foldedShare, 0);
     EXPECT_LT(certificate.foldedShare, 0.1);
   }
-  for (const FoldCertificate& certificate : {shellOf(pushed(0.2)), certifyLevels(pushed(0.2), 0)})
+  for (const FoldCertificate& certificate : {shellOf(pushed(0.2)), certifyLayers(pushed(0.2), 0)})
     EXPECT_EQ(certificate.verdict(), FoldVerdict::Certified);
 }
 
@@ -198,7 +198,7 @@ TEST(FoldCertificate, SmoothMapsAreJudgedAsTheirSlopesSay) {
   for (const double way : {0.0, 0.1, 0.25, 0.6, 1.2}) {
     Patch patch = patchAt([](const V3d& t) { return V3d(2 * t.x, 2 * t.y, t.z); }, 6, 6, 4);
     for (std::size_t k = 1; k < 4; ++k) {
-      V3d& p = patch.levels[k].positions[2 * 6 + 3];
+      V3d& p = patch.layers[k].positions[2 * 6 + 3];
       p += V3d(way, 0.7 * way, 0);
     }
     const mapping::RbfMap map = mapping::patchToTexture(patch, {.lambdaFar = 0.005});
@@ -243,9 +243,9 @@ TEST(FoldCertificate, FoldsThatTheSamplesMissAreRefused) {
   for (int trial = 0; trial < 2000 && missed < 3; ++trial) {
     const Patch patch = patchAt(
         [&](const V3d& t) { return t + V3d(unit(random), unit(random), unit(random)); }, 2, 2, 2);
-    const std::vector<mapping::MapSample> samples = mapping::sampleLevelMap(patch, 0);
+    const std::vector<mapping::MapSample> samples = mapping::sampleLayerMap(patch, 0);
     if (mapping::surveyDistortion(samples, V3d(1)).folded > 0) continue;
-    if (certifyLevels(patch, 0).verdict() != FoldVerdict::Folds) continue;
+    if (certifyLayers(patch, 0).verdict() != FoldVerdict::Folds) continue;
     ++missed;
     try {
       (void)mapping::mapMesh(triangle, patch, {.textureBox = whole});
@@ -261,9 +261,9 @@ TEST(FoldCertificate, FoldsThatTheSamplesMissAreRefused) {
   EXPECT_GT(missed, 0);
 }
 
-TEST(FoldCertificate, LevelsOfUnlikeCountsAreCutWhereEitherEnds) {
+TEST(FoldCertificate, LayersOfUnlikeCountsAreCutWhereEitherEnds) {
   Patch patch = patchAt(box, 5, 4, 3);
-  patch.levels[1] = patchAt(box, 4, 6, 3).levels[1];
+  patch.layers[1] = patchAt(box, 4, 6, 3).layers[1];
   const mapping::ShellCells cells(patch, 0.1);
   double volume = 0;
   const std::vector<V3d> positions = mapping::particlePositions(patch);
@@ -276,24 +276,24 @@ TEST(FoldCertificate, LevelsOfUnlikeCountsAreCutWhereEitherEnds) {
                     corner & 2 ? cell.box.max.y : cell.box.min.y,
                     corner & 4 ? cell.box.max.z : cell.box.min.z);
       const V3d place = mapping::positionOf(cell.corners[corner], positions);
-      EXPECT_LE((place - mapping::levelPosition(patch, uvw)).length(), 1e-14);
+      EXPECT_LE((place - mapping::layerPosition(patch, uvw)).length(), 1e-14);
       EXPECT_LE((place - uvw).length(), 1e-14);
     }
   }
   EXPECT_NEAR(volume, 1.1, 1e-12);
-  EXPECT_EQ(certifyLevels(patch, 0.1).verdict(), FoldVerdict::Certified);
+  EXPECT_EQ(certifyLayers(patch, 0.1).verdict(), FoldVerdict::Certified);
 }
 
 TEST(FoldCertificate, MirroredPatchesAreNotFolded) {
   Patch patch = patchAt([](const V3d& t) { return V3d(1 - t.x, t.y, t.z); }, 4, 4, 3);
   for (const FoldCertificate& certificate :
-       {shellOf(patch), certifyLevels(patch, 0), rbfOf(patch)}) {
+       {shellOf(patch), certifyLayers(patch, 0), rbfOf(patch)}) {
     EXPECT_EQ(certificate.verdict(), FoldVerdict::Folds);
     EXPECT_NEAR(certificate.foldedShare, 1, 1e-12);
   }
   patch.mirrored = true;
   for (const FoldCertificate& certificate :
-       {shellOf(patch), certifyLevels(patch, 0), rbfOf(patch)}) {
+       {shellOf(patch), certifyLayers(patch, 0), rbfOf(patch)}) {
     EXPECT_EQ(certificate.verdict(), FoldVerdict::Certified);
     EXPECT_NEAR(certificate.leastJacobian, 1, 1e-9);
   }
@@ -301,11 +301,11 @@ TEST(FoldCertificate, MirroredPatchesAreNotFolded) {
 
 TEST(FoldCertificate, TheSmallestPatchAndOneWithoutVolume) {
   const Patch smallest = patchAt(box, 2, 2, 2);
-  EXPECT_EQ(certifyLevels(smallest, 0).verdict(), FoldVerdict::Certified);
+  EXPECT_EQ(certifyLayers(smallest, 0).verdict(), FoldVerdict::Certified);
   EXPECT_EQ(shellOf(smallest).verdict(), FoldVerdict::Certified);
   EXPECT_EQ(rbfOf(smallest).verdict(), FoldVerdict::Certified);
   const Patch flat = patchAt([](const V3d& t) { return V3d(t.x, t.y, 0); }, 4, 4, 3);
-  for (const FoldCertificate& certificate : {shellOf(flat), certifyLevels(flat, 0)}) {
+  for (const FoldCertificate& certificate : {shellOf(flat), certifyLayers(flat, 0)}) {
     EXPECT_EQ(certificate.verdict(), FoldVerdict::Folds);
     EXPECT_NEAR(certificate.foldedShare, 1, 1e-12);
     EXPECT_EQ(certificate.leastJacobian, 0);
@@ -317,12 +317,12 @@ TEST(FoldCertificate, DoesNotDependOnPlaceScaleOrThreads) {
     return V3d(t.x + 0.1 * std::sin(3 * t.y), t.y, t.z * (1 + 0.3 * t.x * t.y));
   };
   const Patch patch = patchAt(wavy, 7, 6, 4);
-  const FoldCertificate levels = certifyLevels(patch, 0.05), rbf = rbfOf(patch, 0.05);
+  const FoldCertificate layers = certifyLayers(patch, 0.05), rbf = rbfOf(patch, 0.05);
   for (const double scale : {1e-6, 1e6}) {
     const auto scaled = [&](const V3d& t) { return wavy(t) * scale + V3d(1e3 * scale); };
     const Patch moved = patchAt(scaled, 7, 6, 4, scale);
-    EXPECT_EQ(certifyLevels(moved, 0.05).verdict(), FoldVerdict::Certified);
-    EXPECT_NEAR(certifyLevels(moved, 0.05).leastJacobian, levels.leastJacobian, 1e-8);
+    EXPECT_EQ(certifyLayers(moved, 0.05).verdict(), FoldVerdict::Certified);
+    EXPECT_NEAR(certifyLayers(moved, 0.05).leastJacobian, layers.leastJacobian, 1e-8);
     EXPECT_EQ(shellOf(moved).verdict(), FoldVerdict::Certified);
     EXPECT_EQ(rbfOf(moved, 0.05).verdict(), rbf.verdict());
   }
@@ -373,7 +373,7 @@ TEST(RbfTaylor, CubesKeepTheirBounds) {
   const mapping::RbfCubes cubes(map, sizes, 1e-2);
   mapping::RbfCube cube = cubes.root(V3d(0), 2);
   bool hasFar = false;
-  for (int level = 0; level < 6; ++level) {
+  for (int layer = 0; layer < 6; ++layer) {
     for (int n = 0; n < 20; ++n) {
       const V3d s =
           V3d(2 * unit(random) - 1, 2 * unit(random) - 1, 2 * unit(random) - 1) * cube.half;
@@ -390,7 +390,7 @@ TEST(RbfTaylor, CubesKeepTheirBounds) {
     }
     hasFar = hasFar || cube.near.size() < map.size();
     EXPECT_LE(cube.slopeError, 1e-2);
-    cube = cubes.octant(cube, level % 8);
+    cube = cubes.octant(cube, layer % 8);
   }
   EXPECT_TRUE(hasFar);
 }
@@ -418,9 +418,9 @@ TEST(JacobianField, HoldsTheJacobianOfEachMap) {
   const auto wedge = [](const V3d& t) { return V3d(t.x, t.y, t.z * (1 + t.x)); };
   const Patch patch = patchAt(wedge, 17, 5, 3);
   const mapping::JacobianFieldOptions options{.voxelSize = 0.05};
-  const FoldCertificate levels = certifyLevels(patch, 0);
+  const FoldCertificate layers = certifyLayers(patch, 0);
   const auto field =
-      levelset::asScalarField(mapping::jacobianField(patch, levels, options), "test");
+      levelset::asScalarField(mapping::jacobianField(patch, layers, options), "test");
   const ShellMap shell(patch, {});
   const auto straight = levelset::asScalarField(
       mapping::jacobianField(patch, shell, certifyShell(shell, false), options), "test");
@@ -437,8 +437,8 @@ TEST(JacobianField, HoldsTheJacobianOfEachMap) {
     EXPECT_NEAR(smooth(place), map.jacobian(place).determinant() / proof.unit, 0.03) << x;
   }
   EXPECT_EQ(field(V3d(0.5, 0.5, 3)), 1);
-  EXPECT_THROW((void)mapping::jacobianField(patch, levels, {}), levelset::UsageError);
-  EXPECT_THROW((void)mapping::jacobianField(patch, levels, {.voxelSize = 1e-12}),
+  EXPECT_THROW((void)mapping::jacobianField(patch, layers, {}), levelset::UsageError);
+  EXPECT_THROW((void)mapping::jacobianField(patch, layers, {.voxelSize = 1e-12}),
                levelset::ResourceLimit);
 }
 
@@ -449,7 +449,7 @@ TEST(FoldCertificate, OfASmoothMapShowsWhereWhatItCountsFolds) {
                          levelset::makeCylinder(1.5, 12, V3d(0), V3d(0, 1, 0), 0.2));
   const std::array<V3d, 4> corners = {V3d(-1, -1, -1.12), V3d(1, -1, -1.12), V3d(1, 1, -1.12),
                                       V3d(-1, 1, -1.12)};
-  const Patch patch = mapping::makePatch(trough, corners, 2.5, {.levels = 4}).patch;
+  const Patch patch = mapping::makePatch(trough, corners, 2.5, {.layers = 4}).patch;
   const FoldCertificate proof = certifyRbf(mapping::patchToTexture(patch), patch, 0.1);
   // Whatever is counted as folded has a place to show; what may only fold outside is not certified.
   EXPECT_EQ(proof.foldedShare > 0, proof.verdict() == FoldVerdict::Folds);
@@ -460,8 +460,8 @@ TEST(FoldCertificate, OfASmoothMapShowsWhereWhatItCountsFolds) {
 
 TEST(JacobianField, ShowsFoldsBetweenGridPoints) {
   Patch patch = patchAt(box, 9, 9, 3);
-  patch.levels[1].positions[4 * 9 + 4] += V3d(0.2, 0.2, 0);
-  const FoldCertificate certificate = certifyLevels(patch, 0);
+  patch.layers[1].positions[4 * 9 + 4] += V3d(0.2, 0.2, 0);
+  const FoldCertificate certificate = certifyLayers(patch, 0);
   ASSERT_EQ(certificate.verdict(), FoldVerdict::Folds);
   const levelset::FieldGrid field = mapping::jacobianField(patch, certificate, {.voxelSize = 0.5});
   const auto value = levelset::asScalarField(field, "test");

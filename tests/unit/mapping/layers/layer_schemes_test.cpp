@@ -15,12 +15,12 @@
 #include "mapping/placement/make_patch.h"
 #include "tests/support/patches.h"
 
-namespace level_schemes_test {
+namespace layer_schemes_test {
 
 using Imath::V3d;
 using levelset::NarrowBand;
-using mapping::LevelScheme;
-using mapping::ParticleLevel;
+using mapping::LayerScheme;
+using mapping::ParticleLayer;
 using mapping::Patch;
 using mapping::PatchOptions;
 using mapping::PatchResult;
@@ -59,31 +59,31 @@ TEST(SweepCurve, FollowsACircle) {
   EXPECT_LE((straight.tangent(3) - V3d(0, 0, 1)).length(), 1e-12);
 }
 
-TEST(ConformingLevels, AreRadialAboveASphere) {
+TEST(ConformingLayers, AreRadialAboveASphere) {
   const double radius = 2, height = 0.8;
   const double side = radius * std::sin(0.5) / std::sqrt(2.0), up = radius * std::cos(0.5);
   const PatchResult made = mapping::makePatch(makeBall(radius, 0.1), square(side, up), height,
-                                              {.levels = 5, .scheme = LevelScheme::Conforming});
-  ASSERT_EQ(made.patch.levels.size(), 5u);
-  const ParticleLevel& surface = made.patch.levels.front();
-  for (const ParticleLevel& level : made.patch.levels) {
-    const ParticleLevel below = mapping::withCounts(surface, level.columns, level.rows);
-    for (std::size_t n = 0; n < level.positions.size(); ++n) {
-      EXPECT_NEAR(level.positions[n].length(), radius + level.w * height, 0.004 * height);
-      EXPECT_LE((level.positions[n].normalized() - below.positions[n].normalized()).length(),
+                                              {.layers = 5, .scheme = LayerScheme::Conforming});
+  ASSERT_EQ(made.patch.layers.size(), 5u);
+  const ParticleLayer& surface = made.patch.layers.front();
+  for (const ParticleLayer& layer : made.patch.layers) {
+    const ParticleLayer below = mapping::withCounts(surface, layer.columns, layer.rows);
+    for (std::size_t n = 0; n < layer.positions.size(); ++n) {
+      EXPECT_NEAR(layer.positions[n].length(), radius + layer.w * height, 0.004 * height);
+      EXPECT_LE((layer.positions[n].normalized() - below.positions[n].normalized()).length(),
                 0.002);
     }
   }
   EXPECT_EQ(foldsOf(made.patch), 0u);
 }
 
-double spacingOf(const ParticleLevel& level) {
+double spacingOf(const ParticleLayer& layer) {
   Patch patch;
-  patch.levels = {level};
+  patch.layers = {layer};
   return mapping::meanSpacing(patch);
 }
 
-TEST(LevelDensity, StaysThatOfTheSurfaceWhateverALevelsSize) {
+TEST(LayerDensity, StaysThatOfTheSurfaceWhateverALayersSize) {
   // Two and a half times as wide at the top of the ball's patch, or a third by taper.
   const double side = std::sin(0.5) / std::sqrt(2.0), up = std::cos(0.5);
   const NarrowBand ball = makeBall(1, 0.05), ground = makeGround(0.05);
@@ -96,143 +96,143 @@ TEST(LevelDensity, StaysThatOfTheSurfaceWhateverALevelsSize) {
   const Made all[] = {
       {"conforming",
        mapping::makePatch(ball, onBall, 1.5,
-                          {.levels = 5, .scheme = LevelScheme::Conforming, .spacing = 0.08}),
+                          {.layers = 5, .scheme = LayerScheme::Conforming, .spacing = 0.08}),
        2.5},
       {"conforming, tapered",
        mapping::makePatch(ball, onBall, 1.5,
-                          {.levels = 5,
-                           .scheme = LevelScheme::Conforming,
+                          {.layers = 5,
+                           .scheme = LayerScheme::Conforming,
                            .transform = {.taper = 0.6},
                            .spacing = 0.08}),
        1.6},
       {"spline, tapered",
        mapping::makePatch(
            ground, onGround, 1,
-           {.levels = 5, .scheme = LevelScheme::Spline, .transform = {.taper = 1.0 / 3}}),
+           {.layers = 5, .scheme = LayerScheme::Spline, .transform = {.taper = 1.0 / 3}}),
        1.0 / 3},
       {"reduced, tapered",
-       mapping::makePatch(ground, onGround, 0.3, {.levels = 5, .transform = {.taper = 1.0 / 3}}),
+       mapping::makePatch(ground, onGround, 0.3, {.layers = 5, .transform = {.taper = 1.0 / 3}}),
        1.0 / 3}};
   for (const Made& made : all) {
     SCOPED_TRACE(made.what);
-    const std::vector<ParticleLevel>& levels = made.result.patch.levels;
-    const double spacing = spacingOf(levels.front());
-    for (const ParticleLevel& level : levels) {
-      EXPECT_NEAR(spacingOf(level) / spacing, 1, 0.28) << level.w;
-      EXPECT_TRUE(level.hasRim());
-      EXPECT_EQ(level.rim.size(), 2 * (level.columns + level.rows) + 4);
+    const std::vector<ParticleLayer>& layers = made.result.patch.layers;
+    const double spacing = spacingOf(layers.front());
+    for (const ParticleLayer& layer : layers) {
+      EXPECT_NEAR(spacingOf(layer) / spacing, 1, 0.28) << layer.w;
+      EXPECT_TRUE(layer.hasRim());
+      EXPECT_EQ(layer.rim.size(), 2 * (layer.columns + layer.rows) + 4);
     }
-    const auto cells = [](const ParticleLevel& level) {
-      return static_cast<double>(level.columns - 1);
+    const auto cells = [](const ParticleLayer& layer) {
+      return static_cast<double>(layer.columns - 1);
     };
-    EXPECT_NEAR(cells(levels.back()) / cells(levels.front()), made.topStretch, 0.1);
+    EXPECT_NEAR(cells(layers.back()) / cells(layers.front()), made.topStretch, 0.1);
     EXPECT_EQ(foldsOf(made.result.patch), 0u);
   }
-  // What the budget of all levels does not allow is left out where nobody asks for it.
+  // What the budget of all layers does not allow is left out where nobody asks for it.
   const PatchResult chosen =
-      mapping::makePatch(ball, onBall, 1.5, {.levels = 12, .scheme = LevelScheme::Conforming});
+      mapping::makePatch(ball, onBall, 1.5, {.layers = 12, .scheme = LayerScheme::Conforming});
   EXPECT_LE(chosen.patch.particleCount(), 2600u);
-  for (const LevelScheme scheme : {LevelScheme::Reduced, LevelScheme::Conforming})
+  for (const LayerScheme scheme : {LayerScheme::Reduced, LayerScheme::Conforming})
     for (const double taper : {1e3, 1e30, 1e300}) {
       const PatchOptions wide{
-          .levels = 3, .scheme = scheme, .transform = {.taper = taper}, .spacing = 0.08};
+          .layers = 3, .scheme = scheme, .transform = {.taper = taper}, .spacing = 0.08};
       EXPECT_THROW((void)mapping::makePatch(ball, onBall, 0.3, wide), levelset::ResourceLimit)
           << taper;
     }
   const PatchResult counted = mapping::makePatch(
-      ball, onBall, 1.5, {.levels = 3, .scheme = LevelScheme::Conforming, .cells = {8, 9}});
-  for (const ParticleLevel& level : counted.patch.levels) {
-    EXPECT_EQ(level.columns, 9u);
-    EXPECT_EQ(level.rows, 10u);
+      ball, onBall, 1.5, {.layers = 3, .scheme = LayerScheme::Conforming, .cells = {8, 9}});
+  for (const ParticleLayer& layer : counted.patch.layers) {
+    EXPECT_EQ(layer.columns, 9u);
+    EXPECT_EQ(layer.rows, 10u);
   }
 }
 
-TEST(LevelResampling, KeepsWhatIsQuadraticAndItsRim) {
+TEST(LayerResampling, KeepsWhatIsQuadraticAndItsRim) {
   // x and y are texture coordinates, z a paraboloid; Catmull-Rom reproduces both.
   const auto place = [](double u, double v) { return V3d(u, 2 * v, u * u - u * v + 3 * v * v); };
   const auto sampled = [&](int columns, int rows) {
-    ParticleLevel level;
-    level.columns = static_cast<std::size_t>(columns);
-    level.rows = static_cast<std::size_t>(rows);
-    level.rim.resize(2 * (level.columns + level.rows) + 4);
+    ParticleLayer layer;
+    layer.columns = static_cast<std::size_t>(columns);
+    layer.rows = static_cast<std::size_t>(rows);
+    layer.rim.resize(2 * (layer.columns + layer.rows) + 4);
     for (int j = -1; j <= rows; ++j)
       for (int i = -1; i <= columns; ++i) {
         const V3d p =
             place(i / static_cast<double>(columns - 1), j / static_cast<double>(rows - 1));
         if (i >= 0 && i < columns && j >= 0 && j < rows)
-          level.positions.push_back(p);
+          layer.positions.push_back(p);
         else
-          level.rim[level.rimIndex(i, j)] = p;
+          layer.rim[layer.rimIndex(i, j)] = p;
       }
-    return level;
+    return layer;
   };
-  const ParticleLevel coarse = sampled(8, 7), expected = sampled(15, 12);
-  const ParticleLevel fine = mapping::withCounts(coarse, 15, 12);
+  const ParticleLayer coarse = sampled(8, 7), expected = sampled(15, 12);
+  const ParticleLayer fine = mapping::withCounts(coarse, 15, 12);
   for (int j = -1; j <= 12; ++j)
     for (int i = -1; i <= 15; ++i)
       EXPECT_LE((fine.beyond(i, j) - expected.beyond(i, j)).length(), 1e-12) << i << ' ' << j;
   // Fewer: the rim lies beyond the given one, straight on.
-  const ParticleLevel few = mapping::withCounts(coarse, 4, 4);
+  const ParticleLayer few = mapping::withCounts(coarse, 4, 4);
   const V3d end = coarse.beyond(-1, 0), next = coarse.at(0, 0);
   EXPECT_LE((few.beyond(-1, 0) - (end + (end - next) * (4.0 / 3))).length(), 1e-12);
   EXPECT_LE((few.at(3, 3) - coarse.at(7, 6)).length(), 1e-12);
 }
 
-TEST(ConformingLevels, SpreadWhereReducedOnesStayEven) {
+TEST(ConformingLayers, SpreadWhereReducedOnesStayEven) {
   // On bumpy ground: the thesis shows it in a figure, the cells' areas say it in a number.
   const NarrowBand ground = makeGround(0.12);
-  const PatchOptions even{.scheme = LevelScheme::Reduced, .spacing = 0.12},
-      faithful{.scheme = LevelScheme::Conforming, .spacing = 0.12};
+  const PatchOptions even{.scheme = LayerScheme::Reduced, .spacing = 0.12},
+      faithful{.scheme = LayerScheme::Conforming, .spacing = 0.12};
   const Patch reduced = mapping::makePatch(ground, square(1), 0.5, even).patch;
   const Patch conforming = mapping::makePatch(ground, square(1), 0.5, faithful).patch;
-  EXPECT_LT(mapping::cellAreaVariation(reduced.levels.back()),
-            0.5 * mapping::cellAreaVariation(conforming.levels.back()));
+  EXPECT_LT(mapping::cellAreaVariation(reduced.layers.back()),
+            0.5 * mapping::cellAreaVariation(conforming.layers.back()));
 }
 
-TEST(ConformingLevels, SlowDownTowardsTheMedialAxis) {
-  // A trough whose walls meet above: reduced levels are refused there, these fold and say so.
+TEST(ConformingLayers, SlowDownTowardsTheMedialAxis) {
+  // A trough whose walls meet above: reduced layers are refused there, these fold and say so.
   const NarrowBand trough =
       support::sampleBand([](const V3d& p) { return 1.5 - std::hypot(p.x, p.z - 1.5); },
                           {V3d(-1.6, -2, -0.2), V3d(1.6, 2, 3.2)}, 0.1);
   const std::array<V3d, 4> corners = {V3d(-0.9, -0.8, 0.3), V3d(0.9, -0.8, 0.3), V3d(0.9, 0.8, 0.3),
                                       V3d(-0.9, 0.8, 0.3)};
   const Patch patch =
-      mapping::makePatch(trough, corners, 2, {.scheme = LevelScheme::Conforming}).patch;
-  for (const V3d& p : patch.levels.back().positions)
+      mapping::makePatch(trough, corners, 2, {.scheme = LayerScheme::Conforming}).patch;
+  for (const V3d& p : patch.layers.back().positions)
     EXPECT_LE(std::abs(p.x), 0.3);  // near the axis, not through it
   const Patch shallow =
-      mapping::makePatch(trough, corners, 0.7, {.scheme = LevelScheme::Conforming}).patch;
+      mapping::makePatch(trough, corners, 0.7, {.scheme = LayerScheme::Conforming}).patch;
   EXPECT_EQ(foldsOf(shallow), 0u);
 }
 
-TEST(SplineLevels, GoStraightUpByThemselves) {
-  const PatchOptions options{.levels = 4, .scheme = LevelScheme::Spline};
+TEST(SplineLayers, GoStraightUpByThemselves) {
+  const PatchOptions options{.layers = 4, .scheme = LayerScheme::Spline};
   const Patch patch = mapping::makePatch(makeGround(0), square(1), 1.5, options).patch;
-  for (const ParticleLevel& level : patch.levels)
-    for (std::size_t n = 0; n < level.positions.size(); ++n) {
-      const V3d& foot = patch.levels.front().positions[n];
-      EXPECT_LE((level.positions[n] - foot - V3d(0, 0, 1.5 * level.w)).length(), 1e-3);
+  for (const ParticleLayer& layer : patch.layers)
+    for (std::size_t n = 0; n < layer.positions.size(); ++n) {
+      const V3d& foot = patch.layers.front().positions[n];
+      EXPECT_LE((layer.positions[n] - foot - V3d(0, 0, 1.5 * layer.w)).length(), 1e-3);
     }
 }
 
-TEST(SplineLevels, TravelAsRigidBodies) {
+TEST(SplineLayers, TravelAsRigidBodies) {
   // A quarter of a circle of radius 3, the patch well within it.
   std::vector<V3d> arc;
   for (int i = 1; i <= 6; ++i)
     arc.emplace_back(3 - 3 * std::cos(i * M_PI / 12), 0, 3 * std::sin(i * M_PI / 12));
-  const PatchOptions options{.levels = 7, .scheme = LevelScheme::Spline, .spline = arc};
+  const PatchOptions options{.layers = 7, .scheme = LayerScheme::Spline, .spline = arc};
   const PatchResult made = mapping::makePatch(makeGround(0), square(1), 4.7, options);
   EXPECT_EQ(made.report.slowed, 0u);
-  const std::vector<ParticleLevel>& levels = made.patch.levels;
-  const auto spread = [](const ParticleLevel& level, std::size_t n) {
-    return (level.positions[n] - level.positions.front()).length();
+  const std::vector<ParticleLayer>& layers = made.patch.layers;
+  const auto spread = [](const ParticleLayer& layer, std::size_t n) {
+    return (layer.positions[n] - layer.positions.front()).length();
   };
-  for (const ParticleLevel& level : levels)
-    for (std::size_t n = 0; n < level.positions.size(); ++n)
-      EXPECT_NEAR(spread(level, n), spread(levels.front(), n), 1e-9);
+  for (const ParticleLayer& layer : layers)
+    for (std::size_t n = 0; n < layer.positions.size(); ++n)
+      EXPECT_NEAR(spread(layer, n), spread(layers.front(), n), 1e-9);
   // At the end it faces along x, as far along as the circle says.
   V3d low(10), high(-10);
-  for (const V3d& p : levels.back().positions)
+  for (const V3d& p : layers.back().positions)
     for (int axis = 0; axis < 3; ++axis)
       low[axis] = std::min(low[axis], p[axis]), high[axis] = std::max(high[axis], p[axis]);
   EXPECT_LE(high.x - low.x, 0.05);
@@ -241,47 +241,47 @@ TEST(SplineLevels, TravelAsRigidBodies) {
   EXPECT_EQ(foldsOf(made.patch), 0u);
 }
 
-TEST(SplineLevels, SlowWhatWouldCross) {
+TEST(SplineLayers, SlowWhatWouldCross) {
   // A bend of radius 0.5 under a patch that reaches out by 1.
   const std::vector<V3d> bend = {V3d(0, 0, 0.5), V3d(0.15, 0, 0.85), V3d(0.5, 0, 1),
                                  V3d(1.5, 0, 1)};
-  const PatchOptions options{.levels = 9, .scheme = LevelScheme::Spline, .spline = bend};
+  const PatchOptions options{.layers = 9, .scheme = LayerScheme::Spline, .spline = bend};
   const PatchResult made = mapping::makePatch(makeGround(0), square(1), 2.2, options);
   EXPECT_GT(made.report.slowed, 0u);
-  EXPECT_LT(made.report.slowed, made.patch.levels.front().positions.size());
-  for (std::size_t k = 1; k < made.patch.levels.size(); ++k)
-    for (std::size_t n = 0; n < made.patch.levels[k].positions.size(); ++n)
+  EXPECT_LT(made.report.slowed, made.patch.layers.front().positions.size());
+  for (std::size_t k = 1; k < made.patch.layers.size(); ++k)
+    for (std::size_t n = 0; n < made.patch.layers[k].positions.size(); ++n)
       EXPECT_GT(
-          (made.patch.levels[k].positions[n] - made.patch.levels[k - 1].positions[n]).length(), 0);
+          (made.patch.layers[k].positions[n] - made.patch.layers[k - 1].positions[n]).length(), 0);
 }
 
-TEST(SplineLevels, FadeToAPlane) {
+TEST(SplineLayers, FadeToAPlane) {
   const double radius = 2, side = 0.8, up = std::sqrt(4 - 2 * 0.64);
-  const PatchOptions options{.scheme = LevelScheme::Spline, .fade = true};
+  const PatchOptions options{.scheme = LayerScheme::Spline, .fade = true};
   const Patch patch = mapping::makePatch(makeBall(radius, 0.1), square(side, up), 1, options).patch;
-  const auto relief = [](const ParticleLevel& level) {
+  const auto relief = [](const ParticleLayer& layer) {
     const auto [low, high] =
-        std::minmax_element(level.positions.begin(), level.positions.end(),
+        std::minmax_element(layer.positions.begin(), layer.positions.end(),
                             [](const V3d& a, const V3d& b) { return a.z < b.z; });
     return high->z - low->z;
   };
-  const double first = relief(patch.levels.front());
+  const double first = relief(patch.layers.front());
   EXPECT_GT(first, 0.3);
-  EXPECT_LE(relief(patch.levels.back()), 1e-5);             // the normal is known to that
-  EXPECT_NEAR(relief(patch.levels[3]), 0.4 * first, 1e-3);  // w = 0.6
+  EXPECT_LE(relief(patch.layers.back()), 1e-5);             // the normal is known to that
+  EXPECT_NEAR(relief(patch.layers[3]), 0.4 * first, 1e-3);  // w = 0.6
 }
 
-TEST(LevelTransform, TwistsTapersAndBends) {
+TEST(LayerTransform, TwistsTapersAndBends) {
   const NarrowBand ground = makeGround(0);
-  for (const LevelScheme scheme :
-       {LevelScheme::Reduced, LevelScheme::Conforming, LevelScheme::Spline}) {
-    const auto top = [&](const mapping::LevelTransform& transform) {
+  for (const LayerScheme scheme :
+       {LayerScheme::Reduced, LayerScheme::Conforming, LayerScheme::Spline}) {
+    const auto top = [&](const mapping::LayerTransform& transform) {
       // Of given counts: each particle has its like in the other patches.
       const PatchOptions options{
-          .levels = 5, .scheme = scheme, .transform = transform, .cells = {12, 12}};
-      return mapping::makePatch(ground, square(1), 1, options).patch.levels.back();
+          .layers = 5, .scheme = scheme, .transform = transform, .cells = {12, 12}};
+      return mapping::makePatch(ground, square(1), 1, options).patch.layers.back();
     };
-    const ParticleLevel plain = top({}), twisted = top({.twist = M_PI / 2}),
+    const ParticleLayer plain = top({}), twisted = top({.twist = M_PI / 2}),
                         tapered = top({.taper = 0.5}), bent = top({.bend = 1});
     for (std::size_t n = 0; n < plain.positions.size(); ++n) {
       const V3d p = plain.positions[n];
@@ -295,7 +295,7 @@ TEST(LevelTransform, TwistsTapersAndBends) {
   }
 }
 
-TEST(LevelSchemes, RefuseWhatMakesNoSense) {
+TEST(LayerSchemes, RefuseWhatMakesNoSense) {
   const NarrowBand ground = makeGround(0);
   const auto refused = [&](const PatchOptions& options) {
     try {
@@ -306,14 +306,14 @@ TEST(LevelSchemes, RefuseWhatMakesNoSense) {
     return std::string();
   };
   EXPECT_NE(refused({.fade = true}).find("spline scheme only"), std::string::npos);
-  EXPECT_NE(refused({.scheme = LevelScheme::Spline, .spline = {V3d(0, 0, 0.5)}}).find("only 0.5"),
+  EXPECT_NE(refused({.scheme = LayerScheme::Spline, .spline = {V3d(0, 0, 0.5)}}).find("only 0.5"),
             std::string::npos);
-  EXPECT_NE(refused({.scheme = LevelScheme::Spline, .spline = {V3d(0)}}).find("stands still"),
+  EXPECT_NE(refused({.scheme = LayerScheme::Spline, .spline = {V3d(0)}}).find("stands still"),
             std::string::npos);
-  EXPECT_NE(refused({.scheme = LevelScheme::Spline, .spline = {V3d(std::nan(""))}}).find("finite"),
+  EXPECT_NE(refused({.scheme = LayerScheme::Spline, .spline = {V3d(std::nan(""))}}).find("finite"),
             std::string::npos);
   EXPECT_NE(refused({.transform = {.taper = 0}}).find("positive scale"), std::string::npos);
   EXPECT_NE(refused({.transform = {.twist = std::nan("")}}).find("twist"), std::string::npos);
 }
 
-}  // namespace level_schemes_test
+}  // namespace layer_schemes_test

@@ -81,10 +81,10 @@ TEST(Lattice, TetrahedraFillTheirCells) {
   EXPECT_NEAR(world, 4 * 3 * 1.1, 1e-12);
 }
 
-TEST(Lattice, RefinesLevelsOfFewerParticles) {
+TEST(Lattice, RefinesLayersOfFewerParticles) {
   Patch patch = support::patchAt(onCylinder, 17, 9, 3);
   const Patch coarse = support::patchAt(onCylinder, 9, 5, 3);
-  patch.levels[1] = coarse.levels[1];
+  patch.layers[1] = coarse.layers[1];
   const Lattice lattice(patch, {});
   EXPECT_EQ(lattice.nodeCount(), 17u * 9 * 3);
   // On the cylinder to third order, where chords would leave it by 0.02.
@@ -184,7 +184,7 @@ TEST(ShellMap, TellsEveryTetrahedronThatFolds) {
   EXPECT_NEAR(distortion.stretch.most, 2.1 * 3, 0.1);  // along u at the top
 
   Patch turned = sound;
-  std::swap(turned.levels[2].positions[40], turned.levels[2].positions[42]);
+  std::swap(turned.layers[2].positions[40], turned.layers[2].positions[42]);
   const Distortion folds =
       mapping::surveyDistortion(ShellMap(turned, {.sink = 0.1, .rim = 0.1}).samples(), V3d(1));
   EXPECT_GT(folds.folded, 3u);

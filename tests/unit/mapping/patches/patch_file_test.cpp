@@ -17,14 +17,14 @@ namespace patch_file_test {
 
 using Imath::V3d;
 using levelset::InvalidInput;
-using mapping::ParticleLevel;
+using mapping::ParticleLayer;
 using mapping::Patch;
 using mapping::readPatches;
 using mapping::writePatches;
 
 std::vector<Patch> twoPatches() {
   const levelset::NarrowBand ball = support::makeBall(1, 0.1);
-  const mapping::PatchOptions options = {.levels = 2, .spacing = 0.2};
+  const mapping::PatchOptions options = {.layers = 2, .spacing = 0.2};
   return {mapping::makePatch(ball, support::cap(0.6), 0.3, options).patch,
           mapping::makePatch(ball, support::cap(0.4), 0.1, options).patch};
 }
@@ -40,9 +40,9 @@ TEST(PatchFile, KeepsEveryBit) {
     EXPECT_EQ(after[n].height, before[n].height);
     EXPECT_EQ(after[n].mirrored, before[n].mirrored);
     EXPECT_EQ(after[n].spacing, before[n].spacing);
-    ASSERT_EQ(after[n].levels.size(), before[n].levels.size());
-    for (std::size_t k = 0; k < after[n].levels.size(); ++k) {
-      const ParticleLevel &a = after[n].levels[k], &b = before[n].levels[k];
+    ASSERT_EQ(after[n].layers.size(), before[n].layers.size());
+    for (std::size_t k = 0; k < after[n].layers.size(); ++k) {
+      const ParticleLayer &a = after[n].layers[k], &b = before[n].layers[k];
       EXPECT_EQ(a.columns, b.columns);
       EXPECT_EQ(a.rows, b.rows);
       EXPECT_EQ(a.w, b.w);
@@ -101,8 +101,8 @@ TEST(PatchFile, RefusesWhatIsNoPatch) {
     support::writeText(file, broken);
     try {
       for (const Patch& patch : readPatches(file))
-        for (const ParticleLevel& level : patch.levels)
-          EXPECT_EQ(level.positions.size(), level.columns * level.rows);
+        for (const ParticleLayer& layer : patch.layers)
+          EXPECT_EQ(layer.positions.size(), layer.columns * layer.rows);
     } catch (const InvalidInput&) {
     }
   }
@@ -114,12 +114,12 @@ TEST(PatchFile, RefusesWhatIsNoPatch) {
 TEST(PatchFile, WritesNothingHalf) {
   const support::TemporaryFolder folder;
   std::vector<Patch> patches = twoPatches();
-  patches[1].levels[0].positions[3].y = std::numeric_limits<double>::quiet_NaN();
+  patches[1].layers[0].positions[3].y = std::numeric_limits<double>::quiet_NaN();
   const std::filesystem::path file = folder.path() / "old.patch";
   writePatches(file, twoPatches());
   EXPECT_THROW(writePatches(file, patches), InvalidInput);
   patches = twoPatches();
-  patches[0].levels[1].w = std::numeric_limits<double>::infinity();
+  patches[0].layers[1].w = std::numeric_limits<double>::infinity();
   EXPECT_THROW(writePatches(file, patches), InvalidInput);
   // What was there is there still, and nothing else.
   EXPECT_EQ(readPatches(file).size(), 2u);

@@ -15,8 +15,8 @@
 namespace travel_guard_test {
 
 using Imath::V3d;
-using mapping::LevelScheme;
-using mapping::ParticleLevel;
+using mapping::LayerScheme;
+using mapping::ParticleLayer;
 using mapping::Patch;
 using mapping::PatchResult;
 using mapping::TravelGuard;
@@ -99,13 +99,13 @@ TEST(TravelGuard, KeepsASplinesParticlesApartWhereItsPlaneTurnsOnItself) {
                                                           {V3d(-3, -3, -0.5), V3d(3, 3, 0.5)}, 0.1);
   const PatchResult made = mapping::makePatch(
       ground, support::square(1), 2,
-      {.levels = 6,
-       .scheme = LevelScheme::Spline,
+      {.layers = 6,
+       .scheme = LayerScheme::Spline,
        .spline = {V3d(0, 0, 1), V3d(0.14, 0, 1.1), V3d(0.2, 0, 1), V3d(0.2, 0, 0.05)}});
   EXPECT_GT(made.report.slowed, 0u);
-  const double apart = closest(made.patch.levels.front().positions);
-  for (const ParticleLevel& level : made.patch.levels)
-    EXPECT_GE(closest(level.positions), 0.05 * apart * (1 - 1e-9)) << level.w;
+  const double apart = closest(made.patch.layers.front().positions);
+  for (const ParticleLayer& layer : made.patch.layers)
+    EXPECT_GE(closest(layer.positions), 0.05 * apart * (1 - 1e-9)) << layer.w;
 }
 
 }  // namespace travel_guard_test

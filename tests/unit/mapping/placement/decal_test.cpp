@@ -19,14 +19,14 @@ namespace decal_test {
 
 using Imath::V3d;
 using levelset::NarrowBand;
-using mapping::LevelScheme;
+using mapping::LayerScheme;
 using mapping::makeDecal;
-using mapping::ParticleLevel;
+using mapping::ParticleLayer;
 using mapping::PatchOptions;
 using mapping::PatchResult;
 
 constexpr double kPi = std::numbers::pi;
-const PatchOptions kThin = {.levels = 2, .scheme = LevelScheme::Conforming};
+const PatchOptions kThin = {.layers = 2, .scheme = LayerScheme::Conforming};
 
 /// −1 … 1.
 double shareOf(std::size_t i, std::size_t count) {
@@ -35,10 +35,10 @@ double shareOf(std::size_t i, std::size_t count) {
 
 /// Calls visit(u, v, position), u and v from −radius to radius.
 template <typename Visit>
-void forEachParticle(const ParticleLevel& level, double radius, const Visit& visit) {
-  for (std::size_t j = 0; j < level.rows; ++j)
-    for (std::size_t i = 0; i < level.columns; ++i)
-      visit(radius * shareOf(i, level.columns), radius * shareOf(j, level.rows), level.at(i, j));
+void forEachParticle(const ParticleLayer& layer, double radius, const Visit& visit) {
+  for (std::size_t j = 0; j < layer.rows; ++j)
+    for (std::size_t i = 0; i < layer.columns; ++i)
+      visit(radius * shareOf(i, layer.columns), radius * shareOf(j, layer.rows), layer.at(i, j));
 }
 
 NarrowBand slab(double voxel = 0.1) {
@@ -48,10 +48,10 @@ NarrowBand slab(double voxel = 0.1) {
 
 TEST(Decal, IsTheIdentityOnAPlane) {
   const PatchResult result = makeDecal(slab(), V3d(0.2, -0.1, 0.3), V3d(3, 4, 7), 0.7, 0.3,
-                                       {.levels = 3, .scheme = LevelScheme::Conforming});
-  for (const ParticleLevel& level : result.patch.levels)
-    forEachParticle(level, 0.7, [&](double u, double v, const V3d& p) {
-      const V3d exact = V3d(0.2, -0.1, level.height) + V3d(0.6, 0.8, 0) * u + V3d(-0.8, 0.6, 0) * v;
+                                       {.layers = 3, .scheme = LayerScheme::Conforming});
+  for (const ParticleLayer& layer : result.patch.layers)
+    forEachParticle(layer, 0.7, [&](double u, double v, const V3d& p) {
+      const V3d exact = V3d(0.2, -0.1, layer.height) + V3d(0.6, 0.8, 0) * u + V3d(-0.8, 0.6, 0) * v;
       EXPECT_LT((p - exact).length(), 1e-5);
     });
   EXPECT_NEAR(result.report.uLength, 1.4, 1e-12);
@@ -67,7 +67,7 @@ TEST(Decal, KeepsDistancesAndAnglesOnASphere) {
     const PatchResult result = makeDecal(ball, at, direction, radius, 0.2, kThin);
     const V3d u = direction.normalized(), v = at.cross(u);
     double distance = 0, angle = 0;
-    forEachParticle(result.patch.levels.front(), radius, [&](double x, double y, const V3d& p) {
+    forEachParticle(result.patch.layers.front(), radius, [&](double x, double y, const V3d& p) {
       const double length = std::hypot(x, y);
       if (length < 1e-9) return;
       distance = std::max(distance, std::abs(std::acos(p.dot(at)) / length - 1));
@@ -84,7 +84,7 @@ TEST(Decal, UnrollsACylinder) {
                                               {V3d(-1, -1, -4), V3d(1, 1, 4)}, 0.1);
   const double c = std::cos(0.3), s = std::sin(0.3);
   const PatchResult result = makeDecal(pipe, V3d(1, 0, 0), V3d(0.4, c, s), 2.2, 0.2, kThin);
-  forEachParticle(result.patch.levels.front(), 2.2, [&](double u, double v, const V3d& p) {
+  forEachParticle(result.patch.layers.front(), 2.2, [&](double u, double v, const V3d& p) {
     const double around = u * c - v * s, along = u * s + v * c;
     EXPECT_LT((p - V3d(std::cos(around), std::sin(around), along)).length(), 0.005);
   });
@@ -100,9 +100,9 @@ TEST(Decal, UnfoldsAnEdge) {
   const double c = std::cos(0.5), s = std::sin(0.5);
   const PatchResult result =
       makeDecal(roof, at, up * c + V3d(0, s, 0), radius, 0.2,
-                {.levels = 2, .scheme = LevelScheme::Spline, .spacing = 0.1});
+                {.layers = 2, .scheme = LayerScheme::Spline, .spacing = 0.1});
   double worst = 0;
-  forEachParticle(result.patch.levels.front(), radius, [&](double u, double v, const V3d& p) {
+  forEachParticle(result.patch.layers.front(), radius, [&](double u, double v, const V3d& p) {
     const double across = u * c - v * s, along = u * s + v * c;
     const double beyond = across - away;
     V3d exact = at + up * across + V3d(0, along, 0);
@@ -121,14 +121,14 @@ TEST(Decal, CarriesItsFrameByTheLeastTurn) {
   EXPECT_LT((mapping::carried(x, z, z) - x).length(), 1e-12);
 }
 
-TEST(Decal, LevelsOfReducedDistortionGrowWithTheSurface) {
+TEST(Decal, LayersOfReducedDistortionGrowWithTheSurface) {
   const NarrowBand ball = support::makeBall(1, 0.05, 16);
-  const PatchResult result = makeDecal(ball, V3d(0, 0, 1), V3d(1, 0, 0), 0.6, 0.5, {.levels = 3});
-  ASSERT_EQ(result.patch.levels.size(), 3u);
-  for (const ParticleLevel& level : result.patch.levels) {
-    EXPECT_NEAR(level.height, 0.5 * level.w, 1e-12);
-    const double r = 1 + level.height;
-    forEachParticle(level, 0.6 * r, [&](double u, double v, const V3d& p) {
+  const PatchResult result = makeDecal(ball, V3d(0, 0, 1), V3d(1, 0, 0), 0.6, 0.5, {.layers = 3});
+  ASSERT_EQ(result.patch.layers.size(), 3u);
+  for (const ParticleLayer& layer : result.patch.layers) {
+    EXPECT_NEAR(layer.height, 0.5 * layer.w, 1e-12);
+    const double r = 1 + layer.height;
+    forEachParticle(layer, 0.6 * r, [&](double u, double v, const V3d& p) {
       const double length = std::hypot(u, v);
       EXPECT_NEAR(p.length(), r, 0.01 * 0.05);
       EXPECT_NEAR(std::acos(std::min(1.0, p.z / p.length())) * r, length, 0.003 * r);
@@ -142,18 +142,18 @@ TEST(Decal, MirroredRunsTheOtherWayRound) {
   options.mirror = true;
   const PatchResult mirrored = makeDecal(slab(), V3d(0), V3d(1, 0, 0), 0.6, 0.3, options);
   EXPECT_TRUE(mirrored.patch.mirrored);
-  const ParticleLevel &a = straight.patch.levels[0], &b = mirrored.patch.levels[0];
+  const ParticleLayer &a = straight.patch.layers[0], &b = mirrored.patch.layers[0];
   EXPECT_LT((a.at(0, 0) - b.at(0, b.rows - 1)).length(), 1e-9);
 }
 
 TEST(Decal, CarriesMapsLikeAnyPatch) {
   const PatchResult result = makeDecal(support::makeBall(1, 0.05, 12), V3d(0, 0, 1), V3d(1, 0, 0),
-                                       0.5, 0.3, {.levels = 4, .spacing = 0.1});
+                                       0.5, 0.3, {.layers = 4, .spacing = 0.1});
   const mapping::ShellMap map(result.patch, {});
-  const ParticleLevel& level = result.patch.levels[1];
-  forEachParticle(level, 1, [&](double u, double v, const V3d& p) {
+  const ParticleLayer& layer = result.patch.layers[1];
+  forEachParticle(layer, 1, [&](double u, double v, const V3d& p) {
     if (std::max(std::abs(u), std::abs(v)) > 0.99) return;  // the border belongs to two cells
-    EXPECT_LT((map(p) - V3d((u + 1) / 2, (v + 1) / 2, level.w)).length(), 1e-6);
+    EXPECT_LT((map(p) - V3d((u + 1) / 2, (v + 1) / 2, layer.w)).length(), 1e-6);
   });
 }
 
@@ -162,17 +162,17 @@ TEST(Decal, GivesTheSameBitsForAnyNumberOfThreads) {
   const auto make = [&] { return makeDecal(ball, V3d(0, 0, 1), V3d(1, 1, 0), 0.8, 0.2, kThin); };
   const PatchResult many = support::onThreads(8, make);
   const PatchResult one = support::onThreads(1, make);
-  EXPECT_EQ(many.patch.levels[1].positions, one.patch.levels[1].positions);
-  EXPECT_EQ(many.patch.levels[1].rim, one.patch.levels[1].rim);
+  EXPECT_EQ(many.patch.layers[1].positions, one.patch.layers[1].positions);
+  EXPECT_EQ(many.patch.layers[1].rim, one.patch.layers[1].rim);
 }
 
 TEST(Decal, LiesFarFromTheOriginAsItDoesThere) {
   const V3d away(1e6, -1e6, 1e6);
   const NarrowBand near = levelset::makeSphere(10, V3d(0), 1),
                    far = levelset::makeSphere(10, away, 1);
-  const ParticleLevel a = makeDecal(near, V3d(0, 0, 10), V3d(1, 0, 0), 9, 2, kThin).patch.levels[0];
-  const ParticleLevel b =
-      makeDecal(far, away + V3d(0, 0, 10), V3d(1, 0, 0), 9, 2, kThin).patch.levels[0];
+  const ParticleLayer a = makeDecal(near, V3d(0, 0, 10), V3d(1, 0, 0), 9, 2, kThin).patch.layers[0];
+  const ParticleLayer b =
+      makeDecal(far, away + V3d(0, 0, 10), V3d(1, 0, 0), 9, 2, kThin).patch.layers[0];
   ASSERT_EQ(a.positions.size(), b.positions.size());
   for (std::size_t n = 0; n < a.positions.size(); ++n)
     EXPECT_LT((b.positions[n] - away - a.positions[n]).length(), 1e-5);
@@ -254,15 +254,15 @@ TEST(Decal, GoesAroundAnEarThatItsParticlesResolve) {
       {V3d(-2, -1.5, -half), V3d(1.2, 1.5, half)}, voxel);
   const V3d at(0.6, 0, half), x(1, 0, 0);
   const PatchResult fine = makeDecal(
-      plate, at, x, 1.2, 0.05, {.levels = 2, .scheme = LevelScheme::Conforming, .spacing = 0.06});
-  const ParticleLevel& level = fine.patch.levels.front();
-  const V3d end = level.at(level.columns - 1, level.rows / 2);
+      plate, at, x, 1.2, 0.05, {.layers = 2, .scheme = LayerScheme::Conforming, .spacing = 0.06});
+  const ParticleLayer& layer = fine.patch.layers.front();
+  const V3d end = layer.at(layer.columns - 1, layer.rows / 2);
   // 0.4 to the edge, half a circle around it, the rest back below.
   EXPECT_NEAR(end.z, -half, 0.01);
   EXPECT_NEAR(end.x, 1 - (1.2 - 0.4 - kPi * half), 0.01);
   const std::string coarse = support::refusal<levelset::Error>([&] {
     (void)makeDecal(plate, at, x, 1, 0.05,
-                    {.levels = 2, .scheme = LevelScheme::Conforming, .spacing = 0.5});
+                    {.layers = 2, .scheme = LayerScheme::Conforming, .spacing = 0.5});
   });
   EXPECT_NE(coarse.find("thinner than its particles are apart"), std::string::npos) << coarse;
 }

@@ -30,7 +30,7 @@ constexpr double kVoxel = 0.1, kRadius = 3;
 Patch patchAt(const NarrowBand& ball, double angle, double side = 1) {
   const V3d place(kRadius * std::cos(angle), kRadius * std::sin(angle), 0);
   const auto corners = mapping::cornersAround(ball, place, side, side);
-  return mapping::makePatch(ball, corners, 0.6, {.levels = 3}).patch;
+  return mapping::makePatch(ball, corners, 0.6, {.layers = 3}).patch;
 }
 
 NarrowBand stud() {

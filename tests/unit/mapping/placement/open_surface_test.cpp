@@ -25,7 +25,7 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 using levelset::TriMesh;
 using mapping::makePatch;
-using mapping::ParticleLevel;
+using mapping::ParticleLayer;
 using mapping::Patch;
 using support::patchMesh;
 using support::refusal;
@@ -51,16 +51,16 @@ TEST(OpenSurface, PatchOnAPlaneIsThatOnABox) {
   const NarrowBand box = levelset::makeBox(V3d(4, 4, 2), V3d(0, 0, -1), kVoxel);
   const std::array<V3d, 4> corners = {V3d(-1, -0.7, 0.02), V3d(1.1, -0.5, 0), V3d(0.9, 0.8, 0),
                                       V3d(-1, 0.5, 0)};
-  for (const auto scheme : {mapping::LevelScheme::Reduced, mapping::LevelScheme::Conforming,
-                            mapping::LevelScheme::Spline}) {
-    const mapping::PatchOptions options = {.levels = 3, .scheme = scheme, .spacing = 0.3};
+  for (const auto scheme : {mapping::LayerScheme::Reduced, mapping::LayerScheme::Conforming,
+                            mapping::LayerScheme::Spline}) {
+    const mapping::PatchOptions options = {.layers = 3, .scheme = scheme, .spacing = 0.3};
     const Patch patch = makePatch(plane(), corners, 0.5, options).patch;
     const Patch truth = makePatch(box, corners, 0.5, options).patch;
-    ASSERT_EQ(patch.levels.size(), truth.levels.size());
-    for (std::size_t k = 0; k < patch.levels.size(); ++k) {
-      ASSERT_EQ(patch.levels[k].positions.size(), truth.levels[k].positions.size());
-      for (std::size_t n = 0; n < patch.levels[k].positions.size(); ++n)
-        EXPECT_LT((patch.levels[k].positions[n] - truth.levels[k].positions[n]).length(),
+    ASSERT_EQ(patch.layers.size(), truth.layers.size());
+    for (std::size_t k = 0; k < patch.layers.size(); ++k) {
+      ASSERT_EQ(patch.layers[k].positions.size(), truth.layers[k].positions.size());
+      for (std::size_t n = 0; n < patch.layers[k].positions.size(); ++n)
+        EXPECT_LT((patch.layers[k].positions[n] - truth.layers[k].positions[n]).length(),
                   0.02 * kVoxel);
     }
   }
@@ -75,7 +75,7 @@ TriMesh halfCylinder(double radius, double length) {
 }
 
 TEST(OpenSurface, PatchOnHalfACylinderIsExact) {
-  // Chords of 200 cells: a sagitta of 6e-5. Rows run around, columns along, levels out.
+  // Chords of 200 cells: a sagitta of 6e-5. Rows run around, columns along, layers out.
   const double radius = 2, height = 0.6, arc = 0.9;
   const NarrowBand band =
       levelset::surfaceBand(halfCylinder(radius, 4), kVoxel, {.halfWidth = 13}).band;
@@ -83,25 +83,25 @@ TEST(OpenSurface, PatchOnHalfACylinderIsExact) {
     return V3d(radius * std::sin(a), y, radius * std::cos(a));
   };
   const Patch patch =
-      makePatch(band, {at(-arc, -1), at(arc, -1), at(arc, 1), at(-arc, 1)}, height, {.levels = 4})
+      makePatch(band, {at(-arc, -1), at(arc, -1), at(arc, 1), at(-arc, 1)}, height, {.layers = 4})
           .patch;
-  for (const ParticleLevel& level : patch.levels)
-    for (std::size_t j = 0; j < level.rows; ++j)
-      for (std::size_t i = 0; i < level.columns; ++i) {
-        const V3d p = level.at(i, j);
-        const double u = static_cast<double>(i) / static_cast<double>(level.columns - 1),
-                     v = static_cast<double>(j) / static_cast<double>(level.rows - 1);
+  for (const ParticleLayer& layer : patch.layers)
+    for (std::size_t j = 0; j < layer.rows; ++j)
+      for (std::size_t i = 0; i < layer.columns; ++i) {
+        const V3d p = layer.at(i, j);
+        const double u = static_cast<double>(i) / static_cast<double>(layer.columns - 1),
+                     v = static_cast<double>(j) / static_cast<double>(layer.rows - 1);
         const double r = std::hypot(p.x, p.z);
-        EXPECT_NEAR(r, radius + level.w * height, 0.005 * height);
+        EXPECT_NEAR(r, radius + layer.w * height, 0.005 * height);
         EXPECT_NEAR(std::atan2(p.x, p.z) * r, arc * (2 * u - 1) * r, 0.005 * height);
         EXPECT_NEAR(p.y, 2 * v - 1, 0.005 * height);
       }
 }
 
 TEST(OpenSurface, PatchesMayEndAtTheBorder) {
-  const Patch patch = makePatch(plane(), square(2), 0.5, {.levels = 2}).patch;
-  for (const ParticleLevel& level : patch.levels)
-    for (const V3d& p : level.positions) EXPECT_NEAR(p.z, level.height, 0.01 * kVoxel);
+  const Patch patch = makePatch(plane(), square(2), 0.5, {.layers = 2}).patch;
+  for (const ParticleLayer& layer : patch.layers)
+    for (const V3d& p : layer.positions) EXPECT_NEAR(p.z, layer.height, 0.01 * kVoxel);
 }
 
 TEST(OpenSurface, PatchesOverTheBorderAreRefusedWithThePlace) {
@@ -119,7 +119,7 @@ TEST(OpenSurface, PatchesOverTheBorderAreRefusedWithThePlace) {
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)makePatch(plane(2, 8), square(1), 0.9); }),
               "surface-band --half-width 15");
   // A spline needs no distances above the surface.
-  EXPECT_GT(makePatch(plane(2, 5), square(1), 3, {.scheme = mapping::LevelScheme::Spline})
+  EXPECT_GT(makePatch(plane(2, 5), square(1), 3, {.scheme = mapping::LayerScheme::Spline})
                 .patch.particleCount(),
             0u);
 }
@@ -150,7 +150,7 @@ TEST(OpenSurface, PatchesOverASlitAreRefused) {
       append(halves, half);
     }
     const NarrowBand band = levelset::surfaceBand(halves, kVoxel, {.halfWidth = 8}).band;
-    const mapping::PatchOptions options = {.scheme = mapping::LevelScheme::Spline};
+    const mapping::PatchOptions options = {.scheme = mapping::LayerScheme::Spline};
     const auto over = [&](double x) {
       std::array<V3d, 4> corners = square(0.5);
       for (V3d& p : corners) p = V3d(p.x + x, p.y, p.y);
@@ -169,12 +169,12 @@ TEST(OpenSurface, PatchesMayEndAtTheCornersOfTiltedSheets) {
   for (V3d& p : sheet.positions) p = p * turn + shift;
   for (V3d& p : corners) p = p * turn + shift;
   const NarrowBand band = levelset::surfaceBand(sheet, kVoxel, {.halfWidth = 9}).band;
-  const Patch patch = makePatch(band, corners, 0.3, {.levels = 2}).patch;
+  const Patch patch = makePatch(band, corners, 0.3, {.layers = 2}).patch;
   V3d normal;
   turn.multDirMatrix(V3d(0, 0, 1), normal);
-  for (const ParticleLevel& level : patch.levels)
-    for (const V3d& p : level.positions)
-      EXPECT_NEAR((p - shift).dot(normal), level.height, 0.01 * kVoxel);
+  for (const ParticleLayer& layer : patch.layers)
+    for (const V3d& p : layer.positions)
+      EXPECT_NEAR((p - shift).dot(normal), layer.height, 0.01 * kVoxel);
 }
 
 TEST(OpenSurface, ClosestPointsLieWithin) {
@@ -191,7 +191,7 @@ TEST(OpenSurface, ClosestPointsLieWithin) {
 
 TEST(OpenSurface, TexturesStandOnIt) {
   const NarrowBand band = plane();
-  const Patch patch = makePatch(band, square(1), 0.5, {.levels = 2, .spacing = 0.4}).patch;
+  const Patch patch = makePatch(band, square(1), 0.5, {.layers = 2, .spacing = 0.4}).patch;
   const NarrowBand ball = support::makeBall(1, kVoxel);
   const NarrowBand alone =
       mapping::mapTexture(band, ball, patch, {.merge = mapping::TextureMerge::Alone}).band;
@@ -217,13 +217,13 @@ TEST(OpenSurface, TreesStandOnTerrain) {
   options.density.count = 12;
   options.density.seed = 7;
   options.uSize = options.vSize = 0.5;
-  options.patch.levels = 3;
+  options.patch.layers = 3;
   options.patch.spacing = 0.15;
-  options.patch.scheme = mapping::LevelScheme::Spline;
+  options.patch.scheme = mapping::LayerScheme::Spline;
   const mapping::ScatterResult forest = mapping::scatter(band, 1, options);
   ASSERT_EQ(forest.patches.size(), 12u);
   for (const Patch& patch : forest.patches)
-    for (const V3d& p : patch.levels.front().positions) {
+    for (const V3d& p : patch.layers.front().positions) {
       EXPECT_LE(std::max(std::abs(p.x), std::abs(p.y)), 4 + kVoxel);
       // Facets of 0.1 by 0.1 on curvatures of up to 0.7: a sagitta of up to 0.002. Beyond the
       // border the hills go on straight.
@@ -274,12 +274,12 @@ TEST(OpenSurface, TilesGoAroundAPipe) {
   });
   const NarrowBand band = levelset::surfaceBand(pipe, kVoxel, {.halfWidth = 10}).band;
   const mapping::PatchGridResult grid = mapping::makePatchGridAround(
-      band, V3d(0, 0, -1), V3d(0, 0, 1), 0, 0.3, {.columns = 4, .rows = 2}, {.levels = 2});
+      band, V3d(0, 0, -1), V3d(0, 0, 1), 0, 0.3, {.columns = 4, .rows = 2}, {.layers = 2});
   ASSERT_EQ(grid.patches.size(), 8u);
   for (const Patch& tile : grid.patches)
-    for (const ParticleLevel& level : tile.levels)
-      for (const V3d& p : level.positions)
-        EXPECT_NEAR(std::hypot(p.x, p.y), 1 + level.height, 0.02 * kVoxel);
+    for (const ParticleLayer& layer : tile.layers)
+      for (const V3d& p : layer.positions)
+        EXPECT_NEAR(std::hypot(p.x, p.y), 1 + layer.height, 0.02 * kVoxel);
 }
 
 }  // namespace open_surface_test

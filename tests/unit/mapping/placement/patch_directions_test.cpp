@@ -14,9 +14,9 @@ namespace patch_directions_test {
 
 using Imath::V3d;
 using levelset::UsageError;
-using mapping::LevelScheme;
+using mapping::LayerScheme;
 using mapping::makePatch;
-using mapping::ParticleLevel;
+using mapping::ParticleLayer;
 using mapping::Patch;
 using mapping::PatchOptions;
 
@@ -31,18 +31,18 @@ std::array<V3d, 4> corners() {
   return support::square(side, up);
 }
 
-std::array<V3d, 4> cornersOf(const ParticleLevel& level) {
-  return {level.at(0, 0), level.at(level.columns - 1, 0),
-          level.at(level.columns - 1, level.rows - 1), level.at(0, level.rows - 1)};
+std::array<V3d, 4> cornersOf(const ParticleLayer& layer) {
+  return {layer.at(0, 0), layer.at(layer.columns - 1, 0),
+          layer.at(layer.columns - 1, layer.rows - 1), layer.at(0, layer.rows - 1)};
 }
 
 void expectCornersRise(const Patch& patch, const std::array<V3d, 4>& directions) {
-  for (const ParticleLevel& level : patch.levels) {
-    const std::array<V3d, 4> at = cornersOf(level);
+  for (const ParticleLayer& layer : patch.layers) {
+    const std::array<V3d, 4> at = cornersOf(layer);
     for (std::size_t i = 0; i < 4; ++i) {
-      EXPECT_NEAR(at[i].length(), 1 + level.height, 2e-3 * kHeight) << i;
+      EXPECT_NEAR(at[i].length(), 1 + layer.height, 2e-3 * kHeight) << i;
       const V3d way = at[i] - patch.corners[i], unit = directions[i].normalized();
-      EXPECT_LE((way - unit * way.dot(unit)).length(), 1e-4) << i << " at " << level.height;
+      EXPECT_LE((way - unit * way.dot(unit)).length(), 1e-4) << i << " at " << layer.height;
     }
   }
 }
@@ -51,11 +51,11 @@ TEST(PatchDirections, ParallelCornersRiseAlongTheMiddlesNormal) {
   const Patch patch = makePatch(ball(), corners(), kHeight, {.parallel = true}).patch;
   const V3d up(0, 0, 1);
   expectCornersRise(patch, {up, up, up, up});
-  // The levels do not spread: their corners stay above each other, where by themselves they would
+  // The layers do not spread: their corners stay above each other, where by themselves they would
   // be 1.4 times as far apart.
   const Patch spread = makePatch(ball(), corners(), kHeight).patch;
   const auto width = [](const Patch& p) {
-    const std::array<V3d, 4> at = cornersOf(p.levels.back());
+    const std::array<V3d, 4> at = cornersOf(p.layers.back());
     return (at[1] - at[0]).length();
   };
   EXPECT_NEAR(width(patch), 1, 2e-3);
@@ -78,11 +78,11 @@ TEST(PatchDirections, ShearAPlane) {
                                                          {V3d(-2, -2, -0.5), V3d(2, 2, 0.5)}, 0.1);
   const Patch patch =
       makePatch(plane, support::square(0.5), 0.8, {.directions = {V3d(0.5, 0, 1)}}).patch;
-  const ParticleLevel& ground = patch.levels.front();
-  for (const ParticleLevel& level : patch.levels) {
-    ASSERT_EQ(level.columns, ground.columns);
-    for (std::size_t n = 0; n < level.positions.size(); ++n)
-      EXPECT_LE((level.positions[n] - ground.positions[n] - V3d(0.5, 0, 1) * level.height).length(),
+  const ParticleLayer& ground = patch.layers.front();
+  for (const ParticleLayer& layer : patch.layers) {
+    ASSERT_EQ(layer.columns, ground.columns);
+    for (std::size_t n = 0; n < layer.positions.size(); ++n)
+      EXPECT_LE((layer.positions[n] - ground.positions[n] - V3d(0.5, 0, 1) * layer.height).length(),
                 2e-3);
   }
 }
@@ -91,7 +91,7 @@ TEST(PatchDirections, TakePointsOnTheSidesAlong) {
   PatchOptions options{.parallel = true};
   options.sides[0] = {V3d(0, -0.75, std::sqrt(1 - 0.75 * 0.75))};
   const Patch patch = makePatch(ball(), corners(), kHeight, options).patch;
-  const ParticleLevel& top = patch.levels.back();
+  const ParticleLayer& top = patch.layers.back();
   double nearest = HUGE_VAL;
   for (std::size_t i = 0; i < top.columns; ++i)
     nearest = std::min(nearest, std::hypot(top.at(i, 0).x, top.at(i, 0).y + 0.75));
@@ -109,7 +109,7 @@ TEST(PatchDirections, RefuseWhatLeadsNowhere) {
   EXPECT_NE(refusal({.directions = {V3d(0, 0, 1), V3d(0, 0, 1)}}).find("four"), std::string::npos);
   EXPECT_NE(refusal({.directions = {V3d(0, 0, 1)}, .parallel = true}).find("choose one"),
             std::string::npos);
-  EXPECT_NE(refusal({.scheme = LevelScheme::Conforming, .parallel = true}).find("reduced"),
+  EXPECT_NE(refusal({.scheme = LayerScheme::Conforming, .parallel = true}).find("reduced"),
             std::string::npos);
 }
 

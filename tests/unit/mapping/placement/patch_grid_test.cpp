@@ -16,10 +16,10 @@ namespace patch_grid_test {
 
 using Imath::V3d;
 using levelset::NarrowBand;
-using mapping::LevelScheme;
+using mapping::LayerScheme;
 using mapping::makePatchGrid;
 using mapping::makePatchGridAround;
-using mapping::ParticleLevel;
+using mapping::ParticleLayer;
 using mapping::Patch;
 using mapping::PatchGridResult;
 
@@ -34,12 +34,12 @@ NarrowBand pipe() {
   return levelset::makeCylinder(1, 4, V3d(0), V3d(0, 0, 1), 0.1, {.halfWidth = 8});
 }
 
-/// Borders on all levels: the right one of `a` is the left one of `b`, to the bit, and each rim
+/// Borders on all layers: the right one of `a` is the left one of `b`, to the bit, and each rim
 /// lies on the other's particles.
 void expectSameSeam(const Patch& a, const Patch& b) {
-  ASSERT_EQ(a.levels.size(), b.levels.size());
-  for (std::size_t k = 0; k < a.levels.size(); ++k) {
-    const ParticleLevel &left = a.levels[k], &right = b.levels[k];
+  ASSERT_EQ(a.layers.size(), b.layers.size());
+  for (std::size_t k = 0; k < a.layers.size(); ++k) {
+    const ParticleLayer &left = a.layers[k], &right = b.layers[k];
     ASSERT_EQ(left.rows, right.rows);
     const auto last = static_cast<int>(left.columns) - 1;
     for (int j = -1; j <= static_cast<int>(left.rows); ++j) {
@@ -51,15 +51,15 @@ void expectSameSeam(const Patch& a, const Patch& b) {
 }
 
 void expectSameBorderAbove(const Patch& low, const Patch& high) {
-  for (std::size_t k = 0; k < low.levels.size(); ++k)
-    for (std::size_t i = 0; i < low.levels[k].columns; ++i)
-      EXPECT_EQ(low.levels[k].at(i, low.levels[k].rows - 1), high.levels[k].at(i, 0));
+  for (std::size_t k = 0; k < low.layers.size(); ++k)
+    for (std::size_t i = 0; i < low.layers[k].columns; ++i)
+      EXPECT_EQ(low.layers[k].at(i, low.layers[k].rows - 1), high.layers[k].at(i, 0));
 }
 
 TEST(PatchGrid, TilesAPlaneEvenly) {
   const PatchGridResult grid =
       makePatchGrid(slab(), {V3d(-1.5, -1, 0), V3d(1.5, -1, 0), V3d(1.5, 1, 0), V3d(-1.5, 1, 0)},
-                    0.3, {.columns = 3, .rows = 2}, {.levels = 3});
+                    0.3, {.columns = 3, .rows = 2}, {.layers = 3});
   ASSERT_EQ(grid.patches.size(), 6u);
   for (std::size_t n = 0; n < 6; ++n) {
     const double x = -1.5 + static_cast<double>(n % 3), y = -1 + static_cast<double>(n / 3);
@@ -73,10 +73,10 @@ TEST(PatchGrid, TilesAPlaneEvenly) {
 }
 
 TEST(PatchGrid, NeighboursShareTheirBorders) {
-  for (const LevelScheme scheme : {LevelScheme::Reduced, LevelScheme::Conforming}) {
+  for (const LayerScheme scheme : {LayerScheme::Reduced, LayerScheme::Conforming}) {
     const PatchGridResult grid =
         makePatchGrid(support::makeBall(1, 0.05, 12), support::cap(0.7), 0.3,
-                      {.columns = 2, .rows = 2}, {.levels = 3, .scheme = scheme});
+                      {.columns = 2, .rows = 2}, {.layers = 3, .scheme = scheme});
     ASSERT_EQ(grid.patches.size(), 4u);
     expectSameSeam(grid.patches[0], grid.patches[1]);
     expectSameSeam(grid.patches[2], grid.patches[3]);
@@ -88,9 +88,9 @@ TEST(PatchGrid, NeighboursShareTheirBorders) {
 TEST(PatchGrid, MirroredTilesRunBackAndForth) {
   const PatchGridResult grid =
       makePatchGrid(slab(), support::square(1), 0.3,
-                    {.columns = 2, .rows = 2, .mirrorU = true, .mirrorV = true}, {.levels = 2});
-  const ParticleLevel &first = grid.patches[0].levels[0], &second = grid.patches[1].levels[0],
-                      &above = grid.patches[2].levels[0];
+                    {.columns = 2, .rows = 2, .mirrorU = true, .mirrorV = true}, {.layers = 2});
+  const ParticleLayer &first = grid.patches[0].layers[0], &second = grid.patches[1].layers[0],
+                      &above = grid.patches[2].layers[0];
   const std::size_t last = first.columns - 1, top = first.rows - 1;
   for (std::size_t j = 0; j <= top; ++j) EXPECT_EQ(first.at(last, j), second.at(last, j));
   for (std::size_t i = 0; i <= last; ++i) EXPECT_EQ(first.at(i, top), above.at(i, top));
@@ -105,17 +105,17 @@ TEST(PatchGrid, MirroredTilesRunBackAndForth) {
 TEST(PatchGrid, ShiftedRowsOfAnOpenGridHaveOneTileLess) {
   const PatchGridResult grid =
       makePatchGrid(slab(), support::square(1), 0.3, {.columns = 4, .rows = 2, .shift = 0.5},
-                    {.levels = 2, .cells = {4, 4}});
+                    {.layers = 2, .cells = {4, 4}});
   ASSERT_EQ(grid.patches.size(), 7u);
   EXPECT_NEAR(grid.patches[4].corners[0].x, -0.75, 1e-4);
   EXPECT_NEAR(grid.patches[6].corners[1].x, 0.75, 1e-4);
 }
 
 TEST(PatchGrid, ClosesAroundACylinder) {
-  for (const LevelScheme scheme : {LevelScheme::Conforming, LevelScheme::Reduced}) {
+  for (const LayerScheme scheme : {LayerScheme::Conforming, LayerScheme::Reduced}) {
     const PatchGridResult grid =
         makePatchGridAround(pipe(), V3d(0, 0, -1), V3d(0, 0, 1), 0, 0.4, {.columns = 8, .rows = 2},
-                            {.levels = 3, .scheme = scheme});
+                            {.layers = 3, .scheme = scheme});
     ASSERT_EQ(grid.patches.size(), 16u);
     for (std::size_t n = 0; n < 8; ++n) {
       expectSameSeam(grid.patches[n], grid.patches[(n + 1) % 8]);
@@ -123,9 +123,9 @@ TEST(PatchGrid, ClosesAroundACylinder) {
       const double angle = kPi / 4 * static_cast<double>(n);
       EXPECT_LT((grid.patches[n].corners[0] - V3d(std::cos(angle), std::sin(angle), -1)).length(),
                 0.005);
-      for (const ParticleLevel& level : grid.patches[n].levels)
-        for (const V3d& p : level.positions)
-          EXPECT_NEAR(std::hypot(p.x, p.y), 1 + level.height, 0.005);
+      for (const ParticleLayer& layer : grid.patches[n].layers)
+        for (const V3d& p : layer.positions)
+          EXPECT_NEAR(std::hypot(p.x, p.y), 1 + layer.height, 0.005);
     }
     EXPECT_NEAR(grid.report.uLength, 2 * kPi, 0.02);
     EXPECT_NEAR(grid.report.vLength, 2, 0.005);
@@ -144,12 +144,12 @@ TEST(PatchGrid, GoesAroundAVaseAndShiftsRowsLikeBricks) {
       {V3d(-2), V3d(2)}, 0.1, 4);
   const PatchGridResult grid = makePatchGridAround(
       vase, along * -1.2, along * 1.2, 0.3, 0.1, {.columns = 6, .rows = 2, .shift = 0.5},
-      {.levels = 2, .scheme = LevelScheme::Conforming, .cells = {6, 8}});
+      {.layers = 2, .scheme = LayerScheme::Conforming, .cells = {6, 8}});
   ASSERT_EQ(grid.patches.size(), 12u);
   for (std::size_t n = 0; n < 6; ++n) {
     expectSameSeam(grid.patches[6 + n], grid.patches[6 + (n + 1) % 6]);
     // A shifted tile begins in the middle of the one below.
-    const ParticleLevel &low = grid.patches[n].levels[0], &high = grid.patches[6 + n].levels[0];
+    const ParticleLayer &low = grid.patches[n].layers[0], &high = grid.patches[6 + n].layers[0];
     for (std::size_t i = 0; i <= 3; ++i) EXPECT_EQ(high.at(i, 0), low.at(i + 3, low.rows - 1));
     for (const V3d& p : low.positions)
       EXPECT_NEAR((p - along * p.dot(along)).length(), 0.7 + 0.2 * std::cos(2 * p.dot(along)),
@@ -180,7 +180,7 @@ TEST(PatchGrid, RefusesWhatMakesNoGrid) {
   EXPECT_THROW((void)makePatchGridAround(round, low, V3d(NAN), 0, 0.1, {.columns = 4}),
                levelset::UsageError);
   EXPECT_THROW((void)makePatchGridAround(round, low, high, 0, 0.1, {.columns = 4},
-                                         {.scheme = LevelScheme::Spline}),
+                                         {.scheme = LayerScheme::Spline}),
                levelset::UsageError);
   // Beyond the ends of the cylinder there is nothing, and beside it neither.
   EXPECT_THROW((void)makePatchGridAround(round, low, V3d(0, 0, 3), 0, 0.1, {.columns = 4}),
@@ -194,9 +194,9 @@ TEST(PatchGrid, RefusesWhatMakesNoGrid) {
 
 TEST(PatchMesh, OfAShellIsClosedAndHoldsThePatchsVolume) {
   const auto patch = mapping::makePatch(support::makeBall(1, 0.05, 16), support::cap(0.6), 0.5,
-                                        {.levels = 4, .spacing = 0.08})
+                                        {.layers = 4, .spacing = 0.08})
                          .patch;
-  ASSERT_NE(patch.levels.front().columns, patch.levels.back().columns);
+  ASSERT_NE(patch.layers.front().columns, patch.layers.back().columns);
   const levelset::TriMesh mesh = mapping::patchMesh(patch);
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
   for (const auto& t : mesh.triangles)
@@ -217,15 +217,15 @@ TEST(PatchMesh, OfAShellIsClosedAndHoldsThePatchsVolume) {
 }
 
 TEST(PatchMesh, OfSheetsHasEveryCell) {
-  const auto patch = mapping::makePatch(slab(), support::square(1), 0.3, {.levels = 3}).patch;
+  const auto patch = mapping::makePatch(slab(), support::square(1), 0.3, {.layers = 3}).patch;
   const levelset::TriMesh mesh = mapping::patchMesh(patch, mapping::PatchMeshKind::Sheets);
   EXPECT_NEAR(levelset::surfaceArea(mesh), 3 * 4, 1e-3);
   std::size_t cells = 0;
-  for (const ParticleLevel& level : patch.levels) cells += (level.columns - 1) * (level.rows - 1);
+  for (const ParticleLayer& layer : patch.layers) cells += (layer.columns - 1) * (layer.rows - 1);
   EXPECT_EQ(mesh.triangles.size(), 2 * cells);
   const auto mirrored =
       mapping::makePatch(slab(), {V3d(-1, -1, 0), V3d(-1, 1, 0), V3d(1, 1, 0), V3d(1, -1, 0)}, 0.3,
-                         {.levels = 3, .mirror = true})
+                         {.layers = 3, .mirror = true})
           .patch;
   EXPECT_NEAR(levelset::signedVolume(mapping::patchMesh(mirrored)), 4 * 0.3, 1e-3);
 }

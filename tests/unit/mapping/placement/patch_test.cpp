@@ -19,7 +19,7 @@ namespace patch_test {
 using Imath::V3d;
 using levelset::NarrowBand;
 using mapping::makePatch;
-using mapping::ParticleLevel;
+using mapping::ParticleLayer;
 using mapping::PatchResult;
 using support::cap;
 
@@ -43,18 +43,18 @@ NarrowBand slab(double reach = 1) {
 TEST(Patch, IsALatticeOnAPlane) {
   const PatchResult result =
       makePatch(slab(), {V3d(-1, -0.5, 0), V3d(1, -0.5, 0), V3d(1, 0.5, 0), V3d(-1, 0.5, 0)}, 0.6,
-                {.levels = 4});
-  ASSERT_EQ(result.patch.levels.size(), 4u);
-  for (const ParticleLevel& level : result.patch.levels) {
-    EXPECT_NEAR(level.height, 0.6 * level.w, 1e-12);
-    for (std::size_t j = 0; j < level.rows; ++j)
-      for (std::size_t i = 0; i < level.columns; ++i) {
-        const V3d p = level.at(i, j);
-        EXPECT_NEAR(p.x, -1 + 2.0 * static_cast<double>(i) / static_cast<double>(level.columns - 1),
+                {.layers = 4});
+  ASSERT_EQ(result.patch.layers.size(), 4u);
+  for (const ParticleLayer& layer : result.patch.layers) {
+    EXPECT_NEAR(layer.height, 0.6 * layer.w, 1e-12);
+    for (std::size_t j = 0; j < layer.rows; ++j)
+      for (std::size_t i = 0; i < layer.columns; ++i) {
+        const V3d p = layer.at(i, j);
+        EXPECT_NEAR(p.x, -1 + 2.0 * static_cast<double>(i) / static_cast<double>(layer.columns - 1),
                     1e-4 * 0.1);
-        EXPECT_NEAR(p.y, -0.5 + static_cast<double>(j) / static_cast<double>(level.rows - 1),
+        EXPECT_NEAR(p.y, -0.5 + static_cast<double>(j) / static_cast<double>(layer.rows - 1),
                     1e-4 * 0.1);
-        EXPECT_NEAR(p.z, level.height, 1e-4 * 0.1);
+        EXPECT_NEAR(p.z, layer.height, 1e-4 * 0.1);
       }
   }
   EXPECT_NEAR(result.report.uLength, 2, 1e-5);
@@ -64,46 +64,46 @@ TEST(Patch, IsALatticeOnAPlane) {
   EXPECT_LE(result.patch.particleCount(), 2600u);
 }
 
-/// All four sides of a level about a ball's centre, in steps of one length.
-void expectEvenGreatCircles(const ParticleLevel& level) {
+/// All four sides of a layer about a ball's centre, in steps of one length.
+void expectEvenGreatCircles(const ParticleLayer& layer) {
   std::array<std::vector<V3d>, 4> sides;
-  for (std::size_t i = 0; i < level.columns; ++i) {
-    sides[0].push_back(level.at(i, 0));
-    sides[1].push_back(level.at(i, level.rows - 1));
+  for (std::size_t i = 0; i < layer.columns; ++i) {
+    sides[0].push_back(layer.at(i, 0));
+    sides[1].push_back(layer.at(i, layer.rows - 1));
   }
-  for (std::size_t j = 0; j < level.rows; ++j) {
-    sides[2].push_back(level.at(0, j));
-    sides[3].push_back(level.at(level.columns - 1, j));
+  for (std::size_t j = 0; j < layer.rows; ++j) {
+    sides[2].push_back(layer.at(0, j));
+    sides[3].push_back(layer.at(layer.columns - 1, j));
   }
   for (const std::vector<V3d>& side : sides) {
     const V3d pole = side.front().cross(side.back()).normalized();
     double least = HUGE_VAL, largest = 0;
     for (std::size_t n = 0; n < side.size(); ++n) {
-      EXPECT_NEAR(side[n].dot(pole), 0, 0.02 * kVoxel) << "level " << level.w;
+      EXPECT_NEAR(side[n].dot(pole), 0, 0.02 * kVoxel) << "layer " << layer.w;
       if (n == 0) continue;
       const V3d a = side[n - 1].normalized(), b = side[n].normalized();
       const double step = std::atan2(a.cross(b).length(), a.dot(b));
       least = std::min(least, step), largest = std::max(largest, step);
     }
-    EXPECT_GE(least, 0.99 * largest) << "level " << level.w;
+    EXPECT_GE(least, 0.99 * largest) << "layer " << layer.w;
   }
 }
 
-TEST(Patch, LevelsOnASphereAreConcentricAndSymmetric) {
-  const PatchResult result = makePatch(sphere(), cap(0.6), 0.5, {.levels = 4, .spacing = 0.09});
+TEST(Patch, LayersOnASphereAreConcentricAndSymmetric) {
+  const PatchResult result = makePatch(sphere(), cap(0.6), 0.5, {.layers = 4, .spacing = 0.09});
   EXPECT_FALSE(result.patch.mirrored);
-  for (const ParticleLevel& level : result.patch.levels) {
-    ASSERT_EQ(level.rows, level.columns);  // a quarter turn maps the grid to itself
-    for (std::size_t j = 0; j < level.rows; ++j)
-      for (std::size_t i = 0; i < level.columns; ++i) {
-        const V3d p = level.at(i, j);
-        EXPECT_NEAR(p.length() - 1, level.height, 0.01 * kVoxel);
-        const V3d mirrored = level.at(level.columns - 1 - i, j);
+  for (const ParticleLayer& layer : result.patch.layers) {
+    ASSERT_EQ(layer.rows, layer.columns);  // a quarter turn maps the grid to itself
+    for (std::size_t j = 0; j < layer.rows; ++j)
+      for (std::size_t i = 0; i < layer.columns; ++i) {
+        const V3d p = layer.at(i, j);
+        EXPECT_NEAR(p.length() - 1, layer.height, 0.01 * kVoxel);
+        const V3d mirrored = layer.at(layer.columns - 1 - i, j);
         EXPECT_LT((p - V3d(-mirrored.x, mirrored.y, mirrored.z)).length(), 0.05 * kVoxel);
-        const V3d turned = level.at(level.rows - 1 - j, i);
+        const V3d turned = layer.at(layer.rows - 1 - j, i);
         EXPECT_LT((p - V3d(turned.y, -turned.x, turned.z)).length(), 0.05 * kVoxel);
       }
-    expectEvenGreatCircles(level);
+    expectEvenGreatCircles(layer);
   }
   const double angle = std::acos(V3d(cap(0.6)[0]).dot(cap(0.6)[1]));
   EXPECT_NEAR(result.report.uLength, angle, 1e-3 * angle);
@@ -111,14 +111,14 @@ TEST(Patch, LevelsOnASphereAreConcentricAndSymmetric) {
 }
 
 TEST(Patch, RelaxationMakesCellsEven) {
-  const PatchResult result = makePatch(sphere(), cap(0.7), 0.3, {.levels = 2, .spacing = 0.08});
+  const PatchResult result = makePatch(sphere(), cap(0.7), 0.3, {.layers = 2, .spacing = 0.08});
   EXPECT_TRUE(result.report.isRelaxed);
   EXPECT_LT(result.report.cellAreaVariation, 0.12);
 }
 
-TEST(Patch, KeepsDensityFromLevelToLevel) {
-  const PatchResult result = makePatch(sphere(), cap(0.6), 0.6, {.levels = 3, .spacing = 0.08});
-  const ParticleLevel &low = result.patch.levels.front(), &high = result.patch.levels.back();
+TEST(Patch, KeepsDensityFromLayerToLayer) {
+  const PatchResult result = makePatch(sphere(), cap(0.6), 0.6, {.layers = 3, .spacing = 0.08});
+  const ParticleLayer &low = result.patch.layers.front(), &high = result.patch.layers.back();
   EXPECT_GT(high.columns, low.columns);
   EXPECT_NEAR(static_cast<double>(high.columns - 1) / static_cast<double>(low.columns - 1), 1.6,
               0.15);
@@ -135,11 +135,11 @@ TEST(Patch, SidesRunOverAnEdge) {
   const NarrowBand band = wideBand(box, {V3d(-1), V3d(1)}, 0.7);
   const PatchResult result =
       makePatch(band, {V3d(-0.5, -0.4, 1), V3d(1, -0.4, 0.5), V3d(1, 0.4, 0.5), V3d(-0.5, 0.4, 1)},
-                0.3, {.levels = 3, .spacing = 0.1});
+                0.3, {.layers = 3, .spacing = 0.1});
   EXPECT_NEAR(result.report.uLength, 2, 0.05);
   EXPECT_NEAR(result.report.vLength, 0.8, 0.01);
   // A tricubic's zero set has a bead 0.1012 voxel high along an edge.
-  for (const V3d& p : result.patch.levels.front().positions)
+  for (const V3d& p : result.patch.layers.front().positions)
     EXPECT_LT(std::abs(box(p)), 0.1015 * kVoxel);
 }
 
@@ -177,7 +177,7 @@ TEST(Patch, RefusesCornersThatRunClockwise) {
   const std::string message =
       support::refusal<levelset::UsageError>([&] { (void)makePatch(band, clockwise, 0.3); });
   EXPECT_NE(message.find("\"-1,-0.5,0 1,-0.5,0 1,0.5,0 -1,0.5,0\""), std::string::npos) << message;
-  const PatchResult mirrored = makePatch(band, clockwise, 0.3, {.levels = 2, .mirror = true});
+  const PatchResult mirrored = makePatch(band, clockwise, 0.3, {.layers = 2, .mirror = true});
   EXPECT_TRUE(mirrored.patch.mirrored);
 }
 
@@ -188,7 +188,7 @@ TEST(Patch, RefusesWhatSpansNoPatch) {
   for (const double height : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(),
                               std::numeric_limits<double>::infinity()})
     EXPECT_THROW((void)makePatch(band, sound, height), levelset::UsageError);
-  EXPECT_THROW((void)makePatch(band, sound, 0.3, {.levels = 1}), levelset::UsageError);
+  EXPECT_THROW((void)makePatch(band, sound, 0.3, {.layers = 1}), levelset::UsageError);
   EXPECT_THROW((void)makePatch(band, sound, 0.3, {.spacing = -1}), levelset::UsageError);
   EXPECT_THROW((void)makePatch(band, sound, 0.3, {.spacing = 1e-7}), levelset::ResourceLimit);
 
@@ -225,29 +225,29 @@ TEST(Patch, RefusesHeightsBeyondTheMedialAxis) {
   const double y = 0.5, z = -std::sqrt(0.75);
   const std::array<V3d, 4> corners = {V3d(-0.5, -y, z), V3d(0.5, -y, z), V3d(0.5, y, z),
                                       V3d(-0.5, y, z)};
-  EXPECT_NO_THROW((void)makePatch(trough, corners, 0.5, {.levels = 3, .spacing = 0.15}));
-  EXPECT_THROW((void)makePatch(trough, corners, 1.15, {.levels = 3, .spacing = 0.15}),
+  EXPECT_NO_THROW((void)makePatch(trough, corners, 0.5, {.layers = 3, .spacing = 0.15}));
+  EXPECT_THROW((void)makePatch(trough, corners, 1.15, {.layers = 3, .spacing = 0.15}),
                levelset::InvalidInput);
 }
 
 TEST(Patch, SidesPassThePointsGiven) {
   const std::array<V3d, 4> corners = {V3d(-1, -0.5, 0), V3d(1, -0.5, 0), V3d(1, 0.5, 0),
                                       V3d(-1, 0.5, 0)};
-  mapping::PatchOptions options{.levels = 2, .spacing = 0.1};
+  mapping::PatchOptions options{.layers = 2, .spacing = 0.1};
   options.sides[0] = {V3d(0, -1, 0.3)};  // projected: beside the surface
   options.sides[1] = {V3d(1.3, -0.2, 0), V3d(1.3, 0.2, 0)};
   const PatchResult result = makePatch(slab(), corners, 0.4, options);
-  for (const ParticleLevel& level : result.patch.levels) {
-    const V3d tip(0, -1, level.height);
+  for (const ParticleLayer& layer : result.patch.layers) {
+    const V3d tip(0, -1, layer.height);
     double nearest = 9;
-    for (std::size_t i = 0; i < level.columns; ++i) {
-      const V3d p = level.at(i, 0);
+    for (std::size_t i = 0; i < layer.columns; ++i) {
+      const V3d p = layer.at(i, 0);
       EXPECT_NEAR(p.y, -1 + 0.5 * std::abs(p.x), 1e-3);
       nearest = std::min(nearest, (p - tip).length());
     }
     EXPECT_LT(nearest, 0.06);
-    for (std::size_t j = 0; j < level.rows; ++j) {
-      const V3d p = level.at(level.columns - 1, j);
+    for (std::size_t j = 0; j < layer.rows; ++j) {
+      const V3d p = layer.at(layer.columns - 1, j);
       EXPECT_NEAR(p.x, 1 + std::min(0.3, 0.5 - std::abs(p.y)), 1e-3);
     }
   }
@@ -267,19 +267,19 @@ TEST(Patch, WrapsAThinEar) {
   const PatchResult result = makePatch(
       plate,
       {V3d(0.4, -0.4, half), V3d(0.4, -0.4, -half), V3d(0.4, 0.4, -half), V3d(0.4, 0.4, half)}, 0.2,
-      {.levels = 2, .spacing = 0.1});
+      {.layers = 2, .spacing = 0.1});
   EXPECT_NEAR(result.report.uLength, 1.2 + std::acos(-1.0) * half, 0.01);
   EXPECT_NEAR(result.report.vLength, 0.8, 0.01);
-  EXPECT_TRUE(std::any_of(result.patch.levels[1].positions.begin(),
-                          result.patch.levels[1].positions.end(),
+  EXPECT_TRUE(std::any_of(result.patch.layers[1].positions.begin(),
+                          result.patch.layers[1].positions.end(),
                           [](const V3d& p) { return p.x > 1.3; }));
 }
 
 TEST(Patch, HasAsManyCellsAsAsked) {
-  const PatchResult result = makePatch(sphere(), cap(0.6), 0.4, {.levels = 3, .cells = {7, 5}});
-  for (const ParticleLevel& level : result.patch.levels) {
-    EXPECT_EQ(level.columns, 8u);
-    EXPECT_EQ(level.rows, 6u);
+  const PatchResult result = makePatch(sphere(), cap(0.6), 0.4, {.layers = 3, .cells = {7, 5}});
+  for (const ParticleLayer& layer : result.patch.layers) {
+    EXPECT_EQ(layer.columns, 8u);
+    EXPECT_EQ(layer.rows, 6u);
   }
   EXPECT_THROW((void)makePatch(sphere(), cap(0.6), 0.4, {.cells = {7, 0}}), levelset::UsageError);
 }

@@ -163,7 +163,7 @@ mapping::ScatterOptions small(std::size_t count) {
   return {.density = {.count = count},
           .uSize = 0.8,
           .vSize = 0.6,
-          .patch = {.levels = 2, .spacing = 0.2}};
+          .patch = {.layers = 2, .spacing = 0.2}};
 }
 
 TEST(Scatter, LaysPatchesOfTheSizeAsked) {
@@ -173,13 +173,13 @@ TEST(Scatter, LaysPatchesOfTheSizeAsked) {
   ASSERT_EQ(result.patches.size(), 12u);
   EXPECT_EQ(result.leftOut, 0u);
   for (const Patch& patch : result.patches) {
-    const mapping::ParticleLevel& level = patch.levels.front();
-    const V3d first = level.at(0, 0), last = level.at(level.columns - 1, 0);
+    const mapping::ParticleLayer& layer = patch.layers.front();
+    const V3d first = layer.at(0, 0), last = layer.at(layer.columns - 1, 0);
     EXPECT_NEAR(greatCircle(first, last), 0.8, 0.05);
     // u runs towards the pole, if that is not too near.
-    const V3d center = level.at(level.columns / 2, level.rows / 2);
+    const V3d center = layer.at(layer.columns / 2, layer.rows / 2);
     if (std::abs(center.z) > 1.6) continue;
-    const V3d u = (level.at(level.columns - 1, level.rows / 2) - level.at(0, level.rows / 2));
+    const V3d u = (layer.at(layer.columns - 1, layer.rows / 2) - layer.at(0, layer.rows / 2));
     const V3d normal = center.normalized();
     const V3d pole = (V3d(0, 0, 1) - normal * normal.z).normalized();
     EXPECT_GT(u.normalized().dot(pole), 0.97);
@@ -198,9 +198,9 @@ TEST(Scatter, ScalesPatchesAndTurnsThem) {
   options.jitter = M_PI;
   const auto result = mapping::scatter(ball(), 0.3, options);
   for (const Patch& patch : result.patches) {
-    const mapping::ParticleLevel& level = patch.levels.front();
-    const double scale = level.at(level.columns / 2, level.rows / 2).x > 0 ? 1.0 : 0.5;
-    EXPECT_NEAR(greatCircle(level.at(0, 0), level.at(level.columns - 1, 0)), 0.8 * scale,
+    const mapping::ParticleLayer& layer = patch.layers.front();
+    const double scale = layer.at(layer.columns / 2, layer.rows / 2).x > 0 ? 1.0 : 0.5;
+    EXPECT_NEAR(greatCircle(layer.at(0, 0), layer.at(layer.columns - 1, 0)), 0.8 * scale,
                 0.1 * scale);
     EXPECT_DOUBLE_EQ(patch.height, 0.3 * scale);
   }
@@ -208,7 +208,7 @@ TEST(Scatter, ScalesPatchesAndTurnsThem) {
   const std::vector<Patch> again = mapping::makePatches(ball(), result.sites, 0.3, options.patch);
   ASSERT_EQ(again.size(), result.patches.size());
   for (std::size_t n = 0; n < again.size(); ++n)
-    EXPECT_EQ(again[n].levels.front().positions, result.patches[n].levels.front().positions);
+    EXPECT_EQ(again[n].layers.front().positions, result.patches[n].layers.front().positions);
 }
 
 TEST(Scatter, LeavesOutWhatBearsNoPatchAndFillsTheGaps) {
@@ -234,7 +234,7 @@ TEST(Scatter, LeavesOutWhatBearsNoPatchAndFillsTheGaps) {
 TEST(Scatter, SkipsPatchesThatFold) {
   const NarrowBand base = ball(), stud = support::makeBall(0.5, 0.1);
   std::vector<Patch> patches = mapping::scatter(base, 0.3, small(4)).patches;
-  for (V3d& p : patches[1].levels.back().positions) p *= 0.5;
+  for (V3d& p : patches[1].layers.back().positions) p *= 0.5;
   const mapping::TextureOptions options = {.merge = mapping::TextureMerge::Alone, .voxelSize = 0.1};
   EXPECT_THROW((void)mapping::mapTexture(base, stud, patches, options), InvalidInput);
   mapping::TextureOptions skipping = options;
@@ -246,16 +246,16 @@ TEST(Scatter, SkipsPatchesThatFold) {
   EXPECT_THROW((void)mapping::mapTexture(base, stud, patches[1], skipping), InvalidInput);
 }
 
-/// Between corners of levels: the counts between them may be rounded another way.
+/// Between corners of layers: the counts between them may be rounded another way.
 double worstApart(const Patch& one, const Patch& other) {
-  if (one.levels.size() != other.levels.size()) return HUGE_VAL;
-  const auto cornersOf = [](const mapping::ParticleLevel& level) {
-    const std::size_t u = level.columns - 1, v = level.rows - 1;
-    return std::array{level.at(0, 0), level.at(u, 0), level.at(u, v), level.at(0, v)};
+  if (one.layers.size() != other.layers.size()) return HUGE_VAL;
+  const auto cornersOf = [](const mapping::ParticleLayer& layer) {
+    const std::size_t u = layer.columns - 1, v = layer.rows - 1;
+    return std::array{layer.at(0, 0), layer.at(u, 0), layer.at(u, v), layer.at(0, v)};
   };
   double worst = 0;
-  for (std::size_t k = 0; k < one.levels.size(); ++k) {
-    const auto a = cornersOf(one.levels[k]), b = cornersOf(other.levels[k]);
+  for (std::size_t k = 0; k < one.layers.size(); ++k) {
+    const auto a = cornersOf(one.layers[k]), b = cornersOf(other.layers[k]);
     for (std::size_t i = 0; i < 4; ++i) worst = std::max(worst, (a[i] - b[i]).length());
   }
   return worst;
@@ -267,10 +267,10 @@ TEST(Scatter, PatchesThatShareDistancesStandAsThoseAlone) {
   options.density.count = 16;
   options.density.scale = [](const V3d& p) { return p.x > 0 ? 1.0 : 0.5; };
   options.uSize = options.vSize = 1;
-  options.patch.levels = 4;
-  for (const auto& [scheme, height] : {std::pair(mapping::LevelScheme::Reduced, 1.0),
-                                       std::pair(mapping::LevelScheme::Reduced, 4.5),
-                                       std::pair(mapping::LevelScheme::Conforming, 1.0)}) {
+  options.patch.layers = 4;
+  for (const auto& [scheme, height] : {std::pair(mapping::LayerScheme::Reduced, 1.0),
+                                       std::pair(mapping::LayerScheme::Reduced, 4.5),
+                                       std::pair(mapping::LayerScheme::Conforming, 1.0)}) {
     options.patch.scheme = scheme;
     const auto together = mapping::scatter(base, height, options);
     ASSERT_EQ(together.patches.size(), 16u) << together.cause;

@@ -193,7 +193,7 @@ TEST(Geodesic, IsEmptyBetweenSeparateParts) {
 }
 
 TEST(Geodesic, OfOneLikeAnotherStaysOnItsSide) {
-  // Half a turn has two ways; the one that is asked for is taken, on another level too.
+  // Half a turn has two ways; the one that is asked for is taken, on another layer too.
   const NarrowBand pipe = support::sampleBand([](const V3d& p) { return std::hypot(p.x, p.y) - 1; },
                                               {V3d(-1, -1, -1), V3d(1, 1, 1)}, 0.1, 6);
   const SurfaceField field(pipe);

@@ -67,7 +67,7 @@ Measurement measureAlone(const NarrowBand& base, const NarrowBand& texture, cons
 
 TEST(ExtremeTextures, UnitsOfTheTextureDoNotMatter) {
   // A texture in kilometres or microns on a patch in metres: only its proportions count.
-  const Patch patch = makePatch(slab(), square(1.5), 1, {.levels = 3}).patch;
+  const Patch patch = makePatch(slab(), square(1.5), 1, {.layers = 3}).patch;
   const auto of = [&](double unit) {
     return measureAlone(slab(),
                         levelset::makeTorus(2 * unit, 0.6 * unit, V3d(0), V3d(0, 0, 1), 0.1 * unit),
@@ -86,7 +86,7 @@ TEST(ExtremeTextures, AThousandTimesFinerThanTheBase) {
   // The texture's voxels come out a thousandth of the base's: alone it is mapped as it is; joined,
   // the base would have to be that fine too, which is refused before anything is allocated. With
   // the base's voxels there would be nothing of the texture: refused, and not left out in silence.
-  const Patch patch = makePatch(slab(), square(0.3), 0.3, {.levels = 3}).patch;
+  const Patch patch = makePatch(slab(), square(0.3), 0.3, {.layers = 3}).patch;
   const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.1);
   mapping::TextureOptions options = {.merge = TextureMerge::Alone,
                                      .sink = 0.0,
@@ -103,7 +103,7 @@ TEST(ExtremeTextures, AThousandTimesFinerThanTheBase) {
 
 TEST(ExtremeTextures, CoarseVoxelsShowWhatTheyCan) {
   // A texture of seven times too many voxels is right to second order in the voxels of the result.
-  const Patch patch = makePatch(slab(), square(1), 1, {.levels = 3}).patch;
+  const Patch patch = makePatch(slab(), square(1), 1, {.layers = 3}).patch;
   const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.03);
   const Measurement mapped = measureAlone(slab(), texture, patch, 0.2);
   EXPECT_NEAR(mapped.volume, 4 * kPi / 3 * 0.5, 0.02 * mapped.volume);
@@ -112,7 +112,7 @@ TEST(ExtremeTextures, CoarseVoxelsShowWhatTheyCan) {
 TEST(ExtremeTextures, AThousandTimesCoarserThanTheBase) {
   // A unit a thousand times larger, and six voxels of texture over a patch: as round as those are.
   const NarrowBand fine = levelset::makeSphere(1, V3d(0), 0.04);
-  const Patch patch = makePatch(fine, cap(0.5), 0.5, {.levels = 3}).patch;
+  const Patch patch = makePatch(fine, cap(0.5), 0.5, {.layers = 3}).patch;
   const NarrowBand rough = levelset::makeSphere(3000, V3d(0), 1000);
   const Measurement mapped = measureAlone(fine, rough, patch, 0.04);
   const Measurement smooth =
@@ -168,7 +168,7 @@ TEST(ExtremeTextures, HolesAndHandlesStay) {
               combine(levelset::CsgOperation::Difference, plate, hole), handle);
   ASSERT_EQ(levelset::measure(texture).euler, -2);
   const NarrowBand ball = support::makeBall(4, 0.2);
-  const Patch patch = makePatch(ball, cap(0.5, 4), 1.5, {.levels = 6, .spacing = 0.3}).patch;
+  const Patch patch = makePatch(ball, cap(0.5, 4), 1.5, {.layers = 6, .spacing = 0.3}).patch;
   for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell})
     EXPECT_EQ(measureAlone(ball, texture, patch, 0.1, map).euler, -2);
 }
@@ -180,7 +180,7 @@ TEST(ExtremeTextures, ASpikeUnderAVoxelIsLostAndNothingElse) {
       levelset::makeSphere(1, V3d(0), voxel),
       levelset::makeCapsule(V3d(0, 0, 0.5), V3d(0, 0, 2), 0.2 * voxel, voxel)};
   const NarrowBand spiked = levelset::combine(levelset::CsgOperation::Union, both).band;
-  const Patch patch = makePatch(slab(), square(1), 3, {.levels = 4}).patch;
+  const Patch patch = makePatch(slab(), square(1), 3, {.layers = 4}).patch;
   const mapping::TextureOptions options = {.merge = TextureMerge::Alone,
                                            .sink = 0.0,
                                            .textureBox = Imath::Box3d(V3d(-1), V3d(1, 1, 2)),
@@ -196,8 +196,8 @@ TEST(ExtremeTextures, ASplineThroughItselfIsRefusedWithThePlace) {
   // has two values: the smooth map cannot pass through both, the tetrahedra overlap.
   const NarrowBand base = support::makeBall(4, 0.2);
   mapping::PatchOptions options = {
-      .levels = 24,
-      .scheme = mapping::LevelScheme::Spline,
+      .layers = 24,
+      .scheme = mapping::LayerScheme::Spline,
       .spline = {V3d(0, 0, 6), V3d(2, 0, 8), V3d(3, 0, 6.5), V3d(1.5, 0, 5.3), V3d(-1, 0, 5.2)},
       .spacing = 0.35};
   const NarrowBand texture = levelset::makeBox(V3d(1, 1, 11), V3d(0), 0.2);
@@ -222,7 +222,7 @@ TEST(ExtremeTextures, OverACreaseNothingTears) {
   // sides, and joined one solid without cavities.
   const std::array<V3d, 4> corners = {V3d(2.5, -1, 0), V3d(4, -1, -1.2), V3d(4, 1, -1.2),
                                       V3d(2.5, 1, 0)};
-  const Patch patch = makePatch(slab(), corners, 0.6, {.levels = 4}).patch;
+  const Patch patch = makePatch(slab(), corners, 0.6, {.layers = 4}).patch;
   const NarrowBand texture = levelset::makeBox(V3d(2, 2, 1), V3d(0), 0.2);
   for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell}) {
     const Measurement alone = measureAlone(slab(), texture, patch, 0.1, map);
@@ -243,7 +243,7 @@ TEST(ExtremeTextures, OffsetsBeyondTheCurvatureRadiusAreRefusedWithTheCause) {
   // and the refusal tells the place; with voxels that are asked for, what can be seen is mapped.
   const NarrowBand trough = makeTrough(slab());
   const Patch patch = makePatch(trough, troughCorners(1), 2,
-                                {.levels = 4, .scheme = mapping::LevelScheme::Conforming})
+                                {.layers = 4, .scheme = mapping::LayerScheme::Conforming})
                           .patch;
   const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.1);
   std::string message;
@@ -258,14 +258,14 @@ TEST(ExtremeTextures, OffsetsBeyondTheCurvatureRadiusAreRefusedWithTheCause) {
   EXPECT_GT(mapped.volume, 0.5);
 }
 
-TEST(ExtremeTextures, LevelsBeyondTheCurvatureRadiusThatFoldAreRefused) {
-  // In such a trough the corners of reduced levels meet over the axis and climb there: the sides
-  // of the levels above lie upon each other, and cells turn over. Samples and certificate both see
+TEST(ExtremeTextures, LayersBeyondTheCurvatureRadiusThatFoldAreRefused) {
+  // In such a trough the corners of reduced layers meet over the axis and climb there: the sides
+  // of the layers above lie upon each other, and cells turn over. Samples and certificate both see
   // it, of both maps; who asks for it gets what can be mapped, with the folds counted.
   constexpr double kHeight = 2.5;
   const NarrowBand trough = makeTrough(levelset::makeBox(V3d(4, 3, 2), V3d(0, 0, -1), 0.2));
   const Patch patch =
-      makePatch(trough, troughCorners(0.7), kHeight, {.levels = 4, .spacing = 0.3}).patch;
+      makePatch(trough, troughCorners(0.7), kHeight, {.layers = 4, .spacing = 0.3}).patch;
   const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.1);
   for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell}) {
     SCOPED_TRACE(map == TextureMap::Rbf ? "rbf" : "shell");
@@ -291,7 +291,7 @@ TEST(ExtremeTextures, LevelsBeyondTheCurvatureRadiusThatFoldAreRefused) {
 }
 
 TEST(ExtremeTextures, LambdaIsANumber) {
-  const Patch patch = makePatch(slab(), square(1), 1, {.levels = 2, .spacing = 0.5}).patch;
+  const Patch patch = makePatch(slab(), square(1), 1, {.layers = 2, .spacing = 0.5}).patch;
   const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.1);
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   for (const double bad : {kNan, -1.0, std::numeric_limits<double>::infinity()})

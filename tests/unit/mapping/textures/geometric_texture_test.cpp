@@ -164,7 +164,7 @@ TEST(GeometricTexture, WhatLiesBesideTheTextureDoesNotFoldTheMap) {
       support::sampleBand([](const V3d& p) { return boxDistance(p, V3d(10, 10, 0.375)); },
                           {V3d(-10, -10, -0.375), V3d(10, 10, 0.375)}, 0.25);
   const Patch patch =
-      mapping::makePatch(plate, support::square(9.3, 0.375), 1.5, {.levels = 3, .spacing = 2})
+      mapping::makePatch(plate, support::square(9.3, 0.375), 1.5, {.layers = 3, .spacing = 2})
           .patch;
   const TextureResult result =
       mapTexture(plate, makeRing(4, 1, 0.25), patch, {.merge = TextureMerge::Alone});
@@ -183,16 +183,16 @@ TEST(GeometricTexture, CylinderCoordinatesAreThoseOfTheCylinder) {
   };
   const std::array<V3d, 4> corners = {at(-angle, -half, 0), at(angle, -half, 0), at(angle, half, 0),
                                       at(-angle, half, 0)};
-  const Patch sparse = mapping::makePatch(base, corners, height, {.levels = 11}).patch;
+  const Patch sparse = mapping::makePatch(base, corners, height, {.layers = 11}).patch;
   const Patch dense = mapping::makePatch(base, corners, height, {.spacing = 2 * voxel}).patch;
-  for (const mapping::ParticleLevel& level : sparse.levels)
-    for (std::size_t n = 0; n < level.positions.size(); ++n) {
+  for (const mapping::ParticleLayer& layer : sparse.layers)
+    for (std::size_t n = 0; n < layer.positions.size(); ++n) {
       const auto share = [](std::size_t k, std::size_t count) {
         return 2 * static_cast<double>(k) / static_cast<double>(count - 1) - 1;
       };
-      const V3d place = at(angle * share(n % level.columns, level.columns),
-                           half * share(n / level.columns, level.rows), level.w);
-      ASSERT_LE((level.positions[n] - place).length(), 1e-4 * height);
+      const V3d place = at(angle * share(n % layer.columns, layer.columns),
+                           half * share(n / layer.columns, layer.rows), layer.w);
+      ASSERT_LE((layer.positions[n] - place).length(), 1e-4 * height);
     }
   const double sink = 0.4;
   const mapping::RbfMap smooth = mapping::patchToTexture(sparse, {}, sink);
@@ -336,13 +336,13 @@ TEST(GeometricTexture, RefusesPatchesThatFold) {
   const double y = 0.7, z = -std::sqrt(1 - y * y);
   Patch patch = mapping::makePatch(
                     trough, {V3d(-0.5, -y, z), V3d(0.5, -y, z), V3d(0.5, y, z), V3d(-0.5, y, z)},
-                    0.9, {.levels = 4, .spacing = 0.15})
+                    0.9, {.layers = 4, .spacing = 0.15})
                     .patch;
   // Straight on past the axis, as explicit offsets would go.
-  for (mapping::ParticleLevel& level : patch.levels)
-    for (V3d& p : level.positions) {
+  for (mapping::ParticleLayer& layer : patch.layers)
+    for (V3d& p : layer.positions) {
       const double r = std::hypot(p.y, p.z);
-      const double wanted = 1 - 1.4 * level.w;
+      const double wanted = 1 - 1.4 * layer.w;
       p.y *= wanted / r, p.z *= wanted / r;
     }
   const NarrowBand ball = makeBall(1, 0.1, 3);
@@ -356,7 +356,7 @@ TEST(GeometricTexture, UnionIsOneSolidAndCarvingLeavesAHole) {
   const double voxel = 0.05, radius = 2;
   const NarrowBand base = makeBall(radius, voxel, 3), ring = makeRing(1, 0.25, 0.05);
   const Patch patch =
-      mapping::makePatch(base, cap(0.6, radius), 0.5, {.levels = 3, .spacing = 0.15}).patch;
+      mapping::makePatch(base, cap(0.6, radius), 0.5, {.layers = 3, .spacing = 0.15}).patch;
   const levelset::Measurement before = levelset::measure(base);
   const auto measured = [&](const mapping::TextureOptions& options) {
     return levelset::measure(mapTexture(base, ring, patch, options).band);
@@ -424,7 +424,7 @@ TEST(GeometricTexture, CarvedFlushItLeavesNoSkins) {
 }
 
 TEST(GeometricTexture, AResultIsTheNextBase) {
-  // Three levels of recursion: each ball stands on the one before.
+  // Three layers of recursion: each ball stands on the one before.
   NarrowBand base = makeBall(2, 0.1, 3);
   V3d top(0, 0, 2);
   double volume = levelset::measure(base).volume;
@@ -452,7 +452,7 @@ TEST(GeometricTexture, SameBitsForAnyNumberOfThreads) {
   for (const std::size_t threads : {1, 2, 4, 2}) {
     support::onThreads(threads, [&] {
       const Patch patch =
-          mapping::makePatch(base, cap(0.6, radius), 0.5, {.levels = 3, .spacing = 0.2}).patch;
+          mapping::makePatch(base, cap(0.6, radius), 0.5, {.layers = 3, .spacing = 0.2}).patch;
       hashes.insert(
           mapTexture(base, ring, patch, {.merge = TextureMerge::Alone}).band.contentHash());
     });
@@ -463,7 +463,7 @@ TEST(GeometricTexture, SameBitsForAnyNumberOfThreads) {
 TEST(GeometricTexture, RefusesWhatCannotBeMapped) {
   const double voxel = 0.1;
   const NarrowBand base = makeSlab(voxel), ball = makeBall(1, voxel, 3);
-  const Patch patch = mapping::makePatch(base, square(2), 1, {.levels = 2, .spacing = 0.5}).patch;
+  const Patch patch = mapping::makePatch(base, square(2), 1, {.layers = 2, .spacing = 0.5}).patch;
   const auto with = [&](const mapping::TextureOptions& options) {
     (void)mapTexture(base, ball, patch, options);
   };

@@ -72,7 +72,7 @@ void expectKnurled(
   mapping::PatchGridResult grid = mapping::makePatchGridAround(
       base, V3d(0, 0, -kHalfLength), V3d(0, 0, kHalfLength), 0, kHeight,
       {.columns = kTiles, .rows = kRows},
-      {.levels = 3, .scheme = mapping::LevelScheme::Conforming, .spacing = 0.15});
+      {.layers = 3, .scheme = mapping::LayerScheme::Conforming, .spacing = 0.15});
   if (change) change(base, grid.patches);
   const NarrowBand texture = mapping::makeKnurl(knurl(), V3d(0), 0.04);
   const NarrowBand result =
@@ -128,12 +128,12 @@ TEST(KnurledCylinder, StaysClosedWhenItsPatchesAreRelaxed) {
                    .proportions = mapping::knurlBox(knurl(), V3d(0)).tile.size()})
                   .patch;
     double apart = 0, moved = 0;
-    const auto& left = patches[0].levels.back();
+    const auto& left = patches[0].layers.back();
     for (std::size_t j = 0; j < left.rows; ++j) {
       const std::size_t n = j * left.columns + left.columns - 1;
-      moved = std::max(moved, (left.positions[n] - before[0].levels.back().positions[n]).length());
+      moved = std::max(moved, (left.positions[n] - before[0].layers.back().positions[n]).length());
     }
-    const auto& right = patches[1].levels.back();
+    const auto& right = patches[1].layers.back();
     double parted = 0;
     for (std::size_t j = 0; j < left.rows; ++j)
       parted = std::max(parted, (left.at(left.columns - 1, j) - right.at(0, j)).length());

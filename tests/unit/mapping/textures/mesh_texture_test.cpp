@@ -98,9 +98,9 @@ TEST(MeshTexture, FacesAsBeforeOnAMirroredPatch) {
 TEST(MeshTexture, LeavesOutPatchesThatFold) {
   const NarrowBand base = makeBall(2, 0.1);
   const TriMesh ring = makeRing(1, 0.25, 20, 8);
-  const Patch sound = mapping::makePatch(base, cap(0.4, 2), 0.5, {.levels = 3}).patch;
+  const Patch sound = mapping::makePatch(base, cap(0.4, 2), 0.5, {.layers = 3}).patch;
   Patch folded = sound;
-  std::swap(folded.levels[1].positions[7], folded.levels[1].positions[8]);
+  std::swap(folded.layers[1].positions[7], folded.layers[1].positions[8]);
   const std::array<Patch, 3> patches = {folded, sound, folded};
   EXPECT_THROW((void)mapping::mapMesh(ring, patches), levelset::InvalidInput);
   const mapping::MeshTextureResult result = mapping::mapMesh(ring, patches, {.skipFolds = true});
@@ -124,7 +124,7 @@ TEST(MeshTexture, RefusesWhatCannotBeMoved) {
   for (const V3d& p : mapping::mapMesh(flat, patch, {.textureBox = box}).mesh.positions)
     EXPECT_NEAR(p.length(), 2, 0.02);
   Patch folded = patch;
-  for (V3d& p : folded.levels.back().positions) p *= 0.5;
+  for (V3d& p : folded.layers.back().positions) p *= 0.5;
   EXPECT_THROW((void)mapping::mapMesh(ring, folded), levelset::InvalidInput);
   EXPECT_GT(mapping::mapMesh(ring, folded, {.allowFolds = true}).distortion.folded, 0u);
   EXPECT_THROW((void)mapping::mapMesh(ring, patch, {.progress = [](double) { return false; }}),
@@ -133,20 +133,20 @@ TEST(MeshTexture, RefusesWhatCannotBeMoved) {
 
 // === What vertices carry
 
-/// Particles of a smooth map, `cells` to each side, one on top of the other in three levels.
+/// Particles of a smooth map, `cells` to each side, one on top of the other in three layers.
 Patch patchOf(const std::function<V3d(const V3d&)>& place, std::size_t cells, double height) {
   Patch patch;
   patch.height = height;
   for (std::size_t k = 0; k < 3; ++k) {
-    mapping::ParticleLevel level;
-    level.columns = level.rows = cells + 1;
-    level.w = static_cast<double>(k) / 2;
+    mapping::ParticleLayer layer;
+    layer.columns = layer.rows = cells + 1;
+    layer.w = static_cast<double>(k) / 2;
     for (std::size_t j = 0; j <= cells; ++j)
       for (std::size_t i = 0; i <= cells; ++i)
-        level.positions.push_back(
+        layer.positions.push_back(
             place({static_cast<double>(i) / static_cast<double>(cells),
-                   static_cast<double>(j) / static_cast<double>(cells), level.w}));
-    patch.levels.push_back(std::move(level));
+                   static_cast<double>(j) / static_cast<double>(cells), layer.w}));
+    patch.layers.push_back(std::move(layer));
   }
   return patch;
 }

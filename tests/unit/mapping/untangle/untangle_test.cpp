@@ -30,13 +30,13 @@ using support::makeSlab;
 using support::patchAt;
 
 /// Two by two, one high, on a slab.
-Patch flatPatch(std::size_t columns, std::size_t levels, double scale = 1) {
+Patch flatPatch(std::size_t columns, std::size_t layers, double scale = 1) {
   return patchAt([=](const V3d& t) { return V3d(2 * t.x - 1, 2 * t.y - 1, t.z) * scale; }, columns,
-                 columns, levels, scale);
+                 columns, layers, scale);
 }
 
 void expectCertified(const Patch& patch) {
-  EXPECT_EQ(mapping::certifyLevels(patch, 0).verdict(), FoldVerdict::Certified);
+  EXPECT_EQ(mapping::certifyLayers(patch, 0).verdict(), FoldVerdict::Certified);
   EXPECT_EQ(mapping::certifyShell(mapping::ShellMap(patch, {}), patch.mirrored).verdict(),
             FoldVerdict::Certified);
 }
@@ -44,9 +44,9 @@ void expectCertified(const Patch& patch) {
 /// How far the surface's particles are from where a formula has them.
 double farthestFrom(const Patch& a, const Patch& b) {
   double most = 0;
-  for (std::size_t k = 0; k < a.levels.size(); ++k)
-    for (std::size_t n = 0; n < a.levels[k].positions.size(); ++n)
-      most = std::max(most, (a.levels[k].positions[n] - b.levels[k].positions[n]).length());
+  for (std::size_t k = 0; k < a.layers.size(); ++k)
+    for (std::size_t n = 0; n < a.layers[k].positions.size(); ++n)
+      most = std::max(most, (a.layers[k].positions[n] - b.layers[k].positions[n]).length());
   return most;
 }
 
@@ -101,9 +101,9 @@ TEST(Unfold, APatchThatDoesNotFoldStays) {
 
 TEST(Unfold, MendsParticlesThatWentThroughTheirNeighbours) {
   Patch patch = flatPatch(9, 4);
-  patch.levels[1].positions[4 * 9 + 4] += V3d(0.9, 0.4, 0.5);
-  patch.levels[3].positions[2 * 9 + 6] += V3d(-0.2, 0.6, -0.9);
-  patch.levels[0].positions[3 * 9 + 3] += V3d(0.6, 0, 0);
+  patch.layers[1].positions[4 * 9 + 4] += V3d(0.9, 0.4, 0.5);
+  patch.layers[3].positions[2 * 9 + 6] += V3d(-0.2, 0.6, -0.9);
+  patch.layers[0].positions[3 * 9 + 3] += V3d(0.6, 0, 0);
   const NarrowBand base = makeSlab(2, 0.1);
   const Unfolding result = unfold(base, patch);
   EXPECT_GT(result.before.folded, 3u);
@@ -113,7 +113,7 @@ TEST(Unfold, MendsParticlesThatWentThroughTheirNeighbours) {
   EXPECT_GT(result.farthestMove, 0.2);
   expectCertified(result.patch);
   // The sides on the surface stay, and all that was on it.
-  const mapping::ParticleLevel &surface = result.patch.levels[0], &before = patch.levels[0];
+  const mapping::ParticleLayer &surface = result.patch.layers[0], &before = patch.layers[0];
   for (std::size_t i = 0; i < 9; ++i) {
     EXPECT_EQ(surface.at(i, 0), before.at(i, 0));
     EXPECT_EQ(surface.at(8, i), before.at(8, i));
@@ -137,7 +137,7 @@ TEST(Unfold, MendsOffsetsPastTheMedialAxis) {
   ASSERT_TRUE(result.isUnfolded());
   EXPECT_GT(result.after.leastJacobian, 0.05);
   expectCertified(result.patch);
-  for (const V3d& p : result.patch.levels[0].positions) EXPECT_NEAR(std::hypot(p.y, p.z), 1, 1e-3);
+  for (const V3d& p : result.patch.layers[0].positions) EXPECT_NEAR(std::hypot(p.y, p.z), 1, 1e-3);
 }
 
 TEST(Unfold, SaysWhereItCannot) {
@@ -156,9 +156,9 @@ TEST(Unfold, SaysWhereItCannot) {
 
 TEST(Unfold, CellsWithoutVolumeAndClockwisePatches) {
   const NarrowBand base = makeSlab(2, 0.1);
-  // All of the top lies upon the level below it.
+  // All of the top lies upon the layer below it.
   Patch flat = flatPatch(5, 3);
-  flat.levels[2].positions = flat.levels[1].positions;
+  flat.layers[2].positions = flat.layers[1].positions;
   const Unfolding raised = unfold(base, flat);
   EXPECT_EQ(raised.before.folded, 16u);
   EXPECT_TRUE(raised.isUnfolded());
@@ -168,15 +168,15 @@ TEST(Unfold, CellsWithoutVolumeAndClockwisePatches) {
       patchAt([](const V3d& t) { return V3d(1 - 2 * t.x, 2 * t.y - 1, t.z); }, 6, 6, 3);
   clockwise.mirrored = true;
   EXPECT_EQ(mapping::countFolds(clockwise).folded, 0u);
-  clockwise.levels[1].positions[2 * 6 + 2] += V3d(0.7, 0.5, 0);
+  clockwise.layers[1].positions[2 * 6 + 2] += V3d(0.7, 0.5, 0);
   const Unfolding mended = unfold(base, clockwise);
   EXPECT_GT(mended.before.folded, 0u);
   EXPECT_TRUE(mended.isUnfolded());
   expectCertified(mended.patch);
 
   Patch smallest = flatPatch(2, 2);
-  std::swap(smallest.levels[1].positions[0], smallest.levels[1].positions[3]);
-  std::swap(smallest.levels[1].positions[1], smallest.levels[1].positions[2]);
+  std::swap(smallest.layers[1].positions[0], smallest.layers[1].positions[3]);
+  std::swap(smallest.layers[1].positions[1], smallest.layers[1].positions[2]);
   const Unfolding turned = unfold(base, smallest);
   EXPECT_EQ(turned.before.folded, 1u);
   EXPECT_TRUE(turned.isUnfolded());
@@ -186,18 +186,18 @@ TEST(Unfold, RimsFollowTheirNeighbours) {
   // A patch with rims is moved as a whole where it is mended, and its rims with it.
   const NarrowBand base = support::makeBall(2, 0.1);
   Patch patch = mapping::makePatch(base, support::cap(0.5, 2), 0.5, {.spacing = 0.3}).patch;
-  ASSERT_TRUE(patch.levels[3].hasRim());
-  const std::size_t columns = patch.levels[3].columns;
-  patch.levels[3].positions[2 * columns + 1] += V3d(0.5, 0.4, 0);
+  ASSERT_TRUE(patch.layers[3].hasRim());
+  const std::size_t columns = patch.layers[3].columns;
+  patch.layers[3].positions[2 * columns + 1] += V3d(0.5, 0.4, 0);
   const Unfolding result = unfold(base, patch);
   ASSERT_TRUE(result.isUnfolded());
-  for (std::size_t k = 0; k < patch.levels.size(); ++k) {
-    const mapping::ParticleLevel &level = result.patch.levels[k], &old = patch.levels[k];
-    const int rows = static_cast<int>(level.rows);
+  for (std::size_t k = 0; k < patch.layers.size(); ++k) {
+    const mapping::ParticleLayer &layer = result.patch.layers[k], &old = patch.layers[k];
+    const int rows = static_cast<int>(layer.rows);
     for (int j = 0; j < rows; ++j) {
-      const V3d expected = old.beyond(-1, j) + (level.beyond(0, j) - old.beyond(0, j)) * 2.0 -
-                           (level.beyond(1, j) - old.beyond(1, j));
-      EXPECT_LE((level.beyond(-1, j) - expected).length(), k == 0 ? 0.05 : 1e-12);
+      const V3d expected = old.beyond(-1, j) + (layer.beyond(0, j) - old.beyond(0, j)) * 2.0 -
+                           (layer.beyond(1, j) - old.beyond(1, j));
+      EXPECT_LE((layer.beyond(-1, j) - expected).length(), k == 0 ? 0.05 : 1e-12);
     }
   }
 }
@@ -205,7 +205,7 @@ TEST(Unfold, RimsFollowTheirNeighbours) {
 TEST(Unfold, SameBitsForAnyNumberOfThreadsAndScale) {
   const auto run = [](double scale) {
     Patch patch = flatPatch(6, 3, scale);
-    patch.levels[1].positions[14] += V3d(0.8, 0.3, 0.1) * scale;
+    patch.layers[1].positions[14] += V3d(0.8, 0.3, 0.1) * scale;
     return unfold(makeSlab(2 * scale, 0.1 * scale), patch).patch;
   };
   const Patch one = support::onThreads(1, [&] { return run(1); });
@@ -213,8 +213,8 @@ TEST(Unfold, SameBitsForAnyNumberOfThreadsAndScale) {
   EXPECT_EQ(farthestFrom(one, three), 0);
   // Powers of two change no bit of a mantissa.
   Patch large = run(1024);
-  for (auto& level : large.levels)
-    for (V3d& p : level.positions) p /= 1024;
+  for (auto& layer : large.layers)
+    for (V3d& p : layer.positions) p /= 1024;
   EXPECT_LE(farthestFrom(one, large), 1e-9);
 }
 
@@ -237,16 +237,16 @@ TEST(MinimiseDistortion, IsometriesStay) {
   // The chords of twelve cells lean by a twenty-fourth of the angle against what stands on them.
   EXPECT_NEAR(thin.before.mean, 6 + 2 * 0.05 * 0.05, 1e-3);
   EXPECT_LE(thin.after.mean, thin.before.mean);
-  for (std::size_t n = 0; n < bent.levels[0].positions.size(); ++n)
-    EXPECT_LE((thin.patch.levels[0].positions[n] - bent.levels[0].positions[n]).length(),
+  for (std::size_t n = 0; n < bent.layers[0].positions.size(); ++n)
+    EXPECT_LE((thin.patch.layers[0].positions[n] - bent.layers[0].positions[n]).length(),
               5 * height);
 }
 
 TEST(MinimiseDistortion, ADistortedPlaneBecomesUniformAgain) {
   const Patch uniform = flatPatch(9, 4);
   Patch distorted = uniform;
-  for (auto& level : distorted.levels)
-    for (V3d& p : level.positions) {
+  for (auto& layer : distorted.layers)
+    for (V3d& p : layer.positions) {
       const double inside = (1 - p.x * p.x) * (1 - p.y * p.y);
       p += V3d(0.25 * inside * std::cos(2 * p.y), 0.2 * inside * std::sin(3 * p.x), 0);
     }
@@ -277,7 +277,7 @@ TEST(MinimiseDistortion, ACapGains) {
   // distortion.
   const NarrowBand base = support::makeBall(2, 0.1);
   const Patch patch =
-      mapping::makePatch(base, support::cap(0.6, 2), 1, {.levels = 4, .spacing = 0.4}).patch;
+      mapping::makePatch(base, support::cap(0.6, 2), 1, {.layers = 4, .spacing = 0.4}).patch;
   const DistortionGain fixed = minimiseDistortion(base, patch);
   const DistortionGain free = minimiseDistortion(base, patch, {.freeSides = true});
   EXPECT_LE(fixed.after.mean - 6, 0.4 * (fixed.before.mean - 6));
@@ -286,7 +286,7 @@ TEST(MinimiseDistortion, ACapGains) {
   expectCertified(fixed.patch);
   expectCertified(free.patch);
   for (const Patch* relaxed : {&fixed.patch, &free.patch})
-    for (const V3d& p : relaxed->levels[0].positions) EXPECT_NEAR(p.length(), 2, 1e-3);
+    for (const V3d& p : relaxed->layers[0].positions) EXPECT_NEAR(p.length(), 2, 1e-3);
 }
 
 TEST(MinimiseDistortion, OverACreaseItGainsAndStaysOnBothSides) {
@@ -300,12 +300,12 @@ TEST(MinimiseDistortion, OverACreaseItGainsAndStaysOnBothSides) {
   const Patch patch =
       mapping::makePatch(
           base, {V3d(-0.6, -0.6, 0), V3d(0, -0.6, -0.6), V3d(0, 0.6, -0.6), V3d(-0.6, 0.6, 0)}, 0.4,
-          {.levels = 4, .spacing = 0.1})
+          {.layers = 4, .spacing = 0.1})
           .patch;
   const DistortionGain result = minimiseDistortion(base, patch);
   EXPECT_LT(result.after.mean - 6, 0.6 * (result.before.mean - 6));
   expectCertified(result.patch);
-  for (const V3d& p : result.patch.levels[0].positions) EXPECT_NEAR(corner(p), 0, 0.02);
+  for (const V3d& p : result.patch.layers[0].positions) EXPECT_NEAR(corner(p), 0, 0.02);
 }
 
 TEST(MinimiseDistortion, ThinEarsKeepTheirSides) {
@@ -318,14 +318,14 @@ TEST(MinimiseDistortion, ThinEarsKeepTheirSides) {
   Patch patch =
       patchAt([](const V3d& t) { return V3d(9 * t.x - 4.5, 9 * t.y - 4.5, 0.375 + 1.5 * t.z); }, 7,
               7, 3, 1.5);
-  patch.levels[0].positions[3 * 7 + 3] += V3d(2.2, 0.4, 0);
+  patch.layers[0].positions[3 * 7 + 3] += V3d(2.2, 0.4, 0);
   const Unfolding mended = unfold(base, patch);
   EXPECT_GT(mended.before.folded, 0u);
   ASSERT_TRUE(mended.isUnfolded());
   const DistortionGain relaxed = minimiseDistortion(base, mended.patch);
   EXPECT_LE(relaxed.after.mean, 6 + 1e-4);
   for (const Patch* found : {&mended.patch, &relaxed.patch})
-    for (const V3d& p : found->levels[0].positions) EXPECT_NEAR(p.z, 0.375, 1e-4);
+    for (const V3d& p : found->layers[0].positions) EXPECT_NEAR(p.z, 0.375, 1e-4);
 }
 
 TEST(MinimiseDistortion, ProportionsScaleAndThreads) {
@@ -341,11 +341,11 @@ TEST(MinimiseDistortion, ProportionsScaleAndThreads) {
   // A texture that is twice as high pulls the top up.
   const DistortionGain higher = minimiseDistortion(base, patch, {.proportions = V3d(2, 2, 2)});
   EXPECT_LT(higher.after.mean, higher.before.mean);
-  EXPECT_GT(higher.patch.levels[2].at(3, 3).z, 1.2);
+  EXPECT_GT(higher.patch.layers[2].at(3, 3).z, 1.2);
 
   const auto run = [](double scale) {
     Patch wavy = flatPatch(7, 3, scale);
-    wavy.levels[1].positions[24] += V3d(0.1, 0.05, 0.1) * scale;
+    wavy.layers[1].positions[24] += V3d(0.1, 0.05, 0.1) * scale;
     return minimiseDistortion(makeSlab(2 * scale, 0.1 * scale), wavy);
   };
   const DistortionGain one = support::onThreads(1, [&] { return run(1); });
@@ -359,7 +359,7 @@ TEST(MinimiseDistortion, ProportionsScaleAndThreads) {
 TEST(MinimiseDistortion, RefusesWhatItCannotRelax) {
   const NarrowBand base = makeSlab(2, 0.1);
   Patch folded = flatPatch(5, 3);
-  folded.levels[1].positions[12] += V3d(1, 1, 0);
+  folded.layers[1].positions[12] += V3d(1, 1, 0);
   EXPECT_THROW((void)minimiseDistortion(base, folded), levelset::InvalidInput);
   EXPECT_THROW((void)minimiseDistortion(base, {}), levelset::InvalidInput);
   const Patch patch = flatPatch(5, 3);
@@ -369,7 +369,7 @@ TEST(MinimiseDistortion, RefusesWhatItCannotRelax) {
                levelset::UsageError);
   EXPECT_THROW((void)minimiseDistortion(base, patch, {.maxMemory = 1000}), levelset::ResourceLimit);
   Patch broken = patch;
-  broken.levels[2].positions[3].x = std::nan("");
+  broken.layers[2].positions[3].x = std::nan("");
   EXPECT_THROW((void)unfold(base, broken), levelset::InvalidInput);
   Patch mended = folded;
   EXPECT_THROW((void)unfold(base, mended, {.progress = [](double) { return false; }}),
