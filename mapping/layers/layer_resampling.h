@@ -16,14 +16,15 @@ namespace mapping {
                                        std::size_t rows);
 
 /// A particle below the layers of a patch, or above them.
-struct SunkParticle {
-  Imath::V3d place, uvw;
+struct EmbeddedParticle {
+  Imath::V3d position, uvw;
 };
 
 /// Below w = −sink, or above w = 1 − sink where that is more, and in between: the columns of the
 /// patch go straight on, in layers no wider apart than the patch's own there. Left out where
 /// columns come together, as below a crease.
 /// @param sink  as a share of the patch's height
-[[nodiscard]] std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink);
+[[nodiscard]] std::vector<EmbeddedParticle> embeddedParticles(const Patch& patch,
+                                                              double embedDepth);
 
 }  // namespace mapping

@@ -58,10 +58,10 @@ Lattice::Lattice(const Patch& patch, const LatticeBorder& border) {
     }
   }
   std::vector<double>& w = coordinates_[2];
-  const double rim = border.rim / patch.height, lift = std::max(0.0, -border.sink),
-               sink = std::max(0.0, border.sink);
-  if (rim > 0) w.push_back(-sink - rim);
-  if (sink > 0) w.push_back(-sink);
+  const double rim = border.rim / patch.height, lift = std::max(0.0, -border.embedDepth),
+               embedDepth = std::max(0.0, border.embedDepth);
+  if (rim > 0) w.push_back(-embedDepth - rim);
+  if (embedDepth > 0) w.push_back(-embedDepth);
   const auto below = static_cast<int>(w.size());
   for (const ParticleLayer& layer : patch.layers) w.push_back(layer.w);
   const auto lastLayer = static_cast<int>(w.size()) - 1;

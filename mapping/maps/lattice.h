@@ -13,8 +13,9 @@ namespace mapping {
 
 /// How far a lattice reaches beyond the unit cube of a patch, so that a texture's band ends in it.
 struct LatticeBorder {
-  double sink = 0;  ///< how far the texture lies below w = 0, or above w = 1 if negative; in w
-  double rim = 0;   ///< beyond all that, on all six sides, world units; 0: none, nor around
+  double embedDepth =
+      0;           ///< how far the texture lies below w = 0, or above w = 1 if negative; in w
+  double rim = 0;  ///< beyond all that, on all six sides, world units; 0: none, nor around
 };
 
 /// One of the six tetrahedra of a cell [Brodersen07 §9]. A prism over each half of the cell's

@@ -99,7 +99,7 @@ LayerFrame layerFrame(const Patch& patch, const V3d& uvw) {
            (high.position - low.position) * static_cast<double>(patch.layers.size() - 1)}};
 }
 
-std::vector<MapSample> sampleLayerMap(const Patch& patch, double sink) {
+std::vector<MapSample> sampleLayerMap(const Patch& patch, double embedDepth) {
   constexpr double kInside = 1e-3;  // of a cell, from its corners
   std::vector<MapSample> samples;
   const double layers = static_cast<double>(patch.layers.size() - 1);
@@ -110,8 +110,8 @@ std::vector<MapSample> sampleLayerMap(const Patch& patch, double sink) {
     std::vector<double> heights;
     if (k > 0) heights.push_back(layer.w - kInside * cell.z);
     if (k + 1 < patch.layers.size()) heights.push_back(layer.w + kInside * cell.z);
-    if (k == 0 && sink > 0) heights.push_back(-sink);
-    if (k + 1 == patch.layers.size() && sink < 0) heights.push_back(1 - sink);
+    if (k == 0 && embedDepth > 0) heights.push_back(-embedDepth);
+    if (k + 1 == patch.layers.size() && embedDepth < 0) heights.push_back(1 - embedDepth);
     for (std::size_t j = 0; j + 1 < layer.rows; ++j)
       for (std::size_t i = 0; i + 1 < layer.columns; ++i)
         for (const double w : heights)

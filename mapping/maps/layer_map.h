@@ -28,7 +28,7 @@ struct LayerFrame {
 /// That map and its inverse's slopes in the middle and close to the corners of every cell, where a
 /// bilinear cell turns over first; for layers of unlike counts in those of both.
 /// @param sink  how far below w = 0 to look too, or above w = 1 if negative
-[[nodiscard]] std::vector<MapSample> sampleLayerMap(const Patch& patch, double sink);
+[[nodiscard]] std::vector<MapSample> sampleLayerMap(const Patch& patch, double embedDepth);
 
 /// The longest edge of any cell of particles, across layers included.
 [[nodiscard]] double longestCellEdge(const Patch& patch);

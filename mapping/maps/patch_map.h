@@ -51,7 +51,7 @@ class BlockMap {
 
 /// A map at one place.
 struct MapSample {
-  Imath::V3d place, uvw;
+  Imath::V3d position, uvw;
   Imath::M33d jacobian;  ///< rows: gradients of u, v and w; not finite where the map is flat
 };
 

@@ -6,7 +6,7 @@
 namespace mapping {
 
 enum class PatchMeshKind {
-  Shell,  ///< bottom, top and the four sides: one closed mesh that faces outwards, a solid's
+  Solid,  ///< bottom, top and the four sides: one closed mesh that faces outwards, a solid's
           ///< surface
   Sheets  ///< each layer by itself, as it is
 };
@@ -15,6 +15,6 @@ enum class PatchMeshKind {
 /// triangles. The sides of a shell join the borders of all layers.
 /// @pre two layers or more
 [[nodiscard]] levelset::TriMesh patchMesh(const Patch& patch,
-                                          PatchMeshKind kind = PatchMeshKind::Shell);
+                                          PatchMeshKind kind = PatchMeshKind::Solid);
 
 }  // namespace mapping

@@ -12,7 +12,7 @@ namespace mapping {
 namespace {
 
 using Imath::V3d;
-using Way = std::vector<V3d>;
+using Path = std::vector<V3d>;
 
 constexpr std::size_t kMaxSearchNodes = 4'000'000;
 // Grid points this near to the surface are joined by their 26 neighbours, on planes of any slope.
@@ -20,7 +20,7 @@ constexpr double kBesideVoxels = 0.75;
 // A step that turns the normal by more than a right angle leads through a thin sheet, not around.
 constexpr double kLeastNormalCosine = 0;
 constexpr double kGridExcess = 1.15;  // of ways over the grid; 1.128 for the least handy direction
-constexpr std::size_t kMostWays = 40;
+constexpr std::size_t kMostPaths = 40;
 
 using Key = std::uint64_t;
 using GridCell = std::array<int, 3>;
@@ -41,7 +41,7 @@ GridCell unpackCell(Key key) {
 
 /// The grid points beside φ = height, found out as they are asked for, with what the searches from
 /// the one end and from the other know of them. GridCell (0, 0, 0) is the point a.
-class WayGraph {
+class PathGraph {
  public:
   struct Node {
     std::array<double, 2> cost = {HUGE_VAL, HUGE_VAL};  // from a, from b
@@ -51,7 +51,7 @@ class WayGraph {
     V3d normal{0};
   };
 
-  WayGraph(const SurfaceField& field, double height, const V3d& a, const V3d& b)
+  PathGraph(const SurfaceField& field, double height, const V3d& a, const V3d& b)
       : field_(field), height_(height), ends_{a, b}, step_(field.voxelSize()) {}
 
   [[nodiscard]] V3d place(Key key) const {
@@ -90,15 +90,15 @@ class WayGraph {
   }
 
   /// From a node back to where the search from `end` began; projected.
-  [[nodiscard]] Way trace(std::size_t end, Key key) {
-    Way way;
+  [[nodiscard]] Path trace(std::size_t end, Key key) {
+    Path path;
     for (;; key = nodes_.at(key).from[end]) {
       V3d p = place(key);
-      if (field_.project(p, height_)) way.push_back(p);
+      if (field_.project(p, height_)) path.push_back(p);
       if (nodes_.at(key).from[end] == key) break;
     }
-    way.push_back(ends_[end]);
-    return way;
+    path.push_back(ends_[end]);
+    return path;
   }
 
  private:
@@ -169,7 +169,7 @@ struct Meeting {
 };
 
 /// Nodes about as far from the one end as from the other, the best first.
-std::vector<Meeting> meetings(const WayGraph& graph) {
+std::vector<Meeting> meetings(const PathGraph& graph) {
   std::vector<Meeting> result;
   for (const auto& [key, node] : graph.nodes()) {
     if (!node.isBeside || std::abs(node.cost[0] - node.cost[1]) > 1.8 * graph.step()) continue;
@@ -184,22 +184,22 @@ std::vector<Meeting> meetings(const WayGraph& graph) {
 
 }  // namespace
 
-Way GeodesicSearch::shortest() const {
-  WayGraph graph(field_, height_, a_, b_);
+Path GeodesicSearch::shortest() const {
+  PathGraph graph(field_, height_, a_, b_);
   const auto goal = graph.search(
       0, [](const V3d&, double) { return true; }, [&](const V3d& p) { return (p - b_).length(); },
-      [&](Key key, const WayGraph::Node& node) {
+      [&](Key key, const PathGraph::Node& node) {
         return graph.isBesideEnd(1, graph.place(key), node.normal);
       });
   if (!goal) return {};
-  Way way = graph.trace(0, *goal);
-  std::reverse(way.begin(), way.end());
-  way.push_back(b_);
-  return way;
+  Path path = graph.trace(0, *goal);
+  std::reverse(path.begin(), path.end());
+  path.push_back(b_);
+  return path;
 }
 
-std::vector<Way> GeodesicSearch::alternatives(double longest) const {
-  WayGraph graph(field_, height_, a_, b_);
+std::vector<Path> GeodesicSearch::alternatives(double longest) const {
+  PathGraph graph(field_, height_, a_, b_);
   const double most = kGridExcess * longest, slack = 4 * graph.step();
   for (const std::size_t end : {0u, 1u}) {
     const V3d& from = end == 0 ? a_ : b_;
@@ -210,15 +210,15 @@ std::vector<Way> GeodesicSearch::alternatives(double longest) const {
           return cost <= 0.5 * most + slack &&
                  (p - from).length() + (p - to).length() <= longest + slack;
         },
-        [](const V3d&) { return 0.0; }, [](Key, const WayGraph::Node&) { return false; });
+        [](const V3d&) { return 0.0; }, [](Key, const PathGraph::Node&) { return false; });
   }
   // Meetings close to each other belong to the same way.
   const double apart = std::max(3 * graph.step(), 0.025 * longest);
-  std::vector<Way> ways;
+  std::vector<Path> paths;
   std::vector<std::pair<V3d, V3d>> taken;  // places and normals
   const std::vector<Meeting> all = meetings(graph);
   for (const Meeting& meeting : all) {
-    if (ways.size() == kMostWays || meeting.cost > kGridExcess * all.front().cost) break;
+    if (paths.size() == kMostPaths || meeting.cost > kGridExcess * all.front().cost) break;
     const V3d p = graph.place(meeting.key), normal = graph.node(meeting.key).normal;
     const bool isNew = std::none_of(taken.begin(), taken.end(), [&](const auto& other) {
       // The two faces of a thin sheet are two ways, however near.
@@ -226,13 +226,13 @@ std::vector<Way> GeodesicSearch::alternatives(double longest) const {
     });
     if (!isNew) continue;
     taken.emplace_back(p, normal);
-    Way way = graph.trace(0, meeting.key);
-    std::reverse(way.begin(), way.end());
-    const Way rest = graph.trace(1, meeting.key);
-    way.insert(way.end(), rest.begin() + 1, rest.end());
-    ways.push_back(std::move(way));
+    Path path = graph.trace(0, meeting.key);
+    std::reverse(path.begin(), path.end());
+    const Path rest = graph.trace(1, meeting.key);
+    path.insert(path.end(), rest.begin() + 1, rest.end());
+    paths.push_back(std::move(path));
   }
-  return ways;
+  return paths;
 }
 
 }  // namespace mapping

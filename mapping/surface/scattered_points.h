@@ -25,7 +25,7 @@ struct ScatterDensity {
 };
 
 struct SurfacePoint {
-  Imath::V3d place, normal;  ///< on the zero set; unit, outwards
+  Imath::V3d position, normal;  ///< on the zero set; unit, outwards
   double scale = 1;
 };
 

@@ -14,8 +14,8 @@
 /// neighbours.
 namespace mapping {
 
-struct ShellOptions {
-  double sink = 0;         ///< how far the texture lies below the surface, in w
+struct UntangleOptions {
+  double embedDepth = 0;   ///< how far the texture lies below the surface, in w
   bool freeSides = false;  ///< the sides slide on the surface too; else they stay
   /// Size of the unit cube at rest; empty: that of the patch, so that the proportions that were
   /// asked for are no distortion. For the distortion the unit does not matter.
@@ -27,18 +27,18 @@ struct ShellOptions {
 
 /// Cells of the shell in which the straight map through the particles (or one of a cell's six
 /// tetrahedra) turns over or has no volume, and the least determinant.
-struct ShellFolds {
+struct FoldCount {
   std::size_t folded = 0, cells = 0;
   double leastJacobian = 0;  ///< at the corners and in the tetrahedra of the cells; 1 at rest
 };
-[[nodiscard]] ShellFolds countFolds(const Patch& patch, double sink = 0);
+[[nodiscard]] FoldCount countFolds(const Patch& patch, double embedDepth = 0);
 
-struct Unfolding {
+struct Untangling {
   Patch patch;  ///< the given one, to the bit, where it did not fold, or nothing was mended
-  ShellFolds before, after;
+  FoldCount before, after;
   std::size_t iterations = 0;
   double farthestMove = 0;  ///< of a particle, world units
-  [[nodiscard]] bool isUnfolded() const { return after.folded == 0; }
+  [[nodiscard]] bool isUntangled() const { return after.folded == 0; }
 };
 
 /// Moves particles until no cell folds: the least of an energy that is finite for folds and forbids
@@ -47,28 +47,28 @@ struct Unfolding {
 /// @param base  the solid that the patch was made on
 /// @throws InvalidInput for a patch without layers, with particles that are not finite, or one that
 ///         does not lie on the base; ResourceLimit; Cancelled
-[[nodiscard]] Unfolding unfold(const levelset::NarrowBand& base, const Patch& patch,
-                               const ShellOptions& options = {});
+[[nodiscard]] Untangling untangle(const levelset::NarrowBand& base, const Patch& patch,
+                                  const UntangleOptions& options = {});
 
 /// What the symmetric Dirichlet energy of a shell's elements is, against a box of given proportions
 /// in the size at which it is least: 6 for a map that keeps proportions.
-struct ShellDistortion {
+struct ElementDistortion {
   double mean = 0;  ///< by volume at rest: what is minimised
   double median = 0, percent99 = 0, most = 0;
 };
 
 struct DistortionGain {
   Patch patch;
-  ShellDistortion before, after;
+  ElementDistortion before, after;
   std::size_t iterations = 0;
   double farthestMove = 0;  ///< world units
 };
 
 /// Moves particles to the least symmetric Dirichlet energy [Smith15] over the whole shell, see
-/// ShellDistortion. It falls with every step, and a fold is never made.
-/// @throws InvalidInput as above, and for a patch that folds: unfold it first
+/// ElementDistortion. It falls with every step, and a fold is never made.
+/// @throws InvalidInput as above, and for a patch that folds: untangle it first
 [[nodiscard]] DistortionGain minimiseDistortion(const levelset::NarrowBand& base,
                                                 const Patch& patch,
-                                                const ShellOptions& options = {});
+                                                const UntangleOptions& options = {});
 
 }  // namespace mapping

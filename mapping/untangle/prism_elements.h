@@ -12,40 +12,40 @@
 namespace mapping {
 
 /// Slopes of texture → patch as columns: ∂x/∂u, ∂x/∂v, ∂x/∂w in units of the shape at rest.
-using ShellSlopes = std::array<Imath::V3d, 3>;
+using ElementSlopes = std::array<Imath::V3d, 3>;
 
 /// The energy of one element for each volume at rest, and its derivative by the slopes.
 struct ElementEnergy {
   double value = 0;  ///< infinite where the element must not be
-  ShellSlopes stress{Imath::V3d(0), Imath::V3d(0), Imath::V3d(0)};
+  ElementSlopes stress{Imath::V3d(0), Imath::V3d(0), Imath::V3d(0)};
 };
 
 /// |F|² + |F⁻¹|², the symmetric Dirichlet energy: 6 for a rotation, infinite where F turns over
 /// [Smith15].
-[[nodiscard]] ElementEnergy symmetricDirichlet(const ShellSlopes& slopes);
+[[nodiscard]] ElementEnergy symmetricDirichlet(const ElementSlopes& slopes);
 
 /// |F|² / χ^⅔ + (1 + det²) / χ with χ = (det + √(ε² + det²)) / 2 in place of det: finite for any F,
 /// and as ε goes to nothing it forbids folds [Garanzha21].
-[[nodiscard]] ElementEnergy foldoverEnergy(const ShellSlopes& slopes, double epsilon);
+[[nodiscard]] ElementEnergy foldoverEnergy(const ElementSlopes& slopes, double epsilon);
 
-[[nodiscard]] double determinantOf(const ShellSlopes& slopes);
+[[nodiscard]] double determinantOf(const ElementSlopes& slopes);
 
 /// The cells of a patch's shell as elements in which slopes are linear in the particles: the eight
 /// corners of each cell, where a trilinear map turns over first, and its six tetrahedra.
-class ShellElements {
+class PrismElements {
  public:
   /// @param rest  size of the unit cube at rest, world units
-  /// @param sink  see ShellCells
-  ShellElements(const Patch& patch, const Imath::V3d& rest, double sink);
+  /// @param sink  see PrismCells
+  PrismElements(const Patch& patch, const Imath::V3d& rest, double embedDepth);
 
   [[nodiscard]] std::size_t size() const { return weights_.size(); }
   [[nodiscard]] std::size_t particleCount() const { return particles_; }
   /// Share of an element in the volume at rest.
   [[nodiscard]] double weight(std::size_t element) const { return weights_[element]; }
-  [[nodiscard]] ShellSlopes slopes(std::size_t element,
-                                   const std::vector<Imath::V3d>& positions) const;
+  [[nodiscard]] ElementSlopes slopes(std::size_t element,
+                                     const std::vector<Imath::V3d>& positions) const;
   /// Derivatives by each particle's position, from those by each element's slopes.
-  [[nodiscard]] std::vector<Imath::V3d> gather(const std::vector<ShellSlopes>& stress) const;
+  [[nodiscard]] std::vector<Imath::V3d> gather(const std::vector<ElementSlopes>& stress) const;
 
   /// A particle's share in an element: slopes += position × slope, column by column.
   struct Entry {

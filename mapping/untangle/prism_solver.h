@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "levelset/narrow_band.h"
-#include "mapping/untangle/shell_energy.h"
+#include "mapping/untangle/prism_elements.h"
 
 namespace mapping {
 
@@ -23,14 +23,14 @@ enum class ParticleHold : char {
 /// preconditioned with the Laplacian of the elements [Nocedal06; Claici17], each step projected
 /// onto the surface and taken only when the energy has fallen by enough. The same bits for any
 /// number of threads.
-class ShellSolver {
+class PrismSolver {
  public:
-  using Density = std::function<ElementEnergy(const ShellSlopes&)>;
+  using Density = std::function<ElementEnergy(const ElementSlopes&)>;
 
   /// @param positions  of all particles; those that slide are on the surface
-  ShellSolver(const levelset::NarrowBand& base, const ShellElements& elements,
+  PrismSolver(const levelset::NarrowBand& base, const PrismElements& elements,
               std::vector<ParticleHold> holds, std::vector<Imath::V3d> positions);
-  ~ShellSolver();
+  ~PrismSolver();
 
   /// @return iterations taken; fewer than asked where nothing is left to gain
   std::size_t minimise(const Density& density, std::size_t mostIterations);
@@ -45,9 +45,9 @@ class ShellSolver {
   struct Memory;
 
   double energyAt(const Density& density, const Vectors& positions,
-                  std::vector<ShellSlopes>* stress) const;
+                  std::vector<ElementSlopes>* stress) const;
   /// Derivatives along which particles may move.
-  [[nodiscard]] Vectors gradientOf(const std::vector<ShellSlopes>& stress) const;
+  [[nodiscard]] Vectors gradientOf(const std::vector<ElementSlopes>& stress) const;
   void makeTangent(Vectors& vectors) const;
   void updateNormals();
   /// False where the surface cannot be followed.
@@ -55,7 +55,7 @@ class ShellSolver {
   [[nodiscard]] Vectors preconditioned(Vectors vectors) const;
 
   const levelset::NarrowBand& base_;
-  const ShellElements& elements_;
+  const PrismElements& elements_;
   std::vector<ParticleHold> holds_;
   Vectors positions_, normals_;
   double spacing_ = 0;  ///< of particles, for the length of steps

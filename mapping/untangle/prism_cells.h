@@ -24,21 +24,21 @@ struct ParticleSum {
 
 /// A box of texture space in which the straight map through the particles (see layer_map.h) is
 /// trilinear, and its corners: bits 0, 1, 2 of the index tell the upper end of u, v, w.
-struct ShellCell {
+struct PrismCell {
   Imath::Box3d box;
   std::array<ParticleSum, 8> corners;
 };
 
 /// All such boxes between the layers of a patch, and as far below or above them as a texture is
 /// sunk or lifted. Between layers of unlike counts they end wherever a cell of either does.
-class ShellCells {
+class PrismCells {
  public:
   /// @param sink  of the texture, in w: below the surface, above w = 1 if negative
   /// @pre two layers or more
-  explicit ShellCells(const Patch& patch, double sink = 0);
+  explicit PrismCells(const Patch& patch, double embedDepth = 0);
 
   [[nodiscard]] std::size_t size() const { return slabs_.back().first + slabs_.back().count(); }
-  [[nodiscard]] ShellCell at(std::size_t index) const;
+  [[nodiscard]] PrismCell at(std::size_t index) const;
 
  private:
   struct Slab {
@@ -57,7 +57,7 @@ class ShellCells {
 
 /// Mean lengths of the rows and columns on the surface, and the height: with u, v and w multiplied
 /// by them, slopes are about 1.
-[[nodiscard]] Imath::V3d shellSizes(const Patch& patch);
+[[nodiscard]] Imath::V3d meanExtents(const Patch& patch);
 
 /// Positions of all particles but the rims', layer by layer.
 [[nodiscard]] std::vector<Imath::V3d> particlePositions(const Patch& patch);

@@ -15,9 +15,9 @@ namespace mapping {
 /// The map that is straight in each tetrahedron of a patch's lattice, the hybrid of particle layers
 /// and shell maps [Brodersen07 §9; Porumbescu05]. Continuous, defined in the lattice only, and
 /// where no tetrahedron is turned over it goes both ways.
-class ShellMap final : public PatchMap {
+class PrismMap final : public PatchMap {
  public:
-  ShellMap(const Patch& patch, const LatticeBorder& border);
+  PrismMap(const Patch& patch, const LatticeBorder& border);
 
   [[nodiscard]] Imath::V3d operator()(const Imath::V3d& x) const override;
   [[nodiscard]] Imath::M33d jacobian(const Imath::V3d& x) const override;
@@ -42,14 +42,14 @@ class ShellMap final : public PatchMap {
   [[nodiscard]] bool holdsTexture(const Imath::V3d& uvw) const;
 
  private:
-  friend class ShellBlock;
+  friend class PrismBlock;
   /// A point with what rounding may leave between it and the cell that holds it.
   [[nodiscard]] Imath::Box3d aroundPoint(const Imath::V3d& x) const;
   /// @return false where no tetrahedron holds x
   [[nodiscard]] bool find(const Imath::V3d& x, Tetrahedron& t) const;
 
   Lattice lattice_;
-  double sink_;  ///< in w
+  double embedDepth_;  ///< in w
   CellTree tree_;
 };
 

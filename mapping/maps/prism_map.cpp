@@ -1,4 +1,4 @@
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 
 #include <algorithm>
 #include <array>
@@ -56,9 +56,9 @@ Box3d around(const GridBlock& block) {
 }  // namespace
 
 /// The cells of a shell map that touch a block.
-class ShellBlock final : public BlockMap {
+class PrismBlock final : public BlockMap {
  public:
-  ShellBlock(const ShellMap& map, const GridBlock& block) : map_(map), block_(block) {
+  PrismBlock(const PrismMap& map, const GridBlock& block) : map_(map), block_(block) {
     map.tree_.visit(around(block), [&](const Cell& cell) {
       cells_.push_back(cell);
       return false;
@@ -91,7 +91,7 @@ class ShellBlock final : public BlockMap {
   }
 
   [[nodiscard]] std::unique_ptr<BlockMap> octant(int bits) const override {
-    return std::unique_ptr<BlockMap>(new ShellBlock(*this, bits));
+    return std::unique_ptr<BlockMap>(new PrismBlock(*this, bits));
   }
 
   std::size_t evaluate(std::span<V3d, 512> uvw) const override {
@@ -107,7 +107,7 @@ class ShellBlock final : public BlockMap {
   }
 
  private:
-  ShellBlock(const ShellBlock& parent, int bits)
+  PrismBlock(const PrismBlock& parent, int bits)
       : map_(parent.map_), block_(parent.block_.octant(bits)) {
     const Box3d box = around(block_);
     for (const Cell& cell : parent.cells_)
@@ -140,7 +140,7 @@ class ShellBlock final : public BlockMap {
   /// Goes from point to point through faces; searches the block's cells where that fails.
   class Walk {
    public:
-    explicit Walk(const ShellBlock& block)
+    explicit Walk(const PrismBlock& block)
         : map_(block.map_), lattice_(block.map_.lattice_), block_(block) {}
 
     /// The next point lies beside the first of the row before.
@@ -195,23 +195,23 @@ class ShellBlock final : public BlockMap {
       return barycentric(lattice_.corners(t), x);
     }
 
-    const ShellMap& map_;
+    const PrismMap& map_;
     const Lattice& lattice_;
-    const ShellBlock& block_;
+    const PrismBlock& block_;
     Tetrahedron current_, first_;
     bool isAt_ = false, hasFirst_ = false, isRowStart_ = true;
     std::size_t tests_ = 0;
   };
 
-  const ShellMap& map_;
+  const PrismMap& map_;
   GridBlock block_;
   std::vector<Cell> cells_;
 };
 
-ShellMap::ShellMap(const Patch& patch, const LatticeBorder& border)
-    : lattice_(patch, border), sink_(border.sink), tree_(lattice_) {}
+PrismMap::PrismMap(const Patch& patch, const LatticeBorder& border)
+    : lattice_(patch, border), embedDepth_(border.embedDepth), tree_(lattice_) {}
 
-double ShellMap::estimateBytes(const Patch& patch) {
+double PrismMap::estimateBytes(const Patch& patch) {
   double columns = 0, rows = 0;
   for (const ParticleLayer& layer : patch.layers) {
     columns = std::max(columns, static_cast<double>(layer.columns));
@@ -223,12 +223,12 @@ double ShellMap::estimateBytes(const Patch& patch) {
          (static_cast<double>(patch.layers.size()) + 3);
 }
 
-Box3d ShellMap::aroundPoint(const V3d& x) const {
+Box3d PrismMap::aroundPoint(const V3d& x) const {
   const V3d slack(-kOnFace * tree_.size());
   return {x - slack, x + slack};
 }
 
-bool ShellMap::find(const V3d& x, Tetrahedron& t) const {
+bool PrismMap::find(const V3d& x, Tetrahedron& t) const {
   return tree_.visit(aroundPoint(x), [&](const Cell& cell) {
     for (int order = 0; order < 6; ++order) {
       t = {cell, order};
@@ -238,28 +238,28 @@ bool ShellMap::find(const V3d& x, Tetrahedron& t) const {
   });
 }
 
-V3d ShellMap::operator()(const V3d& x) const {
+V3d PrismMap::operator()(const V3d& x) const {
   Tetrahedron t;
   if (!find(x, t)) return V3d(kNaN);
   return mix(lattice_.textureCorners(t), barycentric(lattice_.corners(t), x));
 }
 
-M33d ShellMap::jacobian(const V3d& x) const {
+M33d PrismMap::jacobian(const V3d& x) const {
   Tetrahedron t;
   if (!find(x, t)) return {kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, kNaN};
   return slopes(lattice_.corners(t), lattice_.textureCorners(t));
 }
 
-std::unique_ptr<BlockMap> ShellMap::restrictTo(const GridBlock& block, double) const {
-  return std::make_unique<ShellBlock>(*this, block);
+std::unique_ptr<BlockMap> PrismMap::restrictTo(const GridBlock& block, double) const {
+  return std::make_unique<PrismBlock>(*this, block);
 }
 
-bool ShellMap::holdsTexture(const V3d& uvw) const {
+bool PrismMap::holdsTexture(const V3d& uvw) const {
   return std::min(uvw.x, uvw.y) >= 0 && std::max(uvw.x, uvw.y) <= 1 &&
-         uvw.z >= -std::max(0.0, sink_) && uvw.z <= 1 + std::max(0.0, -sink_);
+         uvw.z >= -std::max(0.0, embedDepth_) && uvw.z <= 1 + std::max(0.0, -embedDepth_);
 }
 
-std::vector<MapSample> ShellMap::samples() const {
+std::vector<MapSample> PrismMap::samples() const {
   std::vector<MapSample> result;
   result.reserve(6 * lattice_.cellCount());
   const Cell cells = lattice_.cells();
@@ -277,18 +277,18 @@ std::vector<MapSample> ShellMap::samples() const {
   return result;
 }
 
-std::size_t ShellMap::countOverlaps(std::span<const MapSample> samples, MapSample& first) const {
+std::size_t PrismMap::countOverlaps(std::span<const MapSample> samples, MapSample& first) const {
   constexpr double kElsewhere = 1e-6;  // of u, v, w; rounding is far less
   std::size_t count = 0;
   for (const MapSample& sample : samples) {
-    const V3d found = (*this)(sample.place);
+    const V3d found = (*this)(sample.position);
     if (!((found - sample.uvw).length() > kElsewhere) || !holdsTexture(found)) continue;
     if (count++ == 0) first = sample;
   }
   return count;
 }
 
-V3d ShellMap::toPatch(const V3d& uvw) const {
+V3d PrismMap::toPatch(const V3d& uvw) const {
   Tetrahedron t;
   if (!lattice_.locate(uvw, t)) return V3d(kNaN);
   return mix(lattice_.corners(t), barycentric(lattice_.textureCorners(t), uvw));
