@@ -27,7 +27,7 @@ struct Hit {
   std::uint32_t id = 0;         ///< Solid::id or MeshPart::id
   std::size_t solid = 0;        ///< index in Scene::solids, or Scene::meshes
   bool isOnMesh = false;
-  bool isTurned = false;      ///< is that solid's outside inside what is drawn? Normals and
+  bool isFlipped = false;     ///< is that solid's outside inside what is drawn? Normals and
                               ///< curvatures tell of what is drawn
   bool isBeyondBand = false;  ///< has a field a part in it where its band knows no distance?
   /// Where the ray goes on behind a mesh's surface, off the rounding of the hit.

@@ -30,11 +30,11 @@ struct BrickPool {
   static constexpr int kBlocksOfPage = 512;
   /// On from a block's entry: where its values begin, and their strides.
   static constexpr int kFirstOfEntry = kBlocksOfPage, kStridesOfEntry = 2 * kBlocksOfPage;
-  static constexpr std::size_t kCodeRoom = 4;  ///< bytes behind the last code
-  static constexpr int kStrideShift = 8;       ///< of that along x, above that along y
+  static constexpr std::size_t kCodePadding = 4;  ///< bytes behind the last code
+  static constexpr int kStrideShift = 8;          ///< of that along x, above that along y
 
   Filter filter = Filter::Trilinear;
-  ValueBits held = {};
+  ValueBits quantization = {};
   std::array<int, 3> origin{};  ///< index of the point at (0, 0, 0)
   std::array<int, 3> pages{};   ///< along each axis
   /// By x, y, z of the page: where its entries begin; negative, less the edge of an empty cube of
@@ -60,21 +60,21 @@ struct BrickPool {
   /// And the cells that it crosses.
   std::array<int, 3> cellsLow{}, cellsHigh{};
 
-  std::size_t besideCount = 0;    ///< blocks of which some points are held
-  std::size_t blocksLeftOut = 0;  ///< leaves of the band of which nothing is
-  std::size_t blocksUnseen = 0;   ///< that are crossed, and not needed
+  std::size_t haloCount = 0;      ///< blocks of which some points are held
+  std::size_t blocksOmitted = 0;  ///< leaves of the band of which nothing is
+  std::size_t blocksCulled = 0;   ///< that are crossed, and not needed
   [[nodiscard]] std::size_t brickCount() const { return mask.size() / kMaskWords; }
   [[nodiscard]] std::size_t valueBytes() const {
-    return code.empty() ? value.size() * sizeof value[0] : code.size() - kCodeRoom;
+    return code.empty() ? value.size() * sizeof value[0] : code.size() - kCodePadding;
   }
   [[nodiscard]] std::size_t bytes() const;
 };
 
 struct TableOptions {
   Filter filter = Filter::Trilinear;
-  ValueBits held = {};  ///< @pre the values are of these, the coefficients of a spline too
+  ValueBits quantization = {};  ///< @pre the values are of these, the coefficients of a spline too
   /// Is anything of a ball in index space needed? What is not is left out. Empty: everything is.
-  std::function<bool(const Imath::V3d& centre, double radius)> needs = {};
+  std::function<bool(const Imath::V3d& centre, double radius)> keeps = {};
 };
 
 /// @throws levelset::ResourceLimit for a band whose surface spans more than the table can hold, or

@@ -34,7 +34,7 @@ class FieldGrid {
 
   /// Takes where the band is anew. @return has it moved? @pre it has the values that this was made
   /// of
-  bool place(const levelset::NarrowBand& band);
+  bool updateTransform(const levelset::NarrowBand& band);
 
   [[nodiscard]] const Imath::M44d& indexToWorld() const { return indexToWorld_; }
   [[nodiscard]] const Imath::M44d& worldToIndex() const { return worldToIndex_; }

@@ -21,7 +21,7 @@ struct Brick {
 };
 
 /// A block that it does not, of which the shape of the surface takes some points.
-struct BesideBlock {
+struct HaloBlock {
   openvdb::Coord origin;
   openvdb::CoordBBox points = {};  ///< that hold those, from the origin on
   std::vector<float> value = {};   ///< of them by x, y, z; none where all are alike: far away
@@ -32,17 +32,17 @@ struct BesideBlock {
 [[nodiscard]] openvdb::FloatTree::Ptr quasiInterpolated(const openvdb::FloatTree& tree);
 
 struct Bricks {
-  std::vector<std::unique_ptr<Brick>> needed;  ///< in the order of their origins
-  openvdb::CoordBBox crossed;                  ///< origins of all that are crossed
-  openvdb::CoordBBox cells;                    ///< that are, of all
-  std::size_t unneeded = 0;
+  std::vector<std::unique_ptr<Brick>> kept;  ///< in the order of their origins
+  openvdb::CoordBBox crossed;                ///< origins of all that are crossed
+  openvdb::CoordBBox cells;                  ///< that are, of all
+  std::size_t culled = 0;
 };
 
 /// @param tree  of values, or of the spline's coefficients
 [[nodiscard]] Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options);
 
 /// In the order of their origins. @param bricks  of that tree
-[[nodiscard]] std::vector<BesideBlock> blocksBeside(
-    const openvdb::FloatTree& tree, const std::vector<std::unique_ptr<Brick>>& bricks);
+[[nodiscard]] std::vector<HaloBlock> haloBlocks(const openvdb::FloatTree& tree,
+                                                const std::vector<std::unique_ptr<Brick>>& bricks);
 
 }  // namespace render

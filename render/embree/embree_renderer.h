@@ -39,9 +39,9 @@ class EmbreeScene {
                               double near = 0, double far = Camera::kNoDepth) const;
   /// Those in [near, far] that are seen: in their order, up to an opaque one or to where less than
   /// kLeastTransmittance is left. @throws as intersect()
-  [[nodiscard]] std::vector<Hit> intersectSeen(const Imath::V3d& origin,
-                                               const Imath::V3d& direction, double near,
-                                               double far) const;
+  [[nodiscard]] std::vector<Hit> intersectVisible(const Imath::V3d& origin,
+                                                  const Imath::V3d& direction, double near,
+                                                  double far) const;
   /// Share of light that comes through all that is in [0, far], or less than kLeastTransmittance.
   /// @throws as intersect()
   [[nodiscard]] double transmittance(const Imath::V3d& origin, const Imath::V3d& direction,

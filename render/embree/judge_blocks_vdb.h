@@ -61,7 +61,7 @@ struct DrawnField {
 /// Where a ray changes sides.
 struct SideChange {
   double t;
-  bool goesIn;
+  bool enters;
 };
 
 enum class Search { FirstCrossing, AnyCrossing };

@@ -22,14 +22,14 @@ struct SurfaceShift {
   double largest = 0, rms = 0;
 };
 
-struct CoarseBand {
+struct QuantizedBand {
   levelset::NarrowBand band;  ///< of values that `held` has
-  ValueBits held;
+  ValueBits quantization;
   SurfaceShift shift;
 };
 
 /// A band in fewer bits. @param bits  8 or 16
 /// @pre the band is not empty
-[[nodiscard]] CoarseBand coarsened(const levelset::NarrowBand& band, int bits);
+[[nodiscard]] QuantizedBand quantized(const levelset::NarrowBand& band, int bits);
 
 }  // namespace render

@@ -21,7 +21,7 @@ class FrustumCulling {
 
   /// Is anything in that ball needed? Errs towards yes.
   /// @param centre, radius  world units
-  [[nodiscard]] bool needs(const Imath::V3d& centre, double radius) const;
+  [[nodiscard]] bool keeps(const Imath::V3d& centre, double radius) const;
 
  private:
   struct Plane {  // what is seen has normal · p >= offset
@@ -30,7 +30,7 @@ class FrustumCulling {
   };
   double margin_ = 0;          // of what is seen: rays to lights start that far off it, world units
   std::vector<Plane> planes_;  // of the frame and the bounds; none: all of space
-  double skyReach_ = 0;        // of rays around what is seen, world units
+  double occlusionDistance_ = 0;  // of rays around what is seen, world units
   bool hasShadows_ = false;
   Imath::V3d towardsKey_;
   double spread_ = 0;  // of its rays, by length

@@ -10,11 +10,11 @@
 
 #include "levelset/memory_limit.h"
 #include "render/bricks/brick_pool.h"
-#include "render/embree/mesh_rays.h"
-#include "render/kernel/csg_walk.h"
-#include "render/kernel/field_walk.h"
+#include "render/kernel/csg_traversal.h"
+#include "render/kernel/field_traversal.h"
 #include "render/kernel/ray_block.h"
 #include "render/kernel/ray_fan.h"
+#include "render/meshes/mesh_rays.h"
 #include "render/scene/csg_expression.h"
 #include "render/scene/scene.h"
 #include "render/shading/render_options.h"
@@ -46,17 +46,17 @@ class KernelTracer {
 struct PixelHits {
   std::vector<double> depth;        ///< along the view axis, world units
   std::vector<std::int32_t> solid;  ///< index in KernelScene::solids(), or −1
-  std::vector<char> turned;         ///< is that solid's outside inside what the scene makes of it?
+  std::vector<char> flipped;        ///< is that solid's outside inside what the scene makes of it?
   ShapeBlock shapes;
 
   explicit PixelHits(std::size_t size)
-      : depth(size), solid(size, -1), turned(size, 0), shapes(size) {}
+      : depth(size), solid(size, -1), flipped(size, 0), shapes(size) {}
 };
 
 /// Rays of pixels on their way through the solids, from surface to surface.
-struct PixelWalk {
+struct PixelTraversal {
   PixelBlock pixels;
-  CsgWalk solids;
+  CsgTraversal solids;
   struct Crossings {  ///< with one solid, the next of each ray
     std::vector<double> depth;
     ShapeBlock shapes;
@@ -81,7 +81,7 @@ class KernelScene {
   /// stay.
   /// @pre made for any camera, not for a picture; the camera is valid; the scene has the solids and
   /// the expression that this was made of
-  void look(const Scene& scene);
+  void updateView(const Scene& scene);
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
   /// World-space box of the cells that hold surface, and of the meshes; empty when there are none.
@@ -91,26 +91,27 @@ class KernelScene {
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
   /// What is drawn of the solids where the scene blends them: then there are no solids(), and
   /// castPixels() and thickness() find nothing; or null.
-  [[nodiscard]] const FieldWalk* fields() const { return fields_ ? &*fields_ : nullptr; }
+  [[nodiscard]] const FieldTraversal* fields() const { return fields_ ? &*fields_ : nullptr; }
   [[nodiscard]] std::size_t bytes() const;
   /// Blocks of the solids by what was done with them.
   struct Counts {
-    std::size_t crossed = 0, beside = 0;  // held
-    std::size_t leftOut = 0;              // with those that are
-    std::size_t unseen = 0;               // crossed, out of what the picture needs
+    std::size_t crossed = 0, halo = 0;  // held
+    std::size_t omitted = 0;            // with those that are
+    std::size_t culled = 0;             // crossed, out of what the picture needs
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
   /// Of the solids; meshes() are for the caller.
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
-  [[nodiscard]] PixelWalk walkFrom(const PixelBlock& pixels) const;
+  [[nodiscard]] PixelTraversal startTraversal(const PixelBlock& pixels) const;
   /// What rays meet next: those that were told to go on, the others what they met before.
-  [[nodiscard]] PixelHits castOn(const KernelTracer& tracer, PixelWalk& walk) const;
+  [[nodiscard]] PixelHits castNext(const KernelTracer& tracer, PixelTraversal& walk) const;
   /// @return how far each ray is within what is drawn of the solids and is seen, along the view
   /// axis, world units
   [[nodiscard]] std::vector<double> thickness(const KernelTracer& tracer,
                                               const PixelBlock& pixels) const;
-  /// @return for each ray the share of its light that what it meets within its reach lets through
+  /// @return for each ray the share of its light that what it meets within its maxDistance lets
+  /// through
   [[nodiscard]] std::vector<double> transmittances(const KernelTracer& tracer,
                                                    const std::vector<LightRay>& rays) const;
 
@@ -137,7 +138,7 @@ class KernelScene {
   std::vector<KernelSolid> solids_;  // by voxel size and id
   CsgExpression csg_;                // of those
   MeshRays meshes_;
-  std::optional<FieldWalk> fields_;
+  std::optional<FieldTraversal> fields_;
   Imath::Box3d bounds_, tableBounds_;
   double near_ = 0, far_ = Camera::kNoDepth;  // depths that the camera sees
 };

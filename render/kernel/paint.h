@@ -40,7 +40,7 @@ class KernelPainter {
   void paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
   void paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
   /// The ray of a pixel's sample.
-  struct Sight {
+  struct SampleRay {
     Camera::Ray ray;
     double meshNear;  ///< behind the meshes that it met
     double left = 1;  ///< transmittance of what it met; 0: it leaves the scene
@@ -48,7 +48,8 @@ class KernelPainter {
   /// Adds up what rays meet that see anything yet.
   /// @return numbers of those that go on through a solid
   std::vector<std::size_t> addSeen(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
-                                   int sample, const PixelHits& hits, std::vector<Sight>& sights,
+                                   int sample, const PixelHits& hits,
+                                   std::vector<SampleRay>& sampleRays,
                                    std::vector<ColourSum>& sums) const;
 
   const Scene& scene_;

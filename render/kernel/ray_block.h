@@ -50,8 +50,8 @@ struct PixelBlock {
 
 /// What they meet.
 struct HitBlock {
-  static constexpr std::int32_t kGoesIn = -1, kGoesOut = -2;
-  std::vector<std::int32_t> found;  ///< kGoesIn or kGoesOut, or 0
+  static constexpr std::int32_t kEnters = -1, kLeaves = -2;
+  std::vector<std::int32_t> found;  ///< kEnters or kLeaves, or 0
   std::vector<float> t;
   std::vector<std::int32_t> x, y, z;  ///< cell, in the table's space
 

@@ -28,9 +28,9 @@ struct Solid {
   levelset::NarrowBand band;
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
-  std::string name = {};  ///< for the expression
-  double opacity = 1;     ///< of each of its surfaces that a ray meets, (0, 1]
-  ValueBits held = {};    ///< of the kernel's tables; the band has these values (coarsened())
+  std::string name = {};        ///< for the expression
+  double opacity = 1;           ///< of each of its surfaces that a ray meets, (0, 1]
+  ValueBits quantization = {};  ///< of the kernel's tables; the band has these values (quantized())
 };
 
 /// Triangles beside the solids: drawn, lit and lighted through like them, of no use to the

@@ -30,12 +30,12 @@ class PixelSequence {
 [[nodiscard]] Imath::V3d keyDirection(const Scene& scene);
 /// How far rays go that tell how open a point is, world units.
 /// @param diagonal  of the box of the surfaces, world units
-[[nodiscard]] double skyReach(double diagonal);
+[[nodiscard]] double occlusionDistance(double diagonal);
 
 /// Is there anything between a point and a light?
 struct LightRay {
   Imath::V3d origin, direction;  ///< direction of unit length
-  double reach = 0;              ///< world units
+  double maxDistance = 0;        ///< world units
   double light = 0;              ///< what comes along it if nothing is
 };
 

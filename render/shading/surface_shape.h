@@ -16,7 +16,7 @@ struct SurfaceShape {
   double interpolationError = 0;    ///< bound on |trilinear − smooth|, from second differences
 };
 
-/// Fills in the normals and curvatures of a hit, and how far the surface may be off. `isTurned` is
+/// Fills in the normals and curvatures of a hit, and how far the surface may be off. `isFlipped` is
 /// known before.
 /// @param indexToWorld  a rotation with uniform scale, and a translation
 /// @param direction     of the ray: what faces it is the normal where φ has no gradient

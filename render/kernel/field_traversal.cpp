@@ -1,4 +1,4 @@
-#include "render/kernel/field_walk.h"
+#include "render/kernel/field_traversal.h"
 
 #include <array>
 #include <cmath>
@@ -374,7 +374,7 @@ std::optional<Range> partWithin(const Imath::Box3d& box, const V3d& origin, cons
 
 }  // namespace
 
-FieldWalk::FieldWalk(const Scene& scene, std::size_t maxBytes)
+FieldTraversal::FieldTraversal(const Scene& scene, std::size_t maxBytes)
     : expression_(fieldExpression(scene)) {
   double bytes = 0;
   for (const FieldExpression::Operand& operand : expression_.operands)
@@ -382,32 +382,34 @@ FieldWalk::FieldWalk(const Scene& scene, std::size_t maxBytes)
   levelset::requireMemory(bytes, maxBytes, "render");
   for (const FieldExpression::Operand& operand : expression_.operands)
     grids_.emplace_back(scene.solids[operand.solid].band);
-  place(scene);
+  updateTransforms(scene);
 }
 
-bool FieldWalk::place(const Scene& scene) {
+bool FieldTraversal::updateTransforms(const Scene& scene) {
   bool hasMoved = false;
   box_.makeEmpty();
   for (std::size_t i = 0; i < grids_.size(); ++i) {
-    hasMoved = grids_[i].place(scene.solids[expression_.operands[i].solid].band) || hasMoved;
+    hasMoved =
+        grids_[i].updateTransform(scene.solids[expression_.operands[i].solid].band) || hasMoved;
     box_.extendBy(grids_[i].worldBox());
   }
   return hasMoved;
 }
 
-std::size_t FieldWalk::bytes() const {
+std::size_t FieldTraversal::bytes() const {
   std::size_t sum = 0;
   for (const FieldGrid& grid : grids_) sum += grid.bytes();
   return sum;
 }
 
-std::size_t FieldWalk::blockCount() const {
+std::size_t FieldTraversal::blockCount() const {
   std::size_t sum = 0;
   for (const FieldGrid& grid : grids_) sum += grid.blockCount();
   return sum;
 }
 
-Hit FieldWalk::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
+Hit FieldTraversal::intersect(const V3d& origin, const V3d& direction, double near,
+                              double far) const {
   Hit hit;
   const std::optional<Range> part = partWithin(box_, origin, direction, near, far);
   if (!part) return hit;
@@ -422,15 +424,15 @@ Hit FieldWalk::intersect(const V3d& origin, const V3d& direction, double near, d
   return hit;
 }
 
-bool FieldWalk::isOccluded(const V3d& origin, const V3d& direction, double reach) const {
-  const std::optional<Range> part = partWithin(box_, origin, direction, 0, reach);
+bool FieldTraversal::isOccluded(const V3d& origin, const V3d& direction, double maxDistance) const {
+  const std::optional<Range> part = partWithin(box_, origin, direction, 0, maxDistance);
   return part && !FieldSearch(expression_, grids_, origin + direction * part->low, direction,
                               part->high - part->low, false)
                       .crossings.empty();
 }
 
-double FieldWalk::thickness(const V3d& origin, const V3d& direction, double near,
-                            double far) const {
+double FieldTraversal::thickness(const V3d& origin, const V3d& direction, double near,
+                                 double far) const {
   const std::optional<Range> part = partWithin(box_, origin, direction, near, far);
   if (!part) return 0;
   const double end = part->high - part->low;

@@ -12,7 +12,7 @@ namespace render {
 
 /// Things scaled to a diagonal of 1 around the origin, and rays that start at their box: then
 /// origin, direction and boxes carry errors of some 2^-24 each.
-struct FloatView {
+struct EmbreeSpace {
   /// Covers them, in the scaled space.
   static constexpr double kPad = 2e-6;
 
@@ -20,14 +20,14 @@ struct FloatView {
   Imath::V3d centre;
   double scale = 1;
 
-  FloatView() = default;
-  explicit FloatView(const Imath::Box3d& bounds);
+  EmbreeSpace() = default;
+  explicit EmbreeSpace(const Imath::Box3d& bounds);
   /// Where the ray enters the box, at least `near`; nothing when it misses it or ends before.
   [[nodiscard]] std::optional<double> entryOf(const Imath::V3d& origin, const Imath::V3d& direction,
                                               double near, double far) const;
-  /// @param start  in the world, at the box; `reach` from there
+  /// @param start  in the world, at the box; `maxDistance` from there
   [[nodiscard]] RTCRay rayFrom(const Imath::V3d& start, const Imath::V3d& direction,
-                               double reach) const;
+                               double maxDistance) const;
 };
 
 /// @throws levelset::ResourceLimit when Embree tells of an error

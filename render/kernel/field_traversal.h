@@ -17,13 +17,13 @@ namespace render {
 /// bounds of the expression and of its slope by intervals [Mitchell90], halving until a sign is
 /// certain or the expression is monotone. The side that a ray is on is carried from part to part,
 /// so that rounding at faces loses no crossing. Thread-safe. Rays are unit directions.
-class FieldWalk {
+class FieldTraversal {
  public:
   /// @pre the scene is blended, and requireFields()
   /// @throws levelset::ResourceLimit for fields that take more than maxBytes, or are too wide
-  FieldWalk(const Scene& scene, std::size_t maxBytes);
+  FieldTraversal(const Scene& scene, std::size_t maxBytes);
   /// Takes where the solids are anew. @return has any moved?
-  bool place(const Scene& scene);
+  bool updateTransforms(const Scene& scene);
 
   [[nodiscard]] std::size_t bytes() const;
   [[nodiscard]] std::size_t blockCount() const;
@@ -31,7 +31,7 @@ class FieldWalk {
   [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                               double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction,
-                                double reach) const;
+                                double maxDistance) const;
   /// How far the ray is inside in [near, far], world units.
   [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                                  double far) const;
