@@ -235,12 +235,12 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
 
   // === Points of the surface
   FloatTree::ConstPtr interpolated = field.constTreePtr();
-  const auto tell = [&](double done) {
+  const auto reportProgress = [&](double done) {
     report(request.progress, 0.2 * done, request.action);
     return true;
   };
   const SharpPatches patches =
-      request.mayHaveEdges ? SharpPatches(field, within, tell) : SharpPatches();
+      request.mayHaveEdges ? SharpPatches(field, within, reportProgress) : SharpPatches();
   SurfacePoints points = findSurfacePoints(*interpolated, within, patches);
   if (points.thin) {
     interpolated = thicken(field.tree());
@@ -256,15 +256,15 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
         fmt::format("{}: more than 2^32 grid points lie beside the surface; use larger "
                     "voxels",
                     request.action));
-  MemoryEstimate room;
-  for (const Coord& c : points.gridPoints) room.surface.expand(c);
+  MemoryEstimate estimate;
+  for (const Coord& c : points.gridPoints) estimate.surface.expand(c);
   // There are at least 1.15 points to a unit of area.
-  room.area = static_cast<double>(points.size()) / 1.15;
-  room.inside = reach.inside;
-  room.outside = reach.outside;
-  room.region = request.region;
-  room.bytesPerGridPoint = 25;  // state and result, with the unused part of blocks
-  checkMemory(room, request.maxMemory, request.action);
+  estimate.area = static_cast<double>(points.size()) / 1.15;
+  estimate.inside = reach.inside;
+  estimate.outside = reach.outside;
+  estimate.region = request.region;
+  estimate.bytesPerGridPoint = 25;  // state and result, with the unused part of blocks
+  checkMemory(estimate, request.maxMemory, request.action);
   report(request.progress, 0.3, request.action);
 
   // === Nearest of them for each grid point

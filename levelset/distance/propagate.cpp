@@ -61,7 +61,7 @@ class BlockWorker {
   void relax() {
     changed_ = block_.queued;
     for (auto it = block_.queued.beginOn(); it; ++it) queue_.push_back(it.pos());
-    const std::uint32_t news = block_.inbox.exchange(0, std::memory_order_relaxed);
+    const std::uint32_t news = block_.dirtyNeighbours.exchange(0, std::memory_order_relaxed);
     for (int i = 0; i < 27; ++i)
       if (news >> i & 1) readNeighbour(i);
     for (std::size_t head = 0; head < queue_.size(); ++head) {
@@ -271,7 +271,7 @@ void NearestPoints::process(Block& block, std::vector<Coord>& missing) const {
   for (int i = 0; i < 27; ++i) {
     if (!(news >> i & 1)) continue;
     if (Block* other = block.neighbours[static_cast<std::size_t>(i)])
-      other->inbox.fetch_or(1u << (26 - i), std::memory_order_relaxed);
+      other->dirtyNeighbours.fetch_or(1u << (26 - i), std::memory_order_relaxed);
     else
       missing.push_back(block.origin + blockStep(i));
   }
@@ -292,7 +292,7 @@ void NearestPoints::run(const Progress& progress, const char* action) {
     for (auto& candidates : byParity) {
       std::vector<Block*> due;
       for (Block* block : candidates)
-        if (block->inbox.load(std::memory_order_relaxed) || !block->queued.isOff())
+        if (block->dirtyNeighbours.load(std::memory_order_relaxed) || !block->queued.isOff())
           due.push_back(block);
       if (due.empty()) continue;
       again = true;
@@ -306,7 +306,8 @@ void NearestPoints::run(const Progress& progress, const char* action) {
           if (reach_.region && !reach_.region->hasOverlap(extent)) continue;
           Block& block = touch(origin);
           const Coord back = due[i]->origin - origin;
-          block.inbox.fetch_or(1u << directionIndex({back.x() / 8, back.y() / 8, back.z() / 8}));
+          block.dirtyNeighbours.fetch_or(
+              1u << directionIndex({back.x() / 8, back.y() / 8, back.z() / 8}));
         }
       sortNew();
     }

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal only.
+// Internal header of levelset: public headers must not include it.
 
 #include <array>
 #include <atomic>
@@ -29,10 +29,11 @@ class NearestPoints {
     std::array<float, 512> squared;          ///< to it, voxels²; without it, what is out of reach
     Mask inside;                             ///< φ < 0
     Mask own;  ///< holds the surface point that was found for this very grid point
-    std::array<Block*, 27> neighbours{};   ///< as far as they exist
-    openvdb::Coord low, high;              ///< grid points of the block in the region, inclusive
-    std::atomic<std::uint32_t> inbox = 0;  ///< bit i: neighbour i has something new at the border
-    Mask queued;                           ///< has something new for the grid points around it
+    std::array<Block*, 27> neighbours{};  ///< as far as they exist
+    openvdb::Coord low, high;             ///< grid points of the block in the region, inclusive
+    std::atomic<std::uint32_t> dirtyNeighbours =
+        0;        ///< bit i: neighbour i has something new at the border
+    Mask queued;  ///< has something new for the grid points around it
   };
 
   struct Reach {

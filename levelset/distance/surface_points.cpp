@@ -57,9 +57,9 @@ struct Crossings {
 /// The gradient's guess where it is plausible, else the nearest crossing.
 Vec3d firstGuess(const DenseBlock& block, int x, int y, int z, const Crossings& crossings) {
   const auto difference = [&](int dx, int dy, int dz) {
-    const double ahead = block.at(x + dx, y + dy, z + dz),
-                 behind = block.at(x - dx, y - dy, z - dz);
-    return (ahead - behind) / 2;
+    const double forward = block.at(x + dx, y + dy, z + dz),
+                 backward = block.at(x - dx, y - dy, z - dz);
+    return (forward - backward) / 2;
   };
   const Vec3d gradient(difference(1, 0, 0), difference(0, 1, 0), difference(0, 0, 1));
   const double squared = gradient.lengthSqr();

@@ -10,6 +10,8 @@
 #include "levelset/distance/signs.h"
 #include "levelset/eikonal/arrival_start.h"
 #include "levelset/eikonal/arrival_vdb.h"
+#include "levelset/eikonal/fast_marching.h"
+#include "levelset/eikonal/fast_sweeping.h"
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
 #include "levelset/memory_estimate.h"
@@ -149,16 +151,16 @@ class Solver {
   std::unique_ptr<ArrivalBlocks> blocks_;
 };
 
-void checkRoom(const std::vector<StartTime>& start, const FloatGrid& field,
-               const ArrivalRequest& request) {
+void checkMemoryFor(const std::vector<StartTime>& start, const FloatGrid& field,
+                    const ArrivalRequest& request) {
   // How far another speed goes is seen on the way, block by block.
   if (request.options.speed) return;
-  MemoryEstimate room;
-  for (const StartTime& s : start) room.surface.expand(s.gridPoint);
-  room.area = static_cast<double>(start.size()) / (2 * kStartWidth);
-  room.inside = room.outside = request.until / field.voxelSize()[0];
-  room.bytesPerGridPoint = kBytesPerGridPoint;
-  checkMemory(room, request.options.maxMemory, request.action);
+  MemoryEstimate estimate;
+  for (const StartTime& s : start) estimate.surface.expand(s.gridPoint);
+  estimate.area = static_cast<double>(start.size()) / (2 * kStartWidth);
+  estimate.inside = estimate.outside = request.until / field.voxelSize()[0];
+  estimate.bytesPerGridPoint = kBytesPerGridPoint;
+  checkMemory(estimate, request.options.maxMemory, request.action);
 }
 
 ArrivalStart startOf(const ArrivalRequest& request, const Slowness& slowness) {
@@ -169,19 +171,19 @@ ArrivalStart startOf(const ArrivalRequest& request, const Slowness& slowness) {
 }
 
 /// Index positions. @throws ResourceLimit beyond the range of indices
-std::vector<Vec3d> placesOf(std::span<const Imath::V3d> sources,
-                            const openvdb::math::Transform& transform, const char* action) {
-  std::vector<Vec3d> places;
+std::vector<Vec3d> positionsOf(std::span<const Imath::V3d> sources,
+                               const openvdb::math::Transform& transform, const char* action) {
+  std::vector<Vec3d> positions;
   for (const Imath::V3d& source : sources) {
-    places.push_back(transform.worldToIndex(toVdb(source)));
+    positions.push_back(transform.worldToIndex(toVdb(source)));
     for (int i = 0; i < 3; ++i)
-      if (!(std::abs(places.back()[i]) < kIndexLimit))
+      if (!(std::abs(positions.back()[i]) < kIndexLimit))
         throw ResourceLimit(
             fmt::format("{}: a point lies {:.4g} voxels from the origin, beyond the range of "
                         "32-bit indices; use larger voxels",
-                        action, std::abs(places.back()[i])));
+                        action, std::abs(positions.back()[i])));
   }
-  return places;
+  return positions;
 }
 
 }  // namespace
@@ -191,19 +193,19 @@ ArrivalGrid arrivalFromSurface(const FloatGrid& field, const ArrivalRequest& req
   const double unit = world ? typicalSlowness(field, world) : 1;
   const Slowness slowness = scaled(world, unit);
   const std::vector<StartTime> start = startAtSurface(field, startOf(request, slowness));
-  checkRoom(start, field, request);
+  checkMemoryFor(start, field, request);
   return Solver(request, field.transform(), &field.tree(), {}, slowness, unit).run(start);
 }
 
 ArrivalGrid arrivalFromPoints(std::span<const Imath::V3d> sources,
                               const openvdb::math::Transform& transform,
                               const ArrivalRequest& request) {
-  const std::vector<Vec3d> places = placesOf(sources, transform, request.action);
+  const std::vector<Vec3d> positions = positionsOf(sources, transform, request.action);
   const Slowness world = slownessOf(request.options.speed, transform);
-  const double unit = world ? typicalSlowness(places, world) : 1;
+  const double unit = world ? typicalSlowness(positions, world) : 1;
   const Slowness slowness = scaled(world, unit);
-  const std::vector<StartTime> start = startAtPoints(places, startOf(request, slowness));
-  return Solver(request, transform, nullptr, places, slowness, unit).run(start);
+  const std::vector<StartTime> start = startAtPoints(positions, startOf(request, slowness));
+  return Solver(request, transform, nullptr, positions, slowness, unit).run(start);
 }
 
 }  // namespace eikonal

@@ -30,7 +30,7 @@ ArrivalBlocks::ArrivalBlocks(Settings settings) : settings_(std::move(settings))
   limit_ = static_cast<double>(memoryLimit(settings_.maxMemory));
 }
 
-void ArrivalBlocks::checkRoom(const Coord& origin) const {
+void ArrivalBlocks::checkMemoryFor(const Coord& origin) const {
   const double bytes = static_cast<double>(blocks_.size() + 1) * kBytesPerBlock;
   if (bytes > limit_)
     throw ResourceLimit(
@@ -49,7 +49,7 @@ void ArrivalBlocks::checkRoom(const Coord& origin) const {
 ArrivalBlock& ArrivalBlocks::touch(const Coord& origin) {
   ArrivalBlock*& slot = index_[origin];
   if (slot) return *slot;
-  checkRoom(origin);
+  checkMemoryFor(origin);
   ArrivalBlock& block = blocks_.emplace_back();
   slot = &block;
   block.origin = origin;

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal only.
+// Internal header of levelset: public headers must not include it.
 
 #include <array>
 #include <cstdint>
@@ -92,7 +92,7 @@ class ArrivalBlocks {
   [[nodiscard]] bool holds(const openvdb::Coord& origin) const { return index_.count(origin) > 0; }
 
  private:
-  void checkRoom(const openvdb::Coord& origin) const;
+  void checkMemoryFor(const openvdb::Coord& origin) const;
 
   Settings settings_;
   std::unique_ptr<openvdb::FloatGrid::ConstAccessor> side_;
@@ -101,12 +101,5 @@ class ArrivalBlocks {
   std::size_t loaded_ = 0;  ///< blocks whose slowness is known
   double limit_ = 0;        ///< bytes
 };
-
-/// Marches outwards in the order of time [Sethian99]; `order` 1 or 2.
-void marchArrivals(ArrivalBlocks& blocks, int order);
-
-/// Sweeps block by block to rest [Zhao05], then, for order 2, solves once more with the
-/// second-order differences on the upwind side that the first solution found.
-void sweepArrivals(ArrivalBlocks& blocks, int order);
 
 }  // namespace levelset::eikonal

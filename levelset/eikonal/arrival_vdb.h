@@ -1,6 +1,6 @@
 #pragma once
 
-// Arrival times as OpenVDB grids. For .cpp files of levelset only.
+// Arrival times as OpenVDB grids. Internal header of levelset: public headers must not include it.
 
 #include <span>
 

@@ -1,7 +1,7 @@
+#include "levelset/eikonal/fast_marching.h"
+
 #include <queue>
 #include <tuple>
-
-#include "levelset/eikonal/arrival_blocks.h"
 
 namespace levelset::eikonal {
 namespace {
@@ -44,7 +44,7 @@ class Marcher {
         report(blocks_.settings().progress, static_cast<double>(trial.time / until),
                blocks_.settings().action);
     }
-    forgetTrials();
+    clearTrials();
   }
 
  private:
@@ -124,7 +124,7 @@ class Marcher {
     return terms;
   }
 
-  void forgetTrials() {
+  void clearTrials() {
     for (ArrivalBlock& block : blocks_.blocks())
       for (auto it = block.known.beginOff(); it; ++it) block.time[it.pos()] = kFar;
   }

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal only.
+// Internal header of levelset: public headers must not include it.
 
 #include <cmath>
 #include <limits>
@@ -50,8 +50,8 @@ struct StraightTime {
 class PointSources {
  public:
   /// @param slowness  at each; kFar where nothing passes
-  PointSources(std::vector<openvdb::Vec3d> places, std::vector<double> slowness)
-      : places_(std::move(places)), slowness_(std::move(slowness)), tree_(places_) {}
+  PointSources(std::vector<openvdb::Vec3d> positions, std::vector<double> slowness)
+      : positions_(std::move(positions)), slowness_(std::move(slowness)), tree_(positions_) {}
   PointSources(const PointSources&) = delete;
   PointSources& operator=(const PointSources&) = delete;
 
@@ -60,13 +60,13 @@ class PointSources {
   [[nodiscard]] StraightTime straightTime(const openvdb::Coord& gridPoint, double slowness) const {
     const openvdb::Vec3d x = gridPoint.asVec3d();
     const std::uint32_t i =
-        places_.size() == 1 ? 0 : tree_.nearest(x, std::numeric_limits<double>::max());
-    if (slowness_[i] > 2 * slowness || x == places_[i]) return {};
-    return {x - places_[i], slowness_[i]};
+        positions_.size() == 1 ? 0 : tree_.nearest(x, std::numeric_limits<double>::max());
+    if (slowness_[i] > 2 * slowness || x == positions_[i]) return {};
+    return {x - positions_[i], slowness_[i]};
   }
 
  private:
-  std::vector<openvdb::Vec3d> places_;
+  std::vector<openvdb::Vec3d> positions_;
   std::vector<double> slowness_;
   PointTree tree_;
 };
