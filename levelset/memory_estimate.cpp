@@ -12,14 +12,14 @@
 namespace levelset::eikonal {
 
 void checkMemory(const MemoryEstimate& estimate, std::size_t maxMemory, const char* action) {
-  // Inwards there is never more than the solid's own box.
+  // Inwards there are never more points than in the solid's own box.
   const double out = estimate.outside + 1;
   double reached = 1, longest = 0;
   for (int i = 0; i < 3; ++i) {
     double from = estimate.surface.min()[i] - out, to = estimate.surface.max()[i] + out;
     if (from < -kIndexLimit || to > kIndexLimit)
       throw ResourceLimit(
-          fmt::format("{}: distances up to {:.4g} voxels pass the range of 32-bit indices; use a "
+          fmt::format("{}: distances up to {:.4g} voxels exceed the range of 32-bit indices; use a "
                       "smaller distance or larger voxels",
                       action, out));
     if (estimate.region) {
@@ -29,7 +29,7 @@ void checkMemory(const MemoryEstimate& estimate, std::size_t maxMemory, const ch
     reached *= std::max(0.0, to - from + 1);
     longest = std::max(longest, static_cast<double>(estimate.surface.dim()[i]));
   }
-  // Steiner's formula for a convex body, or the whole box.
+  // The smaller of Steiner's formula for a convex body and the complete box.
   const double steiner = estimate.area * (std::min(estimate.inside, longest / 2) + out) +
                          2 * M_PI * longest * out * out + 4.0 / 3 * M_PI * out * out * out;
   const double bytes = std::min(reached, steiner) * estimate.bytesPerGridPoint;

@@ -27,8 +27,7 @@ struct MeshAttributes {
   std::vector<Imath::V2d> uvs;  ///< n × 2, texture coordinates, finite, (0, 0) at the lower left
   std::vector<Imath::V4f> colors;  ///< n × 4, red, green, blue, alpha, finite, 1 is full; values of
                                    ///< the file, no transfer curve applied
-  CoordinatePrecision precision = CoordinatePrecision::Float;  ///< precision of normals and uvs in
-                                                               ///< a file
+  CoordinatePrecision precision = CoordinatePrecision::Float;  ///< normals and uvs in a file
   ColorPrecision colorPrecision = ColorPrecision::Byte;
   bool hasAlpha = false;  ///< false: every alpha is 1
 
@@ -60,7 +59,7 @@ void requireAttributes(const TriMesh& mesh, const char* action);
 
 /// Transforms a normal by a map with the derivatives `slopes` along x, y and z. Uses the inverse
 /// transpose, so that the normal stays perpendicular to the surface. Returns unit length.
-/// @param  hand  1, or −1 for a map that mirrors and so reverses the triangles
+/// @param hand  1, or −1 for a map that mirrors and so reverses the triangles
 /// @return zero for a normal of length zero, and where the map is too flat to leave a direction
 [[nodiscard]] Imath::V3d carriedNormal(const Imath::V3d& normal,
                                        const std::array<Imath::V3d, 3>& slopes, double hand);
@@ -72,7 +71,7 @@ void append(TriMesh& mesh, const TriMesh& other);
 /// Returns the mesh without attributes and with closed seams. Attributes double the vertices along
 /// a seam. The function joins two edges at equal positions when each has one triangle and they run
 /// in opposite directions. Parts that only touch keep their own vertices.
-/// @param  action  name of the action in the message when memory does not suffice
+/// @param action  name of the action in the message when memory does not suffice
 /// @return nullopt when there is no seam to close: the triangles of `mesh` are the result
 /// @throws ResourceLimit
 [[nodiscard]] std::optional<TriMesh> withoutSeams(const TriMesh& mesh, const char* action,

@@ -34,7 +34,7 @@ struct VdbAccess {
 [[nodiscard]] NarrowBand makeBand(openvdb::FloatGrid::Ptr grid);
 
 /// Makes the band of an open surface, as makeBand does.
-/// @param  beyond  as in VdbGrid, with background 0
+/// @param beyond  as in VdbGrid, with background 0
 [[nodiscard]] NarrowBand makeOpenBand(openvdb::FloatGrid::Ptr grid,
                                       std::shared_ptr<const openvdb::FloatTree> beyond);
 

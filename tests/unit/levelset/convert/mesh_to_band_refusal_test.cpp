@@ -37,7 +37,7 @@ TEST(MeshToBandRefusal, NamesBadVoxelSizes) {
   expectRefused(box, 0.1, ExitCode::Usage, "half width is", {.halfWidth = kNan});
   expectRefused(box, 1e-9, ExitCode::Resource, "GB");
   expectRefused(box, 1e-12, ExitCode::Resource, "index of 32 bits");
-  expectRefused(box, 1e-3, ExitCode::Resource, "passes the limit", {.maxMemory = 1000000});
+  expectRefused(box, 1e-3, ExitCode::Resource, "exceeds the limit", {.maxMemory = 1000000});
   expectRefused(box, 100, ExitCode::Input, "larger than the object");
 }
 
@@ -68,7 +68,7 @@ TEST(MeshToBandRefusal, NamesCoordinatesTooCoarse) {
 TEST(MeshToBandRefusal, NamesOpenMeshes) {
   const TriMesh triangle{{V3d(0), V3d(1, 0, 0), V3d(0, 1, 0)}, {{0, 1, 2}}};
   for (const SignMode mode : {SignMode::Auto, SignMode::Winding})
-    expectRefused(triangle, 0.1, ExitCode::Input, "encloses nothing", {.sign = mode});
+    expectRefused(triangle, 0.1, ExitCode::Input, "encloses no volume", {.sign = mode});
   expectRefused(triangle, 0.1, ExitCode::Input, "3 edges have one face",
                 {.sign = SignMode::Closed});
 

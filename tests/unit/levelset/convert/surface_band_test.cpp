@@ -153,7 +153,7 @@ TEST(SurfaceBand, RefusesWhatHasNoTwoSides) {
   // The ends meet to rounding only.
   for (std::size_t j = 0; j < 5; ++j) moebius.positions[39 * 5 + j] = moebius.positions[4 - j];
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand(moebius, 0.05); }),
-              "two faces are turned against each other");
+              "two faces have opposite orientations");
   TriMesh flipped = square(V3d(0), V3d(1, 0, 0), V3d(0, 1, 0));
   std::swap(flipped.triangles[12][0], flipped.triangles[12][1]);
   const std::string sentence = refusal<InvalidInput>([&] { (void)surfaceBand(flipped, 0.1); });
