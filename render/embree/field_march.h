@@ -36,7 +36,7 @@ class FieldMarch {
     Imath::M44d indexToWorld, worldToIndex;
     Imath::Box3d box;  // of the cells that are not constant, index space
   };
-  class Way;
+  class RaySegment;
 
   FieldExpression expression_;
   std::vector<MarchedField> fields_;  // of its operands

@@ -230,8 +230,8 @@ PixelTraversal KernelScene::startTraversal(const PixelBlock& pixels) const {
                                                  {std::vector<double>(rays), ShapeBlock(rays)})};
 }
 
-PixelHits KernelScene::castNext(const KernelTracer& tracer, PixelTraversal& way) const {
-  auto& [pixels, walk, next] = way;
+PixelHits KernelScene::castNext(const KernelTracer& tracer, PixelTraversal& traversal) const {
+  auto& [pixels, walk, next] = traversal;
   PixelHits result(pixels.size());
   do {
     for (std::size_t s = 0; s < solids_.size(); ++s) {

@@ -105,7 +105,7 @@ class KernelScene {
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
   [[nodiscard]] PixelTraversal startTraversal(const PixelBlock& pixels) const;
   /// What rays meet next: those that were told to go on, the others what they met before.
-  [[nodiscard]] PixelHits castNext(const KernelTracer& tracer, PixelTraversal& walk) const;
+  [[nodiscard]] PixelHits castNext(const KernelTracer& tracer, PixelTraversal& traversal) const;
   /// @return how far each ray is within what is drawn of the solids and is seen, along the view
   /// axis, world units
   [[nodiscard]] std::vector<double> thickness(const KernelTracer& tracer,
