@@ -15,11 +15,14 @@ using Imath::V3d;
 using Path = std::vector<V3d>;
 
 constexpr std::size_t kMaxSearchNodes = 4'000'000;
-// Grid points this near to the surface are joined by their 26 neighbours, on planes of any slope.
+// Grid points closer to the surface than this are connected to their 26 neighbours, on planes of
+// any slope.
 constexpr double kBesideVoxels = 0.75;
-// A step that turns the normal by more than a right angle leads through a thin sheet, not around.
+// A step that turns the normal by more than a right angle passes through a thin sheet, not around
+// it.
 constexpr double kLeastNormalCosine = 0;
-constexpr double kGridExcess = 1.15;  // of ways over the grid; 1.128 for the least handy direction
+// Length ratio of grid paths to true paths; 1.128 for the worst direction.
+constexpr double kGridExcess = 1.15;
 constexpr std::size_t kMostPaths = 40;
 
 using Key = std::uint64_t;
@@ -39,8 +42,8 @@ GridCell unpackCell(Key key) {
   return c;
 }
 
-/// The grid points beside φ = height, found out as they are asked for, with what the searches from
-/// the one end and from the other know of them. GridCell (0, 0, 0) is the point a.
+/// Graph of the grid points beside φ = height, built on demand. Nodes hold the state of the
+/// searches from both ends. GridCell (0, 0, 0) is the point a.
 class PathGraph {
  public:
   struct Node {
@@ -63,10 +66,10 @@ class PathGraph {
   [[nodiscard]] const std::unordered_map<Key, Node>& nodes() const { return nodes_; }
   Node& node(Key key) { return nodes_.at(key); }
 
-  /// Dijkstra's algorithm from an end; A* with an estimate of the rest.
-  /// @param mayLie  of a place and the cost to come there; others are left out
-  /// @param isGoal  stop there
-  /// @return the goal's key, or nothing
+  /// Runs Dijkstra's algorithm from an end, or A* if `estimate` is not zero.
+  /// @param mayLie  true for a position and its cost if the search may visit it
+  /// @param isGoal  true for the node that ends the search
+  /// @return key of the goal, or nothing
   template <typename MayLie, typename Estimate, typename IsGoal>
   std::optional<Key> search(std::size_t end, const MayLie& mayLie, const Estimate& estimate,
                             const IsGoal& isGoal) {
@@ -89,7 +92,7 @@ class PathGraph {
            normal.dot(field_.normal(ends_[end])) > kLeastNormalCosine;
   }
 
-  /// From a node back to where the search from `end` began; projected.
+  /// Path from a node back to the start of the search from `end`, projected onto the surface.
   [[nodiscard]] Path trace(std::size_t end, Key key) {
     Path path;
     for (;; key = nodes_.at(key).from[end]) {
@@ -114,7 +117,7 @@ class PathGraph {
     return it->second;
   }
 
-  /// The nodes about an end, from which the way to it is straight.
+  /// Opens the nodes around an end. The path from them to the end is straight.
   template <typename Estimate>
   void start(std::size_t end, const Estimate& estimate) {
     const V3d offset = (ends_[end] - ends_[0]) / step_;
@@ -136,7 +139,7 @@ class PathGraph {
   template <typename MayLie, typename Estimate>
   void expand(std::size_t end, Key key, const MayLie& mayLie, const Estimate& estimate) {
     const GridCell c = unpackCell(key);
-    const Node current = nodes_.at(key);  // the map may move it
+    const Node current = nodes_.at(key);  // a copy, because the map may move it
     for (int n = 0; n < 27; ++n) {
       const GridCell d = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
       if (n == 13) continue;
@@ -168,7 +171,7 @@ struct Meeting {
   Key key;
 };
 
-/// Nodes about as far from the one end as from the other, the best first.
+/// Nodes with about equal distance to both ends, shortest total first.
 std::vector<Meeting> meetings(const PathGraph& graph) {
   std::vector<Meeting> result;
   for (const auto& [key, node] : graph.nodes()) {
@@ -212,16 +215,16 @@ std::vector<Path> GeodesicSearch::alternatives(double longest) const {
         },
         [](const V3d&) { return 0.0; }, [](Key, const PathGraph::Node&) { return false; });
   }
-  // Meetings close to each other belong to the same way.
+  // Meeting points close to each other belong to the same path.
   const double apart = std::max(3 * graph.step(), 0.025 * longest);
   std::vector<Path> paths;
-  std::vector<std::pair<V3d, V3d>> taken;  // places and normals
+  std::vector<std::pair<V3d, V3d>> taken;  // positions and normals
   const std::vector<Meeting> all = meetings(graph);
   for (const Meeting& meeting : all) {
     if (paths.size() == kMostPaths || meeting.cost > kGridExcess * all.front().cost) break;
     const V3d p = graph.place(meeting.key), normal = graph.node(meeting.key).normal;
     const bool isNew = std::none_of(taken.begin(), taken.end(), [&](const auto& other) {
-      // The two faces of a thin sheet are two ways, however near.
+      // The two faces of a thin sheet give two paths, even where they are close.
       return (p - other.first).length() < apart && normal.dot(other.second) > 0;
     });
     if (!isNew) continue;
