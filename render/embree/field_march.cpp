@@ -8,6 +8,7 @@
 
 #include "levelset/vdb.h"
 #include "render/embree/surface_spline_vdb.h"
+#include "render/shading/field_shape.h"
 
 namespace render {
 namespace {
