@@ -9,8 +9,8 @@
 namespace levelset {
 
 struct ClosestPointOptions {
-  std::optional<double> halfWidth =
-      {};  ///< largest distance from the surface, voxels; empty: half width of the solid
+  /// Largest distance from the surface, voxels; empty: half width of the solid.
+  std::optional<double> halfWidth = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };

@@ -32,8 +32,8 @@ class NearestPoints {
     Mask own;     ///< grid points whose surface point was found for that very grid point
     std::array<Block*, 27> neighbours{};  ///< null where there is no block
     openvdb::Coord low, high;  ///< bounds of the block's grid points in the region, inclusive
-    std::atomic<std::uint32_t> dirtyNeighbours =
-        0;        ///< bit i: neighbour i changed at the shared border
+    /// Bit i: neighbour i changed at the shared border.
+    std::atomic<std::uint32_t> dirtyNeighbours = 0;
     Mask queued;  ///< grid points that must offer their surface point to their neighbours
   };
 

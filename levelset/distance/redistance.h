@@ -11,8 +11,8 @@
 namespace levelset {
 
 struct RedistanceOptions {
-  std::optional<double> halfWidth =
-      {};  ///< half width of the result, voxels; empty: that of the operand
+  /// Half width of the result, voxels; empty: that of the operand.
+  std::optional<double> halfWidth = {};
   std::optional<Imath::Box3d> region = {};  ///< world box: distances are computed only inside it
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};

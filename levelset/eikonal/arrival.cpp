@@ -28,11 +28,12 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
 constexpr double kBytesPerGridPoint = 24;
-// A grid point that was inside stays so when its time rounds to nothing, voxels.
+// Least depth of a grid point that was inside, voxels: it stays inside when its time rounds to
+// zero.
 constexpr double kLeastDepth = 1e-7;
 constexpr double kStarted = 0.1;  // share of the work
 
-/// At an index position; kFar where nothing passes. Empty at speed 1.
+/// Returns the slowness at index positions; kFar where the front cannot pass. Empty at speed 1.
 Slowness slownessOf(const ScalarField& speed, const openvdb::math::Transform& transform) {
   if (!speed) return {};
   return [&](const Vec3d& index) {
@@ -51,8 +52,8 @@ Slowness scaled(const Slowness& slowness, double unit) {
 
 class Solver {
  public:
-  /// @param slowness  over `unit`, the typical one: so the times of the solver are about voxels
-  /// @param sources   empty: the front starts at the surface that `side` has
+  /// @param slowness  slowness divided by `unit`, the typical one, so that times are about voxels
+  /// @param sources  empty: the front starts at the surface of `side`
   Solver(const ArrivalRequest& request, const openvdb::math::Transform& transform,
          const FloatTree* side, std::vector<Vec3d> sources, const Slowness& slowness, double unit)
       : request_(request),
@@ -96,7 +97,8 @@ class Solver {
     return static_cast<float>(static_cast<double>(block.time[n]) * voxelTime_);
   }
 
-  /// The grid points that makeLeaf() gives a time: a start may come too late for one.
+  /// Returns the grid points to which makeLeaf() gives a time. A start time may exceed the latest
+  /// time.
   [[nodiscard]] ArrivalBlock::Mask reachedOf(const ArrivalBlock& block) const {
     ArrivalBlock::Mask reached = block.known;
     for (auto it = block.known.beginOn(); it; ++it)
@@ -147,13 +149,13 @@ class Solver {
   const ArrivalRequest& request_;
   const openvdb::math::Transform& transform_;
   const FloatTree* side_;
-  double voxelTime_;  ///< that the front takes for a voxel at the typical speed
+  double voxelTime_;  ///< time that the front takes for a voxel at the typical speed
   std::unique_ptr<ArrivalBlocks> blocks_;
 };
 
 void checkMemoryFor(const std::vector<StartTime>& start, const FloatGrid& field,
                     const ArrivalRequest& request) {
-  // How far another speed goes is seen on the way, block by block.
+  // At another speed the extent is not known in advance: touch() checks memory block by block.
   if (request.options.speed) return;
   MemoryEstimate estimate;
   for (const StartTime& s : start) estimate.surface.expand(s.gridPoint);
@@ -170,7 +172,8 @@ ArrivalStart startOf(const ArrivalRequest& request, const Slowness& slowness) {
           .progress = subProgress(request.options.progress, 0, kStarted)};
 }
 
-/// Index positions. @throws ResourceLimit beyond the range of indices
+/// Converts source points to index positions.
+/// @throws ResourceLimit beyond the range of indices
 std::vector<Vec3d> positionsOf(std::span<const Imath::V3d> sources,
                                const openvdb::math::Transform& transform, const char* action) {
   std::vector<Vec3d> positions;

@@ -20,7 +20,7 @@ Coord neighbourOrigin(const Coord& origin, int direction) {
   return result;
 }
 
-// A block, its slowness and second solution, the result's leaf, and the maps that hold them.
+// Memory of a block: its slowness, second solution and leaf of the result, and the map entries.
 constexpr double kBytesPerBlock = sizeof(ArrivalBlock) + 2 * 2048 + 1024 + 2300 + 100;
 
 }  // namespace
