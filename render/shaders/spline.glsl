@@ -124,7 +124,7 @@ Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Whole) passing, INOU
     high = select(ends, w, high);
     found = OR(found, ends);
     open = AND(open, NOT(ends));
-    open = resume(open, AND(count > 1, NOT(deepest)), part, halvings, size);
+    open = nextPart(open, AND(count > 1, NOT(deepest)), part, halvings, size);
   }
   return found;
 }
