@@ -21,9 +21,9 @@ using Imath::V3d;
 using levelset::InvalidInput;
 
 constexpr const char* kPath = "animate";
-constexpr double kNoWay = 1e-6;  // voxels: no way to speak of
+constexpr double kNoWay = 1e-6;  // voxels; shorter paths count as no path
 
-/// The segment of a path that holds a part of its length, and the share of that segment.
+/// Finds the segment of a path at a share of the path's length, and the share of that segment.
 std::pair<std::size_t, double> placeOn(const std::vector<V3d>& path, double part) {
   double left = part * pathLength(path);
   for (std::size_t i = 1; i < path.size(); ++i) {
@@ -35,7 +35,7 @@ std::pair<std::size_t, double> placeOn(const std::vector<V3d>& path, double part
   return {0, 0};
 }
 
-/// Between the points of a path, and back on the surface.
+/// Interpolates along a path, and projects the result onto the surface.
 V3d pointOn(const SurfaceField& field, const std::vector<V3d>& path, double part) {
   const auto [i, share] = placeOn(path, part);
   V3d p = path[i] + (path[i + 1] - path[i]) * share;
@@ -50,10 +50,10 @@ std::array<V2d, 4> between(const std::array<V2d, 4>& a, const std::array<V2d, 4>
 }
 
 [[noreturn]] void refuseApart(const V3d& a, const V3d& b) {
-  throw InvalidInput(
-      fmt::format("{}: no way on the surface leads from {} to {}; put both patches on one part of "
-                  "the base",
-                  kPath, pointAsOption(a), pointAsOption(b)));
+  throw InvalidInput(fmt::format(
+      "{}: the surface does not connect {} and {}; put both patches on the same surface "
+      "component of the base",
+      kPath, pointAsOption(a), pointAsOption(b)));
 }
 
 }  // namespace
@@ -66,8 +66,8 @@ PatchPath::PatchPath(const levelset::NarrowBand& base, Footprint from, Footprint
   if (isConstant_) return;
   if (rule_ == CarryRule::Rigid && !(from_.reach && to_.reach)) {
     throw InvalidInput(fmt::format(
-        "{}: no straight way leads from the centre {} of the patch to each of its corners; move "
-        "the corners by themselves, or take a smaller patch",
+        "{}: no geodesic leads from the centre {} of the patch to each of its corners; use --carry "
+        "corners, or a smaller patch",
         kPath, pointAsOption(from_.reach ? to_.centre : from_.centre)));
   }
   findCentreWay(guide);
@@ -126,7 +126,7 @@ SurfaceFrame PatchPath::frameAt(double part) const {
 }
 
 void PatchPath::findCornerWays() {
-  constexpr double kJump = 4;  // times the mean step of a corner
+  constexpr double kJump = 4;  // multiple of a corner's mean step
   const SurfaceField field(base_);
   const double voxel = base_.voxelSize();
   double farthest = pathLength(way_);
@@ -165,7 +165,8 @@ Footprint PatchPath::at(double part) const {
   if (part <= 0) return from_;
   if (part >= 1) return to_;
   Footprint result = from_;
-  result.height = from_.height + (to_.height - from_.height) * part;  // to the bit where it stays
+  // Equal bits if the heights are equal.
+  result.height = from_.height + (to_.height - from_.height) * part;
   if (isConstant_) return result;
   const SurfaceField field(base_);
   const SurfaceFrame frame = frameAt(part);
@@ -182,7 +183,7 @@ Footprint PatchPath::at(double part) const {
   if (!corners) {
     throw InvalidInput(
         fmt::format("{}: the surface breaks off between the centre {} of the patch and its "
-                    "corners; move the corners by themselves, or choose other places",
+                    "corners; use --carry corners, or choose other positions",
                     kPath, pointAsOption(frame.centre)));
   }
   result.corners = *corners;

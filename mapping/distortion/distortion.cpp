@@ -16,7 +16,8 @@ namespace {
 
 using Imath::V3d;
 
-/// Of texture → patch: the reciprocals of those of the scaled gradient.
+/// Least and largest singular value of texture → patch: the reciprocals of those of the scaled
+/// gradient.
 struct Stretch {
   double least, most;
 };
@@ -92,7 +93,7 @@ Distortion surveyDistortion(std::span<const MapSample> samples, const V3d& textu
     stretches[2 * n] = stretch.least;
     stretches[2 * n + 1] = stretch.most;
   });
-  // The middle one: slivers and what folds must not weigh.
+  // The median is insensitive to slivers and folds.
   std::vector<double> volumes;
   for (const double jacobian : jacobians)
     if (jacobian > 0) volumes.push_back(1 / jacobian);
