@@ -44,18 +44,20 @@ void checkPositive(double value, const char* what, const char* unit) {
 void checkArguments(const NarrowBand& solid, double time, const CurvatureFlowOptions& options) {
   if (!(time >= 0) || !std::isfinite(time))
     throw UsageError(
-        fmt::format("{}: the time is {}; give world units squared, 0 or more", kAction, time));
+        fmt::format("{}: the time is {}; give a finite time of 0 or more, in world units squared",
+                    kAction, time));
   if (options.tolerance) checkPositive(*options.tolerance, "tolerance", "world units");
   if (options.step) checkPositive(*options.step, "step", "world units squared");
   if (options.mask) checkMask(*options.mask, kAction);
   requireSolid(solid, kAction);
   if (solid.isEmpty())
     throw InvalidInput(fmt::format(
-        "{}: the solid is empty, so there is no surface to move; give a solid", kAction));
+        "{}: the solid is empty, so there is no surface to move; give a solid with a surface",
+        kAction));
   if (options.step && time / *options.step > static_cast<double>(kMostFlowSteps))
     throw ResourceLimit(fmt::format(
-        "{}: a time of {} in steps of {} makes {:.3g} of them, and {} are the most; ask "
-        "for longer steps or a shorter time",
+        "{}: a time of {} in steps of {} requires {:.3g} steps, more than the limit of {}; use "
+        "longer steps or a shorter time",
         kAction, time, *options.step, time / *options.step, kMostFlowSteps));
 }
 
@@ -120,7 +122,7 @@ class CurvatureFlow {
     if (eikonal::hasZeroCrossing(grid.tree())) return;
     throw InvalidInput(
         fmt::format("{}: the solid vanishes after a time of {:.4g} world units squared, before the "
-                    "{:.4g} asked for; give a shorter time",
+                    "requested {:.4g}; give a shorter time",
                     kAction, now_ * voxel_ * voxel_, time_ * voxel_ * voxel_));
   }
 
@@ -179,12 +181,12 @@ class CurvatureFlow {
 
   void requireEnd(double dt) const {
     if (result_.steps < kMostFlowSteps && now_ + dt > now_) return;
-    throw ResourceLimit(
-        fmt::format("{}: {} steps have come to a time of {:.4g} world units squared, and the next "
-                    "is of {:.3g}, so the {:.4g} asked for is out of reach; ask for a shorter time "
-                    "or use larger voxels",
-                    kAction, result_.steps, now_ * voxel_ * voxel_, dt * voxel_ * voxel_,
-                    time_ * voxel_ * voxel_));
+    throw ResourceLimit(fmt::format(
+        "{}: {} steps reached a time of {:.4g} world units squared, and the next "
+        "step is {:.3g}, so the requested {:.4g} takes too many steps; use a shorter time "
+        "or larger voxels",
+        kAction, result_.steps, now_ * voxel_ * voxel_, dt * voxel_ * voxel_,
+        time_ * voxel_ * voxel_));
   }
 
   FlowScheme cheapest(double dt, double left) const {

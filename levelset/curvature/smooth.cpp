@@ -92,10 +92,10 @@ void requireMedian(const openvdb::FloatGrid& grid, double radius) {
   const double around = 4.0 / 3 * M_PI * std::pow(std::max(1.0, radius), 3);
   const double readings = static_cast<double>(grid.activeVoxelCount()) * around;
   if (readings <= kMostReadings) return;
-  throw ResourceLimit(
-      fmt::format("{}: a median within {:.4g} voxels reads {:.3g} values, and {:.3g} are the most; "
-                  "use a smaller sigma, larger voxels or --kind gaussian",
-                  kSmooth, radius, readings, kMostReadings));
+  throw ResourceLimit(fmt::format(
+      "{}: a median within {:.4g} voxels reads {:.3g} values, more than the limit of {:.3g}; use "
+      "a smaller sigma, larger voxels or --kind gaussian",
+      kSmooth, radius, readings, kMostReadings));
 }
 
 /// Filter for fields on the blocks of a band.
@@ -409,12 +409,14 @@ double smoothingReach(SmoothKind kind, double sigma, double halfWidth) {
 
 NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothOptions& options) {
   if (!(sigma > 0) || !std::isfinite(sigma))
-    throw UsageError(fmt::format("{}: sigma is {}; give a positive length", kSmooth, sigma));
+    throw UsageError(
+        fmt::format("{}: sigma is {}; give a positive, finite length", kSmooth, sigma));
   if (options.mask) checkMask(*options.mask, kSmooth);
   requireSolid(solid, kSmooth);
   if (solid.isEmpty())
     throw InvalidInput(fmt::format(
-        "{}: the solid is empty, so there is no surface to smooth; give a solid", kSmooth));
+        "{}: the solid is empty, so there is no surface to smooth; give a solid with a surface",
+        kSmooth));
   const Filtering filtering{kind, sigma / solid.voxelSize()};
   if (options.mask) {
     const CoordBBox box = changingBox(vdb(solid), *options.mask);
@@ -426,8 +428,8 @@ NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothO
   }
   if (auto whole = smoothedIn(std::nullopt, solid, filtering, options)) return std::move(*whole);
   throw InvalidInput(
-      fmt::format("{}: nothing is left of the solid with a sigma of {} world units; give a "
-                  "smaller one",
+      fmt::format("{}: a sigma of {} world units removes the entire solid; give a smaller "
+                  "sigma",
                   kSmooth, sigma));
 }
 

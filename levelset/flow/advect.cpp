@@ -26,7 +26,8 @@ constexpr double kMeshed = 0.05, kMoved = 0.9;
 
 void requireTime(double time, const char* what) {
   if (!std::isfinite(time))
-    throw UsageError(fmt::format("{}: the {} is {}; give a finite one", kAdvectAction, what, time));
+    throw UsageError(
+        fmt::format("{}: the {} is {}; give a finite time", kAdvectAction, what, time));
 }
 
 /// Projects vertices onto the zero set of the tricubic interpolant, a fraction of a voxel away.
@@ -72,9 +73,8 @@ NarrowBand bandOf(const TriMesh& mesh, const NarrowBand& model, const AdvectOpti
     unit = meshToBand(mesh, 1, conversion).band;
   } catch (const InvalidInput& error) {
     throw InvalidInput(
-        fmt::format("{}: what the velocity makes of the solid is no solid on this grid ({}); use "
-                    "smaller voxels "
-                    "or a shorter time",
+        fmt::format("{}: the moved surface encloses no solid on this grid ({}); use smaller "
+                    "voxels or a shorter time",
                     kAdvectAction, error.what()));
   }
   return transform(unit, model.indexToWorld());
@@ -107,8 +107,8 @@ struct Advection::Impl {
     requireSolid(band, kAdvectAction);
     if (band.isEmpty())
       throw InvalidInput(
-          fmt::format("{}: the solid is empty; give one with a surface", kAdvectAction));
-    requireTime(time, "starting time");
+          fmt::format("{}: the solid is empty; give a solid with a surface", kAdvectAction));
+    requireTime(time, "start time");
     if (options.mask) checkMask(*options.mask, kAdvectAction);
     volumeBefore = measure(band).volume;
     if (options.scheme == AdvectScheme::Front)

@@ -227,8 +227,9 @@ double Front::tryStep(const TimeInterval& interval, double from, double to) {
     // The step may have sampled beyond the path of the surface: a shorter one may be finite.
     if (largest.nonFiniteDistance > kShortMove) return 0.25;
     for (const V3d& p : mesh_.positions) requireFinitePath(interval, p, from, to);
-    throw InvalidInput(fmt::format("{}: the velocity overflows at time {:.6g}; use a gentler one",
-                                   interval.action, from));
+    throw InvalidInput(
+        fmt::format("{}: the velocity overflows at time {:.6g}; use smaller velocities",
+                    interval.action, from));
   }
   double allowed = std::min(kFarthestMove / std::max(largest.move, largest.fastest / 4),
                             kMostStrain / mostStrain());

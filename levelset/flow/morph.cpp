@@ -33,13 +33,13 @@ void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOp
   const char* action = options.action;
   if (options.mask) checkMask(*options.mask, action);
   if (options.farthest && !(*options.farthest >= kFirstReach && std::isfinite(*options.farthest)))
-    throw UsageError(fmt::format("{}: distances to {} voxels are too few; give {} or more", action,
-                                 *options.farthest, kFirstReach));
+    throw UsageError(fmt::format("{}: a distance limit of {} voxels is too small; give at least {}",
+                                 action, *options.farthest, kFirstReach));
   if (options.steps < 1)
     throw UsageError(
-        fmt::format("{}: {} steps were asked for; give at least 1", action, options.steps));
+        fmt::format("{}: the number of steps is {}; give at least 1", action, options.steps));
   if (!(options.until > 0 && options.until <= 1))
-    throw UsageError(fmt::format("{}: the part of the path is {}; give a number above 0, up to 1",
+    throw UsageError(fmt::format("{}: the last fraction is {}; give a number above 0, up to 1",
                                  action, options.until));
   if (options.tolerance && !(*options.tolerance > 0 && std::isfinite(*options.tolerance)))
     throw UsageError(
@@ -108,8 +108,8 @@ NarrowBand intermediate(const DistancePair& pair, double part, const MorphOption
   const FloatGrid::Ptr field = pair.at(part, options.mask);
   if (!eikonal::hasZeroCrossing(field->tree()))
     throw InvalidInput(
-        fmt::format("{}: nothing is left of the solid at {:.3g} of the path, since the target lies "
-                    "apart from it; move the target until the two overlap, or ask for 1 step",
+        fmt::format("{}: the solid vanishes at fraction {:.3g} of the morph, since it does not "
+                    "overlap the target; move the target until the two overlap, or use 1 step",
                     options.action, part));
   return makeBand(distances(*field));
 }

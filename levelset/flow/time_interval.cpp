@@ -17,10 +17,10 @@ void requireFinite(const TimeInterval& interval, const V3d& velocity, const V3d&
   if (std::isfinite(velocity.x) && std::isfinite(velocity.y) && std::isfinite(velocity.z)) return;
   V3d world;
   interval.toWorld.multVecMatrix(position, world);
-  throw InvalidInput(fmt::format(
-      "{}: the velocity is not finite at {:.6g},{:.6g},{:.6g} and time {:.6g}; give one "
-      "that is finite wherever the surface goes",
-      interval.action, world.x, world.y, world.z, time));
+  throw InvalidInput(
+      fmt::format("{}: the velocity is not finite at {:.6g},{:.6g},{:.6g} and time {:.6g}; give a "
+                  "velocity that is finite along the path of the surface",
+                  interval.action, world.x, world.y, world.z, time));
 }
 
 std::size_t integrate(const TimeInterval& interval,
@@ -38,11 +38,11 @@ std::size_t integrate(const TimeInterval& interval,
     const StepResult made = step(time, longest);
     const double needed = static_cast<double>(done) + std::abs(to - made.time) / made.next;
     if (!(needed <= kMostSteps) || made.time == time) {
-      throw ResourceLimit(
-          fmt::format("{}: at time {:.6g} the velocity allows steps of {:.3g} only, which makes "
-                      "about {:.3g}, and {} are the most; ask for a shorter time or a gentler "
-                      "velocity",
-                      interval.action, time, made.next, needed, kMostSteps));
+      throw ResourceLimit(fmt::format(
+          "{}: at time {:.6g} the velocity limits steps to {:.3g}, which requires "
+          "about {:.3g} steps, more than the limit of {}; use a shorter time or a smoother "
+          "velocity",
+          interval.action, time, made.next, needed, kMostSteps));
     }
     time = made.time;
     dt = made.next;
