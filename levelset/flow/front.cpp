@@ -24,8 +24,8 @@ constexpr double kLongestEdge = 1;  // voxels
 // It is limited because a new vertex goes onto a curve over the entire edge. Shorter edges need no
 // new vertex: the error limit alone covers their ends.
 constexpr double kFarthestMove = 16, kMostStrain = 0.7, kMostError = 2e-3;
-// Where no velocity moves a vertex further than this in a step, in voxels, the error limit does not
-// apply. At a jump of the velocity no step would be short enough.
+// The error limit does not apply when no velocity moves a vertex further than this in a step, in
+// voxels: at a jump of the velocity no step would be short enough.
 constexpr double kShortMove = 0.25;
 // Largest deviation of the method's second sample from the others, voxels.
 constexpr double kMostStageDeviation = 1;
