@@ -84,7 +84,7 @@ bool markCrossingCells(SurfaceBlock& block) {
 
 /// Traversal of one block by a ray: the present cell and the plane through which the ray entered
 /// it.
-struct BlockWalk {
+struct BlockTraversal {
   const SurfaceBlock& block;
   const IndexRay& ray;
   double enter, leave;  ///< ray interval within the block, clipped to the range of the ray
@@ -116,7 +116,7 @@ struct BlockWalk {
 
 /// Clips the ray to the block; false when it misses. Of planes met at the same parameter the last
 /// one is the entry plane. findFirstCell() and exitAxis() use the same order.
-bool BlockWalk::clip() {
+bool BlockTraversal::clip() {
   for (int a = 0; a < 3; ++a) {
     const int low = block.origin[a], high = low + 8;
     if (ray.isParallel[a]) {
@@ -136,7 +136,7 @@ bool BlockWalk::clip() {
 
 /// Finds the cell in which a traversal of the entire grid would enter this block. The guess by
 /// floor() is corrected by the planes themselves.
-void BlockWalk::findFirstCell() {
+void BlockTraversal::findFirstCell() {
   t = enter;
   for (int a = 0; a < 3; ++a) {
     const int low = block.origin[a], high = low + 7;
@@ -160,7 +160,7 @@ void BlockWalk::findFirstCell() {
   }
 }
 
-int BlockWalk::exitAxis(double& exit) const {
+int BlockTraversal::exitAxis(double& exit) const {
   int result = -1;
   exit = std::numeric_limits<double>::infinity();
   for (int a = 0; a < 3; ++a) {
@@ -180,7 +180,7 @@ double mix(double a, double b, double f) {
   return a * (1 - f) + b * f;
 }
 
-void BlockWalk::placesInCell(double exit, int outAxis, double (&p)[2][3]) const {
+void BlockTraversal::placesInCell(double exit, int outAxis, double (&p)[2][3]) const {
   for (int a = 0; a < 3; ++a) {
     const double base = cell[a];
     p[0][a] = std::clamp(ray.at(a, t) - base, 0.0, 1.0);
@@ -190,8 +190,8 @@ void BlockWalk::placesInCell(double exit, int outAxis, double (&p)[2][3]) const 
   if (outAxis >= 0) p[1][outAxis] = isForward(outAxis) ? 1 : 0;
 }
 
-std::optional<double> BlockWalk::splineRoot(const DrawnField& field, double exit,
-                                            int outAxis) const {
+std::optional<double> BlockTraversal::splineRoot(const DrawnField& field, double exit,
+                                                 int outAxis) const {
   double p[2][3];
   placesInCell(exit, outAxis, p);
   const SplineCell spline(
@@ -199,8 +199,8 @@ std::optional<double> BlockWalk::splineRoot(const DrawnField& field, double exit
   return spline.firstSignChange(V3d(p[0][0], p[0][1], p[0][2]), V3d(p[1][0], p[1][1], p[1][2]));
 }
 
-bool BlockWalk::addSplineRoots(const DrawnField& field, double exit, int outAxis,
-                               std::vector<double>& shares) const {
+bool BlockTraversal::addSplineRoots(const DrawnField& field, double exit, int outAxis,
+                                    std::vector<double>& shares) const {
   double p[2][3];
   placesInCell(exit, outAxis, p);
   const V3d start(p[0][0], p[0][1], p[0][2]);
@@ -213,7 +213,7 @@ bool BlockWalk::addSplineRoots(const DrawnField& field, double exit, int outAxis
 /// The interpolant between `t` and `exit`: the blossom of the cubic at both ends, because the
 /// interpolant is affine in each coordinate. On a face the coordinate is exactly 0 or 1.
 /// @param outAxis  axis of the face at `exit`; -1 when the ray ends within the cell
-BernsteinCubic BlockWalk::restrictToRay(double exit, int outAxis) const {
+BernsteinCubic BlockTraversal::restrictToRay(double exit, int outAxis) const {
   double p[2][3];
   placesInCell(exit, outAxis, p);
   unsigned c[3];
@@ -296,7 +296,7 @@ namespace {
 /// @param visit  called with the parameter and axis of the exit from the cell; returns true to
 ///        continue
 template <typename Visit>
-void walkCells(BlockWalk& walk, double far, const Visit& visit) {
+void traverseCells(BlockTraversal& walk, double far, const Visit& visit) {
   if (!walk.clip()) return;
   walk.findFirstCell();
   for (;;) {
@@ -324,9 +324,9 @@ void walkCells(BlockWalk& walk, double far, const Visit& visit) {
 
 std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& block,
                                    const IndexRay& ray, double near, double far, Search search) {
-  BlockWalk walk{block, ray, near, far};
+  BlockTraversal walk{block, ray, near, far};
   std::optional<double> found;
-  walkCells(walk, far, [&](double exit, int exitAxis) {
+  traverseCells(walk, far, [&](double exit, int exitAxis) {
     if (field.filter != Filter::Trilinear) {
       if (const auto s = walk.splineRoot(field, exit, exitAxis))
         found = walk.t + *s * (exit - walk.t);
@@ -345,9 +345,9 @@ std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& 
 
 void addCrossings(const DrawnField& field, const SurfaceBlock& block, const IndexRay& ray,
                   double near, std::vector<SideChange>& found) {
-  BlockWalk walk{block, ray, near, std::numeric_limits<double>::infinity()};
+  BlockTraversal walk{block, ray, near, std::numeric_limits<double>::infinity()};
   std::vector<double> shares;
-  walkCells(walk, std::numeric_limits<double>::infinity(), [&](double exit, int exitAxis) {
+  traverseCells(walk, std::numeric_limits<double>::infinity(), [&](double exit, int exitAxis) {
     shares.clear();
     bool inside;
     if (field.filter == Filter::Trilinear) {
