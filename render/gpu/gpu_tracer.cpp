@@ -285,7 +285,7 @@ struct GpuTracer::Impl {
     const std::size_t blocks = (bytes + perBlock - 1) / perBlock;
     if (blocks + kFirstValues > static_cast<std::size_t>(context.tableCount())) {
       throw levelset::ResourceLimit(
-          fmt::format("render: {} MB of values need {} buffer textures, and {} leaves {}; use "
+          fmt::format("render: {} MB of values need {} buffer textures, but {} offers {}; use "
                       "larger voxels, or "
                       "draw with --renderer cpu",
                       bytes >> 20, blocks, context.description(),
