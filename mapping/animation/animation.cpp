@@ -229,7 +229,7 @@ class Animation {
         if (bases_.hash() != hash) now = carryAll(base, now);
       });
       hash = bases_.hash();
-      judgeDrift(f, before, now, goal_);
+      warnOfDrift(f, before, now, goal_);
       later_[f - begin] = now;
     }
   }
@@ -266,7 +266,7 @@ class Animation {
       if (!isSameBase) {
         const Footprints before = own_;
         own_ = carryAll(base, own_);
-        judgeDrift(f, before, own_, first_);
+        warnOfDrift(f, before, own_, first_);
       }
       shown_ = isBetween ? onTheWay(f, begin, end) : own_;
       isUnchanged = isUnchanged && shown_ == shownBefore;
@@ -393,8 +393,8 @@ class Animation {
   }
 
   /// Warns about distortion and large displacements, once for each key.
-  void judgeDrift(std::size_t f, const Footprints& before, const Footprints& now,
-                  const Footprints& first) {
+  void warnOfDrift(std::size_t f, const Footprints& before, const Footprints& now,
+                   const Footprints& first) {
     const Drift drift = worstDrift(first, now);
     if (drift.factor() > options_.driftWarning) {
       tellOnce(warnedOfDrift_,

@@ -19,11 +19,12 @@ struct Entry {
   bool operator<(const Entry& other) const { return cell < other.cell; }
 };
 
-/// The share of a step after which two come as close as the diameter; 1 where they do not.
+/// Share of a step after which two particles come as close as the diameter; 1 if they do not.
 double contact(const V3d& apart, const V3d& relative, double diameter) {
   const double approach = apart.dot(relative);
   if (approach >= 0) return 1;
-  // The same one twice, as where a grid closes on itself: others never come that close.
+  // Particles that start this close are one particle stored twice, as where a grid closes on
+  // itself.
   if (apart.length2() < 0.25 * diameter * diameter) return 1;
   const double over = apart.length2() - diameter * diameter;
   if (over <= 0) return 0;
@@ -33,11 +34,11 @@ double contact(const V3d& apart, const V3d& relative, double diameter) {
   return std::min(1.0, over / (std::sqrt(root) - approach));
 }
 
-/// Calls meet(i, j) for all pairs that may touch, always in the same order.
+/// Calls meet(i, j) for all pairs that may touch, in a fixed order.
 template <typename Meet>
 void forEachNear(std::span<const V3d> places, std::span<const V3d> moves, double diameter,
                  const Meet& meet) {
-  // What all do together brings nobody closer.
+  // The common motion does not change distances.
   V3d mean(0);
   for (const V3d& move : moves) mean += move / static_cast<double>(moves.size());
   double farthest = 0;
@@ -56,7 +57,8 @@ void forEachNear(std::span<const V3d> places, std::span<const V3d> moves, double
   for (auto a = entries.begin(); a != entries.end(); ++a) {
     for (auto b = a + 1; b != entries.end() && b->cell == a->cell; ++b)
       meet(a->particle, b->particle);
-    for (int n = 14; n < 27; ++n) {  // the neighbours that come later in the order
+    // The 13 neighbour cells that come later in the order, and the cell itself.
+    for (int n = 14; n < 27; ++n) {
       const GuardCell cell = {a->cell[0] + n / 9 - 1, a->cell[1] + n / 3 % 3 - 1,
                               a->cell[2] + n % 3 - 1};
       for (auto b = std::lower_bound(a, entries.end(), Entry{cell, 0});
@@ -66,7 +68,7 @@ void forEachNear(std::span<const V3d> places, std::span<const V3d> moves, double
   }
 }
 
-/// Gives all of a set the mean of their moves.
+/// Replaces the moves of each set by their mean.
 void moveTogether(levelset::DisjointSets& sets, std::span<V3d> moves) {
   struct Sum {
     V3d moves = V3d(0);
@@ -86,10 +88,10 @@ void moveTogether(levelset::DisjointSets& sets, std::span<V3d> moves) {
 
 void TravelGuard::limit(std::span<const V3d> places, std::span<V3d> moves) {
   if (!(diameter_ > 0)) return;
-  // From where two touch they go on side by side: what would bring them closer is taken from both,
-  // the mean over all that they touch. That may push them into others, so there are some rounds;
-  // those that touch even then move as one, and with whoever they come up to, until nobody touches:
-  // in each of those rounds two sets become one.
+  // After contact two particles move side by side: the approaching component is removed from both,
+  // averaged over all contacts of a particle. This may push them into others, so it is repeated for
+  // kRounds rounds. Particles that still touch are joined into sets that move as one body. Each
+  // further round joins at least two sets, so the loop ends.
   constexpr int kRounds = 12;
   std::vector<V3d> corrections(places.size());
   std::vector<double> contacts(places.size());

@@ -50,7 +50,7 @@ void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
             const LayerFrame frame = layerFrame(patch, uvw);
             mesh.positions[i] = frame.position;
             mesh.attributes.normals[i] =
-                levelset::carriedNormal(texture.attributes.normals[i],
+                levelset::transformedNormal(texture.attributes.normals[i],
                                         {frame.slopes[0] * perSize.x, frame.slopes[1] * perSize.y,
                                          frame.slopes[2] * perSize.z},
                                         hand);
