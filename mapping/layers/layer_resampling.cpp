@@ -8,7 +8,7 @@ namespace {
 
 using Imath::V3d;
 
-/// Of a row of positions, at x = 0 … count − 1; beyond, straight on.
+/// Interpolates a row of positions at x = 0 … count − 1; extrapolates linearly beyond.
 template <typename At>
 V3d along(const At& at, std::size_t count, double x) {
   const double last = static_cast<double>(count - 1);
@@ -18,7 +18,7 @@ V3d along(const At& at, std::size_t count, double x) {
   const auto i = static_cast<std::size_t>(cell);
   const double f = x - cell;
   const V3d b = at(i), c = at(i + 1);
-  // What would come next on a parabola through the three at an end.
+  // Continues the row by the parabola through the last three positions.
   const auto beyond = [&](const V3d& end, const V3d& next, std::size_t third) {
     return count > 2 ? (end - next) * 3.0 + at(third) : end * 2.0 - next;
   };
@@ -35,7 +35,7 @@ V3d placeAt(const ParticleLayer& layer, double x, double y) {
   return along(row, layer.rows, y);
 }
 
-/// Its rim as rows and columns like the others, so that a place is one further along each axis.
+/// Adds the rim as ordinary rows and columns, which shifts each position by one along both axes.
 ParticleLayer withRimInside(const ParticleLayer& layer) {
   ParticleLayer wide;
   wide.columns = layer.columns + 2;
@@ -83,9 +83,10 @@ ParticleLayer withCounts(const ParticleLayer& layer, std::size_t columns, std::s
 }
 
 std::vector<EmbeddedParticle> embeddedParticles(const Patch& patch, double embedDepth) {
-  // Of the distance to a neighbour on the last layer what must be left of it.
+  // Least distance to a neighbour that must remain, as a share of the distance on the last layer.
   constexpr double kLeastShare = 0.25;
-  constexpr double kWidest = 1.1;  // steps of the layers from layer to layer
+  // Spacing of the embedded layers, in spacings of the patch's layers.
+  constexpr double kWidest = 1.1;
   std::vector<EmbeddedParticle> particles;
   if (embedDepth == 0 || patch.layers.size() < 2) return particles;
   const bool isBelow = embedDepth > 0;
@@ -98,9 +99,10 @@ std::vector<EmbeddedParticle> embeddedParticles(const Patch& patch, double embed
     return i >= -rim && i < right + rim && j >= -rim && j < top + rim;
   };
   const double step = std::abs(last.w - before.w);
-  // A smooth map errs most beside its last particles: they lie deeper than the texture, by as much
-  // again or by a step. Columns are straight, so that layers may lie wider apart than layers, and
-  // the wider the deeper.
+  // A smooth map has its largest errors beside its last particles. So particles continue deeper
+  // than the texture, by the same depth again or by one layer spacing, whichever is less. Columns
+  // are straight there, so the embedded layers may be wider apart than the patch's, the more so the
+  // deeper they are.
   const double reach = std::abs(embedDepth) + std::min(std::abs(embedDepth), step);
   const double most = 2.0 * static_cast<double>(patch.layers.size());
   const auto layers = static_cast<int>(std::min(most, std::ceil(reach / (kWidest * step))));

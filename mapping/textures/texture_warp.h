@@ -28,8 +28,8 @@ struct Warp {
   std::size_t operations = 0;  ///< particles summed or tetrahedra tested, see BlockMap::evaluate
   /// Grid points far from the particles that the map sends back into the texture.
   std::size_t ghosts = 0;
-  /// Grid points left out because each would have become a separate solid, smaller than a tenth of
-  /// a voxel.
+  /// Isolated inside grid points less than a tenth of a voxel deep, which were left out so that
+  /// they do not become separate solids.
   std::size_t crumbs = 0;
   /// Random grid points where the map was also evaluated directly, and the largest error of the
   /// fast evaluation at these points, texture voxels.
