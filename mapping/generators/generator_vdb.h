@@ -42,9 +42,8 @@ inline void requireAngle(double angle, double above, double below, const char* a
   if (angle > above && angle < below) return;
   constexpr double kDegrees = 180 / 3.14159265358979323846;
   throw levelset::UsageError(
-      fmt::format("{}: {} is {:.6g} degrees; give more than {:.6g} and less "
-                  "than {:.6g}",
-                  action, name, angle * kDegrees, above * kDegrees, below * kDegrees));
+      fmt::format("{}: {} is {:.6g} degrees; give more than {:.6g} and less than {:.6g}", action,
+                  name, angle * kDegrees, above * kDegrees, below * kDegrees));
 }
 
 inline void requireTiling(const Tiling& tiling, const char* action) {

@@ -28,8 +28,7 @@ void requireHeightmap(const Heightmap& heightmap, const V3d& center) {
   const HeightGrid& grid = heightmap.grid;
   if (grid.columns < 2 || grid.rows < 2) {
     throw levelset::UsageError(
-        fmt::format("{}: the grid has {} columns and {} rows; give at least "
-                    "two of each",
+        fmt::format("{}: the grid has {} columns and {} rows; give at least two of each",
                     kHeightmap, grid.columns, grid.rows));
   }
   const auto count = static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows);

@@ -33,8 +33,7 @@ void requireHexagons(const Hexagons& hexagons, const V3d& center) {
   const double most = std::min(widest / 2, hexagons.height);
   if (hexagons.rounding > most) {
     throw levelset::UsageError(
-        fmt::format("{}: a rounding of {:.6g} is too large for the edges; give at most "
-                    "{:.6g}",
+        fmt::format("{}: a rounding of {:.6g} is too large for the edges; give at most {:.6g}",
                     kHexagons, hexagons.rounding, most));
   }
 }

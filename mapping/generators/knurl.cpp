@@ -38,8 +38,7 @@ void requireKnurl(const Knurl& knurl, const V3d& center) {
   if (knurl.depth > sharpDepth(knurl) * (1 + 1e-9)) {
     throw levelset::UsageError(
         fmt::format("{}: the depth is {:.6g}, but at this pitch and flank angle the crests are "
-                    "sharp at {:.6g}; "
-                    "give a smaller depth or a smaller flank angle",
+                    "sharp at {:.6g}; give a smaller depth or a smaller flank angle",
                     kKnurl, knurl.depth, sharpDepth(knurl)));
   }
 }

@@ -125,9 +125,8 @@ void requireMail(const Ring& ring) {
   const double clearance = ringClearance(ring);
   if (!(clearance > ring.clearance) && !(clearance == ring.clearance && clearance > 0)) {
     throw levelset::UsageError(fmt::format(
-        "{}: the clearance between wires is {:.6g}, but --clearance requires {:.6g}; make the "
-        "wire thinner (a tube under {:.6g} radii, at the best spacing) or change "
-        "--spacing and --lean",
+        "{}: the clearance between wires is {:.6g}, but --clearance requires {:.6g}; make the wire "
+        "thinner (a tube under {:.6g} radii, at the best spacing) or change --spacing and --lean",
         kRing, clearance, ring.clearance, 0.25));
   }
   if (ring.rows > 1 && !holdsRing(Circle(ring, 0, 0), Circle(ring, 0, 1))) {

@@ -235,8 +235,7 @@ void raisePoints(const levelset::NarrowBand& band, double height, std::span<cons
       if (above > kFarthest * rise + step) {
         throw InvalidInput(
             fmt::format("patch: from {} along {} the distance to the base does not reach {:.6g}; "
-                        "use a direction "
-                        "that leans less, or a lower height",
+                        "use a direction that leans less, or a lower height",
                         text(points[i]), text(directions[i]), height));
       }
     }

@@ -197,8 +197,7 @@ std::size_t countAlong(double length, double spacing) {
   if (!(cells < kMostParticles)) {
     throw levelset::ResourceLimit(
         fmt::format("{}: {:.3g} particles along a side exceed the limit of {:.0g}; give a larger "
-                    "--spacing or less "
-                    "taper",
+                    "--spacing or less taper",
                     kPatchLayers, cells, kMostParticles));
   }
   return std::max(kFewest, static_cast<std::size_t>(cells) + 1);
@@ -209,8 +208,7 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
   if (!(count <= kMostParticles)) {
     throw levelset::ResourceLimit(
         fmt::format("{}: a spacing of {:.6g} gives {:.3g} particles, more than the limit of "
-                    "{:.0g}; give a larger "
-                    "--spacing",
+                    "{:.0g}; give a larger --spacing",
                     kPatchLayers, spacing, count, kMostParticles));
   }
 }

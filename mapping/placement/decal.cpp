@@ -45,8 +45,7 @@ DecalFrame frameAt(const SurfaceField& field, const V3d& center, const V3d& dire
   if (!(tangent.length() > kLeastTangent * length)) {
     throw UsageError(fmt::format(
         "{}: the direction {} is normal to the surface at {}, whose normal is "
-        "{:.3g},{:.3g},{:.3g}; "
-        "give a direction along the surface",
+        "{:.3g},{:.3g},{:.3g}; give a direction along the surface",
         kDecal, pointAsOption(direction), pointAsOption(center), normal.x, normal.y, normal.z));
   }
   const V3d u = tangent.normalized(), v = normal.cross(u);
@@ -298,8 +297,7 @@ void checkDecalArguments(const NarrowBand& base, const V3d& direction, double ra
       direction.length() == 0) {
     throw UsageError(
         fmt::format("{}: the direction {} is not a vector of finite, nonzero length; give a "
-                    "direction along the "
-                    "surface",
+                    "direction along the surface",
                     kDecal, pointAsOption(direction)));
   }
   for (const std::vector<V3d>& side : options.sides)

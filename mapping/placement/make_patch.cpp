@@ -43,8 +43,7 @@ void checkApart(const NarrowBand& base, const Outline& outline) {
       if (distance < 2 * base.voxelSize()) {
         throw InvalidInput(
             fmt::format("{}: corners {} and {} both project to {}, {:.3g} voxels apart; sides must "
-                        "be at least two "
-                        "voxels long",
+                        "be at least two voxels long",
                         kPatch, i, j, pointAsOption(corners[i]), distance / base.voxelSize()));
       }
     }
@@ -57,8 +56,7 @@ void checkApart(const NarrowBand& base, const Outline& outline) {
       if ((knots[i] - knots[i - 1]).length() >= 2 * base.voxelSize()) continue;
       throw InvalidInput(
           fmt::format("{}: two points of side {} both project to {}; leave one out (the corners "
-                      "are already part of "
-                      "the side)",
+                      "are already part of the side)",
                       kPatch, side, pointAsOption(knots[i])));
     }
   }
@@ -201,8 +199,7 @@ std::vector<V3d> cornerDirections(const NarrowBand& base, const Outline& outline
     if (directions[i].dot(field.normal(outline.corners[i])) >= kLeastCosine) continue;
     throw UsageError(
         fmt::format("{}: the direction {} hardly leads away from the surface at corner {}, {}; "
-                    "give a direction "
-                    "less than 78 degrees from the normal",
+                    "give a direction less than 78 degrees from the normal",
                     kPatch, pointAsOption(directions[i]), i, pointAsOption(outline.corners[i])));
   }
   return directions;

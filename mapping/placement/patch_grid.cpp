@@ -179,8 +179,7 @@ V3d seenFromOutside(const SurfaceField& field, const V3d& axis, const V3d& direc
   if (inner <= 0 || inner == far) {
     throw InvalidInput(
         fmt::format("{}: the line from the axis at {} along {:.3g},{:.3g},{:.3g} meets no surface; "
-                    "the axis must "
-                    "be inside the base, and end before the base does",
+                    "the axis must be inside the base, and end before the base does",
                     kGrid, pointAsOption(axis), direction.x, direction.y, direction.z));
   }
   for (int i = 0; i < 50; ++i) {
@@ -314,14 +313,13 @@ PatchGridResult makePatchGridAround(const NarrowBand& base, const V3d& from, con
     throw UsageError(fmt::format("{}: {} tiles around; give at least 3", kGrid, grid.columns));
   if (grid.mirrorU && grid.columns % 2 == 1) {
     throw UsageError(
-        fmt::format("{}: with --mirror-u the number of tiles around must be even, so that the last "
-                    "tile matches "
-                    "the first; {} is odd",
+        fmt::format("{}: with --mirror u or both the number of tiles around must be even, so that "
+                    "the last matches the first; {} is odd",
                     kGrid, grid.columns));
   }
   if (options.scheme == LayerScheme::Spline || !options.transform.isIdentity() || options.mirror) {
     throw UsageError(
-        fmt::format("{}: --particles spline, twist, taper, bend and --mirror cannot be combined "
+        fmt::format("{}: --particles spline, twist, taper, bend and --mirrored cannot be combined "
                     "with tiles around an axis",
                     kGrid));
   }

@@ -169,10 +169,8 @@ void checkMerged(const Merged& merged, std::span<const V3d> points, std::span<co
     if (off > std::max(targetSpacing, same)) {
       throw InvalidInput(
           fmt::format("{}: particles at ({:.6g}, {:.6g}, {:.6g}) coincide, but the texture "
-                      "coordinates ({:.6g}, "
-                      "{:.6g}, {:.6g}) of one differ from those of the others by more than "
-                      "neighbours do; remove "
-                      "one of them",
+                      "coordinates ({:.6g}, {:.6g}, {:.6g}) of one differ from those of the others "
+                      "by more than neighbours do; remove one of them",
                       kRbfCloud, points[i].x, points[i].y, points[i].z, targets[i].x, targets[i].y,
                       targets[i].z));
     }
@@ -222,8 +220,7 @@ void findAxes(RbfCloud& cloud, RbfSolveReport& report) {
       "there is only one particle, so the map is constant",
       "all particles lie on one line, so the map rotates and scales space as it does the line",
       "all particles lie in one plane, so the map continues along the plane's normal, scaled by "
-      "the "
-      "mean scale in the plane"};
+      "the mean scale in the plane"};
   if (cloud.directions < 3)
     report.notes.emplace_back(kShapes[static_cast<std::size_t>(cloud.directions)]);
 }

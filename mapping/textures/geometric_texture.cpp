@@ -82,8 +82,7 @@ void checkArguments(const NarrowBand& base, const NarrowBand& texture,
   if (options.embedDepth && std::abs(*options.embedDepth) > diagonal) {
     throw InvalidInput(
         fmt::format("{}: the embedding depth of {:.6g} exceeds the diagonal of the base, {:.6g}; "
-                    "give a smaller "
-                    "--embed",
+                    "give a smaller --embed",
                     kTexture, *options.embedDepth, diagonal));
   }
   if (!(options.blend >= 0) || !std::isfinite(options.blend)) {
@@ -285,9 +284,8 @@ std::string tellOverlap(const ChosenMap& map) {
   const V3d &p = map.overlap.position, &uvw = map.overlap.uvw;
   return fmt::format(
       "{}: the patch passes through itself at {} of {} sample points, one at ({:.6g}, {:.6g}, "
-      "{:.6g}), "
-      "u, v, w = {:.3g}, {:.3g}, {:.3g}, where the texture would have two values; keep its spline "
-      "clear of itself, use a lower height, or map its halves one after the other",
+      "{:.6g}), u, v, w = {:.3g}, {:.3g}, {:.3g}, where the texture would have two values; keep "
+      "its spline clear of itself, use a lower height, or map its halves one after the other",
       kTexture, map.overlaps, map.distortion.samples, p.x, p.y, p.z, uvw.x, uvw.y, uvw.z);
 }
 
@@ -377,10 +375,8 @@ void requireResult(const NarrowBand& texture, const TextureReport& report,
     const V3d& p = worst.foldPoint;
     throw levelset::ResourceLimit(
         fmt::format("{}: the map compresses the texture to {:.2g} of its size near ({:.6g}, "
-                    "{:.6g}, {:.6g}); voxels "
-                    "fine enough for that, {:.3g}, need about {:.3g} GB; give --voxel, a lower "
-                    "height or a flatter "
-                    "position",
+                    "{:.6g}, {:.6g}); voxels fine enough for that, {:.3g}, need about {:.3g} GB; "
+                    "give --voxel, a lower height or a flatter position",
                     kTexture, worst.stretch.least, p.x, p.y, p.z, report.voxelSize, bytes / 1e9));
   }
   levelset::requireMemory(bytes, options.maxMemory, kTexture);

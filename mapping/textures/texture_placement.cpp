@@ -27,8 +27,7 @@ Box3d chooseTextureBox(const Box3d& own, const std::optional<Box3d>& given) {
   }
   if (given && !box.intersects(own)) {
     throw InvalidInput(fmt::format(
-        "{}: the texture box contains nothing of the texture; give a box that meets its "
-        "surface",
+        "{}: the texture box contains nothing of the texture; give a box that meets its surface",
         kAction));
   }
   return box;

@@ -258,8 +258,7 @@ class TextureWarp {
       if (!(std::abs(box.min()[axis]) < kMostIndex) || !(std::abs(box.max()[axis]) < kMostIndex)) {
         throw levelset::ResourceLimit(
             fmt::format("{}: with a voxel size of {:.3g} the grid exceeds the range of 32-bit "
-                        "indices; use larger "
-                        "voxels",
+                        "indices; use larger voxels",
                         kWarp, transform_->voxelSize()[0]));
       }
     }

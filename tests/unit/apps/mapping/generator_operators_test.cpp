@@ -100,7 +100,7 @@ TEST_F(Generators, AreRefusedByADryRunAsByARun) {
                    "under two voxels");
     EXPECT_REFUSED(
         levelsmith(start + "ring --radius 1 --tube 0.3 --columns 2 --rows 2 --voxel 0.05"), 2,
-        "come within");
+        "the clearance between wires is");
     EXPECT_REFUSED(levelsmith(start + "gyroid --cell 1 --thickness 0.3 --voxel 0.02"), 2, "close");
     EXPECT_REFUSED(levelsmith(start + "scales --length 2 --step 3 --voxel 0.05"), 2, "overlap");
     EXPECT_REFUSED(levelsmith(start + "hexagons --size 1 --rounding 1 --voxel 0.05"), 2,
