@@ -209,7 +209,7 @@ class Animation {
       levelset::report(options_.progress, done_, kAnimation);
       moved.push_back(carryFootprint(base, one, options_.carry));
       // A footprint that stops moving must keep the same bits.
-      if (farthestWay(one, moved.back()) <= 1e-6 * base.voxelSize()) moved.back() = one;
+      if (farthestMove(one, moved.back()) <= 1e-6 * base.voxelSize()) moved.back() = one;
     }
     return moved;
   }
@@ -261,14 +261,14 @@ class Animation {
       if (!isSame) patches_ = given;
       // If there is no path, fail before any frame is computed.
       if (!bases_.areMoving() && isBetween && begin + 1 < end)
-        (void)atFrame(f + 1, [&] { return onTheWay(f + 1, begin, end); });
+        (void)atFrame(f + 1, [&] { return footprintsBetween(f + 1, begin, end); });
     } else {
       if (!isSameBase) {
         const Footprints before = own_;
         own_ = carryAll(base, own_);
         warnOfDrift(f, before, own_, first_);
       }
-      shown_ = isBetween ? onTheWay(f, begin, end) : own_;
+      shown_ = isBetween ? footprintsBetween(f, begin, end) : own_;
       isUnchanged = isUnchanged && shown_ == shownBefore;
       if (!isUnchanged) {
         patches_ = remade(
@@ -285,7 +285,8 @@ class Animation {
     for (std::size_t i = 0; i < shown_.size(); ++i) {
       report.corners.push_back(shown_[i].corners);
       if (i < shownBefore.size())
-        report.farthestWay = std::max(report.farthestWay, farthestWay(shownBefore[i], shown_[i]));
+        report.farthestMove =
+            std::max(report.farthestMove, farthestMove(shownBefore[i], shown_[i]));
     }
     report_.frames.push_back(std::move(report));
     visit_(
@@ -297,7 +298,7 @@ class Animation {
     if (isUnchanged) ++report_.reused;
   }
 
-  [[nodiscard]] Footprints onTheWay(std::size_t f, std::size_t begin, std::size_t end) {
+  [[nodiscard]] Footprints footprintsBetween(std::size_t f, std::size_t begin, std::size_t end) {
     const NarrowBand& base = baseAt(f);
     const double part = static_cast<double>(f - begin) / static_cast<double>(end - begin);
     const bool areNew = paths_.size() != own_.size();
@@ -309,8 +310,8 @@ class Animation {
         if (!from.reach) from = withReach(base, std::move(from));
         if (!to.reach) to = withReach(base, std::move(to));
         paths.emplace_back(base, std::move(from), std::move(to), options_.carry,
-                           areNew ? std::vector<V3d>{} : paths_[i].centreWay());
-        tellOfPath(f, paths.back(), areNew);
+                           areNew ? std::vector<V3d>{} : paths_[i].centrePath());
+        warnOfPath(f, paths.back(), areNew);
       }
       paths_ = std::move(paths);
       pathHash_ = bases_.hash();
@@ -324,9 +325,9 @@ class Animation {
   }
 
   /// Warns about a path. Each warning is issued once between two keys, for all patches and frames.
-  void tellOfPath(std::size_t f, const PatchPath& path, bool isNew) {
+  void warnOfPath(std::size_t f, const PatchPath& path, bool isNew) {
     if (!path.isAlike()) {
-      tellOnce(warnedOfWays_,
+      warnOnce(warnedOfPaths_,
                fmt::format(
                    "{}: frame {}: the paths of the corners cannot follow that of the patch's "
                    "centre; each corner takes its own shortest path, and where these lead around "
@@ -336,7 +337,7 @@ class Animation {
     }
     constexpr double kMostTurn = 1;  // radians; sides shrink by the cosine of half the angle
     if (isNew && options_.carry == CarryRule::Corners && std::abs(path.turn()) > kMostTurn) {
-      tellOnce(
+      warnOnce(
           warnedOfTurn_,
           fmt::format("{}: frame {}: the patch turns by {:.0f} degrees on its path, and shrinks "
                       "in between because its corners move along geodesics; --carry rigid turns "
@@ -344,7 +345,7 @@ class Animation {
                       kAnimation, f, std::abs(path.turn()) * 180 / std::acos(-1.0)));
     }
     if (path.hasJumped()) {
-      tellOnce(warnedOfJump_,
+      warnOnce(warnedOfJump_,
                fmt::format(
                    "{}: frame {}: the path from patch to patch differs from that of the previous "
                    "frame, and may lead around another side",
@@ -354,7 +355,7 @@ class Animation {
 
   /// Adds a warning once for each key.
   /// @param key  last key with this warning, counted from 1
-  void tellOnce(std::size_t& key, std::string warning) {
+  void warnOnce(std::size_t& key, std::string warning) {
     if (key == key_ + 1) return;
     key = key_ + 1;
     report_.warnings.push_back(std::move(warning));
@@ -397,7 +398,7 @@ class Animation {
                    const Footprints& first) {
     const Drift drift = worstDrift(first, now);
     if (drift.factor() > options_.driftWarning) {
-      tellOnce(warnedOfDrift_,
+      warnOnce(warnedOfDrift_,
                fmt::format("{}: frame {}: sides or diagonals of the patch are {:.3g} to {:.3g} "
                            "times as long as at its key; {}",
                            kAnimation, f, drift.least, drift.most,
@@ -405,16 +406,16 @@ class Animation {
                                                                 : "the surface under it bends"));
     }
     for (std::size_t i = 0; i < now.size(); ++i) {
-      const double way = farthestWay(before[i], now[i]);
+      const double move = farthestMove(before[i], now[i]);
       const double size = (before[i].corners[2] - before[i].corners[0]).length();
-      if (!(way > 0.5 * size)) continue;
-      tellOnce(
-          warnedOfWay_,
+      if (!(move > 0.5 * size)) continue;
+      warnOnce(
+          warnedOfMove_,
           fmt::format(
               "{}: frame {}: a corner moved {:.4g} to the nearest surface, over half of the "
               "patch's "
               "diagonal; give frames in between, or check that it is the same surface component",
-              kAnimation, f, way));
+              kAnimation, f, move));
     }
   }
 
@@ -424,7 +425,7 @@ class Animation {
   Bases bases_;
   AnimationReport report_;
   std::size_t key_ = 0;
-  std::size_t warnedOfDrift_ = 0, warnedOfWay_ = 0, warnedOfWays_ = 0, warnedOfTurn_ = 0,
+  std::size_t warnedOfDrift_ = 0, warnedOfMove_ = 0, warnedOfPaths_ = 0, warnedOfTurn_ = 0,
               warnedOfJump_ = 0;  ///< last keys with each warning, from 1
   double done_ = 0;
   std::uint64_t baseHash_ = 0, pathHash_ = 0;

@@ -56,7 +56,7 @@ struct FrameReport {
   std::size_t frame = 0;
   std::vector<std::array<Imath::V3d, 4>> corners;  ///< corners of each outline
   /// Largest displacement of a corner since the previous frame, world units.
-  double farthestWay = 0;
+  double farthestMove = 0;
   Drift drift = {};         ///< of the worst outline, relative to the previous or next key
   bool isRemade = false;    ///< true: the patches had to be rebuilt
   std::size_t skipped = 0;  ///< patches left out because they fold, see TextureOptions::skipFolds

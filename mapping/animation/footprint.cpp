@@ -26,8 +26,8 @@ constexpr const char* kAnimate = "animate";
 /// geodesic between the two points and corrects it by the miss of a traced geodesic. The correction
 /// treats the surface as flat, which is inexact by the spreading of geodesics, so each step reduces
 /// the miss.
-std::optional<V3d> straightWayTo(const SurfaceField& field, const SurfaceFrame& frame,
-                                 const V3d& goal) {
+std::optional<V3d> geodesicTo(const SurfaceField& field, const SurfaceFrame& frame,
+                              const V3d& goal) {
   constexpr int kMostShots = 24;
   constexpr double kHit = 1e-4, kNear = 0.05;  // voxels
   const std::vector<V3d> path = geodesic(field, 0, frame.centre, goal);
@@ -111,7 +111,7 @@ Footprint withReach(const NarrowBand& base, Footprint footprint, bool keepsDirec
   SurfaceFrame frame = frameOf(footprint);
   std::array<V3d, 4> ways;
   for (std::size_t i = 0; i < 4; ++i) {
-    const std::optional<V3d> way = straightWayTo(field, frame, footprint.corners[i]);
+    const std::optional<V3d> way = geodesicTo(field, frame, footprint.corners[i]);
     if (!way) return footprint;
     ways[i] = *way;
   }
@@ -148,7 +148,7 @@ Footprint carryFootprint(const NarrowBand& base, const Footprint& footprint, Car
   return moved;
 }
 
-double farthestWay(const Footprint& from, const Footprint& to) {
+double farthestMove(const Footprint& from, const Footprint& to) {
   double farthest = 0;
   for (std::size_t i = 0; i < 4; ++i)
     farthest = std::max(farthest, (to.corners[i] - from.corners[i]).length());

@@ -60,7 +60,7 @@ enum class CarryRule {
                                        CarryRule rule);
 
 /// Largest displacement of a corner.
-[[nodiscard]] double farthestWay(const Footprint& from, const Footprint& to);
+[[nodiscard]] double farthestMove(const Footprint& from, const Footprint& to);
 
 /// Ratios of the straight lengths of the sides and diagonals to those of another footprint.
 struct Drift {

@@ -38,7 +38,7 @@ class PatchPath {
   void dropBase() { base_ = {}; }
   void setBase(const levelset::NarrowBand& base) { base_ = base; }
 
-  [[nodiscard]] const std::vector<Imath::V3d>& centreWay() const { return way_; }
+  [[nodiscard]] const std::vector<Imath::V3d>& centrePath() const { return path_; }
   /// True if the corners move beside the centre. Otherwise each corner takes its own shortest path,
   /// which may lead around the other side.
   [[nodiscard]] bool isAlike() const { return isAlike_; }
@@ -49,17 +49,17 @@ class PatchPath {
 
  private:
   [[nodiscard]] SurfaceFrame frameAt(double part) const;
-  void findCentreWay(const std::vector<Imath::V3d>& guide);
+  void findCentrePath(const std::vector<Imath::V3d>& guide);
   void carryDirections();
-  void findCornerWays();
+  void findCornerPaths();
 
   levelset::NarrowBand base_;
   Footprint from_, to_;
   CarryRule rule_;
   bool isConstant_ = false, isAlike_ = true, hasJumped_ = false;
-  std::vector<Imath::V3d> way_, normals_, directions_;
+  std::vector<Imath::V3d> path_, normals_, directions_;
   double turn_ = 0;
-  std::array<std::vector<Imath::V3d>, 4> cornerWays_;
+  std::array<std::vector<Imath::V3d>, 4> cornerPaths_;
 };
 
 }  // namespace mapping

@@ -33,9 +33,9 @@ struct Distortion {
 /// Texture coordinates of sample points: the particles, the middles of their cells, points between
 /// the layers, and points below the surface.
 /// @param embedDepth  depth of the points below the surface, in w
-[[nodiscard]] std::vector<Imath::V3d> samplePlaces(const Patch& patch, double embedDepth);
+[[nodiscard]] std::vector<Imath::V3d> samplePoints(const Patch& patch, double embedDepth);
 
-/// Evaluates a map at samplePlaces.
+/// Evaluates a map at samplePoints.
 [[nodiscard]] std::vector<MapSample> sampleMap(const PatchMap& map, const Patch& patch,
                                                double embedDepth);
 

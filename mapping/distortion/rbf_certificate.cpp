@@ -374,7 +374,7 @@ std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch, double e
   constexpr std::size_t kManyParticles = 4000;
   if (map.size() < kManyParticles || map.kernel() != RbfKernel::Biharmonic)
     return sampleMap(map, patch, embedDepth);
-  const std::vector<V3d> places = samplePlaces(patch, embedDepth);
+  const std::vector<V3d> places = samplePoints(patch, embedDepth);
   std::vector<MapSample> samples(places.size());
   for (std::size_t n = 0; n < places.size(); ++n)
     samples[n].position = layerPosition(patch, places[n]);

@@ -55,7 +55,7 @@ class GrooveStations {
         mouth_(std::min(depth_ * std::tan(knurl.flankAngle / 2), knurl.pitch / 2)),
         isSharp_(mouth_ > knurl.pitch / 2 * (1 - 1e-9)) {}
 
-  [[nodiscard]] double place(long station) const {
+  [[nodiscard]] double position(long station) const {
     const long groove = station >> 2, rest = station & 3;
     if (rest == 0) return static_cast<double>(groove) * pitch_;
     if (rest == 2 || isSharp_) return (static_cast<double>(groove) + 0.5) * pitch_;
@@ -91,7 +91,7 @@ void addGroove(const Knurl& knurl, const GrooveStations& stations, long groove, 
   const double angle = knurl.pattern == KnurlPattern::Straight ? 0 : knurl.grooveAngle;
   const V2d normal(std::cos(angle), -std::sin(angle)), along(-normal.y, normal.x);
   const auto corner = [&](long station, double t) {
-    const V2d p = normal * stations.place(station) + along * t;
+    const V2d p = normal * stations.position(station) + along * t;
     return V3d(p.x, p.y, stations.height(station));
   };
   for (long station = 4 * groove - 2; station < 4 * groove + 2; ++station)
@@ -105,7 +105,7 @@ void addCrossing(const Knurl& knurl, const GrooveStations& stations, long first,
                  ReliefMesh& relief) {
   const double c = 2 * std::cos(knurl.grooveAngle), s = 2 * std::sin(knurl.grooveAngle);
   const auto corner = [&](long i, long j) {
-    const double a = stations.place(4 * first + i), b = stations.place(4 * second + j);
+    const double a = stations.position(4 * first + i), b = stations.position(4 * second + j);
     return V3d((a + b) / c, (b - a) / s,
                std::min(stations.height(4 * first + i), stations.height(4 * second + j)));
   };

@@ -28,7 +28,7 @@ V3d along(const At& at, std::size_t count, double x) {
          (b * 3.0 - a - c * 3.0 + d) * (0.5 * f * f * f);
 }
 
-V3d placeAt(const ParticleLayer& layer, double x, double y) {
+V3d positionAt(const ParticleLayer& layer, double x, double y) {
   const auto row = [&](std::size_t j) {
     return along([&](std::size_t i) { return layer.at(i, j); }, layer.columns, x);
   };
@@ -64,11 +64,11 @@ ParticleLayer withCounts(const ParticleLayer& layer, std::size_t columns, std::s
     for (std::size_t j = 0; j < rows; ++j)
       for (std::size_t i = 0; i < columns; ++i)
         result.positions.push_back(
-            placeAt(layer, static_cast<double>(i) * across, static_cast<double>(j) * up));
+            positionAt(layer, static_cast<double>(i) * across, static_cast<double>(j) * up));
     return result;
   }
   const ParticleLayer wide = withRimInside(layer);
-  const auto place = [&](int i, int j) { return placeAt(wide, 1 + i * across, 1 + j * up); };
+  const auto place = [&](int i, int j) { return positionAt(wide, 1 + i * across, 1 + j * up); };
   result.rim.resize(2 * (columns + rows) + 4);
   const auto right = static_cast<int>(columns), top = static_cast<int>(rows);
   for (int j = -1; j <= top; ++j)

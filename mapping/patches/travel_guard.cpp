@@ -36,7 +36,7 @@ double contact(const V3d& apart, const V3d& relative, double diameter) {
 
 /// Calls meet(i, j) for all pairs that may touch, in a fixed order.
 template <typename Meet>
-void forEachNear(std::span<const V3d> places, std::span<const V3d> moves, double diameter,
+void forEachNear(std::span<const V3d> positions, std::span<const V3d> moves, double diameter,
                  const Meet& meet) {
   // The common motion does not change distances.
   V3d mean(0);
@@ -44,11 +44,11 @@ void forEachNear(std::span<const V3d> places, std::span<const V3d> moves, double
   double farthest = 0;
   for (const V3d& move : moves) farthest = std::max(farthest, (move - mean).length());
   const double edge = diameter + 2 * farthest;
-  std::vector<Entry> entries(places.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
+  std::vector<Entry> entries(positions.size());
+  for (std::size_t i = 0; i < positions.size(); ++i) {
     for (std::size_t a = 0; a < 3; ++a)
       entries[i].cell[a] =
-          static_cast<std::int64_t>(std::floor(places[i][static_cast<int>(a)] / edge));
+          static_cast<std::int64_t>(std::floor(positions[i][static_cast<int>(a)] / edge));
     entries[i].particle = i;
   }
   std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
@@ -86,22 +86,22 @@ void moveTogether(levelset::DisjointSets& sets, std::span<V3d> moves) {
 
 }  // namespace
 
-void TravelGuard::limit(std::span<const V3d> places, std::span<V3d> moves) {
+void TravelGuard::limit(std::span<const V3d> positions, std::span<V3d> moves) {
   if (!(diameter_ > 0)) return;
   // After contact two particles move side by side: the approaching component is removed from both,
   // averaged over all contacts of a particle. This may push them into others, so it is repeated for
   // kRounds rounds. Particles that still touch are joined into sets that move as one body. Each
   // further round joins at least two sets, so the loop ends.
   constexpr int kRounds = 12;
-  std::vector<V3d> corrections(places.size());
-  std::vector<double> contacts(places.size());
-  levelset::DisjointSets crowds(places.size());
+  std::vector<V3d> corrections(positions.size());
+  std::vector<double> contacts(positions.size());
+  levelset::DisjointSets crowds(positions.size());
   for (int round = 0;; ++round) {
     std::fill(corrections.begin(), corrections.end(), V3d(0));
     std::fill(contacts.begin(), contacts.end(), 0);
     bool isFree = true;
-    forEachNear(places, moves, diameter_, [&](std::size_t i, std::size_t j) {
-      const V3d apart = places[j] - places[i], relative = moves[j] - moves[i];
+    forEachNear(positions, moves, diameter_, [&](std::size_t i, std::size_t j) {
+      const V3d apart = positions[j] - positions[i], relative = moves[j] - moves[i];
       const double t = contact(apart, relative, diameter_);
       if (t == 1) return;
       isFree = false;

@@ -144,7 +144,7 @@ struct RoundFrame {
   [[nodiscard]] V3d direction(double angle) const {
     return out * std::cos(angle) + side * std::sin(angle);
   }
-  [[nodiscard]] V3d place(double share) const { return from + along * (length * share); }
+  [[nodiscard]] V3d pointAt(double share) const { return from + along * (length * share); }
 };
 
 RoundFrame roundFrame(const NarrowBand& base, const V3d& from, const V3d& to, double rotation) {
@@ -201,7 +201,7 @@ ParticleLayer roundLayer(const NarrowBand& base, const RoundFrame& frame, std::s
   layer.columns = columns + 1;
   layer.rows = rows + 1;
   for (std::size_t j = 0; j <= rows; ++j) {
-    const V3d axis = frame.place(static_cast<double>(j) / static_cast<double>(rows));
+    const V3d axis = frame.pointAt(static_cast<double>(j) / static_cast<double>(rows));
     const bool isBorder = j == 0 || j == rows;
     const std::size_t count = isBorder ? 4 * columns : columns;
     std::vector<V3d> ring;

@@ -125,8 +125,8 @@ struct Merged {
   std::vector<std::uint32_t> leader;  ///< original index of one point of each merged one
 };
 
-Merged mergePlaces(std::span<const V3d> points, std::span<const V3d> targets,
-                   std::span<const char> near, double gap) {
+Merged mergeCoincident(std::span<const V3d> points, std::span<const V3d> targets,
+                       std::span<const char> near, double gap) {
   const std::vector<std::uint32_t> leader = findLeaders(points, gap);
   Merged merged;
   merged.place.resize(points.size());
@@ -244,7 +244,7 @@ RbfCloud makeRbfCloud(std::span<const V3d> points, std::span<const V3d> targets,
   // Scaled to size 1, so that no square overflows.
   std::vector<V3d> local;
   for (const V3d& p : points) local.push_back(extent > 0 ? (p - origin) / extent : V3d(0));
-  Merged merged = mergePlaces(local, targets, near, kSmallestGap);
+  Merged merged = mergeCoincident(local, targets, near, kSmallestGap);
   const auto [spacing, targetSpacing] = meanSpacings(merged.points, merged.targets);
   checkMerged(merged, points, targets, targetSpacing, report);
   cloud.spacing = merged.points.size() > 1 ? spacing * extent : 1;

@@ -230,10 +230,10 @@ void RbfCubes::sumFar(RbfCube& cube, std::span<const std::uint32_t> candidates) 
   }
 }
 
-M33d RbfCubes::slopes(const RbfCube& cube, const V3d& place) const {
-  M33d result = cube.far.slopes(place - cube.center);
+M33d RbfCubes::slopes(const RbfCube& cube, const V3d& point) const {
+  M33d result = cube.far.slopes(point - cube.center);
   for (const std::uint32_t i : cube.near) {
-    const V3d way = place - particles_[i].position;
+    const V3d way = point - particles_[i].position;
     const double distance = way.length();
     if (distance == 0) continue;
     for (int k = 0; k < 3; ++k)
@@ -243,10 +243,10 @@ M33d RbfCubes::slopes(const RbfCube& cube, const V3d& place) const {
   return result;
 }
 
-V3d RbfCubes::value(const RbfCube& cube, const V3d& place) const {
-  V3d result = cube.far.value(place - cube.center);
+V3d RbfCubes::value(const RbfCube& cube, const V3d& point) const {
+  V3d result = cube.far.value(point - cube.center);
   for (const std::uint32_t i : cube.near)
-    result += particles_[i].weight * (place - particles_[i].position).length();
+    result += particles_[i].weight * (point - particles_[i].position).length();
   return result;
 }
 

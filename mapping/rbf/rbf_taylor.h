@@ -71,9 +71,9 @@ class RbfCubes {
   [[nodiscard]] double weightNorm(std::uint32_t particle) const { return norms_[particle]; }
   /// Scaled Jacobian at a point of the cube, gradients as rows. At a particle its own term, which
   /// has a kink there, adds nothing.
-  [[nodiscard]] Imath::M33d slopes(const RbfCube& cube, const Imath::V3d& place) const;
+  [[nodiscard]] Imath::M33d slopes(const RbfCube& cube, const Imath::V3d& point) const;
   /// Scaled u, v and w at a point of the cube.
-  [[nodiscard]] Imath::V3d value(const RbfCube& cube, const Imath::V3d& place) const;
+  [[nodiscard]] Imath::V3d value(const RbfCube& cube, const Imath::V3d& point) const;
 
  private:
   /// Moves candidates that are far enough from the cube into its polynomial.

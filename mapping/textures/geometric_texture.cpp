@@ -251,14 +251,14 @@ ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double embedDepth,
   rbf.maxMemory = std::min(rbf.maxMemory, options.maxMemory);
   rbf.solveTolerance = tolerance;
   rbf.progress = levelset::subProgress(options.progress, 0, 0.2);
-  CertifiedRbf judged = certifiedRbf(patch, embedDepth, rbf, cost);
-  result.particles = judged.map->size();
-  result.residual = judged.map->axisResidual();
-  result.solve = judged.map->solveReport();
-  result.distortion = surveyDistortion(judged.samples, textureSize, patch.mirrored);
-  result.certificate = std::move(judged.certificate);
-  result.isExtrapolated = judged.isExtrapolated;
-  result.map = std::move(judged.map);
+  CertifiedRbf certified = certifiedRbf(patch, embedDepth, rbf, cost);
+  result.particles = certified.map->size();
+  result.residual = certified.map->axisResidual();
+  result.solve = certified.map->solveReport();
+  result.distortion = surveyDistortion(certified.samples, textureSize, patch.mirrored);
+  result.certificate = std::move(certified.certificate);
+  result.isExtrapolated = certified.isExtrapolated;
+  result.map = std::move(certified.map);
   return result;
 }
 
@@ -280,7 +280,7 @@ void addSolve(const RbfSolveReport& one, TextureReport& report) {
   }
 }
 
-std::string tellOverlap(const ChosenMap& map) {
+std::string overlapMessage(const ChosenMap& map) {
   const V3d &p = map.overlap.position, &uvw = map.overlap.uvw;
   return fmt::format(
       "{}: the patch passes through itself at {} of {} sample points, one at ({:.6g}, {:.6g}, "
@@ -308,7 +308,7 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
     const bool folds =
         chosen.distortion.folded > 0 || chosen.certificate.verdict() == FoldVerdict::Folds;
     if (!folds && chosen.overlaps > 0) {
-      const std::string message = tellOverlap(chosen);
+      const std::string message = overlapMessage(chosen);
       if (!options.skipFolds && !options.allowFolds) throw InvalidInput(message);
       if (!options.skipFolds) report.notes.push_back(message);
     }
@@ -460,7 +460,7 @@ RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options, double e
 
 CertifiedRbf certifiedRbf(const Patch& patch, double embedDepth, const RbfMapOptions& options,
                           TextureCost& cost) {
-  const auto judged = [&](double held) {
+  const auto certify = [&](double held) {
     CertifiedRbf result;
     result.map = timed(
         cost.setup, [&] { return std::make_unique<RbfMap>(patchToTexture(patch, options, held)); });
@@ -474,9 +474,9 @@ CertifiedRbf certifiedRbf(const Patch& patch, double embedDepth, const RbfMapOpt
     return one.certificate.verdict() == FoldVerdict::Folds ||
            surveyDistortion(one.samples, V3d(1), patch.mirrored).folded > 0;
   };
-  CertifiedRbf result = judged(embedDepth);
+  CertifiedRbf result = certify(embedDepth);
   if (embedDepth == 0 || !folds(result)) return result;
-  CertifiedRbf free = judged(0);
+  CertifiedRbf free = certify(0);
   if (folds(free)) return result;
   free.isExtrapolated = true;
   return free;

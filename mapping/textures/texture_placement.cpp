@@ -36,19 +36,19 @@ Box3d chooseTextureBox(const Box3d& own, const std::optional<Box3d>& given) {
 namespace {
 
 std::string foldSentence(const Distortion& distortion, const FoldCertificate& certificate) {
-  const auto placeOf = [](const V3d& place, const V3d& uvw, double jacobian) {
+  const auto describe = [](const V3d& position, const V3d& uvw, double jacobian) {
     return fmt::format(
         "the worst at ({:.6g}, {:.6g}, {:.6g}), u, v, w = {:.3g}, {:.3g}, {:.3g}, where the map's "
         "Jacobian is {:.3g} of its median",
-        place.x, place.y, place.z, uvw.x, uvw.y, uvw.z, jacobian);
+        position.x, position.y, position.z, uvw.x, uvw.y, uvw.z, jacobian);
   };
   if (distortion.folded > 0)
     return fmt::format(
         "the patch folds at {} of {} sample points, {}", distortion.folded, distortion.samples,
-        placeOf(distortion.foldPoint, distortion.foldUvw, distortion.jacobian.least));
+        describe(distortion.foldPoint, distortion.foldUvw, distortion.jacobian.least));
   const FoldPoint& fold = certificate.worst.front();
   return fmt::format("the patch folds between the {} sample points, {}", distortion.samples,
-                     placeOf(fold.position, fold.uvw, fold.jacobian));
+                     describe(fold.position, fold.uvw, fold.jacobian));
 }
 
 }  // namespace
