@@ -73,9 +73,9 @@ std::array<TermParents, kTerms> makeParents() {
 const std::array<TermParents, kTerms> kParents = makeParents();
 
 /// Bounds the remainder of the gradient of |x + s|, a series in |s| / |x|. The magnitude of its
-/// n-th term is at most the square root of (n + 1) / n: with t the cosine between x and s, the term
-/// is P_n(t) x̂ − P_{n−1}(t) ŝ, whose square is (1 − t²) (P_n² + (1 − t²) P_n′² / n²), and P_n² +
-/// (1 − t²) P_n′² / (n (n + 1)) ≤ 1.
+/// n-th term is at most the square root of (n + 1) / n. With t the cosine between x and s, the term
+/// is P_n(t) x̂ − P_{n−1}(t) ŝ. Its square is (1 − t²) (P_n² + (1 − t²) P_n′² / n²), and P_n² + (1
+/// − t²) P_n′² / (n (n + 1)) ≤ 1.
 double gradientRest(double ratio) {
   const double squared = ratio * ratio;
   return std::sqrt((kDegree + 1.0) / kDegree) * squared * squared * ratio / (1 - ratio);

@@ -98,8 +98,8 @@ double scaleAt(const ScatterDensity& density, const V3d& place) {
   return scale;
 }
 
-/// The zero set as triangles, sampled by area in units of the local scale, so that parts with a
-/// small scale get as many points per scaled area as others.
+/// The zero set as triangles, sampled by area in units of the local scale. So parts with a small
+/// scale get as many points per scaled area as others.
 class AreaSampler {
  public:
   AreaSampler(const levelset::NarrowBand& base, const ScatterDensity& density)
