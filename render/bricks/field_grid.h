@@ -77,8 +77,8 @@ class FieldGrid {
   double background_ = 0;  // world units, as the values
   Imath::V3d corner_;      // corner of the table, in the band's index space
   std::array<int, 3> size_{}, pages_{};
-  // As in BrickPool: position of a page's entries, or the constant of the entire page; and numbers
-  // of blocks.
+  // Same layout as in BrickPool: position of a page's entries, or the constant of the entire page;
+  // and numbers of blocks.
   std::vector<std::int32_t> page_, entry_;
   std::vector<Range> ranges_;
   std::vector<float> values_;
