@@ -110,7 +110,7 @@ std::optional<Cost> costOfSmooth(Invocation& in) {
 
 // === morph
 
-FileSequence stepFiles(const Invocation& in) {
+FileSequence stepSequence(const Invocation& in) {
   const std::string pattern = in.text("keep-steps");
   FileSequence sequence(pattern);
   if (!sequence.hasNumber() || !levelset::isBandFormat(pattern))
@@ -138,7 +138,7 @@ double partOfTheWay(const Invocation& in) {
 std::vector<std::string> stepFiles(const Invocation& in) {
   std::vector<std::string> files;
   if (!in.given("keep-steps")) return files;
-  const FileSequence sequence = stepFiles(in);
+  const FileSequence sequence = stepSequence(in);
   const auto steps = static_cast<std::size_t>(in.integer("steps"));
   for (std::size_t i = 1; i <= steps; ++i) files.push_back(sequence.file(i).string());
   return files;
@@ -147,7 +147,7 @@ std::vector<std::string> stepFiles(const Invocation& in) {
 constexpr long kMostSteps = 100000;
 
 void validateMorph(const Invocation& in) {
-  if (in.given("keep-steps")) (void)stepFiles(in);
+  if (in.given("keep-steps")) (void)stepSequence(in);
   if (partOfTheWay(in) < 1 && in.given("tolerance"))
     throw UsageError(
         "morph: --tolerance tells when the target is reached, and --until ends before; "
@@ -170,7 +170,7 @@ Value morph(Invocation& in) {
   options.mask = maskOf(in);
   if (in.given("tolerance")) options.tolerance = in.length("tolerance");
   if (in.given("keep-steps")) {
-    options.keep = [sequence = stepFiles(in)](const NarrowBand& step, int number) {
+    options.keep = [sequence = stepSequence(in)](const NarrowBand& step, int number) {
       levelset::writeBand(sequence.file(static_cast<std::size_t>(number)), step);
     };
   }

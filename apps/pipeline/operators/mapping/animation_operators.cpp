@@ -55,19 +55,19 @@ FileSequence sequenceOf(const Invocation& in, const char* option, const char* ex
                   in.where(option), sequence.pattern(), example));
 }
 
-FileSequence outFiles(const Invocation& in) {
+FileSequence outSequence(const Invocation& in) {
   const std::string pattern = in.text("out");
   const bool isMesh = levelset::isMeshFormat(pattern);
   return sequenceOf(in, "out", mapsMesh(in) ? "frame_###.ply" : "frame_###.vdb",
                     isMesh || (levelset::isBandFormat(pattern) && !mapsMesh(in)));
 }
 
-FileSequence baseFiles(const Invocation& in) {
+FileSequence baseSequence(const Invocation& in) {
   return sequenceOf(in, "base-frames", "base_###.vdb",
                     levelset::isBandFormat(in.text("base-frames")));
 }
 
-FileSequence textureFiles(const Invocation& in) {
+FileSequence textureSequence(const Invocation& in) {
   const std::string pattern = in.text("texture-frames");
   return sequenceOf(
       in, "texture-frames", mapsMesh(in) ? "texture_###.ply" : "texture_###.vdb",
@@ -82,7 +82,7 @@ std::filesystem::path frameFile(const Invocation& in, const FileSequence& sequen
 
 std::vector<std::string> outFiles(const Invocation& in) {
   std::vector<std::string> files;
-  const FileSequence sequence = outFiles(in);
+  const FileSequence sequence = outSequence(in);
   for (std::size_t f = 0; f < framesOf(in); ++f) files.push_back(sequence.file(f).string());
   return files;
 }
@@ -151,9 +151,9 @@ void validateAnimate(const Invocation& in) {
   if (in.integer("frames") > kMostFrames)
     throw UsageError(fmt::format("animate: --frames {} are too many; give at most {}",
                                  in.integer("frames"), kMostFrames));
-  (void)outFiles(in);
-  if (in.given("base-frames")) (void)baseFiles(in);
-  if (in.given("texture-frames")) (void)textureFiles(in);
+  (void)outSequence(in);
+  if (in.given("base-frames")) (void)baseSequence(in);
+  if (in.given("texture-frames")) (void)textureSequence(in);
   for (const auto& [first, sequence] :
        {std::pair{"base-first", "base-frames"}, std::pair{"texture-first", "texture-frames"}}) {
     if (in.given(first) && !in.given(sequence))
@@ -291,7 +291,7 @@ mapping::AnimationOptions animationOptions(Invocation& in,
     options.carry = mapping::CarryRule::Rigid;
   }
   if (in.given("base-frames")) {
-    options.bases = [sequence = baseFiles(in), &in,
+    options.bases = [sequence = baseSequence(in), &in,
                      told = std::make_shared<std::set<std::size_t>>()](std::size_t frame) {
       return readFrame(in, frame, frameFile(in, sequence, "base-first", frame), *told);
     };
@@ -357,7 +357,7 @@ std::vector<Patch> improvedAt(Invocation& in, const mapping::PatchFrame& frame,
 /// Writes meshes frame by frame, and warns once of what their format leaves out.
 class MeshWriter {
  public:
-  explicit MeshWriter(Invocation& in) : in_(in), out_(outFiles(in)) {}
+  explicit MeshWriter(Invocation& in) : in_(in), out_(outSequence(in)) {}
   void write(std::size_t frame, const levelset::TriMesh& mesh) {
     const std::filesystem::path file = out_.file(frame);
     levelset::writeMesh(file, mesh);
@@ -402,7 +402,7 @@ Value animateMesh(Invocation& in, const std::vector<mapping::AnimationKey>& keys
         bool isReused = frame.isUnchanged;
         if (frame.index > 0 && in.given("texture-frames")) {
           levelset::TriMesh next =
-              levelset::readMesh(frameFile(in, textureFiles(in), "texture-first", frame.index),
+              levelset::readMesh(frameFile(in, textureSequence(in), "texture-first", frame.index),
                                  {.maxMemory = in.maxMemory});
           isReused = isReused && isSame(next, texture);
           texture = std::move(next);
@@ -430,8 +430,8 @@ Value animateMesh(Invocation& in, const std::vector<mapping::AnimationKey>& keys
 }
 
 Value animate(Invocation& in) {
-  if (in.given("base-frames")) requireFrames(in, baseFiles(in), "base-first");
-  if (in.given("texture-frames")) requireFrames(in, textureFiles(in), "texture-first");
+  if (in.given("base-frames")) requireFrames(in, baseSequence(in), "base-first");
+  if (in.given("texture-frames")) requireFrames(in, textureSequence(in), "texture-first");
   const Imath::Box3d textureBox = textureBoxOf(in);
   const std::vector<mapping::AnimationKey> keys = keysOf(in, textureBox);
   if (mapsMesh(in)) return animateMesh(in, keys);
@@ -446,11 +446,11 @@ Value animate(Invocation& in) {
   }
   std::set<std::size_t> told;
   if (in.given("texture-frames")) {
-    options.textures = [sequence = textureFiles(in), &in, &told](std::size_t frame) {
+    options.textures = [sequence = textureSequence(in), &in, &told](std::size_t frame) {
       return readFrame(in, frame, frameFile(in, sequence, "texture-first", frame), told);
     };
   }
-  const FileSequence out = outFiles(in);
+  const FileSequence out = outSequence(in);
   MeshWriter writer(in);
   levelset::TriMesh mesh;  // of the frame before, where that is what is written
   NarrowBand last;
