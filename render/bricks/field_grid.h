@@ -13,8 +13,8 @@
 
 namespace render {
 
-/// The complete field of a band for rays, not only its zero set: the values of the blocks of 8³
-/// cells in which it is not constant, and a table that finds them. Positions are in the band's
+/// The complete field of a band for rays, not only its zero set. It holds the blocks of 8³ cells in
+/// which the values are not constant, and a table that finds them. Positions are in the band's
 /// index space minus a multiple of the block size, so that blocks start at 0.
 class FieldGrid {
  public:
