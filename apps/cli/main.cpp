@@ -40,24 +40,24 @@ void printAll(const std::string& text) {
 constexpr long kMostThreads = 1024;
 
 /// On standard error, under the name of the program, which some sentences begin with.
-void tell(const std::string& sentence) {
+void printMessage(const std::string& sentence) {
   fmt::print(stderr, "{}{}\n",
              sentence.starts_with("levelsmith: ") ? "" : "levelsmith: ", sentence);
 }
 
 /// Says what went wrong. @return the exit code
-int tellFailure(const std::exception_ptr& failure) {
+int printFailure(const std::exception_ptr& failure) {
   try {
     if (failure) std::rethrow_exception(failure);
   } catch (const levelset::Error& error) {
-    tell(error.what());
+    printMessage(error.what());
     return static_cast<int>(error.exitCode());
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "levelsmith: memory ran out; use larger voxels or a narrower band\n");
     return static_cast<int>(ExitCode::Resource);
   } catch (const std::exception& error) {
-    if (pipeline::isWantOfThreads(error)) {
-      fmt::print(stderr, "levelsmith{}\n", pipeline::kWantOfThreads);
+    if (pipeline::isThreadLimitError(error)) {
+      fmt::print(stderr, "levelsmith{}\n", pipeline::kThreadLimitMessage);
       return static_cast<int>(ExitCode::Resource);
     }
     fmt::print(
@@ -76,7 +76,7 @@ int tellFailure(const std::exception_ptr& failure) {
 /// Nothing half written stays behind.
 [[noreturn]] void endUnexpectedly() {
   levelset::removeTemporaryFiles();
-  _exit(tellFailure(std::current_exception()));
+  _exit(printFailure(std::current_exception()));
 }
 
 bool claimsStandardOutput(const pipeline::Graph& graph) {
@@ -99,9 +99,9 @@ bool claimsJson(const pipeline::Graph& graph) {
 
 cli::ProgressStyle progressStyle(const pipeline::Graph& graph) {
   const auto it = graph.globals.find("progress");
-  const std::string wanted = it == graph.globals.end() ? "auto" : it->second;
-  if (wanted == "json") return cli::ProgressStyle::Json;
-  if (wanted == "off" || graph.globals.contains("quiet") || !isatty(STDERR_FILENO))
+  const std::string choice = it == graph.globals.end() ? "auto" : it->second;
+  if (choice == "json") return cli::ProgressStyle::Json;
+  if (choice == "off" || graph.globals.contains("quiet") || !isatty(STDERR_FILENO))
     return cli::ProgressStyle::Off;
   return cli::ProgressStyle::Bar;
 }
@@ -145,7 +145,7 @@ int runGraph(const pipeline::Graph& graph) {
   pipeline::RunSettings settings;
   settings.dryRun = dryRun;
   settings.maxMemory = maxMemory;
-  settings.wholeValues = globals.contains("whole");
+  settings.fullValues = globals.contains("whole");
   if (globals.contains("cache")) settings.cache = globals.at("cache");
   settings.measureErrors = verbose || globals.contains("report");
   if (globals.contains("report") && pipeline::isPage(globals.at("report")))
@@ -164,11 +164,11 @@ int runGraph(const pipeline::Graph& graph) {
   };
   settings.warn = [&](const std::string& sentence) {
     line.clear();
-    if (!quiet) tell("warning: " + sentence);
+    if (!quiet) printMessage("warning: " + sentence);
   };
   settings.note = [&](const std::string& sentence) {
     line.clear();
-    if (!quiet) tell(sentence);
+    if (!quiet) printMessage(sentence);
   };
   pipeline::RunReport report;
   const auto finish = [&] {
@@ -177,8 +177,8 @@ int runGraph(const pipeline::Graph& graph) {
       for (const pipeline::StepReport& step : report.steps)
         fmt::print(stderr, "{}\n", pipeline::stepLine(step, dryRun));
     if (report.tolerance && (verbose || dryRun))
-      for (const std::string& told : pipeline::toleranceLines(*report.tolerance))
-        fmt::print(stderr, "{}\n", told);
+      for (const std::string& line : pipeline::toleranceLines(*report.tolerance))
+        fmt::print(stderr, "{}\n", line);
     if (globals.contains("report")) pipeline::writeReport(globals.at("report"), report);
   };
   try {
@@ -193,7 +193,7 @@ int runGraph(const pipeline::Graph& graph) {
     try {
       finish();
     } catch (const levelset::Error& error) {
-      tell(error.what());
+      printMessage(error.what());
     }
     throw;
   }
@@ -225,7 +225,7 @@ int main(int argc, char** argv) {
   try {
     code = levelsmith({argv + 1, argv + argc});
   } catch (...) {
-    code = tellFailure(std::current_exception());
+    code = printFailure(std::current_exception());
   }
   std::fflush(stderr);
   levelset::removeTemporaryFiles();

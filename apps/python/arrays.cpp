@@ -26,11 +26,12 @@ std::string shapeText(const py::array& array) {
          py::str(array.dtype()).cast<std::string>();
 }
 
-void requireRows(const py::array& array, const char* name, const char* kinds, const char* wanted) {
+void requireRows(const py::array& array, const char* name, const char* kinds,
+                 const char* expected) {
   const bool isKind = std::strchr(kinds, array.dtype().kind()) != nullptr;
   if (isKind && array.ndim() == 2 && array.shape(1) == 3) return;
   throw InvalidInput(fmt::format("Mesh: {} are an array {}; give one of shape (n, 3) of {}", name,
-                                 shapeText(array), wanted));
+                                 shapeText(array), expected));
 }
 
 /// A view of rows of plain numbers.

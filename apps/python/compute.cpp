@@ -110,20 +110,20 @@ class Run {
     if (pipeline::isPage(options_.report)) settings.thumbnails = pipeline::kMostThumbnails;
     settings.begin = [this](const std::string& action) {
       if (!goesOn_) throw levelset::Cancelled(action + ": cancelled");
-      tell(action, 0);
+      reportProgress(action, 0);
     };
     settings.progress = [this](std::size_t, const std::string& action, double fraction) {
-      tell(action, fraction);
+      reportProgress(action, fraction);
     };
-    settings.goesOn = [this] { return goesOn_.load(); };
-    settings.made = made_;
+    settings.shouldContinue = [this] { return goesOn_.load(); };
+    settings.onValue = made_;
     settings.print = [this](const std::string& text) { outcome_.printed += text; };
     settings.warn = [this](const std::string& text) { outcome_.warnings.push_back(text); };
     settings.note = [this](const std::string& text) { outcome_.notes.push_back(text); };
     return settings;
   }
 
-  void tell(const std::string& action, double fraction) {
+  void reportProgress(const std::string& action, double fraction) {
     const std::lock_guard lock(mutex_);
     action_ = action;
     fraction_ = fraction;

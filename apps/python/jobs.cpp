@@ -81,7 +81,7 @@ Job makeJob(const std::string& text, const std::string& name,
       if (param.type == ParamType::Path && option != node.options.end() && !option->second.empty())
         option->second = absolute(option->second, folder);
     }
-    job.places.push_back(node.place);
+    job.places.push_back(node.location);
   }
   for (const char* option : {"cache", "report"})
     if (const auto it = graph.globals.find(option); it != graph.globals.end())
@@ -94,7 +94,7 @@ Job makeJob(const std::string& text, const std::string& name,
 Graph graphOf(const Job& job) {
   Graph graph = pipeline::graphFromJson(job.graph, "the job");
   for (std::size_t i = 0; i < graph.nodes.size() && i < job.places.size(); ++i)
-    graph.nodes[i].place = job.places[i];
+    graph.nodes[i].location = job.places[i];
   graph.globals = job.globals;
   return graph;
 }

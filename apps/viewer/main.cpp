@@ -39,7 +39,7 @@ void runWindow(const viewer::Arguments& arguments) {
     const int width = window.width(), height = window.height();
     viewer.update();
     window.draw([&] { viewer.drawInterface(width, height); });
-    viewer.wantPicture(width, height);
+    viewer.requestPicture(width, height);
     viewer.writeInterfaceShot();
     const bool isSettled = --frames <= 0 && !viewer.isBusy();
     if (window.wait(isSettled ? kIdle : kAfterEvent)) frames = kFramesAfterEvent;

@@ -43,12 +43,12 @@ Viewer::Viewer(const Arguments& arguments, Window& window)
       display_(arguments.display),
       style_(arguments.style) {
   std::snprintf(screenshotName_.data(), screenshotName_.size(), "view.png");
-  tell("Drop a file here, or press Ctrl+O to open one.");
+  showMessage("Drop a file here, or press Ctrl+O to open one.");
 }
 
 void Viewer::open(const std::vector<std::filesystem::path>& files, bool isReload) {
   loader_.open(files, arguments_.resolution, isReload);
-  tell(fmt::format("Reading {} …", namesOf(files)));
+  showMessage(fmt::format("Reading {} …", namesOf(files)));
 }
 
 void Viewer::show(std::shared_ptr<const Model> model, bool keepView) {
@@ -69,7 +69,7 @@ void Viewer::show(std::shared_ptr<const Model> model, bool keepView) {
     }
   }
   window_.setTitle(namesOf(model_->files) + " – Levelsmith");
-  tell(fmt::format("{}: {}.", namesOf(model_->files), model_->description));
+  showMessage(fmt::format("{}: {}.", namesOf(model_->files), model_->description));
 }
 
 bool Viewer::isPanelShown() const {
@@ -84,13 +84,13 @@ void Viewer::frameBesidePanel() {
   camera_.pan({0, 0}, {0.5 * panel, 0}, camera_.targetDepth(), pictureWidth_, pictureHeight_);
 }
 
-void Viewer::tellFailure(const std::exception_ptr& failure, const std::string& instead) {
+void Viewer::showFailure(const std::exception_ptr& failure, const std::string& instead) {
   try {
     std::rethrow_exception(failure);
   } catch (const std::bad_alloc&) {
-    tell("Memory ran out. " + instead);
+    showMessage("Memory ran out. " + instead);
   } catch (const std::exception& error) {
-    tell(fmt::format("{} {}", error.what(), instead));
+    showMessage(fmt::format("{} {}", error.what(), instead));
   }
 }
 
@@ -109,7 +109,7 @@ void Viewer::takeModel() {
   std::optional<Loader::Result> result = loader_.take();
   if (!result) return;
   if (result->failure) {
-    tellFailure(result->failure, model_ ? "(What was shown before stays.)" : "");
+    showFailure(result->failure, model_ ? "(What was shown before stays.)" : "");
     return;
   }
   // A patch that comes on top is looked at from where one stands.
@@ -118,13 +118,13 @@ void Viewer::takeModel() {
   try {
     show(std::move(result->model), result->isReload || isSameSolid);
   } catch (const levelset::Error& error) {
-    tell(error.what());
+    showMessage(error.what());
   }
-  if (result->isReload) tell(message_ + " Read again.");
+  if (result->isReload) showMessage(message_ + " Read again.");
 }
 
 void Viewer::takeFrame() {
-  if (const std::exception_ptr failure = picture_.failure()) tellFailure(failure, "");
+  if (const std::exception_ptr failure = picture_.failure()) showFailure(failure, "");
   const std::shared_ptr<const Frame> frame = picture_.frame();
   if (!frame || frame == frame_) return;
   frame_ = frame;
@@ -139,7 +139,8 @@ void Viewer::watchFiles() {
   if (watch_.hasChanged()) reload();
   const bool isMissing = watch_.isAnyMissing();
   if (isMissing && !wasMissing_)
-    tell("A file is gone; what it held is still shown, and it is read again when it is back.");
+    showMessage(
+        "A file is gone; what it held is still shown, and it is read again when it is back.");
   wasMissing_ = isMissing;
 }
 
@@ -148,7 +149,7 @@ void Viewer::reload() {
 }
 
 bool Viewer::isBusy() const {
-  return loader_.isLoading() || wantedPick_ || picture_.progress() < 1;
+  return loader_.isLoading() || pendingPick_ || picture_.progress() < 1;
 }
 
 // === Keys
@@ -291,27 +292,27 @@ void Viewer::dragTo(const V2d& place, int width, int height) {
 
 void Viewer::pickAt(const V2d& place, bool isForTarget) {
   const auto pixel = [](double at) { return static_cast<int>(std::clamp(at, -1.0, 1e8)); };
-  wantedPick_ = {{pixel(place.x), pixel(place.y)}};
+  pendingPick_ = {{pixel(place.x), pixel(place.y)}};
   isPickForTarget_ = isForTarget;
   finishPick();
 }
 
 void Viewer::finishPick() {
   // Until the pixels are single, they are of other places.
-  if (!wantedPick_ || !frame_ || frame_->pixelSize > 1) return;
-  const std::optional<Picked> picked = pick(*frame_, (*wantedPick_)[0], (*wantedPick_)[1]);
-  wantedPick_.reset();
+  if (!pendingPick_ || !frame_ || frame_->pixelSize > 1) return;
+  const std::optional<Picked> picked = pick(*frame_, (*pendingPick_)[0], (*pendingPick_)[1]);
+  pendingPick_.reset();
   if (isPickForTarget_) {
     if (picked) camera_.centreOn(picked->position);
     return;
   }
   if (!picked) {
-    tell("There is nothing to be picked here.");
+    showMessage("There is nothing to be picked here.");
     return;
   }
   addPick(*picked);
   window_.setClipboard(pointText(picked->position));
-  tell(fmt::format("{} is copied to the clipboard.", pointText(picked->position)));
+  showMessage(fmt::format("{} is copied to the clipboard.", pointText(picked->position)));
 }
 
 void Viewer::addPick(const Picked& picked) {
@@ -326,18 +327,18 @@ void Viewer::copyPicks() {
   }
   if (text.empty()) return;
   window_.setClipboard(text);
-  tell(fmt::format("{} points are copied to the clipboard.", picks_.size()));
+  showMessage(fmt::format("{} points are copied to the clipboard.", picks_.size()));
 }
 
 // === The picture
 
-void Viewer::wantPicture(int width, int height) {
+void Viewer::requestPicture(int width, int height) {
   pictureWidth_ = width;
   pictureHeight_ = height;
   if (!model_) return;
   View view{model_, camera_.camera(width, height), std::nullopt, style_};
   if (isClipped_ && model_->canCut()) view.clip = clip_;
-  picture_.want(view, display_);
+  picture_.request(view, display_);
 }
 
 void Viewer::saveScreenshot() {
@@ -351,10 +352,10 @@ void Viewer::saveScreenshot() {
     if (!frame_)
       throw levelset::InvalidInput("screenshot: there is nothing to be seen yet; open a file");
     writeScreenshot(name, *frame_);
-    tell(fmt::format("{} is written{}.", name.string(),
-                     frame_->isComplete ? "" : ", of a picture that was not finished"));
+    showMessage(fmt::format("{} is written{}.", name.string(),
+                            frame_->isComplete ? "" : ", of a picture that was not finished"));
   } catch (const std::exception& error) {
-    tell(error.what());
+    showMessage(error.what());
   }
 }
 
@@ -366,9 +367,9 @@ void Viewer::writeInterfaceShot() {
   try {
     const Canvas shot = window_.drawInMemory(width, height, [&] { drawInterface(width, height); });
     render::writePng(name, width, height, shot.colours);
-    tell(fmt::format("{} is written.", name.string()));
+    showMessage(fmt::format("{} is written.", name.string()));
   } catch (const std::exception& error) {
-    tell(error.what());
+    showMessage(error.what());
   }
 }
 

@@ -40,7 +40,7 @@ class Viewer {
   void writeInterfaceShot();
 
   /// Asks for the picture of what is shown. @param width, height  pixels
-  void wantPicture(int width, int height);
+  void requestPicture(int width, int height);
   [[nodiscard]] const ProgressivePicture& picture() const { return picture_; }
   [[nodiscard]] bool isBusy() const;
   /// As if somebody had clicked there.
@@ -65,8 +65,8 @@ class Viewer {
   void finishPick();
   void copyPicks();
   void saveScreenshot();
-  void tell(const std::string& sentence) { message_ = sentence; }
-  void tellFailure(const std::exception_ptr& failure, const std::string& instead);
+  void showMessage(const std::string& sentence) { message_ = sentence; }
+  void showFailure(const std::exception_ptr& failure, const std::string& instead);
 
   // === The interface, viewer_panels.cpp
   void drawPanel();
@@ -104,7 +104,7 @@ class Viewer {
   Imath::V2d dragStart_, dragLast_;
   double dragDepth_ = 1;
   bool hasDragged_ = false;
-  std::optional<std::array<int, 2>> wantedPick_;
+  std::optional<std::array<int, 2>> pendingPick_;
   bool isPickForTarget_ = false;
   std::vector<Picked> picks_;
 

@@ -83,7 +83,7 @@ void Viewer::drawViewPart() {
         camera.orthoHeight
             ? fmt::format("--ortho {:.8g}", *camera.orthoHeight)
             : fmt::format("--fov {:.8g}", camera.verticalFov * 180 / std::numbers::pi)));
-    tell("The view is copied to the clipboard, as options of 'levelsmith render'.");
+    showMessage("The view is copied to the clipboard, as options of 'levelsmith render'.");
   }
 }
 

@@ -26,7 +26,7 @@ void printLine(const std::string& line) {
 std::shared_ptr<const Frame> finishedFrame(Window& window, Viewer& viewer, int width, int height,
                                            bool isForPick) {
   for (;;) {
-    viewer.wantPicture(width, height);
+    viewer.requestPicture(width, height);
     if (const std::exception_ptr failure = viewer.picture().failure())
       std::rethrow_exception(failure);
     std::shared_ptr<const Frame> frame = viewer.picture().frame();
@@ -62,7 +62,7 @@ void runScript(const Arguments& arguments) {
   constexpr int kAnyEdge = 64;  // pixels: pictures are made in memory
   Window window("levelsmith-view", kAnyEdge, kAnyEdge, false);
   Viewer viewer(arguments, window);
-  viewer.wantPicture(camera.width, camera.height);
+  viewer.requestPicture(camera.width, camera.height);
   viewer.show(model, false);
   const std::shared_ptr<const Frame> frame =
       finishedFrame(window, viewer, width, height, !arguments.screenshot);

@@ -23,7 +23,7 @@ using convert::SignField;
 using Imath::V3d;
 using Imath::V3i;
 
-/// The caller's progress, made to never fall while stages repeat.
+/// Wraps the caller's progress so that it never decreases while stages repeat.
 Progress rising(const Progress& progress) {
   if (!progress) return {};
   return [&progress, high = 0.0](double fraction) mutable {
@@ -32,7 +32,7 @@ Progress rising(const Progress& progress) {
   };
 }
 
-/// Searched for once, by the first who asks.
+/// Finds the self-intersections once, at the first request.
 class SelfIntersections {
  public:
   SelfIntersections(const TriMesh& mesh, const MeshTopology& topology, Progress progress)
@@ -43,7 +43,7 @@ class SelfIntersections {
     searched_ = true;
     return pairs_;
   }
-  /// −1: nobody asked.
+  /// Number of pairs; −1 when no search was made.
   [[nodiscard]] std::ptrdiff_t count() const { return searched_ ? std::ssize(pairs_) : -1; }
 
  private:
@@ -71,7 +71,7 @@ void checkClosed(const MeshTopology& topology, Nesting nesting) {
   if (nesting == Nesting::Orientation && !topology.boundary.empty())
     throw InvalidInput(
         fmt::format("level-set: at {} edges neighbouring faces are oriented differently, so nested "
-                    "shells cannot follow their orientation; use --nested parity",
+                    "components cannot follow their orientation; use --nested parity",
                     topology.boundary.size()));
 }
 
@@ -80,7 +80,7 @@ SignField::Rule ruleFor(SignMode method, Nesting nesting) {
   return nesting == Nesting::Parity ? SignField::Rule::Parity : SignField::Rule::Orientation;
 }
 
-/// Adds to the mesh the surface that spans its holes.
+/// Adds the surface that spans the holes of the mesh.
 void addOpenSurface(LocalMesh& mesh, const SignField& field, double halfWidth,
                     std::size_t maxMemory, const Progress& progress) {
   std::vector<V3i> seeds;
@@ -112,15 +112,15 @@ void checkResult(const openvdb::FloatGrid& grid, const SignCertificate& certific
         "voxel; use smaller voxels");
   if (!anyInside && !options.signAnyway)
     throw InvalidInput(fmt::format(
-        "level-set: the mesh encloses nothing: its winding number passes 1/2 at no grid point ({} "
-        "boundary edges); close it first, use smaller voxels, or take distances without an inside "
-        "with --sign-anyway",
+        "level-set: the mesh encloses no volume: its winding number exceeds 1/2 at no grid point "
+        "({} boundary edges); close it first, use smaller voxels, or accept distances without an "
+        "inside with --accept-sign",
         certificate.boundaryEdges));
   if (certificate.ambiguousShare > kAmbiguousLimit && !options.signAnyway)
     throw InvalidInput(fmt::format(
         "level-set: inside and outside are a guess at {:.2g} % of the voxels next to the "
         "surface ({} boundary edges, {} non-manifold); close the holes, or accept the guess "
-        "with --sign-anyway",
+        "with --accept-sign",
         100 * certificate.ambiguousShare, certificate.boundaryEdges, certificate.nonManifoldEdges));
 }
 
@@ -134,10 +134,10 @@ std::string describe(const SignCertificate& c) {
       c.closed ? "closed" : "not closed", c.boundaryEdges, c.nonManifoldEdges,
       c.selfIntersections < 0 ? std::string("not searched for")
                               : fmt::format("{}", c.selfIntersections),
-      c.droppedTriangles, c.flipped ? "turned inside out, " : "",
+      c.droppedTriangles, c.flipped ? "orientation reversed, " : "",
       c.ambiguousShare < 1 ? fmt::format("ambiguous at {:.2g} % of the voxels next to the surface",
                                          100 * c.ambiguousShare)
-                           : std::string("no voxel of whose side it is sure"));
+                           : std::string("ambiguous at every voxel next to the surface"));
 }
 
 MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
@@ -191,7 +191,7 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
     }
     if (reached.isEmpty())
       throw InvalidInput(
-          "level-set: the region that is asked for lies beyond the mesh; ask for one that meets "
+          "level-set: the requested region does not meet the mesh; choose a region that meets "
           "it");
     region = blocksOf(reached, *uniformTransform(voxelSize));
   }

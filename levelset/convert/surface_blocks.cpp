@@ -15,11 +15,11 @@ using Imath::V3d;
 using Imath::V3i;
 using List = std::vector<std::uint32_t>;
 
-constexpr std::size_t kTaskSize = 2048;  // triangles; smaller cells stay with their task
-constexpr std::size_t kShare = std::size_t{1} << 50;  // of progress, for the whole
+constexpr std::size_t kTaskSize = 2048;  // triangles; smaller cells stay within their task
+constexpr std::size_t kShare = std::size_t{1} << 50;  // progress units of the complete search
 
 struct Cell {
-  std::int64_t x, y, z, size;  // lowest grid point, edge
+  std::int64_t x, y, z, size;  // lowest grid point; edge length
 };
 
 class BlockWalk {
@@ -43,8 +43,8 @@ class BlockWalk {
 
  private:
   struct Box {
-    V3d low, high;  // enlarged by reach
-    double extent;  // of the triangle, its longest side
+    V3d low, high;  // bounding box enlarged by reach
+    double extent;  // longest side of the triangle's bounding box
   };
 
   Box boxOf(std::size_t t) const {
@@ -59,7 +59,7 @@ class BlockWalk {
     return box;
   }
 
-  /// The cell of 8 · 2ⁿ points about the origin that holds everything within reach.
+  /// Cell of 8 · 2ⁿ points, centred at the origin, that contains all points within reach.
   Cell rootCell() const {
     double half = kBlockDim;
     for (const Box& box : boxes_)

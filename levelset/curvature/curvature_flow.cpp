@@ -97,7 +97,7 @@ class CurvatureFlow {
       FlowScheme::Explicit, FlowScheme::Stabilized, FlowScheme::Implicit};
   static std::size_t index(FlowScheme scheme) { return static_cast<std::size_t>(scheme); }
 
-  void tell() const { report(options_.progress, 0.99 * now_ / time_, kAction); }
+  void reportProgress() const { report(options_.progress, 0.99 * now_ / time_, kAction); }
 
   openvdb::FloatGrid::Ptr distances(const openvdb::FloatGrid& field, double halfWidth) {
     eikonal::DistanceRequest request;
@@ -127,11 +127,11 @@ class CurvatureFlow {
   /// Flows until distances are due, the surface is gone or the time is over.
   openvdb::FloatGrid::Ptr runOn(const openvdb::FloatGrid& grid) {
     CurvatureState state(grid, options_.mask);
-    CurvatureSteps steps(state, [&] { tell(); });
+    CurvatureSteps steps(state, [&] { reportProgress(); });
     if (options_.preservesVolume) prepareVolume(grid, state, steps);
     const double begun = now_;
     for (bool first = true; now_ < time_; first = false) {
-      const NearSurface near = flow::lookNearSurface(state, steps.rate());
+      const NearSurface near = flow::measureNearSurface(state, steps.rate());
       if (near.count == 0) break;
       if (options_.preservesVolume && isAtRest(state, near, steps.shift, now_ - begun)) {
         result_.restedAfter = now_ * voxel_ * voxel_;
@@ -141,12 +141,13 @@ class CurvatureFlow {
       const double left = time_ - now_;
       const double wanted = std::min({wanted_, longest_, left});
       const double onSurface =
-          near.fastest > 0 ? std::max(0.0, flow::kFlowRoom - near.displaced) / near.fastest : left;
+          near.fastest > 0 ? std::max(0.0, flow::kFlowTravel - near.displaced) / near.fastest
+                           : left;
       const double whole = onSurface + (near.fastest > 0 ? near.displaced / near.fastest : 0);
-      const double room = std::min(onSurface, near.clear);
-      if (!first && room < kLeastShare * std::min(wanted, whole)) break;
+      const double available = std::min(onSurface, near.clear);
+      if (!first && available < kLeastShare * std::min(wanted, whole)) break;
       // As long as an explicit step is always possible, the flow never stands still.
-      double dt = std::min(wanted, std::max(room, flow::kExplicitStep));
+      double dt = std::min(wanted, std::max(available, flow::kExplicitStep));
       if (dt > 0.999 * left) dt = left;
       step(state, steps, first ? std::min(dt, kFirstStep) : dt, first);
     }
@@ -164,7 +165,7 @@ class CurvatureFlow {
     flow::Field moved = state.value;
     for (std::size_t i = 0; i < moved.size(); ++i)
       for (std::size_t n = 0; n < 512; ++n) moved[i][n] -= state.start()[i][n];
-    return flow::lookNearSurface(state, moved).unevenness() < kRestMove * rounding * elapsed;
+    return flow::measureNearSurface(state, moved).unevenness() < kRestMove * rounding * elapsed;
   }
 
   /// What the error of the steps is spread over. One that keeps its volume forgets its errors while
@@ -228,14 +229,15 @@ class CurvatureFlow {
     longestTaken_ = std::max(longestTaken_, dt);
     ++result_.steps;
     if (options_.preservesVolume) keepVolume(state, steps);
-    tell();
+    reportProgress();
   }
 
   // === Volume
 
   void prepareVolume(const openvdb::FloatGrid& grid, CurvatureState& state, CurvatureSteps& steps) {
-    inactive_ = flow::inactiveContent(grid.tree());
-    if (!volume_) volume_ = inactive_ + flow::contentOf(state, steps.rate(), steps.shift).volume;
+    inactive_ = flow::inactiveVolume(grid.tree());
+    if (!volume_)
+      volume_ = inactive_ + flow::volumeAndAreaOf(state, steps.rate(), steps.shift).volume;
     keepVolume(state, steps);
   }
 
@@ -244,13 +246,14 @@ class CurvatureFlow {
   void keepVolume(CurvatureState& state, CurvatureSteps& steps) {
     constexpr int kMostCorrections = 4;
     for (int i = 0; i < kMostCorrections; ++i) {
-      const flow::Content content = flow::contentOf(state, steps.rate(), steps.shift);
-      const double excess = inactive_ + content.volume - *volume_;
-      if (!(content.area > 0) || std::abs(excess) < kVolumeTolerance * *volume_) break;
-      steps.raise(excess / content.area);
+      const flow::VolumeAndArea volumeAndArea =
+          flow::volumeAndAreaOf(state, steps.rate(), steps.shift);
+      const double excess = inactive_ + volumeAndArea.volume - *volume_;
+      if (!(volumeAndArea.area > 0) || std::abs(excess) < kVolumeTolerance * *volume_) break;
+      steps.raise(excess / volumeAndArea.area);
     }
     steps.refreshRate();
-    const NearSurface near = flow::lookNearSurface(state, steps.rate());
+    const NearSurface near = flow::measureNearSurface(state, steps.rate());
     if (near.weights > 0) steps.shift += near.rates / near.weights;
     steps.refreshRate();
   }

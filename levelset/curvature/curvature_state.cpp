@@ -90,7 +90,7 @@ void CurvatureState::findCore(std::size_t i, PaddedBlock& block, Bending& bendin
     if (!(phi < kFlowCore)) continue;
     core_[i].setOn(it.pos());
     // The corners of a leader's cell are nearer than a diagonal to its level.
-    if (phi < kFlowOwn - 1.8) continue;
+    if (phi < kFlowLeader - 1.8) continue;
     const Coord c = LeafNode::offsetToLocalCoord(it.pos());
     std::tie(bending.sums[i][it.pos()], bending.squares[i][it.pos()]) =
         bendingAt(block.at(c.x(), c.y(), c.z()));
@@ -101,11 +101,11 @@ void CurvatureState::findFollowers(std::size_t i, PaddedBlock& block, const Bend
   blocks_.gather(start_, i, static_cast<float>(kFlowWidth), block);
   for (auto it = blocks_.active(i).beginOn(); it; ++it) {
     const double phi = static_cast<double>(start_[i][it.pos()]);
-    if (std::abs(phi) < kFlowOwn) continue;
+    if (std::abs(phi) < kFlowLeader) continue;
     const Coord c = LeafNode::offsetToLocalCoord(it.pos());
     Vec3d normal = gradientAt(block, c);
     if (!normal.normalize()) continue;
-    const double back = phi - std::copysign(kFlowOwn, phi);
+    const double back = phi - std::copysign(kFlowLeader, phi);
     const Vec3d p = (blocks_.origin(i) + c).asVec3d() - normal * back;
     Follower follower;
     follower.gridPoint = static_cast<std::uint16_t>(it.pos());
@@ -131,7 +131,7 @@ void CurvatureState::findFollowers(std::size_t i, PaddedBlock& block, const Bend
       bent += weight * static_cast<double>(bending.sums[corner / 512][corner % 512]);
       squares += weight * static_cast<double>(bending.squares[corner / 512][corner % 512]);
     }
-    follower.ahead = static_cast<float>(differenceOfParallel(back, bent, squares));
+    follower.rateDifference = static_cast<float>(differenceOfParallel(back, bent, squares));
     followers_[i].push_back(follower);
   }
 }
@@ -149,7 +149,7 @@ void CurvatureState::evaluate(const Field& field, double shift, Field& rate) con
   blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) {
     followed_[i].clear();
     for (const Follower& f : followers_[i]) {
-      float sum = f.ahead;
+      float sum = f.rateDifference;
       for (std::size_t k = 0; k < 8; ++k)
         sum += f.weights[k] * rate[f.corners[k] / 512][f.corners[k] % 512];
       followed_[i].push_back(sum);
@@ -193,13 +193,13 @@ double NearSurface::unevenness() const {
   return std::sqrt(std::max(0.0, all - linear) / count);
 }
 
-NearSurface lookNearSurface(const CurvatureState& state, const Field& rate) {
+NearSurface measureNearSurface(const CurvatureState& state, const Field& rate) {
   return state.blocks().sum<NearSurface>([&](std::size_t i) {
     NearSurface near;
     for (auto it = state.blocks().active(i).beginOn(); it; ++it) {
       const float phi = state.value[i][it.pos()], start = state.start()[i][it.pos()];
       const double speed = static_cast<double>(rate[i][it.pos()]);
-      if (std::abs(start) >= static_cast<float>(kFlowOwn)) {
+      if (std::abs(start) >= static_cast<float>(kFlowLeader)) {
         const auto side = static_cast<double>(std::copysign(1.0f, start));
         const double left = side * static_cast<double>(phi) - kFlowNearest, pace = -side * speed;
         if (pace > 0) near.clear = std::min(near.clear, std::max(0.0, left) / pace);

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/flow only.
+// Internal header of levelset: public headers must not include it.
 
 #include <limits>
 #include <optional>
@@ -12,13 +12,13 @@ namespace levelset::flow {
 
 /// All in voxels: distances are made so far on each side; the rate is computed so far; from here on
 /// it is that of the closest level within and the difference that parallel surfaces have there at
-/// the start, so that all level sets go along with the surface, which may move by kFlowRoom before
-/// distances are made again. The differences reach 2.83 along diagonals. So far must the distances
-/// go beyond the core, or the rates that follow its outermost grid points are wrong and long steps
-/// carry that to the surface (CurvatureFlow.IsExactInLongSteps). So far, too, is it from the
-/// surface to the level where following begins: with 2.2, a ball of 32 lost a thousandth of a voxel
-/// each time.
-inline constexpr double kFlowWidth = 8.1, kFlowCore = 5.2, kFlowOwn = 4.3, kFlowRoom = 1.5;
+/// the start, so that all level sets go along with the surface, which may move by kFlowTravel
+/// before distances are made again. The differences reach 2.83 along diagonals. So far must the
+/// distances go beyond the core, or the rates that follow its outermost grid points are wrong and
+/// long steps carry that to the surface (CurvatureFlow.IsExactInLongSteps). So far, too, is it from
+/// the surface to the level where following begins: with 2.2, a ball of 32 lost a thousandth of a
+/// voxel each time.
+inline constexpr double kFlowWidth = 8.1, kFlowCore = 5.2, kFlowLeader = 4.3, kFlowTravel = 1.5;
 
 /// φ of a solid in voxels while it flows, on blocks that hold still until distances are made again.
 class CurvatureState {
@@ -43,7 +43,7 @@ class CurvatureState {
   /// Takes its rate from the corners of the cell in which its leader lies.
   struct Follower {
     std::uint16_t gridPoint = 0;
-    float ahead = 0;                         ///< its rate less its leader's
+    float rateDifference = 0;                ///< its rate less its leader's
     std::array<std::uint32_t, 8> corners{};  ///< BandBlocks::find
     std::array<float, 8> weights{};
   };
@@ -62,8 +62,8 @@ class CurvatureState {
   mutable std::vector<std::vector<float>> followed_;  ///< their rates, kept for the memory
 };
 
-/// Until distances are made again no level set that began at kFlowOwn or further may come nearer to
-/// the surface than this. Where the surface stands still, as a ball does that keeps its volume,
+/// Until distances are made again no level set that began at kFlowLeader or further may come nearer
+/// to the surface than this. Where the surface stands still, as a ball does that keeps its volume,
 /// others still move: in time they would make a zero set of their own.
 inline constexpr double kFlowNearest = 1;
 
@@ -83,17 +83,18 @@ struct NearSurface {
   [[nodiscard]] double unevenness() const;
   NearSurface& operator+=(const NearSurface& other);
 };
-[[nodiscard]] NearSurface lookNearSurface(const CurvatureState& state, const Field& rate);
+[[nodiscard]] NearSurface measureNearSurface(const CurvatureState& state, const Field& rate);
 
 /// Volume in voxels³, and its loss when the values rise by one voxel times their weight. Cut by the
 /// tangent plane of each grid point's own cube, and by what the surface bends away from it.
-struct Content {
+struct VolumeAndArea {
   double volume = 0, area = 0;
-  Content& operator+=(const Content& other);
+  VolumeAndArea& operator+=(const VolumeAndArea& other);
 };
 /// @param rate  what evaluate() made of the state with this `shift`
-[[nodiscard]] Content contentOf(const CurvatureState& state, const Field& rate, double shift);
+[[nodiscard]] VolumeAndArea volumeAndAreaOf(const CurvatureState& state, const Field& rate,
+                                            double shift);
 /// Grid points inside that the blocks of a tree do not hold as active: they change in no step.
-[[nodiscard]] double inactiveContent(const openvdb::FloatTree& tree);
+[[nodiscard]] double inactiveVolume(const openvdb::FloatTree& tree);
 
 }  // namespace levelset::flow

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/flow only.
+// Internal header of levelset: public headers must not include it.
 
 #include <functional>
 

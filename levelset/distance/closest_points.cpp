@@ -12,7 +12,7 @@
 namespace levelset {
 namespace {
 
-/// A grid of one value for each closest point: make(its world position).
+/// Builds a grid with one value for each closest point: make(world position of the point).
 template <typename Grid, typename Make>
 typename Grid::Ptr gridOfClosestPoints(const NarrowBand& solid, const ClosestPointOptions& options,
                                        const char* action, const Make& make) {

@@ -20,7 +20,7 @@ Coord neighbourOrigin(const Coord& origin, int direction) {
   return result;
 }
 
-// A block, its slowness and second solution, the result's leaf, and the maps that hold them.
+// Memory of a block: its slowness, second solution and leaf of the result, and the map entries.
 constexpr double kBytesPerBlock = sizeof(ArrivalBlock) + 2 * 2048 + 1024 + 2300 + 100;
 
 }  // namespace
@@ -30,7 +30,7 @@ ArrivalBlocks::ArrivalBlocks(Settings settings) : settings_(std::move(settings))
   limit_ = static_cast<double>(memoryLimit(settings_.maxMemory));
 }
 
-void ArrivalBlocks::checkRoom(const Coord& origin) const {
+void ArrivalBlocks::checkMemoryFor(const Coord& origin) const {
   const double bytes = static_cast<double>(blocks_.size() + 1) * kBytesPerBlock;
   if (bytes > limit_)
     throw ResourceLimit(
@@ -49,7 +49,7 @@ void ArrivalBlocks::checkRoom(const Coord& origin) const {
 ArrivalBlock& ArrivalBlocks::touch(const Coord& origin) {
   ArrivalBlock*& slot = index_[origin];
   if (slot) return *slot;
-  checkRoom(origin);
+  checkMemoryFor(origin);
   ArrivalBlock& block = blocks_.emplace_back();
   slot = &block;
   block.origin = origin;

@@ -120,9 +120,9 @@ struct Advection::Impl {
   [[nodiscard]] flow::Velocity inVoxels(const VectorField& velocity) const {
     const Imath::M44d toWorld = band.indexToWorld(), toIndex = toWorld.inverse();
     const V3d origin = toWorld.translation();
-    return [this, &velocity, toWorld, toIndex, origin](const V3d& place, double at) {
+    return [this, &velocity, toWorld, toIndex, origin](const V3d& position, double at) {
       V3d world, result;
-      toWorld.multDirMatrix(place, world);
+      toWorld.multDirMatrix(position, world);
       world += origin;
       const double share = options.mask ? options.mask->weight(world) : 1;
       if (share == 0) return V3d(0);
@@ -136,19 +136,19 @@ struct Advection::Impl {
     const double end = time + duration;
     requireTime(end, "final time");
     const flow::Velocity speed = inVoxels(velocity);
-    const flow::TimeInterval journey{.velocity = speed,
-                                     .from = time,
-                                     .to = end,
-                                     .action = kAdvectAction,
-                                     .toWorld = band.indexToWorld(),
-                                     .maxMemory = options.maxMemory,
-                                     .progress = subProgress(options.progress, kMeshed, kMoved)};
+    const flow::TimeInterval interval{.velocity = speed,
+                                      .from = time,
+                                      .to = end,
+                                      .action = kAdvectAction,
+                                      .toWorld = band.indexToWorld(),
+                                      .maxMemory = options.maxMemory,
+                                      .progress = subProgress(options.progress, kMeshed, kMoved)};
     if (front)
-      steps += front->advance(journey);
+      steps += front->advance(interval);
     else if (options.scheme == AdvectScheme::SemiLagrangian)
-      steps += flow::carryBySemiLagrange(band, journey);
+      steps += flow::advectSemiLagrangian(band, interval);
     else
-      steps += flow::carryUpwind(band, journey);
+      steps += flow::advectUpwind(band, interval);
     time = end;
   }
 

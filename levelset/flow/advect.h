@@ -12,7 +12,7 @@ namespace levelset {
 
 enum class AdvectScheme {
   /// The surface as triangles whose vertices follow the flow; it becomes a band again at the end.
-  /// Keeps volume and thin sheets: nothing is interpolated on a grid on the way.
+  /// Keeps volume and thin sheets: nothing is interpolated on a grid on the path.
   Front,
   /// φ at the feet of backward characteristics by tricubic interpolation, steps of several voxels,
   /// re-distanced after each [Strain99].
@@ -41,7 +41,7 @@ struct AdvectResult {
 ///
 /// Enright's deformation there and back on 64³ costs the upwind scheme 30 % of the volume (44 %
 /// with OpenVDB's), since a grid cannot hold sheets thinner than its voxels, and the front 0.1 %. A
-/// reference map carried on the same grid was tried and lost its way for the same reason: there it
+/// reference map carried on the same grid was tried and lost its path for the same reason: there it
 /// stretches fortyfold between two grid points. Triangles that are split where they stretch keep
 /// both sides of a sheet, however near they get to each other.
 ///

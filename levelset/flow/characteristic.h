@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/flow only.
+// Internal header of levelset: public headers must not include it.
 
 #include <cmath>
 
@@ -15,19 +15,20 @@ struct Characteristic {
   /// The farthest that any velocity that it looks at would move, voxels; infinite if one is not
   /// finite.
   double fastest = 0;
-  /// How far the second look stands off the line through the first and the third, voxels: it says
+  /// How far the second sample stands off the line through the first and the third, voxels: it says
   /// nothing of the move.
-  double second = 0;
+  double stageDeviation = 0;
   /// Where the first velocity that is not finite lies: how far from the start, voxels.
-  double hole = HUGE_VAL;
+  double nonFiniteDistance = HUGE_VAL;
 
   Characteristic(const Velocity& velocity, const Imath::V3d& from, double time, double to);
-  /// Was every velocity on the way?
+  /// Was every velocity on the path?
   [[nodiscard]] bool isFinite() const { return std::isfinite(fastest); }
 };
 
-/// @throws InvalidInput, telling place and time, unless every velocity that the step looks at is
+/// @throws InvalidInput, telling position and time, unless every velocity that the step looks at is
 ///         finite
-void requireFiniteWay(const TimeInterval& journey, const Imath::V3d& from, double time, double to);
+void requireFinitePath(const TimeInterval& interval, const Imath::V3d& from, double time,
+                       double to);
 
 }  // namespace levelset::flow

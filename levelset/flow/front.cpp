@@ -27,14 +27,14 @@ constexpr double kFarthestMove = 16, kMostStrain = 0.7, kMostError = 2e-3;
 // Where no velocity moves further than this within a step it may err by more: where the velocity
 // jumps, no step would be short enough.
 constexpr double kShortMove = 0.25;
-// What the method's second look may stand off the others, voxels.
-constexpr double kMostSecond = 1;
+// What the method's second sample may stand off the others, voxels.
+constexpr double kMostStageDeviation = 1;
 // Positions, triangles and what splitting and moving keep beside them.
 constexpr double kBytesPerTriangle = 100;
 // A surface with more triangles than this for each voxel of the largest area that it has had is
-// crumpled, not stretched, and would take long to be told apart where it crosses itself. On the way
-// back from a stretch they are as many as they were there. Front.HasFewTrianglesWhereItIsStretched
-// tells how far those of smooth velocities stay below.
+// crumpled, not stretched, and would take long to be told apart where it crosses itself. On the
+// path back from a stretch they are as many as they were there.
+// Front.HasFewTrianglesWhereItIsStretched tells how far those of smooth velocities stay below.
 constexpr double kMostTrianglesPerVoxel = 50, kSpareTriangles = 20000;
 // A face that leans further than this from a vertex normal belongs to another side of a crease.
 constexpr double kCreaseCosine = 0.8;
@@ -177,25 +177,26 @@ namespace {
 
 /// Of all vertices.
 struct Largest {
-  double fastest = 0, move = 0, error = 0, second = 0;  ///< voxels, see Characteristic
-  double hole = HUGE_VAL;                               ///< the nearest
+  double fastest = 0, move = 0, error = 0, stageDeviation = 0;  ///< voxels, see Characteristic
+  double nonFiniteDistance = HUGE_VAL;                          ///< the nearest
 
   static Largest of(const Largest& a, const Largest& b) {
     return {std::max(a.fastest, b.fastest), std::max(a.move, b.move), std::max(a.error, b.error),
-            std::max(a.second, b.second), std::min(a.hole, b.hole)};
+            std::max(a.stageDeviation, b.stageDeviation),
+            std::min(a.nonFiniteDistance, b.nonFiniteDistance)};
   }
 };
 
 }  // namespace
 
-double Front::firstStep(const TimeInterval& journey) const {
+double Front::firstStep(const TimeInterval& interval) const {
   const double fastest = tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, mesh_.positions.size(), 256), 0.0,
       [&](const auto& range, double largest) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           const V3d& p = mesh_.positions[i];
-          const V3d speed = journey.velocity(p, journey.from);
-          requireFinite(journey, speed, p, journey.from);
+          const V3d speed = interval.velocity(p, interval.from);
+          requireFinite(interval, speed, p, interval.from);
           largest = std::max(largest, speed.length());
         }
         return largest;
@@ -204,17 +205,17 @@ double Front::firstStep(const TimeInterval& journey) const {
   return kFarthestMove / fastest;
 }
 
-double Front::tryStep(const TimeInterval& journey, double from, double to) {
+double Front::tryStep(const TimeInterval& interval, double from, double to) {
   moved_.resize(mesh_.positions.size());
   const Largest largest = tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, mesh_.positions.size(), 256), Largest{},
       [&](const auto& range, Largest result) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           const V3d& p = mesh_.positions[i];
-          const Characteristic way(journey.velocity, p, from, to);
-          moved_[i] = p + way.move;
-          result = Largest::of(
-              result, {way.fastest, way.move.length(), way.error.length(), way.second, way.hole});
+          const Characteristic path(interval.velocity, p, from, to);
+          moved_[i] = p + path.move;
+          result = Largest::of(result, {path.fastest, path.move.length(), path.error.length(),
+                                        path.stageDeviation, path.nonFiniteDistance});
         }
         return result;
       },
@@ -222,17 +223,17 @@ double Front::tryStep(const TimeInterval& journey, double from, double to) {
   isStill_ = largest.fastest == 0;
   if (!std::isfinite(largest.fastest)) {
     // Perhaps only because the step looks further than the surface will go.
-    if (largest.hole > kShortMove) return 0.25;
-    for (const V3d& p : mesh_.positions) requireFiniteWay(journey, p, from, to);
+    if (largest.nonFiniteDistance > kShortMove) return 0.25;
+    for (const V3d& p : mesh_.positions) requireFinitePath(interval, p, from, to);
     throw InvalidInput(fmt::format("{}: the velocity overflows at time {:.6g}; use a gentler one",
-                                   journey.action, from));
+                                   interval.action, from));
   }
   double allowed = std::min(kFarthestMove / std::max(largest.move, largest.fastest / 4),
                             kMostStrain / mostStrain());
   if (largest.fastest > kShortMove) {
     if (largest.error > 0)
       allowed = std::min(allowed, std::max(0.1, std::pow(kMostError / largest.error, 0.2)));
-    if (largest.second > kMostSecond) allowed = std::min(allowed, 0.5);
+    if (largest.stageDeviation > kMostStageDeviation) allowed = std::min(allowed, 0.5);
   }
   return allowed;
 }
@@ -256,38 +257,39 @@ double Front::mostStrain() const {
   return std::sqrt(squared);
 }
 
-StepMade Front::step(const TimeInterval& journey, double from, double longest) {
-  const double left = std::abs(journey.to - from), sign = journey.to < from ? -1 : 1;
+StepResult Front::step(const TimeInterval& interval, double from, double longest) {
+  const double left = std::abs(interval.to - from), sign = interval.to < from ? -1 : 1;
   constexpr double kSlack = 1.05, kMargin = 0.9, kGrowth = 4;
   double dt = longest;
-  if (from == journey.from) dt = std::min(dt, firstStep(journey));
+  if (from == interval.from) dt = std::min(dt, firstStep(interval));
   for (;;) {
-    const double to = dt >= left ? journey.to : from + sign * dt;
+    const double to = dt >= left ? interval.to : from + sign * dt;
     if (to == from || left > kGrowth * kMostSteps * dt) return {from, dt};
-    const double allowed = tryStep(journey, from, to);
+    const double allowed = tryStep(interval, from, to);
     if (allowed * kSlack >= 1) {
       mesh_.positions.swap(moved_);
       const double next = dt * std::clamp(kMargin * allowed, kMargin / kSlack, kGrowth);
       // While all stands still, what comes and goes has to be waited for.
-      const double whole = std::abs(journey.to - journey.from);
-      return {to, isStill_ ? std::min(next, kFirstShare * whole) : next};
+      const double total = std::abs(interval.to - interval.from);
+      return {to, isStill_ ? std::min(next, kFirstShare * total) : next};
     }
-    report(journey.progress, (from - journey.from) / (journey.to - journey.from), journey.action);
+    report(interval.progress, (from - interval.from) / (interval.to - interval.from),
+           interval.action);
     dt *= kMargin * allowed;
   }
 }
 
-std::size_t Front::advance(const TimeInterval& journey) {
-  return walk(journey, [&](double from, double longest) {
-    const StepMade made = step(journey, from, longest);
-    splitLongEdges(journey.maxMemory, journey.action);
+std::size_t Front::advance(const TimeInterval& interval) {
+  return integrate(interval, [&](double from, double longest) {
+    const StepResult made = step(interval, from, longest);
+    splitLongEdges(interval.maxMemory, interval.action);
     largestArea_ = std::max(largestArea_, surfaceArea(mesh_));
     if (static_cast<double>(mesh_.triangles.size()) >
         kSpareTriangles + kMostTrianglesPerVoxel * largestArea_) {
       throw ResourceLimit(fmt::format(
           "{}: at time {:.6g} the velocity has folded the surface too finely to follow; "
           "use a smoother velocity, a shorter time or --scheme semi-lagrangian",
-          journey.action, made.time));
+          interval.action, made.time));
     }
     return made;
   });

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/flow only.
+// Internal header of levelset: public headers must not include it.
 
 #include <vector>
 
@@ -26,19 +26,19 @@ class Front {
   /// @throws InvalidInput for a velocity that is not finite; ResourceLimit for too many steps or
   ///         triangles; Cancelled
   /// @return the number of steps
-  std::size_t advance(const TimeInterval& journey);
+  std::size_t advance(const TimeInterval& interval);
 
   [[nodiscard]] const TriMesh& mesh() const { return mesh_; }
 
  private:
   /// Puts the vertices of a step into `moved_`.
   /// @return the share of the step that would be allowed, 1 and more: all of it
-  double tryStep(const TimeInterval& journey, double from, double to);
-  /// How much the edges change on the way to `moved_`, as a share of their lengths or the longest.
+  double tryStep(const TimeInterval& interval, double from, double to);
+  /// How much the edges change on the path to `moved_`, as a share of their lengths or the longest.
   [[nodiscard]] double mostStrain() const;
   /// How long the first step may be, by the speeds at the start.
-  [[nodiscard]] double firstStep(const TimeInterval& journey) const;
-  StepMade step(const TimeInterval& journey, double from, double longest);
+  [[nodiscard]] double firstStep(const TimeInterval& interval) const;
+  StepResult step(const TimeInterval& interval, double from, double longest);
   void splitLongEdges(std::size_t maxMemory, const char* action);
 
   TriMesh mesh_;

@@ -38,7 +38,7 @@ void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOp
     throw UsageError(
         fmt::format("{}: {} steps were asked for; give at least 1", action, options.steps));
   if (!(options.until > 0 && options.until <= 1))
-    throw UsageError(fmt::format("{}: the part of the way is {}; give a number above 0, up to 1",
+    throw UsageError(fmt::format("{}: the part of the path is {}; give a number above 0, up to 1",
                                  action, options.until));
   if (options.tolerance && !(*options.tolerance > 0 && std::isfinite(*options.tolerance)))
     throw UsageError(
@@ -76,7 +76,7 @@ struct DistancePair {
     return found;
   }
 
-  /// The field that is zero where that part of the way is gone; of it `mask` again a part.
+  /// The field that is zero where that part of the path is gone; of it `mask` again a part.
   [[nodiscard]] FloatGrid::Ptr at(double part, const std::optional<Mask>& mask) const {
     FloatGrid::Ptr result = from->deepCopy();
     const auto everywhere = static_cast<float>(part);
@@ -102,12 +102,12 @@ struct DistancePair {
 };
 
 /// @param distances  makes them of a field
-NarrowBand onTheWay(const DistancePair& pair, double part, const MorphOptions& options,
-                    const std::function<FloatGrid::Ptr(const FloatGrid&)>& distances) {
+NarrowBand intermediate(const DistancePair& pair, double part, const MorphOptions& options,
+                        const std::function<FloatGrid::Ptr(const FloatGrid&)>& distances) {
   const FloatGrid::Ptr field = pair.at(part, options.mask);
   if (!eikonal::hasZeroCrossing(field->tree()))
     throw InvalidInput(
-        fmt::format("{}: nothing is left of the solid at {:.3g} of the way, since the target lies "
+        fmt::format("{}: nothing is left of the solid at {:.3g} of the path, since the target lies "
                     "apart from it; move the target until the two overlap, or ask for 1 step",
                     options.action, part));
   return makeBand(distances(*field));
@@ -158,10 +158,11 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
   };
   for (int i = 1; i <= options.steps; ++i) {
     const double part = options.until * i / options.steps;
-    result =
-        part == 1 && isOnTarget ? goal : onTheWay(pair, part, options, [&](const FloatGrid& field) {
-          return distances(field, solid.halfWidth(), fractionOf(i - 1), fractionOf(i));
-        });
+    result = part == 1 && isOnTarget
+                 ? goal
+                 : intermediate(pair, part, options, [&](const FloatGrid& field) {
+                     return distances(field, solid.halfWidth(), fractionOf(i - 1), fractionOf(i));
+                   });
     if (options.keep) options.keep(result, i);
     report(options.progress, fractionOf(i), options.action);
     if (options.tolerance && part < 1 && compare(result, goal).hausdorff() <= *options.tolerance)

@@ -11,11 +11,11 @@ namespace levelset {
 
 struct MorphOptions {
   int steps = 1;
-  double until = 1;  ///< part of the way, in (0, 1]; 1 ends on the target
+  double until = 1;  ///< part of the path, in (0, 1]; 1 ends on the target
   /// World units: the first step whose surface is no farther than this from that of the target, and
   /// the reverse (Hausdorff distance), is the last. Empty: all steps are gone.
   std::optional<double> tolerance = {};
-  /// Of the way, this part is gone at each point; the end is then no longer the target.
+  /// Of the path, this part is gone at each point; the end is then no longer the target.
   std::optional<Mask> mask = {};
   /// Distances count no further than this, voxels: for a mask that parts solids which differ near
   /// their surfaces only, where it saves sweeping them whole. Empty: wherever the surface passes.
@@ -28,13 +28,13 @@ struct MorphOptions {
 };
 
 /// Moves the surface of `solid` on to that of `target`, on the grid of `solid`. At the part s of
-/// the way it is the zero set of (1 − s) distance to the solid + s distance to the target, both
+/// the path it is the zero set of (1 − s) distance to the solid + s distance to the target, both
 /// exact and known wherever the surface passes, re-distanced. A point that belongs to one of the
 /// solids only changes sides once, at a time of its own: every step is nearer to the target than
 /// the one before, whatever the topology.
 /// @throws UsageError for fewer than one step, `until` outside (0, 1], a tolerance that is not
 /// positive or a bad mask; InvalidInput if a solid is
-/// empty, or if nothing is left on the way (the solids lie apart); ResourceLimit; Cancelled
+/// empty, or if nothing is left on the path (the solids lie apart); ResourceLimit; Cancelled
 [[nodiscard]] NarrowBand morph(const NarrowBand& solid, const NarrowBand& target,
                                const MorphOptions& options = {});
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// The cells that the zero set passes, block by block. Includes OpenVDB: for .cpp files only.
+// The cells that the zero set passes, block by block. Internal header of levelset: public headers must not include it.
 
 #include <array>
 #include <cstdint>

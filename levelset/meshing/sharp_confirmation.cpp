@@ -172,10 +172,10 @@ EdgeEvidence evidenceAt(const Vec3d& vertex, const VertexSheets& sheets,
   const openvdb::Coord centre = openvdb::Coord::round(vertex);
   for (const openvdb::Coord& c : openvdb::CoordBBox(centre.offsetBy(-2), centre.offsetBy(2))) {
     const Vec3d to = c.asVec3d() - vertex;
-    const double ahead = to.dot(along), across = (to - along * ahead).length();
+    const double alongEdge = to.dot(along), across = (to - along * alongEdge).length();
     const double value = static_cast<double>(field.getValue(c)) / voxelSize;
     // A value that is cut off at the band's rim tells nothing.
-    if (std::abs(ahead) > kEdgeReach || std::abs(value) > halfWidth * (1 - 1e-5)) continue;
+    if (std::abs(alongEdge) > kEdgeReach || std::abs(value) > halfWidth * (1 - 1e-5)) continue;
     for (const int sign : {1, -1}) {
       const double d0 = sign * to.dot(n0), d1 = sign * to.dot(n1), d = sign * value;
       const bool isInside = d0 < 0 && d1 < 0 && std::min(d0, d1) > -kEdgeReach;
@@ -224,17 +224,17 @@ bool isSharp(const IndexMesh& mesh, std::span<const std::uint32_t> triangles, st
 }
 
 /// A sheet as one vertex tells it.
-struct ToldSheet {
+struct SheetEstimate {
   std::uint32_t vertex;
   Vec3d normal;
 };
 
 /// A sheet of a vertex as another one tells it better: the nearest of the much flatter ones.
-ToldSheet flatterSheet(const IndexMesh& mesh, std::span<const std::uint32_t> triangles,
-                       const ToldSheet& own, const std::vector<VertexSheets>& sheets,
-                       const std::vector<SheetQuality>& quality) {
+SheetEstimate flatterSheet(const IndexMesh& mesh, std::span<const std::uint32_t> triangles,
+                           const SheetEstimate& own, const std::vector<VertexSheets>& sheets,
+                           const std::vector<SheetQuality>& quality) {
   const Vec3d position = mesh.positions[own.vertex];
-  ToldSheet best = own;
+  SheetEstimate best = own;
   double least = kBeside * kBeside;
   for (const std::uint32_t t : triangles)
     for (const std::uint32_t v : mesh.triangles[t]) {

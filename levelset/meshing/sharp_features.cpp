@@ -83,14 +83,16 @@ class FeatureInserter {
   void run() {
     collectCorners();
     for (int pass = 0; pass < kPasses; ++pass) {
-      const auto tell = [&](double done) { report(progress_, (pass + done) / kPasses, "mesh"); };
-      tell(0);
+      const auto reportProgress = [&](double done) {
+        report(progress_, (pass + done) / kPasses, "mesh");
+      };
+      reportProgress(0);
       collect();
       if (edges_.empty() && faces_.empty()) return;
       hasChanged_ = false;
-      tell(0.4);
+      reportProgress(0.4);
       flipEdges();
-      tell(0.8);
+      reportProgress(0.8);
       splitEdges();
       splitFaces();
       if (!hasChanged_) return;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Edges and corners between the vertices of a mesh. Includes OpenVDB: for .cpp files only.
+// Edges and corners between the vertices of a mesh. Internal header of levelset: public headers must not include it.
 
 #include <array>
 #include <cmath>

@@ -1,6 +1,6 @@
 #pragma once
 
-// Includes OpenVDB: for .cpp files only.
+// Internal header of levelset: public headers must not include it.
 
 #include "levelset/meshing/sharp_features.h"
 

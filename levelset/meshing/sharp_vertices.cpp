@@ -153,12 +153,12 @@ class VertexPlacer::BlockField {
     Plane plane;
     plane.distance = value(x, y, z);
     const Vector3d back(value(x - 1, y, z), value(x, y - 1, z), value(x, y, z - 1));
-    const Vector3d ahead(value(x + 1, y, z), value(x, y + 1, z), value(x, y, z + 1));
-    const Vector3d bend = back + ahead - Vector3d::Constant(2 * plane.distance);
+    const Vector3d forward(value(x + 1, y, z), value(x, y + 1, z), value(x, y, z + 1));
+    const Vector3d bend = back + forward - Vector3d::Constant(2 * plane.distance);
     plane.error = bend.cwiseAbs().maxCoeff();
     plane.bend = std::max(plane.error, std::abs(bend.sum()));
     plane.isSmooth = plane.error < kSmooth;
-    plane.gradient = (ahead - back) / 2;
+    plane.gradient = (forward - back) / 2;
     if (plane.isSmooth) {
       plane.normal = plane.gradient;
       plane.isKnown = plane.normal.norm() > 0.5;

@@ -496,7 +496,7 @@ AnimationReport animateTexture(const NarrowBand& base, const NarrowBand& texture
       finest = std::min(finest, result->report.voxelSize);
       coarsest = std::max(coarsest, result->report.voxelSize);
       for (const std::string& note : result->report.notes) frameNotes.add(f.index, note, notes);
-      if (keepsBox && mapping.map == TextureMap::Shell &&
+      if (keepsBox && mapping.map == TextureMap::Prism &&
           isBeyond(now.zeroSetBounds(), *mapping.textureBox, now.voxelSize()))
         frameWarnings.add(f.index,
                           "the texture goes beyond the box of that of frame 0 and is cut off "

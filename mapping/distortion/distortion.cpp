@@ -42,16 +42,16 @@ Spread spreadOf(std::vector<double> values) {
 
 }  // namespace
 
-std::vector<V3d> samplePlaces(const Patch& patch, double sink) {
+std::vector<V3d> samplePlaces(const Patch& patch, double embedDepth) {
   std::vector<V3d> places;
-  if (sink != 0) {  // below the surface, or above the last layer
-    const ParticleLayer& end = sink > 0 ? patch.layers.front() : patch.layers.back();
+  if (embedDepth != 0) {  // below the surface, or above the last layer
+    const ParticleLayer& end = embedDepth > 0 ? patch.layers.front() : patch.layers.back();
     for (std::size_t j = 0; j < end.rows; ++j)
       for (std::size_t i = 0; i < end.columns; ++i)
         for (const double share : {1.0, 0.5})
           places.push_back({static_cast<double>(i) / static_cast<double>(end.columns - 1),
                             static_cast<double>(j) / static_cast<double>(end.rows - 1),
-                            end.w - share * sink});
+                            end.w - share * embedDepth});
   }
   for (std::size_t k = 0; k < patch.layers.size(); ++k) {
     const ParticleLayer& layer = patch.layers[k];
@@ -71,8 +71,8 @@ std::vector<V3d> samplePlaces(const Patch& patch, double sink) {
   return places;
 }
 
-std::vector<MapSample> sampleMap(const PatchMap& map, const Patch& patch, double sink) {
-  const std::vector<V3d> places = samplePlaces(patch, sink);
+std::vector<MapSample> sampleMap(const PatchMap& map, const Patch& patch, double embedDepth) {
+  const std::vector<V3d> places = samplePlaces(patch, embedDepth);
   std::vector<MapSample> samples(places.size());
   tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t n) {
     const V3d place = layerPosition(patch, places[n]);
@@ -107,7 +107,7 @@ Distortion surveyDistortion(std::span<const MapSample> samples, const V3d& textu
   const auto worst = static_cast<std::size_t>(std::min_element(jacobians.begin(), jacobians.end()) -
                                               jacobians.begin());
   result.foldUvw = samples[worst].uvw;
-  result.foldPlace = samples[worst].place;
+  result.foldPoint = samples[worst].position;
   result.jacobian = spreadOf(std::move(jacobians));
   result.leastAbove = HUGE_VAL;
   for (std::size_t n = 0; n < samples.size(); ++n)

@@ -20,7 +20,7 @@ struct Spread {
 struct Distortion {
   std::size_t samples = 0, folded = 0;  ///< places looked at, and where the map turns over
   Spread jacobian;  ///< det ∇Φ × median of its reciprocals; 1 for a box, ≤ 0 folds
-  Imath::V3d foldPlace{0}, foldUvw{0};  ///< of the least, in world and texture coordinates
+  Imath::V3d foldPoint{0}, foldUvw{0};  ///< of the least, in world and texture coordinates
   Spread stretch;  ///< least and largest singular value of texture → patch, world per world; median
                    ///< and percentiles over both
   double leastAbove = 0;   ///< least stretch at and above the surface; below it, a union shows none
@@ -29,11 +29,11 @@ struct Distortion {
 
 /// Texture coordinates of the particles, of the middles of their cells, between the layers, and of
 /// places below the surface. @param sink  how deep to look there, in w
-[[nodiscard]] std::vector<Imath::V3d> samplePlaces(const Patch& patch, double sink);
+[[nodiscard]] std::vector<Imath::V3d> samplePlaces(const Patch& patch, double embedDepth);
 
 /// A map at all of them.
 [[nodiscard]] std::vector<MapSample> sampleMap(const PatchMap& map, const Patch& patch,
-                                               double sink);
+                                               double embedDepth);
 
 /// @param textureSize  of the box that is the unit cube, world units
 /// @param isMirrored   does the patch turn the texture over on purpose?

@@ -14,7 +14,7 @@
 namespace mapping {
 
 class RbfMap;
-class ShellMap;
+class PrismMap;
 
 enum class FoldVerdict {
   Certified,  ///< the Jacobian is positive everywhere
@@ -24,13 +24,13 @@ enum class FoldVerdict {
 [[nodiscard]] const char* foldVerdictName(FoldVerdict verdict);
 
 /// A place where a map turns over.
-struct FoldPlace {
-  Imath::V3d place{0}, uvw{0};
+struct FoldPoint {
+  Imath::V3d position{0}, uvw{0};
   double jacobian = 0;  ///< in the unit of FoldCertificate::leastJacobian
 };
 
 struct FoldCertificate {
-  static constexpr std::size_t kMostPlaces = 5;
+  static constexpr std::size_t kMostPoints = 5;
   std::size_t pieces = 0;  ///< tetrahedra, or parts of cells, that were judged
   /// Of the volume, in the space that the map starts from: not positive for certain, and not
   /// decided.
@@ -40,7 +40,7 @@ struct FoldCertificate {
   /// box, ≤ 0 folds.
   double leastJacobian = 0;
   double unit = 1;               ///< that median: world units³ a unit cube, or its reciprocal
-  std::vector<FoldPlace> worst;  ///< of different cells, the worst first; at most kMostPlaces
+  std::vector<FoldPoint> worst;  ///< of different cells, the worst first; at most kMostPoints
 
   [[nodiscard]] FoldVerdict verdict() const {
     if (!worst.empty()) return FoldVerdict::Folds;
@@ -49,12 +49,12 @@ struct FoldCertificate {
 };
 
 /// Of the map that is straight in tetrahedra: the exact sign of each [Shewchuk97].
-[[nodiscard]] FoldCertificate certifyShell(const ShellMap& map, bool isMirrored);
+[[nodiscard]] FoldCertificate certifyPrisms(const PrismMap& map, bool isMirrored);
 
 /// Of the map that is straight between particles (see layer_map.h): Bernstein coefficients of the
 /// determinant of each trilinear cell. What cannot be told from zero by rounding folds.
-/// @param sink  in w, see ShellCells
-[[nodiscard]] FoldCertificate certifyLayers(const Patch& patch, double sink);
+/// @param sink  in w, see PrismCells
+[[nodiscard]] FoldCertificate certifyLayers(const Patch& patch, double embedDepth);
 
 /// Of the smooth map: in a box about c the slopes are J(c) (I + E) with |E| bounded through the
 /// Taylor polynomials of the particles that are far and the kinks of those that are near; where
@@ -62,7 +62,7 @@ struct FoldCertificate {
 /// or their number passes a bound. Looked at are the boxes of the particles' cells, as far as the
 /// map sends them into the unit cube, and `sink` below it. The bounds are those of φ(r) = r: of
 /// another kernel nothing is decided, and its least Jacobian is not looked for.
-[[nodiscard]] FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double sink);
+[[nodiscard]] FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double embedDepth);
 
 /// Of several maps: pieces are added up, shares and the least Jacobian are those of the map where
 /// they are worst, and the worst of all places are kept. @pre certificates is not empty
@@ -73,6 +73,7 @@ struct FoldCertificate {
 void evaluateRbf(const RbfMap& map, const Patch& patch, std::vector<MapSample>& samples);
 
 /// As sampleMap in distortion.h; where there are many particles, by evaluateRbf.
-[[nodiscard]] std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch, double sink);
+[[nodiscard]] std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch,
+                                               double embedDepth);
 
 }  // namespace mapping

@@ -11,9 +11,9 @@
 
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/rbf/rbf_map.h"
-#include "mapping/untangle/shell_cells.h"
+#include "mapping/untangle/prism_cells.h"
 
 namespace mapping {
 namespace {
@@ -67,7 +67,7 @@ class LeastGrid {
   [[nodiscard]] const openvdb::FloatGrid::Ptr& grid() const { return grid_; }
 
   [[nodiscard]] FieldGrid finish(const FoldCertificate& certificate) {
-    for (const FoldPlace& fold : certificate.worst) add(nearest(fold.place), fold.jacobian);
+    for (const FoldPoint& fold : certificate.worst) add(nearest(fold.position), fold.jacobian);
     return levelset::importField(grid_, kFolds);
   }
 
@@ -84,7 +84,7 @@ void checkField(const Patch& patch, const JacobianFieldOptions& options) {
         fmt::format("{}: the voxel size is {}; give a positive number", kFolds, options.voxelSize));
   }
   const std::vector<V3d> positions = particlePositions(patch);
-  const ShellCells cells(patch, options.sink);
+  const PrismCells cells(patch, options.embedDepth);
   double points = 0;
   for (std::size_t n = 0; n < cells.size(); ++n) {
     Box3d box;
@@ -141,11 +141,12 @@ double trilinearDeterminant(const std::array<V3d, 8>& corners, const V3d& at) {
 
 /// Calls visit(grid point, determinant of texture → patch) in all cells between the particles.
 template <typename Visit>
-void forEachInCells(const Patch& patch, double sink, const LeastGrid& grid, const Visit& visit) {
+void forEachInCells(const Patch& patch, double embedDepth, const LeastGrid& grid,
+                    const Visit& visit) {
   const std::vector<V3d> positions = particlePositions(patch);
-  const ShellCells cells(patch, sink);
+  const PrismCells cells(patch, embedDepth);
   for (std::size_t n = 0; n < cells.size(); ++n) {
-    const ShellCell cell = cells.at(n);
+    const PrismCell cell = cells.at(n);
     std::array<V3d, 8> corners;
     for (std::size_t i = 0; i < 8; ++i) corners[i] = positionOf(cell.corners[i], positions);
     const V3d sides = cell.box.size();
@@ -169,13 +170,13 @@ FieldGrid jacobianField(const Patch& patch, const FoldCertificate& certificate,
   checkField(patch, options);
   LeastGrid grid(options.voxelSize);
   const double unit = (patch.mirrored ? -1 : 1) * certificate.unit;
-  forEachInCells(patch, options.sink, grid, [&](const openvdb::Coord& at, double determinant) {
-    grid.add(at, determinant / unit);
-  });
+  forEachInCells(
+      patch, options.embedDepth, grid,
+      [&](const openvdb::Coord& at, double determinant) { grid.add(at, determinant / unit); });
   return grid.finish(certificate);
 }
 
-FieldGrid jacobianField(const Patch& patch, const ShellMap& map, const FoldCertificate& certificate,
+FieldGrid jacobianField(const Patch& patch, const PrismMap& map, const FoldCertificate& certificate,
                         const JacobianFieldOptions& options) {
   checkField(patch, options);
   LeastGrid grid(options.voxelSize);
@@ -204,7 +205,7 @@ FieldGrid jacobianField(const Patch& patch, const RbfMap& map, const FoldCertifi
                         const JacobianFieldOptions& options) {
   checkField(patch, options);
   LeastGrid grid(options.voxelSize);
-  forEachInCells(patch, options.sink, grid,
+  forEachInCells(patch, options.embedDepth, grid,
                  [&](const openvdb::Coord& at, double) { grid.add(at, 0); });
   std::vector<openvdb::Coord> points;
   std::vector<MapSample> samples;

@@ -10,8 +10,8 @@
 namespace mapping {
 
 struct JacobianFieldOptions {
-  double voxelSize = 0;  ///< world units, positive
-  double sink = 0;       ///< of the texture, in w
+  double voxelSize = 0;   ///< world units, positive
+  double embedDepth = 0;  ///< of the texture, in w
   std::size_t maxMemory = levelset::kNoMemoryLimit;
 };
 
@@ -23,7 +23,7 @@ struct JacobianFieldOptions {
 [[nodiscard]] levelset::FieldGrid jacobianField(const Patch& patch, const RbfMap& map,
                                                 const FoldCertificate& certificate,
                                                 const JacobianFieldOptions& options);
-[[nodiscard]] levelset::FieldGrid jacobianField(const Patch& patch, const ShellMap& map,
+[[nodiscard]] levelset::FieldGrid jacobianField(const Patch& patch, const PrismMap& map,
                                                 const FoldCertificate& certificate,
                                                 const JacobianFieldOptions& options);
 /// Of the map that is straight between the particles, see layer_map.h.

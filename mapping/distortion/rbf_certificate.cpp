@@ -8,13 +8,13 @@
 
 #include "mapping/distortion/distortion.h"
 #include "mapping/distortion/fold_certificate.h"
-#include "mapping/distortion/fold_places.h"
+#include "mapping/distortion/fold_tally.h"
 #include "mapping/maps/cell_tree.h"
 #include "mapping/maps/dual_basis.h"
 #include "mapping/maps/layer_map.h"
 #include "mapping/rbf/rbf_map.h"
 #include "mapping/rbf/rbf_taylor.h"
-#include "mapping/untangle/shell_cells.h"
+#include "mapping/untangle/prism_cells.h"
 
 namespace mapping {
 namespace {
@@ -185,7 +185,7 @@ struct CubeProof {
   std::vector<double> determinants;
   double least = std::numeric_limits<double>::infinity();
   bool folds = false;
-  FoldPlace worst;
+  FoldPoint worst;
   std::size_t pieces = 0;
 };
 
@@ -289,7 +289,7 @@ void fillWithin(const RbfCubes& cubes, const V3d& origin, const V3d& sizes, cons
   if (chosen.size() > kFewSamples && cube.near.size() > kFewSamples) {
     std::array<std::vector<std::uint32_t>, 8> parts;
     for (const std::uint32_t n : chosen) {
-      const V3d way = samples[n].place - origin - cube.center;
+      const V3d way = samples[n].position - origin - cube.center;
       parts[(way.x > 0 ? 1u : 0u) + (way.y > 0 ? 2u : 0u) + (way.z > 0 ? 4u : 0u)].push_back(n);
     }
     tbb::parallel_for(0, 8, [&](int bits) {
@@ -300,8 +300,8 @@ void fillWithin(const RbfCubes& cubes, const V3d& origin, const V3d& sizes, cons
     return;
   }
   for (const std::uint32_t n : chosen) {
-    samples[n].uvw = cubes.value(cube, samples[n].place - origin) / sizes;
-    M33d slopes = cubes.slopes(cube, samples[n].place - origin);
+    samples[n].uvw = cubes.value(cube, samples[n].position - origin) / sizes;
+    M33d slopes = cubes.slopes(cube, samples[n].position - origin);
     for (int k = 0; k < 3; ++k)
       for (int axis = 0; axis < 3; ++axis) slopes[k][axis] /= sizes[k];
     samples[n].jacobian = slopes;
@@ -310,25 +310,26 @@ void fillWithin(const RbfCubes& cubes, const V3d& origin, const V3d& sizes, cons
 
 }  // namespace
 
-FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double sink) {
+FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double embedDepth) {
   if (map.kernel() != RbfKernel::Biharmonic) {
     FoldCertificate nothing;
     nothing.undecidedShare = 1;
     nothing.leastJacobian = std::numeric_limits<double>::quiet_NaN();
     return nothing;
   }
-  const V3d sizes = shellSizes(patch);
+  const V3d sizes = meanExtents(patch);
   const RbfCubes cubes(map, sizes, kProofTolerance);
-  const Lattice lattice(patch, {.sink = sink, .rim = 0});
+  const Lattice lattice(patch, {.embedDepth = embedDepth, .rim = 0});
   const CellTree tree(lattice);
-  const ProofScene scene{map,
-                         cubes,
-                         tree,
-                         map.origin(),
-                         sizes,
-                         {V3d(0, 0, -std::max(0.0, sink)), V3d(1, 1, 1 + std::max(0.0, -sink))},
-                         patch.mirrored ? -1.0 : 1.0,
-                         kSmallestCube * map.meanSpacing()};
+  const ProofScene scene{
+      map,
+      cubes,
+      tree,
+      map.origin(),
+      sizes,
+      {V3d(0, 0, -std::max(0.0, embedDepth)), V3d(1, 1, 1 + std::max(0.0, -embedDepth))},
+      patch.mirrored ? -1.0 : 1.0,
+      kSmallestCube * map.meanSpacing()};
   const std::vector<RbfCube> starts = startingCubes(scene, worldBoxOf(lattice), map.meanSpacing());
   std::vector<CubeProof> proofs(starts.size());
   tbb::parallel_for(std::size_t{0}, starts.size(),
@@ -353,10 +354,10 @@ FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double sink) {
 
 void evaluateRbf(const RbfMap& map, const Patch& patch, std::vector<MapSample>& samples) {
   if (samples.empty()) return;
-  const V3d sizes = shellSizes(patch);
+  const V3d sizes = meanExtents(patch);
   const RbfCubes cubes(map, sizes, kSlopeTolerance);
   Box3d box;
-  for (const MapSample& sample : samples) box.extendBy(sample.place);
+  for (const MapSample& sample : samples) box.extendBy(sample.position);
   const V3d sides = box.size();
   std::vector<std::uint32_t> all(samples.size());
   for (std::size_t n = 0; n < all.size(); ++n) all[n] = static_cast<std::uint32_t>(n);
@@ -365,14 +366,14 @@ void evaluateRbf(const RbfMap& map, const Patch& patch, std::vector<MapSample>& 
   fillWithin(cubes, map.origin(), sizes, root, std::move(all), samples);
 }
 
-std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch, double sink) {
+std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch, double embedDepth) {
   constexpr std::size_t kManyParticles = 4000;
   if (map.size() < kManyParticles || map.kernel() != RbfKernel::Biharmonic)
-    return sampleMap(map, patch, sink);
-  const std::vector<V3d> places = samplePlaces(patch, sink);
+    return sampleMap(map, patch, embedDepth);
+  const std::vector<V3d> places = samplePlaces(patch, embedDepth);
   std::vector<MapSample> samples(places.size());
   for (std::size_t n = 0; n < places.size(); ++n)
-    samples[n].place = layerPosition(patch, places[n]);
+    samples[n].position = layerPosition(patch, places[n]);
   evaluateRbf(map, patch, samples);
   for (std::size_t n = 0; n < places.size(); ++n) samples[n].uvw = places[n];
   return samples;

@@ -82,13 +82,13 @@ ParticleLayer withCounts(const ParticleLayer& layer, std::size_t columns, std::s
   return result;
 }
 
-std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink) {
+std::vector<EmbeddedParticle> embeddedParticles(const Patch& patch, double embedDepth) {
   // Of the distance to a neighbour on the last layer what must be left of it.
   constexpr double kLeastShare = 0.25;
   constexpr double kWidest = 1.1;  // steps of the layers from layer to layer
-  std::vector<SunkParticle> particles;
-  if (sink == 0 || patch.layers.size() < 2) return particles;
-  const bool isBelow = sink > 0;
+  std::vector<EmbeddedParticle> particles;
+  if (embedDepth == 0 || patch.layers.size() < 2) return particles;
+  const bool isBelow = embedDepth > 0;
   const ParticleLayer& last = isBelow ? patch.layers.front() : patch.layers.back();
   const ParticleLayer before =
       withCounts(isBelow ? patch.layers[1] : *(patch.layers.end() - 2), last.columns, last.rows);
@@ -101,7 +101,7 @@ std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink) {
   // A smooth map errs most beside its last particles: they lie deeper than the texture, by as much
   // again or by a step. Columns are straight, so that layers may lie wider apart than layers, and
   // the wider the deeper.
-  const double reach = std::abs(sink) + std::min(std::abs(sink), step);
+  const double reach = std::abs(embedDepth) + std::min(std::abs(embedDepth), step);
   const double most = 2.0 * static_cast<double>(patch.layers.size());
   const auto layers = static_cast<int>(std::min(most, std::ceil(reach / (kWidest * step))));
   for (int n = 1; n <= layers; ++n) {

@@ -52,16 +52,16 @@ PatchSite siteAt(const NarrowBand& base, const SurfacePoint& point, std::size_t 
                  const ScatterOptions& options) {
   double rotation = options.rotation + options.jitter * luckAt(options.density.seed, index);
   if (options.direction) {
-    const V3d direction = options.direction(point.place, 0);
+    const V3d direction = options.direction(point.position, 0);
     if (!std::isfinite(direction.length())) {
       throw levelset::UsageError(
           fmt::format("{}: the direction at ({:.6g}, {:.6g}, {:.6g}) is not finite", kScatter,
-                      point.place.x, point.place.y, point.place.z));
+                      point.position.x, point.position.y, point.position.z));
     }
     rotation += angleTowards(point, direction);
   }
-  return {cornersAround(base, point.place, options.uSize * point.scale, options.vSize * point.scale,
-                        rotation),
+  return {cornersAround(base, point.position, options.uSize * point.scale,
+                        options.vSize * point.scale, rotation),
           point.scale};
 }
 

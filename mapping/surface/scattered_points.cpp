@@ -124,16 +124,16 @@ class AreaSampler {
     const auto& [a, b, c] = mesh_.triangles[n];
     const double root = std::sqrt(random()), share = random();
     SurfacePoint point;
-    point.place = mesh_.positions[a] * (1 - root) + mesh_.positions[b] * (root * (1 - share)) +
-                  mesh_.positions[c] * (root * share);
-    V3d foot = point.place;
+    point.position = mesh_.positions[a] * (1 - root) + mesh_.positions[b] * (root * (1 - share)) +
+                     mesh_.positions[c] * (root * share);
+    V3d foot = point.position;
     if (!field_.project(foot, 0)) {
       // At the border of an open surface: the middle is sure to lie on it.
       foot = (mesh_.positions[a] + mesh_.positions[b] + mesh_.positions[c]) / 3.0;
-      if (!isOpen_ || !field_.project(foot, 0)) foot = point.place;
+      if (!isOpen_ || !field_.project(foot, 0)) foot = point.position;
     }
-    point.place = foot;
-    point.normal = field_.normal(point.place);
+    point.position = foot;
+    point.normal = field_.normal(point.position);
     return point;
   }
 
@@ -171,9 +171,9 @@ Candidates makeCandidates(const AreaSampler& sampler, const ScatterDensity& dens
     SurfacePoint point = sampler(random);
     const double luck = random();
     ++misses;
-    if (density.weight && !(luck < density.weight(point.place))) continue;
+    if (density.weight && !(luck < density.weight(point.position))) continue;
     misses = 0;
-    point.scale = scaleAt(density, point.place);
+    point.scale = scaleAt(density, point.position);
     result.points.push_back(point);
   }
   if (result.points.empty()) {
@@ -203,11 +203,11 @@ std::vector<SurfacePoint> throwDarts(std::span<const SurfacePoint> candidates, d
   PointGrid grid(distance * largestScale(candidates));
   for (const SurfacePoint& candidate : candidates) {
     bool isFree = true;
-    grid.visitNear(candidate.place, [&](std::size_t index) {
+    grid.visitNear(candidate.position, [&](std::size_t index) {
       isFree = isFree && !(scaledDistance(candidate, taken[index], distance) < distance);
     });
     if (!isFree) continue;
-    grid.add(candidate.place, taken.size());
+    grid.add(candidate.position, taken.size());
     taken.push_back(candidate);
   }
   return taken;
@@ -217,7 +217,7 @@ std::vector<SurfacePoint> throwDarts(std::span<const SurfacePoint> candidates, d
 std::vector<SurfacePoint> orderBySpread(std::span<const SurfacePoint> candidates, double reach,
                                         std::size_t kept) {
   PointGrid grid(reach * largestScale(candidates));
-  for (std::size_t i = 0; i < candidates.size(); ++i) grid.add(candidates[i].place, i);
+  for (std::size_t i = 0; i < candidates.size(); ++i) grid.add(candidates[i].position, i);
   struct Neighbour {
     std::size_t index;
     double crowding;
@@ -229,7 +229,7 @@ std::vector<SurfacePoint> orderBySpread(std::span<const SurfacePoint> candidates
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, candidates.size(), 64), [&](const auto& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i)
-          grid.visitNear(candidates[i].place, [&](std::size_t j) {
+          grid.visitNear(candidates[i].position, [&](std::size_t j) {
             if (j == i) return;
             const double d = scaledDistance(candidates[i], candidates[j], 0.5 * reach) / reach;
             if (d < 1) neighbours[i].push_back({j, std::pow(1 - std::max(d, limit), 8)});
@@ -265,7 +265,7 @@ std::vector<SurfacePoint> orderBySpread(std::span<const SurfacePoint> candidates
 }  // namespace
 
 double surfaceDistance(const SurfacePoint& a, const SurfacePoint& b, double thin) {
-  const V3d way = b.place - a.place;
+  const V3d way = b.position - a.position;
   const double straight = way.length();
   if (straight == 0) return 0;
   if (straight < thin && a.normal.dot(b.normal) < kOtherSide)
@@ -284,10 +284,10 @@ double leastDistance(std::span<const SurfacePoint> points, double reach, double 
   PointGrid grid(reach * largestScale(points));
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < points.size(); ++i) {
-    grid.visitNear(points[i].place, [&](std::size_t j) {
+    grid.visitNear(points[i].position, [&](std::size_t j) {
       least = std::min(least, scaledDistance(points[i], points[j], kept));
     });
-    grid.add(points[i].place, i);
+    grid.add(points[i].position, i);
   }
   return least;
 }

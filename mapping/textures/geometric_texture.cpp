@@ -20,7 +20,7 @@
 #include "levelset/placement/resample.h"
 #include "levelset/solids/components.h"
 #include "mapping/layers/layer_resampling.h"
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/textures/shared_sides.h"
 #include "mapping/textures/texture_warp.h"
 
@@ -74,15 +74,16 @@ void checkArguments(const NarrowBand& base, const NarrowBand& texture,
     throw UsageError(fmt::format("{}: the map's tolerance is {}; give texture voxels, at least 0",
                                  kTexture, options.mapTolerance));
   }
-  if (options.sink && !std::isfinite(*options.sink)) {
-    throw UsageError(fmt::format("{}: the sink is {}; give a length", kTexture, *options.sink));
+  if (options.embedDepth && !std::isfinite(*options.embedDepth)) {
+    throw UsageError(fmt::format("{}: the embedding depth is {}; give a length with --embed",
+                                 kTexture, *options.embedDepth));
   }
   const double diagonal = base.zeroSetBounds().size().length();
-  if (options.sink && std::abs(*options.sink) > diagonal) {
-    throw InvalidInput(
-        fmt::format("{}: the sink of {:.6g} is larger than the base, whose diagonal is {:.6g}; "
-                    "give less",
-                    kTexture, *options.sink, diagonal));
+  if (options.embedDepth && std::abs(*options.embedDepth) > diagonal) {
+    throw InvalidInput(fmt::format(
+        "{}: the embedding depth of {:.6g} is larger than the base, whose diagonal is {:.6g}; "
+        "give less",
+        kTexture, *options.embedDepth, diagonal));
   }
   if (!(options.blend >= 0) || !std::isfinite(options.blend)) {
     throw UsageError(fmt::format("{}: the blend radius is {}; give a length of at least 0",
@@ -215,36 +216,38 @@ double solveTolerance(const NarrowBand& texture, const V3d& boxSize, double mapT
   return std::max(kFinestSolve, kSolveShare * mapTolerance * texture.voxelSize() / longest);
 }
 
-std::unique_ptr<ShellMap> buildShell(const NarrowBand& base, const Patch& patch, double sink,
-                                     const TextureOptions& options) {
-  levelset::requireMemory(ShellMap::estimateBytes(patch), options.maxMemory, kTexture);
+std::unique_ptr<PrismMap> buildPrismMap(const NarrowBand& base, const Patch& patch,
+                                        double embedDepth, const TextureOptions& options) {
+  levelset::requireMemory(PrismMap::estimateBytes(patch), options.maxMemory, kTexture);
   levelset::report(options.progress, 0, kTexture);
   // Where the texture ends, its band goes on.
   const double rim = (kBandNeeded + 1) * std::max(base.voxelSize(), options.voxelSize.value_or(0));
-  return std::make_unique<ShellMap>(patch, LatticeBorder{.sink = sink, .rim = rim});
+  return std::make_unique<PrismMap>(patch, LatticeBorder{.embedDepth = embedDepth, .rim = rim});
 }
 
 /// @param sink  as a share of the patch's height
-ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink, const V3d& textureSize,
-                  double tolerance, const TextureOptions& options, TextureCost& cost) {
+ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double embedDepth,
+                  const V3d& textureSize, double tolerance, const TextureOptions& options,
+                  TextureCost& cost) {
   ChosenMap result;
-  if (options.map == TextureMap::Shell) {
-    auto shell = timed(cost.setup, [&] { return buildShell(base, patch, sink, options); });
-    result.particles = shell->lattice().nodeCount();
+  if (options.map == TextureMap::Prism) {
+    auto prisms =
+        timed(cost.setup, [&] { return buildPrismMap(base, patch, embedDepth, options); });
+    result.particles = prisms->lattice().nodeCount();
     result.certificate = timed(cost.certificate, [&] {
-      const std::vector<MapSample> samples = shell->samples();
+      const std::vector<MapSample> samples = prisms->samples();
       result.distortion = surveyDistortion(samples, textureSize, patch.mirrored);
-      result.overlaps = shell->countOverlaps(samples, result.overlap);
-      return certifyShell(*shell, patch.mirrored);
+      result.overlaps = prisms->countOverlaps(samples, result.overlap);
+      return certifyPrisms(*prisms, patch.mirrored);
     });
-    result.map = std::move(shell);
+    result.map = std::move(prisms);
     return result;
   }
   RbfMapOptions rbf = options.rbf;
   rbf.maxMemory = std::min(rbf.maxMemory, options.maxMemory);
   rbf.solveTolerance = tolerance;
   rbf.progress = levelset::subProgress(options.progress, 0, 0.2);
-  JudgedRbf judged = judgedRbf(patch, sink, rbf, cost);
+  CertifiedRbf judged = certifiedRbf(patch, embedDepth, rbf, cost);
   result.particles = judged.map->size();
   result.residual = judged.map->axisResidual();
   result.solve = judged.map->solveReport();
@@ -274,7 +277,7 @@ void addSolve(const RbfSolveReport& one, TextureReport& report) {
 }
 
 std::string tellOverlap(const ChosenMap& map) {
-  const V3d &p = map.overlap.place, &uvw = map.overlap.uvw;
+  const V3d &p = map.overlap.position, &uvw = map.overlap.uvw;
   return fmt::format(
       "{}: the patch passes through itself at {} of {} places, one at ({:.6g}, {:.6g}, {:.6g}), "
       "u, v, w = {:.3g}, {:.3g}, {:.3g}, where the texture would have two values; lead its spline "
@@ -284,8 +287,8 @@ std::string tellOverlap(const ChosenMap& map) {
 
 /// The map of every patch, none where it folds and is skipped. What folds otherwise is refused, or
 /// noted.
-std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> patches, double sink,
-                                const V3d& textureSize, double tolerance,
+std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> patches,
+                                double embedDepth, const V3d& textureSize, double tolerance,
                                 const TextureOptions& options, TextureReport& report) {
   std::vector<ChosenMap> maps;
   std::vector<Distortion> distortions;
@@ -297,7 +300,7 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
     TextureOptions part = options;
     part.progress = levelset::subProgress(options.progress, share(done), share(done + 1));
     ChosenMap chosen =
-        makeMap(base, patch, sink / patch.height, textureSize, tolerance, part, report.cost);
+        makeMap(base, patch, embedDepth / patch.height, textureSize, tolerance, part, report.cost);
     const bool folds =
         chosen.distortion.folded > 0 || chosen.certificate.verdict() == FoldVerdict::Folds;
     if (!folds && chosen.overlaps > 0) {
@@ -311,7 +314,7 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
       continue;
     }
     std::vector<std::string> notes =
-        judgeFolds(chosen.distortion, chosen.certificate, options.allowFolds);
+        checkFolds(chosen.distortion, chosen.certificate, options.allowFolds);
     std::move(notes.begin(), notes.end(), std::back_inserter(report.notes));
     extrapolated += chosen.isExtrapolated;
     report.particles += chosen.particles;
@@ -364,7 +367,7 @@ void requireResult(const NarrowBand& texture, const TextureReport& report,
   const Distortion& worst = report.distortion;
   if (bytes > static_cast<double>(options.maxMemory) && !options.voxelSize &&
       worst.stretch.least < kSqueezed * worst.stretch.median) {
-    const V3d& p = worst.foldPlace;
+    const V3d& p = worst.foldPoint;
     throw levelset::ResourceLimit(fmt::format(
         "{}: the map squeezes the texture to {:.2g} of its size, about ({:.6g}, {:.6g}, {:.6g}), "
         "and "
@@ -430,7 +433,7 @@ void requirePatchOn(const NarrowBand& base, const Patch& patch) {
   }
 }
 
-RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options, double sink) {
+RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options, double embedDepth) {
   std::vector<V3d> points, targets;
   std::vector<char> near;
   for (const ParticleLayer& layer : patch.layers) {
@@ -444,33 +447,33 @@ RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options, double s
         near.push_back(layer.w == 0);
       }
   }
-  for (const SunkParticle& particle : sunkParticles(patch, sink)) {
-    points.push_back(particle.place);
+  for (const EmbeddedParticle& particle : embeddedParticles(patch, embedDepth)) {
+    points.push_back(particle.position);
     targets.push_back(particle.uvw);
     near.push_back(false);
   }
   return {points, targets, near, options};
 }
 
-JudgedRbf judgedRbf(const Patch& patch, double sink, const RbfMapOptions& options,
-                    TextureCost& cost) {
+CertifiedRbf certifiedRbf(const Patch& patch, double embedDepth, const RbfMapOptions& options,
+                          TextureCost& cost) {
   const auto judged = [&](double held) {
-    JudgedRbf result;
+    CertifiedRbf result;
     result.map = timed(
         cost.setup, [&] { return std::make_unique<RbfMap>(patchToTexture(patch, options, held)); });
     result.certificate = timed(cost.certificate, [&] {
-      result.samples = sampleRbf(*result.map, patch, sink);
-      return certifyRbf(*result.map, patch, sink);
+      result.samples = sampleRbf(*result.map, patch, embedDepth);
+      return certifyRbf(*result.map, patch, embedDepth);
     });
     return result;
   };
-  const auto folds = [&](const JudgedRbf& one) {
+  const auto folds = [&](const CertifiedRbf& one) {
     return one.certificate.verdict() == FoldVerdict::Folds ||
            surveyDistortion(one.samples, V3d(1), patch.mirrored).folded > 0;
   };
-  JudgedRbf result = judged(sink);
-  if (sink == 0 || !folds(result)) return result;
-  JudgedRbf free = judged(0);
+  CertifiedRbf result = judged(embedDepth);
+  if (embedDepth == 0 || !folds(result)) return result;
+  CertifiedRbf free = judged(0);
   if (folds(free)) return result;
   free.isExtrapolated = true;
   return free;
@@ -489,10 +492,10 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
   const Box3d box = chooseTextureBox(texture.zeroSetBounds(), options.textureBox);
 
   // === The maps, and what they do to lengths
-  const double sink = options.sink ? *options.sink : base.voxelSize();
+  const double embedDepth = options.embedDepth ? *options.embedDepth : base.voxelSize();
   const double tolerance = solveTolerance(texture, box.size(), options.mapTolerance);
   const std::vector<ChosenMap> maps =
-      makeMaps(base, patches, sink, box.size(), tolerance, options, report);
+      makeMaps(base, patches, embedDepth, box.size(), tolerance, options, report);
   double minStretch = HUGE_VAL, maxStretch = 0, bandStretch = HUGE_VAL;
   for (const ChosenMap& chosen : maps) {
     if (!chosen.map) continue;
@@ -506,7 +509,7 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
   requireResult(texture, report, maps, options);
 
   // === Warp, and make a distance of it again [Brodersen07, ERR-23 in our notes]
-  const bool isCut = options.map == TextureMap::Shell &&
+  const bool isCut = options.map == TextureMap::Prism &&
                      isBeyond(texture.zeroSetBounds(), box, texture.voxelSize());
   const TextureParts parts(
       texture, box, patches, report.voxelSize, isCut, [&](const NarrowBand& part) {
@@ -523,7 +526,8 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
       return levelset::subProgress(options.progress, share(from), share(to));
     };
     Warp warp = timed(report.cost.mapping, [&] {
-      return warpTexture(parts.of(n), {box, sink / patches[n].height}, patches[n], *maps[n].map,
+      return warpTexture(parts.of(n), {box, embedDepth / patches[n].height}, patches[n],
+                         *maps[n].map,
                          {.indexToWorld = chooseGrid(base, report.voxelSize, options.merge),
                           .scale = maps[n].distortion.meanStretch,
                           .mapTolerance = options.mapTolerance,

@@ -26,13 +26,13 @@ enum class TextureMerge {
 
 enum class TextureMap {
   Rbf,   ///< smooth, defined everywhere, relaxed by λ
-  Shell  ///< straight in tetrahedra between the particles, which have to be dense
+  Prism  ///< straight in tetrahedra between the particles, which have to be dense
 };
 
 struct TextureOptions {
   TextureMerge merge = TextureMerge::Union;
   TextureMap map = TextureMap::Rbf;
-  std::optional<double> sink =
+  std::optional<double> embedDepth =
       {};            ///< how deep the texture dips below the surface, world units; empty: one voxel
   double blend = 0;  ///< radius along the seam, world units; 0: none
   std::optional<Imath::Box3d> textureBox =
@@ -92,10 +92,10 @@ struct TextureResult {
 /// layers.
 /// @param sink  as a share of the patch's height; negative: beyond the last layer
 [[nodiscard]] RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options = {},
-                                    double sink = 0);
+                                    double embedDepth = 0);
 
 /// A map, and whether it folds.
-struct JudgedRbf {
+struct CertifiedRbf {
   std::unique_ptr<RbfMap> map;
   std::vector<MapSample> samples;
   FoldCertificate certificate;
@@ -105,8 +105,8 @@ struct JudgedRbf {
 /// The map of a patch for a texture that is sunk; where columns that go straight on would fold it,
 /// as below a crease, and without them it does not fold, the map that goes on by itself.
 /// @param cost  its setup and certificate are added to
-[[nodiscard]] JudgedRbf judgedRbf(const Patch& patch, double sink, const RbfMapOptions& options,
-                                  TextureCost& cost);
+[[nodiscard]] CertifiedRbf certifiedRbf(const Patch& patch, double embedDepth,
+                                        const RbfMapOptions& options, TextureCost& cost);
 
 /// @throws InvalidInput, telling where, when the patch's surface is not the base's
 void requirePatchOn(const levelset::NarrowBand& base, const Patch& patch);

@@ -72,9 +72,9 @@ void noteLostNormals(MeshTextureResult& result) {
 /// Without the note of lost normals.
 MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
                           const MeshTextureOptions& options) {
-  if (!std::isfinite(options.sink)) {
-    throw levelset::UsageError(
-        fmt::format("{}: the sink is {}; give a length", kMapMesh, options.sink));
+  if (!std::isfinite(options.embedDepth)) {
+    throw levelset::UsageError(fmt::format(
+        "{}: the embedding depth is {}; give a length with --embed", kMapMesh, options.embedDepth));
   }
   if (texture.isEmpty()) {
     throw levelset::InvalidInput(
@@ -85,9 +85,9 @@ MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
     throw levelset::InvalidInput(
         fmt::format("{}: the patch has no layers of particles; make it with `patch`", kMapMesh));
   }
-  const double sink = options.sink / patch.height;
+  const double embedDepth = options.embedDepth / patch.height;
   const TexturePlacement placement{chooseTextureBox(levelset::bounds(texture), options.textureBox),
-                                   sink};
+                                   embedDepth};
   MeshTextureResult result;
   constexpr double kSampleBytes = 5 * 2 * 160;
   levelset::requireMemory(
@@ -97,9 +97,9 @@ MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
       options.maxMemory, kMapMesh);
   levelset::report(options.progress, 0, kMapMesh);
   result.distortion =
-      surveyDistortion(sampleLayerMap(patch, sink), placement.box.size(), patch.mirrored);
-  result.certificate = certifyLayers(patch, sink);
-  result.notes = judgeFolds(result.distortion, result.certificate, options.allowFolds);
+      surveyDistortion(sampleLayerMap(patch, embedDepth), placement.box.size(), patch.mirrored);
+  result.certificate = certifyLayers(patch, embedDepth);
+  result.notes = checkFolds(result.distortion, result.certificate, options.allowFolds);
 
   levelset::TriMesh& mesh = result.mesh;
   mesh.positions.resize(texture.positions.size());
@@ -173,7 +173,7 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
   result.distortion = worstOf(distortions);
   result.certificate = worstOf(certificates);
   if (noted > 0) {
-    for (const std::string& note : judgeFolds(result.distortion, result.certificate, true))
+    for (const std::string& note : checkFolds(result.distortion, result.certificate, true))
       result.notes.push_back(noted == 1 ? note
                                         : fmt::format("{} (the worst of {} patches)", note, noted));
   }

@@ -17,7 +17,7 @@
 namespace mapping {
 
 struct MeshTextureOptions {
-  double sink = 0;  ///< how deep the texture dips below the surface, world units
+  double embedDepth = 0;  ///< how deep the texture dips below the surface, world units
   std::optional<Imath::Box3d> textureBox =
       {};  ///< what the unit cube of u, v, w is; empty: the mesh's own box
   bool allowFolds = false;

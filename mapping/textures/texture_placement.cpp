@@ -46,10 +46,10 @@ std::string foldSentence(const Distortion& distortion, const FoldCertificate& ce
   if (distortion.folded > 0)
     return fmt::format(
         "the patch folds at {} of {} places, {}", distortion.folded, distortion.samples,
-        placeOf(distortion.foldPlace, distortion.foldUvw, distortion.jacobian.least));
-  const FoldPlace& fold = certificate.worst.front();
+        placeOf(distortion.foldPoint, distortion.foldUvw, distortion.jacobian.least));
+  const FoldPoint& fold = certificate.worst.front();
   return fmt::format("the patch folds in between the {} places that were sampled, {}",
-                     distortion.samples, placeOf(fold.place, fold.uvw, fold.jacobian));
+                     distortion.samples, placeOf(fold.position, fold.uvw, fold.jacobian));
 }
 
 }  // namespace
@@ -60,7 +60,7 @@ bool isBeyond(const Box3d& own, const Box3d& box, double voxelSize) {
   return !own.isEmpty() && !(wide.intersects(own.min) && wide.intersects(own.max));
 }
 
-std::vector<std::string> judgeFolds(const Distortion& distortion,
+std::vector<std::string> checkFolds(const Distortion& distortion,
                                     const FoldCertificate& certificate, bool areAllowed) {
   if (distortion.folded == 0 && certificate.verdict() == FoldVerdict::Certified) return {};
   if (distortion.folded == 0 && certificate.verdict() == FoldVerdict::Undecided)

@@ -14,12 +14,12 @@ namespace mapping {
 /// Where a texture lies in texture space: the unit cube is `box`, pushed inwards by `sink`.
 struct TexturePlacement {
   Imath::Box3d box;
-  double sink = 0;  ///< in w
+  double embedDepth = 0;  ///< in w
   [[nodiscard]] Imath::V3d toTexture(const Imath::V3d& uvw) const {
-    return box.min + Imath::V3d(uvw.x, uvw.y, uvw.z + sink) * box.size();
+    return box.min + Imath::V3d(uvw.x, uvw.y, uvw.z + embedDepth) * box.size();
   }
   [[nodiscard]] Imath::V3d toUvw(const Imath::V3d& texture) const {
-    return (texture - box.min) / box.size() - Imath::V3d(0, 0, sink);
+    return (texture - box.min) / box.size() - Imath::V3d(0, 0, embedDepth);
   }
 };
 
@@ -34,7 +34,7 @@ struct TexturePlacement {
 /// @return what to note of folds that are allowed, and of parts that are not certified; empty
 ///         without any
 /// @throws InvalidInput for folds that are not, telling where the worst is
-[[nodiscard]] std::vector<std::string> judgeFolds(const Distortion& distortion,
+[[nodiscard]] std::vector<std::string> checkFolds(const Distortion& distortion,
                                                   const FoldCertificate& certificate,
                                                   bool areAllowed);
 

@@ -115,7 +115,7 @@ void markEmptyCubes(BrickPool& pool) {
 /// The bricks, then what is held of the blocks beside them, then a row of values that are far
 /// outside and one of those far inside.
 void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks,
-              const std::vector<BesideBlock>& beside, float background) {
+              const std::vector<HaloBlock>& beside, float background) {
   constexpr int kEdge = BrickPool::kEdge;
   Table table(pool);
   const auto hold = [&](std::size_t slot, std::size_t first, int strideX, int strideY) {
@@ -128,16 +128,16 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
     pool.entry[slot] = static_cast<std::int32_t>(i);
     hold(slot, held, kEdge * kEdge, kEdge);
   }
-  for (const BesideBlock& block : beside) {
+  for (const HaloBlock& block : beside) {
     if (block.value.empty()) continue;
     const Coord low = block.points.min(), size = block.points.dim();
     const int strideY = size.z(), strideX = size.y() * strideY;
     const auto before = static_cast<std::size_t>(low.x() * strideX + low.y() * strideY + low.z());
     hold(table.slotOf(block.origin), held - before, strideX, strideY);
     held += block.value.size();
-    ++pool.besideCount;
+    ++pool.haloCount;
   }
-  for (const BesideBlock& block : beside)
+  for (const HaloBlock& block : beside)
     if (block.value.empty())
       hold(table.slotOf(block.origin), held + (block.isInside ? BrickPool::kBlock : 0), 0, 0);
   held += 2 * BrickPool::kBlock;
@@ -156,7 +156,7 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
     std::copy(bricks[i]->mask.begin(), bricks[i]->mask.end(),
               pool.mask.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kMaskWords));
   });
-  for (const BesideBlock& block : beside)
+  for (const HaloBlock& block : beside)
     pool.value.insert(pool.value.end(), block.value.begin(), block.value.end());
   pool.value.insert(pool.value.end(), BrickPool::kBlock, background);
   pool.value.insert(pool.value.end(), BrickPool::kBlock, -background);
@@ -164,9 +164,9 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
 
 /// Turns the values into codes.
 void encode(BrickPool& pool, const ValueBits& held) {
-  pool.held = held;
+  pool.quantization = held;
   const auto size = static_cast<std::size_t>(held.bits / 8);
-  pool.code.assign(pool.value.size() * size + BrickPool::kCodeRoom, 0);
+  pool.code.assign(pool.value.size() * size + BrickPool::kCodePadding, 0);
   tbb::parallel_for(std::size_t{0}, pool.value.size(), [&](std::size_t i) {
     const int code = held.codeOf(pool.value[i]);
     for (std::size_t b = 0; b < size; ++b)
@@ -218,15 +218,14 @@ BrickPool makeBricks(const levelset::NarrowBand& band, const TableOptions& optio
     pool.pages[i] =
         (box.max()[a] - box.min()[a] + BrickPool::kBlock + BrickPool::kPage - 1) / BrickPool::kPage;
   }
-  pool.blocksUnseen = bricks.unneeded;
-  pool.blocksLeftOut = tree.leafCount();
-  if (bricks.needed.empty()) return pool;
-  fillPool(pool, bricks.needed, blocksBeside(tree, bricks.needed),
-           levelset::vdb(band).background());
-  pool.blocksLeftOut -= pool.besideCount;
-  for (const auto& brick : bricks.needed)
-    pool.blocksLeftOut -= tree.probeConstLeaf(brick->origin) != nullptr;
-  if (options.held.bits != 32) encode(pool, options.held);
+  pool.blocksCulled = bricks.culled;
+  pool.blocksOmitted = tree.leafCount();
+  if (bricks.kept.empty()) return pool;
+  fillPool(pool, bricks.kept, haloBlocks(tree, bricks.kept), levelset::vdb(band).background());
+  pool.blocksOmitted -= pool.haloCount;
+  for (const auto& brick : bricks.kept)
+    pool.blocksOmitted -= tree.probeConstLeaf(brick->origin) != nullptr;
+  if (options.quantization.bits != 32) encode(pool, options.quantization);
   return pool;
 }
 

@@ -158,7 +158,7 @@ FieldGrid::FieldGrid(const levelset::NarrowBand& band) {
     pages_[i] = (size_[i] + 7) / 8;
   }
   corner_ = V3d(box.min()[0], box.min()[1], box.min()[2]);
-  place(band);
+  updateTransform(band);
 
   std::vector<Range> found(origins.size());
   tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t n) {
@@ -204,7 +204,7 @@ FieldGrid::FieldGrid(const levelset::NarrowBand& band) {
   });
 }
 
-bool FieldGrid::place(const levelset::NarrowBand& band) {
+bool FieldGrid::updateTransform(const levelset::NarrowBand& band) {
   const M44d before = indexToWorld_;
   indexToWorld_ = M44d().setTranslation(corner_) * band.indexToWorld();
   worldToIndex_ = indexToWorld_.inverse();

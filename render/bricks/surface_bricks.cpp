@@ -270,7 +270,7 @@ Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
   std::vector<std::unique_ptr<Brick>> bricks(blocks.size());
   struct Sum {
     CoordBBox crossed, cells;
-    std::size_t unneeded = 0;
+    std::size_t culled = 0;
   };
   tbb::enumerable_thread_specific<Sum> sums;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 64), [&](const auto& range) {
@@ -293,10 +293,10 @@ Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
         sum.cells.expand(origin + first);
         sum.cells.expand(origin + last);
       });
-      if (options.needs &&
-          !options.needs(Imath::V3d(origin.x(), origin.y(), origin.z()) + Imath::V3d(0.5 * kBlock),
+      if (options.keeps &&
+          !options.keeps(Imath::V3d(origin.x(), origin.y(), origin.z()) + Imath::V3d(0.5 * kBlock),
                          kRadius)) {
-        ++sum.unneeded;
+        ++sum.culled;
         continue;
       }
       bricks[i] = std::move(brick);
@@ -305,22 +305,22 @@ Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
   });
   Bricks result;
   std::erase(bricks, nullptr);
-  result.needed = std::move(bricks);
+  result.kept = std::move(bricks);
   for (const Sum& sum : sums) {
     result.crossed.expand(sum.crossed);
     result.cells.expand(sum.cells);
-    result.unneeded += sum.unneeded;
+    result.culled += sum.culled;
   }
   return result;
 }
 
-std::vector<BesideBlock> blocksBeside(const openvdb::FloatTree& tree,
-                                      const std::vector<std::unique_ptr<Brick>>& bricks) {
+std::vector<HaloBlock> haloBlocks(const openvdb::FloatTree& tree,
+                                  const std::vector<std::unique_ptr<Brick>>& bricks) {
   std::vector<Part> parts;
   for (const auto& brick : bricks) addPartsBeside(*brick, parts);
   std::sort(parts.begin(), parts.end(),
             [](const Part& a, const Part& b) { return a.origin < b.origin; });
-  std::vector<BesideBlock> blocks;
+  std::vector<HaloBlock> blocks;
   auto brick = bricks.begin();
   for (const Part& part : parts) {
     while (brick != bricks.end() && (*brick)->origin < part.origin) ++brick;
@@ -332,7 +332,7 @@ std::vector<BesideBlock> blocksBeside(const openvdb::FloatTree& tree,
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 64), [&](const auto& range) {
     const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      BesideBlock& block = blocks[i];
+      HaloBlock& block = blocks[i];
       const Leaf* leaf = accessor.probeConstLeaf(block.origin);
       if (!leaf) {
         block.isInside = accessor.getValue(block.origin) < 0;

@@ -9,10 +9,10 @@
 #include "levelset/error.h"
 #include "render/embree/embree_renderer.h"
 #include "render/embree/field_march.h"
-#include "render/embree/float_view.h"
 #include "render/embree/judge_blocks_vdb.h"
-#include "render/embree/mesh_rays.h"
 #include "render/embree/surface_spline_vdb.h"
+#include "render/meshes/embree_space.h"
+#include "render/meshes/mesh_rays.h"
 #include "render/shading/surface_shape.h"
 
 namespace render {
@@ -26,9 +26,9 @@ struct RaySolid {
   Imath::M44d indexToWorld, worldToIndex;
   std::vector<SurfaceBlock> blocks;
   std::uint32_t id;
-  std::size_t index;      // in the scene
-  std::size_t number;     // among those with a surface
-  const FloatView* view;  // of the scene
+  std::size_t index;        // in the scene
+  std::size_t number;       // among those with a surface
+  const EmbreeSpace* view;  // of the scene
   Filter filter;
   Imath::C3f colour;
   double opacity;
@@ -67,8 +67,8 @@ std::optional<double> crossingOf(const RayQuery& query, const RaySolid& solid, u
 void boundBlock(const RTCBoundsFunctionArguments* args) {
   const auto& solid = *static_cast<const RaySolid*>(args->geometryUserPtr);
   const Box3d box = Imath::transform(solid.blocks[args->primID].bounds(), solid.indexToWorld);
-  const V3d low = (box.min - solid.view->centre) * solid.view->scale - V3d(FloatView::kPad);
-  const V3d high = (box.max - solid.view->centre) * solid.view->scale + V3d(FloatView::kPad);
+  const V3d low = (box.min - solid.view->centre) * solid.view->scale - V3d(EmbreeSpace::kPad);
+  const V3d high = (box.max - solid.view->centre) * solid.view->scale + V3d(EmbreeSpace::kPad);
   RTCBounds& bounds = *args->bounds_o;
   bounds.lower_x = static_cast<float>(low.x);
   bounds.lower_y = static_cast<float>(low.y);
@@ -92,10 +92,10 @@ void intersectBlock(const RTCIntersectFunctionNArguments* args) {
   if (query.solid && *t == query.nearest && solid.number >= query.solid->number) return;
   query.nearest = *t;
   query.solid = &solid;
-  // Blocks that could tie stay in Embree's sight.
+  // Blocks that could tie stay in Embree's sampleRay.
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, args->N);
-  RTCRayN_tfar(ray, args->N, 0) = std::min(RTCRayN_tfar(ray, args->N, 0),
-                                           static_cast<float>(*t * query.scale + FloatView::kPad));
+  RTCRayN_tfar(ray, args->N, 0) = std::min(
+      RTCRayN_tfar(ray, args->N, 0), static_cast<float>(*t * query.scale + EmbreeSpace::kPad));
   RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, args->N);
   RTCHitN_geomID(hit, args->N, 0) = args->geomID;
   RTCHitN_primID(hit, args->N, 0) = args->primID;
@@ -115,7 +115,7 @@ void putInOrder(std::vector<SideChange>& changes) {
                    [](const SideChange& a, const SideChange& b) { return a.t < b.t; });
   std::vector<SideChange> kept;
   for (const SideChange& change : changes) {
-    if (!kept.empty() && kept.back().t == change.t && kept.back().goesIn != change.goesIn)
+    if (!kept.empty() && kept.back().t == change.t && kept.back().enters != change.enters)
       kept.pop_back();
     else
       kept.push_back(change);
@@ -127,7 +127,7 @@ void putInOrder(std::vector<SideChange>& changes) {
 struct CsgChange {
   double t;
   std::size_t solid;
-  bool isTurned;
+  bool isFlipped;
 };
 
 /// Calls visit(change) along the ray for as long as that asks for more; without an expression,
@@ -138,7 +138,7 @@ void walkChanges(const CsgExpression& csg, std::vector<std::vector<SideChange>>&
   std::vector<char> inside(changes.size(), 0);
   for (std::size_t s = 0; s < changes.size(); ++s) {
     putInOrder(changes[s]);
-    if (!changes[s].empty()) inside[s] = changes[s][0].goesIn ? 0 : 1;
+    if (!changes[s].empty()) inside[s] = changes[s][0].enters ? 0 : 1;
   }
   std::vector<std::size_t> next(changes.size(), 0);
   for (;;) {
@@ -150,10 +150,10 @@ void walkChanges(const CsgExpression& csg, std::vector<std::vector<SideChange>>&
     const bool before = csg.holds(inside.data());
     for (std::size_t s = 0; s < changes.size(); ++s)
       while (next[s] < changes[s].size() && changes[s][next[s]].t == change->t)
-        inside[s] = changes[s][next[s]++].goesIn ? 1 : 0;
+        inside[s] = changes[s][next[s]++].enters ? 1 : 0;
     const bool after = csg.holds(inside.data());
     if (before == after && !csg.isEmpty()) continue;
-    change->isTurned = !csg.isEmpty() && (inside[change->solid] != 0) != after;
+    change->isFlipped = !csg.isEmpty() && (inside[change->solid] != 0) != after;
     if (!visit(*change)) return;
   }
 }
@@ -177,7 +177,7 @@ struct EmbreeScene::Impl {
   bool isOpaque;
   Box3d allBounds;  // with the meshes
   Box3d bounds;     // of the crossing cells
-  FloatView view;
+  EmbreeSpace view;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
 
@@ -255,7 +255,7 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
   }
   csg = source.csg.renumbered(numbers);
   if (bounds.isEmpty()) return;
-  view = FloatView(bounds);
+  view = EmbreeSpace(bounds);
 }
 
 void EmbreeScene::Impl::build() {
@@ -354,7 +354,7 @@ Hit EmbreeScene::Impl::intersectSolids(const V3d& origin, const V3d& direction, 
   if (!query) return hit;
   if (!csg.isEmpty()) {
     if (const auto change = findCsg(*query, rayHit.ray)) {
-      hit.isTurned = change->isTurned;
+      hit.isFlipped = change->isFlipped;
       complete(hit, *query, solids[change->solid], moved, change->t);
     }
     return hit;
@@ -374,8 +374,8 @@ Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near,
   return onMesh.found ? onMesh : onSolid;
 }
 
-std::vector<Hit> EmbreeScene::intersectSeen(const V3d& origin, const V3d& direction, double near,
-                                            double far) const {
+std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& direction, double near,
+                                               double far) const {
   std::vector<Hit> hits;
   if (impl_->isOpaque) {
     const Hit hit = intersect(origin, direction, near, far);
@@ -406,7 +406,7 @@ std::vector<Hit> EmbreeScene::intersectSeen(const V3d& origin, const V3d& direct
     walkChanges(impl_->csg, changes, [&](const CsgChange& change) {
       if (change.t > query->limit || !addMeshes(moved + change.t)) return false;
       Hit hit;
-      hit.isTurned = change.isTurned;
+      hit.isFlipped = change.isFlipped;
       impl_->complete(hit, *query, impl_->solids[change.solid], moved, change.t);
       hits.push_back(hit);
       share *= 1 - hit.opacity;
@@ -420,7 +420,7 @@ std::vector<Hit> EmbreeScene::intersectSeen(const V3d& origin, const V3d& direct
 double EmbreeScene::transmittance(const V3d& origin, const V3d& direction, double far) const {
   if (impl_->isOpaque) return isOccluded(origin, direction, 0, far) ? 0 : 1;
   double share = 1;
-  for (const Hit& hit : intersectSeen(origin, direction, 0, far)) share *= 1 - hit.opacity;
+  for (const Hit& hit : intersectVisible(origin, direction, 0, far)) share *= 1 - hit.opacity;
   return share;
 }
 
@@ -460,7 +460,7 @@ double EmbreeScene::thickness(const V3d& origin, const V3d& direction, double ne
   std::vector<std::pair<SideChange, std::size_t>> all;
   for (std::size_t s = 0; s < changes.size(); ++s) {
     putInOrder(changes[s]);
-    if (!changes[s].empty() && !changes[s][0].goesIn) inside[s] = 1;
+    if (!changes[s].empty() && !changes[s][0].enters) inside[s] = 1;
     for (const SideChange& change : changes[s]) all.emplace_back(change, s);
   }
   std::stable_sort(all.begin(), all.end(),
@@ -470,7 +470,7 @@ double EmbreeScene::thickness(const V3d& origin, const V3d& direction, double ne
     const double to = std::min(change.t, query->limit);
     if (isWithin(inside)) length += to - from;
     from = to;
-    inside[solid] = change.goesIn ? 1 : 0;
+    inside[solid] = change.enters ? 1 : 0;
   }
   return length;
 }

@@ -8,6 +8,7 @@
 
 #include "levelset/vdb.h"
 #include "render/embree/surface_spline_vdb.h"
+#include "render/shading/field_shape.h"
 
 namespace render {
 namespace {
@@ -98,11 +99,12 @@ double marchedJoin(const FieldExpression& e, Join how, double a, double b) {
 }  // namespace
 
 /// One ray's way: the expression along it, by the distance from where it enters the fields.
-class FieldMarch::Way {
+class FieldMarch::RaySegment {
  public:
   double begin = kEndless, end = 0;  // from the ray's origin, where the fields are not constant
 
-  Way(const FieldMarch& march, const V3d& origin, const V3d& direction, double near, double far)
+  RaySegment(const FieldMarch& march, const V3d& origin, const V3d& direction, double near,
+             double far)
       : march_(march), values_(march.expression_.valueCount()) {
     for (const MarchedField& field : march.fields_) {
       const auto [enter, leave] = partIn(field, origin, direction, near, far);
@@ -220,11 +222,11 @@ FieldMarch::FieldMarch(const Scene& scene) : expression_(fieldExpression(scene))
 
 Hit FieldMarch::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
   Hit hit;
-  Way way(*this, origin, direction, near, far);
-  if (way.isEmpty()) return hit;
-  const std::optional<double> t = way.nextCrossing(0, way.isInside(0));
+  RaySegment segment(*this, origin, direction, near, far);
+  if (segment.isEmpty()) return hit;
+  const std::optional<double> t = segment.nextCrossing(0, segment.isInside(0));
   if (!t) return hit;
-  hit.distance = way.begin + *t;
+  hit.distance = segment.begin + *t;
   hit.position = origin + direction * hit.distance;
   std::vector<FieldShape> shapes;
   for (const MarchedField& field : fields_) {
@@ -239,18 +241,18 @@ Hit FieldMarch::intersect(const V3d& origin, const V3d& direction, double near, 
 
 bool FieldMarch::isOccluded(const V3d& origin, const V3d& direction, double near,
                             double far) const {
-  Way way(*this, origin, direction, near, far);
-  return !way.isEmpty() && way.nextCrossing(0, way.isInside(0));
+  RaySegment segment(*this, origin, direction, near, far);
+  return !segment.isEmpty() && segment.nextCrossing(0, segment.isInside(0));
 }
 
 double FieldMarch::thickness(const V3d& origin, const V3d& direction, double near,
                              double far) const {
-  Way way(*this, origin, direction, near, far);
-  if (way.isEmpty()) return 0;
+  RaySegment segment(*this, origin, direction, near, far);
+  if (segment.isEmpty()) return 0;
   double length = 0, from = 0;
-  for (bool inside = way.isInside(0);; inside = !inside) {
-    const std::optional<double> t = way.nextCrossing(from, inside);
-    if (inside) length += t.value_or(way.end - way.begin) - from;
+  for (bool inside = segment.isInside(0);; inside = !inside) {
+    const std::optional<double> t = segment.nextCrossing(from, inside);
+    if (inside) length += t.value_or(segment.end - segment.begin) - from;
     if (!t) return length;
     from = *t;
   }

@@ -39,14 +39,16 @@ double weighed(const double (&c)[4][4][4], const double (&x)[4], const double (&
 /// The spline along a line: its value and slope by s, and how much the two can change.
 class LineSearch {
  public:
-  LineSearch(const double (&c)[4][4][4], const V3d& p, const V3d& way) : c_(c), p_(p), way_(way) {
+  LineSearch(const double (&c)[4][4][4], const V3d& p, const V3d& direction)
+      : c_(c), p_(p), direction_(direction) {
     // A derivative of a spline is one of the differences of its coefficients, and lies between
     // them.
     for (int a = 0; a < 3; ++a) {
       const double first = mostDifference(a, -1);
-      slope_ += std::abs(way[a]) * first;
+      slope_ += std::abs(direction[a]) * first;
       for (int b = 0; b < 3; ++b)
-        bend_ += std::abs(way[a] * way[b]) * mostDifference(std::min(a, b), std::max(a, b));
+        bend_ +=
+            std::abs(direction[a] * direction[b]) * mostDifference(std::min(a, b), std::max(a, b));
     }
   }
 
@@ -88,12 +90,13 @@ class LineSearch {
     for (int a = 0; a < 3; ++a) {
       double w[3][4];
       place(s, w, a);
-      sum += way_[a] * weighed(c_, w[0], w[1], w[2]);
+      sum += direction_[a] * weighed(c_, w[0], w[1], w[2]);
     }
     return sum;
   }
   void place(double s, double (&w)[3][4], int along) const {
-    for (int a = 0; a < 3; ++a) basis(std::clamp(p_[a] + s * way_[a], 0.0, 1.0), a == along, w[a]);
+    for (int a = 0; a < 3; ++a)
+      basis(std::clamp(p_[a] + s * direction_[a], 0.0, 1.0), a == along, w[a]);
   }
   [[nodiscard]] double bisected(double low, bool lowInside, double high) const {
     for (int n = 0; n < 60; ++n) {
@@ -127,7 +130,7 @@ class LineSearch {
   }
 
   const double (&c_)[4][4][4];
-  V3d p_, way_;
+  V3d p_, direction_;
   double slope_ = 0, bend_ = 0;
   int evaluations_ = 0;
   static constexpr int kMostEvaluations = 4000;

@@ -82,7 +82,7 @@ void main() {
   if (n >= rayCount) return;
   Ray ray = rayNumber(n);
   Hit hit = trace(ray, passingNumber(n));
-  hits[n] = hit.found ? (hit.goesIn ? kGoesIn : kGoesOut) : 0;
+  hits[n] = hit.found ? (hit.enters ? kEnters : kLeaves) : 0;
   hits[rayCount + n] = floatBitsToInt(hit.t);
   hits[2 * rayCount + n] = hit.x;
   hits[3 * rayCount + n] = hit.y;
@@ -175,12 +175,12 @@ std::string shaderText(const Variant& variant, int shift) {
              "#version 450 core\nlayout(local_size_x = {}) in;\n"
              "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {},\n"
              "          kFirstOfEntry = {}, kStridesOfEntry = {}, kStrideShift = {},\n"
-             "          kHitParts = {}, kShapeParts = {}, kGoesIn = {}, kGoesOut = {};\n"
+             "          kHitParts = {}, kShapeParts = {}, kEnters = {}, kLeaves = {};\n"
              "const bool isSpline = {};\n",
              kGroup, BrickPool::kEdge, BrickPool::kValues,
              std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kFirstOfEntry,
              BrickPool::kStridesOfEntry, BrickPool::kStrideShift, kHitParts, ShapeBlock::kParts,
-             HitBlock::kGoesIn, HitBlock::kGoesOut, variant.isSpline) +
+             HitBlock::kEnters, HitBlock::kLeaves, variant.isSpline) +
          kDialect + valueText(variant, shift) + kRootsKernel +
          (variant.isNano ? kNanoText + NanoGrid::layout() + kNanoVdbKernel : kBricksKernel) +
          kWindowKernel + kSplineKernel + kTraceKernel + kShapeKernel +
@@ -305,9 +305,9 @@ struct GpuTracer::Impl {
     t.entries = whole(pool.entry);
     t.masks = whole(pool.mask);
     const std::size_t bytes = pool.valueBytes();
-    if (pool.held.bits == 32)
+    if (pool.quantization.bits == 32)
       uploadValues(t, pool.value.data(), bytes, 4, GL_R32F);
-    else if (pool.held.bits == 16)
+    else if (pool.quantization.bits == 16)
       uploadValues(t, pool.code.data(), bytes, 2, GL_R16UI);
     else
       uploadValues(t, pool.code.data(), bytes, 1, GL_R8UI);
@@ -326,7 +326,7 @@ struct GpuTracer::Impl {
     const Variant variant{.isPixels = isPixels,
                           .isSpline = solid.pool.filter != Filter::Trilinear,
                           .isNano = t.nano.has_value(),
-                          .valueBits = t.nano ? 32 : solid.pool.held.bits,
+                          .valueBits = t.nano ? 32 : solid.pool.quantization.bits,
                           .blocks = static_cast<int>(t.values.size())};
     GLuint& program = programs[variant];
     if (program == 0) program = compileCompute(context, shaderText(variant, shift));
@@ -344,7 +344,7 @@ struct GpuTracer::Impl {
       gl.Uniform1i(place("nanoOriginY"), pool.origin[1]);
       gl.Uniform1i(place("nanoOriginZ"), pool.origin[2]);
     }
-    if (pool.held.bits != 32) gl.Uniform1fv(place("valueStep"), 1, &pool.held.step);
+    if (pool.quantization.bits != 32) gl.Uniform1fv(place("valueStep"), 1, &pool.quantization.step);
     gl.Uniform1i(place("pagesY"), pool.pages[1]);
     gl.Uniform1i(place("pagesZ"), pool.pages[2]);
     gl.Uniform1i(place("tableSizeX"), pool.pages[0] * BrickPool::kPage);

@@ -46,20 +46,20 @@ FrustumCulling::FrustumCulling(const Scene& scene, const RenderOptions& options,
       margin_ = std::max(margin_, (3.1 * solid.band.halfWidth() + 0.1) * solid.band.voxelSize());
   // Of meshes by what single precision makes of their size; and its own share of the whole.
   margin_ += 1e-5 * bounds.size().length();
-  if (options.ambientSamples > 0) skyReach_ = skyReach(bounds.size().length());
+  if (options.ambientSamples > 0) occlusionDistance_ = occlusionDistance(bounds.size().length());
   hasShadows_ = options.shadowSamples > 0;
   towardsKey_ = keyDirection(scene);
   spread_ = scene.key.softness < std::numbers::pi / 2 ? std::tan(scene.key.softness)
                                                       : std::numeric_limits<double>::infinity();
 }
 
-bool FrustumCulling::needs(const V3d& centre, double radius) const {
+bool FrustumCulling::keeps(const V3d& centre, double radius) const {
   const auto isSeen = [&](double around) {
     return std::all_of(planes_.begin(), planes_.end(), [&](const Plane& plane) {
       return plane.normal.dot(centre) - plane.offset >= -around;
     });
   };
-  if (isSeen(radius + margin_ + skyReach_)) return true;
+  if (isSeen(radius + margin_ + occlusionDistance_)) return true;
   if (!hasShadows_) return false;
   // From the ball away from the light, in a cone that widens: is any of it in the frame? The part
   // of the way that is before each plane is an interval.

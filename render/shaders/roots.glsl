@@ -63,7 +63,7 @@ Whole signChanges(Real b0, Real b1, Real b2, Real b3) {
 // Goes on from part number `part` of those of size `size`, to its first half where it is divided, else
 // to the next; whole parts are left where a sign rule proves them empty.
 // @return where there is one
-Bool goOn(Bool open, Bool divides, INOUT(Whole) part, INOUT(Whole) halvings, INOUT(Real) size) {
+Bool resume(Bool open, Bool divides, INOUT(Whole) part, INOUT(Whole) halvings, INOUT(Real) size) {
   Bool divide = AND(open, divides);
   Bool next = AND(open, NOT(divide));
   part = select(divide, part + part, select(next, part + 1, part));
@@ -109,7 +109,7 @@ Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Whole) passin
     high = select(ends, w, high);
     found = OR(found, ends);
     open = AND(open, NOT(ends));
-    open = goOn(open, AND(count > 1, NOT(deepest)), part, halvings, size);
+    open = resume(open, AND(count > 1, NOT(deepest)), part, halvings, size);
   }
   return found;
 }
@@ -142,6 +142,6 @@ Real onSide(Real value, Bool inside) {
 struct Crossing {
   Bool found;
   Real share;  // of the way through the cell
-  Bool goesIn;
+  Bool enters;
   Bool endsInside;
 };

@@ -124,7 +124,7 @@ Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Whole) passing, INOU
     high = select(ends, w, high);
     found = OR(found, ends);
     open = AND(open, NOT(ends));
-    open = goOn(open, AND(count > 1, NOT(deepest)), part, halvings, size);
+    open = resume(open, AND(count > 1, NOT(deepest)), part, halvings, size);
   }
   return found;
 }
@@ -177,10 +177,10 @@ Crossing splineCrossingIn(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Rea
   crossing.found = isolateSpline(asked, b, passing, low, high);
   crossing.endsInside = b[kDegree] < 0.0f;
   crossing.share = real(0.0f);
-  crossing.goesIn = no();
+  crossing.enters = no();
   if (any(crossing.found)) {
     Bool startsInside = valueAt(b, low) < 0.0f;
-    crossing.goesIn = NOT(startsInside);
+    crossing.enters = NOT(startsInside);
     for (int i = 0; i < kBisections; ++i) {
       VAR middle = (low + high) * 0.5f;
       Bool same = NOT(differ(valueAt(b, middle) < 0.0f, startsInside));

@@ -67,11 +67,11 @@ Crossing crossingIn(Bool asked, Whole brick, Whole cellX, Whole cellY, Whole cel
   crossing.found = isolate(asked, b0, b1, b2, b3, passing, low, high);
   crossing.endsInside = b3 < 0.0f;
   crossing.share = real(0.0f);
-  crossing.goesIn = no();
+  crossing.enters = no();
   if (any(crossing.found)) {
     Bool startsInside = blossom(b0, b1, b2, b3, low, low, low) < 0.0f;
     crossing.share = bisect(b0, b1, b2, b3, startsInside, low, high);
-    crossing.goesIn = NOT(startsInside);
+    crossing.enters = NOT(startsInside);
   }
   return crossing;
 }
@@ -122,7 +122,7 @@ Ray viewRay(Real x, Real y) {
 
 struct Hit {
   Bool found;
-  Bool goesIn;
+  Bool enters;
   Real t;
   Whole x, y, z;  // cell
 };
@@ -134,7 +134,7 @@ Hit trace(Ray ray, Whole passing) {
   Bool aheadZ = ray.dz >= 0.0f;
   Hit hit;
   hit.found = no();
-  hit.goesIn = no();
+  hit.enters = no();
   hit.t = ray.start;
   Bool alive = ray.start <= ray.end;
   VAR t = ray.start;
@@ -226,7 +226,7 @@ Hit trace(Ray ray, Whole passing) {
       VAR place = t + crossing.share * (tExit - t);
       Bool hits = AND(asked, AND(crossing.found, place <= ray.end));
       hit.found = OR(hit.found, hits);
-      hit.goesIn = select(hits, crossing.goesIn, hit.goesIn);
+      hit.enters = select(hits, crossing.enters, hit.enters);
       hit.t = select(hits, place, hit.t);
       solved = OR(solved, asked);
       inside = select(asked, crossing.endsInside, inside);

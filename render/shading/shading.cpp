@@ -11,7 +11,7 @@ using Imath::C3f;
 using Imath::V2d;
 using Imath::V3d;
 
-constexpr double kOcclusionReach =
+constexpr double kOcclusionShare =
     0.25;                             // of the scene's diagonal: hollows darken, open sides do not
 constexpr double kDefaultRange = 40;  // of curvatures, times the scene's diagonal
 constexpr std::uint64_t kAmbient = 1, kShadow = 2;
@@ -78,8 +78,8 @@ V3d keyDirection(const Scene& scene) {
   return (right * d.x + up * d.y - forward * d.z).normalized();
 }
 
-double skyReach(double diagonal) {
-  return kOcclusionReach * diagonal;
+double occlusionDistance(double diagonal) {
+  return kOcclusionShare * diagonal;
 }
 
 Shader::Shader(const Scene& scene, double diagonal, const RenderOptions& options)
@@ -112,7 +112,7 @@ void Shader::addSkyRays(const Frame& frame, int x, int y, int sample,
     // The smooth normal's hemisphere dips below the facet's plane: mirror what does.
     const double below = d.dot(frame.facet);
     if (below < 0) d = (d - frame.facet * (2 * below)).normalized();
-    rays.push_back({frame.start, d, skyReach(diagonal_), 1});
+    rays.push_back({frame.start, d, occlusionDistance(diagonal_), 1});
   }
 }
 

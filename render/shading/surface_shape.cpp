@@ -54,7 +54,7 @@ CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
 }
 
 /// The same surface from its other side.
-CurvatureSample turned(const CurvatureSample& sample) {
+CurvatureSample flipped(const CurvatureSample& sample) {
   return {-sample.mean, sample.gauss, -sample.k2, -sample.k1};
 }
 
@@ -75,10 +75,10 @@ void addShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWor
   hit.viewCurvature = curvatureAlong(shape, V3d(axes[0].dot(direction), axes[1].dot(direction),
                                                 axes[2].dot(direction))) /
                       voxelSize;
-  if (!hit.isTurned) return;
+  if (!hit.isFlipped) return;
   hit.facetNormal = -hit.facetNormal;
   hit.normal = -hit.normal;
-  hit.curvature = turned(hit.curvature);
+  hit.curvature = flipped(hit.curvature);
   hit.viewCurvature = -hit.viewCurvature;
 }
 

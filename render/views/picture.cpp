@@ -135,11 +135,11 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   constexpr double kReach = 2.99;  // voxels
   for (const Solid& solid : scene.solids) {
     if (options.filter == Filter::Trilinear || solid.band.isEmpty()) continue;
-    if (options.filter == Filter::BSplineQi && solid.held.bits != 32)
+    if (options.filter == Filter::BSplineQi && solid.quantization.bits != 32)
       throw levelset::UsageError(fmt::format(
           "render: the filter bspline-qi draws from coefficients that {} bits do not hold; take 32 "
           "bits, or another filter",
-          solid.held.bits));
+          solid.quantization.bits));
     if (solid.band.halfWidth() >= kReach) continue;
     throw levelset::InvalidInput(fmt::format(
         "render: the filter {} reads values up to 3 voxels from the surface, and the band has a "
@@ -166,7 +166,7 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
     grids += fmt::format("{}{} {:016x}", comma, levelset::vdb(solid.band).getName(),
                          solid.band.contentHash());
     voxelSizes += fmt::format("{}{}", comma, solid.band.voxelSize());
-    bits += fmt::format("{}{}", comma, solid.held.bits);
+    bits += fmt::format("{}{}", comma, solid.quantization.bits);
   }
   std::map<std::string, std::string> attributes = {
       {"ls:filter", filterName(filter)},

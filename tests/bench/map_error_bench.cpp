@@ -17,7 +17,7 @@
 #include <random>
 #include <vector>
 
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
 #include "mapping/textures/geometric_texture.h"
 #include "tests/bench/wall.h"
@@ -154,7 +154,7 @@ int main(int argc, char** argv) {
     const double solved = now() - start;
     const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
     start = now();
-    const mapping::ShellMap shell(patch, {.sink = 0.05, .rim = 0.05});
+    const mapping::PrismMap shell(patch, {.embedDepth = 0.05, .rim = 0.05});
     const double built = now() - start;
     const Error direct = errorOf([&](const V3d& x) { return rbf(x); });
     const Error fast = errorOf([&](const V3d& x) { return fastAt(rbf, x, 0.005); });

@@ -23,7 +23,7 @@
 #include <vector>
 
 #include "mapping/maps/layer_map.h"
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
 #include "mapping/textures/geometric_texture.h"
 #include "mapping/textures/mesh_texture.h"
@@ -147,7 +147,7 @@ int main(int argc, char** argv) {
              ratio, fast.worst);
 
   start = now();
-  const mapping::ShellMap shell(patch, {.sink = 0.05, .rim = 0.05});
+  const mapping::PrismMap shell(patch, {.embedDepth = 0.05, .rim = 0.05});
   fmt::print("shell map made in {:.2f} s\n", now() - start);
   const Cost tetrahedra =
       run(shell, grid, 0, [](const GridBlock&, const std::array<V3d, 512>&, Cost&) {});

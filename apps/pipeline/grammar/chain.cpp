@@ -129,7 +129,7 @@ struct Action {
   std::map<std::string, std::string> options;  // by full name; a flag is "true"
   std::vector<std::string> operandNames;       // `@NAME`, without the @
   std::string resultName;                      // --as
-  std::string place;                           // in a script
+  std::string location;                        // in a script
 };
 
 Action readAction(Reader& reader) {
@@ -192,7 +192,7 @@ class ChainBuilder {
     node.op = action.op;
     node.options = action.options;
     node.name = action.resultName;
-    node.place = action.place;
+    node.location = action.location;
     node.inputs = takeOperands(action);
     for (const auto& [option, text] : action.options)
       if (const Param* param = action.op->find(option); param && namesValue(*param, text))
@@ -319,7 +319,8 @@ Graph parseLines(const Script& script, const std::map<std::string, std::string>&
   } catch (const UsageError& error) {
     // The reader stands behind the action that failed.
     const std::size_t word = std::min(reader.next, script.words.size());
-    throw UsageError(fmt::format("{} ({})", error.what(), script.place(word > 0 ? word - 1 : 0)));
+    throw UsageError(
+        fmt::format("{} ({})", error.what(), script.location(word > 0 ? word - 1 : 0)));
   }
 }
 
@@ -357,7 +358,7 @@ Graph parse(Reader& reader, bool mayRun, const std::map<std::string, std::string
     }
     const std::size_t first = reader.next;
     Action action = readAction(reader);
-    if (reader.script) action.place = reader.script->place(first);
+    if (reader.script) action.location = reader.script->location(first);
     builder.add(action);
     if (reader.atBang()) {
       ++reader.next;

@@ -11,13 +11,13 @@ namespace pipeline {
 class FileSequence {
  public:
   explicit FileSequence(std::string pattern) : pattern_(std::move(pattern)) {}
-  [[nodiscard]] bool hasNumber() const { return numberAt() != std::string::npos; }
+  [[nodiscard]] bool hasNumber() const { return numberPosition() != std::string::npos; }
   [[nodiscard]] const std::string& pattern() const { return pattern_; }
   /// @pre hasNumber()
   [[nodiscard]] std::filesystem::path file(std::size_t number) const;
 
  private:
-  [[nodiscard]] std::size_t numberAt() const;
+  [[nodiscard]] std::size_t numberPosition() const;
   std::string pattern_;
 };
 

@@ -321,19 +321,20 @@ class Expander {
     }
     hasAction_ |= !words[first].starts_with("-");
     script_.begins.push_back(first);
-    script_.places.push_back(placeOf(line));
-    spend(line, script_.places.back().size());
+    script_.locations.push_back(locationOf(line));
+    spend(line, script_.locations.back().size());
     if (script_.begins.size() > kMostActions)
       fail(line, fmt::format("the script comes to more than {} actions; split it", kMostActions));
   }
 
-  [[nodiscard]] std::string placeOf(const ScriptLine& line) const {
-    std::string place = fmt::format("{}, line {}", file_, line.number);
-    for (const Round& round : rounds_) place += fmt::format(", {} = {}", round.name, round.value);
-    return place;
+  [[nodiscard]] std::string locationOf(const ScriptLine& line) const {
+    std::string location = fmt::format("{}, line {}", file_, line.number);
+    for (const Round& round : rounds_)
+      location += fmt::format(", {} = {}", round.name, round.value);
+    return location;
   }
   [[nodiscard]] std::string placed(const ScriptLine& line, const std::string& who) const {
-    return fmt::format("run: {}: {}", placeOf(line), who);
+    return fmt::format("run: {}: {}", locationOf(line), who);
   }
   [[noreturn]] void fail(const ScriptLine& line, const std::string& sentence) const {
     throw UsageError(placed(line, sentence));
@@ -355,9 +356,10 @@ class Expander {
 
 }  // namespace
 
-const std::string& Script::place(std::size_t word) const {
+const std::string& Script::location(std::size_t word) const {
   const auto after = std::upper_bound(begins.begin(), begins.end(), word);
-  return places[static_cast<std::size_t>(std::max(after - begins.begin(), std::ptrdiff_t{1})) - 1];
+  return locations[static_cast<std::size_t>(std::max(after - begins.begin(), std::ptrdiff_t{1})) -
+                   1];
 }
 
 Script readScript(const std::filesystem::path& file,

@@ -11,11 +11,11 @@ namespace pipeline {
 struct Script {
   std::vector<std::string> words;  ///< as on the command line, with a `!` between actions
   // By line, one that stands in a loop as often as it goes round:
-  std::vector<std::size_t> begins;  ///< its first word
-  std::vector<std::string> places;  ///< "FILE, line 4, i = 2"
+  std::vector<std::size_t> begins;     ///< its first word
+  std::vector<std::string> locations;  ///< "FILE, line 4, i = 2"
 
   /// Where a word stood.
-  [[nodiscard]] const std::string& place(std::size_t word) const;
+  [[nodiscard]] const std::string& location(std::size_t word) const;
 };
 
 /// Reads a script as splitScript() does, replaces its variables and goes through its loops: `set

@@ -105,8 +105,8 @@ class Written {
                     [&](std::size_t input) { return graph.nodes[input].kind == Kind::Scene; });
     for (const std::string& target : targetsOf(node)) {
       if (target == "-") continue;
-      const std::filesystem::path place = placeOf(target);
-      writers_[isScene ? place.parent_path() : place] = writer;
+      const std::filesystem::path path = absolutePath(target);
+      writers_[isScene ? path.parent_path() : path] = writer;
       last_ = writer;
     }
   }
@@ -115,15 +115,15 @@ class Written {
   [[nodiscard]] std::optional<std::size_t> find(const FileRead& file) const {
     if (!last_ || file.standsForOthers) return last_;
     std::optional<std::size_t> found;
-    for (std::filesystem::path place = placeOf(file.name);; place = place.parent_path()) {
-      if (const auto it = writers_.find(place); it != writers_.end())
+    for (std::filesystem::path path = absolutePath(file.name);; path = path.parent_path()) {
+      if (const auto it = writers_.find(path); it != writers_.end())
         found = std::max(found, std::optional(it->second));
-      if (!place.has_relative_path()) return found;
+      if (!path.has_relative_path()) return found;
     }
   }
 
  private:
-  static std::filesystem::path placeOf(const std::string& file) {
+  static std::filesystem::path absolutePath(const std::string& file) {
     std::error_code ignored;
     return std::filesystem::weakly_canonical(std::filesystem::absolute(file, ignored), ignored);
   }

@@ -18,7 +18,7 @@ struct Node {
   std::map<std::string, std::size_t> named;    ///< by option: the node of its `@NAME`
   std::string name;                            ///< --as; empty: none
   Kind kind = Kind::Band;                      ///< of its result, if it makes one
-  std::string place;                           ///< where it was written, if in a script
+  std::string location;                        ///< where it was written, if in a script
   bool voxelFollows = false;  ///< --tolerance is to tell the voxel size that it was not given
 
   [[nodiscard]] bool makes() const { return op->flow == Flow::Makes; }

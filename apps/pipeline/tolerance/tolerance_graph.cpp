@@ -72,11 +72,11 @@ class PartFinder {
     bool takesEnd = false;
     forEachTaken(node, [&](std::size_t input) { takesEnd = takesEnd || isEnd_[input]; });
     if (isMaker && (takesEnd || hasTargets(node)))
-      throw UsageError(withPlace(
+      throw UsageError(withLocation(
           fmt::format("{}: writes files while it makes its result, which --tolerance makes more "
                       "than once; give voxel sizes, or leave out what it writes",
                       node.op->name),
-          node.place));
+          node.location));
     if (!isMaker) {
       isEnd_[i] = 1;
       parts_.ends.push_back(i);
@@ -92,22 +92,22 @@ class PartFinder {
     }
     forEachTaken(node, [&](std::size_t input) { hasVoxels_[i] |= hasVoxels_[input]; });
     if (hasVoxels_[i] && readsStandardInput(node))
-      throw UsageError(withPlace(
+      throw UsageError(withLocation(
           fmt::format("{}: standard input can be read once only, and --tolerance makes this more "
                       "than once; give a file",
                       node.op->name),
-          node.place));
+          node.location));
     (hasVoxels_[i] ? parts_.again : parts_.once).push_back(i);
   }
 
   void refuseVoxelLengths(const Node& node) const {
     for (const auto& [option, text] : node.options)
       if (isLength(node, option) && text.find("vx") != std::string::npos)
-        throw UsageError(withPlace(
+        throw UsageError(withLocation(
             fmt::format("{}: --{}: '{}' counts in voxels, and --tolerance is to choose their "
                         "size; write it in world units",
                         node.op->name, option, text),
-            node.place));
+            node.location));
   }
 
   void findOutputs() {
@@ -153,11 +153,11 @@ std::vector<std::string> voxelLengths(const Graph& graph, const ToleranceParts& 
     const Node& node = graph.nodes[i];
     for (const auto& [option, text] : node.options)
       if (isLength(node, option) && text.find("vx") != std::string::npos)
-        sentences.push_back(withPlace(
+        sentences.push_back(withLocation(
             fmt::format("{}: --{}: '{}' counts in voxels, whose size --tolerance chooses; write it "
                         "in world units if the surface depends on it",
                         node.op->name, option, text),
-            node.place));
+            node.location));
   }
   return sentences;
 }

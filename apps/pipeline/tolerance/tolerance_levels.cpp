@@ -80,7 +80,7 @@ void LevelRunner::makeOnce(RunReport& report) {
   PartGraph part = partGraph(graph_, parts_.once, {});
   askFor(part, joined(wanted, parts_.lasting));
   RunSettings settings = settingsFor(part);
-  settings.made = [&](std::size_t node, const Value& value) {
+  settings.onValue = [&](std::size_t node, const Value& value) {
     const std::size_t origin = part.origin[node];
     if (std::binary_search(wanted.begin(), wanted.end(), origin) ||
         std::binary_search(watched_.begin(), watched_.end(), origin))
@@ -108,7 +108,7 @@ std::map<std::size_t, Value> LevelRunner::planAll(int resolution, RunReport& rep
   settings.progress = {};
   settings.warn = settings.note = settings.print = [](const std::string&) {};
   std::map<std::size_t, Value> plans;
-  settings.made = [&](std::size_t node, const Value& value) {
+  settings.onValue = [&](std::size_t node, const Value& value) {
     plans.insert_or_assign(part.origin[node], value);
   };
   pipeline::run(part.graph, settings, report);
@@ -137,7 +137,7 @@ Level LevelRunner::runAt(double voxel, double coarsening) {
   RunSettings settings = settingsFor(part);
   settings.measureErrors = settings_.measureErrors && coarsening == 1;
   if (coarsening != 1) settings.thumbnails = 0;
-  settings.made = [&](std::size_t node, const Value& value) {
+  settings.onValue = [&](std::size_t node, const Value& value) {
     if (std::binary_search(watched_.begin(), watched_.end(), part.origin[node]))
       made.insert_or_assign(part.origin[node], value);
   };
@@ -216,7 +216,8 @@ std::optional<double> LevelRunner::knownError(const Level& level, std::size_t ou
   if (exact == exact_.end()) return {};
   const LevelSurface& surface = level.surfaces[output];
   levelset::SurfaceDifferenceOptions options{.spacing = surface.voxelSize};
-  if (settings_.goesOn) options.progress = [this](double) { return settings_.goesOn(); };
+  if (settings_.shouldContinue)
+    options.progress = [this](double) { return settings_.shouldContinue(); };
   return levelset::surfaceDifference(surface.surface, exact->second, options).smooth;
 }
 
@@ -229,7 +230,8 @@ LevelDifference LevelRunner::difference(const Level& fine, const Level& coarse,
   const LevelSurface &near = fine.surfaces[output], &far = coarse.surfaces[output];
   levelset::SurfaceDifferenceOptions options{.spacing = near.voxelSize,
                                              .creaseReach = kCreaseReach * far.voxelSize};
-  if (settings_.goesOn) options.progress = [this](double) { return settings_.goesOn(); };
+  if (settings_.shouldContinue)
+    options.progress = [this](double) { return settings_.shouldContinue(); };
   const bool mayHaveCreases = hasCreases_ || near.heldEdge >= kFlatVoxels * far.voxelSize;
   if (mayHaveCreases && near.uniform.isValid() && far.uniform.isValid())
     options.creases = levelset::findCreases(near.uniform.mesh(), near.voxelSize, far.uniform.mesh(),

@@ -164,7 +164,8 @@ PlacedPlane placed(const ClipPlane& clip, const render::Camera& camera,
   return plane;
 }
 
-CutScene::CutScene(const render::Scene& scene, const Imath::Box3d& bounds, ClipPlane::Across across)
+ClippedScene::ClippedScene(const render::Scene& scene, const Imath::Box3d& bounds,
+                           ClipPlane::Across across)
     : scene_(scene) {
   const double extent = std::max(bounds.size().length(), 1e-12), voxel = extent / kBoxVoxels;
   // No larger than it has to be: how far hollows darken goes by the box of all solids.
@@ -199,7 +200,7 @@ CutScene::CutScene(const render::Scene& scene, const Imath::Box3d& bounds, ClipP
       fmt::format("({}) - {}", scene.csg.isEmpty() ? all : scene.csg.text(), cut), names);
 }
 
-const render::Scene& CutScene::at(const PlacedPlane& plane) {
+const render::Scene& ClippedScene::at(const PlacedPlane& plane) {
   V3d s, t;
   frameWith(plane.normal, s, t);
   const V3d &n = plane.normal, &p = plane.point;

@@ -37,10 +37,10 @@ struct PlacedPlane {
 
 /// A scene without what lies before a plane: one more solid, a box, is taken off the others. Its
 /// faces are flat, so that a few large voxels tell them exactly.
-class CutScene {
+class ClippedScene {
  public:
   /// @param bounds  of the solids, not empty
-  CutScene(const render::Scene& scene, const Imath::Box3d& bounds, ClipPlane::Across across);
+  ClippedScene(const render::Scene& scene, const Imath::Box3d& bounds, ClipPlane::Across across);
   /// With the box before that plane, which is across as told.
   [[nodiscard]] const render::Scene& at(const PlacedPlane& plane);
 

@@ -45,7 +45,7 @@ struct ProgressivePicture::Worker {
 
   std::shared_ptr<const Model> preparedModel;  // that the tables are made of
   std::optional<ClipPlane::Across> preparedCut;
-  std::unique_ptr<CutScene> cut;
+  std::unique_ptr<ClippedScene> cut;
   std::unique_ptr<render::KernelScene> surfaces;
   std::unique_ptr<render::GlContext> context;
   std::unique_ptr<render::KernelTracer> tracer;
@@ -65,13 +65,13 @@ struct ProgressivePicture::Worker {
     return scene;
   }
 
-  void take(const Wanted& wanted) {
-    if (!view.model || !isSame(view, wanted.view)) {
-      view = wanted.view;
+  void take(const Request& request) {
+    if (!view.model || !isSame(view, request.view)) {
+      view = request.view;
       pass = 0;
       image = nullptr;
     }
-    display = wanted.display;
+    display = request.display;
   }
 
   void findTracer() {
@@ -103,20 +103,20 @@ struct ProgressivePicture::Worker {
 
   /// Makes the tables where they are not those of the view.
   void prepare() {
-    const std::optional<ClipPlane::Across> wantedCut =
+    const std::optional<ClipPlane::Across> newCut =
         isCut() ? std::optional(view.clip->across) : std::nullopt;
-    if (surfaces && preparedModel == view.model && preparedCut == wantedCut) return;
+    if (surfaces && preparedModel == view.model && preparedCut == newCut) return;
     tracer = nullptr;  // it reads the tables
     surfaces = nullptr;
     cut = nullptr;
-    if (wantedCut)
-      cut = std::make_unique<CutScene>(view.model->scene, view.model->solidBounds, *wantedCut);
+    if (newCut)
+      cut = std::make_unique<ClippedScene>(view.model->scene, view.model->solidBounds, *newCut);
     const render::Scene scene = sceneFor(1);
     render::validate(scene.camera);
     surfaces = std::make_unique<render::KernelScene>(
         scene, levelset::memoryLimit(levelset::kNoMemoryLimit));
     preparedModel = view.model;
-    preparedCut = wantedCut;
+    preparedCut = newCut;
     findTracer();
   }
 
@@ -131,7 +131,7 @@ struct ProgressivePicture::Worker {
     options.style.style = view.style;
     options.maxBytes = levelset::memoryLimit(levelset::kNoMemoryLimit);
     render::requirePicture(scene, options);
-    surfaces->look(scene);
+    surfaces->updateView(scene);
     auto drawn = std::make_shared<render::Image>(scene.camera.width, scene.camera.height);
     const render::KernelPainter painter(scene, *surfaces, options, *drawn);
     const int edge = context && name != "processor" ? kGpuTileEdge : kCpuTileEdge;
@@ -182,11 +182,12 @@ ProgressivePicture::~ProgressivePicture() {
   thread_.join();
 }
 
-void ProgressivePicture::want(const View& view, const Display& display) {
+void ProgressivePicture::request(const View& view, const Display& display) {
   {
     const std::scoped_lock lock(mutex_);
-    if (lastWanted_ && isSame(lastWanted_->view, view) && lastWanted_->display == display) return;
-    lastWanted_ = wanted_ = Wanted{view, display};
+    if (lastRequest_ && isSame(lastRequest_->view, view) && lastRequest_->display == display)
+      return;
+    lastRequest_ = pending_ = Request{view, display};
     isStale_ = true;
     failure_ = nullptr;
   }
@@ -214,12 +215,12 @@ void ProgressivePicture::run() {
     bool isRecoloured = false;
     {
       std::unique_lock lock(mutex_);
-      changed_.wait(lock, [&] { return isEnding_ || wanted_ || worker.pass < kPasses.size(); });
+      changed_.wait(lock, [&] { return isEnding_ || pending_ || worker.pass < kPasses.size(); });
       if (isEnding_) return;
-      if (wanted_) {
-        worker.take(*wanted_);
+      if (pending_) {
+        worker.take(*pending_);
         isRecoloured = worker.image != nullptr;
-        wanted_.reset();
+        pending_.reset();
         isStale_ = false;
       }
     }
@@ -247,7 +248,7 @@ void ProgressivePicture::run() {
     {
       const std::scoped_lock lock(mutex_);
       if (frame) frame_ = frame;
-      if (!wanted_) failure_ = failure;
+      if (!pending_) failure_ = failure;
       rendererName_ = worker.name;
       if (worker.pass == kPasses.size()) progress_ = 1;
     }

@@ -62,7 +62,7 @@ class ProgressivePicture {
   ProgressivePicture& operator=(const ProgressivePicture&) = delete;
 
   /// Returns at once. Of a view that is drawn already only the display is taken.
-  void want(const View& view, const Display& display);
+  void request(const View& view, const Display& display);
   /// The newest one; null before there is any.
   [[nodiscard]] std::shared_ptr<const Frame> frame() const;
   /// Why the view that is wanted cannot be drawn; null: it can.
@@ -74,7 +74,7 @@ class ProgressivePicture {
 
  private:
   struct Worker;
-  struct Wanted {
+  struct Request {
     View view;
     Display display;
   };
@@ -84,8 +84,8 @@ class ProgressivePicture {
   Renderer renderer_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::optional<Wanted> wanted_;      // not yet taken by the thread
-  std::optional<Wanted> lastWanted_;  // taken or not
+  std::optional<Request> pending_;      // not yet taken by the thread
+  std::optional<Request> lastRequest_;  // taken or not
   std::shared_ptr<const Frame> frame_;
   std::exception_ptr failure_;
   std::string rendererName_;

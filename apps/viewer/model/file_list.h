@@ -21,7 +21,7 @@ class FileList {
   bool isToOpen_ = false;
   std::filesystem::path folder_;
   std::vector<std::filesystem::path> folders_, files_;
-  std::string trouble_;
+  std::string error_;
 };
 
 }  // namespace viewer

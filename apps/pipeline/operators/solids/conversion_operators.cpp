@@ -142,7 +142,7 @@ Value mesh(Invocation& in) {
   if (in.operands[0].kind() == Kind::Patch) {
     return Value(meshOfPatches(
         in.operands[0].patch().patches,
-        in.flag("sheets") ? mapping::PatchMeshKind::Sheets : mapping::PatchMeshKind::Shell));
+        in.flag("sheets") ? mapping::PatchMeshKind::Sheets : mapping::PatchMeshKind::Solid));
   }
   return Value(levelset::bandToMesh(
       in.band(),

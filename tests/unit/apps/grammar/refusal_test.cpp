@@ -255,7 +255,7 @@ TEST_F(Refusal, CorruptBandFilesAreThree) {
 
 TEST_F(Refusal, MeshesThatCannotBeUsedAsAskedAreThree) {
   writeFile("triangle.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  EXPECT_REFUSED(levelsmith(toBand("triangle.obj")), 3, "the mesh encloses nothing");
+  EXPECT_REFUSED(levelsmith(toBand("triangle.obj")), 3, "the mesh encloses no volume");
   writeFile("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
   EXPECT_REFUSED(levelsmith(toBand("open.obj", "--voxel 0.05 --sign closed")), 3,
                  "edges have one face");

@@ -336,7 +336,7 @@ TEST_F(ToleranceCommand, RunsScriptsAndGraphs) {
 TEST_F(ToleranceCommand, TellsInADryRunWhatTheModelsPick) {
   const auto told = levelsmith("--dry-run --tolerance 0.1% sphere --radius 1 ! write no.vdb");
   EXPECT_EQ(told.code, 0) << told.err;
-  EXPECT_NE(told.err.find("the error models pick voxels of"), std::string::npos) << told.err;
+  EXPECT_NE(told.err.find("the error models choose voxels of"), std::string::npos) << told.err;
   EXPECT_FALSE(exists("no.vdb"));
 }
 

@@ -108,7 +108,7 @@ TEST(AnimateTexture, ShowsTexturesThatGrowAndShrink) {
   const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
   const Patch a = patchAt(ball, V3d(0, 0, 1));
   const auto textures = [](std::size_t f) { return ballAt(V3d(0), f == 1 ? 0.35 : 0.7); };
-  for (const mapping::TextureMap map : {mapping::TextureMap::Rbf, mapping::TextureMap::Shell}) {
+  for (const mapping::TextureMap map : {mapping::TextureMap::Rbf, mapping::TextureMap::Prism}) {
     mapping::TextureAnimationOptions options{.animation = {.frames = 3}, .texture = coarse()};
     options.animation.make = support::remakePatches;
     options.texture.map = map;

@@ -11,7 +11,7 @@
 #include "mapping/distortion/distortion.h"
 #include "mapping/layers/layer_resampling.h"
 #include "mapping/layers/relaxation.h"
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
 #include "tests/support/patches.h"
 
@@ -38,7 +38,7 @@ NarrowBand makeGround(double bump, double voxel = 0.1) {
 }
 
 std::size_t foldsOf(const Patch& patch) {
-  return mapping::surveyDistortion(mapping::ShellMap(patch, {}).samples(), V3d(1)).folded;
+  return mapping::surveyDistortion(mapping::PrismMap(patch, {}).samples(), V3d(1)).folded;
 }
 
 TEST(SweepCurve, FollowsACircle) {

@@ -8,7 +8,7 @@
 
 #include "levelset/error.h"
 #include "levelset/solids/shapes.h"
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
 #include "mapping/surface/surface_walk.h"
 #include "tests/support/files.h"
@@ -149,7 +149,7 @@ TEST(Decal, MirroredRunsTheOtherWayRound) {
 TEST(Decal, CarriesMapsLikeAnyPatch) {
   const PatchResult result = makeDecal(support::makeBall(1, 0.05, 12), V3d(0, 0, 1), V3d(1, 0, 0),
                                        0.5, 0.3, {.layers = 4, .spacing = 0.1});
-  const mapping::ShellMap map(result.patch, {});
+  const mapping::PrismMap map(result.patch, {});
   const ParticleLayer& layer = result.patch.layers[1];
   forEachParticle(layer, 1, [&](double u, double v, const V3d& p) {
     if (std::max(std::abs(u), std::abs(v)) > 0.99) return;  // the border belongs to two cells

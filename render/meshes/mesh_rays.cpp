@@ -1,4 +1,4 @@
-#include "render/embree/mesh_rays.h"
+#include "render/meshes/mesh_rays.h"
 
 #include <embree3/rtcore.h>
 
@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "render/embree/float_view.h"
+#include "render/meshes/embree_space.h"
 #include "render/shading/style.h"
 
 namespace render {
@@ -19,7 +19,7 @@ struct MeshRays::Impl {
   std::vector<MeshPart> parts;
   bool isOpaque;
   Box3d bounds;
-  FloatView view;
+  EmbreeSpace view;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
 
@@ -48,7 +48,7 @@ MeshRays::Impl::Impl(const Scene& source) : parts(source.meshes) {
     for (const auto& triangle : part.mesh->triangles)
       for (const std::uint32_t v : triangle) bounds.extendBy(part.mesh->positions[v]);
   if (bounds.isEmpty()) return;
-  view = FloatView(bounds);
+  view = EmbreeSpace(bounds);
   try {
     build();
   } catch (...) {  // the destructor does not run for a constructor that throws
@@ -116,7 +116,7 @@ void MeshRays::Impl::complete(const RTCRayHit& found, const V3d& start, const V3
   hit.position = start + direction * t;
   hit.facetNormal = across.length() > 0 ? across.normalized() : -direction;
   hit.normal = hit.facetNormal;
-  hit.surfaceError = FloatView::kPad / view.scale;
+  hit.surfaceError = EmbreeSpace::kPad / view.scale;
   hit.id = part.id;
   hit.solid = found.hit.geomID;
   hit.isOnMesh = true;

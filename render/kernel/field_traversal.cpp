@@ -1,4 +1,4 @@
-#include "render/kernel/field_walk.h"
+#include "render/kernel/field_traversal.h"
 
 #include <array>
 #include <cmath>
@@ -76,8 +76,8 @@ double valueAt(const FieldCubic& c, double s) {
   return r * r * (r * c[0] + 3 * s * c[1]) + s * s * (3 * r * c[2] + s * c[3]);
 }
 
-/// A ray's way through a grid: the block it is in, and the cell of it.
-struct GridWay {
+/// A ray's traversal through a grid: the block it is in, and the cell of it.
+struct GridTraversal {
   const FieldGrid* grid;
   V3d origin, direction;  // index space, by the world's distance along the ray
   double inverse[3];
@@ -88,7 +88,7 @@ struct GridWay {
   Range range{0, 0};                  // of the block, then of the cell
   double corner[2][2][2];
 
-  GridWay(const FieldGrid& of, const V3d& start, const V3d& along) : grid(&of) {
+  GridTraversal(const FieldGrid& of, const V3d& start, const V3d& along) : grid(&of) {
     of.worldToIndex().multVecMatrix(start, origin);
     of.worldToIndex().multDirMatrix(along, direction);
     for (int a = 0; a < 3; ++a) {
@@ -224,7 +224,7 @@ class FieldSearch {
         cubics_(grids.size() * (kMostHalvings + 1)) {
     double largest = 0;
     for (const FieldGrid& grid : grids) {
-      ways_.emplace_back(grid, start, direction);
+      traversals_.emplace_back(grid, start, direction);
       largest = std::max(largest, grid.background());
     }
     noise_ = kNoise * largest;
@@ -234,7 +234,7 @@ class FieldSearch {
  private:
   template <typename Value, typename JoinValues>
   Value joined(std::vector<Value>& values, const JoinValues& join) const {
-    std::size_t n = ways_.size();
+    std::size_t n = traversals_.size();
     for (const FieldExpression::Step& step : e_.steps)
       values[n++] = join(e_, step.join, values[step.a], values[step.b]);
     return values[e_.drawn];
@@ -251,7 +251,7 @@ class FieldSearch {
 
   /// Where the grids' ranges leave no doubt. @return nothing: they do
   std::optional<bool> sideByRanges() {
-    for (std::size_t i = 0; i < ways_.size(); ++i) ranges_[i] = ways_[i].range;
+    for (std::size_t i = 0; i < traversals_.size(); ++i) ranges_[i] = traversals_[i].range;
     const Range all = joined(ranges_, joinRanges);
     if (all.low >= 0) return false;
     if (all.high < 0) return true;
@@ -260,12 +260,12 @@ class FieldSearch {
 
   void walkBlocks() {
     for (double t = 0; t < end_;) {
-      for (GridWay& way : ways_) {
-        while (way.blockExit <= t) way.nextBlock(t);
-        way.range = way.grid->range(way.number);
+      for (GridTraversal& traversal : traversals_) {
+        while (traversal.blockExit <= t) traversal.nextBlock(t);
+        traversal.range = traversal.grid->range(traversal.number);
       }
       double next = end_;
-      for (const GridWay& way : ways_) next = std::min(next, way.blockExit);
+      for (const GridTraversal& traversal : traversals_) next = std::min(next, traversal.blockExit);
       const std::optional<bool> side = sideByRanges();
       if (side ? !settle(*side, t) : !walkCells(t, next)) return;
       t = next;
@@ -273,12 +273,12 @@ class FieldSearch {
   }
 
   bool walkCells(double t, double end) {
-    for (GridWay& way : ways_) way.firstCell(t);
+    for (GridTraversal& traversal : traversals_) traversal.firstCell(t);
     for (;;) {
-      for (GridWay& way : ways_)
-        while (way.cellExit <= t) way.nextCell();
+      for (GridTraversal& traversal : traversals_)
+        while (traversal.cellExit <= t) traversal.nextCell();
       double next = end;
-      for (const GridWay& way : ways_) next = std::min(next, way.cellExit);
+      for (const GridTraversal& traversal : traversals_) next = std::min(next, traversal.cellExit);
       const std::optional<bool> side = sideByRanges();
       if (side ? !settle(*side, t) : !solve(t, next)) return false;
       if (next == end) return true;
@@ -287,12 +287,12 @@ class FieldSearch {
   }
 
   bool solve(double t0, double t1) {
-    for (std::size_t i = 0; i < ways_.size(); ++i) cubics_[i] = ways_[i].cubic(t0, t1);
+    for (std::size_t i = 0; i < traversals_.size(); ++i) cubics_[i] = traversals_[i].cubic(t0, t1);
     return search(0, t0, t1);
   }
 
   bool search(int level, double t0, double t1) {
-    const std::size_t count = ways_.size();
+    const std::size_t count = traversals_.size();
     FieldCubic* cubics = cubics_.data() + static_cast<std::size_t>(level) * count;
     for (std::size_t i = 0; i < count; ++i) bounds_[i] = boundsOf(cubics[i]);
     const FieldBounds all = joined(bounds_, joinBounds);
@@ -316,7 +316,7 @@ class FieldSearch {
   }
 
   [[nodiscard]] double valueOf(const FieldCubic* cubics, double s) {
-    for (std::size_t i = 0; i < ways_.size(); ++i) values_[i] = valueAt(cubics[i], s);
+    for (std::size_t i = 0; i < traversals_.size(); ++i) values_[i] = valueAt(cubics[i], s);
     return joined(values_, [](const FieldExpression& e, Join join, double a, double b) {
       return e.join(join, a, b);
     });
@@ -347,7 +347,7 @@ class FieldSearch {
   double end_;
   bool wantsAll_;
   double noise_ = 0;
-  std::vector<GridWay> ways_;
+  std::vector<GridTraversal> traversals_;
   std::optional<bool> inside_;
   std::vector<double> values_;
   std::vector<FieldBounds> bounds_;
@@ -374,7 +374,7 @@ std::optional<Range> partWithin(const Imath::Box3d& box, const V3d& origin, cons
 
 }  // namespace
 
-FieldWalk::FieldWalk(const Scene& scene, std::size_t maxBytes)
+FieldTraversal::FieldTraversal(const Scene& scene, std::size_t maxBytes)
     : expression_(fieldExpression(scene)) {
   double bytes = 0;
   for (const FieldExpression::Operand& operand : expression_.operands)
@@ -382,32 +382,34 @@ FieldWalk::FieldWalk(const Scene& scene, std::size_t maxBytes)
   levelset::requireMemory(bytes, maxBytes, "render");
   for (const FieldExpression::Operand& operand : expression_.operands)
     grids_.emplace_back(scene.solids[operand.solid].band);
-  place(scene);
+  updateTransforms(scene);
 }
 
-bool FieldWalk::place(const Scene& scene) {
+bool FieldTraversal::updateTransforms(const Scene& scene) {
   bool hasMoved = false;
   box_.makeEmpty();
   for (std::size_t i = 0; i < grids_.size(); ++i) {
-    hasMoved = grids_[i].place(scene.solids[expression_.operands[i].solid].band) || hasMoved;
+    hasMoved =
+        grids_[i].updateTransform(scene.solids[expression_.operands[i].solid].band) || hasMoved;
     box_.extendBy(grids_[i].worldBox());
   }
   return hasMoved;
 }
 
-std::size_t FieldWalk::bytes() const {
+std::size_t FieldTraversal::bytes() const {
   std::size_t sum = 0;
   for (const FieldGrid& grid : grids_) sum += grid.bytes();
   return sum;
 }
 
-std::size_t FieldWalk::blockCount() const {
+std::size_t FieldTraversal::blockCount() const {
   std::size_t sum = 0;
   for (const FieldGrid& grid : grids_) sum += grid.blockCount();
   return sum;
 }
 
-Hit FieldWalk::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
+Hit FieldTraversal::intersect(const V3d& origin, const V3d& direction, double near,
+                              double far) const {
   Hit hit;
   const std::optional<Range> part = partWithin(box_, origin, direction, near, far);
   if (!part) return hit;
@@ -422,15 +424,15 @@ Hit FieldWalk::intersect(const V3d& origin, const V3d& direction, double near, d
   return hit;
 }
 
-bool FieldWalk::isOccluded(const V3d& origin, const V3d& direction, double reach) const {
-  const std::optional<Range> part = partWithin(box_, origin, direction, 0, reach);
+bool FieldTraversal::isOccluded(const V3d& origin, const V3d& direction, double maxDistance) const {
+  const std::optional<Range> part = partWithin(box_, origin, direction, 0, maxDistance);
   return part && !FieldSearch(expression_, grids_, origin + direction * part->low, direction,
                               part->high - part->low, false)
                       .crossings.empty();
 }
 
-double FieldWalk::thickness(const V3d& origin, const V3d& direction, double near,
-                            double far) const {
+double FieldTraversal::thickness(const V3d& origin, const V3d& direction, double near,
+                                 double far) const {
   const std::optional<Range> part = partWithin(box_, origin, direction, near, far);
   if (!part) return 0;
   const double end = part->high - part->low;

@@ -10,10 +10,10 @@
 namespace mapping {
 
 /// The worst first, and no more than are told.
-inline void keepWorst(std::vector<FoldPlace>& places) {
+inline void keepWorst(std::vector<FoldPoint>& places) {
   std::stable_sort(places.begin(), places.end(),
-                   [](const FoldPlace& a, const FoldPlace& b) { return a.jacobian < b.jacobian; });
-  places.resize(std::min(places.size(), FoldCertificate::kMostPlaces));
+                   [](const FoldPoint& a, const FoldPoint& b) { return a.jacobian < b.jacobian; });
+  places.resize(std::min(places.size(), FoldCertificate::kMostPoints));
 }
 
 /// Adds up what is known of the parts of a map, in their order.
@@ -28,7 +28,7 @@ struct FoldTally {
     if (typical > 0) typical_.push_back(typical);
     least_ = std::min(least_, least);
   }
-  void addFold(const FoldPlace& fold) { certificate.worst.push_back(fold); }
+  void addFold(const FoldPoint& fold) { certificate.worst.push_back(fold); }
 
   /// Determinants become shares of the median of those that are positive; the worst folds are kept.
   [[nodiscard]] FoldCertificate finish() {
@@ -38,9 +38,9 @@ struct FoldTally {
       std::nth_element(typical_.begin(), middle, typical_.end());
       unit = *middle;
     }
-    std::vector<FoldPlace>& worst = certificate.worst;
+    std::vector<FoldPoint>& worst = certificate.worst;
     keepWorst(worst);
-    for (FoldPlace& fold : worst) fold.jacobian /= unit;
+    for (FoldPoint& fold : worst) fold.jacobian /= unit;
     certificate.unit = unit;
     if (size_ > 0) {
       certificate.foldedShare = folded_ / size_;
