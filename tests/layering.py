@@ -77,7 +77,8 @@ def offenders():
 
     folders = collections.defaultdict(set)
     for file in files:
-        folders[os.path.splitext(os.path.basename(file))[0]].add(os.path.dirname(file))
+        name, extension = os.path.splitext(os.path.basename(file))
+        folders[name if extension in (".h", ".cpp") else name + extension].add(os.path.dirname(file))
     for name, where in sorted(folders.items()):
         if len(where) > 1 and name not in SHARED_NAMES:
             yield f"files named {name} in several folders: {' '.join(sorted(where))}"
