@@ -19,8 +19,8 @@ typename Grid::Ptr gridOfClosestPoints(const NarrowBand& solid, const ClosestPoi
   using GridLeaf = typename Grid::TreeType::LeafNodeType;
   requireSolid(solid, action);
   if (solid.isEmpty())
-    throw InvalidInput(
-        fmt::format("{}: the solid is empty, so it has no surface; give a solid", action));
+    throw InvalidInput(fmt::format(
+        "{}: the solid is empty, so it has no surface; give a solid with a surface", action));
   eikonal::DistanceRequest request;
   request.action = action;
   request.halfWidth = options.halfWidth.value_or(solid.halfWidth());

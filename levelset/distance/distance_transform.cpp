@@ -250,8 +250,8 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   if (points.size() == 0)
     throw InvalidInput(
         fmt::format("{}: the field has no zero crossing{}, so there is no surface to "
-                    "measure from; give a solid",
-                    request.action, within ? " within reach of the region" : ""));
+                    "measure from; give a solid with a surface",
+                    request.action, within ? " near the region" : ""));
   if (points.size() >= NearestPoints::kNone)
     throw ResourceLimit(
         fmt::format("{}: more than 2^32 grid points lie beside the surface; use larger "

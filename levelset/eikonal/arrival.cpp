@@ -181,10 +181,10 @@ std::vector<Vec3d> positionsOf(std::span<const Imath::V3d> sources,
     positions.push_back(transform.worldToIndex(toVdb(source)));
     for (int i = 0; i < 3; ++i)
       if (!(std::abs(positions.back()[i]) < kIndexLimit))
-        throw ResourceLimit(
-            fmt::format("{}: a point lies {:.4g} voxels from the origin, beyond the range of "
-                        "32-bit indices; use larger voxels",
-                        action, std::abs(positions.back()[i])));
+        throw ResourceLimit(fmt::format(
+            "{}: a source point lies {:.4g} voxels from the origin, beyond the range of "
+            "32-bit indices; use larger voxels",
+            action, std::abs(positions.back()[i])));
   }
   return positions;
 }
@@ -217,12 +217,12 @@ namespace {
 
 eikonal::ArrivalRequest checkedRequest(double until, const ArrivalOptions& options) {
   eikonal::ArrivalRequest request;
-  request.action = options.method == FrontMethod::Marching ? "march" : "sweep";
+  request.action = options.method == FrontMethod::Marching ? "fast-marching" : "fast-sweeping";
   request.until = until;
   request.options = options;
   if (!std::isfinite(until) || until <= 0)
-    throw UsageError(
-        fmt::format("{}: the latest time is {}; give a positive one", request.action, until));
+    throw UsageError(fmt::format("{}: the latest time is {}; give a positive, finite time",
+                                 request.action, until));
   if (options.order != 1 && options.order != 2)
     throw UsageError(
         fmt::format("{}: the order is {}; give 1 or 2", request.action, options.order));
@@ -255,14 +255,16 @@ ArrivalTimes arrivalTimesFromPoints(const NarrowBand& lattice, std::span<const I
                                     double until, const ArrivalOptions& options) {
   const eikonal::ArrivalRequest request = checkedRequest(until, options);
   if (!lattice.shared())
-    throw UsageError(fmt::format("{}: there is no grid to work on; give a solid", request.action));
+    throw UsageError(
+        fmt::format("{}: there is no grid for the times; give a solid", request.action));
   if (sources.empty())
-    throw UsageError(fmt::format("{}: there is no point to start from; give one", request.action));
+    throw UsageError(
+        fmt::format("{}: there is no source point; give at least one", request.action));
   for (const Imath::V3d& p : sources)
     for (int i = 0; i < 3; ++i)
       if (!std::isfinite(p[i]))
         throw UsageError(
-            fmt::format("{}: a point to start from has the coordinate {}; give finite "
+            fmt::format("{}: a source point has the coordinate {}; give finite "
                         "points",
                         request.action, p[i]));
   return asField(eikonal::arrivalFromPoints(sources, vdb(lattice).transform(), request),
@@ -274,11 +276,12 @@ FrontDistance frontDistance(const NarrowBand& solid, double reach, const Arrival
   requireStart(solid, request.action);
   if (options.speed)
     throw UsageError(
-        fmt::format("{}: at another speed than 1 times are no distances; ask for arrival times",
+        fmt::format("{}: with a speed other than 1, arrival times are not distances; request "
+                    "arrival times",
                     request.action));
   if (reach < solid.voxelSize())
-    throw UsageError(fmt::format("{}: the reach is {} voxels; give at least 1", request.action,
-                                 reach / solid.voxelSize()));
+    throw UsageError(fmt::format("{}: the largest distance is {} voxels; give at least 1",
+                                 request.action, reach / solid.voxelSize()));
   eikonal::ArrivalGrid result = eikonal::arrivalFromSurface(vdb(solid), request);
   return {makeBand(std::move(result.times)), result.figures};
 }

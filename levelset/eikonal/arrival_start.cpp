@@ -18,17 +18,17 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Radius around a point source, voxels, in which the front is too curved for differences. Start
-// times are given in it …
+// Largest radius around a point source, voxels, in which start times are given: there the front is
+// too curved for differences.
 constexpr double kStartBall = 8;
-// … where the speed differs from a linear one by at most kLeastLinear of the speed at the point,
-// and from the speed at the point by at most kMostChange. There straight segments are the fastest
-// paths, to within 0.03 voxels.
+// Largest difference of the speed from a linear one, and from the speed at the point, in that
+// radius; both are parts of the speed at the point. Within these bounds straight segments are the
+// fastest paths, to within 0.03 voxels.
 constexpr double kLeastLinear = 0.02, kMostChange = 0.35;
 // Distance between samples of the slowness on a segment, voxels.
 constexpr double kSpacing = 0.5;
-// Where the slowness varies by more than this factor on a segment, another path may be faster.
-// Segments below one voxel are exempt: no grid point beside them offers the solver another path.
+// Another path may be faster if the slowness varies by more than this factor on a segment. Segments
+// below one voxel are exempt: no grid point beside them offers the solver another path.
 constexpr double kMostRatio = 2, kShortRay = 1;
 constexpr std::size_t kPointsPerBatch = 64;
 constexpr double kBytesPerLeaf = 2300;

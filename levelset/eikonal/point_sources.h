@@ -27,8 +27,8 @@ struct StraightTime {
   /// for it.
   [[nodiscard]] double slack() const { return 0.25 * slowness; }
 
-  /// Returns the derivative of T0 along −d less its one-sided difference on x, x + d and x + 2 d,
-  /// for a step d along the axis.
+  /// Returns the error of a one-sided difference of T0: the derivative along −d, less the
+  /// difference on x, x + d and x + 2 d. Here d is a step along the axis.
   [[nodiscard]] double missed(std::size_t axis, bool up, bool second) const {
     if (slowness == 0) return 0;
     const double along = up ? away[static_cast<int>(axis)] : -away[static_cast<int>(axis)];

@@ -57,7 +57,7 @@ class PathGraph {
   PathGraph(const SurfaceField& field, double height, const V3d& a, const V3d& b)
       : field_(field), height_(height), ends_{a, b}, step_(field.voxelSize()) {}
 
-  [[nodiscard]] V3d place(Key key) const {
+  [[nodiscard]] V3d position(Key key) const {
     const GridCell c = unpackCell(key);
     return ends_[0] + V3d(c[0], c[1], c[2]) * step_;
   }
@@ -96,7 +96,7 @@ class PathGraph {
   [[nodiscard]] Path trace(std::size_t end, Key key) {
     Path path;
     for (;; key = nodes_.at(key).from[end]) {
-      V3d p = place(key);
+      V3d p = position(key);
       if (field_.project(p, height_)) path.push_back(p);
       if (nodes_.at(key).from[end] == key) break;
     }
@@ -110,7 +110,7 @@ class PathGraph {
   Node& visit(Key key) {
     const auto [it, isNew] = nodes_.try_emplace(key);
     if (isNew) {
-      const V3d p = place(key);
+      const V3d p = position(key);
       it->second.isBeside = std::abs(field_.value(p) - height_) <= kBesideVoxels * step_;
       if (it->second.isBeside) it->second.normal = field_.normal(p);
     }
@@ -128,7 +128,7 @@ class PathGraph {
       const Key key =
           packCell({middle[0] + n / 9 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n % 3 - 1});
       Node& near = visit(key);
-      const V3d p = place(key);
+      const V3d p = position(key);
       if (!near.isBeside || !isBesideEnd(end, p, near.normal)) continue;
       near.cost[end] = (p - ends_[end]).length();
       near.from[end] = key;
@@ -150,7 +150,7 @@ class PathGraph {
       const double cost =
           current.cost[end] +
           step_ * std::sqrt(static_cast<double>(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
-      const V3d p = place(nextKey);
+      const V3d p = position(nextKey);
       if (cost >= next.cost[end] || !mayLie(p, cost)) continue;
       next.cost[end] = cost;
       next.from[end] = key;
@@ -192,7 +192,7 @@ Path GeodesicSearch::shortest() const {
   const auto goal = graph.search(
       0, [](const V3d&, double) { return true; }, [&](const V3d& p) { return (p - b_).length(); },
       [&](Key key, const PathGraph::Node& node) {
-        return graph.isBesideEnd(1, graph.place(key), node.normal);
+        return graph.isBesideEnd(1, graph.position(key), node.normal);
       });
   if (!goal) return {};
   Path path = graph.trace(0, *goal);
@@ -222,7 +222,7 @@ std::vector<Path> GeodesicSearch::alternatives(double longest) const {
   const std::vector<Meeting> all = meetings(graph);
   for (const Meeting& meeting : all) {
     if (paths.size() == kMostPaths || meeting.cost > kGridExcess * all.front().cost) break;
-    const V3d p = graph.place(meeting.key), normal = graph.node(meeting.key).normal;
+    const V3d p = graph.position(meeting.key), normal = graph.node(meeting.key).normal;
     const bool isNew = std::none_of(taken.begin(), taken.end(), [&](const auto& other) {
       // The two faces of a thin sheet give two paths, even where they are close.
       return (p - other.first).length() < apart && normal.dot(other.second) > 0;

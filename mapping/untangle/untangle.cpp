@@ -46,8 +46,7 @@ void checkInput(const NarrowBand& base, const Patch& patch, const UntangleOption
     for (const V3d& p : layer.positions)
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
         throw InvalidInput(
-            fmt::format("{}: the particle at ({}, {}, {}) is not finite; build the "
-                        "patch again",
+            fmt::format("{}: the particle at ({}, {}, {}) is not finite; build the patch again",
                         action, p.x, p.y, p.z));
       }
   const SurfaceField field(base);

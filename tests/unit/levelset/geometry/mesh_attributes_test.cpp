@@ -156,7 +156,7 @@ TEST(MeshAttributes, GarbageIsRefusedWithItsPlace) {
   const std::string nans = ply("float", "nx\0ny\0nz\0", "0 nan 1");
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)parse("a.ply", nans); }),
               "line 15: a normal holds nan");
-  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)parse("a.ply", nans); }), "--bare");
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)parse("a.ply", nans); }), "--no-attributes");
   EXPECT_TRUE(parse("a.ply", nans, {.attributes = false}).attributes.isEmpty());
   EXPECT_SAYS(refusal<InvalidInput>(
                   [&] { (void)parse("a.ply", ply("uchar", "red\0green\0blue\0", "0 256 1")); }),
