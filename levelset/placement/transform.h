@@ -12,9 +12,9 @@ namespace levelset {
 /// @param matrix  rotation, uniform scale, translation; world' = world * matrix, with Imath's row
 ///                vectors
 /// @throws UsageError if the matrix is not affine and invertible
-/// @throws InvalidInput if the matrix shears, mirrors or scales unevenly (use bake()), if the solid
+/// @throws InvalidInput if the matrix shears, mirrors or scales unevenly (use bake()), or the solid
 /// is
-///         empty, or if its position is too far from the origin for its voxels
+///         empty or too far from the origin for its voxels
 [[nodiscard]] NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix);
 
 struct BakeOptions {
