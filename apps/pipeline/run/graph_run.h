@@ -11,7 +11,7 @@
 
 #include "apps/pipeline/cache/cache.h"
 #include "apps/pipeline/graph/graph.h"
-#include "apps/pipeline/graph/region_of_interest.h"
+#include "apps/pipeline/graph/regions_of_interest.h"
 #include "apps/pipeline/run/runner.h"
 #include "apps/pipeline/run/step_measures.h"
 #include "apps/pipeline/run/task_scheduler.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "apps/pipeline/graph/graph.h"
-#include "apps/pipeline/graph/region_of_interest.h"
+#include "apps/pipeline/graph/regions_of_interest.h"
 #include "apps/pipeline/registry/invocation.h"
 
 namespace pipeline {

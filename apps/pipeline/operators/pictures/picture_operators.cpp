@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "apps/pipeline/graph/region_of_interest.h"
+#include "apps/pipeline/graph/regions_of_interest.h"
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/pictures/camera_options.h"

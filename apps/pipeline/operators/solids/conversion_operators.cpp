@@ -6,7 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "apps/pipeline/graph/region_of_interest.h"
+#include "apps/pipeline/graph/regions_of_interest.h"
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/convert/mesh_to_band.h"

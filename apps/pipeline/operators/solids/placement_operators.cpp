@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "apps/pipeline/graph/region_of_interest.h"
+#include "apps/pipeline/graph/regions_of_interest.h"
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/csg/clip.h"

@@ -1,6 +1,6 @@
 // Only what is needed of a value is made, and it is the same to the bit.
 
-#include "apps/pipeline/graph/region_of_interest.h"
+#include "apps/pipeline/graph/regions_of_interest.h"
 
 #include <gtest/gtest.h>
 

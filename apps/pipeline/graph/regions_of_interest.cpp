@@ -1,4 +1,4 @@
-#include "apps/pipeline/graph/region_of_interest.h"
+#include "apps/pipeline/graph/regions_of_interest.h"
 
 #include <algorithm>
 
