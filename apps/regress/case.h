@@ -3,72 +3,42 @@
 #include <Imath/ImathVec.h>
 
 #include <functional>
-#include <initializer_list>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "apps/regress/truth/truth.h"
+#include "apps/regress/bounds.h"
 
-/// The regression suite: problems with exact answers, run at several resolutions and placements on
-/// the grid.
+/// Regression suite: problems with exact answers, run at several resolutions and placements on the
+/// grid.
 namespace regress {
 
 class Recorder;
 
-enum class Budget { Quick, Full };
-
-/// One run of a problem. The object has a size near one; the voxel size is 1 / resolution.
+/// One run of a problem. The object has a size near one. The voxel size is 1 / resolution.
 struct Sample {
   int resolution = 0;     ///< voxels per unit of length
-  int phase = 0;          ///< which of the placements
+  int phase = 0;          ///< index of the placement
   double voxelSize = 0;   ///< world units
-  Imath::V3d shift = {};  ///< by which the object lies off the grid points, world units
+  Imath::V3d shift = {};  ///< offset of the object from the grid points, world units
 };
 
 /// Placements of an object between the grid points, in voxels.
 [[nodiscard]] const std::vector<Imath::V3d>& subVoxelPhases();
 
-enum class Sense { AtMost, AtLeast };
-
-/// What must hold of a figure of ours, in the worst placement.
-struct Bound {
-  std::string variant;
-  std::string figure;  ///< a column, see columns.h
-  double limit = 0;
-  int resolution = 0;  ///< 0: at every one
-  Sense sense = Sense::AtMost;
-};
-
-/// Most of the zeros along rays that may be missing or too many where a surface is bounded. Not
-/// none: of the rays that hit a ball of radius R, 2 e / R pass so near to its rim that an error of
-/// e decides whether they do; R = 3 voxels and e = 0.03 make two of a hundred.
-inline constexpr double kMostMissed = 0.025;
-
-/// Rays that pass an edge within a part of a voxel may go either way, too, and so may those through
-/// what is as thin as that. Their share falls with the voxel: bounds in the place of kMostMissed,
-/// at these resolutions.
-/// @param atOne  the share with one voxel per unit of length
-inline void allowAtEdges(std::vector<Bound>& bounds, const std::string& variant, double atOne,
-                         std::initializer_list<int> resolutions) {
-  for (const int resolution : resolutions)
-    bounds.push_back({variant, "missed_hits", atOne / resolution, resolution});
-}
-
 struct Case {
-  std::string name = {};        ///< as --case takes it
-  std::string group = {};       ///< operator: the plots are made by it
-  std::string title = {};       ///< one line
-  std::string definition = {};  ///< what is computed and what the answer is
-  std::string citation = {};    ///< keys of REFERENCES.md
-  std::vector<int> quick = {},
-                   full = {};  ///< resolutions; empty for cases that only state outcomes
+  std::string name = {};                   ///< argument of --case
+  std::string group = {};                  ///< operator; each group has one plot
+  std::string title = {};                  ///< one line
+  std::string definition = {};             ///< computation and exact answer
+  std::string citation = {};               ///< keys of REFERENCES.md
+  std::vector<int> quick = {}, full = {};  ///< resolutions; empty for cases with outcomes only
   std::vector<Bound> bounds = {};
   std::function<void(Recorder&)> run = {};
 };
 
-/// A case without rows of figures, which only states outcomes.
+/// Builds a case without rows of figures, which states outcomes only.
 [[nodiscard]] inline Case statedCase(const char* name, const char* title, const char* definition,
                                      const char* citation, void (*run)(Recorder&)) {
   return {.name = name,
@@ -79,10 +49,10 @@ struct Case {
           .run = run};
 }
 
-/// All cases, in the order in which they run.
+/// All cases, in the order of the run.
 [[nodiscard]] const std::vector<Case>& cases();
 
-// Each fills its group; see apps/regress/cases/.
+// Each function adds the cases of one file of apps/regress/cases/.
 void addShapeCases(std::vector<Case>& all);
 void addMeshCases(std::vector<Case>& all);
 void addRedistanceCases(std::vector<Case>& all);
@@ -105,12 +75,12 @@ using Figures = std::map<std::string, double>;
 struct Row {
   std::string variant, tool;
   int resolution = 0;
-  int phase = 0;             ///< -1 in a summary: all of them
-  Figures figures = {};      ///< by column; what was not measured is missing
-  std::string failure = {};  ///< why there are none
+  int phase = 0;             ///< index of the placement; -1 in a summary
+  Figures figures = {};      ///< by column, measured ones only
+  std::string failure = {};  ///< reason why the row has no figures
 };
 
-/// A statement that holds or not.
+/// Statement of a case and its verification.
 struct Outcome {
   std::string variant;
   std::string expected;
@@ -118,7 +88,7 @@ struct Outcome {
   bool passed = false;
 };
 
-/// A bound and what came out.
+/// Bound and the figure found.
 struct Judgement {
   Bound bound;
   int resolution = 0;
@@ -133,7 +103,7 @@ struct CaseResult {
   std::vector<Row> summary;  ///< worst placement, by variant, tool and resolution
   std::vector<Outcome> outcomes;
   std::vector<Judgement> judgements;
-  double cpuSeconds = 0;  ///< with all measuring
+  double cpuSeconds = 0;  ///< measurements included
 };
 
 }  // namespace regress

@@ -82,11 +82,10 @@ class Recorder {
 /// The worst placement for each variant, tool and resolution, with observed orders.
 [[nodiscard]] std::vector<Row> summarize(const std::vector<Row>& rows);
 
-/// Bounds against summaries, ours alone. A bound at a resolution that the budget leaves out is
-/// passed over in the quick budget; in the full one it has failed, as has one that fits no row.
-/// Where the band's errors are bounded, none of its grid points may be missing; where the surface's
-/// are, no more than kMostMissed of its zeros may be missing or too many; unless the case has a
-/// bound of its own for that.
+/// Compares our summaries with the bounds of the case. A bound fails where the figure misses the
+/// limit, where the stated figure is out of date, and where no row fits. A bound at a resolution of
+/// the other budget alone is left to that budget. A case that bounds errors of the band or of the
+/// surface must miss no grid point and no zero, unless it states the share of those.
 [[nodiscard]] std::vector<Judgement> judge(const Case& of, const std::vector<Row>& summary,
                                            Budget budget);
 

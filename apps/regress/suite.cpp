@@ -96,11 +96,11 @@ std::vector<std::string> failures(const CaseResult& result) {
     if (j.passed) continue;
     const std::string what =
         fmt::format("{}: {} at {}: ", result.of->name, j.bound.variant, j.resolution);
-    sentences.push_back(j.remark.empty()
-                            ? fmt::format("{}{} is {:.4g}, the bound is {} {:.4g}", what,
-                                          j.bound.figure, j.found,
-                                          j.bound.sense == Sense::AtMost ? "≤" : "≥", j.bound.limit)
-                            : fmt::format("{}{}: {}", what, j.bound.figure, j.remark));
+    sentences.push_back(
+        j.remark.empty()
+            ? fmt::format("{}{} is {:.4g}, the bound is {} {:.4g}", what, j.bound.figure, j.found,
+                          j.bound.sense == Sense::AtMost ? "≤" : "≥", j.bound.limit())
+            : fmt::format("{}{}: {}", what, j.bound.figure, j.remark));
   }
   for (const Outcome& o : result.outcomes)
     if (!o.passed)

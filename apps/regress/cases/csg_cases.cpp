@@ -76,20 +76,37 @@ void laws(Recorder& out) {
   }
 }
 
-std::vector<Bound> ballBounds() {
-  std::vector<Bound> bounds = {{"union", "band_in_linf_vx", 0.1},
-                               {"union", "band_out_linf_vx", 0.1}};
-  for (const Named& op : kOperations) {
-    // Where the crease is nearest, its place between the grid points is known to a third of a
-    // voxel.
-    bounds.push_back({op.name, "band_in_linf_vx", 0.4});
-    bounds.push_back({op.name, "band_out_linf_vx", 0.4});
-    bounds.push_back({op.name, "band_in_l1_vx", 0.01, 32});
-    bounds.push_back({op.name, "band_out_l1_vx", 0.01, 32});
-    bounds.push_back({op.name, "checks_failed", 0});
-    bounds.push_back({op.name, "volume_error", 2e-3, 64});
-  }
-  return bounds;
+Bounds csgBallsBounds() {
+  return Bounds()
+      .measured("union", "band_in_linf_vx", {{12, 0.0412}, {16, 0.0539}, {32, 0.0557}})
+      .rounding("union", "band_out_linf_vx", 1.5)
+      .measured("union", "band_in_l1_vx", {{12, 0.000443}, {16, 0.000239}, {32, 6.5e-5}})
+      .rounding("union", "band_out_l1_vx", 0.5)
+      .zero("union", "checks_failed")
+      .rounding("intersection", "band_in_linf_vx", 1.5)
+      .measured("intersection", "band_out_linf_vx", {{12, 0.0527}, {16, 0.0507}, {32, 0.0287}})
+      .rounding("intersection", "band_in_l1_vx", 0.5)
+      .measured("intersection", "band_out_l1_vx", {{12, 0.00153}, {16, 0.000493}, {32, 0.000135}})
+      .zero("intersection", "checks_failed")
+      .rounding("difference", "band_in_linf_vx", 1.5)
+      .measured("difference", "band_out_linf_vx", {{12, 0.277}, {16, 0.128}, {32, 0.322}})
+      .ceiling(0.4)
+      .rounding("difference", "band_in_l1_vx", 0.5)
+      .measured("difference", "band_out_l1_vx", {{12, 0.00122}, {16, 0.00072}, {32, 0.000367}})
+      .zero("difference", "checks_failed")
+      .measured("union", "volume_error", {{12, 0.000131}, {16, 6.93e-6}, {32, 1.92e-5}})
+      .measured("intersection", "volume_error", {{12, 0.00118}, {16, 0.000522}, {32, 0.000101}})
+      .measured("difference", "volume_error", {{12, 0.0094}, {16, 0.00447}, {32, 0.00236}});
+}
+
+Bounds csgLawsBounds() {
+  return Bounds()
+      .zero("A ∪ A = A", "deviation_vx")
+      .zero("A ∩ A = A", "deviation_vx")
+      .zero("A ∪ B = B ∪ A", "deviation_vx")
+      .zero("A ∩ B = B ∩ A", "deviation_vx")
+      .zero("X \\ (A ∪ B) = (X \\ A) ∩ (X \\ B)", "deviation_vx")
+      .zero("X \\ (A ∩ B) = (X \\ A) ∪ (X \\ B)", "deviation_vx");
 }
 
 }  // namespace
@@ -107,7 +124,7 @@ void addCsgCases(std::vector<Case>& all) {
        .citation = "closed form",
        .quick = {12, 16, 32},
        .full = {32, 64, 128, 256},
-       .bounds = ballBounds(),
+       .bounds = csgBallsBounds(),
        .run = combineBalls});
   all.push_back({.name = "csg-laws",
                  .group = "CSG laws",
@@ -118,12 +135,7 @@ void addCsgCases(std::vector<Case>& all) {
                  .citation = "set algebra",
                  .quick = {8, 12, 16},
                  .full = {16, 32, 64},
-                 .bounds = {{"A ∪ A = A", "deviation_vx", 0},
-                            {"A ∩ A = A", "deviation_vx", 0},
-                            {"A ∪ B = B ∪ A", "deviation_vx", 0},
-                            {"A ∩ B = B ∩ A", "deviation_vx", 0},
-                            {"X \\ (A ∪ B) = (X \\ A) ∩ (X \\ B)", "deviation_vx", 0},
-                            {"X \\ (A ∩ B) = (X \\ A) ∪ (X \\ B)", "deviation_vx", 0}},
+                 .bounds = csgLawsBounds(),
                  .run = laws});
 }
 

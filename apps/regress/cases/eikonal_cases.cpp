@@ -221,6 +221,88 @@ void closest(Recorder& out) {
   }
 }
 
+Bounds eikonalPointBounds() {
+  return Bounds()
+      .measured("marching, order 2", "band_out_linf_vx",
+                {{12, 2.78e-6}, {16, 2.9e-6}, {32, 1.14e-5}, {64, 3.9e-5}})
+      .rounding("marching, order 2", "band_out_linf_vx", 5, 6)
+      .rounding("marching, order 2", "band_out_linf_vx", 3, 8)
+      .measured("sweeping, order 2", "band_out_linf_vx",
+                {{12, 2.78e-6}, {16, 2.9e-6}, {32, 1.14e-5}, {64, 3.9e-5}})
+      .rounding("sweeping, order 2", "band_out_linf_vx", 5, 6)
+      .rounding("sweeping, order 2", "band_out_linf_vx", 3, 8);
+}
+
+Bounds eikonalGradientBounds() {
+  return Bounds()
+      .measured("marching, order 2", "band_out_linf_vx",
+                {{8, 0.0306}, {12, 0.045}, {16, 0.0395}, {32, 0.0148}, {64, 0.0158}})
+      .measured("sweeping, order 2", "band_out_linf_vx",
+                {{8, 0.0318}, {12, 0.0463}, {16, 0.0407}, {32, 0.0173}, {64, 0.0156}})
+      .order("marching, order 2", "order_band_l1", {{64, 2.20}})
+      .order("sweeping, order 2", "order_band_l1", {{64, 2.21}});
+}
+
+Bounds eikonalMediaBounds() {
+  return Bounds()
+      .measured("slow beyond, marching, order 2", "band_out_linf_vx",
+                {{12, 0.524}, {16, 0.511}, {24, 0.522}})
+      .measured("slow beyond, sweeping, order 2", "band_out_linf_vx",
+                {{12, 0.524}, {16, 0.511}, {24, 0.522}})
+      .measured("fast beyond, marching, order 2", "band_out_linf_vx",
+                {{12, 1.14}, {16, 0.242}, {24, 0.244}})
+      .ceiling(1.5)
+      .measured("fast beyond, sweeping, order 2", "band_out_linf_vx",
+                {{12, 1.15}, {16, 0.242}, {24, 0.244}})
+      .ceiling(1.5);
+}
+
+Bounds eikonalSurfaceBounds() {
+  return Bounds()
+      .measured("sphere, marching, order 2", "band_out_linf_vx",
+                {{8, 0.0387}, {12, 0.0245}, {24, 0.00937}})
+      .ceiling(0.05)
+      .measured("sphere, sweeping, order 2", "band_out_linf_vx",
+                {{8, 0.0387}, {12, 0.0245}, {24, 0.00937}})
+      .ceiling(0.05)
+      .measured("two spheres, sweeping, order 2", "band_out_linf_vx",
+                {{8, 0.115}, {12, 0.0818}, {24, 0.0721}})
+      .ceiling(0.15)
+      .measured("two spheres, marching, order 2", "band_out_linf_vx",
+                {{8, 0.111}, {12, 0.0792}, {24, 0.0721}})
+      .ceiling(0.15)
+      .measured("sphere, marching, order 2", "band_in_linf_vx",
+                {{8, 0.389}, {12, 0.218}, {24, 0.0194}})
+      .ceiling(0.5)
+      .measured("sphere, sweeping, order 2", "band_in_linf_vx",
+                {{8, 0.389}, {12, 0.218}, {24, 0.0194}})
+      .ceiling(0.5)
+      .measured("two spheres, marching, order 2", "band_in_linf_vx",
+                {{8, 0.379}, {12, 0.293}, {24, 0.104}})
+      .ceiling(0.5)
+      .measured("two spheres, sweeping, order 2", "band_in_linf_vx",
+                {{8, 0.379}, {12, 0.293}, {24, 0.104}})
+      .ceiling(0.5);
+}
+
+Bounds closestPointBounds() {
+  return Bounds()
+      .measured("sphere", "surface_linf_vx",
+                {{8, 0.000934},
+                 {12, 0.000407},
+                 {16, 0.000226},
+                 {24, 9.81e-5},
+                 {32, 5.56e-5},
+                 {64, 1.75e-5}})
+      .ceiling(0.001)
+      .measured(
+          "sphere", "value_error",
+          {{8, 0.0151}, {12, 0.0056}, {16, 0.00296}, {24, 0.00123}, {32, 0.000692}, {64, 0.000253}})
+      .zero("sphere", "missing_band")
+      .zero("torus", "missing_band")
+      .order("torus", "order_surface", {{32, 3.14}});
+}
+
 }  // namespace
 
 void addEikonalCases(std::vector<Case>& all) {
@@ -233,8 +315,7 @@ void addEikonalCases(std::vector<Case>& all) {
                  .citation = "Sethian99, Zhao05, Treister16",
                  .quick = {6, 8, 12},
                  .full = {16, 32, 64},
-                 .bounds = {{"marching, order 2", "band_out_linf_vx", 1e-3},
-                            {"sweeping, order 2", "band_out_linf_vx", 1e-3}},
+                 .bounds = eikonalPointBounds(),
                  .run = fromPoint});
   all.push_back({.name = "eikonal-gradient",
                  .group = "eikonal, gradient",
@@ -245,10 +326,7 @@ void addEikonalCases(std::vector<Case>& all) {
                  .citation = "Treister16",
                  .quick = {8, 12, 16},
                  .full = {16, 32, 64},
-                 .bounds = {{"marching, order 2", "band_out_linf_vx", 0.1},
-                            {"sweeping, order 2", "band_out_linf_vx", 0.1},
-                            {"marching, order 2", "order_band_l1", 1.8, 64, Sense::AtLeast},
-                            {"sweeping, order 2", "order_band_l1", 1.8, 64, Sense::AtLeast}},
+                 .bounds = eikonalGradientBounds(),
                  .run = fromPointWithGradient});
   all.push_back({.name = "eikonal-media",
                  .group = "eikonal, two media",
@@ -260,10 +338,7 @@ void addEikonalCases(std::vector<Case>& all) {
                  .citation = "Sethian99, Zhao05",
                  .quick = {12, 16, 24},
                  .full = {32, 64, 128},
-                 .bounds = {{"slow beyond, marching, order 2", "band_out_linf_vx", 1.5},
-                            {"slow beyond, sweeping, order 2", "band_out_linf_vx", 1.5},
-                            {"fast beyond, marching, order 2", "band_out_linf_vx", 1.5},
-                            {"fast beyond, sweeping, order 2", "band_out_linf_vx", 1.5}},
+                 .bounds = eikonalMediaBounds(),
                  .run = throughMedia});
   all.push_back({.name = "eikonal-surface",
                  .group = "eikonal, from a surface",
@@ -275,16 +350,7 @@ void addEikonalCases(std::vector<Case>& all) {
                  .citation = "Sethian99, Zhao05",
                  .quick = {8, 12, 24},
                  .full = {16, 32, 64},
-                 .bounds = {{"sphere, marching, order 2", "band_out_linf_vx", 0.05},
-                            {"sphere, sweeping, order 2", "band_out_linf_vx", 0.05},
-                            {"two spheres, sweeping, order 2", "band_out_linf_vx", 0.15},
-                            {"sphere, sweeping, order 2", "band_in_linf_vx", 0.02, 64},
-                            {"sphere, sweeping, order 2", "band_out_linf_vx", 0.02, 64},
-                            {"two spheres, marching, order 2", "band_out_linf_vx", 0.15},
-                            {"sphere, marching, order 2", "band_in_linf_vx", 0.5},
-                            {"sphere, sweeping, order 2", "band_in_linf_vx", 0.5},
-                            {"two spheres, marching, order 2", "band_in_linf_vx", 0.5},
-                            {"two spheres, sweeping, order 2", "band_in_linf_vx", 0.5}},
+                 .bounds = eikonalSurfaceBounds(),
                  .run = fromSurface});
   all.push_back({.name = "closest-point",
                  .group = "closest point",
@@ -295,13 +361,7 @@ void addEikonalCases(std::vector<Case>& all) {
                  .citation = "Chopp01, Saye14",
                  .quick = {8, 12, 24},
                  .full = {16, 32, 64},
-                 .bounds = {{"sphere", "surface_linf_vx", 1e-3},
-                            {"sphere", "surface_linf_vx", 1e-4, 32},
-                            {"sphere", "surface_linf_vx", 1e-4, 64},
-                            {"sphere", "value_error", 0.05},
-                            {"sphere", "missing_band", 0},
-                            {"torus", "missing_band", 0},
-                            {"torus", "order_surface", 2.8, 32, Sense::AtLeast}},
+                 .bounds = closestPointBounds(),
                  .run = closest});
 }
 

@@ -37,14 +37,6 @@ void scales(Recorder& out) {
   }
 }
 
-std::vector<Bound> scaleBounds() {
-  std::vector<Bound> bounds;
-  for (const char* variant : {"voxel 1", "voxel 1e-6", "voxel 1e6", "1e6 voxels from the origin"})
-    for (const char* figure : {"band_in_linf_vx", "band_out_linf_vx"})
-      bounds.push_back({variant, figure, 0.05});
-  return bounds;
-}
-
 void halfWidths(Recorder& out) {
   for (const Sample& at : out.samples()) {
     for (const double width : {1.0, 1.5, 3.0, 50.0}) {
@@ -139,27 +131,150 @@ void tenMillion(Recorder& out) {
               [&] { return levelset::offset(field, 3 * at.voxelSize); });
 }
 
-std::vector<Bound> contactBounds() {
-  std::vector<Bound> bounds = {
-      {"torus closes its hole", "surface_l1_vx", 0.02},
-      {"union of balls that touch", "band_out_linf_vx", 0.1},
-      {"union of balls that touch", "band_in_linf_vx", 0.1},
-      {"union of balls 0.3 voxels apart", "band_out_linf_vx", 0.1},
-      {"union of balls 0.3 voxels apart", "band_in_linf_vx", 0.1},
-      {"boxes that share a face, united", "volume_error", 0.02, 32},
-      {"boxes that share a face, united", "band_in_linf_vx", 0.75},
-      {"boxes that share a face, united", "band_out_linf_vx", 0.75},
-      {"boxes that share a face, united", "surface_linf_vx", 0.75},
-      {"boxes that share a face, united", "surface_l1_vx", 0.03},
-      {"box cut by one with three faces in common", "volume_error", 0.02, 32},
-      {"box cut by one with three faces in common", "band_in_linf_vx", 0.75},
-      {"box cut by one with three faces in common", "band_out_linf_vx", 0.75},
-      {"box cut by one with three faces in common", "surface_linf_vx", 0.75},
-      {"box cut by one with three faces in common", "surface_l1_vx", 0.03}};
-  for (const char* variant :
-       {"boxes that share a face, united", "box cut by one with three faces in common"})
-    allowAtEdges(bounds, variant, 1.2, {12, 16, 24, 32, 64});
-  return bounds;
+Bounds scalesBounds() {
+  return Bounds()
+      .measured("voxel 1", "band_in_linf_vx",
+                {{6, 0.00252},
+                 {8, 0.000952},
+                 {12, 0.000487},
+                 {16, 0.000292},
+                 {32, 7.96e-5},
+                 {64, 2.07e-5}})
+      .measured("voxel 1", "band_out_linf_vx",
+                {{6, 0.00248},
+                 {8, 0.00103},
+                 {12, 0.000489},
+                 {16, 0.000292},
+                 {32, 7.96e-5},
+                 {64, 2.07e-5}})
+      .measured("voxel 1e-6", "band_in_linf_vx",
+                {{6, 0.00252},
+                 {8, 0.000952},
+                 {12, 0.000487},
+                 {16, 0.000292},
+                 {32, 7.96e-5},
+                 {64, 2.07e-5}})
+      .measured("voxel 1e-6", "band_out_linf_vx",
+                {{6, 0.00248},
+                 {8, 0.00103},
+                 {12, 0.000489},
+                 {16, 0.000292},
+                 {32, 7.96e-5},
+                 {64, 2.07e-5}})
+      .measured("voxel 1e6", "band_in_linf_vx",
+                {{6, 0.00252},
+                 {8, 0.000952},
+                 {12, 0.000487},
+                 {16, 0.000292},
+                 {32, 7.96e-5},
+                 {64, 2.07e-5}})
+      .measured("voxel 1e6", "band_out_linf_vx",
+                {{6, 0.00248},
+                 {8, 0.00103},
+                 {12, 0.000489},
+                 {16, 0.000292},
+                 {32, 7.96e-5},
+                 {64, 2.07e-5}})
+      .measured("1e6 voxels from the origin", "band_in_linf_vx",
+                {{6, 0.00252},
+                 {8, 0.000952},
+                 {12, 0.000487},
+                 {16, 0.000292},
+                 {32, 7.96e-5},
+                 {64, 2.07e-5}})
+      .measured("1e6 voxels from the origin", "band_out_linf_vx",
+                {{6, 0.00248},
+                 {8, 0.00103},
+                 {12, 0.000489},
+                 {16, 0.000292},
+                 {32, 7.96e-5},
+                 {64, 2.07e-5}});
+}
+
+Bounds halfWidthsBounds() {
+  return Bounds()
+      .measured(
+          "half width 1.0", "band_in_linf_vx",
+          {{6, 0.0177}, {8, 0.00853}, {12, 0.00603}, {16, 0.00486}, {32, 0.00467}, {64, 0.0039}})
+      .measured(
+          "half width 1.0", "band_out_linf_vx",
+          {{6, 0.0143}, {8, 0.00895}, {12, 0.00573}, {16, 0.00495}, {32, 0.00467}, {64, 0.00345}})
+      .measured("half width 1.0", "surface_linf_vx",
+                {{6, 0.0265}, {8, 0.0189}, {12, 0.0158}, {16, 0.0142}, {32, 0.0122}, {64, 0.0115}})
+      .measured(
+          "half width 1.5", "band_in_linf_vx",
+          {{6, 0.00863}, {8, 0.00641}, {12, 0.0044}, {16, 0.00306}, {32, 0.00153}, {64, 0.00066}})
+      .measured(
+          "half width 1.5", "band_out_linf_vx",
+          {{6, 0.00897}, {8, 0.00646}, {12, 0.00414}, {16, 0.00295}, {32, 0.00148}, {64, 0.000657}})
+      .measured("half width 3.0", "band_in_linf_vx",
+                {{6, 0.0017}, {16, 9.85e-5}, {32, 7.15e-6}, {64, 1.63e-5}})
+      .rounding("half width 3.0", "band_in_linf_vx", 1.5, 8)
+      .rounding("half width 3.0", "band_in_linf_vx", 1.5, 12)
+      .measured("half width 3.0", "band_out_linf_vx",
+                {{6, 0.00167}, {16, 8.46e-5}, {32, 1.48e-5}, {64, 1.52e-5}})
+      .rounding("half width 3.0", "band_out_linf_vx", 1.5, 8)
+      .rounding("half width 3.0", "band_out_linf_vx", 1.5, 12)
+      .measured("half width 50", "band_out_linf_vx",
+                {{6, 0.00171}, {16, 0.000207}, {32, 1.14e-5}, {64, 1.76e-5}})
+      .zero("half width 50", "checks_failed")
+      .measured("background 10 voxels, band 3", "band_in_linf_vx",
+                {{6, 0.00256}, {16, 9.85e-5}, {32, 7.15e-6}, {64, 1.63e-5}})
+      .rounding("background 10 voxels, band 3", "band_in_linf_vx", 1.5, 8)
+      .rounding("background 10 voxels, band 3", "band_in_linf_vx", 1.5, 12)
+      .measured("background 10 voxels, band 3", "band_out_linf_vx",
+                {{6, 0.00252}, {8, 0.000791}, {16, 8.46e-5}, {32, 1.48e-5}, {64, 1.52e-5}})
+      .rounding("background 10 voxels, band 3", "band_out_linf_vx", 1.5, 12)
+      .measured("half width 1.0", "missed_hits",
+                {{6, 0.00334}, {16, 0.00047}, {32, 0.000253}, {64, 0.000113}});
+}
+
+Bounds contactBounds() {
+  return Bounds()
+      .measured("torus closes its hole", "surface_l1_vx",
+                {{12, 0.00254}, {16, 0.00126}, {24, 0.000508}})
+      .rounding("union of balls that touch", "band_out_linf_vx", 1.5)
+      .rounding("union of balls that touch", "band_in_linf_vx", 1.5)
+      .rounding("union of balls 0.3 voxels apart", "band_out_linf_vx", 1.5)
+      .rounding("union of balls 0.3 voxels apart", "band_in_linf_vx", 1.5)
+      .measured("boxes that share a face, united", "band_in_linf_vx",
+                {{12, 0.739}, {16, 0.505}, {24, 0.505}})
+      .ceiling(0.75)
+      .measured("boxes that share a face, united", "band_out_linf_vx",
+                {{12, 0.545}, {16, 0.505}, {24, 0.505}})
+      .ceiling(0.75)
+      .measured("boxes that share a face, united", "surface_linf_vx",
+                {{12, 0.51}, {16, 0.502}, {24, 0.492}})
+      .ceiling(0.75)
+      .measured("boxes that share a face, united", "surface_l1_vx",
+                {{12, 0.0285}, {16, 0.0249}, {24, 0.0172}})
+      .ceiling(0.03)
+      .measured("box cut by one with three faces in common", "band_in_linf_vx",
+                {{12, 0.111}, {16, 0.111}, {24, 0.111}})
+      .measured("box cut by one with three faces in common", "band_out_linf_vx",
+                {{12, 0.488}, {16, 0.397}, {24, 0.397}})
+      .measured("box cut by one with three faces in common", "surface_linf_vx",
+                {{12, 0.319}, {16, 0.292}, {24, 0.239}})
+      .measured("box cut by one with three faces in common", "surface_l1_vx",
+                {{12, 0.0298}, {16, 0.0216}, {24, 0.0137}})
+      .ceiling(0.03)
+      .measured("boxes that share a face, united", "missed_hits",
+                {{12, 0.0482}, {16, 0.0294}, {24, 0.0242}})
+      .measured("box cut by one with three faces in common", "missed_hits",
+                {{12, 0.0462}, {16, 0.0498}, {24, 0.0235}})
+      .measured("torus closes its hole", "missed_hits", {{12, 0.000757}, {24, 0.00062}})
+      .measured("boxes that share a face, united", "volume_error",
+                {{12, 0.0386}, {16, 0.0117}, {24, 0.00614}})
+      .measured("box cut by one with three faces in common", "volume_error",
+                {{12, 0.0633}, {16, 0.0126}, {24, 0.00617}});
+}
+
+Bounds tenMillionBounds() {
+  return Bounds()
+
+      .required("re-distanced", "peak_bytes", 4e9, 365)
+      .required("re-distanced", "active_voxels", 1e7, 365, Sense::AtLeast)
+      .required("grown by 3 voxels", "peak_bytes", 4e9, 365);
 }
 
 }  // namespace
@@ -175,7 +290,7 @@ void addExtremeCases(std::vector<Case>& all) {
                  .citation = "closed form",
                  .quick = {6, 8, 12},
                  .full = {16, 32, 64},
-                 .bounds = scaleBounds(),
+                 .bounds = scalesBounds(),
                  .run = scales});
   all.push_back({.name = "half-widths",
                  .group = "half widths",
@@ -186,17 +301,7 @@ void addExtremeCases(std::vector<Case>& all) {
                  .citation = "closed form",
                  .quick = {6, 8, 12},
                  .full = {16, 32, 64},
-                 .bounds = {{"half width 1.0", "band_in_linf_vx", 0.05},
-                            {"half width 1.0", "band_out_linf_vx", 0.05},
-                            {"half width 1.0", "surface_linf_vx", 0.05},
-                            {"half width 1.5", "band_in_linf_vx", 0.05},
-                            {"half width 1.5", "band_out_linf_vx", 0.05},
-                            {"half width 3.0", "band_in_linf_vx", 0.05},
-                            {"half width 3.0", "band_out_linf_vx", 0.05},
-                            {"half width 50", "band_out_linf_vx", 0.05},
-                            {"half width 50", "checks_failed", 0},
-                            {"background 10 voxels, band 3", "band_in_linf_vx", 0.05},
-                            {"background 10 voxels, band 3", "band_out_linf_vx", 0.05}},
+                 .bounds = halfWidthsBounds(),
                  .run = halfWidths});
   all.push_back(
       {.name = "contact",
@@ -220,11 +325,7 @@ void addExtremeCases(std::vector<Case>& all) {
                      "budget only.",
                  .citation = "closed form",
                  .full = {365},
-                 .bounds = {{"re-distanced", "peak_bytes", 4e9, 365},
-                            {"re-distanced", "band_in_linf_vx", 0.05, 365},
-                            {"re-distanced", "active_voxels", 1e7, 365, Sense::AtLeast},
-                            {"grown by 3 voxels", "peak_bytes", 4e9, 365},
-                            {"grown by 3 voxels", "band_out_linf_vx", 0.05, 365}},
+                 .bounds = tenMillionBounds(),
                  .run = tenMillion});
 }
 

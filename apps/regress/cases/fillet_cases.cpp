@@ -180,6 +180,33 @@ void roundBalls(Recorder& out) {
   }
 }
 
+Bounds filletPlanesBounds() {
+  return Bounds()
+      .measured("45 degrees", "value_error", {{2, 0.00687}, {3, 0.00393}, {4, 0.00158}})
+      .measured("90 degrees", "value_error", {{2, 0.00688}, {3, 0.000967}, {4, 0.000806}})
+      .measured("135 degrees", "value_error", {{2, 0.00932}, {3, 0.00281}, {4, 0.00215}})
+      .rounding("45 degrees", "deviation_vx", 0.5)
+      .rounding("90 degrees", "deviation_vx", 0.5)
+      .rounding("135 degrees", "deviation_vx", 0.5);
+}
+
+Bounds filletCylindersBounds() {
+  return Bounds()
+      .measured("crossed cylinders", "value_error", {{3, 0.0042}, {4, 0.000835}, {5, 0.000325}})
+      .zero("crossed cylinders", "checks_failed")
+      .zero("crossed cylinders", "cavities");
+}
+
+Bounds filletBallsBounds() {
+  return Bounds()
+      .measured("balls", "band_in_linf_vx", {{10, 0.000894}, {14, 0.00049}, {20, 0.000186}})
+      .measured("balls", "band_out_linf_vx", {{10, 0.000844}, {14, 0.000457}, {20, 0.000204}})
+      .measured("balls", "surface_l1_vx", {{10, 0.000629}, {14, 0.00031}, {20, 0.000139}})
+      .measured("balls", "surface_linf_vx", {{10, 0.0142}, {14, 0.00889}, {20, 0.00677}})
+      .measured("balls", "volume_error", {{10, 9.3e-6}, {14, 1.15e-6}})
+      .rounding("balls", "volume_error", 1, 20);
+}
+
 }  // namespace
 
 void addFilletCases(std::vector<Case>& all) {
@@ -195,15 +222,7 @@ void addFilletCases(std::vector<Case>& all) {
        .citation = "closed form; Rossignac84",
        .quick = {2, 3, 4},
        .full = {4, 8, 16},
-       .bounds = {{"45 degrees", "value_error", 0.02, 4},
-                  {"90 degrees", "value_error", 0.02, 4},
-                  {"135 degrees", "value_error", 0.02, 4},
-                  {"45 degrees", "value_error", 0.02, 8},
-                  {"90 degrees", "value_error", 0.02, 8},
-                  {"135 degrees", "value_error", 0.02, 8},
-                  {"45 degrees", "deviation_vx", 1e-3},
-                  {"90 degrees", "deviation_vx", 1e-3},
-                  {"135 degrees", "deviation_vx", 1e-3}},
+       .bounds = filletPlanesBounds(),
        .run = roundWedges});
   all.push_back(
       {.name = "fillet-cylinders",
@@ -217,9 +236,7 @@ void addFilletCases(std::vector<Case>& all) {
        .citation = "closed form; Rossignac84",
        .quick = {3, 4, 5},
        .full = {4, 8, 16},
-       .bounds = {{"crossed cylinders", "value_error", 0.02},
-                  {"crossed cylinders", "checks_failed", 0},
-                  {"crossed cylinders", "cavities", 0}},
+       .bounds = filletCylindersBounds(),
        .run = roundCylinders});
   all.push_back(
       {.name = "fillet-balls",
@@ -232,11 +249,7 @@ void addFilletCases(std::vector<Case>& all) {
        .citation = "closed form; Rossignac84",
        .quick = {10, 14, 20},
        .full = {16, 24, 32},
-       .bounds = {{"balls", "band_in_linf_vx", 0.005},
-                  {"balls", "band_out_linf_vx", 0.005},
-                  {"balls", "surface_l1_vx", 0.002},
-                  {"balls", "surface_linf_vx", 0.03},
-                  {"balls", "volume_error", 0.001}},
+       .bounds = filletBallsBounds(),
        .run = roundBalls});
 }
 

@@ -115,6 +115,28 @@ void meshEdges(Recorder& out) {
   }
 }
 
+Bounds meshRoundTripBounds() {
+  return Bounds()
+      .rounding("cube", "band_in_linf_vx", 1.5)
+      .rounding("cube", "band_out_linf_vx", 1.5)
+      .rounding("rotated cube", "band_in_linf_vx", 1.5)
+      .rounding("rotated cube", "band_out_linf_vx", 1.5)
+      .order("torus and back", "order_surface", {{24, 2.11}})
+      .measured("torus and back", "band_in_linf_vx", {{12, 0.17}, {16, 0.111}, {24, 0.0835}})
+      .ceiling(0.25)
+      .measured("torus and back", "band_out_linf_vx", {{12, 0.17}, {16, 0.11}, {24, 0.0825}})
+      .ceiling(0.25)
+      .measured("torus and back", "surface_l1_vx", {{12, 0.0265}, {16, 0.0199}, {24, 0.0127}})
+      .measured("torus and back", "missed_hits", {{12, 0.0215}, {16, 0.00669}, {24, 0.00109}})
+      .ceiling(0.025);
+}
+
+Bounds sharpMeshBounds() {
+  return Bounds()
+      .measured("sharp", "value_error", {{16, 0.00627}, {24, 0.00245}, {32, 0.00467}})
+      .measured("sharp", "mesh_linf_vx", {{16, 0.00396}, {24, 0.000823}, {32, 0.00272}});
+}
+
 }  // namespace
 
 void addMeshCases(std::vector<Case>& all) {
@@ -129,15 +151,7 @@ void addMeshCases(std::vector<Case>& all) {
        .citation = "closed forms; Jones95",
        .quick = {12, 16, 24},
        .full = {32, 64, 128},
-       .bounds = {{"cube", "band_in_linf_vx", 1e-4},
-                  {"cube", "band_out_linf_vx", 1e-4},
-                  {"rotated cube", "band_in_linf_vx", 1e-4},
-                  {"rotated cube", "band_out_linf_vx", 1e-4},
-                  {"torus and back", "order_surface", 1.8, 24, Sense::AtLeast},
-                  {"torus and back", "order_surface", 1.8, 64, Sense::AtLeast},
-                  {"torus and back", "band_in_linf_vx", 0.25},
-                  {"torus and back", "band_out_linf_vx", 0.25},
-                  {"torus and back", "surface_l1_vx", 0.05}},
+       .bounds = meshRoundTripBounds(),
        .run = convertMeshes});
   all.push_back(
       {.name = "sharp-mesh",
@@ -150,7 +164,7 @@ void addMeshCases(std::vector<Case>& all) {
        .citation = "Ju02",
        .quick = {16, 24, 32},
        .full = {32, 64, 128},
-       .bounds = {{"sharp", "value_error", 0.05}, {"sharp", "mesh_linf_vx", 0.05}},
+       .bounds = sharpMeshBounds(),
        .run = meshEdges});
 }
 

@@ -74,6 +74,34 @@ void hollow(Recorder& out) {
   }
 }
 
+Bounds openingClosingBounds() {
+  return Bounds()
+      .measured("opening of a box", "band_in_linf_vx", {{12, 0.0297}, {16, 0.00944}, {24, 0.00863}})
+      .measured("opening of a box", "band_out_linf_vx", {{12, 0.032}, {16, 0.015}, {24, 0.00858}})
+      .measured("opening of a box", "surface_l1_vx", {{12, 0.0072}, {16, 0.00297}, {24, 0.00134}})
+      .measured("closing of a box", "band_in_linf_vx",
+                {{12, 0.000939}, {16, 0.000124}, {24, 0.000313}})
+      .measured("closing of a box", "band_out_linf_vx",
+                {{12, 0.00196}, {16, 0.000124}, {24, 0.000313}})
+      .measured("opening of a box", "missed_hits", {{12, 0.00262}, {16, 0.00218}})
+      .measured("closing of a box", "surface_l1_vx", {{12, 0.0222}, {16, 0.0149}, {24, 0.0104}})
+      .measured("opening of a dumb-bell", "surface_l1_vx",
+                {{12, 0.00865}, {16, 0.00284}, {24, 0.00469}})
+      .measured("closing of a box", "missed_hits", {{12, 0.0602}, {16, 0.039}, {24, 0.0234}})
+      .measured("opening of a dumb-bell", "missed_hits", {{12, 0.00422}, {24, 0.00167}});
+}
+
+Bounds shellBounds() {
+  return Bounds()
+      .measured("wall of a sphere", "surface_l1_vx", {{12, 0.00177}, {16, 0.000165}, {24, 3.06e-5}})
+      .ceiling(0.002)
+      .measured("wall of a sphere", "band_in_linf_vx",
+                {{12, 0.00076}, {16, 0.000429}, {24, 0.000195}})
+      .measured("wall of a sphere", "band_out_linf_vx",
+                {{12, 0.000751}, {16, 0.000428}, {24, 0.000162}})
+      .measured("wall of a sphere", "missed_hits", {{12, 0.000456}});
+}
+
 }  // namespace
 
 void addMorphologyCases(std::vector<Case>& all) {
@@ -88,14 +116,7 @@ void addMorphologyCases(std::vector<Case>& all) {
                  .citation = "Serra82",
                  .quick = {12, 16, 24},
                  .full = {32, 64, 128},
-                 .bounds = {{"opening of a box", "surface_l1_vx", 0.05, 64},
-                            {"closing of a box", "surface_l1_vx", 0.05, 64},
-                            {"opening of a dumb-bell", "surface_l1_vx", 0.05, 64},
-                            {"opening of a box", "band_in_linf_vx", 0.1},
-                            {"opening of a box", "band_out_linf_vx", 0.1},
-                            {"opening of a box", "surface_l1_vx", 0.02},
-                            {"closing of a box", "band_in_linf_vx", 0.05},
-                            {"closing of a box", "band_out_linf_vx", 0.05}},
+                 .bounds = openingClosingBounds(),
                  .run = openAndClose});
   all.push_back({.name = "shell",
                  .group = "shell",
@@ -104,9 +125,7 @@ void addMorphologyCases(std::vector<Case>& all) {
                  .citation = "closed form",
                  .quick = {12, 16, 24},
                  .full = {16, 32, 64},
-                 .bounds = {{"wall of a sphere", "surface_l1_vx", 0.002},
-                            {"wall of a sphere", "band_in_linf_vx", 0.05},
-                            {"wall of a sphere", "band_out_linf_vx", 0.05}},
+                 .bounds = shellBounds(),
                  .run = hollow});
 }
 

@@ -78,6 +78,65 @@ void offsetLaws(Recorder& out) {
   }
 }
 
+Bounds offsetSphereBounds() {
+  return Bounds()
+      .measured("+10 voxels", "surface_l1_vx", {{8, 0.000196}, {24, 2.07e-5}, {64, 3.46e-6}})
+      .measured("+10 voxels", "band_in_linf_vx", {{8, 0.00092}, {24, 0.0001}, {64, 1.85e-5}})
+      .measured("+10 voxels", "band_out_linf_vx", {{8, 0.000922}, {24, 9.99e-5}, {64, 1.97e-5}})
+      .measured("-5 voxels", "surface_l1_vx", {{8, 0.00281}, {24, 3.96e-5}, {64, 4.43e-6}})
+      .measured("-5 voxels", "band_in_linf_vx", {{8, 0.00827}, {24, 0.000176}, {64, 2.34e-5}})
+      .measured("-5 voxels", "band_out_linf_vx", {{8, 0.00827}, {24, 0.00015}, {64, 2.36e-5}});
+}
+
+Bounds offsetCubeBounds() {
+  return Bounds()
+      .measured("cube, -5 voxels", "band_in_linf_vx", {{14, 0.0563}})
+      .rounding("cube, -5 voxels", "band_in_linf_vx", 1.5, 20)
+      .rounding("cube, -5 voxels", "band_in_linf_vx", 2, 32)
+      .measured("cube, -5 voxels", "band_out_linf_vx", {{14, 0.772}})
+      .rounding("cube, -5 voxels", "band_out_linf_vx", 2, 20)
+      .rounding("cube, -5 voxels", "band_out_linf_vx", 2, 32)
+      .measured("rotated cube, -5 voxels", "band_in_linf_vx",
+                {{14, 0.0208}, {20, 1.79e-5}, {32, 0.000116}})
+      .measured("rotated cube, -5 voxels", "band_out_linf_vx",
+                {{14, 0.322}, {20, 0.000335}, {32, 0.000297}})
+      .measured("cube, +5 voxels", "band_in_linf_vx", {{14, 0.0139}, {20, 0.00854}, {32, 0.00854}})
+      .measured("cube, +5 voxels", "band_out_linf_vx", {{14, 0.0125}, {20, 0.00748}, {32, 0.00748}})
+      .measured("rotated cube, +5 voxels", "band_in_linf_vx",
+                {{14, 0.0147}, {20, 0.0107}, {32, 0.0138}})
+      .measured("rotated cube, +5 voxels", "band_out_linf_vx",
+                {{14, 0.013}, {20, 0.0114}, {32, 0.0119}})
+      .measured("cube, +5 voxels", "surface_l1_vx", {{14, 0.00171}, {20, 0.00104}, {32, 0.000753}})
+      .measured("rotated cube, +5 voxels", "surface_l1_vx",
+                {{14, 0.00116}, {20, 0.000877}, {32, 0.000632}})
+      .measured("cube, +5 voxels", "missed_hits", {{14, 0.000795}});
+}
+
+Bounds offsetLawsBounds() {
+  return Bounds()
+      .measured("sphere, +3 then +4", "surface_l1_vx",
+                {{6, 0.000347}, {8, 0.000179}, {12, 8.25e-5}})
+      .measured("sphere, +3 then +4", "deviation_vx", {{6, 0.00178}, {8, 0.00116}, {12, 0.000566}})
+      .ceiling(0.002)
+      .measured("sphere, +5 then -5", "surface_l1_vx",
+                {{6, 0.000558}, {8, 0.000288}, {12, 0.000118}})
+      .measured("sphere, +3 then +4", "band_in_linf_vx",
+                {{6, 0.00179}, {8, 0.00101}, {12, 0.00046}})
+      .measured("sphere, +3 then +4", "band_out_linf_vx",
+                {{6, 0.00175}, {8, 0.000993}, {12, 0.000484}})
+      .measured("sphere, +5 then -5", "band_in_linf_vx",
+                {{6, 0.00294}, {8, 0.00102}, {12, 0.000469}})
+      .measured("sphere, +5 then -5", "band_out_linf_vx",
+                {{6, 0.00291}, {8, 0.00112}, {12, 0.000495}})
+      .measured("box, +3 then +4", "band_in_linf_vx", {{6, 0.0276}, {8, 0.0223}, {12, 0.0207}})
+      .measured("box, +3 then +4", "band_out_linf_vx", {{6, 0.0275}, {8, 0.0217}, {12, 0.0212}})
+      .measured("box, +3 then +4", "surface_l1_vx", {{6, 0.00515}, {8, 0.00355}, {12, 0.00322}})
+      .measured("box, +5 then -5", "band_in_linf_vx", {{6, 0.00338}, {8, 0.00119}, {12, 0.00103}})
+      .measured("box, +5 then -5", "band_out_linf_vx", {{6, 0.0132}, {8, 0.00223}, {12, 0.00345}})
+      .measured("sphere, +3 then +4", "missed_hits", {{6, 0.00068}})
+      .measured("box, +3 then +4", "missed_hits", {{6, 0.000822}, {12, 0.000778}});
+}
+
 }  // namespace
 
 void addOffsetCases(std::vector<Case>& all) {
@@ -89,12 +148,7 @@ void addOffsetCases(std::vector<Case>& all) {
        .citation = "closed form",
        .quick = {8, 24, 64},
        .full = {32, 64, 128},
-       .bounds = {{"+10 voxels", "surface_l1_vx", 0.002, 64},
-                  {"+10 voxels", "band_in_linf_vx", 0.05, 64},
-                  {"+10 voxels", "band_out_linf_vx", 0.05, 64},
-                  {"-5 voxels", "surface_l1_vx", 0.002, 64},
-                  {"-5 voxels", "band_in_linf_vx", 0.05, 64},
-                  {"-5 voxels", "band_out_linf_vx", 0.05, 64}},
+       .bounds = offsetSphereBounds(),
        .run = offsetSphere});
   all.push_back(
       {.name = "offset-cube",
@@ -107,32 +161,7 @@ void addOffsetCases(std::vector<Case>& all) {
        .citation = "closed form",
        .quick = {14, 20, 32},
        .full = {40, 80, 160},
-       .bounds = {{"cube, -5 voxels", "band_in_linf_vx", 0.1, 32},
-                  {"cube, -5 voxels", "band_out_linf_vx", 0.1, 32},
-                  {"rotated cube, -5 voxels", "band_in_linf_vx", 0.25, 32},
-                  {"rotated cube, -5 voxels", "band_out_linf_vx", 0.25, 32},
-                  {"cube, -5 voxels", "band_in_linf_vx", 0.1, 80},
-                  {"cube, -5 voxels", "band_out_linf_vx", 0.1, 80},
-                  {"rotated cube, -5 voxels", "band_in_linf_vx", 0.25, 80},
-                  {"rotated cube, -5 voxels", "band_out_linf_vx", 0.25, 80},
-                  {"cube, -5 voxels", "band_in_linf_vx", 0.1, 20},
-                  {"cube, -5 voxels", "band_out_linf_vx", 0.1, 20},
-                  {"cube, -5 voxels", "band_in_linf_vx", 0.1, 40},
-                  {"cube, -5 voxels", "band_out_linf_vx", 0.1, 40},
-                  {"cube, -5 voxels", "band_in_linf_vx", 0.1, 160},
-                  {"cube, -5 voxels", "band_out_linf_vx", 0.1, 160},
-                  {"rotated cube, -5 voxels", "band_in_linf_vx", 0.25, 20},
-                  {"rotated cube, -5 voxels", "band_out_linf_vx", 0.25, 20},
-                  {"rotated cube, -5 voxels", "band_in_linf_vx", 0.25, 40},
-                  {"rotated cube, -5 voxels", "band_out_linf_vx", 0.25, 40},
-                  {"rotated cube, -5 voxels", "band_in_linf_vx", 0.25, 160},
-                  {"rotated cube, -5 voxels", "band_out_linf_vx", 0.25, 160},
-                  {"cube, +5 voxels", "band_in_linf_vx", 0.03},
-                  {"cube, +5 voxels", "band_out_linf_vx", 0.03},
-                  {"rotated cube, +5 voxels", "band_in_linf_vx", 0.03},
-                  {"rotated cube, +5 voxels", "band_out_linf_vx", 0.03},
-                  {"cube, +5 voxels", "surface_l1_vx", 0.005},
-                  {"rotated cube, +5 voxels", "surface_l1_vx", 0.005}},
+       .bounds = offsetCubeBounds(),
        .run = offsetCube});
   all.push_back(
       {.name = "offset-laws",
@@ -144,18 +173,7 @@ void addOffsetCases(std::vector<Case>& all) {
        .citation = "closed form",
        .quick = {6, 8, 12},
        .full = {16, 32, 64},
-       .bounds = {{"sphere, +3 then +4", "surface_l1_vx", 0.002},
-                  {"sphere, +3 then +4", "deviation_vx", 0.002},
-                  {"sphere, +5 then -5", "surface_l1_vx", 0.002},
-                  {"sphere, +3 then +4", "band_in_linf_vx", 0.005},
-                  {"sphere, +3 then +4", "band_out_linf_vx", 0.005},
-                  {"sphere, +5 then -5", "band_in_linf_vx", 0.005},
-                  {"sphere, +5 then -5", "band_out_linf_vx", 0.005},
-                  {"box, +3 then +4", "band_in_linf_vx", 0.05},
-                  {"box, +3 then +4", "band_out_linf_vx", 0.05},
-                  {"box, +3 then +4", "surface_l1_vx", 0.01},
-                  {"box, +5 then -5", "band_in_linf_vx", 0.05},
-                  {"box, +5 then -5", "band_out_linf_vx", 0.05}},
+       .bounds = offsetLawsBounds(),
        .run = offsetLaws});
 }
 

@@ -35,17 +35,20 @@ void sampleShapes(Recorder& out) {
   }
 }
 
-std::vector<Bound> shapeBounds() {
-  std::vector<Bound> bounds;
-  // Voxels hold floats: three voxels' distance is known to 2e-7 of itself.
-  for (const char* variant : {"sphere", "box", "torus", "cylinder", "capsule"})
-    for (const char* figure : {"band_in_linf_vx", "band_out_linf_vx"})
-      bounds.push_back({variant, figure, 2e-6});
-  // A sphere's is below what floats hold at these resolutions, and shows no order.
-  bounds.push_back({"sphere", "volume_error", 1e-6});
-  bounds.push_back({"torus", "order_volume", 1.8, 24, Sense::AtLeast});
-  bounds.push_back({"torus", "order_volume", 1.8, 32, Sense::AtLeast});
-  return bounds;
+Bounds shapesBounds() {
+  return Bounds()
+      .rounding("sphere", "band_in_linf_vx", 1.5)
+      .rounding("sphere", "band_out_linf_vx", 1.5)
+      .rounding("box", "band_in_linf_vx", 1.5)
+      .rounding("box", "band_out_linf_vx", 1.5)
+      .rounding("torus", "band_in_linf_vx", 1.5)
+      .rounding("torus", "band_out_linf_vx", 1.5)
+      .rounding("cylinder", "band_in_linf_vx", 1.5)
+      .rounding("cylinder", "band_out_linf_vx", 1.5)
+      .rounding("capsule", "band_in_linf_vx", 1.5)
+      .rounding("capsule", "band_out_linf_vx", 1.5)
+      .rounding("sphere", "volume_error", 3)
+      .order("torus", "order_volume", {{24, 4.05}, {32, 4.07}});
 }
 
 }  // namespace
@@ -63,7 +66,7 @@ void addShapeCases(std::vector<Case>& all) {
        .citation = "closed forms",
        .quick = {8, 16, 24},
        .full = {16, 32, 64},
-       .bounds = shapeBounds(),
+       .bounds = shapesBounds(),
        .run = sampleShapes});
 }
 

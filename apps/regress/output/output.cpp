@@ -46,11 +46,29 @@ Json toJson(const Row& row) {
   return json;
 }
 
+const char* kindName(Bound::Kind kind) {
+  switch (kind) {
+    case Bound::Kind::Measured:
+      return "measured";
+    case Bound::Kind::Order:
+      return "order";
+    case Bound::Kind::Rounding:
+      return "rounding";
+    case Bound::Kind::Required:
+      return "required";
+    case Bound::Kind::Unmeasured:
+      break;
+  }
+  return "unmeasured";
+}
+
 Json toJson(const Judgement& j) {
   Json json{{"variant", j.bound.variant},
             {"figure", j.bound.figure},
             {"sense", j.bound.sense == Sense::AtMost ? "at most" : "at least"},
-            {"limit", j.bound.limit},
+            {"kind", kindName(j.bound.kind)},
+            {"stated", j.bound.stated},
+            {"limit", j.bound.limit()},
             {"resolution", j.resolution},
             {"found", j.found},
             {"passed", j.passed}};

@@ -68,17 +68,34 @@ void appendSummary(const CaseResult& result, std::string& html) {
   html += "</table></div>\n";
 }
 
+/// The figure that a bound states, as text.
+std::string stated(const Bound& bound) {
+  switch (bound.kind) {
+    case Bound::Kind::Measured:
+    case Bound::Kind::Order:
+      return number(bound.stated);
+    case Bound::Kind::Rounding:
+      return fmt::format("{:g} ε", bound.stated);
+    case Bound::Kind::Required:
+      return "required";
+    case Bound::Kind::Unmeasured:
+      break;
+  }
+  return "not measured";
+}
+
 void appendBounds(const CaseResult& result, std::string& html) {
   if (result.judgements.empty()) return;
   html +=
-      "<table><tr><th>bound on</th><th>figure</th><th>resolution</th><th>bound</th>"
+      "<table><tr><th>bound on</th><th>figure</th><th>resolution</th><th>stated</th><th>bound</th>"
       "<th>found</th></tr>\n";
   for (const Judgement& j : result.judgements)
     html += fmt::format(
-        "<tr class=\"{}\"><td class=\"t\">{}</td><td class=\"t\">{}</td><td>{}</td><td>{} {}</td>"
+        "<tr class=\"{}\"><td class=\"t\">{}</td><td "
+        "class=\"t\">{}</td><td>{}</td><td>{}</td><td>{} {}</td>"
         "<td>{}</td></tr>\n",
         j.passed ? "good" : "bad", escapedHtml(j.bound.variant), j.bound.figure, j.resolution,
-        j.bound.sense == Sense::AtMost ? "≤" : "≥", number(j.bound.limit),
+        stated(j.bound), j.bound.sense == Sense::AtMost ? "≤" : "≥", number(j.bound.limit()),
         j.remark.empty() ? number(j.found) : escapedHtml(j.remark));
   html += "</table>\n";
 }

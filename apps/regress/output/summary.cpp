@@ -1,6 +1,9 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <set>
 #include <string>
 
 #include "apps/regress/recorder.h"
@@ -8,21 +11,20 @@
 namespace regress {
 namespace {
 
-/// What is not there has no error: a figure of it that is judged wherever errors are, unless the
-/// case has a bound of its own for it, and says why.
+/// Share of missing values. A missing value has no error, so this share must be zero wherever
+/// errors are bounded, unless the case states another figure.
 struct Presence {
   const char* figure;
-  const char* errors[2];  ///< how the names of the figures begin that say nothing of it
-  double most;
+  const char* errors[2];  ///< prefixes of the error columns that do not see missing values
 };
-constexpr Presence kPresences[] = {{"missing_band", {"band_", "order_band"}, 0},
-                                   {"missed_hits", {"surface_l", "order_surface"}, kMostMissed}};
+constexpr Presence kPresences[] = {{"missing_band", {"band_", "order_band"}},
+                                   {"missed_hits", {"surface_l", "order_surface"}}};
 
 bool isCost(const std::string& column) {
   return column == "cpu_s";
 }
 
-/// Largest magnitude, sign kept; costs are averaged.
+/// Largest magnitude with its sign; mean of the costs.
 Row worstOf(const std::vector<const Row*>& placements) {
   Row worst = *placements.front();
   worst.phase = -1;
@@ -46,8 +48,8 @@ double figure(const Row& row, const char* column) {
   return it == row.figures.end() ? 0 : std::abs(it->second);
 }
 
-/// The order that two resolutions show. Where the finer error is at the limit of float there is
-/// none to see.
+/// Adds the order of convergence between two resolutions. Does nothing where the finer error is at
+/// the rounding level of float.
 void addOrder(const char* name, double coarse, double fine, double floor, const Row& before,
               Row& row) {
   if (!(coarse > 0) || !(fine > floor)) return;
@@ -73,7 +75,7 @@ void addOrders(const Row& before, Row& row) {
 }  // namespace
 
 std::vector<Row> summarize(const std::vector<Row>& rows) {
-  // In the order in which they came first.
+  // Groups keep the order of their first rows.
   std::vector<std::vector<const Row*>> groups;
   for (const Row& row : rows) {
     const auto it = std::find_if(groups.begin(), groups.end(), [&](const auto& group) {
@@ -87,7 +89,7 @@ std::vector<Row> summarize(const std::vector<Row>& rows) {
   }
   std::vector<Row> summary;
   for (const auto& group : groups) {
-    // A refused placement has no figures: start from one that has.
+    // A refused placement has no figures, so accepted placements come first.
     std::vector<const Row*> placements = group;
     std::stable_partition(placements.begin(), placements.end(),
                           [](const Row* row) { return row->failure.empty(); });
@@ -104,14 +106,19 @@ std::vector<Row> summarize(const std::vector<Row>& rows) {
 
 namespace {
 
-void judgePresence(const Case& of, const Row& row, const Presence& presence,
+bool fits(const Bound& bound, const Row& row, Budget budget) {
+  return bound.isFor(budget) && bound.variant == row.variant &&
+         (bound.resolution == 0 || bound.resolution == row.resolution);
+}
+
+/// Adds a judgement where the case bounds errors, but does not state the share of missing values.
+void judgePresence(const Case& of, const Row& row, const Presence& presence, Budget budget,
                    std::vector<Judgement>& judgements) {
   const auto found = row.figures.find(presence.figure);
   if (found == row.figures.end()) return;
-  const auto isBounded = [&](const auto& fits) {
+  const auto isBounded = [&](const auto& isWanted) {
     return std::any_of(of.bounds.begin(), of.bounds.end(), [&](const Bound& bound) {
-      return bound.variant == row.variant && fits(bound.figure) &&
-             (bound.resolution == 0 || bound.resolution == row.resolution);
+      return fits(bound, row, budget) && isWanted(bound.figure);
     });
   };
   if (isBounded([&](const std::string& figure) { return figure == presence.figure; })) return;
@@ -120,11 +127,51 @@ void judgePresence(const Case& of, const Row& row, const Presence& presence,
                            [&](const char* start) { return figure.starts_with(start); });
       }))
     return;
-  judgements.push_back({{row.variant, presence.figure, presence.most, row.resolution},
-                        row.resolution,
-                        found->second,
-                        found->second <= presence.most,
-                        {}});
+  const Bound none{.variant = row.variant,
+                   .figure = presence.figure,
+                   .kind = Bound::Kind::Required,
+                   .resolution = row.resolution};
+  judgements.push_back({none, row.resolution, found->second, none.isMet(found->second), {}});
+}
+
+/// Adds a failure for each figure that has measured bounds, but none at the resolution of `row`.
+void judgeCompleteness(const Case& of, const Row& row, Budget budget,
+                       std::vector<Judgement>& judgements) {
+  std::set<std::string> bounded, stated;
+  for (const Bound& bound : of.bounds) {
+    if (bound.variant != row.variant) continue;
+    if (bound.kind == Bound::Kind::Measured) bounded.insert(bound.figure);
+    if (fits(bound, row, budget)) stated.insert(bound.figure);
+  }
+  for (const std::string& figure : bounded) {
+    const auto found = row.figures.find(figure);
+    // A share of missing values that is not stated must be zero: judgePresence().
+    const bool isShare =
+        std::any_of(std::begin(kPresences), std::end(kPresences),
+                    [&](const Presence& presence) { return figure == presence.figure; });
+    if (isShare || stated.contains(figure) || found == row.figures.end()) continue;
+    judgements.push_back({{.variant = row.variant, .figure = figure, .resolution = row.resolution},
+                          row.resolution,
+                          found->second,
+                          false,
+                          "the case states no measured figure at this resolution"});
+  }
+}
+
+/// Compares the figure of a row with its bound.
+void judgeFigure(const Row& row, Judgement& j) {
+  const auto it = row.figures.find(j.bound.figure);
+  if (!row.failure.empty() || it == row.figures.end()) {
+    j.remark = row.failure.empty() ? "the figure was not measured" : row.failure;
+    return;
+  }
+  j.found = it->second;
+  const bool isStale = j.bound.isStale(j.found);
+  j.passed = j.bound.isMet(j.found) && !isStale;
+  if (isStale && j.bound.isMet(j.found))
+    j.remark = fmt::format(
+        "found {:.4g}, the limit {:.4g} is too loose: the stated figure {:.4g} is out of date",
+        j.found, j.bound.limit(), j.bound.stated);
 }
 
 }  // namespace
@@ -132,40 +179,37 @@ void judgePresence(const Case& of, const Row& row, const Presence& presence,
 std::vector<Judgement> judge(const Case& of, const std::vector<Row>& summary, Budget budget) {
   std::vector<Judgement> judgements;
   for (const Bound& bound : of.bounds) {
+    if (!bound.isFor(budget)) continue;
     bool met = false;
     for (const Row& row : summary) {
-      if (row.tool != kOurs || row.variant != bound.variant ||
-          (bound.resolution && row.resolution != bound.resolution))
-        continue;
+      if (row.tool != kOurs || !fits(bound, row, budget)) continue;
       met = true;
-      Judgement& j = judgements.emplace_back(Judgement{bound, row.resolution, 0, false, {}});
-      const auto it = row.figures.find(bound.figure);
-      if (!row.failure.empty() || it == row.figures.end()) {
-        j.remark = row.failure.empty() ? "the figure was not measured" : row.failure;
-        continue;
-      }
-      j.found = it->second;
-      j.passed =
-          bound.sense == Sense::AtMost ? std::abs(j.found) <= bound.limit : j.found >= bound.limit;
+      judgeFigure(row, judgements.emplace_back(Judgement{bound, row.resolution, 0, false, {}}));
     }
     const std::vector<int>& resolutions = budget == Budget::Full ? of.full : of.quick;
     const auto has = [&](const std::vector<int>& some) {
       return std::find(some.begin(), some.end(), bound.resolution) != some.end();
     };
-    // A bound on a resolution of the other budget is looked at there.
+    // The other budget judges the bounds at its own resolutions.
     if (!met && (bound.resolution == 0 || has(resolutions) || !(has(of.full) || has(of.quick))))
       judgements.push_back({bound, bound.resolution, 0, false, "there is no such row"});
   }
-  for (const Row& row : summary)
-    if (row.tool == kOurs)
-      for (const Presence& presence : kPresences) judgePresence(of, row, presence, judgements);
-  // A refusal is a failure whether or not a bound looks at it.
+  for (const Row& row : summary) {
+    if (row.tool != kOurs) continue;
+    for (const Presence& presence : kPresences)
+      judgePresence(of, row, presence, budget, judgements);
+    judgeCompleteness(of, row, budget, judgements);
+  }
+  // A refused run fails even where no bound looks at it.
   for (const Row& row : summary)
     if (row.tool == kOurs && !row.failure.empty() &&
         std::none_of(judgements.begin(), judgements.end(), [&](const Judgement& j) {
           return j.bound.variant == row.variant && j.resolution == row.resolution && !j.passed;
         }))
-      judgements.push_back({{row.variant, "cpu_s", 0, row.resolution, Sense::AtMost},
+      judgements.push_back({{.variant = row.variant,
+                             .figure = "cpu_s",
+                             .kind = Bound::Kind::Required,
+                             .resolution = row.resolution},
                             row.resolution,
                             0,
                             false,

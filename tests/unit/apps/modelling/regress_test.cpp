@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
+#include <tuple>
 
 #include "apps/regress/errors.h"
 #include "apps/regress/recorder.h"
@@ -258,56 +259,115 @@ TEST(RegressSummary, TakesTheWorstPlacementAndTheOrder) {
   EXPECT_DOUBLE_EQ(summary[1].figures.at("order_volume"), 2);
 }
 
+TEST(RegressBounds, FollowFromTheStatedFigure) {
+  const auto bounds = Bounds()
+                          .measured("v", "surface_l1", {{8, 0.2}, {16, 0.1, Budget::Full}})
+                          .ceiling(0.25)
+                          .order("v", "order_surface", {{16, 2.1}})
+                          .rounding("v", "band_in_l1", 2)
+                          .zero("v", "checks_failed")
+                          .required("v", "active_voxels", 7, 8, Sense::AtLeast)
+                          .unmeasured("v", "surface_l1", 3, {32})
+                          .all();
+  ASSERT_EQ(bounds.size(), 7u);
+  EXPECT_DOUBLE_EQ(bounds[0].limit(), 0.25);
+  EXPECT_TRUE(bounds[0].isFor(Budget::Quick));
+  EXPECT_DOUBLE_EQ(bounds[1].limit(), 0.15);
+  EXPECT_FALSE(bounds[1].isFor(Budget::Quick));
+  EXPECT_DOUBLE_EQ(bounds[2].limit(), 1.8);
+  EXPECT_FALSE(bounds[2].isMet(1.7));
+  EXPECT_DOUBLE_EQ(bounds[3].limit(), 2 * std::ldexp(1.0, -23));
+  EXPECT_FALSE(bounds[4].isMet(1e-9));
+  EXPECT_TRUE(bounds[5].isMet(8));
+  EXPECT_FALSE(bounds[5].isMet(6));
+  EXPECT_DOUBLE_EQ(bounds[6].limit(), 3);
+  EXPECT_FALSE(bounds[6].isFor(Budget::Quick));
+}
+
 TEST(RegressJudge, FailsBoundsThatAreMissedOrFitNothing) {
   Case c{.name = "c", .quick = {8}, .full = {8, 16}};
-  c.bounds = {{"v", "surface_l1", 0.2},
-              {"v", "surface_l1", 0.1, 8},
-              {"v", "surface_l1", 0.1, 16},
-              {"v", "cpu_s", 1, 8, Sense::AtLeast},
-              {"other", "surface_l1", 1}};
+  c.bounds = Bounds()
+                 .measured("v", "surface_l1", {{8, 0.12}})
+                 .measured("v", "band_in_l1", {{8, 0.09}, {16, 0.09}})
+                 .required("v", "cpu_s", 2, 8, Sense::AtLeast)
+                 .required("other", "surface_l1", 1);
   const auto summary = summarize({rowOf(8, 0, 0.15)});
   const auto quick = judge(c, summary, Budget::Quick);
   ASSERT_EQ(quick.size(), 4u);
   EXPECT_TRUE(quick[0].passed);
   EXPECT_FALSE(quick[1].passed);
-  EXPECT_TRUE(quick[2].passed);
+  EXPECT_FALSE(quick[2].passed);
   EXPECT_FALSE(quick[3].passed);
   EXPECT_EQ(judge(c, summary, Budget::Full).size(), 5u);
 }
 
-TEST(RegressJudge, FailsASurfaceThatIsNotThere) {
-  Case c{.name = "c", .quick = {8, 16}, .bounds = {{"v", "surface_l1", 1}}};
+TEST(RegressJudge, FailsALimitAboveThreeTimesTheFigureFound) {
+  Case c{.name = "c", .quick = {8}};
+  const auto passes = [&](double found) {
+    return judge(c, {rowOf(8, 0, found)}, Budget::Quick).at(0).passed;
+  };
+  c.bounds = Bounds().measured("v", "surface_l1", {{8, 0.1}});
+  EXPECT_TRUE(passes(0.14));
+  EXPECT_TRUE(passes(0.06));
+  EXPECT_FALSE(passes(0.16));
+  EXPECT_FALSE(passes(0.04));
+  EXPECT_FALSE(passes(0));
+  // Figures at rounding level and limits of requirements are never out of date.
+  c.bounds = Bounds().rounding("v", "surface_l1", 2);
+  EXPECT_TRUE(passes(1e-12));
+  c.bounds = Bounds().required("v", "surface_l1", 1);
+  EXPECT_TRUE(passes(1e-12));
   Row row = rowOf(8, 0, 0.1);
-  row.figures["missed_hits"] = 0.8 * kMostMissed;
+  row.figures["order_surface"] = 2.2;
+  c.bounds = Bounds().order("v", "order_surface", {{8, 2.1}});
+  EXPECT_TRUE(judge(c, {row}, Budget::Quick).at(0).passed);
+  row.figures["order_surface"] = 3;
+  EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(0).passed);
+}
+
+TEST(RegressJudge, FailsAResolutionWithoutAStatedFigure) {
+  const Case c{
+      .name = "c", .quick = {8, 16}, .bounds = Bounds().measured("v", "surface_l1", {{8, 0.1}})};
+  const auto judged = judge(c, {rowOf(8, 0, 0.1), rowOf(16, 0, 0.1)}, Budget::Quick);
+  ASSERT_EQ(judged.size(), 2u);
+  EXPECT_TRUE(judged[0].passed);
+  EXPECT_EQ(judged[1].resolution, 16);
+  EXPECT_FALSE(judged[1].passed);
+}
+
+TEST(RegressJudge, FailsASurfaceThatIsNotThere) {
+  Case c{.name = "c", .quick = {8}, .bounds = Bounds().measured("v", "surface_l1", {{8, 0.1}})};
+  Row row = rowOf(8, 0, 0.1);
+  row.figures["missed_hits"] = 0;
   EXPECT_TRUE(judge(c, {row}, Budget::Quick).at(1).passed);
-  row.figures["missed_hits"] = 1.2 * kMostMissed;
+  row.figures["missed_hits"] = 0.01;
   EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(1).passed);
-  // Edges: at each resolution as much less as the voxel is smaller.
-  allowAtEdges(c.bounds, "v", 0.4, {8});
-  EXPECT_TRUE(judge(c, {row}, Budget::Quick).at(1).passed);
-  row.figures["missed_hits"] = 0.06;
+  // A case may state the share.
+  c.bounds =
+      Bounds().measured("v", "surface_l1", {{8, 0.1}}).measured("v", "missed_hits", {{8, 0.01}});
+  const auto stated = judge(c, {row}, Budget::Quick);
+  ASSERT_EQ(stated.size(), 2u);
+  EXPECT_TRUE(stated[1].passed);
+  row.figures["missed_hits"] = 0.02;
   EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(1).passed);
-  row.resolution = 16;
-  row.figures["missed_hits"] = 1.2 * kMostMissed;
-  EXPECT_FALSE(judge(c, {row}, Budget::Quick).back().passed);
 }
 
 TEST(RegressJudge, FailsABandThatIsNotThere) {
-  Case c{.name = "c", .bounds = {{"v", "band_in_l1", 1}}};
+  Case c{.name = "c", .bounds = Bounds().measured("v", "band_in_l1", {{8, 0.1}})};
   Row row = rowOf(8, 0, 0.1);
   row.figures["missing_band"] = 0;
   EXPECT_TRUE(judge(c, {row}, Budget::Quick).at(1).passed);
   row.figures["missing_band"] = 1e-6;
   EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(1).passed);
-  // A case may allow for some, by a bound of its own.
-  c.bounds.push_back({"v", "missing_band", 0.1});
+  // A case may state the share.
+  c.bounds.push_back({.variant = "v", .figure = "missing_band", .stated = 1e-6});
   const auto allowed = judge(c, {row}, Budget::Quick);
   ASSERT_EQ(allowed.size(), 2u);
   EXPECT_TRUE(allowed[1].passed);
   row.figures["missing_band"] = 0.5;
   EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(1).passed);
-  // Where no error of the band is judged, nor is what is missing.
-  c.bounds = {{"v", "surface_l1", 1}};
+  // A case without bounds on the band allows missing grid points.
+  c.bounds = Bounds().measured("v", "surface_l1", {{8, 0.1}});
   EXPECT_EQ(judge(c, {row}, Budget::Quick).size(), 1u);
 }
 
@@ -326,8 +386,17 @@ TEST(RegressCases, AreWhole) {
     EXPECT_FALSE(c.group.empty() || c.title.empty() || c.definition.empty() || c.citation.empty())
         << c.name;
     EXPECT_TRUE(c.run) << c.name;
-    for (const Bound& bound : c.bounds)
+    std::set<std::tuple<std::string, std::string, int, int>> bounded;
+    for (const Bound& bound : c.bounds) {
       EXPECT_TRUE(columnNames.contains(bound.figure)) << c.name << " " << bound.figure;
+      for (const Budget budget : {Budget::Quick, Budget::Full})
+        EXPECT_TRUE(
+            !bound.isFor(budget) ||
+            bounded
+                .insert({bound.variant, bound.figure, bound.resolution, static_cast<int>(budget)})
+                .second)
+            << c.name << ": two bounds on " << bound.figure << " of " << bound.variant;
+    }
   }
 }
 
