@@ -214,7 +214,7 @@ namespace {
 
 eikonal::ArrivalRequest checkedRequest(double until, const ArrivalOptions& options) {
   eikonal::ArrivalRequest request;
-  request.action = options.method == FrontMethod::Marching ? "march" : "sweep";
+  request.action = options.method == FrontMethod::Marching ? "fast-marching" : "fast-sweeping";
   request.until = until;
   request.options = options;
   if (!std::isfinite(until) || until <= 0)

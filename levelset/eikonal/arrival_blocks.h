@@ -61,7 +61,7 @@ struct StartTime {
 class ArrivalBlocks {
  public:
   struct Settings {
-    const char* action = "sweep";
+    const char* action = "fast-sweeping";
     double until = 0;                                            ///< latest time kept
     std::function<double(const openvdb::Coord&)> slowness = {};  ///< empty: 1
     const openvdb::FloatTree* side = nullptr;          ///< its sign: inside; null: none is

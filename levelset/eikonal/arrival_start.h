@@ -16,7 +16,7 @@ inline constexpr double kStartWidth = 2;
 
 /// Where a front starts, before it is solved for.
 struct ArrivalStart {
-  const char* action = "sweep";
+  const char* action = "fast-sweeping";
   Slowness slowness = {};  ///< empty: 1 everywhere
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};

@@ -13,6 +13,7 @@
 #include "levelset/fields/grid.h"
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
+#include "levelset/operator/plan.h"
 #include "mapping/animation/animation.h"
 #include "mapping/patches/patch.h"
 #include "render/views/scene_file.h"
@@ -41,6 +42,10 @@ struct Plan {
   /// Patches only: along u, along v, and the height, 0 where only the texture will tell.
   Imath::V3d patchSize = Imath::V3d(0);
   double patchCount = 1;
+
+  /// The estimates that operators of levelset read.
+  [[nodiscard]] levelset::ValuePlan estimate() const;
+  void set(const levelset::ValuePlan& estimate);
   /// Active voxels that a band of this area takes.
   [[nodiscard]] double activeVoxels() const;
   [[nodiscard]] double bytes() const;
