@@ -36,16 +36,17 @@ void printAll(const std::string& text) {
         fmt::format("levelsmith: standard output cannot be written: {}", std::strerror(errno)));
 }
 
-/// More are no help, and some systems give no more.
+/// More threads do not help, and some systems do not allow more.
 constexpr long kMostThreads = 1024;
 
-/// On standard error, under the name of the program, which some sentences begin with.
+/// Prints a sentence on standard error, with the name of the program in front unless it starts with
+/// it.
 void printMessage(const std::string& sentence) {
   fmt::print(stderr, "{}{}\n",
              sentence.starts_with("levelsmith: ") ? "" : "levelsmith: ", sentence);
 }
 
-/// Says what went wrong. @return the exit code
+/// Prints the error. @return the exit code
 int printFailure(const std::exception_ptr& failure) {
   try {
     if (failure) std::rethrow_exception(failure);
@@ -72,8 +73,8 @@ int printFailure(const std::exception_ptr& failure) {
   return static_cast<int>(ExitCode::Input);
 }
 
-/// For what is thrown where nobody can catch it, as a thread that the system refuses to TBB may be.
-/// Nothing half written stays behind.
+/// Handles exceptions that nobody can catch, such as a thread that the system refuses to TBB.
+/// Temporary files are removed.
 [[noreturn]] void endUnexpectedly() {
   levelset::removeTemporaryFiles();
   _exit(printFailure(std::current_exception()));
@@ -118,11 +119,11 @@ int runGraph(const pipeline::Graph& graph) {
     const auto threads = pipeline::parseInteger(globals.at("threads"), "--threads");
     if (threads > kMostThreads)
       throw levelset::UsageError(
-          fmt::format("--threads: {} are more than {}; give about as many as there are cores",
+          fmt::format("--threads: {} exceeds the limit of {}; give about the number of cores",
                       threads, kMostThreads));
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                   static_cast<std::size_t>(threads));
-    arena.initialize(static_cast<int>(threads));  // more than there are cores, if asked
+    arena.initialize(static_cast<int>(threads));  // may exceed the number of cores
   }
   if (globals.contains("no-clobber")) levelset::setClobberDefault(false);
   pipeline::checkRunTargets(graph);
@@ -135,7 +136,7 @@ int runGraph(const pipeline::Graph& graph) {
     for (const char* option : {"tolerance", "report"})
       if (globals.contains(option))
         throw levelset::UsageError(fmt::format(
-            "--explain: nothing runs, so --{} has nothing to tell; leave one of them out", option));
+            "--explain: nothing runs, so --{} has no effect; leave one of them out", option));
     pipeline::explain(graph, maxMemory, globals.contains("whole") || globals.contains("cache"),
                       printAll);
     return static_cast<int>(ExitCode::Done);
@@ -156,7 +157,7 @@ int runGraph(const pipeline::Graph& graph) {
   };
   settings.print = [&](const std::string& text) {
     line.clear();
-    // Data for programs and text for people do not mix on one stream.
+    // Data for programs and messages for people go to different streams.
     if (dataOnly || (json && !text.starts_with("{")))
       fmt::print(stderr, "{}", text);
     else
@@ -189,7 +190,7 @@ int runGraph(const pipeline::Graph& graph) {
         pipeline::run(graph, settings, report);
     });
   } catch (const std::exception&) {
-    // What went wrong first is what the user must hear.
+    // The first error takes precedence.
     try {
       finish();
     } catch (const levelset::Error& error) {
@@ -229,7 +230,7 @@ int main(int argc, char** argv) {
   }
   std::fflush(stderr);
   levelset::removeTemporaryFiles();
-  // The watching thread may be anywhere; nothing is left to be torn down.
+  // The watching thread still runs, so destructors are skipped.
   if (std::fflush(stdout) != 0 && code == 0) code = static_cast<int>(ExitCode::File);
   _exit(code);
 }

@@ -25,9 +25,9 @@ namespace py = pybind11;
 namespace python {
 namespace {
 
-std::size_t maxMemory = 0;  // of all runs; 0: what is free tells
+std::size_t maxMemory = 0;  // limit of all runs; 0: from the free memory
 
-/// Removes what processes that were killed left beside a file that they were to write.
+/// Removes temporary files that killed processes left beside an output file.
 void removeLeftovers(const std::filesystem::path& target) {
   std::error_code ignored;
   const std::filesystem::path file = levelset::canonicalFile(target);
@@ -44,7 +44,7 @@ void removeLeftovers(const std::filesystem::path& target) {
 
 using Made = std::function<void(std::size_t, const pipeline::Value&)>;
 
-/// A run in a thread of its own. Nothing there touches Python.
+/// A run in a thread of its own, which does not use Python.
 class Run {
  public:
   Run(const pipeline::Graph& graph, const RunOptions& options, Made made)
@@ -55,7 +55,7 @@ class Run {
   }
 
   void end() { goesOn_ = false; }
-  /// @return is it done?
+  /// Returns true when the run is complete.
   bool wait(std::chrono::milliseconds time) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, time, [this] { return isDone_; });
@@ -65,7 +65,7 @@ class Run {
     return {action_, fraction_};
   }
 
-  // Once it is done.
+  // Valid when the run is complete.
   [[nodiscard]] Outcome& outcome() { return outcome_; }
   [[nodiscard]] bool isWhole() const { return isWhole_; }
 
@@ -92,7 +92,7 @@ class Run {
     changed_.notify_all();
   }
 
-  /// What went wrong first is what is told.
+  /// A failure to write the report does not replace an earlier error.
   void writeReport(const pipeline::RunReport& report) {
     if (options_.report.empty()) return;
     try {
@@ -139,10 +139,10 @@ class Run {
   bool isDone_ = false, isWhole_ = false;
   std::string action_;
   double fraction_ = 0;
-  std::thread thread_;  // last: it begins at once
+  std::thread thread_;  // declared last, because it starts at once
 };
 
-/// Looks after signals and progress. @throws what their code raises
+/// Handles signals and progress. @throws py::error_already_set as raised by the handlers
 void attend(Run& run, const py::object& progress) {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   if (progress.is_none()) return;
@@ -152,7 +152,7 @@ void attend(Run& run, const py::object& progress) {
   if (answer.ptr() == Py_False) run.end();
 }
 
-/// Waits for a run. @return what it left, with what Python raised meanwhile
+/// Waits for a run. @return its outcome, with an exception that Python raised meanwhile
 Outcome wait(Run& run, const py::object& progress) {
   constexpr std::chrono::milliseconds kInterval(50);
   std::exception_ptr raised;

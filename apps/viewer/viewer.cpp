@@ -21,8 +21,8 @@ using Imath::V3d;
 constexpr double kWatchSeconds = 0.4;
 constexpr double kTurnPerPixel = 0.006;  // radians
 constexpr double kTurnPerKey = 0.1;      // radians
-constexpr double kClickPixels = 3;       // a button that moves further drags
-constexpr double kZoomPerStep = 0.88;    // of the wheel
+constexpr double kClickPixels = 3;       // larger movements with a pressed button are drags
+constexpr double kZoomPerStep = 0.88;    // per step of the wheel
 
 std::string namesOf(const std::vector<std::filesystem::path>& files) {
   std::string names;
@@ -94,7 +94,7 @@ void Viewer::showFailure(const std::exception_ptr& failure, const std::string& i
   }
 }
 
-// === What comes in from elsewhere
+// === Events from outside the interface
 
 void Viewer::update() {
   takeModel();
@@ -109,10 +109,10 @@ void Viewer::takeModel() {
   std::optional<Loader::Result> result = loader_.take();
   if (!result) return;
   if (result->failure) {
-    showFailure(result->failure, model_ ? "(What was shown before stays.)" : "");
+    showFailure(result->failure, model_ ? "(The previous model stays open.)" : "");
     return;
   }
-  // A patch that comes on top is looked at from where one stands.
+  // A patch that is added to the present solid keeps the view.
   const bool isSameSolid =
       model_ && !model_->files.empty() && result->files.front() == model_->files.front();
   try {
@@ -140,7 +140,7 @@ void Viewer::watchFiles() {
   const bool isMissing = watch_.isAnyMissing();
   if (isMissing && !wasMissing_)
     showMessage(
-        "A file is gone; what it held is still shown, and it is read again when it is back.");
+        "A file was removed. Its contents stay open, and it is read again when it is back.");
   wasMissing_ = isMissing;
 }
 
@@ -245,7 +245,7 @@ void Viewer::pressSpecial(const KeyPress& key) {
 
 void Viewer::useMouse(int width, int height) {
   const ImGuiIO& io = ImGui::GetIO();
-  // In pixels of the picture.
+  // Conversion to pixels of the picture.
   const auto perUnit = [](int pixels, float units) {
     return pixels / std::max(static_cast<double>(units), 1.0);
   };
@@ -298,7 +298,7 @@ void Viewer::pickAt(const V2d& place, bool isForTarget) {
 }
 
 void Viewer::finishPick() {
-  // Until the pixels are single, they are of other places.
+  // Coarser pixels show other positions.
   if (!pendingPick_ || !frame_ || frame_->pixelSize > 1) return;
   const std::optional<Picked> picked = pick(*frame_, (*pendingPick_)[0], (*pendingPick_)[1]);
   pendingPick_.reset();
@@ -307,12 +307,12 @@ void Viewer::finishPick() {
     return;
   }
   if (!picked) {
-    showMessage("There is nothing to be picked here.");
+    showMessage("There is no surface at this pixel.");
     return;
   }
   addPick(*picked);
   window_.setClipboard(pointText(picked->position));
-  showMessage(fmt::format("{} is copied to the clipboard.", pointText(picked->position)));
+  showMessage(fmt::format("{} was copied to the clipboard.", pointText(picked->position)));
 }
 
 void Viewer::addPick(const Picked& picked) {
@@ -327,7 +327,7 @@ void Viewer::copyPicks() {
   }
   if (text.empty()) return;
   window_.setClipboard(text);
-  showMessage(fmt::format("{} points are copied to the clipboard.", picks_.size()));
+  showMessage(fmt::format("{} points were copied to the clipboard.", picks_.size()));
 }
 
 // === The picture
@@ -350,10 +350,10 @@ void Viewer::saveScreenshot() {
       return;
     }
     if (!frame_)
-      throw levelset::InvalidInput("screenshot: there is nothing to be seen yet; open a file");
+      throw levelset::InvalidInput("screenshot: no picture is available yet; open a file");
     writeScreenshot(name, *frame_);
-    showMessage(fmt::format("{} is written{}.", name.string(),
-                            frame_->isComplete ? "" : ", of a picture that was not finished"));
+    showMessage(fmt::format("{} was written{}.", name.string(),
+                            frame_->isComplete ? "" : ", from an unfinished picture"));
   } catch (const std::exception& error) {
     showMessage(error.what());
   }
@@ -367,7 +367,7 @@ void Viewer::writeInterfaceShot() {
   try {
     const Canvas shot = window_.drawInMemory(width, height, [&] { drawInterface(width, height); });
     render::writePng(name, width, height, shot.colours);
-    showMessage(fmt::format("{} is written.", name.string()));
+    showMessage(fmt::format("{} was written.", name.string()));
   } catch (const std::exception& error) {
     showMessage(error.what());
   }

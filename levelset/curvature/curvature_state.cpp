@@ -15,10 +15,10 @@ using openvdb::Vec3d;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
 constexpr float kNear = 1;  // voxels
-// With less than this share of the corners there is no leader.
+// Least sum of the weights of valid corners; below it there is no leader.
 constexpr float kLeastSum = 0.1f;
 
-// What is bent more is taken for bent so: close to a focus or a crease nothing is parallel.
+// Bound of principal curvatures: close to a focus or a crease, level sets are not parallel.
 constexpr double kMostBent = 0.12;
 
 constexpr double kDifferencesReach = 2.8284271247461903;  // (2, 2, 0)
@@ -26,7 +26,7 @@ static_assert(kFlowWidth >= kFlowCore + kDifferencesReach);
 
 struct Nothing {};
 
-/// k1 + k2 of the parallel surface `away` voxels further out, less the same here.
+/// Returns k1 + k2 of the parallel surface `away` voxels further out, less k1 + k2 here.
 double differenceOfParallel(double away, double sum, double squares) {
   const double half = std::sqrt(std::max(0.0, squares / 2 - sum * sum / 4));
   double difference = 0;
@@ -37,8 +37,8 @@ double differenceOfParallel(double away, double sum, double squares) {
   return difference;
 }
 
-/// Sum and squared sum of the principal curvatures of the level set through a grid point of a
-/// distance: the trace of its second derivatives and of their square.
+/// Returns sum and sum of squares of the principal curvatures of the level set through a grid
+/// point. For a distance field these are the traces of the Hessian and of its square.
 std::pair<float, float> bendingAt(const float* p) {
   constexpr std::array<int, 3> kSteps = {PaddedBlock::kStepX, PaddedBlock::kStepY, 1};
   float sum = 0, squares = 0;
@@ -52,7 +52,7 @@ std::pair<float, float> bendingAt(const float* p) {
   return {sum, squares};
 }
 
-/// Central differences at a grid point of a padded block.
+/// Returns central differences at a grid point of a padded block.
 Vec3d gradientAt(const PaddedBlock& block, const Coord& c) {
   const float* p = block.at(c.x(), c.y(), c.z());
   const auto difference = [&](int step) { return static_cast<double>(p[step] - p[-step]) / 2; };
@@ -89,7 +89,8 @@ void CurvatureState::findCore(std::size_t i, PaddedBlock& block, Bending& bendin
     const double phi = static_cast<double>(std::abs(start_[i][it.pos()]));
     if (!(phi < kFlowCore)) continue;
     core_[i].setOn(it.pos());
-    // The corners of a leader's cell are nearer than a diagonal to its level.
+    // Curvature is needed at the corners of leaders' cells; these are within a diagonal of
+    // kFlowLeader.
     if (phi < kFlowLeader - 1.8) continue;
     const Coord c = LeafNode::offsetToLocalCoord(it.pos());
     std::tie(bending.sums[i][it.pos()], bending.squares[i][it.pos()]) =

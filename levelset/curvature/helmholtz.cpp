@@ -7,11 +7,11 @@ namespace {
 
 struct NoBuffer {};
 
-// Residual against the right-hand side.
+// Tolerance of the residual, relative to the right-hand side.
 constexpr double kSolved = 1e-5;
-// Greatest eigenvalue of the negative Laplacian, voxels⁻².
+// Largest eigenvalue of the negative Laplacian, voxels⁻².
 constexpr double kLargestEigenvalue = 12;
-// A lesser weight counts as none: the system would be near singular.
+// A smaller weight counts as zero: the system would be nearly singular.
 constexpr float kLeastWeight = 1e-3f;
 
 }  // namespace

@@ -8,9 +8,9 @@ namespace {
 
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
-// Beyond this many voxels a plane leaves the cube around a grid point alone.
+// Beyond this distance, in voxels, a plane does not cut the cube around a grid point.
 constexpr float kReach = 0.87f;
-// Normals are turned away from the axes by this much, which keeps the formula regular.
+// Least component of a normal: keeps the formula regular near the axes.
 constexpr double kLeastComponent = 1e-3;
 // Support of the kernel that spreads the surface over grid points, voxels.
 constexpr double kSpread = 1.5;
@@ -19,14 +19,14 @@ double cubed(double x) {
   return x > 0 ? x * x * x : 0;
 }
 
-/// Part of the unit cube about the origin in which n·x + d < 0, for a unit normal.
+/// Returns the part of the unit cube about the origin in which n·x + d < 0, for a unit normal.
 double partBelow(openvdb::Vec3d n, double d) {
   double sum = 0;
   for (int i = 0; i < 3; ++i) {
     n[i] = std::max(std::abs(n[i]), kLeastComponent);
     sum += n[i];
   }
-  const double a = sum / 2 - d;  // level of the plane from the lowest corner
+  const double a = sum / 2 - d;  // height of the plane above the lowest corner
   if (a <= 0) return 0;
   if (a >= sum) return 1;
   double volume = cubed(a) - cubed(a - sum);
@@ -58,7 +58,7 @@ VolumeAndArea volumeAndAreaOfBlock(const CurvatureState& state, const Field& rat
     const double weight =
         state.weights().empty() ? 1 : static_cast<double>(state.weights()[i][it.pos()]);
     volumeAndArea.area += delta * weight / std::max(slope, 0.1);
-    // A plane through the foot stands off a surface of curvature κ by κ/24 on the average.
+    // A plane through the foot differs from a surface of curvature κ by κ/24 on average.
     volumeAndArea.volume -= delta * (static_cast<double>(rate[i][it.pos()]) + weight * shift) / 24;
   }
   return volumeAndArea;

@@ -28,11 +28,12 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
 constexpr double kBytesPerGridPoint = 24;
-// A grid point that was inside stays so when its time rounds to nothing, voxels.
+// Least depth of a grid point that was inside, voxels: it stays inside when its time rounds to
+// zero.
 constexpr double kLeastDepth = 1e-7;
 constexpr double kStarted = 0.1;  // share of the work
 
-/// At an index position; kFar where nothing passes. Empty at speed 1.
+/// Returns the slowness at index positions; kFar where the front cannot pass. Empty at speed 1.
 Slowness slownessOf(const ScalarField& speed, const openvdb::math::Transform& transform) {
   if (!speed) return {};
   return [&](const Vec3d& index) {
@@ -51,8 +52,8 @@ Slowness scaled(const Slowness& slowness, double unit) {
 
 class Solver {
  public:
-  /// @param slowness  over `unit`, the typical one: so the times of the solver are about voxels
-  /// @param sources   empty: the front starts at the surface that `side` has
+  /// @param slowness  slowness divided by `unit`, the typical one, so that times are about voxels
+  /// @param sources  empty: the front starts at the surface of `side`
   Solver(const ArrivalRequest& request, const openvdb::math::Transform& transform,
          const FloatTree* side, std::vector<Vec3d> sources, const Slowness& slowness, double unit)
       : request_(request),
@@ -96,7 +97,8 @@ class Solver {
     return static_cast<float>(static_cast<double>(block.time[n]) * voxelTime_);
   }
 
-  /// The grid points that makeLeaf() gives a time: a start may come too late for one.
+  /// Returns the grid points to which makeLeaf() gives a time. A start time may exceed the latest
+  /// time.
   [[nodiscard]] ArrivalBlock::Mask reachedOf(const ArrivalBlock& block) const {
     ArrivalBlock::Mask reached = block.known;
     for (auto it = block.known.beginOn(); it; ++it)
@@ -147,13 +149,13 @@ class Solver {
   const ArrivalRequest& request_;
   const openvdb::math::Transform& transform_;
   const FloatTree* side_;
-  double voxelTime_;  ///< that the front takes for a voxel at the typical speed
+  double voxelTime_;  ///< time that the front takes for a voxel at the typical speed
   std::unique_ptr<ArrivalBlocks> blocks_;
 };
 
 void checkMemoryFor(const std::vector<StartTime>& start, const FloatGrid& field,
                     const ArrivalRequest& request) {
-  // How far another speed goes is seen on the way, block by block.
+  // At another speed the extent is not known in advance: touch() checks memory block by block.
   if (request.options.speed) return;
   MemoryEstimate estimate;
   for (const StartTime& s : start) estimate.surface.expand(s.gridPoint);
@@ -170,7 +172,8 @@ ArrivalStart startOf(const ArrivalRequest& request, const Slowness& slowness) {
           .progress = subProgress(request.options.progress, 0, kStarted)};
 }
 
-/// Index positions. @throws ResourceLimit beyond the range of indices
+/// Converts source points to index positions.
+/// @throws ResourceLimit beyond the range of indices
 std::vector<Vec3d> positionsOf(std::span<const Imath::V3d> sources,
                                const openvdb::math::Transform& transform, const char* action) {
   std::vector<Vec3d> positions;
@@ -178,10 +181,10 @@ std::vector<Vec3d> positionsOf(std::span<const Imath::V3d> sources,
     positions.push_back(transform.worldToIndex(toVdb(source)));
     for (int i = 0; i < 3; ++i)
       if (!(std::abs(positions.back()[i]) < kIndexLimit))
-        throw ResourceLimit(
-            fmt::format("{}: a point lies {:.4g} voxels from the origin, beyond the range of "
-                        "32-bit indices; use larger voxels",
-                        action, std::abs(positions.back()[i])));
+        throw ResourceLimit(fmt::format(
+            "{}: a source point lies {:.4g} voxels from the origin, beyond the range of "
+            "32-bit indices; use larger voxels",
+            action, std::abs(positions.back()[i])));
   }
   return positions;
 }
@@ -218,8 +221,8 @@ eikonal::ArrivalRequest checkedRequest(double until, const ArrivalOptions& optio
   request.until = until;
   request.options = options;
   if (!std::isfinite(until) || until <= 0)
-    throw UsageError(
-        fmt::format("{}: the latest time is {}; give a positive one", request.action, until));
+    throw UsageError(fmt::format("{}: the latest time is {}; give a positive, finite time",
+                                 request.action, until));
   if (options.order != 1 && options.order != 2)
     throw UsageError(
         fmt::format("{}: the order is {}; give 1 or 2", request.action, options.order));
@@ -252,14 +255,16 @@ ArrivalTimes arrivalTimesFromPoints(const NarrowBand& lattice, std::span<const I
                                     double until, const ArrivalOptions& options) {
   const eikonal::ArrivalRequest request = checkedRequest(until, options);
   if (!lattice.shared())
-    throw UsageError(fmt::format("{}: there is no grid to work on; give a solid", request.action));
+    throw UsageError(
+        fmt::format("{}: there is no grid for the times; give a solid", request.action));
   if (sources.empty())
-    throw UsageError(fmt::format("{}: there is no point to start from; give one", request.action));
+    throw UsageError(
+        fmt::format("{}: there is no source point; give at least one", request.action));
   for (const Imath::V3d& p : sources)
     for (int i = 0; i < 3; ++i)
       if (!std::isfinite(p[i]))
         throw UsageError(
-            fmt::format("{}: a point to start from has the coordinate {}; give finite "
+            fmt::format("{}: a source point has the coordinate {}; give finite "
                         "points",
                         request.action, p[i]));
   return asField(eikonal::arrivalFromPoints(sources, vdb(lattice).transform(), request),
@@ -271,11 +276,12 @@ FrontDistance frontDistance(const NarrowBand& solid, double reach, const Arrival
   requireStart(solid, request.action);
   if (options.speed)
     throw UsageError(
-        fmt::format("{}: at another speed than 1 times are no distances; ask for arrival times",
+        fmt::format("{}: with a speed other than 1, arrival times are not distances; request "
+                    "arrival times",
                     request.action));
   if (reach < solid.voxelSize())
-    throw UsageError(fmt::format("{}: the reach is {} voxels; give at least 1", request.action,
-                                 reach / solid.voxelSize()));
+    throw UsageError(fmt::format("{}: the largest distance is {} voxels; give at least 1",
+                                 request.action, reach / solid.voxelSize()));
   eikonal::ArrivalGrid result = eikonal::arrivalFromSurface(vdb(solid), request);
   return {makeBand(std::move(result.times)), result.figures};
 }

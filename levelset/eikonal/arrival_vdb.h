@@ -16,15 +16,17 @@ struct ArrivalRequest {
 };
 
 struct ArrivalGrid {
-  openvdb::FloatGrid::Ptr times;  ///< world; active where reached; elsewhere ± the latest time
+  /// World units; active where reached; elsewhere ± the latest time.
+  openvdb::FloatGrid::Ptr times;
   ArrivalFigures figures;
 };
 
-/// From the zero set, to both sides; negative inside. Level-set class when the speed is 1.
+/// Computes arrival times from the zero set to both sides; negative inside. At speed 1 the grid has
+/// the level-set class.
 [[nodiscard]] ArrivalGrid arrivalFromSurface(const openvdb::FloatGrid& field,
                                              const ArrivalRequest& request);
 
-/// From points (world), on grid points of `transform`.
+/// Computes arrival times from points (world), on the grid points of `transform`.
 [[nodiscard]] ArrivalGrid arrivalFromPoints(std::span<const Imath::V3d> sources,
                                             const openvdb::math::Transform& transform,
                                             const ArrivalRequest& request);

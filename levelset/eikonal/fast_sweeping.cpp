@@ -16,15 +16,17 @@ using openvdb::Coord;
 using openvdb::Index;
 using Mask = ArrivalBlock::Mask;
 
-// Improvements below this part of the time that the grid point's own voxel takes do not count.
+// An improvement below this part of the time for one voxel at the grid point does not count.
 constexpr float kImprovement = 1e-5f;
-// Blocks whose news are later than the earliest by more than this wait, voxels and part of the
-// time: what they would compute now is not final yet. Where the front is slow, voxels take long.
+// Window after the earliest change, in voxels and as a part of the time. Blocks with later changes
+// wait, since their times would not be final yet. The relative part serves slow media, where a
+// voxel takes long.
 constexpr float kWindow = 0.5f, kWindowShare = 0.05f;
 constexpr std::size_t kBlocksPerTask = 8;
 
-/// How late the first solution is followed. The second runs a little remaining of it: by as much as
-/// it can reach back, a voxel at the speed there or a twentieth of the time.
+/// Latest time to which the first solution is computed. With `lookahead` it exceeds `until` by as
+/// much as the second solution reads beyond it: a voxel at the local speed, or a twentieth of the
+/// time.
 struct SweepLimit {
   float until = 0;
   bool lookahead = false;
@@ -37,27 +39,27 @@ int parityOf(const Coord& origin) {
   return ((origin.x() >> 3) & 1) * 4 + ((origin.y() >> 3) & 1) * 2 + ((origin.z() >> 3) & 1);
 }
 
-/// What a sweep keeps of each block beside its times.
+/// State of a block during sweeping, beside its times.
 struct BlockState {
-  float earliest = kFar;             ///< time of the earliest news; kFar: nothing to do
-  bool seen = false;                 ///< has it been worked on?
-  std::uint8_t dirtyNeighbours = 0;  ///< bit d: neighbour d has news
-  std::uint8_t dirtiedNeighbours =
-      0;  ///< bit d: neighbour d should look; written by the block's own work
-  std::array<float, 6> earliestAtFace{};            ///< earliest change at that face
-  std::optional<std::vector<std::uint16_t>> order;  ///< what is to be solved, by first-order time
+  float earliest = kFar;  ///< time of the earliest change not yet processed; kFar: block is clean
+  bool seen = false;      ///< the block was processed before
+  std::uint8_t dirtyNeighbours = 0;  ///< dirty flags, bit d: times of neighbour d changed
+  /// Bit d: neighbour d must be flagged; written only by the block's own work.
+  std::uint8_t dirtiedNeighbours = 0;
+  std::array<float, 6> earliestAtFace{};            ///< earliest change at each face
+  std::optional<std::vector<std::uint16_t>> order;  ///< grid points to solve, by first-order time
   std::unique_ptr<std::array<float, ArrivalBlock::kSize>> second;  ///< second-order times
 };
 
-/// Calls work(block, state) for the blocks that have news until none has: the eight parities of
-/// block positions in turn, one parity in parallel, since its blocks do not touch; the earliest
-/// first. The order is fixed, hence the result.
+/// Scheduler of dirty blocks: calls work(block, state) until no block is dirty.
+/// Takes the eight parities of block positions in turn, the earliest blocks first. Blocks of one
+/// parity do not touch and run in parallel. The order is fixed, and so is the result.
 class Rounds {
  public:
   explicit Rounds(ArrivalBlocks& blocks) : blocks_(blocks) {}
   std::vector<BlockState> blockStates;
 
-  /// Passes on what the blockStates were earliestAtFace before the first round.
+  /// Passes the flags set before the first round to the neighbours.
   void passInitialFlags() {
     blockStates.resize(blocks_.blocks().size());
     for (std::size_t i = 0, end = blockStates.size(); i < end; ++i)
@@ -131,7 +133,7 @@ class Rounds {
   std::size_t sorted_ = 0;
 };
 
-/// Notes that the time at a grid point of the block changed, for the neighbours that read it.
+/// Records a change of the time at a grid point for the neighbours that read it.
 void markDirty(BlockState& state, Index n, float time, Index depth) {
   const std::array<Index, 3> at = {n >> 6, n >> 3 & 7u, n & 7u};
   for (std::size_t axis = 0; axis < 3; ++axis)
@@ -144,8 +146,8 @@ void markDirty(BlockState& state, Index n, float time, Index depth) {
     }
 }
 
-/// Gauss-Seidel sweeps over one block with its neighbours' nearest layers around it, each over the
-/// grid points only beside which something changed.
+/// Gauss-Seidel sweeps over one block, padded with the nearest layer of its neighbours. Each sweep
+/// visits only grid points beside a change.
 class FirstOrderWorker {
  public:
   FirstOrderWorker(ArrivalBlock& block, BlockState& state, const SweepLimit& limit)
@@ -159,7 +161,7 @@ class FirstOrderWorker {
 
   void run() {
     markPending();
-    // Sweeps begin away from the side that the news come from.
+    // The first sweep runs away from the dirty neighbours.
     const int start = (state_.dirtyNeighbours & 2 ? 4 : 0) | (state_.dirtyNeighbours & 8 ? 2 : 0) |
                       (state_.dirtyNeighbours & 32 ? 1 : 0);
     constexpr std::array<int, 8> kGray = {0, 1, 3, 2, 6, 7, 5, 4};
@@ -200,7 +202,7 @@ class FirstOrderWorker {
       }
   }
 
-  /// The first time all grid points, later those beside neighbours with news.
+  /// Marks all grid points at the first call, later only those beside dirty neighbours.
   void markPending() {
     if (!state_.seen) {
       pending_.fill(~std::uint64_t{0});
@@ -241,7 +243,7 @@ class FirstOrderWorker {
     }
   }
 
-  /// Those beside it that are later: only they can come from there.
+  /// Marks the later neighbours: only they can depend on this time.
   void markReaders(int x, int y, int z) {
     const std::size_t here = slot(x, y, z);
     const auto mark = [&](int i, int j, int k) {
@@ -256,7 +258,8 @@ class FirstOrderWorker {
     if (z < 7) mark(x, y, z + 1);
   }
 
-  /// @return did the time improve?
+  /// Solves one grid point.
+  /// @return true when the time improved
   bool relax(int x, int y, int z) {
     const std::size_t s = slot(x, y, z);
     float a = std::min(times_[s - 100], times_[s + 100]),
@@ -292,12 +295,12 @@ class FirstOrderWorker {
   BlockState& state_;
   SweepLimit limit_;
   std::array<float, 1000> times_;
-  std::array<std::uint64_t, 8> pending_{};  ///< to be solved: slices of x, bits of 8 y + z
+  std::array<std::uint64_t, 8> pending_{};  ///< grid points to solve: slices of x, bits 8 y + z
   Mask changed_;
 };
 
-/// Solves again with second-order differences. Which neighbours are upwind is taken from the first
-/// solution, so each grid point waits for earlier ones only and the equations have one solution.
+/// Solver with second-order differences. It takes the upwind neighbours from the first solution. So
+/// each grid point depends on earlier ones only, and the equations have one solution.
 class SecondOrderWorker {
  public:
   SecondOrderWorker(const ArrivalBlocks& blocks, ArrivalBlock& block, BlockState& state,
@@ -338,7 +341,7 @@ class SecondOrderWorker {
   }
 
  private:
-  /// The two layers beside each neighbour with news read from it.
+  /// Marks the two layers beside each dirty neighbour.
   void markPending() {
     for (std::size_t d = 0; d < 6; ++d)
       if (state_.dirtyNeighbours >> d & 1) pending_ |= facingLayers()[d];
@@ -357,7 +360,8 @@ class SecondOrderWorker {
     return layers;
   }
 
-  /// The grid points of the block up to two away; of those that came before none reads this one.
+  /// Marks the grid points of the block up to two away. Marks on earlier ones have no effect: none
+  /// of these reads this one.
   void markReaders(Index n) {
     for (const Index shift : {0u, 3u, 6u}) {
       const Index at = n >> shift & 7u, step = 1u << shift;
@@ -369,7 +373,7 @@ class SecondOrderWorker {
   }
 
   void sortByTime() {
-    // Times are not negative: their bits sort as they do.
+    // Times are not negative, so their bits sort in the same order.
     std::array<std::uint64_t, ArrivalBlock::kSize> keys;
     std::size_t count = 0;
     for (Index n = 0; n < ArrivalBlock::kSize; ++n)
@@ -382,8 +386,8 @@ class SecondOrderWorker {
   }
 
   struct Neighbour {
-    float first = kFar;  ///< time of the first solution
-    double time = 0;     ///< of the second; both negative on the other side
+    float first = kFar;  ///< time of the first solution, negative on the other side
+    double time = 0;     ///< time of the second solution, negative on the other side
   };
 
   static std::size_t slot(const Coord& c) {
@@ -393,7 +397,7 @@ class SecondOrderWorker {
     return slot(openvdb::FloatTree::LeafNodeType::offsetToLocalCoord(n));
   }
 
-  /// Rows of z between two corners.
+  /// Calls each(first grid point) for the rows along z between two corners.
   template <typename Each>
   static void forEachRow(const Coord& from, const Coord& to, const Each& each) {
     for (int x = from.x(); x < to.x(); ++x)
@@ -432,7 +436,7 @@ class SecondOrderWorker {
     const std::size_t here = slot(n);
     const StraightTime straight = blocks_.straightTime(block_, n);
     UpwindTerms terms;
-    std::array<double, 3> near{}, missed{};  // of first order
+    std::array<double, 3> near{}, missed{};  // first-order values and errors
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::size_t step = kStep[axis];
       const Neighbour a = look(here - step, side), b = look(here + step, side);
@@ -462,7 +466,8 @@ class SecondOrderWorker {
         plain.addFirst(near[i], share * missed[i]);
       return solveUpwind(plain, slowness);
     };
-    // Each of these errs more than the one before it and is nearer to being causal; the last is.
+    // Each fallback is less accurate than the one before it and closer to causal; the last one is
+    // causal.
     if (terms.hasSecond && time < terms.latest - straight.slack()) {
       time = inFirstOrder(1);
       first = true;
@@ -476,9 +481,9 @@ class SecondOrderWorker {
   ArrivalBlock& block_;
   BlockState& state_;
   SweepLimit limit_;
-  /// Both solutions in the block and two layers of its neighbours, negative inside.
+  /// Both solutions in the block and in two layers of its neighbours, negative inside.
   std::array<float, 12 * 12 * 12> first_, second_;
-  Mask pending_;  ///< to be solved in this round
+  Mask pending_;  ///< grid points to solve in this round
 };
 
 float earliestUnknown(const ArrivalBlock& block) {

@@ -16,7 +16,7 @@
 #include "levelset/progress.h"
 #include "levelset/progress_gate.h"
 
-// The layout is that of readTopology and readBuffers in OpenVDB's tree/*.h and of
+// The layout follows readTopology and readBuffers in OpenVDB's tree/*.h and
 // io::readCompressedValues, format 222 and later.
 
 namespace levelset {
@@ -25,7 +25,7 @@ namespace {
 using openvdb::Coord;
 using openvdb::Index;
 
-/// Floats of 16 bits may stand for those of a value.
+/// Number of components of a value type. The file may store each component as a half float.
 template <typename T>
 constexpr std::size_t kComponents = 1;
 template <>
@@ -42,7 +42,7 @@ T fromHalves(const openvdb::math::half* halves) {
              static_cast<float>(halves[2]));
 }
 
-/// How the values of one tree are stored.
+/// Storage format of the values of one tree.
 template <typename T>
 struct Storage {
   std::uint32_t compression;
@@ -50,14 +50,14 @@ struct Storage {
   T background;
 };
 
-/// The values of one node as they stand in the file, sizes checked.
+/// Values of one node as stored in the file, with checked sizes.
 template <typename T, typename Mask>
 struct ValueBlock {
-  T inactive[2];   // for the inactive values that are not stored
-  Mask selection;  // which of the two
-  Index count;     // of stored values
+  T inactive[2];   // replacements for inactive values that are not stored
+  Mask selection;  // which of the two replacements
+  Index count;     // number of stored values
   bool activeOnly;
-  const char* data;  // with the length in front where compressed
+  const char* data;  // starts with the length if compressed
   std::size_t size;
 };
 
@@ -70,7 +70,7 @@ Mask takeMask(VdbBytes& bytes) {
   return mask;
 }
 
-/// Blosc trusts the sizes in its own header, which stand in the file too.
+/// Checks the sizes in Blosc's own header, which Blosc trusts although the file supplies them.
 void checkBloscHeader(const VdbBytes& bytes, const char* block, std::size_t stored,
                       std::size_t expected) {
   constexpr std::size_t kHeaderSize = 16;
@@ -83,14 +83,14 @@ void checkBloscHeader(const VdbBytes& bytes, const char* block, std::size_t stor
     bytes.fail("a compressed block disagrees about its size");
 }
 
-/// Steps over stored data that unpack to `expected` bytes; returns what they take.
+/// Skips stored data that unpack to `expected` bytes. Returns the stored size.
 std::size_t takeData(VdbBytes& bytes, std::uint32_t compression, std::size_t expected) {
   namespace io = openvdb::io;
   if ((compression & (io::COMPRESS_BLOSC | io::COMPRESS_ZIP)) == 0) {
     static_cast<void>(bytes.take(expected));
     return expected;
   }
-  const auto length = bytes.value<std::int64_t>();  // negative: not compressed after all
+  const auto length = bytes.value<std::int64_t>();  // negative: stored uncompressed
   if (length <= 0) {
     if (length == std::numeric_limits<std::int64_t>::min() ||
         static_cast<std::size_t>(-length) != expected)
@@ -127,7 +127,7 @@ ValueBlock<T, Mask> takeValues(VdbBytes& bytes, const Storage<T>& storage, const
   block.count = block.activeOnly ? active.countOn() : Mask::SIZE;
   block.data = bytes.rest().data();
   block.size = storage.half && block.count == 0
-                   ? 0  // half floats: nothing at all is stored for none
+                   ? 0  // half floats: zero values take no bytes
                    : takeData(bytes, storage.compression,
                               block.count * (storage.half ? 2 * kComponents<T> : sizeof(T)));
   return block;
@@ -151,7 +151,7 @@ void unpack(const VdbBytes& bytes, const char* data, std::size_t size, std::uint
   }
 }
 
-/// All values of a node, stored or implied.
+/// Fills in all values of a node, stored or implied.
 template <typename T, typename Mask>
 void expand(const VdbBytes& bytes, const ValueBlock<T, Mask>& block, const Storage<T>& storage,
             const Mask& active, T* values) {
@@ -175,7 +175,7 @@ void expand(const VdbBytes& bytes, const ValueBlock<T, Mask>& block, const Stora
     values[i] = active.isOn(i) ? stored[next++] : block.inactive[block.selection.isOn(i) ? 1 : 0];
 }
 
-/// Reads a tree from top to bottom, then the values of its leaves.
+/// Reads a tree from the root down, then the values of its leaves.
 template <typename TreeT>
 class TreeReader {
   using T = typename TreeT::ValueType;
@@ -203,7 +203,7 @@ class TreeReader {
     return tree;
   }
 
-  /// Only moves `bytes` on.
+  /// Skips the tree: only advances `bytes`.
   void skip() {
     countOnly_ = true;
     TreeT tree;
@@ -212,7 +212,8 @@ class TreeReader {
   }
 
  private:
-  /// What a tree takes grows node by node, each of which takes bytes of the file too.
+  /// Counts the memory of the tree. It grows node by node, and each node also takes bytes of the
+  /// file.
   void spend(std::size_t size) {
     memory_ += static_cast<double>(size);
     if (memory_ > static_cast<double>(limits_.maxMemory))
@@ -226,7 +227,7 @@ class TreeReader {
     const auto tiles = bytes_.value<std::uint32_t>(), children = bytes_.value<std::uint32_t>();
     constexpr std::size_t kTileSize = 3 * sizeof(std::int32_t) + sizeof(T) + 1;
     if (tiles > bytes_.remaining() / kTileSize)
-      bytes_.fail(fmt::format("{} tiles are promised", tiles));
+      bytes_.fail(fmt::format("its root promises {} tiles", tiles));
     std::set<Coord> seen;
     for (std::uint32_t i = 0; i < tiles; ++i) {
       const Coord origin = takeOrigin<typename Root::ChildNodeType>(seen);
@@ -246,12 +247,13 @@ class TreeReader {
     Coord origin;
     for (int axis = 0; axis < 3; ++axis) origin[axis] = bytes_.value<std::int32_t>();
     const int mask = static_cast<int>(Node::DIM) - 1;
-    if ((origin & mask) != Coord(0)) bytes_.fail("a node stands off the tree's raster");
-    if (!seen.insert(origin).second) bytes_.fail("a node comes twice");
+    if ((origin & mask) != Coord(0))
+      bytes_.fail("the origin of a node is not a multiple of its size");
+    if (!seen.insert(origin).second) bytes_.fail("two nodes have the same origin");
     return origin;
   }
 
-  /// An active tile may be voxelised later: its leaves count now.
+  /// Counts the leaves of an active tile, which may later be split into voxels.
   void spendTile(Index log2VoxelCount) {
     if (limits_.keepsTiles) return;
     const double leaves = std::ldexp(1.0, static_cast<int>(log2VoxelCount)) / Leaf::SIZE;
@@ -293,7 +295,7 @@ class TreeReader {
     return node;
   }
 
-  /// Where the values of each leaf stand.
+  /// Offsets of the values of each leaf in the file.
   std::vector<std::size_t> skipLeafValues() {
     std::vector<std::size_t> places;
     places.reserve(leaves_.size());
@@ -322,7 +324,7 @@ class TreeReader {
   std::vector<Leaf*> leaves_;
 };
 
-/// OpenVDB's trees of vectors do not convert into each other.
+/// Converts a tree of double vectors to float vectors; OpenVDB has no such conversion.
 openvdb::Vec3STree::Ptr narrowed(const openvdb::Vec3DTree& wide) {
   using Leaf = openvdb::Vec3STree::LeafNodeType;
   auto tree = std::make_shared<openvdb::Vec3STree>(openvdb::Vec3s(wide.background()));
@@ -361,7 +363,7 @@ openvdb::Vec3STree::Ptr readVdbVectorTree(std::string_view file, const std::stri
 
 double readVdbBackground(std::string_view file, const std::string& name, const VdbEntry& entry) {
   VdbBytes bytes(file, name);
-  bytes.seek(entry.treePosition + sizeof(std::int32_t));  // behind the count of buffers
+  bytes.seek(entry.treePosition + sizeof(std::int32_t));  // after the number of buffers
   return hasFloatTree(entry) ? static_cast<double>(bytes.value<float>()) : bytes.value<double>();
 }
 

@@ -24,13 +24,13 @@ using openvdb::FloatTree;
 using openvdb::Index;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Semi-Lagrangian: a step moves nothing further than this many voxels, and strains no more.
+// Semi-Lagrangian: limits of a step, the move in voxels and the strain.
 constexpr double kFarthestFoot = 4, kFootStrain = 0.5;
-// The band that it works in, voxels: all that is interpolated for the values beside the zero set
-// and for the distances made of them is a distance, not the background.
+// Half width of the working band, voxels. All values interpolated beside the zero set, and those
+// for the distances computed from them, are then distances and not the background.
 constexpr double kFootWidth = 5;
-// Upwind: share of what the CFL condition allows, and how far the surface may move before its
-// distance is made again, in voxels; the working band must hold that and the stencils beyond it.
+// Upwind: share of the CFL limit, travel of the surface before redistancing, and half width of the
+// working band, both in voxels. The band must hold the travel and the stencils beyond it.
 constexpr double kCfl = 0.5, kUpwindTravel = 1.5, kUpwindWidth = 6;
 
 std::vector<LeafNode*> leavesOf(FloatTree& tree) {
@@ -43,7 +43,7 @@ V3d positionOf(const LeafNode& leaf, Index n) {
   return toImath(leaf.offsetToGlobalCoord(n).asVec3d());
 }
 
-/// Longest step at a time: the least that `limit` says at the active grid points of a grid.
+/// Returns the longest step at a time: the minimum of `limit` over the active grid points.
 template <typename Limit>
 double longestStep(FloatGrid& grid, const Limit& limit) {
   const std::vector<LeafNode*> leaves = leavesOf(grid.tree());
@@ -67,7 +67,8 @@ FloatGrid::Ptr distanceOf(const FloatGrid& field, double halfWidth, const TimeIn
 
 // === Semi-Lagrangian
 
-// A foot may be off by this many voxels for each step; no path is halved more often than that.
+// Largest error of a foot point per step, voxels. A path with a larger error is halved, at most
+// kMostHalvings times.
 constexpr double kFootError = 1e-3;
 constexpr int kMostHalvings = 6;
 
@@ -120,7 +121,7 @@ double weno5(double a, double b, double c, double d, double e) {
          (6 * (w1 + w2 + w3));
 }
 
-/// Derivative along an axis from the side that the flow comes from; voxels per voxel.
+/// Returns the derivative along an axis from the upwind side; voxels per voxel.
 double upwindDerivative(const eikonal::DenseBlock& block, const Coord& c, int axis, double speed,
                         double voxelSize) {
   const int side = speed > 0 ? -1 : 1;
@@ -163,7 +164,7 @@ void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, do
   });
 }
 
-/// Third-order TVD Runge-Kutta [Shu88].
+/// Third-order TVD Runge-Kutta step [Shu88].
 FloatGrid::Ptr upwindStep(const FloatGrid& start, const TimeInterval& interval, double from,
                           double to) {
   const double dt = to - from;

@@ -17,10 +17,10 @@ void requireFinite(const TimeInterval& interval, const V3d& velocity, const V3d&
   if (std::isfinite(velocity.x) && std::isfinite(velocity.y) && std::isfinite(velocity.z)) return;
   V3d world;
   interval.toWorld.multVecMatrix(position, world);
-  throw InvalidInput(fmt::format(
-      "{}: the velocity is not finite at {:.6g},{:.6g},{:.6g} and time {:.6g}; give one "
-      "that is finite wherever the surface goes",
-      interval.action, world.x, world.y, world.z, time));
+  throw InvalidInput(
+      fmt::format("{}: the velocity is not finite at {:.6g},{:.6g},{:.6g} and time {:.6g}; give a "
+                  "velocity that is finite along the path of the surface",
+                  interval.action, world.x, world.y, world.z, time));
 }
 
 std::size_t integrate(const TimeInterval& interval,
@@ -31,18 +31,18 @@ std::size_t integrate(const TimeInterval& interval,
   while (time != to) {
     report(interval.progress, (time - interval.from) / (to - interval.from), interval.action);
     const double left = std::abs(to - time);
-    // At a late time a share of a short path may be nothing.
+    // At a late time, a share of a short interval may round to zero.
     dt = std::max(dt, 4 * std::abs(std::nextafter(time, to) - time));
-    // The last two steps share what is left.
+    // The last two steps share the remaining time.
     const double longest = dt >= left ? left : left < 2 * dt ? left / 2 : dt;
     const StepResult made = step(time, longest);
     const double needed = static_cast<double>(done) + std::abs(to - made.time) / made.next;
     if (!(needed <= kMostSteps) || made.time == time) {
-      throw ResourceLimit(
-          fmt::format("{}: at time {:.6g} the velocity allows steps of {:.3g} only, which makes "
-                      "about {:.3g}, and {} are the most; ask for a shorter time or a gentler "
-                      "velocity",
-                      interval.action, time, made.next, needed, kMostSteps));
+      throw ResourceLimit(fmt::format(
+          "{}: at time {:.6g} the velocity limits steps to {:.3g}, which requires "
+          "about {:.3g} steps, more than the limit of {}; use a shorter time or a smoother "
+          "velocity",
+          interval.action, time, made.next, needed, kMostSteps));
     }
     time = made.time;
     dt = made.next;
@@ -55,7 +55,8 @@ std::size_t integrate(const TimeInterval& interval,
 std::size_t integrate(const TimeInterval& interval, const std::function<double(double)>& longest,
                       const std::function<void(double, double)>& step) {
   const double to = interval.to, sign = to < interval.from ? -1 : 1;
-  // Uneven parts of a step, so as not to fall in step with what comes and goes.
+  // Sample times within a step. They are uneven so as not to match the period of an oscillating
+  // velocity.
   constexpr double kSamples[] = {0.146, 0.382, 0.618, 1};
   constexpr double kGrowth = 1.5;
   constexpr int kTries = 40;
@@ -70,7 +71,7 @@ std::size_t integrate(const TimeInterval& interval, const std::function<double(d
       for (const double sample : kSamples)
         allowed = std::min(allowed, longest(from + sign * sample * dt));
       least = std::min(atStart, allowed);
-      // While all stands still, sample out for what comes.
+      // While nothing moves, steps stay short, so that a motion that sets in is not skipped.
       if (std::isinf(least) && dt > kFirstShare * total) {
         dt = kFirstShare * total;
         continue;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Includes OpenVDB: for .cpp files only.
+// Includes OpenVDB, so include it from .cpp files only.
 
 #include <algorithm>
 #include <cmath>
@@ -14,24 +14,25 @@
 
 namespace levelset {
 
-/// A binary tree of the bounding boxes of things, to find the nearest of them. The boxes are tight:
-/// planes that only split would not tell how far a flat surface is that lies aside of all of them.
+/// Binary tree of the bounding boxes of items, for nearest-item searches. The boxes are tight.
+/// Splitting planes alone would give poor distance bounds for a flat surface that lies aside of
+/// them.
 class BoxTree {
  public:
   BoxTree() = default;
-  /// @param bound  (thing, low, high): extends the box by a thing
-  /// @param place  (thing, axis): where it counts as being, to be put on one side or the other
+  /// @param bound  (item, low, high): extends the box by an item
+  /// @param place  (item, axis): coordinate by which an item is sorted to one side of a split
   template <typename Bound, typename Place>
   BoxTree(std::size_t count, const Bound& bound, const Place& place) : order_(count) {
     std::iota(order_.begin(), order_.end(), 0u);
     if (count > 0) build(0, static_cast<std::uint32_t>(count), bound, place);
   }
 
-  /// The things as the leaves have them, one leaf after the other.
+  /// Item numbers in the order of the leaves.
   [[nodiscard]] const std::vector<std::uint32_t>& order() const { return order_; }
 
-  /// Calls look(begin, end), with places in order(), for leaves whose box is no further than the
-  /// root of `squared`, which `look` lowers; near ones first.
+  /// Calls look(begin, end), a range of positions in order(), for each leaf whose box lies within
+  /// the root of `squared`. `look` lowers `squared`. Near leaves come first.
   template <typename Look>
   void search(const openvdb::Vec3d& from, const double& squared, const Look& look) const {
     if (!nodes_.empty()) visit(0, from, squared, look);
@@ -42,8 +43,8 @@ class BoxTree {
 
   struct Node {
     openvdb::Vec3f low, high;
-    std::uint32_t begin = 0, end = 0;  ///< in order_
-    std::uint32_t right = 0;           ///< second child; the first follows; 0: a leaf
+    std::uint32_t begin = 0, end = 0;  ///< range in order_
+    std::uint32_t right = 0;  ///< second child; the first child follows its parent; 0: a leaf
   };
 
   template <typename Bound, typename Place>
@@ -53,7 +54,7 @@ class BoxTree {
     nodes_.emplace_back();
     openvdb::Vec3d low(std::numeric_limits<double>::max()), high = -low;
     for (std::uint32_t i = begin; i < end; ++i) bound(order_[i], low, high);
-    // Rounded outwards: a box must hold its things.
+    // Rounded outwards, so that the box contains its items.
     for (int i = 0; i < 3; ++i) {
       nodes_[index].low[i] = std::nextafter(static_cast<float>(low[i]), -INFINITY);
       nodes_[index].high[i] = std::nextafter(static_cast<float>(high[i]), INFINITY);

@@ -8,18 +8,19 @@
 
 #include "levelset/geometry/disjoint_sets.h"
 
-/// The connected surfaces of a triangle mesh, for any vector type with [] (internal).
+/// Surface components (connected surfaces) of a triangle mesh, for any vector type with []
+/// (internal).
 namespace levelset {
 
 struct ComponentFigures {
   double volume = 0;  ///< signed: negative for the wall of a cavity
   double area = 0;
-  long euler = 0;  ///< V − E + F, where each edge has two triangles
+  long euler = 0;  ///< V − E + F, if each edge has two triangles
 };
 
 struct SurfaceComponents {
   std::vector<ComponentFigures> figures;         ///< in the order of their first vertices
-  std::vector<std::uint32_t> componentOfVertex;  ///< kNoComponent: no triangle there
+  std::vector<std::uint32_t> componentOfVertex;  ///< kNoComponent: vertex without a triangle
   static constexpr std::uint32_t kNoComponent = 0xffffffffu;
 };
 
@@ -42,7 +43,8 @@ inline double dot(const Triple& a, const Triple& b) {
 
 }  // namespace components_detail
 
-/// Volumes are taken about a vertex of each shell and summed in the order of triangles.
+/// Finds the surface components. Volumes are computed relative to a vertex of each component and
+/// summed in triangle order.
 template <typename Vector>
 SurfaceComponents findSurfaceComponents(
     const std::vector<Vector>& positions,
@@ -59,7 +61,7 @@ SurfaceComponents findSurfaceComponents(
   std::vector<std::uint32_t> anchors;
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
     if (shells.componentOfVertex[v] == SurfaceComponents::kNoComponent) continue;
-    const std::uint32_t top = sets.find(v);  // its lowest vertex, numbered before
+    const std::uint32_t top = sets.find(v);  // lowest vertex of its set, numbered before
     if (top == v) {
       shells.componentOfVertex[v] = static_cast<std::uint32_t>(anchors.size());
       anchors.push_back(v);
@@ -81,7 +83,7 @@ SurfaceComponents findSurfaceComponents(
     shells.figures[shell].area += std::sqrt(dot(normal, normal)) / 2;
     ++faces[shell];
   }
-  // 3F = 2E.
+  // Each edge has two triangles: 3F = 2E.
   for (std::size_t i = 0; i < faces.size(); ++i) {
     shells.figures[i].euler -= static_cast<long>(faces[i] / 2);
   }

@@ -21,8 +21,10 @@ using openvdb::Vec3d;
 
 constexpr const char* kMeasure = "measure";
 
-/// Sums over the triangles of each shell: chunk by chunk, and the chunks in their order.
-/// @param piece  (triangle, anchor, worker) of one triangle; @param makeWorker  one for each chunk
+/// Sums moments over the triangles of each surface component, chunk by chunk, and adds the chunks
+/// in order.
+/// @param piece  (triangle, anchor, worker): moments of one triangle
+/// @param makeWorker  creates the scratch data of a chunk
 template <typename MakeWorker, typename Piece>
 std::vector<SurfaceMoments> sumShells(const std::vector<std::uint32_t>& shellOfTriangle,
                                       const std::vector<Vec3d>& anchors, const Progress& progress,
@@ -52,7 +54,8 @@ std::vector<SurfaceMoments> sumShells(const std::vector<std::uint32_t>& shellOfT
   return sums;
 }
 
-/// A vertex of each shell: near to all of it, however far the shells are from each other.
+/// Anchors for the moments: a vertex of each surface component. It is close to its component even
+/// if the components are far apart.
 template <typename Vector>
 std::vector<Vec3d> shellAnchors(const SurfaceComponents& shells,
                                 const std::vector<Vector>& positions) {
@@ -73,7 +76,8 @@ std::vector<std::uint32_t> shellsOfTriangles(
   return result;
 }
 
-/// @param anchor  that the moments are about; @param scale  the length of a unit in the world
+/// @param anchor  reference point of the moments
+/// @param scale  length of an index unit in the world
 void describeMoments(const SurfaceMoments& whole, const Vec3d& anchor, const Imath::M44d& toWorld,
                      double scale, Measurement& result) {
   result.volume = whole.volume * scale * scale * scale;
@@ -102,7 +106,8 @@ void describeShells(const SurfaceComponents& shells, const std::vector<SurfaceMo
   for (std::size_t i = 0; i < sums.size(); ++i) {
     result.euler += shells.figures[i].euler;
     ++result.shells;
-    // By flat triangles: what bends by more than a voxel may have a volume of the wrong sign else.
+    // The volume of the flat triangles decides: where the surface bends by more than a voxel, the
+    // curved volume may have the wrong sign.
     const double volume = shells.figures[i].volume;
     if (volume > 0) ++result.components;
     if (volume < 0) ++result.cavities;
@@ -147,7 +152,7 @@ double edgeCurvature(const TriMesh& mesh) {
   return sum;
 }
 
-/// Where attributes may have doubled vertices, and have.
+/// The mesh with closed seams, if attributes may have doubled vertices and did so.
 std::optional<TriMesh> withoutItsSeams(const TriMesh& mesh) {
   if (mesh.attributes.isEmpty()) return std::nullopt;
   return withoutSeams(mesh, kMeasure, memoryLimit(kNoMemoryLimit));
@@ -155,8 +160,8 @@ std::optional<TriMesh> withoutItsSeams(const TriMesh& mesh) {
 
 }  // namespace
 
-// The figures are those of the surface in index space: near to the numbers' origin, so that a part
-// far away in the world measures the same.
+// Computed in index space, near the origin, so that a part far from the world origin has the same
+// measurements.
 Measurement measure(const NarrowBand& solid, const Progress& progress) {
   requireSolid(solid, kMeasure);
   report(progress, 0, kMeasure);
@@ -207,7 +212,7 @@ Measurement measure(const TriMesh& mesh, const Progress& progress) {
 
 namespace {
 
-/// The corners of the triangles at each vertex: for each, the vertices after and before it.
+/// The triangle corners at each vertex: for each corner, the vertices after and before it.
 struct VertexFans {
   std::vector<std::size_t> first;
   std::vector<std::array<std::uint32_t, 2>> spokes;
@@ -229,7 +234,7 @@ VertexFans collectFans(const TriMesh& mesh) {
   return fans;
 }
 
-/// Judges the edges from `vertex` to higher ones, and the vertex itself.
+/// Classifies the edges from `vertex` to vertices of higher index, and the vertex itself.
 class FanJudge {
  public:
   void judge(std::uint32_t vertex, const std::array<std::uint32_t, 2>* begin, std::size_t count,
@@ -261,7 +266,7 @@ class FanJudge {
   struct Spoke {
     std::uint32_t to;
     std::size_t triangle;
-    bool leaves;  ///< the triangle runs from the vertex to `to`
+    bool leaves;  ///< true when the triangle traverses the edge from the vertex to `to`
   };
 
   static void judgeEdge(std::uint32_t from, std::uint32_t to, std::size_t faces,

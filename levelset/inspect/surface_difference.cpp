@@ -34,9 +34,9 @@ TriangleTree treeOf(const TriMesh& mesh) {
   return TriangleTree(std::move(triangles));
 }
 
-/// Samples in one task, whose neighbours are neighbours in space as a rule.
+/// Samples per task. Consecutive samples are usually close in space.
 constexpr std::size_t kDifferenceChunk = 1024;
-/// A side is cut into so many parts at the most: triangles of decimated meshes may be long.
+/// Maximum number of parts of a triangle's side: triangles of decimated meshes may be long.
 constexpr double kMostParts = 256;
 
 struct DifferenceSums {
@@ -51,14 +51,15 @@ struct DifferenceSums {
   }
 };
 
-/// Measures one sample after another. The distance changes by no more than the way between two of
-/// them, which tells the search where to end.
+/// Measures samples one after another. The distance changes by at most the distance between two
+/// samples, which bounds the search.
 class SampleWalk {
  public:
   SampleWalk(const TriangleSurface& target, const eikonal::PointTree* creases, double reach)
       : target_(target), creases_(creases), reach_(reach) {}
 
-  /// @return the distance; 0 beside a crease
+  /// Measures one sample.
+  /// @return the distance; 0 near a crease
   double visit(const V3d& point) {
     const double limit =
         sums_.samples == 0 ? std::numeric_limits<double>::max() : last_ + (point - at_).length();
@@ -84,6 +85,7 @@ class SampleWalk {
   DifferenceSums sums_;
 };
 
+/// Measures the midpoints of the parts of a triangle.
 /// @return the largest distance
 double visitMiddles(const V3d& a, const V3d& b, const V3d& c, double spacing, SampleWalk& walk) {
   const double longest =
@@ -100,7 +102,7 @@ double visitMiddles(const V3d& a, const V3d& b, const V3d& c, double spacing, Sa
   return largest;
 }
 
-/// Calls work(i, walk) for each i below `count`, in parallel, and adds up what is found.
+/// Calls work(i, walk) for each i below `count`, in parallel, and sums the results.
 template <typename Work>
 DifferenceSums walkAll(std::size_t count, const SampleWalk& fresh, const Progress& progress,
                        const Work& work) {
@@ -119,7 +121,8 @@ DifferenceSums walkAll(std::size_t count, const SampleWalk& fresh, const Progres
   return sums;
 }
 
-/// The triangles with the largest distances, of those that come near to the largest of all.
+/// Numbers of the triangles whose distances come close to the largest of all; the 4,096 largest at
+/// most.
 std::vector<std::uint32_t> farthest(const std::vector<float>& distances, double largest) {
   constexpr double kLargePart = 0.75;
   constexpr std::size_t kMost = 4096;
@@ -139,8 +142,8 @@ std::vector<std::uint32_t> farthest(const std::vector<float>& distances, double 
   return numbers;
 }
 
-/// Everywhere at the spacing that was asked for, and where distances are largest four times as
-/// densely, so that the largest is not missed by more than a hundredth or so.
+/// Measures everywhere at the requested spacing, and four times as densely where distances are
+/// largest. The error of the largest distance is then about one percent.
 DifferenceSums differenceTo(const TriangleSurface& target, const TriangleSurface& surface,
                             const eikonal::PointTree* creases,
                             const SurfaceDifferenceOptions& options, const Progress& progress) {
@@ -171,8 +174,8 @@ DifferenceSums differenceTo(const TriangleSurface& target, const TriangleSurface
   return sums;
 }
 
-/// By vertex: the angle between two planes that would scatter the normals as those around it are
-/// scattered, within two rings of triangles.
+/// For each vertex, the angle between two planes whose normals would scatter as the normals in two
+/// rings of triangles around it do.
 std::vector<float> turnsOf(const TriMesh& mesh) {
   std::vector<V3d> normals(mesh.positions.size(), V3d(0));
   std::vector<double> areas(mesh.positions.size(), 0);
@@ -203,7 +206,7 @@ std::vector<float> turnsOf(const TriMesh& mesh) {
   return turns;
 }
 
-/// The largest turn of each cell of a coarse grid, and of the cells about it.
+/// The largest turn in each cell of a coarse grid and its neighbours.
 class TurnGrid {
  public:
   explicit TurnGrid(double cell) : cell_(cell) {}
@@ -240,7 +243,8 @@ class TurnGrid {
 
 TriangleSurface::TriangleSurface(TriMesh mesh) {
   if (mesh.isEmpty())
-    throw InvalidInput("tolerance: a result has no surface to measure; give one that has");
+    throw InvalidInput(
+        "tolerance: a result has no surface to measure; choose a result with a surface");
   TriangleTree tree = treeOf(mesh);
   data_ = std::make_shared<const Data>(Data{std::move(mesh), std::move(tree)});
 }
@@ -250,7 +254,7 @@ const TriMesh& TriangleSurface::mesh() const {
 }
 
 double TriangleSurface::distance(const V3d& point, double limit) const {
-  // A little wider, for the rounding of what told the limit.
+  // Slightly enlarged to allow for rounding of the limit.
   const double wide = limit < 1e300 ? limit * (1 + 1e-9) + 1e-300 : limit;
   const TriangleTree::Hit near = data_->tree.nearest(toVdb(point), wide);
   if (near.found) return near.distance;
@@ -273,10 +277,10 @@ SurfaceDifference surfaceDifference(const TriangleSurface& a, const TriangleSurf
 
 std::vector<V3d> findCreases(const TriMesh& fine, double fineVoxel, const TriMesh& coarse,
                              double coarseVoxel) {
-  // What two planes at 45 degrees leave beside the triangles that the mesh cuts their edge with.
+  // The turn that two planes at 45 degrees leave beside the triangles that cut their edge.
   constexpr double kLeastTurn = 30 * std::numbers::pi / 180;
-  // A bend that is resolved turns twice as much in the coarse mesh, an edge as it happens to meet
-  // the grid: from 0.7 times to 1.2 times as much.
+  // A resolved bend turns twice as much in the coarse mesh. An edge turns 0.7 to 1.2 times as much,
+  // depending on its position in the grid.
   constexpr float kLeastKept = 0.5f, kMostKept = 1.35f;
   const std::vector<float> fineTurns = turnsOf(fine), coarseTurns = turnsOf(coarse);
   const double cell = 2 * std::max(fineVoxel, coarseVoxel);

@@ -24,7 +24,8 @@ struct CoordLess {
   }
 };
 
-/// A grid edge from `point` to the next one along `axis` that the open surface crosses at `t`.
+/// A grid edge from `point` to the next one along `axis`, crossed by the open surface at fraction
+/// `t`.
 struct CutEdge {
   V3i point;
   int axis;
@@ -88,7 +89,7 @@ class OpenSurfaceWalk {
  private:
   static V3d place(const CutEdge& edge) { return V3d(edge.point) + V3d(step(edge.axis)) * edge.t; }
 
-  /// The four cells around an edge, in turn, by their lowest corners.
+  /// The four cells around an edge, in cyclic order, by their lowest corners.
   static V3i cellAt(const CutEdge& edge, int corner) {
     const V3i first = step((edge.axis + 1) % 3), second = step((edge.axis + 2) % 3);
     return edge.point - (corner == 1 || corner == 2 ? first : V3i(0)) -
@@ -113,13 +114,14 @@ class OpenSurfaceWalk {
     return (*found->second)[static_cast<std::size_t>(64 * d.x + 8 * d.y + d.z)];
   }
 
-  /// Across a face the number jumps by one; where it changes less, there is none in between. (A
-  /// hole so small that it changes by more has its rim within a voxel.)
+  /// The winding number jumps by one across a face. A smaller change means that no face lies in
+  /// between. If a hole is so small that the change is larger, its rim lies within a voxel.
   static bool isCut(double w, double next) {
     return (w > 0.5) != (next > 0.5) && std::abs(w - next) < 0.5;
   }
 
-  /// Edges from the block's points upwards; with `both`, also those that come in from below.
+  /// Crossed edges that start at the block's points in positive direction; with `both`, also those
+  /// that enter the block from below.
   void cutsIn(const V3i& origin, bool both, std::vector<CutEdge>& out) const {
     for (int x = 0; x < kBlockDim; ++x)
       for (int y = 0; y < kBlockDim; ++y)
@@ -136,7 +138,7 @@ class OpenSurfaceWalk {
         }
   }
 
-  /// The blocks not yet known into which the cut edges' cells reach.
+  /// Unknown blocks that the cells of the crossed edges extend into.
   std::vector<V3i> neighboursCut(const std::vector<V3i>& wave) const {
     std::vector<std::vector<V3i>> found(wave.size());
     ProgressGate gate(progress_, wave.size(), "level-set");

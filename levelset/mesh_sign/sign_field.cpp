@@ -10,15 +10,16 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 
-/// Mesh and fans, to be crossed by lines, and what has to be added to the integer they give.
+/// Mesh and fans for the line crossings, and the correction to the integer winding number that they
+/// give.
 struct ClosedMesh {
   LocalMesh mesh;
-  std::vector<int> weights;  ///< empty: 1 each
+  std::vector<int> weights;  ///< multiplicities; empty: 1 each
   std::vector<WeightedTriangle> rest;
 };
 
-/// Closes each loop of the boundary by a fan about the mean of its edges' ends. The edges of a loop
-/// form a cycle, so mesh and fans have no boundary, whatever the loop's shape.
+/// Closes each loop of the boundary by a fan from the mean of its edges' end points. The edges of a
+/// loop form a cycle, so mesh and fans together have no boundary, whatever the shape of the loop.
 ClosedMesh closeByFans(const LocalMesh& mesh, const std::vector<BoundaryEdge>& boundary) {
   ClosedMesh closed{mesh, std::vector<int>(mesh.triangles.size(), 1), {}};
   DisjointSets loops(mesh.points.size());

@@ -22,11 +22,12 @@ using levelset::NarrowBand;
 
 constexpr const char* kAnimate = "animate";
 
-/// The straight way from the centre that ends at `goal`: that of the geodesic between them, then
-/// corrected by where a walk along it ends. Corrections are taken as if the surface were flat,
-/// which is off by the share that geodesics spread, so each leaves a part of the miss.
-std::optional<V3d> straightWayTo(const SurfaceField& field, const SurfaceFrame& frame,
-                                 const V3d& goal) {
+/// Finds the tangent vector at the centre whose geodesic ends at `goal`. It starts with that of the
+/// geodesic between the two points and corrects it by the miss of a traced geodesic. The correction
+/// treats the surface as flat, which is inexact by the spreading of geodesics, so each step reduces
+/// the miss.
+std::optional<V3d> geodesicTo(const SurfaceField& field, const SurfaceFrame& frame,
+                              const V3d& goal) {
   constexpr int kMostShots = 24;
   constexpr double kHit = 1e-4, kNear = 0.05;  // voxels
   const std::vector<V3d> path = geodesic(field, 0, frame.centre, goal);
@@ -98,7 +99,7 @@ Footprint footprintOf(const NarrowBand& base, const PatchOutline& outline) {
   const std::array<V3d, 4>& c = footprint.corners;
   const V3d u = outline.direction ? *outline.direction : c[1] + c[2] - c[0] - c[3];
   V3d direction = frame.inPlane(u);
-  // Of a patch that goes all around something any direction does.
+  // For a patch that goes all around something, any direction is suitable.
   if (!(direction.length() > 1e-3 * u.length())) direction = eastOf(frame.normal);
   footprint.direction = direction.normalized();
   footprint.normal = frame.normal;
@@ -110,7 +111,7 @@ Footprint withReach(const NarrowBand& base, Footprint footprint, bool keepsDirec
   SurfaceFrame frame = frameOf(footprint);
   std::array<V3d, 4> ways;
   for (std::size_t i = 0; i < 4; ++i) {
-    const std::optional<V3d> way = straightWayTo(field, frame, footprint.corners[i]);
+    const std::optional<V3d> way = geodesicTo(field, frame, footprint.corners[i]);
     if (!way) return footprint;
     ways[i] = *way;
   }
@@ -139,15 +140,15 @@ Footprint carryFootprint(const NarrowBand& base, const Footprint& footprint, Car
   const auto corners = cornersFrom(field, frameOf(moved), footprint.reach.value());
   if (!corners) {
     throw levelset::InvalidInput(fmt::format(
-        "{}: the surface breaks off between the centre {} of the patch and its corners; carry the "
-        "corners by themselves, or end before",
+        "{}: the surface breaks off between the centre {} of the patch and its corners; use "
+        "--carry corners, or end the animation before this frame",
         kAnimate, pointAsOption(moved.centre)));
   }
   moved.corners = *corners;
   return moved;
 }
 
-double farthestWay(const Footprint& from, const Footprint& to) {
+double farthestMove(const Footprint& from, const Footprint& to) {
   double farthest = 0;
   for (std::size_t i = 0; i < 4; ++i)
     farthest = std::max(farthest, (to.corners[i] - from.corners[i]).length());

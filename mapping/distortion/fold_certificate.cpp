@@ -19,7 +19,7 @@ namespace {
 
 using Imath::V3d;
 
-/// Even orders of the axes make tetrahedra of positive volume.
+/// True for orders of the axes (even permutations) that give tetrahedra of positive volume.
 bool isEvenOrder(int order) {
   const auto& axes = Lattice::kOrders[static_cast<std::size_t>(order)];
   return (axes[0] + 1) % 3 == axes[1];
@@ -33,12 +33,12 @@ V3d middleOf(const Lattice::Corners& c) {
   return (c[0] + c[1] + c[2] + c[3]) / 4.0;
 }
 
-/// What is known of one cell.
+/// Results for one cell.
 struct CellVolume {
   double size = 0, folded = 0, undecided = 0;  ///< volumes of texture space
   double typical = 0;                          ///< determinant of texture → patch
   bool folds = false;
-  FoldPoint least;  ///< its Jacobian is no share of anything yet
+  FoldPoint least;  ///< its Jacobian is not yet divided by the median
   std::size_t pieces = 0;
 };
 

@@ -9,28 +9,31 @@
 
 namespace mapping {
 
-/// The worst first, and no more than are told.
+/// Sorts folds, the worst first, and keeps the number that is reported.
 inline void keepWorst(std::vector<FoldPoint>& places) {
   std::stable_sort(places.begin(), places.end(),
                    [](const FoldPoint& a, const FoldPoint& b) { return a.jacobian < b.jacobian; });
   places.resize(std::min(places.size(), FoldCertificate::kMostPoints));
 }
 
-/// Adds up what is known of the parts of a map, in their order.
+/// Accumulates the results of the parts of a map, in their order.
 struct FoldTally {
   FoldCertificate certificate = {};
 
   void addVolume(double size, double folded, double undecided) {
     size_ += size, folded_ += folded, undecided_ += undecided;
   }
-  /// @param typical  of a part, for the median; @param least  of the same part
+  /// Adds the determinants of one part.
+  /// @param typical  typical determinant, for the median
+  /// @param least    least determinant
   void addDeterminant(double typical, double least) {
     if (typical > 0) typical_.push_back(typical);
     least_ = std::min(least_, least);
   }
   void addFold(const FoldPoint& fold) { certificate.worst.push_back(fold); }
 
-  /// Determinants become shares of the median of those that are positive; the worst folds are kept.
+  /// Returns the certificate: determinants divided by the median of the positive ones, and the
+  /// worst folds.
   [[nodiscard]] FoldCertificate finish() {
     double unit = 1;
     if (!typical_.empty()) {

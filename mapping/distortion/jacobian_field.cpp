@@ -24,7 +24,7 @@ using levelset::FieldGrid;
 
 constexpr const char* kFolds = "folds";
 
-/// A grid on which the least of several values at a point is kept.
+/// Grid that keeps the least of several values at a point.
 class LeastGrid {
  public:
   explicit LeastGrid(double voxelSize)
@@ -40,8 +40,8 @@ class LeastGrid {
       accessor_.setValueOn(at, number);
   }
 
-  /// Calls visit(grid point, its shares in the corners) for those in a tetrahedron, whichever way
-  /// it is turned.
+  /// Calls visit(grid point, barycentric coordinates) for the grid points in a tetrahedron of
+  /// either orientation.
   template <typename Visit>
   void forEachInside(const Lattice::Corners& corners, const Visit& visit) const {
     Box3d box;
@@ -53,7 +53,7 @@ class LeastGrid {
       for (c[1] = ceiling(low[1]); c[1] <= high[1]; ++c[1])
         for (c[2] = ceiling(low[2]); c[2] <= high[2]; ++c[2]) {
           const auto shares = barycentric(corners, levelset::toImath(grid_->indexToWorld(c)));
-          // Points on a face belong to both sides of it.
+          // Points on a face belong to both of its tetrahedra.
           constexpr double kOnAFace = -1e-9;
           if (std::all_of(shares.begin(), shares.end(), [](double s) { return s >= kOnAFace; }))
             visit(c, shares);
@@ -77,7 +77,8 @@ class LeastGrid {
   openvdb::FloatGrid::Accessor accessor_;
 };
 
-/// Grid points of cells of the patch are counted before they are made.
+/// Checks the options and the memory estimate. It bounds the grid points of all cells before the
+/// grid is built.
 void checkField(const Patch& patch, const JacobianFieldOptions& options) {
   if (!(options.voxelSize > 0) || !std::isfinite(options.voxelSize)) {
     throw levelset::UsageError(
@@ -96,18 +97,18 @@ void checkField(const Patch& patch, const JacobianFieldOptions& options) {
       constexpr double kMostIndex = 1e9;
       if (!(std::max(std::abs(box.min[axis]), std::abs(box.max[axis])) <
             kMostIndex * options.voxelSize)) {
-        throw levelset::ResourceLimit(
-            fmt::format("{}: at a voxel of {:.3g} the grid passes the range of 32-bit indices; "
-                        "take a larger one",
-                        kFolds, options.voxelSize));
+        throw levelset::ResourceLimit(fmt::format(
+            "{}: with a voxel size of {:.3g} the grid exceeds the range of 32-bit indices; "
+            "use larger voxels",
+            kFolds, options.voxelSize));
       }
     }
   }
-  constexpr double kBytesPerPoint = 160;  // with the samples of a smooth map
+  constexpr double kBytesPerPoint = 160;  // including the samples of a smooth map
   levelset::requireMemory(points * kBytesPerPoint, options.maxMemory, kFolds);
 }
 
-/// Corners of a cell's six tetrahedra, as bits of the corner's index.
+/// Corners of one of a cell's six tetrahedra, as bits of the corner index.
 std::array<std::size_t, 4> tetrahedronOf(int order) {
   const auto& axes = Lattice::kOrders[static_cast<std::size_t>(order)];
   std::array<std::size_t, 4> corners = {0, 0, 0, 7};
@@ -121,7 +122,7 @@ V3d unitCorner(std::size_t corner) {
           static_cast<double>(corner >> 2)};
 }
 
-/// The determinant of a trilinear map at a place of the unit cube.
+/// Determinant of a trilinear map at a point of the unit cube.
 double trilinearDeterminant(const std::array<V3d, 8>& corners, const V3d& at) {
   std::array<V3d, 3> slopes;
   for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -17,7 +17,8 @@ using Imath::V3d;
 using Cell = std::array<int, 3>;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// What rounding may leave of a point's share in a corner that it lies opposite of.
+// Tolerance for barycentric coordinates: a point on a face may have a share this far below 0 from
+// rounding.
 constexpr double kOnFace = -1e-9;
 
 bool isInside(const std::array<double, 4>& shares) {
@@ -29,7 +30,7 @@ V3d mix(const Lattice::Corners& corners, const std::array<double, 4>& shares) {
          corners[3] * shares[3];
 }
 
-/// Gradients of u, v and w in a tetrahedron, as rows; not finite where it has no volume.
+/// Gradients of u, v and w in a tetrahedron, as rows; not finite if it has no volume.
 M33d slopes(const Lattice::Corners& world, const Lattice::Corners& texture) {
   const std::array<V3d, 3> dual =
       dualBasis(world[1] - world[0], world[2] - world[0], world[3] - world[0]);
@@ -48,14 +49,14 @@ Box3d around(const GridBlock& block) {
   for (int i = 0; i < 3; ++i)
     for (int axis = 0; axis < 3; ++axis)
       half[axis] += std::abs(block.row(i)[axis]) * 0.5 * (block.edge - 1);
-  // Rounding must not lose what lies on the rim.
+  // The box grows a little so that rounding does not lose cells at its border.
   half *= 1 + 1e-9;
   return {center - half, center + half};
 }
 
 }  // namespace
 
-/// The cells of a shell map that touch a block.
+/// The cells of a prism map that touch a block.
 class PrismBlock final : public BlockMap {
  public:
   PrismBlock(const PrismMap& map, const GridBlock& block) : map_(map), block_(block) {
@@ -66,7 +67,8 @@ class PrismBlock final : public BlockMap {
   }
 
   [[nodiscard]] Box3d imageBounds() const override {
-    // Tetrahedra much smaller than the block fill their boxes.
+    // Tetrahedra much smaller than the block fill most of their boxes, so the boxes are tight
+    // enough.
     constexpr std::size_t kFew = 32;
     Box3d bounds;
     for (const Cell& cell : cells_) {
@@ -76,7 +78,7 @@ class PrismBlock final : public BlockMap {
       else
         for (int order = 0; order < 6; ++order) bounds.extendBy(imageIn({cell, order}, box));
     }
-    // Barycentric sums round.
+    // Barycentric sums have rounding errors.
     constexpr double kRounding = 1e-12;
     if (!bounds.isEmpty()) bounds = {bounds.min - V3d(kRounding), bounds.max + V3d(kRounding)};
     return bounds;
@@ -114,8 +116,8 @@ class PrismBlock final : public BlockMap {
       if (map_.lattice_.worldBox(cell).intersects(box)) cells_.push_back(cell);
   }
 
-  /// What one tetrahedron makes of the block: its straight map of the block's hull, as far as its
-  /// own box of texture space reaches.
+  /// Box of the image of the block's hull under the linear map of one tetrahedron, clipped to the
+  /// tetrahedron's own box in texture space.
   [[nodiscard]] Box3d imageIn(const Tetrahedron& t, const Box3d& own) const {
     const Lattice::Corners world = map_.lattice_.corners(t),
                            texture = map_.lattice_.textureCorners(t);
@@ -137,13 +139,13 @@ class PrismBlock final : public BlockMap {
     return image;
   }
 
-  /// Goes from point to point through faces; searches the block's cells where that fails.
+  /// Walks from point to point across faces; searches the block's cells when the walk fails.
   class Walk {
    public:
     explicit Walk(const PrismBlock& block)
         : map_(block.map_), lattice_(block.map_.lattice_), block_(block) {}
 
-    /// The next point lies beside the first of the row before.
+    /// Resumes at the first point of the previous row, which is adjacent to the next point.
     void returnToRow() {
       current_ = first_;
       isAt_ = hasFirst_;
@@ -217,7 +219,7 @@ double PrismMap::estimateBytes(const Patch& patch) {
     columns = std::max(columns, static_cast<double>(layer.columns));
     rows = std::max(rows, static_cast<double>(layer.rows));
   }
-  // Nodes, boxes, samples and what is told from these, for each cell.
+  // Nodes, boxes, samples and the statistics computed from the samples, for each cell.
   constexpr double kBytesPerCell = 1200;
   return kBytesPerCell * (columns + 1) * (rows + 1) *
          (static_cast<double>(patch.layers.size()) + 3);

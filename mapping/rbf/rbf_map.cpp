@@ -22,7 +22,7 @@ constexpr std::size_t kResidualChunk = 512;
 void checkTolerance(double tolerance) {
   if (!(tolerance > 0) || !std::isfinite(tolerance)) {
     throw levelset::UsageError(
-        fmt::format("{}: the tolerance of the solution is {}; give a positive share of the texture",
+        fmt::format("{}: the solver tolerance is {}; give a positive share of the texture's size",
                     kRbfMap, tolerance));
   }
 }

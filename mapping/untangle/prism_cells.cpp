@@ -8,8 +8,8 @@ namespace {
 
 using Imath::V3d;
 
-// Ends of the cells of unlike layers are further apart than this, whatever a million particles may
-// be laid out as, and rounding is far below.
+// Tolerance for equal cell borders of two layers. Different borders are further apart than this for
+// up to a million particles, and rounding errors are much smaller.
 constexpr double kSameEnd = 1e-9;
 
 void addEnds(std::vector<double>& ends, std::size_t count) {
@@ -30,7 +30,7 @@ std::vector<double> endsOf(std::size_t below, std::size_t above) {
 
 struct Share {
   std::size_t index;
-  double fraction;  ///< of the next one
+  double fraction;  ///< weight of the next particle
 };
 
 Share shareAt(double t, std::size_t count) {

@@ -12,28 +12,32 @@
 
 namespace mapping {
 
-/// A place as a weighted sum of particles, counted through all layers, row by row, without rims.
+/// A position as a weighted sum of particles. Particles are counted layer by layer and row by row,
+/// without rims.
 struct ParticleSum {
   struct Term {
     std::uint32_t particle = 0;
     double weight = 0;
   };
   std::array<Term, 8> terms{};
-  std::size_t count = 0;  ///< of the terms that are used
+  std::size_t count = 0;  ///< number of terms in use
 };
 
-/// A box of texture space in which the straight map through the particles (see layer_map.h) is
-/// trilinear, and its corners: bits 0, 1, 2 of the index tell the upper end of u, v, w.
+/// A box of texture space in which the piecewise linear map through the particles (see layer_map.h)
+/// is trilinear, with its eight corners. Bits 0, 1, 2 of a corner's index select the upper end of
+/// u, v, w.
 struct PrismCell {
   Imath::Box3d box;
   std::array<ParticleSum, 8> corners;
 };
 
-/// All such boxes between the layers of a patch, and as far below or above them as a texture is
-/// sunk or lifted. Between layers of unlike counts they end wherever a cell of either does.
+/// All trilinear boxes between the layers of a patch. They continue below or above the layers by
+/// the embedding depth of the texture. Between layers of different counts the boxes end at the cell
+/// borders of both layers.
 class PrismCells {
  public:
-  /// @param sink  of the texture, in w: below the surface, above w = 1 if negative
+  /// @param embedDepth  depth of the texture below the surface, in w; if negative, its lift above w
+  ///         = 1
   /// @pre two layers or more
   explicit PrismCells(const Patch& patch, double embedDepth = 0);
 
@@ -42,10 +46,10 @@ class PrismCells {
 
  private:
   struct Slab {
-    std::size_t lower = 0;     ///< layer; the upper is the next
+    std::size_t lower = 0;     ///< index of the lower layer; the upper layer is the next
     std::size_t first = 0;     ///< index of its first cell
-    double from = 0, to = 0;   ///< in w
-    std::vector<double> u, v;  ///< where its cells end
+    double from = 0, to = 0;   ///< range of w
+    std::vector<double> u, v;  ///< cell borders along u and v
     [[nodiscard]] std::size_t count() const { return (u.size() - 1) * (v.size() - 1); }
   };
   void addLayer(ParticleSum& sum, std::size_t layer, double u, double v, double share) const;
@@ -55,14 +59,14 @@ class PrismCells {
   std::vector<double> w_;
 };
 
-/// Mean lengths of the rows and columns on the surface, and the height: with u, v and w multiplied
-/// by them, slopes are about 1.
+/// Mean lengths of the rows and columns on the surface, and the height. With u, v and w multiplied
+/// by these lengths, slopes are about 1.
 [[nodiscard]] Imath::V3d meanExtents(const Patch& patch);
 
-/// Positions of all particles but the rims', layer by layer.
+/// Positions of all particles except those of the rims, layer by layer.
 [[nodiscard]] std::vector<Imath::V3d> particlePositions(const Patch& patch);
 
-/// The world position of a weighted sum of particles.
+/// World position of a weighted sum of particles.
 [[nodiscard]] Imath::V3d positionOf(const ParticleSum& sum,
                                     const std::vector<Imath::V3d>& positions);
 

@@ -13,7 +13,7 @@ namespace {
 
 using Imath::V3d;
 
-/// Derivatives of the determinant by the columns.
+/// Derivatives of the determinant with respect to the columns.
 ElementSlopes cofactors(const ElementSlopes& f) {
   return {f[1].cross(f[2]), f[2].cross(f[0]), f[0].cross(f[1])};
 }
@@ -22,7 +22,7 @@ double squaredNorm(const ElementSlopes& f) {
   return f[0].length2() + f[1].length2() + f[2].length2();
 }
 
-// Paths from a cell's first corner to its last, one axis after the other, as in Lattice.
+// Paths from the first corner of a cell to its last, one axis after the other, as in Lattice.
 constexpr std::array<std::array<std::size_t, 3>, 6> kPaths = {
     {{0, 1, 2}, {0, 2, 1}, {2, 0, 1}, {1, 0, 2}, {1, 2, 0}, {2, 1, 0}}};
 
@@ -54,7 +54,7 @@ ElementEnergy symmetricDirichlet(const ElementSlopes& f) {
 ElementEnergy foldoverEnergy(const ElementSlopes& f, double epsilon) {
   const ElementSlopes c = cofactors(f);
   const double det = f[0].dot(c[0]), root = std::hypot(epsilon, det);
-  // For negative determinants the sum would cancel.
+  // For negative determinants the sum would suffer cancellation.
   const double chi = det >= 0 ? 0.5 * (det + root) : 0.5 * epsilon * epsilon / (root - det);
   ElementEnergy result;
   if (!(chi > 0)) {
@@ -79,7 +79,7 @@ PrismElements::PrismElements(const Patch& patch, const V3d& rest, double embedDe
     V3d sides = cell.box.size() * rest;
     const double size = sides.x * sides.y * sides.z;
     volume += size;
-    // What is mirrored on purpose is turned back.
+    // A patch that is mirrored on purpose is mirrored back.
     if (patch.mirrored) sides.x = -sides.x;
     for (std::size_t corner = 0; corner < 8; ++corner)
       addElement(
@@ -163,7 +163,7 @@ std::vector<V3d> PrismElements::gather(const std::vector<ElementSlopes>& stress)
 }
 
 double PrismElements::estimateBytes(const Patch& patch) {
-  // Fourteen elements of four particles or more, twice, and a factorised matrix.
+  // 14 elements of at least four particles each, stored twice, and a factorised matrix.
   constexpr double kBytesPerParticle = 8000;
   return kBytesPerParticle * static_cast<double>(patch.particleCount());
 }

@@ -11,43 +11,46 @@
 
 namespace mapping {
 
-/// Slopes of texture → patch as columns: ∂x/∂u, ∂x/∂v, ∂x/∂w in units of the shape at rest.
+/// Slopes of the map texture → patch as columns: ∂x/∂u, ∂x/∂v, ∂x/∂w in units of the rest shape.
 using ElementSlopes = std::array<Imath::V3d, 3>;
 
-/// The energy of one element for each volume at rest, and its derivative by the slopes.
+/// Energy density of one element per unit of rest volume, and its derivative with respect to the
+/// slopes.
 struct ElementEnergy {
-  double value = 0;  ///< infinite where the element must not be
+  double value = 0;  ///< infinite for slopes that the energy forbids
   ElementSlopes stress{Imath::V3d(0), Imath::V3d(0), Imath::V3d(0)};
 };
 
-/// |F|² + |F⁻¹|², the symmetric Dirichlet energy: 6 for a rotation, infinite where F turns over
-/// [Smith15].
+/// Returns |F|² + |F⁻¹|², the symmetric Dirichlet energy: 6 for a rotation, infinite where F is
+/// inverted [Smith15].
 [[nodiscard]] ElementEnergy symmetricDirichlet(const ElementSlopes& slopes);
 
-/// |F|² / χ^⅔ + (1 + det²) / χ with χ = (det + √(ε² + det²)) / 2 in place of det: finite for any F,
-/// and as ε goes to nothing it forbids folds [Garanzha21].
+/// Returns |F|² / χ^⅔ + (1 + det²) / χ, where χ = (det + √(ε² + det²)) / 2 replaces det. The energy
+/// is finite for every F, and forbids folds in the limit ε → 0 [Garanzha21].
 [[nodiscard]] ElementEnergy foldoverEnergy(const ElementSlopes& slopes, double epsilon);
 
 [[nodiscard]] double determinantOf(const ElementSlopes& slopes);
 
-/// The cells of a patch's shell as elements in which slopes are linear in the particles: the eight
-/// corners of each cell, where a trilinear map turns over first, and its six tetrahedra.
+/// The prism cells of a patch split into elements whose slopes are linear in the particle
+/// positions. Each cell has 14 elements: its eight corners, where a trilinear map inverts first,
+/// and its six tetrahedra.
 class PrismElements {
  public:
   /// @param rest  size of the unit cube at rest, world units
-  /// @param sink  see PrismCells
+  /// @param embedDepth  in w, see PrismCells
   PrismElements(const Patch& patch, const Imath::V3d& rest, double embedDepth);
 
   [[nodiscard]] std::size_t size() const { return weights_.size(); }
   [[nodiscard]] std::size_t particleCount() const { return particles_; }
-  /// Share of an element in the volume at rest.
+  /// Share of an element in the total rest volume.
   [[nodiscard]] double weight(std::size_t element) const { return weights_[element]; }
   [[nodiscard]] ElementSlopes slopes(std::size_t element,
                                      const std::vector<Imath::V3d>& positions) const;
-  /// Derivatives by each particle's position, from those by each element's slopes.
+  /// Collects the derivatives with respect to particle positions from those with respect to element
+  /// slopes.
   [[nodiscard]] std::vector<Imath::V3d> gather(const std::vector<ElementSlopes>& stress) const;
 
-  /// A particle's share in an element: slopes += position × slope, column by column.
+  /// Contribution of one particle to an element: slopes += position × slope, column by column.
   struct Entry {
     std::uint32_t particle;
     Imath::V3d slope;
@@ -57,7 +60,7 @@ class PrismElements {
   void forEachEntry(std::size_t element, const Visit& visit) const {
     for (std::size_t n = first_[element]; n < first_[element + 1]; ++n) visit(entries_[n]);
   }
-  /// What elements and their solution take.
+  /// Memory for the elements and for minimising over them, bytes.
   [[nodiscard]] static double estimateBytes(const Patch& patch);
 
  private:
@@ -71,7 +74,8 @@ class PrismElements {
   std::vector<Entry> entries_;
   std::vector<double> weights_;
   std::vector<std::size_t> firstUse_;
-  std::vector<std::array<std::uint32_t, 2>> uses_;  ///< element and entry, particle by particle
+  /// Element and entry of each use, particle by particle.
+  std::vector<std::array<std::uint32_t, 2>> uses_;
 };
 
 }  // namespace mapping

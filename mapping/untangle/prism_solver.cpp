@@ -18,14 +18,15 @@ namespace {
 
 using Imath::V3d;
 
-constexpr std::size_t kRemembered = 8;  // pairs
-constexpr double kSufficient = 1e-4;    // of the fall that the slope promises
+constexpr std::size_t kRemembered = 8;  // pairs of step and gradient change
+constexpr double kSufficient = 1e-4;    // share of the decrease that the slope predicts (Armijo)
 constexpr int kMostHalvings = 30;
 constexpr double kLongestStep = 0.5;  // particle spacings
 constexpr double kStandsStill = 1e-7;
-constexpr double kNoGain = 1e-11;  // of the energy, some times in a row
+// Relative decrease of the energy; kNoGainSteps such steps in a row end the search.
+constexpr double kNoGain = 1e-11;
 constexpr int kNoGainSteps = 5;
-// Second derivative of the symmetric Dirichlet energy at rest, along a change of the slopes.
+// Second derivative of the symmetric Dirichlet energy at rest, with respect to the slopes.
 constexpr double kStiffness = 8;
 
 double innerProduct(const std::vector<V3d>& a, const std::vector<V3d>& b) {
@@ -40,9 +41,9 @@ void addScaled(std::vector<V3d>& a, const std::vector<V3d>& b, double factor) {
 
 }  // namespace
 
-/// The Laplacian of the elements on particles that are not fixed, factorised.
+/// Factorised Laplacian of the elements over the particles that are not fixed.
 struct PrismSolver::Preconditioner {
-  std::vector<int> unknown;  ///< of each particle; −1: fixed
+  std::vector<int> unknown;  ///< index of each particle's unknown; −1: fixed
   int count = 0;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor;
 
@@ -62,7 +63,7 @@ struct PrismSolver::Preconditioner {
           if (column == row) trace += value;
         });
       });
-    // Nothing may be fixed.
+    // The shift keeps the matrix regular when no particle is fixed.
     constexpr double kShift = 1e-6;
     for (int n = 0; n < count; ++n) triplets.emplace_back(n, n, kShift * trace / count);
     Eigen::SparseMatrix<double> matrix(count, count);
@@ -71,7 +72,7 @@ struct PrismSolver::Preconditioner {
   }
 };
 
-/// Steps and what they changed in the gradient.
+/// L-BFGS memory: recent steps and the changes of the gradient over them.
 struct PrismSolver::Memory {
   struct Pair {
     Vectors step, change;
@@ -88,7 +89,7 @@ struct PrismSolver::Memory {
     pairs.push_back({std::move(step), std::move(change), product});
   }
 
-  /// The inverse of the second derivatives, as far as it is known, times `vectors`.
+  /// Applies the approximate inverse Hessian to `vectors`.
   template <typename Start>
   Vectors apply(Vectors vectors, const Start& start) const {
     std::vector<double> alpha(pairs.size());
@@ -119,7 +120,7 @@ PrismSolver::PrismSolver(const levelset::NarrowBand& base, const PrismElements& 
       positions_(std::move(positions)),
       normals_(positions_.size(), V3d(0)),
       preconditioner_(std::make_unique<Preconditioner>(elements, holds_)) {
-  // An element's slopes are differences over its edges at rest; the mean one tells the spacing.
+  // An element's slopes are differences along its edges at rest, so their mean is 1 / spacing.
   double steepness = 0;
   for (std::size_t e = 0; e < elements_.size(); ++e) {
     double steepest = 0;

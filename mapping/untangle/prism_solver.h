@@ -12,27 +12,27 @@
 
 namespace mapping {
 
-/// What holds a particle.
+/// Constraint on the motion of a particle.
 enum class ParticleHold : char {
   Free,
-  Slides,  ///< on the base's surface
+  Slides,  ///< moves on the base's surface
   Fixed
 };
 
-/// Lets particles find the least of a sum over elements: L-BFGS on the surface's tangents,
-/// preconditioned with the Laplacian of the elements [Nocedal06; Claici17], each step projected
-/// onto the surface and taken only when the energy has fallen by enough. The same bits for any
-/// number of threads.
+/// Moves particles to minimise an energy summed over elements. The method is L-BFGS in the tangent
+/// planes of the surface, preconditioned with the Laplacian of the elements [Nocedal06; Claici17].
+/// Each step is projected onto the surface and accepted only if the energy decreases enough. The
+/// result has the same bits for any number of threads.
 class PrismSolver {
  public:
   using Density = std::function<ElementEnergy(const ElementSlopes&)>;
 
-  /// @param positions  of all particles; those that slide are on the surface
+  /// @param positions  of all particles; particles with ParticleHold::Slides lie on the surface
   PrismSolver(const levelset::NarrowBand& base, const PrismElements& elements,
               std::vector<ParticleHold> holds, std::vector<Imath::V3d> positions);
   ~PrismSolver();
 
-  /// @return iterations taken; fewer than asked where nothing is left to gain
+  /// @return number of iterations; fewer than `mostIterations` when the energy no longer decreases
   std::size_t minimise(const Density& density, std::size_t mostIterations);
 
   [[nodiscard]] const std::vector<Imath::V3d>& positions() const { return positions_; }
@@ -46,11 +46,12 @@ class PrismSolver {
 
   double energyAt(const Density& density, const Vectors& positions,
                   std::vector<ElementSlopes>* stress) const;
-  /// Derivatives along which particles may move.
+  /// Gradient of the energy, projected onto the directions in which particles may move.
   [[nodiscard]] Vectors gradientOf(const std::vector<ElementSlopes>& stress) const;
   void makeTangent(Vectors& vectors) const;
   void updateNormals();
-  /// False where the surface cannot be followed.
+  /// Computes positions after a step. Returns false when a sliding particle cannot be projected
+  /// onto the surface.
   bool moved(const Vectors& direction, double step, Vectors& result) const;
   [[nodiscard]] Vectors preconditioned(Vectors vectors) const;
 
@@ -58,7 +59,7 @@ class PrismSolver {
   const PrismElements& elements_;
   std::vector<ParticleHold> holds_;
   Vectors positions_, normals_;
-  double spacing_ = 0;  ///< of particles, for the length of steps
+  double spacing_ = 0;  ///< particle spacing, the unit for step lengths
   std::unique_ptr<Preconditioner> preconditioner_;
 };
 

@@ -27,7 +27,7 @@ void checkInput(const NarrowBand& base, const Patch& patch, const UntangleOption
                 const char* action) {
   if (patch.layers.size() < 2 || !(patch.height > 0)) {
     throw InvalidInput(
-        fmt::format("{}: the patch has no layers of particles; make it with `patch`", action));
+        fmt::format("{}: the patch has no layers of particles; build it with `patch`", action));
   }
   if (!std::isfinite(options.embedDepth)) {
     throw levelset::UsageError(fmt::format(
@@ -46,8 +46,7 @@ void checkInput(const NarrowBand& base, const Patch& patch, const UntangleOption
     for (const V3d& p : layer.positions)
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
         throw InvalidInput(
-            fmt::format("{}: the particle at ({}, {}, {}) is not finite; make the "
-                        "patch again",
+            fmt::format("{}: the particle at ({}, {}, {}) is not finite; build the patch again",
                         action, p.x, p.y, p.z));
       }
   const SurfaceField field(base);
@@ -55,15 +54,16 @@ void checkInput(const NarrowBand& base, const Patch& patch, const UntangleOption
     const double distance = std::abs(field.value(p)) / base.voxelSize();
     if (!(distance <= 1)) {
       throw InvalidInput(
-          fmt::format("{}: the patch does not lie on the base, at ({:.6g}, {:.6g}, {:.6g}) they "
-                      "are {:.3g} voxels or more apart; make the patch on this base",
+          fmt::format("{}: the patch does not lie on the base: at ({:.6g}, {:.6g}, {:.6g}) the "
+                      "surface is at least {:.3g} voxels away; build the patch on this base",
                       action, p.x, p.y, p.z, distance));
     }
   }
   levelset::requireMemory(PrismElements::estimateBytes(patch), options.maxMemory, action);
 }
 
-/// Above the surface all are free; on it those inside slide.
+/// Constraints of all particles: those above the surface are free; those on it slide, except on
+/// sides that must stay.
 std::vector<ParticleHold> holdsOf(const Patch& patch, bool freeSides) {
   std::vector<ParticleHold> holds;
   for (std::size_t k = 0; k < patch.layers.size(); ++k) {
@@ -79,7 +79,8 @@ std::vector<ParticleHold> holdsOf(const Patch& patch, bool freeSides) {
   return holds;
 }
 
-/// A particle of the rim stays as far ahead of the last one as the one before that stays behind.
+/// Moves the rim so that the displacement continues linearly beyond the border: 2 × the border
+/// particle's displacement minus that of the particle inside it.
 void moveRim(const ParticleLayer& old, ParticleLayer& layer) {
   const auto columns = static_cast<int>(layer.columns), rows = static_cast<int>(layer.rows);
   const auto moved = [&](int i, int j) { return layer.beyond(i, j) - old.beyond(i, j); };
@@ -130,7 +131,7 @@ std::array<V3d, 8> cornersOfCell(const PrismCell& cell, const std::vector<V3d>& 
   return corners;
 }
 
-/// Elements come cell by cell.
+/// Elements are stored cell by cell.
 constexpr std::size_t kElementsPerCell = 14;
 
 FoldCount foldsAt(const Patch& patch, const PrismElements& elements, double embedDepth,
@@ -157,14 +158,14 @@ FoldCount foldsAt(const Patch& patch, const PrismElements& elements, double embe
 
 constexpr std::size_t kSettling = 100;  // iterations
 
-/// Runs down ε until no element is turned over [Garanzha21, §3], and on with as small an ε until
-/// no cell folds between its elements either.
-/// @return iterations
+/// Reduces ε until no element is inverted [Garanzha21, §3]. Then continues with a small ε until no
+/// cell folds between its elements either.
+/// @return number of iterations
 std::size_t removeFolds(PrismSolver& solver, const UntangleOptions& options,
                         const std::function<bool()>& isDone) {
   constexpr std::size_t kRound = 20;  // iterations at one ε
-  constexpr double kSlowest = 0.2;    // of the way to no fold, at the least
-  constexpr int kMostStuck = 10;      // rounds that bring nothing
+  constexpr double kSlowest = 0.2;  // least relative progress per round assumed in the update of ε
+  constexpr int kMostStuck = 10;    // rounds without progress before the search ends
   double epsilon = 1, last = -std::numeric_limits<double>::infinity();
   std::size_t iterations = 0;
   int stuck = 0;
@@ -203,7 +204,7 @@ V3d sideLengths(const Patch& patch) {
   return {u, v, patch.height};
 }
 
-/// The energy of an element whose rest is `scale` times as large.
+/// Energy of an element whose rest shape is `scale` times as large.
 ElementEnergy scaledDirichlet(ElementSlopes slopes, double scale) {
   for (V3d& column : slopes) column /= scale;
   ElementEnergy energy = symmetricDirichlet(slopes);
@@ -211,8 +212,8 @@ ElementEnergy scaledDirichlet(ElementSlopes slopes, double scale) {
   return energy;
 }
 
-/// The size of the rest at which the energy is least: |F|² and |F⁻¹|² go with its inverse square
-/// and its square.
+/// Scale of the rest shape with the least energy: |F|² scales with its inverse square and |F⁻¹|²
+/// with its square.
 double bestRestScale(const PrismElements& elements, const std::vector<V3d>& positions) {
   double stretch = 0, squeeze = 0;
   for (std::size_t e = 0; e < elements.size(); ++e) {
@@ -266,7 +267,7 @@ Untangling untangle(const NarrowBand& base, const Patch& patch, const UntangleOp
   std::vector<V3d> found = solver.positions();
   FoldCount after = foldsAt(patch, elements, options.embedDepth, found);
   if (after.folded == 0) {
-    // Cells that just do not fold are too flat for a map that is smoothed.
+    // Cells that barely avoid folding are too flat for the smoothed map.
     result.iterations += solver.minimise(symmetricDirichlet, kSettling);
     const FoldCount settled = foldsAt(patch, elements, options.embedDepth, solver.positions());
     if (settled.folded == 0) after = settled, found = solver.positions();
@@ -307,10 +308,10 @@ DistortionGain minimiseDistortion(const NarrowBand& base, const Patch& patch,
     const double energy = solver.energy(density);
     const std::size_t taken = solver.minimise(density, wanted);
     result.iterations += taken;
-    // The energy forbids folds at the corners of cells; between them they are very rare.
+    // The energy forbids folds at the corners of cells; folds between corners are very rare.
     if (foldsAt(patch, elements, options.embedDepth, solver.positions()).folded > 0) break;
     found = solver.positions();
-    constexpr double kLeastGain = 1e-7;  // of the energy, in a round
+    constexpr double kLeastGain = 1e-7;  // relative decrease of the energy in a round
     if (energy - solver.energy(density) < kLeastGain * energy) break;
   }
   result.after = distortionAt(elements, found);

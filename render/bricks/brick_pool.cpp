@@ -16,15 +16,15 @@ namespace {
 using openvdb::Coord;
 
 constexpr std::size_t kEntriesOfPage = 3 * BrickPool::kBlocksOfPage;
-constexpr int kMostEmptyPages = 1 << 10;  // pages along the edge of an empty cube
-// Single precision tells a place this far from the table's corner to 5e-4 voxel.
+constexpr int kMostEmptyPages = 1 << 10;  // limit of the edge of an empty cube, pages
+// At this distance from the table's corner, single precision resolves positions to 5e-4 voxels.
 constexpr double kWidest = 8192;  // voxels
 constexpr std::size_t kMostValues = std::numeric_limits<std::int32_t>::max();
 
-/// Writes into the empty items of a cubic table the edges of the largest aligned empty cubes.
-/// @param size    items along each axis
-/// @param isEmpty of an item's number
-/// @param edge    of an item
+/// Writes the edges of the largest aligned empty cubes into the empty items of a cubic table.
+/// @param size  number of items along each axis
+/// @param isEmpty  tests the item with a number
+/// @param set  stores the edge of the cube for an item
 template <typename IsEmpty, typename Set>
 void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty, const Set& set) {
   const auto number = [&](const std::array<int, 3>& size_, int x, int y, int z) {
@@ -33,7 +33,7 @@ void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty,
                static_cast<std::size_t>(size_[2]) +
            static_cast<std::size_t>(z);
   };
-  // A pyramid, finest first: is all below empty?
+  // Build a pyramid of flags, finest level first: true where everything below is empty.
   std::vector<std::array<int, 3>> sizes{size};
   std::vector<std::vector<char>> levels(1);
   levels[0].resize(number(size, size[0] - 1, size[1] - 1, size[2] - 1) + 1);
@@ -65,7 +65,7 @@ void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty,
       }
 }
 
-/// Where the entry of the block with that origin is.
+/// Finds the table entry of a block by its origin.
 class Table {
  public:
   explicit Table(BrickPool& pool) : pool_(pool) {
@@ -73,7 +73,7 @@ class Table {
     for (const int n : pool.pages) count *= static_cast<std::size_t>(n);
     pool.page.assign(count, -BrickPool::kPage);
   }
-  /// Makes the page if there is none.
+  /// Position of the block's entry. Adds the page if it is missing.
   std::size_t slotOf(const Coord& origin) {
     std::size_t page = 0, block = 0;
     for (int a = 0; a < 3; ++a) {
@@ -87,8 +87,8 @@ class Table {
     if (first < 0) {
       if (pool_.entry.size() > kMostValues - kEntriesOfPage)
         throw levelset::ResourceLimit(
-            "render: the surface is strewn over more of the table than an index can tell; use "
-            "larger voxels, or draw its parts apart");
+            "render: the surface is spread over more table pages than an index can address; use "
+            "larger voxels, or draw its parts separately");
       first = static_cast<std::int32_t>(pool_.entry.size());
       pool_.entry.resize(pool_.entry.size() + BrickPool::kBlocksOfPage, -BrickPool::kBlock);
       pool_.entry.resize(pool_.entry.size() + kEntriesOfPage - BrickPool::kBlocksOfPage, 0);
@@ -112,8 +112,8 @@ void markEmptyCubes(BrickPool& pool) {
       [&](std::size_t i, int edge) { pool.page[i] = -BrickPool::kPage * edge; });
 }
 
-/// The bricks, then what is held of the blocks beside them, then a row of values that are far
-/// outside and one of those far inside.
+/// Fills the pool with the bricks, then the halo blocks, then one row of values far outside and one
+/// far inside.
 void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks,
               const std::vector<HaloBlock>& beside, float background) {
   constexpr int kEdge = BrickPool::kEdge;
@@ -142,9 +142,9 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
       hold(table.slotOf(block.origin), held + (block.isInside ? BrickPool::kBlock : 0), 0, 0);
   held += 2 * BrickPool::kBlock;
   if (held > kMostValues) {
-    throw levelset::ResourceLimit(
-        fmt::format("render: the surface takes {} values, and {} are the most; use larger voxels",
-                    held, kMostValues));
+    throw levelset::ResourceLimit(fmt::format(
+        "render: the surface needs {} values, but at most {} are supported; use larger voxels",
+        held, kMostValues));
   }
   markEmptyCubes(pool);
   pool.value.resize(bricks.size() * BrickPool::kValues);
@@ -162,7 +162,7 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
   pool.value.insert(pool.value.end(), BrickPool::kBlock, -background);
 }
 
-/// Turns the values into codes.
+/// Converts the values to codes.
 void encode(BrickPool& pool, const ValueBits& held) {
   pool.quantization = held;
   const auto size = static_cast<std::size_t>(held.bits / 8);
@@ -175,17 +175,19 @@ void encode(BrickPool& pool, const ValueBits& held) {
   pool.value = {};
 }
 
-/// @param crossed  origins of the bricks
+/// Checks the extent of the surface. @param crossed  box of the origins of the bricks
 void requireNarrow(const openvdb::CoordBBox& crossed) {
   std::array<double, 3> spans{};
   for (int a = 0; a < 3; ++a)
     spans[static_cast<std::size_t>(a)] =
         static_cast<double>(crossed.max()[a]) - crossed.min()[a] + BrickPool::kBlock;
   if (*std::max_element(spans.begin(), spans.end()) <= kWidest) return;
-  throw levelset::ResourceLimit(fmt::format(
-      "render: the surface spans {:.6g} x {:.6g} x {:.6g} voxels, and {:.0f} are the most in "
-      "single precision; draw with --renderer embree, use larger voxels, or draw its parts apart",
-      spans[0], spans[1], spans[2], kWidest));
+  throw levelset::ResourceLimit(
+      fmt::format("render: the surface spans {:.6g} x {:.6g} x {:.6g} voxels, but at most {:.0f} "
+                  "are supported in "
+                  "single precision; draw with --renderer embree, use larger voxels, or draw its "
+                  "parts separately",
+                  spans[0], spans[1], spans[2], kWidest));
 }
 
 }  // namespace
@@ -207,7 +209,7 @@ BrickPool makeBricks(const levelset::NarrowBand& band, const TableOptions& optio
   if (crossed.empty()) return pool;
   requireNarrow(crossed);
   openvdb::CoordBBox box = crossed;
-  box.expand(BrickPool::kBlock);  // so that stencils look at no block outside the table
+  box.expand(BrickPool::kBlock);  // so that stencils read no block outside the table
   for (std::size_t i = 0; i < 3; ++i) {
     const int a = static_cast<int>(i);
     pool.origin[i] = box.min()[a];

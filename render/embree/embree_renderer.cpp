@@ -40,7 +40,7 @@ struct PixelPainter {
     paintColour(x, y, i);
   }
 
-  /// From the pixel's centre.
+  /// Paints the data layers from the ray through the pixel's centre.
   void paintData(int x, int y, std::size_t i) const {
     const Camera::Ray ray = scene.camera.ray(x + 0.5, y + 0.5);
     if (options.thickness)
@@ -52,7 +52,7 @@ struct PixelPainter {
     if (options.curvature) layers.setCurvature(i, hit.curvature);
   }
 
-  /// The mean over the pixel's area.
+  /// Paints the mean colour of the pixel's samples.
   void paintColour(int x, int y, std::size_t i) const {
     const PixelSequence area = PixelSequence::overArea(x, y);
     std::vector<LightRay> lights;

@@ -26,9 +26,9 @@ struct RaySolid {
   Imath::M44d indexToWorld, worldToIndex;
   std::vector<SurfaceBlock> blocks;
   std::uint32_t id;
-  std::size_t index;        // in the scene
-  std::size_t number;       // among those with a surface
-  const EmbreeSpace* view;  // of the scene
+  std::size_t index;        // index in Scene::solids
+  std::size_t number;       // index among the solids with a surface
+  const EmbreeSpace* view;  // of the entire scene
   Filter filter;
   Imath::C3f colour;
   double opacity;
@@ -39,16 +39,16 @@ struct RaySolid {
   }
 };
 
-/// What the callbacks need beside Embree's float ray: the ray in double, and the best hit so far.
+/// State for Embree's callbacks in addition to its single-precision ray: the ray in double
+/// precision and the best hit so far.
 struct RayQuery {
-  RTCIntersectContext embree;  // first: Embree hands its address back
-  V3d origin, direction;       // world; the origin at the scene's box
-  double limit;  // of the search: the same for every block, so that a hit has the same bits however
-                 // the blocks are visited
+  RTCIntersectContext embree;  // first member: Embree returns its address
+  V3d origin, direction;       // world; the origin is at the scene's box
+  double limit;  // end of the search: the same for all blocks, so that a hit has the same bits in any order of the blocks
   double nearest;
   double scale;
   const RaySolid* solid = nullptr;
-  std::vector<std::vector<SideChange>>* changes = nullptr;  // set: all are wanted, by solid
+  std::vector<std::vector<SideChange>>* changes = nullptr;  // set: collects all changes, by solid
 };
 
 IndexRay indexRayOf(const RayQuery& query, const RaySolid& solid) {
@@ -92,7 +92,7 @@ void intersectBlock(const RTCIntersectFunctionNArguments* args) {
   if (query.solid && *t == query.nearest && solid.number >= query.solid->number) return;
   query.nearest = *t;
   query.solid = &solid;
-  // Blocks that could tie stay in Embree's sampleRay.
+  // Keep blocks that may hold a hit at the same distance within Embree's range.
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, args->N);
   RTCRayN_tfar(ray, args->N, 0) = std::min(
       RTCRayN_tfar(ray, args->N, 0), static_cast<float>(*t * query.scale + EmbreeSpace::kPad));
@@ -109,7 +109,7 @@ void occludeBlock(const RTCOccludedFunctionNArguments* args) {
     RTCRayN_tfar(args->ray, args->N, 0) = -std::numeric_limits<float>::infinity();
 }
 
-/// In their order, without those that undo each other at one place.
+/// Sorts the changes and removes pairs that cancel at equal distance.
 void putInOrder(std::vector<SideChange>& changes) {
   std::stable_sort(changes.begin(), changes.end(),
                    [](const SideChange& a, const SideChange& b) { return a.t < b.t; });
@@ -123,15 +123,15 @@ void putInOrder(std::vector<SideChange>& changes) {
   changes = std::move(kept);
 }
 
-/// Where a ray changes sides of what an expression makes of the solids.
+/// A point where a ray enters or leaves the result of the expression.
 struct CsgChange {
   double t;
   std::size_t solid;
   bool isFlipped;
 };
 
-/// Calls visit(change) along the ray for as long as that asks for more; without an expression,
-/// where it changes sides of any solid.
+/// Calls visit(change) for each such point along the ray until it returns false. Without an
+/// expression, visits the crossings of all solids.
 template <typename Visit>
 void walkChanges(const CsgExpression& csg, std::vector<std::vector<SideChange>>& changes,
                  const Visit& visit) {
@@ -162,8 +162,8 @@ void requireRay(const V3d& origin, const V3d& direction) {
   const double sum = origin.x + origin.y + origin.z + direction.x + direction.y + direction.z;
   if (std::isfinite(sum) && direction != V3d(0)) return;
   throw levelset::UsageError(fmt::format(
-      "render: a ray from {},{},{} along {},{},{} leads nowhere; give finite numbers and "
-      "a direction",
+      "render: a ray from {},{},{} along {},{},{} has no direction or is not finite; give finite numbers and "
+      "a nonzero direction",
       origin.x, origin.y, origin.z, direction.x, direction.y, direction.z));
 }
 
@@ -171,12 +171,12 @@ void requireRay(const V3d& origin, const V3d& direction) {
 
 struct EmbreeScene::Impl {
   std::vector<RaySolid> solids;
-  CsgExpression csg;  // of those
+  CsgExpression csg;  // over these solids
   MeshRays meshes;
-  std::optional<FieldMarch> fields;  // of the solids, where the scene blends them
+  std::optional<FieldMarch> fields;  // set when the scene is blended
   bool isOpaque;
-  Box3d allBounds;  // with the meshes
-  Box3d bounds;     // of the crossing cells
+  Box3d allBounds;  // with meshes
+  Box3d bounds;     // of the crossed cells
   EmbreeSpace view;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
@@ -191,15 +191,15 @@ struct EmbreeScene::Impl {
 
   void gather(const Scene& source, Filter filter);
   void build();
-  /// A query and Embree's ray for it; nothing when the ray misses the scene's box. `moved`: how far
-  /// the origin was moved towards the scene.
+  /// Builds a query and Embree's ray for it; empty when the ray misses the scene's box. `moved`
+  /// returns the distance from the ray's origin to the query's origin.
   std::optional<RayQuery> prepare(const V3d& origin, const V3d& direction, double near, double far,
                                   double& moved, RTCRay& ray) const;
-  /// Every change of sides of the ray, by solid, as far as there is surface.
+  /// All crossings of the ray, by solid, up to the end of the scene.
   [[nodiscard]] std::vector<std::vector<SideChange>> allChanges(RayQuery& query, RTCRay ray) const;
-  /// Of what the expression makes of the solids, up to `limit` of the query.
+  /// First crossing with the result of the expression, up to `limit` of the query.
   std::optional<CsgChange> findCsg(RayQuery& query, RTCRay ray) const;
-  /// @pre the ray leads somewhere
+  /// @pre the direction is finite and not zero
   [[nodiscard]] Hit intersectSolids(const V3d& origin, const V3d& direction, double near,
                                     double far) const;
   void complete(Hit& hit, const RayQuery& query, const RaySolid& solid, double moved,
@@ -219,7 +219,7 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
   if (bounds.isEmpty()) return;
   try {
     build();
-  } catch (...) {  // the destructor does not run for a constructor that throws
+  } catch (...) {  // no destructor runs when a constructor throws
     if (scene) rtcReleaseScene(scene);
     if (device) rtcReleaseDevice(device);
     throw;
@@ -306,7 +306,7 @@ std::vector<std::vector<SideChange>> EmbreeScene::Impl::allChanges(RayQuery& que
   query.changes = &changes;
   RTCRayHit all;
   all.ray = ray;
-  all.ray.tfar = 2;  // to the end of the scene: what comes later tells the side at the start
+  all.ray.tfar = 2;  // end of the scene: later crossings determine the side at the start
   all.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   all.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(scene, &query.embree, &all);
@@ -383,7 +383,7 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
     return hits;
   }
   double share = 1;
-  // Those of meshes up to some place, and whether anything is seen beyond.
+  // Adds mesh hits up to a distance. Returns true when a later surface is still visible.
   const auto addMeshes = [&](double end) {
     while (share >= kLeastTransmittance) {
       const Hit hit = impl_->meshes.intersect(origin, direction, near, end);
@@ -394,7 +394,7 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
     }
     return share >= kLeastTransmittance;
   };
-  if (impl_->fields) {  // whose surface is opaque
+  if (impl_->fields) {  // blended surfaces are opaque
     const Hit onSolid = impl_->intersectSolids(origin, direction, near, far);
     if (addMeshes(onSolid.found ? onSolid.distance : far) && onSolid.found) hits.push_back(onSolid);
     return hits;
@@ -451,7 +451,7 @@ double EmbreeScene::thickness(const V3d& origin, const V3d& direction, double ne
   auto query = impl_->prepare(origin, direction, near, far, moved, ray);
   if (!query) return 0;
   auto changes = impl_->allChanges(*query, ray);
-  // Where nothing is said, what any of them holds.
+  // Without an expression, a point is inside when any solid contains it.
   const auto isWithin = [&](const std::vector<char>& inside) {
     if (!impl_->csg.isEmpty()) return impl_->csg.holds(inside.data());
     return std::find(inside.begin(), inside.end(), 1) != inside.end();

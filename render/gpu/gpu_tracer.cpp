@@ -16,15 +16,15 @@
 namespace render {
 namespace {
 
-constexpr int kGroup = 64;                 // invocations
-constexpr std::size_t kOneRun = 1u << 18;  // rays: short enough for any watchdog
+constexpr int kGroup = 64;                 // invocations of a work group
+constexpr std::size_t kOneRun = 1u << 18;  // rays of a dispatch: short enough for any watchdog
 constexpr int kRayParts = 12, kHitParts = 5;
 
-/// Storage blocks, and texture units.
+/// Bindings of storage blocks, and texture units.
 enum Binding : GLuint { kRays, kHits };
 enum Unit : GLuint { kPages, kEntries, kMasks, kFirstValues };
 
-/// What the kernel's words are in GLSL.
+/// GLSL definitions of the kernel's types and macros.
 constexpr const char* kDialect = R"GLSL(
 #define Real float
 #define Whole int
@@ -132,15 +132,15 @@ constexpr const char* kNanoText = R"GLSL(
 uniform int nanoRoot, nanoTiles, nanoFar, nanoOriginX, nanoOriginY, nanoOriginZ;
 )GLSL";
 
-/// What a shader is made for.
+/// Properties that select a shader.
 struct Variant {
   bool isPixels, isSpline, isNano;
   int valueBits;
-  int blocks;  // of values, in a buffer of texels each
+  int blocks;  // number of texel buffers for the values
   auto operator<=>(const Variant&) const = default;
 };
 
-/// Values in one buffer of texels, or in several of 2^shift values each.
+/// Declares the values in one texel buffer, or in several of 2^shift values each.
 std::string valueText(const Variant& variant, int shift) {
   const bool isCode = variant.valueBits != 32;
   const char* prefix = isCode ? "u" : variant.isNano ? "i" : "";
@@ -157,7 +157,8 @@ std::string valueText(const Variant& variant, int shift) {
   text += variant.blocks == 1 ? "  return texelFetch(values0, i).x;\n}\n"
                               : fmt::format("  return texelFetch(values{}, i & {}).x;\n}}\n",
                                             variant.blocks - 1, (1 << shift) - 1);
-  // Numbers of the NanoVDB grid pass for floats nowhere: those may lose bits.
+  // Words of the NanoVDB grid that are integers never pass through a float, because that may change
+  // bits.
   if (variant.isNano)
     return text + "Real loadValue(Whole i) { return intBitsToFloat(loadHeld(i)); }\n";
   if (!isCode) return text + "Real loadValue(Whole i) { return loadHeld(i); }\n";
@@ -216,21 +217,21 @@ GLuint compileCompute(const GlContext& context, const std::string& text) {
 }
 
 struct GpuTracer::Impl {
-  /// A buffer that shaders read as a texture: Mesa's llvmpipe gathers those by vectors, and storage
-  /// blocks lane by lane.
+  /// A buffer that shaders read as a texture. Mesa's llvmpipe gathers from textures by vectors, but
+  /// from storage blocks lane by lane.
   struct Texels {
     GLuint buffer = 0, texture = 0;
   };
   struct Tables {
     Texels pages, entries, masks;
     std::vector<Texels> values;
-    std::optional<NanoGrid> nano;  // without its words: those are the values, and all there is
+    std::optional<NanoGrid> nano;  // without its words, which are uploaded as values
   };
 
   const GlContext& context;
   const GlFunctions& gl;
   const std::size_t largestTable;
-  int shift = 0;  // of the number of values in a block of them
+  int shift = 0;  // log2 of the number of values in a texel buffer
   std::map<const KernelSolid*, Tables> tables;
   GLuint rays = 0, hits = 0;
   std::map<Variant, GLuint> programs;
@@ -240,7 +241,7 @@ struct GpuTracer::Impl {
         gl(context_.gl()),
         largestTable(largestTable_ > 0 ? largestTable_ : context_.largestTable()) {
     shift = static_cast<int>(std::bit_width(largestTable / sizeof(float))) - 1;
-    shift = std::min(shift, 30);  // numbers of values are ints
+    shift = std::min(shift, 30);  // indices of values are ints
     gl.CreateBuffers(1, &rays);
     gl.CreateBuffers(1, &hits);
   }
@@ -264,7 +265,7 @@ struct GpuTracer::Impl {
   Texels texelsOf(const void* data, std::size_t bytes, GLenum format) {
     if (bytes > largestTable) {
       throw levelset::ResourceLimit(fmt::format(
-          "render: a table of {} MB does not fit into the {} MB that a buffer texture of {} has; "
+          "render: a table of {} MB does not fit into a buffer texture of {} MB, the limit of {}; "
           "use larger voxels, or draw with --renderer cpu",
           bytes >> 20, largestTable >> 20, context.description()));
     }
@@ -276,15 +277,15 @@ struct GpuTracer::Impl {
     return texels;
   }
 
-  /// @param size    of a value, bytes
-  /// @param format  of it
+  /// @param size  of a value, bytes
+  /// @param format  internal format of a value
   void uploadValues(Tables& t, const void* values, std::size_t bytes, std::size_t size,
                     GLenum format) {
     const std::size_t perBlock = size << shift;
     const std::size_t blocks = (bytes + perBlock - 1) / perBlock;
     if (blocks + kFirstValues > static_cast<std::size_t>(context.tableCount())) {
       throw levelset::ResourceLimit(
-          fmt::format("render: {} MB of values need {} buffer textures, and {} leaves {}; use "
+          fmt::format("render: {} MB of values need {} buffer textures, but {} offers {}; use "
                       "larger voxels, or "
                       "draw with --renderer cpu",
                       bytes >> 20, blocks, context.description(),
@@ -378,7 +379,7 @@ struct GpuTracer::Impl {
       gl.BindTextureUnit(kFirstValues + static_cast<GLuint>(b), t.values[b].texture);
   }
 
-  /// @param shapes  of pixels only
+  /// @param shapes  for pixels only; else null
   void run(const KernelSolid& solid, const std::vector<float>& input, std::size_t count,
            HitBlock& found, ShapeBlock* shapes) {
     if (count == 0) return;
@@ -412,7 +413,7 @@ struct GpuTracer::Impl {
     fetch(found.z, 4);
     for (std::size_t p = 0; shapes && p < ShapeBlock::kParts; ++p)
       fetch(shapes->part[p], kHitParts + p);
-    context.check("the rays");
+    context.check("tracing the rays");
   }
 };
 
@@ -437,7 +438,7 @@ GpuTracer::~GpuTracer() {
   try {
     const GlContext::Current current(impl_->context);
     impl_->release();
-  } catch (const levelset::Error&) {  // what a lost context held is lost with it
+  } catch (const levelset::Error&) {  // a lost context has released its objects
   }
 }
 

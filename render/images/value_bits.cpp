@@ -69,8 +69,8 @@ Shifts shiftsOf(const openvdb::FloatTree& before, const openvdb::FloatTree& afte
       });
 }
 
-/// So that the largest value is one that is held, and a band stays as wide as it is; but for the
-/// last bit of it where no step does that.
+/// Step for which the largest value is a quantized value, so that the half width does not change.
+/// Where rounding prevents that, they differ in the last bit.
 float stepOf(float largest, int bits) {
   const float last = static_cast<float>(1 << (bits - 1)) - 0.5f;
   const float step = largest / last;

@@ -48,13 +48,13 @@ void CsgTraversal::answerNone(std::size_t solid, const Query& query) {
 }
 
 bool CsgTraversal::advance() {
-  if (solids_ == 0) return false;  // none has a surface
+  if (solids_ == 0) return false;  // no solid has a surface
   bool asks = false;
   for (std::size_t ray = 0; ray < maxDistances_.size(); ++ray) asks = advance(ray) || asks;
   return asks;
 }
 
-// @return does the ray ask for anything?
+// Returns true when the ray has open queries.
 bool CsgTraversal::advance(std::size_t ray) {
   if (met_[ray] >= 0) return false;
   const auto row = [&](auto& all) {
@@ -68,7 +68,7 @@ bool CsgTraversal::advance(std::size_t ray) {
   return met_[ray] < 0;
 }
 
-// All surfaces at that place, which is the ray's next.
+// Crosses all surfaces at that distance, which is the ray's next.
 void CsgTraversal::cross(std::size_t ray, double place) {
   char* inside = inside_.data() + ray * solids_;
   const bool before = csg_.holds(inside);

@@ -8,37 +8,38 @@
 
 namespace render {
 
-/// Follows rays through solids, each to the first place where it enters or leaves what an
-/// expression makes of them, or without an expression any of them, and on to others. Asks for a
-/// ray's first crossing with each solid, and for others as it comes to them.
+/// Follows rays through solids, from one surface of the result of a CSG expression to the next.
+/// Without an expression, each surface of each solid counts.
 ///
-/// Surfaces met at one and the same place are crossed together, and the lowest of their numbers is
-/// the one that is met.
+/// The caller computes the intersections. The traversal requests the first crossing of a ray with
+/// each solid, and later crossings when it needs them. Surfaces at equal distance are crossed
+/// together; the hit is attributed to the solid with the lowest number.
 class CsgTraversal {
  public:
-  /// What a ray waits for: its crossing with the solid after `passing` others.
+  /// Requested crossing of a ray with a solid: the one after `passing` earlier crossings.
   struct Query {
     std::size_t ray;
     std::int32_t passing;
   };
 
-  /// @param solids  how many the expression counts
-  /// @param maxDistance   of each ray: what lies beyond does not count
+  /// @param solids  number of solids of the expression
+  /// @param maxDistances  largest distance along each ray; crossings beyond it do not count
   CsgTraversal(const CsgExpression& csg, std::size_t solids, std::vector<double> maxDistances);
 
-  /// Those about a solid, which are to be answered before the next advance().
+  /// Open queries about a solid. All of them must be answered before the next advance().
   [[nodiscard]] std::vector<Query> queriesFor(std::size_t solid) const;
   void answer(std::size_t solid, const Query& query, double place, bool enters);
   void answerNone(std::size_t solid, const Query& query);
-  /// Goes on along every ray as far as the answers tell. @return is there anything to ask?
+  /// Advances all rays as far as the answers allow.
+  /// @return true when there are open queries
   bool advance();
 
-  /// Lets a ray that met something go on to what it meets next.
+  /// Lets a ray continue from its present hit to the next one.
   void resume(std::size_t ray) { met_[ray] = -1; }
 
-  /// Number of the solid that the ray meets, or −1.
+  /// Number of the solid that the ray hits, or −1.
   [[nodiscard]] std::int32_t solidMet(std::size_t ray) const { return met_[ray]; }
-  /// Is the outside of that solid inside what the expression makes?
+  /// True when the outside of that solid is inside the result of the expression.
   [[nodiscard]] bool isFlipped(std::size_t ray) const { return flipped_[ray] != 0; }
 
  private:
@@ -48,11 +49,11 @@ class CsgTraversal {
   const CsgExpression& csg_;
   std::size_t solids_;
   std::vector<double> maxDistances_;
-  // By ray and solid.
-  std::vector<double> place_;  // of the next crossing
+  // Indexed by ray and solid.
+  std::vector<double> place_;  // distance of the next crossing
   std::vector<std::int32_t> passed_;
   std::vector<char> inside_, asked_;
-  // By ray.
+  // Indexed by ray.
   std::vector<std::int32_t> met_;
   std::vector<char> flipped_;
 };

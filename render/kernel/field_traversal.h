@@ -12,17 +12,20 @@
 
 namespace render {
 
-/// The zero set of a scene's FieldExpression for the kernel's rays: a walk over the cells of all
-/// grids at once, and in each part of the ray between their faces, where all fields are cubics,
-/// bounds of the expression and of its slope by intervals [Mitchell90], halving until a sign is
-/// certain or the expression is monotone. The side that a ray is on is carried from part to part,
-/// so that rounding at faces loses no crossing. Thread-safe. Rays are unit directions.
+/// Intersects rays with the zero set of a scene's FieldExpression, for the kernel. Thread-safe. Ray
+/// directions have unit length.
+///
+/// A ray traverses the cells of all grids at once. Between two cell faces all fields are cubic in
+/// the ray parameter. Interval arithmetic bounds the expression and its slope there [Mitchell90].
+/// The interval is halved until the sign is certain or the expression is monotone. The side of the
+/// surface is carried from interval to interval, so rounding at faces loses no crossing.
 class FieldTraversal {
  public:
-  /// @pre the scene is blended, and requireFields()
-  /// @throws levelset::ResourceLimit for fields that take more than maxBytes, or are too wide
+  /// @pre the scene is blended and passes requireFields()
+  /// @throws levelset::ResourceLimit when the fields need more than maxBytes or span too many
+  ///         blocks
   FieldTraversal(const Scene& scene, std::size_t maxBytes);
-  /// Takes where the solids are anew. @return has any moved?
+  /// Reads the transforms of the solids again. Returns true when one has moved.
   bool updateTransforms(const Scene& scene);
 
   [[nodiscard]] std::size_t bytes() const;
@@ -32,14 +35,14 @@ class FieldTraversal {
                               double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction,
                                 double maxDistance) const;
-  /// How far the ray is inside in [near, far], world units.
+  /// Length of the ray inside the solid within [near, far], world units.
   [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                                  double far) const;
 
  private:
   FieldExpression expression_;
-  std::vector<FieldGrid> grids_;  // of its operands
-  Imath::Box3d box_;              // beyond it the expression is positive
+  std::vector<FieldGrid> grids_;  // one for each operand
+  Imath::Box3d box_;              // outside it the expression is positive
 };
 
 }  // namespace render

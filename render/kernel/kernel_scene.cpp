@@ -17,11 +17,12 @@ namespace {
 using Imath::M44d;
 using Imath::V3d;
 
-constexpr double kBesideBox = 0.0625;  // lest rounding loses a crossing on a face of the box
+constexpr double kBesideBox =
+    0.0625;  // padding, so that rounding does not lose a crossing on a face of the box
 constexpr double kParallel = 1e30;
 constexpr std::size_t kRaysAtOnce = 1u << 18;
 
-/// A box that holds all cells that the surface may cross, world units.
+/// A box that contains all cells that the surface may cross, world units.
 Imath::Box3d leafBox(const levelset::NarrowBand& band) {
   openvdb::CoordBBox leaves;
   if (band.isEmpty() || !levelset::vdb(band).tree().evalLeafBoundingBox(leaves)) return {};
@@ -31,7 +32,7 @@ Imath::Box3d leafBox(const levelset::NarrowBand& band) {
                           band.indexToWorld());
 }
 
-/// A part of a ray, by its parameter.
+/// An interval of a ray's parameter.
 struct Span {
   double enter, leave;
 };
@@ -49,14 +50,14 @@ Span clipped(const BrickPool& pool, const V3d& origin, const V3d& direction, dou
   return span;
 }
 
-/// Rays of a list that come near a solid, as its kernel takes them.
+/// Rays of a list that pass near a solid, as input of its kernel.
 struct PackedRays {
-  std::vector<std::size_t> number;  // in the list
-  std::vector<double> enter;        // where they start, voxels along the ray
+  std::vector<std::size_t> number;  // number in the list
+  std::vector<double> enter;        // start, voxels along the ray
   RayBlock block{0};
 
-  /// @param asked   numbers of the rays
-  /// @param hasEnd  do they end at their maxDistance, or go on as far as there is surface?
+  /// @param asked  numbers of the rays
+  /// @param hasEnd  rays end at their maxDistance; false: they continue to the last surface
   PackedRays(const KernelSolid& solid, const std::vector<LightRay>& rays,
              const std::vector<std::size_t>& asked, bool hasEnd) {
     struct Ready {
@@ -65,7 +66,7 @@ struct PackedRays {
     };
     std::vector<Ready> ready;
     for (const std::size_t i : asked) {
-      // A step of t is a voxel, so that single precision suits whatever the unit is.
+      // A unit of t is one voxel, so that single precision suffices for any length unit.
       V3d origin, direction;
       solid.worldToTable.multVecMatrix(rays[i].origin, origin);
       solid.worldToTable.multDirMatrix(rays[i].direction * solid.voxelSize, direction);
@@ -113,7 +114,8 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     bounds_ = tableBounds_ = scene.bounds();
     return;
   }
-  // A block for each leaf; those the surface does not cross are built and dropped.
+  // The estimate counts a block for each leaf. Blocks that the surface does not cross are built and
+  // then dropped.
   double leaves = 0;
   Imath::Box3d box = meshes_.bounds();
   for (const Solid& solid : scene.solids) {
@@ -121,7 +123,7 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     leaves += static_cast<double>(levelset::vdb(solid.band).tree().leafCount());
     box.extendBy(leafBox(solid.band));
   }
-  // And a copy of the leaves where the spline's coefficients are made of the values.
+  // With BSplineQi the leaves are copied for the spline's coefficients.
   const double kCopies = options.filter == Filter::BSplineQi ? 4 * 512 : 0;
   const double kBytesOfBlock = 2 * 4 * (BrickPool::kValues + BrickPool::kMaskWords) + kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes, "render");
@@ -230,8 +232,8 @@ PixelTraversal KernelScene::startTraversal(const PixelBlock& pixels) const {
                                                  {std::vector<double>(rays), ShapeBlock(rays)})};
 }
 
-PixelHits KernelScene::castNext(const KernelTracer& tracer, PixelTraversal& way) const {
-  auto& [pixels, walk, next] = way;
+PixelHits KernelScene::castNext(const KernelTracer& tracer, PixelTraversal& traversal) const {
+  auto& [pixels, walk, next] = traversal;
   PixelHits result(pixels.size());
   do {
     for (std::size_t s = 0; s < solids_.size(); ++s) {
@@ -310,7 +312,8 @@ std::vector<double> KernelScene::thickness(const KernelTracer& tracer,
                      [](const Crossing& a, const Crossing& b) { return a.depth < b.depth; });
     std::fill(inside.begin(), inside.end(), 0);
     std::fill(known.begin(), known.end(), 0);
-    for (const Crossing& crossing : all)  // the first of each solid tells where the ray starts
+    for (const Crossing& crossing :
+         all)  // the first crossing of each solid determines the side at the ray's start
       if (!std::exchange(known[crossing.solid], 1))
         inside[crossing.solid] = crossing.enters ? 0 : 1;
     double from = near_;
@@ -382,7 +385,8 @@ void KernelScene::dimByCsg(const KernelTracer& tracer, const std::vector<LightRa
       const std::vector<CsgTraversal::Query> queries = walk.queriesFor(s);
       std::vector<std::size_t> asked;
       for (const CsgTraversal::Query& query : queries) asked.push_back(first + query.ray);
-      // To their end: where a ray ends inside a solid only what comes later tells that it is.
+      // Trace the rays beyond their ends: when a ray ends inside a solid, only later crossings show
+      // it.
       PackedRays packed(solid, rays, asked, false);
       std::size_t n = 0;
       for (const CsgTraversal::Query& query : queries) {
@@ -404,7 +408,8 @@ void KernelScene::dimByCsg(const KernelTracer& tracer, const std::vector<LightRa
       }
     }
     asks = walk.advance();
-    // Only once no ray has anything to ask: those that met a surface then go on together.
+    // Continue rays that met a surface only when no ray has open queries, so that they continue
+    // together.
     if (asks) continue;
     for (std::size_t i = first; i < last; ++i) {
       const std::int32_t met = walk.solidMet(i - first);

@@ -15,8 +15,9 @@ using Imath::V2d;
 using Imath::V3d;
 
 constexpr int kSquare = 4;                        // pixels along the edge of a packet
-constexpr std::size_t kMostLightRays = 1u << 18;  // that wait for an answer
-constexpr double kCastError = 2e-3;  // of the kernel's depths, voxels: rays to lights start beyond
+constexpr std::size_t kMostLightRays = 1u << 18;  // limit of light rays in one batch
+constexpr double kCastError =
+    2e-3;  // error of the kernel's depths, voxels; light rays start beyond it
 
 }  // namespace
 
@@ -78,7 +79,7 @@ Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std
   return hit;
 }
 
-// From the pixels' centres.
+// Uses the rays through the pixels' centres.
 void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const {
   const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
   PixelBlock at(pixels.size());
@@ -107,7 +108,7 @@ void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixe
   }
 }
 
-// The means over the pixels' areas.
+// Computes the means over the pixels' areas.
 void KernelPainter::paintColours(const KernelTracer& tracer,
                                  const std::vector<Pixel>& pixels) const {
   const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
@@ -117,7 +118,7 @@ void KernelPainter::paintColours(const KernelTracer& tracer,
     std::vector<SampleRay> sampleRays;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const V2d shift = PixelSequence::overArea(pixels[i].x, pixels[i].y).at(s);
-      // What single precision makes of the place is where the ray goes.
+      // The ray passes through the pixel position as rounded to single precision.
       at.x[i] = static_cast<float>(pixels[i].x + shift.x - middleX);
       at.y[i] = static_cast<float>(pixels[i].y + shift.y - middleY);
       const Camera::Ray ray = scene_.camera.ray(static_cast<double>(at.x[i]) + middleX,
@@ -211,8 +212,9 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
   } else {
     const KernelScene::Counts& counts = surfaces.counts();
     image.attributes["ls:read"] = fmt::format(
-        "{} blocks of 8x8x8 cells that the surface crosses and {} beside them, for its curvature, "
-        "{:.1f} MB; {} more were left out, and {} of those that it crosses are out of sampleRay",
+        "{} blocks of 8x8x8 cells that the surface crosses and {} neighbouring blocks for its "
+        "curvature, "
+        "{:.1f} MB; {} other blocks are not stored, and {} crossed blocks are outside the view",
         counts.crossed, counts.halo, static_cast<double>(surfaces.bytes()) * 1e-6, counts.omitted,
         counts.culled);
   }

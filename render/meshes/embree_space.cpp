@@ -42,7 +42,7 @@ RTCRay EmbreeSpace::rayFrom(const V3d& start, const V3d& direction, double maxDi
   ray.dir_x = static_cast<float>(direction.x);
   ray.dir_y = static_cast<float>(direction.y);
   ray.dir_z = static_cast<float>(direction.z);
-  // The scene has a diagonal of 1, so nothing lies beyond 2.
+  // The scaled scene has a diagonal of 1, so nothing lies beyond 2.
   ray.tfar = static_cast<float>(std::min(2.0, maxDistance * scale + kPad));
   ray.mask = ~0u;
   return ray;
@@ -52,7 +52,7 @@ void requireEmbree(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
   if (error == RTC_ERROR_NONE) return;
   throw levelset::ResourceLimit(fmt::format(
-      "render: Embree failed with its error {} ({}); use larger voxels, a coarser mesh, or free "
+      "render: Embree failed with error code {} ({}); use larger voxels, a coarser mesh, or free "
       "memory",
       static_cast<int>(error), error == RTC_ERROR_OUT_OF_MEMORY ? "out of memory" : "other"));
 }

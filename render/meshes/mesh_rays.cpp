@@ -33,8 +33,8 @@ struct MeshRays::Impl {
 
   void build();
   void add(const MeshPart& part, unsigned number);
-  /// How far it is to where the ray enters the box, `near` at least, with Embree's ray from there;
-  /// nothing: it misses.
+  /// Computes Embree's ray and the distance to its start, where the ray enters the box, at least
+  /// `near`. Returns nothing when the ray misses the box.
   std::optional<double> prepare(const V3d& origin, const V3d& direction, double near, double far,
                                 RTCRay& ray) const;
   void complete(const RTCRayHit& found, const V3d& start, const V3d& direction, double moved,
@@ -51,7 +51,7 @@ MeshRays::Impl::Impl(const Scene& source) : parts(source.meshes) {
   view = EmbreeSpace(bounds);
   try {
     build();
-  } catch (...) {  // the destructor does not run for a constructor that throws
+  } catch (...) {  // no destructor runs when a constructor throws
     if (scene) rtcReleaseScene(scene);
     if (device) rtcReleaseDevice(device);
     throw;
@@ -109,7 +109,8 @@ void MeshRays::Impl::complete(const RTCRayHit& found, const V3d& start, const V3
   const V3d across = (b - a).cross(c - a);
   const double rough = static_cast<double>(found.ray.tfar) / view.scale;
   const double exact = across.dot(a - start) / across.dot(direction);
-  // On its plane, unless the ray runs along it.
+  // Use the exact intersection with the triangle's plane, unless the ray runs almost parallel to
+  // it.
   const double t = std::abs(exact - rough) * view.scale < 1e-3 ? exact : rough;
   hit.found = true;
   hit.distance = moved + t;

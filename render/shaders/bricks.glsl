@@ -1,9 +1,10 @@
-// What the tables of bricks say of a place. In the words and the space of roots.glsl.
+// Look-up of cells and values in the tables of a BrickPool. Types and space are those of
+// roots.glsl.
 
 struct Spot {
-  Bool crosses;  // the surface may, in the cell
-  Whole size;    // edge of an aligned cube about it that holds no other cell that it crosses
-  Whole brick;   // of the cell's values
+  Bool crosses;  // the surface may cross the cell
+  Whole size;    // edge of an aligned cube around the cell without any other crossed cell
+  Whole brick;   // number of the brick with the cell's values
 };
 
 Spot spotAt(Bool walking, Whole x, Whole y, Whole z) {
@@ -23,7 +24,7 @@ Spot spotAt(Bool walking, Whole x, Whole y, Whole z) {
   return spot;
 }
 
-// At the corners of a cell, of which corner 4x + 2y + z is a number.
+// Values at the corners of a cell. Corner (x, y, z) has the number 4x + 2y + z.
 struct CellValues {
   Real f0, f1, f2, f3, f4, f5, f6, f7;
 };
@@ -43,7 +44,7 @@ CellValues cellValues(Bool asked, Whole brick, Whole x, Whole y, Whole z) {
   return f;
 }
 
-// Where the values of the block that holds a point begin, and their strides.
+// Position and strides of the values of the block that contains a point.
 Whole blockOf(Bool asked, Whole x, Whole y, Whole z, INOUT(Whole) strides) {
   Whole page = loadPage(select(asked, ((x >> kPageShift) * pagesY + (y >> kPageShift)) * pagesZ + (z >> kPageShift), whole(0)));
   Bool full = AND(asked, page >= 0);

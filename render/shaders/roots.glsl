@@ -1,32 +1,32 @@
-// The kernel: the first crossing of a ray with the zero set of a grid of bricks, written once for GLSL
-// and C++. Here: planes, and the roots of polynomials by their signs.
+// The kernel: finds the first crossing of a ray with the zero set of a grid of bricks. The code is
+// valid GLSL and C++. This file holds planes, and root isolation of polynomials by sign changes.
 //
-// C++ includes this text into a class whose Real, Whole and Bool are vectors of lanes, and whose
-// members are the grid's tables; in GLSL they are float, int and bool, and uniforms. Nothing but
-// sums, products and comparisons of floats decides anything, so that every processor gets the same
-// bits; loads of lanes that are not at work go to place 0.
+// C++ includes this text into a class. There Real, Whole and Bool are vectors of lanes, and the
+// tables of the grid are members. In GLSL they are float, int and bool, and uniforms. All decisions
+// depend on sums, products and comparisons of floats alone, so that all processors return the same
+// bits. Inactive lanes load from index 0.
 //
-// Space is that of the tables: grid points at whole coordinates, the first one at 0. Cell (i, j, k)
-// spans the points i … i+1, j … j+1, k … k+1. A negative value is inside, zero is outside.
+// Space is table space: grid points have integer coordinates, starting at 0. Cell (i, j, k) spans
+// the points i … i+1, j … j+1, k … k+1. Negative values are inside, zero is outside.
 
 CONST_INT kNone = 3;             // no axis
-CONST_INT kMostHalvings = 12;    // of a cell where two crossings are looked for
-CONST_INT kBisections = 20;      // of the part that holds one
+CONST_INT kMostHalvings = 12;    // halvings of a cell that may hold several crossings
+CONST_INT kBisections = 20;      // halvings of an interval with one crossing
 CONST_FLOAT kThird = 0.33333333333f;
 CONST_FLOAT kBarelyInside = -1e-30f;
 CONST_FLOAT kLeastDirection = 1e-20f;
 CONST_FLOAT kParallel = 1e30f;
-CONST_FLOAT kBesideBox = 0.0625f;  // so that rounding loses no crossing on a face of the box
+CONST_FLOAT kBesideBox = 0.0625f;  // padding, so that rounding does not lose a crossing on a face of the box
 
-// Where a ray meets the plane of points k. The only such function: monotone in k, and the same for
-// the two cells at a plane, so that no ray slips between them.
+// Parameter at which a ray meets the plane of points k. All cells use this function. It is monotone
+// in k, and both cells at a plane get the same number, so no ray slips between them.
 Real planeAt(Whole k, Real origin, Real inverse) {
   VAR distance = toReal(k) - origin;
   VAR t = distance * inverse;
   return t;
 }
 
-// The cell on one axis that a ray is in at t, among those from low to high.
+// Index along one axis of the cell that contains the ray at t, clamped to [low, high].
 Whole cellAt(Real t, Real origin, Real direction, Real inverse, Whole low, Whole high) {
   VAR place = origin + t * direction;
   VAR held = smaller(larger(place, toReal(low)), toReal(high));
@@ -40,11 +40,11 @@ Whole cellAt(Real t, Real origin, Real direction, Real inverse, Whole low, Whole
 }
 
 Real between(Real a, Real b, Real share, Real rest) {
-  VAR sum = a * rest + b * share;  // exact at both ends, and no sign of its own
+  VAR sum = a * rest + b * share;  // exact at both ends; keeps the sign when a and b have equal signs
   return sum;
 }
 
-// The cubic with Bernstein coefficients b at u, v and w: its blossom.
+// Blossom at (u, v, w) of the cubic with Bernstein coefficients b.
 Real blossom(Real b0, Real b1, Real b2, Real b3, Real u, Real v, Real w) {
   VAR ru = 1.0f - u;
   VAR rv = 1.0f - v;
@@ -60,16 +60,17 @@ Whole signChanges(Real b0, Real b1, Real b2, Real b3) {
          bit(differ(b2 < 0.0f, b3 < 0.0f), 1);
 }
 
-// Goes on from part number `part` of those of size `size`, to its first half where it is divided, else
-// to the next; whole parts are left where a sign rule proves them empty.
-// @return where there is one
-Bool resume(Bool open, Bool divides, INOUT(Whole) part, INOUT(Whole) halvings, INOUT(Real) size) {
+// Moves on from interval number `part` of length `size`: to its first half when it is divided,
+// otherwise to the next interval. Larger intervals are skipped where the sign rule proves them
+// empty.
+// @return true while there is an interval
+Bool nextPart(Bool open, Bool divides, INOUT(Whole) part, INOUT(Whole) halvings, INOUT(Real) size) {
   Bool divide = AND(open, divides);
   Bool next = AND(open, NOT(divide));
   part = select(divide, part + part, select(next, part + 1, part));
   halvings = select(divide, halvings + 1, halvings);
   size = select(divide, size * 0.5f, size);
-  for (int i = 0; i < kMostHalvings; ++i) {  // an even number begins a part twice as large
+  for (int i = 0; i < kMostHalvings; ++i) {  // an even number starts an interval of twice the length
     Bool up = AND(next, AND((part & 1) == 0, halvings > 0));
     part = select(up, part >> 1, part);
     halvings = select(up, halvings - 1, halvings);
@@ -78,9 +79,9 @@ Bool resume(Bool open, Bool divides, INOUT(Whole) part, INOUT(Whole) halvings, I
   return AND(open, OR(divide, halvings > 0));
 }
 
-// Finds the first part of [0, 1] in which the cubic changes sign once, but for `passing` that it
-// passes over, and counts them off.
-// @return where there is one
+// Finds the first interval in [0, 1] with a single sign change of the cubic, after skipping
+// `passing` of them. Skipped changes are subtracted from `passing`.
+// @return true when there is one
 Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Whole) passing, INOUT(Real) low,
              INOUT(Real) high) {
   Whole changes = signChanges(b0, b1, b2, b3);
@@ -109,13 +110,13 @@ Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Whole) passin
     high = select(ends, w, high);
     found = OR(found, ends);
     open = AND(open, NOT(ends));
-    open = resume(open, AND(count > 1, NOT(deepest)), part, halvings, size);
+    open = nextPart(open, AND(count > 1, NOT(deepest)), part, halvings, size);
   }
   return found;
 }
 
-// The parameter in [low, high] at which the cubic changes sign, once there.
-// @param inside  is it negative at low?
+// Finds the parameter in [low, high] at which the cubic changes sign once, by bisection.
+// @param inside  the cubic is negative at low
 Real bisect(Real b0, Real b1, Real b2, Real b3, Bool inside, Real low, Real high) {
   for (int i = 0; i < kBisections; ++i) {
     VAR middle = (low + high) * 0.5f;
@@ -126,14 +127,15 @@ Real bisect(Real b0, Real b1, Real b2, Real b3, Bool inside, Real low, Real high
   return (low + high) * 0.5f;
 }
 
-// The corners of a cell's face, of which corner 4x + 2y + z is a bit.
+// Bits of the corners of a cell's face. Corner (x, y, z) has the bit 4x + 2y + z.
 Whole faceCorners(Whole axis, Bool upper) {
   return select(axis == 0, select(upper, whole(0xf0), whole(0x0f)),
                 select(axis == 1, select(upper, whole(0xcc), whole(0x33)),
                        select(upper, whole(0xaa), whole(0x55))));
 }
 
-// A value of a side that is known: where rounding says otherwise, barely on that side.
+// Corrects a value whose side is known. A value of the wrong side becomes a tiny value of the right
+// one.
 Real onSide(Real value, Bool inside) {
   return select(differ(value < 0.0f, inside), select(inside, real(kBarelyInside), real(0.0f)),
                 value);
@@ -141,7 +143,7 @@ Real onSide(Real value, Bool inside) {
 
 struct Crossing {
   Bool found;
-  Real share;  // of the way through the cell
+  Real share;  // fraction of the ray's segment in the cell
   Bool enters;
   Bool endsInside;
 };

@@ -1,9 +1,9 @@
-// Where a ray crosses the zero set of a tricubic B-spline, whose coefficients the grid holds. In the
-// words and the space of roots.glsl.
+// Crossings of a ray with the zero set of a tricubic B-spline whose coefficients the grid stores.
+// Types and space are those of roots.glsl.
 //
-// Along a line the spline is of degree 9 in a cell. The Bézier net of the box that the way through
-// the cell spans tells its Bernstein coefficients: sums of products that are not negative, so that a
-// net of one sign gives coefficients of that sign, whatever is rounded.
+// Along a line the spline has degree 9 within a cell. Its Bernstein coefficients follow from the
+// Bézier net of the box that the ray's segment spans. They are sums of nonnegative multiples of the
+// net's values. So a net of one sign gives coefficients of that sign, in spite of rounding.
 
 CONST_INT kDegree = 9;
 
@@ -34,8 +34,8 @@ Real blended(IN(Blend) b, Real c0, Real c1, Real c2, Real c3) {
   return sum;
 }
 
-// From four coefficients each on the axis of that stride to the four of the Bézier net between two
-// places.
+// Replaces four coefficients along the axis with that stride by four values of the Bézier net
+// between two positions.
 void bendAxis(INOUT_ARRAY(Real, net, 64), int stride, Real from, Real to) {
   Blend b0 = blendOf(from, from, from);
   Blend b1 = blendOf(from, from, to);
@@ -64,8 +64,8 @@ Whole countChanges(IN_ARRAY(Real, b, 10)) {
   return count;
 }
 
-// Halves the interval of a polynomial, and keeps the left part or the right one. Loops have fixed
-// bounds: Mesa 22.3 loses some of what loops within loops write between bounds that change.
+// Halves the interval of a polynomial and keeps the left or right part. The loops have fixed
+// bounds, because Mesa 22.3 loses writes of nested loops with variable bounds.
 void halve(INOUT_ARRAY(Real, b, 10), Bool asked, Bool right) {
   VAR l[10];
   VAR r[10];
@@ -93,7 +93,7 @@ Real valueAt(IN_ARRAY(Real, b, 10), Real u) {
   return c[0];
 }
 
-// As isolate().
+// Isolates the first sign change; see isolate().
 Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Whole) passing, INOUT(Real) low,
                    INOUT(Real) high) {
   Whole changes = countChanges(b);
@@ -124,14 +124,14 @@ Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Whole) passing, INOU
     high = select(ends, w, high);
     found = OR(found, ends);
     open = AND(open, NOT(ends));
-    open = resume(open, AND(count > 1, NOT(deepest)), part, halvings, size);
+    open = nextPart(open, AND(count > 1, NOT(deepest)), part, halvings, size);
   }
   return found;
 }
 
-// What a ray does between two points of a cell, given from 0 to 1 on each axis.
-// @param carried, inside  is the side known on which the cell before ended, and is it the inside
-// @param passing          how many crossings to pass over, less those that the cell holds
+// Crossing of a ray between two points of a cell, given from 0 to 1 on each axis.
+// @param carried, inside  the side at the end of the previous cell is known, and it is the inside
+// @param passing  number of crossings to skip; reduced by those of the cell
 Crossing splineCrossingIn(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Real x0, Real y0,
                           Real z0, Real x1, Real y1, Real z1, Bool carried, Bool inside,
                           INOUT(Whole) passing) {

@@ -1,11 +1,11 @@
-// The crossings of a ray with the zero set of the interpolant. In the words and the space of
+// Crossings of a ray with the zero set of the trilinear interpolant. Types and space are those of
 // roots.glsl.
 
-// What a ray does between two points of a cell, given from 0 to 1 on each axis.
-// @param brick, cellX …  the cell, as spotAt() found it
-// @param entered, left   axes of the faces, or kNone
-// @param carried, inside is the side known on which the cell before ended, and is it the inside
-// @param passing         how many crossings to pass over, less those that the cell holds
+// Crossing of a ray between two points of a cell, given from 0 to 1 on each axis.
+// @param brick, cellX …  the cell, as returned by spotAt()
+// @param entered, left  axes of the entry and exit faces, or kNone
+// @param carried, inside  the side at the end of the previous cell is known, and it is the inside
+// @param passing  number of crossings to skip; reduced by those of the cell
 Crossing crossingIn(Bool asked, Whole brick, Whole cellX, Whole cellY, Whole cellZ, Real x0, Real y0,
                     Real z0, Real x1, Real y1, Real z1, Whole entered, Whole left, Bool aheadX,
                     Bool aheadY, Bool aheadZ, Bool carried, Bool inside, INOUT(Whole) passing) {
@@ -14,7 +14,8 @@ Crossing crossingIn(Bool asked, Whole brick, Whole cellX, Whole cellY, Whole cel
                 bit(f.f4 < 0.0f, 16) | bit(f.f5 < 0.0f, 32) | bit(f.f6 < 0.0f, 64) |
                 bit(f.f7 < 0.0f, 128);
 
-  // The trilinear interpolant along the way is a cubic; its coefficients are the blossom's values.
+  // Along the segment the trilinear interpolant is a cubic. Its Bernstein coefficients are values
+  // of its blossom.
   VAR rx0 = 1.0f - x0;
   VAR ry0 = 1.0f - y0;
   VAR rz0 = 1.0f - z0;
@@ -48,8 +49,8 @@ Crossing crossingIn(Bool asked, Whole brick, Whole cellX, Whole cellY, Whole cel
   VAR b1 = ((e1 + e2) + e3) * kThird;
   VAR b2 = ((e4 + e5) + e6) * kThird;
 
-  // At a face between two cells there is one side, whichever of them asks: that of its corners
-  // where they agree, else the one on which the cell before ended.
+  // Both cells at a face must agree on the side. It is the sign of the face's corners if they are
+  // equal, otherwise the side at the end of the previous cell.
   Bool upperIn = select(entered == 0, NOT(aheadX), select(entered == 1, NOT(aheadY), NOT(aheadZ)));
   Bool upperOut = select(left == 0, aheadX, select(left == 1, aheadY, aheadZ));
   Whole maskIn = faceCorners(entered, upperIn);
@@ -77,27 +78,28 @@ Crossing crossingIn(Bool asked, Whole brick, Whole cellX, Whole cellY, Whole cel
 }
 
 struct Ray {
-  Real ox, oy, oz;  // where t is 0
-  Real dx, dy, dz;  // by t
-  Real ix, iy, iz;  // their inverses; kParallel where they are 0
-  Real start, end;  // of t
+  Real ox, oy, oz;  // position at t = 0
+  Real dx, dy, dz;  // derivative by t
+  Real ix, iy, iz;  // inverses of the direction; kParallel for 0
+  Real start, end;  // interval of t
 };
 
-// Where the ray of a pixel is on an axis of a RayFan.
+// One component of a pixel's ray in a RayFan.
 Real onFan(float middle, float right, float down, Real x, Real y) {
   VAR across = x * right + y * down;
   return across + middle;
 }
 
-// A ray that goes nowhere on an axis counts as going ahead and meets no plane of it: its inverse
-// is kParallel, and it is not moved off the place where it is.
+// Flushes tiny direction components to 0. A ray without motion along an axis counts as ascending
+// and meets no plane across it: its inverse is kParallel, and its position on the axis does not
+// change.
 Real onlyFar(Real d) {
   return select(AND(d > -kLeastDirection, d < kLeastDirection), real(0.0f), d);
 }
 
 Real inverseOf(Real d) { return select(d == 0.0f, real(kParallel), 1.0f / d); }
 
-// The ray of the pixel (x, y) of the fan, between the faces of the box of crossing cells.
+// The ray of pixel (x, y), clipped to the box of the crossed cells.
 Ray viewRay(Real x, Real y) {
   Ray ray;
   ray.ox = onFan(fan.origin[0], fan.originX[0], fan.originY[0], x, y);
@@ -127,7 +129,7 @@ struct Hit {
   Whole x, y, z;  // cell
 };
 
-// The crossing after `passing` others.
+// Finds the crossing after `passing` earlier ones.
 Hit trace(Ray ray, Whole passing) {
   Bool aheadX = ray.dx >= 0.0f;
   Bool aheadY = ray.dy >= 0.0f;
@@ -141,17 +143,17 @@ Hit trace(Ray ray, Whole passing) {
   Whole x = cellAt(t, ray.ox, ray.dx, ray.ix, whole(0), whole(tableSizeX - 1));
   Whole y = cellAt(t, ray.oy, ray.dy, ray.iy, whole(0), whole(tableSizeY - 1));
   Whole z = cellAt(t, ray.oz, ray.dz, ray.iz, whole(0), whole(tableSizeZ - 1));
-  // A ray that starts before the table's first cells begins on their faces.
+  // A ray that starts in front of the table's first cells begins on their faces.
   t = larger(t, planeAt(select(aheadX, x, x + 1), ray.ox, ray.ix));
   t = larger(t, planeAt(select(aheadY, y, y + 1), ray.oy, ray.iy));
   t = larger(t, planeAt(select(aheadZ, z, z + 1), ray.oz, ray.iz));
   alive = AND(alive, t <= ray.end);
   Whole entered = whole(kNone);
-  Bool solved = no();    // the cell where a lane is crosses the surface, and the ray does not there
-  Bool carried = no();   // the cell before was such a one
-  Bool inside = no();    // and ended there
+  Bool solved = no();    // the surface crosses this cell, but the ray does not cross the surface in it
+  Bool carried = no();   // the previous cell was such a cell
+  Bool inside = no();    // the ray was inside at its end
   while (any(alive)) {
-    // Walk to the next cell with a crossing.
+    // Advance to the next crossed cell.
     Bool walking = alive;
     Whole brick = whole(0);
     Whole axis = whole(kNone);
@@ -199,7 +201,7 @@ Hit trace(Ray ray, Whole passing) {
       alive = AND(alive, NOT(AND(moving, gone)));
       walking = AND(moving, NOT(gone));
     }
-    // Those that still walk have not come to a cell yet.
+    // Rays still in the loop have not found a crossed cell.
     Bool asked = AND(alive, NOT(walking));
     if (any(asked)) {
       VAR fromX = ray.ox - toReal(x);

@@ -99,7 +99,7 @@ def test_a_folder_that_cannot_be_is_refused(ls, tmp_path):
     (tmp_path / "file").write_text("")
     ls.set_cache(tmp_path / "file")
     try:
-        with pytest.raises(ls.FileError, match="cannot be made"):
+        with pytest.raises(ls.FileError, match="cannot create"):
             part(ls).compute()
     finally:
         ls.set_cache()

@@ -53,7 +53,7 @@ double Plan::activeVoxels() const {
 
 double Plan::bytes() const {
   if (kind == Kind::Field) return fieldBytes;
-  // Of corners, and of a place for each two triangles.
+  // Three vertex indices for each triangle, and one position for every two triangles.
   if (kind == Kind::Mesh) return (3 * sizeof(std::uint32_t) + sizeof(Imath::V3d) / 2.0) * triangles;
   return levelset::kBytesPerVoxel * activeVoxels();
 }
@@ -87,7 +87,7 @@ template <typename T>
 const T& Value::as(Kind wanted) const {
   if (const T* value = std::get_if<T>(&data_)) return *value;
   throw levelset::UsageError(
-      fmt::format("levelsmith: a {} stands where a {} is needed; choose "
+      fmt::format("levelsmith: the value is a {}, but a {} is needed; choose "
                   "another operand, or another grid of the file",
                   kindName(kind()), kindName(wanted)));
 }
@@ -156,7 +156,7 @@ render::ViewedScene sceneOf(const Value& drawn) {
   render::ViewedScene viewed;
   if (drawn.kind() == Kind::Scene)
     viewed = drawn.scene();
-  else if (drawn.kind() == Kind::Mesh)  // the value's own
+  else if (drawn.kind() == Kind::Mesh)  // refers to the mesh of the value
     viewed.scene.meshes.push_back(
         {std::shared_ptr<const TriMesh>(std::shared_ptr<const void>(), &drawn.mesh())});
   else

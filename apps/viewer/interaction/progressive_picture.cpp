@@ -16,15 +16,16 @@
 namespace viewer {
 namespace {
 
-/// A picture of a view, ever finer.
+/// One pass of refinement.
 struct Pass {
   int pixelSize, samples, ambientSamples, shadowSamples;
 };
 constexpr std::array<Pass, 6> kPasses = {Pass{8, 1, 0, 0}, {4, 1, 0, 0},  {2, 1, 0, 0},
                                          {1, 1, 0, 0},     {1, 1, 16, 4}, {1, 4, 16, 4}};
 
-constexpr int kCpuTileEdge = 16, kGpuTileEdge = 64;  // pixels: enough rays for a run of each
-constexpr double kOnSurface = 4e-3;  // of the extent: particles that far below it are on it
+constexpr int kCpuTileEdge = 16, kGpuTileEdge = 64;  // pixels; enough rays for efficient tracing
+constexpr double kOnSurface =
+    4e-3;  // relative to the extent: particles at most that far below the surface count as on it
 
 render::Camera shrunk(render::Camera camera, int pixelSize) {
   camera.width = std::max(1, (camera.width + pixelSize / 2) / pixelSize);
@@ -34,16 +35,16 @@ render::Camera shrunk(render::Camera camera, int pixelSize) {
 
 }  // namespace
 
-/// What the thread keeps from picture to picture.
+/// State of the thread, kept from picture to picture.
 struct ProgressivePicture::Worker {
   const ProgressivePicture& owner;
   View view;
   Display display;
-  std::size_t pass = kPasses.size();  // the next one; none left
+  std::size_t pass = kPasses.size();  // next pass; kPasses.size(): none
   int pixelSize = kPasses[0].pixelSize;
-  std::shared_ptr<const render::Image> image;  // the last one that was finished, of this view
+  std::shared_ptr<const render::Image> image;  // last complete picture of this view
 
-  std::shared_ptr<const Model> preparedModel;  // that the tables are made of
+  std::shared_ptr<const Model> preparedModel;  // model of the prepared tables
   std::optional<ClipPlane::Across> preparedCut;
   std::unique_ptr<ClippedScene> cut;
   std::unique_ptr<render::KernelScene> surfaces;
@@ -58,7 +59,7 @@ struct ProgressivePicture::Worker {
   [[nodiscard]] PlacedPlane plane() const {
     return placed(*view.clip, view.camera, view.model->solidBounds);
   }
-  /// What is drawn of the view, by a camera for fewer pixels.
+  /// Scene of the view, with a camera for fewer pixels.
   [[nodiscard]] render::Scene sceneFor(int edge) {
     render::Scene scene = isCut() ? cut->at(plane()) : view.model->scene;
     scene.camera = shrunk(view.camera, edge);
@@ -80,7 +81,7 @@ struct ProgressivePicture::Worker {
       hasTriedGpu = true;
       try {
         context = std::make_unique<render::GlContext>();
-        // A processor that plays a GPU is slower than one that does not.
+        // Software OpenGL is slower than the processor back end.
         const bool isSoftware = context->description().find("llvmpipe") != std::string::npos;
         if (owner.renderer_ == Renderer::Auto && isSoftware) context = nullptr;
       } catch (const levelset::ResourceLimit&) {
@@ -91,7 +92,7 @@ struct ProgressivePicture::Worker {
       try {
         tracer = std::make_unique<render::GpuTracer>(*context, *surfaces);
         name = context->description();
-      } catch (const levelset::ResourceLimit&) {  // its memory is smaller
+      } catch (const levelset::ResourceLimit&) {  // GPU memory is smaller
         if (owner.renderer_ == Renderer::Gpu) throw;
       }
     }
@@ -101,12 +102,12 @@ struct ProgressivePicture::Worker {
     }
   }
 
-  /// Makes the tables where they are not those of the view.
+  /// Builds the tables unless they match the view.
   void prepare() {
     const std::optional<ClipPlane::Across> newCut =
         isCut() ? std::optional(view.clip->across) : std::nullopt;
     if (surfaces && preparedModel == view.model && preparedCut == newCut) return;
-    tracer = nullptr;  // it reads the tables
+    tracer = nullptr;  // it references the tables
     surfaces = nullptr;
     cut = nullptr;
     if (newCut)
@@ -120,7 +121,7 @@ struct ProgressivePicture::Worker {
     findTracer();
   }
 
-  /// @return the picture, or null when another one is wanted meanwhile
+  /// @return the picture, or null when a newer request is pending
   std::shared_ptr<const render::Image> draw(const Pass& how, std::atomic<double>& progress,
                                             const std::atomic<bool>& isStale) {
     const render::Scene scene = sceneFor(how.pixelSize);

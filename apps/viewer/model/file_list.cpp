@@ -41,7 +41,7 @@ void FileList::enter(const fs::path& folder) {
       files.push_back(path);
   }
   error_ = wrong ? "open: " + whole.string() + ": " + wrong.message() : "";
-  if (wrong) return;  // the list that was there stays
+  if (wrong) return;  // keeps the previous list
   std::sort(folders.begin(), folders.end());
   std::sort(files.begin(), files.end());
   folder_ = whole;

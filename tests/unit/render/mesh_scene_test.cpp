@@ -136,7 +136,7 @@ TEST(MeshScene, CastsShadowsOnLevelSetsAndTakesTheirs) {
   const auto meshOf = [](const V3d& middle, const V3d& a, const V3d& b) {
     return std::make_shared<const levelset::TriMesh>(sheet(middle, a, b));
   };
-  // Between the ball and the light, and out of sampleRay.
+  // Between the ball and the light, and outside the view.
   Scene ball = leaningScene();
   ball.meshes.clear();
   Scene shaded = ball;

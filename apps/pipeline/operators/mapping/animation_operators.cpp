@@ -308,14 +308,14 @@ void tellAnimation(Invocation& in, const mapping::AnimationReport& report) {
   mapping::Drift worst;
   for (const mapping::FrameReport& frame : report.frames) {
     nlohmann::ordered_json entry;
-    entry["farthest_way"] = frame.farthestWay;
+    entry["farthest_way"] = frame.farthestMove;
     entry["drift"] = {frame.drift.least, frame.drift.most};
     entry["remade"] = frame.isRemade;
     entry["skipped"] = frame.skipped;
     if (frame.corners.size() == 1)
       for (const Imath::V3d& c : frame.corners.front()) entry["corners"].push_back({c.x, c.y, c.z});
     json["frame"].push_back(std::move(entry));
-    farthest = std::max(farthest, frame.farthestWay);
+    farthest = std::max(farthest, frame.farthestMove);
     if (frame.drift.factor() > worst.factor()) worst = frame.drift;
   }
   in.notes.detailsJson = json.dump();

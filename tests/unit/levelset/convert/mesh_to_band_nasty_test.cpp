@@ -116,7 +116,7 @@ TEST(MeshToBandNasty, RepeatedAndOppositeFaces) {
   EXPECT_EQ(repeated.band.contentHash(),
             meshToBand(boxMesh(V3d(0), V3d(1)), 0.11).band.contentHash());
   mesh.triangles.back() = {0, 1, 2};  // against: the face cancels, a hole is left
-  expectSays(refusal<InvalidInput>([&] { (void)meshToBand(mesh, 0.11); }), "--sign-anyway");
+  expectSays(refusal<InvalidInput>([&] { (void)meshToBand(mesh, 0.11); }), "--accept-sign");
   expectOpenSound(meshToBand(mesh, 0.11, {.signAnyway = true}), mesh);
 }
 

@@ -36,7 +36,7 @@ TEST(MeshToBandRefusal, NamesBadVoxelSizes) {
   expectRefused(box, 0.1, ExitCode::Usage, "half width is", {.halfWidth = 0.5});
   expectRefused(box, 0.1, ExitCode::Usage, "half width is", {.halfWidth = kNan});
   expectRefused(box, 1e-9, ExitCode::Resource, "GB");
-  expectRefused(box, 1e-12, ExitCode::Resource, "index of 32 bits");
+  expectRefused(box, 1e-12, ExitCode::Resource, "32-bit indices");
   expectRefused(box, 1e-3, ExitCode::Resource, "exceeds the limit", {.maxMemory = 1000000});
   expectRefused(box, 100, ExitCode::Input, "larger than the object");
 }
@@ -52,7 +52,7 @@ TEST(MeshToBandRefusal, NamesBadElements) {
   expectRefused(mesh, 0.1, ExitCode::Resource, "vertex 5");
   mesh = boxMesh(V3d(0), V3d(1));
   mesh.triangles[7][1] = 8;
-  expectRefused(mesh, 0.1, ExitCode::Input, "triangle 7 names vertex 8");
+  expectRefused(mesh, 0.1, ExitCode::Input, "triangle 7 refers to vertex 8");
   TriMesh point{{V3d(0), V3d(1), V3d(2)}, {{0, 0, 1}}};
   expectRefused(point, 0.1, ExitCode::Input, "degenerate");
 }
@@ -74,7 +74,7 @@ TEST(MeshToBandRefusal, NamesOpenMeshes) {
 
   const TriMesh bowl = sphereMesh(1, V3d(0), 8, 0.5);
   expectRefused(bowl, 0.1, ExitCode::Input, "use --sign winding", {.sign = SignMode::Closed});
-  expectRefused(bowl, 0.1, ExitCode::Input, "--sign-anyway");
+  expectRefused(bowl, 0.1, ExitCode::Input, "--accept-sign");
 
   const TriMesh moebius = [] {
     TriMesh mesh = patchMesh(33, 5, false, false, [](double u, double v) {

@@ -103,7 +103,7 @@ TEST(MeshToBandScale, RemembersHowFinelyCoordinatesWereKnown) {
   const TriMesh home = transform(floatBoxFarAway(), Imath::M44d().setTranslation(V3d(-1e7)));
   EXPECT_EQ(home.spacing, 1);  // of floats from 2²³ to 2²⁴
   const std::string sentence = refusal<InvalidInput>([&] { (void)meshToBand(home, 0.02); });
-  EXPECT_NE(sentence.find("before the mesh was moved its coordinates were 1 apart"),
+  EXPECT_NE(sentence.find("before the mesh was moved, its coordinates were 1 apart"),
             std::string::npos);
   // Scaling down scales what is not known.
   const TriMesh small = transform(home, Imath::M44d().setScale(0.01));

@@ -158,14 +158,14 @@ TEST(SurfaceBand, RefusesWhatHasNoTwoSides) {
   std::swap(flipped.triangles[12][0], flipped.triangles[12][1]);
   const std::string sentence = refusal<InvalidInput>([&] { (void)surfaceBand(flipped, 0.1); });
   EXPECT_SAYS(sentence, "surface-band: at the edge from (");
-  EXPECT_SAYS(sentence, "turn all to one side");
+  EXPECT_SAYS(sentence, "orient all faces alike");
   TriMesh fin = square(V3d(0), V3d(1, 0, 0), V3d(0, 1, 0), 2);
   fin.positions.emplace_back(0, 0.5, 1);
   fin.triangles.push_back({4, 5, 9});  // on the edge from (0, 0) to (0, 1)
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand(fin, 0.1); }),
               "at the edge from (0, 0, 0) to (0, 1, 0) 3 faces meet");
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand(support::sphereMesh(1), 0.1); }),
-              "'level-set' makes a solid");
+              "'level-set' converts a closed mesh");
 }
 
 TEST(SurfaceBand, RefusesTheCall) {

@@ -127,10 +127,10 @@ TEST(AnimateTexture, ShowsTexturesThatGrowAndShrink) {
     if (map == mapping::TextureMap::Rbf) {
       EXPECT_GT(tops[2], tops[0] + 0.3 * kVoxel);
       EXPECT_TRUE(report.warnings.empty());
-    } else {  // the shell ends there
+    } else {  // the prism map ends there
       EXPECT_NEAR(tops[2], tops[0], 0.3 * kVoxel);
       ASSERT_EQ(report.warnings.size(), 1u);
-      EXPECT_NE(report.warnings[0].find("frame 2: the texture goes beyond"), std::string::npos);
+      EXPECT_NE(report.warnings[0].find("frame 2: the texture extends beyond"), std::string::npos);
     }
     // A box that is given is kept.
     options.texture.textureBox = ballAt(V3d(0), 0.7).zeroSetBounds();

@@ -305,10 +305,10 @@ TEST(LayerSchemes, RefuseWhatMakesNoSense) {
     }
     return std::string();
   };
-  EXPECT_NE(refused({.fade = true}).find("spline scheme only"), std::string::npos);
+  EXPECT_NE(refused({.fade = true}).find("require --particles spline"), std::string::npos);
   EXPECT_NE(refused({.scheme = LayerScheme::Spline, .spline = {V3d(0, 0, 0.5)}}).find("only 0.5"),
             std::string::npos);
-  EXPECT_NE(refused({.scheme = LayerScheme::Spline, .spline = {V3d(0)}}).find("stands still"),
+  EXPECT_NE(refused({.scheme = LayerScheme::Spline, .spline = {V3d(0)}}).find("two equal points"),
             std::string::npos);
   EXPECT_NE(refused({.scheme = LayerScheme::Spline, .spline = {V3d(std::nan(""))}}).find("finite"),
             std::string::npos);

@@ -12,6 +12,7 @@
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
 #include "levelset/inspect/measure.h"
+#include "levelset/solids/shapes.h"
 #include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
 #include "tests/support/files.h"
@@ -349,7 +350,7 @@ TEST(GeometricTexture, RefusesPatchesThatFold) {
   const NarrowBand ball = makeBall(1, 0.1, 3);
   const std::string message =
       support::refusal<levelset::InvalidInput>([&] { (void)mapTexture(trough, ball, patch); });
-  EXPECT_NE(message.find("most at ("), std::string::npos) << message;
+  EXPECT_NE(message.find("the worst at ("), std::string::npos) << message;
   EXPECT_NE(message.find("u, v, w"), std::string::npos) << message;
 }
 
@@ -366,7 +367,7 @@ TEST(GeometricTexture, UnionIsOneSolidAndCarvingLeavesAHole) {
   // ring's.
   const levelset::Measurement united = measured({.embedDepth = 0.2, .voxelSize = voxel});
   EXPECT_EQ(united.components, 1u);
-  EXPECT_EQ(united.shells, 1u);
+  EXPECT_EQ(united.surfaces, 1u);
   EXPECT_EQ(united.euler, 2);
   EXPECT_GT(united.volume, before.volume);
   const levelset::Measurement blended =
