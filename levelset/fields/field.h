@@ -13,8 +13,8 @@ using VectorField = std::function<Imath::V3d(const Imath::V3d& world, double tim
 
 /// An attribute of a surface: numbers, or vectors at time 0. One of the two is set.
 struct Attribute {
-  ScalarField scalar;
-  VectorField vector;
+  ScalarField scalar = {};
+  VectorField vector = {};
 
   [[nodiscard]] explicit operator bool() const { return scalar || vector; }
 };

@@ -24,8 +24,8 @@ namespace levelset {
 
 /// Velocity of an option: one known by its name, or a field.
 struct NamedVelocity {
-  std::string name;   ///< one of velocityNames(); empty: `field` counts
-  VectorField field;  ///< world units per unit of time
+  std::string name = {};   ///< one of velocityNames(); empty: `field` counts
+  VectorField field = {};  ///< world units per unit of time
 };
 
 /// Names of the velocities above: enright, rotation, vortex.

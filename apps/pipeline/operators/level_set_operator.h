@@ -31,6 +31,7 @@ namespace detail {
 using levelset::FieldGrid;
 using levelset::NarrowBand;
 using levelset::OperatorRun;
+using levelset::RegionOfInterest;
 using levelset::TriMesh;
 using levelset::ValuePlan;
 
@@ -195,8 +196,7 @@ void addEstimates(Operator& op) {
   if constexpr (requires(const Options& options) { Op::cost(options, OperatorPlans()); })
     op.cost = costOf<Op>;
   if constexpr (requires(const Options& options) {
-                  Op::regionOfInterest(options, OperatorPlans(), std::size_t(),
-                                       levelset::RegionOfInterest());
+                  Op::regionOfInterest(options, OperatorPlans(), std::size_t(), RegionOfInterest());
                 })
     op.regionOfInterest = regionOfInterest<Op>;
   if constexpr (requires(const Options& options) { Op::leastRadius(options); })

@@ -65,17 +65,17 @@ class ParamCollector {
  public:
   template <class T, class Owner>
   void operator()(const char* name, T Owner::*member, const levelset::OptionInfo& info) {
-    using Value = OptionValueType<T>;
-    if constexpr (std::is_same_v<Value, levelset::Mask>) {
+    using Bare = OptionValueType<T>;
+    if constexpr (std::is_same_v<Bare, levelset::Mask>) {
       params = withMask(std::move(params));
-    } else if constexpr (std::is_same_v<Value, levelset::VoxelSize>) {
+    } else if constexpr (std::is_same_v<Bare, levelset::VoxelSize>) {
       params.push_back(voxelParam());
       params.push_back(resolutionParam());
     } else {
-      static_assert(paramTypeOf<Value>({}).has_value(), "a member of this type needs a table");
-      Param param = makeParam(name, *paramTypeOf<Value>(info.unit), info);
+      static_assert(paramTypeOf<Bare>({}).has_value(), "a member of this type needs a table");
+      Param param = makeParam(name, *paramTypeOf<Bare>(info.unit), info);
       if (param.type == ParamType::Lengths) param.count = 3;
-      if constexpr (std::is_same_v<Value, levelset::NamedVelocity>)
+      if constexpr (std::is_same_v<Bare, levelset::NamedVelocity>)
         param.choices = levelset::velocityNames();
       if constexpr (!OptionValue<T>::isOptional)
         if (!info.required) param.fallback = textOf(defaults_.*member);
@@ -150,20 +150,20 @@ class OptionReader {
 
   template <class T, class Owner>
   void operator()(const char* name, T Owner::*member, const levelset::OptionInfo& info) {
-    using Value = OptionValueType<T>;
-    if constexpr (std::is_same_v<Value, levelset::Mask>) {
+    using Bare = OptionValueType<T>;
+    if constexpr (std::is_same_v<Bare, levelset::Mask>) {
       if (stage_ == OptionStage::Run)
         options_.*member = maskOf(in_);
       else if (in_.given("mask"))
         options_.*member = levelset::Mask{.field = anyField()};
-    } else if constexpr (std::is_same_v<Value, levelset::VoxelSize>) {
+    } else if constexpr (std::is_same_v<Bare, levelset::VoxelSize>) {
       // Resolved by the caller, since it depends on the object.
     } else if constexpr (std::is_same_v<T, levelset::Length>) {
       options_.*member = levelset::Length::world(length(name));
     } else {
       const bool isLengthWithDefault = info.unit == levelset::OptionUnit::Length &&
                                        !OptionValue<T>::isOptional && !info.required;
-      if (in_.given(name) || isLengthWithDefault) options_.*member = valueOf<Value>(name, info);
+      if (in_.given(name) || isLengthWithDefault) options_.*member = valueOf<Bare>(name, info);
     }
   }
 

@@ -37,7 +37,7 @@ enum class ParamType {
             ///< field
 };
 
-enum class Range { Any, Positive, NonNegative };
+using Range = levelset::OptionRange;
 
 struct Param {
   std::string name;  ///< without the dashes
