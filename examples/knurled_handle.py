@@ -1,4 +1,4 @@
-"""A handle with a knurled grip: a tile of knurl laid all around a cylinder.
+"""A handle with a knurled grip: a knurl tile is repeated around a cylinder.
 
 python3 examples/knurled_handle.py FOLDER [VOXEL]
 """
@@ -17,7 +17,7 @@ tiles = handle.patch_grid(
     count=(6, 3), around=((0, 0, -1.8), (0, 0, 1.8)), height=0.15, levels=3, spacing=0.15
 )
 
-# A tile that goes on beyond its sides, so that it meets its neighbours whole.
+# The tile extends beyond its sides, so that it connects to its neighbours.
 overlap = 0.15
 knurl = ls.knurl(pitch=0.7, depth=0.15, base=0.2, angle=45, columns=1, rows=1, overlap=overlap, voxel=voxel)
 tile = knurl.bounds

@@ -1,7 +1,7 @@
-"""A dragon that grows scales: one solid, strewn over its skin as a geometric texture.
+"""A dragon with scales: one solid is scattered over its skin as a geometric texture.
 
 python3 examples/scaled_dragon.py FOLDER [VOXELS [MODEL]]: voxels along the longest side. The model is
-data/models/dragon_vrip_res3.ply.gz; where it was not fetched, a torus takes its place.
+data/models/dragon_vrip_res3.ply.gz; if it is missing, a torus replaces it.
 """
 
 import os
@@ -25,9 +25,9 @@ else:
 low, high = skin.bounds
 span = (high - low).max()
 
-warnings.filterwarnings("ignore", "scatter: ", ls.Warning)  # where a scale would fold, there is none
+warnings.filterwarnings("ignore", "scatter: ", ls.Warning)  # scales whose map would fold are left out
 
-# A tongue that lies flat; its box becomes the box of each patch.
+# A flat tongue; its bounding box is mapped to the box of each patch.
 scale = ls.sphere(radius=1, voxel=0.08).transform(scale=(1, 1.4, 0.4), bake=True)
 places = skin.scatter(
     count=5 * resolution // 2, size=(0.045 * span, 0.055 * span), height=0.013 * span, levels=3,

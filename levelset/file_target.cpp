@@ -140,7 +140,7 @@ void writeAll(int fd, const char* data, std::size_t size, const fs::path& target
 
 /// Refuses a device that accepts no data. Such a device, for example /dev/full, fails on a write of
 /// zero bytes.
-void requireTakes(int fd, const fs::path& target) {
+void requireWritable(int fd, const fs::path& target) {
   if (fd < 0) throwErrno(target, "cannot be opened for writing", errno);
   struct stat status {};
   if (::fstat(fd, &status) != 0 || !S_ISCHR(status.st_mode)) return;
@@ -167,12 +167,12 @@ FileTarget::FileTarget(const fs::path& target, bool clobber)
   struct stat status {};
   const bool exists = descriptor_ < 0 && ::stat(finalPath_.c_str(), &status) == 0;
   if (exists && S_ISDIR(status.st_mode)) throwIo(target_, "is a directory; name a file in it");
-  writtenThrough_ = descriptor_ >= 0 || (exists && !S_ISREG(status.st_mode));
-  if (writtenThrough_) {
+  copiesToTarget_ = descriptor_ >= 0 || (exists && !S_ISREG(status.st_mode));
+  if (copiesToTarget_) {
     if (descriptor_ >= 0) {
-      requireTakes(descriptor_, target_);
+      requireWritable(descriptor_, target_);
     } else if (S_ISCHR(status.st_mode)) {  // opening a pipe could wait for its reader
-      requireTakes(Descriptor(::open(finalPath_.c_str(), O_WRONLY | O_CLOEXEC)).get(), target_);
+      requireWritable(Descriptor(::open(finalPath_.c_str(), O_WRONLY | O_CLOEXEC)).get(), target_);
     }
     std::error_code error;
     const fs::path folder = fs::temp_directory_path(error);
@@ -220,8 +220,8 @@ FileTarget::~FileTarget() {
 }
 
 void FileTarget::commit() {
-  if (writtenThrough_) {
-    copyThrough();
+  if (copiesToTarget_) {
+    copyToTarget();
     return;  // the destructor removes the copy
   }
   {
@@ -246,7 +246,7 @@ void FileTarget::commit() {
   committed_ = true;
 }
 
-void FileTarget::copyThrough() {
+void FileTarget::copyToTarget() {
   const SigpipeGuard guard;
   const Descriptor source(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));
   if (source.get() < 0) {

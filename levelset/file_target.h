@@ -34,14 +34,14 @@ class FileTarget {
 
  private:
   void createTemporary(const std::filesystem::path& folder, std::string name);
-  void copyThrough();
+  void copyToTarget();
 
   std::filesystem::path target_;     ///< the caller's name of the target, for messages
   std::filesystem::path finalPath_;  ///< target with all links resolved
   std::filesystem::path path_;
   int descriptor_ = -1;  ///< descriptor of this process that the target names (/dev/stdout), or -1
   bool clobber_ = true;
-  bool writtenThrough_ = false;
+  bool copiesToTarget_ = false;
   bool committed_ = false;
 };
 

@@ -61,8 +61,8 @@ void requireAttributes(const TriMesh& mesh, const char* action);
 /// transpose, so that the normal stays perpendicular to the surface. Returns unit length.
 /// @param hand  1, or −1 for a map that mirrors and so reverses the triangles
 /// @return zero for a normal of length zero, and where the map is too flat to leave a direction
-[[nodiscard]] Imath::V3d carriedNormal(const Imath::V3d& normal,
-                                       const std::array<Imath::V3d, 3>& slopes, double hand);
+[[nodiscard]] Imath::V3d transformedNormal(const Imath::V3d& normal,
+                                           const std::array<Imath::V3d, 3>& slopes, double hand);
 
 /// Appends the vertices and triangles of another mesh. Attributes that only one mesh has are
 /// dropped. The result has the coarser precision and spacing of the two.

@@ -65,13 +65,13 @@ void requireAttributes(const TriMesh& mesh, const char* action) {
   requireList(mesh.attributes.colors, count, "colour", action);
 }
 
-V3d carriedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, double hand) {
+V3d transformedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, double hand) {
   // Scaled by the largest component first, so that no product overflows.
   double inA = largestPart(slopes[0]), inB = largestPart(slopes[1]), inC = largestPart(slopes[2]);
   const double size = std::max(std::max(inA, inB), inC);
   const double length = largestPart(normal);
-  constexpr double kLeast = 1e-300;  // its inverse is still finite
-  if (!(size > kLeast) || !(length > kLeast)) return V3d(0);
+  constexpr double kMinMagnitude = 1e-300;  // its inverse is still finite
+  if (!(size > kMinMagnitude) || !(length > kMinMagnitude)) return V3d(0);
   const double bySize = 1 / size, byLength = 1 / length;
   const V3d a = slopes[0] * bySize, b = slopes[1] * bySize, c = slopes[2] * bySize,
             n = normal * byLength;

@@ -49,9 +49,9 @@ struct Camera {
 inline constexpr double kMaxPixels = 268435456;  // 2^28
 
 /// Checks a camera.
-/// @throws levelset::UsageError when a number is not finite, `from` equals `to`, `up` is parallel
-///         to the view, the field of view, the height or the depths are out of range, or a size is
-///         not positive
+/// @throws levelset::UsageError when a number is not finite, `from` equals `to`, or `up` is
+///         parallel to the view. Also when the field of view, the height or the depths are out of
+///         range, or a size is not positive.
 /// @throws levelset::ResourceLimit for more than kMaxPixels pixels
 void validate(const Camera& camera);
 

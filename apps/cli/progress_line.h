@@ -10,8 +10,8 @@ namespace cli {
 
 enum class ProgressStyle { Off, Bar, Json };
 
-/// Reports progress on standard error: a bar once an action has run for a second, or lines of JSON,
-/// one at the start of each action and then at most ten per second.
+/// Reports progress on standard error. The bar appears once an action has run for a second. JSON
+/// lines appear at the start of each action, and then at most ten per second.
 class ProgressLine {
  public:
   ProgressLine(ProgressStyle style, std::size_t actions) : style_(style), actions_(actions) {}

@@ -42,13 +42,16 @@ void removeLeftovers(const std::filesystem::path& target) {
   }
 }
 
-using Made = std::function<void(std::size_t, const pipeline::Value&)>;
+using OnValue = std::function<void(std::size_t, const pipeline::Value&)>;
 
 /// A run in a thread of its own, which does not use Python.
 class Run {
  public:
-  Run(const pipeline::Graph& graph, const RunOptions& options, Made made)
-      : graph_(graph), options_(options), made_(std::move(made)), thread_([this] { work(); }) {}
+  Run(const pipeline::Graph& graph, const RunOptions& options, OnValue onValue)
+      : graph_(graph),
+        options_(options),
+        onValue_(std::move(onValue)),
+        thread_([this] { work(); }) {}
   ~Run() {
     end();
     if (thread_.joinable()) thread_.join();
@@ -116,7 +119,7 @@ class Run {
       reportProgress(action, fraction);
     };
     settings.shouldContinue = [this] { return goesOn_.load(); };
-    settings.onValue = made_;
+    settings.onValue = onValue_;
     settings.print = [this](const std::string& text) { outcome_.printed += text; };
     settings.warn = [this](const std::string& text) { outcome_.warnings.push_back(text); };
     settings.note = [this](const std::string& text) { outcome_.notes.push_back(text); };
@@ -131,7 +134,7 @@ class Run {
 
   const pipeline::Graph& graph_;
   const RunOptions& options_;
-  const Made made_;
+  const OnValue onValue_;
   Outcome outcome_;
   std::atomic<bool> goesOn_ = true;
   std::mutex mutex_;

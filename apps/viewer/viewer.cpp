@@ -346,7 +346,7 @@ void Viewer::saveScreenshot() {
   try {
     requireScreenshotName(name, isInterfaceShot_);
     if (isInterfaceShot_) {
-      wantsInterfaceShot_ = true;  // of the next frame, without the dialog
+      wantsInterfaceShot_ = true;  // taken in the next frame, without the dialog
       return;
     }
     if (!frame_)

@@ -96,7 +96,7 @@ class Viewer {
   bool isClipped_ = false;
   Display display_;
   render::Style style_;
-  std::shared_ptr<const Frame> frame_;  // that the window shows
+  std::shared_ptr<const Frame> frame_;  // frame that the window shows
   int pictureWidth_ = 1, pictureHeight_ = 1;
 
   enum class Drag { None, Orbit, Pan };

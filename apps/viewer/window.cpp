@@ -241,7 +241,7 @@ Canvas Window::drawInMemory(int width, int height, const std::function<void()>& 
   canvas.colours.resize(4 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, canvas.colours.data());
-  // OpenGL counts rows from below, and what it blends leaves alpha behind that says nothing.
+  // OpenGL counts rows from below, and blending leaves a meaningless alpha.
   const std::size_t row = 4 * static_cast<std::size_t>(width);
   for (int y = 0; y < height / 2; ++y)
     std::swap_ranges(canvas.colours.begin() + static_cast<std::ptrdiff_t>(row) * y,

@@ -202,7 +202,7 @@ double ambiguousShare(const openvdb::FloatGrid& grid, const SignField& field, co
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
     const LeafNode& leaf = *leaves[n];
     const V3i block = toV3i(leaf.origin()) - origin;
-    const bool clear = field.isClearIn(block);
+    const bool clear = field.isUnambiguousIn(block);
     SignField::BlockWinding winding;
     if (!clear) field.winding(block, winding);
     auto accessor = grid.getConstAccessor();

@@ -50,12 +50,12 @@ NarrowBand LevelSetOperator::run(const TriMesh& mesh, const Options& options, Op
   const MeshToBandOptions settings{.halfWidth = options.halfWidth,
                                    .sign = options.sign,
                                    .nesting = options.nesting,
-                                   .signAnyway = options.acceptsSign,
+                                   .acceptSign = options.acceptsSign,
                                    .searchSelfIntersections = !options.skipsIntersectionTest,
                                    .roi = run.roi,
                                    .maxMemory = run.maxMemory,
                                    .progress = run.progress,
-                                   .certified = [&](const SignCertificate& certificate) {
+                                   .onCertificate = [&](const SignCertificate& certificate) {
                                      run.certificate = figuresOf(certificate);
                                      run.notes.push_back(describe(certificate));
                                    }};
@@ -116,9 +116,9 @@ double SurfaceBandOperator::longestSide(const Options&, Plans operands) {
 }
 
 void SurfaceBandOperator::check(const Options& options, const GivenOptions&) {
-  if (options.halfWidth < kLeastSurfaceHalfWidth) {
+  if (options.halfWidth < kMinSurfaceHalfWidth) {
     throw UsageError(fmt::format("surface-band: --half-width is {} voxels; give at least {}",
-                                 options.halfWidth, kLeastSurfaceHalfWidth));
+                                 options.halfWidth, kMinSurfaceHalfWidth));
   }
 }
 
@@ -128,11 +128,11 @@ NarrowBand SurfaceBandOperator::run(const TriMesh& mesh, const Options& options,
       {.halfWidth = options.halfWidth, .maxMemory = run.maxMemory, .progress = run.progress});
   run.notes.push_back(fmt::format("{} border edges, {} triangles dropped", result.borderEdges,
                                   result.droppedTriangles));
-  if (result.cutVoxels > 0)
+  if (result.removedVoxels > 0)
     run.notes.push_back(
         fmt::format("{} voxels lie half way between the front of one part of the surface and the "
                     "back of another, and are cut out: patches cannot pass there",
-                    result.cutVoxels));
+                    result.removedVoxels));
   return std::move(result.band);
 }
 

@@ -24,7 +24,7 @@ using Imath::V3d;
 using Imath::V3i;
 
 /// Wraps the caller's progress so that it never decreases while stages repeat.
-Progress rising(const Progress& progress) {
+Progress monotonic(const Progress& progress) {
   if (!progress) return {};
   return [&progress, high = 0.0](double fraction) mutable {
     high = std::max(high, fraction);
@@ -88,7 +88,7 @@ void addOpenSurface(LocalMesh& mesh, const SignField& field, double halfWidth,
   convert::forEachBlock(
       mesh, halfWidth,
       [&](const V3i& block, std::span<const std::uint32_t>) {
-        if (field.isClearIn(block)) return;
+        if (field.isUnambiguousIn(block)) return;
         const std::lock_guard lock(mutex);
         seeds.push_back(block);
       },
@@ -110,13 +110,13 @@ void checkResult(const openvdb::FloatGrid& grid, const SignCertificate& certific
     throw InvalidInput(
         "level-set: no grid point lies inside the object, which is everywhere thinner than a "
         "voxel; use smaller voxels");
-  if (!anyInside && !options.signAnyway)
+  if (!anyInside && !options.acceptSign)
     throw InvalidInput(fmt::format(
         "level-set: the mesh encloses no volume: its winding number exceeds 1/2 at no grid point "
         "({} boundary edges); close it first, use smaller voxels, or accept distances without an "
         "inside with --accept-sign",
         certificate.boundaryEdges));
-  if (certificate.ambiguousShare > kAmbiguousLimit && !options.signAnyway)
+  if (certificate.ambiguousShare > kAmbiguousLimit && !options.acceptSign)
     throw InvalidInput(fmt::format(
         "level-set: inside and outside are a guess at {:.2g} % of the voxels next to the "
         "surface ({} boundary edges, {} non-manifold); close the holes, or accept the guess "
@@ -144,7 +144,7 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
                             const MeshToBandOptions& options) {
   constexpr const char* kAction = "level-set";
   convert::checkMeshInput(mesh, voxelSize, options);
-  const Progress progress = rising(options.progress);
+  const Progress progress = monotonic(options.progress);
   const std::size_t maxMemory = memoryLimit(options.maxMemory);
   report(progress, 0, kAction);
 
@@ -198,7 +198,7 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
   const auto grid = convert::assembleBand(local, field, origin, voxelSize, halfWidth, region,
                                           maxMemory, subProgress(progress, 0.6, 1));
   certificate.ambiguousShare = convert::ambiguousShare(*grid, field, origin);
-  if (options.certified) options.certified(certificate);
+  if (options.onCertificate) options.onCertificate(certificate);
   checkResult(*grid, certificate, options);
   report(progress, 1, kAction);
   return {makeBand(grid), certificate};

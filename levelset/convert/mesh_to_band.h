@@ -42,7 +42,7 @@ struct MeshToBandOptions {
   double halfWidth = 3;  ///< voxels, at least 1
   SignMode sign = SignMode::Auto;
   Nesting nesting = Nesting::Parity;    ///< used with SignMode::Closed only
-  bool signAnyway = false;              ///< accept an ambiguous sign, or a mesh without an inside
+  bool acceptSign = false;              ///< accept an ambiguous sign, or a mesh without an inside
   bool searchSelfIntersections = true;  ///< false: Auto assumes that the mesh has none
   /// Region of interest. Distances outside it are omitted, as cropped() does, unless the mesh has
   /// holes. The certificate covers the complete mesh, except for the ambiguous share.
@@ -50,7 +50,7 @@ struct MeshToBandOptions {
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
   /// Receives the complete certificate, also when the mesh is then refused.
-  std::function<void(const SignCertificate&)> certified = {};
+  std::function<void(const SignCertificate&)> onCertificate = {};
 };
 
 /// Limit of SignCertificate::ambiguousShare. Above it the sign is considered a guess.

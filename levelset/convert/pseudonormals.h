@@ -25,7 +25,9 @@ class Pseudonormals {
 
   /// The first edge with three or more faces, or with two faces that run along it in the same
   /// direction.
-  [[nodiscard]] const std::optional<UnorientedEdge>& flaw() const { return flaw_; }
+  [[nodiscard]] const std::optional<UnorientedEdge>& unorientedEdge() const {
+    return unorientedEdge_;
+  }
   [[nodiscard]] std::size_t borderEdges() const { return borderEdges_; }
 
   struct Direction {
@@ -39,7 +41,7 @@ class Pseudonormals {
   std::vector<Imath::V3d> faces_;
   std::vector<Direction> edges_, vertices_;
   std::vector<std::array<std::uint32_t, 3>> edgeOf_;
-  std::optional<UnorientedEdge> flaw_;
+  std::optional<UnorientedEdge> unorientedEdge_;
   std::size_t borderEdges_ = 0;
 };
 

@@ -84,15 +84,15 @@ class SideOfSurface {
       foot = at;
     }
     const Pseudonormals::Direction direction = normals_.at(nearest, foot.part);
-    const V3d way = p - foot.point;
-    const double ahead = way.dot(direction.normal);
+    const V3d offset = p - foot.point;
+    const double ahead = offset.dot(direction.normal);
     if (!direction.onBorder) {
       const double length = distance < kTouching ? 0 : distance;
       return {ahead < 0 ? -length : length, length < reach_};
     }
     // Beyond the border the value is the distance to the plane of the border's normal. It continues
     // the distance smoothly across the border.
-    const double beyond = (way - direction.normal * ahead).length();
+    const double beyond = (offset - direction.normal * ahead).length();
     const bool isOn = direction.normal != V3d(0) && beyond <= kBeyond && std::abs(ahead) < reach_;
     return {std::abs(ahead) < kTouching ? 0 : ahead, isOn, beyond};
   }
@@ -179,7 +179,7 @@ bool isContradiction(float here, float next, const float* last, const float* aft
 }
 
 /// Deactivates the voxels beside a contradiction.
-std::size_t cutContradictions(openvdb::FloatGrid& grid) {
+std::size_t removeContradictions(openvdb::FloatGrid& grid) {
   const float voxel = static_cast<float>(grid.voxelSize()[0]), background = grid.background();
   openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid.tree());
   std::vector<std::vector<openvdb::Index>> cuts(leaves.leafCount());
@@ -212,19 +212,19 @@ std::size_t cutContradictions(openvdb::FloatGrid& grid) {
 }
 
 void checkSurface(const Pseudonormals& normals, const V3i& origin, double voxelSize) {
-  if (const auto& flaw = normals.flaw()) {
+  if (const auto& edge = normals.unorientedEdge()) {
     const auto text = [&](const V3d& p) {
       const V3d world = (p + V3d(origin)) * voxelSize;
       return fmt::format("({:.6g}, {:.6g}, {:.6g})", world.x, world.y, world.z);
     };
     throw InvalidInput(
-        flaw->faces > 2
+        edge->faces > 2
             ? fmt::format("{}: at the edge from {} to {}, {} faces meet, so the surface does not "
                           "have two sides; split the surface there",
-                          kSurfaceBand, text(flaw->from), text(flaw->to), flaw->faces)
+                          kSurfaceBand, text(edge->from), text(edge->to), edge->faces)
             : fmt::format("{}: at the edge from {} to {}, two faces have opposite orientations; "
                           "orient all faces alike (a Moebius strip has only one side: cut it)",
-                          kSurfaceBand, text(flaw->from), text(flaw->to)));
+                          kSurfaceBand, text(edge->from), text(edge->to)));
   }
   if (normals.borderEdges() == 0)
     throw InvalidInput(fmt::format(
@@ -235,9 +235,9 @@ void checkSurface(const Pseudonormals& normals, const V3i& origin, double voxelS
 
 SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
                               const SurfaceBandOptions& options) {
-  if (!(options.halfWidth >= kLeastSurfaceHalfWidth) || !std::isfinite(options.halfWidth))
+  if (!(options.halfWidth >= kMinSurfaceHalfWidth) || !std::isfinite(options.halfWidth))
     throw UsageError(fmt::format("{}: the half width is {} voxels; give at least {}", kSurfaceBand,
-                                 options.halfWidth, kLeastSurfaceHalfWidth));
+                                 options.halfWidth, kMinSurfaceHalfWidth));
   convert::checkMeshInput(mesh, voxelSize,
                           {.halfWidth = options.halfWidth, .maxMemory = options.maxMemory},
                           kSurfaceBand);
@@ -255,7 +255,7 @@ SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
       measureBlocks(local, side, origin, voxelSize, options.halfWidth,
                     memoryLimit(options.maxMemory), subProgress(options.progress, 0.1, 1));
   SurfaceBandResult result;
-  result.cutVoxels = cutContradictions(*grids.grid);
+  result.removedVoxels = removeContradictions(*grids.grid);
   result.band = makeOpenBand(grids.grid, grids.beyond);
   result.borderEdges = normals.borderEdges();
   result.droppedTriangles = topology.dropped;

@@ -11,10 +11,10 @@
 namespace levelset {
 
 /// Minimum half width, voxels: tricubic interpolation at the surface reads up to 3.5 voxels away.
-inline constexpr double kLeastSurfaceHalfWidth = 4;
+inline constexpr double kMinSurfaceHalfWidth = 4;
 
 struct SurfaceBandOptions {
-  double halfWidth = 5;  ///< voxels, at least kLeastSurfaceHalfWidth
+  double halfWidth = 5;  ///< voxels, at least kMinSurfaceHalfWidth
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
@@ -23,8 +23,8 @@ struct SurfaceBandResult {
   NarrowBand band;  ///< isOpenSurface()
   std::size_t borderEdges = 0;
   std::size_t droppedTriangles = 0;  ///< triangles without area and exact duplicates
-  std::size_t cutVoxels = 0;  ///< voxels removed where the front of one part of the surface meets
-                              ///< the back of another
+  std::size_t removedVoxels = 0;     ///< voxels removed where the front of one part of the surface
+                                  ///< meets the back of another
 };
 
 /// Computes distances to an open, consistently oriented mesh, positive on the side that the

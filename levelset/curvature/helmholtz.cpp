@@ -29,7 +29,7 @@ HelmholtzSolver::HelmholtzSolver(const BandBlocks& blocks, const Field& weights)
   blocks.forEach<PaddedBlock>([&](std::size_t i, PaddedBlock& block) {
     blocks.gather(inBand, i, 0, block);
     for (auto it = unknown_[i].beginOn(); it; ++it)
-      neighbours_[i][it.pos()] = block.sixAround(it.pos());
+      neighbours_[i][it.pos()] = block.neighbourSum(it.pos());
   });
 }
 
@@ -43,7 +43,7 @@ void HelmholtzSolver::multiply(float dt, const Field& in, Field& out) const {
     for (auto it = unknown_[i].beginOn(); it; ++it) {
       const openvdb::Index n = it.pos();
       out[i][n] =
-          in[i][n] / weight(i, n) - dt * (block.sixAround(n) - neighbours_[i][n] * in[i][n]);
+          in[i][n] / weight(i, n) - dt * (block.neighbourSum(n) - neighbours_[i][n] * in[i][n]);
     }
   });
 }

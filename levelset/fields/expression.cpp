@@ -88,11 +88,11 @@ class Formulas {
   }
   [[noreturn]] static void refuse(const std::string& text, const Variables& variables,
                                   const char* action, const std::string& why) {
-    constexpr std::size_t kMostShown = 200;
+    constexpr std::size_t kMaxShown = 200;
     throw UsageError(
         fmt::format("{}: the formula '{}' cannot be read: {}; use {}, numbers and functions such "
                     "as sin({})",
-                    action, text.size() > kMostShown ? text.substr(0, kMostShown) + "…" : text, why,
+                    action, text.size() > kMaxShown ? text.substr(0, kMaxShown) + "…" : text, why,
                     variables.names, variables.names[0]));
   }
 

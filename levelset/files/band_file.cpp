@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 constexpr std::streamoff kIdentifierOffset = 8 + 3 * 4 + 1;
 /// Smallest voxel size of a NanoVDB file. NanoVDB's writer inverts the matrix with OpenVDB's
 /// AffineMap, which treats smaller voxels as singular.
-constexpr double kLeastNanoVoxel = 1.5e-5;
+constexpr double kMinNanoVoxel = 1.5e-5;
 
 std::string bandFormat(const fs::path& nameOrFormat) {
   std::string text = nameOrFormat.filename().string();
@@ -352,11 +352,11 @@ void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOpti
     throw InvalidInput(
         fmt::format("write: there is no band to write to '{}'; create one first", path.string()));
   requireSolid(band, "write");  // a file would not record that the surface is open
-  if (format == "nvdb" && band.voxelSize() < kLeastNanoVoxel)
+  if (format == "nvdb" && band.voxelSize() < kMinNanoVoxel)
     throw InvalidInput(fmt::format(
         "write: '{}' cannot hold voxels of {:.6g}, NanoVDB accepts none below {}; write "
         "a .vdb file, or change the unit of length",
-        path.string(), band.voxelSize(), kLeastNanoVoxel));
+        path.string(), band.voxelSize(), kMinNanoVoxel));
   const auto grid = namedGrid(vdb(band), options.name);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   writeTarget(path, [&](const fs::path& target) {

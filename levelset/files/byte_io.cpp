@@ -234,8 +234,8 @@ FirstBytes readFirstBytes(const fs::path& path, std::size_t count) {
   InputFile file(path);
   fill(raw, 0, kNoMemoryLimit, count, file.name(), false,
        [&](char* to, std::size_t size) { return file.read(to, size); });
-  const std::size_t atHand = raw.size() < count ? raw.size() : 0;
-  if (!isGzip(raw.view())) return {std::move(raw), std::max(file.expectedSize(), atHand)};
+  const std::size_t fileSize = raw.size() < count ? raw.size() : 0;
+  if (!isGzip(raw.view())) return {std::move(raw), std::max(file.expectedSize(), fileSize)};
   Bytes inflated;
   std::size_t produced = 0;
   inflated.resize(count);
@@ -251,7 +251,7 @@ FirstBytes readFirstBytes(const fs::path& path, std::size_t count) {
     // The raw bytes end at `count`. The data decompressed so far is the result.
   }
   inflated.resize(produced);
-  return {std::move(inflated), atHand > 0 && produced < count ? produced : 0};
+  return {std::move(inflated), fileSize > 0 && produced < count ? produced : 0};
 }
 
 struct ByteWriter::Deflater {

@@ -62,7 +62,8 @@ class MappedFile {
 /// The first bytes of a file, decompressed if necessary. Damage further on goes unnoticed.
 struct FirstBytes {
   Bytes bytes;
-  std::size_t whole = 0;  ///< size of the complete file in bytes; 0 when unknown without reading it
+  std::size_t fileSize =
+      0;  ///< size of the complete file in bytes; 0 when unknown without reading it
 };
 /// Reads the first bytes of a file.
 /// @param count  maximum number of bytes

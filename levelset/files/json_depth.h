@@ -6,9 +6,9 @@
 namespace levelset {
 
 /// Maximum nesting depth of JSON documents. The program's own documents are less deep.
-inline constexpr std::size_t kMostJsonDepth = 64;
+inline constexpr std::size_t kMaxJsonDepth = 64;
 
-/// Returns true when lists and objects are nested deeper than kMostJsonDepth. Check a text before
+/// Returns true when lists and objects are nested deeper than kMaxJsonDepth. Check a text before
 /// parsing it: copying or writing such a document would overflow the stack.
 [[nodiscard]] inline bool isJsonTooDeep(std::string_view text) {
   std::size_t depth = 0;
@@ -23,7 +23,7 @@ inline constexpr std::size_t kMostJsonDepth = 64;
     } else if (c == '"') {
       isQuoted = true;
     } else if (c == '[' || c == '{') {
-      if (++depth > kMostJsonDepth) return true;
+      if (++depth > kMaxJsonDepth) return true;
     } else if ((c == ']' || c == '}') && depth > 0) {
       --depth;
     }

@@ -26,9 +26,9 @@ void initializeOnce() {
 }
 
 std::vector<VdbMetadata> readMetadata(VdbBytes& bytes) {
-  constexpr std::size_t kLeastSize = 12;  // three lengths
+  constexpr std::size_t kMinSize = 12;  // three lengths
   const auto count = bytes.value<std::uint32_t>();
-  if (count > bytes.remaining() / kLeastSize)
+  if (count > bytes.remaining() / kMinSize)
     bytes.fail(fmt::format("its header promises {} entries of metadata", count));
   std::vector<VdbMetadata> result;
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -94,7 +94,7 @@ VdbEntry readDescriptor(VdbBytes& bytes) {
 }
 
 /// Moves to the start of the next grid.
-void stepOver(VdbBytes& bytes, const VdbEntry& entry, std::int64_t end) {
+void skipTree(VdbBytes& bytes, const VdbEntry& entry, std::int64_t end) {
   if (end > 0) {
     if (static_cast<std::size_t>(end) < bytes.position())
       bytes.fail(fmt::format("grid '{}' ends before it begins", entry.name));
@@ -164,9 +164,9 @@ std::vector<VdbEntry> readVdbEntries(std::string_view file, const std::string& n
   VdbBytes bytes(file, name);
   const bool hasOffsets = readFileHeader(bytes);
   const auto version = VdbBytes(file.substr(sizeof kMagic), name).value<std::uint32_t>();
-  constexpr std::size_t kLeastSize = 40;  // names and offsets
+  constexpr std::size_t kMinSize = 40;  // names and offsets
   const auto count = bytes.value<std::int32_t>();
-  if (count < 0 || static_cast<std::size_t>(count) > bytes.remaining() / kLeastSize)
+  if (count < 0 || static_cast<std::size_t>(count) > bytes.remaining() / kMinSize)
     bytes.fail(fmt::format("its header promises {} grids", count));
   std::vector<VdbEntry> entries;
   for (std::int32_t i = 0; i < count; ++i) {
@@ -182,7 +182,7 @@ std::vector<VdbEntry> readVdbEntries(std::string_view file, const std::string& n
     const VdbMetadata* given = entry.find(openvdb::GridBase::META_GRID_NAME);
     if (given) entry.name = given->value;
     // The end of the last grid is not needed, but it reveals a truncated file.
-    stepOver(bytes, entry, hasOffsets ? end : 0);
+    skipTree(bytes, entry, hasOffsets ? end : 0);
     entries.push_back(std::move(entry));
   }
   return entries;

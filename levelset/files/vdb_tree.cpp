@@ -191,14 +191,14 @@ class TreeReader {
   typename TreeT::Ptr read() {
     auto tree = std::make_shared<TreeT>();
     readRoot(tree->root());
-    const std::vector<std::size_t> places = skipLeafValues();
+    const std::vector<std::size_t> offsets = skipLeafValues();
     ProgressGate gate(limits_.progress, leaves_.size(), "read");
     tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t i) {
       VdbBytes at = bytes_;
-      at.seek(places[i]);
+      at.seek(offsets[i]);
       readLeafValues(at, *leaves_[i]);
-      constexpr std::size_t kOften = 64;  // leaves between two reports
-      if (i % kOften == 0) gate.advance(std::min(kOften, leaves_.size() - i));
+      constexpr std::size_t kReportInterval = 64;  // leaves between two reports
+      if (i % kReportInterval == 0) gate.advance(std::min(kReportInterval, leaves_.size() - i));
     });
     return tree;
   }
@@ -214,7 +214,7 @@ class TreeReader {
  private:
   /// Counts the memory of the tree. It grows node by node, and each node also takes bytes of the
   /// file.
-  void spend(std::size_t size) {
+  void countMemory(std::size_t size) {
     memory_ += static_cast<double>(size);
     if (memory_ > static_cast<double>(limits_.maxMemory))
       requireMemory(memory_, limits_.maxMemory, "read");
@@ -233,7 +233,7 @@ class TreeReader {
       const Coord origin = takeOrigin<typename Root::ChildNodeType>(seen);
       const T value = bytes_.value<T>();
       const bool active = bytes_.value<std::uint8_t>() != 0;
-      if (active) spendTile(Root::ChildNodeType::TOTAL * 3);
+      if (active) countTile(Root::ChildNodeType::TOTAL * 3);
       root.addTile(origin, value, active);
     }
     for (std::uint32_t i = 0; i < children; ++i) {
@@ -254,11 +254,11 @@ class TreeReader {
   }
 
   /// Counts the leaves of an active tile, which may later be split into voxels.
-  void spendTile(Index log2VoxelCount) {
+  void countTile(Index log2VoxelCount) {
     if (limits_.keepsTiles) return;
     const double leaves = std::ldexp(1.0, static_cast<int>(log2VoxelCount)) / Leaf::SIZE;
     memory_ += leaves * static_cast<double>(sizeof(Leaf) + Leaf::SIZE * sizeof(T));
-    spend(0);
+    countMemory(0);
   }
 
   template <typename Node>
@@ -266,7 +266,7 @@ class TreeReader {
     if constexpr (Node::LEVEL == 0) {
       auto leaf = std::make_unique<Node>(openvdb::PartialCreate(), origin, storage_.background);
       leaf->setValueMask(takeMask<typename Node::NodeMaskType>(bytes_));
-      if (!countOnly_) spend(sizeof(Node) + Node::SIZE * sizeof(T));
+      if (!countOnly_) countMemory(sizeof(Node) + Node::SIZE * sizeof(T));
       leaves_.push_back(leaf.get());
       return leaf;
     } else {
@@ -278,7 +278,7 @@ class TreeReader {
   std::unique_ptr<Node> readInternal(const Coord& origin) {
     using Mask = typename Node::NodeMaskType;
     const auto children = takeMask<Mask>(bytes_), active = takeMask<Mask>(bytes_);
-    spend(sizeof(Node));
+    countMemory(sizeof(Node));
     const auto block = takeValues<T, Mask>(bytes_, storage_, active);
     std::vector<T> values(Node::NUM_VALUES);
     expand(bytes_, block, storage_, active, values.data());
@@ -286,7 +286,7 @@ class TreeReader {
     for (Index i = 0; i < Node::NUM_VALUES; ++i) {
       if (children.isOn(i)) continue;
       node->addTile(i, values[i], active.isOn(i));
-      if (active.isOn(i)) spendTile(3 * Node::ChildNodeType::TOTAL);
+      if (active.isOn(i)) countTile(3 * Node::ChildNodeType::TOTAL);
     }
     for (auto it = children.beginOn(); it; ++it) {
       const Coord childOrigin = node->offsetToGlobalCoord(it.pos());
@@ -297,14 +297,14 @@ class TreeReader {
 
   /// Offsets of the values of each leaf in the file.
   std::vector<std::size_t> skipLeafValues() {
-    std::vector<std::size_t> places;
-    places.reserve(leaves_.size());
+    std::vector<std::size_t> offsets;
+    offsets.reserve(leaves_.size());
     for (std::size_t i = 0; i < leaves_.size(); ++i) {
-      places.push_back(bytes_.position());
+      offsets.push_back(bytes_.position());
       const auto active = takeMask<typename Leaf::NodeMaskType>(bytes_);
       static_cast<void>(takeValues<T, typename Leaf::NodeMaskType>(bytes_, storage_, active));
     }
-    return places;
+    return offsets;
   }
 
   void readLeafValues(VdbBytes& at, Leaf& leaf) const {

@@ -21,11 +21,11 @@ class BoxTree {
  public:
   BoxTree() = default;
   /// @param bound  (item, low, high): extends the box by an item
-  /// @param place  (item, axis): coordinate by which an item is sorted to one side of a split
-  template <typename Bound, typename Place>
-  BoxTree(std::size_t count, const Bound& bound, const Place& place) : order_(count) {
+  /// @param coordinate  (item, axis): coordinate by which an item is sorted to one side of a split
+  template <typename Bound, typename Coordinate>
+  BoxTree(std::size_t count, const Bound& bound, const Coordinate& coordinate) : order_(count) {
     std::iota(order_.begin(), order_.end(), 0u);
-    if (count > 0) build(0, static_cast<std::uint32_t>(count), bound, place);
+    if (count > 0) build(0, static_cast<std::uint32_t>(count), bound, coordinate);
   }
 
   /// Item numbers in the order of the leaves.
@@ -39,7 +39,7 @@ class BoxTree {
   }
 
  private:
-  static constexpr std::uint32_t kThingsPerLeaf = 4;
+  static constexpr std::uint32_t kItemsPerLeaf = 4;
 
   struct Node {
     openvdb::Vec3f low, high;
@@ -47,9 +47,9 @@ class BoxTree {
     std::uint32_t right = 0;  ///< second child; the first child follows its parent; 0: a leaf
   };
 
-  template <typename Bound, typename Place>
+  template <typename Bound, typename Coordinate>
   std::uint32_t build(std::uint32_t begin, std::uint32_t end, const Bound& bound,
-                      const Place& place) {
+                      const Coordinate& coordinate) {
     const auto index = static_cast<std::uint32_t>(nodes_.size());
     nodes_.emplace_back();
     openvdb::Vec3d low(std::numeric_limits<double>::max()), high = -low;
@@ -61,16 +61,16 @@ class BoxTree {
     }
     nodes_[index].begin = begin;
     nodes_[index].end = end;
-    if (end - begin <= kThingsPerLeaf) return index;
+    if (end - begin <= kItemsPerLeaf) return index;
     const openvdb::Vec3d size = high - low;
     const int axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
     const std::uint32_t middle = begin + (end - begin) / 2;
     const auto at = [&](std::uint32_t i) { return order_.begin() + i; };
     std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
-      return place(a, axis) < place(b, axis);
+      return coordinate(a, axis) < coordinate(b, axis);
     });
-    build(begin, middle, bound, place);
-    const std::uint32_t right = build(middle, end, bound, place);
+    build(begin, middle, bound, coordinate);
+    const std::uint32_t right = build(middle, end, bound, coordinate);
     nodes_[index].right = right;
     return index;
   }

@@ -15,7 +15,7 @@ namespace {
 bool anyCoincide(const std::vector<Imath::V3d>& positions) {
   convert::PositionTable table(positions, positions.size());
   for (std::uint32_t v = 0; v < positions.size(); ++v)
-    if (table.findOrEnter(positions[v], v) != v) return true;
+    if (table.findOrInsert(positions[v], v) != v) return true;
   return false;
 }
 
@@ -61,11 +61,11 @@ std::vector<BorderSide> findBorder(const TriMesh& mesh) {
 
 /// Finds the representatives of the edge ends. Enters vertices on the border only, so that parts
 /// that only touch keep their own vertices.
-void findPlaces(const std::vector<Imath::V3d>& positions, std::vector<BorderSide>& border) {
+void findEndVertices(const std::vector<Imath::V3d>& positions, std::vector<BorderSide>& border) {
   convert::PositionTable table(positions, border.size());
   for (BorderSide& side : border) {
-    side.low = table.findOrEnter(positions[side.atLow], side.atLow);
-    side.high = table.findOrEnter(positions[side.atHigh], side.atHigh);
+    side.low = table.findOrInsert(positions[side.atLow], side.atLow);
+    side.high = table.findOrInsert(positions[side.atHigh], side.atHigh);
     if (side.low <= side.high) continue;
     std::swap(side.low, side.high);
     std::swap(side.atLow, side.atHigh);
@@ -147,7 +147,7 @@ std::optional<TriMesh> withoutSeams(const TriMesh& mesh, const char* action,
   constexpr double kBorderBytes = sizeof(BorderSide) + 2 * 8 + kTableBytes;
   requireMemory(static_cast<double>(border.size()) * kBorderBytes + triangles * 12 + vertices * 32,
                 maxMemory, action);
-  findPlaces(mesh.positions, border);
+  findEndVertices(mesh.positions, border);
   DisjointSets joined(mesh.positions.size());
   joinSides(border, joined);
   return withJoined(mesh, joined);

@@ -21,7 +21,7 @@ class ValueTable {
   /// Returns the index entered before for an equal position; otherwise enters `index` and returns
   /// it.
   /// @pre points[index] equals `p`, at the latest when the next position is entered
-  std::uint32_t findOrEnter(const Vector& p, std::uint32_t index) {
+  std::uint32_t findOrInsert(const Vector& p, std::uint32_t index) {
     if (2 * entered_ >= slots_.size()) grow();
     std::uint32_t& slot = find(p);
     if (slot == kNone) {

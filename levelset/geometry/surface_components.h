@@ -51,43 +51,43 @@ SurfaceComponents findSurfaceComponents(
     const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   using namespace components_detail;
   DisjointSets sets(positions.size());
-  SurfaceComponents shells;
-  shells.componentOfVertex.assign(positions.size(), SurfaceComponents::kNoComponent);
+  SurfaceComponents components;
+  components.componentOfVertex.assign(positions.size(), SurfaceComponents::kNoComponent);
   for (const auto& t : triangles) {
     sets.join(t[0], t[1]);
     sets.join(t[0], t[2]);
-    for (const std::uint32_t v : t) shells.componentOfVertex[v] = 0;  // in use
+    for (const std::uint32_t v : t) components.componentOfVertex[v] = 0;  // in use
   }
   std::vector<std::uint32_t> anchors;
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
-    if (shells.componentOfVertex[v] == SurfaceComponents::kNoComponent) continue;
+    if (components.componentOfVertex[v] == SurfaceComponents::kNoComponent) continue;
     const std::uint32_t top = sets.find(v);  // lowest vertex of its set, numbered before
     if (top == v) {
-      shells.componentOfVertex[v] = static_cast<std::uint32_t>(anchors.size());
+      components.componentOfVertex[v] = static_cast<std::uint32_t>(anchors.size());
       anchors.push_back(v);
-      shells.figures.emplace_back();
+      components.figures.emplace_back();
     } else {
-      shells.componentOfVertex[v] = shells.componentOfVertex[top];
+      components.componentOfVertex[v] = components.componentOfVertex[top];
     }
-    ++shells.figures[shells.componentOfVertex[v]].euler;
+    ++components.figures[components.componentOfVertex[v]].euler;
   }
   std::vector<std::size_t> faces(anchors.size(), 0);
   for (const auto& t : triangles) {
-    const std::uint32_t shell = shells.componentOfVertex[t[0]];
-    const Vector& anchor = positions[anchors[shell]];
+    const std::uint32_t component = components.componentOfVertex[t[0]];
+    const Vector& anchor = positions[anchors[component]];
     const Triple a = difference(positions[t[0]], anchor),
                  ab = difference(positions[t[1]], positions[t[0]]),
                  ac = difference(positions[t[2]], positions[t[0]]);
     const Triple normal = cross(ab, ac);
-    shells.figures[shell].volume += dot(a, normal) / 6;
-    shells.figures[shell].area += std::sqrt(dot(normal, normal)) / 2;
-    ++faces[shell];
+    components.figures[component].volume += dot(a, normal) / 6;
+    components.figures[component].area += std::sqrt(dot(normal, normal)) / 2;
+    ++faces[component];
   }
   // Each edge has two triangles: 3F = 2E.
   for (std::size_t i = 0; i < faces.size(); ++i) {
-    shells.figures[i].euler -= static_cast<long>(faces[i] / 2);
+    components.figures[i].euler -= static_cast<long>(faces[i] / 2);
   }
-  return shells;
+  return components;
 }
 
 }  // namespace levelset

@@ -30,7 +30,7 @@ struct PaddedBlock {
     return values.data() + ((x + kPad) * kSide + y + kPad) * kRow + z + kPad;
   }
   /// Sum of the values at the six neighbours of a grid point, given by its offset in the leaf.
-  [[nodiscard]] float sixAround(openvdb::Index offset) const {
+  [[nodiscard]] float neighbourSum(openvdb::Index offset) const {
     const auto n = static_cast<int>(offset);
     const float* p = at(n >> 6, n >> 3 & 7, n & 7);
     return p[kStepX] + p[-kStepX] + p[kStepY] + p[-kStepY] + p[1] + p[-1];

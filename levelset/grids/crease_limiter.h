@@ -14,23 +14,23 @@ inline constexpr double kCreaseBend = 0.3;
 /// reaches it.
 inline constexpr float kCreaseOneSided = 3;
 
-/// If one of the two outer samples lies beyond a crease, replaces it by extrapolation of the other
-/// three.
-inline void limitAtCrease(float& v0, float v1, float v2, float& v3, float crease) {
+/// If one of the two outer samples lies beyond a crease, replaces it by extrapolation of the
+/// other three.
+inline void limitAtCrease(float& v0, float v1, float v2, float& v3, float bendLimit) {
   const float before = v0 - 2 * v1 + v2, after = v1 - 2 * v2 + v3;
-  if (std::abs(before) > crease && std::abs(before) > kCreaseOneSided * std::abs(after))
+  if (std::abs(before) > bendLimit && std::abs(before) > kCreaseOneSided * std::abs(after))
     v0 = 3 * (v1 - v2) + v3;
-  else if (std::abs(after) > crease && std::abs(after) > kCreaseOneSided * std::abs(before))
+  else if (std::abs(after) > bendLimit && std::abs(after) > kCreaseOneSided * std::abs(before))
     v3 = 3 * (v2 - v1) + v0;
 }
 
 /// Returns true when a second difference along the lines of a cell's 4³ samples (x slowest) exceeds
 /// the limit. Without branches, so that the compiler vectorises it: almost all cells have no
 /// crease.
-inline bool bendsMoreThan(const std::array<float, 64>& s, float crease) {
+inline bool bendsMoreThan(const std::array<float, 64>& s, float bendLimit) {
   int bent = 0;
   const auto look = [&](std::size_t i, std::size_t step) {
-    bent |= static_cast<int>(std::abs(s[i] - 2 * s[i + step] + s[i + 2 * step]) > crease);
+    bent |= static_cast<int>(std::abs(s[i] - 2 * s[i + step] + s[i + 2 * step]) > bendLimit);
   };
   for (std::size_t i = 0; i < 32; ++i) look(i, 16);
   for (std::size_t x = 0; x < 64; x += 16)
@@ -43,17 +43,18 @@ inline bool bendsMoreThan(const std::array<float, 64>& s, float crease) {
 /// essentially non-oscillatory schemes choose their stencils [Harten87]. The interpolant on the
 /// face between two cells depends only on the samples in its plane. Both cells therefore agree
 /// there, and the interpolant stays continuous.
-/// @param crease  kCreaseBend in the units of the samples
-inline void limitAtCreases(std::array<float, 64>& s, float crease) {
-  if (!bendsMoreThan(s, crease)) return;
-  for (std::size_t i = 0; i < 16; ++i) limitAtCrease(s[i], s[i + 16], s[i + 32], s[i + 48], crease);
+/// @param bendLimit  kCreaseBend in the units of the samples
+inline void limitAtCreases(std::array<float, 64>& s, float bendLimit) {
+  if (!bendsMoreThan(s, bendLimit)) return;
+  for (std::size_t i = 0; i < 16; ++i)
+    limitAtCrease(s[i], s[i + 16], s[i + 32], s[i + 48], bendLimit);
   for (std::size_t i = 0; i < 16; ++i) {
     float* line = &s[(i / 4) * 16 + i % 4];
-    limitAtCrease(line[0], line[4], line[8], line[12], crease);
+    limitAtCrease(line[0], line[4], line[8], line[12], bendLimit);
   }
   for (std::size_t i = 0; i < 16; ++i) {
     float* line = &s[4 * i];
-    limitAtCrease(line[0], line[1], line[2], line[3], crease);
+    limitAtCrease(line[0], line[1], line[2], line[3], bendLimit);
   }
 }
 

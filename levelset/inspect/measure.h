@@ -17,7 +17,7 @@ struct Measurement {
   Imath::Box3d bounds;  ///< bounds of the zero set, world units
   std::size_t activeVoxels = 0;
   double voxelSize = 0, halfWidth = 0;
-  std::size_t components = 0, shells = 0, cavities = 0;
+  std::size_t components = 0, surfaces = 0, cavities = 0;
   long euler = 0;  ///< Euler characteristic V − E + F of the surface: 2 per sphere, 0 per torus
   Imath::V3d centroid = Imath::V3d(0);  ///< centroid of the solid, world units; zero for zero
                                         ///< volume

@@ -37,7 +37,7 @@ TriangleTree treeOf(const TriMesh& mesh) {
 /// Samples per task. Consecutive samples are usually close in space.
 constexpr std::size_t kDifferenceChunk = 1024;
 /// Maximum number of parts of a triangle's side: triangles of decimated meshes may be long.
-constexpr double kMostParts = 256;
+constexpr double kMaxParts = 256;
 
 struct DifferenceSums {
   double smooth = 0, crease = 0;
@@ -53,9 +53,9 @@ struct DifferenceSums {
 
 /// Measures samples one after another. The distance changes by at most the distance between two
 /// samples, which bounds the search.
-class SampleWalk {
+class SampleScan {
  public:
-  SampleWalk(const TriangleSurface& target, const eikonal::PointTree* creases, double reach)
+  SampleScan(const TriangleSurface& target, const eikonal::PointTree* creases, double reach)
       : target_(target), creases_(creases), reach_(reach) {}
 
   /// Measures one sample.
@@ -87,33 +87,33 @@ class SampleWalk {
 
 /// Measures the midpoints of the parts of a triangle.
 /// @return the largest distance
-double visitMiddles(const V3d& a, const V3d& b, const V3d& c, double spacing, SampleWalk& walk) {
+double visitMiddles(const V3d& a, const V3d& b, const V3d& c, double spacing, SampleScan& scan) {
   const double longest =
       std::sqrt(std::max({(b - a).length2(), (c - b).length2(), (a - c).length2()}));
-  const int parts = static_cast<int>(std::clamp(std::ceil(longest / spacing), 1.0, kMostParts));
+  const int parts = static_cast<int>(std::clamp(std::ceil(longest / spacing), 1.0, kMaxParts));
   const V3d u = (b - a) / parts, v = (c - a) / parts;
   double largest = 0;
   for (int i = 0; i < parts; ++i)
     for (int j = 0; i + j < parts; ++j) {
-      largest = std::max(largest, walk.visit(a + u * (i + 1 / 3.0) + v * (j + 1 / 3.0)));
+      largest = std::max(largest, scan.visit(a + u * (i + 1 / 3.0) + v * (j + 1 / 3.0)));
       if (i + j + 1 < parts)
-        largest = std::max(largest, walk.visit(a + u * (i + 2 / 3.0) + v * (j + 2 / 3.0)));
+        largest = std::max(largest, scan.visit(a + u * (i + 2 / 3.0) + v * (j + 2 / 3.0)));
     }
   return largest;
 }
 
-/// Calls work(i, walk) for each i below `count`, in parallel, and sums the results.
+/// Calls work(i, scan) for each i below `count`, in parallel, and sums the results.
 template <typename Work>
-DifferenceSums walkAll(std::size_t count, const SampleWalk& fresh, const Progress& progress,
+DifferenceSums scanAll(std::size_t count, const SampleScan& fresh, const Progress& progress,
                        const Work& work) {
   const std::size_t chunks = (count + kDifferenceChunk - 1) / kDifferenceChunk;
   std::vector<DifferenceSums> parts(chunks);
   ProgressGate gate(progress, std::max<std::size_t>(1, chunks), "tolerance");
   tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
-    SampleWalk walk = fresh;
+    SampleScan scan = fresh;
     const std::size_t end = std::min(count, (chunk + 1) * kDifferenceChunk);
-    for (std::size_t i = chunk * kDifferenceChunk; i < end; ++i) work(i, walk);
-    parts[chunk] = walk.sums();
+    for (std::size_t i = chunk * kDifferenceChunk; i < end; ++i) work(i, scan);
+    parts[chunk] = scan.sums();
     gate.advance(1);
   });
   DifferenceSums sums;
@@ -125,18 +125,18 @@ DifferenceSums walkAll(std::size_t count, const SampleWalk& fresh, const Progres
 /// most.
 std::vector<std::uint32_t> farthest(const std::vector<float>& distances, double largest) {
   constexpr double kLargePart = 0.75;
-  constexpr std::size_t kMost = 4096;
+  constexpr std::size_t kMaxCount = 4096;
   std::vector<std::uint32_t> numbers;
   for (std::size_t i = 0; i < distances.size(); ++i)
     if (distances[i] > 0 && distances[i] >= kLargePart * largest)
       numbers.push_back(static_cast<std::uint32_t>(i));
-  if (numbers.size() > kMost) {
-    std::nth_element(numbers.begin(), numbers.begin() + kMost, numbers.end(),
+  if (numbers.size() > kMaxCount) {
+    std::nth_element(numbers.begin(), numbers.begin() + kMaxCount, numbers.end(),
                      [&](std::uint32_t a, std::uint32_t b) {
                        return distances[a] > distances[b] ||
                               (distances[a] == distances[b] && a < b);
                      });
-    numbers.resize(kMost);
+    numbers.resize(kMaxCount);
     std::sort(numbers.begin(), numbers.end());
   }
   return numbers;
@@ -149,26 +149,26 @@ DifferenceSums differenceTo(const TriangleSurface& target, const TriangleSurface
                             const SurfaceDifferenceOptions& options, const Progress& progress) {
   constexpr double kDenser = 4;
   const TriMesh& mesh = surface.mesh();
-  const SampleWalk fresh(target, creases, options.creaseReach);
+  const SampleScan fresh(target, creases, options.creaseRadius);
   std::vector<float> atVertices(mesh.positions.size()), ofTriangles(mesh.triangles.size());
-  DifferenceSums sums = walkAll(mesh.positions.size(), fresh, subProgress(progress, 0, 0.3),
-                                [&](std::size_t i, SampleWalk& walk) {
-                                  atVertices[i] = static_cast<float>(walk.visit(mesh.positions[i]));
+  DifferenceSums sums = scanAll(mesh.positions.size(), fresh, subProgress(progress, 0, 0.3),
+                                [&](std::size_t i, SampleScan& scan) {
+                                  atVertices[i] = static_cast<float>(scan.visit(mesh.positions[i]));
                                 });
-  const auto visit = [&](std::size_t i, double spacing, SampleWalk& walk) {
+  const auto visit = [&](std::size_t i, double spacing, SampleScan& scan) {
     const auto& [a, b, c] = mesh.triangles[i];
-    return visitMiddles(mesh.positions[a], mesh.positions[b], mesh.positions[c], spacing, walk);
+    return visitMiddles(mesh.positions[a], mesh.positions[b], mesh.positions[c], spacing, scan);
   };
-  sums.add(walkAll(mesh.triangles.size(), fresh, subProgress(progress, 0.3, 0.9),
-                   [&](std::size_t i, SampleWalk& walk) {
+  sums.add(scanAll(mesh.triangles.size(), fresh, subProgress(progress, 0.3, 0.9),
+                   [&](std::size_t i, SampleScan& scan) {
                      const auto& [a, b, c] = mesh.triangles[i];
-                     ofTriangles[i] = std::max({static_cast<float>(visit(i, options.spacing, walk)),
+                     ofTriangles[i] = std::max({static_cast<float>(visit(i, options.spacing, scan)),
                                                 atVertices[a], atVertices[b], atVertices[c]});
                    }));
   const std::vector<std::uint32_t> dense = farthest(ofTriangles, sums.smooth);
-  const DifferenceSums again = walkAll(
+  const DifferenceSums again = scanAll(
       dense.size(), fresh, subProgress(progress, 0.9, 1),
-      [&](std::size_t i, SampleWalk& walk) { visit(dense[i], options.spacing / kDenser, walk); });
+      [&](std::size_t i, SampleScan& scan) { visit(dense[i], options.spacing / kDenser, scan); });
   sums.smooth = std::max(sums.smooth, again.smooth);
   sums.crease = std::max(sums.crease, again.crease);
   return sums;
@@ -278,24 +278,24 @@ SurfaceDifference surfaceDifference(const TriangleSurface& a, const TriangleSurf
 std::vector<V3d> findCreases(const TriMesh& fine, double fineVoxel, const TriMesh& coarse,
                              double coarseVoxel) {
   // The turn that two planes at 45 degrees leave beside the triangles that cut their edge.
-  constexpr double kLeastTurn = 30 * std::numbers::pi / 180;
+  constexpr double kMinTurn = 30 * std::numbers::pi / 180;
   // A resolved bend turns twice as much in the coarse mesh. An edge turns 0.7 to 1.2 times as much,
   // depending on its position in the grid.
-  constexpr float kLeastKept = 0.5f, kMostKept = 1.35f;
+  constexpr float kMinTurnRatio = 0.5f, kMaxTurnRatio = 1.35f;
   const std::vector<float> fineTurns = turnsOf(fine), coarseTurns = turnsOf(coarse);
   const double cell = 2 * std::max(fineVoxel, coarseVoxel);
   TurnGrid fineGrid(cell), coarseGrid(cell);
   for (std::size_t i = 0; i < fineTurns.size(); ++i)
-    if (fineTurns[i] >= kLeastTurn) fineGrid.add(fine.positions[i], fineTurns[i]);
+    if (fineTurns[i] >= kMinTurn) fineGrid.add(fine.positions[i], fineTurns[i]);
   for (std::size_t i = 0; i < coarseTurns.size(); ++i)
-    if (coarseTurns[i] >= kLeastTurn * kLeastKept)
+    if (coarseTurns[i] >= kMinTurn * kMinTurnRatio)
       coarseGrid.add(coarse.positions[i], coarseTurns[i]);
   std::vector<V3d> creases;
   for (std::size_t i = 0; i < fineTurns.size(); ++i) {
-    if (!(fineTurns[i] >= kLeastTurn)) continue;
+    if (!(fineTurns[i] >= kMinTurn)) continue;
     const float here = fineGrid.around(fine.positions[i]);
     const float there = coarseGrid.around(fine.positions[i]);
-    if (there >= kLeastKept * here && there <= kMostKept * here)
+    if (there >= kMinTurnRatio * here && there <= kMaxTurnRatio * here)
       creases.push_back(fine.positions[i]);
   }
   return creases;

@@ -122,14 +122,14 @@ MeshFileInfo meshFileInfo(const fs::path& path, const std::string& format) {
   if (head.empty()) failFile(name, "is empty; download or create the file again");
   MeshFileInfo info;
   if (choice.format->read == readPly) {
-    info = plyInfo(head, first.whole, name);
-    const bool isMesh = info.vertices > 0 && info.faces > 0, isKnown = first.whole > 0;
-    if (isMesh && isKnown && path != "-" && !plyHoldsTriangles(head, first.whole, name))
+    info = plyInfo(head, first.fileSize, name);
+    const bool isMesh = info.vertices > 0 && info.faces > 0, isKnown = first.fileSize > 0;
+    if (isMesh && isKnown && path != "-" && !plyHoldsTriangles(head, first.fileSize, name))
       (void)readMesh(path, {.format = format});  // its message says where the file ends
   } else if (choice.format->read == readStl) {
-    info = stlInfo(head, first.whole, name);
+    info = stlInfo(head, first.fileSize, name);
   } else if (choice.format->read == readOff) {
-    info = offInfo(head, first.whole, name);
+    info = offInfo(head, first.fileSize, name);
   } else {
     info.format = choice.format->extension;
   }

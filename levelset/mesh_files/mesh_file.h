@@ -28,7 +28,7 @@ struct ReadMeshOptions {
   std::size_t maxMemory = kNoMemoryLimit;
   /// Receives the names of attributes that a TriMesh cannot hold: "colours of faces". Unused when
   /// `attributes` is false.
-  std::vector<std::string>* leftAside = nullptr;
+  std::vector<std::string>* unsupported = nullptr;
   Progress progress = {};
 };
 

@@ -23,7 +23,8 @@ bool fitsFloat(double x) {
 }
 
 template <typename Vector>
-void requireNumbers(const std::string& name, const Vector& numbers, const char* what, Place place) {
+void requireNumbers(const std::string& name, const Vector& numbers, const char* what,
+                    FilePosition place) {
   for (unsigned axis = 0; axis < Vector::dimensions(); ++axis)
     if (const auto number = numbers[static_cast<int>(axis)]; !std::isfinite(number))
       failAt(name, place,
@@ -41,7 +42,7 @@ double extremeNumber(const char* first, const char* last) {
 
 }  // namespace
 
-void failAt(const std::string& name, Place place, const std::string& what) {
+void failAt(const std::string& name, FilePosition place, const std::string& what) {
   throw InvalidInput(fmt::format("read: {}, {} {}: {}", name, place.unit, place.number, what));
 }
 
@@ -54,8 +55,8 @@ void requireText(std::string_view input, const std::string& name, const char* fo
     failFile(name, fmt::format("holds binary data, not {} text; give its actual format", format));
 }
 
-void requireNothingBehind(std::string_view input, std::size_t end, const std::string& name,
-                          const std::string& what) {
+void requireNoTrailingData(std::string_view input, std::size_t end, const std::string& name,
+                           const std::string& what) {
   const std::size_t more = input.find_first_not_of(" \t\r\n\f\v", end);
   if (more == std::string_view::npos) return;
   failFile(name, fmt::format("has data after {}, at byte {} of {}; its header is damaged or "
@@ -106,11 +107,11 @@ void MeshBuilder::requireMore(double bytes) const {
   requireMemory(static_cast<double>(now) + bytes, options_.maxMemory, "read");
 }
 
-void MeshBuilder::leaveAside(std::string what) {
-  if (options_.leftAside) options_.leftAside->push_back(std::move(what));
+void MeshBuilder::noteUnsupported(std::string what) {
+  if (options_.unsupported) options_.unsupported->push_back(std::move(what));
 }
 
-void MeshBuilder::addVertex(double x, double y, double z, Place place, const char* at) {
+void MeshBuilder::addVertex(double x, double y, double z, FilePosition place, const char* at) {
   for (const double c : {x, y, z}) {
     if (std::abs(c) <= kMaxCoordinate) continue;
     const bool finite = std::isfinite(c);
@@ -124,29 +125,29 @@ void MeshBuilder::addVertex(double x, double y, double z, Place place, const cha
   tick(at);
 }
 
-void MeshBuilder::addNormal(const Imath::V3d& normal, Place place) {
+void MeshBuilder::addNormal(const Imath::V3d& normal, FilePosition place) {
   requireNumbers(name_, normal, "normal", place);
   mesh_.attributes.normals.push_back(normal);
 }
 
-void MeshBuilder::addUv(const Imath::V2d& uv, Place place) {
+void MeshBuilder::addUv(const Imath::V2d& uv, FilePosition place) {
   requireNumbers(name_, uv, "texture coordinate", place);
   mesh_.attributes.uvs.push_back(uv);
 }
 
-void MeshBuilder::addColor(const Imath::V4f& color, Place place) {
+void MeshBuilder::addColor(const Imath::V4f& color, FilePosition place) {
   requireNumbers(name_, color, "colour", place);
   mesh_.attributes.colors.push_back(color);
 }
 
-void MeshBuilder::noteIndex(std::uint64_t index, Place place) {
+void MeshBuilder::noteIndex(std::uint64_t index, FilePosition place) {
   if (index < highestIndex_ || (index == highestIndex_ && highestNumber_ != 0)) return;
   highestIndex_ = index;
   highestUnit_ = place.unit;
   highestNumber_ = place.number;
 }
 
-std::uint64_t MeshBuilder::splitVertex(std::uint64_t vertex, Place place) {
+std::uint64_t MeshBuilder::splitVertex(std::uint64_t vertex, FilePosition place) {
   noteIndex(vertex, place);
   splitVertices_.push_back(static_cast<std::uint32_t>(vertex));
   // The placeholder counts down from the maximum until all vertices are known: kMaxIndex - n fits a
@@ -172,7 +173,8 @@ void MeshBuilder::placeSplitVertices() {
     mesh_.positions.push_back(mesh_.positions[vertex]);
 }
 
-void MeshBuilder::addFace(std::span<const std::uint64_t> corners, Place place, const char* at) {
+void MeshBuilder::addFace(std::span<const std::uint64_t> corners, FilePosition place,
+                          const char* at) {
   for (const std::uint64_t corner : corners)
     if ((corner & kSplit) == 0) noteIndex(corner, place);
   if (corners.size() > 3)

@@ -16,13 +16,13 @@
 namespace levelset {
 
 /// Position in a file, for messages: "line 12", "vertex 3".
-struct Place {
+struct FilePosition {
   const char* unit;
   std::size_t number;
 };
 
 /// @throws InvalidInput: "read: 'x.ply', line 12: <what>"
-[[noreturn]] void failAt(const std::string& name, Place place, const std::string& what);
+[[noreturn]] void failAt(const std::string& name, FilePosition place, const std::string& what);
 /// @throws InvalidInput: "read: 'x.ply' <what>"
 [[noreturn]] void failFile(const std::string& name, const std::string& what);
 
@@ -43,18 +43,18 @@ class MeshBuilder {
   void declarePrecision(CoordinatePrecision precision);
 
   /// Adds a vertex. `at` is the current reading position, for the progress.
-  void addVertex(double x, double y, double z, Place place, const char* at);
+  void addVertex(double x, double y, double z, FilePosition place, const char* at);
   /// Adds an attribute of the last vertex. @throws InvalidInput for numbers that are not finite
-  void addNormal(const Imath::V3d& normal, Place place);
-  void addUv(const Imath::V2d& uv, Place place);
-  void addColor(const Imath::V4f& color, Place place);
+  void addNormal(const Imath::V3d& normal, FilePosition place);
+  void addUv(const Imath::V2d& uv, FilePosition place);
+  void addColor(const Imath::V4f& color, FilePosition place);
   [[nodiscard]] bool wantsAttributes() const { return options_.attributes; }
   [[nodiscard]] MeshAttributes& attributes() { return mesh_.attributes; }
   /// Records that the file has attributes that the caller does not want.
   void dropAttributes() { droppedAttributes_ = true; }
   [[nodiscard]] bool droppedAttributes() const { return droppedAttributes_; }
   /// Reports an attribute that a TriMesh cannot hold.
-  void leaveAside(std::string what);
+  void noteUnsupported(std::string what);
   /// Sets the memory that the reader uses besides the mesh.
   void noteBytes(std::size_t bytes) { readerBytes_ = bytes; }
   [[nodiscard]] std::size_t splitCount() const { return splitVertices_.size(); }
@@ -63,10 +63,10 @@ class MeshBuilder {
   /// Adds a duplicate of a vertex, which may not have been read yet.
   /// @return a placeholder for the corners of faces; the final number of the n-th duplicate is
   ///         vertexCount() + n
-  [[nodiscard]] std::uint64_t splitVertex(std::uint64_t vertex, Place place);
+  [[nodiscard]] std::uint64_t splitVertex(std::uint64_t vertex, FilePosition place);
 
   /// Adds a face. Corners count from 0; faces with fewer than three corners are skipped.
-  void addFace(std::span<const std::uint64_t> corners, Place place, const char* at);
+  void addFace(std::span<const std::uint64_t> corners, FilePosition place, const char* at);
   /// Completes the mesh.
   /// @throws InvalidInput when an index is out of range or there is no triangle
   [[nodiscard]] TriMesh finish();
@@ -76,7 +76,7 @@ class MeshBuilder {
     std::size_t firstTriangle, corners, place;
   };
   void tick(const char* at);
-  void noteIndex(std::uint64_t index, Place place);
+  void noteIndex(std::uint64_t index, FilePosition place);
   void placeSplitVertices();
   void splitPolygons();
 
@@ -108,7 +108,7 @@ class TextCursor {
  public:
   TextCursor(std::string_view text, const std::string& name, std::size_t firstLine = 1);
 
-  [[nodiscard]] Place place() const { return {"line", line_}; }
+  [[nodiscard]] FilePosition place() const { return {"line", line_}; }
   [[nodiscard]] const char* at() const { return p_; }
   [[nodiscard]] std::size_t remaining() const { return static_cast<std::size_t>(end_ - p_); }
   [[nodiscard]] bool atEnd() const { return p_ == end_; }
@@ -169,8 +169,8 @@ void requireText(std::string_view input, const std::string& name, const char* fo
 
 /// Refuses data after the elements that the header promises: the header then promises too few.
 /// @param what  the data that has been read: "the 12 triangles that its header promises"
-void requireNothingBehind(std::string_view input, std::size_t end, const std::string& name,
-                          const std::string& what);
+void requireNoTrailingData(std::string_view input, std::size_t end, const std::string& name,
+                           const std::string& what);
 
 void readPly(std::string_view input, MeshBuilder& builder);
 void readObj(std::string_view input, MeshBuilder& builder);

@@ -24,13 +24,13 @@ class Seams {
   static constexpr std::uint32_t kNone = 0xffffffffu;
   using Pair = std::array<std::uint32_t, 2>;  // indices of texture coordinate and normal
 
-  /// @param mostVertices  maximum number of vertices in a file of that size; larger indices are
+  /// @param maxVertices  maximum number of vertices in a file of that size; larger indices are
   ///         invalid
-  Seams(MeshBuilder& builder, std::size_t mostVertices)
-      : builder_(builder), mostVertices_(mostVertices) {}
+  Seams(MeshBuilder& builder, std::size_t maxVertices)
+      : builder_(builder), maxVertices_(maxVertices) {}
 
-  std::uint64_t corner(std::uint64_t vertex, const Pair& pair, Place place) {
-    if (pair == kNeither || vertex >= mostVertices_) return vertex;
+  std::uint64_t corner(std::uint64_t vertex, const Pair& pair, FilePosition place) {
+    if (pair == kNeither || vertex >= maxVertices_) return vertex;
     if (vertex >= first_.size()) first_.resize(vertex + 1, kNeither);
     if (first_[vertex] == kNeither) first_[vertex] = pair;
     if (first_[vertex] == pair) return vertex;
@@ -51,9 +51,9 @@ class Seams {
     for (const Key& split : splits_) result.push_back(split.pair);
     return result;
   }
-  /// Number of duplicate vertices; splitOf(n) is the original of the n-th one.
+  /// Number of duplicate vertices; originalOf(n) is the original of the n-th one.
   [[nodiscard]] std::size_t splitCount() const { return splits_.size(); }
-  [[nodiscard]] std::uint64_t splitOf(std::size_t n) const { return splits_[n].vertex; }
+  [[nodiscard]] std::uint64_t originalOf(std::size_t n) const { return splits_[n].vertex; }
 
   [[nodiscard]] std::size_t bytes() const {
     constexpr std::size_t kNode = 64;
@@ -78,7 +78,7 @@ class Seams {
   };
 
   MeshBuilder& builder_;
-  std::size_t mostVertices_;
+  std::size_t maxVertices_;
   std::vector<Pair> first_;
   std::vector<Key> splits_;
   std::unordered_map<Key, std::uint64_t, Hash> others_;
@@ -94,7 +94,7 @@ class ObjReader {
       if (cursor_.skipBlanks('#', true)) readStatement();
       cursor_.skipLine();
     }
-    if (builder_.wantsAttributes()) giveAttributes();
+    if (builder_.wantsAttributes()) storeAttributes();
   }
 
  private:
@@ -106,11 +106,11 @@ class ObjReader {
                              kNormal = {"normal", "the index of a normal"};
 
   /// References of faces to one list, and the position of the greatest index.
-  struct Named {
+  struct References {
     std::uint64_t count = 0;
-    Place place{"line", 0};
+    FilePosition place{"line", 0};
     std::vector<bool> seen;  ///< flags of the entries that preceded their faces
-    void note(std::uint64_t index, std::size_t soFar, Place at) {
+    void note(std::uint64_t index, std::size_t soFar, FilePosition at) {
       if (index < soFar) {
         if (seen.size() < soFar) seen.resize(soFar);
         seen[index] = true;
@@ -122,7 +122,7 @@ class ObjReader {
       place = at;
     }
     bool isAhead = false;  ///< true when a face preceded an entry that it refers to
-    [[nodiscard]] std::size_t unseen(std::size_t all) const {
+    [[nodiscard]] std::size_t unreferenced(std::size_t all) const {
       if (isAhead) return 0;  // unknown
       return all - static_cast<std::size_t>(std::count(seen.begin(), seen.end(), true));
     }
@@ -137,18 +137,19 @@ class ObjReader {
     convert::ValueTable<Vector> table{all, 0};
     void add(const Vector& value) {
       all.push_back(value);
-      const auto index = static_cast<std::uint32_t>(std::min<std::size_t>(all.size(), kMost) - 1);
-      first.push_back(all.size() <= kMost ? table.findOrEnter(value, index) : index);
+      const auto index =
+          static_cast<std::uint32_t>(std::min<std::size_t>(all.size(), kMaxCount) - 1);
+      first.push_back(all.size() <= kMaxCount ? table.findOrInsert(value, index) : index);
     }
     /// Index of the first equal value. A value that has not been read yet represents itself.
     [[nodiscard]] std::uint32_t firstEqual(std::uint64_t index) const {
       if (index < first.size()) return first[index];
-      return static_cast<std::uint32_t>(std::min<std::uint64_t>(index, kMost));
+      return static_cast<std::uint32_t>(std::min<std::uint64_t>(index, kMaxCount));
     }
     [[nodiscard]] std::size_t bytes() const {
       return all.capacity() * sizeof(Vector) + first.capacity() * sizeof(first[0]) + table.bytes();
     }
-    static constexpr std::size_t kMost = Seams::kNone - 1;
+    static constexpr std::size_t kMaxCount = Seams::kNone - 1;
   };
 
   void readStatement() {
@@ -166,7 +167,7 @@ class ObjReader {
 
   double readNumber(const char* what) {
     cursor_.skipBlanks('#', true);
-    const Place place = cursor_.place();
+    const FilePosition place = cursor_.place();
     const double number = cursor_.number(what);
     if (!std::isfinite(number)) failAt(builder_.name(), place, notFinite(what, number));
     return number;
@@ -203,7 +204,7 @@ class ObjReader {
   }
 
   void readVertex() {
-    const Place place = cursor_.place();
+    const FilePosition place = cursor_.place();
     double position[3];
     for (double& coordinate : position) {
       cursor_.skipBlanks('#', true);
@@ -218,7 +219,7 @@ class ObjReader {
   void readColor() {
     std::array<double, 4> numbers = {1, 1, 1, 1};
     std::size_t count = 0;
-    const Place place = cursor_.place();
+    const FilePosition place = cursor_.place();
     for (; count < 4 && cursor_.skipBlanks('#', true); ++count)
       numbers[count] = cursor_.number("a weight or colour after the coordinates");
     if (count < 3) return;
@@ -233,7 +234,7 @@ class ObjReader {
   }
 
   void readFace() {
-    const Place place = cursor_.place();
+    const FilePosition place = cursor_.place();
     corners_.clear();
     while (cursor_.skipBlanks('#', true)) {
       const std::uint64_t vertex = readIndex(kVertex, builder_.vertexCount());
@@ -251,14 +252,14 @@ class ObjReader {
   }
 
   /// Reads the index of a texture coordinate (part 0) or of a normal (part 1).
-  void readPart(std::size_t part, Place place, Seams::Pair& pair) {
+  void readPart(std::size_t part, FilePosition place, Seams::Pair& pair) {
     if (!builder_.wantsAttributes() || part > 1) {
       static_cast<void>(cursor_.integer("the index of a texture coordinate or normal"));
       return;
     }
     const std::size_t soFar = part == 0 ? uvs_.all.size() : normals_.all.size();
     const std::uint64_t index = readIndex(part == 0 ? kUv : kNormal, soFar);
-    (part == 0 ? namedUvs_ : namedNormals_).note(index, soFar, place);
+    (part == 0 ? uvReferences_ : normalReferences_).note(index, soFar, place);
     pair[part] = part == 0 ? uvs_.firstEqual(index) : normals_.firstEqual(index);
   }
 
@@ -279,7 +280,7 @@ class ObjReader {
     return static_cast<std::uint64_t>(count + index);
   }
 
-  void requireNamed(const Named& named, std::size_t count, const char* what) const {
+  void checkReferences(const References& named, std::size_t count, const char* what) const {
     if (named.count <= count) return;
     failAt(builder_.name(), named.place,
            fmt::format("a face refers to {} {} of {}; repair the mesh, or read it without "
@@ -287,14 +288,14 @@ class ObjReader {
                        what, named.count, count));
   }
 
-  void giveAttributes() {
-    requireNamed(namedUvs_, uvs_.all.size(), "texture coordinate");
-    requireNamed(namedNormals_, normals_.all.size(), "normal");
-    tellUnnamed(namedUvs_, uvs_.all.size(), "texture coordinates");
-    tellUnnamed(namedNormals_, normals_.all.size(), "normals");
+  void storeAttributes() {
+    checkReferences(uvReferences_, uvs_.all.size(), "texture coordinate");
+    checkReferences(normalReferences_, normals_.all.size(), "normal");
+    reportUnreferenced(uvReferences_, uvs_.all.size(), "texture coordinates");
+    reportUnreferenced(normalReferences_, normals_.all.size(), "normals");
     MeshAttributes& attributes = builder_.attributes();
     const std::size_t count = builder_.vertexCount(), whole = count + builder_.splitCount();
-    const bool hasUvs = namedUvs_.count > 0, hasNormals = namedNormals_.count > 0,
+    const bool hasUvs = uvReferences_.count > 0, hasNormals = normalReferences_.count > 0,
                hasColors = !colors_.empty();
     const std::size_t perVertex =
         (hasUvs ? sizeof(Imath::V2d) : 0) + (hasNormals ? sizeof(Imath::V3d) : 0) +
@@ -317,20 +318,21 @@ class ObjReader {
         allFloat = allFloat && Imath::V3d(Imath::V3f(normal)) == normal;
       attributes.precision = allFloat ? CoordinatePrecision::Float : CoordinatePrecision::Double;
     }
-    if (hasColors) giveColors(attributes, count, whole);
+    if (hasColors) storeColors(attributes, count, whole);
     builder_.noteBytes(0);  // the reader's lists are freed before the mesh is completed
   }
 
-  void tellUnnamed(const Named& named, std::size_t count, const char* what) {
-    if (const std::size_t unseen = named.unseen(count))
-      builder_.leaveAside(fmt::format("{} of {} {}, which no face refers to", unseen, count, what));
+  void reportUnreferenced(const References& named, std::size_t count, const char* what) {
+    if (const std::size_t unreferenced = named.unreferenced(count))
+      builder_.noteUnsupported(
+          fmt::format("{} of {} {}, which no face refers to", unreferenced, count, what));
   }
 
-  void giveColors(MeshAttributes& attributes, std::size_t count, std::size_t whole) {
+  void storeColors(MeshAttributes& attributes, std::size_t count, std::size_t whole) {
     colors_.reserve(whole);
     colors_.resize(count, Imath::V4f(1));
     for (std::size_t n = 0; n < seams_.splitCount(); ++n)
-      if (seams_.splitOf(n) < count) colors_.push_back(colors_[seams_.splitOf(n)]);
+      if (seams_.originalOf(n) < count) colors_.push_back(colors_[seams_.originalOf(n)]);
     const bool allBytes = std::all_of(colors_.begin(), colors_.end(), isOfBytes);
     attributes.colorPrecision = allBytes ? ColorPrecision::Byte : ColorPrecision::Float;
     attributes.hasAlpha = hasAlpha_;
@@ -353,7 +355,7 @@ class ObjReader {
   Values<Imath::V2d> uvs_;
   Values<Imath::V3d> normals_;
   std::vector<Imath::V4f> colors_;
-  Named namedUvs_, namedNormals_;
+  References uvReferences_, normalReferences_;
   bool hasAlpha_ = false;
 };
 

@@ -41,13 +41,13 @@ Counts readHeader(TextCursor& cursor) {
   return {static_cast<std::size_t>(counts[0]), static_cast<std::size_t>(counts[1])};
 }
 
-constexpr std::size_t kLeastVertex = 6, kLeastFace = 2;  // "0 0 0\n", "0\n"
+constexpr std::size_t kMinVertexSize = 6, kMinFaceSize = 2;  // "0 0 0\n", "0\n"
 
 /// @param remaining  bytes after the header
 void checkCounts(const Counts& counts, std::size_t remaining, const std::string& name) {
   const std::size_t left = remaining + 1;  // the last line may lack its line end
-  if (counts.vertices <= left / kLeastVertex &&
-      counts.faces <= (left - counts.vertices * kLeastVertex) / kLeastFace)
+  if (counts.vertices <= left / kMinVertexSize &&
+      counts.faces <= (left - counts.vertices * kMinVertexSize) / kMinFaceSize)
     return;
   failFile(name, fmt::format(
                      "promises {} vertices and {} faces, more than its {} bytes of data can hold; "
@@ -87,7 +87,7 @@ class OffReader {
   void readFace() {
     corners_.clear();
     cursor_.skipToToken('#');
-    const Place place = cursor_.place();
+    const FilePosition place = cursor_.place();
     for (std::int64_t left = readWhole("the number of corners"); left > 0; --left) {
       cursor_.skipToToken('#');
       corners_.push_back(static_cast<std::uint64_t>(readWhole("the index of a vertex")));

@@ -41,7 +41,7 @@ class BinarySource {
     index_ = index;
   }
   void end() {}
-  [[nodiscard]] Place place() const { return {element_->name.c_str(), index_}; }
+  [[nodiscard]] FilePosition place() const { return {element_->name.c_str(), index_}; }
   [[nodiscard]] const char* at() const { return p_; }
 
   double value(Type type) {
@@ -107,7 +107,7 @@ class AsciiSource {
              fmt::format("there are more values than an element '{}' has; export the mesh again",
                          element_->name));
   }
-  [[nodiscard]] Place place() const { return cursor_.place(); }
+  [[nodiscard]] FilePosition place() const { return cursor_.place(); }
   [[nodiscard]] const char* at() const { return cursor_.at(); }
 
   double value(Type type) {
@@ -181,7 +181,7 @@ class ElementReader {
   }
 
   void addVertex() {
-    const Place place = source_.place();
+    const FilePosition place = source_.place();
     builder_.addVertex(of(Role::X), of(Role::Y), of(Role::Z), place, source_.at());
     if (hasNormals_) builder_.addNormal({of(Role::Nx), of(Role::Ny), of(Role::Nz)}, place);
     if (hasUvs_) builder_.addUv({of(Role::U), of(Role::V)}, place);
@@ -257,8 +257,8 @@ void readElements(const Header& header, std::string_view data, MeshBuilder& buil
   Source source(data, header.lines, builder.name());
   ElementReader<Source> reader(source, builder);
   for (const Element& element : header.elements) reader.read(element);
-  requireNothingBehind(data, static_cast<std::size_t>(source.at() - data.data()), builder.name(),
-                       "the elements that its header promises");
+  requireNoTrailingData(data, static_cast<std::size_t>(source.at() - data.data()), builder.name(),
+                        "the elements that its header promises");
 }
 
 /// Marks all attributes as skipped.
@@ -303,7 +303,7 @@ void reserveElements(const Header& header, std::size_t dataSize, MeshBuilder& bu
 void readPly(std::string_view input, MeshBuilder& builder) {
   Header header = ply::readHeader(input, builder.name());
   if (builder.wantsAttributes()) {
-    for (const std::string& what : header.leftAside) builder.leaveAside(what);
+    for (const std::string& what : header.unsupported) builder.noteUnsupported(what);
   } else if (skipAttributes(header)) {
     builder.dropAttributes();
   }

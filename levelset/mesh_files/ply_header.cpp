@@ -145,17 +145,18 @@ class HeaderReader {
     }
     if (property.role >= Role::Red && property.role <= Role::Alpha && !isColorType(property.type))
       property.role = Role::Skip;
-    if (element.name == "face") noteOfFaces(name);
+    if (element.name == "face") noteFaceAttributes(name);
     element.properties.push_back(property);
   }
 
   static int familyOf(std::string_view name) { return name.size() > 1 ? 3 : name < "u" ? 2 : 1; }
 
-  void noteOfFaces(std::string_view name) {
-    if (name == "texcoord") header_.leftAside.insert("texture coordinates of faces");
+  void noteFaceAttributes(std::string_view name) {
+    if (name == "texcoord") header_.unsupported.insert("texture coordinates of faces");
     if (name == "red" || name == "green" || name == "blue")
-      header_.leftAside.insert("colours of faces");
-    if (name == "nx" || name == "ny" || name == "nz") header_.leftAside.insert("normals of faces");
+      header_.unsupported.insert("colours of faces");
+    if (name == "nx" || name == "ny" || name == "nz")
+      header_.unsupported.insert("normals of faces");
   }
 
   static Role roleOf(std::string_view element, std::string_view name, bool list) {

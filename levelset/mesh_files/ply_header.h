@@ -70,9 +70,9 @@ struct Element {
 struct Header {
   Encoding encoding = Encoding::Ascii;
   std::vector<Element> elements;
-  std::size_t size = 0;                  ///< bytes before the data
-  std::size_t lines = 0;                 ///< lines of the header
-  std::set<std::string> leftAside = {};  ///< names of attributes that a TriMesh cannot hold
+  std::size_t size = 0;                    ///< bytes before the data
+  std::size_t lines = 0;                   ///< lines of the header
+  std::set<std::string> unsupported = {};  ///< names of attributes that a TriMesh cannot hold
 };
 
 /// Reads the header of a PLY file.

@@ -19,12 +19,12 @@ class VertexMerger {
  public:
   explicit VertexMerger(MeshBuilder& builder) : builder_(builder), table_(points_, 1 << 11) {}
 
-  std::uint64_t add(const Imath::V3d& stored, Place place, const char* at) {
+  std::uint64_t add(const Imath::V3d& stored, FilePosition place, const char* at) {
     const Imath::V3d p = stored + Imath::V3d(0);  // −0 + 0 = 0
     if (points_.size() >= std::numeric_limits<std::uint32_t>::max())
       failFile(builder_.name(), "holds more than 4294967294 vertices; split the mesh");
     const auto next = static_cast<std::uint32_t>(points_.size());
-    const std::uint32_t found = table_.findOrEnter(p, next);
+    const std::uint32_t found = table_.findOrInsert(p, next);
     if (found == next) {
       builder_.addVertex(p.x, p.y, p.z, place, at);
       points_.push_back(p);
@@ -63,7 +63,7 @@ bool isBinary(std::string_view input, std::size_t fileSize) {
 
 /// Number of triangles that a file of that size can hold. Checks the number that its header
 /// promises.
-std::size_t roomForFacets(std::string_view head, std::size_t fileSize, const std::string& name) {
+std::size_t facetCapacity(std::string_view head, std::size_t fileSize, const std::string& name) {
   if (fileSize < kStlHeaderSize)
     failFile(name,
              "is neither text that begins with 'solid' nor long enough for a binary "
@@ -79,9 +79,9 @@ std::size_t roomForFacets(std::string_view head, std::size_t fileSize, const std
 }
 
 void readBinary(std::string_view input, MeshBuilder& builder) {
-  const std::size_t held = roomForFacets(input, input.size(), builder.name());
+  const std::size_t held = facetCapacity(input, input.size(), builder.name());
   const std::size_t count = facetCount(input);
-  requireNothingBehind(
+  requireNoTrailingData(
       input, kStlHeaderSize + count * kFacetSize, builder.name(),
       fmt::format("the {} triangles that its header promises (it can hold {})", count, held));
   builder.declarePrecision(CoordinatePrecision::Float);
@@ -92,7 +92,7 @@ void readBinary(std::string_view input, MeshBuilder& builder) {
     const char* facet = input.data() + kStlHeaderSize + i * kFacetSize;
     float numbers[9];
     std::memcpy(numbers, facet + 12, sizeof numbers);  // after the normal
-    const Place place{"triangle", i};
+    const FilePosition place{"triangle", i};
     for (std::size_t k = 0; k < 3; ++k)
       corners[k] =
           merger.add({numbers[3 * k], numbers[3 * k + 1], numbers[3 * k + 2]}, place, facet);
@@ -205,7 +205,7 @@ void readStl(std::string_view input, MeshBuilder& builder) {
 
 MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize, const std::string& name) {
   if (!isBinary(head, fileSize)) return {"stl, ascii", 0, 0};
-  if (fileSize > 0) (void)roomForFacets(head, fileSize, name);
+  if (fileSize > 0) (void)facetCapacity(head, fileSize, name);
   return {"stl, binary", 0, head.size() >= kStlHeaderSize ? facetCount(head) : 0};
 }
 

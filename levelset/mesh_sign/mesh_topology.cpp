@@ -12,7 +12,7 @@ std::vector<std::uint32_t> weld(const std::vector<Imath::V3d>& positions) {
   PositionTable table(positions, positions.size());
   std::vector<std::uint32_t> first(positions.size());
   for (std::uint32_t v = 0; v < positions.size(); ++v)
-    first[v] = table.findOrEnter(positions[v], v);
+    first[v] = table.findOrInsert(positions[v], v);
   return first;
 }
 

@@ -85,7 +85,7 @@ bool segmentMeets(const V3d& p, const V3d& q, int sideP, int sideQ, const Triang
 /// Returns true when a line through the common first corner separates the two triangles in some
 /// axis projection. They then share that corner only. This decides nearly all pairs of a flat fan,
 /// for which orient3d would need exact arithmetic.
-bool partAtCorner(const TriangleCorners& a, const TriangleCorners& b) {
+bool separateAtCorner(const TriangleCorners& a, const TriangleCorners& b) {
   const int axis = projectionAxis(a);
   const V2d corner = dropAxis(a[0], axis);
   const std::array<V2d, 2> p = {dropAxis(a[1], axis), dropAxis(a[2], axis)};
@@ -128,7 +128,7 @@ bool trianglesMeet(const Triangle& first, const Triangle& second,
     return convert::orient2d(p, q, dropAxis(a[2], axis)) ==
            convert::orient2d(p, q, dropAxis(b[2], axis));
   }
-  if (shared == 1 && partAtCorner(a, b)) return false;
+  if (shared == 1 && separateAtCorner(a, b)) return false;
   std::array<int, 3> sideA{}, sideB{};  // sides of the other triangle's plane
   for (std::size_t i = shared; i < 3; ++i) sideA[i] = convert::orient3d(b[0], b[1], b[2], a[i]);
   if (shared == 0 && sideA[0] == sideA[1] && sideA[1] == sideA[2] && sideA[0] != 0) return false;

@@ -115,7 +115,7 @@ double SignField::winding(const V3i& point) const {
 
 void SignField::winding(const V3i& origin, BlockWinding& out) const {
   std::array<CrossingSum, 64> sums;
-  const bool clear = isClearIn(origin);
+  const bool clear = isUnambiguousIn(origin);
   for (int y = 0; y < kBlockDim; ++y) {
     lines_.slab(origin.x, origin.y + y, origin.z, sums.data());
     for (int x = 0; x < kBlockDim; ++x)
@@ -127,7 +127,7 @@ void SignField::winding(const V3i& origin, BlockWinding& out) const {
   }
 }
 
-bool SignField::isClearIn(const V3i& origin) const {
+bool SignField::isUnambiguousIn(const V3i& origin) const {
   return !isOpen() || field_.bound(V3d(origin) + V3d(3.5), 6.07) < 0.25;
 }
 

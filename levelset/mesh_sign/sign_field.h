@@ -44,7 +44,7 @@ class SignField {
 
   /// Returns true when the winding number lies within 1/4 of an integer throughout the block. The
   /// sign is then unambiguous and no open surface passes through.
-  [[nodiscard]] bool isClearIn(const Imath::V3i& origin) const;
+  [[nodiscard]] bool isUnambiguousIn(const Imath::V3i& origin) const;
 
  private:
   [[nodiscard]] double refine(double integer, const Imath::V3d& point) const;

@@ -24,8 +24,8 @@ using PatchMaker = std::function<std::vector<Patch>(
     const levelset::NarrowBand& base, std::span<const Footprint> footprints,
     std::span<const Footprint> origins, const levelset::Progress& progress)>;
 
-/// Options that rebuild a patch of unknown origin with as many particles as it has: along ∇φ if all
-/// layers have equal counts, else as a separate relaxed net on each layer.
+/// Options that rebuild a patch of unknown origin with as many particles as it has. If all layers
+/// have equal counts, particles follow ∇φ. Otherwise each layer is a separate relaxed net.
 [[nodiscard]] PatchOptions optionsLike(const Patch& patch);
 
 /// Patches at one frame, on the base of that frame.
@@ -45,8 +45,8 @@ struct AnimationOptions {
   CarryRule carry = CarryRule::Corners;
   BandFrames bases = {};  ///< empty: the base does not change
   PatchMaker make = {};   ///< builds patches like those of the first key
-  /// Factor for the drift warning: a warning is issued when the sides or diagonals of a carried
-  /// patch have changed by more than this factor since its key.
+  /// Factor for the drift warning. It is issued when the sides or diagonals of a carried patch have
+  /// changed by more than this factor since its key.
   double driftWarning = 1.5;
   levelset::Progress progress = {};
 };

@@ -33,15 +33,15 @@ std::optional<V3d> geodesicTo(const SurfaceField& field, const SurfaceFrame& fra
   const std::vector<V3d> path = geodesic(field, 0, frame.centre, goal);
   if (path.size() < 2) return {};
   V3d best = frame.inPlane(path[1] - path[0]).normalized() * pathLength(path);
-  V3d way = best, correction(0);
+  V3d offset = best, correction(0);
   double miss = HUGE_VAL, step = 1;
   for (int shot = 0; shot < kMostShots && miss > kHit * field.voxelSize(); ++shot) {
-    SurfaceWalk walk(field, 0, frame.centre, way);
-    const bool isWhole = walk.advance(way.length());
+    SurfaceWalk walk(field, 0, frame.centre, offset);
+    const bool isWhole = walk.advance(offset.length());
     const V3d gap = goal - walk.position();
     if (isWhole && gap.length() < miss) {
       miss = gap.length();
-      best = way;
+      best = offset;
       const V3d ahead = best.normalized(), aside = frame.normal.cross(ahead);
       correction = ahead * gap.dot(walk.direction()) +
                    aside * gap.dot(walk.normal().cross(walk.direction()));
@@ -49,7 +49,7 @@ std::optional<V3d> geodesicTo(const SurfaceField& field, const SurfaceFrame& fra
       step *= 0.5;
     }
     if (!std::isfinite(miss)) return {};
-    way = best + correction * step;
+    offset = best + correction * step;
   }
   if (miss > kNear * field.voxelSize()) return {};
   return best;
@@ -57,8 +57,8 @@ std::optional<V3d> geodesicTo(const SurfaceField& field, const SurfaceFrame& fra
 
 }  // namespace
 
-V3d SurfaceFrame::inPlane(const V3d& way) const {
-  return way - normal * normal.dot(way);
+V3d SurfaceFrame::inPlane(const V3d& offset) const {
+  return offset - normal * normal.dot(offset);
 }
 
 V3d SurfaceFrame::turned(double angle) const {
@@ -70,8 +70,8 @@ std::optional<std::array<V3d, 4>> cornersFrom(const SurfaceField& field, const S
   const V3d v = frame.normal.cross(frame.direction);
   std::array<V3d, 4> corners;
   for (std::size_t i = 0; i < 4; ++i) {
-    const V3d way = frame.direction * reach[i].x + v * reach[i].y;
-    const std::optional<V3d> corner = walkStraight(field, 0, frame.centre, way, way.length());
+    const V3d offset = frame.direction * reach[i].x + v * reach[i].y;
+    const std::optional<V3d> corner = walkStraight(field, 0, frame.centre, offset, offset.length());
     if (!corner) return {};
     corners[i] = *corner;
   }
@@ -109,19 +109,19 @@ Footprint footprintOf(const NarrowBand& base, const PatchOutline& outline) {
 Footprint withReach(const NarrowBand& base, Footprint footprint, bool keepsDirection) {
   const SurfaceField field(base);
   SurfaceFrame frame = frameOf(footprint);
-  std::array<V3d, 4> ways;
+  std::array<V3d, 4> offsets;
   for (std::size_t i = 0; i < 4; ++i) {
-    const std::optional<V3d> way = geodesicTo(field, frame, footprint.corners[i]);
-    if (!way) return footprint;
-    ways[i] = *way;
+    const std::optional<V3d> offset = geodesicTo(field, frame, footprint.corners[i]);
+    if (!offset) return footprint;
+    offsets[i] = *offset;
   }
-  const V3d u = ways[1] + ways[2] - ways[0] - ways[3];
-  if (!keepsDirection && u.length() > 1e-3 * ways[0].length()) frame.direction = u.normalized();
+  const V3d u = offsets[1] + offsets[2] - offsets[0] - offsets[3];
+  if (!keepsDirection && u.length() > 1e-3 * offsets[0].length()) frame.direction = u.normalized();
   footprint.direction = frame.direction;
   const V3d v = frame.normal.cross(frame.direction);
   footprint.reach.emplace();
   for (std::size_t i = 0; i < 4; ++i)
-    (*footprint.reach)[i] = {ways[i].dot(frame.direction), ways[i].dot(v)};
+    (*footprint.reach)[i] = {offsets[i].dot(frame.direction), offsets[i].dot(v)};
   return footprint;
 }
 
@@ -172,10 +172,10 @@ Drift driftBetween(const Footprint& first, const Footprint& now) {
 }
 
 V3d movedAlong(const Footprint& from, const Footprint& to, const V3d& point) {
-  const V3d way = point - from.centre;
-  return to.centre + to.direction * way.dot(from.direction) +
-         to.normal.cross(to.direction) * way.dot(from.normal.cross(from.direction)) +
-         to.normal * way.dot(from.normal);
+  const V3d offset = point - from.centre;
+  return to.centre + to.direction * offset.dot(from.direction) +
+         to.normal.cross(to.direction) * offset.dot(from.normal.cross(from.direction)) +
+         to.normal * offset.dot(from.normal);
 }
 
 }  // namespace mapping

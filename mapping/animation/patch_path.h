@@ -17,8 +17,8 @@ struct SurfaceFrame;
 /// The centre moves along a geodesic. u is transported along it, and the angle that remains at the
 /// end is distributed evenly, so that patches may rotate. Under CarryRule::Corners each corner has
 /// its own geodesic, as in the thesis. It is straightened from a path beside the centre's path, so
-/// that around a pipe all corners go the same way. Under CarryRule::Rigid the shape is interpolated
-/// evenly.
+/// that around a pipe all corners go around the same side. Under CarryRule::Rigid the shape is
+/// interpolated evenly.
 class PatchPath {
  public:
   /// Computes the path.

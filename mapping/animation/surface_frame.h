@@ -13,7 +13,7 @@ namespace mapping {
 /// A point on the zero set with a tangent direction and the normal.
 struct SurfaceFrame {
   Imath::V3d centre, direction, normal;  ///< point; unit direction; unit normal
-  [[nodiscard]] Imath::V3d inPlane(const Imath::V3d& way) const;
+  [[nodiscard]] Imath::V3d inPlane(const Imath::V3d& offset) const;
   /// The direction rotated about the normal, by radians anticlockwise seen from outside.
   [[nodiscard]] Imath::V3d turned(double angle) const;
 };

@@ -88,13 +88,13 @@ CubeSlopes slopesIn(const RbfCubes& cubes, const RbfCube& cube) {
   const double radius = cube.radius();
   for (const std::uint32_t i : cube.near) {
     const RbfParticle& particle = cubes.particles()[i];
-    const V3d way = cube.center - particle.position;
-    const double distance = way.length();
+    const V3d offset = cube.center - particle.position;
+    const double distance = offset.length();
     result.value += particle.weight * distance;
     if (!(distance > 0)) continue;
     const KinkBound bound = kinkBound(radius / distance);
     if (bound.kind == KinkBound::Kind::Any) continue;
-    const V3d n = way / distance;
+    const V3d n = offset / distance;
     for (int k = 0; k < 3; ++k)
       for (int axis = 0; axis < 3; ++axis) result.slopes[k][axis] += particle.weight[k] * n[axis];
     if (bound.kind != KinkBound::Kind::Curved) continue;
@@ -293,8 +293,9 @@ void fillWithin(const RbfCubes& cubes, const V3d& origin, const V3d& sizes, cons
   if (chosen.size() > kFewSamples && cube.near.size() > kFewSamples) {
     std::array<std::vector<std::uint32_t>, 8> parts;
     for (const std::uint32_t n : chosen) {
-      const V3d way = samples[n].position - origin - cube.center;
-      parts[(way.x > 0 ? 1u : 0u) + (way.y > 0 ? 2u : 0u) + (way.z > 0 ? 4u : 0u)].push_back(n);
+      const V3d offset = samples[n].position - origin - cube.center;
+      parts[(offset.x > 0 ? 1u : 0u) + (offset.y > 0 ? 2u : 0u) + (offset.z > 0 ? 4u : 0u)]
+          .push_back(n);
     }
     tbb::parallel_for(0, 8, [&](int bits) {
       auto& part = parts[static_cast<std::size_t>(bits)];

@@ -43,9 +43,10 @@ void requireKnurl(const Knurl& knurl, const V3d& center) {
   }
 }
 
-/// Profile of the relief across the grooves, as heights at stations, four per pitch: the bottom,
-/// the edge of the crest, the middle between two grooves, and the edge of the crest before the next
-/// groove. Stations are numbered continuously, so that neighbouring grooves compute the same bits.
+/// Profile of the relief across the grooves, as heights at four stations per pitch. The stations
+/// are the bottom, the edge of the crest, the middle between two grooves, and the edge of the crest
+/// before the next groove. They are numbered continuously, so that neighbouring grooves compute the
+/// same bits.
 class GrooveStations {
  public:
   explicit GrooveStations(const Knurl& knurl)

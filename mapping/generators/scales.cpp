@@ -113,8 +113,8 @@ class ScaleOutline {
   double half_, rounding_, length_, middle_ = 0, radius_ = 0, aside_ = 0, notch_ = 0;
 };
 
-/// Distance to the pattern in its own frame: the origin is the root of the first scale, in the
-/// middle of the first column; the top of the plate is z = 0.
+/// Distance to the pattern in its own frame. The origin is the root of the first scale, in the
+/// middle of the first column. The top of the plate is z = 0.
 class ScalesField {
  public:
   ScalesField(const Scales& scales, const V3d& origin, double reach)

@@ -110,9 +110,9 @@ std::vector<EmbeddedParticle> embeddedParticles(const Patch& patch, double embed
     const double depth = reach * n / layers, share = depth / step;
     const auto keepsApart = [&](int i, int j, int u, int v) {
       if (!isThere(u, v)) return true;
-      const V3d way = last.beyond(u, v) - last.beyond(i, j);
-      const V3d turn = way - (before.beyond(u, v) - before.beyond(i, j));
-      return (way + turn * share).dot(way) >= kLeastShare * way.length2();
+      const V3d offset = last.beyond(u, v) - last.beyond(i, j);
+      const V3d turn = offset - (before.beyond(u, v) - before.beyond(i, j));
+      return (offset + turn * share).dot(offset) >= kLeastShare * offset.length2();
     };
     for (int j = -rim; j < top + rim; ++j)
       for (int i = -rim; i < right + rim; ++i) {

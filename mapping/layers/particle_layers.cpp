@@ -174,11 +174,11 @@ void addRim(const levelset::NarrowBand& band, ParticleLayer& layer) {
   const auto columns = static_cast<int>(layer.columns), rows = static_cast<int>(layer.rows);
   layer.rim.assign(2 * (layer.columns + layer.rows) + 4, V3d(0));
   const auto onwards = [&](const V3d& last, const V3d& before) {
-    const V3d way = last - before;
+    const V3d offset = last - before;
     constexpr double kMostTurn = 0.5;  // cosine
-    const std::optional<V3d> end = walkStraight(field, layer.height, last, way, way.length());
+    const std::optional<V3d> end = walkStraight(field, layer.height, last, offset, offset.length());
     const bool isAhead = end && field.normal(last).dot(field.normal(*end)) > kMostTurn;
-    return isAhead ? *end : last + way;
+    return isAhead ? *end : last + offset;
   };
   for (int j = 0; j < rows; ++j) {
     layer.rim[layer.rimIndex(-1, j)] = onwards(layer.beyond(0, j), layer.beyond(1, j));

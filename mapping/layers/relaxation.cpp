@@ -120,10 +120,10 @@ V3d springForce(const ParticleLayer& layer, const RestLengths& rest, std::size_t
     if (i < 0 || j < 0 || i >= static_cast<long>(layer.columns) ||
         j >= static_cast<long>(layer.rows))
       continue;
-    const V3d way = layer.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j)) - p;
-    const double length = way.length();
+    const V3d offset = layer.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j)) - p;
+    const double length = offset.length();
     if (length == 0) continue;
-    force += way * (1 - rest.of(spring, column, row) / length);
+    force += offset * (1 - rest.of(spring, column, row) / length);
   }
   return force;
 }

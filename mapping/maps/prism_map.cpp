@@ -122,11 +122,11 @@ class PrismBlock final : public BlockMap {
     const Lattice::Corners world = map_.lattice_.corners(t),
                            texture = map_.lattice_.textureCorners(t);
     const M33d slope = slopes(world, texture);
-    const V3d way = block_.center() - world[0];
+    const V3d offset = block_.center() - world[0];
     Box3d image;
     for (int k = 0; k < 3; ++k) {
       const V3d gradient(slope[k][0], slope[k][1], slope[k][2]);
-      const double middle = texture[0][k] + gradient.dot(way);
+      const double middle = texture[0][k] + gradient.dot(offset);
       double extent = 0;
       for (int i = 0; i < 3; ++i)
         extent += std::abs(gradient.dot(block_.row(i))) * 0.5 * (block_.edge - 1);

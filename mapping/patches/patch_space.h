@@ -21,8 +21,8 @@ struct PatchSpaceOptions {
 
 /// Computes distances to the base up to `height` above a patch, by fast sweeping from the narrow
 /// band in a box around the patch [Brodersen07 §8.2]. If the height is many voxels, the grid is up
-/// to four times coarser: iso-surfaces of φ become smoother with height, and the surface itself is
-/// represented by the base's own band.
+/// to four times coarser. Iso-surfaces of φ become smoother with height, and the base's own band
+/// represents the surface itself.
 /// @throws InvalidInput for an open surface whose band does not reach the height, because it cannot
 ///         be swept
 /// @param border  points on the surface along the sides of the patch

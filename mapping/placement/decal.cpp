@@ -77,11 +77,11 @@ void walkToParticles(const NarrowBand& band, const DecalFrame& frame, double rad
       tbb::blocked_range<std::size_t>(0, layer.positions.size(), 16), [&](const auto& range) {
         const SurfaceField field(band);
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
-          const V3d way = frame.u * (radius * signedShare(n % layer.columns, layer.columns)) +
-                          frame.v * (radius * signedShare(n / layer.columns, layer.rows));
-          const double length = way.length();
+          const V3d offset = frame.u * (radius * signedShare(n % layer.columns, layer.columns)) +
+                             frame.v * (radius * signedShare(n / layer.columns, layer.rows));
+          const double length = offset.length();
           if (length < 1e-9 * radius) continue;
-          SurfaceWalk walk(field, layer.height, frame.center, way);
+          SurfaceWalk walk(field, layer.height, frame.center, offset);
           if (!walk.advance(length)) missing[n] = length - walk.walked();
           layer.positions[n] = walk.position();
         }
@@ -233,8 +233,8 @@ std::vector<std::vector<V3d>> spokes(const NarrowBand& band, const DecalFrame& f
                                      double radius) {
   const SurfaceField field(band);
   std::vector<std::vector<V3d>> result;
-  for (const V3d& way : {frame.u, -frame.u, frame.v, -frame.v}) {
-    SurfaceWalk walk(field, 0, frame.center, way);
+  for (const V3d& offset : {frame.u, -frame.u, frame.v, -frame.v}) {
+    SurfaceWalk walk(field, 0, frame.center, offset);
     std::vector<V3d> path = {frame.center};
     const double pieces = std::ceil(radius / band.voxelSize());
     for (int i = 0; i < static_cast<int>(pieces) && walk.advance(radius / pieces); ++i)

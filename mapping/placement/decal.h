@@ -8,13 +8,13 @@
 namespace mapping {
 
 /// Builds a square patch around one point: u and v run from −radius to radius along the surface. It
-/// uses the exponential map: each particle is the end of the geodesic that starts at the centre in
-/// the particle's direction and has the particle's distance in the (u, v) plane. So distances and
-/// directions from the centre are preserved, and developable surfaces are mapped without
-/// distortion. Each geodesic is traced separately (see SurfaceWalk), because passing coordinates
-/// from neighbour to neighbour [Schmidt06] accumulates errors. With LayerScheme::Reduced each layer
-/// has its own exponential map, around the centre carried along ∇φ. Its size grows with the
-/// distances from the centre to the middles of the sides.
+/// uses the exponential map: each particle is the end of a geodesic from the centre. The geodesic
+/// has the particle's direction and distance in the (u, v) plane. So distances and directions from
+/// the centre are preserved, and developable surfaces are mapped without distortion. Each geodesic
+/// is traced separately (see SurfaceWalk), because passing coordinates from neighbour to neighbour
+/// [Schmidt06] accumulates errors. With LayerScheme::Reduced each layer has its own exponential
+/// map, around the centre carried along ∇φ. Its size grows with the distances from the centre to
+/// the middles of the sides.
 /// @param at         centre, projected along φ to the zero set
 /// @param direction  direction of u; its tangential part is used
 /// @param radius     half of the square's side, along the surface, world units
@@ -22,8 +22,8 @@ namespace mapping {
 /// @param options    with mirror, v runs in the opposite direction; sides must be empty
 /// @throws UsageError for a direction along the normal, and lengths that are not positive
 /// @throws InvalidInput if the surface breaks off within the radius, if the decal folds or overlaps
-///         itself, and where it goes around an edge thinner than its particle spacing; the message
-///         suggests a radius that works
+///         itself, or where an edge is thinner than the particle spacing. The message suggests a
+///         radius that works.
 [[nodiscard]] PatchResult makeDecal(const levelset::NarrowBand& base, const Imath::V3d& at,
                                     const Imath::V3d& direction, double radius, double height,
                                     const PatchOptions& options = {});

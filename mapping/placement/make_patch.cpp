@@ -84,7 +84,7 @@ double handednessOfSides(const NarrowBand& base, const PatchSides& sides) {
     return isReversed ? (tenths[9] - tenths[10]).normalized()
                       : (tenths[1] - tenths[0]).normalized();
   };
-  const std::array<std::array<V3d, 2>, 4> ways = {
+  const std::array<std::array<V3d, 2>, 4> offsets = {
       {{leaving(sides[0], false), leaving(sides[3], false)},
        {leaving(sides[1], false), leaving(sides[0], true)},
        {leaving(sides[2], true), leaving(sides[1], true)},
@@ -93,7 +93,7 @@ double handednessOfSides(const NarrowBand& base, const PatchSides& sides) {
                                       sides[2].front()};
   double sum = 0;
   for (std::size_t i = 0; i < 4; ++i)
-    sum += ways[i][0].cross(ways[i][1]).dot(field.normal(corners[i]));
+    sum += offsets[i][0].cross(offsets[i][1]).dot(field.normal(corners[i]));
   return sum;
 }
 
@@ -340,8 +340,8 @@ std::array<V3d, 4> cornersAround(const NarrowBand& base, const V3d& point, doubl
   constexpr std::array<std::array<double, 2>, 4> kSigns = {{{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}};
   std::array<V3d, 4> corners;
   for (std::size_t i = 0; i < 4; ++i) {
-    const V3d way = u * (0.5 * a * kSigns[i][0]) + v * (0.5 * b * kSigns[i][1]);
-    const std::optional<V3d> corner = walkStraight(field, 0, center, way, way.length());
+    const V3d offset = u * (0.5 * a * kSigns[i][0]) + v * (0.5 * b * kSigns[i][1]);
+    const std::optional<V3d> corner = walkStraight(field, 0, center, offset, offset.length());
     if (!corner) {
       throw InvalidInput(fmt::format(
           "{}: the surface breaks off between {} and corner {}; use a smaller size, or give the "

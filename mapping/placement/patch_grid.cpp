@@ -148,8 +148,8 @@ struct RoundFrame {
 };
 
 RoundFrame roundFrame(const NarrowBand& base, const V3d& from, const V3d& to, double rotation) {
-  const V3d way = to - from;
-  if (!(way.length() >= 2 * base.voxelSize()) || !std::isfinite(way.length())) {
+  const V3d offset = to - from;
+  if (!(offset.length() >= 2 * base.voxelSize()) || !std::isfinite(offset.length())) {
     throw UsageError(
         fmt::format("{}: the axis from {} to {} is under two voxels long; give two "
                     "points that are further apart",
@@ -157,12 +157,12 @@ RoundFrame roundFrame(const NarrowBand& base, const V3d& from, const V3d& to, do
   }
   if (!std::isfinite(rotation))
     throw UsageError(fmt::format("{}: the rotation is {}; give an angle", kGrid, rotation));
-  const V3d along = way.normalized();
+  const V3d along = offset.normalized();
   const V3d reference = std::abs(along.x) < 0.9 ? V3d(1, 0, 0) : V3d(0, 1, 0);
   const V3d east = (reference - along * along.dot(reference)).normalized();
   const V3d north = along.cross(east);
   const V3d out = east * std::cos(rotation) + north * std::sin(rotation);
-  return {from, along, out, along.cross(out), way.length()};
+  return {from, along, out, along.cross(out), offset.length()};
 }
 
 /// First intersection of a line from outside to the axis with the surface.

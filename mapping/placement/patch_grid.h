@@ -37,10 +37,10 @@ struct PatchGridResult {
                                             const PatchGridOptions& grid,
                                             const PatchOptions& options = {});
 
-/// Builds tiles all around an axis, between the two planes across it through its ends. u runs
-/// around the axis, anticlockwise seen from `to`; v runs from `from` to `to`; the last column joins
-/// the first. The surface used is the part visible from outside along lines perpendicular to the
-/// axis.
+/// Builds tiles all around an axis, between the two planes across it through its ends. The
+/// direction of u is around the axis, anticlockwise seen from `to`. That of v is from `from` to
+/// `to`. The last column joins the first. The surface used is the part visible from outside along
+/// lines perpendicular to the axis.
 /// @param from, to  different points on the axis; a solid of revolution has its own axis
 /// @param rotation  angle of the first seam about the axis, radians, from the perpendicular
 ///         direction nearest to +x (or to +y for an axis along x)

@@ -194,10 +194,10 @@ Imath::Box3d RbfBlock::boundsFor(Kernel) const {
   V3d value(0), remainder(error_);
   M33d gradient(0, 0, 0, 0, 0, 0, 0, 0, 0);
   for (const std::uint32_t i : near_) {
-    const V3d way = center - map_.particles_[i].position, weight = map_.particles_[i].weight;
-    const double distance = way.length();
+    const V3d offset = center - map_.particles_[i].position, weight = map_.particles_[i].weight;
+    const double distance = offset.length();
     value += weight * Kernel::value(distance);
-    const V3d slope = distance > 0 ? way * (Kernel::slope(distance) / distance) : V3d(0);
+    const V3d slope = distance > 0 ? offset * (Kernel::slope(distance) / distance) : V3d(0);
     for (int k = 0; k < 3; ++k)
       for (int axis = 0; axis < 3; ++axis) gradient[k][axis] += weight[k] * slope[axis];
     const double beyond = beyondTangent<Kernel>(distance, radius);

@@ -192,8 +192,8 @@ class KrylovSolver {
       for (int k = 0; k < 3; ++k)
         problems[static_cast<std::size_t>(k)].push(orthogonalize(basis, k));
       ++report_.iterations;
-      const double way = static_cast<double>(report_.iterations);
-      levelset::report(options_.progress, 0.1 + 0.8 * way / (way + 20), kKrylov);
+      const double done = static_cast<double>(report_.iterations);
+      levelset::report(options_.progress, 0.1 + 0.8 * done / (done + 20), kKrylov);
     }
     return combine(searched, problems);
   }

@@ -43,8 +43,8 @@ struct RbfMapOptions {
 /// smooth map and for λ = 0, the error decreases with the spacing h as h⁴ or faster for growing
 /// kernels. It decreases as h² for the two decaying kernels, whose width shrinks with the spacing.
 /// A direct solution takes n² doubles and n³/3 operations. An iterative solution takes about 4 kB
-/// per particle, n² operations for each of a few restarts, and n log n for each step between them;
-/// n² again for kernels that grow faster than r.
+/// per particle, n² operations for each of a few restarts, and n log n for each step between them.
+/// For kernels that grow faster than r each step takes n² operations.
 ///
 /// Coincident particles count as one, with the mean of their targets. If all particles lie in one
 /// plane, A maps the plane's normal to the normal of the plane's image, scaled by the mean scale in

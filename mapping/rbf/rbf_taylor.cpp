@@ -73,9 +73,9 @@ std::array<TermParents, kTerms> makeParents() {
 const std::array<TermParents, kTerms> kParents = makeParents();
 
 /// Bounds the remainder of the gradient of |x + s|, a series in |s| / |x|. The magnitude of its
-/// n-th term is at most the square root of (n + 1) / n: with t the cosine between x and s, the term
-/// is P_n(t) x̂ − P_{n−1}(t) ŝ, whose square is (1 − t²) (P_n² + (1 − t²) P_n′² / n²), and P_n² +
-/// (1 − t²) P_n′² / (n (n + 1)) ≤ 1.
+/// n-th term is at most the square root of (n + 1) / n. With t the cosine between x and s, the term
+/// is P_n(t) x̂ − P_{n−1}(t) ŝ. Its square is (1 − t²) (P_n² + (1 − t²) P_n′² / n²), and P_n² + (1
+/// − t²) P_n′² / (n (n + 1)) ≤ 1.
 double gradientRest(double ratio) {
   const double squared = ratio * ratio;
   return std::sqrt((kDegree + 1.0) / kDegree) * squared * squared * ratio / (1 - ratio);
@@ -98,15 +98,15 @@ void TaylorPolynomial::addAffine(const V3d& value, const M33d& rows) {
 
 // Applied to |x|, x·∇ gives |x| and r² ∇ gives x |x|. Together they give each coefficient from
 // those of one and two degrees less.
-void TaylorPolynomial::addDistance(const V3d& way, const V3d& weight) {
+void TaylorPolynomial::addDistance(const V3d& offset, const V3d& weight) {
   std::array<double, kTerms + 1> a;
   a[kNoTerm] = 0;
-  const double squared = way.length2(), inverse = 1 / squared;
+  const double squared = offset.length2(), inverse = 1 / squared;
   a[0] = std::sqrt(squared);
   for (std::size_t n = 1; n < kTerms; ++n) {
     const TermParents& parents = kParents[n];
     const double first =
-        way.x * a[parents.one[0]] + way.y * a[parents.one[1]] + way.z * a[parents.one[2]];
+        offset.x * a[parents.one[0]] + offset.y * a[parents.one[1]] + offset.z * a[parents.one[2]];
     const double second = a[parents.two[0]] + a[parents.two[1]] + a[parents.two[2]];
     a[n] = (parents.firstShare * first + parents.secondShare * second) * inverse;
   }
@@ -217,8 +217,8 @@ RbfCube RbfCubes::octant(const RbfCube& cube, int bits) const {
 void RbfCubes::sumFar(RbfCube& cube, std::span<const std::uint32_t> candidates) const {
   const double radius = cube.radius();
   for (const std::uint32_t i : candidates) {
-    const V3d way = cube.center - particles_[i].position;
-    const double distance = way.length();
+    const V3d offset = cube.center - particles_[i].position;
+    const double distance = offset.length();
     if (!(radius <= farRatio_ * distance)) {
       cube.near.push_back(i);
       continue;
@@ -226,19 +226,19 @@ void RbfCubes::sumFar(RbfCube& cube, std::span<const std::uint32_t> candidates) 
     const double error = norms_[i] * gradientRest(radius / distance);
     cube.slopeError += error;
     cube.valueError += error * radius;
-    cube.far.addDistance(way, particles_[i].weight);
+    cube.far.addDistance(offset, particles_[i].weight);
   }
 }
 
 M33d RbfCubes::slopes(const RbfCube& cube, const V3d& point) const {
   M33d result = cube.far.slopes(point - cube.center);
   for (const std::uint32_t i : cube.near) {
-    const V3d way = point - particles_[i].position;
-    const double distance = way.length();
+    const V3d offset = point - particles_[i].position;
+    const double distance = offset.length();
     if (distance == 0) continue;
     for (int k = 0; k < 3; ++k)
       for (int axis = 0; axis < 3; ++axis)
-        result[k][axis] += particles_[i].weight[k] * way[axis] / distance;
+        result[k][axis] += particles_[i].weight[k] * offset[axis] / distance;
   }
   return result;
 }

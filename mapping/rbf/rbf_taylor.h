@@ -29,9 +29,9 @@ class TaylorPolynomial {
 
   [[nodiscard]] const Imath::V3d& operator[](std::size_t term) const { return terms_[term]; }
   void addAffine(const Imath::V3d& value, const Imath::M33d& rows);
-  /// Adds weight × |way + s|, expanded in s, by the recurrence of [Duan01].
-  /// @pre way is not zero
-  void addDistance(const Imath::V3d& way, const Imath::V3d& weight);
+  /// Adds weight × |offset + s|, expanded in s, by the recurrence of [Duan01].
+  /// @pre offset is not zero
+  void addDistance(const Imath::V3d& offset, const Imath::V3d& weight);
   /// Re-expands the polynomial around a point at distance vector `by` from the old one.
   void shift(const Imath::V3d& by);
   /// Jacobian at s: gradients of the three components as rows.

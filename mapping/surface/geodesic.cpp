@@ -24,8 +24,8 @@ constexpr int kSweepsBetweenLooks = 16;
 constexpr double kCalm = 1e-5;      // relative change of the length between two checks
 constexpr double kStraight = 1e-3;  // voxels; largest move of a point in the last sweep
 
-V3d tangential(const V3d& way, const V3d& normal) {
-  return way - normal * way.dot(normal);
+V3d tangential(const V3d& offset, const V3d& normal) {
+  return offset - normal * offset.dot(normal);
 }
 
 /// Walks towards b by small steps on the surface; returns an empty path when stuck.
@@ -34,9 +34,9 @@ std::vector<V3d> walkTowards(const SurfaceField& field, double height, const V3d
   const double maxSteps = 4 * (b - a).length() / step + 16;
   std::vector<V3d> path = {a};
   while ((b - path.back()).length() > 1.5 * step) {
-    const V3d p = path.back(), way = b - p;
-    const V3d along = tangential(way, field.normal(p));
-    if (along.length() < 1e-3 * way.length() || static_cast<double>(path.size()) > maxSteps)
+    const V3d p = path.back(), offset = b - p;
+    const V3d along = tangential(offset, field.normal(p));
+    if (along.length() < 1e-3 * offset.length() || static_cast<double>(path.size()) > maxSteps)
       return {};
     V3d next = p + along.normalized() * step;
     if (!field.project(next, height)) return {};
@@ -147,9 +147,9 @@ std::vector<V3d> withBends(const SurfaceField& field, double height, const std::
 bool isBeside(const std::vector<V3d>& path, const std::vector<V3d>& other, double distance) {
   return std::all_of(path.begin(), path.end(), [&](const V3d& p) {
     for (std::size_t i = 1; i < other.size(); ++i) {
-      const V3d chord = other[i] - other[i - 1], way = p - other[i - 1];
-      const double along = std::clamp(way.dot(chord) / chord.length2(), 0.0, 1.0);
-      if ((way - chord * along).length() <= distance) return true;
+      const V3d chord = other[i] - other[i - 1], offset = p - other[i - 1];
+      const double along = std::clamp(offset.dot(chord) / chord.length2(), 0.0, 1.0);
+      if ((offset - chord * along).length() <= distance) return true;
     }
     return false;
   });
@@ -221,8 +221,8 @@ std::vector<V3d> geodesic(const SurfaceField& field, double height, const V3d& a
   path = straighten(field, height, std::move(path));
   double shortest = pathLength(path);
   if (shortest <= kNearlyStraight * (b - a).length()) return path;
-  for (const std::vector<V3d>& way : search.alternatives(shortest)) {
-    std::vector<V3d> other = coarsePath(field, height, way);
+  for (const std::vector<V3d>& offset : search.alternatives(shortest)) {
+    std::vector<V3d> other = coarsePath(field, height, offset);
     relaxPath(field, height, other);
     if (pathLength(withBends(field, height, other)) > kWorthTrying * shortest ||
         isBeside(other, path, 2 * field.voxelSize()))

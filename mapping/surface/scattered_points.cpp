@@ -98,8 +98,8 @@ double scaleAt(const ScatterDensity& density, const V3d& place) {
   return scale;
 }
 
-/// The zero set as triangles, sampled by area in units of the local scale, so that parts with a
-/// small scale get as many points per scaled area as others.
+/// The zero set as triangles, sampled by area in units of the local scale. So parts with a small
+/// scale get as many points per scaled area as others.
 class AreaSampler {
  public:
   AreaSampler(const levelset::NarrowBand& base, const ScatterDensity& density)
@@ -270,14 +270,14 @@ std::vector<SurfacePoint> orderBySpread(std::span<const SurfacePoint> candidates
 }  // namespace
 
 double surfaceDistance(const SurfacePoint& a, const SurfacePoint& b, double thin) {
-  const V3d way = b.position - a.position;
-  const double straight = way.length();
+  const V3d offset = b.position - a.position;
+  const double straight = offset.length();
   if (straight == 0) return 0;
   if (straight < thin && a.normal.dot(b.normal) < kOtherSide)
     return std::numeric_limits<double>::infinity();
   const auto clamped = [](double x) { return std::clamp(x, -1.0, 1.0); };
-  const double first = clamped(a.normal.dot(way) / straight),
-               last = clamped(b.normal.dot(way) / straight);
+  const double first = clamped(a.normal.dot(offset) / straight),
+               last = clamped(b.normal.dot(offset) / straight);
   const double turn = first - last;
   constexpr double kStraight = 1e-4;
   const double bend = std::abs(turn) < kStraight ? 1 / std::sqrt(std::max(1 - first * first, 0.25))

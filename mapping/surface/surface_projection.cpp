@@ -75,11 +75,11 @@ V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point, cons
   // Gradient descent of the distance to `point` along the surface; steps are halved when one fails.
   double step = 1;
   for (int i = 0; i < 60 && step > 1e-3; ++i) {
-    const V3d normal = field.normal(foot), way = point - foot;
-    const V3d along = way - normal * way.dot(normal);
+    const V3d normal = field.normal(foot), offset = point - foot;
+    const V3d along = offset - normal * offset.dot(normal);
     if (along.length() < 1e-6 * base.voxelSize()) break;
     V3d next = foot + along * std::min(step, base.voxelSize() / along.length());
-    if (field.project(next, 0) && (point - next).length() < way.length()) {
+    if (field.project(next, 0) && (point - next).length() < offset.length()) {
       foot = next;
     } else {
       step *= 0.5;
@@ -88,10 +88,10 @@ V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point, cons
   // On an open surface the line to the closest point is normal to the surface, unless the closest
   // point is on the border.
   if (base.isOpenSurface()) {
-    const V3d normal = field.normal(foot), way = point - foot;
+    const V3d normal = field.normal(foot), offset = point - foot;
     constexpr double kBeyondVoxels = 1, kSlant = 0.02;
-    const double along = (way - normal * way.dot(normal)).length();
-    if (along > kBeyondVoxels * base.voxelSize() && along > kSlant * way.length())
+    const double along = (offset - normal * offset.dot(normal)).length();
+    if (along > kBeyondVoxels * base.voxelSize() && along > kSlant * offset.length())
       failBrokenOff(foot, point, action);
   }
   const double distance = (point - foot).length();

@@ -59,16 +59,16 @@ bool SurfaceWalk::step(double length) {
   const bool isShortest = length <= kShortestVoxels * field_.voxelSize();
   const auto inHalves = [&] { return !isShortest && step(0.5 * length) && step(0.5 * length); };
   if (!field_.project(ahead, height_)) return inHalves();
-  V3d way = ahead - position_;
-  const double chord = way.length();
-  if (way.dot(direction_) < 0.5 * length || chord > 2 * length) return inHalves();
+  V3d offset = ahead - position_;
+  const double chord = offset.length();
+  if (offset.dot(direction_) < 0.5 * length || chord > 2 * length) return inHalves();
   const double cosine = normal_.dot(field_.normal(ahead));
   const double turn = std::acos(std::clamp(cosine, -1.0, 1.0));
   if (turn > (isShortest ? kSharpest : kMostTurn)) return inHalves();
   // The projection makes the step too short or too long. The chord of an arc of this length and
   // turn has the right length.
   const double half = 0.5 * turn;
-  V3d next = position_ + way * (length * (half > 1e-4 ? std::sin(half) / half : 1.0) / chord);
+  V3d next = position_ + offset * (length * (half > 1e-4 ? std::sin(half) / half : 1.0) / chord);
   if (!field_.project(next, height_)) return inHalves();
   const V3d gradient = field_.gradient(next);
   if (gradient.length() > kSteepestWalk) return inHalves();

@@ -128,7 +128,7 @@ Imath::M44d chooseGrid(const NarrowBand& base, double voxelSize, TextureMerge me
   return result;
 }
 
-/// Adapts a texture to the voxels of the result: resamples it if they are much coarser, and widens
+/// Adapts a texture to the voxels of the result. Resamples it if they are much coarser, and widens
 /// its band so that it covers enough of them after warping.
 /// @param least, most  stretch of texture → patch
 NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least, double most,
@@ -151,7 +151,7 @@ NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least,
 }
 
 /// Parts of the texture that are mapped onto each patch. A prism map ends a little outside the unit
-/// cube, so a texture that extends beyond the given box is clipped at the box, not at the end of
+/// cube. So a texture that extends beyond the given box is clipped at the box, not at the end of
 /// the map. At sides that patches share it is clipped two voxels further out, so that tiles
 /// overlap. If they met face to face, the grid would show a gap. A texture that only touches the
 /// box is not clipped.

@@ -103,9 +103,9 @@ struct CertifiedRbf {
   bool isExtrapolated = false;
 };
 
-/// Builds and certifies the RBF map of a patch for an embedded texture. If the columns continued
-/// below the surface make the map fold, as below a crease, and the map without them does not fold,
-/// the map without them is returned.
+/// Builds and certifies the RBF map of a patch for an embedded texture. Columns continued below the
+/// surface may make the map fold, as below a crease. If the map without them does not fold, that
+/// map is returned.
 /// @param cost  setup and certificate times are added to it
 [[nodiscard]] CertifiedRbf certifiedRbf(const Patch& patch, double embedDepth,
                                         const RbfMapOptions& options, TextureCost& cost);

@@ -196,8 +196,8 @@ class TextureWarp {
   }
 
   /// Removes isolated inside grid points. Where a face coincides with a plane of the grid, the last
-  /// digits of the map decide the sign of its points, and each could become a separate solid. If
-  /// the texture has no other inside points, they are kept.
+  /// digits of the map decide the sign of its points. Each of them could become a separate solid.
+  /// If the texture has no other inside points, they are kept.
   /// @return number of removed points
   static std::size_t dropCrumbs(openvdb::FloatGrid& grid) {
     constexpr double kDepth = 0.1;  // voxels; deeper points are not due to rounding

@@ -242,15 +242,15 @@ std::size_t PrismSolver::minimise(const Density& density, std::size_t mostIterat
       memory.pairs.clear();
       continue;
     }
-    Vectors way = next, change = gradient;
-    addScaled(way, positions_, -1);
+    Vectors offset = next, change = gradient;
+    addScaled(offset, positions_, -1);
     positions_.swap(next);
     updateNormals();
     gradient = gradientOf(stress);
     for (std::size_t n = 0; n < change.size(); ++n) change[n] = gradient[n] - change[n];
-    makeTangent(way);
+    makeTangent(offset);
     makeTangent(change);
-    memory.add(std::move(way), std::move(change));
+    memory.add(std::move(offset), std::move(change));
     still = energy - reached < kNoGain * energy ? still + 1 : 0;
     energy = reached;
     ++iterations;

@@ -14,9 +14,9 @@
 
 namespace render {
 
-/// The values of a band that rays read: those of the blocks of 8³ cells that the surface crosses,
-/// those of neighbouring blocks that stencils for the curvature read, and a table that finds them.
-/// The members are plain arrays, as they are uploaded to the GPU.
+/// The values of a band that rays read, and a table that finds them. It holds the blocks of 8³
+/// cells that the surface crosses. Of neighbouring blocks it holds the points that stencils for the
+/// curvature read. The members are plain arrays, as they are uploaded to the GPU.
 ///
 /// Positions are in table space: the band's index space minus `origin`. Blocks, pages of 8³ blocks
 /// and empty cubes are aligned in it.
@@ -50,8 +50,8 @@ struct BrickPool {
   /// kMaskWords for each brick. Bit 64x + 8y + z is set where the corners of the cell differ in
   /// sign, or where the bounds of the spline do.
   std::vector<std::uint32_t> mask;
-  /// φ in the band's unit, or the spline's coefficients, by x, y, z: kValues for each brick, then
-  /// the boxes of the halo blocks, then rows of values far outside and far inside.
+  /// φ in the band's unit, or the spline's coefficients, by x, y, z. First kValues for each brick,
+  /// then the boxes of the halo blocks. Two rows follow, of values far outside and far inside.
   std::vector<float> value;
   /// Replaces `value` when values are quantized: little-endian codes, followed by padding so that a
   /// 32-bit load of the last code stays in bounds.

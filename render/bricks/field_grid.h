@@ -13,8 +13,8 @@
 
 namespace render {
 
-/// The complete field of a band for rays, not only its zero set: the values of the blocks of 8³
-/// cells in which it is not constant, and a table that finds them. Positions are in the band's
+/// The complete field of a band for rays, not only its zero set. It holds the blocks of 8³ cells in
+/// which the values are not constant, and a table that finds them. Positions are in the band's
 /// index space minus a multiple of the block size, so that blocks start at 0.
 class FieldGrid {
  public:
@@ -77,8 +77,8 @@ class FieldGrid {
   double background_ = 0;  // world units, as the values
   Imath::V3d corner_;      // corner of the table, in the band's index space
   std::array<int, 3> size_{}, pages_{};
-  // As in BrickPool: position of a page's entries, or the constant of the entire page; and numbers
-  // of blocks.
+  // Same layout as in BrickPool: position of a page's entries, or the constant of the entire page;
+  // and numbers of blocks.
   std::vector<std::int32_t> page_, entry_;
   std::vector<Range> ranges_;
   std::vector<float> values_;

@@ -140,7 +140,7 @@ struct SplineBlock {
     constexpr float kMiddle[4] = {1.0f / 48, 23.0f / 48, 23.0f / 48, 1.0f / 48};
     constexpr float kRoom =
         1e-5f;  // relative to the largest coefficient: margin for single-precision rounding
-    Row middle{}, most{}, slopeX{}, slopeY{}, slopeZ{};  // of all points at that z
+    Row middle{}, most{}, slopeX{}, slopeY{}, slopeZ{};  // one entry for each z
     const auto widen = [](float& to, float v) { to = std::max(to, v); };
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j) {

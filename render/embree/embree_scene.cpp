@@ -28,7 +28,7 @@ struct RaySolid {
   std::uint32_t id;
   std::size_t index;        // index in Scene::solids
   std::size_t number;       // index among the solids with a surface
-  const EmbreeSpace* view;  // of the entire scene
+  const EmbreeSpace* view;  // space of the entire scene
   Filter filter;
   Imath::C3f colour;
   double opacity;
@@ -44,7 +44,8 @@ struct RaySolid {
 struct RayQuery {
   RTCIntersectContext embree;  // first member: Embree returns its address
   V3d origin, direction;       // world; the origin is at the scene's box
-  double limit;  // end of the search: the same for all blocks, so that a hit has the same bits in any order of the blocks
+  double limit;  // end of the search: the same for all blocks, so that a hit has the same bits in
+                 // any order of the blocks
   double nearest;
   double scale;
   const RaySolid* solid = nullptr;
@@ -161,10 +162,11 @@ void walkChanges(const CsgExpression& csg, std::vector<std::vector<SideChange>>&
 void requireRay(const V3d& origin, const V3d& direction) {
   const double sum = origin.x + origin.y + origin.z + direction.x + direction.y + direction.z;
   if (std::isfinite(sum) && direction != V3d(0)) return;
-  throw levelset::UsageError(fmt::format(
-      "render: a ray from {},{},{} along {},{},{} has no direction or is not finite; give finite numbers and "
-      "a nonzero direction",
-      origin.x, origin.y, origin.z, direction.x, direction.y, direction.z));
+  throw levelset::UsageError(
+      fmt::format("render: a ray from {},{},{} along {},{},{} has no direction or is not finite; "
+                  "give finite numbers and "
+                  "a nonzero direction",
+                  origin.x, origin.y, origin.z, direction.x, direction.y, direction.z));
 }
 
 }  // namespace
@@ -176,7 +178,7 @@ struct EmbreeScene::Impl {
   std::optional<FieldMarch> fields;  // set when the scene is blended
   bool isOpaque;
   Box3d allBounds;  // with meshes
-  Box3d bounds;     // of the crossed cells
+  Box3d bounds;     // box of the crossed cells
   EmbreeSpace view;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;

@@ -20,7 +20,7 @@ using CornerAccessor = openvdb::tree::ValueAccessor<const FloatTree, false>;
 using Join = FieldExpression::Join;
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
-constexpr double kLeastStep = 1e-7;  // of the finest voxel
+constexpr double kLeastStep = 1e-7;  // relative to the finest voxel
 constexpr double kMostStepUp = 1e5;  // limit on the growth of repeated least steps
 constexpr double kSlopeRounding = 1 + 1e-6;
 
@@ -180,8 +180,7 @@ class FieldMarch::RaySegment {
     return values_[march_.expression_.drawn];
   }
 
-  /// Where all fields are constant at t, the parameter at which the next field begins to vary; else
-  /// 0.
+  /// Parameter at which the next field begins to vary, when all fields are constant at t; else 0.
   [[nodiscard]] double nextEntry(double t) const {
     double entry = kEndless;
     for (const Part& part : parts_) {

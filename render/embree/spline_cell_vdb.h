@@ -1,7 +1,7 @@
 #pragma once
 
-// Private to the judge: the tricubic B-spline of a cell in double precision, and the crossings of a
-// line with its zero set, found by bounds on the slope.
+// Private to the judge: the tricubic B-spline of a cell in double precision. Finds the crossings of
+// a line with its zero set by bounds on the slope.
 
 #include <optional>
 #include <vector>

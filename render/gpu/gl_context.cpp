@@ -15,7 +15,7 @@
 namespace render {
 namespace {
 
-constexpr const char* kWayOut = "use a machine with OpenGL 4.5, or draw with --renderer cpu";
+constexpr const char* kRemedy = "use a machine with OpenGL 4.5, or draw with --renderer cpu";
 
 bool hasWord(const char* words, std::string_view word) {
   return words && std::string_view(words).find(word) != std::string_view::npos;
@@ -44,13 +44,13 @@ struct GlContext::Egl {
   Egl() {
     library = dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL);
     if (!library) {
-      throw NoOpenGl(fmt::format("render: EGL is not available ({}); {}", dlerror(), kWayOut));
+      throw NoOpenGl(fmt::format("render: EGL is not available ({}); {}", dlerror(), kRemedy));
     }
     const auto load = [&](auto& function, const char* name) {
       function =
           reinterpret_cast<std::remove_reference_t<decltype(function)>>(dlsym(library, name));
       if (!function)
-        throw NoOpenGl(fmt::format("render: EGL has no function {}; {}", name, kWayOut));
+        throw NoOpenGl(fmt::format("render: EGL has no function {}; {}", name, kRemedy));
     };
     load(getProcAddress, "eglGetProcAddress");
     load(queryString, "eglQueryString");
@@ -67,7 +67,7 @@ struct GlContext::Egl {
         getProcAddress("eglGetPlatformDisplayEXT"));
     if (!getPlatformDisplay)
       throw NoOpenGl(
-          fmt::format("render: EGL does not support contexts without a window; {}", kWayOut));
+          fmt::format("render: EGL does not support contexts without a window; {}", kRemedy));
   }
   // The library is not unloaded: drivers leave threads and handlers that outlive the context.
   ~Egl() { close(); }
@@ -90,7 +90,7 @@ struct GlContext::Egl {
     if (openOn(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, "no surface")) return;
     for (EGLDeviceEXT device : software)
       if (openOn(EGL_PLATFORM_DEVICE_EXT, device, "a software device")) return;
-    throw NoOpenGl(fmt::format("render: OpenGL 4.5 is not available ({}); {}", tried, kWayOut));
+    throw NoOpenGl(fmt::format("render: OpenGL 4.5 is not available ({}); {}", tried, kRemedy));
   }
 
   void listDevices(std::vector<EGLDeviceEXT>& hardware, std::vector<EGLDeviceEXT>& software) {
@@ -150,7 +150,7 @@ GlContext::GlContext() : egl_(std::make_unique<Egl>()) {
     function =
         reinterpret_cast<std::remove_reference_t<decltype(function)>>(egl_->getProcAddress(name));
     if (!function)
-      throw NoOpenGl(fmt::format("render: OpenGL has no function {}; {}", name, kWayOut));
+      throw NoOpenGl(fmt::format("render: OpenGL has no function {}; {}", name, kRemedy));
   };
 #define LEVELSMITH_GL_LOAD(Type, name) load(gl_.name, "gl" #name);
   LEVELSMITH_GL_FUNCTIONS(LEVELSMITH_GL_LOAD)

@@ -27,7 +27,7 @@ enum Unit : GLuint { kPages, kEntries, kMasks, kFirstValues };
 /// GLSL definitions of the kernel's types and macros.
 constexpr const char* kDialect = R"GLSL(
 #define Real float
-#define Whole int
+#define Int int
 #define Bool bool
 #define VAR precise float
 #define IN(Type) Type
@@ -56,24 +56,24 @@ layout(std430, binding = 0) readonly buffer Rays { float rays[]; };
 layout(std430, binding = 1) writeonly buffer Hits { int hits[]; };
 
 Real real(float v) { return v; }
-Whole whole(int v) { return v; }
+Int integer(int v) { return v; }
 Bool no() { return false; }
-Real toReal(Whole v) { return float(v); }
-Whole toWhole(Real v) { return int(v); }
+Real toReal(Int v) { return float(v); }
+Int toInt(Real v) { return int(v); }
 Real select(Bool c, Real a, Real b) { return c ? a : b; }
-Whole select(Bool c, Whole a, Whole b) { return c ? a : b; }
+Int select(Bool c, Int a, Int b) { return c ? a : b; }
 Bool select(Bool c, Bool a, Bool b) { return c ? a : b; }
 Real smaller(Real a, Real b) { return b < a ? b : a; }
-Whole smaller(Whole a, Whole b) { return b < a ? b : a; }
+Int smaller(Int a, Int b) { return b < a ? b : a; }
 Real larger(Real a, Real b) { return a < b ? b : a; }
-Whole larger(Whole a, Whole b) { return a < b ? b : a; }
-Whole bit(Bool c, int n) { return c ? n : 0; }
+Int larger(Int a, Int b) { return a < b ? b : a; }
+Int bit(Bool c, int n) { return c ? n : 0; }
 Bool differ(Bool a, Bool b) { return a != b; }
 Bool any(Bool c) { return c; }
 Bool many(Bool walking, Bool alive) { return walking; }
-Whole loadPage(Whole i) { return texelFetch(pages, i).x; }
-Whole loadEntry(Whole i) { return texelFetch(entries, i).x; }
-Whole loadMask(Whole i) { return texelFetch(masks, i).x; }
+Int loadPage(Int i) { return texelFetch(pages, i).x; }
+Int loadEntry(Int i) { return texelFetch(entries, i).x; }
+Int loadMask(Int i) { return texelFetch(masks, i).x; }
 )GLSL";
 
 constexpr const char* kMain = R"GLSL(
@@ -96,7 +96,7 @@ Ray rayNumber(int n) { return viewRay(rays[n], rays[rayCount + n]); }
 int passingNumber(int n) { return int(rays[2 * rayCount + n]); }
 
 void addShape(int n, Ray ray, Hit hit) {
-  // llvmpipe runs through all branches, but leaves loops that no ray is in.
+  // llvmpipe executes all branches, but skips loops that no ray enters.
   for (int i = hit.found ? 0 : 1; i < 1; ++i) {
     Shape s = shapeOf(ray, hit);
     float parts[kShapeParts] = float[kShapeParts](s.gx, s.gy, s.gz, s.tx, s.ty, s.tz, s.hxx, s.hyy,
@@ -150,7 +150,7 @@ std::string valueText(const Variant& variant, int shift) {
     text += fmt::format("layout(binding = {}) uniform {}samplerBuffer values{};\n",
                         static_cast<int>(kFirstValues) + b, prefix, b);
   }
-  text += fmt::format("{} loadHeld(Whole i) {{\n", type);
+  text += fmt::format("{} loadHeld(Int i) {{\n", type);
   for (int b = 0; b + 1 < variant.blocks; ++b)
     text += fmt::format("  if (i >> {} == {}) return texelFetch(values{}, i & {}).x;\n", shift, b,
                         b, (1 << shift) - 1);
@@ -160,11 +160,11 @@ std::string valueText(const Variant& variant, int shift) {
   // Words of the NanoVDB grid that are integers never pass through a float, because that may change
   // bits.
   if (variant.isNano)
-    return text + "Real loadValue(Whole i) { return intBitsToFloat(loadHeld(i)); }\n";
-  if (!isCode) return text + "Real loadValue(Whole i) { return loadHeld(i); }\n";
+    return text + "Real loadValue(Int i) { return intBitsToFloat(loadHeld(i)); }\n";
+  if (!isCode) return text + "Real loadValue(Int i) { return loadHeld(i); }\n";
   return text + fmt::format(
                     "uniform float valueStep;\n"
-                    "Real loadValue(Whole i) {{\n"
+                    "Real loadValue(Int i) {{\n"
                     "  VAR fromZero = float(int(loadHeld(i))) + {}.5;\n"
                     "  VAR value = fromZero * valueStep;\n"
                     "  return value;\n}}\n",
@@ -299,12 +299,12 @@ struct GpuTracer::Impl {
   void upload(const KernelSolid& solid) {
     const BrickPool& pool = solid.pool;
     Tables& t = tables[&solid];
-    const auto whole = [&](const auto& data) {
+    const auto textureOf = [&](const auto& data) {
       return texelsOf(data.data(), data.size() * sizeof data[0], GL_R32I);
     };
-    t.pages = whole(pool.page);
-    t.entries = whole(pool.entry);
-    t.masks = whole(pool.mask);
+    t.pages = textureOf(pool.page);
+    t.entries = textureOf(pool.entry);
+    t.masks = textureOf(pool.mask);
     const std::size_t bytes = pool.valueBytes();
     if (pool.quantization.bits == 32)
       uploadValues(t, pool.value.data(), bytes, 4, GL_R32F);

@@ -235,11 +235,11 @@ class Comparer {
 
   std::vector<Layer> layers() {
     std::vector<Layer> all;
-    std::set<std::string> told;  // channels that a layer compares
+    std::set<std::string> compared;  // channels that a layer compares
     const auto add = [&](const std::vector<std::string>& channels, Layer layer) {
       if (!std::all_of(channels.begin(), channels.end(), [&](const auto& c) { return has(c); }))
         return;
-      told.insert(channels.begin(), channels.end());
+      compared.insert(channels.begin(), channels.end());
       all.push_back(std::move(layer));
     };
     const bool hasDepth = has("Z");
@@ -292,7 +292,7 @@ class Comparer {
                                   return std::max(0.0, angle - turnBetweenPlaces(i));
                                 }});
     for (const auto& [name, channel] : a_.channels) {
-      if (told.count(name) || name == "A" || !has(name)) continue;
+      if (compared.count(name) || name == "A" || !has(name)) continue;
       add({name}, {name, "absolute", {kInfinite, kInfinite}, [this, name = name](std::size_t i) {
                      return apart(value(a_, name, i), value(b_, name, i));
                    }});

@@ -27,7 +27,7 @@ struct LayerComparison {
   std::string layer;           ///< "Z", "N", "P", "curvature.mean", "id", "colour" …
   std::string measure;         ///< unit of the difference: "relative", "radians" …
   std::size_t compared = 0;    ///< pixels that both pictures hit
-  double median = 0, p99 = 0;  ///< of the differences of these pixels
+  double median = 0, p99 = 0;  ///< statistics of the differences of these pixels
   double p999 = 0, largest = 0;
   LayerTolerance allowed{};
   std::vector<PixelDifference>

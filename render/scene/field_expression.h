@@ -65,9 +65,9 @@ struct FieldExpression {
 [[nodiscard]] FieldExpression fieldExpression(const Scene& scene);
 
 /// Checks the blending options of any scene.
-/// @throws levelset::UsageError for a softness below 0 or without an expression, a morph outside
-///         [0, 1], beside an expression or of other than two solids, and transparent solids that
-///         are blended
+/// @throws levelset::UsageError for a softness below 0 or without an expression, and for
+///         transparent solids that are blended. Also for a morph outside [0, 1], beside an
+///         expression, or of other than two solids.
 /// @throws levelset::InvalidInput for a softness larger than the bands' width, and a morph of empty
 ///         solids
 void requireFields(const Scene& scene);

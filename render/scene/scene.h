@@ -44,7 +44,7 @@ struct MeshPart {
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
   std::string name = {};
-  double opacity = 1;  ///< as in Solid
+  double opacity = 1;  ///< same meaning as in Solid
 };
 
 /// Transmittance below which a ray ends as if the last surface were opaque.

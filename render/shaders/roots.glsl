@@ -1,7 +1,7 @@
 // The kernel: finds the first crossing of a ray with the zero set of a grid of bricks. The code is
 // valid GLSL and C++. This file holds planes, and root isolation of polynomials by sign changes.
 //
-// C++ includes this text into a class. There Real, Whole and Bool are vectors of lanes, and the
+// C++ includes this text into a class. There Real, Int and Bool are vectors of lanes, and the
 // tables of the grid are members. In GLSL they are float, int and bool, and uniforms. All decisions
 // depend on sums, products and comparisons of floats alone, so that all processors return the same
 // bits. Inactive lanes load from index 0.
@@ -20,22 +20,22 @@ CONST_FLOAT kBesideBox = 0.0625f;  // padding, so that rounding does not lose a 
 
 // Parameter at which a ray meets the plane of points k. All cells use this function. It is monotone
 // in k, and both cells at a plane get the same number, so no ray slips between them.
-Real planeAt(Whole k, Real origin, Real inverse) {
+Real planeAt(Int k, Real origin, Real inverse) {
   VAR distance = toReal(k) - origin;
   VAR t = distance * inverse;
   return t;
 }
 
 // Index along one axis of the cell that contains the ray at t, clamped to [low, high].
-Whole cellAt(Real t, Real origin, Real direction, Real inverse, Whole low, Whole high) {
+Int cellAt(Real t, Real origin, Real direction, Real inverse, Int low, Int high) {
   VAR place = origin + t * direction;
   VAR held = smaller(larger(place, toReal(low)), toReal(high));
-  Whole cell = toWhole(held);  // not negative
+  Int cell = toInt(held);  // not negative
   Bool ahead = direction >= 0.0f;
   VAR leaves = planeAt(select(ahead, cell + 1, cell), origin, inverse);
   VAR enters = planeAt(select(ahead, cell, cell + 1), origin, inverse);
-  Whole onwards = select(ahead, whole(1), whole(-1));
-  Whole mended = select(leaves < t, cell + onwards, select(enters > t, cell - onwards, cell));
+  Int onwards = select(ahead, integer(1), integer(-1));
+  Int mended = select(leaves < t, cell + onwards, select(enters > t, cell - onwards, cell));
   return smaller(larger(mended, low), high);
 }
 
@@ -55,7 +55,7 @@ Real blossom(Real b0, Real b1, Real b2, Real b3, Real u, Real v, Real w) {
   return between(between(a0, a1, v, rv), between(a1, a2, v, rv), w, rw);
 }
 
-Whole signChanges(Real b0, Real b1, Real b2, Real b3) {
+Int signChanges(Real b0, Real b1, Real b2, Real b3) {
   return bit(differ(b0 < 0.0f, b1 < 0.0f), 1) + bit(differ(b1 < 0.0f, b2 < 0.0f), 1) +
          bit(differ(b2 < 0.0f, b3 < 0.0f), 1);
 }
@@ -64,7 +64,7 @@ Whole signChanges(Real b0, Real b1, Real b2, Real b3) {
 // otherwise to the next interval. Larger intervals are skipped where the sign rule proves them
 // empty.
 // @return true while there is an interval
-Bool nextPart(Bool open, Bool divides, INOUT(Whole) part, INOUT(Whole) halvings, INOUT(Real) size) {
+Bool nextPart(Bool open, Bool divides, INOUT(Int) part, INOUT(Int) halvings, INOUT(Real) size) {
   Bool divide = AND(open, divides);
   Bool next = AND(open, NOT(divide));
   part = select(divide, part + part, select(next, part + 1, part));
@@ -82,17 +82,17 @@ Bool nextPart(Bool open, Bool divides, INOUT(Whole) part, INOUT(Whole) halvings,
 // Finds the first interval in [0, 1] with a single sign change of the cubic, after skipping
 // `passing` of them. Skipped changes are subtracted from `passing`.
 // @return true when there is one
-Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Whole) passing, INOUT(Real) low,
+Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Int) passing, INOUT(Real) low,
              INOUT(Real) high) {
-  Whole changes = signChanges(b0, b1, b2, b3);
+  Int changes = signChanges(b0, b1, b2, b3);
   Bool single = AND(asked, changes == 1);
   Bool found = AND(single, passing == 0);
   passing = passing - bit(AND(single, NOT(found)), 1);
   Bool open = AND(asked, changes > 1);
   low = real(0.0f);
   high = real(1.0f);
-  Whole part = whole(0);
-  Whole halvings = whole(0);
+  Int part = integer(0);
+  Int halvings = integer(0);
   VAR size = real(1.0f);
   while (any(open)) {
     VAR u = toReal(part) * size;
@@ -101,7 +101,7 @@ Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Whole) passin
     VAR c1 = blossom(b0, b1, b2, b3, u, u, w);
     VAR c2 = blossom(b0, b1, b2, b3, u, w, w);
     VAR c3 = blossom(b0, b1, b2, b3, w, w, w);
-    Whole count = signChanges(c0, c1, c2, c3);
+    Int count = signChanges(c0, c1, c2, c3);
     Bool deepest = halvings == kMostHalvings;
     Bool crosses = AND(open, OR(count == 1, AND(deepest, differ(c0 < 0.0f, c3 < 0.0f))));
     Bool ends = AND(crosses, passing == 0);
@@ -128,10 +128,10 @@ Real bisect(Real b0, Real b1, Real b2, Real b3, Bool inside, Real low, Real high
 }
 
 // Bits of the corners of a cell's face. Corner (x, y, z) has the bit 4x + 2y + z.
-Whole faceCorners(Whole axis, Bool upper) {
-  return select(axis == 0, select(upper, whole(0xf0), whole(0x0f)),
-                select(axis == 1, select(upper, whole(0xcc), whole(0x33)),
-                       select(upper, whole(0xaa), whole(0x55))));
+Int faceCorners(Int axis, Bool upper) {
+  return select(axis == 0, select(upper, integer(0xf0), integer(0x0f)),
+                select(axis == 1, select(upper, integer(0xcc), integer(0x33)),
+                       select(upper, integer(0xaa), integer(0x55))));
 }
 
 // Corrects a value whose side is known. A value of the wrong side becomes a tiny value of the right

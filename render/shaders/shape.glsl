@@ -67,8 +67,8 @@ struct Column {
 };
 
 Column columnAt(IN(Window) w, int i, int j) {
-  Whole nearBlocks = firstAt(w, i, j, 0);
-  Whole farBlocks = firstAt(w, i, j, 1);
+  Int nearBlocks = firstAt(w, i, j, 0);
+  Int farBlocks = firstAt(w, i, j, 1);
   Column c;
   c.f0 = loadValue(select(w.farZ[0], farBlocks, nearBlocks) + w.stepZ[0]);
   c.f1 = loadValue(select(w.farZ[1], farBlocks, nearBlocks) + w.stepZ[1]);
@@ -81,8 +81,8 @@ Column columnAt(IN(Window) w, int i, int j) {
 
 // A column without its two ends, which are not stored where i or j is an end.
 Column shortColumnAt(IN(Window) w, int i, int j) {
-  Whole nearBlocks = firstAt(w, i, j, 0);
-  Whole farBlocks = firstAt(w, i, j, 1);
+  Int nearBlocks = firstAt(w, i, j, 0);
+  Int farBlocks = firstAt(w, i, j, 1);
   Column c;
   c.f0 = real(0.0f);
   c.f1 = loadValue(select(w.farZ[1], farBlocks, nearBlocks) + w.stepZ[1]);
@@ -251,7 +251,7 @@ void addTrilinear(INOUT(Shape) shape, IN(Corners) low, IN(Corners) high, Real a,
 
 // @param cell  cell that contains the position
 // @param a, b, c  position in the cell, from 0 to 1
-Shape shapeAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Real a, Real b, Real c) {
+Shape shapeAt(Bool asked, Int cellX, Int cellY, Int cellZ, Real a, Real b, Real c) {
   Window w = windowAt(asked, cellX, cellY, cellZ);
   Stencil x = stencilAt(a);
   Stencil y = stencilAt(b);

@@ -58,8 +58,8 @@ void bendAxis(INOUT_ARRAY(Real, net, 64), int stride, Real from, Real to) {
   }
 }
 
-Whole countChanges(IN_ARRAY(Real, b, 10)) {
-  Whole count = whole(0);
+Int countChanges(IN_ARRAY(Real, b, 10)) {
+  Int count = integer(0);
   for (int i = 0; i < kDegree; ++i) count = count + bit(differ(b[i] < 0.0f, b[i + 1] < 0.0f), 1);
   return count;
 }
@@ -94,17 +94,17 @@ Real valueAt(IN_ARRAY(Real, b, 10), Real u) {
 }
 
 // Isolates the first sign change; see isolate().
-Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Whole) passing, INOUT(Real) low,
+Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Int) passing, INOUT(Real) low,
                    INOUT(Real) high) {
-  Whole changes = countChanges(b);
+  Int changes = countChanges(b);
   Bool single = AND(asked, changes == 1);
   Bool found = AND(single, passing == 0);
   passing = passing - bit(AND(single, NOT(found)), 1);
   Bool open = AND(asked, changes > 1);
   low = real(0.0f);
   high = real(1.0f);
-  Whole part = whole(0);
-  Whole halvings = whole(0);
+  Int part = integer(0);
+  Int halvings = integer(0);
   VAR size = real(1.0f);
   while (any(open)) {
     VAR c[10];
@@ -113,7 +113,7 @@ Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Whole) passing, INOU
       Bool deep = AND(open, halvings > n);
       if (any(deep)) halve(c, deep, ((part >> n) & 1) != 0);
     }
-    Whole count = countChanges(c);
+    Int count = countChanges(c);
     Bool deepest = halvings == kMostHalvings;
     Bool crosses = AND(open, OR(count == 1, AND(deepest, differ(c[0] < 0.0f, c[kDegree] < 0.0f))));
     Bool ends = AND(crosses, passing == 0);
@@ -132,15 +132,15 @@ Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Whole) passing, INOU
 // Crossing of a ray between two points of a cell, given from 0 to 1 on each axis.
 // @param carried, inside  the side at the end of the previous cell is known, and it is the inside
 // @param passing  number of crossings to skip; reduced by those of the cell
-Crossing splineCrossingIn(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Real x0, Real y0,
+Crossing splineCrossingIn(Bool asked, Int cellX, Int cellY, Int cellZ, Real x0, Real y0,
                           Real z0, Real x1, Real y1, Real z1, Bool carried, Bool inside,
-                          INOUT(Whole) passing) {
+                          INOUT(Int) passing) {
   Window w = windowAt(asked, cellX, cellY, cellZ);
   VAR net[64];
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) {
-      Whole nearBlocks = firstAt(w, i + 1, j + 1, 0);
-      Whole farBlocks = firstAt(w, i + 1, j + 1, 1);
+      Int nearBlocks = firstAt(w, i + 1, j + 1, 0);
+      Int farBlocks = firstAt(w, i + 1, j + 1, 1);
       for (int k = 0; k < 4; ++k)
         net[16 * i + 4 * j + k] =
             loadValue(select(w.farZ[k + 1], farBlocks, nearBlocks) + w.stepZ[k + 1]);

@@ -6,11 +6,11 @@
 // @param entered, left  axes of the entry and exit faces, or kNone
 // @param carried, inside  the side at the end of the previous cell is known, and it is the inside
 // @param passing  number of crossings to skip; reduced by those of the cell
-Crossing crossingIn(Bool asked, Whole brick, Whole cellX, Whole cellY, Whole cellZ, Real x0, Real y0,
-                    Real z0, Real x1, Real y1, Real z1, Whole entered, Whole left, Bool aheadX,
-                    Bool aheadY, Bool aheadZ, Bool carried, Bool inside, INOUT(Whole) passing) {
+Crossing crossingIn(Bool asked, Int brick, Int cellX, Int cellY, Int cellZ, Real x0, Real y0,
+                    Real z0, Real x1, Real y1, Real z1, Int entered, Int left, Bool aheadX,
+                    Bool aheadY, Bool aheadZ, Bool carried, Bool inside, INOUT(Int) passing) {
   CellValues f = cellValues(asked, brick, cellX, cellY, cellZ);
-  Whole signs = bit(f.f0 < 0.0f, 1) | bit(f.f1 < 0.0f, 2) | bit(f.f2 < 0.0f, 4) | bit(f.f3 < 0.0f, 8) |
+  Int signs = bit(f.f0 < 0.0f, 1) | bit(f.f1 < 0.0f, 2) | bit(f.f2 < 0.0f, 4) | bit(f.f3 < 0.0f, 8) |
                 bit(f.f4 < 0.0f, 16) | bit(f.f5 < 0.0f, 32) | bit(f.f6 < 0.0f, 64) |
                 bit(f.f7 < 0.0f, 128);
 
@@ -53,10 +53,10 @@ Crossing crossingIn(Bool asked, Whole brick, Whole cellX, Whole cellY, Whole cel
   // equal, otherwise the side at the end of the previous cell.
   Bool upperIn = select(entered == 0, NOT(aheadX), select(entered == 1, NOT(aheadY), NOT(aheadZ)));
   Bool upperOut = select(left == 0, aheadX, select(left == 1, aheadY, aheadZ));
-  Whole maskIn = faceCorners(entered, upperIn);
-  Whole maskOut = faceCorners(left, upperOut);
-  Whole in_ = signs & maskIn;
-  Whole out_ = signs & maskOut;
+  Int maskIn = faceCorners(entered, upperIn);
+  Int maskOut = faceCorners(left, upperOut);
+  Int in_ = signs & maskIn;
+  Int out_ = signs & maskOut;
   Bool uniformIn = AND(entered != kNone, OR(in_ == 0, in_ == maskIn));
   Bool uniformOut = AND(left != kNone, OR(out_ == 0, out_ == maskOut));
   b0 = select(uniformIn, onSide(b0, in_ != 0), select(carried, onSide(b0, inside), b0));
@@ -126,11 +126,11 @@ struct Hit {
   Bool found;
   Bool enters;
   Real t;
-  Whole x, y, z;  // cell
+  Int x, y, z;  // cell
 };
 
 // Finds the crossing after `passing` earlier ones.
-Hit trace(Ray ray, Whole passing) {
+Hit trace(Ray ray, Int passing) {
   Bool aheadX = ray.dx >= 0.0f;
   Bool aheadY = ray.dy >= 0.0f;
   Bool aheadZ = ray.dz >= 0.0f;
@@ -140,38 +140,38 @@ Hit trace(Ray ray, Whole passing) {
   hit.t = ray.start;
   Bool alive = ray.start <= ray.end;
   VAR t = ray.start;
-  Whole x = cellAt(t, ray.ox, ray.dx, ray.ix, whole(0), whole(tableSizeX - 1));
-  Whole y = cellAt(t, ray.oy, ray.dy, ray.iy, whole(0), whole(tableSizeY - 1));
-  Whole z = cellAt(t, ray.oz, ray.dz, ray.iz, whole(0), whole(tableSizeZ - 1));
+  Int x = cellAt(t, ray.ox, ray.dx, ray.ix, integer(0), integer(tableSizeX - 1));
+  Int y = cellAt(t, ray.oy, ray.dy, ray.iy, integer(0), integer(tableSizeY - 1));
+  Int z = cellAt(t, ray.oz, ray.dz, ray.iz, integer(0), integer(tableSizeZ - 1));
   // A ray that starts in front of the table's first cells begins on their faces.
   t = larger(t, planeAt(select(aheadX, x, x + 1), ray.ox, ray.ix));
   t = larger(t, planeAt(select(aheadY, y, y + 1), ray.oy, ray.iy));
   t = larger(t, planeAt(select(aheadZ, z, z + 1), ray.oz, ray.iz));
   alive = AND(alive, t <= ray.end);
-  Whole entered = whole(kNone);
+  Int entered = integer(kNone);
   Bool solved = no();    // the surface crosses this cell, but the ray does not cross the surface in it
   Bool carried = no();   // the previous cell was such a cell
   Bool inside = no();    // the ray was inside at its end
   while (any(alive)) {
     // Advance to the next crossed cell.
     Bool walking = alive;
-    Whole brick = whole(0);
-    Whole axis = whole(kNone);
+    Int brick = integer(0);
+    Int axis = integer(kNone);
     VAR tExit = t;
     while (many(walking, alive)) {
       Spot spot = spotAt(walking, x, y, z);
       Bool stop = AND(spot.crosses, NOT(solved));
-      Whole size = spot.size;
-      Whole lowX = x & (whole(0) - size);
-      Whole lowY = y & (whole(0) - size);
-      Whole lowZ = z & (whole(0) - size);
+      Int size = spot.size;
+      Int lowX = x & (integer(0) - size);
+      Int lowY = y & (integer(0) - size);
+      Int lowZ = z & (integer(0) - size);
       VAR tx = planeAt(select(aheadX, lowX + size, lowX), ray.ox, ray.ix);
       VAR ty = planeAt(select(aheadY, lowY + size, lowY), ray.oy, ray.iy);
       VAR tz = planeAt(select(aheadZ, lowZ + size, lowZ), ray.oz, ray.iz);
       Bool byX = AND(tx <= ty, tx <= tz);
       Bool byY = AND(NOT(byX), ty <= tz);
       Bool byZ = AND(NOT(byX), NOT(byY));
-      Whole out_ = select(byX, whole(0), select(byY, whole(1), whole(2)));
+      Int out_ = select(byX, integer(0), select(byY, integer(1), integer(2)));
       VAR leaves = larger(t, select(byX, tx, select(byY, ty, tz)));
       Bool stopping = AND(walking, stop);
       brick = select(stopping, spot.brick, brick);
@@ -183,12 +183,12 @@ Hit trace(Ray ray, Whole passing) {
       carried = select(moving, solved, carried);
       solved = AND(solved, NOT(moving));
       Bool leap = AND(moving, size > 1);
-      Whole nextX = select(aheadX, lowX + size, lowX - 1);
-      Whole nextY = select(aheadY, lowY + size, lowY - 1);
-      Whole nextZ = select(aheadZ, lowZ + size, lowZ - 1);
-      Whole stillX = x;
-      Whole stillY = y;
-      Whole stillZ = z;
+      Int nextX = select(aheadX, lowX + size, lowX - 1);
+      Int nextY = select(aheadY, lowY + size, lowY - 1);
+      Int nextZ = select(aheadZ, lowZ + size, lowZ - 1);
+      Int stillX = x;
+      Int stillY = y;
+      Int stillZ = z;
       if (any(leap)) {
         stillX = select(leap, cellAt(leaves, ray.ox, ray.dx, ray.ix, lowX, lowX + (size - 1)), x);
         stillY = select(leap, cellAt(leaves, ray.oy, ray.dy, ray.iy, lowY, lowY + (size - 1)), y);

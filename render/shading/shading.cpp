@@ -12,7 +12,7 @@ using Imath::V2d;
 using Imath::V3d;
 
 constexpr double kOcclusionShare =
-    0.25;  // of the scene's diagonal: hollows darken, open surfaces do not
+    0.25;  // fraction of the scene's diagonal: hollows darken, open surfaces do not
 constexpr double kDefaultRange = 40;  // range of curvatures, times the scene's diagonal
 constexpr std::uint64_t kAmbient = 1, kShadow = 2;
 

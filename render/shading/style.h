@@ -57,9 +57,9 @@ struct ColourImage {
 /// Options of a style.
 struct StyleOptions {
   Style style = Style::Lit;
-  /// Curvature scale, per world unit: the curvature half way to the end of a colour map, and the
-  /// threshold of ridges and valleys. 0: 40 divided by the diagonal of the bounding box of the
-  /// surfaces.
+  /// Curvature scale, per world unit. This curvature is half way to the end of a colour map, and it
+  /// is the threshold of ridges and valleys. 0: 40 divided by the diagonal of the bounding box of
+  /// the surfaces.
   double curvatureRange = 0;
   double lineWidth = 2;                            ///< width of silhouette lines, pixels
   std::shared_ptr<const ColourImage> matcap = {};  ///< picture of a shaded ball, for Style::Matcap

@@ -10,7 +10,7 @@ namespace render {
 /// Derivatives of a level set at a surface point. Positions are in index space, φ has its own
 /// (world) unit.
 struct SurfaceShape {
-  Imath::V3d gradient{0};           ///< of the quasi-interpolating tricubic B-spline, per voxel
+  Imath::V3d gradient{0};  ///< gradient of the quasi-interpolating tricubic B-spline, per voxel
   Imath::V3d trilinearGradient{0};  ///< gradient of the interpolant that the rays meet
   Imath::M33d hessian{0.0};         ///< second derivatives of the B-spline
   double interpolationError = 0;    ///< bound on |trilinear − smooth|, from second differences

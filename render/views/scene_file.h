@@ -14,7 +14,7 @@
 /// Scene files: JSON that names files of level sets and meshes, by paths relative to its folder.
 namespace render {
 
-/// A scene, and a flag that tells if its file sets a camera.
+/// A scene. `hasCamera` is true when its file sets the camera.
 struct ViewedScene {
   Scene scene;
   bool hasCamera = false;

@@ -19,10 +19,10 @@ class CacheKeys {
   /// @param maxMemory  limit for grids that must be read to compute their digest, bytes
   CacheKeys(const Cache& cache, std::size_t maxMemory);
 
-  /// Computes one key per node; empty for unneeded nodes and for nodes that cannot be cached. A
-  /// node cannot be cached if it reads standard input, reads a file that refers to other files,
-  /// writes to something other than a file, or measures time. The same holds for nodes that depend
-  /// on it.
+  /// Computes one key per node; empty for unneeded nodes and for nodes that cannot be cached. Not
+  /// cached: nodes that read standard input or a file that refers to other files, that write to
+  /// something other than a file, or that measure time. The same holds for nodes that depend on
+  /// them.
   [[nodiscard]] std::vector<std::optional<std::string>> of(const Graph& graph,
                                                            const std::vector<char>& needed) const;
 

@@ -76,7 +76,7 @@ class Expander {
   Script expand() {
     expand(0, lines_.size());
     if (!hasAction_)
-      throw UsageError(fmt::format("run: '{}' holds no action; write one on each line", file_));
+      throw UsageError(fmt::format("run: '{}' contains no action; write one on each line", file_));
     return std::move(script_);
   }
 

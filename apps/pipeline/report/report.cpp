@@ -199,9 +199,9 @@ std::vector<std::string> toleranceLines(const ToleranceReport& tolerance) {
   if (tolerance.outputs.empty())
     lines.push_back(
         tolerance.modelVoxelSize > 0
-            ? fmt::format("tolerance: the error models choose voxels of {:.4g}; nothing ran",
+            ? fmt::format("tolerance: the error models choose voxels of {:.4g} for the first run",
                           tolerance.modelVoxelSize)
-            : "tolerance: the error models cannot predict the voxel size; nothing ran");
+            : "tolerance: the error models cannot predict the voxel size of the first run");
   return lines;
 }
 

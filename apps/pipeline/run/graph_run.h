@@ -45,9 +45,9 @@ class Values {
   std::vector<std::optional<Value>> values_;
 };
 
-/// One run of a graph. Independent branches run concurrently. Two cases run one after another at
-/// the end: a node whose cache entry is damaged, and a node that fails on a region of interest but
-/// may succeed on complete values.
+/// One run of a graph. Independent branches run concurrently. Some nodes run one after another at
+/// the end: a node with a damaged cache entry, or a node that failed on a region of interest. The
+/// latter may succeed on complete values.
 class GraphRun {
  public:
   GraphRun(const Graph& graph, const RunSettings& settings, RunReport& report);

@@ -27,8 +27,8 @@ struct ToleranceRound {
 
 /// Outcome of a run with `--tolerance`.
 struct ToleranceReport {
-  std::string written;        ///< tolerance as the user wrote it
-  double modelVoxelSize = 0;  ///< first choice of the error models; 0: no model applies
+  std::string written;              ///< tolerance as the user wrote it
+  double modelVoxelSize = 0;        ///< first choice of the error models; 0: no model applies
   std::vector<std::string> models;  ///< regression cases that these error models are fitted to
   double voxelSize = 0;             ///< voxel size of the result
   std::vector<ToleranceOutput> outputs;

@@ -26,8 +26,10 @@ struct ToleranceParts {
 };
 
 /// Assigns the nodes of a graph to their roles.
-/// @throws levelset::UsageError if no voxel size is open, if no result has an error estimate, if a
-///         length counts in the open voxel size, or if an action writes files beside its result
+/// @throws levelset::UsageError if no voxel size is open, or no result has an error estimate
+/// @throws levelset::UsageError if a length counts in the open voxel size, or an action writes
+/// files
+///         beside its result
 [[nodiscard]] ToleranceParts toleranceParts(const Graph& graph);
 
 /// Returns a warning for each length in voxels: the exact surface then depends on the voxel size.

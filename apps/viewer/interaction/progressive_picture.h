@@ -50,7 +50,7 @@ struct Frame {
   int pixelSize = 8;                           ///< edge of a picture pixel, window pixels
   bool isComplete = false;                     ///< all samples are done, with light and shadow
   std::shared_ptr<const render::Image> image;  ///< the layers of the picture
-  Canvas canvas;                               ///< as displayed, of any size
+  Canvas canvas;                               ///< displayed pixels, any size
 };
 
 /// Draws views in a background thread, in passes of increasing quality.

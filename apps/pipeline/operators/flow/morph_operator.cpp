@@ -16,7 +16,7 @@ FileSequence stepSequence(const Invocation& in) {
   FileSequence sequence(pattern);
   if (!sequence.hasNumber() || !levelset::isBandFormat(pattern))
     throw levelset::UsageError(
-        fmt::format("{}: '{}' names no sequence of .vdb files; put # where the number goes, as in "
+        fmt::format("{}: '{}' is not a sequence of .vdb files; write # for the number, as in "
                     "step_###.vdb",
                     in.where("keep-steps"), pattern));
   return sequence;

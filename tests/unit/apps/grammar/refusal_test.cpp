@@ -310,7 +310,7 @@ TEST_F(Refusal, OneVertexFarAwayEndsAtOnce) {
 TEST_F(Refusal, MemoryInUseIsFour) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.005 ! write in.vdb").code, 0);
   EXPECT_REFUSED(levelsmith("--max-memory 110M read in.vdb ! mesh ! write out.ply"), 4,
-                 "memory in use passes --max-memory");
+                 "memory in use exceeds --max-memory");
   expectNothingWritten(1);
 }
 

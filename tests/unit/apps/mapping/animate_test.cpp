@@ -254,7 +254,8 @@ TEST_F(Animate, TakesNumbersFromTheNameOfTheFileOnly) {
 TEST_F(Animate, RefusesBeforeAnythingIsComputed) {
   const std::string head = kScene + "animate @ball @ring @here ";
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --out frame.vdb"), 2, "put # where the number goes");
-  EXPECT_REFUSED(levelsmith(head + "--frames 3 --out f_#.txt"), 2, "names no row of such files");
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --out f_#.txt"), 2,
+                 "is not a sequence of such files");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --out no/where_#.vdb"), 6, "where_0.vdb");
   EXPECT_REFUSED(levelsmith(head + "--frames 0 --out f_#.vdb"), 2, "--frames");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --base-frames b.vdb --out f_#.vdb"), 2,

@@ -117,7 +117,7 @@ TEST(MeshToBandNasty, RepeatedAndOppositeFaces) {
             meshToBand(boxMesh(V3d(0), V3d(1)), 0.11).band.contentHash());
   mesh.triangles.back() = {0, 1, 2};  // against: the face cancels, a hole is left
   expectSays(refusal<InvalidInput>([&] { (void)meshToBand(mesh, 0.11); }), "--accept-sign");
-  expectOpenSound(meshToBand(mesh, 0.11, {.signAnyway = true}), mesh);
+  expectOpenSound(meshToBand(mesh, 0.11, {.acceptSign = true}), mesh);
 }
 
 /// A rectangle across an axis, as two triangles of a soup; distances do not ask which way it faces.

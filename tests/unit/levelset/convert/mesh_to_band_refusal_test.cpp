@@ -93,7 +93,7 @@ TEST(MeshToBandRefusal, NamesOpenMeshes) {
 TEST(MeshToBandRefusal, GivesDistancesWithoutAnInsideWhenAskedTo) {
   const TriMesh triangle{{V3d(0), V3d(1, 0, 0), V3d(0, 1, 0)}, {{0, 1, 2}}};
   for (const SignMode mode : {SignMode::Auto, SignMode::Winding}) {
-    const auto result = meshToBand(triangle, 0.1, {.sign = mode, .signAnyway = true});
+    const auto result = meshToBand(triangle, 0.1, {.sign = mode, .acceptSign = true});
     EXPECT_EQ(result.certificate.ambiguousShare, 1);
     EXPECT_TRUE(result.band.zeroSetBounds().isEmpty());
     EXPECT_GT(result.band.activeVoxelCount(), 300);

@@ -111,7 +111,7 @@ TEST(MeshToBand, SpansHoleOfHemisphere) {
   const TriMesh mesh = sphereMesh(1, V3d(0.01, 0.02, 0.03), 10, 0.5);
   const double h = 0.11;
   EXPECT_THROW((void)meshToBand(mesh, h), InvalidInput);  // half the rim's disc is a guess
-  const auto result = meshToBand(mesh, h, {.signAnyway = true});
+  const auto result = meshToBand(mesh, h, {.acceptSign = true});
   EXPECT_EQ(result.certificate.method, SignMode::Winding);
   EXPECT_GT(result.certificate.ambiguousShare, 1e-3);
   expectOpenSound(result, mesh);
@@ -194,7 +194,7 @@ TEST(MeshToBand, GivesTheSameBitsForAnyThreadCount) {
   for (const std::size_t threads : {1u, 2u, 4u}) {
     support::onThreads(threads, [&] {
       hashes.push_back(meshToBand(whole, 0.03).band.contentHash());
-      hashes.push_back(meshToBand(open, 0.08, {.signAnyway = true}).band.contentHash());
+      hashes.push_back(meshToBand(open, 0.08, {.acceptSign = true}).band.contentHash());
     });
   }
   for (std::size_t i = 2; i < hashes.size(); ++i) EXPECT_EQ(hashes[i], hashes[i % 2]);

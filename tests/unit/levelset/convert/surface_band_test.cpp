@@ -54,7 +54,7 @@ TEST(SurfaceBand, OfAPlaneIsTheDistanceToIt) {
   const levelset::SurfaceBandResult made = surfaceBand(square(middle, u, v), h);
   EXPECT_TRUE(made.band.isOpenSurface());
   EXPECT_EQ(made.borderEdges, 16u);
-  EXPECT_EQ(made.cutVoxels, 0u);
+  EXPECT_EQ(made.removedVoxels, 0u);
   EXPECT_DOUBLE_EQ(made.band.halfWidth(), 5);
   std::size_t within = 0, beyond = 0;
   support::forEachActive(made.band, [&](const V3d& p, double phi) {
@@ -119,7 +119,7 @@ TEST(SurfaceBand, FrontAndBackDoNotMeet) {
     TriMesh sheets = square(V3d(0, 0, 0.013), V3d(1, 0, 0), V3d(0, 1, 0));
     append(sheets, square(V3d(0, 0, 0.013 + gap), V3d(1, 0, 0), V3d(0, 1, 0)));
     const levelset::SurfaceBandResult made = surfaceBand(sheets, h);
-    EXPECT_GT(made.cutVoxels, 0u) << gap;
+    EXPECT_GT(made.removedVoxels, 0u) << gap;
     auto accessor = vdb(made.band).getConstAccessor();
     for (auto it = vdb(made.band).cbeginValueOn(); it; ++it) {
       const openvdb::Coord c = it.getCoord();

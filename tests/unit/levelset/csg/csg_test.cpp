@@ -11,6 +11,7 @@
 #include "levelset/error.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/measure.h"
+#include "levelset/placement/resample.h"
 #include "levelset/placement/transform.h"
 #include "levelset/solids/morphology.h"
 #include "levelset/solids/shapes.h"
@@ -295,13 +296,14 @@ TEST(Csg, BringsOperandsToTheFinestGrid) {
       result.notes[0],
       "union: operand 1 was resampled from voxels of 0.1 to the grid of operand 2 with voxels of "
       "0.05");
-  EXPECT_EQ(result.notes[1], "union: operand 2 cut to half width 3 voxels");
+  EXPECT_EQ(result.notes[1], "union: operand 2 was narrowed to a half width of 3 voxels");
   const double direct = measure(unite(makeSphere(1, V3d(0.5, 0, 0), 0.05), fine)).volume;
   EXPECT_NEAR(measure(result.band).volume, direct, 1e-3 * direct);
   // Widths alone are cut, not resampled.
   const NarrowBand wide = makeSphere(1, V3d(0), 0.1, {.halfWidth = 5});
   const CsgResult cut = combine(CsgOperation::Union, std::array{wide, coarse});
-  EXPECT_EQ(cut.notes, std::vector<std::string>{"union: operand 1 cut to half width 3 voxels"});
+  EXPECT_EQ(cut.notes,
+            std::vector<std::string>{"union: operand 1 was narrowed to a half width of 3 voxels"});
   EXPECT_TRUE(combine(CsgOperation::Union, std::array{coarse, coarse}).notes.empty());
   EXPECT_EQ(cut.band.contentHash(), unite(makeSphere(1, V3d(0), 0.1), coarse).contentHash());
 }

@@ -212,7 +212,7 @@ TEST(CurvatureFlow, LetsNoOtherLevelSetComeUpToTheSurface) {
                       {.scheme = scheme, .preservesVolume = true, .tolerance = 100, .step = 160})
             .band;
     const Measurement after = measure(flowed);
-    EXPECT_EQ(after.shells, 1u) << static_cast<int>(scheme);
+    EXPECT_EQ(after.surfaces, 1u) << static_cast<int>(scheme);
     EXPECT_NEAR(after.volume, before, 1e-3 * before) << static_cast<int>(scheme);
   }
 }

@@ -290,15 +290,15 @@ TEST(MeshAttributes, TransformKeepsNormalsAcross) {
 TEST(MeshAttributes, CarriedNormalsSurviveAnyScale) {
   const V3d n(1, 2, -3);
   for (const double scale : {1e-150, 1.0, 1e150})
-    EXPECT_LT((levelset::carriedNormal(n * scale,
+    EXPECT_LT((levelset::transformedNormal(n * scale,
                                        {V3d(scale, 0, 0), V3d(0, scale, 0), V3d(0, 0, scale)}, 1) -
                n.normalized())
                   .length(),
               1e-15);
   // A thin map is no flat one.
-  EXPECT_EQ(levelset::carriedNormal({1, 0, 0}, {V3d(1, 0, 0), V3d(0, 1e-9, 0), V3d(0, 0, 1e-9)}, 1),
+  EXPECT_EQ(levelset::transformedNormal({1, 0, 0}, {V3d(1, 0, 0), V3d(0, 1e-9, 0), V3d(0, 0, 1e-9)}, 1),
             V3d(1, 0, 0));
-  EXPECT_EQ(levelset::carriedNormal({0, 0, 1}, {V3d(1, 2, 0.1), V3d(3, 6, 0.3), V3d(0, 0, 1)}, 1),
+  EXPECT_EQ(levelset::transformedNormal({0, 0, 1}, {V3d(1, 2, 0.1), V3d(3, 6, 0.3), V3d(0, 0, 1)}, 1),
             V3d(0));
 }
 

@@ -180,16 +180,16 @@ TEST(MeshSeams, WhatIsLeftAsideIsTold) {
                   "property list uchar float texcoord\nproperty uchar red\nproperty uchar green\n"
                   "property uchar blue\n",
                   " 6 0 0 1 0 0 1 255 0 0"),
-              {.leftAside = &told});
+              {.unsupported = &told});
   EXPECT_EQ(told, (std::vector<std::string>{"colours of faces", "texture coordinates of faces"}));
   told.clear();
   const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 1\nvn 0 0 1\n";
-  (void)parse("a.obj", obj + "f 1/1 2/1 3/1\n", {.leftAside = &told});
+  (void)parse("a.obj", obj + "f 1/1 2/1 3/1\n", {.unsupported = &told});
   EXPECT_EQ(told, (std::vector<std::string>{"1 of 2 texture coordinates, which no face refers to",
                                             "1 of 1 normals, which no face refers to"}));
   told.clear();
-  (void)parse("a.obj", obj + "f 1/1/1 2/2/1 3/1/1\n", {.leftAside = &told});
-  (void)parse("a.obj", obj + "f 1 2 3\n", {.attributes = false, .leftAside = &told});
+  (void)parse("a.obj", obj + "f 1/1/1 2/2/1 3/1/1\n", {.unsupported = &told});
+  (void)parse("a.obj", obj + "f 1 2 3\n", {.attributes = false, .unsupported = &told});
   EXPECT_TRUE(told.empty());
 }
 
