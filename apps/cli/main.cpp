@@ -178,8 +178,8 @@ int runGraph(const pipeline::Graph& graph) {
       for (const pipeline::StepReport& step : report.steps)
         fmt::print(stderr, "{}\n", pipeline::stepLine(step, dryRun));
     if (report.tolerance && (verbose || dryRun))
-      for (const std::string& line : pipeline::toleranceLines(*report.tolerance))
-        fmt::print(stderr, "{}\n", line);
+      for (const std::string& text : pipeline::toleranceLines(*report.tolerance))
+        fmt::print(stderr, "{}\n", text);
     if (globals.contains("report")) pipeline::writeReport(globals.at("report"), report);
   };
   try {

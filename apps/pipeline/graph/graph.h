@@ -48,8 +48,9 @@ struct Graph {
 /// checkNode().
 void leaveVoxelOpen(Node& node);
 
-/// Finds the nodes that the requested results need, or the nodes that write, draw, print or check.
-/// If there are neither results nor such nodes, all nodes are needed.
+/// Finds the needed nodes: the requested results, the nodes that write, draw, print or check, and
+/// all nodes that these depend on. If there are neither results nor such nodes, all nodes are
+/// needed.
 /// @return one flag per node
 [[nodiscard]] std::vector<char> neededNodes(const Graph& graph);
 

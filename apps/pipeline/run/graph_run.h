@@ -59,7 +59,7 @@ class GraphRun {
   enum class NodeState {
     Unneeded,  // no requested result depends on it
     Compute,   // its operator must run
-    Load,      // a node that runs takes its value, and the cache has it
+    Load,      // the cache has its value, which a node that runs or the caller takes
     UpToDate   // its results exist and no node that runs takes its value
   };
   using ContinueCheck = std::function<bool()>;

@@ -242,8 +242,7 @@ void explain(const Graph& graph, std::size_t maxMemory, bool fullValues,
         seconds += cost->seconds;
         worked[i] = cost->bytes;
         if (cost->seconds > 0) text += "; " + inSeconds(cost->seconds);
-        if (cost->bytes > 0)
-          text += fmt::format(", working memory {:.3g} MB", cost->bytes * 1e-6);
+        if (cost->bytes > 0) text += fmt::format(", working memory {:.3g} MB", cost->bytes * 1e-6);
       } else {
         untimed.push_back(node.op->name);
       }

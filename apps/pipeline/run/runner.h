@@ -15,6 +15,7 @@
 
 namespace pipeline {
 
+/// Options and callbacks of a run.
 struct RunSettings {
   bool dryRun = false;
   bool measureErrors = false;  ///< estimate each result's error; costs a pass over the result
@@ -38,6 +39,7 @@ struct RunSettings {
   std::function<void(const std::string&)> warn = {}, note = {};
 };
 
+/// Inputs, result and cost of one action that ran.
 struct StepReport {
   std::string action;
   bool isCached = false;                          ///< the result comes from an earlier run
@@ -45,7 +47,7 @@ struct StepReport {
   std::map<std::string, std::string> defaults;    ///< defaults of the other options
   StepNotes notes;
   double wallSeconds = 0, cpuSeconds = 0;
-  double peakBytes = 0;
+  double peakBytes = 0;  ///< peak resident memory
   std::string resultName, resultKind;
   std::string location;  ///< position in the script, "FILE, line 4"; empty: none
   double activeVoxels = 0, voxelSize = 0, halfWidth = 0;
@@ -54,6 +56,7 @@ struct StepReport {
   Thumbnail thumbnail = {};  ///< picture of the result, if requested
 };
 
+/// Report of a complete run.
 struct RunReport {
   std::string graphJson;  ///< the complete graph as JSON
   std::vector<StepReport> steps;
