@@ -7,6 +7,8 @@
 #include "levelset/mesh.h"
 #include "levelset/mesh_sign/mesh_queries.h"
 #include "levelset/narrow_band.h"
+#include "levelset/operator/cost.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 #include "levelset/region_of_interest.h"
 
@@ -77,5 +79,45 @@ struct MeshToBandResult {
 /// @param action  start of the message
 /// @throws InvalidInput for a voxel larger than the object
 void checkVoxelSize(double voxelSize, double longestSide, const char* action = "level-set");
+
+/// The operator `level-set`.
+struct LevelSetOperator {
+  static const OperatorText text;
+  static constexpr Slope slope = Slope::One;
+  static constexpr bool makesPart = true;
+  static constexpr ErrorModel errorModel{1, 0.7, kCreaseError, "mesh-round-trip"};
+
+  struct Options {
+    VoxelSize voxel;
+    double halfWidth = 3;  ///< voxels
+    SignMode sign = SignMode::Auto;
+    Nesting nesting = Nesting::Parity;
+    bool acceptsSign = false;
+    bool skipsIntersectionTest = false;
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("voxel", &Options::voxel, {});
+      visit("half-width", &Options::halfWidth, kNewHalfWidth);
+      visit(
+          "sign", &Options::sign,
+          {{"auto", SignMode::Auto}, {"closed", SignMode::Closed}, {"winding", SignMode::Winding}},
+          {.help = "how inside is distinguished from outside"});
+      visit("nested", &Options::nesting,
+            {{"parity", Nesting::Parity}, {"orientation", Nesting::Orientation}},
+            {.help = "under 'closed': nested surfaces alternate, or follow their orientation"});
+      visit("accept-sign", &Options::acceptsSign,
+            {.help = "accept a sign that is a guess, or distances without an inside",
+             .formerName = "sign-anyway"});
+      visit("skip-intersection-test", &Options::skipsIntersectionTest,
+            {.help = "under 'auto': do not search self-intersections", .formerName = "trust-mesh"});
+    }
+  };
+
+  static double longestSide(const Options& options, Plans operands);
+  static NarrowBand run(const TriMesh& mesh, const Options& options, OperatorRun& run);
+  static ValuePlan plan(const Options& options, Plans operands, const OperatorRun& run);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
 
 }  // namespace levelset

@@ -4,6 +4,7 @@
 
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 
 /// Band of a surface that has a border: a base for patches, not a solid.
@@ -44,5 +45,30 @@ struct SurfaceBandResult {
 /// @throws ResourceLimit, Cancelled
 [[nodiscard]] SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
                                             const SurfaceBandOptions& options = {});
+
+/// The operator `surface-band`.
+struct SurfaceBandOperator {
+  static const OperatorText text;
+  static constexpr bool makesSurface = true;
+
+  struct Options {
+    VoxelSize voxel;
+    double halfWidth = 16;  ///< voxels
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("voxel", &Options::voxel, {});
+      visit("half-width", &Options::halfWidth,
+            {.help = "half width of the band, voxels, at least 4; 16 are enough for patches of up "
+                     "to ten voxels",
+             .range = OptionRange::Positive});
+    }
+  };
+
+  static void check(const Options& options, const GivenOptions& given);
+  static double longestSide(const Options& options, Plans operands);
+  static NarrowBand run(const TriMesh& mesh, const Options& options, OperatorRun& run);
+  static ValuePlan plan(const Options& options, Plans operands, const OperatorRun& run);
+};
 
 }  // namespace levelset

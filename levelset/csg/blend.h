@@ -56,4 +56,47 @@ struct BlendOptions {
 [[nodiscard]] CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b,
                               double radius, const BlendOptions& options = {});
 
+/// The operator `blend`.
+struct BlendOperator {
+  static const OperatorText text;
+  static constexpr std::size_t operandCount = 2;
+  static constexpr ErrorModel errorModel{2, 0.5, 0, "fillet-balls"};
+
+  struct Options {
+    double radius = 0;  ///< world units
+    CsgOperation operation = CsgOperation::Union;
+    BlendMethod method = BlendMethod::Curvature;
+    std::optional<double> reach;  ///< world units
+    BlendSide side = BlendSide::Both;
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("radius", &Options::radius,
+            {.help = "radius of the rounding",
+             .unit = OptionUnit::Length,
+             .range = OptionRange::NonNegative,
+             .required = true});
+      visit("op", &Options::operation,
+            {{"union", CsgOperation::Union},
+             {"intersection", CsgOperation::Intersection},
+             {"difference", CsgOperation::Difference}},
+            {.help = "operation whose seam is rounded"});
+      visit("method", &Options::method,
+            {{"curvature", BlendMethod::Curvature}, {"fillet", BlendMethod::Fillet}},
+            {.help = "method that rounds the seam"});
+      visit("reach", &Options::reach,
+            {.help = "fillet: largest distance of the middle of its arc from the seam, beyond "
+                     "which the ball gets smaller; default: twice the radius",
+             .unit = OptionUnit::Length,
+             .range = OptionRange::Positive});
+      visit("side", &Options::side,
+            {{"both", BlendSide::Both}, {"add", BlendSide::Add}, {"remove", BlendSide::Remove}},
+            {.help = "add material, remove it, or both"});
+    }
+  };
+
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+  static ValuePlan plan(const Options& options, Plans operands, const OperatorRun& run);
+};
+
 }  // namespace levelset

@@ -4,6 +4,8 @@
 #include <Imath/ImathPlane.h>
 
 #include "levelset/narrow_band.h"
+#include "levelset/operator/cost.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 
 namespace levelset {
@@ -21,5 +23,30 @@ namespace levelset {
 /// @throws InvalidInput if the result is empty
 [[nodiscard]] NarrowBand clip(const NarrowBand& solid, const Imath::Plane3d& plane,
                               const Progress& progress = {});
+
+/// The operator `clip`.
+struct ClipOperator {
+  static const OperatorText text;
+  static constexpr Slope slope = Slope::OfOperands;
+  static constexpr ErrorModel errorModel{2, kTriangleError, kCreaseError, "csg-balls"};
+
+  struct Options {
+    std::optional<Imath::Box3d> box;  ///< either this or `plane`
+    std::vector<Imath::V3d> plane;    ///< point and normal
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("box", &Options::box, {.help = "keep the part inside"});
+      visit("plane", &Options::plane, {.help = "point and normal: keep the part behind the plane"});
+    }
+  };
+
+  static void check(const Options& options, const GivenOptions& given);
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+  static ValuePlan plan(const Options& options, Plans operands, const OperatorRun& run);
+  static RegionOfInterest regionOfInterest(const Options& options, const OperatorPlans& plans,
+                                           std::size_t operand, const RegionOfInterest& ofResult);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
 
 }  // namespace levelset

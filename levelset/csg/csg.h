@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "levelset/narrow_band.h"
+#include "levelset/operator/cost.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 
 /// Union, intersection and difference of solids. Operands on different grids are resampled to the
@@ -36,5 +38,45 @@ struct CsgResult {
 [[nodiscard]] NarrowBand unite(const NarrowBand& a, const NarrowBand& b);
 [[nodiscard]] NarrowBand intersect(const NarrowBand& a, const NarrowBand& b);
 [[nodiscard]] NarrowBand subtract(const NarrowBand& a, const NarrowBand& b);
+
+/// Extent, in voxels, around a part of a cut or joined solid that decides the part. A seam is
+/// corrected up to the half width, from all surfaces within the half width. Faces that touch the
+/// blocks of 8³ beside the seam are computed again from as many voxels beyond those blocks.
+[[nodiscard]] constexpr double seamReach(double halfWidth) {
+  constexpr double kBlocks = 3 * 8;
+  return 2 * halfWidth + kBlocks;
+}
+
+/// Plan of a union, intersection or difference, as if surfaces were spread evenly over their boxes.
+[[nodiscard]] ValuePlan planCombined(CsgOperation operation, Plans operands);
+
+/// Estimates that the three operators share.
+template <CsgOperation operation>
+struct CsgOperator {
+  using Options = NoOptions;
+  static constexpr std::size_t operandCount = 2;
+  static constexpr bool takesMore = true;
+  static constexpr Slope slope = Slope::OfOperands;
+  static constexpr ErrorModel errorModel{2, kTriangleError, kCreaseError, "csg-balls"};
+
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+  static ValuePlan plan(const Options& options, Plans operands, const OperatorRun& run);
+  static RegionOfInterest regionOfInterest(const Options& options, const OperatorPlans& plans,
+                                           std::size_t operand, const RegionOfInterest& ofResult);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
+
+/// The operator `union`.
+struct UnionOperator : CsgOperator<CsgOperation::Union> {
+  static const OperatorText text;
+};
+/// The operator `intersection`.
+struct IntersectionOperator : CsgOperator<CsgOperation::Intersection> {
+  static const OperatorText text;
+};
+/// The operator `difference`.
+struct DifferenceOperator : CsgOperator<CsgOperation::Difference> {
+  static const OperatorText text;
+};
 
 }  // namespace levelset

@@ -4,6 +4,8 @@
 
 #include "levelset/fields/mask.h"
 #include "levelset/narrow_band.h"
+#include "levelset/operator/cost.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 
 namespace levelset {
@@ -57,5 +59,47 @@ struct CurvatureFlowResult {
 /// @throws Cancelled
 [[nodiscard]] CurvatureFlowResult curvatureFlow(NarrowBand solid, double time,
                                                 const CurvatureFlowOptions& options = {});
+
+/// The operator `curvature-flow`.
+struct CurvatureFlowOperator {
+  static const OperatorText text;
+  static constexpr ErrorModel errorModel{2, 0.9, 0, "curvature-sphere"};
+
+  struct Options {
+    double time = 0;  ///< world units²
+    bool preservesVolume = false;
+    FlowScheme scheme = FlowScheme::Auto;
+    std::optional<double> tolerance;  ///< world units
+    std::optional<double> step;       ///< world units²
+    std::optional<Mask> mask;
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("time", &Options::time,
+            {.help = "length of time, world units squared",
+             .range = OptionRange::NonNegative,
+             .required = true,
+             .position = 0});
+      visit("volume-preserving", &Options::preservesVolume,
+            {.help = "take the mean curvature off, so that the volume stays"});
+      visit("scheme", &Options::scheme,
+            {{"auto", FlowScheme::Auto},
+             {"explicit", FlowScheme::Explicit},
+             {"stabilized", FlowScheme::Stabilized},
+             {"implicit", FlowScheme::Implicit}},
+            {.help = "scheme of the steps in time; auto: the one predicted to cost least"});
+      visit("tolerance", &Options::tolerance,
+            {.help = "error of the steps in time, rms; default: 0.02vx",
+             .unit = OptionUnit::Length,
+             .range = OptionRange::Positive});
+      visit("step", &Options::step,
+            {.help = "longest step, world units squared", .range = OptionRange::Positive});
+      visit("mask", &Options::mask, {});
+    }
+  };
+
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
 
 }  // namespace levelset

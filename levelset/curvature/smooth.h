@@ -4,6 +4,8 @@
 
 #include "levelset/fields/mask.h"
 #include "levelset/narrow_band.h"
+#include "levelset/operator/cost.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 
 namespace levelset {
@@ -42,5 +44,40 @@ struct SmoothOptions {
 /// @throws Cancelled
 [[nodiscard]] NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma,
                                 const SmoothOptions& options = {});
+
+/// The operator `smooth`.
+struct SmoothOperator {
+  static const OperatorText text;
+  static constexpr Slope slope = Slope::One;
+  static constexpr double partTolerance = kDistanceTolerance;
+  static constexpr ErrorModel errorModel{2, kTriangleError, 0, "smooth"};
+
+  struct Options {
+    SmoothKind kind = SmoothKind::Gaussian;
+    double sigma = 0;  ///< world units
+    std::optional<Mask> mask;
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("kind", &Options::kind,
+            {{"gaussian", SmoothKind::Gaussian},
+             {"mean", SmoothKind::Mean},
+             {"median", SmoothKind::Median},
+             {"taubin", SmoothKind::Taubin}},
+            {.help = "kind of the filter"});
+      visit("sigma", &Options::sigma,
+            {.help = "standard deviation of the filter",
+             .unit = OptionUnit::Length,
+             .range = OptionRange::Positive,
+             .required = true});
+      visit("mask", &Options::mask, {});
+    }
+  };
+
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+  static RegionOfInterest regionOfInterest(const Options& options, const OperatorPlans& plans,
+                                           std::size_t operand, const RegionOfInterest& ofResult);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
 
 }  // namespace levelset

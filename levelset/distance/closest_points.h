@@ -4,6 +4,8 @@
 
 #include "levelset/fields/grid.h"
 #include "levelset/narrow_band.h"
+#include "levelset/operator/cost.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 
 namespace levelset {
@@ -38,5 +40,23 @@ struct ClosestPointOptions {
 /// Extends a vector attribute, taken at time 0, off the surface in the same way.
 [[nodiscard]] FieldGrid extendOffSurface(const NarrowBand& solid, const VectorField& attribute,
                                          const ClosestPointOptions& options = {});
+
+/// The operator `closest-point`.
+struct ClosestPointOperator {
+  static const OperatorText text;
+
+  struct Options {
+    std::optional<double> halfWidth;  ///< of the result, voxels
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("half-width", &Options::halfWidth, kResultHalfWidth);
+    }
+  };
+
+  static FieldGrid run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+  static ValuePlan plan(const Options& options, Plans operands, const OperatorRun& run);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
 
 }  // namespace levelset

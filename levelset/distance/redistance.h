@@ -6,6 +6,8 @@
 #include <optional>
 
 #include "levelset/narrow_band.h"
+#include "levelset/operator/cost.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 
 namespace levelset {
@@ -47,5 +49,49 @@ inline constexpr double kReadBySurface = 6;
 /// @throws ResourceLimit when the result does not fit into memory
 /// @throws Cancelled
 [[nodiscard]] NarrowBand redistance(NarrowBand field, const RedistanceOptions& options = {});
+
+/// Estimates the cost of distances that are computed again.
+/// @param layer      ValuePlan::layer() of the surface
+/// @param halfWidth  of the result, voxels
+[[nodiscard]] Cost costOfDistances(double layer, double halfWidth);
+
+/// Options of the operators `reinitialize` and `rebuild-band`.
+template <bool isRequired>
+struct HalfWidthOptions {
+  std::optional<double> halfWidth;  ///< of the result, voxels
+
+  template <class Visitor>
+  static void describe(Visitor& visit) {
+    OptionInfo info = kResultHalfWidth;
+    info.required = isRequired;
+    if (isRequired) info.help = "half width of the result, in voxels";
+    visit("half-width", &HalfWidthOptions::halfWidth, info);
+  }
+};
+
+/// Estimates that the two operators share.
+template <bool isRequired>
+struct RedistanceOperator {
+  using Options = HalfWidthOptions<isRequired>;
+  static constexpr Slope slope = Slope::One;
+  static constexpr double partTolerance = kDistanceTolerance;
+
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+  static ValuePlan plan(const Options& options, Plans operands, const OperatorRun& run);
+  static RegionOfInterest regionOfInterest(const Options& options, const OperatorPlans& plans,
+                                           std::size_t operand, const RegionOfInterest& ofResult);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
+
+/// The operator `reinitialize`.
+struct ReinitializeOperator : RedistanceOperator<false> {
+  static const OperatorText text;
+  static constexpr ErrorModel errorModel{2, kTriangleError, 0, "redistance"};
+};
+/// The operator `rebuild-band`.
+struct RebuildBandOperator : RedistanceOperator<true> {
+  static const OperatorText text;
+  static constexpr ErrorModel errorModel{2, kTriangleError, 0, "half-widths"};
+};
 
 }  // namespace levelset

@@ -5,6 +5,8 @@
 
 #include "levelset/fields/grid.h"
 #include "levelset/narrow_band.h"
+#include "levelset/operator/cost.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 
 /// Arrival times of fronts that move along their normals at a given speed: |∇T| F = 1.
@@ -75,5 +77,55 @@ struct FrontDistance {
 /// @throws UsageError also when a speed is set, or `reach` is below one voxel
 [[nodiscard]] FrontDistance frontDistance(const NarrowBand& solid, double reach,
                                           const ArrivalOptions& options = {});
+
+/// Options of the operators `fast-marching` and `fast-sweeping`.
+struct FrontOptions {
+  Length to = Length::voxels(8);
+  ScalarField speed;             ///< world units per unit of time
+  std::vector<Imath::V3d> from;  ///< world units; empty: the surface
+  int order = 2;
+  Attribute extend;
+
+  template <class Visitor>
+  static void describe(Visitor& visit) {
+    visit("to", &FrontOptions::to,
+          {.help = "latest time, which at speed 1 is a distance",
+           .unit = OptionUnit::Length,
+           .range = OptionRange::Positive});
+    visit("speed", &FrontOptions::speed,
+          {.help = "F, in world units per unit of time; default: 1"});
+    visit("from", &FrontOptions::from,
+          {.help = "start at these points, on the grid of the operand, in place of its surface"});
+    visit("order", &FrontOptions::order, {{"1", 1}, {"2", 2}},
+          {.help = "order of the differences; 2 falls back to 1 where it must"});
+    visit("extend", &FrontOptions::extend,
+          {.help = "in place of times: this attribute, carried off the surface along its normals"});
+  }
+};
+
+/// Operator that moves a front from a surface or from points.
+template <FrontMethod method>
+struct FrontOperator {
+  using Options = FrontOptions;
+
+  static void check(const Options& options, const GivenOptions& given);
+  /// True when the result is a field of times or of the attribute, not a band of distances.
+  static bool makesField(const Options& options) {
+    return options.speed || !options.from.empty() || options.extend;
+  }
+  static std::variant<NarrowBand, FieldGrid> run(std::vector<NarrowBand> operands,
+                                                 const Options& options, OperatorRun& run);
+  static ValuePlan plan(const Options& options, Plans operands, const OperatorRun& run);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
+
+/// The operator `fast-marching`.
+struct FastMarchingOperator : FrontOperator<FrontMethod::Marching> {
+  static const OperatorText text;
+};
+/// The operator `fast-sweeping`.
+struct FastSweepingOperator : FrontOperator<FrontMethod::Sweeping> {
+  static const OperatorText text;
+};
 
 }  // namespace levelset

@@ -5,7 +5,9 @@
 
 #include "levelset/fields/field.h"
 #include "levelset/fields/mask.h"
+#include "levelset/flow/velocity.h"
 #include "levelset/narrow_band.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 
 namespace levelset {
@@ -74,6 +76,51 @@ class Advection {
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
+};
+
+/// The operator `advect`.
+struct AdvectOperator {
+  static const OperatorText text;
+  static constexpr ErrorModel errorModel{2, 1.1, 0, "rigid-rotation"};
+
+  struct Options {
+    NamedVelocity field;
+    double time = 0, start = 0;
+    AdvectScheme scheme = AdvectScheme::Front;
+    std::optional<double> period;  ///< of a velocity known by its name
+    Imath::V3d center = Imath::V3d(0), axis = Imath::V3d(0, 0, 1);
+    std::string factor;  ///< formula in t; empty: 1
+    bool fixVolume = false;
+    std::optional<Mask> mask;
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("field", &Options::field,
+            {.help = "the velocity, world units per unit of time", .required = true});
+      visit("time", &Options::time,
+            {.help = "length of time; negative: backwards", .required = true});
+      visit("start", &Options::start, {.help = "time of the velocity at which it begins"});
+      visit("scheme", &Options::scheme,
+            {{"front", AdvectScheme::Front},
+             {"semi-lagrangian", AdvectScheme::SemiLagrangian},
+             {"upwind", AdvectScheme::Upwind}},
+            {.help = "numerical scheme"});
+      visit("period", &Options::period,
+            {.help = "period of a velocity known by its name; default: enright 3, vortex 8, "
+                     "rotation 1",
+             .range = OptionRange::Positive});
+      visit("center", &Options::center, {.help = "centre of the rotation"});
+      visit("axis", &Options::axis, {.help = "axis of the rotation"});
+      visit("factor", &Options::factor,
+            {.help = "formula in t that the velocity is multiplied by"});
+      visit("fix-volume", &Options::fixVolume,
+            {.help = "offset the result to the volume of the solid"});
+      visit("mask", &Options::mask, {});
+    }
+  };
+
+  static void check(const Options& options, const GivenOptions& given);
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
 };
 
 }  // namespace levelset

@@ -60,4 +60,9 @@ VectorField rotationVelocity(const V3d& center, const V3d& axis, double period) 
   return [center, spin](const V3d& p, double) { return spin.cross(p - center); };
 }
 
+const std::vector<std::string>& velocityNames() {
+  static const std::vector<std::string> names{"enright", "rotation", "vortex"};
+  return names;
+}
+
 }  // namespace levelset

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "levelset/fields/field.h"
 
 /// Standard velocity fields for tests of advection.
@@ -18,5 +21,14 @@ namespace levelset {
 /// @throws UsageError also for an axis of zero length or a point that is not finite
 [[nodiscard]] VectorField rotationVelocity(const Imath::V3d& center, const Imath::V3d& axis,
                                            double period = 1);
+
+/// Velocity of an option: one known by its name, or a field.
+struct NamedVelocity {
+  std::string name = {};   ///< one of velocityNames(); empty: `field` counts
+  VectorField field = {};  ///< world units per unit of time
+};
+
+/// Names of the velocities above: enright, rotation, vortex.
+[[nodiscard]] const std::vector<std::string>& velocityNames();
 
 }  // namespace levelset

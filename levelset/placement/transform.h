@@ -4,6 +4,8 @@
 
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
+#include "levelset/operator/cost.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 
 namespace levelset {
@@ -34,5 +36,54 @@ struct BakeOptions {
 /// @throws UsageError if the matrix is not affine and invertible
 /// @throws InvalidInput if attributes do not fit the vertices, or a coordinate exceeds 1e100
 [[nodiscard]] TriMesh transform(TriMesh mesh, const Imath::M44d& matrix);
+
+/// The operator `transform`.
+struct TransformOperator {
+  static const OperatorText text;
+  static constexpr Slope slope = Slope::OfOperands;
+  static constexpr double partTolerance = kDistanceTolerance;  // of `bake`; otherwise to the bit
+  static constexpr ErrorModel errorModel{2, 0.65, 0, "resample-chain"};
+
+  struct Options {
+    std::optional<Imath::M44d> matrix;    ///< row vectors, translation in the last row
+    std::optional<Imath::V3d> translate;  ///< world units
+    std::vector<double> rotate;           ///< degrees: one angle about `axis`, or three
+    Imath::V3d axis = Imath::V3d(0, 0, 1);
+    std::vector<double> scale;  ///< one factor, or three
+    std::optional<int> mirror;  ///< 0 to 2: x, y, z
+    Imath::V3d about = Imath::V3d(0);
+    bool bake = false;
+    std::optional<double> voxel;  ///< world units
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("matrix", &Options::matrix,
+            {.help = "acts on row vectors, translation in the last row"});
+      visit("translate", &Options::translate, {.help = "world units"});
+      visit("rotate", &Options::rotate,
+            {.help = "degrees about --axis, or about x, then y, then z"});
+      visit("axis", &Options::axis, {.help = "axis of a single --rotate"});
+      visit("scale", &Options::scale,
+            {.help = "one factor, or one for each axis", .range = OptionRange::Positive});
+      visit("mirror", &Options::mirror, {{"x", 0}, {"y", 1}, {"z", 2}},
+            {.help = "across the plane through --about"});
+      visit("about", &Options::about, {.help = "centre of mirror, scale and rotate"});
+      visit("bake", &Options::bake, {.help = "resample on an axis-aligned uniform grid"});
+      visit("voxel", &Options::voxel,
+            {.help = "voxel size of the baked grid; default: as before",
+             .unit = OptionUnit::Length,
+             .range = OptionRange::Positive,
+             .allowsVoxels = false});
+    }
+  };
+
+  static void check(const Options& options, const GivenOptions& given);
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+  static TriMesh run(const TriMesh& mesh, const Options& options, OperatorRun& run);
+  static ValuePlan plan(const Options& options, Plans operands, const OperatorRun& run);
+  static RegionOfInterest regionOfInterest(const Options& options, const OperatorPlans& plans,
+                                           std::size_t operand, const RegionOfInterest& ofResult);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
 
 }  // namespace levelset

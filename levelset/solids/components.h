@@ -4,6 +4,8 @@
 #include <limits>
 
 #include "levelset/narrow_band.h"
+#include "levelset/operator/cost.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 
 /// Connected components of a solid and of the space around it. Inside grid points connect along the
@@ -50,5 +52,46 @@ struct SliversDropped {
 /// @pre both are solids, and the band of `cutter` is at least two voxels of `solid` wide
 [[nodiscard]] SliversDropped dropSlivers(const NarrowBand& solid, const NarrowBand& cutter,
                                          const Progress& progress = {});
+
+/// The operator `keep`.
+struct KeepOperator {
+  static const OperatorText text;
+  static constexpr ErrorModel errorModel{2, 0, 0, "shapes"};
+
+  struct Options {
+    std::size_t largest = 1;
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("largest", &Options::largest,
+            {.help = "number of solids to keep, by volume",
+             .range = OptionRange::Positive,
+             .required = true});
+    }
+  };
+
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
+
+/// The operator `fill-cavities`.
+struct FillCavitiesOperator {
+  static const OperatorText text;
+  static constexpr ErrorModel errorModel{2, 0, 0, "shapes"};
+
+  struct Options {
+    std::optional<double> upTo;  ///< world units³
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("up-to", &Options::upTo,
+            {.help = "only voids up to this volume, world units cubed",
+             .range = OptionRange::Positive});
+    }
+  };
+
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
 
 }  // namespace levelset

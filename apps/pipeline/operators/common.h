@@ -41,24 +41,8 @@ inline std::vector<std::string> sentencesOf(const levelset::BandRepairs& repairs
   return sentences;
 }
 
-/// @param box  everywhere stays so
-inline Imath::Box3d grown(Imath::Box3d box, double by) {
-  box.min -= Imath::V3d(by);
-  box.max += Imath::V3d(by);
-  return box;
-}
-
-/// Voxels beside a part of a cut or joined solid that the part follows from: a seam is corrected as
-/// far as the band reaches, from all that lies there, and about faces that touch the blocks of 8³
-/// beside them are made again from what lies as far beyond those.
-inline double seamReach(double halfWidth) {
-  constexpr double kBlocks = 3 * 8;
-  return 2 * halfWidth + kBlocks;
-}
-
-/// Where distances are made of a part, values that are right already may be kept where they are not
-/// of the whole, or the other way round. Voxels.
-inline constexpr double kDistanceTolerance = 1e-4;
+using levelset::grown;
+using levelset::kDistanceTolerance;
 
 inline Param voxelParam(const char* doc = "edge of a voxel") {
   return {.name = "voxel",
@@ -79,7 +63,7 @@ inline void requireVoxelSize(const Invocation& in) {
 inline Param halfWidthParam(const char* fallback = "3") {
   return {.name = "half-width",
           .type = ParamType::Number,
-          .doc = "reach of the band on each side, in voxels",
+          .doc = "extent of the band on each side, in voxels",
           .fallback = fallback,
           .range = Range::Positive};
 }

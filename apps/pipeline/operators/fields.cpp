@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <cmath>
+
 #include "levelset/error.h"
 #include "levelset/fields/expression.h"
 #include "levelset/fields/grid.h"
@@ -21,6 +23,23 @@ levelset::VectorField vectorField(const Invocation& in, const std::string& param
   const auto named = in.named.find(param);
   if (named == in.named.end()) return levelset::vectorExpression(in.text(param), where.c_str());
   return levelset::asVectorField(named->second.field(), where.c_str());
+}
+
+levelset::Attribute attribute(const Invocation& in, const std::string& param) {
+  const auto named = in.named.find(param);
+  if (named != in.named.end() && named->second.kind() == Kind::Field &&
+      named->second.field().isVector())
+    return {.vector = vectorField(in, param)};
+  // Refused here, where the parameter's text is known, not in the field that is made of it.
+  return {.scalar = [scalar = scalarField(in, param), where = in.where(param),
+                     text = in.text(param)](const Imath::V3d& p) {
+    const double value = scalar(p);
+    if (std::isfinite(static_cast<float>(value))) return value;
+    throw levelset::InvalidInput(
+        fmt::format("{}: '{}' is {} on the surface at {:.6g},{:.6g},{:.6g}; give an attribute that "
+                    "is finite on all of it",
+                    where, text, value, p.x, p.y, p.z));
+  }};
 }
 
 std::vector<Param> maskParams() {

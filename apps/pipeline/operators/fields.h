@@ -18,6 +18,10 @@ namespace pipeline {
 /// @throws levelset::UsageError, InvalidInput for a field of numbers
 [[nodiscard]] levelset::VectorField vectorField(const Invocation& in, const std::string& param);
 
+/// A parameter of type Scalar that is an attribute of a surface: numbers, or vectors.
+/// The numbers throw levelset::InvalidInput where they are not finite.
+[[nodiscard]] levelset::Attribute attribute(const Invocation& in, const std::string& param);
+
 /// --mask, --mask-min, --mask-max and --mask-invert: to be added to an operator's parameters.
 [[nodiscard]] std::vector<Param> maskParams();
 /// `params` and those of a mask.

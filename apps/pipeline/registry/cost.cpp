@@ -7,12 +7,6 @@
 
 namespace pipeline {
 
-Cost& Cost::operator+=(const Cost& next) {
-  seconds += next.seconds;
-  bytes = std::max(bytes, next.bytes);
-  return *this;
-}
-
 CostOf costPerVoxel(double nanoseconds, double bytes, double perTriangle) {
   return [=](Invocation& in) -> std::optional<Cost> {
     struct Size {

@@ -4,20 +4,13 @@
 #include <optional>
 
 #include "apps/pipeline/values/value.h"
+#include "levelset/operator/cost.h"
 
 namespace pipeline {
 
 class Invocation;
 
-/// What running an action takes, roughly: as measured on solids of some million voxels, which
-/// tests/bench/step_costs.py does again and holds against this.
-struct Cost {
-  double seconds = 0;  ///< CPU time
-  double bytes = 0;    ///< worked with at once, beside operands and result
-
-  /// Of one after the other.
-  Cost& operator+=(const Cost& next);
-};
+using levelset::Cost;
 
 /// Its operands are plans of what is read, and Invocation::planned that of what is made. Empty
 /// where it cannot be told.

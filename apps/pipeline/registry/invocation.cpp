@@ -94,6 +94,10 @@ void Invocation::note(const Resolved& length) {
     *known = length;
 }
 
+double Invocation::writtenLength(const std::string& name) const {
+  return parseLength(text(name), where(name)).number;
+}
+
 double Invocation::length(const std::string& name) {
   return toWorld(name, text(name), name);
 }

@@ -13,6 +13,7 @@
 
 #include "apps/pipeline/registry/operator.h"
 #include "apps/pipeline/values/value.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 #include "levelset/region_of_interest.h"
 
@@ -26,12 +27,7 @@ struct Resolved {
   std::optional<double> voxels = {};
 };
 
-/// One figure that says how far off a result may be.
-struct ErrorEstimate {
-  std::string measure;  ///< "eikonal residual, mean"
-  double value = 0;
-  std::string unit;  ///< "" or "voxels" or a world unit
-};
+using levelset::ErrorEstimate;
 
 /// What an operator left behind beside its value.
 struct StepNotes {
@@ -83,6 +79,8 @@ class Invocation {
   [[nodiscard]] std::pair<int, int> imageSize(const std::string& name) const;
   /// World units. `vx` and `%` refer to the first operand, or to setReference().
   [[nodiscard]] double length(const std::string& name);
+  /// The number of a length as it was written, whatever its unit.
+  [[nodiscard]] double writtenLength(const std::string& name) const;
   /// As many as its parameter counts.
   [[nodiscard]] std::vector<double> lengths(const std::string& name);
   /// The voxel size asked by --voxel or --resolution; the latter needs the object's longest side.

@@ -196,30 +196,7 @@ const Param* Operator::find(const std::string& param) const {
 }
 
 const std::vector<Operator>& operators() {
-  static const std::vector<Operator> all = [] {
-    std::vector<Operator> list;
-    addFileOperators(list);
-    addShapeOperators(list);
-    addConversionOperators(list);
-    addSolidOperators(list);
-    addAdvectionOperators(list);
-    addEikonalOperators(list);
-    addFlowOperators(list);
-    addPlacementOperators(list);
-    addPatchOperators(list);
-    addScatterOperators(list);
-    addTextureOperators(list);
-    addAnimationOperators(list);
-    addGeneratorOperators(list);
-    addFoldOperators(list);
-    addInspectionOperators(list);
-    addSceneOperators(list);
-    addSliceOperators(list);
-    addPictureOperators(list);
-    addRegressionOperators(list);
-    addCacheOperators(list);
-    return list;
-  }();
+  static const std::vector<Operator> all = allOperators();
   return all;
 }
 

@@ -6,6 +6,7 @@
 
 #include "apps/pipeline/registry/cost.h"
 #include "apps/pipeline/values/value.h"
+#include "levelset/operator/description.h"
 #include "levelset/region_of_interest.h"
 
 /// The registry: one declaration per operator. The command line, its help and its checks are made
@@ -36,7 +37,7 @@ enum class ParamType {
             ///< field
 };
 
-enum class Range { Any, Positive, NonNegative };
+using Range = levelset::OptionRange;
 
 struct Param {
   std::string name;  ///< without the dashes
@@ -46,10 +47,11 @@ struct Param {
   std::vector<std::string> choices = {};  ///< of a Choice
   Range range = Range::Any;
   bool required = false;
-  std::size_t count = 1;     ///< Lengths: how many, with commas between them
-  int position = -1;         ///< ≥ 0: may be given without its name, at this place
-  bool allowsVoxels = true;  ///< Length: may it be given in vx?
-  bool allowsAuto = false;   ///< Length: `auto` is an answer too
+  std::size_t count = 1;        ///< Lengths: how many, with commas between them
+  int position = -1;            ///< ≥ 0: may be given without its name, at this place
+  bool allowsVoxels = true;     ///< Length: may it be given in vx?
+  bool allowsAuto = false;      ///< Length: `auto` is an answer too
+  std::string formerName = {};  ///< a name that scripts used before; it keeps working
 };
 
 /// The type in words, e.g. "image size".
@@ -69,19 +71,15 @@ enum class Flow {
   PassesThrough  ///< leaves its operand where it is: write, measure, check, info, render
 };
 
-/// What is known of the slope of the band that an operator makes.
-enum class Slope {
-  Any,        ///< it may be no distance
-  One,        ///< a distance
-  OfOperands  ///< a distance, if all operands are
-};
+using levelset::Slope;
 
 struct Operator {
   std::string name;
-  std::string group;         ///< heading in `help`
-  std::string summary;       ///< one line
-  std::string details = {};  ///< what a user should know beyond the parameters
-  std::string example = {};  ///< a whole command line
+  std::string group;            ///< heading in `help`
+  std::string summary;          ///< one line
+  std::string details = {};     ///< what a user should know beyond the parameters
+  std::string example = {};     ///< a whole command line
+  std::string formerName = {};  ///< a name that scripts used before; it keeps working
   std::vector<Param> params = {};
   std::vector<std::vector<Kind>> operands = {};  ///< kinds allowed at each place
   bool takesMore = false;         ///< further operands of the last place's kinds may follow
@@ -96,6 +94,9 @@ struct Operator {
   std::function<Plan(Invocation&)> plan = {};
   /// What `run` takes beside its operands and its result; without it, nobody knows.
   CostOf cost = {};
+  std::optional<levelset::ErrorModel> errorModel = {};
+  /// Least radius of curvature of the result, world units; not positive where options do not tell.
+  std::function<double(Invocation&)> leastRadius = {};
   Slope slope = Slope::Any;
   /// The region of interest of an operand, given that of the result; without it, the whole. The
   /// operands are plans, and Invocation::planned is that of the whole result. Inside the part the
@@ -124,26 +125,7 @@ struct Operator {
 /// `run FILE`, which parseChain() replaces by the actions of the file: for help only.
 [[nodiscard]] const Operator& runOperator();
 
-// Each fills its group; see apps/pipeline/operators/.
-void addFileOperators(std::vector<Operator>& all);
-void addShapeOperators(std::vector<Operator>& all);
-void addConversionOperators(std::vector<Operator>& all);
-void addSolidOperators(std::vector<Operator>& all);
-void addAdvectionOperators(std::vector<Operator>& all);
-void addEikonalOperators(std::vector<Operator>& all);
-void addFlowOperators(std::vector<Operator>& all);
-void addPlacementOperators(std::vector<Operator>& all);
-void addPatchOperators(std::vector<Operator>& all);
-void addScatterOperators(std::vector<Operator>& all);
-void addTextureOperators(std::vector<Operator>& all);
-void addAnimationOperators(std::vector<Operator>& all);
-void addGeneratorOperators(std::vector<Operator>& all);
-void addFoldOperators(std::vector<Operator>& all);
-void addInspectionOperators(std::vector<Operator>& all);
-void addSceneOperators(std::vector<Operator>& all);
-void addSliceOperators(std::vector<Operator>& all);
-void addPictureOperators(std::vector<Operator>& all);
-void addRegressionOperators(std::vector<Operator>& all);
-void addCacheOperators(std::vector<Operator>& all);
+/// One line per operator, in the order of the help: apps/pipeline/operators/all_operators.cpp.
+[[nodiscard]] std::vector<Operator> allOperators();
 
 }  // namespace pipeline

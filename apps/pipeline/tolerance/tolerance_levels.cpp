@@ -56,7 +56,7 @@ LevelRunner::LevelRunner(const Graph& graph, const ToleranceParts& parts,
     const Node& node = graph.nodes[i];
     if (node.op->name == "level-set")
       meshes_.push_back(node.inputs.at(0));
-    else if (node.kind == Kind::Band && errorModel(node.op->name).creaseConstant > 0)
+    else if (node.kind == Kind::Band && errorModel(*node.op).creaseConstant > 0)
       hasCreases_ = true;
   }
   meshes_ = joined(meshes_, {});

@@ -29,24 +29,33 @@ const char* kindName(Kind kind) {
   return "";
 }
 
+levelset::ValuePlan Plan::estimate() const {
+  return {.bounds = bounds,
+          .area = area,
+          .voxelSize = voxelSize,
+          .halfWidth = halfWidth,
+          .triangles = triangles,
+          .fieldBytes = fieldBytes};
+}
+
+void Plan::set(const levelset::ValuePlan& estimate) {
+  bounds = estimate.bounds;
+  area = estimate.area;
+  voxelSize = estimate.voxelSize;
+  halfWidth = estimate.halfWidth;
+  triangles = estimate.triangles;
+  fieldBytes = estimate.fieldBytes;
+}
+
 double Plan::activeVoxels() const {
-  if (!(voxelSize > 0)) return 0;
-  const double layer = area / (voxelSize * voxelSize) * 2 * halfWidth;
-  if (bounds.isEmpty()) return layer;
-  // The band cannot have more voxels than its bounding box.
-  double all = 1;
-  for (int axis = 0; axis < 3; ++axis)
-    all *= (bounds.max[axis] - bounds.min[axis]) / voxelSize + 2 * halfWidth + 1;
-  return std::min(layer, all);
+  return voxelSize > 0 ? estimate().activeVoxels() : 0;
 }
 
 double Plan::bytes() const {
   if (kind == Kind::Field) return fieldBytes;
   // Three vertex indices for each triangle, and one position for every two triangles.
   if (kind == Kind::Mesh) return (3 * sizeof(std::uint32_t) + sizeof(Imath::V3d) / 2.0) * triangles;
-  // Measured: a band fills about a third of its leaf blocks, so an active voxel takes 12 bytes.
-  constexpr double kBytesPerVoxel = 12;
-  return kBytesPerVoxel * activeVoxels();
+  return levelset::kBytesPerVoxel * activeVoxels();
 }
 
 Value::Value(TriMesh mesh) : data_(std::make_shared<const TriMesh>(std::move(mesh))) {}

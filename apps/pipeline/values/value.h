@@ -13,6 +13,7 @@
 #include "levelset/fields/grid.h"
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
+#include "levelset/operator/plan.h"
 #include "mapping/animation/animation.h"
 #include "mapping/patches/patch.h"
 #include "render/views/scene_file.h"
@@ -43,6 +44,10 @@ struct Plan {
   /// determine it.
   Imath::V3d patchSize = Imath::V3d(0);
   double patchCount = 1;
+
+  /// The estimates that operators of levelset read.
+  [[nodiscard]] levelset::ValuePlan estimate() const;
+  void set(const levelset::ValuePlan& estimate);
   /// Estimated number of active voxels of a band with this area.
   [[nodiscard]] double activeVoxels() const;
   /// Estimated memory of the value, bytes.

@@ -5,8 +5,8 @@
 
 #include "apps/regress/recorder.h"
 #include "apps/regress/truth/exact_band.h"
-#include "levelset/flow/morph.h"
 #include "levelset/inspect/compare.h"
+#include "levelset/solids/morph.h"
 
 namespace regress {
 

@@ -279,12 +279,12 @@ TEST(Tolerance, StaysWithTheGraph) {
 
 TEST(ErrorModels, NameCasesOfTheSuite) {
   for (const char* action : {"sphere", "level-set", "union", "offset", "smooth", "mesh"}) {
-    const pipeline::ErrorModel& model = pipeline::errorModel(action);
-    EXPECT_STREQ(model.action, action);
-    EXPECT_STRNE(model.source, "");
-    EXPECT_TRUE(pipeline::findOperator(action));
+    const pipeline::Operator* op = pipeline::findOperator(action);
+    ASSERT_TRUE(op) << action;
+    EXPECT_TRUE(op->errorModel) << action;
+    EXPECT_STRNE(pipeline::errorModel(*op).source, "") << action;
   }
-  EXPECT_EQ(pipeline::errorModel("texture").order, 1);
+  EXPECT_EQ(pipeline::errorModel(*pipeline::findOperator("texture")).order, 1);
 }
 
 TEST(ErrorModels, PickTheFirstVoxelSize) {

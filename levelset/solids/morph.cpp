@@ -1,4 +1,4 @@
-#include "levelset/flow/morph.h"
+#include "levelset/solids/morph.h"
 
 #include <fmt/core.h>
 #include <openvdb/tree/LeafManager.h>

@@ -5,6 +5,7 @@
 
 #include "levelset/fields/mask.h"
 #include "levelset/narrow_band.h"
+#include "levelset/operator/description.h"
 #include "levelset/progress.h"
 
 namespace levelset {
@@ -40,5 +41,37 @@ struct MorphOptions {
 /// @throws Cancelled
 [[nodiscard]] NarrowBand morph(const NarrowBand& solid, const NarrowBand& target,
                                const MorphOptions& options = {});
+
+/// The operator `morph`.
+struct MorphOperator {
+  static const OperatorText text;
+  static constexpr std::size_t operandCount = 2;
+  static constexpr ErrorModel errorModel{2, 0.45, kCreaseError, "morph"};
+
+  struct Options {
+    int steps = 1;
+    std::string until = "converged";
+    std::optional<double> tolerance;  ///< world units
+    std::optional<Mask> mask;
+    std::function<void(const NarrowBand& step, int number)> keep;  ///< as MorphOptions::keep
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit(
+          "steps", &Options::steps,
+          {.help = "number of steps from the solid to the target", .range = OptionRange::Positive});
+      visit("until", &Options::until,
+            {.help = "converged: on the target; or a part of the way, above 0 and up to 1"});
+      visit("tolerance", &Options::tolerance,
+            {.help = "a step as near as this to the target is the last",
+             .unit = OptionUnit::Length,
+             .range = OptionRange::Positive});
+      visit("mask", &Options::mask, {});
+    }
+  };
+
+  static void check(const Options& options, const GivenOptions& given);
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+};
 
 }  // namespace levelset

@@ -1,4 +1,4 @@
-#include "levelset/flow/morph.h"
+#include "levelset/solids/morph.h"
 
 #include <gtest/gtest.h>
 #include <openvdb/tools/Diagnostics.h>

@@ -1,0 +1,10 @@
+#pragma once
+
+#include "apps/pipeline/registry/operator.h"
+
+namespace pipeline {
+
+/// `morph` with --keep-steps, which writes a file for each step.
+[[nodiscard]] Operator morphOperator();
+
+}  // namespace pipeline

@@ -1,0 +1,148 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "levelset/convert/mesh_to_band.h"
+#include "levelset/convert/surface_band.h"
+#include "levelset/error.h"
+
+namespace levelset {
+namespace {
+
+Figures figuresOf(const SignCertificate& c) {
+  Figures figures{{"closed", c.closed},
+                  {"boundary_edges", c.boundaryEdges},
+                  {"non_manifold_edges", c.nonManifoldEdges}};
+  if (c.selfIntersections < 0)
+    figures.emplace_back("self_intersections", std::string("not searched"));
+  else
+    figures.emplace_back("self_intersections", static_cast<std::size_t>(c.selfIntersections));
+  figures.emplace_back("method", std::string(c.method == SignMode::Closed ? "closed" : "winding"));
+  figures.emplace_back("flipped", c.flipped);
+  figures.emplace_back("ambiguous_share", c.ambiguousShare);
+  figures.emplace_back("dropped_triangles", c.droppedTriangles);
+  return figures;
+}
+
+}  // namespace
+
+const OperatorText LevelSetOperator::text{
+    .name = "level-set",
+    .group = "Conversion",
+    .summary = "turn a mesh into a level set with exact distances",
+    .details =
+        "auto takes 'closed' when every edge has two faces and no self-intersection is "
+        "found, otherwise "
+        "'winding' (inside where the generalised winding number passes one half). The sign "
+        "certificate says what "
+        "was found; where the sign would be a guess the mesh is refused unless "
+        "--accept-sign.",
+    .example = "levelsmith read dragon.ply ! level-set --resolution 512 ! write dragon.vdb"};
+
+double LevelSetOperator::longestSide(const Options&, Plans operands) {
+  return operands[0].longestSide();
+}
+
+NarrowBand LevelSetOperator::run(const TriMesh& mesh, const Options& options, OperatorRun& run) {
+  const MeshToBandOptions settings{.halfWidth = options.halfWidth,
+                                   .sign = options.sign,
+                                   .nesting = options.nesting,
+                                   .acceptSign = options.acceptsSign,
+                                   .searchSelfIntersections = !options.skipsIntersectionTest,
+                                   .roi = run.roi,
+                                   .maxMemory = run.maxMemory,
+                                   .progress = run.progress,
+                                   .onCertificate = [&](const SignCertificate& certificate) {
+                                     run.certificate = figuresOf(certificate);
+                                     run.notes.push_back(describe(certificate));
+                                   }};
+  MeshToBandResult result = meshToBand(mesh, options.voxel.edge, settings);
+  if (options.acceptsSign && result.band.zeroSetBounds().isEmpty()) {
+    run.warnings.push_back(
+        "no grid point lies inside: the band holds distances to the mesh and no surface; close the "
+        "mesh to get a solid");
+  } else if (options.acceptsSign && result.certificate.ambiguousShare > kAmbiguousLimit) {
+    run.warnings.push_back(
+        fmt::format("the sign is a guess at a share of {:.2g} of the voxels beside the surface",
+                    result.certificate.ambiguousShare));
+  }
+  return std::move(result.band);
+}
+
+ValuePlan LevelSetOperator::plan(const Options& options, Plans operands, const OperatorRun&) {
+  ValuePlan plan = operands[0];
+  plan.triangles = 0;
+  plan.voxelSize = options.voxel.edge;
+  plan.halfWidth = options.halfWidth;
+  checkVoxelSize(plan.voxelSize, plan.longestSide());
+  double reach = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    reach = std::max({reach, std::abs(plan.bounds.min[axis]), std::abs(plan.bounds.max[axis])});
+  if (!(reach / plan.voxelSize < std::numeric_limits<std::int32_t>::max()))
+    throw ResourceLimit(
+        fmt::format("level-set: the mesh reaches {:.3g} voxels from the origin, more than can be "
+                    "counted; use larger voxels or move it",
+                    reach / plan.voxelSize));
+  return plan;
+}
+
+std::optional<Cost> LevelSetOperator::cost(const Options&, const OperatorPlans& plans) {
+  const double triangles = plans.operands[0].triangles, voxels = plans.result.activeVoxels();
+  if (triangles == 0) return {};
+  return Cost{1e-9 * (2800 * triangles + 500 * voxels), 60 * triangles + 4 * voxels};
+}
+
+const OperatorText SurfaceBandOperator::text{
+    .name = "surface-band",
+    .group = "Conversion",
+    .summary = "make an open mesh (terrain, a sheet) a base for patches",
+    .details =
+        "Distances to one side and the other of a mesh whose faces are all turned to one side, "
+        "up "
+        "to its border. It has no inside: 'patch', 'decal', 'patch-grid', 'scatter' and 'folds' "
+        "take it as base, 'texture' with --alone or --map mesh. Patches end at the border. The "
+        "band has to be as wide as patches are high, and six voxels more, unless their layers "
+        "follow a spline. A closed mesh is for 'level-set'.",
+    .example =
+        "levelsmith heightmap --image <(printf '0 1 0\\n1 2 1\\n0 1 0\\n') --size 8,8 --height 2 "
+        "--voxel 0.2 --sheet ! surface-band --voxel 0.2 --half-width 12 ! patch --at "
+        "0,0,2 --size 3,3 --height 1 ! mesh ! measure"};
+
+double SurfaceBandOperator::longestSide(const Options&, Plans operands) {
+  return operands[0].longestSide();
+}
+
+void SurfaceBandOperator::check(const Options& options, const GivenOptions&) {
+  if (options.halfWidth < kMinSurfaceHalfWidth) {
+    throw UsageError(fmt::format("surface-band: --half-width is {} voxels; give at least {}",
+                                 options.halfWidth, kMinSurfaceHalfWidth));
+  }
+}
+
+NarrowBand SurfaceBandOperator::run(const TriMesh& mesh, const Options& options, OperatorRun& run) {
+  SurfaceBandResult result = surfaceBand(
+      mesh, options.voxel.edge,
+      {.halfWidth = options.halfWidth, .maxMemory = run.maxMemory, .progress = run.progress});
+  run.notes.push_back(fmt::format("{} border edges, {} triangles dropped", result.borderEdges,
+                                  result.droppedTriangles));
+  if (result.removedVoxels > 0)
+    run.notes.push_back(
+        fmt::format("{} voxels lie half way between the front of one part of the surface and the "
+                    "back of another, and are cut out: patches cannot pass there",
+                    result.removedVoxels));
+  return std::move(result.band);
+}
+
+ValuePlan SurfaceBandOperator::plan(const Options& options, Plans operands, const OperatorRun&) {
+  ValuePlan plan = operands[0];
+  plan.triangles = 0;
+  plan.voxelSize = options.voxel.edge;
+  plan.halfWidth = options.halfWidth;
+  checkVoxelSize(plan.voxelSize, plan.longestSide(), "surface-band");
+  return plan;
+}
+
+}  // namespace levelset

@@ -1,0 +1,119 @@
+#include <fmt/core.h>
+
+#include "levelset/distance/closest_points.h"
+#include "levelset/distance/redistance.h"
+#include "levelset/eikonal/arrival.h"
+#include "levelset/error.h"
+
+namespace levelset {
+namespace {
+
+constexpr const char* kFrontDetails =
+    "Solves |grad T| F = 1 from the surface to both sides (negative inside) or from "
+    "points. "
+    "Without --speed, --from and --extend the times are distances and the result is a band "
+    "again; `rebuild-band` computes the same by closest points, which is more exact. Otherwise the "
+    "result is a field. Where the speed is zero, negative or no number, nothing passes.";
+
+constexpr const char* frontName(FrontMethod method) {
+  return method == FrontMethod::Marching ? "fast-marching" : "fast-sweeping";
+}
+
+void noteFigures(const FrontOptions& options, const ArrivalFigures& figures, OperatorRun& run) {
+  run.notes.push_back(fmt::format("{} grid points reached", figures.reached));
+  if (options.order == 2)
+    run.notes.push_back(
+        fmt::format("{} of them fell back to first order on some axis", figures.firstOrder));
+  run.figures = {{"reached", figures.reached},
+                 {"started", figures.started},
+                 {"first_order", figures.firstOrder}};
+}
+
+FieldGrid extendAttribute(const NarrowBand& solid, const FrontOptions& options, OperatorRun& run) {
+  const ClosestPointOptions settings{
+      .halfWidth = options.to.in(solid.voxelSize()) / solid.voxelSize(),
+      .maxMemory = run.maxMemory,
+      .progress = run.progress};
+  run.notes.push_back("the attribute is that of the closest point of the surface");
+  return options.extend.vector ? extendOffSurface(solid, options.extend.vector, settings)
+                               : extendOffSurface(solid, options.extend.scalar, settings);
+}
+
+}  // namespace
+
+template <FrontMethod method>
+void FrontOperator<method>::check(const Options&, const GivenOptions& given) {
+  for (const char* other : {"speed", "from", "order"})
+    if (given("extend") && given(other))
+      throw UsageError(
+          fmt::format("{}: --extend carries an attribute along the normals, so --{} has no meaning "
+                      "beside it; leave one out",
+                      frontName(method), other));
+}
+
+template <FrontMethod method>
+std::variant<NarrowBand, FieldGrid> FrontOperator<method>::run(std::vector<NarrowBand> operands,
+                                                               const Options& options,
+                                                               OperatorRun& run) {
+  const NarrowBand& solid = operands[0];
+  if (options.extend) return extendAttribute(solid, options, run);
+  const double reach = options.to.in(solid.voxelSize());
+  const ArrivalOptions settings{.method = method,
+                                .order = options.order,
+                                .speed = options.speed,
+                                .maxMemory = run.maxMemory,
+                                .progress = run.progress};
+  if (makesField(options)) {
+    ArrivalTimes result = options.from.empty()
+                              ? arrivalTimes(solid, reach, settings)
+                              : arrivalTimesFromPoints(solid, options.from, reach, settings);
+    noteFigures(options, result.figures, run);
+    return std::move(result.times);
+  }
+  FrontDistance result = frontDistance(solid, reach, settings);
+  noteFigures(options, result.figures, run);
+  return std::move(result.band);
+}
+
+template <FrontMethod method>
+ValuePlan FrontOperator<method>::plan(const Options& options, Plans operands, const OperatorRun&) {
+  constexpr double kBytes = 8;  // for each active voxel of a field
+  ValuePlan plan = operands[0];
+  plan.halfWidth = options.to.in(plan.voxelSize) / plan.voxelSize;
+  if (makesField(options)) plan.fieldBytes = plan.activeVoxels() * kBytes;
+  return plan;
+}
+
+template <FrontMethod method>
+std::optional<Cost> FrontOperator<method>::cost(const Options& options,
+                                                const OperatorPlans& plans) {
+  const ValuePlan& solid = plans.operands[0];
+  const double reach = options.to.in(solid.voxelSize) / solid.voxelSize,
+               voxels = solid.layer() * 2 * reach;
+  if (!options.from.empty()) return {};  // depends on the volume around the points
+  if (options.extend) return costOfDistances(solid.layer(), reach);
+  return Cost{1e-9 * (method == FrontMethod::Marching ? 1400 : 550) * voxels, 12 * voxels};
+}
+
+template struct FrontOperator<FrontMethod::Marching>;
+template struct FrontOperator<FrontMethod::Sweeping>;
+
+const OperatorText FastMarchingOperator::text{
+    .name = "fast-marching",
+    .group = "Distances",
+    .summary = "arrival times and distances by fast marching",
+    .details = kFrontDetails,
+    .example =
+        "levelsmith sphere --radius 1 --voxel 0.05 ! fast-marching --speed \"1 + 0.5*x\" "
+        "--to 0.4 ! info",
+    .formerName = "march"};
+
+const OperatorText FastSweepingOperator::text{
+    .name = "fast-sweeping",
+    .group = "Distances",
+    .summary = "arrival times and distances by fast sweeping",
+    .details = kFrontDetails,
+    .example = "levelsmith sphere --radius 1 --voxel 0.05 ! fast-sweeping --to 8vx ! check",
+    .formerName = "sweep"};
+
+}  // namespace levelset

@@ -1,0 +1,51 @@
+#include "levelset/error.h"
+#include "levelset/meshing/band_to_mesh.h"
+
+namespace levelset {
+
+const OperatorText MeshOperator::text{
+    .name = "mesh",
+    .group = "Conversion",
+    .summary = "turn a level set, or the space of a patch, into a closed triangle mesh",
+    .details =
+        "Of a patch: its lowest and highest particles and its sides, one closed surface for "
+        "each patch, or with --sheets every layer as it is.",
+    .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! mesh --sharp ! write box.ply"};
+
+void MeshOperator::check(const Options& options, const GivenOptions&) {
+  if (options.adaptivity > 1) throw UsageError("mesh: --adaptivity must lie between 0 and 1");
+  if (options.sharp && options.adaptivity > 0)
+    throw UsageError("mesh: --sharp and --adaptivity exclude each other; give one");
+}
+
+TriMesh MeshOperator::run(std::vector<NarrowBand> operands, const Options& options,
+                          OperatorRun& run) {
+  return bandToMesh(
+      operands[0],
+      {.adaptivity = options.adaptivity, .sharp = options.sharp, .progress = run.progress});
+}
+
+ValuePlan MeshOperator::plan(const Options&, Plans operands, const OperatorRun&) {
+  // Triangles for each square of a voxel's side; --sharp and --adaptivity make no more.
+  constexpr double kTriangles = 3.35;
+  const ValuePlan& solid = operands[0];
+  return {.bounds = solid.bounds, .area = solid.area, .triangles = kTriangles * solid.layer()};
+}
+
+/// The ends of edges that the zero set crosses are less than a voxel from it; half a voxel more is
+/// for distances that are not exact.
+RegionOfInterest MeshOperator::regionOfInterest(const Options& options, const OperatorPlans&,
+                                                std::size_t, const RegionOfInterest&) {
+  if (options.sharp || options.adaptivity > 0) return {};
+  return {.halfWidth = 1.5};
+}
+
+std::optional<Cost> MeshOperator::cost(const Options& options, const OperatorPlans& plans) {
+  const ValuePlan& solid = plans.operands[0];
+  if (!solid.isBand()) return {};
+  const double layer = solid.layer();
+  if (options.sharp) return Cost{1e-9 * 1300 * layer, 420 * layer};
+  return Cost{1e-9 * 330 * layer, 40 * layer};
+}
+
+}  // namespace levelset

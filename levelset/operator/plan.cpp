@@ -1,0 +1,33 @@
+#include "levelset/operator/plan.h"
+
+#include <algorithm>
+
+namespace levelset {
+
+double ValuePlan::longestSide() const {
+  const Imath::V3d size = bounds.size();
+  return std::max({size.x, size.y, size.z});
+}
+
+double ValuePlan::activeVoxels() const {
+  if (!(voxelSize > 0)) return 0;
+  const double inLayers = area / (voxelSize * voxelSize) * 2 * halfWidth;
+  if (bounds.isEmpty()) return inLayers;
+  // No grid point counts twice, however large the surface is.
+  double all = 1;
+  for (int axis = 0; axis < 3; ++axis)
+    all *= (bounds.max[axis] - bounds.min[axis]) / voxelSize + 2 * halfWidth + 1;
+  return std::min(inLayers, all);
+}
+
+double ValuePlan::layer() const {
+  return voxelSize > 0 ? area / (voxelSize * voxelSize) : 0;
+}
+
+Imath::Box3d grown(Imath::Box3d box, double by) {
+  box.min -= Imath::V3d(by);
+  box.max += Imath::V3d(by);
+  return box;
+}
+
+}  // namespace levelset
