@@ -4,10 +4,10 @@
 #include <string>
 #include <string_view>
 
-/// Text that goes into pages: of the regression suite, and of reports.
+/// Text and data for HTML pages: the regression suite and reports.
 namespace apps {
 
-/// Bytes of the well-formed UTF-8 sequence that a text begins with; 0: it begins with none
+/// Length in bytes of the well-formed UTF-8 sequence at the start of a text; 0 if there is none
 /// [Unicode 15, table 3-7].
 [[nodiscard]] inline std::size_t utf8SequenceLength(std::string_view text) {
   const auto byte = [&](std::size_t i) {
@@ -33,8 +33,8 @@ namespace apps {
   return 0;
 }
 
-/// As it stands between tags and in quoted attributes. Bytes that are no UTF-8, and controls that
-/// no page may hold, become U+FFFD.
+/// Escapes text for use between tags and in quoted attributes. Bytes that are not UTF-8, and
+/// control characters that HTML forbids, become U+FFFD.
 [[nodiscard]] inline std::string escapedHtml(std::string_view text) {
   std::string result;
   result.reserve(text.size());
@@ -61,7 +61,7 @@ namespace apps {
   return result;
 }
 
-/// As `data:` addresses hold bytes [RFC 4648, section 4].
+/// Base64 encoding of bytes for `data:` URLs [RFC 4648, section 4].
 [[nodiscard]] inline std::string base64(std::string_view bytes) {
   constexpr const char* kDigits =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

@@ -10,7 +10,8 @@
 #include <limits>
 #include <string>
 
-/// What a piece of work costs this process (Linux): shared by the runner and the regression suite.
+/// Measures CPU time and memory of this process (Linux). Used by the runner and the regression
+/// suite.
 namespace apps {
 
 /// CPU seconds of all threads so far.
@@ -20,7 +21,8 @@ namespace apps {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-/// A line of /proc/self/status that holds kilobytes, in bytes; NaN where there is none.
+/// Value in bytes of a line of /proc/self/status that is given in kilobytes; NaN if the line is
+/// missing.
 [[nodiscard]] inline double processStatusBytes(const std::string& key) {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);)
@@ -28,7 +30,7 @@ namespace apps {
   return std::numeric_limits<double>::quiet_NaN();
 }
 
-/// High-water mark of the resident set since the last reset.
+/// Peak of the resident set since the last reset, bytes.
 [[nodiscard]] inline double peakResidentBytes() {
   return processStatusBytes("VmHWM:");
 }
@@ -38,10 +40,11 @@ inline void resetPeakResident() {
 
 struct Cost {
   double cpuSeconds = 0;
-  double peakBytes = 0;  ///< by which the resident set grew at its largest
+  double peakBytes = 0;  ///< largest growth of the resident set, bytes
 };
 
-/// Runs `work` and tells what it took. Freed memory is handed back first, so that it counts again.
+/// Runs `work` and measures its cost. Freed memory is first returned to the system, so that memory
+/// allocated again counts.
 [[nodiscard]] inline Cost costOf(const std::function<void()>& work) {
   malloc_trim(0);
   resetPeakResident();

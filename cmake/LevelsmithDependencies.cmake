@@ -1,5 +1,5 @@
-# Third-party packages, each found once. Read by our build and by the installed package; in the
-# latter, only what the requested components link is looked for.
+# Finds the third-party packages. Used by this build and by the installed package; the latter finds
+# only packages that the requested components link.
 
 list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_CXX_LIBRARY_ARCHITECTURE}/cmake/OpenVDB
      /usr/lib/x86_64-linux-gnu/cmake/OpenVDB)

@@ -1,9 +1,10 @@
 # levelsmith_module(NAME HEADERS … [PUBLIC libs…] [PRIVATE libs…])
 #
-# Makes one library from all .cpp files below the calling folder: alias Levelsmith::NAME, C++20,
-# warnings, header self-check, install and export. HEADERS are the public ones, relative to the calling
-# folder; they are included from the repository root. Sources are found by a glob, so that a new
-# operator needs no line in a list; public headers are listed, because each is a promise to users.
+# Builds one library from all .cpp files below the calling folder: alias Levelsmith::NAME, C++20,
+# warnings, header self-check, install and export. HEADERS lists the public headers, relative to the
+# calling folder; they are included by their path from the repository root. Sources are found by a
+# glob, so a new operator needs no line in a list. Public headers are listed because each of them is
+# part of the public interface.
 
 include(GNUInstallDirs)
 
@@ -13,11 +14,12 @@ if(LEVELSMITH_STRICT)
   target_compile_options(levelsmith_warnings INTERFACE -Werror)
 endif()
 
-# Same bits on every machine: no contraction of a*b+c behind our back.
+# Disable contraction of a*b+c, so that results have the same bits on all machines.
 add_library(levelsmith_flags INTERFACE)
 target_compile_options(levelsmith_flags INTERFACE -ffp-contract=off)
 
-# The tests themselves are only linked with them: they take as long to instrument as all they test.
+# Tests are linked with the sanitizers but not instrumented, because that takes as long as for the
+# modules.
 set(LEVELSMITH_SANITIZE "" CACHE STRING "Sanitizers for the modules and the command, as -fsanitize= takes them")
 add_library(levelsmith_sanitizers INTERFACE)
 if(LEVELSMITH_SANITIZE)
@@ -45,7 +47,7 @@ function(levelsmith_module name)
           DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/Levelsmith FILE Levelsmith_${name}.cmake)
 endfunction()
 
-# levelset/vdb.h is the heaviest include we have: precompiled where files are compiled one by one.
+# levelset/vdb.h is the most expensive include. It is precompiled unless the build is a unity build.
 function(levelsmith_precompile_vdb name)
   if(LEVELSMITH_PCH AND NOT CMAKE_UNITY_BUILD)
     target_precompile_headers(${name} PRIVATE ${PROJECT_SOURCE_DIR}/levelset/vdb.h)

@@ -1,12 +1,12 @@
-# What the Python module alone needs. Where it is not there the rest is built without it.
+# Finds the packages that only the Python module needs. Without them the module is not built.
 
-# A sanitizer would have to be in the interpreter.
+# A sanitizer would have to be linked into the interpreter.
 if(LEVELSMITH_SANITIZE)
   set(LEVELSMITH_PYTHON OFF)
   return()
 endif()
 
-# Debian's Python has the packages, whatever other comes first in PATH.
+# Prefer Debian's Python, which has the packages, to other interpreters in PATH.
 if(NOT Python_EXECUTABLE AND EXISTS /usr/bin/python3)
   set(Python_EXECUTABLE /usr/bin/python3)
 endif()
@@ -17,6 +17,6 @@ if(Python_FOUND)
                   RESULT_VARIABLE lacks_numpy ERROR_QUIET)
 endif()
 if(NOT Python_FOUND OR NOT pybind11_FOUND OR NOT lacks_numpy EQUAL 0)
-  message(STATUS "The Python module is left out: install pybind11-dev, python3-dev and python3-numpy for it")
+  message(STATUS "The Python module is not built: it needs pybind11-dev, python3-dev and python3-numpy")
   set(LEVELSMITH_PYTHON OFF)
 endif()

@@ -1,10 +1,10 @@
-# What the viewer alone needs. Where it is not there the rest is built without it.
+# Finds the packages that only the viewer needs. Without them the viewer is not built.
 
 find_package(glfw3 CONFIG QUIET)
 find_package(OpenGL QUIET COMPONENTS OpenGL)
 find_path(LEVELSMITH_IMGUI_INCLUDE imgui/backends/imgui_impl_glfw.h)
 find_library(LEVELSMITH_IMGUI_LIBRARY imgui)
-find_library(LEVELSMITH_STB_LIBRARY stb)  # Debian's imgui takes its fonts' rasteriser from there
+find_library(LEVELSMITH_STB_LIBRARY stb)  # Debian's imgui uses the font rasteriser of stb
 mark_as_advanced(LEVELSMITH_IMGUI_INCLUDE LEVELSMITH_IMGUI_LIBRARY LEVELSMITH_STB_LIBRARY)
 
 if(glfw3_FOUND AND TARGET OpenGL::GL AND LEVELSMITH_IMGUI_INCLUDE AND LEVELSMITH_IMGUI_LIBRARY)
@@ -17,6 +17,6 @@ if(glfw3_FOUND AND TARGET OpenGL::GL AND LEVELSMITH_IMGUI_INCLUDE AND LEVELSMITH
     target_link_libraries(levelsmith_imgui INTERFACE ${LEVELSMITH_STB_LIBRARY})
   endif()
 else()
-  message(STATUS "levelsmith-view is left out: install libglfw3-dev, libimgui-dev and libgl-dev for it")
+  message(STATUS "levelsmith-view is not built: it needs libglfw3-dev, libimgui-dev and libgl-dev")
   set(LEVELSMITH_VIEWER OFF)
 endif()

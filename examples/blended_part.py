@@ -1,4 +1,4 @@
-"""A bracket: CSG with operators, seams rounded outside and sharp within.
+"""A bracket: CSG with operators. Outer seams are rounded, inner ones stay sharp.
 
 python3 examples/blended_part.py FOLDER [VOXEL]
 """

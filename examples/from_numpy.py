@@ -1,4 +1,4 @@
-"""An orbital of the hydrogen atom: a function sampled by numpy becomes two solids.
+"""An orbital of the hydrogen atom: a function sampled with numpy is converted to two solids.
 
 python3 examples/from_numpy.py FOLDER [VOXEL]
 """
@@ -20,7 +20,7 @@ r = numpy.sqrt(x**2 + y**2 + z**2)
 psi = z * (x**2 - y**2) * numpy.exp(-r / 4)  # 4f, up to a factor
 level = 0.2 * psi.max()
 
-# Negative inside; only signs and the slope beside the surface matter.
+# Negative inside. Only the signs and the values next to the surface are used.
 lobes = [ls.from_array(level - sign * psi, voxel, origin=steps[[0, 0, 0]]) for sign in (1, -1)]
 for lobe, name in zip(lobes, ("plus", "minus")):
     lobe.name = name

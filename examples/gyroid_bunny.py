@@ -1,7 +1,7 @@
-"""A bunny as one would print it: a wall, and gyroid sheets within.
+"""A bunny for 3D printing: a thin wall, filled with gyroid sheets.
 
 python3 examples/gyroid_bunny.py FOLDER [VOXELS [MODEL]]: voxels along the longest side. The model is
-data/models/bunny.obj; where it was not fetched, a torus takes its place.
+data/models/bunny.obj; if it is missing, a torus replaces it.
 """
 
 import math
@@ -29,7 +29,7 @@ wall = 2 * body.voxel
 
 
 def gyroid(points):
-    """About the distance to a sheet, less half its thickness."""
+    """Approximate distance to a sheet, minus half its thickness."""
     x, y, z = (2 * math.pi / cell * points).T
     sheet = numpy.sin(x) * numpy.cos(y) + numpy.sin(y) * numpy.cos(z) + numpy.sin(z) * numpy.cos(x)
     edge = numpy.max(numpy.abs(points - (low + high) / 2) - (high - low) / 2, axis=1)
@@ -40,7 +40,7 @@ margin = 4 * body.voxel
 filling = ls.from_function(gyroid, (low - margin, high + margin), body.voxel)
 part = body.shell(thickness=wall) | (body & filling)
 
-# Open it to look inside.
+# Cut the part open to show the inside.
 cut = part.clip(plane=((low + high) / 2, (0, 0, 1)))
 span = numpy.linalg.norm(high - low)
 eye = (low + high) / 2 + span * numpy.array([0.5, 0.4, 1.4])

@@ -1,4 +1,4 @@
-"""An island out of noise: hills from an array, the sea about them to look through, a corner cut off.
+"""An island from noise: hills from an array in a transparent sea, with one corner cut off.
 
 python3 examples/island.py FOLDER [VOXEL]
 """
@@ -14,7 +14,7 @@ folder = sys.argv[1]
 voxel = float(sys.argv[2]) if len(sys.argv) > 2 else 0.05
 os.makedirs(folder, exist_ok=True)
 
-# Noise of all wave lengths, the long ones stronger, that sinks towards the border.
+# Noise of all wavelengths, with more power in long ones. It falls off towards the border.
 size = 128
 waves = numpy.hypot(*numpy.meshgrid(numpy.fft.fftfreq(size), numpy.fft.fftfreq(size)))
 noise = numpy.fft.fft2(numpy.random.default_rng(5).normal(size=(size, size)))

@@ -1,4 +1,4 @@
-"""Two solids, and the ways between them: a strip of pictures, one for each step.
+"""A morph between two solids: a strip of pictures, one for each step.
 
 python3 examples/morph_sequence.py FOLDER [VOXEL]
 """

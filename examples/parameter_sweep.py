@@ -1,7 +1,7 @@
-"""One part with many parameters, on one process or on several.
+"""One part with many parameter sets, in one process or several.
 
-python3 examples/parameter_sweep.py FOLDER [VOXEL [WORKERS]]: with WORKERS by Dask
-(python3-distributed), with the same pictures and figures.
+python3 examples/parameter_sweep.py FOLDER [VOXEL [WORKERS]]: with WORKERS, jobs run on
+Dask (python3-distributed), with the same results.
 """
 
 import os
@@ -16,7 +16,7 @@ import levelsmith as ls
 
 
 def part(radius, seam, voxel, folder):
-    """A ball in a plate. Returns its volume, and the name of its picture."""
+    """Blends a ball with a plate. Returns the volume and the name of the picture."""
     plate = ls.box(size=(5, 5, 1), voxel=voxel)
     body = ls.blend(plate, ls.sphere(radius=radius, center=(0, 0, 0.4), voxel=voxel), radius=seam)
     picture = os.path.join(folder, f"part_{radius}_{seam}.png")

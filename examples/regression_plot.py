@@ -1,6 +1,6 @@
-"""How fast errors fall as voxels get smaller: measured against exact answers, with their orders.
+"""Convergence of errors with the voxel size, measured against exact values, with the orders.
 
-python3 examples/regression_plot.py FOLDER [VOXEL]: the smallest one.
+python3 examples/regression_plot.py FOLDER [VOXEL]: VOXEL is the smallest voxel size.
 """
 
 import math
@@ -23,7 +23,7 @@ RADIUS, TUBE, GROWTH = 1.0, 0.4, 0.1
 
 
 def errors(voxel):
-    """Of a ring that grew, placed between the grid points."""
+    """Errors of an offset torus that is centred between grid points."""
     centre = 0.37 * voxel * numpy.ones(3)
     ring = ls.torus(radius=RADIUS, tube=TUBE, center=centre, voxel=voxel).offset(GROWTH)
     tube = TUBE + GROWTH

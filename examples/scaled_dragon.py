@@ -1,7 +1,7 @@
-"""A dragon that grows scales: one solid, strewn over its skin as a geometric texture.
+"""A dragon with scales: one solid is scattered over its skin as a geometric texture.
 
 python3 examples/scaled_dragon.py FOLDER [VOXELS [MODEL]]: voxels along the longest side. The model is
-data/models/dragon_vrip_res3.ply.gz; where it was not fetched, a torus takes its place.
+data/models/dragon_vrip_res3.ply.gz; if it is missing, a torus replaces it.
 """
 
 import os
@@ -25,15 +25,15 @@ else:
 low, high = skin.bounds
 span = (high - low).max()
 
-warnings.filterwarnings("ignore", "scatter: ", ls.Warning)  # where a scale would fold, there is none
+warnings.filterwarnings("ignore", "scatter: ", ls.Warning)  # scales whose map would fold are left out
 
-# A tongue that lies flat; its box becomes the box of each patch.
+# A flat tongue; its bounding box is mapped to the box of each patch.
 scale = ls.sphere(radius=1, voxel=0.08).transform(scale=(1, 1.4, 0.4), bake=True)
 places = skin.scatter(
-    count=5 * resolution // 2, size=(0.045 * span, 0.055 * span), height=0.013 * span, levels=3,
+    count=5 * resolution // 2, size=(0.045 * span, 0.055 * span), height=0.013 * span, layers=3,
     along="0,-1,0", jitter=10, seed=2,
 )  # fmt: skip
-scaled = skin.texture(scale, places, sink=0.005 * span, skip_folds=True, voxel=skin.voxel)
+scaled = skin.texture(scale, places, embed=0.005 * span, skip_folds=True, voxel=skin.voxel)
 
 picture = os.path.join(folder, "scaled_dragon.png")
 eye = (low + high) / 2 + span * numpy.array([0.4, 0.25, 1.35])

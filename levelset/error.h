@@ -3,15 +3,15 @@
 #include <stdexcept>
 #include <string>
 
-/// One exception class per exit class of the command line. A message is one sentence: what was
-/// attempted, what is wrong and where, and what to do about it.
+/// Exception classes, one for each exit code of the command line. A message is one sentence. It
+/// names the attempted action, the cause, the location and a remedy.
 namespace levelset {
 
 enum class ExitCode : int {
   Done = 0,
-  Usage = 2,     ///< the call itself is wrong: a negative length, a missing operand
-  Input = 3,     ///< the data cannot be used as asked: truncated file, open mesh under `closed`
-  Resource = 4,  ///< memory, index range or image size would pass its limit
+  Usage = 2,     ///< wrong call: a negative length, a missing operand
+  Input = 3,     ///< unusable data: a truncated file, an open mesh under `closed`
+  Resource = 4,  ///< memory, index range or image size exceeds its limit
   Numeric = 5,   ///< a numeric check failed
   File = 6,      ///< missing, unreadable, not writable, disk full
   Interrupted = 130

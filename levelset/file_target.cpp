@@ -23,13 +23,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMaxLinks = 40;          // as the kernel's own limit
-constexpr std::size_t kMaxStem = 180;  // keeps the temporary's name under NAME_MAX
+constexpr int kMaxLinks = 40;          // the kernel's own limit
+constexpr std::size_t kMaxStem = 180;  // keeps the name of the temporary file below NAME_MAX
 constexpr std::size_t kCopyChunk = 1 << 20;
 
 std::atomic<bool> mayClobber{true};
 
-/// The temporary files of this process. The lock is held for single system calls only.
+/// Names of the temporary files of this process. The lock is held for single system calls only.
 struct Registry {
   std::mutex mutex;
   std::set<std::string> names;
@@ -73,8 +73,8 @@ class Descriptor {
   int fd_;
 };
 
-/// A write to a pipe without a reader raises SIGPIPE, which ends the process; hold it back in this
-/// thread so that the write answers EPIPE and the caller hears a sentence.
+/// Blocks SIGPIPE in this thread. A write to a pipe without a reader raises SIGPIPE, which ends the
+/// process. With the signal blocked, the write returns EPIPE and the caller gets an error message.
 class SigpipeGuard {
  public:
   SigpipeGuard() {
@@ -100,7 +100,7 @@ class SigpipeGuard {
   bool wasPending_ = false;
 };
 
-/// N for /proc/<process>/fd/N, else -1.
+/// Returns N for /proc/<process>/fd/N, else -1.
 int ownDescriptor(const fs::path& path) {
   const fs::path folder = path.parent_path();
   if (folder != fmt::format("/proc/{}/fd", ::getpid()) && folder != "/proc/self/fd") return -1;
@@ -110,8 +110,8 @@ int ownDescriptor(const fs::path& path) {
   return error == std::errc{} && end == name.data() + name.size() ? fd : -1;
 }
 
-/// Follows links one by one, stopping at an open descriptor of this process: what that points to
-/// may have no name, and must not be truncated if it has one.
+/// Resolves links one by one and stops at an open descriptor of this process. The file behind a
+/// descriptor may have no name, and must not be truncated if it has one.
 fs::path followLinks(const fs::path& target) {
   fs::path current = fs::absolute(target);
   for (int i = 0; i < kMaxLinks; ++i) {
@@ -123,7 +123,7 @@ fs::path followLinks(const fs::path& target) {
     if (error) return current;
     current = next.is_absolute() ? next : current.parent_path() / next;
   }
-  throwIo(target, "is a link that leads back to itself; name the file itself");
+  throwIo(target, "is a symbolic link that leads back to itself; name the file itself");
 }
 
 void writeAll(int fd, const char* data, std::size_t size, const fs::path& target) {
@@ -138,8 +138,9 @@ void writeAll(int fd, const char* data, std::size_t size, const fs::path& target
   }
 }
 
-/// A device that takes nothing, as /dev/full, says so when asked to take no bytes.
-void requireTakes(int fd, const fs::path& target) {
+/// Refuses a device that accepts no data. Such a device, for example /dev/full, fails on a write of
+/// zero bytes.
+void requireWritable(int fd, const fs::path& target) {
   if (fd < 0) throwErrno(target, "cannot be opened for writing", errno);
   struct stat status {};
   if (::fstat(fd, &status) != 0 || !S_ISCHR(status.st_mode)) return;
@@ -166,12 +167,12 @@ FileTarget::FileTarget(const fs::path& target, bool clobber)
   struct stat status {};
   const bool exists = descriptor_ < 0 && ::stat(finalPath_.c_str(), &status) == 0;
   if (exists && S_ISDIR(status.st_mode)) throwIo(target_, "is a directory; name a file in it");
-  writtenThrough_ = descriptor_ >= 0 || (exists && !S_ISREG(status.st_mode));
-  if (writtenThrough_) {
+  copiesToTarget_ = descriptor_ >= 0 || (exists && !S_ISREG(status.st_mode));
+  if (copiesToTarget_) {
     if (descriptor_ >= 0) {
-      requireTakes(descriptor_, target_);
-    } else if (S_ISCHR(status.st_mode)) {  // to open a pipe may wait for its reader
-      requireTakes(Descriptor(::open(finalPath_.c_str(), O_WRONLY | O_CLOEXEC)).get(), target_);
+      requireWritable(descriptor_, target_);
+    } else if (S_ISCHR(status.st_mode)) {  // opening a pipe could wait for its reader
+      requireWritable(Descriptor(::open(finalPath_.c_str(), O_WRONLY | O_CLOEXEC)).get(), target_);
     }
     std::error_code error;
     const fs::path folder = fs::temp_directory_path(error);
@@ -206,7 +207,7 @@ void FileTarget::createTemporary(const fs::path& folder, std::string name) {
     }
     if (errno == EEXIST) continue;
     if (errno == ENOENT || errno == ENOTDIR)
-      throwIo(target_, fmt::format("cannot be created: there is no folder '{}'; make it first",
+      throwIo(target_, fmt::format("cannot be created: there is no folder '{}'; create it first",
                                    folder.string()));
     throwErrno(target_, "cannot be created", errno);
   }
@@ -219,8 +220,8 @@ FileTarget::~FileTarget() {
 }
 
 void FileTarget::commit() {
-  if (writtenThrough_) {
-    copyThrough();
+  if (copiesToTarget_) {
+    copyToTarget();
     return;  // the destructor removes the copy
   }
   {
@@ -238,14 +239,14 @@ void FileTarget::commit() {
   if (registry().closed) throwCancelled(target_);
   const unsigned flags = clobber_ ? 0 : RENAME_NOREPLACE;
   int result = ::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, finalPath_.c_str(), flags);
-  if (result != 0 && (errno == EINVAL || errno == ENOSYS))  // a file system that knows no flags
+  if (result != 0 && (errno == EINVAL || errno == ENOSYS))  // the file system supports no flags
     result = ::rename(path_.c_str(), finalPath_.c_str());
-  if (result != 0) throwErrno(target_, "could not be put in place", errno);
+  if (result != 0) throwErrno(target_, "could not be renamed to its final name", errno);
   registry().names.erase(path_.string());
   committed_ = true;
 }
 
-void FileTarget::copyThrough() {
+void FileTarget::copyToTarget() {
   const SigpipeGuard guard;
   const Descriptor source(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));
   if (source.get() < 0) {

@@ -5,62 +5,64 @@
 
 namespace levelset {
 
-/// Where an output file goes until it is whole: a temporary file beside the target, renamed over it
-/// by commit() and removed by the destructor otherwise. An existing target keeps its permissions; a
-/// symbolic link stays, and the file that it points to is replaced.
+/// Writes an output file atomically. The data goes to a temporary file beside the target. commit()
+/// renames the temporary file over the target; the destructor removes it otherwise. An existing
+/// target keeps its permissions. A symbolic link stays, and the file that it points to is replaced.
 ///
-/// Pipes and devices, standard output ("-") among them, cannot be renamed over: what is written
-/// goes to a temporary file first and is copied into them by commit(), so writers may seek whatever
-/// the target is, and a reader sees nothing of a job that failed.
+/// Pipes and devices, including standard output ("-"), cannot be renamed over. commit() copies the
+/// temporary file into them. Writers may therefore seek on any target, and a reader receives no
+/// data from a job that failed.
 class FileTarget {
  public:
-  /// @throws IoError when the folder is missing or not writable, the target is a directory or
-  ///         read-only, it is a device that takes nothing, or it exists and `clobber` (or
-  ///         setClobberDefault) is false
+  /// @throws IoError when the folder is missing or not writable, or when the target is a directory,
+  ///         a read-only file or a device that accepts no data. Also throws when the target exists
+  ///         and `clobber` (or setClobberDefault) is false.
   explicit FileTarget(const std::filesystem::path& target, bool clobber = true);
   ~FileTarget();
   FileTarget(const FileTarget&) = delete;
   FileTarget& operator=(const FileTarget&) = delete;
 
-  /// What to open and write: an empty file that exists already. Its name does not end as the
-  /// target's does, so tell the format by the target.
+  /// Path of the file to open and write. The file exists already and is empty. Its extension
+  /// differs from that of the target, so choose the format by the target.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
-  /// Flushes to disk and renames, or copies into a pipe or device. The caller's own streams on
-  /// path() must be closed before.
-  /// @throws IoError when the disk is full, the pipe has no reader or the rename fails; Cancelled
-  ///         after removeTemporaryFiles()
+  /// Flushes the data to disk and renames the file, or copies it into a pipe or device. The caller
+  /// closes its own streams on path() first.
+  /// @throws IoError when the disk is full, the pipe has no reader or the rename fails
+  /// @throws Cancelled after removeTemporaryFiles()
   void commit();
 
  private:
   void createTemporary(const std::filesystem::path& folder, std::string name);
-  void copyThrough();
+  void copyToTarget();
 
-  std::filesystem::path target_;     ///< as the caller named it, for messages
-  std::filesystem::path finalPath_;  ///< behind all links
+  std::filesystem::path target_;     ///< the caller's name of the target, for messages
+  std::filesystem::path finalPath_;  ///< target with all links resolved
   std::filesystem::path path_;
-  int descriptor_ = -1;  ///< of this process, when the target names one (/dev/stdout)
+  int descriptor_ = -1;  ///< descriptor of this process that the target names (/dev/stdout), or -1
   bool clobber_ = true;
-  bool writtenThrough_ = false;
+  bool copiesToTarget_ = false;
   bool committed_ = false;
 };
 
-/// Does the name stand for standard output: "-", /dev/stdout, /dev/fd/1 or a link to one of these?
+/// Returns true when the name stands for standard output: "-", /dev/stdout, /dev/fd/1 or a link to
+/// one of these.
 [[nodiscard]] bool isStandardOutput(const std::filesystem::path& target);
 
-/// The one name of a file that need not exist, behind all links and folders; empty for devices,
-/// which take from many, and for "-".
+/// Canonical path of a file that need not exist, with all links and folders resolved. Empty for "-"
+/// and for devices, which several writers may share.
 [[nodiscard]] std::filesystem::path canonicalFile(const std::filesystem::path& file);
 
-/// Do both names, of files that need not exist, lead to one and the same? Never of devices, which
-/// take from many.
+/// Returns true when both names lead to the same file. The files need not exist. Always false for
+/// devices, which several writers may share.
 [[nodiscard]] bool isSameFile(const std::filesystem::path& a, const std::filesystem::path& b);
 
-/// Removes every temporary file of this process at once. Safe to call from a thread that handles
-/// a signal while others write; nothing is renamed or begun afterwards.
+/// Removes all temporary files of this process. A thread that handles a signal may call it while
+/// other threads write. Afterwards no file is renamed or created.
 void removeTemporaryFiles() noexcept;
 
-/// With false, every FileTarget refuses to overwrite an existing file (`--no-clobber`).
+/// Sets the default of `clobber`. With false, every FileTarget refuses to overwrite an existing
+/// file (`--no-clobber`).
 void setClobberDefault(bool clobber);
 [[nodiscard]] bool clobberDefault();
 

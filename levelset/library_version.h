@@ -5,12 +5,13 @@
 
 namespace levelset {
 
-/// A library that a module is made of.
+/// Name and version of a library that the program links.
 struct LibraryVersion {
   std::string name, version;
 };
 
-/// Those of levelset/: as they say at run time where they can, else as their headers say.
+/// Versions of the libraries that levelset/ uses: the run-time version where the library reports
+/// one, else the version in its headers.
 [[nodiscard]] std::vector<LibraryVersion> libraryVersions();
 
 }  // namespace levelset

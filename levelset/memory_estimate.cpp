@@ -11,28 +11,28 @@
 
 namespace levelset::eikonal {
 
-void checkMemory(const MemoryEstimate& room, std::size_t maxMemory, const char* action) {
-  // Inwards there is never more than the solid's own box.
-  const double out = room.outside + 1;
+void checkMemory(const MemoryEstimate& estimate, std::size_t maxMemory, const char* action) {
+  // Inwards there are never more points than in the solid's own box.
+  const double out = estimate.outside + 1;
   double reached = 1, longest = 0;
   for (int i = 0; i < 3; ++i) {
-    double from = room.surface.min()[i] - out, to = room.surface.max()[i] + out;
+    double from = estimate.surface.min()[i] - out, to = estimate.surface.max()[i] + out;
     if (from < -kIndexLimit || to > kIndexLimit)
       throw ResourceLimit(
-          fmt::format("{}: distances up to {:.4g} voxels pass the range of 32-bit indices; use a "
+          fmt::format("{}: distances up to {:.4g} voxels exceed the range of 32-bit indices; use a "
                       "smaller distance or larger voxels",
                       action, out));
-    if (room.region) {
-      from = std::max<double>(from, room.region->min()[i]);
-      to = std::min<double>(to, room.region->max()[i]);
+    if (estimate.region) {
+      from = std::max<double>(from, estimate.region->min()[i]);
+      to = std::min<double>(to, estimate.region->max()[i]);
     }
     reached *= std::max(0.0, to - from + 1);
-    longest = std::max(longest, static_cast<double>(room.surface.dim()[i]));
+    longest = std::max(longest, static_cast<double>(estimate.surface.dim()[i]));
   }
-  // Steiner's formula for a convex body, or the whole box.
-  const double steiner = room.area * (std::min(room.inside, longest / 2) + out) +
+  // The smaller of Steiner's formula for a convex body and the complete box.
+  const double steiner = estimate.area * (std::min(estimate.inside, longest / 2) + out) +
                          2 * M_PI * longest * out * out + 4.0 / 3 * M_PI * out * out * out;
-  const double bytes = std::min(reached, steiner) * room.bytesPerGridPoint;
+  const double bytes = std::min(reached, steiner) * estimate.bytesPerGridPoint;
   requireMemory(bytes, memoryLimit(maxMemory), action);
 }
 

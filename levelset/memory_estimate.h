@@ -8,18 +8,18 @@
 
 namespace levelset::eikonal {
 
-/// What is asked for around a surface, in voxels.
+/// Extent of the grid points that an operator computes around a surface, in voxels.
 struct MemoryEstimate {
   openvdb::CoordBBox surface;
   double area = 0;
-  double inside = 0, outside = 0;  ///< distances
+  double inside = 0, outside = 0;  ///< distances from the surface, voxels
   std::optional<openvdb::CoordBBox> region = {};
   double bytesPerGridPoint = 20;
 };
 
-/// Refuses what cannot fit before anything is allocated.
-/// @throws ResourceLimit when the grid points reached take more than `maxMemory` or than there is,
-///         or pass the range of indices
-void checkMemory(const MemoryEstimate& room, std::size_t maxMemory, const char* action);
+/// Refuses a computation that does not fit into memory, before it allocates.
+/// @throws ResourceLimit when the grid points take more than `maxMemory` or the machine's memory,
+///         or exceed the index range
+void checkMemory(const MemoryEstimate& estimate, std::size_t maxMemory, const char* action);
 
 }  // namespace levelset::eikonal

@@ -4,7 +4,7 @@
 
 namespace levelset {
 
-/// `maxMemory`, or what the machine has if that is less: bytes that an operator may plan to use.
+/// Bytes that an operator may plan to use: the smaller of `maxMemory` and the machine's memory.
 [[nodiscard]] std::size_t memoryLimit(std::size_t maxMemory);
 
 }  // namespace levelset

@@ -11,14 +11,14 @@ namespace {
 
 using Imath::V3d;
 
-/// One list: as long as there are vertices, and all of it finite.
+/// Checks that one list has an entry for each vertex and that all its values are finite.
 template <typename Vector>
 void requireList(const std::vector<Vector>& list, std::size_t vertices, const char* name,
                  const char* action) {
   if (list.empty()) return;
   if (list.size() != vertices) {
     throw InvalidInput(
-        fmt::format("{}: the mesh has {} {}s for {} vertices; give one to each, or "
+        fmt::format("{}: the mesh has {} {}s for {} vertices; give one for each vertex, or "
                     "none",
                     action, list.size(), name, vertices));
   }
@@ -26,8 +26,8 @@ void requireList(const std::vector<Vector>& list, std::size_t vertices, const ch
     for (unsigned axis = 0; axis < Vector::dimensions(); ++axis)
       if (!std::isfinite(list[v][static_cast<int>(axis)])) {
         throw InvalidInput(
-            fmt::format("{}: the {} of vertex {} holds {}, which is not a number; "
-                        "repair the mesh, or leave its {}s out",
+            fmt::format("{}: the {} of vertex {} holds {}, which is not a finite number; "
+                        "repair the mesh, or remove its {}s",
                         action, name, v, list[v][static_cast<int>(axis)], name));
       }
 }
@@ -65,20 +65,20 @@ void requireAttributes(const TriMesh& mesh, const char* action) {
   requireList(mesh.attributes.colors, count, "colour", action);
 }
 
-V3d carriedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, double hand) {
-  // Divided by the largest number first, so that no product leaves the range of numbers.
+V3d transformedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, double hand) {
+  // Scaled by the largest component first, so that no product overflows.
   double inA = largestPart(slopes[0]), inB = largestPart(slopes[1]), inC = largestPart(slopes[2]);
   const double size = std::max(std::max(inA, inB), inC);
   const double length = largestPart(normal);
-  constexpr double kLeast = 1e-300;  // whose inverse is a number
-  if (!(size > kLeast) || !(length > kLeast)) return V3d(0);
+  constexpr double kMinMagnitude = 1e-300;  // its inverse is still finite
+  if (!(size > kMinMagnitude) || !(length > kMinMagnitude)) return V3d(0);
   const double bySize = 1 / size, byLength = 1 / length;
   const V3d a = slopes[0] * bySize, b = slopes[1] * bySize, c = slopes[2] * bySize,
             n = normal * byLength;
-  // The columns of the cofactor matrix: the inverse transpose but for its determinant, which need
-  // not be divided by.
+  // Columns of the cofactor matrix, which is the inverse transpose times the determinant. The scale
+  // does not matter here.
   const V3d moved = hand * (n.x * b.cross(c) + n.y * c.cross(a) + n.z * a.cross(b));
-  // What is left of a flat map is rounding.
+  // For a flat map, the remaining vector consists of rounding errors.
   inA *= bySize, inB *= bySize, inC *= bySize;
   const double sum =
       std::abs(n.x) * inB * inC + std::abs(n.y) * inC * inA + std::abs(n.z) * inA * inB;
@@ -95,7 +95,7 @@ void append(TriMesh& mesh, const TriMesh& other) {
     mesh.precision = other.precision;
     mesh.spacing = other.spacing;
   } else if (more > 0) {
-    // The coarser of both: no coordinate of the whole is known better.
+    // The coarser of the two: it holds for all coordinates of the joined mesh.
     if (other.precision == CoordinatePrecision::Float) mesh.precision = other.precision;
     mesh.spacing = std::max(mesh.spacing, other.spacing);
   }

@@ -22,15 +22,16 @@ using LeafNode = openvdb::FloatTree::LeafNodeType;
 
 constexpr const char* kOpenSurface = "levelsmith_open_surface";
 
-/// The linear part, one image of an axis per row. Not by way of OpenVDB's AffineMap, which refuses
-/// voxels below 1.4e-5 as singular.
+/// The linear part of a transform: one image of an axis per row. It avoids OpenVDB's AffineMap,
+/// which refuses voxels below 1.4e-5 as singular.
 std::array<openvdb::Vec3d, 3> linearPart(const openvdb::math::Transform& transform) {
   const openvdb::math::MapBase& map = *transform.baseMap();
   return {map.applyJacobian(openvdb::Vec3d(1, 0, 0)), map.applyJacobian(openvdb::Vec3d(0, 1, 0)),
           map.applyJacobian(openvdb::Vec3d(0, 0, 1))};
 }
 
-/// Rotation, uniform scale and translation only, to within rounding of the stored matrix.
+/// Returns true for a rotation, uniform scale and translation, within the rounding of the stored
+/// matrix.
 bool isSimilarity(const openvdb::math::Transform& transform) {
   if (!transform.isLinear()) return false;
   const std::array<openvdb::Vec3d, 3> rows = linearPart(transform);
@@ -60,8 +61,8 @@ double NarrowBand::voxelSize() const {
 
 double NarrowBand::halfWidth() const {
   if (!grid_) return 0;
-  // The background is a float. The short number that it was made from, if there is one: 3, not
-  // 3.0000001; in any case one that gives the same background again.
+  // The background is a float, so the ratio may be 3.0000001. Returns the short number, 3, if it
+  // gives the same background; else the ratio itself.
   const double voxel = voxelSize(), ratio = static_cast<double>(grid_->grid->background()) / voxel;
   const double rounded = std::round(ratio * 1e6) / 1e6;
   return backgroundOf(rounded, voxel) == grid_->grid->background() ? rounded : ratio;
@@ -157,8 +158,8 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action, BandRepairs* repa
   const std::string name = grid->getName().empty() ? "(unnamed)" : grid->getName();
   if (grid->getGridClass() != openvdb::GRID_LEVEL_SET) {
     throw InvalidInput(
-        fmt::format("{}: grid '{}' is of class '{}', not a level set; convert it before it is read",
-                    action, name, FloatGrid::gridClassToString(grid->getGridClass())));
+        fmt::format("{}: grid '{}' is of class '{}', not a level set; convert it first", action,
+                    name, FloatGrid::gridClassToString(grid->getGridClass())));
   }
   if (!isSimilarity(grid->transform())) {
     throw InvalidInput(
@@ -170,14 +171,14 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action, BandRepairs* repa
   const float background = grid->background();
   if (!(background > 0) || !std::isfinite(background)) {
     throw InvalidInput(
-        fmt::format("{}: the background of grid '{}' is {}, a level set needs a "
-                    "positive one",
+        fmt::format("{}: the background of grid '{}' is {}; a level set needs a "
+                    "positive, finite one",
                     action, name, background));
   }
   BandRepairs made;
   made.activeTiles = grid->tree().activeTileCount();
   grid->tree().voxelizeActiveTiles();
-  // Half floats round the background of a file that holds them.
+  // Files with half floats round the background.
   const auto takes = [&](float& value) {
     const float right = std::signbit(value) ? -background : background;
     made.inactiveValues += std::abs(value - right) > 1e-3f * background;
@@ -188,7 +189,7 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action, BandRepairs* repa
     for (openvdb::Index i = 0; i < LeafNode::SIZE; ++i) {
       if (!std::isfinite(values[i])) {
         throw InvalidInput(
-            fmt::format("{}: grid '{}' holds {} at index {}; repair the file or make it "
+            fmt::format("{}: grid '{}' holds {} at index {}; repair the file or write it "
                         "again",
                         action, name, values[i], coordText(leaf->offsetToGlobalCoord(i))));
       }
@@ -211,8 +212,8 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action, BandRepairs* repa
 
 openvdb::math::Transform::Ptr uniformTransform(double voxelSize) {
   using openvdb::math::UniformScaleMap;
-  // The map's constructor refuses a determinant below 3e-15; its fields, read as from a file, may
-  // hold any scale.
+  // The map's constructor refuses a determinant below 3e-15. Its fields may hold any scale when
+  // they are read from a stream.
   const double fields[] = {voxelSize, voxelSize, 1 / voxelSize, 1 / voxelSize / voxelSize,
                            1 / voxelSize / 2};
   std::stringstream stream;
@@ -227,7 +228,8 @@ openvdb::math::Transform::Ptr uniformTransform(double voxelSize) {
 float backgroundOf(double halfWidth, double voxelSize) {
   const double width = halfWidth * voxelSize;
   const auto background = static_cast<float>(width);
-  // A float times the inverse of its factor is itself but for the last bits of a double.
+  // When `width` stems from a float background, the product differs from that float only in the
+  // last bits of a double.
   return background < width * (1 - 1e-12) ? std::nextafter(background, INFINITY) : background;
 }
 
@@ -251,7 +253,8 @@ openvdb::CoordBBox blocksOf(const Imath::Box3d& world, const openvdb::math::Tran
 }
 
 void requireBackground(float background, double voxelSize, const char* action) {
-  // Distances of a thousandth of a voxel must still be normal numbers.
+  // A thousandth of the background must still be a normal number, so that small distances keep full
+  // precision.
   if (background > 1000 * std::numeric_limits<float>::min() && std::isfinite(background)) return;
   throw InvalidInput(
       fmt::format("{}: voxels of {:.6g} are too {} for distances in single precision; change the "

@@ -13,50 +13,54 @@ namespace levelset {
 
 struct VdbGrid;  // levelset/vdb.h, for .cpp files only
 
-/// Index coordinates stay below this, so that those of the nodes around them do not overflow 32
-/// bits.
+/// Limit of the magnitude of index coordinates. The margin keeps the coordinates of the surrounding
+/// tree nodes within 32 bits.
 inline constexpr double kIndexLimit = 2147483648.0 - 8192;
 
-/// What a grid from outside lacked to be a band.
+/// Repairs that importBand made to turn an external grid into a band.
 struct BandRepairs {
-  std::uint64_t activeTiles = 0;     ///< were split into voxels
-  std::uint64_t inactiveValues = 0;  ///< were not ± background, and were set to it by their sign
+  std::uint64_t activeTiles = 0;     ///< active tiles that were split into voxels
+  std::uint64_t inactiveValues = 0;  ///< inactive values other than ± background, set to it by
+                                     ///< their sign
 };
 
-/// A solid as a signed distance in a narrow band on a sparse grid: `float` values in world units,
-/// negative inside, |∇φ| ≈ 1 in the band, ± background elsewhere.
+/// A solid as a signed distance field in a narrow band on a sparse grid. Values are `float` in
+/// world units, negative inside, with |∇φ| ≈ 1 in the band and ± background elsewhere.
 ///
-/// A value: copies share one grid and show it as const, so they are cheap and nobody sees another's
-/// edit. Grid points sit at integer index coordinates; the transform to world space is a rotation,
-/// a uniform scale and a translation. The bits of the tree do not depend on the number of threads.
+/// The class has value semantics. Copies are cheap: they share one const grid, and an edit of one
+/// copy does not affect the others. Grid points lie at integer index coordinates. The transform to
+/// world space is a rotation, a uniform scale and a translation. The bits of the tree do not depend
+/// on the number of threads.
 class NarrowBand {
  public:
   NarrowBand() = default;
 
-  /// True when the band has no active voxel: there is no surface.
+  /// Returns true when the band has no active voxel: there is no surface.
   [[nodiscard]] bool isEmpty() const;
-  /// Edge of a voxel, world units.
+  /// Edge length of a voxel, world units.
   [[nodiscard]] double voxelSize() const;
-  /// Distance to which the band reaches on each side, in voxels; background = halfWidth ×
+  /// Width of the band on each side of the surface, in voxels. The background is halfWidth ×
   /// voxelSize.
   [[nodiscard]] double halfWidth() const;
   [[nodiscard]] std::size_t activeVoxelCount() const;
-  /// Bytes that the tree takes.
+  /// Memory of the tree in bytes.
   [[nodiscard]] std::size_t memoryUse() const;
-  /// Index to world; Imath multiplies row vectors: `world = index * matrix`.
+  /// Transform from index to world space. Imath multiplies row vectors: `world = index * matrix`.
   [[nodiscard]] Imath::M44d indexToWorld() const;
-  /// World-space box of the zero set's sign changes (between voxel centres, by linear
-  /// interpolation); empty when there are none.
+  /// World-space box of the sign changes between neighbouring grid points, located by linear
+  /// interpolation. Empty when there are none.
   [[nodiscard]] Imath::Box3d zeroSetBounds() const;
-  /// Is it the band about a surface with a border (surfaceBand), cut off beyond that? It has two
-  /// sides and no inside: a base for patches, and no solid.
+  /// Returns true for the band of a surface with a border (surfaceBand). The band ends at the
+  /// border. Such a surface has two sides and no inside: it can be the base of patches but is no
+  /// solid.
   [[nodiscard]] bool isOpenSurface() const;
-  /// Of its grid, where it came from a file that gave one.
+  /// Name of the grid, where the band comes from a file that gives one.
   [[nodiscard]] std::string name() const;
-  /// Hash of transform, topology and values: equal for equal trees, whatever made them.
+  /// Hash of transform, topology and values. Equal trees have equal hashes, whichever operator
+  /// computed them.
   [[nodiscard]] std::uint64_t contentHash() const;
 
-  /// For our own .cpp files; see levelset/vdb.h.
+  /// Grid behind the band, for the .cpp files of this library; see levelset/vdb.h.
   [[nodiscard]] const std::shared_ptr<VdbGrid>& shared() const { return grid_; }
   explicit NarrowBand(std::shared_ptr<VdbGrid> grid) : grid_(std::move(grid)) {}
 
@@ -65,14 +69,14 @@ class NarrowBand {
   std::shared_ptr<VdbGrid> grid_;
 };
 
-/// A region that ends nowhere, and is it one?
+/// Unbounded region.
 inline const Imath::Box3d kEverywhere{Imath::V3d{Imath::V3d::baseTypeLowest()},
                                       Imath::V3d{Imath::V3d::baseTypeMax()}};
 [[nodiscard]] inline bool isEverywhere(const Imath::Box3d& region) {
   return region == kEverywhere;
 }
 
-/// What every operator on solids asks first.
+/// Refuses a band that is no solid. Every operator on solids calls it first.
 /// @throws InvalidInput for an open surface: "measure: the operand is an open surface, …"
 void requireSolid(const NarrowBand& band, const char* action);
 

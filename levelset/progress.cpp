@@ -18,7 +18,7 @@ Progress subProgress(const Progress& whole, double from, double to) {
 void requireMemory(double estimatedBytes, std::size_t maxBytes, const char* action) {
   if (estimatedBytes <= static_cast<double>(maxBytes)) return;
   throw ResourceLimit(fmt::format(
-      "{}: needs about {:.3g} GB, which passes the limit of {:.3g} GB; use larger voxels "
+      "{}: needs about {:.3g} GB, which exceeds the limit of {:.3g} GB; use larger voxels "
       "or raise --max-memory",
       action, estimatedBytes * 1e-9, static_cast<double>(maxBytes) * 1e-9));
 }

@@ -6,22 +6,25 @@
 
 namespace levelset {
 
-/// Called by long operators with a fraction in [0, 1] that never falls; return false to cancel,
-/// upon which the operator throws Cancelled and leaves nothing behind. Calls come one at a time,
-/// though not always from the thread that called the operator. Empty: nobody asks.
+/// Callback through which long operators report their progress, a fraction in [0, 1] that never
+/// decreases. It returns false to cancel; the operator then throws Cancelled and leaves no partial
+/// result. Calls come one at a time, but not always from the thread that called the operator.
+/// Empty: no reports.
 using Progress = std::function<bool(double)>;
 
-/// Throws Cancelled if `progress` is set and answers false.
+/// Reports the fraction.
+/// @throws Cancelled when `progress` is set and returns false
 void report(const Progress& progress, double fraction, const char* action);
 
-/// The part [from, to] of a longer job, as a Progress of its own.
+/// Maps the progress of a subtask, 0 to 1, to the interval [from, to] of the complete task.
 [[nodiscard]] Progress subProgress(const Progress& whole, double from, double to);
 
-/// Bytes that an operator may plan to use; operators estimate first and throw ResourceLimit before
-/// they allocate.
+/// Value for "no limit" of the bytes that an operator may use. Operators estimate their memory and
+/// throw ResourceLimit before they allocate.
 inline constexpr std::size_t kNoMemoryLimit = std::numeric_limits<std::size_t>::max();
 
-/// Throws ResourceLimit, naming both figures, if `estimatedBytes` passes `maxBytes`.
+/// Compares a memory estimate with its limit.
+/// @throws ResourceLimit, with both figures, when `estimatedBytes` exceeds `maxBytes`
 void requireMemory(double estimatedBytes, std::size_t maxBytes, const char* action);
 
 }  // namespace levelset

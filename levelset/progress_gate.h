@@ -8,8 +8,8 @@
 
 namespace levelset {
 
-/// Lets parallel work report progress: one call at a time, with a fraction that never falls, and
-/// none that waits for another (internal).
+/// Lets parallel tasks report progress. Calls come one at a time with a fraction that never
+/// decreases, and no task waits for another (internal).
 class ProgressGate {
  public:
   ProgressGate(const Progress& progress, std::size_t total, const char* action)

@@ -10,14 +10,14 @@
 
 namespace levelset {
 
-/// The part of a band that its consumers read: a half width and a box.
+/// Part of a band that its consumers read: a half width and a box.
 struct RegionOfInterest {
   double halfWidth = std::numeric_limits<double>::infinity();  ///< voxels
   Imath::Box3d region = kEverywhere;                           ///< world units
 
   [[nodiscard]] bool isWhole() const { return std::isinf(halfWidth) && isEverywhere(region); }
 
-  /// Grows to what either of two consumers reads.
+  /// Extends the region of interest to include that of a second consumer.
   void join(const RegionOfInterest& other) {
     halfWidth = std::max(halfWidth, other.halfWidth);
     region.extendBy(other.region);

@@ -1,6 +1,7 @@
 #pragma once
 
-// The one header that includes OpenVDB. Include it from .cpp files only: it costs three seconds.
+// The only header that includes OpenVDB. Include it from .cpp files only: it takes three seconds to
+// compile.
 
 #include <openvdb/openvdb.h>
 
@@ -10,8 +11,8 @@ namespace levelset {
 
 struct VdbGrid {
   openvdb::FloatGrid::Ptr grid;
-  /// Of an open surface: how far beyond the border the closest point of what it goes on by lies,
-  /// voxels; active where it goes on.
+  /// For an open surface: distance beyond the border, in voxels, of the closest point on the
+  /// surface's straight extension. Active where the band belongs to the extension.
   std::shared_ptr<const openvdb::FloatTree> beyond = {};
 };
 
@@ -19,26 +20,27 @@ struct VdbAccess {
   static std::shared_ptr<VdbGrid>& slot(NarrowBand& band) { return band.grid_; }
 };
 
-/// The grid behind a band, to read. @pre the band was made, not default constructed
+/// The grid behind a band, read-only. @pre the band is not default constructed
 [[nodiscard]] inline const openvdb::FloatGrid& vdb(const NarrowBand& band) {
   return *band.shared()->grid;
 }
 
-/// The grid behind a band, to change: copied first if somebody else holds it.
+/// The grid behind a band, for editing. Copies it first when another band shares it.
 [[nodiscard]] openvdb::FloatGrid& editVdb(NarrowBand& band);
 
-/// Takes a grid that holds the invariants of a band (asserted in debug builds, not checked):
-/// class level set, background > 0, no active tiles, inactive values ± background.
+/// Makes a band of a grid that fulfils the invariants of a band: class level set, background > 0,
+/// no active tiles, inactive values ± background. Debug builds assert them; nothing else checks
+/// them.
 [[nodiscard]] NarrowBand makeBand(openvdb::FloatGrid::Ptr grid);
 
-/// As makeBand, of an open surface.
-/// @param beyond  as in VdbGrid; background 0
+/// Makes the band of an open surface, as makeBand does.
+/// @param beyond  as in VdbGrid, with background 0
 [[nodiscard]] NarrowBand makeOpenBand(openvdb::FloatGrid::Ptr grid,
                                       std::shared_ptr<const openvdb::FloatTree> beyond);
 
-/// Checks the invariants of a grid that came from outside and takes it.
-/// Active tiles are voxelised, inactive values are set to ± background by their sign; `repairs`,
-/// if given, counts them.
+/// Checks the invariants of an external grid and makes a band of it. Splits active tiles into
+/// voxels and sets inactive values to ± background by their sign. Counts both in `repairs` if
+/// given.
 /// @throws InvalidInput for NaN or infinite values, a background ≤ 0, a class other than level set,
 ///         or a transform that is not a rotation, uniform scale and translation
 [[nodiscard]] NarrowBand importBand(openvdb::FloatGrid::Ptr grid, const char* action,
@@ -51,24 +53,25 @@ struct VdbAccess {
   return {v.x, v.y, v.z};
 }
 
-/// An axis-aligned transform: world = voxelSize × index.
+/// Axis-aligned transform: world = voxelSize × index.
 [[nodiscard]] openvdb::math::Transform::Ptr uniformTransform(double voxelSize);
 
-/// halfWidth × voxelSize, rounded up: a band of three voxels must not become one of 2.9999999,
-/// which OpenVDB's own check refuses. Bands must agree to the bit in where they end, so that
-/// everybody takes it from here; `NarrowBand::halfWidth` gives back what makes the same number
-/// again.
+/// halfWidth × voxelSize, rounded up. Rounding down would turn a band of 3 voxels into one of
+/// 2.9999999, which OpenVDB's own check refuses. All bands take their background from here, because
+/// their widths must agree to the bit. `NarrowBand::halfWidth` returns a number that gives the same
+/// background again.
 [[nodiscard]] float backgroundOf(double halfWidth, double voxelSize);
 
-/// @throws InvalidInput when distances up to there leave the range of `float`
+/// Checks that distances up to `background` fit into single precision.
+/// @throws InvalidInput when they leave the range of `float`
 void requireBackground(float background, double voxelSize, const char* action);
 
-/// The 8³ blocks of grid points that meet a world box, as far as there are indices: from the first
-/// point of the first to the last of the last.
+/// Index box of the 8³ blocks of grid points that meet a world box, clamped to the index range. It
+/// runs from the lowest point of the first block to the highest point of the last.
 [[nodiscard]] openvdb::CoordBBox blocksOf(const Imath::Box3d& world,
                                           const openvdb::math::Transform& transform);
 
-/// An empty level-set grid with that transform and background halfWidth × voxelSize.
+/// Empty level-set grid with that transform and the background halfWidth × voxelSize.
 [[nodiscard]] openvdb::FloatGrid::Ptr emptyLevelSet(openvdb::math::Transform::Ptr transform,
                                                     double halfWidth);
 

@@ -83,7 +83,7 @@ Imath::M44d Camera::worldToCamera() const {
 Imath::M44d Camera::worldToNdc() const {
   const HalfExtent half = halfExtentOf(*this);
   const double sx = 0.5 / half.x, sy = -0.5 / half.y;
-  // The third coordinate is discarded by readers; it keeps the matrix regular.
+  // Readers discard the third coordinate; it keeps the matrix invertible.
   const Imath::M44d perspective(sx, 0, 0, 0, 0, sy, 0, 0, 0.5, 0.5, 1, 1, 0, 0, -1, 0);
   const Imath::M44d orthographic(sx, 0, 0, 0, 0, sy, 0, 0, 0, 0, 1, 0, 0.5, 0.5, 0, 1);
   return worldToCamera() * (orthoHeight ? orthographic : perspective);
@@ -93,63 +93,65 @@ void validate(const Camera& camera) {
   using levelset::UsageError;
   if (camera.width <= 0 || camera.height <= 0) {
     throw UsageError(
-        fmt::format("camera: an image of {}x{} pixels has nothing to show; give both "
-                    "sizes a positive number",
+        fmt::format("camera: an image of {}x{} pixels is empty; give "
+                    "a positive width and height",
                     camera.width, camera.height));
   }
   if (static_cast<double>(camera.width) * camera.height > kMaxPixels) {
     throw levelset::ResourceLimit(
-        fmt::format("camera: an image of {}x{} pixels passes the limit of "
+        fmt::format("camera: an image of {}x{} pixels exceeds the limit of "
                     "{:.0f} pixels; choose a smaller size",
                     camera.width, camera.height, kMaxPixels));
   }
   if (!isFinite(camera.from) || !isFinite(camera.to) || !isFinite(camera.up)) {
     throw UsageError(
-        fmt::format("camera: from {}, to {}, up {} are not all finite; give finite "
+        fmt::format("camera: from {}, to {}, up {} must be finite; give finite "
                     "points",
                     text(camera.from), text(camera.to), text(camera.up)));
   }
   const V3d view = camera.to - camera.from;
   if (!(view.length() > 0)) {
-    throw UsageError(fmt::format("camera: from and to are the same point {}; move one of them",
+    throw UsageError(fmt::format("camera: the points from and to are both {}; move one of them",
                                  text(camera.to)));
   }
   const V3d across = view.normalized().cross(camera.up);
   if (!(across.length() > 1e-9 * camera.up.length())) {
     throw UsageError(
-        fmt::format("camera: up {} is parallel to the view from {} to {}; choose "
+        fmt::format("camera: the vector up, {}, is parallel to the view from {} to {}; choose "
                     "another up",
                     text(camera.up), text(camera.from), text(camera.to)));
   }
   if (camera.orthoHeight) {
     if (!(*camera.orthoHeight > 0) || !std::isfinite(*camera.orthoHeight)) {
-      throw UsageError(fmt::format("camera: the orthographic height {} is not a positive length",
+      throw UsageError(fmt::format("camera: the orthographic height {} must be a positive length",
                                    *camera.orthoHeight));
     }
   } else if (!(camera.verticalFov > 0 && camera.verticalFov < std::numbers::pi)) {
-    throw UsageError(fmt::format("camera: the field of view of {} degrees is not between 0 and 180",
-                                 camera.verticalFov * 180 / std::numbers::pi));
+    throw UsageError(
+        fmt::format("camera: the field of view of {} degrees must lie between 0 and 180",
+                    camera.verticalFov * 180 / std::numbers::pi));
   }
   if (!(camera.near >= 0) || !(camera.farthest() > camera.near) ||
       !std::isfinite(camera.farthest())) {
     throw UsageError(
-        fmt::format("camera: there is no depth from {} to {} to be seen; take a "
-                    "near plane at 0 or more, and a far one beyond it",
+        fmt::format("camera: the depth range from {} to {} is empty; give a "
+                    "near plane at 0 or more, and a far plane behind it",
                     camera.near, camera.farthest()));
   }
 }
 
 namespace {
 
-/// Turns the default view, whose up is y, to another up.
+/// Rotates the default view, whose up vector is y, to another up vector.
 V3d viewFrom(const V3d& up) {
   const V3d view(0.45, 0.35, 1);
   const double length = up.length();
   if (!(length > 0) || !std::isfinite(length))
-    throw levelset::UsageError("camera: up has no direction; give for example 0,1,0");
+    throw levelset::UsageError(
+        "camera: the vector up is zero or not finite; give for example 0,1,0");
   const V3d y = up / length;
   if (y == V3d(0, 1, 0)) return view;
-  // z stays in front as far as it is across `up`; where up is z, -y is in front.
+  // The front is z, made perpendicular to `up`; where up is z, -y is the front.
   const V3d front = std::abs(y.z) < 0.9 ? V3d(0, 0, 1) : V3d(0, y.z > 0 ? -1 : 1, 0);
   const V3d x = y.cross(front).normalized();
   return x * view.x + y * view.y + x.cross(y) * view.z;
@@ -160,7 +162,8 @@ V3d viewFrom(const V3d& up) {
 Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double verticalFov,
                      const V3d& up) {
   if (bounds.isEmpty() || !isFinite(bounds.min) || !isFinite(bounds.max)) {
-    throw levelset::UsageError("camera: there is no surface to frame; give the view with --from");
+    throw levelset::UsageError(
+        "camera: the scene has no surface to frame; give the view with --from");
   }
   Camera camera;
   camera.width = width;
@@ -171,12 +174,12 @@ Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double v
   camera.from = camera.to + viewFrom(up);
   validate(camera);
 
-  // A corner at (x, y, depth) beyond a camera that stands `back` behind the target and is shifted
-  // by s is seen when |x - s| <= k (back + depth): linear in s and back, so each axis has a closed
-  // form.
+  // Consider a camera at distance `back` from the target, shifted by s along an image axis. It sees
+  // a corner at (x, y, depth) when |x - s| <= k (back + depth). This is linear in s and back, so
+  // each axis has a closed form.
   const CameraAxes axes = axesOf(camera);
   const double half[2] = {halfExtentOf(camera).x, halfExtentOf(camera).y};
-  constexpr double kMargin = 0.94;  // of the picture that the box may take
+  constexpr double kMargin = 0.94;  // share of the picture that the box fills
   double back = 0, shift[2];
   for (int axis = 0; axis < 2; ++axis) {
     const double k = kMargin * half[axis];

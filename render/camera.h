@@ -8,51 +8,56 @@
 
 namespace render {
 
-/// Looks from a point to a point; perspective with a vertical field of view, or orthographic.
+/// A camera that looks from one point at another, in perspective or orthographic projection.
 struct Camera {
-  static constexpr double kNoDepth = 1e300;  ///< farther than anything
+  static constexpr double kNoDepth = 1e300;  ///< larger than every depth
   Imath::V3d from{0, 0, 5}, to{0, 0, 0}, up{0, 1, 0};
   double verticalFov = 0.6108652381980153;  ///< radians, (0, π)
-  std::optional<double> orthoHeight = {};   ///< world units; set: orthographic
-  /// World units along the view axis: what is nearer or farther is not seen, but lighted through.
-  /// 0 or more, and unset, which is no end, or beyond `near`.
+  std::optional<double> orthoHeight = {};   ///< world units; set: orthographic projection
+  /// Depth range that the camera sees, world units along the view axis. `near` is at least 0, `far`
+  /// is above `near` or unset (no end). Surfaces outside the range are invisible but still cast
+  /// shadows.
   double near = 0;
   std::optional<double> far = {};
   int width = 1024, height = 1024;  ///< pixels
 
   struct Ray {
     Imath::V3d origin, direction;     ///< direction of unit length
-    double near = 0, far = kNoDepth;  ///< what of it sees, along the direction
+    double near = 0, far = kNoDepth;  ///< visible interval, distances along the direction
   };
-  /// Through image position (x, y) in pixels, (0, 0) the upper left corner, +y down.
+  /// Ray through the image position (x, y) in pixels; (0, 0) is the upper left corner, +y points
+  /// down.
   [[nodiscard]] Ray ray(double x, double y) const;
   [[nodiscard]] double farthest() const { return far.value_or(kNoDepth); }
   /// Unit view axis, towards `to`.
   [[nodiscard]] Imath::V3d axis() const;
-  /// What a pixel to the right and one down are on the plane at unit depth (perspective), or in
-  /// world units (orthographic).
+  /// World-space vectors from one pixel to the next one to the right and to the next one below. In
+  /// perspective they are measured on the plane at unit depth, otherwise in world units.
   struct PixelSteps {
     Imath::V3d right, down;
   };
   [[nodiscard]] PixelSteps pixelSteps() const;
-  /// OpenEXR's camera space: x right, y up, z along the view. Row vectors: `camera = world *
-  /// matrix`.
+  /// Matrix to OpenEXR's camera space: x right, y up, z along the view. Vectors are rows: `camera =
+  /// world * matrix`.
   [[nodiscard]] Imath::M44d worldToCamera() const;
-  /// OpenEXR's normalised device space: (0, 0) the upper left corner, (1, 1) the lower right one.
+  /// Matrix to OpenEXR's normalised device space: (0, 0) is the upper left corner, (1, 1) the lower
+  /// right one.
   [[nodiscard]] Imath::M44d worldToNdc() const;
 };
 
-/// More pixels than this are refused.
+/// Largest number of pixels of an image; larger images are refused.
 inline constexpr double kMaxPixels = 268435456;  // 2^28
 
-/// @throws levelset::UsageError when a number is not finite, from equals to, up is parallel to the
-///         view, the field of view, the height or the depths are out of range, or a size is not
-///         positive
-/// @throws levelset::ResourceLimit for more than kMaxPixels
+/// Checks a camera.
+/// @throws levelset::UsageError when a number is not finite, `from` equals `to`, or `up` is
+///         parallel to the view. Also when the field of view, the height or the depths are out of
+///         range, or a size is not positive.
+/// @throws levelset::ResourceLimit for more than kMaxPixels pixels
 void validate(const Camera& camera);
 
-/// A three-quarter view from the right, above and in front of what is up, that just frames the box,
-/// at any aspect. @throws levelset::UsageError when the box is empty, and as validate()
+/// Camera that just frames the box, at any aspect ratio. It looks from the upper right front, where
+/// `up` points upwards.
+/// @throws levelset::UsageError when the box is empty, and as validate()
 [[nodiscard]] Camera framingCamera(const Imath::Box3d& bounds, int width, int height,
                                    double verticalFov = 0.6108652381980153,
                                    const Imath::V3d& up = {0, 1, 0});

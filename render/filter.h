@@ -2,14 +2,15 @@
 
 namespace render {
 
-/// What is drawn of a grid: the zero set of which function through its values.
+/// Interpolation of a grid's values. Renderers draw the zero set of the interpolating function.
 enum class Filter {
-  /// Between the values.
+  /// Trilinear interpolation.
   Trilinear,
-  /// Tricubic B-spline with the values for coefficients: smooth, and off by a sixth of the
+  /// Tricubic B-spline whose coefficients are the grid values: smooth, but off by a sixth of the
   /// Laplacian.
   BSpline,
-  /// The same with the coefficients f − ∇²f/6: on the values to fourth order [Sigg05].
+  /// Quasi-interpolating tricubic B-spline with coefficients f − ∇²f/6: it meets the values to
+  /// fourth order [Sigg05].
   BSplineQi
 };
 

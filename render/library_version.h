@@ -6,7 +6,8 @@
 
 namespace render {
 
-/// Those that render/ takes beside levelset::libraryVersions(), likewise.
+/// Versions of the libraries that render/ uses in addition to levelset::libraryVersions(), in the
+/// same form.
 [[nodiscard]] std::vector<levelset::LibraryVersion> libraryVersions();
 
 }  // namespace render

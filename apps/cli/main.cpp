@@ -36,28 +36,29 @@ void printAll(const std::string& text) {
         fmt::format("levelsmith: standard output cannot be written: {}", std::strerror(errno)));
 }
 
-/// More are no help, and some systems give no more.
+/// More threads do not help, and some systems do not allow more.
 constexpr long kMostThreads = 1024;
 
-/// On standard error, under the name of the program, which some sentences begin with.
-void tell(const std::string& sentence) {
+/// Prints a sentence on standard error, with the name of the program in front unless it starts with
+/// it.
+void printMessage(const std::string& sentence) {
   fmt::print(stderr, "{}{}\n",
              sentence.starts_with("levelsmith: ") ? "" : "levelsmith: ", sentence);
 }
 
-/// Says what went wrong. @return the exit code
-int tellFailure(const std::exception_ptr& failure) {
+/// Prints the error. @return the exit code
+int printFailure(const std::exception_ptr& failure) {
   try {
     if (failure) std::rethrow_exception(failure);
   } catch (const levelset::Error& error) {
-    tell(error.what());
+    printMessage(error.what());
     return static_cast<int>(error.exitCode());
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "levelsmith: memory ran out; use larger voxels or a narrower band\n");
     return static_cast<int>(ExitCode::Resource);
   } catch (const std::exception& error) {
-    if (pipeline::isWantOfThreads(error)) {
-      fmt::print(stderr, "levelsmith{}\n", pipeline::kWantOfThreads);
+    if (pipeline::isThreadLimitError(error)) {
+      fmt::print(stderr, "levelsmith{}\n", pipeline::kThreadLimitMessage);
       return static_cast<int>(ExitCode::Resource);
     }
     fmt::print(
@@ -72,11 +73,11 @@ int tellFailure(const std::exception_ptr& failure) {
   return static_cast<int>(ExitCode::Input);
 }
 
-/// For what is thrown where nobody can catch it, as a thread that the system refuses to TBB may be.
-/// Nothing half written stays behind.
+/// Handles exceptions that nobody can catch, such as a thread that the system refuses to TBB.
+/// Temporary files are removed.
 [[noreturn]] void endUnexpectedly() {
   levelset::removeTemporaryFiles();
-  _exit(tellFailure(std::current_exception()));
+  _exit(printFailure(std::current_exception()));
 }
 
 bool claimsStandardOutput(const pipeline::Graph& graph) {
@@ -99,9 +100,9 @@ bool claimsJson(const pipeline::Graph& graph) {
 
 cli::ProgressStyle progressStyle(const pipeline::Graph& graph) {
   const auto it = graph.globals.find("progress");
-  const std::string wanted = it == graph.globals.end() ? "auto" : it->second;
-  if (wanted == "json") return cli::ProgressStyle::Json;
-  if (wanted == "off" || graph.globals.contains("quiet") || !isatty(STDERR_FILENO))
+  const std::string choice = it == graph.globals.end() ? "auto" : it->second;
+  if (choice == "json") return cli::ProgressStyle::Json;
+  if (choice == "off" || graph.globals.contains("quiet") || !isatty(STDERR_FILENO))
     return cli::ProgressStyle::Off;
   return cli::ProgressStyle::Bar;
 }
@@ -118,11 +119,11 @@ int runGraph(const pipeline::Graph& graph) {
     const auto threads = pipeline::parseInteger(globals.at("threads"), "--threads");
     if (threads > kMostThreads)
       throw levelset::UsageError(
-          fmt::format("--threads: {} are more than {}; give about as many as there are cores",
+          fmt::format("--threads: {} exceeds the limit of {}; give about the number of cores",
                       threads, kMostThreads));
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                   static_cast<std::size_t>(threads));
-    arena.initialize(static_cast<int>(threads));  // more than there are cores, if asked
+    arena.initialize(static_cast<int>(threads));  // may exceed the number of cores
   }
   if (globals.contains("no-clobber")) levelset::setClobberDefault(false);
   pipeline::checkRunTargets(graph);
@@ -135,7 +136,7 @@ int runGraph(const pipeline::Graph& graph) {
     for (const char* option : {"tolerance", "report"})
       if (globals.contains(option))
         throw levelset::UsageError(fmt::format(
-            "--explain: nothing runs, so --{} has nothing to tell; leave one of them out", option));
+            "--explain: nothing runs, so --{} has no effect; leave one of them out", option));
     pipeline::explain(graph, maxMemory, globals.contains("whole") || globals.contains("cache"),
                       printAll);
     return static_cast<int>(ExitCode::Done);
@@ -145,7 +146,7 @@ int runGraph(const pipeline::Graph& graph) {
   pipeline::RunSettings settings;
   settings.dryRun = dryRun;
   settings.maxMemory = maxMemory;
-  settings.wholeValues = globals.contains("whole");
+  settings.fullValues = globals.contains("whole");
   if (globals.contains("cache")) settings.cache = globals.at("cache");
   settings.measureErrors = verbose || globals.contains("report");
   if (globals.contains("report") && pipeline::isPage(globals.at("report")))
@@ -156,7 +157,7 @@ int runGraph(const pipeline::Graph& graph) {
   };
   settings.print = [&](const std::string& text) {
     line.clear();
-    // Data for programs and text for people do not mix on one stream.
+    // Data for programs and messages for people go to different streams.
     if (dataOnly || (json && !text.starts_with("{")))
       fmt::print(stderr, "{}", text);
     else
@@ -164,11 +165,11 @@ int runGraph(const pipeline::Graph& graph) {
   };
   settings.warn = [&](const std::string& sentence) {
     line.clear();
-    if (!quiet) tell("warning: " + sentence);
+    if (!quiet) printMessage("warning: " + sentence);
   };
   settings.note = [&](const std::string& sentence) {
     line.clear();
-    if (!quiet) tell(sentence);
+    if (!quiet) printMessage(sentence);
   };
   pipeline::RunReport report;
   const auto finish = [&] {
@@ -177,8 +178,8 @@ int runGraph(const pipeline::Graph& graph) {
       for (const pipeline::StepReport& step : report.steps)
         fmt::print(stderr, "{}\n", pipeline::stepLine(step, dryRun));
     if (report.tolerance && (verbose || dryRun))
-      for (const std::string& told : pipeline::toleranceLines(*report.tolerance))
-        fmt::print(stderr, "{}\n", told);
+      for (const std::string& text : pipeline::toleranceLines(*report.tolerance))
+        fmt::print(stderr, "{}\n", text);
     if (globals.contains("report")) pipeline::writeReport(globals.at("report"), report);
   };
   try {
@@ -189,11 +190,11 @@ int runGraph(const pipeline::Graph& graph) {
         pipeline::run(graph, settings, report);
     });
   } catch (const std::exception&) {
-    // What went wrong first is what the user must hear.
+    // The first error takes precedence.
     try {
       finish();
     } catch (const levelset::Error& error) {
-      tell(error.what());
+      printMessage(error.what());
     }
     throw;
   }
@@ -225,11 +226,11 @@ int main(int argc, char** argv) {
   try {
     code = levelsmith({argv + 1, argv + argc});
   } catch (...) {
-    code = tellFailure(std::current_exception());
+    code = printFailure(std::current_exception());
   }
   std::fflush(stderr);
   levelset::removeTemporaryFiles();
-  // The watching thread may be anywhere; nothing is left to be torn down.
+  // The watching thread still runs, so destructors are skipped.
   if (std::fflush(stdout) != 0 && code == 0) code = static_cast<int>(ExitCode::File);
   _exit(code);
 }

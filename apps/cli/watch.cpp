@@ -25,7 +25,8 @@ std::string currentAction = "levelsmith";
 std::string memorySentence() {
   const std::lock_guard lock(actionMutex);
   return "\nlevelsmith: " + currentAction +
-         ": memory in use passes --max-memory; use larger voxels or a narrower band, or raise it\n";
+         ": the memory in use exceeds --max-memory; use larger voxels or a narrower band, or raise "
+         "the limit\n";
 }
 
 [[noreturn]] void endNow(const char* sentence, int code) {
@@ -59,8 +60,8 @@ void watch(sigset_t signals, std::size_t maxBytes) {
 
 void startWatch(std::size_t maxBytes) {
   std::signal(SIGPIPE, SIG_IGN);
-  // A shell starts background jobs with SIGINT ignored; a signal that is ignored never reaches the
-  // watch.
+  // A shell starts background jobs with SIGINT ignored, and an ignored signal never arrives at the
+  // watching thread.
   std::signal(SIGINT, SIG_DFL);
   sigset_t signals;
   sigemptyset(&signals);

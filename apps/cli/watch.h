@@ -5,15 +5,16 @@
 
 namespace cli {
 
-/// From here on a thread of its own watches for Ctrl-C and for memory: temporary files are removed
-/// and the process ends at once, with 130 when interrupted and 4 when the resident set passes
-/// `maxBytes`. Call it before any other thread is started: signals are blocked in all that follow.
+/// Starts a thread that watches for Ctrl-C and for memory use. It ends the process at once and
+/// removes temporary files: with exit code 130 on an interrupt, and with 4 when the resident set
+/// exceeds `maxBytes`. Call it before any other thread starts, because it blocks signals in all
+/// later threads.
 void startWatch(std::size_t maxBytes);
 
-/// Names the action that runs now, for the sentence that ends it.
+/// Sets the name of the running action, for the message at such an end.
 void tellAction(const std::string& action);
 
-/// 80 % of the memory that is free now.
+/// 80 % of the memory that is free now, bytes.
 [[nodiscard]] std::size_t defaultMemoryLimit();
 
 }  // namespace cli

@@ -26,14 +26,15 @@ std::string shapeText(const py::array& array) {
          py::str(array.dtype()).cast<std::string>();
 }
 
-void requireRows(const py::array& array, const char* name, const char* kinds, const char* wanted) {
+void requireRows(const py::array& array, const char* name, const char* kinds,
+                 const char* expected) {
   const bool isKind = std::strchr(kinds, array.dtype().kind()) != nullptr;
   if (isKind && array.ndim() == 2 && array.shape(1) == 3) return;
-  throw InvalidInput(fmt::format("Mesh: {} are an array {}; give one of shape (n, 3) of {}", name,
-                                 shapeText(array), wanted));
+  throw InvalidInput(fmt::format("Mesh: {} is an array {}; give one of shape (n, 3) of {}", name,
+                                 shapeText(array), expected));
 }
 
-/// A view of rows of plain numbers.
+/// Read-only view of rows of numbers.
 template <typename Row, typename T, std::size_t columns>
 py::object rowsView(const py::object& owner, const std::vector<Row>& rows) {
   static_assert(sizeof(Row) == columns * sizeof(T));
@@ -48,7 +49,7 @@ py::object rowsView(const py::object& owner, const std::vector<Row>& rows) {
 
 TriMesh meshFromArrays(const py::array& vertices, const py::array& faces) {
   requireRows(vertices, "vertices", "f", "float32 or float64");
-  requireRows(faces, "faces", "iu", "whole numbers");
+  requireRows(faces, "faces", "iu", "integers");
   const auto places = py::array_t<double, py::array::c_style | py::array::forcecast>(vertices);
   const auto corners = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>(faces);
   TriMesh mesh;
@@ -66,8 +67,8 @@ TriMesh meshFromArrays(const py::array& vertices, const py::array& faces) {
   for (py::ssize_t i = 0; i < corners.shape(0); ++i, c += 3) {
     for (int k = 0; k < 3; ++k)
       if (c[k] < 0 || c[k] >= count || c[k] > std::int64_t{0xffffffff})
-        throw InvalidInput(
-            fmt::format("Mesh: face {} takes vertex {}, and there are {}", i, c[k], count));
+        throw InvalidInput(fmt::format(
+            "Mesh: face {} uses vertex {}, but there are only {} vertices", i, c[k], count));
     mesh.triangles.push_back({static_cast<std::uint32_t>(c[0]), static_cast<std::uint32_t>(c[1]),
                               static_cast<std::uint32_t>(c[2])});
   }
@@ -96,8 +97,8 @@ DenseBand bandArray(const levelset::NarrowBand& band, const std::optional<Imath:
   for (int i = 0; i < 3; ++i)
     if (std::abs(matrix[i][i] - voxel) > 1e-6 * voxel)
       throw InvalidInput(
-          "array: the grid is turned against the axes; put 'resample' or 'transform' with bake "
-          "before it");
+          "array: the grid is rotated against the axes; use 'resample' or 'transform' with bake "
+          "first");
   openvdb::CoordBBox range = grid.evalActiveVoxelBoundingBox();
   if (box) {
     const openvdb::Vec3d low = grid.worldToIndex(levelset::toVdb(box->min)),
@@ -106,13 +107,13 @@ DenseBand bandArray(const levelset::NarrowBand& band, const std::optional<Imath:
     range = {Coord::ceil(low - slack), Coord::floor(high + slack)};
   }
   if (range.empty())
-    throw InvalidInput(box ? "array: no grid point lies in the box; give a larger one"
+    throw InvalidInput(box ? "array: the box contains no grid point; give a larger box"
                            : "array: the level set is empty; give a box");
   const openvdb::Vec3d size = range.extents().asVec3d();
   levelset::requireMemory(size[0] * size[1] * size[2] * sizeof(float), maxMemory, "array");
   const Coord dim = range.dim();
   py::array_t<float> values({dim.x(), dim.y(), dim.z()});
-  openvdb::tools::Dense<float> dense(range, values.mutable_data());  // z runs fastest
+  openvdb::tools::Dense<float> dense(range, values.mutable_data());  // z varies fastest
   {
     const py::gil_scoped_release release;
     openvdb::tools::copyToDense(grid, dense);
@@ -127,7 +128,7 @@ levelset::NarrowBand bandOfSamples(const V3d& origin, double voxel,
   using Leaf = openvdb::FloatTree::LeafNodeType;
   auto transform = levelset::uniformTransform(voxel);
   transform->postTranslate(levelset::toVdb(origin));
-  // Beyond all samples: a background says nothing of a surface.
+  // Larger than all samples, so that the background adds no surface.
   auto largest = static_cast<float>(voxel);
   for (py::ssize_t i = 0; i < values.size(); ++i)
     largest = std::max(largest, std::abs(values.data()[i]));
@@ -145,7 +146,7 @@ levelset::NarrowBand bandOfSamples(const V3d& origin, double voxel,
   const float* samples = values.data();
   for (py::ssize_t i = 0; i < places.shape(0); ++i, samples += Leaf::SIZE) {
     auto* leaf = new Leaf(coord(places, i), 0.0F, true);
-    std::copy(samples, samples + Leaf::SIZE, leaf->buffer().data());  // z runs fastest in both
+    std::copy(samples, samples + Leaf::SIZE, leaf->buffer().data());  // z varies fastest in both
     tree.addLeaf(leaf);
   }
   return levelset::makeBand(grid);

@@ -8,35 +8,39 @@
 
 #include "apps/pipeline/values/value.h"
 
-/// Between values and numpy.
+/// Conversions between values and numpy arrays.
 namespace python {
 
-/// @param vertices  n × 3 of floats
-/// @param faces     m × 3 of whole numbers
+/// Builds a mesh.
+/// @param vertices  n × 3 floats
+/// @param faces  m × 3 integers
 /// @throws levelset::InvalidInput for other shapes and types, numbers that are not finite, and
-///         faces whose vertices are none
+///         faces with invalid vertex numbers
 [[nodiscard]] levelset::TriMesh meshFromArrays(const pybind11::array& vertices,
                                                const pybind11::array& faces);
 
-/// One of the lists of a mesh, as a read-only array that shares its memory. Attributes that the
-/// mesh does not have are None.
+/// One of the lists of a mesh, as a read-only array that shares its memory. None for attributes
+/// that the mesh does not have.
 [[nodiscard]] pybind11::object meshArray(const pybind11::object& owner,
                                          const levelset::TriMesh& mesh, const std::string& list);
 
 /// Signed distances at the grid points of a box.
 struct DenseBand {
   pybind11::array_t<float> values;
-  Imath::V3d origin;  ///< world, of the first
+  Imath::V3d origin;  ///< world position of the first grid point
 };
-/// @param box  world; those of the band where there is none
-/// @throws levelset::InvalidInput for a band that is turned against the axes; ResourceLimit
+/// Reads the values of a band.
+/// @param box  world units; default: the box of the band
+/// @throws levelset::InvalidInput for a band whose grid is rotated against the axes
+/// @throws levelset::ResourceLimit for too many grid points
 [[nodiscard]] DenseBand bandArray(const levelset::NarrowBand& band,
                                   const std::optional<Imath::Box3d>& box, std::size_t maxMemory);
 
-/// A grid out of samples, with the right zero set and no distances yet: for `reinitialize`.
-/// @param blocks  n × 3, the numbers of blocks of 8³ grid points
-/// @param values  n × 8 × 8 × 8, their samples
-/// @param inside  m × 3, blocks that lie inside and have no samples
+/// Builds a grid from samples. Its zero set is correct, but its values are not yet distances:
+/// `reinitialize` computes these.
+/// @param blocks  n × 3 block coordinates; blocks have 8³ grid points
+/// @param values  n × 8 × 8 × 8 samples of these blocks
+/// @param inside  m × 3 coordinates of blocks without samples that lie inside
 [[nodiscard]] levelset::NarrowBand bandOfSamples(const Imath::V3d& origin, double voxel,
                                                  const pybind11::array_t<std::int32_t>& blocks,
                                                  const pybind11::array_t<float>& values,

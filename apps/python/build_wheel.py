@@ -1,7 +1,7 @@
-"""Builds the wheel of levelsmith with CMake: what pip calls (PEP 517), without packages of its own.
+"""Builds the wheel of levelsmith with CMake. A PEP 517 back end for pip without dependencies.
 
-`--config-settings build-dir=build/ci` takes a tree that is configured already. Otherwise
-build/python is made, with as many jobs as CMAKE_BUILD_PARALLEL_LEVEL says, and what CMAKE_ARGS holds.
+`--config-settings build-dir=build/ci` uses a build tree that is already configured. Otherwise
+build/python is created, with CMAKE_BUILD_PARALLEL_LEVEL jobs and the options in CMAKE_ARGS.
 """
 
 import base64
@@ -23,7 +23,7 @@ def version():
 
 
 def tag():
-    """Of one interpreter and one machine: it links the libraries of the system."""
+    """Tag for one interpreter and one platform, because the extension links system libraries."""
     python = f"cp{sys.version_info[0]}{sys.version_info[1]}"
     machine = sysconfig.get_platform().replace("-", "_").replace(".", "_")
     return f"{python}-{python}-{machine}"
@@ -38,7 +38,7 @@ def metadata():
 
 
 def build(settings):
-    """Returns the folder of the package."""
+    """Builds the package. Returns its folder."""
     folder = (settings or {}).get("build-dir")
     if folder:
         folder = os.path.join(ROOT, folder)
@@ -55,7 +55,7 @@ def build(settings):
 
 
 def python():
-    """The interpreter behind a virtual environment, whose headers CMake looks for."""
+    """The base interpreter of a virtual environment, for which CMake finds headers."""
     name = f"python{sys.version_info[0]}.{sys.version_info[1]}"
     base = os.path.join(sys.base_prefix, "bin", name)
     return base if os.path.exists(base) else sys.executable
@@ -87,7 +87,7 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
 
 
 def add(archive, path, content):
-    """Returns its line of the record."""
+    """Adds a file to the archive. Returns its line of RECORD."""
     archive.writestr(path, content)
     digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
     return f"{path},sha256={digest},{len(content)}\n"
@@ -102,7 +102,7 @@ def get_requires_for_build_sdist(config_settings=None):
 
 
 def build_sdist(sdist_directory, config_settings=None):
-    """All that git knows of."""
+    """Archives all files of the last git commit."""
     name = f"levelsmith-{version()}"
     archive = os.path.join(os.path.abspath(sdist_directory), name + ".tar.gz")
     subprocess.check_call(

@@ -25,9 +25,9 @@ namespace py = pybind11;
 namespace python {
 namespace {
 
-std::size_t maxMemory = 0;  // of all runs; 0: what is free tells
+std::size_t maxMemory = 0;  // limit of all runs; 0: from the free memory
 
-/// Removes what processes that were killed left beside a file that they were to write.
+/// Removes temporary files that killed processes left beside an output file.
 void removeLeftovers(const std::filesystem::path& target) {
   std::error_code ignored;
   const std::filesystem::path file = levelset::canonicalFile(target);
@@ -42,20 +42,23 @@ void removeLeftovers(const std::filesystem::path& target) {
   }
 }
 
-using Made = std::function<void(std::size_t, const pipeline::Value&)>;
+using OnValue = std::function<void(std::size_t, const pipeline::Value&)>;
 
-/// A run in a thread of its own. Nothing there touches Python.
+/// A run in a thread of its own, which does not use Python.
 class Run {
  public:
-  Run(const pipeline::Graph& graph, const RunOptions& options, Made made)
-      : graph_(graph), options_(options), made_(std::move(made)), thread_([this] { work(); }) {}
+  Run(const pipeline::Graph& graph, const RunOptions& options, OnValue onValue)
+      : graph_(graph),
+        options_(options),
+        onValue_(std::move(onValue)),
+        thread_([this] { work(); }) {}
   ~Run() {
     end();
     if (thread_.joinable()) thread_.join();
   }
 
   void end() { goesOn_ = false; }
-  /// @return is it done?
+  /// Returns true when the run is complete.
   bool wait(std::chrono::milliseconds time) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, time, [this] { return isDone_; });
@@ -65,7 +68,7 @@ class Run {
     return {action_, fraction_};
   }
 
-  // Once it is done.
+  // Valid when the run is complete.
   [[nodiscard]] Outcome& outcome() { return outcome_; }
   [[nodiscard]] bool isWhole() const { return isWhole_; }
 
@@ -92,7 +95,7 @@ class Run {
     changed_.notify_all();
   }
 
-  /// What went wrong first is what is told.
+  /// A failure to write the report does not replace an earlier error.
   void writeReport(const pipeline::RunReport& report) {
     if (options_.report.empty()) return;
     try {
@@ -110,20 +113,20 @@ class Run {
     if (pipeline::isPage(options_.report)) settings.thumbnails = pipeline::kMostThumbnails;
     settings.begin = [this](const std::string& action) {
       if (!goesOn_) throw levelset::Cancelled(action + ": cancelled");
-      tell(action, 0);
+      reportProgress(action, 0);
     };
     settings.progress = [this](std::size_t, const std::string& action, double fraction) {
-      tell(action, fraction);
+      reportProgress(action, fraction);
     };
-    settings.goesOn = [this] { return goesOn_.load(); };
-    settings.made = made_;
+    settings.shouldContinue = [this] { return goesOn_.load(); };
+    settings.onValue = onValue_;
     settings.print = [this](const std::string& text) { outcome_.printed += text; };
     settings.warn = [this](const std::string& text) { outcome_.warnings.push_back(text); };
     settings.note = [this](const std::string& text) { outcome_.notes.push_back(text); };
     return settings;
   }
 
-  void tell(const std::string& action, double fraction) {
+  void reportProgress(const std::string& action, double fraction) {
     const std::lock_guard lock(mutex_);
     action_ = action;
     fraction_ = fraction;
@@ -131,7 +134,7 @@ class Run {
 
   const pipeline::Graph& graph_;
   const RunOptions& options_;
-  const Made made_;
+  const OnValue onValue_;
   Outcome outcome_;
   std::atomic<bool> goesOn_ = true;
   std::mutex mutex_;
@@ -139,10 +142,10 @@ class Run {
   bool isDone_ = false, isWhole_ = false;
   std::string action_;
   double fraction_ = 0;
-  std::thread thread_;  // last: it begins at once
+  std::thread thread_;  // declared last, because it starts at once
 };
 
-/// Looks after signals and progress. @throws what their code raises
+/// Handles signals and progress. @throws py::error_already_set as raised by the handlers
 void attend(Run& run, const py::object& progress) {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   if (progress.is_none()) return;
@@ -152,7 +155,7 @@ void attend(Run& run, const py::object& progress) {
   if (answer.ptr() == Py_False) run.end();
 }
 
-/// Waits for a run. @return what it left, with what Python raised meanwhile
+/// Waits for a run. @return its outcome, with an exception that Python raised meanwhile
 Outcome wait(Run& run, const py::object& progress) {
   constexpr std::chrono::milliseconds kInterval(50);
   std::exception_ptr raised;

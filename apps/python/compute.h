@@ -9,37 +9,38 @@
 
 namespace python {
 
-/// What a run left behind beside the values.
+/// Results of a run apart from the values.
 struct Outcome {
   std::string report;  ///< JSON
   std::string printed;
   std::vector<std::string> warnings, notes;
   std::exception_ptr
-      failure;  ///< a levelset::Error, or what `progress` or a signal's handler raised
+      failure;  ///< a levelset::Error, or an exception raised by `progress` or a signal handler
 };
+/// Options of a run.
 
 struct RunOptions {
-  /// None, or called in this thread with the name of an action and the fraction done of it: at most
-  /// 20 times a second, and once in the end; False ends the run.
+  /// None, or a function of the name of an action and the completed fraction. It is called in this
+  /// thread, at most 20 times per second and once at the end. Returning False ends the run.
   pybind11::object progress = pybind11::none();
-  std::filesystem::path cache = {};  ///< folder of earlier results; empty: none are kept
-  /// It may have been begun before, by a process that was killed: what that left beside the files
-  /// that are to be written is removed.
+  std::filesystem::path cache = {};  ///< cache folder; empty: no cache
+  /// The job may have been started before by a process that was killed. Temporary files that it
+  /// left beside the output files are removed.
   bool isAgain = false;
-  // Of a pipeline.
-  std::filesystem::path report = {};  ///< where to write it; empty: nowhere
+  // For pipelines only.
+  std::filesystem::path report = {};  ///< report file; empty: none
   bool measureErrors = false;
-  std::size_t maxMemory = 0;  ///< bytes; 0: as setMaxMemory
+  std::size_t maxMemory = 0;  ///< bytes; 0: the limit of setMaxMemory()
 };
 
-/// Computes values and keeps them, in a thread of its own, while this one waits for signals without
-/// holding the interpreter's lock.
+/// Computes values and keeps them, in a thread of its own. The calling thread waits for signals
+/// without holding the interpreter's lock.
 [[nodiscard]] Outcome compute(const std::vector<LazyPtr>& values, const RunOptions& options);
-/// The same of a graph as it was written, for what it writes and prints.
+/// Runs a graph as written, for its output files and printed text.
 [[nodiscard]] Outcome compute(const pipeline::Graph& graph, const RunOptions& options);
 
-/// Of all runs from now on: threads, or 0 for as many as there are cores; bytes, or 0 for 80 % of
-/// what is free.
+/// Settings of all later runs: number of threads, 0 for the number of cores; bytes, 0 for 80 % of
+/// the free memory.
 void setThreads(std::size_t count);
 void setMaxMemory(std::size_t bytes);
 [[nodiscard]] std::size_t memoryLimit();

@@ -35,7 +35,7 @@ void refuseStandardStreams(const Node& node) {
     const auto& uses = node.op->*use;
     if (uses && !node.options.contains("json") && uses(probe))
       throw UsageError(pipeline::sentenceOf(
-          node.op->name, "'-' is a standard stream, and jobs have none; name a file"));
+          node.op->name, "'-' is a standard stream, which jobs do not have; give a file"));
   }
 }
 
@@ -43,14 +43,14 @@ std::string absolute(const std::string& file, const fs::path& folder) {
   return (folder / file).lexically_normal().string();
 }
 
-/// A folder that is gone with all in it.
+/// A folder that is removed at the end, with its contents.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
     std::string name = (fs::temp_directory_path() / "levelsmith-XXXXXX").string();
     if (!::mkdtemp(name.data()))
       throw levelset::IoError(
-          fmt::format("pickle: no folder can be made in '{}'; name another one by TMPDIR",
+          fmt::format("pickle: a folder cannot be created in '{}'; set TMPDIR to another folder",
                       fs::temp_directory_path().string()));
     path_ = name;
   }
@@ -81,7 +81,7 @@ Job makeJob(const std::string& text, const std::string& name,
       if (param.type == ParamType::Path && option != node.options.end() && !option->second.empty())
         option->second = absolute(option->second, folder);
     }
-    job.places.push_back(node.place);
+    job.places.push_back(node.location);
   }
   for (const char* option : {"cache", "report"})
     if (const auto it = graph.globals.find(option); it != graph.globals.end())
@@ -94,7 +94,7 @@ Job makeJob(const std::string& text, const std::string& name,
 Graph graphOf(const Job& job) {
   Graph graph = pipeline::graphFromJson(job.graph, "the job");
   for (std::size_t i = 0; i < graph.nodes.size() && i < job.places.size(); ++i)
-    graph.nodes[i].place = job.places[i];
+    graph.nodes[i].location = job.places[i];
   graph.globals = job.globals;
   return graph;
 }
@@ -102,10 +102,10 @@ Graph graphOf(const Job& job) {
 std::string bytesOf(const Value& value) {
   if (value.kind() == Kind::Mesh) return pipeline::bytesOf(value.mesh());
   if (value.kind() != Kind::Band && value.kind() != Kind::Field)
-    throw UsageError(
-        fmt::format("pickle: a {} cannot be handed to another process; hand over what is made with "
-                    "it, or what makes it",
-                    kindName(value.kind())));
+    throw UsageError(fmt::format(
+        "pickle: a {} cannot be sent to another process; send the values computed from it, "
+        "or its inputs",
+        kindName(value.kind())));
   const TemporaryFolder folder;
   if (value.kind() == Kind::Band)
     levelset::writeBand(folder.file(), value.band(), {.name = value.band().name()});
@@ -120,7 +120,7 @@ Value valueOf(Kind kind, const std::string& bytes) {
     levelset::TriMesh mesh;
     if (!pipeline::readMeshBytes(bytes, mesh))
       throw levelset::InvalidInput(
-          "pickle: the bytes of a mesh are damaged, or of another version; make them again");
+          "pickle: the bytes of a mesh are damaged or from another version; pickle the mesh again");
     return Value(std::move(mesh));
   }
   const TemporaryFolder folder;
@@ -129,8 +129,8 @@ Value valueOf(Kind kind, const std::string& bytes) {
   out.close();
   if (!out)
     throw levelset::IoError(
-        fmt::format("pickle: '{}' cannot be written; make room there, or name another folder by "
-                    "TMPDIR",
+        fmt::format("pickle: '{}' cannot be written; free some space, or set TMPDIR to "
+                    "another folder",
                     folder.file().string()));
   if (kind == Kind::Field)
     return Value(levelset::readField(folder.file(),

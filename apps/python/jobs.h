@@ -8,30 +8,32 @@
 #include "apps/pipeline/graph/graph.h"
 #include "apps/pipeline/values/value.h"
 
-/// What is handed to other processes: pipelines with their parameters, and values.
+/// Data for other processes: pipelines with their parameters, and values.
 namespace python {
 
-/// A pipeline that was checked, for whatever folder it will run in.
+/// A checked pipeline. It does not depend on the current folder.
 struct Job {
-  std::string graph;                           ///< JSON; its files have absolute names
-  std::vector<std::string> places;             ///< by node: where a script wrote it
-  std::map<std::string, std::string> globals;  ///< options of the run
+  std::string graph;                           ///< JSON, with absolute file names
+  std::vector<std::string> places;             ///< by node: location in the script
+  std::map<std::string, std::string> globals;  ///< global options of the run
 };
 
-/// @param text      of a script, or of a graph where the name is that of one (.json)
-/// @param name      for what is said about it
-/// @param settings  values of its variables; of a graph they stand in it already
-/// @param folder    that the names of files are relative to
+/// Parses and checks a pipeline.
+/// @param text  text of a script, or of a graph if the name ends in .json
+/// @param name  name for error messages
+/// @param settings  values of the script's variables; ignored for graphs
+/// @param folder  folder to which file names are relative
 /// @throws levelset::UsageError also for standard streams, which other processes do not have
 [[nodiscard]] Job makeJob(const std::string& text, const std::string& name,
                           const std::map<std::string, std::string>& settings,
                           const std::filesystem::path& folder);
 [[nodiscard]] pipeline::Graph graphOf(const Job& job);
 
-/// A level set, a field or a mesh as bytes, bit for bit, for this program on such machines.
+/// Encodes a level set, a field or a mesh without loss, for the same version of this program on the
+/// same kind of machine.
 /// @throws levelset::UsageError for values of other kinds
 [[nodiscard]] std::string bytesOf(const pipeline::Value& value);
-/// @throws levelset::InvalidInput for bytes that are damaged
+/// Decodes a value. @throws levelset::InvalidInput for damaged bytes
 [[nodiscard]] pipeline::Value valueOf(pipeline::Kind kind, const std::string& bytes);
 
 }  // namespace python

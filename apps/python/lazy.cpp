@@ -20,7 +20,7 @@ Lazy::Lazy(Value value) : value_(std::move(value)), isSettled_(true) {
 
 Lazy::~Lazy() {
   leaveInputs();
-  // Not by recursion: a chain may be longer than the stack is deep.
+  // Not recursive, because a chain may be longer than the stack allows.
   std::vector<LazyPtr> open;
   moveInputs(open);
   while (!open.empty()) {
@@ -43,7 +43,7 @@ void Lazy::letGo() {
   if (holders_ == 0 && waiting_ == 0) value_.reset();
 }
 
-/// It will not ask for them again.
+/// Releases the inputs, which are not requested again.
 void Lazy::leaveInputs() {
   if (isSettled_) return;
   isSettled_ = true;
@@ -63,7 +63,7 @@ void Lazy::settle(std::optional<Value> value) {
 }
 
 Request::Request(const std::vector<LazyPtr>& results, Depth depth) {
-  // Each behind what it takes; not by recursion.
+  // Lists each node after its inputs. Not recursive, because chains may be long.
   std::vector<std::pair<LazyPtr, bool>> open;
   for (auto it = results.rbegin(); it != results.rend(); ++it) open.emplace_back(*it, false);
   while (!open.empty()) {
@@ -108,7 +108,7 @@ void Request::add(Lazy& lazy, Depth depth) {
       node.options[option] = "@" + (name.empty() ? fmt::format("{}", of) : name);
       node.named[option] = of;
     }
-    // A file has each name once.
+    // Names must be unique within a file.
     for (const Node& other : graph_.nodes)
       if (depth == Depth::Whole && other.name == node.name) node.name.clear();
   }
@@ -121,7 +121,7 @@ void Request::keep(std::size_t node, const Value& value) {
 
 void Request::settle(bool isDone) {
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    // With a cache what others made of a value may be known, and not the value itself.
+    // With a cache, derived values may be known without the value itself.
     const bool isMissing = isKept_[i] && !values_[i] && graph_.nodes[i].makes();
     if (isDone ? !isMissing : values_[i].has_value()) nodes_[i]->settle(std::move(values_[i]));
   }

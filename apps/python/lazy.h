@@ -8,20 +8,20 @@
 
 #include "apps/pipeline/graph/graph.h"
 
-/// Values that are asked for, as Python holds them. Everything here is called under the
-/// interpreter's lock.
+/// Lazy values behind Python objects. All functions are called under the interpreter's lock, unless
+/// stated otherwise.
 namespace python {
 
 class Lazy;
 using LazyPtr = std::shared_ptr<Lazy>;
 
-/// A node of a graph that grows, and its value once that is known. The value stays as long as
-/// somebody may still ask for it: a Python object, or a node that is not computed yet.
+/// A node of a growing graph, and its value once computed. The value is kept as long as a Python
+/// object or a node that is not yet computed may request it.
 class Lazy {
  public:
   /// @param node  its `inputs` and `named` are not read
   Lazy(pipeline::Node node, std::vector<LazyPtr> inputs, std::map<std::string, LazyPtr> named);
-  /// A value that was made elsewhere.
+  /// Wraps a value that was computed elsewhere.
   explicit Lazy(pipeline::Value value);
   ~Lazy();
   Lazy(const Lazy&) = delete;
@@ -30,7 +30,7 @@ class Lazy {
   [[nodiscard]] pipeline::Kind kind() const { return node_.kind; }
   [[nodiscard]] const pipeline::Node& node() const { return node_; }
   [[nodiscard]] const std::optional<pipeline::Value>& value() const { return value_; }
-  /// It was computed, though the value may have been let go since.
+  /// True when the value was computed, also if it has been released since.
   [[nodiscard]] bool isSettled() const { return isSettled_; }
   void setName(std::string name) { node_.name = std::move(name); }
 
@@ -46,7 +46,7 @@ class Lazy {
 
   void letGo();
   void leaveInputs();
-  /// Empties the lists of what it takes, into `all`.
+  /// Moves all inputs into `all`.
   void moveInputs(std::vector<LazyPtr>& all);
 
   pipeline::Node node_;
@@ -54,23 +54,23 @@ class Lazy {
   std::map<std::string, LazyPtr> named_;
   std::optional<pipeline::Value> value_;
   bool isSettled_ = false;
-  std::size_t holders_ = 0;  ///< Python objects
-  std::size_t waiting_ = 0;  ///< times that nodes which are not settled take it
+  std::size_t holders_ = 0;  ///< number of Python objects
+  std::size_t waiting_ = 0;  ///< number of uses as input of unsettled nodes
 };
 
-/// What has to be computed for some values: a graph, up to what is known.
+/// The graph to compute some values, down to known values.
 class Request {
  public:
   enum class Depth {
-    Unknown,  ///< what is known is given
-    Whole     ///< for files: all, as it was written
+    Unknown,  ///< stops at known values
+    Whole     ///< complete graph, for files
   };
   explicit Request(const std::vector<LazyPtr>& results, Depth depth = Depth::Unknown);
 
   [[nodiscard]] const pipeline::Graph& graph() const { return graph_; }
-  /// For the runner; needs no lock.
+  /// Values for the runner. Needs no lock.
   void keep(std::size_t node, const pipeline::Value& value);
-  /// Hands the values out. @param isDone  did all of it run?
+  /// Stores the computed values in the nodes. @param isDone  the run was complete
   void settle(bool isDone);
 
  private:
@@ -79,7 +79,7 @@ class Request {
   pipeline::Graph graph_;
   std::vector<LazyPtr> nodes_;
   std::map<const Lazy*, std::size_t> numbers_;
-  std::vector<char> isKept_;  ///< by node: who may ask for it once this has run?
+  std::vector<char> isKept_;  ///< by node: its value may be requested after the run
   std::vector<std::optional<pipeline::Value>> values_;
 };
 

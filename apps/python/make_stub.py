@@ -1,15 +1,15 @@
-"""Writes the hints of the package levelsmith, from its registry, into it. make_stub.py FOLDER"""
+"""Generates type hints from the registry and writes them into the package. make_stub.py FOLDER"""
 
 import inspect
 import os
 import sys
 
-sys.path[0] = sys.argv[1]  # not the package's sources, which lie beside this
+sys.path[0] = sys.argv[1]  # use the built package, not its sources beside this file
 
 import levelsmith  # noqa: E402
 from levelsmith import _operators, _values  # noqa: E402
 
-HEAD = '''"""Hints of levelsmith, made from its registry of operators."""
+HEAD = '''"""Type hints of levelsmith, generated from its registry of operators."""
 
 import os
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Type, TypeVar, Union

@@ -15,7 +15,7 @@
 #include "apps/python/python_arguments.h"
 #include "levelset/error.h"
 
-/// levelsmith._core: what the package levelsmith is made of.
+/// levelsmith._core: the extension module below the package levelsmith.
 
 namespace py = pybind11;
 
@@ -29,7 +29,7 @@ using pipeline::ParamType;
 using python::Handle;
 using python::LazyPtr;
 
-/// The class of Python that stands for a kind.
+/// Name of the Python class for a kind of value.
 const char* className(Kind kind) {
   switch (kind) {
     case Kind::Mesh:
@@ -89,8 +89,8 @@ const char* hintOf(ParamType type) {
   return "";
 }
 
-/// What an operator may make of operands whose first is of one kind, as far as one option at a time
-/// tells.
+/// Kinds of results of an operator for one kind of first operand, found by trying each option
+/// alone.
 std::set<Kind> resultKinds(const Operator& op, const Kind* first) {
   if (!op.resultKind) return {Kind::Band};
   std::set<Kind> kinds;
@@ -101,7 +101,7 @@ std::set<Kind> resultKinds(const Operator& op, const Kind* first) {
           pipeline::Plan{.kind = i == 0 && first ? *first : op.operands[i][0]});
     try {
       kinds.insert(op.resultKind(invocation));
-    } catch (const levelset::Error&) {  // more options tell
+    } catch (const levelset::Error&) {  // requires several options
     }
   };
   probe({});
@@ -112,8 +112,8 @@ std::set<Kind> resultKinds(const Operator& op, const Kind* first) {
   return kinds;
 }
 
-/// By class of the first operand ("" without operands), the classes of what is made; None of what
-/// makes nothing.
+/// Classes of results by class of the first operand ("" without operands); None if the operator has
+/// no result.
 py::object resultClasses(const Operator& op) {
   if (op.flow != pipeline::Flow::Makes) return py::none();
   py::dict result;
@@ -167,19 +167,20 @@ py::list describeOperators() {
   return all;
 }
 
-/// The exceptions, by exit code.
+/// The exception classes, by exit code.
 class Exceptions {
  public:
   explicit Exceptions(py::module_& module) {
-    error_ = add(module, "Error", 1, {PyExc_Exception}, "What levelsmith refuses or fails to do.");
-    usage_ = add(module, "UsageError", 2, {error_, PyExc_ValueError}, "The call itself is wrong.");
-    input_ = add(module, "InputError", 3, {error_}, "The data cannot be used as asked.");
+    error_ = add(module, "Error", 1, {PyExc_Exception}, "Base class of all errors of levelsmith.");
+    usage_ = add(module, "UsageError", 2, {error_, PyExc_ValueError},
+                 "The arguments of the call are wrong.");
+    input_ = add(module, "InputError", 3, {error_}, "The input data cannot be used.");
     resource_ =
-        add(module, "ResourceError", 4, {error_}, "It would pass a limit of memory or size.");
-    numeric_ = add(module, "NumericalError", 5, {error_}, "A numeric check failed.");
+        add(module, "ResourceError", 4, {error_}, "A limit of memory or size would be exceeded.");
+    numeric_ = add(module, "NumericalError", 5, {error_}, "A numerical check failed.");
     file_ =
         add(module, "FileError", 6, {error_, PyExc_OSError}, "A file cannot be read or written.");
-    cancelled_ = add(module, "Cancelled", 130, {error_}, "Ended by the progress callback.");
+    cancelled_ = add(module, "Cancelled", 130, {error_}, "The progress callback ended the run.");
   }
 
   [[nodiscard]] PyObject* of(ExitCode code) const {
@@ -228,13 +229,13 @@ std::vector<LazyPtr> lazies(const py::iterable& nodes) {
   return list;
 }
 
-/// What is in a node that was computed.
+/// Value of a computed node.
 const pipeline::Value& valueOf(const Handle& node) {
   if (node.lazy()->value()) return *node.lazy()->value();
-  throw levelset::UsageError("levelsmith: the value is not computed yet; call compute()");
+  throw levelset::UsageError("levelsmith: the value is not yet computed; call compute()");
 }
 
-/// (report, printed, warnings, notes, exception or None)
+/// Returns (report, printed, warnings, notes, exception or None).
 py::tuple tupleOf(const python::Outcome& outcome) {
   py::object failure = py::none();
   try {
@@ -258,14 +259,14 @@ py::tuple compute(const py::iterable& nodes, const py::object& progress, const s
 
 using Texts = std::map<std::string, std::string>;
 
-/// (graph, places, globals)
+/// Returns (graph, locations, globals).
 py::tuple makeJob(const std::string& text, const std::string& name, const Texts& settings,
                   const std::string& folder) {
   const python::Job job = python::makeJob(text, name, settings, folder);
   return py::make_tuple(job.graph, job.places, job.globals);
 }
 
-/// As compute().
+/// Runs a job. Returns as compute().
 py::tuple runJob(const std::string& graph, const std::vector<std::string>& places,
                  const Texts& globals, const std::string& cache) {
   const pipeline::Graph whole = python::graphOf({graph, places, globals});
@@ -282,7 +283,7 @@ py::tuple runJob(const std::string& graph, const std::vector<std::string>& place
               .maxMemory = memory.empty() ? 0 : pipeline::parseBytes(memory, "--max-memory")}));
 }
 
-/// The kind of a node that was computed, and its value.
+/// Returns the kind of a computed node, and its value as bytes.
 py::tuple pack(const Handle& node) {
   const pipeline::Value value = valueOf(node);
   std::string bytes;
@@ -298,7 +299,8 @@ std::string graphText(const py::iterable& nodes) {
   for (const pipeline::Node& node : request.graph().nodes)
     if (node.op == &pipeline::givenOperator())
       throw levelset::UsageError(
-          "graph: it begins with an array, which a graph cannot hold; save that value and read it");
+          "graph: its first value comes from an array, which a graph cannot store; save that value "
+          "to a file and read it");
   return graphJson(request.graph());
 }
 
@@ -306,7 +308,7 @@ std::optional<Imath::Box3d> boxOf(const py::object& box) {
   if (box.is_none()) return std::nullopt;
   const auto corners = py::array_t<double, py::array::c_style | py::array::forcecast>(box);
   if (corners.ndim() != 2 || corners.shape(0) != 2 || corners.shape(1) != 3)
-    throw levelset::UsageError("array: a box is two points, ((x, y, z), (x, y, z))");
+    throw levelset::UsageError("array: a box needs two points, ((x, y, z), (x, y, z))");
   const double* c = corners.data();
   return Imath::Box3d({c[0], c[1], c[2]}, {c[3], c[4], c[5]});
 }
@@ -359,7 +361,7 @@ PYBIND11_MODULE(_core, module) {
                              [](const Handle& node) { return valueOf(node).band().voxelSize(); })
       .def("mesh_array",
            [](const py::object& self, const std::string& list) {
-             // The array holds the mesh itself: the node may let it go.
+             // The capsule owns a reference to the mesh, because the node may release its value.
              const auto& value = valueOf(self.cast<const Handle&>());
              const py::capsule owner(new pipeline::Value(value), [](void* held) {
                delete static_cast<pipeline::Value*>(held);

@@ -19,7 +19,7 @@ using pipeline::Operator;
 using pipeline::Param;
 using pipeline::ParamType;
 
-/// The lazy value behind a Python object, if it is one.
+/// Returns the lazy value of a Python object, if it has one.
 LazyPtr lazyOf(py::handle object) {
   static PyObject* const name = PyUnicode_InternFromString("_node");
   if (py::isinstance<Handle>(object)) return object.cast<const Handle&>().lazy();
@@ -34,7 +34,7 @@ LazyPtr lazyOf(py::handle object) {
   return py::isinstance<Handle>(held) ? held.cast<const Handle&>().lazy() : nullptr;
 }
 
-/// A number as one would write it; nothing for what is none.
+/// Text of a number as in a chain; empty if the object is not a number.
 std::optional<std::string> numberText(py::handle value) {
   PyObject* object = value.ptr();
   if (PyBool_Check(object)) return std::nullopt;
@@ -42,9 +42,9 @@ std::optional<std::string> numberText(py::handle value) {
   if (PyIndex_Check(object)) {
     const auto whole = py::reinterpret_steal<py::object>(PyNumber_Index(object));
     if (whole) return py::str(whole).cast<std::string>();
-    PyErr_Clear();  // an array is an index only when it holds one number
+    PyErr_Clear();  // an array is an index only when it holds a single number
   }
-  // An array without dimensions is a number too, and no row of any.
+  // A 0-dimensional array is a number, too.
   const bool isRow = PySequence_Check(object) && PySequence_Size(object) >= 0;
   PyErr_Clear();
   if (!isRow && PyNumber_Check(object)) {
@@ -58,11 +58,10 @@ std::optional<std::string> numberText(py::handle value) {
 [[noreturn]] void refuse(py::handle value, const std::string& where) {
   const std::string type = py::str(py::type::of(value).attr("__name__"));
   throw UsageError(
-      fmt::format("{}: a value of type {} cannot be given here; see its help", where, type));
+      fmt::format("{}: a value of type {} is not supported here; see the help", where, type));
 }
 
-/// Rows of numbers, or of lengths as texts, with `inner` between the columns and `outer` between
-/// the rows.
+/// Text of rows of numbers or lengths, with `inner` between columns and `outer` between rows.
 std::string rowsText(py::handle value, const char* inner, const char* outer,
                      const std::string& where) {
   std::string text;
@@ -88,7 +87,7 @@ bool ofWords(py::handle sequence) {
   return false;
 }
 
-/// A value of a parameter as one would write it.
+/// Text of a parameter's value as in a chain.
 std::string textOf(const Param& param, py::handle value, const std::string& where) {
   if (PyUnicode_Check(value.ptr())) return value.cast<std::string>();
   if (param.type == ParamType::Path) {
@@ -140,10 +139,10 @@ const Param& paramNamed(const Operator& op, const ParamsByName& params, const st
   const std::string guess = pipeline::didYouMean(name, names);
   throw UsageError(fmt::format(
       "{}: there is no option {}{}", op.name, name,
-      guess.empty() ? "; its help lists them" : fmt::format("; did you mean {}?", guess)));
+      guess.empty() ? "; its help lists the options" : fmt::format("; did you mean {}?", guess)));
 }
 
-/// What a call gives, put together bit by bit.
+/// Collects the arguments of a call.
 class Call {
  public:
   explicit Call(std::size_t action)
@@ -185,7 +184,8 @@ class Call {
  private:
   void give(const Param& param, py::handle value, const std::string& where) {
     if (value.is_none()) return;
-    if (node_.options.contains(param.name)) throw UsageError(where + ": is given twice");
+    if (node_.options.contains(param.name))
+      throw UsageError(where + ": the parameter is given twice");
     if (param.type == ParamType::Flag) {
       if (!PyNumber_Check(value.ptr())) refuse(value, where);
       if (PyObject_IsTrue(value.ptr()) == 1) node_.options[param.name] = "true";
@@ -200,12 +200,12 @@ class Call {
     std::string text = textOf(param, value, where);
     if (pipeline::namesValue(param, text))
       throw UsageError(
-          fmt::format("{}: '{}' names a value of a chain; give the value itself", where, text));
+          fmt::format("{}: '{}' is a reference of a chain; give the value itself", where, text));
     pipeline::checkText(param, text, where);
     node_.options[param.name] = std::move(text);
   }
 
-  /// By the rules of a graph, of which this node and what it takes are one.
+  /// Checks this node and its inputs by the rules of a graph.
   void check() {
     std::vector<Node> before;
     const auto addBefore = [&](const Lazy& lazy, std::string name) {

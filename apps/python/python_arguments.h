@@ -8,7 +8,7 @@
 
 namespace python {
 
-/// A lazy value as a Python object has it.
+/// A lazy value, held by a Python object.
 class Handle {
  public:
   explicit Handle(LazyPtr lazy) : lazy_(std::move(lazy)) { lazy_->hold(); }
@@ -22,13 +22,13 @@ class Handle {
   LazyPtr lazy_;
 };
 
-/// The name of a parameter as Python writes it: half_width, from_.
+/// Name of a parameter in Python: half_width, from_.
 [[nodiscard]] std::string pythonName(const std::string& param);
 
-/// A call of an operator, checked as a chain's would be: operands first, then values of parameters
-/// that have a place, then all others by name. Nothing runs.
-/// @param action  its number in the registry
-/// @throws levelset::UsageError
+/// Builds the node of an operator call. Arguments are checked like those of a chain: first
+/// operands, then parameters with a position, then parameters by name. Nothing runs.
+/// @param action  number in the registry
+/// @throws levelset::UsageError for invalid arguments
 [[nodiscard]] LazyPtr makeNode(std::size_t action, const pybind11::args& args,
                                const pybind11::kwargs& kwargs);
 

@@ -19,27 +19,27 @@ namespace {
 
 using levelset::ExitCode;
 
-/// Under the name of the program, which some sentences begin with.
-void tellOnStandardError(const std::string& sentence) {
+/// Prints a sentence with the name of the program in front, unless it starts with it.
+void printMessage(const std::string& sentence) {
   constexpr const char* kName = "levelsmith-view: ";
   fmt::print(stderr, "{}{}\n", sentence.starts_with(kName) ? "" : kName, sentence);
 }
 
 void runWindow(const viewer::Arguments& arguments) {
-  // What cannot be opened at all is said where it was asked for.
+  // Report files that cannot be opened on the command line, before the window opens.
   viewer::requireReadable(arguments.files);
   viewer::Window window("Levelsmith", arguments.width, arguments.height, true);
   viewer::Viewer viewer(arguments, window);
   if (!arguments.files.empty()) viewer.open(arguments.files);
-  constexpr double kIdle = 0.25;  // seconds between looks at the files
+  constexpr double kIdle = 0.25;  // seconds between checks of the files
   constexpr double kAfterEvent = 0.02;
-  constexpr int kFramesAfterEvent = 3;  // that ImGui takes to settle
+  constexpr int kFramesAfterEvent = 3;  // frames that ImGui needs to settle
   int frames = kFramesAfterEvent;
   while (!window.isToClose()) {
     const int width = window.width(), height = window.height();
     viewer.update();
     window.draw([&] { viewer.drawInterface(width, height); });
-    viewer.wantPicture(width, height);
+    viewer.requestPicture(width, height);
     viewer.writeInterfaceShot();
     const bool isSettled = --frames <= 0 && !viewer.isBusy();
     if (window.wait(isSettled ? kIdle : kAfterEvent)) frames = kFramesAfterEvent;
@@ -62,18 +62,18 @@ int levelsmithView(const std::vector<std::string>& words) {
   return static_cast<int>(ExitCode::Done);
 }
 
-/// Says what went wrong. @return the exit code
-int tellWhatFailed(const std::exception_ptr& failure) {
+/// Prints the error. @return the exit code
+int printFailure(const std::exception_ptr& failure) {
   try {
     std::rethrow_exception(failure);
   } catch (const levelset::Error& error) {
-    tellOnStandardError(error.what());
+    printMessage(error.what());
     return static_cast<int>(error.exitCode());
   } catch (const std::bad_alloc&) {
-    tellOnStandardError("memory ran out; show something smaller, or a smaller --resolution");
+    printMessage("memory ran out; open a smaller model, or use a smaller --resolution");
     return static_cast<int>(ExitCode::Resource);
   } catch (const std::exception& error) {
-    tellOnStandardError(fmt::format(
+    printMessage(fmt::format(
         "unexpected failure: {}; please report it with the command that caused it", error.what()));
   }
   return static_cast<int>(ExitCode::Input);
@@ -86,11 +86,11 @@ int main(int argc, char** argv) {
   try {
     code = levelsmithView({argv + 1, argv + argc});
   } catch (...) {
-    code = tellWhatFailed(std::current_exception());
+    code = printFailure(std::current_exception());
   }
   std::fflush(stderr);
   levelset::removeTemporaryFiles();
-  // Threads that watch or read may be anywhere; nothing is left to be torn down.
+  // Other threads may still run, so destructors are skipped.
   if (std::fflush(stdout) != 0 && code == 0) code = static_cast<int>(ExitCode::File);
   _exit(code);
 }

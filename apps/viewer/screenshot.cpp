@@ -11,7 +11,7 @@ namespace viewer {
 void requireScreenshotName(const std::filesystem::path& file, bool isInterface) {
   const std::string format = render::imageFormat(file);
   if (format == "png" || (format == "exr" && !isInterface)) return;
-  throw levelset::UsageError(fmt::format("screenshot: '{}' is no name for one; end it in .png{}",
+  throw levelset::UsageError(fmt::format("screenshot: '{}' has no supported extension; use .png{}",
                                          file.string(),
                                          isInterface ? "" : ", or in .exr for all layers"));
 }

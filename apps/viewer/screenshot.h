@@ -6,12 +6,14 @@
 
 namespace viewer {
 
-/// Writes what a frame shows as a .png, or all of its layers as an .exr.
-/// @throws levelset::UsageError for another name; levelset::IoError when it cannot be written
+/// Writes the picture of a frame as a .png, or all of its layers as an .exr.
+/// @throws levelset::UsageError for another file name extension
+/// @throws levelset::IoError when the file cannot be written
 void writeScreenshot(const std::filesystem::path& file, const Frame& frame);
 
-/// @throws levelset::UsageError for a name of no format that writeScreenshot() knows
-/// @param isInterface  of the whole window, which has no layers: .png only
+/// Checks the extension of a screenshot's file name.
+/// @param isInterface  the screenshot is of the entire window, which has no layers: .png only
+/// @throws levelset::UsageError for an extension that writeScreenshot() does not support
 void requireScreenshotName(const std::filesystem::path& file, bool isInterface);
 
 }  // namespace viewer

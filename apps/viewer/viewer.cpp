@@ -21,8 +21,8 @@ using Imath::V3d;
 constexpr double kWatchSeconds = 0.4;
 constexpr double kTurnPerPixel = 0.006;  // radians
 constexpr double kTurnPerKey = 0.1;      // radians
-constexpr double kClickPixels = 3;       // a button that moves further drags
-constexpr double kZoomPerStep = 0.88;    // of the wheel
+constexpr double kClickPixels = 3;       // larger movements with a pressed button are drags
+constexpr double kZoomPerStep = 0.88;    // per step of the wheel
 
 std::string namesOf(const std::vector<std::filesystem::path>& files) {
   std::string names;
@@ -43,12 +43,12 @@ Viewer::Viewer(const Arguments& arguments, Window& window)
       display_(arguments.display),
       style_(arguments.style) {
   std::snprintf(screenshotName_.data(), screenshotName_.size(), "view.png");
-  tell("Drop a file here, or press Ctrl+O to open one.");
+  showMessage("Drop a file here, or press Ctrl+O to open one.");
 }
 
 void Viewer::open(const std::vector<std::filesystem::path>& files, bool isReload) {
   loader_.open(files, arguments_.resolution, isReload);
-  tell(fmt::format("Reading {} …", namesOf(files)));
+  showMessage(fmt::format("Reading {} …", namesOf(files)));
 }
 
 void Viewer::show(std::shared_ptr<const Model> model, bool keepView) {
@@ -69,7 +69,7 @@ void Viewer::show(std::shared_ptr<const Model> model, bool keepView) {
     }
   }
   window_.setTitle(namesOf(model_->files) + " – Levelsmith");
-  tell(fmt::format("{}: {}.", namesOf(model_->files), model_->description));
+  showMessage(fmt::format("{}: {}.", namesOf(model_->files), model_->description));
 }
 
 bool Viewer::isPanelShown() const {
@@ -84,17 +84,17 @@ void Viewer::frameBesidePanel() {
   camera_.pan({0, 0}, {0.5 * panel, 0}, camera_.targetDepth(), pictureWidth_, pictureHeight_);
 }
 
-void Viewer::tellFailure(const std::exception_ptr& failure, const std::string& instead) {
+void Viewer::showFailure(const std::exception_ptr& failure, const std::string& instead) {
   try {
     std::rethrow_exception(failure);
   } catch (const std::bad_alloc&) {
-    tell("Memory ran out. " + instead);
+    showMessage("Memory ran out. " + instead);
   } catch (const std::exception& error) {
-    tell(fmt::format("{} {}", error.what(), instead));
+    showMessage(fmt::format("{} {}", error.what(), instead));
   }
 }
 
-// === What comes in from elsewhere
+// === Events from outside the interface
 
 void Viewer::update() {
   takeModel();
@@ -109,22 +109,22 @@ void Viewer::takeModel() {
   std::optional<Loader::Result> result = loader_.take();
   if (!result) return;
   if (result->failure) {
-    tellFailure(result->failure, model_ ? "(What was shown before stays.)" : "");
+    showFailure(result->failure, model_ ? "(The previous model stays open.)" : "");
     return;
   }
-  // A patch that comes on top is looked at from where one stands.
+  // A patch that is added to the present solid keeps the view.
   const bool isSameSolid =
       model_ && !model_->files.empty() && result->files.front() == model_->files.front();
   try {
     show(std::move(result->model), result->isReload || isSameSolid);
   } catch (const levelset::Error& error) {
-    tell(error.what());
+    showMessage(error.what());
   }
-  if (result->isReload) tell(message_ + " Read again.");
+  if (result->isReload) showMessage(message_ + " Read again.");
 }
 
 void Viewer::takeFrame() {
-  if (const std::exception_ptr failure = picture_.failure()) tellFailure(failure, "");
+  if (const std::exception_ptr failure = picture_.failure()) showFailure(failure, "");
   const std::shared_ptr<const Frame> frame = picture_.frame();
   if (!frame || frame == frame_) return;
   frame_ = frame;
@@ -139,7 +139,8 @@ void Viewer::watchFiles() {
   if (watch_.hasChanged()) reload();
   const bool isMissing = watch_.isAnyMissing();
   if (isMissing && !wasMissing_)
-    tell("A file is gone; what it held is still shown, and it is read again when it is back.");
+    showMessage(
+        "A file was removed. Its contents stay open, and it is read again when it is back.");
   wasMissing_ = isMissing;
 }
 
@@ -148,7 +149,7 @@ void Viewer::reload() {
 }
 
 bool Viewer::isBusy() const {
-  return loader_.isLoading() || wantedPick_ || picture_.progress() < 1;
+  return loader_.isLoading() || pendingPick_ || picture_.progress() < 1;
 }
 
 // === Keys
@@ -244,7 +245,7 @@ void Viewer::pressSpecial(const KeyPress& key) {
 
 void Viewer::useMouse(int width, int height) {
   const ImGuiIO& io = ImGui::GetIO();
-  // In pixels of the picture.
+  // Conversion to pixels of the picture.
   const auto perUnit = [](int pixels, float units) {
     return pixels / std::max(static_cast<double>(units), 1.0);
   };
@@ -291,27 +292,27 @@ void Viewer::dragTo(const V2d& place, int width, int height) {
 
 void Viewer::pickAt(const V2d& place, bool isForTarget) {
   const auto pixel = [](double at) { return static_cast<int>(std::clamp(at, -1.0, 1e8)); };
-  wantedPick_ = {{pixel(place.x), pixel(place.y)}};
+  pendingPick_ = {{pixel(place.x), pixel(place.y)}};
   isPickForTarget_ = isForTarget;
   finishPick();
 }
 
 void Viewer::finishPick() {
-  // Until the pixels are single, they are of other places.
-  if (!wantedPick_ || !frame_ || frame_->pixelSize > 1) return;
-  const std::optional<Picked> picked = pick(*frame_, (*wantedPick_)[0], (*wantedPick_)[1]);
-  wantedPick_.reset();
+  // Coarser pixels show other positions.
+  if (!pendingPick_ || !frame_ || frame_->pixelSize > 1) return;
+  const std::optional<Picked> picked = pick(*frame_, (*pendingPick_)[0], (*pendingPick_)[1]);
+  pendingPick_.reset();
   if (isPickForTarget_) {
     if (picked) camera_.centreOn(picked->position);
     return;
   }
   if (!picked) {
-    tell("There is nothing to be picked here.");
+    showMessage("There is no surface at this pixel.");
     return;
   }
   addPick(*picked);
   window_.setClipboard(pointText(picked->position));
-  tell(fmt::format("{} is copied to the clipboard.", pointText(picked->position)));
+  showMessage(fmt::format("{} was copied to the clipboard.", pointText(picked->position)));
 }
 
 void Viewer::addPick(const Picked& picked) {
@@ -326,18 +327,18 @@ void Viewer::copyPicks() {
   }
   if (text.empty()) return;
   window_.setClipboard(text);
-  tell(fmt::format("{} points are copied to the clipboard.", picks_.size()));
+  showMessage(fmt::format("{} points were copied to the clipboard.", picks_.size()));
 }
 
 // === The picture
 
-void Viewer::wantPicture(int width, int height) {
+void Viewer::requestPicture(int width, int height) {
   pictureWidth_ = width;
   pictureHeight_ = height;
   if (!model_) return;
   View view{model_, camera_.camera(width, height), std::nullopt, style_};
   if (isClipped_ && model_->canCut()) view.clip = clip_;
-  picture_.want(view, display_);
+  picture_.request(view, display_);
 }
 
 void Viewer::saveScreenshot() {
@@ -345,16 +346,16 @@ void Viewer::saveScreenshot() {
   try {
     requireScreenshotName(name, isInterfaceShot_);
     if (isInterfaceShot_) {
-      wantsInterfaceShot_ = true;  // of the next frame, without the dialog
+      wantsInterfaceShot_ = true;  // taken in the next frame, without the dialog
       return;
     }
     if (!frame_)
-      throw levelset::InvalidInput("screenshot: there is nothing to be seen yet; open a file");
+      throw levelset::InvalidInput("screenshot: no picture is available yet; open a file");
     writeScreenshot(name, *frame_);
-    tell(fmt::format("{} is written{}.", name.string(),
-                     frame_->isComplete ? "" : ", of a picture that was not finished"));
+    showMessage(fmt::format("{} was written{}.", name.string(),
+                            frame_->isComplete ? "" : ", from an unfinished picture"));
   } catch (const std::exception& error) {
-    tell(error.what());
+    showMessage(error.what());
   }
 }
 
@@ -366,9 +367,9 @@ void Viewer::writeInterfaceShot() {
   try {
     const Canvas shot = window_.drawInMemory(width, height, [&] { drawInterface(width, height); });
     render::writePng(name, width, height, shot.colours);
-    tell(fmt::format("{} is written.", name.string()));
+    showMessage(fmt::format("{} was written.", name.string()));
   } catch (const std::exception& error) {
-    tell(error.what());
+    showMessage(error.what());
   }
 }
 

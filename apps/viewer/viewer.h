@@ -20,30 +20,30 @@
 
 namespace viewer {
 
-/// What the window shows, and what is done by hand in it.
+/// State of the window and reactions to the user's input.
 class Viewer {
  public:
   Viewer(const Arguments& arguments, Window& window);
 
-  /// Reads files in the background; what is shown stays until they are read.
+  /// Reads files in the background; the present model is shown until they are read.
   void open(const std::vector<std::filesystem::path>& files, bool isReload = false);
-  /// Shows a model that was read. @param keepView  as seen before
+  /// Shows a model. @param keepView  keeps the present camera
   void show(std::shared_ptr<const Model> model, bool keepView);
 
-  /// Takes up what came in from elsewhere: models, pictures, drops, changed files.
+  /// Handles external events: loaded models, finished pictures, dropped files, changed files.
   void update();
-  /// The window's interface, while it is drawn; acts upon what is done in it.
-  /// @param width, height  of the picture, pixels
+  /// Draws the interface and handles the user's input to it.
+  /// @param width, height  size of the picture, pixels
   void drawInterface(int width, int height);
 
-  /// Writes the picture of the whole window that was asked for in it, if one was.
+  /// Writes the picture of the entire window if the user requested one.
   void writeInterfaceShot();
 
-  /// Asks for the picture of what is shown. @param width, height  pixels
-  void wantPicture(int width, int height);
+  /// Requests the picture of the present view. @param width, height  pixels
+  void requestPicture(int width, int height);
   [[nodiscard]] const ProgressivePicture& picture() const { return picture_; }
   [[nodiscard]] bool isBusy() const;
-  /// As if somebody had clicked there.
+  /// Adds a picked point, as a click does.
   void addPick(const Picked& picked);
 
  private:
@@ -65,8 +65,8 @@ class Viewer {
   void finishPick();
   void copyPicks();
   void saveScreenshot();
-  void tell(const std::string& sentence) { message_ = sentence; }
-  void tellFailure(const std::exception_ptr& failure, const std::string& instead);
+  void showMessage(const std::string& sentence) { message_ = sentence; }
+  void showFailure(const std::exception_ptr& failure, const std::string& instead);
 
   // === The interface, viewer_panels.cpp
   void drawPanel();
@@ -96,7 +96,7 @@ class Viewer {
   bool isClipped_ = false;
   Display display_;
   render::Style style_;
-  std::shared_ptr<const Frame> frame_;  // that the window has
+  std::shared_ptr<const Frame> frame_;  // frame that the window shows
   int pictureWidth_ = 1, pictureHeight_ = 1;
 
   enum class Drag { None, Orbit, Pan };
@@ -104,11 +104,11 @@ class Viewer {
   Imath::V2d dragStart_, dragLast_;
   double dragDepth_ = 1;
   bool hasDragged_ = false;
-  std::optional<std::array<int, 2>> wantedPick_;
+  std::optional<std::array<int, 2>> pendingPick_;
   bool isPickForTarget_ = false;
   std::vector<Picked> picks_;
 
-  // Keys for the dialog that is open: ImGui misses those that are let go at once.
+  // Keys for the open dialog: ImGui misses keys that are released within one frame.
   bool isEntered_ = false, isEscaped_ = false;
   std::string message_;
   bool asksScreenshot_ = false, asksKeys_ = false;

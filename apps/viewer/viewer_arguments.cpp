@@ -17,31 +17,31 @@ namespace {
 
 using levelset::UsageError;
 
-constexpr long kMostResolution = 4096;  // voxels: more than rays can tell from each other
+constexpr long kMostResolution = 4096;  // voxels; rays resolve no more
 
 constexpr const char* kHelp = R"(levelsmith-view [FILE…] [options]
 Shows a level set (.vdb), a mesh (.ply .obj .stl .off, also .gz) or a scene (.json), and patches (.patch) with it.
 
-  --size WxH          of the picture, pixels                            [1280x800]
-  --from, --to X,Y,Z  where the eye is and where it looks               [all is seen]
-  --up X,Y,Z          what is up                                        [0,1,0]
+  --size WxH          size of the picture, pixels                       [1280x800]
+  --from, --to X,Y,Z  position of the eye and target                    [frames the model]
+  --up X,Y,Z          up direction                                      [0,1,0]
   --fov DEGREES       vertical field of view                            [35]
-  --ortho L           orthographic; height of the view, world units
-  --layer NAME        colour, normal, depth, position, mean, gauss, k1, k2 or id
-  --style NAME        of the colours: lit, tone, mean, gauss, principal, accessibility or ink
-  --range N           of curvatures, by the extent of what is drawn     [40]
-  --clip PLANE        cuts at x=0.1, y=0.1, z=0.1, or view=0.1 before the middle, and shows phi there
-  --patches LINES     none, outline, base or all levels of particles    [all]
-  --resolution N      of meshes: voxels along the longest side          [256]
+  --ortho L           orthographic projection; height of the view, world units
+  --layer NAME        displayed layer: colour, normal, depth, position, mean, gauss, k1, k2 or id
+  --style NAME        shading style: lit, tone, mean, gauss, principal, accessibility or ink
+  --range N           range of curvatures, times the model's extent     [40]
+  --clip PLANE        clip plane that shows phi: x=0.1, y=0.1, z=0.1, or view=0.1 (in front of the centre)
+  --patches LINES     none, outline, base or all layers of particles    [all]
+  --resolution N      voxels along the longest side of a mesh           [256]
   --renderer NAME     auto, cpu or gpu                                  [auto]
   --help, --version
 
-Without anybody looking, for scripts (a display is needed all the same, for example that of xvfb-run):
-  --screenshot FILE   writes the finished picture, .png or .exr, and ends
-  --interface         the screenshot shows the whole window
-  --pick X,Y          prints what is seen through a pixel as JSON, and ends
+Options for scripts, without an open window (a display is required, for example with xvfb-run):
+  --screenshot FILE   writes the complete picture, .png or .exr, and exits
+  --interface         the screenshot shows the entire window
+  --pick X,Y          prints the surface point at a pixel as JSON, and exits
 
-Left button: turn; middle or right: move; wheel: come nearer; click: pick a point. docs/viewer.md lists the keys.
+Left button: turn; middle or right: move; wheel: zoom; click: pick a point. docs/viewer.md lists the keys.
 )";
 
 std::string whereOf(const std::string& option) {
@@ -51,31 +51,34 @@ std::string whereOf(const std::string& option) {
 std::array<int, 2> parsePixel(const std::string& text) {
   const std::size_t comma = text.find(',');
   if (comma == std::string::npos)
-    throw UsageError(
-        fmt::format("levelsmith-view: --pick '{}' is no pixel; give X,Y as 640,400", text));
+    throw UsageError(fmt::format(
+        "levelsmith-view: --pick '{}' is not a pixel; give X,Y, for example 640,400", text));
   const long x = pipeline::parseInteger(text.substr(0, comma), whereOf("--pick")),
              y = pipeline::parseInteger(text.substr(comma + 1), whereOf("--pick"));
   constexpr long kMost = 1L << 28;
   if (x < 0 || y < 0 || x > kMost || y > kMost)
-    throw UsageError(fmt::format(
-        "levelsmith-view: --pick {} lies outside of any picture; 0,0 is the upper left", text));
+    throw UsageError(
+        fmt::format("levelsmith-view: --pick {} has a negative or too large coordinate; 0,0 is the "
+                    "upper left corner",
+                    text));
   return {static_cast<int>(x), static_cast<int>(y)};
 }
 
 double parsePositive(const std::string& text, const std::string& option) {
   const double number = pipeline::parseNumber(text, whereOf(option));
-  if (!(number > 0)) throw UsageError(fmt::format("{} {} is not positive", whereOf(option), text));
+  if (!(number > 0)) throw UsageError(fmt::format("{} {} must be positive", whereOf(option), text));
   return number;
 }
 
 render::Style styleNamed(const std::string& name) {
   std::string all;
   for (const render::Style style : render::kStyles) {
-    if (style == render::Style::Matcap) continue;  // it needs a picture of its own
+    if (style == render::Style::Matcap) continue;  // it needs a picture of a ball
     if (render::styleName(style) == name) return style;
     all += (all.empty() ? "" : ", ") + std::string(render::styleName(style));
   }
-  throw UsageError(fmt::format("levelsmith-view: --style '{}' is none; give one of {}", name, all));
+  throw UsageError(
+      fmt::format("levelsmith-view: --style '{}' is unknown; give one of {}", name, all));
 }
 
 Renderer rendererNamed(const std::string& name) {
@@ -83,7 +86,7 @@ Renderer rendererNamed(const std::string& name) {
   if (name == "cpu") return Renderer::Cpu;
   if (name == "gpu") return Renderer::Gpu;
   throw UsageError(
-      fmt::format("levelsmith-view: --renderer '{}' is none; give auto, cpu or gpu", name));
+      fmt::format("levelsmith-view: --renderer '{}' is unknown; give auto, cpu or gpu", name));
 }
 
 using Setter = std::function<void(Arguments&, const std::string&)>;
@@ -127,7 +130,7 @@ const std::map<std::string, Setter>& setters() {
        [](Arguments& to, const std::string& text) {
          to.resolution = pipeline::parseInteger(text, whereOf("--resolution"));
          if (to.resolution < 4 || to.resolution > kMostResolution)
-           throw UsageError(fmt::format("levelsmith-view: --resolution {} is not from 4 to {}",
+           throw UsageError(fmt::format("levelsmith-view: --resolution {} is not between 4 and {}",
                                         text, kMostResolution));
        }},
       {"--renderer",
@@ -153,7 +156,7 @@ const std::map<std::string, bool Arguments::*>& flags() {
   for (const auto& [name, flag] : flags()) known.push_back(name);
   const std::string meant = pipeline::didYouMean(option, known);
   throw UsageError(fmt::format("levelsmith-view: there is no option {}; {}", option,
-                               meant.empty() ? "levelsmith-view --help lists them"
+                               meant.empty() ? "levelsmith-view --help lists the options"
                                              : fmt::format("did you mean {}?", meant)));
 }
 
@@ -162,19 +165,19 @@ void requireSense(const Arguments& arguments) {
   if (arguments.screenshot) requireScreenshotName(*arguments.screenshot, arguments.isInterface);
   if (arguments.isInterface && !arguments.screenshot)
     throw UsageError(
-        "levelsmith-view: --interface says what a screenshot shows; give --screenshot "
-        "FILE beside it");
+        "levelsmith-view: --interface requires a screenshot; add --screenshot "
+        "FILE");
   if (arguments.isScript() && arguments.files.empty())
     throw UsageError("levelsmith-view: --screenshot and --pick need a file to show; give its name");
   if (arguments.to && !arguments.from)
-    throw UsageError("levelsmith-view: --to needs --from beside it");
+    throw UsageError("levelsmith-view: --to requires --from; add --from");
   if (arguments.verticalFov && !(*arguments.verticalFov < std::numbers::pi))
     throw UsageError("levelsmith-view: --fov is too wide; it must be below 180 degrees");
   if (arguments.pick &&
       ((*arguments.pick)[0] >= arguments.width || (*arguments.pick)[1] >= arguments.height) &&
       arguments.hasSize)
     throw UsageError(
-        fmt::format("levelsmith-view: --pick {},{} lies outside of the picture of {}x{} pixels",
+        fmt::format("levelsmith-view: --pick {},{} lies outside the picture of {}x{} pixels",
                     (*arguments.pick)[0], (*arguments.pick)[1], arguments.width, arguments.height));
 }
 
@@ -187,7 +190,7 @@ Arguments parseArguments(const std::vector<std::string>& words) {
     const std::string& word = words[i];
     if (areOptionsOver || word.size() < 2 || word[0] != '-') {
       if (word.empty())
-        throw UsageError("levelsmith-view: the name of a file is empty; give one, or none");
+        throw UsageError("levelsmith-view: a file name is empty; give a name or omit it");
       arguments.files.emplace_back(word);
       continue;
     }
@@ -205,7 +208,7 @@ Arguments parseArguments(const std::vector<std::string>& words) {
     const auto setter = setters().find(name);
     if (setter == setters().end()) refuseOption(name);
     if (equals == std::string::npos && i + 1 == words.size())
-      throw UsageError(fmt::format("levelsmith-view: {} needs a value behind it", name));
+      throw UsageError(fmt::format("levelsmith-view: {} needs a value after it", name));
     setter->second(arguments, equals == std::string::npos ? words[++i] : word.substr(equals + 1));
   }
   requireSense(arguments);

@@ -14,34 +14,36 @@
 
 namespace viewer {
 
-/// What the user asked for.
+/// Command line arguments of the viewer.
 struct Arguments {
   std::vector<std::filesystem::path> files;
-  int width = 1280, height = 800;  ///< of the picture, pixels
-  bool hasSize = false;            ///< or is it a scene's?
+  int width = 1280, height = 800;  ///< size of the picture, pixels
+  bool hasSize = false;            ///< the size is given; false: a scene's size has priority
   std::optional<Imath::V3d> from = {}, to = {}, up = {};
   std::optional<double> verticalFov = {};  ///< radians
   std::optional<double> orthoHeight = {};  ///< world units
   std::optional<ClipPlane> clip = {};
   Display display = {};
   render::Style style = render::Style::Lit;
-  long resolution = 256;  ///< of meshes
+  long resolution = 256;  ///< voxels along the longest side of a mesh
   Renderer renderer = Renderer::Auto;
   std::optional<std::filesystem::path> screenshot = {};
-  bool isInterface = false;                     ///< the screenshot is of the whole window
-  std::optional<std::array<int, 2>> pick = {};  ///< a pixel
+  bool isInterface = false;                     ///< the screenshot shows the entire window
+  std::optional<std::array<int, 2>> pick = {};  ///< pixel to pick
   bool asksHelp = false, asksVersion = false;
 
-  /// Is there nobody to look at the window?
+  /// True when the viewer runs without user interaction.
   [[nodiscard]] bool isScript() const { return screenshot || pick; }
 };
 
+/// Parses the command line.
 /// @throws levelset::UsageError
 [[nodiscard]] Arguments parseArguments(const std::vector<std::string>& words);
+/// Text of levelsmith-view --help.
 [[nodiscard]] std::string viewerHelp();
 
-/// From where a model is seen: as the options say, else as its scene does, else framed.
-/// @throws levelset::UsageError for a camera that cannot see
+/// First camera of a model: from the options, else from its scene, else one that frames it.
+/// @throws levelset::UsageError for an invalid camera
 [[nodiscard]] render::Camera firstCamera(const Arguments& arguments, const Model& model, int width,
                                          int height);
 

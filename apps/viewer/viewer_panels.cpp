@@ -7,7 +7,7 @@
 
 #include "apps/viewer/viewer.h"
 
-// What the window shows beside the picture.
+// Panels, dialogs and status line of the window.
 namespace viewer {
 namespace {
 
@@ -21,7 +21,7 @@ bool beginPart(const char* title) {
   return ImGui::CollapsingHeader(title, ImGuiTreeNodeFlags_DefaultOpen);
 }
 
-/// A slider over doubles.
+/// A slider for a double.
 bool slideDouble(const char* label, double& value, double low, double high, const char* format) {
   return ImGui::SliderScalar(label, ImGuiDataType_Double, &value, &low, &high, format);
 }
@@ -83,7 +83,7 @@ void Viewer::drawViewPart() {
         camera.orthoHeight
             ? fmt::format("--ortho {:.8g}", *camera.orthoHeight)
             : fmt::format("--fov {:.8g}", camera.verticalFov * 180 / std::numbers::pi)));
-    tell("The view is copied to the clipboard, as options of 'levelsmith render'.");
+    showMessage("The view was copied to the clipboard, as options of 'levelsmith render'.");
   }
 }
 
@@ -112,7 +112,7 @@ void Viewer::drawLayerPart() {
 void Viewer::drawClipPart() {
   if (!beginPart("Clip plane")) return;
   if (model_ && !model_->canCut()) {
-    ImGui::TextWrapped("%s", "There is no inside that can be shown.");
+    ImGui::TextWrapped("%s", "The model has no solid that can be clipped.");
     return;
   }
   ImGui::Checkbox("cut", &isClipped_);
@@ -147,7 +147,7 @@ void Viewer::drawPatchPart() {
 
 void Viewer::drawPointPart() {
   if (picks_.empty() || !beginPart("Points")) return;
-  constexpr std::size_t kShown = 6;  // the newest
+  constexpr std::size_t kShown = 6;  // newest points shown
   const std::size_t first = picks_.size() > kShown ? picks_.size() - kShown : 0;
   for (std::size_t i = first; i < picks_.size(); ++i) {
     const Picked& picked = picks_[i];
@@ -208,7 +208,7 @@ void Viewer::drawScreenshotDialog() {
   if (!ImGui::BeginPopupModal(kTitle, nullptr, ImGuiWindowFlags_AlwaysAutoResize)) return;
   if (ImGui::IsWindowAppearing()) ImGui::SetKeyboardFocusHere();
   ImGui::InputText("name", screenshotName_.data(), screenshotName_.size());
-  ImGui::Checkbox("of the whole window", &isInterfaceShot_);
+  ImGui::Checkbox("the entire window", &isInterfaceShot_);
   if (ImGui::Button("Write") || isEntered_) {
     saveScreenshot();
     ImGui::CloseCurrentPopup();
@@ -226,11 +226,11 @@ void Viewer::drawKeysDialog() {
   constexpr std::array<std::array<const char*, 2>, 14> kKeys = {{
       {"left button", "turn; with shift: move"},
       {"middle, right", "move"},
-      {"wheel", "nearer and further, towards the pointer"},
+      {"wheel", "zoom in and out at the pointer"},
       {"click", "pick a point, and copy its coordinates"},
       {"arrows", "turn"},
-      {"f", "all is seen"},
-      {"x y z, X Y Z", "look against an axis, or along it"},
+      {"f", "frame the model"},
+      {"x y z, X Y Z", "look along the negative or positive axis"},
       {"o", "orthographic, perspective"},
       {"t", "turn about the point under the pointer"},
       {"l, L", "the next layer, the one before"},

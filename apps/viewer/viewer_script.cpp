@@ -22,11 +22,11 @@ void printLine(const std::string& line) {
                                         std::strerror(errno)));
 }
 
-/// Waits for the picture. @param isForPick  light and shadow are not needed
+/// Waits until the picture is complete. @param isForPick  light and shadow are not needed
 std::shared_ptr<const Frame> finishedFrame(Window& window, Viewer& viewer, int width, int height,
                                            bool isForPick) {
   for (;;) {
-    viewer.wantPicture(width, height);
+    viewer.requestPicture(width, height);
     if (const std::exception_ptr failure = viewer.picture().failure())
       std::rethrow_exception(failure);
     std::shared_ptr<const Frame> frame = viewer.picture().frame();
@@ -35,7 +35,7 @@ std::shared_ptr<const Frame> finishedFrame(Window& window, Viewer& viewer, int w
   }
 }
 
-/// ImGui lays windows out in one frame and draws them in the next.
+/// Returns a picture of the window. ImGui computes layout in one frame and draws it in the next.
 Canvas windowShot(Window& window, Viewer& viewer, int width, int height) {
   constexpr int kFrames = 3;
   Canvas shot;
@@ -48,21 +48,24 @@ Canvas windowShot(Window& window, Viewer& viewer, int width, int height) {
 }  // namespace
 
 void runScript(const Arguments& arguments) {
-  if (arguments.screenshot) levelset::FileTarget(*arguments.screenshot);  // can it be written?
+  if (arguments.screenshot)
+    levelset::FileTarget(*arguments.screenshot);  // fails early if the file cannot be written
   const auto model = std::make_shared<const Model>(
       openModel(arguments.files, {.resolution = arguments.resolution}));
   if (arguments.clip && !model->canCut())
     throw levelset::InvalidInput(
-        "levelsmith-view: --clip cuts solids, and there is no inside to be shown; leave it out");
-  // As 'levelsmith render' has it.
+        "levelsmith-view: --clip needs solids that can be cut, and the model has none; omit "
+        "--clip");
+  // Same rule as in 'levelsmith render'.
   const bool isSceneSize = model->camera && !arguments.hasSize;
   const int width = isSceneSize ? model->camera->width : arguments.width,
             height = isSceneSize ? model->camera->height : arguments.height;
   const render::Camera camera = firstCamera(arguments, *model, width, height);
-  constexpr int kAnyEdge = 64;  // pixels: pictures are made in memory
+  constexpr int kAnyEdge =
+      64;  // pixels; pictures are drawn in memory, so the size of the window does not matter
   Window window("levelsmith-view", kAnyEdge, kAnyEdge, false);
   Viewer viewer(arguments, window);
-  viewer.wantPicture(camera.width, camera.height);
+  viewer.requestPicture(camera.width, camera.height);
   viewer.show(model, false);
   const std::shared_ptr<const Frame> frame =
       finishedFrame(window, viewer, width, height, !arguments.screenshot);
@@ -70,8 +73,8 @@ void runScript(const Arguments& arguments) {
     const auto [x, y] = *arguments.pick;
     if (x >= width || y >= height)
       throw levelset::UsageError(
-          fmt::format("levelsmith-view: --pick {},{} lies outside of the picture of {}x{} pixels",
-                      x, y, width, height));
+          fmt::format("levelsmith-view: --pick {},{} lies outside the picture of {}x{} pixels", x,
+                      y, width, height));
     const std::optional<Picked> picked = pick(*frame, x, y);
     if (picked) viewer.addPick(*picked);
     printLine(pickedJson(picked));

@@ -4,9 +4,9 @@
 
 namespace viewer {
 
-/// Draws what the arguments ask for until it is finished, in a window that nobody sees; prints what
-/// is picked on standard output, and writes the screenshot.
-/// @throws what reading, drawing and writing do
+/// Draws the requested picture in an invisible window until it is complete. Prints the picked point
+/// on standard output and writes the screenshot.
+/// @throws levelset::Error as reading, drawing and writing do
 void runScript(const Arguments& arguments);
 
 }  // namespace viewer

@@ -21,21 +21,21 @@ namespace viewer {
 namespace {
 
 constexpr const char* kWithoutDisplay =
-    "give it a display, for example that of xvfb-run, or draw with 'levelsmith render', which "
+    "provide a display, for example with xvfb-run, or draw with 'levelsmith render', which "
     "needs "
     "none";
 
-std::string glfwTrouble() {
+std::string glfwError() {
   const char* description = nullptr;
   glfwGetError(&description);
-  return description ? description : "no reason is known";
+  return description ? description : "unknown reason";
 }
 
 Window& windowOf(GLFWwindow* window) {
   return *static_cast<Window*>(glfwGetWindowUserPointer(window));
 }
 
-/// One with the letters that the interface writes, if the system has it.
+/// Loads a font with all characters of the interface, if the system has one.
 void loadFont() {
   constexpr std::array<const char*, 3> kPlaces = {
       "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
@@ -64,7 +64,7 @@ void drawBackground(ImDrawList& list, float width, float height) {
   list.AddRectFilledMultiColor({0, 0}, {width, height}, top, top, bottom, bottom);
 }
 
-/// A picture in memory to be drawn on, while it lives.
+/// A framebuffer in memory that is the render target during its lifetime.
 class MemoryTarget {
  public:
   MemoryTarget(int width, int height) {
@@ -95,23 +95,23 @@ class MemoryTarget {
 Window::Window(const std::string& title, int width, int height, bool isVisible) {
   if (!glfwInit())
     throw levelset::ResourceLimit(fmt::format("levelsmith-view: no window can be opened ({}); {}",
-                                              glfwTrouble(), kWithoutDisplay));
+                                              glfwError(), kWithoutDisplay));
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   glfwWindowHint(GLFW_VISIBLE, isVisible ? GLFW_TRUE : GLFW_FALSE);
   window_ = glfwCreateWindow(width, height, title.c_str(), nullptr, nullptr);
   if (!window_) {
-    const std::string trouble = glfwTrouble();
+    const std::string error = glfwError();
     glfwTerminate();
     throw levelset::ResourceLimit(
-        fmt::format("levelsmith-view: no window with OpenGL 3.3 can be opened ({}); {}", trouble,
+        fmt::format("levelsmith-view: no window with OpenGL 3.3 can be opened ({}); {}", error,
                     kWithoutDisplay));
   }
   glfwMakeContextCurrent(window_);
   glfwSwapInterval(1);
   glfwSetWindowUserPointer(window_, this);
-  // Before ImGui's, which call them in turn.
+  // Must be set before ImGui's callbacks, which call these.
   glfwSetCharCallback(window_, [](GLFWwindow* window, unsigned character) {
     windowOf(window).keys_.push_back({.character = character});
   });
@@ -125,7 +125,7 @@ Window::Window(const std::string& title, int width, int height, bool isVisible) 
   });
   IMGUI_CHECKVERSION();
   ImGui::CreateContext();
-  ImGui::GetIO().IniFilename = nullptr;  // nothing is left behind in the user's folder
+  ImGui::GetIO().IniFilename = nullptr;  // do not write a settings file to the user's folder
   setStyle();
   loadFont();
   ImGui_ImplGlfw_InitForOpenGL(window_, true);
@@ -179,7 +179,7 @@ void Window::setPicture(const Canvas& canvas) {
   if (!texture_) glGenTextures(1, &texture_);
   glBindTexture(GL_TEXTURE_2D, texture_);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  // Pixels stay as sharp as they are where each is one of the window's.
+  // Linear filtering keeps pixels sharp where a picture pixel is a window pixel.
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
@@ -227,10 +227,11 @@ Canvas Window::drawInMemory(int width, int height, const std::function<void()>& 
   GLint most = 0;
   glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &most);
   const auto refuse = [&] {
-    throw levelset::ResourceLimit(fmt::format(
-        "levelsmith-view: OpenGL takes no window of {}x{} pixels here, {} along a side are the "
-        "most; give a smaller --size",
-        width, height, most));
+    throw levelset::ResourceLimit(
+        fmt::format("levelsmith-view: a window of {}x{} pixels is too large, because OpenGL "
+                    "supports at most {} "
+                    "along a side; give a smaller --size",
+                    width, height, most));
   };
   if (width > most || height > most) refuse();
   const MemoryTarget target(width, height);
@@ -240,7 +241,7 @@ Canvas Window::drawInMemory(int width, int height, const std::function<void()>& 
   canvas.colours.resize(4 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, canvas.colours.data());
-  // OpenGL counts rows from below, and what it blends leaves alpha behind that says nothing.
+  // OpenGL counts rows from below, and blending leaves a meaningless alpha.
   const std::size_t row = 4 * static_cast<std::size_t>(width);
   for (int y = 0; y < height / 2; ++y)
     std::swap_ranges(canvas.colours.begin() + static_cast<std::ptrdiff_t>(row) * y,

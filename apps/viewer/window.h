@@ -12,26 +12,26 @@ struct GLFWwindow;
 
 namespace viewer {
 
-/// A key that was pressed: what it writes, or GLFW's number of one that writes nothing.
+/// A pressed key: its character, or GLFW's key number for keys without a character.
 struct KeyPress {
   unsigned character = 0;
   int key = 0;
   bool withControl = false;
 };
 
-/// A window with OpenGL and Dear ImGui in it, one at a time. For the main thread only.
+/// A window with OpenGL and Dear ImGui. Only one may exist at a time, on the main thread.
 class Window {
  public:
-  /// @param isVisible  false: for pictures of it alone
-  /// @throws levelset::ResourceLimit where there is no display, or no OpenGL 3.3 on it
+  /// @param isVisible  false: for pictures of the window only
+  /// @throws levelset::ResourceLimit when there is no display, or OpenGL 3.3 is missing
   Window(const std::string& title, int width, int height, bool isVisible);
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
 
-  /// From any thread: something is to be drawn.
+  /// Requests a redraw. May be called from any thread.
   static void wake();
-  /// Waits for something to happen, some seconds at most. @return did it?
+  /// Waits for an event, at most the given time. Returns true when an event arrived.
   bool wait(double seconds);
   [[nodiscard]] bool isToClose() const;
   void close();
@@ -40,17 +40,17 @@ class Window {
   [[nodiscard]] int width() const;   ///< pixels, at least 1
   [[nodiscard]] int height() const;  ///< pixels, at least 1
 
-  /// Draws the picture, if it has one, and over it what `interface` makes of ImGui.
+  /// Draws the picture, if there is one, and on top of it the ImGui widgets of `interface`.
   void draw(const std::function<void()>& interface);
-  /// The same into memory, of any size. @return red, green, blue, alpha
-  /// @throws levelset::ResourceLimit for a size that OpenGL does not take
+  /// Draws the same into memory, at any size. @return red, green, blue, alpha
+  /// @throws levelset::ResourceLimit for a size that OpenGL does not support
   [[nodiscard]] Canvas drawInMemory(int width, int height, const std::function<void()>& interface);
 
-  /// What is drawn behind the interface, over all of the window.
+  /// Picture behind the interface, stretched to the window.
   void setPicture(const Canvas& canvas);
   void clearPicture();
 
-  /// Since the last call.
+  /// Input since the last call.
   [[nodiscard]] std::vector<KeyPress> takeKeys();
   [[nodiscard]] std::vector<std::filesystem::path> takeDrops();
 

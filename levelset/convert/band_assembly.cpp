@@ -26,7 +26,7 @@ using Root = FloatTree::RootNodeType;
 using Upper = Root::ChildNodeType;
 using Lower = Upper::ChildNodeType;
 
-/// Voxels. Far below what distances are exact to, far above what rounding leaves of zero.
+/// Voxels. Far below the accuracy of the distances, far above the rounding error at zero.
 constexpr double kOnSurface = 1e-6;
 
 Coord toCoord(const V3i& p) {
@@ -36,7 +36,7 @@ V3i toV3i(const Coord& p) {
   return {p.x(), p.y(), p.z()};
 }
 
-/// Leaves made by many threads, each its own list.
+/// Collects leaves from several threads, each with a list of its own.
 class LeafCollector {
  public:
   LeafCollector(double reach, double voxelSize, std::size_t maxMemory)
@@ -54,7 +54,8 @@ class LeafCollector {
     auto leaf = std::make_unique<LeafNode>(toCoord(block + origin), background_, false);
     float* values = leaf->buffer().data();
     for (openvdb::Index i = 0; i < LeafNode::SIZE; ++i) {
-      // On the surface, which is outside: rounding must not make specks of single points of it.
+      // A point on the surface counts as outside, so that rounding leaves no isolated inside
+      // points.
       const double d = distance.distances()[i] < kOnSurface ? 0 : distance.distances()[i];
       const bool isActive = d < reach;
       const float value =
@@ -93,14 +94,14 @@ class LeafCollector {
 
 using Region = std::optional<openvdb::CoordBBox>;
 
-/// Signs of tiles. Their points lie at least a voxel from the surface, so neighbouring tiles agree:
-/// only the first of a row of them is looked up. Of a tile that the region only meets, the part
-/// within: two neighbours have theirs side by side.
+/// Computes the signs of tiles. The points of a tile lie at least a voxel from the surface, so
+/// adjacent tiles agree. Only the first tile of a row is looked up. Where the region covers a part
+/// of a tile, the sign is that of this part; the parts of two neighbours are adjacent too.
 template <typename Node>
 void signTiles(Node& node, const SignField& field, const V3i& origin, float background,
                const Region& region) {
   constexpr openvdb::Index kZ = 1, kY = 1u << Node::LOG2DIM, kX = 1u << (2 * Node::LOG2DIM);
-  std::vector<signed char> side(Node::NUM_VALUES, 0);  // 0: a child
+  std::vector<signed char> side(Node::NUM_VALUES, 0);  // 0: a child node
   for (auto it = node.beginValueAll(); it; ++it) {
     const openvdb::Index n = it.pos();
     signed char& s = side[n];
@@ -131,7 +132,7 @@ void signTilesOfAll(FloatTree& tree, const SignField& field, const V3i& origin, 
   });
 }
 
-/// Interior tiles of the root: a row of them lies between two nodes that hold the surface.
+/// Adds the interior tiles of the root: rows of tiles between two nodes that contain the surface.
 void signRootTiles(FloatTree& tree, const SignField& field, const V3i& origin, float background) {
   std::vector<Coord> keys;
   for (auto it = tree.root().cbeginChildOn(); it; ++it) keys.push_back(it->origin());
@@ -149,7 +150,8 @@ void signRootTiles(FloatTree& tree, const SignField& field, const V3i& origin, f
   }
 }
 
-/// All that the region meets: a part of a solid may lie open anywhere.
+/// Adds the interior root tiles that the region meets. With a region, a row need not end at a node
+/// that contains the surface.
 void signRootTilesIn(const openvdb::CoordBBox& region, FloatTree& tree, const SignField& field,
                      const V3i& origin, float background) {
   constexpr int kDim = static_cast<int>(Upper::DIM);
@@ -195,11 +197,12 @@ double ambiguousShare(const openvdb::FloatGrid& grid, const SignField& field, co
   if (!field.isOpen()) return 0;
   std::vector<const LeafNode*> leaves;
   grid.tree().getNodes(leaves);
-  std::vector<std::array<std::size_t, 2>> counts(leaves.size());  // next to the zero set, ambiguous
+  std::vector<std::array<std::size_t, 2>> counts(leaves.size());  // voxels next to the zero set;
+                                                                  // ambiguous ones
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
     const LeafNode& leaf = *leaves[n];
     const V3i block = toV3i(leaf.origin()) - origin;
-    const bool clear = field.isClearIn(block);
+    const bool clear = field.isUnambiguousIn(block);
     SignField::BlockWinding winding;
     if (!clear) field.winding(block, winding);
     auto accessor = grid.getConstAccessor();

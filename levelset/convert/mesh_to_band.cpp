@@ -23,8 +23,8 @@ using convert::SignField;
 using Imath::V3d;
 using Imath::V3i;
 
-/// The caller's progress, made to never fall while stages repeat.
-Progress rising(const Progress& progress) {
+/// Wraps the caller's progress so that it never decreases while stages repeat.
+Progress monotonic(const Progress& progress) {
   if (!progress) return {};
   return [&progress, high = 0.0](double fraction) mutable {
     high = std::max(high, fraction);
@@ -32,7 +32,7 @@ Progress rising(const Progress& progress) {
   };
 }
 
-/// Searched for once, by the first who asks.
+/// Finds the self-intersections once, at the first request.
 class SelfIntersections {
  public:
   SelfIntersections(const TriMesh& mesh, const MeshTopology& topology, Progress progress)
@@ -43,7 +43,7 @@ class SelfIntersections {
     searched_ = true;
     return pairs_;
   }
-  /// −1: nobody asked.
+  /// Number of pairs; −1 when no search was made.
   [[nodiscard]] std::ptrdiff_t count() const { return searched_ ? std::ssize(pairs_) : -1; }
 
  private:
@@ -71,7 +71,7 @@ void checkClosed(const MeshTopology& topology, Nesting nesting) {
   if (nesting == Nesting::Orientation && !topology.boundary.empty())
     throw InvalidInput(
         fmt::format("level-set: at {} edges neighbouring faces are oriented differently, so nested "
-                    "shells cannot follow their orientation; use --nested parity",
+                    "components cannot follow their orientation; use --nested parity",
                     topology.boundary.size()));
 }
 
@@ -80,7 +80,7 @@ SignField::Rule ruleFor(SignMode method, Nesting nesting) {
   return nesting == Nesting::Parity ? SignField::Rule::Parity : SignField::Rule::Orientation;
 }
 
-/// Adds to the mesh the surface that spans its holes.
+/// Adds the surface that spans the holes of the mesh.
 void addOpenSurface(LocalMesh& mesh, const SignField& field, double halfWidth,
                     std::size_t maxMemory, const Progress& progress) {
   std::vector<V3i> seeds;
@@ -88,7 +88,7 @@ void addOpenSurface(LocalMesh& mesh, const SignField& field, double halfWidth,
   convert::forEachBlock(
       mesh, halfWidth,
       [&](const V3i& block, std::span<const std::uint32_t>) {
-        if (field.isClearIn(block)) return;
+        if (field.isUnambiguousIn(block)) return;
         const std::lock_guard lock(mutex);
         seeds.push_back(block);
       },
@@ -110,17 +110,17 @@ void checkResult(const openvdb::FloatGrid& grid, const SignCertificate& certific
     throw InvalidInput(
         "level-set: no grid point lies inside the object, which is everywhere thinner than a "
         "voxel; use smaller voxels");
-  if (!anyInside && !options.signAnyway)
+  if (!anyInside && !options.acceptSign)
     throw InvalidInput(fmt::format(
-        "level-set: the mesh encloses nothing: its winding number passes 1/2 at no grid point ({} "
-        "boundary edges); close it first, use smaller voxels, or take distances without an inside "
-        "with --sign-anyway",
+        "level-set: the mesh encloses no volume: its winding number exceeds 1/2 at no grid point "
+        "({} boundary edges); close it first, use smaller voxels, or accept distances without an "
+        "inside with --accept-sign",
         certificate.boundaryEdges));
-  if (certificate.ambiguousShare > kAmbiguousLimit && !options.signAnyway)
+  if (certificate.ambiguousShare > kAmbiguousLimit && !options.acceptSign)
     throw InvalidInput(fmt::format(
         "level-set: inside and outside are a guess at {:.2g} % of the voxels next to the "
         "surface ({} boundary edges, {} non-manifold); close the holes, or accept the guess "
-        "with --sign-anyway",
+        "with --accept-sign",
         100 * certificate.ambiguousShare, certificate.boundaryEdges, certificate.nonManifoldEdges));
 }
 
@@ -134,17 +134,17 @@ std::string describe(const SignCertificate& c) {
       c.closed ? "closed" : "not closed", c.boundaryEdges, c.nonManifoldEdges,
       c.selfIntersections < 0 ? std::string("not searched for")
                               : fmt::format("{}", c.selfIntersections),
-      c.droppedTriangles, c.flipped ? "turned inside out, " : "",
+      c.droppedTriangles, c.flipped ? "orientation reversed, " : "",
       c.ambiguousShare < 1 ? fmt::format("ambiguous at {:.2g} % of the voxels next to the surface",
                                          100 * c.ambiguousShare)
-                           : std::string("no voxel of whose side it is sure"));
+                           : std::string("ambiguous at every voxel next to the surface"));
 }
 
 MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
                             const MeshToBandOptions& options) {
   constexpr const char* kAction = "level-set";
   convert::checkMeshInput(mesh, voxelSize, options);
-  const Progress progress = rising(options.progress);
+  const Progress progress = monotonic(options.progress);
   const std::size_t maxMemory = memoryLimit(options.maxMemory);
   report(progress, 0, kAction);
 
@@ -191,14 +191,14 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
     }
     if (reached.isEmpty())
       throw InvalidInput(
-          "level-set: the region that is asked for lies beyond the mesh; ask for one that meets "
+          "level-set: the requested region does not meet the mesh; choose a region that meets "
           "it");
     region = blocksOf(reached, *uniformTransform(voxelSize));
   }
   const auto grid = convert::assembleBand(local, field, origin, voxelSize, halfWidth, region,
                                           maxMemory, subProgress(progress, 0.6, 1));
   certificate.ambiguousShare = convert::ambiguousShare(*grid, field, origin);
-  if (options.certified) options.certified(certificate);
+  if (options.onCertificate) options.onCertificate(certificate);
   checkResult(*grid, certificate, options);
   report(progress, 1, kAction);
   return {makeBand(grid), certificate};

@@ -43,14 +43,14 @@ void checkElements(const TriMesh& mesh, const char* action) {
   for (std::size_t v = 0; v < mesh.positions.size(); ++v)
     if (!isFinite(mesh.positions[v]))
       throw InvalidInput(
-          fmt::format("{}: vertex {} is at {}, which is not a place; repair the mesh", action, v,
-                      text(mesh.positions[v])));
+          fmt::format("{}: vertex {} has the coordinates {}, which are not finite; repair the mesh",
+                      action, v, text(mesh.positions[v])));
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     for (const std::uint32_t v : mesh.triangles[t])
       if (v >= mesh.positions.size())
-        throw InvalidInput(
-            fmt::format("{}: triangle {} names vertex {}, but there are only {}; repair the mesh",
-                        action, t, v, mesh.positions.size()));
+        throw InvalidInput(fmt::format(
+            "{}: triangle {} refers to vertex {}, but there are only {} vertices; repair the mesh",
+            action, t, v, mesh.positions.size()));
 }
 
 std::uint32_t outermostVertex(const TriMesh& mesh) {
@@ -61,8 +61,8 @@ std::uint32_t outermostVertex(const TriMesh& mesh) {
   return result;
 }
 
-/// Of the surface in the box, world units²: of triangles that reach out of it as much as of their
-/// own boxes, along the axis on which that is least.
+/// Area of the surface within the box, world units². A triangle that extends beyond the box counts
+/// by the share of its own bounding box, along the axis with the smallest share.
 double areaWithin(const Imath::Box3d& box, const TriMesh& mesh) {
   if (isEverywhere(box)) return surfaceArea(mesh);
   double area = 0;
@@ -81,7 +81,8 @@ double areaWithin(const Imath::Box3d& box, const TriMesh& mesh) {
   return area;
 }
 
-/// Bytes: some 12 per voxel of the band, and per triangle our copy, its box and its lists.
+/// Estimate in bytes: about 12 per voxel of the band; per triangle, the local copy, its box and its
+/// index lists.
 double estimateMemory(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
   const double halfWidth = std::min(options.halfWidth, options.roi.halfWidth);
   Imath::Box3d box = options.roi.region;
@@ -96,17 +97,17 @@ void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermo
   const bool isFloat = mesh.precision == CoordinatePrecision::Float;
   const double here = spacingAt(largest(mesh.positions[outermost]), mesh.precision);
   if (mesh.spacing > voxelSize / 8 && mesh.spacing > here)
-    throw InvalidInput(
-        fmt::format("{}: before the mesh was moved its coordinates were {:.3g} apart "
-                    "(measured where it is now), coarser than an eighth of the voxel size {:.6g}; "
-                    "move the object to the origin before it is written, or use larger voxels",
-                    action, mesh.spacing, voxelSize));
+    throw InvalidInput(fmt::format(
+        "{}: before the mesh was moved, its coordinates were {:.3g} apart "
+        "(measured at its present position), coarser than an eighth of the voxel size {:.6g}; "
+        "move the object to the origin before writing it, or use larger voxels",
+        action, mesh.spacing, voxelSize));
   const double spacing = here;
   if (spacing > voxelSize / 8)
     throw InvalidInput(
         fmt::format("{}: {} coordinates at vertex {}, {}, are {:.3g} apart, coarser than an "
                     "eighth of the "
-                    "voxel size {:.6g}; move the object to the origin before it is written, or use "
+                    "voxel size {:.6g}; move the object to the origin before writing it, or use "
                     "larger voxels",
                     action, isFloat ? "single-precision" : "double-precision", outermost,
                     text(mesh.positions[outermost]), spacing, voxelSize));
@@ -122,11 +123,11 @@ void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptio
   checkVoxelSize(voxelSize, std::max({size.x, size.y, size.z}), action);
   const std::uint32_t outermost = outermostVertex(mesh);
   if (largest(mesh.positions[outermost]) / voxelSize + options.halfWidth >= kIndexLimit)
-    throw ResourceLimit(
-        fmt::format("{}: vertex {} at {} is {:.3g} voxels from the origin, beyond an index of 32 "
-                    "bits; use larger voxels, or remove the vertex if it is astray",
-                    action, outermost, text(mesh.positions[outermost]),
-                    largest(mesh.positions[outermost]) / voxelSize));
+    throw ResourceLimit(fmt::format(
+        "{}: vertex {} at {} is {:.3g} voxels from the origin, beyond the range of 32-bit "
+        "indices; use larger voxels, or remove the vertex if it is an outlier",
+        action, outermost, text(mesh.positions[outermost]),
+        largest(mesh.positions[outermost]) / voxelSize));
   requireMemory(estimateMemory(mesh, voxelSize, options), memoryLimit(options.maxMemory), action);
   checkPrecision(mesh, voxelSize, outermost, action);
 }

@@ -7,17 +7,17 @@
 
 namespace levelset::convert {
 
-/// What meshToBand refuses before it starts, in the order: the call, the mesh, the index range, the
+/// Checks the input of meshToBand, in this order: the arguments, the mesh, the index range, the
 /// memory, the precision of the coordinates.
-/// @param action  begins the message
+/// @param action  start of the message
 /// @throws UsageError, InvalidInput, ResourceLimit
 void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options,
                     const char* action = "level-set");
 
-/// The grid point, of coordinates that 8 divides, nearest below the middle of the mesh.
+/// Grid point just below the centre of the mesh. Its coordinates are multiples of 8.
 [[nodiscard]] Imath::V3i localOrigin(const TriMesh& mesh, double voxelSize);
 
-/// The welded faces in voxels about `origin`.
+/// The welded faces, in voxels relative to `origin`.
 [[nodiscard]] LocalMesh toLocal(const TriMesh& mesh, const MeshTopology& topology, double voxelSize,
                                 const Imath::V3i& origin);
 

@@ -58,8 +58,9 @@ Pseudonormals::Pseudonormals(const LocalMesh& mesh)
     borderEdges_ += edge.onBorder;
     if (edge.onBorder) vertices_[sides[i].low].onBorder = vertices_[sides[i].high].onBorder = true;
     const bool isSound = faces == 1 || (faces == 2 && sides[i].rises != sides[i + 1].rises);
-    if (!isSound && !flaw_)
-      flaw_ = UnorientedEdge{mesh.points[sides[i].low], mesh.points[sides[i].high], faces};
+    if (!isSound && !unorientedEdge_)
+      unorientedEdge_ =
+          UnorientedEdge{mesh.points[sides[i].low], mesh.points[sides[i].high], faces};
   }
   for (Direction& vertex : vertices_) vertex.normal = directionOf(vertex.normal);
 }

@@ -28,12 +28,12 @@ using Imath::V3i;
 using SurfaceLeaf = openvdb::FloatTree::LeafNodeType;
 
 constexpr const char* kSurfaceBand = "surface-band";
-// Voxels by which the surface goes on beyond its border: what a tricubic reads at a corner of it,
-// two along each axis.
+// Voxels by which the band extends the surface beyond its border. Tricubic interpolation reads two
+// voxels along each axis, about 3.5 along the diagonal.
 constexpr double kBeyond = 3.5;
 constexpr double kTouching = 1e-6;  // voxels, as in meshToBand
 
-/// A triangle's bounding sphere, for a quick look.
+/// Bounding sphere of a triangle, for quick rejection.
 struct Sphere {
   V3d center;
   double radius;
@@ -50,11 +50,11 @@ std::vector<Sphere> spheresOf(const LocalMesh& mesh) {
   return spheres;
 }
 
-/// What a grid point knows of the surface: voxels.
+/// Relation of a grid point to the surface, in voxels.
 struct SignedPoint {
   double value = 0;
   bool isActive = false;
-  double beyond = 0;  ///< the border
+  double beyond = 0;  ///< distance beyond the border, voxels
 };
 
 class SideOfSurface {
@@ -62,10 +62,10 @@ class SideOfSurface {
   SideOfSurface(const LocalMesh& mesh, const Pseudonormals& normals, double reach)
       : mesh_(mesh), normals_(normals), spheres_(spheresOf(mesh)), reach_(reach) {}
 
-  /// As far as a block has to look, so that what the surface goes on by is seen.
+  /// Search radius of a block, voxels. It covers the extension beyond the border.
   [[nodiscard]] double search() const { return std::sqrt(reach_ * reach_ + kBeyond * kBeyond); }
 
-  /// @param distance  of the point to the nearest triangle
+  /// @param distance  distance of the point to the nearest triangle
   [[nodiscard]] SignedPoint at(const V3d& p, double distance,
                                std::span<const std::uint32_t> candidates) const {
     double best = HUGE_VAL;
@@ -84,14 +84,15 @@ class SideOfSurface {
       foot = at;
     }
     const Pseudonormals::Direction direction = normals_.at(nearest, foot.part);
-    const V3d way = p - foot.point;
-    const double ahead = way.dot(direction.normal);
+    const V3d offset = p - foot.point;
+    const double ahead = offset.dot(direction.normal);
     if (!direction.onBorder) {
       const double length = distance < kTouching ? 0 : distance;
       return {ahead < 0 ? -length : length, length < reach_};
     }
-    // Straight on beyond the border, across which `ahead` goes over from the distance smoothly.
-    const double beyond = (way - direction.normal * ahead).length();
+    // Beyond the border the value is the distance to the plane of the border's normal. It continues
+    // the distance smoothly across the border.
+    const double beyond = (offset - direction.normal * ahead).length();
     const bool isOn = direction.normal != V3d(0) && beyond <= kBeyond && std::abs(ahead) < reach_;
     return {std::abs(ahead) < kTouching ? 0 : ahead, isOn, beyond};
   }
@@ -166,10 +167,10 @@ SurfaceGrids measureBlocks(const LocalMesh& mesh, const SideOfSurface& side, con
   return grids;
 }
 
-/// Is the change of sign from `here` to `next` no surface, but the middle between the front of one
-/// part and the back of another? Distances differ by no more than the step where there is one
-/// surface; closer parts are told by slopes that run against the change on both sides of it.
-/// @param last, after  the points before and behind, where they are active
+/// Returns true when the sign change from `here` to `next` is no surface, but the midpoint between
+/// the front of one part and the back of another. At a real surface, distances differ by at most
+/// the step. Close parts are recognised by slopes on both sides that run against the change.
+/// @param last, after  values of the points before and behind, where active; else null
 bool isContradiction(float here, float next, const float* last, const float* after, float voxel) {
   if ((here < 0) == (next < 0)) return false;
   const float change = next - here;
@@ -177,8 +178,8 @@ bool isContradiction(float here, float next, const float* last, const float* aft
   return last && after && (here - *last) * change < 0 && (*after - next) * change < 0;
 }
 
-/// Takes out what lies beside a contradiction.
-std::size_t cutContradictions(openvdb::FloatGrid& grid) {
+/// Deactivates the voxels beside a contradiction.
+std::size_t removeContradictions(openvdb::FloatGrid& grid) {
   const float voxel = static_cast<float>(grid.voxelSize()[0]), background = grid.background();
   openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid.tree());
   std::vector<std::vector<openvdb::Index>> cuts(leaves.leafCount());
@@ -211,32 +212,32 @@ std::size_t cutContradictions(openvdb::FloatGrid& grid) {
 }
 
 void checkSurface(const Pseudonormals& normals, const V3i& origin, double voxelSize) {
-  if (const auto& flaw = normals.flaw()) {
+  if (const auto& edge = normals.unorientedEdge()) {
     const auto text = [&](const V3d& p) {
       const V3d world = (p + V3d(origin)) * voxelSize;
       return fmt::format("({:.6g}, {:.6g}, {:.6g})", world.x, world.y, world.z);
     };
     throw InvalidInput(
-        flaw->faces > 2
-            ? fmt::format("{}: at the edge from {} to {} {} faces meet, so that it has no two "
-                          "sides; take the surface apart there",
-                          kSurfaceBand, text(flaw->from), text(flaw->to), flaw->faces)
-            : fmt::format("{}: at the edge from {} to {} two faces are turned against each other; "
-                          "turn all to one side (a Moebius strip has only one: cut it)",
-                          kSurfaceBand, text(flaw->from), text(flaw->to)));
+        edge->faces > 2
+            ? fmt::format("{}: at the edge from {} to {}, {} faces meet, so the surface does not "
+                          "have two sides; split the surface there",
+                          kSurfaceBand, text(edge->from), text(edge->to), edge->faces)
+            : fmt::format("{}: at the edge from {} to {}, two faces have opposite orientations; "
+                          "orient all faces alike (a Moebius strip has only one side: cut it)",
+                          kSurfaceBand, text(edge->from), text(edge->to)));
   }
   if (normals.borderEdges() == 0)
     throw InvalidInput(fmt::format(
-        "{}: the mesh has no border; 'level-set' makes a solid of a closed one", kSurfaceBand));
+        "{}: the mesh has no border; 'level-set' converts a closed mesh to a solid", kSurfaceBand));
 }
 
 }  // namespace
 
 SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
                               const SurfaceBandOptions& options) {
-  if (!(options.halfWidth >= kLeastSurfaceHalfWidth) || !std::isfinite(options.halfWidth))
+  if (!(options.halfWidth >= kMinSurfaceHalfWidth) || !std::isfinite(options.halfWidth))
     throw UsageError(fmt::format("{}: the half width is {} voxels; give at least {}", kSurfaceBand,
-                                 options.halfWidth, kLeastSurfaceHalfWidth));
+                                 options.halfWidth, kMinSurfaceHalfWidth));
   convert::checkMeshInput(mesh, voxelSize,
                           {.halfWidth = options.halfWidth, .maxMemory = options.maxMemory},
                           kSurfaceBand);
@@ -254,7 +255,7 @@ SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
       measureBlocks(local, side, origin, voxelSize, options.halfWidth,
                     memoryLimit(options.maxMemory), subProgress(options.progress, 0.1, 1));
   SurfaceBandResult result;
-  result.cutVoxels = cutContradictions(*grids.grid);
+  result.removedVoxels = removeContradictions(*grids.grid);
   result.band = makeOpenBand(grids.grid, grids.beyond);
   result.borderEdges = normals.borderEdges();
   result.droppedTriangles = topology.dropped;

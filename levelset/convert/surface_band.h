@@ -6,14 +6,14 @@
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 
-/// A band about a surface that has a border: a base for patches, not a solid.
+/// Band of a surface that has a border: a base for patches, not a solid.
 namespace levelset {
 
-/// Voxels: a tricubic at the surface reads as far as 3.5.
-inline constexpr double kLeastSurfaceHalfWidth = 4;
+/// Minimum half width, voxels: tricubic interpolation at the surface reads up to 3.5 voxels away.
+inline constexpr double kMinSurfaceHalfWidth = 4;
 
 struct SurfaceBandOptions {
-  double halfWidth = 5;  ///< voxels, at least kLeastSurfaceHalfWidth
+  double halfWidth = 5;  ///< voxels, at least kMinSurfaceHalfWidth
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
@@ -21,23 +21,27 @@ struct SurfaceBandOptions {
 struct SurfaceBandResult {
   NarrowBand band;  ///< isOpenSurface()
   std::size_t borderEdges = 0;
-  std::size_t droppedTriangles = 0;  ///< without area, or repeated exactly
-  std::size_t cutVoxels = 0;  ///< between two parts of the surface, where their sides contradict
+  std::size_t droppedTriangles = 0;  ///< triangles without area and exact duplicates
+  /// Voxels removed where the front of one part of the surface meets the back of another.
+  std::size_t removedVoxels = 0;
 };
 
-/// Distances to an open mesh whose triangles face one way, positive on the side that they face: the
-/// sign is that of the closest face, and about edges and vertices of their pseudonormals, weighted
-/// by angle [Baerentzen05]. Beyond the border the surface goes on straight for 3.5 voxels, so
-/// that interpolation is sound up to the border however the surface lies; there the band is cut
-/// off, and beyond it nothing is active. How far beyond the border a place lies is kept
-/// (BandSampler::beyondBorder), for what goes on so from both sides of a slit meets. So it is where
-/// the front of one part meets the back of another, at half their distance.
-/// @param mesh       vertices at equal positions count as one
-/// @param voxelSize  world units, positive and finite; grid points sit at its integer multiples
-/// @throws UsageError for a voxel size or half width out of range; InvalidInput for a mesh that
-///         meshToBand would not take, one without a border, edges with three faces, and edges where
-///         two faces are turned against each other (a Möbius strip has some however it is turned);
-///         ResourceLimit; Cancelled
+/// Computes distances to an open, consistently oriented mesh, positive on the side that the
+/// triangles face. The sign is that of the closest face; at edges and vertices, that of the
+/// angle-weighted pseudonormal [Baerentzen05].
+///
+/// Beyond the border the band extends the surface straight for 3.5 voxels. Interpolation is thus
+/// valid up to the border in any orientation. The band ends there and nothing is active further
+/// out. The extensions of both sides of a slit overlap, so the band stores the distance of each
+/// point beyond the border (BandSampler::beyondBorder). The band also ends halfway between two
+/// parts where the front of one faces the back of the other.
+/// @param mesh  vertices at equal positions count as one
+/// @param voxelSize  world units, positive and finite; grid points lie at its integer multiples
+/// @throws UsageError for a voxel size or half width out of range
+/// @throws InvalidInput for a mesh that meshToBand refuses or a mesh without a border. Also throws
+///         for an edge with three faces or with two faces of opposite orientations. Any Möbius
+///         strip has such an edge.
+/// @throws ResourceLimit, Cancelled
 [[nodiscard]] SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
                                             const SurfaceBandOptions& options = {});
 

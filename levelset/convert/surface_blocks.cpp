@@ -15,17 +15,17 @@ using Imath::V3d;
 using Imath::V3i;
 using List = std::vector<std::uint32_t>;
 
-constexpr std::size_t kTaskSize = 2048;  // triangles; smaller cells stay with their task
-constexpr std::size_t kShare = std::size_t{1} << 50;  // of progress, for the whole
+constexpr std::size_t kTaskSize = 2048;  // triangles; smaller cells stay within their task
+constexpr std::size_t kShare = std::size_t{1} << 50;  // progress units of the complete search
 
 struct Cell {
-  std::int64_t x, y, z, size;  // lowest grid point, edge
+  std::int64_t x, y, z, size;  // lowest grid point; edge length
 };
 
-class BlockWalk {
+class BlockTraversal {
  public:
-  BlockWalk(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
-            const Progress& progress, const std::optional<Imath::Box3i>& region)
+  BlockTraversal(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
+                 const Progress& progress, const std::optional<Imath::Box3i>& region)
       : mesh_(mesh),
         reach_(reach),
         visit_(visit),
@@ -38,13 +38,13 @@ class BlockWalk {
   void run() {
     List all(mesh_.triangles.size());
     for (std::size_t t = 0; t < all.size(); ++t) all[t] = static_cast<std::uint32_t>(t);
-    group_.run_and_wait([&] { walk(rootCell(), all, kShare); });
+    group_.run_and_wait([&] { traverse(rootCell(), all, kShare); });
   }
 
  private:
   struct Box {
-    V3d low, high;  // enlarged by reach
-    double extent;  // of the triangle, its longest side
+    V3d low, high;  // bounding box enlarged by reach
+    double extent;  // longest side of the triangle's bounding box
   };
 
   Box boxOf(std::size_t t) const {
@@ -59,7 +59,7 @@ class BlockWalk {
     return box;
   }
 
-  /// The cell of 8 · 2ⁿ points about the origin that holds everything within reach.
+  /// Cell of 8 · 2ⁿ points, centred at the origin, that contains all points within reach.
   Cell rootCell() const {
     double half = kBlockDim;
     for (const Box& box : boxes_)
@@ -92,7 +92,7 @@ class BlockWalk {
     return true;
   }
 
-  void walk(const Cell& cell, const List& triangles, std::size_t share) {
+  void traverse(const Cell& cell, const List& triangles, std::size_t share) {
     if (!isInRegion(cell)) return gate_.advance(share);
     if (cell.size == kBlockDim) {
       visit_(V3i(static_cast<int>(cell.x), static_cast<int>(cell.y), static_cast<int>(cell.z)),
@@ -118,10 +118,11 @@ class BlockWalk {
                                    static_cast<double>(total));
       if (list.size() >= kTaskSize) {
         gate_.advance(0);
-        group_.run(
-            [this, task = part, own = std::move(list), partShare] { walk(task, own, partShare); });
+        group_.run([this, task = part, own = std::move(list), partShare] {
+          traverse(task, own, partShare);
+        });
       } else {
-        walk(part, list, partShare);
+        traverse(part, list, partShare);
       }
     }
   }
@@ -139,7 +140,7 @@ class BlockWalk {
 
 void forEachBlock(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
                   const Progress& progress, const std::optional<Imath::Box3i>& region) {
-  if (!mesh.triangles.empty()) BlockWalk(mesh, reach, visit, progress, region).run();
+  if (!mesh.triangles.empty()) BlockTraversal(mesh, reach, visit, progress, region).run();
 }
 
 }  // namespace levelset::convert

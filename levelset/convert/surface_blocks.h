@@ -14,15 +14,15 @@
 
 namespace levelset::convert {
 
-/// Called with a block's lowest grid point and the triangles that may come within reach of it, in
-/// ascending order; from many threads at once.
+/// Receives the lowest grid point of a block and the triangles that may lie within reach of it, in
+/// ascending order. Called from several threads at once.
 using BlockVisitor =
     std::function<void(const Imath::V3i& origin, std::span<const std::uint32_t> candidates)>;
 
-/// Visits every 8³ block of grid points that may lie within `reach` voxels of the mesh. Space is
-/// halved from one cell down to the blocks, each cell passing on the triangles that reach its
-/// parts; large triangles are judged by their distance, not by their box.
-/// @param region  if any: the lowest grid point of the first block that is visited, and of the last
+/// Visits all 8³ blocks of grid points that may lie within `reach` voxels of the mesh. Recursively
+/// halves space from one root cell down to the blocks. Each cell passes on the triangles that may
+/// reach its halves. Large triangles are tested by their distance, not by their bounding box.
+/// @param region  if given: the lowest grid points of the first and the last block to visit
 void forEachBlock(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
                   const Progress& progress, const std::optional<Imath::Box3i>& region = {});
 

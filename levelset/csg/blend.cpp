@@ -25,16 +25,16 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-constexpr double kHalfWidth = 4;     // voxels, of the band in which the flow runs
-constexpr double kStepLength = 0.4;  // voxels that the surface may move in a step …
+constexpr double kHalfWidth = 4;     // voxels, half width of the band for the flow
+constexpr double kStepLength = 0.4;  // voxels: largest movement in one step …
 constexpr double kDrift = 1;         // … and between two distance transforms
-// The flow brings a right-angled crease to its radius within this time, voxels² per radius².
+// Time in which the flow rounds a right-angled crease to its radius, as a multiple of radius².
 constexpr double kDuration = 1;
-// It is at rest when it moves slower than this part of the curvature asked for.
+// The flow has converged when its speed is below this fraction of 1 / radius.
 constexpr double kRest = 0.03;
-constexpr double kCoarsest = 1.5;  // voxels: the smallest radius that a grid can show
+constexpr double kCoarsest = 1.5;  // voxels: smallest radius that a grid can represent
 
-/// Lets the flow run until nothing is bent more sharply than the radius.
+/// Runs the flow until no curvature exceeds 1 / radius.
 FloatGrid::Ptr runFlow(FloatGrid::Ptr field, solids::SeamWeights& weights,
                        const solids::SeamFlow& flow, double halfWidth,
                        const BlendOptions& options) {
@@ -61,7 +61,7 @@ FloatGrid::Ptr runFlow(FloatGrid::Ptr field, solids::SeamWeights& weights,
   return eikonal::distanceTransform(*field, request);
 }
 
-/// Puts the flowed field into the solid where it has a weight, and nowhere else.
+/// Copies the field of the flow into the solid where the weight is not zero.
 void putBack(const FloatGrid& part, solids::SeamWeights& weights, FloatGrid& solid) {
   FloatTree& tree = solid.tree();
   const float background = solid.background();
@@ -97,16 +97,16 @@ void checkRadius(double radius, const BlendOptions& options) {
     throw UsageError(
         fmt::format("blend: the reach is {}; give a length above zero", *options.reach));
   if (options.method != BlendMethod::Fillet)
-    throw UsageError("blend: a reach is for the fillet method; leave it out");
+    throw UsageError("blend: --reach applies only to --method fillet; leave it out");
 }
 
-/// A radius beyond the solids themselves would flow them away.
+/// Checks the radius against the size of the solid: a larger flow would remove the solid.
 void checkAgainstSize(double radius, const NarrowBand& solid) {
   const Imath::Box3d box = solid.zeroSetBounds();
   if (!box.isEmpty() && radius > box.size().length())
     throw InvalidInput(
         fmt::format("blend: the radius {:.4g} is larger than the solids, whose "
-                    "diagonal is {:.4g}; use a smaller one",
+                    "diagonal is {:.4g}; use a smaller radius",
                     radius, box.size().length()));
 }
 
@@ -120,7 +120,7 @@ CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b
   if (a.isEmpty() || b.isEmpty())
     throw InvalidInput("blend: a solid is empty, so there is nothing to blend; give two solids");
 
-  // === The hard edges first
+  // === Plain CSG
   const solids::SeamOperands operands = solids::onOneGrid(a, b, options);
   CsgOptions csg;
   csg.maxMemory = options.maxMemory;
@@ -139,16 +139,17 @@ CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b
   checkAgainstSize(radius, result.band);
   if (radiusVoxels < kCoarsest)
     result.notes.push_back(fmt::format(
-        "blend: a radius of {:.3g} voxels is below what the grid can show; use smaller voxels",
+        "blend: the grid cannot represent a radius of {:.3g} voxels; use smaller voxels",
         radiusVoxels));
   const std::vector<Vec3d> curve =
       solids::seamCurve(vdb(operands.a).tree(), vdb(operands.b).tree());
   if (curve.empty()) {
-    result.notes.emplace_back("blend: the surfaces do not meet, so there is no crease to round");
+    result.notes.emplace_back(
+        "blend: the surfaces do not intersect, so there is no crease to round");
     return result;
   }
 
-  // === Flow beside the curve, on a copy of what lies there
+  // === Flow near the curve, on a copy of the blocks there
   FloatGrid& solid = editVdb(result.band);
   solids::SeamWeights weights(curve, radiusVoxels);
   FloatGrid::Ptr part = solids::cutOut(solid, eikonal::PointTree(curve), radiusVoxels);

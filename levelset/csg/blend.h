@@ -15,42 +15,44 @@ enum class BlendSide {
 };
 
 enum class BlendMethod {
-  Curvature,  ///< flow along the seam
-  Fillet      ///< a ball rolled along it
+  Curvature,  ///< curvature flow near the seam
+  Fillet      ///< ball rolled along the seam
 };
 
 struct BlendOptions {
   BlendSide side = BlendSide::Both;
   BlendMethod method = BlendMethod::Curvature;
-  /// Fillet: how far the middle of its arc may be from the seam, world units, > 0; empty: twice the
-  /// radius, which is reached where the surfaces meet at 39°.
+  /// Fillet only: largest distance from the seam to the middle of the arc, world units, > 0. Empty:
+  /// twice the radius, which limits the ball where the surfaces meet at less than 39°.
   std::optional<double> reach = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
-/// CSG and its rounding in one: by curvature flow along the curve in which the two zero sets meet
-/// [Museth02, Brodersen07 §6.3]: φ_t = D(d) (κ − clamp(κ, ±1/radius)) |∇φ| with κ = k1 + k2, where
-/// d is the distance to the curve and D falls smoothly from 1 to 0 at `radius`. Unlike the plain
-/// flow of the sources this one moves only what is bent more sharply than the radius, so it comes
-/// to rest as a fillet: a right-angled crease is filled as by a circle of that radius, within 10 %.
-/// A sharper crease has no room for it and becomes as round as `radius` to both sides allows.
-/// Nothing changes further than `radius` from the curve, so solids that are near but do not meet
-/// stay apart.
+/// Combines two solids and rounds the crease along the curve in which their zero sets intersect.
 ///
-/// Or, with BlendMethod::Fillet, as a ball of that radius leaves it that rolls along the seam and
-/// touches both surfaces: between planes at an angle θ (of the space between them) the arc of that
-/// radius, with nothing changed beyond radius / tan(θ/2) from the seam. Where the arc would be
-/// further from the seam than `reach` the ball is as much smaller, so that surfaces which nearly
-/// touch get no bulge. A union's fillet adds material, the others' removes it.
+/// BlendMethod::Curvature integrates the flow φ_t = D(d) (κ − clamp(κ, ±1/radius)) |∇φ| [Museth02,
+/// Brodersen07 §6.3]. Here κ = k1 + k2, d is the distance to the curve, and D falls smoothly from 1
+/// to 0 at `radius`. Unlike the plain flow of the sources, this flow moves only points with a
+/// curvature above 1/radius, so it converges to a fillet. A right-angled crease becomes a circular
+/// arc of that radius, within 10 %. A sharper crease becomes as round as `radius` on both sides
+/// allows. Nothing changes farther than `radius` from the curve, so solids that are near but do not
+/// intersect stay apart.
+///
+/// BlendMethod::Fillet rolls a ball of that radius along the seam, in contact with both surfaces.
+/// Between planes at an angle θ (of the space between them) the result is an arc of that radius.
+/// Nothing changes beyond radius / tan(θ/2) from the seam. Where the arc would be farther from the
+/// seam than `reach`, the ball is smaller, so surfaces that nearly touch get no bulge. The fillet
+/// of a union adds material; those of the other operations remove it.
 /// @param radius  world units, ≥ 0; 0 is plain CSG
-/// @return        notes tell of resampled operands, of surfaces that do not meet (plain CSG then)
-/// and
-///                of a radius below 1.5 voxels
-/// @throws UsageError if `radius` is negative or not finite; InvalidInput if a solid is empty or
-/// the
-///         radius larger than the solids; ResourceLimit, Cancelled
-/// @note needs O(radius) steps over the grid points around the curve
+/// @return        notes report resampled operands, surfaces that do not intersect (plain CSG), and
+/// a
+///                radius below 1.5 voxels
+/// @throws UsageError if `radius` is negative or not finite
+/// @throws InvalidInput if a solid is empty or the radius is larger than the solids
+/// @throws ResourceLimit if the memory estimate exceeds the limit
+/// @throws Cancelled
+/// @note Curvature needs O(radius) steps over the grid points around the curve.
 [[nodiscard]] CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b,
                               double radius, const BlendOptions& options = {});
 

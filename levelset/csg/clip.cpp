@@ -16,7 +16,8 @@ namespace {
 using Imath::V3d;
 
 InvalidInput nothingLeft() {
-  return InvalidInput("clip: nothing is left, the solid lies outside; check the box or the plane");
+  return InvalidInput(
+      "clip: the result is empty, because the solid lies outside; check the box or the plane");
 }
 
 Imath::Box3d worldBounds(const openvdb::FloatGrid& grid, const openvdb::CoordBBox& box) {
@@ -24,7 +25,7 @@ Imath::Box3d worldBounds(const openvdb::FloatGrid& grid, const openvdb::CoordBBo
   return {toImath(world.min()), toImath(world.max())};
 }
 
-/// Of all grid points in the band or inside. A part of a solid need not have a band all around.
+/// Bounds of all grid points in the band or inside. A cropped solid may have no band on some sides.
 openvdb::CoordBBox solidBounds(const openvdb::FloatGrid& grid) {
   openvdb::CoordBBox bounds = grid.evalActiveVoxelBoundingBox();
   openvdb::CoordBBox tile;
@@ -35,7 +36,8 @@ openvdb::CoordBBox solidBounds(const openvdb::FloatGrid& grid) {
   return bounds;
 }
 
-/// The solid's grid with the distance of a region of space, as far as the solid reaches.
+/// Intersects a solid with a region of space, given as a signed distance function. Samples the
+/// function only within the bounds of the solid.
 template <typename Distance>
 NarrowBand clipBy(const NarrowBand& solid, const Progress& progress, const Distance& distance) {
   report(progress, 0, "clip");
@@ -55,7 +57,7 @@ NarrowBand clipBy(const NarrowBand& solid, const Progress& progress, const Dista
 
 void requireSurface(const NarrowBand& solid) {
   requireSolid(solid, "clip");
-  if (solid.isEmpty()) throw InvalidInput("clip: the solid has no surface");
+  if (solid.isEmpty()) throw InvalidInput("clip: the solid is empty; give a solid with a surface");
 }
 
 }  // namespace
@@ -65,16 +67,16 @@ NarrowBand clip(const NarrowBand& solid, const Imath::Box3d& box, const Progress
   for (int axis = 0; axis < 3; ++axis) {
     if (box.min[axis] < box.max[axis]) continue;  // false for NaN
     throw UsageError(
-        fmt::format("clip: the box reaches from {} to {} along axis {}; its lower corner "
+        fmt::format("clip: the box extends from {} to {} along axis {}; its lower corner "
                     "must be below its upper one",
                     box.min[axis], box.max[axis], "xyz"[axis]));
   }
-  // A box beyond the band leaves nothing, and costs nothing to refuse.
+  // Reject a box outside the band early, before any work.
   const openvdb::FloatGrid& grid = vdb(solid);
   const Imath::Box3d reach = worldBounds(grid, solidBounds(grid));
   for (int axis = 0; axis < 3; ++axis)
     if (box.min[axis] > reach.max[axis] || box.max[axis] < reach.min[axis]) throw nothingLeft();
-  // From each face by itself, so that a value does not depend on where the others are.
+  // Measure each face separately, so that a value does not depend on the positions of other faces.
   return clipBy(solid, progress, [=](const V3d& p) {
     const V3d q(std::max(box.min.x - p.x, p.x - box.max.x),
                 std::max(box.min.y - p.y, p.y - box.max.y),

@@ -8,12 +8,17 @@
 
 namespace levelset {
 
-/// The part of a solid inside an axis-aligned world box, closed by the box's faces.
-/// @throws InvalidInput when nothing is left
+/// Cuts a solid to the inside of an axis-aligned box in world units. The faces of the box close the
+/// cut.
+/// @throws UsageError if the box is empty
+/// @throws InvalidInput if the result is empty
 [[nodiscard]] NarrowBand clip(const NarrowBand& solid, const Imath::Box3d& box,
                               const Progress& progress = {});
 
-/// The part of a solid behind a plane (on the side that its normal points away from), closed by it.
+/// Cuts a solid to one side of a plane, the side that its normal points away from. The plane closes
+/// the cut.
+/// @throws UsageError if the normal or the distance is not finite, or the normal is zero
+/// @throws InvalidInput if the result is empty
 [[nodiscard]] NarrowBand clip(const NarrowBand& solid, const Imath::Plane3d& plane,
                               const Progress& progress = {});
 

@@ -36,7 +36,7 @@ const char* nameOf(CsgOperation operation) {
   return "";
 }
 
-/// Negative zero and zero compare equal but are not the same bits.
+/// Replaces negative zeros by zeros, so that equal results have equal bits.
 void clearSignOfZeros(FloatTree& tree) {
   openvdb::tree::LeafManager<FloatTree> leaves(tree);
   leaves.foreach ([](FloatTree::LeafNodeType& leaf, std::size_t) {
@@ -45,7 +45,7 @@ void clearSignOfZeros(FloatTree& tree) {
   });
 }
 
-/// What is left to be pruned.
+/// Computes the combined field without pruning.
 FloatGrid::Ptr minimumOf(CsgOperation operation, const FloatGrid& a, const FloatGrid& b) {
   FloatGrid::Ptr result = a.deepCopy();
   {
@@ -65,8 +65,8 @@ FloatGrid::Ptr minimumOf(CsgOperation operation, const FloatGrid& a, const Float
 void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options,
                    const char* action) {
   if (solids.size() < 2) {
-    throw UsageError(fmt::format("{}: needs at least two solids, there {}", action,
-                                 solids.empty() ? "are none" : "is one"));
+    throw UsageError(fmt::format("{}: needs at least two solids, but there {}; name more operands",
+                                 action, solids.empty() ? "are none" : "is one"));
   }
   double bytes = 0;
   for (std::size_t i = 0; i < solids.size(); ++i) {
@@ -79,7 +79,7 @@ void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options
   requireMemory(2 * bytes, options.maxMemory, action);
 }
 
-/// All solids on the grid points of the finest, with the smallest half width.
+/// Resamples all solids to the grid of the finest one, with the smallest half width.
 std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgOptions& options,
                                   const char* action, std::vector<std::string>& notes) {
   const auto finest = std::min_element(
@@ -91,10 +91,10 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
   for (std::size_t i = 0; i < solids.size(); ++i) {
     if (shareTransform(vdb(*finest), vdb(solids[i]))) {
       result.push_back(narrowed(solids[i], halfWidth));
-      // More than the last bits.
+      // Half widths that differ only by rounding need no note.
       if (halfWidth < solids[i].halfWidth() * (1 - 1e-5))
-        notes.push_back(fmt::format("{}: operand {} cut to half width {:.6g} voxels", action, i + 1,
-                                    halfWidth));
+        notes.push_back(fmt::format("{}: operand {} was narrowed to a half width of {:.6g} voxels",
+                                    action, i + 1, halfWidth));
       continue;
     }
     result.push_back(resampleTo(solids[i], finest->indexToWorld(),
@@ -104,7 +104,7 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
         "with voxels of {}",
         action, i + 1, solids[i].voxelSize(), finest - solids.begin() + 1, finest->voxelSize()));
   }
-  // Of voxel sizes that differ in the last bits, the same half width ends in different places.
+  // Voxel sizes may differ in the last bits, and then equal half widths give different backgrounds.
   float background = vdb(result.front()).background();
   for (const NarrowBand& solid : result) background = std::min(background, vdb(solid).background());
   for (NarrowBand& solid : result)
@@ -114,11 +114,11 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
 
 using Leaf = FloatTree::LeafNodeType;
 
-/// Gives grid points back what they had before a re-distancing where that was right, and the band
-/// its end where faces lie on grid points.
-/// @param old  the leaf before, null where there was none
+/// Restores the values of before a re-distancing where they were correct. Also restores the end of
+/// the band where faces lie on grid points.
+/// @param old  leaf before the re-distancing; null: there was none
 void keepGoodValues(Leaf& leaf, const Leaf* old, float background, double voxelSize) {
-  constexpr double kSame = 0.05;  // voxels: what re-distancing may be off along ridges
+  constexpr double kSame = 0.05;  // voxels: error of re-distancing along ridges
   const auto same = static_cast<float>(kSame * voxelSize);
   for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
     if (!leaf.isValueOn(n)) continue;
@@ -131,7 +131,7 @@ void keepGoodValues(Leaf& leaf, const Leaf* old, float background, double voxelS
   }
 }
 
-/// Blocks within `reach` blocks of others, along each axis by itself.
+/// Dilates a set of blocks by `reach` blocks along each axis.
 std::set<openvdb::Coord> blocksAbout(const std::vector<openvdb::Coord>& blocks, int reach) {
   std::set<openvdb::Coord> all(blocks.begin(), blocks.end());
   for (int axis = 0; axis < 3; ++axis) {
@@ -144,8 +144,8 @@ std::set<openvdb::Coord> blocksAbout(const std::vector<openvdb::Coord>& blocks, 
   return all;
 }
 
-/// Makes distances again where faces that bound nothing were the nearest: about these only, so that
-/// what a solid is elsewhere changes nothing here, and costs nothing.
+/// Re-distances the field near coincident faces that bound no solid. Works only near these faces,
+/// so the cost and the result do not depend on the rest of the solid.
 void redistanceAbout(const std::vector<openvdb::Coord>& faces, FloatGrid& grid,
                      const char* action) {
   const double voxelSize = grid.voxelSize()[0];
@@ -200,7 +200,7 @@ FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const F
   const FloatGrid::Ptr result = minimumOf(operation, a, b);
   correctSeam(*result, a, b, signs);
   pruneOneSided(result->tree());
-  // Where they end at an edge of the result no plane tells how far it is.
+  // Where such a face ends at an edge of the result, the plane model of correctSeam() is wrong.
   const std::vector<openvdb::Coord> faces = coincidentFaces(first, second, signs);
   if (!faces.empty() && eikonal::hasZeroCrossing(result->tree()))
     redistanceAbout(faces, *result, nameOf(operation));
@@ -209,7 +209,8 @@ FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const F
 
 namespace {
 
-/// Neighbours first, then what they make: with many small solids nothing large is copied for each.
+/// Unites neighbours pairwise, then their results. With many small solids, no large band is copied
+/// for each of them.
 NarrowBand uniteAll(std::vector<NarrowBand> solids, const CsgOptions& options) {
   const auto pairs = static_cast<double>(solids.size() - 1);
   double done = 0;
@@ -247,15 +248,15 @@ CsgResult combine(CsgOperation operation, std::span<const NarrowBand> solids,
            action);
     FloatGrid::Ptr merged = mergePair(operation, vdb(result.band), vdb(operands[i]));
     if (!hasInside(*merged)) {
-      throw InvalidInput(
-          operation == CsgOperation::Intersection
-              ? fmt::format(
-                    "{}: nothing is left, operand {} does not overlap what is common to those "
-                    "before it; check where they are",
-                    action, i + 1)
-              : fmt::format("{}: nothing is left after operand {} is taken away; check which is "
-                            "subtracted from which",
-                            action, i + 1));
+      throw InvalidInput(operation == CsgOperation::Intersection
+                             ? fmt::format("{}: the result is empty, because operand {} does not "
+                                           "overlap the intersection of the "
+                                           "operands before it; check their positions",
+                                           action, i + 1)
+                             : fmt::format("{}: the result is empty after operand {} is "
+                                           "subtracted; check the order of the "
+                                           "operands",
+                                           action, i + 1));
     }
     result.band = makeBand(std::move(merged));
   }

@@ -16,15 +16,15 @@ using openvdb::FloatGrid;
 using openvdb::Vec3d;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-/// Gap that counts as closed, voxels: what rounding leaves between faces made to touch.
+/// Largest gap that counts as closed, voxels. Rounding leaves such gaps between touching faces.
 constexpr double kGap = 1e-3;
 
 struct Contact {
   Coord at;
-  double depth;  ///< voxels, negative: the least deep of the neighbours inside
+  double depth;  ///< smallest depth of the inside neighbours, voxels, negative
 };
 
-/// Both operands with their signs, in voxels.
+/// Reads both operands with their signs, in voxels.
 struct SignedPair {
   FloatGrid::ConstAccessor a, b;
   double first, second;
@@ -42,7 +42,7 @@ struct SignedPair {
     return second * static_cast<double>(b.getValue(c));
   }
   [[nodiscard]] double least(const Coord& c) const { return std::min(u(c), v(c)); }
-  /// On both surfaces, inside of neither.
+  /// Decides if a grid point is on both surfaces and inside neither solid.
   [[nodiscard]] bool isOnBoth(const Coord& c) const {
     return least(c) >= 0 && std::max(u(c), v(c)) <= kGap;
   }
@@ -53,13 +53,14 @@ Coord stepped(Coord c, int axis, int step) {
   return c;
 }
 
-/// A grid point between two faces that touch: opposite slopes, the inside of both on either hand,
-/// and more of the face along each other axis (two spheres that touch in a point stay two).
+/// Decides if a grid point is between two touching faces. The gradients are opposite there, and
+/// along one axis both neighbours are inside. Along every other axis the face continues, so two
+/// spheres that touch in a point stay separate.
 bool isContact(const SignedPair& pair, const Coord& c, double& depth) {
   if (!pair.isOnBoth(c)) return false;
   Vec3d slopeU, slopeV;
   depth = -std::numeric_limits<double>::max();
-  int through = 0;  // axes with the inside on both hands
+  int through = 0;  // number of axes with both neighbours inside
   for (int axis = 0; axis < 3; ++axis) {
     const Coord up = stepped(c, axis, 1), down = stepped(c, axis, -1);
     slopeU[axis] = pair.u(up) - pair.u(down);
@@ -105,24 +106,25 @@ FloatGrid::Ptr withContacts(const FloatGrid& grid, const std::vector<Contact>& c
   return result;
 }
 
-/// Beside a face of both, whose slopes are opposite, and which goes on: round solids that touch are
-/// opposite in the point, and along the line through it, only.
+/// Decides if a grid point is next to a common face with opposite gradients that continues around
+/// the point. Round solids that touch have opposite gradients only along the line through the
+/// contact.
 bool isBesideBoth(const SignedPair& pair, const Coord& c) {
   const auto isOpposite = [&](const Coord& at) {
     return std::abs(pair.u(at) + pair.v(at)) <= kGap;
   };
   if (!isOpposite(c)) return false;
-  int goesOn = 0;
+  int continued = 0;
   for (int axis = 0; axis < 3; ++axis)
-    for (const int step : {-2, 2}) goesOn += isOpposite(stepped(c, axis, step)) ? 1 : 0;
-  if (goesOn < 3) return false;
+    for (const int step : {-2, 2}) continued += isOpposite(stepped(c, axis, step)) ? 1 : 0;
+  if (continued < 3) return false;
   Vec3d slopeU, slopeV;
   for (int axis = 0; axis < 3; ++axis) {
     const Coord up = stepped(c, axis, 1), down = stepped(c, axis, -1);
     slopeU[axis] = pair.u(up) - pair.u(down);
     slopeV[axis] = pair.v(up) - pair.v(down);
   }
-  // Twice a unit slope; less at edges.
+  // The central difference spans two voxels: twice a unit gradient, less at edges.
   return slopeU.length() > 1.8 && slopeV.length() > 1.8 &&
          slopeU.dot(slopeV) < -0.999 * slopeU.length() * slopeV.length();
 }

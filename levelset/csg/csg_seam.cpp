@@ -17,18 +17,18 @@ using openvdb::FloatGrid;
 using openvdb::Vec3d;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-/// How far a foot point may miss the surface, voxels, before its voxel counts as doubtful. Doubtful
-/// voxels are only measured again: too small a figure costs time, not accuracy.
+/// Largest error of a foot point, voxels, before its voxel counts as doubtful. Doubtful voxels are
+/// measured again, so a smaller figure costs time, not accuracy.
 constexpr double kFootMiss = 0.02;
-/// Half the edge of a cell, with an overlap: planes stand off a curved surface by a quarter of its
-/// curvature, and where they meet neighbouring patches must leave no gap.
+/// Half the edge of a cell, with an overlap. The planes deviate from a curved surface by a quarter
+/// of its curvature, and neighbouring patches must leave no gap where they meet.
 constexpr double kPatchReach = 0.5 + 0.05;
 constexpr double kLineReach = 0.5 + 0.1;
-/// A cell whose values stand further off their plane, voxels, holds an edge. A sphere of five
-/// voxels stays below.
+/// Largest deviation of the corner values from their plane, voxels. A cell with a larger one
+/// contains an edge. A sphere with a radius of five voxels stays below.
 constexpr double kBend = 0.05;
 
-/// One operand with its sign, in voxels.
+/// Reads one operand with its sign, in voxels.
 struct SignedField {
   FloatGrid::ConstAccessor accessor;
   double perVoxel;  ///< sign / voxel size
@@ -43,7 +43,8 @@ struct SignedField {
   double operator()(const Vec3d& index) const {
     return perVoxel * SampleBlock<2>(accessor, index).value();
   }
-  /// From a point inside towards the surface: along each axis the neighbour nearer to it counts.
+  /// Direction from an inside point to the surface. Along each axis, uses the neighbour that is
+  /// closer to the surface.
   Vec3d towardsSurface(const Coord& c) const {
     const double here = (*this)(c);
     Vec3d direction(0, 0, 0);
@@ -58,9 +59,9 @@ struct SignedField {
   }
 };
 
-/// The plane n·y + d = 0 that a surface has in a cell, y from the cell's centre.
+/// Plane n·y + d = 0 that fits a surface in a cell, with y relative to the cell's centre.
 struct Patch {
-  bool isThere = false;
+  bool isValid = false;
   Vec3d n;
   double d = 0;
 
@@ -71,13 +72,13 @@ struct Patch {
 struct SurfaceCell {
   Vec3d center;
   Patch first, second;
-  bool isSeam = false;  ///< both surfaces pass: each counts where the other is not inside
+  bool isSeam = false;  ///< both surfaces cross the cell; each counts outside the other solid
 };
 
 struct CellCorners {
   std::array<double, 8> values;
 
-  /// Of both solids together.
+  /// Corner values of the minimum of both solids.
   CellCorners(const CellCorners& first, const CellCorners& second) {
     for (std::size_t i = 0; i < 8; ++i) values[i] = std::min(first.values[i], second.values[i]);
   }
@@ -86,7 +87,7 @@ struct CellCorners {
     for (int i = 0; i < 8; ++i)
       values[static_cast<std::size_t>(i)] = field(c.offsetBy((i >> 2) & 1, (i >> 1) & 1, i & 1));
   }
-  /// Of the solids together: the result has no crossing in the cell.
+  /// Decides if each corner is inside one of the solids, so that the result has no surface here.
   bool allInsideWith(const CellCorners& other) const {
     for (std::size_t i = 0; i < 8; ++i)
       if (!(values[i] < 0) && !(other.values[i] < 0)) return false;
@@ -95,10 +96,10 @@ struct CellCorners {
   bool allOutside() const {
     return std::none_of(values.begin(), values.end(), [](double v) { return v < 0; });
   }
-  /// How far the values stand off their plane: an edge of the solid itself runs through the cell.
+  /// Decides if the values deviate from their plane, because an edge of the solid crosses the cell.
   bool isBent() const {
     const Patch plane = patch();
-    if (!plane.isThere) return true;
+    if (!plane.isValid) return true;
     const double slope = slopeLength();
     for (int i = 0; i < 8; ++i) {
       const Vec3d corner((i & 4) ? 0.5 : -0.5, (i & 2) ? 0.5 : -0.5, (i & 1) ? 0.5 : -0.5);
@@ -132,24 +133,24 @@ Vec3d clamped(const Vec3d& y, double reach) {
           std::clamp(y[2], -reach, reach)};
 }
 
-/// Distance from r to the part of a patch in the cell where `other` is not inside.
+/// Distance from r to the part of a patch in the cell that is outside the other solid.
 double patchDistance(const Patch& patch, const Patch& other, bool isSeam, const Vec3d& r,
                      double best) {
-  if (!patch.isThere || std::abs(patch.above(r)) >= best) return best;
+  if (!patch.isValid || std::abs(patch.above(r)) >= best) return best;
   Vec3d y = r;
   for (int i = 0; i < 3; ++i) y = clamped(y - patch.above(y) * patch.n, kPatchReach);
   y -= patch.above(y) * patch.n;
-  if (isSeam && other.isThere && other.above(y) < 0) return best;
+  if (isSeam && other.isValid && other.above(y) < 0) return best;
   return std::min(best, (r - y).length());
 }
 
-/// Distance from r to the line in which both patches meet, as far as it runs in the cell.
+/// Distance from r to the intersection line of both patches, within the cell.
 double lineDistance(const SurfaceCell& cell, const Vec3d& r, double best) {
   const Patch &p = cell.first, &q = cell.second;
-  if (!p.isThere || !q.isThere) return best;
+  if (!p.isValid || !q.isValid) return best;
   const Vec3d along = p.n.cross(q.n);
   const double squaredSine = along.lengthSqr();
-  if (squaredSine < 1e-4) return best;  // as good as parallel
+  if (squaredSine < 1e-4) return best;  // nearly parallel
   const double cosine = p.n.dot(q.n);
   const Vec3d origin =
       ((cosine * q.d - p.d) / squaredSine) * p.n + ((cosine * p.d - q.d) / squaredSine) * q.n;
@@ -219,8 +220,8 @@ class SeamCorrector {
     const SignedField& winner = atU < atV ? u : v;
     const SignedField& loser = atU < atV ? v : u;
     const double depth = -std::min(atU, atV);
-    // Everything within `depth` is inside the winner; further off than that, the loser's surface
-    // and inside are out of reach.
+    // All points within `depth` are inside the winner. A loser farther away than `depth` cannot
+    // change the distance.
     if (std::max(atU, atV) > depth + kFootMiss) return false;
     if (isBesideSurface(u, v, c)) return false;
     const Vec3d direction = winner.towardsSurface(c);
@@ -230,7 +231,8 @@ class SeamCorrector {
     return std::abs(winner(foot)) > kFootMiss || loser(foot) < kFootMiss;
   }
 
-  /// Equal values are those of one solid, or of two on the plane midway between them.
+  /// Decides if both operands have the same surface here. Equal values at one point alone also
+  /// occur midway between two surfaces.
   static bool isOneSurface(const SignedField& u, const SignedField& v, const Coord& c) {
     for (int axis = 0; axis < 3; ++axis)
       for (const int step : {-1, 1}) {
@@ -241,8 +243,8 @@ class SeamCorrector {
     return true;
   }
 
-  /// Shares a face of a cell with a grid point outside: its value has a say in where the surface
-  /// is.
+  /// Decides if a grid point shares a cell face with an outside grid point. Its value then affects
+  /// the position of the surface.
   static bool isBesideSurface(const SignedField& u, const SignedField& v, const Coord& c) {
     for (int x = -1; x <= 1; ++x)
       for (int y = -1; y <= 1; ++y)
@@ -254,7 +256,7 @@ class SeamCorrector {
     return false;
   }
 
-  /// The surface cells of all leaves within reach of a doubtful voxel.
+  /// Collects the surface cells of all leaves near doubtful voxels.
   void collectCells() {
     const int leaves = static_cast<int>(std::ceil((reach_ + 2) / 8)) * 8;
     for (const DoubtfulLeaf& leaf : doubtful_)
@@ -284,7 +286,7 @@ class SeamCorrector {
     cell.center = c.asVec3d() + Vec3d(0.5);
     cell.isSeam = crossesFirst && crossesSecond;
     if (cell.isSeam && (first.isBent() || second.isBent())) {
-      // More than two faces meet: one plane through them all.
+      // More than two faces meet here: fit one plane to the minimum.
       cell.isSeam = false;
       cell.first = CellCorners(first, second).patch();
     } else {
@@ -310,7 +312,8 @@ class SeamCorrector {
     }
   }
 
-  /// Voxels; no more than a little beyond the band.
+  /// Distance to the surface cells, voxels. Returns slightly more than the half width if they are
+  /// farther away.
   double surfaceDistance(const Coord& c) const {
     const int steps = static_cast<int>(std::ceil((reach_ + 2) / 8));
     const Coord home = c & ~7;
@@ -338,7 +341,7 @@ class SeamCorrector {
   CsgSigns signs_;
   double reach_;  ///< half width of the band, voxels
   std::vector<DoubtfulLeaf> doubtful_;
-  std::map<Coord, std::vector<SurfaceCell>> cells_;  ///< by leaf origin
+  std::map<Coord, std::vector<SurfaceCell>> cells_;  ///< surface cells by leaf origin
 };
 
 }  // namespace

@@ -1,6 +1,6 @@
 #pragma once
 
-// Steps of constructive solid geometry on grids, for our own .cpp files.
+// Steps of constructive solid geometry on grids. Includes OpenVDB: for .cpp files only.
 
 #include <optional>
 #include <vector>
@@ -11,20 +11,20 @@
 
 namespace levelset {
 
-/// Every operation is result × min(first × a, second × b) for signs of ± 1, so that what holds of a
-/// union's inside holds of an intersection's outside.
+/// Signs that reduce every operation to a minimum: result × min(first × a, second × b), each ±1. A
+/// rule for the inside of a union then applies to the outside of an intersection.
 struct CsgSigns {
   float first, second, result;
 };
 [[nodiscard]] CsgSigns csgSigns(CsgOperation operation);
 
-/// a op b of two grids with one transform and background, re-distanced where min and max are none.
-/// The result may have no inside.
+/// Combines two grids with equal transforms and backgrounds. Corrects the distances where the
+/// minimum or maximum is not a distance. The result may have no inside.
 [[nodiscard]] openvdb::FloatGrid::Ptr mergePair(CsgOperation operation, const openvdb::FloatGrid& a,
                                                 const openvdb::FloatGrid& b);
 
-/// a op b by minimum and maximum alone, whatever they are off the surface. Signs are those of the
-/// operands also where a band is cut: openvdb's own floods them from where a node begins.
+/// Combines two grids by minimum or maximum only, without correction. Takes signs from the operands
+/// even where a band is cropped, unlike OpenVDB's own operation, which floods them within a node.
 [[nodiscard]] openvdb::FloatGrid::Ptr mergePlain(CsgOperation operation,
                                                  const openvdb::FloatGrid& a,
                                                  const openvdb::FloatGrid& b);
@@ -32,25 +32,26 @@ struct CsgSigns {
 struct ClosedPair {
   openvdb::FloatGrid::Ptr a, b;
 };
-/// Where two faces touch on grid points, both distances are zero there and their minimum would
-/// leave a crack without width. Gives both operands the depth of their neighbours at such points;
-/// empty when there are none.
+/// Closes cracks between faces that touch on grid points. Both distances are zero there, so their
+/// minimum would leave a crack of zero width. Gives both operands the depth of their neighbours at
+/// these points.
+/// @return empty if there are no such points
 [[nodiscard]] std::optional<ClosedPair> closeContacts(const openvdb::FloatGrid& a,
                                                       const openvdb::FloatGrid& b,
                                                       const CsgSigns& signs);
 
-/// The leaf blocks where the surfaces run through each other face to face, the inside of one where
-/// the outside of the other is. Their minimum is then zero, or nearly, along faces that bound
-/// nothing, and all distances about them are to these.
+/// Finds the leaf blocks in which the surfaces coincide with opposite orientation. The minimum is
+/// then zero, or nearly zero, along faces that bound no solid, and nearby distances refer to these
+/// faces.
 [[nodiscard]] std::vector<openvdb::Coord> coincidentFaces(const openvdb::FloatGrid& a,
                                                           const openvdb::FloatGrid& b,
                                                           const CsgSigns& signs);
 
-/// Corrects the minimum of two distances where it is a bound only. Inside a union, a point whose
-/// nearest point on one solid lies within the other is further from the surface than either
-/// distance says: it takes the distance to the planes that both surfaces have in the cells about
-/// it, and to the line where these meet. Voxels beside the zero set keep their values, so that it
-/// stays.
+/// Corrects the minimum of two distances where it is only a bound. Inside a union, the nearest
+/// point on one solid may lie inside the other; the surface is then farther away than either
+/// distance. The correction measures the distance to the planes that fit both surfaces in nearby
+/// cells, and to their intersection lines. Voxels next to the zero set keep their values, so the
+/// surface stays.
 /// @param result  result × min(first × a, second × b), same transform and background as both
 void correctSeam(openvdb::FloatGrid& result, const openvdb::FloatGrid& a,
                  const openvdb::FloatGrid& b, const CsgSigns& signs);

@@ -24,46 +24,47 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-constexpr double kLeastRadius = 0.5;  // voxels: a smaller ball leaves no trace on the grid
-// Surfaces whose normals are nearer than that to each other meet in no edge.
+constexpr double kLeastRadius = 0.5;  // voxels: the grid cannot represent a smaller ball
+// Cosine of the smallest angle between the normals at an edge; closer normals form no edge.
 constexpr double kSameCosine = 0.9995;
 constexpr int kSpineSteps = 16;
 constexpr double kSpineTolerance = 1e-3;  // voxels
 constexpr double kLongestSpineStep = 4;   // voxels
-// What is left of the way along the spine shrinks at least by this share of a step, where it has
-// one nearest point.
+// Smallest ratio between the decrease of the remaining distance along the spine and the step taken,
+// where the spine has a unique nearest point.
 constexpr double kLeastShrinkage = 0.05;
-constexpr double kStencil = 4;  // voxels beyond a point that its jet reads
-// How far from the seam the planes that the ball touches may meet, by the ball's radius and in
-// voxels: further off, the surfaces face each other without having met there.
+constexpr double kStencil = 4;  // voxels around a point that its jet reads
+// Largest distance from the seam to the edge of the two tangent planes at the contacts, in ball
+// radii plus voxels. Beyond it, the surfaces face each other without meeting there.
 constexpr double kSeamShare = 0.75, kSeamSlack = 2;
 
-/// The ball at one place.
+/// A position of the ball.
 struct Ball {
-  Vec3d centre, normalA, normalB;  ///< normals of the distances there
+  Vec3d centre, normalA, normalB;  ///< normals: gradients of both distances at the centre
   double cosine = 0, radius = 0;
 };
 
 /// Lengths in voxels.
 struct FilletSize {
   double radius, reach;
-  double bound = HUGE_VAL;  ///< nothing that the ball touches is further from the seam
+  double bound = HUGE_VAL;  ///< upper bound of the distance from the seam to a contact point
 
-  /// Of the ball that fits where the normals have that cosine: the middle of its arc is
-  /// r (1 / sin(θ/2) − 1) from the seam.
+  /// Radius of the ball that fits between surfaces whose normals have this cosine. The middle of
+  /// its arc is r (1 / sin(θ/2) − 1) from the seam, and at most `reach`.
   [[nodiscard]] double radiusAt(double cosine) const {
     const double sine = std::sqrt(std::max(0.0, (1 + cosine) / 2));
     return std::min(radius, reach * sine / (1 - sine));
   }
-  /// How far from the seam the surface changes: r / tan(θ/2), largest where the reach binds first.
+  /// Largest distance from the seam at which the surface changes: r / tan(θ/2), at the angle where
+  /// `reach` starts to limit the radius.
   [[nodiscard]] double extent() const {
     const double sine = radius / (reach + radius);
     return std::min(bound, radius * std::sqrt(1 - sine * sine) / sine);
   }
 };
 
-/// How far from the seam both solids are within reach of one ball: the seam lies in both their
-/// boxes, and so does, up to the ball, what it touches. Voxels.
+/// Upper bound of the distance from the seam within which one ball can touch both solids, voxels.
+/// The seam lies in the bounding boxes of both solids, and so do the contact points, up to a ball.
 double boundOf(const FloatGrid& a, const FloatGrid& b, const FilletSize& size, double halfWidth) {
   openvdb::CoordBBox common = a.evalActiveVoxelBoundingBox();
   common.intersect(b.evalActiveVoxelBoundingBox());
@@ -71,7 +72,7 @@ double boundOf(const FloatGrid& a, const FloatGrid& b, const FilletSize& size, d
   return (common.extents().asVec3d() + Vec3d(2 * margin)).length();
 }
 
-/// Distances in voxels, positive where the ball rolls.
+/// Computes distances in a wide band around the seam, in voxels, positive on the side of the ball.
 FloatGrid::Ptr widened(const NarrowBand& solid, float sign, const eikonal::PointTree& curve,
                        const FilletSize& size, double halfWidth, const BlendOptions& options) {
   FloatGrid::Ptr part = cutOut(vdb(solid), curve, 2 * (size.extent() + halfWidth));
@@ -98,7 +99,7 @@ class BallRoller {
         size_(size),
         curve_(curve) {}
 
-  /// The distance to the fillet at a grid point, if that is where the surface is nearest.
+  /// Distance from a grid point to the fillet; empty if the fillet is not its nearest surface.
   std::optional<double> distance(const Coord& point, double halfWidth) {
     const double a = static_cast<double>(readA_.getValue(point)),
                  b = static_cast<double>(readB_.getValue(point));
@@ -123,11 +124,12 @@ class BallRoller {
     return block.jet(p - block.origin().asVec3d());
   }
 
-  /// Newton's method on a(s) = b(s) = r and, along the curve, the secant method on the way to x:
-  /// where the curve bends around x, that way shrinks by less than what is gone.
+  /// Finds the ball whose centre is nearest to x. Uses Newton's method for a(s) = b(s) = r. Along
+  /// the curve, uses the secant method: where the curve bends around x, the remaining distance
+  /// decreases by less than the step.
   bool findBall(const Vec3d& x, Ball& ball) {
     ball.centre = x;
-    double before = 0, gone = 0, shrinks = 1;
+    double before = 0, moved = 0, shrinkage = 1;
     for (int step = 0; step < kSpineSteps; ++step) {
       const eikonal::Jet a = jetAt(a_, ball.centre), b = jetAt(b_, ball.centre);
       if (std::abs(a.value) > known_ || std::abs(b.value) > known_) return false;
@@ -141,17 +143,18 @@ class BallRoller {
       const double squaredSine = 1 - ball.cosine * ball.cosine;
       const double da = ball.radius - a.value, db = ball.radius - b.value;
       const Vec3d along = ball.normalA.cross(ball.normalB) / std::sqrt(squaredSine);
-      const double way = along.dot(x - ball.centre);
-      if (std::abs(gone) > kSpineTolerance)
-        shrinks = std::clamp((before - way) / gone, kLeastShrinkage, 2.0);
+      const double remaining = along.dot(x - ball.centre);
+      if (std::abs(moved) > kSpineTolerance)
+        shrinkage = std::clamp((before - remaining) / moved, kLeastShrinkage, 2.0);
       Vec3d move = ball.normalA * ((da - ball.cosine * db) / squaredSine) +
-                   ball.normalB * ((db - ball.cosine * da) / squaredSine) + along * (way / shrinks);
+                   ball.normalB * ((db - ball.cosine * da) / squaredSine) +
+                   along * (remaining / shrinkage);
       const double length = move.length();
       if (!std::isfinite(length)) return false;
       if (length > kLongestSpineStep) move *= kLongestSpineStep / length;
       ball.centre += move;
-      before = way;
-      gone = along.dot(move);
+      before = remaining;
+      moved = along.dot(move);
       if (length < kSpineTolerance) return true;
     }
     return false;
@@ -159,13 +162,13 @@ class BallRoller {
 
   FloatGrid::ConstAccessor readA_, readB_;
   eikonal::DenseBlockCache a_, b_;
-  double known_;  ///< distances up to there are told by their interpolant
+  double known_;  ///< largest magnitude at which the interpolant is valid
   FilletSize size_;
   const eikonal::PointTree& curve_;
 };
 
-/// Leaf blocks that come within `extent` of the curve and in which both distances are known, in
-/// order: where one is not, no ball touches both.
+/// Finds the leaf blocks within `extent` of the curve that contain both distances, sorted.
+/// Elsewhere no ball touches both solids.
 std::vector<Coord> blocksBeside(const FloatTree& a, const FloatTree& b,
                                 const eikonal::PointTree& curve, double extent) {
   std::vector<Coord> both;
@@ -189,7 +192,7 @@ struct FilletBlock {
   Coord origin;
   std::vector<std::pair<openvdb::Index, float>> values;  ///< voxels, with the result's sign
 };
-// With all its values, as a vector grows, and the leaf that they go to.
+// A block with all its values, with spare capacity of the vector, and the leaf of the result.
 constexpr double kBytesPerBlock = sizeof(FilletBlock) + 2 * 512 * 8 + 2300;
 
 void putFillet(const std::vector<FilletBlock>& blocks, FloatGrid& solid) {
@@ -215,8 +218,9 @@ void addFillet(CsgOperation operation, const SeamOperands& operands, double radi
                const BlendOptions& options, CsgResult& result) {
   const bool adds = operation == CsgOperation::Union;
   if (options.side == (adds ? BlendSide::Remove : BlendSide::Add)) {
-    result.notes.emplace_back(adds ? "blend: the fillet of a union only adds material"
-                                   : "blend: this fillet only removes material");
+    result.notes.emplace_back(
+        adds ? "blend: the fillet of a union only adds material, so --side remove changes nothing"
+             : "blend: this fillet only removes material, so --side add changes nothing");
     return;
   }
   const double voxelSize = result.band.voxelSize(), halfWidth = result.band.halfWidth();
@@ -224,15 +228,16 @@ void addFillet(CsgOperation operation, const SeamOperands& operands, double radi
   size.bound = boundOf(vdb(operands.a), vdb(operands.b), size, halfWidth);
   const std::vector<Vec3d> curve = seamCurve(vdb(operands.a).tree(), vdb(operands.b).tree());
   if (curve.empty()) {
-    result.notes.emplace_back("blend: the surfaces do not meet, so there is no crease to round");
+    result.notes.emplace_back(
+        "blend: the surfaces do not intersect, so there is no crease to round");
     return;
   }
   if (size.radius < 1.5)
     result.notes.push_back(fmt::format(
-        "blend: a radius of {:.3g} voxels is below what the grid can show; use smaller voxels",
+        "blend: the grid cannot represent a radius of {:.3g} voxels; use smaller voxels",
         size.radius));
 
-  // === Distances as far as the ball is wide
+  // === Distances over the diameter of the ball
   const eikonal::PointTree tree(curve);
   const CsgSigns signs = csgSigns(operation);
   const auto within = [&](double from, double to) {
@@ -245,7 +250,7 @@ void addFillet(CsgOperation operation, const SeamOperands& operands, double radi
   const FloatGrid::Ptr b =
       widened(operands.b, signs.second, tree, size, halfWidth, within(0.6, 0.8));
 
-  // === The ball at each grid point beside the seam
+  // === Position of the ball for each grid point near the seam
   const std::vector<Coord> origins =
       blocksBeside(a->tree(), b->tree(), tree, size.extent() + halfWidth + 1);
   requireMemory(static_cast<double>(origins.size()) * kBytesPerBlock,

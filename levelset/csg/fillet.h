@@ -1,17 +1,17 @@
 #pragma once
 
-// For the .cpp files of levelset/solids only.
+// For the .cpp files of levelset/csg only.
 
 #include "levelset/csg/seam_operands.h"
 
 namespace levelset::solids {
 
-/// Rounds the seam of `result`, the plain CSG of the operands, as a ball does that rolls along it.
+/// Rounds the seam of `result`, the plain CSG of the operands, with a rolling-ball fillet.
 ///
-/// With exact distances a, b of both solids the ball's centre runs along the curve a = b = r
-/// outside. A grid point finds the point s of that curve that is nearest to it by Newton's method;
-/// if it lies between the two radii from s to the points where the ball touches, its distance to
-/// the fillet is r − |x − s|. Else nothing changes.
+/// With exact distances a and b to both solids, the ball's centre moves along the spine curve
+/// a = b = r outside the solids. Newton's method finds the point s of this curve nearest to a grid
+/// point x. If x lies between the two radii from s to the contact points of the ball, its distance
+/// to the fillet is r − |x − s|. Otherwise its value does not change.
 /// @param radius  world units, > 0
 void addFillet(CsgOperation operation, const SeamOperands& operands, double radius,
                const BlendOptions& options, CsgResult& result);

@@ -16,9 +16,9 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 using Accessor = openvdb::tree::ValueAccessor<const FloatTree>;
 
-// Sine of the smallest angle between surfaces that counts as a crease.
+// Sine of the smallest angle between the surfaces that counts as a crease.
 constexpr double kLeastSine = 0.1;
-// How far from the centre of its cell a point of the curve may be found, voxels along an axis.
+// Largest distance of a curve point from the centre of its cell, voxels along each axis.
 constexpr double kCellReach = 0.75;
 
 /// The linear model of a field in a cell that its zero set crosses.
@@ -41,7 +41,7 @@ struct CellModel {
   }
 };
 
-/// The point nearest to the cell's centre on which both models vanish.
+/// Finds the point nearest to the cell's centre at which both models are zero.
 std::optional<Vec3d> meetingPoint(const CellModel& a, const CellModel& b, const Coord& cell) {
   const double aa = a.gradient.lengthSqr(), bb = b.gradient.lengthSqr(),
                ab = a.gradient.dot(b.gradient);

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/solids only.
+// For the .cpp files of levelset/csg only.
 
 #include <vector>
 
@@ -8,10 +8,11 @@
 
 namespace levelset::solids {
 
-/// Points of the curve in which the zero sets of two fields on the same grid points meet, about one
-/// a voxel: from each cell that both cross, the point where both linear models vanish, if it lies
-/// in or beside the cell [Brodersen07 §6.3]. Surfaces that run along each other meet in no curve.
-/// Index space, in tree order.
+/// Finds points on the curve in which the zero sets of two fields intersect, about one per voxel.
+/// Both fields share their grid points. Each cell that both zero sets cross gives the point where
+/// both linear models are zero, if it lies in or near the cell [Brodersen07 §6.3]. Nearly parallel
+/// surfaces give no points.
+/// @return index coordinates, in tree order
 [[nodiscard]] std::vector<openvdb::Vec3d> seamCurve(const openvdb::FloatTree& a,
                                                     const openvdb::FloatTree& b);
 

@@ -18,22 +18,22 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 using Manager = openvdb::tree::LeafManager<FloatTree>;
 
-// The weight is one up to this part of the radius.
+// The weight is 1 up to this fraction of the radius.
 constexpr double kFullWeight = 0.7;
-// Largest stable explicit step for κ = k1 + k2 in three dimensions, voxels², with some air.
+// Largest stable explicit step for κ = k1 + k2 in three dimensions, voxels², with a margin.
 constexpr double kExplicitStep = 0.15;
-// Sharper than this, voxels⁻¹, the grid holds no curvature.
+// Largest curvature that the grid can represent, voxels⁻¹.
 constexpr double kSharpest = 2;
 constexpr float kNearSurface = 1;  // voxels
 
-/// 1 at x ≤ 0, 0 at x ≥ 1, twice differentiable.
+/// Falls from 1 at x ≤ 0 to 0 at x ≥ 1, twice differentiable.
 double fade(double x) {
   if (x <= 0) return 1;
   if (x >= 1) return 0;
   return 1 - x * x * x * (10 + x * (6 * x - 15));
 }
 
-/// φ_t without the weight at a grid point of a dense block, central differences.
+/// Computes φ_t without the weight at a grid point of a dense block, by central differences.
 double speed(const eikonal::DenseBlock& b, int x, int y, int z, const SeamFlow& flow) {
   const auto v = [&](int i, int j, int k) {
     return static_cast<double>(b.at(x + i, y + j, z + k));
@@ -55,15 +55,15 @@ double speed(const eikonal::DenseBlock& b, int x, int y, int z, const SeamFlow& 
   const double bound = 1 / flow.radius;
   double excess = std::clamp(curvature, -kSharpest, kSharpest);
   excess -= std::clamp(excess, -bound, bound);
-  // φ falls where material is added.
+  // Adding material decreases φ.
   if (flow.side == BlendSide::Add) excess = std::min(excess, 0.0);
   if (flow.side == BlendSide::Remove) excess = std::max(excess, 0.0);
   return excess * slope;
 }
 
-/// The leaves on which something moves, with their weights, in tree order.
+/// Leaves with nonzero weights, and these weights, in tree order.
 struct MovingLeaves {
-  std::vector<std::size_t> number;  ///< in the leaf manager
+  std::vector<std::size_t> number;  ///< indices in the leaf manager
   std::vector<const SeamWeights::Block*> weights;
 
   MovingLeaves(const Manager& manager, SeamWeights& all) {
@@ -79,7 +79,7 @@ struct MovingLeaves {
   }
 };
 
-/// Calls visit(leaf number, moving number, offset, φ_t) at the active grid points that take part.
+/// Calls visit(leaf index, index in `moving`, offset, φ_t) at each active grid point with a weight.
 template <typename Visit>
 void forEachMoving(const Manager& manager, const MovingLeaves& moving, const SeamFlow& flow,
                    const Visit& visit) {
@@ -142,7 +142,7 @@ const SeamWeights::Block* SeamWeights::at(const Coord& origin) {
 }
 
 double seamStep(FloatTree& field, SeamWeights& weights, const SeamFlow& flow, double dt) {
-  Manager manager(field, 1);  // the tree holds stage j - 1, the buffer beside it stage j - 2
+  Manager manager(field, 1);  // the tree contains stage j - 1, the auxiliary buffer stage j - 2
   const MovingLeaves moving(manager, weights);
   std::vector<SeamWeights::Block> before(moving.number.size());
   for (std::size_t i = 0; i < before.size(); ++i)

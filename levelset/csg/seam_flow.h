@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/solids only.
+// For the .cpp files of levelset/csg only.
 
 #include <array>
 #include <memory>
@@ -13,16 +13,16 @@
 
 namespace levelset::solids {
 
-/// How strongly a grid point takes part in the flow: 1 near the curve, smoothly 0 at `radius` from
-/// it.
+/// Weight of each grid point in the flow: 1 near the curve, falling smoothly to 0 at `radius`.
 class SeamWeights {
  public:
   using Block = std::array<float, 512>;
-  /// @param radius  voxels; keeps a view of the curve
+  /// @param curve   points in index space; must outlive this object
+  /// @param radius  voxels
   SeamWeights(std::span<const openvdb::Vec3d> curve, double radius);
-  /// Weights of the leaf block at `origin`; null where all vanish. Not for several threads at once.
+  /// Weights of the leaf block at `origin`; null if all are zero. Not thread-safe.
   const Block* at(const openvdb::Coord& origin);
-  /// Makes the weights of these blocks, in parallel.
+  /// Computes the weights of these blocks in parallel.
   void prepare(const std::vector<openvdb::Coord>& origins);
 
  private:
@@ -39,13 +39,14 @@ struct SeamFlow {
   BlendSide side = BlendSide::Both;
 };
 
-/// One step of φ_t = D (κ − clamp(κ, ±1/radius)) |∇φ| on a field in voxels, κ = k1 + k2: only what
-/// is bent more sharply than the radius moves, so the flow comes to rest when nothing is. Stable by
-/// a Runge-Kutta-Legendre scheme of first order [Meyer14] in as many stages as `dt` asks for.
-/// @return the largest change of a value within a voxel of the zero set
+/// Integrates φ_t = D (κ − clamp(κ, ±1/radius)) |∇φ| over one step, with κ = k1 + k2 and a field in
+/// voxels. Only points with a curvature above 1/radius move, so the flow stops when there are none.
+/// Uses a first-order Runge-Kutta-Legendre scheme [Meyer14] with as many stages as `dt` requires
+/// for stability.
+/// @return largest change of a value within one voxel of the zero set, voxels
 double seamStep(openvdb::FloatTree& field, SeamWeights& weights, const SeamFlow& flow, double dt);
 
-/// Largest |φ_t| within a voxel of the zero set.
+/// Largest |φ_t| within one voxel of the zero set.
 [[nodiscard]] double seamSpeed(openvdb::FloatTree& field, SeamWeights& weights,
                                const SeamFlow& flow);
 

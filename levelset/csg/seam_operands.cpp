@@ -17,10 +17,10 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Voxels around the part that changes that hold the surface it hangs on.
+// Voxels around the changing part that contain the surface next to it.
 constexpr double kSurfaceMargin = 8;
 
-/// A block that holds no distances, only signs.
+/// Adds a block that contains signs only, no distances.
 void addSigns(const FloatTree& source, const Coord& origin, FloatTree& target) {
   const float background = target.background();
   const LeafNode* leaf = source.probeConstLeaf(origin);
@@ -35,7 +35,7 @@ void addSigns(const FloatTree& source, const Coord& origin, FloatTree& target) {
   target.addLeaf(signs);
 }
 
-/// The inside that holds no blocks: however deep, a ball asks on which side it is.
+/// Copies the inside tiles, because the fillet reads the sign at any depth.
 void copyInsideTiles(const FloatTree& source, FloatTree& target) {
   auto tile = source.cbeginValueOff();
   tile.setMaxDepth(FloatTree::ValueOffCIter::LEAF_DEPTH - 1);
@@ -56,7 +56,9 @@ SeamOperands onOneGrid(const NarrowBand& a, const NarrowBand& b, const BlendOpti
   resampling.progress = subProgress(options.progress, 0, 0.2);
   const NarrowBand moved = resampleTo(coarse, fine.indexToWorld(), resampling);
   std::string note = fmt::format(
-      "blend: the {} operand was resampled from voxels of {:.4g} to the other's grid of {:.4g}",
+      "blend: the {} operand was resampled from voxels of {:.4g} to voxels of {:.4g}, the grid of "
+      "the "
+      "other operand",
       firstIsFiner ? "second" : "first", coarse.voxelSize(), fine.voxelSize());
   return {firstIsFiner ? fine : moved, firstIsFiner ? moved : fine, {std::move(note)}};
 }
@@ -69,7 +71,7 @@ FloatGrid::Ptr cutOut(const FloatGrid& solid, const eikonal::PointTree& curve, d
   std::set<Coord> inner, rim;
   for (auto leaf = solid.tree().cbeginLeaf(); leaf; ++leaf) {
     const Vec3d centre = leaf->origin().asVec3d() + Vec3d(3.5);
-    const double reach = radius + kSurfaceMargin + 6.1;  // to the corners of the block
+    const double reach = radius + kSurfaceMargin + 6.1;  // 6.1: half the diagonal of a block
     if (curve.nearest(centre, reach) == eikonal::PointTree::kNone) continue;
     inner.insert(leaf->origin());
     auto copy = std::make_unique<LeafNode>(*leaf);

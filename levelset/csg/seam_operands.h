@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/solids only.
+// For the .cpp files of levelset/csg only.
 
 #include "levelset/csg/blend.h"
 #include "levelset/geometry/point_tree.h"
@@ -13,12 +13,13 @@ struct SeamOperands {
   std::vector<std::string> notes;
 };
 
-/// Both solids of a blend on the grid points of the finer; takes the first fifth of the progress.
+/// Resamples both solids of a blend to the finer grid. Uses the first fifth of the progress.
 [[nodiscard]] SeamOperands onOneGrid(const NarrowBand& a, const NarrowBand& b,
                                      const BlendOptions& options);
 
-/// The blocks of a solid that come within `radius` (voxels) and a margin of the curve, its values
-/// in voxels, and the signs of the blocks around those and of all that is deep inside.
+/// Copies the blocks of a solid within `radius` plus a margin of the curve, with values in voxels.
+/// Neighbour blocks and tiles deep inside contain only signs.
+/// @param radius  voxels
 [[nodiscard]] openvdb::FloatGrid::Ptr cutOut(const openvdb::FloatGrid& solid,
                                              const eikonal::PointTree& curve, double radius);
 

@@ -19,20 +19,20 @@ using flow::CurvatureSteps;
 using flow::NearSurface;
 
 constexpr const char* kAction = "curvature-flow";
-// Without a tolerance, voxels over the whole time.
+// Default tolerance in voxels, over the entire time.
 constexpr double kDefaultTolerance = 0.02;
-// Steps grow and shrink by no more than this, and stay this far below what the estimate allows.
+// Limits of the growth and shrinkage of steps, and safety factor on the error estimate.
 constexpr double kMostGrowth = 3, kMostShrinkage = 0.2, kSafety = 0.8;
-// A first step, before there is an estimate, voxels².
+// Length of the first step, before an estimate exists, voxels².
 constexpr double kFirstStep = 10 * flow::kExplicitStep;
-// Distances are made again when less than this share of the wanted step is left in the band.
+// Redistancing is due when the band leaves less than this share of the wanted step.
 constexpr double kLeastShare = 0.4;
-// Blocks of fields that are alive during a step, and the part of a band's blocks that is active.
+// Number of fields alive during a step, and the active share of a band's blocks.
 constexpr double kFields = 9, kFilled = 0.45;
-constexpr double kVolumeTolerance = 1e-6;  // of the volume
+constexpr double kVolumeTolerance = 1e-6;  // share of the volume
 constexpr std::size_t kMostFlowSteps = 100000;
-// A surface that keeps its volume has come to rest when it would move no further than this, at its
-// pace, in the time in which it rounds itself, voxels.
+// A surface with preserved volume is at rest when its rate would move it less than this, in voxels,
+// over the time in which it rounds itself.
 constexpr double kRestMove = 0.05;
 
 void checkPositive(double value, const char* what, const char* unit) {
@@ -44,25 +44,27 @@ void checkPositive(double value, const char* what, const char* unit) {
 void checkArguments(const NarrowBand& solid, double time, const CurvatureFlowOptions& options) {
   if (!(time >= 0) || !std::isfinite(time))
     throw UsageError(
-        fmt::format("{}: the time is {}; give world units squared, 0 or more", kAction, time));
+        fmt::format("{}: the time is {}; give a finite time of 0 or more, in world units squared",
+                    kAction, time));
   if (options.tolerance) checkPositive(*options.tolerance, "tolerance", "world units");
   if (options.step) checkPositive(*options.step, "step", "world units squared");
   if (options.mask) checkMask(*options.mask, kAction);
   requireSolid(solid, kAction);
   if (solid.isEmpty())
     throw InvalidInput(fmt::format(
-        "{}: the solid is empty, so there is no surface to move; give a solid", kAction));
+        "{}: the solid is empty, so there is no surface to move; give a solid with a surface",
+        kAction));
   if (options.step && time / *options.step > static_cast<double>(kMostFlowSteps))
     throw ResourceLimit(fmt::format(
-        "{}: a time of {} in steps of {} makes {:.3g} of them, and {} are the most; ask "
-        "for longer steps or a shorter time",
+        "{}: a time of {} in steps of {} requires {:.3g} steps, more than the limit of {}; use "
+        "longer steps or a shorter time",
         kAction, time, *options.step, time / *options.step, kMostFlowSteps));
 }
 
-/// After that time, voxels squared, the corners of a cube have moved by a voxel.
+/// Time in voxels² after which the corners of a cube have moved by a voxel.
 constexpr double kEdgesGone = 0.5;
 
-/// One flow, in voxels.
+/// Curvature flow of one solid, in voxels.
 class CurvatureFlow {
  public:
   CurvatureFlow(const NarrowBand& solid, double time, const CurvatureFlowOptions& options)
@@ -97,7 +99,7 @@ class CurvatureFlow {
       FlowScheme::Explicit, FlowScheme::Stabilized, FlowScheme::Implicit};
   static std::size_t index(FlowScheme scheme) { return static_cast<std::size_t>(scheme); }
 
-  void tell() const { report(options_.progress, 0.99 * now_ / time_, kAction); }
+  void reportProgress() const { report(options_.progress, 0.99 * now_ / time_, kAction); }
 
   openvdb::FloatGrid::Ptr distances(const openvdb::FloatGrid& field, double halfWidth) {
     eikonal::DistanceRequest request;
@@ -120,18 +122,18 @@ class CurvatureFlow {
     if (eikonal::hasZeroCrossing(grid.tree())) return;
     throw InvalidInput(
         fmt::format("{}: the solid vanishes after a time of {:.4g} world units squared, before the "
-                    "{:.4g} asked for; give a shorter time",
+                    "requested {:.4g}; give a shorter time",
                     kAction, now_ * voxel_ * voxel_, time_ * voxel_ * voxel_));
   }
 
-  /// Flows until distances are due, the surface is gone or the time is over.
+  /// Integrates until redistancing is due, the surface is gone or the time is over.
   openvdb::FloatGrid::Ptr runOn(const openvdb::FloatGrid& grid) {
     CurvatureState state(grid, options_.mask);
-    CurvatureSteps steps(state, [&] { tell(); });
+    CurvatureSteps steps(state, [&] { reportProgress(); });
     if (options_.preservesVolume) prepareVolume(grid, state, steps);
     const double begun = now_;
     for (bool first = true; now_ < time_; first = false) {
-      const NearSurface near = flow::lookNearSurface(state, steps.rate());
+      const NearSurface near = flow::measureNearSurface(state, steps.rate());
       if (near.count == 0) break;
       if (options_.preservesVolume && isAtRest(state, near, steps.shift, now_ - begun)) {
         result_.restedAfter = now_ * voxel_ * voxel_;
@@ -141,12 +143,13 @@ class CurvatureFlow {
       const double left = time_ - now_;
       const double wanted = std::min({wanted_, longest_, left});
       const double onSurface =
-          near.fastest > 0 ? std::max(0.0, flow::kFlowRoom - near.displaced) / near.fastest : left;
+          near.fastest > 0 ? std::max(0.0, flow::kFlowTravel - near.displaced) / near.fastest
+                           : left;
       const double whole = onSurface + (near.fastest > 0 ? near.displaced / near.fastest : 0);
-      const double room = std::min(onSurface, near.clear);
-      if (!first && room < kLeastShare * std::min(wanted, whole)) break;
-      // As long as an explicit step is always possible, the flow never stands still.
-      double dt = std::min(wanted, std::max(room, flow::kExplicitStep));
+      const double available = std::min(onSurface, near.clear);
+      if (!first && available < kLeastShare * std::min(wanted, whole)) break;
+      // The explicit step is always possible, so the flow always advances.
+      double dt = std::min(wanted, std::max(available, flow::kExplicitStep));
       if (dt > 0.999 * left) dt = left;
       step(state, steps, first ? std::min(dt, kFirstStep) : dt, first);
     }
@@ -154,8 +157,9 @@ class CurvatureFlow {
     return state.toGrid(grid);
   }
 
-  /// By the pace of the moment, or, since what long steps and new distances leave behind may be
-  /// rougher than that, by the way since distances were made, `elapsed` ago.
+  /// Returns true when the surface is at rest, by its current rate. Long steps and redistancing
+  /// leave roughness that may exceed that rate. So the displacement since redistancing, `elapsed`
+  /// ago, is tested too.
   static bool isAtRest(const CurvatureState& state, const NearSurface& near, double meanCurvature,
                        double elapsed) {
     const double rounding = meanCurvature * meanCurvature;
@@ -164,11 +168,12 @@ class CurvatureFlow {
     flow::Field moved = state.value;
     for (std::size_t i = 0; i < moved.size(); ++i)
       for (std::size_t n = 0; n < 512; ++n) moved[i][n] -= state.start()[i][n];
-    return flow::lookNearSurface(state, moved).unevenness() < kRestMove * rounding * elapsed;
+    return flow::measureNearSurface(state, moved).unevenness() < kRestMove * rounding * elapsed;
   }
 
-  /// What the error of the steps is spread over. One that keeps its volume forgets its errors while
-  /// it rounds itself: the slowest wave on a ball dies with the square of its mean curvature.
+  /// Returns the time over which the tolerance is spread. A surface with preserved volume forgets
+  /// its errors while it rounds itself: the slowest wave on a ball decays with the square of the
+  /// mean curvature.
   double errorSpan(double meanCurvature) const {
     if (!options_.preservesVolume || meanCurvature == 0) return time_;
     return std::min(time_, 1 / (meanCurvature * meanCurvature));
@@ -176,17 +181,17 @@ class CurvatureFlow {
 
   void requireEnd(double dt) const {
     if (result_.steps < kMostFlowSteps && now_ + dt > now_) return;
-    throw ResourceLimit(
-        fmt::format("{}: {} steps have come to a time of {:.4g} world units squared, and the next "
-                    "is of {:.3g}, so the {:.4g} asked for is out of reach; ask for a shorter time "
-                    "or use larger voxels",
-                    kAction, result_.steps, now_ * voxel_ * voxel_, dt * voxel_ * voxel_,
-                    time_ * voxel_ * voxel_));
+    throw ResourceLimit(fmt::format(
+        "{}: {} steps reached a time of {:.4g} world units squared, and the next "
+        "step is {:.3g}, so the requested {:.4g} takes too many steps; use a shorter time "
+        "or larger voxels",
+        kAction, result_.steps, now_ * voxel_ * voxel_, dt * voxel_ * voxel_,
+        time_ * voxel_ * voxel_));
   }
 
   FlowScheme cheapest(double dt, double left) const {
     if (options_.scheme != FlowScheme::Auto) return options_.scheme;
-    // What is left of the time, at this pace.
+    // Cost of the remaining time with steps of this length.
     const auto cost = [&](FlowScheme scheme) {
       return scheme == FlowScheme::Explicit ? flow::predictedCost(scheme, left)
                                             : left / dt * flow::predictedCost(scheme, dt);
@@ -195,8 +200,8 @@ class CurvatureFlow {
                              [&](auto a, auto b) { return cost(a) < cost(b); });
   }
 
-  /// One step of dt or less. The first after distances were made smooths away their rounding, of
-  /// which an estimate would see nothing else.
+  /// Takes one step of at most dt. The first step after redistancing smooths away the rounding of
+  /// the distances; an error estimate would measure only that rounding.
   void step(CurvatureState& state, CurvatureSteps& steps, double dt, bool first) {
     const FlowScheme scheme = cheapest(dt, time_ - now_);
     if (scheme == FlowScheme::Explicit) dt = std::min(dt, flow::kExplicitStep);
@@ -217,7 +222,7 @@ class CurvatureFlow {
         wanted_ = dt;
         continue;
       }
-      // A step that was cut short says little of how far one may go.
+      // A shortened step says little about the longest possible one.
       wanted_ = std::max({flow::kExplicitStep, dt * factor, factor > 1 ? wanted_ : 0.0});
       if (span < time_) error_ *= std::exp(-dt / span);
       error_ += error;
@@ -228,29 +233,31 @@ class CurvatureFlow {
     longestTaken_ = std::max(longestTaken_, dt);
     ++result_.steps;
     if (options_.preservesVolume) keepVolume(state, steps);
-    tell();
+    reportProgress();
   }
 
   // === Volume
 
   void prepareVolume(const openvdb::FloatGrid& grid, CurvatureState& state, CurvatureSteps& steps) {
-    inactive_ = flow::inactiveContent(grid.tree());
-    if (!volume_) volume_ = inactive_ + flow::contentOf(state, steps.rate(), steps.shift).volume;
+    inactive_ = flow::inactiveVolume(grid.tree());
+    if (!volume_)
+      volume_ = inactive_ + flow::volumeAndAreaOf(state, steps.rate(), steps.shift).volume;
     keepVolume(state, steps);
   }
 
-  /// Moves the surface as a whole until the volume is what it was, and takes from now on the mean
-  /// curvature off the rate.
+  /// Offsets the surface until its volume is restored. From then on the mean curvature is
+  /// subtracted from the rate.
   void keepVolume(CurvatureState& state, CurvatureSteps& steps) {
     constexpr int kMostCorrections = 4;
     for (int i = 0; i < kMostCorrections; ++i) {
-      const flow::Content content = flow::contentOf(state, steps.rate(), steps.shift);
-      const double excess = inactive_ + content.volume - *volume_;
-      if (!(content.area > 0) || std::abs(excess) < kVolumeTolerance * *volume_) break;
-      steps.raise(excess / content.area);
+      const flow::VolumeAndArea volumeAndArea =
+          flow::volumeAndAreaOf(state, steps.rate(), steps.shift);
+      const double excess = inactive_ + volumeAndArea.volume - *volume_;
+      if (!(volumeAndArea.area > 0) || std::abs(excess) < kVolumeTolerance * *volume_) break;
+      steps.raise(excess / volumeAndArea.area);
     }
     steps.refreshRate();
-    const NearSurface near = flow::lookNearSurface(state, steps.rate());
+    const NearSurface near = flow::measureNearSurface(state, steps.rate());
     if (near.weights > 0) steps.shift += near.rates / near.weights;
     steps.refreshRate();
   }

@@ -9,44 +9,52 @@
 namespace levelset {
 
 enum class FlowScheme {
-  Auto,        ///< whichever of the others is predicted to cost least
-  Explicit,    ///< Euler steps
-  Stabilized,  ///< Runge-Kutta-Legendre of second order, s stages for about s²/4 Euler steps
-  Implicit     ///< linearly implicit, second order by extrapolation, conjugate gradients
+  Auto,      ///< scheme with the least predicted cost
+  Explicit,  ///< Euler steps
+  /// Runge-Kutta-Legendre of second order: s stages replace about s²/4 Euler steps.
+  Stabilized,
+  /// Linearly implicit, second order by extrapolation, solved with conjugate gradients.
+  Implicit
 };
 
 struct CurvatureFlowOptions {
   FlowScheme scheme = FlowScheme::Auto;
   bool preservesVolume = false;   ///< V_n = mean of κ over the surface − κ
-  std::optional<Mask> mask = {};  ///< V_n times its weight
-  std::optional<double> tolerance =
-      {};                           ///< of the steps in time, rms over the surface, world units
-  std::optional<double> step = {};  ///< longest step, world units²; cut where the band is left
+  std::optional<Mask> mask = {};  ///< scales V_n
+  /// Error of the time steps, rms over the surface, world units.
+  std::optional<double> tolerance = {};
+  /// Longest step, world units²; shortened where the surface would leave the band.
+  std::optional<double> step = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
 struct CurvatureFlowResult {
   NarrowBand band;
-  FlowScheme scheme = FlowScheme::Auto;  ///< that took most of the time; Auto: there was no step
+  /// Scheme used for most of the time; Auto: no step was taken.
+  FlowScheme scheme = FlowScheme::Auto;
   std::size_t steps = 0;
-  std::size_t evaluations = 0;  ///< of the rate over the band, or what costs as much
+  std::size_t evaluations = 0;  ///< evaluations of the rate over the band, or work of the same cost
   std::size_t redistances = 0;
-  double errorEstimate = 0;  ///< of the steps in time, rms over the surface, world units
-  double shortestStep = 0;   ///< world units²; no step is made shorter for the tolerance's sake
-  double longestStep = 0;    ///< of those that were taken, world units²
-  std::optional<double> restedAfter = {};  ///< a time; with preservesVolume nothing moved any more
+  /// Estimated error of the time steps, rms over the surface, world units.
+  double errorEstimate = 0;
+  double shortestStep = 0;  ///< world units²; the tolerance makes no step shorter than this
+  double longestStep = 0;   ///< longest step taken, world units²
+  /// Time after which the surface was at rest; set only with preservesVolume.
+  std::optional<double> restedAfter = {};
 };
 
 /// Moves the surface inwards with the speed κ = k1 + k2 for a `time` in world units²: a ball obeys
-/// R² = R0² − 4 time. Topology may change; parts may vanish.
-/// κ|∇φ| is of fourth order where the surface is smooth at the scale of the voxels. Distances are
-/// made again only when the surface has moved a voxel and a half. Without a tolerance the steps in
-/// time leave two hundredths of a voxel. [Meyer14, Smereka03, Sommeijer98]
-/// With preservesVolume it ends when the surface has come to rest.
-/// @throws UsageError for a time, step or tolerance that is not positive and finite (time may be
-/// 0); InvalidInput if `solid` is empty or vanishes on the way, telling when; ResourceLimit,
-/// also for more than 100 000 steps; Cancelled
+/// R² = R0² − 4 time. The topology may change, and parts may vanish.
+/// κ|∇φ| is of fourth order where the surface is smooth at the scale of the voxels. Redistancing
+/// happens only when the surface has moved a voxel and a half. Without a tolerance the error of the
+/// time steps is two hundredths of a voxel. [Meyer14, Smereka03, Sommeijer98]
+/// With preservesVolume the flow ends when the surface is at rest.
+/// @throws UsageError for a time, step or tolerance that is not positive and finite (time may be 0)
+/// @throws InvalidInput if `solid` is empty, or vanishes during the flow; the message gives the
+///         time
+/// @throws ResourceLimit when the band does not fit into memory, and for more than 100 000 steps
+/// @throws Cancelled
 [[nodiscard]] CurvatureFlowResult curvatureFlow(NarrowBand solid, double time,
                                                 const CurvatureFlowOptions& options = {});
 

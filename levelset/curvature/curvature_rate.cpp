@@ -10,9 +10,9 @@ namespace {
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 = std::int32_t __attribute__((vector_size(16)));
 
-// Below this squared slope the gradient gives no direction.
+// Below this squared slope the gradient has no reliable direction.
 constexpr float kFlat = 0.01f;
-// The fourth-order correction may be this part of the second-order rate, or this many voxels⁻¹.
+// Bound of the fourth-order correction: share of the second-order rate, and floor in voxels⁻¹.
 constexpr float kCorrectionShare = 0.3f, kCorrectionFloor = 0.02f;
 
 Float4 load(const float* p) {
@@ -64,7 +64,7 @@ Derivatives differences(const float* centre) {
   return d;
 }
 
-/// Richardson's combination of differences over one and two voxels: fourth order.
+/// Richardson extrapolation of differences over one and two voxels: fourth order.
 Derivatives combine(const Derivatives& one, const Derivatives& two) {
   const auto mix = [](Float4 a, Float4 b) { return (4.0f * a - b) * (1.0f / 3); };
   return {mix(one.x, two.x),   mix(one.y, two.y),   mix(one.z, two.z),
@@ -72,7 +72,7 @@ Derivatives combine(const Derivatives& one, const Derivatives& two) {
           mix(one.xy, two.xy), mix(one.xz, two.xz), mix(one.yz, two.yz)};
 }
 
-/// Sum of the two second derivatives across the strongest one.
+/// Returns the sum of the two second derivatives across the strongest one.
 float rateWithoutNormal(const Derivatives& d, int lane) {
   Eigen::Matrix3f h;
   h << d.xx[lane], d.xy[lane], d.xz[lane], d.xy[lane], d.yy[lane], d.yz[lane], d.xz[lane],

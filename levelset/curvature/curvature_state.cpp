@@ -15,10 +15,10 @@ using openvdb::Vec3d;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
 constexpr float kNear = 1;  // voxels
-// With less than this share of the corners there is no leader.
+// Least sum of the weights of valid corners; below it there is no leader.
 constexpr float kLeastSum = 0.1f;
 
-// What is bent more is taken for bent so: close to a focus or a crease nothing is parallel.
+// Bound of principal curvatures: close to a focus or a crease, level sets are not parallel.
 constexpr double kMostBent = 0.12;
 
 constexpr double kDifferencesReach = 2.8284271247461903;  // (2, 2, 0)
@@ -26,7 +26,7 @@ static_assert(kFlowWidth >= kFlowCore + kDifferencesReach);
 
 struct Nothing {};
 
-/// k1 + k2 of the parallel surface `away` voxels further out, less the same here.
+/// Returns k1 + k2 of the parallel surface `away` voxels further out, less k1 + k2 here.
 double differenceOfParallel(double away, double sum, double squares) {
   const double half = std::sqrt(std::max(0.0, squares / 2 - sum * sum / 4));
   double difference = 0;
@@ -37,8 +37,8 @@ double differenceOfParallel(double away, double sum, double squares) {
   return difference;
 }
 
-/// Sum and squared sum of the principal curvatures of the level set through a grid point of a
-/// distance: the trace of its second derivatives and of their square.
+/// Returns sum and sum of squares of the principal curvatures of the level set through a grid
+/// point. For a distance field these are the traces of the Hessian and of its square.
 std::pair<float, float> bendingAt(const float* p) {
   constexpr std::array<int, 3> kSteps = {PaddedBlock::kStepX, PaddedBlock::kStepY, 1};
   float sum = 0, squares = 0;
@@ -52,7 +52,7 @@ std::pair<float, float> bendingAt(const float* p) {
   return {sum, squares};
 }
 
-/// Central differences at a grid point of a padded block.
+/// Returns central differences at a grid point of a padded block.
 Vec3d gradientAt(const PaddedBlock& block, const Coord& c) {
   const float* p = block.at(c.x(), c.y(), c.z());
   const auto difference = [&](int step) { return static_cast<double>(p[step] - p[-step]) / 2; };
@@ -89,8 +89,9 @@ void CurvatureState::findCore(std::size_t i, PaddedBlock& block, Bending& bendin
     const double phi = static_cast<double>(std::abs(start_[i][it.pos()]));
     if (!(phi < kFlowCore)) continue;
     core_[i].setOn(it.pos());
-    // The corners of a leader's cell are nearer than a diagonal to its level.
-    if (phi < kFlowOwn - 1.8) continue;
+    // Curvature is needed at the corners of leaders' cells; these are within a diagonal of
+    // kFlowLeader.
+    if (phi < kFlowLeader - 1.8) continue;
     const Coord c = LeafNode::offsetToLocalCoord(it.pos());
     std::tie(bending.sums[i][it.pos()], bending.squares[i][it.pos()]) =
         bendingAt(block.at(c.x(), c.y(), c.z()));
@@ -101,11 +102,11 @@ void CurvatureState::findFollowers(std::size_t i, PaddedBlock& block, const Bend
   blocks_.gather(start_, i, static_cast<float>(kFlowWidth), block);
   for (auto it = blocks_.active(i).beginOn(); it; ++it) {
     const double phi = static_cast<double>(start_[i][it.pos()]);
-    if (std::abs(phi) < kFlowOwn) continue;
+    if (std::abs(phi) < kFlowLeader) continue;
     const Coord c = LeafNode::offsetToLocalCoord(it.pos());
     Vec3d normal = gradientAt(block, c);
     if (!normal.normalize()) continue;
-    const double back = phi - std::copysign(kFlowOwn, phi);
+    const double back = phi - std::copysign(kFlowLeader, phi);
     const Vec3d p = (blocks_.origin(i) + c).asVec3d() - normal * back;
     Follower follower;
     follower.gridPoint = static_cast<std::uint16_t>(it.pos());
@@ -131,7 +132,7 @@ void CurvatureState::findFollowers(std::size_t i, PaddedBlock& block, const Bend
       bent += weight * static_cast<double>(bending.sums[corner / 512][corner % 512]);
       squares += weight * static_cast<double>(bending.squares[corner / 512][corner % 512]);
     }
-    follower.ahead = static_cast<float>(differenceOfParallel(back, bent, squares));
+    follower.rateDifference = static_cast<float>(differenceOfParallel(back, bent, squares));
     followers_[i].push_back(follower);
   }
 }
@@ -149,7 +150,7 @@ void CurvatureState::evaluate(const Field& field, double shift, Field& rate) con
   blocks_.forEach<Nothing>([&](std::size_t i, Nothing&) {
     followed_[i].clear();
     for (const Follower& f : followers_[i]) {
-      float sum = f.ahead;
+      float sum = f.rateDifference;
       for (std::size_t k = 0; k < 8; ++k)
         sum += f.weights[k] * rate[f.corners[k] / 512][f.corners[k] % 512];
       followed_[i].push_back(sum);
@@ -193,13 +194,13 @@ double NearSurface::unevenness() const {
   return std::sqrt(std::max(0.0, all - linear) / count);
 }
 
-NearSurface lookNearSurface(const CurvatureState& state, const Field& rate) {
+NearSurface measureNearSurface(const CurvatureState& state, const Field& rate) {
   return state.blocks().sum<NearSurface>([&](std::size_t i) {
     NearSurface near;
     for (auto it = state.blocks().active(i).beginOn(); it; ++it) {
       const float phi = state.value[i][it.pos()], start = state.start()[i][it.pos()];
       const double speed = static_cast<double>(rate[i][it.pos()]);
-      if (std::abs(start) >= static_cast<float>(kFlowOwn)) {
+      if (std::abs(start) >= static_cast<float>(kFlowLeader)) {
         const auto side = static_cast<double>(std::copysign(1.0f, start));
         const double left = side * static_cast<double>(phi) - kFlowNearest, pace = -side * speed;
         if (pace > 0) near.clear = std::min(near.clear, std::max(0.0, left) / pace);

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/flow only.
+// Internal header of levelset: public headers must not include it.
 
 #include <limits>
 #include <optional>
@@ -10,45 +10,49 @@
 
 namespace levelset::flow {
 
-/// All in voxels: distances are made so far on each side; the rate is computed so far; from here on
-/// it is that of the closest level within and the difference that parallel surfaces have there at
-/// the start, so that all level sets go along with the surface, which may move by kFlowRoom before
-/// distances are made again. The differences reach 2.83 along diagonals. So far must the distances
-/// go beyond the core, or the rates that follow its outermost grid points are wrong and long steps
-/// carry that to the surface (CurvatureFlow.IsExactInLongSteps). So far, too, is it from the
-/// surface to the level where following begins: with 2.2, a ball of 32 lost a thousandth of a voxel
-/// each time.
-inline constexpr double kFlowWidth = 8.1, kFlowCore = 5.2, kFlowOwn = 4.3, kFlowRoom = 1.5;
+/// Widths around the surface, in voxels.
+/// - kFlowWidth: distances are computed up to here on each side.
+/// - kFlowCore: the rate is computed up to here.
+/// - kFlowLeader: from here on a grid point follows a leader, the closest point of this level set.
+///   Its rate is that of its leader plus the difference that parallel surfaces have there at the
+///   start. So all level sets move along with the surface.
+/// - kFlowTravel: the surface may move this far before redistancing.
+/// Differences reach 2.83 voxels along diagonals. Distances must extend that far beyond the core.
+/// Otherwise the rates that follow its outermost grid points are wrong, and long steps carry the
+/// error to the surface (CurvatureFlow.IsExactInLongSteps). The level set of the leaders must also
+/// be that far from the surface after its travel. With 2.2 instead, a ball of 32 voxels lost a
+/// thousandth of a voxel at each redistancing.
+inline constexpr double kFlowWidth = 8.1, kFlowCore = 5.2, kFlowLeader = 4.3, kFlowTravel = 1.5;
 
-/// φ of a solid in voxels while it flows, on blocks that hold still until distances are made again.
+/// φ of a solid in voxels during the flow, on blocks that stay fixed until redistancing.
 class CurvatureState {
  public:
-  /// @param distance  a band of kFlowWidth
+  /// @param distance  a band of half width kFlowWidth
   CurvatureState(const openvdb::FloatGrid& distance, const std::optional<Mask>& mask);
 
   Field value;
 
   [[nodiscard]] const BandBlocks& blocks() const { return blocks_; }
   [[nodiscard]] const Field& start() const { return start_; }
-  /// How strongly each grid point takes part; empty: all do fully.
+  /// Weight of each grid point's motion; empty: all weights are 1.
   [[nodiscard]] const Field& weights() const { return weights_; }
 
-  /// φ_t at all grid points of the band: weight (κ − shift) |∇φ|.
+  /// Computes φ_t at all grid points of the band: weight (κ − shift) |∇φ|.
   void evaluate(const Field& field, double shift, Field& rate) const;
 
-  /// Writes `value` to a copy of the band that this was made of.
+  /// Writes `value` to a copy of the band that the state was constructed from.
   [[nodiscard]] openvdb::FloatGrid::Ptr toGrid(const openvdb::FloatGrid& distance) const;
 
  private:
-  /// Takes its rate from the corners of the cell in which its leader lies.
+  /// Grid point that takes its rate from the corners of the cell in which its leader lies.
   struct Follower {
     std::uint16_t gridPoint = 0;
-    float ahead = 0;                         ///< its rate less its leader's
+    float rateDifference = 0;                ///< rate of the follower less that of its leader
     std::array<std::uint32_t, 8> corners{};  ///< BandBlocks::find
     std::array<float, 8> weights{};
   };
 
-  /// How the level sets bend at grid points of the core: k1 + k2 and k1² + k2².
+  /// Curvature of the level sets at grid points of the core: k1 + k2 and k1² + k2².
   struct Bending {
     Field sums, squares;
   };
@@ -59,41 +63,46 @@ class CurvatureState {
   Field start_, weights_;
   std::vector<BandBlocks::Mask> core_;
   std::vector<std::vector<Follower>> followers_;
-  mutable std::vector<std::vector<float>> followed_;  ///< their rates, kept for the memory
+  /// Rates of the followers; a member to reuse its memory.
+  mutable std::vector<std::vector<float>> followed_;
 };
 
-/// Until distances are made again no level set that began at kFlowOwn or further may come nearer to
-/// the surface than this. Where the surface stands still, as a ball does that keeps its volume,
-/// others still move: in time they would make a zero set of their own.
+/// Least distance from the surface, in voxels, for level sets that began at kFlowLeader or beyond.
+/// A nearer one forces redistancing. Where the surface stands still, as a ball with preserved
+/// volume does, other level sets still move. In time they would form another zero set.
 inline constexpr double kFlowNearest = 1;
 
-/// What a field looks like beside its zero set, |φ| < 1.
+/// Sums and extrema over the grid points beside the zero set, |φ| < 1.
 struct NearSurface {
   double count = 0;
-  double fastest = 0;    ///< |rate|
-  double displaced = 0;  ///< how far the surface went since distances were made
+  double fastest = 0;    ///< largest |rate|
+  double displaced = 0;  ///< largest displacement of the surface since redistancing, voxels
   double squares = 0;    ///< sum of squared rates
-  double rates = 0;      ///< sum of rates …
-  double weights = 0;    ///< … and of the weights
+  double rates = 0;      ///< sum of rates
+  double weights = 0;    ///< sum of weights
   double levels = 0, levelSquares = 0, levelRates = 0;  ///< sums of φ, φ² and φ times the rate
-  /// Time after which a level set from further off comes within kFlowNearest, at its pace.
+  /// Time until a level set from kFlowLeader or beyond comes within kFlowNearest at its current
+  /// rate.
   double clear = std::numeric_limits<double>::infinity();
-  /// Deviation of the rate on the surface, rms. Level sets beside it bend more or less than it
-  /// does: what of the rate is linear in φ is taken off.
+  /// Returns the rms deviation of the rate on the surface. Level sets beside it bend more or less
+  /// than the surface, so the part of the rate that is linear in φ is subtracted.
   [[nodiscard]] double unevenness() const;
   NearSurface& operator+=(const NearSurface& other);
 };
-[[nodiscard]] NearSurface lookNearSurface(const CurvatureState& state, const Field& rate);
+[[nodiscard]] NearSurface measureNearSurface(const CurvatureState& state, const Field& rate);
 
-/// Volume in voxels³, and its loss when the values rise by one voxel times their weight. Cut by the
-/// tangent plane of each grid point's own cube, and by what the surface bends away from it.
-struct Content {
+/// Volume in voxels³, and weighted area in voxels²: the volume lost when all values rise by one
+/// voxel times their weight. The tangent plane at each grid point cuts its own cube; a correction
+/// accounts for the bend of the surface.
+struct VolumeAndArea {
   double volume = 0, area = 0;
-  Content& operator+=(const Content& other);
+  VolumeAndArea& operator+=(const VolumeAndArea& other);
 };
-/// @param rate  what evaluate() made of the state with this `shift`
-[[nodiscard]] Content contentOf(const CurvatureState& state, const Field& rate, double shift);
-/// Grid points inside that the blocks of a tree do not hold as active: they change in no step.
-[[nodiscard]] double inactiveContent(const openvdb::FloatTree& tree);
+/// Computes the volume and the weighted area of the state.
+/// @param rate  rate that evaluate() returned for the state with this `shift`
+[[nodiscard]] VolumeAndArea volumeAndAreaOf(const CurvatureState& state, const Field& rate,
+                                            double shift);
+/// Counts the inside grid points that are not active in the blocks of a tree: no step changes them.
+[[nodiscard]] double inactiveVolume(const openvdb::FloatTree& tree);
 
 }  // namespace levelset::flow

@@ -75,8 +75,8 @@ double CurvatureSteps::rmsNearSurface(const Error& error) const {
     }
   };
   const Sum sum = state_.blocks().sum<Sum>([&](std::size_t i) {
-    // The mean over a block: what alternates from one grid point to the next is rounding of the
-    // distances, which any step damps and no shorter one avoids.
+    // The error is averaged over a block. An error that alternates between grid points is rounding
+    // of the distances: any step damps it, and no shorter step avoids it.
     double total = 0, count = 0;
     for (auto it = state_.blocks().active(i).beginOn(); it; ++it) {
       if (!(std::abs(before_[i][it.pos()]) < 1)) continue;
@@ -149,8 +149,8 @@ void CurvatureSteps::legendreStep(double dt) {
   }
 }
 
-// Linearly implicit Euler steps with the Laplacian in the place of the rate's derivative
-// [Smereka03], one of dt against two of half that: twice the two less the one is of second order.
+// Linearly implicit Euler steps with the Laplacian in place of the rate's derivative [Smereka03].
+// Twice the result of two half steps less that of one full step is of second order.
 double CurvatureSteps::implicitStep(double dt) {
   if (!solver_) solver_ = std::make_unique<HelmholtzSolver>(state_.blocks(), state_.weights());
   work_ += kIterationCost * solver_->solve(dt, rateBefore_, last_, pulse_);
@@ -162,7 +162,7 @@ double CurvatureSteps::implicitStep(double dt) {
   work_ += kIterationCost * solver_->solve(dt / 2, stageRate_, stageRate_, pulse_);
   state_.blocks().forEach<NoScratch>([&](std::size_t i, NoScratch&) {
     for (std::size_t n = 0; n < 512; ++n) {
-      older_[i][n] += stageRate_[i][n];  // the change by two half steps
+      older_[i][n] += stageRate_[i][n];  // change by two half steps
       last_[i][n] = older_[i][n] - last_[i][n];
       state_.value[i][n] = before_[i][n] + older_[i][n] + last_[i][n];
     }

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/flow only.
+// Internal header of levelset: public headers must not include it.
 
 #include <functional>
 #include <memory>
@@ -11,32 +11,34 @@
 
 namespace levelset::flow {
 
-/// Stages that a Runge-Kutta-Legendre step of this length takes, odd.
+/// Returns the number of stages of a Runge-Kutta-Legendre step of length `dt`; always odd.
 [[nodiscard]] int legendreStages(double dt);
 
-/// What a step costs, in evaluations of the rate. Counts of operations, not measured times.
+/// Returns the cost of a step in evaluations of the rate. The figure counts operations and is not
+/// measured.
 [[nodiscard]] double predictedCost(FlowScheme scheme, double dt);
 
-/// Steps in time; lengths in voxels, times in voxels². Keeps its fields between steps.
+/// Time stepping of a curvature flow; lengths in voxels, times in voxels². Keeps its fields between
+/// steps.
 class CurvatureSteps {
  public:
-  /// @param pulse  called now and then during a step; throws to stop
+  /// @param pulse  called repeatedly during a step; may throw to stop it
   CurvatureSteps(CurvatureState& state, std::function<void()> pulse);
 
-  /// Takes one step. `rate` must be that of the state; it is brought up to date.
-  /// @return rms over the surface of the estimated error of the step
+  /// Takes one step. rate() must be that of the state; the step updates it.
+  /// @return estimated error of the step, rms over the surface
   double take(FlowScheme scheme, double dt);
-  /// Takes the last step back.
+  /// Reverts the last step.
   void undo();
   /// Adds `by` times the weights to all values.
   void raise(double by);
-  /// After raise() or a change of the shift.
+  /// Recomputes rate(), after raise() or a change of the shift.
   void refreshRate();
 
   [[nodiscard]] const Field& rate() const { return rate_; }
-  double shift = 0;  ///< taken from the curvature
+  double shift = 0;  ///< constant subtracted from the curvature
   [[nodiscard]] std::size_t evaluations() const { return static_cast<std::size_t>(work_); }
-  /// The error grows with this power of the step.
+  /// Returns the power of the step length with which the error grows.
   [[nodiscard]] static int errorOrder(FlowScheme scheme) {
     return scheme == FlowScheme::Stabilized ? 3 : 2;
   }
@@ -52,7 +54,7 @@ class CurvatureSteps {
   CurvatureState& state_;
   std::function<void()> pulse_;
   Field before_, rate_, rateBefore_, last_, older_, stageRate_;
-  std::unique_ptr<HelmholtzSolver> solver_;  ///< made when first used
+  std::unique_ptr<HelmholtzSolver> solver_;  ///< created at first use
   double work_ = 0;
 };
 

@@ -7,11 +7,11 @@ namespace {
 
 struct NoBuffer {};
 
-// Residual against the right-hand side.
+// Tolerance of the residual, relative to the right-hand side.
 constexpr double kSolved = 1e-5;
-// Greatest eigenvalue of the negative Laplacian, voxels⁻².
+// Largest eigenvalue of the negative Laplacian, voxels⁻².
 constexpr double kLargestEigenvalue = 12;
-// A lesser weight counts as none: the system would be near singular.
+// A smaller weight counts as zero: the system would be nearly singular.
 constexpr float kLeastWeight = 1e-3f;
 
 }  // namespace
@@ -29,7 +29,7 @@ HelmholtzSolver::HelmholtzSolver(const BandBlocks& blocks, const Field& weights)
   blocks.forEach<PaddedBlock>([&](std::size_t i, PaddedBlock& block) {
     blocks.gather(inBand, i, 0, block);
     for (auto it = unknown_[i].beginOn(); it; ++it)
-      neighbours_[i][it.pos()] = block.sixAround(it.pos());
+      neighbours_[i][it.pos()] = block.neighbourSum(it.pos());
   });
 }
 
@@ -43,7 +43,7 @@ void HelmholtzSolver::multiply(float dt, const Field& in, Field& out) const {
     for (auto it = unknown_[i].beginOn(); it; ++it) {
       const openvdb::Index n = it.pos();
       out[i][n] =
-          in[i][n] / weight(i, n) - dt * (block.sixAround(n) - neighbours_[i][n] * in[i][n]);
+          in[i][n] / weight(i, n) - dt * (block.neighbourSum(n) - neighbours_[i][n] * in[i][n]);
     }
   });
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/flow only.
+// Internal header of levelset: public headers must not include it.
 
 #include <functional>
 
@@ -8,13 +8,16 @@
 
 namespace levelset::flow {
 
-/// Solves (1/w − dt Δ) change = dt rate / w on the grid points of a band, no flow through its rim,
-/// by conjugate gradients; sums in a fixed order. Where the weight w vanishes so does the change.
+/// Solver of (1/w − dt Δ) change = dt rate / w on the grid points of a band, with no flow through
+/// its rim. Uses conjugate gradients with sums in a fixed order. The change vanishes where the
+/// weight w does.
 class HelmholtzSolver {
  public:
-  /// Keeps a view of both. @param weights  empty: all one
+  /// Keeps a reference to both arguments.
+  /// @param weights  empty: all one
   HelmholtzSolver(const BandBlocks& blocks, const Field& weights);
-  /// `change` may be `rate`. @return the number of iterations
+  /// Solves for `change`, which may be the same field as `rate`.
+  /// @return the number of iterations
   int solve(double dt, const Field& rate, Field& change, const std::function<void()>& pulse);
   [[nodiscard]] static double predictedIterations(double dt);
 
@@ -28,7 +31,7 @@ class HelmholtzSolver {
   const BandBlocks& blocks_;
   const Field& weights_;
   std::vector<BandBlocks::Mask> unknown_;
-  Field neighbours_;  ///< how many of the six are in the band
+  Field neighbours_;  ///< number of the six neighbours in the band
   Field residual_, scaled_, direction_, product_;
 };
 

@@ -23,24 +23,24 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 
 constexpr const char* kSmooth = "smooth";
-// A Gaussian is cut here.
+// Cut-off of the Gaussian, in σ.
 constexpr double kGaussianReach = 4;
-// What the interpolant reads beside the zero set.
+// Distance from the zero set at which the interpolant reads values, voxels.
 constexpr double kStencil = 3;
-// Beyond this many σ the tails of both sides of the surface balance: the band may end there.
+// Half width that the filter needs, in σ. Beyond it the tails of both sides of the surface balance.
 constexpr double kKnownReach = 3;
-// A band that misses as little of a width counts as wide as that.
+// Relative tolerance for a band to count as wide enough.
 constexpr double kWideEnough = 1.0001;
 constexpr double kFieldsAlive = 5;
-// Values that a median may read in all: some thousand CPU seconds.
+// Largest number of values that a median may read in all: some thousand CPU seconds.
 constexpr double kMostReadings = 1e12;
 constexpr double kWidened = 0.3, kFiltered = 0.7;  // shares of the work
 
 /// Weights of a symmetric filter along a line, the middle one first.
 std::vector<float> gaussianWeights(double sigma) {
   const int reach = std::max(1, static_cast<int>(std::ceil(kGaussianReach * sigma)));
-  // Integrated over each voxel's own width, so that a σ below a voxel keeps its variance; that of
-  // the width is taken off.
+  // The weights integrate the Gaussian over each voxel, so that a σ below a voxel keeps its
+  // variance. The variance of the voxel's own width is subtracted.
   std::vector<double> weights;
   const double narrowed = std::sqrt(std::max(sigma * sigma - 1.0 / 12, 1e-4));
   double sum = 0;
@@ -55,7 +55,7 @@ std::vector<float> gaussianWeights(double sigma) {
 }
 
 std::vector<float> boxWeights(double sigma) {
-  // Whole voxels and an equal part of one at each end, of variance σ².
+  // A box of variance σ²: full weight on inner voxels, and an equal part of it at both ends.
   int whole = 0;
   const auto squares = [](int n) { return n * (n + 1.0) * (2.0 * n + 1) / 3; };
   while (squares(whole + 1) / (2.0 * (whole + 1) + 1) <= sigma * sigma) ++whole;
@@ -69,7 +69,8 @@ std::vector<float> boxWeights(double sigma) {
   return result;
 }
 
-/// Steps within a dense cube of `side` grid points to those within `radius` of its centre.
+/// Returns index steps within a dense cube of `side` grid points to those within `radius` of its
+/// centre.
 std::vector<std::ptrdiff_t> stepsWithin(double radius, int pad, std::ptrdiff_t side) {
   const double squared = std::max(1.0, radius * radius);
   std::vector<std::ptrdiff_t> steps;
@@ -86,21 +87,21 @@ int medianPad(double radius) {
   return std::max(1, static_cast<int>(std::floor(radius)));
 }
 
-/// Refuses a median that nobody would wait for.
+/// Refuses a median that takes too long.
 void requireMedian(const openvdb::FloatGrid& grid, double radius) {
   const double around = 4.0 / 3 * M_PI * std::pow(std::max(1.0, radius), 3);
   const double readings = static_cast<double>(grid.activeVoxelCount()) * around;
   if (readings <= kMostReadings) return;
-  throw ResourceLimit(
-      fmt::format("{}: a median within {:.4g} voxels reads {:.3g} values, and {:.3g} are the most; "
-                  "use a smaller sigma, larger voxels or --kind gaussian",
-                  kSmooth, radius, readings, kMostReadings));
+  throw ResourceLimit(fmt::format(
+      "{}: a median within {:.4g} voxels reads {:.3g} values, more than the limit of {:.3g}; use "
+      "a smaller sigma, larger voxels or --kind gaussian",
+      kSmooth, radius, readings, kMostReadings));
 }
 
-/// Filters fields on the blocks of a band.
+/// Filter for fields on the blocks of a band.
 class BlockFilter {
  public:
-  /// @param passes  over all blocks, for the progress
+  /// @param passes  number of passes over all blocks, for the progress
   BlockFilter(const openvdb::FloatGrid& grid, double passes, Progress progress)
       : tree_(grid.tree()),
         blocks_(grid.tree()),
@@ -150,7 +151,7 @@ class BlockFilter {
     return tree_.getValue(c) < 0 ? -far_ : far_;
   }
 
-  /// Calls work(i, scratch) for each block, in parallel, and tells of each.
+  /// Calls work(i, scratch) for each block in parallel, and reports progress.
   template <typename Scratch, typename Work>
   void forEachBlock(const Work& work) const {
     blocks_.forEach<Scratch>([&](std::size_t i, Scratch& scratch) {
@@ -160,12 +161,12 @@ class BlockFilter {
     });
   }
 
-  /// Values of a block and of `pad` grid points on each side of it, rows along z.
+  /// Copies the values of a block and of `pad` grid points on each side of it, rows along z.
   void gatherWide(const Field& field, std::size_t i, int pad, std::vector<float>& dense) const {
     const int side = 8 + 2 * pad, chain = (pad + 7) / 8;
     dense.resize(static_cast<std::size_t>(side) * static_cast<std::size_t>(side) *
                  static_cast<std::size_t>(side));
-    // First and last but one of the block `k` blocks away, counted from the first block's own.
+    // Range [from, to) of the block `k` blocks away, in coordinates of the block itself.
     const auto from = [&](int k) { return std::max(8 * k, -pad); };
     const auto to = [&](int k) { return std::min(8 * k + 8, 8 + pad); };
     for (int bx = -chain; bx <= chain; ++bx)
@@ -190,7 +191,8 @@ class BlockFilter {
         }
   }
 
-  /// The blocks in a line, then each of the 64 lines through the one in the middle.
+  /// Convolves along an axis: copies the chain of blocks around each block, then filters its 64
+  /// lines.
   void alongAxis(const Field& in, int axis, const std::vector<float>& weights, Field& out) const {
     const int reach = static_cast<int>(weights.size()) - 1, chain = (reach + 7) / 8;
     const std::size_t stride = axis == 0 ? 64 : axis == 1 ? 8 : 1;
@@ -231,7 +233,7 @@ class BlockFilter {
   const openvdb::FloatTree& tree_;
   BandBlocks blocks_;
   float far_;
-  double work_;  ///< blocks, each as often as it is filtered
+  double work_;  ///< total work: blocks times the passes over each
   mutable double done_ = 0;
   mutable std::mutex mutex_;
   Progress progress_;
@@ -269,7 +271,8 @@ void applyMask(const Mask& mask, const openvdb::FloatGrid& grid, const BandBlock
   });
 }
 
-/// Points of the band where the mask lets anything change; empty when nowhere.
+/// Returns the bounds of the band's grid points with a positive mask weight; empty when there are
+/// none.
 CoordBBox changingBox(const openvdb::FloatGrid& grid, const Mask& mask) {
   CoordBBox box;
   for (auto it = grid.cbeginValueOn(); it; ++it)
@@ -278,7 +281,7 @@ CoordBBox changingBox(const openvdb::FloatGrid& grid, const Mask& mask) {
   return box;
 }
 
-/// Grid points whose values differ.
+/// Returns the bounds of the grid points whose values differ.
 CoordBBox differing(const BandBlocks& blocks, const Field& a, const Field& b) {
   CoordBBox box;
   for (std::size_t i = 0; i < blocks.size(); ++i)
@@ -288,7 +291,7 @@ CoordBBox differing(const BandBlocks& blocks, const Field& a, const Field& b) {
   return box;
 }
 
-/// Puts what `source` holds in a box in place of what `target` does.
+/// Replaces the content of a box in `target` by that of `source`.
 void paste(const openvdb::FloatTree& source, const CoordBBox& box, openvdb::FloatTree& target) {
   target.fill(box, target.background(), false);
   for (auto it = source.cbeginValueAll(); it; ++it) {
@@ -317,17 +320,18 @@ struct Filtering {
   double width;  ///< voxels
 
   [[nodiscard]] double passes() const { return kind == SmoothKind::Taubin ? 2 : 1; }
-  /// How far from the surface distances have to be known, voxels.
+  /// Returns the distance from the surface to which distances must be known, voxels.
   [[nodiscard]] double known() const {
     return kind == SmoothKind::Median ? width + 1 : passes() * kKnownReach * width;
   }
-  /// How far from a grid point values are read, voxels.
+  /// Returns the distance from a grid point to which values are read, voxels.
   [[nodiscard]] double reach() const {
     return kind == SmoothKind::Median ? width + 1 : passes() * kGaussianReach * width;
   }
 };
 
-/// The solid smoothed in a box of grid points, or everywhere; none when no surface is left there.
+/// Smooths the solid in a box of grid points, or everywhere. Returns none when the box holds no
+/// usable surface.
 std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const NarrowBand& solid,
                                      const Filtering& filtering, const SmoothOptions& options) {
   const double voxel = solid.voxelSize();
@@ -340,8 +344,8 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
     return wider;
   };
 
-  // === Distances as far as the filter reads
-  // Those that are made in the end reach across the band from a surface as far away.
+  // === Distances for the filter
+  // The distances computed at the end depend on surfaces up to twice the half width away.
   const double trusted = filtering.known(), own = 2 * solid.halfWidth() + 2;
   const double needed = trusted + std::max(filtering.reach(), own) + 2 * kStencil;
   openvdb::FloatGrid::Ptr field;
@@ -367,12 +371,12 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
   if (options.mask) applyMask(*options.mask, *field, filter.blocks(), before, after);
   const CoordBBox moved = box ? differing(filter.blocks(), before, after) : CoordBBox();
   if (box && moved.empty()) return solid;
-  // A wide filter may reach further than the part of the field that was looked at.
+  // A wide filter may change grid points outside the part of the field that was computed.
   if (box && !around(trusted).isInside(moved)) return std::nullopt;
   filter.blocks().write(after, voxel, field->tree());
   if (!eikonal::hasZeroCrossing(field->tree())) return std::nullopt;
 
-  // === Distances again
+  // === Redistancing
   request.halfWidth = solid.halfWidth();
   request.progress = subProgress(options.progress, kFiltered, 1);
   request.region.reset();
@@ -383,7 +387,7 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
   try {
     changed = eikonal::distanceTransform(*field, request);
   } catch (const InvalidInput&) {
-    return std::nullopt;  // the crossings are those of the part's own borders
+    return std::nullopt;  // the only crossings are at the borders of the part
   }
   const openvdb::FloatGrid::Ptr result = vdb(solid).deepCopy();
   paste(changed->tree(), *request.region, result->tree());
@@ -405,24 +409,27 @@ double smoothingReach(SmoothKind kind, double sigma, double halfWidth) {
 
 NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothOptions& options) {
   if (!(sigma > 0) || !std::isfinite(sigma))
-    throw UsageError(fmt::format("{}: sigma is {}; give a positive length", kSmooth, sigma));
+    throw UsageError(
+        fmt::format("{}: sigma is {}; give a positive, finite length", kSmooth, sigma));
   if (options.mask) checkMask(*options.mask, kSmooth);
   requireSolid(solid, kSmooth);
   if (solid.isEmpty())
     throw InvalidInput(fmt::format(
-        "{}: the solid is empty, so there is no surface to smooth; give a solid", kSmooth));
+        "{}: the solid is empty, so there is no surface to smooth; give a solid with a surface",
+        kSmooth));
   const Filtering filtering{kind, sigma / solid.voxelSize()};
   if (options.mask) {
     const CoordBBox box = changingBox(vdb(solid), *options.mask);
     if (box.empty()) return solid;
-    // Without a surface near by, what is left elsewhere tells the distances.
+    // When the box holds no usable surface, the surface elsewhere determines the distances: smooth
+    // all.
     if (!box.isInside(vdb(solid).evalActiveVoxelBoundingBox()))
       if (auto part = smoothedIn(box, solid, filtering, options)) return std::move(*part);
   }
   if (auto whole = smoothedIn(std::nullopt, solid, filtering, options)) return std::move(*whole);
   throw InvalidInput(
-      fmt::format("{}: nothing is left of the solid with a sigma of {} world units; give a "
-                  "smaller one",
+      fmt::format("{}: a sigma of {} world units removes the entire solid; give a smaller "
+                  "sigma",
                   kSmooth, sigma));
 }
 

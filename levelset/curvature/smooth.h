@@ -9,10 +9,11 @@
 namespace levelset {
 
 enum class SmoothKind {
-  Gaussian,  ///< convolution of φ with a Gaussian of that σ, out to 4 σ
-  Mean,      ///< with a box of the same variance
-  Median,    ///< median over the grid points within σ, one voxel at least
-  Taubin     ///< a Gaussian, then sharpened by as much as long waves lost: keeps the volume
+  Gaussian,  ///< convolution of φ with a Gaussian of standard deviation σ, cut at 4 σ
+  Mean,      ///< convolution with a box of the same variance
+  Median,    ///< median over the grid points within σ, at least one voxel
+  /// Gaussian, then sharpening that restores long waves; preserves the volume.
+  Taubin
 };
 
 struct SmoothOptions {
@@ -21,22 +22,24 @@ struct SmoothOptions {
   Progress progress = {};
 };
 
-/// How far from a place the surface decides what smoothing makes of it there.
-/// @param sigma  of the filter, voxels
-/// @param halfWidth  of the solid, voxels
+/// Returns the radius around a point within which the surface determines the smoothed result there.
+/// @param sigma      standard deviation of the filter, voxels
+/// @param halfWidth  half width of the solid, voxels
 /// @return voxels
 [[nodiscard]] double smoothingReach(SmoothKind kind, double sigma, double halfWidth);
 
-/// How far from the surface a filter has to know distances: a narrower band is made as wide first.
-/// @param sigma  of the filter, voxels
+/// Returns the half width that the filter needs. A narrower band is rebuilt to this width first.
+/// @param sigma  standard deviation of the filter, voxels
 /// @return voxels
 [[nodiscard]] double smoothingWidth(SmoothKind kind, double sigma);
 
-/// Smooths the surface: filters φ and makes distances of the result.
-/// @param sigma  world units
-/// @throws UsageError unless `sigma` is positive and finite; InvalidInput if `solid` is empty or
-/// nothing is left of it; ResourceLimit, also for a median over more than 1e12 values in all;
-/// Cancelled
+/// Smooths the surface: filters φ and recomputes the distances.
+/// @param sigma  standard deviation of the filter, world units
+/// @throws UsageError unless `sigma` is positive and finite
+/// @throws InvalidInput if `solid` is empty or nothing is left of it
+/// @throws ResourceLimit when the band does not fit into memory, and for a median that reads more
+///         than 1e12 values in all
+/// @throws Cancelled
 [[nodiscard]] NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma,
                                 const SmoothOptions& options = {});
 

@@ -11,13 +11,14 @@ using openvdb::Vec3d;
 constexpr int kMaxIterations = 8;
 constexpr double kFootReach = 2;    // voxels from the start
 constexpr double kLongestStep = 1;  // voxels
-// A step is the last when what it leaves, about the cube of its length by the square of the
-// curvature, is below this part of a voxel.
+// The iteration stops when the estimated error after a step falls below this, in voxels. The
+// estimate is the cube of the step's length times the square of the curvature.
 constexpr double kTolerance = 2e-5;
 constexpr double kLongestLastStep = 0.6;
-constexpr double kLeastCurvature = 0.1;  // of the distance along the surface, against 1 on a plane
+// Least second derivative of half the squared distance along the surface; it is 1 on a plane.
+constexpr double kLeastCurvature = 0.1;
 
-/// Two unit vectors perpendicular to a unit vector and to each other.
+/// Computes two unit vectors perpendicular to a unit vector and to each other.
 void tangents(const Vec3d& n, Vec3d& t1, Vec3d& t2) {
   // [Duff17], without a branch that loses precision.
   const double sign = std::copysign(1.0, n.z());
@@ -27,13 +28,14 @@ void tangents(const Vec3d& n, Vec3d& t1, Vec3d& t2) {
 }
 
 struct NewtonStep {
-  Vec3d along;  ///< the step
+  Vec3d along;  ///< step vector
   double length = 0;
-  double remains = 0;  ///< estimate of the distance to the solution after it, voxels
+  double remains = 0;  ///< estimated distance to the solution after the step, voxels
 };
 
-/// One Newton step of the constrained problem: along the normal to φ = 0, along the tangents to
-/// where the distance to `from` is stationary. The normal part includes the second order.
+/// Takes one Newton step of the constrained problem: along the normal to φ = 0, along the tangents
+/// to the point where the distance to `from` is stationary. The normal part includes the second
+/// order.
 NewtonStep newtonStep(const Jet& jet, double slope, const Vec3d& toFrom) {
   const Vec3d n = jet.gradient / slope;
   const double along = -jet.value / slope;
@@ -44,7 +46,7 @@ NewtonStep newtonStep(const Jet& jet, double slope, const Vec3d& toFrom) {
   double a11 = 1 + lambda * h1.dot(t1), a12 = lambda * h1.dot(t2), a22 = 1 + lambda * h2.dot(t2);
   const double b1 = toFrom.dot(t1) - lambda * along * h1.dot(n);
   const double b2 = toFrom.dot(t2) - lambda * along * h2.dot(n);
-  // Past the centre of curvature the stationary point is a maximum: lift the eigenvalues.
+  // Past the centre of curvature the stationary point is a maximum: shift the eigenvalues up.
   const double mean = (a11 + a22) / 2, half = (a11 - a22) / 2;
   const double least = mean - std::sqrt(half * half + a12 * a12);
   if (least < kLeastCurvature) {
@@ -95,7 +97,7 @@ Foot closestPointByOneStep(const Jet& jet, const Vec3d& from, const Vec3d& start
 }
 
 bool changesSignAround(const DenseBlock& block, const Vec3d& point) {
-  // A curved surface bulges by this much through the face of a cell before a corner sees it.
+  // A curved surface can bulge this far through the face of a cell before a corner changes sign.
   constexpr double kBulge = 0.25;
   int low[3], high[3];
   for (int i = 0; i < 3; ++i) {

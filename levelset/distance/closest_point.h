@@ -1,34 +1,38 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal and levelset/solids only.
+// Internal header of levelset: public headers must not include it.
 
 #include "levelset/distance/interpolant.h"
 
 namespace levelset::eikonal {
 
-/// A point of the zero set and how far it is, in voxels.
+/// Foot point: a point of the zero set and its distance from the query point, in voxels.
 struct Foot {
   openvdb::Vec3d point;
   double distance = 0;
   bool converged = false;
-  bool left = false;  ///< the search left the reach of the block at `point`: go on from there
+  /// The search moved more than two voxels from its start: restart it at `point`, in the block
+  /// there.
+  bool left = false;
 };
 
-/// The point of the interpolant's zero set that is closest to `from`, sought from `start`: Newton's
-/// method on φ(y) = 0, (from − y) × ∇φ(y) = 0 [Chopp01, Saye14], with the second derivatives, which
-/// keeps it quadratic at any distance. Safeguarded: bounded steps, stays within two voxels of
-/// `start`; when it does not converge, only `left` says what to do. Positions are in voxels from
-/// the block's origin.
+/// Finds the point of the interpolant's zero set that is closest to `from`, with Newton's method
+/// started at `start`.
+/// Solves φ(y) = 0, (from − y) × ∇φ(y) = 0 [Chopp01, Saye14]. Second derivatives keep the
+/// convergence quadratic at any distance.
+/// Steps are bounded and stay within two voxels of `start`. When the search does not converge, only
+/// `left` is meaningful. Positions are in voxels from the block's origin.
 [[nodiscard]] Foot closestPoint(const DenseBlock& block, const openvdb::Vec3d& from,
                                 const openvdb::Vec3d& start);
 
-/// The same by one step from a point of the zero set, given the derivatives there; not converged
-/// when that is not enough. Positions in any frame.
+/// Finds the closest point in a single Newton step from a point on the zero set, given the
+/// derivatives there. `converged` is false when one step does not suffice. Positions may be in any
+/// frame.
 [[nodiscard]] Foot closestPointByOneStep(const Jet& jet, const openvdb::Vec3d& from,
                                          const openvdb::Vec3d& start);
 
-/// Is there a change of sign among the grid points around a point of the zero set? Where values of
-/// one sign dip towards zero, an interpolant may pass it though the field does not.
+/// Returns true when the grid points around a point of the zero set change sign. Where values of
+/// one sign dip towards zero, an interpolant may cross zero although the field does not.
 [[nodiscard]] bool changesSignAround(const DenseBlock& block, const openvdb::Vec3d& point);
 
 }  // namespace levelset::eikonal

@@ -12,15 +12,15 @@
 namespace levelset {
 namespace {
 
-/// A grid of one value for each closest point: make(its world position).
+/// Builds a grid with one value for each closest point: make(world position of the point).
 template <typename Grid, typename Make>
 typename Grid::Ptr gridOfClosestPoints(const NarrowBand& solid, const ClosestPointOptions& options,
                                        const char* action, const Make& make) {
   using GridLeaf = typename Grid::TreeType::LeafNodeType;
   requireSolid(solid, action);
   if (solid.isEmpty())
-    throw InvalidInput(
-        fmt::format("{}: the solid is empty, so it has no surface; give a solid", action));
+    throw InvalidInput(fmt::format(
+        "{}: the solid is empty, so it has no surface; give a solid with a surface", action));
   eikonal::DistanceRequest request;
   request.action = action;
   request.halfWidth = options.halfWidth.value_or(solid.halfWidth());

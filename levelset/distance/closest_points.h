@@ -9,27 +9,33 @@
 namespace levelset {
 
 struct ClosestPointOptions {
-  std::optional<double> halfWidth = {};  ///< how far from the surface, voxels; empty: as the solid
+  /// Largest distance from the surface, voxels; empty: half width of the solid.
+  std::optional<double> halfWidth = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
-/// The closest-point transform: for each grid point nearer to the surface than the half width, the
-/// point of the surface closest to it, in world units. Found as redistance() does, so φ there is
-/// zero to the order of the tricubic interpolant; stored as float, so at coordinates of 10⁶ voxels
-/// to a sixteenth of a voxel.
-/// @throws InvalidInput for an empty solid; UsageError for a half width below 1; ResourceLimit;
-///         Cancelled
+/// Closest-point transform: for each grid point nearer to the surface than the half width, the
+/// closest point of the surface, in world units.
+/// Uses the same search as redistance(), so φ at that point is zero to the order of the tricubic
+/// interpolant. Stored as float: at coordinates of 10⁶ voxels the resolution is a sixteenth of a
+/// voxel.
+/// @throws InvalidInput for an empty solid
+/// @throws UsageError for a half width below 1
+/// @throws ResourceLimit when the result does not fit into memory
+/// @throws Cancelled
 [[nodiscard]] FieldGrid closestPoints(const NarrowBand& solid,
                                       const ClosestPointOptions& options = {});
 
-/// Carries an attribute off the surface along its normals: at each grid point the value that the
-/// attribute has at the closest point, so ∇φ · ∇q = 0. Elsewhere 0.
-/// @throws UsageError also when the attribute is not set; InvalidInput also when it is not finite
+/// Extends a scalar attribute off the surface along its normals: each grid point within the half
+/// width gets the value of the attribute at its closest point, so ∇φ · ∇q = 0. Other grid points
+/// get 0.
+/// @throws UsageError also when the attribute is not set
+/// @throws InvalidInput also when the attribute is not finite
 [[nodiscard]] FieldGrid extendOffSurface(const NarrowBand& solid, const ScalarField& attribute,
                                          const ClosestPointOptions& options = {});
 
-/// The same of an attribute of vectors, at time 0.
+/// Extends a vector attribute, taken at time 0, off the surface in the same way.
 [[nodiscard]] FieldGrid extendOffSurface(const NarrowBand& solid, const VectorField& attribute,
                                          const ClosestPointOptions& options = {});
 

@@ -27,20 +27,21 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 using Block = NearestPoints::Block;
 
-// A neighbour's surface point further than this from ours belongs to another part of the surface.
+// A neighbour's surface point farther than this from our own belongs to another part of the
+// surface.
 constexpr double kOtherPart = 2;
-// How much nearer another part can turn out to be once both are polished.
+// Another part of the surface can gain at most this much, in voxels, when both points are refined.
 constexpr double kPolishGain = 0.5;
 
-// A grid point whose value is its distance to within the tricubic's own error keeps it, so that
-// what is a distance already does not creep when it is re-distanced again and again. That error is
-// about this much times the square of the curvature; never taken for more than at a radius of 8,
-// nor for less than what rounding leaves. Voxels.
+// A grid point keeps its value when the value is its distance within the tricubic's own error. So
+// repeated redistancing does not shift a distance field. The error is about kTricubicError times
+// the square of the curvature. It is capped at kMostError, its value at a radius of 8 voxels, and
+// never below rounding. Voxels.
 constexpr double kTricubicError = 0.03, kMostError = 1e-3, kRounding = 1e-6;
 
 constexpr int kAttempts = 4;
 
-/// A point of the zero set and how far it is, in voxels.
+/// Point of the zero set and its distance, in voxels.
 struct Closest {
   Vec3d point;
   double distance = 0;
@@ -49,14 +50,14 @@ struct Closest {
   }
 };
 
-/// The point of the zero set closest to one grid point, from the surface points that it and its
-/// neighbours got.
+/// Finds the point of the zero set closest to a grid point. Candidates are the surface points of
+/// the grid point and of its neighbours.
 class Polisher {
  public:
   Polisher(const FloatTree& field, const SurfacePoints& points, const SharpPatches& patches)
       : cache_(field), points_(points), patches_(patches) {}
 
-  /// How far a distance to the surface beside a surface point is off by the interpolation, voxels.
+  /// Returns the interpolation error of distances to the surface beside a surface point, voxels.
   [[nodiscard]] double interpolationError(std::uint32_t point) const {
     const Jet jet = points_.jets[point].jet();
     const double bend = jet.xx * jet.xx + jet.yy * jet.yy + jet.zz * jet.zz +
@@ -85,8 +86,9 @@ class Polisher {
   }
 
  private:
-  /// Closest on the surface near a surface point: on the patches or on the interpolant, and where
-  /// the way leads from one to the other, on that.
+  /// Finds the closest point of the surface near a surface point. The search starts on the patches
+  /// or on the interpolant, where the surface point lies. It changes over when the point it finds
+  /// belongs to the other one.
   Closest polish(const Vec3d& x, std::uint32_t point) {
     const Vec3d start = points_.positions[point];
     if (!points_.sharp[point]) {
@@ -101,9 +103,9 @@ class Polisher {
     return polishOnInterpolant(x, hit.point);
   }
 
-  /// The foot that Newton's method finds from `start`; that itself if it fails.
-  /// Far inside, where the ways to much of the surface are almost as long, the foot may be far
-  /// along it.
+  /// Finds the foot point with Newton's method from `start`; returns `start` if that fails. Far
+  /// inside, much of the surface is almost equally near. The foot may then be far along the
+  /// surface, so the search restarts from where it left the block.
   Closest polishOnInterpolant(const Vec3d& x, Vec3d start) {
     const Closest first{start, (x - start).length()};
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
@@ -137,14 +139,13 @@ class Polisher {
   const SharpPatches& patches_;
 };
 
-/// What the result holds in the place of a block: a leaf, or a tile when no value of it lies in the
-/// band and all are of one sign.
+/// Result for one block: a leaf, or a tile when no value lies in the band and all have one sign.
 struct LeafOrTile {
   std::unique_ptr<LeafNode> leaf;
   float tile = 0;
 };
 
-/// @param before the field's values there, null where it has none
+/// @param before  leaf of the input field; null where the field has none
 LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Polisher& polisher,
                     const DistanceRequest& request, double voxelSize, float background) {
   const double shift = request.shift, halfWidth = request.halfWidth;
@@ -164,7 +165,7 @@ LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Polisher& polish
         if (points) (*points)[n] = closest.point;
       }
     }
-    // A grid point that was inside stays so when its distance rounds to nothing.
+    // An inside grid point stays inside when its distance rounds to zero.
     if (inside && shift == 0) value = std::min(value, -1e-7);
     if (before && shift == 0 && before->isValueOn(n)) {
       const double kept = static_cast<double>(before->getValue(n)) / voxelSize;
@@ -233,14 +234,14 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   if (within)
     within->expand(static_cast<int>(std::min(1e9, std::max(reach.inside, reach.outside) + 2)));
 
-  // === Points of the surface
+  // === Surface points
   FloatTree::ConstPtr interpolated = field.constTreePtr();
-  const auto tell = [&](double done) {
+  const auto reportProgress = [&](double done) {
     report(request.progress, 0.2 * done, request.action);
     return true;
   };
   const SharpPatches patches =
-      request.mayHaveEdges ? SharpPatches(field, within, tell) : SharpPatches();
+      request.mayHaveEdges ? SharpPatches(field, within, reportProgress) : SharpPatches();
   SurfacePoints points = findSurfacePoints(*interpolated, within, patches);
   if (points.thin) {
     interpolated = thicken(field.tree());
@@ -249,25 +250,25 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   if (points.size() == 0)
     throw InvalidInput(
         fmt::format("{}: the field has no zero crossing{}, so there is no surface to "
-                    "measure from; give a solid",
-                    request.action, within ? " within reach of the region" : ""));
+                    "measure from; give a solid with a surface",
+                    request.action, within ? " near the region" : ""));
   if (points.size() >= NearestPoints::kNone)
     throw ResourceLimit(
         fmt::format("{}: more than 2^32 grid points lie beside the surface; use larger "
                     "voxels",
                     request.action));
-  MemoryEstimate room;
-  for (const Coord& c : points.gridPoints) room.surface.expand(c);
-  // There are at least 1.15 points to a unit of area.
-  room.area = static_cast<double>(points.size()) / 1.15;
-  room.inside = reach.inside;
-  room.outside = reach.outside;
-  room.region = request.region;
-  room.bytesPerGridPoint = 25;  // state and result, with the unused part of blocks
-  checkMemory(room, request.maxMemory, request.action);
+  MemoryEstimate estimate;
+  for (const Coord& c : points.gridPoints) estimate.surface.expand(c);
+  // There are at least 1.15 points per unit of area.
+  estimate.area = static_cast<double>(points.size()) / 1.15;
+  estimate.inside = reach.inside;
+  estimate.outside = reach.outside;
+  estimate.region = request.region;
+  estimate.bytesPerGridPoint = 25;  // state and result, including the unused part of blocks
+  checkMemory(estimate, request.maxMemory, request.action);
   report(request.progress, 0.3, request.action);
 
-  // === Nearest of them for each grid point
+  // === Nearest surface point of each grid point
   NearestPoints nearest(field.tree(), points, reach);
   nearest.run(subProgress(request.progress, 0.3, 0.6), request.action);
 

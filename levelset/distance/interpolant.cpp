@@ -17,7 +17,7 @@ Float4 load4(const float* values) {
   return result;
 }
 
-/// Catmull-Rom weights of four samples at -1, 0, 1, 2 and their two derivatives.
+/// Catmull-Rom weights of four samples at -1, 0, 1, 2, with first and second derivatives.
 struct Weights {
   float w[4], d[4], dd[4];
   explicit Weights(double t) {
@@ -49,7 +49,7 @@ double dot(const float (&w)[4], const Float4& v) {
 
 void DenseBlock::load(const openvdb::FloatGrid::ConstAccessor& accessor, const Coord& origin) {
   origin_ = origin;
-  // Per axis: the pad before the leaf, the leaf, the pad after it.
+  // Per axis: the padding before the leaf, the leaf, the padding after it.
   constexpr int kFrom[3] = {-kPad, 0, 8}, kTo[3] = {0, 8, 8 + kPad};
   for (int bx = 0; bx < 3; ++bx)
     for (int by = 0; by < 3; ++by)

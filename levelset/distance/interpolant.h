@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal and levelset/solids only.
+// Internal header of levelset: public headers must not include it.
 
 #include <array>
 #include <cstring>
@@ -9,7 +9,7 @@
 
 namespace levelset::eikonal {
 
-/// Value and derivatives up to the second of an interpolated field, per voxel.
+/// Value, gradient and second derivatives of an interpolated field, per voxel.
 struct Jet {
   double value = 0;
   openvdb::Vec3d gradient;
@@ -21,7 +21,7 @@ struct Jet {
   }
 };
 
-/// A jet to be kept by the million.
+/// Jet in single precision, for arrays of millions.
 struct CompactJet {
   std::array<float, 10> numbers{};
   CompactJet() = default;
@@ -36,14 +36,14 @@ struct CompactJet {
   }
 };
 
-/// Dense copy of a leaf block of a tree and of four grid points on each side of it. Interpolates
-/// tricubically (Catmull-Rom: passes through the grid values, C¹). Positions are in voxels from the
-/// first grid point of the leaf.
+/// Dense copy of a leaf block and of four grid points on each side of it. Interpolates tricubically
+/// (Catmull-Rom: passes through the grid values, C¹). Positions are in voxels from the first grid
+/// point of the leaf.
 class DenseBlock {
  public:
   static constexpr int kPad = 4;
   static constexpr int kSide = 16;
-  /// Where the 4³ stencil lies inside the copy.
+  /// Bounds of the positions whose 4³ stencil lies inside the copy.
   static constexpr double kDomainMin = 1 - kPad;
   static constexpr double kDomainMax = kSide - kPad - 2;
 
@@ -59,6 +59,7 @@ class DenseBlock {
       if (!(p[i] >= kDomainMin && p[i] < kDomainMax)) return false;
     return true;
   }
+  /// Interpolates value and derivatives at a position.
   /// @pre contains(p)
   [[nodiscard]] Jet jet(const openvdb::Vec3d& p) const;
 
@@ -67,11 +68,11 @@ class DenseBlock {
   alignas(64) std::array<float, kSide * kSide * kSide> values_;
 };
 
-/// A few dense blocks of one tree, kept while neighbouring positions are asked for. One per thread.
+/// Cache of a few dense blocks of one tree, for queries at neighbouring positions. One per thread.
 class DenseBlockCache {
  public:
   explicit DenseBlockCache(const openvdb::FloatTree& tree) : accessor_(tree) {}
-  /// The block whose leaf holds the cell of `position` (index space).
+  /// Returns the block whose leaf holds the cell of `position` (index space).
   const DenseBlock& around(const openvdb::Vec3d& position);
 
  private:
@@ -84,7 +85,7 @@ class DenseBlockCache {
   std::vector<Slot> slots_ = std::vector<Slot>(kSlots);
 };
 
-/// First grid point of the leaf block that holds a position.
+/// Returns the first grid point of the leaf block that holds a position.
 [[nodiscard]] inline openvdb::Coord leafOrigin(const openvdb::Vec3d& position) {
   return openvdb::Coord::floor(position) & ~7;
 }

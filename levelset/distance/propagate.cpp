@@ -17,7 +17,7 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using Block = NearestPoints::Block;
 
-// A surface point found for a neighbour may stand off our own by half a voxel along the surface.
+// A neighbour's surface point may differ from our own by half a voxel along the surface.
 constexpr double kBlockMargin = 0.5;
 
 int directionIndex(const Coord& d) {
@@ -47,7 +47,7 @@ float squareOf(double x) {
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 = std::int32_t __attribute__((vector_size(16)));
 
-/// Relaxes one block to rest, given its neighbours.
+/// Relaxes one block until it is stable, given its neighbours.
 class BlockWorker {
  public:
   BlockWorker(Block& block, const SurfacePoints& points) : block_(block), points_(points) {
@@ -61,7 +61,7 @@ class BlockWorker {
   void relax() {
     changed_ = block_.queued;
     for (auto it = block_.queued.beginOn(); it; ++it) queue_.push_back(it.pos());
-    const std::uint32_t news = block_.inbox.exchange(0, std::memory_order_relaxed);
+    const std::uint32_t news = block_.dirtyNeighbours.exchange(0, std::memory_order_relaxed);
     for (int i = 0; i < 27; ++i)
       if (news >> i & 1) readNeighbour(i);
     for (std::size_t head = 0; head < queue_.size(); ++head) {
@@ -71,12 +71,13 @@ class BlockWorker {
     }
   }
 
-  /// Bit i: neighbour i can use what changed here, as far as `limit` (squared).
+  /// Returns the neighbours that the changes of this block can improve: bit i for neighbour i.
+  /// Squared distances of `limit` and more do not count.
   [[nodiscard]] std::uint32_t outbox(float limit) const;
 
  private:
-  // Squared distances of the block with two grid points around it that accept nothing (-1), so that
-  // rows of four can be compared without looking where they lie.
+  // Squared distances of the block and of two grid points around it. The padding holds -1 and
+  // accepts nothing, so rows of four need no bounds check.
   static constexpr int kPad = 2, kSide = 12, kRow = 16;
   static std::size_t slot(int x, int y, int z) {
     return static_cast<std::size_t>(((x + kPad) * kSide + y + kPad) * kRow + z + kPad);
@@ -98,7 +99,8 @@ class BlockWorker {
     queue_.push_back(n);
   }
 
-  /// To the grid points of the block around a position, which may be one outside it.
+  /// Offers a surface point to the grid points of the block around a position. The position may lie
+  /// one grid point outside the block.
   void offerAround(const Coord& c, std::uint32_t point) {
     const openvdb::Vec3f at = local(point);
     const float dz = at[2] - static_cast<float>(c.z() - 1);
@@ -111,7 +113,7 @@ class BlockWorker {
         const Float4 squared = squareZ + (dx * dx + dy * dy);
         Float4 held;
         std::memcpy(&held, &held_[slot(x, y, c.z() - 1)], sizeof(held));
-        const Int4 better = squared < held;  // the first of equals stays: the order is fixed
+        const Int4 better = squared < held;  // a tie keeps the first point, so the order is fixed
         std::uint64_t any[2];
         std::memcpy(any, &better, sizeof(any));
         if (!(any[0] | any[1])) continue;
@@ -124,7 +126,7 @@ class BlockWorker {
   void readNeighbour(int index) {
     const Block& other = *block_.neighbours[static_cast<std::size_t>(index)];
     const Coord d = direction(index);
-    Coord from, to;  // in the block's own coordinates
+    Coord from, to;  // block coordinates
     for (int i = 0; i < 3; ++i) {
       from[i] = d[i] < 0 ? -1 : d[i] > 0 ? 8 : 0;
       to[i] = d[i] < 0 ? -1 : d[i] > 0 ? 8 : 7;
@@ -223,7 +225,7 @@ void NearestPoints::seedBesideSurface() {
   for (std::uint32_t i = 0; i < points_.gridPoints.size(); ++i)
     if (!reach_.region || reach_.region->isInside(points_.gridPoints[i]))
       seed(points_.gridPoints[i], i, true);
-  // An edge may lie nearer to a grid point than what its neighbours found on the faces.
+  // An edge may be nearer to a grid point than the points that its neighbours found on the faces.
   for (std::size_t i = points_.gridPoints.size(); i < points_.size(); ++i) {
     const Coord cell = Coord::floor(points_.positions[i]);
     for (int corner = 0; corner < 8; ++corner) {
@@ -235,8 +237,8 @@ void NearestPoints::seedBesideSurface() {
 }
 
 void NearestPoints::seedRegionBoundary() {
-  // The straight way from a grid point to its closest point leaves the region through its boundary:
-  // with the boundary right, nothing outside has to be visited.
+  // The straight segment from a grid point to its closest point leaves the region through the
+  // boundary. With correct values on the boundary, no block outside needs a visit.
   const PointTree tree(points_.positions);
   const openvdb::CoordBBox& box = *reach_.region;
   const double limit = std::max(reach_.inside, reach_.outside) + kBlockMargin;
@@ -271,7 +273,7 @@ void NearestPoints::process(Block& block, std::vector<Coord>& missing) const {
   for (int i = 0; i < 27; ++i) {
     if (!(news >> i & 1)) continue;
     if (Block* other = block.neighbours[static_cast<std::size_t>(i)])
-      other->inbox.fetch_or(1u << (26 - i), std::memory_order_relaxed);
+      other->dirtyNeighbours.fetch_or(1u << (26 - i), std::memory_order_relaxed);
     else
       missing.push_back(block.origin + blockStep(i));
   }
@@ -292,7 +294,7 @@ void NearestPoints::run(const Progress& progress, const char* action) {
     for (auto& candidates : byParity) {
       std::vector<Block*> due;
       for (Block* block : candidates)
-        if (block->inbox.load(std::memory_order_relaxed) || !block->queued.isOff())
+        if (block->dirtyNeighbours.load(std::memory_order_relaxed) || !block->queued.isOff())
           due.push_back(block);
       if (due.empty()) continue;
       again = true;
@@ -306,7 +308,8 @@ void NearestPoints::run(const Progress& progress, const char* action) {
           if (reach_.region && !reach_.region->hasOverlap(extent)) continue;
           Block& block = touch(origin);
           const Coord back = due[i]->origin - origin;
-          block.inbox.fetch_or(1u << directionIndex({back.x() / 8, back.y() / 8, back.z() / 8}));
+          block.dirtyNeighbours.fetch_or(
+              1u << directionIndex({back.x() / 8, back.y() / 8, back.z() / 8}));
         }
       sortNew();
     }

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal only.
+// Internal header of levelset: public headers must not include it.
 
 #include <array>
 #include <atomic>
@@ -12,12 +12,11 @@
 
 namespace levelset::eikonal {
 
-/// For each grid point near the zero set, the nearest of the surface points.
-///
-/// Grid points hand what they have to their 26 neighbours until nothing improves. Inside a leaf
-/// block that runs by a queue; between blocks by rounds over the eight parities of their positions.
-/// Blocks of one parity never touch, so they run in parallel and the order, hence the result, is
-/// fixed.
+/// Nearest surface point of each grid point near the zero set.
+/// Each grid point offers its surface point to its 26 neighbours until nothing improves. A queue
+/// drives this inside a leaf block. Between blocks it runs in rounds over the eight parities of the
+/// block positions. Blocks of one parity never touch, so they run in parallel; the order, and so
+/// the result, is fixed.
 class NearestPoints {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
@@ -25,14 +24,17 @@ class NearestPoints {
 
   struct Block {
     openvdb::Coord origin;
-    std::array<std::uint32_t, 512> nearest;  ///< number of the surface point
-    std::array<float, 512> squared;          ///< to it, voxels²; without it, what is out of reach
-    Mask inside;                             ///< φ < 0
-    Mask own;  ///< holds the surface point that was found for this very grid point
-    std::array<Block*, 27> neighbours{};   ///< as far as they exist
-    openvdb::Coord low, high;              ///< grid points of the block in the region, inclusive
-    std::atomic<std::uint32_t> inbox = 0;  ///< bit i: neighbour i has something new at the border
-    Mask queued;                           ///< has something new for the grid points around it
+    std::array<std::uint32_t, 512> nearest;  ///< index of the nearest surface point
+    /// Squared distance to the nearest surface point, voxels². Without one: the square of the
+    /// largest distance that counts.
+    std::array<float, 512> squared;
+    Mask inside;  ///< φ < 0
+    Mask own;     ///< grid points whose surface point was found for that very grid point
+    std::array<Block*, 27> neighbours{};  ///< null where there is no block
+    openvdb::Coord low, high;  ///< bounds of the block's grid points in the region, inclusive
+    /// Bit i: neighbour i changed at the shared border.
+    std::atomic<std::uint32_t> dirtyNeighbours = 0;
+    Mask queued;  ///< grid points that must offer their surface point to their neighbours
   };
 
   struct Reach {

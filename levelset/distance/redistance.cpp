@@ -10,7 +10,7 @@
 namespace levelset {
 namespace {
 
-/// The smallest box of grid points that holds a world box.
+/// Returns the smallest box of grid points that holds a world box.
 openvdb::CoordBBox gridBox(const openvdb::math::Transform& transform, const Imath::Box3d& box) {
   openvdb::BBoxd index;
   for (int corner = 0; corner < 8; ++corner) {
@@ -18,7 +18,7 @@ openvdb::CoordBBox gridBox(const openvdb::math::Transform& transform, const Imat
                        corner & 4 ? box.max.z : box.min.z);
     index.expand(transform.worldToIndex(toVdb(p)));
   }
-  // What rounding adds must not add a layer.
+  // Rounding must not add a layer of grid points.
   const openvdb::Vec3d slack(1e-6);
   return {openvdb::Coord::floor(index.min() + slack), openvdb::Coord::ceil(index.max() - slack)};
 }
@@ -34,7 +34,8 @@ bool isFinite(const Imath::Box3d& box) {
 NarrowBand redistance(NarrowBand field, const RedistanceOptions& options) {
   requireSolid(field, "redistance");
   if (field.isEmpty())
-    throw InvalidInput("redistance: the field has no zero crossing, it is empty; give a solid");
+    throw InvalidInput(
+        "redistance: the field is empty and has no zero crossing; give a solid with a surface");
   eikonal::DistanceRequest request;
   request.halfWidth = options.halfWidth.value_or(field.halfWidth());
   if (!std::isfinite(request.halfWidth) || request.halfWidth < 1)
@@ -42,7 +43,9 @@ NarrowBand redistance(NarrowBand field, const RedistanceOptions& options) {
         fmt::format("redistance: the half width is {} voxels; give at least 1", request.halfWidth));
   if (options.region) {
     if (options.region->isEmpty() || !isFinite(*options.region))
-      throw UsageError("redistance: the region is empty or not finite; give a box");
+      throw UsageError(
+          "redistance: the region is empty or has a coordinate that is not finite; give a finite "
+          "box");
     request.region = gridBox(vdb(field).transform(), *options.region);
   }
   request.maxMemory = options.maxMemory;

@@ -11,38 +11,41 @@
 namespace levelset {
 
 struct RedistanceOptions {
-  std::optional<double> halfWidth = {};     ///< of the result, voxels; empty: as the operand
-  std::optional<Imath::Box3d> region = {};  ///< world box: distances are made only inside it
+  /// Half width of the result, voxels; empty: that of the operand.
+  std::optional<double> halfWidth = {};
+  std::optional<Imath::Box3d> region = {};  ///< world box: distances are computed only inside it
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
-/// Voxels beside the surface that distances are made from, edges and the faces that meet there
-/// included.
+/// Distance from the surface, in voxels, within which field values affect the surface points.
+/// Includes edges and the faces that meet there.
 inline constexpr double kReadBySurface = 6;
 
-/// Voxels about a place that decide which distances are made there, of a surface and of those
-/// beside it.
-/// @param halfWidth  of the result, voxels
+/// Radius around a point, in voxels, within which the field determines the distance computed there.
+/// @param halfWidth  half width of the result, voxels
 [[nodiscard]] inline double distanceReach(double halfWidth) {
   return halfWidth + 2 * kReadBySurface;
 }
 
-/// Makes a signed distance again out of a field that has the right zero set, without moving that.
-/// Beside the interface each grid point finds the closest point on a tricubic interpolant by
-/// Newton's method [Chopp01, Saye14]; from there closest points travel outwards block by block, and
-/// each grid point keeps the nearest and polishes it on the interpolant. Second order in the voxel
-/// size and better on smooth surfaces; edges and corners of faces that are flat beside them are
-/// those of `mesh --sharp`, others are rounded by up to 0.75 voxel. The result does not depend on
-/// the order of blocks or on the number of threads. A value that is right to the tricubic's own
-/// error (1e-3 voxel at a radius of curvature of 8, less where it is flatter) is kept, so a
-/// distance keeps its bits where radii of curvature exceed 10 voxels.
+/// Recomputes a signed distance from a field with the right zero set, without moving the zero set.
+/// Beside the surface each grid point finds its closest point on a tricubic interpolant with
+/// Newton's method [Chopp01, Saye14]. From there closest points propagate outwards block by block.
+/// Each grid point keeps the nearest one and refines it on the interpolant.
+/// The error is of second order in the voxel size, and smaller on smooth surfaces. Edges and
+/// corners between faces that are flat beside them are those of `mesh --sharp`. Other edges are
+/// rounded by up to 0.75 voxel. The result does not depend on the order of blocks or on the number
+/// of threads.
+/// A value within the tricubic's own error is kept (1e-3 voxel at a radius of curvature of 8, less
+/// on flatter parts). So a distance field keeps its bits where radii of curvature exceed 10 voxels.
 /// @param field  right sign everywhere, Lipschitz, any slope; only values beside the zero set are
 ///               read
-/// @return       with `region`, distances on the smallest box of grid points that holds it;
-///               signs everywhere
-/// @throws InvalidInput if the field has no zero crossing; UsageError for a half width below 1 or
-///         an empty region; ResourceLimit; Cancelled
+/// @return with `region`, distances on the smallest box of grid points that holds it; signs
+///         everywhere
+/// @throws InvalidInput if the field has no zero crossing
+/// @throws UsageError for a half width below 1 or an empty region
+/// @throws ResourceLimit when the result does not fit into memory
+/// @throws Cancelled
 [[nodiscard]] NarrowBand redistance(NarrowBand field, const RedistanceOptions& options = {});
 
 }  // namespace levelset

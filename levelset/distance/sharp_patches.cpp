@@ -22,19 +22,19 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Second differences of unit slope beyond which a grid point may lie beside an edge, voxels.
+// Second difference, voxels per unit slope, above which a grid point may lie beside an edge.
 constexpr double kSharpBend = 0.15;
-// The interpolant of a cell sees an edge up to this many cells away, and the bisectors of its
-// faces.
+// An edge affects the interpolant of cells up to this many cells away, and so do the bisector
+// planes of its faces.
 constexpr int kZone = 3;
-// Where another sheet faces away this near to an edge, in voxels, the values between both belong to
-// either, and the planes that they tell lie on neither.
+// An edge is rejected when another sheet that faces away lies nearer than this, in voxels. The
+// values between both mix the two, and planes fitted to them lie on neither.
 constexpr double kThin = 2;
-// Normals with a smaller scalar product face away from each other. So do the faces of a knife edge
-// of less than 26°, which looks like the rim of a plate and is left to the interpolant like that.
+// Two normals face away from each other when their dot product is below this. The faces of a knife
+// edge below 26° count too: it looks like the rim of a plate, and both stay on the interpolant.
 constexpr double kFacesAway = -0.9;
 
-/// Is there a sharp bend at a grid point beside the surface?
+/// Returns true when the field bends sharply at a grid point beside the surface.
 bool bends(const DenseBlock& block, double limit) {
   constexpr int kSteps[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   for (int x = 0; x < 8; ++x)
@@ -54,7 +54,7 @@ bool bends(const DenseBlock& block, double limit) {
   return false;
 }
 
-/// The leaves where the field bends beside the surface, and all around them.
+/// Returns the leaves where the field bends beside the surface, with all leaves around them.
 FloatGrid::Ptr bentPart(const FloatGrid& field, const std::optional<CoordBBox>& within) {
   std::vector<const LeafNode*> leaves;
   for (auto it = field.tree().cbeginLeaf(); it; ++it)
@@ -88,11 +88,11 @@ FloatGrid::Ptr bentPart(const FloatGrid& field, const std::optional<CoordBBox>& 
   return part;
 }
 
-/// The triangles of a mesh by the cells that their centroids lie in, to find thin places.
+/// Triangles of a mesh, sorted by the cells of their centroids, to find thin parts.
 class SheetTable {
  public:
   explicit SheetTable(const SharpMesh& mesh) {
-    openvdb::MaskTree near;  // leaves within reach of a feature
+    openvdb::MaskTree near;  // leaves near a feature
     for (std::size_t v = 0; v < mesh.sheets.size(); ++v)
       for (int corner = 0; corner < 8 && mesh.sheets[v].count > 1; ++corner)
         near.touchLeaf(Coord::floor(mesh.positions[v] + Vec3d(corner & 4 ? kThin : -kThin,
@@ -148,7 +148,7 @@ SharpPatches::SharpPatches(const FloatGrid& field, const std::optional<CoordBBox
   const CellSurface surface(*part);
   const SharpMesh mesh = sharpSurface(surface, *part, progress);
 
-  // === Where an edge is sure
+  // === Confirmed edges
   const bool hasFeatures = std::any_of(mesh.sheets.begin(), mesh.sheets.end(),
                                        [](const VertexSheets& s) { return s.count > 1; });
   if (!hasFeatures) return;
@@ -162,12 +162,12 @@ SharpPatches::SharpPatches(const FloatGrid& field, const std::optional<CoordBBox
   openvdb::tools::dilateActiveValues(zone_, kZone, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                      openvdb::tools::IGNORE_TILES);
 
-  // === What is used there
+  // === Patches around them
   border_.topologyUnion(zone_);
   openvdb::tools::dilateActiveValues(border_, 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                      openvdb::tools::IGNORE_TILES);
-  // Beyond the zone too: a point at its border must find the surface that goes on there nearer than
-  // the last triangle that touches the zone.
+  // Patches extend beyond the zone. A point at its border must find the continuing surface nearer
+  // than the last triangle that touches the zone.
   openvdb::MaskTree around(border_);
   openvdb::tools::dilateActiveValues(around, 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                      openvdb::tools::IGNORE_TILES);

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal only.
+// Internal header of levelset: public headers must not include it.
 
 #include <functional>
 
@@ -8,8 +8,8 @@
 
 namespace levelset::eikonal {
 
-/// Sets ± background of `result` by the signs of `field`, but for the leaf blocks that `holds` says
-/// are made by somebody else.
+/// Writes ± background into `result` with the signs of `field`. Skips the leaf blocks for which
+/// `holds` returns true: the caller fills those.
 void copySigns(const openvdb::FloatTree& field,
                const std::function<bool(const openvdb::Coord& origin)>& holds,
                openvdb::FloatTree& result);

@@ -23,16 +23,16 @@ using LeafNode = FloatTree::LeafNodeType;
 constexpr std::array<std::array<int, 3>, 6> kDirections = {
     {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}}};
 
-// Linear crossings stand off the interpolant's by up to about this much.
+// Linear crossings differ from those of the interpolant by up to about this much, voxels.
 constexpr double kCrossingTolerance = 0.05;
-// A sharp surface stands off the linear crossings by up to about this much.
+// A sharp surface differs from the linear crossings by up to about this much, voxels.
 constexpr double kSharpTolerance = 0.5;
 
 Vec3d vectorOf(const std::array<int, 3>& d) {
   return Vec3d(d[0], d[1], d[2]);
 }
 
-/// Where linear interpolation puts the crossings on the six edges at a grid point; 2 = no crossing.
+/// Linear crossings on the six edges at a grid point, as distances in voxels; 2: no crossing.
 struct Crossings {
   std::array<double, 6> at;
   int nearest = 0;
@@ -54,12 +54,13 @@ struct Crossings {
   }
 };
 
-/// The gradient's guess where it is plausible, else the nearest crossing.
+/// Returns the gradient's estimate of the foot point where it is plausible, else the nearest
+/// crossing.
 Vec3d firstGuess(const DenseBlock& block, int x, int y, int z, const Crossings& crossings) {
   const auto difference = [&](int dx, int dy, int dz) {
-    const double ahead = block.at(x + dx, y + dy, z + dz),
-                 behind = block.at(x - dx, y - dy, z - dz);
-    return (ahead - behind) / 2;
+    const double forward = block.at(x + dx, y + dy, z + dz),
+                 backward = block.at(x - dx, y - dy, z - dz);
+    return (forward - backward) / 2;
   };
   const Vec3d gradient(difference(1, 0, 0), difference(0, 1, 0), difference(0, 0, 1));
   const double squared = gradient.lengthSqr();
@@ -70,8 +71,9 @@ Vec3d firstGuess(const DenseBlock& block, int x, int y, int z, const Crossings& 
   return crossings.offset(crossings.nearest);
 }
 
-/// Closest point of the zero set to a grid point beside it. Each crossing nearer than what Newton's
-/// method found is a start of its own, so both walls of a narrow gap are seen.
+/// Finds the closest point of the zero set to a grid point beside it. A crossing nearer than the
+/// point that Newton's method found is used as another start, so both walls of a narrow gap are
+/// found.
 Vec3d findFoot(const DenseBlock& block, int x, int y, int z, const Crossings& crossings) {
   const Vec3d from(x, y, z);
   Foot best = closestPoint(block, from, from + firstGuess(block, x, y, z, crossings));
@@ -81,7 +83,7 @@ Vec3d findFoot(const DenseBlock& block, int x, int y, int z, const Crossings& cr
     const Foot other = closestPoint(block, from, from + crossings.offset(i));
     if (other.converged && (!best.converged || other.distance < best.distance)) best = other;
   }
-  // On creases the method may find no rest; the crossing does lie on the surface.
+  // On creases Newton's method may not converge; a crossing always lies on the surface.
   const bool plausible = best.converged && changesSignAround(block, best.point) &&
                          best.distance <= crossings.nearestDistance() + 4 * kCrossingTolerance;
   return plausible ? best.point : from + crossings.offset(crossings.nearest);
@@ -111,7 +113,7 @@ std::vector<const LeafNode*> leavesOf(const FloatTree& tree,
   return leaves;
 }
 
-/// Calls work(leaf number, dense block around it) for all, in parallel.
+/// Calls work(leaf number, dense block around it) for all leaves, in parallel.
 template <typename Work>
 void forEachBlock(const FloatTree& tree, const std::vector<const LeafNode*>& leaves,
                   const Work& work) {
@@ -125,9 +127,10 @@ void forEachBlock(const FloatTree& tree, const std::vector<const LeafNode*>& lea
   });
 }
 
-/// Extrapolation to a grid point that holds the bare background, from what lies behind it along
-/// each axis: the mean of what they say, beyond the background. 0 = there is nothing behind it.
-/// Quadratic where that bends the line only gently, so that smooth fields keep their order.
+/// Extrapolates to a grid point that holds the bare background. Takes the mean over the axes, at
+/// least the background; returns 0 when no axis has two distances to extrapolate from. The
+/// extrapolation is quadratic where the second difference is small, so that smooth fields keep
+/// their order.
 float extrapolate(const DenseBlock& block, int x, int y, int z, float background) {
   constexpr float kGentle = 0.25f;
   const float sign = block.at(x, y, z) < 0 ? -1.0f : 1.0f;
@@ -167,13 +170,13 @@ void addLayer(FloatTree& tree) {
     for (const auto& [n, value] : additions[i]) leaf->setValueOnly(n, value);
 }
 
-/// Does the interpolant beside this grid point read values that were cut off at the background?
+/// Returns true when the interpolant beside this grid point reads values clipped to the background.
 bool isThinAt(const DenseBlock& block, int x, int y, int z, float background) {
   const float here = std::abs(block.at(x, y, z));
   for (const auto& d : kDirections) {
     const float one = std::abs(block.at(x + d[0], y + d[1], z + d[2]));
     const float two = std::abs(block.at(x + 2 * d[0], y + 2 * d[1], z + 2 * d[2]));
-    // What lies further than a straight continuation says was not cut off.
+    // A value beyond the linear continuation was not clipped.
     if (one >= background || (two >= background && 2 * one - here > 1.02f * background))
       return true;
   }

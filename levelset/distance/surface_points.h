@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal only.
+// Internal header of levelset: public headers must not include it.
 
 #include <cstdint>
 #include <optional>
@@ -12,25 +12,28 @@
 
 namespace levelset::eikonal {
 
-/// The closest points of the zero set, one for each grid point that has a neighbour of other sign,
-/// sorted by leaf block in tree order, then by grid point; then the points on edges and corners.
+/// Closest points of the zero set, one for each grid point with a neighbour of the other sign. They
+/// are sorted by leaf block in tree order, then by grid point. Points on edges and corners follow.
 struct SurfacePoints {
-  std::vector<openvdb::Vec3d> positions;   ///< index space
-  std::vector<openvdb::Coord> gridPoints;  ///< whose closest point it is; not of edges and corners
-  std::vector<CompactJet> jets;            ///< of the interpolant there; zero where it has none
-  std::vector<char> sharp;                 ///< lies on the patches, not on the interpolant
-  bool thin = false;  ///< the interpolant saw grid points without a distance: thicken() the field
+  std::vector<openvdb::Vec3d> positions;  ///< index space
+  std::vector<openvdb::Coord>
+      gridPoints;                ///< grid point of each closest point; none for edges and corners
+  std::vector<CompactJet> jets;  ///< derivatives of the interpolant at the point; zero on patches
+  std::vector<char> sharp;       ///< point lies on the patches, not on the interpolant
+  /// The interpolant read grid points without a distance: call thicken() on the field.
+  bool thin = false;
   [[nodiscard]] std::size_t size() const { return positions.size(); }
 };
 
-/// Finds them among the leaf blocks that touch `within` (all if empty). A pair of neighbours counts
-/// when at least one of them holds a distance: two opposite backgrounds say nothing of a surface.
+/// Finds the surface points in the leaf blocks that touch `within` (empty: all). A pair of
+/// neighbours counts when at least one holds a distance: two opposite backgrounds do not locate a
+/// surface.
 [[nodiscard]] SurfacePoints findSurfacePoints(const openvdb::FloatTree& field,
                                               const std::optional<openvdb::CoordBBox>& within,
                                               const SharpPatches& patches);
 
-/// The field with two layers more on each side, extrapolated along the axes: by a parabola where
-/// the field is smooth, else straight.
+/// Returns the field with two more layers on each side, extrapolated along the axes. The
+/// extrapolation is parabolic where the field is smooth, else linear.
 [[nodiscard]] openvdb::FloatTree::Ptr thicken(const openvdb::FloatTree& field);
 
 }  // namespace levelset::eikonal

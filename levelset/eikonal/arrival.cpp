@@ -10,6 +10,8 @@
 #include "levelset/distance/signs.h"
 #include "levelset/eikonal/arrival_start.h"
 #include "levelset/eikonal/arrival_vdb.h"
+#include "levelset/eikonal/fast_marching.h"
+#include "levelset/eikonal/fast_sweeping.h"
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
 #include "levelset/memory_estimate.h"
@@ -26,11 +28,12 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
 constexpr double kBytesPerGridPoint = 24;
-// A grid point that was inside stays so when its time rounds to nothing, voxels.
+// Least depth of a grid point that was inside, voxels: it stays inside when its time rounds to
+// zero.
 constexpr double kLeastDepth = 1e-7;
 constexpr double kStarted = 0.1;  // share of the work
 
-/// At an index position; kFar where nothing passes. Empty at speed 1.
+/// Returns the slowness at index positions; kFar where the front cannot pass. Empty at speed 1.
 Slowness slownessOf(const ScalarField& speed, const openvdb::math::Transform& transform) {
   if (!speed) return {};
   return [&](const Vec3d& index) {
@@ -49,8 +52,8 @@ Slowness scaled(const Slowness& slowness, double unit) {
 
 class Solver {
  public:
-  /// @param slowness  over `unit`, the typical one: so the times of the solver are about voxels
-  /// @param sources   empty: the front starts at the surface that `side` has
+  /// @param slowness  slowness divided by `unit`, the typical one, so that times are about voxels
+  /// @param sources  empty: the front starts at the surface of `side`
   Solver(const ArrivalRequest& request, const openvdb::math::Transform& transform,
          const FloatTree* side, std::vector<Vec3d> sources, const Slowness& slowness, double unit)
       : request_(request),
@@ -94,7 +97,8 @@ class Solver {
     return static_cast<float>(static_cast<double>(block.time[n]) * voxelTime_);
   }
 
-  /// The grid points that makeLeaf() gives a time: a start may come too late for one.
+  /// Returns the grid points to which makeLeaf() gives a time. A start time may exceed the latest
+  /// time.
   [[nodiscard]] ArrivalBlock::Mask reachedOf(const ArrivalBlock& block) const {
     ArrivalBlock::Mask reached = block.known;
     for (auto it = block.known.beginOn(); it; ++it)
@@ -145,20 +149,20 @@ class Solver {
   const ArrivalRequest& request_;
   const openvdb::math::Transform& transform_;
   const FloatTree* side_;
-  double voxelTime_;  ///< that the front takes for a voxel at the typical speed
+  double voxelTime_;  ///< time that the front takes for a voxel at the typical speed
   std::unique_ptr<ArrivalBlocks> blocks_;
 };
 
-void checkRoom(const std::vector<StartTime>& start, const FloatGrid& field,
-               const ArrivalRequest& request) {
-  // How far another speed goes is seen on the way, block by block.
+void checkMemoryFor(const std::vector<StartTime>& start, const FloatGrid& field,
+                    const ArrivalRequest& request) {
+  // At another speed the extent is not known in advance: touch() checks memory block by block.
   if (request.options.speed) return;
-  MemoryEstimate room;
-  for (const StartTime& s : start) room.surface.expand(s.gridPoint);
-  room.area = static_cast<double>(start.size()) / (2 * kStartWidth);
-  room.inside = room.outside = request.until / field.voxelSize()[0];
-  room.bytesPerGridPoint = kBytesPerGridPoint;
-  checkMemory(room, request.options.maxMemory, request.action);
+  MemoryEstimate estimate;
+  for (const StartTime& s : start) estimate.surface.expand(s.gridPoint);
+  estimate.area = static_cast<double>(start.size()) / (2 * kStartWidth);
+  estimate.inside = estimate.outside = request.until / field.voxelSize()[0];
+  estimate.bytesPerGridPoint = kBytesPerGridPoint;
+  checkMemory(estimate, request.options.maxMemory, request.action);
 }
 
 ArrivalStart startOf(const ArrivalRequest& request, const Slowness& slowness) {
@@ -168,20 +172,21 @@ ArrivalStart startOf(const ArrivalRequest& request, const Slowness& slowness) {
           .progress = subProgress(request.options.progress, 0, kStarted)};
 }
 
-/// Index positions. @throws ResourceLimit beyond the range of indices
-std::vector<Vec3d> placesOf(std::span<const Imath::V3d> sources,
-                            const openvdb::math::Transform& transform, const char* action) {
-  std::vector<Vec3d> places;
+/// Converts source points to index positions.
+/// @throws ResourceLimit beyond the range of indices
+std::vector<Vec3d> positionsOf(std::span<const Imath::V3d> sources,
+                               const openvdb::math::Transform& transform, const char* action) {
+  std::vector<Vec3d> positions;
   for (const Imath::V3d& source : sources) {
-    places.push_back(transform.worldToIndex(toVdb(source)));
+    positions.push_back(transform.worldToIndex(toVdb(source)));
     for (int i = 0; i < 3; ++i)
-      if (!(std::abs(places.back()[i]) < kIndexLimit))
-        throw ResourceLimit(
-            fmt::format("{}: a point lies {:.4g} voxels from the origin, beyond the range of "
-                        "32-bit indices; use larger voxels",
-                        action, std::abs(places.back()[i])));
+      if (!(std::abs(positions.back()[i]) < kIndexLimit))
+        throw ResourceLimit(fmt::format(
+            "{}: a source point lies {:.4g} voxels from the origin, beyond the range of "
+            "32-bit indices; use larger voxels",
+            action, std::abs(positions.back()[i])));
   }
-  return places;
+  return positions;
 }
 
 }  // namespace
@@ -191,19 +196,19 @@ ArrivalGrid arrivalFromSurface(const FloatGrid& field, const ArrivalRequest& req
   const double unit = world ? typicalSlowness(field, world) : 1;
   const Slowness slowness = scaled(world, unit);
   const std::vector<StartTime> start = startAtSurface(field, startOf(request, slowness));
-  checkRoom(start, field, request);
+  checkMemoryFor(start, field, request);
   return Solver(request, field.transform(), &field.tree(), {}, slowness, unit).run(start);
 }
 
 ArrivalGrid arrivalFromPoints(std::span<const Imath::V3d> sources,
                               const openvdb::math::Transform& transform,
                               const ArrivalRequest& request) {
-  const std::vector<Vec3d> places = placesOf(sources, transform, request.action);
+  const std::vector<Vec3d> positions = positionsOf(sources, transform, request.action);
   const Slowness world = slownessOf(request.options.speed, transform);
-  const double unit = world ? typicalSlowness(places, world) : 1;
+  const double unit = world ? typicalSlowness(positions, world) : 1;
   const Slowness slowness = scaled(world, unit);
-  const std::vector<StartTime> start = startAtPoints(places, startOf(request, slowness));
-  return Solver(request, transform, nullptr, places, slowness, unit).run(start);
+  const std::vector<StartTime> start = startAtPoints(positions, startOf(request, slowness));
+  return Solver(request, transform, nullptr, positions, slowness, unit).run(start);
 }
 
 }  // namespace eikonal
@@ -212,12 +217,12 @@ namespace {
 
 eikonal::ArrivalRequest checkedRequest(double until, const ArrivalOptions& options) {
   eikonal::ArrivalRequest request;
-  request.action = options.method == FrontMethod::Marching ? "march" : "sweep";
+  request.action = options.method == FrontMethod::Marching ? "fast-marching" : "fast-sweeping";
   request.until = until;
   request.options = options;
   if (!std::isfinite(until) || until <= 0)
-    throw UsageError(
-        fmt::format("{}: the latest time is {}; give a positive one", request.action, until));
+    throw UsageError(fmt::format("{}: the latest time is {}; give a positive, finite time",
+                                 request.action, until));
   if (options.order != 1 && options.order != 2)
     throw UsageError(
         fmt::format("{}: the order is {}; give 1 or 2", request.action, options.order));
@@ -250,14 +255,16 @@ ArrivalTimes arrivalTimesFromPoints(const NarrowBand& lattice, std::span<const I
                                     double until, const ArrivalOptions& options) {
   const eikonal::ArrivalRequest request = checkedRequest(until, options);
   if (!lattice.shared())
-    throw UsageError(fmt::format("{}: there is no grid to work on; give a solid", request.action));
+    throw UsageError(
+        fmt::format("{}: there is no grid for the times; give a solid", request.action));
   if (sources.empty())
-    throw UsageError(fmt::format("{}: there is no point to start from; give one", request.action));
+    throw UsageError(
+        fmt::format("{}: there is no source point; give at least one", request.action));
   for (const Imath::V3d& p : sources)
     for (int i = 0; i < 3; ++i)
       if (!std::isfinite(p[i]))
         throw UsageError(
-            fmt::format("{}: a point to start from has the coordinate {}; give finite "
+            fmt::format("{}: a source point has the coordinate {}; give finite "
                         "points",
                         request.action, p[i]));
   return asField(eikonal::arrivalFromPoints(sources, vdb(lattice).transform(), request),
@@ -269,11 +276,12 @@ FrontDistance frontDistance(const NarrowBand& solid, double reach, const Arrival
   requireStart(solid, request.action);
   if (options.speed)
     throw UsageError(
-        fmt::format("{}: at another speed than 1 times are no distances; ask for arrival times",
+        fmt::format("{}: with a speed other than 1, arrival times are not distances; request "
+                    "arrival times",
                     request.action));
   if (reach < solid.voxelSize())
-    throw UsageError(fmt::format("{}: the reach is {} voxels; give at least 1", request.action,
-                                 reach / solid.voxelSize()));
+    throw UsageError(fmt::format("{}: the largest distance is {} voxels; give at least 1",
+                                 request.action, reach / solid.voxelSize()));
   eikonal::ArrivalGrid result = eikonal::arrivalFromSurface(vdb(solid), request);
   return {makeBand(std::move(result.times)), result.figures};
 }

@@ -7,19 +7,24 @@
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 
-/// Fronts that move along their normals at a given speed: |∇T| F = 1.
+/// Arrival times of fronts that move along their normals at a given speed: |∇T| F = 1.
 namespace levelset {
 
 enum class FrontMethod {
-  Marching,  ///< one grid point after the other in the order of time [Sethian99]; one thread
-  Sweeping   ///< block by block in alternating directions until nothing changes [Zhao05]
+  /// Fast marching: accepts one grid point after the other in the order of time [Sethian99]; one
+  /// thread.
+  Marching,
+  /// Fast sweeping: solves block by block in alternating directions until nothing changes [Zhao05].
+  Sweeping
 };
 
 struct ArrivalOptions {
   FrontMethod method = FrontMethod::Sweeping;
-  /// 1, or 2: second-order differences, per grid point back to first where they are not upwind.
+  /// Order of the upwind differences, 1 or 2. With 2, a grid point falls back to first order where
+  /// the second-order difference is not upwind.
   int order = 2;
-  /// World units per unit of time. Where it is zero, negative or NaN, nothing passes. Empty: 1.
+  /// Speed, world units per unit of time. The front does not pass where it is zero, negative or
+  /// NaN. Empty: 1.
   ScalarField speed = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
@@ -27,13 +32,13 @@ struct ArrivalOptions {
 
 struct ArrivalFigures {
   std::size_t reached = 0;  ///< grid points with a time
-  std::size_t started = 0;  ///< of them, given by the start
-  /// Of them, fell back to first order, on one axis or more, where the second was asked.
+  std::size_t started = 0;  ///< grid points whose time the start gives
+  /// Grid points that fell back from second to first order on one axis or more.
   std::size_t firstOrder = 0;
 };
 
 struct ArrivalTimes {
-  FieldGrid times;  ///< active where the front came; elsewhere ± the latest time
+  FieldGrid times;  ///< active where the front arrived; elsewhere ± the latest time
   ArrivalFigures figures;
 };
 
@@ -42,28 +47,31 @@ struct FrontDistance {
   ArrivalFigures figures;
 };
 
-/// When a front that starts on the surface of `solid` at time 0 and moves to both sides comes to
-/// the grid points around it. Negative inside. Within two voxels of the surface the start is the
-/// time along the straight way to the closest point, as far as the speed on it is much the same.
+/// Computes when a front arrives at the grid points around the surface of `solid`. It starts on the
+/// surface at time 0 and moves to both sides; times are negative inside.
+/// Within two voxels of the surface the time is that along the straight segment to the closest
+/// point, where the speed on the segment varies little.
 /// @param until  the latest time; at speed 1 a distance, world units
-/// @throws UsageError for an order other than 1 or 2, or `until` not positive and finite;
-///         InvalidInput for an empty solid, or when the speed is nowhere positive on its surface;
-///         ResourceLimit; Cancelled
+/// @throws UsageError for an order other than 1 or 2, or `until` not positive and finite
+/// @throws InvalidInput for an empty solid, or when the speed is nowhere positive on its surface
+/// @throws ResourceLimit when the blocks that the front reaches do not fit into memory
+/// @throws Cancelled
 [[nodiscard]] ArrivalTimes arrivalTimes(const NarrowBand& solid, double until,
                                         const ArrivalOptions& options = {});
 
-/// The same from points, on the grid points of `lattice` (its solid does not count). The start is
-/// exact within eight voxels of each point, as far as the speed is about linear all around; where
-/// it is not, the front starts as a ball of about two voxels. In second order the singularity at
-/// the nearest point is taken apart: at constant speed times from one point are exact to float
-/// [Treister16].
+/// Computes arrival times of a front that starts at points, on the grid of `lattice` (the solid
+/// itself does not count).
+/// Within eight voxels of each point the start is exact, as far as the speed is about linear in all
+/// directions. Elsewhere the front starts as a ball of about two voxels. With order 2 the
+/// singularity at the nearest point is factored out: at constant speed, times from one point are
+/// exact to float [Treister16].
 /// @throws UsageError also when there is no point, or one that is not finite
 [[nodiscard]] ArrivalTimes arrivalTimesFromPoints(const NarrowBand& lattice,
                                                   std::span<const Imath::V3d> sources, double until,
                                                   const ArrivalOptions& options = {});
 
-/// The distance to `reach` (world units) on both sides, by front instead of by closest points;
-/// redistance() is more exact and as fast where the speed is 1.
+/// Computes the distance up to `reach` (world units) on both sides of the surface, with a front
+/// instead of closest points. redistance() is more accurate and as fast where the speed is 1.
 /// @throws UsageError also when a speed is set, or `reach` is below one voxel
 [[nodiscard]] FrontDistance frontDistance(const NarrowBand& solid, double reach,
                                           const ArrivalOptions& options = {});

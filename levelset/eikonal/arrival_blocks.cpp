@@ -20,7 +20,7 @@ Coord neighbourOrigin(const Coord& origin, int direction) {
   return result;
 }
 
-// A block, its slowness and second solution, the result's leaf, and the maps that hold them.
+// Memory of a block: its slowness, second solution and leaf of the result, and the map entries.
 constexpr double kBytesPerBlock = sizeof(ArrivalBlock) + 2 * 2048 + 1024 + 2300 + 100;
 
 }  // namespace
@@ -30,26 +30,26 @@ ArrivalBlocks::ArrivalBlocks(Settings settings) : settings_(std::move(settings))
   limit_ = static_cast<double>(memoryLimit(settings_.maxMemory));
 }
 
-void ArrivalBlocks::checkRoom(const Coord& origin) const {
+void ArrivalBlocks::checkMemoryFor(const Coord& origin) const {
   const double bytes = static_cast<double>(blocks_.size() + 1) * kBytesPerBlock;
   if (bytes > limit_)
     throw ResourceLimit(
         fmt::format("{}: the front has reached {} blocks of 512 grid points, which take {:.4g} MB, "
-                    "more than the limit of {:.4g} MB; go less far, use larger voxels or allow "
-                    "more memory",
+                    "more than the limit of {:.4g} MB; use a smaller distance or time, larger "
+                    "voxels or more memory",
                     settings_.action, blocks_.size(), bytes / 1e6, limit_ / 1e6));
   for (int i = 0; i < 3; ++i)
     if (std::abs(static_cast<double>(origin[i])) > kIndexLimit - 16)
       throw ResourceLimit(
-          fmt::format("{}: the front passes the range of 32-bit indices; go less far or use larger "
-                      "voxels",
+          fmt::format("{}: the front leaves the range of 32-bit indices; use a smaller distance "
+                      "or time, or larger voxels",
                       settings_.action));
 }
 
 ArrivalBlock& ArrivalBlocks::touch(const Coord& origin) {
   ArrivalBlock*& slot = index_[origin];
   if (slot) return *slot;
-  checkRoom(origin);
+  checkMemoryFor(origin);
   ArrivalBlock& block = blocks_.emplace_back();
   slot = &block;
   block.origin = origin;

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal only.
+// Internal header of levelset: public headers must not include it.
 
 #include <array>
 #include <cstdint>
@@ -17,9 +17,9 @@
 
 namespace levelset::eikonal {
 
-/// Times at the 8³ grid points of a leaf block. All times are divided by what the front takes for a
-/// voxel at a typical speed, so that at that speed they are distances in voxels, whatever it is;
-/// they count from the front's start, on either side of it.
+/// Arrival times at the 8³ grid points of a leaf block.
+/// Times are divided by the time that the front takes for a voxel at a typical speed. At that speed
+/// they are distances in voxels. They count from the front's start and are positive on both sides.
 struct ArrivalBlock {
   using Mask = openvdb::util::NodeMask<3>;
   static constexpr openvdb::Index kSize = 512;
@@ -27,18 +27,18 @@ struct ArrivalBlock {
   openvdb::Coord origin;
   std::uint32_t number = 0;
   std::array<float, kSize> time;
-  /// Of the typical one; kFar where nothing passes; empty: 1 everywhere.
+  /// Slowness relative to the typical one; kFar where the front cannot pass; empty: 1 everywhere.
   std::unique_ptr<std::array<float, kSize>> slowness;
-  std::array<ArrivalBlock*, 6> neighbours{};  ///< −x, +x, −y, +y, −z, +z, as far as they exist
-  Mask inside;                                ///< behind the front's start
-  Mask known;                                 ///< start values, or accepted ones
-  Mask firstOrder;  ///< fell back to first order, on one axis or more, where the second was asked
+  std::array<ArrivalBlock*, 6> neighbours{};  ///< −x, +x, −y, +y, −z, +z; null where there is none
+  Mask inside;                                ///< on the negative side of the front's start
+  Mask known;                                 ///< start times and accepted times
+  Mask firstOrder;  ///< fell back from second to first order on one axis or more
 
   [[nodiscard]] double slownessAt(openvdb::Index n) const {
     return slowness ? static_cast<double>((*slowness)[n]) : 1.0;
   }
-  /// The neighbour in direction d (axis · 2 + (step > 0)) of a grid point: its block, null if there
-  /// is none, and its offset there.
+  /// Returns the block of a grid point's neighbour in direction d = axis · 2 + (step > 0), null if
+  /// there is none. `to` is the neighbour's offset in that block.
   [[nodiscard]] const ArrivalBlock* step(openvdb::Index n, int d, openvdb::Index& to) const {
     const int shift = 6 - 3 * (d >> 1);
     const openvdb::Index at = n >> shift & 7u;
@@ -51,32 +51,34 @@ struct ArrivalBlock {
   }
 };
 
-/// One grid point of which the time is known at the start.
+/// Grid point with a known time at the start.
 struct StartTime {
   openvdb::Coord gridPoint;
   float time = 0;
 };
 
-/// The blocks that a front has come to. They are added one by one, numbered in that order.
+/// Blocks that a front has reached. They are added one by one and numbered in that order.
 class ArrivalBlocks {
  public:
   struct Settings {
-    const char* action = "sweep";
-    double until = 0;                                            ///< latest time kept
+    const char* action = "fast-sweeping";
+    double until = 0;                                            ///< latest time to keep
     std::function<double(const openvdb::Coord&)> slowness = {};  ///< empty: 1
-    const openvdb::FloatTree* side = nullptr;          ///< its sign: inside; null: none is
-    std::shared_ptr<const PointSources> sources = {};  ///< where the front starts at points
+    /// Negative values mark the inside; null: no grid point is inside.
+    const openvdb::FloatTree* side = nullptr;
+    std::shared_ptr<const PointSources> sources = {};  ///< set where the front starts at points
     std::size_t maxMemory = kNoMemoryLimit;
     Progress progress = {};
   };
   explicit ArrivalBlocks(Settings settings);
 
-  /// Makes the blocks of the start and sets their times. @throws InvalidInput when nothing passes
-  /// at any of the grid points
+  /// Creates the blocks of the start and sets their times.
+  /// @throws InvalidInput when the front cannot pass at any of the grid points
   void start(const std::vector<StartTime>& times);
-  /// The block, made if it is not there; with `slowness` left for loadSlowness.
+  /// Returns the block at `origin` and creates it if needed; loadSlowness() must then fill its
+  /// slowness.
   ArrivalBlock& touch(const openvdb::Coord& origin);
-  /// Asks for the slowness of the blocks made since it was last called, in parallel.
+  /// Evaluates the slowness of the blocks created since the last call, in parallel.
   void loadSlowness();
 
   [[nodiscard]] const Settings& settings() const { return settings_; }
@@ -92,7 +94,7 @@ class ArrivalBlocks {
   [[nodiscard]] bool holds(const openvdb::Coord& origin) const { return index_.count(origin) > 0; }
 
  private:
-  void checkRoom(const openvdb::Coord& origin) const;
+  void checkMemoryFor(const openvdb::Coord& origin) const;
 
   Settings settings_;
   std::unique_ptr<openvdb::FloatGrid::ConstAccessor> side_;
@@ -101,12 +103,5 @@ class ArrivalBlocks {
   std::size_t loaded_ = 0;  ///< blocks whose slowness is known
   double limit_ = 0;        ///< bytes
 };
-
-/// Marches outwards in the order of time [Sethian99]; `order` 1 or 2.
-void marchArrivals(ArrivalBlocks& blocks, int order);
-
-/// Sweeps block by block to rest [Zhao05], then, for order 2, solves once more with the
-/// second-order differences on the upwind side that the first solution found.
-void sweepArrivals(ArrivalBlocks& blocks, int order);
 
 }  // namespace levelset::eikonal

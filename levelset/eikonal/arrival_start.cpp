@@ -18,23 +18,25 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// The curvature of the front around a point is too much for differences up to here, voxels …
+// Largest radius around a point source, voxels, in which start times are given: there the front is
+// too curved for differences.
 constexpr double kStartBall = 8;
-// … so far the start is given where the speed is linear up to this part of that at the point, and
-// changes by no more than this part: straight ways are the fastest there, but for 0.03 voxels.
+// Largest difference of the speed from a linear one, and from the speed at the point, in that
+// radius; both are parts of the speed at the point. Within these bounds straight segments are the
+// fastest paths, to within 0.03 voxels.
 constexpr double kLeastLinear = 0.02, kMostChange = 0.35;
-// The slowness is read this often on a way, voxels.
+// Distance between samples of the slowness on a segment, voxels.
 constexpr double kSpacing = 0.5;
-// Where it changes by more than this factor on the way, another way may be faster; a way below a
-// voxel has no grid points beside it that the solver could take instead.
-constexpr double kMostRatio = 2, kShortWay = 1;
+// Another path may be faster if the slowness varies by more than this factor on a segment. Segments
+// below one voxel are exempt: no grid point beside them offers the solver another path.
+constexpr double kMostRatio = 2, kShortRay = 1;
 constexpr std::size_t kPointsPerBatch = 64;
 constexpr double kBytesPerLeaf = 2300;
-// So many places tell the typical slowness.
+// Number of samples for the typical slowness.
 constexpr std::size_t kProbes = 1000;
 
-/// Time along a straight way: Simpson's rule on the slowness. kFar when something is in the way,
-/// and where the way may not be the fastest.
+/// Integrates the slowness along a straight segment with Simpson's rule. Returns kFar when the
+/// front cannot pass on the segment, or when the segment may not be the fastest path.
 float straightTime(const Vec3d& from, const Vec3d& to, const Slowness& slowness, double spacing) {
   const double length = (to - from).length();
   const int pieces = 2 * std::max(1, static_cast<int>(std::ceil(length / (2 * spacing))));
@@ -46,14 +48,14 @@ float straightTime(const Vec3d& from, const Vec3d& to, const Slowness& slowness,
     most = std::max(most, here);
     sum += here * (k == 0 || k == pieces ? 1 : k % 2 ? 4 : 2);
   }
-  if (length > kShortWay && most > kMostRatio * least) return kFar;
+  if (length > kShortRay && most > kMostRatio * least) return kFar;
   return static_cast<float>(length * sum / (3 * pieces));
 }
 
-/// Places every half voxel, grid points among them, up to the ball's radius and half a cell from
-/// one, the nearest first.
-const std::vector<Vec3d>& halfVoxelPlaces() {
-  static const std::vector<Vec3d> places = [] {
+/// Returns offsets on a half-voxel lattice, shortest first. It covers the ball and half a cell
+/// around it, and includes the grid points.
+const std::vector<Vec3d>& halfVoxelOffsets() {
+  static const std::vector<Vec3d> offsets = [] {
     std::vector<Vec3d> made;
     const double far = kStartBall + 0.9;
     const int reach = static_cast<int>(far / kSpacing);
@@ -65,12 +67,12 @@ const std::vector<Vec3d>& halfVoxelPlaces() {
                      [](const Vec3d& a, const Vec3d& b) { return a.lengthSqr() < b.lengthSqr(); });
     return made;
   }();
-  return places;
+  return offsets;
 }
 
-/// Radius of the ball around a point in which the speed is about linear, voxels. No way that leaves
-/// the ball is faster than a straight one within.
-double calmRadius(const Vec3d& point, const Slowness& slowness) {
+/// Returns the radius of the ball around a point in which the speed is about linear, voxels. No
+/// path that leaves the ball is faster than a straight one within it.
+double linearRadius(const Vec3d& point, const Slowness& slowness) {
   const auto speed = [&](const Vec3d& p) {
     const double here = slowness(p);
     return here < static_cast<double>(kFar) ? 1 / here : 0;
@@ -85,9 +87,9 @@ double calmRadius(const Vec3d& point, const Slowness& slowness) {
   }
   double radius = std::min(kStartBall, kMostChange * own / slope.length());
   const Vec3d centre = Coord::round(point).asVec3d();
-  for (const Vec3d& place : halfVoxelPlaces()) {
-    if (place.length() > radius + 0.9) break;
-    const Vec3d offset = centre + place - point;
+  for (const Vec3d& sample : halfVoxelOffsets()) {
+    if (sample.length() > radius + 0.9) break;
+    const Vec3d offset = centre + sample - point;
     const double distance = offset.length();
     if (distance > radius) continue;
     const double change = speed(point + offset) - own;
@@ -97,8 +99,8 @@ double calmRadius(const Vec3d& point, const Slowness& slowness) {
 }
 
 std::vector<StartTime> startAround(const Vec3d& point, const Slowness& slowness) {
-  const double calm = slowness ? calmRadius(point, slowness) : kStartBall;
-  const double radius = std::max(calm, kStartWidth);
+  const double linear = slowness ? linearRadius(point, slowness) : kStartBall;
+  const double radius = std::max(linear, kStartWidth);
   const int reach = static_cast<int>(std::ceil(radius)) + 1;
   const Coord centre = Coord::round(point);
   std::vector<StartTime> start;
@@ -109,7 +111,7 @@ std::vector<StartTime> startAround(const Vec3d& point, const Slowness& slowness)
         const double distance = (c.asVec3d() - point).length();
         if (distance > radius) continue;
         const float time = slowness ? straightTime(point, c.asVec3d(), slowness,
-                                                   distance <= calm ? kStartBall : kSpacing)
+                                                   distance <= linear ? kStartBall : kSpacing)
                                     : static_cast<float>(distance);
         if (time < kFar) start.push_back({c, time});
       }
@@ -123,11 +125,11 @@ std::vector<StartTime> activeTimes(const FloatTree& times) {
   return start;
 }
 
-double medianSlowness(const std::vector<Vec3d>& places, const Slowness& slowness) {
+double medianSlowness(const std::vector<Vec3d>& positions, const Slowness& slowness) {
   std::vector<double> found;
-  const std::size_t stride = 1 + places.size() / kProbes;
-  for (std::size_t i = 0; i < places.size(); i += stride)
-    if (const double here = slowness(places[i]); here < static_cast<double>(kFar))
+  const std::size_t stride = 1 + positions.size() / kProbes;
+  for (std::size_t i = 0; i < positions.size(); i += stride)
+    if (const double here = slowness(positions[i]); here < static_cast<double>(kFar))
       found.push_back(here);
   if (found.empty()) return 1;
   const auto middle = found.begin() + static_cast<std::ptrdiff_t>(found.size() / 2);
@@ -166,7 +168,7 @@ std::vector<StartTime> startAtSurface(const FloatGrid& field, const ArrivalStart
 }
 
 std::vector<StartTime> startAtPoints(std::span<const Vec3d> points, const ArrivalStart& start) {
-  // Balls overlap: what is kept does not grow with the points, but with the room they take.
+  // Balls overlap: the kept times grow with the volume they cover, not with the number of points.
   FloatTree times(kFar);
   std::vector<std::vector<StartTime>> parts(kPointsPerBatch);
   for (std::size_t begin = 0; begin < points.size(); begin += kPointsPerBatch) {
@@ -188,15 +190,15 @@ std::vector<StartTime> startAtPoints(std::span<const Vec3d> points, const Arriva
 }
 
 double typicalSlowness(const FloatGrid& field, const Slowness& slowness) {
-  std::vector<Vec3d> places;
+  std::vector<Vec3d> positions;
   const auto near = static_cast<float>(field.voxelSize()[0]);
   for (auto leaf = field.tree().cbeginLeaf(); leaf; ++leaf)
     for (auto it = leaf->cbeginValueOn(); it; ++it) {
       if (std::abs(*it) > near) continue;
-      places.push_back(it.getCoord().asVec3d());
-      break;  // one a leaf is enough
+      positions.push_back(it.getCoord().asVec3d());
+      break;  // one sample per leaf is enough
     }
-  return medianSlowness(places, slowness);
+  return medianSlowness(positions, slowness);
 }
 
 double typicalSlowness(std::span<const Vec3d> points, const Slowness& slowness) {

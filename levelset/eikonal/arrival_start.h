@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal only.
+// Internal header of levelset: public headers must not include it.
 
 #include <span>
 
@@ -8,32 +8,34 @@
 
 namespace levelset::eikonal {
 
-/// At an index position; kFar where nothing passes. Safe to call from many threads.
+/// Slowness at an index position; kFar where the front cannot pass. Safe to call from many threads.
 using Slowness = std::function<double(const openvdb::Vec3d&)>;
 
-/// Second-order differences read two grid points back: that far the start is given, voxels.
+/// Distance from the start, in voxels, to which start times are given: second-order differences
+/// read two grid points back.
 inline constexpr double kStartWidth = 2;
 
-/// Where a front starts, before it is solved for.
+/// Options for computing the times at which a front starts.
 struct ArrivalStart {
-  const char* action = "sweep";
+  const char* action = "fast-sweeping";
   Slowness slowness = {};  ///< empty: 1 everywhere
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
-/// Times along the straight way to the closest point of the zero set, up to two voxels from it.
-/// What the straight way may be wrong about is left out: the solver goes there.
+/// Computes the times along straight segments to the closest points of the zero set, up to two
+/// voxels from it. Leaves out grid points whose segment may not be the fastest path: the solver
+/// reaches them.
 [[nodiscard]] std::vector<StartTime> startAtSurface(const openvdb::FloatGrid& field,
                                                     const ArrivalStart& start);
 
-/// The same around points (index space); up to eight voxels, as far as the speed is about linear
-/// all around.
+/// Computes start times around points (index space), up to eight voxels away where the speed is
+/// about linear in all directions.
 [[nodiscard]] std::vector<StartTime> startAtPoints(std::span<const openvdb::Vec3d> points,
                                                    const ArrivalStart& start);
 
-/// What an active grid point beside the zero set has for slowness, by the median of some: by this
-/// times are scaled. 1 where nothing passes.
+/// Returns the median slowness over a sample of active grid points beside the zero set. Times are
+/// scaled by it. Returns 1 where the front cannot pass.
 [[nodiscard]] double typicalSlowness(const openvdb::FloatGrid& field, const Slowness& slowness);
 [[nodiscard]] double typicalSlowness(std::span<const openvdb::Vec3d> points,
                                      const Slowness& slowness);

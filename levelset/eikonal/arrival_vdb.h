@@ -1,6 +1,6 @@
 #pragma once
 
-// Arrival times as OpenVDB grids. For .cpp files of levelset only.
+// Arrival times as OpenVDB grids. Internal header of levelset: public headers must not include it.
 
 #include <span>
 
@@ -10,21 +10,23 @@
 namespace levelset::eikonal {
 
 struct ArrivalRequest {
-  const char* action = "sweep";
+  const char* action = "fast-sweeping";
   double until = 0;  ///< world units of time
   ArrivalOptions options = {};
 };
 
 struct ArrivalGrid {
-  openvdb::FloatGrid::Ptr times;  ///< world; active where reached; elsewhere ± the latest time
+  /// World units; active where reached; elsewhere ± the latest time.
+  openvdb::FloatGrid::Ptr times;
   ArrivalFigures figures;
 };
 
-/// From the zero set, to both sides; negative inside. Level-set class when the speed is 1.
+/// Computes arrival times from the zero set to both sides; negative inside. At speed 1 the grid has
+/// the level-set class.
 [[nodiscard]] ArrivalGrid arrivalFromSurface(const openvdb::FloatGrid& field,
                                              const ArrivalRequest& request);
 
-/// From points (world), on grid points of `transform`.
+/// Computes arrival times from points (world), on the grid points of `transform`.
 [[nodiscard]] ArrivalGrid arrivalFromPoints(std::span<const Imath::V3d> sources,
                                             const openvdb::math::Transform& transform,
                                             const ArrivalRequest& request);

@@ -1,7 +1,7 @@
+#include "levelset/eikonal/fast_marching.h"
+
 #include <queue>
 #include <tuple>
-
-#include "levelset/eikonal/arrival_blocks.h"
 
 namespace levelset::eikonal {
 namespace {
@@ -12,7 +12,7 @@ struct Trial {
   float time;
   std::uint32_t block;
   Index offset;
-  /// Equal times in the order in which blocks were made: the queue leaves nothing to chance.
+  /// Orders equal times by block number and offset, so the order of the queue is deterministic.
   friend bool operator>(const Trial& a, const Trial& b) {
     return std::tie(a.time, a.block, a.offset) > std::tie(b.time, b.block, b.offset);
   }
@@ -44,7 +44,7 @@ class Marcher {
         report(blocks_.settings().progress, static_cast<double>(trial.time / until),
                blocks_.settings().action);
     }
-    forgetTrials();
+    clearTrials();
   }
 
  private:
@@ -71,7 +71,8 @@ class Marcher {
     if (terms.count == 0) return;
     double time = solveUpwind(terms, slowness);
     bool first = order_ == 2 && terms.hasFirst;
-    // Each of these errs more than the one before it and is nearer to being causal; the last is.
+    // Each fallback is less accurate than the one before it and closer to causal; the last one is
+    // causal.
     if (terms.hasSecond && time < terms.latest - straight.slack()) {
       time = solveUpwind(gather(block, n, 1, straight), slowness);
       first = true;
@@ -85,7 +86,8 @@ class Marcher {
     queue_.push({stored, block.number, n});
   }
 
-  /// Upwind values from accepted neighbours; those across the start count backwards.
+  /// Collects upwind values from accepted neighbours. Neighbours across the front's start have
+  /// negative times.
   static UpwindTerms gather(const ArrivalBlock& block, Index n, int order,
                             const StraightTime& straight) {
     UpwindTerms terms;
@@ -124,7 +126,7 @@ class Marcher {
     return terms;
   }
 
-  void forgetTrials() {
+  void clearTrials() {
     for (ArrivalBlock& block : blocks_.blocks())
       for (auto it = block.known.beginOff(); it; ++it) block.time[it.pos()] = kFar;
   }

@@ -1,3 +1,5 @@
+#include "levelset/eikonal/fast_sweeping.h"
+
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -7,8 +9,6 @@
 #include <cmath>
 #include <optional>
 
-#include "levelset/eikonal/arrival_blocks.h"
-
 namespace levelset::eikonal {
 namespace {
 
@@ -16,20 +16,22 @@ using openvdb::Coord;
 using openvdb::Index;
 using Mask = ArrivalBlock::Mask;
 
-// Improvements below this part of the time that the grid point's own voxel takes do not count.
+// An improvement below this part of the time for one voxel at the grid point does not count.
 constexpr float kImprovement = 1e-5f;
-// Blocks whose news are later than the earliest by more than this wait, voxels and part of the
-// time: what they would compute now is not final yet. Where the front is slow, voxels take long.
+// Window after the earliest change, in voxels and as a part of the time. Blocks with later changes
+// wait, since their times would not be final yet. The relative part serves slow media, where a
+// voxel takes long.
 constexpr float kWindow = 0.5f, kWindowShare = 0.05f;
 constexpr std::size_t kBlocksPerTask = 8;
 
-/// How late the first solution is followed. The second runs a little ahead of it: by as much as it
-/// can reach back, a voxel at the speed there or a twentieth of the time.
+/// Latest time to which the first solution is computed. With `lookahead` it exceeds `until` by as
+/// much as the second solution reads beyond it: a voxel at the local speed, or a twentieth of the
+/// time.
 struct SweepLimit {
   float until = 0;
-  bool ahead = false;
+  bool lookahead = false;
   [[nodiscard]] float at(double slowness) const {
-    return ahead ? std::max(until + static_cast<float>(slowness), 1.05f * until) : until;
+    return lookahead ? std::max(until + static_cast<float>(slowness), 1.05f * until) : until;
   }
 };
 
@@ -37,30 +39,31 @@ int parityOf(const Coord& origin) {
   return ((origin.x() >> 3) & 1) * 4 + ((origin.y() >> 3) & 1) * 2 + ((origin.z() >> 3) & 1);
 }
 
-/// What a sweep keeps of each block beside its times.
-struct Desk {
-  float earliest = kFar;        ///< time of the earliest news; kFar: nothing to do
-  bool seen = false;            ///< has it been worked on?
-  std::uint8_t newsFrom = 0;    ///< bit d: neighbour d has news
-  std::uint8_t tells = 0;       ///< bit d: neighbour d should look; written by the block's own work
-  std::array<float, 6> told{};  ///< earliest change at that face
-  std::optional<std::vector<std::uint16_t>> order;  ///< what is to be solved, by first-order time
+/// State of a block during sweeping, beside its times.
+struct BlockState {
+  float earliest = kFar;  ///< time of the earliest change not yet processed; kFar: block is clean
+  bool seen = false;      ///< the block was processed before
+  std::uint8_t dirtyNeighbours = 0;  ///< dirty flags, bit d: times of neighbour d changed
+  /// Bit d: neighbour d must be flagged; written only by the block's own work.
+  std::uint8_t dirtiedNeighbours = 0;
+  std::array<float, 6> earliestAtFace{};            ///< earliest change at each face
+  std::optional<std::vector<std::uint16_t>> order;  ///< grid points to solve, by first-order time
   std::unique_ptr<std::array<float, ArrivalBlock::kSize>> second;  ///< second-order times
 };
 
-/// Calls work(block, desk) for the blocks that have news until none has: the eight parities of
-/// block positions in turn, one parity in parallel, since its blocks do not touch; the earliest
-/// first. The order is fixed, hence the result.
+/// Scheduler of dirty blocks: calls work(block, state) until no block is dirty.
+/// Takes the eight parities of block positions in turn, the earliest blocks first. Blocks of one
+/// parity do not touch and run in parallel. The order is fixed, and so is the result.
 class Rounds {
  public:
   explicit Rounds(ArrivalBlocks& blocks) : blocks_(blocks) {}
-  std::vector<Desk> desks;
+  std::vector<BlockState> blockStates;
 
-  /// Passes on what the desks were told before the first round.
-  void deliverStart() {
-    desks.resize(blocks_.blocks().size());
-    for (std::size_t i = 0, end = desks.size(); i < end; ++i)
-      deliver(static_cast<std::uint32_t>(i), true);
+  /// Passes the flags set before the first round to the neighbours.
+  void passInitialFlags() {
+    blockStates.resize(blocks_.blocks().size());
+    for (std::size_t i = 0, end = blockStates.size(); i < end; ++i)
+      passDirtyFlags(static_cast<std::uint32_t>(i), true);
   }
 
   template <typename Work>
@@ -68,7 +71,7 @@ class Rounds {
     sortNew();
     float window = 0;
     for (;;) {
-      const float earliest = earliestNews();
+      const float earliest = earliestDirty();
       if (earliest == kFar) return;
       window = std::max({window, earliest + kWindow, (1 + kWindowShare) * earliest});
       report(subProgress(blocks_.settings().progress, from, to),
@@ -77,13 +80,13 @@ class Rounds {
       for (auto& candidates : byParity_) {
         std::vector<std::uint32_t> due;
         for (const std::uint32_t i : candidates)
-          if (desks[i].earliest <= window) due.push_back(i);
+          if (blockStates[i].earliest <= window) due.push_back(i);
         const auto range = tbb::blocked_range<std::size_t>(0, due.size(), kBlocksPerTask);
         tbb::parallel_for(range, [&](const auto& part) {
           for (std::size_t i = part.begin(); i != part.end(); ++i)
-            work(blocks_.block(due[i]), desks[due[i]]);
+            work(blocks_.block(due[i]), blockStates[due[i]]);
         });
-        for (const std::uint32_t i : due) deliver(i, mayGrow);
+        for (const std::uint32_t i : due) passDirtyFlags(i, mayGrow);
         if (mayGrow) sortNew();
       }
     }
@@ -96,18 +99,18 @@ class Rounds {
       const auto number = static_cast<std::uint32_t>(sorted_);
       byParity_[static_cast<std::size_t>(parityOf(blocks_.block(number).origin))].push_back(number);
     }
-    desks.resize(sorted_);
+    blockStates.resize(sorted_);
   }
 
-  [[nodiscard]] float earliestNews() const {
+  [[nodiscard]] float earliestDirty() const {
     float earliest = kFar;
-    for (const Desk& desk : desks) earliest = std::min(earliest, desk.earliest);
+    for (const BlockState& state : blockStates) earliest = std::min(earliest, state.earliest);
     return earliest;
   }
 
-  void deliver(std::uint32_t number, bool mayGrow) {
+  void passDirtyFlags(std::uint32_t number, bool mayGrow) {
     for (int d = 0; d < 6; ++d) {
-      if (!(desks[number].tells >> d & 1)) continue;
+      if (!(blockStates[number].dirtiedNeighbours >> d & 1)) continue;
       ArrivalBlock& block = blocks_.block(number);
       ArrivalBlock* other = block.neighbours[static_cast<std::size_t>(d)];
       if (!other && !mayGrow) continue;
@@ -115,13 +118,14 @@ class Rounds {
         Coord origin = block.origin;
         origin[d >> 1] += d & 1 ? 8 : -8;
         other = &blocks_.touch(origin);
-        desks.resize(blocks_.blocks().size());
+        blockStates.resize(blocks_.blocks().size());
       }
-      Desk& desk = desks[other->number];
-      desk.newsFrom |= static_cast<std::uint8_t>(1 << (d ^ 1));
-      desk.earliest = std::min(desk.earliest, desks[number].told[static_cast<std::size_t>(d)]);
+      BlockState& state = blockStates[other->number];
+      state.dirtyNeighbours |= static_cast<std::uint8_t>(1 << (d ^ 1));
+      state.earliest =
+          std::min(state.earliest, blockStates[number].earliestAtFace[static_cast<std::size_t>(d)]);
     }
-    desks[number].tells = 0;
+    blockStates[number].dirtiedNeighbours = 0;
   }
 
   ArrivalBlocks& blocks_;
@@ -129,24 +133,25 @@ class Rounds {
   std::size_t sorted_ = 0;
 };
 
-/// Notes that the time at a grid point of the block changed, for the neighbours that read it.
-void tell(Desk& desk, Index n, float time, Index depth) {
+/// Records a change of the time at a grid point for the neighbours that read it.
+void markDirty(BlockState& state, Index n, float time, Index depth) {
   const std::array<Index, 3> at = {n >> 6, n >> 3 & 7u, n & 7u};
   for (std::size_t axis = 0; axis < 3; ++axis)
     for (std::size_t side = 0; side < 2; ++side) {
       if (side ? at[axis] < 8 - depth : at[axis] >= depth) continue;
       const std::size_t d = 2 * axis + side;
-      if (!(desk.tells >> d & 1) || time < desk.told[d]) desk.told[d] = time;
-      desk.tells |= static_cast<std::uint8_t>(1u << d);
+      if (!(state.dirtiedNeighbours >> d & 1) || time < state.earliestAtFace[d])
+        state.earliestAtFace[d] = time;
+      state.dirtiedNeighbours |= static_cast<std::uint8_t>(1u << d);
     }
 }
 
-/// Gauss-Seidel sweeps over one block with its neighbours' nearest layers around it, each over the
-/// grid points only beside which something changed.
+/// Gauss-Seidel sweeps over one block, padded with the nearest layer of its neighbours. Each sweep
+/// visits only grid points beside a change.
 class FirstOrderWorker {
  public:
-  FirstOrderWorker(ArrivalBlock& block, Desk& desk, const SweepLimit& limit)
-      : block_(block), desk_(desk), limit_(limit) {
+  FirstOrderWorker(ArrivalBlock& block, BlockState& state, const SweepLimit& limit)
+      : block_(block), state_(state), limit_(limit) {
     times_.fill(kFar);
     for (int x = 0; x < 8; ++x)
       for (int y = 0; y < 8; ++y)
@@ -155,20 +160,20 @@ class FirstOrderWorker {
   }
 
   void run() {
-    markNews();
-    // Sweeps begin away from the side that the news come from.
-    const int start =
-        (desk_.newsFrom & 2 ? 4 : 0) | (desk_.newsFrom & 8 ? 2 : 0) | (desk_.newsFrom & 32 ? 1 : 0);
+    markPending();
+    // The first sweep runs away from the dirty neighbours.
+    const int start = (state_.dirtyNeighbours & 2 ? 4 : 0) | (state_.dirtyNeighbours & 8 ? 2 : 0) |
+                      (state_.dirtyNeighbours & 32 ? 1 : 0);
     constexpr std::array<int, 8> kGray = {0, 1, 3, 2, 6, 7, 5, 4};
     for (std::size_t i = 0; isPending(); ++i) sweep(start ^ kGray[i % 8]);
-    desk_.seen = true;
-    desk_.newsFrom = 0;
-    desk_.earliest = kFar;
+    state_.seen = true;
+    state_.dirtyNeighbours = 0;
+    state_.earliest = kFar;
     for (auto it = changed_.beginOn(); it; ++it) {
       const Index n = it.pos();
       const float time = times_[slot(n)];
       block_.time[n] = time;
-      if (time <= limit_.at(block_.slownessAt(n))) tell(desk_, n, time, 1);
+      if (time <= limit_.at(block_.slownessAt(n))) markDirty(state_, n, time, 1);
     }
   }
 
@@ -197,20 +202,20 @@ class FirstOrderWorker {
       }
   }
 
-  /// The first time all grid points, later those beside neighbours with news.
-  void markNews() {
-    if (!desk_.seen) {
+  /// Marks all grid points at the first call, later only those beside dirty neighbours.
+  void markPending() {
+    if (!state_.seen) {
       pending_.fill(~std::uint64_t{0});
       return;
     }
     constexpr std::uint64_t kColumn = 0x0101010101010101;
-    if (desk_.newsFrom & 1) pending_[0] = ~std::uint64_t{0};
-    if (desk_.newsFrom & 2) pending_[7] = ~std::uint64_t{0};
+    if (state_.dirtyNeighbours & 1) pending_[0] = ~std::uint64_t{0};
+    if (state_.dirtyNeighbours & 2) pending_[7] = ~std::uint64_t{0};
     for (std::uint64_t& slice : pending_) {
-      if (desk_.newsFrom & 4) slice |= 0xFF;
-      if (desk_.newsFrom & 8) slice |= std::uint64_t{0xFF} << 56;
-      if (desk_.newsFrom & 16) slice |= kColumn;
-      if (desk_.newsFrom & 32) slice |= kColumn << 7;
+      if (state_.dirtyNeighbours & 4) slice |= 0xFF;
+      if (state_.dirtyNeighbours & 8) slice |= std::uint64_t{0xFF} << 56;
+      if (state_.dirtyNeighbours & 16) slice |= kColumn;
+      if (state_.dirtyNeighbours & 32) slice |= kColumn << 7;
     }
   }
 
@@ -229,16 +234,16 @@ class FirstOrderWorker {
 
   void sweepRow(int x, int y, bool backwards) {
     std::uint64_t& slice = pending_[static_cast<std::size_t>(x)];
-    unsigned ahead = 0xFF;
-    while (const unsigned row = static_cast<unsigned>(slice >> (8 * y)) & ahead) {
+    unsigned remaining = 0xFF;
+    while (const unsigned row = static_cast<unsigned>(slice >> (8 * y)) & remaining) {
       const int z = backwards ? std::bit_width(row) - 1 : std::countr_zero(row);
       slice &= ~(std::uint64_t{1} << (8 * y + z));
-      ahead = backwards ? (1u << z) - 1 : 0xFFu << (z + 1) & 0xFFu;
+      remaining = backwards ? (1u << z) - 1 : 0xFFu << (z + 1) & 0xFFu;
       if (relax(x, y, z)) markReaders(x, y, z);
     }
   }
 
-  /// Those beside it that are later: only they can come from there.
+  /// Marks the later neighbours: only they can depend on this time.
   void markReaders(int x, int y, int z) {
     const std::size_t here = slot(x, y, z);
     const auto mark = [&](int i, int j, int k) {
@@ -253,7 +258,8 @@ class FirstOrderWorker {
     if (z < 7) mark(x, y, z + 1);
   }
 
-  /// @return did the time improve?
+  /// Solves one grid point.
+  /// @return true when the time improved
   bool relax(int x, int y, int z) {
     const std::size_t s = slot(x, y, z);
     float a = std::min(times_[s - 100], times_[s + 100]),
@@ -286,59 +292,59 @@ class FirstOrderWorker {
   }
 
   ArrivalBlock& block_;
-  Desk& desk_;
+  BlockState& state_;
   SweepLimit limit_;
   std::array<float, 1000> times_;
-  std::array<std::uint64_t, 8> pending_{};  ///< to be solved: slices of x, bits of 8 y + z
+  std::array<std::uint64_t, 8> pending_{};  ///< grid points to solve: slices of x, bits 8 y + z
   Mask changed_;
 };
 
-/// Solves again with second-order differences. Which neighbours are upwind is taken from the first
-/// solution, so each grid point waits for earlier ones only and the equations have one solution.
+/// Solver with second-order differences. It takes the upwind neighbours from the first solution. So
+/// each grid point depends on earlier ones only, and the equations have one solution.
 class SecondOrderWorker {
  public:
-  SecondOrderWorker(const ArrivalBlocks& blocks, ArrivalBlock& block, Desk& desk,
-                    const std::vector<Desk>& desks, const SweepLimit& limit)
-      : blocks_(blocks), block_(block), desk_(desk), limit_(limit) {
-    load(block, desk, Coord(0), Coord(0), Coord(8));
+  SecondOrderWorker(const ArrivalBlocks& blocks, ArrivalBlock& block, BlockState& state,
+                    const std::vector<BlockState>& blockStates, const SweepLimit& limit)
+      : blocks_(blocks), block_(block), state_(state), limit_(limit) {
+    load(block, state, Coord(0), Coord(0), Coord(8));
     for (int d = 0; d < 6; ++d) {
       Coord from(0), to(8), shift(0);
       shift[d >> 1] = d & 1 ? 8 : -8;
       (d & 1 ? to : from)[d >> 1] = d & 1 ? 2 : 6;
       if (const ArrivalBlock* other = block.neighbours[static_cast<std::size_t>(d)])
-        load(*other, desks[other->number], shift, from, to);
+        load(*other, blockStates[other->number], shift, from, to);
       else
         clear(shift, from, to);
     }
   }
 
   void run() {
-    if (desk_.order) {
-      markNews();
+    if (state_.order) {
+      markPending();
     } else {
       sortByTime();
       pending_.setOn();
     }
-    for (const std::uint16_t n : *desk_.order) {
+    for (const std::uint16_t n : *state_.order) {
       if (!pending_.isOn(n)) continue;
       const auto time = static_cast<float>(solve(n));
-      float& stored = (*desk_.second)[n];
+      float& stored = (*state_.second)[n];
       if (std::abs(time - stored) <= kImprovement * static_cast<float>(block_.slownessAt(n)))
         continue;
       stored = time;
       second_[slot(n)] = block_.inside.isOn(n) ? -time : time;
-      tell(desk_, n, block_.time[n], 2);
+      markDirty(state_, n, block_.time[n], 2);
       markReaders(n);
     }
-    desk_.newsFrom = 0;
-    desk_.earliest = kFar;
+    state_.dirtyNeighbours = 0;
+    state_.earliest = kFar;
   }
 
  private:
-  /// The two layers beside each neighbour with news read from it.
-  void markNews() {
+  /// Marks the two layers beside each dirty neighbour.
+  void markPending() {
     for (std::size_t d = 0; d < 6; ++d)
-      if (desk_.newsFrom >> d & 1) pending_ |= facingLayers()[d];
+      if (state_.dirtyNeighbours >> d & 1) pending_ |= facingLayers()[d];
   }
 
   static const std::array<Mask, 6>& facingLayers() {
@@ -354,7 +360,8 @@ class SecondOrderWorker {
     return layers;
   }
 
-  /// The grid points of the block up to two away; of those that came before none reads this one.
+  /// Marks the grid points of the block up to two away. Marks on earlier ones have no effect: none
+  /// of these reads this one.
   void markReaders(Index n) {
     for (const Index shift : {0u, 3u, 6u}) {
       const Index at = n >> shift & 7u, step = 1u << shift;
@@ -366,21 +373,21 @@ class SecondOrderWorker {
   }
 
   void sortByTime() {
-    // Times are not negative: their bits sort as they do.
+    // Times are not negative, so their bits sort in the same order.
     std::array<std::uint64_t, ArrivalBlock::kSize> keys;
     std::size_t count = 0;
     for (Index n = 0; n < ArrivalBlock::kSize; ++n)
       if (!block_.known.isOn(n) && block_.time[n] <= limit_.at(block_.slownessAt(n)))
         keys[count++] = std::uint64_t{std::bit_cast<std::uint32_t>(block_.time[n])} << 16 | n;
     std::sort(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(count));
-    desk_.order.emplace(count);
+    state_.order.emplace(count);
     for (std::size_t i = 0; i < count; ++i)
-      (*desk_.order)[i] = static_cast<std::uint16_t>(keys[i] & 0xFFFF);
+      (*state_.order)[i] = static_cast<std::uint16_t>(keys[i] & 0xFFFF);
   }
 
   struct Neighbour {
-    float first = kFar;  ///< time of the first solution
-    double time = 0;     ///< of the second; both negative on the other side
+    float first = kFar;  ///< time of the first solution, negative on the other side
+    double time = 0;     ///< time of the second solution, negative on the other side
   };
 
   static std::size_t slot(const Coord& c) {
@@ -390,7 +397,7 @@ class SecondOrderWorker {
     return slot(openvdb::FloatTree::LeafNodeType::offsetToLocalCoord(n));
   }
 
-  /// Rows of z between two corners.
+  /// Calls each(first grid point) for the rows along z between two corners.
   template <typename Each>
   static void forEachRow(const Coord& from, const Coord& to, const Each& each) {
     for (int x = from.x(); x < to.x(); ++x)
@@ -401,8 +408,8 @@ class SecondOrderWorker {
     forEachRow(from, to,
                [&](const Coord& c) { std::fill_n(&first_[slot(c + shift)], count, kFar); });
   }
-  void load(const ArrivalBlock& block, const Desk& desk, const Coord& shift, const Coord& from,
-            const Coord& to) {
+  void load(const ArrivalBlock& block, const BlockState& state, const Coord& shift,
+            const Coord& from, const Coord& to) {
     const auto count = static_cast<Index>(to.z() - from.z());
     const bool isMixed = !block.inside.isOn() && !block.inside.isOff();
     const float all = block.inside.isOn() ? -1.0f : 1.0f;
@@ -413,7 +420,7 @@ class SecondOrderWorker {
       for (Index i = 0; i < count; ++i) {
         const float side = !isMixed ? all : block.inside.isOn(n + i) ? -1.0f : 1.0f;
         first[i] = side * block.time[n + i];
-        second[i] = side * (*desk.second)[n + i];
+        second[i] = side * (*state.second)[n + i];
       }
     });
   }
@@ -429,7 +436,7 @@ class SecondOrderWorker {
     const std::size_t here = slot(n);
     const StraightTime straight = blocks_.straightTime(block_, n);
     UpwindTerms terms;
-    std::array<double, 3> near{}, missed{};  // of first order
+    std::array<double, 3> near{}, missed{};  // first-order values and errors
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::size_t step = kStep[axis];
       const Neighbour a = look(here - step, side), b = look(here + step, side);
@@ -459,7 +466,8 @@ class SecondOrderWorker {
         plain.addFirst(near[i], share * missed[i]);
       return solveUpwind(plain, slowness);
     };
-    // Each of these errs more than the one before it and is nearer to being causal; the last is.
+    // Each fallback is less accurate than the one before it and closer to causal; the last one is
+    // causal.
     if (terms.hasSecond && time < terms.latest - straight.slack()) {
       time = inFirstOrder(1);
       first = true;
@@ -471,11 +479,11 @@ class SecondOrderWorker {
 
   const ArrivalBlocks& blocks_;
   ArrivalBlock& block_;
-  Desk& desk_;
+  BlockState& state_;
   SweepLimit limit_;
-  /// Both solutions in the block and two layers of its neighbours, negative inside.
+  /// Both solutions in the block and in two layers of its neighbours, negative inside.
   std::array<float, 12 * 12 * 12> first_, second_;
-  Mask pending_;  ///< to be solved in this round
+  Mask pending_;  ///< grid points to solve in this round
 };
 
 float earliestUnknown(const ArrivalBlock& block) {
@@ -487,16 +495,16 @@ float earliestUnknown(const ArrivalBlock& block) {
 
 void solveSecondOrder(ArrivalBlocks& blocks, const SweepLimit& limit) {
   Rounds rounds(blocks);
-  rounds.desks.resize(blocks.blocks().size());
+  rounds.blockStates.resize(blocks.blocks().size());
   for (ArrivalBlock& block : blocks.blocks()) {
-    Desk& desk = rounds.desks[block.number];
-    desk.second = std::make_unique<std::array<float, ArrivalBlock::kSize>>(block.time);
-    desk.earliest = earliestUnknown(block);
+    BlockState& state = rounds.blockStates[block.number];
+    state.second = std::make_unique<std::array<float, ArrivalBlock::kSize>>(block.time);
+    state.earliest = earliestUnknown(block);
   }
-  rounds.run(false, 0.5, 1, [&](ArrivalBlock& block, Desk& desk) {
-    SecondOrderWorker(blocks, block, desk, rounds.desks, limit).run();
+  rounds.run(false, 0.5, 1, [&](ArrivalBlock& block, BlockState& state) {
+    SecondOrderWorker(blocks, block, state, rounds.blockStates, limit).run();
   });
-  for (ArrivalBlock& block : blocks.blocks()) block.time = *rounds.desks[block.number].second;
+  for (ArrivalBlock& block : blocks.blocks()) block.time = *rounds.blockStates[block.number].second;
 }
 
 }  // namespace
@@ -506,17 +514,17 @@ void sweepArrivals(ArrivalBlocks& blocks, int order) {
   const SweepLimit limit{until, order == 2};
   {
     Rounds rounds(blocks);
-    rounds.desks.resize(blocks.blocks().size());
+    rounds.blockStates.resize(blocks.blocks().size());
     for (ArrivalBlock& block : blocks.blocks())
       for (auto it = block.known.beginOn(); it; ++it) {
-        Desk& desk = rounds.desks[block.number];
+        BlockState& state = rounds.blockStates[block.number];
         if (block.time[it.pos()] > until) continue;
-        desk.earliest = std::min(desk.earliest, block.time[it.pos()]);
-        tell(desk, it.pos(), block.time[it.pos()], 1);
+        state.earliest = std::min(state.earliest, block.time[it.pos()]);
+        markDirty(state, it.pos(), block.time[it.pos()], 1);
       }
-    rounds.deliverStart();
-    rounds.run(true, 0, order == 2 ? 0.5 : 1, [&](ArrivalBlock& block, Desk& desk) {
-      FirstOrderWorker(block, desk, limit).run();
+    rounds.passInitialFlags();
+    rounds.run(true, 0, order == 2 ? 0.5 : 1, [&](ArrivalBlock& block, BlockState& state) {
+      FirstOrderWorker(block, state, limit).run();
     });
   }
   if (order == 2) solveSecondOrder(blocks, limit);

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal only.
+// Internal header of levelset: public headers must not include it.
 
 #include <algorithm>
 #include <cmath>
@@ -8,25 +8,25 @@
 
 namespace levelset::eikonal {
 
-/// A time that nothing has reached.
+/// Time of a grid point that no front has reached.
 inline constexpr float kFar = 1e30f;
 
-/// What the grid points behind x on one axis say: weight · (u − value)² is the square of the
+/// Contribution of the upwind grid points on one axis: weight · (u − value)² is the square of the
 /// derivative. First order: the neighbour's time and 1. Second order: (4 T₁ − T₂) / 3 and 9/4.
 struct UpwindTerm {
   double value = 0;
   double weight = 1;
 };
 
-/// Up to one term for each axis.
+/// Upwind contributions, at most one for each axis.
 struct UpwindTerms {
   UpwindTerm term[3];
   int count = 0;
-  double latest = -std::numeric_limits<double>::max();  ///< nearest neighbours' times, the largest
-  bool hasFirst = false, hasSecond = false;             ///< is one of the terms of that order?
-  double known = 0;  ///< squares of derivatives along axes that have no term
+  double latest = -std::numeric_limits<double>::max();  ///< latest time of the nearest neighbours
+  bool hasFirst = false, hasSecond = false;             ///< presence of terms of that order
+  double known = 0;  ///< squares of derivatives along axes without a term
 
-  /// @param missed  what the difference lacks of the derivative, where that is known
+  /// @param missed  error of the difference against the derivative, where known
   void addFirst(double near, double missed = 0) {
     add(near - missed, 1, near);
     hasFirst = true;
@@ -38,7 +38,7 @@ struct UpwindTerms {
 
  private:
   void add(double value, double weight, double near) {
-    // Sorted by value.
+    // Insert sorted by value.
     int i = count++;
     for (; i > 0 && term[i - 1].value > value; --i) term[i] = term[i - 1];
     term[i] = {value, weight};
@@ -46,14 +46,15 @@ struct UpwindTerms {
   }
 };
 
-/// The time u at which a front of the given slowness (per voxel) comes from the terms: solves
-/// Σ weight (u − value)² = slowness² − known, with the later axes left out while they lie in the
-/// future [Sethian99, Zhao05].
+/// Solves Σ weight (u − value)² = slowness² − known for the arrival time u, with the slowness per
+/// voxel. Leaves out axes whose values are later than the time from the earlier axes [Sethian99,
+/// Zhao05].
 [[nodiscard]] inline double solveUpwind(const UpwindTerms& terms, double slowness) {
   const double base = terms.term[0].value,
                square = std::max(0.0, slowness * slowness - terms.known);
-  // An axis counts if the earlier ones alone come later than its value: if at that value the sum
-  // is below slowness². The sum rises from value to value, so the last that counts is found first.
+  // An axis counts if its value is earlier than the time from the earlier axes alone: then the sum
+  // at that value is below slowness². The sum rises from value to value, so the search runs from
+  // the last axis.
   int count = terms.count;
   for (; count > 1; --count) {
     double sum = 0;

@@ -13,7 +13,7 @@ namespace {
 
 using Imath::V3d;
 
-/// What a formula may read.
+/// Variables that a formula may use.
 struct Variables {
   bool space = false, time = false;
   const char* names = "";
@@ -21,8 +21,8 @@ struct Variables {
 constexpr Variables kSpace = {true, false, "x, y, z, r"}, kTime = {false, true, "t"},
                     kSpaceAndTime = {true, true, "x, y, z, r, t"};
 
-/// A parser with the variables that it reads. Its variables are bound by address, so each thread
-/// has one of its own.
+/// A parser with its variables. It binds the variables by address, so each thread has its own
+/// parser.
 class Formula {
  public:
   Formula(const std::string& text, const Variables& variables)
@@ -40,7 +40,7 @@ class Formula {
   Formula(const Formula& other) : Formula(other.text_, other.variables_) {}
   Formula& operator=(const Formula&) = delete;
 
-  /// The values of all formulas of the text, as many as it has.
+  /// Evaluates all formulas of the text and returns their values; `count` receives their number.
   const double* evaluate(const V3d& place, double time, int& count) {
     place_ = place;
     radius_ = place.length();
@@ -78,7 +78,7 @@ class Formulas {
   }
 
  private:
-  /// The parser takes a text before it reads it, and refuses one that is too long.
+  /// Parses the text. The parser's constructor refuses a text that is too long.
   static Formula read(const std::string& text, const Variables& variables, const char* action) {
     try {
       return {text, variables};
@@ -88,11 +88,11 @@ class Formulas {
   }
   [[noreturn]] static void refuse(const std::string& text, const Variables& variables,
                                   const char* action, const std::string& why) {
-    constexpr std::size_t kMostShown = 200;
+    constexpr std::size_t kMaxShown = 200;
     throw UsageError(
         fmt::format("{}: the formula '{}' cannot be read: {}; use {}, numbers and functions such "
                     "as sin({})",
-                    action, text.size() > kMostShown ? text.substr(0, kMostShown) + "…" : text, why,
+                    action, text.size() > kMaxShown ? text.substr(0, kMaxShown) + "…" : text, why,
                     variables.names, variables.names[0]));
   }
 

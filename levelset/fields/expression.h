@@ -5,22 +5,22 @@
 
 #include "levelset/fields/field.h"
 
-/// Fields written as formulas in x, y, z (world units) and r = |(x, y, z)|, in t (time), or in all
-/// of them: muParser's grammar (+ − * / ^, comparison, ?:, &&, ||, sin … atan2, exp, ln, sqrt, min,
-/// max, abs, sign, rint, sum, avg), and `pi`. A formula that reads what has no meaning for it is
-/// refused.
+/// Fields given by formulas in x, y, z (world units) and r = |(x, y, z)|, in t (time), or in all of
+/// them. The grammar is muParser's: + − * / ^, comparison, ?:, &&, ||, sin … atan2, exp, ln, sqrt,
+/// min, max, abs, sign, rint, sum, avg; and `pi`. A formula with a variable that it does not have
+/// is refused.
 namespace levelset {
 
-/// One formula in x, y, z, r.
-/// @param action  for messages
-/// @throws UsageError with the place when the text is no such formula
+/// Parses one formula in x, y, z, r.
+/// @param action  name of the action in messages
+/// @throws UsageError, with the position, for an invalid formula
 [[nodiscard]] ScalarField scalarExpression(const std::string& text, const char* action);
 
-/// Three formulas in x, y, z, r, t with commas between them: "-y, x, 0.1*sin(t)".
-/// @throws UsageError when there are not three, or one is none
+/// Parses three formulas in x, y, z, r, t, separated by commas: "-y, x, 0.1*sin(t)".
+/// @throws UsageError when there are not three, or one is invalid
 [[nodiscard]] VectorField vectorExpression(const std::string& text, const char* action);
 
-/// One formula in t. @throws UsageError when the text is no such formula
+/// Parses one formula in t. @throws UsageError for an invalid formula
 [[nodiscard]] std::function<double(double time)> timeExpression(const std::string& text,
                                                                 const char* action);
 

@@ -6,8 +6,8 @@
 
 namespace levelset {
 
-/// A number at each point of space (world units), or a vector at each point and time: a constant,
-/// an expression, a grid. Safe to call from many threads at once.
+/// A number at each point of space (world units), or a vector at each point and time. The source is
+/// a constant, an expression or a grid. Several threads may call it at once.
 using ScalarField = std::function<double(const Imath::V3d& world)>;
 using VectorField = std::function<Imath::V3d(const Imath::V3d& world, double time)>;
 

@@ -18,16 +18,16 @@ using openvdb::Coord;
 using openvdb::FloatGrid;
 using openvdb::Vec3SGrid;
 
-// Positions beyond any tree, NaN among them, still give a valid coordinate.
+// Clamps positions far outside any tree, and NaN, to a valid coordinate.
 constexpr double kFarthestIndex = 2147483000.0;
 
-/// What is below a position on an axis: a cell of the grid, and the share of it.
+/// Grid cell below a position on an axis, and the fraction of the position in it.
 struct Cell {
   int low;
   double share;
 
   explicit Cell(double index) {
-    // Comparisons that NaN fails, so that it goes to the far end.
+    // NaN fails these comparisons and so goes to the far end.
     const double near = index < kFarthestIndex ? index : kFarthestIndex;
     const double inside = near > -kFarthestIndex ? near : -kFarthestIndex;
     const int towardsZero = static_cast<int>(inside);
@@ -36,7 +36,8 @@ struct Cell {
   }
 };
 
-/// The N³ grid points from one on, in their leaf, or gathered from several.
+/// The N³ grid points from a lowest one upwards: a view of their leaf, or a copy gathered from
+/// several.
 template <typename Value, int N>
 class PointBlock {
  public:
@@ -65,8 +66,8 @@ class PointBlock {
   PointBlock(const PointBlock&) = delete;
   PointBlock& operator=(const PointBlock&) = delete;
 
-  /// Trilinear between eight of them; `pick` reads one number of a value.
-  /// @param first  of the eight
+  /// Trilinear interpolation between eight of the points; `pick` selects one component of a value.
+  /// @param first  lowest of the eight points, relative to the block
   template <typename Pick>
   [[nodiscard]] double trilinear(const Coord& first, const double (&t)[3], const Pick& pick) const {
     const Value* values = first_ + first[0] * strideX_ + first[1] * strideY_ + first[2];
@@ -81,7 +82,7 @@ class PointBlock {
   }
 
  private:
-  /// Those of one leaf, or tile.
+  /// Copies the values of one leaf or tile.
   template <typename Accessor>
   void gather(const Accessor& accessor, const Coord& low, const Coord& from, const Coord& to) {
     const Coord first = low + from;
@@ -100,8 +101,8 @@ class PointBlock {
   Value gathered_[N * N * N];
 };
 
-/// A grid that many threads sample: each through an accessor of its own. The tree does not change,
-/// so nobody need be told of it.
+/// Grid access for several threads, each with an accessor of its own. The tree never changes, so it
+/// need not register the accessors.
 template <typename GridT>
 class FieldSampler {
  public:
@@ -133,7 +134,7 @@ ScalarField sampled(std::shared_ptr<const void> owner, const FloatGrid& grid) {
 
 using VectorSampler = FieldSampler<Vec3SGrid>;
 
-/// All three numbers stand at the grid's points.
+/// Interpolates a vector whose three components belong to the grid points.
 V3d centredVector(VectorSampler& sampler, const V3d& world) {
   const openvdb::Vec3d index = sampler.toIndex(world);
   const Cell x(index[0]), y(index[1]), z(index[2]);
@@ -145,7 +146,8 @@ V3d centredVector(VectorSampler& sampler, const V3d& world) {
   return result;
 }
 
-/// Each number stands half a voxel before the grid's points along its own axis.
+/// Interpolates a vector whose components belong to points half a voxel before the grid points,
+/// each along its own axis.
 V3d staggeredVector(VectorSampler& sampler, const V3d& world) {
   const openvdb::Vec3d index = sampler.toIndex(world);
   const Cell x(index[0]), y(index[1]), z(index[2]);
@@ -171,7 +173,7 @@ void checkField(const GridT& grid, const char* action) {
   const auto refuse = [&](const Coord& at) {
     throw InvalidInput(
         fmt::format("{}: grid '{}' holds NaN or infinity at index [{}, {}, {}]; repair the "
-                    "file or make it again",
+                    "file or write it again",
                     action, grid.getName(), at.x(), at.y(), at.z()));
   };
   if (!openvdb::math::isFinite(grid.background())) refuse(Coord(0));
@@ -232,7 +234,7 @@ std::uint64_t FieldGrid::contentHash() const {
 ScalarField asScalarField(const FieldGrid& grid, const char* action) {
   if (grid.isVector()) {
     throw InvalidInput(
-        fmt::format("{}: grid '{}' holds vectors, and a number is needed at each "
+        fmt::format("{}: grid '{}' holds vectors, but a number is needed at each "
                     "point; give a scalar grid",
                     action, grid.name()));
   }
@@ -246,7 +248,7 @@ ScalarField asScalarField(const NarrowBand& band) {
 VectorField asVectorField(const FieldGrid& grid, const char* action) {
   if (!grid.isVector()) {
     throw InvalidInput(
-        fmt::format("{}: grid '{}' holds numbers, and a vector is needed at each "
+        fmt::format("{}: grid '{}' holds numbers, but a vector is needed at each "
                     "point; give a vector grid",
                     action, grid.name()));
   }

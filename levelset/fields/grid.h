@@ -13,48 +13,52 @@ namespace levelset {
 
 struct VdbField;  // levelset/fields/grid_vdb.h, for .cpp files only
 
-/// Numbers or vectors on a sparse grid of any class: a fog volume, an attribute, a velocity. Not a
-/// narrow band: nothing is promised about its values but that they are finite.
+/// Numbers or vectors on a sparse grid of any class: a fog volume, an attribute, a velocity. Unlike
+/// in a narrow band, the values are only required to be finite.
 ///
-/// A value: copies share one grid, which nobody changes. Grids come from files (readField in
-/// levelset/files/band_file.h) and from operators.
+/// The class has value semantics. Copies share one grid, which never changes. Grids come from files
+/// (readField in levelset/files/band_file.h) and from operators.
 class FieldGrid {
  public:
   explicit FieldGrid(std::shared_ptr<const VdbField> field) : field_(std::move(field)) {}
 
   [[nodiscard]] bool isVector() const;
-  /// Component i of a vector at the centre of the voxel's lower face i (marker-and-cell), not at
-  /// the voxel's centre.
+  /// Returns true when component i of a vector belongs to the centre of the voxel's lower face i
+  /// (marker-and-cell), not to the voxel's centre.
   [[nodiscard]] bool isStaggered() const;
-  /// OpenVDB's word: "staggered", "fog volume", "unknown", …
+  /// OpenVDB's name of the class: "staggered", "fog volume", "unknown", …
   [[nodiscard]] std::string gridClass() const;
   [[nodiscard]] std::string name() const;
-  /// Edge of a voxel, world units; 0 when the voxels are no cubes.
+  /// Edge length of a voxel, world units; 0 when the voxels are not cubes.
   [[nodiscard]] double voxelSize() const;
   [[nodiscard]] std::uint64_t activeVoxelCount() const;
-  /// Bytes that the tree takes.
+  /// Memory of the tree in bytes.
   [[nodiscard]] std::size_t memoryUse() const;
-  /// World-space box about the centres of the active voxels; empty when there are none.
+  /// World-space box around the centres of the active voxels; empty when there are none.
   [[nodiscard]] Imath::Box3d bounds() const;
-  /// Hash of transform, topology, class and values: equal for equal grids, whatever made them.
+  /// Hash of transform, topology, class and values. Equal grids have equal hashes, whatever their
+  /// source.
   [[nodiscard]] std::uint64_t contentHash() const;
 
-  /// For our own .cpp files; see levelset/fields/grid_vdb.h.
+  /// Grid behind the field, for the .cpp files of this library; see levelset/fields/grid_vdb.h.
   [[nodiscard]] const std::shared_ptr<const VdbField>& shared() const { return field_; }
 
  private:
   std::shared_ptr<const VdbField> field_;
 };
 
-/// Trilinear between grid points, through the grid's transform; the background outside.
-/// @throws InvalidInput for a vector grid. @param action  for the message
+/// Interpolates the grid trilinearly, with the background outside.
+/// @param action  name of the action in the message
+/// @throws InvalidInput for a vector grid
 [[nodiscard]] ScalarField asScalarField(const FieldGrid& grid, const char* action);
 
-/// The signed distance of a band, world units: ± background outside it.
+/// The signed distance of a band, world units; ± background outside it.
 [[nodiscard]] ScalarField asScalarField(const NarrowBand& band);
 
-/// Trilinear as above, each component about its own place when staggered. The same at any time.
-/// @throws InvalidInput for a scalar grid. @param action  for the message
+/// Interpolates a vector grid trilinearly, constant in time. Staggered components have grid points
+/// of their own.
+/// @param action  name of the action in the message
+/// @throws InvalidInput for a scalar grid
 [[nodiscard]] VectorField asVectorField(const FieldGrid& grid, const char* action);
 
 }  // namespace levelset

@@ -1,13 +1,13 @@
 #pragma once
 
-// What is behind a FieldGrid. Includes OpenVDB: for .cpp files only.
+// The grid behind a FieldGrid. Includes OpenVDB, so include it from .cpp files only.
 
 #include "levelset/fields/grid.h"
 #include "levelset/vdb.h"
 
 namespace levelset {
 
-/// One of the two is set.
+/// A scalar or a vector grid; the other pointer is null.
 struct VdbField {
   openvdb::FloatGrid::ConstPtr scalar = {};
   openvdb::Vec3SGrid::ConstPtr vector = {};
@@ -17,7 +17,7 @@ struct VdbField {
   }
 };
 
-/// Take a grid that came from outside, and find it finite.
+/// Makes a field of an external grid and checks that its values are finite.
 /// @throws InvalidInput for NaN or infinite values, or a transform that is not linear
 [[nodiscard]] FieldGrid importField(const openvdb::FloatGrid::Ptr& grid, const char* action);
 [[nodiscard]] FieldGrid importField(const openvdb::Vec3SGrid::Ptr& grid, const char* action);

@@ -25,7 +25,7 @@ void checkMask(const Mask& mask, const char* action) {
   if (!mask.field) throw UsageError(fmt::format("{}: the mask has no field; give one", action));
   if (!(mask.min <= mask.max) || !std::isfinite(mask.min) || !std::isfinite(mask.max)) {
     throw UsageError(
-        fmt::format("{}: the mask reaches from {} to {}; give finite values, the "
+        fmt::format("{}: the mask ranges from {} to {}; give finite values, the "
                     "smaller first",
                     action, mask.min, mask.max));
   }

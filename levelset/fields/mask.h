@@ -4,20 +4,21 @@
 
 namespace levelset {
 
-/// Where an operator acts, and how strongly.
+/// A field that limits where, and how strongly, an operator acts.
 struct Mask {
   ScalarField field;
-  double min = 0;  ///< field values from which on it acts …
-  double max = 1;  ///< … and at which it acts fully
+  double min = 0;  ///< field value at which the operator begins to act
+  double max = 1;  ///< field value from which on it acts fully
   bool invert = false;
 
-  /// 0: the surface stays as it is, 1: the operator acts fully; 3t² − 2t³ between. With min = max
-  /// a step. NaN in the field counts as 0 before inversion.
+  /// Weight of the operator at a point. 0: the surface stays unchanged; 1: the operator acts fully;
+  /// 3t² − 2t³ between. A step if min = max. NaN in the field counts as 0 before inversion.
   [[nodiscard]] double weight(const Imath::V3d& world) const;
 };
 
-/// @throws UsageError unless field is set, min and max are finite and min ≤ max.
-///         @param action  for the message
+/// Checks a mask.
+/// @param action  name of the action in the message
+/// @throws UsageError unless the field is set, min and max are finite and min ≤ max
 void checkMask(const Mask& mask, const char* action);
 
 }  // namespace levelset

@@ -23,10 +23,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Where the random identifier stands: behind magic number, three versions and a flag.
+/// Offset of the random identifier: after the magic number, three versions and a flag.
 constexpr std::streamoff kIdentifierOffset = 8 + 3 * 4 + 1;
-/// NanoVDB's writer inverts the matrix by OpenVDB's AffineMap, which takes less for singular.
-constexpr double kLeastNanoVoxel = 1.5e-5;
+/// Smallest voxel size of a NanoVDB file. NanoVDB's writer inverts the matrix with OpenVDB's
+/// AffineMap, which treats smaller voxels as singular.
+constexpr double kMinNanoVoxel = 1.5e-5;
 
 std::string bandFormat(const fs::path& nameOrFormat) {
   std::string text = nameOrFormat.filename().string();
@@ -40,7 +41,7 @@ std::string bandFormat(const fs::path& path, const std::string& given) {
   const std::string format = bandFormat(given.empty() ? path : fs::path(given));
   if (!format.empty()) return format;
   throw UsageError(
-      fmt::format("write: '{}' tells no format of a band; end the name in .vdb or .nvdb, or "
+      fmt::format("write: '{}' names no format of a band; end the name in .vdb or .nvdb, or "
                   "give --format",
                   given.empty() ? path.string() : given));
 }
@@ -74,32 +75,33 @@ std::string listOf(const std::vector<VdbEntry>& entries) {
   return list.empty() ? "nothing" : list;
 }
 
-/// By name, or the only level set.
+/// Chooses the grid by name, or the only level set.
 const VdbEntry& chooseGrid(const std::vector<VdbEntry>& entries, const std::string& wanted,
                            const std::string& file) {
   const VdbEntry* chosen = nullptr;
   for (const VdbEntry& entry : entries) {
     if (wanted.empty() ? !isLevelSet(entry) : entry.name != wanted) continue;
     if (chosen) {
-      throw InvalidInput(fmt::format("read: {} holds more than one {}: {}; {}", file,
-                                     wanted.empty() ? "level set" : "grid of that name",
-                                     listOf(entries),
-                                     wanted.empty() ? "choose with --grid" : "write them apart"));
+      throw InvalidInput(
+          fmt::format("read: {} holds more than one {}: {}; {}", file,
+                      wanted.empty() ? "level set" : "grid of that name", listOf(entries),
+                      wanted.empty() ? "choose with --grid" : "write them to separate files"));
     }
     chosen = &entry;
   }
   if (!chosen) {
     throw InvalidInput(fmt::format(
-        "read: {} holds {}, and no {}; {}", file, listOf(entries),
+        "read: {} holds {}, but no {}; {}", file, listOf(entries),
         wanted.empty() ? "level set of float values" : fmt::format("grid '{}'", wanted),
-        wanted.empty() ? "convert it to a level set before, or name one with --grid to take it as "
-                         "a field"
-                       : "choose one of these with --grid"));
+        wanted.empty()
+            ? "convert it to a level set first, or name a grid with --grid to read it as "
+              "a field"
+            : "choose one of these with --grid"));
   }
   return *chosen;
 }
 
-/// The entry that holds the tree: another one where trees are shared.
+/// The entry that owns the tree; a different entry where grids share a tree.
 const VdbEntry& treeOwner(const std::vector<VdbEntry>& entries, const VdbEntry& entry,
                           const std::string& file) {
   if (entry.instanceOf.empty()) return entry;
@@ -108,12 +110,12 @@ const VdbEntry& treeOwner(const std::vector<VdbEntry>& entries, const VdbEntry& 
         other.type == entry.type)
       return other;
   throw InvalidInput(
-      fmt::format("read: {} is damaged: the tree of grid '{}' is missing; fetch or make "
+      fmt::format("read: {} is damaged: the tree of grid '{}' is missing; download or create "
                   "the file again",
                   file, entry.name));
 }
 
-/// A .vdb file in memory, one of its grids chosen.
+/// A .vdb file in memory and the chosen grid.
 struct ChosenGrid {
   std::string_view file;
   const std::string& name;
@@ -124,10 +126,10 @@ struct ChosenGrid {
   [[nodiscard]] std::string action() const { return fmt::format("read: {}", name); }
 
   [[noreturn]] void refuseType(const char* readable) const {
-    throw InvalidInput(
-        fmt::format("read: grid '{}' of {} holds values of type {}, and {} are read; convert it "
-                    "before",
-                    entry.name, name, valueType(entry), readable));
+    throw InvalidInput(fmt::format(
+        "read: grid '{}' of {} holds values of type {}; supported types are {}; convert it "
+        "first",
+        entry.name, name, valueType(entry), readable));
   }
 
   template <typename GridT, typename Read>
@@ -169,8 +171,8 @@ auto readFrom(const fs::path& path, const ReadBandOptions& options, const Take& 
   const std::string name = inputName(path);
   if (bandFormat(path) == "nvdb") {
     throw UsageError(
-        fmt::format("read: {} is written for renderers and not read back; read the .vdb "
-                    "that it was made from",
+        fmt::format("read: {} is a file for renderers, which cannot be read back; read the .vdb "
+                    "file that it was written from",
                     name));
   }
   try {
@@ -184,14 +186,14 @@ auto readFrom(const fs::path& path, const ReadBandOptions& options, const Take& 
     throw ResourceLimit(
         fmt::format("read: {} does not fit into memory; free memory or use larger voxels", name));
   } catch (const openvdb::Exception& error) {
-    throw InvalidInput(
-        fmt::format("read: {} is damaged: {}; fetch or make the file again", name, error.what()));
+    throw InvalidInput(fmt::format("read: {} is damaged: {}; download or create the file again",
+                                   name, error.what()));
   }
 }
 
 // === Writing
 
-/// A file that tells how much of what was expected has gone into it.
+/// A file buffer that reports how much of the expected data has been written.
 class ReportingFile : public std::filebuf {
  public:
   ReportingFile(const Progress& progress, double expected)
@@ -203,7 +205,7 @@ class ReportingFile : public std::filebuf {
     written_ += static_cast<double>(size);
     if (written_ > told_ + kStep) {
       told_ = written_;
-      // Compression leaves less than was expected; the end is told by whoever closes the file.
+      // Compression leaves fewer bytes than expected. Closing the file reports the end.
       report(progress_, std::min(0.9, written_ / expected_), "write");
     }
     return std::filebuf::xsputn(data, size);
@@ -214,14 +216,14 @@ class ReportingFile : public std::filebuf {
   double expected_, written_ = 0, told_ = 0;
 };
 
-/// OpenVDB's writer, with grid offsets, on any stream that can seek.
+/// OpenVDB's writer, with grid offsets, on any seekable stream.
 struct StreamArchive : openvdb::io::Archive {
   void writeGrids(std::ostream& out, const openvdb::GridBase::ConstPtr& grid) const {
     Archive::write(out, openvdb::GridCPtrVec{grid}, true, openvdb::MetaMap());
   }
 };
 
-/// The grid with nothing but what we say about it; the tree is shared.
+/// Copies a grid without its metadata, except those that this library sets. The tree is shared.
 template <typename GridT>
 typename GridT::Ptr namedGrid(const GridT& source, const std::string& name) {
   using Tree = typename GridT::TreeType;
@@ -257,7 +259,7 @@ void writeVdb(const fs::path& path, const openvdb::GridBase::ConstPtr& grid, std
   report(progress, 1, "write");
 }
 
-/// @param write  fills the file at the path it is given
+/// @param write  fills the file at the given path
 template <typename Write>
 void writeTarget(const fs::path& path, const Write& write) {
   FileTarget target(path);
@@ -287,7 +289,7 @@ T metadataValue(const VdbEntry& entry, const char* key, T otherwise) {
   return value;
 }
 
-/// The box around the corners of an index box in the world.
+/// World-space bounding box of the corners of an index box.
 Imath::Box3d worldBox(const Imath::Box3d& box, const openvdb::math::Transform& transform) {
   Imath::Box3d result;
   for (int corner = 0; corner < 8; ++corner) {
@@ -299,7 +301,7 @@ Imath::Box3d worldBox(const Imath::Box3d& box, const openvdb::math::Transform& t
   return result;
 }
 
-/// @param owner  the entry that holds the tree
+/// @param owner  the entry that owns the tree
 GridInfo describe(const VdbEntry& entry, const VdbEntry& owner, std::string_view file,
                   const std::string& name) {
   using openvdb::GridBase;
@@ -348,13 +350,13 @@ void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOpti
   const std::string format = bandFormat(path, options.format);
   if (!band.shared())
     throw InvalidInput(
-        fmt::format("write: there is no band to write to '{}'; make one first", path.string()));
-  requireSolid(band, "write");  // a file would not tell
-  if (format == "nvdb" && band.voxelSize() < kLeastNanoVoxel)
-    throw InvalidInput(
-        fmt::format("write: '{}' cannot hold voxels of {:.6g}, NanoVDB takes none below {}; write "
-                    "a .vdb, or change the unit of length",
-                    path.string(), band.voxelSize(), kLeastNanoVoxel));
+        fmt::format("write: there is no band to write to '{}'; create one first", path.string()));
+  requireSolid(band, "write");  // a file would not record that the surface is open
+  if (format == "nvdb" && band.voxelSize() < kMinNanoVoxel)
+    throw InvalidInput(fmt::format(
+        "write: '{}' cannot hold voxels of {:.6g}, NanoVDB accepts none below {}; write "
+        "a .vdb file, or change the unit of length",
+        path.string(), band.voxelSize(), kMinNanoVoxel));
   const auto grid = namedGrid(vdb(band), options.name);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   writeTarget(path, [&](const fs::path& target) {

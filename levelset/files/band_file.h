@@ -12,64 +12,69 @@
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 
-/// Narrow bands and fields in OpenVDB (`.vdb`) files, and bands in NanoVDB (`.nvdb`) files.
+/// Reads and writes narrow bands and fields in OpenVDB files (`.vdb`), and writes bands to NanoVDB
+/// files (`.nvdb`).
 namespace levelset {
 
 struct ReadBandOptions {
   std::string grid = {};  ///< name of the grid; empty: the only float level set of the file
   std::size_t maxMemory = kNoMemoryLimit;
-  BandRepairs* repairs = nullptr;  ///< told what the grid lacked to be a band
+  BandRepairs* repairs = nullptr;  ///< receives the repairs that the grid needed to become a band
   Progress progress = {};
 };
 
-/// Values stored as half floats or doubles become floats.
+/// Reads a level set as a band. Values stored as half floats or doubles become floats. A damaged
+/// file causes an error, never a hang.
 /// @param path  a .vdb file, or "-" for standard input
-/// @throws IoError when it cannot be opened; InvalidInput when it is damaged, holds no such grid,
-/// or
-///         the grid breaks the invariants of a band. Damaged files end in an error, never in a
-///         hang. ResourceLimit before the grid passes options.maxMemory or the machine's memory
+/// @throws IoError when the file cannot be opened
+/// @throws InvalidInput when the file is damaged or holds no such grid, or the grid breaks the
+///         invariants of a band
+/// @throws ResourceLimit before the grid exceeds options.maxMemory or the machine's memory
 [[nodiscard]] NarrowBand readBand(const std::filesystem::path& path,
                                   const ReadBandOptions& options = {});
 
-/// The same for a grid of any class: numbers or vectors. The grid must be named unless it is a
-/// level set and the only one.
-/// @throws also InvalidInput for NaN or infinite values
+/// Reads a grid of any class as a field of numbers or vectors. options.grid must name the grid,
+/// unless it is the only level set of the file.
+/// @throws as readBand; also InvalidInput for NaN or infinite values
 [[nodiscard]] FieldGrid readField(const std::filesystem::path& path,
                                   const ReadBandOptions& options = {});
 
-/// A level set as a band, any other grid as a field.
+/// Result of readGrid: a level set as a band, any other grid as a field.
 using BandOrField = std::variant<NarrowBand, FieldGrid>;
 [[nodiscard]] BandOrField readGrid(const std::filesystem::path& path,
                                    const ReadBandOptions& options = {});
 
 struct WriteBandOptions {
-  std::string name = "surface";  ///< of the grid
+  std::string name = "surface";  ///< name of the grid
   std::string format = {};       ///< "vdb" or "nvdb"; empty: by extension
   Progress progress = {};
 };
 
-/// Writes beside the target and renames (FileTarget). Equal bands give equal bytes: the identifier
-/// that OpenVDB draws at random is replaced by the content hash.
-/// @throws IoError; UsageError for an unknown format; InvalidInput for a band that was never made
+/// Writes a band to a temporary file and renames it over the target (FileTarget). Equal bands give
+/// equal bytes: the content hash replaces OpenVDB's random identifier.
+/// @throws IoError
+/// @throws UsageError for an unknown format
+/// @throws InvalidInput for a default-constructed band
 void writeBand(const std::filesystem::path& path, const NarrowBand& band,
                const WriteBandOptions& options = {});
 
-/// As writeBand, to `.vdb` only; its class is kept.
+/// Writes a field as writeBand does, to `.vdb` only. Keeps the grid class.
 void writeField(const std::filesystem::path& path, const FieldGrid& field,
                 const WriteBandOptions& options = {});
 
-/// One grid of a .vdb file, from its header and metadata alone: no voxel is loaded.
+/// Properties of one grid of a .vdb file, from its header and metadata only. No voxel is loaded.
 struct GridInfo {
   std::string name;
-  std::string type;  ///< of the values: "float", "half", "double", "vec3s", …; else OpenVDB's word
+  std::string type;  ///< value type: "float", "half", "double", "vec3s", …; else OpenVDB's name
   std::string gridClass;           ///< "level set", "fog volume", …
-  bool isLevelSet = false;         ///< of that class, and of numbers: readBand takes it
-  std::uint64_t activeVoxels = 0;  ///< 0 when the file does not say
-  double voxelSize = 0;            ///< 0 when the voxels are no cubes of one size
-  double halfWidth = 0;            ///< voxels, of a level set; else 0
-  Imath::Box3d indexBounds;        ///< empty when the file does not say
-  Imath::Box3d worldBounds;        ///< of the centres of its active voxels; empty likewise
-  std::uint64_t bytes = 0;         ///< of memory that its tree takes; 0 when the file does not say
+  bool isLevelSet = false;         ///< level set of numbers, which readBand accepts
+  std::uint64_t activeVoxels = 0;  ///< 0 when unknown from the file
+  double voxelSize = 0;            ///< world units; 0 when the voxels are not cubes of equal size
+  double halfWidth = 0;            ///< voxels; 0 for other classes than level set
+  Imath::Box3d indexBounds;        ///< empty when unknown from the file
+  Imath::Box3d worldBounds;  ///< box of the centres of the active voxels, world units; empty when
+                             ///< unknown
+  std::uint64_t bytes = 0;   ///< memory of the tree in bytes; 0 when unknown from the file
 };
 [[nodiscard]] std::vector<GridInfo> bandFileInfo(const std::filesystem::path& path);
 

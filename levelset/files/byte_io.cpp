@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kReadChunk = 1 << 22;
-constexpr int kGzipWindow = 15 + 16;  // zlib's way to ask for a gzip wrapper
+constexpr int kGzipWindow = 15 + 16;  // zlib's code for a gzip wrapper
 
 std::string systemMessage(int error) {
   return std::generic_category().message(error);
@@ -59,18 +59,18 @@ class InputFile {
   InputFile(const InputFile&) = delete;
   InputFile& operator=(const InputFile&) = delete;
 
-  /// 0 when only reading will tell.
+  /// Size of the file; 0 when unknown before reading.
   [[nodiscard]] std::size_t expectedSize() const { return expected_; }
   [[nodiscard]] const std::string& name() const { return name_; }
 
-  /// Null where it cannot be had.
+  /// Maps the file into memory; null where that is impossible.
   [[nodiscard]] void* mapped() const {
     if (expected_ == 0) return nullptr;
     void* begin = ::mmap(nullptr, expected_, PROT_READ, MAP_PRIVATE, fd_, 0);
     return begin == MAP_FAILED ? nullptr : begin;
   }
 
-  /// 0 at the end.
+  /// Reads up to `size` bytes; returns 0 at the end.
   std::size_t read(char* to, std::size_t size) {
     for (;;) {
       const ssize_t count = ::read(fd_, to, size);
@@ -89,11 +89,11 @@ class InputFile {
 
 [[noreturn]] void throwTooLarge(const std::string& name, std::size_t limit, bool inflated) {
   throw ResourceLimit(fmt::format(
-      "read: {} {}passes the memory limit of {:.3g} GB; raise --max-memory or use a smaller file",
+      "read: {} {}exceeds the memory limit of {:.3g} GB; raise --max-memory or use a smaller file",
       name, inflated ? "when decompressed " : "", static_cast<double>(limit) * 1e-9));
 }
 
-/// Appends what `next` delivers until it delivers nothing, or `stopAt` bytes are there.
+/// Appends the data from `next` until it returns nothing or `stopAt` bytes are present.
 template <typename Next>
 void fill(Bytes& bytes, std::size_t expected, std::size_t limit, std::size_t stopAt,
           const std::string& name, bool inflated, Next next) {
@@ -120,12 +120,12 @@ bool isGzip(std::string_view bytes) {
   return bytes.size() >= 2 && bytes[0] == '\x1f' && bytes[1] == '\x8b';
 }
 
-/// Inflates gzip members one after the other; what follows them is ignored, as gzip does.
+/// Decompresses consecutive gzip members. Ignores data after them, as gzip does.
 class Inflater {
  public:
   Inflater(std::string_view input, std::string name) : rest_(input), name_(std::move(name)) {
     if (inflateInit2(&stream_, kGzipWindow) != Z_OK)
-      throw ResourceLimit("read: no memory to decompress; close other programs");
+      throw ResourceLimit("read: not enough memory to decompress; close other programs");
   }
   ~Inflater() { inflateEnd(&stream_); }
   Inflater(const Inflater&) = delete;
@@ -157,7 +157,7 @@ class Inflater {
  private:
   [[noreturn]] void throwDamaged(const char* how) const {
     throw InvalidInput(fmt::format(
-        "read: the compressed data of {} {}; fetch or make the file again", name_, how));
+        "read: the compressed data of {} {}; download or create the file again", name_, how));
   }
   z_stream stream_{};
   std::string_view rest_;
@@ -171,7 +171,7 @@ void Bytes::resize(std::size_t size) {
   char* grown = static_cast<char*>(std::realloc(data_.get(), std::max<std::size_t>(size, 1)));
   if (!grown) {
     throw ResourceLimit(
-        fmt::format("read: no memory for {:.3g} GB; use a smaller file or free memory",
+        fmt::format("read: not enough memory for {:.3g} GB; use a smaller file or free memory",
                     static_cast<double>(size) * 1e-9));
   }
   static_cast<void>(data_.release());
@@ -192,14 +192,15 @@ Bytes readAll(InputFile& file, std::size_t maxMemory) {
   fill(raw, file.expectedSize(), limit, kNoMemoryLimit, file.name(), false,
        [&](char* to, std::size_t size) { return file.read(to, size); });
   if (raw.size() == 0)
-    throw InvalidInput(fmt::format("read: {} is empty; fetch or make the file again", file.name()));
+    throw InvalidInput(
+        fmt::format("read: {} is empty; download or create the file again", file.name()));
   if (!isGzip(raw.view())) return raw;
   Bytes inflated;
   fill(inflated, 4 * raw.size(), limit, kNoMemoryLimit, file.name(), true,
        Inflater(raw.view(), file.name()));
   if (inflated.size() == 0) {
     throw InvalidInput(
-        fmt::format("read: {} holds nothing when decompressed; make the file again", file.name()));
+        fmt::format("read: {} is empty when decompressed; create the file again", file.name()));
   }
   return inflated;
 }
@@ -233,8 +234,8 @@ FirstBytes readFirstBytes(const fs::path& path, std::size_t count) {
   InputFile file(path);
   fill(raw, 0, kNoMemoryLimit, count, file.name(), false,
        [&](char* to, std::size_t size) { return file.read(to, size); });
-  const std::size_t atHand = raw.size() < count ? raw.size() : 0;
-  if (!isGzip(raw.view())) return {std::move(raw), std::max(file.expectedSize(), atHand)};
+  const std::size_t fileSize = raw.size() < count ? raw.size() : 0;
+  if (!isGzip(raw.view())) return {std::move(raw), std::max(file.expectedSize(), fileSize)};
   Bytes inflated;
   std::size_t produced = 0;
   inflated.resize(count);
@@ -247,10 +248,10 @@ FirstBytes readFirstBytes(const fs::path& path, std::size_t count) {
       produced += more;
     }
   } catch (const InvalidInput&) {
-    // The raw bytes were cut at `count`; what was inflated up to there is what was asked for.
+    // The raw bytes end at `count`. The data decompressed so far is the result.
   }
   inflated.resize(produced);
-  return {std::move(inflated), atHand > 0 && produced < count ? produced : 0};
+  return {std::move(inflated), fileSize > 0 && produced < count ? produced : 0};
 }
 
 struct ByteWriter::Deflater {
@@ -259,7 +260,7 @@ struct ByteWriter::Deflater {
   Deflater() {
     if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, kGzipWindow, 8,
                      Z_DEFAULT_STRATEGY) != Z_OK)
-      throw ResourceLimit("write: no memory to compress; close other programs");
+      throw ResourceLimit("write: not enough memory to compress; close other programs");
   }
   ~Deflater() { deflateEnd(&stream); }
 };
@@ -299,8 +300,9 @@ void ByteWriter::commit() {
   if (deflater_) deflateBuffer(true);
   const int fd = std::exchange(fd_, -1);
   if (::close(fd) != 0)
-    throw IoError(fmt::format("write: {} could not be written: {}; make room or write elsewhere",
-                              name_, systemMessage(errno)));
+    throw IoError(
+        fmt::format("write: {} could not be written: {}; free disk space or write elsewhere", name_,
+                    systemMessage(errno)));
   target_.commit();
 }
 
@@ -340,8 +342,9 @@ void ByteWriter::put(const char* data, std::size_t size) {
     const ssize_t written = ::write(fd_, data, size);
     if (written < 0) {
       if (errno == EINTR) continue;
-      throw IoError(fmt::format("write: {} could not be written: {}; make room or write elsewhere",
-                                name_, systemMessage(errno)));
+      throw IoError(
+          fmt::format("write: {} could not be written: {}; free disk space or write elsewhere",
+                      name_, systemMessage(errno)));
     }
     data += written;
     size -= static_cast<std::size_t>(written);

@@ -12,18 +12,19 @@
 #include "levelset/file_target.h"
 #include "levelset/progress.h"
 
-// Private to levelset/files: whole files into memory and out again, compressed or not.
+// Private to levelset/files and levelset/mesh_files: reads and writes complete files in memory,
+// with or without gzip compression.
 
 namespace levelset {
 
-/// A block of bytes that grows in place, without being filled first.
+/// A block of bytes that grows in place, without initialisation.
 class Bytes {
  public:
   [[nodiscard]] const char* data() const { return data_.get(); }
   [[nodiscard]] char* data() { return data_.get(); }
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::string_view view() const { return {data_.get(), size_}; }
-  /// @throws ResourceLimit when the memory cannot be had
+  /// @throws ResourceLimit when the memory cannot be allocated
   void resize(std::size_t size);
 
  private:
@@ -34,15 +35,15 @@ class Bytes {
   std::size_t size_ = 0;
 };
 
-/// Reads a file, or standard input for "-"; gzip data is told by its first bytes and inflated.
-/// @throws IoError when it cannot be opened or read; InvalidInput when it is empty or the
-/// compressed
-///         data is damaged; ResourceLimit as soon as the bytes pass `maxMemory` or the machine's
-///         memory
+/// Reads a file, or standard input for "-". Detects gzip data by its first bytes and decompresses
+/// it.
+/// @throws IoError when the file cannot be opened or read
+/// @throws InvalidInput when the file is empty or its compressed data is damaged
+/// @throws ResourceLimit as soon as the bytes exceed `maxMemory` or the machine's memory
 [[nodiscard]] Bytes readBytes(const std::filesystem::path& path, std::size_t maxMemory);
 
-/// The bytes of a file without those that nobody looks at: mapped into memory, or read as by
-/// readBytes where that cannot be (pipes, standard input, gzip data).
+/// A file mapped into memory, so that only the pages in use are loaded. Reads the file as readBytes
+/// does where mapping is impossible (pipes, standard input, gzip data).
 class MappedFile {
  public:
   /// @throws as readBytes
@@ -58,19 +59,21 @@ class MappedFile {
   std::size_t size_ = 0;
 };
 
-/// The beginning of a file, inflated likewise; damage further on is not seen.
+/// The first bytes of a file, decompressed if necessary. Damage further on goes unnoticed.
 struct FirstBytes {
   Bytes bytes;
-  std::size_t whole = 0;  ///< bytes of all of the file; 0 when only reading it would tell
+  std::size_t fileSize =
+      0;  ///< size of the complete file in bytes; 0 when unknown without reading it
 };
-/// @param count  as many at most
+/// Reads the first bytes of a file.
+/// @param count  maximum number of bytes
 [[nodiscard]] FirstBytes readFirstBytes(const std::filesystem::path& path, std::size_t count);
 
-/// What messages call the file: its name in quotes, or standard input.
+/// Name of the input in messages: the file name in quotes, or "standard input".
 [[nodiscard]] std::string inputName(const std::filesystem::path& path);
 
-/// Buffered, checked writing into a FileTarget, gzip-compressed on demand. The same bytes come out
-/// for the same input: no time stamp, no name.
+/// Buffered, checked writer to a FileTarget, with optional gzip compression. Equal input gives
+/// equal bytes: the gzip header contains neither time stamp nor name.
 class ByteWriter {
  public:
   ByteWriter(const std::filesystem::path& target, bool compressed);
@@ -88,12 +91,12 @@ class ByteWriter {
   void writeValue(T value) {
     write(&value, sizeof value);
   }
-  /// The shortest text that reads back as `value`, whatever the locale.
+  /// Writes the shortest text that reads back as `value`, in any locale.
   void writeNumber(double value);
   void writeNumber(float value);
   void writeNumber(std::uint64_t value);
 
-  /// Writes what is left and puts the file in place. @throws IoError
+  /// Writes the remaining bytes and completes the file. @throws IoError
   void commit();
 
  private:

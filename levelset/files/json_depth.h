@@ -5,11 +5,11 @@
 
 namespace levelset {
 
-/// As deep as no document of ours goes.
-inline constexpr std::size_t kMostJsonDepth = 64;
+/// Maximum nesting depth of JSON documents. The program's own documents are less deep.
+inline constexpr std::size_t kMaxJsonDepth = 64;
 
-/// Do lists and objects stand in each other deeper than kMostJsonDepth? To be asked before a text
-/// is parsed: copying and writing such a document would run through the stack.
+/// Returns true when lists and objects are nested deeper than kMaxJsonDepth. Check a text before
+/// parsing it: copying or writing such a document would overflow the stack.
 [[nodiscard]] inline bool isJsonTooDeep(std::string_view text) {
   std::size_t depth = 0;
   bool isQuoted = false;
@@ -23,7 +23,7 @@ inline constexpr std::size_t kMostJsonDepth = 64;
     } else if (c == '"') {
       isQuoted = true;
     } else if (c == '[' || c == '{') {
-      if (++depth > kMostJsonDepth) return true;
+      if (++depth > kMaxJsonDepth) return true;
     } else if ((c == ']' || c == '}') && depth > 0) {
       --depth;
     }

@@ -4,12 +4,11 @@
 
 #include <filesystem>
 
-// Private to levelset/files: NanoVDB's headers, four seconds of compile time, stay behind this
-// one.
+// Private to levelset/files. Isolates NanoVDB's headers, which take four seconds to compile.
 
 namespace levelset {
 
-/// Writes a grid as a .nvdb file, uncompressed so that it can be mapped into memory.
+/// Writes a grid as a .nvdb file, uncompressed, so that the file can be mapped into memory.
 void writeNanoGrid(const std::filesystem::path& path, const openvdb::FloatGrid& grid);
 
 }  // namespace levelset

@@ -8,7 +8,7 @@
 
 #include "levelset/error.h"
 
-// The layout is that of OpenVDB's io/Archive.cc, io/GridDescriptor.cc and metadata/MetaMap.cc.
+// The layout follows OpenVDB's io/Archive.cc, io/GridDescriptor.cc and metadata/MetaMap.cc.
 
 namespace levelset {
 namespace {
@@ -18,7 +18,7 @@ constexpr std::uint32_t kOldestVersion = openvdb::OPENVDB_FILE_VERSION_NODE_MASK
 constexpr std::uint32_t kNewestVersion = openvdb::OPENVDB_FILE_VERSION;
 constexpr std::size_t kIdentifierSize = 36;
 constexpr std::string_view kHalfSuffix = "_HalfFloat";
-constexpr char kNameSeparator = '\x1e';  // before the number that makes equal names unique
+constexpr char kNameSeparator = '\x1e';  // precedes the number that makes equal names unique
 
 void initializeOnce() {
   static std::once_flag once;
@@ -26,10 +26,10 @@ void initializeOnce() {
 }
 
 std::vector<VdbMetadata> readMetadata(VdbBytes& bytes) {
-  constexpr std::size_t kLeastSize = 12;  // three lengths
+  constexpr std::size_t kMinSize = 12;  // three lengths
   const auto count = bytes.value<std::uint32_t>();
-  if (count > bytes.remaining() / kLeastSize)
-    bytes.fail(fmt::format("{} entries of metadata are promised", count));
+  if (count > bytes.remaining() / kMinSize)
+    bytes.fail(fmt::format("its header promises {} entries of metadata", count));
   std::vector<VdbMetadata> result;
   for (std::uint32_t i = 0; i < count; ++i) {
     VdbMetadata entry;
@@ -41,7 +41,7 @@ std::vector<VdbMetadata> readMetadata(VdbBytes& bytes) {
   return result;
 }
 
-/// @return whether the file says where its grids end
+/// @return true when the file stores the ends of its grids
 bool readFileHeader(VdbBytes& bytes) {
   if (bytes.remaining() < sizeof kMagic || bytes.value<std::int64_t>() != kMagic) {
     throw InvalidInput(
@@ -49,10 +49,10 @@ bool readFileHeader(VdbBytes& bytes) {
   }
   const auto version = bytes.value<std::uint32_t>();
   if (version < kOldestVersion || version > kNewestVersion) {
-    throw InvalidInput(
-        fmt::format("read: {} is of OpenVDB's file format {}, and {} to {} are read; "
-                    "write it again with a current program",
-                    bytes.name(), version, kOldestVersion, kNewestVersion));
+    throw InvalidInput(fmt::format(
+        "read: {} has version {} of OpenVDB's file format; versions {} to {} are supported; "
+        "write it again with a current program",
+        bytes.name(), version, kOldestVersion, kNewestVersion));
   }
   static_cast<void>(bytes.take(2 * sizeof(std::uint32_t)));  // version of the library
   const bool hasOffsets = bytes.value<char>() != 0;
@@ -61,7 +61,7 @@ bool readFileHeader(VdbBytes& bytes) {
   return hasOffsets;
 }
 
-/// Null for a kind of map that no band can have.
+/// Reads a transform; null for a kind of map that a band cannot have.
 openvdb::math::Transform::Ptr readTransform(VdbBytes& bytes, std::uint32_t version) {
   VdbBytes probe = bytes;
   const std::string_view kind = probe.text();
@@ -93,8 +93,8 @@ VdbEntry readDescriptor(VdbBytes& bytes) {
   return entry;
 }
 
-/// To the beginning of the next grid.
-void stepOver(VdbBytes& bytes, const VdbEntry& entry, std::int64_t end) {
+/// Moves to the start of the next grid.
+void skipTree(VdbBytes& bytes, const VdbEntry& entry, std::int64_t end) {
   if (end > 0) {
     if (static_cast<std::size_t>(end) < bytes.position())
       bytes.fail(fmt::format("grid '{}' ends before it begins", entry.name));
@@ -105,7 +105,7 @@ void stepOver(VdbBytes& bytes, const VdbEntry& entry, std::int64_t end) {
       (!hasFloatTree(entry) && !hasDoubleTree(entry) && !hasVectorTree(entry))) {
     throw InvalidInput(
         fmt::format("read: {} was written as a stream, and grid '{}' of type '{}' in it "
-                    "cannot be stepped over; write the level set to a file of its own",
+                    "cannot be skipped; write the level set to a separate file",
                     bytes.name(), entry.name, entry.type));
   }
   skipVdbTree(bytes, entry);
@@ -132,8 +132,9 @@ std::string_view VdbBytes::text() {
 }
 
 void VdbBytes::fail(const std::string& what) const {
-  throw InvalidInput(fmt::format("read: {} is damaged at byte {}: {}; fetch or make the file again",
-                                 *name_, position_, what));
+  throw InvalidInput(
+      fmt::format("read: {} is damaged at byte {}: {}; download or create the file again", *name_,
+                  position_, what));
 }
 
 const VdbMetadata* VdbEntry::find(std::string_view key) const {
@@ -163,24 +164,25 @@ std::vector<VdbEntry> readVdbEntries(std::string_view file, const std::string& n
   VdbBytes bytes(file, name);
   const bool hasOffsets = readFileHeader(bytes);
   const auto version = VdbBytes(file.substr(sizeof kMagic), name).value<std::uint32_t>();
-  constexpr std::size_t kLeastSize = 40;  // names and offsets
+  constexpr std::size_t kMinSize = 40;  // names and offsets
   const auto count = bytes.value<std::int32_t>();
-  if (count < 0 || static_cast<std::size_t>(count) > bytes.remaining() / kLeastSize)
-    bytes.fail(fmt::format("{} grids are promised", count));
+  if (count < 0 || static_cast<std::size_t>(count) > bytes.remaining() / kMinSize)
+    bytes.fail(fmt::format("its header promises {} grids", count));
   std::vector<VdbEntry> entries;
   for (std::int32_t i = 0; i < count; ++i) {
     VdbEntry entry = readDescriptor(bytes);
     static_cast<void>(bytes.take(2 * sizeof(std::int64_t)));  // offsets of grid and blocks
     const auto end = bytes.value<std::int64_t>();
-    if (hasOffsets && end <= 0) bytes.fail(fmt::format("grid '{}' ends nowhere", entry.name));
+    if (hasOffsets && end <= 0)
+      bytes.fail(fmt::format("the end of grid '{}' is missing", entry.name));
     entry.compression = bytes.value<std::uint32_t>();
     entry.metadata = readMetadata(bytes);
     entry.transform = readTransform(bytes, version);
     entry.treePosition = bytes.position();
     const VdbMetadata* given = entry.find(openvdb::GridBase::META_GRID_NAME);
     if (given) entry.name = given->value;
-    // The last grid's end matters to nobody, but shows that the file was cut off.
-    stepOver(bytes, entry, hasOffsets ? end : 0);
+    // The end of the last grid is not needed, but it reveals a truncated file.
+    skipTree(bytes, entry, hasOffsets ? end : 0);
     entries.push_back(std::move(entry));
   }
   return entries;

@@ -11,14 +11,14 @@
 #include "levelset/progress.h"
 #include "levelset/vdb.h"
 
-// Private to levelset/files: our own reader of .vdb files. OpenVDB's trusts every count and size
-// in the file: on a damaged one it loops for hours, writes past buffers or leaks. Here each is
-// checked against the bytes that are there before it is believed; only the decompression is
-// OpenVDB's, of blocks whose sizes are known to be right.
+// Private to levelset/files: this library's own reader of .vdb files. OpenVDB's reader trusts all
+// counts and sizes in a file. On a damaged file it loops for hours, writes past buffers or leaks
+// memory. This reader checks each count and size against the bytes present. Only the decompression
+// is OpenVDB's, for blocks whose sizes have been checked.
 
 namespace levelset {
 
-/// A stretch of a file, read from front to back, never beyond its end.
+/// A byte range of a file that is read from front to back, never beyond its end.
 class VdbBytes {
  public:
   VdbBytes(std::string_view file, const std::string& name) : file_(file), name_(&name) {}
@@ -34,7 +34,7 @@ class VdbBytes {
     std::memcpy(&result, take(sizeof(T)), sizeof(T));
     return result;
   }
-  /// Length, then characters.
+  /// Reads a length and then that many characters.
   [[nodiscard]] std::string_view text();
   [[nodiscard]] std::string_view rest() const { return file_.substr(position_); }
   /// @throws InvalidInput: "read: 'x.vdb' is damaged at byte 123: <what>; …"
@@ -47,7 +47,7 @@ class VdbBytes {
   std::size_t position_ = 0;
 };
 
-/// Lets OpenVDB's functions, which read streams, read bytes in memory.
+/// Stream buffer on bytes in memory, for OpenVDB's functions that read streams.
 class MemoryBuffer : public std::streambuf {
  public:
   explicit MemoryBuffer(std::string_view bytes) {
@@ -61,52 +61,53 @@ struct VdbMetadata {
   std::string_view name, type, value;
 };
 
-/// One grid of a file, all but its tree.
+/// One grid of a file, without its tree.
 struct VdbEntry {
-  std::string name, type;  ///< type as OpenVDB writes it, without the suffix for half floats
-  std::string instanceOf;  ///< unique name of the grid whose tree this one shares; else empty
+  std::string name, type;  ///< type: OpenVDB's name, without the suffix for half floats
+  std::string instanceOf;  ///< unique name of the grid that owns a shared tree; else empty
   std::string uniqueName;
   bool half = false;
   std::uint32_t compression = 0;
   std::vector<VdbMetadata> metadata;
-  openvdb::math::Transform::Ptr transform;  ///< null when it is of a kind we do not read
-  std::size_t treePosition = 0;             ///< byte in the file
+  openvdb::math::Transform::Ptr transform;  ///< null for an unsupported kind
+  std::size_t treePosition = 0;             ///< byte offset in the file
 
   [[nodiscard]] const VdbMetadata* find(std::string_view key) const;
   [[nodiscard]] std::string gridClass() const;
 };
 
-/// Every grid of the file, from its headers; trees are stepped over.
+/// Reads the headers of all grids of the file and skips the trees.
 /// @throws InvalidInput when the file is damaged
 [[nodiscard]] std::vector<VdbEntry> readVdbEntries(std::string_view file, const std::string& name);
 
 struct VdbTreeLimits {
   std::size_t maxMemory = kNoMemoryLimit;
-  bool keepsTiles = false;  ///< active tiles stay tiles: they need not fit as voxels
+  bool keepsTiles = false;  ///< active tiles stay tiles; they need not fit in memory as voxels
   Progress progress = {};
 };
 
-/// The tree of an entry of float or double values, as a float tree.
+/// Reads the tree of an entry with float or double values, as a float tree.
 /// @throws InvalidInput when the file is damaged; ResourceLimit before the tree passes its limit
 [[nodiscard]] openvdb::FloatTree::Ptr readVdbTree(std::string_view file, const std::string& name,
                                                   const VdbEntry& entry,
                                                   const VdbTreeLimits& limits);
-/// The same of float or double vectors.
+/// Reads the tree of an entry with float or double vectors, as a float vector tree.
+/// @throws as readVdbTree
 [[nodiscard]] openvdb::Vec3STree::Ptr readVdbVectorTree(std::string_view file,
                                                         const std::string& name,
                                                         const VdbEntry& entry,
                                                         const VdbTreeLimits& limits);
 
-/// The background of such a tree, from its head alone.
+/// Background of a float or double tree, from the start of the tree only.
 [[nodiscard]] double readVdbBackground(std::string_view file, const std::string& name,
                                        const VdbEntry& entry);
 
-/// Takes bytes past the tree of an entry, for files that do not say where it ends.
+/// Skips the tree of an entry, for files that do not store the end of a grid.
 void skipVdbTree(VdbBytes& bytes, const VdbEntry& entry);
 
 [[nodiscard]] bool hasFloatTree(const VdbEntry& entry);
 [[nodiscard]] bool hasDoubleTree(const VdbEntry& entry);
-/// Of float or double vectors.
+/// Returns true for float or double vectors.
 [[nodiscard]] bool hasVectorTree(const VdbEntry& entry);
 
 }  // namespace levelset

@@ -16,7 +16,7 @@
 #include "levelset/progress.h"
 #include "levelset/progress_gate.h"
 
-// The layout is that of readTopology and readBuffers in OpenVDB's tree/*.h and of
+// The layout follows readTopology and readBuffers in OpenVDB's tree/*.h and
 // io::readCompressedValues, format 222 and later.
 
 namespace levelset {
@@ -25,7 +25,7 @@ namespace {
 using openvdb::Coord;
 using openvdb::Index;
 
-/// Floats of 16 bits may stand for those of a value.
+/// Number of components of a value type. The file may store each component as a half float.
 template <typename T>
 constexpr std::size_t kComponents = 1;
 template <>
@@ -42,7 +42,7 @@ T fromHalves(const openvdb::math::half* halves) {
              static_cast<float>(halves[2]));
 }
 
-/// How the values of one tree are stored.
+/// Storage format of the values of one tree.
 template <typename T>
 struct Storage {
   std::uint32_t compression;
@@ -50,14 +50,14 @@ struct Storage {
   T background;
 };
 
-/// The values of one node as they stand in the file, sizes checked.
+/// Values of one node as stored in the file, with checked sizes.
 template <typename T, typename Mask>
 struct ValueBlock {
-  T inactive[2];   // for the inactive values that are not stored
-  Mask selection;  // which of the two
-  Index count;     // of stored values
+  T inactive[2];   // replacements for inactive values that are not stored
+  Mask selection;  // which of the two replacements
+  Index count;     // number of stored values
   bool activeOnly;
-  const char* data;  // with the length in front where compressed
+  const char* data;  // starts with the length if compressed
   std::size_t size;
 };
 
@@ -70,7 +70,7 @@ Mask takeMask(VdbBytes& bytes) {
   return mask;
 }
 
-/// Blosc trusts the sizes in its own header, which stand in the file too.
+/// Checks the sizes in Blosc's own header, which Blosc trusts although the file supplies them.
 void checkBloscHeader(const VdbBytes& bytes, const char* block, std::size_t stored,
                       std::size_t expected) {
   constexpr std::size_t kHeaderSize = 16;
@@ -83,14 +83,14 @@ void checkBloscHeader(const VdbBytes& bytes, const char* block, std::size_t stor
     bytes.fail("a compressed block disagrees about its size");
 }
 
-/// Steps over stored data that unpack to `expected` bytes; returns what they take.
+/// Skips stored data that unpack to `expected` bytes. Returns the stored size.
 std::size_t takeData(VdbBytes& bytes, std::uint32_t compression, std::size_t expected) {
   namespace io = openvdb::io;
   if ((compression & (io::COMPRESS_BLOSC | io::COMPRESS_ZIP)) == 0) {
     static_cast<void>(bytes.take(expected));
     return expected;
   }
-  const auto length = bytes.value<std::int64_t>();  // negative: not compressed after all
+  const auto length = bytes.value<std::int64_t>();  // negative: stored uncompressed
   if (length <= 0) {
     if (length == std::numeric_limits<std::int64_t>::min() ||
         static_cast<std::size_t>(-length) != expected)
@@ -127,7 +127,7 @@ ValueBlock<T, Mask> takeValues(VdbBytes& bytes, const Storage<T>& storage, const
   block.count = block.activeOnly ? active.countOn() : Mask::SIZE;
   block.data = bytes.rest().data();
   block.size = storage.half && block.count == 0
-                   ? 0  // half floats: nothing at all is stored for none
+                   ? 0  // half floats: zero values take no bytes
                    : takeData(bytes, storage.compression,
                               block.count * (storage.half ? 2 * kComponents<T> : sizeof(T)));
   return block;
@@ -151,7 +151,7 @@ void unpack(const VdbBytes& bytes, const char* data, std::size_t size, std::uint
   }
 }
 
-/// All values of a node, stored or implied.
+/// Fills in all values of a node, stored or implied.
 template <typename T, typename Mask>
 void expand(const VdbBytes& bytes, const ValueBlock<T, Mask>& block, const Storage<T>& storage,
             const Mask& active, T* values) {
@@ -175,7 +175,7 @@ void expand(const VdbBytes& bytes, const ValueBlock<T, Mask>& block, const Stora
     values[i] = active.isOn(i) ? stored[next++] : block.inactive[block.selection.isOn(i) ? 1 : 0];
 }
 
-/// Reads a tree from top to bottom, then the values of its leaves.
+/// Reads a tree from the root down, then the values of its leaves.
 template <typename TreeT>
 class TreeReader {
   using T = typename TreeT::ValueType;
@@ -191,19 +191,19 @@ class TreeReader {
   typename TreeT::Ptr read() {
     auto tree = std::make_shared<TreeT>();
     readRoot(tree->root());
-    const std::vector<std::size_t> places = skipLeafValues();
+    const std::vector<std::size_t> offsets = skipLeafValues();
     ProgressGate gate(limits_.progress, leaves_.size(), "read");
     tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t i) {
       VdbBytes at = bytes_;
-      at.seek(places[i]);
+      at.seek(offsets[i]);
       readLeafValues(at, *leaves_[i]);
-      constexpr std::size_t kOften = 64;  // leaves between two reports
-      if (i % kOften == 0) gate.advance(std::min(kOften, leaves_.size() - i));
+      constexpr std::size_t kReportInterval = 64;  // leaves between two reports
+      if (i % kReportInterval == 0) gate.advance(std::min(kReportInterval, leaves_.size() - i));
     });
     return tree;
   }
 
-  /// Only moves `bytes` on.
+  /// Skips the tree: only advances `bytes`.
   void skip() {
     countOnly_ = true;
     TreeT tree;
@@ -212,8 +212,9 @@ class TreeReader {
   }
 
  private:
-  /// What a tree takes grows node by node, each of which takes bytes of the file too.
-  void spend(std::size_t size) {
+  /// Counts the memory of the tree. It grows node by node, and each node also takes bytes of the
+  /// file.
+  void countMemory(std::size_t size) {
     memory_ += static_cast<double>(size);
     if (memory_ > static_cast<double>(limits_.maxMemory))
       requireMemory(memory_, limits_.maxMemory, "read");
@@ -226,13 +227,13 @@ class TreeReader {
     const auto tiles = bytes_.value<std::uint32_t>(), children = bytes_.value<std::uint32_t>();
     constexpr std::size_t kTileSize = 3 * sizeof(std::int32_t) + sizeof(T) + 1;
     if (tiles > bytes_.remaining() / kTileSize)
-      bytes_.fail(fmt::format("{} tiles are promised", tiles));
+      bytes_.fail(fmt::format("its root promises {} tiles", tiles));
     std::set<Coord> seen;
     for (std::uint32_t i = 0; i < tiles; ++i) {
       const Coord origin = takeOrigin<typename Root::ChildNodeType>(seen);
       const T value = bytes_.value<T>();
       const bool active = bytes_.value<std::uint8_t>() != 0;
-      if (active) spendTile(Root::ChildNodeType::TOTAL * 3);
+      if (active) countTile(Root::ChildNodeType::TOTAL * 3);
       root.addTile(origin, value, active);
     }
     for (std::uint32_t i = 0; i < children; ++i) {
@@ -246,17 +247,18 @@ class TreeReader {
     Coord origin;
     for (int axis = 0; axis < 3; ++axis) origin[axis] = bytes_.value<std::int32_t>();
     const int mask = static_cast<int>(Node::DIM) - 1;
-    if ((origin & mask) != Coord(0)) bytes_.fail("a node stands off the tree's raster");
-    if (!seen.insert(origin).second) bytes_.fail("a node comes twice");
+    if ((origin & mask) != Coord(0))
+      bytes_.fail("the origin of a node is not a multiple of its size");
+    if (!seen.insert(origin).second) bytes_.fail("two nodes have the same origin");
     return origin;
   }
 
-  /// An active tile may be voxelised later: its leaves count now.
-  void spendTile(Index log2VoxelCount) {
+  /// Counts the leaves of an active tile, which may later be split into voxels.
+  void countTile(Index log2VoxelCount) {
     if (limits_.keepsTiles) return;
     const double leaves = std::ldexp(1.0, static_cast<int>(log2VoxelCount)) / Leaf::SIZE;
     memory_ += leaves * static_cast<double>(sizeof(Leaf) + Leaf::SIZE * sizeof(T));
-    spend(0);
+    countMemory(0);
   }
 
   template <typename Node>
@@ -264,7 +266,7 @@ class TreeReader {
     if constexpr (Node::LEVEL == 0) {
       auto leaf = std::make_unique<Node>(openvdb::PartialCreate(), origin, storage_.background);
       leaf->setValueMask(takeMask<typename Node::NodeMaskType>(bytes_));
-      if (!countOnly_) spend(sizeof(Node) + Node::SIZE * sizeof(T));
+      if (!countOnly_) countMemory(sizeof(Node) + Node::SIZE * sizeof(T));
       leaves_.push_back(leaf.get());
       return leaf;
     } else {
@@ -276,7 +278,7 @@ class TreeReader {
   std::unique_ptr<Node> readInternal(const Coord& origin) {
     using Mask = typename Node::NodeMaskType;
     const auto children = takeMask<Mask>(bytes_), active = takeMask<Mask>(bytes_);
-    spend(sizeof(Node));
+    countMemory(sizeof(Node));
     const auto block = takeValues<T, Mask>(bytes_, storage_, active);
     std::vector<T> values(Node::NUM_VALUES);
     expand(bytes_, block, storage_, active, values.data());
@@ -284,7 +286,7 @@ class TreeReader {
     for (Index i = 0; i < Node::NUM_VALUES; ++i) {
       if (children.isOn(i)) continue;
       node->addTile(i, values[i], active.isOn(i));
-      if (active.isOn(i)) spendTile(3 * Node::ChildNodeType::TOTAL);
+      if (active.isOn(i)) countTile(3 * Node::ChildNodeType::TOTAL);
     }
     for (auto it = children.beginOn(); it; ++it) {
       const Coord childOrigin = node->offsetToGlobalCoord(it.pos());
@@ -293,16 +295,16 @@ class TreeReader {
     return node;
   }
 
-  /// Where the values of each leaf stand.
+  /// Offsets of the values of each leaf in the file.
   std::vector<std::size_t> skipLeafValues() {
-    std::vector<std::size_t> places;
-    places.reserve(leaves_.size());
+    std::vector<std::size_t> offsets;
+    offsets.reserve(leaves_.size());
     for (std::size_t i = 0; i < leaves_.size(); ++i) {
-      places.push_back(bytes_.position());
+      offsets.push_back(bytes_.position());
       const auto active = takeMask<typename Leaf::NodeMaskType>(bytes_);
       static_cast<void>(takeValues<T, typename Leaf::NodeMaskType>(bytes_, storage_, active));
     }
-    return places;
+    return offsets;
   }
 
   void readLeafValues(VdbBytes& at, Leaf& leaf) const {
@@ -322,7 +324,7 @@ class TreeReader {
   std::vector<Leaf*> leaves_;
 };
 
-/// OpenVDB's trees of vectors do not convert into each other.
+/// Converts a tree of double vectors to float vectors; OpenVDB has no such conversion.
 openvdb::Vec3STree::Ptr narrowed(const openvdb::Vec3DTree& wide) {
   using Leaf = openvdb::Vec3STree::LeafNodeType;
   auto tree = std::make_shared<openvdb::Vec3STree>(openvdb::Vec3s(wide.background()));
@@ -361,7 +363,7 @@ openvdb::Vec3STree::Ptr readVdbVectorTree(std::string_view file, const std::stri
 
 double readVdbBackground(std::string_view file, const std::string& name, const VdbEntry& entry) {
   VdbBytes bytes(file, name);
-  bytes.seek(entry.treePosition + sizeof(std::int32_t));  // behind the count of buffers
+  bytes.seek(entry.treePosition + sizeof(std::int32_t));  // after the number of buffers
   return hasFloatTree(entry) ? static_cast<double>(bytes.value<float>()) : bytes.value<double>();
 }
 

@@ -26,11 +26,12 @@ constexpr double kMeshed = 0.05, kMoved = 0.9;
 
 void requireTime(double time, const char* what) {
   if (!std::isfinite(time))
-    throw UsageError(fmt::format("{}: the {} is {}; give a finite one", kAdvectAction, what, time));
+    throw UsageError(
+        fmt::format("{}: the {} is {}; give a finite time", kAdvectAction, what, time));
 }
 
-/// Vertices onto the zero set of the tricubic interpolant, a fraction of a voxel away. Where the
-/// field has a crease they stay.
+/// Projects vertices onto the zero set of the tricubic interpolant, a fraction of a voxel away.
+/// Vertices on a crease of the field stay.
 void projectVertices(TriMesh& mesh, const NarrowBand& band) {
   constexpr int kNewtonSteps = 4;
   constexpr double kMostProjection = 0.3;  // voxels
@@ -50,7 +51,7 @@ void projectVertices(TriMesh& mesh, const NarrowBand& band) {
   }
 }
 
-/// The surface of a band as triangles in index space.
+/// Returns the surface of a band as triangles in index space.
 TriMesh surfaceOf(const NarrowBand& band) {
   TriMesh mesh = bandToMesh(band, {.sharp = true});
   projectVertices(mesh, band);
@@ -59,7 +60,7 @@ TriMesh surfaceOf(const NarrowBand& band) {
   return mesh;
 }
 
-/// The band on the grid of `model` that triangles in index space enclose.
+/// Returns the band that triangles in index space enclose, on the grid of `model`.
 NarrowBand bandOf(const TriMesh& mesh, const NarrowBand& model, const AdvectOptions& options) {
   MeshToBandOptions conversion;
   conversion.halfWidth = model.halfWidth();
@@ -72,15 +73,14 @@ NarrowBand bandOf(const TriMesh& mesh, const NarrowBand& model, const AdvectOpti
     unit = meshToBand(mesh, 1, conversion).band;
   } catch (const InvalidInput& error) {
     throw InvalidInput(
-        fmt::format("{}: what the velocity makes of the solid is no solid on this grid ({}); use "
-                    "smaller voxels "
-                    "or a shorter time",
+        fmt::format("{}: the moved surface encloses no solid on this grid ({}); use smaller "
+                    "voxels or a shorter time",
                     kAdvectAction, error.what()));
   }
   return transform(unit, model.indexToWorld());
 }
 
-/// Offsets until the volume is that of the start.
+/// Offsets the band until its volume is `volume`.
 NarrowBand withVolume(NarrowBand band, double volume, const AdvectOptions& options) {
   constexpr int kTries = 6;
   constexpr double kTolerance = 1e-5;
@@ -97,7 +97,7 @@ NarrowBand withVolume(NarrowBand band, double volume, const AdvectOptions& optio
 
 struct Advection::Impl {
   AdvectOptions options;
-  NarrowBand band;  ///< the start; with the schemes on the grid what became of it
+  NarrowBand band;  ///< start of the motion; the grid schemes update it
   std::optional<flow::Front> front;
   double time, volumeBefore;
   std::size_t steps = 0;
@@ -107,8 +107,8 @@ struct Advection::Impl {
     requireSolid(band, kAdvectAction);
     if (band.isEmpty())
       throw InvalidInput(
-          fmt::format("{}: the solid is empty; give one with a surface", kAdvectAction));
-    requireTime(time, "starting time");
+          fmt::format("{}: the solid is empty; give a solid with a surface", kAdvectAction));
+    requireTime(time, "start time");
     if (options.mask) checkMask(*options.mask, kAdvectAction);
     volumeBefore = measure(band).volume;
     if (options.scheme == AdvectScheme::Front)
@@ -116,13 +116,13 @@ struct Advection::Impl {
     report(options.progress, kMeshed, kAdvectAction);
   }
 
-  /// In voxels of the band's grid, masked.
+  /// Converts a world velocity to masked voxels of the band's grid.
   [[nodiscard]] flow::Velocity inVoxels(const VectorField& velocity) const {
     const Imath::M44d toWorld = band.indexToWorld(), toIndex = toWorld.inverse();
     const V3d origin = toWorld.translation();
-    return [this, &velocity, toWorld, toIndex, origin](const V3d& place, double at) {
+    return [this, &velocity, toWorld, toIndex, origin](const V3d& position, double at) {
       V3d world, result;
-      toWorld.multDirMatrix(place, world);
+      toWorld.multDirMatrix(position, world);
       world += origin;
       const double share = options.mask ? options.mask->weight(world) : 1;
       if (share == 0) return V3d(0);
@@ -136,19 +136,19 @@ struct Advection::Impl {
     const double end = time + duration;
     requireTime(end, "final time");
     const flow::Velocity speed = inVoxels(velocity);
-    const flow::TimeInterval journey{.velocity = speed,
-                                     .from = time,
-                                     .to = end,
-                                     .action = kAdvectAction,
-                                     .toWorld = band.indexToWorld(),
-                                     .maxMemory = options.maxMemory,
-                                     .progress = subProgress(options.progress, kMeshed, kMoved)};
+    const flow::TimeInterval interval{.velocity = speed,
+                                      .from = time,
+                                      .to = end,
+                                      .action = kAdvectAction,
+                                      .toWorld = band.indexToWorld(),
+                                      .maxMemory = options.maxMemory,
+                                      .progress = subProgress(options.progress, kMeshed, kMoved)};
     if (front)
-      steps += front->advance(journey);
+      steps += front->advance(interval);
     else if (options.scheme == AdvectScheme::SemiLagrangian)
-      steps += flow::carryBySemiLagrange(band, journey);
+      steps += flow::advectSemiLagrangian(band, interval);
     else
-      steps += flow::carryUpwind(band, journey);
+      steps += flow::advectUpwind(band, interval);
     time = end;
   }
 
@@ -156,7 +156,7 @@ struct Advection::Impl {
     AdvectResult result;
     result.steps = steps;
     result.volumeBefore = volumeBefore;
-    // Without a step the solid is what was given, to the bit.
+    // Without a step the result is the given solid, to the bit.
     result.band = front && steps > 0 ? bandOf(front->mesh(), band, options) : band;
     result.volumeAfter = measure(result.band).volume;
     if (options.fixVolume) result.band = withVolume(result.band, volumeBefore, options);

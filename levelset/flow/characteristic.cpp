@@ -11,7 +11,7 @@ using Imath::V3d;
 
 constexpr std::size_t kStages = 6;
 constexpr std::array<double, kStages> kTime = {0, 1.0 / 5, 3.0 / 10, 3.0 / 5, 1, 7.0 / 8};
-constexpr std::array<std::array<double, 5>, kStages> kPlace = {
+constexpr std::array<std::array<double, 5>, kStages> kStagePosition = {
     {{0, 0, 0, 0, 0},
      {1.0 / 5, 0, 0, 0, 0},
      {3.0 / 40, 9.0 / 40, 0, 0, 0},
@@ -23,19 +23,20 @@ constexpr std::array<double, kStages> kMove = {37.0 / 378,  0, 250.0 / 621,
 constexpr std::array<double, kStages> kFourth = {
     2825.0 / 27648, 0, 18575.0 / 48384, 13525.0 / 55296, 277.0 / 14336, 1.0 / 4};
 
-/// @param seen  called with each velocity, its place and time
+/// Samples the velocity at the stages of a step.
+/// @param seen  called with each velocity, its position and time
 template <typename Seen>
 std::array<V3d, kStages> velocitiesOn(const Velocity& velocity, const V3d& from, double time,
                                       double to, const Seen& seen) {
   const double dt = to - time;
   std::array<V3d, kStages> k;
   for (std::size_t stage = 0; stage < kStages; ++stage) {
-    V3d place = from;
-    for (std::size_t i = 0; i < stage; ++i) place += k[i] * (dt * kPlace[stage][i]);
-    // Rounding must not ask beyond the end.
+    V3d position = from;
+    for (std::size_t i = 0; i < stage; ++i) position += k[i] * (dt * kStagePosition[stage][i]);
+    // Rounding must not evaluate the velocity beyond the end of the interval.
     const double at = kTime[stage] == 1 ? to : time + dt * kTime[stage];
-    k[stage] = velocity(place, at);
-    seen(k[stage], place, at);
+    k[stage] = velocity(position, at);
+    seen(k[stage], position, at);
   }
   return k;
 }
@@ -45,26 +46,27 @@ std::array<V3d, kStages> velocitiesOn(const Velocity& velocity, const V3d& from,
 Characteristic::Characteristic(const Velocity& velocity, const V3d& from, double time, double to) {
   const double dt = to - time;
   const auto k =
-      velocitiesOn(velocity, from, time, to, [&](const V3d& u, const V3d& place, double) {
+      velocitiesOn(velocity, from, time, to, [&](const V3d& u, const V3d& position, double) {
         const double reach = u.length() * std::abs(dt);
         if (std::isfinite(reach)) {
           fastest = std::max(fastest, reach);
         } else {
           fastest = HUGE_VAL;
-          hole = std::min(hole, (place - from).length());
+          nonFiniteDistance = std::min(nonFiniteDistance, (position - from).length());
         }
       });
   for (std::size_t stage = 0; stage < kStages; ++stage) {
     move += k[stage] * (dt * kMove[stage]);
     error += k[stage] * (dt * (kMove[stage] - kFourth[stage]));
   }
-  second = (k[1] - k[0] - (k[2] - k[0]) * (2.0 / 3)).length() * std::abs(dt);
+  stageDeviation = (k[1] - k[0] - (k[2] - k[0]) * (2.0 / 3)).length() * std::abs(dt);
 }
 
-void requireFiniteWay(const TimeInterval& journey, const V3d& from, double time, double to) {
-  (void)velocitiesOn(
-      journey.velocity, from, time, to,
-      [&](const V3d& u, const V3d& place, double at) { requireFinite(journey, u, place, at); });
+void requireFinitePath(const TimeInterval& interval, const V3d& from, double time, double to) {
+  (void)velocitiesOn(interval.velocity, from, time, to,
+                     [&](const V3d& u, const V3d& position, double at) {
+                       requireFinite(interval, u, position, at);
+                     });
 }
 
 }  // namespace levelset::flow

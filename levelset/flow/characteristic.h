@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/flow only.
+// Internal header of levelset: public headers must not include it.
 
 #include <cmath>
 
@@ -8,26 +8,27 @@
 
 namespace levelset::flow {
 
-/// One step along a characteristic: the fifth-order method of Cash and Karp, and how far its
-/// fourth-order one ends from it [Cash90].
+/// One step along a characteristic with the fifth-order method of Cash and Karp [Cash90]. The error
+/// is the difference to its embedded fourth-order method.
 struct Characteristic {
   Imath::V3d move{0}, error{0};  ///< voxels
-  /// The farthest that any velocity that it looks at would move, voxels; infinite if one is not
+  /// Largest displacement over the step by any sampled velocity, voxels; infinite if one is not
   /// finite.
   double fastest = 0;
-  /// How far the second look stands off the line through the first and the third, voxels: it says
-  /// nothing of the move.
-  double second = 0;
-  /// Where the first velocity that is not finite lies: how far from the start, voxels.
-  double hole = HUGE_VAL;
+  /// Deviation of the second velocity sample from the line through the first and the third, voxels.
+  /// The move gives the second sample no weight.
+  double stageDeviation = 0;
+  /// Distance from the start to the nearest sample that is not finite, voxels.
+  double nonFiniteDistance = HUGE_VAL;
 
   Characteristic(const Velocity& velocity, const Imath::V3d& from, double time, double to);
-  /// Was every velocity on the way?
+  /// Returns true when every sampled velocity is finite.
   [[nodiscard]] bool isFinite() const { return std::isfinite(fastest); }
 };
 
-/// @throws InvalidInput, telling place and time, unless every velocity that the step looks at is
-///         finite
-void requireFiniteWay(const TimeInterval& journey, const Imath::V3d& from, double time, double to);
+/// Checks every velocity that the step samples.
+/// @throws InvalidInput with position and time, if one is not finite
+void requireFinitePath(const TimeInterval& interval, const Imath::V3d& from, double time,
+                       double to);
 
 }  // namespace levelset::flow

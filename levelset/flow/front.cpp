@@ -19,24 +19,24 @@ using Imath::V3d;
 using Triangle = std::array<std::uint32_t, 3>;
 
 constexpr double kLongestEdge = 1;  // voxels
-// A step moves no vertex further than this many voxels, turns and stretches no edge by more than
-// this share of it, or of the longest, and errs by no more voxels than this at any vertex. The
-// stretch is limited because the curve of a new vertex is laid over a whole edge: shorter ones need
-// no new vertex, and what their ends do is the error's business alone.
+// Limits of a step: move of a vertex in voxels, strain of an edge, error of a vertex in voxels.
+// Strain is the change of an edge as a share of its length, or of kLongestEdge for shorter edges.
+// It is limited because a new vertex goes onto a curve over the entire edge. Shorter edges need no
+// new vertex: the error limit alone covers their ends.
 constexpr double kFarthestMove = 16, kMostStrain = 0.7, kMostError = 2e-3;
-// Where no velocity moves further than this within a step it may err by more: where the velocity
-// jumps, no step would be short enough.
+// The error limit does not apply when no velocity moves a vertex further than this in a step, in
+// voxels: at a jump of the velocity no step would be short enough.
 constexpr double kShortMove = 0.25;
-// What the method's second look may stand off the others, voxels.
-constexpr double kMostSecond = 1;
-// Positions, triangles and what splitting and moving keep beside them.
+// Largest deviation of the method's second sample from the others, voxels.
+constexpr double kMostStageDeviation = 1;
+// Positions and triangles, with the temporary arrays for splitting and moving.
 constexpr double kBytesPerTriangle = 100;
-// A surface with more triangles than this for each voxel of the largest area that it has had is
-// crumpled, not stretched, and would take long to be told apart where it crosses itself. On the way
-// back from a stretch they are as many as they were there. Front.HasFewTrianglesWhereItIsStretched
-// tells how far those of smooth velocities stay below.
+// Limit of triangles per voxel of the largest area so far. A surface with more is crumpled, not
+// stretched, and takes long to resolve where it crosses itself. The largest area counts because a
+// surface keeps the triangles of a stretch on its way back. The test
+// Front.HasFewTrianglesWhereItIsStretched shows the margin for smooth velocities.
 constexpr double kMostTrianglesPerVoxel = 50, kSpareTriangles = 20000;
-// A face that leans further than this from a vertex normal belongs to another side of a crease.
+// A face whose normal deviates more than this from a vertex normal lies beyond a crease.
 constexpr double kCreaseCosine = 0.8;
 
 std::uint64_t edgeKey(std::uint32_t a, std::uint32_t b) {
@@ -70,17 +70,18 @@ class Splitter {
     return (mesh_.positions[a] - mesh_.positions[b]).length2() > kLongestEdge * kLongestEdge;
   }
 
-  /// One of the two triangles at an edge goes along it upwards.
+  /// Marks a long edge in the one triangle that passes it from the lower to the higher vertex.
   void mark(std::uint32_t a, std::uint32_t b) {
     if (a < b && isLong(a, b)) edges_.push_back(edgeKey(a, b));
   }
 
-  /// Number of a long edge.
+  /// Returns the number of a long edge.
   [[nodiscard]] std::uint32_t find(std::uint32_t a, std::uint32_t b) const {
     return index_.at(edgeKey(a, b));
   }
 
-  /// Midpoint of the cubic curve with the vertices' normals, straight on the side of a crease.
+  /// Adds the midpoints of cubic curves with the normals of the vertices. Where a crease passes at
+  /// a vertex, its side of the curve is straight.
   void addMidpoints() {
     std::vector<V3d> normals(mesh_.positions.size(), V3d(0));
     for (const Triangle& t : mesh_.triangles) {
@@ -121,7 +122,7 @@ class Splitter {
       int marked = 0;
       for (std::size_t k = 0; k < 3; ++k) marked += (m[k] = midpoint(t[k], t[(k + 1) % 3])) != 0;
       if (marked == 0) continue;
-      // Turned so that the first edge is split, and the last one not unless all are.
+      // Rotate so that the first edge is split, and the last one is not unless all are.
       while (m[0] == 0 || (marked == 2 && m[2] != 0)) {
         std::rotate(t.begin(), t.begin() + 1, t.end());
         std::rotate(m.begin(), m.begin() + 1, m.end());
@@ -163,7 +164,8 @@ Front::Front(TriMesh mesh, std::size_t maxMemory, const char* action) : mesh_(st
 }
 
 void Front::splitLongEdges(std::size_t maxMemory, const char* action) {
-  constexpr int kPasses = 4;  // a step stretches little; what is left waits for the next
+  // A step stretches little; remaining long edges wait for the next step.
+  constexpr int kPasses = 4;
   for (int pass = 0; pass < kPasses; ++pass) {
     Splitter splitter(mesh_);
     const double count = static_cast<double>(mesh_.triangles.size() + 2 * splitter.longEdges());
@@ -175,27 +177,28 @@ void Front::splitLongEdges(std::size_t maxMemory, const char* action) {
 
 namespace {
 
-/// Of all vertices.
+/// Maxima over all vertices.
 struct Largest {
-  double fastest = 0, move = 0, error = 0, second = 0;  ///< voxels, see Characteristic
-  double hole = HUGE_VAL;                               ///< the nearest
+  double fastest = 0, move = 0, error = 0, stageDeviation = 0;  ///< voxels, see Characteristic
+  double nonFiniteDistance = HUGE_VAL;                          ///< minimum over all vertices
 
   static Largest of(const Largest& a, const Largest& b) {
     return {std::max(a.fastest, b.fastest), std::max(a.move, b.move), std::max(a.error, b.error),
-            std::max(a.second, b.second), std::min(a.hole, b.hole)};
+            std::max(a.stageDeviation, b.stageDeviation),
+            std::min(a.nonFiniteDistance, b.nonFiniteDistance)};
   }
 };
 
 }  // namespace
 
-double Front::firstStep(const TimeInterval& journey) const {
+double Front::firstStep(const TimeInterval& interval) const {
   const double fastest = tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, mesh_.positions.size(), 256), 0.0,
       [&](const auto& range, double largest) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           const V3d& p = mesh_.positions[i];
-          const V3d speed = journey.velocity(p, journey.from);
-          requireFinite(journey, speed, p, journey.from);
+          const V3d speed = interval.velocity(p, interval.from);
+          requireFinite(interval, speed, p, interval.from);
           largest = std::max(largest, speed.length());
         }
         return largest;
@@ -204,35 +207,36 @@ double Front::firstStep(const TimeInterval& journey) const {
   return kFarthestMove / fastest;
 }
 
-double Front::tryStep(const TimeInterval& journey, double from, double to) {
+double Front::tryStep(const TimeInterval& interval, double from, double to) {
   moved_.resize(mesh_.positions.size());
   const Largest largest = tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, mesh_.positions.size(), 256), Largest{},
       [&](const auto& range, Largest result) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           const V3d& p = mesh_.positions[i];
-          const Characteristic way(journey.velocity, p, from, to);
-          moved_[i] = p + way.move;
-          result = Largest::of(
-              result, {way.fastest, way.move.length(), way.error.length(), way.second, way.hole});
+          const Characteristic path(interval.velocity, p, from, to);
+          moved_[i] = p + path.move;
+          result = Largest::of(result, {path.fastest, path.move.length(), path.error.length(),
+                                        path.stageDeviation, path.nonFiniteDistance});
         }
         return result;
       },
       Largest::of);
   isStill_ = largest.fastest == 0;
   if (!std::isfinite(largest.fastest)) {
-    // Perhaps only because the step looks further than the surface will go.
-    if (largest.hole > kShortMove) return 0.25;
-    for (const V3d& p : mesh_.positions) requireFiniteWay(journey, p, from, to);
-    throw InvalidInput(fmt::format("{}: the velocity overflows at time {:.6g}; use a gentler one",
-                                   journey.action, from));
+    // The step may have sampled beyond the path of the surface: a shorter one may be finite.
+    if (largest.nonFiniteDistance > kShortMove) return 0.25;
+    for (const V3d& p : mesh_.positions) requireFinitePath(interval, p, from, to);
+    throw InvalidInput(
+        fmt::format("{}: the velocity overflows at time {:.6g}; use smaller velocities",
+                    interval.action, from));
   }
   double allowed = std::min(kFarthestMove / std::max(largest.move, largest.fastest / 4),
                             kMostStrain / mostStrain());
   if (largest.fastest > kShortMove) {
     if (largest.error > 0)
       allowed = std::min(allowed, std::max(0.1, std::pow(kMostError / largest.error, 0.2)));
-    if (largest.second > kMostSecond) allowed = std::min(allowed, 0.5);
+    if (largest.stageDeviation > kMostStageDeviation) allowed = std::min(allowed, 0.5);
   }
   return allowed;
 }
@@ -244,7 +248,7 @@ double Front::mostStrain() const {
         for (std::size_t i = range.begin(); i != range.end(); ++i)
           for (std::size_t k = 0; k < 3; ++k) {
             const std::uint32_t a = mesh_.triangles[i][k], b = mesh_.triangles[i][(k + 1) % 3];
-            if (a > b) continue;  // the triangle on its other side asks
+            if (a > b) continue;  // the triangle on the other side handles it
             const V3d before = mesh_.positions[b] - mesh_.positions[a];
             const V3d change = moved_[b] - moved_[a] - before;
             largest = std::max(largest, change.length2() / std::max(kLongestEdge * kLongestEdge,
@@ -256,38 +260,39 @@ double Front::mostStrain() const {
   return std::sqrt(squared);
 }
 
-StepMade Front::step(const TimeInterval& journey, double from, double longest) {
-  const double left = std::abs(journey.to - from), sign = journey.to < from ? -1 : 1;
+StepResult Front::step(const TimeInterval& interval, double from, double longest) {
+  const double left = std::abs(interval.to - from), sign = interval.to < from ? -1 : 1;
   constexpr double kSlack = 1.05, kMargin = 0.9, kGrowth = 4;
   double dt = longest;
-  if (from == journey.from) dt = std::min(dt, firstStep(journey));
+  if (from == interval.from) dt = std::min(dt, firstStep(interval));
   for (;;) {
-    const double to = dt >= left ? journey.to : from + sign * dt;
+    const double to = dt >= left ? interval.to : from + sign * dt;
     if (to == from || left > kGrowth * kMostSteps * dt) return {from, dt};
-    const double allowed = tryStep(journey, from, to);
+    const double allowed = tryStep(interval, from, to);
     if (allowed * kSlack >= 1) {
       mesh_.positions.swap(moved_);
       const double next = dt * std::clamp(kMargin * allowed, kMargin / kSlack, kGrowth);
-      // While all stands still, what comes and goes has to be waited for.
-      const double whole = std::abs(journey.to - journey.from);
-      return {to, isStill_ ? std::min(next, kFirstShare * whole) : next};
+      // While nothing moves, steps stay short, so that a motion that sets in is not skipped.
+      const double total = std::abs(interval.to - interval.from);
+      return {to, isStill_ ? std::min(next, kFirstShare * total) : next};
     }
-    report(journey.progress, (from - journey.from) / (journey.to - journey.from), journey.action);
+    report(interval.progress, (from - interval.from) / (interval.to - interval.from),
+           interval.action);
     dt *= kMargin * allowed;
   }
 }
 
-std::size_t Front::advance(const TimeInterval& journey) {
-  return walk(journey, [&](double from, double longest) {
-    const StepMade made = step(journey, from, longest);
-    splitLongEdges(journey.maxMemory, journey.action);
+std::size_t Front::advance(const TimeInterval& interval) {
+  return integrate(interval, [&](double from, double longest) {
+    const StepResult made = step(interval, from, longest);
+    splitLongEdges(interval.maxMemory, interval.action);
     largestArea_ = std::max(largestArea_, surfaceArea(mesh_));
     if (static_cast<double>(mesh_.triangles.size()) >
         kSpareTriangles + kMostTrianglesPerVoxel * largestArea_) {
       throw ResourceLimit(fmt::format(
           "{}: at time {:.6g} the velocity has folded the surface too finely to follow; "
           "use a smoother velocity, a shorter time or --scheme semi-lagrangian",
-          journey.action, made.time));
+          interval.action, made.time));
     }
     return made;
   });

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/flow only.
+// Internal header of levelset: public headers must not include it.
 
 #include <vector>
 
@@ -9,42 +9,43 @@
 
 namespace levelset::flow {
 
-/// A closed surface of triangles that moves with a velocity.
-///
-/// Vertices follow their characteristics by a Runge-Kutta method of fifth order that tells its own
-/// error [Cash90]; a step in which any of them errs, moves or stretches its surroundings by too
-/// much is made again, shorter. An edge that gets longer than a voxel is split; the new vertex goes
-/// onto the cubic curve that the normals at the ends tell [Vlachos01]. Nothing is interpolated on a
-/// grid, so the surface neither wears down nor loses what is thinner than a voxel.
+/// Closed triangle surface that moves with a velocity.
+/// Vertices follow their characteristics with a fifth-order Runge-Kutta method with error estimate
+/// [Cash90]. A step is repeated with a shorter length when a vertex exceeds the limits of error or
+/// move, or when an edge exceeds the limit of strain. An edge longer than a voxel is split; the new
+/// vertex goes onto the cubic curve defined by the normals at the ends [Vlachos01]. Nothing is
+/// interpolated on a grid, so the surface does not erode and keeps parts thinner than a voxel.
 class Front {
  public:
   /// @param mesh  closed and two-manifold, in voxels
-  /// @throws ResourceLimit
+  /// @throws ResourceLimit when the split triangles do not fit into memory
   Front(TriMesh mesh, std::size_t maxMemory, const char* action);
 
-  /// Moves from one time to another, later or earlier.
-  /// @throws InvalidInput for a velocity that is not finite; ResourceLimit for too many steps or
-  ///         triangles; Cancelled
+  /// Moves the surface over the time interval, forwards or backwards.
+  /// @throws InvalidInput for a velocity that is not finite
+  /// @throws ResourceLimit for too many steps or triangles
+  /// @throws Cancelled
   /// @return the number of steps
-  std::size_t advance(const TimeInterval& journey);
+  std::size_t advance(const TimeInterval& interval);
 
   [[nodiscard]] const TriMesh& mesh() const { return mesh_; }
 
  private:
-  /// Puts the vertices of a step into `moved_`.
-  /// @return the share of the step that would be allowed, 1 and more: all of it
-  double tryStep(const TimeInterval& journey, double from, double to);
-  /// How much the edges change on the way to `moved_`, as a share of their lengths or the longest.
+  /// Computes the vertices after a step into `moved_`.
+  /// @return allowed share of the step; 1 or more accepts the step
+  double tryStep(const TimeInterval& interval, double from, double to);
+  /// Returns the largest change of an edge from the mesh to `moved_`, as a share of its length or
+  /// of kLongestEdge.
   [[nodiscard]] double mostStrain() const;
-  /// How long the first step may be, by the speeds at the start.
-  [[nodiscard]] double firstStep(const TimeInterval& journey) const;
-  StepMade step(const TimeInterval& journey, double from, double longest);
+  /// Returns the longest first step, from the speeds at the start.
+  [[nodiscard]] double firstStep(const TimeInterval& interval) const;
+  StepResult step(const TimeInterval& interval, double from, double longest);
   void splitLongEdges(std::size_t maxMemory, const char* action);
 
   TriMesh mesh_;
-  std::vector<Imath::V3d> moved_;  ///< where a step would bring the vertices
-  double largestArea_ = 0;         ///< that it has had, voxels²
-  bool isStill_ = false;           ///< nothing moved in the last step that was tried
+  std::vector<Imath::V3d> moved_;  ///< vertices after the step that was tried last
+  double largestArea_ = 0;         ///< largest area so far, voxels²
+  bool isStill_ = false;           ///< nothing moved in the step that was tried last
 };
 
 }  // namespace levelset::flow

@@ -24,13 +24,13 @@ using openvdb::FloatTree;
 using openvdb::Index;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Semi-Lagrangian: a step moves nothing further than this many voxels, and strains no more.
+// Semi-Lagrangian: limits of a step, the move in voxels and the strain.
 constexpr double kFarthestFoot = 4, kFootStrain = 0.5;
-// The band that it works in, voxels: all that is interpolated for the values beside the zero set
-// and for the distances made of them is a distance, not the background.
+// Half width of the working band, voxels. All values interpolated beside the zero set, and those
+// for the distances computed from them, are then distances and not the background.
 constexpr double kFootWidth = 5;
-// Upwind: share of what the CFL condition allows, and how far the surface may move before its
-// distance is made again, in voxels; the working band must hold that and the stencils beyond it.
+// Upwind: share of the CFL limit, travel of the surface before redistancing, and half width of the
+// working band, both in voxels. The band must hold the travel and the stencils beyond it.
 constexpr double kCfl = 0.5, kUpwindTravel = 1.5, kUpwindWidth = 6;
 
 std::vector<LeafNode*> leavesOf(FloatTree& tree) {
@@ -39,50 +39,51 @@ std::vector<LeafNode*> leavesOf(FloatTree& tree) {
   return leaves;
 }
 
-V3d placeOf(const LeafNode& leaf, Index n) {
+V3d positionOf(const LeafNode& leaf, Index n) {
   return toImath(leaf.offsetToGlobalCoord(n).asVec3d());
 }
 
-/// Longest step at a time: the least that `limit` says at the active grid points of a grid.
+/// Returns the longest step at a time: the minimum of `limit` over the active grid points.
 template <typename Limit>
 double longestStep(FloatGrid& grid, const Limit& limit) {
   const std::vector<LeafNode*> leaves = leavesOf(grid.tree());
   std::vector<double> least(leaves.size(), HUGE_VAL);
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
     for (auto it = leaves[i]->cbeginValueOn(); it; ++it)
-      least[i] = std::min(least[i], limit(placeOf(*leaves[i], it.pos())));
+      least[i] = std::min(least[i], limit(positionOf(*leaves[i], it.pos())));
   });
   double result = HUGE_VAL;
   for (const double value : least) result = std::min(result, value);
   return result;
 }
 
-FloatGrid::Ptr distanceOf(const FloatGrid& field, double halfWidth, const TimeInterval& journey) {
+FloatGrid::Ptr distanceOf(const FloatGrid& field, double halfWidth, const TimeInterval& interval) {
   eikonal::DistanceRequest request;
-  request.action = journey.action;
+  request.action = interval.action;
   request.halfWidth = halfWidth;
-  request.maxMemory = journey.maxMemory;
+  request.maxMemory = interval.maxMemory;
   return eikonal::distanceTransform(field, request);
 }
 
 // === Semi-Lagrangian
 
-// A foot may be off by this many voxels for each step; no way is halved more often than that.
+// Largest error of a foot point per step, voxels. A path with a larger error is halved, at most
+// kMostHalvings times.
 constexpr double kFootError = 1e-3;
 constexpr int kMostHalvings = 6;
 
-V3d footOf(const TimeInterval& journey, const V3d& place, double from, double to,
+V3d footOf(const TimeInterval& interval, const V3d& position, double from, double to,
            int halvings = 0) {
-  const Characteristic way(journey.velocity, place, from, to);
-  if (!way.isFinite()) requireFiniteWay(journey, place, from, to);
-  if (!(way.error.length() > kFootError) || halvings == kMostHalvings) return place + way.move;
+  const Characteristic path(interval.velocity, position, from, to);
+  if (!path.isFinite()) requireFinitePath(interval, position, from, to);
+  if (!(path.error.length() > kFootError) || halvings == kMostHalvings) return position + path.move;
   const double middle = from + (to - from) / 2;
-  return footOf(journey, footOf(journey, place, from, middle, halvings + 1), middle, to,
+  return footOf(interval, footOf(interval, position, from, middle, halvings + 1), middle, to,
                 halvings + 1);
 }
 
-FloatGrid::Ptr semiLagrangeStep(const FloatGrid& before, const TimeInterval& journey, double from,
-                                double to) {
+FloatGrid::Ptr semiLagrangianStep(const FloatGrid& before, const TimeInterval& interval,
+                                  double from, double to) {
   const FloatGrid::Ptr after = before.deepCopy();
   openvdb::tools::dilateActiveValues(after->tree(), static_cast<int>(kFarthestFoot) + 1,
                                      openvdb::tools::NN_FACE_EDGE, openvdb::tools::IGNORE_TILES);
@@ -92,7 +93,8 @@ FloatGrid::Ptr semiLagrangeStep(const FloatGrid& before, const TimeInterval& jou
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
     eikonal::DenseBlockCache& cache = caches.local();
     for (auto it = leaves[i]->beginValueOn(); it; ++it) {
-      const openvdb::Vec3d foot = toVdb(footOf(journey, placeOf(*leaves[i], it.pos()), to, from));
+      const openvdb::Vec3d foot =
+          toVdb(footOf(interval, positionOf(*leaves[i], it.pos()), to, from));
       const eikonal::DenseBlock& block = cache.around(foot);
       it.setValue(static_cast<float>(block.jet(foot - block.origin().asVec3d()).value));
     }
@@ -119,7 +121,7 @@ double weno5(double a, double b, double c, double d, double e) {
          (6 * (w1 + w2 + w3));
 }
 
-/// Derivative along an axis from the side that the flow comes from; voxels per voxel.
+/// Returns the derivative along an axis from the upwind side; voxels per voxel.
 double upwindDerivative(const eikonal::DenseBlock& block, const Coord& c, int axis, double speed,
                         double voxelSize) {
   const int side = speed > 0 ? -1 : 1;
@@ -137,7 +139,7 @@ double upwindDerivative(const eikonal::DenseBlock& block, const Coord& c, int ax
 
 /// result = share · start + (1 − share) · (field − dt u·∇field) on the active grid points.
 void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, double time,
-                double dt, const TimeInterval& journey, FloatGrid& result) {
+                double dt, const TimeInterval& interval, FloatGrid& result) {
   const std::vector<LeafNode*> leaves = leavesOf(result.tree());
   const double h = result.voxelSize()[0], background = static_cast<double>(result.background());
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
@@ -147,8 +149,8 @@ void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, do
     block.load(accessor, leaves[i]->origin());
     for (auto it = leaves[i]->beginValueOn(); it; ++it) {
       const Coord c = LeafNode::offsetToLocalCoord(it.pos());
-      const V3d speed = journey.velocity(placeOf(*leaves[i], it.pos()), time);
-      requireFinite(journey, speed, placeOf(*leaves[i], it.pos()), time);
+      const V3d speed = interval.velocity(positionOf(*leaves[i], it.pos()), time);
+      requireFinite(interval, speed, positionOf(*leaves[i], it.pos()), time);
       double slope = 0;
       for (int axis = 0; axis < 3; ++axis)
         if (speed[axis] != 0)
@@ -162,65 +164,65 @@ void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, do
   });
 }
 
-/// Third-order TVD Runge-Kutta [Shu88].
-FloatGrid::Ptr upwindStep(const FloatGrid& start, const TimeInterval& journey, double from,
+/// Third-order TVD Runge-Kutta step [Shu88].
+FloatGrid::Ptr upwindStep(const FloatGrid& start, const TimeInterval& interval, double from,
                           double to) {
   const double dt = to - from;
   const FloatGrid::Ptr one = start.deepCopy(), two = start.deepCopy(), three = start.deepCopy();
-  eulerStage(start, start, 0, from, dt, journey, *one);
-  eulerStage(start, *one, 0.75, to, dt, journey, *two);
-  eulerStage(start, *two, 1.0 / 3, from + dt / 2, dt, journey, *three);
+  eulerStage(start, start, 0, from, dt, interval, *one);
+  eulerStage(start, *one, 0.75, to, dt, interval, *two);
+  eulerStage(start, *two, 1.0 / 3, from + dt / 2, dt, interval, *three);
   return three;
 }
 
 }  // namespace
 
-std::size_t carryBySemiLagrange(NarrowBand& band, const TimeInterval& journey) {
+std::size_t advectSemiLagrangian(NarrowBand& band, const TimeInterval& interval) {
   const double halfWidth = band.halfWidth(), width = std::max(halfWidth, kFootWidth);
   FloatGrid::Ptr grid =
-      width > halfWidth ? distanceOf(vdb(band), width, journey) : vdb(band).deepCopy();
+      width > halfWidth ? distanceOf(vdb(band), width, interval) : vdb(band).deepCopy();
   const auto longest = [&](double time) {
     return longestStep(*grid, [&](const V3d& p) {
-      const V3d speed = journey.velocity(p, time);
-      requireFinite(journey, speed, p, time);
+      const V3d speed = interval.velocity(p, time);
+      requireFinite(interval, speed, p, time);
       double strain = 0;
       for (int axis = 0; axis < 3; ++axis) {
         V3d q = p;
         q[axis] += 1;
-        strain += (journey.velocity(q, time) - speed).length2();
+        strain += (interval.velocity(q, time) - speed).length2();
       }
       return std::min(kFarthestFoot / speed.length(), kFootStrain / std::sqrt(strain));
     });
   };
-  const std::size_t steps = walk(journey, longest, [&](double from, double to) {
-    grid = distanceOf(*semiLagrangeStep(*grid, journey, from, to), width, journey);
+  const std::size_t steps = integrate(interval, longest, [&](double from, double to) {
+    grid = distanceOf(*semiLagrangianStep(*grid, interval, from, to), width, interval);
   });
-  if (steps > 0) band = makeBand(width > halfWidth ? distanceOf(*grid, halfWidth, journey) : grid);
+  if (steps > 0) band = makeBand(width > halfWidth ? distanceOf(*grid, halfWidth, interval) : grid);
   return steps;
 }
 
-std::size_t carryUpwind(NarrowBand& band, const TimeInterval& journey) {
+std::size_t advectUpwind(NarrowBand& band, const TimeInterval& interval) {
   const double halfWidth = band.halfWidth();
-  FloatGrid::Ptr grid = distanceOf(vdb(band), std::max(halfWidth, kUpwindWidth), journey);
+  FloatGrid::Ptr grid = distanceOf(vdb(band), std::max(halfWidth, kUpwindWidth), interval);
   double travelled = 0, fastest = 0;
   const auto longest = [&](double time) {
     const double step = longestStep(*grid, [&](const V3d& p) {
-      const V3d speed = journey.velocity(p, time);
-      requireFinite(journey, speed, p, time);
+      const V3d speed = interval.velocity(p, time);
+      requireFinite(interval, speed, p, time);
       return kCfl / (std::abs(speed.x) + std::abs(speed.y) + std::abs(speed.z));
     });
     fastest = std::max(fastest, kCfl / step);
     return step;
   };
-  const std::size_t steps = walk(journey, longest, [&](double from, double to) {
-    grid = upwindStep(*grid, journey, from, to);
+  const std::size_t steps = integrate(interval, longest, [&](double from, double to) {
+    grid = upwindStep(*grid, interval, from, to);
     travelled += std::abs(to - from) * fastest;
     fastest = 0;
     if (travelled < kUpwindTravel) return;
-    grid = distanceOf(*grid, std::max(halfWidth, kUpwindWidth), journey);
+    grid = distanceOf(*grid, std::max(halfWidth, kUpwindWidth), interval);
     travelled = 0;
   });
-  if (steps > 0) band = makeBand(distanceOf(*grid, halfWidth, journey));
+  if (steps > 0) band = makeBand(distanceOf(*grid, halfWidth, interval));
   return steps;
 }
 

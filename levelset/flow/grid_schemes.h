@@ -1,21 +1,21 @@
 #pragma once
 
-// For the .cpp files of levelset/flow only.
+// Internal header of levelset: public headers must not include it.
 
 #include "levelset/flow/time_interval.h"
 #include "levelset/narrow_band.h"
 
 namespace levelset::flow {
 
-/// φ at the feet of backward characteristics (classical Runge-Kutta), interpolated tricubically;
-/// a signed distance again after each step. Works in a band of five voxels, or the solid's own if
-/// that is wider.
+/// Moves a band over the time interval with the semi-Lagrangian scheme. Interpolates φ tricubically
+/// at the feet of backward characteristics, and redistances after each step. Works in a band of
+/// five voxels, or in the solid's own band if that is wider.
 /// @return the number of steps
-std::size_t carryBySemiLagrange(NarrowBand& band, const TimeInterval& journey);
+std::size_t advectSemiLagrangian(NarrowBand& band, const TimeInterval& interval);
 
-/// HJ-WENO5 with TVD-RK3, a signed distance again whenever the surface has moved a voxel and a
-/// half.
-/// @return the number of steps, as the CFL condition makes them
-std::size_t carryUpwind(NarrowBand& band, const TimeInterval& journey);
+/// Moves a band over the time interval with HJ-WENO5 and TVD-RK3. Redistances whenever the surface
+/// has moved a voxel and a half.
+/// @return the number of steps, which the CFL condition determines
+std::size_t advectUpwind(NarrowBand& band, const TimeInterval& interval);
 
 }  // namespace levelset::flow

@@ -21,24 +21,25 @@ using openvdb::FloatTree;
 using TreeManager = openvdb::tree::LeafManager<FloatTree>;
 using LeafNode = FloatTree::LeafNodeType;
 
-// First guess of how far the surfaces are apart, voxels; doubled until it is enough.
+// First guess of the distance between the surfaces, voxels; doubled until it suffices.
 constexpr double kFirstReach = 8;
-// Of the job, when the target is on the grid of the solid and when the distances are known.
+// Progress when the target is on the grid of the solid, and when the distances are known.
 constexpr double kUntilResampled = 0.05, kUntilDistances = 0.4;
-// Distances reach this much further than the surfaces go, so that interpolation sees them whole.
+// Distances extend this much beyond the surfaces, voxels, so that interpolation reads no
+// background.
 constexpr double kBesideSurface = 4;
 
 void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
   const char* action = options.action;
   if (options.mask) checkMask(*options.mask, action);
   if (options.farthest && !(*options.farthest >= kFirstReach && std::isfinite(*options.farthest)))
-    throw UsageError(fmt::format("{}: distances to {} voxels are too few; give {} or more", action,
-                                 *options.farthest, kFirstReach));
+    throw UsageError(fmt::format("{}: a distance limit of {} voxels is too small; give at least {}",
+                                 action, *options.farthest, kFirstReach));
   if (options.steps < 1)
     throw UsageError(
-        fmt::format("{}: {} steps were asked for; give at least 1", action, options.steps));
+        fmt::format("{}: the number of steps is {}; give at least 1", action, options.steps));
   if (!(options.until > 0 && options.until <= 1))
-    throw UsageError(fmt::format("{}: the part of the way is {}; give a number above 0, up to 1",
+    throw UsageError(fmt::format("{}: the last fraction is {}; give a number above 0, up to 1",
                                  action, options.until));
   if (options.tolerance && !(*options.tolerance > 0 && std::isfinite(*options.tolerance)))
     throw UsageError(
@@ -50,7 +51,7 @@ void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOp
                                    solid.isEmpty() ? "solid" : "target"));
 }
 
-/// Two distances on blocks that they share.
+/// Distances to two solids on common blocks.
 struct DistancePair {
   FloatGrid::Ptr from, to;
 
@@ -59,8 +60,7 @@ struct DistancePair {
     to->tree().topologyUnion(from->tree());
   }
 
-  /// Is there a grid point within one solid only where either distance is beyond its reach, or
-  /// nearly?
+  /// Returns true when a grid point inside only one solid has a distance near or beyond the extent.
   [[nodiscard]] bool fallsShort(double reach) const {
     const auto limit = static_cast<float>((reach - kBesideSurface) * from->voxelSize()[0]);
     std::atomic<bool> found = false;
@@ -76,7 +76,7 @@ struct DistancePair {
     return found;
   }
 
-  /// The field that is zero where that part of the way is gone; of it `mask` again a part.
+  /// Computes the field whose zero set is the surface at a fraction, scaled by `mask` where given.
   [[nodiscard]] FloatGrid::Ptr at(double part, const std::optional<Mask>& mask) const {
     FloatGrid::Ptr result = from->deepCopy();
     const auto everywhere = static_cast<float>(part);
@@ -93,7 +93,8 @@ struct DistancePair {
           s *= static_cast<float>(mask->weight({p.x(), p.y(), p.z()}));
         }
         const float mixed = (1 - s) * values[n] + s * b[n];
-        // Far inside one and far outside the other, and halfway: what was solid stays.
+        // A point far inside one solid and far outside the other mixes to zero at one half: solid
+        // stays.
         values[n] = mixed == 0 && values[n] <= -farInside ? -onSide : mixed;
       }
     });
@@ -101,14 +102,14 @@ struct DistancePair {
   }
 };
 
-/// @param distances  makes them of a field
-NarrowBand onTheWay(const DistancePair& pair, double part, const MorphOptions& options,
-                    const std::function<FloatGrid::Ptr(const FloatGrid&)>& distances) {
+/// @param distances  computes distances from a field
+NarrowBand intermediate(const DistancePair& pair, double part, const MorphOptions& options,
+                        const std::function<FloatGrid::Ptr(const FloatGrid&)>& distances) {
   const FloatGrid::Ptr field = pair.at(part, options.mask);
   if (!eikonal::hasZeroCrossing(field->tree()))
     throw InvalidInput(
-        fmt::format("{}: nothing is left of the solid at {:.3g} of the way, since the target lies "
-                    "apart from it; move the target until the two overlap, or ask for 1 step",
+        fmt::format("{}: the solid vanishes at fraction {:.3g} of the morph, since it does not "
+                    "overlap the target; move the target until the two overlap, or use 1 step",
                     options.action, part));
   return makeBand(distances(*field));
 }
@@ -121,7 +122,7 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
       resampleLike(target, solid,
                    {.maxMemory = options.maxMemory,
                     .progress = subProgress(options.progress, 0, kUntilResampled)});
-  // The surface stays within what either solid holds.
+  // The surface stays within the active voxels of both solids.
   openvdb::CoordBBox region = vdb(solid).evalActiveVoxelBoundingBox();
   region.expand(vdb(goal).evalActiveVoxelBoundingBox());
   region.expand(static_cast<int>(kBesideSurface));
@@ -139,10 +140,10 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
   // === Distances wherever the surface will pass
   DistancePair pair;
   const bool isOnTarget = options.until == 1 && !options.mask;
-  const bool isDirect = isOnTarget && options.steps == 1;  // only the end is asked for
+  const bool isDirect = isOnTarget && options.steps == 1;  // only the end is requested
   double done = kUntilResampled;
   for (double reach = options.farthest.value_or(kFirstReach); !isDirect; reach *= 2) {
-    // Each is the last but for one as long as all before.
+    // Each attempt takes about as long as all before it, so it gets half of the remaining progress.
     const double half = (done + kUntilDistances) / 2, quarter = (done + half) / 2;
     pair.from = distances(vdb(solid), reach, done, quarter, region);
     pair.to = distances(vdb(goal), reach, quarter, half, region);
@@ -158,10 +159,11 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
   };
   for (int i = 1; i <= options.steps; ++i) {
     const double part = options.until * i / options.steps;
-    result =
-        part == 1 && isOnTarget ? goal : onTheWay(pair, part, options, [&](const FloatGrid& field) {
-          return distances(field, solid.halfWidth(), fractionOf(i - 1), fractionOf(i));
-        });
+    result = part == 1 && isOnTarget
+                 ? goal
+                 : intermediate(pair, part, options, [&](const FloatGrid& field) {
+                     return distances(field, solid.halfWidth(), fractionOf(i - 1), fractionOf(i));
+                   });
     if (options.keep) options.keep(result, i);
     report(options.progress, fractionOf(i), options.action);
     if (options.tolerance && part < 1 && compare(result, goal).hausdorff() <= *options.tolerance)

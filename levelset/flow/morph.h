@@ -11,30 +11,33 @@ namespace levelset {
 
 struct MorphOptions {
   int steps = 1;
-  double until = 1;  ///< part of the way, in (0, 1]; 1 ends on the target
-  /// World units: the first step whose surface is no farther than this from that of the target, and
-  /// the reverse (Hausdorff distance), is the last. Empty: all steps are gone.
+  double until = 1;  ///< last fraction of the morph, in (0, 1]; 1 ends on the target
+  /// Hausdorff distance to the target, world units, at which the morph stops: the first step within
+  /// it is the last. Empty: all steps are computed.
   std::optional<double> tolerance = {};
-  /// Of the way, this part is gone at each point; the end is then no longer the target.
+  /// Scales the fraction at each point; the end is then no longer the target.
   std::optional<Mask> mask = {};
-  /// Distances count no further than this, voxels: for a mask that parts solids which differ near
-  /// their surfaces only, where it saves sweeping them whole. Empty: wherever the surface passes.
+  /// Largest distance that counts, voxels. Saves computing distances far from the surfaces when a
+  /// mask joins solids that differ only near them. Empty: wherever the surface passes.
   std::optional<double> farthest = {};
-  /// Receives every step, 1 to `steps`, the last one too.
+  /// Receives every step, 1 to `steps`, including the last.
   std::function<void(const NarrowBand& step, int number)> keep = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
-  const char* action = "morph";  ///< in messages
+  const char* action = "morph";  ///< prefix of messages
 };
 
-/// Moves the surface of `solid` on to that of `target`, on the grid of `solid`. At the part s of
-/// the way it is the zero set of (1 − s) distance to the solid + s distance to the target, both
-/// exact and known wherever the surface passes, re-distanced. A point that belongs to one of the
-/// solids only changes sides once, at a time of its own: every step is nearer to the target than
-/// the one before, whatever the topology.
+/// Moves the surface of `solid` towards that of `target`, on the grid of `solid`.
+/// At fraction s the surface is the zero set of (1 − s) · distance to the solid + s · distance to
+/// the target, redistanced. Both distances are exact and known wherever the surface passes. A point
+/// inside only one of the solids changes sides once, at a fraction of its own. So every step is
+/// nearer to the target than the one before, whatever the topology.
 /// @throws UsageError for fewer than one step, `until` outside (0, 1], a tolerance that is not
-/// positive or a bad mask; InvalidInput if a solid is
-/// empty, or if nothing is left on the way (the solids lie apart); ResourceLimit; Cancelled
+///         positive, or an invalid mask
+/// @throws InvalidInput if a solid is empty, or if nothing is left at some fraction (the solids lie
+///         apart)
+/// @throws ResourceLimit when the distances do not fit into memory
+/// @throws Cancelled
 [[nodiscard]] NarrowBand morph(const NarrowBand& solid, const NarrowBand& target,
                                const MorphOptions& options = {});
 

@@ -12,66 +12,68 @@ namespace levelset::flow {
 
 using Imath::V3d;
 
-void requireFinite(const TimeInterval& journey, const V3d& velocity, const V3d& place,
+void requireFinite(const TimeInterval& interval, const V3d& velocity, const V3d& position,
                    double time) {
   if (std::isfinite(velocity.x) && std::isfinite(velocity.y) && std::isfinite(velocity.z)) return;
   V3d world;
-  journey.toWorld.multVecMatrix(place, world);
-  throw InvalidInput(fmt::format(
-      "{}: the velocity is not finite at {:.6g},{:.6g},{:.6g} and time {:.6g}; give one "
-      "that is finite wherever the surface goes",
-      journey.action, world.x, world.y, world.z, time));
+  interval.toWorld.multVecMatrix(position, world);
+  throw InvalidInput(
+      fmt::format("{}: the velocity is not finite at {:.6g},{:.6g},{:.6g} and time {:.6g}; give a "
+                  "velocity that is finite along the path of the surface",
+                  interval.action, world.x, world.y, world.z, time));
 }
 
-std::size_t walk(const TimeInterval& journey, const std::function<StepMade(double, double)>& step) {
-  const double to = journey.to, whole = std::abs(to - journey.from);
-  double time = journey.from, dt = kFirstShare * whole;
+std::size_t integrate(const TimeInterval& interval,
+                      const std::function<StepResult(double, double)>& step) {
+  const double to = interval.to, total = std::abs(to - interval.from);
+  double time = interval.from, dt = kFirstShare * total;
   std::size_t done = 0;
   while (time != to) {
-    report(journey.progress, (time - journey.from) / (to - journey.from), journey.action);
+    report(interval.progress, (time - interval.from) / (to - interval.from), interval.action);
     const double left = std::abs(to - time);
-    // At a late time a share of a short way may be nothing.
+    // At a late time, a share of a short interval may round to zero.
     dt = std::max(dt, 4 * std::abs(std::nextafter(time, to) - time));
-    // The last two steps share what is left.
+    // The last two steps share the remaining time.
     const double longest = dt >= left ? left : left < 2 * dt ? left / 2 : dt;
-    const StepMade made = step(time, longest);
+    const StepResult made = step(time, longest);
     const double needed = static_cast<double>(done) + std::abs(to - made.time) / made.next;
     if (!(needed <= kMostSteps) || made.time == time) {
-      throw ResourceLimit(
-          fmt::format("{}: at time {:.6g} the velocity allows steps of {:.3g} only, which makes "
-                      "about {:.3g}, and {} are the most; ask for a shorter time or a gentler "
-                      "velocity",
-                      journey.action, time, made.next, needed, kMostSteps));
+      throw ResourceLimit(fmt::format(
+          "{}: at time {:.6g} the velocity limits steps to {:.3g}, which requires "
+          "about {:.3g} steps, more than the limit of {}; use a shorter time or a smoother "
+          "velocity",
+          interval.action, time, made.next, needed, kMostSteps));
     }
     time = made.time;
     dt = made.next;
     ++done;
   }
-  report(journey.progress, 1, journey.action);
+  report(interval.progress, 1, interval.action);
   return done;
 }
 
-std::size_t walk(const TimeInterval& journey, const std::function<double(double)>& longest,
-                 const std::function<void(double, double)>& step) {
-  const double to = journey.to, sign = to < journey.from ? -1 : 1;
-  // Uneven parts of a step, so as not to fall in step with what comes and goes.
-  constexpr double kLooks[] = {0.146, 0.382, 0.618, 1};
+std::size_t integrate(const TimeInterval& interval, const std::function<double(double)>& longest,
+                      const std::function<void(double, double)>& step) {
+  const double to = interval.to, sign = to < interval.from ? -1 : 1;
+  // Sample times within a step. They are uneven so as not to match the period of an oscillating
+  // velocity.
+  constexpr double kSamples[] = {0.146, 0.382, 0.618, 1};
   constexpr double kGrowth = 1.5;
   constexpr int kTries = 40;
-  const double whole = std::abs(to - journey.from);
-  double last = whole;
-  return walk(journey, [&](double from, double) {
+  const double total = std::abs(to - interval.from);
+  double last = total;
+  return integrate(interval, [&](double from, double) {
     const double left = std::abs(to - from);
     const double atStart = longest(from);
     double dt = std::min({left, kGrowth * last, atStart}), least = atStart;
     for (int i = 0; i < kTries; ++i) {
       double allowed = std::numeric_limits<double>::infinity();
-      for (const double look : kLooks)
-        allowed = std::min(allowed, longest(from + sign * look * dt));
+      for (const double sample : kSamples)
+        allowed = std::min(allowed, longest(from + sign * sample * dt));
       least = std::min(atStart, allowed);
-      // While all stands still, look out for what comes.
-      if (std::isinf(least) && dt > kFirstShare * whole) {
-        dt = kFirstShare * whole;
+      // While nothing moves, steps stay short, so that a motion that sets in is not skipped.
+      if (std::isinf(least) && dt > kFirstShare * total) {
+        dt = kFirstShare * total;
         continue;
       }
       if (dt <= 1.05 * allowed) break;
@@ -81,9 +83,9 @@ std::size_t walk(const TimeInterval& journey, const std::function<double(double)
     const bool isStill = std::isinf(least);
     last = dt;
     const double next = dt >= left ? to : from + sign * dt;
-    if (!(left / dt <= kMostSteps)) return StepMade{from, dt};
+    if (!(left / dt <= kMostSteps)) return StepResult{from, dt};
     if (!isStill) step(from, next);
-    return StepMade{next, kGrowth * dt};
+    return StepResult{next, kGrowth * dt};
   });
 }
 

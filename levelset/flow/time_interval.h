@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/flow only.
+// Internal header of levelset: public headers must not include it.
 
 #include <Imath/ImathMatrix.h>
 #include <Imath/ImathVec.h>
@@ -11,44 +11,48 @@
 
 namespace levelset::flow {
 
-/// Voxels per unit of time, at a place in voxels and a time. Safe to call from many threads.
-using Velocity = std::function<Imath::V3d(const Imath::V3d& place, double time)>;
+/// Velocity in voxels per unit of time, at a position in voxels and a time. Safe to call from many
+/// threads.
+using Velocity = std::function<Imath::V3d(const Imath::V3d& position, double time)>;
 
-/// What is carried from when to when.
+/// Velocity field and the time interval over which it moves the surface.
 struct TimeInterval {
   const Velocity& velocity;
   double from, to;
-  const char* action;   ///< for messages
+  const char* action;   ///< prefix of messages
   Imath::M44d toWorld;  ///< from voxels, for messages
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
 inline constexpr double kMostSteps = 20000;
-/// The first step is this share of the way: what is still at the start, and at the end of it, may
-/// move in between. Not a round number, so as not to fall in step with what comes and goes.
+/// First step as a share of the interval. A velocity that is zero at both ends of a step may move
+/// the surface in between, so the first step is short. The share is not a round number, so that it
+/// does not match the period of an oscillating velocity.
 inline constexpr double kFirstShare = 0.0259;
 
-/// Where a step ended, and how long the next one may be.
-struct StepMade {
+/// End time of a step, and the longest allowed next step.
+struct StepResult {
   double time, next;
 };
 
-/// Walks from journey.from to journey.to, reporting progress.
-/// @param step  makes a step from a time towards journey.to, no longer than it is told (positive)
-/// @return      the number of steps
-/// @throws ResourceLimit when it sees more steps coming than anybody waits for
-std::size_t walk(const TimeInterval& journey,
-                 const std::function<StepMade(double from, double longest)>& step);
+/// Integrates over the interval step by step and reports progress.
+/// @param step  takes a step from a time towards interval.to, of at most the given positive length
+/// @return the number of steps
+/// @throws ResourceLimit when the step lengths predict more than kMostSteps steps
+std::size_t integrate(const TimeInterval& interval,
+                      const std::function<StepResult(double from, double longest)>& step);
 
-/// Walks in steps that are short enough at their beginning, on the way and at their end.
+/// Integrates over the interval in steps that the limit allows at their beginning, between and at
+/// their end.
 /// @param longest  longest step at a time, positive or infinite
-/// @param step     makes the step between two times
-std::size_t walk(const TimeInterval& journey, const std::function<double(double)>& longest,
-                 const std::function<void(double, double)>& step);
+/// @param step     takes the step between two times
+std::size_t integrate(const TimeInterval& interval, const std::function<double(double)>& longest,
+                      const std::function<void(double, double)>& step);
 
-/// @throws InvalidInput, telling place and time, unless the velocity is finite
-void requireFinite(const TimeInterval& journey, const Imath::V3d& velocity, const Imath::V3d& place,
-                   double time);
+/// Checks that a velocity is finite.
+/// @throws InvalidInput with position and time, if it is not finite
+void requireFinite(const TimeInterval& interval, const Imath::V3d& velocity,
+                   const Imath::V3d& position, double time);
 
 }  // namespace levelset::flow

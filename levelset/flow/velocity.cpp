@@ -17,7 +17,7 @@ void requirePeriod(double period) {
         "advect: the period of the velocity is {}; give a positive, finite time", period));
 }
 
-/// sin² of πx and sin of 2πx.
+/// sin² of πx, and sin of 2πx.
 struct Waves {
   double squared, twice;
   explicit Waves(double x) {

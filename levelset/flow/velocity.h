@@ -2,20 +2,20 @@
 
 #include "levelset/fields/field.h"
 
-/// Velocities that everybody measures advection with.
+/// Standard velocity fields for tests of advection.
 namespace levelset {
 
-/// LeVeque's deformation of the unit cube, which Enright's test uses [LeVeque96, Enright02]: no
+/// LeVeque's deformation of the unit cube, used by Enright's test [LeVeque96, Enright02]: free of
 /// divergence, stretches a sphere to a sheet and back within `period`.
-/// @throws UsageError for a period that is not positive and finite; so do the others
+/// @throws UsageError for a period that is not positive and finite; this holds for all three fields
 [[nodiscard]] VectorField enrightVelocity(double period = 3);
 
-/// The single vortex in the unit square, the same at every z; back at its start after `period`
+/// Single vortex in the unit square, the same at every z; returns to its start after `period`
 /// [Bell89, LeVeque96].
 [[nodiscard]] VectorField vortexVelocity(double period = 8);
 
 /// Rigid rotation, one turn anticlockwise about `axis` through `center` in `period`.
-/// @throws UsageError also for an axis without direction or a point that is not finite
+/// @throws UsageError also for an axis of zero length or a point that is not finite
 [[nodiscard]] VectorField rotationVelocity(const Imath::V3d& center, const Imath::V3d& axis,
                                            double period = 1);
 

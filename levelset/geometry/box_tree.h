@@ -1,6 +1,6 @@
 #pragma once
 
-// Includes OpenVDB: for .cpp files only.
+// Includes OpenVDB, so include it from .cpp files only.
 
 #include <algorithm>
 #include <cmath>
@@ -14,62 +14,63 @@
 
 namespace levelset {
 
-/// A binary tree of the bounding boxes of things, to find the nearest of them. The boxes are tight:
-/// planes that only split would not tell how far a flat surface is that lies aside of all of them.
+/// Binary tree of the bounding boxes of items, for nearest-item searches. The boxes are tight.
+/// Splitting planes alone would give poor distance bounds for a flat surface that lies aside of
+/// them.
 class BoxTree {
  public:
   BoxTree() = default;
-  /// @param bound  (thing, low, high): extends the box by a thing
-  /// @param place  (thing, axis): where it counts as being, to be put on one side or the other
-  template <typename Bound, typename Place>
-  BoxTree(std::size_t count, const Bound& bound, const Place& place) : order_(count) {
+  /// @param bound  (item, low, high): extends the box by an item
+  /// @param coordinate  (item, axis): coordinate by which an item is sorted to one side of a split
+  template <typename Bound, typename Coordinate>
+  BoxTree(std::size_t count, const Bound& bound, const Coordinate& coordinate) : order_(count) {
     std::iota(order_.begin(), order_.end(), 0u);
-    if (count > 0) build(0, static_cast<std::uint32_t>(count), bound, place);
+    if (count > 0) build(0, static_cast<std::uint32_t>(count), bound, coordinate);
   }
 
-  /// The things as the leaves have them, one leaf after the other.
+  /// Item numbers in the order of the leaves.
   [[nodiscard]] const std::vector<std::uint32_t>& order() const { return order_; }
 
-  /// Calls look(begin, end), with places in order(), for leaves whose box is no further than the
-  /// root of `squared`, which `look` lowers; near ones first.
+  /// Calls look(begin, end), a range of positions in order(), for each leaf whose box lies within
+  /// the root of `squared`. `look` lowers `squared`. Near leaves come first.
   template <typename Look>
   void search(const openvdb::Vec3d& from, const double& squared, const Look& look) const {
     if (!nodes_.empty()) visit(0, from, squared, look);
   }
 
  private:
-  static constexpr std::uint32_t kThingsPerLeaf = 4;
+  static constexpr std::uint32_t kItemsPerLeaf = 4;
 
   struct Node {
     openvdb::Vec3f low, high;
-    std::uint32_t begin = 0, end = 0;  ///< in order_
-    std::uint32_t right = 0;           ///< second child; the first follows; 0: a leaf
+    std::uint32_t begin = 0, end = 0;  ///< range in order_
+    std::uint32_t right = 0;  ///< second child; the first child follows its parent; 0: a leaf
   };
 
-  template <typename Bound, typename Place>
+  template <typename Bound, typename Coordinate>
   std::uint32_t build(std::uint32_t begin, std::uint32_t end, const Bound& bound,
-                      const Place& place) {
+                      const Coordinate& coordinate) {
     const auto index = static_cast<std::uint32_t>(nodes_.size());
     nodes_.emplace_back();
     openvdb::Vec3d low(std::numeric_limits<double>::max()), high = -low;
     for (std::uint32_t i = begin; i < end; ++i) bound(order_[i], low, high);
-    // Rounded outwards: a box must hold its things.
+    // Rounded outwards, so that the box contains its items.
     for (int i = 0; i < 3; ++i) {
       nodes_[index].low[i] = std::nextafter(static_cast<float>(low[i]), -INFINITY);
       nodes_[index].high[i] = std::nextafter(static_cast<float>(high[i]), INFINITY);
     }
     nodes_[index].begin = begin;
     nodes_[index].end = end;
-    if (end - begin <= kThingsPerLeaf) return index;
+    if (end - begin <= kItemsPerLeaf) return index;
     const openvdb::Vec3d size = high - low;
     const int axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
     const std::uint32_t middle = begin + (end - begin) / 2;
     const auto at = [&](std::uint32_t i) { return order_.begin() + i; };
     std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
-      return place(a, axis) < place(b, axis);
+      return coordinate(a, axis) < coordinate(b, axis);
     });
-    build(begin, middle, bound, place);
-    const std::uint32_t right = build(middle, end, bound, place);
+    build(begin, middle, bound, coordinate);
+    const std::uint32_t right = build(middle, end, bound, coordinate);
     nodes_[index].right = right;
     return index;
   }

@@ -2,15 +2,15 @@
 
 namespace levelset {
 
-/// The point of a triangle that is nearest to another, and on which part of it that lies.
+/// Closest point on a triangle and the feature (corner, edge or interior) that contains it.
 template <typename Vector>
 struct TriangleFoot {
   Vector point{0};
-  int part = 6;  ///< 0 to 2: a corner; 3 to 5: the edge from corner part − 3 to the next; 6: within
+  int part = 6;  ///< 0 to 2: corner; 3 to 5: edge from corner part − 3 to the next; 6: interior
 };
 
-/// By the regions of its plane that are nearest to corners, edges and the inside [Ericson05,
-/// 5.1.5]. Of a triangle without area a point on an edge or a corner.
+/// Finds the closest point by the Voronoi regions of the corners, edges and interior [Ericson05,
+/// 5.1.5]. For a triangle without area, returns a point on an edge or a corner.
 template <typename Vector>
 [[nodiscard]] TriangleFoot<Vector> closestOnTriangle(const Vector& p, const Vector& a,
                                                      const Vector& b, const Vector& c) {

@@ -7,22 +7,23 @@
 
 namespace levelset {
 
-/// Sets of numbers that are joined one by one; the lowest of a set stands for it (internal).
+/// Disjoint sets of numbers that support joining (union-find). The lowest number represents its set
+/// (internal).
 class DisjointSets {
  public:
-  /// 0 … count − 1, each alone.
+  /// The numbers 0 … count − 1, each in a set of its own.
   explicit DisjointSets(std::size_t count) : parent_(count) {
     std::iota(parent_.begin(), parent_.end(), 0u);
   }
 
   [[nodiscard]] std::size_t size() const { return parent_.size(); }
 
-  /// One more, alone.
+  /// Adds one number in a set of its own and returns it.
   std::uint32_t add() {
     parent_.push_back(static_cast<std::uint32_t>(parent_.size()));
     return parent_.back();
   }
-  /// The lowest of the set of i.
+  /// Lowest number of the set that contains i.
   std::uint32_t find(std::uint32_t i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;

@@ -12,11 +12,11 @@ using Imath::V2d;
 using Imath::V3d;
 
 constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
-// [Shewchuk97, figures 21 and 23], rounded up.
+// Error bounds of [Shewchuk97, figures 21 and 23], rounded up.
 constexpr double kOrient2dBound = (3 + 16 * kUnit) * kUnit;
 constexpr double kOrient3dBound = (8 + 64 * kUnit) * kUnit;
 
-/// A sum of doubles held exactly, as nonoverlapping components of growing size.
+/// An exact sum of doubles, stored as nonoverlapping components of increasing magnitude.
 class Expansion {
  public:
   void add(double value) {
@@ -44,14 +44,14 @@ class Expansion {
     addProduct(high, c);
   }
 
-  /// The largest component outweighs all others together.
+  /// Sign of the sum. The largest component outweighs all others together.
   [[nodiscard]] int sign() const {
     if (size_ == 0) return 0;
     return parts_[size_ - 1] > 0 ? 1 : -1;
   }
 
  private:
-  std::array<double, 128> parts_;  // at most 24 products of three, four components each
+  std::array<double, 128> parts_;  // at most 24 products of three factors, four components each
   std::size_t size_ = 0;
 };
 
@@ -59,7 +59,7 @@ int signOf(double value) {
   return (value > 0) - (value < 0);
 }
 
-/// True when a − b is rounded to `difference` without error.
+/// Returns true when a − b equals `difference` exactly.
 bool isExact(double a, double b, double difference) {
   const double virtualB = a - difference;
   return (a - (difference + virtualB)) + (virtualB - b) == 0;
@@ -76,7 +76,7 @@ int orient2dExact(const V2d& a, const V2d& b, const V2d& c) {
   return det.sign();
 }
 
-/// u × v · w of exact differences.
+/// Adds the triple product u × v · w times `factor`.
 void addTriple(Expansion& det, const V3d& u, const V3d& v, const V3d& w, double factor) {
   det.addProduct(factor * u.y, v.z, w.x);
   det.addProduct(-factor * u.z, v.y, w.x);
@@ -98,7 +98,7 @@ int orient3dExact(const V3d& a, const V3d& b, const V3d& c, const V3d& d) {
     addTriple(det, u, v, w, 1);
     return det.sign();
   }
-  // (b − a) × (c − a) · (d − a), multiplied out.
+  // The expanded form of (b − a) × (c − a) · (d − a).
   addTriple(det, b, c, d, 1);
   addTriple(det, a, c, d, -1);
   addTriple(det, a, b, d, 1);

@@ -10,22 +10,23 @@
 namespace levelset {
 namespace {
 
-/// Else nothing can be joined, and nothing has to be sorted to tell.
+/// Returns true when two vertices have equal positions. Otherwise there is nothing to join, and the
+/// edges need not be sorted.
 bool anyCoincide(const std::vector<Imath::V3d>& positions) {
   convert::PositionTable table(positions, positions.size());
   for (std::uint32_t v = 0; v < positions.size(); ++v)
-    if (table.findOrEnter(positions[v], v) != v) return true;
+    if (table.findOrInsert(positions[v], v) != v) return true;
   return false;
 }
 
-/// An edge of one triangle alone.
+/// An edge with a single triangle.
 struct BorderSide {
-  std::uint32_t low, high;  ///< the places of its ends
+  std::uint32_t low, high;  ///< vertices that represent the positions of its ends
   std::uint32_t atLow, atHigh;
-  bool rises;  ///< the triangle runs along it from low to high
+  bool rises;  ///< the triangle runs along the edge from low to high
 };
 
-/// In the order of the triangles.
+/// Finds the edges with a single triangle, in triangle order.
 std::vector<BorderSide> findBorder(const TriMesh& mesh) {
   struct Side {
     std::uint32_t low, high;
@@ -58,12 +59,13 @@ std::vector<BorderSide> findBorder(const TriMesh& mesh) {
   return border;
 }
 
-/// Of the border's vertices alone, so that what merely touches keeps its own.
-void findPlaces(const std::vector<Imath::V3d>& positions, std::vector<BorderSide>& border) {
+/// Finds the representatives of the edge ends. Enters vertices on the border only, so that parts
+/// that only touch keep their own vertices.
+void findEndVertices(const std::vector<Imath::V3d>& positions, std::vector<BorderSide>& border) {
   convert::PositionTable table(positions, border.size());
   for (BorderSide& side : border) {
-    side.low = table.findOrEnter(positions[side.atLow], side.atLow);
-    side.high = table.findOrEnter(positions[side.atHigh], side.atHigh);
+    side.low = table.findOrInsert(positions[side.atLow], side.atLow);
+    side.high = table.findOrInsert(positions[side.atHigh], side.atHigh);
     if (side.low <= side.high) continue;
     std::swap(side.low, side.high);
     std::swap(side.atLow, side.atHigh);
@@ -76,10 +78,10 @@ void join(DisjointSets& vertices, const BorderSide& a, const BorderSide& b) {
   vertices.join(a.atHigh, b.atHigh);
 }
 
-/// Sides at one place that run against each other are paired as brackets are: triangles of one part
-/// stand together in a mesh, so that parts which share an edge keep to themselves. What is left
-/// over is joined too: an edge with three faces, or two that are turned against each other, is
-/// one with or without seams.
+/// Joins edges at equal positions. Edges that run in opposite directions are paired like brackets.
+/// The triangles of one part are consecutive in a mesh, so parts that share an edge stay separate.
+/// Unpaired edges are joined too: an edge with three faces, or with two faces of opposite
+/// orientation, is one edge with or without seams.
 void joinSides(const std::vector<BorderSide>& border, DisjointSets& vertices) {
   std::vector<std::size_t> order(border.size()), open;
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -104,7 +106,8 @@ void joinSides(const std::vector<BorderSide>& border, DisjointSets& vertices) {
   }
 }
 
-/// Without the vertices that stand for another, and the triangles that have become lines.
+/// Removes the vertices that another vertex represents, and the triangles that have become
+/// degenerate.
 TriMesh withJoined(const TriMesh& mesh, DisjointSets& vertices) {
   TriMesh joined;
   joined.precision = mesh.precision;
@@ -140,11 +143,11 @@ std::optional<TriMesh> withoutSeams(const TriMesh& mesh, const char* action,
   requireMemory(triangles * 3 * kSideBytes, maxMemory, action);
   std::vector<BorderSide> border = findBorder(mesh);
   if (border.empty()) return std::nullopt;
-  // With its order and places; then the result.
+  // Memory of the border with its order and position table, then of the result.
   constexpr double kBorderBytes = sizeof(BorderSide) + 2 * 8 + kTableBytes;
   requireMemory(static_cast<double>(border.size()) * kBorderBytes + triangles * 12 + vertices * 32,
                 maxMemory, action);
-  findPlaces(mesh.positions, border);
+  findEndVertices(mesh.positions, border);
   DisjointSets joined(mesh.positions.size());
   joinSides(border, joined);
   return withJoined(mesh, joined);

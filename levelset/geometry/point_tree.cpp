@@ -22,7 +22,7 @@ std::uint32_t PointTree::nearest(const Vec3d& query, double limit) const {
       const std::uint32_t point = tree_.order()[i];
       const double distance = (query - points_[point]).lengthSqr();
       if (distance > squared || (distance == squared && point > best)) continue;
-      // At the limit itself nothing is found.
+      // A point exactly at the limit does not count.
       if (distance == squared && best == kNone) continue;
       squared = distance;
       best = point;

@@ -10,14 +10,15 @@
 
 namespace levelset::eikonal {
 
-/// Points in a tree of bounding boxes; the answers do not depend on how it was built.
+/// Points in a tree of bounding boxes, for nearest-point searches. Results do not depend on the
+/// structure of the tree.
 class PointTree {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
-  /// Keeps a view of the points.
+  /// Keeps a view of the points: the caller keeps them alive.
   explicit PointTree(std::span<const openvdb::Vec3d> points);
-  /// Number of the point nearest to `query` and nearer than `limit`, the first of equals; else
-  /// kNone.
+  /// Index of the point that is nearest to `query` and nearer than `limit`; the lowest index among
+  /// equals. kNone when there is no such point.
   [[nodiscard]] std::uint32_t nearest(const openvdb::Vec3d& query, double limit) const;
 
  private:

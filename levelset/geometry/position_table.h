@@ -8,18 +8,20 @@
 
 namespace levelset::convert {
 
-/// Finds equal points, of two or three coordinates; −0 and +0 are one place. Open addressing.
+/// Hash table that finds equal points of two or three coordinates. −0 and +0 are equal. Open
+/// addressing.
 template <typename Vector>
 class ValueTable {
  public:
-  /// @param points    those that are entered, kept by the caller
-  /// @param expected  how many will be
+  /// @param points  positions of the entered indices; the caller keeps them alive
+  /// @param expected  expected number of entries
   ValueTable(const std::vector<Vector>& points, std::size_t expected)
       : points_(points), slots_(std::bit_ceil(2 * expected + 2), kNone) {}
 
-  /// The index entered before for this position, or else `index`, which is entered for it.
-  /// @pre points[index] is `p`, at the latest when the next one is entered
-  std::uint32_t findOrEnter(const Vector& p, std::uint32_t index) {
+  /// Returns the index entered before for an equal position; otherwise enters `index` and returns
+  /// it.
+  /// @pre points[index] equals `p`, at the latest when the next position is entered
+  std::uint32_t findOrInsert(const Vector& p, std::uint32_t index) {
     if (2 * entered_ >= slots_.size()) grow();
     std::uint32_t& slot = find(p);
     if (slot == kNone) {

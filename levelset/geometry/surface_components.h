@@ -8,18 +8,19 @@
 
 #include "levelset/geometry/disjoint_sets.h"
 
-/// The connected surfaces of a triangle mesh, for any vector type with [] (internal).
+/// Surface components (connected surfaces) of a triangle mesh, for any vector type with []
+/// (internal).
 namespace levelset {
 
 struct ComponentFigures {
   double volume = 0;  ///< signed: negative for the wall of a cavity
   double area = 0;
-  long euler = 0;  ///< V − E + F, where each edge has two triangles
+  long euler = 0;  ///< V − E + F, if each edge has two triangles
 };
 
 struct SurfaceComponents {
   std::vector<ComponentFigures> figures;         ///< in the order of their first vertices
-  std::vector<std::uint32_t> componentOfVertex;  ///< kNoComponent: no triangle there
+  std::vector<std::uint32_t> componentOfVertex;  ///< kNoComponent: vertex without a triangle
   static constexpr std::uint32_t kNoComponent = 0xffffffffu;
 };
 
@@ -42,50 +43,51 @@ inline double dot(const Triple& a, const Triple& b) {
 
 }  // namespace components_detail
 
-/// Volumes are taken about a vertex of each shell and summed in the order of triangles.
+/// Finds the surface components. Volumes are computed relative to a vertex of each component and
+/// summed in triangle order.
 template <typename Vector>
 SurfaceComponents findSurfaceComponents(
     const std::vector<Vector>& positions,
     const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   using namespace components_detail;
   DisjointSets sets(positions.size());
-  SurfaceComponents shells;
-  shells.componentOfVertex.assign(positions.size(), SurfaceComponents::kNoComponent);
+  SurfaceComponents components;
+  components.componentOfVertex.assign(positions.size(), SurfaceComponents::kNoComponent);
   for (const auto& t : triangles) {
     sets.join(t[0], t[1]);
     sets.join(t[0], t[2]);
-    for (const std::uint32_t v : t) shells.componentOfVertex[v] = 0;  // in use
+    for (const std::uint32_t v : t) components.componentOfVertex[v] = 0;  // in use
   }
   std::vector<std::uint32_t> anchors;
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
-    if (shells.componentOfVertex[v] == SurfaceComponents::kNoComponent) continue;
-    const std::uint32_t top = sets.find(v);  // its lowest vertex, numbered before
+    if (components.componentOfVertex[v] == SurfaceComponents::kNoComponent) continue;
+    const std::uint32_t top = sets.find(v);  // lowest vertex of its set, numbered before
     if (top == v) {
-      shells.componentOfVertex[v] = static_cast<std::uint32_t>(anchors.size());
+      components.componentOfVertex[v] = static_cast<std::uint32_t>(anchors.size());
       anchors.push_back(v);
-      shells.figures.emplace_back();
+      components.figures.emplace_back();
     } else {
-      shells.componentOfVertex[v] = shells.componentOfVertex[top];
+      components.componentOfVertex[v] = components.componentOfVertex[top];
     }
-    ++shells.figures[shells.componentOfVertex[v]].euler;
+    ++components.figures[components.componentOfVertex[v]].euler;
   }
   std::vector<std::size_t> faces(anchors.size(), 0);
   for (const auto& t : triangles) {
-    const std::uint32_t shell = shells.componentOfVertex[t[0]];
-    const Vector& anchor = positions[anchors[shell]];
+    const std::uint32_t component = components.componentOfVertex[t[0]];
+    const Vector& anchor = positions[anchors[component]];
     const Triple a = difference(positions[t[0]], anchor),
                  ab = difference(positions[t[1]], positions[t[0]]),
                  ac = difference(positions[t[2]], positions[t[0]]);
     const Triple normal = cross(ab, ac);
-    shells.figures[shell].volume += dot(a, normal) / 6;
-    shells.figures[shell].area += std::sqrt(dot(normal, normal)) / 2;
-    ++faces[shell];
+    components.figures[component].volume += dot(a, normal) / 6;
+    components.figures[component].area += std::sqrt(dot(normal, normal)) / 2;
+    ++faces[component];
   }
-  // 3F = 2E.
+  // Each edge has two triangles: 3F = 2E.
   for (std::size_t i = 0; i < faces.size(); ++i) {
-    shells.figures[i].euler -= static_cast<long>(faces[i] / 2);
+    components.figures[i].euler -= static_cast<long>(faces[i] / 2);
   }
-  return shells;
+  return components;
 }
 
 }  // namespace levelset

@@ -1,6 +1,6 @@
 #pragma once
 
-// Includes OpenVDB: for .cpp files only.
+// Includes OpenVDB, so include it from .cpp files only.
 
 #include <array>
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace levelset {
 
-/// Triangles in a tree of bounding boxes, to find the nearest of them.
+/// Triangles in a tree of bounding boxes, for nearest-triangle searches.
 class TriangleTree {
  public:
   using Triangle = std::array<openvdb::Vec3d, 3>;
@@ -24,7 +24,7 @@ class TriangleTree {
     double distance = 0;
     bool found = false;
   };
-  /// The nearest point of the triangles that is nearer than `limit`.
+  /// Nearest point on the triangles within `limit`.
   [[nodiscard]] Hit nearest(const openvdb::Vec3d& from, double limit) const;
 
  private:

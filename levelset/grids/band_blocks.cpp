@@ -54,7 +54,7 @@ void BandBlocks::write(const Field& field, double unit, FloatTree& tree) const {
 
 void BandBlocks::gather(const Field& field, std::size_t i, float outside,
                         PaddedBlock& block) const {
-  // Per axis: the pad before the leaf, the leaf, the pad after it.
+  // Ranges for each axis: the border before the leaf, the leaf, the border after it.
   constexpr int kFrom[3] = {-PaddedBlock::kPad, 0, 8}, kTo[3] = {0, 8, 8 + PaddedBlock::kPad};
   for (int bx = 0; bx < 3; ++bx)
     for (int by = 0; by < 3; ++by)

@@ -14,31 +14,31 @@
 
 namespace levelset::flow {
 
-/// One float a grid point of a leaf block.
+/// One float for each grid point of a leaf block.
 using Values = std::array<float, 512>;
-/// One block a leaf, in tree order.
+/// One block for each leaf, in tree order.
 using Field = std::vector<Values>;
 
-/// A leaf block and two grid points on each side of it, rows along z.
+/// A leaf block with a border of two grid points on each side; rows run along z.
 struct PaddedBlock {
   static constexpr int kPad = 2, kSide = 12, kRow = 16;
   static constexpr int kStepX = kSide * kRow, kStepY = kRow;
   alignas(64) std::array<float, kSide * kSide * kRow> values;
 
-  /// Where the grid point (x, y, z) of the leaf lies.
+  /// Address of the value at the grid point (x, y, z) of the leaf.
   [[nodiscard]] const float* at(int x, int y, int z) const {
     return values.data() + ((x + kPad) * kSide + y + kPad) * kRow + z + kPad;
   }
-  /// Sum of the values at the six neighbours of a grid point, by its offset in the leaf.
-  [[nodiscard]] float sixAround(openvdb::Index offset) const {
+  /// Sum of the values at the six neighbours of a grid point, given by its offset in the leaf.
+  [[nodiscard]] float neighbourSum(openvdb::Index offset) const {
     const auto n = static_cast<int>(offset);
     const float* p = at(n >> 6, n >> 3 & 7, n & 7);
     return p[kStepX] + p[-kStepX] + p[kStepY] + p[-kStepY] + p[1] + p[-1];
   }
 };
 
-/// The leaf blocks of a band and who borders on whom: fields on them are plain arrays, so that many
-/// can live side by side. The topology does not change.
+/// The leaf blocks of a band and their neighbours. Fields on the blocks are plain arrays, so that
+/// several can exist at the same time. The topology does not change.
 class BandBlocks {
  public:
   using LeafNode = openvdb::FloatTree::LeafNodeType;
@@ -50,18 +50,20 @@ class BandBlocks {
   [[nodiscard]] std::size_t size() const { return origins_.size(); }
   [[nodiscard]] const openvdb::Coord& origin(std::size_t i) const { return origins_[i]; }
   [[nodiscard]] const Mask& active(std::size_t i) const { return active_[i]; }
-  /// Number of a grid point, 512 × block + offset; kNone outside all blocks.
+  /// Number of a grid point: 512 × block + offset; kNone outside all blocks.
   [[nodiscard]] std::uint32_t find(const openvdb::Coord& gridPoint) const;
 
-  /// All values of the leaves of a tree of this topology, divided by `unit`.
+  /// Reads all leaf values of a tree of the same topology, divided by `unit`.
   [[nodiscard]] Field read(const openvdb::FloatTree& tree, double unit) const;
-  /// The active values back, times `unit`.
+  /// Writes the active values to the tree, multiplied by `unit`.
   void write(const Field& field, double unit, openvdb::FloatTree& tree) const;
 
-  /// @param outside  value beyond the blocks outside the solid; inside it is −outside
+  /// Copies a block and its border.
+  /// @param outside  value at border points beyond all blocks, outside the solid; −outside inside
+  ///         it
   void gather(const Field& field, std::size_t i, float outside, PaddedBlock& block) const;
 
-  /// Calls work(i, scratch) for each block, in parallel; `Scratch` is made once a task.
+  /// Calls work(i, scratch) for each block, in parallel. Each task has one `Scratch`.
   template <typename Scratch, typename Work>
   void forEach(const Work& work) const {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 16), [&](const auto& range) {
@@ -83,7 +85,8 @@ class BandBlocks {
   }
 
  private:
-  static constexpr std::int32_t kOutside = -1, kInside = -2;  // in place of a neighbour's number
+  static constexpr std::int32_t kOutside = -1, kInside = -2;  // replace the number of a missing
+                                                              // neighbour
 
   std::vector<openvdb::Coord> origins_;
   std::vector<Mask> active_;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Bands of distances that are given by a formula, for our own .cpp files.
+// Bands of distances given by a formula, for the .cpp files of this library.
 
 #include <tbb/parallel_for.h>
 
@@ -16,10 +16,12 @@
 
 namespace levelset {
 
-/// Fills a tree with a function that changes by at most one world unit per world unit. A block
-/// whose centre is further from the zero set than its corners are from its centre, by the band's
-/// width, holds no voxel of the band: it becomes a tile, and only the blocks near the surface are
-/// looked into. Blocks are independent, so the bits do not depend on the number of threads.
+/// Fills a tree with a function that changes by at most one world unit per world unit.
+///
+/// A block holds no voxel of the band if its centre lies far enough from the zero set: further than
+/// the half width plus the distance from centre to corner. It becomes a tile; only blocks near the
+/// surface are evaluated point by point. Blocks are independent, so the bits do not depend on the
+/// number of threads.
 /// @tparam Phi  double(double i, double j, double k): world distance at an index position
 template <typename Phi>
 class BlockFiller {
@@ -32,18 +34,18 @@ class BlockFiller {
         voxelSize_(grid.voxelSize()[0]),
         background_(grid.background()) {}
 
-  /// Leaves are made of these blocks only.
+  /// Limits the creation of leaves to these blocks.
   void limitTo(const openvdb::CoordBBox& blocks) { limit_ = blocks; }
 
-  /// Fills the 128³ blocks that meet `domain`; the rest stays as it was.
-  /// @return whether any grid point lies inside
+  /// Fills the 128³ blocks that meet `domain`; the rest stays unchanged.
+  /// @return true when a grid point lies inside
   bool fill(const openvdb::CoordBBox& domain, const Progress& progress, const char* action) {
     const openvdb::Coord first = domain.min() & ~(kRoot - 1);
     for (int x = first[0]; x <= domain.max()[0]; x += kRoot)
       for (int y = first[1]; y <= domain.max()[1]; y += kRoot)
         for (int z = first[2]; z <= domain.max()[2]; z += kRoot)
           descend(openvdb::Coord(x, y, z), kRoot, domain);
-    // In slices, so that a cancel is heard in time and from one thread.
+    // In slices, so that cancelling takes effect quickly and the reports come from one thread.
     constexpr std::size_t kSlice = 64;
     std::vector<Filled> slice(std::min(kSlice, surfaceBlocks_.size()));
     for (std::size_t from = 0; from < surfaceBlocks_.size(); from += kSlice) {
@@ -61,12 +63,12 @@ class BlockFiller {
   }
 
  private:
-  static constexpr int kRoot = 4096, kLower = 128, kLeaf = 8;  // edges of the tree's nodes
+  static constexpr int kRoot = 4096, kLower = 128, kLeaf = 8;  // edge lengths of the tree's nodes
   enum class Side { Inside, Outside, Near };
 
   struct Filled {
     std::vector<std::unique_ptr<Leaf>> leaves;
-    std::vector<openvdb::Coord> inside;  ///< leaf-sized tiles
+    std::vector<openvdb::Coord> inside;  ///< tiles of leaf size
     bool anyInside = false;
   };
 
@@ -78,7 +80,7 @@ class BlockFiller {
     return value < 0 ? Side::Inside : Side::Outside;
   }
 
-  /// From root blocks down to blocks of kLower, serially: there are few.
+  /// Descends from root blocks to blocks of kLower, serially, because there are few.
   void descend(const openvdb::Coord& origin, int edge, const openvdb::CoordBBox& domain) {
     if (!domain.hasOverlap(openvdb::CoordBBox::createCube(origin, edge))) return;
     const Side side = sideOf(origin, edge);

@@ -14,9 +14,9 @@ using openvdb::FloatTree;
 
 namespace {
 
-/// Replaces nodes by tiles where they are beyond the band and on one side of the surface. OpenVDB's
-/// pruneLevelSet() goes by a node's first value, which is right of closed bands alone: a part of
-/// one (crop.h) may end between the two sides.
+/// Replaces nodes by tiles where they lie beyond the band and on one side of the surface. OpenVDB's
+/// pruneLevelSet() uses a node's first value, which is valid for closed bands only. A cropped band
+/// (crop.h) may end between the two sides.
 class PruneOneSided {
  public:
   explicit PruneOneSided(float background) : background_(background) {}
@@ -76,7 +76,7 @@ void endBandAt(FloatGrid& grid, float background) {
 bool shareTransform(const FloatGrid& a, const FloatGrid& b) {
   openvdb::CoordBBox box = a.evalActiveVoxelBoundingBox();
   box.expand(b.evalActiveVoxelBoundingBox());
-  // OpenVDB compares transforms to 1e-7 world units, which may be more than a voxel.
+  // OpenVDB compares transforms with a tolerance of 1e-7 world units, which may exceed a voxel.
   if (box.empty()) return a.transform() == b.transform();
   std::array<openvdb::Coord, 8> corners;
   box.getCornerPoints(corners.data());

@@ -1,7 +1,7 @@
 #pragma once
 
-// Interpolation on the samples of a tree, for our own .cpp files: the sampler and the resampling
-// kernels share it.
+// Interpolation between the samples of a tree, for the .cpp files of this library. The sampler and
+// the resampling kernels share it.
 
 #include <algorithm>
 #include <array>
@@ -12,8 +12,9 @@
 
 namespace levelset {
 
-/// Weights of N = 2 (linear) or N = 4 (Catmull-Rom) samples at fraction t in [0, 1) past the sample
-/// that lies at or before the position, and their derivatives by t. They sum to 1 and to 0.
+/// Weights of N = 2 (linear) or N = 4 (Catmull-Rom) samples, and their derivatives by t. The
+/// position lies at fraction t in [0, 1) after the preceding sample. The weights sum to 1, the
+/// derivatives to 0.
 template <int N>
 struct AxisWeights {
   std::array<double, N> weight, slope;
@@ -32,11 +33,12 @@ struct AxisWeights {
   }
 };
 
-/// The N³ samples about an index position, x slowest, and where the position lies among them.
+/// The N³ samples around an index position, x slowest, and the fraction of the position among them.
 template <int N>
 struct SampleBlock {
-  static constexpr int kBefore = N / 2 - 1;  ///< samples before the one at or before the position
-  openvdb::Coord origin;                     ///< of the first sample
+  static constexpr int kBefore = N / 2 - 1;  ///< samples before the one at or just below the
+                                             ///< position
+  openvdb::Coord origin;                     ///< index coordinates of the first sample
   openvdb::Vec3d fraction;
   std::array<float, N * N * N> values;
 
@@ -45,7 +47,7 @@ struct SampleBlock {
     fetch(accessor);
   }
 
-  /// Without values: to ask only whether all samples are active.
+  /// Without values: only for allActive().
   explicit SampleBlock(const openvdb::Vec3d& index) {
     for (int axis = 0; axis < 3; ++axis) {
       const double cell = std::fmax(-kFarthest, std::fmin(kFarthest, std::floor(index[axis])));
@@ -75,7 +77,7 @@ struct SampleBlock {
     return true;
   }
 
-  /// Does any sample hold the bare background?
+  /// Returns true when a sample holds exactly ± background.
   [[nodiscard]] bool touches(float background) const {
     for (const float v : values)
       if (std::abs(v) == background) return true;
@@ -90,7 +92,7 @@ struct SampleBlock {
     return sum;
   }
 
-  /// By index coordinates.
+  /// Derivatives by the index coordinates.
   [[nodiscard]] openvdb::Vec3d gradient() const {
     const AxisWeights<N> wx(fraction[0]), wy(fraction[1]), wz(fraction[2]);
     openvdb::Vec3d sum(0, 0, 0);
@@ -106,14 +108,14 @@ struct SampleBlock {
   }
 
  private:
-  // Positions beyond any tree, NaN among them, still give a valid coordinate.
+  // Clamps positions far outside any tree, and NaN, to a valid coordinate.
   static constexpr double kFarthest = 2147483000.0;
 
   [[nodiscard]] bool isInOneLeaf() const {
     return (origin[0] & 7) <= 8 - N && (origin[1] & 7) <= 8 - N && (origin[2] & 7) <= 8 - N;
   }
 
-  /// Bits of N × N voxels in one x-slice of a leaf's mask (8 y rows of 8 z bits).
+  /// Bits of N × N voxels in one x-slice of a leaf's mask (8 rows along y, each of 8 bits along z).
   [[nodiscard]] std::uint64_t rowPattern() const {
     const std::uint64_t bits = ((std::uint64_t{1} << N) - 1) << (origin[2] & 7);
     std::uint64_t pattern = 0;
@@ -128,7 +130,7 @@ struct SampleBlock {
     return sum;
   }
 
-  /// Leaf by leaf: along each axis the samples lie in one leaf or in two.
+  /// Copies the samples leaf by leaf: along each axis they lie in one or two leaves.
   template <typename Accessor>
   void fetch(const Accessor& accessor) {
     openvdb::Coord from(0), to;

@@ -8,7 +8,7 @@
 namespace levelset {
 
 struct BandSampler::Impl {
-  NarrowBand band;  // keeps the tree alive under the accessor
+  NarrowBand band;  // keeps the tree of the accessor alive
   openvdb::FloatGrid::ConstAccessor accessor;
   std::optional<openvdb::FloatGrid::ConstAccessor> beyond;
   Interpolation interpolation;
@@ -34,7 +34,8 @@ struct BandSampler::Impl {
                                                      : SampleBlock<4>(accessor, index).value();
   }
 
-  /// A derivative by index coordinates is a covector: it goes to world by the transposed inverse.
+  /// Transforms a derivative by index coordinates, a covector, to world space: by the transposed
+  /// inverse.
   [[nodiscard]] Imath::V3d covectorToWorld(const openvdb::Vec3d& g) const {
     const Imath::M44d& m = worldToIndex;
     Imath::V3d world;

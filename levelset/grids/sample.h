@@ -10,11 +10,11 @@ namespace levelset {
 
 enum class Interpolation {
   Trilinear,
-  Tricubic  ///< Catmull-Rom, 64 samples: passes through the grid values, C¹
+  Tricubic  ///< Catmull-Rom, 64 samples: interpolates the grid values, C¹
 };
 
-/// Reads a band at world positions. Caches the path through the tree: cheap to make, one per
-/// thread. Outside the band the value is ± background and the gradient zero.
+/// Samples a band at world positions. Caches the path through the tree. Cheap to construct; use one
+/// per thread. Outside the band the value is ± background and the gradient zero.
 class BandSampler {
  public:
   explicit BandSampler(const NarrowBand& band,
@@ -26,12 +26,14 @@ class BandSampler {
   [[nodiscard]] double value(const Imath::V3d& world) const;
   /// Analytic gradient of the interpolant, world units per world unit.
   [[nodiscard]] Imath::V3d gradient(const Imath::V3d& world) const;
-  /// Unit normal by central differences of the interpolant one voxel apart; zero where it vanishes.
+  /// Unit normal by central differences of the interpolant, one voxel apart; zero where the
+  /// difference vanishes.
   [[nodiscard]] Imath::V3d normal(const Imath::V3d& world) const;
-  /// True when all grid points that value() reads are active.
+  /// Returns true when all grid points that value() reads are active.
   [[nodiscard]] bool isInBand(const Imath::V3d& world) const;
-  /// How far beyond the border of an open surface a place is to which the band goes on straight,
-  /// world units, trilinearly; 0 within the surface, of solids, and outside the band.
+  /// Distance of a point beyond the border of an open surface, where the band extends the surface
+  /// straight. World units, interpolated trilinearly. 0 within the surface, for solids, and outside
+  /// the band.
   [[nodiscard]] double beyondBorder(const Imath::V3d& world) const;
 
  private:

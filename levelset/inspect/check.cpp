@@ -19,12 +19,12 @@ using openvdb::FloatTree;
 using LeafNode = FloatTree::LeafNodeType;
 
 constexpr double kMeanResidualLimit = 0.1;
-/// Bounds of |∇φ|² at a zero crossing, those of openvdb::tools::checkLevelSet.
+/// Bounds of |∇φ|² at a zero crossing, from openvdb::tools::checkLevelSet.
 constexpr double kMinSquaredSlope = 0.5, kMaxSquaredSlope = 1.5;
-/// In a narrower band, only voxels at edges of the solid have all their neighbours in it.
+/// In a narrower band, only voxels at edges of the solid have all their neighbours in the band.
 constexpr double kMinHalfWidthForResidual = 2 - 1e-5;
 
-/// Values that fail a check: how many, and the first in tree order.
+/// Number of values that fail a check, and the first one in tree order.
 struct Finding {
   std::size_t count = 0;
   Coord where;
@@ -67,7 +67,8 @@ class SlopeStencil {
   explicit SlopeStencil(const FloatGrid& grid)
       : accessor_(grid.getConstAccessor()), inverse_(1 / grid.voxelSize()[0]) {}
 
-  /// False when a neighbour is outside the band: there is no slope to speak of.
+  /// Moves to a voxel. Returns false when a neighbour is outside the band, so that no slope is
+  /// defined.
   bool moveTo(const Coord& c, float value) {
     at_ = c;
     centre_ = static_cast<double>(value);
@@ -89,7 +90,8 @@ class SlopeStencil {
   [[nodiscard]] double inverseVoxel() const { return inverse_; }
   [[nodiscard]] bool hasCrossing() const { return hasCrossing_; }
 
-  /// Godunov's choice of one-sided differences, which looks towards the zero set.
+  /// Squared slope by Godunov's choice of the one-sided differences that point towards the zero
+  /// set.
   [[nodiscard]] double upwindSquaredSlope() const {
     double sum = 0;
     const double sign = centre_ < 0 ? -1 : 1;
@@ -102,8 +104,9 @@ class SlopeStencil {
     return sum;
   }
 
-  /// Can a slope between the one-sided differences of each axis have a square in [low, high]?
-  /// Beside an edge of the solid, where they differ much, any of them may be the right one.
+  /// Returns true when a slope between the one-sided differences of each axis can have a square in
+  /// [low, high]. Beside an edge of the solid these differences vary widely, and any slope between
+  /// them may be correct.
   [[nodiscard]] bool canHaveSquaredSlope(double low, double high) const {
     double least = 0, most = 0;
     for (const auto& pair : around_) {
@@ -114,8 +117,8 @@ class SlopeStencil {
     return least <= high && most >= low;
   }
 
-  /// Of |∇φ| from 1, with the differences that lead away from sheets thinner than two voxels, if
-  /// there is one beside: towards it, a difference goes across both of its sides.
+  /// Deviation of |∇φ| from 1 beside a sheet thinner than two voxels; nullopt where there is none.
+  /// Uses the differences away from the sheet: a difference towards it spans both of its sides.
   [[nodiscard]] std::optional<double> residualBesideSheet() const {
     const bool isInside = centre_ < 0;
     double sum = 0;
@@ -180,8 +183,8 @@ void checkLeaf(const LeafNode& leaf, float background, SlopeStencil& stencil, Le
       out.badSlope.add(c, static_cast<float>(std::sqrt(upwind)));
     }
     if (!measureResidual) continue;
-    // Where distances meet from two sides only one-sided differences are right; elsewhere central
-    // ones are more exact. A field of the wrong slope fails by either.
+    // Where distances from two sides meet, only one-sided differences are correct. Elsewhere
+    // central differences are more accurate. A field of wrong slope fails both.
     double residual = std::min(std::abs(std::sqrt(upwind) - 1),
                                std::abs(std::sqrt(stencil.centralSquaredSlope()) - 1));
     if (stencil.hasCrossing())
@@ -220,7 +223,7 @@ LeafFindings checkLeaves(const FloatGrid& grid, const Progress& progress) {
   return total;
 }
 
-/// Tiles with their faults; active ones are found apart.
+/// Checks the values of tiles. Active tiles are counted separately.
 void checkTiles(const FloatGrid& grid, Finding& active, LeafFindings& out) {
   const float background = grid.background();
   for (auto tile = grid.tree().cbeginValueAll(); tile; ++tile) {
@@ -237,7 +240,7 @@ void checkTiles(const FloatGrid& grid, Finding& active, LeafFindings& out) {
 
 CheckItem checkBackground(const FloatGrid& grid) {
   const double voxels = static_cast<double>(grid.background()) / grid.voxelSize()[0];
-  // Rounded to float, a half width of one voxel may fall a little short.
+  // Rounded to float, a half width of one voxel may be slightly too small.
   if (std::isfinite(voxels) && voxels >= 1 - 1e-5) return {"positive background", true, ""};
   return {"positive background", false,
           fmt::format("the background is {}, which is {} voxels; it needs at least one",

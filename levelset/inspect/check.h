@@ -11,7 +11,7 @@ namespace levelset {
 struct CheckItem {
   std::string name;  ///< "positive background"
   bool passed = false;
-  std::string detail;  ///< what was found where, when it failed
+  std::string detail;  ///< fault and position, if the check failed
 };
 
 struct CheckReport {
@@ -21,10 +21,12 @@ struct CheckReport {
   [[nodiscard]] bool passed() const;
 };
 
-/// The nine checks of openvdb::tools::checkLevelSet, one item each, and the eikonal residual of the
-/// band (fails when its mean passes 0.1). They differ from OpenVDB where those fault sound bands: a
-/// half width of one voxel is enough, and beside an edge of the solid, where one-sided slopes
-/// differ, any between them may be the right one.
+/// Runs the nine checks of openvdb::tools::checkLevelSet, one item each, and checks the eikonal
+/// residual of the band. The residual fails when its mean exceeds 0.1.
+///
+/// Two checks differ from OpenVDB's, which reject valid bands. A half width of one voxel suffices.
+/// Beside an edge of the solid the one-sided slopes differ, and any slope between them may be
+/// correct.
 [[nodiscard]] CheckReport check(const NarrowBand& solid, const Progress& progress = {});
 
 }  // namespace levelset

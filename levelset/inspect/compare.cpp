@@ -30,7 +30,7 @@ using openvdb::Vec3d;
 using Sample = CurvedSurface::Sample;
 constexpr std::size_t kSampleChunk = 2048;
 
-/// Calls work(chunk, first, end) for chunks of so many things, in parallel.
+/// Calls work(chunk, first, end) for chunks of samples, in parallel.
 template <typename Work>
 void forEachChunk(std::size_t count, const Progress& progress, const Work& work) {
   const std::size_t chunks = (count + kSampleChunk - 1) / kSampleChunk;
@@ -41,7 +41,7 @@ void forEachChunk(std::size_t count, const Progress& progress, const Work& work)
   });
 }
 
-/// The zero set of one solid: samples of it, and what distances to it are measured by.
+/// The zero set of one solid: its samples, and the data for distance queries.
 class ZeroSet {
  public:
   ZeroSet(const NarrowBand& solid, const Progress& progress)
@@ -65,12 +65,13 @@ class ZeroSet {
   using Cache = eikonal::DenseBlockCache;
   [[nodiscard]] Cache makeCache() const { return Cache(*field_); }
   [[nodiscard]] bool isEmpty() const { return points_.size() == 0; }
-  /// Index space.
+  /// Samples in index space.
   [[nodiscard]] const std::vector<Sample>& samples() const { return samples_; }
   [[nodiscard]] Vec3d toWorld(const Vec3d& index) const { return transform_->indexToWorld(index); }
 
-  /// World units. By Newton's method from the nearest known point and, close to the surface, from
-  /// where the query is itself; at edges, which it does not find its way about, by the triangles.
+  /// Distance of a point to the zero set, world units. Newton's method starts from the nearest
+  /// known point and, close to the surface, also from the query point. It may fail at edges, so the
+  /// flat triangles there are tested as well.
   [[nodiscard]] double distance(const Vec3d& world, Cache& cache) const {
     const Vec3d query = transform_->worldToIndex(world);
     const Vec3d start = points_.positions[tree_.nearest(query, std::numeric_limits<double>::max())];
@@ -88,7 +89,7 @@ class ZeroSet {
   }
 
  private:
-  /// Voxels.
+  /// Voxels: distance below which Newton's method also starts from the query point.
   static constexpr double kOwnStart = 1.5;
 
   struct Points {

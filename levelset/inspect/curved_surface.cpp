@@ -13,19 +13,21 @@ namespace {
 
 using openvdb::Vec3d;
 
-/// Half width, voxels, from which on the tricubic stencil beside the surface lies in the band.
+/// Minimum half width, voxels, at which the tricubic stencil beside the surface lies in the band.
 constexpr double kTricubicHalfWidth = 3;
-/// How far the surface may be from the triangle, in voxels.
+/// Maximum distance of the surface from the triangle, in voxels.
 constexpr double kLargestLift = 0.4;
-/// Normals of a triangle's corners further from its own: an edge of the solid passes.
+/// Minimum cosine between the normals at the corners of a triangle and its own normal. A lower
+/// value indicates an edge of the solid.
 constexpr double kSmoothCosine = 0.85;
 constexpr int kLiftSteps = 4;
-constexpr double kLiftTolerance = 1e-3;  // voxels: Newton's last step; what is left is its square
+constexpr double kLiftTolerance = 1e-3;  // voxels: limit of Newton's last step; the remaining error
+                                         // is its square
 
 struct QuadratureNode {
   double u, v, weight;
 };
-/// Degree four on the triangle [Dunavant85]; weights sum to 1.
+/// Quadrature rule of degree four on the triangle [Dunavant85]; weights sum to 1.
 constexpr double kNear = 0.445948490915965, kFar = 0.091576213509771,
                  kNearWeight = 0.223381589678011, kFarWeight = 0.109951743655322;
 constexpr std::array<QuadratureNode, 6> kRule = {{{kNear, kNear, kNearWeight},
@@ -39,7 +41,7 @@ Vec3d toDouble(const openvdb::Vec3f& v) {
   return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
 }
 
-/// Adds what a piece of surface at p brings, `a` being its area vector.
+/// Adds the contribution of a surface element at p with the area vector `a`.
 void addPiece(SurfaceMoments& sum, const Vec3d& p, const Vec3d& a) {
   sum.volume += p.dot(a) / 3;
   sum.area += a.length();
@@ -108,7 +110,7 @@ bool CurvedSurface::isSmooth(std::size_t triangle) const {
   const auto& t = mesh_.triangles[triangle];
   Vec3d own = (mesh_.positions[t[1]] - mesh_.positions[t[0]])
                   .cross(mesh_.positions[t[2]] - mesh_.positions[t[0]]);
-  // Of a sliver, the corners tell more than the triangle.
+  // For a sliver, the normal at a corner is more reliable than that of the triangle.
   if (own.length() < 0.05) own = toDouble(normals_[t[0]]);
   own.normalize();
   return std::all_of(t.begin(), t.end(), [&](std::uint32_t v) {
@@ -146,8 +148,8 @@ CurvedSurface::Node CurvedSurface::node(std::size_t triangle, bool bends, double
       break;
     }
   }
-  // (k1 + k2) dA = n · (n_u × S_v + S_u × n_v), by the interpolated normals: across an edge of the
-  // solid they turn by its angle.
+  // (k1 + k2) dA = n · (n_u × S_v + S_u × n_v), with the interpolated normals: across an edge of
+  // the solid they turn by its angle.
   const double length = normal.length();
   if (length > 0.1) {
     const Vec3d unit = normal / length;

@@ -21,59 +21,65 @@ using openvdb::Vec3d;
 
 constexpr const char* kMeasure = "measure";
 
-/// Sums over the triangles of each shell: chunk by chunk, and the chunks in their order.
-/// @param piece  (triangle, anchor, worker) of one triangle; @param makeWorker  one for each chunk
+/// Sums moments over the triangles of each surface component, chunk by chunk, and adds the chunks
+/// in order.
+/// @param piece  (triangle, anchor, worker): moments of one triangle
+/// @param makeWorker  creates the scratch data of a chunk
 template <typename MakeWorker, typename Piece>
-std::vector<SurfaceMoments> sumShells(const std::vector<std::uint32_t>& shellOfTriangle,
-                                      const std::vector<Vec3d>& anchors, const Progress& progress,
-                                      const MakeWorker& makeWorker, const Piece& piece) {
+std::vector<SurfaceMoments> sumComponents(const std::vector<std::uint32_t>& componentOfTriangle,
+                                          const std::vector<Vec3d>& anchors,
+                                          const Progress& progress, const MakeWorker& makeWorker,
+                                          const Piece& piece) {
   constexpr std::size_t kChunk = 4096;
   struct Part {
-    std::uint32_t shell;
+    std::uint32_t component;
     SurfaceMoments sum;
   };
-  const std::size_t count = shellOfTriangle.size();
+  const std::size_t count = componentOfTriangle.size();
   std::vector<std::vector<Part>> parts((count + kChunk - 1) / kChunk);
   ProgressGate gate(progress, parts.size(), kMeasure);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t chunk) {
     auto worker = makeWorker();
     const std::size_t end = std::min(count, (chunk + 1) * kChunk);
     for (std::size_t i = chunk * kChunk; i < end; ++i) {
-      const std::uint32_t shell = shellOfTriangle[i];
-      if (parts[chunk].empty() || parts[chunk].back().shell != shell)
-        parts[chunk].push_back({shell, {}});
-      parts[chunk].back().sum.add(piece(i, anchors[shell], worker));
+      const std::uint32_t component = componentOfTriangle[i];
+      if (parts[chunk].empty() || parts[chunk].back().component != component)
+        parts[chunk].push_back({component, {}});
+      parts[chunk].back().sum.add(piece(i, anchors[component], worker));
     }
     gate.advance(1);
   });
   std::vector<SurfaceMoments> sums(anchors.size());
   for (const auto& chunk : parts)
-    for (const Part& part : chunk) sums[part.shell].add(part.sum);
+    for (const Part& part : chunk) sums[part.component].add(part.sum);
   return sums;
 }
 
-/// A vertex of each shell: near to all of it, however far the shells are from each other.
+/// Anchors for the moments: a vertex of each surface component. It is close to its component even
+/// if the components are far apart.
 template <typename Vector>
-std::vector<Vec3d> shellAnchors(const SurfaceComponents& shells,
-                                const std::vector<Vector>& positions) {
-  std::vector<Vec3d> anchors(shells.figures.size());
+std::vector<Vec3d> componentAnchors(const SurfaceComponents& components,
+                                    const std::vector<Vector>& positions) {
+  std::vector<Vec3d> anchors(components.figures.size());
   for (std::size_t v = positions.size(); v-- > 0;) {
-    const std::uint32_t shell = shells.componentOfVertex[v];
-    if (shell != SurfaceComponents::kNoComponent)
-      anchors[shell] = Vec3d(positions[v][0], positions[v][1], positions[v][2]);
+    const std::uint32_t component = components.componentOfVertex[v];
+    if (component != SurfaceComponents::kNoComponent)
+      anchors[component] = Vec3d(positions[v][0], positions[v][1], positions[v][2]);
   }
   return anchors;
 }
 
-std::vector<std::uint32_t> shellsOfTriangles(
-    const SurfaceComponents& shells, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+std::vector<std::uint32_t> componentsOfTriangles(
+    const SurfaceComponents& components,
+    const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   std::vector<std::uint32_t> result;
   result.reserve(triangles.size());
-  for (const auto& t : triangles) result.push_back(shells.componentOfVertex[t[0]]);
+  for (const auto& t : triangles) result.push_back(components.componentOfVertex[t[0]]);
   return result;
 }
 
-/// @param anchor  that the moments are about; @param scale  the length of a unit in the world
+/// @param anchor  reference point of the moments
+/// @param scale  length of an index unit in the world
 void describeMoments(const SurfaceMoments& whole, const Vec3d& anchor, const Imath::M44d& toWorld,
                      double scale, Measurement& result) {
   result.volume = whole.volume * scale * scale * scale;
@@ -94,16 +100,17 @@ void describeMoments(const SurfaceMoments& whole, const Vec3d& anchor, const Ima
     for (int j = 0; j < 3; ++j) result.inertia[i][j] = (i == j ? trace : 0) - turned[i][j];
 }
 
-void describeShells(const SurfaceComponents& shells, const std::vector<SurfaceMoments>& sums,
-                    const std::vector<Vec3d>& anchors, const Imath::M44d& toWorld, double scale,
-                    Measurement& result) {
+void describeComponents(const SurfaceComponents& components,
+                        const std::vector<SurfaceMoments>& sums, const std::vector<Vec3d>& anchors,
+                        const Imath::M44d& toWorld, double scale, Measurement& result) {
   if (anchors.empty()) return;
   SurfaceMoments whole;
   for (std::size_t i = 0; i < sums.size(); ++i) {
-    result.euler += shells.figures[i].euler;
-    ++result.shells;
-    // By flat triangles: what bends by more than a voxel may have a volume of the wrong sign else.
-    const double volume = shells.figures[i].volume;
+    result.euler += components.figures[i].euler;
+    ++result.surfaces;
+    // The volume of the flat triangles decides: where the surface bends by more than a voxel, the
+    // curved volume may have the wrong sign.
+    const double volume = components.figures[i].volume;
     if (volume > 0) ++result.components;
     if (volume < 0) ++result.cavities;
     whole.add(sums[i].about(anchors[0] - anchors[i]));
@@ -147,7 +154,7 @@ double edgeCurvature(const TriMesh& mesh) {
   return sum;
 }
 
-/// Where attributes may have doubled vertices, and have.
+/// The mesh with closed seams, if attributes may have doubled vertices and did so.
 std::optional<TriMesh> withoutItsSeams(const TriMesh& mesh) {
   if (mesh.attributes.isEmpty()) return std::nullopt;
   return withoutSeams(mesh, kMeasure, memoryLimit(kNoMemoryLimit));
@@ -155,8 +162,8 @@ std::optional<TriMesh> withoutItsSeams(const TriMesh& mesh) {
 
 }  // namespace
 
-// The figures are those of the surface in index space: near to the numbers' origin, so that a part
-// far away in the world measures the same.
+// Computed in index space, near the origin, so that a part far from the world origin has the same
+// measurements.
 Measurement measure(const NarrowBand& solid, const Progress& progress) {
   requireSolid(solid, kMeasure);
   report(progress, 0, kMeasure);
@@ -167,18 +174,19 @@ Measurement measure(const NarrowBand& solid, const Progress& progress) {
   if (solid.isEmpty()) return result;
   const IndexMesh mesh = marchCells(CellSurface(vdb(solid)));
   report(progress, 0.2, kMeasure);
-  const SurfaceComponents shells = findSurfaceComponents(mesh.positions, mesh.triangles);
-  const std::vector<Vec3d> anchors = shellAnchors(shells, mesh.positions);
+  const SurfaceComponents components = findSurfaceComponents(mesh.positions, mesh.triangles);
+  const std::vector<Vec3d> anchors = componentAnchors(components, mesh.positions);
   report(progress, 0.3, kMeasure);
   const CurvedSurface surface(mesh, vdb(solid));
   const Progress last = subProgress(progress, 0.4, 1);
-  const std::vector<SurfaceMoments> sums = sumShells(
-      shellsOfTriangles(shells, mesh.triangles), anchors, last, [&] { return surface.makeCache(); },
+  const std::vector<SurfaceMoments> sums = sumComponents(
+      componentsOfTriangles(components, mesh.triangles), anchors, last,
+      [&] { return surface.makeCache(); },
       [&](std::size_t i, const Vec3d& anchor, CurvedSurface::Cache& cache) {
         return surface.moments(i, anchor, cache);
       });
   const Imath::M44d matrix = solid.indexToWorld();
-  describeShells(shells, sums, anchors, matrix, result.voxelSize, result);
+  describeComponents(components, sums, anchors, matrix, result.voxelSize, result);
   for (const Vec3d& p : mesh.positions) result.bounds.extendBy(toImath(p) * matrix);
   return result;
 }
@@ -187,18 +195,18 @@ Measurement measure(const TriMesh& mesh, const Progress& progress) {
   report(progress, 0, kMeasure);
   if (const auto closed = withoutItsSeams(mesh)) return measure(*closed, progress);
   Measurement result;
-  const SurfaceComponents shells = findSurfaceComponents(mesh.positions, mesh.triangles);
-  const std::vector<Vec3d> anchors = shellAnchors(shells, mesh.positions);
+  const SurfaceComponents components = findSurfaceComponents(mesh.positions, mesh.triangles);
+  const std::vector<Vec3d> anchors = componentAnchors(components, mesh.positions);
   const Progress middle = subProgress(progress, 0.3, 0.6);
-  const std::vector<SurfaceMoments> sums = sumShells(
-      shellsOfTriangles(shells, mesh.triangles), anchors, middle, [] { return 0; },
+  const std::vector<SurfaceMoments> sums = sumComponents(
+      componentsOfTriangles(components, mesh.triangles), anchors, middle, [] { return 0; },
       [&](std::size_t i, const Vec3d& anchor, int) {
         const auto& t = mesh.triangles[i];
         return flatTriangleMoments(toVdb(mesh.positions[t[0]]) - anchor,
                                    toVdb(mesh.positions[t[1]]) - anchor,
                                    toVdb(mesh.positions[t[2]]) - anchor);
       });
-  describeShells(shells, sums, anchors, Imath::M44d(), 1, result);
+  describeComponents(components, sums, anchors, Imath::M44d(), 1, result);
   result.meanCurvature = edgeCurvature(mesh);
   result.bounds = bounds(mesh);
   report(progress, 1, kMeasure);
@@ -207,7 +215,7 @@ Measurement measure(const TriMesh& mesh, const Progress& progress) {
 
 namespace {
 
-/// The corners of the triangles at each vertex: for each, the vertices after and before it.
+/// The triangle corners at each vertex: for each corner, the vertices after and before it.
 struct VertexFans {
   std::vector<std::size_t> first;
   std::vector<std::array<std::uint32_t, 2>> spokes;
@@ -229,11 +237,11 @@ VertexFans collectFans(const TriMesh& mesh) {
   return fans;
 }
 
-/// Judges the edges from `vertex` to higher ones, and the vertex itself.
-class FanJudge {
+/// Classifies the edges from `vertex` to vertices of higher index, and the vertex itself.
+class FanClassifier {
  public:
-  void judge(std::uint32_t vertex, const std::array<std::uint32_t, 2>* begin, std::size_t count,
-             Manifoldness& out) {
+  void classify(std::uint32_t vertex, const std::array<std::uint32_t, 2>* begin, std::size_t count,
+                Manifoldness& out) {
     if (!count) return;
     spokes_.clear();
     for (std::size_t i = 0; i < count; ++i) {
@@ -249,10 +257,10 @@ class FanJudge {
     for (std::size_t i = 0, end = 0; i < spokes_.size(); i = end) {
       std::size_t leaving = 0;
       for (end = i; end < spokes_.size() && spokes_[end].to == spokes_[i].to; ++end) {
-        leaving += spokes_[end].leaves;
+        leaving += spokes_[end].isOutgoing;
         fans -= join(spokes_[i].triangle, spokes_[end].triangle);
       }
-      if (vertex <= spokes_[i].to) judgeEdge(vertex, spokes_[i].to, end - i, leaving, out);
+      if (vertex <= spokes_[i].to) classifyEdge(vertex, spokes_[i].to, end - i, leaving, out);
     }
     out.nonManifoldVertices += fans > 1;
   }
@@ -261,11 +269,11 @@ class FanJudge {
   struct Spoke {
     std::uint32_t to;
     std::size_t triangle;
-    bool leaves;  ///< the triangle runs from the vertex to `to`
+    bool isOutgoing;  ///< true when the triangle traverses the edge from the vertex to `to`
   };
 
-  static void judgeEdge(std::uint32_t from, std::uint32_t to, std::size_t faces,
-                        std::size_t leaving, Manifoldness& out) {
+  static void classifyEdge(std::uint32_t from, std::uint32_t to, std::size_t faces,
+                           std::size_t leaving, Manifoldness& out) {
     if (from == to || faces > 2) {
       ++out.nonManifoldEdges;
     } else if (faces == 1) {
@@ -297,11 +305,11 @@ Manifoldness manifoldness(const TriMesh& mesh) {
   constexpr std::size_t kChunk = 1 << 14;
   std::vector<Manifoldness> parts((mesh.positions.size() + kChunk - 1) / kChunk);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t part) {
-    FanJudge judge;
+    FanClassifier classifier;
     const std::size_t end = std::min(mesh.positions.size(), (part + 1) * kChunk);
     for (std::size_t v = part * kChunk; v < end; ++v) {
-      judge.judge(static_cast<std::uint32_t>(v), fans.spokes.data() + fans.first[v],
-                  fans.first[v + 1] - fans.first[v], parts[part]);
+      classifier.classify(static_cast<std::uint32_t>(v), fans.spokes.data() + fans.first[v],
+                          fans.first[v + 1] - fans.first[v], parts[part]);
     }
   });
   Manifoldness total;

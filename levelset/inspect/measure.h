@@ -12,33 +12,36 @@
 namespace levelset {
 
 struct Measurement {
-  double volume = 0;    ///< of the solid, cavities subtracted, world units³
-  double area = 0;      ///< of all its surfaces, world units²
-  Imath::Box3d bounds;  ///< of the zero set
+  double volume = 0;    ///< volume of the solid without its cavities, world units³
+  double area = 0;      ///< area of all its surfaces, world units²
+  Imath::Box3d bounds;  ///< bounds of the zero set, world units
   std::size_t activeVoxels = 0;
   double voxelSize = 0, halfWidth = 0;
-  std::size_t components = 0, shells = 0, cavities = 0;
-  long euler = 0;                       ///< V − E + F of the surface: 2 per sphere, 0 per torus
-  Imath::V3d centroid = Imath::V3d(0);  ///< of the solid, world; zero when the volume is
-  /// Of the solid with density 1 about its centroid, along the world's axes, world units⁵.
+  std::size_t components = 0, surfaces = 0, cavities = 0;
+  long euler = 0;  ///< Euler characteristic V − E + F of the surface: 2 per sphere, 0 per torus
+  Imath::V3d centroid = Imath::V3d(0);  ///< centroid of the solid, world units; zero for zero
+                                        ///< volume
+  /// Inertia tensor of the solid with density 1 about its centroid, along the world axes, world
+  /// units⁵.
   Imath::M33d inertia = Imath::M33d(0.0);
   double meanCurvature = 0;  ///< ∫ (k1 + k2) / 2 dA, world units: 4πR for a sphere
 };
 
-/// By quadrature on the zero set of the tricubic interpolant: on smooth surfaces better than third
-/// order in the voxel size, along edges second, as a grid shows them. Sums run in a fixed order.
-/// An empty band measures zero.
+/// Measures a solid by quadrature on the zero set of the tricubic interpolant. The error is better
+/// than third order in the voxel size on smooth surfaces, and second order along edges. Sums run in
+/// a fixed order. An empty band measures zero.
 /// @throws InvalidInput for an open surface
 [[nodiscard]] Measurement measure(const NarrowBand& solid, const Progress& progress = {});
 
-/// The same figures of a triangle mesh, exact for its flat triangles. `components` counts connected
-/// surfaces that face outwards. Volume, centroid and inertia mean something for a closed mesh only;
-/// the curvature is that of its edges, half the length times the angle [Steiner40]. Seams of
+/// Measures a triangle mesh, exactly for its flat triangles. `components` counts the connected
+/// surfaces that face outwards. Volume, centroid and inertia are meaningful for a closed mesh only.
+/// The curvature is that of the edges: half the length times the angle [Steiner40]. Seams of
 /// attributes count as closed (withoutSeams).
 [[nodiscard]] Measurement measure(const TriMesh& mesh, const Progress& progress = {});
 
-/// Is every edge shared by exactly two triangles that run along it in opposite directions, and
-/// every vertex the centre of one fan? Seams of attributes count as closed (withoutSeams).
+/// Defects of a mesh. In a closed manifold, exactly two triangles share each edge and traverse it
+/// in opposite directions. The triangles at each vertex form one fan. Seams of attributes count as
+/// closed (withoutSeams).
 struct Manifoldness {
   std::size_t boundaryEdges = 0, nonManifoldEdges = 0, misorientedEdges = 0,
               nonManifoldVertices = 0;

@@ -34,10 +34,10 @@ TriangleTree treeOf(const TriMesh& mesh) {
   return TriangleTree(std::move(triangles));
 }
 
-/// Samples in one task, whose neighbours are neighbours in space as a rule.
+/// Samples per task. Consecutive samples are usually close in space.
 constexpr std::size_t kDifferenceChunk = 1024;
-/// A side is cut into so many parts at the most: triangles of decimated meshes may be long.
-constexpr double kMostParts = 256;
+/// Maximum number of parts of a triangle's side: triangles of decimated meshes may be long.
+constexpr double kMaxParts = 256;
 
 struct DifferenceSums {
   double smooth = 0, crease = 0;
@@ -51,14 +51,15 @@ struct DifferenceSums {
   }
 };
 
-/// Measures one sample after another. The distance changes by no more than the way between two of
-/// them, which tells the search where to end.
-class SampleWalk {
+/// Measures samples one after another. The distance changes by at most the distance between two
+/// samples, which bounds the search.
+class SampleScan {
  public:
-  SampleWalk(const TriangleSurface& target, const eikonal::PointTree* creases, double reach)
+  SampleScan(const TriangleSurface& target, const eikonal::PointTree* creases, double reach)
       : target_(target), creases_(creases), reach_(reach) {}
 
-  /// @return the distance; 0 beside a crease
+  /// Measures one sample.
+  /// @return the distance; 0 near a crease
   double visit(const V3d& point) {
     const double limit =
         sums_.samples == 0 ? std::numeric_limits<double>::max() : last_ + (point - at_).length();
@@ -84,34 +85,35 @@ class SampleWalk {
   DifferenceSums sums_;
 };
 
+/// Measures the midpoints of the parts of a triangle.
 /// @return the largest distance
-double visitMiddles(const V3d& a, const V3d& b, const V3d& c, double spacing, SampleWalk& walk) {
+double visitMiddles(const V3d& a, const V3d& b, const V3d& c, double spacing, SampleScan& scan) {
   const double longest =
       std::sqrt(std::max({(b - a).length2(), (c - b).length2(), (a - c).length2()}));
-  const int parts = static_cast<int>(std::clamp(std::ceil(longest / spacing), 1.0, kMostParts));
+  const int parts = static_cast<int>(std::clamp(std::ceil(longest / spacing), 1.0, kMaxParts));
   const V3d u = (b - a) / parts, v = (c - a) / parts;
   double largest = 0;
   for (int i = 0; i < parts; ++i)
     for (int j = 0; i + j < parts; ++j) {
-      largest = std::max(largest, walk.visit(a + u * (i + 1 / 3.0) + v * (j + 1 / 3.0)));
+      largest = std::max(largest, scan.visit(a + u * (i + 1 / 3.0) + v * (j + 1 / 3.0)));
       if (i + j + 1 < parts)
-        largest = std::max(largest, walk.visit(a + u * (i + 2 / 3.0) + v * (j + 2 / 3.0)));
+        largest = std::max(largest, scan.visit(a + u * (i + 2 / 3.0) + v * (j + 2 / 3.0)));
     }
   return largest;
 }
 
-/// Calls work(i, walk) for each i below `count`, in parallel, and adds up what is found.
+/// Calls work(i, scan) for each i below `count`, in parallel, and sums the results.
 template <typename Work>
-DifferenceSums walkAll(std::size_t count, const SampleWalk& fresh, const Progress& progress,
+DifferenceSums scanAll(std::size_t count, const SampleScan& fresh, const Progress& progress,
                        const Work& work) {
   const std::size_t chunks = (count + kDifferenceChunk - 1) / kDifferenceChunk;
   std::vector<DifferenceSums> parts(chunks);
   ProgressGate gate(progress, std::max<std::size_t>(1, chunks), "tolerance");
   tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
-    SampleWalk walk = fresh;
+    SampleScan scan = fresh;
     const std::size_t end = std::min(count, (chunk + 1) * kDifferenceChunk);
-    for (std::size_t i = chunk * kDifferenceChunk; i < end; ++i) work(i, walk);
-    parts[chunk] = walk.sums();
+    for (std::size_t i = chunk * kDifferenceChunk; i < end; ++i) work(i, scan);
+    parts[chunk] = scan.sums();
     gate.advance(1);
   });
   DifferenceSums sums;
@@ -119,60 +121,61 @@ DifferenceSums walkAll(std::size_t count, const SampleWalk& fresh, const Progres
   return sums;
 }
 
-/// The triangles with the largest distances, of those that come near to the largest of all.
+/// Numbers of the triangles whose distances come close to the largest of all; the 4,096 largest at
+/// most.
 std::vector<std::uint32_t> farthest(const std::vector<float>& distances, double largest) {
   constexpr double kLargePart = 0.75;
-  constexpr std::size_t kMost = 4096;
+  constexpr std::size_t kMaxCount = 4096;
   std::vector<std::uint32_t> numbers;
   for (std::size_t i = 0; i < distances.size(); ++i)
     if (distances[i] > 0 && distances[i] >= kLargePart * largest)
       numbers.push_back(static_cast<std::uint32_t>(i));
-  if (numbers.size() > kMost) {
-    std::nth_element(numbers.begin(), numbers.begin() + kMost, numbers.end(),
+  if (numbers.size() > kMaxCount) {
+    std::nth_element(numbers.begin(), numbers.begin() + kMaxCount, numbers.end(),
                      [&](std::uint32_t a, std::uint32_t b) {
                        return distances[a] > distances[b] ||
                               (distances[a] == distances[b] && a < b);
                      });
-    numbers.resize(kMost);
+    numbers.resize(kMaxCount);
     std::sort(numbers.begin(), numbers.end());
   }
   return numbers;
 }
 
-/// Everywhere at the spacing that was asked for, and where distances are largest four times as
-/// densely, so that the largest is not missed by more than a hundredth or so.
+/// Measures everywhere at the requested spacing, and four times as densely where distances are
+/// largest. The error of the largest distance is then about one percent.
 DifferenceSums differenceTo(const TriangleSurface& target, const TriangleSurface& surface,
                             const eikonal::PointTree* creases,
                             const SurfaceDifferenceOptions& options, const Progress& progress) {
   constexpr double kDenser = 4;
   const TriMesh& mesh = surface.mesh();
-  const SampleWalk fresh(target, creases, options.creaseReach);
+  const SampleScan fresh(target, creases, options.creaseRadius);
   std::vector<float> atVertices(mesh.positions.size()), ofTriangles(mesh.triangles.size());
-  DifferenceSums sums = walkAll(mesh.positions.size(), fresh, subProgress(progress, 0, 0.3),
-                                [&](std::size_t i, SampleWalk& walk) {
-                                  atVertices[i] = static_cast<float>(walk.visit(mesh.positions[i]));
+  DifferenceSums sums = scanAll(mesh.positions.size(), fresh, subProgress(progress, 0, 0.3),
+                                [&](std::size_t i, SampleScan& scan) {
+                                  atVertices[i] = static_cast<float>(scan.visit(mesh.positions[i]));
                                 });
-  const auto visit = [&](std::size_t i, double spacing, SampleWalk& walk) {
+  const auto visit = [&](std::size_t i, double spacing, SampleScan& scan) {
     const auto& [a, b, c] = mesh.triangles[i];
-    return visitMiddles(mesh.positions[a], mesh.positions[b], mesh.positions[c], spacing, walk);
+    return visitMiddles(mesh.positions[a], mesh.positions[b], mesh.positions[c], spacing, scan);
   };
-  sums.add(walkAll(mesh.triangles.size(), fresh, subProgress(progress, 0.3, 0.9),
-                   [&](std::size_t i, SampleWalk& walk) {
+  sums.add(scanAll(mesh.triangles.size(), fresh, subProgress(progress, 0.3, 0.9),
+                   [&](std::size_t i, SampleScan& scan) {
                      const auto& [a, b, c] = mesh.triangles[i];
-                     ofTriangles[i] = std::max({static_cast<float>(visit(i, options.spacing, walk)),
+                     ofTriangles[i] = std::max({static_cast<float>(visit(i, options.spacing, scan)),
                                                 atVertices[a], atVertices[b], atVertices[c]});
                    }));
   const std::vector<std::uint32_t> dense = farthest(ofTriangles, sums.smooth);
-  const DifferenceSums again = walkAll(
+  const DifferenceSums again = scanAll(
       dense.size(), fresh, subProgress(progress, 0.9, 1),
-      [&](std::size_t i, SampleWalk& walk) { visit(dense[i], options.spacing / kDenser, walk); });
+      [&](std::size_t i, SampleScan& scan) { visit(dense[i], options.spacing / kDenser, scan); });
   sums.smooth = std::max(sums.smooth, again.smooth);
   sums.crease = std::max(sums.crease, again.crease);
   return sums;
 }
 
-/// By vertex: the angle between two planes that would scatter the normals as those around it are
-/// scattered, within two rings of triangles.
+/// For each vertex, the angle between two planes whose normals would scatter as the normals in two
+/// rings of triangles around it do.
 std::vector<float> turnsOf(const TriMesh& mesh) {
   std::vector<V3d> normals(mesh.positions.size(), V3d(0));
   std::vector<double> areas(mesh.positions.size(), 0);
@@ -203,7 +206,7 @@ std::vector<float> turnsOf(const TriMesh& mesh) {
   return turns;
 }
 
-/// The largest turn of each cell of a coarse grid, and of the cells about it.
+/// The largest turn in each cell of a coarse grid and its neighbours.
 class TurnGrid {
  public:
   explicit TurnGrid(double cell) : cell_(cell) {}
@@ -240,7 +243,8 @@ class TurnGrid {
 
 TriangleSurface::TriangleSurface(TriMesh mesh) {
   if (mesh.isEmpty())
-    throw InvalidInput("tolerance: a result has no surface to measure; give one that has");
+    throw InvalidInput(
+        "tolerance: a result has no surface to measure; choose a result with a surface");
   TriangleTree tree = treeOf(mesh);
   data_ = std::make_shared<const Data>(Data{std::move(mesh), std::move(tree)});
 }
@@ -250,7 +254,7 @@ const TriMesh& TriangleSurface::mesh() const {
 }
 
 double TriangleSurface::distance(const V3d& point, double limit) const {
-  // A little wider, for the rounding of what told the limit.
+  // Slightly enlarged to allow for rounding of the limit.
   const double wide = limit < 1e300 ? limit * (1 + 1e-9) + 1e-300 : limit;
   const TriangleTree::Hit near = data_->tree.nearest(toVdb(point), wide);
   if (near.found) return near.distance;
@@ -273,25 +277,25 @@ SurfaceDifference surfaceDifference(const TriangleSurface& a, const TriangleSurf
 
 std::vector<V3d> findCreases(const TriMesh& fine, double fineVoxel, const TriMesh& coarse,
                              double coarseVoxel) {
-  // What two planes at 45 degrees leave beside the triangles that the mesh cuts their edge with.
-  constexpr double kLeastTurn = 30 * std::numbers::pi / 180;
-  // A bend that is resolved turns twice as much in the coarse mesh, an edge as it happens to meet
-  // the grid: from 0.7 times to 1.2 times as much.
-  constexpr float kLeastKept = 0.5f, kMostKept = 1.35f;
+  // The turn that two planes at 45 degrees leave beside the triangles that cut their edge.
+  constexpr double kMinTurn = 30 * std::numbers::pi / 180;
+  // A resolved bend turns twice as much in the coarse mesh. An edge turns 0.7 to 1.2 times as much,
+  // depending on its position in the grid.
+  constexpr float kMinTurnRatio = 0.5f, kMaxTurnRatio = 1.35f;
   const std::vector<float> fineTurns = turnsOf(fine), coarseTurns = turnsOf(coarse);
   const double cell = 2 * std::max(fineVoxel, coarseVoxel);
   TurnGrid fineGrid(cell), coarseGrid(cell);
   for (std::size_t i = 0; i < fineTurns.size(); ++i)
-    if (fineTurns[i] >= kLeastTurn) fineGrid.add(fine.positions[i], fineTurns[i]);
+    if (fineTurns[i] >= kMinTurn) fineGrid.add(fine.positions[i], fineTurns[i]);
   for (std::size_t i = 0; i < coarseTurns.size(); ++i)
-    if (coarseTurns[i] >= kLeastTurn * kLeastKept)
+    if (coarseTurns[i] >= kMinTurn * kMinTurnRatio)
       coarseGrid.add(coarse.positions[i], coarseTurns[i]);
   std::vector<V3d> creases;
   for (std::size_t i = 0; i < fineTurns.size(); ++i) {
-    if (!(fineTurns[i] >= kLeastTurn)) continue;
+    if (!(fineTurns[i] >= kMinTurn)) continue;
     const float here = fineGrid.around(fine.positions[i]);
     const float there = coarseGrid.around(fine.positions[i]);
-    if (there >= kLeastKept * here && there <= kMostKept * here)
+    if (there >= kMinTurnRatio * here && there <= kMaxTurnRatio * here)
       creases.push_back(fine.positions[i]);
   }
   return creases;

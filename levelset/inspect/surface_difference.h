@@ -10,18 +10,18 @@
 
 namespace levelset {
 
-/// A surface of triangles, made ready for distances to it. Copies share it.
+/// A triangle mesh prepared for distance queries. Copies share it.
 class TriangleSurface {
  public:
   TriangleSurface() = default;
   /// @throws InvalidInput for a mesh without triangles
   explicit TriangleSurface(TriMesh mesh);
 
-  /// False of one that was default constructed, which has nothing to ask for.
+  /// Returns false for a default-constructed surface, which has no data.
   [[nodiscard]] bool isValid() const { return data_ != nullptr; }
   [[nodiscard]] const TriMesh& mesh() const;
-  /// World units, without sign; exact to rounding.
-  /// @param limit  a distance that it is known not to pass: the nearer, the sooner found
+  /// Unsigned distance of a point, world units; exact to rounding.
+  /// @param limit  known upper bound of the distance; a tight bound makes the search faster
   [[nodiscard]] double distance(const Imath::V3d& point, double limit) const;
 
  private:
@@ -30,39 +30,40 @@ class TriangleSurface {
 };
 
 struct SurfaceDifferenceOptions {
-  /// World units: triangles are cut into parts with sides no longer than this.
+  /// Maximum side of the parts into which triangles are divided for sampling, world units.
   double spacing = 0;
-  std::vector<Imath::V3d> creases = {};  ///< points along creases
-  double creaseReach = 0;                ///< what is nearer to one of them is told apart
+  std::vector<Imath::V3d> creases = {};  ///< points along creases, world units
+  double creaseRadius = 0;  ///< world units; samples within it of a crease point are counted
+                            ///< separately
   Progress progress = {};
 };
 
-/// World units.
+/// Differences of two surfaces, world units.
 struct SurfaceDifference {
-  double smooth = 0;       ///< two-sided Hausdorff distance of what lies away from creases
-  double crease = 0;       ///< the same of what lies beside them
-  double creaseShare = 0;  ///< of the samples
+  double smooth = 0;       ///< two-sided Hausdorff distance of the samples away from creases
+  double crease = 0;       ///< the same distance of the samples near creases
+  double creaseShare = 0;  ///< share of the samples near creases
 };
 
-/// How far two surfaces are apart: the largest distance from samples of each to the other. Samples
-/// are the vertices and the middles of the parts that the triangles are cut into; where distances
-/// are largest, of parts a fourth as long.
+/// Measures the largest distance of two surfaces, from samples of each to the other. The samples
+/// are the vertices and the midpoints of the parts into which the triangles are divided. Where
+/// distances are largest, the parts are a quarter as long.
 /// @throws Cancelled
 [[nodiscard]] SurfaceDifference surfaceDifference(const TriangleSurface& a,
                                                   const TriangleSurface& b,
                                                   const SurfaceDifferenceOptions& options);
 
-/// Vertices of a uniform mesh at which its normals turn within about two voxels, and turn by as
-/// much in a coarser mesh of the same surface within two of its own voxels. A bend that is resolved
-/// turns half as much in half the distance; an edge, or a seam of two solids, by the same angle at
-/// every scale.
-/// @param fine    bandToMesh() of a band with voxels of that size, as is `coarse`
-/// @return        positions, world units
+/// Finds creases: vertices of a uniform mesh at which the normals turn within about two voxels. A
+/// coarser mesh of the same surface must turn as much within two of its own voxels. A resolved bend
+/// turns half as much over half the distance. A sharp edge or a seam of two solids turns by the
+/// same angle at every scale.
+/// @param fine  result of bandToMesh() for a band with voxels of that size; likewise `coarse`
+/// @return positions, world units
 [[nodiscard]] std::vector<Imath::V3d> findCreases(const TriMesh& fine, double fineVoxel,
                                                   const TriMesh& coarse, double coarseVoxel);
 
-/// How far the two faces at an edge are flat, at the edge of at least 45 degrees where that is
-/// most: with smaller voxels a field shows a crease there. World units; 0 without such edges.
+/// Width of the flat faces beside the sharp edges, world units: the largest value over all edges of
+/// at least 45 degrees. With smaller voxels, a field resolves a crease there. 0 without such edges.
 [[nodiscard]] double flatBesideEdges(const TriMesh& mesh);
 
 }  // namespace levelset

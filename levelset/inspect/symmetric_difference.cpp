@@ -17,11 +17,11 @@ using openvdb::Vec3d;
 
 struct TetCorner {
   Vec3d p;
-  std::array<double, 2> phi;  ///< of both fields
+  std::array<double, 2> phi;  ///< values of both fields
 };
 using Tet = std::array<TetCorner, 4>;
 
-/// The parts of a tetrahedron where one linear field is negative: three tetrahedra at most.
+/// The parts of a tetrahedron in which one linear field is negative: at most three tetrahedra.
 struct NegativeParts {
   std::array<Tet, 3> tets;
   std::size_t count = 0;
@@ -70,7 +70,8 @@ double negativeVolume(const Tet& tet, std::size_t field) {
   return sum;
 }
 
-/// Of a unit cell with corners numbered dx·4 + dy·2 + dz: six tetrahedra about its diagonal.
+/// Symmetric difference in a unit cell, split into six tetrahedra around its diagonal. Corners have
+/// the numbers dx·4 + dy·2 + dz.
 double cellDifference(const std::array<std::array<double, 2>, 8>& corners) {
   constexpr std::array<std::array<int, 2>, 6> kPaths = {
       {{4, 6}, {4, 5}, {2, 6}, {2, 3}, {1, 5}, {1, 3}}};
@@ -88,7 +89,7 @@ double cellDifference(const std::array<std::array<double, 2>, 8>& corners) {
   return sum;
 }
 
-/// Over the cells whose lowest corners lie in the leaf block at `origin`.
+/// Sum over the cells whose lowest corners lie in the leaf block at `origin`.
 double blockDifference(const FloatTree& a, const FloatTree& b, const Coord& origin) {
   std::vector<std::array<double, 2>> values;
   values.reserve(729);
@@ -120,7 +121,7 @@ double blockDifference(const FloatTree& a, const FloatTree& b, const Coord& orig
   return sum;
 }
 
-/// Leaf blocks of both trees, and those below them whose cells reach into one.
+/// Leaf blocks of both trees, and the blocks below them whose cells extend into one.
 std::vector<Coord> blocksOfBoth(const FloatTree& a, const FloatTree& b) {
   std::vector<Coord> blocks;
   for (const FloatTree* tree : {&a, &b})
@@ -143,7 +144,7 @@ openvdb::MaskTree insideTiles(const FloatTree& tree) {
   return mask;
 }
 
-/// Voxels in tiles that are inside on one side only.
+/// Number of voxels in tiles that are inside in one tree only.
 double tileDifference(const FloatTree& a, const FloatTree& b, const std::vector<Coord>& blocks) {
   const openvdb::MaskTree inA = insideTiles(a), inB = insideTiles(b);
   double sum = 0;

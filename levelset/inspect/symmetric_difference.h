@@ -6,8 +6,8 @@
 
 namespace levelset {
 
-/// Volume, in voxels, of the points that are inside one of two fields only. Both on the same grid
-/// points; each cell is cut into tetrahedra on which the fields are linear.
+/// Volume, in voxels, of the points that lie inside exactly one of two fields on the same grid
+/// points. Each cell is split into tetrahedra with linear fields.
 [[nodiscard]] double symmetricDifference(const openvdb::FloatTree& a, const openvdb::FloatTree& b);
 
 }  // namespace levelset

@@ -38,7 +38,8 @@ std::optional<FormatChoice> findFormat(const fs::path& nameOrFormat) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c | 0x20);
   const bool compressed = text.ends_with(".gz");
   if (compressed) text.resize(text.size() - 3);
-  const std::string extension = text.substr(text.rfind('.') + 1);  // all of it without a point
+  const std::string extension = text.substr(text.rfind('.') + 1);  // the complete text if there is
+                                                                   // no dot
   for (const MeshFormat& format : kFormats)
     if (extension == format.extension) return FormatChoice{&format, compressed};
   return std::nullopt;
@@ -48,18 +49,19 @@ FormatChoice meshFormat(const fs::path& path, const std::string& given, const ch
   if (!given.empty()) {
     if (const auto choice = findFormat(given)) return *choice;
     throw UsageError(
-        fmt::format("{}: the mesh format '{}' is not known; use ply, obj, stl or off, "
-                    "with .gz behind it if compressed",
+        fmt::format("{}: the mesh format '{}' is unknown; use ply, obj, stl or off, "
+                    "with .gz appended if compressed",
                     action, given));
   }
   if (const auto choice = findFormat(path)) return *choice;
   if (path == "-") {
-    throw UsageError(fmt::format(
-        "{}: standard {} has no name that tells its format; give --format ply, obj, stl or off",
-        action, action[0] == 'r' ? "input" : "output"));
+    throw UsageError(
+        fmt::format("{}: standard {} has no name that determines its format; give --format ply, "
+                    "obj, stl or off",
+                    action, action[0] == 'r' ? "input" : "output"));
   }
   throw UsageError(
-      fmt::format("{}: the name '{}' tells no mesh format; end it in .ply, .obj, .stl or "
+      fmt::format("{}: the name '{}' names no mesh format; end it in .ply, .obj, .stl or "
                   ".off, or give --format",
                   action, path.string()));
 }
@@ -79,7 +81,7 @@ TriMesh readMesh(const fs::path& path, const ReadMeshOptions& options) {
     if (mesh.isEmpty())
       failFile(
           inputName(path),
-          "holds triangles without area only, of which none is left when its seams are closed; "
+          "holds only triangles without area, of which none remains when its seams are closed; "
           "export the mesh again");
     report(options.progress, 1, "read");
     return mesh;
@@ -93,7 +95,7 @@ void writeMesh(const fs::path& path, const TriMesh& mesh, const WriteMeshOptions
   const FormatChoice choice = meshFormat(path, options.format, "write");
   requireAttributes(mesh, "write");
   report(options.progress, 0, "write");
-  // Without the attributes that they are for, seams would be slits.
+  // Without the attributes, seams would remain as slits.
   std::optional<TriMesh> closed;
   if (!choice.format->attributes && !mesh.attributes.isEmpty())
     closed = withoutSeams(mesh, "write", options.maxMemory);
@@ -117,17 +119,17 @@ MeshFileInfo meshFileInfo(const fs::path& path, const std::string& format) {
   const std::string name = inputName(path);
   const FirstBytes first = readFirstBytes(path, kInfoBytes);
   const std::string_view head = first.bytes.view();
-  if (head.empty()) failFile(name, "is empty; fetch or make the file again");
+  if (head.empty()) failFile(name, "is empty; download or create the file again");
   MeshFileInfo info;
   if (choice.format->read == readPly) {
-    info = plyInfo(head, first.whole, name);
-    const bool isMesh = info.vertices > 0 && info.faces > 0, isKnown = first.whole > 0;
-    if (isMesh && isKnown && path != "-" && !plyHoldsTriangles(head, first.whole, name))
-      (void)readMesh(path, {.format = format});  // which tells where it ends
+    info = plyInfo(head, first.fileSize, name);
+    const bool isMesh = info.vertices > 0 && info.faces > 0, isKnown = first.fileSize > 0;
+    if (isMesh && isKnown && path != "-" && !plyHoldsTriangles(head, first.fileSize, name))
+      (void)readMesh(path, {.format = format});  // its message says where the file ends
   } else if (choice.format->read == readStl) {
-    info = stlInfo(head, first.whole, name);
+    info = stlInfo(head, first.fileSize, name);
   } else if (choice.format->read == readOff) {
-    info = offInfo(head, first.whole, name);
+    info = offInfo(head, first.fileSize, name);
   } else {
     info.format = choice.format->extension;
   }

@@ -8,60 +8,68 @@
 #include "levelset/mesh.h"
 #include "levelset/progress.h"
 
-/// Triangle meshes in files: PLY, OBJ, STL and OFF, each also compressed as `.gz`. The format is
-/// told by the extension, or given. Polygons are split into triangles; unused elements are skipped.
-/// PLY and OBJ hold the attributes of vertices too. In PLY they are `nx ny nz`, `s t` (also read:
-/// `u v`, `texture_u texture_v`) and `red green blue` with or without `alpha`, of uchar, ushort or
-/// float. In OBJ they are `vn`, `vt` and numbers behind the coordinates of `v`; a vertex with
-/// several pairs of `vt` and `vn` becomes as many vertices, the first in its place and the others
-/// behind all. Seams are written as they are held, by vertices of their own. STL and OFF hold none;
-/// they are written with the seams closed, and a PLY whose attributes are not wanted is read so.
+/// Reads and writes triangle meshes in PLY, OBJ, STL and OFF files, each also compressed as `.gz`.
+/// The extension determines the format, unless it is given. Polygons are split into triangles;
+/// unused elements are skipped.
+///
+/// PLY and OBJ also hold vertex attributes. PLY uses `nx ny nz`, `s t` (also read: `u v`,
+/// `texture_u texture_v`) and `red green blue`, with or without `alpha`, as uchar, ushort or float.
+/// OBJ uses `vn`, `vt` and numbers after the coordinates of `v`. A vertex with several pairs of
+/// `vt` and `vn` becomes several vertices: the first keeps its index and the others follow after
+/// all vertices. Seams are written as they are stored, with duplicate vertices. STL and OFF hold no
+/// attributes, so writing closes the seams. Reading a PLY file without attributes closes the seams
+/// too.
 namespace levelset {
 
 struct ReadMeshOptions {
-  std::string format =
-      {};  ///< "ply", "obj", "stl", "off", with ".gz" behind if compressed; empty: by extension
-  bool attributes = true;  ///< false: positions and triangles only, whatever else is there
+  /// "ply", "obj", "stl", "off", with ".gz" appended if compressed; empty: by extension
+  std::string format = {};
+  bool attributes = true;  ///< false: reads positions and triangles only
   std::size_t maxMemory = kNoMemoryLimit;
-  /// Told what the mesh had that it cannot carry, in words: "colours of faces"; not for meshes
-  /// whose attributes are not wanted.
-  std::vector<std::string>* leftAside = nullptr;
+  /// Receives the names of attributes that a TriMesh cannot hold: "colours of faces". Unused when
+  /// `attributes` is false.
+  std::vector<std::string>* unsupported = nullptr;
   Progress progress = {};
 };
 
-/// @param path  a file, or "-" for standard input (needs options.format)
-/// @throws IoError when it cannot be opened or read; InvalidInput when it is not what it claims:
-///         empty, truncated, counts beyond the file's size, index out of range, NaN or infinite
-///         coordinate, no triangle; attributes that are no numbers, or an index of one out of range
+/// Reads a mesh.
+/// @param path  a file, or "-" for standard input (requires options.format)
+/// @throws IoError when the file cannot be opened or read
+/// @throws InvalidInput when the file is empty, truncated or without triangles. Also throws when a
+///         count exceeds the file's size, an index is out of range, or a coordinate or attribute is
+///         not finite.
 [[nodiscard]] TriMesh readMesh(const std::filesystem::path& path,
                                const ReadMeshOptions& options = {});
 
 struct WriteMeshOptions {
-  std::string format = {};  ///< as in ReadMeshOptions; STL and PLY are written binary
+  std::string format = {};  ///< as in ReadMeshOptions; STL and PLY are written in binary
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
-/// Writes beside the target and renames (FileTarget).
-/// @throws IoError; UsageError for an unknown format; InvalidInput for attributes that do not fit
-///         the vertices
+/// Writes a mesh to a temporary file and renames it over the target (FileTarget).
+/// @throws IoError
+/// @throws UsageError for an unknown format
+/// @throws InvalidInput for attributes whose number differs from that of the vertices
 void writeMesh(const std::filesystem::path& path, const TriMesh& mesh,
                const WriteMeshOptions& options = {});
 
-/// Does a file of that name, or format, hold normals, texture coordinates and colours?
+/// Returns true when a file of that name or format can hold normals, texture coordinates and
+/// colours.
 [[nodiscard]] bool holdsAttributes(const std::filesystem::path& nameOrFormat);
 
-/// True for a name, or a format, that readMesh understands.
+/// Returns true for a file name or format that readMesh supports.
 [[nodiscard]] bool isMeshFormat(const std::filesystem::path& nameOrFormat);
 
-/// What the header of a mesh file says, without reading its elements where the format allows.
+/// Properties of a mesh file from its header, without reading its elements where the format allows.
 struct MeshFileInfo {
   std::string format;        ///< e.g. "ply, binary little endian"
-  std::size_t vertices = 0;  ///< 0 when only a full read would tell
+  std::size_t vertices = 0;  ///< 0 when only a full read can determine it
   std::size_t faces = 0;
-  std::string attributes = {};  ///< in words, as describe() has them; empty: none, or not known
+  std::string attributes = {};  ///< attributes in words, from describe(); empty: none or unknown
 };
-/// Counts are compared with the size of the file: what it cannot hold is refused as readMesh does.
+/// Reads the header of a mesh file. Refuses counts that the file is too small to hold, as readMesh
+/// does.
 /// @param format  as in ReadMeshOptions
 [[nodiscard]] MeshFileInfo meshFileInfo(const std::filesystem::path& path,
                                         const std::string& format = {});

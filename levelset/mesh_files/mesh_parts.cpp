@@ -14,7 +14,7 @@ namespace levelset {
 namespace {
 
 constexpr std::uint64_t kMaxIndex = std::numeric_limits<std::uint32_t>::max();
-constexpr std::uint64_t kSplit = std::uint64_t{1} << 63;  // marks a corner at a split vertex
+constexpr std::uint64_t kSplit = std::uint64_t{1} << 63;  // marks a corner at a duplicate vertex
 constexpr double kMaxCoordinate = std::numeric_limits<float>::max();
 constexpr std::size_t kTickMask = 0xFFFF;
 
@@ -23,16 +23,18 @@ bool fitsFloat(double x) {
 }
 
 template <typename Vector>
-void requireNumbers(const std::string& name, const Vector& numbers, const char* what, Place place) {
+void requireNumbers(const std::string& name, const Vector& numbers, const char* what,
+                    FilePosition place) {
   for (unsigned axis = 0; axis < Vector::dimensions(); ++axis)
     if (const auto number = numbers[static_cast<int>(axis)]; !std::isfinite(number))
       failAt(name, place,
              fmt::format("a {} holds {}, which is not a finite number; repair the mesh, or read it "
-                         "bare, without what its vertices carry (--bare)",
+                         "without attributes (--no-attributes)",
                          what, number));
 }
 
-/// What std::from_chars calls out of range, too large or too small: decided by strtod.
+/// Value of a number that std::from_chars reports as out of range: strtod decides whether it is too
+/// large or too small.
 double extremeNumber(const char* first, const char* last) {
   static const locale_t plain = ::newlocale(LC_ALL_MASK, "C", nullptr);
   return ::strtod_l(std::string(first, last).c_str(), nullptr, plain);
@@ -40,7 +42,7 @@ double extremeNumber(const char* first, const char* last) {
 
 }  // namespace
 
-void failAt(const std::string& name, Place place, const std::string& what) {
+void failAt(const std::string& name, FilePosition place, const std::string& what) {
   throw InvalidInput(fmt::format("read: {}, {} {}: {}", name, place.unit, place.number, what));
 }
 
@@ -50,15 +52,15 @@ void failFile(const std::string& name, const std::string& what) {
 
 void requireText(std::string_view input, const std::string& name, const char* format) {
   if (input.substr(0, 4096).find('\0') != std::string_view::npos)
-    failFile(name, fmt::format("holds binary data, not {} text; give its true format", format));
+    failFile(name, fmt::format("holds binary data, not {} text; give its actual format", format));
 }
 
-void requireNothingBehind(std::string_view input, std::size_t end, const std::string& name,
-                          const std::string& what) {
+void requireNoTrailingData(std::string_view input, std::size_t end, const std::string& name,
+                           const std::string& what) {
   const std::size_t more = input.find_first_not_of(" \t\r\n\f\v", end);
   if (more == std::string_view::npos) return;
-  failFile(name, fmt::format("goes on behind {}, at byte {} of {}; its header is damaged or "
-                             "something was appended: export it again",
+  failFile(name, fmt::format("has data after {}, at byte {} of {}; its header is damaged or "
+                             "data was appended: export it again",
                              what, more, input.size()));
 }
 
@@ -69,8 +71,8 @@ MeshBuilder::MeshBuilder(std::string name, const ReadMeshOptions& options, std::
 
 void MeshBuilder::reserve(std::size_t vertices, std::size_t triangles, std::size_t attributeBytes) {
   if (vertices > kMaxIndex)
-    failFile(name_, fmt::format("holds {} vertices, more than the 4294967295 that can be numbered; "
-                                "split it",
+    failFile(name_, fmt::format("holds {} vertices, more than the maximum of 4294967295; "
+                                "split the mesh",
                                 vertices));
   const double bytes = static_cast<double>(input_.size() + attributeBytes) +
                        static_cast<double>(vertices) * sizeof(Imath::V3d) +
@@ -91,7 +93,7 @@ void MeshBuilder::tick(const char* at) {
          static_cast<double>(at - input_.data()) / static_cast<double>(input_.size()), "read");
   requireMore(0);
   if (mesh_.positions.size() > kMaxIndex)
-    failFile(name_, "holds more than the 4294967295 vertices that can be numbered; split it");
+    failFile(name_, "holds more than 4294967295 vertices; split the mesh");
 }
 
 void MeshBuilder::requireMore(double bytes) const {
@@ -105,11 +107,11 @@ void MeshBuilder::requireMore(double bytes) const {
   requireMemory(static_cast<double>(now) + bytes, options_.maxMemory, "read");
 }
 
-void MeshBuilder::leaveAside(std::string what) {
-  if (options_.leftAside) options_.leftAside->push_back(std::move(what));
+void MeshBuilder::noteUnsupported(std::string what) {
+  if (options_.unsupported) options_.unsupported->push_back(std::move(what));
 }
 
-void MeshBuilder::addVertex(double x, double y, double z, Place place, const char* at) {
+void MeshBuilder::addVertex(double x, double y, double z, FilePosition place, const char* at) {
   for (const double c : {x, y, z}) {
     if (std::abs(c) <= kMaxCoordinate) continue;
     const bool finite = std::isfinite(c);
@@ -123,32 +125,33 @@ void MeshBuilder::addVertex(double x, double y, double z, Place place, const cha
   tick(at);
 }
 
-void MeshBuilder::addNormal(const Imath::V3d& normal, Place place) {
+void MeshBuilder::addNormal(const Imath::V3d& normal, FilePosition place) {
   requireNumbers(name_, normal, "normal", place);
   mesh_.attributes.normals.push_back(normal);
 }
 
-void MeshBuilder::addUv(const Imath::V2d& uv, Place place) {
+void MeshBuilder::addUv(const Imath::V2d& uv, FilePosition place) {
   requireNumbers(name_, uv, "texture coordinate", place);
   mesh_.attributes.uvs.push_back(uv);
 }
 
-void MeshBuilder::addColor(const Imath::V4f& color, Place place) {
+void MeshBuilder::addColor(const Imath::V4f& color, FilePosition place) {
   requireNumbers(name_, color, "colour", place);
   mesh_.attributes.colors.push_back(color);
 }
 
-void MeshBuilder::noteIndex(std::uint64_t index, Place place) {
+void MeshBuilder::noteIndex(std::uint64_t index, FilePosition place) {
   if (index < highestIndex_ || (index == highestIndex_ && highestNumber_ != 0)) return;
   highestIndex_ = index;
   highestUnit_ = place.unit;
   highestNumber_ = place.number;
 }
 
-std::uint64_t MeshBuilder::splitVertex(std::uint64_t vertex, Place place) {
+std::uint64_t MeshBuilder::splitVertex(std::uint64_t vertex, FilePosition place) {
   noteIndex(vertex, place);
   splitVertices_.push_back(static_cast<std::uint32_t>(vertex));
-  // Counted down, until all vertices are known: kMaxIndex - n fits a triangle's corner.
+  // The placeholder counts down from the maximum until all vertices are known: kMaxIndex - n fits a
+  // triangle's corner.
   return kSplit | (kMaxIndex - (splitVertices_.size() - 1));
 }
 
@@ -157,8 +160,8 @@ void MeshBuilder::placeSplitVertices() {
   if (splits == 0) return;
   if (before + splits > kMaxIndex) {
     failFile(name_,
-             "has more than the 4294967295 vertices that can be numbered, once those with "
-             "several normals or texture coordinates are split; split it");
+             "has more than 4294967295 vertices, once those with "
+             "several normals or texture coordinates are split; split the mesh");
   }
   const std::uint64_t first = kMaxIndex - (splits - 1);
   for (auto& triangle : mesh_.triangles)
@@ -170,12 +173,13 @@ void MeshBuilder::placeSplitVertices() {
     mesh_.positions.push_back(mesh_.positions[vertex]);
 }
 
-void MeshBuilder::addFace(std::span<const std::uint64_t> corners, Place place, const char* at) {
+void MeshBuilder::addFace(std::span<const std::uint64_t> corners, FilePosition place,
+                          const char* at) {
   for (const std::uint64_t corner : corners)
     if ((corner & kSplit) == 0) noteIndex(corner, place);
   if (corners.size() > 3)
     polygons_.push_back({mesh_.triangles.size(), corners.size(), place.number});
-  // A fan holds the corners until all vertices are known.
+  // A fan stores the corners until all vertices are known.
   for (std::size_t i = 2; i < corners.size(); ++i) {
     mesh_.triangles.push_back({static_cast<std::uint32_t>(corners[0]),
                                static_cast<std::uint32_t>(corners[i - 1]),
@@ -191,27 +195,26 @@ void MeshBuilder::splitPolygons() {
     corners.assign({triangles[0][0], triangles[0][1]});
     for (std::size_t i = 0; i + 2 < polygon.corners; ++i) corners.push_back(triangles[i][2]);
     if (!splitPolygon(corners, mesh_.positions, triangles)) {
-      failAt(
-          name_, {highestUnit_.c_str(), polygon.place},
-          fmt::format("a face of {} corners is too intricate to split; triangulate the mesh before",
-                      polygon.corners));
+      failAt(name_, {highestUnit_.c_str(), polygon.place},
+             fmt::format("a face of {} corners is too complex to split; triangulate the mesh first",
+                         polygon.corners));
     }
   }
 }
 
 TriMesh MeshBuilder::finish() {
   const std::size_t count = mesh_.positions.size();
-  if (count > kMaxIndex)
-    failFile(name_, "holds more than the 4294967295 vertices that can be numbered; split it");
+  if (count > kMaxIndex) failFile(name_, "holds more than 4294967295 vertices; split the mesh");
   if (mesh_.triangles.empty())
-    failFile(name_, fmt::format("holds {} vertices and no triangle; export the mesh with its faces",
-                                count));
+    failFile(
+        name_,
+        fmt::format("holds {} vertices and no triangles; export the mesh with its faces", count));
   if (highestIndex_ >= count) {
-    failAt(
-        name_, {highestUnit_.c_str(), highestNumber_},
-        fmt::format("a face names vertex {} (counted from 0) of {}; repair the mesh or export it "
-                    "again",
-                    highestIndex_, count));
+    failAt(name_, {highestUnit_.c_str(), highestNumber_},
+           fmt::format(
+               "a face refers to vertex {} (counted from 0) of {}; repair the mesh or export it "
+               "again",
+               highestIndex_, count));
   }
   placeSplitVertices();
   splitPolygons();
@@ -256,7 +259,7 @@ void TextCursor::skipLine() {
 
 std::string_view TextCursor::token() {
   const char* begin = p_;
-  if (p_ != end_ && *p_ == '\\') ++p_;  // one that continues no line is part of a name
+  if (p_ != end_ && *p_ == '\\') ++p_;  // a backslash that continues no line is part of a name
   while (!atBlank()) ++p_;
   return {begin, static_cast<std::size_t>(p_ - begin)};
 }
@@ -289,7 +292,7 @@ std::int64_t TextCursor::integer(const char* what) {
 
 void TextCursor::failNumber(const char* what) const {
   if (atEnd()) {
-    fail(fmt::format("the file ends where {} should stand; fetch or export it again", what));
+    fail(fmt::format("the file ends where {} is expected; download or export it again", what));
   }
   const char* end = p_;
   while (end != end_ && end - p_ < 24 && static_cast<unsigned char>(*end) > ' ') ++end;
@@ -297,7 +300,8 @@ void TextCursor::failNumber(const char* what) const {
   std::replace_if(
       found.begin(), found.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, '?');
   if (found.empty()) fail(fmt::format("{} is missing; repair the file or export it again", what));
-  fail(fmt::format("'{}' stands where {} should; repair the file or export it again", found, what));
+  fail(fmt::format("found '{}' where {} is expected; repair the file or export it again", found,
+                   what));
 }
 
 }  // namespace levelset

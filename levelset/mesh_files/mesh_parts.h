@@ -11,60 +11,63 @@
 #include "levelset/files/byte_io.h"
 #include "levelset/mesh_files/mesh_file.h"
 
-// Private to levelset/files: what the readers and writers of the mesh formats share.
+// Private to levelset/mesh_files: shared code of the mesh readers and writers.
 
 namespace levelset {
 
-/// Where in a file something was found: "line 12", "vertex 3".
-struct Place {
+/// Position in a file, for messages: "line 12", "vertex 3".
+struct FilePosition {
   const char* unit;
   std::size_t number;
 };
 
 /// @throws InvalidInput: "read: 'x.ply', line 12: <what>"
-[[noreturn]] void failAt(const std::string& name, Place place, const std::string& what);
+[[noreturn]] void failAt(const std::string& name, FilePosition place, const std::string& what);
 /// @throws InvalidInput: "read: 'x.ply' <what>"
 [[noreturn]] void failFile(const std::string& name, const std::string& what);
 
-/// Collects vertices and faces, checks them, and splits polygons once all vertices are there (a
-/// face may come before its vertices).
+/// Collects vertices and faces, checks them, and splits polygons once all vertices are known. A
+/// face may precede its vertices.
 class MeshBuilder {
  public:
   MeshBuilder(std::string name, const ReadMeshOptions& options, std::string_view input);
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::size_t vertexCount() const { return mesh_.positions.size(); }
-  /// The numbers of a header; the caller has checked them against the size of the file.
-  /// @param attributeBytes  that the vertices' attributes will take
+  /// Reserves memory for the counts of a header. The caller has checked them against the size of
+  /// the file.
+  /// @param attributeBytes  memory of the vertex attributes
   void reserve(std::size_t vertices, std::size_t triangles, std::size_t attributeBytes = 0);
-  /// Of the stored numbers; without it, float if every coordinate fits.
+  /// Declares the precision of the stored numbers. Without it, the precision is Float if every
+  /// coordinate fits a float.
   void declarePrecision(CoordinatePrecision precision);
 
-  /// `at` is where reading stands, for the progress.
-  void addVertex(double x, double y, double z, Place place, const char* at);
-  /// The last vertex's. @throws InvalidInput for numbers that are not finite
-  void addNormal(const Imath::V3d& normal, Place place);
-  void addUv(const Imath::V2d& uv, Place place);
-  void addColor(const Imath::V4f& color, Place place);
+  /// Adds a vertex. `at` is the current reading position, for the progress.
+  void addVertex(double x, double y, double z, FilePosition place, const char* at);
+  /// Adds an attribute of the last vertex. @throws InvalidInput for numbers that are not finite
+  void addNormal(const Imath::V3d& normal, FilePosition place);
+  void addUv(const Imath::V2d& uv, FilePosition place);
+  void addColor(const Imath::V4f& color, FilePosition place);
   [[nodiscard]] bool wantsAttributes() const { return options_.attributes; }
   [[nodiscard]] MeshAttributes& attributes() { return mesh_.attributes; }
-  /// Attributes are there, and not wanted.
+  /// Records that the file has attributes that the caller does not want.
   void dropAttributes() { droppedAttributes_ = true; }
   [[nodiscard]] bool droppedAttributes() const { return droppedAttributes_; }
-  /// Something that a mesh cannot carry.
-  void leaveAside(std::string what);
-  /// What the reader holds beside the mesh.
+  /// Reports an attribute that a TriMesh cannot hold.
+  void noteUnsupported(std::string what);
+  /// Sets the memory that the reader uses besides the mesh.
   void noteBytes(std::size_t bytes) { readerBytes_ = bytes; }
   [[nodiscard]] std::size_t splitCount() const { return splitVertices_.size(); }
-  /// @throws ResourceLimit if so much more than is held does not fit
+  /// @throws ResourceLimit when that many further bytes do not fit
   void requireMore(double bytes) const;
-  /// Another vertex at the place of one that may be still to come.
-  /// @return what stands for it as a corner of faces; its number will be vertexCount() + n for the
-  ///         n-th of these
-  [[nodiscard]] std::uint64_t splitVertex(std::uint64_t vertex, Place place);
+  /// Adds a duplicate of a vertex, which may not have been read yet.
+  /// @return a placeholder for the corners of faces; the final number of the n-th duplicate is
+  ///         vertexCount() + n
+  [[nodiscard]] std::uint64_t splitVertex(std::uint64_t vertex, FilePosition place);
 
-  /// Corners count from 0; faces with fewer than three are skipped.
-  void addFace(std::span<const std::uint64_t> corners, Place place, const char* at);
+  /// Adds a face. Corners count from 0; faces with fewer than three corners are skipped.
+  void addFace(std::span<const std::uint64_t> corners, FilePosition place, const char* at);
+  /// Completes the mesh.
   /// @throws InvalidInput when an index is out of range or there is no triangle
   [[nodiscard]] TriMesh finish();
 
@@ -73,7 +76,7 @@ class MeshBuilder {
     std::size_t firstTriangle, corners, place;
   };
   void tick(const char* at);
-  void noteIndex(std::uint64_t index, Place place);
+  void noteIndex(std::uint64_t index, FilePosition place);
   void placeSplitVertices();
   void splitPolygons();
 
@@ -82,42 +85,44 @@ class MeshBuilder {
   const ReadMeshOptions& options_;
   std::string_view input_;
   std::vector<Polygon> polygons_;
-  std::vector<std::uint32_t> splitVertices_;  // of which vertex
+  std::vector<std::uint32_t> splitVertices_;  // original vertex of each duplicate
   std::size_t readerBytes_ = 0;
   std::uint64_t highestIndex_ = 0;
-  std::string highestUnit_ = "line";  // of its own: what named it may be gone when it is told
+  std::string highestUnit_ = "line";  // owned copy: the text of the element's name may be freed
+                                      // before the message is built
   std::size_t highestNumber_ = 0;
   std::size_t added_ = 0;
   bool precisionDeclared_ = false, droppedAttributes_ = false;
   bool allFloat_ = true;
 };
 
-/// Splits the polygon with those corners into corners.size() − 2 triangles: a fan where there are
-/// few corners and that keeps within the polygon, else by clipping ears in the plane that fits
-/// best.
-/// @return false when the polygon is too intricate to split in reasonable time
+/// Splits a polygon into corners.size() − 2 triangles. Uses a fan for few corners if the fan stays
+/// inside the polygon; otherwise clips ears in the best-fitting plane.
+/// @return false when the polygon is too complex to split in reasonable time
 [[nodiscard]] bool splitPolygon(std::span<const std::uint32_t> corners,
                                 const std::vector<Imath::V3d>& positions,
                                 std::array<std::uint32_t, 3>* triangles);
 
-/// Walks through text token by token and counts lines.
+/// Reads text token by token and counts lines.
 class TextCursor {
  public:
   TextCursor(std::string_view text, const std::string& name, std::size_t firstLine = 1);
 
-  [[nodiscard]] Place place() const { return {"line", line_}; }
+  [[nodiscard]] FilePosition place() const { return {"line", line_}; }
   [[nodiscard]] const char* at() const { return p_; }
   [[nodiscard]] std::size_t remaining() const { return static_cast<std::size_t>(end_ - p_); }
   [[nodiscard]] bool atEnd() const { return p_ == end_; }
 
-  /// Skips blanks (and, with `continuation`, a backslash before the line's end); true when a token
-  /// of the same line follows. `comment` begins a comment, 0 for none.
+  /// Skips blanks and, with `continuation`, a backslash before the end of a line. Returns true when
+  /// a token of the same line follows. `comment` is the character that starts a comment, 0 for
+  /// none.
   bool skipBlanks(char comment, bool continuation = false) {
     while (p_ != end_) {
       const char c = *p_;
       if (c == '\n' || (comment && c == comment)) {
         return false;
-      } else if (static_cast<unsigned char>(c) <= ' ') {  // what ends a token is stepped over
+      } else if (static_cast<unsigned char>(c) <= ' ') {  // blanks and control characters end a
+                                                          // token
         ++p_;
       } else if (c == '\\' && continuation && skipContinuation()) {
         continue;
@@ -127,17 +132,18 @@ class TextCursor {
     }
     return false;
   }
-  /// Skips blanks, comments and line ends; false at the end of the text.
+  /// Skips blanks, comments and line ends. Returns false at the end of the text.
   bool skipToToken(char comment);
-  /// To the beginning of the next line.
+  /// Moves to the start of the next line.
   void skipLine();
-  /// The token at the cursor, taken: one character at least, lest a reader stands still.
+  /// Takes the token at the cursor, at least one character, so that a reader always advances.
   [[nodiscard]] std::string_view token();
-  /// The number at the cursor, taken; ± infinity when it is beyond a double. Fails at no number.
+  /// Takes the number at the cursor; ± infinity beyond the range of a double. Fails if there is no
+  /// number.
   [[nodiscard]] double number(const char* what);
-  /// The integer at the cursor, taken without what follows it (as in 1/2/3).
+  /// Takes the integer at the cursor, without the characters after it (as in 1/2/3).
   [[nodiscard]] std::int64_t integer(const char* what);
-  /// Takes `c` if it stands at the cursor.
+  /// Takes `c` if it is the character at the cursor.
   bool take(char c) {
     if (p_ == end_ || *p_ != c) return false;
     ++p_;
@@ -158,13 +164,13 @@ class TextCursor {
   const std::string& name_;
 };
 
-/// Reading stops here when text was promised and binary data found.
+/// Refuses binary data where text is expected.
 void requireText(std::string_view input, const std::string& name, const char* format);
 
-/// Nothing but blanks may follow what the header promises: else it promises too little.
-/// @param what  that has been read, "the 12 triangles that its header promises"
-void requireNothingBehind(std::string_view input, std::size_t end, const std::string& name,
-                          const std::string& what);
+/// Refuses data after the elements that the header promises: the header then promises too few.
+/// @param what  the data that has been read: "the 12 triangles that its header promises"
+void requireNoTrailingData(std::string_view input, std::size_t end, const std::string& name,
+                           const std::string& what);
 
 void readPly(std::string_view input, MeshBuilder& builder);
 void readObj(std::string_view input, MeshBuilder& builder);
@@ -176,20 +182,21 @@ void writeObj(ByteWriter& out, const TriMesh& mesh, const Progress& progress);
 void writeStl(ByteWriter& out, const TriMesh& mesh, const Progress& progress);
 void writeOff(ByteWriter& out, const TriMesh& mesh, const Progress& progress);
 
-/// From the first bytes of a file of `fileSize` bytes (0: not known). A header that promises more
-/// than that many bytes can hold is refused as a reader refuses it.
+/// Reads the properties of a mesh from the first bytes of a file of `fileSize` bytes (0: unknown).
+/// Refuses a header that promises more than the file can hold, as the reader does.
 [[nodiscard]] MeshFileInfo plyInfo(std::string_view head, std::size_t fileSize,
                                    const std::string& name);
 [[nodiscard]] MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize,
                                    const std::string& name);
 [[nodiscard]] MeshFileInfo offInfo(std::string_view head, std::size_t fileSize,
                                    const std::string& name);
-/// Can a PLY file of that size hold what its header promises if every face is a triangle? Where it
-/// cannot, it was cut off or has faces of fewer corners, and only a full read tells.
+/// Returns true when a PLY file of that size can hold the elements of its header if every face is a
+/// triangle. Otherwise the file is truncated or has faces of fewer corners, and only a full read
+/// can decide.
 [[nodiscard]] bool plyHoldsTriangles(std::string_view head, std::size_t fileSize,
                                      const std::string& name);
 
-/// Reports every so many elements, without a call for each.
+/// Reports the progress every 65,536 elements.
 class WriteProgress {
  public:
   WriteProgress(const Progress& progress, std::size_t total) : progress_(progress), total_(total) {}

@@ -17,19 +17,20 @@
 namespace levelset {
 namespace {
 
-/// Gives each pair of texture coordinate and normal at a vertex a vertex of its own. The first pair
-/// is that of the vertex itself; corners without any share it.
+/// Assigns a separate vertex to each pair of texture coordinate and normal at a vertex. The vertex
+/// itself takes the first pair. Corners without a pair share it.
 class Seams {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
-  using Pair = std::array<std::uint32_t, 2>;  // of which texture coordinate and normal
+  using Pair = std::array<std::uint32_t, 2>;  // indices of texture coordinate and normal
 
-  /// @param mostVertices  no file of that size holds more: what is beyond is no vertex
-  Seams(MeshBuilder& builder, std::size_t mostVertices)
-      : builder_(builder), mostVertices_(mostVertices) {}
+  /// @param maxVertices  maximum number of vertices in a file of that size; larger indices are
+  ///         invalid
+  Seams(MeshBuilder& builder, std::size_t maxVertices)
+      : builder_(builder), maxVertices_(maxVertices) {}
 
-  std::uint64_t corner(std::uint64_t vertex, const Pair& pair, Place place) {
-    if (pair == kNeither || vertex >= mostVertices_) return vertex;
+  std::uint64_t corner(std::uint64_t vertex, const Pair& pair, FilePosition place) {
+    if (pair == kNeither || vertex >= maxVertices_) return vertex;
     if (vertex >= first_.size()) first_.resize(vertex + 1, kNeither);
     if (first_[vertex] == kNeither) first_[vertex] = pair;
     if (first_[vertex] == pair) return vertex;
@@ -41,7 +42,7 @@ class Seams {
     return found->second;
   }
 
-  /// Of every vertex, the split ones behind the others.
+  /// The pair of every vertex; those of the duplicates follow.
   [[nodiscard]] std::vector<Pair> pairs(std::size_t vertices) const {
     std::vector<Pair> result;
     result.reserve(vertices + splits_.size());
@@ -50,9 +51,9 @@ class Seams {
     for (const Key& split : splits_) result.push_back(split.pair);
     return result;
   }
-  /// Of which vertex the n-th split one was made.
+  /// Number of duplicate vertices; originalOf(n) is the original of the n-th one.
   [[nodiscard]] std::size_t splitCount() const { return splits_.size(); }
-  [[nodiscard]] std::uint64_t splitOf(std::size_t n) const { return splits_[n].vertex; }
+  [[nodiscard]] std::uint64_t originalOf(std::size_t n) const { return splits_[n].vertex; }
 
   [[nodiscard]] std::size_t bytes() const {
     constexpr std::size_t kNode = 64;
@@ -77,7 +78,7 @@ class Seams {
   };
 
   MeshBuilder& builder_;
-  std::size_t mostVertices_;
+  std::size_t maxVertices_;
   std::vector<Pair> first_;
   std::vector<Key> splits_;
   std::unordered_map<Key, std::uint64_t, Hash> others_;
@@ -93,7 +94,7 @@ class ObjReader {
       if (cursor_.skipBlanks('#', true)) readStatement();
       cursor_.skipLine();
     }
-    if (builder_.wantsAttributes()) giveAttributes();
+    if (builder_.wantsAttributes()) storeAttributes();
   }
 
  private:
@@ -104,12 +105,12 @@ class ObjReader {
                              kUv = {"texture coordinate", "the index of a texture coordinate"},
                              kNormal = {"normal", "the index of a normal"};
 
-  /// What faces name of one list, and where the greatest index stands.
-  struct Named {
+  /// References of faces to one list, and the position of the greatest index.
+  struct References {
     std::uint64_t count = 0;
-    Place place{"line", 0};
-    std::vector<bool> seen;  ///< of those that stood before their faces
-    void note(std::uint64_t index, std::size_t soFar, Place at) {
+    FilePosition place{"line", 0};
+    std::vector<bool> seen;  ///< flags of the entries that preceded their faces
+    void note(std::uint64_t index, std::size_t soFar, FilePosition at) {
       if (index < soFar) {
         if (seen.size() < soFar) seen.resize(soFar);
         seen[index] = true;
@@ -120,15 +121,15 @@ class ObjReader {
       count = index + 1;
       place = at;
     }
-    bool isAhead = false;  ///< some stand behind their faces
-    [[nodiscard]] std::size_t unseen(std::size_t all) const {
-      if (isAhead) return 0;  // who knows
+    bool isAhead = false;  ///< true when a face preceded an entry that it refers to
+    [[nodiscard]] std::size_t unreferenced(std::size_t all) const {
+      if (isAhead) return 0;  // unknown
       return all - static_cast<std::size_t>(std::count(seen.begin(), seen.end(), true));
     }
   };
 
-  /// Values of a list, and for each the first that equals it: seams lie where values differ, not
-  /// where a file repeats them.
+  /// Values of a list, and for each the index of the first equal value. Seams lie where values
+  /// differ, not where a file repeats a value.
   template <typename Vector>
   struct Values {
     std::vector<Vector> all;
@@ -136,18 +137,19 @@ class ObjReader {
     convert::ValueTable<Vector> table{all, 0};
     void add(const Vector& value) {
       all.push_back(value);
-      const auto index = static_cast<std::uint32_t>(std::min<std::size_t>(all.size(), kMost) - 1);
-      first.push_back(all.size() <= kMost ? table.findOrEnter(value, index) : index);
+      const auto index =
+          static_cast<std::uint32_t>(std::min<std::size_t>(all.size(), kMaxCount) - 1);
+      first.push_back(all.size() <= kMaxCount ? table.findOrInsert(value, index) : index);
     }
-    /// One that is still to come stands for itself.
+    /// Index of the first equal value. A value that has not been read yet represents itself.
     [[nodiscard]] std::uint32_t firstEqual(std::uint64_t index) const {
       if (index < first.size()) return first[index];
-      return static_cast<std::uint32_t>(std::min<std::uint64_t>(index, kMost));
+      return static_cast<std::uint32_t>(std::min<std::uint64_t>(index, kMaxCount));
     }
     [[nodiscard]] std::size_t bytes() const {
       return all.capacity() * sizeof(Vector) + first.capacity() * sizeof(first[0]) + table.bytes();
     }
-    static constexpr std::size_t kMost = Seams::kNone - 1;
+    static constexpr std::size_t kMaxCount = Seams::kNone - 1;
   };
 
   void readStatement() {
@@ -165,7 +167,7 @@ class ObjReader {
 
   double readNumber(const char* what) {
     cursor_.skipBlanks('#', true);
-    const Place place = cursor_.place();
+    const FilePosition place = cursor_.place();
     const double number = cursor_.number(what);
     if (!std::isfinite(number)) failAt(builder_.name(), place, notFinite(what, number));
     return number;
@@ -173,8 +175,8 @@ class ObjReader {
 
   static std::string notFinite(const char* what, double number) {
     return fmt::format(
-        "{} is {}, which is not a finite number; repair the mesh, or read it bare, "
-        "without what its vertices carry (--bare)",
+        "{} is {}, which is not a finite number; repair the mesh, or read it "
+        "without attributes (--no-attributes)",
         what, number);
   }
 
@@ -182,7 +184,9 @@ class ObjReader {
     const double u = readNumber("a texture coordinate");
     const double v = cursor_.skipBlanks('#', true) ? readNumber("a texture coordinate") : 0;
     uvs_.add({u, v});
-    while (cursor_.skipBlanks('#', true)) skipToken();  // a third is the depth of a solid texture
+    while (cursor_.skipBlanks('#', true))
+      skipToken();  // a third number is the depth of a solid
+                    // texture
     noteBytes();
   }
 
@@ -200,7 +204,7 @@ class ObjReader {
   }
 
   void readVertex() {
-    const Place place = cursor_.place();
+    const FilePosition place = cursor_.place();
     double position[3];
     for (double& coordinate : position) {
       cursor_.skipBlanks('#', true);
@@ -211,18 +215,18 @@ class ObjReader {
     while (cursor_.skipBlanks('#', true)) skipToken();
   }
 
-  /// Three or four numbers behind the coordinates are a colour; a single one is a weight.
+  /// Reads the numbers after the coordinates: three or four are a colour, a single one is a weight.
   void readColor() {
     std::array<double, 4> numbers = {1, 1, 1, 1};
     std::size_t count = 0;
-    const Place place = cursor_.place();
+    const FilePosition place = cursor_.place();
     for (; count < 4 && cursor_.skipBlanks('#', true); ++count)
-      numbers[count] = cursor_.number("a weight or colour behind the coordinates");
+      numbers[count] = cursor_.number("a weight or colour after the coordinates");
     if (count < 3) return;
     for (const double number : numbers)
       if (!(std::abs(number) <= std::numeric_limits<float>::max()))
         failAt(builder_.name(), place, notFinite("a colour", number));
-    colors_.resize(builder_.vertexCount(), Imath::V4f(1));  // white where there was none
+    colors_.resize(builder_.vertexCount(), Imath::V4f(1));  // white for vertices without a colour
     for (int i = 0; i < 4; ++i)
       colors_.back()[i] = static_cast<float>(numbers[static_cast<std::size_t>(i)]);
     hasAlpha_ = hasAlpha_ || count == 4;
@@ -230,7 +234,7 @@ class ObjReader {
   }
 
   void readFace() {
-    const Place place = cursor_.place();
+    const FilePosition place = cursor_.place();
     corners_.clear();
     while (cursor_.skipBlanks('#', true)) {
       const std::uint64_t vertex = readIndex(kVertex, builder_.vertexCount());
@@ -239,7 +243,7 @@ class ObjReader {
         if (!cursor_.atBlank() && *cursor_.at() != '/') readPart(i, place, pair);
       if (!cursor_.atBlank())
         cursor_.fail(
-            "a corner of a face is not v, v/t, v//n or v/t/n; export "
+            "a corner of a face is not of the form v, v/t, v//n or v/t/n; export "
             "the mesh again");
       corners_.push_back(builder_.wantsAttributes() ? seams_.corner(vertex, pair, place) : vertex);
     }
@@ -247,50 +251,51 @@ class ObjReader {
     builder_.addFace(corners_, place, cursor_.at());
   }
 
-  /// The index of a texture coordinate (part 0) or of a normal (part 1).
-  void readPart(std::size_t part, Place place, Seams::Pair& pair) {
+  /// Reads the index of a texture coordinate (part 0) or of a normal (part 1).
+  void readPart(std::size_t part, FilePosition place, Seams::Pair& pair) {
     if (!builder_.wantsAttributes() || part > 1) {
       static_cast<void>(cursor_.integer("the index of a texture coordinate or normal"));
       return;
     }
     const std::size_t soFar = part == 0 ? uvs_.all.size() : normals_.all.size();
     const std::uint64_t index = readIndex(part == 0 ? kUv : kNormal, soFar);
-    (part == 0 ? namedUvs_ : namedNormals_).note(index, soFar, place);
+    (part == 0 ? uvReferences_ : normalReferences_).note(index, soFar, place);
     pair[part] = part == 0 ? uvs_.firstEqual(index) : normals_.firstEqual(index);
   }
 
-  /// From 0; negative ones count back from the latest.
+  /// Reads an index and returns it counted from 0. Negative indices count back from the latest
+  /// entry.
   std::uint64_t readIndex(const IndexName& what, std::size_t soFar) {
     const std::int64_t index = cursor_.integer(what.index);
     const auto count = static_cast<std::int64_t>(soFar);
     if (index > 0) return static_cast<std::uint64_t>(index - 1);
     if (index == 0)
-      cursor_.fail(fmt::format("a face names {} 0, but OBJ counts from 1; export the mesh again",
-                               what.noun));
+      cursor_.fail(fmt::format(
+          "a face refers to {} 0, but OBJ counts from 1; export the mesh again", what.noun));
     if (index < -count)
       cursor_.fail(
-          fmt::format("a face names {} {}, but only {} stand before it; repair the mesh or "
+          fmt::format("a face refers to {} {}, but only {} precede it; repair the mesh or "
                       "export it again",
                       what.noun, index, count));
     return static_cast<std::uint64_t>(count + index);
   }
 
-  void requireNamed(const Named& named, std::size_t count, const char* what) const {
+  void checkReferences(const References& named, std::size_t count, const char* what) const {
     if (named.count <= count) return;
     failAt(builder_.name(), named.place,
-           fmt::format("a face names {} {} of {}; repair the mesh, or read it bare, without what "
-                       "its vertices carry (--bare)",
+           fmt::format("a face refers to {} {} of {}; repair the mesh, or read it without "
+                       "attributes (--no-attributes)",
                        what, named.count, count));
   }
 
-  void giveAttributes() {
-    requireNamed(namedUvs_, uvs_.all.size(), "texture coordinate");
-    requireNamed(namedNormals_, normals_.all.size(), "normal");
-    tellUnnamed(namedUvs_, uvs_.all.size(), "texture coordinates");
-    tellUnnamed(namedNormals_, normals_.all.size(), "normals");
+  void storeAttributes() {
+    checkReferences(uvReferences_, uvs_.all.size(), "texture coordinate");
+    checkReferences(normalReferences_, normals_.all.size(), "normal");
+    reportUnreferenced(uvReferences_, uvs_.all.size(), "texture coordinates");
+    reportUnreferenced(normalReferences_, normals_.all.size(), "normals");
     MeshAttributes& attributes = builder_.attributes();
     const std::size_t count = builder_.vertexCount(), whole = count + builder_.splitCount();
-    const bool hasUvs = namedUvs_.count > 0, hasNormals = namedNormals_.count > 0,
+    const bool hasUvs = uvReferences_.count > 0, hasNormals = normalReferences_.count > 0,
                hasColors = !colors_.empty();
     const std::size_t perVertex =
         (hasUvs ? sizeof(Imath::V2d) : 0) + (hasNormals ? sizeof(Imath::V3d) : 0) +
@@ -313,27 +318,29 @@ class ObjReader {
         allFloat = allFloat && Imath::V3d(Imath::V3f(normal)) == normal;
       attributes.precision = allFloat ? CoordinatePrecision::Float : CoordinatePrecision::Double;
     }
-    if (hasColors) giveColors(attributes, count, whole);
-    builder_.noteBytes(0);  // what is left of the reader goes before the mesh is made
+    if (hasColors) storeColors(attributes, count, whole);
+    builder_.noteBytes(0);  // the reader's lists are freed before the mesh is completed
   }
 
-  void tellUnnamed(const Named& named, std::size_t count, const char* what) {
-    if (const std::size_t unseen = named.unseen(count))
-      builder_.leaveAside(fmt::format("{} of {} {}, which no face names", unseen, count, what));
+  void reportUnreferenced(const References& named, std::size_t count, const char* what) {
+    if (const std::size_t unreferenced = named.unreferenced(count))
+      builder_.noteUnsupported(
+          fmt::format("{} of {} {}, which no face refers to", unreferenced, count, what));
   }
 
-  void giveColors(MeshAttributes& attributes, std::size_t count, std::size_t whole) {
+  void storeColors(MeshAttributes& attributes, std::size_t count, std::size_t whole) {
     colors_.reserve(whole);
     colors_.resize(count, Imath::V4f(1));
     for (std::size_t n = 0; n < seams_.splitCount(); ++n)
-      if (seams_.splitOf(n) < count) colors_.push_back(colors_[seams_.splitOf(n)]);
+      if (seams_.originalOf(n) < count) colors_.push_back(colors_[seams_.originalOf(n)]);
     const bool allBytes = std::all_of(colors_.begin(), colors_.end(), isOfBytes);
     attributes.colorPrecision = allBytes ? ColorPrecision::Byte : ColorPrecision::Float;
     attributes.hasAlpha = hasAlpha_;
     attributes.colors = std::move(colors_);
   }
 
-  /// Written by a program that holds bytes: each number is the float next to one of n / 255.
+  /// Returns true when every component equals n / 255 rounded to double, as written by a program
+  /// that stores bytes.
   static bool isOfBytes(const Imath::V4f& color) {
     for (int i = 0; i < 4; ++i)
       if (!(color[i] >= 0 && color[i] <= 1) || std::round(color[i] * 255) / 255 != color[i])
@@ -348,7 +355,7 @@ class ObjReader {
   Values<Imath::V2d> uvs_;
   Values<Imath::V3d> normals_;
   std::vector<Imath::V4f> colors_;
-  Named namedUvs_, namedNormals_;
+  References uvReferences_, normalReferences_;
   bool hasAlpha_ = false;
 };
 
@@ -380,7 +387,7 @@ void writeObj(ByteWriter& out, const TriMesh& mesh, const Progress& progress) {
     for (int i = 0; i < (held.colors.empty() ? 0 : held.hasAlpha ? 4 : 3); ++i) {
       const float part = held.colors[v][i];
       out.write(" ");
-      // All digits of a float, but where a few tell the byte.
+      // Writes all digits of a float, or the few digits that identify a byte.
       if (held.colorPrecision == ColorPrecision::Byte)
         out.writeNumber(std::round(std::clamp(part, 0.0f, 1.0f) * 255) / 255);
       else

@@ -14,43 +14,44 @@ struct Counts {
   std::size_t vertices = 0, faces = 0;
 };
 
-/// The keyword [ST][C][N]OFF and the counts; colours and normals stand behind the coordinates of a
-/// vertex, texture coordinates too, so they are skipped with the rest of the line.
+/// Reads the keyword [ST][C][N]OFF and the counts. Colours, normals and texture coordinates follow
+/// the coordinates of a vertex, so they are skipped with the rest of the line.
 Counts readHeader(TextCursor& cursor) {
   if (!cursor.skipToToken('#')) cursor.fail("the file holds no data; export the mesh again");
   const std::string_view keyword = cursor.token();
   if (!keyword.ends_with("OFF") || keyword.size() > 6)
-    cursor.fail("the file does not begin with 'OFF'; give its true format");
+    cursor.fail("the file does not begin with 'OFF'; give its actual format");
   for (const char c : keyword.substr(0, keyword.size() - 3)) {
     if (c == '4' || c == 'n')
-      cursor.fail(fmt::format("'{}' is a mesh of another dimension; export it in three", keyword));
+      cursor.fail(fmt::format("'{}' is a mesh of another dimension; export it in three dimensions",
+                              keyword));
     if (c != 'C' && c != 'N' && c != 'S' && c != 'T')
-      cursor.fail("the file does not begin with 'OFF'; give its true format");
+      cursor.fail("the file does not begin with 'OFF'; give its actual format");
   }
   if (cursor.skipBlanks('#') && *cursor.at() == 'B')
-    cursor.fail("binary OFF is not read; export the mesh as text or as PLY");
+    cursor.fail("binary OFF is not supported; export the mesh as text or as PLY");
   std::int64_t counts[2];
   for (std::int64_t& count : counts) {
     cursor.skipToToken('#');
-    count = cursor.integer("the count of vertices and faces");
+    count = cursor.integer("the number of vertices and faces");
     if (count < 0)
-      cursor.fail(fmt::format("the count {} is negative; export the mesh again", count));
+      cursor.fail(fmt::format("the number {} is negative; export the mesh again", count));
   }
-  cursor.skipLine();  // the count of edges, which nobody fills in
+  cursor.skipLine();  // the number of edges, which is unreliable
   return {static_cast<std::size_t>(counts[0]), static_cast<std::size_t>(counts[1])};
 }
 
-constexpr std::size_t kLeastVertex = 6, kLeastFace = 2;  // "0 0 0\n", "0\n"
+constexpr std::size_t kMinVertexSize = 6, kMinFaceSize = 2;  // "0 0 0\n", "0\n"
 
-/// @param remaining  bytes behind the header
+/// @param remaining  bytes after the header
 void checkCounts(const Counts& counts, std::size_t remaining, const std::string& name) {
-  const std::size_t left = remaining + 1;  // the last line may lack its end
-  if (counts.vertices <= left / kLeastVertex &&
-      counts.faces <= (left - counts.vertices * kLeastVertex) / kLeastFace)
+  const std::size_t left = remaining + 1;  // the last line may lack its line end
+  if (counts.vertices <= left / kMinVertexSize &&
+      counts.faces <= (left - counts.vertices * kMinVertexSize) / kMinFaceSize)
     return;
   failFile(name, fmt::format(
                      "promises {} vertices and {} faces, more than its {} bytes of data can hold; "
-                     "it was cut off or its header is damaged: fetch or export it again",
+                     "it is truncated or its header is damaged: download or export it again",
                      counts.vertices, counts.faces, remaining));
 }
 
@@ -67,8 +68,8 @@ class OffReader {
     for (std::size_t i = 0; i < counts.faces; ++i) readFace();
     if (cursor_.skipToToken('#'))
       cursor_.fail(fmt::format(
-          "the file goes on behind the {} vertices and {} faces that its header promises; the "
-          "header is damaged or something was appended: export it again",
+          "the file has data after the {} vertices and {} faces that its header promises; the "
+          "header is damaged or data was appended: export it again",
           counts.vertices, counts.faces));
   }
 
@@ -86,7 +87,7 @@ class OffReader {
   void readFace() {
     corners_.clear();
     cursor_.skipToToken('#');
-    const Place place = cursor_.place();
+    const FilePosition place = cursor_.place();
     for (std::int64_t left = readWhole("the number of corners"); left > 0; --left) {
       cursor_.skipToToken('#');
       corners_.push_back(static_cast<std::uint64_t>(readWhole("the index of a vertex")));
@@ -98,7 +99,7 @@ class OffReader {
   std::int64_t readWhole(const char* what) {
     const std::int64_t value = cursor_.integer(what);
     if (value < 0 || !cursor_.atBlank())
-      cursor_.fail(fmt::format("{} is not a whole number from 0; export the mesh again", what));
+      cursor_.fail(fmt::format("{} is not a non-negative integer; export the mesh again", what));
     return value;
   }
 

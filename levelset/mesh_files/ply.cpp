@@ -41,7 +41,7 @@ class BinarySource {
     index_ = index;
   }
   void end() {}
-  [[nodiscard]] Place place() const { return {element_->name.c_str(), index_}; }
+  [[nodiscard]] FilePosition place() const { return {element_->name.c_str(), index_}; }
   [[nodiscard]] const char* at() const { return p_; }
 
   double value(Type type) {
@@ -72,7 +72,7 @@ class BinarySource {
     requireList(type, count);
     p_ += count * ply::sizeOf(type);
   }
-  /// A list of `count` values is there.
+  /// Checks that a list of `count` values is present.
   void requireList(Type type, std::size_t count) {
     if (count > static_cast<std::size_t>(end_ - p_) / ply::sizeOf(type)) failShort();
   }
@@ -83,7 +83,7 @@ class BinarySource {
   }
   [[noreturn]] void failShort() const {
     failAt(name_, place(),
-           "the file ends in the middle of it; it was cut off or is damaged: fetch or export it "
+           "the file ends within it; it is truncated or damaged: download or export it "
            "again");
   }
 
@@ -94,7 +94,7 @@ class BinarySource {
   std::size_t index_ = 0;
 };
 
-/// One element a line; a line with too many values would shift all that follow.
+/// Reads one element per line. A line with too many values would shift all that follow.
 class AsciiSource {
  public:
   AsciiSource(std::string_view data, std::size_t headerLines, const std::string& name)
@@ -107,13 +107,14 @@ class AsciiSource {
              fmt::format("there are more values than an element '{}' has; export the mesh again",
                          element_->name));
   }
-  [[nodiscard]] Place place() const { return cursor_.place(); }
+  [[nodiscard]] FilePosition place() const { return cursor_.place(); }
   [[nodiscard]] const char* at() const { return cursor_.at(); }
 
   double value(Type type) {
     if (!cursor_.skipToToken(0)) failEnd();
     const double number = cursor_.number("a number");
-    // What is declared float is one; beyond its range the caller should see what was written.
+    // A value declared float is rounded to float. Beyond the range of float, the caller receives
+    // the written number.
     const bool isFloat =
         type == Type::Float && std::abs(number) <= std::numeric_limits<float>::max();
     return isFloat ? static_cast<double>(static_cast<float>(number)) : number;
@@ -132,7 +133,7 @@ class AsciiSource {
   [[noreturn]] void failEnd() const {
     failAt(name_, place(),
            fmt::format(
-               "the file ends within the elements '{}'; it was cut off or is damaged: fetch or "
+               "the file ends within the elements '{}'; it is truncated or damaged: download or "
                "export it again",
                element_->name));
   }
@@ -180,7 +181,7 @@ class ElementReader {
   }
 
   void addVertex() {
-    const Place place = source_.place();
+    const FilePosition place = source_.place();
     builder_.addVertex(of(Role::X), of(Role::Y), of(Role::Z), place, source_.at());
     if (hasNormals_) builder_.addNormal({of(Role::Nx), of(Role::Ny), of(Role::Nz)}, place);
     if (hasUvs_) builder_.addUv({of(Role::U), of(Role::V)}, place);
@@ -212,29 +213,30 @@ class ElementReader {
       corner = wholeNumber(source_.value(property.type), "the index of a vertex");
   }
 
-  /// As text a number may be beyond its type; what is no number at all is told elsewhere.
+  /// Refuses a number beyond the range of its type, which text can contain. Another check refuses
+  /// numbers that are not finite.
   void requireFloat(double value) const {
     if (!std::isfinite(value) || std::abs(value) <= std::numeric_limits<float>::max()) return;
     failAt(builder_.name(), source_.place(),
-           fmt::format("{} is beyond the range of float, 3.4e38, of which its property is; repair "
-                       "the mesh, or read it bare, without what its vertices carry (--bare)",
+           fmt::format("{} exceeds the range of the property's type float, 3.4e38; repair "
+                       "the mesh, or read it without attributes (--no-attributes)",
                        value));
   }
 
-  /// Of what the type can hold; the float next to it.
+  /// Fraction of the type's maximum, rounded to float.
   double share(double value, Type type) const {
     const double full = type == Type::Uint8 ? 255 : 65535;
     if (!(value >= 0 && value <= full) || std::floor(value) != value) {
       failAt(builder_.name(), source_.place(),
-             fmt::format("a colour holds {}, which is no whole number from 0 to {}; repair the "
-                         "mesh, or read it bare, without what its vertices carry (--bare)",
+             fmt::format("a colour holds {}, which is not an integer from 0 to {}; repair the "
+                         "mesh, or read it without attributes (--no-attributes)",
                          value, full));
     }
     return static_cast<double>(static_cast<float>(value) / static_cast<float>(full));
   }
 
   std::uint64_t wholeNumber(double value, const char* what) const {
-    constexpr double kLimit = 1e15;  // doubles count exactly up to 9e15
+    constexpr double kLimit = 1e15;  // doubles represent integers exactly up to 9e15
     if (value >= 0 && value < kLimit) {
       const auto whole = static_cast<std::uint64_t>(value);
       if (static_cast<double>(whole) == value) return whole;
@@ -255,11 +257,12 @@ void readElements(const Header& header, std::string_view data, MeshBuilder& buil
   Source source(data, header.lines, builder.name());
   ElementReader<Source> reader(source, builder);
   for (const Element& element : header.elements) reader.read(element);
-  requireNothingBehind(data, static_cast<std::size_t>(source.at() - data.data()), builder.name(),
-                       "the elements that its header promises");
+  requireNoTrailingData(data, static_cast<std::size_t>(source.at() - data.data()), builder.name(),
+                        "the elements that its header promises");
 }
 
-/// @return  were there any?
+/// Marks all attributes as skipped.
+/// @return true when there were any
 bool skipAttributes(Header& header) {
   bool any = false;
   for (Element& element : header.elements)
@@ -271,7 +274,8 @@ bool skipAttributes(Header& header) {
   return any;
 }
 
-/// Triangles cannot be more than the data can list; a header may claim what it likes.
+/// Reserves memory. A header may promise any number of triangles, so the size of the data limits
+/// them.
 void reserveElements(const Header& header, std::size_t dataSize, MeshBuilder& builder) {
   std::size_t vertices = 0, triangles = 0, attributeBytes = 0;
   for (const Element& element : header.elements) {
@@ -299,7 +303,7 @@ void reserveElements(const Header& header, std::size_t dataSize, MeshBuilder& bu
 void readPly(std::string_view input, MeshBuilder& builder) {
   Header header = ply::readHeader(input, builder.name());
   if (builder.wantsAttributes()) {
-    for (const std::string& what : header.leftAside) builder.leaveAside(what);
+    for (const std::string& what : header.unsupported) builder.noteUnsupported(what);
   } else if (skipAttributes(header)) {
     builder.dropAttributes();
   }
@@ -338,7 +342,7 @@ MeshFileInfo plyInfo(std::string_view head, std::size_t fileSize, const std::str
   for (const Element& element : header.elements) {
     if (element.holdsVertices()) {
       info.vertices = element.count;
-      MeshAttributes held;  // one of each that there is
+      MeshAttributes held;  // one entry of each attribute present
       if (element.holdsNormals()) held.normals.resize(1);
       if (element.holdsUvs()) held.uvs.resize(1);
       if (element.holdsColors()) held.colors.resize(1);

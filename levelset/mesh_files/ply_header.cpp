@@ -32,7 +32,7 @@ class HeaderReader {
   Header read() {
     if (input_.starts_with("\xEF\xBB\xBF")) offset_ = 3;  // byte order mark
     if (words(nextLine()) != std::vector<std::string_view>{"ply"})
-      failFile(name_, "does not begin with 'ply'; give its true format");
+      failFile(name_, "does not begin with 'ply'; give its actual format");
     for (;;) {
       const auto line = words(nextLine());
       if (line.empty() || line[0] == "comment" || line[0] == "obj_info") continue;
@@ -44,9 +44,9 @@ class HeaderReader {
       else if (line[0] == "property")
         readProperty(line);
       else
-        fail(fmt::format("'{}' is no word of a PLY header", line[0]));
+        fail(fmt::format("'{}' is not a keyword of a PLY header", line[0]));
     }
-    if (!formatSeen_) fail("the header names no format");
+    if (!formatSeen_) fail("the header has no format line");
     for (Element& element : header_.elements) chooseUvs(element);
     header_.size = offset_;
     return std::move(header_);
@@ -61,8 +61,8 @@ class HeaderReader {
     const std::size_t end = input_.substr(0, kMaxHeader).find('\n', offset_);
     ++header_.lines;
     if (end == std::string_view::npos) {
-      if (header_.lines == 1) failFile(name_, "does not begin with 'ply'; give its true format");
-      fail("the header has no end");
+      if (header_.lines == 1) failFile(name_, "does not begin with 'ply'; give its actual format");
+      fail("the header has no 'end_header' line");
     }
     const std::string_view line = input_.substr(offset_, end - offset_);
     offset_ = end + 1;
@@ -78,7 +78,7 @@ class HeaderReader {
     else if (format == "binary_big_endian")
       header_.encoding = Encoding::Big;
     else
-      fail(fmt::format("the format '{}' is not known", format));
+      fail(fmt::format("the format '{}' is unknown", format));
     formatSeen_ = true;
   }
 
@@ -89,14 +89,14 @@ class HeaderReader {
     const auto [end, error] =
         std::from_chars(line[2].data(), line[2].data() + line[2].size(), element.count);
     if (error != std::errc{} || end != line[2].data() + line[2].size())
-      fail(fmt::format("'{}' is no count of elements", line[2]));
+      fail(fmt::format("'{}' is not a number of elements", line[2]));
     if (element.name == "vertex")
       for (const Element& other : header_.elements)
-        if (other.name == element.name) fail("the element 'vertex' comes twice");
+        if (other.name == element.name) fail("the element 'vertex' occurs twice");
     header_.elements.push_back(std::move(element));
   }
 
-  /// The first pair of names that is whole.
+  /// Chooses the first complete pair of names for the texture coordinates.
   static void chooseUvs(Element& element) {
     const auto holds = [&](Role role, int family) {
       return std::any_of(element.properties.begin(), element.properties.end(),
@@ -120,11 +120,11 @@ class HeaderReader {
         {"float64", Type::Double}};
     for (const auto& [name, type] : names)
       if (word == name) return type;
-    fail(fmt::format("the type '{}' is not known", word));
+    fail(fmt::format("the type '{}' is unknown", word));
   }
 
   void readProperty(const std::vector<std::string_view>& line) {
-    if (header_.elements.empty()) fail("a property stands before the first element");
+    if (header_.elements.empty()) fail("a property precedes the first element");
     Element& element = header_.elements.back();
     const bool list = line.size() > 1 && line[1] == "list";
     if (line.size() < (list ? 5u : 3u)) fail("a property needs a type and a name");
@@ -139,23 +139,24 @@ class HeaderReader {
     if (property.role != Role::Skip &&
         std::any_of(element.properties.begin(), element.properties.end(), isSame)) {
       if (isAttribute(property.role))
-        property.role = Role::Skip;  // the first counts
+        property.role = Role::Skip;  // the first one counts
       else
-        fail(fmt::format("the property '{}' comes twice", name));
+        fail(fmt::format("the property '{}' occurs twice", name));
     }
     if (property.role >= Role::Red && property.role <= Role::Alpha && !isColorType(property.type))
       property.role = Role::Skip;
-    if (element.name == "face") noteOfFaces(name);
+    if (element.name == "face") noteFaceAttributes(name);
     element.properties.push_back(property);
   }
 
   static int familyOf(std::string_view name) { return name.size() > 1 ? 3 : name < "u" ? 2 : 1; }
 
-  void noteOfFaces(std::string_view name) {
-    if (name == "texcoord") header_.leftAside.insert("texture coordinates of faces");
+  void noteFaceAttributes(std::string_view name) {
+    if (name == "texcoord") header_.unsupported.insert("texture coordinates of faces");
     if (name == "red" || name == "green" || name == "blue")
-      header_.leftAside.insert("colours of faces");
-    if (name == "nx" || name == "ny" || name == "nz") header_.leftAside.insert("normals of faces");
+      header_.unsupported.insert("colours of faces");
+    if (name == "nx" || name == "ny" || name == "nz")
+      header_.unsupported.insert("normals of faces");
   }
 
   static Role roleOf(std::string_view element, std::string_view name, bool list) {
@@ -172,7 +173,7 @@ class HeaderReader {
     return Role::Skip;
   }
 
-  /// Those of which it is plain what is full.
+  /// Returns true for types whose value of full colour is known.
   static bool isColorType(Type type) {
     return type == Type::Uint8 || type == Type::Uint16 || type >= Type::Float;
   }
@@ -196,14 +197,14 @@ Header readHeader(std::string_view input, const std::string& name) {
 }
 
 void checkPromises(const Header& header, std::size_t dataSize, const std::string& name) {
-  std::size_t left = dataSize + 1;  // the last line of a text may lack its end
+  std::size_t left = dataSize + 1;  // the last line of a text may lack its line end
   for (const Element& element : header.elements) {
     const std::size_t least = element.leastSize(header.encoding);
     if (least == 0) continue;
     if (element.count > left / least) {
       failFile(name,
                fmt::format("promises {} elements '{}', more than its {} bytes of data can hold; "
-                           "it was cut off or its header is damaged: fetch or export it again",
+                           "it is truncated or its header is damaged: download or export it again",
                            element.count, element.name, dataSize));
     }
     left -= element.count * least;

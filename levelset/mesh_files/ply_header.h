@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-/// What a PLY file promises: Greg Turk, "The PLY Polygon File Format", Stanford 1994.
+/// Header of a PLY file. Greg Turk, "The PLY Polygon File Format", Stanford 1994.
 namespace levelset::ply {
 
 enum class Type { Int8, Uint8, Int16, Uint16, Int32, Uint32, Float, Double };
@@ -25,12 +25,12 @@ constexpr std::size_t sizeOf(Type type) {
   return sizes[static_cast<int>(type)];
 }
 
-/// Of an element, in the order of the data.
+/// Property of an element, in the order of the data.
 struct Property {
   Type type;
   std::optional<Type> listCount;  ///< set for a list
   Role role = Role::Skip;
-  int family = 0;  ///< of texture coordinates: which of the pairs of names
+  int family = 0;  ///< which pair of names of texture coordinates
 };
 
 struct Element {
@@ -51,14 +51,14 @@ struct Element {
   [[nodiscard]] bool holdsColors() const {
     return has(Role::Red) && has(Role::Green) && has(Role::Blue);
   }
-  /// The widest type among the properties from one role to another.
+  /// The widest type among the properties in a range of roles.
   [[nodiscard]] Type widest(Role from, Role to) const {
     Type widest = Type::Int8;
     for (const Property& p : properties)
       if (p.role >= from && p.role <= to) widest = std::max(widest, p.type);
     return widest;
   }
-  /// Bytes that one element takes at least.
+  /// Minimum size of one element in bytes.
   [[nodiscard]] std::size_t leastSize(Encoding encoding) const {
     std::size_t size = 0;
     for (const Property& p : properties)
@@ -70,20 +70,21 @@ struct Element {
 struct Header {
   Encoding encoding = Encoding::Ascii;
   std::vector<Element> elements;
-  std::size_t size = 0;                  ///< bytes, up to the data
-  std::size_t lines = 0;                 ///< of text
-  std::set<std::string> leftAside = {};  ///< what a mesh might carry and ours do not
+  std::size_t size = 0;                    ///< bytes before the data
+  std::size_t lines = 0;                   ///< lines of the header
+  std::set<std::string> unsupported = {};  ///< names of attributes that a TriMesh cannot hold
 };
 
-/// @param input  the whole file, or its beginning with the header in it
-/// @throws InvalidInput with the line
+/// Reads the header of a PLY file.
+/// @param input  the complete file, or its start including the header
+/// @throws InvalidInput with the line number
 [[nodiscard]] Header readHeader(std::string_view input, const std::string& name);
 
-/// Nothing promises more than the file can hold.
+/// Checks that the file can hold all elements that the header promises.
 /// @throws InvalidInput
 void checkPromises(const Header& header, std::size_t dataSize, const std::string& name);
 
-/// What a mesh needs is there, and the file may hold it.
+/// Checks that the header has vertices and faces, and that the file can hold them.
 /// @throws InvalidInput
 void checkHeader(const Header& header, std::size_t dataSize, const std::string& name);
 

@@ -50,8 +50,8 @@ void writePly(ByteWriter& out, const TriMesh& mesh, const Progress& progress) {
   static_assert(std::endian::native == std::endian::little, "the header says little endian");
   const bool asFloat = mesh.precision == CoordinatePrecision::Float;
   const char* real = asFloat ? "float" : "double";
-  // Readers that take the index for a signed int are common; the wider type only where it is
-  // needed.
+  // Many readers interpret the index as a signed int, so the unsigned type is used only where
+  // necessary.
   const char* index = mesh.positions.size() > 0x7FFFFFFF ? "uint" : "int";
   out.write(
       fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {0}\n"

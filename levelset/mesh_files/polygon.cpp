@@ -10,21 +10,23 @@ namespace {
 using Imath::V2d;
 using Imath::V3d;
 
-/// A larger polygon is no fan though it might be: its triangles would all share a corner, and so
+/// Maximum number of corners of a fan. All triangles of a larger fan would share a corner, and so
 /// would their bounding boxes.
 constexpr std::size_t kLargestFan = 16;
-/// Beyond this many corner × reflex-corner tests (about two seconds) a polygon is refused.
+/// Limit of the corner × reflex-corner tests (about two seconds). A polygon that needs more is
+/// refused.
 constexpr double kMaxTests = 5e8;
 
 double cross(const V2d& a, const V2d& b, const V2d& c) {
   return (b - a).cross(c - a);
 }
 
-/// The corners in the plane of the two axes across the polygon's normal, counter-clockwise.
+/// Projects the corners onto the plane of the two axes across the polygon's normal,
+/// counter-clockwise.
 std::vector<V2d> flatten(std::span<const std::uint32_t> corners,
                          const std::vector<V3d>& positions) {
   const V3d origin = positions[corners[0]];
-  V3d normal(0);  // Newell: twice the area vector, for planar or not
+  V3d normal(0);  // Newell's method: twice the area vector, also for non-planar polygons
   for (std::size_t i = 1; i + 1 < corners.size(); ++i)
     normal += (positions[corners[i]] - origin).cross(positions[corners[i + 1]] - origin);
   int drop = 0;
@@ -41,15 +43,16 @@ std::vector<V2d> flatten(std::span<const std::uint32_t> corners,
   return points;
 }
 
-/// Every triangle of the fan from the first corner turns the right way.
+/// Returns true when every triangle of the fan from the first corner has the correct orientation.
 bool fanFits(const std::vector<V2d>& points) {
   for (std::size_t i = 1; i + 1 < points.size(); ++i)
     if (cross(points[0], points[i], points[i + 1]) < 0) return false;
   return true;
 }
 
-/// Ear clipping with a queue of ears: clipping one changes the state of its two neighbours only,
-/// and puts them at the end, so that one after the other corner goes rather than all around one.
+/// Ear clipping with a queue of ears. Clipping an ear changes only its two neighbours and moves
+/// them to the end of the queue. The ears are thus clipped all around the polygon, not at one
+/// corner only.
 class EarClipper {
  public:
   explicit EarClipper(const std::vector<V2d>& points)
@@ -112,7 +115,8 @@ class EarClipper {
     });
   }
 
-  /// When a polygon that crosses itself, or has no area, offers no ear: any corner will do.
+  /// Takes the next ear. A polygon that crosses itself or has no area may have none; then any
+  /// corner is taken.
   std::size_t nextEar(std::size_t current) {
     while (!ears_.empty()) {
       const auto [ear, turn] = ears_.front();
@@ -125,7 +129,8 @@ class EarClipper {
   const std::vector<V2d>& points_;
   std::vector<std::size_t> previous_, next_, reflex_;
   std::vector<State> state_;
-  std::vector<std::uint32_t> turns_;  // how often queued: earlier places in the queue are void
+  std::vector<std::uint32_t> turns_;  // number of times queued; earlier entries in the queue are
+                                      // void
   std::deque<std::pair<std::size_t, std::uint32_t>> ears_;
 };
 

@@ -14,17 +14,17 @@ namespace {
 
 constexpr std::size_t kStlHeaderSize = 84, kFacetSize = 50;
 
-/// Gives equal positions one number.
+/// Assigns one vertex number to equal positions.
 class VertexMerger {
  public:
   explicit VertexMerger(MeshBuilder& builder) : builder_(builder), table_(points_, 1 << 11) {}
 
-  std::uint64_t add(const Imath::V3d& stored, Place place, const char* at) {
+  std::uint64_t add(const Imath::V3d& stored, FilePosition place, const char* at) {
     const Imath::V3d p = stored + Imath::V3d(0);  // −0 + 0 = 0
     if (points_.size() >= std::numeric_limits<std::uint32_t>::max())
-      failFile(builder_.name(), "holds more than 4294967294 vertices; split it");
+      failFile(builder_.name(), "holds more than 4294967294 vertices; split the mesh");
     const auto next = static_cast<std::uint32_t>(points_.size());
-    const std::uint32_t found = table_.findOrEnter(p, next);
+    const std::uint32_t found = table_.findOrInsert(p, next);
     if (found == next) {
       builder_.addVertex(p.x, p.y, p.z, place, at);
       points_.push_back(p);
@@ -53,7 +53,7 @@ bool beginsWithSolid(std::string_view input) {
                     [](char a, char b) { return (a | 0x20) == b; });
 }
 
-/// Binary headers may begin with "solid" too, so the size of the file decides first.
+/// A binary header may also begin with "solid", so the size of the file decides first.
 bool isBinary(std::string_view input, std::size_t fileSize) {
   if (input.size() >= kStlHeaderSize &&
       fileSize == kStlHeaderSize + std::size_t{facetCount(input)} * kFacetSize)
@@ -61,27 +61,29 @@ bool isBinary(std::string_view input, std::size_t fileSize) {
   return !beginsWithSolid(input) || input.substr(0, 1024).find('\0') != std::string_view::npos;
 }
 
-/// The triangles that a file of so many bytes has room for; what its header promises must fit.
-std::size_t roomForFacets(std::string_view head, std::size_t fileSize, const std::string& name) {
+/// Number of triangles that a file of that size can hold. Checks the number that its header
+/// promises.
+std::size_t facetCapacity(std::string_view head, std::size_t fileSize, const std::string& name) {
   if (fileSize < kStlHeaderSize)
     failFile(name,
              "is neither text that begins with 'solid' nor long enough for a binary "
-             "STL; give its true format");
+             "STL; give its actual format");
   const std::size_t count = facetCount(head), held = (fileSize - kStlHeaderSize) / kFacetSize;
   if (count > held) {
-    failFile(name, fmt::format("promises {} triangles and holds {}; it was cut off or is no STL: "
-                               "fetch or export it again",
-                               count, held));
+    failFile(name,
+             fmt::format("promises {} triangles and holds {}; it is truncated or not an STL file: "
+                         "download or export it again",
+                         count, held));
   }
   return held;
 }
 
 void readBinary(std::string_view input, MeshBuilder& builder) {
-  const std::size_t held = roomForFacets(input, input.size(), builder.name());
+  const std::size_t held = facetCapacity(input, input.size(), builder.name());
   const std::size_t count = facetCount(input);
-  requireNothingBehind(
+  requireNoTrailingData(
       input, kStlHeaderSize + count * kFacetSize, builder.name(),
-      fmt::format("the {} triangles that its header promises (it has room for {})", count, held));
+      fmt::format("the {} triangles that its header promises (it can hold {})", count, held));
   builder.declarePrecision(CoordinatePrecision::Float);
   builder.reserve(count / 2, count);
   VertexMerger merger(builder);
@@ -89,8 +91,8 @@ void readBinary(std::string_view input, MeshBuilder& builder) {
   for (std::size_t i = 0; i < count; ++i) {
     const char* facet = input.data() + kStlHeaderSize + i * kFacetSize;
     float numbers[9];
-    std::memcpy(numbers, facet + 12, sizeof numbers);  // behind the normal
-    const Place place{"triangle", i};
+    std::memcpy(numbers, facet + 12, sizeof numbers);  // after the normal
+    const FilePosition place{"triangle", i};
     for (std::size_t k = 0; k < 3; ++k)
       corners[k] =
           merger.add({numbers[3 * k], numbers[3 * k + 1], numbers[3 * k + 2]}, place, facet);
@@ -128,29 +130,31 @@ class TextReader {
         continue;
       }
       if (keyword != "solid" && keyword != "endsolid")
-        cursor_.fail(fmt::format("'{}' is no word of an STL file; export the mesh again", keyword));
+        cursor_.fail(
+            fmt::format("'{}' is not a keyword of an STL file; export the mesh again", keyword));
       open = keyword == "solid";
       cursor_.skipLine();  // the name
     }
     if (open)
-      cursor_.fail("the file ends before 'endsolid'; it was cut off: fetch or export it again");
+      cursor_.fail("the file ends before 'endsolid'; it is truncated: download or export it again");
   }
 
  private:
   std::string lowerToken() {
     std::string word(cursor_.token().substr(0, 24));
-    if (word.empty()) cursor_.fail("a backslash stands where a word should; export the mesh again");
+    if (word.empty())
+      cursor_.fail("found a backslash where a word is expected; export the mesh again");
     for (char& c : word)
       if (c >= 'A' && c <= 'Z') c = static_cast<char>(c | 0x20);
     return word;
   }
 
-  /// Computed again from the corners, so neither needed nor checked.
+  /// Skips the normal: it follows from the corners and is neither needed nor checked.
   void readNormal() {
     for (int i = 0; i < 4; ++i) {
       cursor_.skipToToken(0);
       if (cursor_.token().empty())
-        cursor_.fail("the file ends within a facet; it was cut off: fetch or export it again");
+        cursor_.fail("the file ends within a facet; it is truncated: download or export it again");
     }
   }
 
@@ -169,11 +173,11 @@ class TextReader {
   std::vector<std::uint64_t> corners_;
 };
 
-/// What single precision must leave of the object's longest side.
+/// Maximum spacing of single-precision coordinates, relative to the object's longest side.
 constexpr double kStlPrecision = 1e-3;
 
 void requireSinglePrecision(const TriMesh& mesh) {
-  if (mesh.precision == CoordinatePrecision::Float) return;  // nothing is lost
+  if (mesh.precision == CoordinatePrecision::Float) return;  // no loss of precision
   const Imath::Box3d box = bounds(mesh);
   if (box.isEmpty()) return;
   double farthest = 0;
@@ -185,8 +189,8 @@ void requireSinglePrecision(const TriMesh& mesh) {
       spacingAt(farthest, CoordinatePrecision::Float) <= kStlPrecision * longest)
     return;
   throw InvalidInput(fmt::format(
-      "write: STL keeps places in single precision, too coarse for an object of {:.3g} that lies "
-      "{:.3g} from the origin; write PLY, OBJ or OFF, or move it to the origin first",
+      "write: STL stores positions in single precision, too coarse for an object of {:.3g} at "
+      "a distance of {:.3g} from the origin; write PLY, OBJ or OFF, or move it to the origin first",
       longest, farthest));
 }
 
@@ -201,7 +205,7 @@ void readStl(std::string_view input, MeshBuilder& builder) {
 
 MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize, const std::string& name) {
   if (!isBinary(head, fileSize)) return {"stl, ascii", 0, 0};
-  if (fileSize > 0) (void)roomForFacets(head, fileSize, name);
+  if (fileSize > 0) (void)facetCapacity(head, fileSize, name);
   return {"stl, binary", 0, head.size() >= kStlHeaderSize ? facetCount(head) : 0};
 }
 

@@ -16,22 +16,23 @@ namespace {
 using Imath::V2d;
 using Imath::V3d;
 
-constexpr std::size_t kChunk = 4096;  // triangles; fixed, so that threads do not change the result
+constexpr std::size_t kChunk = 4096;  // triangles per chunk; fixed, so that the number of threads
+                                      // does not change the result
 
-/// Side of the edge a → b on which the line through q moved by (ε, ε²) lies; 0 only when a = b.
+/// Side of the edge a → b on which the line through q, shifted by (ε, ε²), lies. 0 only when a = b.
 int sideOf(const V2d& a, const V2d& b, const V2d& q) {
   if (const int side = orient2d(a, b, q)) return side;
   if (a.y != b.y) return a.y > b.y ? 1 : -1;
   return (b.x > a.x) - (b.x < a.x);
 }
 
-/// The plane (y, z) seen along the line.
+/// Projects a point along the line onto the plane (y, z).
 V2d project(const V3d& p) {
   return {p.y, p.z};
 }
 
-/// The first integer x for which the point (x, y, z) lies behind the face, seen from −x.
-/// @param front  +1 when the face shows its front to +x
+/// First integer x for which the point (x, y, z) lies behind the face, as seen from −x.
+/// @param front  +1 when the front of the face points to +x
 int firstBehind(const V3d& a, const V3d& b, const V3d& c, const V2d& q, int front) {
   const V2d pa = project(a) - q, pb = project(b) - q, pc = project(c) - q;
   const double bc = pb.x * pc.y, cb = pb.y * pc.x;
@@ -43,8 +44,8 @@ int firstBehind(const V3d& a, const V3d& b, const V3d& c, const V2d& q, int fron
   const double size =
       std::abs(bc) + std::abs(cb) + std::abs(ca) + std::abs(ac) + std::abs(ab) + std::abs(ba);
   const double magnitude = std::max(std::abs(low), std::abs(high));
-  // Each weight is off by at most 4 ulp of its terms; a weighted mean of a.x, b.x, c.x moves by
-  // that share of their range.
+  // The error of each weight is at most 4 ulp of its terms. A weighted mean of a.x, b.x, c.x
+  // changes by that fraction of their range.
   constexpr double kUlp = 2.3e-16;
   double x = (low + high) / 2, error = (high - low) / 2;
   if (sum > 0 && 32 * kUlp * size < sum) {
@@ -54,7 +55,7 @@ int firstBehind(const V3d& a, const V3d& b, const V3d& c, const V2d& q, int fron
   error += 8 * kUlp * magnitude;
   int before = static_cast<int>(std::floor(x - error));
   int behind = static_cast<int>(std::floor(x + error)) + 1;
-  // `before` is not behind the face and `behind` is, except by rounding in between.
+  // Bisection. `before` is not behind the face and `behind` is; only rounding decides in between.
   while (behind - before > 1) {
     const int middle = before + (behind - before) / 2;
     if (orient3d(a, b, c, V3d(middle, q.x, q.y)) == front)
@@ -65,7 +66,7 @@ int firstBehind(const V3d& a, const V3d& b, const V3d& c, const V2d& q, int fron
   return behind;
 }
 
-/// Range of z that the triangle covers at this y, a little enlarged; the exact test decides inside.
+/// Range of z that the triangle covers at this y, slightly enlarged. The exact test then decides.
 std::pair<double, double> rangeAt(double y, const V2d& a, const V2d& b, const V2d& c) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   const auto visit = [&](const V2d& p, const V2d& q) {
@@ -96,7 +97,7 @@ void LineCrossings::addTriangle(const V3d& a, const V3d& b, const V3d& c, int we
       const V2d q(y, z);
       const int side = sideOf(pa, pb, q);
       if (side == 0 || sideOf(pb, pc, q) != side || sideOf(pc, pa, q) != side) continue;
-      // Counter-clockwise in (y, z) means a normal towards +x: the line leaves there.
+      // Counter-clockwise in (y, z) means a normal towards +x: the line leaves the solid there.
       out.push_back({y, z, firstBehind(a, b, c, q, side), -side * weight, {}});
     }
   }

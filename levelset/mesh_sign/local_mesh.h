@@ -8,8 +8,8 @@
 
 namespace levelset::convert {
 
-/// A mesh in voxels about an integer origin: grid points have integer coordinates, and numbers stay
-/// small however far from the world's origin the object lies.
+/// A mesh in voxel units relative to an integer origin. Grid points have integer coordinates.
+/// Coordinates stay small even if the object lies far from the world origin.
 struct LocalMesh {
   std::vector<Imath::V3d> points;
   std::vector<Triangle> triangles;

@@ -9,11 +9,12 @@
 
 namespace levelset {
 
-/// Pairs of triangles that cross each other, shared vertices and edges apart. Exact predicates.
+/// Counts the pairs of triangles that cross each other, apart from shared vertices and edges. Uses
+/// exact predicates.
 [[nodiscard]] std::size_t countSelfIntersections(const TriMesh& mesh,
                                                  const Progress& progress = {});
 
-/// Generalised winding number of the mesh about `point`, by direct summation: the reference.
+/// Generalised winding number of the mesh at `point`, by direct summation. Serves as the reference.
 [[nodiscard]] double windingNumber(const TriMesh& mesh, const Imath::V3d& point);
 
 }  // namespace levelset

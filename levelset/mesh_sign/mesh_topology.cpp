@@ -7,18 +7,18 @@
 namespace levelset::convert {
 namespace {
 
-/// For each vertex the lowest index among those at its position.
+/// For each vertex, the lowest index of the vertices at the same position.
 std::vector<std::uint32_t> weld(const std::vector<Imath::V3d>& positions) {
   PositionTable table(positions, positions.size());
   std::vector<std::uint32_t> first(positions.size());
   for (std::uint32_t v = 0; v < positions.size(); ++v)
-    first[v] = table.findOrEnter(positions[v], v);
+    first[v] = table.findOrInsert(positions[v], v);
   return first;
 }
 
-/// Rows of items that share a key in [0, keys): counting sort, stable.
+/// Items grouped by a key in [0, keys), by a stable counting sort.
 struct Buckets {
-  std::vector<std::size_t> begin;    ///< keys + 1
+  std::vector<std::size_t> begin;    ///< start of each group, keys + 1 entries
   std::vector<std::uint32_t> items;  ///< grouped by key
 
   template <typename KeyOf>
@@ -31,14 +31,15 @@ struct Buckets {
   }
 };
 
-/// Rotated so that its lowest vertex comes first: equal for equal faces of equal orientation.
+/// Rotates the face so that its lowest vertex comes first. Equal faces of equal orientation become
+/// equal triples.
 Triangle canonical(const Triangle& t) {
   const std::size_t low =
       static_cast<std::size_t>(std::min_element(t.begin(), t.end()) - t.begin());
   return {t[low], t[(low + 1) % 3], t[(low + 2) % 3]};
 }
 
-/// The faces without all but the first of equal ones.
+/// Removes all but the first of equal faces.
 std::vector<Triangle> withoutRepeated(const std::vector<Triangle>& triangles,
                                       std::size_t vertices) {
   const Buckets byVertex(vertices, triangles.size(),
@@ -104,8 +105,8 @@ MeshTopology findTopology(const TriMesh& mesh) {
     MeshTopology other;
     other.triangles = std::move(single);
     countEdges(other, mesh.positions.size());
-    // Decimation leaves faces that coincide though each closes a sheet of its own: to drop one of
-    // them would open the mesh.
+    // Decimated meshes may contain coincident faces that each close a sheet of their own. Removing
+    // one of them would open the mesh.
     if (other.boundary.size() <= topology.boundary.size() && other.oddEdges <= topology.oddEdges)
       topology = std::move(other);
   }

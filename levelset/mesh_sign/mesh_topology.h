@@ -11,25 +11,27 @@ namespace levelset::convert {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// A directed edge of the mesh's boundary, counted as often as the faces leave it unmatched.
+/// A directed edge of the boundary, with the number of unmatched faces.
 struct BoundaryEdge {
   std::uint32_t from = 0, to = 0;
   int multiplicity = 1;  ///< positive
 };
 
 struct MeshTopology {
-  /// Faces over welded vertices: of vertices at equal positions, the one with the lowest index.
-  /// Faces with a repeated vertex are left out, and exact repetitions of a face unless that opens
-  /// the mesh; a face and its reverse stay.
+  /// Faces over welded vertices. Among vertices at equal positions, the one with the lowest index
+  /// represents the others. Faces with a repeated vertex are removed. Exact duplicates of a face
+  /// are removed unless that opens the mesh. A face and its reverse both stay.
   std::vector<Triangle> triangles;
   std::size_t dropped = 0;
-  std::size_t boundaryEdges = 0;       ///< with one face
-  std::size_t nonManifoldEdges = 0;    ///< with three or more faces
-  std::size_t oddEdges = 0;            ///< with an odd number of faces: crossing parity fails there
-  std::vector<BoundaryEdge> boundary;  ///< edges that more faces run along one way than the other
+  std::size_t boundaryEdges = 0;     ///< edges with one face
+  std::size_t nonManifoldEdges = 0;  ///< edges with three or more faces
+  std::size_t oddEdges = 0;  ///< edges with an odd number of faces, where crossing parity fails
+  std::vector<BoundaryEdge> boundary;  ///< edges that more faces traverse in one direction than in
+                                       ///< the other
   [[nodiscard]] bool isClosed() const { return boundaryEdges == 0 && nonManifoldEdges == 0; }
 };
 
+/// Finds the welded faces and counts their edges by the number of faces.
 /// @pre every index < positions.size()
 [[nodiscard]] MeshTopology findTopology(const TriMesh& mesh);
 

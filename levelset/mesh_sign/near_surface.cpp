@@ -25,7 +25,7 @@ SampleCell cellOf(const V3d& p) {
   return cell;
 }
 
-/// The cells that hold points, each with the triangles that come near it.
+/// Grid cells that contain points, each with the triangles near it.
 class SampleCells {
  public:
   explicit SampleCells(std::span<const V3d> points) {

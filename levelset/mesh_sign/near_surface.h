@@ -9,7 +9,7 @@
 
 namespace levelset::convert {
 
-/// For each point: is a triangle of the mesh no farther than `reach` (voxels)?
+/// For each point, 1 when a triangle of the mesh lies within `reach` (voxels), else 0.
 [[nodiscard]] std::vector<char> areNear(const LocalMesh& mesh, std::span<const Imath::V3d> points,
                                         double reach);
 

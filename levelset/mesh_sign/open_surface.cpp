@@ -24,8 +24,9 @@ struct CoordLess {
   }
 };
 
-/// A grid edge from `point` to the next one along `axis` that the open surface crosses at `t`.
-struct CutEdge {
+/// A grid edge from `point` to the next one along `axis`, crossed by the open surface at fraction
+/// `t`.
+struct CrossedEdge {
   V3i point;
   int axis;
   double t;
@@ -52,27 +53,27 @@ class OpenSurfaceWalk {
           static_cast<double>(known_.size() + wave.size()) * sizeof(SignField::BlockWinding),
           maxMemory_, "level-set");
       evaluate(wave);
-      wave = neighboursCut(wave);
+      wave = unknownNeighbours(wave);
     }
   }
 
   std::vector<std::array<V3d, 3>> triangles() const {
-    std::vector<CutEdge> edges;
-    for (const auto& [origin, values] : known_) cutsIn(origin, false, edges);
+    std::vector<CrossedEdge> edges;
+    for (const auto& [origin, values] : known_) crossedEdgesIn(origin, false, edges);
     struct Mean {
       V3d sum = V3d(0);
       double count = 0;
     };
     std::map<V3i, Mean, CoordLess> cells;
-    for (const CutEdge& edge : edges)
+    for (const CrossedEdge& edge : edges)
       for (int corner = 0; corner < 4; ++corner) {
         Mean& mean = cells[cellAt(edge, corner)];
-        mean.sum += place(edge);
+        mean.sum += crossingPoint(edge);
         mean.count += 1;
       }
     std::vector<std::array<V3d, 3>> result;
     result.reserve(edges.size() * 3);
-    for (const CutEdge& edge : edges) {
+    for (const CrossedEdge& edge : edges) {
       std::array<V3d, 4> quad;
       for (int corner = 0; corner < 4; ++corner) {
         const Mean& mean = cells.at(cellAt(edge, corner));
@@ -80,16 +81,18 @@ class OpenSurfaceWalk {
       }
       result.push_back({quad[0], quad[1], quad[2]});
       result.push_back({quad[0], quad[2], quad[3]});
-      result.push_back({place(edge), place(edge), place(edge)});
+      result.push_back({crossingPoint(edge), crossingPoint(edge), crossingPoint(edge)});
     }
     return result;
   }
 
  private:
-  static V3d place(const CutEdge& edge) { return V3d(edge.point) + V3d(step(edge.axis)) * edge.t; }
+  static V3d crossingPoint(const CrossedEdge& edge) {
+    return V3d(edge.point) + V3d(step(edge.axis)) * edge.t;
+  }
 
-  /// The four cells around an edge, in turn, by their lowest corners.
-  static V3i cellAt(const CutEdge& edge, int corner) {
+  /// The four cells around an edge, in cyclic order, by their lowest corners.
+  static V3i cellAt(const CrossedEdge& edge, int corner) {
     const V3i first = step((edge.axis + 1) % 3), second = step((edge.axis + 2) % 3);
     return edge.point - (corner == 1 || corner == 2 ? first : V3i(0)) -
            (corner >= 2 ? second : V3i(0));
@@ -113,14 +116,15 @@ class OpenSurfaceWalk {
     return (*found->second)[static_cast<std::size_t>(64 * d.x + 8 * d.y + d.z)];
   }
 
-  /// Across a face the number jumps by one; where it changes less, there is none in between. (A
-  /// hole so small that it changes by more has its rim within a voxel.)
-  static bool isCut(double w, double next) {
+  /// The winding number jumps by one across a face. A smaller change means that no face lies in
+  /// between. If a hole is so small that the change is larger, its rim lies within a voxel.
+  static bool isCrossed(double w, double next) {
     return (w > 0.5) != (next > 0.5) && std::abs(w - next) < 0.5;
   }
 
-  /// Edges from the block's points upwards; with `both`, also those that come in from below.
-  void cutsIn(const V3i& origin, bool both, std::vector<CutEdge>& out) const {
+  /// Crossed edges that start at the block's points in positive direction; with `both`, also those
+  /// that enter the block from below.
+  void crossedEdgesIn(const V3i& origin, bool both, std::vector<CrossedEdge>& out) const {
     for (int x = 0; x < kBlockDim; ++x)
       for (int y = 0; y < kBlockDim; ++y)
         for (int z = 0; z < kBlockDim; ++z) {
@@ -128,22 +132,23 @@ class OpenSurfaceWalk {
           const double w = at(p);
           for (int axis = 0; axis < 3; ++axis) {
             const double next = at(p + step(axis));
-            if (isCut(w, next)) out.push_back({p, axis, (0.5 - w) / (next - w)});
+            if (isCrossed(w, next)) out.push_back({p, axis, (0.5 - w) / (next - w)});
             if (!both || p[axis] != origin[axis]) continue;
             const double last = at(p - step(axis));
-            if (isCut(last, w)) out.push_back({p - step(axis), axis, (0.5 - last) / (w - last)});
+            if (isCrossed(last, w))
+              out.push_back({p - step(axis), axis, (0.5 - last) / (w - last)});
           }
         }
   }
 
-  /// The blocks not yet known into which the cut edges' cells reach.
-  std::vector<V3i> neighboursCut(const std::vector<V3i>& wave) const {
+  /// Unknown blocks that the cells of the crossed edges extend into.
+  std::vector<V3i> unknownNeighbours(const std::vector<V3i>& wave) const {
     std::vector<std::vector<V3i>> found(wave.size());
     ProgressGate gate(progress_, wave.size(), "level-set");
     tbb::parallel_for(std::size_t{0}, wave.size(), [&](std::size_t i) {
-      std::vector<CutEdge> edges;
-      cutsIn(wave[i], true, edges);
-      for (const CutEdge& edge : edges)
+      std::vector<CrossedEdge> edges;
+      crossedEdgesIn(wave[i], true, edges);
+      for (const CrossedEdge& edge : edges)
         for (int corner = 0; corner < 4; ++corner)
           for (int k = 0; k < 8; ++k) {
             const V3i origin = blockOf(cellAt(edge, corner) + V3i(k >> 2, (k >> 1) & 1, k & 1));

@@ -26,8 +26,8 @@ V2d dropAxis(const V3d& p, int axis) {
   return {p[(axis + 1) % 3], p[(axis + 2) % 3]};
 }
 
-/// An axis along which the triangle does not project to a segment, the best conditioned first; −1
-/// for a triangle that is exactly without area.
+/// Axis along which the triangle does not project to a segment; the best-conditioned such axis. −1
+/// for a triangle with exactly zero area.
 int projectionAxis(const TriangleCorners& t) {
   const V3d normal = (t[1] - t[0]).cross(t[2] - t[0]);
   std::array<int, 3> axes = {0, 1, 2};
@@ -39,13 +39,13 @@ int projectionAxis(const TriangleCorners& t) {
   return -1;
 }
 
-/// p lies on the segment between a and b, given that the three are collinear.
+/// Returns true when p lies on the segment from a to b. The three points must be collinear.
 bool isBetween(const V2d& a, const V2d& b, const V2d& p) {
   return p.x >= std::min(a.x, b.x) && p.x <= std::max(a.x, b.x) && p.y >= std::min(a.y, b.y) &&
          p.y <= std::max(a.y, b.y);
 }
 
-/// Closed segments in the plane have a point in common.
+/// Returns true when two closed segments in the plane have a point in common.
 bool segmentsMeet(const V2d& a, const V2d& b, const V2d& c, const V2d& d) {
   const int c1 = convert::orient2d(a, b, c), d1 = convert::orient2d(a, b, d);
   const int a1 = convert::orient2d(c, d, a), b1 = convert::orient2d(c, d, b);
@@ -54,14 +54,15 @@ bool segmentsMeet(const V2d& a, const V2d& b, const V2d& c, const V2d& d) {
          (a1 == 0 && isBetween(c, d, a)) || (b1 == 0 && isBetween(c, d, b));
 }
 
-/// p lies in the closed triangle, of the plane.
+/// Returns true when p lies in the closed triangle, in the plane.
 bool contains(const std::array<V2d, 3>& t, const V2d& p) {
   const int s0 = convert::orient2d(t[0], t[1], p), s1 = convert::orient2d(t[1], t[2], p),
             s2 = convert::orient2d(t[2], t[0], p);
   return (s0 >= 0 && s1 >= 0 && s2 >= 0) || (s0 <= 0 && s1 <= 0 && s2 <= 0);
 }
 
-/// The closed segment pq and the closed triangle, all in one plane, have a point in common.
+/// Returns true when the closed segment pq and the closed triangle, all in one plane, have a point
+/// in common.
 bool meetsInPlane(const V3d& p, const V3d& q, const TriangleCorners& t) {
   const int axis = projectionAxis(t);
   const std::array<V2d, 3> f = {dropAxis(t[0], axis), dropAxis(t[1], axis), dropAxis(t[2], axis)};
@@ -70,21 +71,21 @@ bool meetsInPlane(const V3d& p, const V3d& q, const TriangleCorners& t) {
          segmentsMeet(a, b, f[1], f[2]) || segmentsMeet(a, b, f[2], f[0]);
 }
 
-/// The closed segment pq and the closed triangle have a point in common.
-/// @param sideP  of the triangle's plane, as orient3d gives it
+/// Returns true when the closed segment pq and the closed triangle have a point in common.
+/// @param sideP, sideQ  sides of the triangle's plane, from orient3d
 bool segmentMeets(const V3d& p, const V3d& q, int sideP, int sideQ, const TriangleCorners& t) {
   if (sideP * sideQ > 0) return false;
   if (sideP == 0 && sideQ == 0) return meetsInPlane(p, q, t);
-  // Looking along pq, the three edges must not turn different ways.
+  // As seen along pq, the three edges must not turn in different directions.
   const int s0 = convert::orient3d(p, q, t[0], t[1]), s1 = convert::orient3d(p, q, t[1], t[2]),
             s2 = convert::orient3d(p, q, t[2], t[0]);
   return (s0 >= 0 && s1 >= 0 && s2 >= 0) || (s0 <= 0 && s1 <= 0 && s2 <= 0);
 }
 
-/// A line through the corner that both triangles begin with has them on different sides, seen along
-/// some axis: they have that corner in common and nothing else. Decides nearly all pairs of a flat
-/// fan, where orient3d would have to go to exact arithmetic for every one.
-bool partAtCorner(const TriangleCorners& a, const TriangleCorners& b) {
+/// Returns true when a line through the common first corner separates the two triangles in some
+/// axis projection. They then share that corner only. This decides nearly all pairs of a flat fan,
+/// for which orient3d would need exact arithmetic.
+bool separateAtCorner(const TriangleCorners& a, const TriangleCorners& b) {
   const int axis = projectionAxis(a);
   const V2d corner = dropAxis(a[0], axis);
   const std::array<V2d, 2> p = {dropAxis(a[1], axis), dropAxis(a[2], axis)};
@@ -102,11 +103,11 @@ bool partAtCorner(const TriangleCorners& a, const TriangleCorners& b) {
   return isBetween(p, q) || isBetween(q, p);
 }
 
-/// The two triangles meet elsewhere than in the vertices and the edge that they share.
+/// Returns true when the two triangles meet outside their shared vertices and edge.
 bool trianglesMeet(const Triangle& first, const Triangle& second,
                    const std::vector<V3d>& positions) {
-  // Rotate the shared vertices to the front; faces of a 2-manifold share an edge the other way
-  // round, which does not matter here.
+  // Rotate the shared vertices to the front. Faces of a 2-manifold traverse a shared edge in
+  // opposite directions, which does not matter here.
   Triangle s = first, t = second;
   std::size_t shared = 0;
   for (std::size_t i = 0; i < 3; ++i)
@@ -127,8 +128,8 @@ bool trianglesMeet(const Triangle& first, const Triangle& second,
     return convert::orient2d(p, q, dropAxis(a[2], axis)) ==
            convert::orient2d(p, q, dropAxis(b[2], axis));
   }
-  if (shared == 1 && partAtCorner(a, b)) return false;
-  std::array<int, 3> sideA{}, sideB{};  // of the other's plane
+  if (shared == 1 && separateAtCorner(a, b)) return false;
+  std::array<int, 3> sideA{}, sideB{};  // sides of the other triangle's plane
   for (std::size_t i = shared; i < 3; ++i) sideA[i] = convert::orient3d(b[0], b[1], b[2], a[i]);
   if (shared == 0 && sideA[0] == sideA[1] && sideA[1] == sideA[2] && sideA[0] != 0) return false;
   if (shared == 1 && sideA[1] == sideA[2] && sideA[1] != 0) return false;
@@ -144,9 +145,9 @@ bool trianglesMeet(const Triangle& first, const Triangle& second,
   return false;
 }
 
-/// The search: space is halved along its longest side until few triangles are left in a part. A
-/// pair may share several parts; it belongs to the one that holds the lowest corner of what their
-/// boxes have in common.
+/// Searches by halving space along its longest side until a part holds few triangles. Several parts
+/// may contain the same pair. It belongs to the part that contains the lowest corner of the
+/// intersection of both boxes.
 class PairSearch {
  public:
   PairSearch(const std::vector<Triangle>& triangles, const std::vector<V3d>& positions,
@@ -185,7 +186,7 @@ class PairSearch {
   using List = std::vector<std::uint32_t>;
   struct Part {
     List triangles;
-    Imath::Box3d region;  // open above, except at the end of space
+    Imath::Box3d region;  // open above, except at the upper end of space
   };
   static constexpr const char* kAction = "self-intersections";
   static constexpr std::size_t kFew = 24;
@@ -203,7 +204,7 @@ class PairSearch {
         if (boxes_[i].min[axis] < middle) low.push_back(i);
         if (boxes_[i].max[axis] >= middle) high.push_back(i);
       }
-      // Where most triangles reach into both halves, halving does not help.
+      // Where most triangles extend into both halves, halving does not help.
       if (low.size() + high.size() < all.size() + all.size() / 2) {
         List().swap(all);
         Imath::Box3d lowRegion = region, highRegion = region;

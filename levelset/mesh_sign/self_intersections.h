@@ -11,8 +11,8 @@ namespace levelset::convert {
 
 using TrianglePair = std::pair<std::uint32_t, std::uint32_t>;
 
-/// The pairs of triangles that meet elsewhere than in vertices and edges that they share, each
-/// once, by rising indices. Triangles without area meet nothing. Exact.
+/// Finds the pairs of triangles that meet outside their shared vertices and edges. Each pair
+/// appears once, in ascending order of indices. Triangles without area meet nothing. Exact.
 [[nodiscard]] std::vector<TrianglePair> findSelfIntersections(
     const std::vector<Triangle>& triangles, const std::vector<Imath::V3d>& positions,
     const Progress& progress);

@@ -20,19 +20,19 @@ namespace {
 
 using Imath::V3d;
 using Polygon = std::vector<V3d>;
-/// Polygons that are kept, or not, as a whole.
+/// Polygons that are kept or dropped together.
 using Sheet = std::vector<Polygon>;
 
 constexpr const char* kAction = "level-set";
-/// With more points to judge than this, the winding number is summed over a tree.
+/// Number of points above which the winding number is summed over a tree.
 constexpr std::size_t kFewPoints = 16;
-/// Of a polygon's size: corners nearer to a plane count as on it.
+/// Relative to the polygon's size: corners nearer to a plane count as on it.
 constexpr double kOnPlane = 1e-12;
-/// Voxels: folds no deeper than this stay as they are. No grid shows what they hide, and distances
-/// stay those to the mesh as it was given.
+/// Voxels. Folds no deeper than this stay in the mesh. No grid resolves their interior, and the
+/// distances then still refer to the given mesh.
 constexpr double kShallow = 0.25;
 
-/// The directed edges of triangles, to find those that share one with a single neighbour.
+/// Directed edges of triangles, used to find the edges that exactly two triangles share.
 struct HalfEdge {
   std::uint32_t low, high, triangle;
   bool rising;
@@ -56,8 +56,8 @@ V3d centroid(std::span<const V3d> polygon) {
   return sum / static_cast<double>(polygon.size());
 }
 
-/// Cuts a convex polygon by the plane through `point`; a part without corners off the plane is left
-/// out.
+/// Cuts a convex polygon by the plane through `point`. A polygon without corners on both sides
+/// stays in one piece.
 void cut(const Polygon& polygon, const V3d& point, const V3d& normal, std::vector<Polygon>& out) {
   double size = 0;
   for (const V3d& p : polygon) size = std::max(size, (p - polygon[0]).length());
@@ -151,8 +151,8 @@ class SeparatingSurface {
     for (const auto& [i, j] : pairs_) partners_[next[i]++] = j, partners_[next[j]++] = i;
   }
 
-  /// Triangles that no other crosses, joined over edges that two of them share: the winding numbers
-  /// of both sides are the same all over such a patch.
+  /// Joins uncrossed triangles over edges that exactly two of them share. The winding numbers on
+  /// both sides are constant on such a patch.
   void findPatches() {
     std::vector<HalfEdge> edges;
     edges.reserve(3 * mesh_.triangles.size());
@@ -189,7 +189,8 @@ class SeparatingSurface {
     field_ = WindingField(std::move(all));
   }
 
-  /// Without the triangles in whose plane the point lies, which have no winding number there.
+  /// Winding number without the given triangles. The point lies in their planes, where their own
+  /// winding number is undefined.
   [[nodiscard]] double windingAt(const V3d& point, std::span<const std::uint32_t> without) const {
     double w = 0;
     if (field_.isEmpty()) {
@@ -211,7 +212,7 @@ class SeparatingSurface {
     return true;
   }
 
-  /// The point, of the triangle's plane, lies in it.
+  /// Returns true when the point, which lies in the triangle's plane, lies in the triangle.
   [[nodiscard]] bool covers(std::uint32_t t, const V3d& point) const {
     const std::array<V3d, 3> c = corners(t);
     const V3d normal = areaVector(c);
@@ -220,11 +221,11 @@ class SeparatingSurface {
     return true;
   }
 
-  /// A polygon of triangle t that nothing crosses has the solid on one side only.
+  /// Returns true when an uncrossed polygon of triangle t has the solid on exactly one side.
   [[nodiscard]] bool separates(std::uint32_t t, std::span<const V3d> polygon) const {
     const V3d point = centroid(polygon), normal = areaVector(corners(t));
     std::vector<std::uint32_t> inPlane = {t};
-    double jump = 1;  // of the winding number, from the front to the back
+    double jump = 1;  // jump of the winding number from the front to the back
     for (const std::uint32_t other : partners(t)) {
       if (!isCoplanar(t, other)) continue;
       inPlane.push_back(other);
@@ -235,7 +236,7 @@ class SeparatingSurface {
     return (back > 0.5) != (front > 0.5);
   }
 
-  /// The triangle cut along all that cross it, a part only by those near it.
+  /// Cuts a triangle along all triangles that cross it. Each part is cut only by triangles near it.
   [[nodiscard]] std::vector<Polygon> pieces(std::uint32_t t) const {
     const std::array<V3d, 3> own = corners(t);
     std::vector<Polygon> parts = {Polygon(own.begin(), own.end())};
@@ -276,7 +277,7 @@ class SeparatingSurface {
       result.triangles.push_back({first, first + k - 1, first + k});
   }
 
-  /// What separates goes to the result, the rest to the sheets.
+  /// Adds the separating pieces to the result and the others to the sheets.
   void addPieces(LocalMesh& result, std::vector<Sheet>& sheets) const {
     std::vector<std::uint32_t> crossed;
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
@@ -299,9 +300,9 @@ class SeparatingSurface {
     }
   }
 
-  /// Gives back the sheets that lie within kShallow of the result all over.
+  /// Restores the sheets that lie within kShallow of the result at all their sample points.
   static void addShallow(const std::vector<Sheet>& sheets, LocalMesh& result) {
-    // One point of each tells the deep ones.
+    // One point of each sheet suffices to exclude the deep ones.
     std::vector<V3d> points;
     for (const Sheet& sheet : sheets) {
       const auto largest =
@@ -340,10 +341,11 @@ class SeparatingSurface {
   std::span<const TrianglePair> pairs_;
   double flip_;
   const Progress& progress_;
-  std::vector<std::size_t> first_;       // of each triangle's partners
+  std::vector<std::size_t> first_;       // start of each triangle's partners in partners_
   std::vector<std::uint32_t> partners_;  // triangles that meet it
   DisjointSets groups_;
-  std::vector<std::uint32_t> largest_;  // triangle of each patch, by the patch's lowest
+  std::vector<std::uint32_t> largest_;  // largest triangle of each patch, indexed by the patch's
+                                        // lowest
   WindingField field_;
 };
 

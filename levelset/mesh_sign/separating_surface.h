@@ -8,12 +8,12 @@
 
 namespace levelset::convert {
 
-/// The part of a mesh without boundary that has the solid on one side and not on the other: where
-/// shells overlap, or one lies in another of the same orientation, the sheets inside separate
-/// nothing. Triangles that cross others are cut along them. Folds shallower than a quarter voxel
-/// stay.
-/// @param pairs the triangles that meet, as findSelfIntersections gives them
-/// @param flip  −1 when the mesh faces inwards and is taken to be turned
+/// Finds the part of a mesh without boundary that separates the solid from the outside. Where
+/// surface components overlap, or one lies inside another of the same orientation, the inner sheets
+/// separate nothing and are removed. Triangles that cross others are cut along the intersections.
+/// Folds shallower than a quarter voxel stay.
+/// @param pairs  intersecting triangles, from findSelfIntersections
+/// @param flip  −1 when the mesh faces inwards and counts as reversed
 [[nodiscard]] LocalMesh separatingSurface(const LocalMesh& mesh,
                                           std::span<const TrianglePair> pairs, double flip,
                                           const Progress& progress);

@@ -10,15 +10,16 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 
-/// Mesh and fans, to be crossed by lines, and what has to be added to the integer they give.
+/// Mesh and fans for the line crossings, and the correction to the integer winding number that they
+/// give.
 struct ClosedMesh {
   LocalMesh mesh;
-  std::vector<int> weights;  ///< empty: 1 each
+  std::vector<int> weights;  ///< multiplicities; empty: 1 each
   std::vector<WeightedTriangle> rest;
 };
 
-/// Closes each loop of the boundary by a fan about the mean of its edges' ends. The edges of a loop
-/// form a cycle, so mesh and fans have no boundary, whatever the loop's shape.
+/// Closes each loop of the boundary by a fan from the mean of its edges' end points. The edges of a
+/// loop form a cycle, so mesh and fans together have no boundary, whatever the shape of the loop.
 ClosedMesh closeByFans(const LocalMesh& mesh, const std::vector<BoundaryEdge>& boundary) {
   ClosedMesh closed{mesh, std::vector<int>(mesh.triangles.size(), 1), {}};
   DisjointSets loops(mesh.points.size());
@@ -114,7 +115,7 @@ double SignField::winding(const V3i& point) const {
 
 void SignField::winding(const V3i& origin, BlockWinding& out) const {
   std::array<CrossingSum, 64> sums;
-  const bool clear = isClearIn(origin);
+  const bool clear = isUnambiguousIn(origin);
   for (int y = 0; y < kBlockDim; ++y) {
     lines_.slab(origin.x, origin.y + y, origin.z, sums.data());
     for (int x = 0; x < kBlockDim; ++x)
@@ -126,7 +127,7 @@ void SignField::winding(const V3i& origin, BlockWinding& out) const {
   }
 }
 
-bool SignField::isClearIn(const V3i& origin) const {
+bool SignField::isUnambiguousIn(const V3i& origin) const {
   return !isOpen() || field_.bound(V3d(origin) + V3d(3.5), 6.07) < 0.25;
 }
 

@@ -15,12 +15,12 @@
 
 namespace levelset::convert {
 
-/// Inside or outside at the grid points of a mesh.
+/// Inside or outside at the grid points around a mesh.
 ///
-/// A mesh without boundary needs its crossings with grid lines only. Otherwise each loop of its
-/// boundary is closed by a fan of triangles: mesh and fans together have an integer winding number,
-/// read off the crossings, and the mesh has that less what the fans have, a sum over few triangles.
-/// A soup that is mostly boundary is summed itself.
+/// For a mesh without boundary the crossings with grid lines suffice. Otherwise a fan of triangles
+/// closes each loop of the boundary. Mesh and fans together have an integer winding number, which
+/// the crossings give. The winding number of the mesh is this integer minus that of the fans, a sum
+/// over few triangles. If most of the mesh is boundary, the sum is taken over the mesh itself.
 class SignField {
  public:
   enum class Rule { Parity, Orientation, Winding };
@@ -28,23 +28,23 @@ class SignField {
   SignField(const LocalMesh& mesh, const MeshTopology& topology, Rule rule,
             const Progress& progress);
 
-  /// True when the whole mesh faces inwards, and was turned.
+  /// Returns true when the complete mesh faces inwards and counts as reversed.
   [[nodiscard]] bool isFlipped() const { return flip_ < 0; }
-  /// True when the surface between inside and outside may leave the triangles.
+  /// Returns true when the surface between inside and outside may leave the triangles.
   [[nodiscard]] bool isOpen() const { return !field_.isEmpty(); }
 
-  /// Winding number at a grid point, turned if the mesh was, to such accuracy that comparisons with
-  /// 1/4, 1/2 and 3/4 are those of the exact number. Under Parity: 1 inside, 0 outside.
+  /// Winding number at a grid point, for the reversed mesh if isFlipped(). Accurate enough that
+  /// comparisons with 1/4, 1/2 and 3/4 give the exact result. Under Parity: 1 inside, 0 outside.
   [[nodiscard]] double winding(const Imath::V3i& point) const;
   [[nodiscard]] bool isInside(const Imath::V3i& point) const { return winding(point) > 0.5; }
 
-  /// The same for all points of a block, x slowest.
+  /// Winding numbers of all points of a block, x slowest.
   using BlockWinding = std::array<double, kBlockVoxels>;
   void winding(const Imath::V3i& origin, BlockWinding& out) const;
 
-  /// True when the number is within 1/4 of an integer all over the block: no doubt, no open
-  /// surface.
-  [[nodiscard]] bool isClearIn(const Imath::V3i& origin) const;
+  /// Returns true when the winding number lies within 1/4 of an integer throughout the block. The
+  /// sign is then unambiguous and no open surface passes through.
+  [[nodiscard]] bool isUnambiguousIn(const Imath::V3i& origin) const;
 
  private:
   [[nodiscard]] double refine(double integer, const Imath::V3d& point) const;
@@ -52,7 +52,7 @@ class SignField {
 
   Rule rule_;
   double flip_ = 1;
-  WindingField field_;  ///< what the mesh has beyond the integer
+  WindingField field_;  ///< part of the winding number beyond the integer
   LineCrossings lines_;
 };
 

@@ -10,14 +10,14 @@ namespace {
 using Imath::V3d;
 using Imath::V3f;
 
-/// Rounding in `float` of centres and distances near a block, generously.
+/// Generous bounds of the rounding error of `float` centres and distances near a block.
 constexpr float kRelativeSlack = 1e-5f, kSlack = 2e-5f;
 
 double clampUnit(double t) {
   return t < 0 ? 0 : (t > 1 ? 1 : t);
 }
 
-/// A unit vector across u.
+/// A unit vector perpendicular to u.
 V3d anyPerpendicular(const V3d& u) {
   const V3d axis = std::abs(u.x) < 0.6 ? V3d(1, 0, 0) : V3d(0, 1, 0);
   return (axis - u * u.dot(axis)).normalized();
@@ -57,7 +57,7 @@ double TriangleFrame::squaredDistance(const V3d& point) const {
   const V3d d = point - a_;
   const double x = d.dot(u_), y = d.dot(v_), height = d.dot(n_);
   double plane = 0;
-  if (y <= 0) {  // no angle at AB is obtuse: AB is nearest
+  if (y <= 0) {  // the angles at A and B are not obtuse, so AB is nearest
     const double dx = x < 0 ? -x : (x > length_ ? x - length_ : 0);
     plane = dx * dx + y * y;
   } else {
@@ -126,9 +126,9 @@ float BlockDistance::squaredToCentres(const Spheres& spheres, const V3f& point) 
   return low;
 }
 
-/// A sphere's centre lies on its triangle, so the nearest centre bounds the distance from above; at
-/// a point of the cell that bound grows by at most the cell's radius, and so does every other
-/// distance.
+/// The centre of a sphere lies on its triangle, so the nearest centre bounds the distance from
+/// above. At a point of the cell, this bound and all other distances change by at most the cell's
+/// radius.
 void BlockDistance::pass(const Spheres& from, const V3f& centre, float cellRadius, Spheres& to) {
   const float low = std::sqrt(squaredToCentres(from, centre)) * (1 + kRelativeSlack) + kSlack;
   const float bound =
@@ -173,7 +173,7 @@ double BlockDistance::nearest(const Spheres& spheres, const V3f& point) {
   return std::sqrt(best);
 }
 
-/// @param level  1 for the cells of 4³ points, 2 for those of 2³, 3 for single points
+/// @param level  1 for cells of 4³ points, 2 for cells of 2³, 3 for single points
 void BlockDistance::splitCell(int level, const V3f& centre) {
   const float offset = static_cast<float>(kBlockDim >> level) / 2;
   const float cellRadius = (static_cast<float>(kBlockDim >> level) - 1) * 0.8660255f;

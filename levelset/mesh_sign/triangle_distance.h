@@ -12,8 +12,8 @@
 namespace levelset::convert {
 
 /// A triangle in a frame of its own: A at the origin, its longest edge AB along u, C above it at
-/// (cx, cy). The distance of a point is then a problem of the plane plus a height [Jones95].
-/// Triangles without area keep their longest edge, or their point, and measure to that.
+/// (cx, cy). The distance of a point then reduces to a problem in the plane plus a height
+/// [Jones95]. A triangle without area reduces to its longest edge or to a point.
 class TriangleFrame {
  public:
   TriangleFrame() = default;
@@ -27,28 +27,28 @@ class TriangleFrame {
   double inverseAc_ = 0, inverseBc_ = 0;  // 1 / squared length; 0 for a point
 };
 
-/// Edge of a block: the leaf nodes of the tree.
+/// Edge length of a block in grid points: a leaf node of the tree.
 inline constexpr int kBlockDim = 8;
 inline constexpr int kBlockVoxels = kBlockDim * kBlockDim * kBlockDim;
 
-/// Distances of the 8³ grid points of a block to the nearest of some triangles: exact, but only as
-/// far as `reach`. Cells of 4³ and 2³ points pass on only the triangles that can be nearest to one
-/// of their points, judged by bounding spheres. Keeps its scratch memory from block to block.
+/// Distances of the 8³ grid points of a block to the nearest of given triangles. Distances are
+/// exact up to `reach`. Cells of 4³ and 2³ points pass on only the triangles that can be nearest to
+/// one of their points, by bounding spheres. Reuses its scratch memory between blocks.
 class BlockDistance {
  public:
   explicit BlockDistance(double reach) : reach_(reach) {}
 
-  /// @param candidates  triangles; all that come within reach of the block must be among them
-  /// @param origin      the block's lowest grid point
-  /// @return true when a point lies within reach; distances() holds them all
+  /// @param candidates  triangles, including all within reach of the block
+  /// @param origin  lowest grid point of the block
+  /// @return true when a point lies within reach; distances() then holds all distances
   bool measure(const LocalMesh& mesh, std::span<const std::uint32_t> candidates,
                const Imath::V3d& origin);
 
-  /// In voxels, `reach` for points that lie no nearer; x slowest, z fastest.
+  /// Distances in voxels, x slowest, z fastest; `reach` for points that are further away.
   [[nodiscard]] const std::array<double, kBlockVoxels>& distances() const { return distances_; }
 
  private:
-  struct Spheres {  // structure of arrays: the loops over it vectorise
+  struct Spheres {  // structure of arrays, so that loops over it vectorise
     std::vector<float> x, y, z, radius;
     std::vector<std::uint32_t> slot;
     std::size_t size = 0;
@@ -65,9 +65,9 @@ class BlockDistance {
   Imath::V3d centre_;
   std::array<double, kBlockVoxels> distances_{};
   bool anyWithin_ = false;
-  std::array<Spheres, 3> lists_;  // of the block, of a 4³ cell, of a 2³ cell
+  std::array<Spheres, 3> lists_;  // lists of the block, of a 4³ cell, of a 2³ cell
   std::vector<float> squared_;
-  std::vector<std::array<Imath::V3d, 3>> corners_;  // about the block's centre
+  std::vector<std::array<Imath::V3d, 3>> corners_;  // relative to the centre of the block
   std::vector<TriangleFrame> frames_;
   std::vector<char> hasFrame_;
 };

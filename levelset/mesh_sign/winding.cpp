@@ -33,7 +33,7 @@ V3d centroid(const WeightedTriangle& t) {
   return (t.corners[0] + t.corners[1] + t.corners[2]) / 3;
 }
 
-/// The triangle's area over the smallest squared distance that any point of the ball may have.
+/// Area of the triangle divided by the smallest possible squared distance to a point of the ball.
 double boundOf(const WeightedTriangle& t, const V3d& centre, double radius) {
   const V3d middle = centroid(t);
   double reach = 0;
@@ -141,8 +141,8 @@ double WindingField::within(double tolerance, const V3d& point) const {
     const std::size_t index = stack[--top];
     const Node& node = nodes_[index];
     const double gap = (node.centre - point).length() - node.radius;
-    // Second derivatives of r / |r|³ are at most 6 / |r|⁴; the nodes' errors share the tolerance by
-    // their areas.
+    // Second derivatives of r / |r|³ are at most 6 / |r|⁴. The nodes share the tolerance in
+    // proportion to their areas.
     const double error = 3 * kQuarterPi * node.spread;
     if (gap > 0 && error <= perArea * node.area * (gap * gap) * (gap * gap)) {
       sum += far(node, point);

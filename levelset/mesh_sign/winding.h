@@ -8,31 +8,32 @@
 
 namespace levelset::convert {
 
-/// Signed solid angle of the triangle about `point`, in turns of the full sphere: positive when its
-/// back is seen [vanOosterom83]. A closed mesh that faces outwards sums to 1 inside.
+/// Signed solid angle of the triangle as seen from `point`, as a fraction of the full sphere.
+/// Positive when the back side is visible [vanOosterom83]. A closed mesh that faces outwards sums
+/// to 1 inside.
 [[nodiscard]] double solidAngle(const Imath::V3d& a, const Imath::V3d& b, const Imath::V3d& c,
                                 const Imath::V3d& point);
 
-/// A triangle that counts `weight` times.
+/// A triangle with a multiplicity.
 struct WeightedTriangle {
   std::array<Imath::V3d, 3> corners;
   double weight = 1;
 };
 
-/// The winding number of a set of triangles: clusters far away by their dipole and its first moment
-/// [Barill18], each with a bound of what that leaves out, so that a value comes with the accuracy
-/// asked for.
+/// Winding number of a set of triangles. Far clusters enter by their dipole and its first moment
+/// [Barill18]. Each cluster has an error bound, so that a value meets the requested tolerance.
 class WindingField {
  public:
   WindingField() = default;
   explicit WindingField(std::vector<WeightedTriangle> triangles);
 
   [[nodiscard]] bool isEmpty() const { return triangles_.empty(); }
-  /// By direct summation in the order of the tree.
+  /// Exact value, by direct summation in tree order.
   [[nodiscard]] double exact(const Imath::V3d& point) const;
-  /// Within `tolerance` of the exact value.
+  /// Value within `tolerance` of the exact one.
   [[nodiscard]] double within(double tolerance, const Imath::V3d& point) const;
-  /// No point of the ball has a winding number beyond ± this; infinite near the triangles.
+  /// Bound on the magnitude of the winding number at all points of the ball. Infinite near the
+  /// triangles.
   [[nodiscard]] double bound(const Imath::V3d& centre, double radius) const;
 
  private:

@@ -15,11 +15,11 @@ constexpr const char* kAction = "mesh";
 
 void validate(const NarrowBand& band, const BandToMeshOptions& options) {
   if (!(options.adaptivity >= 0 && options.adaptivity <= 1)) {
-    throw UsageError(fmt::format("mesh: adaptivity {} is outside [0, 1]; give a number in it",
-                                 options.adaptivity));
+    throw UsageError(fmt::format(
+        "mesh: adaptivity {} is outside [0, 1]; give a number in that range", options.adaptivity));
   }
   if (options.sharp && options.adaptivity > 0) {
-    throw UsageError("mesh: sharp and adaptivity do not go together; leave one out");
+    throw UsageError("mesh: sharp and adaptivity exclude each other; omit one of them");
   }
   if (!options.openSurface) requireSolid(band, kAction);
   if (band.isEmpty()) {

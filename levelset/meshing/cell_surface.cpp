@@ -28,7 +28,7 @@ Coord lowered(const Coord& origin, unsigned side) {
   return origin.offsetBy(side & 4 ? -kSide : 0, side & 2 ? -kSide : 0, side & 1 ? -kSide : 0);
 }
 
-/// Bit (y, z) of the result is bit (y, z + 1) of the slab, then of the slab beyond it.
+/// Shifts a slab: bit (y, z) of the result is bit (y, z + 1) of the slab, or of the slab beyond it.
 std::uint64_t shiftZ(std::uint64_t slab, std::uint64_t beyond) {
   return ((slab >> 1) & ~(kLowZ << 7)) | ((beyond & kLowZ) << 7);
 }
@@ -65,7 +65,7 @@ void sortUnique(std::vector<Coord>& coords) {
   coords.erase(std::unique(coords.begin(), coords.end()), coords.end());
 }
 
-/// Blocks without a leaf, on both sides of every face where tiles of opposite sign meet.
+/// Returns the blocks without a leaf on both sides of every face where tiles of opposite sign meet.
 std::vector<Coord> blocksBetweenTiles(const FloatGrid& grid) {
   std::vector<Coord> found;
   FloatGrid::ConstAccessor accessor = grid.getConstAccessor();
@@ -101,8 +101,8 @@ CellSurface::CellSurface(const FloatGrid& grid) : grid_(grid) {
   numberAll();
 }
 
-/// Leaves, and the blocks beside them that have a cell with corners of both signs though they are
-/// tiles: a cell belongs to its lowest corner, which need not be in a leaf.
+/// Collects the leaves, and the tiles beside them that hold a cell with corners of both signs. A
+/// cell belongs to the block of its lowest corner, which may be a tile.
 void CellSurface::collectBlocks() {
   const FloatTree& tree = grid_.tree();
   blocks_.reserve(tree.leafCount());
@@ -123,7 +123,7 @@ void CellSurface::collectBlocks() {
   for (const SurfaceBlock& block : blocks_) addBelow(block.origin, 1);
   for (const Coord& origin : blocksBetweenTiles(grid_)) addBelow(origin, 0);
   sortUnique(candidates);
-  // A tile can only have mixed cells if some value beside it has another sign.
+  // A tile can hold such cells only if some value beside it has another sign.
   for (const Coord& origin : candidates) {
     const float fill = accessor.getValue(origin);
     bool mixed = false;
@@ -147,8 +147,8 @@ void CellSurface::collectBlocks() {
     block.fill = fill;
     blocks_.push_back(block);
   }
-  // As a tree has its leaves: whether one is there changes with the width of the band, and the
-  // triangles are not to change with that.
+  // Order the blocks as a tree orders its leaves. A block may be a leaf or not, depending on the
+  // width of the band. The triangles must not depend on that.
   std::sort(blocks_.begin(), blocks_.end(), [](const SurfaceBlock& a, const SurfaceBlock& b) {
     for (const int nodeSide : {4096, 128, kSide}) {
       const Coord first = a.origin & -nodeSide, second = b.origin & -nodeSide;
@@ -159,7 +159,8 @@ void CellSurface::collectBlocks() {
 }
 
 void CellSurface::linkBlocks() {
-  if (blocks_.size() >= kNoBlock) throw ResourceLimit("mesh: the band has too many leaves");
+  if (blocks_.size() >= kNoBlock)
+    throw ResourceLimit("mesh: the band has more than 4294967294 leaves; use larger voxels");
   std::unordered_map<Coord, std::uint32_t, OriginHash> indexOf;
   indexOf.reserve(blocks_.size());
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
@@ -184,7 +185,8 @@ std::uint64_t CellSurface::insideWord(const SurfaceBlock& block, unsigned side, 
   return block.neighbourFill[side] < 0 ? ~0ull : 0;
 }
 
-/// Signs of slab x in [0, 8], and the same moved by one along z, along y, along both: by dy·2 + dz.
+/// Returns the signs of slab x in [0, 8], by dy·2 + dz: unshifted, shifted by one along z, along y,
+/// and along both.
 CellSurface::Slab CellSurface::slabWords(const SurfaceBlock& block, int x) const {
   const unsigned far = x == kSide ? 4 : 0;
   const int slab = x & (kSide - 1);
@@ -260,8 +262,8 @@ std::uint32_t CellSurface::vertexOf(const SurfaceBlock& block, int x, int y, int
 
 namespace {
 
-/// Distance to a grid point, in voxels, that two crossings beside it keep. Far above the spacing of
-/// floats in a file, far below any accuracy that the field has.
+/// Least distance, in voxels, between a crossing and a grid point with other crossings. It is far
+/// above the spacing of floats in a file, and far below any accuracy of the field.
 constexpr double kCornerGuard = 1e-4;
 
 bool hasOtherCrossing(const CellSurface& surface, const Coord& point, const Coord& along) {
@@ -284,7 +286,7 @@ openvdb::Vec3d crossingPoint(const CellSurface& surface, const SurfaceBlock& blo
   const double high = static_cast<double>(
       surface.valueAt(block, x + (axis == 0), y + (axis == 1), z + (axis == 2)));
   double t = low / (low - high);
-  if (!(t >= 0 && t <= 1)) t = 0.5;  // values that are not numbers
+  if (!(t >= 0 && t <= 1)) t = 0.5;  // the values are NaN
   const Coord point = block.origin.offsetBy(x, y, z);
   if (t < kCornerGuard || t > 1 - kCornerGuard) {
     Coord beyond = point;

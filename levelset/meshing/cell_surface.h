@@ -1,6 +1,7 @@
 #pragma once
 
-// The cells that the zero set passes, block by block. Includes OpenVDB: for .cpp files only.
+// Cells that the zero set passes, block by block. Internal header of levelset: public headers must
+// not include it.
 
 #include <array>
 #include <cstdint>
@@ -11,30 +12,31 @@
 
 namespace levelset {
 
-/// 8³ grid points, and the cells and edges whose lowest corner is one of them. Bit y·8 + z of word
-/// x stands for a grid point, as in OpenVDB's masks.
+/// Block of 8³ grid points, with the cells and edges whose lowest corner is one of them. Bit y·8 +
+/// z of word x stands for a grid point, as in OpenVDB's masks.
 struct SurfaceBlock {
   openvdb::Coord origin;
-  const float* values = nullptr;  ///< of the leaf; null: `fill` everywhere
+  const float* values = nullptr;  ///< values of the leaf; null: `fill` everywhere
   float fill = 0;
   std::array<std::uint32_t, 8> neighbour = {};  ///< by dx·4 + dy·2 + dz; [0] is the block itself
-  std::array<float, 8> neighbourFill = {};      ///< the value there, where no block is
+  std::array<float, 8> neighbourFill = {};      ///< value of a neighbour that has no block
   std::array<std::uint64_t, 8> inside = {};
   std::array<std::uint64_t, 24> crossed = {};  ///< [x·3 + axis]: edges with a change of sign
-  std::array<std::uint16_t, 24> rank = {};     ///< crossed edges before that word
+  std::array<std::uint16_t, 24> rank = {};     ///< number of crossed edges before that word
   std::size_t firstVertex = 0, vertexCount = 0;
   std::size_t firstTriangle = 0, triangleCount = 0;
   std::size_t firstCycle = 0, cycleCount = 0;  ///< polygons of the table, for dual meshes
   [[nodiscard]] float value(int offset) const { return values ? values[offset] : fill; }
 };
 
-/// Every cell with corners of both signs, and every edge with ends of both, in an order that
-/// depends on the grid alone: leaves in tree order, then further blocks by position. A grid point
-/// with φ < 0 is inside. Values outside the leaves are those of the tiles, so that a band cut open
-/// still gives a closed surface.
+/// All cells and edges with corners of both signs.
+/// Their order depends on the grid alone: leaves in tree order, then further blocks by position. A
+/// grid point with φ < 0 is inside. Outside the leaves the tiles give the values, so a band that
+/// was cut open still yields a closed surface.
 class CellSurface {
  public:
-  /// @throws ResourceLimit when a triangle mesh of it would need more than 2³² vertices
+  /// Collects, links and numbers the blocks.
+  /// @throws ResourceLimit when a triangle mesh of the surface needs more than 2³² vertices
   explicit CellSurface(const openvdb::FloatGrid& grid);
 
   static constexpr std::uint32_t kNoBlock = 0xffffffffu;
@@ -44,13 +46,14 @@ class CellSurface {
   [[nodiscard]] std::size_t triangleCount() const { return triangleCount_; }
   [[nodiscard]] std::size_t cycleCount() const { return cycleCount_; }
 
-  /// Sign words of the corners of all cells with lowest corner in slab x, by corner number.
+  /// Returns the sign words of the corners of all cells with lowest corner in slab x, by corner
+  /// number.
   [[nodiscard]] std::array<std::uint64_t, 8> cornerWords(const SurfaceBlock& block, int x) const;
-  /// Value at a grid point given relative to the block, each coordinate in [0, 8].
+  /// Returns the value at a grid point relative to the block, each coordinate in [0, 8].
   [[nodiscard]] float valueAt(const SurfaceBlock& block, int x, int y, int z) const;
-  /// Is the grid point inside? Any point; slow.
+  /// Returns true when the grid point is inside. Accepts any point; slow.
   [[nodiscard]] bool isInside(const openvdb::Coord& point) const;
-  /// Number of the crossed edge `edge` of the cell (x, y, z).
+  /// Returns the number of the crossed edge `edge` of the cell (x, y, z).
   [[nodiscard]] std::uint32_t vertexOf(const SurfaceBlock& block, int x, int y, int z,
                                        int edge) const;
 
@@ -98,12 +101,12 @@ class CellSurface {
   std::size_t vertexCount_ = 0, triangleCount_ = 0, cycleCount_ = 0;
 };
 
-/// Where the zero of linear interpolation lies on a crossed edge, in index space. Kept a little
-/// away from a grid point where other edges cross too, so that no two vertices coincide.
+/// Returns the zero of linear interpolation on a crossed edge, in index space. It keeps a small
+/// distance from a grid point where other edges cross too, so that no two vertices coincide.
 [[nodiscard]] openvdb::Vec3d crossingPoint(const CellSurface& surface, const SurfaceBlock& block,
                                            int x, int y, int z, int axis);
 
-/// The uniform mesh in index space: marching cubes on the table's polygons [Lor87].
+/// Uniform mesh in index space: marching cubes with the polygons of the table [Lor87].
 struct IndexMesh {
   std::vector<openvdb::Vec3d> positions;
   std::vector<std::array<std::uint32_t, 3>> triangles;

@@ -19,7 +19,7 @@ int edgeBetween(const Offset& a, const Offset& b) {
   return static_cast<int>(axis) * 4 + a[(axis + 1) % 3] * 2 + a[(axis + 2) % 3];
 }
 
-/// The corners of a face, counter-clockwise seen from outside the cell.
+/// Returns the corners of a face, counter-clockwise seen from outside the cell.
 std::array<Offset, 4> faceLoop(std::size_t axis, int side) {
   constexpr int kLoop[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
   std::array<Offset, 4> loop;
@@ -32,7 +32,7 @@ std::array<Offset, 4> faceLoop(std::size_t axis, int side) {
   return loop;
 }
 
-/// next[e]: the edge that follows e on the polygon through it, or −1.
+/// Returns next[e]: the edge that follows e on its polygon, or −1.
 std::array<int, 12> linkEdges(int pattern) {
   std::array<int, 12> next;
   next.fill(-1);
@@ -73,8 +73,8 @@ double squaredDistance(int a, int b) {
   return sum;
 }
 
-/// Splits polygon[first … last] with the shortest diagonals. None may lie in a face of the cell:
-/// the cell beyond it could use the same one, and four triangles would meet there.
+/// Splits polygon[first … last] with the shortest diagonals. No diagonal may lie in a face of the
+/// cell. The cell beyond the face could use the same one, and four triangles would meet there.
 class PolygonSplit {
  public:
   explicit PolygonSplit(const std::vector<int>& polygon) : polygon_(polygon) {}

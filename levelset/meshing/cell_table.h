@@ -3,27 +3,30 @@
 #include <array>
 #include <cstdint>
 
-/// The surface inside one cell of the grid, for each of the 256 patterns of signs at its corners.
+/// Surface inside one cell of the grid, for each of the 256 patterns of signs at its corners.
 ///
 /// Corner = dx·4 + dy·2 + dz. Edge = axis·4 + k, where k's two bits are the offsets along the axes
-/// axis+1 (high) and axis+2 (low), modulo 3. The table is derived, not pasted: on each face, every
-/// run of inside corners is cut off by one segment, so that inside corners which only share a
-/// diagonal stay apart. Both cells at a face see the same segments, hence the surface is closed and
-/// each of its vertices lies in one ring of polygons. Inside is thereby connected along grid edges,
-/// outside also across the diagonals of faces.
+/// axis+1 (high) and axis+2 (low), modulo 3.
+/// The table is computed, not copied. On each face, one segment cuts off every run of inside
+/// corners, so inside corners that share only a diagonal stay apart. Both cells at a face have the
+/// same segments. Hence the surface is closed, and each of its vertices lies in one ring of
+/// polygons. The inside is connected along grid edges, the outside also across the diagonals of
+/// faces.
 namespace levelset {
 
 struct CellCase {
-  std::uint8_t cycleCount = 0;  ///< closed polygons
+  std::uint8_t cycleCount = 0;  ///< number of closed polygons
   std::array<std::uint8_t, 4> cycleLength = {};
-  std::array<std::uint8_t, 12> cycleEdges = {};  ///< of all polygons, one after the other, seen
-                                                 ///< from outside counter-clockwise
-  std::array<std::int8_t, 12> cycleOfEdge = {};  ///< −1: the edge is not crossed
+  /// Edges of all polygons, one after the other, counter-clockwise seen from outside.
+  std::array<std::uint8_t, 12> cycleEdges = {};
+  /// Polygon through the edge; −1: the edge is not crossed.
+  std::array<std::int8_t, 12> cycleOfEdge = {};
   std::uint8_t triangleCount = 0;
-  std::array<std::array<std::uint8_t, 3>, 8> triangles = {};  ///< the polygons split; edges
+  /// Triangles of the polygons, as edges.
+  std::array<std::array<std::uint8_t, 3>, 8> triangles = {};
 };
 
-/// By pattern: bit c is set when corner c is inside.
+/// Returns the cases by pattern: bit c is set when corner c is inside.
 [[nodiscard]] const std::array<CellCase, 256>& cellTable();
 
 [[nodiscard]] constexpr int cornerOf(int dx, int dy, int dz) {
@@ -32,7 +35,7 @@ struct CellCase {
 [[nodiscard]] constexpr int edgeAxis(int edge) {
   return edge >> 2;
 }
-/// Offset of the edge's lower end from the cell's lowest corner.
+/// Returns the offset of the edge's lower end from the cell's lowest corner.
 [[nodiscard]] constexpr std::array<int, 3> edgeOffset(int edge) {
   std::array<int, 3> offset = {};
   const int axis = edge >> 2;

@@ -15,12 +15,12 @@ struct DoubleTraits : OpenMesh::DefaultTraits {
 };
 using HalfedgeMesh = OpenMesh::TriMesh_ArrayKernelT<DoubleTraits>;
 
-/// Neighbours of both ends of an edge that may collapse. Without a limit, flat parts become fans of
-/// thousands of triangles, and each further collapse visits all of them.
+/// Largest sum of the valences of both ends of an edge that may collapse. Without a limit, flat
+/// parts become fans of thousands of triangles, and each further collapse visits all of them.
 constexpr unsigned kMaxValences = 24;
 
-/// The quadric of a flat part is zero but for rounding; below zero would mean that the collapse is
-/// forbidden.
+/// Quadric module that accepts rounding. The quadric of a flat part is zero except for rounding,
+/// and a negative priority would forbid the collapse.
 template <typename AnyMesh>
 class FlatQuadric : public OpenMesh::Decimater::ModQuadricT<AnyMesh> {
  public:
@@ -37,7 +37,7 @@ class FlatQuadric : public OpenMesh::Decimater::ModQuadricT<AnyMesh> {
   }
 };
 
-/// A collapse may not turn a triangle by more than that.
+/// Largest turn of a triangle by a collapse.
 constexpr float kMaxTurnDegrees = 45;
 
 HalfedgeMesh toHalfedges(const IndexMesh& mesh) {

@@ -4,9 +4,9 @@
 
 namespace levelset {
 
-/// Coarsens a closed mesh where it is flat. Vertices that remain keep their places; the planes of
-/// all triangles that went into one stay within `tolerance` of it [Gar97]. Closed and 2-manifold as
-/// before.
+/// Coarsens a closed mesh where it is flat. Vertices that remain do not move. Each stays within
+/// `tolerance` of the planes of all triangles merged into it [Gar97]. The mesh remains closed and
+/// 2-manifold.
 [[nodiscard]] IndexMesh decimate(const IndexMesh& mesh, double tolerance);
 
 }  // namespace levelset

@@ -14,37 +14,39 @@ namespace {
 
 using openvdb::Vec3d;
 
-/// Of a feature: largest distance from the planes of its faces, voxels.
+/// Largest distance of a feature vertex from the planes of its faces, voxels.
 constexpr double kMisfit = 0.1;
-/// Between these distances from a feature, in voxels, the surface must be as flat as its faces …
+/// Ring around a feature in which the surface must be as flat as its faces: distances in voxels.
 constexpr double kRingBegin = 0.8, kRingEnd = 2.3;
-/// … which is when all but this part of it turns away from them by less than this part of the angle
-/// between them. On a round surface the normal goes on turning.
+/// Largest part of the ring that may turn away from the faces, and the turn that counts, as a share
+/// of the angle between them. On a round surface the normal continues to turn.
 constexpr double kOddPart = 0.15, kTurn = 0.35;
-/// The surface that does not turn away is no further from their planes, voxels.
+/// Largest distance of the rest of the ring from the planes of the faces, voxels.
 constexpr double kOffFace = 0.35;
-/// A vertex further from a plane that it was fitted to, voxels, stands for two surfaces that run
-/// through its cell; it lies on neither.
+/// A vertex further than this, in voxels, from a plane to which it was fitted is torn: two surfaces
+/// run through its cell, and it lies on neither.
 constexpr double kTorn = 0.3;
-/// A sheet is flat where second differences, in voxels, are below that share of the feature's angle
+/// A sheet is flat where second differences, in voxels, are below this share of the feature's angle
 /// in radians.
 constexpr double kFlatBend = 0.06;
-/// Planes of places with larger second differences, voxels, give way to those of places where they
-/// are so many times smaller, …
+/// Planes with larger second differences than kBent, voxels, are replaced by planes nearby whose
+/// second differences are smaller by the factor kFlatter.
 constexpr double kBent = 0.005, kFlatter = 4;
-/// … if these belong to the same face: no further off the vertex, voxels. What that moves a vertex
-/// by, voxels, is no more either.
+/// Both planes must belong to the same face: largest distance of the new plane from the vertex,
+/// voxels. It also limits the resulting move of the vertex.
 constexpr double kSameFace = 0.3;
-/// Inside a convex edge, or outside a concave one, the values up to that many voxels away are those
-/// of the nearer sheet, and beyond the edge those of the edge, …
+/// Distance from an edge, voxels, up to which values are compared with those of a sharp edge.
+/// Inside a convex edge, or outside a concave one, these are distances to the nearer sheet. Beyond
+/// the edge they are distances to the edge.
 constexpr double kEdgeReach = 1.5;
-/// … to that many voxels, but for so large a part of them: near a corner a third sheet is nearer.
-/// At a right angle that is rounded off they differ by up to 2/5 of the radius.
+/// Tolerance of that comparison, voxels, and the part of the values that may exceed it. At a
+/// rounded right angle, values differ by up to 2/5 of the radius. Vertices within kCornerReach of a
+/// corner do not count, since a third sheet is nearer there.
 constexpr double kRounded = 0.06, kRoundedPart = 0.15, kCornerReach = 2;
-/// Vertices that near to a feature, along the surface, in voxels, are beside it.
+/// Distance along the surface, voxels, within which vertices are beside a feature.
 constexpr double kBeside = 3;
 
-/// The triangles at each vertex of a mesh.
+/// Triangles at each vertex of a mesh.
 class Fans {
  public:
   explicit Fans(const IndexMesh& mesh) : begin_(mesh.positions.size() + 1) {
@@ -65,7 +67,7 @@ class Fans {
   std::vector<std::uint32_t> triangles_;
 };
 
-/// Triangles connected to a vertex and nearer than `radius`.
+/// Returns the triangles connected to a vertex and nearer than `radius`.
 std::vector<std::uint32_t> trianglesNear(const IndexMesh& mesh, const Fans& fans,
                                          std::uint32_t vertex, double radius) {
   const Vec3d centre = mesh.positions[vertex];
@@ -82,7 +84,7 @@ std::vector<std::uint32_t> trianglesNear(const IndexMesh& mesh, const Fans& fans
   return found;
 }
 
-/// Between two of the sheets.
+/// Returns the widest angle between two of the sheets.
 double widestAngle(const VertexSheets& sheets) {
   double least = 1;
   for (std::size_t i = 0; i < sheets.count; ++i)
@@ -91,8 +93,9 @@ double widestAngle(const VertexSheets& sheets) {
   return std::acos(std::clamp(least, -1.0, 1.0));
 }
 
-/// Is each sheet of a feature flat somewhere near it? A round surface that turns by the same angle
-/// within reach of one cell's planes is bent everywhere, by at least twice kFlatBend of the angle.
+/// Returns true when each sheet of a feature is flat somewhere near it. A round surface that turns
+/// by the same angle within one cell's planes is bent everywhere, by at least twice kFlatBend of
+/// the angle.
 bool hasFlatSheets(const IndexMesh& mesh, std::span<const std::uint32_t> triangles,
                    std::uint32_t feature, const std::vector<VertexSheets>& sheets,
                    const std::vector<SheetQuality>& quality) {
@@ -109,7 +112,7 @@ bool hasFlatSheets(const IndexMesh& mesh, std::span<const std::uint32_t> triangl
   return flat + 1 == 1u << own.count;
 }
 
-/// Does the surface around a feature lie in the planes of its faces?
+/// Returns true when the surface around a feature lies in the planes of its faces.
 bool isConfirmed(const IndexMesh& mesh, const Fans& fans, std::uint32_t vertex,
                  const VertexSheets& sheets, const std::vector<SheetQuality>& quality) {
   const double turn = std::cos(kTurn * widestAngle(sheets));
@@ -131,7 +134,7 @@ bool isConfirmed(const IndexMesh& mesh, const Fans& fans, std::uint32_t vertex,
       isIn |= cosine >= turn * size && std::abs(n.dot(middle - mesh.positions[vertex])) < kOffFace;
       isFar |= cosine < -turn * size;
     }
-    // The far side of a thin plate neither shows the faces nor denies them.
+    // The far side of a thin plate neither confirms nor refutes the faces.
     if (isFar && !isIn && !isTorn) continue;
     area += size;
     if (!isIn || isTorn) odd += size;
@@ -139,8 +142,8 @@ bool isConfirmed(const IndexMesh& mesh, const Fans& fans, std::uint32_t vertex,
   return area > 0 && odd <= kOddPart * area;
 }
 
-/// How many grid points beside an edge were looked at, and at how many the values are not those of
-/// a sharp one: were it convex, were it concave.
+/// Number of grid points examined beside an edge, and number whose values contradict a sharp edge.
+/// Index 0 assumes a convex edge, index 1 a concave one.
 struct EdgeEvidence {
   std::array<std::size_t, 2> points = {}, odd = {};
 
@@ -159,8 +162,9 @@ struct EdgeEvidence {
   }
 };
 
-/// Of a vertex with two sheets. Inside a convex edge the distance is that to the nearer plane, and
-/// beyond the edge no larger than that to it; a concave one is the same with the signs changed.
+/// Collects the evidence at a vertex with two sheets. Inside a convex edge, a distance field holds
+/// the distance to the nearer plane; beyond the edge, at most the distance to the edge. A concave
+/// edge is the same with the signs changed.
 EdgeEvidence evidenceAt(const Vec3d& vertex, const VertexSheets& sheets,
                         const openvdb::FloatGrid::ConstAccessor& field, double voxelSize,
                         double halfWidth) {
@@ -172,10 +176,10 @@ EdgeEvidence evidenceAt(const Vec3d& vertex, const VertexSheets& sheets,
   const openvdb::Coord centre = openvdb::Coord::round(vertex);
   for (const openvdb::Coord& c : openvdb::CoordBBox(centre.offsetBy(-2), centre.offsetBy(2))) {
     const Vec3d to = c.asVec3d() - vertex;
-    const double ahead = to.dot(along), across = (to - along * ahead).length();
+    const double alongEdge = to.dot(along), across = (to - along * alongEdge).length();
     const double value = static_cast<double>(field.getValue(c)) / voxelSize;
-    // A value that is cut off at the band's rim tells nothing.
-    if (std::abs(ahead) > kEdgeReach || std::abs(value) > halfWidth * (1 - 1e-5)) continue;
+    // A value clipped at the rim of the band is no evidence.
+    if (std::abs(alongEdge) > kEdgeReach || std::abs(value) > halfWidth * (1 - 1e-5)) continue;
     for (const int sign : {1, -1}) {
       const double d0 = sign * to.dot(n0), d1 = sign * to.dot(n1), d = sign * value;
       const bool isInside = d0 < 0 && d1 < 0 && std::min(d0, d1) > -kEdgeReach;
@@ -189,7 +193,7 @@ EdgeEvidence evidenceAt(const Vec3d& vertex, const VertexSheets& sheets,
   return found;
 }
 
-/// Are the sheets of one edge those of the other?
+/// Returns true when two edges have the same sheets.
 bool areSameSheets(const VertexSheets& a, const VertexSheets& b) {
   if (a.count != 2 || b.count != 2) return false;
   const auto match = [&](std::size_t i, std::size_t j) {
@@ -198,8 +202,8 @@ bool areSameSheets(const VertexSheets& a, const VertexSheets& b) {
   return (match(0, 0) && match(1, 1)) || (match(0, 1) && match(1, 0));
 }
 
-/// Do the values around an edge say that it is not rounded off? Near a corner they tell of a third
-/// sheet.
+/// Returns true when the values around an edge show that it is not rounded. Vertices near a corner
+/// do not count where others exist, since a third sheet affects them.
 bool isSharp(const IndexMesh& mesh, std::span<const std::uint32_t> triangles, std::uint32_t feature,
              const std::vector<VertexSheets>& sheets, const std::vector<EdgeEvidence>& evidence) {
   std::vector<std::uint32_t> edge, corners;
@@ -223,18 +227,18 @@ bool isSharp(const IndexMesh& mesh, std::span<const std::uint32_t> triangles, st
   return apart.points[0] + apart.points[1] ? apart.isSharp() : all.isSharp();
 }
 
-/// A sheet as one vertex tells it.
-struct ToldSheet {
+/// Normal of a sheet, as estimated at one vertex.
+struct SheetEstimate {
   std::uint32_t vertex;
   Vec3d normal;
 };
 
-/// A sheet of a vertex as another one tells it better: the nearest of the much flatter ones.
-ToldSheet flatterSheet(const IndexMesh& mesh, std::span<const std::uint32_t> triangles,
-                       const ToldSheet& own, const std::vector<VertexSheets>& sheets,
-                       const std::vector<SheetQuality>& quality) {
+/// Returns a better estimate of a sheet: the nearest one that is much flatter.
+SheetEstimate flatterSheet(const IndexMesh& mesh, std::span<const std::uint32_t> triangles,
+                           const SheetEstimate& own, const std::vector<VertexSheets>& sheets,
+                           const std::vector<SheetQuality>& quality) {
   const Vec3d position = mesh.positions[own.vertex];
-  ToldSheet best = own;
+  SheetEstimate best = own;
   double least = kBeside * kBeside;
   for (const std::uint32_t t : triangles)
     for (const std::uint32_t v : mesh.triangles[t]) {
@@ -323,7 +327,7 @@ std::vector<bool> confirmFeatures(IndexMesh& mesh, const openvdb::FloatGrid& fie
     if (!isEdge[v] && !(isSure[i] && sheets[v].count > 2)) near[i] = {};
     gate.advance(1);
   });
-  // At a corner the values tell of three sheets: it is as sharp as the edges that end there.
+  // Values at a corner depend on three sheets: a corner is as sharp as the edges that end there.
   const auto touchesEdge = [&](std::uint32_t t) {
     const auto& [a, b, c] = mesh.triangles[t];
     return isEdge[a] || isEdge[b] || isEdge[c];

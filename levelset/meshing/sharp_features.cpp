@@ -18,21 +18,22 @@ namespace {
 using openvdb::Vec3d;
 using Triangle = MeshTriangle;
 
-/// A mesh edge or triangle nearer to the solid's edge or corner than that, voxels, is left alone.
+/// A mesh edge or triangle nearer than this to an edge or corner of the solid stays, voxels.
 constexpr double kFeatureTolerance = 0.01;
-/// What a new vertex may be away from the edge or triangle that it is put into, voxels.
+/// Largest distance of a new vertex from the edge or triangle that it splits, voxels.
 constexpr double kFeatureReach = 1.5;
-/// Sheets at a smaller angle form no edge.
+/// Sheets whose normals have a larger dot product form no edge.
 constexpr double kCreaseCosine = 0.88;
-/// What a pass inserts can ask for more: a corner after the three edges that run into it.
+/// Number of passes. What a pass inserts can require more: a corner follows after its three edges.
 constexpr int kPasses = 8;
-/// Two corners are at least that far apart, voxels.
+/// Least distance between two corners, voxels.
 constexpr double kCornerApart = 0.1;
-/// Three sheets of which one is nearly parallel to the line of the others form no corner.
+/// Least determinant of three normals at a corner: below it, one sheet is nearly parallel to the
+/// line of the others.
 constexpr double kLeastDeterminant = 0.05;
 constexpr std::uint32_t kNoVertex = 0xffffffffu;
 
-/// A sheet's plane n·x = d.
+/// Plane n·x = d of a sheet.
 struct SheetPlane {
   Vec3d n;
   double d;
@@ -42,7 +43,7 @@ struct SheetPlane {
 struct NewVertex {
   Vec3d position;
   VertexSheets sheets;
-  double gap = 0;  ///< how far the surface is from the mesh there, voxels
+  double gap = 0;  ///< distance of the surface from the mesh there, voxels
 };
 
 void addSheet(VertexSheets& sheets, const Vec3d& n) {
@@ -52,12 +53,13 @@ void addSheet(VertexSheets& sheets, const Vec3d& n) {
   sheets.normal[sheets.count++] = openvdb::Vec3f(n);
 }
 
-/// The point of the line in which two sheets meet that is nearest to the middle of the segment from
-/// a point of the one to a point of the other; none where they do not form an edge between both.
+/// Returns the point on the intersection line of two sheets that is nearest to the middle of the
+/// segment from `a` to `b`. Each end lies on one sheet. Returns none where the sheets form no edge
+/// between both points.
 std::optional<Vec3d> creasePoint(const Vec3d& a, const Vec3d& na, const Vec3d& b, const Vec3d& nb) {
   const double cosine = na.dot(nb);
   if (cosine > kCreaseCosine || cosine < -kCreaseCosine) return std::nullopt;
-  // Across a convex edge each point lies below the other's plane, across a concave one above.
+  // Across a convex edge each point lies below the other's plane, across a concave edge above it.
   const double belowB = nb.dot(a - b), belowA = na.dot(b - a);
   if (!(belowA * belowB > 0)) return std::nullopt;
   const Vec3d middle = (a + b) * 0.5;
@@ -83,14 +85,16 @@ class FeatureInserter {
   void run() {
     collectCorners();
     for (int pass = 0; pass < kPasses; ++pass) {
-      const auto tell = [&](double done) { report(progress_, (pass + done) / kPasses, "mesh"); };
-      tell(0);
+      const auto reportProgress = [&](double done) {
+        report(progress_, (pass + done) / kPasses, "mesh");
+      };
+      reportProgress(0);
       collect();
       if (edges_.empty() && faces_.empty()) return;
       hasChanged_ = false;
-      tell(0.4);
+      reportProgress(0.4);
       flipEdges();
-      tell(0.8);
+      reportProgress(0.8);
       splitEdges();
       splitFaces();
       if (!hasChanged_) return;
@@ -102,7 +106,7 @@ class FeatureInserter {
     return sheetGap(positions_[a], sheets_[a], positions_[b], sheets_[b]);
   }
 
-  /// Where a vertex belongs on a mesh edge, if it needs one.
+  /// Returns the vertex that a mesh edge needs on an edge of the solid, or none.
   [[nodiscard]] std::optional<NewVertex> edgeVertex(std::uint32_t a, std::uint32_t b) const {
     if (gapBetween(a, b) < kFeatureTolerance) return std::nullopt;
     const Vec3d &pa = positions_[a], &pb = positions_[b];
@@ -123,14 +127,14 @@ class FeatureInserter {
       }
     }
     if (best) return best;
-    // The edge of the solid ends at a corner before it gets between both.
+    // The edge of the solid may end at a corner before it passes between both vertices.
     const std::array<std::uint32_t, 2> ends = {a, b};
     best = cornerOf(ends, middle);
     if (best) best->gap = segmentDistance(best->position, pa, pb);
     return best && best->gap > kFeatureTolerance ? best : std::nullopt;
   }
 
-  /// Does a triangle lie in one sheet of a vertex of it, turned as that?
+  /// Returns true when a triangle lies in a sheet of one of its vertices and faces the same side.
   [[nodiscard]] bool fitsSheet(const Triangle& t) const {
     const Vec3d area =
         (positions_[t[1]] - positions_[t[0]]).cross(positions_[t[2]] - positions_[t[0]]);
@@ -155,7 +159,8 @@ class FeatureInserter {
     return hasFeature && isKnown && !fitsSheet(t);
   }
 
-  /// The corner where the sheets of some vertices meet, if they are three and it is beside `near`.
+  /// Returns the corner where the sheets of some vertices meet; none unless they are three and it
+  /// is near.
   [[nodiscard]] std::optional<NewVertex> cornerOf(std::span<const std::uint32_t> vertices,
                                                   const Vec3d& near) const {
     NewVertex corner;
@@ -180,7 +185,7 @@ class FeatureInserter {
     return corner;
   }
 
-  /// Where a vertex belongs in a triangle whose sides are fine, if it needs one.
+  /// Returns the vertex that a triangle with valid sides needs at a corner of the solid, or none.
   [[nodiscard]] std::optional<NewVertex> faceVertex(const Triangle& t) const {
     if (!isOffSheets(t)) return std::nullopt;
     const Vec3d &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
@@ -193,7 +198,7 @@ class FeatureInserter {
     return vertex;
   }
 
-  // === Corners, so that no two vertices are put on one
+  // === Corners, so that no two vertices share one
 
   static std::array<int, 3> cornerCell(const Vec3d& p) {
     return {static_cast<int>(std::floor(p[0])), static_cast<int>(std::floor(p[1])),
@@ -280,8 +285,8 @@ class FeatureInserter {
     return index;
   }
 
-  /// Gives each edge that is still cut its vertex, then splits the triangles beside it. Triangles
-  /// that a flip has changed wait for the next pass.
+  /// Inserts a vertex on each edge that still cuts across, then splits the triangles beside it.
+  /// Triangles changed by a flip wait for the next pass.
   void splitEdges() {
     struct Cut {
       std::size_t triangle;
@@ -302,7 +307,7 @@ class FeatureInserter {
     });
     for (std::size_t i = 0, end = 0; i < cuts.size(); i = end) {
       const Triangle t = triangles_[cuts[i].triangle];
-      std::array<std::uint32_t, 3> middle;  // on the side from t[k] to the next
+      std::array<std::uint32_t, 3> middle;  // on the side from t[k] to the next vertex
       middle.fill(kNoVertex);
       for (end = i; end < cuts.size() && cuts[end].triangle == cuts[i].triangle; ++end)
         for (std::size_t k = 0; k < 3; ++k)
@@ -320,7 +325,7 @@ class FeatureInserter {
         triangles_.push_back({t[k], middle[k], middle[(k + 2) % 3]});
       return;
     }
-    std::size_t k = 0;  // turned so that side k is cut and, of two, side k + 1 too
+    std::size_t k = 0;  // rotate: side k is cut, and of two cut sides the other is k + 1
     while (middle[k] == kNoVertex || (count == 2 && middle[(k + 1) % 3] == kNoVertex)) ++k;
     const std::uint32_t a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3], ab = middle[k];
     if (count == 1) {
@@ -357,16 +362,17 @@ class FeatureInserter {
   std::vector<Triangle>& triangles_;
   std::vector<VertexSheets>& sheets_;
   const Progress& progress_;
-  /// Mesh edges that cut across an edge of the solid, by how far, and the sides of faces_ (0).
+  /// Mesh edges that cut across an edge of the solid, with the distance as weight, and the sides of
+  /// faces_ with weight 0.
   std::vector<PairedEdge> edges_;
-  std::vector<std::size_t> faces_;  ///< triangles without a cut side that lie in no sheet
+  std::vector<std::size_t> faces_;  ///< triangles in no sheet that have no cut side
   std::map<std::array<int, 3>, std::vector<std::uint32_t>> corners_;  ///< by cell
   bool hasChanged_ = false;                                           ///< in this pass
   std::vector<bool> touched_;  ///< triangles that a flip has changed in this pass
 };
 
-/// Takes the triangles out that touch a vertex with sheets, and those that may share a mesh edge
-/// between two vertices of these: what edges are looked for in, mostly a small part.
+/// Removes and returns the triangles in which edges are sought, usually a small part. These touch a
+/// vertex with sheets, or may share a mesh edge between two vertices of such triangles.
 std::vector<Triangle> takeFeaturePart(std::vector<Triangle>& triangles,
                                       const std::vector<VertexSheets>& sheets) {
   std::vector<bool> isNear(sheets.size());
@@ -386,7 +392,7 @@ std::vector<Triangle> takeFeaturePart(std::vector<Triangle>& triangles,
   return part;
 }
 
-/// Removes vertices that no triangle has any more.
+/// Removes vertices without triangles.
 void removeUnused(IndexMesh& mesh, std::vector<VertexSheets>& sheets) {
   std::vector<bool> isUsed(mesh.positions.size());
   for (const Triangle& t : mesh.triangles)
@@ -426,7 +432,7 @@ void insertFeatures(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Pr
     mesh.triangles = std::move(rest);
     return;
   }
-  // What is unfolded may turn out to lack a corner that a folded triangle had.
+  // After the repair, a triangle may lack a corner that a folded triangle had: run twice.
   for (const double begin : {0.0, 0.5}) {
     FeatureInserter(mesh, sheets, subProgress(progress, begin, begin + 0.3)).run();
     unfoldSheets(mesh, sheets, subProgress(progress, begin + 0.3, begin + 0.5));

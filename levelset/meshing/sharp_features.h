@@ -1,6 +1,7 @@
 #pragma once
 
-// Edges and corners between the vertices of a mesh. Includes OpenVDB: for .cpp files only.
+// Edges and corners of the solid between the vertices of a mesh. Internal header of levelset:
+// public headers must not include it.
 
 #include <array>
 #include <cmath>
@@ -11,8 +12,8 @@
 
 namespace levelset {
 
-/// The unit normals of the sheets of the surface that meet at a vertex: one on a smooth part, two
-/// on an edge, three at a corner. None: nothing is known there.
+/// Unit normals of the sheets that meet at a vertex; a sheet is a smooth part of the surface. One
+/// sheet on a smooth part, two on an edge, three at a corner. None: unknown.
 struct VertexSheets {
   static constexpr std::size_t kMost = 4;
   std::uint8_t count = 0;
@@ -23,11 +24,12 @@ struct VertexSheets {
   return openvdb::Vec3d(sheets.normal[i]);
 }
 
-/// Sheets whose normals are less than that far apart are one.
+/// Sheets whose normals have a larger dot product are the same sheet.
 inline constexpr double kOneSheetCosine = 0.9;
 
-/// Does the segment `to`, from a vertex whose sheet has normal `n` to one with `sheets`, run in
-/// that sheet? The chord of a round face is at right angles to the mean of the normals at its ends.
+/// Returns true when the segment `to` runs in one sheet, from a vertex with sheet normal `n` to one
+/// with `sheets`. The chord of a round face is perpendicular to the mean of the normals at its
+/// ends.
 [[nodiscard]] inline bool isInSheet(const openvdb::Vec3d& n, const openvdb::Vec3d& to,
                                     const VertexSheets& sheets) {
   constexpr double kOff = 0.03;  // voxels
@@ -39,41 +41,44 @@ inline constexpr double kOneSheetCosine = 0.9;
   return false;
 }
 
-/// How well the planes are known that a vertex was fitted to.
+/// Accuracy of the planes to which a vertex was fitted.
 struct SheetQuality {
-  double misfit = 0;  ///< largest distance of the vertex to one of them, voxels
-  double bend = 1;    ///< largest second difference of the values that tell them, voxels
+  double misfit = 0;  ///< largest distance of the vertex from a plane, voxels
+  double bend = 1;    ///< largest second difference of the values that define the planes, voxels
 };
 
-/// The vertices near which edges of the solid are sure: some vertex with several sheets is there,
-/// the surface around it lies in these, and each of them is much flatter somewhere than a round
-/// surface that turns as far. Smooth surfaces have none, whatever their curvature, and nor have
-/// edges that are rounded off by a voxel or more: the values beside them are not those of the
-/// planes. Those vertices are put where the planes of their sheets meet as the flattest places near
-/// them tell these: an edge bends the values at the grid points next to it.
-/// @param field    whose zero set the mesh is
+/// Finds the vertices near confirmed edges of the solid and moves them onto the edges.
+/// An edge is confirmed when three conditions hold. A vertex has several sheets, the surface around
+/// it lies in these, and each sheet is somewhere much flatter than a round surface that turns as
+/// far. Smooth surfaces have no such edges, whatever their curvature. Edges rounded by a voxel or
+/// more have none either: the values beside them are not those of the planes.
+/// A vertex moves to the point where the planes of its sheets meet. The planes come from the
+/// flattest parts nearby, since an edge bends the values at the grid points next to it.
+/// @param field    field whose zero set the mesh is
 /// @param sheets   one for each vertex
 /// @param quality  one for each vertex
+/// @return true for each vertex near a confirmed edge
 [[nodiscard]] std::vector<bool> confirmFeatures(IndexMesh& mesh, const openvdb::FloatGrid& field,
                                                 std::vector<VertexSheets>& sheets,
                                                 const std::vector<SheetQuality>& quality,
                                                 const Progress& progress);
 
-/// How far one end of a segment between two vertices is from the nearest sheet through the other,
-/// voxels: 0 when the segment runs in a sheet of either.
+/// Returns how far one end of a segment is from the nearest sheet through the other end, voxels. 0
+/// when the segment runs in a sheet of either vertex.
 [[nodiscard]] double sheetGap(const openvdb::Vec3d& from, const VertexSheets& fromSheets,
                               const openvdb::Vec3d& to, const VertexSheets& toSheets);
 
-/// Makes mesh edges follow the edges of the solid, after Kobbelt et al. [Kobbelt01]: a mesh edge
-/// that cuts across one is flipped to run along it, or gets a vertex where the sheets of its ends
-/// meet; a triangle whose vertices have no sheet in common gets one at the corner where three
-/// sheets meet. Positions are in voxels. The mesh stays closed and 2-manifold.
+/// Aligns mesh edges with the edges of the solid, after Kobbelt et al. [Kobbelt01].
+/// A mesh edge that cuts across an edge of the solid is flipped to run along it, or split where the
+/// sheets of its ends meet. A triangle whose vertices have no common sheet gets a vertex at the
+/// corner where three sheets meet. Positions are in voxels. The mesh stays closed and 2-manifold.
 /// @param sheets  one for each vertex; grows with the mesh
 void insertFeatures(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress);
 
-/// Mends triangles that are turned over in their sheet or without area there, where vertices of
-/// neighbouring cells have changed places or meet: by flips of mesh edges, then by leaving vertices
-/// out, which stay behind without sheets. The surface stays where it is and 2-manifold.
+/// Repairs triangles that are turned over in their sheet or have no area there. Such triangles
+/// arise where vertices of neighbouring cells coincide or have exchanged their order. The repair
+/// flips mesh edges, then removes vertices from the triangles; these vertices remain in the list
+/// without sheets. The surface stays in place and 2-manifold.
 void unfoldSheets(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress);
 
 }  // namespace levelset

@@ -16,9 +16,10 @@ using Eigen::Vector3d;
 using openvdb::Coord;
 using openvdb::FloatGrid;
 
-/// How far a vertex without a sheet may be from those of its neighbours, and from where they meet.
+/// Largest distance of a vertex without sheets from those of its neighbours, and from their
+/// intersection, voxels.
 constexpr double kAdoptReach = 1.25;
-/// Vertices stay that far apart, voxels.
+/// Least distance between vertices, voxels.
 constexpr double kApart = 0.05;
 /// Diagonals whose gaps differ by less, voxels, are equally good.
 constexpr double kSameGap = 0.02;
@@ -27,7 +28,7 @@ openvdb::Vec3d toIndex(const Vector3d& p) {
   return {p.x(), p.y(), p.z()};
 }
 
-/// Faces of a cell that one polygon passes twice: bit axis·2 + side, by polygon of the case.
+/// Returns the faces of a cell that one polygon passes twice: bit axis·2 + side, by polygon.
 std::array<std::uint8_t, 4> facesPassedTwice(const CellCase& cell) {
   std::array<std::uint8_t, 4> result = {};
   for (int axis = 0; axis < 3; ++axis) {
@@ -48,11 +49,11 @@ std::array<std::uint8_t, 4> facesPassedTwice(const CellCase& cell) {
   return result;
 }
 
-/// A segment on a face that two cells pass twice: both cells would be joined by two equal edges. A
-/// vertex of its own on each segment keeps them apart.
+/// Segment on a face that the polygons of both cells pass twice. Both cells would be joined by two
+/// equal mesh edges, so each segment gets its own vertex.
 struct FaceSegment {
-  Coord insideCorner;    ///< the corner that the segment cuts off
-  Coord oppositeCorner;  ///< of the face
+  Coord insideCorner;    ///< corner that the segment cuts off
+  Coord oppositeCorner;  ///< opposite corner of the face
   friend bool operator<(const FaceSegment& a, const FaceSegment& b) {
     return std::tie(a.insideCorner, a.oppositeCorner) < std::tie(b.insideCorner, b.oppositeCorner);
   }
@@ -62,8 +63,8 @@ struct FaceSegment {
 };
 
 /// Slots of the cells around an edge, counter-clockwise about its axis, by the two offsets of the
-/// edge in the cell; and the axis (0: axis + 1, 1: axis + 2) in which each differs from the next
-/// one.
+/// edge in the cell. kRingStep is the axis in which each cell differs from the next one (0: axis +
+/// 1, 1: axis + 2).
 constexpr std::array<unsigned, 4> kRing = {0, 2, 3, 1};
 constexpr std::array<int, 4> kRingStep = {0, 1, 0, 1};
 
@@ -138,7 +139,8 @@ class DualMesher {
     });
   }
 
-  /// Is the side of the quadrilateral from slot kRing[i] to the next one of the doubled kind?
+  /// Returns true when the side of the quadrilateral from slot kRing[i] to the next one lies on a
+  /// face that both cells pass twice.
   [[nodiscard]] bool isDoubled(const std::array<std::uint32_t, 4>& cells, int axis,
                                std::size_t i) const {
     const int step = (axis + 1 + kRingStep[i]) % 3;
@@ -150,11 +152,11 @@ class DualMesher {
     return (twice_[lower] >> (step * 2 + 1)) & (twice_[upper] >> (step * 2)) & 1;
   }
 
-  /// The face lies towards the side where the edge of that slot pair is: both cells share the other
-  /// offset, which says on which side of the edge the face is.
+  /// Returns the segment on the face between the cells of slots i and i + 1. Both cells have the
+  /// same other offset of the edge; it gives the side of the edge on which the face lies.
   [[nodiscard]] static FaceSegment segmentAt(const Coord& low, int axis, bool lowInside,
                                              std::size_t i) {
-    const int other = (axis + 2 - kRingStep[i]) % 3;  // the axis along which the face extends
+    const int other = (axis + 2 - kRingStep[i]) % 3;  // axis along which the face extends
     const unsigned bit = kRingStep[i] == 0 ? 1 : 2;
     Coord high = low;
     high[axis] += 1;
@@ -165,8 +167,9 @@ class DualMesher {
     return segment;
   }
 
-  /// A cell beside a corner may have no grid point with a face to itself. Its vertex then goes
-  /// where the sheets of the vertices around it meet.
+  /// Gives vertices without sheets those of their neighbours. A cell beside a corner may have no
+  /// grid point whose values belong to one face. Its vertex then moves to the intersection of the
+  /// neighbours' sheets.
   void adoptSheets() {
     std::vector<bool> isWithout(vertices_.size());
     std::vector<std::uint32_t> without;
@@ -253,7 +256,7 @@ class DualMesher {
     segments_.erase(std::unique(segments_.begin(), segments_.end()), segments_.end());
   }
 
-  /// Half way between the crossings on both edges of the face at the corner that is cut off.
+  /// Returns the midpoint between the crossings on both edges of the face at the segment's corner.
   [[nodiscard]] openvdb::Vec3d middle(const FaceSegment& segment) const {
     const openvdb::FloatTree& tree = grid_.tree();
     const double own = static_cast<double>(tree.getValue(segment.insideCorner));
@@ -298,7 +301,8 @@ class DualMesher {
     });
   }
 
-  /// A diagonal must not cut across an edge of the solid; otherwise the shorter one.
+  /// Returns the start of the diagonal that does not cut across an edge of the solid; else that of
+  /// the shorter diagonal.
   [[nodiscard]] std::size_t firstOfDiagonal(const std::vector<std::uint32_t>& quad) const {
     const auto gap = [&](std::size_t i) {
       const DualVertex &a = vertices_[quad[i]], &b = vertices_[quad[i + 2]];

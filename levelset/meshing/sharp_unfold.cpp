@@ -13,11 +13,12 @@ namespace {
 using openvdb::Vec3d;
 using Triangle = MeshTriangle;
 
-/// A triangle of less height, voxels, is folded or without area; flips gain at least that.
+/// Least height of a triangle, voxels; a lower one is folded or has no area. Least gain of a flip,
+/// voxels.
 constexpr double kLeastHeight = 0.02, kLeastGain = 1e-3;
-/// The height of a triangle that lies in no sheet: less than any other.
+/// Height of a triangle that lies in no sheet: less than any other.
 constexpr double kOffSheets = -10;
-/// A flip can ask for another one, and a vertex that goes for flips.
+/// Number of passes. A flip can require another flip, and a removed vertex can require flips.
 constexpr int kUnfoldPasses = 8;
 
 class SheetUnfolder {
@@ -38,8 +39,9 @@ class SheetUnfolder {
   }
 
  private:
-  /// The least height of a triangle in the sheet that it lies in, voxels: negative when it is
-  /// turned over there; kOffSheets if it lies in none.
+  /// Returns the height of a triangle over its longest side, in the sheet that fits it best,
+  /// voxels. The height is negative when the triangle is turned over there, and kOffSheets if it
+  /// lies in none.
   [[nodiscard]] double heightInSheet(const Triangle& t) const {
     const Vec3d &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
     const Vec3d area = (b - a).cross(c - a);
@@ -77,9 +79,9 @@ class SheetUnfolder {
     return all;
   }
 
-  /// Vertices out of order along an edge of the solid turn triangles over in their sheet, and three
-  /// of them on it make one without area. Where both triangles beside a mesh edge get better by it,
-  /// the edge is flipped.
+  /// Flips mesh edges where both triangles beside the edge improve in sum. Vertices out of order
+  /// along an edge of the solid turn triangles over in their sheet. Three vertices on that edge
+  /// form a triangle without area.
   void flip(double done) {
     for (int pass = 0; pass < kUnfoldPasses; ++pass) {
       report(progress_, done, "mesh");
@@ -107,20 +109,21 @@ class SheetUnfolder {
     }
   }
 
-  /// What a triangle lacks to the least height, voxels.
+  /// Returns what a triangle lacks to the least height, voxels.
   [[nodiscard]] double deficit(const Triangle& t) const {
     return std::max(0.0, kLeastHeight - heightInSheet(t));
   }
 
-  /// By how much both triangles lack less after a flip, voxels.
+  /// Returns the decrease of both triangles' deficits by a flip, voxels.
   [[nodiscard]] double gain(const PairedEdge& edge, const EdgeFlip& flip) const {
     if (!flip.isPossible) return 0;
     return deficit(triangles_[edge.triangle[0]]) + deficit(triangles_[edge.triangle[1]]) -
            deficit(flip.left) - deficit(flip.right);
   }
 
-  /// Where no flip unfolds a triangle, one of its vertices is superfluous: one that another can
-  /// stand for without folding anything else. @return was there any?
+  /// Removes superfluous vertices where no flip unfolds a triangle. A vertex is superfluous if a
+  /// neighbour can replace it without folding other triangles.
+  /// @return true when a vertex was removed
   bool collapse() {
     faces_ = foldedTriangles();
     if (faces_.empty()) return false;
@@ -156,9 +159,9 @@ class SheetUnfolder {
     return hasChanged;
   }
 
-  /// Can a vertex take the place of its neighbour `from`? The mesh must stay a manifold (their
-  /// common neighbours are the two opposite to their edge), and the triangles lack less than
-  /// before.
+  /// Returns true when `to` can replace its neighbour `from`. The mesh must stay a manifold: their
+  /// only common neighbours are the two vertices opposite to their edge. The sum of the triangles'
+  /// deficits must decrease.
   [[nodiscard]] bool canStandFor(const std::vector<std::size_t>& fan, std::uint32_t from,
                                  std::uint32_t to, const std::vector<std::size_t>& other) const {
     if (sheets_[to].count < sheets_[from].count) return false;
@@ -189,7 +192,7 @@ class SheetUnfolder {
   std::vector<VertexSheets>& sheets_;
   const Progress& progress_;
   std::vector<std::size_t> faces_;  ///< folded triangles
-  std::vector<bool> touched_;       ///< triangles that have changed in this pass
+  std::vector<bool> touched_;       ///< triangles changed in this pass
 };
 
 }  // namespace

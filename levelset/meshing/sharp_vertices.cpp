@@ -13,31 +13,31 @@ using openvdb::FloatGrid;
 
 /// Second difference, in voxels, up to which a grid point counts as smooth.
 constexpr double kSmooth = 0.15;
-/// How far the values around a grid point may be from a plane of unit slope for it to tell one.
+/// Largest deviation of the values around a grid point from a plane of unit slope, voxels.
 constexpr double kPlanar = 0.1;
-/// A grid point whose second differences are no larger takes its plane from central differences
-/// alone: beside an edge, one face's own values may tell it better.
+/// Up to this second difference, central differences alone give the plane of a grid point. Above
+/// it, one octant's values may give a better plane beside an edge.
 constexpr double kSurelySmooth = 0.02;
-/// Values that close to a plane of unit slope are those of a flat face.
+/// Values this close to a plane of unit slope are those of a flat face.
 constexpr double kFlat = 1e-4;
-/// Of the planes of one sheet, those that are so many times worse than another do not count.
+/// A plane is dropped when another plane of its sheet has an error smaller by this factor.
 constexpr double kWorse = 4;
-/// Eigenvalues of the planes' matrix below that share of the largest are noise.
+/// Eigenvalues of the planes' matrix below this share of the largest are noise.
 constexpr double kRank = 0.05;
-/// How far from its cell, in voxels, a plane may touch the surface and still be of use.
+/// Largest distance from its cell, in voxels, at which a plane may touch the surface.
 constexpr double kTouchMargin = 0.75;
-/// The field where a plane touches the surface is no larger, voxels, be it beside an edge: a plane
-/// may run on beyond its face.
+/// Largest field value at the point where a plane touches the surface, voxels. Beside an edge, a
+/// plane may extend beyond its face.
 constexpr double kOffSurface = 0.3;
-/// How far outside its cell, in voxels, a vertex may lie.
+/// Largest distance of a vertex from its cell, voxels.
 constexpr double kVertexReach = 1;
-/// A plane that a vertex lies off by more, voxels, is none of its sheets.
+/// Largest distance of a vertex from the planes of its sheets, voxels.
 constexpr double kOffSheet = 0.05;
 
-/// Newton steps along a normal, and the slope along it, in voxels, from which they are of use.
+/// Number of Newton steps along a normal.
 constexpr int kSettleSteps = 4;
-/// How far outside its cell, in voxels, they may lead: no further than the linear crossings were
-/// off.
+/// Largest distance from its cell, voxels, to which the steps may lead: the linear crossings are
+/// off by no more. kLeastSlope is the least slope along the normal for the steps.
 constexpr double kSettleReach = 0.15;
 constexpr double kLeastSlope = 0.5;
 
@@ -46,7 +46,7 @@ openvdb::Vec3f toSheet(const Vector3d& normal) {
           static_cast<float>(normal.z())};
 }
 
-/// Leaves out planes that another one of their sheet tells much better.
+/// Removes planes for which their sheet has a much better one.
 void dropWorse(std::vector<FacePlane>& planes) {
   const std::vector<FacePlane> all = planes;
   std::erase_if(planes, [&](const FacePlane& plane) {
@@ -64,20 +64,21 @@ bool isInCell(const Vector3d& p, double margin) {
 
 }  // namespace
 
-/// A tangent plane of the surface, told by one grid point.
+/// Tangent plane of the surface, estimated at one grid point.
 struct VertexPlacer::Plane {
   Vector3d normal = Vector3d::Zero();
-  Vector3d gradient = Vector3d::Zero();  ///< by central differences
-  double distance = 0;                   ///< of the grid point from it, voxels
-  double error = 0;                      ///< how far the values around are from it, voxels
-  double bend = 0;  ///< of the values that tell it, voxels: their largest second
-                    ///< difference, or the sum of all, which no rotation changes
+  Vector3d gradient = Vector3d::Zero();  ///< central differences
+  double distance = 0;                   ///< distance of the grid point from the plane, voxels
+  double error = 0;                      ///< distance of the values around from the plane, voxels
+  /// Bend of the values behind the plane, voxels: the largest second difference, or the sum of all
+  /// three, which is invariant under rotation.
+  double bend = 0;
   bool isSmooth = false;
   bool isKnown = false;
 };
 
-/// The values of a block, of a layer below it and of two above, in voxels, and what planes they
-/// tell.
+/// Values of a block, of one layer below it and of two above, in voxels, with the planes estimated
+/// from them.
 class VertexPlacer::BlockField {
  public:
   BlockField(const FloatGrid& grid, const Coord& origin) {
@@ -94,7 +95,7 @@ class VertexPlacer::BlockField {
     return values_[static_cast<std::size_t>(((x + 1) * kDim + y + 1) * kDim + z + 1)];
   }
 
-  /// Trilinear, at most one voxel outside the block.
+  /// Interpolates trilinearly, at most one voxel outside the block.
   [[nodiscard]] double interpolated(const Vector3d& p) const {
     std::array<int, 3> low;
     Vector3d t;
@@ -112,7 +113,8 @@ class VertexPlacer::BlockField {
     return sum;
   }
 
-  /// Interpolated with second differences too, on a smooth field to third order; in [0, 8].
+  /// Interpolates with second differences too: third order on a smooth field. Coordinates in [0,
+  /// 8].
   [[nodiscard]] double curved(const Vector3d& p) const {
     std::array<int, 3> low;
     Vector3d t;
@@ -136,7 +138,7 @@ class VertexPlacer::BlockField {
     return sum;
   }
 
-  /// Each coordinate in [0, 8].
+  /// Returns the plane of a grid point, with each coordinate in [0, 8].
   [[nodiscard]] const Plane& plane(int x, int y, int z) {
     const auto i = static_cast<std::size_t>((x * 9 + y) * 9 + z);
     if (!made_[i]) {
@@ -153,12 +155,12 @@ class VertexPlacer::BlockField {
     Plane plane;
     plane.distance = value(x, y, z);
     const Vector3d back(value(x - 1, y, z), value(x, y - 1, z), value(x, y, z - 1));
-    const Vector3d ahead(value(x + 1, y, z), value(x, y + 1, z), value(x, y, z + 1));
-    const Vector3d bend = back + ahead - Vector3d::Constant(2 * plane.distance);
+    const Vector3d forward(value(x + 1, y, z), value(x, y + 1, z), value(x, y, z + 1));
+    const Vector3d bend = back + forward - Vector3d::Constant(2 * plane.distance);
     plane.error = bend.cwiseAbs().maxCoeff();
     plane.bend = std::max(plane.error, std::abs(bend.sum()));
     plane.isSmooth = plane.error < kSmooth;
-    plane.gradient = (ahead - back) / 2;
+    plane.gradient = (forward - back) / 2;
     if (plane.isSmooth) {
       plane.normal = plane.gradient;
       plane.isKnown = plane.normal.norm() > 0.5;
@@ -172,8 +174,9 @@ class VertexPlacer::BlockField {
     return plane;
   }
 
-  /// Beside an edge of the solid, differences across it mix two faces. Of the eight cells at the
-  /// grid point, the one whose corners lie nearest to a plane of unit slope has a face to itself.
+  /// Takes the plane from one of the eight cells at the grid point. Beside an edge of the solid,
+  /// central differences mix two faces. The cell whose corners lie nearest to a plane of unit slope
+  /// belongs to one face.
   void chooseOctant(int x, int y, int z, double limit, Plane& plane) const {
     double best = limit;
     for (int octant = 0; octant < 8; ++octant) {
@@ -192,7 +195,8 @@ class VertexPlacer::BlockField {
       plane.isKnown = true;
       plane.isSmooth = false;
     }
-    // One cell's values are as flat at the pole of a small ball as on a face, but never exactly so.
+    // One cell's values are as flat at the pole of a small ball as on a face, but never exactly
+    // flat.
     if (best < kFlat) plane.bend = best;
   }
 
@@ -201,7 +205,8 @@ class VertexPlacer::BlockField {
   std::array<bool, 729> made_ = {};
 };
 
-/// Positions are relative to the cell's lowest corner until the end.
+/// Implementation of VertexPlacer. Positions are relative to the cell's lowest corner until place()
+/// returns.
 class VertexPlacer::Impl {
  public:
   Impl(const FloatGrid& grid, const Coord& origin) : field_(grid, origin) {}
@@ -253,8 +258,9 @@ class VertexPlacer::Impl {
     return t >= 0 && t <= 1 ? t : 0.5;
   }
 
-  /// The mean of the crossings lies as far inside a curved surface as the tangent planes at them
-  /// lie outside: half way between is on it to higher order.
+  /// Computes the vertex on a smooth surface. The mean of the crossings lies as far inside a curved
+  /// surface as their tangent planes lie outside. So the midpoint is on the surface to higher
+  /// order.
   [[nodiscard]] DualVertex placeSmooth(const Vector3d& centre) const {
     Vector3d mean = Vector3d::Zero();
     for (const auto& [point, normal] : crossings_) mean += normal;
@@ -273,8 +279,8 @@ class VertexPlacer::Impl {
     return {result, sheets, result};
   }
 
-  /// Where curvatures are a good part of a voxel's, half way is not near enough: from there to the
-  /// zero of the field along the normal.
+  /// Moves a smooth vertex to the zero of the field along its normal. Where the radius of curvature
+  /// is close to a voxel, the midpoint is not accurate enough.
   void settle(DualVertex& vertex) const {
     if (!vertex.sheets.count) return;
     const openvdb::Vec3d n = sheetNormal(vertex.sheets, 0);
@@ -289,8 +295,8 @@ class VertexPlacer::Impl {
     if (isInCell(p, kSettleReach)) vertex.smooth = p;
   }
 
-  /// A point on the edge or corner where the planes meet. It may lie a little outside the cell: it
-  /// is on the surface there, which the nearest point of the cell is not.
+  /// Computes the vertex on the edge or corner where the planes meet. It may lie a little outside
+  /// the cell: it is on the surface there, and the nearest point of the cell is not.
   void placeByPlanes(const Vector3d& centre, unsigned corners, DualVertex& vertex) {
     for (const auto& [touch, reach] :
          {std::pair(kTouchMargin, 0.0), std::pair(0.0, 0.0), std::pair(kTouchMargin, kVertexReach),
@@ -313,7 +319,7 @@ class VertexPlacer::Impl {
     }
   }
 
-  /// Planes that touch the surface in the cell or within `margin` of it.
+  /// Collects the planes that touch the surface in the cell or within `margin` of it.
   void collectPlanes(unsigned corners, double margin) {
     planes_.clear();
     for (int corner = 0; corner < 8; ++corner) {
@@ -341,8 +347,8 @@ class VertexPlacer::Impl {
   }
 
   BlockField field_;
-  int x_ = 0, y_ = 0, z_ = 0;                             // the cell
-  std::vector<std::pair<Vector3d, Vector3d>> crossings_;  ///< with normals
+  int x_ = 0, y_ = 0, z_ = 0;                             // current cell
+  std::vector<std::pair<Vector3d, Vector3d>> crossings_;  ///< with gradients
   std::vector<FacePlane> planes_;
 };
 

@@ -22,7 +22,7 @@ NarrowBand cropped(NarrowBand band, const RegionOfInterest& part) {
     for (auto leaf = vdb(band).tree().cbeginLeaf(); leaf; ++leaf)
       if (!blocks.isInside(leaf->origin())) beyond.push_back(leaf->origin());
     if (!beyond.empty()) {
-      // Only what stays is copied.
+      // Copy only the blocks that stay.
       const openvdb::FloatGrid& whole = vdb(band);
       openvdb::FloatGrid::Ptr rest = openvdb::FloatGrid::create(whole.background());
       rest->insertMeta(whole);

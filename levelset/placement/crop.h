@@ -5,10 +5,10 @@
 
 namespace levelset {
 
-/// A band that holds the part as it was, to the bit, and little beside it. Beyond the region it
-/// may end anywhere, as if the solid were cut open there, and no sign is to be trusted.
-/// @param part  a half width that is no narrower changes nothing
-/// @throws UsageError for a half width below 1, or a region that is empty
+/// Crops a band to a region of interest. Values in the region keep their bits; a few blocks around
+/// it may stay. Outside the region, the band may end anywhere and its signs are undefined.
+/// @param part  a half width of at least that of the band does not narrow the band
+/// @throws UsageError if the half width is below 1 or the region is empty
 [[nodiscard]] NarrowBand cropped(NarrowBand band, const RegionOfInterest& part);
 
 }  // namespace levelset

@@ -31,20 +31,21 @@ using openvdb::Vec3d;
 using Leaf = FloatTree::LeafNodeType;
 
 const double kCubeDiagonal = std::sqrt(3.0);
-/// Furthest of the 64 samples from a position, voxels.
+/// Distance from a position to the farthest of its 64 samples, voxels.
 const double kTricubicReach = 2 * kCubeDiagonal;
-/// Voxels from the surface to which re-distancing reads: two grid points beside it, and their
-/// samples.
+/// Distance from the surface within which re-distancing reads, voxels: two grid points on each
+/// side, and their samples.
 constexpr double kReadReach = 3.5;
-/// Layers added to each side of a band by thickening it twice.
+/// Voxels that thickening a band twice adds on each side.
 constexpr double kThickened = 4;
 
-/// Target index to source index, and what a source value is worth in the target's world.
+/// Maps between target and source indices, and the factor from source values to distances in the
+/// target.
 struct Placement {
   Imath::M44d targetToSource, sourceToTarget;
-  double scale;        ///< least stretch: the scaled value is no more than the distance
-  double targetVoxel;  ///< world
-  double sourceVoxel;  ///< world, smallest
+  double scale;        ///< smallest stretch, so the scaled value is at most the distance
+  double targetVoxel;  ///< voxel size of the target, world units
+  double sourceVoxel;  ///< smallest voxel size of the source, world units
 
   [[nodiscard]] Vec3d toSource(const Vec3d& target) const { return map(targetToSource, target); }
   [[nodiscard]] Vec3d toTarget(const Vec3d& source) const { return map(sourceToTarget, source); }
@@ -62,10 +63,10 @@ class ResampleKernel {
   ResampleKernel(const FloatGrid& source, FloatGrid& target, const Placement& placement)
       : source_(source),
         target_(target),
-        place_(placement),
-        kink_(static_cast<float>(kCreaseBend * placement.sourceVoxel / placement.scale)) {}
+        placement_(placement),
+        creaseBend_(static_cast<float>(kCreaseBend * placement.sourceVoxel / placement.scale)) {}
 
-  /// Makes the target's leaves that can hold voxels of the source's band.
+  /// Adds the leaves of the target that can contain voxels of the source's band.
   void addLeaves(const char* action) {
     std::vector<const Leaf*> leaves;
     source_.tree().getNodes(leaves);
@@ -91,11 +92,12 @@ class ResampleKernel {
     leaves.foreach ([this](Leaf& leaf, std::size_t) {
       const auto accessor = source_.getConstAccessor();
       for (openvdb::Index n = 0; n < Leaf::SIZE; ++n)
-        fillVoxel(leaf, n, place_.toSource(leaf.offsetToGlobalCoord(n).asVec3d()), accessor);
+        fillVoxel(leaf, n, placement_.toSource(leaf.offsetToGlobalCoord(n).asVec3d()), accessor);
     });
   }
 
-  /// No tile meets the surface: its centre has the sign of all of it.
+  /// Sets the signs of tiles. A tile never contains the surface, so the sign at its centre
+  /// suffices.
   void fillTiles() {
     openvdb::tree::NodeManager<FloatTree, FloatTree::RootNodeType::LEVEL - 1> nodes(target_.tree());
     nodes.foreachTopDown([this](auto& node, std::size_t = 0) { fillTilesOf(node); });
@@ -109,11 +111,11 @@ class ResampleKernel {
     Vec3d low(std::numeric_limits<double>::max()), high(-std::numeric_limits<double>::max());
     const openvdb::CoordBBox box = leaf.getNodeBoundingBox();
     for (int i = 0; i < 8; ++i) {
-      // A voxel around the leaf: cells reach over its faces.
+      // One voxel more on each side, because cells extend over the faces of the leaf.
       const Vec3d corner((i & 4) ? box.max()[0] + 1 : box.min()[0] - 1,
                          (i & 2) ? box.max()[1] + 1 : box.min()[1] - 1,
                          (i & 1) ? box.max()[2] + 1 : box.min()[2] - 1);
-      const Vec3d p = place_.toTarget(corner);
+      const Vec3d p = placement_.toTarget(corner);
       low = openvdb::math::minComponent(low, p);
       high = openvdb::math::maxComponent(high, p);
     }
@@ -121,7 +123,7 @@ class ResampleKernel {
     for (int axis = 0; axis < 3; ++axis) {
       if (!(std::max(std::abs(low[axis]), std::abs(high[axis])) < kIndexLimit)) {
         throw ResourceLimit(fmt::format(
-            "{}: the result reaches grid index {:.3g}, beyond 32 bits; use larger voxels", action,
+            "{}: the grid index {:.3g} of the result exceeds 32 bits; use larger voxels", action,
             std::max(std::abs(low[axis]), std::abs(high[axis]))));
       }
       first[axis] = static_cast<int>(std::floor(low[axis])) & ~7;
@@ -135,31 +137,32 @@ class ResampleKernel {
     return result;
   }
 
-  /// By the Lipschitz bound from the block's centre: can a voxel of it be in the target's band?
+  /// Decides, by the Lipschitz bound at the block's centre, if a block can contain voxels of the
+  /// target's band.
   [[nodiscard]] bool isNearBand(const Coord& origin, const Accessor& accessor) const {
-    const Vec3d p = place_.toSource(origin.asVec3d() + Vec3d(3.5));
+    const Vec3d p = placement_.toSource(origin.asVec3d() + Vec3d(3.5));
     const Coord cell = Coord::round(p);
-    // A source voxel's world distance from the block's centre changes the value by no more.
-    const double offset = (p - cell.asVec3d()).length() * place_.sourceVoxel;
-    const double here = std::abs(static_cast<double>(accessor.getValue(cell))) * place_.scale;
-    const double halfDiagonal = 3.5 * kCubeDiagonal * place_.targetVoxel;
+    // The value changes by at most the distance from the source voxel to the block's centre.
+    const double offset = (p - cell.asVec3d()).length() * placement_.sourceVoxel;
+    const double here = std::abs(static_cast<double>(accessor.getValue(cell))) * placement_.scale;
+    const double halfDiagonal = 3.5 * kCubeDiagonal * placement_.targetVoxel;
     return here - offset - halfDiagonal < static_cast<double>(target_.background());
   }
 
   void fillVoxel(Leaf& leaf, openvdb::Index n, const Vec3d& p, const Accessor& accessor) const {
     const float background = target_.background();
     const auto take = [&](double sample) {
-      const auto value = static_cast<float>(sample * place_.scale);
+      const auto value = static_cast<float>(sample * placement_.scale);
       if (std::abs(value) < background)
         leaf.setValueOn(n, value);
       else
         leaf.setValueOff(n, std::copysign(background, value));
     };
-    // By the nearest sample alone, most of a leaf is out of the band.
+    // The nearest sample alone shows that most of a leaf is outside the band.
     const Coord nearest = Coord::round(p);
-    const double offset = (p - nearest.asVec3d()).length() * place_.sourceVoxel;
+    const double offset = (p - nearest.asVec3d()).length() * placement_.sourceVoxel;
     const float sample = accessor.getValue(nearest);
-    if (std::abs(static_cast<double>(sample)) * place_.scale >
+    if (std::abs(static_cast<double>(sample)) * placement_.scale >
         1.1 * (static_cast<double>(background) + offset)) {
       leaf.setValueOff(n, std::copysign(background, sample));
       return;
@@ -174,11 +177,12 @@ class ResampleKernel {
       take(cell.value());
       return;
     }
-    limitAtCreases(block.values, kink_);
+    limitAtCreases(block.values, creaseBend_);
     take(block.value());
   }
 
-  /// ± background, by the nearest sample: the position is at the rim of the band or beyond.
+  /// Background with the sign of the nearest sample, for positions at or beyond the end of the
+  /// band.
   [[nodiscard]] float signAt(const Vec3d& p, const Accessor& accessor) const {
     return std::copysign(target_.background(), accessor.getValue(Coord::round(p)));
   }
@@ -191,18 +195,18 @@ class ResampleKernel {
     const auto accessor = source_.getConstAccessor();
     for (auto it = node.beginValueAll(); it; ++it) {
       const double half = 0.5 * (Node::ChildNodeType::DIM - 1);
-      it.setValue(signAt(place_.toSource(it.getCoord().asVec3d() + Vec3d(half)), accessor));
+      it.setValue(signAt(placement_.toSource(it.getCoord().asVec3d() + Vec3d(half)), accessor));
     }
   }
   [[nodiscard]] float signAtCenter(const Coord& origin, int edge) const {
-    return signAt(place_.toSource(origin.asVec3d() + Vec3d(0.5 * (edge - 1))),
+    return signAt(placement_.toSource(origin.asVec3d() + Vec3d(0.5 * (edge - 1))),
                   source_.getConstAccessor());
   }
 
   const FloatGrid& source_;
   FloatGrid& target_;
-  const Placement& place_;
-  float kink_;
+  const Placement& placement_;
+  float creaseBend_;
 };
 
 Placement placementOf(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
@@ -217,8 +221,9 @@ Placement placementOf(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
   return place;
 }
 
-/// The source with values as far out as sampling and re-distancing read. Extrapolated ones are only
-/// support: the distances out there are made anew. They are inactive and not ± background.
+/// Extends the source band to the distance that sampling and re-distancing read. Extrapolated
+/// values are inactive and differ from ± background. They only support the interpolation;
+/// re-distancing replaces the distances there.
 FloatGrid::Ptr supported(const NarrowBand& solid, const Placement& place, std::size_t maxMemory,
                          const Progress& progress) {
   const double needed = sampledWidth(place.targetVoxel / place.sourceVoxel);
@@ -231,18 +236,18 @@ FloatGrid::Ptr supported(const NarrowBand& solid, const Placement& place, std::s
   return FloatGrid::create(eikonal::thicken(*eikonal::thicken(grid.tree())));
 }
 
-/// Before any block is looked at.
-/// @param refinement  target voxels along a source voxel
+/// Checks the memory estimate before any block is built.
+/// @param refinement  number of target voxels along a source voxel
 void checkMemory(const NarrowBand& solid, double refinement, double halfWidth,
                  std::size_t maxMemory, const char* action) {
-  // Source voxels beside the surface, then the leaves of the target, as they are twice: sampled and
-  // made distances again.
+  // Estimate the source voxels at the surface, then the leaves of the target. The target exists
+  // twice, sampled and re-distanced.
   const double surface = static_cast<double>(solid.activeVoxelCount()) / (2 * solid.halfWidth());
   const double leaves = surface * refinement * refinement / 64 * (2 * halfWidth + 15) / 8;
   requireMemory(leaves * 2 * 2300, maxMemory, action);
 }
 
-/// The target's voxels must be smaller than the solid, before anything is widened for their sake.
+/// Checks that the target's voxels are smaller than the solid, before the band is widened.
 void requireSmallerVoxels(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
                           const Placement& place, const char* action) {
   const Imath::V3d size = solid.zeroSetBounds().size();
@@ -250,8 +255,8 @@ void requireSmallerVoxels(const NarrowBand& solid, const Imath::M44d& sourceToWo
       std::max({size.x, size.y, size.z}) / solid.voxelSize() * stretchOf(sourceToWorld).greatest;
   if (place.targetVoxel <= longest) return;
   throw InvalidInput(
-      fmt::format("{}: voxels of {} are larger than the whole solid, whose longest side "
-                  "is about {:.3g}; use smaller ones",
+      fmt::format("{}: voxels of {} are larger than the longest side of the solid, "
+                  "about {:.3g}; use smaller voxels",
                   action, place.targetVoxel, longest));
 }
 
@@ -268,11 +273,11 @@ Stretch stretchOf(const Imath::M44d& matrix) {
 openvdb::math::Transform::Ptr transformOf(const Imath::M44d& indexToWorld, const char* action) {
   const double scale = indexToWorld[0][0];
   if (scale > 0 && indexToWorld == axisAligned(scale)) return uniformTransform(scale);
-  // OpenVDB refuses a matrix whose determinant is 3e-15 or less.
+  // OpenVDB rejects a matrix with a determinant of 3e-15 or less.
   if (!(Imath::M44d(indexToWorld).determinant() > 1e-14)) {
     throw ResourceLimit(
-        fmt::format("{}: voxels of {:.3g} are too small for a grid that is turned or "
-                    "moved; use larger units",
+        fmt::format("{}: voxels of {:.3g} are too small for a rotated or "
+                    "translated grid; use a smaller unit of length, so that the numbers are larger",
                     action, stretchOf(indexToWorld).least));
   }
   return openvdb::math::Transform::createLinearTransform(openvdb::math::Mat4d(&indexToWorld[0][0]));
@@ -284,18 +289,19 @@ Imath::M44d axisAligned(double voxelSize) {
 
 void requireVoxelSize(double voxelSize, const char* action) {
   if (voxelSize > 0 && std::isfinite(voxelSize)) return;
-  throw UsageError(fmt::format("{}: the voxel size is {}, it must be a positive, finite length",
-                               action, voxelSize));
+  throw UsageError(
+      fmt::format("{}: the voxel size is {}; give a positive, finite length", action, voxelSize));
 }
 
 NarrowBand resampleField(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
                          const Imath::M44d& targetToWorld, double halfWidth, std::size_t maxMemory,
                          const Progress& progress, const char* action) {
   requireSolid(solid, action);
-  if (solid.isEmpty()) throw InvalidInput(fmt::format("{}: the solid has no surface", action));
+  if (solid.isEmpty())
+    throw InvalidInput(fmt::format("{}: the solid is empty; give a solid with a surface", action));
   if (!(halfWidth >= 1) || !std::isfinite(halfWidth)) {
     throw UsageError(
-        fmt::format("{}: the half width is {} voxels, it must be at least 1", action, halfWidth));
+        fmt::format("{}: the half width is {} voxels; give at least 1", action, halfWidth));
   }
   const Placement place = placementOf(solid, sourceToWorld, targetToWorld);
   requireSmallerVoxels(solid, sourceToWorld, place, action);
@@ -312,8 +318,8 @@ NarrowBand resampleField(const NarrowBand& solid, const Imath::M44d& sourceToWor
   report(progress, 0.6, action);
   if (!hasInside(*target)) {
     throw InvalidInput(
-        fmt::format("{}: no grid point lies inside, voxels of {} are too large for this "
-                    "solid; use smaller ones",
+        fmt::format("{}: no grid point lies inside, because voxels of {} are too large for this "
+                    "solid; use smaller voxels",
                     action, place.targetVoxel));
   }
   return redistance(
@@ -329,8 +335,8 @@ NarrowBand resampleTo(const NarrowBand& solid, const Imath::M44d& indexToWorld,
   if (!(stretch.least > 0) || !(stretch.greatest < stretch.least * (1 + 1e-6)) ||
       !(Imath::M44d(indexToWorld).determinant() > 0)) {
     throw InvalidInput(
-        fmt::format("{}: the new grid's transform shears, mirrors or scales its axes "
-                    "differently; give it a rotation, a uniform scale and a translation",
+        fmt::format("{}: the transform of the new grid shears, mirrors or scales unevenly; "
+                    "use a rotation, a uniform scale and a translation",
                     action));
   }
   return resampleField(solid, solid.indexToWorld(), indexToWorld, halfWidth, options.maxMemory,

@@ -10,31 +10,37 @@
 namespace levelset {
 
 struct ResampleOptions {
-  std::optional<double> halfWidth = {};  ///< of the result, voxels; empty: as the operand
+  std::optional<double> halfWidth =
+      {};  ///< half width of the result, voxels; empty: that of the operand
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
-/// How far beside the surface a solid is sampled, in its own voxels: a band that is too narrow is
-/// made wider first.
-/// @param ratio  voxel of the result to that of the solid
+/// Half width, in voxels of the solid, that resampling reads. A narrower band is widened first.
+/// @param ratio  voxel size of the result divided by that of the solid
 [[nodiscard]] double sampledWidth(double ratio);
 
-/// The same solid on the axis-aligned grid of integer multiples of `voxelSize`: tricubic
-/// (Catmull-Rom) where the source band allows, re-distanced towards the rim of the new band. Per
-/// leaf block, so the bits do not depend on the number of threads.
+/// Resamples a solid on the axis-aligned grid of integer multiples of `voxelSize`. Interpolates
+/// with tricubic Catmull-Rom splines where the source band allows, and re-distances the result.
+/// Works per leaf block, so the bits do not depend on the number of threads.
+/// @throws UsageError unless the voxel size is positive and finite, and the half width at least 1
+/// @throws InvalidInput if the solid is empty or the voxels are too large for it
+/// @throws ResourceLimit if the memory estimate or the 32-bit grid index exceeds its limit
 [[nodiscard]] NarrowBand resample(const NarrowBand& solid, double voxelSize,
                                   const ResampleOptions& options = {});
 
-/// The same, on the grid points of another transform (rotation, uniform scale, translation).
+/// Resamples a solid on the grid points of another transform.
+/// @param indexToWorld  rotation, uniform scale, translation
+/// @throws as resample(); InvalidInput for any other transform
 [[nodiscard]] NarrowBand resampleTo(const NarrowBand& solid, const Imath::M44d& indexToWorld,
                                     const ResampleOptions& options = {});
 
-/// The same, on the grid points and with the half width of `like`.
+/// Resamples a solid on the grid points of `like`, by default with its half width.
+/// @throws as resampleTo()
 [[nodiscard]] NarrowBand resampleLike(const NarrowBand& solid, const NarrowBand& like,
                                       const ResampleOptions& options = {});
 
-/// True when both bands sit on the same grid points with the same half width.
+/// Decides if both bands have the same grid points and the same half width.
 [[nodiscard]] bool shareGrid(const NarrowBand& a, const NarrowBand& b);
 
 }  // namespace levelset

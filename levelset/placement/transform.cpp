@@ -17,13 +17,13 @@ namespace {
 
 using openvdb::FloatTree;
 
-/// The matrix must move points to points, and back.
+/// Checks that a matrix is finite, affine and invertible.
 void requireAffine(const Imath::M44d& matrix, const char* action) {
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j < 4; ++j) {
       if (std::isfinite(matrix[i][j])) continue;
       throw UsageError(
-          fmt::format("{}: the matrix holds {} in row {}, column {}; its elements must be "
+          fmt::format("{}: the matrix has {} in row {}, column {}; its elements must be "
                       "finite",
                       action, matrix[i][j], i + 1, j + 1));
     }
@@ -36,36 +36,37 @@ void requireAffine(const Imath::M44d& matrix, const char* action) {
   const Stretch stretch = stretchOf(matrix);
   if (!(stretch.least > 1e-12 * stretch.greatest)) {
     throw UsageError(
-        fmt::format("{}: the matrix flattens the solid (it stretches by {} and by {}); it "
-                    "must be invertible",
+        fmt::format("{}: the matrix is singular (it stretches by {} and by {}); use an "
+                    "invertible matrix",
                     action, stretch.least, stretch.greatest));
   }
 }
 
-/// Grids and meshes keep places in double precision, of which volumes must not overflow.
+/// Largest coordinate of grids and meshes, in double precision: volumes must not overflow.
 constexpr double kFarthest = 1e100;
-/// Of a voxel: what rounding of places in the world may change.
-constexpr double kPlaceTolerance = 1e-6;
+/// Largest rounding error of world positions, voxels.
+constexpr double kPositionTolerance = 1e-6;
 
-/// Where places are rounded to a good part of a voxel, a grid no longer knows its own voxel size.
-void requirePlace(const Imath::M44d& indexToWorld, double voxelSize, const char* action) {
+/// Checks that the origin of a grid is accurate. With large rounding errors, the voxel size is
+/// lost.
+void requirePrecision(const Imath::M44d& indexToWorld, double voxelSize, const char* action) {
   double farthest = 0;
   for (int axis = 0; axis < 3; ++axis)
     farthest = std::max(farthest, std::abs(indexToWorld[3][axis]));
   const double spacing = spacingAt(farthest, CoordinatePrecision::Double);
-  if (spacing <= kPlaceTolerance * voxelSize) return;
-  throw InvalidInput(
-      fmt::format("{}: at {:.3g} from the origin places are {:.2g} apart in double precision, too "
-                  "far for voxels of {:.3g}; move the solid less far, or use larger voxels",
-                  action, farthest, spacing, voxelSize));
+  if (spacing <= kPositionTolerance * voxelSize) return;
+  throw InvalidInput(fmt::format(
+      "{}: at {:.3g} from the origin, double precision resolves only {:.2g}, too coarse for "
+      "voxels of {:.3g}; move the solid less far, or use larger voxels",
+      action, farthest, spacing, voxelSize));
 }
 
 void requireStretch(const Stretch& stretch, const char* action) {
   if (stretch.greatest < kFarthest && stretch.least > 1 / kFarthest) return;
-  throw InvalidInput(
-      fmt::format("{}: the matrix stretches by {:.3g} to {:.3g}, beyond what numbers hold; change "
-                  "the unit of length",
-                  action, stretch.least, stretch.greatest));
+  throw InvalidInput(fmt::format(
+      "{}: the matrix stretches by {:.3g} to {:.3g}, and coordinates or volumes would overflow; "
+      "change the unit of length",
+      action, stretch.least, stretch.greatest));
 }
 
 void scaleDistances(openvdb::FloatGrid& grid, double scale, float background) {
@@ -94,21 +95,22 @@ NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix) {
   requireStretch(stretch, action);
   if (stretch.greatest > stretch.least * (1 + 1e-7) || !(Imath::M44d(matrix).determinant() > 0)) {
     throw InvalidInput(
-        fmt::format("{}: the matrix shears, mirrors or scales unevenly, which the "
-                    "transform of a grid cannot hold; bake it (--bake)",
+        fmt::format("{}: the matrix shears, mirrors or scales unevenly, which a grid "
+                    "transform cannot represent; resample the solid with --bake",
                     action));
   }
-  if (!solid.shared()) throw InvalidInput(fmt::format("{}: the solid has no surface", action));
-  const Imath::M44d placed = solid.indexToWorld() * matrix;
+  if (!solid.shared())
+    throw InvalidInput(fmt::format("{}: the solid is empty; give a solid with a surface", action));
+  const Imath::M44d moved = solid.indexToWorld() * matrix;
   const double voxelSize = solid.voxelSize() * stretch.greatest, halfWidth = solid.halfWidth();
   const float background = backgroundOf(halfWidth, voxelSize);
   requireBackground(background, voxelSize, action);
-  requirePlace(placed, voxelSize, action);
-  const openvdb::math::Transform::Ptr transform = transformOf(placed, action);
+  requirePrecision(moved, voxelSize, action);
+  const openvdb::math::Transform::Ptr transform = transformOf(moved, action);
   openvdb::FloatGrid& grid = editVdb(solid);
   grid.setTransform(transform);
   const double scale = std::cbrt(Imath::M44d(matrix).determinant());
-  // A rotation's determinant is one but for rounding: its distances stay to the bit.
+  // The determinant of a rotation is one up to rounding; keep the bits of the distances then.
   if (std::abs(scale - 1) > 1e-9) scaleDistances(grid, scale, background);
   return solid;
 }
@@ -130,15 +132,15 @@ TriMesh transform(TriMesh mesh, const Imath::M44d& matrix) {
   const Stretch stretch = stretchOf(matrix);
   requireStretch(stretch, action);
   mesh.spacing = coordinateSpacing(mesh) * stretch.greatest;
-  mesh.precision = CoordinatePrecision::Double;  // moved numbers have more digits than stored ones
+  mesh.precision = CoordinatePrecision::Double;  // transformed coordinates need more digits
   for (Imath::V3d& position : mesh.positions) {
     Imath::V3d moved;
     matrix.multVecMatrix(position, moved);
     for (int axis = 0; axis < 3; ++axis)
       if (!(std::abs(moved[axis]) < kFarthest))
         throw InvalidInput(
-            fmt::format("{}: a vertex would come to lie at ({:.3g}, {:.3g}, {:.3g}), beyond what "
-                        "volumes can be told of; change the unit of length",
+            fmt::format("{}: a vertex moves to ({:.3g}, {:.3g}, {:.3g}), where volumes "
+                        "would overflow; change the unit of length",
                         action, moved.x, moved.y, moved.z));
     position = moved;
   }
@@ -148,9 +150,9 @@ TriMesh transform(TriMesh mesh, const Imath::M44d& matrix) {
                                             Imath::V3d(matrix[2][0], matrix[2][1], matrix[2][2])};
   const bool turns =
       slopes != std::array{Imath::V3d(1, 0, 0), Imath::V3d(0, 1, 0), Imath::V3d(0, 0, 1)};
-  if (turns)  // else they stay to the bit
+  if (turns)  // otherwise keep the bits
     for (Imath::V3d& normal : mesh.attributes.normals)
-      normal = carriedNormal(normal, slopes, mirrors ? -1 : 1);
+      normal = transformedNormal(normal, slopes, mirrors ? -1 : 1);
   if (mirrors)
     for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
   return mesh;

@@ -8,11 +8,13 @@
 
 namespace levelset {
 
-/// Moves a solid exactly, by changing the transform of its grid; a uniform scale scales the
-/// distances.
-/// @param matrix  rotation, uniform scale, translation; `world' = world * matrix` (Imath's row
-/// vectors)
-/// @throws InvalidInput for a matrix that shears, mirrors or scales unevenly: bake it
+/// Transforms a solid exactly, by its grid transform. A uniform scale also scales the distances.
+/// @param matrix  rotation, uniform scale, translation; world' = world * matrix, with Imath's row
+///                vectors
+/// @throws UsageError if the matrix is not affine and invertible
+/// @throws InvalidInput if the matrix shears, mirrors or scales unevenly (use bake()), or the solid
+/// is
+///         empty or too far from the origin for its voxels
 [[nodiscard]] NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix);
 
 struct BakeOptions {
@@ -20,16 +22,17 @@ struct BakeOptions {
   Progress progress = {};
 };
 
-/// Moves a solid by any invertible affine matrix and resamples it on the axis-aligned grid of
-/// `voxelSize`, re-distanced.
+/// Transforms a solid by any invertible affine matrix. Resamples it on the axis-aligned grid of
+/// `voxelSize` and re-distances it.
+/// @throws UsageError if the matrix is not affine and invertible; further errors as resample()
 [[nodiscard]] NarrowBand bake(const NarrowBand& solid, const Imath::M44d& matrix, double voxelSize,
                               const BakeOptions& options = {});
 
-/// Moves the vertices; a mirroring matrix also turns the triangles. Normals follow by the inverse
-/// transpose, at unit length. The mesh keeps in mind how
-/// finely its coordinates were known, and is written in double precision from then on.
-/// @throws UsageError for a matrix that is not affine and invertible; InvalidInput for attributes
-///         that do not fit the vertices, and for places beyond what numbers hold
+/// Transforms the vertices of a mesh. A mirroring matrix also reverses the triangles. Normals
+/// transform by the inverse transpose and stay unit vectors. The mesh remembers the precision of
+/// its original coordinates, and is written in double precision from then on.
+/// @throws UsageError if the matrix is not affine and invertible
+/// @throws InvalidInput if attributes do not fit the vertices, or a coordinate exceeds 1e100
 [[nodiscard]] TriMesh transform(TriMesh mesh, const Imath::M44d& matrix);
 
 }  // namespace levelset

@@ -27,20 +27,19 @@ using FloatLeaf = FloatTree::LeafNodeType;
 using LabelLeaf = Int32Tree::LeafNodeType;
 using BlockSet = std::set<Coord>;
 
-/// Share of a voxel by which a distance may differ from the one made anew and still be the same.
+/// Largest difference, in voxels, between an old and a recomputed distance that count as equal.
 constexpr float kSameDistance = 0.02f;
-/// Share of a voxel that a zero keeps when its sign must show.
+/// Smallest magnitude, in voxels, of a value whose sign must be kept.
 constexpr float kLeastDistance = 1e-3f;
 
-/// Turns regions over: what was inside becomes outside, or the other way round, and the surfaces
-/// between them and their neighbours vanish. Grid points that are nearer to a remaining surface
-/// keep their bits.
+/// Flips regions from inside to outside or from outside to inside. The surfaces between them and
+/// their neighbours vanish. Grid points that are nearer to a remaining surface keep their bits.
 class RegionFlip {
  public:
   RegionFlip(const NarrowBand& solid, const RegionMap& map, std::vector<bool> flipped,
              const Progress& progress)
       : solid_(solid), map_(map), flipped_(std::move(flipped)), progress_(progress) {
-    reach_ = static_cast<int>(std::ceil((solid.halfWidth() + 1) / 8));
+    bandBlocks_ = static_cast<int>(std::ceil((solid.halfWidth() + 1) / 8));
   }
 
   [[nodiscard]] NarrowBand run() {
@@ -60,11 +59,12 @@ class RegionFlip {
     return flipped_[static_cast<std::size_t>(region)];
   }
 
-  /// Blocks that a vanishing surface can reach, and among them those that a remaining one reaches.
+  /// Collects the blocks within the band of a vanishing surface, and those also within the band of
+  /// a remaining one.
   void collectBlocks() {
     BlockSet vanishing, remaining;
-    map_.forEachShellBlock([&](const Coord& origin, std::uint32_t shell) {
-      const RegionShell& s = map_.shells()[shell];
+    map_.forEachSurfaceBlock([&](const Coord& origin, std::uint32_t component) {
+      const RegionSurface& s = map_.surfaces()[component];
       const bool stays = isFlipped(static_cast<std::int32_t>(s.inside)) ==
                          isFlipped(static_cast<std::int32_t>(s.outside));
       (stays ? remaining : vanishing).insert(origin);
@@ -78,9 +78,9 @@ class RegionFlip {
   [[nodiscard]] BlockSet dilated(const BlockSet& blocks) const {
     BlockSet result;
     for (const Coord& origin : blocks)
-      for (int x = -reach_; x <= reach_; ++x)
-        for (int y = -reach_; y <= reach_; ++y)
-          for (int z = -reach_; z <= reach_; ++z)
+      for (int x = -bandBlocks_; x <= bandBlocks_; ++x)
+        for (int y = -bandBlocks_; y <= bandBlocks_; ++y)
+          for (int z = -bandBlocks_; z <= bandBlocks_; ++z)
             result.insert(origin.offsetBy(8 * x, 8 * y, 8 * z));
     return result;
   }
@@ -94,7 +94,7 @@ class RegionFlip {
     }
   }
 
-  /// Signs become right everywhere. Values do where no remaining surface is near.
+  /// Corrects all signs. Also corrects the values, except near a remaining surface.
   void flipLeaf(FloatLeaf& leaf) const {
     const LabelLeaf& labels = *map_.labels().probeConstLeaf(leaf.origin());
     const bool nearVanishing = vanishing_.count(leaf.origin()) > 0;
@@ -115,8 +115,8 @@ class RegionFlip {
     }
   }
 
-  /// The field with larger distances beside the vanished surfaces: those of small ones on both
-  /// sides would let an interpolant dip through zero.
+  /// Copies the field with larger distances next to vanished surfaces. With small distances on both
+  /// sides, an interpolant could cross zero there.
   [[nodiscard]] NarrowBand smoothed(const NarrowBand& flippedSolid) const {
     NarrowBand result = flippedSolid;
     FloatGrid& grid = editVdb(result);
@@ -137,22 +137,22 @@ class RegionFlip {
     return result;
   }
 
-  /// A box, in the world, that holds those blocks and some surface.
+  /// World box that contains the blocks of `both_` and the surfaces near them.
   [[nodiscard]] Imath::Box3d worldBoxOfBoth() const {
     openvdb::BBoxd box;
     for (const Coord& origin : both_) {
       box.expand(openvdb::BBoxd(origin.asVec3d(), (origin + Coord(7)).asVec3d()));
     }
-    box.expand(8.0 * (reach_ + 1));
+    box.expand(8.0 * (bandBlocks_ + 1));
     const openvdb::BBoxd world = vdb(solid_).transform().indexToWorld(box);
     return {toImath(world.min()), toImath(world.max())};
   }
 
-  /// Where both kinds of surface are near: grid points that were nearest to a vanished one take
-  /// their distance from the field made anew.
+  /// Recomputes distances near both kinds of surfaces. Grid points that were nearest to a vanished
+  /// surface get their distance from the re-distanced field.
   void renew(NarrowBand& result) const {
-    // Wider than the result, so that a distance just within the background can be told from one
-    // that ends there.
+    // Wider than the result, to distinguish a distance just below the background from a clamped
+    // one.
     const NarrowBand fresh =
         redistance(smoothed(result), {.halfWidth = solid_.halfWidth() + 1,
                                       .region = worldBoxOfBoth(),
@@ -178,8 +178,8 @@ class RegionFlip {
     }
   }
 
-  /// Outside the band no surface was near at all. In it, the value is right if the remaining
-  /// surfaces are not further than it says.
+  /// Decides if a value is still correct. Outside the band no surface was near. Inside it, the
+  /// value is correct if the remaining surfaces are not farther away.
   [[nodiscard]] bool isRight(const FloatLeaf& leaf, openvdb::Index i, float distance,
                              FloatGrid::ConstAccessor& signs) const {
     if (!leaf.isValueOn(i)) return true;
@@ -188,7 +188,8 @@ class RegionFlip {
            isBesideSurface(signs, leaf.offsetToGlobalCoord(i), own);
   }
 
-  /// Such a grid point makes the zero set: it must keep its value.
+  /// Decides if a grid point has a neighbour of the other sign. Its value defines the zero set and
+  /// must stay.
   static bool isBesideSurface(FloatGrid::ConstAccessor& values, const Coord& c, float own) {
     for (int axis = 0; axis < 3; ++axis) {
       for (int step = -1; step <= 1; step += 2) {
@@ -204,7 +205,7 @@ class RegionFlip {
   const RegionMap& map_;
   std::vector<bool> flipped_;
   const Progress& progress_;
-  int reach_ = 1;
+  int bandBlocks_ = 1;
   BlockSet vanishing_, both_;
 };
 
@@ -218,15 +219,15 @@ NarrowBand flip(const NarrowBand& solid, const RegionMap& map, std::vector<bool>
 
 Topology topology(const NarrowBand& solid) {
   const Measurement m = measure(solid);
-  return {m.components, m.shells, m.cavities};
+  return {m.components, m.surfaces, m.cavities};
 }
 
 NarrowBand keepLargest(const NarrowBand& solid, std::size_t count, const Progress& progress) {
-  if (!count) throw UsageError("keep: the number of solids to keep is 0; keep at least one");
+  if (!count) throw UsageError("keep: --largest is 0; keep at least one solid");
   requireSolid(solid, "keep");
   if (solid.isEmpty()) {
     throw InvalidInput(
-        "keep: the band is empty, so there is nothing to keep; check the steps "
+        "keep: the level set is empty, so there is no solid to keep; check the actions "
         "before it");
   }
   const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5), "keep");
@@ -235,7 +236,7 @@ NarrowBand keepLargest(const NarrowBand& solid, std::size_t count, const Progres
   for (std::size_t i = 0; i < regions.size(); ++i) {
     if (regions[i].inside) solids.push_back(i);
   }
-  // Equal solids differ in the last bits of their volumes; ties fall to the first in the tree.
+  // Volumes of equal solids may differ in the last bits, so compare them in single precision.
   const auto volume = [&](std::size_t i) { return static_cast<float>(regions[i].volume); };
   std::stable_sort(solids.begin(), solids.end(),
                    [&](std::size_t a, std::size_t b) { return volume(a) > volume(b); });

@@ -6,45 +6,48 @@
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 
-/// Connected parts of a solid and of the space around it. Grid points are connected along the edges
-/// of the grid (6 neighbours) inside, and also across the diagonals of its faces (18 neighbours)
-/// outside, as the mesh of bandToMesh separates them, so that a solid and its surroundings never
-/// cross.
+/// Connected components of a solid and of the space around it. Inside grid points connect along the
+/// grid axes (6 neighbours). Outside grid points also connect across face diagonals (18
+/// neighbours). The mesh of bandToMesh() separates them in the same way, so inside and outside
+/// never cross.
 namespace levelset {
 
 struct Topology {
-  std::size_t components = 0;  ///< solids
-  std::size_t shells = 0;      ///< surfaces
+  std::size_t components = 0;  ///< connected solids
+  std::size_t surfaces = 0;    ///< surface components
   std::size_t cavities = 0;    ///< enclosed voids
 };
+/// Counts the connected components of a solid, of its surface and of its cavities.
 [[nodiscard]] Topology topology(const NarrowBand& solid);
 
-/// Keeps the `count` solids of largest volume with their cavities, drops the others. Of equal ones,
-/// those that come first in the tree stay. Grid points that are not nearest to a dropped surface
-/// keep their bits.
-/// @throws UsageError for count = 0; InvalidInput if the band is empty
+/// Keeps the `count` components of largest volume with their cavities and removes the others. Among
+/// components of equal volume, the first in tree order stays. Grid points that are not nearest to a
+/// removed surface keep their bits.
+/// @throws UsageError if `count` is 0
+/// @throws InvalidInput if the band is empty
 [[nodiscard]] NarrowBand keepLargest(const NarrowBand& solid, std::size_t count,
                                      const Progress& progress = {});
 
-/// More than any void has.
+/// Volume that exceeds every cavity.
 inline constexpr double kAnyVolume = std::numeric_limits<double>::infinity();
 
-/// Fills enclosed voids up to `maxVolume` world units³ (default: all). What floats in a void is not
-/// part of its volume, and is swallowed when it is filled; an empty band stays empty.
+/// Fills enclosed cavities. A solid inside a cavity does not count for its volume and disappears
+/// when the cavity is filled. An empty band stays empty.
+/// @param maxVolume  largest volume to fill, world units³; default: all cavities
 /// @throws UsageError if `maxVolume` is negative or not a number
 [[nodiscard]] NarrowBand fillCavities(const NarrowBand& solid, double maxVolume = kAnyVolume,
                                       const Progress& progress = {});
 
 struct SliversDropped {
   NarrowBand band;
-  std::size_t count = 0;
+  std::size_t count = 0;  ///< number of removed slivers
 };
 
-/// Drops the skins that a cut leaves where the cutter ends in the surface of what it cuts, and
-/// rounding decides: solids that go nowhere half a voxel deep and lie within a voxel of the
-/// cutter's surface. Others keep their bits, as with keepLargest(); where nothing else is left they
-/// stay.
-/// @pre both are solids, and `cutter` has a band of two voxels of `solid` at least
+/// Removes the thin slivers that rounding leaves where the surface of the cutter coincides with
+/// that of the cut solid. A sliver is a component that is nowhere half a voxel deep and lies within
+/// a voxel of the cutter's surface. Other components keep their bits, as with keepLargest(). If all
+/// components are slivers, they stay.
+/// @pre both are solids, and the band of `cutter` is at least two voxels of `solid` wide
 [[nodiscard]] SliversDropped dropSlivers(const NarrowBand& solid, const NarrowBand& cutter,
                                          const Progress& progress = {});
 

@@ -13,11 +13,11 @@
 namespace levelset {
 namespace {
 
-/// Off by there and back again; never beyond where it started, which on edges that come back to
-/// grid points would depend on the last bits.
-NarrowBand thereAndBack(const NarrowBand& solid, double distance, const OffsetOptions& options) {
+/// Offsets a solid by `distance` and back. Limits the result by the start solid, because edges that
+/// return to grid points could otherwise pass it by rounding.
+NarrowBand offsetAndBack(const NarrowBand& solid, double distance, const OffsetOptions& options) {
   OffsetOptions first = options, second = options;
-  // What the way back reads is made again anyway.
+  // The second offset recomputes its band anyway, so the first half width is the default.
   first.halfWidth = {};
   first.progress = subProgress(options.progress, 0, 0.5);
   second.progress = subProgress(options.progress, 0.5, 1);
@@ -29,7 +29,7 @@ NarrowBand thereAndBack(const NarrowBand& solid, double distance, const OffsetOp
                              vdb(start), vdb(back)));
 }
 
-void checkRadiusOf(double radius, const char* action) {
+void checkRadius(double radius, const char* action) {
   if (!std::isfinite(radius) || radius < 0)
     throw UsageError(
         fmt::format("{}: the radius is {}; give a length of zero or more", action, radius));
@@ -44,20 +44,20 @@ void checkShell(const NarrowBand& solid, double thickness) {
     throw InvalidInput(
         "shell: the solid is empty, so there is no surface to thicken; give a solid");
   if (thickness < solid.voxelSize() * (1 - 1e-9))
-    throw InvalidInput(fmt::format(
-        "shell: a wall of {:.4g} is thinner than a voxel of {:.4g}, which no grid shows; use a "
-        "thicker wall or smaller voxels",
-        thickness, solid.voxelSize()));
+    throw InvalidInput(
+        fmt::format("shell: a wall of {:.4g} is thinner than a voxel of {:.4g}; use a "
+                    "thicker wall or smaller voxels",
+                    thickness, solid.voxelSize()));
 }
 
-/// The solid moved inwards, as the cavity of a shell.
+/// Offsets the solid inwards, to get the cavity of a shell.
 NarrowBand cavityOf(const NarrowBand& solid, double depth, const OffsetOptions& options) {
   try {
     return offset(solid, -depth, options);
   } catch (const InvalidInput&) {
     throw InvalidInput(fmt::format(
-        "shell: no part of the solid is thicker than twice {:.4g}, so no cavity is left in it; use "
-        "a thinner wall",
+        "shell: no part of the solid is thicker than twice {:.4g}, so there is no cavity; use a "
+        "thinner wall",
         depth));
   }
 }
@@ -65,16 +65,16 @@ NarrowBand cavityOf(const NarrowBand& solid, double depth, const OffsetOptions& 
 }  // namespace
 
 NarrowBand opening(const NarrowBand& solid, double radius, const OffsetOptions& options) {
-  checkRadiusOf(radius, "open");
-  return thereAndBack(solid, -radius, options);
+  checkRadius(radius, "open");
+  return offsetAndBack(solid, -radius, options);
 }
 
 NarrowBand closing(const NarrowBand& solid, double radius, const OffsetOptions& options) {
-  checkRadiusOf(radius, "close");
-  return thereAndBack(solid, radius, options);
+  checkRadius(radius, "close");
+  return offsetAndBack(solid, radius, options);
 }
 
-// Both walls are exact distances and do not meet, so their intersection is one too.
+// Both surfaces have exact distances and do not intersect, so their difference has too.
 NarrowBand shell(const NarrowBand& solid, double thickness, ShellSide side,
                  const OffsetOptions& options) {
   checkShell(solid, thickness);

@@ -15,9 +15,9 @@ namespace {
 
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
-// What the interpolant reads beside the moved surface before distances are made again.
-constexpr double kShell = 3;
-// Of a voxel: lengths beside each other on the surface may pass those that were seen by this.
+// Voxels around the moved surface that the interpolant reads before re-distancing.
+constexpr double kPadding = 3;
+// Voxels by which lengths between the sampled closest points may exceed the sampled range.
 constexpr double kRangeMargin = 0.5;
 
 double checkedHalfWidth(const NarrowBand& solid, const OffsetOptions& options) {
@@ -35,19 +35,20 @@ void requireSurface(const NarrowBand& solid, const OffsetOptions& options) {
         "{}: the solid is empty, so there is no surface to move; give a solid", options.action));
 }
 
-/// Distances out to where the surface may go, kept beside it only.
-eikonal::DistanceRequest shellRequest(const OffsetOptions& options, double shift, double reach) {
+/// Requests distances near the possible positions of the new surface.
+eikonal::DistanceRequest nearSurfaceRequest(const OffsetOptions& options, double shift,
+                                            double reach) {
   eikonal::DistanceRequest request;
   request.action = options.action;
-  request.halfWidth = reach + kShell;
+  request.halfWidth = reach + kPadding;
   request.shift = shift;
   request.maxMemory = options.maxMemory;
   return request;
 }
 
-/// A distance again: where fronts met, a shifted one is only a bound.
-NarrowBand distancesAgain(const openvdb::FloatGrid& field, double halfWidth,
-                          const OffsetOptions& options, double done) {
+/// Re-distances a shifted field. Where fronts met, it is only a bound of the distance.
+NarrowBand redistanced(const openvdb::FloatGrid& field, double halfWidth,
+                       const OffsetOptions& options, double done) {
   eikonal::DistanceRequest request;
   request.action = options.action;
   request.halfWidth = halfWidth;
@@ -60,7 +61,7 @@ bool hasSurface(const openvdb::FloatGrid& field) {
   return field.activeVoxelCount() > 0 && eikonal::hasZeroCrossing(field.tree());
 }
 
-/// The length at each closest point of the surface, in voxels.
+/// Offset length at each closest point of the surface, in voxels.
 class Lengths {
  public:
   Lengths(const openvdb::FloatGrid& field, const ScalarField& distance, const char* action)
@@ -81,11 +82,11 @@ class Lengths {
   struct Range {
     double low = INFINITY, high = -INFINITY;
   };
-  /// Over the closest points of the grid points beside the surface.
+  /// Range of lengths over the closest points of the grid points next to the surface.
   [[nodiscard]] Range range(const OffsetOptions& options) const {
     Range all;
     std::mutex mutex;
-    eikonal::DistanceRequest request = shellRequest(options, 0, 0);
+    eikonal::DistanceRequest request = nearSurfaceRequest(options, 0, 0);
     request.progress = subProgress(options.progress, 0, 0.3);
     request.visitPoints = [&](const LeafNode& leaf, const eikonal::ClosestPointLeaf& points) {
       Range own;
@@ -115,33 +116,34 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
   requireSurface(solid, options);
   const double halfWidth = checkedHalfWidth(solid, options);
   if (distance == 0 && halfWidth == solid.halfWidth()) return solid;
-  if (distance == 0) return distancesAgain(vdb(solid), halfWidth, options, 0);
+  if (distance == 0) return redistanced(vdb(solid), halfWidth, options, 0);
 
-  eikonal::DistanceRequest request = shellRequest(options, distance / solid.voxelSize(), 0);
+  eikonal::DistanceRequest request = nearSurfaceRequest(options, distance / solid.voxelSize(), 0);
   request.progress = subProgress(options.progress, 0, 0.6);
   const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
   if (!hasSurface(*moved))
     throw InvalidInput(
-        fmt::format("{}: nothing is left of the solid after {} world units; no part of it is "
-                    "thicker than twice that, use a smaller length",
+        fmt::format("{}: the result is empty after an offset of {} world units, because no part of "
+                    "the solid is "
+                    "thicker than twice that; use a smaller length",
                     options.action, distance));
-  return distancesAgain(*moved, halfWidth, options, 0.6);
+  return redistanced(*moved, halfWidth, options, 0.6);
 }
 
 NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance, const OffsetOptions& options) {
   if (!distance)
-    throw UsageError(
-        fmt::format("{}: there is no length; give a formula or a grid of numbers", options.action));
+    throw UsageError(fmt::format("{}: the length is missing; give a formula or a grid of numbers",
+                                 options.action));
   requireSurface(solid, options);
   const double halfWidth = checkedHalfWidth(solid, options);
   const double voxel = solid.voxelSize();
   const Lengths lengths(vdb(solid), distance, options.action);
   const Lengths::Range range = lengths.range(options);
 
-  // === φ(x) − length(closest point), where the surface may pass
+  // === Compute φ(x) − length(closest point) near the possible positions of the new surface
   const double middle = (range.low + range.high) / 2;
   eikonal::DistanceRequest request =
-      shellRequest(options, middle, (range.high - range.low) / 2 + kRangeMargin);
+      nearSurfaceRequest(options, middle, (range.high - range.low) / 2 + kRangeMargin);
   request.progress = subProgress(options.progress, 0.3, 0.7);
   const auto limit = static_cast<float>(request.halfWidth * voxel);
   openvdb::FloatTree displaced;
@@ -161,10 +163,10 @@ NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance, const OffsetO
     *moved->tree().touchLeaf(leaf->origin()) = *leaf;
   if (!hasSurface(*moved))
     throw InvalidInput(
-        fmt::format("{}: nothing is left of the solid after {:.6g} to {:.6g} world units; use "
+        fmt::format("{}: the result is empty after offsets of {:.6g} to {:.6g} world units; use "
                     "smaller lengths",
                     options.action, range.low * voxel, range.high * voxel));
-  return distancesAgain(*moved, halfWidth, options, 0.7);
+  return redistanced(*moved, halfWidth, options, 0.7);
 }
 
 }  // namespace levelset

@@ -9,27 +9,31 @@
 namespace levelset {
 
 struct OffsetOptions {
-  std::optional<double> halfWidth = {};  ///< of the result, voxels; empty: as the operand
+  std::optional<double> halfWidth =
+      {};  ///< half width of the result, voxels; empty: that of the operand
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
-  const char* action = "offset";  ///< in messages
+  const char* action = "offset";  ///< name in messages
 };
 
-/// Moves the surface along its normal by `distance`; positive grows the solid. Distances are swept
-/// out to the new zero set and re-distanced once, whatever `distance`.
+/// Offsets the surface along its normal by `distance`; a positive distance grows the solid. Extends
+/// the distances to the new zero set and re-distances once, for any `distance`.
 /// @param distance  world units, any sign
-/// @throws UsageError if `distance` is not finite; InvalidInput if `solid` is empty or nothing is
-/// left;
-///         ResourceLimit, before anything is allocated; Cancelled
+/// @throws UsageError if `distance` is not finite
+/// @throws InvalidInput if `solid` or the result is empty
+/// @throws ResourceLimit if the memory estimate exceeds the limit, before any allocation
+/// @throws Cancelled
 [[nodiscard]] NarrowBand offset(NarrowBand solid, double distance,
                                 const OffsetOptions& options = {});
 
-/// Moves each point of the surface along its normal by the length that `distance` has there (world
-/// units, any sign): a displacement map, or an offset under a mask. The new surface is the zero set
-/// of φ(x) − distance(closest point of x), re-distanced once; what it does not reach is as before.
-/// Where the length changes faster along the surface than the surface's own curvature lets normals
-/// meet, the farthest point along each normal counts: no overhangs.
-/// @throws as offset(), InvalidInput where `distance` is not finite, with the place
+/// Offsets each point of the surface along its normal by the local value of `distance`. Implements
+/// displacement maps and masked offsets. The new surface is the zero set of
+/// φ(x) − distance(closest point of x), re-distanced once. Parts with zero distance stay. Overhangs
+/// cannot occur: where the distance varies too fast along the surface, the farthest point along
+/// each normal counts.
+/// @param distance  world units, any sign
+/// @throws as offset()
+/// @throws InvalidInput if `distance` is not finite at a point; names the point
 [[nodiscard]] NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance,
                                   const OffsetOptions& options = {});
 

@@ -35,7 +35,7 @@ bool isEmpty(const LeafBits& mask) {
   return std::all_of(mask.begin(), mask.end(), [](std::uint64_t word) { return word == 0; });
 }
 
-/// The part of `within` that hangs together with its first voxel.
+/// Connected component of `within` that contains its first voxel.
 LeafBits firstComponent(const LeafBits& within) {
   constexpr std::uint64_t kLowZ = 0x0101010101010101ull, kHighZ = kLowZ << 7;
   LeafBits grown = {};
@@ -56,7 +56,7 @@ LeafBits firstComponent(const LeafBits& within) {
   return grown;
 }
 
-/// Components of both signs, in a fixed order.
+/// Splits a leaf into components of both signs, in a fixed order.
 std::vector<LeafBits> splitLeaf(const FloatLeaf& leaf) {
   std::vector<LeafBits> parts;
   LeafBits left = insideMask(leaf);
@@ -73,7 +73,7 @@ std::vector<LeafBits> splitLeaf(const FloatLeaf& leaf) {
   return parts;
 }
 
-/// Offsets in a leaf of the 64 voxels at one of its faces.
+/// Leaf offsets of the 64 voxels on one of its faces.
 std::array<openvdb::Index, 64> faceOffsets(int axis, int position) {
   std::array<openvdb::Index, 64> offsets;
   std::size_t count = 0;
@@ -87,7 +87,8 @@ std::array<openvdb::Index, 64> faceOffsets(int axis, int position) {
 
 }  // namespace
 
-/// Joins labels; the lowest stands for its set. Label 0 is the space that the tree does not cover.
+/// Joins labels into sets; the lowest label represents its set. Label 0 is the space outside the
+/// tree.
 class RegionMap::Linker {
  public:
   std::int32_t add() { return static_cast<std::int32_t>(sets_.add()); }
@@ -175,7 +176,7 @@ void RegionMap::joinLeaves(const FloatGrid& grid, Linker& linker) const {
         const auto& here = (side ? high : low)[static_cast<std::size_t>(axis)];
         const auto& there = (side ? low : high)[static_cast<std::size_t>(axis)];
         const FloatLeaf* other = values.probeConstLeaf(beside);
-        if (other && !side) continue;  // joined from the other one
+        if (other && !side) continue;  // the other leaf joins this pair
         const LabelLeaf* otherLabels = other ? labels.probeConstLeaf(beside) : nullptr;
         const bool tileInside = !other && values.getValue(beside) < 0;
         const std::int32_t tileLabel = other ? 0 : labels.getValue(beside);
@@ -189,7 +190,7 @@ void RegionMap::joinLeaves(const FloatGrid& grid, Linker& linker) const {
   }
 }
 
-/// Each tile looks at neighbours of its size or larger; smaller ones look at it.
+/// Joins each tile with neighbours of equal or larger size. Smaller neighbours join with it.
 void RegionMap::joinTiles(const FloatGrid& grid, Linker& linker) const {
   openvdb::tree::ValueAccessor<const FloatTree> values(grid.tree());
   openvdb::tree::ValueAccessor<const Int32Tree> labels(labels_);
@@ -209,7 +210,7 @@ void RegionMap::joinTiles(const FloatGrid& grid, Linker& linker) const {
   }
 }
 
-/// Outside corners that only share the diagonal of a face belong together.
+/// Joins outside corners that share only the diagonal of a cell face.
 void RegionMap::joinDiagonals(const CellSurface& surface, Linker& linker) const {
   constexpr int kAxes[3] = {4, 2, 1};  // corner bits
   openvdb::tree::ValueAccessor<const Int32Tree> labels(labels_);
@@ -236,7 +237,7 @@ void RegionMap::numberRegions(const FloatGrid& grid, Linker& linker) {
   std::vector<std::int32_t> number(static_cast<std::size_t>(linker.size()));
   std::int32_t count = 0;
   for (std::int32_t i = 0; i < linker.size(); ++i) {
-    const std::int32_t root = linker.root(i);  // never after i
+    const std::int32_t root = linker.root(i);  // never greater than i
     number[static_cast<std::size_t>(i)] =
         root == i ? count++ : number[static_cast<std::size_t>(root)];
   }
@@ -274,28 +275,30 @@ void RegionMap::numberRegions(const FloatGrid& grid, Linker& linker) {
 void RegionMap::findSurfaceComponents(const CellSurface& surface) {
   const IndexMesh mesh = marchCells(surface);
   const SurfaceComponents found = levelset::findSurfaceComponents(mesh.positions, mesh.triangles);
-  shells_.resize(found.figures.size());
-  std::vector<bool> seen(shells_.size(), false);
+  surfaces_.resize(found.figures.size());
+  std::vector<bool> seen(surfaces_.size(), false);
   openvdb::tree::ValueAccessor<const Int32Tree> labels(labels_);
   std::size_t vertex = 0;
   for (const SurfaceBlock& block : surface.blocks()) {
     std::uint32_t last = SurfaceComponents::kNoComponent;
     CellSurface::forEachVertex(block, [&](int x, int y, int z, int axis) {
-      const std::uint32_t shell = found.componentOfVertex[vertex++];
-      if (shell != last) shellBlocks_.emplace_back(block.origin, last = shell);
-      if (seen[shell]) return;
-      seen[shell] = true;
+      const std::uint32_t component = found.componentOfVertex[vertex++];
+      if (component != last) surfaceBlocks_.emplace_back(block.origin, last = component);
+      if (seen[component]) return;
+      seen[component] = true;
       const Coord low = block.origin.offsetBy(x, y, z);
       Coord high = low;
       high[axis] += 1;
       const bool lowInside = block.value(x * 64 + y * 8 + z) < 0;
-      shells_[shell].inside = static_cast<std::uint32_t>(labels.getValue(lowInside ? low : high));
-      shells_[shell].outside = static_cast<std::uint32_t>(labels.getValue(lowInside ? high : low));
+      surfaces_[component].inside =
+          static_cast<std::uint32_t>(labels.getValue(lowInside ? low : high));
+      surfaces_[component].outside =
+          static_cast<std::uint32_t>(labels.getValue(lowInside ? high : low));
     });
   }
-  for (std::size_t i = 0; i < shells_.size(); ++i) {
-    regions_[shells_[i].inside].volume += found.figures[i].volume;
-    regions_[shells_[i].outside].volume -= found.figures[i].volume;
+  for (std::size_t i = 0; i < surfaces_.size(); ++i) {
+    regions_[surfaces_[i].inside].volume += found.figures[i].volume;
+    regions_[surfaces_[i].outside].volume -= found.figures[i].volume;
   }
 }
 

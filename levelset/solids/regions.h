@@ -11,37 +11,41 @@
 
 namespace levelset {
 
-/// A connected part of the inside (6 neighbours) or of the outside (18 neighbours, as the surface
-/// of CellSurface separates them).
+/// A connected component of the inside (6 neighbours) or of the outside (18 neighbours). The
+/// surface of CellSurface separates them.
 struct Region {
   bool inside = false;
-  double volume = 0;  ///< voxels³, what lies in its voids left out; region 0 reaches infinity
+  double volume =
+      0;  ///< voxels³, without regions enclosed in it; invalid for region 0, which is unbounded
 };
 
-/// A closed connected surface, between two regions.
-struct RegionShell {
-  std::uint32_t inside = 0, outside = 0;
+/// A surface component, which separates two regions.
+struct RegionSurface {
+  std::uint32_t inside = 0, outside = 0;  ///< region indices
 };
 
+/// Connected regions of a grid, and the surfaces between them.
 class RegionMap {
  public:
-  /// All space: leaves by their voxels, the rest by its tiles. Nothing is made dense.
-  /// @param action  for messages
+  /// Labels the complete space: each voxel of a leaf and each tile. Does not expand tiles.
+  /// @param action  name in messages
   explicit RegionMap(const openvdb::FloatGrid& grid, const Progress& progress = {},
                      const char* action = "regions");
 
-  static constexpr std::uint32_t kInfinite = 0;  ///< the outside that reaches infinity
+  static constexpr std::uint32_t kInfinite = 0;  ///< index of the unbounded outside region
 
-  /// In tree order; the first is kInfinite.
+  /// Regions in tree order; the first is kInfinite.
   [[nodiscard]] const std::vector<Region>& regions() const { return regions_; }
-  [[nodiscard]] const std::vector<RegionShell>& shells() const { return shells_; }
-  /// One region a voxel, with the topology of the grid.
+  /// Surface components between the regions.
+  [[nodiscard]] const std::vector<RegionSurface>& surfaces() const { return surfaces_; }
+  /// Region index of each voxel and tile, with the topology of the grid.
   [[nodiscard]] const openvdb::Int32Tree& labels() const { return labels_; }
 
-  /// Calls visit(block origin, shell) for each block and each shell that crosses an edge of it.
+  /// Calls visit(block origin, surface index) for each block and each surface component that
+  /// crosses one of its edges.
   template <typename Visit>
-  void forEachShellBlock(Visit&& visit) const {
-    for (const auto& [origin, shell] : shellBlocks_) visit(origin, shell);
+  void forEachSurfaceBlock(Visit&& visit) const {
+    for (const auto& [origin, surface] : surfaceBlocks_) visit(origin, surface);
   }
 
  private:
@@ -56,8 +60,8 @@ class RegionMap {
 
   openvdb::Int32Tree labels_;
   std::vector<Region> regions_;
-  std::vector<RegionShell> shells_;
-  std::vector<std::pair<openvdb::Coord, std::uint32_t>> shellBlocks_;
+  std::vector<RegionSurface> surfaces_;
+  std::vector<std::pair<openvdb::Coord, std::uint32_t>> surfaceBlocks_;
 };
 
 }  // namespace levelset

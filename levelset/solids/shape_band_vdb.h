@@ -1,6 +1,6 @@
 #pragma once
 
-// Bands of solids whose distance is a formula, for our own .cpp files.
+// Bands of solids with a formula for the distance. Includes OpenVDB: for .cpp files only.
 
 #include <fmt/core.h>
 
@@ -13,9 +13,11 @@
 
 namespace levelset {
 
-/// @param distance  double(const V3d&): signed distance at a world position. Further from the
-///                  surface than the band, less in magnitude will do, with the right sign.
-/// @throws as checkShape; InvalidInput when no grid point lies inside
+/// Builds the band of a solid from a distance function.
+/// @param distance  double(const V3d&): signed distance at a world position. Outside the band, any
+///                  lower bound of the magnitude with the correct sign suffices.
+/// @throws as checkShape()
+/// @throws InvalidInput if no grid point lies inside
 template <typename Distance>
 NarrowBand makeShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
                      const char* action, const Distance& distance) {
@@ -41,7 +43,7 @@ NarrowBand makeShape(const ShapeExtent& extent, double voxelSize, const ShapeOpt
   }
   if (!filler.fill(domain, options.progress, action)) {
     throw InvalidInput(
-        fmt::format("{}: no grid point lies inside, the shape is too thin for voxels "
+        fmt::format("{}: no grid point lies inside, because the shape is too thin for voxels "
                     "of {}; use smaller voxels",
                     action, voxelSize));
   }

@@ -19,13 +19,13 @@ using Imath::V3d;
 void requireLength(double length, const char* action, const char* name) {
   if (length > 0 && std::isfinite(length)) return;
   throw UsageError(
-      fmt::format("{}: {} is {}, it must be a positive, finite length", action, name, length));
+      fmt::format("{}: {} is {}; give a positive, finite length", action, name, length));
 }
 
 void requirePoint(const V3d& point, const char* action, const char* name) {
   if (std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z)) return;
-  throw UsageError(fmt::format("{}: {} is {},{},{}; its coordinates must be finite", action, name,
-                               point.x, point.y, point.z));
+  throw UsageError(fmt::format("{}: {} is {},{},{}; give finite coordinates", action, name, point.x,
+                               point.y, point.z));
 }
 
 V3d requireAxis(const V3d& axis, const char* action) {
@@ -39,15 +39,15 @@ void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions
                  const char* action) {
   if (!std::isfinite(extent.area)) {
     throw InvalidInput(fmt::format(
-        "{}: the area of the surface is beyond all numbers; change the unit of length", action));
+        "{}: the surface area overflows double precision; change the unit of length", action));
   }
   const V3d size = extent.bounds.size();
   const double longest = std::max({size.x, size.y, size.z});
   if (voxelSize > longest) {
-    throw InvalidInput(fmt::format(
-        "{}: the voxel size {} is larger than the whole shape, whose longest side is {}; "
-        "use smaller voxels",
-        action, voxelSize, longest));
+    throw InvalidInput(
+        fmt::format("{}: the voxel size {} is larger than the longest side of the shape, {}; "
+                    "use smaller voxels",
+                    action, voxelSize, longest));
   }
   double farthest = 0;
   for (int axis = 0; axis < 3; ++axis)
@@ -56,12 +56,13 @@ void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions
   const double index = farthest / voxelSize + options.halfWidth;
   if (!(index < kIndexLimit)) {
     throw ResourceLimit(
-        fmt::format("{}: at voxel size {} the shape reaches grid index {:.3g}, beyond 32 bits; use "
+        fmt::format("{}: at voxel size {} the grid index {:.3g} of the shape exceeds 32 bits; use "
                     "larger voxels "
                     "or move it towards the origin",
                     action, voxelSize, index));
   }
-  // A surface patch of one leaf face meets the leaves within the band and about one leaf more.
+  // A surface piece of the size of a leaf face overlaps the leaves within the band, and about one
+  // leaf more.
   double leaves = extent.area / (64 * voxelSize * voxelSize) * (2 * options.halfWidth + 15) / 8;
   if (!isEverywhere(options.region)) {
     const V3d blocks = options.region.size() / (8 * voxelSize) + V3d(2);
@@ -74,14 +75,14 @@ Imath::Box3d around(const V3d& center, const V3d& half) {
   return {center - half, center + half};
 }
 
-/// Half extents of a disc of `radius` about a unit axis.
+/// Half extents of a disc of `radius` perpendicular to a unit axis.
 V3d discExtent(double radius, const V3d& axis) {
   V3d half;
   for (int i = 0; i < 3; ++i) half[i] = radius * std::sqrt(std::max(0.0, 1 - axis[i] * axis[i]));
   return half;
 }
 
-/// Without std::hypot's guard against overflow, which costs ten times as much.
+/// Length of (u, v). std::hypot would guard against overflow, but takes ten times as long.
 double length2d(double u, double v) {
   return std::sqrt(u * u + v * v);
 }
@@ -91,10 +92,11 @@ double quadrantDistance(double u, double v) {
   return std::min(std::max(u, v), 0.0) + length2d(std::max(u, 0.0), std::max(v, 0.0));
 }
 
-/// In the half plane of a ring's profile (r ≥ 0 from the axis, z along it): the distance to a disc
-/// of radius `tube` about (radius, 0). A tube wider than its ring is cut by the axis: what the disc
-/// has beyond is the profile of the other side. Then a point whose nearest point of the circle lies
-/// there is nearest to the cusp where the circle meets the axis instead.
+/// Distance to the profile of a torus in the half plane r ≥ 0, with r the distance from the axis
+/// and z along it. The profile is a disc of radius `tube` around (radius, 0). If `tube` exceeds
+/// `radius`, the axis cuts the disc, and the part beyond belongs to the opposite side. A point
+/// whose nearest circle point lies beyond the axis is then nearest to the cusp, where the circle
+/// meets the axis.
 double ringDistance(double r, double z, double radius, double tube) {
   const double toCenter = length2d(r - radius, z);
   if (tube > radius && tube * (radius - r) > radius * toCenter) {
@@ -110,8 +112,8 @@ void checkShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions&
                 const char* action) {
   requireLength(voxelSize, action, "the voxel size");
   if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth)) {
-    throw UsageError(fmt::format("{}: the half width is {} voxels, it must be at least 1", action,
-                                 options.halfWidth));
+    throw UsageError(
+        fmt::format("{}: the half width is {} voxels; give at least 1", action, options.halfWidth));
   }
   requireFits(extent, voxelSize, options, action);
 }
@@ -205,7 +207,7 @@ NarrowBand makeCapsule(const V3d& from, const V3d& to, double radius, double vox
   const V3d along = to - from;
   const double squaredLength = along.length2();
   return makeShape(capsuleExtent(from, to, radius), voxelSize, options, action, [=](const V3d& p) {
-    // Both ends in one place: a sphere.
+    // If both ends coincide, the capsule is a sphere.
     const double t =
         squaredLength > 0 ? std::clamp(((p - from) ^ along) / squaredLength, 0.0, 1.0) : 0.0;
     return (p - from - along * t).length() - radius;

@@ -26,7 +26,7 @@ using levelset::UsageError;
 constexpr const char* kAnimation = "animate";
 using Footprints = std::vector<Footprint>;
 
-/// With the frame, unless it tells one; without the name of whoever worked for the animation.
+/// Adds the frame to a message that has none, and removes the prefix of the action that failed.
 std::string sentenceAt(std::size_t frame, std::string sentence) {
   if (sentence.starts_with(std::string(kAnimation) + ": frame ")) return sentence;
   for (const std::string who : {"animate: ", "texture: ", "read: ", "write: "}) {
@@ -37,7 +37,7 @@ std::string sentenceAt(std::size_t frame, std::string sentence) {
   return fmt::format("{}: frame {}: {}", kAnimation, frame, sentence);
 }
 
-/// Calls, and tells the frame in what is refused, but for what is wrong with the call as a whole.
+/// Runs `call` and adds the frame to its errors, except to usage errors, which concern all frames.
 template <typename Call>
 auto atFrame(std::size_t frame, const Call& call) {
   try {
@@ -67,47 +67,47 @@ bool isSamePatch(const Patch& a, const Patch& b) {
 void checkKeys(const std::vector<AnimationKey>& keys, const AnimationOptions& options) {
   if (options.frames < 1) throw UsageError(fmt::format("{}: there are no frames", kAnimation));
   if (keys.empty() || keys.front().frame != 0)
-    throw UsageError(fmt::format("{}: the first patch stands at frame 0", kAnimation));
+    throw UsageError(fmt::format("{}: the first patch must be at frame 0", kAnimation));
   for (std::size_t k = 0; k < keys.size(); ++k) {
     if (keys[k].patches.empty())
       throw UsageError(fmt::format("{}: patch {} holds no patches", kAnimation, k + 1));
     if (keys[k].frame >= options.frames || (k > 0 && keys[k].frame <= keys[k - 1].frame)) {
       throw UsageError(fmt::format(
-          "{}: patch {} stands at frame {}, which is not between the frame of the patch before "
-          "and the last, {}; give rising frames, or more of them",
+          "{}: patch {} is at frame {}, which is not between the frame of the previous patch and "
+          "the last frame, {}; give increasing frames, or more frames",
           kAnimation, k + 1, keys[k].frame, options.frames - 1));
     }
     if (keys.size() == 1) continue;
     if (keys[k].outlines.empty()) {
       throw UsageError(fmt::format(
-          "{}: patch {} goes all around its axis and cannot be moved to another place; leave the "
-          "other patches out",
+          "{}: patch {} goes all around its axis and cannot be moved to another position; leave "
+          "out the other patches",
           kAnimation, k + 1));
     }
     if (keys[k].outlines.size() != keys.front().outlines.size()) {
       throw UsageError(
-          fmt::format("{}: patch {} is a set of {}, the first of {}; each must have "
-                      "one to go to",
+          fmt::format("{}: patch {} is a set of {}, the first patch a set of {}; give sets of the "
+                      "same size",
                       kAnimation, k + 1, keys[k].outlines.size(), keys.front().outlines.size()));
     }
     const std::vector<Patch>&first = keys.front().patches, &patches = keys[k].patches;
     if (patches.size() != first.size()) {
       throw UsageError(fmt::format(
-          "{}: patch {} is a set of {} tiles, the first of {}; frames between them follow the "
-          "first, so give all the same count",
+          "{}: patch {} is a set of {} tiles, the first patch a set of {}; the frames between them "
+          "follow the first patch, so give the same number of tiles for all",
           kAnimation, k + 1, patches.size(), first.size()));
     }
     for (std::size_t i = 0; i < patches.size(); ++i) {
       if (patches[i].mirrored == first[i].mirrored) continue;
       throw UsageError(
-          fmt::format("{}: patch {} is mirrored and the first is not, or the other way "
-                      "round{}; no way leads from one to the other",
+          fmt::format("{}: one of patch {} and the first patch is mirrored and the other is "
+                      "not{}; mirror both or neither",
                       kAnimation, k + 1, i > 0 ? fmt::format(", in member {}", i + 1) : ""));
     }
   }
 }
 
-/// The bases of all frames, one held at a time beside the first.
+/// Bases of all frames. Only one is in memory besides the first.
 class Bases {
  public:
   Bases(const NarrowBand& first, const BandFrames& frames)
@@ -120,7 +120,7 @@ class Bases {
   const NarrowBand& at(std::size_t frame) {
     if (frame == frame_) return now_;
     if (!frames_) return now_;
-    now_ = NarrowBand();  // before the next is read
+    now_ = NarrowBand();  // frees memory before the next base is read
     now_ = frame == 0 ? first_ : frames_(frame);
     hash_ = frame == 0 ? firstHash_ : now_.contentHash();
     frame_ = frame;
@@ -128,7 +128,7 @@ class Bases {
   }
   [[nodiscard]] bool areMoving() const { return static_cast<bool>(frames_); }
   [[nodiscard]] bool mustRead(std::size_t frame) const { return frames_ && frame != frame_; }
-  /// Of the base that was asked for last.
+  /// Hash of the base returned last.
   [[nodiscard]] std::uint64_t hash() const { return hash_; }
 
  private:
@@ -148,7 +148,7 @@ class Animation {
   AnimationReport run() {
     for (std::size_t k = 1; k < keys_.size(); ++k) {
       warnOfLayers(k);
-      // On bases that move, when the way to the key is looked for.
+      // On moving bases, this is checked when the path to the key is computed.
       if (!bases_.areMoving()) atFrame(keys_[k].frame, [&] { requireOn(bases_.at(0), k); });
     }
     for (std::size_t k = 0; k < keys_.size(); ++k) {
@@ -168,8 +168,8 @@ class Animation {
                       first = keys_.front().patches.front().layers.size();
     if (layers == first) return;
     report_.warnings.push_back(
-        fmt::format("{}: patch {} has {} layers and the first {}; the frames between follow the "
-                    "first, so give all the same --levels",
+        fmt::format("{}: patch {} has {} layers and the first patch {}; the frames between them "
+                    "follow the first patch, so give the same --layers for all",
                     kAnimation, k + 1, layers, first));
   }
 
@@ -177,7 +177,7 @@ class Animation {
     for (const Patch& patch : keys_[key].patches) requirePatchOn(base, patch);
   }
 
-  /// The base of a frame. Nothing else holds the one before when another is read.
+  /// Base of a frame. The paths release the previous base before another one is read.
   const NarrowBand& baseAt(std::size_t frame) {
     if (bases_.mustRead(frame))
       for (PatchPath& path : paths_) path.dropBase();
@@ -194,8 +194,8 @@ class Animation {
         one = withReach(base, std::move(one), outline.direction.has_value());
       if (options_.carry == CarryRule::Rigid && !one.reach) {
         throw InvalidInput(fmt::format(
-            "{}: no straight way leads from the centre {} of the patch to each of its corners; "
-            "carry the corners by themselves, or take a smaller patch",
+            "{}: no geodesic leads from the centre {} of the patch to each of its corners; use "
+            "--carry corners, or a smaller patch",
             kAnimation, pointAsOption(one.centre)));
       }
       all.push_back(std::move(one));
@@ -208,13 +208,13 @@ class Animation {
     for (const Footprint& one : from) {
       levelset::report(options_.progress, done_, kAnimation);
       moved.push_back(carryFootprint(base, one, options_.carry));
-      // Once it stands still, it shall do so to the bit.
-      if (farthestWay(one, moved.back()) <= 1e-6 * base.voxelSize()) moved.back() = one;
+      // A footprint that stops moving must keep the same bits.
+      if (farthestMove(one, moved.back()) <= 1e-6 * base.voxelSize()) moved.back() = one;
     }
     return moved;
   }
 
-  /// What the next key's patches were on the bases before it.
+  /// Carries the footprints of the next key backwards over the previous bases.
   void carryBackwards(std::size_t begin, std::size_t end) {
     done_ = static_cast<double>(begin) / static_cast<double>(options_.frames);
     later_.assign(end - begin, {});
@@ -229,7 +229,7 @@ class Animation {
         if (bases_.hash() != hash) now = carryAll(base, now);
       });
       hash = bases_.hash();
-      judgeDrift(f, before, now, goal_);
+      warnOfDrift(f, before, now, goal_);
       later_[f - begin] = now;
     }
   }
@@ -248,7 +248,7 @@ class Animation {
     bool isUnchanged = isSameBase;
     const Footprints shownBefore = shown_;
 
-    // === Where the patches stand
+    // === Footprints of this frame
     if (f == begin) {
       own_ = footprintsOf(base, key_);
       first_ = own_;
@@ -259,16 +259,16 @@ class Animation {
           std::equal(given.begin(), given.end(), patches_.begin(), patches_.end(), isSamePatch);
       isUnchanged = isUnchanged && isSame;
       if (!isSame) patches_ = given;
-      // Where there is no way, no frame shall be made in vain.
+      // If there is no path, fail before any frame is computed.
       if (!bases_.areMoving() && isBetween && begin + 1 < end)
-        (void)atFrame(f + 1, [&] { return onTheWay(f + 1, begin, end); });
+        (void)atFrame(f + 1, [&] { return footprintsBetween(f + 1, begin, end); });
     } else {
       if (!isSameBase) {
         const Footprints before = own_;
         own_ = carryAll(base, own_);
-        judgeDrift(f, before, own_, first_);
+        warnOfDrift(f, before, own_, first_);
       }
-      shown_ = isBetween ? onTheWay(f, begin, end) : own_;
+      shown_ = isBetween ? footprintsBetween(f, begin, end) : own_;
       isUnchanged = isUnchanged && shown_ == shownBefore;
       if (!isUnchanged) {
         patches_ = remade(
@@ -285,7 +285,8 @@ class Animation {
     for (std::size_t i = 0; i < shown_.size(); ++i) {
       report.corners.push_back(shown_[i].corners);
       if (i < shownBefore.size())
-        report.farthestWay = std::max(report.farthestWay, farthestWay(shownBefore[i], shown_[i]));
+        report.farthestMove =
+            std::max(report.farthestMove, farthestMove(shownBefore[i], shown_[i]));
     }
     report_.frames.push_back(std::move(report));
     visit_(
@@ -297,7 +298,7 @@ class Animation {
     if (isUnchanged) ++report_.reused;
   }
 
-  [[nodiscard]] Footprints onTheWay(std::size_t f, std::size_t begin, std::size_t end) {
+  [[nodiscard]] Footprints footprintsBetween(std::size_t f, std::size_t begin, std::size_t end) {
     const NarrowBand& base = baseAt(f);
     const double part = static_cast<double>(f - begin) / static_cast<double>(end - begin);
     const bool areNew = paths_.size() != own_.size();
@@ -309,8 +310,8 @@ class Animation {
         if (!from.reach) from = withReach(base, std::move(from));
         if (!to.reach) to = withReach(base, std::move(to));
         paths.emplace_back(base, std::move(from), std::move(to), options_.carry,
-                           areNew ? std::vector<V3d>{} : paths_[i].centreWay());
-        tellOfPath(f, paths.back(), areNew);
+                           areNew ? std::vector<V3d>{} : paths_[i].centrePath());
+        warnOfPath(f, paths.back(), areNew);
       }
       paths_ = std::move(paths);
       pathHash_ = bases_.hash();
@@ -323,36 +324,38 @@ class Animation {
     return result;
   }
 
-  /// Each sentence once between two keys, for all patches and frames.
-  void tellOfPath(std::size_t f, const PatchPath& path, bool isNew) {
+  /// Warns about a path. Each warning is issued once between two keys, for all patches and frames.
+  void warnOfPath(std::size_t f, const PatchPath& path, bool isNew) {
     if (!path.isAlike()) {
-      tellOnce(
-          warnedOfWays_,
-          fmt::format("{}: frame {}: the corners' ways could not be laid beside that of the "
-                      "patch's centre; each takes its own shortest, and where these lead around "
-                      "different sides the patch is stretched; try --carry rigid, or a patch "
-                      "between the two",
-                      kAnimation, f));
+      warnOnce(warnedOfPaths_,
+               fmt::format(
+                   "{}: frame {}: the paths of the corners cannot follow that of the patch's "
+                   "centre; each corner takes its own shortest path, and where these lead around "
+                   "different sides the patch is stretched; use --carry rigid, or add a patch "
+                   "between the two",
+                   kAnimation, f));
     }
-    constexpr double kMostTurn = 1;  // radians: sides shrink by the cosine of half of it
+    constexpr double kMostTurn = 1;  // radians; sides shrink by the cosine of half the angle
     if (isNew && options_.carry == CarryRule::Corners && std::abs(path.turn()) > kMostTurn) {
-      tellOnce(warnedOfTurn_,
-               fmt::format("{}: frame {}: the patch turns by {:.0f} degrees on its way, and "
-                           "shrinks in between as "
-                           "its corners go straight; --carry rigid turns it as a whole",
-                           kAnimation, f, std::abs(path.turn()) * 180 / std::acos(-1.0)));
+      warnOnce(
+          warnedOfTurn_,
+          fmt::format("{}: frame {}: the patch turns by {:.0f} degrees on its path, and shrinks "
+                      "in between because its corners move along geodesics; --carry rigid turns "
+                      "it without shrinking",
+                      kAnimation, f, std::abs(path.turn()) * 180 / std::acos(-1.0)));
     }
     if (path.hasJumped()) {
-      tellOnce(
-          warnedOfJump_,
-          fmt::format("{}: frame {}: the way from patch to patch no longer runs as on the frame "
-                      "before, and may have jumped",
-                      kAnimation, f));
+      warnOnce(warnedOfJump_,
+               fmt::format(
+                   "{}: frame {}: the path from patch to patch differs from that of the previous "
+                   "frame, and may lead around another side",
+                   kAnimation, f));
     }
   }
 
-  /// @param key  of which it was told last, from 1
-  void tellOnce(std::size_t& key, std::string warning) {
+  /// Adds a warning once for each key.
+  /// @param key  last key with this warning, counted from 1
+  void warnOnce(std::size_t& key, std::string warning) {
     if (key == key_ + 1) return;
     key = key_ + 1;
     report_.warnings.push_back(std::move(warning));
@@ -361,11 +364,11 @@ class Animation {
   [[nodiscard]] std::vector<Patch> remade(const NarrowBand& base,
                                           const levelset::Progress& progress) const {
     if (!options_.make)
-      throw UsageError(fmt::format("{}: nothing tells how to make its patches again", kAnimation));
+      throw UsageError(fmt::format("{}: it is unknown how to rebuild its patches", kAnimation));
     std::vector<Patch> patches;
     try {
       patches = options_.make(base, shown_, origins_, progress);
-    } catch (const UsageError& error) {  // its options were right for a patch that has moved since
+    } catch (const UsageError& error) {  // the options were valid for the patch before it moved
       throw InvalidInput(error.what());
     }
     const std::vector<Patch>& first = keys_.front().patches;
@@ -373,8 +376,8 @@ class Animation {
       const Patch& patch = patches[i];
       if (patch.mirrored == first[std::min(i, first.size() - 1)].mirrored) continue;
       throw InvalidInput(fmt::format(
-          "{}: the patch has turned over, its corners {}, {}, {} and {} run the other way round; "
-          "carry it with --carry rigid, or end before",
+          "{}: the patch is inverted: its corners {}, {}, {} and {} are now in the opposite order; "
+          "use --carry rigid, or end the animation before this frame",
           kAnimation, pointAsOption(patch.corners[0]), pointAsOption(patch.corners[1]),
           pointAsOption(patch.corners[2]), pointAsOption(patch.corners[3])));
     }
@@ -390,28 +393,29 @@ class Animation {
     return worst;
   }
 
-  /// Warns once a key of each.
-  void judgeDrift(std::size_t f, const Footprints& before, const Footprints& now,
-                  const Footprints& first) {
+  /// Warns about distortion and large displacements, once for each key.
+  void warnOfDrift(std::size_t f, const Footprints& before, const Footprints& now,
+                   const Footprints& first) {
     const Drift drift = worstDrift(first, now);
     if (drift.factor() > options_.driftWarning) {
-      tellOnce(warnedOfDrift_,
+      warnOnce(warnedOfDrift_,
                fmt::format("{}: frame {}: sides or diagonals of the patch are {:.3g} to {:.3g} "
-                           "times as long as at first; {}",
+                           "times as long as at its key; {}",
                            kAnimation, f, drift.least, drift.most,
                            options_.carry == CarryRule::Corners ? "--carry rigid keeps its shape"
-                                                                : "the surface bends under it"));
+                                                                : "the surface under it bends"));
     }
     for (std::size_t i = 0; i < now.size(); ++i) {
-      const double way = farthestWay(before[i], now[i]);
+      const double move = farthestMove(before[i], now[i]);
       const double size = (before[i].corners[2] - before[i].corners[0]).length();
-      if (!(way > 0.5 * size)) continue;
-      tellOnce(
-          warnedOfWay_,
+      if (!(move > 0.5 * size)) continue;
+      warnOnce(
+          warnedOfMove_,
           fmt::format(
-              "{}: frame {}: a corner went {:.4g} to the nearest surface, over half of the patch's "
-              "diagonal; give frames in between, or look whether it is still the same part",
-              kAnimation, f, way));
+              "{}: frame {}: a corner moved {:.4g} to the nearest surface, over half of the "
+              "patch's "
+              "diagonal; give frames in between, or check that it is the same surface component",
+              kAnimation, f, move));
     }
   }
 
@@ -421,15 +425,15 @@ class Animation {
   Bases bases_;
   AnimationReport report_;
   std::size_t key_ = 0;
-  std::size_t warnedOfDrift_ = 0, warnedOfWay_ = 0, warnedOfWays_ = 0, warnedOfTurn_ = 0,
-              warnedOfJump_ = 0;  ///< last keys of which it was told, from 1
+  std::size_t warnedOfDrift_ = 0, warnedOfMove_ = 0, warnedOfPaths_ = 0, warnedOfTurn_ = 0,
+              warnedOfJump_ = 0;  ///< last keys with each warning, from 1
   double done_ = 0;
   std::uint64_t baseHash_ = 0, pathHash_ = 0;
   Footprints origins_;
   Footprints own_, first_,
-      shown_;                      ///< of the last key: carried, as it was; and what is mapped onto
-  Footprints goal_;                ///< of the next key
-  std::vector<Footprints> later_;  ///< the same on the bases before it
+      shown_;                      ///< of the last key: carried, original, and current
+  Footprints goal_;                ///< footprints of the next key
+  std::vector<Footprints> later_;  ///< footprints of the next key on the bases before it
   std::vector<PatchPath> paths_;
   std::vector<Patch> patches_;
 };
@@ -442,7 +446,7 @@ PatchOptions optionsLike(const Patch& patch) {
       std::all_of(patch.layers.begin(), patch.layers.end(), [&](const ParticleLayer& layer) {
         return layer.columns == surface.columns && layer.rows == surface.rows;
       });
-  // Layers that differ in their counts tell what an older file does not.
+  // Without a stored scheme, unequal particle counts of the layers show that they were relaxed.
   const bool isTravelling = patch.scheme ? *patch.scheme != LayerScheme::Reduced : areAlike;
   PatchOptions options{.layers = std::max<std::size_t>(2, patch.layers.size()),
                        .scheme = isTravelling ? LayerScheme::Conforming : LayerScheme::Reduced,
@@ -463,7 +467,7 @@ AnimationReport animatePatches(const NarrowBand& base, const std::vector<Animati
 AnimationReport animateTexture(const NarrowBand& base, const NarrowBand& texture,
                                const std::vector<AnimationKey>& keys,
                                const TextureAnimationOptions& options, const FrameWriter& write) {
-  constexpr double kImproving = 0.3;  // of the progress
+  constexpr double kImproving = 0.3;  // share of the progress
   std::optional<TextureResult> result;
   std::vector<Patch> improved;
   std::vector<std::size_t> skipped;
@@ -473,7 +477,7 @@ AnimationReport animateTexture(const NarrowBand& base, const NarrowBand& texture
   std::size_t reused = 0;
   double finest = HUGE_VAL, coarsest = 0;
   TextureOptions mapping = options.texture;
-  // A texture that grows shall be seen to grow.
+  // The box of frame 0 is used for all frames, so that a growing texture also grows in the result.
   const bool keepsBox = options.textures && !mapping.textureBox;
   if (keepsBox) mapping.textureBox = texture.zeroSetBounds();
   AnimationReport report = animatePatches(base, keys, options.animation, [&](const PatchFrame& f) {
@@ -484,7 +488,7 @@ AnimationReport animateTexture(const NarrowBand& base, const NarrowBand& texture
     if (isReused) {
       ++reused;
     } else {
-      result.reset();  // before the next takes memory
+      result.reset();  // frees memory before the next result
       const bool improves = options.improve && !f.isUnchanged;
       if (improves) {
         PatchFrame part = f;
@@ -496,12 +500,13 @@ AnimationReport animateTexture(const NarrowBand& base, const NarrowBand& texture
       finest = std::min(finest, result->report.voxelSize);
       coarsest = std::max(coarsest, result->report.voxelSize);
       for (const std::string& note : result->report.notes) frameNotes.add(f.index, note, notes);
-      if (keepsBox && mapping.map == TextureMap::Shell &&
+      if (keepsBox && mapping.map == TextureMap::Prism &&
           isBeyond(now.zeroSetBounds(), *mapping.textureBox, now.voxelSize()))
-        frameWarnings.add(f.index,
-                          "the texture goes beyond the box of that of frame 0 and is cut off "
-                          "there, where the shell ends; give --texture-box, or --map rbf",
-                          warnings);
+        frameWarnings.add(
+            f.index,
+            "the texture extends beyond the box of frame 0 and is cut off there, where "
+            "the prism map ends; give --texture-box, or use --map rbf",
+            warnings);
     }
     skipped.push_back(result->report.skipped);
     write(f.index, *result, isReused);
@@ -512,8 +517,8 @@ AnimationReport animateTexture(const NarrowBand& base, const NarrowBand& texture
   std::move(warnings.begin(), warnings.end(), std::back_inserter(report.warnings));
   if (coarsest > finest)
     report.notes.push_back(
-        fmt::format("voxels of {:.4g} to {:.4g}, as the texture is squeezed from frame to frame; a "
-                    "voxel size that is given holds for all",
+        fmt::format("voxel sizes vary from {:.4g} to {:.4g} because the texture is compressed "
+                    "differently in each frame; give --voxel to use one size for all frames",
                     finest, coarsest));
   return report;
 }

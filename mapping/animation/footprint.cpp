@@ -22,25 +22,26 @@ using levelset::NarrowBand;
 
 constexpr const char* kAnimate = "animate";
 
-/// The straight way from the centre that ends at `goal`: that of the geodesic between them, then
-/// corrected by where a walk along it ends. Corrections are taken as if the surface were flat,
-/// which is off by the share that geodesics spread, so each leaves a part of the miss.
-std::optional<V3d> straightWayTo(const SurfaceField& field, const SurfaceFrame& frame,
-                                 const V3d& goal) {
+/// Finds the tangent vector at the centre whose geodesic ends at `goal`. It starts with that of the
+/// geodesic between the two points and corrects it by the miss of a traced geodesic. The correction
+/// treats the surface as flat, which is inexact by the spreading of geodesics, so each step reduces
+/// the miss.
+std::optional<V3d> geodesicTo(const SurfaceField& field, const SurfaceFrame& frame,
+                              const V3d& goal) {
   constexpr int kMostShots = 24;
   constexpr double kHit = 1e-4, kNear = 0.05;  // voxels
   const std::vector<V3d> path = geodesic(field, 0, frame.centre, goal);
   if (path.size() < 2) return {};
   V3d best = frame.inPlane(path[1] - path[0]).normalized() * pathLength(path);
-  V3d way = best, correction(0);
+  V3d offset = best, correction(0);
   double miss = HUGE_VAL, step = 1;
   for (int shot = 0; shot < kMostShots && miss > kHit * field.voxelSize(); ++shot) {
-    SurfaceWalk walk(field, 0, frame.centre, way);
-    const bool isWhole = walk.advance(way.length());
+    SurfaceWalk walk(field, 0, frame.centre, offset);
+    const bool isWhole = walk.advance(offset.length());
     const V3d gap = goal - walk.position();
     if (isWhole && gap.length() < miss) {
       miss = gap.length();
-      best = way;
+      best = offset;
       const V3d ahead = best.normalized(), aside = frame.normal.cross(ahead);
       correction = ahead * gap.dot(walk.direction()) +
                    aside * gap.dot(walk.normal().cross(walk.direction()));
@@ -48,7 +49,7 @@ std::optional<V3d> straightWayTo(const SurfaceField& field, const SurfaceFrame& 
       step *= 0.5;
     }
     if (!std::isfinite(miss)) return {};
-    way = best + correction * step;
+    offset = best + correction * step;
   }
   if (miss > kNear * field.voxelSize()) return {};
   return best;
@@ -56,8 +57,8 @@ std::optional<V3d> straightWayTo(const SurfaceField& field, const SurfaceFrame& 
 
 }  // namespace
 
-V3d SurfaceFrame::inPlane(const V3d& way) const {
-  return way - normal * normal.dot(way);
+V3d SurfaceFrame::inPlane(const V3d& offset) const {
+  return offset - normal * normal.dot(offset);
 }
 
 V3d SurfaceFrame::turned(double angle) const {
@@ -69,8 +70,8 @@ std::optional<std::array<V3d, 4>> cornersFrom(const SurfaceField& field, const S
   const V3d v = frame.normal.cross(frame.direction);
   std::array<V3d, 4> corners;
   for (std::size_t i = 0; i < 4; ++i) {
-    const V3d way = frame.direction * reach[i].x + v * reach[i].y;
-    const std::optional<V3d> corner = walkStraight(field, 0, frame.centre, way, way.length());
+    const V3d offset = frame.direction * reach[i].x + v * reach[i].y;
+    const std::optional<V3d> corner = walkStraight(field, 0, frame.centre, offset, offset.length());
     if (!corner) return {};
     corners[i] = *corner;
   }
@@ -98,7 +99,7 @@ Footprint footprintOf(const NarrowBand& base, const PatchOutline& outline) {
   const std::array<V3d, 4>& c = footprint.corners;
   const V3d u = outline.direction ? *outline.direction : c[1] + c[2] - c[0] - c[3];
   V3d direction = frame.inPlane(u);
-  // Of a patch that goes all around something any direction does.
+  // For a patch that goes all around something, any direction is suitable.
   if (!(direction.length() > 1e-3 * u.length())) direction = eastOf(frame.normal);
   footprint.direction = direction.normalized();
   footprint.normal = frame.normal;
@@ -108,19 +109,19 @@ Footprint footprintOf(const NarrowBand& base, const PatchOutline& outline) {
 Footprint withReach(const NarrowBand& base, Footprint footprint, bool keepsDirection) {
   const SurfaceField field(base);
   SurfaceFrame frame = frameOf(footprint);
-  std::array<V3d, 4> ways;
+  std::array<V3d, 4> offsets;
   for (std::size_t i = 0; i < 4; ++i) {
-    const std::optional<V3d> way = straightWayTo(field, frame, footprint.corners[i]);
-    if (!way) return footprint;
-    ways[i] = *way;
+    const std::optional<V3d> offset = geodesicTo(field, frame, footprint.corners[i]);
+    if (!offset) return footprint;
+    offsets[i] = *offset;
   }
-  const V3d u = ways[1] + ways[2] - ways[0] - ways[3];
-  if (!keepsDirection && u.length() > 1e-3 * ways[0].length()) frame.direction = u.normalized();
+  const V3d u = offsets[1] + offsets[2] - offsets[0] - offsets[3];
+  if (!keepsDirection && u.length() > 1e-3 * offsets[0].length()) frame.direction = u.normalized();
   footprint.direction = frame.direction;
   const V3d v = frame.normal.cross(frame.direction);
   footprint.reach.emplace();
   for (std::size_t i = 0; i < 4; ++i)
-    (*footprint.reach)[i] = {ways[i].dot(frame.direction), ways[i].dot(v)};
+    (*footprint.reach)[i] = {offsets[i].dot(frame.direction), offsets[i].dot(v)};
   return footprint;
 }
 
@@ -139,15 +140,15 @@ Footprint carryFootprint(const NarrowBand& base, const Footprint& footprint, Car
   const auto corners = cornersFrom(field, frameOf(moved), footprint.reach.value());
   if (!corners) {
     throw levelset::InvalidInput(fmt::format(
-        "{}: the surface breaks off between the centre {} of the patch and its corners; carry the "
-        "corners by themselves, or end before",
+        "{}: the surface breaks off between the centre {} of the patch and its corners; use "
+        "--carry corners, or end the animation before this frame",
         kAnimate, pointAsOption(moved.centre)));
   }
   moved.corners = *corners;
   return moved;
 }
 
-double farthestWay(const Footprint& from, const Footprint& to) {
+double farthestMove(const Footprint& from, const Footprint& to) {
   double farthest = 0;
   for (std::size_t i = 0; i < 4; ++i)
     farthest = std::max(farthest, (to.corners[i] - from.corners[i]).length());
@@ -171,10 +172,10 @@ Drift driftBetween(const Footprint& first, const Footprint& now) {
 }
 
 V3d movedAlong(const Footprint& from, const Footprint& to, const V3d& point) {
-  const V3d way = point - from.centre;
-  return to.centre + to.direction * way.dot(from.direction) +
-         to.normal.cross(to.direction) * way.dot(from.normal.cross(from.direction)) +
-         to.normal * way.dot(from.normal);
+  const V3d offset = point - from.centre;
+  return to.centre + to.direction * offset.dot(from.direction) +
+         to.normal.cross(to.direction) * offset.dot(from.normal.cross(from.direction)) +
+         to.normal * offset.dot(from.normal);
 }
 
 }  // namespace mapping

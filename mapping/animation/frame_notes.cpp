@@ -5,7 +5,7 @@
 namespace mapping {
 
 void FrameNotes::add(std::size_t frame, const std::string& sentence,
-                     std::vector<std::string>& told) {
+                     std::vector<std::string>& messages) {
   std::string kind;
   for (std::size_t i = 0; i < sentence.size();) {
     if (sentence[i] < '0' || sentence[i] > '9') {
@@ -17,7 +17,7 @@ void FrameNotes::add(std::size_t frame, const std::string& sentence,
     kind += '0';
   }
   if (known_.insert(std::move(kind)).second)
-    told.push_back(fmt::format("frame {}: {}", frame, sentence));
+    messages.push_back(fmt::format("frame {}: {}", frame, sentence));
 }
 
 }  // namespace mapping

@@ -7,15 +7,15 @@
 
 namespace mapping {
 
-/// Sentences that come up frame by frame, each told of the first frame that says it.
+/// Messages that repeat frame by frame, each reported for the first frame only.
 class FrameNotes {
  public:
-  /// Adds "frame N: …" to `told`, unless a sentence that differs in its figures only was added
+  /// Adds "frame N: …" to `messages`, unless a sentence that differs only in its numbers was added
   /// before.
-  void add(std::size_t frame, const std::string& sentence, std::vector<std::string>& told);
+  void add(std::size_t frame, const std::string& sentence, std::vector<std::string>& messages);
 
  private:
-  std::set<std::string> known_;  ///< without their figures
+  std::set<std::string> known_;  ///< sentences without their numbers
 };
 
 }  // namespace mapping

@@ -21,10 +21,10 @@ using Imath::V3d;
 using levelset::InvalidInput;
 
 constexpr const char* kPath = "animate";
-constexpr double kNoWay = 1e-6;  // voxels: no way to speak of
+constexpr double kNoDistance = 1e-6;  // voxels; shorter paths count as no path
 
-/// The segment of a path that holds a part of its length, and the share of that segment.
-std::pair<std::size_t, double> placeOn(const std::vector<V3d>& path, double part) {
+/// Finds the segment of a path at a share of the path's length, and the share of that segment.
+std::pair<std::size_t, double> segmentAt(const std::vector<V3d>& path, double part) {
   double left = part * pathLength(path);
   for (std::size_t i = 1; i < path.size(); ++i) {
     const double length = (path[i] - path[i - 1]).length();
@@ -35,9 +35,9 @@ std::pair<std::size_t, double> placeOn(const std::vector<V3d>& path, double part
   return {0, 0};
 }
 
-/// Between the points of a path, and back on the surface.
+/// Interpolates along a path, and projects the result onto the surface.
 V3d pointOn(const SurfaceField& field, const std::vector<V3d>& path, double part) {
-  const auto [i, share] = placeOn(path, part);
+  const auto [i, share] = segmentAt(path, part);
   V3d p = path[i] + (path[i + 1] - path[i]) * share;
   V3d projected = p;
   return field.project(projected, 0) ? projected : p;
@@ -50,10 +50,10 @@ std::array<V2d, 4> between(const std::array<V2d, 4>& a, const std::array<V2d, 4>
 }
 
 [[noreturn]] void refuseApart(const V3d& a, const V3d& b) {
-  throw InvalidInput(
-      fmt::format("{}: no way on the surface leads from {} to {}; put both patches on one part of "
-                  "the base",
-                  kPath, pointAsOption(a), pointAsOption(b)));
+  throw InvalidInput(fmt::format(
+      "{}: the surface does not connect {} and {}; put both patches on the same surface "
+      "component of the base",
+      kPath, pointAsOption(a), pointAsOption(b)));
 }
 
 }  // namespace
@@ -66,20 +66,20 @@ PatchPath::PatchPath(const levelset::NarrowBand& base, Footprint from, Footprint
   if (isConstant_) return;
   if (rule_ == CarryRule::Rigid && !(from_.reach && to_.reach)) {
     throw InvalidInput(fmt::format(
-        "{}: no straight way leads from the centre {} of the patch to each of its corners; move "
-        "the corners by themselves, or take a smaller patch",
+        "{}: no geodesic leads from the centre {} of the patch to each of its corners; use --carry "
+        "corners, or a smaller patch",
         kPath, pointAsOption(from_.reach ? to_.centre : from_.centre)));
   }
-  findCentreWay(guide);
+  findCentrePath(guide);
   carryDirections();
-  if (rule_ == CarryRule::Corners) findCornerWays();
+  if (rule_ == CarryRule::Corners) findCornerPaths();
 }
 
-void PatchPath::findCentreWay(const std::vector<V3d>& guide) {
+void PatchPath::findCentrePath(const std::vector<V3d>& guide) {
   const SurfaceField field(base_);
   const V3d &a = from_.centre, &b = to_.centre;
-  if ((b - a).length() <= kNoWay * base_.voxelSize()) {
-    way_ = {a, b};
+  if ((b - a).length() <= kNoDistance * base_.voxelSize()) {
+    path_ = {a, b};
     return;
   }
   std::vector<V3d> path;
@@ -90,10 +90,10 @@ void PatchPath::findCentreWay(const std::vector<V3d>& guide) {
   }
   if (path.empty()) refuseApart(a, b);
   const double voxels = pathLength(path) / base_.voxelSize();
-  way_ = sampleByArcLength(path, static_cast<std::size_t>(std::ceil(voxels)) + 2);
-  for (std::size_t i = 1; i + 1 < way_.size(); ++i) {
-    V3d p = way_[i];
-    if (field.project(p, 0)) way_[i] = p;
+  path_ = sampleByArcLength(path, static_cast<std::size_t>(std::ceil(voxels)) + 2);
+  for (std::size_t i = 1; i + 1 < path_.size(); ++i) {
+    V3d p = path_[i];
+    if (field.project(p, 0)) path_[i] = p;
   }
 }
 
@@ -101,8 +101,8 @@ void PatchPath::carryDirections() {
   const SurfaceField field(base_);
   normals_ = {from_.normal};
   directions_ = {from_.direction};
-  for (std::size_t i = 1; i < way_.size(); ++i) {
-    V3d normal = i + 1 == way_.size() ? to_.normal : field.normal(way_[i]);
+  for (std::size_t i = 1; i < path_.size(); ++i) {
+    V3d normal = i + 1 == path_.size() ? to_.normal : field.normal(path_[i]);
     if (normal == V3d(0)) normal = normals_.back();
     const V3d direction = carried(directions_.back(), normals_.back(), normal);
     directions_.push_back(direction == V3d(0) ? eastOf(normal) : direction);
@@ -114,9 +114,9 @@ void PatchPath::carryDirections() {
 
 SurfaceFrame PatchPath::frameAt(double part) const {
   const SurfaceField field(base_);
-  const std::size_t i = placeOn(way_, part).first;
+  const std::size_t i = segmentAt(path_, part).first;
   SurfaceFrame frame;
-  frame.centre = pointOn(field, way_, part);
+  frame.centre = pointOn(field, path_, part);
   frame.normal = field.normal(frame.centre);
   if (frame.normal == V3d(0)) frame.normal = normals_[i];
   frame.direction = carried(directions_[i], normals_[i], frame.normal);
@@ -125,11 +125,11 @@ SurfaceFrame PatchPath::frameAt(double part) const {
   return frame;
 }
 
-void PatchPath::findCornerWays() {
-  constexpr double kJump = 4;  // times the mean step of a corner
+void PatchPath::findCornerPaths() {
+  constexpr double kJump = 4;  // multiple of a corner's mean step
   const SurfaceField field(base_);
   const double voxel = base_.voxelSize();
-  double farthest = pathLength(way_);
+  double farthest = pathLength(path_);
   for (std::size_t i = 0; i < 4; ++i)
     farthest = std::max(farthest, (to_.corners[i] - from_.corners[i]).length());
   const auto steps = static_cast<std::size_t>(std::max(4.0, std::ceil(farthest / (2 * voxel))));
@@ -152,12 +152,13 @@ void PatchPath::findCornerWays() {
   }
   for (std::size_t i = 0; i < 4; ++i) {
     const V3d &a = from_.corners[i], &b = to_.corners[i];
-    if ((b - a).length() <= kNoWay * voxel && pathLength(isAlike_ ? beside[i] : way_) < voxel) {
-      cornerWays_[i] = {a, b};
+    if ((b - a).length() <= kNoDistance * voxel &&
+        pathLength(isAlike_ ? beside[i] : path_) < voxel) {
+      cornerPaths_[i] = {a, b};
       continue;
     }
-    cornerWays_[i] = isAlike_ ? straighten(field, 0, beside[i]) : geodesic(field, 0, a, b);
-    if (cornerWays_[i].size() < 2) refuseApart(a, b);
+    cornerPaths_[i] = isAlike_ ? straighten(field, 0, beside[i]) : geodesic(field, 0, a, b);
+    if (cornerPaths_[i].size() < 2) refuseApart(a, b);
   }
 }
 
@@ -165,7 +166,8 @@ Footprint PatchPath::at(double part) const {
   if (part <= 0) return from_;
   if (part >= 1) return to_;
   Footprint result = from_;
-  result.height = from_.height + (to_.height - from_.height) * part;  // to the bit where it stays
+  // Equal bits if the heights are equal.
+  result.height = from_.height + (to_.height - from_.height) * part;
   if (isConstant_) return result;
   const SurfaceField field(base_);
   const SurfaceFrame frame = frameAt(part);
@@ -175,14 +177,14 @@ Footprint PatchPath::at(double part) const {
   result.reach.reset();
   if (from_.reach && to_.reach) result.reach = between(*from_.reach, *to_.reach, part);
   if (rule_ == CarryRule::Corners) {
-    for (std::size_t i = 0; i < 4; ++i) result.corners[i] = pointOn(field, cornerWays_[i], part);
+    for (std::size_t i = 0; i < 4; ++i) result.corners[i] = pointOn(field, cornerPaths_[i], part);
     return result;
   }
   const auto corners = cornersFrom(field, frame, *result.reach);
   if (!corners) {
     throw InvalidInput(
         fmt::format("{}: the surface breaks off between the centre {} of the patch and its "
-                    "corners; move the corners by themselves, or choose other places",
+                    "corners; use --carry corners, or choose other positions",
                     kPath, pointAsOption(frame.centre)));
   }
   result.corners = *corners;

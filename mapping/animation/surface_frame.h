@@ -10,11 +10,11 @@
 
 namespace mapping {
 
-/// A place on the zero set with a direction in it.
+/// A point on the zero set with a tangent direction and the normal.
 struct SurfaceFrame {
-  Imath::V3d centre, direction, normal;  ///< both unit
-  [[nodiscard]] Imath::V3d inPlane(const Imath::V3d& way) const;
-  /// The direction, turned about the normal; radians, anticlockwise seen from outside.
+  Imath::V3d centre, direction, normal;  ///< point; unit direction; unit normal
+  [[nodiscard]] Imath::V3d inPlane(const Imath::V3d& offset) const;
+  /// The direction rotated about the normal, by radians anticlockwise seen from outside.
   [[nodiscard]] Imath::V3d turned(double angle) const;
 };
 
@@ -22,7 +22,7 @@ struct SurfaceFrame {
   return {footprint.centre, footprint.direction, footprint.normal};
 }
 
-/// Where the straight ways end; empty where the surface breaks off before.
+/// End points of the geodesics to the corners; empty if the surface breaks off before one of them.
 [[nodiscard]] std::optional<std::array<Imath::V3d, 4>> cornersFrom(
     const SurfaceField& field, const SurfaceFrame& frame, const std::array<Imath::V2d, 4>& reach);
 

@@ -16,7 +16,8 @@ namespace {
 
 using Imath::V3d;
 
-/// Of texture → patch: the reciprocals of those of the scaled gradient.
+/// Least and largest singular value of texture → patch: the reciprocals of those of the scaled
+/// gradient.
 struct Stretch {
   double least, most;
 };
@@ -42,16 +43,16 @@ Spread spreadOf(std::vector<double> values) {
 
 }  // namespace
 
-std::vector<V3d> samplePlaces(const Patch& patch, double sink) {
-  std::vector<V3d> places;
-  if (sink != 0) {  // below the surface, or above the last layer
-    const ParticleLayer& end = sink > 0 ? patch.layers.front() : patch.layers.back();
+std::vector<V3d> samplePoints(const Patch& patch, double embedDepth) {
+  std::vector<V3d> points;
+  if (embedDepth != 0) {  // below the surface, or above the last layer
+    const ParticleLayer& end = embedDepth > 0 ? patch.layers.front() : patch.layers.back();
     for (std::size_t j = 0; j < end.rows; ++j)
       for (std::size_t i = 0; i < end.columns; ++i)
         for (const double share : {1.0, 0.5})
-          places.push_back({static_cast<double>(i) / static_cast<double>(end.columns - 1),
+          points.push_back({static_cast<double>(i) / static_cast<double>(end.columns - 1),
                             static_cast<double>(j) / static_cast<double>(end.rows - 1),
-                            end.w - share * sink});
+                            end.w - share * embedDepth});
   }
   for (std::size_t k = 0; k < patch.layers.size(); ++k) {
     const ParticleLayer& layer = patch.layers[k];
@@ -60,23 +61,23 @@ std::vector<V3d> samplePlaces(const Patch& patch, double sink) {
     for (std::size_t j = 0; j < layer.rows; ++j)
       for (std::size_t i = 0; i < layer.columns; ++i) {
         const double u = static_cast<double>(i), v = static_cast<double>(j);
-        places.push_back({u / columns, v / rows, layer.w});
+        points.push_back({u / columns, v / rows, layer.w});
         if (i + 1 == layer.columns || j + 1 == layer.rows) continue;
-        places.push_back({(u + 0.5) / columns, (v + 0.5) / rows, layer.w});
+        points.push_back({(u + 0.5) / columns, (v + 0.5) / rows, layer.w});
         if (k + 1 < patch.layers.size())
-          places.push_back(
+          points.push_back(
               {(u + 0.5) / columns, (v + 0.5) / rows, 0.5 * (layer.w + patch.layers[k + 1].w)});
       }
   }
-  return places;
+  return points;
 }
 
-std::vector<MapSample> sampleMap(const PatchMap& map, const Patch& patch, double sink) {
-  const std::vector<V3d> places = samplePlaces(patch, sink);
-  std::vector<MapSample> samples(places.size());
-  tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t n) {
-    const V3d place = layerPosition(patch, places[n]);
-    samples[n] = {place, places[n], map.jacobian(place)};
+std::vector<MapSample> sampleMap(const PatchMap& map, const Patch& patch, double embedDepth) {
+  const std::vector<V3d> points = samplePoints(patch, embedDepth);
+  std::vector<MapSample> samples(points.size());
+  tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t n) {
+    const V3d position = layerPosition(patch, points[n]);
+    samples[n] = {position, points[n], map.jacobian(position)};
   });
   return samples;
 }
@@ -92,7 +93,7 @@ Distortion surveyDistortion(std::span<const MapSample> samples, const V3d& textu
     stretches[2 * n] = stretch.least;
     stretches[2 * n + 1] = stretch.most;
   });
-  // The middle one: slivers and what folds must not weigh.
+  // The median is insensitive to slivers and folds.
   std::vector<double> volumes;
   for (const double jacobian : jacobians)
     if (jacobian > 0) volumes.push_back(1 / jacobian);
@@ -107,7 +108,7 @@ Distortion surveyDistortion(std::span<const MapSample> samples, const V3d& textu
   const auto worst = static_cast<std::size_t>(std::min_element(jacobians.begin(), jacobians.end()) -
                                               jacobians.begin());
   result.foldUvw = samples[worst].uvw;
-  result.foldPlace = samples[worst].place;
+  result.foldPoint = samples[worst].position;
   result.jacobian = spreadOf(std::move(jacobians));
   result.leastAbove = HUGE_VAL;
   for (std::size_t n = 0; n < samples.size(); ++n)

@@ -11,38 +11,44 @@
 
 namespace mapping {
 
-/// Least, most, and what one in a hundred, half and all but one in a hundred stay below.
+/// Least and largest value, and the 1 %, 50 % and 99 % quantiles.
 struct Spread {
   double least = 0, percent1 = 0, median = 0, percent99 = 0, most = 0;
 };
 
-/// What a map does to lengths and volumes.
+/// Distortion of lengths and volumes by a map.
 struct Distortion {
-  std::size_t samples = 0, folded = 0;  ///< places looked at, and where the map turns over
-  Spread jacobian;  ///< det ∇Φ × median of its reciprocals; 1 for a box, ≤ 0 folds
-  Imath::V3d foldPlace{0}, foldUvw{0};  ///< of the least, in world and texture coordinates
-  Spread stretch;  ///< least and largest singular value of texture → patch, world per world; median
-                   ///< and percentiles over both
-  double leastAbove = 0;   ///< least stretch at and above the surface; below it, a union shows none
+  /// Number of samples, and of samples where the map is inverted.
+  std::size_t samples = 0, folded = 0;
+  Spread jacobian;  ///< det ∇Φ × median of its reciprocals; 1 for a box, ≤ 0 at folds
+  /// Sample with the least Jacobian, in world and texture coordinates.
+  Imath::V3d foldPoint{0}, foldUvw{0};
+  /// Singular values of texture → patch, world per world: least, largest, and quantiles over all.
+  Spread stretch;
+  /// Least stretch at and above the surface, where a union shows the texture.
+  double leastAbove = 0;
   double meanStretch = 0;  ///< third root of the median volume ratio
 };
 
-/// Texture coordinates of the particles, of the middles of their cells, between the layers, and of
-/// places below the surface. @param sink  how deep to look there, in w
-[[nodiscard]] std::vector<Imath::V3d> samplePlaces(const Patch& patch, double sink);
+/// Texture coordinates of sample points: the particles, the middles of their cells, points between
+/// the layers, and points below the surface.
+/// @param embedDepth  depth of the points below the surface, in w
+[[nodiscard]] std::vector<Imath::V3d> samplePoints(const Patch& patch, double embedDepth);
 
-/// A map at all of them.
+/// Evaluates a map at samplePoints.
 [[nodiscard]] std::vector<MapSample> sampleMap(const PatchMap& map, const Patch& patch,
-                                               double sink);
+                                               double embedDepth);
 
-/// @param textureSize  of the box that is the unit cube, world units
-/// @param isMirrored   does the patch turn the texture over on purpose?
+/// Computes the distortion over samples.
+/// @param textureSize  size of the box that is mapped to the unit cube, world units
+/// @param isMirrored   true if the patch mirrors the texture on purpose
 /// @pre samples is not empty
 [[nodiscard]] Distortion surveyDistortion(std::span<const MapSample> samples,
                                           const Imath::V3d& textureSize, bool isMirrored = false);
 
-/// Of several maps: counts are added up; the least, the percentiles and the most are those of the
-/// map where they are worst, medians and the mean stretch are the median map's.
+/// Combines the distortion of several maps. Counts are summed; extremes and the 1 % and 99 %
+/// quantiles are the worst over all maps; medians and the mean stretch are the median over the
+/// maps.
 /// @pre maps is not empty
 [[nodiscard]] Distortion worstOf(std::span<const Distortion> maps);
 

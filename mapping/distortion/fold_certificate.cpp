@@ -8,18 +8,18 @@
 #include <limits>
 
 #include "levelset/geometry/exact_predicates.h"
-#include "mapping/distortion/fold_places.h"
+#include "mapping/distortion/fold_tally.h"
 #include "mapping/layers/trilinear_volume.h"
 #include "mapping/maps/layer_map.h"
-#include "mapping/maps/shell_map.h"
-#include "mapping/untangle/shell_cells.h"
+#include "mapping/maps/prism_map.h"
+#include "mapping/untangle/prism_cells.h"
 
 namespace mapping {
 namespace {
 
 using Imath::V3d;
 
-/// Even orders of the axes make tetrahedra of positive volume.
+/// True for orders of the axes (even permutations) that give tetrahedra of positive volume.
 bool isEvenOrder(int order) {
   const auto& axes = Lattice::kOrders[static_cast<std::size_t>(order)];
   return (axes[0] + 1) % 3 == axes[1];
@@ -33,12 +33,12 @@ V3d middleOf(const Lattice::Corners& c) {
   return (c[0] + c[1] + c[2] + c[3]) / 4.0;
 }
 
-/// What is known of one cell.
+/// Results for one cell.
 struct CellVolume {
   double size = 0, folded = 0, undecided = 0;  ///< volumes of texture space
   double typical = 0;                          ///< determinant of texture → patch
   bool folds = false;
-  FoldPlace least;  ///< its Jacobian is no share of anything yet
+  FoldPoint least;  ///< its Jacobian is not yet divided by the median
   std::size_t pieces = 0;
 };
 
@@ -54,7 +54,7 @@ FoldCertificate certificateOf(const std::vector<CellVolume>& cells) {
   return tally.finish();
 }
 
-CellVolume tetrahedronVolumes(const ShellMap& map, const std::array<int, 3>& cell, double hand) {
+CellVolume tetrahedronVolumes(const PrismMap& map, const std::array<int, 3>& cell, double hand) {
   CellVolume result;
   result.least.jacobian = std::numeric_limits<double>::infinity();
   const Lattice& lattice = map.lattice();
@@ -98,7 +98,7 @@ FoldCertificate worstOf(std::span<const FoldCertificate> certificates) {
   return result;
 }
 
-FoldCertificate certifyShell(const ShellMap& map, bool isMirrored) {
+FoldCertificate certifyPrisms(const PrismMap& map, bool isMirrored) {
   const Lattice& lattice = map.lattice();
   std::vector<CellVolume> cells(lattice.cellCount());
   const auto columns = static_cast<std::size_t>(lattice.cells()[0]),
@@ -113,12 +113,12 @@ FoldCertificate certifyShell(const ShellMap& map, bool isMirrored) {
   return certificateOf(cells);
 }
 
-FoldCertificate certifyLayers(const Patch& patch, double sink) {
-  const ShellCells shell(patch, sink);
+FoldCertificate certifyLayers(const Patch& patch, double embedDepth) {
+  const PrismCells prisms(patch, embedDepth);
   const std::vector<V3d> positions = particlePositions(patch);
-  std::vector<CellVolume> cells(shell.size());
+  std::vector<CellVolume> cells(prisms.size());
   tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t n) {
-    const ShellCell cell = shell.at(n);
+    const PrismCell cell = prisms.at(n);
     std::array<V3d, 8> corners;
     double rounding = 0;
     for (std::size_t corner = 0; corner < 8; ++corner) {

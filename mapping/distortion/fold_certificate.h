@@ -9,38 +9,38 @@
 #include "mapping/maps/patch_map.h"
 #include "mapping/patches/patch.h"
 
-/// Proofs that a map turns over nowhere in the texture's part of patch space, not only where it was
-/// looked at.
+/// Proofs that a map is nowhere inverted in the part of patch space that holds the texture, not
+/// only at sample points.
 namespace mapping {
 
 class RbfMap;
-class ShellMap;
+class PrismMap;
 
 enum class FoldVerdict {
   Certified,  ///< the Jacobian is positive everywhere
-  Folds,      ///< it is not at some place
-  Undecided   ///< no fold was met, but parts are left that were not decided
+  Folds,      ///< the Jacobian is zero or negative at a known point
+  Undecided   ///< no fold was found, but some parts remain undecided
 };
 [[nodiscard]] const char* foldVerdictName(FoldVerdict verdict);
 
-/// A place where a map turns over.
-struct FoldPlace {
-  Imath::V3d place{0}, uvw{0};
+/// A point where a map is inverted.
+struct FoldPoint {
+  Imath::V3d position{0}, uvw{0};
   double jacobian = 0;  ///< in the unit of FoldCertificate::leastJacobian
 };
 
 struct FoldCertificate {
-  static constexpr std::size_t kMostPlaces = 5;
-  std::size_t pieces = 0;  ///< tetrahedra, or parts of cells, that were judged
-  /// Of the volume, in the space that the map starts from: not positive for certain, and not
-  /// decided.
+  static constexpr std::size_t kMostPoints = 5;
+  std::size_t pieces = 0;  ///< number of tetrahedra, or parts of cells, that were tested
+  /// Shares of the volume, in the domain of the map, that certainly fold and that remain undecided.
   double foldedShare = 0, undecidedShare = 0;
-  /// The least determinant that was met, over its median: of texture → patch for shells and meshes,
-  /// of patch → texture for the smooth map, each in the direction in which it is given. 1 for a
-  /// box, ≤ 0 folds.
+  /// Least determinant found, divided by the median determinant; 1 for a box, ≤ 0 at folds. Prism
+  /// maps and meshes use the determinant of texture → patch, smooth maps that of patch → texture,
+  /// each in the direction in which the map is defined.
   double leastJacobian = 0;
-  double unit = 1;               ///< that median: world units³ a unit cube, or its reciprocal
-  std::vector<FoldPlace> worst;  ///< of different cells, the worst first; at most kMostPlaces
+  double unit = 1;  ///< the median determinant: world units³ per unit cube, or its reciprocal
+  /// Points of different cells, the worst first; at most kMostPoints.
+  std::vector<FoldPoint> worst;
 
   [[nodiscard]] FoldVerdict verdict() const {
     if (!worst.empty()) return FoldVerdict::Folds;
@@ -48,31 +48,34 @@ struct FoldCertificate {
   }
 };
 
-/// Of the map that is straight in tetrahedra: the exact sign of each [Shewchuk97].
-[[nodiscard]] FoldCertificate certifyShell(const ShellMap& map, bool isMirrored);
+/// Certifies a prism map by the exact sign of the determinant of each tetrahedron [Shewchuk97].
+[[nodiscard]] FoldCertificate certifyPrisms(const PrismMap& map, bool isMirrored);
 
-/// Of the map that is straight between particles (see layer_map.h): Bernstein coefficients of the
-/// determinant of each trilinear cell. What cannot be told from zero by rounding folds.
-/// @param sink  in w, see ShellCells
-[[nodiscard]] FoldCertificate certifyLayers(const Patch& patch, double sink);
+/// Certifies the piecewise linear map of the particle layers (see layer_map.h) by the Bernstein
+/// coefficients of the determinant of each trilinear cell. A determinant that is zero within
+/// rounding errors counts as a fold.
+/// @param embedDepth  in w, see PrismCells
+[[nodiscard]] FoldCertificate certifyLayers(const Patch& patch, double embedDepth);
 
-/// Of the smooth map: in a box about c the slopes are J(c) (I + E) with |E| bounded through the
-/// Taylor polynomials of the particles that are far and the kinks of those that are near; where
-/// |E| < 1 the determinant has the sign of that of J(c). Boxes are halved until that decides them,
-/// or their number passes a bound. Looked at are the boxes of the particles' cells, as far as the
-/// map sends them into the unit cube, and `sink` below it. The bounds are those of φ(r) = r: of
-/// another kernel nothing is decided, and its least Jacobian is not looked for.
-[[nodiscard]] FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double sink);
+/// Certifies a smooth map. In a box around c the Jacobian is J(c) (I + E). The bound on |E| comes
+/// from the Taylor polynomials of the far particles and the kinks of the near ones. If |E| < 1, the
+/// determinant has the sign of det J(c) in the entire box. Boxes are halved until they are decided,
+/// or until their number exceeds a limit. The boxes cover the cells of the particles, where the map
+/// sends them into the unit cube or down to `embedDepth` below it. The bounds hold for φ(r) = r.
+/// For other kernels nothing is decided, and the least Jacobian is not searched.
+[[nodiscard]] FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double embedDepth);
 
-/// Of several maps: pieces are added up, shares and the least Jacobian are those of the map where
-/// they are worst, and the worst of all places are kept. @pre certificates is not empty
+/// Combines several certificates. Pieces are summed; shares and the least Jacobian are those of the
+/// worst map; the worst points of all maps are kept.
+/// @pre certificates is not empty
 [[nodiscard]] FoldCertificate worstOf(std::span<const FoldCertificate> certificates);
 
-/// Texture coordinates and slopes of the smooth map at the samples' places: far particles by
-/// polynomials, right to 1e-5 of the mean slope.
+/// Computes texture coordinates and Jacobians of the smooth map at the positions of the samples.
+/// Far particles are summed by polynomials, accurate to 1e-5 of the mean slope.
 void evaluateRbf(const RbfMap& map, const Patch& patch, std::vector<MapSample>& samples);
 
-/// As sampleMap in distortion.h; where there are many particles, by evaluateRbf.
-[[nodiscard]] std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch, double sink);
+/// Samples a smooth map like sampleMap in distortion.h, by evaluateRbf if there are many particles.
+[[nodiscard]] std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch,
+                                               double embedDepth);
 
 }  // namespace mapping

@@ -11,9 +11,9 @@
 
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/rbf/rbf_map.h"
-#include "mapping/untangle/shell_cells.h"
+#include "mapping/untangle/prism_cells.h"
 
 namespace mapping {
 namespace {
@@ -24,7 +24,7 @@ using levelset::FieldGrid;
 
 constexpr const char* kFolds = "folds";
 
-/// A grid on which the least of several values at a point is kept.
+/// Grid that keeps the least of several values at a point.
 class LeastGrid {
  public:
   explicit LeastGrid(double voxelSize)
@@ -40,8 +40,8 @@ class LeastGrid {
       accessor_.setValueOn(at, number);
   }
 
-  /// Calls visit(grid point, its shares in the corners) for those in a tetrahedron, whichever way
-  /// it is turned.
+  /// Calls visit(grid point, barycentric coordinates) for the grid points in a tetrahedron of
+  /// either orientation.
   template <typename Visit>
   void forEachInside(const Lattice::Corners& corners, const Visit& visit) const {
     Box3d box;
@@ -53,7 +53,7 @@ class LeastGrid {
       for (c[1] = ceiling(low[1]); c[1] <= high[1]; ++c[1])
         for (c[2] = ceiling(low[2]); c[2] <= high[2]; ++c[2]) {
           const auto shares = barycentric(corners, levelset::toImath(grid_->indexToWorld(c)));
-          // Points on a face belong to both sides of it.
+          // Points on a face belong to both of its tetrahedra.
           constexpr double kOnAFace = -1e-9;
           if (std::all_of(shares.begin(), shares.end(), [](double s) { return s >= kOnAFace; }))
             visit(c, shares);
@@ -67,7 +67,7 @@ class LeastGrid {
   [[nodiscard]] const openvdb::FloatGrid::Ptr& grid() const { return grid_; }
 
   [[nodiscard]] FieldGrid finish(const FoldCertificate& certificate) {
-    for (const FoldPlace& fold : certificate.worst) add(nearest(fold.place), fold.jacobian);
+    for (const FoldPoint& fold : certificate.worst) add(nearest(fold.position), fold.jacobian);
     return levelset::importField(grid_, kFolds);
   }
 
@@ -77,14 +77,15 @@ class LeastGrid {
   openvdb::FloatGrid::Accessor accessor_;
 };
 
-/// Grid points of cells of the patch are counted before they are made.
+/// Checks the options and the memory estimate. It bounds the grid points of all cells before the
+/// grid is built.
 void checkField(const Patch& patch, const JacobianFieldOptions& options) {
   if (!(options.voxelSize > 0) || !std::isfinite(options.voxelSize)) {
     throw levelset::UsageError(
         fmt::format("{}: the voxel size is {}; give a positive number", kFolds, options.voxelSize));
   }
   const std::vector<V3d> positions = particlePositions(patch);
-  const ShellCells cells(patch, options.sink);
+  const PrismCells cells(patch, options.embedDepth);
   double points = 0;
   for (std::size_t n = 0; n < cells.size(); ++n) {
     Box3d box;
@@ -96,18 +97,18 @@ void checkField(const Patch& patch, const JacobianFieldOptions& options) {
       constexpr double kMostIndex = 1e9;
       if (!(std::max(std::abs(box.min[axis]), std::abs(box.max[axis])) <
             kMostIndex * options.voxelSize)) {
-        throw levelset::ResourceLimit(
-            fmt::format("{}: at a voxel of {:.3g} the grid passes the range of 32-bit indices; "
-                        "take a larger one",
-                        kFolds, options.voxelSize));
+        throw levelset::ResourceLimit(fmt::format(
+            "{}: with a voxel size of {:.3g} the grid exceeds the range of 32-bit indices; "
+            "use larger voxels",
+            kFolds, options.voxelSize));
       }
     }
   }
-  constexpr double kBytesPerPoint = 160;  // with the samples of a smooth map
+  constexpr double kBytesPerPoint = 160;  // including the samples of a smooth map
   levelset::requireMemory(points * kBytesPerPoint, options.maxMemory, kFolds);
 }
 
-/// Corners of a cell's six tetrahedra, as bits of the corner's index.
+/// Corners of one of a cell's six tetrahedra, as bits of the corner index.
 std::array<std::size_t, 4> tetrahedronOf(int order) {
   const auto& axes = Lattice::kOrders[static_cast<std::size_t>(order)];
   std::array<std::size_t, 4> corners = {0, 0, 0, 7};
@@ -121,7 +122,7 @@ V3d unitCorner(std::size_t corner) {
           static_cast<double>(corner >> 2)};
 }
 
-/// The determinant of a trilinear map at a place of the unit cube.
+/// Determinant of a trilinear map at a point of the unit cube.
 double trilinearDeterminant(const std::array<V3d, 8>& corners, const V3d& at) {
   std::array<V3d, 3> slopes;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -141,11 +142,12 @@ double trilinearDeterminant(const std::array<V3d, 8>& corners, const V3d& at) {
 
 /// Calls visit(grid point, determinant of texture → patch) in all cells between the particles.
 template <typename Visit>
-void forEachInCells(const Patch& patch, double sink, const LeastGrid& grid, const Visit& visit) {
+void forEachInCells(const Patch& patch, double embedDepth, const LeastGrid& grid,
+                    const Visit& visit) {
   const std::vector<V3d> positions = particlePositions(patch);
-  const ShellCells cells(patch, sink);
+  const PrismCells cells(patch, embedDepth);
   for (std::size_t n = 0; n < cells.size(); ++n) {
-    const ShellCell cell = cells.at(n);
+    const PrismCell cell = cells.at(n);
     std::array<V3d, 8> corners;
     for (std::size_t i = 0; i < 8; ++i) corners[i] = positionOf(cell.corners[i], positions);
     const V3d sides = cell.box.size();
@@ -169,13 +171,13 @@ FieldGrid jacobianField(const Patch& patch, const FoldCertificate& certificate,
   checkField(patch, options);
   LeastGrid grid(options.voxelSize);
   const double unit = (patch.mirrored ? -1 : 1) * certificate.unit;
-  forEachInCells(patch, options.sink, grid, [&](const openvdb::Coord& at, double determinant) {
-    grid.add(at, determinant / unit);
-  });
+  forEachInCells(
+      patch, options.embedDepth, grid,
+      [&](const openvdb::Coord& at, double determinant) { grid.add(at, determinant / unit); });
   return grid.finish(certificate);
 }
 
-FieldGrid jacobianField(const Patch& patch, const ShellMap& map, const FoldCertificate& certificate,
+FieldGrid jacobianField(const Patch& patch, const PrismMap& map, const FoldCertificate& certificate,
                         const JacobianFieldOptions& options) {
   checkField(patch, options);
   LeastGrid grid(options.voxelSize);
@@ -204,7 +206,7 @@ FieldGrid jacobianField(const Patch& patch, const RbfMap& map, const FoldCertifi
                         const JacobianFieldOptions& options) {
   checkField(patch, options);
   LeastGrid grid(options.voxelSize);
-  forEachInCells(patch, options.sink, grid,
+  forEachInCells(patch, options.embedDepth, grid,
                  [&](const openvdb::Coord& at, double) { grid.add(at, 0); });
   std::vector<openvdb::Coord> points;
   std::vector<MapSample> samples;

@@ -10,23 +10,24 @@
 namespace mapping {
 
 struct JacobianFieldOptions {
-  double voxelSize = 0;  ///< world units, positive
-  double sink = 0;       ///< of the texture, in w
+  double voxelSize = 0;   ///< world units, positive
+  double embedDepth = 0;  ///< depth of the texture below the surface, in w
   std::size_t maxMemory = levelset::kNoMemoryLimit;
 };
 
-/// The Jacobian of a map on the grid points of patch space, in the unit of its certificate: 1 where
-/// it is the median, ≤ 0 where the map turns over. Where parts of a folded patch lie upon each
-/// other the least one counts; the worst places of the certificate are set even between grid
-/// points. The background is 1.
-/// @throws UsageError for a voxel size that is not positive; ResourceLimit
+/// Computes the Jacobian determinant of a map at the grid points of patch space, in the unit of its
+/// certificate: 1 at the median, ≤ 0 where the map is inverted. Where a folded patch overlaps
+/// itself, the field has the least value. The worst points of the certificate are written to their
+/// nearest grid points. The background is 1.
+/// @throws UsageError for a voxel size that is not positive
+/// @throws ResourceLimit if it needs more than `maxMemory` bytes
 [[nodiscard]] levelset::FieldGrid jacobianField(const Patch& patch, const RbfMap& map,
                                                 const FoldCertificate& certificate,
                                                 const JacobianFieldOptions& options);
-[[nodiscard]] levelset::FieldGrid jacobianField(const Patch& patch, const ShellMap& map,
+[[nodiscard]] levelset::FieldGrid jacobianField(const Patch& patch, const PrismMap& map,
                                                 const FoldCertificate& certificate,
                                                 const JacobianFieldOptions& options);
-/// Of the map that is straight between the particles, see layer_map.h.
+/// The same for the piecewise linear map of the particle layers, see layer_map.h.
 [[nodiscard]] levelset::FieldGrid jacobianField(const Patch& patch,
                                                 const FoldCertificate& certificate,
                                                 const JacobianFieldOptions& options);

@@ -8,13 +8,13 @@
 
 #include "mapping/distortion/distortion.h"
 #include "mapping/distortion/fold_certificate.h"
-#include "mapping/distortion/fold_places.h"
+#include "mapping/distortion/fold_tally.h"
 #include "mapping/maps/cell_tree.h"
 #include "mapping/maps/dual_basis.h"
 #include "mapping/maps/layer_map.h"
 #include "mapping/rbf/rbf_map.h"
 #include "mapping/rbf/rbf_taylor.h"
-#include "mapping/untangle/shell_cells.h"
+#include "mapping/untangle/prism_cells.h"
 
 namespace mapping {
 namespace {
@@ -23,13 +23,13 @@ using Imath::Box3d;
 using Imath::M33d;
 using Imath::V3d;
 
-// Of the slopes of a map that keeps all lengths.
+// Tolerances of the far particles' slopes; a map that preserves lengths has slopes of 1.
 constexpr double kProofTolerance = 1e-2;
 constexpr double kSlopeTolerance = 1e-5;
-// What rounding may take from a bound.
+// Margin of the bounds for rounding errors.
 constexpr double kProofRounding = 1e-9;
-// Cubes that are judged within one of the size of a particle's cell: at first, and where that left
-// something undecided though no fold was met.
+// Largest number of cubes tested within one cube of the size of a particle's cell. The second limit
+// applies if the first leaves cubes undecided and no fold was found.
 constexpr std::size_t kFewCubes = 80, kMostCubes = 800;
 constexpr double kSmallestCube = 1.0 / 32;  // mean particle spacings
 
@@ -37,33 +37,35 @@ V3d rowOf(const M33d& m, int k) {
   return {m[k][0], m[k][1], m[k][2]};
 }
 
-/// Second derivatives of three functions: xx, yy, zz, xy, xz, yz of each as a vector.
+/// Second derivatives xx, yy, zz, xy, xz, yz of three functions, each as a vector.
 using Curvature = std::array<V3d, 6>;
 
-/// Slopes change by this from the middle of a cube to `s`, column by column.
+/// Change of the slopes from the middle of a cube to `s`, as columns.
 std::array<V3d, 3> changeAt(const Curvature& h, const V3d& s) {
   return {h[0] * s.x + h[3] * s.y + h[4] * s.z, h[3] * s.x + h[1] * s.y + h[5] * s.z,
           h[4] * s.x + h[5] * s.y + h[2] * s.z};
 }
 
-/// A smooth map in a cube: slopes and curvature in its middle, and how far slopes may stray.
+/// Slopes and curvature of a smooth map in the middle of a cube, and bounds on the change of its
+/// slopes.
 struct CubeSlopes {
   M33d slopes;
   Curvature curvature{};
   V3d value{0};
-  V3d rowStray{0};      ///< of the rows of the slopes, how far they change
+  V3d rowStray{0};      ///< bound on the change of each row of the slopes
   double relative = 0;  ///< bound of |slopes⁻¹ (slopes elsewhere) − 1|
   double determinant = 0;
 };
 
-/// How far the direction to a particle may turn in a ball, and what is taken for its middle.
+/// Bound on the change of the direction to a particle in a ball, and the approximation at its
+/// middle.
 struct KinkBound {
   enum class Kind { Curved, Straight, Any } kind = Kind::Any;
   double error = 1;
 };
 
 KinkBound kinkBound(double ratio) {
-  // Beyond the second derivative the series of RbfCubes's bound begins with |s|² / |x|².
+  // Beyond the second derivative, the series bounded in RbfCubes begins with |s|² / |x|².
   constexpr double kCurved = 0.45, kStraight = 0.86, kSecond = 1.2247448713915890;
   if (ratio < kCurved) return {KinkBound::Kind::Curved, kSecond * ratio * ratio / (1 - ratio)};
   if (ratio < kStraight) return {KinkBound::Kind::Straight, 2 * std::sin(0.5 * std::asin(ratio))};
@@ -81,18 +83,18 @@ CubeSlopes slopesIn(const RbfCubes& cubes, const RbfCube& cube) {
   for (int k = 0; k < 3; ++k)
     for (std::size_t axis = 0; axis < 3; ++axis)
       result.slopes[k][static_cast<int>(axis)] = far[1 + axis][k];
-  // Terms 4 to 9: xx, xy, xz, yy, yz, zz.
+  // Terms 4 to 9 are xx, xy, xz, yy, yz, zz.
   result.curvature = {far[4] * 2.0, far[7] * 2.0, far[9] * 2.0, far[5], far[6], far[8]};
   const double radius = cube.radius();
   for (const std::uint32_t i : cube.near) {
     const RbfParticle& particle = cubes.particles()[i];
-    const V3d way = cube.center - particle.position;
-    const double distance = way.length();
+    const V3d offset = cube.center - particle.position;
+    const double distance = offset.length();
     result.value += particle.weight * distance;
     if (!(distance > 0)) continue;
     const KinkBound bound = kinkBound(radius / distance);
     if (bound.kind == KinkBound::Kind::Any) continue;
-    const V3d n = way / distance;
+    const V3d n = offset / distance;
     for (int k = 0; k < 3; ++k)
       for (int axis = 0; axis < 3; ++axis) result.slopes[k][axis] += particle.weight[k] * n[axis];
     if (bound.kind != KinkBound::Kind::Curved) continue;
@@ -107,7 +109,8 @@ CubeSlopes slopesIn(const RbfCubes& cubes, const RbfCube& cube) {
   return result;
 }
 
-/// Fills in the bounds: the inverse of the slopes in the middle takes out what they have in common.
+/// Computes the bounds. Multiplying by the inverse of the slopes in the middle removes their common
+/// part.
 void boundSlopes(const RbfCubes& cubes, const RbfCube& cube, CubeSlopes& at) {
   at.determinant = at.slopes.determinant();
   const std::array<V3d, 3> inverse =
@@ -124,7 +127,7 @@ void boundSlopes(const RbfCubes& cubes, const RbfCube& cube, CubeSlopes& at) {
     stray += applyColumns(inverse, particle.weight).length() * bound.error;
     for (int k = 0; k < 3; ++k) at.rowStray[k] += std::abs(particle.weight[k]) * bound.error;
   }
-  // Beyond its curvature the polynomial's slopes are no larger than the sum of their terms.
+  // Beyond the curvature, the polynomial's slopes are bounded by the sum of their terms.
   for (std::size_t n = 10; n < TaylorPolynomial::kTerms; ++n) {
     const auto& p = TaylorPolynomial::powers()[n];
     const double power = std::pow(cube.half, p.total() - 1);
@@ -132,7 +135,7 @@ void boundSlopes(const RbfCubes& cubes, const RbfCube& cube, CubeSlopes& at) {
     stray += applyColumns(inverse, cube.far[n]).length() * slope;
     for (int k = 0; k < 3; ++k) at.rowStray[k] += std::abs(cube.far[n][k]) * slope;
   }
-  // What is linear is largest in a corner; opposite ones are alike.
+  // The norm of a linear function is largest at a corner, and equal at opposite corners.
   double bend = 0;
   V3d rowBend(0);
   for (int corner = 0; corner < 4; ++corner) {
@@ -152,16 +155,16 @@ void boundSlopes(const RbfCubes& cubes, const RbfCube& cube, CubeSlopes& at) {
   if (!std::isfinite(at.relative)) at.relative = HUGE_VAL;
 }
 
-/// What is looked at, shared by all cubes.
+/// Inputs shared by all cubes.
 struct ProofScene {
   const RbfMap& map;
   const RbfCubes& cubes;
   const CellTree& tree;
   V3d origin, sizes;
-  Box3d wanted;  ///< of u, v and w
+  Box3d wanted;  ///< range of u, v and w that the texture covers
   double hand, smallest;
 
-  /// Do cells of the particles reach into the cube?
+  /// True if cells of the particles extend into the cube.
   [[nodiscard]] bool isInPatch(const RbfCube& cube, double half) const {
     const V3d middle = cube.center + origin;
     return tree.visit({middle - V3d(half), middle + V3d(half)},
@@ -179,29 +182,30 @@ struct ProofScene {
   }
 };
 
-/// What is known of a cube of the size of a particle's cell.
+/// Results for one cube of the size of a particle's cell.
 struct CubeProof {
   double size = 0, folded = 0, undecided = 0;
   std::vector<double> determinants;
   double least = std::numeric_limits<double>::infinity();
   bool folds = false;
-  FoldPlace worst;
+  FoldPoint worst;
   std::size_t pieces = 0;
 };
 
-/// Is the middle of a cube in the patch, and does it go into the texture?
+/// True if the middle of a cube is in the patch and maps into the texture.
 bool isCenterWanted(const ProofScene& scene, const RbfCube& cube, const CubeSlopes& at) {
   return scene.wanted.intersects(at.value / scene.sizes) && scene.isInPatch(cube, 0);
 }
 
-/// The middle of a cube. @pre isCenterWanted
+/// Evaluates the determinant in the middle of a cube.
+/// @pre isCenterWanted
 void lookAtCenter(const ProofScene& scene, const RbfCube& cube, const CubeSlopes& at,
                   CubeProof& proof) {
   const V3d uvw = at.value / scene.sizes;
   const V3d place = cube.center + scene.origin;
   const double volume = scene.hand * scene.sizes.x * scene.sizes.y * scene.sizes.z;
   double determinant = scene.hand * scene.cubes.slopes(cube, cube.center).determinant();
-  // The polynomial's error must not make the fold.
+  // The exact map decides, so that the polynomial's error cannot cause a fold.
   if (!(determinant > 0)) determinant = volume * scene.map.jacobian(place).determinant();
   if (determinant > 0) proof.determinants.push_back(determinant);
   if (!(determinant < proof.least)) return;
@@ -221,8 +225,8 @@ CubeProof proveCube(const ProofScene& scene, const RbfCube& start, std::size_t m
     boundSlopes(scene.cubes, cube, at);
     if (!scene.reachesTexture(cube, at)) continue;
     ++proof.pieces;
-    // One that turns over folds the texture only where it is part of it: of a cube across the
-    // border a part outside may be what does.
+    // A cube across the border of the texture may be inverted only outside it. So an inverted cube
+    // counts as a fold only if its middle is in the texture.
     const bool isWanted = isCenterWanted(scene, cube, at);
     const bool isPositive = scene.hand * at.determinant > 0;
     const bool isDecided = at.relative < 1 && (isPositive || isWanted);
@@ -242,7 +246,7 @@ CubeProof proveCube(const ProofScene& scene, const RbfCube& start, std::size_t m
   return proof;
 }
 
-/// Cubes of about a particle's cell that hold all of the patch.
+/// Cubes of about the size of a particle's cell that cover the patch.
 std::vector<RbfCube> startingCubes(const ProofScene& scene, const Box3d& box, double spacing) {
   const V3d sides = box.size();
   const double half = 0.5 * std::max({sides.x, sides.y, sides.z}) * (1 + 1e-9);
@@ -281,7 +285,7 @@ Box3d worldBoxOf(const Lattice& lattice) {
   return box;
 }
 
-/// Cuts the samples into those of each octant until few are left, and looks at them there.
+/// Distributes the samples to octants until each holds few, and evaluates them there.
 void fillWithin(const RbfCubes& cubes, const V3d& origin, const V3d& sizes, const RbfCube& cube,
                 std::vector<std::uint32_t> chosen, std::vector<MapSample>& samples) {
   constexpr std::size_t kFewSamples = 16;
@@ -289,8 +293,9 @@ void fillWithin(const RbfCubes& cubes, const V3d& origin, const V3d& sizes, cons
   if (chosen.size() > kFewSamples && cube.near.size() > kFewSamples) {
     std::array<std::vector<std::uint32_t>, 8> parts;
     for (const std::uint32_t n : chosen) {
-      const V3d way = samples[n].place - origin - cube.center;
-      parts[(way.x > 0 ? 1u : 0u) + (way.y > 0 ? 2u : 0u) + (way.z > 0 ? 4u : 0u)].push_back(n);
+      const V3d offset = samples[n].position - origin - cube.center;
+      parts[(offset.x > 0 ? 1u : 0u) + (offset.y > 0 ? 2u : 0u) + (offset.z > 0 ? 4u : 0u)]
+          .push_back(n);
     }
     tbb::parallel_for(0, 8, [&](int bits) {
       auto& part = parts[static_cast<std::size_t>(bits)];
@@ -300,8 +305,8 @@ void fillWithin(const RbfCubes& cubes, const V3d& origin, const V3d& sizes, cons
     return;
   }
   for (const std::uint32_t n : chosen) {
-    samples[n].uvw = cubes.value(cube, samples[n].place - origin) / sizes;
-    M33d slopes = cubes.slopes(cube, samples[n].place - origin);
+    samples[n].uvw = cubes.value(cube, samples[n].position - origin) / sizes;
+    M33d slopes = cubes.slopes(cube, samples[n].position - origin);
     for (int k = 0; k < 3; ++k)
       for (int axis = 0; axis < 3; ++axis) slopes[k][axis] /= sizes[k];
     samples[n].jacobian = slopes;
@@ -310,25 +315,26 @@ void fillWithin(const RbfCubes& cubes, const V3d& origin, const V3d& sizes, cons
 
 }  // namespace
 
-FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double sink) {
+FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double embedDepth) {
   if (map.kernel() != RbfKernel::Biharmonic) {
     FoldCertificate nothing;
     nothing.undecidedShare = 1;
     nothing.leastJacobian = std::numeric_limits<double>::quiet_NaN();
     return nothing;
   }
-  const V3d sizes = shellSizes(patch);
+  const V3d sizes = meanExtents(patch);
   const RbfCubes cubes(map, sizes, kProofTolerance);
-  const Lattice lattice(patch, {.sink = sink, .rim = 0});
+  const Lattice lattice(patch, {.embedDepth = embedDepth, .rim = 0});
   const CellTree tree(lattice);
-  const ProofScene scene{map,
-                         cubes,
-                         tree,
-                         map.origin(),
-                         sizes,
-                         {V3d(0, 0, -std::max(0.0, sink)), V3d(1, 1, 1 + std::max(0.0, -sink))},
-                         patch.mirrored ? -1.0 : 1.0,
-                         kSmallestCube * map.meanSpacing()};
+  const ProofScene scene{
+      map,
+      cubes,
+      tree,
+      map.origin(),
+      sizes,
+      {V3d(0, 0, -std::max(0.0, embedDepth)), V3d(1, 1, 1 + std::max(0.0, -embedDepth))},
+      patch.mirrored ? -1.0 : 1.0,
+      kSmallestCube * map.meanSpacing()};
   const std::vector<RbfCube> starts = startingCubes(scene, worldBoxOf(lattice), map.meanSpacing());
   std::vector<CubeProof> proofs(starts.size());
   tbb::parallel_for(std::size_t{0}, starts.size(),
@@ -353,10 +359,10 @@ FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double sink) {
 
 void evaluateRbf(const RbfMap& map, const Patch& patch, std::vector<MapSample>& samples) {
   if (samples.empty()) return;
-  const V3d sizes = shellSizes(patch);
+  const V3d sizes = meanExtents(patch);
   const RbfCubes cubes(map, sizes, kSlopeTolerance);
   Box3d box;
-  for (const MapSample& sample : samples) box.extendBy(sample.place);
+  for (const MapSample& sample : samples) box.extendBy(sample.position);
   const V3d sides = box.size();
   std::vector<std::uint32_t> all(samples.size());
   for (std::size_t n = 0; n < all.size(); ++n) all[n] = static_cast<std::uint32_t>(n);
@@ -365,14 +371,14 @@ void evaluateRbf(const RbfMap& map, const Patch& patch, std::vector<MapSample>& 
   fillWithin(cubes, map.origin(), sizes, root, std::move(all), samples);
 }
 
-std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch, double sink) {
+std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch, double embedDepth) {
   constexpr std::size_t kManyParticles = 4000;
   if (map.size() < kManyParticles || map.kernel() != RbfKernel::Biharmonic)
-    return sampleMap(map, patch, sink);
-  const std::vector<V3d> places = samplePlaces(patch, sink);
+    return sampleMap(map, patch, embedDepth);
+  const std::vector<V3d> places = samplePoints(patch, embedDepth);
   std::vector<MapSample> samples(places.size());
   for (std::size_t n = 0; n < places.size(); ++n)
-    samples[n].place = layerPosition(patch, places[n]);
+    samples[n].position = layerPosition(patch, places[n]);
   evaluateRbf(map, patch, samples);
   for (std::size_t n = 0; n < places.size(); ++n) samples[n].uvw = places[n];
   return samples;

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <cstddef>
 
-/// Polynomials through Chebyshev nodes, in one axis and over cubes of nodes.
+/// Polynomial interpolation at Chebyshev nodes, along one axis and over cubes of nodes.
 namespace mapping {
 
 template <std::size_t In, std::size_t Out>
-using NodeWeights = std::array<std::array<double, In>, Out>;  ///< of values in, for each value out
+/// Weights of the In input values for each of the Out output values.
+using NodeWeights = std::array<std::array<double, In>, Out>;
 
 /// Chebyshev nodes of [−1, 1].
 template <std::size_t Nodes>
@@ -22,7 +23,7 @@ const std::array<double, Nodes>& chebyshevNodes() {
   return nodes;
 }
 
-/// Values at `at` of the polynomials that are 1 at one node and 0 at the others.
+/// Values at `at` of the Lagrange polynomials, which are 1 at one node and 0 at the others.
 template <std::size_t Nodes>
 std::array<double, Nodes> lagrangeAt(double at) {
   const std::array<double, Nodes>& nodes = chebyshevNodes<Nodes>();
@@ -36,7 +37,7 @@ std::array<double, Nodes> lagrangeAt(double at) {
   return values;
 }
 
-/// Values at `at` of the polynomial through the nodes.
+/// Weights that interpolate at each of the points `at` from the values at the nodes.
 template <std::size_t Nodes, std::size_t Out>
 NodeWeights<Nodes, Out> interpolation(const std::array<double, Out>& at) {
   NodeWeights<Nodes, Out> weights;

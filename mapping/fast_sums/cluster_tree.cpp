@@ -67,7 +67,7 @@ std::uint32_t PointTree::nearest(std::uint32_t point) const {
           best = std::min(best, std::pair((points_[order_[n]] - p).length2(), order_[n]));
       continue;
     }
-    // The nearer child is looked at first.
+    // The nearer child is visited first.
     const auto first = static_cast<std::size_t>(node.child);
     const bool isFirstNearer =
         squaredGap(nodes_[first].box, place) <= squaredGap(nodes_[first + 1].box, place);
@@ -100,9 +100,9 @@ std::vector<std::uint32_t> PointTree::within(const V3d& center, double radius) c
 std::vector<std::uint32_t> PointTree::around(const Box3d& box, std::size_t count) const {
   using Far = std::pair<double, std::uint32_t>;
   std::vector<Far> found;
-  std::priority_queue<Far, std::vector<Far>, std::greater<>> open;  // nodes, by their gaps
+  std::priority_queue<Far, std::vector<Far>, std::greater<>> open;  // nodes, ordered by distance
   open.emplace(squaredGap(nodes_[0].box, box), 0);
-  // What was found counts from where no node that is left is nearer.
+  // Points found are final up to the distance of the nearest node that is still open.
   double reach = std::numeric_limits<double>::infinity();
   while (!open.empty() && open.top().first <= reach) {
     const Node& node = nodes_[open.top().second];

@@ -10,36 +10,38 @@
 
 namespace mapping {
 
-/// Distance of two boxes, squared; 0 where they touch.
+/// Squared distance of two boxes; 0 where they touch.
 [[nodiscard]] double squaredGap(const Imath::Box3d& a, const Imath::Box3d& b);
 
-/// Points in a binary tree of tight boxes, halved across their longest side by the middle point, so
-/// that it is balanced however the points lie. It refers to the points.
+/// A balanced binary tree of points with tight boxes. Each node is split across its longest side at
+/// the median point. It refers to the points.
 class PointTree {
  public:
   struct Node {
-    std::uint32_t begin = 0, end = 0;  ///< of order()
-    std::int32_t child = -1;           ///< the first of two in a row; −1: a leaf
+    std::uint32_t begin = 0, end = 0;  ///< range of order()
+    std::int32_t child = -1;           ///< the first of two adjacent children; −1: a leaf
     Imath::Box3d box = {};
     [[nodiscard]] std::size_t count() const { return end - begin; }
     [[nodiscard]] bool isLeaf() const { return child < 0; }
   };
 
-  /// @param leafSize  points in a leaf at the most, ≥ 1
-  /// @pre there is a point, and fewer than 2³¹
+  /// Builds the tree.
+  /// @param leafSize  maximum number of points in a leaf, ≥ 1
+  /// @pre there is at least one point, and fewer than 2³¹
   PointTree(std::span<const Imath::V3d> points, std::size_t leafSize);
 
-  /// The same tree of the same points once these lie in its order; it refers to those.
+  /// The same tree for the points reordered into its order; it refers to the reordered points.
   [[nodiscard]] PointTree inOrder(std::span<const Imath::V3d> orderedPoints) const;
-  /// Parents before children, the root first.
+  /// Nodes, parents before children, the root first.
   [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }
-  /// Indices of the points, leaf after leaf.
+  /// Indices of the points, leaf by leaf.
   [[nodiscard]] std::span<const std::uint32_t> order() const { return order_; }
-  /// The nearest other point, the lower index of two; `point` itself if there is no other.
+  /// Index of the nearest other point, the lower index in a tie; `point` itself if there is no
+  /// other.
   [[nodiscard]] std::uint32_t nearest(std::uint32_t point) const;
-  /// All points no further than `radius` from `center`, in the order of the tree.
+  /// All points within `radius` of `center`, in the order of the tree.
   [[nodiscard]] std::vector<std::uint32_t> within(const Imath::V3d& center, double radius) const;
-  /// The `count` points nearest to a box, by distance and then index; fewer if there are no more.
+  /// The `count` points nearest to a box, by distance and then index; fewer if the tree has fewer.
   [[nodiscard]] std::vector<std::uint32_t> around(const Imath::Box3d& box, std::size_t count) const;
 
  private:

@@ -11,14 +11,15 @@ using Imath::V3d;
 
 namespace {
 
-// Boxes are far from each other from this times the radius of the larger on.
+// Boxes are far from each other if their gap exceeds this multiple of the larger radius.
 constexpr double kFarGap = 1;
-constexpr std::size_t kSequential = 2000;  // points that are not worth two tasks
+constexpr std::size_t kSequential = 2000;  // nodes with fewer points are not worth two tasks
 
 }  // namespace
 
 struct RbfClusterSum::Pass {
-  std::vector<RbfParticle> sources;  ///< the particles, then kCubeNodes for each box
+  /// The particles, then kCubeNodes Chebyshev nodes for each box.
+  std::vector<RbfParticle> sources;
   std::vector<V3d> sums;
 };
 
@@ -77,7 +78,7 @@ void RbfClusterSum::gather(Pass& pass) const {
     for (const std::size_t half : {0u, 1u}) {
       const std::size_t child = static_cast<std::size_t>(nodes_[at].child) + half;
       const RbfParticle* from = &pass.sources[points_.size() + child * kCubeNodes];
-      Shift shift = shiftTo(at, child), back = shift;  // transposed
+      Shift shift = shiftTo(at, child), back = shift;  // `back` becomes the transpose
       for (std::size_t axis = 0; axis < 3; ++axis)
         for (std::size_t i = 0; i < kNodes; ++i)
           for (std::size_t j = 0; j < kNodes; ++j) back[axis][i][j] = shift[axis][j][i];
@@ -106,7 +107,7 @@ void RbfClusterSum::addSources(std::size_t at, std::vector<std::uint32_t>& sourc
     sources.push_back(static_cast<std::uint32_t>(first + n));
 }
 
-/// What of the candidates is summed at the node, and what is left to its children.
+/// Divides the candidates into sources that are summed at the node, and the rest for its children.
 void RbfClusterSum::chooseSources(std::size_t at, std::span<const std::uint32_t> candidates,
                                   std::vector<std::uint32_t>& sources,
                                   std::vector<std::uint32_t>& rest) const {

@@ -13,41 +13,42 @@
 
 namespace mapping {
 
-/// Sums over all particles at all particles in about n log n operations, to some digits: what is
-/// far from a box of the tree stands as weights at its Chebyshev nodes and is felt as values at
-/// those of another box [Fong09], for any kernel. The error is not bounded; compare with
-/// addRbfSums.
+/// Sums over all particles at all particles in about n log n operations, for any kernel [Fong09].
+/// The particles of a box are replaced by weights at its Chebyshev nodes, and their sums at a
+/// distant box are evaluated at the nodes of that box. The error has no bound; addRbfSums gives the
+/// exact value.
 class RbfClusterSum {
  public:
-  /// @param points  in the order of their tree, whose order() is 0, 1, 2, …; both are referred to
+  /// @param points  in the order of their tree, so that its order() is 0, 1, 2, …; referred to
+  /// @param nodes   nodes of that tree; referred to
   RbfClusterSum(RbfKernel kernel, std::span<const Imath::V3d> points,
                 std::span<const PointTree::Node> nodes);
 
-  /// Σ ω_i φ(|p_j − p_i|) for each particle j.
+  /// Computes Σ ω_i φ(|p_j − p_i|) for each particle j.
   [[nodiscard]] std::vector<Imath::V3d> operator()(std::span<const Imath::V3d> weights) const;
 
  private:
-  static constexpr std::size_t kNodes = 7;  ///< along an axis
+  static constexpr std::size_t kNodes = 7;  ///< along each axis
   static constexpr std::size_t kCubeNodes = kNodes * kNodes * kNodes;
   using Cube = std::array<double, kCubeNodes>;
-  using Cubes = std::array<Cube, 3>;  ///< of u, v and w
+  using Cubes = std::array<Cube, 3>;  ///< values for u, v and w
   using Shift = std::array<NodeWeights<kNodes, kNodes>, 3>;
 
-  /// Where a box has its nodes.
+  /// Position and size of a box's node cube.
   struct Frame {
-    Imath::V3d center, half;  ///< edges of no length have half of 1
+    Imath::V3d center, half;  ///< half sizes; 1 for edges of length zero
     double radius = 0;
   };
-  struct Pass;  ///< what one sum works on
+  struct Pass;  ///< working data of one sum
 
   [[nodiscard]] Imath::V3d nodeOf(const Frame& frame, std::size_t node) const;
-  /// From the nodes of a box to those of its child, in each axis.
+  /// Interpolation from the nodes of a box to the nodes of its child, along each axis.
   [[nodiscard]] Shift shiftTo(std::size_t parent, std::size_t child) const;
   void gather(Pass& pass) const;
   void gatherLeaf(std::size_t node, Pass& pass) const;
   void descend(std::size_t node, std::span<const std::uint32_t> candidates, const Cubes& inherited,
                Pass& pass) const;
-  /// Has a box no more particles than nodes, so that it is not worth dividing?
+  /// True if a box has no more particles than nodes, so that dividing it saves nothing.
   [[nodiscard]] bool isBottom(std::size_t node) const {
     return nodes_[node].isLeaf() || nodes_[node].count() <= kCubeNodes;
   }

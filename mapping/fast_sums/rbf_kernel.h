@@ -4,38 +4,39 @@
 #include <cmath>
 #include <cstdint>
 
-/// The radial functions φ of RBF maps [Brodersen07 table 8.1], and proven bounds on them.
+/// The radial functions φ of RBF maps [Brodersen07 table 8.1], with proven bounds.
 namespace mapping {
 
-/// φ of r in mean particle spacings, so that a map does not depend on the unit of length. The map
-/// of a kernel that is homogeneous (r, r³), or homogeneous but for a polynomial that the side
-/// conditions cancel (r² log r), does not depend on the spacing either, but for what λ is.
+/// φ takes r in mean particle spacings, so that a map does not depend on the unit of length. For
+/// homogeneous kernels (r, r³) the map does not depend on the spacing either, apart from the
+/// meaning of λ. The same holds for r² log r, which is homogeneous up to a polynomial that the side
+/// conditions cancel.
 enum class RbfKernel : std::uint8_t {
-  Biharmonic,   ///< r: conditionally negative definite of order 1, the least bent
+  Biharmonic,   ///< r: conditionally negative definite of order 1, least bending
   Triharmonic,  ///< r³: conditionally positive definite of order 2
   ThinPlate,    ///< r² log r: conditionally positive definite of order 2
-  Sum,          ///< r³ + r² log r: order 2
+  Sum,          ///< r³ + r² log r: conditionally positive definite of order 2
   /// Multi-order Laplacian, τ = 0.02 and δ = 5 [Dinh02], divided by its value at 0: positive
-  /// definite and local
+  /// definite and local.
   Laplacian,
   Gaussian  ///< exp(−r²): positive definite and local
 };
 
-/// Every kernel is a struct of static functions, so that loops are compiled for each.
-///   kSign         +1 where Σ a_i a_j φ(|p_i − p_j|) ≥ 0 for all a that are orthogonal to the
-///   linear
-///                 polynomials, −1 where ≤ 0. r^(2k+1) and r^(2k) log r have (−1)^(k+1) at order
-///                 k + 1 in any dimension [Wendland05 ch. 8], so that linear polynomials, order 2,
-///                 do for all six.
+/// Kernels as structs of static functions, so that loops are compiled for each kernel.
+///   kSign                 +1 if Σ a_i a_j φ(|p_i − p_j|) ≥ 0 for all a orthogonal to the linear
+///                         polynomials, −1 if ≤ 0
 ///   value(r), slope(r)    φ and φ′
-///   sixth(d)      ≥ |d⁶φ/dt⁶| / 6! along any straight line, a distance of d or more away; falls in
-///   d slopeBound(lo, hi)    ≥ |φ′| for r in [lo, hi] bendBound(lo, hi)     ≥ the norm of the
-///   Hessian of φ(|x|) for |x| in [lo, hi]; may be infinite farBound(d)   ≥ |φ| from d on; infinite
-///   if φ grows
+///   sixth(d)              ≥ |d⁶φ/dt⁶| / 6! along any straight line at distance d or more;
+///                         decreases with d
+///   slopeBound(lo, hi)    ≥ |φ′| for r in [lo, hi]
+///   bendBound(lo, hi)     ≥ the norm of the Hessian of φ(|x|) for |x| in [lo, hi]; may be infinite
+///   farBound(d)           ≥ |φ| for r ≥ d; infinite if φ grows
+/// r^(2k+1) and r^(2k) log r have the sign (−1)^(k+1) at order k + 1 in any dimension [Wendland05
+/// ch. 8]. So linear polynomials, order 2, suffice for all six kernels.
 namespace rbf {
 
-/// Along a line at distance r from it, |x − p| = r √(1 − 2ct + t²) is a generating function of
-/// Gegenbauer polynomials. At t⁶ its coefficient is (P₄ − P₆)(c)/11, largest at c = 0.
+/// Bound from Gegenbauer polynomials: on a line at distance r, |x − p| = r √(1 − 2ct + t²) is their
+/// generating function. Its coefficient at t⁶ is (P₄ − P₆)(c)/11, which is largest at c = 0.
 struct Biharmonic {
   static constexpr double kSign = -1;
   static double value(double r) { return r; }
@@ -49,7 +50,8 @@ struct Biharmonic {
   static double farBound(double) { return HUGE_VAL; }
 };
 
-/// The coefficient of (1 − 2ct + t²)^(3/2) at t⁶ is (1 − c²)²(7c² − 1)/16, largest at c = 0.
+/// The coefficient of (1 − 2ct + t²)^(3/2) at t⁶ is (1 − c²)²(7c² − 1)/16, which is largest at c =
+/// 0.
 struct Triharmonic {
   static constexpr double kSign = 1;
   static double value(double r) { return r * r * r; }
@@ -60,9 +62,8 @@ struct Triharmonic {
   static double farBound(double) { return HUGE_VAL; }
 };
 
-/// log(1 − 2ct + t²) = −Σ 2 T_n(c) tⁿ/n; times the polynomial, the coefficient of
-/// q log(q)/2 at t⁶ is T₆/30 − T₄/20. The Hessian's eigenvalues are 2 log r + 1 (twice) and 2 log r
-/// + 3.
+/// With log(1 − 2ct + t²) = −Σ 2 T_n(c) tⁿ/n and q = 1 − 2ct + t², the coefficient of q log(q)/2 at
+/// t⁶ is T₆/30 − T₄/20. The Hessian has the eigenvalues 2 log r + 1 (twice) and 2 log r + 3.
 struct ThinPlate {
   static constexpr double kSign = 1;
   static double value(double r) { return r > 0 ? r * r * std::log(r) : 0; }
@@ -95,9 +96,9 @@ struct Sum {
   static double farBound(double) { return HUGE_VAL; }
 };
 
-/// Green's function of δ²∇² − ∇⁴ + τ²∇⁶ but for its sign: (1 + a e^(−fr) − b e^(−sr)) / (4π δ² r)
+/// Green's function of δ²∇² − ∇⁴ + τ²∇⁶ up to its sign: (1 + a e^(−fr) − b e^(−sr)) / (4π δ² r)
 /// with f² and s² = (1 ± √(1 − 4τ²δ²)) / (2τ²), a = s²/(f² − s²), b = f²/(f² − s²). Its Fourier
-/// transform 1/(δ²ξ² + ξ⁴ + τ²ξ⁶) is positive. τ and δ count in mean particle spacings.
+/// transform 1/(δ²ξ² + ξ⁴ + τ²ξ⁶) is positive. τ and δ are in mean particle spacings.
 struct LaplacianShape {
   static constexpr double kTau = 0.02, kDelta = 5;
   double fast, slow;  ///< f and s
@@ -115,17 +116,17 @@ struct LaplacianShape {
 };
 inline const LaplacianShape kLaplacian;
 
-/// The transform is positive, so no second derivative passes the one at 0 in size.
+/// Since the Fourier transform is positive, no second derivative exceeds the one at 0 in magnitude.
 struct Laplacian {
   static constexpr double kSign = 1;
   static double value(double r) {
     const LaplacianShape& k = kLaplacian;
-    const double at = std::max(r, 1e-100);  // the limit at 0: both terms are straight there
+    const double at = std::max(r, 1e-100);  // the limit at 0: both terms are linear there
     return k.scale * (k.a * std::expm1(-k.fast * at) - k.b * std::expm1(-k.slow * at)) / at;
   }
   static double slope(double r) {
     const LaplacianShape& k = kLaplacian;
-    // Straight near 0, where the closed form cancels.
+    // Linear near 0, where the closed form suffers cancellation.
     if (r < 3e-7) return -k.bendAtZero * r;
     const double f = k.fast, s = k.slow;
     return (k.scale * (k.b * s * std::exp(-s * r) - k.a * f * std::exp(-f * r)) - value(r)) / r;
@@ -154,23 +155,24 @@ struct Laplacian {
   static double farBound(double d) { return kLaplacian.scale / d; }
 
  private:
-  /// Bound on the coefficient of exp(−κ√q)/√q, q = 1 − 2ct + t², at t⁶: Cauchy's, over circles of
-  /// radius 6/7, where |√q| ≥ 1/7 and Re √q ≥ 0, and of radius 1/2, where Re √q ≥ (1/2) cos(π/6).
+  /// Bound on the coefficient of exp(−κ√q)/√q, q = 1 − 2ct + t², at t⁶, by Cauchy's estimate. It
+  /// uses circles of radius 6/7, where |√q| ≥ 1/7 and Re √q ≥ 0, and of radius 1/2, where Re √q ≥
+  /// (1/2) cos(π/6).
   static double yukawa(double rate) { return std::min(17.66, 128 * std::exp(-0.433 * rate)); }
 };
 
-/// Cramér's inequality: |H₆(t)| exp(−t²/2) ≤ 1.0865 · 2³ √6!.
+/// Uses Cramér's inequality: |H₆(t)| exp(−t²/2) ≤ 1.0865 · 2³ √6!.
 struct Gaussian {
   static constexpr double kSign = 1;
   static double value(double r) { return std::exp(-r * r); }
   static double slope(double r) { return -2 * r * std::exp(-r * r); }
   static double sixth(double d) { return 0.324 * std::exp(-0.5 * d * d); }
   static double slopeBound(double lo, double) {
-    const double at = std::max(lo, M_SQRT1_2);  // largest there
+    const double at = std::max(lo, M_SQRT1_2);  // position of the maximum
     return 2 * at * std::exp(-at * at);
   }
   static double bendBound(double lo, double) {
-    const double squared = lo * lo;  // (4r² − 2) exp(−r²) has another peak at r² = 3/2
+    const double squared = lo * lo;  // (4r² − 2) exp(−r²) has another maximum at r² = 3/2
     if (squared > 1.5) return (4 * squared - 2) * std::exp(-squared);
     return std::max(2 * std::exp(-squared), 4 * std::exp(-1.5));
   }

@@ -1,5 +1,5 @@
-// Compiled with -O3 -fno-math-errno -fno-trapping-math, so that plain loops become vector code; no
-// flag changes a bit of the results, since each point's sum runs over the particles in one order.
+// Compiled with -O3 -fno-math-errno -fno-trapping-math, so that plain loops are vectorised. The
+// flags do not change the results: each point's sum runs over the particles in a fixed order.
 
 #include "mapping/fast_sums/rbf_sum.h"
 
@@ -13,7 +13,7 @@
 namespace mapping {
 namespace {
 
-constexpr std::size_t kTile = 64;  // points, few enough for the first-layer cache
+constexpr std::size_t kTile = 64;  // points; few enough for the first-level cache
 
 const double kScale = rbf::kLaplacian.scale, kA = rbf::kLaplacian.a, kB = rbf::kLaplacian.b,
              kFast = rbf::kLaplacian.fast, kSlow = rbf::kLaplacian.slow;

@@ -11,13 +11,13 @@
 
 namespace mapping {
 
-/// A particle's position, in mean particle spacings, and its weights for u, v and w.
+/// Position of a particle, in mean particle spacings, and its weights for u, v and w.
 struct RbfParticle {
   Imath::V3d position, weight;
 };
 
-/// Positions and sums of some points, one array for each component: plain loops over them become
-/// vector code, by what the processor can do when the program runs, and to the same bits.
+/// Positions and sums of a set of points, one array for each component. Plain loops over the arrays
+/// are vectorised, with the instruction set chosen at run time; all variants give the same bits.
 struct RbfPoints {
   std::vector<double> x, y, z, u, v, w;
   explicit RbfPoints(std::size_t count)

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the sources of the generators share.
+// Checks and distance functions shared by the sources of the generators.
 
 #include <fmt/core.h>
 
@@ -15,7 +15,8 @@
 
 namespace mapping {
 
-/// @throws UsageError unless the length is positive and finite
+/// Checks that a length is positive and finite.
+/// @throws UsageError otherwise
 inline void requirePositive(double length, const char* action, const char* name) {
   if (length > 0 && std::isfinite(length)) return;
   throw levelset::UsageError(
@@ -34,15 +35,15 @@ inline void requireFinite(const Imath::V3d& point, const char* action, const cha
                                          action, name, point.x, point.y, point.z));
 }
 
-/// An open range, radians in, degrees told.
+/// Checks that an angle lies in an open range; radians in the arguments, degrees in the message.
+/// @throws UsageError otherwise
 inline void requireAngle(double angle, double above, double below, const char* action,
                          const char* name) {
   if (angle > above && angle < below) return;
   constexpr double kDegrees = 180 / 3.14159265358979323846;
   throw levelset::UsageError(
-      fmt::format("{}: {} is {:.6g} degrees; give more than {:.6g} and less "
-                  "than {:.6g}",
-                  action, name, angle * kDegrees, above * kDegrees, below * kDegrees));
+      fmt::format("{}: {} is {:.6g} degrees; give more than {:.6g} and less than {:.6g}", action,
+                  name, angle * kDegrees, above * kDegrees, below * kDegrees));
 }
 
 inline void requireTiling(const Tiling& tiling, const char* action) {
@@ -54,7 +55,8 @@ inline void requireTiling(const Tiling& tiling, const char* action) {
   requireNonNegative(tiling.overlap, action, "the overlap");
 }
 
-/// @throws InvalidInput for what a grid cannot show
+/// Checks that a length is at least two voxels.
+/// @throws InvalidInput otherwise
 inline void requireResolved(double length, double voxelSize, const char* action, const char* name) {
   constexpr double kFewestVoxels = 2;
   if (length >= kFewestVoxels * voxelSize * (1 - 1e-9)) return;
@@ -69,12 +71,12 @@ inline double convexEdge(double u, double v) {
   return std::min(std::max(u, v), 0.0) + std::sqrt(a * a + b * b);
 }
 
-/// Distance to what is left of the plane when the quadrant u > 0, v > 0 is taken away.
+/// Distance to the plane without the quadrant u > 0, v > 0.
 inline double concaveEdge(double u, double v) {
   return -convexEdge(-u, -v);
 }
 
-/// Distance to a box from outside, less in magnitude than the depth inside.
+/// Distance to a box; exact outside, a lower bound of the depth inside.
 inline double boxDistance(const Imath::V3d& p, const Imath::Box3d& box) {
   double depth = -HUGE_VAL, squared = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -98,8 +100,9 @@ Imath::V3d slopeOf(const Distance& distance, const Imath::V3d& p, double step) {
   return slope;
 }
 
-/// The nearest point to p of a solid's surface within faces of a box: coordinates along `fixed`
-/// axes are given, the others follow from the planes that touch the solid. A plane needs one step.
+/// Finds the point of a solid's surface nearest to p within faces of a box, by Newton steps.
+/// Coordinates along `fixed` axes are those of `corner`; the others follow from tangent planes of
+/// the solid. For a plane one step suffices.
 template <typename Distance>
 Imath::V3d footWithin(const Distance& distance, const Imath::V3d& p, const Imath::V3d& corner,
                       const std::array<bool, 3>& fixed, double step) {
@@ -124,16 +127,19 @@ Imath::V3d footWithin(const Distance& distance, const Imath::V3d& p, const Imath
   return foot;
 }
 
-/// Exact distance to what a box leaves of a solid. Inside it is that to the nearer of the two;
-/// outside, the nearest point lies on the solid, on the box, or where the solid meets faces of the
-/// box. @param distance  exact beside the solid's surface, nowhere more in magnitude than it is
-/// @param exact  up to where the result has to be exact: beyond, it may be less
+/// Exact distance to the intersection of a solid and a box. Inside, it is the distance to the
+/// nearer surface. Outside, the nearest point lies on the solid, on the box, or where the solid
+/// meets faces of the box.
+/// @param distance  exact near the solid's surface; its magnitude nowhere exceeds the exact
+///         distance
+/// @param exact     distance up to which the result is exact; beyond it may be smaller
 template <typename Distance>
 double clippedDistance(const Distance& distance, const Imath::V3d& p, const Imath::Box3d& box,
                        double exact, double voxelSize) {
   const double outside = boxDistance(p, box);
   const double toSolid = distance(p), least = std::max(outside, toSolid);
-  // A ball of this size about p is inside, far away, or does not touch the box's faces.
+  // In these cases p is inside, or further away than `exact`, or its nearest point of the solid
+  // does not involve the faces of the box.
   if (least <= 0 || least > exact || outside < -toSolid) return least;
   const double step = 1e-3 * voxelSize;
   std::array<bool, 3> fixed = {};
@@ -157,15 +163,15 @@ double clippedDistance(const Distance& distance, const Imath::V3d& p, const Imat
   return std::max(least, std::min((corner - p).length(), 2 * least + step));
 }
 
-/// A band from a function with the right sign and the right zero set whose values beside it are
-/// those of unit slope, and which nowhere passes the distance: sampled, and made a distance again
+/// Builds a band from a function with the right sign and zero set, unit slope beside the zero set,
+/// and values that nowhere exceed the distance. The function is sampled, and distances are restored
 /// by closest points.
 template <typename Field>
 levelset::NarrowBand makeFromField(const levelset::ShapeExtent& extent, double voxelSize,
                                    const levelset::ShapeOptions& options, const char* action,
                                    const Field& field) {
   levelset::checkShape(extent, voxelSize, options, action);
-  // What the tricubic interpolant beside the zero set reads.
+  // The tricubic interpolant at the zero set reads values up to this distance.
   constexpr double kSampledHalfWidth = 4;
   levelset::NarrowBand sampled =
       levelset::makeShape(extent, voxelSize,

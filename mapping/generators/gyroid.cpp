@@ -17,14 +17,14 @@ using levelset::ShapeOptions;
 
 constexpr const char* kGyroid = "gyroid";
 constexpr double kTurn = 2 * std::numbers::pi;
-// The largest slope of the formula, per radian.
+// Largest slope of the formula, per radian.
 constexpr double kSteepest = 1.7320508075688773;
-// Of the surface in one cubic cell: area, in squares of its edge.
+// Area of the surface in one cell, in squares of its edge.
 constexpr double kCellArea = 3.0968;
-// From the middle of a strut's thinnest place to the surface, in cells.
+// Distance from the middle of a strut at its thinnest to the surface, in cells.
 constexpr double kNeck = kThickestGyroidWall / 2;
 
-/// The formula with its derivatives, at angles.
+/// Value and derivatives of the formula at a point, in radians.
 struct GyroidJet {
   double value;
   V3d slope;
@@ -53,15 +53,16 @@ double gyroidValue(const V3d& p) {
          std::sin(p.z) * std::cos(p.x);
 }
 
-/// From a point p to a foot on the surface, radians: Newton's method for the foot x and the
-/// multiplier λ of x − p + λ ∇g = 0, g = 0 [Saye14], from where x falls onto the surface along ∇g.
-/// HUGE_VAL where it finds none.
+/// Distance from p to a foot point on the surface, radians. Newton's method solves x − p + λ ∇g =
+/// 0, g = 0 for the foot x and the multiplier λ [Saye14]. It starts where the given x projects onto
+/// the surface along ∇g. Returns HUGE_VAL if it does not converge.
 double distanceToFoot(const V3d& p, V3d x) {
   for (int i = 0; i < 2; ++i) {
     const GyroidJet g(x);
     x -= g.slope * (g.value / std::max(g.slope.length2(), 0.25));
   }
-  // Towards the foot along the surface, which settles on the side that Newton's method is to find.
+  // Moves along the surface towards the foot, which selects the side on which Newton's method
+  // converges.
   for (int i = 0; i < 4; ++i) {
     const GyroidJet g(x);
     const double squared = std::max(g.slope.length2(), 0.25);
@@ -78,7 +79,8 @@ double distanceToFoot(const V3d& p, V3d x) {
     const GyroidJet g(x);
     M33d system = g.curvature * multiplier;
     for (int axis = 0; axis < 3; ++axis) system[axis][axis] += 1;
-    const M33d inverse = system.inverse();  // symmetric; the identity when it has none
+    // Symmetric; Imath returns the identity for a singular matrix.
+    const M33d inverse = system.inverse();
     const V3d u = g.slope * inverse, v = (p - x - g.slope * multiplier) * inverse;
     const double pivot = g.slope ^ u;
     if (!(std::abs(pivot) > 1e-12)) break;
@@ -91,12 +93,13 @@ double distanceToFoot(const V3d& p, V3d x) {
   return std::abs(gyroidValue(x)) < 1e-9 ? (x - p).length() : HUGE_VAL;
 }
 
-/// From a point to the nearest of the surface, radians. Where the foot is further than near the
-/// surface it can be, p may lie between several: starts around it tell which is nearest.
+/// Distance from a point to the surface, radians. If the foot is further away than points near the
+/// surface allow, several feet may compete, so further starts around p decide which is nearest.
 double distanceToSurface(const V3d& p) {
   const double least = std::abs(gyroidValue(p)) / kSteepest;
   double best = distanceToFoot(p, p);
-  constexpr double kPlain = 1.34, kAround = 0.4;  // as at the necks, and radians
+  // Ratio reached at the necks, and offset of the starts in radians.
+  constexpr double kPlain = 1.34, kAround = 0.4;
   if (best <= kPlain * least) return best;
   for (int corner = 0; corner < 8; ++corner) {
     const V3d aside(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
@@ -111,10 +114,10 @@ void requireGyroid(const Gyroid& gyroid, const V3d& center) {
   const bool isSheet = gyroid.kind == GyroidKind::Sheet;
   const double most = (isSheet ? kThickestGyroidWall : kThickestGyroidStrut) * gyroid.cell;
   if (gyroid.thickness >= most) {
-    throw levelset::UsageError(
-        fmt::format("{}: at a thickness of {:.6g} the {} close all openings of a cell of {:.6g}; "
-                    "stay under {:.6g}",
-                    kGyroid, gyroid.thickness, isSheet ? "walls" : "struts", gyroid.cell, most));
+    throw levelset::UsageError(fmt::format(
+        "{}: a thickness of {:.6g} closes all openings between the {} in a cell of {:.6g}; "
+        "give less than {:.6g}",
+        kGyroid, gyroid.thickness, isSheet ? "walls" : "struts", gyroid.cell, most));
   }
   for (const int count : gyroid.cells) {
     if (count >= 1 && count <= 1'000'000) continue;
@@ -128,8 +131,9 @@ class GyroidField {
  public:
   GyroidField(const Gyroid& gyroid, const V3d& corner, double reach)
       : isSheet_(gyroid.kind == GyroidKind::Sheet),
-        // The solid is where the distance (from the surface or signed) is below this.
-        layer_(isSheet_ ? gyroid.thickness / 2 : gyroid.thickness / 2 - kNeck * gyroid.cell),
+        // Offset: the solid is where the distance (unsigned for a sheet, signed for a network) is
+        // less.
+        offset_(isSheet_ ? gyroid.thickness / 2 : gyroid.thickness / 2 - kNeck * gyroid.cell),
         cell_(gyroid.cell),
         corner_(corner),
         reach_(reach) {}
@@ -137,18 +141,18 @@ class GyroidField {
   double operator()(const V3d& world) const {
     const V3d p = world - corner_;
     const double value = gyroidValue(p * (kTurn / cell_));
-    // What the distance is at least, by the steepest slope.
+    // Lower bound of the distance, from the largest slope.
     double least = value / kSteepest * cell_ / kTurn;
     if (isSheet_) least = std::abs(least);
-    if (least - layer_ > reach_ || (!isSheet_ && least - layer_ < -reach_ && least < 0))
-      return least - layer_;
+    if (least - offset_ > reach_ || (!isSheet_ && least - offset_ < -reach_ && least < 0))
+      return least - offset_;
     const double distance = gyroidDistance(p, cell_);
-    return (isSheet_ ? std::abs(distance) : distance) - layer_;
+    return (isSheet_ ? std::abs(distance) : distance) - offset_;
   }
 
  private:
   bool isSheet_;
-  double layer_, cell_;
+  double offset_, cell_;
   V3d corner_;
   double reach_;
 };
@@ -182,7 +186,7 @@ void checkGyroid(const Gyroid& gyroid, const V3d& center, double voxelSize,
   requireResolved(gyroid.thickness, voxelSize, kGyroid, "the thickness");
   const double most = gyroid.kind == GyroidKind::Sheet ? kThickestGyroidWall : kThickestGyroidStrut;
   requireResolved(most * gyroid.cell - gyroid.thickness, voxelSize, kGyroid,
-                  "what the openings leave at their necks");
+                  "the opening at the necks");
 }
 
 levelset::NarrowBand makeGyroid(const Gyroid& gyroid, const V3d& center, double voxelSize,

@@ -11,24 +11,25 @@
 namespace mapping {
 
 enum class GyroidKind {
-  Sheet,   ///< a wall along the surface between two labyrinths of equal shape
+  Sheet,   ///< a wall along the surface between two congruent labyrinths
   Network  ///< the struts of one labyrinth
 };
 
-/// The layer surface sin x cos y + sin y cos z + sin z cos x = 0, which is near Schoen's minimal
-/// surface [Schoen70, Wohlgemuth01], cut off by the box of its cells.
+/// The level surface sin x cos y + sin y cos z + sin z cos x = 0, which approximates Schoen's
+/// minimal surface [Schoen70, Wohlgemuth01], clipped by the box of its cells.
 struct Gyroid {
   GyroidKind kind = GyroidKind::Sheet;
   double cell = 1;         ///< edge of a cubic cell, world units
-  double thickness = 0.1;  ///< of the wall everywhere, or of struts where they are thinnest
-  std::array<int, 3> cells = {1, 1, 1};  ///< along x, y and z
+  double thickness = 0.1;  ///< thickness of the wall, or of struts at their thinnest; world units
+  std::array<int, 3> cells = {1, 1, 1};  ///< number of cells along x, y and z
 };
 
-/// Thickest walls and struts, in cells: beyond, a labyrinth closes at its necks.
+/// Largest thickness of walls and struts, in cells. Thicker ones close the necks of a labyrinth.
 inline constexpr double kThickestGyroidWall = 0.2449, kThickestGyroidStrut = 0.4898;
 
-/// Signed distance from the surface itself, world units: at a position from a corner of a cell, to
-/// within rounding where it is less than an eighth of a cell; positive where the formula is.
+/// Signed distance to the surface, world units, positive where the formula is positive. It is exact
+/// within rounding errors up to an eighth of a cell.
+/// @param position  relative to a corner of a cell
 [[nodiscard]] double gyroidDistance(const Imath::V3d& position, double cell);
 
 [[nodiscard]] TileBox gyroidBox(const Gyroid& gyroid, const Imath::V3d& center);
@@ -36,8 +37,11 @@ inline constexpr double kThickestGyroidWall = 0.2449, kThickestGyroidStrut = 0.4
 void checkGyroid(const Gyroid& gyroid, const Imath::V3d& center, double voxelSize,
                  const levelset::ShapeOptions& options = {});
 
-/// @throws UsageError for lengths out of range and thicknesses that close a labyrinth; InvalidInput
-///         for walls, struts or openings under two voxels; ResourceLimit; Cancelled
+/// Builds a gyroid.
+/// @throws UsageError for lengths out of range and thicknesses that close a labyrinth
+/// @throws InvalidInput for walls, struts or openings under two voxels
+/// @throws ResourceLimit if the memory estimate exceeds the limit
+/// @throws Cancelled if the progress callback cancels
 [[nodiscard]] levelset::NarrowBand makeGyroid(const Gyroid& gyroid, const Imath::V3d& center,
                                               double voxelSize,
                                               const levelset::ShapeOptions& options = {});

@@ -14,9 +14,9 @@ using levelset::ShapeExtent;
 using levelset::ShapeOptions;
 
 constexpr const char* kHeightmap = "heightmap";
-// Sum of the magnitudes of the weights of cubic convolution, in one dimension, at most.
+// Upper bound of the sum of the magnitudes of the weights of cubic convolution, in one dimension.
 constexpr double kCubicWeights = 1.25;
-// Its slope, in largest differences of neighbours, at most.
+// Upper bound of its slope, relative to the largest difference of neighbours.
 constexpr double kCubicSlope = 1.5;
 
 void requireHeightmap(const Heightmap& heightmap, const V3d& center) {
@@ -28,14 +28,14 @@ void requireHeightmap(const Heightmap& heightmap, const V3d& center) {
   const HeightGrid& grid = heightmap.grid;
   if (grid.columns < 2 || grid.rows < 2) {
     throw levelset::UsageError(
-        fmt::format("{}: the grid has {} columns and {} rows; give at least "
-                    "two of each",
+        fmt::format("{}: the grid has {} columns and {} rows; give at least two of each",
                     kHeightmap, grid.columns, grid.rows));
   }
   const auto count = static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows);
   if (grid.heights.size() != count) {
-    throw levelset::UsageError(fmt::format("{}: the grid of {} x {} has {} heights", kHeightmap,
-                                           grid.columns, grid.rows, grid.heights.size()));
+    throw levelset::UsageError(fmt::format("{}: the grid of {} x {} nodes has {} heights",
+                                           kHeightmap, grid.columns, grid.rows,
+                                           grid.heights.size()));
   }
   for (std::size_t i = 0; i < count; ++i) {
     if (std::isfinite(grid.heights[i])) continue;
@@ -46,14 +46,15 @@ void requireHeightmap(const Heightmap& heightmap, const V3d& center) {
   }
 }
 
-/// A height, and how it changes along u and v.
+/// A height and its derivatives with respect to u and v.
 struct HeightJet {
   double value = 0;
   V2d slope{0, 0};
 };
 
-/// The surface over the unit square. Beyond the border cubic convolution takes what a parabola
-/// through the three last nodes gives, so that it keeps parabolas up to the border [Keys81].
+/// The surface over the unit square. Beyond the border, cubic convolution uses values of the
+/// parabola through the last three nodes, so that it reproduces parabolas up to the border
+/// [Keys81].
 class HeightSurface {
  public:
   explicit HeightSurface(const Heightmap& heightmap)
@@ -67,7 +68,7 @@ class HeightSurface {
   struct Range {
     double low = HUGE_VAL, high = -HUGE_VAL;
   };
-  /// That no height passes.
+  /// Bounds of all heights.
   [[nodiscard]] Range range() const {
     const bool isLinear = heightmap_.interpolation == HeightInterpolation::Linear;
     const double beyond = isLinear ? 0 : (kCubicWeights * kCubicWeights - 1) / 2;
@@ -88,7 +89,7 @@ class HeightSurface {
     return all;
   }
 
-  /// That no slope along u or v passes.
+  /// Bounds of the slopes along u and v.
   [[nodiscard]] V2d steepest() const {
     V2d difference(0, 0);
     const bool isLinear = heightmap_.interpolation == HeightInterpolation::Linear;
@@ -105,7 +106,7 @@ class HeightSurface {
   }
 
  private:
-  /// A place between two nodes.
+  /// A position between two nodes.
   struct Station {
     int node;
     double t, count;
@@ -116,7 +117,7 @@ class HeightSurface {
     }
   };
 
-  /// Counted from the smallest x and y; one beyond each border is known, too.
+  /// Height of a node, counted from the smallest x and y; also for one node beyond each border.
   [[nodiscard]] double node(int i, int j) const {
     if (i < 0 || i >= columns_) {
       return beyond(columns_, i, [&](int inner) { return node(inner, j); });
@@ -171,7 +172,7 @@ class HeightSurface {
   int columns_, rows_;
 };
 
-/// In world units above the base: of the heights that the surface may reach, at least 0 … height.
+/// Range of heights that the surface may have above the base, world units; at least 0 … height.
 HeightSurface::Range worldRange(const Heightmap& heightmap) {
   HeightSurface::Range range = HeightSurface(heightmap).range();
   return {range.low * heightmap.height, range.high * heightmap.height};
@@ -197,8 +198,8 @@ class HeightField {
     const HeightJet jet = surface_.at((p.x - tile_.min.x) / heightmap_.size.x,
                                       (p.y - tile_.min.y) / heightmap_.size.y);
     const double above = p.z - zero_ - jet.value * heightmap_.height;
-    // The distance is at least this; beside the surface its own slope tells it better, which
-    // elsewhere may overlook a cliff.
+    // Lower bound of the distance. Near the surface its own slope gives a better value, which
+    // elsewhere could miss a cliff.
     double value = above / steepest_;
     if (std::abs(value) < trusted_) {
       const V2d slope(jet.slope.x / heightmap_.size.x, jet.slope.y / heightmap_.size.y);
@@ -232,7 +233,7 @@ ShapeExtent heightmapExtent(const Heightmap& heightmap, const V3d& center) {
   Imath::Box3d bounds = heightmapBox(heightmap, center).whole;
   const HeightSurface::Range range = worldRange(heightmap);
   bounds.max.z = bounds.min.z + heightmap.base + std::max(range.high, 0.0);
-  // By steps along both axes.
+  // Area of the top, from the steps along both axes.
   const HeightGrid& grid = heightmap.grid;
   const double dx = heightmap.size.x / (grid.columns - 1), dy = heightmap.size.y / (grid.rows - 1);
   double top = 0;
@@ -264,7 +265,7 @@ levelset::NarrowBand makeHeightmap(const Heightmap& heightmap, const V3d& center
 levelset::TriMesh heightmapSheet(const Heightmap& heightmap, const V3d& center, double spacing,
                                  const ShapeOptions& options) {
   const Imath::Box3d tile = heightmapBox(heightmap, center).tile;
-  requirePositive(spacing, kHeightmap, "the distance of vertices");
+  requirePositive(spacing, kHeightmap, "the vertex spacing");
   const double columns = std::ceil(heightmap.size.x / spacing * (1 - 1e-9)),
                rows = std::ceil(heightmap.size.y / spacing * (1 - 1e-9));
   constexpr double kBytesPerVertex = 24 + 16 + 2 * 12, kMostVertices = 4294967295.0;
@@ -272,7 +273,7 @@ levelset::TriMesh heightmapSheet(const Heightmap& heightmap, const V3d& center, 
   levelset::requireMemory(kBytesPerVertex * vertices, options.maxMemory, kHeightmap);
   if (vertices > kMostVertices) {
     throw levelset::ResourceLimit(
-        fmt::format("{}: {:.3g} vertices are more than a mesh can number; put them farther apart",
+        fmt::format("{}: {:.3g} vertices exceed the limit of a mesh; use a larger vertex spacing",
                     kHeightmap, vertices));
   }
   const HeightSurface surface(heightmap);

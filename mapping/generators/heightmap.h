@@ -9,47 +9,51 @@
 
 namespace mapping {
 
-/// Heights at the nodes of a rectangular grid, as a picture has its pixels.
+/// Heights at the nodes of a rectangular grid, like the pixels of a picture.
 struct HeightGrid {
   int columns = 0, rows = 0;    ///< at least 2 of each
   std::vector<double> heights;  ///< rows × columns, 0 … 1; the first row has the largest y
 };
 
 enum class HeightInterpolation {
-  Linear,  ///< along each axis, creases along the grid's lines
-  Cubic    ///< cubic convolution [Keys81]: smooth, may pass the heights beside steps by a quarter
+  Linear,  ///< linear along each axis, with creases along the grid lines
+  Cubic    ///< cubic convolution [Keys81]: smooth; may overshoot by a quarter of a step
 };
 
 struct Heightmap {
   HeightGrid grid = {};
-  Imath::V2d size{1, 1};  ///< from the first column and row to the last, world units
-  double height = 1;      ///< of what is 1, above what is 0
-  double base = 0;        ///< of solid below what is 0
+  Imath::V2d size{1, 1};  ///< distance from the first to the last column and row, world units
+  double height = 1;      ///< world height of the value 1 above the value 0
+  double base = 0;        ///< thickness of solid below the value 0, world units
   HeightInterpolation interpolation = HeightInterpolation::Cubic;
 };
 
-/// Of the grid alone: the height at u, v in 0 … 1 along x and y.
+/// Interpolated grid value at u, v in 0 … 1 along x and y.
 [[nodiscard]] double heightAt(const Heightmap& heightmap, double u, double v);
 
-/// The box of base and height.
+/// Box of base and heights.
 [[nodiscard]] TileBox heightmapBox(const Heightmap& heightmap, const Imath::V3d& center);
 [[nodiscard]] levelset::ShapeExtent heightmapExtent(const Heightmap& heightmap,
                                                     const Imath::V3d& center);
 void checkHeightmap(const Heightmap& heightmap, const Imath::V3d& center, double voxelSize,
                     const levelset::ShapeOptions& options = {});
 
-/// @throws UsageError for lengths out of range, a grid of fewer than two columns or rows, heights
-///         that are not finite; InvalidInput when no grid point lies inside; ResourceLimit;
-///         Cancelled
+/// Builds the solid between the heights and the bottom of the base.
+/// @throws UsageError for lengths out of range, a grid of fewer than two columns or rows, and
+///         heights that are not finite
+/// @throws InvalidInput if no grid point lies inside
+/// @throws ResourceLimit if the memory estimate exceeds the limit
+/// @throws Cancelled if the progress callback cancels
 [[nodiscard]] levelset::NarrowBand makeHeightmap(const Heightmap& heightmap,
                                                  const Imath::V3d& center, double voxelSize,
                                                  const levelset::ShapeOptions& options = {});
 
-/// Its top alone, as an open mesh that faces up: a terrain, to be a base by surfaceBand.
-/// Vertices lie `spacing` apart or closer, evenly along x and along y, with u and v as texture
-/// coordinates. Heights are those of the picture, also where a solid would be cut off below.
-/// @throws UsageError as makeHeightmap does, and for a spacing that is not positive; ResourceLimit;
-///         Cancelled
+/// Builds only the top, as an open mesh that faces up: a terrain that surfaceBand can turn into a
+/// base. Vertices are at most `spacing` apart, evenly along x and along y, with u and v as texture
+/// coordinates. Heights are those of the picture, even where a solid would be clipped below.
+/// @throws UsageError as makeHeightmap, and for a spacing that is not positive
+/// @throws ResourceLimit if the memory estimate exceeds the limit
+/// @throws Cancelled if the progress callback cancels
 [[nodiscard]] levelset::TriMesh heightmapSheet(const Heightmap& heightmap, const Imath::V3d& center,
                                                double spacing,
                                                const levelset::ShapeOptions& options = {});

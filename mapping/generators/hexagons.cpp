@@ -33,17 +33,17 @@ void requireHexagons(const Hexagons& hexagons, const V3d& center) {
   const double most = std::min(widest / 2, hexagons.height);
   if (hexagons.rounding > most) {
     throw levelset::UsageError(
-        fmt::format("{}: a rounding of {:.6g} is more than the edges have room for; give at most "
-                    "{:.6g}",
+        fmt::format("{}: a rounding of {:.6g} is too large for the edges; give at most {:.6g}",
                     kHexagons, hexagons.rounding, most));
   }
 }
 
-/// Distance to a hexagon about the origin. @param apothem  from its centre to its flats
+/// Distance to a hexagon around the origin.
+/// @param apothem  distance from its centre to its flats
 double hexagonDistance(double x, double y, double apothem) {
   x = std::abs(x);
   y = std::abs(y);
-  // Mirrored at 30 degrees, the flat across x is the nearest one.
+  // After mirroring at 30 degrees the flat across x is the nearest one.
   if (y * kRoot3 > x) {
     const double mirrored = (x + kRoot3 * y) / 2;
     y = std::abs((kRoot3 * x - y) / 2);
@@ -53,8 +53,8 @@ double hexagonDistance(double x, double y, double apothem) {
   return beyond > 0 ? std::sqrt(beyond * beyond + beside * beside) : beyond;
 }
 
-/// Exact distance to the pattern without end, whose plate goes down without end. `origin` is the
-/// centre of a hexagon, on top of the plate.
+/// Exact distance to the infinite pattern, whose plate extends infinitely downwards. `origin` is
+/// the centre of a hexagon, at the top of the plate.
 class HexagonField {
  public:
   HexagonField(const Hexagons& hexagons, const V3d& origin)
@@ -72,7 +72,7 @@ class HexagonField {
   }
 
  private:
-  /// Seen from the nearest centre: that of the nearest two rows.
+  /// Position relative to the nearest hexagon centre, which is in one of the two nearest rows.
   [[nodiscard]] V2d toNearest(const V3d& p) const {
     V2d best(HUGE_VAL, HUGE_VAL);
     const double low = std::floor(p.y / period_.y);
@@ -101,7 +101,7 @@ ShapeExtent hexagonsExtent(const Hexagons& hexagons, const V3d& center) {
   const Imath::Box3d bounds = hexagonsBox(hexagons, center).whole;
   const V3d size = bounds.size();
   const V2d period = hexagonPeriod(hexagons);
-  // The six flats of each hexagon, and all that lies flat.
+  // The six flats of each hexagon; horizontal faces are added below.
   const double walls = 2 * kRoot3 * hexagons.size * hexagons.height / (period.x * period.y);
   return {bounds, size.x * size.y * (2 + walls) + 2 * (size.x + size.y) * size.z};
 }
@@ -119,8 +119,8 @@ levelset::NarrowBand makeHexagons(const Hexagons& hexagons, const V3d& center, d
   checkHexagons(hexagons, center, voxelSize, options);
   const TileBox box = hexagonsBox(hexagons, center);
   const V2d period = hexagonPeriod(hexagons);
-  // The first row stands on the tile's lower side, which halves it: beside it, the side would cut
-  // slivers off the next row's corners.
+  // The tile's lower side halves the hexagons of the first row. A side beside the row would cut
+  // slivers off the corners of the next row.
   const V3d origin(box.tile.min.x + period.x / 2, box.tile.min.y, box.tile.max.z - hexagons.height);
   const HexagonField pattern(hexagons, origin);
   const double exact = (options.halfWidth + 0.5) * voxelSize;

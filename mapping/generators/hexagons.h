@@ -7,19 +7,20 @@
 namespace mapping {
 
 enum class HexagonKind {
-  Raised,    ///< six-sided pillars with gaps between them
-  Honeycomb  ///< walls between six-sided cells
+  Raised,    ///< hexagonal pillars with gaps between them
+  Honeycomb  ///< walls between hexagonal cells
 };
 
-/// Hexagons with flats across x, in rows along x of which every second one stands half a spacing
-/// aside, on a plate or without one. An even number of rows goes on across its tile's sides.
+/// Hexagons with flats across x, in rows along x, with or without a plate. Every second row is
+/// shifted by half a spacing. With an even number of rows the pattern continues across the sides of
+/// its tile.
 struct Hexagons {
   HexagonKind kind = HexagonKind::Raised;
-  double size = 1;      ///< of a hexagon across its flats, world units
-  double gap = 0.2;     ///< between hexagons; the thickness of a honeycomb's walls
-  double height = 0.5;  ///< above the plate
-  double base = 0.2;    ///< thickness of the plate; 0: pillars apart, cells open at both ends
-  double rounding = 0;  ///< radius of the upper edges, of raised hexagons along their corners too
+  double size = 1;      ///< width of a hexagon across its flats, world units
+  double gap = 0.2;     ///< gap between hexagons, or thickness of a honeycomb's walls
+  double height = 0.5;  ///< height above the plate
+  double base = 0.2;    ///< thickness of the plate; 0: separate pillars, or cells open at both ends
+  double rounding = 0;  ///< radius of the upper edges; also of the corners of raised hexagons
   Tiling tiling = {};
 };
 
@@ -29,8 +30,11 @@ struct Hexagons {
 void checkHexagons(const Hexagons& hexagons, const Imath::V3d& center, double voxelSize,
                    const levelset::ShapeOptions& options = {});
 
-/// @throws UsageError for lengths out of range, a rounding that is wider than half of what it
-///         rounds; InvalidInput for a size or gap under two voxels; ResourceLimit; Cancelled
+/// Builds hexagons.
+/// @throws UsageError for lengths out of range, and a rounding wider than half of the rounded part
+/// @throws InvalidInput for a size or gap under two voxels
+/// @throws ResourceLimit if the memory estimate exceeds the limit
+/// @throws Cancelled if the progress callback cancels
 [[nodiscard]] levelset::NarrowBand makeHexagons(const Hexagons& hexagons, const Imath::V3d& center,
                                                 double voxelSize,
                                                 const levelset::ShapeOptions& options = {});

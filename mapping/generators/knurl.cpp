@@ -36,33 +36,34 @@ void requireKnurl(const Knurl& knurl, const V3d& center) {
   requireTiling(knurl.tiling, kKnurl);
   requireFinite(center, kKnurl, "the centre");
   if (knurl.depth > sharpDepth(knurl) * (1 + 1e-9)) {
-    throw levelset::UsageError(fmt::format(
-        "{}: the depth is {:.6g}, but at that pitch and angle of flanks the crests are sharp at "
-        "{:.6g}; take shallower or steeper grooves",
-        kKnurl, knurl.depth, sharpDepth(knurl)));
+    throw levelset::UsageError(
+        fmt::format("{}: the depth is {:.6g}, but at this pitch and flank angle the crests are "
+                    "sharp at {:.6g}; give a smaller depth or a smaller flank angle",
+                    kKnurl, knurl.depth, sharpDepth(knurl)));
   }
 }
 
-/// The relief of one groove across: heights over stations, four to a pitch: the bottom, the foot of
-/// its wall's crest, the middle between two grooves, the crest before the next. Stations are
-/// numbered through, so that neighbours compute the same bits.
+/// Profile of the relief across the grooves, as heights at four stations per pitch. The stations
+/// are the bottom, the edge of the crest, the middle between two grooves, and the edge of the crest
+/// before the next groove. They are numbered continuously, so that neighbouring grooves compute the
+/// same bits.
 class GrooveStations {
  public:
   explicit GrooveStations(const Knurl& knurl)
       : pitch_(knurl.pitch),
         depth_(depthOf(knurl)),
-        // Half of a groove's mouth; sharp crests have no land between them.
+        // Half width of a groove's mouth. Sharp crests have no land between them.
         mouth_(std::min(depth_ * std::tan(knurl.flankAngle / 2), knurl.pitch / 2)),
         isSharp_(mouth_ > knurl.pitch / 2 * (1 - 1e-9)) {}
 
-  [[nodiscard]] double place(long station) const {
+  [[nodiscard]] double position(long station) const {
     const long groove = station >> 2, rest = station & 3;
     if (rest == 0) return static_cast<double>(groove) * pitch_;
     if (rest == 2 || isSharp_) return (static_cast<double>(groove) + 0.5) * pitch_;
     return rest == 1 ? static_cast<double>(groove) * pitch_ + mouth_
                      : static_cast<double>(groove + 1) * pitch_ - mouth_;
   }
-  /// Zero on the crests.
+  /// Height of a station: −depth at the bottom of a groove, zero on the crests.
   [[nodiscard]] double height(long station) const { return (station & 3) == 0 ? -depth_ : 0; }
 
  private:
@@ -70,7 +71,7 @@ class GrooveStations {
   bool isSharp_;
 };
 
-/// Numbers of the grooves that a box may meet, along the normal (cos, ±sin) of a family.
+/// Range of the grooves of one family that may meet a box, along the family's normal (cos, ±sin).
 struct GrooveRange {
   long first, last;
 };
@@ -85,13 +86,13 @@ GrooveRange groovesOver(const Imath::Box2d& box, const V2d& normal, double pitch
   return {static_cast<long>(std::floor(low)) - 1, static_cast<long>(std::ceil(high)) + 1};
 }
 
-/// The flats of a groove's two flanks and of the lands beside it, all along the box.
+/// Adds the flat faces of a groove's two flanks and of the lands beside it, along the entire box.
 void addGroove(const Knurl& knurl, const GrooveStations& stations, long groove, double length,
                ReliefMesh& relief) {
   const double angle = knurl.pattern == KnurlPattern::Straight ? 0 : knurl.grooveAngle;
   const V2d normal(std::cos(angle), -std::sin(angle)), along(-normal.y, normal.x);
   const auto corner = [&](long station, double t) {
-    const V2d p = normal * stations.place(station) + along * t;
+    const V2d p = normal * stations.position(station) + along * t;
     return V3d(p.x, p.y, stations.height(station));
   };
   for (long station = 4 * groove - 2; station < 4 * groove + 2; ++station)
@@ -99,12 +100,13 @@ void addGroove(const Knurl& knurl, const GrooveStations& stations, long groove, 
                 corner(station, length)});
 }
 
-/// The flats about the crossing of two grooves: in each quarter a flank of either and the land.
+/// Adds the flat faces around the crossing of two grooves: in each quadrant a flank of each groove,
+/// and the land.
 void addCrossing(const Knurl& knurl, const GrooveStations& stations, long first, long second,
                  ReliefMesh& relief) {
   const double c = 2 * std::cos(knurl.grooveAngle), s = 2 * std::sin(knurl.grooveAngle);
   const auto corner = [&](long i, long j) {
-    const double a = stations.place(4 * first + i), b = stations.place(4 * second + j);
+    const double a = stations.position(4 * first + i), b = stations.position(4 * second + j);
     return V3d((a + b) / c, (b - a) / s,
                std::min(stations.height(4 * first + i), stations.height(4 * second + j)));
   };
@@ -133,7 +135,7 @@ levelset::TriMesh knurlMesh(const Knurl& knurl, const V3d& center, const ShapeOp
   const TileBox box = knurlBox(knurl, center);
   constexpr double kBytesPerCrossing = 6000;  // 24 triangles with their vertices, edges and maps
   levelset::requireMemory(crossingCount(knurl, box) * kBytesPerCrossing, options.maxMemory, kKnurl);
-  // In the pattern's own frame: the tile begins where two grooves cross.
+  // Coordinates in the pattern's own frame, where the tile begins at a crossing of two grooves.
   const V3d corner = box.tile.min;
   const Imath::Box2d rectangle(V2d(box.whole.min.x - corner.x, box.whole.min.y - corner.y),
                                V2d(box.whole.max.x - corner.x, box.whole.max.y - corner.y));

@@ -8,19 +8,20 @@ namespace mapping {
 
 enum class KnurlPattern {
   Diamond,   ///< two families of grooves that cross
-  Diagonal,  ///< one of them
+  Diagonal,  ///< one family of grooves
   Straight   ///< grooves along y
 };
 
-/// A plate with V-grooves in its top, as knurling wheels press them [DIN82]. A tile of the diamond
-/// pattern holds two diamonds for each column and row; a tile of the straight one is a pitch long.
+/// A plate with V-grooves in its top, as pressed by knurling wheels [DIN82]. A tile of the diamond
+/// pattern holds two diamonds for each column and row. A tile of the straight pattern is one pitch
+/// long.
 struct Knurl {
   KnurlPattern pattern = KnurlPattern::Diamond;
-  double pitch = 1;                    ///< of neighbouring grooves, across them, world units
-  double depth = 0;                    ///< of the grooves; 0: until the crests between are sharp
+  double pitch = 1;  ///< distance of neighbouring grooves, across them, world units
+  double depth = 0;  ///< depth of the grooves; 0: the depth at which the crests become sharp
   double flankAngle = 1.570796326795;  ///< radians between the two flanks of a groove
-  double grooveAngle = 0.5235987756;   ///< radians from y; straight grooves have none
-  double base = 0;                     ///< of solid below the grooves
+  double grooveAngle = 0.5235987756;   ///< radians from y; ignored for straight grooves
+  double base = 0;                     ///< thickness of solid below the grooves
   Tiling tiling = {};
 };
 
@@ -28,15 +29,18 @@ struct Knurl {
 [[nodiscard]] double sharpDepth(const Knurl& knurl);
 
 [[nodiscard]] TileBox knurlBox(const Knurl& knurl, const Imath::V3d& center);
-/// Bounds and area, of the grooves all of it.
+/// Bounds and area, including the area of the grooves.
 [[nodiscard]] levelset::ShapeExtent knurlExtent(const Knurl& knurl, const Imath::V3d& center);
-/// Refuses what `makeKnurl` would, before anything is made.
+/// Throws the usage and input errors of `makeKnurl` without building anything.
 void checkKnurl(const Knurl& knurl, const Imath::V3d& center, double voxelSize,
                 const levelset::ShapeOptions& options = {});
 
-/// Exact distances to all flanks, crests and sides.
-/// @throws UsageError for lengths and angles out of range and grooves deeper than sharp crests
-///         allow; InvalidInput for a pitch or depth under two voxels; ResourceLimit; Cancelled
+/// Builds a knurled plate with exact distances to all flanks, crests and sides.
+/// @throws UsageError for lengths and angles out of range, and grooves deeper than sharp crests
+///         allow
+/// @throws InvalidInput for a pitch or depth under two voxels
+/// @throws ResourceLimit if the memory estimate exceeds the limit
+/// @throws Cancelled if the progress callback cancels
 [[nodiscard]] levelset::NarrowBand makeKnurl(const Knurl& knurl, const Imath::V3d& center,
                                              double voxelSize,
                                              const levelset::ShapeOptions& options = {});

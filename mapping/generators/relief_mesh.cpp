@@ -9,7 +9,8 @@ namespace {
 
 using Imath::V3d;
 
-/// Where an edge meets axis = side: the same bits whichever end is named first.
+/// Intersection of an edge with the plane axis = side; the order of the ends does not change the
+/// bits.
 V3d crossSide(V3d a, V3d b, int axis, double side) {
   if (std::array{b.x, b.y, b.z} < std::array{a.x, a.y, a.z}) std::swap(a, b);
   const double t = (side - a[axis]) / (b[axis] - a[axis]);
@@ -18,7 +19,8 @@ V3d crossSide(V3d a, V3d b, int axis, double side) {
   return p;
 }
 
-/// What is left of a convex polygon on one side of a plane. @param sign  1: keep below `side`
+/// Clips a convex polygon at a plane.
+/// @param sign  1: keep the part below `side`; −1: keep the part above
 std::vector<V3d> cutOff(const std::vector<V3d>& polygon, int axis, double side, double sign) {
   std::vector<V3d> kept;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -31,7 +33,7 @@ std::vector<V3d> cutOff(const std::vector<V3d>& polygon, int axis, double side, 
   return kept;
 }
 
-/// Is there a part of it that is not on the plane?
+/// True if the polygon has a vertex that is not on the plane.
 bool hasWidth(const std::vector<V3d>& polygon, int axis, double side) {
   for (const V3d& p : polygon)
     if (p[axis] != side) return true;
@@ -41,7 +43,7 @@ bool hasWidth(const std::vector<V3d>& polygon, int axis, double side) {
 }  // namespace
 
 std::uint32_t ReliefMesh::vertex(const V3d& p) {
-  // Adding zero makes -0 and 0 one place.
+  // Adding zero turns −0 into 0, so that both give the same key.
   const auto [it, isNew] = vertices_.try_emplace(
       {p.x + 0.0, p.y + 0.0, p.z + 0.0}, static_cast<std::uint32_t>(mesh_.positions.size()));
   if (isNew) mesh_.positions.push_back(p);

@@ -10,19 +10,20 @@
 
 namespace mapping {
 
-/// A closed mesh under a relief of convex, flat facets (internal). Facets that share an edge give
-/// its ends with the same bits; what is cut off by the sides of a rectangle keeps that.
+/// A closed mesh under a relief of convex, flat facets (internal). Facets that share an edge must
+/// give its ends with the same bits; clipping at the sides of a rectangle preserves this.
 class ReliefMesh {
  public:
-  /// @param rectangle  x and y; facets are cut off there. Corners of facets within `snap` of a side
-  ///                   are put onto it
+  /// @param rectangle  x and y; facets are clipped there
+  /// @param snap       corners of facets within this distance of a side are moved onto it
   ReliefMesh(const Imath::Box2d& rectangle, double snap) : rectangle_(rectangle), snap_(snap) {}
 
+  /// Adds a facet.
   /// @param corners  of a convex polygon, anticlockwise seen from above
   void add(std::vector<Imath::V3d> corners);
 
-  /// The solid between the relief, which covers the rectangle, and z = bottom: walls below the
-  /// relief's border and a flat bottom.
+  /// Returns the solid between the relief and z = bottom: walls below the relief's border and a
+  /// flat bottom. The relief must cover the rectangle.
   [[nodiscard]] levelset::TriMesh close(double bottom) &&;
 
  private:

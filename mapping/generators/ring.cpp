@@ -16,8 +16,9 @@ using levelset::ShapeOptions;
 constexpr const char* kRing = "ring";
 constexpr int kMostRings = 1'000'000;
 
-// In radii: where the least distance between the circles of a sheet is largest, 0.5022. There the
-// next ring of the row, the rings held and the ring three rows on are equally near.
+// In radii. At this spacing and lean the least distance between the circles of a sheet is largest,
+// 0.5022. There the next ring of the row, the rings held, and the ring three rows away are equally
+// near.
 constexpr double kBestColumn = 2.50219, kBestRow = 0.62,
                  kBestLean = 34.7207 * 3.14159265358979323846 / 180;
 
@@ -26,7 +27,7 @@ V2d ringSpacing(const Ring& ring) {
   return {kBestColumn * ring.radius, kBestRow * ring.radius};
 }
 
-/// Radius of the round wire that holds the section.
+/// Radius of the round wire that contains the section.
 double wireReach(const Ring& ring) {
   return ring.section ? ring.section->length() / 2 : ring.tube;
 }
@@ -45,8 +46,8 @@ void requireRing(const Ring& ring, const V3d& center) {
     requirePositive(ring.tube, kRing, "the tube");
     if (ring.tube >= ring.radius) {
       throw levelset::UsageError(fmt::format(
-          "{}: a tube of radius {:.6g} closes a ring of radius {:.6g}; make it thinner (`torus` "
-          "makes what has no hole)",
+          "{}: a tube of radius {:.6g} closes a ring of radius {:.6g}; make it thinner, or use "
+          "`torus` for a solid without a hole",
           kRing, ring.tube, ring.radius));
     }
   }
@@ -55,7 +56,7 @@ void requireRing(const Ring& ring, const V3d& center) {
       ring.rows > kMostRings / ring.columns) {
     throw levelset::UsageError(
         fmt::format("{}: {} columns and {} rows; give at least 1 of each "
-                    "and a million rings at most",
+                    "and at most a million rings",
                     kRing, ring.columns, ring.rows));
   }
   if (ring.spacing) {
@@ -66,7 +67,7 @@ void requireRing(const Ring& ring, const V3d& center) {
   requireFinite(center, kRing, "the centre");
 }
 
-/// A ring's circle: where it is, and the two directions that span it.
+/// Circle of a ring: its centre, and the two directions that span it.
 struct Circle {
   V3d center, along{1, 0, 0}, across, axis;
   double radius;
@@ -80,7 +81,8 @@ struct Circle {
   [[nodiscard]] V3d at(double angle) const {
     return center + (along * std::cos(angle) + across * std::sin(angle)) * radius;
   }
-  /// Of a point, in the half plane of the profile: from the circle outwards, and along the axis.
+  /// Coordinates of a point in the half plane of the profile: outwards from the circle, and along
+  /// the axis.
   [[nodiscard]] V2d profile(const V3d& p) const {
     const V3d d = p - center;
     const double u = d ^ along, v = d ^ across;
@@ -88,8 +90,8 @@ struct Circle {
   }
 };
 
-/// Least distance of two circles: the nearest of many points of one, and then by golden section
-/// between its neighbours.
+/// Least distance of two circles: the nearest of many sample points of one circle, refined between
+/// its neighbours by golden-section search.
 double distanceOfCircles(const Circle& a, const Circle& b) {
   const auto distance = [&](double angle) { return b.profile(a.at(angle)).length(); };
   constexpr int kSamples = 360;
@@ -106,9 +108,9 @@ double distanceOfCircles(const Circle& a, const Circle& b) {
   return distance((low + high) / 2);
 }
 
-/// Does one circle pass once through the disc of the other?
+/// True if one circle passes exactly once through the disc of the other.
 bool holdsRing(const Circle& a, const Circle& b) {
-  // Where b meets the plane of a: s + c cos t + d sin t = 0.
+  // Solves for the points where b meets the plane of a: s + c cos t + d sin t = 0.
   const double s = (b.center - a.center) ^ a.axis, c = b.radius * (b.along ^ a.axis),
                d = b.radius * (b.across ^ a.axis), size = std::sqrt(c * c + d * d);
   if (!(std::abs(s) < size)) return false;
@@ -123,9 +125,8 @@ void requireMail(const Ring& ring) {
   const double clearance = ringClearance(ring);
   if (!(clearance > ring.clearance) && !(clearance == ring.clearance && clearance > 0)) {
     throw levelset::UsageError(fmt::format(
-        "{}: wires come within {:.6g} of each other, but {:.6g} is to be left; make the "
-        "wire thinner (a tube under {:.6g} radii, at the best spacing) or change "
-        "--spacing and --lean",
+        "{}: the clearance between wires is {:.6g}, but --clearance requires {:.6g}; make the wire "
+        "thinner (a tube under {:.6g} radii, at the best spacing) or change --spacing and --lean",
         kRing, clearance, ring.clearance, 0.25));
   }
   if (ring.rows > 1 && !holdsRing(Circle(ring, 0, 0), Circle(ring, 0, 1))) {
@@ -136,7 +137,7 @@ void requireMail(const Ring& ring) {
   }
 }
 
-/// Half extents of a ring about its centre.
+/// Half size of a ring's bounding box.
 V3d ringHalfSize(const Ring& ring) {
   const double lean = ringLean(ring, 0), c = std::abs(std::cos(lean)), s = std::abs(std::sin(lean));
   if (!ring.section) return V3d(ring.radius, ring.radius * c, ring.radius * s) + V3d(ring.tube);
@@ -179,7 +180,7 @@ class RingField {
   }
 
  private:
-  /// The first or last whole number of 0 … count − 1 from a place on.
+  /// The first (or last) integer of 0 … count − 1 that is not below (above) `place`.
   static int nth(double place, int count, bool isFirst) {
     return static_cast<int>(isFirst ? std::clamp(std::ceil(place), 0.0, double(count))
                                     : std::clamp(std::floor(place), -1.0, double(count - 1)));
@@ -215,7 +216,8 @@ double ringClearance(const Ring& ring) {
   const V2d spacing = ringSpacing(ring);
   const double reach = 2 * (ring.radius + wireReach(ring));
   double least = HUGE_VAL;
-  // Rows and columns repeat: all pairs are those of the first two rows with what is near.
+  // Rows and columns are periodic, so the pairs of the first two rows with their neighbourhood
+  // suffice.
   const double ranges = std::min<double>(ring.rows, reach / spacing.y + 1) *
                         std::min<double>(ring.columns, 2 * reach / spacing.x + 3);
   if (ranges > kMostRings) return -2 * wireReach(ring);
@@ -262,14 +264,14 @@ void checkRing(const Ring& ring, const V3d& center, double voxelSize, const Shap
     requireResolved(2 * ring.tube, voxelSize, kRing, "the wire");
   }
   if (ring.isSheet())
-    requireResolved(ringClearance(ring), voxelSize, kRing, "what is left between wires");
+    requireResolved(ringClearance(ring), voxelSize, kRing, "the clearance between wires");
 }
 
 levelset::NarrowBand makeRing(const Ring& ring, const V3d& center, double voxelSize,
                               const ShapeOptions& options) {
   checkRing(ring, center, voxelSize, options);
   const ShapeExtent extent = ringExtent(ring, center);
-  // Beyond a leaf, blocks need to know no more than that they are far.
+  // Beyond the size of a leaf, blocks only need to know that they are far from the surface.
   const double reach = (options.halfWidth + 8) * voxelSize;
   return levelset::makeShape(extent, voxelSize, options, kRing,
                              RingField(ring, center - sheetMiddle(ring), extent.bounds, reach));

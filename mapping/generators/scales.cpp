@@ -19,12 +19,13 @@ double stepOf(const Scales& scales) {
   return scales.step > 0 ? scales.step : scales.length / 2;
 }
 
-/// Scales without a thickness are so thick that their lower faces are inside the plate.
+/// Thickness of a scale. With thickness 0 the scale is so thick that its lower face is inside the
+/// plate.
 double thicknessOf(const Scales& scales) {
   return scales.thickness > 0 ? scales.thickness : 1.1 * scales.length * std::tan(scales.tilt);
 }
 
-/// What is left between a scale and the one under its tip.
+/// Gap between a scale and the scale under its tip.
 double rowGap(const Scales& scales) {
   return stepOf(scales) * std::sin(scales.tilt) - scales.thickness;
 }
@@ -49,7 +50,7 @@ void requireScales(const Scales& scales, const V3d& center) {
         fmt::format("{}: {} is {:.6g}; give at most {:.6g}", kScales, what, is, most));
   };
   if (tipOf(scales) > scales.length)
-    refuse("the tip, which is part of the length,", tipOf(scales), scales.length);
+    refuse("the tip (part of the length)", tipOf(scales), scales.length);
   if (tipOf(scales) < scales.width / 2) {
     throw levelset::UsageError(
         fmt::format("{}: a tip of {:.6g} is blunter than a half circle; give at least half the "
@@ -57,23 +58,23 @@ void requireScales(const Scales& scales, const V3d& center) {
                     kScales, tipOf(scales), scales.width / 2));
   }
   if (stepOf(scales) > scales.length)
-    refuse("the step, beyond which rows do not overlap,", stepOf(scales), scales.length);
+    refuse("the step (rows must overlap)", stepOf(scales), scales.length);
   const double roundest = std::min(thicknessOf(scales), scales.width) / 2;
   if (scales.rounding > roundest) refuse("the rounding", scales.rounding, roundest);
   if (scales.thickness > 0 && rowGap(scales) <= 0) {
-    throw levelset::UsageError(
-        fmt::format("{}: the rows touch at a thickness of {:.6g}; stay under {:.6g}, or give 0 for "
-                    "scales that are solid down to the plate",
-                    kScales, scales.thickness, stepOf(scales) * std::sin(scales.tilt)));
+    throw levelset::UsageError(fmt::format(
+        "{}: with a thickness of {:.6g} the rows touch; give less than {:.6g}, or give 0 "
+        "for scales that are solid down to the plate",
+        kScales, scales.thickness, stepOf(scales) * std::sin(scales.tilt)));
   }
 }
 
-/// Neighbours of a row overlap by this share of their width, so that the notch between their tips
-/// has an angle that a grid can show.
+/// Neighbours in a row overlap by this share of their width, so that the notch between their tips
+/// is wide enough for a grid to resolve.
 constexpr double kRowOverlap = 0.06;
 
-/// The row of tongues to which the scales of a row are cut, in their plane: a sheet whose border is
-/// two arcs for each scale, which meet at its tip and, with those of its neighbours, in notches.
+/// Outline of the tongues of a row, in their plane: a sheet whose border has two arcs for each
+/// scale. The arcs meet at the tip of the scale, and in notches with the arcs of its neighbours.
 class ScaleOutline {
  public:
   explicit ScaleOutline(const Scales& scales)
@@ -83,18 +84,20 @@ class ScaleOutline {
     radius_ = (tip * tip + side * side) / (2 * side);
     aside_ = radius_ - side;
     notch_ = middle_ + std::sqrt(radius_ * radius_ - (half_ + aside_) * (half_ + aside_));
-    // Where the arcs of the scale without its rounding meet.
+    // Point where the arcs of the scale without its rounding meet.
     const double inner = radius_ - rounding_;
     length_ = middle_ + std::sqrt(std::max(0.0, inner * inner - aside_ * aside_));
   }
 
-  /// To the outline that is smaller by the rounding. @param u  from the root to the tip, @param v
-  /// across from the middle of the nearest scale
+  /// Distance to the outline reduced by the rounding.
+  /// @param u  coordinate from the root to the tip
+  /// @param v  coordinate across, from the middle of the nearest scale
   [[nodiscard]] double distance(double u, double v) const {
     v = std::abs(v);
     const double along = u - middle_, across = v + aside_;
     const double fromCenter = std::sqrt(along * along + across * across);
-    // Beyond both arcs the tip is nearest; inside, where the arc is a neighbour's, the notch.
+    // Beyond both arcs the tip is nearest. Inside, where the arc belongs to a neighbour, the notch
+    // is nearest.
     if (fromCenter > radius_ - rounding_ && across * (radius_ - rounding_) < aside_ * fromCenter) {
       const double beyond = u - length_;
       return std::sqrt(beyond * beyond + v * v);
@@ -110,8 +113,8 @@ class ScaleOutline {
   double half_, rounding_, length_, middle_ = 0, radius_ = 0, aside_ = 0, notch_ = 0;
 };
 
-/// In the pattern's own frame: the root of the first scale, in the middle of the first column, is
-/// the origin; the plate's top is z = 0.
+/// Distance to the pattern in its own frame. The origin is the root of the first scale, in the
+/// middle of the first column. The top of the plate is z = 0.
 class ScalesField {
  public:
   ScalesField(const Scales& scales, const V3d& origin, double reach)
@@ -135,7 +138,7 @@ class ScalesField {
   }
 
  private:
-  /// To the nearest scale of a row.
+  /// Distance to the nearest scale of a row.
   [[nodiscard]] double scale(const V3d& p, double row) const {
     const double aside = std::remainder(row, 2.0) != 0 ? scales_.width / 2 : 0;
     const V3d q(std::remainder(p.x - aside, scales_.width), p.y - row * step_, p.z);
@@ -164,7 +167,7 @@ TileBox scalesBox(const Scales& scales, const V3d& center) {
 ShapeExtent scalesExtent(const Scales& scales, const V3d& center) {
   const Imath::Box3d bounds = scalesBox(scales, center).whole;
   const V3d size = bounds.size();
-  // Both faces of all scales, and their edges.
+  // Area of both faces of all scales, and of their edges.
   const double faces = 2 * scales.length / stepOf(scales) + 2 * scales.thickness *
                                                                 (scales.length + scales.width) /
                                                                 (stepOf(scales) * scales.width);
@@ -178,7 +181,7 @@ void checkScales(const Scales& scales, const V3d& center, double voxelSize,
   requireResolved(scales.width, voxelSize, kScales, "the width");
   if (scales.thickness == 0) return;
   requireResolved(scales.thickness, voxelSize, kScales, "the thickness");
-  requireResolved(rowGap(scales), voxelSize, kScales, "what is left under the tips");
+  requireResolved(rowGap(scales), voxelSize, kScales, "the gap under the tips");
 }
 
 levelset::NarrowBand makeScales(const Scales& scales, const V3d& center, double voxelSize,
@@ -186,10 +189,10 @@ levelset::NarrowBand makeScales(const Scales& scales, const V3d& center, double 
   checkScales(scales, center, voxelSize, options);
   const TileBox box = scalesBox(scales, center);
   const V3d origin(box.tile.min.x + scales.width / 2, box.tile.min.y, box.tile.min.z + scales.base);
-  // Beyond a leaf, blocks need to know no more than that they are far.
+  // Beyond the size of a leaf, blocks only need to know that they are far from the surface.
   const double exact = (options.halfWidth + 0.5) * voxelSize;
   const ScalesField pattern(scales, origin, exact + 8 * voxelSize);
-  // Tips end by themselves.
+  // Tips are not clipped at the top.
   Imath::Box3d cut = box.whole;
   cut.max.z = HUGE_VAL;
   return levelset::makeShape(

@@ -6,16 +6,16 @@
 
 namespace mapping {
 
-/// Scales of fish or reptiles on a plate: flat tongues in rows along x, tips towards +y, each row
-/// half a width aside of the one before and under its tips. An even number of rows goes on across
-/// its tile's sides.
+/// Scales of fish or reptiles on a plate: flat tongues in rows along x, with tips towards +y. Each
+/// row is shifted by half a width and lies under the tips of the previous row. With an even number
+/// of rows the pattern continues across the sides of its tile.
 struct Scales {
-  double length = 1.4;        ///< of a scale, from the plate to its tip, world units
-  double width = 1;           ///< of a scale, and from one to the next of a row
-  double thickness = 0;       ///< of a scale; 0: solid down to the plate
-  double tilt = 0.349065850;  ///< radians from the plate
-  double step = 0;            ///< from row to row; 0: half a length
-  double tip = 0;             ///< length of the pointed part; 0: half a width, which is round
+  double length = 1.4;        ///< length of a scale, from the plate to its tip, world units
+  double width = 1;           ///< width of a scale, and distance between scales of a row
+  double thickness = 0;       ///< thickness of a scale; 0: solid down to the plate
+  double tilt = 0.349065850;  ///< angle to the plate, radians
+  double step = 0;            ///< distance between rows; 0: half a length
+  double tip = 0;             ///< length of the pointed part; 0: half a width, which makes it round
   double rounding = 0;        ///< radius of the edges
   double base = 0.3;          ///< thickness of the plate
   Tiling tiling = {};
@@ -26,9 +26,12 @@ struct Scales {
 void checkScales(const Scales& scales, const Imath::V3d& center, double voxelSize,
                  const levelset::ShapeOptions& options = {});
 
-/// @throws UsageError for lengths and angles out of range, tips longer than their scales and rows
-///         that do not overlap; InvalidInput for a width or thickness under two voxels;
-///         ResourceLimit; Cancelled
+/// Builds scales.
+/// @throws UsageError for lengths and angles out of range, tips longer than their scales, and rows
+///         that do not overlap
+/// @throws InvalidInput for a width or thickness under two voxels
+/// @throws ResourceLimit if the memory estimate exceeds the limit
+/// @throws Cancelled if the progress callback cancels
 [[nodiscard]] levelset::NarrowBand makeScales(const Scales& scales, const Imath::V3d& center,
                                               double voxelSize,
                                               const levelset::ShapeOptions& options = {});

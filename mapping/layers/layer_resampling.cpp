@@ -8,7 +8,7 @@ namespace {
 
 using Imath::V3d;
 
-/// Of a row of positions, at x = 0 … count − 1; beyond, straight on.
+/// Interpolates a row of positions at x = 0 … count − 1; extrapolates linearly beyond.
 template <typename At>
 V3d along(const At& at, std::size_t count, double x) {
   const double last = static_cast<double>(count - 1);
@@ -18,7 +18,7 @@ V3d along(const At& at, std::size_t count, double x) {
   const auto i = static_cast<std::size_t>(cell);
   const double f = x - cell;
   const V3d b = at(i), c = at(i + 1);
-  // What would come next on a parabola through the three at an end.
+  // Continues the row by the parabola through the last three positions.
   const auto beyond = [&](const V3d& end, const V3d& next, std::size_t third) {
     return count > 2 ? (end - next) * 3.0 + at(third) : end * 2.0 - next;
   };
@@ -28,14 +28,14 @@ V3d along(const At& at, std::size_t count, double x) {
          (b * 3.0 - a - c * 3.0 + d) * (0.5 * f * f * f);
 }
 
-V3d placeAt(const ParticleLayer& layer, double x, double y) {
+V3d positionAt(const ParticleLayer& layer, double x, double y) {
   const auto row = [&](std::size_t j) {
     return along([&](std::size_t i) { return layer.at(i, j); }, layer.columns, x);
   };
   return along(row, layer.rows, y);
 }
 
-/// Its rim as rows and columns like the others, so that a place is one further along each axis.
+/// Adds the rim as ordinary rows and columns, which shifts each position by one along both axes.
 ParticleLayer withRimInside(const ParticleLayer& layer) {
   ParticleLayer wide;
   wide.columns = layer.columns + 2;
@@ -64,11 +64,11 @@ ParticleLayer withCounts(const ParticleLayer& layer, std::size_t columns, std::s
     for (std::size_t j = 0; j < rows; ++j)
       for (std::size_t i = 0; i < columns; ++i)
         result.positions.push_back(
-            placeAt(layer, static_cast<double>(i) * across, static_cast<double>(j) * up));
+            positionAt(layer, static_cast<double>(i) * across, static_cast<double>(j) * up));
     return result;
   }
   const ParticleLayer wide = withRimInside(layer);
-  const auto place = [&](int i, int j) { return placeAt(wide, 1 + i * across, 1 + j * up); };
+  const auto place = [&](int i, int j) { return positionAt(wide, 1 + i * across, 1 + j * up); };
   result.rim.resize(2 * (columns + rows) + 4);
   const auto right = static_cast<int>(columns), top = static_cast<int>(rows);
   for (int j = -1; j <= top; ++j)
@@ -82,13 +82,14 @@ ParticleLayer withCounts(const ParticleLayer& layer, std::size_t columns, std::s
   return result;
 }
 
-std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink) {
-  // Of the distance to a neighbour on the last layer what must be left of it.
+std::vector<EmbeddedParticle> embeddedParticles(const Patch& patch, double embedDepth) {
+  // Least distance to a neighbour that must remain, as a share of the distance on the last layer.
   constexpr double kLeastShare = 0.25;
-  constexpr double kWidest = 1.1;  // steps of the layers from layer to layer
-  std::vector<SunkParticle> particles;
-  if (sink == 0 || patch.layers.size() < 2) return particles;
-  const bool isBelow = sink > 0;
+  // Spacing of the embedded layers, in spacings of the patch's layers.
+  constexpr double kWidest = 1.1;
+  std::vector<EmbeddedParticle> particles;
+  if (embedDepth == 0 || patch.layers.size() < 2) return particles;
+  const bool isBelow = embedDepth > 0;
   const ParticleLayer& last = isBelow ? patch.layers.front() : patch.layers.back();
   const ParticleLayer before =
       withCounts(isBelow ? patch.layers[1] : *(patch.layers.end() - 2), last.columns, last.rows);
@@ -98,19 +99,20 @@ std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink) {
     return i >= -rim && i < right + rim && j >= -rim && j < top + rim;
   };
   const double step = std::abs(last.w - before.w);
-  // A smooth map errs most beside its last particles: they lie deeper than the texture, by as much
-  // again or by a step. Columns are straight, so that layers may lie wider apart than layers, and
-  // the wider the deeper.
-  const double reach = std::abs(sink) + std::min(std::abs(sink), step);
+  // A smooth map has its largest errors beside its last particles. So particles continue deeper
+  // than the texture, by the same depth again or by one layer spacing, whichever is less. Columns
+  // are straight there, so the embedded layers may be wider apart than the patch's, the more so the
+  // deeper they are.
+  const double reach = std::abs(embedDepth) + std::min(std::abs(embedDepth), step);
   const double most = 2.0 * static_cast<double>(patch.layers.size());
   const auto layers = static_cast<int>(std::min(most, std::ceil(reach / (kWidest * step))));
   for (int n = 1; n <= layers; ++n) {
     const double depth = reach * n / layers, share = depth / step;
     const auto keepsApart = [&](int i, int j, int u, int v) {
       if (!isThere(u, v)) return true;
-      const V3d way = last.beyond(u, v) - last.beyond(i, j);
-      const V3d turn = way - (before.beyond(u, v) - before.beyond(i, j));
-      return (way + turn * share).dot(way) >= kLeastShare * way.length2();
+      const V3d offset = last.beyond(u, v) - last.beyond(i, j);
+      const V3d turn = offset - (before.beyond(u, v) - before.beyond(i, j));
+      return (offset + turn * share).dot(offset) >= kLeastShare * offset.length2();
     };
     for (int j = -rim; j < top + rim; ++j)
       for (int i = -rim; i < right + rim; ++i) {

@@ -5,25 +5,26 @@
 
 #include "mapping/patches/patch.h"
 
-/// Other counts of particles on the same smooth surface through a layer's.
+/// Resamples the particle layers of a patch.
 namespace mapping {
 
-/// A layer of other counts on the smooth surface (Catmull-Rom) through the given one and its rim; a
-/// rim comes to lie one of the new spacings outside, straight on if that is beyond the given one.
-/// The given layer for its own counts.
+/// Resamples a layer on the smooth surface (Catmull-Rom) through its particles and rim. The new rim
+/// lies one new spacing outside, continued linearly where that is beyond the given rim. Returns the
+/// given layer if the counts are equal.
 /// @param columns, rows  each at least 2
 [[nodiscard]] ParticleLayer withCounts(const ParticleLayer& layer, std::size_t columns,
                                        std::size_t rows);
 
-/// A particle below the layers of a patch, or above them.
-struct SunkParticle {
-  Imath::V3d place, uvw;
+/// A particle below or above the layers of a patch, where an embedded texture lies.
+struct EmbeddedParticle {
+  Imath::V3d position, uvw;
 };
 
-/// Below w = −sink, or above w = 1 − sink where that is more, and in between: the columns of the
-/// patch go straight on, in layers no wider apart than the patch's own there. Left out where
-/// columns come together, as below a crease.
-/// @param sink  as a share of the patch's height
-[[nodiscard]] std::vector<SunkParticle> sunkParticles(const Patch& patch, double sink);
+/// Particles down to w = −embedDepth, or up to w = 1 − embedDepth if embedDepth is negative. The
+/// columns of the patch continue linearly, in layers no further apart than the patch's own layers
+/// there. Particles are left out where columns converge, as below a crease.
+/// @param embedDepth  as a share of the patch's height
+[[nodiscard]] std::vector<EmbeddedParticle> embeddedParticles(const Patch& patch,
+                                                              double embedDepth);
 
 }  // namespace mapping

@@ -20,7 +20,7 @@ double shareOf(std::size_t k, std::size_t count) {
   return static_cast<double>(k) / static_cast<double>(count - 1);
 }
 
-/// The same counts and rim, at another height.
+/// Copy of a layer, with the same counts and rim, at another height.
 ParticleLayer layerLike(const ParticleLayer& surface, double w, double height) {
   ParticleLayer layer = surface;
   layer.w = w;
@@ -28,11 +28,11 @@ ParticleLayer layerLike(const ParticleLayer& surface, double w, double height) {
   return layer;
 }
 
-/// v turned by the least rotation that takes one unit vector to another.
+/// Rotates v by the least rotation that maps one unit vector to another.
 V3d turned(const V3d& v, const V3d& from, const V3d& to) {
   const V3d axis = from.cross(to);
   const double cosine = from.dot(to);
-  // Half a turn within a step does not come up on a dense curve.
+  // Half a turn within one step cannot occur on a dense curve.
   if (cosine < -0.999) return v;
   return v + axis.cross(v) + axis.cross(axis.cross(v)) / (1 + cosine);
 }
@@ -82,7 +82,7 @@ ParticleLayer advected(const levelset::NarrowBand& space, const ParticleLayer& s
   return top;
 }
 
-/// Evenly on the straight ways from the surface to the top.
+/// Interpolates linearly along the straight paths from the surface to the top layer.
 ParticleLayer between(const ParticleLayer& surface, const ParticleLayer& top, double height,
                       double w) {
   ParticleLayer layer = layerLike(surface, w, w * height);
@@ -93,7 +93,7 @@ ParticleLayer between(const ParticleLayer& surface, const ParticleLayer& top, do
   return layer;
 }
 
-/// Spheres of a twentieth of the least distance between neighbours.
+/// Guard whose spheres have a diameter of a twentieth of the least distance between neighbours.
 TravelGuard guardOf(const ParticleLayer& surface) {
   constexpr double kShare = 0.05;
   double least = HUGE_VAL;
@@ -128,7 +128,7 @@ ParticleLayer conformingLayer(const levelset::NarrowBand& space, const ParticleL
 
 SweepCurve::SweepCurve(std::span<const V3d> points) {
   const std::size_t last = points.size() - 1;
-  // Tangents by the parabola through three points, at speeds of one.
+  // Tangents by the parabola through three points, at unit speed.
   std::vector<V3d> tangents(points.size());
   std::vector<double> chords(last);
   for (std::size_t i = 0; i < last; ++i) chords[i] = (points[i + 1] - points[i]).length();
@@ -166,7 +166,7 @@ V3d SweepCurve::position(double length) const {
 }
 
 V3d SweepCurve::tangent(double length) const {
-  // Chords about the middle of two segments, one going over to the next.
+  // Interpolates between the directions of two segments, from middle to middle.
   const std::size_t i = segment(length);
   const double middle = 0.5 * (lengths_[i] + lengths_[i + 1]);
   const std::size_t j =
@@ -181,15 +181,15 @@ V3d SweepCurve::tangent(double length) const {
 
 SplineSweep splineLayers(const ParticleLayer& surface, const SweepCurve& curve, double height,
                          std::size_t count, bool isFaded) {
-  constexpr std::size_t kSteps = 32;  // from layer to layer
-  constexpr double kCrawl = 0.02;     // of the way that the curve goes
+  constexpr std::size_t kSteps = 32;  // steps from layer to layer
+  constexpr double kCrawl = 0.02;     // least progress, as a share of the curve's
   SplineSweep sweep;
   sweep.layers.push_back(layerLike(surface, 0, 0));
   ParticleLayer layer = surface;
   std::vector<V3d> places = particlesOf(surface), moves(places.size());
   TravelGuard guard = guardOf(surface);
   std::vector<char> isSlowed(places.size(), 0);
-  // What stands above the plane across the curve's beginning.
+  // Heights of the particles above the plane across the start of the curve.
   std::vector<double> above;
   const V3d start = curve.position(0), along = curve.tangent(0);
   for (const V3d& p : places) above.push_back((p - start).dot(along));
@@ -230,7 +230,7 @@ void transformLayers(std::vector<ParticleLayer>& layers, const LayerTransform& t
   for (ParticleLayer& layer : layers) {
     const double w = layer.w, scale = std::lerp(1.0, transform.taper, w);
     const double lean = transform.bend * w;
-    // The straight axis as an arc of the same length.
+    // The straight axis becomes an arc of the same length.
     const double radius = transform.bend != 0 ? height / transform.bend : 0;
     const V3d foot = origin + axis * (w * height);
     const V3d bent = transform.bend != 0 ? origin + axis * (radius * std::sin(lean)) +

@@ -19,8 +19,8 @@ std::string text(const V3d& p) {
   return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z);
 }
 
-/// Coons' patch: opposite sides blended, less what the corners count twice. Exact on planes, and
-/// nearly so on quadrics.
+/// Coons patch: blends opposite sides and subtracts the bilinear corner term. Exact on planes, and
+/// nearly exact on quadrics.
 V3d coons(const PatchSides& border, const ParticleLayer& layer, std::size_t column,
           std::size_t row) {
   const double u = static_cast<double>(column) / static_cast<double>(layer.columns - 1);
@@ -32,8 +32,8 @@ V3d coons(const PatchSides& border, const ParticleLayer& layer, std::size_t colu
          (c0 * ((1 - u) * (1 - v)) + c1 * (u * (1 - v)) + c2 * (u * v) + c3 * ((1 - u) * v));
 }
 
-/// True when neighbours in the rows lie no further apart than the sides give reason for: the
-/// blended start has not slipped to another part of the surface.
+/// True if neighbours in rows and columns are as close as the sides suggest. Otherwise the blended
+/// start has slipped to another part of the surface.
 bool isUnbroken(const ParticleLayer& layer, double longestU, double longestV) {
   for (std::size_t j = 0; j < layer.rows; ++j)
     for (std::size_t i = 0; i < layer.columns; ++i) {
@@ -57,18 +57,18 @@ bool sweepBlended(const SurfaceField& field, const SurfaceField& guide, const Pa
                     4 * v / static_cast<double>(layer.rows - 1));
 }
 
-/// Geodesics that join opposite subdivision points: they never leave the surface.
+/// Fills the layer by geodesics between opposite side points, which never leave the surface.
 void sweepGeodesics(const SurfaceField& field, const std::vector<V3d>& firstRow,
                     ParticleLayer& layer) {
   std::vector<V3d> path = firstRow;
   for (std::size_t j = 1; j + 1 < layer.rows; ++j) {
     const V3d a = layer.at(0, j), b = layer.at(layer.columns - 1, j);
-    // Rows that lie side by side run alike, also where two ways are equally long.
+    // Adjacent rows take similar paths, even where two paths are equally long.
     path = geodesicLike(field, layer.height, a, b, path);
     if (path.empty()) path = geodesic(field, layer.height, a, b);
     if (path.empty()) {
       throw InvalidInput(
-          fmt::format("patch: no path on the surface joins {} and {}; move the corners "
+          fmt::format("patch: the surface does not connect {} and {}; move the corners "
                       "closer together",
                       text(a), text(b)));
     }
@@ -81,9 +81,10 @@ void sweepGeodesics(const SurfaceField& field, const std::vector<V3d>& firstRow,
   }
 }
 
-/// Through all knots, each stretch the shortest way.
-/// @param longest  of a stretch
-/// @return empty when two knots are not joined, or by too long a way; the first of them in `gap`
+/// Joins shortest paths through all knots.
+/// @param longest  largest length of a path between two knots
+/// @return empty if two knots are not connected, or only by a longer path; `gap` is the index of
+///         the first of them
 std::vector<V3d> sideThrough(const SurfaceField& field, double height,
                              const std::vector<V3d>& knots, const std::vector<V3d>* below,
                              double longest, std::size_t& gap) {
@@ -107,7 +108,7 @@ PatchSides makeSides(const levelset::NarrowBand& band, double height,
                      const std::array<V3d, 4>& corners, const PatchSides& between,
                      const PatchSides* below, const PatchSides* ground) {
   const SurfaceField field(band);
-  // Half a turn in the way of a side adds π times the height.
+  // Half a turn along a side adds π times the height.
   constexpr double kMostGrowth = 4;
   constexpr std::array<std::array<std::size_t, 2>, 4> kEnds = {{{0, 1}, {1, 2}, {3, 2}, {0, 3}}};
   PatchSides sides;
@@ -125,12 +126,12 @@ PatchSides makeSides(const levelset::NarrowBand& band, double height,
                     text(knots[gap]), text(knots[gap + 1]), kEnds[side][0], kEnds[side][1], height);
     if (ground) {
       throw InvalidInput(
-          fmt::format("patch: no way shorter than {:.6g} {}: they have come apart above the "
-                      "surface; lower the height, or move the corners closer together",
+          fmt::format("patch: no path shorter than {:.6g} {}: the surface separates them at that "
+                      "height; use a lower height, or move the corners closer together",
                       longest, ends));
     }
     throw InvalidInput(fmt::format(
-        "patch: no path on the surface {}; put all points on one part of the base", ends));
+        "patch: no path on the surface {}; put all points on the same surface component", ends));
   }
   return sides;
 }
@@ -173,11 +174,11 @@ void addRim(const levelset::NarrowBand& band, ParticleLayer& layer) {
   const auto columns = static_cast<int>(layer.columns), rows = static_cast<int>(layer.rows);
   layer.rim.assign(2 * (layer.columns + layer.rows) + 4, V3d(0));
   const auto onwards = [&](const V3d& last, const V3d& before) {
-    const V3d way = last - before;
+    const V3d offset = last - before;
     constexpr double kMostTurn = 0.5;  // cosine
-    const std::optional<V3d> end = walkStraight(field, layer.height, last, way, way.length());
+    const std::optional<V3d> end = walkStraight(field, layer.height, last, offset, offset.length());
     const bool isAhead = end && field.normal(last).dot(field.normal(*end)) > kMostTurn;
-    return isAhead ? *end : last + way;
+    return isAhead ? *end : last + offset;
   };
   for (int j = 0; j < rows; ++j) {
     layer.rim[layer.rimIndex(-1, j)] = onwards(layer.beyond(0, j), layer.beyond(1, j));
@@ -209,8 +210,8 @@ void advectPoints(const levelset::NarrowBand& band, double from, double to, std:
     if (!field.project(p, to)) {
       throw InvalidInput(
           fmt::format("patch: above the point {} the distance to the base does not reach {:.6g}, "
-                      "other parts of it "
-                      "come too near at {}; lower the height or move the patch",
+                      "because another part of the base is too near at {}; use a lower height or "
+                      "move the patch",
                       text(point), to, text(p)));
     }
     point = p;
@@ -219,7 +220,8 @@ void advectPoints(const levelset::NarrowBand& band, double from, double to, std:
 
 void raisePoints(const levelset::NarrowBand& band, double height, std::span<const V3d> directions,
                  std::span<V3d> points) {
-  constexpr double kFarthest = 10;  // times the difference: a direction that leans by 84 degrees
+  // Multiple of the height difference: a direction that leans by 84 degrees.
+  constexpr double kFarthest = 10;
   constexpr int kHalvings = 40;
   const SurfaceField field(band);
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -231,10 +233,10 @@ void raisePoints(const levelset::NarrowBand& band, double height, std::span<cons
     while (!isAbove(above)) {
       above += step;
       if (above > kFarthest * rise + step) {
-        throw InvalidInput(fmt::format(
-            "patch: from {} along {} the distance to the base does not come to {:.6g}; let the "
-            "direction lean less, or lower the height",
-            text(points[i]), text(directions[i]), height));
+        throw InvalidInput(
+            fmt::format("patch: from {} along {} the distance to the base does not reach {:.6g}; "
+                        "use a direction that leans less, or a lower height",
+                        text(points[i]), text(directions[i]), height));
       }
     }
     double below = std::max(0.0, above - step);
@@ -242,12 +244,13 @@ void raisePoints(const levelset::NarrowBand& band, double height, std::span<cons
       const double middle = 0.5 * (below + above);
       (isAbove(middle) ? above : below) = middle;
     }
-    // At the end of the room that was swept values jump.
+    // Values jump at the end of the swept region.
     if (field.value(points[i] + directions[i] * above) - height > 0.1 * field.voxelSize()) {
-      throw InvalidInput(fmt::format(
-          "patch: from {} along {} the way leaves the room above the patch before the distance to "
-          "the base comes to {:.6g}; let the direction lean less, or lower the height",
-          text(points[i]), text(directions[i]), height));
+      throw InvalidInput(
+          fmt::format("patch: the ray from {} along {} leaves the region above the patch before "
+                      "the distance to "
+                      "the base reaches {:.6g}; use a direction that leans less, or a lower height",
+                      text(points[i]), text(directions[i]), height));
     }
     points[i] += directions[i] * (0.5 * (below + above));
   }

@@ -20,14 +20,14 @@ using levelset::NarrowBand;
 using levelset::UsageError;
 
 constexpr const char* kPatchLayers = "patch";
-// The map's system is dense: n³ / 3 operations and n² numbers. This many particles cost a second or
-// two, and lie some five to ten voxels apart on a patch of a hundred or two.
+// The system of the map is dense: n³ / 3 operations and n² numbers. This many particles cost about
+// a second or two, and are five to ten voxels apart on a patch of 100 to 200 voxels.
 constexpr double kParticleBudget = 2000;
-constexpr double kSmallestSpacing = 1.5;  // voxels; closer ones say the same thing twice
+constexpr double kSmallestSpacing = 1.5;  // voxels; closer particles carry no more information
 constexpr std::size_t kFewest = 4;        // particles along a side
 constexpr double kMostParticles = 1e6;
 
-/// The middle of a layer, and directions there.
+/// Middle of a layer, with the normal and the direction of u there.
 struct Axis {
   V3d origin, normal, u;
 };
@@ -59,10 +59,10 @@ struct Counts {
   std::size_t columns, rows;
 };
 
-/// Calls refit(layer, counts) for each layer above the surface whose particles lie over a quarter
-/// closer or farther apart than on the surface, along u or v; than the spacing that all layers
-/// together would be given, where that is wider and none is asked for.
-/// @throws ResourceLimit as checkParticleCount does
+/// Calls refit(layer, counts) for each layer above the surface whose particle spacing along u or v
+/// differs by over a quarter from that on the surface. If no spacing is requested and the automatic
+/// spacing for all layers together is wider, that one is the reference.
+/// @throws ResourceLimit as checkParticleCount
 template <typename Refit>
 void keepDensity(const NarrowBand& base, std::vector<ParticleLayer>& layers, double height,
                  const PatchOptions& options, const Refit& refit) {
@@ -105,8 +105,8 @@ void checkPatchOptions(const char* action, double height, const PatchOptions& op
     throw UsageError(fmt::format("{}: the height is {}; give a positive length", action, height));
   }
   if (options.layers < 2) {
-    throw UsageError(
-        fmt::format("{}: {} layers of particles; give at least 2", action, options.layers));
+    throw UsageError(fmt::format("{}: {} layers of particles; give --layers of at least 2", action,
+                                 options.layers));
   }
   if (!(options.spacing >= 0) || !std::isfinite(options.spacing)) {
     throw UsageError(fmt::format("{}: the spacing of particles is {}; give a positive length",
@@ -125,25 +125,24 @@ void checkPatchOptions(const char* action, double height, const PatchOptions& op
                     action, t.twist, t.taper, t.bend));
   }
   if (options.scheme != LayerScheme::Spline && (!options.spline.empty() || options.fade)) {
-    throw UsageError(
-        fmt::format("{}: a spline and its fading go with the spline scheme only", action));
+    throw UsageError(fmt::format("{}: --spline and --fade require --particles spline", action));
   }
   if (options.scheme != LayerScheme::Reduced && (options.parallel || !options.directions.empty())) {
     throw UsageError(
-        fmt::format("{}: directions of the corners go with the reduced scheme only", action));
+        fmt::format("{}: directions of the corners require --particles reduced", action));
   }
   if (options.parallel && !options.directions.empty()) {
     throw UsageError(fmt::format(
-        "{}: the corners are to rise in directions of their own and in parallel; choose one",
-        action));
+        "{}: --directions and --parallel exclude each other; give one of them", action));
   }
   if (options.directions.size() > 1 && options.directions.size() != 4) {
-    throw UsageError(fmt::format("{}: {} directions of corners; give one for all, or four", action,
+    throw UsageError(fmt::format("{}: {} directions; give one for all corners, or four", action,
                                  options.directions.size()));
   }
   for (const V3d& d : options.directions) {
     if (!std::isfinite(d.x) || !std::isfinite(d.y) || !std::isfinite(d.z) || !(d.length() > 0)) {
-      throw UsageError(fmt::format("{}: the direction {} leads nowhere", action, pointAsOption(d)));
+      throw UsageError(fmt::format("{}: the direction {} is not a vector of finite, nonzero length",
+                                   action, pointAsOption(d)));
     }
   }
   for (const V3d& p : options.spline) {
@@ -196,10 +195,10 @@ double chooseSpacing(double voxelSize, std::span<const LayerSize> layers, std::s
 std::size_t countAlong(double length, double spacing) {
   const double cells = std::round(length / spacing);
   if (!(cells < kMostParticles)) {
-    throw levelset::ResourceLimit(fmt::format(
-        "{}: {:.3g} particles lie along a side, more than {:.0g}; take a wider spacing, "
-        "or less taper",
-        kPatchLayers, cells, kMostParticles));
+    throw levelset::ResourceLimit(
+        fmt::format("{}: {:.3g} particles along a side exceed the limit of {:.0g}; give a larger "
+                    "--spacing or less taper",
+                    kPatchLayers, cells, kMostParticles));
   }
   return std::max(kFewest, static_cast<std::size_t>(cells) + 1);
 }
@@ -207,17 +206,17 @@ std::size_t countAlong(double length, double spacing) {
 void checkParticleCount(double count, double spacing, const PatchOptions& options) {
   levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kPatchLayers);
   if (!(count <= kMostParticles)) {
-    throw levelset::ResourceLimit(fmt::format(
-        "{}: a spacing of {:.6g} would make {:.3g} particles, more than {:.0g}; take a wider "
-        "one",
-        kPatchLayers, spacing, count, kMostParticles));
+    throw levelset::ResourceLimit(
+        fmt::format("{}: a spacing of {:.6g} gives {:.3g} particles, more than the limit of "
+                    "{:.0g}; give a larger --spacing",
+                    kPatchLayers, spacing, count, kMostParticles));
   }
 }
 
 NarrowBand sweepAbove(const NarrowBand& base, std::span<const V3d> outline, const LayerSize& size,
                       double height, const PatchOptions& options, double lean) {
-  // Inner particles may lie outside the box of the sides: a patch may bulge by a quarter of its
-  // width.
+  // Inner particles may lie outside the box of the sides, because a patch may bulge by a quarter of
+  // its width.
   const double bulge = 0.25 * std::min(size.u, size.v) + lean;
   return sweepPatchSpace(base, outline, bulge, height,
                          {.shared = options.space,
@@ -234,7 +233,8 @@ std::vector<ParticleLayer> layersFromSurface(const NarrowBand& base, const Parti
     std::vector<ParticleLayer> layers = conformingLayers(space, surface, height, options.layers);
     if (options.cells[0] == 0) {
       keepDensity(base, layers, height, options, [&](ParticleLayer& layer, const Counts& n) {
-        // New particles start on the surface like the others, wherever it has relief between them.
+        // New particles start on the surface like the others, even where it has relief between
+        // them.
         ParticleLayer start = withCounts(surface, n.columns, n.rows);
         const SurfaceField field(base);
         for (V3d& p : start.positions) (void)field.project(p, 0);
@@ -250,17 +250,17 @@ std::vector<ParticleLayer> layersFromSurface(const NarrowBand& base, const Parti
   if (options.spline.empty()) points.push_back(axis.origin + axis.normal * height);
   for (std::size_t i = 1; i < points.size(); ++i) {
     if ((points[i] - points[i - 1]).length() < 1e-6 * base.voxelSize()) {
-      throw UsageError(fmt::format("{}: the spline stands still at {}; leave one point out{}",
+      throw UsageError(fmt::format("{}: the spline has two equal points at {}; leave one out{}",
                                    kPatchLayers, pointAsOption(points[i]),
-                                   i == 1 ? ", it begins at the patch's centre by itself" : ""));
+                                   i == 1 ? ", because it starts at the patch's centre" : ""));
     }
   }
   const SweepCurve curve(points);
   if (height > curve.length() * (1 + 1e-9)) {
-    throw UsageError(
-        fmt::format("{}: the height is {:.6g} and the spline only {:.6g} long; lower the height or "
-                    "lengthen the spline",
-                    kPatchLayers, height, curve.length()));
+    throw UsageError(fmt::format(
+        "{}: the height is {:.6g} but the spline is only {:.6g} long; use a lower height or "
+        "a longer spline",
+        kPatchLayers, height, curve.length()));
   }
   SplineSweep sweep = splineLayers(surface, curve, height, options.layers, options.fade);
   report.slowed = sweep.slowed;
@@ -279,12 +279,12 @@ void requireCovered(const NarrowBand& base, const ParticleLayer& layer) {
     V3d p = place;
     if (field.project(p, 0) && !field.isBeyondBorder(p)) return;
     throw levelset::InvalidInput(fmt::format(
-        "{}: the surface breaks off at ({:.6g}, {:.6g}, {:.6g}), within the patch; keep to "
-        "one side of its border, and off its holes",
+        "{}: the surface breaks off at ({:.6g}, {:.6g}, {:.6g}), within the patch; move the patch "
+        "away from the border and holes of the surface",
         kPatchLayers, place.x, place.y, place.z));
   };
   for (const V3d& p : layer.positions) require(p);
-  constexpr double kStepVoxels = 1;  // a slit of four shows in the middle two of them
+  constexpr double kStepVoxels = 1;  // a slit of four voxels contains two of these samples
   const auto steps = [&](const V3d& along) {
     return std::ceil(along.length() / (kStepVoxels * base.voxelSize()));
   };

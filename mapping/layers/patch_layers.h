@@ -10,13 +10,14 @@
 #include "levelset/narrow_band.h"
 #include "mapping/patches/patch.h"
 
-/// What all ways of making a patch share.
+/// Steps shared by all functions that build patches.
 namespace mapping {
 
-/// As one would give it on the command line, to the last bit.
+/// Formats a point as on the command line, exact to the last bit.
 [[nodiscard]] std::string pointAsOption(const Imath::V3d& p);
 
-/// @param action  begins the message
+/// Checks the height and options of a patch.
+/// @param action  prefix of the message
 /// @throws UsageError for a height that is not positive and options out of range
 void checkPatchOptions(const char* action, double height, const PatchOptions& options);
 
@@ -27,30 +28,32 @@ struct LayerSize {
 
 [[nodiscard]] LayerSize sizeOf(const ParticleLayer& layer);
 
-/// (u/s + 3)(v/s + 3), rims and all, summed over the layers.
+/// Particle count at a spacing s: (u/s + 3)(v/s + 3), including rims, summed over the layers.
 [[nodiscard]] double particlesAt(double spacing, std::span<const LayerSize> layers);
 
-/// The spacing that makes some two thousand particles of all layers together, and no less than 1.5
-/// voxels.
-/// @param times  how often each layer comes
+/// Spacing that gives about two thousand particles over all layers; at least 1.5 voxels.
+/// @param times  number of copies of each layer
 [[nodiscard]] double chooseSpacing(double voxelSize, std::span<const LayerSize> layers,
                                    std::size_t times = 1);
 
-/// How many particles lie along a length, at least four. @throws ResourceLimit for over a million
+/// Number of particles along a length, at least four.
+/// @throws ResourceLimit for over a million
 [[nodiscard]] std::size_t countAlong(double length, double spacing);
 
-/// @throws ResourceLimit for more than a million, or more than memory holds
+/// Checks the total particle count.
+/// @throws ResourceLimit for more than a million, or more than the memory limit allows
 void checkParticleCount(double count, double spacing, const PatchOptions& options);
 
-/// Distances throughout patch space, from points along the outline.
-/// @param lean  how far layers may leave the room above the outline sideways, world units
+/// Computes distances throughout patch space, from points along the outline.
+/// @param lean  how far layers may extend sideways beyond the space above the outline, world units
 [[nodiscard]] levelset::NarrowBand sweepAbove(const levelset::NarrowBand& base,
                                               std::span<const Imath::V3d> outline,
                                               const LayerSize& size, double height,
                                               const PatchOptions& options, double lean = 0);
 
-/// Schemes A and C: the particles on the surface travel. Unless the options give counts, a layer
-/// that travel and taper spread or crowd by over a quarter gets the surface's spacing again.
+/// Schemes A and C: builds the layers by moving the particles of the surface. Unless the options
+/// give counts, a layer whose spacing travel and taper change by over a quarter is resampled at the
+/// surface's spacing.
 [[nodiscard]] std::vector<ParticleLayer> layersFromSurface(const levelset::NarrowBand& base,
                                                            const ParticleLayer& surface,
                                                            std::span<const Imath::V3d> outline,
@@ -58,11 +61,12 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
                                                            const PatchOptions& options,
                                                            PatchReport& report);
 
-/// An open surface lies under all of a layer, looked for every two voxels; a solid does anyway.
-/// @throws InvalidInput with the place where it breaks off
+/// Checks that an open surface lies under the entire layer, sampled every two voxels. A closed
+/// solid always passes.
+/// @throws InvalidInput with the position where the surface breaks off
 void requireCovered(const levelset::NarrowBand& base, const ParticleLayer& layer);
 
-/// Turns, scales and bends the layers as the options ask, and measures them.
+/// Twists, tapers and bends the layers as the options request, and measures them.
 void finishPatch(const levelset::NarrowBand& base, const PatchOptions& options, Patch& patch,
                  PatchReport& report);
 

@@ -16,9 +16,9 @@ namespace {
 using Imath::V3d;
 
 constexpr std::size_t kMaxIterations = 1000;
-constexpr double kAtRest = 1e-3;  // voxels an iteration
-// Twelve springs of unit stiffness pull at a particle: 1/12 is the longest step that cannot
-// overshoot by more than the momentum takes back.
+constexpr double kAtRest = 1e-3;  // voxels per iteration
+// Twelve springs of unit stiffness act on a particle. 1/12 is the longest step whose overshoot the
+// momentum can compensate.
 constexpr double kStep = 1.0 / 12;
 constexpr double kMomentum = 0.8;
 
@@ -26,7 +26,7 @@ double fractionOf(std::size_t k, std::size_t count) {
   return static_cast<double>(k) / static_cast<double>(count - 1);
 }
 
-/// A place between four particles of a layer, at shares of its columns and rows.
+/// A position between four particles of a layer, at fractions of its columns and rows.
 struct Between {
   std::size_t corner, columns;
   double s, t;
@@ -49,7 +49,7 @@ struct Between {
 };
 
 struct Spring {
-  int columns, rows;  // to the neighbour
+  int columns, rows;  // offset of the neighbour
 };
 constexpr std::array<Spring, 12> kSprings = {{{1, 0},
                                               {-1, 0},
@@ -64,11 +64,13 @@ constexpr std::array<Spring, 12> kSprings = {{{1, 0},
                                               {0, 2},
                                               {0, -2}}};  // flexion
 
-/// Lengths at rest: between the borders, the chords go over from one border's mean to the other's.
+/// Rest lengths of springs. Between the borders they are interpolated from one border's mean to the
+/// other's.
 struct RestLengths {
-  /// Of neighbours, and of those two apart: on a bent surface these are less than twice as long.
-  std::array<std::vector<double>, 2> along;   // in u, of each row
-  std::array<std::vector<double>, 2> across;  // in v, of each column
+  /// Lengths for neighbours, and for particles two apart: on a bent surface these are less than
+  /// twice as long.
+  std::array<std::vector<double>, 2> along;   // along u, for each row
+  std::array<std::vector<double>, 2> across;  // along v, for each column
 
   explicit RestLengths(const ParticleLayer& layer) {
     const auto rowChord = [&](std::size_t row, std::size_t apart) {
@@ -118,15 +120,15 @@ V3d springForce(const ParticleLayer& layer, const RestLengths& rest, std::size_t
     if (i < 0 || j < 0 || i >= static_cast<long>(layer.columns) ||
         j >= static_cast<long>(layer.rows))
       continue;
-    const V3d way = layer.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j)) - p;
-    const double length = way.length();
+    const V3d offset = layer.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j)) - p;
+    const double length = offset.length();
     if (length == 0) continue;
-    force += way * (1 - rest.of(spring, column, row) / length);
+    force += offset * (1 - rest.of(spring, column, row) / length);
   }
   return force;
 }
 
-/// A layer with half as many rows and columns of particles, between those of the fine one.
+/// Resamples a layer to half as many rows and columns.
 ParticleLayer coarsened(const SurfaceField& field, const ParticleLayer& fine) {
   ParticleLayer coarse = fine;
   coarse.rim.clear();
@@ -144,7 +146,7 @@ ParticleLayer coarsened(const SurfaceField& field, const ParticleLayer& fine) {
   return coarse;
 }
 
-/// The last column is the first one again.
+/// Copies the first column to the last one.
 void closeRing(std::vector<V3d>& positions, std::size_t columns) {
   for (std::size_t n = 0; n < positions.size(); n += columns)
     positions[n + columns - 1] = positions[n];
@@ -152,8 +154,8 @@ void closeRing(std::vector<V3d>& positions, std::size_t columns) {
 
 Relaxation settle(const levelset::NarrowBand& band, ParticleLayer& layer, bool isRing);
 
-/// What is out of place over many particles is put right where it is over few: springs alone hand
-/// it on by one particle an iteration.
+/// Corrects long-range displacements on coarser layers first, because springs propagate them by
+/// only one particle per iteration.
 void settleCoarsely(const levelset::NarrowBand& band, ParticleLayer& layer, bool isRing) {
   constexpr std::size_t kFewestToCoarsen = 8;
   if (std::min(layer.columns, layer.rows) < kFewestToCoarsen) return;

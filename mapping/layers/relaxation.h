@@ -9,14 +9,14 @@ namespace mapping {
 
 struct Relaxation {
   std::size_t iterations = 0;
-  double lastMove = 0;       ///< the farthest that a particle moved in the last iteration, voxels
+  double lastMove = 0;       ///< largest displacement of a particle in the last iteration, voxels
   bool isConverged = false;  ///< lastMove ≤ 1e-3
 };
 
-/// Lets a layer's inner particles come to rest as the masses of a net of springs that stays on
-/// φ = layer.height: structural, shear and flexion springs [Provot95], borders fixed, projected
-/// after each step. Springs rest at the mean spacing of the borders that they run along.
-/// @param isRing  the last column is the first one again, and moves with it
+/// Relaxes the inner particles of a layer as masses of a spring net on φ = layer.height. The net
+/// has structural, shear and flexion springs [Provot95], fixed borders, and is projected after each
+/// step. The rest length of a spring is the mean spacing of the borders parallel to it.
+/// @param isRing  the last column equals the first one, and moves with it
 Relaxation relax(const levelset::NarrowBand& band, ParticleLayer& layer, bool isRing = false);
 
 /// Standard deviation / mean of the areas of a layer's cells.

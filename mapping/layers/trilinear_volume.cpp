@@ -11,10 +11,10 @@ namespace {
 
 using Imath::V3d;
 
-using Bernstein = std::array<double, 27>;  // index 9 i + 3 j + k, degrees along u, v, w
+using Bernstein = std::array<double, 27>;  // index 9 i + 3 j + k for the degrees along u, v, w
 constexpr std::array<std::size_t, 3> kBernsteinStep = {9, 3, 1};
 
-/// Edges of the image: along `axis`, at the ends (a, b) of the two axes after it.
+/// Edges of the image along `axis`, at the ends (a, b) of the two following axes.
 struct CornerEdges {
   std::array<std::array<V3d, 4>, 3> along;
   std::array<double, 3> longest{};
@@ -32,8 +32,8 @@ struct CornerEdges {
   }
 };
 
-/// Coefficients of det(∂x/∂u, ∂x/∂v, ∂x/∂w): each factor is linear in the two other axes, and the
-/// product of two linear functions has the mean of what meets in its middle coefficient.
+/// Bernstein coefficients of det(∂x/∂u, ∂x/∂v, ∂x/∂w). Each factor is linear in the two other axes.
+/// The middle coefficient of a product of two linear functions is the mean of the mixed products.
 Bernstein coefficientsOf(const CornerEdges& edges, double hand) {
   Bernstein sums{};
   for (std::size_t u = 0; u < 4; ++u)      // bits: v, w
@@ -50,7 +50,7 @@ Bernstein coefficientsOf(const CornerEdges& edges, double hand) {
   return sums;
 }
 
-/// De Casteljau at the middle of an axis.
+/// Splits the polynomial at the middle of an axis by de Casteljau's algorithm.
 void halve(const Bernstein& whole, std::size_t axis, Bernstein& low, Bernstein& high) {
   const std::size_t step = kBernsteinStep[axis];
   for (std::size_t n = 0; n < 27; ++n) {
@@ -62,7 +62,7 @@ void halve(const Bernstein& whole, std::size_t axis, Bernstein& low, Bernstein& 
   }
 }
 
-/// The axis along which coefficients differ most.
+/// Axis along which the coefficients change most.
 std::size_t liveliestAxis(const Bernstein& values) {
   std::array<double, 3> change{};
   for (std::size_t axis = 0; axis < 3; ++axis)
@@ -84,7 +84,7 @@ VolumeSign signOfTrilinear(const std::array<V3d, 8>& corners, double rounding, d
                            std::size_t mostPieces) {
   const CornerEdges edges(corners);
   const auto& longest = edges.longest;
-  // Sums of eight triple products and their halvings, and corners that are off.
+  // Error bound: sums of eight triple products and their halvings, and the errors of the corners.
   const double slack =
       64 * std::numeric_limits<double>::epsilon() * longest[0] * longest[1] * longest[2] +
       8 * rounding * (longest[0] * longest[1] + longest[1] * longest[2] + longest[2] * longest[0]);

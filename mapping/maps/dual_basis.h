@@ -6,8 +6,8 @@
 
 namespace mapping {
 
-/// The vectors that are 1 along one of three and 0 along the others; not finite where the three lie
-/// in a plane.
+/// Dual basis of three vectors: each result has dot product 1 with one of them and 0 with the
+/// others. Not finite if the three vectors lie in a plane.
 [[nodiscard]] inline std::array<Imath::V3d, 3> dualBasis(const Imath::V3d& a, const Imath::V3d& b,
                                                          const Imath::V3d& c) {
   const double volume = a.dot(b.cross(c));

@@ -12,7 +12,7 @@ namespace {
 using Imath::V3d;
 using Node = std::array<int, 3>;
 
-/// Evenly spaced from 0 to 1.
+/// Evenly spaced coordinates from 0 to 1.
 std::vector<double> evenly(std::size_t count) {
   std::vector<double> result(count, 1);
   for (std::size_t i = 0; i + 1 < count; ++i)
@@ -20,7 +20,8 @@ std::vector<double> evenly(std::size_t count) {
   return result;
 }
 
-/// Mean distance of the outermost particles to those before them, along columns and along rows.
+/// Mean distance of the outermost particles to their inner neighbours, along rows and along
+/// columns.
 std::array<double, 2> endSpacings(const ParticleLayer& layer) {
   std::array<double, 2> sum{};
   for (std::size_t j = 0; j < layer.rows; ++j)
@@ -44,7 +45,7 @@ Lattice::Lattice(const Patch& patch, const LatticeBorder& border) {
   const int around = border.rim > 0 ? 1 : 0;
   coordinates_[0] = evenly(columns);
   coordinates_[1] = evenly(rows);
-  // How many of its cells the one around is wide, along u and v.
+  // Width of the outer cells along u and v, in cells of the grid.
   std::array<double, 2> wide = {1, 1};
   if (around) {
     const std::array<double, 2> spacing =
@@ -58,10 +59,10 @@ Lattice::Lattice(const Patch& patch, const LatticeBorder& border) {
     }
   }
   std::vector<double>& w = coordinates_[2];
-  const double rim = border.rim / patch.height, lift = std::max(0.0, -border.sink),
-               sink = std::max(0.0, border.sink);
-  if (rim > 0) w.push_back(-sink - rim);
-  if (sink > 0) w.push_back(-sink);
+  const double rim = border.rim / patch.height, lift = std::max(0.0, -border.embedDepth),
+               embedDepth = std::max(0.0, border.embedDepth);
+  if (rim > 0) w.push_back(-embedDepth - rim);
+  if (embedDepth > 0) w.push_back(-embedDepth);
   const auto below = static_cast<int>(w.size());
   for (const ParticleLayer& layer : patch.layers) w.push_back(layer.w);
   const auto lastLayer = static_cast<int>(w.size()) - 1;
@@ -83,7 +84,7 @@ Lattice::Lattice(const Patch& patch, const LatticeBorder& border) {
         positions_[nodeIndex({i + around, j + around, k})] =
             layer.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
     if (!around) continue;
-    // The particles of the rim tell the direction, if there are any.
+    // The rim particles, if there are any, give the direction.
     const auto end = [&](const Node& to, const Node& near, const Node& far, double share) {
       if (!layer.hasRim()) return straight(to, near, far, share);
       const V3d p = positions_[nodeIndex(near)];

@@ -11,31 +11,37 @@
 
 namespace mapping {
 
-/// How far a lattice reaches beyond the unit cube of a patch, so that a texture's band ends in it.
+/// Extent of a lattice beyond the unit cube of a patch, so that the band of a texture ends inside
+/// the lattice.
 struct LatticeBorder {
-  double sink = 0;  ///< how far the texture lies below w = 0, or above w = 1 if negative; in w
-  double rim = 0;   ///< beyond all that, on all six sides, world units; 0: none, nor around
+  /// Depth of the texture below w = 0; if negative, its lift above w = 1; in w.
+  double embedDepth = 0;
+  /// Further margin on all six sides, world units; 0: no margin and no outer cells.
+  double rim = 0;
 };
 
-/// One of the six tetrahedra of a cell [Brodersen07 §9]. A prism over each half of the cell's
-/// bottom, each split by its lowest and highest corner, makes the paths from the cell's first
-/// corner to its last: along three axes in one of six orders. So neighbours need not be stored.
+/// One of the six tetrahedra of a cell [Brodersen07 §9]. The cell is two prisms, one over each half
+/// of its bottom, each split by its lowest and highest corner. Every tetrahedron is a path from the
+/// cell's first corner to its last, along the three axes in one of six orders. So neighbours need
+/// not be stored.
 struct Tetrahedron {
   std::array<int, 3> cell{};
   int order = 0;  ///< 0 … 5, see Lattice::kOrders
 };
 
 /// The particles of a patch as a grid of nodes with the same counts on every layer, split into
-/// tetrahedra, with layers around it that go on straight.
+/// tetrahedra. Outer layers of cells continue the grid linearly.
 class Lattice {
  public:
-  /// Axes (u = 0, v = 1, w = 2) in the order in which a tetrahedron's path takes them.
+  /// Axes (u = 0, v = 1, w = 2) in the order of a tetrahedron's path.
   static constexpr std::array<std::array<int, 3>, 6> kOrders = {
       {{0, 1, 2}, {0, 2, 1}, {2, 0, 1}, {1, 0, 2}, {1, 2, 0}, {2, 1, 0}}};
   using Corners = std::array<Imath::V3d, 4>;
 
-  /// Layers of fewer particles are refined on a smooth surface through them.
-  /// @param border  beyond the layers and sides cells go straight on; around, by one cell at least
+  /// Builds the grid. Layers with fewer particles are refined on a smooth surface through their
+  /// particles.
+  /// @param border  extent beyond the layers and sides, continued linearly; a rim is at least one
+  ///         cell wide
   Lattice(const Patch& patch, const LatticeBorder& border);
 
   [[nodiscard]] const std::array<int, 3>& cells() const { return cells_; }
@@ -44,19 +50,20 @@ class Lattice {
 
   /// World positions of a tetrahedron's corners, along its path.
   [[nodiscard]] Corners corners(const Tetrahedron& t) const;
-  /// Texture coordinates of the same.
+  /// Texture coordinates of a tetrahedron's corners, along its path.
   [[nodiscard]] Corners textureCorners(const Tetrahedron& t) const;
   /// Texture coordinates of a cell's box.
   [[nodiscard]] Imath::Box3d textureBox(const std::array<int, 3>& cell) const;
   /// World box of a cell.
   [[nodiscard]] Imath::Box3d worldBox(const std::array<int, 3>& cell) const;
-  /// Does a face of the cell lie on the outside of the lattice?
+  /// True if a face of the cell lies on the border of the lattice.
   [[nodiscard]] bool isOutermost(const std::array<int, 3>& cell) const;
 
-  /// Steps through the face opposite a corner. False at the outside.
+  /// Steps to the neighbour across the face opposite `corner`. Returns false at the border.
   [[nodiscard]] bool cross(Tetrahedron& t, int corner) const;
 
-  /// The tetrahedron that holds a place of texture space. False outside the lattice.
+  /// Finds the tetrahedron that contains a point of texture space. Returns false outside the
+  /// lattice.
   [[nodiscard]] bool locate(const Imath::V3d& uvw, Tetrahedron& t) const;
 
  private:
@@ -70,12 +77,13 @@ class Lattice {
             coordinates_[2][static_cast<std::size_t>(node[2])]};
   }
 
-  std::array<int, 3> cells_{};                      ///< along u, v, w
-  std::array<std::vector<double>, 3> coordinates_;  ///< of the nodes, along u, v, w
+  std::array<int, 3> cells_{};  ///< along u, v, w
+  /// Texture coordinates of the nodes, along u, v, w.
+  std::array<std::vector<double>, 3> coordinates_;
   std::vector<Imath::V3d> positions_;
 };
 
-/// Barycentric coordinates of x; not finite where the tetrahedron has no volume.
+/// Barycentric coordinates of x; not finite if the tetrahedron has no volume.
 [[nodiscard]] std::array<double, 4> barycentric(const Lattice::Corners& corners,
                                                 const Imath::V3d& x);
 

@@ -13,7 +13,7 @@ using Imath::V3d;
 
 struct Interval {
   std::size_t cell;
-  double fraction;  ///< outside [0, 1] beyond the first and last cell
+  double fraction;  ///< below 0 before the first cell, above 1 beyond the last
 };
 
 Interval locate(double t, std::size_t count) {
@@ -26,7 +26,7 @@ V3d lerp(const V3d& a, const V3d& b, double t) {
   return a + (b - a) * t;
 }
 
-/// The cell of a layer, and where in it.
+/// A cell of a layer, and the position inside it.
 struct LayerCell {
   Interval i, j;
 };
@@ -35,7 +35,7 @@ LayerCell cellOf(const ParticleLayer& layer, double u, double v) {
   return {locate(u, layer.columns), locate(v, layer.rows)};
 }
 
-/// Layers are alike as a rule: one search for both.
+/// Cell of the upper layer. Most layers have equal counts, so one search serves both.
 LayerCell cellAbove(const ParticleLayer& low, const LayerCell& cell, const ParticleLayer& high,
                     double u, double v) {
   return low.columns == high.columns && low.rows == high.rows ? cell : cellOf(high, u, v);
@@ -58,10 +58,10 @@ LayerFrame frameOnLayer(const ParticleLayer& layer, const LayerCell& cell) {
            (high - low) * static_cast<double>(layer.rows - 1), V3d(0)}};
 }
 
-/// Slopes by differences so small that they stay in one cell; exact to rounding, the map being
-/// trilinear there.
+/// Computes slopes by central differences whose steps stay in one cell. They are exact up to
+/// rounding, because the map is trilinear there.
 MapSample sampleAt(const Patch& patch, const V3d& uvw, const V3d& step) {
-  std::array<V3d, 3> along;  // how the place changes along u, v and w
+  std::array<V3d, 3> along;  // derivatives of the position along u, v and w
   for (int axis = 0; axis < 3; ++axis) {
     V3d ahead = uvw, behind = uvw;
     ahead[axis] += step[axis];
@@ -99,8 +99,8 @@ LayerFrame layerFrame(const Patch& patch, const V3d& uvw) {
            (high.position - low.position) * static_cast<double>(patch.layers.size() - 1)}};
 }
 
-std::vector<MapSample> sampleLayerMap(const Patch& patch, double sink) {
-  constexpr double kInside = 1e-3;  // of a cell, from its corners
+std::vector<MapSample> sampleLayerMap(const Patch& patch, double embedDepth) {
+  constexpr double kInside = 1e-3;  // distance of samples from the corners, in cells
   std::vector<MapSample> samples;
   const double layers = static_cast<double>(patch.layers.size() - 1);
   for (std::size_t k = 0; k < patch.layers.size(); ++k) {
@@ -110,8 +110,8 @@ std::vector<MapSample> sampleLayerMap(const Patch& patch, double sink) {
     std::vector<double> heights;
     if (k > 0) heights.push_back(layer.w - kInside * cell.z);
     if (k + 1 < patch.layers.size()) heights.push_back(layer.w + kInside * cell.z);
-    if (k == 0 && sink > 0) heights.push_back(-sink);
-    if (k + 1 == patch.layers.size() && sink < 0) heights.push_back(1 - sink);
+    if (k == 0 && embedDepth > 0) heights.push_back(-embedDepth);
+    if (k + 1 == patch.layers.size() && embedDepth < 0) heights.push_back(1 - embedDepth);
     for (std::size_t j = 0; j + 1 < layer.rows; ++j)
       for (std::size_t i = 0; i + 1 < layer.columns; ++i)
         for (const double w : heights)

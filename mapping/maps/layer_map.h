@@ -10,27 +10,28 @@
 
 namespace mapping {
 
-/// Texture → patch space straight through the particles: bilinear in u and v within the two layers
-/// about w, then linear between them [Brodersen07 §8.4]. Beyond the unit cube the outermost cells
-/// go on linearly.
+/// Maps texture → patch space, piecewise linear through the particles: bilinear in u and v within
+/// the two layers next to w, then linear between them [Brodersen07 §8.4]. Beyond the unit cube the
+/// outermost cells continue linearly.
 [[nodiscard]] Imath::V3d layerPosition(const Patch& patch, const Imath::V3d& uvw);
 
-/// That map with its derivatives, world units per unit of u, v and w.
+/// Value and derivatives of the layer map; derivatives in world units per unit of u, v and w.
 struct LayerFrame {
-  Imath::V3d position;  ///< to the bit that of layerPosition
+  Imath::V3d position;  ///< equal to layerPosition, bit for bit
   std::array<Imath::V3d, 3> slopes;
 };
 
-/// On the border of two cells the slopes are those of the one that begins there, on the last border
-/// of the one that ends there.
+/// Evaluates the layer map with derivatives. On the border of two cells the slopes are those of the
+/// cell that begins there; on the last border, of the cell that ends there.
 [[nodiscard]] LayerFrame layerFrame(const Patch& patch, const Imath::V3d& uvw);
 
-/// That map and its inverse's slopes in the middle and close to the corners of every cell, where a
-/// bilinear cell turns over first; for layers of unlike counts in those of both.
-/// @param sink  how far below w = 0 to look too, or above w = 1 if negative
-[[nodiscard]] std::vector<MapSample> sampleLayerMap(const Patch& patch, double sink);
+/// Samples the layer map and the slopes of its inverse in the middle and near the corners of every
+/// cell, where a bilinear cell inverts first. For layers of different counts the cells of both
+/// layers are sampled.
+/// @param embedDepth  also sample this far below w = 0, or above w = 1 if negative; in w
+[[nodiscard]] std::vector<MapSample> sampleLayerMap(const Patch& patch, double embedDepth);
 
-/// The longest edge of any cell of particles, across layers included.
+/// Longest edge of any cell of particles, including edges between layers.
 [[nodiscard]] double longestCellEdge(const Patch& patch);
 
 }  // namespace mapping

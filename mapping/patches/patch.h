@@ -20,15 +20,15 @@ struct ParticleLayer {
   double w = 0;                       ///< texture coordinate of the layer
   double height = 0;                  ///< distance from the base surface, world units
   std::vector<Imath::V3d> positions;  ///< rows × columns, row major: index = row * columns + column
-  /// One more particle at each end of the rows and columns, which go on straight on the surface,
-  /// see beyond(); empty: there are none.
+  /// Particles one spacing beyond each end of the rows and columns, continued straight along the
+  /// surface, see beyond(); empty: no rim.
   std::vector<Imath::V3d> rim = {};
 
   [[nodiscard]] const Imath::V3d& at(std::size_t column, std::size_t row) const {
     return positions[row * columns + column];
   }
-  /// Index in `rim`, of 2 (columns + rows) + 4: the row before the first, the one after the last,
-  /// the column before the first, the one after the last.
+  /// Index in `rim`, which has 2 (columns + rows) + 4 particles: the row before the first row, the
+  /// row after the last, the column before the first column, the column after the last.
   /// @pre column is −1 or columns, or row is −1 or rows
   [[nodiscard]] std::size_t rimIndex(int column, int row) const {
     const auto c = static_cast<std::size_t>(column + 1), r = static_cast<std::size_t>(row);
@@ -36,6 +36,7 @@ struct ParticleLayer {
     if (r == rows) return columns + 2 + c;
     return 2 * (columns + 2) + (column == -1 ? r : rows + r);
   }
+  /// Particle of the layer or of its rim.
   /// @pre hasRim(); column from −1 to columns, row from −1 to rows
   [[nodiscard]] const Imath::V3d& beyond(int column, int row) const {
     const bool isInside = column >= 0 && static_cast<std::size_t>(column) < columns && row >= 0 &&
@@ -48,8 +49,8 @@ struct ParticleLayer {
 
 enum class LayerScheme {
   Reduced,     ///< scheme B: one relaxed patch per offset layer, from its own advected corners
-  Conforming,  ///< scheme A: every particle follows ∇φ, the layers between on its straight way
-  Spline       ///< scheme C: the surface's particles travel along a curve and turn with it
+  Conforming,  ///< scheme A: each particle follows ∇φ; inner layers lie on its straight path
+  Spline       ///< scheme C: the surface's particles travel along a curve and rotate with it
 };
 
 struct Patch {
@@ -58,7 +59,7 @@ struct Patch {
   bool mirrored = false;
   std::vector<ParticleLayer> layers;  ///< from the surface (w = 0) outwards (w = 1)
   double spacing = 0;                 ///< mean distance of neighbouring particles, world units
-  /// How its layers were made; none: an older file does not say.
+  /// Scheme by which the layers were built; empty: unknown, as in older files.
   std::optional<LayerScheme> scheme = {};
   [[nodiscard]] std::size_t particleCount() const;
 };
@@ -66,18 +67,19 @@ struct Patch {
 /// Mean distance of neighbouring particles within the layers.
 [[nodiscard]] double meanSpacing(const Patch& patch);
 
-/// How the sides and rows of a patch turned out.
+/// Measurements of a new patch.
 struct PatchReport {
   double uLength = 0, vLength = 0;  ///< mean length of the rows and columns at w = 0
-  double cellAreaVariation = 0;     ///< standard deviation / mean of the cells' areas at w = 0
-  std::size_t relaxIterations = 0;  ///< of all layers together
+  double cellAreaVariation = 0;     ///< standard deviation / mean of the cell areas at w = 0
+  std::size_t relaxIterations = 0;  ///< sum over all layers
   bool isRelaxed = true;            ///< the last step moved no particle by more than 1e-3 voxel
-  double projectionDistance = 0;    ///< the farthest corner's way to the surface
-  std::size_t slowed =
-      0;  ///< particles of a spline that would have met their neighbours on the way
+  /// Largest distance from a given corner to the surface, world units.
+  double projectionDistance = 0;
+  /// Spline only: number of particles that were slowed to avoid their neighbours.
+  std::size_t slowed = 0;
 };
 
-/// What grows with w, about the axis of the patch.
+/// Transform of the layers that grows with w, about the axis of the patch.
 struct LayerTransform {
   double twist = 0;  ///< radians, anticlockwise seen from outside, at w = 1
   double taper = 1;  ///< scale across the axis at w = 1, positive
@@ -88,25 +90,26 @@ struct LayerTransform {
 struct PatchOptions {
   std::size_t layers = 6;  ///< at least 2
   LayerScheme scheme = LayerScheme::Reduced;
-  /// Spline only: points that the curve passes after the patch's centre; none: straight along the
-  /// normal there. The height is measured along the curve.
+  /// Spline only: points of the curve after the patch's centre; none: straight along the normal
+  /// there. The height is measured along the curve.
   std::vector<Imath::V3d> spline = {};
-  bool fade = false;  ///< Spline only: the surface's own relief goes to nothing on the way
+  bool fade = false;  ///< Spline only: the relief of the surface fades to zero along the curve
   LayerTransform transform = {};
-  /// Points near the surface that the sides 0 → 1, 1 → 2, 3 → 2 and 0 → 3 pass in this order: a
-  /// side is the shortest way from point to point and has a corner at each.
+  /// Points near the surface through which the sides 0 → 1, 1 → 2, 3 → 2 and 0 → 3 pass, in this
+  /// order. A side is the shortest path between successive points and has a corner at each.
   std::array<std::vector<Imath::V3d>, 4> sides = {};
-  /// Reduced only: in which the corners rise, straight, instead of along ∇φ: one for all, or one
-  /// each; the corners of points on the sides lie between. Where a surface bends much, parallel
-  /// ones keep the upper layers from spreading [Brodersen07 fig. 8.4].
+  /// Reduced only: straight directions in which the corners rise, instead of along ∇φ: one for all
+  /// corners, or one for each. Directions at points on the sides are interpolated. Where a surface
+  /// bends strongly, parallel directions keep the upper layers from spreading [Brodersen07 fig.
+  /// 8.4].
   std::vector<Imath::V3d> directions = {};
-  bool parallel = false;  ///< Reduced only: all in that of the normal at the patch's centre
-  double spacing = 0;     ///< of particles, world units; 0: chosen from patch and voxel size
-  /// Of cells along u and v, the same on all layers, each at least 3; 0, 0: as the spacing asks.
+  bool parallel = false;  ///< Reduced only: all corners rise along the normal at the patch's centre
+  double spacing = 0;     ///< particle spacing, world units; 0: chosen from patch and voxel size
+  /// Cells along u and v, the same on all layers, each at least 3; 0, 0: chosen from the spacing.
   std::array<std::size_t, 2> cells = {0, 0};
-  bool mirror = false;  ///< accept corners that run clockwise seen from outside
-  /// Of sweepSharedSpace, where many patches share distances to the base; it must outlive the call.
-  /// Where it does not do, or there is none, they are swept out about the patch.
+  bool mirror = false;  ///< accept corners in clockwise order seen from outside
+  /// Result of sweepSharedSpace, when many patches share distances to the base; it must outlive the
+  /// call. Without it, or where it does not reach, distances are computed around the patch.
   const levelset::NarrowBand* space = nullptr;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};

@@ -25,13 +25,15 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kFormat = "levelsmith patches";
 constexpr int kVersion = 1;
 constexpr std::array<const char*, 3> kSchemeNames = {"reduced", "conforming", "spline"};
-// The text, and what two letters may become: a node of the document, with its place in a list.
+// Memory per character: the text, and the document nodes that two characters may become, with their
+// list entries.
 constexpr double kBytesPerLetter = 20;
 
 Json toJson(const V3d& p) {
   if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
     throw InvalidInput(fmt::format(
-        "write: a particle of the patch lies at ({}, {}, {}), which no file holds", p.x, p.y, p.z));
+        "write: a particle of the patch at ({}, {}, {}) is not finite; build the patch again", p.x,
+        p.y, p.z));
   }
   return {p.x, p.y, p.z};
 }
@@ -45,7 +47,7 @@ Json toJson(std::span<const V3d> points) {
 void requireFinite(double value, const char* what) {
   if (!std::isfinite(value)) {
     throw InvalidInput(
-        fmt::format("write: the {} of the patch is {}, which no file holds", what, value));
+        fmt::format("write: the {} of the patch is {}; build the patch again", what, value));
   }
 }
 
@@ -74,7 +76,7 @@ Json toJson(const Patch& patch) {
   return json;
 }
 
-/// Reads a document, knowing where it is for what it says when something is wrong.
+/// Reads a document. Messages name the position in the document.
 class Reader {
  public:
   explicit Reader(std::string file) : file_(std::move(file)) {}
@@ -93,7 +95,7 @@ class Reader {
   [[nodiscard]] double number(const Json& json, const char* name, const std::string& where) const {
     const Json& value = member(json, name, where);
     if (!value.is_number() || !std::isfinite(value.get<double>()))
-      refuse(where, fmt::format("has a \"{}\" that is no number", name));
+      refuse(where, fmt::format("has a \"{}\" that is not a finite number", name));
     return value.get<double>();
   }
 
@@ -101,14 +103,14 @@ class Reader {
                                   const std::string& where) const {
     const double value = number(json, name, where);
     if (!(value >= 2) || value > 1e6 || value != std::floor(value))
-      refuse(where, fmt::format("has {} {}", value, name));
+      refuse(where, fmt::format("has {} {}, not an integer from 2 to 1000000", value, name));
     return static_cast<std::size_t>(value);
   }
 
   [[nodiscard]] std::vector<V3d> points(const Json& json, const char* name,
                                         const std::string& where) const {
     const Json& list = member(json, name, where);
-    if (!list.is_array()) refuse(where, fmt::format("has \"{}\" that are no list", name));
+    if (!list.is_array()) refuse(where, fmt::format("has a \"{}\" that is not a list", name));
     std::vector<V3d> result;
     result.reserve(list.size());
     for (const Json& entry : list) {
@@ -119,7 +121,7 @@ class Reader {
         if (isPoint) p[static_cast<int>(axis)] = entry[axis].get<double>();
       }
       if (!isPoint)
-        refuse(where, fmt::format("has no point at place {} of \"{}\"", result.size(), name));
+        refuse(where, fmt::format("has an invalid point {} in \"{}\"", result.size(), name));
       result.push_back(p);
     }
     return result;
@@ -138,14 +140,15 @@ class Reader {
                                 layer.positions.size(), layer.columns, layer.rows));
     const std::size_t rim = 2 * (layer.columns + layer.rows) + 4;
     if (layer.hasRim() && layer.rim.size() != rim)
-      refuse(where, fmt::format("has a rim of {} particles, not {}", layer.rim.size(), rim));
+      refuse(where, fmt::format("has a rim of {} particles instead of {}", layer.rim.size(), rim));
     return layer;
   }
 
   [[nodiscard]] Patch patch(const Json& json, const std::string& where) const {
     Patch patch;
     const std::vector<V3d> corners = points(json, "corners", where);
-    if (corners.size() != 4) refuse(where, fmt::format("has {} corners", corners.size()));
+    if (corners.size() != 4)
+      refuse(where, fmt::format("has {} corners instead of 4", corners.size()));
     std::copy(corners.begin(), corners.end(), patch.corners.begin());
     patch.height = number(json, "height", where);
     if (!(patch.height > 0)) refuse(where, "has a height that is not positive");
@@ -156,7 +159,7 @@ class Reader {
     if (!(patch.spacing > 0)) refuse(where, "has a spacing that is not positive");
     if (json.contains("scheme")) {
       const auto name = std::find(kSchemeNames.begin(), kSchemeNames.end(), json.at("scheme"));
-      if (name == kSchemeNames.end()) refuse(where, "has a \"scheme\" that is none");
+      if (name == kSchemeNames.end()) refuse(where, "has an unknown \"scheme\"");
       patch.scheme = static_cast<LayerScheme>(name - kSchemeNames.begin());
     }
     const Json& layers = member(json, "levels", where);
@@ -168,7 +171,7 @@ class Reader {
       const double below = isFirst ? 0 : patch.layers[patch.layers.size() - 2].w;
       const double w = patch.layers.back().w;
       if (isFirst ? w != 0 : !(w > below))
-        refuse(place, fmt::format("is at w = {}; layers go from 0 up to 1", w));
+        refuse(place, fmt::format("is at w = {}; w must increase from 0 to 1", w));
     }
     if (patch.layers.back().w != 1) refuse(where, "ends below w = 1");
     const auto last = static_cast<double>(patch.layers.size() - 1);
@@ -196,7 +199,7 @@ std::string textOf(const std::filesystem::path& file, std::size_t maxMemory) {
     std::error_code failed;
     if (std::filesystem::is_directory(file, failed)) {
       throw levelset::IoError(
-          fmt::format("read: {} is a folder; give a file of patches", file.string()));
+          fmt::format("read: {} is a folder; give a patch file", file.string()));
     }
     const auto size = std::filesystem::file_size(file, failed);
     if (!failed)
@@ -227,7 +230,7 @@ void writePatches(const std::filesystem::path& file, std::span<const Patch> patc
     stream.flush();
     if (!stream) {
       throw levelset::IoError(
-          fmt::format("write: {} cannot be written; is the disk full?", file.string()));
+          fmt::format("write: {} cannot be written; check the free disk space", file.string()));
     }
   }
   target.commit();
@@ -240,15 +243,15 @@ bool isPatchFormat(const std::string& name) {
 std::vector<Patch> readPatches(const std::filesystem::path& file, std::size_t maxMemory) {
   const Reader reader(file.string());
   const std::string whole = "the file", text = textOf(file, maxMemory);
-  if (levelset::isJsonTooDeep(text)) reader.refuse(whole, "has lists in lists, too many");
+  if (levelset::isJsonTooDeep(text)) reader.refuse(whole, "has too deeply nested lists");
   const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (json.is_discarded()) reader.refuse(whole, "is no JSON document, or was cut off");
+  if (json.is_discarded()) reader.refuse(whole, "is not a JSON document, or is truncated");
   const Json& format = reader.member(json, "format", whole);
-  if (format != kFormat) reader.refuse(whole, "holds no patches");
+  if (format != kFormat) reader.refuse(whole, "is not a patch file");
   if (reader.number(json, "version", whole) != kVersion)
-    reader.refuse(whole, fmt::format("is not of version {}", kVersion));
+    reader.refuse(whole, fmt::format("does not have version {}", kVersion));
   const Json& list = reader.member(json, "patches", whole);
-  if (!list.is_array() || list.empty()) reader.refuse(whole, "holds no patches");
+  if (!list.is_array() || list.empty()) reader.refuse(whole, "has no patches");
   std::vector<Patch> patches;
   for (const Json& entry : list)
     patches.push_back(reader.patch(entry, fmt::format("patch {}", patches.size())));

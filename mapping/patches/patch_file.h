@@ -7,18 +7,22 @@
 
 #include "mapping/patches/patch.h"
 
-/// Patches in files: JSON with the particles of every layer, to the last bit.
+/// Patch files: JSON with the particles of every layer, exact to the last bit.
 namespace mapping {
 
-/// @throws InvalidInput when a number is not finite; IoError when the file cannot be made
+/// Writes patches to a file.
+/// @throws InvalidInput if a number is not finite
+/// @throws IoError if the file cannot be written
 void writePatches(const std::filesystem::path& file, std::span<const Patch> patches);
 
-/// @throws IoError when the file cannot be read; InvalidInput, telling what and where, when it is
-///         not one of patches or its counts and numbers make none; ResourceLimit
+/// Reads patches from a file. Errors name the position in the file.
+/// @throws IoError if the file cannot be read
+/// @throws InvalidInput if it is not a patch file, or its counts and numbers are inconsistent
+/// @throws ResourceLimit if it needs more than `maxMemory` bytes
 [[nodiscard]] std::vector<Patch> readPatches(const std::filesystem::path& file,
                                              std::size_t maxMemory = levelset::kNoMemoryLimit);
 
-/// True for a name, or a format, that readPatches understands: .patch.
+/// True for a file name or format that readPatches understands: .patch.
 [[nodiscard]] bool isPatchFormat(const std::string& name);
 
 }  // namespace mapping

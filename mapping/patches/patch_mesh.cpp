@@ -11,14 +11,14 @@ namespace {
 using levelset::TriMesh;
 using VertexIndex = std::uint32_t;
 
-/// Vertices of a layer's particles in a mesh: that of particle 0, and the counts.
+/// Vertices of a layer's particles in a mesh: index of particle 0, and the layer's counts.
 struct SheetIndex {
   VertexIndex first;
   const ParticleLayer* layer;
   [[nodiscard]] VertexIndex at(std::size_t column, std::size_t row) const {
     return first + static_cast<VertexIndex>(row * layer->columns + column);
   }
-  /// Anticlockwise seen from above, from corner 0 back to it.
+  /// Vertices of a side, anticlockwise around the layer seen from above, starting at corner n.
   [[nodiscard]] std::vector<VertexIndex> side(int n) const {
     const std::size_t right = layer->columns - 1, top = layer->rows - 1;
     std::vector<VertexIndex> result;
@@ -38,7 +38,7 @@ SheetIndex addSheet(const ParticleLayer& layer, TriMesh& mesh) {
   return sheet;
 }
 
-/// Facing the way that w goes, or back.
+/// Adds the triangles of the cells, facing along +w or −w.
 void addCells(const SheetIndex& sheet, bool isUp, TriMesh& mesh) {
   const auto add = [&](VertexIndex a, VertexIndex b, VertexIndex c) {
     if (isUp)
@@ -53,8 +53,8 @@ void addCells(const SheetIndex& sheet, bool isUp, TriMesh& mesh) {
     }
 }
 
-/// A wall between two borders of perhaps different counts, whose triangles advance on the one that
-/// is behind.
+/// Adds a wall between two borders, possibly with different counts. Each triangle advances on the
+/// border that is behind.
 void addWall(const std::vector<VertexIndex>& low, const std::vector<VertexIndex>& high,
              TriMesh& mesh) {
   std::size_t i = 0, j = 0;
@@ -78,7 +78,7 @@ TriMesh patchMesh(const Patch& patch, PatchMeshKind kind) {
   if (kind == PatchMeshKind::Sheets) {
     for (const ParticleLayer& layer : patch.layers) addCells(addSheet(layer, mesh), true, mesh);
   } else {
-    // Between bottom and top only the borders count: a vertex inside would have no triangle.
+    // Inner layers need only their borders: a vertex inside would have no triangle.
     std::vector<std::array<std::vector<VertexIndex>, 4>> borders;
     for (const ParticleLayer& layer : patch.layers) {
       const bool isEnd = &layer == &patch.layers.front() || &layer == &patch.layers.back();
@@ -93,7 +93,7 @@ TriMesh patchMesh(const Patch& patch, PatchMeshKind kind) {
         for (int n = 0; n < 4; ++n) {
           const std::vector<VertexIndex> side = inLayer.side(n);
           for (std::size_t i = 0; i < side.size(); ++i) {
-            const bool isLast = i + 1 == side.size();  // where the next side begins
+            const bool isLast = i + 1 == side.size();  // the first vertex of the next side
             border[static_cast<std::size_t>(n)].push_back(
                 isLast && n == 3 ? first : static_cast<VertexIndex>(mesh.positions.size()));
             if (!isLast) mesh.positions.push_back(layer.positions[side[i]]);

@@ -6,15 +6,14 @@
 namespace mapping {
 
 enum class PatchMeshKind {
-  Shell,  ///< bottom, top and the four sides: one closed mesh that faces outwards, a solid's
-          ///< surface
-  Sheets  ///< each layer by itself, as it is
+  Solid,  ///< one closed mesh that faces outwards: bottom, top and the four sides
+  Sheets  ///< each layer as an open mesh
 };
 
-/// Patch space as a mesh, to look at: particles are its vertices, each cell of four is two
-/// triangles. The sides of a shell join the borders of all layers.
+/// Builds a mesh of patch space for display. Particles are its vertices, and each cell of four
+/// particles is two triangles. The sides of a Solid connect the borders of all layers.
 /// @pre two layers or more
 [[nodiscard]] levelset::TriMesh patchMesh(const Patch& patch,
-                                          PatchMeshKind kind = PatchMeshKind::Shell);
+                                          PatchMeshKind kind = PatchMeshKind::Solid);
 
 }  // namespace mapping

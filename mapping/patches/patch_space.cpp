@@ -17,11 +17,13 @@ namespace {
 using Imath::V3d;
 using levelset::NarrowBand;
 
-constexpr double kMarginVoxels = 6;   // of distances beyond the highest layer, for the filters
-constexpr double kCoarseVoxels = 20;  // that a height is worth; with fewer, layers would be inexact
-constexpr double kCoarsest = 4;       // times the base's voxel
-constexpr double kThinnest = 12;      // coarse voxels through the base's box
-constexpr double kFaithful = 0.25;    // coarse voxels by which a coarse surface may be off
+// Distances beyond the highest layer, for the interpolation filters.
+constexpr double kMarginVoxels = 6;
+// Least number of coarse voxels per height; fewer make the layers inexact.
+constexpr double kCoarseVoxels = 20;
+constexpr double kCoarsest = 4;     // multiple of the base's voxel size
+constexpr double kThinnest = 12;    // coarse voxels across the base's bounding box
+constexpr double kFaithful = 0.25;  // largest error of the coarse surface, coarse voxels
 
 bool isFaithful(const NarrowBand& coarse, std::span<const V3d> border) {
   const levelset::BandSampler sampler(coarse, levelset::Interpolation::Tricubic);
@@ -30,7 +32,7 @@ bool isFaithful(const NarrowBand& coarse, std::span<const V3d> border) {
   });
 }
 
-/// How many times coarser a grid may be for layers up to a height.
+/// Coarsening factor of the grid for layers up to a height.
 double coarsestFactor(const NarrowBand& base, double height) {
   if (height < 2 * kCoarseVoxels * base.voxelSize()) return 1;
   const V3d extent = base.zeroSetBounds().size();
@@ -39,7 +41,7 @@ double coarsestFactor(const NarrowBand& base, double height) {
                                             thickness / kThinnest})));
 }
 
-/// None where no grid point of the coarser grid lies inside.
+/// Resamples the base to a coarser grid; empty if no grid point of it lies inside.
 std::optional<NarrowBand> coarsened(const NarrowBand& base, double factor,
                                     const PatchSpaceOptions& options) {
   try {
@@ -49,7 +51,7 @@ std::optional<NarrowBand> coarsened(const NarrowBand& base, double factor,
   }
 }
 
-/// The base on a coarser grid; the base itself when that would lose its surface.
+/// The base on a coarser grid, or the base itself if the coarser grid would lose its surface.
 NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> border, double height,
                    const PatchSpaceOptions& options) {
   for (double factor = coarsestFactor(base, height); factor >= 2; --factor) {
@@ -59,12 +61,12 @@ NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> border, double h
   return base;
 }
 
-/// Is the band wide enough as it is?
+/// True if the band already extends to the height.
 bool reaches(const NarrowBand& base, double height) {
   return base.halfWidth() * base.voxelSize() >= height + kMarginVoxels * base.voxelSize();
 }
 
-/// Would the patch's own space be no better than this?
+/// True if the shared distances are as good as the patch's own.
 bool serves(const NarrowBand& shared, const NarrowBand& base, std::span<const V3d> border,
             double height) {
   constexpr double kRounding = 1 + 1e-9;
@@ -89,8 +91,8 @@ NarrowBand sweepPatchSpace(const NarrowBand& base, std::span<const V3d> border, 
     constexpr double kRounding = 1e-6;
     if (base.halfWidth() >= needed - kRounding) return base;
     throw levelset::InvalidInput(fmt::format(
-        "patch: the band of the open surface reaches {:.6g} voxels, and the height {:.6g} "
-        "needs more; make it with surface-band --half-width {}, or lower the patch",
+        "patch: the band of the open surface extends to {:.6g} voxels, and the height {:.6g} "
+        "needs more; build it with surface-band --half-width {}, or use a lower patch",
         base.halfWidth(), height, std::ceil(needed - kRounding)));
   }
   if (options.shared && serves(*options.shared, base, border, height)) return *options.shared;
@@ -110,9 +112,9 @@ std::optional<NarrowBand> sweepSharedSpace(const NarrowBand& base, const PatchCr
                                            const PatchSpaceOptions& options) {
   if (base.isEmpty() || base.isOpenSurface() || reaches(base, crowd.highest)) return {};
   const double factor = coarsestFactor(base, crowd.lowest);
-  // Boxes and the whole reach equally far from the surface, so areas of surface compare them. A
-  // grid point costs three and more times as much in a box, for the search along its faces. A
-  // coarser grid is made of the whole base, for each patch that is alone.
+  // Both variants extend equally far from the surface, so their costs are compared by surface area.
+  // In a box a grid point costs at least three times as much, because of the search along the box
+  // faces. A coarser grid resamples the entire base for each patch that has its own box.
   constexpr double kBoxCost = 3;
   const double around = 2 * (crowd.highest + kMarginVoxels * base.voxelSize());
   const double boxes =

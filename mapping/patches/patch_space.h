@@ -12,19 +12,19 @@
 namespace mapping {
 
 struct PatchSpaceOptions {
-  /// Of sweepSharedSpace; taken where it reaches the height and is as exact there as the patch's
-  /// own.
+  /// Result of sweepSharedSpace; used if it extends to the height and is as accurate there as the
+  /// patch's own distances.
   const levelset::NarrowBand* shared = nullptr;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
 
-/// Distances to the base as far as `height` above a patch, swept out of the narrow band in a box
-/// about it [Brodersen07 §8.2]. Where that is many voxels, a grid of up to a quarter of the
-/// resolution does: layers of φ grow smooth with their height, and the surface itself is left to
-/// the base's own band.
-/// @throws InvalidInput for an open surface whose band does not reach far enough: it cannot be
-/// swept
+/// Computes distances to the base up to `height` above a patch, by fast sweeping from the narrow
+/// band in a box around the patch [Brodersen07 §8.2]. If the height is many voxels, the grid is up
+/// to four times coarser. Iso-surfaces of φ become smoother with height, and the base's own band
+/// represents the surface itself.
+/// @throws InvalidInput for an open surface whose band does not reach the height, because it cannot
+///         be swept
 /// @param border  points on the surface along the sides of the patch
 /// @param bulge   how far the inner surface may leave the box of the border, world units
 [[nodiscard]] levelset::NarrowBand sweepPatchSpace(const levelset::NarrowBand& base,
@@ -32,15 +32,16 @@ struct PatchSpaceOptions {
                                                    double height,
                                                    const PatchSpaceOptions& options = {});
 
-/// Many patches on one base.
+/// Size of a group of patches on one base.
 struct PatchCrowd {
   std::size_t count;
-  double uSize, vSize;     ///< of the largest, world units
-  double lowest, highest;  ///< of their heights, world units, positive
+  double uSize, vSize;     ///< of the largest patch, world units
+  double lowest, highest;  ///< range of the patch heights, world units, positive
 };
 
-/// Distances for many patches at once: around all of the base, when that costs less than a box
-/// about each of them. None when it costs more, or more than a quarter of the memory.
+/// Computes distances for many patches at once around the entire base, if that costs less than a
+/// box around each patch. Returns nothing if it costs more, or needs more than a quarter of the
+/// memory.
 [[nodiscard]] std::optional<levelset::NarrowBand> sweepSharedSpace(
     const levelset::NarrowBand& base, const PatchCrowd& crowd,
     const PatchSpaceOptions& options = {});

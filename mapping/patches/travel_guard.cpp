@@ -19,11 +19,12 @@ struct Entry {
   bool operator<(const Entry& other) const { return cell < other.cell; }
 };
 
-/// The share of a step after which two come as close as the diameter; 1 where they do not.
+/// Share of a step after which two particles come as close as the diameter; 1 if they do not.
 double contact(const V3d& apart, const V3d& relative, double diameter) {
   const double approach = apart.dot(relative);
   if (approach >= 0) return 1;
-  // The same one twice, as where a grid closes on itself: others never come that close.
+  // Particles that start this close are one particle stored twice, as where a grid closes on
+  // itself.
   if (apart.length2() < 0.25 * diameter * diameter) return 1;
   const double over = apart.length2() - diameter * diameter;
   if (over <= 0) return 0;
@@ -33,21 +34,21 @@ double contact(const V3d& apart, const V3d& relative, double diameter) {
   return std::min(1.0, over / (std::sqrt(root) - approach));
 }
 
-/// Calls meet(i, j) for all pairs that may touch, always in the same order.
+/// Calls meet(i, j) for all pairs that may touch, in a fixed order.
 template <typename Meet>
-void forEachNear(std::span<const V3d> places, std::span<const V3d> moves, double diameter,
+void forEachNear(std::span<const V3d> positions, std::span<const V3d> moves, double diameter,
                  const Meet& meet) {
-  // What all do together brings nobody closer.
+  // The common motion does not change distances.
   V3d mean(0);
   for (const V3d& move : moves) mean += move / static_cast<double>(moves.size());
   double farthest = 0;
   for (const V3d& move : moves) farthest = std::max(farthest, (move - mean).length());
   const double edge = diameter + 2 * farthest;
-  std::vector<Entry> entries(places.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
+  std::vector<Entry> entries(positions.size());
+  for (std::size_t i = 0; i < positions.size(); ++i) {
     for (std::size_t a = 0; a < 3; ++a)
       entries[i].cell[a] =
-          static_cast<std::int64_t>(std::floor(places[i][static_cast<int>(a)] / edge));
+          static_cast<std::int64_t>(std::floor(positions[i][static_cast<int>(a)] / edge));
     entries[i].particle = i;
   }
   std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
@@ -56,7 +57,8 @@ void forEachNear(std::span<const V3d> places, std::span<const V3d> moves, double
   for (auto a = entries.begin(); a != entries.end(); ++a) {
     for (auto b = a + 1; b != entries.end() && b->cell == a->cell; ++b)
       meet(a->particle, b->particle);
-    for (int n = 14; n < 27; ++n) {  // the neighbours that come later in the order
+    // The 13 neighbour cells that come later in the order, and the cell itself.
+    for (int n = 14; n < 27; ++n) {
       const GuardCell cell = {a->cell[0] + n / 9 - 1, a->cell[1] + n / 3 % 3 - 1,
                               a->cell[2] + n % 3 - 1};
       for (auto b = std::lower_bound(a, entries.end(), Entry{cell, 0});
@@ -66,7 +68,7 @@ void forEachNear(std::span<const V3d> places, std::span<const V3d> moves, double
   }
 }
 
-/// Gives all of a set the mean of their moves.
+/// Replaces the moves of each set by their mean.
 void moveTogether(levelset::DisjointSets& sets, std::span<V3d> moves) {
   struct Sum {
     V3d moves = V3d(0);
@@ -84,22 +86,22 @@ void moveTogether(levelset::DisjointSets& sets, std::span<V3d> moves) {
 
 }  // namespace
 
-void TravelGuard::limit(std::span<const V3d> places, std::span<V3d> moves) {
+void TravelGuard::limit(std::span<const V3d> positions, std::span<V3d> moves) {
   if (!(diameter_ > 0)) return;
-  // From where two touch they go on side by side: what would bring them closer is taken from both,
-  // the mean over all that they touch. That may push them into others, so there are some rounds;
-  // those that touch even then move as one, and with whoever they come up to, until nobody touches:
-  // in each of those rounds two sets become one.
+  // After contact two particles move side by side: the approaching component is removed from both,
+  // averaged over all contacts of a particle. This may push them into others, so it is repeated for
+  // kRounds rounds. Particles that still touch are joined into sets that move as one body. Each
+  // further round joins at least two sets, so the loop ends.
   constexpr int kRounds = 12;
-  std::vector<V3d> corrections(places.size());
-  std::vector<double> contacts(places.size());
-  levelset::DisjointSets crowds(places.size());
+  std::vector<V3d> corrections(positions.size());
+  std::vector<double> contacts(positions.size());
+  levelset::DisjointSets crowds(positions.size());
   for (int round = 0;; ++round) {
     std::fill(corrections.begin(), corrections.end(), V3d(0));
     std::fill(contacts.begin(), contacts.end(), 0);
     bool isFree = true;
-    forEachNear(places, moves, diameter_, [&](std::size_t i, std::size_t j) {
-      const V3d apart = places[j] - places[i], relative = moves[j] - moves[i];
+    forEachNear(positions, moves, diameter_, [&](std::size_t i, std::size_t j) {
+      const V3d apart = positions[j] - positions[i], relative = moves[j] - moves[i];
       const double t = contact(apart, relative, diameter_);
       if (t == 1) return;
       isFree = false;

@@ -8,20 +8,21 @@
 
 namespace mapping {
 
-/// Keeps particles that travel from running into each other: small spheres about them, and the time
-/// at which two first touch on their straight ways of one step, so that none passes through another
-/// however long the step is [Brodersen07 §8.2].
+/// Keeps moving particles from colliding. Each particle is a small sphere, and the guard computes
+/// the time at which two spheres first touch on the straight paths of one step. So none passes
+/// through another, however long the step is [Brodersen07 §8.2].
 class TravelGuard {
  public:
-  /// @param diameter  of the spheres, world units; particles that begin closer than half of it are
-  ///        taken for one
+  /// @param diameter  of the spheres, world units; particles that start closer than half of it
+  ///         count as one particle
   TravelGuard(double diameter, std::size_t particles) : diameter_(diameter), isSlowed_(particles) {}
 
-  /// Takes from the moves of those that would touch what would bring them closer from there on:
-  /// they go on side by side. Where that is not enough, a crowd moves as one.
-  void limit(std::span<const Imath::V3d> places, std::span<Imath::V3d> moves);
+  /// Limits the moves of one step. For particles that would touch, the components that bring them
+  /// closer after the contact are removed, so that they move on side by side. If that does not
+  /// suffice, the group moves as one body.
+  void limit(std::span<const Imath::V3d> positions, std::span<Imath::V3d> moves);
 
-  /// Was its move ever changed?
+  /// True for particles whose move was ever changed.
   [[nodiscard]] const std::vector<char>& slowed() const { return isSlowed_; }
 
  private:

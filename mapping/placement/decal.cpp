@@ -29,9 +29,10 @@ using levelset::NarrowBand;
 using levelset::UsageError;
 
 constexpr const char* kDecal = "decal";
-constexpr double kLeastTangent = 0.02;  // of a direction: 1.1 degrees from the normal
+// Sine of 1.1 degrees, the least angle between the direction and the normal.
+constexpr double kLeastTangent = 0.02;
 
-/// Where a layer's map begins, and the directions of u and v there, unit.
+/// Centre of a layer's map, and the unit directions of u and v there.
 struct DecalFrame {
   V3d center, u, v;
 };
@@ -43,44 +44,44 @@ DecalFrame frameAt(const SurfaceField& field, const V3d& center, const V3d& dire
   const V3d tangent = direction - normal * normal.dot(direction);
   if (!(tangent.length() > kLeastTangent * length)) {
     throw UsageError(fmt::format(
-        "{}: the direction {} stands on the surface at {}, whose normal is {:.3g},{:.3g},{:.3g}; "
-        "give one that runs along the surface",
+        "{}: the direction {} is normal to the surface at {}, whose normal is "
+        "{:.3g},{:.3g},{:.3g}; give a direction along the surface",
         kDecal, pointAsOption(direction), pointAsOption(center), normal.x, normal.y, normal.z));
   }
   const V3d u = tangent.normalized(), v = normal.cross(u);
   return {center, u, isMirrored ? -v : v};
 }
 
-/// −1 … 1 along a row or column.
+/// Position from −1 to 1 along a row or column.
 double signedShare(std::size_t i, std::size_t count) {
   return 2 * static_cast<double>(i) / static_cast<double>(count - 1) - 1;
 }
 
-/// Half the side of a square about the centre that does not hold what lies at (u, v) of ±1.
+/// Half side of the largest square around the centre that does not contain the particle.
 double squareRadius(const ParticleLayer& layer, std::size_t index, double radius) {
   return radius * std::max(std::abs(signedShare(index % layer.columns, layer.columns)),
                            std::abs(signedShare(index / layer.columns, layer.rows)));
 }
 
 std::string smallerRadius(double radius) {
-  return fmt::format("take a radius below {:.4g}", radius);
+  return fmt::format("use a radius below {:.4g}", radius);
 }
 
-/// Sends a walk to each particle of the layer.
+/// Traces a geodesic to each particle of the layer.
 /// @throws InvalidInput where the surface breaks off
 void walkToParticles(const NarrowBand& band, const DecalFrame& frame, double radius,
                      ParticleLayer& layer) {
   layer.positions.assign(layer.columns * layer.rows, frame.center);
-  std::vector<double> missing(layer.positions.size(), 0);  // of the way
+  std::vector<double> missing(layer.positions.size(), 0);  // length that was not traced
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, layer.positions.size(), 16), [&](const auto& range) {
         const SurfaceField field(band);
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
-          const V3d way = frame.u * (radius * signedShare(n % layer.columns, layer.columns)) +
-                          frame.v * (radius * signedShare(n / layer.columns, layer.rows));
-          const double length = way.length();
+          const V3d offset = frame.u * (radius * signedShare(n % layer.columns, layer.columns)) +
+                             frame.v * (radius * signedShare(n / layer.columns, layer.rows));
+          const double length = offset.length();
           if (length < 1e-9 * radius) continue;
-          SurfaceWalk walk(field, layer.height, frame.center, way);
+          SurfaceWalk walk(field, layer.height, frame.center, offset);
           if (!walk.advance(length)) missing[n] = length - walk.walked();
           layer.positions[n] = walk.position();
         }
@@ -115,7 +116,8 @@ std::vector<V3d> particleNormals(const NarrowBand& band, const ParticleLayer& la
   return normals;
 }
 
-/// Half of a cell's vector of area: positive along the normals where the cell lies as it should.
+/// Projection of a cell's area vector onto its normals, up to a factor; positive if the cell is not
+/// inverted.
 double facing(const ParticleLayer& layer, const std::vector<V3d>& normals, std::size_t column,
               std::size_t row) {
   const std::size_t a = row * layer.columns + column, b = a + 1, c = a + layer.columns, d = c + 1;
@@ -124,17 +126,17 @@ double facing(const ParticleLayer& layer, const std::vector<V3d>& normals, std::
   return area.dot(normals[a] + normals[b] + normals[c] + normals[d]);
 }
 
-/// What is wrong with a layer, and half the side of the square that ends before it.
+/// First defect of a layer, and half the side of the square that excludes it.
 struct Trouble {
   double radius = std::numeric_limits<double>::infinity();
   V3d place{0};
-  const char* sentence = "";  ///< with a gap for the place
+  const char* sentence = "";  ///< with a placeholder for the position
   void note(double at, const V3d& where, const char* what) {
     if (at < radius) *this = {at, where, what};
   }
 };
 
-/// Cells that turn over, or pass through the solid.
+/// Finds cells that are inverted, or that pass through the solid.
 void findFolds(const ParticleLayer& layer, const std::vector<V3d>& normals, double radius,
                bool isMirrored, Trouble& trouble) {
   constexpr double kOpposite = -0.5;
@@ -147,19 +149,20 @@ void findFolds(const ParticleLayer& layer, const std::vector<V3d>& normals, doub
       const bool isOpposite = normals[a].dot(normals[a + 1]) < kOpposite ||
                               normals[a].dot(normals[a + layer.columns]) < kOpposite;
       if (isOpposite) {
-        trouble.note(at, layer.positions[a],
-                     "goes around a part at {} that is thinner than its particles are apart; take "
-                     "them closer with --spacing, or ");
+        trouble.note(
+            at, layer.positions[a],
+            "goes around a part at {} that is thinner than its particle spacing; use a smaller "
+            "--spacing, or ");
       }
       const double area = facing(layer, normals, i, j);
       if ((isMirrored ? -area : area) <= 0) {
         trouble.note(at, layer.positions[a],
-                     "folds at {}, where ways from its centre have crossed; ");
+                     "folds at {}, where geodesics from its centre cross; ");
       }
     }
 }
 
-/// Particles that are no neighbours and lie upon each other.
+/// Finds particles that are not neighbours but nearly coincide.
 void findOverlaps(const ParticleLayer& layer, const std::vector<V3d>& normals, double radius,
                   Trouble& trouble) {
   constexpr double kNear = 0.75;  // spacings
@@ -184,7 +187,7 @@ void findOverlaps(const ParticleLayer& layer, const std::vector<V3d>& normals, d
         normals[n].dot(normals[m]) < 0)
       return;
     trouble.note(std::max(squareRadius(layer, n, radius), squareRadius(layer, m, radius)),
-                 layer.positions[n], "comes round to itself at {}; ");
+                 layer.positions[n], "overlaps itself at {}; ");
   };
   for (std::size_t n = 0; n < layer.positions.size(); ++n) {
     const auto [x, y, z] = cellOf(layer.positions[n]);
@@ -197,7 +200,8 @@ void findOverlaps(const ParticleLayer& layer, const std::vector<V3d>& normals, d
   }
 }
 
-/// @throws InvalidInput where the layer folds, lies upon itself or passes through the solid
+/// Checks a layer.
+/// @throws InvalidInput if the layer folds, overlaps itself or passes through the solid
 void requireSound(const NarrowBand& band, const ParticleLayer& layer, double radius,
                   bool isMirrored) {
   const std::vector<V3d> normals = particleNormals(band, layer);
@@ -211,7 +215,7 @@ void requireSound(const NarrowBand& band, const ParticleLayer& layer, double rad
                   smallerRadius(0.95 * trouble.radius)));
 }
 
-/// One exponential map on φ = height.
+/// Builds the layer of one exponential map on φ = height.
 ParticleLayer decalLayer(const NarrowBand& band, const DecalFrame& frame, double radius,
                          double height, double w, std::size_t count, bool isMirrored) {
   ParticleLayer layer;
@@ -224,13 +228,13 @@ ParticleLayer decalLayer(const NarrowBand& band, const DecalFrame& frame, double
   return layer;
 }
 
-/// From the centre to the middles of the sides.
+/// Geodesics from the centre to the middles of the sides.
 std::vector<std::vector<V3d>> spokes(const NarrowBand& band, const DecalFrame& frame,
                                      double radius) {
   const SurfaceField field(band);
   std::vector<std::vector<V3d>> result;
-  for (const V3d& way : {frame.u, -frame.u, frame.v, -frame.v}) {
-    SurfaceWalk walk(field, 0, frame.center, way);
+  for (const V3d& offset : {frame.u, -frame.u, frame.v, -frame.v}) {
+    SurfaceWalk walk(field, 0, frame.center, offset);
     std::vector<V3d> path = {frame.center};
     const double pieces = std::ceil(radius / band.voxelSize());
     for (int i = 0; i < static_cast<int>(pieces) && walk.advance(radius / pieces); ++i)
@@ -240,8 +244,8 @@ std::vector<std::vector<V3d>> spokes(const NarrowBand& band, const DecalFrame& f
   return result;
 }
 
-/// The same frame, one layer up: its centre and spokes are carried along ∇φ.
-/// @return how much longer the spokes have become, on the average
+/// Moves the frame one layer up: its centre and spokes are carried along ∇φ.
+/// @return mean growth factor of the spokes
 double raiseFrame(const NarrowBand& space, double from, double to, DecalFrame& frame,
                   std::vector<std::vector<V3d>>& paths) {
   std::vector<V3d> points = {frame.center};
@@ -257,8 +261,8 @@ double raiseFrame(const NarrowBand& space, double from, double to, DecalFrame& f
     if (path.empty()) path = geodesic(field, to, frame.center, points[i + 1]);
     if (path.empty()) {
       throw InvalidInput(fmt::format(
-          "{}: at height {:.4g} the surface no longer joins its centre and sides; lower the height "
-          "or take the conforming particles",
+          "{}: at height {:.4g} the surface no longer connects its centre and sides; use a lower "
+          "height or --particles conforming",
           kDecal, to));
     }
     growth += pathLength(path) / length / static_cast<double>(paths.size());
@@ -292,25 +296,25 @@ void checkDecalArguments(const NarrowBand& base, const V3d& direction, double ra
   if (!std::isfinite(direction.x) || !std::isfinite(direction.y) || !std::isfinite(direction.z) ||
       direction.length() == 0) {
     throw UsageError(
-        fmt::format("{}: the direction {} shows nowhere; give one that runs along the "
-                    "surface",
+        fmt::format("{}: the direction {} is not a vector of finite, nonzero length; give a "
+                    "direction along the surface",
                     kDecal, pointAsOption(direction)));
   }
   for (const std::vector<V3d>& side : options.sides)
     if (!side.empty())
       throw UsageError(
-          fmt::format("{}: points along sides go with the corners of a patch", kDecal));
+          fmt::format("{}: points along sides require a patch with corners; use `patch`", kDecal));
   if (radius < 2 * base.voxelSize()) {
     throw InvalidInput(
-        fmt::format("{}: the radius {:.4g} is under two voxels of {:.4g}; take a "
-                    "larger one, or resample the base",
+        fmt::format("{}: the radius {:.4g} is under two voxels of {:.4g}; use a "
+                    "larger radius, or resample the base",
                     kDecal, radius, base.voxelSize()));
   }
   const double diagonal = base.zeroSetBounds().size().length();
   if (radius > 10 * diagonal) {
     throw InvalidInput(
-        fmt::format("{}: the radius {:.4g} is over ten times the base's diagonal of {:.4g}; make "
-                    "it smaller",
+        fmt::format("{}: the radius {:.4g} is over ten times the base's diagonal of {:.4g}; use a "
+                    "smaller radius",
                     kDecal, radius, diagonal));
   }
 }

@@ -32,7 +32,7 @@ void checkPatchArguments(const std::array<V3d, 4>& corners, double height,
 
 struct Outline {
   std::array<V3d, 4> corners;
-  PatchSides between;  ///< points that the sides pass
+  PatchSides between;  ///< points on the sides between the corners
 };
 
 void checkApart(const NarrowBand& base, const Outline& outline) {
@@ -41,10 +41,10 @@ void checkApart(const NarrowBand& base, const Outline& outline) {
     for (std::size_t j = i + 1; j < 4; ++j) {
       const double distance = (corners[i] - corners[j]).length();
       if (distance < 2 * base.voxelSize()) {
-        throw InvalidInput(fmt::format(
-            "{}: corners {} and {} both fall on {}, {:.3g} voxels apart; a patch needs sides of at "
-            "least two voxels",
-            kPatch, i, j, pointAsOption(corners[i]), distance / base.voxelSize()));
+        throw InvalidInput(
+            fmt::format("{}: corners {} and {} both project to {}, {:.3g} voxels apart; sides must "
+                        "be at least two voxels long",
+                        kPatch, i, j, pointAsOption(corners[i]), distance / base.voxelSize()));
       }
     }
   constexpr std::array<std::array<std::size_t, 2>, 4> kEnds = {{{0, 1}, {1, 2}, {3, 2}, {0, 3}}};
@@ -54,16 +54,16 @@ void checkApart(const NarrowBand& base, const Outline& outline) {
     knots.push_back(corners[kEnds[side][1]]);
     for (std::size_t i = 1; i < knots.size(); ++i) {
       if ((knots[i] - knots[i - 1]).length() >= 2 * base.voxelSize()) continue;
-      throw InvalidInput(fmt::format(
-          "{}: two points of side {} both fall on {}; the side begins and ends at corners by "
-          "itself, leave one point out",
-          kPatch, side, pointAsOption(knots[i])));
+      throw InvalidInput(
+          fmt::format("{}: two points of side {} both project to {}; leave one out (the corners "
+                      "are already part of the side)",
+                      kPatch, side, pointAsOption(knots[i])));
     }
   }
 }
 
-/// Positive when the corners run anticlockwise seen from outside: twice the area that each corner
-/// spans with its neighbours, against the normal there.
+/// Positive if the corners are in anticlockwise order seen from outside: twice the area spanned at
+/// each corner with its neighbours, projected on the normal there.
 double handedness(const NarrowBand& base, const std::array<V3d, 4>& corners) {
   const SurfaceField field(base);
   double sum = 0;
@@ -74,17 +74,17 @@ double handedness(const NarrowBand& base, const std::array<V3d, 4>& corners) {
   return sum;
 }
 
-/// The same by the directions in which sides leave the corners: it tells also where a patch is
-/// wrapped around an edge, so that its corners lie above each other.
+/// The same from the directions in which sides leave the corners. It also works for a patch wrapped
+/// around an edge, whose corners lie above each other.
 double handednessOfSides(const NarrowBand& base, const PatchSides& sides) {
   const SurfaceField field(base);
-  // A tenth of the way along.
+  // Direction over the first tenth of the side.
   const auto leaving = [](const std::vector<V3d>& side, bool isReversed) {
     const std::vector<V3d> tenths = sampleByArcLength(side, 11);
     return isReversed ? (tenths[9] - tenths[10]).normalized()
                       : (tenths[1] - tenths[0]).normalized();
   };
-  const std::array<std::array<V3d, 2>, 4> ways = {
+  const std::array<std::array<V3d, 2>, 4> offsets = {
       {{leaving(sides[0], false), leaving(sides[3], false)},
        {leaving(sides[1], false), leaving(sides[0], true)},
        {leaving(sides[2], true), leaving(sides[1], true)},
@@ -93,11 +93,12 @@ double handednessOfSides(const NarrowBand& base, const PatchSides& sides) {
                                       sides[2].front()};
   double sum = 0;
   for (std::size_t i = 0; i < 4; ++i)
-    sum += ways[i][0].cross(ways[i][1]).dot(field.normal(corners[i]));
+    sum += offsets[i][0].cross(offsets[i][1]).dot(field.normal(corners[i]));
   return sum;
 }
 
-/// @return true when mirrored
+/// Checks the orientation of the corners.
+/// @return true if the patch is mirrored
 bool checkOrientation(const NarrowBand& base, const std::array<V3d, 4>& given,
                       const PatchSides& sides, bool mirror) {
   const std::array<V3d, 4> corners = {sides[0].front(), sides[0].back(), sides[2].back(),
@@ -114,9 +115,8 @@ bool checkOrientation(const NarrowBand& base, const std::array<V3d, 4>& given,
   }
   if (area < 0 && !mirror) {
     throw UsageError(
-        fmt::format("{}: the corners run clockwise seen from outside, which would mirror the "
-                    "texture; give them as "
-                    "\"{} {} {} {}\" or ask for --mirror",
+        fmt::format("{}: the corners are in clockwise order seen from outside, which mirrors the "
+                    "texture; give them as \"{} {} {} {}\", or give --mirror",
                     kPatch, pointAsOption(given[0]), pointAsOption(given[3]),
                     pointAsOption(given[2]), pointAsOption(given[1])));
   }
@@ -142,7 +142,7 @@ LayerSides makeLayerSides(const NarrowBand& band, double height, const std::arra
   return layer;
 }
 
-/// Corners and points between them, projected to the surface.
+/// Projects the corners and the points between them to the surface.
 Outline projectOutline(const NarrowBand& base, const std::array<V3d, 4>& corners,
                        const PatchOptions& options, PatchReport& report) {
   Outline outline;
@@ -158,7 +158,7 @@ Outline projectOutline(const NarrowBand& base, const std::array<V3d, 4>& corners
   return outline;
 }
 
-/// Counts by the spacing; positions between the sides.
+/// Builds a layer: counts from the spacing, positions between the sides.
 ParticleLayer filledLayer(const NarrowBand& band, const NarrowBand& guide, const LayerSides& border,
                           double height, double spacing, const PatchOptions& options,
                           PatchReport& report) {
@@ -173,14 +173,15 @@ ParticleLayer filledLayer(const NarrowBand& band, const NarrowBand& guide, const
   return layer;
 }
 
-/// In which corners, and the points between them, rise; empty: along ∇φ.
+/// Directions in which the corners and the points between them rise; empty: along ∇φ.
 struct Rise {
   std::vector<V3d> corners;
   std::array<std::vector<V3d>, 4> between;
-  double lean = 0;  ///< how far they lead away sideways for each length of height
+  double lean = 0;  ///< sideways displacement per unit of height
 };
 
-/// The unit direction of each corner.
+/// Unit direction of each corner.
+/// @throws UsageError for a direction that hardly leads away from the surface
 /// @throws UsageError for one that hardly leads away from the surface
 std::vector<V3d> cornerDirections(const NarrowBand& base, const Outline& outline,
                                   const PatchOptions& options) {
@@ -196,10 +197,10 @@ std::vector<V3d> cornerDirections(const NarrowBand& base, const Outline& outline
     directions[i].normalize();
     constexpr double kLeastCosine = 0.2;  // 78 degrees
     if (directions[i].dot(field.normal(outline.corners[i])) >= kLeastCosine) continue;
-    throw UsageError(fmt::format(
-        "{}: the direction {} hardly leads away from the surface at corner {}, {}; let it lean by "
-        "less than 78 degrees",
-        kPatch, pointAsOption(directions[i]), i, pointAsOption(outline.corners[i])));
+    throw UsageError(
+        fmt::format("{}: the direction {} hardly leads away from the surface at corner {}, {}; "
+                    "give a direction less than 78 degrees from the normal",
+                    kPatch, pointAsOption(directions[i]), i, pointAsOption(outline.corners[i])));
   }
   return directions;
 }
@@ -224,7 +225,7 @@ Rise riseOf(const NarrowBand& base, const Outline& outline, const PatchOptions& 
   return rise;
 }
 
-/// Brings corners and points between them from one layer to the next.
+/// Moves the corners and the points between them from one layer to the next.
 void raiseOutline(const NarrowBand& space, const Rise& rise, double from, double to,
                   Outline& outline) {
   if (rise.corners.empty()) {
@@ -237,8 +238,8 @@ void raiseOutline(const NarrowBand& space, const Rise& rise, double from, double
     raisePoints(space, to, rise.between[side], outline.between[side]);
 }
 
-/// Scheme B: the sides of each layer from its own advected corners, and a complete patch between
-/// them.
+/// Scheme B: builds the sides of each layer from its own advected corners, and a complete patch
+/// between them.
 std::vector<ParticleLayer> reducedLayers(const NarrowBand& base, Outline outline,
                                          std::vector<LayerSides> sides, double height,
                                          const PatchOptions& options, PatchReport& report) {
@@ -251,7 +252,7 @@ std::vector<ParticleLayer> reducedLayers(const NarrowBand& base, Outline outline
     sides.push_back(makeLayerSides(space, layer, outline.corners, outline.between,
                                    &sides.back().sides, &sides.front().sides));
   }
-  // As large as taper leaves them.
+  // Sizes of the layers after tapering.
   const auto scaleOf = [&](const LayerSides& border) {
     return std::lerp(1.0, options.transform.taper, border.height / height);
   };
@@ -271,7 +272,7 @@ std::vector<ParticleLayer> reducedLayers(const NarrowBand& base, Outline outline
   return layers;
 }
 
-/// Schemes A and C: one patch on the surface, whose particles travel.
+/// Schemes A and C: builds one patch on the surface, whose particles then move.
 std::vector<ParticleLayer> travellingLayers(const NarrowBand& base, const LayerSides& sides,
                                             double height, const PatchOptions& options,
                                             PatchReport& report) {
@@ -305,7 +306,7 @@ PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners,
                        options.spacing, options);
   levelset::report(options.progress, 0.1, kPatch);
 
-  // === Layers above it
+  // === The layers above it
   patch.layers = options.scheme == LayerScheme::Reduced
                      ? reducedLayers(base, outline, std::move(sides), height, options, report)
                      : travellingLayers(base, sides.front(), height, options, report);
@@ -339,12 +340,12 @@ std::array<V3d, 4> cornersAround(const NarrowBand& base, const V3d& point, doubl
   constexpr std::array<std::array<double, 2>, 4> kSigns = {{{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}};
   std::array<V3d, 4> corners;
   for (std::size_t i = 0; i < 4; ++i) {
-    const V3d way = u * (0.5 * a * kSigns[i][0]) + v * (0.5 * b * kSigns[i][1]);
-    const std::optional<V3d> corner = walkStraight(field, 0, center, way, way.length());
+    const V3d offset = u * (0.5 * a * kSigns[i][0]) + v * (0.5 * b * kSigns[i][1]);
+    const std::optional<V3d> corner = walkStraight(field, 0, center, offset, offset.length());
     if (!corner) {
       throw InvalidInput(fmt::format(
-          "{}: the surface breaks off on the way from {} to corner {}; choose a smaller "
-          "size or give the corners",
+          "{}: the surface breaks off between {} and corner {}; use a smaller size, or give the "
+          "corners",
           kPatch, pointAsOption(center), i));
     }
     corners[i] = *corner;

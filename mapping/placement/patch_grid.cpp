@@ -26,9 +26,9 @@ using levelset::NarrowBand;
 using levelset::UsageError;
 
 constexpr const char* kGrid = "patch-grid";
-constexpr double kMostPerTile = 2000;    // particles, as many as a single patch has
-constexpr double kMostPerGrid = 20000;   // all layers; relaxing takes the longer the more there are
-constexpr std::size_t kFewestCells = 4;  // of a tile, along a side
+constexpr double kMostPerTile = 2000;    // particles, the same as for a single patch
+constexpr double kMostPerGrid = 20000;   // over all layers; relaxation slows down with their number
+constexpr std::size_t kFewestCells = 4;  // along each side of a tile
 
 void checkGrid(const PatchGridOptions& grid) {
   constexpr std::size_t kMostTiles = 100'000;
@@ -43,7 +43,7 @@ void checkGrid(const PatchGridOptions& grid) {
   }
 }
 
-/// How many cells a tile has along u and v.
+/// Number of cells of a tile along u and v.
 std::array<std::size_t, 2> cellsPerTile(const NarrowBand& base, const LayerSize& whole,
                                         const PatchGridOptions& grid, const PatchOptions& options) {
   if (options.cells[0] > 0) return options.cells;
@@ -65,22 +65,22 @@ std::array<std::size_t, 2> cellsPerTile(const NarrowBand& base, const LayerSize&
   return result;
 }
 
-/// Layers of particles that are cut into tiles.
+/// Particle layers that are cut into tiles.
 struct Sheet {
-  std::vector<ParticleLayer> layers;  ///< of equal counts
-  bool isRing = false;                ///< the last column is the first one again
+  std::vector<ParticleLayer> layers;  ///< all with equal counts
+  bool isRing = false;                ///< true: the last column equals the first
   double height = 0;
   bool isMirrored = false;
   LayerScheme scheme = LayerScheme::Reduced;
 };
 
 struct Tile {
-  std::size_t column, row;    ///< of its first particle
-  std::size_t columns, rows;  ///< of its cells
+  std::size_t column, row;    ///< of the first particle
+  std::size_t columns, rows;  ///< number of cells
   bool isTurnedU, isTurnedV;
 };
 
-/// The part of a layer under a tile; its rim lies on the neighbours' particles.
+/// Part of a layer under a tile; its rim consists of the neighbours' particles.
 ParticleLayer cut(const ParticleLayer& whole, const Tile& tile, bool isRing) {
   ParticleLayer part;
   part.columns = tile.columns + 1;
@@ -136,36 +136,37 @@ std::vector<Patch> cutTiles(const Sheet& sheet, const PatchGridOptions& grid) {
   return patches;
 }
 
-/// An axis and directions across it: `out` at the first seam, and `side` a quarter turn on.
+/// An axis and two directions across it: `out` at the first seam, and `side` a quarter turn
+/// further.
 struct RoundFrame {
   V3d from, along, out, side;
   double length;
   [[nodiscard]] V3d direction(double angle) const {
     return out * std::cos(angle) + side * std::sin(angle);
   }
-  [[nodiscard]] V3d place(double share) const { return from + along * (length * share); }
+  [[nodiscard]] V3d pointAt(double share) const { return from + along * (length * share); }
 };
 
 RoundFrame roundFrame(const NarrowBand& base, const V3d& from, const V3d& to, double rotation) {
-  const V3d way = to - from;
-  if (!(way.length() >= 2 * base.voxelSize()) || !std::isfinite(way.length())) {
+  const V3d offset = to - from;
+  if (!(offset.length() >= 2 * base.voxelSize()) || !std::isfinite(offset.length())) {
     throw UsageError(
         fmt::format("{}: the axis from {} to {} is under two voxels long; give two "
-                    "points on it that are apart",
+                    "points that are further apart",
                     kGrid, pointAsOption(from), pointAsOption(to)));
   }
   if (!std::isfinite(rotation))
     throw UsageError(fmt::format("{}: the rotation is {}; give an angle", kGrid, rotation));
-  const V3d along = way.normalized();
+  const V3d along = offset.normalized();
   const V3d reference = std::abs(along.x) < 0.9 ? V3d(1, 0, 0) : V3d(0, 1, 0);
   const V3d east = (reference - along * along.dot(reference)).normalized();
   const V3d north = along.cross(east);
   const V3d out = east * std::cos(rotation) + north * std::sin(rotation);
-  return {from, along, out, along.cross(out), way.length()};
+  return {from, along, out, along.cross(out), offset.length()};
 }
 
-/// Where a line from outside to the axis meets the surface first.
-/// @throws InvalidInput when it does not
+/// First intersection of a line from outside to the axis with the surface.
+/// @throws InvalidInput if there is none
 V3d seenFromOutside(const SurfaceField& field, const V3d& axis, const V3d& direction, double far,
                     double background) {
   double outer = far, inner = far;
@@ -176,10 +177,10 @@ V3d seenFromOutside(const SurfaceField& field, const V3d& axis, const V3d& direc
     inner -= std::max(0.9 * std::min(phi, background), 0.1 * field.voxelSize());
   }
   if (inner <= 0 || inner == far) {
-    throw InvalidInput(fmt::format(
-        "{}: from the axis at {} no surface is met along {:.3g},{:.3g},{:.3g}; let the axis run "
-        "inside the base and end before the base does",
-        kGrid, pointAsOption(axis), direction.x, direction.y, direction.z));
+    throw InvalidInput(
+        fmt::format("{}: the line from the axis at {} along {:.3g},{:.3g},{:.3g} meets no surface; "
+                    "the axis must be inside the base, and end before the base does",
+                    kGrid, pointAsOption(axis), direction.x, direction.y, direction.z));
   }
   for (int i = 0; i < 50; ++i) {
     const double middle = 0.5 * (inner + outer);
@@ -188,7 +189,8 @@ V3d seenFromOutside(const SurfaceField& field, const V3d& axis, const V3d& direc
   return axis + direction * (0.5 * (inner + outer));
 }
 
-/// The first and last row evenly along their rings, those between by equal angles.
+/// Builds the surface layer. Particles of the first and last row are evenly spaced along their
+/// rings, those of the other rows at equal angles.
 ParticleLayer roundLayer(const NarrowBand& base, const RoundFrame& frame, std::size_t columns,
                          std::size_t rows) {
   const SurfaceField field(base);
@@ -199,7 +201,7 @@ ParticleLayer roundLayer(const NarrowBand& base, const RoundFrame& frame, std::s
   layer.columns = columns + 1;
   layer.rows = rows + 1;
   for (std::size_t j = 0; j <= rows; ++j) {
-    const V3d axis = frame.place(static_cast<double>(j) / static_cast<double>(rows));
+    const V3d axis = frame.pointAt(static_cast<double>(j) / static_cast<double>(rows));
     const bool isBorder = j == 0 || j == rows;
     const std::size_t count = isBorder ? 4 * columns : columns;
     std::vector<V3d> ring;
@@ -218,9 +220,10 @@ ParticleLayer roundLayer(const NarrowBand& base, const RoundFrame& frame, std::s
   return layer;
 }
 
-/// @throws InvalidInput where neighbours lie so far apart that the surface is not one sheet
+/// Checks that the surface around the axis is a single sheet.
+/// @throws InvalidInput where neighbours are too far apart
 void requireOneSheet(const ParticleLayer& layer) {
-  constexpr double kFarthest = 4;  // times the mean of all along u, or along v
+  constexpr double kFarthest = 4;  // multiple of the mean distance along u, or along v
   for (const auto& [across, up] : {std::pair<std::size_t, std::size_t>{1, 0}, {0, 1}}) {
     std::vector<std::pair<double, V3d>> steps;
     double sum = 0;
@@ -234,13 +237,13 @@ void requireOneSheet(const ParticleLayer& layer) {
       if (length <= kFarthest * sum / static_cast<double>(steps.size())) continue;
       throw InvalidInput(fmt::format(
           "{}: seen from the axis the surface jumps at {}; move the axis or its ends so that each "
-          "line out from it meets one sheet",
+          "line from the axis meets only one sheet",
           kGrid, pointAsOption(place)));
     }
   }
 }
 
-/// The rim goes on around, and straight on at the two ends.
+/// Adds the rim: periodic around the axis, and straight at the two ends.
 void addRoundRim(const NarrowBand& band, ParticleLayer& layer) {
   addRim(band, layer);
   const auto last = static_cast<int>(layer.columns) - 1, rows = static_cast<int>(layer.rows);
@@ -309,15 +312,16 @@ PatchGridResult makePatchGridAround(const NarrowBand& base, const V3d& from, con
   if (grid.columns < 3)
     throw UsageError(fmt::format("{}: {} tiles around; give at least 3", kGrid, grid.columns));
   if (grid.mirrorU && grid.columns % 2 == 1) {
-    throw UsageError(fmt::format(
-        "{}: of {} tiles around, every other one mirrored, the last would not meet the first; give "
-        "an even number",
-        kGrid, grid.columns));
+    throw UsageError(
+        fmt::format("{}: with --mirror u or both the number of tiles around must be even, so that "
+                    "the last matches the first; {} is odd",
+                    kGrid, grid.columns));
   }
   if (options.scheme == LayerScheme::Spline || !options.transform.isIdentity() || options.mirror) {
-    throw UsageError(fmt::format(
-        "{}: splines, twist, taper, bend and mirrored corners do not go with tiles around an axis",
-        kGrid));
+    throw UsageError(
+        fmt::format("{}: --particles spline, twist, taper, bend and --mirrored cannot be combined "
+                    "with tiles around an axis",
+                    kGrid));
   }
   const RoundFrame frame = roundFrame(base, from, to, rotation);
   PatchGridResult result;

@@ -11,38 +11,42 @@
 
 namespace mapping {
 
-/// How a texture is tiled.
+/// Tiling of a texture over one patch.
 struct PatchGridOptions {
   std::size_t columns = 1, rows = 1;  ///< tiles along u and v, each at least 1
-  bool mirrorU = false;               ///< every other column of tiles runs the other way along u
-  bool mirrorV = false;               ///< every other row of tiles runs the other way along v
-  /// Every other row is moved along u by this share of a tile, 0 to below 1, to the nearest
-  /// particle. Such a row of an open grid has one tile less.
+  bool mirrorU = false;               ///< every second column of tiles is mirrored along u
+  bool mirrorV = false;               ///< every second row of tiles is mirrored along v
+  /// Shift of every second row along u, as a share of a tile from 0 to below 1, rounded to the
+  /// nearest particle. In an open grid such a row has one tile less.
   double shift = 0;
 };
 
 struct PatchGridResult {
   std::vector<Patch> patches;  ///< row by row, along u first
-  PatchReport report;          ///< of all tiles together
+  PatchReport report;          ///< over all tiles
 };
 
-/// Tiles of one patch between four corners, see makePatch. Neighbours share the particles of their
-/// common border, bit for bit, and each tile's rim lies on its neighbours' particles: textures that
-/// meet at the borders of their boxes meet on the surface. Layers have equal counts of particles.
-/// @throws as makePatch; UsageError for counts of 0, and a shift out of range
+/// Builds the tiles of one patch between four corners, see makePatch. Neighbours share the
+/// particles of their common border bit for bit, and the rim of each tile lies on its neighbours'
+/// particles. So textures that match at the borders of their boxes match on the surface. All layers
+/// have equal particle counts.
+/// @throws UsageError as makePatch, and for counts of 0 and a shift out of range
+/// @throws InvalidInput as makePatch
 [[nodiscard]] PatchGridResult makePatchGrid(const levelset::NarrowBand& base,
                                             const std::array<Imath::V3d, 4>& corners, double height,
                                             const PatchGridOptions& grid,
                                             const PatchOptions& options = {});
 
-/// Tiles all around an axis, between the planes across it through its two ends: u runs around,
-/// anticlockwise seen from `to`, v from `from` to `to`; the last column meets the first. The
-/// surface is what is seen from outside along lines at right angles to the axis.
-/// @param from, to  on the axis, apart; a solid of revolution has its own
-/// @param rotation  of the first seam about the axis, radians, from the direction that is nearest
-///                  to +x (or +y along x)
-/// @throws UsageError also for less than 3 columns, or mirrorU with an odd number of them;
-///         InvalidInput where no surface lies around the axis, or where it is not one sheet
+/// Builds tiles all around an axis, between the two planes across it through its ends. The
+/// direction of u is around the axis, anticlockwise seen from `to`. That of v is from `from` to
+/// `to`. The last column joins the first. The surface used is the part visible from outside along
+/// lines perpendicular to the axis.
+/// @param from, to  different points on the axis; a solid of revolution has its own axis
+/// @param rotation  angle of the first seam about the axis, radians, from the perpendicular
+///         direction nearest to +x (or to +y for an axis along x)
+/// @throws UsageError as makePatchGrid, for fewer than 3 columns, and for mirrorU with an odd
+///         number of columns
+/// @throws InvalidInput where no surface lies around the axis, or where it is not a single sheet
 [[nodiscard]] PatchGridResult makePatchGridAround(const levelset::NarrowBand& base,
                                                   const Imath::V3d& from, const Imath::V3d& to,
                                                   double rotation, double height,

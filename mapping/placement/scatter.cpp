@@ -26,12 +26,12 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 
 constexpr const char* kScatter = "scatter";
-// Places that are tried for each patch that is asked for, before fewer will have to do.
+// Positions tried for each requested patch.
 constexpr std::size_t kTriesPerPatch = 3;
-// A patch that fills a gap may be this much nearer to the others than those are to each other.
+// A patch that fills a gap may be nearer to others by this factor than they are to each other.
 constexpr double kGapShare = 0.75;
 
-/// A number in [−1, 1) that belongs to a place, whichever of the others are taken.
+/// A random number in [−1, 1) for one position, independent of the other positions.
 double luckAt(std::uint64_t seed, std::size_t index) {
   std::uint64_t z = seed + (index + 1) * 0x9e3779b97f4a7c15;  // splitmix64
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
@@ -40,7 +40,7 @@ double luckAt(std::uint64_t seed, std::size_t index) {
   return 2 * (static_cast<double>(z >> 11) * 0x1p-53) - 1;
 }
 
-/// The angle from where cornersAround lays u to a direction, about the normal.
+/// Angle about the normal from the direction of u in cornersAround to a direction.
 double angleTowards(const SurfacePoint& point, const V3d& direction) {
   const V3d flat = direction - point.normal * point.normal.dot(direction);
   if (!(flat.length() > 1e-6 * direction.length()) || !(direction.length() > 0)) return 0;
@@ -52,16 +52,16 @@ PatchSite siteAt(const NarrowBand& base, const SurfacePoint& point, std::size_t 
                  const ScatterOptions& options) {
   double rotation = options.rotation + options.jitter * luckAt(options.density.seed, index);
   if (options.direction) {
-    const V3d direction = options.direction(point.place, 0);
+    const V3d direction = options.direction(point.position, 0);
     if (!std::isfinite(direction.length())) {
       throw levelset::UsageError(
           fmt::format("{}: the direction at ({:.6g}, {:.6g}, {:.6g}) is not finite", kScatter,
-                      point.place.x, point.place.y, point.place.z));
+                      point.position.x, point.position.y, point.position.z));
     }
     rotation += angleTowards(point, direction);
   }
-  return {cornersAround(base, point.place, options.uSize * point.scale, options.vSize * point.scale,
-                        rotation),
+  return {cornersAround(base, point.position, options.uSize * point.scale,
+                        options.vSize * point.scale, rotation),
           point.scale};
 }
 
@@ -75,7 +75,7 @@ bool doesFold(const Patch& patch) {
   return surveyDistortion(sampleLayerMap(patch, 0), V3d(1), patch.mirrored).folded > 0;
 }
 
-/// A patch, or why there is none.
+/// A patch, or the reason why there is none.
 struct Attempt {
   std::optional<Patch> patch;
   PatchSite site = {};
@@ -88,7 +88,7 @@ Attempt tryAt(const NarrowBand& base, const SurfacePoint& point, std::size_t ind
   try {
     attempt.site = siteAt(base, point, index, options);
     PatchOptions part = atScale(options.patch, point.scale);
-    part.mirror = true;  // corners in the wrong order are no mistake of the caller's here
+    part.mirror = true;  // clockwise corners are not an error of the caller here
     PatchResult made = makePatch(base, attempt.site.corners, height * point.scale, part);
     Patch& patch = made.patch;
     const auto isHalf = [&](double length, double asked) {
@@ -96,7 +96,7 @@ Attempt tryAt(const NarrowBand& base, const SurfacePoint& point, std::size_t ind
     };
     if (patch.mirrored || isHalf(made.report.uLength, options.uSize) ||
         isHalf(made.report.vLength, options.vSize)) {
-      attempt.cause = "the surface is too bent for a patch of this size";
+      attempt.cause = "the surface bends too much for a patch of this size";
       return attempt;
     }
     if (!options.allowFolds && doesFold(patch)) {
@@ -110,7 +110,7 @@ Attempt tryAt(const NarrowBand& base, const SurfacePoint& point, std::size_t ind
   return attempt;
 }
 
-/// Splines are followed without distances.
+/// Sweeps shared distances, which spline patches do not need.
 std::optional<NarrowBand> sweepFor(const NarrowBand& base, const PatchCrowd& crowd,
                                    const PatchOptions& options) {
   if (options.scheme == LayerScheme::Spline) return {};
@@ -118,7 +118,7 @@ std::optional<NarrowBand> sweepFor(const NarrowBand& base, const PatchCrowd& cro
                           {.maxMemory = options.maxMemory, .progress = options.progress});
 }
 
-/// Places beyond the best so many are not tried.
+/// Number of positions that are tried, the best first.
 std::size_t triesOf(const ScatteredPoints& points) {
   return std::min(points.points.size(), kTriesPerPatch * points.wanted);
 }
@@ -168,7 +168,7 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
   parts.patch.progress = {};
   parts.patch.space = space ? &*space : nullptr;
 
-  // === The places that were chosen
+  // === The chosen positions
   std::vector<Attempt> attempts(points.wanted);
   const levelset::Progress progress = levelset::subProgress(options.density.progress, 0.4, 0.9);
   levelset::ProgressGate gate(progress, points.wanted, kScatter);
@@ -188,7 +188,7 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
   };
   for (std::size_t n = 0; n < points.wanted; ++n) take(attempts[n], points.points[n]);
 
-  // === The next best in the gaps of those that bear no patch
+  // === The next best positions, in the gaps of those where no patch could be built
   const std::size_t tries = triesOf(points);
   const double kept = std::isfinite(points.distance) ? points.distance : 0;
   for (std::size_t n = points.wanted; n < tries && taken.size() < points.wanted; ++n) {
@@ -199,8 +199,9 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
     levelset::report(options.density.progress, 0.9, kScatter);
   }
   if (result.patches.empty()) {
-    throw InvalidInput(fmt::format("{}: none of {} places bears a patch, at the first because: {}",
-                                   kScatter, result.leftOut, result.cause));
+    throw InvalidInput(fmt::format(
+        "{}: no patch could be built at any of {} positions; the first failed because: {}",
+        kScatter, result.leftOut, result.cause));
   }
   result.distance = leastDistance(taken, base.zeroSetBounds().size().length(), kept);
   levelset::report(options.density.progress, 1, kScatter);

@@ -12,21 +12,21 @@
 #include "mapping/placement/make_patch.h"
 #include "mapping/surface/scattered_points.h"
 
-/// Many patches strewn over a surface [Brodersen07 §8.5, figure 8.11].
+/// Scatters many patches over a surface [Brodersen07 §8.5, figure 8.11].
 namespace mapping {
 
 struct ScatterOptions {
-  ScatterDensity density = {};  ///< its scale is that of the patches, heights included
-  double uSize = 0, vSize = 0;  ///< of a patch at scale 1, world units
-  /// u runs along this, as far as the surface lets it; empty or zero: as `cornersAround` has it.
+  ScatterDensity density = {};  ///< its scale also scales the patches, heights included
+  double uSize = 0, vSize = 0;  ///< size of a patch at scale 1, world units
+  /// Direction of u, projected onto the surface; empty or zero: the direction of `cornersAround`.
   levelset::VectorField direction = {};
-  double rotation = 0;      ///< of u about the normal, radians
-  double jitter = 0;        ///< a random turn of up to this to either side, radians
-  PatchOptions patch = {};  ///< spacing at scale 1
+  double rotation = 0;      ///< rotation of u about the normal, radians
+  double jitter = 0;        ///< amplitude of a random rotation to either side, radians
+  PatchOptions patch = {};  ///< its spacing is the one at scale 1
   bool allowFolds = false;
 };
 
-/// Where one patch of many lies.
+/// Corners and scale of one scattered patch.
 struct PatchSite {
   std::array<Imath::V3d, 4> corners;
   double scale = 1;
@@ -34,22 +34,22 @@ struct PatchSite {
 
 struct ScatterResult {
   std::vector<Patch> patches;
-  std::vector<PatchSite> sites;  ///< of the patches
-  double distance = 0;           ///< least distance of two patches' centres, in their scales
-  std::size_t leftOut = 0;       ///< places that bear no patch
-  std::string cause;             ///< why the first of them does not
+  std::vector<PatchSite> sites;  ///< one for each patch
+  double distance = 0;      ///< least distance between two patch centres, in units of their scales
+  std::size_t leftOut = 0;  ///< number of positions where no patch could be built
+  std::string cause;        ///< reason for the first position left out
 };
 
-/// Strews patches over a surface. A place that bears none, because the surface is too bent or
-/// breaks off there or because the patch would fold, is left out and counted; with a count, others
-/// are tried instead.
-/// @param height  at scale 1, world units
-/// @throws as scatterPoints and makePatch do; InvalidInput, telling a cause, when no place bears a
-///         patch
+/// Scatters patches over a surface. A position is left out and counted if the surface bends too
+/// much or breaks off there, or if the patch would fold. If a count is given, other positions are
+/// tried instead.
+/// @param height  patch height at scale 1, world units
+/// @throws UsageError, ResourceLimit as scatterPoints and makePatch
+/// @throws InvalidInput as scatterPoints, and with the reason if no position allows a patch
 [[nodiscard]] ScatterResult scatter(const levelset::NarrowBand& base, double height,
                                     const ScatterOptions& options);
 
-/// The patches of known sites at another height.
+/// Builds patches at known sites with another height.
 [[nodiscard]] std::vector<Patch> makePatches(const levelset::NarrowBand& base,
                                              const std::vector<PatchSite>& sites, double height,
                                              const PatchOptions& options = {});

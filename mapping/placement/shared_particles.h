@@ -6,9 +6,9 @@
 
 namespace mapping {
 
-/// Particles on the sides of a layer of patches that fell together before each patch was moved by
-/// itself, to a thousandth of the spacing as those of tiles do, fall together again: in the mean of
-/// their places.
+/// Joins the particles that adjacent patches share on their sides again, after each patch was moved
+/// separately. Particles count as shared if they coincided before to a thousandth of the spacing,
+/// as those of tiles do. Each joined particle gets the mean position.
 /// @param before, after  the same patches, with the same layers
 void joinSharedParticles(std::span<const Patch> before, std::span<Patch> after);
 

@@ -23,7 +23,7 @@ using ToNodes = NodeWeights<kNodes, kNodes>;
 
 const std::array<double, kNodes>& kChebyshev = chebyshevNodes<kNodes>();
 
-/// Coefficients of T_0 … T_5 from values at the nodes.
+/// Weights that convert values at the nodes to coefficients of T_0 … T_5.
 ToNodes makeToCoefficients() {
   ToNodes weights;
   for (std::size_t k = 0; k < kNodes; ++k)
@@ -41,7 +41,7 @@ NodeWeights<kNodes, kLeaf> makeToGridPoints() {
 }
 const NodeWeights<kNodes, kLeaf> kToGridPoints = makeToGridPoints();
 
-/// From a block's nodes to those of its lower or upper half along an axis.
+/// Weights from a block's nodes to the nodes of its lower or upper half along an axis.
 ToNodes toHalf(int edge, bool isUpper) {
   const double half = (0.5 * edge - 1) / (edge - 1), middle = isUpper ? 1 - half : half - 1;
   std::array<double, kNodes> at;
@@ -57,11 +57,11 @@ double radiusOf(const GridBlock& block) {
   return 0.5 * (block.edge - 1) * std::sqrt(longest);
 }
 
-// Lebesgue constant of six Chebyshev nodes.
+// Lebesgue constant for six Chebyshev nodes.
 constexpr double kLebesgue = 2.11;
 
-/// How far the polynomial may be off for a particle of weight 1 that is `gap` from the hull: by the
-/// sixth derivatives, or by all that there is of a kernel that falls off.
+/// Error bound of the polynomial for a particle of weight 1 at distance `gap` from the hull. It
+/// uses the sixth derivatives, or the value bound of a decaying kernel.
 template <typename Kernel>
 double farError(double halfEdge, double gap) {
   const double a = halfEdge / 2, squared = a * a;
@@ -70,7 +70,7 @@ double farError(double halfEdge, double gap) {
   return std::min(cube, Kernel::farBound(gap) * (1 + kLebesgue * kLebesgue * kLebesgue));
 }
 
-/// MemoryEstimate for what a tangent at the middle of a ball leaves out.
+/// Bound of the remainder beyond the tangent at the middle of a ball.
 template <typename Kernel>
 double beyondTangent(double distance, double radius) {
   const double lo = std::max(distance - radius, 0.0), hi = distance + radius;
@@ -78,7 +78,7 @@ double beyondTangent(double distance, double radius) {
                   0.5 * radius * radius * Kernel::bendBound(lo, hi));
 }
 
-/// The block in the map's own coordinates, mean particle spacings about its origin.
+/// Block in the map's own coordinates: mean particle spacings relative to its origin.
 GridBlock scaled(const GridBlock& block, const V3d& origin, double spacing) {
   GridBlock result = block;
   result.origin = (block.origin - origin) / spacing;
@@ -136,8 +136,8 @@ std::vector<std::uint32_t> RbfBlock::split(Kernel, std::span<const std::uint32_t
   double halfEdge = 0;
   for (int i = 0; i < 3; ++i) halfEdge = std::max(halfEdge, half * block_.row(i).length());
 
-  // Those whose errors are least go first, as many as the tolerance lets; what the octants may add
-  // is left to them. Errors are told apart by their power of two only.
+  // Particles with the smallest errors go first, as many as the tolerance allows; a share of the
+  // tolerance is reserved for the octants. Errors are sorted only by their power of two.
   constexpr int kPowers = 128;
   std::array<double, kPowers> errors{};
   std::vector<std::int8_t> power(candidates.size());
@@ -194,10 +194,10 @@ Imath::Box3d RbfBlock::boundsFor(Kernel) const {
   V3d value(0), remainder(error_);
   M33d gradient(0, 0, 0, 0, 0, 0, 0, 0, 0);
   for (const std::uint32_t i : near_) {
-    const V3d way = center - map_.particles_[i].position, weight = map_.particles_[i].weight;
-    const double distance = way.length();
+    const V3d offset = center - map_.particles_[i].position, weight = map_.particles_[i].weight;
+    const double distance = offset.length();
     value += weight * Kernel::value(distance);
-    const V3d slope = distance > 0 ? way * (Kernel::slope(distance) / distance) : V3d(0);
+    const V3d slope = distance > 0 ? offset * (Kernel::slope(distance) / distance) : V3d(0);
     for (int k = 0; k < 3; ++k)
       for (int axis = 0; axis < 3; ++axis) gradient[k][axis] += weight[k] * slope[axis];
     const double beyond = beyondTangent<Kernel>(distance, radius);
@@ -205,7 +205,7 @@ Imath::Box3d RbfBlock::boundsFor(Kernel) const {
   }
   V3d extent = remainder;
   for (int k = 0; k < 3; ++k) {
-    // |T_n| ≤ 1: beyond constant and slopes, coefficients add up.
+    // T_n| ≤ 1, so beyond the constant and linear terms the magnitudes of the coefficients add up.
     std::array<double, kCubeNodes> coefficients;
     transformCube(kToCoefficients, kToCoefficients, kToCoefficients,
                   far_[static_cast<std::size_t>(k)].data(), coefficients.data());

@@ -11,10 +11,11 @@
 
 namespace mapping {
 
-/// An RbfMap on a block: particles far from it are summed as a polynomial of degree five in each
-/// axis at Chebyshev nodes, which the octants inherit, so that each particle is summed once for a
-/// whole neighbourhood; the near ones are left to the grid points themselves. The polynomial's
-/// error is bounded, particle by particle, and the sum of the bounds stays below the tolerance.
+/// An RbfMap restricted to a block. Particles far from the block are summed into a polynomial of
+/// degree five in each axis, given by its values at Chebyshev nodes. Octants inherit the
+/// polynomial, so each particle is summed once for a large neighbourhood. Near particles are summed
+/// at the grid points. The polynomial's error is bounded particle by particle, and the sum of the
+/// bounds stays below the tolerance.
 class RbfBlock final : public BlockMap {
  public:
   RbfBlock(const RbfMap& map, const GridBlock& block, double tolerance);
@@ -23,18 +24,20 @@ class RbfBlock final : public BlockMap {
   [[nodiscard]] std::unique_ptr<BlockMap> octant(int bits) const override;
   std::size_t evaluate(std::span<Imath::V3d, 512> uvw) const override;
 
-  /// How many particles are left to the grid points.
+  /// Number of particles that are summed at the grid points.
   [[nodiscard]] std::size_t nearCount() const { return near_.size(); }
 
  private:
-  static constexpr std::size_t kNodes = 6;  ///< along an axis
+  static constexpr std::size_t kNodes = 6;  ///< along each axis
   static constexpr std::size_t kCubeNodes = kNodes * kNodes * kNodes;
-  using Values = std::array<std::array<double, kCubeNodes>, 3>;  ///< of u, v and w at the nodes
+  /// Values of u, v and w at the nodes.
+  using Values = std::array<std::array<double, kCubeNodes>, 3>;
 
   RbfBlock(const RbfBlock& parent, int bits);
-  /// Moves particles that are far enough from `near_` into the polynomial.
+  /// Moves candidates that are far enough from the block into the polynomial; the others go to
+  /// `near_`.
   void chooseFar(std::span<const std::uint32_t> candidates);
-  /// The far ones of the candidates; the others go to `near_`.
+  /// Returns the far candidates and adds the others to `near_`.
   template <typename Kernel>
   std::vector<std::uint32_t> split(Kernel kernel, std::span<const std::uint32_t> candidates);
   void sumFar(std::span<const std::uint32_t> far);
@@ -42,9 +45,9 @@ class RbfBlock final : public BlockMap {
   [[nodiscard]] Imath::Box3d boundsFor(Kernel kernel) const;
 
   const RbfMap& map_;
-  GridBlock block_;  ///< in mean particle spacings about the map's origin
+  GridBlock block_;  ///< in mean particle spacings, relative to the map's origin
   double tolerance_;
-  double error_ = 0;  ///< of the polynomial, so far
+  double error_ = 0;  ///< error bound of the polynomial so far
   Values far_{};
   std::vector<std::uint32_t> near_;
 };

@@ -21,12 +21,12 @@ using Imath::V3d;
 using levelset::InvalidInput;
 
 constexpr const char* kRbfCloud = "rbf map";
-// Two particles nearer than this share of the cloud's size give rows that rounding cannot tell
-// apart.
+// Two particles closer than this share of the cloud's size give matrix rows that are equal within
+// rounding errors.
 constexpr double kSmallestGap = 1e-9;
 // A cloud flatter than this share of its size leaves the gradient across it undetermined.
 constexpr double kFlattest = 1e-6;
-// Targets of one place that differ by less than this share of their size are the same.
+// Targets of coincident particles that differ by less than this share of their size count as equal.
 constexpr double kSameTarget = 1e-9;
 constexpr std::size_t kNeighbourLeaf = 16;
 
@@ -47,7 +47,7 @@ void checkArguments(std::span<const V3d> points, std::span<const V3d> targets,
     }
   }
   if (points.size() != targets.size() || points.size() != near.size()) {
-    throw InvalidInput(fmt::format("{}: {} points, {} targets and {} flags; give as many of each",
+    throw InvalidInput(fmt::format("{}: {} points, {} targets and {} flags; give equal numbers",
                                    kRbfCloud, points.size(), targets.size(), near.size()));
   }
   if (points.empty()) {
@@ -56,13 +56,13 @@ void checkArguments(std::span<const V3d> points, std::span<const V3d> targets,
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!isFinite(points[i]) || !isFinite(targets[i])) {
       throw InvalidInput(
-          fmt::format("{}: particle {} at ({}, {}, {}) is not finite; check the patch", kRbfCloud,
-                      i, points[i].x, points[i].y, points[i].z));
+          fmt::format("{}: particle {} at ({}, {}, {}) is not finite; build the patch again",
+                      kRbfCloud, i, points[i].x, points[i].y, points[i].z));
     }
   }
 }
 
-/// Mean, and largest |coordinate| about it.
+/// Mean of the points, and the largest |coordinate| relative to it.
 std::pair<V3d, double> centreOf(std::span<const V3d> points) {
   V3d mean(0);
   for (const V3d& p : points) mean += p / static_cast<double>(points.size());
@@ -71,7 +71,7 @@ std::pair<V3d, double> centreOf(std::span<const V3d> points) {
   return {mean, extent};
 }
 
-/// For each point the first of those in its place, which stands for all of them.
+/// For each point, the index of the first coincident point, which represents the group.
 std::vector<std::uint32_t> findLeaders(std::span<const V3d> points, double gap) {
   std::vector<std::uint32_t> order(points.size()), leader(points.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -79,7 +79,7 @@ std::vector<std::uint32_t> findLeaders(std::span<const V3d> points, double gap) 
     return std::tuple(points[i].x, points[i].y, points[i].z, i);
   };
   std::sort(order.begin(), order.end(), [&](auto a, auto b) { return key(a) < key(b); });
-  // Equal ones first, so that a heap of them does not make the search below quadratic.
+  // Equal points are grouped first, so that many of them do not make the search below quadratic.
   std::vector<std::uint32_t> distinct;
   for (const std::uint32_t i : order) {
     if (distinct.empty() || points[distinct.back()] != points[i]) distinct.push_back(i);
@@ -101,7 +101,7 @@ std::vector<std::uint32_t> findLeaders(std::span<const V3d> points, double gap) 
   return leader;
 }
 
-/// Mean distances of a point, and of its target, to those of the nearest neighbour.
+/// Mean distance of a point to its nearest neighbour, and of their targets.
 std::pair<double, double> meanSpacings(std::span<const V3d> points, std::span<const V3d> targets) {
   const PointTree tree(points, kNeighbourLeaf);
   std::vector<std::uint32_t> nearest(points.size());
@@ -117,16 +117,16 @@ std::pair<double, double> meanSpacings(std::span<const V3d> points, std::span<co
   return {spacing / count, step / count};
 }
 
-/// The points' places, each once, at the means of their points and targets.
+/// Particles with distinct positions; targets of coincident points are averaged.
 struct Merged {
   std::vector<V3d> points, targets;
   std::vector<char> near;
-  std::vector<std::uint32_t> place;   ///< of each point
-  std::vector<std::uint32_t> leader;  ///< a point of each place
+  std::vector<std::uint32_t> place;   ///< merged index of each point
+  std::vector<std::uint32_t> leader;  ///< original index of one point of each merged one
 };
 
-Merged mergePlaces(std::span<const V3d> points, std::span<const V3d> targets,
-                   std::span<const char> near, double gap) {
+Merged mergeCoincident(std::span<const V3d> points, std::span<const V3d> targets,
+                       std::span<const char> near, double gap) {
   const std::vector<std::uint32_t> leader = findLeaders(points, gap);
   Merged merged;
   merged.place.resize(points.size());
@@ -148,14 +148,14 @@ Merged mergePlaces(std::span<const V3d> points, std::span<const V3d> targets,
   }
   for (std::size_t i = 0; i < points.size(); ++i)
     merged.targets[merged.place[i]] += targets[i] / count[merged.place[i]];
-  // Alone, a target is itself to the last bit.
+  // A single target keeps its bits.
   for (std::size_t i = 0; i < points.size(); ++i)
     if (count[merged.place[i]] == 1) merged.targets[merged.place[i]] = targets[i];
   return merged;
 }
 
-/// Counts what was merged, and refuses what contradicts itself.
-void judgeMerged(const Merged& merged, std::span<const V3d> points, std::span<const V3d> targets,
+/// Counts the merged particles, and rejects contradictory targets.
+void checkMerged(const Merged& merged, std::span<const V3d> points, std::span<const V3d> targets,
                  double targetSpacing, RbfSolveReport& report) {
   if (merged.points.size() == points.size()) return;
   const double same = kSameTarget * centreOf(targets).second;
@@ -167,12 +167,12 @@ void judgeMerged(const Merged& merged, std::span<const V3d> points, std::span<co
     worst = std::max(worst, off);
     if (off > same) differs[merged.place[i]] = 1;
     if (off > std::max(targetSpacing, same)) {
-      throw InvalidInput(fmt::format(
-          "{}: particles at ({:.6g}, {:.6g}, {:.6g}) share a place, but one goes to ({:.6g}, "
-          "{:.6g}, {:.6g}) and the others lie further from there than neighbours do; take away "
-          "one of them",
-          kRbfCloud, points[i].x, points[i].y, points[i].z, targets[i].x, targets[i].y,
-          targets[i].z));
+      throw InvalidInput(
+          fmt::format("{}: particles at ({:.6g}, {:.6g}, {:.6g}) coincide, but the texture "
+                      "coordinates ({:.6g}, {:.6g}, {:.6g}) of one differ from those of the others "
+                      "by more than neighbours do; remove one of them",
+                      kRbfCloud, points[i].x, points[i].y, points[i].z, targets[i].x, targets[i].y,
+                      targets[i].z));
     }
   }
   std::vector<char> isTaken(merged.points.size(), 0);
@@ -183,18 +183,18 @@ void judgeMerged(const Merged& merged, std::span<const V3d> points, std::span<co
   }
   if (report.merged > 0) {
     report.notes.push_back(fmt::format(
-        "{} particles share the place and texture coordinates of another and were left out",
+        "{} particles share the position and texture coordinates of another and were left out",
         report.merged));
   }
   if (report.averaged > 0) {
     report.notes.push_back(fmt::format(
-        "{} particles share the place of another and were averaged with it, texture coordinates "
+        "{} particles share the position of another and were averaged with it; texture coordinates "
         "differ from the mean by up to {:.3g}",
         report.averaged, worst));
   }
 }
 
-/// Principal axes of the points, the widest first, and how many of them are wide.
+/// Computes the principal axes of the points, the widest first, and counts the wide ones.
 void findAxes(RbfCloud& cloud, RbfSolveReport& report) {
   if (cloud.points.size() > 1) {
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
@@ -207,7 +207,8 @@ void findAxes(RbfCloud& cloud, RbfSolveReport& report) {
     for (int n = 0; n < 3; ++n) {
       const Eigen::Vector3d axis = solver.eigenvectors().col(2 - n);
       cloud.axes[static_cast<std::size_t>(n)] = V3d(axis[0], axis[1], axis[2]);
-      // Squares of lengths carry the rounding of the largest, so the width itself is measured.
+      // Eigenvalues are squared lengths with the rounding error of the largest, so the width is
+      // measured.
       double width = 0;
       for (const V3d& p : cloud.points)
         width = std::max(width, std::abs(p.dot(cloud.axes[static_cast<std::size_t>(n)])));
@@ -216,10 +217,10 @@ void findAxes(RbfCloud& cloud, RbfSolveReport& report) {
   }
   report.directions = cloud.directions;
   constexpr std::array<const char*, 3> kShapes = {
-      "there is one particle, so the map is constant",
-      "the particles lie on one line, so the map turns and scales space as it does that line",
-      "the particles lie in one plane, so the map goes on across it at right angles, by the mean "
-      "scale within it"};
+      "there is only one particle, so the map is constant",
+      "all particles lie on one line, so the map rotates and scales space as it does the line",
+      "all particles lie in one plane, so the map continues along the plane's normal, scaled by "
+      "the mean scale in the plane"};
   if (cloud.directions < 3)
     report.notes.emplace_back(kShapes[static_cast<std::size_t>(cloud.directions)]);
 }
@@ -234,21 +235,22 @@ RbfCloud makeRbfCloud(std::span<const V3d> points, std::span<const V3d> targets,
   const auto [origin, extent] = centreOf(points);
   const auto [targetOrigin, targetExtent] = centreOf(targets);
   if (!std::isfinite(extent) || !std::isfinite(targetExtent)) {
-    throw InvalidInput(fmt::format(
-        "{}: the particles lie further apart than numbers reach; use a larger unit of length",
-        kRbfCloud));
+    throw InvalidInput(
+        fmt::format("{}: the distance between particles overflows double precision; use a larger "
+                    "unit of length",
+                    kRbfCloud));
   }
   cloud.origin = origin;
-  // Of size 1, so that no square overflows.
+  // Scaled to size 1, so that no square overflows.
   std::vector<V3d> local;
   for (const V3d& p : points) local.push_back(extent > 0 ? (p - origin) / extent : V3d(0));
-  Merged merged = mergePlaces(local, targets, near, kSmallestGap);
+  Merged merged = mergeCoincident(local, targets, near, kSmallestGap);
   const auto [spacing, targetSpacing] = meanSpacings(merged.points, merged.targets);
-  judgeMerged(merged, points, targets, targetSpacing, report);
+  checkMerged(merged, points, targets, targetSpacing, report);
   cloud.spacing = merged.points.size() > 1 ? spacing * extent : 1;
   cloud.targets = std::move(merged.targets);
   for (const std::uint32_t i : merged.leader) {
-    // As the map does, so that it finds its particles to the last bit.
+    // Computed as RbfMap does, so that the particles match to the last bit.
     cloud.points.push_back((points[i] - origin) / cloud.spacing);
     cloud.extent = std::max(cloud.extent, largest(cloud.points.back()));
   }

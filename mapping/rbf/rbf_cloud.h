@@ -12,39 +12,43 @@ namespace mapping {
 
 struct RbfMapOptions;
 
-/// What was found out about the particles of an RBF map, and what was done about it.
+/// Properties of the particles of an RBF map, and how its system was solved.
 struct RbfSolveReport {
-  std::size_t merged = 0;    ///< particles that shared the place and target of another
-  std::size_t averaged = 0;  ///< that shared the place of another with a target of its own
-  int directions = 3;        ///< in which the particles spread: 3, 2 in a plane, 1 on a line
-  /// 1-norm condition of the system orthogonal to the polynomials, estimated; of the preconditioned
-  /// system, 2-norm and on the space searched, if that was solved by iteration. 0: nothing solved.
+  std::size_t merged = 0;    ///< particles with the position and target of another
+  std::size_t averaged = 0;  ///< particles with the position of another but a different target
+  int directions = 3;        ///< dimension of the particles' span: 3, 2 in a plane, 1 on a line
+  /// Estimated condition number of the system orthogonal to the polynomials, in the 1-norm. For an
+  /// iterative solution: of the preconditioned system, in the 2-norm on the Krylov space. 0:
+  /// nothing was solved.
   double condition = 0;
-  bool isRegularized = false;  ///< was something added to the diagonal beside λ?
+  bool isRegularized = false;  ///< true: the diagonal was increased beyond λ
   bool isIterative = false;
-  std::size_t iterations = 0;      ///< of the Krylov method
-  double solveResidual = 0;        ///< of the linear system, u, v, w; not what λ stands off
-  std::vector<std::string> notes;  ///< what somebody who maps should know, sentences
+  std::size_t iterations = 0;  ///< iterations of the Krylov method
+  /// Residual of the linear system in u, v, w; excludes the deviation due to λ.
+  double solveResidual = 0;
+  std::vector<std::string> notes;  ///< messages for the user, one sentence each
 };
 
-/// The particles of an RBF map as they are solved for: each place once, in mean particle spacings
-/// about their centre.
+/// Particles of an RBF map as the solver uses them: one for each position, in mean particle
+/// spacings relative to their centre.
 struct RbfCloud {
   std::vector<Imath::V3d> points, targets;
   std::vector<double> lambda;
   Imath::V3d origin{0};
-  double spacing = 1;  ///< mean distance of a particle to its nearest neighbour, world; 1 for one
-  double extent = 0;   ///< of the points, largest |coordinate|
-  /// Orthonormal; along the first `directions` of them the points spread.
+  /// Mean distance to the nearest neighbour, world units; 1 for a single particle.
+  double spacing = 1;
+  double extent = 0;  ///< largest |coordinate| of the points
+  /// Orthonormal axes; the points span the first `directions` of them.
   std::array<Imath::V3d, 3> axes{Imath::V3d(1, 0, 0), Imath::V3d(0, 1, 0), Imath::V3d(0, 0, 1)};
   int directions = 0;
 };
 
-/// Particles nearer to each other than 1e-9 of the cloud's size are one, at the mean of their
-/// targets. A direction across which the cloud is thinner than 1e-6 of its size counts as missing.
-/// @throws UsageError for λ that is negative or not finite; InvalidInput for no points, numbers
-///         that are not finite, and points in one place whose targets are further apart than those
-///         of neighbours
+/// Merges and normalises the particles. Particles closer than 1e-9 of the cloud's size are merged,
+/// with the mean of their targets. A direction in which the cloud is thinner than 1e-6 of its size
+/// is not counted in `directions`.
+/// @throws UsageError for λ that is negative or not finite
+/// @throws InvalidInput for no points, numbers that are not finite, and coincident points whose
+///         targets are further apart than those of neighbours
 [[nodiscard]] RbfCloud makeRbfCloud(std::span<const Imath::V3d> points,
                                     std::span<const Imath::V3d> targets, std::span<const char> near,
                                     const RbfMapOptions& options, RbfSolveReport& report);

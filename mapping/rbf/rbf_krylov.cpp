@@ -23,20 +23,20 @@ using Imath::V3d;
 
 constexpr const char* kKrylov = "rbf map";
 constexpr std::size_t kSolveLeaf = 128;
-constexpr Index kMostSteps = 40;  // between restarts
+constexpr Index kMostSteps = 40;  // steps between restarts
 constexpr int kMostRestarts = 30;
-// A restart that leaves more than this of the residual stands still.
+// Stagnation: a restart that reduces the residual by less than this factor.
 constexpr double kStill = 0.7;
-// The fast sum is not right to more digits, so a restart does not ask for them.
+// The accuracy of the fast sum limits the reduction of one restart.
 constexpr double kLeastReduction = 1e-3;
 
-/// Does what is far weigh so much more than what is near that the fast sum's digits do not do?
+/// True if far particles outweigh near ones so much that the fast sum is too inaccurate.
 bool growsFast(RbfKernel kernel) {
   return kernel == RbfKernel::Triharmonic || kernel == RbfKernel::ThinPlate ||
          kernel == RbfKernel::Sum;
 }
 
-/// The particles in the order of a tree, so that those of a box lie in a row.
+/// Reorders the particles by a tree, so that those of a box are contiguous.
 RbfCloud inOrder(const RbfCloud& cloud, std::span<const std::uint32_t> order) {
   RbfCloud result = cloud;
   for (std::size_t n = 0; n < order.size(); ++n) {
@@ -55,13 +55,14 @@ Matrix rowsInOrder(const Matrix& matrix, std::span<const std::uint32_t> order) {
   return result;
 }
 
-/// The least-squares problem of one right-hand side, as columns come.
+/// Least-squares problem of one right-hand side; columns are added one by one.
 class Hessenberg {
  public:
   explicit Hessenberg(double residual) : right_(Eigen::VectorXd::Zero(kMostSteps + 1)) {
     right_[0] = residual;
   }
-  /// @param column  the products with the basis and the length of what they leave, steps + 2
+  /// Adds a column.
+  /// @param column  products with the basis, and the norm of the rest; steps + 2 values
   void push(Eigen::VectorXd column) {
     plain_.topRows(column.size()).col(steps_) = column;
     for (Index i = 0; i < steps_; ++i) rotate(i, column[i], column[i + 1]);
@@ -78,12 +79,12 @@ class Hessenberg {
     Eigen::VectorXd result = right_.head(steps_);
     for (Index i = steps_; i-- > 0;) {
       for (Index j = i + 1; j < steps_; ++j) result[i] -= triangle_(i, j) * result[j];
-      // What a solution does not need, once it is found, has no length.
+      // An exhausted Krylov space gives a zero column, which gets the coefficient 0.
       result[i] = triangle_(i, i) != 0 ? result[i] / triangle_(i, i) : 0;
     }
     return result;
   }
-  /// Largest over smallest singular value: the condition on the space searched.
+  /// Ratio of the largest to the smallest singular value: the condition number on the Krylov space.
   [[nodiscard]] double condition() const {
     const Eigen::JacobiSVD<MatrixXd> svd(plain_.topLeftCorner(steps_ + 1, steps_));
     const auto& values = svd.singularValues();
@@ -103,7 +104,7 @@ class Hessenberg {
   std::array<double, kMostSteps> cosine_{}, sine_{};
 };
 
-/// Flexible GMRES for u, v and w in step.
+/// Flexible GMRES for u, v and w in lockstep.
 class KrylovSolver {
  public:
   KrylovSolver(const RbfCloud& cloud, const RbfMapOptions& options, const MatrixXd& q,
@@ -117,7 +118,8 @@ class KrylovSolver {
         isDirect_(growsFast(options.kernel)),
         report_(report) {}
 
-  /// @param tolerance  of the residual's largest number
+  /// Solves for the weights.
+  /// @param tolerance  largest magnitude of the residual's entries
   RbfFit solve(const RbfColumns& values, double tolerance) {
     const RbfColumns right = project(values), zero = RbfColumns::Zero(values.rows(), 3);
     RbfFit fit{zero, zero};
@@ -132,7 +134,7 @@ class KrylovSolver {
       if (worst <= tolerance) break;
       const bool isStill = !(worst < kStill * before);
       if ((isStill && isDirect_) || restart >= kMostRestarts) refuse(worst, tolerance);
-      if (isStill) isDirect_ = true;  // by the fast sum's errors, perhaps
+      if (isStill) isDirect_ = true;  // the errors of the fast sum may be the cause
     }
     return fit;
   }
@@ -140,8 +142,8 @@ class KrylovSolver {
  private:
   [[noreturn]] void refuse(double worst, double tolerance) const {
     throw levelset::NumericalError(fmt::format(
-        "{}: after {} iterations for {} particles the residual stands still at {:.3g} in texture "
-        "coordinates, {:.3g} is asked for; take a larger λ, particles of more even spacing, the "
+        "{}: after {} iterations for {} particles the residual stagnates at {:.3g} in texture "
+        "coordinates, but {:.3g} is required; use a larger λ, more evenly spaced particles, the "
         "biharmonic kernel or a larger tolerance",
         kKrylov, report_.iterations, cloud_.points.size(), worst, tolerance));
   }
@@ -168,7 +170,7 @@ class KrylovSolver {
     return project(result);
   }
 
-  /// Weights that take all but about `reduction` of the residual away.
+  /// Computes weights that reduce the residual to about `reduction` times its norm.
   RbfColumns correct(const RbfColumns& residual, double reduction) {
     std::vector<RbfColumns> basis = {residual}, searched;
     std::vector<Hessenberg> problems;
@@ -190,13 +192,14 @@ class KrylovSolver {
       for (int k = 0; k < 3; ++k)
         problems[static_cast<std::size_t>(k)].push(orthogonalize(basis, k));
       ++report_.iterations;
-      const double way = static_cast<double>(report_.iterations);
-      levelset::report(options_.progress, 0.1 + 0.8 * way / (way + 20), kKrylov);
+      const double done = static_cast<double>(report_.iterations);
+      levelset::report(options_.progress, 0.1 + 0.8 * done / (done + 20), kKrylov);
     }
     return combine(searched, problems);
   }
 
-  /// Makes column k of the last orthogonal to those before, twice, and of length 1.
+  /// Orthogonalises column k of the last basis matrix against the previous ones, twice, and
+  /// normalises it.
   static Eigen::VectorXd orthogonalize(std::vector<RbfColumns>& basis, int k) {
     const std::size_t last = basis.size() - 1;
     Eigen::VectorXd products = Eigen::VectorXd::Zero(static_cast<Index>(last) + 1);
@@ -232,7 +235,7 @@ class KrylovSolver {
   double sign_;
   RbfClusterSum sum_;
   RbfPreconditioner inverse_;
-  bool isDirect_;  ///< are products direct sums?
+  bool isDirect_;  ///< true: products are direct sums
   RbfSolveReport& report_;
 };
 
@@ -242,7 +245,7 @@ RbfFit solveIteratively(const RbfCloud& cloud, const RbfMapOptions& options, con
                         const RbfColumns& values, RbfSolveReport& report) {
   const auto n = static_cast<double>(cloud.points.size());
   const double basis = 2.0 * kMostSteps * sizeof(double) * 3;
-  constexpr double kSumBytes = 500;  // a particle's share of the nodes of the fast sum
+  constexpr double kSumBytes = 500;  // per particle, for the nodes of the fast sum
   levelset::requireMemory(n * (basis + kSumBytes) + RbfPreconditioner::estimateBytes(n),
                           options.maxMemory, kKrylov);
   const PointTree first(cloud.points, kSolveLeaf);

@@ -4,17 +4,17 @@
 
 namespace mapping {
 
-/// The weights of solveRbf by restarted, flexible GMRES [Saad93] in the space orthogonal to the
-/// polynomials. Products with the matrix are RbfClusterSum's, or direct sums for the kernels that
-/// grow faster than r; what a restart begins with, and what ends the search, is the residual by the
-/// direct sum, so that the fast sum's errors do not matter in the end. The preconditioner solves
-/// for the particles of each leaf of a tree, and others around it, apart, and then for a coarse
-/// choice of all [Beatson00].
+/// Computes the weights of solveRbf by restarted, flexible GMRES [Saad93] in the space orthogonal
+/// to the polynomials. Matrix products use RbfClusterSum, or direct sums for kernels that grow
+/// faster than r. Each restart and the final test use the residual of the direct sum, so that
+/// errors of the fast sum do not affect the result. The preconditioner solves separately for the
+/// particles of each leaf of a tree with their neighbours, and then for a coarse subset of all
+/// particles [Beatson00].
 /// @param q  n × (1 + directions), orthonormal: the polynomials at the particles
-/// @return weights, and what the matrix makes of them, whose residual, the polynomials' part aside,
-/// is at most options.solveTolerance
-///         times the targets' extent in u, v and w
-/// @throws ResourceLimit before allocating too much, NumericalError where iteration stands still
+/// @return weights and their image under the matrix. Orthogonal to the polynomials, the residual is
+///         at most options.solveTolerance times the extent of the targets in u, v and w.
+/// @throws ResourceLimit if the memory estimate exceeds the limit
+/// @throws NumericalError if the iteration stagnates
 [[nodiscard]] RbfFit solveIteratively(const RbfCloud& cloud, const RbfMapOptions& options,
                                       const Eigen::MatrixXd& q, const RbfColumns& values,
                                       RbfSolveReport& report);

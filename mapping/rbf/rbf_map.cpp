@@ -22,7 +22,7 @@ constexpr std::size_t kResidualChunk = 512;
 void checkTolerance(double tolerance) {
   if (!(tolerance > 0) || !std::isfinite(tolerance)) {
     throw levelset::UsageError(
-        fmt::format("{}: the tolerance of the solution is {}; give a positive share of the texture",
+        fmt::format("{}: the solver tolerance is {}; give a positive share of the texture's size",
                     kRbfMap, tolerance));
   }
 }
@@ -71,10 +71,10 @@ Imath::M33d RbfMap::jacobian(const V3d& x) const {
   Imath::M33d result = linear_;
   withKernel(kernel_, [&](auto kernel) {
     for (const RbfParticle& particle : particles_) {
-      const V3d way = local - particle.position;
-      const double distance = way.length();
+      const V3d offset = local - particle.position;
+      const double distance = offset.length();
       if (distance == 0) continue;
-      const V3d slope = way * (decltype(kernel)::slope(distance) / distance);
+      const V3d slope = offset * (decltype(kernel)::slope(distance) / distance);
       for (int k = 0; k < 3; ++k)
         for (int axis = 0; axis < 3; ++axis) result[k][axis] += particle.weight[k] * slope[axis];
     }

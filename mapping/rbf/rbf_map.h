@@ -19,78 +19,86 @@ namespace mapping {
 
 struct RbfMapOptions {
   RbfKernel kernel = RbfKernel::Biharmonic;
-  /// Relaxation of the interpolation at the surface, and everywhere else: what is added to ±φ on
-  /// the diagonal, where φ is of r in mean particle spacings. ≥ 0. For φ(r) = r it is a length in
-  /// mean particle spacings; kernels that fall off have φ(0) = 1.
+  /// Relaxation λ at the surface, and everywhere else: added to ±φ on the diagonal, ≥ 0. φ takes r
+  /// in mean particle spacings. For φ(r) = r, λ is a length in mean particle spacings; decaying
+  /// kernels have φ(0) = 1.
   double lambdaNear = 0.005, lambdaFar = 0.25;
-  /// Beyond so many particles, or where factors pass maxMemory, the system is solved by iteration.
+  /// Largest number of particles for a direct solution. Above it, or if the factors exceed
+  /// maxMemory, the system is solved iteratively.
   std::size_t denseLimit = 10000;
-  /// Of an iterative solve: largest residual in u, v and w over the targets' extent.
+  /// Tolerance of the iterative solver: largest residual in u, v and w, divided by the targets'
+  /// extent.
   double solveTolerance = 1e-6;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
 
-/// Φ(x) = A x + b + Σ ω_i φ(|x − p_i|) through particles (p_i, uvw_i), smoothed by ±φ + λ on the
-/// diagonal [Brodersen07 §8.3]; the sign is the kernel's, see RbfKernel: φ(r) = r is conditionally
-/// negative, and needs φ − λ [Carr01]. Affine maps are reproduced exactly whatever λ, and a map
-/// does not depend on the unit of length, nor on where and how the patch lies.
+/// Φ(x) = A x + b + Σ ω_i φ(|x − p_i|) through particles (p_i, uvw_i), smoothed by the matrix ±φ +
+/// λ on the diagonal [Brodersen07 §8.3]. The sign is that of the kernel, see RbfKernel: φ(r) = r is
+/// conditionally negative definite, and needs φ − λ [Carr01]. Affine maps are reproduced exactly
+/// for every λ. A map does not depend on the unit of length, nor on the position and orientation of
+/// the patch.
 ///
-/// Linear polynomials suffice for all kernels, see RbfKernel. In the middle of the particles of a
-/// smooth map the error at λ = 0 falls with the spacing h like h⁴ or faster for the kernels that
-/// grow; like h² for the two that fall off, which shrink with the spacing. Setting up takes n²
-/// doubles and n³/3 operations; or, by iteration, about 4 kB a particle, n² operations for each of
-/// a few restarts, and n log n for each step between them, but n² again for kernels that grow
-/// faster than r.
+/// Linear polynomials suffice for all kernels, see RbfKernel. In the interior of the particles of a
+/// smooth map and for λ = 0, the error decreases with the spacing h as h⁴ or faster for growing
+/// kernels. It decreases as h² for the two decaying kernels, whose width shrinks with the spacing.
+/// A direct solution takes n² doubles and n³/3 operations. An iterative solution takes about 4 kB
+/// per particle, n² operations for each of a few restarts, and n log n for each step between them.
+/// For kernels that grow faster than r each step takes n² operations.
 ///
-/// Particles in one place are one, with the mean of their targets. Where all particles lie in one
-/// plane, A takes its normal to what is at right angles to the plane's image, lengthened by the
-/// mean scale in the plane; on one line, A turns and scales as it does along the line, and a single
-/// particle gives a constant.
+/// Coincident particles count as one, with the mean of their targets. If all particles lie in one
+/// plane, A maps the plane's normal to the normal of the plane's image, scaled by the mean scale in
+/// the plane. If they lie on one line, A is a similarity that follows the line. A single particle
+/// gives a constant.
 class RbfMap final : public PatchMap {
  public:
-  /// @param points, targets  n each; @param near  n, true where lambdaNear applies
-  /// @throws UsageError for λ or a tolerance that is negative or not finite; InvalidInput for no
-  ///         points, two points in one place whose targets are further apart than those of
-  ///         neighbours, numbers that are not finite; ResourceLimit before the matrix is allocated;
-  ///         NumericalError where the iteration stands still
+  /// Builds the map.
+  /// @param points, targets  n each
+  /// @param near  n values, true where lambdaNear applies
+  /// @throws UsageError for λ or a tolerance that is negative or not finite
+  /// @throws InvalidInput for no points, numbers that are not finite, and coincident points whose
+  ///         targets are further apart than those of neighbours
+  /// @throws ResourceLimit before the matrix is allocated
+  /// @throws NumericalError if the iteration stagnates
   RbfMap(std::span<const Imath::V3d> points, std::span<const Imath::V3d> targets,
          std::span<const char> near, const RbfMapOptions& options = {});
 
   [[nodiscard]] Imath::V3d operator()(const Imath::V3d& x) const override;
-  /// At a particle, the kink of φ(r) = r counts nothing.
+  /// Jacobian of the map. At a particle its own term with φ(r) = r, which has a kink there, adds
+  /// nothing.
   [[nodiscard]] Imath::M33d jacobian(const Imath::V3d& x) const override;
   [[nodiscard]] std::unique_ptr<BlockMap> restrictTo(const GridBlock& block,
                                                      double tolerance) const override;
   /// Largest |Φ(p_i) − uvw_i| over the particles.
   [[nodiscard]] double maxResidual() const { return maxResidual_; }
-  /// Largest residual in u, v and w apart.
+  /// Largest residual for u, v and w separately.
   [[nodiscard]] const Imath::V3d& axisResidual() const { return axisResidual_; }
-  /// Mean distance of a particle to its nearest neighbour, world units; 1 for a single one.
+  /// Mean distance of a particle to its nearest neighbour, world units; 1 for a single particle.
   [[nodiscard]] double meanSpacing() const { return spacing_; }
-  /// Particles, those in one place once.
+  /// Number of particles; coincident ones count once.
   [[nodiscard]] std::size_t size() const { return particles_.size(); }
   [[nodiscard]] const RbfSolveReport& solveReport() const { return solveReport_; }
   [[nodiscard]] RbfKernel kernel() const { return kernel_; }
-  /// Positions in mean particle spacings about origin(), and weights.
+  /// Particles with their weights; positions in mean particle spacings relative to origin().
   [[nodiscard]] std::span<const RbfParticle> particles() const { return particles_; }
   [[nodiscard]] const Imath::V3d& origin() const { return origin_; }
-  /// Rows: gradients of the affine part, for each mean particle spacing; its value at origin().
+  /// Affine part: gradients as rows, per mean particle spacing; and the value at origin().
   [[nodiscard]] const Imath::M33d& linearPart() const { return linear_; }
   [[nodiscard]] const Imath::V3d& constantPart() const { return constant_; }
 
  private:
   friend class RbfBlock;
   void measureResidual(std::span<const Imath::V3d> points, std::span<const Imath::V3d> targets);
-  /// @param local  in mean particle spacings about the origin, as all that follows
+  /// Affine part of the map.
+  /// @param local  position in mean particle spacings relative to the origin
   [[nodiscard]] Imath::V3d affine(const Imath::V3d& local) const;
 
   RbfKernel kernel_;
   std::vector<RbfParticle> particles_;
-  std::vector<double> weightNorm_;  ///< |ω_i|, per particle
-  Imath::V3d origin_{0};            ///< world
-  double spacing_ = 1;              ///< world
-  Imath::M33d linear_;              ///< rows: gradients of the affine part
+  std::vector<double> weightNorm_;  ///< |ω_i| of each particle
+  Imath::V3d origin_{0};            ///< world units
+  double spacing_ = 1;              ///< world units
+  Imath::M33d linear_;              ///< gradients of the affine part as rows
   Imath::V3d constant_{0};
   double maxResidual_ = 0;
   Imath::V3d axisResidual_{0};

@@ -16,14 +16,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Imath::V3d;
 
-constexpr std::size_t kAround = 150;      // particles beside a leaf that are solved for with it
-constexpr std::size_t kCoarseShare = 40;  // particles for each coarse one, while those are few
+constexpr std::size_t kAround = 150;  // neighbouring particles that are solved together with a leaf
+constexpr std::size_t kCoarseShare = 40;  // particles per coarse particle, below kMostCoarse
 constexpr std::size_t kMostCoarse = 2500;
 constexpr std::size_t kCoarseTile = 64;
-// Of the diagonal: keeps the factors of close particles definite.
+// Share of the diagonal; keeps the factors of close particles positive definite.
 constexpr double kRidge = 1e-12;
 
-/// Cholesky's factors of the lower right of a matrix, a little of its diagonal added if need be.
+/// Cholesky factors of a symmetric matrix. If needed, a small share of its diagonal is added.
 Eigen::LLT<MatrixXd> factor(MatrixXd system) {
   const double mean = system.rows() > 0 ? system.diagonal().cwiseAbs().mean() : 0;
   for (double ridge = kRidge;; ridge *= 100) {
@@ -33,7 +33,8 @@ Eigen::LLT<MatrixXd> factor(MatrixXd system) {
   }
 }
 
-/// An orthonormal basis whose first columns span the polynomials at the chosen particles.
+/// An orthonormal basis whose first columns span the polynomials at the chosen particles, and their
+/// number.
 std::pair<MatrixXd, Index> basisOf(const MatrixXd& q, std::span<const std::uint32_t> chosen) {
   MatrixXd polynomial(static_cast<Index>(chosen.size()), q.cols());
   for (std::size_t i = 0; i < chosen.size(); ++i)
@@ -58,7 +59,7 @@ RbfPreconditioner::RbfPreconditioner(const RbfCloud& cloud, RbfKernel kernel, co
 
 double RbfPreconditioner::estimateBytes(double particles) {
   const double coarse = std::min(particles / kCoarseShare, static_cast<double>(kMostCoarse));
-  constexpr double kMatrices = 5;  // of the coarse particles, while they are factored
+  constexpr double kMatrices = 5;  // matrices of the coarse particles during factorisation
   return particles * (3.0 * kAround * sizeof(float) + 100) +
          kMatrices * coarse * coarse * sizeof(double);
 }
@@ -76,7 +77,7 @@ void RbfPreconditioner::makeLeaf(const PointTree& tree, Leaf& leaf) const {
   const auto [basis, rank] = basisOf(q_, leaf.members);
   const Index rest = system.rows() - rank;
   system = basis.rightCols(rest).transpose() * system * basis.rightCols(rest);
-  // The inverse is symmetric: its own rows are its own columns.
+  // The inverse is symmetric, so its own rows equal its own columns.
   const MatrixXd right = basis.rightCols(rest).topRows(own).transpose();
   leaf.inverse =
       (basis.rightCols(rest) * factor(std::move(system)).solve(right)).transpose().cast<float>();

@@ -10,28 +10,28 @@
 
 namespace mapping {
 
-/// An approximate inverse of s φ + λ in two layers [Beatson00]: the particles of each leaf of a
-/// tree, with those around them, are solved for apart, and of each solution only the leaf's own
-/// weights are kept; what that leaves at a coarse choice of particles is then solved for. It refers
-/// to the cloud and the tree.
+/// A two-level approximate inverse of s φ + λ [Beatson00]. First, each leaf of a tree is solved
+/// separately together with neighbouring particles, and only the leaf's own weights are kept. Then
+/// the remaining residual at a coarse subset of particles is solved. It refers to the cloud and the
+/// tree.
 class RbfPreconditioner {
  public:
   /// @param cloud  in the order of the tree
-  /// @param q      orthonormal: the polynomials at the particles
+  /// @param q      polynomials at the particles, orthonormal
   RbfPreconditioner(const RbfCloud& cloud, RbfKernel kernel, const PointTree& tree,
                     const Eigen::MatrixXd& q);
 
-  /// Weights orthogonal to the polynomials.
+  /// Returns weights orthogonal to the polynomials.
   [[nodiscard]] RbfColumns operator()(const RbfColumns& residual) const;
 
-  /// Bytes for so many particles.
+  /// Memory for a number of particles, bytes.
   [[nodiscard]] static double estimateBytes(double particles);
 
  private:
   struct Leaf {
     std::uint32_t begin, end;
     std::vector<std::uint32_t> members;
-    Eigen::MatrixXf inverse;  ///< own × members
+    Eigen::MatrixXf inverse;  ///< own particles × members
   };
   void chooseCoarse();
   void makeLeaf(const PointTree& tree, Leaf& leaf) const;
@@ -45,7 +45,7 @@ class RbfPreconditioner {
   const Eigen::MatrixXd& q_;
   std::vector<Leaf> leaves_;
   std::vector<std::uint32_t> coarse_;
-  Eigen::MatrixXd coarseQ_;  ///< whole orthogonal basis, polynomials first
+  Eigen::MatrixXd coarseQ_;  ///< complete orthogonal basis, polynomials first
   Eigen::LLT<Eigen::MatrixXd> coarseFactors_;
 };
 

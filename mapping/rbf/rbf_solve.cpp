@@ -22,11 +22,11 @@ using Eigen::MatrixXd;
 using Imath::V3d;
 
 constexpr const char* kRbfSolve = "rbf map";
-// Condition beyond which a solution has no digits left; this share of the system's norm, or tens of
-// it, is then added to its diagonal.
+// Beyond this condition number a solution has no correct digits. Then this share of the system's
+// norm, or powers of ten of it, is added to its diagonal.
 constexpr double kWorstCondition = 1e15;
 constexpr double kFirstRidge = 1e-14;
-// Fewer than this are always solved by factors.
+// Smaller systems are always solved directly.
 constexpr std::size_t kAlwaysDense = 500;
 constexpr std::size_t kChunk = 512;
 
@@ -34,7 +34,8 @@ double signOf(RbfKernel kernel) {
   return withKernel(kernel, [](auto k) { return decltype(k)::kSign; });
 }
 
-/// Polynomials that the particles tell apart, at the particles: 1 and the spread-out coordinates.
+/// Polynomials that the particles distinguish, at the particles: 1 and the coordinates along
+/// spread-out axes.
 MatrixXd polynomialOf(const RbfCloud& cloud) {
   const auto n = static_cast<Index>(cloud.points.size());
   MatrixXd result(n, 1 + cloud.directions);
@@ -48,15 +49,18 @@ MatrixXd polynomialOf(const RbfCloud& cloud) {
   return result;
 }
 
-/// The unit vector u after the least rotation that takes unit vector a to b. @pre u ⟂ a
+/// Rotates the unit vector u by the least rotation that maps the unit vector a to b.
+/// @pre u ⟂ a
 V3d turned(const V3d& u, const V3d& a, const V3d& b, bool isFirst) {
   const double cosine = a.dot(b);
-  if (cosine < -1 + 1e-12) return isFirst ? u : -u;  // half a turn about the first of the others
+  // Half a turn about the first perpendicular axis.
+  if (cosine < -1 + 1e-12) return isFirst ? u : -u;
   return u - (a + b) * (u.dot(b) / (1 + cosine));
 }
 
-/// The gradient across what the particles span: at right angles to their plane by the mean scale in
-/// it, and the same handedness; about a line, turned and scaled as the line is.
+/// Gradient in the directions that the particles do not span. Normal to a plane, it is the normal
+/// of the plane's image times the mean scale in the plane, with the same handedness. Around a line,
+/// it is the similarity of the line.
 Imath::M33d missingGradient(const RbfCloud& cloud, const MatrixXd& coefficients) {
   Imath::M33d result(0, 0, 0, 0, 0, 0, 0, 0, 0);
   const auto along = [&](int d) {
@@ -93,8 +97,8 @@ void addGradient(const RbfCloud& cloud, const Imath::M33d& gradient, double fact
             factor * gradient[k][axis] * cloud.points[static_cast<std::size_t>(i)][axis];
 }
 
-/// Cholesky's factors in place of the lower half of `system`, whose upper half stays as it is; made
-/// positive definite, to rounding, if it is not.
+/// Solves by Cholesky factors, which overwrite the lower half of `system`; the upper half is kept.
+/// If the matrix is not positive definite within rounding errors, its diagonal is increased.
 MatrixXd solveDefinite(Eigen::Ref<MatrixXd> system, const MatrixXd& right, RbfSolveReport& report) {
   const Eigen::VectorXd diagonal = system.diagonal();
   const double norm = system.cwiseAbs().colwise().sum().maxCoeff();
@@ -105,10 +109,10 @@ MatrixXd solveDefinite(Eigen::Ref<MatrixXd> system, const MatrixXd& right, RbfSo
       report.condition = 1 / reciprocal;
       if (ridge > 0) {
         report.isRegularized = true;
-        report.notes.push_back(
-            fmt::format("the particles' system is singular to rounding, {:.0e} of its size was "
-                        "added to its diagonal; particles are much closer here than elsewhere",
-                        ridge));
+        report.notes.push_back(fmt::format(
+            "the particles' system is singular within rounding errors; {:.0e} of its norm "
+            "was added to its diagonal; some particles are much closer than others",
+            ridge));
       }
       return factors.solve(right);
     }
@@ -118,7 +122,7 @@ MatrixXd solveDefinite(Eigen::Ref<MatrixXd> system, const MatrixXd& right, RbfSo
   }
 }
 
-/// Weights by Cholesky's factors, orthogonal to the polynomials.
+/// Weights orthogonal to the polynomials, by Cholesky factorisation.
 RbfColumns solveDirectly(const RbfCloud& cloud, RbfKernel kernel,
                          const Eigen::HouseholderQR<MatrixXd>& polynomial, const RbfColumns& values,
                          const levelset::Progress& progress, RbfSolveReport& report) {
@@ -211,7 +215,7 @@ RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options, RbfSol
         solveDirectly(cloud, options.kernel, polynomial, values, options.progress, report);
     fit.image = multiplyDirectly(cloud, options.kernel, fit.weights);
   }
-  // What the kernels leave is the polynomial's; what that leaves is the error of the solution.
+  // The polynomial fits what the kernels leave; the remainder is the error of the solution.
   RbfColumns rest = values - fit.image;
   const MatrixXd coefficients = polynomial.solve(rest);
   rest -= polynomialOf(cloud) * coefficients;
@@ -220,7 +224,7 @@ RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options, RbfSol
   if (!weights.allFinite() || !coefficients.allFinite()) {
     throw levelset::NumericalError(
         fmt::format("{}: solving for {} particles overflowed; check the patch for particles that "
-                    "lie much closer than others",
+                    "are much closer than others",
                     kRbfSolve, cloud.points.size()));
   }
 

@@ -13,9 +13,10 @@ namespace mapping {
 
 struct RbfMapOptions;
 
-using RbfColumns = Eigen::Matrix<double, Eigen::Dynamic, 3>;  ///< of u, v and w, a row a particle
+/// Columns u, v and w; one row per particle.
+using RbfColumns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-/// Weights orthogonal to the polynomials, and s φ + λ times them.
+/// Weights orthogonal to the polynomials, and their product with s φ + λ.
 struct RbfFit {
   RbfColumns weights, image;
 };
@@ -24,23 +25,24 @@ struct RbfFit {
 struct RbfSolution {
   std::vector<Imath::V3d> weights;
   Imath::V3d constant{0};
-  Imath::M33d linear;  ///< rows: gradients
+  Imath::M33d linear;  ///< gradients as rows
 };
 
-/// With s the kernel's sign, s φ + λ is positive definite on the vectors that are orthogonal to the
-/// polynomials that the particles tell apart, and there the system is solved: by Cholesky's
-/// factors, or by iteration beyond options.denseLimit and where the factors pass options.maxMemory.
-/// Where the particles spread in fewer than three directions, the affine part is completed by a
-/// similarity: see RbfMap.
-/// @throws ResourceLimit before too much is allocated; NumericalError where iteration stands still
+/// Solves for the weights. With s the kernel's sign, s φ + λ is positive definite on the vectors
+/// orthogonal to the polynomials that the particles distinguish. The system is solved there by
+/// Cholesky factorisation, or iteratively above options.denseLimit and if the factors exceed
+/// options.maxMemory. If the particles span fewer than three directions, a similarity completes the
+/// affine part, see RbfMap.
+/// @throws ResourceLimit before too much memory is allocated
+/// @throws NumericalError if the iteration stagnates
 [[nodiscard]] RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options,
                                    RbfSolveReport& report);
 
-/// (s φ + λ) times the weights, added up directly.
+/// Computes (s φ + λ) times the weights by direct summation.
 [[nodiscard]] RbfColumns multiplyDirectly(const RbfCloud& cloud, RbfKernel kernel,
                                           const RbfColumns& weights);
 
-/// s φ + λ between chosen particles.
+/// Matrix s φ + λ between chosen particles.
 [[nodiscard]] Eigen::MatrixXd rbfMatrix(const RbfCloud& cloud, RbfKernel kernel,
                                         std::span<const std::uint32_t> chosen);
 

@@ -46,7 +46,8 @@ std::size_t termOf(int x, int y, int z) {
 
 constexpr std::size_t kNoTerm = kTerms;
 
-/// The terms of one and of two powers less of x, y and z, and what each counts in |x|'s.
+/// Recurrence of a coefficient of |x|: the terms with one and with two powers less of x, y and z,
+/// and their factors.
 struct TermParents {
   std::array<std::size_t, 3> one, two;
   double firstShare = 0, secondShare = 0;
@@ -71,9 +72,10 @@ std::array<TermParents, kTerms> makeParents() {
 }
 const std::array<TermParents, kTerms> kParents = makeParents();
 
-/// The gradient of |x + s| is a series in |s| / |x| whose n-th term is no longer than the square
-/// root of (n + 1) / n: with t the cosine between x and s it is P_n(t) x̂ − P_{n−1}(t) ŝ, whose
-/// square is (1 − t²) (P_n² + (1 − t²) P_n′² / n²), and P_n² + (1 − t²) P_n′² / (n (n + 1)) ≤ 1.
+/// Bounds the remainder of the gradient of |x + s|, a series in |s| / |x|. The magnitude of its
+/// n-th term is at most the square root of (n + 1) / n. With t the cosine between x and s, the term
+/// is P_n(t) x̂ − P_{n−1}(t) ŝ. Its square is (1 − t²) (P_n² + (1 − t²) P_n′² / n²), and P_n² + (1
+/// − t²) P_n′² / (n (n + 1)) ≤ 1.
 double gradientRest(double ratio) {
   const double squared = ratio * ratio;
   return std::sqrt((kDegree + 1.0) / kDegree) * squared * squared * ratio / (1 - ratio);
@@ -94,17 +96,17 @@ void TaylorPolynomial::addAffine(const V3d& value, const M33d& rows) {
   }
 }
 
-// x·∇ and r² ∇ of |x| are |x| and x |x|; both together give each coefficient by those of one and
-// two degrees less.
-void TaylorPolynomial::addDistance(const V3d& way, const V3d& weight) {
+// Applied to |x|, x·∇ gives |x| and r² ∇ gives x |x|. Together they give each coefficient from
+// those of one and two degrees less.
+void TaylorPolynomial::addDistance(const V3d& offset, const V3d& weight) {
   std::array<double, kTerms + 1> a;
   a[kNoTerm] = 0;
-  const double squared = way.length2(), inverse = 1 / squared;
+  const double squared = offset.length2(), inverse = 1 / squared;
   a[0] = std::sqrt(squared);
   for (std::size_t n = 1; n < kTerms; ++n) {
     const TermParents& parents = kParents[n];
     const double first =
-        way.x * a[parents.one[0]] + way.y * a[parents.one[1]] + way.z * a[parents.one[2]];
+        offset.x * a[parents.one[0]] + offset.y * a[parents.one[1]] + offset.z * a[parents.one[2]];
     const double second = a[parents.two[0]] + a[parents.two[1]] + a[parents.two[2]];
     a[n] = (parents.firstShare * first + parents.secondShare * second) * inverse;
   }
@@ -167,7 +169,8 @@ RbfCubes::RbfCubes(const RbfMap& map, const V3d& sizes, double tolerance)
     : particles_(map.particles().begin(), map.particles().end()),
       linear_(map.linearPart()),
       constant_(map.constantPart() * sizes) {
-  // The map counts lengths in particle spacings; what grows like r is divided by as much.
+  // The map uses particle spacings as its unit, so the weights of the kernel r are divided by the
+  // spacing.
   const double spacing = map.meanSpacing();
   double sum = 0;
   for (RbfParticle& particle : particles_) {
@@ -214,8 +217,8 @@ RbfCube RbfCubes::octant(const RbfCube& cube, int bits) const {
 void RbfCubes::sumFar(RbfCube& cube, std::span<const std::uint32_t> candidates) const {
   const double radius = cube.radius();
   for (const std::uint32_t i : candidates) {
-    const V3d way = cube.center - particles_[i].position;
-    const double distance = way.length();
+    const V3d offset = cube.center - particles_[i].position;
+    const double distance = offset.length();
     if (!(radius <= farRatio_ * distance)) {
       cube.near.push_back(i);
       continue;
@@ -223,27 +226,27 @@ void RbfCubes::sumFar(RbfCube& cube, std::span<const std::uint32_t> candidates) 
     const double error = norms_[i] * gradientRest(radius / distance);
     cube.slopeError += error;
     cube.valueError += error * radius;
-    cube.far.addDistance(way, particles_[i].weight);
+    cube.far.addDistance(offset, particles_[i].weight);
   }
 }
 
-M33d RbfCubes::slopes(const RbfCube& cube, const V3d& place) const {
-  M33d result = cube.far.slopes(place - cube.center);
+M33d RbfCubes::slopes(const RbfCube& cube, const V3d& point) const {
+  M33d result = cube.far.slopes(point - cube.center);
   for (const std::uint32_t i : cube.near) {
-    const V3d way = place - particles_[i].position;
-    const double distance = way.length();
+    const V3d offset = point - particles_[i].position;
+    const double distance = offset.length();
     if (distance == 0) continue;
     for (int k = 0; k < 3; ++k)
       for (int axis = 0; axis < 3; ++axis)
-        result[k][axis] += particles_[i].weight[k] * way[axis] / distance;
+        result[k][axis] += particles_[i].weight[k] * offset[axis] / distance;
   }
   return result;
 }
 
-V3d RbfCubes::value(const RbfCube& cube, const V3d& place) const {
-  V3d result = cube.far.value(place - cube.center);
+V3d RbfCubes::value(const RbfCube& cube, const V3d& point) const {
+  V3d result = cube.far.value(point - cube.center);
   for (const std::uint32_t i : cube.near)
-    result += particles_[i].weight * (place - particles_[i].position).length();
+    result += particles_[i].weight * (point - particles_[i].position).length();
   return result;
 }
 

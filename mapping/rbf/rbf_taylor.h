@@ -13,8 +13,8 @@
 
 namespace mapping {
 
-/// A polynomial in x, y, z of total degree five or less with vectors for coefficients: what far
-/// particles add to a smooth map about one place.
+/// A polynomial in x, y, z of total degree at most five with vector coefficients: the Taylor
+/// expansion of the far particles' sum around a point.
 class TaylorPolynomial {
  public:
   static constexpr int kDegree = 5;
@@ -24,17 +24,17 @@ class TaylorPolynomial {
     [[nodiscard]] int total() const { return x + y + z; }
   };
   TaylorPolynomial() { terms_.fill(Imath::V3d(0)); }
-  /// Of each term, in an order of growing total degree.
+  /// Powers of each term, ordered by total degree.
   static const std::array<Powers, kTerms>& powers();
 
   [[nodiscard]] const Imath::V3d& operator[](std::size_t term) const { return terms_[term]; }
   void addAffine(const Imath::V3d& value, const Imath::M33d& rows);
-  /// weight × |way + s|, expanded in s. [Duan01] for the recurrence of its coefficients.
-  /// @pre way is not zero
-  void addDistance(const Imath::V3d& way, const Imath::V3d& weight);
-  /// The same polynomial about a place that lies `by` from the old one.
+  /// Adds weight × |offset + s|, expanded in s, by the recurrence of [Duan01].
+  /// @pre offset is not zero
+  void addDistance(const Imath::V3d& offset, const Imath::V3d& weight);
+  /// Re-expands the polynomial around a point at distance vector `by` from the old one.
   void shift(const Imath::V3d& by);
-  /// Rows: gradients of the three components at s.
+  /// Jacobian at s: gradients of the three components as rows.
   [[nodiscard]] Imath::M33d slopes(const Imath::V3d& s) const;
   [[nodiscard]] Imath::V3d value(const Imath::V3d& s) const;
 
@@ -42,47 +42,48 @@ class TaylorPolynomial {
   std::array<Imath::V3d, kTerms> terms_;
 };
 
-/// A smooth map in scaled units about the middle of a cube: u, v and w are multiplied by the sizes
-/// of the patch, so that slopes are about 1.
+/// A smooth map around the centre of a cube, in scaled units: u, v and w are multiplied by the
+/// extents of the patch, so that slopes are about 1.
 struct RbfCube {
   Imath::V3d center{0};  ///< relative to the map's origin
-  double half = 0;       ///< of the edge, world units
+  double half = 0;       ///< half edge length, world units
   TaylorPolynomial far;
-  double slopeError = 0, valueError = 0;  ///< of the polynomial in the cube's ball
-  std::vector<std::uint32_t> near;        ///< particles that it does not hold
+  double slopeError = 0, valueError = 0;  ///< error bounds of the polynomial in the cube's ball
+  std::vector<std::uint32_t> near;        ///< particles that the polynomial does not contain
 
   [[nodiscard]] double radius() const { return half * 1.7320508075688774; }
 };
 
-/// Cubes of a smooth map, ever smaller: particles far from a cube are summed into its polynomial,
+/// Hierarchy of cubes for a smooth map. Particles far from a cube are summed into its polynomial,
 /// which its octants inherit.
 class RbfCubes {
  public:
-  /// @param map        of the kernel r
-  /// @param sizes      that u, v and w are multiplied by
-  /// @param tolerance  of the far particles' slopes together, in scaled units
+  /// @param map        with the kernel r
+  /// @param sizes      factors of u, v and w
+  /// @param tolerance  error bound for the slopes of all far particles together, in scaled units
   RbfCubes(const RbfMap& map, const Imath::V3d& sizes, double tolerance);
 
   [[nodiscard]] RbfCube root(const Imath::V3d& center, double half) const;
-  /// Upper half along x, y, z where bit 1, 2, 4 is set.
+  /// The octant that is the upper half along x, y, z where bit 1, 2, 4 is set.
   [[nodiscard]] RbfCube octant(const RbfCube& cube, int bits) const;
-  /// Scaled weights; positions relative to the map's origin.
+  /// Particles with scaled weights; positions relative to the map's origin.
   [[nodiscard]] std::span<const RbfParticle> particles() const { return particles_; }
   [[nodiscard]] double weightNorm(std::uint32_t particle) const { return norms_[particle]; }
-  /// Rows: scaled gradients at a place in the cube. At a particle, its own kink counts nothing.
-  [[nodiscard]] Imath::M33d slopes(const RbfCube& cube, const Imath::V3d& place) const;
-  /// Scaled u, v and w.
-  [[nodiscard]] Imath::V3d value(const RbfCube& cube, const Imath::V3d& place) const;
+  /// Scaled Jacobian at a point of the cube, gradients as rows. At a particle its own term, which
+  /// has a kink there, adds nothing.
+  [[nodiscard]] Imath::M33d slopes(const RbfCube& cube, const Imath::V3d& point) const;
+  /// Scaled u, v and w at a point of the cube.
+  [[nodiscard]] Imath::V3d value(const RbfCube& cube, const Imath::V3d& point) const;
 
  private:
-  /// Moves particles that are far enough from `candidates` into the cube's polynomial.
+  /// Moves candidates that are far enough from the cube into its polynomial.
   void sumFar(RbfCube& cube, std::span<const std::uint32_t> candidates) const;
 
   std::vector<RbfParticle> particles_;
   std::vector<double> norms_;
   Imath::M33d linear_;
   Imath::V3d constant_{0};
-  double farRatio_ = 0;  ///< of a cube's radius to the distance, at which a particle is far
+  double farRatio_ = 0;  ///< ratio of a cube's radius to the distance from which a particle is far
 };
 
 }  // namespace mapping

@@ -11,30 +11,32 @@ namespace {
 
 using Imath::V3d;
 
-// No way is shorter than the chord: a path no longer than this is not worth a search for others.
+// A path is never shorter than the chord. Below this ratio no other paths are searched.
 constexpr double kNearlyStraight = 1.01;
-constexpr double kWorthTrying = 1.02;  // times the shortest, of a way that is straightened roughly
-constexpr double kLeastTurnCosine = -0.7;  // between the ends of a segment, over an edge too
-constexpr double kFlatCosine = 0.98;       // of 0.2 radians: a chord that is 0.2 % short
+// Multiple of the shortest length, for a roughly straightened path.
+constexpr double kWorthTrying = 1.02;
+// Between the normals at the ends of a segment, also over an edge.
+constexpr double kLeastTurnCosine = -0.7;
+constexpr double kFlatCosine = 0.98;  // of 0.2 radians, for which a chord is 0.2 % short
 constexpr std::size_t kCoarsestSegments = 8;
 constexpr int kMaxSweeps = 600;
 constexpr int kSweepsBetweenLooks = 16;
-constexpr double kCalm = 1e-5;      // of the length, from one look to the next
-constexpr double kStraight = 1e-3;  // voxels that the last sweep moved a point
+constexpr double kCalm = 1e-5;      // relative change of the length between two checks
+constexpr double kStraight = 1e-3;  // voxels; largest move of a point in the last sweep
 
-V3d tangential(const V3d& way, const V3d& normal) {
-  return way - normal * way.dot(normal);
+V3d tangential(const V3d& offset, const V3d& normal) {
+  return offset - normal * offset.dot(normal);
 }
 
-/// Towards b by small steps on the surface; empty when stuck.
+/// Walks towards b by small steps on the surface; returns an empty path when stuck.
 std::vector<V3d> walkTowards(const SurfaceField& field, double height, const V3d& a, const V3d& b) {
   const double step = field.voxelSize();
   const double maxSteps = 4 * (b - a).length() / step + 16;
   std::vector<V3d> path = {a};
   while ((b - path.back()).length() > 1.5 * step) {
-    const V3d p = path.back(), way = b - p;
-    const V3d along = tangential(way, field.normal(p));
-    if (along.length() < 1e-3 * way.length() || static_cast<double>(path.size()) > maxSteps)
+    const V3d p = path.back(), offset = b - p;
+    const V3d along = tangential(offset, field.normal(p));
+    if (along.length() < 1e-3 * offset.length() || static_cast<double>(path.size()) > maxSteps)
       return {};
     V3d next = p + along.normalized() * step;
     if (!field.project(next, height)) return {};
@@ -46,8 +48,8 @@ std::vector<V3d> walkTowards(const SurfaceField& field, double height, const V3d
   return path;
 }
 
-/// Could a straight step lead from one of these normals to the other along the surface? Through a
-/// thin sheet they are opposite.
+/// True if a straight step along the surface can turn the normal this much. Through a thin sheet
+/// the normals are opposite.
 bool isSoundTurn(const V3d& normal, const V3d& next) {
   return normal.dot(next) > kLeastTurnCosine;
 }
@@ -64,18 +66,19 @@ bool isSound(const std::vector<V3d>& normals) {
   return true;
 }
 
-/// Over-relaxed sweeps until no point moves; the ends stay.
+/// Straightens a path by over-relaxed sweeps until no point moves; the ends stay.
 void relaxPath(const SurfaceField& field, double height, std::vector<V3d>& path) {
   if (path.size() < 3) return;
   const double segments = static_cast<double>(path.size() - 1);
-  const double best = 2 / (1 + std::sin(std::acos(-1.0) / segments));  // SOR's for a chain
+  // Optimal SOR factor for a chain.
+  const double best = 2 / (1 + std::sin(std::acos(-1.0) / segments));
   double factor = best, lengthBefore = HUGE_VAL;
   const double longest = 0.5 * pathLength(path) / segments;
   std::vector<V3d> normals = normalsOn(field, path);
   for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
     double moved = 0;
     for (std::size_t n = 1; n + 1 < path.size(); ++n) {
-      // There and back again, so that neither end is favoured.
+      // Alternating directions, so that neither end is favoured.
       const std::size_t i = sweep % 2 == 0 ? n : path.size() - 1 - n;
       V3d move = ((path[i - 1] + path[i + 1]) * 0.5 - path[i]) * factor;
       move = tangential(move, normals[i]);
@@ -84,7 +87,7 @@ void relaxPath(const SurfaceField& field, double height, std::vector<V3d>& path)
       V3d next = path[i] + move;
       if (!field.project(next, height) || (next - path[i]).length() > 2 * longest) continue;
       const V3d normal = field.normal(next);
-      // A segment that is sound must stay so: the path would slip off a thin ear otherwise.
+      // A sound segment must stay sound; otherwise the path would slip off a thin ear.
       const auto spoils = [&](std::size_t other) {
         return !isSoundTurn(normal, normals[other]) && isSoundTurn(normals[i], normals[other]);
       };
@@ -95,7 +98,7 @@ void relaxPath(const SurfaceField& field, double height, std::vector<V3d>& path)
     }
     if (moved < kStraight * field.voxelSize()) return;
     if (sweep % kSweepsBetweenLooks != 0) continue;
-    // Over edges the points may swing for ever about where they belong.
+    // Near edges the points may oscillate for ever.
     const double length = pathLength(path);
     const bool isCalm = lengthBefore - length < kCalm * length;
     if (isCalm && factor == 1) return;
@@ -115,13 +118,13 @@ std::vector<V3d> withMidpoints(const SurfaceField& field, double height,
   return result;
 }
 
-/// Points between those where the surface turns, so that chords do not cut its edges short.
+/// Inserts points where the surface bends, so that chords do not cut its edges short.
 void followBend(const SurfaceField& field, double height, const V3d& p, const V3d& q, int depth,
                 std::vector<V3d>& result) {
   const bool isFlat = field.normal(p).dot(field.normal(q)) > kFlatCosine;
   V3d middle = (p + q) * 0.5;
   if (!isFlat && depth > 0 && field.project(middle, height)) {
-    // Thrown aside by a ridge of φ, it would lengthen the path.
+    // A midpoint that a ridge of φ throws aside would lengthen the path.
     const double chord = (q - p).length();
     if ((middle - p).length() < chord && (middle - q).length() < chord) {
       followBend(field, height, p, middle, depth - 1, result);
@@ -140,24 +143,25 @@ std::vector<V3d> withBends(const SurfaceField& field, double height, const std::
   return result;
 }
 
-/// Does the path lie within `distance` of the points and chords of another?
+/// True if the path lies within `distance` of the chords of another path.
 bool isBeside(const std::vector<V3d>& path, const std::vector<V3d>& other, double distance) {
   return std::all_of(path.begin(), path.end(), [&](const V3d& p) {
     for (std::size_t i = 1; i < other.size(); ++i) {
-      const V3d chord = other[i] - other[i - 1], way = p - other[i - 1];
-      const double along = std::clamp(way.dot(chord) / chord.length2(), 0.0, 1.0);
-      if ((way - chord * along).length() <= distance) return true;
+      const V3d chord = other[i] - other[i - 1], offset = p - other[i - 1];
+      const double along = std::clamp(offset.dot(chord) / chord.length2(), 0.0, 1.0);
+      if ((offset - chord * along).length() <= distance) return true;
     }
     return false;
   });
 }
 
-/// Equally spaced, some four voxels apart, and closer where that would cut through a thin part.
+/// Samples a path evenly, about every four voxels, and more densely where a segment would cut
+/// through a thin part.
 std::vector<V3d> coarsePath(const SurfaceField& field, double height,
                             const std::vector<V3d>& path) {
   const double voxels = pathLength(path) / field.voxelSize();
   std::vector<V3d> result;
-  // Segments of some four voxels first: chords that stay within any band.
+  // Segments of about four voxels have chords that stay within any band.
   for (std::size_t segments = std::max(kCoarsestSegments, static_cast<std::size_t>(voxels / 4));;
        segments *= 2) {
     result = sampleByArcLength(path, segments + 1);
@@ -217,8 +221,8 @@ std::vector<V3d> geodesic(const SurfaceField& field, double height, const V3d& a
   path = straighten(field, height, std::move(path));
   double shortest = pathLength(path);
   if (shortest <= kNearlyStraight * (b - a).length()) return path;
-  for (const std::vector<V3d>& way : search.alternatives(shortest)) {
-    std::vector<V3d> other = coarsePath(field, height, way);
+  for (const std::vector<V3d>& offset : search.alternatives(shortest)) {
+    std::vector<V3d> other = coarsePath(field, height, offset);
     relaxPath(field, height, other);
     if (pathLength(withBends(field, height, other)) > kWorthTrying * shortest ||
         isBeside(other, path, 2 * field.voxelSize()))
@@ -234,7 +238,7 @@ std::vector<V3d> geodesic(const SurfaceField& field, double height, const V3d& a
 
 std::vector<V3d> geodesicLike(const SurfaceField& field, double height, const V3d& a, const V3d& b,
                               const std::vector<V3d>& path) {
-  constexpr double kLongest = 3;  // times the mean segment
+  constexpr double kLongest = 3;  // multiple of the mean segment
   const double voxels = pathLength(path) / field.voxelSize();
   const std::size_t segments = std::max(kCoarsestSegments, static_cast<std::size_t>(voxels / 2));
   std::vector<V3d> moved = sampleByArcLength(path, segments + 1);

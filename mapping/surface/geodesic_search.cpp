@@ -12,15 +12,18 @@ namespace mapping {
 namespace {
 
 using Imath::V3d;
-using Way = std::vector<V3d>;
+using Path = std::vector<V3d>;
 
 constexpr std::size_t kMaxSearchNodes = 4'000'000;
-// Grid points this near to the surface are joined by their 26 neighbours, on planes of any slope.
+// Grid points closer to the surface than this are connected to their 26 neighbours, on planes of
+// any slope.
 constexpr double kBesideVoxels = 0.75;
-// A step that turns the normal by more than a right angle leads through a thin sheet, not around.
+// A step that turns the normal by more than a right angle passes through a thin sheet, not around
+// it.
 constexpr double kLeastNormalCosine = 0;
-constexpr double kGridExcess = 1.15;  // of ways over the grid; 1.128 for the least handy direction
-constexpr std::size_t kMostWays = 40;
+// Length ratio of grid paths to true paths; 1.128 for the worst direction.
+constexpr double kGridExcess = 1.15;
+constexpr std::size_t kMostPaths = 40;
 
 using Key = std::uint64_t;
 using GridCell = std::array<int, 3>;
@@ -39,9 +42,9 @@ GridCell unpackCell(Key key) {
   return c;
 }
 
-/// The grid points beside φ = height, found out as they are asked for, with what the searches from
-/// the one end and from the other know of them. GridCell (0, 0, 0) is the point a.
-class WayGraph {
+/// Graph of the grid points beside φ = height, built on demand. Nodes hold the state of the
+/// searches from both ends. GridCell (0, 0, 0) is the point a.
+class PathGraph {
  public:
   struct Node {
     std::array<double, 2> cost = {HUGE_VAL, HUGE_VAL};  // from a, from b
@@ -51,10 +54,10 @@ class WayGraph {
     V3d normal{0};
   };
 
-  WayGraph(const SurfaceField& field, double height, const V3d& a, const V3d& b)
+  PathGraph(const SurfaceField& field, double height, const V3d& a, const V3d& b)
       : field_(field), height_(height), ends_{a, b}, step_(field.voxelSize()) {}
 
-  [[nodiscard]] V3d place(Key key) const {
+  [[nodiscard]] V3d position(Key key) const {
     const GridCell c = unpackCell(key);
     return ends_[0] + V3d(c[0], c[1], c[2]) * step_;
   }
@@ -63,10 +66,10 @@ class WayGraph {
   [[nodiscard]] const std::unordered_map<Key, Node>& nodes() const { return nodes_; }
   Node& node(Key key) { return nodes_.at(key); }
 
-  /// Dijkstra's algorithm from an end; A* with an estimate of the rest.
-  /// @param mayLie  of a place and the cost to come there; others are left out
-  /// @param isGoal  stop there
-  /// @return the goal's key, or nothing
+  /// Runs Dijkstra's algorithm from an end, or A* if `estimate` is not zero.
+  /// @param mayLie  true for a position and its cost if the search may visit it
+  /// @param isGoal  true for the node that ends the search
+  /// @return key of the goal, or nothing
   template <typename MayLie, typename Estimate, typename IsGoal>
   std::optional<Key> search(std::size_t end, const MayLie& mayLie, const Estimate& estimate,
                             const IsGoal& isGoal) {
@@ -89,16 +92,16 @@ class WayGraph {
            normal.dot(field_.normal(ends_[end])) > kLeastNormalCosine;
   }
 
-  /// From a node back to where the search from `end` began; projected.
-  [[nodiscard]] Way trace(std::size_t end, Key key) {
-    Way way;
+  /// Path from a node back to the start of the search from `end`, projected onto the surface.
+  [[nodiscard]] Path trace(std::size_t end, Key key) {
+    Path path;
     for (;; key = nodes_.at(key).from[end]) {
-      V3d p = place(key);
-      if (field_.project(p, height_)) way.push_back(p);
+      V3d p = position(key);
+      if (field_.project(p, height_)) path.push_back(p);
       if (nodes_.at(key).from[end] == key) break;
     }
-    way.push_back(ends_[end]);
-    return way;
+    path.push_back(ends_[end]);
+    return path;
   }
 
  private:
@@ -107,14 +110,14 @@ class WayGraph {
   Node& visit(Key key) {
     const auto [it, isNew] = nodes_.try_emplace(key);
     if (isNew) {
-      const V3d p = place(key);
+      const V3d p = position(key);
       it->second.isBeside = std::abs(field_.value(p) - height_) <= kBesideVoxels * step_;
       if (it->second.isBeside) it->second.normal = field_.normal(p);
     }
     return it->second;
   }
 
-  /// The nodes about an end, from which the way to it is straight.
+  /// Opens the nodes around an end. The path from them to the end is straight.
   template <typename Estimate>
   void start(std::size_t end, const Estimate& estimate) {
     const V3d offset = (ends_[end] - ends_[0]) / step_;
@@ -125,7 +128,7 @@ class WayGraph {
       const Key key =
           packCell({middle[0] + n / 9 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n % 3 - 1});
       Node& near = visit(key);
-      const V3d p = place(key);
+      const V3d p = position(key);
       if (!near.isBeside || !isBesideEnd(end, p, near.normal)) continue;
       near.cost[end] = (p - ends_[end]).length();
       near.from[end] = key;
@@ -136,7 +139,7 @@ class WayGraph {
   template <typename MayLie, typename Estimate>
   void expand(std::size_t end, Key key, const MayLie& mayLie, const Estimate& estimate) {
     const GridCell c = unpackCell(key);
-    const Node current = nodes_.at(key);  // the map may move it
+    const Node current = nodes_.at(key);  // a copy, because the map may move it
     for (int n = 0; n < 27; ++n) {
       const GridCell d = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
       if (n == 13) continue;
@@ -147,7 +150,7 @@ class WayGraph {
       const double cost =
           current.cost[end] +
           step_ * std::sqrt(static_cast<double>(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
-      const V3d p = place(nextKey);
+      const V3d p = position(nextKey);
       if (cost >= next.cost[end] || !mayLie(p, cost)) continue;
       next.cost[end] = cost;
       next.from[end] = key;
@@ -168,8 +171,8 @@ struct Meeting {
   Key key;
 };
 
-/// Nodes about as far from the one end as from the other, the best first.
-std::vector<Meeting> meetings(const WayGraph& graph) {
+/// Nodes with about equal distance to both ends, shortest total first.
+std::vector<Meeting> meetings(const PathGraph& graph) {
   std::vector<Meeting> result;
   for (const auto& [key, node] : graph.nodes()) {
     if (!node.isBeside || std::abs(node.cost[0] - node.cost[1]) > 1.8 * graph.step()) continue;
@@ -184,22 +187,22 @@ std::vector<Meeting> meetings(const WayGraph& graph) {
 
 }  // namespace
 
-Way GeodesicSearch::shortest() const {
-  WayGraph graph(field_, height_, a_, b_);
+Path GeodesicSearch::shortest() const {
+  PathGraph graph(field_, height_, a_, b_);
   const auto goal = graph.search(
       0, [](const V3d&, double) { return true; }, [&](const V3d& p) { return (p - b_).length(); },
-      [&](Key key, const WayGraph::Node& node) {
-        return graph.isBesideEnd(1, graph.place(key), node.normal);
+      [&](Key key, const PathGraph::Node& node) {
+        return graph.isBesideEnd(1, graph.position(key), node.normal);
       });
   if (!goal) return {};
-  Way way = graph.trace(0, *goal);
-  std::reverse(way.begin(), way.end());
-  way.push_back(b_);
-  return way;
+  Path path = graph.trace(0, *goal);
+  std::reverse(path.begin(), path.end());
+  path.push_back(b_);
+  return path;
 }
 
-std::vector<Way> GeodesicSearch::alternatives(double longest) const {
-  WayGraph graph(field_, height_, a_, b_);
+std::vector<Path> GeodesicSearch::alternatives(double longest) const {
+  PathGraph graph(field_, height_, a_, b_);
   const double most = kGridExcess * longest, slack = 4 * graph.step();
   for (const std::size_t end : {0u, 1u}) {
     const V3d& from = end == 0 ? a_ : b_;
@@ -210,29 +213,29 @@ std::vector<Way> GeodesicSearch::alternatives(double longest) const {
           return cost <= 0.5 * most + slack &&
                  (p - from).length() + (p - to).length() <= longest + slack;
         },
-        [](const V3d&) { return 0.0; }, [](Key, const WayGraph::Node&) { return false; });
+        [](const V3d&) { return 0.0; }, [](Key, const PathGraph::Node&) { return false; });
   }
-  // Meetings close to each other belong to the same way.
+  // Meeting points close to each other belong to the same path.
   const double apart = std::max(3 * graph.step(), 0.025 * longest);
-  std::vector<Way> ways;
-  std::vector<std::pair<V3d, V3d>> taken;  // places and normals
+  std::vector<Path> paths;
+  std::vector<std::pair<V3d, V3d>> taken;  // positions and normals
   const std::vector<Meeting> all = meetings(graph);
   for (const Meeting& meeting : all) {
-    if (ways.size() == kMostWays || meeting.cost > kGridExcess * all.front().cost) break;
-    const V3d p = graph.place(meeting.key), normal = graph.node(meeting.key).normal;
+    if (paths.size() == kMostPaths || meeting.cost > kGridExcess * all.front().cost) break;
+    const V3d p = graph.position(meeting.key), normal = graph.node(meeting.key).normal;
     const bool isNew = std::none_of(taken.begin(), taken.end(), [&](const auto& other) {
-      // The two faces of a thin sheet are two ways, however near.
+      // The two faces of a thin sheet give two paths, even where they are close.
       return (p - other.first).length() < apart && normal.dot(other.second) > 0;
     });
     if (!isNew) continue;
     taken.emplace_back(p, normal);
-    Way way = graph.trace(0, meeting.key);
-    std::reverse(way.begin(), way.end());
-    const Way rest = graph.trace(1, meeting.key);
-    way.insert(way.end(), rest.begin() + 1, rest.end());
-    ways.push_back(std::move(way));
+    Path path = graph.trace(0, meeting.key);
+    std::reverse(path.begin(), path.end());
+    const Path rest = graph.trace(1, meeting.key);
+    path.insert(path.end(), rest.begin() + 1, rest.end());
+    paths.push_back(std::move(path));
   }
-  return ways;
+  return paths;
 }
 
 }  // namespace mapping

@@ -26,28 +26,29 @@ using levelset::InvalidInput;
 using levelset::UsageError;
 
 constexpr const char* kSpread = "scatter";
-constexpr double kCandidatesPerPoint = 20;  // [Yuksel15] takes five and more
+constexpr double kCandidatesPerPoint = 20;  // [Yuksel15] uses at least five
 constexpr double kMostPoints = 1e6;
 constexpr double kOtherSide = -0.5;  // cosine between normals
-constexpr double kThin = 0.25;       // of the distance that is kept
+constexpr double kThin = 0.25;       // share of the least distance
 
-/// The same numbers everywhere, which the standard's distributions do not promise.
+/// Random numbers that are equal on all platforms, unlike the standard library's distributions.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : engine_(seed) {}
-  /// In [0, 1).
+  /// Uniform in [0, 1).
   double operator()() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
 
  private:
   std::mt19937_64 engine_;
 };
 
-/// Which points are near: cells as wide as the distance that matters.
+/// Grid of points for neighbour searches. Its cells are as wide as the largest distance that
+/// matters.
 class PointGrid {
  public:
   explicit PointGrid(double width) : width_(width) {}
   void add(const V3d& p, std::size_t index) { cells_[cellOf(p)].push_back(index); }
-  /// Every point that may lie within the width of p.
+  /// Visits every point that may lie within the grid's width of p.
   template <typename Visit>
   void visitNear(const V3d& p, const Visit& visit) const {
     const CellKey c = cellOf(p);
@@ -78,12 +79,12 @@ class PointGrid {
 
 void checkDensity(const ScatterDensity& density) {
   if (!(density.distance >= 0) || !std::isfinite(density.distance)) {
-    throw UsageError(fmt::format("{}: the distance of points is {}; give a positive length",
+    throw UsageError(fmt::format("{}: the distance between points is {}; give a positive length",
                                  kSpread, density.distance));
   }
   if ((density.count > 0) == (density.distance > 0)) {
     throw UsageError(
-        fmt::format("{}: give either how many points there are or how far apart", kSpread));
+        fmt::format("{}: give either the number of points or their distance", kSpread));
   }
 }
 
@@ -91,14 +92,14 @@ double scaleAt(const ScatterDensity& density, const V3d& place) {
   const double scale = density.scale ? density.scale(place) : 1;
   if (!(scale > 0) || !std::isfinite(scale)) {
     throw UsageError(
-        fmt::format("{}: the scale at ({:.6g}, {:.6g}, {:.6g}) is {}; it has to be positive",
-                    kSpread, place.x, place.y, place.z, scale));
+        fmt::format("{}: the scale at ({:.6g}, {:.6g}, {:.6g}) is {}; it must be positive", kSpread,
+                    place.x, place.y, place.z, scale));
   }
   return scale;
 }
 
-/// The zero set as triangles, to choose from by area in units of the scale there, so that small
-/// places are as likely to be met as large ones.
+/// The zero set as triangles, sampled by area in units of the local scale. So parts with a small
+/// scale get as many points per scaled area as others.
 class AreaSampler {
  public:
   AreaSampler(const levelset::NarrowBand& base, const ScatterDensity& density)
@@ -115,7 +116,7 @@ class AreaSampler {
       sums_.push_back(area_);
     }
   }
-  /// In units of the scale².
+  /// Total area in units of scale².
   [[nodiscard]] double area() const { return area_; }
 
   SurfacePoint operator()(Random& random) const {
@@ -124,21 +125,22 @@ class AreaSampler {
     const auto& [a, b, c] = mesh_.triangles[n];
     const double root = std::sqrt(random()), share = random();
     SurfacePoint point;
-    point.place = mesh_.positions[a] * (1 - root) + mesh_.positions[b] * (root * (1 - share)) +
-                  mesh_.positions[c] * (root * share);
-    V3d foot = point.place;
+    point.position = mesh_.positions[a] * (1 - root) + mesh_.positions[b] * (root * (1 - share)) +
+                     mesh_.positions[c] * (root * share);
+    V3d foot = point.position;
     if (!field_.project(foot, 0)) {
-      // At the border of an open surface: the middle is sure to lie on it.
+      // At the border of an open surface the sampled point may not project; the triangle's centroid
+      // does.
       foot = (mesh_.positions[a] + mesh_.positions[b] + mesh_.positions[c]) / 3.0;
-      if (!isOpen_ || !field_.project(foot, 0)) foot = point.place;
+      if (!isOpen_ || !field_.project(foot, 0)) foot = point.position;
     }
-    point.place = foot;
-    point.normal = field_.normal(point.place);
+    point.position = foot;
+    point.normal = field_.normal(point.position);
     return point;
   }
 
  private:
-  /// Of an open surface: triangles where the band is cut off.
+  /// Removes the triangles of an open surface that close off the end of the band.
   void dropWalls() {
     std::erase_if(mesh_.triangles, [&](const auto& t) {
       V3d p = (mesh_.positions[t[0]] + mesh_.positions[t[1]] + mesh_.positions[t[2]]) / 3.0;
@@ -156,13 +158,13 @@ class AreaSampler {
 
 struct Candidates {
   std::vector<SurfacePoint> points;
-  double area = 0;  ///< that the weight leaves, each part in units of its scale²
+  double area = 0;  ///< area accepted by the weight, in units of scale²
 };
 
-/// By area, thinned by the weight.
+/// Samples candidates by area and accepts them with the probability of the weight.
 Candidates makeCandidates(const AreaSampler& sampler, const ScatterDensity& density,
                           std::size_t count, Random& random) {
-  // A weight that leaves less is taken for one that leaves nothing.
+  // A weight that accepts fewer points counts as zero everywhere.
   constexpr std::size_t kMostMisses = 200000, kReported = 4096;
   Candidates result;
   std::size_t tried = 0, misses = 0;
@@ -171,21 +173,22 @@ Candidates makeCandidates(const AreaSampler& sampler, const ScatterDensity& dens
     SurfacePoint point = sampler(random);
     const double luck = random();
     ++misses;
-    if (density.weight && !(luck < density.weight(point.place))) continue;
+    if (density.weight && !(luck < density.weight(point.position))) continue;
     misses = 0;
-    point.scale = scaleAt(density, point.place);
+    point.scale = scaleAt(density, point.position);
     result.points.push_back(point);
   }
   if (result.points.empty()) {
     throw InvalidInput(
-        fmt::format("{}: the mask leaves no place on the surface; widen it", kSpread));
+        fmt::format("{}: the mask leaves no position on the surface; enlarge it", kSpread));
   }
   result.area =
       sampler.area() * static_cast<double>(result.points.size()) / static_cast<double>(tried);
   return result;
 }
 
-/// In scales. @param reach  that matters, in scales
+/// Distance in units of the mean scale.
+/// @param reach  relevant distance, in scales
 double scaledDistance(const SurfacePoint& a, const SurfacePoint& b, double reach) {
   const double scale = 0.5 * (a.scale + b.scale);
   return surfaceDistance(a, b, kThin * reach * scale) / scale;
@@ -197,39 +200,41 @@ double largestScale(std::span<const SurfacePoint> points) {
   return largest;
 }
 
-/// In the order that they come, unless one that was taken is too near.
+/// Accepts candidates in their order, unless an accepted one is too near.
 std::vector<SurfacePoint> throwDarts(std::span<const SurfacePoint> candidates, double distance) {
   std::vector<SurfacePoint> taken;
   PointGrid grid(distance * largestScale(candidates));
   for (const SurfacePoint& candidate : candidates) {
     bool isFree = true;
-    grid.visitNear(candidate.place, [&](std::size_t index) {
+    grid.visitNear(candidate.position, [&](std::size_t index) {
       isFree = isFree && !(scaledDistance(candidate, taken[index], distance) < distance);
     });
     if (!isFree) continue;
-    grid.add(candidate.place, taken.size());
+    grid.add(candidate.position, taken.size());
     taken.push_back(candidate);
   }
   return taken;
 }
 
-/// Gives up the most crowded until none are left: in reverse, every first n are well spread.
+/// Removes the most crowded candidates one by one. In reverse order of removal, any first n points
+/// are well spread.
 std::vector<SurfacePoint> orderBySpread(std::span<const SurfacePoint> candidates, double reach,
                                         std::size_t kept) {
   PointGrid grid(reach * largestScale(candidates));
-  for (std::size_t i = 0; i < candidates.size(); ++i) grid.add(candidates[i].place, i);
+  for (std::size_t i = 0; i < candidates.size(); ++i) grid.add(candidates[i].position, i);
   struct Neighbour {
     std::size_t index;
     double crowding;
   };
-  // What is much too near either way is not told apart: one of the two goes [Yuksel15].
+  // Pairs that are much too near count equally, because one of the two is removed anyway
+  // [Yuksel15].
   const double share = static_cast<double>(kept) / static_cast<double>(candidates.size());
   const double limit = 0.65 * (1 - std::pow(share, 1.5));
   std::vector<std::vector<Neighbour>> neighbours(candidates.size());
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, candidates.size(), 64), [&](const auto& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i)
-          grid.visitNear(candidates[i].place, [&](std::size_t j) {
+          grid.visitNear(candidates[i].position, [&](std::size_t j) {
             if (j == i) return;
             const double d = scaledDistance(candidates[i], candidates[j], 0.5 * reach) / reach;
             if (d < 1) neighbours[i].push_back({j, std::pow(1 - std::max(d, limit), 8)});
@@ -265,14 +270,14 @@ std::vector<SurfacePoint> orderBySpread(std::span<const SurfacePoint> candidates
 }  // namespace
 
 double surfaceDistance(const SurfacePoint& a, const SurfacePoint& b, double thin) {
-  const V3d way = b.place - a.place;
-  const double straight = way.length();
+  const V3d offset = b.position - a.position;
+  const double straight = offset.length();
   if (straight == 0) return 0;
   if (straight < thin && a.normal.dot(b.normal) < kOtherSide)
     return std::numeric_limits<double>::infinity();
   const auto clamped = [](double x) { return std::clamp(x, -1.0, 1.0); };
-  const double first = clamped(a.normal.dot(way) / straight),
-               last = clamped(b.normal.dot(way) / straight);
+  const double first = clamped(a.normal.dot(offset) / straight),
+               last = clamped(b.normal.dot(offset) / straight);
   const double turn = first - last;
   constexpr double kStraight = 1e-4;
   const double bend = std::abs(turn) < kStraight ? 1 / std::sqrt(std::max(1 - first * first, 0.25))
@@ -284,10 +289,10 @@ double leastDistance(std::span<const SurfacePoint> points, double reach, double 
   PointGrid grid(reach * largestScale(points));
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < points.size(); ++i) {
-    grid.visitNear(points[i].place, [&](std::size_t j) {
+    grid.visitNear(points[i].position, [&](std::size_t j) {
       least = std::min(least, scaledDistance(points[i], points[j], kept));
     });
-    grid.add(points[i].place, i);
+    grid.add(points[i].position, i);
   }
   return least;
 }
@@ -308,18 +313,18 @@ ScatteredPoints scatterPoints(const levelset::NarrowBand& base, const ScatterDen
   Random random(density.seed);
   double wanted = static_cast<double>(density.count);
   if (density.count == 0) {
-    // Discs cannot be packed more densely.
+    // Discs cannot be packed more densely than in a hexagonal grid.
     constexpr std::size_t kSurvey = 1000;
     const double disc = 0.5 * std::sqrt(3.0) * density.distance * density.distance;
     wanted = std::max(1.0, makeCandidates(sampler, density, kSurvey, random).area / disc);
   }
   if (!(wanted <= kMostPoints)) {
-    throw levelset::ResourceLimit(
-        fmt::format("{}: this would be {:.3g} points, more than {:.0g}; {}", kSpread, wanted,
-                    kMostPoints, density.count > 0 ? "ask for fewer" : "take a larger distance"));
+    throw levelset::ResourceLimit(fmt::format(
+        "{}: {:.3g} points exceed the limit of {:.0g}; {}", kSpread, wanted, kMostPoints,
+        density.count > 0 ? "give a smaller count" : "give a larger distance"));
   }
-  constexpr double kNeighbours = 70,
-                   kBytesPerNeighbour = 16;  // of a candidate, and to remember one
+  constexpr double kNeighbours = 70,  // of a candidate
+      kBytesPerNeighbour = 16;
   levelset::requireMemory(
       wanted * kCandidatesPerPoint * (sizeof(SurfacePoint) + kNeighbours * kBytesPerNeighbour),
       density.maxMemory, kSpread);

@@ -10,8 +10,8 @@ using Imath::V3d;
 
 constexpr int kMaxSteps = 40;
 constexpr int kUndampedSteps = 12;
-constexpr double kTolerance = 1e-5;  // voxels: near what float distances resolve
-constexpr double kAccepted = 1e-2;   // voxels: where a crease lets the steps swing to and fro
+constexpr double kTolerance = 1e-5;  // voxels; close to the resolution of float distances
+constexpr double kAccepted = 1e-2;   // voxels; accepted at a crease, where the steps oscillate
 
 }  // namespace
 
@@ -33,12 +33,13 @@ bool SurfaceField::project(V3d& p, double height) const {
     const double phi = sampler_.value(p);
     const double gap = phi - height;
     if (std::abs(gap) <= kTolerance * voxelSize_) return !isOpen_ || sampler_.isInBand(p);
-    // Beyond the band there is nothing to follow.
+    // Outside the band the field has no gradient to follow.
     if (std::abs(phi) >= background_ * (1 - 1e-6)) return false;
     const V3d gradient = sampler_.gradient(p);
     const double squared = gradient.length2();
     if (squared < 1e-8) return false;
-    // A weak gradient is a ridge of φ nearby: a full Newton step would throw p far across it.
+    // A weak gradient indicates a ridge of φ nearby; a full Newton step would throw p far across
+    // it.
     V3d move = gradient * (-gap / std::max(squared, 0.25));
     if (step >= kUndampedSteps) move *= 0.5;
     p += move;

@@ -7,7 +7,8 @@
 
 namespace mapping {
 
-/// The layers φ = height of a base as surfaces to walk on. Cheap to make, one per thread.
+/// Access to the iso-surfaces φ = height of a base for projecting and tracing. Cheap to construct;
+/// use one object per thread.
 class SurfaceField {
  public:
   explicit SurfaceField(const levelset::NarrowBand& band);
@@ -17,11 +18,12 @@ class SurfaceField {
   [[nodiscard]] Imath::V3d gradient(const Imath::V3d& p) const { return sampler_.gradient(p); }
   /// ∇φ / |∇φ|; zero outside the band.
   [[nodiscard]] Imath::V3d normal(const Imath::V3d& p) const;
-  /// Moves p along ∇φ until φ = height, to a hundred-thousandth of a voxel: p ← p − (φ − height)
-  /// ∇φ. False, with p where it stuck, when the way leaves the band or meets a ridge of φ, and
+  /// Moves p along ∇φ until φ = height within a hundred-thousandth of a voxel: p ← p − (φ − height)
+  /// ∇φ. Returns false, with the last p, if the path leaves the band or meets a ridge of φ, or
   /// where an open surface breaks off.
   [[nodiscard]] bool project(Imath::V3d& p, double height) const;
-  /// Does p lie by more than a voxel beyond the border of an open surface, where the band goes on?
+  /// True if p lies more than a voxel beyond the border of an open surface, where the band
+  /// continues.
   [[nodiscard]] bool isBeyondBorder(const Imath::V3d& p) const {
     return isOpen_ && sampler_.beyondBorder(p) > voxelSize_;
   }
@@ -29,7 +31,7 @@ class SurfaceField {
  private:
   levelset::BandSampler sampler_;
   double voxelSize_, background_;
-  bool isOpen_;  ///< what is cut off is no surface
+  bool isOpen_;  ///< true: the part of the band beyond the border is not a surface
 };
 
 }  // namespace mapping

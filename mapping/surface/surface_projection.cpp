@@ -14,7 +14,7 @@ namespace {
 
 using Imath::V3d;
 
-/// Projection of the grid point next to the surface whose foot is nearest to `point`.
+/// Grid point beside the surface that is nearest to `point`.
 V3d nearestFoot(const levelset::NarrowBand& base, const V3d& point) {
   const openvdb::FloatGrid& grid = levelset::vdb(base);
   const double voxel = base.voxelSize();
@@ -39,7 +39,7 @@ V3d nearestFoot(const levelset::NarrowBand& base, const V3d& point) {
 [[noreturn]] void failBrokenOff(const V3d& foot, const V3d& point, const char* action) {
   throw levelset::InvalidInput(fmt::format(
       "{}: the surface breaks off at about ({:.6g}, {:.6g}, {:.6g}), before the point ({:.6g}, "
-      "{:.6g}, {:.6g}); choose a point farther within its border",
+      "{:.6g}, {:.6g}); choose a point further inside its border",
       action, foot.x, foot.y, foot.z, point.x, point.y, point.z));
 }
 
@@ -67,41 +67,41 @@ V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point, cons
     if (!field.project(foot, 0)) {
       if (base.isOpenSurface()) failBrokenOff(foot, point, action);
       throw levelset::InvalidInput(fmt::format(
-          "{}: the field about ({:.6g}, {:.6g}, {:.6g}), nearest to the point {}, is not a "
-          "distance; re-distance the base first",
+          "{}: the field near ({:.6g}, {:.6g}, {:.6g}), nearest to the point {}, is not a "
+          "distance field; re-distance the base first",
           action, foot.x, foot.y, foot.z, at()));
     }
   }
-  // Down the distance to `point` along the surface, steps halved where one fails.
+  // Gradient descent of the distance to `point` along the surface; steps are halved when one fails.
   double step = 1;
   for (int i = 0; i < 60 && step > 1e-3; ++i) {
-    const V3d normal = field.normal(foot), way = point - foot;
-    const V3d along = way - normal * way.dot(normal);
+    const V3d normal = field.normal(foot), offset = point - foot;
+    const V3d along = offset - normal * offset.dot(normal);
     if (along.length() < 1e-6 * base.voxelSize()) break;
     V3d next = foot + along * std::min(step, base.voxelSize() / along.length());
-    if (field.project(next, 0) && (point - next).length() < way.length()) {
+    if (field.project(next, 0) && (point - next).length() < offset.length()) {
       foot = next;
     } else {
       step *= 0.5;
     }
   }
-  // On an open surface the way to the closest point runs along the normal, or that lies at the
-  // border.
+  // On an open surface the line to the closest point is normal to the surface, unless the closest
+  // point is on the border.
   if (base.isOpenSurface()) {
-    const V3d normal = field.normal(foot), way = point - foot;
+    const V3d normal = field.normal(foot), offset = point - foot;
     constexpr double kBeyondVoxels = 1, kSlant = 0.02;
-    const double along = (way - normal * way.dot(normal)).length();
-    if (along > kBeyondVoxels * base.voxelSize() && along > kSlant * way.length())
+    const double along = (offset - normal * offset.dot(normal)).length();
+    if (along > kBeyondVoxels * base.voxelSize() && along > kSlant * offset.length())
       failBrokenOff(foot, point, action);
   }
   const double distance = (point - foot).length();
-  // Within the band the answer is sure; the box would take a look at every voxel.
+  // Within the band the result is certain; the bounding box would visit every voxel.
   if (distance <= base.halfWidth() * base.voxelSize()) return foot;
   const double diagonal = base.zeroSetBounds().size().length();
   if (distance > diagonal) {
     throw levelset::InvalidInput(fmt::format(
-        "{}: the point {} is {:.6g} away from the surface, further than the diagonal {:.6g} "
-        "of its box; give a point near the base",
+        "{}: the point {} is {:.6g} away from the surface, more than the diagonal {:.6g} "
+        "of its bounding box; give a point near the base",
         action, at(), distance, diagonal));
   }
   return foot;

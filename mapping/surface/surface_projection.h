@@ -6,11 +6,12 @@
 
 namespace mapping {
 
-/// The point of the zero set that is nearest to `point`, however far: from the nearest grid point
-/// beside the surface, then along the surface until no step comes nearer.
-/// @param action  begins the message
-/// @throws InvalidInput when it is further than the diagonal of the zero set's box, or there is no
-///         surface; where an open surface breaks off before its nearest point, with that place
+/// Finds the point of the zero set nearest to `point`, at any distance. It starts at the nearest
+/// grid point beside the surface and moves along the surface until no step comes nearer.
+/// @param action  prefix of the message
+/// @throws InvalidInput if there is no surface, if the point is further away than the diagonal of
+///         the zero set's box, or if an open surface breaks off before the nearest point. The
+///         message gives the position.
 [[nodiscard]] Imath::V3d closestSurfacePoint(const levelset::NarrowBand& base,
                                              const Imath::V3d& point, const char* action);
 

@@ -9,11 +9,11 @@ namespace {
 using Imath::V3d;
 
 constexpr double kStepVoxels = 0.5;
-constexpr double kShortestVoxels = 1.0 / 64;  // a step where the surface turns sharply
-constexpr double kMostTurn = 0.15;            // radians within a step that is not the shortest
+constexpr double kShortestVoxels = 1.0 / 64;  // a step where the surface bends sharply
+constexpr double kMostTurn = 0.15;            // radians within a step longer than the shortest
 constexpr double kSharpest = 1.2;             // radians within the shortest step
-// Distances have a slope of 1, and up to 1.1 beside edges where they are interpolated. Where a band
-// ends its values jump: that wall is none of the surface.
+// Distances have slope 1, and up to 1.1 beside edges where they are interpolated. At the end of a
+// band the values jump; that wall is not part of the surface.
 constexpr double kSteepestWalk = 2.5;
 
 V3d withoutNormal(const V3d& v, const V3d& normal) {
@@ -28,7 +28,7 @@ V3d unitOrZero(const V3d& v) {
 }  // namespace
 
 V3d carried(const V3d& direction, const V3d& from, const V3d& to) {
-  constexpr double kOpposite = -0.99;  // cosine; no rotation is the least one
+  constexpr double kOpposite = -0.99;  // cosine; beyond it the least rotation is not unique
   const V3d axis = from.cross(to);
   const double cosine = from.dot(to);
   if (cosine < kOpposite) return unitOrZero(withoutNormal(direction, to));
@@ -59,16 +59,16 @@ bool SurfaceWalk::step(double length) {
   const bool isShortest = length <= kShortestVoxels * field_.voxelSize();
   const auto inHalves = [&] { return !isShortest && step(0.5 * length) && step(0.5 * length); };
   if (!field_.project(ahead, height_)) return inHalves();
-  V3d way = ahead - position_;
-  const double chord = way.length();
-  if (way.dot(direction_) < 0.5 * length || chord > 2 * length) return inHalves();
+  V3d offset = ahead - position_;
+  const double chord = offset.length();
+  if (offset.dot(direction_) < 0.5 * length || chord > 2 * length) return inHalves();
   const double cosine = normal_.dot(field_.normal(ahead));
   const double turn = std::acos(std::clamp(cosine, -1.0, 1.0));
   if (turn > (isShortest ? kSharpest : kMostTurn)) return inHalves();
-  // The projection leaves the step too short or too long; the chord of an arc of this length and
-  // turn is right.
+  // The projection makes the step too short or too long. The chord of an arc of this length and
+  // turn has the right length.
   const double half = 0.5 * turn;
-  V3d next = position_ + way * (length * (half > 1e-4 ? std::sin(half) / half : 1.0) / chord);
+  V3d next = position_ + offset * (length * (half > 1e-4 ? std::sin(half) / half : 1.0) / chord);
   if (!field_.project(next, height_)) return inHalves();
   const V3d gradient = field_.gradient(next);
   if (gradient.length() > kSteepestWalk) return inHalves();

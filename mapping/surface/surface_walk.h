@@ -6,30 +6,30 @@
 
 namespace mapping {
 
-/// A tangent direction at a place with normal `from`, at a place with normal `to`: turned by the
-/// least rotation between the normals, which over an edge unfolds it. Unit vectors; zero for a
-/// direction that has no part in the plane of `to`.
+/// Parallel transport of a tangent direction from a point with normal `from` to a point with normal
+/// `to`, by the least rotation between the normals. Across an edge this unfolds the faces. All
+/// vectors are unit vectors; the result is zero for a direction along `to`.
 [[nodiscard]] Imath::V3d carried(const Imath::V3d& direction, const Imath::V3d& from,
                                  const Imath::V3d& to);
 
-/// Walks straight ahead on φ = height: the geodesic that a start and a direction determine. Over an
-/// edge it goes on as if the faces were unfolded. Steps are half a voxel long, less where the
-/// surface turns; second order in them.
+/// Traces a geodesic on φ = height from a start point and a direction. Across an edge it continues
+/// as if the faces were unfolded into a plane. Steps are half a voxel long, shorter where the
+/// surface bends; the method is second order in the step.
 class SurfaceWalk {
  public:
-  /// @param from       on φ = height
-  /// @param direction  its part in the tangent plane counts
+  /// @param from       start point on φ = height
+  /// @param direction  start direction; its tangential part is used
   SurfaceWalk(const SurfaceField& field, double height, const Imath::V3d& from,
               const Imath::V3d& direction);
 
-  /// Goes on by `length` along the surface. False, and standing where it stopped, when the surface
-  /// breaks off on the way or is too sharp to be followed.
+  /// Advances by `length` along the surface. Returns false, at the last position, if the surface
+  /// breaks off or is too sharp to be followed.
   [[nodiscard]] bool advance(double length);
   [[nodiscard]] const Imath::V3d& position() const { return position_; }
-  /// Unit, in the tangent plane.
+  /// Unit direction in the tangent plane.
   [[nodiscard]] const Imath::V3d& direction() const { return direction_; }
   [[nodiscard]] const Imath::V3d& normal() const { return normal_; }
-  /// World units since the start.
+  /// Distance since the start, world units.
   [[nodiscard]] double walked() const { return walked_; }
 
  private:

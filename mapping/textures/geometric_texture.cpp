@@ -20,7 +20,7 @@
 #include "levelset/placement/resample.h"
 #include "levelset/solids/components.h"
 #include "mapping/layers/layer_resampling.h"
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/textures/shared_sides.h"
 #include "mapping/textures/texture_warp.h"
 
@@ -34,21 +34,21 @@ using levelset::NarrowBand;
 using levelset::UsageError;
 
 constexpr const char* kTexture = "texture";
-// The stretch is sampled, and known to about this: a flat patch keeps the base's own grid.
+// Accuracy of the sampled stretch; within it, a flat patch keeps the base's own grid.
 constexpr double kStretchError = 0.01;
-// Voxels of the result that the texture's band has to reach on each side, so that the high-order
-// interpolant beside the zero set reads nothing but distances.
+// Result voxels that the texture's band must extend on each side, so that the high-order
+// interpolant at the zero set reads only distances.
 constexpr double kBandNeeded = 3;
-// Voxels of the texture for one of the result from which on they are too many: resampled first, its
-// band costs what the result does and not the cube of their ratio.
+// Ratio of result to texture voxel size above which the texture is resampled first. Then the cost
+// of its band follows the result and not the cube of the ratio.
 constexpr double kCoarser = 6;
-// A map whose least stretch is below this share of the median is told to squeeze.
+// A map whose least stretch is below this share of the median counts as compressing.
 constexpr double kSqueezed = 0.2;
-// Share of the map's tolerance that is left to the solution, and the finest that is worth asking
-// for.
+// Share of the map's tolerance that the solver may use, and the finest useful tolerance.
 constexpr double kSolveShare = 0.1, kFinestSolve = 1e-10;
 
-/// @return what `work` returns; its CPU seconds are added
+/// Calls `work` and adds its CPU time to `seconds`.
+/// @return the result of `work`
 template <typename Work>
 auto timed(double& seconds, const Work& work) {
   const std::clock_t start = std::clock();
@@ -74,15 +74,16 @@ void checkArguments(const NarrowBand& base, const NarrowBand& texture,
     throw UsageError(fmt::format("{}: the map's tolerance is {}; give texture voxels, at least 0",
                                  kTexture, options.mapTolerance));
   }
-  if (options.sink && !std::isfinite(*options.sink)) {
-    throw UsageError(fmt::format("{}: the sink is {}; give a length", kTexture, *options.sink));
+  if (options.embedDepth && !std::isfinite(*options.embedDepth)) {
+    throw UsageError(fmt::format("{}: the embedding depth is {}; give a length with --embed",
+                                 kTexture, *options.embedDepth));
   }
   const double diagonal = base.zeroSetBounds().size().length();
-  if (options.sink && std::abs(*options.sink) > diagonal) {
+  if (options.embedDepth && std::abs(*options.embedDepth) > diagonal) {
     throw InvalidInput(
-        fmt::format("{}: the sink of {:.6g} is larger than the base, whose diagonal is {:.6g}; "
-                    "give less",
-                    kTexture, *options.sink, diagonal));
+        fmt::format("{}: the embedding depth of {:.6g} exceeds the diagonal of the base, {:.6g}; "
+                    "give a smaller --embed",
+                    kTexture, *options.embedDepth, diagonal));
   }
   if (!(options.blend >= 0) || !std::isfinite(options.blend)) {
     throw UsageError(fmt::format("{}: the blend radius is {}; give a length of at least 0",
@@ -90,8 +91,8 @@ void checkArguments(const NarrowBand& base, const NarrowBand& texture,
   }
   if (options.merge != TextureMerge::Alone && base.isOpenSurface()) {
     throw levelset::InvalidInput(
-        fmt::format("{}: the base is an open surface, which has no inside to join; take the "
-                    "texture --alone, or move a mesh with --map mesh",
+        fmt::format("{}: the base is an open surface, which has no inside; give --alone for the "
+                    "texture alone, or map a mesh with --map mesh",
                     kTexture));
   }
   requireSolid(texture, kTexture);
@@ -101,11 +102,11 @@ void checkArguments(const NarrowBand& base, const NarrowBand& texture,
                     base.isEmpty() ? "base" : "texture"));
   }
   if (patches.empty())
-    throw UsageError(fmt::format("{}: there is no patch; make one with `patch`", kTexture));
+    throw UsageError(fmt::format("{}: there is no patch; build one with `patch`", kTexture));
   for (const Patch& patch : patches) {
     if (patch.layers.size() < 2 || !(patch.height > 0)) {
       throw InvalidInput(
-          fmt::format("{}: the patch has no layers of particles; make it with `patch`", kTexture));
+          fmt::format("{}: the patch has no layers of particles; build it with `patch`", kTexture));
     }
     requirePatchOn(base, patch);
   }
@@ -117,7 +118,8 @@ double chooseVoxelSize(const NarrowBand& base, const NarrowBand& texture, double
   return resultVoxelSize(base.voxelSize(), texture.voxelSize(), minStretch);
 }
 
-/// The base's own grid where the voxels agree, so that merging needs no resampling.
+/// Transform of the result: the base's own grid if the voxel sizes agree, so that merging needs no
+/// resampling.
 Imath::M44d chooseGrid(const NarrowBand& base, double voxelSize, TextureMerge merge) {
   const bool agrees = std::abs(voxelSize - base.voxelSize()) <= 1e-9 * voxelSize;
   if (agrees && merge != TextureMerge::Alone) return base.indexToWorld();
@@ -126,18 +128,18 @@ Imath::M44d chooseGrid(const NarrowBand& base, double voxelSize, TextureMerge me
   return result;
 }
 
-/// What a result of coarser voxels can show of a texture, with a band that still reaches some of
-/// them once it is warped.
+/// Adapts a texture to the voxels of the result. Resamples it if they are much coarser, and widens
+/// its band so that it covers enough of them after warping.
 /// @param least, most  stretch of texture → patch
 NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least, double most,
                       const TextureOptions& options) {
   NarrowBand fitted = texture;
-  const double coarsest = voxelSize / most;  // of the texture's voxels that is still fine enough
+  const double coarsest = voxelSize / most;  // coarsest texture voxel size that is fine enough
   if (coarsest > kCoarser * texture.voxelSize()) {
     fitted = levelset::resample(texture, coarsest, {.maxMemory = options.maxMemory});
     if (fitted.isEmpty()) {
       throw InvalidInput(
-          fmt::format("{}: on the patch, the texture is smaller than a voxel of {:.6g}; use "
+          fmt::format("{}: on the patch the texture is smaller than a voxel of {:.6g}; use "
                       "smaller voxels",
                       kTexture, voxelSize));
     }
@@ -148,10 +150,11 @@ NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least,
                               {.halfWidth = std::ceil(needed), .maxMemory = options.maxMemory});
 }
 
-/// What of the texture is mapped onto each patch. A shell ends somewhere around the unit cube, so
-/// what is outside of a box that was asked for is cut off there, not at the end of the shell; at
-/// sides that patches share two voxels beyond them, so that tiles do not meet face to face, where
-/// the grid would see a gap. What touches the box is left as it is.
+/// Parts of the texture that are mapped onto each patch. A prism map ends a little outside the unit
+/// cube. So a texture that extends beyond the given box is clipped at the box, not at the end of
+/// the map. At sides that patches share it is clipped two voxels further out, so that tiles
+/// overlap. If they met face to face, the grid would show a gap. A texture that only touches the
+/// box is not clipped.
 class TextureParts {
  public:
   template <typename Fit>
@@ -189,73 +192,77 @@ class TextureParts {
   std::vector<SharedSides> ofPatch_;
 };
 
-/// A map of the chosen kind, and what is known of it.
+/// A map of the chosen kind, with its measurements.
 struct ChosenMap {
   std::unique_ptr<PatchMap> map;
   Distortion distortion = {};
   FoldCertificate certificate = {};
   std::size_t particles = 0;
-  V3d residual{0};           ///< at the particles, in u, v and w
-  std::size_t overlaps = 0;  ///< places where the patch passes through itself without folding
-  MapSample overlap = {};    ///< one of them
+  V3d residual{0};  ///< at the particles, in u, v and w
+  /// Sample points where the patch passes through itself without folding.
+  std::size_t overlaps = 0;
+  MapSample overlap = {};  ///< one of these points
   RbfSolveReport solve = {};
-  bool isExtrapolated = false;  ///< where the texture is sunk no particles hold it
+  bool isExtrapolated = false;  ///< true: no particles support the map below the surface
 
-  /// Where the texture is seen, most of the map is not stretched less than this; a fold here or
-  /// there sets no voxel size, nor does what is sunk into the base and squeezed there by a crease.
+  /// Stretch that determines the voxel size: the least stretch where the texture is visible.
+  /// Isolated folds do not count, nor do parts embedded in the base that a crease compresses.
   [[nodiscard]] double leastStretch(TextureMerge merge) const {
     if (distortion.folded > 0) return distortion.stretch.percent1;
     return merge == TextureMerge::Union ? distortion.leastAbove : distortion.stretch.least;
   }
 };
 
-/// The solution's tolerance in u, v and w for one of the map in texture voxels.
+/// Solver tolerance in u, v and w for a map tolerance in texture voxels.
 double solveTolerance(const NarrowBand& texture, const V3d& boxSize, double mapTolerance) {
   const double longest = std::max({boxSize.x, boxSize.y, boxSize.z});
   return std::max(kFinestSolve, kSolveShare * mapTolerance * texture.voxelSize() / longest);
 }
 
-std::unique_ptr<ShellMap> buildShell(const NarrowBand& base, const Patch& patch, double sink,
-                                     const TextureOptions& options) {
-  levelset::requireMemory(ShellMap::estimateBytes(patch), options.maxMemory, kTexture);
+std::unique_ptr<PrismMap> buildPrismMap(const NarrowBand& base, const Patch& patch,
+                                        double embedDepth, const TextureOptions& options) {
+  levelset::requireMemory(PrismMap::estimateBytes(patch), options.maxMemory, kTexture);
   levelset::report(options.progress, 0, kTexture);
-  // Where the texture ends, its band goes on.
+  // Margin for the texture's band, which extends beyond the texture.
   const double rim = (kBandNeeded + 1) * std::max(base.voxelSize(), options.voxelSize.value_or(0));
-  return std::make_unique<ShellMap>(patch, LatticeBorder{.sink = sink, .rim = rim});
+  return std::make_unique<PrismMap>(patch, LatticeBorder{.embedDepth = embedDepth, .rim = rim});
 }
 
-/// @param sink  as a share of the patch's height
-ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double sink, const V3d& textureSize,
-                  double tolerance, const TextureOptions& options, TextureCost& cost) {
+/// Builds and certifies the map of one patch.
+/// @param embedDepth  as a share of the patch's height
+ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double embedDepth,
+                  const V3d& textureSize, double tolerance, const TextureOptions& options,
+                  TextureCost& cost) {
   ChosenMap result;
-  if (options.map == TextureMap::Shell) {
-    auto shell = timed(cost.setup, [&] { return buildShell(base, patch, sink, options); });
-    result.particles = shell->lattice().nodeCount();
+  if (options.map == TextureMap::Prism) {
+    auto prisms =
+        timed(cost.setup, [&] { return buildPrismMap(base, patch, embedDepth, options); });
+    result.particles = prisms->lattice().nodeCount();
     result.certificate = timed(cost.certificate, [&] {
-      const std::vector<MapSample> samples = shell->samples();
+      const std::vector<MapSample> samples = prisms->samples();
       result.distortion = surveyDistortion(samples, textureSize, patch.mirrored);
-      result.overlaps = shell->countOverlaps(samples, result.overlap);
-      return certifyShell(*shell, patch.mirrored);
+      result.overlaps = prisms->countOverlaps(samples, result.overlap);
+      return certifyPrisms(*prisms, patch.mirrored);
     });
-    result.map = std::move(shell);
+    result.map = std::move(prisms);
     return result;
   }
   RbfMapOptions rbf = options.rbf;
   rbf.maxMemory = std::min(rbf.maxMemory, options.maxMemory);
   rbf.solveTolerance = tolerance;
   rbf.progress = levelset::subProgress(options.progress, 0, 0.2);
-  JudgedRbf judged = judgedRbf(patch, sink, rbf, cost);
-  result.particles = judged.map->size();
-  result.residual = judged.map->axisResidual();
-  result.solve = judged.map->solveReport();
-  result.distortion = surveyDistortion(judged.samples, textureSize, patch.mirrored);
-  result.certificate = std::move(judged.certificate);
-  result.isExtrapolated = judged.isExtrapolated;
-  result.map = std::move(judged.map);
+  CertifiedRbf certified = certifiedRbf(patch, embedDepth, rbf, cost);
+  result.particles = certified.map->size();
+  result.residual = certified.map->axisResidual();
+  result.solve = certified.map->solveReport();
+  result.distortion = surveyDistortion(certified.samples, textureSize, patch.mirrored);
+  result.certificate = std::move(certified.certificate);
+  result.isExtrapolated = certified.isExtrapolated;
+  result.map = std::move(certified.map);
   return result;
 }
 
-/// Figures of the worst, counts of all, and what each has to say once.
+/// Combines solver reports: figures of the worst, sums of the counts, and each note once.
 void addSolve(const RbfSolveReport& one, TextureReport& report) {
   RbfSolveReport& all = report.solve;
   all.merged += one.merged;
@@ -273,19 +280,19 @@ void addSolve(const RbfSolveReport& one, TextureReport& report) {
   }
 }
 
-std::string tellOverlap(const ChosenMap& map) {
-  const V3d &p = map.overlap.place, &uvw = map.overlap.uvw;
+std::string overlapMessage(const ChosenMap& map) {
+  const V3d &p = map.overlap.position, &uvw = map.overlap.uvw;
   return fmt::format(
-      "{}: the patch passes through itself at {} of {} places, one at ({:.6g}, {:.6g}, {:.6g}), "
-      "u, v, w = {:.3g}, {:.3g}, {:.3g}, where the texture would have two values; lead its spline "
-      "clear of itself, lower its height, or map its halves one after the other",
+      "{}: the patch passes through itself at {} of {} sample points, one at ({:.6g}, {:.6g}, "
+      "{:.6g}), u, v, w = {:.3g}, {:.3g}, {:.3g}, where the texture would have two values; keep "
+      "its spline clear of itself, use a lower height, or map its halves one after the other",
       kTexture, map.overlaps, map.distortion.samples, p.x, p.y, p.z, uvw.x, uvw.y, uvw.z);
 }
 
-/// The map of every patch, none where it folds and is skipped. What folds otherwise is refused, or
-/// noted.
-std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> patches, double sink,
-                                const V3d& textureSize, double tolerance,
+/// Builds the maps of all patches; a skipped patch gets no map. Other folds are errors, or notes if
+/// folds are allowed.
+std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> patches,
+                                double embedDepth, const V3d& textureSize, double tolerance,
                                 const TextureOptions& options, TextureReport& report) {
   std::vector<ChosenMap> maps;
   std::vector<Distortion> distortions;
@@ -297,11 +304,11 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
     TextureOptions part = options;
     part.progress = levelset::subProgress(options.progress, share(done), share(done + 1));
     ChosenMap chosen =
-        makeMap(base, patch, sink / patch.height, textureSize, tolerance, part, report.cost);
+        makeMap(base, patch, embedDepth / patch.height, textureSize, tolerance, part, report.cost);
     const bool folds =
         chosen.distortion.folded > 0 || chosen.certificate.verdict() == FoldVerdict::Folds;
     if (!folds && chosen.overlaps > 0) {
-      const std::string message = tellOverlap(chosen);
+      const std::string message = overlapMessage(chosen);
       if (!options.skipFolds && !options.allowFolds) throw InvalidInput(message);
       if (!options.skipFolds) report.notes.push_back(message);
     }
@@ -311,7 +318,7 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
       continue;
     }
     std::vector<std::string> notes =
-        judgeFolds(chosen.distortion, chosen.certificate, options.allowFolds);
+        checkFolds(chosen.distortion, chosen.certificate, options.allowFolds);
     std::move(notes.begin(), notes.end(), std::back_inserter(report.notes));
     extrapolated += chosen.isExtrapolated;
     report.particles += chosen.particles;
@@ -324,14 +331,14 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
   report.patches = distortions.size();
   if (distortions.empty()) {
     throw InvalidInput(
-        fmt::format("{}: all of {} patches fold; lower their height or make them smaller", kTexture,
+        fmt::format("{}: all of {} patches fold; use a lower height or smaller patches", kTexture,
                     patches.size()));
   }
   if (extrapolated > 0) {
     report.notes.push_back(
-        fmt::format("below {} of {} patches, where the surface has a crease or bends too narrowly "
-                    "for the sink, the map goes on by itself, without particles that hold it; sink "
-                    "the texture less, or take --map shell",
+        fmt::format("below {} of {} patches the surface has a crease or bends too much for the "
+                    "embedding depth, so the map is extrapolated there without particles; give a "
+                    "smaller --embed, or --map shell",
                     extrapolated, patches.size()));
   }
   if (report.skipped > 0) {
@@ -343,7 +350,8 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> p
   return maps;
 }
 
-/// Blocks of the result by the texture's own count, before anything is allocated.
+/// Checks the memory estimate of the result, from the voxel count of the texture, before anything
+/// is allocated.
 void requireResult(const NarrowBand& texture, const TextureReport& report,
                    std::span<const ChosenMap> maps, const TextureOptions& options) {
   const double voxelSize = report.voxelSize;
@@ -355,27 +363,26 @@ void requireResult(const NarrowBand& texture, const TextureReport& report,
         std::max(1.0, options.halfWidth / std::max(1.0, texture.halfWidth() * finer));
     voxels +=
         static_cast<double>(texture.activeVoxelCount()) * std::max(1e-3, finer * finer) * width;
-    // All of the texture's band is warped, however many of the result's voxels it is wide.
+    // The entire band of the texture is warped, even if it is wider than the result's band.
     warped = std::max(warped, static_cast<double>(texture.activeVoxelCount()) * std::pow(finer, 3));
   }
-  constexpr double kBytesPerVoxel = 40;  // active share of a block, and three fields of them
-  constexpr double kBytesWarped = 8;     // a value, and its share of the block's others
+  constexpr double kBytesPerVoxel = 40;  // active share of a block, for three fields
+  constexpr double kBytesWarped = 8;  // a value, and its share of the inactive values of the block
   const double bytes = voxels * kBytesPerVoxel + warped * kBytesWarped;
   const Distortion& worst = report.distortion;
   if (bytes > static_cast<double>(options.maxMemory) && !options.voxelSize &&
       worst.stretch.least < kSqueezed * worst.stretch.median) {
-    const V3d& p = worst.foldPlace;
-    throw levelset::ResourceLimit(fmt::format(
-        "{}: the map squeezes the texture to {:.2g} of its size, about ({:.6g}, {:.6g}, {:.6g}), "
-        "and "
-        "voxels that show it there, {:.3g}, need about {:.3g} GB; give --voxel, lower the height, "
-        "or choose a flatter place",
-        kTexture, worst.stretch.least, p.x, p.y, p.z, report.voxelSize, bytes / 1e9));
+    const V3d& p = worst.foldPoint;
+    throw levelset::ResourceLimit(
+        fmt::format("{}: the map compresses the texture to {:.2g} of its size near ({:.6g}, "
+                    "{:.6g}, {:.6g}); voxels fine enough for that, {:.3g}, need about {:.3g} GB; "
+                    "give --voxel, a lower height or a flatter position",
+                    kTexture, worst.stretch.least, p.x, p.y, p.z, report.voxelSize, bytes / 1e9));
   }
   levelset::requireMemory(bytes, options.maxMemory, kTexture);
 }
 
-/// All that was mapped as one solid.
+/// Unites all mapped pieces.
 NarrowBand join(std::vector<NarrowBand> pieces, const TextureOptions& options) {
   if (pieces.size() == 1) return std::move(pieces.front());
   return levelset::combine(levelset::CsgOperation::Union, pieces, {.maxMemory = options.maxMemory})
@@ -402,8 +409,8 @@ NarrowBand merge(const NarrowBand& base, NarrowBand warped, const TextureOptions
   levelset::SliversDropped clean = levelset::dropSlivers(result.band, warped);
   if (clean.count > 0) {
     report.notes.push_back(
-        fmt::format("{} skins of less than a voxel that were left where the texture ends in the "
-                    "base's surface were dropped; sink it deeper or raise it to be clear of it",
+        fmt::format("{} slivers thinner than a voxel, left where the texture ends at the base's "
+                    "surface, were removed; change --embed so that the texture ends away from it",
                     clean.count));
   }
   return std::move(clean.band);
@@ -421,16 +428,15 @@ void requirePatchOn(const NarrowBand& base, const Patch& patch) {
   for (const V3d& p : patch.layers.front().positions) {
     const double distance = std::abs(sampler.value(p)) / base.voxelSize();
     if (distance > 1) {
-      throw InvalidInput(
-          fmt::format("{}: the patch does not lie on the base, at ({:.6g}, {:.6g}, {:.6g}) they "
-                      "are {:.3g} voxels or "
-                      "more apart; make the patch on this base",
-                      kTexture, p.x, p.y, p.z, distance));
+      throw InvalidInput(fmt::format(
+          "{}: the patch does not lie on the base: at ({:.6g}, {:.6g}, {:.6g}) the surface is "
+          "at least {:.3g} voxels away; build the patch on this base",
+          kTexture, p.x, p.y, p.z, distance));
     }
   }
 }
 
-RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options, double sink) {
+RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options, double embedDepth) {
   std::vector<V3d> points, targets;
   std::vector<char> near;
   for (const ParticleLayer& layer : patch.layers) {
@@ -444,33 +450,33 @@ RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options, double s
         near.push_back(layer.w == 0);
       }
   }
-  for (const SunkParticle& particle : sunkParticles(patch, sink)) {
-    points.push_back(particle.place);
+  for (const EmbeddedParticle& particle : embeddedParticles(patch, embedDepth)) {
+    points.push_back(particle.position);
     targets.push_back(particle.uvw);
     near.push_back(false);
   }
   return {points, targets, near, options};
 }
 
-JudgedRbf judgedRbf(const Patch& patch, double sink, const RbfMapOptions& options,
-                    TextureCost& cost) {
-  const auto judged = [&](double held) {
-    JudgedRbf result;
+CertifiedRbf certifiedRbf(const Patch& patch, double embedDepth, const RbfMapOptions& options,
+                          TextureCost& cost) {
+  const auto certify = [&](double held) {
+    CertifiedRbf result;
     result.map = timed(
         cost.setup, [&] { return std::make_unique<RbfMap>(patchToTexture(patch, options, held)); });
     result.certificate = timed(cost.certificate, [&] {
-      result.samples = sampleRbf(*result.map, patch, sink);
-      return certifyRbf(*result.map, patch, sink);
+      result.samples = sampleRbf(*result.map, patch, embedDepth);
+      return certifyRbf(*result.map, patch, embedDepth);
     });
     return result;
   };
-  const auto folds = [&](const JudgedRbf& one) {
+  const auto folds = [&](const CertifiedRbf& one) {
     return one.certificate.verdict() == FoldVerdict::Folds ||
            surveyDistortion(one.samples, V3d(1), patch.mirrored).folded > 0;
   };
-  JudgedRbf result = judged(sink);
-  if (sink == 0 || !folds(result)) return result;
-  JudgedRbf free = judged(0);
+  CertifiedRbf result = certify(embedDepth);
+  if (embedDepth == 0 || !folds(result)) return result;
+  CertifiedRbf free = certify(0);
   if (folds(free)) return result;
   free.isExtrapolated = true;
   return free;
@@ -488,25 +494,26 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
   TextureReport& report = result.report;
   const Box3d box = chooseTextureBox(texture.zeroSetBounds(), options.textureBox);
 
-  // === The maps, and what they do to lengths
-  const double sink = options.sink ? *options.sink : base.voxelSize();
+  // === The maps and their distortion
+  const double embedDepth = options.embedDepth ? *options.embedDepth : base.voxelSize();
   const double tolerance = solveTolerance(texture, box.size(), options.mapTolerance);
   const std::vector<ChosenMap> maps =
-      makeMaps(base, patches, sink, box.size(), tolerance, options, report);
+      makeMaps(base, patches, embedDepth, box.size(), tolerance, options, report);
   double minStretch = HUGE_VAL, maxStretch = 0, bandStretch = HUGE_VAL;
   for (const ChosenMap& chosen : maps) {
     if (!chosen.map) continue;
     minStretch = std::min(minStretch, chosen.leastStretch(options.merge));
     maxStretch = std::max(maxStretch, chosen.distortion.stretch.most);
-    // What is squeezed further than that is under a voxel, unless voxels follow it.
+    // Parts compressed more than this are under a voxel, unless the voxel size follows them.
     bandStretch = std::min(bandStretch, std::max(chosen.leastStretch(options.merge),
                                                  kSqueezed * chosen.distortion.stretch.median));
   }
   report.voxelSize = chooseVoxelSize(base, texture, minStretch, options);
   requireResult(texture, report, maps, options);
 
-  // === Warp, and make a distance of it again [Brodersen07, ERR-23 in our notes]
-  const bool isCut = options.map == TextureMap::Shell &&
+  // === Warp the texture, then restore distances: the warped field has the right zero set and
+  // signs, but its values are only approximate distances [Brodersen07 §8.3]
+  const bool isCut = options.map == TextureMap::Prism &&
                      isBeyond(texture.zeroSetBounds(), box, texture.voxelSize());
   const TextureParts parts(
       texture, box, patches, report.voxelSize, isCut, [&](const NarrowBand& part) {
@@ -523,7 +530,8 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
       return levelset::subProgress(options.progress, share(from), share(to));
     };
     Warp warp = timed(report.cost.mapping, [&] {
-      return warpTexture(parts.of(n), {box, sink / patches[n].height}, patches[n], *maps[n].map,
+      return warpTexture(parts.of(n), {box, embedDepth / patches[n].height}, patches[n],
+                         *maps[n].map,
                          {.indexToWorld = chooseGrid(base, report.voxelSize, options.merge),
                           .scale = maps[n].distortion.meanStretch,
                           .mapTolerance = options.mapTolerance,
@@ -552,11 +560,10 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
                     ghosts));
   }
   if (crumbs > 0) {
-    report.notes.push_back(
-        fmt::format("{} grid points, inside alone and by less than a tenth of a voxel, were left "
-                    "out, as where a "
-                    "flat side falls together with a plane of the grid",
-                    crumbs));
+    report.notes.push_back(fmt::format(
+        "{} isolated inside grid points, less than a tenth of a voxel deep, were left out; "
+        "they occur where a flat side coincides with a plane of the grid",
+        crumbs));
   }
   result.band = timed(report.cost.merging, [&] {
     return merge(base, join(std::move(pieces), options), options, report);

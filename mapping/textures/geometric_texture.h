@@ -15,64 +15,65 @@
 #include "mapping/patches/patch.h"
 #include "mapping/rbf/rbf_map.h"
 
-/// Any solid laid onto a patch of any surface as a level set [Brodersen07 §8.3, §8.5].
+/// Maps a solid onto patches of a surface as a level set [Brodersen07 §8.3, §8.5].
 namespace mapping {
 
 enum class TextureMerge {
-  Union,  ///< stands on the surface
-  Carve,  ///< is cut out of it
-  Alone   ///< only the warped texture
+  Union,  ///< adds the texture to the base
+  Carve,  ///< subtracts the texture from the base
+  Alone   ///< returns only the warped texture
 };
 
 enum class TextureMap {
   Rbf,   ///< smooth, defined everywhere, relaxed by λ
-  Shell  ///< straight in tetrahedra between the particles, which have to be dense
+  Prism  ///< prism map: piecewise linear in tetrahedra between the particles, which must be dense
 };
 
 struct TextureOptions {
   TextureMerge merge = TextureMerge::Union;
   TextureMap map = TextureMap::Rbf;
-  std::optional<double> sink =
-      {};            ///< how deep the texture dips below the surface, world units; empty: one voxel
-  double blend = 0;  ///< radius along the seam, world units; 0: none
-  std::optional<Imath::Box3d> textureBox =
-      {};  ///< what the unit cube of u, v, w is; empty: the texture's zero-set box. What is outside
-           ///< goes on beyond the patch, but not in a shell: there it is cut off. A box that holds
-           ///< all of the texture cuts nothing
-  std::optional<double> voxelSize =
-      {};                      ///< empty: the finest of base and texture × smallest stretch
+  /// Depth of the texture below the surface, world units; empty: one voxel.
+  std::optional<double> embedDepth = {};
+  double blend = 0;  ///< radius of the blend along the seam, world units; 0: no blend
+  /// Box that is mapped to the unit cube of u, v, w; empty: the box of the texture's zero set. An
+  /// RBF map continues the texture outside the box beyond the patch; a prism map cuts it off there,
+  /// unless the box contains the entire texture.
+  std::optional<Imath::Box3d> textureBox = {};
+  /// Voxel size of the result, world units; empty: the smaller of the base's and of the texture's
+  /// times the smallest stretch.
+  std::optional<double> voxelSize = {};
   double halfWidth = 3;        ///< voxels
-  RbfMapOptions rbf = {};      ///< but for solveTolerance, a tenth of mapTolerance
-  double mapTolerance = 0.05;  ///< of the map's fast evaluation, texture voxels
+  RbfMapOptions rbf = {};      ///< solveTolerance is ignored: a tenth of mapTolerance is used
+  double mapTolerance = 0.05;  ///< error bound of the map's fast evaluation, texture voxels
   bool allowFolds = false;
-  bool skipFolds = false;  ///< of many patches, leave out those that fold
+  bool skipFolds = false;  ///< leave out patches whose map folds, if there are several
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
 
-/// Where the CPU time went, seconds of all threads.
+/// CPU time of the steps, seconds summed over all threads.
 struct TextureCost {
   double setup = 0;        ///< solving for the map, or building its tetrahedra
-  double certificate = 0;  ///< surveying the distortion, and proving where there is no fold
-  double mapping = 0;      ///< the texture at the grid points
-  double distance = 0;     ///< making distances of it
-  double merging = 0;      ///< with the other pieces and the base
+  double certificate = 0;  ///< measuring the distortion, and certifying the map
+  double mapping = 0;      ///< evaluating the texture at the grid points
+  double distance = 0;     ///< restoring distances
+  double merging = 0;      ///< merging with the other pieces and the base
 };
 
-/// Of all patches together; distortion is that of the worst.
+/// Measurements over all patches; the distortion is that of the worst patch.
 struct TextureReport {
   double voxelSize = 0;
-  std::size_t patches = 0, skipped = 0;  ///< mapped, and left out because they fold
+  std::size_t patches = 0, skipped = 0;  ///< mapped patches, and patches left out because they fold
   std::size_t particles = 0, blocksTested = 0, blocksEvaluated = 0;
-  /// Particles added up or tetrahedra tried, for each grid point of the blocks evaluated.
+  /// Particles summed or tetrahedra tested, per grid point of the evaluated blocks.
   double operationsPerPoint = 0;
   Distortion distortion = {};
   FoldCertificate certificate = {};
   double mapResidual = 0;  ///< largest |Φ(p) − uvw| × texture size, world units
-  /// How far the map's fast evaluation was off at grid points drawn at random, texture voxels.
+  /// Largest error of the map's fast evaluation at random grid points, texture voxels.
   double mapError = 0;
   std::size_t mapErrorPoints = 0;
-  RbfSolveReport solve = {};  ///< of an RBF map
+  RbfSolveReport solve = {};  ///< of an RBF map only
   TextureCost cost = {};
   std::vector<std::string> notes;
 };
@@ -82,51 +83,57 @@ struct TextureResult {
   TextureReport report;
 };
 
-/// Voxel size of a result for which none is asked: the texture's where the map squeezes it below
-/// the base's, else the base's own. @param minStretch  of texture → patch
+/// Default voxel size of a result: the texture's times the stretch if that is smaller than the
+/// base's, else the base's.
+/// @param minStretch  smallest stretch of texture → patch
 [[nodiscard]] double resultVoxelSize(double base, double texture, double minStretch);
 
-/// The map of a patch: through its particles, those of its rims too, to their texture coordinates,
-/// λ near for w = 0. Without the rims the map errs most beside the patch's sides; and beyond its
-/// first and last layer, so that where the texture is sunk columns go straight on by as many
-/// layers.
-/// @param sink  as a share of the patch's height; negative: beyond the last layer
+/// Builds the RBF map of a patch from its particles and rims to their texture coordinates, with λ
+/// near for w = 0. The rims reduce the error beside the patch's sides. For an embedded texture the
+/// columns continue linearly beyond the first or last layer.
+/// @param embedDepth  as a share of the patch's height; negative: beyond the last layer
 [[nodiscard]] RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options = {},
-                                    double sink = 0);
+                                    double embedDepth = 0);
 
-/// A map, and whether it folds.
-struct JudgedRbf {
+/// An RBF map with its samples and its fold certificate.
+struct CertifiedRbf {
   std::unique_ptr<RbfMap> map;
   std::vector<MapSample> samples;
   FoldCertificate certificate;
   bool isExtrapolated = false;
 };
 
-/// The map of a patch for a texture that is sunk; where columns that go straight on would fold it,
-/// as below a crease, and without them it does not fold, the map that goes on by itself.
-/// @param cost  its setup and certificate are added to
-[[nodiscard]] JudgedRbf judgedRbf(const Patch& patch, double sink, const RbfMapOptions& options,
-                                  TextureCost& cost);
+/// Builds and certifies the RBF map of a patch for an embedded texture. Columns continued below the
+/// surface may make the map fold, as below a crease. If the map without them does not fold, that
+/// map is returned.
+/// @param cost  setup and certificate times are added to it
+[[nodiscard]] CertifiedRbf certifiedRbf(const Patch& patch, double embedDepth,
+                                        const RbfMapOptions& options, TextureCost& cost);
 
-/// @throws InvalidInput, telling where, when the patch's surface is not the base's
+/// Checks that the patch lies on the surface of the base.
+/// @throws InvalidInput, with the position, if it does not
 void requirePatchOn(const levelset::NarrowBand& base, const Patch& patch);
 
-/// Warps `texture` into the patch, re-distances it [Brodersen07 §8.3], and merges it with `base`.
-/// Where the texture, squeezed by the map, has voxels no finer than the base's, the result has the
-/// base's own grid.
-/// @param base     the solid that the patch was made on
+/// Warps `texture` into the patch, restores distances [Brodersen07 §8.3], and merges the result
+/// with `base`. If the warped texture needs no finer voxels than the base has, the result has the
+/// grid of the base.
+/// @param base     the solid on which the patch was built
 /// @param texture  any solid; x, y, z of its box become u, v, w
-/// @throws UsageError for lengths that are negative or not finite; InvalidInput when the map folds
-/// (with the place), the patch does not lie on `base`, or the
-///         texture box is empty; NumericalError where an RBF map's solution by iteration stands
-///         still; ResourceLimit before allocating too much
+/// @throws UsageError for lengths that are negative or not finite
+/// @throws InvalidInput if the map folds (with the position), the patch does not lie on `base`, or
+///         the texture box is empty
+/// @throws NumericalError if the iterative solver of an RBF map stagnates
+/// @throws ResourceLimit if the memory estimate exceeds `maxMemory`
 [[nodiscard]] TextureResult mapTexture(const levelset::NarrowBand& base,
                                        const levelset::NarrowBand& texture, const Patch& patch,
                                        const TextureOptions& options = {});
 
-/// The same texture on each of many patches of one base: all have one voxel size, overlaps are
-/// united, and the base is merged once, so that a patch costs no more for being one of many.
-/// @throws as above; UsageError when there is no patch; InvalidInput when all were to be skipped
+/// Maps the same texture onto each of many patches of one base. All have one voxel size, overlaps
+/// are united, and the base is merged once, so that the cost per patch does not grow with their
+/// number.
+/// @throws UsageError as above, and if there is no patch
+/// @throws InvalidInput as above, and if all patches were skipped
+/// @throws NumericalError, ResourceLimit as above
 [[nodiscard]] TextureResult mapTexture(const levelset::NarrowBand& base,
                                        const levelset::NarrowBand& texture,
                                        std::span<const Patch> patches,

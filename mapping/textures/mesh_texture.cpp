@@ -22,19 +22,19 @@ namespace {
 
 constexpr const char* kMapMesh = "texture";
 
-/// Bytes of a mesh of that kind for each of its vertices.
+/// Memory per vertex of a mesh with the given attributes, bytes.
 double bytesPerVertex(const levelset::TriMesh& mesh) {
   const levelset::MeshAttributes& held = mesh.attributes;
   return 24 + (held.normals.empty() ? 0 : 24) + (held.uvs.empty() ? 0 : 16) +
          (held.colors.empty() ? 0 : 16);
 }
 
-/// How many normals have no direction.
+/// Number of normals of length zero.
 std::size_t countLost(const std::vector<V3d>& normals) {
   return static_cast<std::size_t>(std::count(normals.begin(), normals.end(), V3d(0)));
 }
 
-/// Moves the vertices, and the normals with them where there are some.
+/// Moves the vertices, and the normals if there are any.
 template <bool kNormals>
 void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
                   const TexturePlacement& placement, const levelset::Progress& progress,
@@ -42,52 +42,52 @@ void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
   const V3d perSize = V3d(1) / placement.box.size();
   const double hand = patch.mirrored ? -1 : 1;
   levelset::ProgressGate gate(progress, mesh.positions.size(), kMapMesh);
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 4096), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          const V3d uvw = placement.toUvw(texture.positions[i]);
-          if constexpr (kNormals) {
-            const LayerFrame frame = layerFrame(patch, uvw);
-            mesh.positions[i] = frame.position;
-            mesh.attributes.normals[i] =
-                levelset::carriedNormal(texture.attributes.normals[i],
-                                        {frame.slopes[0] * perSize.x, frame.slopes[1] * perSize.y,
-                                         frame.slopes[2] * perSize.z},
-                                        hand);
-          } else {
-            mesh.positions[i] = layerPosition(patch, uvw);
-          }
-        }
-        gate.advance(range.size());
-      });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 4096),
+                    [&](const auto& range) {
+                      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                        const V3d uvw = placement.toUvw(texture.positions[i]);
+                        if constexpr (kNormals) {
+                          const LayerFrame frame = layerFrame(patch, uvw);
+                          mesh.positions[i] = frame.position;
+                          mesh.attributes.normals[i] = levelset::transformedNormal(
+                              texture.attributes.normals[i],
+                              {frame.slopes[0] * perSize.x, frame.slopes[1] * perSize.y,
+                               frame.slopes[2] * perSize.z},
+                              hand);
+                        } else {
+                          mesh.positions[i] = layerPosition(patch, uvw);
+                        }
+                      }
+                      gate.advance(range.size());
+                    });
 }
 
 void noteLostNormals(MeshTextureResult& result) {
   if (result.lostNormals == 0) return;
-  result.notes.push_back(
-      fmt::format("{} of {} normals have no direction, or none on the patch, and are zero",
-                  result.lostNormals, result.mesh.attributes.normals.size()));
+  result.notes.push_back(fmt::format(
+      "{} of {} normals have length zero, in the mesh or after the mapping, and stay zero",
+      result.lostNormals, result.mesh.attributes.normals.size()));
 }
 
-/// Without the note of lost normals.
+/// Maps the mesh without the note about lost normals.
 MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
                           const MeshTextureOptions& options) {
-  if (!std::isfinite(options.sink)) {
-    throw levelset::UsageError(
-        fmt::format("{}: the sink is {}; give a length", kMapMesh, options.sink));
+  if (!std::isfinite(options.embedDepth)) {
+    throw levelset::UsageError(fmt::format(
+        "{}: the embedding depth is {}; give a length with --embed", kMapMesh, options.embedDepth));
   }
   if (texture.isEmpty()) {
     throw levelset::InvalidInput(
-        fmt::format("{}: the mesh has no triangles; give one with some", kMapMesh));
+        fmt::format("{}: the mesh has no triangles; give a mesh with triangles", kMapMesh));
   }
   requireAttributes(texture, kMapMesh);
   if (patch.layers.size() < 2 || !(patch.height > 0)) {
     throw levelset::InvalidInput(
-        fmt::format("{}: the patch has no layers of particles; make it with `patch`", kMapMesh));
+        fmt::format("{}: the patch has no layers of particles; build it with `patch`", kMapMesh));
   }
-  const double sink = options.sink / patch.height;
+  const double embedDepth = options.embedDepth / patch.height;
   const TexturePlacement placement{chooseTextureBox(levelset::bounds(texture), options.textureBox),
-                                   sink};
+                                   embedDepth};
   MeshTextureResult result;
   constexpr double kSampleBytes = 5 * 2 * 160;
   levelset::requireMemory(
@@ -97,9 +97,9 @@ MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
       options.maxMemory, kMapMesh);
   levelset::report(options.progress, 0, kMapMesh);
   result.distortion =
-      surveyDistortion(sampleLayerMap(patch, sink), placement.box.size(), patch.mirrored);
-  result.certificate = certifyLayers(patch, sink);
-  result.notes = judgeFolds(result.distortion, result.certificate, options.allowFolds);
+      surveyDistortion(sampleLayerMap(patch, embedDepth), placement.box.size(), patch.mirrored);
+  result.certificate = certifyLayers(patch, embedDepth);
+  result.notes = checkFolds(result.distortion, result.certificate, options.allowFolds);
 
   levelset::TriMesh& mesh = result.mesh;
   mesh.positions.resize(texture.positions.size());
@@ -128,10 +128,10 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
 MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patch> patches,
                           const MeshTextureOptions& options) {
   if (patches.empty())
-    throw levelset::UsageError("texture: there is no patch; make one with `patch`");
+    throw levelset::UsageError("texture: there is no patch; build one with `patch`");
   if (patches.size() * texture.positions.size() > std::numeric_limits<std::uint32_t>::max()) {
     throw levelset::ResourceLimit(fmt::format(
-        "texture: {} patches of {} vertices are more than a mesh can number; take fewer patches",
+        "texture: {} patches of {} vertices exceed the vertex limit of a mesh; give fewer patches",
         patches.size(), texture.positions.size()));
   }
   levelset::requireMemory(
@@ -160,9 +160,8 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
     certificates.push_back(std::move(one.certificate));
   }
   if (distortions.empty()) {
-    throw levelset::InvalidInput(
-        fmt::format("texture: all of {} patches fold; lower their height or make them smaller",
-                    patches.size()));
+    throw levelset::InvalidInput(fmt::format(
+        "texture: all of {} patches fold; use a lower height or smaller patches", patches.size()));
   }
   result.skipped = patches.size() - distortions.size();
   if (result.skipped > 0) {
@@ -173,7 +172,7 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
   result.distortion = worstOf(distortions);
   result.certificate = worstOf(certificates);
   if (noted > 0) {
-    for (const std::string& note : judgeFolds(result.distortion, result.certificate, true))
+    for (const std::string& note : checkFolds(result.distortion, result.certificate, true))
       result.notes.push_back(noted == 1 ? note
                                         : fmt::format("{} (the worst of {} patches)", note, noted));
   }

@@ -17,39 +17,43 @@
 namespace mapping {
 
 struct MeshTextureOptions {
-  double sink = 0;  ///< how deep the texture dips below the surface, world units
-  std::optional<Imath::Box3d> textureBox =
-      {};  ///< what the unit cube of u, v, w is; empty: the mesh's own box
+  double embedDepth = 0;  ///< depth of the texture below the surface, world units
+  /// Box that is mapped to the unit cube of u, v, w; empty: the mesh's own box.
+  std::optional<Imath::Box3d> textureBox = {};
   bool allowFolds = false;
-  bool skipFolds = false;  ///< of many patches, leave out those that fold
+  bool skipFolds = false;  ///< leave out patches whose map folds, if there are several
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
 
 struct MeshTextureResult {
   levelset::TriMesh mesh;
-  Distortion distortion;  ///< in the middle and close to the corners of the particles' cells
+  Distortion distortion;  ///< sampled in the middle and near the corners of the particles' cells
   FoldCertificate certificate;
   std::size_t skipped = 0;      ///< patches left out because they fold
-  std::size_t lostNormals = 0;  ///< that had no direction, or have none on the patch: zero
+  std::size_t lostNormals = 0;  ///< normals of length zero, given or after the map
   std::vector<std::string> notes;
 };
 
-/// Moves the vertices of a mesh from texture space onto a patch, straight between its particles:
-/// within the two layers about w first, then from one to the other [Brodersen07 §8.4]. Any mesh
-/// will do, closed or not; its triangles stay, turned over where the patch is mirrored so that they
-/// face as before. Beyond the unit cube the outermost cells go on.
-/// Normals follow by the inverse transpose of the map's derivatives in the cell of their vertex (on
-/// a border, in the one that begins there), at unit length and on the same side of the triangles;
-/// those of length zero stay so, with a note. Texture coordinates and colours are copied.
-/// @throws UsageError for a sink that is not finite; InvalidInput when the mesh is empty, its box
-///         has no volume, its attributes do not fit its vertices or are not finite, or the patch
-///         folds; ResourceLimit; Cancelled
+/// Moves the vertices of a mesh from texture space onto a patch, piecewise linearly through its
+/// particles: within the two layers next to w first, then between them [Brodersen07 §8.4]. The mesh
+/// may be open or closed. Its triangles are kept, and reversed if the patch is mirrored so that
+/// they face the same side. Beyond the unit cube the outermost cells continue linearly. Normals are
+/// transformed by the inverse transpose of the map's Jacobian in the cell of their vertex; on a
+/// border, in the cell that begins there. They get unit length and stay on the same side of the
+/// triangles. Normals of length zero stay zero, with a note. Texture coordinates and colours are
+/// copied.
+/// @throws UsageError for an embedding depth that is not finite
+/// @throws InvalidInput if the mesh is empty, its box has no volume, its attributes do not match
+///         its vertices or are not finite, or the patch folds
+/// @throws ResourceLimit if the memory estimate exceeds `maxMemory`
+/// @throws Cancelled if the progress callback cancels
 [[nodiscard]] MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
                                         const MeshTextureOptions& options = {});
 
-/// The same mesh on each of many patches, one after the other in one mesh.
-/// @throws as above; UsageError when there is no patch
+/// Maps the same mesh onto each of many patches, joined into one mesh.
+/// @throws UsageError as above, and if there is no patch
+/// @throws InvalidInput, ResourceLimit, Cancelled as above
 [[nodiscard]] MeshTextureResult mapMesh(const levelset::TriMesh& texture,
                                         std::span<const Patch> patches,
                                         const MeshTextureOptions& options = {});

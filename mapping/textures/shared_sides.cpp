@@ -21,7 +21,7 @@ struct Side {
   }
 };
 
-/// In the order of SharedSides.
+/// Sides of a patch in the order of SharedSides.
 std::array<Side, 4> sidesOf(const Patch& patch, std::size_t number) {
   const ParticleLayer& layer = patch.layers.front();
   const std::size_t right = layer.columns - 1, top = layer.rows - 1;

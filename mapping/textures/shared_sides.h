@@ -8,10 +8,11 @@
 
 namespace mapping {
 
-/// Of a patch: do u = 0, u = 1, v = 0 and v = 1 lie on a side of another patch, or of its own?
+/// For the sides u = 0, u = 1, v = 0 and v = 1 of a patch: true if the side coincides with a side
+/// of another patch or of the same one.
 using SharedSides = std::array<bool, 4>;
 
-/// Sides on the surface whose ends and middles fall together to a thousandth of the spacing, as
+/// Finds sides on the surface whose ends and middles coincide to a thousandth of the spacing, as
 /// those of tiles do.
 [[nodiscard]] std::vector<SharedSides> sharedSides(std::span<const Patch> patches);
 

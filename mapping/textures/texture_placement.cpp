@@ -21,15 +21,14 @@ Box3d chooseTextureBox(const Box3d& own, const std::optional<Box3d>& given) {
   const V3d size = box.isEmpty() ? V3d(0) : box.size();
   if (!(size.x > 0 && size.y > 0 && size.z > 0) || !std::isfinite(size.x * size.y * size.z)) {
     throw InvalidInput(
-        fmt::format("{}: the texture box has no volume, its size is {:.6g} × {:.6g} × "
+        fmt::format("{}: the texture box has no volume: its size is {:.6g} × {:.6g} × "
                     "{:.6g}; give a low and a high corner",
                     kAction, size.x, size.y, size.z));
   }
   if (given && !box.intersects(own)) {
-    throw InvalidInput(
-        fmt::format("{}: the texture box holds nothing of the texture; give one that its "
-                    "surface passes through",
-                    kAction));
+    throw InvalidInput(fmt::format(
+        "{}: the texture box contains nothing of the texture; give a box that meets its surface",
+        kAction));
   }
   return box;
 }
@@ -37,19 +36,19 @@ Box3d chooseTextureBox(const Box3d& own, const std::optional<Box3d>& given) {
 namespace {
 
 std::string foldSentence(const Distortion& distortion, const FoldCertificate& certificate) {
-  const auto placeOf = [](const V3d& place, const V3d& uvw, double jacobian) {
+  const auto describe = [](const V3d& position, const V3d& uvw, double jacobian) {
     return fmt::format(
-        "most at ({:.6g}, {:.6g}, {:.6g}), u, v, w = {:.3g}, {:.3g}, {:.3g}, where the map's "
+        "the worst at ({:.6g}, {:.6g}, {:.6g}), u, v, w = {:.3g}, {:.3g}, {:.3g}, where the map's "
         "Jacobian is {:.3g} of its median",
-        place.x, place.y, place.z, uvw.x, uvw.y, uvw.z, jacobian);
+        position.x, position.y, position.z, uvw.x, uvw.y, uvw.z, jacobian);
   };
   if (distortion.folded > 0)
     return fmt::format(
-        "the patch folds at {} of {} places, {}", distortion.folded, distortion.samples,
-        placeOf(distortion.foldPlace, distortion.foldUvw, distortion.jacobian.least));
-  const FoldPlace& fold = certificate.worst.front();
-  return fmt::format("the patch folds in between the {} places that were sampled, {}",
-                     distortion.samples, placeOf(fold.place, fold.uvw, fold.jacobian));
+        "the patch folds at {} of {} sample points, {}", distortion.folded, distortion.samples,
+        describe(distortion.foldPoint, distortion.foldUvw, distortion.jacobian.least));
+  const FoldPoint& fold = certificate.worst.front();
+  return fmt::format("the patch folds between the {} sample points, {}", distortion.samples,
+                     describe(fold.position, fold.uvw, fold.jacobian));
 }
 
 }  // namespace
@@ -60,16 +59,16 @@ bool isBeyond(const Box3d& own, const Box3d& box, double voxelSize) {
   return !own.isEmpty() && !(wide.intersects(own.min) && wide.intersects(own.max));
 }
 
-std::vector<std::string> judgeFolds(const Distortion& distortion,
+std::vector<std::string> checkFolds(const Distortion& distortion,
                                     const FoldCertificate& certificate, bool areAllowed) {
   if (distortion.folded == 0 && certificate.verdict() == FoldVerdict::Certified) return {};
   if (distortion.folded == 0 && certificate.verdict() == FoldVerdict::Undecided)
-    return {fmt::format("no fold of the map was met, but {:.2g} of its volume is not certified",
+    return {fmt::format("no fold of the map was found, but {:.2g} of its volume is not certified",
                         certificate.undecidedShare)};
   std::string sentence = foldSentence(distortion, certificate);
   if (!areAllowed) {
-    throw InvalidInput(fmt::format(
-        "{}: {}; unfold the patch, lower its height or choose a flatter place", kAction, sentence));
+    throw InvalidInput(fmt::format("{}: {}; give --untangle, a lower height or a flatter position",
+                                   kAction, sentence));
   }
   return {std::move(sentence)};
 }

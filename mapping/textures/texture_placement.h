@@ -11,30 +11,30 @@
 
 namespace mapping {
 
-/// Where a texture lies in texture space: the unit cube is `box`, pushed inwards by `sink`.
+/// Position of a texture in texture space: the unit cube is `box`, moved inwards by `embedDepth`.
 struct TexturePlacement {
   Imath::Box3d box;
-  double sink = 0;  ///< in w
+  double embedDepth = 0;  ///< in w
   [[nodiscard]] Imath::V3d toTexture(const Imath::V3d& uvw) const {
-    return box.min + Imath::V3d(uvw.x, uvw.y, uvw.z + sink) * box.size();
+    return box.min + Imath::V3d(uvw.x, uvw.y, uvw.z + embedDepth) * box.size();
   }
   [[nodiscard]] Imath::V3d toUvw(const Imath::V3d& texture) const {
-    return (texture - box.min) / box.size() - Imath::V3d(0, 0, sink);
+    return (texture - box.min) / box.size() - Imath::V3d(0, 0, embedDepth);
   }
 };
 
-/// The box that becomes the unit cube: the one that is given, else the texture's own.
-/// @throws InvalidInput when it has no volume or holds nothing of the texture
+/// Returns the box that becomes the unit cube: the given one, or else the texture's own.
+/// @throws InvalidInput if it has no volume or does not meet the texture
 [[nodiscard]] Imath::Box3d chooseTextureBox(const Imath::Box3d& own,
                                             const std::optional<Imath::Box3d>& given);
 
-/// Does a texture of this box stick out of the other, by more than a small part of its voxels?
+/// True if a texture with box `own` extends beyond `box` by more than a small fraction of a voxel.
 [[nodiscard]] bool isBeyond(const Imath::Box3d& own, const Imath::Box3d& box, double voxelSize);
 
-/// @return what to note of folds that are allowed, and of parts that are not certified; empty
-///         without any
-/// @throws InvalidInput for folds that are not, telling where the worst is
-[[nodiscard]] std::vector<std::string> judgeFolds(const Distortion& distortion,
+/// Checks a map for folds.
+/// @return notes about folds that are allowed, and about parts that are not certified; often empty
+/// @throws InvalidInput for folds that are not allowed, with the position of the worst
+[[nodiscard]] std::vector<std::string> checkFolds(const Distortion& distortion,
                                                   const FoldCertificate& certificate,
                                                   bool areAllowed);
 

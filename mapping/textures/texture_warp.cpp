@@ -30,10 +30,11 @@ using openvdb::CoordBBox;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
 constexpr const char* kWarp = "texture";
-constexpr int kRootEdge = 64;  // grid points along a block that the descent begins with
+constexpr int kRootEdge = 64;  // grid points along a block at the top of the hierarchy
 constexpr double kLeafBytes = sizeof(LeafNode) + LeafNode::SIZE * sizeof(float);
 
-/// Which parts of a texture's grid have leaf nodes: counts over boxes in constant time.
+/// Summed-area table of the leaf nodes of a texture's grid: counts the leaves in a box in constant
+/// time.
 class Occupancy {
  public:
   explicit Occupancy(const openvdb::FloatGrid& grid) : grid_(grid) {
@@ -51,7 +52,7 @@ class Occupancy {
     for (int axis = 0; axis < 3; ++axis) accumulate(axis);
   }
 
-  /// Is there a leaf node within a box of world coordinates, widened by `pad` voxels?
+  /// True if a leaf node lies within a box of world coordinates, widened by `pad` voxels.
   [[nodiscard]] bool touches(const Box3d& world, double pad) const {
     openvdb::Vec3d low(std::numeric_limits<double>::max()), high(-low);
     for (int corner = 0; corner < 8; ++corner) {
@@ -69,7 +70,7 @@ class Occupancy {
       a[axis] = static_cast<int>(std::max(first, 0.0));
       b[axis] = static_cast<int>(std::min(last, size_[axis] - 1.0)) + 1;
     }
-    std::uint32_t count = 0;  // wraps around in between, ends right
+    std::uint32_t count = 0;  // may wrap around temporarily
     for (int corner = 0; corner < 8; ++corner) {
       const Coord c(corner & 1 ? a.x() : b.x(), corner & 2 ? a.y() : b.y(),
                     corner & 4 ? a.z() : b.z());
@@ -98,7 +99,8 @@ class Occupancy {
   const openvdb::FloatGrid& grid_;
   int shift_ = 3;
   Coord origin_, size_;
-  std::vector<std::uint32_t> sums_;  // over all cells below, in each axis one more than cells
+  // Sums over all cells below; one more than cells along each axis.
+  std::vector<std::uint32_t> sums_;
 };
 
 struct Block {
@@ -106,7 +108,7 @@ struct Block {
   int edge;
 };
 
-/// The finaliser of SplitMix64 over the coordinates.
+/// Hash of the coordinates by the finaliser of SplitMix64.
 std::uint64_t hashOf(const Coord& c) {
   std::uint64_t hash = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -120,10 +122,10 @@ std::uint64_t hashOf(const Coord& c) {
 
 enum class Meets { Nothing, Inside, Band };
 
-/// What became of a block of patch space.
+/// Results for a block of patch space.
 struct Piece {
   std::vector<std::unique_ptr<LeafNode>> leaves;
-  std::vector<Block> inside;  ///< wholly
+  std::vector<Block> inside;  ///< blocks that are completely inside
   std::size_t tested = 0, ghosts = 0, operations = 0, checked = 0;
   double mapError = 0;  ///< texture voxels
 
@@ -138,7 +140,7 @@ struct Piece {
   }
 };
 
-/// One pass over patch space.
+/// Warps a texture over patch space.
 class TextureWarp {
  public:
   TextureWarp(const levelset::NarrowBand& texture, const TexturePlacement& placement,
@@ -185,7 +187,7 @@ class TextureWarp {
     }
     if (warp.blocksEvaluated == 0) {
       throw levelset::InvalidInput(fmt::format(
-          "{}: nothing of the texture falls into the patch; check the texture box and the sink",
+          "{}: no part of the texture falls into the patch; check --texture-box and --embed",
           kWarp));
     }
     warp.crumbs = dropCrumbs(*grid);
@@ -193,12 +195,12 @@ class TextureWarp {
     return warp;
   }
 
-  /// Grid points that are inside alone: where a face falls together with a plane of the grid, the
-  /// map's last digits tell its points apart, and each would become a solid of its own. Where there
-  /// are no others they are what there is of the texture, and stay.
-  /// @return how many
+  /// Removes isolated inside grid points. Where a face coincides with a plane of the grid, the last
+  /// digits of the map decide the sign of its points. Each of them could become a separate solid.
+  /// If the texture has no other inside points, they are kept.
+  /// @return number of removed points
   static std::size_t dropCrumbs(openvdb::FloatGrid& grid) {
-    constexpr double kDepth = 0.1;  // voxels: what is deeper is more than rounding
+    constexpr double kDepth = 0.1;  // voxels; deeper points are not due to rounding
     const auto deepest = static_cast<float>(-kDepth * grid.voxelSize()[0]);
     const auto accessor = grid.getConstAccessor();
     std::vector<Coord> crumbs;
@@ -228,8 +230,8 @@ class TextureWarp {
     return levelset::toImath(transform_->indexToWorld(index));
   }
 
-  /// Aligned blocks over the image of the texture's band under the straight map, with room for what
-  /// the two maps differ by.
+  /// Aligned blocks over the image of the texture's band under the layer map, with a margin for the
+  /// difference between the two maps.
   std::vector<Block> rootBlocks() const {
     const openvdb::FloatGrid& grid = levelset::vdb(texture_);
     const CoordBBox active = grid.evalActiveVoxelBoundingBox();
@@ -254,10 +256,10 @@ class TextureWarp {
     for (int axis = 0; axis < 3; ++axis) {
       count *= box.extents()[axis] / kRootEdge + 2;
       if (!(std::abs(box.min()[axis]) < kMostIndex) || !(std::abs(box.max()[axis]) < kMostIndex)) {
-        throw levelset::ResourceLimit(fmt::format(
-            "{}: at a voxel of {:.3g} the grid passes the range of 32-bit indices; take a "
-            "larger one",
-            kWarp, transform_->voxelSize()[0]));
+        throw levelset::ResourceLimit(
+            fmt::format("{}: with a voxel size of {:.3g} the grid exceeds the range of 32-bit "
+                        "indices; use larger voxels",
+                        kWarp, transform_->voxelSize()[0]));
       }
     }
     levelset::requireMemory(count * (sizeof(Block) + sizeof(Piece)), options_.maxMemory, kWarp);
@@ -270,7 +272,7 @@ class TextureWarp {
     return blocks;
   }
 
-  /// The samplers of one thread.
+  /// Samplers for one thread.
   struct Samplers {
     explicit Samplers(const levelset::NarrowBand& texture)
         : linear(texture), cubic(texture, levelset::Interpolation::Tricubic) {}
@@ -308,7 +310,8 @@ class TextureWarp {
       descend(octant(block, bits), *map.octant(bits), samplers, piece);
   }
 
-  /// Must the block be looked into? Notes it if it lies wholly inside.
+  /// True if the block must be subdivided or evaluated. Records the block if it lies completely
+  /// inside.
   bool splits(const Block& block, const BlockMap& map, const Samplers& samplers,
               Piece& piece) const {
     ++piece.tested;
@@ -324,7 +327,7 @@ class TextureWarp {
   }
 
   void requireLeaves(std::size_t count) const {
-    // The field, its copy while distances are made, and the result.
+    // The field, its copy while distances are restored, and the result.
     levelset::requireMemory(static_cast<double>(count) * 3 * kLeafBytes, options_.maxMemory, kWarp);
   }
 
@@ -340,8 +343,8 @@ class TextureWarp {
     return isGhost(center, middle) ? Meets::Nothing : Meets::Inside;
   }
 
-  /// Far from the particles the map may return to the texture; going there through the particles
-  /// shows that this is another place.
+  /// True if the map, far from the particles, sends a point back into the texture. The layer map of
+  /// the result then gives a position far from the point.
   bool isGhost(const V3d& place, const V3d& uvw) const {
     return !map_.isLocal() && (layerPosition(patch_, uvw) - place).length() > ghostDistance_;
   }
@@ -371,11 +374,11 @@ class TextureWarp {
     }
   }
 
-  /// Evaluates the map itself at a point of some leaves, which a hash of their places chooses: the
-  /// same ones whatever the threads do, and so few that it costs a twentieth of the rest.
+  /// Evaluates the map directly at a point of some leaves, chosen by a hash of their coordinates.
+  /// The choice does not depend on the threads, and the cost is about a twentieth of the rest.
   void checkAgainstDirect(const LeafNode& leaf, const std::array<V3d, LeafNode::SIZE>& uvw,
                           Piece& piece) const {
-    if (map_.isLocal()) return;  // there is no other evaluation
+    if (map_.isLocal()) return;  // a local map has no other evaluation
     constexpr std::uint64_t kParticlesOfLeaf = 250;
     const std::uint64_t hash = hashOf(leaf.origin());
     const std::uint64_t every = 1 + patch_.particleCount() / kParticlesOfLeaf;
@@ -395,7 +398,7 @@ class TextureWarp {
   const WarpOptions& options_;
   Occupancy occupancy_;
   openvdb::math::Transform::Ptr transform_;
-  M33d step_;  ///< rows: world steps of the grid's axes
+  M33d step_;  ///< world steps of the grid's axes as rows
   double textureBackground_, tolerance_ = 0, ghostDistance_;
   float background_ = 0;
   std::atomic<std::size_t> leafCount_ = 0;

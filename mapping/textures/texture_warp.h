@@ -13,33 +13,35 @@
 namespace mapping {
 
 struct WarpOptions {
-  Imath::M44d indexToWorld;  ///< of the result: rotation, uniform scale, translation
-  double scale = 1;          ///< typical stretch: texture distances are multiplied by it
-  double mapTolerance =
-      0.05;  ///< how far the fast evaluation of the map may be off, texture voxels
+  /// Index to world transform of the result: rotation, uniform scale, translation.
+  Imath::M44d indexToWorld;
+  double scale = 1;  ///< typical stretch, the factor of the texture's distances
+  /// Error bound of the map's fast evaluation, texture voxels.
+  double mapTolerance = 0.05;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
 
 struct Warp {
-  levelset::NarrowBand field;  ///< right zero set and signs; distances are only roughly those
+  levelset::NarrowBand field;  ///< zero set and signs are correct; distances are approximate
   std::size_t blocksTested = 0, blocksEvaluated = 0;
-  std::size_t operations = 0;  ///< particles added up or tetrahedra tried, see BlockMap::evaluate
-  std::size_t ghosts =
-      0;  ///< grid points that the map, far from the particles, sends back into the texture
-  /// Grid points that would have been solids of their own, within a tenth of a voxel of nothing,
-  /// and were left out.
+  std::size_t operations = 0;  ///< particles summed or tetrahedra tested, see BlockMap::evaluate
+  /// Grid points far from the particles that the map sends back into the texture.
+  std::size_t ghosts = 0;
+  /// Isolated inside grid points less than a tenth of a voxel deep, which were left out so that
+  /// they do not become separate solids.
   std::size_t crumbs = 0;
-  /// Grid points drawn at random where the map was evaluated directly too, and how far the fast
-  /// evaluation was off at any of them, texture voxels.
+  /// Random grid points where the map was also evaluated directly, and the largest error of the
+  /// fast evaluation at these points, texture voxels.
   std::size_t checked = 0;
   double mapError = 0;
 };
 
-/// Pulls a texture back into patch space. Blocks of 64³ grid points are split down to 8³ while the
-/// image of a block, bounded through the map's slopes, may touch the texture's band; only 8³ blocks
-/// that may are evaluated, the others are inside or outside as a whole.
-/// @throws InvalidInput when no block meets the texture; ResourceLimit before the limit is passed
+/// Pulls a texture back into patch space. Blocks of 64³ grid points are split down to 8³ as long as
+/// the image of a block, bounded through the map's slopes, may touch the texture's band. Only such
+/// 8³ blocks are evaluated; the others lie completely inside or outside.
+/// @throws InvalidInput if no block meets the texture
+/// @throws ResourceLimit before memory exceeds `maxMemory`
 [[nodiscard]] Warp warpTexture(const levelset::NarrowBand& texture,
                                const TexturePlacement& placement, const Patch& patch,
                                const PatchMap& map, const WarpOptions& options);

@@ -12,9 +12,9 @@
 #include "levelset/error.h"
 #include "mapping/layers/trilinear_volume.h"
 #include "mapping/surface/surface_field.h"
-#include "mapping/untangle/shell_cells.h"
-#include "mapping/untangle/shell_energy.h"
-#include "mapping/untangle/shell_solver.h"
+#include "mapping/untangle/prism_cells.h"
+#include "mapping/untangle/prism_elements.h"
+#include "mapping/untangle/prism_solver.h"
 
 namespace mapping {
 namespace {
@@ -23,15 +23,15 @@ using Imath::V3d;
 using levelset::InvalidInput;
 using levelset::NarrowBand;
 
-void checkShell(const NarrowBand& base, const Patch& patch, const ShellOptions& options,
+void checkInput(const NarrowBand& base, const Patch& patch, const UntangleOptions& options,
                 const char* action) {
   if (patch.layers.size() < 2 || !(patch.height > 0)) {
     throw InvalidInput(
-        fmt::format("{}: the patch has no layers of particles; make it with `patch`", action));
+        fmt::format("{}: the patch has no layers of particles; build it with `patch`", action));
   }
-  if (!std::isfinite(options.sink)) {
-    throw levelset::UsageError(
-        fmt::format("{}: the sink is {}; give a length", action, options.sink));
+  if (!std::isfinite(options.embedDepth)) {
+    throw levelset::UsageError(fmt::format(
+        "{}: the embedding depth is {}; give a length with --embed", action, options.embedDepth));
   }
   if (options.proportions) {
     const V3d& p = *options.proportions;
@@ -46,8 +46,7 @@ void checkShell(const NarrowBand& base, const Patch& patch, const ShellOptions& 
     for (const V3d& p : layer.positions)
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
         throw InvalidInput(
-            fmt::format("{}: the particle at ({}, {}, {}) is not finite; make the "
-                        "patch again",
+            fmt::format("{}: the particle at ({}, {}, {}) is not finite; build the patch again",
                         action, p.x, p.y, p.z));
       }
   const SurfaceField field(base);
@@ -55,15 +54,16 @@ void checkShell(const NarrowBand& base, const Patch& patch, const ShellOptions& 
     const double distance = std::abs(field.value(p)) / base.voxelSize();
     if (!(distance <= 1)) {
       throw InvalidInput(
-          fmt::format("{}: the patch does not lie on the base, at ({:.6g}, {:.6g}, {:.6g}) they "
-                      "are {:.3g} voxels or more apart; make the patch on this base",
+          fmt::format("{}: the patch does not lie on the base: at ({:.6g}, {:.6g}, {:.6g}) the "
+                      "surface is at least {:.3g} voxels away; build the patch on this base",
                       action, p.x, p.y, p.z, distance));
     }
   }
-  levelset::requireMemory(ShellElements::estimateBytes(patch), options.maxMemory, action);
+  levelset::requireMemory(PrismElements::estimateBytes(patch), options.maxMemory, action);
 }
 
-/// Above the surface all are free; on it those inside slide.
+/// Constraints of all particles: those above the surface are free; those on it slide, except on
+/// sides that must stay.
 std::vector<ParticleHold> holdsOf(const Patch& patch, bool freeSides) {
   std::vector<ParticleHold> holds;
   for (std::size_t k = 0; k < patch.layers.size(); ++k) {
@@ -79,7 +79,8 @@ std::vector<ParticleHold> holdsOf(const Patch& patch, bool freeSides) {
   return holds;
 }
 
-/// A particle of the rim stays as far ahead of the last one as the one before that stays behind.
+/// Moves the rim so that the displacement continues linearly beyond the border: 2 × the border
+/// particle's displacement minus that of the particle inside it.
 void moveRim(const ParticleLayer& old, ParticleLayer& layer) {
   const auto columns = static_cast<int>(layer.columns), rows = static_cast<int>(layer.rows);
   const auto moved = [&](int i, int j) { return layer.beyond(i, j) - old.beyond(i, j); };
@@ -124,18 +125,18 @@ double farthest(const std::vector<V3d>& a, const std::vector<V3d>& b) {
   return most;
 }
 
-std::array<V3d, 8> cornersOfCell(const ShellCell& cell, const std::vector<V3d>& positions) {
+std::array<V3d, 8> cornersOfCell(const PrismCell& cell, const std::vector<V3d>& positions) {
   std::array<V3d, 8> corners;
   for (std::size_t n = 0; n < 8; ++n) corners[n] = positionOf(cell.corners[n], positions);
   return corners;
 }
 
-/// Elements come cell by cell.
+/// Elements are stored cell by cell.
 constexpr std::size_t kElementsPerCell = 14;
 
-ShellFolds foldsAt(const Patch& patch, const ShellElements& elements, double sink,
-                   const std::vector<V3d>& positions) {
-  const ShellCells cells(patch, sink);
+FoldCount foldsAt(const Patch& patch, const PrismElements& elements, double embedDepth,
+                  const std::vector<V3d>& positions) {
+  const PrismCells cells(patch, embedDepth);
   std::vector<char> folds(cells.size());
   std::vector<double> least(cells.size());
   tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t n) {
@@ -148,7 +149,7 @@ ShellFolds foldsAt(const Patch& patch, const ShellElements& elements, double sin
         signOfTrilinear(cornersOfCell(cells.at(n), positions), 0, patch.mirrored ? -1 : 1);
     folds[n] = sign.folds || sign.undecided > 0;
   });
-  ShellFolds result;
+  FoldCount result;
   result.cells = cells.size();
   result.leastJacobian = *std::min_element(least.begin(), least.end());
   for (const char isFolded : folds) result.folded += isFolded ? 1 : 0;
@@ -157,22 +158,22 @@ ShellFolds foldsAt(const Patch& patch, const ShellElements& elements, double sin
 
 constexpr std::size_t kSettling = 100;  // iterations
 
-/// Runs down ε until no element is turned over [Garanzha21, §3], and on with as small an ε until
-/// no cell folds between its elements either.
-/// @return iterations
-std::size_t untangle(ShellSolver& solver, const ShellOptions& options,
-                     const std::function<bool()>& isDone) {
+/// Reduces ε until no element is inverted [Garanzha21, §3]. Then continues with a small ε until no
+/// cell folds between its elements either.
+/// @return number of iterations
+std::size_t removeFolds(PrismSolver& solver, const UntangleOptions& options,
+                        const std::function<bool()>& isDone) {
   constexpr std::size_t kRound = 20;  // iterations at one ε
-  constexpr double kSlowest = 0.2;    // of the way to no fold, at the least
-  constexpr int kMostStuck = 10;      // rounds that bring nothing
+  constexpr double kSlowest = 0.2;  // least relative progress per round assumed in the update of ε
+  constexpr int kMostStuck = 10;    // rounds without progress before the search ends
   double epsilon = 1, last = -std::numeric_limits<double>::infinity();
   std::size_t iterations = 0;
   int stuck = 0;
   while (iterations < options.mostIterations && stuck < kMostStuck) {
     levelset::report(options.progress,
                      static_cast<double>(iterations) / static_cast<double>(options.mostIterations),
-                     "unfold");
-    const auto density = [epsilon](const ShellSlopes& f) { return foldoverEnergy(f, epsilon); };
+                     "untangle");
+    const auto density = [epsilon](const ElementSlopes& f) { return foldoverEnergy(f, epsilon); };
     const double energy = solver.energy(density);
     const std::size_t taken = solver.minimise(density, kRound);
     iterations += std::max<std::size_t>(taken, 1);
@@ -203,20 +204,20 @@ V3d sideLengths(const Patch& patch) {
   return {u, v, patch.height};
 }
 
-/// The energy of an element whose rest is `scale` times as large.
-ElementEnergy scaledDirichlet(ShellSlopes slopes, double scale) {
+/// Energy of an element whose rest shape is `scale` times as large.
+ElementEnergy scaledDirichlet(ElementSlopes slopes, double scale) {
   for (V3d& column : slopes) column /= scale;
   ElementEnergy energy = symmetricDirichlet(slopes);
   for (V3d& column : energy.stress) column /= scale;
   return energy;
 }
 
-/// The size of the rest at which the energy is least: |F|² and |F⁻¹|² go with its inverse square
-/// and its square.
-double bestRestScale(const ShellElements& elements, const std::vector<V3d>& positions) {
+/// Scale of the rest shape with the least energy: |F|² scales with its inverse square and |F⁻¹|²
+/// with its square.
+double bestRestScale(const PrismElements& elements, const std::vector<V3d>& positions) {
   double stretch = 0, squeeze = 0;
   for (std::size_t e = 0; e < elements.size(); ++e) {
-    const ShellSlopes f = elements.slopes(e, positions);
+    const ElementSlopes f = elements.slopes(e, positions);
     const double squares = f[0].length2() + f[1].length2() + f[2].length2();
     stretch += elements.weight(e) * squares;
     squeeze += elements.weight(e) * (symmetricDirichlet(f).value - squares);
@@ -224,8 +225,8 @@ double bestRestScale(const ShellElements& elements, const std::vector<V3d>& posi
   return std::sqrt(std::sqrt(stretch / squeeze));
 }
 
-ShellDistortion distortionAt(const ShellElements& elements, const std::vector<V3d>& positions) {
-  ShellDistortion result;
+ElementDistortion distortionAt(const PrismElements& elements, const std::vector<V3d>& positions) {
+  ElementDistortion result;
   const double scale = bestRestScale(elements, positions);
   std::vector<double> values(elements.size());
   for (std::size_t e = 0; e < values.size(); ++e) {
@@ -244,31 +245,31 @@ ShellDistortion distortionAt(const ShellElements& elements, const std::vector<V3
 
 }  // namespace
 
-ShellFolds countFolds(const Patch& patch, double sink) {
-  const ShellElements elements(patch, shellSizes(patch), sink);
-  return foldsAt(patch, elements, sink, particlePositions(patch));
+FoldCount countFolds(const Patch& patch, double embedDepth) {
+  const PrismElements elements(patch, meanExtents(patch), embedDepth);
+  return foldsAt(patch, elements, embedDepth, particlePositions(patch));
 }
 
-Unfolding unfold(const NarrowBand& base, const Patch& patch, const ShellOptions& options) {
-  checkShell(base, patch, options, "unfold");
-  const ShellElements elements(patch, options.proportions.value_or(shellSizes(patch)),
-                               options.sink);
+Untangling untangle(const NarrowBand& base, const Patch& patch, const UntangleOptions& options) {
+  checkInput(base, patch, options, "untangle");
+  const PrismElements elements(patch, options.proportions.value_or(meanExtents(patch)),
+                               options.embedDepth);
   const std::vector<V3d> start = particlePositions(patch);
-  Unfolding result;
-  result.before = result.after = foldsAt(patch, elements, options.sink, start);
+  Untangling result;
+  result.before = result.after = foldsAt(patch, elements, options.embedDepth, start);
   result.patch = patch;
-  if (result.isUnfolded()) return result;
-  ShellSolver solver(base, elements, holdsOf(patch, options.freeSides), start);
+  if (result.isUntangled()) return result;
+  PrismSolver solver(base, elements, holdsOf(patch, options.freeSides), start);
   const auto isDone = [&] {
-    return foldsAt(patch, elements, options.sink, solver.positions()).folded == 0;
+    return foldsAt(patch, elements, options.embedDepth, solver.positions()).folded == 0;
   };
-  result.iterations = untangle(solver, options, isDone);
+  result.iterations = removeFolds(solver, options, isDone);
   std::vector<V3d> found = solver.positions();
-  ShellFolds after = foldsAt(patch, elements, options.sink, found);
+  FoldCount after = foldsAt(patch, elements, options.embedDepth, found);
   if (after.folded == 0) {
-    // Cells that just do not fold are too flat for a map that is smoothed.
+    // Cells that barely avoid folding are too flat for the smoothed map.
     result.iterations += solver.minimise(symmetricDirichlet, kSettling);
-    const ShellFolds settled = foldsAt(patch, elements, options.sink, solver.positions());
+    const FoldCount settled = foldsAt(patch, elements, options.embedDepth, solver.positions());
     if (settled.folded == 0) after = settled, found = solver.positions();
   }
   if (after.folded >= result.before.folded) return result;
@@ -279,21 +280,21 @@ Unfolding unfold(const NarrowBand& base, const Patch& patch, const ShellOptions&
 }
 
 DistortionGain minimiseDistortion(const NarrowBand& base, const Patch& patch,
-                                  const ShellOptions& options) {
+                                  const UntangleOptions& options) {
   constexpr const char* kRelax = "relax";
-  checkShell(base, patch, options, kRelax);
-  const ShellElements elements(patch, options.proportions.value_or(sideLengths(patch)),
-                               options.sink);
+  checkInput(base, patch, options, kRelax);
+  const PrismElements elements(patch, options.proportions.value_or(sideLengths(patch)),
+                               options.embedDepth);
   const std::vector<V3d> start = particlePositions(patch);
-  const ShellFolds folds = foldsAt(patch, elements, options.sink, start);
+  const FoldCount folds = foldsAt(patch, elements, options.embedDepth, start);
   if (folds.folded > 0) {
     throw InvalidInput(
-        fmt::format("{}: the patch folds in {} of {} cells of its particles; unfold it first",
+        fmt::format("{}: the patch folds in {} of {} cells of its particles; untangle it first",
                     kRelax, folds.folded, folds.cells));
   }
   DistortionGain result;
   result.before = distortionAt(elements, start);
-  ShellSolver solver(base, elements, holdsOf(patch, options.freeSides), start);
+  PrismSolver solver(base, elements, holdsOf(patch, options.freeSides), start);
   std::vector<V3d> found = start;
   constexpr std::size_t kRound = 20;
   while (result.iterations < options.mostIterations) {
@@ -303,14 +304,14 @@ DistortionGain minimiseDistortion(const NarrowBand& base, const Patch& patch,
         kRelax);
     const std::size_t wanted = std::min(kRound, options.mostIterations - result.iterations);
     const double scale = bestRestScale(elements, found);
-    const auto density = [scale](const ShellSlopes& f) { return scaledDirichlet(f, scale); };
+    const auto density = [scale](const ElementSlopes& f) { return scaledDirichlet(f, scale); };
     const double energy = solver.energy(density);
     const std::size_t taken = solver.minimise(density, wanted);
     result.iterations += taken;
-    // The energy forbids folds at the corners of cells; between them they are very rare.
-    if (foldsAt(patch, elements, options.sink, solver.positions()).folded > 0) break;
+    // The energy forbids folds at the corners of cells; folds between corners are very rare.
+    if (foldsAt(patch, elements, options.embedDepth, solver.positions()).folded > 0) break;
     found = solver.positions();
-    constexpr double kLeastGain = 1e-7;  // of the energy, in a round
+    constexpr double kLeastGain = 1e-7;  // relative decrease of the energy in a round
     if (energy - solver.energy(density) < kLeastGain * energy) break;
   }
   result.after = distortionAt(elements, found);

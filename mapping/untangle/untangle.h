@@ -9,66 +9,76 @@
 #include "levelset/progress.h"
 #include "mapping/patches/patch.h"
 
-/// Patches whose particles are moved so that the map through them folds less, or stretches less:
-/// those of the surface slide on it, those above are free, and those of the rims follow their
-/// neighbours.
+/// Moves the particles of a patch so that the map through them has fewer folds or less distortion.
+/// Particles on the surface slide on it, particles above it are free, and rim particles follow
+/// their neighbours.
 namespace mapping {
 
-struct ShellOptions {
-  double sink = 0;         ///< how far the texture lies below the surface, in w
-  bool freeSides = false;  ///< the sides slide on the surface too; else they stay
-  /// Size of the unit cube at rest; empty: that of the patch, so that the proportions that were
-  /// asked for are no distortion. For the distortion the unit does not matter.
+struct UntangleOptions {
+  double embedDepth = 0;  ///< depth of the texture below the surface, in w
+  /// True: particles on the sides slide on the surface too; false: they stay.
+  bool freeSides = false;
+  /// Size of the unit cube at rest; empty: the size of the patch, so that the proportions of the
+  /// patch do not count as distortion. Only the proportions affect the distortion, not the unit of
+  /// length.
   std::optional<Imath::V3d> proportions = {};
   std::size_t mostIterations = 1000;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
 
-/// Cells of the shell in which the straight map through the particles (or one of a cell's six
-/// tetrahedra) turns over or has no volume, and the least determinant.
-struct ShellFolds {
+/// Number of cells in which the piecewise linear map through the particles, or one of the cell's
+/// six tetrahedra, is inverted or has no volume.
+struct FoldCount {
   std::size_t folded = 0, cells = 0;
-  double leastJacobian = 0;  ///< at the corners and in the tetrahedra of the cells; 1 at rest
+  double leastJacobian = 0;  ///< least determinant at the corners and in the tetrahedra; 1 at rest
 };
-[[nodiscard]] ShellFolds countFolds(const Patch& patch, double sink = 0);
+[[nodiscard]] FoldCount countFolds(const Patch& patch, double embedDepth = 0);
 
-struct Unfolding {
-  Patch patch;  ///< the given one, to the bit, where it did not fold, or nothing was mended
-  ShellFolds before, after;
+struct Untangling {
+  /// Equal to the input patch, bit for bit, if it had no folds or none could be removed.
+  Patch patch;
+  FoldCount before, after;
   std::size_t iterations = 0;
-  double farthestMove = 0;  ///< of a particle, world units
-  [[nodiscard]] bool isUnfolded() const { return after.folded == 0; }
+  double farthestMove = 0;  ///< largest displacement of a particle, world units
+  [[nodiscard]] bool isUntangled() const { return after.folded == 0; }
 };
 
-/// Moves particles until no cell folds: the least of an energy that is finite for folds and forbids
-/// them in the limit [Garanzha21]. Where the sides of the patch themselves cross on the surface, no
-/// place of the other particles mends that: the patch with the fewest folds is returned.
-/// @param base  the solid that the patch was made on
-/// @throws InvalidInput for a patch without layers, with particles that are not finite, or one that
-///         does not lie on the base; ResourceLimit; Cancelled
-[[nodiscard]] Unfolding unfold(const levelset::NarrowBand& base, const Patch& patch,
-                               const ShellOptions& options = {});
+/// Moves particles until no cell folds, by minimising an energy that is finite for folds and
+/// forbids them in the limit [Garanzha21]. If the sides of the patch cross each other on the
+/// surface, no position of the other particles removes that fold. In that case the patch with the
+/// fewest folds is returned.
+/// @param base  the solid on which the patch was built
+/// @throws InvalidInput for a patch without layers, with particles that are not finite, or that
+///         does not lie on the base
+/// @throws UsageError for an embedding depth or proportions that are not finite, or proportions
+///         that are not positive
+/// @throws ResourceLimit if the memory estimate exceeds `maxMemory`
+/// @throws Cancelled if the progress callback cancels
+[[nodiscard]] Untangling untangle(const levelset::NarrowBand& base, const Patch& patch,
+                                  const UntangleOptions& options = {});
 
-/// What the symmetric Dirichlet energy of a shell's elements is, against a box of given proportions
-/// in the size at which it is least: 6 for a map that keeps proportions.
-struct ShellDistortion {
-  double mean = 0;  ///< by volume at rest: what is minimised
+/// Symmetric Dirichlet energy of the elements, relative to a rest box of the given proportions. The
+/// size of the rest box is the one with the least energy. A map that keeps the proportions has
+/// energy 6.
+struct ElementDistortion {
+  double mean = 0;  ///< weighted by rest volume; the minimised quantity
   double median = 0, percent99 = 0, most = 0;
 };
 
 struct DistortionGain {
   Patch patch;
-  ShellDistortion before, after;
+  ElementDistortion before, after;
   std::size_t iterations = 0;
-  double farthestMove = 0;  ///< world units
+  double farthestMove = 0;  ///< largest displacement of a particle, world units
 };
 
-/// Moves particles to the least symmetric Dirichlet energy [Smith15] over the whole shell, see
-/// ShellDistortion. It falls with every step, and a fold is never made.
-/// @throws InvalidInput as above, and for a patch that folds: unfold it first
+/// Moves particles to minimise the symmetric Dirichlet energy [Smith15] over all elements, see
+/// ElementDistortion. The energy decreases in every step, and no step creates a fold.
+/// @throws InvalidInput as untangle(), and for a patch that folds: untangle it first
+/// @throws UsageError, ResourceLimit, Cancelled as untangle()
 [[nodiscard]] DistortionGain minimiseDistortion(const levelset::NarrowBand& base,
                                                 const Patch& patch,
-                                                const ShellOptions& options = {});
+                                                const UntangleOptions& options = {});
 
 }  // namespace mapping

@@ -16,15 +16,15 @@ namespace {
 using openvdb::Coord;
 
 constexpr std::size_t kEntriesOfPage = 3 * BrickPool::kBlocksOfPage;
-constexpr int kMostEmptyPages = 1 << 10;  // pages along the edge of an empty cube
-// Single precision tells a place this far from the table's corner to 5e-4 voxel.
+constexpr int kMostEmptyPages = 1 << 10;  // limit of the edge of an empty cube, pages
+// At this distance from the table's corner, single precision resolves positions to 5e-4 voxels.
 constexpr double kWidest = 8192;  // voxels
 constexpr std::size_t kMostValues = std::numeric_limits<std::int32_t>::max();
 
-/// Writes into the empty items of a cubic table the edges of the largest aligned empty cubes.
-/// @param size    items along each axis
-/// @param isEmpty of an item's number
-/// @param edge    of an item
+/// Writes the edges of the largest aligned empty cubes into the empty items of a cubic table.
+/// @param size  number of items along each axis
+/// @param isEmpty  tests the item with a number
+/// @param set  stores the edge of the cube for an item
 template <typename IsEmpty, typename Set>
 void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty, const Set& set) {
   const auto number = [&](const std::array<int, 3>& size_, int x, int y, int z) {
@@ -33,7 +33,7 @@ void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty,
                static_cast<std::size_t>(size_[2]) +
            static_cast<std::size_t>(z);
   };
-  // A pyramid, finest first: is all below empty?
+  // Build a pyramid of flags, finest level first: true where everything below is empty.
   std::vector<std::array<int, 3>> sizes{size};
   std::vector<std::vector<char>> levels(1);
   levels[0].resize(number(size, size[0] - 1, size[1] - 1, size[2] - 1) + 1);
@@ -65,7 +65,7 @@ void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty,
       }
 }
 
-/// Where the entry of the block with that origin is.
+/// Finds the table entry of a block by its origin.
 class Table {
  public:
   explicit Table(BrickPool& pool) : pool_(pool) {
@@ -73,7 +73,7 @@ class Table {
     for (const int n : pool.pages) count *= static_cast<std::size_t>(n);
     pool.page.assign(count, -BrickPool::kPage);
   }
-  /// Makes the page if there is none.
+  /// Position of the block's entry. Adds the page if it is missing.
   std::size_t slotOf(const Coord& origin) {
     std::size_t page = 0, block = 0;
     for (int a = 0; a < 3; ++a) {
@@ -87,8 +87,8 @@ class Table {
     if (first < 0) {
       if (pool_.entry.size() > kMostValues - kEntriesOfPage)
         throw levelset::ResourceLimit(
-            "render: the surface is strewn over more of the table than an index can tell; use "
-            "larger voxels, or draw its parts apart");
+            "render: the surface is spread over more table pages than an index can address; use "
+            "larger voxels, or draw its parts separately");
       first = static_cast<std::int32_t>(pool_.entry.size());
       pool_.entry.resize(pool_.entry.size() + BrickPool::kBlocksOfPage, -BrickPool::kBlock);
       pool_.entry.resize(pool_.entry.size() + kEntriesOfPage - BrickPool::kBlocksOfPage, 0);
@@ -112,10 +112,10 @@ void markEmptyCubes(BrickPool& pool) {
       [&](std::size_t i, int edge) { pool.page[i] = -BrickPool::kPage * edge; });
 }
 
-/// The bricks, then what is held of the blocks beside them, then a row of values that are far
-/// outside and one of those far inside.
+/// Fills the pool with the bricks, then the halo blocks, then one row of values far outside and one
+/// far inside.
 void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks,
-              const std::vector<BesideBlock>& beside, float background) {
+              const std::vector<HaloBlock>& beside, float background) {
   constexpr int kEdge = BrickPool::kEdge;
   Table table(pool);
   const auto hold = [&](std::size_t slot, std::size_t first, int strideX, int strideY) {
@@ -128,23 +128,23 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
     pool.entry[slot] = static_cast<std::int32_t>(i);
     hold(slot, held, kEdge * kEdge, kEdge);
   }
-  for (const BesideBlock& block : beside) {
+  for (const HaloBlock& block : beside) {
     if (block.value.empty()) continue;
     const Coord low = block.points.min(), size = block.points.dim();
     const int strideY = size.z(), strideX = size.y() * strideY;
     const auto before = static_cast<std::size_t>(low.x() * strideX + low.y() * strideY + low.z());
     hold(table.slotOf(block.origin), held - before, strideX, strideY);
     held += block.value.size();
-    ++pool.besideCount;
+    ++pool.haloCount;
   }
-  for (const BesideBlock& block : beside)
+  for (const HaloBlock& block : beside)
     if (block.value.empty())
       hold(table.slotOf(block.origin), held + (block.isInside ? BrickPool::kBlock : 0), 0, 0);
   held += 2 * BrickPool::kBlock;
   if (held > kMostValues) {
-    throw levelset::ResourceLimit(
-        fmt::format("render: the surface takes {} values, and {} are the most; use larger voxels",
-                    held, kMostValues));
+    throw levelset::ResourceLimit(fmt::format(
+        "render: the surface needs {} values, but at most {} are supported; use larger voxels",
+        held, kMostValues));
   }
   markEmptyCubes(pool);
   pool.value.resize(bricks.size() * BrickPool::kValues);
@@ -156,17 +156,17 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
     std::copy(bricks[i]->mask.begin(), bricks[i]->mask.end(),
               pool.mask.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kMaskWords));
   });
-  for (const BesideBlock& block : beside)
+  for (const HaloBlock& block : beside)
     pool.value.insert(pool.value.end(), block.value.begin(), block.value.end());
   pool.value.insert(pool.value.end(), BrickPool::kBlock, background);
   pool.value.insert(pool.value.end(), BrickPool::kBlock, -background);
 }
 
-/// Turns the values into codes.
+/// Converts the values to codes.
 void encode(BrickPool& pool, const ValueBits& held) {
-  pool.held = held;
+  pool.quantization = held;
   const auto size = static_cast<std::size_t>(held.bits / 8);
-  pool.code.assign(pool.value.size() * size + BrickPool::kCodeRoom, 0);
+  pool.code.assign(pool.value.size() * size + BrickPool::kCodePadding, 0);
   tbb::parallel_for(std::size_t{0}, pool.value.size(), [&](std::size_t i) {
     const int code = held.codeOf(pool.value[i]);
     for (std::size_t b = 0; b < size; ++b)
@@ -175,17 +175,19 @@ void encode(BrickPool& pool, const ValueBits& held) {
   pool.value = {};
 }
 
-/// @param crossed  origins of the bricks
+/// Checks the extent of the surface. @param crossed  box of the origins of the bricks
 void requireNarrow(const openvdb::CoordBBox& crossed) {
   std::array<double, 3> spans{};
   for (int a = 0; a < 3; ++a)
     spans[static_cast<std::size_t>(a)] =
         static_cast<double>(crossed.max()[a]) - crossed.min()[a] + BrickPool::kBlock;
   if (*std::max_element(spans.begin(), spans.end()) <= kWidest) return;
-  throw levelset::ResourceLimit(fmt::format(
-      "render: the surface spans {:.6g} x {:.6g} x {:.6g} voxels, and {:.0f} are the most in "
-      "single precision; draw with --renderer embree, use larger voxels, or draw its parts apart",
-      spans[0], spans[1], spans[2], kWidest));
+  throw levelset::ResourceLimit(
+      fmt::format("render: the surface spans {:.6g} x {:.6g} x {:.6g} voxels, but at most {:.0f} "
+                  "are supported in "
+                  "single precision; draw with --renderer embree, use larger voxels, or draw its "
+                  "parts separately",
+                  spans[0], spans[1], spans[2], kWidest));
 }
 
 }  // namespace
@@ -207,7 +209,7 @@ BrickPool makeBricks(const levelset::NarrowBand& band, const TableOptions& optio
   if (crossed.empty()) return pool;
   requireNarrow(crossed);
   openvdb::CoordBBox box = crossed;
-  box.expand(BrickPool::kBlock);  // so that stencils look at no block outside the table
+  box.expand(BrickPool::kBlock);  // so that stencils read no block outside the table
   for (std::size_t i = 0; i < 3; ++i) {
     const int a = static_cast<int>(i);
     pool.origin[i] = box.min()[a];
@@ -218,15 +220,14 @@ BrickPool makeBricks(const levelset::NarrowBand& band, const TableOptions& optio
     pool.pages[i] =
         (box.max()[a] - box.min()[a] + BrickPool::kBlock + BrickPool::kPage - 1) / BrickPool::kPage;
   }
-  pool.blocksUnseen = bricks.unneeded;
-  pool.blocksLeftOut = tree.leafCount();
-  if (bricks.needed.empty()) return pool;
-  fillPool(pool, bricks.needed, blocksBeside(tree, bricks.needed),
-           levelset::vdb(band).background());
-  pool.blocksLeftOut -= pool.besideCount;
-  for (const auto& brick : bricks.needed)
-    pool.blocksLeftOut -= tree.probeConstLeaf(brick->origin) != nullptr;
-  if (options.held.bits != 32) encode(pool, options.held);
+  pool.blocksCulled = bricks.culled;
+  pool.blocksOmitted = tree.leafCount();
+  if (bricks.kept.empty()) return pool;
+  fillPool(pool, bricks.kept, haloBlocks(tree, bricks.kept), levelset::vdb(band).background());
+  pool.blocksOmitted -= pool.haloCount;
+  for (const auto& brick : bricks.kept)
+    pool.blocksOmitted -= tree.probeConstLeaf(brick->origin) != nullptr;
+  if (options.quantization.bits != 32) encode(pool, options.quantization);
   return pool;
 }
 

@@ -14,71 +14,75 @@
 
 namespace render {
 
-/// What a ray needs of a band: the values of the blocks of 8³ cells that its surface crosses, and
-/// of those beside them that tell its curvature, and a table that finds them. Plain arrays, as they
-/// are uploaded.
+/// The values of a band that rays read, and a table that finds them. It holds the blocks of 8³
+/// cells that the surface crosses. Of neighbouring blocks it holds the points that stencils for the
+/// curvature read. The members are plain arrays, as they are uploaded to the GPU.
 ///
-/// Space is that of the table: the band's index space less `origin`. Blocks, pages of 8³ blocks and
-/// empty cubes are aligned in it.
+/// Positions are in table space: the band's index space minus `origin`. Blocks, pages of 8³ blocks
+/// and empty cubes are aligned in it.
 struct BrickPool {
   static constexpr int kBlock = 8;  ///< cells of a block along an axis
   static constexpr int kEdge =
-      kBlock + 1;  ///< points of a brick along an axis: of its last face too
+      kBlock + 1;  ///< points of a brick along an axis, with those of the last face
   static constexpr int kValues = kEdge * kEdge * kEdge;
-  static constexpr int kMaskWords = 16;  ///< 32 bits each
+  static constexpr int kMaskWords = 16;  ///< words of 32 bits
   static constexpr int kPage = 64;       ///< cells of a page along an axis
   static constexpr int kBlocksOfPage = 512;
-  /// On from a block's entry: where its values begin, and their strides.
+  /// Offsets from a block's entry to the position of its values, and to their strides.
   static constexpr int kFirstOfEntry = kBlocksOfPage, kStridesOfEntry = 2 * kBlocksOfPage;
-  static constexpr std::size_t kCodeRoom = 4;  ///< bytes behind the last code
-  static constexpr int kStrideShift = 8;       ///< of that along x, above that along y
+  static constexpr std::size_t kCodePadding = 4;  ///< bytes after the last code
+  static constexpr int kStrideShift = 8;          ///< the stride along x stands above that along y
 
   Filter filter = Filter::Trilinear;
-  ValueBits held = {};
+  ValueBits quantization = {};
   std::array<int, 3> origin{};  ///< index of the point at (0, 0, 0)
-  std::array<int, 3> pages{};   ///< along each axis
-  /// By x, y, z of the page: where its entries begin; negative, less the edge of an empty cube of
-  /// cells that holds it.
+  std::array<int, 3> pages{};   ///< number along each axis
+  /// By x, y, z of the page: position of its entries. Negative: minus the edge of an empty cube of
+  /// cells that contains the page.
   std::vector<std::int32_t> page;
-  /// For each page three lists of kBlocksOfPage, by x, y, z of the block. First, for blocks that
-  /// the surface crosses, the number of the brick; negative as above for others. Then, for these
-  /// and for whatever a cell's stencil reaches beside them, where the value of the block's first
-  /// point is or would be, for of others than bricks a box of points is held; and the strides of
-  /// its values along x and along y, which are 0 where all are alike.
+  /// Three lists of kBlocksOfPage for each page, by x, y, z of the block.
+  /// 1. Number of the brick for a block that the surface crosses; otherwise negative, as in `page`.
+  /// 2. Position of the value of the block's first point, for each block that a stencil reads. For
+  /// blocks other than bricks only a box of points is stored, so that first point may lie outside
+  /// it.
+  /// 3. Strides of the block's values along x and y. They are 0 where all values are equal.
   std::vector<std::int32_t> entry;
-  /// kMaskWords of a brick: bit 64x + 8y + z where the corners of the cell differ in sign, or the
-  /// bounds of the spline do.
+  /// kMaskWords for each brick. Bit 64x + 8y + z is set where the corners of the cell differ in
+  /// sign, or where the bounds of the spline do.
   std::vector<std::uint32_t> mask;
-  /// φ in the band's unit or the spline's coefficients, by x, y, z: kValues of each brick, then of
-  /// the boxes beside them, and rows that are far outside and far inside.
+  /// φ in the band's unit, or the spline's coefficients, by x, y, z. First kValues for each brick,
+  /// then the boxes of the halo blocks. Two rows follow, of values far outside and far inside.
   std::vector<float> value;
-  /// In place of these, where they are held in fewer bits, the least first; and room behind the
-  /// last one for a load of 32 bits.
+  /// Replaces `value` when values are quantized: little-endian codes, followed by padding so that a
+  /// 32-bit load of the last code stays in bounds.
   std::vector<std::uint8_t> code;
-  /// Points between which the blocks lie that the surface crosses, in the table's space.
+  /// Range of points of the blocks that the surface crosses, in table space.
   std::array<int, 3> low{}, high{};
-  /// And the cells that it crosses.
+  /// Range of the cells that the surface crosses.
   std::array<int, 3> cellsLow{}, cellsHigh{};
 
-  std::size_t besideCount = 0;    ///< blocks of which some points are held
-  std::size_t blocksLeftOut = 0;  ///< leaves of the band of which nothing is
-  std::size_t blocksUnseen = 0;   ///< that are crossed, and not needed
+  std::size_t haloCount = 0;      ///< neighbouring blocks with some stored points
+  std::size_t blocksOmitted = 0;  ///< leaves of the band without stored points
+  std::size_t blocksCulled = 0;   ///< crossed blocks that the picture does not need
   [[nodiscard]] std::size_t brickCount() const { return mask.size() / kMaskWords; }
   [[nodiscard]] std::size_t valueBytes() const {
-    return code.empty() ? value.size() * sizeof value[0] : code.size() - kCodeRoom;
+    return code.empty() ? value.size() * sizeof value[0] : code.size() - kCodePadding;
   }
   [[nodiscard]] std::size_t bytes() const;
 };
 
+/// Options of makeBricks().
 struct TableOptions {
   Filter filter = Filter::Trilinear;
-  ValueBits held = {};  ///< @pre the values are of these, the coefficients of a spline too
-  /// Is anything of a ball in index space needed? What is not is left out. Empty: everything is.
-  std::function<bool(const Imath::V3d& centre, double radius)> needs = {};
+  ValueBits quantization =
+      {};  ///< @pre the values are multiples of its step, as are the coefficients of a spline
+  /// Returns false for balls in index space that may be culled. Empty: nothing is culled.
+  std::function<bool(const Imath::V3d& centre, double radius)> keeps = {};
 };
 
-/// @throws levelset::ResourceLimit for a band whose surface spans more than the table can hold, or
-///         more values than an index can tell
+/// Builds the bricks of a band.
+/// @throws levelset::ResourceLimit for a surface that spans more than the table can hold, or for
+///         more values than an index can address
 [[nodiscard]] BrickPool makeBricks(const levelset::NarrowBand& band,
                                    const TableOptions& options = {});
 

@@ -18,10 +18,11 @@ using Imath::V3d;
 using openvdb::Coord;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-constexpr double kWidestField = 1 << 14;  // voxels: 2^24 pages in the table
+constexpr double kWidestField = 1 << 14;  // voxels; gives 2^24 pages in the table
 constexpr int kPageCells = 64;
 
-/// A leaf reaches into the seven blocks below it, too.
+/// Origins of the blocks with cells that are not constant. A leaf also has cells in the seven
+/// blocks below it.
 std::vector<Coord> blockOrigins(const openvdb::FloatTree& tree) {
   std::vector<Coord> origins;
   for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
@@ -32,7 +33,7 @@ std::vector<Coord> blockOrigins(const openvdb::FloatTree& tree) {
   return origins;
 }
 
-/// Values of the block's points, from up to eight leaves.
+/// Reads the values of the block's points, from up to eight leaves.
 void readBlock(const openvdb::FloatTree& tree, const Coord& origin, float* to) {
   constexpr int kPoints = FieldGrid::kPoints;
   openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> accessor(tree);
@@ -50,9 +51,10 @@ void readBlock(const openvdb::FloatTree& tree, const Coord& origin, float* to) {
   }
 }
 
-/// What the taps of six points about a cell, from two before its first corner on, make of a
-/// function's values: the uniform cubic B-spline of them, and of their second differences; with
-/// first and second derivatives. At a in [0, 1] of the cell.
+/// Weights of six points around a cell, starting two points before its lowest corner, for a
+/// function along one axis at a in [0, 1] of the cell. `own` gives the uniform cubic B-spline with
+/// the function values as coefficients, `bent` the one with their second differences. Each has the
+/// first and second derivatives.
 struct SplineTaps {
   double own[3][6] = {}, bent[3][6] = {};
 
@@ -80,11 +82,12 @@ double applied(const double (&taps)[6], const double* to, int stride) {
 
 using FieldWindow = FieldGrid::FieldWindow;
 
-/// Derivatives of order p, q, r of Σ (f − ∇²f/6) B, an axis at a time: along each the spline of
-/// what is left, and beside it the same with the second differences of this axis and those before.
+/// Computes the derivatives of order p, q, r of Σ (f − ∇²f/6) B, one axis at a time. `own` holds
+/// the spline over the axes done so far, `bent` the sum in which one of these axes uses second
+/// differences.
 void splineDerivatives(const FieldWindow& f, const V3d& a, double (&sum)[3][3][3]) {
   const SplineTaps tx(a.x), ty(a.y), tz(a.z);
-  double own[6][6][3], bent[6][6][3];  // by x, y and order along z
+  double own[6][6][3], bent[6][6][3];  // indexed by x, y and order along z
   for (int x = 0; x < 6; ++x)
     for (int y = 0; y < 6; ++y)
       for (int r = 0; r < 3; ++r) {
@@ -104,7 +107,7 @@ void splineDerivatives(const FieldWindow& f, const V3d& a, double (&sum)[3][3][3
     }
 }
 
-/// Bound on |trilinear − smooth| from the second differences at the cell's corners.
+/// Bound on |trilinear − smooth|, from the second differences at the cell's corners.
 double interpolationErrorOf(const FieldWindow& f) {
   double error = 0;
   for (int x = 2; x < 4; ++x)
@@ -118,7 +121,7 @@ double interpolationErrorOf(const FieldWindow& f) {
   return error / 8;
 }
 
-/// Value of the interpolant and its gradient.
+/// Value and gradient of the trilinear interpolant.
 double interpolate(const FieldWindow& f, const V3d& a, V3d& gradient) {
   const auto mix = [](double u, double v, double share) { return u + (v - u) * share; };
   double face[2], alongZ[2], alongY[2];
@@ -150,15 +153,16 @@ FieldGrid::FieldGrid(const levelset::NarrowBand& band) {
   for (int a = 0; a < 3; ++a) {
     const double span = static_cast<double>(box.max()[a]) - box.min()[a];
     if (span > kWidestField)
-      throw levelset::ResourceLimit(fmt::format(
-          "render: a band of {:.0f} voxels along an axis is wider than {:.0f}; use larger voxels",
-          span, kWidestField));
+      throw levelset::ResourceLimit(
+          fmt::format("render: a band spans {:.0f} voxels along an axis, but at most {:.0f} are "
+                      "supported; use larger voxels",
+                      span, kWidestField));
     const auto i = static_cast<std::size_t>(a);
     size_[i] = static_cast<int>(span) / kEdge + 1;
     pages_[i] = (size_[i] + 7) / 8;
   }
   corner_ = V3d(box.min()[0], box.min()[1], box.min()[2]);
-  place(band);
+  updateTransform(band);
 
   std::vector<Range> found(origins.size());
   tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t n) {
@@ -204,7 +208,7 @@ FieldGrid::FieldGrid(const levelset::NarrowBand& band) {
   });
 }
 
-bool FieldGrid::place(const levelset::NarrowBand& band) {
+bool FieldGrid::updateTransform(const levelset::NarrowBand& band) {
   const M44d before = indexToWorld_;
   indexToWorld_ = M44d().setTranslation(corner_) * band.indexToWorld();
   worldToIndex_ = indexToWorld_.inverse();
@@ -222,7 +226,7 @@ Imath::Box3d FieldGrid::worldBox() const {
 
 void FieldGrid::read(const std::array<int, 3>& low, FieldWindow& window) const {
   constexpr int kWindow = 6;
-  // Block by block: a window lies in two along an axis, at most.
+  // Read block by block: a window overlaps at most two blocks along an axis.
   for (int n = 0; n < 8; ++n) {
     int at[3], from[3], end[3];
     bool isEmpty = false, isBeyond = false;

@@ -19,8 +19,8 @@ using Leaf = openvdb::FloatTree::LeafNodeType;
 
 constexpr int kBlock = BrickPool::kBlock;
 
-/// Origins of the blocks that can hold a crossing cell: those of leaves, and those before them,
-/// whose last cells reach into them. In tree order of no importance, each once.
+/// Origins of the blocks that may hold a crossed cell: leaves, and the blocks before them, whose
+/// last cells have corners in the leaves. Each origin appears once, in no particular order.
 std::vector<Coord> blocksOf(const openvdb::FloatTree& tree) {
   std::vector<Coord> blocks;
   blocks.reserve(tree.leafCount() * 2);
@@ -33,8 +33,8 @@ std::vector<Coord> blocksOf(const openvdb::FloatTree& tree) {
   return blocks;
 }
 
-/// The values of the 9³ points from a block's origin on, from up to eight leaves.
-/// @return do they differ in sign?
+/// Fills in the values of the 9³ points from a block's origin on, from up to eight leaves. Returns
+/// true when they differ in sign.
 template <typename Accessor>
 bool fill(const Accessor& accessor, Brick& brick) {
   constexpr int kEdge = BrickPool::kEdge;
@@ -62,7 +62,8 @@ void findCrossings(Brick& brick) {
   brick.mask = {};
   for (int x = 0; x < kBlock; ++x)
     for (int y = 0; y < kBlock; ++y) {
-      // Bit z: are the four points at z of this column of cells inside, all or any?
+      // Bit z of `all` and `any`: all or any of the four points at z of this column of cells are
+      // inside.
       unsigned all = 0, any = 0;
       for (int z = 0; z < kEdge; ++z) {
         const auto isInside = [&](int i, int j) {
@@ -78,14 +79,15 @@ void findCrossings(Brick& brick) {
     }
 }
 
-/// The coefficients that the cells of a block need, from the point before the first one on.
+/// Coefficients that the cells of a block read, starting one point before its origin.
 struct SplineBlock {
   static constexpr int kAround = kBlock + 3;
   float c[kAround][kAround][kAround];
 
   template <typename Accessor>
   SplineBlock(const Accessor& accessor, const Coord& origin) {
-    constexpr int kFirst[4] = {0, 1, kBlock + 1, kAround};  // of the blocks before, here and behind
+    constexpr int kFirst[4] = {
+        0, 1, kBlock + 1, kAround};  // first index in the previous block, this one and the next one
     for (int n = 0; n < 27; ++n) {
       const int b[3] = {n / 9, n / 3 % 3, n % 3};
       const Coord at =
@@ -106,7 +108,7 @@ struct SplineBlock {
   }
 
   using SignRows = std::array<std::array<unsigned, kAround>, kAround>;
-  /// Bit z of row (x, y): is the coefficient negative?
+  /// Sign rows: bit z of row (x, y) is set where the coefficient is negative.
   [[nodiscard]] SignRows signRows() const {
     SignRows rows;
     for (std::size_t x = 0; x < kAround; ++x)
@@ -118,8 +120,8 @@ struct SplineBlock {
     return rows;
   }
 
-  /// Bit z: do the coefficients of the cell (x, y, z) differ in sign? Where not the spline, which
-  /// lies between them, crosses nothing.
+  /// Bit z is set where the coefficients of cell (x, y, z) differ in sign. In other cells the
+  /// spline has no zero, because its values lie between the coefficients.
   [[nodiscard]] static unsigned mixedCells(const SignRows& rows, std::size_t x, std::size_t y) {
     unsigned any = 0, all = ~0u;
     for (std::size_t i = x; i < x + 4; ++i)
@@ -132,12 +134,13 @@ struct SplineBlock {
     return (any | any >> 2) & ~(all & all >> 2) & 0xff;
   }
 
-  /// Bit z: is the spline in the middle of the cell (x, y, z) nearer to zero than its slopes let it
-  /// get from there? For a row at a time, whose points along z stand side by side.
+  /// Bit z is set where the value of the spline in the middle of cell (x, y, z) does not exceed its
+  /// slope bound, so a zero is possible. Processes a row along z at once.
   [[nodiscard]] unsigned openCells(int x, int y) const {
     constexpr float kMiddle[4] = {1.0f / 48, 23.0f / 48, 23.0f / 48, 1.0f / 48};
-    constexpr float kRoom = 1e-5f;  // of the largest coefficient, for single precision
-    Row middle{}, most{}, slopeX{}, slopeY{}, slopeZ{};  // of all points at that z
+    constexpr float kRoom =
+        1e-5f;  // relative to the largest coefficient: margin for single-precision rounding
+    Row middle{}, most{}, slopeX{}, slopeY{}, slopeZ{};  // one entry for each z
     const auto widen = [](float& to, float v) { to = std::max(to, v); };
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j) {
@@ -167,7 +170,7 @@ struct SplineBlock {
 
  private:
   using Row = std::array<float, kAround>;
-  /// In each place that of it and those behind it, 3 or 4 in all.
+  /// Replaces each entry by the largest of `count` consecutive entries (3 or 4) from it on.
   static void takeLargest(Row& row, std::size_t count) {
     for (std::size_t z = 0; z + 1 < kAround; ++z) row[z] = std::max(row[z], row[z + 1]);
     for (std::size_t z = 0; z < kBlock; ++z) row[z] = std::max(row[z], row[z + count - 2]);
@@ -190,8 +193,7 @@ void findSplineCrossings(const Accessor& accessor, Brick& brick) {
     }
 }
 
-/// Calls work(first, last) for each row of cells along z, from the first that is crossed to the
-/// last.
+/// Calls work(first, last) for each row of cells along z, with its first and its last crossed cell.
 template <typename Work>
 void overCrossedRows(const Brick& brick, const Work& work) {
   for (int x = 0; x < kBlock; ++x)
@@ -203,14 +205,15 @@ void overCrossedRows(const Brick& brick, const Work& work) {
     }
 }
 
-/// A block and the points of it that something takes.
+/// A block, and the box of its points that a stencil reads.
 struct Part {
   Coord origin;
-  CoordBBox points;  ///< from the origin on
+  CoordBBox points;  ///< relative to the origin
 };
 
-/// Of the blocks around a brick: what tells the surface's shape in its cells. The stencil of a cell
-/// goes from one point before it to two behind on each axis, and a point further on one of them.
+/// Adds the points of neighbouring blocks that determine the surface's shape in the cells of a
+/// brick. The stencil of a cell covers one point before it and two points after it on each axis.
+/// Along one axis at a time it covers one more point in both directions.
 void addPartsBeside(const Brick& brick, std::vector<Part>& parts) {
   std::array<CoordBBox, 27> beside;
   const auto add = [&](const CoordBBox& points) {
@@ -240,7 +243,7 @@ void addPartsBeside(const Brick& brick, std::vector<Part>& parts) {
 
 }  // namespace
 
-/// The spline's coefficients f − ∇²f/6 in the place of the values, in leaves.
+/// Builds a tree with the spline's coefficients f − ∇²f/6 in place of the values, in leaves.
 openvdb::FloatTree::Ptr quasiInterpolated(const openvdb::FloatTree& tree) {
   openvdb::FloatTree::Ptr result(new openvdb::FloatTree(tree));
   openvdb::tree::LeafManager<openvdb::FloatTree> leaves(*result);
@@ -264,13 +267,13 @@ openvdb::FloatTree::Ptr quasiInterpolated(const openvdb::FloatTree& tree) {
 }
 
 Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
-  // Of a block, with what stencils reach about it.
+  // Radius of a ball around a block and the stencils of its cells.
   constexpr double kRadius = 0.5 * kBlock * std::numbers::sqrt3 + 3;
   const std::vector<Coord> blocks = blocksOf(tree);
   std::vector<std::unique_ptr<Brick>> bricks(blocks.size());
   struct Sum {
     CoordBBox crossed, cells;
-    std::size_t unneeded = 0;
+    std::size_t culled = 0;
   };
   tbb::enumerable_thread_specific<Sum> sums;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 64), [&](const auto& range) {
@@ -293,10 +296,10 @@ Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
         sum.cells.expand(origin + first);
         sum.cells.expand(origin + last);
       });
-      if (options.needs &&
-          !options.needs(Imath::V3d(origin.x(), origin.y(), origin.z()) + Imath::V3d(0.5 * kBlock),
+      if (options.keeps &&
+          !options.keeps(Imath::V3d(origin.x(), origin.y(), origin.z()) + Imath::V3d(0.5 * kBlock),
                          kRadius)) {
-        ++sum.unneeded;
+        ++sum.culled;
         continue;
       }
       bricks[i] = std::move(brick);
@@ -305,22 +308,22 @@ Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
   });
   Bricks result;
   std::erase(bricks, nullptr);
-  result.needed = std::move(bricks);
+  result.kept = std::move(bricks);
   for (const Sum& sum : sums) {
     result.crossed.expand(sum.crossed);
     result.cells.expand(sum.cells);
-    result.unneeded += sum.unneeded;
+    result.culled += sum.culled;
   }
   return result;
 }
 
-std::vector<BesideBlock> blocksBeside(const openvdb::FloatTree& tree,
-                                      const std::vector<std::unique_ptr<Brick>>& bricks) {
+std::vector<HaloBlock> haloBlocks(const openvdb::FloatTree& tree,
+                                  const std::vector<std::unique_ptr<Brick>>& bricks) {
   std::vector<Part> parts;
   for (const auto& brick : bricks) addPartsBeside(*brick, parts);
   std::sort(parts.begin(), parts.end(),
             [](const Part& a, const Part& b) { return a.origin < b.origin; });
-  std::vector<BesideBlock> blocks;
+  std::vector<HaloBlock> blocks;
   auto brick = bricks.begin();
   for (const Part& part : parts) {
     while (brick != bricks.end() && (*brick)->origin < part.origin) ++brick;
@@ -332,7 +335,7 @@ std::vector<BesideBlock> blocksBeside(const openvdb::FloatTree& tree,
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 64), [&](const auto& range) {
     const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      BesideBlock& block = blocks[i];
+      HaloBlock& block = blocks[i];
       const Leaf* leaf = accessor.probeConstLeaf(block.origin);
       if (!leaf) {
         block.isInside = accessor.getValue(block.origin) < 0;

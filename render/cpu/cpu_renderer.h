@@ -6,9 +6,11 @@
 
 namespace render {
 
-/// Draws the scene by the kernel compiled for this processor: the same layers as renderEmbree(), in
-/// single precision. Pixels depend on the scene alone, not on threads or instruction sets.
-/// @throws as renderEmbree(); levelset::ResourceLimit also for surfaces that span too much
+/// Draws the scene with the kernel compiled for this processor. Layers are those of renderEmbree(),
+/// in single precision. Pixels depend on the scene alone, not on the number of threads or the
+/// instruction set.
+/// @throws as renderEmbree()
+/// @throws levelset::ResourceLimit also for surfaces that span more than the tables can hold
 [[nodiscard]] Image renderCpu(const Scene& scene, const RenderOptions& options = {});
 
 }  // namespace render

@@ -10,18 +10,20 @@ namespace render {
 
 enum class InstructionSet { Sse2, Avx2, Avx512 };
 
-/// Those that this processor has, the fastest last.
+/// Instruction sets that this processor supports, the fastest last.
 [[nodiscard]] std::vector<InstructionSet> instructionSets();
 
-/// First crossings of rays with a band's zero set; the bits are the same on all instruction sets.
+/// Finds the first crossings of rays with a band's zero set. All instruction sets return the same
+/// bits.
 /// @param hits  as long as the rays
-/// @pre the processor has the set
+/// @pre the processor supports the set
 void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits,
                InstructionSet set = instructionSets().back());
 
-/// The same of pixels of a fan, and what the surface is like there; packets of neighbours are the
-/// fastest.
+/// Finds the first crossings of the rays through pixels, and the shape of the surface there.
+/// Fastest when neighbouring pixels follow each other.
 /// @param hits, shapes  as long as the pixels
+/// @pre the processor supports the set
 void tracePixels(const BrickPool& pool, const RayFan& fan, const PixelBlock& pixels, HitBlock& hits,
                  ShapeBlock& shapes, InstructionSet set = instructionSets().back());
 

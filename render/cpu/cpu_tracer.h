@@ -5,7 +5,7 @@
 
 namespace render {
 
-/// The kernel on the processor, by the widest instructions that it has, on the calling thread.
+/// Runs the kernel on the calling thread with the widest instructions that the processor supports.
 class CpuTracer : public KernelTracer {
  public:
   void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,

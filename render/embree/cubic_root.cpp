@@ -3,7 +3,7 @@
 namespace render {
 namespace {
 
-/// Halvings after which an interval is as narrow as the spacing of doubles below 1.
+/// Number of halvings after which an interval is as narrow as the spacing of doubles below 1.
 constexpr int kMaxDepth = 52;
 
 int signChanges(const BernsteinCubic& b) {
@@ -17,7 +17,8 @@ struct CubicPiece {
   int depth;
 };
 
-/// De Casteljau at one half: `piece` becomes its left half, the right half is returned.
+/// Splits a piece at one half by De Casteljau's algorithm: `piece` becomes the left half, the right
+/// half is returned.
 CubicPiece splitCubic(CubicPiece& piece) {
   const BernsteinCubic b = piece.b;
   const double b01 = 0.5 * (b[0] + b[1]), b12 = 0.5 * (b[1] + b[2]), b23 = 0.5 * (b[2] + b[3]);
@@ -29,9 +30,10 @@ CubicPiece splitCubic(CubicPiece& piece) {
   return {{middle, b123, b23, b[3]}, piece.low + piece.width, piece.width, piece.depth};
 }
 
-/// Walks the pieces from the left. A piece without sign variation has no root (convex hull); one
-/// whose ends differ in sign has one for certain. `stopAtProof` returns as soon as that is known.
-/// @param all  where given, takes every root, and none is returned
+/// Processes the pieces from left to right. A piece without sign variation has no root (convex
+/// hull). A piece whose ends differ in sign has one. With `stopAtProof` the search ends as soon as
+/// a root is certain.
+/// @param all  if given, receives all roots, and the function returns none
 double searchCubic(const BernsteinCubic& cubic, bool stopAtProof,
                    std::vector<double>* all = nullptr) {
   CubicPiece stack[kMaxDepth + 1];

@@ -40,7 +40,7 @@ struct PixelPainter {
     paintColour(x, y, i);
   }
 
-  /// From the pixel's centre.
+  /// Paints the data layers from the ray through the pixel's centre.
   void paintData(int x, int y, std::size_t i) const {
     const Camera::Ray ray = scene.camera.ray(x + 0.5, y + 0.5);
     if (options.thickness)
@@ -52,7 +52,7 @@ struct PixelPainter {
     if (options.curvature) layers.setCurvature(i, hit.curvature);
   }
 
-  /// The mean over the pixel's area.
+  /// Paints the mean colour of the pixel's samples.
   void paintColour(int x, int y, std::size_t i) const {
     const PixelSequence area = PixelSequence::overArea(x, y);
     std::vector<LightRay> lights;
@@ -62,12 +62,13 @@ struct PixelPainter {
       const V2d at = area.at(s);
       const Camera::Ray ray = scene.camera.ray(x + at.x, y + at.y);
       double seen = 1;
-      for (const Hit& hit : rays.intersectSeen(ray.origin, ray.direction, ray.near, ray.far)) {
+      for (const Hit& hit : rays.intersectVisible(ray.origin, ray.direction, ray.near, ray.far)) {
         lights.clear();
         const LightRays range = shader.addRays(hit, ray.direction, x, y, s, lights);
         transmittances.clear();
         for (const LightRay& light : lights)
-          transmittances.push_back(rays.transmittance(light.origin, light.direction, light.reach));
+          transmittances.push_back(
+              rays.transmittance(light.origin, light.direction, light.maxDistance));
         sum.add(shader.colour(hit, ray.direction, range, lights, transmittances),
                 seen * hit.opacity);
         seen *= 1 - hit.opacity;

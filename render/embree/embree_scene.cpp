@@ -9,10 +9,10 @@
 #include "levelset/error.h"
 #include "render/embree/embree_renderer.h"
 #include "render/embree/field_march.h"
-#include "render/embree/float_view.h"
 #include "render/embree/judge_blocks_vdb.h"
-#include "render/embree/mesh_rays.h"
 #include "render/embree/surface_spline_vdb.h"
+#include "render/meshes/embree_space.h"
+#include "render/meshes/mesh_rays.h"
 #include "render/shading/surface_shape.h"
 
 namespace render {
@@ -26,9 +26,9 @@ struct RaySolid {
   Imath::M44d indexToWorld, worldToIndex;
   std::vector<SurfaceBlock> blocks;
   std::uint32_t id;
-  std::size_t index;      // in the scene
-  std::size_t number;     // among those with a surface
-  const FloatView* view;  // of the scene
+  std::size_t index;        // index in Scene::solids
+  std::size_t number;       // index among the solids with a surface
+  const EmbreeSpace* view;  // space of the entire scene
   Filter filter;
   Imath::C3f colour;
   double opacity;
@@ -39,16 +39,17 @@ struct RaySolid {
   }
 };
 
-/// What the callbacks need beside Embree's float ray: the ray in double, and the best hit so far.
+/// State for Embree's callbacks in addition to its single-precision ray: the ray in double
+/// precision and the best hit so far.
 struct RayQuery {
-  RTCIntersectContext embree;  // first: Embree hands its address back
-  V3d origin, direction;       // world; the origin at the scene's box
-  double limit;  // of the search: the same for every block, so that a hit has the same bits however
-                 // the blocks are visited
+  RTCIntersectContext embree;  // first member: Embree returns its address
+  V3d origin, direction;       // world; the origin is at the scene's box
+  double limit;  // end of the search: the same for all blocks, so that a hit has the same bits in
+                 // any order of the blocks
   double nearest;
   double scale;
   const RaySolid* solid = nullptr;
-  std::vector<std::vector<SideChange>>* changes = nullptr;  // set: all are wanted, by solid
+  std::vector<std::vector<SideChange>>* changes = nullptr;  // set: collects all changes, by solid
 };
 
 IndexRay indexRayOf(const RayQuery& query, const RaySolid& solid) {
@@ -67,8 +68,8 @@ std::optional<double> crossingOf(const RayQuery& query, const RaySolid& solid, u
 void boundBlock(const RTCBoundsFunctionArguments* args) {
   const auto& solid = *static_cast<const RaySolid*>(args->geometryUserPtr);
   const Box3d box = Imath::transform(solid.blocks[args->primID].bounds(), solid.indexToWorld);
-  const V3d low = (box.min - solid.view->centre) * solid.view->scale - V3d(FloatView::kPad);
-  const V3d high = (box.max - solid.view->centre) * solid.view->scale + V3d(FloatView::kPad);
+  const V3d low = (box.min - solid.view->centre) * solid.view->scale - V3d(EmbreeSpace::kPad);
+  const V3d high = (box.max - solid.view->centre) * solid.view->scale + V3d(EmbreeSpace::kPad);
   RTCBounds& bounds = *args->bounds_o;
   bounds.lower_x = static_cast<float>(low.x);
   bounds.lower_y = static_cast<float>(low.y);
@@ -92,10 +93,10 @@ void intersectBlock(const RTCIntersectFunctionNArguments* args) {
   if (query.solid && *t == query.nearest && solid.number >= query.solid->number) return;
   query.nearest = *t;
   query.solid = &solid;
-  // Blocks that could tie stay in Embree's sight.
+  // Keep blocks that may hold a hit at the same distance within Embree's range.
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, args->N);
-  RTCRayN_tfar(ray, args->N, 0) = std::min(RTCRayN_tfar(ray, args->N, 0),
-                                           static_cast<float>(*t * query.scale + FloatView::kPad));
+  RTCRayN_tfar(ray, args->N, 0) = std::min(
+      RTCRayN_tfar(ray, args->N, 0), static_cast<float>(*t * query.scale + EmbreeSpace::kPad));
   RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, args->N);
   RTCHitN_geomID(hit, args->N, 0) = args->geomID;
   RTCHitN_primID(hit, args->N, 0) = args->primID;
@@ -109,13 +110,13 @@ void occludeBlock(const RTCOccludedFunctionNArguments* args) {
     RTCRayN_tfar(args->ray, args->N, 0) = -std::numeric_limits<float>::infinity();
 }
 
-/// In their order, without those that undo each other at one place.
+/// Sorts the changes and removes pairs that cancel at equal distance.
 void putInOrder(std::vector<SideChange>& changes) {
   std::stable_sort(changes.begin(), changes.end(),
                    [](const SideChange& a, const SideChange& b) { return a.t < b.t; });
   std::vector<SideChange> kept;
   for (const SideChange& change : changes) {
-    if (!kept.empty() && kept.back().t == change.t && kept.back().goesIn != change.goesIn)
+    if (!kept.empty() && kept.back().t == change.t && kept.back().enters != change.enters)
       kept.pop_back();
     else
       kept.push_back(change);
@@ -123,22 +124,22 @@ void putInOrder(std::vector<SideChange>& changes) {
   changes = std::move(kept);
 }
 
-/// Where a ray changes sides of what an expression makes of the solids.
+/// A point where a ray enters or leaves the result of the expression.
 struct CsgChange {
   double t;
   std::size_t solid;
-  bool isTurned;
+  bool isFlipped;
 };
 
-/// Calls visit(change) along the ray for as long as that asks for more; without an expression,
-/// where it changes sides of any solid.
+/// Calls visit(change) for each such point along the ray until it returns false. Without an
+/// expression, visits the crossings of all solids.
 template <typename Visit>
 void walkChanges(const CsgExpression& csg, std::vector<std::vector<SideChange>>& changes,
                  const Visit& visit) {
   std::vector<char> inside(changes.size(), 0);
   for (std::size_t s = 0; s < changes.size(); ++s) {
     putInOrder(changes[s]);
-    if (!changes[s].empty()) inside[s] = changes[s][0].goesIn ? 0 : 1;
+    if (!changes[s].empty()) inside[s] = changes[s][0].enters ? 0 : 1;
   }
   std::vector<std::size_t> next(changes.size(), 0);
   for (;;) {
@@ -150,10 +151,10 @@ void walkChanges(const CsgExpression& csg, std::vector<std::vector<SideChange>>&
     const bool before = csg.holds(inside.data());
     for (std::size_t s = 0; s < changes.size(); ++s)
       while (next[s] < changes[s].size() && changes[s][next[s]].t == change->t)
-        inside[s] = changes[s][next[s]++].goesIn ? 1 : 0;
+        inside[s] = changes[s][next[s]++].enters ? 1 : 0;
     const bool after = csg.holds(inside.data());
     if (before == after && !csg.isEmpty()) continue;
-    change->isTurned = !csg.isEmpty() && (inside[change->solid] != 0) != after;
+    change->isFlipped = !csg.isEmpty() && (inside[change->solid] != 0) != after;
     if (!visit(*change)) return;
   }
 }
@@ -161,23 +162,24 @@ void walkChanges(const CsgExpression& csg, std::vector<std::vector<SideChange>>&
 void requireRay(const V3d& origin, const V3d& direction) {
   const double sum = origin.x + origin.y + origin.z + direction.x + direction.y + direction.z;
   if (std::isfinite(sum) && direction != V3d(0)) return;
-  throw levelset::UsageError(fmt::format(
-      "render: a ray from {},{},{} along {},{},{} leads nowhere; give finite numbers and "
-      "a direction",
-      origin.x, origin.y, origin.z, direction.x, direction.y, direction.z));
+  throw levelset::UsageError(
+      fmt::format("render: a ray from {},{},{} along {},{},{} has no direction or is not finite; "
+                  "give finite numbers and "
+                  "a nonzero direction",
+                  origin.x, origin.y, origin.z, direction.x, direction.y, direction.z));
 }
 
 }  // namespace
 
 struct EmbreeScene::Impl {
   std::vector<RaySolid> solids;
-  CsgExpression csg;  // of those
+  CsgExpression csg;  // over these solids
   MeshRays meshes;
-  std::optional<FieldMarch> fields;  // of the solids, where the scene blends them
+  std::optional<FieldMarch> fields;  // set when the scene is blended
   bool isOpaque;
-  Box3d allBounds;  // with the meshes
-  Box3d bounds;     // of the crossing cells
-  FloatView view;
+  Box3d allBounds;  // with meshes
+  Box3d bounds;     // box of the crossed cells
+  EmbreeSpace view;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
 
@@ -191,15 +193,15 @@ struct EmbreeScene::Impl {
 
   void gather(const Scene& source, Filter filter);
   void build();
-  /// A query and Embree's ray for it; nothing when the ray misses the scene's box. `moved`: how far
-  /// the origin was moved towards the scene.
+  /// Builds a query and Embree's ray for it; empty when the ray misses the scene's box. `moved`
+  /// returns the distance from the ray's origin to the query's origin.
   std::optional<RayQuery> prepare(const V3d& origin, const V3d& direction, double near, double far,
                                   double& moved, RTCRay& ray) const;
-  /// Every change of sides of the ray, by solid, as far as there is surface.
+  /// All crossings of the ray, by solid, up to the end of the scene.
   [[nodiscard]] std::vector<std::vector<SideChange>> allChanges(RayQuery& query, RTCRay ray) const;
-  /// Of what the expression makes of the solids, up to `limit` of the query.
+  /// First crossing with the result of the expression, up to `limit` of the query.
   std::optional<CsgChange> findCsg(RayQuery& query, RTCRay ray) const;
-  /// @pre the ray leads somewhere
+  /// @pre the direction is finite and not zero
   [[nodiscard]] Hit intersectSolids(const V3d& origin, const V3d& direction, double near,
                                     double far) const;
   void complete(Hit& hit, const RayQuery& query, const RaySolid& solid, double moved,
@@ -219,7 +221,7 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
   if (bounds.isEmpty()) return;
   try {
     build();
-  } catch (...) {  // the destructor does not run for a constructor that throws
+  } catch (...) {  // no destructor runs when a constructor throws
     if (scene) rtcReleaseScene(scene);
     if (device) rtcReleaseDevice(device);
     throw;
@@ -255,7 +257,7 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
   }
   csg = source.csg.renumbered(numbers);
   if (bounds.isEmpty()) return;
-  view = FloatView(bounds);
+  view = EmbreeSpace(bounds);
 }
 
 void EmbreeScene::Impl::build() {
@@ -306,7 +308,7 @@ std::vector<std::vector<SideChange>> EmbreeScene::Impl::allChanges(RayQuery& que
   query.changes = &changes;
   RTCRayHit all;
   all.ray = ray;
-  all.ray.tfar = 2;  // to the end of the scene: what comes later tells the side at the start
+  all.ray.tfar = 2;  // end of the scene: later crossings determine the side at the start
   all.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   all.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(scene, &query.embree, &all);
@@ -354,7 +356,7 @@ Hit EmbreeScene::Impl::intersectSolids(const V3d& origin, const V3d& direction, 
   if (!query) return hit;
   if (!csg.isEmpty()) {
     if (const auto change = findCsg(*query, rayHit.ray)) {
-      hit.isTurned = change->isTurned;
+      hit.isFlipped = change->isFlipped;
       complete(hit, *query, solids[change->solid], moved, change->t);
     }
     return hit;
@@ -374,8 +376,8 @@ Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near,
   return onMesh.found ? onMesh : onSolid;
 }
 
-std::vector<Hit> EmbreeScene::intersectSeen(const V3d& origin, const V3d& direction, double near,
-                                            double far) const {
+std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& direction, double near,
+                                               double far) const {
   std::vector<Hit> hits;
   if (impl_->isOpaque) {
     const Hit hit = intersect(origin, direction, near, far);
@@ -383,7 +385,7 @@ std::vector<Hit> EmbreeScene::intersectSeen(const V3d& origin, const V3d& direct
     return hits;
   }
   double share = 1;
-  // Those of meshes up to some place, and whether anything is seen beyond.
+  // Adds mesh hits up to a distance. Returns true when a later surface is still visible.
   const auto addMeshes = [&](double end) {
     while (share >= kLeastTransmittance) {
       const Hit hit = impl_->meshes.intersect(origin, direction, near, end);
@@ -394,7 +396,7 @@ std::vector<Hit> EmbreeScene::intersectSeen(const V3d& origin, const V3d& direct
     }
     return share >= kLeastTransmittance;
   };
-  if (impl_->fields) {  // whose surface is opaque
+  if (impl_->fields) {  // blended surfaces are opaque
     const Hit onSolid = impl_->intersectSolids(origin, direction, near, far);
     if (addMeshes(onSolid.found ? onSolid.distance : far) && onSolid.found) hits.push_back(onSolid);
     return hits;
@@ -406,7 +408,7 @@ std::vector<Hit> EmbreeScene::intersectSeen(const V3d& origin, const V3d& direct
     walkChanges(impl_->csg, changes, [&](const CsgChange& change) {
       if (change.t > query->limit || !addMeshes(moved + change.t)) return false;
       Hit hit;
-      hit.isTurned = change.isTurned;
+      hit.isFlipped = change.isFlipped;
       impl_->complete(hit, *query, impl_->solids[change.solid], moved, change.t);
       hits.push_back(hit);
       share *= 1 - hit.opacity;
@@ -420,7 +422,7 @@ std::vector<Hit> EmbreeScene::intersectSeen(const V3d& origin, const V3d& direct
 double EmbreeScene::transmittance(const V3d& origin, const V3d& direction, double far) const {
   if (impl_->isOpaque) return isOccluded(origin, direction, 0, far) ? 0 : 1;
   double share = 1;
-  for (const Hit& hit : intersectSeen(origin, direction, 0, far)) share *= 1 - hit.opacity;
+  for (const Hit& hit : intersectVisible(origin, direction, 0, far)) share *= 1 - hit.opacity;
   return share;
 }
 
@@ -451,7 +453,7 @@ double EmbreeScene::thickness(const V3d& origin, const V3d& direction, double ne
   auto query = impl_->prepare(origin, direction, near, far, moved, ray);
   if (!query) return 0;
   auto changes = impl_->allChanges(*query, ray);
-  // Where nothing is said, what any of them holds.
+  // Without an expression, a point is inside when any solid contains it.
   const auto isWithin = [&](const std::vector<char>& inside) {
     if (!impl_->csg.isEmpty()) return impl_->csg.holds(inside.data());
     return std::find(inside.begin(), inside.end(), 1) != inside.end();
@@ -460,7 +462,7 @@ double EmbreeScene::thickness(const V3d& origin, const V3d& direction, double ne
   std::vector<std::pair<SideChange, std::size_t>> all;
   for (std::size_t s = 0; s < changes.size(); ++s) {
     putInOrder(changes[s]);
-    if (!changes[s].empty() && !changes[s][0].goesIn) inside[s] = 1;
+    if (!changes[s].empty() && !changes[s][0].enters) inside[s] = 1;
     for (const SideChange& change : changes[s]) all.emplace_back(change, s);
   }
   std::stable_sort(all.begin(), all.end(),
@@ -470,7 +472,7 @@ double EmbreeScene::thickness(const V3d& origin, const V3d& direction, double ne
     const double to = std::min(change.t, query->limit);
     if (isWithin(inside)) length += to - from;
     from = to;
-    inside[solid] = change.goesIn ? 1 : 0;
+    inside[solid] = change.enters ? 1 : 0;
   }
   return length;
 }

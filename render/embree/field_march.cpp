@@ -8,6 +8,7 @@
 
 #include "levelset/vdb.h"
 #include "render/embree/surface_spline_vdb.h"
+#include "render/shading/field_shape.h"
 
 namespace render {
 namespace {
@@ -19,12 +20,12 @@ using CornerAccessor = openvdb::tree::ValueAccessor<const FloatTree, false>;
 using Join = FieldExpression::Join;
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
-constexpr double kLeastStep = 1e-7;  // of the finest voxel
-constexpr double kMostStepUp = 1e5;  // of the least step, where it is taken again and again
+constexpr double kLeastStep = 1e-7;  // relative to the finest voxel
+constexpr double kMostStepUp = 1e5;  // limit on the growth of repeated least steps
 constexpr double kSlopeRounding = 1 + 1e-6;
 
-/// Largest gradient that the interpolant may have in the cells from the leaf's origin − 1 on, per
-/// voxel: along each axis the largest of the four edges.
+/// Bound on the gradient of the interpolant in the cells from the leaf's origin − 1 on, per voxel.
+/// Along each axis it is the largest slope of the four cell edges.
 double steepestNear(const FloatTree& tree, const Coord& origin) {
   CornerAccessor accessor(tree);
   constexpr int kPoints = 10;
@@ -49,7 +50,7 @@ double steepestNear(const FloatTree& tree, const Coord& origin) {
   return steepest;
 }
 
-/// Of the whole interpolant, per voxel.
+/// Bound on the gradient of the entire interpolant, per voxel.
 double steepestOf(const FloatTree& tree) {
   std::vector<Coord> origins;
   for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) origins.push_back(leaf->origin());
@@ -76,7 +77,7 @@ double interpolantAt(const CornerAccessor& accessor, const V3d& place) {
   return sum;
 }
 
-/// The smooth minimum as a mixture.
+/// The smooth minimum, written as a convex combination.
 double mixedMin(double a, double b, double softness) {
   const double h = std::clamp(0.5 + 0.5 * (b - a) / softness, 0.0, 1.0);
   return a * h + b * (1 - h) - softness * h * (1 - h);
@@ -97,12 +98,15 @@ double marchedJoin(const FieldExpression& e, Join how, double a, double b) {
 
 }  // namespace
 
-/// One ray's way: the expression along it, by the distance from where it enters the fields.
-class FieldMarch::Way {
+/// The expression along one ray, as a function of the distance from the point where the ray enters
+/// the fields.
+class FieldMarch::RaySegment {
  public:
-  double begin = kEndless, end = 0;  // from the ray's origin, where the fields are not constant
+  double begin = kEndless,
+         end = 0;  // from the ray's origin: range in which the fields are not constant
 
-  Way(const FieldMarch& march, const V3d& origin, const V3d& direction, double near, double far)
+  RaySegment(const FieldMarch& march, const V3d& origin, const V3d& direction, double near,
+             double far)
       : march_(march), values_(march.expression_.valueCount()) {
     for (const MarchedField& field : march.fields_) {
       const auto [enter, leave] = partIn(field, origin, direction, near, far);
@@ -125,14 +129,15 @@ class FieldMarch::Way {
   [[nodiscard]] bool isEmpty() const { return begin >= end; }
   [[nodiscard]] bool isInside(double t) { return valueAt(t) < 0; }
 
-  /// From t, on that side, to the next change of sides. @return nothing: it stays
+  /// Finds the next crossing after t, given the side at t. Returns nothing when the ray stays on
+  /// that side.
   std::optional<double> nextCrossing(double t, bool inside) {
     double least = march_.leastStep_;
     while (t < end - begin) {
       const double value = valueAt(t);
       if ((value < 0) != inside) return t;
       const double safe = std::abs(value) / march_.steepest_, step = std::max(safe, least);
-      // A ray in a face of the solid would never get on.
+      // The growing least step ends the search on a ray that runs within a face of the solid.
       least =
           safe < least ? std::min(2 * least, kMostStepUp * march_.leastStep_) : march_.leastStep_;
       const double next = std::min(std::max(t + step, nextEntry(t)), end - begin);
@@ -143,10 +148,10 @@ class FieldMarch::Way {
   }
 
  private:
-  struct Part {  // of the ray, in a field's index space
+  struct Part {  // segment of the ray, in a field's index space
     CornerAccessor accessor;
     V3d start, step;
-    double enter, leave;  // where it is not constant
+    double enter, leave;  // range in which the field is not constant
   };
 
   static std::pair<double, double> partIn(const MarchedField& field, const V3d& origin,
@@ -175,7 +180,7 @@ class FieldMarch::Way {
     return values_[march_.expression_.drawn];
   }
 
-  /// Where all fields are constant, where the next one is not; else 0.
+  /// Parameter at which the next field begins to vary, when all fields are constant at t; else 0.
   [[nodiscard]] double nextEntry(double t) const {
     double entry = kEndless;
     for (const Part& part : parts_) {
@@ -220,11 +225,11 @@ FieldMarch::FieldMarch(const Scene& scene) : expression_(fieldExpression(scene))
 
 Hit FieldMarch::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
   Hit hit;
-  Way way(*this, origin, direction, near, far);
-  if (way.isEmpty()) return hit;
-  const std::optional<double> t = way.nextCrossing(0, way.isInside(0));
+  RaySegment segment(*this, origin, direction, near, far);
+  if (segment.isEmpty()) return hit;
+  const std::optional<double> t = segment.nextCrossing(0, segment.isInside(0));
   if (!t) return hit;
-  hit.distance = way.begin + *t;
+  hit.distance = segment.begin + *t;
   hit.position = origin + direction * hit.distance;
   std::vector<FieldShape> shapes;
   for (const MarchedField& field : fields_) {
@@ -239,18 +244,18 @@ Hit FieldMarch::intersect(const V3d& origin, const V3d& direction, double near, 
 
 bool FieldMarch::isOccluded(const V3d& origin, const V3d& direction, double near,
                             double far) const {
-  Way way(*this, origin, direction, near, far);
-  return !way.isEmpty() && way.nextCrossing(0, way.isInside(0));
+  RaySegment segment(*this, origin, direction, near, far);
+  return !segment.isEmpty() && segment.nextCrossing(0, segment.isInside(0));
 }
 
 double FieldMarch::thickness(const V3d& origin, const V3d& direction, double near,
                              double far) const {
-  Way way(*this, origin, direction, near, far);
-  if (way.isEmpty()) return 0;
+  RaySegment segment(*this, origin, direction, near, far);
+  if (segment.isEmpty()) return 0;
   double length = 0, from = 0;
-  for (bool inside = way.isInside(0);; inside = !inside) {
-    const std::optional<double> t = way.nextCrossing(from, inside);
-    if (inside) length += t.value_or(way.end - way.begin) - from;
+  for (bool inside = segment.isInside(0);; inside = !inside) {
+    const std::optional<double> t = segment.nextCrossing(from, inside);
+    if (inside) length += t.value_or(segment.end - segment.begin) - from;
     if (!t) return length;
     from = *t;
   }

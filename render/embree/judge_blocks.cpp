@@ -16,9 +16,9 @@ using Imath::V3d;
 using openvdb::Coord;
 using openvdb::FloatTree;
 
-// === Which cells hold the surface
+// === Cells that the surface crosses
 
-/// Bit z of rows[x][y]: the value at (x, y, z), 0 … 8 each, is negative.
+/// Bit z of rows[x][y] is set where the value at (x, y, z) is negative, each 0 … 8.
 using SignRows = std::array<std::array<unsigned, 9>, 9>;
 
 SignRows signRowsOf(const SurfaceBlock& block) {
@@ -33,7 +33,7 @@ SignRows signRowsOf(const SurfaceBlock& block) {
   return rows;
 }
 
-/// Adds cells z of the bits to `crossing` and `extent`.
+/// Adds the cells with set bits z to `crossing` and `extent`.
 void markCells(SurfaceBlock& block, unsigned x, unsigned y, unsigned cells) {
   block.crossing[x] |= std::uint64_t{cells} << (8 * y);
   for (unsigned z = 0; z < 8; ++z) {
@@ -47,7 +47,8 @@ void markCells(SurfaceBlock& block, unsigned x, unsigned y, unsigned cells) {
   }
 }
 
-/// The same where the spline may cross zero.
+/// Fills `crossing` and `extent` with the cells in which the spline may cross zero; false when
+/// there are none.
 bool markSplineCells(SurfaceBlock& block, const DrawnField& field) {
   const SplineCoefficients<8> coefficients(field.tree, block.origin, field.filter);
   block.crossing.fill(0);
@@ -62,7 +63,8 @@ bool markSplineCells(SurfaceBlock& block, const DrawnField& field) {
   return block.extent[3] != 0;
 }
 
-/// Fills `crossing` and `extent`; false when no cell crosses.
+/// Fills `crossing` and `extent` with the cells whose corners differ in sign; false when there are
+/// none.
 bool markCrossingCells(SurfaceBlock& block) {
   const SignRows rows = signRowsOf(block);
   block.crossing.fill(0);
@@ -78,16 +80,17 @@ bool markCrossingCells(SurfaceBlock& block) {
   return block.extent[3] != 0;
 }
 
-// === Through a block, cell by cell
+// === Traversal of a block, cell by cell
 
-/// What a ray sees of one block: a cell and the plane through which it came.
-struct BlockWalk {
+/// Traversal of one block by a ray: the present cell and the plane through which the ray entered
+/// it.
+struct BlockTraversal {
   const SurfaceBlock& block;
   const IndexRay& ray;
-  double enter, leave;  ///< of the block, clipped to the ray's range
-  int axis = -1;        ///< of the entry plane of the cell; -1: the ray starts inside
-  int cell[3] = {};     ///< index coordinates
-  double t = 0;         ///< at the entry
+  double enter, leave;  ///< ray interval within the block, clipped to the range of the ray
+  int axis = -1;        ///< axis of the entry plane of the cell; -1: the ray starts inside
+  int cell[3] = {};     ///< index coordinates of the cell
+  double t = 0;         ///< parameter at the entry into the cell
 
   [[nodiscard]] bool isForward(int a) const { return ray.direction[a] > 0; }
   [[nodiscard]] double exitPlane(int a, int k) const {
@@ -100,19 +103,20 @@ struct BlockWalk {
   bool clip();
   void findFirstCell();
   int exitAxis(double& exit) const;
-  /// Where in the cell the ray is at `t` and at `exit`; on the faces the coordinate is 0 or 1.
+  /// Positions in the cell at `t` and at `exit`; on a face the coordinate is exactly 0 or 1.
   void placesInCell(double exit, int outAxis, double (&p)[2][3]) const;
   [[nodiscard]] BernsteinCubic restrictToRay(double exit, int exitAxis) const;
   [[nodiscard]] std::optional<double> splineRoot(const DrawnField& field, double exit,
                                                  int exitAxis) const;
-  /// @return is the ray inside where it enters the cell?
+  /// Appends the roots of the spline in the cell. Returns true when the ray is inside at the entry
+  /// into the cell.
   bool addSplineRoots(const DrawnField& field, double exit, int outAxis,
                       std::vector<double>& shares) const;
 };
 
-/// False when the ray misses the block. Of planes met together the last counts as the entry, which
-/// is the order in which findFirstCell and exitAxis take them.
-bool BlockWalk::clip() {
+/// Clips the ray to the block; false when it misses. Of planes met at the same parameter the last
+/// one is the entry plane. findFirstCell() and exitAxis() use the same order.
+bool BlockTraversal::clip() {
   for (int a = 0; a < 3; ++a) {
     const int low = block.origin[a], high = low + 8;
     if (ray.isParallel[a]) {
@@ -130,9 +134,9 @@ bool BlockWalk::clip() {
   return enter <= leave;
 }
 
-/// The cell in which the walk of the whole grid would enter this block: found by floor, put right
-/// with the planes themselves.
-void BlockWalk::findFirstCell() {
+/// Finds the cell in which a traversal of the entire grid would enter this block. The guess by
+/// floor() is corrected by the planes themselves.
+void BlockTraversal::findFirstCell() {
   t = enter;
   for (int a = 0; a < 3; ++a) {
     const int low = block.origin[a], high = low + 7;
@@ -156,7 +160,7 @@ void BlockWalk::findFirstCell() {
   }
 }
 
-int BlockWalk::exitAxis(double& exit) const {
+int BlockTraversal::exitAxis(double& exit) const {
   int result = -1;
   exit = std::numeric_limits<double>::infinity();
   for (int a = 0; a < 3; ++a) {
@@ -170,12 +174,13 @@ int BlockWalk::exitAxis(double& exit) const {
   return result;
 }
 
-/// a at 0 and b at 1, both to the bit: the value on a face is the same from either side.
+/// Interpolates linearly. Returns exactly a at 0 and b at 1, so a value on a face is the same from
+/// both sides.
 double mix(double a, double b, double f) {
   return a * (1 - f) + b * f;
 }
 
-void BlockWalk::placesInCell(double exit, int outAxis, double (&p)[2][3]) const {
+void BlockTraversal::placesInCell(double exit, int outAxis, double (&p)[2][3]) const {
   for (int a = 0; a < 3; ++a) {
     const double base = cell[a];
     p[0][a] = std::clamp(ray.at(a, t) - base, 0.0, 1.0);
@@ -185,8 +190,8 @@ void BlockWalk::placesInCell(double exit, int outAxis, double (&p)[2][3]) const 
   if (outAxis >= 0) p[1][outAxis] = isForward(outAxis) ? 1 : 0;
 }
 
-std::optional<double> BlockWalk::splineRoot(const DrawnField& field, double exit,
-                                            int outAxis) const {
+std::optional<double> BlockTraversal::splineRoot(const DrawnField& field, double exit,
+                                                 int outAxis) const {
   double p[2][3];
   placesInCell(exit, outAxis, p);
   const SplineCell spline(
@@ -194,8 +199,8 @@ std::optional<double> BlockWalk::splineRoot(const DrawnField& field, double exit
   return spline.firstSignChange(V3d(p[0][0], p[0][1], p[0][2]), V3d(p[1][0], p[1][1], p[1][2]));
 }
 
-bool BlockWalk::addSplineRoots(const DrawnField& field, double exit, int outAxis,
-                               std::vector<double>& shares) const {
+bool BlockTraversal::addSplineRoots(const DrawnField& field, double exit, int outAxis,
+                                    std::vector<double>& shares) const {
   double p[2][3];
   placesInCell(exit, outAxis, p);
   const V3d start(p[0][0], p[0][1], p[0][2]);
@@ -205,10 +210,10 @@ bool BlockWalk::addSplineRoots(const DrawnField& field, double exit, int outAxis
   return spline.value(start) < 0;
 }
 
-/// The interpolant between `t` and `exit`: the cubic's blossom at the two ends, since the
-/// interpolant is affine in each coordinate. On the faces the coordinate is 0 or 1 exactly.
-/// @param outAxis  of the face at `exit`; -1 when the ray ends within the cell
-BernsteinCubic BlockWalk::restrictToRay(double exit, int outAxis) const {
+/// The interpolant between `t` and `exit`: the blossom of the cubic at both ends, because the
+/// interpolant is affine in each coordinate. On a face the coordinate is exactly 0 or 1.
+/// @param outAxis  axis of the face at `exit`; -1 when the ray ends within the cell
+BernsteinCubic BlockTraversal::restrictToRay(double exit, int outAxis) const {
   double p[2][3];
   placesInCell(exit, outAxis, p);
   unsigned c[3];
@@ -250,8 +255,8 @@ Imath::Box3d SurfaceBlock::bounds() const {
 std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field) {
   const FloatTree& tree = field.tree;
   using Leaf = FloatTree::LeafNodeType;
-  // A cell belongs to the block of its lowest corner, so a leaf also reaches into the seven blocks
-  // below it, which need not have leaves of their own.
+  // A cell belongs to the block of its lowest corner. So a leaf has cells in the seven blocks below
+  // it, which may have no leaves of their own.
   std::vector<Coord> origins;
   for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
     for (int n = 0; n < 8; ++n)
@@ -286,11 +291,12 @@ std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field) {
 
 namespace {
 
-/// Takes the walk through the marked cells of its block, in their order.
-/// @param far    where the ray ends
-/// @param visit  of where the ray leaves the cell, and by which face; says whether to go on
+/// Traverses the marked cells of a block, in their order along the ray.
+/// @param far  end of the ray
+/// @param visit  called with the parameter and axis of the exit from the cell; returns true to
+///        continue
 template <typename Visit>
-void walkCells(BlockWalk& walk, double far, const Visit& visit) {
+void traverseCells(BlockTraversal& walk, double far, const Visit& visit) {
   if (!walk.clip()) return;
   walk.findFirstCell();
   for (;;) {
@@ -318,9 +324,9 @@ void walkCells(BlockWalk& walk, double far, const Visit& visit) {
 
 std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& block,
                                    const IndexRay& ray, double near, double far, Search search) {
-  BlockWalk walk{block, ray, near, far};
+  BlockTraversal walk{block, ray, near, far};
   std::optional<double> found;
-  walkCells(walk, far, [&](double exit, int exitAxis) {
+  traverseCells(walk, far, [&](double exit, int exitAxis) {
     if (field.filter != Filter::Trilinear) {
       if (const auto s = walk.splineRoot(field, exit, exitAxis))
         found = walk.t + *s * (exit - walk.t);
@@ -339,9 +345,9 @@ std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& 
 
 void addCrossings(const DrawnField& field, const SurfaceBlock& block, const IndexRay& ray,
                   double near, std::vector<SideChange>& found) {
-  BlockWalk walk{block, ray, near, std::numeric_limits<double>::infinity()};
+  BlockTraversal walk{block, ray, near, std::numeric_limits<double>::infinity()};
   std::vector<double> shares;
-  walkCells(walk, std::numeric_limits<double>::infinity(), [&](double exit, int exitAxis) {
+  traverseCells(walk, std::numeric_limits<double>::infinity(), [&](double exit, int exitAxis) {
     shares.clear();
     bool inside;
     if (field.filter == Filter::Trilinear) {

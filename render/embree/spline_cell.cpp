@@ -9,9 +9,9 @@ namespace {
 using Imath::V3d;
 using openvdb::Coord;
 
-constexpr int kDepth = 40;  // halvings of a cell
+constexpr int kDepth = 40;  // largest number of halvings
 
-/// Values of the basis at a, or of its derivative.
+/// Values of the B-spline basis at a, or of its derivative.
 void basis(double a, bool isSlope, double (&w)[4]) {
   const double b = 1 - a;
   if (isSlope) {
@@ -36,17 +36,19 @@ double weighed(const double (&c)[4][4][4], const double (&x)[4], const double (&
   return sum;
 }
 
-/// The spline along a line: its value and slope by s, and how much the two can change.
+/// The spline along a line: value and slope at the parameter s, and bounds on their changes.
 class LineSearch {
  public:
-  LineSearch(const double (&c)[4][4][4], const V3d& p, const V3d& way) : c_(c), p_(p), way_(way) {
-    // A derivative of a spline is one of the differences of its coefficients, and lies between
-    // them.
+  LineSearch(const double (&c)[4][4][4], const V3d& p, const V3d& direction)
+      : c_(c), p_(p), direction_(direction) {
+    // A derivative of a spline is a convex combination of differences of its coefficients, so these
+    // bound it.
     for (int a = 0; a < 3; ++a) {
       const double first = mostDifference(a, -1);
-      slope_ += std::abs(way[a]) * first;
+      slope_ += std::abs(direction[a]) * first;
       for (int b = 0; b < 3; ++b)
-        bend_ += std::abs(way[a] * way[b]) * mostDifference(std::min(a, b), std::max(a, b));
+        bend_ +=
+            std::abs(direction[a] * direction[b]) * mostDifference(std::min(a, b), std::max(a, b));
     }
   }
 
@@ -56,20 +58,21 @@ class LineSearch {
     return weighed(c_, w[0], w[1], w[2]);
   }
 
-  /// Of the whole way from p, in any direction of its axes.
+  /// False when the value at the line's start excludes a zero. Holds for all directions with the
+  /// same absolute components.
   [[nodiscard]] bool mayCross() const { return std::abs(value(0)) <= slope_ * (1 + 1e-9); }
 
-  /// The changes of sign between low and high, whose signs are given: that of the two cells at a
-  /// face, whatever is rounded within.
-  /// @param take  is told of them in their order, and says whether to go on
-  /// @return was it told to stop?
+  /// Reports the sign changes between low and high, in order. The signs at both ends are given:
+  /// they are shared by the two cells at a face and are independent of rounding within the cell.
+  /// @param take  called for each change; returns true to stop
+  /// @return true when the search was stopped
   template <typename Take>
   bool search(double low, bool lowInside, double high, bool highInside, int depth,
               const Take& take) {
     const auto stops = [&](bool isChange, double at) { return isChange && !take(at); };
     const double middle = 0.5 * (low + high), half = 0.5 * (high - low);
     const bool differ = lowInside != highInside;
-    // A line in the zero set, or at a point of it, is told by its ends.
+    // For a line within the zero set, or one that touches it, the signs of the ends decide.
     if (depth == 0 || slope_ == 0 || evaluations_ > kMostEvaluations) return stops(differ, middle);
     const double v = value(middle);
     ++evaluations_;
@@ -88,12 +91,13 @@ class LineSearch {
     for (int a = 0; a < 3; ++a) {
       double w[3][4];
       place(s, w, a);
-      sum += way_[a] * weighed(c_, w[0], w[1], w[2]);
+      sum += direction_[a] * weighed(c_, w[0], w[1], w[2]);
     }
     return sum;
   }
   void place(double s, double (&w)[3][4], int along) const {
-    for (int a = 0; a < 3; ++a) basis(std::clamp(p_[a] + s * way_[a], 0.0, 1.0), a == along, w[a]);
+    for (int a = 0; a < 3; ++a)
+      basis(std::clamp(p_[a] + s * direction_[a], 0.0, 1.0), a == along, w[a]);
   }
   [[nodiscard]] double bisected(double low, bool lowInside, double high) const {
     for (int n = 0; n < 60; ++n) {
@@ -103,7 +107,8 @@ class LineSearch {
     }
     return 0.5 * (low + high);
   }
-  /// Of the coefficients along axis a, and along b again (−1: once only).
+  /// Largest difference of coefficients along axis a, or second difference along a and b (b = −1:
+  /// first difference).
   [[nodiscard]] double mostDifference(int a, int b) const {
     double most = 0;
     int n[3];
@@ -127,7 +132,7 @@ class LineSearch {
   }
 
   const double (&c_)[4][4][4];
-  V3d p_, way_;
+  V3d p_, direction_;
   double slope_ = 0, bend_ = 0;
   int evaluations_ = 0;
   static constexpr int kMostEvaluations = 4000;
@@ -141,7 +146,7 @@ bool SplineCell::mayCross() const {
     for (const auto& row : plane)
       for (const double c : row) (c < 0 ? anyInside : anyOutside) = true;
   if (!anyInside || !anyOutside) return false;
-  // From the middle to any corner, at the most.
+  // No corner is farther from the middle.
   const LineSearch toCorner(c_, V3d(0.5), V3d(0.5));
   return toCorner.mayCross();
 }

@@ -1,7 +1,7 @@
 #pragma once
 
-// Private to the judge: the tricubic B-spline of a cell in double precision, and where a line
-// crosses its zero set, by bounds of its slopes.
+// Private to the judge: the tricubic B-spline of a cell in double precision. Finds the crossings of
+// a line with its zero set by bounds on the slope.
 
 #include <optional>
 #include <vector>
@@ -11,13 +11,13 @@
 
 namespace render {
 
-/// The spline's coefficients that the cells from (0, 0, 0) to (size − 1)³ of a grid need.
+/// Spline coefficients that the cells from (0, 0, 0) to (size − 1)³ of a block read.
 template <int size>
 struct SplineCoefficients {
   double c[size + 3][size + 3][size + 3];
 
-  /// @param cell    index of the first one's lowest corner
-  /// @param filter  not trilinear
+  /// @param cell  index of the lowest corner of the first cell
+  /// @param filter  BSpline or BSplineQi
   SplineCoefficients(const openvdb::FloatTree& tree, const openvdb::Coord& cell, Filter filter) {
     openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> accessor(tree);
     const auto at = [&](int x, int y, int z) {
@@ -36,9 +36,10 @@ struct SplineCoefficients {
   }
 };
 
+/// The tricubic B-spline on one cell.
 class SplineCell {
  public:
-  /// Cell (x, y, z) of a block.
+  /// Takes cell (x, y, z) of a block.
   template <int size>
   explicit SplineCell(const SplineCoefficients<size>& block, int x = 0, int y = 0, int z = 0) {
     for (int i = 0; i < 4; ++i)
@@ -46,19 +47,19 @@ class SplineCell {
         for (int k = 0; k < 4; ++k) c_[i][j][k] = block.c[x + i][y + j][z + k];
   }
 
-  /// False where it crosses zero for certain nowhere: its coefficients have one sign, or the middle
-  /// is farther from zero than its slopes allow.
+  /// False when the spline certainly has no zero: all coefficients have one sign, or the value at
+  /// the centre is larger than the slope bound allows.
   [[nodiscard]] bool mayCross() const;
-  /// The same bits for both cells at a face that p is on: what the farthest coefficients weigh
-  /// there is nothing.
+  /// Value at p. Both cells at a common face return the same bits for p on that face, because there
+  /// the farthest coefficients have weight zero.
   /// @param p  in [0, 1]³
   [[nodiscard]] double value(const Imath::V3d& p) const;
-  /// The first share of the way from p to q at which the spline changes sign: halves are left out
-  /// where the middle is farther from zero than its slope allows, and not halved any more where the
-  /// slope cannot change its sign.
+  /// Finds the first fraction of the segment from p to q at which the spline changes sign. A half
+  /// is skipped when the value at its middle is larger than the slope bound allows. A half is not
+  /// divided further when the slope cannot change its sign.
   [[nodiscard]] std::optional<double> firstSignChange(const Imath::V3d& p,
                                                       const Imath::V3d& q) const;
-  /// Appends all of them, in order. Each turns to the other side.
+  /// Appends all of these fractions, in ascending order. The directions of the changes alternate.
   void addSignChanges(const Imath::V3d& p, const Imath::V3d& q, std::vector<double>& found) const;
 
  private:

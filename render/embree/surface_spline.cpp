@@ -9,7 +9,7 @@ namespace {
 using Imath::V3d;
 using openvdb::Coord;
 
-/// 6³ grid values from cell − 2 on; the cell's own corners are at 2 and 3.
+/// 6³ grid values from cell − 2 on. The corners of the cell have the indices 2 and 3.
 struct ShapeWindow {
   double f[6][6][6];
 
@@ -27,7 +27,7 @@ struct ShapeWindow {
   }
 };
 
-/// Weights of the uniform cubic B-spline, its first and second derivative, at a in [0, 1].
+/// Weights of the uniform cubic B-spline and its first and second derivatives, at a in [0, 1].
 struct SplineWeights {
   double w[3][4];
 
@@ -68,7 +68,7 @@ SurfaceShape surfaceShape(const openvdb::FloatTree& tree, const V3d& position, F
       tree, Coord(static_cast<int>(base.x), static_cast<int>(base.y), static_cast<int>(base.z)));
   const SplineWeights weights[3] = {SplineWeights(a.x), SplineWeights(a.y), SplineWeights(a.z)};
 
-  // sum[p][q][r]: derivative of order p, q, r along x, y, z, up to two in all.
+  // sum[p][q][r]: derivative of order p, q, r along x, y, z, with p + q + r ≤ 2.
   double sum[3][3][3] = {};
   double error = 0;
   for (int x = 0; x < 4; ++x) {

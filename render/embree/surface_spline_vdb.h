@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to the judge: what a surface is like at a point, in double precision and from OpenVDB's
+// Private to the judge: derivatives of a surface at a point, in double precision and from OpenVDB's
 // own tree.
 
 #include "levelset/vdb.h"
@@ -9,9 +9,10 @@
 
 namespace render {
 
-/// At `position` (index space), from the 6³ grid values around it. The B-spline's coefficients are
-/// f − ∇²f/6 by differences, which takes away the inward shift of a plain B-spline [Sigg05]; those
-/// of Filter::BSpline are the values. Where rays meet the spline nothing else is said of it.
+/// Computes the shape at `position` (index space) from the 6³ grid values around it. The B-spline's
+/// coefficients are f − ∇²f/6 by differences, which removes the inward shift of a plain B-spline
+/// [Sigg05]. For Filter::BSpline the coefficients are the values. For both spline filters,
+/// `trilinearGradient` is the gradient of the spline and `interpolationError` is 0.
 [[nodiscard]] SurfaceShape surfaceShape(const openvdb::FloatTree& tree, const Imath::V3d& position,
                                         Filter filter);
 

@@ -15,7 +15,7 @@
 namespace render {
 namespace {
 
-constexpr const char* kWayOut = "use a machine with OpenGL 4.5, or draw with --renderer cpu";
+constexpr const char* kRemedy = "use a machine with OpenGL 4.5, or draw with --renderer cpu";
 
 bool hasWord(const char* words, std::string_view word) {
   return words && std::string_view(words).find(word) != std::string_view::npos;
@@ -39,17 +39,18 @@ struct GlContext::Egl {
   PFNEGLGETPLATFORMDISPLAYEXTPROC getPlatformDisplay = nullptr;
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
-  std::string tried;  // what failed, and why
+  std::string tried;  // failed attempts, with reasons
 
   Egl() {
     library = dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL);
     if (!library) {
-      throw NoOpenGl(fmt::format("render: there is no EGL here ({}); {}", dlerror(), kWayOut));
+      throw NoOpenGl(fmt::format("render: EGL is not available ({}); {}", dlerror(), kRemedy));
     }
     const auto load = [&](auto& function, const char* name) {
       function =
           reinterpret_cast<std::remove_reference_t<decltype(function)>>(dlsym(library, name));
-      if (!function) throw NoOpenGl(fmt::format("render: EGL has no {}; {}", name, kWayOut));
+      if (!function)
+        throw NoOpenGl(fmt::format("render: EGL has no function {}; {}", name, kRemedy));
     };
     load(getProcAddress, "eglGetProcAddress");
     load(queryString, "eglQueryString");
@@ -65,21 +66,22 @@ struct GlContext::Egl {
     getPlatformDisplay = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(
         getProcAddress("eglGetPlatformDisplayEXT"));
     if (!getPlatformDisplay)
-      throw NoOpenGl(fmt::format("render: EGL cannot do without a window here; {}", kWayOut));
+      throw NoOpenGl(
+          fmt::format("render: EGL does not support contexts without a window; {}", kRemedy));
   }
-  // The library stays: drivers leave threads and handlers behind that outlive the context.
+  // The library is not unloaded: drivers leave threads and handlers that outlive the context.
   ~Egl() { close(); }
   Egl(const Egl&) = delete;
   Egl& operator=(const Egl&) = delete;
 
-  /// The display, which is one for the whole process and whoever else uses it, is not terminated.
+  /// Does not terminate the display, which is shared by the entire process.
   void close() {
     if (context != EGL_NO_CONTEXT) destroyContext(display, context);
     display = EGL_NO_DISPLAY;
     context = EGL_NO_CONTEXT;
   }
 
-  /// Devices of hardware, then the platform without any, then devices of software.
+  /// Tries hardware devices first, then the surfaceless platform, then software devices.
   void open() {
     std::vector<EGLDeviceEXT> hardware, software;
     listDevices(hardware, software);
@@ -87,8 +89,8 @@ struct GlContext::Egl {
       if (openOn(EGL_PLATFORM_DEVICE_EXT, device, "a device")) return;
     if (openOn(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, "no surface")) return;
     for (EGLDeviceEXT device : software)
-      if (openOn(EGL_PLATFORM_DEVICE_EXT, device, "a device in software")) return;
-    throw NoOpenGl(fmt::format("render: no OpenGL 4.5 could be opened ({}); {}", tried, kWayOut));
+      if (openOn(EGL_PLATFORM_DEVICE_EXT, device, "a software device")) return;
+    throw NoOpenGl(fmt::format("render: OpenGL 4.5 is not available ({}); {}", tried, kRemedy));
   }
 
   void listDevices(std::vector<EGLDeviceEXT>& hardware, std::vector<EGLDeviceEXT>& software) {
@@ -120,9 +122,9 @@ struct GlContext::Egl {
       return fail("not initialised");
     }
     if (!hasWord(queryString(display, EGL_EXTENSIONS), "EGL_KHR_surfaceless_context"))
-      return fail("it needs a window");
+      return fail("requires a window");
     if (!bindApi(EGL_OPENGL_API)) return fail("no OpenGL");
-    // With word of a lost context where the driver can give it.
+    // Request notification of a lost context, if the driver supports it.
     for (const bool tellsLoss : {true, false}) {
       const EGLint version[] = {
           EGL_CONTEXT_MAJOR_VERSION,
@@ -137,7 +139,7 @@ struct GlContext::Egl {
       context = createContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, version);
       if (context != EGL_NO_CONTEXT) return true;
     }
-    return fail("no context of version 4.5 without a configuration");
+    return fail("no OpenGL 4.5 context without a framebuffer configuration");
   }
 };
 
@@ -147,7 +149,8 @@ GlContext::GlContext() : egl_(std::make_unique<Egl>()) {
   const auto load = [&](auto& function, const char* name) {
     function =
         reinterpret_cast<std::remove_reference_t<decltype(function)>>(egl_->getProcAddress(name));
-    if (!function) throw NoOpenGl(fmt::format("render: OpenGL has no {}; {}", name, kWayOut));
+    if (!function)
+      throw NoOpenGl(fmt::format("render: OpenGL has no function {}; {}", name, kRemedy));
   };
 #define LEVELSMITH_GL_LOAD(Type, name) load(gl_.name, "gl" #name);
   LEVELSMITH_GL_FUNCTIONS(LEVELSMITH_GL_LOAD)
@@ -172,11 +175,12 @@ GlContext::Current::Current(const GlContext& context) : context_(context), lock_
   draw_ = egl.currentSurface(EGL_DRAW);
   read_ = egl.currentSurface(EGL_READ);
   before_ = egl.currentContext();
-  // The API is each thread's own.
+  // The bound API is a property of each thread.
   if (!egl.bindApi(EGL_OPENGL_API) ||
       !egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, egl.context)) {
     throw levelset::ResourceLimit(
-        "render: the graphics driver took the context away; draw again, or with --renderer cpu");
+        "render: the OpenGL context cannot be made current; try again, or draw with --renderer "
+        "cpu");
   }
 }
 
@@ -187,22 +191,22 @@ GlContext::Current::~Current() {
     return;
   }
   egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
-  // What a thread leaves behind Mesa frees when the thread ends, and again when the process does:
-  // a crash where both happen at once.
+  // Mesa frees the state of a thread when the thread ends, and again when the process ends. If both
+  // happen at once, it crashes.
   egl.releaseThread();
 }
 
 void GlContext::check(const char* what) const {
   if (gl_.GetGraphicsResetStatus() != GL_NO_ERROR) {
-    throw levelset::ResourceLimit(fmt::format(
-        "render: the graphics driver gave up on {}, and the context is lost; draw a smaller "
-        "picture, or with --renderer cpu",
-        what));
+    throw levelset::ResourceLimit(
+        fmt::format("render: the OpenGL context was lost while {}; draw a smaller "
+                    "picture, or with --renderer cpu",
+                    what));
   }
   const GLenum error = gl_.GetError();
   if (error == GL_NO_ERROR) return;
   throw levelset::ResourceLimit(fmt::format(
-      "render: {} failed with OpenGL's error {:#x}{}; use larger voxels, or draw with --renderer "
+      "render: {} failed with OpenGL error {:#x}{}; use larger voxels, or draw with --renderer "
       "cpu",
       what, error, error == GL_OUT_OF_MEMORY ? " (out of memory)" : ""));
 }

@@ -1,7 +1,7 @@
 #pragma once
 
-// Private to the GPU renderer. OpenGL 4.5 without a display or a window: EGL is loaded at run time,
-// so that programs start where there is none.
+// Private to the GPU renderer. OpenGL 4.5 without a display or a window. EGL is loaded at run time,
+// so programs also start on machines without it.
 
 #include <GL/glcorearb.h>
 
@@ -49,24 +49,24 @@ namespace render {
   X(PFNGLUNIFORM1IPROC, Uniform1i)                           \
   X(PFNGLUSEPROGRAMPROC, UseProgram)
 
-/// The functions of OpenGL that are used, without their prefix.
+/// OpenGL functions in use, without the prefix "gl".
 struct GlFunctions {
 #define LEVELSMITH_GL_MEMBER(Type, name) Type name = nullptr;
   LEVELSMITH_GL_FUNCTIONS(LEVELSMITH_GL_MEMBER)
 #undef LEVELSMITH_GL_MEMBER
 };
 
-/// A context of OpenGL 4.5 of its own. Hardware is preferred to software.
+/// An OpenGL 4.5 context without a window. Hardware is preferred to software.
 class GlContext {
  public:
-  /// @throws NoOpenGl where there is no EGL, or no OpenGL 4.5, with what was tried
+  /// @throws NoOpenGl when EGL or OpenGL 4.5 is missing; the message lists the attempts
   GlContext();
   ~GlContext();
   GlContext(const GlContext&) = delete;
   GlContext& operator=(const GlContext&) = delete;
 
-  /// While it lives the calling thread, and no other, may call OpenGL; then what was current before
-  /// is again.
+  /// Makes the context current on the calling thread, exclusively, and restores the previous
+  /// context at the end of its lifetime.
   class Current {
    public:
     explicit Current(const GlContext& context);
@@ -81,14 +81,15 @@ class GlContext {
   };
 
   const GlFunctions& gl() const { return gl_; }
-  /// Renderer and version as the driver tells them.
+  /// Renderer and version as reported by the driver.
   [[nodiscard]] const std::string& description() const { return description_; }
-  /// Bytes of the largest buffer of 32-bit texels.
+  /// Size of the largest buffer of 32-bit texels, bytes.
   [[nodiscard]] std::size_t largestTable() const { return largestTable_; }
-  /// Of those that a compute shader can see.
+  /// Number of texel buffers that a compute shader can access.
   [[nodiscard]] int tableCount() const { return tableCount_; }
-  /// @pre current  @throws levelset::ResourceLimit when the context was lost or OpenGL reports an
-  ///                       error, with `what` was being done
+  /// Checks for OpenGL errors. @pre the context is current
+  /// @param what  current operation, for the message
+  /// @throws levelset::ResourceLimit when the context was lost or OpenGL reports an error
   void check(const char* what) const;
 
  private:

@@ -11,11 +11,11 @@ Image renderGpu(const Scene& scene, const RenderOptions& options) {
   requirePicture(scene, options);
   if (scene.isBlended())
     throw levelset::UsageError(
-        "render: the shader has no soft expressions and no morphs; take --renderer cpu");
+        "render: --renderer gpu supports neither soft expressions nor morphs; use --renderer cpu");
   levelset::report(options.progress, 0, "render");
   const KernelScene surfaces(scene, options);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();
-  if (options.fromNanoVdb) {  // made, and copied into words
+  if (options.fromNanoVdb) {  // memory of the grids and of their copies as words
     double bytes = 0;
     for (const Solid& solid : scene.solids)
       bytes += 2 * static_cast<double>(solid.band.memoryUse());
@@ -23,7 +23,7 @@ Image renderGpu(const Scene& scene, const RenderOptions& options) {
   }
   const GlContext context;
   const GpuTracer tracer(context, surfaces, 0, options.fromNanoVdb ? &scene : nullptr);
-  constexpr int kGpuTile = 64;  // pixels: enough rays for a run
+  constexpr int kGpuTile = 64;  // pixels; large enough for an efficient dispatch
   return paintPicture(scene, surfaces, tracer, kGpuTile, "gpu " + context.description(), options);
 }
 

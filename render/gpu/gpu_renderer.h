@@ -7,15 +7,18 @@
 
 namespace render {
 
-/// There is no OpenGL 4.5 without a display here.
+/// OpenGL 4.5 without a display is not available.
 struct NoOpenGl : levelset::ResourceLimit {
   using ResourceLimit::ResourceLimit;
 };
 
-/// Draws the scene by the kernel as an OpenGL 4.5 compute shader, without a display: the same bits
-/// as renderCpu() where the driver rounds as IEEE 754 has it (Mesa's llvmpipe does).
-/// @throws as renderCpu(); levelset::UsageError for scenes that are blended; NoOpenGl;
-///         levelset::ResourceLimit also where the driver does not take the shader or the grids
+/// Draws the scene with the kernel as an OpenGL 4.5 compute shader, without a display. Pixels have
+/// the same bits as those of renderCpu() when the driver rounds as IEEE 754 requires (Mesa's
+/// llvmpipe does).
+/// @throws as renderCpu()
+/// @throws levelset::UsageError for blended scenes
+/// @throws NoOpenGl when OpenGL 4.5 is missing
+/// @throws levelset::ResourceLimit also when the driver rejects the shader or the grids
 [[nodiscard]] Image renderGpu(const Scene& scene, const RenderOptions& options = {});
 
 }  // namespace render

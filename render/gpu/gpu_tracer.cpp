@@ -16,18 +16,18 @@
 namespace render {
 namespace {
 
-constexpr int kGroup = 64;                 // invocations
-constexpr std::size_t kOneRun = 1u << 18;  // rays: short enough for any watchdog
+constexpr int kGroup = 64;                 // invocations of a work group
+constexpr std::size_t kOneRun = 1u << 18;  // rays of a dispatch: short enough for any watchdog
 constexpr int kRayParts = 12, kHitParts = 5;
 
-/// Storage blocks, and texture units.
+/// Bindings of storage blocks, and texture units.
 enum Binding : GLuint { kRays, kHits };
 enum Unit : GLuint { kPages, kEntries, kMasks, kFirstValues };
 
-/// What the kernel's words are in GLSL.
+/// GLSL definitions of the kernel's types and macros.
 constexpr const char* kDialect = R"GLSL(
 #define Real float
-#define Whole int
+#define Int int
 #define Bool bool
 #define VAR precise float
 #define IN(Type) Type
@@ -56,24 +56,24 @@ layout(std430, binding = 0) readonly buffer Rays { float rays[]; };
 layout(std430, binding = 1) writeonly buffer Hits { int hits[]; };
 
 Real real(float v) { return v; }
-Whole whole(int v) { return v; }
+Int integer(int v) { return v; }
 Bool no() { return false; }
-Real toReal(Whole v) { return float(v); }
-Whole toWhole(Real v) { return int(v); }
+Real toReal(Int v) { return float(v); }
+Int toInt(Real v) { return int(v); }
 Real select(Bool c, Real a, Real b) { return c ? a : b; }
-Whole select(Bool c, Whole a, Whole b) { return c ? a : b; }
+Int select(Bool c, Int a, Int b) { return c ? a : b; }
 Bool select(Bool c, Bool a, Bool b) { return c ? a : b; }
 Real smaller(Real a, Real b) { return b < a ? b : a; }
-Whole smaller(Whole a, Whole b) { return b < a ? b : a; }
+Int smaller(Int a, Int b) { return b < a ? b : a; }
 Real larger(Real a, Real b) { return a < b ? b : a; }
-Whole larger(Whole a, Whole b) { return a < b ? b : a; }
-Whole bit(Bool c, int n) { return c ? n : 0; }
+Int larger(Int a, Int b) { return a < b ? b : a; }
+Int bit(Bool c, int n) { return c ? n : 0; }
 Bool differ(Bool a, Bool b) { return a != b; }
 Bool any(Bool c) { return c; }
 Bool many(Bool walking, Bool alive) { return walking; }
-Whole loadPage(Whole i) { return texelFetch(pages, i).x; }
-Whole loadEntry(Whole i) { return texelFetch(entries, i).x; }
-Whole loadMask(Whole i) { return texelFetch(masks, i).x; }
+Int loadPage(Int i) { return texelFetch(pages, i).x; }
+Int loadEntry(Int i) { return texelFetch(entries, i).x; }
+Int loadMask(Int i) { return texelFetch(masks, i).x; }
 )GLSL";
 
 constexpr const char* kMain = R"GLSL(
@@ -82,7 +82,7 @@ void main() {
   if (n >= rayCount) return;
   Ray ray = rayNumber(n);
   Hit hit = trace(ray, passingNumber(n));
-  hits[n] = hit.found ? (hit.goesIn ? kGoesIn : kGoesOut) : 0;
+  hits[n] = hit.found ? (hit.enters ? kEnters : kLeaves) : 0;
   hits[rayCount + n] = floatBitsToInt(hit.t);
   hits[2 * rayCount + n] = hit.x;
   hits[3 * rayCount + n] = hit.y;
@@ -96,7 +96,7 @@ Ray rayNumber(int n) { return viewRay(rays[n], rays[rayCount + n]); }
 int passingNumber(int n) { return int(rays[2 * rayCount + n]); }
 
 void addShape(int n, Ray ray, Hit hit) {
-  // llvmpipe runs through all branches, but leaves loops that no ray is in.
+  // llvmpipe executes all branches, but skips loops that no ray enters.
   for (int i = hit.found ? 0 : 1; i < 1; ++i) {
     Shape s = shapeOf(ray, hit);
     float parts[kShapeParts] = float[kShapeParts](s.gx, s.gy, s.gz, s.tx, s.ty, s.tz, s.hxx, s.hyy,
@@ -132,15 +132,15 @@ constexpr const char* kNanoText = R"GLSL(
 uniform int nanoRoot, nanoTiles, nanoFar, nanoOriginX, nanoOriginY, nanoOriginZ;
 )GLSL";
 
-/// What a shader is made for.
+/// Properties that select a shader.
 struct Variant {
   bool isPixels, isSpline, isNano;
   int valueBits;
-  int blocks;  // of values, in a buffer of texels each
+  int blocks;  // number of texel buffers for the values
   auto operator<=>(const Variant&) const = default;
 };
 
-/// Values in one buffer of texels, or in several of 2^shift values each.
+/// Declares the values in one texel buffer, or in several of 2^shift values each.
 std::string valueText(const Variant& variant, int shift) {
   const bool isCode = variant.valueBits != 32;
   const char* prefix = isCode ? "u" : variant.isNano ? "i" : "";
@@ -150,20 +150,21 @@ std::string valueText(const Variant& variant, int shift) {
     text += fmt::format("layout(binding = {}) uniform {}samplerBuffer values{};\n",
                         static_cast<int>(kFirstValues) + b, prefix, b);
   }
-  text += fmt::format("{} loadHeld(Whole i) {{\n", type);
+  text += fmt::format("{} loadHeld(Int i) {{\n", type);
   for (int b = 0; b + 1 < variant.blocks; ++b)
     text += fmt::format("  if (i >> {} == {}) return texelFetch(values{}, i & {}).x;\n", shift, b,
                         b, (1 << shift) - 1);
   text += variant.blocks == 1 ? "  return texelFetch(values0, i).x;\n}\n"
                               : fmt::format("  return texelFetch(values{}, i & {}).x;\n}}\n",
                                             variant.blocks - 1, (1 << shift) - 1);
-  // Numbers of the NanoVDB grid pass for floats nowhere: those may lose bits.
+  // Words of the NanoVDB grid that are integers never pass through a float, because that may change
+  // bits.
   if (variant.isNano)
-    return text + "Real loadValue(Whole i) { return intBitsToFloat(loadHeld(i)); }\n";
-  if (!isCode) return text + "Real loadValue(Whole i) { return loadHeld(i); }\n";
+    return text + "Real loadValue(Int i) { return intBitsToFloat(loadHeld(i)); }\n";
+  if (!isCode) return text + "Real loadValue(Int i) { return loadHeld(i); }\n";
   return text + fmt::format(
                     "uniform float valueStep;\n"
-                    "Real loadValue(Whole i) {{\n"
+                    "Real loadValue(Int i) {{\n"
                     "  VAR fromZero = float(int(loadHeld(i))) + {}.5;\n"
                     "  VAR value = fromZero * valueStep;\n"
                     "  return value;\n}}\n",
@@ -175,12 +176,12 @@ std::string shaderText(const Variant& variant, int shift) {
              "#version 450 core\nlayout(local_size_x = {}) in;\n"
              "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {},\n"
              "          kFirstOfEntry = {}, kStridesOfEntry = {}, kStrideShift = {},\n"
-             "          kHitParts = {}, kShapeParts = {}, kGoesIn = {}, kGoesOut = {};\n"
+             "          kHitParts = {}, kShapeParts = {}, kEnters = {}, kLeaves = {};\n"
              "const bool isSpline = {};\n",
              kGroup, BrickPool::kEdge, BrickPool::kValues,
              std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kFirstOfEntry,
              BrickPool::kStridesOfEntry, BrickPool::kStrideShift, kHitParts, ShapeBlock::kParts,
-             HitBlock::kGoesIn, HitBlock::kGoesOut, variant.isSpline) +
+             HitBlock::kEnters, HitBlock::kLeaves, variant.isSpline) +
          kDialect + valueText(variant, shift) + kRootsKernel +
          (variant.isNano ? kNanoText + NanoGrid::layout() + kNanoVdbKernel : kBricksKernel) +
          kWindowKernel + kSplineKernel + kTraceKernel + kShapeKernel +
@@ -216,21 +217,21 @@ GLuint compileCompute(const GlContext& context, const std::string& text) {
 }
 
 struct GpuTracer::Impl {
-  /// A buffer that shaders read as a texture: Mesa's llvmpipe gathers those by vectors, and storage
-  /// blocks lane by lane.
+  /// A buffer that shaders read as a texture. Mesa's llvmpipe gathers from textures by vectors, but
+  /// from storage blocks lane by lane.
   struct Texels {
     GLuint buffer = 0, texture = 0;
   };
   struct Tables {
     Texels pages, entries, masks;
     std::vector<Texels> values;
-    std::optional<NanoGrid> nano;  // without its words: those are the values, and all there is
+    std::optional<NanoGrid> nano;  // without its words, which are uploaded as values
   };
 
   const GlContext& context;
   const GlFunctions& gl;
   const std::size_t largestTable;
-  int shift = 0;  // of the number of values in a block of them
+  int shift = 0;  // log2 of the number of values in a texel buffer
   std::map<const KernelSolid*, Tables> tables;
   GLuint rays = 0, hits = 0;
   std::map<Variant, GLuint> programs;
@@ -240,7 +241,7 @@ struct GpuTracer::Impl {
         gl(context_.gl()),
         largestTable(largestTable_ > 0 ? largestTable_ : context_.largestTable()) {
     shift = static_cast<int>(std::bit_width(largestTable / sizeof(float))) - 1;
-    shift = std::min(shift, 30);  // numbers of values are ints
+    shift = std::min(shift, 30);  // indices of values are ints
     gl.CreateBuffers(1, &rays);
     gl.CreateBuffers(1, &hits);
   }
@@ -264,7 +265,7 @@ struct GpuTracer::Impl {
   Texels texelsOf(const void* data, std::size_t bytes, GLenum format) {
     if (bytes > largestTable) {
       throw levelset::ResourceLimit(fmt::format(
-          "render: a table of {} MB does not fit into the {} MB that a buffer texture of {} has; "
+          "render: a table of {} MB does not fit into a buffer texture of {} MB, the limit of {}; "
           "use larger voxels, or draw with --renderer cpu",
           bytes >> 20, largestTable >> 20, context.description()));
     }
@@ -276,15 +277,15 @@ struct GpuTracer::Impl {
     return texels;
   }
 
-  /// @param size    of a value, bytes
-  /// @param format  of it
+  /// @param size  of a value, bytes
+  /// @param format  internal format of a value
   void uploadValues(Tables& t, const void* values, std::size_t bytes, std::size_t size,
                     GLenum format) {
     const std::size_t perBlock = size << shift;
     const std::size_t blocks = (bytes + perBlock - 1) / perBlock;
     if (blocks + kFirstValues > static_cast<std::size_t>(context.tableCount())) {
       throw levelset::ResourceLimit(
-          fmt::format("render: {} MB of values need {} buffer textures, and {} leaves {}; use "
+          fmt::format("render: {} MB of values need {} buffer textures, but {} offers {}; use "
                       "larger voxels, or "
                       "draw with --renderer cpu",
                       bytes >> 20, blocks, context.description(),
@@ -298,16 +299,16 @@ struct GpuTracer::Impl {
   void upload(const KernelSolid& solid) {
     const BrickPool& pool = solid.pool;
     Tables& t = tables[&solid];
-    const auto whole = [&](const auto& data) {
+    const auto textureOf = [&](const auto& data) {
       return texelsOf(data.data(), data.size() * sizeof data[0], GL_R32I);
     };
-    t.pages = whole(pool.page);
-    t.entries = whole(pool.entry);
-    t.masks = whole(pool.mask);
+    t.pages = textureOf(pool.page);
+    t.entries = textureOf(pool.entry);
+    t.masks = textureOf(pool.mask);
     const std::size_t bytes = pool.valueBytes();
-    if (pool.held.bits == 32)
+    if (pool.quantization.bits == 32)
       uploadValues(t, pool.value.data(), bytes, 4, GL_R32F);
-    else if (pool.held.bits == 16)
+    else if (pool.quantization.bits == 16)
       uploadValues(t, pool.code.data(), bytes, 2, GL_R16UI);
     else
       uploadValues(t, pool.code.data(), bytes, 1, GL_R8UI);
@@ -326,7 +327,7 @@ struct GpuTracer::Impl {
     const Variant variant{.isPixels = isPixels,
                           .isSpline = solid.pool.filter != Filter::Trilinear,
                           .isNano = t.nano.has_value(),
-                          .valueBits = t.nano ? 32 : solid.pool.held.bits,
+                          .valueBits = t.nano ? 32 : solid.pool.quantization.bits,
                           .blocks = static_cast<int>(t.values.size())};
     GLuint& program = programs[variant];
     if (program == 0) program = compileCompute(context, shaderText(variant, shift));
@@ -344,7 +345,7 @@ struct GpuTracer::Impl {
       gl.Uniform1i(place("nanoOriginY"), pool.origin[1]);
       gl.Uniform1i(place("nanoOriginZ"), pool.origin[2]);
     }
-    if (pool.held.bits != 32) gl.Uniform1fv(place("valueStep"), 1, &pool.held.step);
+    if (pool.quantization.bits != 32) gl.Uniform1fv(place("valueStep"), 1, &pool.quantization.step);
     gl.Uniform1i(place("pagesY"), pool.pages[1]);
     gl.Uniform1i(place("pagesZ"), pool.pages[2]);
     gl.Uniform1i(place("tableSizeX"), pool.pages[0] * BrickPool::kPage);
@@ -378,7 +379,7 @@ struct GpuTracer::Impl {
       gl.BindTextureUnit(kFirstValues + static_cast<GLuint>(b), t.values[b].texture);
   }
 
-  /// @param shapes  of pixels only
+  /// @param shapes  for pixels only; else null
   void run(const KernelSolid& solid, const std::vector<float>& input, std::size_t count,
            HitBlock& found, ShapeBlock* shapes) {
     if (count == 0) return;
@@ -412,7 +413,7 @@ struct GpuTracer::Impl {
     fetch(found.z, 4);
     for (std::size_t p = 0; shapes && p < ShapeBlock::kParts; ++p)
       fetch(shapes->part[p], kHitParts + p);
-    context.check("the rays");
+    context.check("tracing the rays");
   }
 };
 
@@ -437,7 +438,7 @@ GpuTracer::~GpuTracer() {
   try {
     const GlContext::Current current(impl_->context);
     impl_->release();
-  } catch (const levelset::Error&) {  // what a lost context held is lost with it
+  } catch (const levelset::Error&) {  // a lost context has released its objects
   }
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to the GPU renderer: the kernel as a compute shader.
+// Private to the GPU renderer: runs the kernel as a compute shader.
 
 #include <memory>
 #include <string>
@@ -10,18 +10,16 @@
 
 namespace render {
 
-/// The kernel on the graphics processor. Each solid's tables are uploaded once. Safe to call from
-/// many threads, which take turns.
+/// Runs the kernel on the graphics processor. The tables of each solid are uploaded once.
+/// Thread-safe; calls are serialised.
 class GpuTracer : public KernelTracer {
  public:
-  /// @param context       must outlive it
-  /// @param largestTable  bytes of a buffer of texels at most; 0: what the driver says
-  /// @param grids         of which the scene was made: their NanoVDB grids are uploaded in the
-  /// place
-  ///                      of the tables, the reference that those are held against; none: the
-  ///                      tables
-  /// @pre with grids the filter is trilinear
-  /// @throws levelset::ResourceLimit where the tables do not fit, or the shader does not compile
+  /// @param context  must outlive the tracer
+  /// @param largestTable  largest texel buffer, bytes; 0: the limit of the driver
+  /// @param grids  scene that KernelScene was built from. Its NanoVDB grids are uploaded in place
+  ///        of the tables, as a reference for them. Null: the tables are uploaded.
+  /// @pre with `grids` the filter is trilinear
+  /// @throws levelset::ResourceLimit when the tables do not fit, or the shader does not compile
   GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestTable = 0,
             const Scene* grids = nullptr);
   ~GpuTracer() override;
@@ -35,8 +33,8 @@ class GpuTracer : public KernelTracer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A compute shader, ready to run. @pre the context is current
-/// @throws levelset::ResourceLimit with the driver's first words where it does not compile
+/// Compiles and links a compute shader. @pre the context is current
+/// @throws levelset::ResourceLimit with the start of the driver's log when it does not compile
 [[nodiscard]] GLuint compileCompute(const GlContext& context, const std::string& text);
 
 }  // namespace render

@@ -9,19 +9,19 @@
 
 namespace render {
 
-/// The words of a NanoVDB grid, and behind them eight values far outside and eight far inside.
+/// The words of a NanoVDB grid, followed by eight values far outside and eight far inside.
 struct NanoGrid {
   std::vector<float> words;
-  int root = 0;   ///< place of the root node
-  int tiles = 0;  ///< of it
-  int far = 0;    ///< place of the values behind the grid
+  int root = 0;   ///< word index of the root node
+  int tiles = 0;  ///< number of its tiles
+  int far = 0;    ///< word index of the values after the grid
 
-  /// Places within nodes, as GLSL constants.
+  /// GLSL constants with the offsets of members within nodes.
   [[nodiscard]] static std::string layout();
 };
 
-/// @pre the band is not empty
-/// @throws levelset::ResourceLimit for more words than an index can tell
+/// Converts a band. @pre the band is not empty
+/// @throws levelset::ResourceLimit for more words than an index can address
 [[nodiscard]] NanoGrid makeNanoGrid(const levelset::NarrowBand& band);
 
 }  // namespace render

@@ -19,16 +19,17 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr std::size_t kShown = 5;
-// Of all pixels: where a ray passes an outline within a rounding error, either answer is right.
+// Allowed share of the pixels at outlines. Where a ray passes an outline within the rounding error,
+// both answers are right.
 constexpr double kOutlineShare = 1e-5;
-// What Z of one surface may differ by at most, relative.
+// Largest relative difference of Z between samples of one surface.
 constexpr double kOneSurface = 1e-3;
 enum : char { kMissed, kHit, kBroken };
 
 using Difference = std::function<double(std::size_t)>;
 
-/// How a layer is compared, and what may lie between two correct renderers: one in single and one
-/// in double precision. docs/rendering.md derives the numbers.
+/// Comparison of one layer, with the tolerance between two correct renderers, one in single and one
+/// in double precision. docs/rendering.md derives the tolerances.
 struct Layer {
   std::string name, measure;
   LayerTolerance allowed;
@@ -46,14 +47,16 @@ class Comparer {
   Comparer(const Image& first, const Image& second, const ImageComparisonOptions& options)
       : a_(first), b_(second), options_(options) {
     if (a_.width != b_.width || a_.height != b_.height)
-      throw levelset::InvalidInput(fmt::format(
-          "compare-images: the pictures have {} × {} and {} × {} pixels; draw both at one size",
-          a_.width, a_.height, b_.width, b_.height));
+      throw levelset::InvalidInput(
+          fmt::format("compare-images: the pictures have {} × {} and {} × {} pixels; draw both "
+                      "with the same size",
+                      a_.width, a_.height, b_.width, b_.height));
     for (const auto& [name, tolerance] : options_.tolerances)
       if (!(tolerance.usual >= 0) || !(tolerance.worst >= 0))
-        throw levelset::UsageError(fmt::format(
-            "compare-images: the tolerance of {} is {}, {}; give two numbers, 0 or more", name,
-            tolerance.usual, tolerance.worst));
+        throw levelset::UsageError(
+            fmt::format("compare-images: the tolerance of {} is {}, {}; give two finite numbers "
+                        "that are 0 or more",
+                        name, tolerance.usual, tolerance.worst));
   }
 
   ImageComparison run() {
@@ -65,9 +68,9 @@ class Comparer {
     const std::vector<Layer> all = layers();
     for (const auto& [name, tolerance] : options_.tolerances)
       if (std::none_of(all.begin(), all.end(), [&](const Layer& l) { return l.name == name; }))
-        throw levelset::UsageError(
-            fmt::format("compare-images: there is no layer '{}' in both pictures; they have {}",
-                        name, namesOf(all)));
+        throw levelset::UsageError(fmt::format(
+            "compare-images: the pictures have no common layer '{}'; their common layers are {}",
+            name, namesOf(all)));
     for (const Layer& layer : all) compare(layer);
     compareBits();
     return std::move(result_);
@@ -90,8 +93,8 @@ class Comparer {
     const bool byDepth = has("Z");
     if (!byDepth && !has("A"))
       throw levelset::InvalidInput(
-          "compare-images: the pictures have neither Z nor A in common, so nothing tells what they "
-          "hit; draw them with 'render FILE.exr'");
+          "compare-images: the pictures have neither Z nor A in common, so their hits cannot be "
+          "found; draw them with 'render FILE.exr'");
     const auto hits = [&](const Image& image) {
       const std::vector<float>& channel = image.channels.at(byDepth ? "Z" : "A");
       std::vector<char> hit(channel.size());
@@ -109,14 +112,14 @@ class Comparer {
     isCompared_.assign(result_.pixels, 0);
   }
 
-  /// Calls visit(index) for a pixel and those around it.
+  /// Calls visit(index) for a pixel and its neighbours.
   template <typename Visit>
   void forEachWithinOne(int x, int y, const Visit& visit) const {
     for (int v = std::max(0, y - 1); v <= std::min(a_.height - 1, y + 1); ++v)
       for (int u = std::max(0, x - 1); u <= std::min(a_.width - 1, x + 1); ++u) visit(index(u, v));
   }
 
-  /// Both a hit and a miss within one pixel.
+  /// True when there are a hit and a miss within one pixel.
   [[nodiscard]] bool isOutline(const std::vector<char>& hit, int x, int y) const {
     bool any = false, all = true;
     forEachWithinOne(x, y, [&](std::size_t i) {
@@ -126,8 +129,9 @@ class Comparer {
     return any && !all;
   }
 
-  /// One picture sees the front of two surfaces, the other the one behind: Z differs by more than
-  /// one surface allows, and each lies within what the other has within one pixel.
+  /// True when one picture shows the front of two surfaces and the other one the back. Then Z
+  /// differs by more than one surface allows, and each Z lies in the range that the other picture
+  /// has within one pixel.
   [[nodiscard]] bool isInnerOutline(int x, int y) const {
     if (!has("Z")) return false;
     const std::size_t i = index(x, y);
@@ -169,7 +173,7 @@ class Comparer {
         isCompared_[i] = areHit && !isInner;
         if (hitA_[i] == hitB_[i] && !isBroken && !isInner) continue;
         shown[i] = hitB_[i] == kHit && !isInner ? -1 : 1;
-        // An outline of both: a leak is one of its own picture only.
+        // Require the outline in both pictures: a leak has an outline only in its own picture.
         const bool excused =
             isInner || (!isBroken && isOutline(hitA_, x, y) && isOutline(hitB_, x, y));
         ++(excused ? result_.unlikeAtOutline : result_.unlikeElsewhere);
@@ -180,18 +184,19 @@ class Comparer {
     if (result_.unlike.size() > kShown) result_.unlike.resize(kShown);
   }
 
-  /// A positive length in a picture's header.
+  /// A positive length from a picture's header.
   [[nodiscard]] static double lengthNamed(const Image& image, const char* name, double fallback) {
     const auto found = image.attributes.find(name);
     if (found == image.attributes.end()) return fallback;
     const double size = std::atof(found->second.c_str());
     return size > 0 && std::isfinite(size * size) ? size : fallback;
   }
-  /// The first, where there are several solids.
+  /// Voxel size of the first solid.
   [[nodiscard]] double voxelSize() const { return lengthNamed(a_, "ls:voxelSize", 1); }
 
-  /// What curvatures change by over the 1e-3 voxel that places may be apart, per voxel: third
-  /// differences of values in few bits are up to eight steps of those in a band of three voxels.
+  /// Tolerance of curvatures of quantized values, per voxel: their change over 1e-3 voxels, the
+  /// allowed distance of positions. In a band of three voxels, third differences of the values are
+  /// up to eight quantization steps.
   [[nodiscard]] double curvatureStep() const {
     const double bits = lengthNamed(a_, "ls:valueBits", 32);
     return bits < 32 ? 1e-3 * 8 * 6 * std::exp2(-bits) : 0;
@@ -205,11 +210,11 @@ class Comparer {
     }
     return std::sqrt(squares);
   }
-  /// Radians by which the surface turns from the place of one picture to the other's; 0 where
-  /// layers that tell it are missing.
+  /// Angle in radians by which the surface turns between the positions of both pictures; 0 where
+  /// the layers for it are missing.
   [[nodiscard]] double turnBetweenPlaces(std::size_t i) const {
     if (!has("P.X") || !has("P.Y") || !has("P.Z")) return 0;
-    constexpr double kMostTurn = 1.7e-3;  // as much as is allowed without
+    constexpr double kMostTurn = 1.7e-3;  // the tolerance of pictures without these layers
     double curvature[2] = {};
     for (const char* name : {"curvature.k1", "curvature.k2"}) {
       if (!has(name)) continue;
@@ -219,7 +224,7 @@ class Comparer {
     const double turn = vectorDifference("P", i) * std::min(curvature[0], curvature[1]);
     return std::isfinite(turn) ? std::min(turn, kMostTurn) : 0;
   }
-  /// Of P from the origin: it is stored in so many bits.
+  /// Distance of P from the origin, which determines the precision of P.
   [[nodiscard]] double distance(std::size_t i) const {
     const double d = std::hypot(value(a_, "P.X", i), value(a_, "P.Y", i), value(a_, "P.Z", i));
     return std::isfinite(d) ? d : 0;
@@ -230,11 +235,11 @@ class Comparer {
 
   std::vector<Layer> layers() {
     std::vector<Layer> all;
-    std::set<std::string> told;  // channels that some layer compares
+    std::set<std::string> compared;  // channels that a layer compares
     const auto add = [&](const std::vector<std::string>& channels, Layer layer) {
       if (!std::all_of(channels.begin(), channels.end(), [&](const auto& c) { return has(c); }))
         return;
-      told.insert(channels.begin(), channels.end());
+      compared.insert(channels.begin(), channels.end());
       all.push_back(std::move(layer));
     };
     const bool hasDepth = has("Z");
@@ -257,7 +262,7 @@ class Comparer {
         {"curvature.gauss", "per voxel²", {1e-4 + rough, kInfinite}, [this, h](std::size_t i) {
            return h * h * apart(value(a_, "curvature.gauss", i), value(b_, "curvature.gauss", i));
          }});
-    // From close by, places are known relative to the solid's size only.
+    // For a near camera, the precision of positions is relative to the size of the solid.
     const double extent =
         std::max(lengthNamed(a_, kExtentAttribute, 0), lengthNamed(b_, kExtentAttribute, 0));
     add({"Z"}, {"Z", "relative", {2e-6, kOneSurface}, [this, extent](std::size_t i) {
@@ -272,21 +277,22 @@ class Comparer {
            const double d = vectorDifference("P", i);
            return d > 0 && hasDepth ? d / std::max({depth(i), distance(i), extent}) : d;
          }});
-    // A ray that grazes a surface is within it for the square root of how far it dips in.
+    // The length of a grazing ray inside a surface is proportional to the square root of its depth
+    // of penetration.
     add({"thickness"}, {"thickness", "relative", {1e-5, 1e-2}, [this, extent](std::size_t i) {
                           const double d =
                               apart(value(a_, "thickness", i), value(b_, "thickness", i));
                           return d > 0 ? d / std::max(depth(i), extent) : 0;
                         }});
-    // The angle between unit vectors, precise where it is small. Where a ray grazes the surface the
-    // places stand off each other, and the normals by that times the curvature.
+    // Angle between unit vectors, by a formula that is precise for small angles. For grazing rays
+    // the positions differ, and the normals differ by that distance times the curvature.
     add({"N.X", "N.Y", "N.Z"}, {"N", "radians", {2e-4, 1.7e-3}, [this](std::size_t i) {
                                   const double d = vectorDifference("N", i);
                                   const double angle = d <= 2 ? 2 * std::asin(d / 2) : kInfinite;
                                   return std::max(0.0, angle - turnBetweenPlaces(i));
                                 }});
     for (const auto& [name, channel] : a_.channels) {
-      if (told.count(name) || name == "A" || !has(name)) continue;
+      if (compared.count(name) || name == "A" || !has(name)) continue;
       add({name}, {name, "absolute", {kInfinite, kInfinite}, [this, name = name](std::size_t i) {
                      return apart(value(a_, name, i), value(b_, name, i));
                    }});
@@ -338,7 +344,7 @@ class Comparer {
       };
       found.median = share(0.5);
       found.p99 = share(0.99);
-      // Of fewer than a thousand pixels this would be the worst of all: one may pass it.
+      // With fewer than a thousand pixels the percentile is the maximum; exclude one pixel from it.
       const std::size_t beyond = std::min<std::size_t>(1, sorted.size() / 100);
       found.p999 = std::min(share(0.999), sorted[sorted.size() - 1 - beyond]);
       found.largest = sorted.back();
@@ -346,7 +352,7 @@ class Comparer {
     result_.layers.push_back(std::move(found));
   }
 
-  /// Of all channels that both have, whether hit or not; lists those of one.
+  /// Compares the bits of all channels that both pictures have, hit or not, and lists the others.
   void compareBits() {
     std::vector<char> differs(result_.pixels, 0);
     const auto pass = [&](const auto& mine, const auto& others, const auto& differ) {
@@ -388,19 +394,20 @@ bool ImageComparison::agrees() const {
 
 std::string ImageComparison::reason() const {
   if (isExact) {
-    if (!onlyOne.empty()) return fmt::format("only one has the channel {}", onlyOne[0]);
-    return differentBits > 0 ? fmt::format("{} pixels have other bits", differentBits) : "";
+    if (!onlyOne.empty()) return fmt::format("only one picture has the channel {}", onlyOne[0]);
+    return differentBits > 0 ? fmt::format("{} pixels have different bits", differentBits) : "";
   }
   if (!coverageAgrees()) {
     return fmt::format(
-        "one hits and the other misses in {} pixels off the outline (0 allowed) and {} along it "
+        "only one of them hits in {} pixels away from outlines (0 allowed) and in {} along "
+        "outlines "
         "({} allowed), the first at {},{}",
         unlikeElsewhere, unlikeAtOutline, outlineAllowed, unlike[0].x, unlike[0].y);
   }
   for (const LayerComparison& layer : layers) {
     if (layer.agrees()) continue;
     return fmt::format(
-        "{} differs by {:.3g} ({}) in one pixel of 1000 ({:.3g} allowed) and {:.3g} at most "
+        "{} differs by {:.3g} ({}) at the 99.9 % percentile ({:.3g} allowed) and by at most {:.3g} "
         "({:.3g} "
         "allowed), the worst at {},{}",
         layer.layer, layer.p999, layer.measure, layer.allowed.usual, layer.largest,

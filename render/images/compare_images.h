@@ -8,14 +8,14 @@
 
 #include "render/images/image.h"
 
-/// How far two pictures of one scene differ, layer by layer: shares of the pixels and the worst
-/// ones, never one mean over all, in which a leak of one pixel drowns.
+/// Compares two pictures of one scene, layer by layer, by percentiles and the worst pixels. A mean
+/// over all pixels is not used, because it hides a leak of one pixel.
 namespace render {
 
-/// What may lie between two correct renderers.
+/// Largest difference allowed between two correct renderers.
 struct LayerTolerance {
-  double usual;  ///< for 999 pixels of 1000
-  double worst;  ///< for all
+  double usual;  ///< for 99.9 % of the pixels
+  double worst;  ///< for all pixels
 };
 
 struct PixelDifference {
@@ -25,13 +25,15 @@ struct PixelDifference {
 
 struct LayerComparison {
   std::string layer;           ///< "Z", "N", "P", "curvature.mean", "id", "colour" …
-  std::string measure;         ///< of the difference: "relative", "radians" …
+  std::string measure;         ///< unit of the difference: "relative", "radians" …
   std::size_t compared = 0;    ///< pixels that both pictures hit
-  double median = 0, p99 = 0;  ///< of the differences there
+  double median = 0, p99 = 0;  ///< statistics of the differences of these pixels
   double p999 = 0, largest = 0;
   LayerTolerance allowed{};
-  std::vector<PixelDifference> worst;  ///< the largest first, at most five; none of 0
-  /// Never where a difference is infinite: one of the pictures is broken there.
+  std::vector<PixelDifference>
+      worst;  ///< at most five, the largest first; zero differences are left out
+  /// True when the differences are within the tolerance. False for an infinite difference, which
+  /// means that one picture is broken there.
   [[nodiscard]] bool agrees() const {
     return std::isfinite(largest) && p999 <= allowed.usual && largest <= allowed.worst;
   }
@@ -39,42 +41,48 @@ struct LayerComparison {
 
 struct ImageComparison {
   std::size_t pixels = 0, bothHit = 0;
-  /// Hit by one only: beside an outline of both pictures, where rounding decides, and elsewhere;
-  /// there those of a Z that is none, too, and along inner outlines those of unlike surfaces.
+  /// Pixels that are hit in one picture only. AtOutline: beside an outline of both pictures, where
+  /// rounding decides. Elsewhere: all others, including pixels with a NaN Z, and pixels of
+  /// different surfaces along inner outlines.
   std::size_t unlikeAtOutline = 0, unlikeElsewhere = 0;
-  std::size_t outlineAllowed = 0;       ///< of the first kind; of the others none
-  std::vector<PixelDifference> unlike;  ///< the first five, those elsewhere before the others
-  std::vector<LayerComparison> layers;  ///< in the order of their names
-  std::vector<std::string> onlyOne;     ///< layers of one picture; nobody compares them
-  std::size_t differentBits = 0;        ///< pixels in which any channel has other bits
-  bool isExact = false;                 ///< agreement asks for the same bits
+  std::size_t outlineAllowed = 0;  ///< limit of unlikeAtOutline; unlikeElsewhere must be 0
+  std::vector<PixelDifference>
+      unlike;  ///< the first five; pixels elsewhere precede those at outlines
+  std::vector<LayerComparison> layers;  ///< sorted by name
+  std::vector<std::string> onlyOne;     ///< layers of one picture only; not compared
+  std::size_t differentBits = 0;        ///< pixels with different bits in any channel
+  bool isExact = false;                 ///< agreement requires equal bits
   Image difference;                     ///< a channel for each layer, and "coverage"
 
   [[nodiscard]] bool coverageAgrees() const {
     return unlikeElsewhere == 0 && unlikeAtOutline <= outlineAllowed;
   }
   [[nodiscard]] bool agrees() const;
-  /// The first reason why not, as the end of a sentence; empty when they agree.
+  /// First reason of a disagreement, as the end of a sentence; empty when the pictures agree.
   [[nodiscard]] std::string reason() const;
 };
 
 struct ImageComparisonOptions {
-  bool exact = false;  ///< the same bits in all channels, and the same channels
-  /// In the place of the layers' own.
+  bool exact = false;  ///< requires equal bits in all channels, and the same channels
+  /// Overrides the tolerances of layers, by name.
   std::map<std::string, LayerTolerance> tolerances = {};
 };
 
-/// A pixel is hit where Z is finite, missed where it is +inf; without Z, hit where A is positive.
-/// Where each Z lies between those that the other picture has within a pixel, they belong to two
-/// surfaces in front of each other: an inner outline, and no layer is compared. Differences of Z
-/// are relative to Z or to the size of what is drawn (ls:extent of the first header) if that is
-/// larger, those of P to these or to P's length, those of N angles, less the one that the surface
-/// turns by between the places of both (P times curvature, where there are such layers), those of
-/// curvatures by the
-/// voxel size that the first picture's header names (ls:voxelSize; 1 without), those of id 0 or 1.
-/// NaN differs infinitely.
+/// Compares two pictures.
+///
+/// A pixel is hit where Z is finite, and missed where Z is +inf; without Z, it is hit where A is
+/// positive. Inner outline: each Z lies between those of the other picture within one pixel. Then
+/// the pixels show two surfaces in front of each other, and no layer is compared.
+///
+/// Measures of difference by layer. NaN counts as an infinite difference.
+/// - Z: relative to the larger of Z and the size of the scene (ls:extent of the first header).
+/// - P: relative to the larger of these and the length of P.
+/// - N: angle, minus the angle by which the surface turns between both positions (P times
+///   curvature, if these layers exist).
+/// - curvature: times the voxel size in the first header (ls:voxelSize; 1 if missing).
+/// - id: 0 or 1.
 /// @throws levelset::InvalidInput for pictures of different sizes, or without Z and A
-/// @throws levelset::UsageError for a tolerance of a layer that they do not have, or that is none
+/// @throws levelset::UsageError for a tolerance of a missing layer, or an invalid tolerance
 [[nodiscard]] ImageComparison compareImages(const Image& first, const Image& second,
                                             const ImageComparisonOptions& options = {});
 

@@ -14,8 +14,8 @@
 #include "levelset/error.h"
 #include "render/camera.h"
 
-// The layout is that of "OpenEXR File Layout": numbers are little endian, a header is a list of
-// attributes, each a name, a type, a size and as many bytes, that an empty name ends.
+// The layout is defined in "OpenEXR File Layout". Numbers are little endian. A header is a list of
+// attributes, each with name, type, size and value. An empty name ends the list.
 
 namespace render {
 namespace {
@@ -25,14 +25,16 @@ using levelset::InvalidInput;
 constexpr std::uint32_t kExrMagic = 20000630;
 constexpr std::uint32_t kManyParts = 0x1000;
 constexpr std::size_t kLongestName = 255;
-constexpr std::size_t kMostAttributeBytes = 1 << 24;  // of one; a preview picture is the largest
-/// ZIP packs about 1000 to 1 at best; a header that promises far more than the file holds is
+constexpr std::size_t kMostAttributeBytes =
+    1 << 24;  // largest attribute, bytes; the largest one in use is a preview picture
+/// ZIP compresses by a factor of at most about 1000. A header that announces far more than that is
 /// damaged.
 constexpr double kMaxCompression = 5000;
-/// Of one chunk, by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
+/// Lines in a chunk by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
 constexpr std::array<double, 10> kChunkLines = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
 constexpr std::size_t kZip = 3;
-/// Of one chunk, under any compression; the file holds a number of 8 bytes for each chunk.
+/// Largest number of lines in a chunk for any compression. The file stores a number of 8 bytes for
+/// each chunk.
 constexpr double kMostLines = 256;
 constexpr double kChunkBytes = 8;
 
@@ -46,7 +48,7 @@ const std::map<std::string, std::size_t> kSizes = {
     {"v2f", 8},         {"v2i", 8},      {"v3d", 24},
     {"v3f", 12},        {"v3i", 12},     {"deepImageState", 1}};
 
-/// Walks through a file, of which only the headers are read.
+/// Reads the headers of a file without the pixels.
 class ExrHeaderReader {
  public:
   ExrHeaderReader(const std::filesystem::path& path, std::size_t maxMemory)
@@ -57,21 +59,21 @@ class ExrHeaderReader {
         fileBytes_(static_cast<double>(left_)) {}
 
   void check() {
-    if (number() != kExrMagic) refuse("it begins otherwise");
+    if (number() != kExrMagic) refuse("its first bytes are not those of an EXR");
     const bool hasManyParts = (number() & kManyParts) != 0;
     while (checkPart() && hasManyParts) {
     }
   }
 
  private:
-  /// What one header tells of its pixels.
+  /// Pixel layout from one header.
   struct Part {
     double width = 0, height = 0, channels = 0;
-    double tileWidth = 0, tileHeight = 0;  // 0: rows
-    std::size_t compression = kZip;        // what OpenEXR takes where none is told
+    double tileWidth = 0, tileHeight = 0;  // 0: scan lines
+    std::size_t compression = kZip;        // OpenEXR's default
   };
 
-  /// @return false at the empty header that ends those of a file of many parts
+  /// Returns false at the empty header that ends the list of headers in a multi-part file.
   bool checkPart() {
     Part part;
     bool isEmpty = true;
@@ -104,10 +106,10 @@ class ExrHeaderReader {
     };
     part.width = corner(2) - corner(0) + 1;
     part.height = corner(3) - corner(1) + 1;
-    constexpr double kFarthest = 1 << 30;  // sums of these stay within 32 bits
+    constexpr double kFarthest = 1 << 30;  // sums of two such numbers fit into 32 bits
     for (std::size_t i = 0; i < 4; ++i)
       if (std::abs(corner(i)) > kFarthest)
-        refuse(fmt::format("its window reaches to {:.0f}", corner(i)));
+        refuse(fmt::format("its data window extends to {:.0f}", corner(i)));
   }
 
   void readTiles(const std::string& value, Part& part) const {
@@ -116,7 +118,7 @@ class ExrHeaderReader {
     if (part.tileWidth < 1 || part.tileHeight < 1) refuse("its tiles are empty");
   }
 
-  /// A name, and 16 bytes; an empty name behind the last.
+  /// Counts the channels: a name and 16 bytes each; an empty name ends the list.
   [[nodiscard]] double channelCount(const std::string& value) const {
     double count = 0;
     std::size_t at = 0;
@@ -125,12 +127,12 @@ class ExrHeaderReader {
       if (end == std::string::npos || end - at >= kLongestName) break;
       at = end + 1 + 16;
     }
-    if (at + 1 != value.size() || value[at] != '\0') refuse("its list of channels does not end");
+    if (at + 1 != value.size() || value[at] != '\0') refuse("its list of channels has no end");
     return count;
   }
 
-  /// OpenEXR reads what a type says, whatever the size, and what comes behind is taken for the next
-  /// attribute.
+  /// Checks the size of an attribute. OpenEXR reads as many bytes as the type requires, whatever
+  /// the stated size, and then takes the rest for the next attribute.
   void checkSize(const std::string& name, const std::string& type, const std::string& value) const {
     const auto known = kSizes.find(type);
     bool isRight = known == kSizes.end() || known->second == value.size();
@@ -148,7 +150,7 @@ class ExrHeaderReader {
     }
     if (type == "floatvector") isRight = value.size() % 4 == 0;
     if (!isRight)
-      refuse(fmt::format("its attribute '{}' has {} bytes, and is said to be a {}", name,
+      refuse(fmt::format("its attribute '{}' has {} bytes, the wrong size for its type {}", name,
                          value.size(), type));
   }
 
@@ -158,17 +160,17 @@ class ExrHeaderReader {
     if (!(pixels <= kMaxPixels)) {
       throw levelset::ResourceLimit(
           fmt::format("read image: {} has {:.0f}x{:.0f} pixels, which "
-                      "passes the limit of {:.0f} pixels",
+                      "exceeds the limit of {:.0f} pixels",
                       name_, part.width, part.height, kMaxPixels));
     }
     if (pixels * std::max(1.0, part.channels) * 2 > fileBytes_ * kMaxCompression) {
       throw InvalidInput(
-          fmt::format("read image: {} promises {:.0f}x{:.0f} pixels in {:.0f} channels, "
+          fmt::format("read image: {} announces {:.0f}x{:.0f} pixels in {:.0f} channels, "
                       "more than its {:.0f} bytes can hold; copy it again",
                       name_, part.width, part.height, part.channels, fileBytes_));
     }
     if (part.tileWidth > 0) {
-      // A tile is held whole, however little of it lies in the picture.
+      // OpenEXR stores entire tiles, also where only a part lies in the picture.
       if (part.tileWidth > 2 * part.width + 64 || part.tileHeight > 2 * part.height + 64)
         refuse(fmt::format("it has tiles of {:.0f}x{:.0f} for {:.0f}x{:.0f} pixels", part.tileWidth,
                            part.tileHeight, part.width, part.height));
@@ -181,27 +183,28 @@ class ExrHeaderReader {
     }
   }
 
-  /// A chunk is held packed and unpacked, as large as it may be, however few lines there are.
+  /// Checks the memory of a chunk. OpenEXR holds a chunk both packed and unpacked, at full size
+  /// even when it has few lines.
   void requireChunkMemory(const Part& part, double pixels) const {
     const double bytes = 2 * 4 * pixels * part.channels;
     if (bytes <= maxMemory_) return;
     throw levelset::ResourceLimit(
-        fmt::format("read image: {} has chunks of {:.3g} MB, which pass the limit of {:.3g} MB; "
+        fmt::format("read image: {} has chunks of {:.3g} MB, which exceed the limit of {:.3g} MB; "
                     "raise --max-memory",
                     name_, bytes * 1e-6, maxMemory_ * 1e-6));
   }
 
   void requireChunks(double count) const {
-    if (count * kChunkBytes > fileBytes_) refuse(fmt::format("it promises {:.0f} chunks", count));
+    if (count * kChunkBytes > fileBytes_) refuse(fmt::format("it announces {:.0f} chunks", count));
   }
 
   // === Bytes
 
   std::string bytes(std::size_t count) {
-    if (count > left_) refuse("it ends within its header");
+    if (count > left_) refuse("the file ends within the header");
     std::string result(count, '\0');
     in_.read(result.data(), static_cast<std::streamsize>(count));
-    if (!in_) refuse("it ends within its header");
+    if (!in_) refuse("the file ends within the header");
     left_ -= count;
     return result;
   }
@@ -210,7 +213,7 @@ class ExrHeaderReader {
     std::string result;
     for (char c = bytes(1)[0]; c != '\0'; c = bytes(1)[0]) {
       result += c;
-      if (result.size() >= kLongestName) refuse("a name in its header does not end");
+      if (result.size() >= kLongestName) refuse("a name in its header has no end");
     }
     return result;
   }
@@ -223,7 +226,7 @@ class ExrHeaderReader {
   }
   [[noreturn]] void refuse(const std::string& what) const {
     throw InvalidInput(
-        fmt::format("read image: {} is no readable EXR image: {}; copy it again", name_, what));
+        fmt::format("read image: {} is not a readable EXR image: {}; copy it again", name_, what));
   }
 
   std::string name_;

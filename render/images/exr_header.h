@@ -3,15 +3,15 @@
 #include <cstddef>
 #include <filesystem>
 
-// Private to render: OpenEXR takes memory for whatever sizes a file claims.
+// Private to render. Needed because OpenEXR allocates memory for any size that a file claims.
 
 namespace render {
 
-/// Looks at the headers of an EXR file before OpenEXR does: every attribute must lie within the
-/// file, and what tables and pixels they promise must be such as a file of its size can hold.
-/// @throws levelset::InvalidInput for a file that is none or damaged
-/// @param maxMemory  bytes that OpenEXR may take for a chunk
-/// @throws levelset::ResourceLimit for more than kMaxPixels, or a chunk that is larger
+/// Checks the headers of an EXR file before OpenEXR reads it. Every attribute must lie within the
+/// file. The tables and pixels that it announces must fit the size of the file.
+/// @param maxMemory  limit on OpenEXR's memory for one chunk, bytes
+/// @throws levelset::InvalidInput when the file is not an EXR or is damaged
+/// @throws levelset::ResourceLimit for more than kMaxPixels pixels, or a chunk above the limit
 void checkExrHeader(const std::filesystem::path& path, std::size_t maxMemory);
 
 }  // namespace render

@@ -21,7 +21,8 @@ using levelset::IoError;
 
 constexpr const char* kReadGrey = "read image";
 
-/// libpng leaves a call by longjmp, past destructors: what it needs lives out here.
+/// libpng returns from errors by longjmp, which skips destructors. So its state is held here,
+/// outside the functions that call it.
 struct PngReader {
   png_structp png = nullptr;
   png_infop info = nullptr;
@@ -35,7 +36,7 @@ struct PngReader {
   PngReader(const PngReader&) = delete;
   PngReader& operator=(const PngReader&) = delete;
 
-  /// Everything up to the rows. @return false, with `error`, when the file is not as it should be
+  /// Reads everything before the rows. Returns false and sets `error` when the file is damaged.
   bool readHeader(std::FILE* file) {
     if (setjmp(png_jmpbuf(png))) return false;
     png_init_io(png, file);
@@ -43,7 +44,8 @@ struct PngReader {
     return true;
   }
 
-  /// Rows of 16 bits, or 8 where the file has no more, with alpha where it has some.
+  /// Prepares rows of 16 bits, or of 8 bits for a file with at most 8, with alpha if the file has
+  /// it.
   bool prepare() {
     if (setjmp(png_jmpbuf(png))) return false;
     if (png_get_bit_depth(png, info) < 8) png_set_expand_gray_1_2_4_to_8(png);
@@ -69,10 +71,10 @@ struct PngReader {
 };
 
 [[noreturn]] void refuseDamaged(const std::string& name, const std::string& why) {
-  throw InvalidInput(fmt::format("{}: {} is no whole PNG image: {}", kReadGrey, name, why));
+  throw InvalidInput(fmt::format("{}: {} is not a complete PNG image: {}", kReadGrey, name, why));
 }
 
-/// Of 8 or 16 bits, the larger byte first.
+/// Sample of 8 or 16 bits; the high byte is first.
 double sampleAt(const png_byte* row, std::size_t index, bool isDeep) {
   if (!isDeep) return row[index] / 255.0;
   return (row[2 * index] * 256 + row[2 * index + 1]) / 65535.0;
@@ -83,9 +85,10 @@ double sampleAt(const png_byte* row, std::size_t index, bool isDeep) {
 void requirePngChunks(const std::filesystem::path& path) {
   std::error_code failed;
   const std::uintmax_t size = std::filesystem::file_size(path, failed);
-  if (failed) return;  // a pipe, which is read once only
+  if (failed) return;  // a pipe, which can be read only once
   std::ifstream in(path, std::ios::binary);
-  constexpr std::uintmax_t kSignature = 8, kAround = 12;  // a length, a type and a checksum
+  constexpr std::uintmax_t kSignature = 8,
+                           kAround = 12;  // bytes of a chunk's length, type and checksum
   for (std::uintmax_t at = kSignature; at + kAround <= size;) {
     unsigned char length[4] = {};
     in.seekg(static_cast<std::streamoff>(at));
@@ -94,18 +97,19 @@ void requirePngChunks(const std::filesystem::path& path) {
                                  static_cast<std::uintmax_t>(length[1]) << 16 |
                                  static_cast<std::uintmax_t>(length[2]) << 8 | length[3];
     if (!in || bytes > size - at - kAround)
-      refuseDamaged(path.string(), fmt::format("it is cut off behind byte {}", at));
+      refuseDamaged(path.string(), fmt::format("it ends after byte {}", at));
     at += kAround + bytes;
   }
 }
 
 void requirePngPixels(const std::filesystem::path& path, double width, double height) {
-  constexpr double kMostPerByte = 8 * 1040;  // deflate packs 1032 to 1 at best, pixels of one bit
+  constexpr double kMostPerByte =
+      8 * 1040;  // deflate packs at most 1032 to 1, and a byte holds 8 pixels of one bit
   std::error_code failed;
   const auto bytes = static_cast<double>(std::filesystem::file_size(path, failed));
   if (failed || width * height <= bytes * kMostPerByte) return;
   throw InvalidInput(
-      fmt::format("{}: {} promises {}x{} pixels, more than its {} bytes can hold; copy it again",
+      fmt::format("{}: {} announces {}x{} pixels, more than its {} bytes can hold; copy it again",
                   kReadGrey, path.string(), width, height, bytes));
 }
 
@@ -121,14 +125,15 @@ GreyImage readGreyPng(const std::filesystem::path& path, std::size_t maxMemory) 
   }
   PngReader reader;
   if (!reader.png || !reader.info)
-    throw levelset::ResourceLimit(fmt::format("{}: no memory to begin with {}", kReadGrey, name));
+    throw levelset::ResourceLimit(fmt::format("{}: no memory left to read {}", kReadGrey, name));
   requirePngChunks(path);
   if (!reader.readHeader(file.get())) refuseDamaged(name, reader.error);
   const auto width = static_cast<std::size_t>(png_get_image_width(reader.png, reader.info)),
              height = static_cast<std::size_t>(png_get_image_height(reader.png, reader.info));
   if (png_get_color_type(reader.png, reader.info) & PNG_COLOR_MASK_COLOR) {
-    throw InvalidInput(fmt::format(
-        "{}: {} has colours, of which none tells a height; convert it to grey", kReadGrey, name));
+    throw InvalidInput(
+        fmt::format("{}: {} is a colour picture, but heights need grey values; convert it to grey",
+                    kReadGrey, name));
   }
   requirePngPixels(path, static_cast<double>(width), static_cast<double>(height));
   if (!reader.prepare()) refuseDamaged(name, reader.error);

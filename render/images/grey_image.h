@@ -8,26 +8,28 @@
 
 namespace render {
 
-/// A grey picture as numbers, without any curve of tones.
+/// A grey picture as numbers, without a tone curve.
 struct GreyImage {
   int width = 0, height = 0;
-  std::vector<double> values;  ///< height × width, 0 (black) … 1 (white), the first row on top
-  std::vector<double> alpha;   ///< of the same size, 0 … 1; empty: all is opaque
+  std::vector<double> values;  ///< height × width, 0 (black) … 1 (white), top row first
+  std::vector<double> alpha;   ///< same size, 0 … 1; empty: opaque
 };
 
 /// Reads a PNG of 1 to 16 bits, with or without alpha or a transparent grey.
-/// @throws IoError when it cannot be read; InvalidInput for what is no PNG, is damaged, promises
-///         more than its bytes can hold, or has colours; ResourceLimit, before it allocates, for
-///         one that passes `maxMemory`
+/// @throws IoError when the file cannot be read
+/// @throws InvalidInput when it is not a PNG, is damaged, announces more pixels than its bytes can
+///         hold, or has colours
+/// @throws ResourceLimit, before memory is allocated, for a picture that exceeds `maxMemory`
 [[nodiscard]] GreyImage readGreyPng(const std::filesystem::path& path,
                                     std::size_t maxMemory = levelset::kNoMemoryLimit);
 
-/// Throws InvalidInput for a PNG whose chunks reach beyond the file: libpng takes memory for what
-/// they claim.
+/// Checks that the chunks of a PNG lie within the file, because libpng allocates memory for any
+/// chunk size that a file claims.
+/// @throws InvalidInput for a chunk beyond the end of the file
 void requirePngChunks(const std::filesystem::path& path);
 
-/// Throws InvalidInput for a PNG of more pixels than a file of its size can hold, before memory is
-/// taken for them.
+/// Checks the size of a PNG before memory is allocated for its pixels.
+/// @throws InvalidInput for more pixels than a file of its size can hold
 void requirePngPixels(const std::filesystem::path& path, double width, double height);
 
 }  // namespace render

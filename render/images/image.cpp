@@ -31,8 +31,8 @@ namespace {
 using levelset::InvalidInput;
 using levelset::IoError;
 
-// === Bytes in memory: EXR files are written with seeks, pipes cannot; and every error of the disk
-// shows in one place.
+// === Bytes in memory. EXR files are written with seeks, which pipes do not support. Besides, all
+// disk errors then occur in one place.
 
 class MemoryStream : public Imf::OStream {
  public:
@@ -55,7 +55,7 @@ class MemoryStream : public Imf::OStream {
 void writeBytes(const std::filesystem::path& path, const std::vector<char>& bytes) {
   levelset::FileTarget target(path);
   const auto fail = [&] {
-    throw IoError(fmt::format("write image: {}: {}; free some space or choose another place",
+    throw IoError(fmt::format("write image: {}: {}; free some space or choose another folder",
                               path.string(), std::strerror(errno)));
   };
   std::FILE* file = std::fopen(target.path().c_str(), "wb");
@@ -72,8 +72,9 @@ void writeBytes(const std::filesystem::path& path, const std::vector<char>& byte
 
 void requireWhole(const Image& image) {
   if (image.width <= 0 || image.height <= 0) {
-    throw InvalidInput(fmt::format("write image: it has {}x{} pixels; an image needs at least one",
-                                   image.width, image.height));
+    throw InvalidInput(
+        fmt::format("write image: the image has {}x{} pixels, but needs at least one", image.width,
+                    image.height));
   }
   const auto check = [&](const std::string& name, std::size_t size) {
     if (size == image.pixelCount()) return;
@@ -127,7 +128,8 @@ std::vector<char> encodeExr(const Image& image) {
 
 // === PNG
 
-/// Linear up to the knee, then a smooth approach to 1, so that highlights do not clip; sRGB after.
+/// Tone curve: linear up to the knee, then a smooth approach to 1, so that highlights do not clip;
+/// then sRGB.
 double toneCurve(double linear) {
   constexpr double kKnee = 0.6;
   if (!(linear > 0)) return 0;
@@ -150,7 +152,7 @@ std::vector<char> encodePng(int width, int height, const std::vector<std::uint8_
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
   std::vector<char> bytes(size);
   if (!png_image_write_to_memory(&png, bytes.data(), &size, 0, pixels.data(), 0, nullptr))
-    throw IoError(fmt::format("write image: PNG cannot hold it: {}", png.message));
+    throw IoError(fmt::format("write image: the image cannot be encoded as PNG: {}", png.message));
   bytes.resize(size);
   return bytes;
 }
@@ -160,7 +162,7 @@ std::vector<char> encodePng(int width, int height, const std::vector<std::uint8_
 Image readOpenExr(Imf::InputFile& file, const std::string& name, std::size_t maxMemory) {
   const Imf::Header& header = file.header();
   const Imath::Box2i window = header.dataWindow();
-  // checkExrHeader() has seen to it that these are small enough.
+  // checkExrHeader() has checked that these are small enough.
   const int width = window.max.x - window.min.x + 1, height = window.max.y - window.min.y + 1;
   double channelCount = 0;
   for (auto it = header.channels().begin(); it != header.channels().end(); ++it) ++channelCount;
@@ -251,10 +253,10 @@ void writePng(const std::filesystem::path& path, int width, int height,
 void writeImage(const std::filesystem::path& path, const Image& image, const std::string& format) {
   const std::string kind = imageFormat(path, format);
   if (kind.empty()) {
-    throw levelset::UsageError(
-        fmt::format("write image: {} names no format we write; end it in .exr or .png, or give the "
-                    "format",
-                    path.string()));
+    throw levelset::UsageError(fmt::format(
+        "write image: {} has no supported format; use the extension .exr or .png, or give the "
+        "format",
+        path.string()));
   }
   requireWhole(image);
   std::vector<char> bytes;
@@ -264,7 +266,7 @@ void writeImage(const std::filesystem::path& path, const Image& image, const std
     throw;
   } catch (const std::bad_alloc&) {
     throw;
-  } catch (const std::exception& error) {  // OpenEXR's own
+  } catch (const std::exception& error) {  // an exception of OpenEXR
     throw IoError(fmt::format("write image: {}: {}", path.string(), error.what()));
   }
   writeBytes(path, bytes);
@@ -290,7 +292,7 @@ Image readExr(const std::filesystem::path& path, std::size_t maxMemory) {
     throw levelset::ResourceLimit(fmt::format("read image: {} does not fit in memory", name));
   } catch (const std::exception& error) {
     throw InvalidInput(
-        fmt::format("read image: {} is no readable EXR image: {}", name, error.what()));
+        fmt::format("read image: {} is not a readable EXR image: {}", name, error.what()));
   }
 }
 

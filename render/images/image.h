@@ -9,21 +9,22 @@
 
 #include "levelset/progress.h"
 
-/// Images with named channels, written as EXR (all channels) or PNG (R G B A through a tone curve).
-/// Colour is linear with premultiplied alpha, as OpenEXR has it.
+/// Images with named channels. They are written as EXR (all channels) or PNG (R G B A through a
+/// tone curve). As in OpenEXR, colour is linear with premultiplied alpha.
 namespace render {
 
-/// Diagonal of the box of what is drawn, world units: what positions in single precision are
-/// relative to.
+/// Name of the header attribute with the diagonal of the scene's bounding box, world units. The
+/// error of single-precision positions is relative to it.
 inline constexpr const char* kExtentAttribute = "ls:extent";
 
+/// An image with named channels.
 struct Image {
   int width = 0, height = 0;  ///< pixels
-  /// Each width × height, row major, top row first.
+  /// Width × height values each, row by row, top row first.
   std::map<std::string, std::vector<float>> channels;
   std::map<std::string, std::vector<std::uint32_t>> ids;  ///< UINT channels
   std::map<std::string, std::string> attributes;          ///< written to the EXR header as strings
-  std::map<std::string, std::vector<float>> matrices;     ///< 16 floats, by rows: M44f attributes
+  std::map<std::string, std::vector<float>> matrices;  ///< 16 floats each, by rows: M44f attributes
 
   Image() = default;
   Image(int width_, int height_) : width(width_), height(height_) {}
@@ -33,37 +34,44 @@ struct Image {
   std::vector<float>& addChannel(const std::string& name, float fill = 0);
 };
 
-/// "exr" or "png" by `format` or the extension of `path`, in any case; empty for others.
+/// Returns "exr" or "png", from `format` or else from the extension of `path`, in upper or lower
+/// case. Empty for other formats.
 [[nodiscard]] std::string imageFormat(const std::filesystem::path& path,
                                       const std::string& format = {});
 
-/// Writes beside the target and renames when whole; the bytes depend on the image alone.
-/// EXR: every channel, 32 bits, ZIP, no date. PNG: R G B (and A, opaque without one), 8 bits: alpha
-/// is divided out, a shoulder bends what is above 0.6 towards 1, then the sRGB curve.
+/// Writes an image. It is written to a temporary file beside the target, which is then renamed. The
+/// bytes depend on the image alone.
+///
+/// EXR: all channels, 32 bits, ZIP compression, no date. PNG: R G B A, 8 bits, opaque without a
+/// channel A. Alpha is divided out, values above 0.6 are compressed towards 1, and the sRGB curve
+/// is applied.
 /// @param format  "exr" or "png"; empty: by the extension of `path`
 /// @throws levelset::UsageError for another format, or a PNG of an image without R G B
 /// @throws levelset::InvalidInput for an image whose channels do not fit its size
-/// @throws levelset::IoError when it cannot be written
+/// @throws levelset::IoError when the file cannot be written
 void writeImage(const std::filesystem::path& path, const Image& image,
                 const std::string& format = {});
 
-/// What a PNG shows of an image: red, green, blue and alpha of 8 bits for each pixel, as above.
+/// Computes the pixels of the PNG of an image: red, green, blue and alpha of 8 bits each, as in
+/// writeImage().
 /// @throws levelset::UsageError for an image without R G B
 [[nodiscard]] std::vector<std::uint8_t> displayColours(const Image& image);
 
-/// The bytes of the PNG that writeImage() writes.
-/// @throws levelset::UsageError for an image without R G B; InvalidInput as writeImage()
+/// Encodes the PNG that writeImage() writes.
+/// @throws levelset::UsageError for an image without R G B
+/// @throws levelset::InvalidInput as writeImage()
 [[nodiscard]] std::vector<char> pngBytes(const Image& image);
 
-/// Writes such colours as they are, likewise. @pre four for each pixel, at least one pixel
-/// @throws levelset::IoError when it cannot be written
+/// Writes display colours to a PNG file.
+/// @pre `colours` has four bytes for each pixel, and there is at least one pixel
+/// @throws levelset::IoError when the file cannot be written
 void writePng(const std::filesystem::path& path, int width, int height,
               const std::vector<std::uint8_t>& colours);
 
-/// Reads channels of 16 or 32 bits of the first part, string and M44f attributes.
+/// Reads the first part of an EXR file: channels of 16 or 32 bits, string and M44f attributes.
 /// @throws levelset::IoError when the file cannot be opened
-/// @throws levelset::InvalidInput when it is no EXR, damaged, or subsampled
-/// @throws levelset::ResourceLimit for more than 2^28 pixels, or what passes `maxMemory`
+/// @throws levelset::InvalidInput when it is not an EXR, is damaged, or is subsampled
+/// @throws levelset::ResourceLimit for more than 2^28 pixels, or above `maxMemory`
 [[nodiscard]] Image readExr(const std::filesystem::path& path,
                             std::size_t maxMemory = levelset::kNoMemoryLimit);
 

@@ -69,8 +69,8 @@ Shifts shiftsOf(const openvdb::FloatTree& before, const openvdb::FloatTree& afte
       });
 }
 
-/// So that the largest value is one that is held, and a band stays as wide as it is; but for the
-/// last bit of it where no step does that.
+/// Step for which the largest value is a quantized value, so that the half width does not change.
+/// If rounding prevents this, the last bit may differ.
 float stepOf(float largest, int bits) {
   const float last = static_cast<float>(1 << (bits - 1)) - 0.5f;
   const float step = largest / last;
@@ -91,12 +91,14 @@ float ValueBits::valueOf(int code) const {
   return fromZero * step;
 }
 
-CoarseBand coarsened(const levelset::NarrowBand& band, int bits) {
-  CoarseBand result{.band = band, .held = {.bits = bits}, .shift = {}};
+QuantizedBand quantized(const levelset::NarrowBand& band, int bits) {
+  QuantizedBand result{.band = band, .quantization = {.bits = bits}, .shift = {}};
   const openvdb::FloatTree& before = levelset::vdb(band).tree();
-  result.held.step = stepOf(largestOf(before), bits);
+  result.quantization.step = stepOf(largestOf(before), bits);
   openvdb::FloatTree& after = levelset::editVdb(result.band).tree();
-  const auto held = [&](float value) { return result.held.valueOf(result.held.codeOf(value)); };
+  const auto held = [&](float value) {
+    return result.quantization.valueOf(result.quantization.codeOf(value));
+  };
   openvdb::tools::changeBackground(after, held(before.background()));
   openvdb::tree::LeafManager<openvdb::FloatTree>(after).foreach ([&](Leaf& leaf, std::size_t) {
     for (auto value = leaf.beginValueAll(); value; ++value) value.setValue(held(*value));

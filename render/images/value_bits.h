@@ -4,32 +4,34 @@
 
 namespace render {
 
-/// Values held in few bits, evenly between −φ and φ of the largest in magnitude. There is no zero
-/// among them, and none changes its sign, so the cells that the surface crosses stay the same.
+/// Quantization of values to few bits: evenly spaced between minus and plus the largest magnitude.
+/// Zero is not among the quantized values and no value changes its sign, so the surface crosses the
+/// same cells.
 struct ValueBits {
-  int bits = 32;   ///< 8 or 16; 32: single precision, untouched
-  float step = 0;  ///< between two values next to each other, in the band's unit
+  int bits = 32;   ///< 8 or 16; 32: single precision, not quantized
+  float step = 0;  ///< difference of consecutive values, in the band's unit
 
-  /// Number of the value next to one that is at most as large as the largest.
+  /// Code of the nearest quantized value. The magnitude of `value` is at most the largest one.
   [[nodiscard]] int codeOf(float value) const;
-  /// As the kernel takes it.
+  /// Value of a code, as the kernel computes it.
   [[nodiscard]] float valueOf(int code) const;
   [[nodiscard]] bool operator==(const ValueBits&) const = default;
 };
 
-/// How far a surface moved, voxels: measured where it crosses the grid's edges.
+/// Displacement of a surface, voxels, measured at its crossings with grid edges.
 struct SurfaceShift {
   double largest = 0, rms = 0;
 };
 
-struct CoarseBand {
-  levelset::NarrowBand band;  ///< of values that `held` has
-  ValueBits held;
+/// A band with quantized values.
+struct QuantizedBand {
+  levelset::NarrowBand band;  ///< values are multiples of the quantization
+  ValueBits quantization;
   SurfaceShift shift;
 };
 
-/// A band in fewer bits. @param bits  8 or 16
+/// Quantizes the values of a band. @param bits  8 or 16
 /// @pre the band is not empty
-[[nodiscard]] CoarseBand coarsened(const levelset::NarrowBand& band, int bits);
+[[nodiscard]] QuantizedBand quantized(const levelset::NarrowBand& band, int bits);
 
 }  // namespace render

@@ -15,7 +15,7 @@ FrustumCulling::FrustumCulling(const Scene& scene, const RenderOptions& options,
                                const Imath::Box3d& bounds) {
   const Camera& camera = scene.camera;
   const bool isLit = usesLights(options.style.style);
-  // Rays through an expression go on to where they leave the last solid, in all directions.
+  // With an expression, occlusion rays continue to the exit from the last solid, in all directions.
   if (isLit && options.ambientSamples > 0 && !scene.csg.isEmpty()) return;
 
   const V3d axis = camera.axis();
@@ -35,38 +35,42 @@ FrustumCulling::FrustumCulling(const Scene& scene, const RenderOptions& options,
     for (const double side : {-1.0, 1.0}) {
       if (camera.orthoHeight)
         add(camera.from + edge * side, edge * -side);
-      else  // edge is where the frame ends at a distance of 1
+      else  // `edge` is the edge of the frame at distance 1
         add(camera.from, axis * edge.length() - edge * (side / edge.length()));
     }
   if (!isLit) return;
-  // Shader starts them at twice the error of the surface that was hit. Three second differences of
-  // values up to the half width are twelve of these at most, over eight.
+  // Shader starts light rays at twice the surface error of the hit. That error is at most three
+  // second differences over 8. Second differences of values up to the half width sum to at most 12
+  // half widths.
   for (const Solid& solid : scene.solids)
     if (!solid.band.isEmpty())
       margin_ = std::max(margin_, (3.1 * solid.band.halfWidth() + 0.1) * solid.band.voxelSize());
-  // Of meshes by what single precision makes of their size; and its own share of the whole.
+  // The rest covers the surface error of meshes, which is single-precision rounding relative to
+  // their size, and the rounding of this test itself.
   margin_ += 1e-5 * bounds.size().length();
-  if (options.ambientSamples > 0) skyReach_ = skyReach(bounds.size().length());
+  if (options.ambientSamples > 0) occlusionDistance_ = occlusionDistance(bounds.size().length());
   hasShadows_ = options.shadowSamples > 0;
   towardsKey_ = keyDirection(scene);
   spread_ = scene.key.softness < std::numbers::pi / 2 ? std::tan(scene.key.softness)
                                                       : std::numeric_limits<double>::infinity();
 }
 
-bool FrustumCulling::needs(const V3d& centre, double radius) const {
+bool FrustumCulling::keeps(const V3d& centre, double radius) const {
   const auto isSeen = [&](double around) {
     return std::all_of(planes_.begin(), planes_.end(), [&](const Plane& plane) {
       return plane.normal.dot(centre) - plane.offset >= -around;
     });
   };
-  if (isSeen(radius + margin_ + skyReach_)) return true;
+  if (isSeen(radius + margin_ + occlusionDistance_)) return true;
   if (!hasShadows_) return false;
-  // From the ball away from the light, in a cone that widens: is any of it in the frame? The part
-  // of the way that is before each plane is an interval.
+  // A cone that widens opens from the ball, away from the light. Test if it intersects the frustum:
+  // the part of its axis in front of each plane is an interval.
   double from = 0, to = std::numeric_limits<double>::infinity();
   for (const Plane& plane : planes_) {
     const double room = plane.normal.dot(centre) - plane.offset + radius + margin_;
-    const double slope = spread_ - plane.normal.dot(towardsKey_);  // of room, by the way
+    const double slope =
+        spread_ -
+        plane.normal.dot(towardsKey_);  // change of `room` per unit of length along the axis
     if (slope > 0)
       from = std::max(from, -room / slope);
     else if (slope < 0)

@@ -17,11 +17,12 @@ namespace {
 using Imath::M44d;
 using Imath::V3d;
 
-constexpr double kBesideBox = 0.0625;  // lest rounding loses a crossing on a face of the box
+constexpr double kBesideBox =
+    0.0625;  // padding, so that rounding does not lose a crossing on a face of the box
 constexpr double kParallel = 1e30;
 constexpr std::size_t kRaysAtOnce = 1u << 18;
 
-/// A box that holds all cells that the surface may cross, world units.
+/// A box that contains all cells that the surface may cross, world units.
 Imath::Box3d leafBox(const levelset::NarrowBand& band) {
   openvdb::CoordBBox leaves;
   if (band.isEmpty() || !levelset::vdb(band).tree().evalLeafBoundingBox(leaves)) return {};
@@ -31,13 +32,13 @@ Imath::Box3d leafBox(const levelset::NarrowBand& band) {
                           band.indexToWorld());
 }
 
-/// A part of a ray, by its parameter.
+/// An interval of a ray's parameter.
 struct Span {
   double enter, leave;
 };
 
-Span clipped(const BrickPool& pool, const V3d& origin, const V3d& direction, double reach) {
-  Span span{0, reach};
+Span clipped(const BrickPool& pool, const V3d& origin, const V3d& direction, double maxDistance) {
+  Span span{0, maxDistance};
   for (int a = 0; a < 3; ++a) {
     const auto i = static_cast<std::size_t>(a);
     const double inverse = std::abs(direction[a]) < 1 / kParallel ? kParallel : 1 / direction[a];
@@ -49,14 +50,14 @@ Span clipped(const BrickPool& pool, const V3d& origin, const V3d& direction, dou
   return span;
 }
 
-/// Rays of a list that come near a solid, as its kernel takes them.
+/// Rays of a list that pass near a solid, as input of its kernel.
 struct PackedRays {
-  std::vector<std::size_t> number;  // in the list
-  std::vector<double> enter;        // where they start, voxels along the ray
+  std::vector<std::size_t> number;  // number in the list
+  std::vector<double> enter;        // start, voxels along the ray
   RayBlock block{0};
 
-  /// @param asked   numbers of the rays
-  /// @param hasEnd  do they end at their reach, or go on as far as there is surface?
+  /// @param asked  numbers of the rays
+  /// @param hasEnd  rays end at their maxDistance; false: they continue to the last surface
   PackedRays(const KernelSolid& solid, const std::vector<LightRay>& rays,
              const std::vector<std::size_t>& asked, bool hasEnd) {
     struct Ready {
@@ -65,12 +66,12 @@ struct PackedRays {
     };
     std::vector<Ready> ready;
     for (const std::size_t i : asked) {
-      // A step of t is a voxel, so that single precision suits whatever the unit is.
+      // A unit of t is one voxel, so that single precision suffices for any length unit.
       V3d origin, direction;
       solid.worldToTable.multVecMatrix(rays[i].origin, origin);
       solid.worldToTable.multDirMatrix(rays[i].direction * solid.voxelSize, direction);
-      const double reach = hasEnd ? rays[i].reach / solid.voxelSize : kParallel;
-      const Span span = clipped(solid.pool, origin, direction, reach);
+      const double maxDistance = hasEnd ? rays[i].maxDistance / solid.voxelSize : kParallel;
+      const Span span = clipped(solid.pool, origin, direction, maxDistance);
       if (!(span.enter <= span.leave)) continue;
       ready.push_back({origin + direction * span.enter, direction, span});
       number.push_back(i);
@@ -113,7 +114,8 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     bounds_ = tableBounds_ = scene.bounds();
     return;
   }
-  // A block for each leaf; those the surface does not cross are built and dropped.
+  // The estimate counts a block for each leaf. Blocks that the surface does not cross are built and
+  // then dropped.
   double leaves = 0;
   Imath::Box3d box = meshes_.bounds();
   for (const Solid& solid : scene.solids) {
@@ -121,27 +123,27 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     leaves += static_cast<double>(levelset::vdb(solid.band).tree().leafCount());
     box.extendBy(leafBox(solid.band));
   }
-  // And a copy of the leaves where the spline's coefficients are made of the values.
+  // With BSplineQi the leaves are copied for the spline's coefficients.
   const double kCopies = options.filter == Filter::BSplineQi ? 4 * 512 : 0;
   const double kBytesOfBlock = 2 * 4 * (BrickPool::kValues + BrickPool::kMaskWords) + kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes, "render");
-  const FrustumCulling need =
+  const FrustumCulling culling =
       isPicture && !box.isEmpty() ? FrustumCulling(scene, options, box) : FrustumCulling();
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
     const Solid& source = scene.solids[i];
     if (source.band.isEmpty() || (!scene.csg.isEmpty() && !scene.csg.uses(i))) continue;
     const M44d toWorld = source.band.indexToWorld();
     KernelSolid solid;
-    TableOptions tables{.filter = options.filter, .held = source.held};
+    TableOptions tables{.filter = options.filter, .quantization = source.quantization};
     if (isPicture)
-      tables.needs = [&](const V3d& centre, double radius) {
-        return need.needs(centre * toWorld, radius * source.band.voxelSize());
+      tables.keeps = [&](const V3d& centre, double radius) {
+        return culling.keeps(centre * toWorld, radius * source.band.voxelSize());
       };
     solid.pool = makeBricks(source.band, tables);
     const BrickPool& pool = solid.pool;
-    counts_.leftOut += pool.blocksLeftOut;
-    counts_.unseen += pool.blocksUnseen;
-    if (pool.brickCount() + pool.blocksUnseen == 0) continue;
+    counts_.omitted += pool.blocksOmitted;
+    counts_.culled += pool.blocksCulled;
+    if (pool.brickCount() + pool.blocksCulled == 0) continue;
     Extent& extent = extents_.emplace_back();
     extent.index = i;
     const V3d origin(pool.origin[0], pool.origin[1], pool.origin[2]);
@@ -153,7 +155,7 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     extent.cells = boxOf(pool.cellsLow, pool.cellsHigh);
     if (pool.brickCount() == 0) continue;
     counts_.crossed += pool.brickCount();
-    counts_.beside += pool.besideCount;
+    counts_.halo += pool.haloCount;
     solid.index = i;
     solid.id = source.id;
     solid.voxelSize = source.band.voxelSize();
@@ -165,12 +167,12 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
   std::vector<int> numbers(scene.solids.size(), -1);
   for (std::size_t s = 0; s < solids_.size(); ++s) numbers[solids_[s].index] = static_cast<int>(s);
   csg_ = scene.csg.renumbered(numbers);
-  look(scene);
+  updateView(scene);
 }
 
-void KernelScene::look(const Scene& scene) {
+void KernelScene::updateView(const Scene& scene) {
   if (fields_) {
-    if (fields_->place(scene)) bounds_ = tableBounds_ = scene.bounds();
+    if (fields_->updateTransforms(scene)) bounds_ = tableBounds_ = scene.bounds();
     return;
   }
   near_ = scene.camera.near;
@@ -199,8 +201,8 @@ std::size_t KernelScene::bytes() const {
 
 PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const {
   if (csg_.isEmpty()) return castFirst(tracer, pixels);
-  PixelWalk walk = walkFrom(pixels);
-  return castOn(tracer, walk);
+  PixelTraversal walk = startTraversal(pixels);
+  return castNext(tracer, walk);
 }
 
 PixelHits KernelScene::castFirst(const KernelTracer& tracer, const PixelBlock& pixels) const {
@@ -223,39 +225,39 @@ PixelHits KernelScene::castFirst(const KernelTracer& tracer, const PixelBlock& p
   return result;
 }
 
-PixelWalk KernelScene::walkFrom(const PixelBlock& pixels) const {
+PixelTraversal KernelScene::startTraversal(const PixelBlock& pixels) const {
   const std::size_t rays = pixels.size();
-  return {pixels, CsgWalk(csg_, solids_.size(), std::vector<double>(rays, far_)),
-          std::vector<PixelWalk::Crossings>(solids_.size(),
-                                            {std::vector<double>(rays), ShapeBlock(rays)})};
+  return {pixels, CsgTraversal(csg_, solids_.size(), std::vector<double>(rays, far_)),
+          std::vector<PixelTraversal::Crossings>(solids_.size(),
+                                                 {std::vector<double>(rays), ShapeBlock(rays)})};
 }
 
-PixelHits KernelScene::castOn(const KernelTracer& tracer, PixelWalk& way) const {
-  auto& [pixels, walk, next] = way;
+PixelHits KernelScene::castNext(const KernelTracer& tracer, PixelTraversal& traversal) const {
+  auto& [pixels, walk, next] = traversal;
   PixelHits result(pixels.size());
   do {
     for (std::size_t s = 0; s < solids_.size(); ++s) {
       const KernelSolid& solid = solids_[s];
-      const std::vector<CsgWalk::Question> questions = walk.questionsAbout(s);
-      if (questions.empty()) continue;
-      PixelBlock asked(questions.size());
-      for (std::size_t n = 0; n < questions.size(); ++n) {
-        asked.x[n] = pixels.x[questions[n].ray];
-        asked.y[n] = pixels.y[questions[n].ray];
-        asked.passing[n] = questions[n].passing;
+      const std::vector<CsgTraversal::Query> queries = walk.queriesFor(s);
+      if (queries.empty()) continue;
+      PixelBlock asked(queries.size());
+      for (std::size_t n = 0; n < queries.size(); ++n) {
+        asked.x[n] = pixels.x[queries[n].ray];
+        asked.y[n] = pixels.y[queries[n].ray];
+        asked.passing[n] = queries[n].passing;
       }
       HitBlock hits(asked.size());
       ShapeBlock shapes(asked.size());
       tracer.trace(solid, asked, hits, shapes);
-      for (std::size_t n = 0; n < questions.size(); ++n) {
+      for (std::size_t n = 0; n < queries.size(); ++n) {
         if (!hits.found[n]) {
-          walk.answerNone(s, questions[n]);
+          walk.answerNone(s, queries[n]);
           continue;
         }
-        const std::size_t ray = questions[n].ray;
+        const std::size_t ray = queries[n].ray;
         next[s].depth[ray] = solid.fan.depthAt(hits.t[n]);
         next[s].shapes.take(ray, shapes, n);
-        walk.answer(s, questions[n], next[s].depth[ray], hits.found[n] == HitBlock::kGoesIn);
+        walk.answer(s, queries[n], next[s].depth[ray], hits.found[n] == HitBlock::kEnters);
       }
     }
   } while (walk.advance());
@@ -265,7 +267,7 @@ PixelHits KernelScene::castOn(const KernelTracer& tracer, PixelWalk& way) const 
     const auto s = static_cast<std::size_t>(met);
     result.solid[i] = met;
     result.depth[i] = next[s].depth[i];
-    result.turned[i] = walk.isTurned(i) ? 1 : 0;
+    result.flipped[i] = walk.isFlipped(i) ? 1 : 0;
     result.shapes.take(i, next[s].shapes, i);
   }
   return result;
@@ -276,7 +278,7 @@ std::vector<double> KernelScene::thickness(const KernelTracer& tracer,
   struct Crossing {
     double depth;
     std::size_t solid;
-    bool goesIn;
+    bool enters;
   };
   std::vector<std::vector<Crossing>> crossings(pixels.size());
   for (std::size_t s = 0; s < solids_.size(); ++s) {
@@ -296,7 +298,7 @@ std::vector<double> KernelScene::thickness(const KernelTracer& tracer,
       for (std::size_t n = 0; n < open.size(); ++n) {
         if (!hits.found[n]) continue;
         crossings[open[n]].push_back(
-            {solids_[s].fan.depthAt(hits.t[n]), s, hits.found[n] == HitBlock::kGoesIn});
+            {solids_[s].fan.depthAt(hits.t[n]), s, hits.found[n] == HitBlock::kEnters});
         rest.push_back(open[n]);
       }
       open = std::move(rest);
@@ -310,15 +312,16 @@ std::vector<double> KernelScene::thickness(const KernelTracer& tracer,
                      [](const Crossing& a, const Crossing& b) { return a.depth < b.depth; });
     std::fill(inside.begin(), inside.end(), 0);
     std::fill(known.begin(), known.end(), 0);
-    for (const Crossing& crossing : all)  // the first of each solid tells where the ray starts
+    for (const Crossing& crossing :
+         all)  // the first crossing of each solid determines the side at the ray's start
       if (!std::exchange(known[crossing.solid], 1))
-        inside[crossing.solid] = crossing.goesIn ? 0 : 1;
+        inside[crossing.solid] = crossing.enters ? 0 : 1;
     double from = near_;
     for (const Crossing& crossing : all) {
       const double to = std::clamp(crossing.depth, near_, far_);
       if (isInside(inside)) lengths[i] += std::max(0.0, to - from);
       from = to;
-      inside[crossing.solid] = crossing.goesIn ? 1 : 0;
+      inside[crossing.solid] = crossing.enters ? 1 : 0;
     }
   }
   return lengths;
@@ -333,7 +336,7 @@ std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
                                                 const std::vector<LightRay>& rays) const {
   std::vector<double> light(rays.size(), 1);
   for (std::size_t i = 0; i < rays.size() && fields_; ++i)
-    if (fields_->isOccluded(rays[i].origin, rays[i].direction, rays[i].reach)) light[i] = 0;
+    if (fields_->isOccluded(rays[i].origin, rays[i].direction, rays[i].maxDistance)) light[i] = 0;
   for (std::size_t first = 0; first < rays.size() && !fields_; first += kRaysAtOnce) {
     const std::size_t last = std::min(rays.size(), first + kRaysAtOnce);
     if (csg_.isEmpty())
@@ -343,7 +346,7 @@ std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
   }
   for (std::size_t i = 0; i < rays.size() && !meshes_.isEmpty(); ++i)
     if (light[i] >= kLeastTransmittance)
-      light[i] *= meshes_.transmittance(rays[i].origin, rays[i].direction, rays[i].reach);
+      light[i] *= meshes_.transmittance(rays[i].origin, rays[i].direction, rays[i].maxDistance);
   return light;
 }
 
@@ -372,46 +375,48 @@ void KernelScene::dimBySolids(const KernelTracer& tracer, const std::vector<Ligh
 
 void KernelScene::dimByCsg(const KernelTracer& tracer, const std::vector<LightRay>& rays,
                            std::size_t first, std::size_t last, std::vector<double>& light) const {
-  std::vector<double> reach;
-  for (std::size_t i = first; i < last; ++i) reach.push_back(rays[i].reach);
-  CsgWalk walk(csg_, solids_.size(), std::move(reach));
+  std::vector<double> maxDistance;
+  for (std::size_t i = first; i < last; ++i) maxDistance.push_back(rays[i].maxDistance);
+  CsgTraversal walk(csg_, solids_.size(), std::move(maxDistance));
   bool asks;
   do {
     for (std::size_t s = 0; s < solids_.size(); ++s) {
       const KernelSolid& solid = solids_[s];
-      const std::vector<CsgWalk::Question> questions = walk.questionsAbout(s);
+      const std::vector<CsgTraversal::Query> queries = walk.queriesFor(s);
       std::vector<std::size_t> asked;
-      for (const CsgWalk::Question& question : questions) asked.push_back(first + question.ray);
-      // To their end: where a ray ends inside a solid only what comes later tells that it is.
+      for (const CsgTraversal::Query& query : queries) asked.push_back(first + query.ray);
+      // Trace the rays beyond their ends: when a ray ends inside a solid, only later crossings show
+      // it.
       PackedRays packed(solid, rays, asked, false);
       std::size_t n = 0;
-      for (const CsgWalk::Question& question : questions) {
-        if (n < packed.number.size() && packed.number[n] == first + question.ray)
-          packed.block.passing[n++] = question.passing;
+      for (const CsgTraversal::Query& query : queries) {
+        if (n < packed.number.size() && packed.number[n] == first + query.ray)
+          packed.block.passing[n++] = query.passing;
       }
       HitBlock hits(packed.block.size);
       if (!packed.number.empty()) tracer.trace(solid, packed.block, hits);
       n = 0;
-      for (const CsgWalk::Question& question : questions) {
-        const bool isNear = n < packed.number.size() && packed.number[n] == first + question.ray;
+      for (const CsgTraversal::Query& query : queries) {
+        const bool isNear = n < packed.number.size() && packed.number[n] == first + query.ray;
         if (isNear && hits.found[n])
-          walk.answer(s, question,
+          walk.answer(s, query,
                       (packed.enter[n] + static_cast<double>(hits.t[n])) * solid.voxelSize,
-                      hits.found[n] == HitBlock::kGoesIn);
+                      hits.found[n] == HitBlock::kEnters);
         else
-          walk.answerNone(s, question);
+          walk.answerNone(s, query);
         if (isNear) ++n;
       }
     }
     asks = walk.advance();
-    // Only once no ray has anything to ask: those that met a surface then go on together.
+    // Continue rays that met a surface only when no ray has open queries, so that they continue
+    // together.
     if (asks) continue;
     for (std::size_t i = first; i < last; ++i) {
       const std::int32_t met = walk.solidMet(i - first);
       if (met < 0 || light[i] < kLeastTransmittance) continue;
       light[i] *= 1 - solids_[static_cast<std::size_t>(met)].opacity;
       if (light[i] < kLeastTransmittance) continue;
-      walk.goOn(i - first);
+      walk.resume(i - first);
       asks = true;
     }
   } while (asks);

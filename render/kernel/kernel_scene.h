@@ -10,11 +10,11 @@
 
 #include "levelset/memory_limit.h"
 #include "render/bricks/brick_pool.h"
-#include "render/embree/mesh_rays.h"
-#include "render/kernel/csg_walk.h"
-#include "render/kernel/field_walk.h"
+#include "render/kernel/csg_traversal.h"
+#include "render/kernel/field_traversal.h"
 #include "render/kernel/ray_block.h"
 #include "render/kernel/ray_fan.h"
+#include "render/meshes/mesh_rays.h"
 #include "render/scene/csg_expression.h"
 #include "render/scene/scene.h"
 #include "render/shading/render_options.h"
@@ -22,7 +22,7 @@
 
 namespace render {
 
-/// A solid of a scene as the kernel sees it.
+/// A solid of a scene with its tables for the kernel.
 struct KernelSolid {
   std::size_t index = 0;  ///< in Scene::solids
   std::uint32_t id = 0;
@@ -32,114 +32,119 @@ struct KernelSolid {
   Imath::M44d tableToWorld, worldToTable;
 };
 
-/// Runs the kernel somewhere. The hits of all tracers have the same bits.
+/// Interface of the kernel's back ends (processor, GPU). All of them return the same bits.
 class KernelTracer {
  public:
   virtual ~KernelTracer() = default;
-  /// @param hits, shapes  as long as the pixels; shapes only where something is hit
+  /// @param hits, shapes  arrays as long as the pixels; `shapes` is written only where there is a
+  ///        hit
   virtual void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,
                      ShapeBlock& shapes) const = 0;
   virtual void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const = 0;
 };
 
-/// What a block of pixels shows.
+/// Hits of the rays through a block of pixels.
 struct PixelHits {
   std::vector<double> depth;        ///< along the view axis, world units
   std::vector<std::int32_t> solid;  ///< index in KernelScene::solids(), or −1
-  std::vector<char> turned;         ///< is that solid's outside inside what the scene makes of it?
+  std::vector<char> flipped;        ///< the outside of that solid is inside the drawn shape
   ShapeBlock shapes;
 
   explicit PixelHits(std::size_t size)
-      : depth(size), solid(size, -1), turned(size, 0), shapes(size) {}
+      : depth(size), solid(size, -1), flipped(size, 0), shapes(size) {}
 };
 
-/// Rays of pixels on their way through the solids, from surface to surface.
-struct PixelWalk {
+/// Rays through pixels that continue from surface to surface.
+struct PixelTraversal {
   PixelBlock pixels;
-  CsgWalk solids;
-  struct Crossings {  ///< with one solid, the next of each ray
+  CsgTraversal solids;
+  struct Crossings {  ///< next crossing of each ray with one solid
     std::vector<double> depth;
     ShapeBlock shapes;
   };
   std::vector<Crossings> next;
 };
 
-/// The surfaces of a scene made ready for the kernel, whoever runs it. Of two solids hit at the
-/// same depth the one of the smaller voxels counts, of two such the first one by id.
+/// A scene prepared for the kernel, independent of the back end. When two solids are hit at the
+/// same depth, the one with the smaller voxels counts; for equal voxels, the one with the lower id.
 class KernelScene {
  public:
-  /// For any camera. @param maxBytes  for what the kernel reads
-  /// @param filter    what is drawn of the grids
+  /// Prepares the scene for any camera.
+  /// @param maxBytes  memory limit of the kernel's data
+  /// @param filter  interpolation of the grids
   /// @pre the camera is valid
   /// @throws levelset::ResourceLimit before anything is allocated; and as makeBricks()
   explicit KernelScene(const Scene& scene, std::size_t maxBytes = levelset::kNoMemoryLimit,
                        Filter filter = Filter::Trilinear);
-  /// For that picture: what it does not need is left out. @pre as above
+  /// Prepares the scene for one picture; data that cannot affect it is culled. @pre the camera is
+  /// valid
   KernelScene(const Scene& scene, const RenderOptions& options);
 
-  /// Takes the camera, where the solids are and how opaque, anew from a scene; tables and meshes
-  /// stay.
-  /// @pre made for any camera, not for a picture; the camera is valid; the scene has the solids and
-  /// the expression that this was made of
-  void look(const Scene& scene);
+  /// Reads the camera and the transforms and opacities of the solids again; tables and meshes stay.
+  /// @pre built for any camera, not for one picture; the camera is valid; solids and expression of
+  ///      the scene are those that it was built from
+  void updateView(const Scene& scene);
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
-  /// World-space box of the cells that hold surface, and of the meshes; empty when there are none.
+  /// World-space box of the cells that the surfaces cross, and of the meshes; empty when there are
+  /// none.
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
-  /// The same of blocks: what places are as exact as, in single precision.
+  /// World-space box of the blocks. Its size determines the absolute precision of single-precision
+  /// positions.
   [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
-  /// What is drawn of the solids where the scene blends them: then there are no solids(), and
-  /// castPixels() and thickness() find nothing; or null.
-  [[nodiscard]] const FieldWalk* fields() const { return fields_ ? &*fields_ : nullptr; }
+  /// Traversal of a blended scene, else null. For a blended scene solids() is empty, and
+  /// castPixels() and thickness() find nothing.
+  [[nodiscard]] const FieldTraversal* fields() const { return fields_ ? &*fields_ : nullptr; }
   [[nodiscard]] std::size_t bytes() const;
-  /// Blocks of the solids by what was done with them.
+  /// Numbers of blocks of the solids, by their treatment.
   struct Counts {
-    std::size_t crossed = 0, beside = 0;  // held
-    std::size_t leftOut = 0;              // with those that are
-    std::size_t unseen = 0;               // crossed, out of what the picture needs
+    std::size_t crossed = 0, halo = 0;  // stored
+    std::size_t omitted = 0;            // not stored: neither crossed nor read by a stencil
+    std::size_t culled = 0;             // crossed by the surface, but irrelevant to the picture
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
-  /// Of the solids; meshes() are for the caller.
+  /// First hits with the solids. The caller intersects meshes().
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
-  [[nodiscard]] PixelWalk walkFrom(const PixelBlock& pixels) const;
-  /// What rays meet next: those that were told to go on, the others what they met before.
-  [[nodiscard]] PixelHits castOn(const KernelTracer& tracer, PixelWalk& walk) const;
-  /// @return how far each ray is within what is drawn of the solids and is seen, along the view
-  /// axis, world units
+  [[nodiscard]] PixelTraversal startTraversal(const PixelBlock& pixels) const;
+  /// Next hits of the rays that CsgTraversal::resume() released; the other rays keep their present
+  /// hit.
+  [[nodiscard]] PixelHits castNext(const KernelTracer& tracer, PixelTraversal& traversal) const;
+  /// @return for each pixel the length of the visible ray inside the drawn solids, along the view
+  ///         axis, world units
   [[nodiscard]] std::vector<double> thickness(const KernelTracer& tracer,
                                               const PixelBlock& pixels) const;
-  /// @return for each ray the share of its light that what it meets within its reach lets through
+  /// @return for each ray the share of its light that passes all surfaces within its maxDistance
   [[nodiscard]] std::vector<double> transmittances(const KernelTracer& tracer,
                                                    const std::vector<LightRay>& rays) const;
 
  private:
   [[nodiscard]] PixelHits castFirst(const KernelTracer& tracer, const PixelBlock& pixels) const;
-  /// Is a place within what is drawn that those solids hold?
+  /// True when a point that lies in those solids is inside the drawn shape. @param inside  by solid
   [[nodiscard]] bool isInside(const std::vector<char>& inside) const;
-  /// Dims the light of the rays from `first` up to `last`.
+  /// Dims the light of the rays in [first, last).
   void dimBySolids(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
                    std::size_t last, std::vector<double>& light) const;
   void dimByCsg(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
                 std::size_t last, std::vector<double>& light) const;
 
-  /// @param isPicture  leave out what it does not need
+  /// @param isPicture  cull data that the picture does not need
   void makeTables(const Scene& scene, const RenderOptions& options, bool isPicture);
 
-  /// Where a surface is, of which the tables may hold a part or nothing.
+  /// Extent of a solid's surface. The tables may hold only a part of it.
   struct Extent {
     std::size_t index;           // in Scene::solids
-    Imath::Box3d cells, blocks;  // that it crosses, in indices
+    Imath::Box3d cells, blocks;  // crossed by the surface, index space
   };
   std::vector<Extent> extents_;
   Counts counts_;
-  std::vector<KernelSolid> solids_;  // by voxel size and id
-  CsgExpression csg_;                // of those
+  std::vector<KernelSolid> solids_;  // sorted by voxel size and id
+  CsgExpression csg_;                // over those solids
   MeshRays meshes_;
-  std::optional<FieldWalk> fields_;
+  std::optional<FieldTraversal> fields_;
   Imath::Box3d bounds_, tableBounds_;
-  double near_ = 0, far_ = Camera::kNoDepth;  // depths that the camera sees
+  double near_ = 0, far_ = Camera::kNoDepth;  // visible depth range of the camera
 };
 
 }  // namespace render

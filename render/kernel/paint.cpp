@@ -15,8 +15,9 @@ using Imath::V2d;
 using Imath::V3d;
 
 constexpr int kSquare = 4;                        // pixels along the edge of a packet
-constexpr std::size_t kMostLightRays = 1u << 18;  // that wait for an answer
-constexpr double kCastError = 2e-3;  // of the kernel's depths, voxels: rays to lights start beyond
+constexpr std::size_t kMostLightRays = 1u << 18;  // limit of light rays in one batch
+constexpr double kCastError =
+    2e-3;  // error of the kernel's depths, voxels; light rays start beyond it
 
 }  // namespace
 
@@ -50,7 +51,7 @@ std::size_t KernelPainter::numberOf(const Pixel& pixel) const {
 
 Hit KernelPainter::hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
                          std::size_t i) const {
-  const FieldWalk* fields = surfaces_.fields();
+  const FieldTraversal* fields = surfaces_.fields();
   Hit onSolid;
   if (fields)
     onSolid = fields->intersect(ray.origin, ray.direction, ray.near, ray.far);
@@ -72,13 +73,13 @@ Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std
   hit.solid = solid.index;
   hit.colour = scene_.solids[solid.index].colour;
   hit.opacity = solid.opacity;
-  hit.isTurned = hits.turned[i] != 0;
+  hit.isFlipped = hits.flipped[i] != 0;
   addShape(hit, hits.shapes.at(i), solid.tableToWorld, ray.direction);
   hit.surfaceError += kCastError * solid.voxelSize;
   return hit;
 }
 
-// From the pixels' centres.
+// Uses the rays through the pixels' centres.
 void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const {
   const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
   PixelBlock at(pixels.size());
@@ -107,34 +108,35 @@ void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixe
   }
 }
 
-// The means over the pixels' areas.
+// Computes the means over the pixels' areas.
 void KernelPainter::paintColours(const KernelTracer& tracer,
                                  const std::vector<Pixel>& pixels) const {
   const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
   std::vector<ColourSum> sums(pixels.size());
   PixelBlock at(pixels.size());
   for (int s = 0; s < options_.samples; ++s) {
-    std::vector<Sight> sights;
+    std::vector<SampleRay> sampleRays;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const V2d shift = PixelSequence::overArea(pixels[i].x, pixels[i].y).at(s);
-      // What single precision makes of the place is where the ray goes.
+      // The ray passes through the pixel position as rounded to single precision.
       at.x[i] = static_cast<float>(pixels[i].x + shift.x - middleX);
       at.y[i] = static_cast<float>(pixels[i].y + shift.y - middleY);
       const Camera::Ray ray = scene_.camera.ray(static_cast<double>(at.x[i]) + middleX,
                                                 static_cast<double>(at.y[i]) + middleY);
-      sights.push_back({ray, ray.near});
+      sampleRays.push_back({ray, ray.near});
     }
     if (scene_.isOpaque()) {
-      addSeen(tracer, pixels, s, surfaces_.castPixels(tracer, at), sights, sums);
+      addSeen(tracer, pixels, s, surfaces_.castPixels(tracer, at), sampleRays, sums);
       continue;
     }
-    PixelWalk walk = surfaces_.walkFrom(at);
+    PixelTraversal walk = surfaces_.startTraversal(at);
     for (bool seesMore = true; seesMore;) {
-      const PixelHits hits = surfaces_.castOn(tracer, walk);
-      for (const std::size_t i : addSeen(tracer, pixels, s, hits, sights, sums))
-        walk.solids.goOn(i);
-      seesMore = std::any_of(sights.begin(), sights.end(),
-                             [](const Sight& sight) { return sight.left >= kLeastTransmittance; });
+      const PixelHits hits = surfaces_.castNext(tracer, walk);
+      for (const std::size_t i : addSeen(tracer, pixels, s, hits, sampleRays, sums))
+        walk.solids.resume(i);
+      seesMore = std::any_of(sampleRays.begin(), sampleRays.end(), [](const SampleRay& sampleRay) {
+        return sampleRay.left >= kLeastTransmittance;
+      });
     }
   }
   for (std::size_t i = 0; i < pixels.size(); ++i)
@@ -143,7 +145,8 @@ void KernelPainter::paintColours(const KernelTracer& tracer,
 
 std::vector<std::size_t> KernelPainter::addSeen(const KernelTracer& tracer,
                                                 const std::vector<Pixel>& pixels, int sample,
-                                                const PixelHits& hits, std::vector<Sight>& sights,
+                                                const PixelHits& hits,
+                                                std::vector<SampleRay>& sampleRays,
                                                 std::vector<ColourSum>& sums) const {
   struct Lit {
     std::size_t pixel;
@@ -164,7 +167,7 @@ std::vector<std::size_t> KernelPainter::addSeen(const KernelTracer& tracer,
     points.clear();
   };
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    auto& [ray, meshNear, left] = sights[i];
+    auto& [ray, meshNear, left] = sampleRays[i];
     if (left < kLeastTransmittance) continue;
     if (rays.size() > kMostLightRays) addColours();
     const Hit hit = hitOf(ray, meshNear, hits, i);
@@ -209,10 +212,11 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
   } else {
     const KernelScene::Counts& counts = surfaces.counts();
     image.attributes["ls:read"] = fmt::format(
-        "{} blocks of 8x8x8 cells that the surface crosses and {} beside them, for its curvature, "
-        "{:.1f} MB; {} more were left out, and {} of those that it crosses are out of sight",
-        counts.crossed, counts.beside, static_cast<double>(surfaces.bytes()) * 1e-6, counts.leftOut,
-        counts.unseen);
+        "{} blocks of 8x8x8 cells that the surface crosses and {} neighbouring blocks for its "
+        "curvature, "
+        "{:.1f} MB; {} other blocks are not stored, and {} crossed blocks are outside the view",
+        counts.crossed, counts.halo, static_cast<double>(surfaces.bytes()) * 1e-6, counts.omitted,
+        counts.culled);
   }
   addViewAttributes(image, scene, surfaces.tableBounds().size().length());
   painter.layers().addWarnings(image, scene);

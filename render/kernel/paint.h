@@ -12,17 +12,17 @@
 
 namespace render {
 
-/// A part of a picture, pixels.
+/// A rectangle of pixels.
 struct PixelBox {
-  int left, top, right, bottom;  ///< the last two are the first outside
+  int left, top, right, bottom;  ///< right and bottom are exclusive
 };
 
-/// Paints parts of a picture from the kernel's hits, a kind of ray at a time.
+/// Paints rectangles of a picture from the kernel's hits, one kind of ray after another.
 class KernelPainter {
  public:
   KernelPainter(const Scene& scene, const KernelScene& surfaces, const RenderOptions& options,
                 Image& image);
-  /// Parts may be painted at the same time.
+  /// Paints one rectangle. Thread-safe for disjoint rectangles.
   void paint(const KernelTracer& tracer, const PixelBox& box) const;
   [[nodiscard]] const PictureLayers& layers() const { return layers_; }
 
@@ -30,25 +30,27 @@ class KernelPainter {
   struct Pixel {
     int x, y;
   };
-  /// Neighbours next to each other: squares of four.
+  /// Pixels of the box in an order that keeps neighbours together, in squares of four.
   [[nodiscard]] static std::vector<Pixel> pixelsOf(const PixelBox& box);
   [[nodiscard]] std::size_t numberOf(const Pixel& pixel) const;
-  /// What the ray of number i meets first, if anything. @param meshNear  from there on of meshes
+  /// First hit of ray number i, on a solid or a mesh. @param meshNear  distance at which meshes
+  /// begin to count
   [[nodiscard]] Hit hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
                           std::size_t i) const;
   [[nodiscard]] Hit hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
   void paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
   void paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
-  /// The ray of a pixel's sample.
-  struct Sight {
+  /// The ray of one sample of a pixel.
+  struct SampleRay {
     Camera::Ray ray;
-    double meshNear;  ///< behind the meshes that it met
-    double left = 1;  ///< transmittance of what it met; 0: it leaves the scene
+    double meshNear;  ///< distance behind the last mesh surface that it hit
+    double left = 1;  ///< transmittance of the surfaces that it hit; 0: the ray ends
   };
-  /// Adds up what rays meet that see anything yet.
-  /// @return numbers of those that go on through a solid
+  /// Adds the colours of the hits of all rays that are not yet absorbed.
+  /// @return numbers of the rays that continue through a transparent solid
   std::vector<std::size_t> addSeen(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
-                                   int sample, const PixelHits& hits, std::vector<Sight>& sights,
+                                   int sample, const PixelHits& hits,
+                                   std::vector<SampleRay>& sampleRays,
                                    std::vector<ColourSum>& sums) const;
 
   const Scene& scene_;
@@ -58,9 +60,9 @@ class KernelPainter {
   PictureLayers layers_;
 };
 
-/// The whole picture, tile by tile in parallel, with its header.
-/// @param tile      edge of a tile, pixels
-/// @param renderer  for the header
+/// Paints the entire picture in parallel tiles and writes its header attributes.
+/// @param tile  edge of a tile, pixels
+/// @param renderer  name for the header
 [[nodiscard]] Image paintPicture(const Scene& scene, const KernelScene& surfaces,
                                  const KernelTracer& tracer, int tile, const std::string& renderer,
                                  const RenderOptions& options);

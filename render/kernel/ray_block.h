@@ -9,22 +9,23 @@
 
 namespace render {
 
-/// What the kernel takes for 1 / d: a ray that goes nowhere on an axis meets no plane of it.
+/// The kernel's value of 1 / d. For d = 0 it is so large that the ray meets no plane across that
+/// axis.
 inline float rayInverse(float d) {
   return d == 0 ? 1e30f : 1 / d;
 }
 
-/// Rays in the space of a BrickPool's table, by number; arrays are a multiple of kLanes long. A ray
-/// that starts behind its end meets nothing.
+/// A batch of rays in the table space of a BrickPool. Array lengths are multiples of kLanes. A ray
+/// with start > end hits nothing.
 struct RayBlock {
   static constexpr std::size_t kLanes = 16;
 
-  std::size_t size = 0;               ///< of the arrays
-  std::vector<float> ox, oy, oz;      ///< where t is 0
-  std::vector<float> dx, dy, dz;      ///< by t
+  std::size_t size = 0;               ///< length of the arrays
+  std::vector<float> ox, oy, oz;      ///< origin: position at t = 0
+  std::vector<float> dx, dy, dz;      ///< derivative by t
   std::vector<float> ix, iy, iz;      ///< rayInverse(d)
-  std::vector<float> start, end;      ///< of t
-  std::vector<std::int32_t> passing;  ///< how many crossings to pass over
+  std::vector<float> start, end;      ///< interval of t
+  std::vector<std::int32_t> passing;  ///< number of crossings to skip
 
   explicit RayBlock(std::size_t count) : size((count + kLanes - 1) / kLanes * kLanes) {
     for (auto* a : {&ox, &oy, &oz}) a->assign(size, 0);
@@ -35,11 +36,11 @@ struct RayBlock {
   }
 };
 
-/// Pixels of a RayFan by number: how far right of and below the picture's middle they are, in
-/// pixels. As many as a multiple of RayBlock::kLanes.
+/// A batch of pixels of a RayFan: offsets from the centre of the picture to the right and down, in
+/// pixels. The length is a multiple of RayBlock::kLanes.
 struct PixelBlock {
   std::vector<float> x, y;
-  std::vector<std::int32_t> passing;  ///< how many crossings to pass over
+  std::vector<std::int32_t> passing;  ///< number of crossings to skip
 
   explicit PixelBlock(std::size_t count)
       : x((count + RayBlock::kLanes - 1) / RayBlock::kLanes * RayBlock::kLanes),
@@ -48,18 +49,19 @@ struct PixelBlock {
   [[nodiscard]] std::size_t size() const { return x.size(); }
 };
 
-/// What they meet.
+/// Hits of a batch of rays or pixels.
 struct HitBlock {
-  static constexpr std::int32_t kGoesIn = -1, kGoesOut = -2;
-  std::vector<std::int32_t> found;  ///< kGoesIn or kGoesOut, or 0
+  static constexpr std::int32_t kEnters = -1, kLeaves = -2;
+  std::vector<std::int32_t>
+      found;  ///< direction of the crossing: kEnters, kLeaves, or 0 for no hit
   std::vector<float> t;
-  std::vector<std::int32_t> x, y, z;  ///< cell, in the table's space
+  std::vector<std::int32_t> x, y, z;  ///< cell, in table space
 
   explicit HitBlock(std::size_t size) : found(size), t(size), x(size), y(size), z(size) {}
 };
 
-/// What the surface is like where they meet it: the parts of the kernel's Shape in their order, per
-/// grid point and in the table's axes.
+/// Shape of the surface at the hits: the members of the kernel's Shape in their order, per grid
+/// point and along the axes of the table.
 struct ShapeBlock {
   static constexpr std::size_t kParts = 13;
   std::array<std::vector<float>, kParts> part;
@@ -68,7 +70,7 @@ struct ShapeBlock {
     for (std::vector<float>& p : part) p.resize(size);
   }
   [[nodiscard]] SurfaceShape at(std::size_t i) const;
-  /// Number i of the other becomes number `to`.
+  /// Copies entry i of `from` to entry `to`.
   void take(std::size_t to, const ShapeBlock& from, std::size_t i) {
     for (std::size_t p = 0; p < kParts; ++p) part[p][to] = from.part[p][i];
   }

@@ -13,11 +13,11 @@
 namespace render {
 namespace {
 
-constexpr std::size_t kMostPending = 64;  // bits of holds()' stack
+constexpr std::size_t kMostPending = 64;  // bits of the stack in holds()
 
 }  // namespace
 
-/// By recursive descent; leaves the steps in postfix order.
+/// Parses by recursive descent and writes the steps in postfix order.
 class CsgParser {
  public:
   CsgParser(const std::string& text, const std::vector<std::string>& names, std::vector<int>& steps)
@@ -26,11 +26,11 @@ class CsgParser {
   void parse() {
     chain(0);
     skipBlanks();
-    if (at_ < text_.size()) refuse(fmt::format("'{}' does not belong there", text_[at_]));
+    if (at_ < text_.size()) refuse(fmt::format("'{}' is unexpected", text_[at_]));
   }
 
  private:
-  /// Operands of the operator of that level, looser ones first, and what joins them.
+  /// Parses operands joined by operators of one precedence level; level 0 binds loosest.
   void chain(std::size_t level) {
     static constexpr std::pair<char, CsgExpression::Step> kOperators[] = {
         {'|', CsgExpression::kUnion},
@@ -47,7 +47,7 @@ class CsgParser {
 
   void operand() {
     if (take('(')) {
-      if (++depth_ > kMostPending) refuse("its parentheses are nested too deeply");
+      if (++depth_ > kMostPending) refuse("parentheses are nested too deeply");
       chain(0);
       --depth_;
       if (!take(')')) refuse("a ')' is missing");
@@ -63,9 +63,9 @@ class CsgParser {
     const auto found = std::find(names_.begin(), names_.end(), name);
     if (found == names_.end()) {
       at_ = first;
-      refuse(fmt::format("no solid is called '{}'", name));
+      refuse(fmt::format("there is no solid '{}'", name));
     }
-    if (++pending_ > kMostPending) refuse("it is nested too deeply");
+    if (++pending_ > kMostPending) refuse("the expression is nested too deeply");
     steps_.push_back(static_cast<int>(found - names_.begin()));
   }
 
@@ -82,9 +82,9 @@ class CsgParser {
     std::string all;
     for (const std::string& name : names_) all += (all.empty() ? "" : ", ") + name;
     throw levelset::UsageError(fmt::format(
-        "scene: the expression '{}' cannot be read at place {}: {}; {}", text_, at_ + 1, why,
-        all.empty() ? "give it level sets: meshes are of no use to it"
-                    : "write as in '(a | b) - c', with the names " + all));
+        "scene: the expression '{}' has an error at character {}: {}; {}", text_, at_ + 1, why,
+        all.empty() ? "add level sets, because it cannot use meshes"
+                    : "write for example '(a | b) - c'; the names are " + all));
   }
 
   const std::string& text_;
@@ -99,7 +99,7 @@ CsgExpression::CsgExpression(const std::string& text, const std::vector<std::str
 }
 
 bool CsgExpression::holds(const char* inside) const {
-  std::uint64_t stack = 0;  // the newest is the lowest bit
+  std::uint64_t stack = 0;  // the newest entry is the lowest bit
   for (const int step : steps_) {
     if (step >= 0) {
       stack = stack << 1 | (inside[step] != 0);

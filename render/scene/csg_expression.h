@@ -8,32 +8,35 @@
 
 namespace render {
 
-/// A solid made of others, point by point: `a | b` what is in either, `a & b` in both, `a - b` in a
-/// alone, with parentheses. As in Python `-` binds closest, then `&`, then `|`.
+/// A CSG expression over named solids, evaluated point by point: `a | b` is the union, `a & b` the
+/// intersection, `a - b` the difference. As in Python, `-` binds closest, then `&`, then `|`;
+/// parentheses are allowed.
 class CsgExpression {
  public:
   CsgExpression() = default;
-  /// @param names  of the solids, in their order: letters, digits and _, no digit first
-  /// @throws levelset::UsageError for a text that is no such expression or names none of them
+  /// @param names  names of the solids, in their order: letters, digits and _, no digit first
+  /// @throws levelset::UsageError for a text that is not such an expression or uses an unknown name
   CsgExpression(const std::string& text, const std::vector<std::string>& names);
 
   [[nodiscard]] bool isEmpty() const { return steps_.empty(); }
   [[nodiscard]] const std::string& text() const { return text_; }
-  /// @param inside  by solid: not 0 where it holds the point
+  /// True when the result contains a point. @param inside  by solid: nonzero when it contains the
+  /// point
   [[nodiscard]] bool holds(const char* inside) const;
-  /// Of signed distances to the solids, by solid, one that has the sign of what the expression
-  /// makes and is nowhere larger in magnitude than the distance to it.
+  /// Combines signed distances to the solids, given by solid. The result has the sign of the
+  /// distance to the result's surface, and its magnitude is never larger.
   [[nodiscard]] double phi(const double* phi) const;
   [[nodiscard]] bool uses(std::size_t solid) const;
-  /// A box that holds what the expression makes of solids that lie in those boxes.
-  /// @param growth  how far a union may reach beyond its operands, world units
+  /// A box that contains the result, given boxes that contain the solids.
+  /// @param growth  distance by which a union may extend beyond its operands, world units
   [[nodiscard]] Imath::Box3d bounds(const std::vector<Imath::Box3d>& boxes,
                                     double growth = 0) const;
-  /// The same of solids by other numbers. @param numbers  by solid; negative: it holds nothing
+  /// The same expression with other numbers of the solids.
+  /// @param numbers  new number of each solid; negative: the solid is empty
   [[nodiscard]] CsgExpression renumbered(const std::vector<int>& numbers) const;
 
   enum Step : int { kUnion = -1, kIntersection = -2, kDifference = -3, kNothing = -4 };
-  /// Operands before what joins them: a solid's number, or a Step.
+  /// The expression in postfix notation. Entries are numbers of solids, or a Step.
   [[nodiscard]] const std::vector<int>& postfix() const { return steps_; }
 
  private:

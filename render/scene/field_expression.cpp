@@ -18,7 +18,7 @@ double backgroundOf(const Solid& solid) {
   return solid.band.halfWidth() * solid.band.voxelSize();
 }
 
-/// Does the expression read that solid's field?
+/// True when the expression reads the field of that solid.
 bool isOperand(const Scene& scene, std::size_t solid) {
   return !scene.solids[solid].band.isEmpty() && (scene.morph || scene.csg.uses(solid));
 }
@@ -34,7 +34,7 @@ Join joinOf(int step) {
   }
 }
 
-/// Turns the postfix order into steps. What is empty drops out.
+/// Converts the postfix order into steps. Empty solids drop out.
 class StepWriter {
  public:
   explicit StepWriter(FieldExpression& to) : to_(to) {}
@@ -60,7 +60,7 @@ class StepWriter {
   std::vector<std::optional<std::size_t>> stack_;
 };
 
-/// Of steps within steps.
+/// Nesting depth of the steps.
 int depthOf(const FieldExpression& expression) {
   std::vector<int> depth(expression.operands.size(), 0);
   for (const FieldExpression::Step& step : expression.steps)
@@ -71,40 +71,42 @@ int depthOf(const FieldExpression& expression) {
 void requireMorph(const Scene& scene) {
   if (!scene.csg.isEmpty() || scene.softness > 0)
     throw levelset::UsageError(
-        "scene: a morph goes from one solid to another, without an expression; leave one of them "
+        "scene: a morph goes from one solid to another and cannot be combined with an expression; "
+        "leave one of them "
         "out");
   if (!(*scene.morph >= 0 && *scene.morph <= 1))
     throw levelset::UsageError(
-        fmt::format("scene: a morph of {} is not from 0 to 1", *scene.morph));
+        fmt::format("scene: a morph of {} is not between 0 and 1", *scene.morph));
   if (scene.solids.size() != 2)
     throw levelset::UsageError(
-        fmt::format("scene: a morph is of two solids, and there are {}", scene.solids.size()));
+        fmt::format("scene: a morph needs two solids, but the scene has {}", scene.solids.size()));
   for (const Solid& solid : scene.solids)
     if (solid.band.isEmpty())
-      throw levelset::InvalidInput(fmt::format(
-          "scene: '{}' is empty, and nothing can be morphed into it; give two solids", solid.name));
+      throw levelset::InvalidInput(
+          fmt::format("scene: '{}' is empty and cannot be morphed; give two solids with a surface",
+                      solid.name));
 }
 
 void requireSoftness(const Scene& scene) {
   if (!(scene.softness >= 0 && std::isfinite(scene.softness)))
     throw levelset::UsageError(
-        fmt::format("scene: a softness of {} joins nothing; give a length", scene.softness));
+        fmt::format("scene: a softness of {} must be a length of 0 or more", scene.softness));
   if (!(scene.softness > 0)) return;
   if (scene.csg.isEmpty())
-    throw levelset::UsageError(
-        "scene: softness is of an expression; say what is joined, as in 'a | b'");
+    throw levelset::UsageError("scene: softness needs an expression; give one, such as 'a | b'");
   const FieldExpression expression = fieldExpression(scene);
   double narrowest = std::numeric_limits<double>::infinity();
   for (const FieldExpression::Operand& operand : expression.operands)
     narrowest = std::min(narrowest, operand.background);
-  // Each step takes up to K/4 off: far from all solids something must be left.
+  // Each step lowers the value by up to K/4. Far from all solids the value must stay positive.
   const int depth = depthOf(expression);
   const double most = narrowest * std::min(1.0, 3.999 / std::max(depth, 1));
   if (scene.softness <= most) return;
   throw levelset::InvalidInput(fmt::format(
-      "scene: a softness of {:.6g} reaches beyond the bands, which know distances up to {:.6g}{}; "
-      "widen them first, or take at most {:.6g}",
-      scene.softness, narrowest, depth > 4 ? fmt::format(", in {} steps", depth) : "", most));
+      "scene: a softness of {:.6g} exceeds the bands, which store distances up to {:.6g}{}; "
+      "widen them with rebuild-band, or give at most {:.6g}",
+      scene.softness, narrowest,
+      depth > 4 ? fmt::format(" and are joined in {} nested steps", depth) : "", most));
 }
 
 }  // namespace
@@ -146,8 +148,8 @@ void requireFields(const Scene& scene) {
   for (const Solid& solid : scene.solids)
     if (solid.opacity != 1)
       throw levelset::UsageError(fmt::format(
-          "scene: an opacity of {} for '{}' has no place: soft expressions and morphs have one "
-          "surface, mixed of all solids; leave their opacities out",
+          "scene: an opacity of {} for '{}' is not supported: soft expressions and morphs have one "
+          "surface, blended from all solids; omit the opacity",
           solid.opacity, solid.name));
 }
 

@@ -12,14 +12,14 @@
 
 namespace render {
 
-/// A function of the distances to solids whose zero set is drawn: soft CSG by the smooth minimum of
-/// degree two [Quilez13],
+/// A function of the distances to solids; renderers draw its zero set. It is soft CSG by the smooth
+/// minimum of degree two [Quilez13],
 ///   smin(a, b) = min(a, b) − max(K − |a − b|, 0)² / 4K,  smax(a, b) = −smin(−a, −b),
-/// or (1 − s) a + s b on the way from one solid to another. Distances are the trilinear
-/// interpolants of the grids, each on its own, ± the background where a band does not reach.
+/// or the morph (1 − s) a + s b between two solids. Distances are the trilinear interpolants of the
+/// grids, each on its own grid, and ± the background outside a band.
 struct FieldExpression {
   enum class Join { Union, Intersection, Difference, Morph };
-  /// Operands are numbered: the solids first, then the results of the steps.
+  /// One operation. Operand numbers count the solids first, then the results of earlier steps.
   struct Step {
     Join join;
     std::size_t a, b;
@@ -32,13 +32,14 @@ struct FieldExpression {
   };
   std::vector<Operand> operands;  ///< solids with a band
   std::vector<Step> steps;
-  std::size_t drawn = 0;  ///< whose zero set is: number of a value
+  std::size_t drawn = 0;  ///< number of the value whose zero set is drawn
   double softness = 0;    ///< K, world units
   double share = 0;       ///< s
 
-  /// Nothing is drawn.
+  /// True when nothing is drawn.
   [[nodiscard]] bool isEmpty() const { return operands.empty(); }
-  /// Of two values; not smaller where a is larger, or b, but for a difference, where b is smaller.
+  /// Joins two values. The result is monotone: nondecreasing in a and b, but nonincreasing in b for
+  /// a difference.
   [[nodiscard]] double join(Join how, double a, double b) const {
     switch (how) {
       case Join::Union:
@@ -60,14 +61,15 @@ struct FieldExpression {
   }
 };
 
-/// Of a scene that is blended. @pre requireFields(scene)
+/// Builds the expression of a blended scene. @pre the scene passes requireFields()
 [[nodiscard]] FieldExpression fieldExpression(const Scene& scene);
 
-/// Of any scene.
-/// @throws levelset::UsageError for a softness without an expression or below 0, a morph beyond
-///         [0, 1], beside an expression or of other than two solids, and solids of an opacity that
-///         are blended; levelset::InvalidInput for a softness beyond what the bands know, and a
-///         morph of nothing
+/// Checks the blending options of any scene.
+/// @throws levelset::UsageError for a softness below 0 or without an expression, and for
+///         transparent solids that are blended. Also for a morph outside [0, 1], beside an
+///         expression, or of other than two solids.
+/// @throws levelset::InvalidInput for a softness larger than the bands' width, and a morph of empty
+///         solids
 void requireFields(const Scene& scene);
 
 }  // namespace render

@@ -17,7 +17,7 @@ Imath::Box3d Scene::bounds() const {
     boxes.push_back(solid.band.isEmpty() ? Imath::Box3d() : solid.band.zeroSetBounds());
     all.extendBy(boxes.back());
   }
-  constexpr double kMostGrowth = 0.25;  // of a smooth minimum, in K
+  constexpr double kMostGrowth = 0.25;  // growth of a smooth minimum, as a multiple of K
   if (!csg.isEmpty()) all = csg.bounds(boxes, kMostGrowth * softness);
   for (const MeshPart& part : meshes) all.extendBy(levelset::bounds(*part.mesh));
   return all;

@@ -17,49 +17,56 @@
 
 namespace render {
 
+/// The key light of a scene.
 struct Light {
-  Imath::V3d direction{-0.4, 0.7,
-                       0.6};  ///< towards the light, in camera space (x right, y up, z to the eye)
+  Imath::V3d direction{
+      -0.4, 0.7, 0.6};  ///< towards the light, in camera space (x right, y up, z towards the eye)
   double strength = 0.8;
-  double softness = 0.15;  ///< half angle of the light, radians: penumbrae
+  double softness = 0.15;  ///< half angle of the light, radians: width of penumbrae
 };
 
+/// A level set of a scene.
 struct Solid {
   levelset::NarrowBand band;
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
-  std::string name = {};  ///< for the expression
-  double opacity = 1;     ///< of each of its surfaces that a ray meets, (0, 1]
-  ValueBits held = {};    ///< of the kernel's tables; the band has these values (coarsened())
+  std::string name = {};  ///< name in the expression
+  double opacity = 1;     ///< opacity of each surface crossing, (0, 1]
+  ValueBits quantization =
+      {};  ///< quantization of the kernel's tables; the band has these values (see quantized())
 };
 
-/// Triangles beside the solids: drawn, lit and lighted through like them, of no use to the
-/// expression. Flat unless the vertices have normals; of their colours (sRGB) if they have some.
+/// Triangles beside the solids. They are drawn, lit and cast shadows like solids, but cannot be
+/// used in the expression. Shading is flat unless the vertices have normals. Vertex colours (sRGB)
+/// replace `colour`.
 struct MeshPart {
   std::shared_ptr<const levelset::TriMesh> mesh;
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
   std::string name = {};
-  double opacity = 1;  ///< as of a Solid
+  double opacity = 1;  ///< same meaning as in Solid
 };
 
-/// What lets less light through than this is as good as opaque.
+/// Transmittance below which a ray ends as if the last surface were opaque.
 inline constexpr double kLeastTransmittance = 1.0 / 512;
 
+/// Everything that a renderer draws.
 struct Scene {
   Camera camera;
   Light key;
   double ambient = 0.32;  ///< weight of the ambient term, dimmed by occlusion
   std::vector<Solid> solids;
   std::vector<MeshPart> meshes = {};
-  CsgExpression csg = {};  ///< what is drawn of the solids; empty: each of them
-  double softness = 0;     ///< of the expression: K of the smooth minimum, world units; 0: none
-  std::optional<double> morph = {};  ///< set: on the way from the one solid to the other, [0, 1]
-  /// Is the zero set of one function of all fields drawn (render/scene/field_expression.h)?
+  CsgExpression csg = {};  ///< expression over the solids; empty: each solid is drawn
+  double softness = 0;     ///< K of the smooth minimum in the expression, world units; 0: sharp
+  std::optional<double> morph =
+      {};  ///< set: fraction of the morph from the first solid to the second, [0, 1]
+  /// True when the scene is drawn as the zero set of one function of all fields
+  /// (render/scene/field_expression.h).
   [[nodiscard]] bool isBlended() const { return softness > 0 || morph; }
-  /// Is nothing seen through?
+  /// True when no surface is transparent.
   [[nodiscard]] bool isOpaque() const;
-  /// A box that holds what is drawn; empty where nothing can be.
+  /// A box that contains all surfaces; empty when there can be none.
   [[nodiscard]] Imath::Box3d bounds() const;
 };
 

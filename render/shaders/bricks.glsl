@@ -1,36 +1,37 @@
-// What the tables of bricks say of a place. In the words and the space of roots.glsl.
+// Look-up of cells and values in the tables of a BrickPool. Types and space are those of
+// roots.glsl.
 
 struct Spot {
-  Bool crosses;  // the surface may, in the cell
-  Whole size;    // edge of an aligned cube about it that holds no other cell that it crosses
-  Whole brick;   // of the cell's values
+  Bool crosses;  // the surface may cross the cell
+  Int size;    // edge of an aligned cube around the cell without any other crossed cell
+  Int brick;   // number of the brick with the cell's values
 };
 
-Spot spotAt(Bool walking, Whole x, Whole y, Whole z) {
-  Whole page = select(walking, ((x >> kPageShift) * pagesY + (y >> kPageShift)) * pagesZ + (z >> kPageShift), whole(0));
-  Whole entry = loadPage(page);
+Spot spotAt(Bool walking, Int x, Int y, Int z) {
+  Int page = select(walking, ((x >> kPageShift) * pagesY + (y >> kPageShift)) * pagesZ + (z >> kPageShift), integer(0));
+  Int entry = loadPage(page);
   Bool full = AND(walking, entry >= 0);
-  Whole slot = select(full, entry + (((x >> 3) & 7) << 6 | ((y >> 3) & 7) << 3 | ((z >> 3) & 7)), whole(0));
-  Whole held = loadEntry(slot);
+  Int slot = select(full, entry + (((x >> 3) & 7) << 6 | ((y >> 3) & 7) << 3 | ((z >> 3) & 7)), integer(0));
+  Int held = loadEntry(slot);
   entry = select(full, held, entry);
   Bool isBrick = AND(full, entry >= 0);
-  Whole cell = (x & 7) << 6 | (y & 7) << 3 | (z & 7);
-  Whole word = loadMask(select(isBrick, (entry << 4) + (cell >> 5), whole(0)));
+  Int cell = (x & 7) << 6 | (y & 7) << 3 | (z & 7);
+  Int word = loadMask(select(isBrick, (entry << 4) + (cell >> 5), integer(0)));
   Spot spot;
   spot.crosses = AND(isBrick, ((word >> (cell & 31)) & 1) != 0);
-  spot.size = select(isBrick, whole(1), whole(0) - entry);
+  spot.size = select(isBrick, integer(1), integer(0) - entry);
   spot.brick = entry;
   return spot;
 }
 
-// At the corners of a cell, of which corner 4x + 2y + z is a number.
+// Values at the corners of a cell. Corner (x, y, z) has the number 4x + 2y + z.
 struct CellValues {
   Real f0, f1, f2, f3, f4, f5, f6, f7;
 };
 
-CellValues cellValues(Bool asked, Whole brick, Whole x, Whole y, Whole z) {
-  Whole corner = ((x & 7) * kBrickEdge + (y & 7)) * kBrickEdge + (z & 7);
-  Whole first = select(asked, brick * kBrickValues + corner, whole(0));
+CellValues cellValues(Bool asked, Int brick, Int x, Int y, Int z) {
+  Int corner = ((x & 7) * kBrickEdge + (y & 7)) * kBrickEdge + (z & 7);
+  Int first = select(asked, brick * kBrickValues + corner, integer(0));
   CellValues f;
   f.f0 = loadValue(first);
   f.f1 = loadValue(first + 1);
@@ -43,13 +44,13 @@ CellValues cellValues(Bool asked, Whole brick, Whole x, Whole y, Whole z) {
   return f;
 }
 
-// Where the values of the block that holds a point begin, and their strides.
-Whole blockOf(Bool asked, Whole x, Whole y, Whole z, INOUT(Whole) strides) {
-  Whole page = loadPage(select(asked, ((x >> kPageShift) * pagesY + (y >> kPageShift)) * pagesZ + (z >> kPageShift), whole(0)));
+// Position and strides of the values of the block that contains a point.
+Int blockOf(Bool asked, Int x, Int y, Int z, INOUT(Int) strides) {
+  Int page = loadPage(select(asked, ((x >> kPageShift) * pagesY + (y >> kPageShift)) * pagesZ + (z >> kPageShift), integer(0)));
   Bool full = AND(asked, page >= 0);
-  Whole slot = select(full, page + (((x >> 3) & 7) << 6 | ((y >> 3) & 7) << 3 | ((z >> 3) & 7)), whole(0));
-  Whole heldStrides = loadEntry(slot + kStridesOfEntry);
-  Whole first = loadEntry(slot + kFirstOfEntry);
-  strides = select(full, heldStrides, whole(0));
-  return select(full, first, whole(0));
+  Int slot = select(full, page + (((x >> 3) & 7) << 6 | ((y >> 3) & 7) << 3 | ((z >> 3) & 7)), integer(0));
+  Int heldStrides = loadEntry(slot + kStridesOfEntry);
+  Int first = loadEntry(slot + kFirstOfEntry);
+  strides = select(full, heldStrides, integer(0));
+  return select(full, first, integer(0));
 }

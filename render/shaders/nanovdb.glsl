@@ -1,20 +1,20 @@
-// What a NanoVDB grid says of a place, in the place of bricks.glsl: the reference that the bricks are
-// held against. For GLSL alone, in the space of roots.glsl; numbers of places are of words of 32 bits.
+// Look-up of cells and values in a NanoVDB grid, in place of bricks.glsl. It is the reference for
+// the bricks. GLSL only. Space is that of roots.glsl; positions are indices of 32-bit words.
 //
-// Behind the grid stand a row of eight values that are far outside and one of those far inside, for
-// blocks that are no leaves.
+// The grid is followed by a row of eight values far outside and a row of eight far inside, which
+// serve blocks without a leaf.
 
 struct Spot {
-  bool crosses;  // the surface, in the cell
-  int size;      // edge of an aligned cube about it that holds no other cell that it crosses
-  int brick;     // of no use here
+  bool crosses;  // the surface crosses the cell
+  int size;      // edge of an aligned cube around the cell without any other crossed cell
+  int brick;     // not used here
 };
 
 struct CellValues {
   float f0, f1, f2, f3, f4, f5, f6, f7;
 };
 
-// A node's child, by the distance in bytes at that place.
+// Position of a node's child. The word at `place` holds its distance in bytes.
 int childAt(int node, int place) {
   return node + (((loadHeld(place) >> 2) & 0x3fffffff) | loadHeld(place + 1) << 30);
 }
@@ -23,7 +23,8 @@ bool isOnAt(int mask, int n) { return ((loadHeld(mask + (n >> 5)) >> (n & 31)) &
 
 int farRow(float value) { return value < 0.0 ? nanoFar + 8 : nanoFar; }
 
-// Where the values of the block that holds a point begin, and their strides: 0 where it is no leaf.
+// Position and strides of the values of the block that contains a point. Strides are 0 where there
+// is no leaf.
 int blockOf(bool asked, int x, int y, int z, inout int strides) {
   strides = 0;
   int i = x + nanoOriginX, j = y + nanoOriginY, k = z + nanoOriginZ;
@@ -57,10 +58,10 @@ float nanoValue(int x, int y, int z) {
   return loadValue(first + inBlock + (z & 7));
 }
 
-// @param first, strides  of the block that holds it
+// @param first, strides  position and strides of the block that contains the cell's lowest corner
 CellValues cellValuesIn(int first, int strides, int x, int y, int z) {
   CellValues f;
-  if (strides != 0 && (x & 7) < 7 && (y & 7) < 7 && (z & 7) < 7) {  // all in that block
+  if (strides != 0 && (x & 7) < 7 && (y & 7) < 7 && (z & 7) < 7) {  // all corners in that block
     int at = first + ((x & 7) << 6 | (y & 7) << 3 | (z & 7));
     f.f0 = loadValue(at);
     f.f1 = loadValue(at + 1);
@@ -97,7 +98,7 @@ Spot spotAt(bool walking, int x, int y, int z) {
   int strides;
   int first = blockOf(true, x, y, z, strides);
   bool anyLeaf = strides != 0;
-  for (int n = 1; n < 8; ++n) {  // into which the block's last cells reach
+  for (int n = 1; n < 8; ++n) {  // blocks into which the block's last cells extend
     if (anyLeaf) break;
     int beside;
     blockOf(true, x + 8 * (n >> 2), y + 8 * ((n >> 1) & 1), z + 8 * (n & 1), beside);

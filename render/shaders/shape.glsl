@@ -1,16 +1,17 @@
-// What a surface looks like at a hit: gradient and Hessian of the tricubic B-spline with the
-// coefficients f − ∇²f/6 [Sigg05], and the gradient of the trilinear interpolant. Where the grid holds
-// the coefficients of the spline that rays meet, it is that one. In the words and the space of
+// Shape of the surface at a hit: gradient and Hessian of the tricubic B-spline with coefficients f
+// − ∇²f/6 [Sigg05], and gradient of the trilinear interpolant. If the grid stores spline
+// coefficients, all of these are derivatives of that spline. Types and space are those of
 // roots.glsl.
 //
-// The coefficients are not made: what they weigh, less a sixth of the weights' second differences, is
-// what the values weigh. So every value is read once and kept nowhere; Mesa 22.3 gathers from arrays.
+// The coefficients are not computed. Instead the weight of each value is the weight of its
+// coefficient minus a sixth of the weights' second differences. So each value is loaded once and
+// kept in no array, because Mesa 22.3 gathers from arrays.
 
 CONST_FLOAT kSixth = 0.16666666667f;
 CONST_FLOAT kEighth = 0.125f;
 
-// On one axis, of the six points from cell − 2 on: the weights of the uniform cubic B-spline and of
-// its derivatives, which are 0 at either end, and a sixth of their second differences.
+// Weights along one axis of the six points from cell − 2 on: those of the uniform cubic B-spline
+// and its derivatives, which are 0 at both ends, and a sixth of their second differences.
 struct Stencil {
   Real value[6], slope[6], bend[6];
   Real valueBend[6], slopeBend[6], bendBend[6];
@@ -66,8 +67,8 @@ struct Column {
 };
 
 Column columnAt(IN(Window) w, int i, int j) {
-  Whole nearBlocks = firstAt(w, i, j, 0);
-  Whole farBlocks = firstAt(w, i, j, 1);
+  Int nearBlocks = firstAt(w, i, j, 0);
+  Int farBlocks = firstAt(w, i, j, 1);
   Column c;
   c.f0 = loadValue(select(w.farZ[0], farBlocks, nearBlocks) + w.stepZ[0]);
   c.f1 = loadValue(select(w.farZ[1], farBlocks, nearBlocks) + w.stepZ[1]);
@@ -78,10 +79,10 @@ Column columnAt(IN(Window) w, int i, int j) {
   return c;
 }
 
-// Without its ends, which are not held where i or j are one.
+// A column without its two ends, which are not stored where i or j is an end.
 Column shortColumnAt(IN(Window) w, int i, int j) {
-  Whole nearBlocks = firstAt(w, i, j, 0);
-  Whole farBlocks = firstAt(w, i, j, 1);
+  Int nearBlocks = firstAt(w, i, j, 0);
+  Int farBlocks = firstAt(w, i, j, 1);
   Column c;
   c.f0 = real(0.0f);
   c.f1 = loadValue(select(w.farZ[1], farBlocks, nearBlocks) + w.stepZ[1]);
@@ -103,8 +104,8 @@ Real whole6(IN(Column) c, IN_ARRAY(Real, weight, 6)) {
   return sum;
 }
 
-// Of a slab across x: derivatives along y and z by their orders, of the values; and of the
-// coefficients but for what x has to do with them.
+// Derivatives along y and z in one slab across x, named by their orders. r: of the values. p: of
+// the coefficients, without the second differences along x.
 struct Slab {
   Real r00, r10, r20, r01, r11, r02;
   Real p00, p10, p20, p01, p11, p02;
@@ -159,13 +160,13 @@ void addColumn(INOUT(Slab) s, IN(Column) c, IN(Stencil) y, IN(Stencil) z, int j)
 }
 
 struct Shape {
-  Real gx, gy, gz;                    // gradient of the B-spline, φ by grid points
-  Real tx, ty, tz;                    // of the trilinear interpolant
-  Real hxx, hyy, hzz, hxy, hxz, hyz;  // of the B-spline
+  Real gx, gy, gz;                    // gradient of the B-spline, φ per grid spacing
+  Real tx, ty, tz;                    // gradient of the trilinear interpolant
+  Real hxx, hyy, hzz, hxy, hxz, hyz;  // Hessian of the B-spline
   Real error;                         // bound on |trilinear − smooth|, from second differences
 };
 
-// What the values of a slab have to do with the coefficients of those beside it.
+// Subtracts the part of a slab's values in the second differences along x of neighbouring slabs.
 void takeBeside(INOUT(Shape) shape, IN(Slab) s, Real value, Real slope, Real bend) {
   shape.gx = minus(shape.gx, slope, s.r00);
   shape.gy = minus(shape.gy, value, s.r10);
@@ -197,7 +198,7 @@ Real bendOf(Real before, Real at, Real after) {
   return magnitude(bend);
 }
 
-// Four corners of the cell, and how much the values bend there along y and z.
+// Values at four corners of the cell, and their second differences along y and z.
 struct Corners {
   Real f00, f01, f10, f11;
   Real b00, b01, b10, b11;
@@ -220,7 +221,7 @@ Corners cornersOf(IN(Column) c1, IN(Column) c2, IN(Column) c3, IN(Column) c4) {
   return c;
 }
 
-// A bound from the corners of one slab between those beside it.
+// Bound on the interpolation error from the corners of a slab and its two neighbours.
 Real errorOf(IN(Corners) before, IN(Corners) at, IN(Corners) after) {
   VAR e00 = bendOf(before.f00, at.f00, after.f00) + at.b00;
   VAR e01 = bendOf(before.f01, at.f01, after.f01) + at.b01;
@@ -230,12 +231,12 @@ Real errorOf(IN(Corners) before, IN(Corners) at, IN(Corners) after) {
   return most;
 }
 
-// The trilinear interpolant's, between two slabs.
+// Adds the gradient of the trilinear interpolant between two slabs.
 void addTrilinear(INOUT(Shape) shape, IN(Corners) low, IN(Corners) high, Real a, Real b, Real c) {
   VAR ra = 1.0f - a;
   VAR rb = 1.0f - b;
   VAR rc = 1.0f - c;
-  // Across y and z, of each slab; then their slopes along y and along z.
+  // Values of each slab, interpolated along y and z; then their derivatives along y and z.
   VAR v0 = between(between(low.f00, low.f01, c, rc), between(low.f10, low.f11, c, rc), b, rb);
   VAR v1 = between(between(high.f00, high.f01, c, rc), between(high.f10, high.f11, c, rc), b, rb);
   VAR y0 = between(low.f10 - low.f00, low.f11 - low.f01, c, rc);
@@ -248,9 +249,9 @@ void addTrilinear(INOUT(Shape) shape, IN(Corners) low, IN(Corners) high, Real a,
   shape.tz = between(z0, z1, a, ra);
 }
 
-// @param cell  that holds the place
-// @param a, b, c  the place in it, from 0 to 1
-Shape shapeAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Real a, Real b, Real c) {
+// @param cell  cell that contains the position
+// @param a, b, c  position in the cell, from 0 to 1
+Shape shapeAt(Bool asked, Int cellX, Int cellY, Int cellZ, Real a, Real b, Real c) {
   Window w = windowAt(asked, cellX, cellY, cellZ);
   Stencil x = stencilAt(a);
   Stencil y = stencilAt(b);
@@ -294,7 +295,7 @@ Shape shapeAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Real a, Real b,
     addValues(s, shortColumnAt(w, i, 4), y, z, 4);
     takeBeside(shape, s, x.valueBend[i], x.slopeBend[i], x.bendBend[i]);
   }
-  if (isSpline) {  // the surface that rays meet
+  if (isSpline) {  // rays meet the spline itself
     shape.tx = shape.gx;
     shape.ty = shape.gy;
     shape.tz = shape.gz;
@@ -303,7 +304,7 @@ Shape shapeAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Real a, Real b,
   return shape;
 }
 
-// Where a ray meets the surface.
+// Shape at the hit of a ray.
 Shape shapeOf(IN(Ray) ray, IN(Hit) hit) {
   VAR x = (ray.ox - toReal(hit.x)) + hit.t * ray.dx;
   VAR y = (ray.oy - toReal(hit.y)) + hit.t * ray.dy;

@@ -1,9 +1,9 @@
-// Where a ray crosses the zero set of a tricubic B-spline, whose coefficients the grid holds. In the
-// words and the space of roots.glsl.
+// Crossings of a ray with the zero set of a tricubic B-spline whose coefficients the grid stores.
+// Types and space are those of roots.glsl.
 //
-// Along a line the spline is of degree 9 in a cell. The Bézier net of the box that the way through
-// the cell spans tells its Bernstein coefficients: sums of products that are not negative, so that a
-// net of one sign gives coefficients of that sign, whatever is rounded.
+// Along a line the spline has degree 9 within a cell. Its Bernstein coefficients follow from the
+// Bézier net of the box that the ray's segment spans. They are sums of nonnegative multiples of the
+// net's values. So a net of one sign gives coefficients of that sign, in spite of rounding.
 
 CONST_INT kDegree = 9;
 
@@ -34,8 +34,8 @@ Real blended(IN(Blend) b, Real c0, Real c1, Real c2, Real c3) {
   return sum;
 }
 
-// From four coefficients each on the axis of that stride to the four of the Bézier net between two
-// places.
+// Replaces four coefficients along the axis with that stride by four values of the Bézier net
+// between two positions.
 void bendAxis(INOUT_ARRAY(Real, net, 64), int stride, Real from, Real to) {
   Blend b0 = blendOf(from, from, from);
   Blend b1 = blendOf(from, from, to);
@@ -58,14 +58,14 @@ void bendAxis(INOUT_ARRAY(Real, net, 64), int stride, Real from, Real to) {
   }
 }
 
-Whole countChanges(IN_ARRAY(Real, b, 10)) {
-  Whole count = whole(0);
+Int countChanges(IN_ARRAY(Real, b, 10)) {
+  Int count = integer(0);
   for (int i = 0; i < kDegree; ++i) count = count + bit(differ(b[i] < 0.0f, b[i + 1] < 0.0f), 1);
   return count;
 }
 
-// Halves the interval of a polynomial, and keeps the left part or the right one. Loops have fixed
-// bounds: Mesa 22.3 loses some of what loops within loops write between bounds that change.
+// Halves the interval of a polynomial and keeps the left or right part. The loops have fixed
+// bounds, because Mesa 22.3 loses writes of nested loops with variable bounds.
 void halve(INOUT_ARRAY(Real, b, 10), Bool asked, Bool right) {
   VAR l[10];
   VAR r[10];
@@ -93,18 +93,18 @@ Real valueAt(IN_ARRAY(Real, b, 10), Real u) {
   return c[0];
 }
 
-// As isolate().
-Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Whole) passing, INOUT(Real) low,
+// Isolates the first sign change; see isolate().
+Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Int) passing, INOUT(Real) low,
                    INOUT(Real) high) {
-  Whole changes = countChanges(b);
+  Int changes = countChanges(b);
   Bool single = AND(asked, changes == 1);
   Bool found = AND(single, passing == 0);
   passing = passing - bit(AND(single, NOT(found)), 1);
   Bool open = AND(asked, changes > 1);
   low = real(0.0f);
   high = real(1.0f);
-  Whole part = whole(0);
-  Whole halvings = whole(0);
+  Int part = integer(0);
+  Int halvings = integer(0);
   VAR size = real(1.0f);
   while (any(open)) {
     VAR c[10];
@@ -113,7 +113,7 @@ Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Whole) passing, INOU
       Bool deep = AND(open, halvings > n);
       if (any(deep)) halve(c, deep, ((part >> n) & 1) != 0);
     }
-    Whole count = countChanges(c);
+    Int count = countChanges(c);
     Bool deepest = halvings == kMostHalvings;
     Bool crosses = AND(open, OR(count == 1, AND(deepest, differ(c[0] < 0.0f, c[kDegree] < 0.0f))));
     Bool ends = AND(crosses, passing == 0);
@@ -124,23 +124,23 @@ Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Whole) passing, INOU
     high = select(ends, w, high);
     found = OR(found, ends);
     open = AND(open, NOT(ends));
-    open = goOn(open, AND(count > 1, NOT(deepest)), part, halvings, size);
+    open = nextPart(open, AND(count > 1, NOT(deepest)), part, halvings, size);
   }
   return found;
 }
 
-// What a ray does between two points of a cell, given from 0 to 1 on each axis.
-// @param carried, inside  is the side known on which the cell before ended, and is it the inside
-// @param passing          how many crossings to pass over, less those that the cell holds
-Crossing splineCrossingIn(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Real x0, Real y0,
+// Crossing of a ray between two points of a cell, given from 0 to 1 on each axis.
+// @param carried, inside  the side at the end of the previous cell is known, and it is the inside
+// @param passing  number of crossings to skip; reduced by those of the cell
+Crossing splineCrossingIn(Bool asked, Int cellX, Int cellY, Int cellZ, Real x0, Real y0,
                           Real z0, Real x1, Real y1, Real z1, Bool carried, Bool inside,
-                          INOUT(Whole) passing) {
+                          INOUT(Int) passing) {
   Window w = windowAt(asked, cellX, cellY, cellZ);
   VAR net[64];
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) {
-      Whole nearBlocks = firstAt(w, i + 1, j + 1, 0);
-      Whole farBlocks = firstAt(w, i + 1, j + 1, 1);
+      Int nearBlocks = firstAt(w, i + 1, j + 1, 0);
+      Int farBlocks = firstAt(w, i + 1, j + 1, 1);
       for (int k = 0; k < 4; ++k)
         net[16 * i + 4 * j + k] =
             loadValue(select(w.farZ[k + 1], farBlocks, nearBlocks) + w.stepZ[k + 1]);
@@ -177,10 +177,10 @@ Crossing splineCrossingIn(Bool asked, Whole cellX, Whole cellY, Whole cellZ, Rea
   crossing.found = isolateSpline(asked, b, passing, low, high);
   crossing.endsInside = b[kDegree] < 0.0f;
   crossing.share = real(0.0f);
-  crossing.goesIn = no();
+  crossing.enters = no();
   if (any(crossing.found)) {
     Bool startsInside = valueAt(b, low) < 0.0f;
-    crossing.goesIn = NOT(startsInside);
+    crossing.enters = NOT(startsInside);
     for (int i = 0; i < kBisections; ++i) {
       VAR middle = (low + high) * 0.5f;
       Bool same = NOT(differ(valueAt(b, middle) < 0.0f, startsInside));

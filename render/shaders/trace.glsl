@@ -1,20 +1,21 @@
-// The crossings of a ray with the zero set of the interpolant. In the words and the space of
+// Crossings of a ray with the zero set of the trilinear interpolant. Types and space are those of
 // roots.glsl.
 
-// What a ray does between two points of a cell, given from 0 to 1 on each axis.
-// @param brick, cellX …  the cell, as spotAt() found it
-// @param entered, left   axes of the faces, or kNone
-// @param carried, inside is the side known on which the cell before ended, and is it the inside
-// @param passing         how many crossings to pass over, less those that the cell holds
-Crossing crossingIn(Bool asked, Whole brick, Whole cellX, Whole cellY, Whole cellZ, Real x0, Real y0,
-                    Real z0, Real x1, Real y1, Real z1, Whole entered, Whole left, Bool aheadX,
-                    Bool aheadY, Bool aheadZ, Bool carried, Bool inside, INOUT(Whole) passing) {
+// Crossing of a ray between two points of a cell, given from 0 to 1 on each axis.
+// @param brick, cellX …  the cell, as returned by spotAt()
+// @param entered, left  axes of the entry and exit faces, or kNone
+// @param carried, inside  the side at the end of the previous cell is known, and it is the inside
+// @param passing  number of crossings to skip; reduced by those of the cell
+Crossing crossingIn(Bool asked, Int brick, Int cellX, Int cellY, Int cellZ, Real x0, Real y0,
+                    Real z0, Real x1, Real y1, Real z1, Int entered, Int left, Bool aheadX,
+                    Bool aheadY, Bool aheadZ, Bool carried, Bool inside, INOUT(Int) passing) {
   CellValues f = cellValues(asked, brick, cellX, cellY, cellZ);
-  Whole signs = bit(f.f0 < 0.0f, 1) | bit(f.f1 < 0.0f, 2) | bit(f.f2 < 0.0f, 4) | bit(f.f3 < 0.0f, 8) |
+  Int signs = bit(f.f0 < 0.0f, 1) | bit(f.f1 < 0.0f, 2) | bit(f.f2 < 0.0f, 4) | bit(f.f3 < 0.0f, 8) |
                 bit(f.f4 < 0.0f, 16) | bit(f.f5 < 0.0f, 32) | bit(f.f6 < 0.0f, 64) |
                 bit(f.f7 < 0.0f, 128);
 
-  // The trilinear interpolant along the way is a cubic; its coefficients are the blossom's values.
+  // Along the segment the trilinear interpolant is a cubic. Its Bernstein coefficients are values
+  // of its blossom.
   VAR rx0 = 1.0f - x0;
   VAR ry0 = 1.0f - y0;
   VAR rz0 = 1.0f - z0;
@@ -48,14 +49,14 @@ Crossing crossingIn(Bool asked, Whole brick, Whole cellX, Whole cellY, Whole cel
   VAR b1 = ((e1 + e2) + e3) * kThird;
   VAR b2 = ((e4 + e5) + e6) * kThird;
 
-  // At a face between two cells there is one side, whichever of them asks: that of its corners
-  // where they agree, else the one on which the cell before ended.
+  // Both cells at a face must agree on the side. It is the sign of the face's corners if they are
+  // equal, otherwise the side at the end of the previous cell.
   Bool upperIn = select(entered == 0, NOT(aheadX), select(entered == 1, NOT(aheadY), NOT(aheadZ)));
   Bool upperOut = select(left == 0, aheadX, select(left == 1, aheadY, aheadZ));
-  Whole maskIn = faceCorners(entered, upperIn);
-  Whole maskOut = faceCorners(left, upperOut);
-  Whole in_ = signs & maskIn;
-  Whole out_ = signs & maskOut;
+  Int maskIn = faceCorners(entered, upperIn);
+  Int maskOut = faceCorners(left, upperOut);
+  Int in_ = signs & maskIn;
+  Int out_ = signs & maskOut;
   Bool uniformIn = AND(entered != kNone, OR(in_ == 0, in_ == maskIn));
   Bool uniformOut = AND(left != kNone, OR(out_ == 0, out_ == maskOut));
   b0 = select(uniformIn, onSide(b0, in_ != 0), select(carried, onSide(b0, inside), b0));
@@ -67,37 +68,38 @@ Crossing crossingIn(Bool asked, Whole brick, Whole cellX, Whole cellY, Whole cel
   crossing.found = isolate(asked, b0, b1, b2, b3, passing, low, high);
   crossing.endsInside = b3 < 0.0f;
   crossing.share = real(0.0f);
-  crossing.goesIn = no();
+  crossing.enters = no();
   if (any(crossing.found)) {
     Bool startsInside = blossom(b0, b1, b2, b3, low, low, low) < 0.0f;
     crossing.share = bisect(b0, b1, b2, b3, startsInside, low, high);
-    crossing.goesIn = NOT(startsInside);
+    crossing.enters = NOT(startsInside);
   }
   return crossing;
 }
 
 struct Ray {
-  Real ox, oy, oz;  // where t is 0
-  Real dx, dy, dz;  // by t
-  Real ix, iy, iz;  // their inverses; kParallel where they are 0
-  Real start, end;  // of t
+  Real ox, oy, oz;  // position at t = 0
+  Real dx, dy, dz;  // derivative by t
+  Real ix, iy, iz;  // inverses of the direction; kParallel for 0
+  Real start, end;  // interval of t
 };
 
-// Where the ray of a pixel is on an axis of a RayFan.
+// One component of a pixel's ray in a RayFan.
 Real onFan(float middle, float right, float down, Real x, Real y) {
   VAR across = x * right + y * down;
   return across + middle;
 }
 
-// A ray that goes nowhere on an axis counts as going ahead and meets no plane of it: its inverse
-// is kParallel, and it is not moved off the place where it is.
+// Flushes tiny direction components to 0. A ray without motion along an axis counts as ascending
+// and meets no plane across it: its inverse is kParallel, and its position on the axis does not
+// change.
 Real onlyFar(Real d) {
   return select(AND(d > -kLeastDirection, d < kLeastDirection), real(0.0f), d);
 }
 
 Real inverseOf(Real d) { return select(d == 0.0f, real(kParallel), 1.0f / d); }
 
-// The ray of the pixel (x, y) of the fan, between the faces of the box of crossing cells.
+// The ray of pixel (x, y), clipped to the box of the crossed cells.
 Ray viewRay(Real x, Real y) {
   Ray ray;
   ray.ox = onFan(fan.origin[0], fan.originX[0], fan.originY[0], x, y);
@@ -122,54 +124,54 @@ Ray viewRay(Real x, Real y) {
 
 struct Hit {
   Bool found;
-  Bool goesIn;
+  Bool enters;
   Real t;
-  Whole x, y, z;  // cell
+  Int x, y, z;  // cell
 };
 
-// The crossing after `passing` others.
-Hit trace(Ray ray, Whole passing) {
+// Finds the crossing after `passing` earlier ones.
+Hit trace(Ray ray, Int passing) {
   Bool aheadX = ray.dx >= 0.0f;
   Bool aheadY = ray.dy >= 0.0f;
   Bool aheadZ = ray.dz >= 0.0f;
   Hit hit;
   hit.found = no();
-  hit.goesIn = no();
+  hit.enters = no();
   hit.t = ray.start;
   Bool alive = ray.start <= ray.end;
   VAR t = ray.start;
-  Whole x = cellAt(t, ray.ox, ray.dx, ray.ix, whole(0), whole(tableSizeX - 1));
-  Whole y = cellAt(t, ray.oy, ray.dy, ray.iy, whole(0), whole(tableSizeY - 1));
-  Whole z = cellAt(t, ray.oz, ray.dz, ray.iz, whole(0), whole(tableSizeZ - 1));
-  // A ray that starts before the table's first cells begins on their faces.
+  Int x = cellAt(t, ray.ox, ray.dx, ray.ix, integer(0), integer(tableSizeX - 1));
+  Int y = cellAt(t, ray.oy, ray.dy, ray.iy, integer(0), integer(tableSizeY - 1));
+  Int z = cellAt(t, ray.oz, ray.dz, ray.iz, integer(0), integer(tableSizeZ - 1));
+  // A ray that starts in front of the table's first cells begins on their faces.
   t = larger(t, planeAt(select(aheadX, x, x + 1), ray.ox, ray.ix));
   t = larger(t, planeAt(select(aheadY, y, y + 1), ray.oy, ray.iy));
   t = larger(t, planeAt(select(aheadZ, z, z + 1), ray.oz, ray.iz));
   alive = AND(alive, t <= ray.end);
-  Whole entered = whole(kNone);
-  Bool solved = no();    // the cell where a lane is crosses the surface, and the ray does not there
-  Bool carried = no();   // the cell before was such a one
-  Bool inside = no();    // and ended there
+  Int entered = integer(kNone);
+  Bool solved = no();    // the surface crosses this cell, but the ray does not cross the surface in it
+  Bool carried = no();   // the previous cell was such a cell
+  Bool inside = no();    // the ray was inside at its end
   while (any(alive)) {
-    // Walk to the next cell with a crossing.
+    // Advance to the next crossed cell.
     Bool walking = alive;
-    Whole brick = whole(0);
-    Whole axis = whole(kNone);
+    Int brick = integer(0);
+    Int axis = integer(kNone);
     VAR tExit = t;
     while (many(walking, alive)) {
       Spot spot = spotAt(walking, x, y, z);
       Bool stop = AND(spot.crosses, NOT(solved));
-      Whole size = spot.size;
-      Whole lowX = x & (whole(0) - size);
-      Whole lowY = y & (whole(0) - size);
-      Whole lowZ = z & (whole(0) - size);
+      Int size = spot.size;
+      Int lowX = x & (integer(0) - size);
+      Int lowY = y & (integer(0) - size);
+      Int lowZ = z & (integer(0) - size);
       VAR tx = planeAt(select(aheadX, lowX + size, lowX), ray.ox, ray.ix);
       VAR ty = planeAt(select(aheadY, lowY + size, lowY), ray.oy, ray.iy);
       VAR tz = planeAt(select(aheadZ, lowZ + size, lowZ), ray.oz, ray.iz);
       Bool byX = AND(tx <= ty, tx <= tz);
       Bool byY = AND(NOT(byX), ty <= tz);
       Bool byZ = AND(NOT(byX), NOT(byY));
-      Whole out_ = select(byX, whole(0), select(byY, whole(1), whole(2)));
+      Int out_ = select(byX, integer(0), select(byY, integer(1), integer(2)));
       VAR leaves = larger(t, select(byX, tx, select(byY, ty, tz)));
       Bool stopping = AND(walking, stop);
       brick = select(stopping, spot.brick, brick);
@@ -181,12 +183,12 @@ Hit trace(Ray ray, Whole passing) {
       carried = select(moving, solved, carried);
       solved = AND(solved, NOT(moving));
       Bool leap = AND(moving, size > 1);
-      Whole nextX = select(aheadX, lowX + size, lowX - 1);
-      Whole nextY = select(aheadY, lowY + size, lowY - 1);
-      Whole nextZ = select(aheadZ, lowZ + size, lowZ - 1);
-      Whole stillX = x;
-      Whole stillY = y;
-      Whole stillZ = z;
+      Int nextX = select(aheadX, lowX + size, lowX - 1);
+      Int nextY = select(aheadY, lowY + size, lowY - 1);
+      Int nextZ = select(aheadZ, lowZ + size, lowZ - 1);
+      Int stillX = x;
+      Int stillY = y;
+      Int stillZ = z;
       if (any(leap)) {
         stillX = select(leap, cellAt(leaves, ray.ox, ray.dx, ray.ix, lowX, lowX + (size - 1)), x);
         stillY = select(leap, cellAt(leaves, ray.oy, ray.dy, ray.iy, lowY, lowY + (size - 1)), y);
@@ -199,7 +201,7 @@ Hit trace(Ray ray, Whole passing) {
       alive = AND(alive, NOT(AND(moving, gone)));
       walking = AND(moving, NOT(gone));
     }
-    // Those that still walk have not come to a cell yet.
+    // Rays still in the loop have not found a crossed cell.
     Bool asked = AND(alive, NOT(walking));
     if (any(asked)) {
       VAR fromX = ray.ox - toReal(x);
@@ -226,7 +228,7 @@ Hit trace(Ray ray, Whole passing) {
       VAR place = t + crossing.share * (tExit - t);
       Bool hits = AND(asked, AND(crossing.found, place <= ray.end));
       hit.found = OR(hit.found, hits);
-      hit.goesIn = select(hits, crossing.goesIn, hit.goesIn);
+      hit.enters = select(hits, crossing.enters, hit.enters);
       hit.t = select(hits, place, hit.t);
       solved = OR(solved, asked);
       inside = select(asked, crossing.endsInside, inside);

@@ -1,18 +1,18 @@
-// The grid points about a cell, wherever they are held. In the words and the space of roots.glsl.
+// The grid points around a cell, in one or several blocks. Types and space are those of roots.glsl.
 
-// The six grid points on each axis from cell − 2 on, which lie in one block or in two.
+// Six grid points on each axis, from cell − 2 on. They lie in one block or two along an axis.
 struct Window {
-  Whole base[8];     // of the blocks, by bits x, y, z: where their first values are
-  Whole strides[8];  // and how far apart others
+  Int base[8];     // position of the first value of each block, by bits x, y, z
+  Int strides[8];  // strides of its values
   Bool farX[6], farY[6], farZ[6];
-  Whole stepX[6], stepY[6], stepZ[6];  // within the block
+  Int stepX[6], stepY[6], stepZ[6];  // offset within the block
 };
 
-Window windowAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ) {
+Window windowAt(Bool asked, Int cellX, Int cellY, Int cellZ) {
   Window w;
-  Whole x = cellX - 2;
-  Whole y = cellY - 2;
-  Whole z = cellZ - 2;
+  Int x = cellX - 2;
+  Int y = cellY - 2;
+  Int z = cellZ - 2;
   for (int i = 0; i < 6; ++i) {
     w.farX[i] = (x & 7) + i > 7;
     w.farY[i] = (y & 7) + i > 7;
@@ -26,11 +26,11 @@ Window windowAt(Bool asked, Whole cellX, Whole cellY, Whole cellZ) {
   return w;
 }
 
-// Numbers of the values at (i, j, 0) and on, as long as they are in the near blocks or in the far.
-Whole firstAt(IN(Window) w, int i, int j, int far) {
-  Whole base = select(w.farY[j], select(w.farX[i], w.base[6 + far], w.base[2 + far]),
+// Indices of the values at (i, j, 0) and following, in the near blocks or in the far ones.
+Int firstAt(IN(Window) w, int i, int j, int far) {
+  Int base = select(w.farY[j], select(w.farX[i], w.base[6 + far], w.base[2 + far]),
                       select(w.farX[i], w.base[4 + far], w.base[far]));
-  Whole strides = select(w.farY[j], select(w.farX[i], w.strides[6 + far], w.strides[2 + far]),
+  Int strides = select(w.farY[j], select(w.farX[i], w.strides[6 + far], w.strides[2 + far]),
                          select(w.farX[i], w.strides[4 + far], w.strides[far]));
   return base + w.stepX[i] * (strides >> kStrideShift) + w.stepY[j] * (strides & ((1 << kStrideShift) - 1));
 }

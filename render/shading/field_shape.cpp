@@ -10,10 +10,13 @@ using Imath::M33d;
 using Imath::V3d;
 using Join = FieldExpression::Join;
 
-constexpr double kAtEnd = 1 - 1e-6;   // of the background: there the band knows no distance
-constexpr double kEqualParts = 1e-6;  // of two solids: the first one counts
+constexpr double kAtEnd =
+    1 - 1e-6;  // relative to the background: at larger values the band has no distance
+constexpr double kEqualParts =
+    1e-6;  // contributions of two solids that count as equal; the first solid counts
 
-/// A step's value with its derivatives by its operands: a, and b of the sign it is joined with.
+/// Value of a step and its derivatives by its operands: a, and b with the sign with which it is
+/// joined.
 struct JoinShape {
   double value, a, b;
   double signOfB;

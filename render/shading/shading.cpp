@@ -11,9 +11,9 @@ using Imath::C3f;
 using Imath::V2d;
 using Imath::V3d;
 
-constexpr double kOcclusionReach =
-    0.25;                             // of the scene's diagonal: hollows darken, open sides do not
-constexpr double kDefaultRange = 40;  // of curvatures, times the scene's diagonal
+constexpr double kOcclusionShare =
+    0.25;  // fraction of the scene's diagonal: hollows darken, open surfaces do not
+constexpr double kDefaultRange = 40;  // range of curvatures, times the scene's diagonal
 constexpr std::uint64_t kAmbient = 1, kShadow = 2;
 
 std::uint64_t scramble(std::uint64_t x) {  // the finaliser of SplitMix64
@@ -27,7 +27,7 @@ double unitInterval(std::uint64_t bits) {
   return static_cast<double>(bits >> 11) * 0x1p-53;
 }
 
-/// Two unit vectors that make a frame with n [Duff17].
+/// Completes n to an orthonormal frame [Duff17].
 void tangentFrame(const V3d& n, V3d& s, V3d& t) {
   const double sign = std::copysign(1.0, n.z);
   const double a = -1 / (sign + n.z), b = n.x * n.y * a;
@@ -35,7 +35,7 @@ void tangentFrame(const V3d& n, V3d& s, V3d& t) {
   t = {b, sign + n.y * n.y * a, -n.y};
 }
 
-/// Around `axis`: cosine-weighted over the hemisphere.
+/// Direction in the hemisphere around `axis`, cosine-weighted.
 V3d cosineDirection(const V3d& axis, const V2d& u) {
   V3d s, t;
   tangentFrame(axis, s, t);
@@ -43,7 +43,7 @@ V3d cosineDirection(const V3d& axis, const V2d& u) {
   return s * (r * std::cos(angle)) + t * (r * std::sin(angle)) + axis * std::sqrt(1 - u.x);
 }
 
-/// Around `axis`: even over the cone of that half angle.
+/// Direction in a cone around `axis`, uniformly distributed.
 V3d coneDirection(const V3d& axis, double halfAngle, const V2d& u) {
   V3d s, t;
   tangentFrame(axis, s, t);
@@ -78,8 +78,8 @@ V3d keyDirection(const Scene& scene) {
   return (right * d.x + up * d.y - forward * d.z).normalized();
 }
 
-double skyReach(double diagonal) {
-  return kOcclusionReach * diagonal;
+double occlusionDistance(double diagonal) {
+  return kOcclusionShare * diagonal;
 }
 
 Shader::Shader(const Scene& scene, double diagonal, const RenderOptions& options)
@@ -98,7 +98,7 @@ Shader::Frame Shader::frameOf(const Hit& hit, const V3d& direction) const {
   Frame frame{hit.position, hit.normal, hit.facetNormal};
   if (frame.facet.dot(direction) > 0) frame.facet = -frame.facet;
   if (frame.normal.dot(frame.facet) < 0) frame.normal = -frame.normal;
-  // Off the interpolant's ripples, and off the rounding of the hit itself.
+  // Move the start off the ripples of the interpolant and the rounding error of the hit.
   frame.start += frame.facet * (2 * hit.surfaceError + 1e-9 * diagonal_);
   return frame;
 }
@@ -109,10 +109,11 @@ void Shader::addSkyRays(const Frame& frame, int x, int y, int sample,
   const PixelSequence sequence(x, y, kAmbient);
   for (int i = 0; i < count; ++i) {
     V3d d = cosineDirection(frame.normal, sequence.at(sample * count + i));
-    // The smooth normal's hemisphere dips below the facet's plane: mirror what does.
+    // The hemisphere around the smooth normal extends below the plane of the facet. Mirror such
+    // directions.
     const double below = d.dot(frame.facet);
     if (below < 0) d = (d - frame.facet * (2 * below)).normalized();
-    rays.push_back({frame.start, d, skyReach(diagonal_), 1});
+    rays.push_back({frame.start, d, occlusionDistance(diagonal_), 1});
   }
 }
 
@@ -200,7 +201,7 @@ C3f Shader::litColour(const Hit& hit, const Frame& frame, const V3d& direction, 
                   C3f(0.50f, 0.45f, 0.41f) * static_cast<float>(1 - upward);
   C3f result = scaled(C3f(1.06f, 1.0f, 0.90f), key);
   for (int c = 0; c < 3; ++c) {
-    // Light that bounces in a hollow of this colour; 1 where the sky is open.
+    // Interreflection in a hollow of this colour; 1 where the sky is open.
     const double bounced = open / (1 - static_cast<double>(albedo[c]) * (1 - open));
     result[c] += static_cast<float>(bounced) * static_cast<float>(scene_.ambient) * sky[c];
   }
@@ -234,7 +235,8 @@ C3f Shader::inkColour(const Hit& hit, const Frame& frame, const V3d& direction) 
   const auto mark = [&](const C3f& with, double amount) {
     colour += scaled(with - colour, std::clamp(amount, 0.0, 1.0));
   };
-  // A ridge bends one way alone, or that way most: corners are all of them.
+  // The larger curvature decides: a ridge bends most outwards, a valley most inwards. A convex
+  // corner counts as a ridge.
   const double ridge = hit.curvature.k1 / curvatureRange_,
                valley = -hit.curvature.k2 / curvatureRange_;
   mark(sepia, ridge > valley ? 1.5 * (ridge - 1) : 0);

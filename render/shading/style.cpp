@@ -21,7 +21,7 @@ C3f mixed(const C3f& a, const C3f& b, double share) {
   return a + (b - a) * static_cast<float>(share);
 }
 
-/// From −1 to 1, half of the way at ±range: nothing is cut off, whatever the scale.
+/// Maps curvatures to (−1, 1), with ±range at half way. Large values are compressed, not clipped.
 double squeezed(double curvature, double range) {
   return 2 / std::numbers::pi * std::atan(curvature / range);
 }
@@ -33,7 +33,8 @@ double ramp(double from, double to, double x) {
 
 const C3f kNeutral(0.62f, 0.60f, 0.57f);
 
-/// Between two colours that differ by lightness as little as by the sign that they tell.
+/// Colour between two hues, through neutral at 0. The lightness carries little of the difference,
+/// so that shading stays readable.
 C3f diverging(double value, const C3f& negative, const C3f& positive) {
   return mixed(kNeutral, value < 0 ? negative : positive, std::abs(value));
 }
@@ -71,19 +72,19 @@ C3f meanColour(const CurvatureSample& sample, double range) {
 }
 
 C3f gaussColour(const CurvatureSample& sample, double range) {
-  // Of the size of a curvature, so that one range serves both.
+  // The square root has the dimension of a curvature, so that one range serves both.
   const double k = std::copysign(std::sqrt(std::abs(sample.gauss)), sample.gauss);
   return diverging(squeezed(k, range), C3f(0.02f, 0.30f, 0.10f), C3f(0.62f, 0.24f, 0.0f));
 }
 
 C3f principalColour(const CurvatureSample& sample, double range) {
-  // Corners and edges of the table, whose entries are k1 ≥ k2: bowl, groove, saddle, ridge, dome.
+  // Corners and edges of the table of pairs k1 ≥ k2: bowl, groove, saddle, ridge, dome.
   const double a = squeezed(sample.k1, range), b = squeezed(sample.k2, range);
   const C3f dome(0.65f, 0.05f, 0.03f), ridge(0.75f, 0.48f, 0.04f), saddle(0.06f, 0.42f, 0.10f),
       groove(0.03f, 0.40f, 0.52f), bowl(0.04f, 0.08f, 0.55f);
   const double size = std::min(1.0, std::hypot(a, b));
   if (size == 0) return kNeutral;
-  // −1 for bowls, −1/2 grooves, 0 saddles, 1/2 ridges, 1 domes [Koenderink92].
+  // Shape index: −1 for bowls, −1/2 grooves, 0 saddles, 1/2 ridges, 1 domes [Koenderink92].
   const double index = 2 / std::numbers::pi * std::atan2(a + b, a - b);
   const C3f* table[5] = {&bowl, &groove, &saddle, &ridge, &dome};
   const double place = std::clamp(2 * (index + 1), 0.0, 4.0);
@@ -96,8 +97,8 @@ double accessibilityOf(const CurvatureSample& sample, double range) {
 }
 
 double silhouetteOf(double cosine, double viewCurvature, double width) {
-  // The line ends where the surface has bent away by its width; where it bends towards the eye
-  // there is no outline to be near to.
+  // The line ends where the surface has turned away from the outline by the line's width. A surface
+  // that curves towards the eye has no outline nearby.
   const double bend = std::clamp(width * viewCurvature, 0.0, 1.0);
   const double limit = std::sqrt(bend * (2 - bend));
   return limit > 0 && cosine <= limit ? 1 : 0;
@@ -127,7 +128,7 @@ ColourImage readColourPng(const std::filesystem::path& path, std::size_t maxMemo
   std::error_code failed;
   if (!std::filesystem::is_regular_file(path, failed))
     throw levelset::IoError(
-        fmt::format("read image: there is no file '{}'; check the name", path.string()));
+        fmt::format("read image: '{}' does not exist; check the name", path.string()));
   if (!std::ifstream(path, std::ios::binary))
     throw levelset::IoError(
         fmt::format("read image: {} cannot be opened; check its permissions", path.string()));
@@ -140,11 +141,12 @@ ColourImage readColourPng(const std::filesystem::path& path, std::size_t maxMemo
   png.version = PNG_IMAGE_VERSION;
   if (!png_image_begin_read_from_file(&png, path.c_str()))
     throw levelset::InvalidInput(
-        fmt::format("read image: {} is no PNG: {}", path.string(), png.message));
+        fmt::format("read image: {} is not a PNG: {}", path.string(), png.message));
   constexpr double kMostPixels = 1 << 26;
   if (static_cast<double>(png.width) * png.height > kMostPixels)
-    throw levelset::ResourceLimit(fmt::format("read image: {} has {}x{} pixels, more than 2^26",
-                                              path.string(), png.width, png.height));
+    throw levelset::ResourceLimit(
+        fmt::format("read image: {} has {}x{} pixels, but at most 2^26 are supported",
+                    path.string(), png.width, png.height));
   requirePngPixels(path, png.width, png.height);
   levelset::requireMemory((4.0 + sizeof(C3f)) * png.width * png.height, maxMemory, "read image");
   png.format = PNG_FORMAT_RGBA;

@@ -17,8 +17,8 @@ V3d row(const Imath::M44d& m, int i) {
   return {m[i][0], m[i][1], m[i][2]};
 }
 
-/// Of the normal section along a direction (index axes, of any length) on the tangent plane, per
-/// voxel; zero where the direction is the normal's.
+/// Normal curvature in a direction (index axes, any length), projected onto the tangent plane, per
+/// voxel. Zero where the direction is that of the normal.
 double curvatureAlong(const SurfaceShape& shape, const V3d& direction) {
   const double length = shape.gradient.length();
   if (!(length > 0)) return 0;
@@ -28,8 +28,8 @@ double curvatureAlong(const SurfaceShape& shape, const V3d& direction) {
   return along.dot(along * shape.hessian) / (length * along.length2());
 }
 
-/// From gradient and Hessian [Goldman05], per world unit: k1 ≥ k2. Zero where the gradient
-/// vanishes.
+/// Principal, mean and Gauss curvatures from gradient and Hessian [Goldman05], per world unit, k1 ≥
+/// k2. Zero where the gradient vanishes.
 CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
   const V3d& g = shape.gradient;
   const Imath::M33d& h = shape.hessian;
@@ -53,8 +53,8 @@ CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
   return {mean, gauss, mean + spread, mean - spread};
 }
 
-/// The same surface from its other side.
-CurvatureSample turned(const CurvatureSample& sample) {
+/// Curvatures of the same surface seen from its other side.
+CurvatureSample flipped(const CurvatureSample& sample) {
   return {-sample.mean, sample.gauss, -sample.k2, -sample.k1};
 }
 
@@ -62,7 +62,7 @@ CurvatureSample turned(const CurvatureSample& sample) {
 
 void addShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWorld,
               const V3d& direction) {
-  // For a rotation with uniform scale, gradients turn as directions do.
+  // A rotation with uniform scale maps gradients like directions.
   V3d facet, smooth;
   indexToWorld.multDirMatrix(shape.trilinearGradient, facet);
   indexToWorld.multDirMatrix(shape.gradient, smooth);
@@ -75,10 +75,10 @@ void addShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWor
   hit.viewCurvature = curvatureAlong(shape, V3d(axes[0].dot(direction), axes[1].dot(direction),
                                                 axes[2].dot(direction))) /
                       voxelSize;
-  if (!hit.isTurned) return;
+  if (!hit.isFlipped) return;
   hit.facetNormal = -hit.facetNormal;
   hit.normal = -hit.normal;
-  hit.curvature = turned(hit.curvature);
+  hit.curvature = flipped(hit.curvature);
   hit.viewCurvature = -hit.viewCurvature;
 }
 

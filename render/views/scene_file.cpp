@@ -31,13 +31,14 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kFormat = "levelsmith scene";
 constexpr int kVersion = 1;
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kMostBytes = 1 << 24;  // of a file that only names others
+constexpr double kMostBytes =
+    1 << 24;  // limit of a scene file, which contains only names of other files
 
 Json toJson(const V3d& v) {
   return {v.x, v.y, v.z};
 }
 
-/// By the shortest numbers that are these floats again.
+/// Writes the shortest numbers that are read back as the same floats.
 Json colourJson(const Imath::C3f& colour) {
   const auto shortest = [](float c) { return std::stod(fmt::format("{}", c)); };
   return {shortest(colour.x), shortest(colour.y), shortest(colour.z)};
@@ -71,24 +72,24 @@ void requireColour(const Imath::C3f& colour) {
   for (int c = 0; c < 3; ++c)
     if (!(colour[c] >= 0 && colour[c] <= 1))
       throw InvalidInput(
-          fmt::format("write: a colour of {}, {}, {} is not from 0 to 1; give another", colour.x,
-                      colour.y, colour.z));
+          fmt::format("write: the colour {}, {}, {} is not between 0 and 1; give one in this range",
+                      colour.x, colour.y, colour.z));
 }
 
-/// Of a part of a scene, beside its file.
+/// File of a part of a scene, beside the scene's file.
 std::filesystem::path fileBeside(const std::filesystem::path& file, const std::string& name,
                                  const char* extension) {
   return file.parent_path() / (file.stem().string() + "-" + name + extension);
 }
 
-/// Reads a document, knowing what it is for what it says when something is wrong.
+/// Reads the document. Error messages name the file and the part.
 class Reader {
  public:
   explicit Reader(const std::filesystem::path& file) : file_(file.string()) {}
 
   [[noreturn]] void refuse(const std::string& where, const std::string& what) const {
     throw InvalidInput(fmt::format(
-        "read: {}: {} {}; docs/rendering.md tells how a scene is written", file_, where, what));
+        "read: {}: {} {}; docs/rendering.md describes the format of scenes", file_, where, what));
   }
 
   [[nodiscard]] const Json& member(const Json& json, const char* name,
@@ -101,11 +102,11 @@ class Reader {
   [[nodiscard]] std::string text(const Json& json, const char* name,
                                  const std::string& where) const {
     const Json& value = member(json, name, where);
-    if (!value.is_string()) refuse(where, fmt::format("has a \"{}\" that is no text", name));
+    if (!value.is_string()) refuse(where, fmt::format("has a \"{}\" that is not a text", name));
     return value.get<std::string>();
   }
 
-  /// As many finite numbers as asked for.
+  /// Reads exactly `count` finite numbers.
   [[nodiscard]] std::vector<double> numbers(const Json& json, const char* name, std::size_t count,
                                             const std::string& where) const {
     const Json& list = member(json, name, where);
@@ -132,10 +133,10 @@ class Reader {
     return numbers(json, name, 1, where)[0];
   }
 
-  /// So that a word that is written wrongly is not passed over.
+  /// Rejects unknown members, so that a misspelt word is not ignored.
   void requireKnown(const Json& json, const std::set<std::string>& known,
                     const std::string& where) const {
-    if (!json.is_object()) refuse(where, "is no object");
+    if (!json.is_object()) refuse(where, "is not an object");
     for (const auto& [name, value] : json.items())
       if (!known.contains(name)) refuse(where, fmt::format("has an unknown \"{}\"", name));
   }
@@ -172,7 +173,7 @@ class Reader {
     return light;
   }
 
-  /// What solids and meshes have in common. @param number_  of the part, from 1 on
+  /// Reads the members common to solids and meshes. @param number_  of the part, from 1 on
   template <typename Part>
   void readPart(const Json& json, std::size_t number_, const std::string& where,
                 Part& solid) const {
@@ -181,38 +182,39 @@ class Reader {
     if (json.contains("id")) {
       const double id = number(json, "id", where);
       if (!(id >= 1 && id <= 4294967295.0) || id != std::floor(id))
-        refuse(where, "has an \"id\" that is no whole number from 1 to 4294967295");
+        refuse(where, "has an \"id\" that is not an integer from 1 to 4294967295");
       solid.id = static_cast<std::uint32_t>(id);
     }
     if (json.contains("colour")) {
       const V3d colour = point(json, "colour", where);
       for (int c = 0; c < 3; ++c)
         if (!(colour[c] >= 0 && colour[c] <= 1))
-          refuse(where, "has a \"colour\" that is not from 0 to 1");
+          refuse(where, "has a \"colour\" that is not between 0 and 1");
       solid.colour = Imath::C3f(colour);
     }
     if (json.contains("opacity")) solid.opacity = number(json, "opacity", where);
     if (!(solid.opacity > 0 && solid.opacity <= 1))
-      refuse(where, "has an \"opacity\" that is not above 0 and up to 1");
+      refuse(where, "has an \"opacity\" that is not above 0 and at most 1");
   }
 
-  /// Beside the scene's own file, unless it is told in full.
+  /// Path of a part's file, relative to the scene's folder unless absolute.
   [[nodiscard]] std::filesystem::path partFile(const Json& json, const std::filesystem::path& file,
                                                const std::string& where) const {
     const std::string name = text(json, "file", where);
-    if (name == "-") refuse(where, "is to come from standard input, which a scene cannot");
+    if (name == "-") refuse(where, "names standard input, which a scene cannot use");
     return file.parent_path() / name;
   }
 
-  /// What a job makes of numbers of the file; where it refuses them, so does this.
+  /// Returns the result of a job. If the job rejects the values, adds the file and the location to
+  /// the message.
   template <typename Job>
-  auto told(const std::string& where, const Job& job) const {
+  auto withContext(const std::string& where, const Job& job) const {
     try {
       return job();
     } catch (const levelset::UsageError& error) {
-      refuse(where, fmt::format("cannot be used ({})", error.what()));
+      refuse(where, fmt::format("is not valid ({})", error.what()));
     } catch (const InvalidInput& error) {
-      refuse(where, fmt::format("cannot be used ({})", error.what()));
+      refuse(where, fmt::format("is not valid ({})", error.what()));
     }
   }
 
@@ -244,18 +246,18 @@ Json documentOf(const std::filesystem::path& file) {
   return Json::parse(text, nullptr, /*allow_exceptions=*/false);
 }
 
-/// Before anything is written: JSON holds UTF-8 only.
+/// Called before anything is written, because JSON supports only UTF-8.
 std::string textOf(const Json& json, const std::filesystem::path& file) {
   try {
     return json.dump(2);
   } catch (const Json::exception&) {
     throw levelset::IoError(fmt::format(
-        "write: {} cannot be told in the file, since its name is not UTF-8; take another name",
+        "write: {} cannot be stored in a scene, because its name is not UTF-8; use another name",
         file.string()));
   }
 }
 
-/// The parts of a job that takes one after the other.
+/// Divides progress among parts that run one after the other.
 class Parts {
  public:
   Parts(const levelset::Progress& progress, std::size_t count)
@@ -285,10 +287,10 @@ void readSolid(const Reader& reader, const Json& json, const std::filesystem::pa
                .repairs = &repairs,
                .progress = progress});
   if (solid.band.isOpenSurface())
-    reader.refuse(where, "is the band of an open surface, which holds no solid");
+    reader.refuse(where, "is the band of an open surface, which is not a solid");
   if (options.repairs) options.repairs(repairs, source);
   if (json.contains("transform"))
-    solid.band = reader.told(
+    solid.band = reader.withContext(
         where, [&] { return levelset::transform(solid.band, reader.matrix(json, where)); });
   scene.solids.push_back(std::move(solid));
 }
@@ -311,7 +313,7 @@ void readMeshPart(const Reader& reader, const Json& json, const std::filesystem:
       reader.partFile(json, file, where),
       {.attributes = true, .maxMemory = options.maxMemory, .progress = progress});
   if (json.contains("transform"))
-    mesh = reader.told(
+    mesh = reader.withContext(
         where, [&] { return levelset::transform(std::move(mesh), reader.matrix(json, where)); });
   part.mesh = std::make_shared<const levelset::TriMesh>(std::move(mesh));
   scene.meshes.push_back(std::move(part));
@@ -329,11 +331,13 @@ void requireSceneNames(const std::vector<std::string>& names) {
     const auto isWord = [](unsigned char c) { return std::isalnum(c) || c == '_'; };
     if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0])) ||
         !std::all_of(name.begin(), name.end(), isWord))
-      throw levelset::UsageError(fmt::format(
-          "scene: '{}' cannot name a part; take letters, digits and _, no digit first", name));
-    if (!seen.insert(name).second)
       throw levelset::UsageError(
-          fmt::format("scene: two parts are called '{}'; give each a name of its own", name));
+          fmt::format("scene: '{}' is not a valid name of a part; use letters, digits and _, and "
+                      "no digit first",
+                      name));
+    if (!seen.insert(name).second)
+      throw levelset::UsageError(fmt::format(
+          "scene: two parts have the name '{}'; give each part a different name", name));
   }
 }
 
@@ -396,8 +400,8 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   const Reader reader(file);
   const Json json = documentOf(file);
   const std::string whole = "the file";
-  if (json.is_discarded()) reader.refuse(whole, "is no JSON document, or was cut off");
-  if (reader.text(json, "format", whole) != kFormat) reader.refuse(whole, "holds no scene");
+  if (json.is_discarded()) reader.refuse(whole, "is not a JSON document, or is incomplete");
+  if (reader.text(json, "format", whole) != kFormat) reader.refuse(whole, "is not a scene");
   if (reader.number(json, "version", whole) != kVersion)
     reader.refuse(whole, fmt::format("is not of version {}", kVersion));
   reader.requireKnown(json,
@@ -409,18 +413,18 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   viewed.hasCamera = json.contains("camera");
   if (viewed.hasCamera) {
     scene.camera = reader.camera(json.at("camera"));
-    reader.told("the camera", [&] { validate(scene.camera); });
+    reader.withContext("the camera", [&] { validate(scene.camera); });
   }
   if (json.contains("light")) scene.key = reader.light(json.at("light"));
   if (json.contains("ambient")) scene.ambient = reader.number(json, "ambient", whole);
-  reader.told("the light", [&] { requireLight(scene); });
+  reader.withContext("the light", [&] { requireLight(scene); });
   const Json none = Json::array();
   const Json& solids = json.contains("solids") ? json.at("solids") : none;
   const Json& meshes = json.contains("meshes") ? json.at("meshes") : none;
   if (!solids.is_array() || !meshes.is_array() || (solids.empty() && meshes.empty()))
     reader.refuse(whole, "has no solids and no meshes");
   Parts parts(options.progress, solids.size() + meshes.size());
-  ReadSceneOptions rest = options;  // the limit is of all parts together
+  ReadSceneOptions rest = options;  // the memory limit applies to all parts together
   rest.maxMemory = levelset::memoryLimit(options.maxMemory);
   const auto spend = [&rest](std::size_t bytes) {
     rest.maxMemory -= std::min(rest.maxMemory, bytes);
@@ -433,7 +437,7 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
     readMeshPart(reader, entry, file, rest, parts.next(), scene);
     spend(bytesOf(*scene.meshes.back().mesh));
   }
-  reader.told(whole, [&] { requireNames(scene); });
+  reader.withContext(whole, [&] { requireNames(scene); });
   std::set<std::uint32_t> ids;
   const auto isNew = [&](const auto& part) { return ids.insert(part.id).second; };
   if (!std::all_of(scene.solids.begin(), scene.solids.end(), isNew) ||
@@ -443,7 +447,7 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
     scene.csg = CsgExpression(reader.text(json, "csg", whole), solidNames(scene));
   if (json.contains("soft")) scene.softness = reader.number(json, "soft", whole);
   if (json.contains("morph")) scene.morph = reader.number(json, "morph", whole);
-  reader.told(whole, [&] { requireFields(scene); });
+  reader.withContext(whole, [&] { requireFields(scene); });
   return viewed;
 }
 

@@ -18,15 +18,15 @@ namespace {
 using Imath::C3f;
 using Imath::V3d;
 
-constexpr double kMargin = 1.08;     // of the frame about the solid
-constexpr double kLine = 1.2;        // pixels
-constexpr double kZeroLine = 2.4;    // pixels
+constexpr double kMargin = 1.08;     // size of the frame relative to the solid
+constexpr double kLine = 1.2;        // width of a contour line, pixels
+constexpr double kZeroLine = 2.4;    // width of the zero contour, pixels
 constexpr double kFaintLine = 0.45;  // darkness of the contours
 constexpr int kAcross = 4;           // samples along a pixel's side
 
-/// Where the pixels are.
+/// Positions of the pixels.
 struct Frame {
-  V3d centre, right, down;  ///< the last two by a pixel
+  V3d centre, right, down;  ///< right and down: the step from pixel to pixel
   [[nodiscard]] V3d at(double x, double y) const { return centre + right * x + down * y; }
 };
 
@@ -70,11 +70,11 @@ class SlicePainter {
     C3f result = phi < 0 ? mixedColour(C3f(0.55f, 0.72f, 0.88f), C3f(0.10f, 0.25f, 0.52f), depth)
                          : mixedColour(C3f(0.94f, 0.82f, 0.62f), C3f(0.62f, 0.40f, 0.18f), depth);
     if (isFar) return phi < 0 ? C3f(0.16f, 0.20f, 0.28f) : C3f(0.80f, 0.80f, 0.80f);
-    // A line is as many pixels wide as φ changes in the plane.
+    // The line width in pixels follows from the gradient of φ within the plane.
     const V3d gradient = phi_.gradient(p);
     const double perPixel = std::hypot(gradient.dot(frame_.right), gradient.dot(frame_.down));
     const double toLine = std::abs(phi - std::round(phi / step_) * step_);
-    const bool isEnd = std::abs(phi) > background_ - 0.25 * step_;  // where the band is cut off
+    const bool isEnd = std::abs(phi) > background_ - 0.25 * step_;  // near the end of the band
     if (!isEnd && toLine < 0.5 * kLine * perPixel && 4 * kLine * perPixel < step_)
       result = mixedColour(result, C3f(0), kFaintLine);
     if (std::abs(phi) < 0.5 * kZeroLine * perPixel) result = C3f(0.01f);
@@ -91,14 +91,15 @@ void requireSlice(const levelset::NarrowBand& band, const SliceOptions& options)
   const V3d sum = options.point + options.normal;
   if (!std::isfinite(sum.x + sum.y + sum.z) || !(options.normal.length() > 0))
     throw levelset::UsageError(
-        "slice: the plane has no direction; give a point and a normal of finite numbers");
+        "slice: the plane's point or normal is not finite, or the normal is zero; give a finite "
+        "point and a nonzero normal");
   if (options.width < 1 || options.height < 1 || !(options.step >= 0) ||
       !std::isfinite(options.step))
     throw levelset::UsageError(fmt::format(
-        "slice: {}x{} pixels with a contour every {} cannot be drawn; give positive numbers",
+        "slice: {}x{} pixels with a contour every {} are out of range; give positive numbers",
         options.width, options.height, options.step));
   if (static_cast<double>(options.width) * options.height > kMaxPixels)
-    throw levelset::ResourceLimit(fmt::format("slice: {}x{} pixels are more than {:.0f}",
+    throw levelset::ResourceLimit(fmt::format("slice: {}x{} pixels exceed the limit of {:.0f}",
                                               options.width, options.height, kMaxPixels));
   constexpr double kBytesOfPixel = 8 * 4;
   levelset::requireMemory(kBytesOfPixel * options.width * options.height, options.maxBytes,

@@ -9,22 +9,24 @@
 
 namespace render {
 
-/// A plane through a solid.
+/// A plane through a solid, and the size of its picture.
 struct SliceOptions {
-  Imath::V3d point{0}, normal{0, 0, 1};  ///< seen from where the normal, of any length, points
+  Imath::V3d point{0}, normal{0, 0, 1};  ///< the normal, of any length, points towards the viewer
   int width = 1024, height = 768;        ///< pixels
-  double step = 0;  ///< world units from one contour line to the next; 0: a voxel
-  std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< for the image
+  double step = 0;                       ///< distance of contour lines, world units; 0: one voxel
+  std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< memory limit of the image
   levelset::Progress progress = {};
 };
 
-/// The distance φ in a plane: by colour, blue inside and brown outside, with contour lines, the
-/// zero one black; even tones where the band does not reach. Upwards is z, or y where the normal is
-/// along z; the picture frames the solid's bounds.
-/// @return layers R G B A, and phi (trilinear, ± the background outside the band), P.X P.Y P.Z,
-///         from the pixels' middles, world units
-/// @throws levelset::UsageError for a plane without direction, a size or step that is not positive;
-///         levelset::InvalidInput for a solid without surface; levelset::Cancelled
+/// Draws the distance φ in a plane: blue inside and brown outside, with contour lines; the zero
+/// contour is black. Areas outside the band have even tones. Up is z, or y where the normal is
+/// along z. The picture frames the solid's bounds.
+/// @return layers R G B A; phi (trilinear, ± the background outside the band) and P.X P.Y P.Z at
+///         the pixel centres, world units
+/// @throws levelset::UsageError for a plane with a zero normal, or a size or step that is not
+///         positive
+/// @throws levelset::InvalidInput for a solid without surface
+/// @throws levelset::Cancelled when progress asks to stop
 [[nodiscard]] Image drawSlice(const levelset::NarrowBand& band, const SliceOptions& options);
 
 }  // namespace render

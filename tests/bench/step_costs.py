@@ -67,8 +67,8 @@ def said(command, chain):
     told = subprocess.run([command, "--explain", *chain], capture_output=True, text=True, check=True).stdout
     row = told.splitlines()[-2]
     seconds = re.search(r"; ([0-9.e+-]+) s", row)
-    worked = re.search(r"works with ([0-9.e+-]+) MB", row)
-    made = re.search(r", ([0-9.e+-]+) MB", row.split("works with")[0])
+    worked = re.search(r"working memory ([0-9.e+-]+) MB", row)
+    made = re.search(r", ([0-9.e+-]+) MB", row.split("working memory")[0])
     values = sum(float(found.group(1)) for found in (worked, made) if found)
     return float(seconds.group(1)) if seconds else None, 1e6 * values
 

@@ -20,10 +20,10 @@ void readAs(const char* name, std::string_view bytes) {
   const std::filesystem::path file = scratchFile(name, bytes);
   accepts([&] { static_cast<void>(levelset::meshFileInfo(file)); });
   for (const bool attributes : {true, false}) {
-    std::vector<std::string> leftAside;
+    std::vector<std::string> unsupported;
     accepts([&] {
       requireSound(levelset::readMesh(
-          file, {.attributes = attributes, .maxMemory = kMaxMemory, .leftAside = &leftAside}));
+          file, {.attributes = attributes, .maxMemory = kMaxMemory, .unsupported = &unsupported}));
     });
   }
 }

@@ -99,7 +99,7 @@ def test_a_folder_that_cannot_be_is_refused(ls, tmp_path):
     (tmp_path / "file").write_text("")
     ls.set_cache(tmp_path / "file")
     try:
-        with pytest.raises(ls.FileError, match="cannot be made"):
+        with pytest.raises(ls.FileError, match="cannot create"):
             part(ls).compute()
     finally:
         ls.set_cache()
@@ -120,5 +120,5 @@ def test_values_are_pickled_bit_for_bit(ls):
     field = ls.sphere(radius=1, voxel=0.1).march(speed="1 + 0.5*x", to=0.4)
     assert type(field) is ls.Field
     assert pickle.loads(pickle.dumps(field)).info() == field.info()
-    with pytest.raises(ls.UsageError, match="patch cannot be handed"):
+    with pytest.raises(ls.UsageError, match="patch cannot be sent"):
         pickle.dumps(solid.decal(at=(0, 0, 1), direction=(1, 0, 0), radius=0.3, height=0.1))

@@ -49,7 +49,7 @@ Json notesJson(const StepNotes& notes) {
   return json;
 }
 
-/// Infinities, which JSON has no numbers for, come back as nothing.
+/// Reads a number. JSON has no infinity and stores it as null.
 double numberOf(const Json& json) {
   return json.is_number() ? json.get<double>() : HUGE_VAL;
 }
@@ -77,22 +77,23 @@ std::string contentsOf(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-/// An entry as it is in its file: a digest of all behind it comes first, since a text that was
-/// damaged may still be one.
+/// Text of an entry file: a digest of the JSON text, then the JSON text. The digest detects damage
+/// that leaves valid JSON.
 std::string textOf(const Json& entry) {
   const std::string text = entry.dump(1, ' ', false, Json::error_handler_t::replace);
   return digestOf(text) + "\n" + text;
 }
 
-/// @throws std::exception for what is damaged, or not there
+/// @throws std::exception if the entry is damaged or missing
 Json readEntry(const fs::path& file) {
   const std::string bytes = contentsOf(file);
   const std::size_t end = std::min(bytes.find('\n'), bytes.size());
   const std::string text = bytes.substr(std::min(end + 1, bytes.size()));
-  if (bytes.substr(0, end) != digestOf(text)) throw levelset::InvalidInput("cache: it is damaged");
+  if (bytes.substr(0, end) != digestOf(text))
+    throw levelset::InvalidInput("cache: the entry is damaged");
   Json entry = Json::parse(text);
   if (entry.at("version") != kCacheVersion)
-    throw levelset::InvalidInput("cache: it is of another version");
+    throw levelset::InvalidInput("cache: the entry has another version");
   return entry;
 }
 
@@ -104,11 +105,11 @@ void touch(const fs::path& file) {
   (void)::utimensat(AT_FDCWD, file.c_str(), nullptr, 0);
 }
 
-/// Of what a value is, to tell whether it came back whole.
+/// Hash of a value's content, to verify that it was read back unchanged.
 std::uint64_t hashOf(const Value& value) {
   if (value.kind() == Kind::Band) return value.band().contentHash();
   if (value.kind() == Kind::Field) return value.field().contentHash();
-  return 0;  // the bytes of a mesh hold their own
+  return 0;  // the bytes of a mesh contain their own digest
 }
 
 }  // namespace
@@ -131,19 +132,19 @@ Cache::Cache(fs::path folder) : folder_(std::move(folder)) {
     fs::create_directories(folder_ / part, error);
     if (error)
       throw levelset::IoError(
-          fmt::format("--cache: '{}' cannot be made: {}; name a folder that can be written",
+          fmt::format("--cache: cannot create '{}': {}; use a folder that is writable",
                       (folder_ / part).string(), error.message()));
   }
   if (::access((folder_ / "new").c_str(), W_OK) != 0)
     throw levelset::IoError(
-        fmt::format("--cache: '{}' cannot be written to; name another folder", folder_.string()));
+        fmt::format("--cache: '{}' is not writable; use another folder", folder_.string()));
 }
 
 bool Cache::canHold(Kind kind) {
   return kind == Kind::Band || kind == Kind::Field || kind == Kind::Mesh;
 }
 
-fs::path Cache::place(const std::string& key, const char* extension) const {
+fs::path Cache::entryPath(const std::string& key, const char* extension) const {
   return folder_ / "results" / (key + extension);
 }
 
@@ -154,12 +155,12 @@ fs::path Cache::temporary() const {
 
 bool Cache::has(const std::string& key) const {
   std::error_code error;
-  return fs::is_regular_file(place(key, kEntry), error);
+  return fs::is_regular_file(entryPath(key, kEntry), error);
 }
 
 std::optional<CachedStep> Cache::step(const std::string& key) const {
   try {
-    const Json json = readEntry(place(key, kEntry));
+    const Json json = readEntry(entryPath(key, kEntry));
     CachedStep step{.action = json.at("action").get<std::string>(),
                     .notes = notesOf(json.at("step")),
                     .output = json.at("output").get<std::string>(),
@@ -168,7 +169,7 @@ std::optional<CachedStep> Cache::step(const std::string& key) const {
       step.files.push_back({f.at("path").get<std::string>(), f.at("size").get<std::uint64_t>(),
                             f.at("inode").get<std::uint64_t>(), f.at("device").get<std::uint64_t>(),
                             f.at("changed").get<std::int64_t>()});
-    touch(place(key, kEntry));
+    touch(entryPath(key, kEntry));
     return step;
   } catch (const std::exception&) {  // damaged
     return {};
@@ -177,18 +178,18 @@ std::optional<CachedStep> Cache::step(const std::string& key) const {
 
 std::optional<Value> Cache::value(const std::string& key, std::size_t maxMemory) const {
   try {
-    const Json json = readEntry(place(key, kEntry));
+    const Json json = readEntry(entryPath(key, kEntry));
     const std::string kind = json.at("kind").get<std::string>();
     if (kind == kindName(Kind::Mesh)) {
       levelset::TriMesh mesh;
-      if (!readMeshBytes(contentsOf(place(key, kMesh)), mesh)) return {};
+      if (!readMeshBytes(contentsOf(entryPath(key, kMesh)), mesh)) return {};
       return Value(std::move(mesh));
     }
     const levelset::ReadBandOptions options{.grid = json.at("grid").get<std::string>(),
                                             .maxMemory = maxMemory};
     Value value = kind == kindName(Kind::Field)
-                      ? Value(levelset::readField(place(key, kGrid), options))
-                      : Value(levelset::readBand(place(key, kGrid), options));
+                      ? Value(levelset::readField(entryPath(key, kGrid), options))
+                      : Value(levelset::readBand(entryPath(key, kGrid), options));
     if (hashOf(value) != json.at("hash").get<std::uint64_t>()) return {};
     return value;
   } catch (const levelset::ResourceLimit&) {
@@ -233,13 +234,13 @@ std::string Cache::put(const std::string& key, const CachedStep& step, const Val
         levelset::writeBand(whole, value->band(), {.name = value->band().name(), .format = "vdb"});
       }
       json["bytes"] = fs::file_size(whole);
-      fs::rename(whole, place(key, extension));
+      fs::rename(whole, entryPath(key, extension));
     }
     std::ofstream out(entry, std::ios::binary);
     out << textOf(json);
     out.close();
     if (!out) throw levelset::IoError("the disk is full");
-    fs::rename(entry, place(key, kEntry));
+    fs::rename(entry, entryPath(key, kEntry));
     return {};
   } catch (const levelset::Cancelled&) {
     std::error_code ignored;
@@ -249,7 +250,7 @@ std::string Cache::put(const std::string& key, const CachedStep& step, const Val
     std::error_code ignored;
     fs::remove(whole, ignored);
     fs::remove(entry, ignored);
-    return fmt::format("--cache: the result of '{}' was not kept: {}", step.action, error.what());
+    return fmt::format("--cache: the result of '{}' was not stored: {}", step.action, error.what());
   }
 }
 
@@ -258,7 +259,7 @@ std::optional<std::string> Cache::memo(const std::string& name) const {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return {};
   std::string text = contentsOf(file);
-  if (text.size() < 2 || text.back() != '\n') return {};  // cut off
+  if (text.size() < 2 || text.back() != '\n') return {};  // truncated
   text.pop_back();
   return text;
 }
@@ -281,11 +282,11 @@ std::vector<Cache::Entry> Cache::list() const {
     Entry entry;
     entry.key = item.path().stem().string();
     struct stat about;
-    if (::stat(item.path().c_str(), &about) != 0) continue;  // gone meanwhile
+    if (::stat(item.path().c_str(), &about) != 0) continue;  // another process removed it
     entry.used = nanoseconds(about.st_mtim);
     entry.bytes = static_cast<std::uint64_t>(about.st_size);
     for (const char* extension : {kGrid, kMesh})
-      if (::stat(place(entry.key, extension).c_str(), &about) == 0)
+      if (::stat(entryPath(entry.key, extension).c_str(), &about) == 0)
         entry.bytes += static_cast<std::uint64_t>(about.st_size);
     const std::optional<CachedStep> known = [&]() -> std::optional<CachedStep> {
       try {
@@ -313,11 +314,11 @@ std::size_t Cache::shrink(std::uint64_t mostBytes) const {
       continue;
     }
     for (const char* extension : {kEntry, kGrid, kMesh})
-      fs::remove(place(entry.key, extension), ignored);
+      fs::remove(entryPath(entry.key, extension), ignored);
     ++gone;
   }
-  // Values without an entry, and files of processes that are no more. Those that live may be about
-  // to write the entry: an hour is enough for that.
+  // Remove values without an entry, and temporary files of dead processes. A live process may be
+  // about to write the entry of a value, so only values older than one hour are removed.
   constexpr auto kLongEnough = std::chrono::hours(1);
   const auto isOld = [&](const fs::path& file) {
     const auto written = fs::last_write_time(file, ignored);

@@ -12,62 +12,69 @@
 
 namespace pipeline {
 
-/// A file as a node left it: the same as long as nobody touched it.
+/// State of a file after a node wrote it. A later comparison shows if the file changed.
 struct FileStamp {
   std::string path;
   std::uint64_t size = 0, inode = 0, device = 0;
-  std::int64_t changed = 0;  ///< ns
+  std::int64_t changed = 0;  ///< modification time, ns
   [[nodiscard]] bool operator==(const FileStamp&) const = default;
 };
-/// @return nothing for what is no file
+/// @return the current state of a regular file; empty for anything else
 [[nodiscard]] std::optional<FileStamp> stampOf(const std::filesystem::path& file);
 
-/// What running a node left behind, beside its value.
+/// Everything a node produced beside its value.
 struct CachedStep {
   std::string action;
   StepNotes notes;
-  std::string output;            ///< what it printed
-  std::vector<FileStamp> files;  ///< that it wrote
+  std::string output;            ///< printed text
+  std::vector<FileStamp> files;  ///< files that the node wrote
 };
 
-/// Results by what they follow from, in a folder that several processes may share. Entries are
-/// files that are written beside their place and renamed when whole; one that is damaged counts as
-/// absent.
+/// A folder of results, each stored under a key that hashes all inputs of the result. Several
+/// processes may share the folder. Each entry is written to a temporary file and renamed when
+/// complete. A damaged entry counts as absent.
 class Cache {
  public:
   struct Entry {
     std::string key, action;
     std::uint64_t bytes = 0;
-    std::int64_t used = 0;  ///< ns since 1970
+    std::int64_t used = 0;  ///< time of last use, ns since 1970
   };
 
-  /// Makes the folder if there is none. @throws levelset::IoError
+  /// Opens the folder, or creates it.
+  /// @throws levelset::IoError if it cannot be created or written
   explicit Cache(std::filesystem::path folder);
 
-  /// Meshes, level sets and fields can be kept.
+  /// Decides if values of a kind can be stored: meshes, level sets and fields can.
   [[nodiscard]] static bool canHold(Kind kind);
   [[nodiscard]] bool has(const std::string& key) const;
-  /// @return nothing where there is none, or it is damaged
+  /// @return empty if there is no entry or the entry is damaged
   [[nodiscard]] std::optional<CachedStep> step(const std::string& key) const;
+  /// @param maxMemory  limit for the value, bytes
+  /// @return empty if there is no value or the entry is damaged
+  /// @throws levelset::ResourceLimit if the value exceeds the limit
   [[nodiscard]] std::optional<Value> value(const std::string& key, std::size_t maxMemory) const;
-  /// Failures to write are told, and are none of the chain.
-  /// @param value  none for what makes none
-  /// @return       a sentence where it could not be kept
+  /// Stores a result. A write failure is returned as a message and does not fail the run.
+  /// @param value  null for a node without a value
+  /// @return       error message; empty if the result was stored
   [[nodiscard]] std::string put(const std::string& key, const CachedStep& step,
                                 const Value* value) const;
 
-  /// A text by a short name, for what is expensive to know of a file.
+  /// Reads a short text stored by remember(). It saves an expensive look at a file, such as a
+  /// digest.
   [[nodiscard]] std::optional<std::string> memo(const std::string& name) const;
   void remember(const std::string& name, const std::string& text) const;
 
-  /// The last used first.
+  /// Lists the entries, most recently used first.
   [[nodiscard]] std::vector<Entry> list() const;
-  /// Removes the longest unused until no more than that are left, and what dead processes left.
-  /// @return how many entries went
+  /// Removes the least recently used entries until at most `mostBytes` remain. Also removes damaged
+  /// entries and temporary files of processes that no longer run.
+  /// @return number of removed entries
   std::size_t shrink(std::uint64_t mostBytes) const;
 
  private:
-  [[nodiscard]] std::filesystem::path place(const std::string& key, const char* extension) const;
+  [[nodiscard]] std::filesystem::path entryPath(const std::string& key,
+                                                const char* extension) const;
   [[nodiscard]] std::filesystem::path temporary() const;
 
   std::filesystem::path folder_;

@@ -16,7 +16,7 @@
 namespace pipeline {
 namespace {
 
-/// Texts that do not run into each other.
+/// Appends a labelled text with its length, so that different lists of texts give different keys.
 void add(std::string& to, const std::string& what, const std::string& text) {
   to += fmt::format("{}:{}:{}\n", what, text.size(), text);
 }
@@ -40,7 +40,8 @@ std::string stampText(const FileStamp& stamp) {
   return fmt::format("{} {} {} {}", stamp.size, stamp.inode, stamp.device, stamp.changed);
 }
 
-/// The file that this code is in: results of another program are another one's.
+/// File that contains this code. Its digest is part of each key, because another version of the
+/// program may compute other results.
 std::filesystem::path programFile() {
   Dl_info about;
   const bool isKnown =
@@ -68,7 +69,7 @@ std::optional<std::string> CacheKeys::contentOf(const std::filesystem::path& fil
                                                 const Node& node) const {
   const std::optional<FileStamp> stamp = stampOf(file);
   const std::string extension = lowerExtension(file);
-  if (!stamp || extension == ".json") return {};  // it names files that it does not hold
+  if (!stamp || extension == ".json") return {};  // the file refers to other files
   std::string about = stampText(*stamp);
   const bool isGrid = extension == ".vdb";
   const auto grid = node.options.find("grid");
@@ -77,7 +78,7 @@ std::optional<std::string> CacheKeys::contentOf(const std::filesystem::path& fil
   if (auto known = cache_.memo(name)) return known;
   std::optional<std::string> content;
   if (isGrid) {
-    // Files of one tree differ wherever they were written.
+    // OpenVDB files of one tree can differ in their bytes, so hash the content.
     try {
       const levelset::BandOrField read = levelset::readGrid(
           file, {.grid = grid == node.options.end() ? "" : grid->second, .maxMemory = maxMemory_});
@@ -86,7 +87,7 @@ std::optional<std::string> CacheKeys::contentOf(const std::filesystem::path& fil
     } catch (const levelset::Cancelled&) {
       throw;
     } catch (const levelset::Error&) {
-      return {};  // the action will say what is wrong with it
+      return {};  // the action will report the error
     }
   } else {
     content = digestOfFile(file);

@@ -11,17 +11,18 @@
 
 namespace pipeline {
 
-/// What a node's result follows from, in short: the program, the action, its options, the content
-/// of the files that it reads, and the same of the nodes that it takes.
+/// Computes the cache key of each node. The key hashes everything that determines the result: the
+/// program, the action, its options, the content of its input files, and the keys of its operands.
 class CacheKeys {
  public:
-  /// @param cache      knows the contents of files that were read before
-  /// @param maxMemory  for grids that must be read to be known
+  /// @param cache      remembers digests of files, so that unchanged files are not read again
+  /// @param maxMemory  limit for grids that must be read to compute their digest, bytes
   CacheKeys(const Cache& cache, std::size_t maxMemory);
 
-  /// Of each node that is needed. None for what may be another one the next time: it reads standard
-  /// input or files that name others, writes to what is no file, or measures time; and for what
-  /// takes such a result.
+  /// Computes one key per node; empty for unneeded nodes and for nodes that cannot be cached. Not
+  /// cached: nodes that read standard input or a file that refers to other files, that write to
+  /// something other than a file, or that measure time. The same holds for nodes that depend on
+  /// them.
   [[nodiscard]] std::vector<std::optional<std::string>> of(const Graph& graph,
                                                            const std::vector<char>& needed) const;
 
@@ -29,7 +30,7 @@ class CacheKeys {
   [[nodiscard]] std::optional<std::string> keyOf(
       const Graph& graph, const Node& node,
       const std::vector<std::optional<std::string>>& before) const;
-  /// Of a value that was made elsewhere: by what it holds.
+  /// Key of a value from outside the graph: a hash of its content.
   [[nodiscard]] std::optional<std::string> keyOf(const Value& given) const;
   [[nodiscard]] std::optional<std::string> contentOf(const std::filesystem::path& file,
                                                      const Node& node) const;

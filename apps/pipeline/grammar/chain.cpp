@@ -18,7 +18,7 @@ namespace {
 
 using levelset::UsageError;
 
-/// `--name`, but not a negative number, a bare `-` or an operand.
+/// Recognizes an option `--name`, as opposed to a negative number, a bare `-` or an operand.
 bool isOption(const std::string& token) {
   return token.size() > 1 && token[0] == '-' &&
          !(token[1] == '.' || (token[1] >= '0' && token[1] <= '9'));
@@ -34,7 +34,7 @@ bool findIn(const std::vector<Param>& params, const std::string& name) {
   return std::any_of(params.begin(), params.end(), [&](const Param& p) { return p.name == name; });
 }
 
-/// By full name, or by a beginning that only one parameter has.
+/// Finds a parameter by its full name or by a unique prefix.
 const Param& matchParam(const std::vector<Param>& params, const std::string& name,
                         const std::string& who) {
   std::vector<const Param*> begun;
@@ -60,8 +60,8 @@ const Param& matchParam(const std::vector<Param>& params, const std::string& nam
 
 struct Reader {
   const std::vector<std::string>& tokens;
-  const Script* script = nullptr;  // that the tokens are from
-  bool isStandardInput = false;    // was a script read from there?
+  const Script* script = nullptr;  // script that contains the tokens; null: command line
+  bool isStandardInput = false;    // the script came from standard input
   std::size_t next = 0;
 
   [[nodiscard]] bool atEnd() const { return next >= tokens.size(); }
@@ -75,7 +75,7 @@ struct Reader {
     if (token == "-q") token = "--quiet";
     if (!token.starts_with("--")) {
       throw UsageError(
-          fmt::format("{}: '{}' is not an option; options begin with two dashes", who, token));
+          fmt::format("{}: '{}' is not an option; an option begins with two dashes", who, token));
     }
     const std::size_t equals = token.find('=');
     const Param& param =
@@ -108,10 +108,10 @@ const Operator& matchOperator(const std::string& name) {
   for (const Operator& op : operators()) names.push_back(op.name);
   if (name == "help") {
     throw UsageError(
-        "levelsmith: help stands alone: `levelsmith help` or `levelsmith help ACTION`");
+        "levelsmith: help must be the only action: `levelsmith help` or `levelsmith help ACTION`");
   }
   if (name == runOperator().name)
-    throw UsageError("run: stands alone, behind global options only: `levelsmith run FILE`");
+    throw UsageError("run: must be the only action, after global options: `levelsmith run FILE`");
   const std::string guess = didYouMean(name, names);
   throw UsageError(fmt::format("levelsmith: there is no action '{}'{}", name,
                                guess.empty() ? "; `levelsmith help` lists them"
@@ -119,17 +119,17 @@ const Operator& matchOperator(const std::string& name) {
 }
 
 std::string operandName(const std::string& token, const std::string& who) {
-  if (token.size() < 2) throw UsageError(fmt::format("{}: '@' needs a name behind it", who));
+  if (token.size() < 2) throw UsageError(fmt::format("{}: a name must follow '@'", who));
   return token.substr(1);
 }
 
-/// An action as it was written.
+/// An action as written.
 struct Action {
   const Operator* op = nullptr;
   std::map<std::string, std::string> options;  // by full name; a flag is "true"
   std::vector<std::string> operandNames;       // `@NAME`, without the @
   std::string resultName;                      // --as
-  std::string place;                           // in a script
+  std::string location;                        // position in a script
 };
 
 Action readAction(Reader& reader) {
@@ -157,10 +157,10 @@ Action readAction(Reader& reader) {
       return p.position == static_cast<int>(i);
     });
     if (param == op.params.end()) {
-      throw UsageError(
-          fmt::format("{}: what is '{}' for? separate actions with a lone '!', name operands "
-                      "with '@'",
-                      op.name, positional[i]));
+      throw UsageError(fmt::format(
+          "{}: unexpected argument '{}'; separate actions with a lone '!', name operands "
+          "with '@'",
+          op.name, positional[i]));
     }
     const std::string where = op.name + ": " + param->name;
     if (action.options.contains(param->name)) throw UsageError(where + ": is given twice");
@@ -180,10 +180,10 @@ Action readAction(Reader& reader) {
   return action;
 }
 
-/// Follows values through the chain: they live on a stack, and by name for good.
+/// Builds the nodes of a chain. Unnamed values are on a stack; named values stay available.
 class ChainBuilder {
  public:
-  /// @param voxelsFollow  do voxel sizes that are left out follow from --tolerance?
+  /// @param voxelsFollow  --tolerance chooses the voxel sizes that are not given
   ChainBuilder(std::vector<Node>& nodes, bool voxelsFollow)
       : nodes_(nodes), voxelsFollow_(voxelsFollow) {}
 
@@ -192,7 +192,7 @@ class ChainBuilder {
     node.op = action.op;
     node.options = action.options;
     node.name = action.resultName;
-    node.place = action.place;
+    node.location = action.location;
     node.inputs = takeOperands(action);
     for (const auto& [option, text] : action.options)
       if (const Param* param = action.op->find(option); param && namesValue(*param, text))
@@ -203,8 +203,7 @@ class ChainBuilder {
       stack_.push_back(nodes_.size());
       if (!node.name.empty() && !names_.emplace(node.name, nodes_.size()).second) {
         throw UsageError(
-            fmt::format("{}: the name '{}' is taken; values do not change, so choose another",
-                        node.op->name, node.name));
+            fmt::format("{}: the name '{}' is taken; choose another", node.op->name, node.name));
       }
     }
     nodes_.push_back(std::move(node));
@@ -217,13 +216,13 @@ class ChainBuilder {
     std::vector<std::string> known;
     for (const auto& entry : names_) known.push_back(entry.first);
     const std::string guess = didYouMean(name, known);
-    throw UsageError(fmt::format("{}: nothing is named '@{}'{}", op.name, name,
+    throw UsageError(fmt::format("{}: no result is named '@{}'{}", op.name, name,
                                  guess.empty() ? "; give an earlier result that name with --as"
                                                : fmt::format("; did you mean '@{}'?", guess)));
   }
 
-  /// Those that are named come last; what is missing before them comes off the stack, and stays
-  /// there where the action passes it through.
+  /// Collects the operands. Named operands come last; missing ones before them are taken off the
+  /// stack. An action that passes its operand through leaves it on the stack.
   std::vector<std::size_t> takeOperands(const Action& action) {
     std::vector<std::size_t> named;
     for (const std::string& name : action.operandNames) named.push_back(nodeOf(name, *action.op));
@@ -247,7 +246,7 @@ class ChainBuilder {
 
 using StreamUse = std::function<bool(const Invocation&)> Operator::*;
 
-/// Two actions that claim the same standard stream for data would garble each other.
+/// Checks that at most one action uses a standard stream for data.
 void checkStandardStream(const Graph& graph, StreamUse use, const char* stream,
                          std::string firstUser) {
   for (const Node& node : graph.nodes) {
@@ -255,7 +254,7 @@ void checkStandardStream(const Graph& graph, StreamUse use, const char* stream,
     if (!claims || !claims(Invocation(*node.op, node.options))) continue;
     if (!firstUser.empty()) {
       throw UsageError(
-          fmt::format("{}: standard {} is used already, by {}; use a file for one of them",
+          fmt::format("{}: standard {} is already used by {}; use a file for one of them",
                       node.op->name, stream, firstUser));
     }
     firstUser = "'" + node.op->name + "'";
@@ -276,10 +275,12 @@ void checkStandardStreams(const Graph& graph, bool isScriptFromInput) {
 
 namespace {
 
-/// @param outer  global options that stand before the `run` of these words, and win
+/// Parses global options and actions.
+/// @param mayRun  `run FILE` is allowed
+/// @param outer   global options before `run`; they override those of the script
 Graph parse(Reader& reader, bool mayRun, const std::map<std::string, std::string>& outer);
 
-/// What stands behind `run`.
+/// Arguments of `run`.
 struct ScriptCall {
   std::string file;
   std::map<std::string, std::string> settings;
@@ -295,7 +296,7 @@ ScriptCall readCall(Reader& reader) {
       const std::string text = option.at("set");
       const std::size_t equals = std::min(text.find('='), text.size());
       if (equals == 0 || equals == text.size())
-        throw UsageError(fmt::format("run: --set: '{}' is not NAME=VALUE", text));
+        throw UsageError(fmt::format("run: --set: '{}' is not of the form NAME=VALUE", text));
       if (!call.settings.emplace(text.substr(0, equals), text.substr(equals + 1)).second)
         throw UsageError(fmt::format("run: --set: '{}' is given twice", text.substr(0, equals)));
     } else if (call.file.empty() && token != "!") {
@@ -303,8 +304,7 @@ ScriptCall readCall(Reader& reader) {
       ++reader.next;
     } else {
       throw UsageError(
-          "run: takes one file, and nothing behind it but --set NAME=VALUE; write the further "
-          "actions into the file");
+          "run: only --set NAME=VALUE may follow the file; write further actions into it");
     }
   }
   if (call.file.empty())
@@ -317,19 +317,22 @@ Graph parseLines(const Script& script, const std::map<std::string, std::string>&
   try {
     return parse(reader, false, outer);
   } catch (const UsageError& error) {
-    // The reader stands behind the action that failed.
+    // The reader is just after the action that failed.
     const std::size_t word = std::min(reader.next, script.words.size());
-    throw UsageError(fmt::format("{} ({})", error.what(), script.place(word > 0 ? word - 1 : 0)));
+    throw UsageError(
+        fmt::format("{} ({})", error.what(), script.location(word > 0 ? word - 1 : 0)));
   }
 }
 
-/// `run FILE`: the chain that the file holds. Global options of the command line come first.
+/// Parses `run FILE` into the graph of the file. Global options of the command line override those
+/// of the file.
 Graph parseFile(Reader& reader, const Graph& before) {
   const ScriptCall call = readCall(reader);
   if (isGraphFile(call.file)) {
     if (!call.settings.empty())
       throw UsageError(
-          fmt::format("run: --set says nothing to '{}'; a graph has no variables", call.file));
+          fmt::format("run: --set has no effect on '{}': a graph has no variables; leave out --set",
+                      call.file));
     return readGraph(call.file, before.globals);
   }
   Graph graph = parseLines(readScript(call.file, call.settings), before.globals);
@@ -344,20 +347,20 @@ Graph parse(Reader& reader, bool mayRun, const std::map<std::string, std::string
     reader.readOption(globalParams(), "levelsmith", graph.globals);
   if (!reader.atEnd() && tokens[reader.next] == runOperator().name) {
     if (mayRun) return parseFile(reader, graph);
-    throw UsageError("run: a file of actions cannot run another one; put its actions here");
+    throw UsageError("run: a script cannot run another one; copy its actions into this script");
   }
   for (const auto& [name, value] : outer) graph.globals[name] = value;
   ChainBuilder builder(graph.nodes, graph.globals.contains("tolerance"));
   while (!reader.atEnd()) {
     if (reader.atBang()) {
-      throw UsageError(
-          fmt::format("levelsmith: there is no action {} the '!' at word {}",
-                      reader.next == 0 || graph.nodes.empty() ? "before" : "between this and",
-                      reader.next + 1));
+      throw UsageError(fmt::format(
+          "levelsmith: there is no action {} the '!' at word {}",
+          reader.next == 0 || graph.nodes.empty() ? "before" : "between an earlier '!' and",
+          reader.next + 1));
     }
     const std::size_t first = reader.next;
     Action action = readAction(reader);
-    if (reader.script) action.place = reader.script->place(first);
+    if (reader.script) action.location = reader.script->location(first);
     builder.add(action);
     if (reader.atBang()) {
       ++reader.next;

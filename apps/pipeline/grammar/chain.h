@@ -8,12 +8,12 @@
 
 namespace pipeline {
 
-/// Reads `global options ACTION args ! ACTION …`, and checks all that can be told before anything
-/// runs: actions, options, numbers, ranges, operands and their kinds, who writes standard output.
+/// Parses a command line `GLOBAL-OPTIONS ACTION ARGUMENTS ! ACTION …` into a graph. Checks actions,
+/// options, numbers, ranges, operands and their kinds, and the use of standard input and output.
 /// @throws levelset::UsageError
 [[nodiscard]] Graph parseChain(const std::vector<std::string>& tokens);
 
-/// The same of what a script comes to.
+/// Parses an expanded script into a graph, with the same checks.
 [[nodiscard]] Graph parseScript(const Script& script);
 
 }  // namespace pipeline

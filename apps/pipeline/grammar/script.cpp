@@ -17,10 +17,11 @@ namespace {
 
 using levelset::UsageError;
 
-/// Actions of a script, and rounds of its loops: a chain is checked as a whole and held in memory.
+/// Limit for the actions of a script, and for the iterations of its loops. The complete chain is
+/// held in memory.
 constexpr std::size_t kMostActions = 100'000;
 constexpr std::size_t kMostScriptBytes = 1 << 24;
-/// Of all that the rounds of loops write: variables may double in each.
+/// Limit for the expanded text: a variable can double its length in each iteration.
 constexpr std::size_t kMostExpandedBytes = 1 << 26;
 constexpr std::size_t kMostNested = 64;
 
@@ -31,7 +32,7 @@ bool isName(const std::string& text) {
          text.find_first_not_of(std::string(kLetters) + kDigits) == std::string::npos;
 }
 
-/// "file:stem": the name, and which part of it.
+/// A reference such as "file:stem": variable name, and part of a file name.
 struct Reference {
   std::string name, part;
 };
@@ -41,7 +42,7 @@ Reference referenceOf(const std::string& text) {
   return {text.substr(0, colon), text.substr(std::min(colon + 1, text.size()))};
 }
 
-/// A word that was written as it stands, without quotes and variables; else empty.
+/// Text of a word without quotes and variables; empty for other words.
 std::string plainText(const ScriptWord& word) {
   return word.size() == 1 && !word[0].isVariable && !word[0].isQuoted ? word[0].text : "";
 }
@@ -51,14 +52,14 @@ bool beginsLoop(const ScriptLine& line) {
   return word == "repeat" || word == "for";
 }
 
-/// `repeat COUNT`, `repeat COUNT as NAME`, `for NAME in …`
+/// Variable of a loop: `repeat COUNT` (i), `repeat COUNT as NAME`, `for NAME in …`.
 std::string loopVariable(const ScriptLine& line) {
   const bool isFor = plainText(line.words[0]) == "for";
   if (!isFor && line.words.size() < 4) return "i";
   return plainText(line.words[isFor ? 1 : 3]);
 }
 
-/// A variable, and the round of its loop.
+/// A loop variable and its current value.
 struct Round {
   std::string name, value;
 };
@@ -75,14 +76,14 @@ class Expander {
   Script expand() {
     expand(0, lines_.size());
     if (!hasAction_)
-      throw UsageError(fmt::format("run: '{}' holds no action; write one on each line", file_));
+      throw UsageError(fmt::format("run: '{}' contains no action; write one on each line", file_));
     return std::move(script_);
   }
 
  private:
-  // === Before anything is replaced
+  // === Checks before any variable is replaced
 
-  /// Finds the end of each loop, and checks its form.
+  /// Finds the end of each loop and checks its syntax.
   void matchEnds() {
     ends_.resize(lines_.size());
     std::vector<std::size_t> open;
@@ -93,25 +94,24 @@ class Expander {
         checkLoop(line);
         open.push_back(i);
         if (open.size() > kMostNested)
-          fail(line, fmt::format("{}: loops stand in loops, more than {} deep; split the script",
-                                 word, kMostNested));
+          fail(line, fmt::format("{}: loops are nested more than {} deep; split the script", word,
+                                 kMostNested));
       } else if (word == "end") {
-        if (line.words.size() > 1) fail(line, "end: stands alone on its line");
+        if (line.words.size() > 1) fail(line, "end: must be alone on its line");
         if (open.empty()) fail(line, "end: there is no loop to end; leave it out");
         ends_[open.back()] = i;
         open.pop_back();
       } else if (word == "set") {
         if (line.words.size() != 3)
-          fail(line, "set: takes a name and one word: set NAME VALUE; quote what has blanks");
+          fail(line, "set: takes a name and one word: set NAME VALUE; quote a value with blanks");
         checkName(line, "set", plainText(line.words[1]));
         set_.insert(plainText(line.words[1]));
       }
     }
     if (!open.empty()) {
       const ScriptLine& line = lines_[open.back()];
-      fail(line,
-           fmt::format("{}: its `end` is missing; write it behind the last action of the loop",
-                       plainText(line.words[0])));
+      fail(line, fmt::format("{}: its `end` is missing; write it after the last action of the loop",
+                             plainText(line.words[0])));
     }
   }
 
@@ -137,10 +137,10 @@ class Expander {
     }
   }
 
-  /// A setting that nobody asks for is a slip of the pen.
+  /// Checks that the script uses each setting: an unused one is probably misspelt.
   void checkSettings() const {
     std::set<std::string> taken = set_;
-    std::vector<std::pair<std::string, std::size_t>> loops;  // the variable, and where it ends
+    std::vector<std::pair<std::string, std::size_t>> loops;  // variable, and the line of its `end`
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       std::erase_if(loops, [&](const auto& loop) { return loop.second == i; });
       for (const ScriptWord& word : lines_[i].words) {
@@ -158,9 +158,9 @@ class Expander {
       if (taken.contains(name)) continue;
       const std::string guess = didYouMean(name, names);
       throw UsageError(
-          fmt::format("run: --set {}={}: no variable of '{}' takes it; {}", name, value, file_,
+          fmt::format("run: --set {0}={1}: '{2}' has no variable {0}; {3}", name, value, file_,
                       !guess.empty()  ? fmt::format("did you mean '{}'?", guess)
-                      : names.empty() ? "it has none"
+                      : names.empty() ? "it has no variables"
                                       : fmt::format("it has {}", fmt::join(names, ", "))));
     }
   }
@@ -190,7 +190,7 @@ class Expander {
       rounds_.back().value = value;
       if (++roundCount_ > kMostActions)
         fail(line,
-             fmt::format("the loops go round more than {} times; split the script", kMostActions));
+             fmt::format("the loops have more than {} iterations; split the script", kMostActions));
       expand(index + 1, ends_[index]);
     }
     rounds_.pop_back();
@@ -200,7 +200,7 @@ class Expander {
     const std::string text = replaced(line, line.words[1]);
     const long count = parseInteger(text, placed(line, "repeat"));
     if (count < 0 || static_cast<std::size_t>(count) > kMostActions) {
-      fail(line, fmt::format("repeat: '{}' is no count from 0 to {}", text, kMostActions));
+      fail(line, fmt::format("repeat: '{}' is not a count from 0 to {}", text, kMostActions));
     }
     std::vector<std::string> values;
     for (long i = 0; i < count; ++i) values.push_back(std::to_string(i));
@@ -214,7 +214,7 @@ class Expander {
     return loopValues(words, {kMostActions, &budget_}, placed(line, "for"));
   }
 
-  /// Variables that are not quoted are split at blanks, as in a shell.
+  /// Appends the words of a list. Splits unquoted variables at blanks, as a shell does.
   void addListWords(const ScriptLine& line, const ScriptWord& word,
                     std::vector<ListWord>& words) const {
     bool inWord = false, isPattern = false;
@@ -266,12 +266,12 @@ class Expander {
     return text;
   }
 
-  /// Counts what is written before it is held.
+  /// Counts expanded text before it is stored.
   void spend(const ScriptLine& line, std::size_t bytes) const {
     expandedBytes_ += bytes;
     if (expandedBytes_ > kMostExpandedBytes)
-      fail(line, fmt::format("the variables and loops of the script come to more than {} MB of "
-                             "text; split it",
+      fail(line, fmt::format("the variables and loops expand to more than {} MB of "
+                             "text; split the script",
                              kMostExpandedBytes >> 20));
   }
 
@@ -284,7 +284,7 @@ class Expander {
     if (part == "dir") return path.has_parent_path() ? path.parent_path().string() : ".";
     if (part == "stem")
       return (path.extension() == ".gz" ? path.stem().stem() : path.stem()).string();
-    fail(line, fmt::format("${{{}}}: there is no part '{}'; a file's name has stem, name and dir",
+    fail(line, fmt::format("${{{}}}: there is no part '{}'; use stem, name or dir of a file name",
                            variable, part));
   }
 
@@ -300,16 +300,16 @@ class Expander {
     for (const auto& entry : settings_) known.push_back(entry.first);
     for (const Round& each : rounds_) known.push_back(each.name);
     if (!isName(name)) {
-      hint = "write ${NAME}, or $${ where no variable is meant";
+      hint = "write ${NAME}, or $${ for a literal ${";
     } else if (set_.contains(name)) {
-      hint = "the line that sets it stands further down; move it up";
+      hint = "the line that sets it is further down; move it up";
     } else if (const std::string guess = didYouMean(name, known); !guess.empty()) {
       hint = fmt::format("did you mean ${{{}}}?", guess);
     }
     fail(line, fmt::format("${{{}}} has no value; {}", name, hint));
   }
 
-  // === What comes of it
+  // === Expanded lines
 
   void addLine(const ScriptLine& line) {
     std::vector<std::string>& words = script_.words;
@@ -321,19 +321,20 @@ class Expander {
     }
     hasAction_ |= !words[first].starts_with("-");
     script_.begins.push_back(first);
-    script_.places.push_back(placeOf(line));
-    spend(line, script_.places.back().size());
+    script_.locations.push_back(locationOf(line));
+    spend(line, script_.locations.back().size());
     if (script_.begins.size() > kMostActions)
-      fail(line, fmt::format("the script comes to more than {} actions; split it", kMostActions));
+      fail(line, fmt::format("the script expands to more than {} actions; split it", kMostActions));
   }
 
-  [[nodiscard]] std::string placeOf(const ScriptLine& line) const {
-    std::string place = fmt::format("{}, line {}", file_, line.number);
-    for (const Round& round : rounds_) place += fmt::format(", {} = {}", round.name, round.value);
-    return place;
+  [[nodiscard]] std::string locationOf(const ScriptLine& line) const {
+    std::string location = fmt::format("{}, line {}", file_, line.number);
+    for (const Round& round : rounds_)
+      location += fmt::format(", {} = {}", round.name, round.value);
+    return location;
   }
   [[nodiscard]] std::string placed(const ScriptLine& line, const std::string& who) const {
-    return fmt::format("run: {}: {}", placeOf(line), who);
+    return fmt::format("run: {}: {}", locationOf(line), who);
   }
   [[noreturn]] void fail(const ScriptLine& line, const std::string& sentence) const {
     throw UsageError(placed(line, sentence));
@@ -342,10 +343,10 @@ class Expander {
   const std::vector<ScriptLine> lines_;
   const std::string file_;
   const std::map<std::string, std::string>& settings_;
-  std::vector<std::size_t> ends_;              // by the line that begins a loop
-  std::set<std::string> set_;                  // names that lines set, anywhere
-  std::map<std::string, std::string> values_;  // that lines have set so far
-  std::vector<Round> rounds_;                  // of the loops that are open, outermost first
+  std::vector<std::size_t> ends_;  // for each line that begins a loop: the line of its `end`
+  std::set<std::string> set_;      // names that any `set` line sets
+  std::map<std::string, std::string> values_;  // values set so far
+  std::vector<Round> rounds_;                  // open loops, outermost first
   std::size_t roundCount_ = 0;
   FolderBudget budget_;
   mutable std::size_t expandedBytes_ = 0;
@@ -355,9 +356,10 @@ class Expander {
 
 }  // namespace
 
-const std::string& Script::place(std::size_t word) const {
+const std::string& Script::location(std::size_t word) const {
   const auto after = std::upper_bound(begins.begin(), begins.end(), word);
-  return places[static_cast<std::size_t>(std::max(after - begins.begin(), std::ptrdiff_t{1})) - 1];
+  return locations[static_cast<std::size_t>(std::max(after - begins.begin(), std::ptrdiff_t{1})) -
+                   1];
 }
 
 Script readScript(const std::filesystem::path& file,

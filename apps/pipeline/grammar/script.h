@@ -7,28 +7,29 @@
 
 namespace pipeline {
 
-/// The words of a chain that was written into a file, one action a line.
+/// The expanded words of a script, a file with one action on each line.
 struct Script {
-  std::vector<std::string> words;  ///< as on the command line, with a `!` between actions
-  // By line, one that stands in a loop as often as it goes round:
-  std::vector<std::size_t> begins;  ///< its first word
-  std::vector<std::string> places;  ///< "FILE, line 4, i = 2"
+  std::vector<std::string> words;  ///< as on the command line, with `!` between actions
+  // One entry per expanded line; a line in a loop has one entry per iteration.
+  std::vector<std::size_t> begins;     ///< index of its first word
+  std::vector<std::string> locations;  ///< position, "FILE, line 4, i = 2"
 
-  /// Where a word stood.
-  [[nodiscard]] const std::string& place(std::size_t word) const;
+  /// Position of a word in the script.
+  [[nodiscard]] const std::string& location(std::size_t word) const;
 };
 
-/// Reads a script as splitScript() does, replaces its variables and goes through its loops: `set
-/// NAME VALUE`, `repeat COUNT [as NAME]` and `for NAME in LIST` up to `end`. Lines that hold only
-/// options, before the first action, are global options.
-/// @param file      or "-" for standard input
-/// @param settings  values of variables, which win over those of `set`
-/// @throws levelset::IoError when it cannot be read, or no file matches a pattern;
-///         levelset::UsageError for what cannot be understood, a variable without a value, a
-///         setting that no variable takes, a file without an action or with too many
+/// Reads a script, splits it as splitScript() does, replaces its variables and expands its loops.
+/// The statements are `set NAME VALUE`, `repeat COUNT [as NAME]` and `for NAME in LIST`; `end` ends
+/// a loop. Lines of options before the first action are global options.
+/// @param file      path, or "-" for standard input
+/// @param settings  values of variables; they override those of `set`
+/// @throws levelset::IoError if the file cannot be read, or no file matches a pattern
+/// @throws levelset::UsageError for a syntax error, a variable without a value, a setting of an
+///         unknown variable, a script without an action, or one that exceeds a limit
 [[nodiscard]] Script readScript(const std::filesystem::path& file,
                                 const std::map<std::string, std::string>& settings = {});
-/// The same of a text. @param name  of the script, for what is said about it
+/// Expands the text of a script, as readScript() does.
+/// @param name  name of the script, for error messages
 [[nodiscard]] Script expandScript(const std::string& text, const std::string& name,
                                   const std::map<std::string, std::string>& settings = {});
 

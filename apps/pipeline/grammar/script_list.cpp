@@ -17,15 +17,15 @@ namespace {
 using levelset::IoError;
 using levelset::UsageError;
 
-/// Digits that a 64-bit number holds whatever they are.
+/// Number of decimal digits that always fit into 64 bits.
 constexpr std::size_t kMostDigits = 18;
 
-/// A number as it was written, that no binary fraction rounds: digits / 10^decimals.
+/// An exact decimal number: digits / 10^decimals.
 struct Decimal {
   long long digits = 0;
   std::size_t decimals = 0;
   std::size_t whole = 0;  ///< digits before the point
-  bool isPadded = false;  ///< has zeros in front
+  bool isPadded = false;  ///< has leading zeros
 };
 
 std::optional<Decimal> parseDecimal(const std::string& text) {
@@ -57,7 +57,7 @@ std::string decimalText(long long digits, std::size_t decimals, std::size_t widt
   return (digits < 0 ? "-" : "") + whole + (fraction.empty() ? "" : "." + fraction);
 }
 
-/// Is it meant as a range? A name may have two points too: "../a.ply".
+/// Decides if a word is a range. A file name may contain two points too: "../a.ply".
 bool looksLikeRange(const ListWord& word) {
   const std::size_t points = word.isBare ? word.text.find("..") : std::string::npos;
   return points != std::string::npos && parseDecimal(word.text.substr(0, points));
@@ -89,10 +89,10 @@ std::vector<std::string> rangeValues(const std::string& range, const std::string
   }
   const long long length = to->digits - from->digits;
   if (step->digits == 0)
-    throw UsageError(fmt::format("{}: '{}' never ends; its step must not be 0", where, written));
+    throw UsageError(fmt::format("{}: '{}' never ends; give a step other than 0", where, written));
   if (length != 0 && (length > 0) != (step->digits > 0)) {
     throw UsageError(
-        fmt::format("{}: '{}' leads away from its end; give it a step of the other "
+        fmt::format("{}: '{}' never reaches its end; use a step of the other "
                     "sign, as in 10..0 step -1",
                     where, written));
   }
@@ -107,11 +107,11 @@ std::vector<std::string> rangeValues(const std::string& range, const std::string
   return values;
 }
 
-// glob() hands nothing on to the functions that it reads folders by.
+// glob() passes no user data to its callbacks, so they share this variable.
 thread_local FolderBudget* globBudget = nullptr;
 
 void* openFolder(const char* name) {
-  errno = ENFILE;  // what refuseFolder() is told
+  errno = ENFILE;  // this value reaches refuseFolder()
   if (globBudget->folders == 0 || globBudget->entries == 0) return nullptr;
   --globBudget->folders;
   return ::opendir(name);
@@ -129,7 +129,7 @@ bool mayLookUp() {
   return true;
 }
 
-/// Of folders that cannot be read, only what passes the budget ends the search.
+/// Ends the search when the budget is used up. Ignores folders that cannot be read.
 int refuseFolder(const char*, int error) {
   return error == ENFILE ? 1 : 0;
 }
@@ -152,16 +152,15 @@ std::vector<std::string> matchingFiles(const std::string& pattern, FolderBudget*
   globfree(&found);
   if (status == GLOB_ABORTED || budget->entries == 0 || budget->names == 0)
     throw UsageError(fmt::format(
-        "{}: '{}' makes the script look into too many folders and files; name the folder, and use "
-        "fewer patterns",
+        "{}: '{}' visits too many folders and files; name the folder, and use fewer patterns",
         where, pattern));
   if (status == 0) {
-    std::sort(files.begin(), files.end());  // by bytes, whatever the locale
+    std::sort(files.begin(), files.end());  // by bytes, independent of the locale
     return files;
   }
   throw IoError(fmt::format(
-      "{}: {} '{}'; check the names and the folder, or quote it if it is no "
-      "pattern",
+      "{}: {} '{}'; check the names and the folder, or quote it if it is not "
+      "a pattern",
       where, status == GLOB_NOMATCH ? "no file matches" : "no folder can be read for", pattern));
 }
 

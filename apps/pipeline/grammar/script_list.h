@@ -4,33 +4,35 @@
 #include <string>
 #include <vector>
 
-/// What the loops of scripts go through.
+/// Values of the loop variables of scripts.
 namespace pipeline {
 
-/// A word behind `for NAME in`, its variables replaced.
+/// A word after `for NAME in`, with its variables replaced.
 struct ListWord {
   std::string text;
-  std::string pattern = {};  ///< for the names of files, if it has an unquoted * ? or [
-  bool isBare = true;        ///< has no quotes: may be a range
+  std::string pattern = {};  ///< file name pattern; empty: the word has no unquoted * ? or [
+  bool isBare = true;        ///< has no quotes, so it may be a range
 };
 
-/// What patterns may still look at: `/*/../*/../*` finds each folder anew in every folder, and what
-/// glob() takes grows with the square of their number.
+/// Remaining numbers of folders, entries and names that patterns may visit. A pattern such as
+/// `/*/../*/../*` visits each folder again in every folder, and the time of glob() grows with the
+/// square of the number of folders.
 struct FolderBudget {
   std::size_t folders = 2048, entries = 1 << 20;
-  std::size_t names = 8192;  ///< that stand as they are behind a pattern: the `..`
+  std::size_t names = 8192;  ///< literal names after a pattern, such as `..`
 };
 
 struct ListLimits {
-  std::size_t mostNumbers = 0;  ///< of a range
+  std::size_t mostNumbers = 0;  ///< largest count of numbers in a range
   FolderBudget* budget = nullptr;
 };
 
-/// The words themselves; A..B as the numbers from A to B, `A..B step S` by steps, each written as
-/// the decimal that it is, and with zeros in front where A or B has them; files for a pattern,
-/// sorted.
-/// @throws levelset::UsageError whose sentence begins with `where`, for what passes the limits too;
-///         levelset::IoError when no file matches a pattern
+/// Lists the values of a loop. `A..B` gives the numbers from A to B, and `A..B step S` those with
+/// step S. Numbers are exact decimals, padded with zeros if A or B is. A pattern gives the sorted
+/// names of the matching files. Any other word gives itself.
+/// @param where  prefix of each error message
+/// @throws levelset::UsageError for a wrong range, or if a limit is exceeded
+/// @throws levelset::IoError if no file matches a pattern
 [[nodiscard]] std::vector<std::string> loopValues(const std::vector<ListWord>& words,
                                                   const ListLimits& limits,
                                                   const std::string& where);

@@ -13,7 +13,7 @@ class Splitter {
  public:
   Splitter(const std::string& text, const std::string& name) : text_(text), name_(name) {}
 
-  /// The next line that has words; without any at the end.
+  /// Reads the next line that has words; returns a line without words at the end.
   ScriptLine nextLine() {
     ScriptLine line;
     while (at_ < text_.size()) {
@@ -40,7 +40,7 @@ class Splitter {
   }
 
  private:
-  /// A backslash before the end of the line.
+  /// Recognizes a backslash before the end of a line.
   [[nodiscard]] bool isJoin() const { return isAt("\\\n") || isAt("\\\r\n"); }
   [[nodiscard]] bool isAt(std::string_view part) const {
     return text_.compare(at_, part.size(), part) == 0;
@@ -63,7 +63,7 @@ class Splitter {
 
   void readQuoted(char quote) {
     const std::size_t begin = line_;
-    word_.push_back({.isQuoted = true});  // '' is a word too
+    word_.push_back({.isQuoted = true});  // '' is an empty word
     for (++at_; at_ < text_.size() && text_[at_] != quote;) {
       if (quote == '"' && text_[at_] == '\\' && at_ + 1 < text_.size())
         ++at_;
@@ -75,11 +75,11 @@ class Splitter {
       add(text_[at_++], true);
     }
     if (at_ >= text_.size())
-      fail(begin, fmt::format("the quote {} is not closed; close it", quote));
+      fail(begin, fmt::format("the quote {} is not closed; add the closing quote", quote));
     ++at_;
   }
 
-  /// What stands here, if it is no quote: a character, or a variable.
+  /// Reads a variable or one unquoted character.
   void readCharacter(bool quoted) {
     if (isAt("$${")) {
       ++at_;
@@ -88,7 +88,7 @@ class Splitter {
     } else if (isAt("${")) {
       const std::size_t end = text_.find_first_of("}\n", at_);
       if (end == std::string::npos || text_[end] == '\n')
-        fail(line_, "a ${ is not closed; write ${NAME}, or $${ where no variable is meant");
+        fail(line_, "a ${ is not closed; write ${NAME}, or $${ for a literal ${");
       word_.push_back({text_.substr(at_ + 2, end - at_ - 2), true, quoted});
       at_ = end + 1;
     } else {
@@ -107,7 +107,7 @@ class Splitter {
   }
 
   const std::string &text_, &name_;
-  ScriptWord word_;  // that is being read
+  ScriptWord word_;  // word being read
   std::size_t at_ = 0, line_ = 1;
 };
 

@@ -20,8 +20,8 @@ std::string mismatch(const Operator& op, std::size_t index, Kind found,
     remedy = "; put 'level-set' before it";
   if (found == Kind::Band && allowed == std::vector{Kind::Mesh}) remedy = "; put 'mesh' before it";
   if (found == Kind::Surface)
-    remedy = "; it has no inside, and is the base of patches and of 'texture --alone' only";
-  if (found == Kind::Patch) remedy = "; 'texture' makes a level set with it";
+    remedy = "; it has no inside, so only patches and 'texture --alone' can use it";
+  if (found == Kind::Patch) remedy = "; 'texture' builds a level set from it";
   if (found == Kind::Scene) remedy = "; 'render' draws it, 'write' saves it as .json";
   std::string kinds;
   for (std::size_t i = 0; i < allowed.size(); ++i)
@@ -30,8 +30,8 @@ std::string mismatch(const Operator& op, std::size_t index, Kind found,
                          : i + 1 == allowed.size() ? " or "
                                                    : ", ",
                          kindName(allowed[i]));
-  return fmt::format("{}: operand {} is a {}, {} is needed{}", op.name, index + 1, kindName(found),
-                     kinds, remedy);
+  return fmt::format("{}: operand {} is a {}, but {} is needed{}", op.name, index + 1,
+                     kindName(found), kinds, remedy);
 }
 
 void checkOperands(const Node& node, const std::vector<Node>& before) {
@@ -43,8 +43,8 @@ void checkOperands(const Node& node, const std::vector<Node>& before) {
   }
   if (found < wanted && !op.operandsOptional) {
     throw UsageError(
-        fmt::format("{}: needs {} operand{} and finds {}; read or make {} first, or name {} with "
-                    "'@'",
+        fmt::format("{}: needs {} operand{} but has {}; read or compute {} first, or name {} "
+                    "with '@'",
                     op.name, wanted, wanted == 1 ? "" : "s", found,
                     wanted - found == 1 ? "one" : "them", wanted - found == 1 ? "it" : "them"));
   }
@@ -61,8 +61,8 @@ void checkNamed(const Node& node, const std::vector<Node>& before) {
     const Node& value = before[number];
     const bool isScalar = node.op->find(option)->type == ParamType::Scalar;
     if (value.kind == Kind::Field || (isScalar && value.kind == Kind::Band)) continue;
-    throw UsageError(fmt::format("{}: --{}: '@{}' is a {}, a {} is needed", node.op->name, option,
-                                 value.name, kindName(value.kind),
+    throw UsageError(fmt::format("{}: --{}: '@{}' is a {}, but a {} is needed", node.op->name,
+                                 option, value.name, kindName(value.kind),
                                  isScalar ? "field or a level set" : "field"));
   }
 }
@@ -74,7 +74,7 @@ std::vector<std::string> targetsOf(const Node& node) {
 
 struct FileRead {
   std::string name;
-  bool standsForOthers = false;  ///< a scene names files that it does not hold, a '#' numbers
+  bool standsForOthers = false;  ///< refers to further files: a scene, or a sequence with '#'
 };
 
 std::vector<FileRead> filesRead(const Node& node) {
@@ -94,36 +94,36 @@ std::vector<FileRead> filesRead(const Node& node) {
   return files;
 }
 
-/// What nodes write, and which of them was added last.
+/// Files that nodes write, with their writers, and the writer added last.
 class Written {
  public:
   void add(const Graph& graph, std::size_t writer) {
     const Node& node = graph.nodes[writer];
-    // A scene has files of its solids beside it.
+    // A scene writes files of its solids into the same folder.
     const bool isScene =
         std::any_of(node.inputs.begin(), node.inputs.end(),
                     [&](std::size_t input) { return graph.nodes[input].kind == Kind::Scene; });
     for (const std::string& target : targetsOf(node)) {
       if (target == "-") continue;
-      const std::filesystem::path place = placeOf(target);
-      writers_[isScene ? place.parent_path() : place] = writer;
+      const std::filesystem::path path = absolutePath(target);
+      writers_[isScene ? path.parent_path() : path] = writer;
       last_ = writer;
     }
   }
 
-  /// Itself, or a folder that it is in.
+  /// Finds the last writer of a file or of a folder that contains it.
   [[nodiscard]] std::optional<std::size_t> find(const FileRead& file) const {
     if (!last_ || file.standsForOthers) return last_;
     std::optional<std::size_t> found;
-    for (std::filesystem::path place = placeOf(file.name);; place = place.parent_path()) {
-      if (const auto it = writers_.find(place); it != writers_.end())
+    for (std::filesystem::path path = absolutePath(file.name);; path = path.parent_path()) {
+      if (const auto it = writers_.find(path); it != writers_.end())
         found = std::max(found, std::optional(it->second));
-      if (!place.has_relative_path()) return found;
+      if (!path.has_relative_path()) return found;
     }
   }
 
  private:
-  static std::filesystem::path placeOf(const std::string& file) {
+  static std::filesystem::path absolutePath(const std::string& file) {
     std::error_code ignored;
     return std::filesystem::weakly_canonical(std::filesystem::absolute(file, ignored), ignored);
   }
@@ -137,7 +137,7 @@ class Written {
 const Operator& givenOperator() {
   static const Operator op{.name = "given",
                            .group = "",
-                           .summary = "a value that was made elsewhere",
+                           .summary = "a value from outside the graph",
                            .isRepeatable = false};
   return op;
 }
@@ -162,7 +162,7 @@ Kind checkNode(const Node& node, const std::vector<Node>& before) {
 
 std::vector<char> neededNodes(const Graph& graph) {
   const std::vector<Node>& nodes = graph.nodes;
-  // An operator that makes a value and writes files beside it is not there for the value alone.
+  // An operator that computes a value and also writes files is needed for its files.
   const auto actsOutside = [](const Node& node) {
     return !node.makes() || !targetsOf(node).empty();
   };

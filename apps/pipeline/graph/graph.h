@@ -10,60 +10,66 @@
 
 namespace pipeline {
 
-/// An action, its parameters checked, and what it takes.
+/// One action with checked options and its operands.
 struct Node {
   const Operator* op = nullptr;
-  std::map<std::string, std::string> options;  ///< by full name; a flag is "true"
-  std::vector<std::size_t> inputs;             ///< its operands: numbers of nodes before it
-  std::map<std::string, std::size_t> named;    ///< by option: the node of its `@NAME`
-  std::string name;                            ///< --as; empty: none
-  Kind kind = Kind::Band;                      ///< of its result, if it makes one
-  std::string place;                           ///< where it was written, if in a script
-  bool voxelFollows = false;  ///< --tolerance is to tell the voxel size that it was not given
+  std::map<std::string, std::string> options;  ///< by full option name; a flag is "true"
+  std::vector<std::size_t> inputs;             ///< operands: indices of earlier nodes
+  std::map<std::string, std::size_t>
+      named;                  ///< by option: index of the node that `@NAME` refers to
+  std::string name;           ///< name from --as; empty: none
+  Kind kind = Kind::Band;     ///< kind of the result, if there is one
+  std::string location;       ///< position in a script; empty: not from a script
+  bool voxelFollows = false;  ///< voxel size is not given, and --tolerance will choose it
 
   [[nodiscard]] bool makes() const { return op->flow == Flow::Makes; }
 };
 
-/// Values that are made of values: what is asked for, not yet computed. However it was written, as
-/// a chain, as a file, as JSON, the same graph comes of it.
+/// The requested computation: nodes that compute values from values. A command line, a script and a
+/// JSON file with the same actions give the same graph.
 struct Graph {
-  std::map<std::string, std::string> globals;  ///< options of the run as a whole
-  std::vector<Node> nodes;                     ///< each behind what it takes
-  std::map<std::size_t, Value> given;          ///< by node: what was made elsewhere (givenOperator)
-  std::vector<std::size_t> results;  ///< nodes whose values are asked for, used by others or not
+  std::map<std::string, std::string> globals;  ///< options of the run
+  std::vector<Node> nodes;                     ///< each node follows its operands
+  std::map<std::size_t, Value>
+      given;  ///< by node: values from outside the graph, see givenOperator()
+  std::vector<std::size_t> results;  ///< nodes whose values are requested
 };
 
-/// Of nodes whose values Graph::given holds. Nothing runs it, and no file can name it.
+/// Operator of nodes whose values are in Graph::given. It never runs, and files cannot refer to it.
 [[nodiscard]] const Operator& givenOperator();
 
-/// Checks what a node takes, and tells the kind of what it makes.
-/// @throws levelset::UsageError for operands that are too many, too few or of kinds that it does
-/// not
-///         take, and as Operator::validate
+/// Checks the operands and options of a node.
+/// @return kind of its result
+/// @throws levelset::UsageError if the number or the kinds of operands do not fit, or as
+///         Operator::validate
 [[nodiscard]] Kind checkNode(const Node& node, const std::vector<Node>& before);
 
-/// Leaves the voxel size of a node open, for --tolerance to tell: of one that needs it and gives
-/// none. Before checkNode().
+/// Leaves the voxel size to --tolerance, if the node takes one and none is given. Call this before
+/// checkNode().
 void leaveVoxelOpen(Node& node);
 
-/// By node: is it needed for the results that are asked for, or for what the graph does outside
-/// itself, that is for what it writes, draws, prints or checks? Where there is nothing of either
-/// kind, everything is.
+/// Finds the needed nodes: the requested results, the nodes that write, draw, print or check, and
+/// all nodes that these depend on. If there are neither results nor such nodes, all nodes are
+/// needed.
+/// @return one flag per node
 [[nodiscard]] std::vector<char> neededNodes(const Graph& graph);
 
-/// By node: the last one before it that writes what it reads, if any does. Until that has run, what
-/// the file holds is something else.
+/// Finds, for each node, the last earlier node that writes a file it reads. The node must wait
+/// until that writer has run.
+/// @return one node index per node; empty: no writer
 [[nodiscard]] std::vector<std::optional<std::size_t>> findWritersRead(
     const Graph& graph, const std::vector<char>& needed);
 
-/// By node: does one behind it write what it reads? Once that has run, it is not to be read again.
+/// Finds the nodes that read a file which a later node writes. After that writer, the input is
+/// lost.
+/// @return one flag per node
 [[nodiscard]] std::vector<char> findOverwritten(const Graph& graph,
                                                 const std::vector<char>& needed);
 
-/// Does it read what can be read once only, standard input or a pipe?
+/// Decides if a node reads standard input or a pipe, which can be read only once.
 [[nodiscard]] bool readsOnce(const Node& node);
 
-/// By node: by how many others that are needed its value is taken.
+/// Counts, for each node, how often needed nodes take its value.
 [[nodiscard]] std::vector<std::size_t> countUses(const Graph& graph,
                                                  const std::vector<char>& needed);
 

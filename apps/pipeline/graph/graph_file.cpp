@@ -38,7 +38,7 @@ Json toJson(const Node& node) {
   return json;
 }
 
-/// Reads nodes one by one, and says which one it is about.
+/// Reads nodes one by one. Each error message names the node.
 class GraphReader {
  public:
   GraphReader(const Json& nodes, std::string file, std::map<std::string, std::string> globals)
@@ -63,11 +63,11 @@ class GraphReader {
   }
 
   void readNode(const Json& json) {
-    if (!json.is_object()) refuse("is no object; write {\"op\": ...}");
+    if (!json.is_object()) refuse("is not an object; write {\"op\": ...}");
     for (const auto& [key, value] : json.items())
       if (key != "op" && key != "options" && key != "inputs" && key != "named" && key != "as")
         refuse(
-            fmt::format("'{}' is nothing a node has; give op, options, inputs, named and as", key));
+            fmt::format("has an unknown member '{}'; use op, options, inputs, named and as", key));
     Node node;
     const std::string op = textOf(json, "op");
     node.op = findOperator(op);
@@ -76,7 +76,7 @@ class GraphReader {
           fmt::format("run: there is no action '{}'; `levelsmith help` lists them", op));
     readOptions(json, node);
     if (json.contains("inputs")) {
-      if (!json["inputs"].is_array()) refuse("'inputs' is no list");
+      if (!json["inputs"].is_array()) refuse("'inputs' is not a list; write [0, 1]");
       for (const Json& input : json["inputs"]) node.inputs.push_back(numberOf(input));
     }
     readNamed(json, node);
@@ -92,7 +92,7 @@ class GraphReader {
   void readOptions(const Json& json, Node& node) const {
     if (!json.contains("options")) return;
     const Json& options = json["options"];
-    if (!options.is_object()) refuse("its options are no object; write {\"radius\": \"1\"}");
+    if (!options.is_object()) refuse("'options' is not an object; write {\"radius\": \"1\"}");
     for (const auto& [name, value] : options.items()) {
       const Param& param = paramOf(node, name);
       const std::string where = node.op->name + ": --" + name;
@@ -107,7 +107,7 @@ class GraphReader {
       else if (value.is_number())
         text = value.dump();
       else
-        refuse(fmt::format("--{} is neither a text nor a number", name));
+        refuse(fmt::format("--{} is neither a text nor a number; write \"1\" or 1", name));
       if (namesValue(param, text))
         throw UsageError(fmt::format(
             "{}: '{}' names a value; give the number of its node under \"named\"", where, text));
@@ -119,7 +119,7 @@ class GraphReader {
   void readNamed(const Json& json, Node& node) const {
     if (!json.contains("named")) return;
     const Json& named = json["named"];
-    if (!named.is_object()) refuse("what it names is no object; write {\"mask\": 0}");
+    if (!named.is_object()) refuse("'named' is not an object; write {\"mask\": 0}");
     for (const auto& [name, value] : named.items()) {
       const Param& param = paramOf(node, name);
       const std::size_t number = numberOf(value);
@@ -127,7 +127,8 @@ class GraphReader {
       const std::string text = "@" + (known.empty() ? fmt::format("{}", number) : known);
       if (!namesValue(param, text))
         throw UsageError(
-            fmt::format("{}: --{} takes no value of another action", node.op->name, name));
+            fmt::format("{}: --{} takes no value of another action; give it under \"options\"",
+                        node.op->name, name));
       if (node.options.contains(name))
         throw UsageError(fmt::format("{}: --{}: is given twice", node.op->name, name));
       node.options[name] = text;
@@ -137,7 +138,7 @@ class GraphReader {
 
   void setName(const std::string& name, Node& node) {
     if (!node.makes())
-      throw UsageError(fmt::format("{}: makes nothing that could be named", node.op->name));
+      throw UsageError(fmt::format("{}: has no result to name; leave out \"as\"", node.op->name));
     if (name.empty() || !names_.emplace(name, at_).second)
       throw UsageError(
           fmt::format("{}: the name '{}' is taken or empty; choose another", node.op->name, name));
@@ -150,17 +151,18 @@ class GraphReader {
                                  node.op->name, name, node.op->name));
   }
   [[nodiscard]] std::string textOf(const Json& json, const char* key) const {
-    if (!json.contains(key) || !json[key].is_string()) refuse(fmt::format("has no text '{}'", key));
+    if (!json.contains(key) || !json[key].is_string())
+      refuse(fmt::format("has no text member '{}'", key));
     return json[key].get<std::string>();
   }
-  /// Of a node before this one, that makes a value.
+  /// Index of an earlier node that has a value.
   [[nodiscard]] std::size_t numberOf(const Json& json) const {
     if (!json.is_number_unsigned() || json.get<std::uint64_t>() >= at_)
-      refuse(fmt::format("takes {}; give the number of a node before it, the first is 0",
+      refuse(fmt::format("refers to {}; give the number of an earlier node, the first is 0",
                          json.dump(-1, ' ', false, Json::error_handler_t::replace)));
     const auto number = json.get<std::size_t>();
     if (!graph_.nodes[number].makes())
-      refuse(fmt::format("takes node {}, and '{}' makes no value", number,
+      refuse(fmt::format("takes node {}, but '{}' has no result", number,
                          graph_.nodes[number].op->name));
     return number;
   }
@@ -175,7 +177,7 @@ class GraphReader {
 std::string toleranceText(const Json& json, const std::string& file) {
   if (!json.is_string() && !json.is_number())
     throw InvalidInput(
-        fmt::format("run: '{}': its tolerance is neither a text nor a number", file));
+        fmt::format("run: '{}': \"tolerance\" is neither a text nor a number", file));
   const std::string text = json.is_string() ? json.get<std::string>() : json.dump();
   const std::vector<Param>& all = globalParams();
   const auto param = std::find_if(all.begin(), all.end(),
@@ -199,16 +201,16 @@ Graph graphFromJson(const std::string& text, const std::string& name,
   const Json json = levelset::isJsonTooDeep(text) ? Json() : Json::parse(text, nullptr, false);
   if (json.is_discarded() || !json.is_object() || json.value("format", Json()) != kFormat)
     throw InvalidInput(fmt::format(
-        "run: '{}' is no graph; write one with --save-graph, or a text with one action a line",
+        "run: '{}' is not a graph; write one with --save-graph, or a text with one action a line",
         name));
   if (json.value("version", Json()) != kVersion)
     throw InvalidInput(fmt::format(
-        "run: '{}' is of version {}, and this program knows {}", name,
+        "run: '{}' has version {}, but this program reads version {}", name,
         json.value("version", Json()).dump(-1, ' ', false, Json::error_handler_t::replace),
         kVersion));
   const auto nodes = json.find("nodes");
   if (nodes == json.end() || !nodes->is_array() || nodes->empty())
-    throw InvalidInput(fmt::format("run: '{}' holds no nodes", name));
+    throw InvalidInput(fmt::format("run: '{}' contains no nodes", name));
   std::map<std::string, std::string> all = globals;
   if (json.contains(kTolerance) && !all.contains(kTolerance))
     all[kTolerance] = toleranceText(json[kTolerance], name);

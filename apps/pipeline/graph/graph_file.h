@@ -7,27 +7,30 @@
 
 namespace pipeline {
 
-/// A graph as JSON: `{"format": "levelsmith graph", "version": 1, "nodes": […]}`, each node
-/// `{"op": NAME, "options": {…}, "inputs": [numbers of nodes], "named": {option: number of a node},
-/// "as": NAME}`, of which all but the first may be left out. Of the options of the run
-/// `"tolerance"` is in it, beside the nodes: voxel sizes follow from it.
+/// Writes a graph as JSON: `{"format": "levelsmith graph", "version": 1, "nodes": […]}`. Each node
+/// is
+/// `{"op": NAME, "options": {…}, "inputs": [node indices], "named": {OPTION: node index}, "as":
+/// NAME}`; all members except "op" are optional. The only run option in the file is `"tolerance"`,
+/// beside the nodes, because it determines voxel sizes.
 [[nodiscard]] std::string graphJson(const Graph& graph);
 
-/// Options may be texts as one would write them, numbers, or true for a flag.
-/// @param name     of the file, for what is said about it
-/// @param globals  options of the run, which win over what the text says
-/// @throws levelset::InvalidInput for what is no such text; levelset::UsageError, with the number
-/// of
-///         the node, for actions and options that are none, or that cannot be taken together
+/// Reads a graph from JSON. An option is a text as on the command line, a number, or true for a
+/// flag.
+/// @param name     name of the file, for error messages
+/// @param globals  options of the run; they override those of the text
+/// @throws levelset::InvalidInput if the text is not a graph
+/// @throws levelset::UsageError if an action or option is unknown or does not fit; names the node
 [[nodiscard]] Graph graphFromJson(const std::string& text, const std::string& name,
                                   const std::map<std::string, std::string>& globals = {});
 
-/// Does the name say that a file holds a graph?
+/// Decides by extension if a file contains a graph.
 [[nodiscard]] bool isGraphFile(const std::filesystem::path& file);
 
-/// @throws as graphFromJson(), and levelset::IoError when it cannot be read
+/// Reads a graph from a file.
+/// @throws levelset::IoError if the file cannot be read; further errors as graphFromJson()
 [[nodiscard]] Graph readGraph(const std::filesystem::path& file,
                               const std::map<std::string, std::string>& globals = {});
+/// Writes a graph to a file.
 /// @throws levelset::IoError
 void writeGraph(const std::filesystem::path& file, const Graph& graph);
 

@@ -55,15 +55,15 @@ Value read(Invocation& in) {
         file, {.maxMemory = in.maxMemory, .repairs = warn, .progress = in.progress}));
   }
   if (fileKind(in) == Kind::Mesh) {
-    std::vector<std::string> leftAside;
+    std::vector<std::string> unsupported;
     levelset::TriMesh mesh = levelset::readMesh(file, {.format = in.text("format"),
                                                        .attributes = !in.flag("bare"),
                                                        .maxMemory = in.maxMemory,
-                                                       .leftAside = &leftAside,
+                                                       .unsupported = &unsupported,
                                                        .progress = in.progress});
-    if (!leftAside.empty()) {
+    if (!unsupported.empty()) {
       in.notes.warnings.push_back(fmt::format("{}: left aside what no vertex can carry: {}",
-                                              file.string(), fmt::join(leftAside, "; ")));
+                                              file.string(), fmt::join(unsupported, "; ")));
     }
     return Value(std::move(mesh));
   }

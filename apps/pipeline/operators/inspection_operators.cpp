@@ -40,7 +40,7 @@ Value measure(Invocation& in) {
   json["voxel_size"] = m.voxelSize;
   json["half_width"] = m.halfWidth;
   json["components"] = m.components;
-  json["shells"] = m.shells;
+  json["shells"] = m.surfaces;
   json["cavities"] = m.cavities;
   json["euler"] = m.euler;
   json["centroid"] = toJson(m.centroid);

@@ -24,7 +24,7 @@ Json toJson(const StepReport& step) {
   Json json;
   json["action"] = step.action;
   if (!step.resultName.empty()) json["name"] = step.resultName;
-  if (!step.place.empty()) json["place"] = step.place;
+  if (!step.location.empty()) json["place"] = step.location;
   json["parameters"] = step.parameters;
   json["defaults"] = step.defaults;
   for (const Resolved& length : step.notes.lengths) {
@@ -33,7 +33,7 @@ Json toJson(const StepReport& step) {
     entry["world"] = length.world;
     if (length.voxels) entry["voxels"] = *length.voxels;
   }
-  if (step.isKnown) json["known"] = true;
+  if (step.isCached) json["known"] = true;
   json["wall_s"] = step.wallSeconds;
   json["cpu_s"] = step.cpuSeconds;
   json["peak_bytes"] = step.peakBytes;
@@ -45,9 +45,9 @@ Json toJson(const StepReport& step) {
       result["half_width"] = step.halfWidth;
       result["active_voxels"] = step.activeVoxels;
     }
-    if (!std::isinf(step.needed.halfWidth)) result["needed"]["half_width"] = step.needed.halfWidth;
-    if (!levelset::isEverywhere(step.needed.region)) {
-      const auto& [low, high] = step.needed.region;
+    if (!std::isinf(step.roi.halfWidth)) result["needed"]["half_width"] = step.roi.halfWidth;
+    if (!levelset::isEverywhere(step.roi.region)) {
+      const auto& [low, high] = step.roi.region;
       result["needed"]["region"] = {{low.x, low.y, low.z}, {high.x, high.y, high.z}};
     }
     if (step.triangles > 0) result["triangles"] = step.triangles;
@@ -106,7 +106,7 @@ std::string errorText(const StepReport& step) {
   return text;
 }
 
-/// In small letters.
+/// Extension in lower case.
 std::string extensionOf(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension)
@@ -142,17 +142,17 @@ void checkRunTargets(const Graph& graph) {
     if (const auto it = graph.globals.find(option); it != graph.globals.end())
       wanted.emplace_back(std::string("--") + option, it->second);
   if (wanted.size() == 2 && levelset::isSameFile(wanted[0].second, wanted[1].second))
-    throw levelset::UsageError(fmt::format(
-        "--save-graph: '{}' is what --report writes too; use another file for one of them",
-        wanted[1].second));
+    throw levelset::UsageError(
+        fmt::format("--save-graph: --report writes '{}' too; use another file for one of them",
+                    wanted[1].second));
   for (const auto& [option, file] : wanted) {
     for (const Node& node : graph.nodes) {
       if (!node.op->targets) continue;
       for (const std::string& target : node.op->targets(Invocation(*node.op, node.options))) {
         if (!levelset::isSameFile(target, file)) continue;
         throw levelset::UsageError(
-            fmt::format("{}: '{}' is what '{}' writes too; use another file for one of them",
-                        option, file, node.op->name));
+            fmt::format("{}: the action '{}' writes '{}' too; use another file for one of them",
+                        option, node.op->name, file));
       }
     }
     const std::filesystem::path path = file;
@@ -162,13 +162,13 @@ void checkRunTargets(const Graph& graph) {
     const bool isReport = option == "--report";
     if (!isDevice && (!extension.empty() || !isReport) && extension != ".json" &&
         !(isReport && isPage(path)))
-      throw levelset::UsageError(fmt::format("{}: '{}' is no kind of {}; name a .json{} file",
-                                             option, file, isReport ? "report" : "graph",
-                                             isReport ? " or .html" : ""));
+      throw levelset::UsageError(
+          fmt::format("{}: '{}' has no known extension for a {}; use a .json{} file", option, file,
+                      isReport ? "report" : "graph", isReport ? " or .html" : ""));
     try {
       const levelset::FileTarget probe(file);
     } catch (const levelset::Error& error) {
-      refuseAs(option, error);
+      rethrowAs(option, error);
     }
   }
 }
@@ -183,7 +183,7 @@ std::vector<std::string> toleranceLines(const ToleranceReport& tolerance) {
     std::string line =
         fmt::format("tolerance: voxels of {:.4g}, {:.2f} s", round.voxelSize, round.seconds);
     for (const ToleranceOutput& output : round.outputs)
-      line += fmt::format("; {} off by {:.3g}", output.name, output.achieved);
+      line += fmt::format("; error of {} {:.3g}", output.name, output.achieved);
     lines.push_back(line + (round.failure.empty() ? "" : "; " + round.failure));
   }
   for (const ToleranceOutput& output : tolerance.outputs) {
@@ -192,22 +192,23 @@ std::vector<std::string> toleranceLines(const ToleranceReport& tolerance) {
                     output.name, output.requested, output.achieved,
                     output.isReached() ? "reached" : "reached only", tolerance.voxelSize);
     if (output.crease > 0)
-      line += fmt::format("; beside creases, which the field cannot hold, {:.3g}", output.crease);
+      line +=
+          fmt::format("; near creases, which the field cannot represent, {:.3g}", output.crease);
     lines.push_back(line);
   }
   if (tolerance.outputs.empty())
     lines.push_back(
         tolerance.modelVoxelSize > 0
-            ? fmt::format("tolerance: the error models pick voxels of {:.4g}, before anything ran",
+            ? fmt::format("tolerance: the error models choose voxels of {:.4g} for the first run",
                           tolerance.modelVoxelSize)
-            : "tolerance: the error models cannot tell the voxel size before anything ran");
+            : "tolerance: the error models cannot predict the voxel size of the first run");
   return lines;
 }
 
 std::string stepLine(const StepReport& step, bool dryRun) {
   std::string line = fmt::format("{:<14}", step.action);
-  if (step.isKnown)
-    line += " of an earlier run";
+  if (step.isCached)
+    line += " from an earlier run";
   else if (!dryRun)
     line += fmt::format(" {:7.2f} s ({:.2f} s CPU), peak {:.0f} MB", step.wallSeconds,
                         step.cpuSeconds, step.peakBytes * 1e-6);

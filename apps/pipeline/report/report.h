@@ -8,23 +8,24 @@
 
 namespace pipeline {
 
-/// The report as JSON: an object with `version`, `versions` of all libraries, `graph` (which `run`
-/// takes, as a file of its own), `steps`, `tolerance` where one was asked for, `left_out`,
-/// `warnings`, `exit_code`, `error`.
+/// Writes the report as JSON. The object contains `version`, `versions` of all libraries, `graph`,
+/// `steps`, `tolerance` (only with --tolerance), `left_out`, `warnings`, `exit_code` and `error`.
+/// `graph`, saved to a file, is a valid input of the action `run`.
 [[nodiscard]] std::string reportJson(const RunReport& report);
-/// What was asked for and reached, and the voxel sizes that were tried, a line each.
+/// Formats one line for each voxel size that was tried, and one for each result.
 [[nodiscard]] std::vector<std::string> toleranceLines(const ToleranceReport& tolerance);
-/// Refuses a --report or --save-graph that cannot be written before time is spent on what it should
-/// tell of.
-/// @throws levelset::IoError; UsageError when an action writes the same file
+/// Checks the files of --report and --save-graph before the run.
+/// @throws levelset::IoError if a file cannot be written
+/// @throws levelset::UsageError if an action writes the same file, or the extension is unknown
 void checkRunTargets(const Graph& graph);
-/// Is a report of this name a page? By its extension.
+/// Decides by extension if a report is an HTML page.
 [[nodiscard]] bool isPage(const std::filesystem::path& path);
-/// By extension: .json or .html; "-" is JSON on standard output. Written beside the target and
-/// renamed.
+/// Writes a report as .json or .html, by extension; "-" writes JSON to standard output. Writes a
+/// temporary file and renames it.
+/// @throws levelset::IoError
 void writeReport(const std::filesystem::path& path, const RunReport& report);
 
-/// One line for people: what the step made, how long it took, how far off it may be.
+/// Formats one line about a step: its result, time, memory and estimated error.
 [[nodiscard]] std::string stepLine(const StepReport& step, bool dryRun);
 
 }  // namespace pipeline

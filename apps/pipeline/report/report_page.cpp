@@ -70,17 +70,17 @@ summary { cursor: pointer; color: var(--faint); }
 <body>
 )HTML";
 
-/// What came of the run, for each exit code.
+/// Meaning of an exit code.
 const char* meaningOf(int exitCode) {
   switch (static_cast<levelset::ExitCode>(exitCode)) {
     case levelset::ExitCode::Done:
       return "done";
     case levelset::ExitCode::Usage:
-      return "the call is wrong";
+      return "the command line is wrong";
     case levelset::ExitCode::Input:
-      return "the data cannot be used as asked";
+      return "the input data is not usable";
     case levelset::ExitCode::Resource:
-      return "memory or another limit would be passed";
+      return "memory or another limit would be exceeded";
     case levelset::ExitCode::Numeric:
       return "a numeric check failed";
     case levelset::ExitCode::File:
@@ -105,7 +105,7 @@ std::string megabytes(double bytes) {
   return std::isfinite(bytes) ? fmt::format("{:.0f}", bytes * 1e-6) : "–";
 }
 
-/// 1234567 as 1,234,567.
+/// Formats 1234567 as 1,234,567.
 std::string grouped(double count) {
   const std::string digits = fmt::format("{:.0f}", count);
   std::string text;
@@ -120,14 +120,14 @@ std::string pointText(const Imath::V3d& p) {
   return fmt::format("{:.6g}, {:.6g}, {:.6g}", p.x, p.y, p.z);
 }
 
-/// A half width in voxels and in the world.
+/// Formats a half width in voxels and in world units.
 std::string widthText(double voxels, double voxelSize) {
   return fmt::format("±{} vx = ±{}", figure(voxels), figure(voxels * voxelSize));
 }
 
 // === Actions
 
-/// As a shell takes it for one word.
+/// Quotes a text so that a shell reads it as one word.
 std::string quotedWord(const std::string& text) {
   const std::string plain = "_-./,:=@%+";
   const bool isPlain = !text.empty() && std::all_of(text.begin(), text.end(), [&](char c) {
@@ -140,7 +140,8 @@ std::string quotedWord(const std::string& text) {
   return quoted + "'";
 }
 
-/// One that stands at a place goes without its name, if all before it are there, too.
+/// Command line of a step. Positional options go without their names, if all positional options
+/// before them are given.
 std::string actionText(const StepReport& step) {
   const Operator* op = findOperator(step.action);
   std::map<int, std::string> places;
@@ -168,7 +169,7 @@ std::string actionText(const StepReport& step) {
   return text;
 }
 
-/// Figures as they were made, for people.
+/// Indents a JSON text.
 std::string prettyJson(const std::string& text) {
   const auto json = nlohmann::ordered_json::parse(text, nullptr, false);
   return json.is_discarded()
@@ -197,11 +198,11 @@ class StepTable {
         "<div class=\"scroll\"><table>\n<caption>{}</caption>\n<thead><tr>{}<th "
         "scope=\"col\">action</th><th scope=\"col\" class=\"n\">wall s</th><th scope=\"col\" "
         "class=\"n\">CPU s</th><th scope=\"col\" class=\"n\">peak MB</th><th scope=\"col\" "
-        "class=\"n\">size</th><th scope=\"col\" class=\"n\">voxel size</th><th scope=\"col\">band "
-        "made</th><th scope=\"col\">needed of it</th><th scope=\"col\">error "
+        "class=\"n\">size</th><th scope=\"col\" class=\"n\">voxel size</th><th scope=\"col\">half "
+        "width</th><th scope=\"col\">region of interest</th><th scope=\"col\">error "
         "estimate</th></tr></thead>\n",
-        report_.dryRun ? "What each step would make, as far as it can be told before it runs"
-                       : "What each step made and cost, in the order of the graph",
+        report_.dryRun ? "Predicted result of each step"
+                       : "Result and cost of each step, in the order of the graph",
         hasPictures_ ? "<th scope=\"col\">result</th>" : "");
     for (std::size_t i = 0; i < report_.steps.size(); ++i) text += row(report_.steps[i], i);
     return text + "</table></div>\n";
@@ -215,9 +216,9 @@ class StepTable {
       text += fmt::format("<td class=\"picture\"{}>{}</td>", more.empty() ? "" : " rowspan=\"2\"",
                           pictureOf(step, index));
     text += "<th scope=\"rowgroup\">" + headOf(step) + "</th>";
-    // The bar behind the time is its share of the whole.
+    // The bar behind the time shows the share of the total time.
     const double share = wall_ > 0 && step.wallSeconds > 0 ? 100 * step.wallSeconds / wall_ : 0;
-    if (step.isKnown || report_.dryRun)
+    if (step.isCached || report_.dryRun)
       text += "<td class=\"n\">–</td><td class=\"n\">–</td><td class=\"n\">–</td>";
     else
       text += fmt::format(
@@ -239,14 +240,13 @@ class StepTable {
     if (step.resultKind.empty()) return "";
     if (step.thumbnail.png.empty()) {
       const std::string reason =
-          step.thumbnail.missing.empty() ? "none was asked for" : step.thumbnail.missing;
+          step.thumbnail.missing.empty() ? "not requested" : step.thumbnail.missing;
       return "<span class=\"faint\">no picture: " + escapedHtml(reason) + "</span>";
     }
     return fmt::format(
         "<img src=\"data:image/png;base64,{}\" width=\"{}\" height=\"{}\" alt=\"{}\">",
         apps::base64(step.thumbnail.png), kThumbnailWidth, kThumbnailHeight,
-        escapedHtml(
-            fmt::format("the {} that step {}, {}, made", step.resultKind, index + 1, step.action)));
+        escapedHtml(fmt::format("the {} of step {}, {}", step.resultKind, index + 1, step.action)));
   }
 
   static std::string headOf(const StepReport& step) {
@@ -257,8 +257,8 @@ class StepTable {
     };
     if (!step.resultName.empty()) tag("@" + step.resultName);
     if (!step.resultKind.empty()) tag(step.resultKind);
-    if (step.isKnown) tag("of an earlier run");
-    if (!step.place.empty()) tag(step.place);
+    if (step.isCached) tag("from an earlier run");
+    if (!step.location.empty()) tag(step.location);
     return tags.empty() ? text : text + "<br>" + tags.substr(1);
   }
 
@@ -271,14 +271,14 @@ class StepTable {
   }
 
   static std::string neededOf(const StepReport& step) {
-    if (step.needed.isWhole()) return step.voxelSize > 0 ? "all" : "";
+    if (step.roi.isWhole()) return step.voxelSize > 0 ? "all" : "";
     std::string text;
-    if (!std::isinf(step.needed.halfWidth))
-      text = step.voxelSize > 0 ? widthText(step.needed.halfWidth, step.voxelSize)
-                                : fmt::format("±{} vx", figure(step.needed.halfWidth));
-    if (levelset::isEverywhere(step.needed.region)) return text;
+    if (!std::isinf(step.roi.halfWidth))
+      text = step.voxelSize > 0 ? widthText(step.roi.halfWidth, step.voxelSize)
+                                : fmt::format("±{} vx", figure(step.roi.halfWidth));
+    if (levelset::isEverywhere(step.roi.region)) return text;
     if (!text.empty()) text += "<br>";
-    const Imath::Box3d& box = step.needed.region;
+    const Imath::Box3d& box = step.roi.region;
     return text + fmt::format("<span class=\"faint\">the box from {}<br>to {}</span>",
                               pointText(box.min), pointText(box.max));
   }
@@ -292,7 +292,7 @@ class StepTable {
     return text;
   }
 
-  /// Lengths as they were resolved, what it told, and its figures.
+  /// Warnings, notes, resolved lengths, certificate, details and default options of a step.
   static std::string moreOf(const StepReport& step) {
     std::string items, folds;
     for (const std::string& warning : step.notes.warnings)
@@ -312,7 +312,7 @@ class StepTable {
     if (!step.defaults.empty()) {
       std::string lines;
       for (const auto& [name, value] : step.defaults) lines += "--" + name + " " + value + "\n";
-      folds += folded("parameters that were not given", lines);
+      folds += folded("options with their default values", lines);
     }
     return (items.empty() ? "" : "<ul>" + items + "</ul>") + folds;
   }
@@ -375,11 +375,11 @@ std::string creaseText(const ToleranceOutput& output) {
 
 std::string toleranceOutputs(const ToleranceReport& tolerance) {
   std::string text =
-      "<div class=\"scroll\"><table>\n<caption>Largest error asked for and reached, away from "
-      "creases that the field cannot hold, world units</caption>\n<thead><tr><th "
+      "<div class=\"scroll\"><table>\n<caption>Largest error requested and achieved, away from "
+      "creases that the field cannot represent, world units</caption>\n<thead><tr><th "
       "scope=\"col\">result</th><th scope=\"col\" class=\"n\">requested</th><th scope=\"col\" "
       "class=\"n\">achieved</th><th scope=\"col\">reached</th><th scope=\"col\">by</th><th "
-      "scope=\"col\">beside creases</th><th scope=\"col\" "
+      "scope=\"col\">near creases</th><th scope=\"col\" "
       "class=\"n\">order</th></tr></thead>\n<tbody>\n";
   for (const ToleranceOutput& output : tolerance.outputs)
     text += fmt::format(
@@ -394,14 +394,14 @@ std::string toleranceOutputs(const ToleranceReport& tolerance) {
 
 std::string toleranceRounds(const ToleranceReport& tolerance) {
   std::string text =
-      "<div class=\"scroll\" style=\"margin-top:1rem\"><table>\n<caption>Voxel sizes that were "
+      "<div class=\"scroll\" style=\"margin-top:1rem\"><table>\n<caption>Voxel sizes "
       "tried</caption>\n<thead><tr><th scope=\"col\">voxel size</th><th scope=\"col\" "
-      "class=\"n\">wall s</th><th scope=\"col\">what came of it</th></tr></thead>\n<tbody>\n";
+      "class=\"n\">wall s</th><th scope=\"col\">outcome</th></tr></thead>\n<tbody>\n";
   for (const ToleranceRound& round : tolerance.rounds) {
     std::string found;
     for (const ToleranceOutput& output : round.outputs)
       found +=
-          fmt::format("<li><code>{}</code> off by {}, beside creases: {}</li>",
+          fmt::format("<li>error of <code>{}</code> {}, near creases: {}</li>",
                       escapedHtml(output.name), figure(output.achieved, 3), creaseText(output));
     if (!round.failure.empty())
       found += "<li><span class=\"warn\">" + escapedHtml(round.failure) + "</span></li>";
@@ -415,15 +415,15 @@ std::string toleranceRounds(const ToleranceReport& tolerance) {
 }
 
 std::string toleranceSection(const ToleranceReport& tolerance) {
-  std::string text = fmt::format("<h2>Tolerance</h2>\n<p>Asked for: <code>{}</code>. ",
+  std::string text = fmt::format("<h2>Tolerance</h2>\n<p>Requested: <code>{}</code>. ",
                                  escapedHtml(tolerance.written));
   if (tolerance.modelVoxelSize > 0)
-    text += fmt::format("The error models picked voxels of {} before anything ran",
+    text += fmt::format("The error models chose voxels of {} before the run",
                         figure(tolerance.modelVoxelSize));
   else
-    text += "The error models could not tell the voxel size before anything ran";
+    text += "The error models could not predict the voxel size";
   for (std::size_t i = 0; i < tolerance.models.size(); ++i)
-    text += fmt::format("{}<code>{}</code>", i == 0 ? "; they rest on " : ", ",
+    text += fmt::format("{}<code>{}</code>", i == 0 ? "; they are fitted to " : ", ",
                         escapedHtml(tolerance.models[i]));
   text += ".</p>\n";
   if (!tolerance.limit.empty())
@@ -435,8 +435,8 @@ std::string toleranceSection(const ToleranceReport& tolerance) {
 
 std::string versionTable() {
   std::string text =
-      "<h2>Versions</h2>\n<div class=\"scroll narrow\"><table>\n<caption>What the program is made "
-      "of</caption>\n<thead><tr><th scope=\"col\">part</th><th "
+      "<h2>Versions</h2>\n<div class=\"scroll narrow\"><table>\n<caption>Parts of the "
+      "program</caption>\n<thead><tr><th scope=\"col\">part</th><th "
       "scope=\"col\">version</th></tr></thead>\n<tbody>\n";
   for (const auto& [name, version] : programVersions())
     text += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escapedHtml(name),
@@ -447,10 +447,9 @@ std::string versionTable() {
 std::string graphSection(const RunReport& report) {
   if (report.graphJson.empty()) return "";
   return fmt::format(
-      "<h2>The graph</h2>\n<p>It makes the same results again: <a download=\"graph.json\" "
+      "<h2>The graph</h2>\n<p>It computes the same results again: <a download=\"graph.json\" "
       "href=\"data:application/json;base64,{}\">save it</a> as <code>graph.json</code>, then "
-      "<code>levelsmith run graph.json</code>. Paths are as they were written; options of the run, "
-      "as "
+      "<code>levelsmith run graph.json</code>. Paths are as written. Options of the run, such as "
       "<code>--max-memory</code>, are not part of it.</p>\n"
       "<details><summary>graph.json</summary><pre>{}</pre></details>\n",
       apps::base64(report.graphJson), escapedHtml(report.graphJson));
@@ -463,7 +462,7 @@ std::string reportPage(const RunReport& report) {
   page += listOf("Warnings", report.warnings, " class=\"warn\"");
   if (report.tolerance) page += toleranceSection(*report.tolerance);
   if (!report.steps.empty()) page += "<h2>Steps</h2>\n" + StepTable(report).html();
-  page += listOf("Left out, since nothing needed it", report.leftOut, "");
+  page += listOf("Left out, because no requested result depends on it", report.leftOut, "");
   return page + graphSection(report) + versionTable() + "</main>\n</body>\n</html>\n";
 }
 

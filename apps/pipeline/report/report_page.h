@@ -6,8 +6,8 @@
 
 namespace pipeline {
 
-/// The report as one page of HTML, pictures included: it loads nothing and runs nothing. The same
-/// run gives the same bytes, but for what it cost.
+/// Formats the report as one HTML page with embedded pictures. The page loads no other file and
+/// contains no script. Two equal runs give equal bytes, except for times and memory.
 [[nodiscard]] std::string reportPage(const RunReport& report);
 
 }  // namespace pipeline

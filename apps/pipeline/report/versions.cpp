@@ -10,7 +10,7 @@ namespace pipeline {
 namespace {
 
 #ifdef __clang__
-constexpr const char* kCompiler = __VERSION__;  // names itself
+constexpr const char* kCompiler = __VERSION__;  // includes the name of the compiler
 #else
 constexpr const char* kCompiler = "GCC " __VERSION__;
 #endif

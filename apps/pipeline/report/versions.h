@@ -6,7 +6,7 @@
 
 namespace pipeline {
 
-/// What this program is made of: itself first, its libraries, and the compiler at the end.
+/// Versions of the program, its libraries and the compiler, in this order.
 [[nodiscard]] std::vector<levelset::LibraryVersion> programVersions();
 
 }  // namespace pipeline

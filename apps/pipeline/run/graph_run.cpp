@@ -18,11 +18,11 @@
 namespace pipeline {
 namespace {
 
-/// Of a part; of the whole it may be something else.
-struct RefusedInPart {};
+/// Failure of a node on a region of interest. The node may succeed on complete values.
+struct RegionFailure {};
 
-/// Is it about what was given, rather than about memory or an end that was asked for?
-bool isOfInput(const std::exception_ptr& failure) {
+/// Decides if the input causes a failure, as opposed to memory or a cancellation.
+bool isInputError(const std::exception_ptr& failure) {
   try {
     std::rethrow_exception(failure);
   } catch (const levelset::ResourceLimit&) {
@@ -36,27 +36,30 @@ bool isOfInput(const std::exception_ptr& failure) {
   }
 }
 
-/// Operators hold this many times what they take or make, at most, by the report's peaks.
-constexpr double kWorkingSpace = 4;
+/// Largest ratio of an operator's peak memory to the size of its operands and result, from the
+/// peaks of run reports.
+constexpr double kWorkingFactor = 4;
 
-/// Of meshes that are read to be planned with.
-constexpr double kMostEarlyBytes = 1 << 28;
+/// Limit for the meshes that are read during planning, bytes.
+constexpr double kMaxPlanningBytes = 1 << 28;
 
-/// Voxels: what estimateError() reads of a band, up to the corners of cells beside those of the
-/// zero set.
+/// Half width, in voxels, that estimateError() reads of a band: the cells of the zero set and
+/// their neighbour cells.
 constexpr double kMeasuredHalfWidth = 4;
 
-/// @throws levelset::InvalidInput where there is no surface in the part
-Value partOf(const Value& value, const RegionOfInterest& roi) {
+/// Crops a band to a region of interest.
+/// @throws levelset::InvalidInput if the region contains no surface
+Value cropTo(const Value& value, const RegionOfInterest& roi) {
   if (value.kind() != Kind::Band) return value;
   levelset::NarrowBand part = levelset::cropped(value.band(), roi);
   if (part.isEmpty() && !levelset::isEverywhere(roi.region))
-    throw levelset::InvalidInput("no surface lies in the part that is needed");
+    throw levelset::InvalidInput(
+        "no surface lies in the region of interest; use --no-roi to compute the complete value");
   return Value(std::move(part));
 }
 
-/// Does it leave something behind beside its value, or look at what is outside?
-bool isOrdered(const Node& node) {
+/// Decides if a node has effects beside its value, or depends on more than its operands.
+bool hasSideEffects(const Node& node) {
   const Operator& op = *node.op;
   if (!node.makes() || !op.isRepeatable) return true;
   const Invocation probe(op, node.options);
@@ -81,73 +84,77 @@ void GraphRun::run() {
     runNodes();
   } catch (...) {
     try {
-      tellInOrder();
+      reportInOrder();
     } catch (const std::exception&) {
-      // What went wrong first is what the user must hear.
+      // The first failure is the one to report.
     }
-    fileSteps();
+    collectSteps();
     throw;
   }
-  fileSteps();
+  collectSteps();
 }
 
 void GraphRun::runNodes() {
-  const auto count = [&](auto... fates) {
+  const auto count = [&](auto... states) {
     std::size_t sum = 0;
     for (std::size_t i = 0; i < states_.size(); ++i)
-      sum += !isGiven(i) && ((states_[i] == fates) || ...);
+      sum += !isGiven(i) && ((states_[i] == states) || ...);
     return sum;
   };
-  const std::size_t known = count(NodeState::Load, NodeState::Known), ran = count(NodeState::Run);
-  planAhead();
+  const std::size_t known = count(NodeState::Load, NodeState::UpToDate),
+                    ran = count(NodeState::Compute);
+  planNodes();
   for (std::size_t i = 0; i < graph_.nodes.size(); ++i) {
     const Node& node = graph_.nodes[i];
-    if (states_[i] == NodeState::LeftOut)
+    if (states_[i] == NodeState::Unneeded)
       report_.leftOut.push_back(node.op->name + (node.name.empty() ? "" : " @" + node.name));
     else if (const auto given = graph_.given.find(i); given != graph_.given.end())
       values_.put(i, given->second);
   }
   const std::size_t all = graph_.nodes.size();
-  JobsDone done{.isDone = std::vector<char>(all, 0)};
-  if (threads_ > 1 && !settings_.dryRun && isBranched()) done = scheduleTasks();
+  ScheduleResult done{.isDone = std::vector<char>(all, 0)};
+  if (threads_ > 1 && !settings_.dryRun && hasBranches()) done = scheduleTasks();
   runInOrder(done.isDone, done.failed.value_or(all));
   if (done.failure) std::rethrow_exception(done.failure);
   if (known > 0)
     settings_.note(
-        ran == 0 ? fmt::format("nothing was computed: all {} results are of an earlier run", known)
-                 : fmt::format("{} of {} results are of an earlier run", known, known + ran));
+        ran == 0
+            ? fmt::format("nothing was computed: all {} results come from an earlier run", known)
+            : fmt::format("{} of {} results come from an earlier run", known, known + ran));
 }
 
 void GraphRun::runInOrder(const std::vector<char>& isDone, std::size_t end) {
   for (std::size_t i = 0; i < end; ++i) {
-    tellInOrder();
-    if (isDone[i] || wasEarly_[i] || isGiven(i) || states_[i] == NodeState::LeftOut) continue;
-    if (isRefused_[i]) makeWhole(i);
-    if (isRefused_[i] || states_[i] == NodeState::Run)
+    reportInOrder();
+    if (isDone[i] || isComputedForPlan_[i] || isGiven(i) || states_[i] == NodeState::Unneeded)
+      continue;
+    if (needsFullValues_[i]) requestFullValues(i);
+    if (needsFullValues_[i] || states_[i] == NodeState::Compute)
       compute(i);
     else
-      recall(i);
+      loadFromCache(i);
   }
-  tellInOrder();
+  reportInOrder();
 }
 
-/// @return by node: how many that run take its value
+/// Sets the state of each node.
+/// @return for each node, the number of nodes that run and take its value
 std::vector<std::size_t> GraphRun::decideStates() {
   const std::size_t count = graph_.nodes.size();
   const std::vector<char> needed = neededNodes(graph_);
-  wasEarly_.resize(count);
-  earlyFailures_.resize(count);
-  isRefused_.resize(count);
+  isComputedForPlan_.resize(count);
+  planningFailures_.resize(count);
+  needsFullValues_.resize(count);
   regions_.resize(count);
   plans_.resize(count);
   steps_.resize(count);
-  unspoken_.resize(count);
+  pendingOutput_.resize(count);
   states_.resize(count);
   for (std::size_t i = 0; i < count; ++i)
-    states_[i] = needed[i] ? NodeState::Run : NodeState::LeftOut;
+    states_[i] = needed[i] ? NodeState::Compute : NodeState::Unneeded;
   if (!settings_.cache.empty() && !settings_.dryRun) useCache(needed);
   std::vector<char> runs(count);
-  for (std::size_t i = 0; i < count; ++i) runs[i] = states_[i] == NodeState::Run;
+  for (std::size_t i = 0; i < count; ++i) runs[i] = states_[i] == NodeState::Compute;
   return countUses(graph_, runs);
 }
 
@@ -162,34 +169,35 @@ void GraphRun::useCache(const std::vector<char>& needed) {
     if (!needed[i]) continue;
     const bool isKnown = keys_[i] && cache_->has(*keys_[i]);
     if (!node.makes()) {
-      if (isKnown && isUpToDate(*keys_[i])) states_[i] = NodeState::Known;
-    } else if (!taken[i] && uses[i] > 0) {  // what ends a chain is made for itself
-      states_[i] = NodeState::Known;
+      if (isKnown && isUpToDate(*keys_[i])) states_[i] = NodeState::UpToDate;
+    } else if (!taken[i] && uses[i] > 0) {  // a value without consumers is a result of its own
+      states_[i] = NodeState::UpToDate;
     } else if (isKnown && Cache::canHold(node.kind)) {
       states_[i] = NodeState::Load;
     }
-    if (states_[i] != NodeState::Run) continue;
+    if (states_[i] != NodeState::Compute) continue;
     for (const std::size_t input : node.inputs) taken[input] = 1;
     for (const auto& [option, input] : node.named) taken[input] = 1;
   }
 }
 
-/// Are the files there as they were left?
+/// Decides if the files that a cached step wrote are unchanged.
 bool GraphRun::isUpToDate(const std::string& key) const {
   const std::optional<CachedStep> step = cache_->step(key);
   return step && std::all_of(step->files.begin(), step->files.end(),
                              [](const FileStamp& file) { return stampOf(file.path) == file; });
 }
 
-/// Finds how large values are, and how much of each is needed, so that no more is made. Values that
-/// others may ask for later, out of a cache or of Python, are whole.
-void GraphRun::planAhead() {
+/// Estimates the size of each value and finds its region of interest. Values that may be requested
+/// again later, from the cache or from Python, stay complete.
+void GraphRun::planNodes() {
   std::vector<char> runs(graph_.nodes.size());
-  for (std::size_t i = 0; i < runs.size(); ++i) runs[i] = states_[i] == NodeState::Run;
+  for (std::size_t i = 0; i < runs.size(); ++i) runs[i] = states_[i] == NodeState::Compute;
   if (settings_.dryRun) return;
-  plans_ =
-      plansOf(graph_, runs, settings_.maxMemory, [&](std::size_t i) { return planEarly(i); }).plans;
-  if (!settings_.wholeValues && !cache_ && !settings_.made)
+  plans_ = planValues(graph_, runs, settings_.maxMemory, [&](std::size_t i) {
+             return planFromMesh(i);
+           }).plans;
+  if (!settings_.fullValues && !cache_ && !settings_.onValue)
     regions_ =
         regionsOfInterest(graph_, runs, plans_, settings_.measureErrors ? kMeasuredHalfWidth : 1);
   if (std::any_of(regions_.begin(), regions_.end(),
@@ -197,164 +205,166 @@ void GraphRun::planAhead() {
     const std::vector<char> isOverwritten = findOverwritten(graph_, runs);
     for (std::size_t i = 0; i < runs.size(); ++i) {
       if (!runs[i] || !(isOverwritten[i] || readsOnce(graph_.nodes[i]))) continue;
-      // It is there to be taken once more, where a part turns out not to do.
+      // The node cannot be read again: keep its complete value for a retry on complete values.
       regions_[i] = {};
       values_.addUse(i);
     }
   }
-  requireMemoryFor(graph_, runs, plans_, regions_, settings_.maxMemory);
+  checkMemoryFor(graph_, runs, plans_, regions_, settings_.maxMemory);
 }
 
-/// To plan a mesh is to read it: so it is made now where a band is made of it, unless many are held
-/// already.
-std::optional<Plan> GraphRun::planEarly(std::size_t i) {
-  const double most = std::min(kMostEarlyBytes, static_cast<double>(settings_.maxMemory) / 8);
-  const bool makesBand = std::any_of(graph_.nodes.begin() + static_cast<std::ptrdiff_t>(i),
+/// Computes a mesh during planning if a band is computed from it. The plan of a mesh requires the
+/// mesh itself. Does nothing when the meshes held already exceed the limit.
+std::optional<Plan> GraphRun::planFromMesh(std::size_t i) {
+  const double most = std::min(kMaxPlanningBytes, static_cast<double>(settings_.maxMemory) / 8);
+  const bool feedsBand = std::any_of(graph_.nodes.begin() + static_cast<std::ptrdiff_t>(i),
                                      graph_.nodes.end(), [&](const Node& node) {
                                        return node.makes() && node.kind == Kind::Band &&
                                               std::find(node.inputs.begin(), node.inputs.end(),
                                                         i) != node.inputs.end();
                                      });
-  if (!makesBand || earlyBytes_ > most) return {};
-  const std::size_t toldBefore = tellEnd_;
+  if (!feedsBand || planningBytes_ > most) return {};
+  const std::size_t endBefore = reportEnd_;
   try {
     compute(i);
   } catch (const levelset::Cancelled&) {
     throw;
   } catch (const levelset::Error&) {
-    earlyFailures_[i] = std::current_exception();  // thrown in its turn
-    states_[i] = NodeState::Run;
-    tellEnd_ = std::min(toldBefore, i + 1);
+    planningFailures_[i] = std::current_exception();  // rethrown when the node's turn comes
+    states_[i] = NodeState::Compute;
+    reportEnd_ = std::min(endBefore, i + 1);
     return {};
   }
-  wasEarly_[i] = 1;
+  isComputedForPlan_[i] = 1;
   if (!values_.has(i)) return {};
   const levelset::TriMesh& mesh = values_.peek(i).mesh();
-  earlyBytes_ += static_cast<double>(mesh.positions.size() * sizeof(mesh.positions[0]) +
-                                     mesh.triangles.size() * sizeof(mesh.triangles[0]));
+  planningBytes_ += static_cast<double>(mesh.positions.size() * sizeof(mesh.positions[0]) +
+                                        mesh.triangles.size() * sizeof(mesh.triangles[0]));
   return values_.peek(i).plan();
 }
 
-/// Did it take or make less than the whole?
-bool GraphRun::isPartial(std::size_t i) const {
+/// Decides if the result or an operand of a node is restricted to a region of interest.
+bool GraphRun::isRestricted(std::size_t i) const {
   const std::vector<std::size_t>& inputs = graph_.nodes[i].inputs;
   return !regions_[i].isWhole() ||
          std::any_of(inputs.begin(), inputs.end(),
                      [&](std::size_t input) { return !regions_[input].isWhole(); });
 }
 
-/// From now on it and all that it is made of are whole.
-void GraphRun::makeWhole(std::size_t i) {
-  std::vector<char> isAsked(i + 1, 0);
-  isAsked[i] = 1;
+/// Removes the region of interest from a node and from all nodes that it depends on.
+void GraphRun::requestFullValues(std::size_t i) {
+  std::vector<char> isRequested(i + 1, 0);
+  isRequested[i] = 1;
   for (std::size_t k = i + 1; k-- > 0;) {
-    if (!isAsked[k]) continue;
+    if (!isRequested[k]) continue;
     regions_[k] = {};
     for (const std::size_t input : graph_.nodes[k].inputs) {
       if (!regions_[input].isWhole()) values_.drop(input);
-      isAsked[input] = 1;
+      isRequested[input] = 1;
     }
   }
 }
 
-/// Is there one that runs and does not wait for what runs before it?
-bool GraphRun::isBranched() const {
+/// Decides if any node can run concurrently with the node before it.
+bool GraphRun::hasBranches() const {
   std::optional<std::size_t> before;
   for (std::size_t i = 0; i < graph_.nodes.size(); ++i) {
-    if (states_[i] == NodeState::LeftOut || isGiven(i)) continue;
+    if (states_[i] == NodeState::Unneeded || isGiven(i)) continue;
     const Node& node = graph_.nodes[i];
     const auto& inputs = node.inputs;
-    const bool takesIt = before && std::find(inputs.begin(), inputs.end(), *before) != inputs.end();
-    if (before && !takesIt && !isOrdered(node)) return true;
+    const bool takesPrevious =
+        before && std::find(inputs.begin(), inputs.end(), *before) != inputs.end();
+    if (before && !takesPrevious && !hasSideEffects(node)) return true;
     before = i;
   }
   return false;
 }
 
-std::vector<Job> GraphRun::jobs() const {
+std::vector<Task> GraphRun::tasks() const {
   std::vector<char> needed(graph_.nodes.size());
-  for (std::size_t i = 0; i < needed.size(); ++i) needed[i] = states_[i] != NodeState::LeftOut;
+  for (std::size_t i = 0; i < needed.size(); ++i) needed[i] = states_[i] != NodeState::Unneeded;
   const auto writers = findWritersRead(graph_, needed);
-  std::vector<Job> jobs(graph_.nodes.size());
-  for (std::size_t i = 0; i < jobs.size(); ++i) {
+  std::vector<Task> tasks(graph_.nodes.size());
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
     if (!needed[i] || isGiven(i)) continue;
     const Node& node = graph_.nodes[i];
-    jobs[i].waitsForAll = isOrdered(node);
-    if (writers[i]) jobs[i].waitsFor.push_back(*writers[i]);
-    if (states_[i] != NodeState::Run) continue;
-    for (const std::size_t input : node.inputs) jobs[i].waitsFor.push_back(input);
-    for (const auto& [option, input] : node.named) jobs[i].waitsFor.push_back(input);
+    tasks[i].isBarrier = hasSideEffects(node);
+    if (writers[i]) tasks[i].dependencies.push_back(*writers[i]);
+    if (states_[i] != NodeState::Compute) continue;
+    for (const std::size_t input : node.inputs) tasks[i].dependencies.push_back(input);
+    for (const auto& [option, input] : node.named) tasks[i].dependencies.push_back(input);
   }
-  return jobs;
+  return tasks;
 }
 
-JobsDone GraphRun::scheduleTasks() {
-  JobSettings settings{.threads = threads_};
-  settings.run = [&](std::size_t i, const GoesOn& goesOn) {
-    const bool isDone = runBeside(i, goesOn);
+ScheduleResult GraphRun::scheduleTasks() {
+  SchedulerSettings settings{.threads = threads_};
+  settings.run = [&](std::size_t i, const ContinueCheck& shouldContinue) {
+    const bool isDone = runTask(i, shouldContinue);
     const std::lock_guard lock(mutex_);
-    if (isDone) tellInOrder();
+    if (isDone) reportInOrder();
     return isDone;
   };
-  settings.mayJoin = [&](std::size_t i, const std::vector<std::size_t>& running) {
+  settings.mayStart = [&](std::size_t i, const std::vector<std::size_t>& running) {
     const std::lock_guard lock(mutex_);
-    return fitsBeside(i, running);
+    return fitsInMemory(i, running);
   };
-  return pipeline::scheduleTasks(jobs(), settings);
+  return pipeline::scheduleTasks(tasks(), settings);
 }
 
-/// @return false: it has to be done without others beside it
-bool GraphRun::runBeside(std::size_t i, const GoesOn& goesOn) {
-  NodeState fate = NodeState::LeftOut;
+/// Runs a node as a task of the scheduler.
+/// @return false: the node must run later, without concurrent tasks
+bool GraphRun::runTask(std::size_t i, const ContinueCheck& shouldContinue) {
+  NodeState state = NodeState::Unneeded;
   {
     const std::lock_guard lock(mutex_);
-    fate = states_[i];
-    if (fate == NodeState::LeftOut || wasEarly_[i] || isGiven(i)) return true;
+    state = states_[i];
+    if (state == NodeState::Unneeded || isComputedForPlan_[i] || isGiven(i)) return true;
     const Node& node = graph_.nodes[i];
-    const auto isThere = [&](std::size_t input) { return values_.has(input); };
-    if (fate == NodeState::Run &&
-        !(std::all_of(node.inputs.begin(), node.inputs.end(), isThere) &&
+    const auto isAvailable = [&](std::size_t input) { return values_.has(input); };
+    if (state == NodeState::Compute &&
+        !(std::all_of(node.inputs.begin(), node.inputs.end(), isAvailable) &&
           std::all_of(node.named.begin(), node.named.end(),
-                      [&](const auto& named) { return isThere(named.second); })))
+                      [&](const auto& named) { return isAvailable(named.second); })))
       return false;
-    if (fate == NodeState::Run) states_[i] = NodeState::Known;
+    if (state == NodeState::Compute) states_[i] = NodeState::UpToDate;
   }
-  if (fate != NodeState::Run) return recallValue(i);
+  if (state != NodeState::Compute) return tryLoad(i);
   tbb::task_arena arena(static_cast<int>(threads_));
   const ArenaCpu cpu(arena);
   try {
-    arena.execute([&] { attempt(i, goesOn, &cpu); });
-  } catch (const RefusedInPart&) {
+    arena.execute([&] { runChecked(i, shouldContinue, &cpu); });
+  } catch (const RegionFailure&) {
     const std::lock_guard lock(mutex_);
-    isRefused_[i] = 1;
+    needsFullValues_[i] = 1;
     return false;
   }
   return true;
 }
 
-/// Is there memory for it beside those that run, as far as can be told?
-bool GraphRun::fitsBeside(std::size_t i, const std::vector<std::size_t>& running) const {
+/// Decides, from memory estimates, if a node fits into memory beside the running ones.
+bool GraphRun::fitsInMemory(std::size_t i, const std::vector<std::size_t>& running) const {
   if (!isLimited()) return true;
-  const std::optional<double> own = workBytes(i);
+  const std::optional<double> own = workingBytes(i);
   if (!own) return false;
   double bytes = apps::processStatusBytes("VmRSS:") + *own;
   for (const std::size_t other : running) {
-    const std::optional<double> of = workBytes(other);
+    const std::optional<double> of = workingBytes(other);
     if (!of) return false;
     bytes += *of;
   }
-  // What runs is not told to the byte: half is left.
+  // The estimates are rough: leave half of the limit free.
   return bytes <= static_cast<double>(settings_.maxMemory) / 2;
 }
 
-/// Empty: nobody knows.
-std::optional<double> GraphRun::workBytes(std::size_t i) const {
-  if (isGiven(i) || states_[i] == NodeState::LeftOut || wasEarly_[i]) return 0;
+/// Estimates the memory that a node takes while it runs, bytes; empty: unknown.
+std::optional<double> GraphRun::workingBytes(std::size_t i) const {
+  if (isGiven(i) || states_[i] == NodeState::Unneeded || isComputedForPlan_[i]) return 0;
   const Node& node = graph_.nodes[i];
   double bytes = 0;
   const auto add = [&](std::size_t of) {
     if (!plans_[of]) return false;
-    bytes += kWorkingSpace * restricted(*plans_[of], regions_[of]).bytes();
+    bytes += kWorkingFactor * restricted(*plans_[of], regions_[of]).bytes();
     return true;
   };
   if (node.makes() && !add(i)) return {};
@@ -367,7 +377,7 @@ std::optional<double> GraphRun::workBytes(std::size_t i) const {
 StepReport& GraphRun::begin(std::size_t i) {
   const Node& node = graph_.nodes[i];
   StepReport step;
-  if (steps_[i]) {  // it is made again, and took what it took before, too
+  if (steps_[i]) {  // a repeated step: its costs add up
     step.wallSeconds = steps_[i]->wallSeconds;
     step.cpuSeconds = steps_[i]->cpuSeconds;
     step.peakBytes = steps_[i]->peakBytes;
@@ -378,59 +388,60 @@ StepReport& GraphRun::begin(std::size_t i) {
     if (!param.fallback.empty() && !node.options.contains(param.name))
       step.defaults[param.name] = param.fallback;
   step.resultName = node.name;
-  step.place = node.place;
-  step.needed = regions_[i];
+  step.location = node.location;
+  step.roi = regions_[i];
   return steps_[i].emplace(std::move(step));
 }
 
-void GraphRun::fileSteps() {
-  for (std::size_t i = 0; i < std::min(steps_.size(), tellEnd_); ++i)
+void GraphRun::collectSteps() {
+  for (std::size_t i = 0; i < std::min(steps_.size(), reportEnd_); ++i)
     if (steps_[i]) report_.steps.push_back(std::move(*steps_[i]));
 }
 
 Thumbnail GraphRun::thumbnailFor(std::size_t i, const Value& value) {
   if (settings_.thumbnails == 0) return {};
   if (i >= settings_.thumbnails)
-    return {.png = {},
-            .missing = fmt::format("only the first {} actions have one", settings_.thumbnails)};
+    return {
+        .png = {},
+        .missing = fmt::format("only the first {} actions get a thumbnail", settings_.thumbnails)};
   Thumbnail thumbnail = thumbnailOf(value, settings_.maxMemory);
-  running_.forgetPeak();
+  running_.resetPeak();
   return thumbnail;
 }
 
-/// To be told in its turn.
-void GraphRun::tell(std::size_t i, const std::string& output) {
-  unspoken_[i] = output;
+/// Stores the printed text of a finished node until its turn to be reported.
+void GraphRun::queueOutput(std::size_t i, const std::string& output) {
+  pendingOutput_[i] = output;
 }
 
-/// What comes first in the graph is told first, whatever ended first.
-void GraphRun::tellInOrder() {
-  for (; nextTold_ < std::min(states_.size(), tellEnd_); ++nextTold_) {
-    const std::size_t i = nextTold_;
-    if (isGiven(i) || states_[i] == NodeState::LeftOut) continue;
-    if (!unspoken_[i]) return;
+/// Reports finished nodes in the order of the graph, independent of which one ended first.
+void GraphRun::reportInOrder() {
+  for (; nextReported_ < std::min(states_.size(), reportEnd_); ++nextReported_) {
+    const std::size_t i = nextReported_;
+    if (isGiven(i) || states_[i] == NodeState::Unneeded) continue;
+    if (!pendingOutput_[i]) return;
     const Node& node = graph_.nodes[i];
     StepNotes& notes = steps_[i]->notes;
     try {
-      if (!unspoken_[i]->empty() && settings_.print) settings_.print(*unspoken_[i]);
+      if (!pendingOutput_[i]->empty() && settings_.print) settings_.print(*pendingOutput_[i]);
     } catch (const levelset::Error& error) {
-      refuseAs(node.op->name, error, node.place);
+      rethrowAs(node.op->name, error, node.location);
     }
     for (const std::string& text : notes.warnings)
-      settings_.warn(withPlace(sentenceOf(node.op->name, text), node.place));
+      settings_.warn(withLocation(sentenceOf(node.op->name, text), node.location));
     for (const std::string& text : notes.notes) settings_.note(sentenceOf(node.op->name, text));
-    // Told at the end, and by the report where it belongs.
+    // The failure is thrown after the run, and the report lists it as a warning of its step.
     if (!notes.failure.empty()) notes.warnings.push_back(notes.failure);
   }
 }
 
-/// What is known of a node is told again, and its value brought where one is taken.
-void GraphRun::recall(std::size_t i) {
-  if (!recallValue(i)) compute(i);
+/// Repeats the cached output of a node and loads its value if a node takes it.
+void GraphRun::loadFromCache(std::size_t i) {
+  if (!tryLoad(i)) compute(i);
 }
 
-/// @return false: its entry is damaged
-bool GraphRun::recallValue(std::size_t i) {
+/// @return false: the cache entry is damaged
+bool GraphRun::tryLoad(std::size_t i) {
   std::optional<Value> value;
   if (states_[i] == NodeState::Load) {
     value = cache_->value(*keys_[i], settings_.maxMemory);
@@ -440,7 +451,7 @@ bool GraphRun::recallValue(std::size_t i) {
   if (value) thumbnail = thumbnailFor(i, *value);
   const std::lock_guard lock(mutex_);
   StepReport& step = begin(i);
-  step.isKnown = true;
+  step.isCached = true;
   step.thumbnail = std::move(thumbnail);
   std::string output;
   if (keys_[i])
@@ -450,66 +461,69 @@ bool GraphRun::recallValue(std::size_t i) {
     }
   if (value) {
     describeResult(*value, false, step);
-    if (settings_.made) settings_.made(i, *value);
+    if (settings_.onValue) settings_.onValue(i, *value);
     values_.put(i, std::move(*value));
   }
-  tell(i, output);
+  queueOutput(i, output);
   return true;
 }
 
-/// Also where an entry of the cache was damaged, and what it was made of has to be made again.
+/// Computes a node. Computes or loads its operands first if they are missing, as they are after a
+/// damaged cache entry.
 void GraphRun::compute(std::size_t i) {
   if (isGiven(i)) return values_.put(i, graph_.given.at(i));
   const Node& node = graph_.nodes[i];
-  const bool isPlanned = states_[i] == NodeState::Run;  // its uses of others are counted
-  states_[i] = NodeState::Known;  // to those who may ask for it again, once its value was let go
+  const bool isPlanned =
+      states_[i] == NodeState::Compute;  // the uses of its operands are already counted
+  states_[i] = NodeState::UpToDate;      // a later request for a released value loads it
   if (!isPlanned) {
     for (const std::size_t input : node.inputs) values_.addUse(input);
     for (const auto& [option, input] : node.named) values_.addUse(input);
   }
   const auto bring = [&](std::size_t input) {
     if (values_.has(input)) return;
-    if (cache_ && states_[input] == NodeState::Known && keys_[input] &&
+    if (cache_ && states_[input] == NodeState::UpToDate && keys_[input] &&
         Cache::canHold(graph_.nodes[input].kind) && cache_->has(*keys_[input]))
       states_[input] = NodeState::Load;
     if (states_[input] == NodeState::Load)
-      recall(input);
+      loadFromCache(input);
     else
       compute(input);
   };
   for (const std::size_t input : node.inputs) bring(input);
   for (const auto& [option, input] : node.named) bring(input);
   try {
-    attempt(i, {}, nullptr);
-  } catch (const RefusedInPart&) {
-    makeWhole(i);
-    compute(i);  // its uses of others are counted again
+    runChecked(i, {}, nullptr);
+  } catch (const RegionFailure&) {
+    requestFullValues(i);
+    compute(i);  // counts the uses of its operands again
   }
 }
 
-void GraphRun::attempt(std::size_t i, const GoesOn& goesOn, const ArenaCpu* arena) {
+void GraphRun::runChecked(std::size_t i, const ContinueCheck& shouldContinue,
+                          const ArenaCpu* arena) {
   const Node& node = graph_.nodes[i];
-  if (earlyFailures_[i]) {
+  if (planningFailures_[i]) {
     const std::lock_guard lock(mutex_);
-    tellEnd_ = std::min(tellEnd_, i + 1);
-    std::rethrow_exception(earlyFailures_[i]);
+    reportEnd_ = std::min(reportEnd_, i + 1);
+    std::rethrow_exception(planningFailures_[i]);
   }
   StepReport& step = begin(i);
   StepClock clock(step, running_, arena);
   try {
-    runNode(i, step, clock, goesOn);
+    runNode(i, step, clock, shouldContinue);
   } catch (const std::bad_alloc&) {
-    throw levelset::ResourceLimit(withPlace(
-        node.op->name + ": memory ran out; use larger voxels or a narrower band", node.place));
+    throw levelset::ResourceLimit(withLocation(
+        node.op->name + ": memory ran out; use larger voxels or a narrower band", node.location));
   } catch (const levelset::Error& error) {
-    refuseAs(node.op->name, error, node.place);
+    rethrowAs(node.op->name, error, node.location);
   } catch (const std::exception& error) {
-    if (!isWantOfThreads(error)) throw;
-    throw levelset::ResourceLimit(withPlace(node.op->name + kWantOfThreads, node.place));
+    if (!isThreadLimitError(error)) throw;
+    throw levelset::ResourceLimit(withLocation(node.op->name + kThreadLimitMessage, node.location));
   }
 }
 
-Invocation GraphRun::invocationOf(std::size_t i, const GoesOn& goesOn) {
+Invocation GraphRun::invocationOf(std::size_t i, const ContinueCheck& shouldContinue) {
   const Node& node = graph_.nodes[i];
   Invocation invocation(*node.op, node.options);
   const std::lock_guard lock(mutex_);
@@ -525,26 +539,29 @@ Invocation GraphRun::invocationOf(std::size_t i, const GoesOn& goesOn) {
   invocation.isPartial = !node.inputs.empty() && std::isfinite(regions_[node.inputs[0]].halfWidth);
   invocation.maxMemory = settings_.maxMemory;
   invocation.dryRun = settings_.dryRun;
-  if (settings_.progress || settings_.goesOn || goesOn)
-    invocation.progress = [this, i, &node, goesOn](double fraction) {
+  if (settings_.progress || settings_.shouldContinue || shouldContinue)
+    invocation.progress = [this, i, &node, shouldContinue](double fraction) {
       if (settings_.progress) settings_.progress(i, node.op->name, fraction);
-      return (!goesOn || goesOn()) && (!settings_.goesOn || settings_.goesOn());
+      return (!shouldContinue || shouldContinue()) &&
+             (!settings_.shouldContinue || settings_.shouldContinue());
     };
   return invocation;
 }
 
-/// @throws RefusedInPart where the whole may not be refused, or else that has to be said of it
-void GraphRun::runNode(std::size_t i, StepReport& step, StepClock& clock, const GoesOn& goesOn) {
+/// Runs the operator of a node, or its plan in a dry run.
+/// @throws RegionFailure if the node may succeed on complete values; otherwise the operator's error
+void GraphRun::runNode(std::size_t i, StepReport& step, StepClock& clock,
+                       const ContinueCheck& shouldContinue) {
   const Node& node = graph_.nodes[i];
   const Operator& op = *node.op;
-  Invocation invocation = invocationOf(i, goesOn);
+  Invocation invocation = invocationOf(i, shouldContinue);
   const auto finish = [&](const Value* value, bool isRefused = false) {
     const std::lock_guard lock(mutex_);
-    if (isRefused) tellEnd_ = std::min(tellEnd_, i + 1);
-    if (value && settings_.made) settings_.made(i, *value);
+    if (isRefused) reportEnd_ = std::min(reportEnd_, i + 1);
+    if (value && settings_.onValue) settings_.onValue(i, *value);
     if (value) values_.put(i, *value);
     step.notes = invocation.notes;
-    tell(i, invocation.output);
+    queueOutput(i, invocation.output);
   };
   try {
     if (settings_.dryRun) {
@@ -557,25 +574,26 @@ void GraphRun::runNode(std::size_t i, StepReport& step, StepClock& clock, const 
       finish(node.makes() ? &value : nullptr);
     } else {
       Value value = op.run(invocation);
-      if (!regions_[i].isWhole()) value = partOf(value, regions_[i]);
+      if (!regions_[i].isWhole()) value = cropTo(value, regions_[i]);
       if (node.makes()) describeResult(value, false, step);
       clock.stop();
       if (node.makes() && settings_.measureErrors)
         estimateError(value, invocation, invocation.notes);
-      keep(i, invocation, value);
+      storeInCache(i, invocation, value);
       if (node.makes()) step.thumbnail = thumbnailFor(i, value);
       finish(node.makes() ? &value : nullptr);
     }
   } catch (...) {
     clock.stop();
-    if (isPartial(i) && isOfInput(std::current_exception())) throw RefusedInPart();
+    if (isRestricted(i) && isInputError(std::current_exception())) throw RegionFailure();
     finish(nullptr, true);
     throw;
   }
 }
 
-/// For the next run. What did not reach what was asked is not kept, so that it is told again.
-void GraphRun::keep(std::size_t i, const Invocation& invocation, const Value& value) {
+/// Stores a result for later runs. Does not store a failed one, so that the failure is reported
+/// again.
+void GraphRun::storeInCache(std::size_t i, const Invocation& invocation, const Value& value) {
   if (!cache_ || !keys_[i] || !invocation.notes.failure.empty()) return;
   const Node& node = graph_.nodes[i];
   CachedStep step{

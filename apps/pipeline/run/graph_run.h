@@ -18,10 +18,10 @@
 
 namespace pipeline {
 
-/// Values of nodes that have run, as long as something is to take them.
+/// Values of nodes that have run. Keeps each value until its last consumer takes it.
 class Values {
  public:
-  /// @param uses  of each
+  /// @param uses  number of consumers of each node
   explicit Values(std::vector<std::size_t> uses) : uses_(std::move(uses)), values_(uses_.size()) {}
 
   [[nodiscard]] bool has(std::size_t node) const { return values_[node].has_value(); }
@@ -30,9 +30,9 @@ class Values {
   void put(std::size_t node, Value value) {
     if (uses_[node] > 0) values_[node] = std::move(value);
   }
-  /// Makes `take` find nothing, so that it has to be put again.
+  /// Removes a value. It must be put again before the next take().
   void drop(std::size_t node) { values_[node].reset(); }
-  /// The last that takes a value has it alone, and may work in its place.
+  /// Returns a value. The last consumer becomes its only owner and may modify it in place.
   Value take(std::size_t node) {
     if (--uses_[node] > 0) return *values_[node];
     Value last = std::move(*values_[node]);
@@ -45,58 +45,59 @@ class Values {
   std::vector<std::optional<Value>> values_;
 };
 
-/// One run of a graph. Branches run side by side as long as nothing is odd; what cannot be done
-/// like that (a damaged entry of the cache, a part that is refused where the whole may not be) is
-/// left to the end and done one after another.
+/// One run of a graph. Independent branches run concurrently. Some nodes run one after another at
+/// the end: a node with a damaged cache entry, or a node that failed on a region of interest. The
+/// latter may succeed on complete values.
 class GraphRun {
  public:
   GraphRun(const Graph& graph, const RunSettings& settings, RunReport& report);
 
-  /// Also where it throws, the steps that ran are in the report.
+  /// Runs the graph. The report contains all steps that ran, even if this function throws.
   void run();
 
  private:
   enum class NodeState {
-    LeftOut,  // nothing needs it
-    Run,
-    Load,  // its value is known, and taken by one that runs
-    Known  // and not even that is needed
+    Unneeded,  // no requested result depends on it
+    Compute,   // its operator must run
+    Load,      // the cache has its value, which a node that runs or the caller takes
+    UpToDate   // its results exist and no node that runs takes its value
   };
-  using GoesOn = std::function<bool()>;
+  using ContinueCheck = std::function<bool()>;
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
   std::vector<std::size_t> decideStates();
   void useCache(const std::vector<char>& needed);
   [[nodiscard]] bool isUpToDate(const std::string& key) const;
 
-  void planAhead();
-  std::optional<Plan> planEarly(std::size_t i);
-  [[nodiscard]] bool isPartial(std::size_t i) const;
-  void makeWhole(std::size_t i);
+  void planNodes();
+  std::optional<Plan> planFromMesh(std::size_t i);
+  [[nodiscard]] bool isRestricted(std::size_t i) const;
+  void requestFullValues(std::size_t i);
 
   void runNodes();
   void runInOrder(const std::vector<char>& isDone, std::size_t end);
-  [[nodiscard]] bool isBranched() const;
-  [[nodiscard]] std::vector<Job> jobs() const;
-  JobsDone scheduleTasks();
-  bool runBeside(std::size_t i, const GoesOn& goesOn);
-  [[nodiscard]] bool fitsBeside(std::size_t i, const std::vector<std::size_t>& running) const;
-  [[nodiscard]] std::optional<double> workBytes(std::size_t i) const;
+  [[nodiscard]] bool hasBranches() const;
+  [[nodiscard]] std::vector<Task> tasks() const;
+  ScheduleResult scheduleTasks();
+  bool runTask(std::size_t i, const ContinueCheck& shouldContinue);
+  [[nodiscard]] bool fitsInMemory(std::size_t i, const std::vector<std::size_t>& running) const;
+  [[nodiscard]] std::optional<double> workingBytes(std::size_t i) const;
 
   [[nodiscard]] bool isGiven(std::size_t i) const { return graph_.given.contains(i); }
   Thumbnail thumbnailFor(std::size_t i, const Value& value);
   [[nodiscard]] bool isLimited() const { return settings_.maxMemory != levelset::kNoMemoryLimit; }
   StepReport& begin(std::size_t i);
-  void fileSteps();
-  void tell(std::size_t i, const std::string& output);
-  void tellInOrder();
-  void recall(std::size_t i);
-  bool recallValue(std::size_t i);
+  void collectSteps();
+  void queueOutput(std::size_t i, const std::string& output);
+  void reportInOrder();
+  void loadFromCache(std::size_t i);
+  bool tryLoad(std::size_t i);
   void compute(std::size_t i);
-  void attempt(std::size_t i, const GoesOn& goesOn, const ArenaCpu* arena);
-  void runNode(std::size_t i, StepReport& step, StepClock& clock, const GoesOn& goesOn);
-  [[nodiscard]] Invocation invocationOf(std::size_t i, const GoesOn& goesOn);
-  void keep(std::size_t i, const Invocation& invocation, const Value& value);
+  void runChecked(std::size_t i, const ContinueCheck& shouldContinue, const ArenaCpu* arena);
+  void runNode(std::size_t i, StepReport& step, StepClock& clock,
+               const ContinueCheck& shouldContinue);
+  [[nodiscard]] Invocation invocationOf(std::size_t i, const ContinueCheck& shouldContinue);
+  void storeInCache(std::size_t i, const Invocation& invocation, const Value& value);
 
   const Graph& graph_;
   const RunSettings& settings_;
@@ -106,17 +107,17 @@ class GraphRun {
   std::optional<Cache> cache_;
   std::vector<std::optional<std::string>> keys_;
   std::vector<RegionOfInterest> regions_;
-  std::vector<std::optional<Plan>> plans_;  // of whole values, as far as they were told ahead
-  std::vector<char> wasEarly_;              // ran to be planned with
-  std::vector<std::exception_ptr> earlyFailures_;
-  double earlyBytes_ = 0;
-  std::vector<char> isRefused_;  // of a part, and is to be tried of the whole
+  std::vector<std::optional<Plan>> plans_;  // of complete values; empty: unknown
+  std::vector<char> isComputedForPlan_;     // ran already, because planning needs its mesh
+  std::vector<std::exception_ptr> planningFailures_;
+  double planningBytes_ = 0;
+  std::vector<char> needsFullValues_;  // failed on a region of interest; retried on complete values
   RunningSteps running_;
-  std::vector<std::optional<StepReport>> steps_;      // by node
-  std::vector<std::optional<std::string>> unspoken_;  // what ended, and is told in its turn
-  std::size_t nextTold_ = 0, tellEnd_ = kNone;
-  std::mutex mutex_;  // of the values, the fates, what is told, and the settings' functions
-  Values values_;     // the last: decideStates() fills the others
+  std::vector<std::optional<StepReport>> steps_;           // one per node; empty: did not run
+  std::vector<std::optional<std::string>> pendingOutput_;  // printed text of finished nodes
+  std::size_t nextReported_ = 0, reportEnd_ = kNone;
+  std::mutex mutex_;  // guards values, states, steps, output and the callbacks of the settings
+  Values values_;     // last member: decideStates() initializes the others
 };
 
 }  // namespace pipeline

@@ -12,14 +12,14 @@
 namespace pipeline {
 namespace {
 
-/// An action as people know it.
+/// Name of an action, with its --as name.
 std::string labelOf(const Node& node) {
   return node.op->name + (node.name.empty() ? "" : " @" + node.name);
 }
 
 std::string reasonFor(const Graph& graph, std::size_t index, const std::vector<char>& runs) {
   const Node& node = graph.nodes[index];
-  if (!runs[index]) return "left out: nothing that is asked for needs it";
+  if (!runs[index]) return "left out: no requested result depends on it";
   std::vector<std::string> takers;
   for (std::size_t i = index + 1; i < graph.nodes.size(); ++i) {
     const Node& other = graph.nodes[i];
@@ -37,10 +37,10 @@ std::string reasonFor(const Graph& graph, std::size_t index, const std::vector<c
   };
   if (!files.empty()) return "writes " + joined(files);
   if (!takers.empty()) return "for " + joined(takers);
-  return node.makes() ? "ends the chain" : "asked for";
+  return node.makes() ? "ends the chain" : "requested";
 }
 
-std::string needOf(const RegionOfInterest& roi, const Plan& plan) {
+std::string roiText(const RegionOfInterest& roi, const Plan& plan) {
   std::string text;
   if (roi.halfWidth < plan.halfWidth)
     text += fmt::format("; {:.3g} of {:.3g} voxels of its band", roi.halfWidth, plan.halfWidth);
@@ -52,7 +52,7 @@ std::string needOf(const RegionOfInterest& roi, const Plan& plan) {
   return text;
 }
 
-/// Of its value, as far as that is needed. 0 where nobody knows.
+/// Estimated bytes of a value within its region of interest; 0 if unknown.
 double bytesOf(const std::optional<Plan>& plan, const RegionOfInterest& roi) {
   if (!plan) return 0;
   if (plan->kind == Kind::Mesh) return plan->bytes();
@@ -61,15 +61,16 @@ double bytesOf(const std::optional<Plan>& plan, const RegionOfInterest& roi) {
   return isTold ? restricted(*plan, roi).bytes() : 0;
 }
 
-/// What asks for all of its operands makes all of its result, of which a part is kept then.
-bool makesWhole(const Node& node) {
+/// Decides if an operator computes its complete result, which is then cropped to the region of
+/// interest. These are the operators that read all of their operands.
+bool ignoresRoi(const Node& node) {
   return !node.inputs.empty() && !node.op->regionOfInterest && !node.op->makesParts;
 }
 
-/// Where values take most: they live from what makes them to the last that takes them.
+/// Largest memory of the values held at once. A value lives until its last consumer has run.
 struct Peak {
   double bytes = 0;
-  std::size_t node = 0;  ///< that makes the last of them
+  std::size_t node = 0;  ///< node whose result reaches the peak
 };
 
 Peak findPeak(const Graph& graph, const std::vector<char>& runs,
@@ -90,8 +91,8 @@ Peak findPeak(const Graph& graph, const std::vector<char>& runs,
     };
     for (const std::size_t input : graph.nodes[i].inputs) release(input);
     for (const auto& [option, input] : graph.nodes[i].named) release(input);
-    const double made = makesWhole(graph.nodes[i]) ? bytesOf(plans[i], {}) : bytes(i);
-    // What is taken for the last time may be worked on in its place.
+    const double made = ignoresRoi(graph.nodes[i]) ? bytesOf(plans[i], {}) : bytes(i);
+    // The last consumer of a value may modify it in place.
     double during = held + std::max(0.0, made - largest);
     if (!worked.empty()) during = held + made + worked[i];
     if (during > peak.bytes) peak = {during, i};
@@ -101,12 +102,12 @@ Peak findPeak(const Graph& graph, const std::vector<char>& runs,
   return peak;
 }
 
-/// Roughly, as it is known.
+/// Formats an estimated time with few digits.
 std::string inSeconds(double seconds) {
   return seconds < 100 ? fmt::format("{:.2g} s", seconds) : fmt::format("{:.0f} s", seconds);
 }
 
-/// Of what runs, where its own operands and its result are known.
+/// Estimated cost of a node; empty if the plan of an operand or of the result is unknown.
 std::optional<Cost> costOf(const Graph& graph, std::size_t i,
                            const std::vector<std::optional<Plan>>& plans,
                            const std::vector<RegionOfInterest>& regions) {
@@ -119,7 +120,7 @@ std::optional<Cost> costOf(const Graph& graph, std::size_t i,
   }
   if (node.makes()) {
     if (!plans[i]) return {};
-    invocation.planned = makesWhole(node) ? *plans[i] : restricted(*plans[i], regions[i]);
+    invocation.planned = ignoresRoi(node) ? *plans[i] : restricted(*plans[i], regions[i]);
   }
   return node.op->cost(invocation);
 }
@@ -134,8 +135,8 @@ Plan planOf(Invocation& invocation) {
   return plan;
 }
 
-ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs, std::size_t maxMemory,
-                   const std::function<std::optional<Plan>(std::size_t)>& mesh) {
+ValuePlans planValues(const Graph& graph, const std::vector<char>& runs, std::size_t maxMemory,
+                      const std::function<std::optional<Plan>(std::size_t)>& mesh) {
   ValuePlans all{std::vector<std::optional<Plan>>(graph.nodes.size()),
                  std::vector<std::exception_ptr>(graph.nodes.size())};
   std::vector<std::optional<Plan>>& plans = all.plans;
@@ -152,7 +153,7 @@ ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs, std::size_
       continue;
     }
     Invocation invocation(*node.op, node.options);
-    // A scene or a patch out of a file is read to be planned, which is as much as to make it.
+    // To plan a scene or a patch from a file means to read it, which costs as much as to run.
     const bool isHeavy =
         node.inputs.empty() && (node.kind == Kind::Patch || node.kind == Kind::Scene);
     bool isKnown = (node.op->plan || !node.inputs.empty()) && !isHeavy && !readsOnce(node);
@@ -166,7 +167,8 @@ ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs, std::size_
     }
     for (const auto& [option, input] : node.named) invocation.named.emplace(option, know(input));
     if (!isKnown) continue;
-    // Of the whole, which need not fit: requireMemoryFor() asks for the part that is made.
+    // This plans complete values, which need not fit into memory: checkMemoryFor() checks the
+    // regions of interest.
     const bool isRead =
         std::any_of(node.op->params.begin(), node.op->params.end(), [&](const Param& param) {
           return param.type == ParamType::Path && node.options.contains(param.name);
@@ -178,15 +180,15 @@ ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs, std::size_
     } catch (const levelset::Cancelled&) {
       throw;
     } catch (const levelset::Error&) {
-      all.refusals[i] = std::current_exception();
+      all.failures[i] = std::current_exception();
     }
   }
   return all;
 }
 
-void requireMemoryFor(const Graph& graph, const std::vector<char>& runs,
-                      const std::vector<std::optional<Plan>>& plans,
-                      const std::vector<RegionOfInterest>& regions, std::size_t maxMemory) {
+void checkMemoryFor(const Graph& graph, const std::vector<char>& runs,
+                    const std::vector<std::optional<Plan>>& plans,
+                    const std::vector<RegionOfInterest>& regions, std::size_t maxMemory) {
   for (std::size_t i = 0; i < plans.size(); ++i)
     if (plans[i])
       levelset::requireMemory(restricted(*plans[i], regions[i]).bytes(), maxMemory,
@@ -198,23 +200,24 @@ void requireMemoryFor(const Graph& graph, const std::vector<char>& runs,
         (graph.nodes[peak.node].op->name + " and the values held beside it").c_str());
 }
 
-void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
-             const std::function<void(const std::string&)>& tell) {
+void explain(const Graph& graph, std::size_t maxMemory, bool fullValues,
+             const std::function<void(const std::string&)>& print) {
   const std::vector<char> runs = neededNodes(graph);
-  const ValuePlans all = plansOf(graph, runs, maxMemory, [&](std::size_t i) -> std::optional<Plan> {
-    const Node& node = graph.nodes[i];
-    Invocation invocation(*node.op, node.options);
-    invocation.maxMemory = maxMemory;
-    invocation.dryRun = true;
-    try {
-      return planOf(invocation);
-    } catch (const levelset::Error& error) {
-      refuseAs(node.op->name, error, node.place);
-    }
-  });
+  const ValuePlans all =
+      planValues(graph, runs, maxMemory, [&](std::size_t i) -> std::optional<Plan> {
+        const Node& node = graph.nodes[i];
+        Invocation invocation(*node.op, node.options);
+        invocation.maxMemory = maxMemory;
+        invocation.dryRun = true;
+        try {
+          return planOf(invocation);
+        } catch (const levelset::Error& error) {
+          rethrowAs(node.op->name, error, node.location);
+        }
+      });
   const std::vector<std::optional<Plan>>& plans = all.plans;
   std::vector<RegionOfInterest> regions(graph.nodes.size());
-  if (!wholeValues) regions = regionsOfInterest(graph, runs, plans);
+  if (!fullValues) regions = regionsOfInterest(graph, runs, plans);
   std::string text;
   double seconds = 0;
   std::vector<double> worked(graph.nodes.size(), 0);  // bytes, by node
@@ -224,7 +227,7 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
     text += fmt::format("{:<20} {}", labelOf(node), reasonFor(graph, i, runs));
     if (plans[i]) {
       const Plan plan = restricted(*plans[i], regions[i]);
-      text += needOf(regions[i], *plans[i]);
+      text += roiText(regions[i], *plans[i]);
       if (plan.kind == Kind::Band && plan.voxelSize > 0)
         text += fmt::format("; about {:.3g} voxels of {:.4g}, {:.3g} MB", plan.activeVoxels(),
                             plan.voxelSize, plan.bytes() * 1e-6);
@@ -232,14 +235,14 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
         text +=
             fmt::format("; about {:.3g} triangles, {:.3g} MB", plan.triangles, plan.bytes() * 1e-6);
     } else if (runs[i] && node.makes()) {
-      text += "; its size cannot be told before it is made";
+      text += "; its size is unknown until it is computed";
     }
     if (runs[i]) {
       if (const std::optional<Cost> cost = costOf(graph, i, plans, regions)) {
         seconds += cost->seconds;
         worked[i] = cost->bytes;
         if (cost->seconds > 0) text += "; " + inSeconds(cost->seconds);
-        if (cost->bytes > 0) text += fmt::format(", works with {:.3g} MB", cost->bytes * 1e-6);
+        if (cost->bytes > 0) text += fmt::format(", working memory {:.3g} MB", cost->bytes * 1e-6);
       } else {
         untimed.push_back(node.op->name);
       }
@@ -249,23 +252,22 @@ void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
   std::sort(untimed.begin(), untimed.end());
   untimed.erase(std::unique(untimed.begin(), untimed.end()), untimed.end());
   text += fmt::format(
-      "values of about {:.3g} MB are held at once, about {:.3g} MB with what actions work with; "
-      "about {} of one core{}\n",
+      "at most about {:.3g} MB of values are held at once, {:.3g} MB with working memory; about {} "
+      "on one core{}\n",
       findPeak(graph, runs, plans, regions).bytes * 1e-6,
       findPeak(graph, runs, plans, regions, worked).bytes * 1e-6, inSeconds(seconds),
       untimed.empty() ? ""
-                      : fmt::format(", and what {} take{}, which cannot be told before",
-                                    fmt::join(untimed, ", "), untimed.size() == 1 ? "s" : ""));
-  tell(text);
+                      : fmt::format(", plus {}, whose time is unknown", fmt::join(untimed, ", ")));
+  print(text);
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-    if (!all.refusals[i]) continue;
+    if (!all.failures[i]) continue;
     try {
-      std::rethrow_exception(all.refusals[i]);
+      std::rethrow_exception(all.failures[i]);
     } catch (const levelset::Error& error) {
-      refuseAs(graph.nodes[i].op->name, error, graph.nodes[i].place);
+      rethrowAs(graph.nodes[i].op->name, error, graph.nodes[i].location);
     }
   }
-  requireMemoryFor(graph, runs, plans, regions, maxMemory);
+  checkMemoryFor(graph, runs, plans, regions, maxMemory);
 }
 
 }  // namespace pipeline

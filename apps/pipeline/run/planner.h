@@ -13,36 +13,38 @@
 
 namespace pipeline {
 
-/// What the operator would make of operands that are plans.
-/// @throws levelset::Error for what it would refuse
+/// Predicts the result of an operator whose operands are plans.
+/// @throws levelset::Error if the operator would reject its operands or options
 [[nodiscard]] Plan planOf(Invocation& invocation);
 
-/// What can be told of values before they are made.
+/// Predicted sizes of values, known before the values are computed.
 struct ValuePlans {
-  std::vector<std::optional<Plan>> plans;    ///< by node; empty: its size cannot be told
-  std::vector<std::exception_ptr> refusals;  ///< by node: why there is no plan, if that was refused
+  std::vector<std::optional<Plan>> plans;    ///< one per node; empty: unknown size
+  std::vector<std::exception_ptr> failures;  ///< one per node: error that prevented the plan
 };
 
-/// Plans of the values that those which run would make, as far as they can be told.
-/// @param runs       by node
-/// @param maxMemory  for what has to be read to be planned
-/// @param mesh  plans a node that reads or makes a mesh of nothing, which may take a while
-[[nodiscard]] ValuePlans plansOf(const Graph& graph, const std::vector<char>& runs,
-                                 std::size_t maxMemory,
-                                 const std::function<std::optional<Plan>(std::size_t)>& mesh);
+/// Plans the values of all nodes that run.
+/// @param runs       one flag per node
+/// @param maxMemory  limit for files that planning must read, bytes
+/// @param mesh       plans a node without operands whose result is a mesh; may take a while
+[[nodiscard]] ValuePlans planValues(const Graph& graph, const std::vector<char>& runs,
+                                    std::size_t maxMemory,
+                                    const std::function<std::optional<Plan>(std::size_t)>& mesh);
 
-/// Refuses what would take more than there is, before anything is made: one value, or those that
-/// are held at once where they run one after another.
-/// @throws levelset::ResourceLimit, with the action
-void requireMemoryFor(const Graph& graph, const std::vector<char>& runs,
-                      const std::vector<std::optional<Plan>>& plans,
-                      const std::vector<RegionOfInterest>& regions, std::size_t maxMemory);
+/// Checks the memory estimate before anything is computed. Counts each value alone, and the values
+/// that a run in graph order holds at once.
+/// @throws levelset::ResourceLimit if the estimate exceeds the limit; names the action
+void checkMemoryFor(const Graph& graph, const std::vector<char>& runs,
+                    const std::vector<std::optional<Plan>>& plans,
+                    const std::vector<RegionOfInterest>& regions, std::size_t maxMemory);
 
-/// Tells what would run, and what is left out and why; how much of each value is needed; what it
-/// would take. Reads meshes, and makes and writes nothing.
-/// @param tell  gets the text, also where a refusal follows
-/// @throws as requireMemoryFor, and for what an operator would refuse
-void explain(const Graph& graph, std::size_t maxMemory, bool wholeValues,
-             const std::function<void(const std::string&)>& tell);
+/// Describes a run without running it: which actions run and why, the region of interest of each
+/// value, and the estimated time and memory. Reads meshes, but computes and writes nothing.
+/// @param fullValues  ignore regions of interest
+/// @param print       receives the text, even if an error follows
+/// @throws levelset::ResourceLimit as checkMemoryFor()
+/// @throws levelset::Error if an operator would reject its operands or options
+void explain(const Graph& graph, std::size_t maxMemory, bool fullValues,
+             const std::function<void(const std::string&)>& print);
 
 }  // namespace pipeline

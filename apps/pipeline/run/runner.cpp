@@ -14,7 +14,7 @@
 namespace pipeline {
 namespace {
 
-/// What was made, and that no other node takes.
+/// Lists a warning for each value that no node takes and no caller requests.
 std::vector<std::string> unusedValues(const Graph& graph) {
   const std::vector<std::size_t> uses = countUses(graph, std::vector<char>(graph.nodes.size(), 1));
   const std::set<std::size_t> results(graph.results.begin(), graph.results.end());
@@ -22,26 +22,28 @@ std::vector<std::string> unusedValues(const Graph& graph) {
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     const Node& node = graph.nodes[i];
     if (!node.makes() || uses[i] > 0 || results.contains(i)) continue;
-    sentences.push_back(withPlace(
-        fmt::format("the {}{} at the end of the chain is not used; write it, or leave it out",
-                    kindName(node.kind), node.name.empty() ? "" : " '" + node.name + "'"),
-        node.place));
+    sentences.push_back(withLocation(
+        fmt::format(
+            "the {}{} at the end of the chain is not used; write it, or leave out its action",
+            kindName(node.kind), node.name.empty() ? "" : " '" + node.name + "'"),
+        node.location));
   }
   return sentences;
 }
 
-/// Ends a chain in which a step left its value behind without reaching what was asked.
-void tellFailures(const RunReport& report) {
+/// Throws if a step missed its requested accuracy but still produced a value.
+void throwFailures(const RunReport& report) {
   for (const StepReport& step : report.steps)
     if (!step.notes.failure.empty())
       throw levelset::NumericalError(
-          withPlace(step.action + ": " + step.notes.failure, step.place));
+          withLocation(step.action + ": " + step.notes.failure, step.location));
 }
 
-/// What the actions of a graph write.
+/// Files that the actions of a graph write.
 class Targets {
  public:
-  /// @return was it named before? As isSameFile would find, in the time of one look
+  /// Adds a file.
+  /// @return true if an earlier name denotes the same file; one hash look-up per call
   bool add(const std::string& target) {
     const bool isDash = target == "-", isOutput = levelset::isStandardOutput(target);
     const std::filesystem::path file = levelset::canonicalFile(target);
@@ -56,8 +58,8 @@ class Targets {
   bool hasDash_ = false, hasOutput_ = false;
 };
 
-/// Refuses targets that cannot be written before time is spent on what should go there.
-/// @param earlier  what the actions before write; grows
+/// Rejects output files that cannot be written, before any action runs.
+/// @param earlier  files of the actions before; receives the files of this action
 void checkTargets(const Node& action, const RunSettings& settings, Targets& earlier,
                   RunReport& report) {
   if (!action.op->targets) return;
@@ -66,19 +68,20 @@ void checkTargets(const Node& action, const RunSettings& settings, Targets& earl
       const levelset::FileTarget probe(target);
       if (!earlier.add(target)) continue;
       if (!levelset::clobberDefault())
-        throw levelset::IoError(
-            fmt::format("{}: '{}' is written by an action before, and --no-clobber forbids to "
-                        "overwrite it; use another file",
-                        action.op->name, target));
-      report.warnings.push_back(withPlace(
-          fmt::format("{}: '{}' is written by an action before, too, and only the last one stays; "
-                      "use another file",
-                      action.op->name, target),
-          action.place));
+        throw levelset::IoError(fmt::format(
+            "{}: an earlier action writes '{}' too, and --no-clobber forbids to overwrite it; use "
+            "another file",
+            action.op->name, target));
+      report.warnings.push_back(withLocation(
+          fmt::format(
+              "{}: an earlier action writes '{}' too, and only the last content stays; use another "
+              "file",
+              action.op->name, target),
+          action.location));
       settings.warn(report.warnings.back());
     }
   } catch (const levelset::Error& error) {
-    refuseAs(action.op->name, error, action.place);
+    rethrowAs(action.op->name, error, action.location);
   }
 }
 
@@ -95,7 +98,7 @@ void run(const Graph& graph, const RunSettings& settings, RunReport& report) {
       report.warnings.push_back(sentence);
       settings.warn(sentence);
     }
-    tellFailures(report);
+    throwFailures(report);
   } catch (const levelset::Error& error) {
     report.error = error.what();
     report.exitCode = static_cast<int>(error.exitCode());

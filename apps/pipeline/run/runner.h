@@ -15,60 +15,64 @@
 
 namespace pipeline {
 
+/// Options and callbacks of a run.
 struct RunSettings {
   bool dryRun = false;
-  bool measureErrors = false;  ///< estimate each result's error: costs a pass over it
+  bool measureErrors = false;  ///< estimate each result's error; costs a pass over the result
   std::size_t maxMemory = levelset::kNoMemoryLimit;
-  bool wholeValues = false;          ///< make all of each value, also where a part of it would do
-  std::size_t thumbnails = 0;        ///< of so many steps, but in dry runs
-  std::filesystem::path cache = {};  ///< folder of earlier results; empty: none are kept
-  // Branches run side by side: these are called from several threads, but for progress and goesOn
-  // never at the same time.
-  /// Called with the name of each action before it runs.
+  bool fullValues = false;           ///< ignore regions of interest (--no-roi)
+  std::size_t thumbnails = 0;        ///< number of steps with a thumbnail; none in dry runs
+  std::filesystem::path cache = {};  ///< folder of cached results; empty: no cache
+  // Branches run concurrently, so several threads call these functions. Calls never overlap, except
+  // those of `progress` and `shouldContinue`.
+  /// Receives the name of each action before it runs.
   std::function<void(const std::string&)> begin = {};
-  /// Called with the action's place in the chain, its name and the fraction done, from any thread.
+  /// Receives the node's index, the name of its action and the completed fraction, 0 to 1.
   std::function<void(std::size_t, const std::string&, double)> progress = {};
-  /// Asked while an action runs, from any thread; false ends it with levelset::Cancelled.
-  std::function<bool()> goesOn = {};
-  /// Called with the value of each node that ran and makes one; in a dry run with its plan.
-  std::function<void(std::size_t, const Value&)> made = {};
-  /// Text for people that an action prints.
+  /// Polled while an action runs; false ends the action with levelset::Cancelled.
+  std::function<bool()> shouldContinue = {};
+  /// Receives the value of each node that ran and has one; in a dry run, its plan.
+  std::function<void(std::size_t, const Value&)> onValue = {};
+  /// Receives the text that an action prints for the user.
   std::function<void(const std::string&)> print = {};
-  /// One sentence beside the result.
+  /// Receive one sentence about a result.
   std::function<void(const std::string&)> warn = {}, note = {};
 };
 
+/// Inputs, result and cost of one action that ran.
 struct StepReport {
   std::string action;
-  bool isKnown = false;                           ///< the result is of an earlier run
-  std::map<std::string, std::string> parameters;  ///< as written
-  std::map<std::string, std::string> defaults;    ///< of those that were not
+  bool isCached = false;                          ///< the result comes from an earlier run
+  std::map<std::string, std::string> parameters;  ///< options as written
+  std::map<std::string, std::string> defaults;    ///< defaults of the other options
   StepNotes notes;
   double wallSeconds = 0, cpuSeconds = 0;
-  double peakBytes = 0;
+  double peakBytes = 0;  ///< peak resident memory
   std::string resultName, resultKind;
-  std::string place;  ///< in a script
+  std::string location;  ///< position in the script, "FILE, line 4"; empty: none
   double activeVoxels = 0, voxelSize = 0, halfWidth = 0;
-  levelset::RegionOfInterest needed = {};  ///< of the result, by others; empty: all of it
+  levelset::RegionOfInterest roi = {};  ///< part of the result that other nodes read
   std::size_t triangles = 0;
-  Thumbnail thumbnail = {};  ///< of the result, where asked for
+  Thumbnail thumbnail = {};  ///< picture of the result, if requested
 };
 
+/// Report of a complete run.
 struct RunReport {
-  std::string graphJson;  ///< of all that was asked for
+  std::string graphJson;  ///< the complete graph as JSON
   std::vector<StepReport> steps;
-  std::vector<std::string> warnings;  ///< about the graph as a whole
-  std::vector<std::string> leftOut;   ///< actions that nothing needed
-  std::string error;                  ///< the sentence that ended it, if one did
+  std::vector<std::string> warnings;  ///< about the graph, not about one step
+  std::vector<std::string> leftOut;   ///< actions that no requested result depends on
+  std::string error;                  ///< message of the error that ended the run; empty: none
   int exitCode = 0;
   bool dryRun = false;
-  std::optional<ToleranceReport> tolerance;  ///< of a run with --tolerance
+  std::optional<ToleranceReport> tolerance;  ///< only of a run with --tolerance
 };
 
-/// Runs those nodes that are needed, as if one after another, and lets values go once the last that
-/// takes them has run. Branches run side by side as far as there are threads and memory; what
-/// writes or prints waits for all before it. With a cache neither those run whose results are
-/// known, nor what only they take. A refusal is recorded in the report and then thrown on.
+/// Runs the needed nodes of a graph. The results equal those of a run in graph order. Releases each
+/// value after its last consumer. Branches run concurrently within the limits of threads and
+/// memory. A node that writes or prints waits for all nodes before it. With a cache, nodes with
+/// cached results do not run, nor do nodes that only they depend on.
+/// @throws levelset::Error if a node fails; the report contains the message
 void run(const Graph& graph, const RunSettings& settings, RunReport& report);
 
 }  // namespace pipeline

@@ -90,7 +90,7 @@ double ArenaCpu::seconds() const {
 
 void RunningSteps::add(StepClock& clock) {
   const std::lock_guard lock(mutex_);
-  tellPeak();
+  updatePeaks();
   apps::resetPeakResident();
   clocks_.push_back(&clock);
   if (clocks_.size() < 2) return;
@@ -99,16 +99,16 @@ void RunningSteps::add(StepClock& clock) {
 
 void RunningSteps::remove(StepClock& clock) {
   const std::lock_guard lock(mutex_);
-  tellPeak();
+  updatePeaks();
   clocks_.erase(std::find(clocks_.begin(), clocks_.end(), &clock));
 }
 
-void RunningSteps::forgetPeak() {
+void RunningSteps::resetPeak() {
   const std::lock_guard lock(mutex_);
   if (clocks_.empty()) apps::resetPeakResident();
 }
 
-void RunningSteps::tellPeak() {
+void RunningSteps::updatePeaks() {
   if (clocks_.empty()) return;
   const double peak = apps::peakResidentBytes();
   for (StepClock* const running : clocks_)

@@ -10,16 +10,17 @@
 #include "apps/pipeline/registry/invocation.h"
 #include "apps/pipeline/run/runner.h"
 
-/// What is told of a step beside what it makes.
+/// Measurements of a step for the report: error, size, time and memory.
 namespace pipeline {
 
-/// How far off a result may be, by what can be told from the result itself.
+/// Estimates the error of a result from the result and its operands. Adds the figures to `notes`.
 void estimateError(const Value& value, const Invocation& invocation, StepNotes& notes);
 
-/// Sizes and kind of what a step made. @param dryRun  it is a plan
+/// Records the kind and size of a result in its step.
+/// @param dryRun  `value` is a plan
 void describeResult(const Value& value, bool dryRun, StepReport& step);
 
-/// CPU time of the threads that work in an arena, as long as they do.
+/// Measures the CPU time that threads spend inside a TBB arena.
 class ArenaCpu : public tbb::task_scheduler_observer {
  public:
   explicit ArenaCpu(tbb::task_arena& arena);
@@ -33,39 +34,39 @@ class ArenaCpu : public tbb::task_scheduler_observer {
 
  private:
   mutable std::mutex mutex_;
-  std::map<pthread_t, double> since_;  // CPU seconds of those that are in it, when they came
+  std::map<pthread_t, double> since_;  // CPU seconds at entry, of threads inside the arena
   double past_ = 0;
 };
 
 class StepClock;
 
-/// The steps that run at a time.
+/// The steps that run at the same time.
 class RunningSteps {
  public:
   void add(StepClock& clock);
   void remove(StepClock& clock);
-  /// What was taken until now is of none of those that run.
-  void forgetPeak();
+  /// Resets the peak of the process if no step runs, so that earlier memory counts for no step.
+  void resetPeak();
 
  private:
-  void tellPeak();
+  void updatePeaks();
 
   std::mutex mutex_;
   std::vector<StepClock*> clocks_;
 };
 
-/// Measures a step until it is told to stop; what follows is the report's own work. A step that has
-/// the process to itself takes all that this takes; of one beside others it is what the threads of
-/// its arena take, and the peak is of all of them.
+/// Measures time and memory of a step until stop(). A step that runs alone gets the CPU time of the
+/// complete process. A concurrent step gets the CPU time of its arena, and the memory peak of the
+/// complete process.
 class StepClock {
  public:
-  /// @param arena  that the step runs in, if it may have others beside it
+  /// @param arena  arena of the step, if other steps may run concurrently
   StepClock(StepReport& step, RunningSteps& running, const ArenaCpu* arena = nullptr);
   ~StepClock() { stop(); }
   StepClock(const StepClock&) = delete;
   StepClock& operator=(const StepClock&) = delete;
 
-  /// Adds to what the step took before.
+  /// Adds time and memory to the figures of the step. Further calls have no effect.
   void stop();
 
  private:

@@ -12,20 +12,23 @@
 namespace pipeline {
 namespace {
 
-class SideBySide {
+class TaskScheduler {
  public:
-  SideBySide(const std::vector<Job>& jobs, const JobSettings& settings)
-      : jobs_(jobs), settings_(settings), states_(jobs.size(), State::Waits), group_(jobs.size()) {
-    for (std::size_t i = 0, group = 0; i < jobs.size(); ++i) {
-      group_[i] = group;
-      if (jobs[i].waitsForAll) ++group;
+  TaskScheduler(const std::vector<Task>& tasks, const SchedulerSettings& settings)
+      : tasks_(tasks),
+        settings_(settings),
+        states_(tasks.size(), State::Waiting),
+        barriersBefore_(tasks.size()) {
+    for (std::size_t i = 0, barriers = 0; i < tasks.size(); ++i) {
+      barriersBefore_[i] = barriers;
+      if (tasks[i].isBarrier) ++barriers;
     }
   }
 
-  JobsDone run() {
-    work();
-    for (std::thread& thread : threads_) thread.join();
-    JobsDone all;
+  ScheduleResult run() {
+    runWorker();
+    for (std::thread& thread : workers_) thread.join();
+    ScheduleResult all;
     for (const State state : states_) all.isDone.push_back(state == State::Done);
     if (failure_) all.failed = firstFailure_.load();
     all.failure = failure_;
@@ -33,114 +36,116 @@ class SideBySide {
   }
 
  private:
-  enum class State { Waits, Runs, Done, Undone };
+  enum class State { Waiting, Running, Done, Skipped };
 
-  void work() {
+  void runWorker() {
     std::unique_lock lock(mutex_);
     for (;;) {
-      const std::optional<std::size_t> job = next();
-      if (!job) {
+      const std::optional<std::size_t> task = nextTask();
+      if (!task) {
         if (running_.empty()) return changed_.notify_all();
-        ++idle_;
+        ++idleWorkers_;
         changed_.wait(lock);
-        --idle_;
+        --idleWorkers_;
         continue;
       }
-      states_[*job] = State::Runs;
-      running_.push_back(*job);
-      enlist();
+      states_[*task] = State::Running;
+      running_.push_back(*task);
+      addWorker();
       lock.unlock();
-      State end = State::Undone;
+      State end = State::Skipped;
       std::exception_ptr failure;
       try {
-        if (settings_.run(*job, [this, job] { return *job <= firstFailure_; })) end = State::Done;
+        if (settings_.run(*task, [this, task] { return *task <= firstFailure_; }))
+          end = State::Done;
       } catch (...) {
         failure = std::current_exception();
       }
       lock.lock();
-      running_.erase(std::find(running_.begin(), running_.end(), *job));
-      if (end == State::Undone)
-        leave(*job);
+      running_.erase(std::find(running_.begin(), running_.end(), *task));
+      if (end == State::Skipped)
+        skip(*task);
       else
-        states_[*job] = end;
-      if (failure && *job < firstFailure_) {
-        firstFailure_ = *job;
+        states_[*task] = end;
+      if (failure && *task < firstFailure_) {
+        firstFailure_ = *task;
         failure_ = failure;
       }
       changed_.notify_all();
     }
   }
 
-  /// One more thread where there is something for it to do.
-  void enlist() {
-    if (idle_ > 0 || threads_.size() + 1 >= settings_.threads || !next()) return;
+  /// Starts one more thread if another task can start now.
+  void addWorker() {
+    if (idleWorkers_ > 0 || workers_.size() + 1 >= settings_.threads || !nextTask()) return;
     try {
-      threads_.emplace_back([this] { work(); });
+      workers_.emplace_back([this] { runWorker(); });
     } catch (const std::system_error&) {
-      // Then those that there are do it.
+      // The system gives no more threads: the existing ones run all tasks.
     }
   }
 
-  /// The first that can begin.
-  std::optional<std::size_t> next() {
+  /// Finds the first task that can start.
+  std::optional<std::size_t> nextTask() {
     if (running_.size() >= settings_.threads) return {};
-    for (std::size_t i = firstOpen_; i < std::min(jobs_.size(), firstFailure_.load()); ++i) {
-      const bool canBegin = states_[i] == State::Waits && isReady(i);
-      if (i == firstOpen_ && hasEnded(i)) {  // isReady() may have left it just now
-        ++firstOpen_;
+    for (std::size_t i = firstUnfinished_; i < std::min(tasks_.size(), firstFailure_.load()); ++i) {
+      const bool canStart = states_[i] == State::Waiting && isReady(i);
+      if (i == firstUnfinished_ && isFinished(i)) {  // isReady() may have skipped it
+        ++firstUnfinished_;
         continue;
       }
-      // Those far ahead would hold their results for long.
-      if (group_[i] >= group_[firstOpen_] + settings_.threads) break;
-      if (!canBegin) continue;
-      // Nor do later ones join: small ones would overtake a large one for ever.
-      if (!running_.empty() && !settings_.mayJoin(i, running_)) break;
+      // Results of tasks far ahead would occupy memory for a long time.
+      if (barriersBefore_[i] >= barriersBefore_[firstUnfinished_] + settings_.threads) break;
+      if (!canStart) continue;
+      // Later tasks wait as well: small tasks could otherwise delay a large one forever.
+      if (!running_.empty() && !settings_.mayStart(i, running_)) break;
       return i;
     }
     return {};
   }
 
-  [[nodiscard]] bool hasEnded(std::size_t i) const {
-    return states_[i] == State::Done || states_[i] == State::Undone;
+  [[nodiscard]] bool isFinished(std::size_t i) const {
+    return states_[i] == State::Done || states_[i] == State::Skipped;
   }
 
-  /// Also finds what can never begin.
+  /// Decides if a waiting task can start. Skips a task that can never start.
   bool isReady(std::size_t i) {
     const auto blocks = [&](std::size_t before) { return states_[before] != State::Done; };
-    const auto isLeft = [&](std::size_t before) { return states_[before] == State::Undone; };
-    const Job& job = jobs_[i];
-    if (job.waitsForAll ? firstLeft_ < i
-                        : std::any_of(job.waitsFor.begin(), job.waitsFor.end(), isLeft))
-      leave(i);
-    if (states_[i] != State::Waits) return false;
-    return job.waitsForAll ? i == firstOpen_
-                           : std::none_of(job.waitsFor.begin(), job.waitsFor.end(), blocks);
+    const auto isSkipped = [&](std::size_t before) { return states_[before] == State::Skipped; };
+    const Task& task = tasks_[i];
+    if (task.isBarrier ? firstSkipped_ < i
+                       : std::any_of(task.dependencies.begin(), task.dependencies.end(), isSkipped))
+      skip(i);
+    if (states_[i] != State::Waiting) return false;
+    return task.isBarrier
+               ? i == firstUnfinished_
+               : std::none_of(task.dependencies.begin(), task.dependencies.end(), blocks);
   }
 
-  void leave(std::size_t i) {
-    states_[i] = State::Undone;
-    firstLeft_ = std::min(firstLeft_, i);
+  void skip(std::size_t i) {
+    states_[i] = State::Skipped;
+    firstSkipped_ = std::min(firstSkipped_, i);
   }
 
-  const std::vector<Job>& jobs_;
-  const JobSettings& settings_;
+  const std::vector<Task>& tasks_;
+  const SchedulerSettings& settings_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<State> states_;
-  std::vector<std::size_t> group_;  // by job: how many that wait for all come before it
+  std::vector<std::size_t> barriersBefore_;  // number of barriers before each task
   std::vector<std::size_t> running_;
-  std::vector<std::thread> threads_;
-  std::size_t idle_ = 0;
-  std::size_t firstOpen_ = 0;  // neither done nor left
-  std::size_t firstLeft_ = static_cast<std::size_t>(-1);
+  std::vector<std::thread> workers_;
+  std::size_t idleWorkers_ = 0;
+  std::size_t firstUnfinished_ = 0;  // first task that is neither done nor skipped
+  std::size_t firstSkipped_ = static_cast<std::size_t>(-1);
   std::atomic<std::size_t> firstFailure_ = static_cast<std::size_t>(-1);
   std::exception_ptr failure_;
 };
 
 }  // namespace
 
-JobsDone scheduleTasks(const std::vector<Job>& jobs, const JobSettings& settings) {
-  return SideBySide(jobs, settings).run();
+ScheduleResult scheduleTasks(const std::vector<Task>& tasks, const SchedulerSettings& settings) {
+  return TaskScheduler(tasks, settings).run();
 }
 
 }  // namespace pipeline

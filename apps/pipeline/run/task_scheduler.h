@@ -8,30 +8,34 @@
 
 namespace pipeline {
 
-/// A job among others that are told in an order in which they could run one after another.
-struct Job {
-  std::vector<std::size_t> waitsFor;  ///< jobs before it
-  bool waitsForAll = false;           ///< for all before it: it leaves something outside
+/// A task of an ordered list. Running the tasks one after another in list order is always valid.
+struct Task {
+  std::vector<std::size_t> dependencies;  ///< indices of earlier tasks that must be done first
+  bool isBarrier = false;  ///< waits for all earlier tasks, because it has outside effects
 };
 
-struct JobSettings {
-  /// How many run at once at most, and how many that wait for all are worked towards at a time.
+struct SchedulerSettings {
+  /// Largest number of tasks that run at once. Also limits how many barriers ahead of the first
+  /// unfinished task a task may start.
   std::size_t threads = 1;
-  /// Runs a job, which should end soon by any exception once `goesOn` says false: one before it has
-  /// failed. Called from several threads. @return was it done? What waits for it is left otherwise
-  std::function<bool(std::size_t job, const std::function<bool()>& goesOn)> run = {};
-  /// May it begin beside those that run? Called by one thread at a time.
-  std::function<bool(std::size_t job, const std::vector<std::size_t>& running)> mayJoin = {};
+  /// Runs a task. Several threads call this function.
+  /// `shouldContinue` returns false once an earlier task has failed. The task should then end soon
+  /// by throwing any exception.
+  /// @return true when the task is done; false skips the task and all tasks that depend on it
+  std::function<bool(std::size_t task, const std::function<bool()>& shouldContinue)> run = {};
+  /// Decides if a task may start while the `running` tasks run. Calls never overlap.
+  std::function<bool(std::size_t task, const std::vector<std::size_t>& running)> mayStart = {};
 };
 
-struct JobsDone {
-  std::vector<char> isDone;  ///< by job
-  /// The first in order of those that failed, and what it threw. All before it were tried.
+struct ScheduleResult {
+  std::vector<char> isDone;  ///< one flag per task
+  /// Index of the failed task that is first in the list. All tasks before it were tried.
   std::optional<std::size_t> failed = {};
-  std::exception_ptr failure = {};
+  std::exception_ptr failure = {};  ///< exception that this task threw
 };
 
-/// Runs jobs, on the caller's thread and on more where several can begin, the first ones first.
-JobsDone scheduleTasks(const std::vector<Job>& jobs, const JobSettings& settings);
+/// Runs tasks on the caller's thread, and on further threads when several tasks can start.
+/// Prefers tasks that are earlier in the list.
+ScheduleResult scheduleTasks(const std::vector<Task>& tasks, const SchedulerSettings& settings);
 
 }  // namespace pipeline

@@ -16,7 +16,7 @@
 namespace pipeline {
 namespace {
 
-/// What of the limit is left beside what the process holds.
+/// Memory that the limit leaves beside the resident memory of the process, bytes.
 std::size_t memoryLeft(std::size_t maxMemory) {
   const std::size_t limit = levelset::memoryLimit(maxMemory);
   const double held = apps::processStatusBytes("VmRSS:");
@@ -24,7 +24,7 @@ std::size_t memoryLeft(std::size_t maxMemory) {
   return limit - std::min(limit, static_cast<std::size_t>(held));
 }
 
-/// Of Embree's tree over a mesh, and its copies of corners and faces.
+/// Memory of Embree's tree over a mesh, with its copies of vertices and faces, for each triangle.
 constexpr double kBytesOfTriangle = 250;
 
 std::string drawn(const Value& value, std::size_t maxBytes) {
@@ -47,15 +47,15 @@ std::string drawn(const Value& value, std::size_t maxBytes) {
   return {bytes.begin(), bytes.end()};
 }
 
-/// Why there is none for a kind of value; null: there may be one.
+/// Reason why a kind of value has no picture; null if it may have one.
 const char* reasonAgainst(Kind kind) {
   switch (kind) {
     case Kind::Patch:
-      return "patches are not drawn";
+      return "a patch has no thumbnail";
     case Kind::Field:
-      return "fields are not drawn";
+      return "a field has no thumbnail";
     case Kind::Surface:
-      return "open surfaces are not drawn";
+      return "an open surface has no thumbnail";
     default:
       return nullptr;
   }
@@ -71,13 +71,13 @@ Thumbnail thumbnailOf(const Value& value, std::size_t maxMemory) {
   }
   try {
     picture.png = drawn(value, memoryLeft(maxMemory));
-    if (picture.png.empty()) picture.missing = "no surface is to be seen";
+    if (picture.png.empty()) picture.missing = "no surface is visible";
   } catch (const levelset::ResourceLimit&) {
     picture.missing = "too little memory is left";
   } catch (const std::bad_alloc&) {
     picture.missing = "too little memory is left";
   } catch (const std::exception&) {
-    picture.missing = "there is no surface that can be drawn";
+    picture.missing = "the value has no surface to draw";
   }
   return picture;
 }

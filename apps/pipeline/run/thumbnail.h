@@ -8,19 +8,20 @@
 namespace pipeline {
 
 inline constexpr int kThumbnailWidth = 160, kThumbnailHeight = 120;  ///< pixels
-/// So many steps of a run have one: a page of more is slow to open.
+/// Largest number of steps of a run that get a thumbnail. A page with more is slow to open.
 inline constexpr std::size_t kMostThumbnails = 100;
 
-/// A small picture of a value, for people who look through a report.
+/// A small picture of a value, shown in the report.
 struct Thumbnail {
-  std::string png;      ///< the bytes of the file; empty: there is none
-  std::string missing;  ///< why, in a few words
+  std::string png;      ///< bytes of the PNG file; empty: no picture
+  std::string missing;  ///< short reason why there is no picture
 };
 
-/// Draws level sets, meshes and scenes on the processor, from the front, right and above, or as a
-/// scene is seen. What cannot be drawn, or would pass the limit beside what the process holds, is
-/// left out: a run does not fail for want of a picture. The bytes depend on the value alone.
-/// @param maxMemory  of the process
+/// Draws a level set, mesh or scene with the CPU renderer. The camera looks from the front, right
+/// and above; a scene with a camera uses its own. A value that cannot be drawn gets no picture and
+/// a reason, so a run never fails because of a thumbnail. The same holds for a value whose picture
+/// would exceed the memory that is left. The bytes depend on the value alone.
+/// @param maxMemory  memory limit of the process, bytes
 [[nodiscard]] Thumbnail thumbnailOf(const Value& value, std::size_t maxMemory);
 
 }  // namespace pipeline

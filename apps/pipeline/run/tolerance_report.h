@@ -5,35 +5,35 @@
 
 namespace pipeline {
 
-/// What was asked of one result, and what was reached. Lengths are world units.
+/// Requested and achieved error of one result. Lengths are world units.
 struct ToleranceOutput {
-  std::string name;         ///< "@NAME", or the action that made it
-  double requested = 0;     ///< largest error asked for
+  std::string name;         ///< "@NAME", or the action that computed the result
+  double requested = 0;     ///< largest error that the user accepts
   double achieved = 0;      ///< estimate: two-sided Hausdorff distance, away from creases
-  bool isMeasured = false;  ///< against the exact surface, and not estimated
-  double crease = 0;        ///< estimate of the same beside creases that the field cannot hold
-  double creaseShare = 0;   ///< of the surface, that counts as beside a crease
-  double order = 0;         ///< at which the error falls, as used
+  bool isMeasured = false;  ///< `achieved` is measured against the exact surface, not estimated
+  double crease = 0;        ///< estimate near creases that the field cannot represent
+  double creaseShare = 0;   ///< fraction of the surface that counts as near a crease
+  double order = 0;         ///< convergence order that the estimate uses
   [[nodiscard]] bool isReached() const { return achieved <= requested; }
 };
 
-/// One voxel size that was tried.
+/// A voxel size that was tried, and its outcome.
 struct ToleranceRound {
   double voxelSize = 0;
-  double seconds = 0;                    ///< wall time, its coarser runs included
-  std::vector<ToleranceOutput> outputs;  ///< empty where it failed
-  std::string failure;                   ///< the sentence of what refused it
+  double seconds = 0;                    ///< wall time, including the coarser runs of this round
+  std::vector<ToleranceOutput> outputs;  ///< empty if the round failed
+  std::string failure;                   ///< error message of the failure
 };
 
-/// Of a run with `--tolerance`.
+/// Outcome of a run with `--tolerance`.
 struct ToleranceReport {
-  std::string written;        ///< as it was asked for
-  double modelVoxelSize = 0;  ///< what the error models picked before anything ran; 0: could not
-  std::vector<std::string> models;  ///< cases of the regression suite that those rest on
-  double voxelSize = 0;             ///< of the result
+  std::string written;              ///< tolerance as the user wrote it
+  double modelVoxelSize = 0;        ///< first choice of the error models; 0: no model applies
+  std::vector<std::string> models;  ///< regression cases that these error models are fitted to
+  double voxelSize = 0;             ///< voxel size of the result
   std::vector<ToleranceOutput> outputs;
   std::vector<ToleranceRound> rounds;
-  std::string limit;  ///< what kept it from going on; empty: nothing
+  std::string limit;  ///< reason why refinement stopped early; empty: it did not
   [[nodiscard]] bool isReached() const {
     for (const ToleranceOutput& output : outputs)
       if (!output.isReached()) return false;

@@ -22,32 +22,35 @@
 namespace pipeline {
 namespace {
 
-// === What the plan rests on
-/// Of the error estimated from runs, for the largest of a few distances is a matter of chance:
-/// where it is on one grid, it is not on the other. Without it, estimates are 1.0 to 2.1 times the
-/// true error over the cases of tests/bench/tolerance_bench.cpp.
+// === Constants of the search
+/// Safety factor for errors estimated from runs: the largest distance is at different points on
+/// different grids. Without the factor, estimates are 1.0 to 2.1 times the true error over the
+/// cases of tests/bench/tolerance_bench.cpp.
 constexpr double kSafety = 1.25;
-/// Part of the tolerance that the next voxel size aims at.
+/// Fraction of the tolerance that the next voxel size aims at.
 constexpr double kAim = 0.65;
-/// The same where the error is not estimated but measured.
+/// The same fraction where the error is measured, not estimated.
 constexpr double kMeasuredAim = 0.8;
-/// Of what is measured, for what lies between samples: those at half the spacing find up to 1.06
-/// times as much on the bunny.
+/// Safety factor for measured errors, because samples miss the points between them. On the bunny,
+/// samples at half the spacing find up to 1.06 times the error.
 constexpr double kMeasuredSafety = 1.1;
-/// An estimate below this part of the tolerance is worth a coarser run, which costs less in memory
-/// and in all that follows.
+/// An estimate below this fraction of the tolerance justifies a run with larger voxels. It saves
+/// memory, and time in all later actions.
 constexpr double kWasteful = 0.25;
-/// Largest steps from one voxel size to the next: an extrapolation is as good as it is short.
+/// Smallest and largest factor from one voxel size to the next. Short extrapolations are more
+/// accurate.
 constexpr double kFinest = 1 / 3.0, kCoarsest = 4;
-/// Voxels along an object below which comparisons tell nothing: its coarsest run has a quarter.
+/// Smallest number of voxels along an object. The coarsest run has a quarter of them, and
+/// comparisons with fewer voxels are meaningless.
 constexpr double kLeastVoxels = 8;
-/// Voxels along the longest side that the first voxel size does not pass, whatever models say.
+/// Largest number of voxels along the longest side in the first run, independent of the models.
 constexpr double kMostFirst = 64;
-/// Beside creases the error is about half a voxel. It is not judged, but does not get larger than
-/// a few times the tolerance where memory allows.
+/// Largest voxel size, in tolerances, if there are creases. The error near creases is about half a
+/// voxel. It does not count, but should stay within a few tolerances where memory allows.
 constexpr double kCreaseVoxels = 4;
 constexpr int kMostRounds = 12;
-/// The least order that is believed: below, the difference of two runs counts as the error.
+/// Lowest convergence order in use. At a lower observed order, the difference of two runs counts as
+/// the error.
 constexpr double kLeastOrder = 1;
 constexpr int kPlanResolution = 16;
 
@@ -61,16 +64,16 @@ class ToleranceRun {
         parts_(withoutCacheUse(toleranceParts(graph), settings)),
         model_(graphModel(graph, surfacesOf(graph, parts_))),
         levels_(graph, parts_, settings) {
-    told_.written = graph.globals.at("tolerance");
-    for (const char* name : model_.cases) told_.models.emplace_back(name);
+    outcome_.written = graph.globals.at("tolerance");
+    for (const char* name : model_.cases) outcome_.models.emplace_back(name);
   }
 
   void run() {
     for (const std::string& sentence : voxelLengths(graph_, parts_)) warn(sentence);
-    levels_.makeOnce(report_);
+    levels_.computeOnce(report_);
     plan();
     if (settings_.dryRun) {
-      if (told_.modelVoxelSize > 0) levels_.planAt(told_.modelVoxelSize, report_);
+      if (outcome_.modelVoxelSize > 0) levels_.planAt(outcome_.modelVoxelSize, report_);
     } else {
       base_ = apps::processStatusBytes("VmRSS:");
       search();
@@ -78,8 +81,8 @@ class ToleranceRun {
     }
   }
 
-  /// Also of a run that failed.
-  void tell() {
+  /// Fills the report, also after a failed run.
+  void fillReport() {
     const std::vector<char> needed = neededNodes(graph_);
     report_.leftOut.clear();
     for (std::size_t i = 0; i < graph_.nodes.size(); ++i)
@@ -87,12 +90,12 @@ class ToleranceRun {
         report_.leftOut.push_back(graph_.nodes[i].op->name + (graph_.nodes[i].name.empty()
                                                                   ? ""
                                                                   : " @" + graph_.nodes[i].name));
-    report_.tolerance = told_;
+    report_.tolerance = outcome_;
   }
 
  private:
-  /// With a cache what is made once is one of the results that it knows; values that are given it
-  /// does not.
+  /// With a cache, moves the values of `once` to `again`: the cache stores them, and it could not
+  /// store results that depend on given values.
   static ToleranceParts withoutCacheUse(ToleranceParts parts, const RunSettings& settings) {
     if (settings.cache.empty() || settings.dryRun) return parts;
     parts.again.insert(parts.again.end(), parts.once.begin(), parts.once.end());
@@ -120,7 +123,7 @@ class ToleranceRun {
   }
 
   // === The first voxel size
-  /// By the error models, and by how large things are.
+  /// Chooses it from the error models and from the sizes of the objects.
   void plan() {
     RunReport planned;
     const std::map<std::size_t, Value> plans = levels_.planAll(kPlanResolution, planned);
@@ -138,16 +141,16 @@ class ToleranceRun {
     }
     double voxel = std::numeric_limits<double>::max();
     for (const std::size_t i : parts_.chosen)
-      if (const double told = modelVoxelSize(graph_.nodes[i], kAim * requested); told > 0)
-        voxel = std::min(voxel, told);
+      if (const double modelled = modelVoxelSize(graph_.nodes[i], kAim * requested); modelled > 0)
+        voxel = std::min(voxel, modelled);
     if (model_.makesCreases) voxel = std::min(voxel, kCreaseVoxels * requested);
     if (voxel < std::numeric_limits<double>::max())
-      told_.modelVoxelSize = rounded(std::min(voxel, coarsest()));
+      outcome_.modelVoxelSize = rounded(std::min(voxel, coarsest()));
   }
 
   [[nodiscard]] double coarsest() const { return shortestSide_ / kLeastVoxels; }
 
-  /// To three digits, downwards: for people to read.
+  /// Rounds down to three digits, for readability.
   static double rounded(double voxel) {
     const double unit = std::pow(10, std::floor(std::log10(voxel)) - 2);
     const double steps = std::floor(voxel / unit * (1 + 1e-12));
@@ -155,13 +158,13 @@ class ToleranceRun {
   }
 
   // === Runs
-  /// Of one voxel size: the result, and what tells its error.
+  /// Result and error estimate at one voxel size.
   struct Trial {
     Level level;
     std::vector<ToleranceOutput> outputs = {};
-    double ratio = 0;  ///< largest of the errors to what was asked for
-    double order = 1;  ///< of that one
-    double aim = 1;    ///< part of what was asked for that the next one aims at
+    double ratio = 0;  ///< largest ratio of an error to its tolerance
+    double order = 1;  ///< convergence order of the output with that ratio
+    double aim = 1;    ///< fraction of the tolerance that the next run aims at
     bool hasCreases = false;
     double finest = 0;  ///< tolerance of the strictest output
   };
@@ -170,7 +173,7 @@ class ToleranceRun {
     coarsePeak_ = base_;
     Trial trial{.level = levels_.runAt(voxel, 1)};
     trial.outputs.resize(parts_.outputs.size());
-    std::vector<std::size_t> open;  // outputs of which runs with larger voxels have to tell
+    std::vector<std::size_t> open;  // outputs whose error needs runs with larger voxels
     for (std::size_t i = 0; i < parts_.outputs.size(); ++i) {
       ToleranceOutput& output = trial.outputs[i];
       output.name = nameOf(graph_.nodes[parts_.outputs[i]]);
@@ -197,12 +200,13 @@ class ToleranceRun {
       trial.finest = std::min(trial.finest, output.requested);
     }
     trial.level.peakBytes = std::max(trial.level.peakBytes, apps::peakResidentBytes());
-    trial.level.surfaces.clear();  // what is kept is the result
+    trial.level.surfaces.clear();  // only the result is needed from here on
     return trial;
   }
 
-  /// Does what is measured fall with the voxels? It does not where the mesh has parts inside of the
-  /// solid, or creases that are finer than the tolerance: estimates have to tell then.
+  /// Decides if the measured error falls with the voxel size. It does not fall if the mesh has
+  /// parts inside the solid, or creases finer than the tolerance. The error is then estimated
+  /// instead.
   bool measuredFalls(double voxel, double error, std::size_t output) {
     const auto last = measured_.find(output);
     if (last != measured_.end() && voxel < last->second.voxel) {
@@ -213,8 +217,9 @@ class ToleranceRun {
     return believesMeasured_;
   }
 
-  /// What is measured counts no more where it is not small enough, and the best voxel size is tried
-  /// again. @return false where that is so already
+  /// Switches from measured to estimated errors if a measured one is too large. Sets `voxel` to the
+  /// best voxel size, to try it again.
+  /// @return false if no measured error is too large, or estimates are already in use
   bool turnToEstimates(double& voxel) {
     const auto& outputs = best_->outputs;
     const bool rests = std::any_of(outputs.begin(), outputs.end(), [](const ToleranceOutput& o) {
@@ -225,13 +230,14 @@ class ToleranceRun {
     return true;
   }
 
-  /// Richardson: from runs with voxels twice and four times as large.
+  /// Estimates errors by Richardson extrapolation from voxels twice and four times as large.
   void extrapolate(double voxel, const std::vector<std::size_t>& outputs, Trial& trial) {
     std::optional<Level> coarser;
     try {
       coarser = levels_.runAt(voxel, 4);
       coarser->values.clear();
-    } catch (const levelset::InvalidInput&) {  // it is no longer an object: the model has to do
+    } catch (const levelset::InvalidInput&) {  // no object is left at that voxel size: use the
+                                               // model's order
     }
     Level coarse = levels_.runAt(voxel, 2);
     coarse.values.clear();
@@ -245,7 +251,7 @@ class ToleranceRun {
       const double order =
           std::clamp(isObserved ? std::log2(far.smooth / near.smooth) : kLeastOrder, kLeastOrder,
                      std::max(kLeastOrder, model_.order));
-      // The difference may be small by chance; the one before it then tells what to expect.
+      // The difference may be small by chance, so also use the expected one of the coarser pair.
       const double expected = far.smooth / std::exp2(order);
       const double error = kSafety * std::max(near.smooth, expected) / (std::exp2(order) - 1);
       output.creaseShare = near.creaseShare;
@@ -257,10 +263,10 @@ class ToleranceRun {
     }
   }
 
-  /// The least voxel size that memory allows, after a trial.
+  /// Smallest voxel size that memory allows, predicted from a trial.
   [[nodiscard]] double leastVoxel(const Trial& trial) const {
     if (settings_.maxMemory == levelset::kNoMemoryLimit) return 0;
-    // What the operators allocate on the way, and what comparing takes, follows the surface.
+    // The working memory of operators and of comparisons is proportional to the surface area.
     constexpr double kVoxelBytes = 24, kTriangleBytes = 200, kUsable = 0.85;
     const double h = trial.level.voxelSize, peak = trial.level.peakBytes;
     const double least = kVoxelBytes * trial.level.voxels +
@@ -272,7 +278,7 @@ class ToleranceRun {
   }
 
   // === The search
-  /// The voxel size to try after a trial; none: it will do.
+  /// Voxel size to try after a trial; empty: the search ends.
   std::optional<double> nextVoxel(const Trial& trial) {
     const double h = trial.level.voxelSize;
     const double step = std::clamp(
@@ -296,31 +302,33 @@ class ToleranceRun {
   }
 
   void search() {
-    double voxel = std::max(longestSide_ / kMostFirst / kCoarsest,
-                            std::min(told_.modelVoxelSize > 0
-                                         ? std::max(told_.modelVoxelSize, longestSide_ / kMostFirst)
-                                         : longestSide_ / kMostFirst,
-                                     coarsest()));
+    double voxel =
+        std::max(longestSide_ / kMostFirst / kCoarsest,
+                 std::min(outcome_.modelVoxelSize > 0
+                              ? std::max(outcome_.modelVoxelSize, longestSide_ / kMostFirst)
+                              : longestSide_ / kMostFirst,
+                          coarsest()));
     voxel = rounded(voxel);
-    int refusals = 0;
+    int failures = 0;
     double before = 0, beforeRatio = 0;
     for (int round = 0; round < kMostRounds; ++round) {
-      std::optional<Trial> trial = attempt(voxel);
+      std::optional<Trial> trial = tryVoxelSize(voxel);
       if (!trial) {
         if (!best_) {
-          // What is too coarse for one object may be asked for again; what is wrong with it not.
-          if (++refusals > 2) std::rethrow_exception(refusal_);
+          // The voxels may be too large for an object. Try smaller ones twice, then report the
+          // error.
+          if (++failures > 2) std::rethrow_exception(failure_);
           voxel = rounded(voxel / 4);
           continue;
         }
-        told_.limit = told_.rounds.back().failure;
+        outcome_.limit = outcome_.rounds.back().failure;
         if (turnToEstimates(voxel)) continue;
-        if (best_->ratio <= 1 || ++refusals > 2) return;
+        if (best_->ratio <= 1 || ++failures > 2) return;
         voxel = rounded(std::sqrt(voxel * best_->level.voxelSize));
         if (voxel > 0.9 * best_->level.voxelSize) return;
         continue;
       }
-      if (trial->ratio <= 1 && refusals > 0) told_.limit.clear();
+      if (trial->ratio <= 1 && failures > 0) outcome_.limit.clear();
       const bool stalls =
           before > 1.4 * voxel && trial->ratio > 1 && trial->ratio > 0.85 * beforeRatio;
       before = voxel;
@@ -329,47 +337,48 @@ class ToleranceRun {
       const double least = leastVoxel(*trial);
       const double order = trial->order, ratio = trial->ratio;
       keepBest(std::move(*trial));
-      if (!next || refusals > 2) return;
-      // Once is a matter of chance, unless there is a reason.
+      if (!next || failures > 2) return;
+      // A single stall may be chance, unless fixed voxel sizes explain it.
       if (stalls && (++stalled_ > 1 || !parts_.fixed.empty())) {
-        told_.limit = stallSentence();
+        outcome_.limit = stallSentence();
         return;
       }
       double wanted = *next;
       if (wanted < least) {
         if (ratio <= 1) return;
-        // As fine as memory allows, if that is worth a run.
+        // Use the finest voxels that memory allows, if they are clearly finer.
         if (least > 0.85 * voxel) {
           if (turnToEstimates(voxel)) continue;
-          told_.limit = memorySentence(voxel * std::pow(kAim / ratio, 1 / order));
+          outcome_.limit = memorySentence(voxel * std::pow(kAim / ratio, 1 / order));
           return;
         }
         wanted = rounded(1.02 * least);
       }
       voxel = wanted;
     }
-    if (best_->ratio > 1 && told_.limit.empty())
-      told_.limit = fmt::format("{} voxel sizes were tried", kMostRounds);
+    if (best_->ratio > 1 && outcome_.limit.empty())
+      outcome_.limit = fmt::format("the limit of {} voxel sizes was reached", kMostRounds);
   }
 
   [[nodiscard]] std::string memorySentence(double voxel) const {
-    return fmt::format("voxels of about {:.2g} would take more than --max-memory, {:.0f} MB", voxel,
+    return fmt::format("voxels of about {:.2g} would need more than --max-memory, {:.0f} MB", voxel,
                        static_cast<double>(settings_.maxMemory) * 1e-6);
   }
   [[nodiscard]] std::string stallSentence() const {
     for (const std::size_t i : parts_.fixed) {
       const std::map<std::string, std::string>& options = graph_.nodes[i].options;
       const char* option = options.contains("voxel") ? "voxel" : "resolution";
-      return fmt::format("the error no longer falls with the voxels; '{}' has its own, --{} {}",
+      return fmt::format("the error no longer falls with the voxel size; '{}' has a fixed --{} {}",
                          nameOf(graph_.nodes[i]), option, options.at(option));
     }
-    return "the error no longer falls with the voxels";
+    return "the error no longer falls with the voxel size";
   }
 
-  /// @return nothing where it was refused
-  std::optional<Trial> attempt(double voxel) {
+  /// Tries a voxel size and records the round.
+  /// @return empty if the run failed
+  std::optional<Trial> tryVoxelSize(double voxel) {
     malloc_trim(0);
-    ToleranceRound& round = told_.rounds.emplace_back();
+    ToleranceRound& round = outcome_.rounds.emplace_back();
     round.voxelSize = voxel;
     const auto start = std::chrono::steady_clock::now();
     std::optional<Trial> trial;
@@ -377,7 +386,7 @@ class ToleranceRun {
       trial = tryVoxel(voxel);
       round.outputs = trial->outputs;
     } catch (const levelset::InvalidInput& error) {
-      refusal_ = std::current_exception();
+      failure_ = std::current_exception();
       round.failure = error.what();
     } catch (const levelset::ResourceLimit& error) {
       if (!best_) throw;
@@ -387,8 +396,8 @@ class ToleranceRun {
     return trial;
   }
 
-  /// Of those that reach what was asked the coarsest, of the others the one that is nearest to it;
-  /// but where creases are, the finer of two that do.
+  /// Keeps the better of two trials. Among trials within the tolerance, the coarser one is better,
+  /// or with creases the later one. Among the others, the one with the smaller error is better.
   void keepBest(Trial trial) {
     const bool isBetter =
         !best_ || (trial.ratio <= 1 ? best_->ratio > 1 || trial.hasCreases ||
@@ -400,15 +409,15 @@ class ToleranceRun {
   // === The end
   void finish() {
     Trial& best = *best_;
-    told_.voxelSize = best.level.voxelSize;
-    told_.outputs = best.outputs;
+    outcome_.voxelSize = best.level.voxelSize;
+    outcome_.outputs = best.outputs;
     for (StepReport& step : best.level.report.steps) report_.steps.push_back(std::move(step));
     for (const std::string& sentence : best.level.report.warnings)
       report_.warnings.push_back(sentence);
-    for (const Told& text : best.level.told) {
-      if (text.kind == Told::Kind::Warn)
+    for (const Message& text : best.level.messages) {
+      if (text.kind == Message::Kind::Warn)
         settings_.warn(text.text);
-      else if (text.kind == Told::Kind::Note)
+      else if (text.kind == Message::Kind::Note)
         settings_.note(text.text);
       else if (settings_.print)
         settings_.print(text.text);
@@ -419,32 +428,33 @@ class ToleranceRun {
     } catch (const levelset::NumericalError&) {
       failure = std::current_exception();
     }
-    for (const ToleranceOutput& output : told_.outputs) settings_.note(sentenceOf(output));
-    if (!told_.isReached()) throw levelset::NumericalError(missSentence());
+    for (const ToleranceOutput& output : outcome_.outputs) settings_.note(sentenceOf(output));
+    if (!outcome_.isReached()) throw levelset::NumericalError(missSentence());
     if (!best.level.failure.empty()) throw levelset::NumericalError(best.level.failure);
     if (failure) std::rethrow_exception(failure);
   }
 
   [[nodiscard]] std::string sentenceOf(const ToleranceOutput& output) const {
     std::string text =
-        fmt::format("{}: off by about {:.2g} with voxels of {:.3g}, where {:.4g} was asked for",
-                    output.name, output.achieved, told_.voxelSize, output.requested);
+        fmt::format("{}: error about {:.2g} with voxels of {:.3g}, {:.4g} requested", output.name,
+                    output.achieved, outcome_.voxelSize, output.requested);
     if (output.crease > output.requested)
       text +=
-          fmt::format("; beside creases, which the field cannot hold, by {:.2g}", output.crease);
+          fmt::format("; near creases, which the field cannot represent, {:.2g}", output.crease);
     return text;
   }
 
   [[nodiscard]] std::string missSentence() const {
     const auto worst =
-        std::max_element(told_.outputs.begin(), told_.outputs.end(),
+        std::max_element(outcome_.outputs.begin(), outcome_.outputs.end(),
                          [](const ToleranceOutput& a, const ToleranceOutput& b) {
                            return a.achieved / a.requested < b.achieved / b.requested;
                          });
     return fmt::format(
-        "--tolerance: {:.4g} was asked for and {:.2g} reached, by '{}' with voxels of {:.3g}; {}; "
-        "the best result is kept: ask for less, or give more memory",
-        worst->requested, worst->achieved, worst->name, told_.voxelSize, told_.limit);
+        "--tolerance: {:.4g} was requested, but '{}' has an error of {:.2g} with voxels of {:.3g}; "
+        "{}; "
+        "the best result was written: use a larger tolerance, or more memory",
+        worst->requested, worst->name, worst->achieved, outcome_.voxelSize, outcome_.limit);
   }
 
   const Graph& graph_;
@@ -454,39 +464,40 @@ class ToleranceRun {
   ToleranceParts parts_;
   GraphModel model_;
   LevelRunner levels_;
-  ToleranceReport told_;
+  ToleranceReport outcome_;
   double longestSide_ = 0, shortestSide_ = std::numeric_limits<double>::max();
   double base_ = 0, coarsePeak_ = 0;
   std::optional<Trial> best_;
-  std::optional<double> reaching_, failing_;  ///< the coarsest that do, the finest that do not
-  std::exception_ptr refusal_;
+  std::optional<double> reaching_;  ///< coarsest voxel size within the tolerance
+  std::optional<double> failing_;   ///< finest voxel size beyond the tolerance
+  std::exception_ptr failure_;
   int stalled_ = 0;
   struct Measured {
     double voxel = 0, error = 0;
   };
-  std::map<std::size_t, Measured> measured_;  ///< by output
+  std::map<std::size_t, Measured> measured_;  ///< last measured error by output
   bool believesMeasured_ = true;
 };
 
 }  // namespace
 
 void runToTolerance(const Graph& graph, const RunSettings& settings, RunReport& report) {
-  std::optional<ToleranceRun> whole;
-  const auto tell = [&](const std::string& error, int code) {
+  std::optional<ToleranceRun> run;
+  const auto fillReport = [&](const std::string& error, int code) {
     report.dryRun = settings.dryRun;
     report.graphJson = graphJson(graph);
     report.error = error;
     report.exitCode = code;
-    if (whole) whole->tell();
+    if (run) run->fillReport();
   };
   try {
-    whole.emplace(graph, settings, report).run();
-    tell("", 0);
+    run.emplace(graph, settings, report).run();
+    fillReport("", 0);
   } catch (const levelset::Error& error) {
-    tell(error.what(), static_cast<int>(error.exitCode()));
+    fillReport(error.what(), static_cast<int>(error.exitCode()));
     throw;
   } catch (const std::exception& error) {
-    tell(error.what(), static_cast<int>(levelset::ExitCode::Input));
+    fillReport(error.what(), static_cast<int>(levelset::ExitCode::Input));
     throw;
   }
 }

@@ -4,20 +4,19 @@
 
 namespace pipeline {
 
-/// Runs a graph so that its results are off by no more than `--tolerance` of its globals tells.
-/// Voxel sizes that its nodes leave out are chosen: a first one by the error models, from which the
-/// graph is run, without what it writes, at ever better ones. How far a result is off is told by
-/// Richardson's extrapolation from runs with voxels twice and four times as large. What it writes
-/// is written once, from the best run.
+/// Runs a graph so that the error of its results is at most the global option `--tolerance`.
+/// Chooses the voxel sizes that nodes leave out. The error models give the first voxel size;
+/// further runs refine or coarsen it. Richardson extrapolation from runs with voxels twice and four
+/// times as large estimates the error. Files are written once, from the best run.
 ///
-/// The error is the two-sided Hausdorff distance of surfaces: of the triangles that `mesh` makes of
-/// a level set, or of the mesh that is the result. What lies beside creases that the field cannot
-/// hold is told apart and not judged.
+/// The error is the two-sided Hausdorff distance of surfaces. The surface of a level set is the
+/// mesh that `mesh` computes. Errors near creases that the field cannot represent are reported
+/// separately and do not count.
 ///
-/// Fills the report, RunReport::tolerance too.
-/// @throws as run(); levelset::UsageError where there is nothing to choose a voxel size for, or no
-///         surface in the end; levelset::NumericalError, after the best result was written, where
-///         the tolerance was not reached
+/// Fills the report, including RunReport::tolerance.
+/// @throws levelset::Error as run()
+/// @throws levelset::UsageError if no node leaves its voxel size open, or no result has a surface
+/// @throws levelset::NumericalError if the tolerance was not reached; the best result was written
 void runToTolerance(const Graph& graph, const RunSettings& settings, RunReport& report);
 
 }  // namespace pipeline

@@ -24,12 +24,12 @@ bool readsStandardInput(const Node& node) {
          node.op->usesStandardInput(Invocation(*node.op, node.options));
 }
 
-bool isJudged(Kind kind) {
+bool hasErrorEstimate(Kind kind) {
   return kind == Kind::Band || kind == Kind::Mesh;
 }
 
 template <typename Visit>
-void forEachTaken(const Node& node, const Visit& visit) {
+void forEachOperand(const Node& node, const Visit& visit) {
   for (const std::size_t input : node.inputs) visit(input);
   for (const auto& [option, input] : node.named) visit(input);
 }
@@ -44,7 +44,7 @@ std::string scaledVoxel(const std::string& text, double factor) {
   return fmt::format("{}{}", length.number * factor, length.unit == Unit::Percent ? "%" : "");
 }
 
-/// Sorts nodes into parts.
+/// Assigns each node to its role.
 class PartFinder {
  public:
   explicit PartFinder(const Graph& graph)
@@ -55,28 +55,30 @@ class PartFinder {
 
   ToleranceParts find() {
     for (std::size_t i = 0; i < graph_.nodes.size(); ++i)
-      if (needed_[i]) place(i);
+      if (needed_[i]) classify(i);
     if (parts_.chosen.empty())
       throw UsageError(
-          "--tolerance: no action is left to choose a voxel size for; leave out --voxel and "
-          "--resolution where a level set is made, or leave out --tolerance");
+          "--tolerance: every action has a voxel size already; leave out --voxel and --resolution "
+          "of an "
+          "action that computes a level set, or leave out --tolerance");
     findOutputs();
     parts_.constant = parts_.once;
     return std::move(parts_);
   }
 
  private:
-  void place(std::size_t i) {
+  void classify(std::size_t i) {
     const Node& node = graph_.nodes[i];
     const bool isMaker = node.makes() && node.kind != Kind::Scene;
-    bool takesEnd = false;
-    forEachTaken(node, [&](std::size_t input) { takesEnd = takesEnd || isEnd_[input]; });
-    if (isMaker && (takesEnd || hasTargets(node)))
-      throw UsageError(withPlace(
-          fmt::format("{}: writes files while it makes its result, which --tolerance makes more "
-                      "than once; give voxel sizes, or leave out what it writes",
-                      node.op->name),
-          node.place));
+    bool dependsOnEnd = false;
+    forEachOperand(node, [&](std::size_t input) { dependsOnEnd = dependsOnEnd || isEnd_[input]; });
+    if (isMaker && (dependsOnEnd || hasTargets(node)))
+      throw UsageError(withLocation(
+          fmt::format(
+              "{}: writes files while it computes its result, and --tolerance computes the result "
+              "more than once; give voxel sizes, or do not write files here",
+              node.op->name),
+          node.location));
     if (!isMaker) {
       isEnd_[i] = 1;
       parts_.ends.push_back(i);
@@ -85,54 +87,57 @@ class PartFinder {
     if (node.voxelFollows) {
       parts_.chosen.push_back(i);
       hasVoxels_[i] = 1;
-      refuseVoxelLengths(node);
+      rejectVoxelLengths(node);
     } else if (node.options.contains("voxel") || node.options.contains("resolution")) {
       parts_.fixed.push_back(i);
       hasVoxels_[i] = 1;
     }
-    forEachTaken(node, [&](std::size_t input) { hasVoxels_[i] |= hasVoxels_[input]; });
+    forEachOperand(node, [&](std::size_t input) { hasVoxels_[i] |= hasVoxels_[input]; });
     if (hasVoxels_[i] && readsStandardInput(node))
-      throw UsageError(withPlace(
-          fmt::format("{}: standard input can be read once only, and --tolerance makes this more "
-                      "than once; give a file",
-                      node.op->name),
-          node.place));
+      throw UsageError(withLocation(
+          fmt::format(
+              "{}: standard input can be read only once, and --tolerance runs this action more "
+              "than once; give a file",
+              node.op->name),
+          node.location));
     (hasVoxels_[i] ? parts_.again : parts_.once).push_back(i);
   }
 
-  void refuseVoxelLengths(const Node& node) const {
+  void rejectVoxelLengths(const Node& node) const {
     for (const auto& [option, text] : node.options)
       if (isLength(node, option) && text.find("vx") != std::string::npos)
-        throw UsageError(withPlace(
-            fmt::format("{}: --{}: '{}' counts in voxels, and --tolerance is to choose their "
+        throw UsageError(withLocation(
+            fmt::format("{}: --{}: '{}' counts in voxels, and --tolerance chooses their "
                         "size; write it in world units",
                         node.op->name, option, text),
-            node.place));
+            node.location));
   }
 
   void findOutputs() {
-    std::vector<char> isTaken(graph_.nodes.size(), 0), lasts(graph_.nodes.size(), 0);
+    std::vector<char> isTaken(graph_.nodes.size(), 0), isFinal(graph_.nodes.size(), 0);
     for (std::size_t i = 0; i < graph_.nodes.size(); ++i)
       if (needed_[i])
-        forEachTaken(graph_.nodes[i],
-                     [&](std::size_t input) { (isEnd_[i] ? lasts : isTaken)[input] = 1; });
+        forEachOperand(graph_.nodes[i],
+                       [&](std::size_t input) { (isEnd_[i] ? isFinal : isTaken)[input] = 1; });
     for (const std::size_t i : parts_.again) {
-      const bool isLast = lasts[i] || !isTaken[i];
-      if (isLast && isJudged(graph_.nodes[i].kind) && followsChosen(i)) parts_.outputs.push_back(i);
+      const bool isLast = isFinal[i] || !isTaken[i];
+      if (isLast && hasErrorEstimate(graph_.nodes[i].kind) && followsChosen(i))
+        parts_.outputs.push_back(i);
     }
     for (std::size_t i = 0; i < graph_.nodes.size(); ++i)
-      if (needed_[i] && !isEnd_[i] && (lasts[i] || !isTaken[i])) parts_.lasting.push_back(i);
+      if (needed_[i] && !isEnd_[i] && (isFinal[i] || !isTaken[i])) parts_.lasting.push_back(i);
     if (parts_.outputs.empty())
       throw UsageError(
-          "--tolerance: there is no level set and no mesh at the end whose error could be told; "
-          "end with one, or give voxel sizes");
+          "--tolerance: no result is a level set or a mesh, so there is no error to estimate; end "
+          "the "
+          "chain with one, or give voxel sizes");
   }
 
   [[nodiscard]] bool followsChosen(std::size_t i) const {
     if (graph_.nodes[i].voxelFollows) return true;
     bool follows = false;
-    forEachTaken(graph_.nodes[i],
-                 [&](std::size_t input) { follows = follows || followsChosen(input); });
+    forEachOperand(graph_.nodes[i],
+                   [&](std::size_t input) { follows = follows || followsChosen(input); });
     return follows;
   }
 
@@ -153,11 +158,11 @@ std::vector<std::string> voxelLengths(const Graph& graph, const ToleranceParts& 
     const Node& node = graph.nodes[i];
     for (const auto& [option, text] : node.options)
       if (isLength(node, option) && text.find("vx") != std::string::npos)
-        sentences.push_back(withPlace(
+        sentences.push_back(withLocation(
             fmt::format("{}: --{}: '{}' counts in voxels, whose size --tolerance chooses; write it "
                         "in world units if the surface depends on it",
                         node.op->name, option, text),
-            node.place));
+            node.location));
   }
   return sentences;
 }

@@ -12,9 +12,9 @@
 namespace pipeline {
 namespace {
 
-/// Nodes of `from` that one of `by` takes.
-std::vector<std::size_t> takenOf(const Graph& graph, const std::vector<std::size_t>& from,
-                                 const std::vector<std::size_t>& by) {
+/// Selects the nodes of `from` that are operands of a node of `by`.
+std::vector<std::size_t> operandsAmong(const Graph& graph, const std::vector<std::size_t>& from,
+                                       const std::vector<std::size_t>& by) {
   std::set<std::size_t> taken;
   for (const std::size_t i : by) {
     const Node& node = graph.nodes[i];
@@ -34,7 +34,7 @@ std::vector<std::size_t> joined(std::vector<std::size_t> a, const std::vector<st
   return a;
 }
 
-void askFor(PartGraph& part, const std::vector<std::size_t>& wanted) {
+void requestResults(PartGraph& part, const std::vector<std::size_t>& wanted) {
   for (std::size_t i = 0; i < part.origin.size(); ++i)
     if (std::binary_search(wanted.begin(), wanted.end(), part.origin[i]))
       part.graph.results.push_back(i);
@@ -73,14 +73,14 @@ RunSettings LevelRunner::settingsFor(const PartGraph& part) const {
   return settings;
 }
 
-void LevelRunner::makeOnce(RunReport& report) {
+void LevelRunner::computeOnce(RunReport& report) {
   if (parts_.once.empty()) return;
   const std::vector<std::size_t> wanted =
-      takenOf(graph_, parts_.once, joined(parts_.again, parts_.ends));
+      operandsAmong(graph_, parts_.once, joined(parts_.again, parts_.ends));
   PartGraph part = partGraph(graph_, parts_.once, {});
-  askFor(part, joined(wanted, parts_.lasting));
+  requestResults(part, joined(wanted, parts_.lasting));
   RunSettings settings = settingsFor(part);
-  settings.made = [&](std::size_t node, const Value& value) {
+  settings.onValue = [&](std::size_t node, const Value& value) {
     const std::size_t origin = part.origin[node];
     if (std::binary_search(wanted.begin(), wanted.end(), origin) ||
         std::binary_search(watched_.begin(), watched_.end(), origin))
@@ -89,13 +89,13 @@ void LevelRunner::makeOnce(RunReport& report) {
   pipeline::run(part.graph, settings, report);
 }
 
-PartGraph LevelRunner::whole() const {
+PartGraph LevelRunner::repeatedAndEnds() const {
   const std::vector<std::size_t> rest = joined(parts_.again, parts_.ends);
-  return partGraph(graph_, joined(rest, takenOf(graph_, parts_.once, rest)), once_);
+  return partGraph(graph_, joined(rest, operandsAmong(graph_, parts_.once, rest)), once_);
 }
 
 std::map<std::size_t, Value> LevelRunner::planAll(int resolution, RunReport& report) const {
-  PartGraph part = whole();
+  PartGraph part = repeatedAndEnds();
   ToleranceParts inPart;
   for (std::size_t i = 0; i < part.origin.size(); ++i)
     if (std::binary_search(parts_.chosen.begin(), parts_.chosen.end(), part.origin[i]))
@@ -108,7 +108,7 @@ std::map<std::size_t, Value> LevelRunner::planAll(int resolution, RunReport& rep
   settings.progress = {};
   settings.warn = settings.note = settings.print = [](const std::string&) {};
   std::map<std::size_t, Value> plans;
-  settings.made = [&](std::size_t node, const Value& value) {
+  settings.onValue = [&](std::size_t node, const Value& value) {
     plans.insert_or_assign(part.origin[node], value);
   };
   pipeline::run(part.graph, settings, report);
@@ -116,7 +116,7 @@ std::map<std::size_t, Value> LevelRunner::planAll(int resolution, RunReport& rep
 }
 
 void LevelRunner::planAt(double voxel, RunReport& report) const {
-  PartGraph part = whole();
+  PartGraph part = repeatedAndEnds();
   ToleranceParts inPart;
   for (std::size_t i = 0; i < part.origin.size(); ++i)
     if (std::binary_search(parts_.chosen.begin(), parts_.chosen.end(), part.origin[i]))
@@ -128,29 +128,29 @@ void LevelRunner::planAt(double voxel, RunReport& report) const {
 Level LevelRunner::runAt(double voxel, double coarsening) {
   Graph sized = graph_;
   setVoxels(sized, parts_, voxel, coarsening);
-  PartGraph part =
-      partGraph(sized, joined(parts_.again, takenOf(graph_, parts_.once, parts_.again)), once_);
-  askFor(part, watched_);
+  PartGraph part = partGraph(
+      sized, joined(parts_.again, operandsAmong(graph_, parts_.once, parts_.again)), once_);
+  requestResults(part, watched_);
   Level level;
   level.voxelSize = voxel * coarsening;
   std::map<std::size_t, Value> made;
   RunSettings settings = settingsFor(part);
   settings.measureErrors = settings_.measureErrors && coarsening == 1;
   if (coarsening != 1) settings.thumbnails = 0;
-  settings.made = [&](std::size_t node, const Value& value) {
+  settings.onValue = [&](std::size_t node, const Value& value) {
     if (std::binary_search(watched_.begin(), watched_.end(), part.origin[node]))
       made.insert_or_assign(part.origin[node], value);
   };
-  const auto keep = [&](Told::Kind kind) {
-    return [&level, kind](const std::string& text) { level.told.push_back({kind, text}); };
+  const auto collect = [&](Message::Kind kind) {
+    return [&level, kind](const std::string& text) { level.messages.push_back({kind, text}); };
   };
-  settings.print = keep(Told::Kind::Print);
-  settings.warn = keep(Told::Kind::Warn);
-  settings.note = keep(Told::Kind::Note);
+  settings.print = collect(Message::Kind::Print);
+  settings.warn = collect(Message::Kind::Warn);
+  settings.note = collect(Message::Kind::Note);
   try {
     pipeline::run(part.graph, settings, level.report);
   } catch (const levelset::NumericalError& error) {
-    // A check that a step did not pass is told once everything has run; its value is there.
+    // A failed check of a step ends the run only after all steps, so the values may exist.
     for (const std::size_t i : parts_.outputs)
       if (!made.contains(i)) throw;
     level.failure = error.what();
@@ -190,9 +190,9 @@ LevelSurface LevelRunner::surfaceOf(std::size_t output, const std::map<std::size
     level.surface = level.uniform = meshOf(value);
   } else {
     level.surface = levelset::TriangleSurface(value.mesh());
-    const Node& made_of = graph_.nodes[node];
-    if (made_of.inputs.size() == 1)
-      if (const auto before = made.find(made_of.inputs[0]);
+    const Node& maker = graph_.nodes[node];
+    if (maker.inputs.size() == 1)
+      if (const auto before = made.find(maker.inputs[0]);
           before != made.end() && before->second.kind() == Kind::Band)
         level.uniform = meshOf(before->second);
   }
@@ -216,20 +216,22 @@ std::optional<double> LevelRunner::knownError(const Level& level, std::size_t ou
   if (exact == exact_.end()) return {};
   const LevelSurface& surface = level.surfaces[output];
   levelset::SurfaceDifferenceOptions options{.spacing = surface.voxelSize};
-  if (settings_.goesOn) options.progress = [this](double) { return settings_.goesOn(); };
+  if (settings_.shouldContinue)
+    options.progress = [this](double) { return settings_.shouldContinue(); };
   return levelset::surfaceDifference(surface.surface, exact->second, options).smooth;
 }
 
 LevelDifference LevelRunner::difference(const Level& fine, const Level& coarse,
                                         std::size_t output) const {
-  // Faces must be flat as far as normals are looked at, on both sides.
+  // Faces must be flat over the distance at which crease detection reads normals, on both sides.
   constexpr double kFlatVoxels = 4;
-  // The triangles that cut off an edge, and those whose values its rounding reaches.
+  // Extent, in coarse voxels, of triangles that cut off an edge or that its rounding affects.
   constexpr double kCreaseReach = 2.5;
   const LevelSurface &near = fine.surfaces[output], &far = coarse.surfaces[output];
   levelset::SurfaceDifferenceOptions options{.spacing = near.voxelSize,
-                                             .creaseReach = kCreaseReach * far.voxelSize};
-  if (settings_.goesOn) options.progress = [this](double) { return settings_.goesOn(); };
+                                             .creaseRadius = kCreaseReach * far.voxelSize};
+  if (settings_.shouldContinue)
+    options.progress = [this](double) { return settings_.shouldContinue(); };
   const bool mayHaveCreases = hasCreases_ || near.heldEdge >= kFlatVoxels * far.voxelSize;
   if (mayHaveCreases && near.uniform.isValid() && far.uniform.isValid())
     options.creases = levelset::findCreases(near.uniform.mesh(), near.voxelSize, far.uniform.mesh(),

@@ -11,66 +11,74 @@
 
 namespace pipeline {
 
-/// A result at one voxel size, ready to be compared.
+/// Surface of a result at one voxel size, for comparison.
 struct LevelSurface {
   levelset::TriangleSurface surface = {};
-  levelset::TriangleSurface uniform = {};  ///< of the level set that a mesh was made from, if any
-  double voxelSize = 0;                    ///< of that level set, or of the result
-  double diagonal = 0;                     ///< of its bounding box
-  double heldEdge = 0;  ///< world units: how far from an edge meshes that it is made of are flat
+  levelset::TriangleSurface uniform =
+      {};                ///< surface of the level set that the mesh comes from, if any
+  double voxelSize = 0;  ///< voxel size of that level set or of the result, world units
+  double diagonal = 0;   ///< diagonal of the bounding box, world units
+  double heldEdge =
+      0;  ///< distance from an edge within which the source meshes are flat, world units
 };
 
-/// Something that a run told, kept until it is known to be the one that counts.
-struct Told {
+/// A message of a run, held back until the run is known to be the best one.
+struct Message {
   enum class Kind { Print, Warn, Note } kind = Kind::Note;
   std::string text;
 };
 
-/// One run of what is made again and again.
+/// Results of one run at one voxel size.
 struct Level {
   double voxelSize = 0;
-  std::vector<LevelSurface> surfaces;   ///< by output
-  std::map<std::size_t, Value> values;  ///< that last, by number of node
+  std::vector<LevelSurface> surfaces;   ///< one per output
+  std::map<std::size_t, Value> values;  ///< values of ToleranceParts::lasting, by node index
   RunReport report;
-  std::vector<Told> told;
-  std::string failure;   ///< a check that a step did not pass, and went on
-  double peakBytes = 0;  ///< of the resident set
-  double voxels = 0;     ///< active ones of all its steps
+  std::vector<Message> messages;
+  std::string failure;   ///< message of a failed check after which the run continued
+  double peakBytes = 0;  ///< peak resident memory, bytes
+  double voxels = 0;     ///< active voxels of all steps together
   std::size_t triangles = 0;
 };
 
-/// How far the result of `fine` is from that of `coarse`.
+/// Difference of a result between a fine and a coarse run.
 struct LevelDifference {
-  double smooth = 0, crease = 0, creaseShare = 0;  ///< as of levelset::SurfaceDifference
+  double smooth = 0, crease = 0, creaseShare = 0;  ///< as in levelset::SurfaceDifference
 };
 
-/// Runs the parts of a graph at voxel sizes, and compares what comes of it.
+/// Runs the parts of a graph at several voxel sizes and compares their results.
 class LevelRunner {
  public:
   LevelRunner(const Graph& graph, const ToleranceParts& parts, const RunSettings& settings);
 
-  /// Makes what no voxel size has a part in. Its steps go into `report`.
-  void makeOnce(RunReport& report);
-  /// Plans the whole graph with that many voxels along the longest side of each object: checks what
-  /// it will write, too. @return by node
+  /// Computes the values that are independent of voxel sizes. Appends the steps to `report`.
+  void computeOnce(RunReport& report);
+  /// Plans the complete graph with `resolution` voxels along the longest side of each object. Also
+  /// checks the files that it will write.
+  /// @return plans by node index
   [[nodiscard]] std::map<std::size_t, Value> planAll(int resolution, RunReport& report) const;
-  /// @param coarsening  of the voxels that were given
-  /// @throws as run()
+  /// Runs the graph without `ends`, at `voxel` times `coarsening`.
+  /// @param voxel       voxel size of the chosen nodes, world units
+  /// @param coarsening  factor for the given voxel sizes too
+  /// @throws levelset::Error as run()
   [[nodiscard]] Level runAt(double voxel, double coarsening);
-  /// Plans the whole graph at a voxel size.
+  /// Plans the complete graph at a voxel size. Appends the steps to `report`.
   void planAt(double voxel, RunReport& report) const;
-  /// Runs what writes, draws, prints and checks, on the values of a level.
+  /// Runs the nodes that write, draw, print and check, on the values of one run.
   void runEnds(const Level& level, RunReport& report) const;
-  /// @param output  its number among ToleranceParts::outputs
-  /// How far the result is from the mesh that it stands for, where it is a level set of a mesh, or
-  /// a mesh of that: the largest distance from each to the other, creases included. What of the
-  /// mesh is inside the solid counts too, so that it may be too large, never too small.
+  /// Measures the largest two-sided distance between a result and its source mesh, creases
+  /// included. Faces of the mesh inside the solid count too, so the figure may be too large, never
+  /// too small.
+  /// @param output  index in ToleranceParts::outputs
+  /// @return empty unless the result is a level set of a mesh, or a mesh of such a level set
   [[nodiscard]] std::optional<double> knownError(const Level& level, std::size_t output);
+  /// Compares one output of two runs.
+  /// @param output  index in ToleranceParts::outputs
   [[nodiscard]] LevelDifference difference(const Level& fine, const Level& coarse,
                                            std::size_t output) const;
 
  private:
-  [[nodiscard]] PartGraph whole() const;
+  [[nodiscard]] PartGraph repeatedAndEnds() const;
   [[nodiscard]] RunSettings settingsFor(const PartGraph& part) const;
   [[nodiscard]] LevelSurface surfaceOf(std::size_t output, const std::map<std::size_t, Value>& made,
                                        double voxel) const;
@@ -78,11 +86,12 @@ class LevelRunner {
   const Graph& graph_;
   const ToleranceParts& parts_;
   const RunSettings& settings_;
-  std::vector<std::size_t> watched_;  ///< values that are looked at: outputs, what they came from
+  std::vector<std::size_t> watched_;  ///< values to keep: outputs, their sources, `lasting`
   std::map<std::size_t, Value> once_;
-  std::vector<std::size_t> meshes_;                         ///< that level sets are made of
-  std::map<std::size_t, levelset::TriangleSurface> exact_;  ///< of those, where no voxel had a part
-  bool hasCreases_ = false;  ///< does an action make them, other than `level-set`?
+  std::vector<std::size_t> meshes_;  ///< source meshes of level sets
+  std::map<std::size_t, levelset::TriangleSurface>
+      exact_;                ///< source meshes that are independent of voxel sizes
+  bool hasCreases_ = false;  ///< an action other than `level-set` creates creases
 };
 
 }  // namespace pipeline

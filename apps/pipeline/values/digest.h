@@ -5,8 +5,8 @@
 
 namespace pipeline {
 
-/// 128 bits of a hash of the bytes (XXH3), as 32 hexadecimal digits. No defence against those who
-/// want two texts to have the same.
+/// 128-bit XXH3 hash of the bytes, as 32 hexadecimal digits. The hash is not cryptographic: equal
+/// digests of different texts can be constructed on purpose.
 [[nodiscard]] std::string digestOf(std::string_view bytes);
 
 }  // namespace pipeline

@@ -30,7 +30,7 @@ std::ifstream openHeights(const std::filesystem::path& path) {
                                       isFolder ? "is a folder" : std::strerror(errno)));
 }
 
-/// By the first byte, which no text begins with; a pipe cannot be wound back.
+/// Recognizes a PNG by its first byte, with which no text begins. A pipe cannot be rewound.
 bool isPng(std::istream& in) {
   return in.peek() == 0x89;
 }
@@ -44,7 +44,8 @@ mapping::HeightGrid fromPicture(const std::filesystem::path& path, bool invert,
   return {image.width, image.height, std::move(image.values)};
 }
 
-/// Appends the numbers of a line. @param where  for the refusal
+/// Appends the numbers of a line.
+/// @param where  prefix of the error message
 void readLine(const std::string& line, const std::string& where, std::vector<double>& numbers) {
   constexpr const char* kBetween = " \t\r,;";
   for (std::size_t at = line.find_first_not_of(kBetween); at != std::string::npos;) {
@@ -54,7 +55,7 @@ void readLine(const std::string& line, const std::string& where, std::vector<dou
     const auto [stop, error] = std::from_chars(first, last, number);
     if (error != std::errc() || stop != last || !std::isfinite(number)) {
       throw InvalidInput(
-          fmt::format("{}: '{}' is no finite number; give a grey PNG or lines of "
+          fmt::format("{}: '{}' is not a finite number; give a grey PNG or lines of "
                       "numbers",
                       where, line.substr(at, std::min<std::size_t>(end - at, 40))));
     }
@@ -76,10 +77,10 @@ mapping::HeightGrid fromNumbers(std::istream& in, const std::string& name, bool 
     const auto count = static_cast<int>(grid.heights.size() - before);
     if (count == 0) continue;
     if (grid.rows > 0 && count != grid.columns) {
-      throw InvalidInput(
-          fmt::format("{}: it has {} numbers, the lines before have {}; give as "
-                      "many in each",
-                      where, count, grid.columns));
+      throw InvalidInput(fmt::format(
+          "{}: the line has {} numbers, but earlier lines have {}; give equally many in "
+          "each line",
+          where, count, grid.columns));
     }
     grid.columns = count;
     ++grid.rows;

@@ -7,11 +7,14 @@
 
 namespace pipeline {
 
-/// Heights from a file: a grey PNG, black 0 and white 1, what is transparent as much nearer to the
-/// ground; or lines of numbers with blanks, commas or semicolons between them, the least 0 and the
-/// largest 1. The first row has the largest y.
-/// @param invert  white, or the largest number, becomes the ground
-/// @throws IoError, InvalidInput, ResourceLimit, telling the line of what cannot be used
+/// Reads heights from a grey PNG or from lines of numbers. In a PNG, black is 0 and white is 1, and
+/// the alpha channel scales the height. Numbers are separated by blanks, commas or semicolons; the
+/// smallest becomes 0 and the largest 1. The first row has the largest y.
+/// @param invert  white, or the largest number, becomes 0
+/// @param maxMemory  limit for the heights, bytes
+/// @throws IoError if the file cannot be read
+/// @throws InvalidInput if a line is not usable; names the line
+/// @throws ResourceLimit if the heights exceed the limit
 [[nodiscard]] mapping::HeightGrid readHeights(const std::filesystem::path& path, bool invert,
                                               std::size_t maxMemory);
 

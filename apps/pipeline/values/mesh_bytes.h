@@ -6,9 +6,11 @@
 
 namespace pipeline {
 
-/// A mesh bit for bit, with a checksum, for this machine and this program.
+/// Writes a mesh bit for bit, with a checksum. Only the same program on the same machine type can
+/// read it.
 [[nodiscard]] std::string bytesOf(const levelset::TriMesh& mesh);
-/// @return false for what is no such bytes, or damaged: the mesh is not whole then
+/// Reads the bytes of bytesOf().
+/// @return false if the bytes are damaged or have another format; `mesh` is then incomplete
 [[nodiscard]] bool readMeshBytes(const std::string& bytes, levelset::TriMesh& mesh);
 
 }  // namespace pipeline

@@ -7,7 +7,7 @@ namespace pipeline {
 
 std::string sentenceOf(const std::string& who, std::string sentence) {
   if (sentence.starts_with(who + ":")) return sentence;
-  // Whoever reads or writes for an action is no action that the user knows of.
+  // These prefixes name internal functions, not an action that the user wrote.
   for (const std::string helper : {"read: ", "write: ", "levelsmith: "}) {
     if (!sentence.starts_with(helper)) continue;
     sentence.erase(0, helper.size());
@@ -16,19 +16,19 @@ std::string sentenceOf(const std::string& who, std::string sentence) {
   return who + ": " + sentence;
 }
 
-bool isWantOfThreads(const std::exception& error) {
+bool isThreadLimitError(const std::exception& error) {
   const auto* system = dynamic_cast<const std::system_error*>(&error);
   if (system) return system->code() == std::errc::resource_unavailable_try_again;
   return std::string_view(error.what()).starts_with("pthread_create");
 }
 
-std::string withPlace(const std::string& sentence, const std::string& place) {
-  return place.empty() ? sentence : sentence + " (" + place + ")";
+std::string withLocation(const std::string& sentence, const std::string& location) {
+  return location.empty() ? sentence : sentence + " (" + location + ")";
 }
 
-void refuseAs(const std::string& who, const levelset::Error& error, const std::string& place) {
+void rethrowAs(const std::string& who, const levelset::Error& error, const std::string& location) {
   using levelset::ExitCode;
-  const std::string sentence = withPlace(sentenceOf(who, error.what()), place);
+  const std::string sentence = withLocation(sentenceOf(who, error.what()), location);
   switch (error.exitCode()) {
     case ExitCode::Usage:
       throw levelset::UsageError(sentence);

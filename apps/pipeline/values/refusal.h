@@ -7,21 +7,21 @@
 
 namespace pipeline {
 
-/// Is it what std::thread or TBB throws when the system gives no more threads?
-[[nodiscard]] bool isWantOfThreads(const std::exception& error);
-/// What to tell then, after the name of who wanted them.
-inline constexpr const char* kWantOfThreads =
+/// Decides if std::thread or TBB threw `error` because the system gives no more threads.
+[[nodiscard]] bool isThreadLimitError(const std::exception& error);
+/// Error message for that case, appended to the name of the action or program.
+inline constexpr const char* kThreadLimitMessage =
     ": the system gives no more threads; raise its limits (ulimit -u, -v), or use fewer --threads";
 
-/// `sentence` as one of `who`: "union: operand 1 …" is that already, "read: 'x.ply' is empty" of a
-/// reader deeper down becomes "info: 'x.ply' is empty".
+/// Adds the prefix "who: " to a message. Keeps a message that already does. Replaces the prefix of
+/// an internal reader or writer: "read: 'x.ply' is empty" becomes "info: 'x.ply' is empty".
 [[nodiscard]] std::string sentenceOf(const std::string& who, std::string sentence);
 
-/// `sentence`, and where in a script that was; as it is for an empty place.
-[[nodiscard]] std::string withPlace(const std::string& sentence, const std::string& place);
+/// Appends a position in a script to a message; appends nothing if the position is empty.
+[[nodiscard]] std::string withLocation(const std::string& sentence, const std::string& location);
 
-/// A refusal from deeper down, told as one of what the user wrote: an action, or an option.
-[[noreturn]] void refuseAs(const std::string& who, const levelset::Error& error,
-                           const std::string& place = {});
+/// Rethrows an error under the name of the action or option that the user wrote. Keeps its class.
+[[noreturn]] void rethrowAs(const std::string& who, const levelset::Error& error,
+                            const std::string& location = {});
 
 }  // namespace pipeline

@@ -25,9 +25,9 @@ std::string textOf(std::istream& in, const std::string& name, const std::string&
     in.read(block.data(), static_cast<std::streamsize>(block.size()));
     text.append(block.data(), static_cast<std::size_t>(in.gcount()));
     if (text.size() > mostBytes)
-      throw levelset::InvalidInput(fmt::format(
-          "{}: '{}' is longer than {} MB, and nothing of the kind is; name another file", who, name,
-          mostBytes >> 20));
+      throw levelset::InvalidInput(
+          fmt::format("{}: '{}' is longer than {} MB, the limit for such files; use another file",
+                      who, name, mostBytes >> 20));
   }
   return text;
 }
@@ -40,11 +40,11 @@ std::string readText(const std::filesystem::path& file, const std::string& who,
   std::error_code error;
   if (std::filesystem::is_directory(file, error))
     throw levelset::IoError(
-        fmt::format("{}: '{}' is a directory; name a file", who, file.string()));
+        fmt::format("{}: '{}' is a directory; give a file", who, file.string()));
   std::ifstream in(file, std::ios::binary);
   if (!in) {
     throw levelset::IoError(
-        fmt::format("{}: '{}' cannot be read: {}; check the name and its permissions", who,
+        fmt::format("{}: cannot read '{}': {}; check the path and the permissions", who,
                     file.string(), std::strerror(errno)));
   }
   return textOf(in, file.string(), who, mostBytes);
@@ -57,11 +57,11 @@ void writeText(const std::filesystem::path& file, const std::string& text, const
     if (!out) throw levelset::IoError(fmt::format("cannot write '{}'", file.string()));
     const bool whole = std::fwrite(text.data(), 1, text.size(), out) == text.size();
     if (std::fclose(out) != 0 || !whole)
-      throw levelset::IoError(
-          fmt::format("'{}' cannot be written to the end; is the disk full?", file.string()));
+      throw levelset::IoError(fmt::format(
+          "writing '{}' failed before its end; check the free disk space", file.string()));
     target.commit();
   } catch (const levelset::Error& failure) {
-    refuseAs(who, failure);
+    rethrowAs(who, failure);
   }
 }
 

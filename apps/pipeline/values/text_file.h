@@ -6,13 +6,16 @@
 
 namespace pipeline {
 
-/// A file as it is. @param file  or "-" for standard input
-/// @param who  begins what is said when it cannot be read: an action or an option
-/// @throws levelset::IoError when it cannot be read; levelset::InvalidInput for more than mostBytes
+/// Reads a complete file.
+/// @param file  path, or "-" for standard input
+/// @param who   action or option that begins each error message
+/// @throws levelset::IoError if the file cannot be read
+/// @throws levelset::InvalidInput if the file is longer than `mostBytes`
 [[nodiscard]] std::string readText(const std::filesystem::path& file, const std::string& who,
                                    std::size_t mostBytes);
 
-/// Whole, or not at all. @throws levelset::IoError
+/// Writes a file completely. On failure the old file stays unchanged.
+/// @throws levelset::IoError
 void writeText(const std::filesystem::path& file, const std::string& text, const std::string& who);
 
 }  // namespace pipeline

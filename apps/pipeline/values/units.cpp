@@ -31,7 +31,7 @@ std::vector<std::string_view> words(std::string_view text) {
   return parts;
 }
 
-/// Reads the number at the start of `text` and returns what follows it.
+/// Reads the number at the start of `text` and returns the rest of the text.
 std::string_view leadingNumber(std::string_view text, double& number, std::string_view where) {
   std::string_view digits = text;
   if (digits.starts_with('+')) digits.remove_prefix(1);
@@ -73,7 +73,8 @@ long parseInteger(std::string_view text, std::string_view where) {
   long number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc() || end != text.data() + text.size()) {
-    throw UsageError(fmt::format("{}: '{}' is not a whole number", where, text));
+    throw UsageError(
+        fmt::format("{}: '{}' is not a whole number; write it like 3 or -2", where, text));
   }
   return number;
 }
@@ -134,7 +135,7 @@ std::pair<int, int> parseImageSize(std::string_view text, std::string_view where
   const long width = parseInteger(parts[0], where), height = parseInteger(parts[1], where);
   if (width < 1 || height < 1) {
     throw UsageError(
-        fmt::format("{}: an image of {} pixels has nothing to show; both sides must be at "
+        fmt::format("{}: an image of {} pixels is empty; both sides must be at "
                     "least 1",
                     where, text));
   }
@@ -173,7 +174,8 @@ std::size_t parseBytes(std::string_view text, std::string_view where) {
   }
   const double bytes = number * factor;
   if (!(bytes >= 1) || bytes > 1e18) {
-    throw UsageError(fmt::format("{}: '{}' is not a usable amount of memory", where, text));
+    throw UsageError(fmt::format(
+        "{}: '{}' is not a possible amount of memory; write it like 4G or 512M", where, text));
   }
   return static_cast<std::size_t>(bytes);
 }
@@ -204,7 +206,7 @@ Imath::M44d parseMatrix(std::string_view text, std::string_view where) {
   if (matrix[0][3] != 0 || matrix[1][3] != 0 || matrix[2][3] != 0 || matrix[3][3] != 1) {
     throw UsageError(
         fmt::format("{}: the last column must be 0 0 0 1; points are row vectors and the "
-                    "translation stands in the last row",
+                    "translation is the last row",
                     where));
   }
   return matrix;

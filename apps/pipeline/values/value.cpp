@@ -33,7 +33,7 @@ double Plan::activeVoxels() const {
   if (!(voxelSize > 0)) return 0;
   const double layer = area / (voxelSize * voxelSize) * 2 * halfWidth;
   if (bounds.isEmpty()) return layer;
-  // However much surface there is, no grid point counts twice.
+  // The band cannot have more voxels than its bounding box.
   double all = 1;
   for (int axis = 0; axis < 3; ++axis)
     all *= (bounds.max[axis] - bounds.min[axis]) / voxelSize + 2 * halfWidth + 1;
@@ -42,9 +42,9 @@ double Plan::activeVoxels() const {
 
 double Plan::bytes() const {
   if (kind == Kind::Field) return fieldBytes;
-  // Of corners, and of a place for each two triangles.
+  // Three vertex indices for each triangle, and one position for every two triangles.
   if (kind == Kind::Mesh) return (3 * sizeof(std::uint32_t) + sizeof(Imath::V3d) / 2.0) * triangles;
-  // A band fills about a third of its leaf blocks: 12 bytes for each active voxel, as measured.
+  // Measured: a band fills about a third of its leaf blocks, so an active voxel takes 12 bytes.
   constexpr double kBytesPerVoxel = 12;
   return kBytesPerVoxel * activeVoxels();
 }
@@ -78,7 +78,7 @@ template <typename T>
 const T& Value::as(Kind wanted) const {
   if (const T* value = std::get_if<T>(&data_)) return *value;
   throw levelset::UsageError(
-      fmt::format("levelsmith: a {} stands where a {} is needed; choose "
+      fmt::format("levelsmith: the value is a {}, but a {} is needed; choose "
                   "another operand, or another grid of the file",
                   kindName(kind()), kindName(wanted)));
 }
@@ -147,7 +147,7 @@ render::ViewedScene sceneOf(const Value& drawn) {
   render::ViewedScene viewed;
   if (drawn.kind() == Kind::Scene)
     viewed = drawn.scene();
-  else if (drawn.kind() == Kind::Mesh)  // the value's own
+  else if (drawn.kind() == Kind::Mesh)  // refers to the mesh of the value
     viewed.scene.meshes.push_back(
         {std::shared_ptr<const TriMesh>(std::shared_ptr<const void>(), &drawn.mesh())});
   else

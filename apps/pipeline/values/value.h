@@ -24,56 +24,61 @@ enum class Kind {
   Band,
   Patch,
   Field,
-  Surface,  ///< a band about an open surface: a base for patches
+  Surface,  ///< a band around an open surface: a base for patches
   Scene
 };
 [[nodiscard]] const char* kindName(Kind kind);
 
-/// What is known of a value before it is computed: enough to resolve lengths and estimate cost.
+/// Predicted properties of a value, known before it is computed. They suffice to resolve lengths
+/// and to estimate cost.
 struct Plan {
   Kind kind = Kind::Band;
-  Imath::Box3d bounds = {};  ///< of the zero set or the vertices, world units
-  double area = 0;           ///< of the surface, world units²
-  double voxelSize = 0;      ///< bands only, of solids or surfaces
+  Imath::Box3d bounds = {};  ///< bounds of the zero set or of the vertices, world units
+  double area = 0;           ///< surface area, world units²
+  double voxelSize = 0;      ///< bands of solids and surfaces only, world units
   double halfWidth = 0;      ///< voxels, bands only
   double fieldBytes = 0;     ///< fields only
-  double triangles = 0;      ///< meshes only; 0: not known
-  /// Patches only: along u, along v, and the height, 0 where only the texture will tell.
+  double triangles = 0;      ///< meshes only; 0: unknown
+  /// Patches only: size along u, size along v and height, world units. Height 0: the texture will
+  /// determine it.
   Imath::V3d patchSize = Imath::V3d(0);
   double patchCount = 1;
-  /// Active voxels that a band of this area takes.
+  /// Estimated number of active voxels of a band with this area.
   [[nodiscard]] double activeVoxels() const;
+  /// Estimated memory of the value, bytes.
   [[nodiscard]] double bytes() const;
 };
 
-/// How patches were made, for whoever makes them again on another base or in another place.
+/// Description of how patches were built, to rebuild them on another base or at another position.
 struct PatchRecipe {
-  /// What of them is to be carried, and how to make them there.
+  /// Extracts the outlines that are carried to another base.
   std::function<std::vector<mapping::PatchOutline>(const std::vector<mapping::Patch>&)> outlines =
       {};
+  /// Builds patches from carried outlines.
   mapping::PatchMaker make = {};
-  /// In place of the two: of patches that an axis tells, which stay about it.
+  /// Replaces `outlines` and `make` for patches around a fixed axis.
   std::function<std::vector<mapping::Patch>(const levelset::NarrowBand& base, double height,
                                             const levelset::Progress& progress)>
       around = {};
-  bool isRigid = false;    ///< centre and direction tell all of it, as of a decal
-  std::string fixed = {};  ///< why it cannot be moved; empty: it can
+  bool isRigid = false;    ///< centre and direction determine the patch, as for a decal
+  std::string fixed = {};  ///< reason why the patch cannot be moved; empty: it can
   std::string action = {};
-  /// Its options but for the place and the height, as far as they shape the patch, and as far as
-  /// they only tell how finely it is made.
+  /// Options without position and height: `shape` determines the geometry, `fineness` only its
+  /// resolution.
   std::map<std::string, std::string> shape = {}, fineness = {};
 };
 
-/// One patch or many of one base.
+/// One or several patches on one base.
 struct PatchValue {
   std::vector<mapping::Patch> patches;
-  /// With `--height auto`: makes them once the texture has told the height. Empty otherwise.
+  /// Builds the patches for a given height. Set only with `--height auto`, where the texture
+  /// determines the height.
   std::function<std::vector<mapping::Patch>(double height, const levelset::Progress&)> atHeight =
       {};
-  std::shared_ptr<const PatchRecipe> recipe = {};  ///< of those from files: none
+  std::shared_ptr<const PatchRecipe> recipe = {};  ///< null for patches from files
 };
 
-/// What flows through a chain: immutable, cheap to copy. In a dry run only the plan is there.
+/// A value of a chain: immutable and cheap to copy. In a dry run it contains only a plan.
 class Value {
  public:
   explicit Value(levelset::TriMesh mesh);
@@ -84,16 +89,18 @@ class Value {
   explicit Value(Plan plan);
 
   [[nodiscard]] Kind kind() const;
-  // The value as that kind. A file may turn out to hold another kind than its name promised.
-  // @throws levelset::UsageError when it is of another kind
+  // These return the value as the given kind. A file may contain another kind than its name
+  // suggests.
+  // @throws levelset::UsageError if the value is of another kind
   [[nodiscard]] const levelset::TriMesh& mesh() const;
   [[nodiscard]] const levelset::NarrowBand& band() const;
   [[nodiscard]] const PatchValue& patch() const;
   [[nodiscard]] const levelset::FieldGrid& field() const;
   [[nodiscard]] const render::ViewedScene& scene() const;
 
-  /// Known, or read off the value and remembered.
+  /// Returns the plan. Computes it from the value on the first call.
   [[nodiscard]] const Plan& plan() const;
+  /// Diagonal of the bounding box, world units; 0 if the box is empty.
   [[nodiscard]] double diagonal() const {
     return plan().bounds.isEmpty() ? 0 : plan().bounds.size().length();
   }
@@ -109,7 +116,7 @@ class Value {
   mutable std::optional<Plan> plan_;
 };
 
-/// A level set, a mesh or a scene as what is drawn of it. Not beyond the value's life.
+/// Builds a scene that shows a level set, a mesh or a scene. The value must outlive the result.
 [[nodiscard]] render::ViewedScene sceneOf(const Value& drawn);
 
 }  // namespace pipeline

@@ -5,10 +5,10 @@
     part = ls.box(size=(4, 4, 2), voxel=0.1) - ls.cylinder(radius=1, height=3, voxel=0.1)
     part.mesh().save("part.ply")
 
-Values are lazy: a call makes a node of a graph, and what is needed is computed once a result is
-asked for, by `save`, `render`, `measure`, `array`, `vertices` or `compute`. The operators are those
-of the command line; `help(ls.offset)` explains one. Lengths are world units (0.5), voxels ("2vx") or
-a share of the first operand's diagonal ("1%"). Solids are where distances are negative.
+Values are lazy: a call adds a node to a graph. Nodes are computed when a result is requested, by
+`save`, `render`, `measure`, `array`, `vertices` or `compute`. The operators are those of the command
+line; `help(ls.offset)` explains one. Lengths are world units (0.5), voxels ("2vx") or a percentage
+of the first operand's diagonal ("1%"). Distances are negative inside a solid.
 """
 
 from ._core import (

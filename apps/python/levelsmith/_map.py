@@ -1,4 +1,4 @@
-"""One graph over many parameters, here or on the workers of a Dask cluster."""
+"""Runs one graph with many parameter sets, in this process or on the workers of a Dask cluster."""
 
 import collections
 import hashlib
@@ -12,7 +12,7 @@ import numpy
 
 from . import _core, _values
 
-# Of a pipeline's options of the run, those that a job follows, and those that only tell people.
+# Global options of a pipeline that jobs use, and those that only concern output for the user.
 FOLLOWED = {"cache", "report", "max-memory", "verbose"}
 IGNORED = {"quiet", "progress", "threads"}
 
@@ -21,16 +21,16 @@ def map(graph, parameters, client=None, *, cache=None):
     """Run a graph once for each set of parameters. Returns the results, in their order.
 
     graph: a pipeline with ${variables}, as a text of several lines or as a file (.pipeline, or a
-        graph as .json, in whose options they may stand); or a function of the parameters that
-        returns values, or anything else that can be pickled, also in lists, tuples and dictionaries.
-    parameters: dictionaries, whose keys are the variables of a pipeline or the arguments of a function.
-    client: a dask.distributed.Client, whose workers run the jobs; None: this process, one by one.
-        The job of a worker that dies is run again by another one.
-    cache: a folder that keeps results, for all jobs; None: that of set_cache().
+        graph as .json with variables in its options). Or a function of the parameters that returns
+        values, or other objects that can be pickled, also in lists, tuples and dictionaries.
+    parameters: dictionaries; keys are variables of the pipeline, or arguments of the function.
+    client: a dask.distributed.Client whose workers run the jobs; None: this process, one by one.
+        If a worker dies, another one runs its job again.
+    cache: cache folder of all jobs; None: that of set_cache().
 
-    A pipeline's result is its report, with what it printed under "printed"; its files are those of the
-    caller's folder. Pipelines are all checked before the first one runs. What is refused is raised as
-    here, with the parameters named: of several, the first in order.
+    The result of a pipeline is its report, with the printed text under "printed". File names are
+    relative to the caller's folder. All pipelines are checked before the first one runs. Errors are
+    raised in this process and name the parameters; of several errors, the first in order is raised.
     """
     sets = _sets(parameters)
     folder = os.path.abspath(cache) if cache else _values.cache_folder()
@@ -38,12 +38,12 @@ def map(graph, parameters, client=None, *, cache=None):
     outcomes = _here(jobs, folder) if client is None else _there(jobs, folder, client)
     results = []
     for number, outcome in enumerate(outcomes):
-        result, told, error = outcome
+        result, messages, error = outcome
         about = _about(number, sets[number])
-        for text in told:
+        for text in messages:
             warnings.warn(f"{text} ({about})", _values.Warning, stacklevel=2)
         if error is not None:
-            outcomes.close()  # the other jobs are not waited for
+            outcomes.close()  # do not wait for the other jobs
             raise _named(error, about)
         results.append(result)
     return results
@@ -80,7 +80,7 @@ def _named(error, about):
 
 
 class _Function:
-    """A call."""
+    """A function call with its parameters."""
 
     def __init__(self, function, parameters):
         self.function, self.parameters = function, parameters
@@ -92,7 +92,7 @@ class _Function:
             kind = type(value).__name__
             if kind not in ("Solid", "Mesh", "Field"):
                 raise _core.UsageError(
-                    f"map: the function returns a {kind}, which stays in its process; return what is made with it"
+                    f"map: the function returns a {kind}, which cannot leave its process; return values computed from it"
                 )
         if values:
             _values.run([value._node for value in values])
@@ -117,7 +117,7 @@ def _functions(function, sets):
 
 
 class _Pipeline:
-    """A pipeline with the values of its variables: a graph, checked, and absolute names of files."""
+    """A pipeline with values for its variables: a checked graph with absolute file names."""
 
     def __init__(self, text, name, settings, folder):
         if name.lower().endswith(".json"):
@@ -125,7 +125,7 @@ class _Pipeline:
         self.graph, self.places, self.options = _core.job(text, name, settings, folder)
         for option in self.options:
             if option not in FOLLOWED | IGNORED:
-                raise _core.UsageError(f"map: --{option} is nothing that jobs follow; leave it out of '{name}'")
+                raise _core.UsageError(f"map: jobs do not support --{option}; remove it from '{name}'")
 
     def run(self, job):
         outcome = _core.run_job(self.graph, self.places, self.options, job.cache)
@@ -152,7 +152,7 @@ def _pipelines(graph, sets):
                 text = file.read()
         except OSError as error:
             raise _core.FileError(
-                f"map: '{name}' cannot be read: {error.strerror}; give a file, or a pipeline of several lines"
+                f"map: '{name}' cannot be read: {error.strerror}; give a file name, or the text of a pipeline in several lines"
             ) from None
     folder = os.getcwd()
     jobs = []
@@ -167,7 +167,7 @@ def _pipelines(graph, sets):
 
 
 def _text(value, where):
-    """A value as one would write it."""
+    """Text of a value in a pipeline."""
     if isinstance(value, (str, os.PathLike)):
         return os.fspath(value)
     if isinstance(value, numpy.ndarray) and value.ndim == 0:
@@ -182,16 +182,16 @@ def _text(value, where):
     if isinstance(value, (list, tuple, numpy.ndarray)):
         rows = any(isinstance(item, (list, tuple, numpy.ndarray)) for item in value)
         return (" " if rows else ",").join(_text(item, where) for item in value)
-    raise _core.UsageError(f"{where}: a value of type {type(value).__name__} cannot stand in a pipeline")
+    raise _core.UsageError(f"{where}: a value of type {type(value).__name__} is not supported in a pipeline")
 
 
 def _filled(text, name, settings):
-    """A graph in whose options variables were replaced."""
+    """Replaces the variables in the options of a graph."""
     try:
         graph = json.loads(text)
         options = [node["options"] for node in graph["nodes"] if "options" in node]
     except (ValueError, TypeError, KeyError):
-        return text  # the reader of graphs says what is wrong with it
+        return text  # the reader of graphs reports the error
     found = set()
 
     def value_of(match):
@@ -207,8 +207,8 @@ def _filled(text, name, settings):
                 each[option] = re.sub(r"\$\{([^}]*)\}", value_of, value)
     for variable in settings:
         if variable not in found:
-            known = f"it has {', '.join(sorted(found))}" if found else "it has none"
-            raise _core.UsageError(f"map: no variable of '{name}' takes '{variable}'; {known}")
+            known = f"its variables are {', '.join(sorted(found))}" if found else "it has no variables"
+            raise _core.UsageError(f"map: '{name}' has no variable '{variable}'; {known}")
     return json.dumps(graph)
 
 
@@ -216,9 +216,9 @@ def _run(job, folder):
     """Returns (result, warnings, exception or None)."""
     with _values.Job(folder) as context:
         try:
-            return job.run(context), context.told, None
+            return job.run(context), context.messages, None
         except Exception as error:
-            return None, context.told, error
+            return None, context.messages, error
 
 
 def _here(jobs, folder):
@@ -227,23 +227,23 @@ def _here(jobs, folder):
 
 
 def _on_worker(job, folder, processes):
-    """What a worker does."""
+    """Runs a job on a worker."""
     from distributed import get_worker
 
     worker = get_worker()
     host = worker.address.rpartition(":")[0]
     if host in processes:
-        # The processes of a machine share its cores; results do not depend on it.
+        # The processes of a machine share its cores. Results do not depend on the number of threads.
         _values.share_machine(processes[host], _memory_of(worker))
-    result, told, error = _run(job, folder)
+    result, messages, error = _run(job, folder)
     if error is not None:
-        error._told = told  # goes with it
+        error._messages = messages  # sent with the exception
         raise error
-    return result, told
+    return result, messages
 
 
 def _memory_of(worker):
-    """Bytes from which on Dask pauses it."""
+    """Memory use, in bytes, at which Dask pauses the worker."""
     limit = getattr(getattr(worker, "memory_manager", None), "memory_limit", None)
     return int(0.8 * limit) if limit else 0
 
@@ -261,7 +261,7 @@ def _there(jobs, folder, client):
         address.rpartition(":")[0] for address in addresses if not address.startswith("inproc:")
     )
     keys = [f"levelsmith-{hashlib.sha256(f'{job.key()} {folder}'.encode()).hexdigest()}" for job in jobs]
-    once = dict(zip(keys, jobs))  # equal jobs are one
+    once = dict(zip(keys, jobs))  # equal jobs run once
     futures = dict(
         zip(once, client.map(_on_worker, list(once.values()), key=list(once), folder=folder, processes=dict(processes)))
     )
@@ -271,11 +271,11 @@ def _there(jobs, folder, client):
                 yield (*futures[key].result(), None)
             except KilledWorker:
                 yield None, [], _core.ResourceError(
-                    "map: every worker that took this job died, perhaps for want of memory; use larger voxels, "
+                    "map: every worker that took this job died, perhaps because memory ran out; use larger voxels, "
                     "or fewer workers with more memory each"
                 )
             except Exception as error:
-                yield None, getattr(error, "_told", []), error
+                yield None, getattr(error, "_messages", []), error
     finally:
         for future in futures.values():
-            future.release()  # nobody waits for the rest
+            future.release()  # cancel the remaining jobs

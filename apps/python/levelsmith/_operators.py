@@ -1,4 +1,4 @@
-"""Functions and methods, made from the registry of operators."""
+"""Functions and methods, generated from the registry of operators."""
 
 import inspect
 import json
@@ -16,7 +16,7 @@ def python_name(operator):
 
 
 def default_of(param):
-    """A default as Python would write it."""
+    """Default of a parameter, as a Python value."""
     text = param["default"]
     if not text:
         return False if param["hint"] == "bool" else None
@@ -31,12 +31,12 @@ def default_of(param):
 
 
 def hidden(param):
-    """Figures come back as a dictionary in any case."""
+    """True for --json: measured values are always returned as a dictionary."""
     return param["name"] == "json"
 
 
 def operand_names(operator):
-    """One for each operand: solid, mesh, patch, …; numbered where a kind comes again."""
+    """Names of the operands: solid, mesh, patch, …; numbered where a kind occurs twice."""
     kinds = [kinds[0].lower() for kinds in operator["operands"]]
     count = {kind: kinds.count(kind) for kind in kinds}
     return [
@@ -72,7 +72,7 @@ def signature_of(operator):
 FORMS = {
     "bool": "True or False",
     "float": "number",
-    "int": "whole number",
+    "int": "integer",
     "str": "text",
     "Text": "text",
     "Length": "length",
@@ -98,7 +98,7 @@ def form_of(param):
 
 
 def in_python(text):
-    """Options as Python has them."""
+    """Replaces names of options by those of Python parameters."""
     return re.sub(r"--([a-z][a-z0-9-]*)", lambda m: m[1].replace("-", "_"), text)
 
 
@@ -110,9 +110,9 @@ def doc_of(operator):
     if params:
         lines += [""]
     for param in params:
-        needed = ", needed" if param["required"] else ""
-        told = f"  {param['name']}: {in_python(param['doc'])} ({form_of(param)}{needed})"
-        lines += textwrap.wrap(told, 96, subsequent_indent="      ")
+        needed = ", required" if param["required"] else ""
+        line = f"  {param['name']}: {in_python(param['doc'])} ({form_of(param)}{needed})"
+        lines += textwrap.wrap(line, 96, subsequent_indent="      ")
     if operator["example"]:
         lines += ["", "On the command line:", "  " + operator["example"]]
     return "\n".join(lines)
@@ -123,7 +123,7 @@ def figures_of(printed):
 
 
 def make(number, operator):
-    """The function of an operator."""
+    """Creates the function of an operator."""
     node, wrap, run = _core.node, _values.wrap, _values.run
     if operator["result"]:
 

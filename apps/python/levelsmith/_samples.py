@@ -1,4 +1,4 @@
-"""From arrays and functions to solids."""
+"""Converts arrays and functions to solids."""
 
 import numpy
 
@@ -22,13 +22,13 @@ def _require(voxel, action):
 def _point(point, name, action):
     point = numpy.asarray(point, dtype=float)
     if point.shape != (3,) or not numpy.isfinite(point).all():
-        raise _core.UsageError(f"{action}: {name} is no point; give three finite numbers")
+        raise _core.UsageError(f"{action}: {name} is not a point; give three finite numbers")
     return point
 
 
 def _solid(origin, voxel, blocks, values, inside, half_width, action):
     if not (values < 0).any():
-        _refuse("nothing is inside; distances are negative there", action)
+        _refuse("no value is negative; distances must be negative inside", action)
     raw = _values.wrap(
         _core.samples(
             tuple(float(x) for x in origin),
@@ -43,7 +43,7 @@ def _solid(origin, voxel, blocks, values, inside, half_width, action):
 
 
 def _mixed(signs, axes):
-    """Does a sign change over blocks, or between them and a neighbour?"""
+    """Blocks in which the sign changes, or between which and a neighbour it changes."""
     low, high = signs.min(axis=axes), signs.max(axis=axes)
     mixed = low != high
     for axis in range(3):
@@ -55,7 +55,7 @@ def _mixed(signs, axes):
 
 
 def _dilated(mask):
-    """With the neighbours of blocks, those over edges and corners among them."""
+    """Adds the neighbours of blocks, over faces, edges and corners."""
     for axis in range(3):
         near = mask.copy()
         a, b = _sides(axis)
@@ -68,9 +68,9 @@ def _dilated(mask):
 def from_array(phi, voxel, origin=(0, 0, 0), half_width=3):
     """A solid from an array of signed distances, negative inside.
 
-    phi[i, j, k] is the value at origin + voxel * (i, j, k). Only signs and the values beside the
-    surface are read, and distances are made again from them; the array must hold the whole solid,
-    with positive values all around.
+    phi[i, j, k] is the value at origin + voxel * (i, j, k). Only the signs and the values next to the
+    surface are read; distances are computed from these. The array must contain the entire solid,
+    with positive values on its border.
     """
     action = "from_array"
     voxel, origin = _require(voxel, action), _point(origin, "the origin", action)
@@ -85,8 +85,8 @@ def from_array(phi, voxel, origin=(0, 0, 0), half_width=3):
         for end in (0, -1):
             if (phi.take(end, axis) < 0).any():
                 _refuse(
-                    f"the solid reaches the {'end' if end else 'start'} of axis {axis}; "
-                    "give a larger array, positive all around",
+                    f"the solid touches the {'end' if end else 'start'} of axis {axis}; "
+                    "give a larger array with positive values on its border",
                     action,
                 )
     padded, before = _padded(phi.astype(numpy.float32))
@@ -100,9 +100,10 @@ def from_array(phi, voxel, origin=(0, 0, 0), half_width=3):
 
 
 def _padded(phi):
-    """To whole blocks, and with room where the surface is near the border. Returns also how many came before.
+    """Pads to complete blocks, and further where the surface is near the border.
 
-    Beyond the array it goes on with its slope, and does not fall.
+    Returns the padded array and the number of points added in front, by axis. The padding
+    continues the slope at the border, but does not decrease.
     """
     def room(axis, layers):
         return HALF if (phi.take(layers, axis, mode="clip") < 0).any() else 0
@@ -114,7 +115,7 @@ def _padded(phi):
 
 
 class _Sampler:
-    """A function at grid points, in calls of bounded size."""
+    """Evaluates a function at grid points, in calls of bounded size."""
 
     CALL = 1 << 18
 
@@ -122,7 +123,7 @@ class _Sampler:
         self.function, self.origin, self.voxel = function, origin, voxel
 
     def at(self, index):
-        """index: (n, 3) of whole numbers."""
+        """Values at grid points. index: (n, 3) integers."""
         values = numpy.empty(len(index), numpy.float64)
         for start in range(0, len(index), self.CALL):
             part = index[start : start + self.CALL]
@@ -149,34 +150,35 @@ class _Sampler:
 def from_function(f, bounds, voxel, half_width=3):
     """A solid from a function of points, negative inside, that need not be a distance.
 
-    f takes an (n, 3) array of world points and returns (n,) numbers. bounds are two points between
-    which the whole solid lies. f is asked at every fourth grid point, at all grid points where its
-    sign changes or may change by how fast it varies there, and on along the surface. A part of the
-    solid is missed only where it lies between those grid points and f does not tell of it.
+    f takes an (n, 3) array of world points and returns (n,) numbers. bounds are two points; the box
+    between them contains the entire solid. f is evaluated at every fourth grid point. It is evaluated
+    at all grid points of a block where its sign changes, or where its slope suggests a sign change,
+    and then along the surface. A part of the solid is missed only if it lies between the coarse
+    points and the values and slopes there do not indicate it.
     """
     action = "from_function"
     voxel = _require(voxel, action)
     if numpy.shape(bounds) != (2, 3):
-        raise _core.UsageError(f"{action}: bounds are two points, ((x, y, z), (x, y, z))")
+        raise _core.UsageError(f"{action}: bounds needs two points, ((x, y, z), (x, y, z))")
     low, high = (_point(bounds[i], "a bound", action) for i in (0, 1))
     if not (low < high).all():
         raise _core.UsageError(f"{action}: the first bound must be below the second on every axis")
     count = numpy.ceil((high - low) / (voxel * SIDE) + 1e-9)
     if numpy.prod(2 * count + 1) > MOST_COARSE:
-        raise _core.ResourceError(f"{action}: the bounds hold too many voxels; use larger ones")
+        raise _core.ResourceError(f"{action}: the bounds contain too many voxels; use larger voxels")
     count = count.astype(int)
     sampler = _Sampler(f, low, voxel)
-    wanted, is_inside = _coarse(sampler, count)
+    requested, is_inside = _coarse(sampler, count)
     blocks = _Blocks(count, is_inside)
-    while wanted.any():
-        index = numpy.argwhere(wanted)
+    while requested.any():
+        index = numpy.argwhere(requested)
         points = (SIDE * index[:, None, :] + OFFSETS[None]).reshape(-1, 3)
-        wanted = blocks.add(index, sampler.at(points).reshape(-1, SIDE, SIDE, SIDE))
+        requested = blocks.add(index, sampler.at(points).reshape(-1, SIDE, SIDE, SIDE))
     index, samples = blocks.result()
     inside = numpy.argwhere(is_inside & (blocks.number < 0))
     if ((inside == 0) | (inside == count - 1)).any() or _meet_border(index, samples, count):
-        _refuse("the solid reaches the bounds; give larger ones", action)
-    scale = numpy.abs(samples).max(initial=0) or 1.0  # may be beyond the range of float
+        _refuse("the solid touches the bounds; give larger bounds", action)
+    scale = numpy.abs(samples).max(initial=0) or 1.0  # samples may exceed the range of float32
     return _solid(low, voxel, index, samples / scale, inside, half_width, action)
 
 
@@ -185,7 +187,7 @@ MOST_COARSE = 2**27
 
 
 def _coarse(sampler, count):
-    """By every fourth grid point: which blocks may hold a surface, and which begin inside?"""
+    """Blocks that may contain a surface, and blocks that lie inside, by every fourth grid point."""
     shape = 2 * count + 1
     values = sampler.at(HALF * numpy.indices(shape).reshape(3, -1).T).reshape(shape)
     slopes = numpy.zeros_like(values)
@@ -203,20 +205,20 @@ def _coarse(sampler, count):
         numpy.minimum(nearest, numpy.abs(values[part]), out=nearest)
         numpy.maximum(slope, slopes[part], out=slope)
         inside += values[part] < 0
-    # A point is no farther from the next of them than 0.87 of the way from one to another.
-    wanted = (nearest <= 1.2 * slope) | ((inside > 0) & (inside < 27))
-    return wanted, inside == 27
+    # The distance to the nearest coarse point is at most 0.87 times their spacing.
+    requested = (nearest <= 1.2 * slope) | ((inside > 0) & (inside < 27))
+    return requested, inside == 27
 
 
 def _sides(axis):
-    """What lies before and behind each step along an axis."""
+    """Slices of the items before and after each step along an axis."""
     before, behind = [slice(None)] * 3, [slice(None)] * 3
     before[axis], behind[axis] = slice(None, -1), slice(1, None)
     return tuple(before), tuple(behind)
 
 
 class _Blocks:
-    """Blocks with samples, and which others are needed beside them."""
+    """Blocks with samples. Finds the neighbours that need samples, too."""
 
     REACH = 3  # grid points that an interpolant reads beyond the surface
 
@@ -227,31 +229,31 @@ class _Blocks:
         self.signs = numpy.zeros((0, SIDE, SIDE, SIDE), bool)
 
     def add(self, index, samples):
-        """Returns the blocks that are wanted now."""
+        """Adds samples. Returns the blocks that need samples next."""
         self.number[tuple(index.T)] = len(self.signs) + numpy.arange(len(index))
         self.index.append(index)
         self.samples.append(samples)
         signs = samples < 0
         self.signs = numpy.concatenate([self.signs, signs])
-        wanted = numpy.zeros(self.count, bool)
+        requested = numpy.zeros(self.count, bool)
         near = {-1: slice(None, self.REACH), 0: slice(None), 1: slice(-self.REACH, None)}
         for step in numpy.ndindex(3, 3, 3):
             step = numpy.array(step) - 1
             part = signs[(slice(None), *(near[s] for s in step))].reshape(len(signs), -1)
-            self._want(index[part.any(axis=1) & ~part.all(axis=1)] + step, wanted)
+            self._request(index[part.any(axis=1) & ~part.all(axis=1)] + step, requested)
         for axis in range(3):
             for side in (-1, 1):
                 step = numpy.zeros(3, int)
                 step[axis] = side
-                self._want_across(index, signs, axis, step, wanted)
-        return wanted & (self.number < 0)
+                self._request_across(index, signs, axis, step, requested)
+        return requested & (self.number < 0)
 
-    def _want(self, index, wanted):
+    def _request(self, index, requested):
         index = index[((index >= 0) & (index < self.count)).all(axis=1)]
-        wanted[tuple(index.T)] = True
+        requested[tuple(index.T)] = True
 
-    def _want_across(self, index, signs, axis, step, wanted):
-        """All around where the sign changes from one block to the next."""
+    def _request_across(self, index, signs, axis, step, requested):
+        """Requests all blocks around a face of blocks across which the sign changes."""
         other = index + step
         known = ((other >= 0) & (other < self.count)).all(axis=1)
         index, signs, other = index[known], signs[known], other[known]
@@ -263,7 +265,7 @@ class _Blocks:
         there[sampled] = self.signs[number[sampled]].take(face, axis + 1)
         crossed = index[(here != there).any(axis=(1, 2))]
         for near in numpy.ndindex(3, 3, 3):
-            self._want(crossed + numpy.array(near) - 1, wanted)
+            self._request(crossed + numpy.array(near) - 1, requested)
 
     def result(self):
         if not self.index:

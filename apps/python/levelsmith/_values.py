@@ -1,4 +1,4 @@
-"""Lazy values, one class for each kind."""
+"""Lazy values, with one class for each kind."""
 
 import hashlib
 import json
@@ -13,32 +13,32 @@ import numpy
 from . import _core
 
 _log = logging.getLogger("levelsmith")
-_local = threading.local()  # of each thread: the report of its last run, and the job it is part of
-_limits = {"cache": "", "threads": None, "memory": None}  # as the user set them
-_share = None  # as share_machine set it
+_local = threading.local()  # per thread: the report of its last run, and its job
+_limits = {"cache": "", "threads": None, "memory": None}  # as set by the user
+_share = None  # as set by share_machine
 operators = {}  # functions by name, see _operators.install
 
 
 class Warning(UserWarning):
-    """What levelsmith finds worth telling beside a result."""
+    """A warning about a result."""
 
 
 def run(nodes, progress=None, level=3):
-    """Compute nodes. Returns what was printed; warnings point `level` calls up."""
+    """Compute nodes. Returns the printed text. Warnings are attributed to the caller `level` frames up."""
     job = getattr(_local, "job", None)
     return settle(_core.compute(nodes, progress, cache_folder(), job is not None), level + 1)
 
 
 def settle(outcome, level=3):
-    """Tells what a run told. Returns what it printed, or raises what ended it."""
-    report, printed, told, notes, failure = outcome
+    """Emits the notes and warnings of a run. Returns the printed text, or raises the error of the run."""
+    report, printed, messages, notes, failure = outcome
     _local.report = report
     for text in notes:
         _log.info("%s", text)
     job = getattr(_local, "job", None)
-    for text in told:
+    for text in messages:
         if job:
-            job.told.append(text)
+            job.messages.append(text)
         else:
             warnings.warn(text, Warning, stacklevel=level)
     if failure is not None:
@@ -47,10 +47,10 @@ def settle(outcome, level=3):
 
 
 class Job:
-    """What this thread does for map(): results are kept in its folder, and warnings go with it."""
+    """A job of map() on this thread. It has its own cache folder and collects warnings."""
 
     def __init__(self, cache):
-        self.cache, self.told = cache, []
+        self.cache, self.messages = cache, []
 
     def __enter__(self):
         self.before = getattr(_local, "job", None)
@@ -64,55 +64,55 @@ class Job:
 def compute(*values, progress=None):
     """Compute values, each node once, and keep them.
 
-    progress(action, fraction) is called in this thread, at most 20 times a second and once in the
-    end; False ends the run with Cancelled. Ctrl-C ends it with KeyboardInterrupt. Returns the
-    report, as `--report` of the command line writes it.
+    progress(action, fraction) is called in this thread, at most 20 times per second and once at the
+    end. If it returns False, the run ends with Cancelled. Ctrl-C ends it with KeyboardInterrupt.
+    Returns the report, as written by `--report` of the command line.
     """
     for value in values:
         if not isinstance(value, Value):
-            raise _core.UsageError(f"compute: {type(value).__name__} is no value of levelsmith")
+            raise _core.UsageError(f"compute: {type(value).__name__} is not a value of levelsmith")
     run([value._node for value in values], progress)
     return last_report()
 
 
 def last_report():
-    """The report of this thread's last run: its steps, with parameters, times, notes and errors."""
+    """Report of this thread's last run: its steps with parameters, times, notes and errors."""
     return json.loads(_local.report) if hasattr(_local, "report") else None
 
 
 def graph(*values):
-    """The graph that makes values, as text: `levelsmith run g.json` does it again."""
+    """Graph of values, as text. `levelsmith run g.json` computes it again."""
     return _core.graph([value._node for value in values])
 
 
 def set_threads(count=0):
-    """Threads to use from now on; 0: as many as there are cores. Results do not depend on it."""
+    """Set the number of threads; 0: number of cores. Results do not depend on it."""
     _core.set_threads(count)
     _limits["threads"] = count
 
 
 def set_max_memory(size=""):
-    """Refuse what would take more, e.g. "4G"; "": 80 % of what is free."""
+    """Set the memory limit, for example "4G"; "": 80 % of the free memory. Larger runs are refused."""
     _core.set_max_memory(str(size))
     _limits["memory"] = size
 
 
 def set_cache(folder=""):
-    """Keep results in a folder from now on, and take known ones from there; "": nowhere.
+    """Set the folder in which results are kept and from which known results are read; "": no cache.
 
-    As `--cache` of the command line, with which it may be shared; see `cache` for what is in it.
+    The same as `--cache` of the command line, and compatible with it. `cache` lists the contents.
     """
     _limits["cache"] = os.path.abspath(folder) if folder else ""
 
 
 def cache_folder():
-    """Of this thread; empty: none."""
+    """Cache folder of this thread; empty: no cache."""
     job = getattr(_local, "job", None)
     return job.cache if job else _limits["cache"]
 
 
 def share_machine(processes, memory):
-    """Limits for one of several processes, where the user set none. memory: bytes, or 0."""
+    """Set limits for one of several processes, unless the user has set them. memory: bytes, or 0."""
     global _share
     if _share == (processes, memory):
         return
@@ -130,34 +130,34 @@ def wrap(node):
 
 
 def unwrap(kind, content, name):
-    """What Value.__reduce__ took apart."""
+    """Restores a value from the data of Value.__reduce__."""
     value = wrap(_core.unpack(kind, content))
     value.name = name
     return value
 
 
 class Value:
-    """What is asked for of levelsmith: computed when needed, and then kept. Never changes."""
+    """An immutable lazy value. It is computed when needed, and then kept."""
 
     __slots__ = ("_node", "__weakref__")
     _node: _core.Node
 
     def __init__(self):
-        raise TypeError("make values by operators, as ls.sphere(radius=1, voxel=0.1)")
+        raise TypeError("create values with operators, for example ls.sphere(radius=1, voxel=0.1)")
 
     def compute(self, progress=None):
-        """Compute it, and keep it. Returns itself. See compute()."""
+        """Compute the value and keep it. Returns the value itself. See compute()."""
         run([self._node], progress)
         return self
 
     @property
     def is_computed(self):
-        """Is it known already?"""
+        """True when the value is computed."""
         return self._node.is_computed
 
     @property
     def name(self):
-        """As expressions of `scene` and messages call it; empty: none."""
+        """Name in expressions of `scene` and in messages; empty: none."""
         return self._node.name
 
     @name.setter
@@ -166,7 +166,7 @@ class Value:
 
     @property
     def bounds(self):
-        """Two points: the box of the surface, or of the vertices, world units. Computes it."""
+        """Box of the surface or the vertices, as two points, world units. Computes the value."""
         return numpy.array(self._known().bounds)
 
     def __reduce__(self):
@@ -194,7 +194,7 @@ class Value:
 
 
 class _Drawn(Value):
-    """What can be drawn."""
+    """A value that can be drawn."""
 
     __slots__ = ()
 
@@ -225,14 +225,14 @@ class Solid(_Drawn):
 
     @property
     def voxel(self):
-        """Edge of a voxel, world units. Computes it."""
+        """Voxel size, world units. Computes the value."""
         return self._known().voxel
 
     def array(self, box=None):
-        """Signed distances at the grid points of a box, two points in world units, or of the band.
+        """Signed distances at the grid points of a box. box: two world points; None: box of the band.
 
-        A float32 array with `origin`, the world place of [0, 0, 0], and `voxel`. Outside the band it
-        holds the distance at its rim, with the right sign.
+        Returns a float32 array with `origin`, the world position of [0, 0, 0], and `voxel`. Outside
+        the band the values are ± its half width, with the correct sign.
         """
         values, origin, voxel = self._known().band_array(box)
         result = values.view(Volume)
@@ -247,7 +247,7 @@ def _combine(operator, a, b):
 
 
 class Volume(numpy.ndarray):
-    """Numbers on a grid: an array that knows where it lies. Slices keep `voxel`, not `origin`."""
+    """An array of grid values with its position. Slices keep `voxel`, but not `origin`."""
 
     origin = None
     voxel = None
@@ -259,13 +259,13 @@ class Volume(numpy.ndarray):
 
 
 class Surface(Value):
-    """A band about an open surface: a base for patches, with two sides and no inside."""
+    """A band around an open surface: a base for patches, with two sides but no inside."""
 
     __slots__ = ()
 
 
 class Mesh(_Drawn):
-    """Triangles: `Mesh(vertices, faces)` of arrays, (n, 3) of floats and (m, 3) of whole numbers."""
+    """A triangle mesh: `Mesh(vertices, faces)` from arrays of (n, 3) floats and (m, 3) integers."""
 
     __slots__ = ()
 
@@ -274,44 +274,44 @@ class Mesh(_Drawn):
 
     @property
     def vertices(self):
-        """World units, (n, 3) of float64, read-only, no copy. Computes it."""
+        """Vertex positions, world units: (n, 3) float64, read-only, no copy. Computes the value."""
         return self._known().mesh_array("vertices")
 
     @property
     def faces(self):
-        """Numbers of vertices, (m, 3) of uint32, counter-clockwise from outside, read-only."""
+        """Vertex numbers of the faces: (m, 3) uint32, counter-clockwise from outside, read-only."""
         return self._known().mesh_array("faces")
 
     @property
     def normals(self):
-        """Of vertices, (n, 3); None where there are none."""
+        """Vertex normals, (n, 3); None if the mesh has none."""
         return self._known().mesh_array("normals")
 
     @property
     def uvs(self):
-        """Texture coordinates of vertices, (n, 2); None where there are none."""
+        """Texture coordinates of the vertices, (n, 2); None if the mesh has none."""
         return self._known().mesh_array("uvs")
 
     @property
     def colors(self):
-        """Red, green, blue and alpha of vertices, (n, 4); None where there are none."""
+        """Red, green, blue and alpha of the vertices, (n, 4); None if the mesh has none."""
         return self._known().mesh_array("colors")
 
 
 class Patch(Value):
-    """Where textures stand on a surface: one patch, or many."""
+    """One or more patches: regions of a surface on which textures are placed."""
 
     __slots__ = ()
 
 
 class Field(Value):
-    """Numbers or vectors on a sparse grid, for parameters that take a field."""
+    """Scalars or vectors on a sparse grid, for parameters that accept a field."""
 
     __slots__ = ()
 
 
 class Scene(_Drawn):
-    """Solids and meshes to be drawn together."""
+    """Solids and meshes that are drawn together."""
 
     __slots__ = ()
 

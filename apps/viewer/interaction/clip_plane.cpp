@@ -23,10 +23,11 @@ using Imath::V3d;
 
 constexpr const char* kCutName = "clip_plane";
 constexpr double kBoxVoxels = 48;
-constexpr double kBeforeEnd = 1 - 1e-6;  // of what the band reaches: rounding is beyond
-constexpr double kBesideSolids = 8;      // voxels: normals read values three away from a place
+constexpr double kBeforeEnd =
+    1 - 1e-6;  // fraction of the half width; larger values may be rounded background
+constexpr double kBesideSolids = 8;  // voxels; normals read values three voxels away
 
-// As slices of the command have them: about the surface, at the band's end, and beyond.
+// Same tones as in 'slice': near the surface, at the end of the band, and outside it.
 constexpr DisplayColour kNearInside = {0.77, 0.86, 0.91}, kFarInside = {0.35, 0.54, 0.75},
                         kNearOutside = {0.92, 0.89, 0.81}, kFarOutside = {0.81, 0.67, 0.46},
                         kDeepInside = {0.44, 0.49, 0.57};
@@ -37,7 +38,7 @@ DisplayColour mixedTones(const DisplayColour& a, const DisplayColour& b, double 
   return colour;
 }
 
-/// Two unit vectors that make a right-handed frame with n.
+/// Completes n to a right-handed orthonormal frame.
 void frameWith(const V3d& n, V3d& s, V3d& t) {
   s = (std::abs(n.x) < 0.9 ? V3d(1, 0, 0) : V3d(0, 1, 0)).cross(n).normalized();
   t = n.cross(s);
@@ -49,7 +50,7 @@ std::string unusedName(const render::Scene& scene, std::string name) {
   return name;
 }
 
-/// How much of a line of that half width covers a pixel that is `distance` from its middle; pixels.
+/// Coverage of a pixel by a line of that half width at `distance` from its centre; pixels.
 double lineShare(double distance, double halfWidth) {
   return std::clamp(halfWidth + 0.5 - distance, 0.0, 1.0);
 }
@@ -60,7 +61,7 @@ struct PhiPainter {
   const PlacedPlane& plane;
   const render::Scene& scene;
   std::vector<std::uint8_t>& colours;
-  double voxel = 0, reach = 0;  // of the finest band, the widest, world units
+  double voxel = 0, reach = 0;  // voxel of the finest band and widest half width, world units
 
   PhiPainter(const render::Image& image_, const render::Camera& camera_, const PlacedPlane& plane_,
              const render::Scene& scene_, std::vector<std::uint8_t>& colours_)
@@ -88,7 +89,7 @@ struct PhiPainter {
     const double depth = distance * ray.direction.dot(camera.axis());
     const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
                           static_cast<std::size_t>(x);
-    // What is left of the solids lies behind the plane, or in it; meshes are not cut.
+    // Solids are visible only behind or in the plane. Meshes are not clipped.
     const auto seen = static_cast<double>(image.channels.at("Z")[i]);
     if (!(depth > 0 && depth < seen + 0.5 * voxel)) return;
     const V3d place = ray.origin + ray.direction * distance;
@@ -100,16 +101,16 @@ struct PhiPainter {
     blend(i, colourOf(phi, pixel), phi < 0 ? 1 : 0.85 * (1 - phi / reach));
   }
 
-  /// @param pixel  its edge at that place, world units
+  /// @param pixel  edge of the pixel at that point, world units
   [[nodiscard]] DisplayColour colourOf(double phi, double pixel) const {
     DisplayColour colour = phi <= -reach * kBeforeEnd ? kDeepInside
                            : phi < 0 ? mixedTones(kNearInside, kFarInside, -phi / reach)
                                      : mixedTones(kNearOutside, kFarOutside, phi / reach);
-    // Lines closer than a few pixels say nothing.
+    // Fade out contours that are closer than a few pixels.
     const double room = std::clamp((voxel / pixel - 3) / 3, 0.0, 1.0);
     const double whole = std::round(phi / voxel);
     double dark = 0;
-    if (std::abs(phi) < reach - 0.3 * voxel && whole != 0)  // where the band ends is no contour
+    if (std::abs(phi) < reach - 0.3 * voxel && whole != 0)  // the end of the band is not a contour
       dark = 0.45 * room * lineShare(std::abs(phi - whole * voxel) / pixel, 0.4);
     dark = std::max(dark, lineShare(std::abs(phi) / pixel, 0.9));
     for (double& c : colour) c *= 1 - dark;
@@ -142,7 +143,7 @@ ClipPlane parseClipPlane(const std::string& text) {
     clip.across = ClipPlane::Across::View;
   else
     throw levelset::UsageError(fmt::format(
-        "levelsmith-view: --clip '{}' is no plane; give x=0.1, y=0.1, z=0.1 or view=0.1", text));
+        "levelsmith-view: --clip '{}' is not a plane; give x=0.1, y=0.1, z=0.1 or view=0.1", text));
   if (equals != std::string::npos)
     clip.offset = pipeline::parseNumber(text.substr(equals + 1), "levelsmith-view: --clip");
   return clip;
@@ -164,10 +165,11 @@ PlacedPlane placed(const ClipPlane& clip, const render::Camera& camera,
   return plane;
 }
 
-CutScene::CutScene(const render::Scene& scene, const Imath::Box3d& bounds, ClipPlane::Across across)
+ClippedScene::ClippedScene(const render::Scene& scene, const Imath::Box3d& bounds,
+                           ClipPlane::Across across)
     : scene_(scene) {
   const double extent = std::max(bounds.size().length(), 1e-12), voxel = extent / kBoxVoxels;
-  // No larger than it has to be: how far hollows darken goes by the box of all solids.
+  // Keep the box small, because the length of occlusion rays depends on the bounds of all solids.
   V3d size(extent);
   if (across != ClipPlane::Across::View) {
     V3d normal(0), s, t;
@@ -178,7 +180,7 @@ CutScene::CutScene(const render::Scene& scene, const Imath::Box3d& bounds, ClipP
       size[a] = std::max(std::abs((a == 0 ? s : a == 1 ? t : normal).dot(whole)), extent / 4);
   }
   size += V3d(kBesideSolids * voxel);
-  // The face that cuts lies between grid points.
+  // Place the cutting face between grid points.
   box_ = levelset::transform(levelset::makeBox(size, {0, 0, 0.5 * size.z + 0.5 * voxel}, voxel),
                              Imath::M44d().setTranslation(V3d(0, 0, -0.5 * voxel)));
 
@@ -199,7 +201,7 @@ CutScene::CutScene(const render::Scene& scene, const Imath::Box3d& bounds, ClipP
       fmt::format("({}) - {}", scene.csg.isEmpty() ? all : scene.csg.text(), cut), names);
 }
 
-const render::Scene& CutScene::at(const PlacedPlane& plane) {
+const render::Scene& ClippedScene::at(const PlacedPlane& plane) {
   V3d s, t;
   frameWith(plane.normal, s, t);
   const V3d &n = plane.normal, &p = plane.point;

@@ -13,11 +13,11 @@ using Imath::V2d;
 using Imath::V3d;
 
 constexpr double kNearestPole =
-    1e-9;  // radians: where azimuth is told by what is up in the picture
+    1e-9;  // radians; nearer to a pole, the picture's up direction determines the azimuth
 
-constexpr double kFramed = 0.94;  // of the picture that a box may take
+constexpr double kFramed = 0.94;  // share of the picture that a framed box fills
 
-/// Where a place of the picture is in the world, at that depth.
+/// World position of a picture position at that depth.
 V3d worldAt(const render::Camera& camera, const V2d& place, double depth) {
   const render::Camera::Ray ray = camera.ray(place.x, place.y);
   return ray.origin + ray.direction * (depth / ray.direction.dot(camera.axis()));
@@ -39,7 +39,7 @@ void OrbitCamera::take(const render::Camera& changed) {
   try {
     render::validate(changed);
   } catch (const levelset::Error&) {
-    return;  // as far as numbers go
+    return;  // overflow: keep the present camera
   }
   camera_ = changed;
 }
@@ -55,7 +55,8 @@ void OrbitCamera::orbit(double right, double up) {
   const V3d forward = camera_.axis();
   const V3d screenUp = forward.cross(camera_.up).normalized().cross(forward);
   const double sine = std::clamp(-forward.dot(vertical_), -1.0, 1.0);
-  // Away from the eye along the ground; at the poles what is up in the picture tells.
+  // Horizontal direction away from the eye. At the poles it follows from the picture's up
+  // direction.
   V3d ahead = forward + vertical_ * sine;
   if (ahead.length() < kNearestPole) ahead = screenUp * (sine > 0 ? 1 : -1);
   ahead.normalize();
@@ -84,7 +85,7 @@ void OrbitCamera::zoom(double factor, const V2d& place, double depth, int width,
     changed.from = fixed + (changed.from - fixed) * factor;
     changed.to = fixed + (changed.to - fixed) * factor;
   } else {
-    // The eye keeps its distance, lest it enters what it looks at.
+    // The eye keeps its distance, so that it does not enter the surface.
     const V3d axis = changed.axis();
     V3d shift = (fixed - changed.to) * (1 - factor);
     shift -= axis * shift.dot(axis);
@@ -108,7 +109,8 @@ void OrbitCamera::frame(const Imath::Box3d& bounds, int width, int height) {
             up = right.cross(axis), half = 0.5 * bounds.size();
   const double aspect = static_cast<double>(std::max(width, 1)) / std::max(height, 1);
   const double slopeY = kFramed * std::tan(0.5 * camera_.verticalFov), slopeX = slopeY * aspect;
-  // Of the eye from the middle, and half the view, for the corner that asks for most.
+  // Distance of the eye from the centre, and half extent of the view, as required by the outermost
+  // corner.
   double distance = 1e-9, extent = 1e-9;
   for (int corner = 0; corner < 8; ++corner) {
     const V3d p(corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y,
@@ -131,7 +133,7 @@ void OrbitCamera::lookAgainst(const V3d& direction) {
   const V3d toEye = direction.normalized();
   V3d up = vertical_;
   if (std::abs(toEye.dot(vertical_)) > 1 - 1e-9) {
-    // From above: what lay ahead of an eye in front of it is up.
+    // View from above: up is the direction that is ahead in a front view.
     const V3d front = std::abs(vertical_.z) < 0.9 ? V3d(0, 0, -1) : V3d(0, 1, 0);
     up = front - toEye * front.dot(toEye);
   }

@@ -16,7 +16,7 @@ namespace {
 using Imath::V3d;
 
 constexpr std::array<const char*, 4> kLinesNames = {"none", "outline", "base", "all"};
-constexpr double kBehind = 0.12;  // how much of a line is seen behind a surface
+constexpr double kBehind = 0.12;  // opacity of a line behind a surface
 
 DisplayColour layerColour(double w) {
   constexpr DisplayColour kLow = {0.05, 0.62, 0.60}, kHigh = {0.95, 0.52, 0.10};
@@ -26,12 +26,12 @@ DisplayColour layerColour(double w) {
   return colour;
 }
 
-/// A place in the picture, pixels, and its depth.
+/// A position in the picture, pixels, and its depth.
 struct Seen {
   double x, y, depth;
 };
 
-/// Draws lines and dots over a picture, knowing how deep it is.
+/// Draws lines and dots over a picture, with a depth test.
 class Pen {
  public:
   Pen(const render::Camera& camera, const render::Image& picture, double tolerance, Canvas& canvas)
@@ -77,7 +77,8 @@ class Pen {
             0.5 * canvas_.height - p.y * shrink * scaleY_, p.z};
   }
 
-  /// A pixel along the longer axis after the other; across it two share the line.
+  /// Draws an antialiased line: one step per pixel along its longer axis, shared by two pixels
+  /// across it.
   void lineSeen(const Seen& a, const Seen& b, const DisplayColour& colour) const {
     const bool isSteep = std::abs(b.y - a.y) > std::abs(b.x - a.x);
     const double from = isSteep ? a.y : a.x, to = isSteep ? b.y : b.x;
@@ -87,7 +88,7 @@ class Pen {
     for (int i = static_cast<int>(low); i < static_cast<int>(std::ceil(high)); ++i) {
       const double at = std::clamp(i + 0.5, low, high), t = (at - from) / (to - from);
       const double across = (isSteep ? a.x + (b.x - a.x) * t : a.y + (b.y - a.y) * t) - 0.5;
-      // Between places in a perspective picture it is one over the depth that is linear.
+      // In perspective the reciprocal of the depth is linear along the line in the picture.
       const double depth =
           isOrtho_ ? a.depth + (b.depth - a.depth) * t : 1 / ((1 - t) / a.depth + t / b.depth);
       const double below = std::floor(across), share = across - below;
@@ -171,7 +172,7 @@ PatchLines patchLinesNamed(const std::string& name) {
   const auto found = std::find(kLinesNames.begin(), kLinesNames.end(), name);
   if (found == kLinesNames.end())
     throw levelset::UsageError(fmt::format(
-        "levelsmith-view: --patches '{}' is none of them; give none, outline, base or all", name));
+        "levelsmith-view: --patches '{}' is unknown; give none, outline, base or all", name));
   return static_cast<PatchLines>(found - kLinesNames.begin());
 }
 

@@ -10,32 +10,32 @@
 
 namespace viewer {
 
-/// What is drawn of patches.
+/// Parts of patches that are drawn.
 enum class PatchLines {
   None,
-  Outline,  ///< the edges of the space above each
-  Base,     ///< the particles on the surface and the lines between them
-  All       ///< those of every layer
+  Outline,  ///< edges of the space above each patch
+  Base,     ///< particles on the surface and the lines between them
+  All       ///< particles and lines of all layers
 };
 
-/// @throws levelset::UsageError for a name other than none, outline, base and all
+/// Value for a name. @throws levelset::UsageError for a name other than none, outline, base and all
 [[nodiscard]] PatchLines patchLinesNamed(const std::string& name);
 [[nodiscard]] const char* patchLinesName(PatchLines lines);
 
-/// A picture of bytes to draw on: red, green, blue, alpha for each pixel.
+/// An image of bytes: red, green, blue and alpha for each pixel.
 struct Canvas {
   int width = 0, height = 0;
   std::vector<std::uint8_t> colours;
 };
 
-/// The same stretched to another size, smoothly. @pre both sizes are positive
+/// Resamples the canvas smoothly to another size. @pre both sizes are positive
 [[nodiscard]] Canvas stretched(const Canvas& canvas, int width, int height);
 
-/// Draws patches, from teal at the surface to orange at the top; faintly what lies behind a
-/// surface.
-/// @param camera     of the canvas' size
-/// @param picture    whose depths tell what lies behind a surface, of any size
-/// @param tolerance  what lies less far behind is in front, world units
+/// Draws patches in colours from teal at the surface to orange at the top. Lines behind a surface
+/// are faint.
+/// @param camera  camera with the size of the canvas
+/// @param picture  picture, of any size, with the depths of the surfaces
+/// @param tolerance  depth difference up to which a line counts as in front, world units
 void drawPatches(const std::vector<mapping::Patch>& patches, PatchLines lines,
                  const render::Camera& camera, const render::Image& picture, double tolerance,
                  Canvas& canvas);

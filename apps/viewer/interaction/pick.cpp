@@ -26,8 +26,8 @@ V3d vectorAt(const render::Image& image, const char* name, std::size_t i) {
   return {part("X"), part("Y"), part("Z")};
 }
 
-/// Of the solids with the number, the one whose surface is nearest; on a clip plane, whose number
-/// nobody has, the one that is deepest there.
+/// Name of the solid with that id whose surface is nearest. A clip plane's id belongs to no solid;
+/// then the solid that is deepest at the point.
 std::string nameAt(const render::Scene& scene, std::uint32_t id, const std::vector<double>& phi) {
   std::string name;
   double least = INFINITY;
@@ -74,7 +74,7 @@ std::optional<double> depthSeen(const Frame& frame, double x, double y) {
 }
 
 std::string pointText(const V3d& point) {
-  // As many digits as the picture's single precision tells apart; no negative zero.
+  // Significant digits of single precision; negative zero becomes zero.
   const auto digits = [](double x) { return fmt::format("{:.8g}", x == 0 ? 0 : x); };
   return fmt::format("{},{},{}", digits(point.x), digits(point.y), digits(point.z));
 }

@@ -9,23 +9,24 @@
 
 namespace viewer {
 
-/// A place on what is shown.
+/// A point on a visible surface.
 struct Picked {
-  Imath::V3d position, normal;  ///< world units; of unit length, outwards
-  double phi = 0;               ///< of what the scene draws of solids, world units
-  std::string solid = {};       ///< its name
+  Imath::V3d position, normal;  ///< world units; outward unit normal
+  double phi = 0;               ///< φ of the drawn shape, world units
+  std::string solid = {};       ///< name of the solid
 };
 
-/// What is seen through the middle of a pixel; none where nothing is. @pre its pixels are single
+/// Surface point at the centre of a pixel; none for a miss. @pre the frame has pixel size 1
 [[nodiscard]] std::optional<Picked> pick(const Frame& frame, int x, int y);
 
-/// Along the view axis, of what is seen there in a frame of any fineness; none where nothing is.
+/// Depth along the view axis of the surface at a picture position, in a frame of any pixel size;
+/// none for a miss.
 [[nodiscard]] std::optional<double> depthSeen(const Frame& frame, double x, double y);
 
-/// "x,y,z" as the command line takes points.
+/// Formats a point as "x,y,z", the form of the command line.
 [[nodiscard]] std::string pointText(const Imath::V3d& point);
 
-/// One object: {"position": […], "normal": […], "phi": …, "solid": "…"}; null for none.
+/// JSON object {"position": […], "normal": […], "phi": …, "solid": "…"}; null for none.
 [[nodiscard]] std::string pickedJson(const std::optional<Picked>& picked);
 
 }  // namespace viewer

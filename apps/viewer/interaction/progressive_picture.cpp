@@ -16,15 +16,16 @@
 namespace viewer {
 namespace {
 
-/// A picture of a view, ever finer.
+/// One pass of refinement.
 struct Pass {
   int pixelSize, samples, ambientSamples, shadowSamples;
 };
 constexpr std::array<Pass, 6> kPasses = {Pass{8, 1, 0, 0}, {4, 1, 0, 0},  {2, 1, 0, 0},
                                          {1, 1, 0, 0},     {1, 1, 16, 4}, {1, 4, 16, 4}};
 
-constexpr int kCpuTileEdge = 16, kGpuTileEdge = 64;  // pixels: enough rays for a run of each
-constexpr double kOnSurface = 4e-3;  // of the extent: particles that far below it are on it
+constexpr int kCpuTileEdge = 16, kGpuTileEdge = 64;  // pixels; enough rays for efficient tracing
+constexpr double kOnSurface =
+    4e-3;  // relative to the extent: particles at most that far below the surface count as on it
 
 render::Camera shrunk(render::Camera camera, int pixelSize) {
   camera.width = std::max(1, (camera.width + pixelSize / 2) / pixelSize);
@@ -34,18 +35,18 @@ render::Camera shrunk(render::Camera camera, int pixelSize) {
 
 }  // namespace
 
-/// What the thread keeps from picture to picture.
+/// State of the thread, kept from picture to picture.
 struct ProgressivePicture::Worker {
   const ProgressivePicture& owner;
   View view;
   Display display;
-  std::size_t pass = kPasses.size();  // the next one; none left
+  std::size_t pass = kPasses.size();  // next pass; kPasses.size(): none
   int pixelSize = kPasses[0].pixelSize;
-  std::shared_ptr<const render::Image> image;  // the last one that was finished, of this view
+  std::shared_ptr<const render::Image> image;  // last complete picture of this view
 
-  std::shared_ptr<const Model> preparedModel;  // that the tables are made of
+  std::shared_ptr<const Model> preparedModel;  // model of the prepared tables
   std::optional<ClipPlane::Across> preparedCut;
-  std::unique_ptr<CutScene> cut;
+  std::unique_ptr<ClippedScene> cut;
   std::unique_ptr<render::KernelScene> surfaces;
   std::unique_ptr<render::GlContext> context;
   std::unique_ptr<render::KernelTracer> tracer;
@@ -58,20 +59,20 @@ struct ProgressivePicture::Worker {
   [[nodiscard]] PlacedPlane plane() const {
     return placed(*view.clip, view.camera, view.model->solidBounds);
   }
-  /// What is drawn of the view, by a camera for fewer pixels.
+  /// Scene of the view, with a camera for fewer pixels.
   [[nodiscard]] render::Scene sceneFor(int edge) {
     render::Scene scene = isCut() ? cut->at(plane()) : view.model->scene;
     scene.camera = shrunk(view.camera, edge);
     return scene;
   }
 
-  void take(const Wanted& wanted) {
-    if (!view.model || !isSame(view, wanted.view)) {
-      view = wanted.view;
+  void take(const Request& request) {
+    if (!view.model || !isSame(view, request.view)) {
+      view = request.view;
       pass = 0;
       image = nullptr;
     }
-    display = wanted.display;
+    display = request.display;
   }
 
   void findTracer() {
@@ -80,7 +81,7 @@ struct ProgressivePicture::Worker {
       hasTriedGpu = true;
       try {
         context = std::make_unique<render::GlContext>();
-        // A processor that plays a GPU is slower than one that does not.
+        // Software OpenGL is slower than the processor back end.
         const bool isSoftware = context->description().find("llvmpipe") != std::string::npos;
         if (owner.renderer_ == Renderer::Auto && isSoftware) context = nullptr;
       } catch (const levelset::ResourceLimit&) {
@@ -91,7 +92,7 @@ struct ProgressivePicture::Worker {
       try {
         tracer = std::make_unique<render::GpuTracer>(*context, *surfaces);
         name = context->description();
-      } catch (const levelset::ResourceLimit&) {  // its memory is smaller
+      } catch (const levelset::ResourceLimit&) {  // GPU memory is smaller
         if (owner.renderer_ == Renderer::Gpu) throw;
       }
     }
@@ -101,26 +102,26 @@ struct ProgressivePicture::Worker {
     }
   }
 
-  /// Makes the tables where they are not those of the view.
+  /// Builds the tables unless they match the view.
   void prepare() {
-    const std::optional<ClipPlane::Across> wantedCut =
+    const std::optional<ClipPlane::Across> newCut =
         isCut() ? std::optional(view.clip->across) : std::nullopt;
-    if (surfaces && preparedModel == view.model && preparedCut == wantedCut) return;
-    tracer = nullptr;  // it reads the tables
+    if (surfaces && preparedModel == view.model && preparedCut == newCut) return;
+    tracer = nullptr;  // it references the tables
     surfaces = nullptr;
     cut = nullptr;
-    if (wantedCut)
-      cut = std::make_unique<CutScene>(view.model->scene, view.model->solidBounds, *wantedCut);
+    if (newCut)
+      cut = std::make_unique<ClippedScene>(view.model->scene, view.model->solidBounds, *newCut);
     const render::Scene scene = sceneFor(1);
     render::validate(scene.camera);
     surfaces = std::make_unique<render::KernelScene>(
         scene, levelset::memoryLimit(levelset::kNoMemoryLimit));
     preparedModel = view.model;
-    preparedCut = wantedCut;
+    preparedCut = newCut;
     findTracer();
   }
 
-  /// @return the picture, or null when another one is wanted meanwhile
+  /// @return the picture, or null when a newer request is pending
   std::shared_ptr<const render::Image> draw(const Pass& how, std::atomic<double>& progress,
                                             const std::atomic<bool>& isStale) {
     const render::Scene scene = sceneFor(how.pixelSize);
@@ -131,7 +132,7 @@ struct ProgressivePicture::Worker {
     options.style.style = view.style;
     options.maxBytes = levelset::memoryLimit(levelset::kNoMemoryLimit);
     render::requirePicture(scene, options);
-    surfaces->look(scene);
+    surfaces->updateView(scene);
     auto drawn = std::make_shared<render::Image>(scene.camera.width, scene.camera.height);
     const render::KernelPainter painter(scene, *surfaces, options, *drawn);
     const int edge = context && name != "processor" ? kGpuTileEdge : kCpuTileEdge;
@@ -182,11 +183,12 @@ ProgressivePicture::~ProgressivePicture() {
   thread_.join();
 }
 
-void ProgressivePicture::want(const View& view, const Display& display) {
+void ProgressivePicture::request(const View& view, const Display& display) {
   {
     const std::scoped_lock lock(mutex_);
-    if (lastWanted_ && isSame(lastWanted_->view, view) && lastWanted_->display == display) return;
-    lastWanted_ = wanted_ = Wanted{view, display};
+    if (lastRequest_ && isSame(lastRequest_->view, view) && lastRequest_->display == display)
+      return;
+    lastRequest_ = pending_ = Request{view, display};
     isStale_ = true;
     failure_ = nullptr;
   }
@@ -214,12 +216,12 @@ void ProgressivePicture::run() {
     bool isRecoloured = false;
     {
       std::unique_lock lock(mutex_);
-      changed_.wait(lock, [&] { return isEnding_ || wanted_ || worker.pass < kPasses.size(); });
+      changed_.wait(lock, [&] { return isEnding_ || pending_ || worker.pass < kPasses.size(); });
       if (isEnding_) return;
-      if (wanted_) {
-        worker.take(*wanted_);
+      if (pending_) {
+        worker.take(*pending_);
         isRecoloured = worker.image != nullptr;
-        wanted_.reset();
+        pending_.reset();
         isStale_ = false;
       }
     }
@@ -247,7 +249,7 @@ void ProgressivePicture::run() {
     {
       const std::scoped_lock lock(mutex_);
       if (frame) frame_ = frame;
-      if (!wanted_) failure_ = failure;
+      if (!pending_) failure_ = failure;
       rendererName_ = worker.name;
       if (worker.pass == kPasses.size()) progress_ = 1;
     }

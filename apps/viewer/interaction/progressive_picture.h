@@ -20,61 +20,62 @@
 
 namespace viewer {
 
+/// Choice of the back end.
 enum class Renderer {
-  Auto,  ///< the GPU where it is one, else the processor
+  Auto,  ///< the GPU if it is hardware, else the processor
   Cpu,
   Gpu
 };
 
-/// What is drawn. Another view is another picture.
+/// Everything that determines a picture.
 struct View {
   std::shared_ptr<const Model> model;
   render::Camera camera;
   std::optional<ClipPlane> clip = {};
-  render::Style style = render::Style::Lit;  ///< of the colours; no matcap
+  render::Style style = render::Style::Lit;  ///< shading style; not matcap
 };
 
-/// How a picture is shown; nothing is drawn again when it changes.
+/// Display options, which change without a new picture.
 struct Display {
   Layer layer = Layer::Colour;
-  double curvatureRange = 40;  ///< by the extent, see layerColours()
+  double curvatureRange = 40;  ///< relative to the extent, see layerColours()
   PatchLines patches = PatchLines::All;
-  bool contours = true;  ///< φ on the clip plane
+  bool contours = true;  ///< draws contours of φ on the clip plane
   bool operator==(const Display&) const = default;
 };
 
-/// A view, drawn more or less finely.
+/// A picture of a view at one level of refinement.
 struct Frame {
   View view;
-  int pixelSize = 8;        ///< of the window, along an edge of one of the picture
-  bool isComplete = false;  ///< with all samples, light and shadow
-  std::shared_ptr<const render::Image> image;  ///< its layers
-  Canvas canvas;                               ///< as it is shown, of any size
+  int pixelSize = 8;                           ///< edge of a picture pixel, window pixels
+  bool isComplete = false;                     ///< all samples are done, with light and shadow
+  std::shared_ptr<const render::Image> image;  ///< the layers of the picture
+  Canvas canvas;                               ///< displayed pixels, any size
 };
 
-/// Draws views in a thread of its own, each first coarsely and then ever finer.
+/// Draws views in a background thread, in passes of increasing quality.
 class ProgressivePicture {
  public:
-  /// @param wake  called from that thread when there is something new to be shown
+  /// @param wake  called from that thread when a new frame is available
   explicit ProgressivePicture(Renderer renderer = Renderer::Auto, std::function<void()> wake = {});
   ~ProgressivePicture();
   ProgressivePicture(const ProgressivePicture&) = delete;
   ProgressivePicture& operator=(const ProgressivePicture&) = delete;
 
-  /// Returns at once. Of a view that is drawn already only the display is taken.
-  void want(const View& view, const Display& display);
-  /// The newest one; null before there is any.
+  /// Requests a view and returns at once. For the present view only the display options change.
+  void request(const View& view, const Display& display);
+  /// Newest frame; null before the first one.
   [[nodiscard]] std::shared_ptr<const Frame> frame() const;
-  /// Why the view that is wanted cannot be drawn; null: it can.
+  /// Error that prevents drawing of the requested view; null: none.
   [[nodiscard]] std::exception_ptr failure() const;
-  /// Of the present pass, from 0 to 1; 1 when there is nothing to do.
+  /// Progress of the present pass, from 0 to 1; 1 when idle.
   [[nodiscard]] double progress() const { return progress_; }
-  /// Who draws, for people.
+  /// Description of the back end for the user.
   [[nodiscard]] std::string rendererName() const;
 
  private:
   struct Worker;
-  struct Wanted {
+  struct Request {
     View view;
     Display display;
   };
@@ -84,18 +85,18 @@ class ProgressivePicture {
   Renderer renderer_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::optional<Wanted> wanted_;      // not yet taken by the thread
-  std::optional<Wanted> lastWanted_;  // taken or not
+  std::optional<Request> pending_;      // not yet taken by the thread
+  std::optional<Request> lastRequest_;  // newest request, taken or not
   std::shared_ptr<const Frame> frame_;
   std::exception_ptr failure_;
   std::string rendererName_;
   bool isEnding_ = false;
-  std::atomic<bool> isStale_ = false;  // what is being drawn is no longer wanted
+  std::atomic<bool> isStale_ = false;  // the present drawing is out of date
   std::atomic<double> progress_ = 1;
   std::thread thread_;
 };
 
-/// Are both cameras the same, to the last bit?
+/// True when both are equal to the last bit.
 [[nodiscard]] bool isSame(const render::Camera& a, const render::Camera& b);
 [[nodiscard]] bool isSame(const View& a, const View& b);
 

@@ -32,16 +32,16 @@ void FileList::enter(const fs::path& folder) {
   std::vector<fs::path> folders, files;
   fs::directory_iterator entry(whole, wrong);
   for (; !wrong && entry != fs::directory_iterator(); entry.increment(wrong)) {
-    std::error_code untold;
+    std::error_code ignored;
     const fs::path& path = entry->path();
     if (path.filename().string().starts_with(".")) continue;
-    if (entry->is_directory(untold))
+    if (entry->is_directory(ignored))
       folders.push_back(path);
     else if (canOpen(path))
       files.push_back(path);
   }
-  trouble_ = wrong ? "open: " + whole.string() + ": " + wrong.message() : "";
-  if (wrong) return;  // the list that was there stays
+  error_ = wrong ? "open: " + whole.string() + ": " + wrong.message() : "";
+  if (wrong) return;  // keeps the previous list
   std::sort(folders.begin(), folders.end());
   std::sort(files.begin(), files.end());
   folder_ = whole;
@@ -58,7 +58,7 @@ std::optional<fs::path> FileList::draw(bool isEscaped) {
   if (!ImGui::BeginPopupModal(kOpenTitle)) return std::nullopt;
   std::optional<fs::path> chosen, entered;
   ImGui::TextUnformatted(folder_.string().c_str());
-  if (!trouble_.empty()) ImGui::TextWrapped("%s", trouble_.c_str());
+  if (!error_.empty()) ImGui::TextWrapped("%s", error_.c_str());
   ImGui::BeginChild("entries", {0, -ImGui::GetFrameHeightWithSpacing()}, true);
   if (folder_.has_parent_path() && ImGui::Selectable("..")) entered = folder_.parent_path();
   for (const fs::path& folder : folders_)

@@ -7,12 +7,13 @@
 
 namespace viewer {
 
-/// Folders and files that can be opened, to choose from in the window.
+/// Dialog that lists folders and readable files.
 class FileList {
  public:
-  /// Begins in a folder, or beside a file; in the current folder where that does not exist.
+  /// Opens the dialog in a folder, or in the folder of a file; in the current folder if that does
+  /// not exist.
   void show(const std::filesystem::path& place);
-  /// Draws the dialog while it is open. @return the file that was chosen
+  /// Draws the dialog while it is open. @return the chosen file
   std::optional<std::filesystem::path> draw(bool isEscaped);
 
  private:
@@ -21,7 +22,7 @@ class FileList {
   bool isToOpen_ = false;
   std::filesystem::path folder_;
   std::vector<std::filesystem::path> folders_, files_;
-  std::string trouble_;
+  std::string error_;
 };
 
 }  // namespace viewer

@@ -6,16 +6,16 @@
 
 namespace viewer {
 
-/// Tells when files were changed by somebody.
+/// Detects changes of files.
 class FileWatch {
  public:
   FileWatch() = default;
-  /// Watches these from their present state on.
+  /// Starts to watch these files from their present state on.
   explicit FileWatch(std::vector<std::filesystem::path> files);
 
-  /// True once after one of them has been written or replaced and lies still since the last call:
-  /// it may be in the middle of being written otherwise. One that is removed counts when it is
-  /// back.
+  /// Returns true once after a file has been written or replaced and has not changed since the
+  /// previous call. Otherwise it may still be in the middle of being written. A removed file counts
+  /// as changed when it is back.
   [[nodiscard]] bool hasChanged();
   [[nodiscard]] bool isAnyMissing() const;
 

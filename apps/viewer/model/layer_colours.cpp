@@ -20,14 +20,14 @@ std::uint8_t displayByte(double unit) {
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(unit, 0.0, 1.0)));
 }
 
-/// Least and greatest of what is hit.
+/// Range of values over the hit pixels.
 struct ValueRange {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   void extendBy(double value) {
     low = std::min(low, value);
     high = std::max(high, value);
   }
-  /// 0 to 1; the middle where there is no range.
+  /// Position in the range, 0 to 1; 0.5 for an empty range.
   [[nodiscard]] double share(double value) const {
     return high > low ? (value - low) / (high - low) : 0.5;
   }
@@ -75,7 +75,7 @@ std::vector<std::uint8_t> depthColours(const render::Image& image) {
   for (std::size_t i = 0; i < image.pixelCount(); ++i)
     if (isHit(image, i)) range.extendBy(valueAt(z, i));
   return painted(image, [&](std::size_t i) {
-    const double grey = 1 - 0.85 * range.share(valueAt(z, i));  // never as dark as the background
+    const double grey = 1 - 0.85 * range.share(valueAt(z, i));  // brighter than the background
     return DisplayColour{grey, grey, grey};
   });
 }
@@ -111,7 +111,7 @@ Layer layerNamed(const std::string& name) {
   std::string all;
   for (const char* known : kLayerNames) all += (all.empty() ? "" : ", ") + std::string(known);
   throw levelset::UsageError(
-      fmt::format("levelsmith-view: --layer '{}' is none; give one of {}", name, all));
+      fmt::format("levelsmith-view: --layer '{}' is unknown; give one of {}", name, all));
 }
 
 DisplayColour divergingColour(double value) {
@@ -119,7 +119,7 @@ DisplayColour divergingColour(double value) {
                           kRed = {0.75, 0.16, 0.18};
   const double v = std::isnan(value) ? 0 : std::clamp(value, -1.0, 1.0);
   const DisplayColour& end = v < 0 ? kBlue : kRed;
-  const double share = std::sqrt(std::abs(v));  // small values are many: they are told apart, too
+  const double share = std::sqrt(std::abs(v));  // the square root separates the many small values
   DisplayColour colour;
   for (std::size_t c = 0; c < 3; ++c) colour[c] = kWhite[c] + (end[c] - kWhite[c]) * share;
   return colour;
@@ -127,7 +127,7 @@ DisplayColour divergingColour(double value) {
 
 DisplayColour idColour(std::uint32_t id) {
   if (id == 0) return {0.5, 0.5, 0.5};
-  // Hues a golden section apart are far from all before.
+  // Hues at golden-section steps stay far from all earlier ones.
   const double hue = 6 * std::fmod(0.58 + 0.61803398874989485 * (id - 1), 1.0);
   DisplayColour colour;
   constexpr std::array<double, 3> kMiddle = {0, 2, 4};

@@ -20,7 +20,7 @@ Loader::~Loader() {
 void Loader::open(const std::vector<std::filesystem::path>& files, long resolution, bool isReload) {
   if (job_) job_->isCancelled = true;
   const auto job = job_ = std::make_shared<Job>();
-  // Nobody waits for one that was given up: it ends at its next report, and holds its own job.
+  // The thread is detached: a cancelled job ends at its next progress report and owns its state.
   std::thread([job, files, resolution, isReload, wake = wake_] {
     Result result{.files = files, .model = nullptr, .failure = nullptr, .isReload = isReload};
     try {

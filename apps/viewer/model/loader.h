@@ -11,7 +11,7 @@
 
 namespace viewer {
 
-/// Reads models in the background, one after another; what is asked for last counts.
+/// Reads models in the background. Only the newest request counts.
 class Loader {
  public:
   /// @param wake  called from another thread when there is a result
@@ -26,11 +26,11 @@ class Loader {
     std::exception_ptr failure;
     bool isReload = false;
   };
-  /// Gives up what is being read.
+  /// Starts to read files and cancels a read in progress.
   void open(const std::vector<std::filesystem::path>& files, long resolution, bool isReload);
   [[nodiscard]] bool isLoading() const { return job_ != nullptr; }
   [[nodiscard]] double progress() const;
-  /// Once it is there.
+  /// Result of the read, once it is complete.
   [[nodiscard]] std::optional<Result> take();
 
  private:

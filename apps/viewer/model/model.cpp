@@ -33,7 +33,7 @@ FileKind kindOf(const fs::path& file) {
   return FileKind::Unknown;
 }
 
-/// Letters, digits and _ of a file's name, as expressions of solids ask.
+/// Converts a file name to a solid's name of letters, digits and _, as expressions require.
 std::string solidNameOf(const fs::path& file) {
   const std::string stem = file.stem().string();
   std::string name;
@@ -47,15 +47,15 @@ levelset::NarrowBand bandOfMesh(const fs::path& file, const OpenOptions& options
       file, {.attributes = false, .progress = levelset::subProgress(options.progress, 0, 0.2)});
   const Imath::V3d size = levelset::bounds(mesh).size();
   const double longest = std::max({size.x, size.y, size.z});
-  // A scan with holes is there to be looked at, too.
+  // Meshes with holes are accepted for viewing.
   return levelset::meshToBand(mesh, longest / static_cast<double>(options.resolution),
-                              {.signAnyway = true,
+                              {.acceptSign = true,
                                .searchSelfIntersections = false,
                                .progress = levelset::subProgress(options.progress, 0.2, 1)})
       .band;
 }
 
-/// Files of the level sets and meshes that a scene names; readScene() has judged it before.
+/// Files of the level sets and meshes of a scene that readScene() has read.
 std::vector<fs::path> solidFilesOf(const fs::path& scene) {
   std::vector<fs::path> files;
   std::ifstream stream(scene);
@@ -113,7 +113,7 @@ void measureModel(Model& model) {
 }  // namespace
 
 bool Model::canCut() const {
-  // The cut is an expression, within which nothing is seen through.
+  // Clipping uses an expression, which does not show transparent solids.
   const bool hidesNothing = scene.isOpaque() || !scene.csg.isEmpty();
   return !solidBounds.isEmpty() && !scene.solids.empty() && !scene.isBlended() && hidesNothing &&
          std::none_of(scene.solids.begin(), scene.solids.end(),
@@ -129,18 +129,18 @@ void requireReadable(const std::vector<fs::path>& files) {
   for (const fs::path& file : files) {
     const FileKind kind = kindOf(file);
     if (kind == FileKind::Unknown)
-      throw UsageError(fmt::format("open: '{}' is of no known format; give a file of {}",
-                                   file.string(), kFormats));
+      throw UsageError(
+          fmt::format("open: '{}' has an unknown format; use {}", file.string(), kFormats));
     std::error_code wrong;
     if (!fs::exists(file, wrong))
       throw levelset::IoError(
           fmt::format("open: '{}' does not exist; check its name", file.string()));
     if (kind == FileKind::Patch) continue;
     if (solid)
-      throw UsageError(
-          fmt::format("open: '{}' is a second solid beside '{}'; open one, or make a scene of both "
-                      "(levelsmith help scene)",
-                      file.string(), solid->string()));
+      throw UsageError(fmt::format(
+          "open: '{}' is a second solid after '{}'; open one of them, or combine both in a scene "
+          "(levelsmith help scene)",
+          file.string(), solid->string()));
     solid = &file;
   }
 }

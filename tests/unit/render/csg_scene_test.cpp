@@ -278,7 +278,7 @@ TEST(Thickness, IsTheSameOfAllRenderersAndFromWithin) {
 
 struct Crossing {
   double depth;
-  bool goesIn;
+  bool enters;
   std::array<int, 3> cell;
 };
 
@@ -296,7 +296,7 @@ std::vector<Crossing> allCrossings(const KernelSolid& solid, float x, float y) {
     tracer.trace(solid, pixel, hits, shapes);
     if (!hits.found[0]) break;
     all.push_back({solid.fan.depthAt(hits.t[0]),
-                   hits.found[0] == HitBlock::kGoesIn,
+                   hits.found[0] == HitBlock::kEnters,
                    {hits.x[0], hits.y[0], hits.z[0]}});
   }
   return all;
@@ -346,7 +346,7 @@ TEST(AllCrossings, ComeInTheirOrderInAndOut) {
         most = std::max(most, all.size());
         if (!all.empty()) ++crossed;
         for (std::size_t i = 0; i < all.size(); ++i) {
-          ASSERT_EQ(all[i].goesIn, i % 2 == 0);
+          ASSERT_EQ(all[i].enters, i % 2 == 0);
           if (i == 0) continue;
           ASSERT_GE(all[i].depth, all[i - 1].depth - 1e-3);
           if (all[i].cell == all[i - 1].cell) ++inOneCell;

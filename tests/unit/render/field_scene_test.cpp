@@ -315,10 +315,10 @@ TEST(FieldScene, IsDrawnOfCoarseValuesByBothRenderers) {
       const Image whole = renderCpu(scene, kDataOnly);
       double step = 0;
       for (Solid& solid : scene.solids) {
-        CoarseBand coarse = coarsened(solid.band, bits);
+        QuantizedBand coarse = quantized(solid.band, bits);
         solid.band = std::move(coarse.band);
-        solid.held = coarse.held;
-        step = std::max(step, static_cast<double>(coarse.held.step));
+        solid.quantization = coarse.quantization;
+        step = std::max(step, static_cast<double>(coarse.quantization.step));
       }
       expectJudged(scene, std::to_string(bits) + " bits");
       const Image image = renderCpu(scene, kDataOnly);

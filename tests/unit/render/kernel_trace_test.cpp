@@ -219,7 +219,7 @@ TEST(BrickPool, HoldsWhatTheSurfaceCrosses) {
   // Leaves that the surface does not cross are no bricks, and the others held only beside these.
   const std::size_t leaves = levelset::vdb(solid).tree().leafCount();
   EXPECT_GT(leaves, pool.brickCount() + 100);
-  EXPECT_EQ(pool.brickCount() + pool.besideCount + pool.blocksLeftOut, leaves);
+  EXPECT_EQ(pool.brickCount() + pool.haloCount + pool.blocksOmitted, leaves);
   std::size_t crossing = 0, set = 0, full = 0;
   for (const std::uint32_t word : pool.mask)
     set += static_cast<std::size_t>(__builtin_popcount(word));
@@ -246,7 +246,7 @@ TEST(BrickPool, HoldsWhatTellsTheCurvature) {
   for (const NarrowBand& solid : {ball(40), levelset::makeBox(V3d(60, 50, 3), V3d(0, 0, 7), 1)}) {
     const BrickPool pool = render::makeBricks(solid);
     const auto& tree = levelset::vdb(solid).tree();
-    EXPECT_GT(pool.besideCount, 0u);
+    EXPECT_GT(pool.haloCount, 0u);
     const auto valueAt = [&](int x, int y, int z) {
       const std::size_t page = static_cast<std::size_t>(
           ((x >> 6) * pool.pages[1] + (y >> 6)) * pool.pages[2] + (z >> 6));

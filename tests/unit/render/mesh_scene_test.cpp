@@ -10,7 +10,7 @@
 #include "levelset/solids/shapes.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
-#include "render/embree/mesh_rays.h"
+#include "render/meshes/mesh_rays.h"
 #include "render/gpu/gpu_renderer.h"
 #include "render/images/compare_images.h"
 #include "tests/support/render_scenes.h"
@@ -136,7 +136,7 @@ TEST(MeshScene, CastsShadowsOnLevelSetsAndTakesTheirs) {
   const auto meshOf = [](const V3d& middle, const V3d& a, const V3d& b) {
     return std::make_shared<const levelset::TriMesh>(sheet(middle, a, b));
   };
-  // Between the ball and the light, and out of sight.
+  // Between the ball and the light, and outside the view.
   Scene ball = leaningScene();
   ball.meshes.clear();
   Scene shaded = ball;

@@ -26,9 +26,9 @@ using support::sceneOf;
 using namespace render;
 
 Scene coarseScene(const NarrowBand& band, int bits) {
-  const CoarseBand coarse = coarsened(band, bits);
+  const QuantizedBand coarse = quantized(band, bits);
   Scene scene = sceneOf(coarse.band);
-  scene.solids[0].held = coarse.held;
+  scene.solids[0].quantization = coarse.quantization;
   scene.camera = sceneOf(band).camera;
   return scene;
 }
@@ -49,8 +49,8 @@ TEST(ValueBits, MoveTheSurfaceByHalfAStepAtMost) {
     const NarrowBand band = levelset::makeSphere(40 * voxel, V3d(0.3, 0.2, 0.1) * voxel, voxel);
     double last = 1;
     for (const int bits : {8, 16}) {
-      const CoarseBand coarse = coarsened(band, bits);
-      const double step = static_cast<double>(coarse.held.step) / voxel;
+      const QuantizedBand coarse = quantized(band, bits);
+      const double step = static_cast<double>(coarse.quantization.step) / voxel;
       EXPECT_NEAR(step, 6 / (std::exp2(bits) - 1),
                   1e-6 * step);  // a band of three voxels on each side
       EXPECT_LE(coarse.shift.largest, 0.5 * step * 1.01);
@@ -62,7 +62,7 @@ TEST(ValueBits, MoveTheSurfaceByHalfAStepAtMost) {
       last = coarse.shift.largest;
       EXPECT_EQ(coarse.band.activeVoxelCount(), band.activeVoxelCount());
       EXPECT_NEAR(coarse.band.halfWidth(), band.halfWidth(), 1e-6);
-      EXPECT_EQ(coarsened(coarse.band, bits).band.activeVoxelCount(), band.activeVoxelCount());
+      EXPECT_EQ(quantized(coarse.band, bits).band.activeVoxelCount(), band.activeVoxelCount());
     }
   }
 }
@@ -84,7 +84,7 @@ TEST(ValueBits, MakeTheTablesSmaller) {
       for (int b = 0; b < bits / 8; ++b)
         code |= codes.code[i * static_cast<std::size_t>(bits / 8) + static_cast<std::size_t>(b)]
                 << (8 * b);
-      ASSERT_EQ(codes.held.valueOf(code), pool.value[i]);
+      ASSERT_EQ(codes.quantization.valueOf(code), pool.value[i]);
     }
   }
 }

@@ -60,7 +60,7 @@ TEST(ProgressivePicture, FinishesWhatIsWantedLast) {
   View view = ballView(model);
   for (int i = 0; i < 20; ++i) {
     view.camera.from.x = 0.1 * i;
-    picture.want(view, {});
+    picture.request(view, {});
   }
   const auto frame = finished(picture, view);
   ASSERT_NE(frame, nullptr);
@@ -71,10 +71,10 @@ TEST(ProgressivePicture, FinishesWhatIsWantedLast) {
 TEST(ProgressivePicture, ShowsAnotherLayerOfTheSamePicture) {
   ProgressivePicture picture(Renderer::Cpu);
   const View view = ballView(ballModel());
-  picture.want(view, {});
+  picture.request(view, {});
   const auto first = finished(picture, view);
   ASSERT_NE(first, nullptr);
-  picture.want(view, {.layer = Layer::Normal});
+  picture.request(view, {.layer = Layer::Normal});
   std::shared_ptr<const Frame> second;
   for (int i = 0; i < 1000 && (!second || second == first); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -90,12 +90,12 @@ TEST(ProgressivePicture, SaysWhyAViewCannotBeDrawnAndGoesOn) {
   const auto model = ballModel();
   View view = ballView(model), blind = view;
   blind.camera.from = blind.camera.to;
-  picture.want(blind, {});
+  picture.request(blind, {});
   for (int i = 0; i < 1000 && !picture.failure(); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   ASSERT_TRUE(picture.failure());
   EXPECT_THROW(std::rethrow_exception(picture.failure()), levelset::UsageError);
-  picture.want(view, {});
+  picture.request(view, {});
   EXPECT_NE(finished(picture, view), nullptr);
 }
 
@@ -103,10 +103,10 @@ TEST(ProgressivePicture, DrawsPicturesOfOnePixelAndOfNothing) {
   ProgressivePicture picture(Renderer::Cpu);
   View view = ballView(ballModel());
   view.camera.width = view.camera.height = 1;
-  picture.want(view, {});
+  picture.request(view, {});
   EXPECT_NE(finished(picture, view), nullptr);
   view = ballView(std::make_shared<Model>());
-  picture.want(view, {});
+  picture.request(view, {});
   const auto frame = finished(picture, view);
   ASSERT_NE(frame, nullptr);
   EXPECT_FALSE(pick(*frame, 32, 24).has_value());
@@ -117,7 +117,7 @@ TEST(ClipPlane, ShowsThePlaneAndTheDistanceInIt) {
   View view = ballView(ballModel());
   for (const auto across : {ClipPlane::Across::Z, ClipPlane::Across::View}) {
     view.clip = ClipPlane{across, 0.25};
-    picture.want(view, {});
+    picture.request(view, {});
     const auto frame = finished(picture, view);
     ASSERT_NE(frame, nullptr);
     for (const int x : {32, 38}) {  // in the ball's section
@@ -155,7 +155,7 @@ TEST(ClipPlane, CutsWhatAnExpressionMakes) {
   scene.csg = render::CsgExpression("a - b", {"a", "b"});
   EXPECT_NEAR(scenePhi(scene, {-0.1, 0.05}), -0.05, 1e-15);
   EXPECT_NEAR(scenePhi(scene, {-0.1, -0.2}), 0.2, 1e-15);
-  CutScene cut(scene, Imath::Box3d(V3d(-1), V3d(1.5, 1, 1)), ClipPlane::Across::Y);
+  ClippedScene cut(scene, Imath::Box3d(V3d(-1), V3d(1.5, 1, 1)), ClipPlane::Across::Y);
   const render::Scene& result = cut.at({{0, 0.5, 0}, {0, 1, 0}});
   ASSERT_EQ(result.solids.size(), 3u);
   const char kept[3] = {1, 0, 0}, taken[3] = {1, 0, 1};

@@ -110,15 +110,15 @@ std::optional<Cost> costOfSmooth(Invocation& in) {
 
 // === morph
 
-FileSequence stepRow(const Invocation& in) {
+FileSequence stepSequence(const Invocation& in) {
   const std::string pattern = in.text("keep-steps");
-  FileSequence row(pattern);
-  if (!row.hasNumber() || !levelset::isBandFormat(pattern))
+  FileSequence sequence(pattern);
+  if (!sequence.hasNumber() || !levelset::isBandFormat(pattern))
     throw UsageError(
-        fmt::format("{}: '{}' names no row of .vdb files; put # where the number goes, as in "
+        fmt::format("{}: '{}' is not a sequence of .vdb files; write # for the number, as in "
                     "step_###.vdb",
                     in.where("keep-steps"), pattern));
-  return row;
+  return sequence;
 }
 
 double partOfTheWay(const Invocation& in) {
@@ -138,16 +138,16 @@ double partOfTheWay(const Invocation& in) {
 std::vector<std::string> stepFiles(const Invocation& in) {
   std::vector<std::string> files;
   if (!in.given("keep-steps")) return files;
-  const FileSequence row = stepRow(in);
+  const FileSequence sequence = stepSequence(in);
   const auto steps = static_cast<std::size_t>(in.integer("steps"));
-  for (std::size_t i = 1; i <= steps; ++i) files.push_back(row.file(i).string());
+  for (std::size_t i = 1; i <= steps; ++i) files.push_back(sequence.file(i).string());
   return files;
 }
 
 constexpr long kMostSteps = 100000;
 
 void validateMorph(const Invocation& in) {
-  if (in.given("keep-steps")) (void)stepRow(in);
+  if (in.given("keep-steps")) (void)stepSequence(in);
   if (partOfTheWay(in) < 1 && in.given("tolerance"))
     throw UsageError(
         "morph: --tolerance tells when the target is reached, and --until ends before; "
@@ -170,8 +170,8 @@ Value morph(Invocation& in) {
   options.mask = maskOf(in);
   if (in.given("tolerance")) options.tolerance = in.length("tolerance");
   if (in.given("keep-steps")) {
-    options.keep = [row = stepRow(in)](const NarrowBand& step, int number) {
-      levelset::writeBand(row.file(static_cast<std::size_t>(number)), step);
+    options.keep = [sequence = stepSequence(in)](const NarrowBand& step, int number) {
+      levelset::writeBand(sequence.file(static_cast<std::size_t>(number)), step);
     };
   }
   NarrowBand result = levelset::morph(in.band(0), in.band(1), options);

@@ -46,48 +46,51 @@ std::size_t keyCount(const Invocation& in) {
 
 /// @param what  of their content
 /// @param isKnown  is the format one that holds it?
-FileSequence rowOf(const Invocation& in, const char* option, const char* example, bool isKnown) {
-  FileSequence row(in.text(option));
-  if (row.hasNumber() && isKnown) return row;
+FileSequence sequenceOf(const Invocation& in, const char* option, const char* example,
+                        bool isKnown) {
+  FileSequence sequence(in.text(option));
+  if (sequence.hasNumber() && isKnown) return sequence;
   throw UsageError(
-      fmt::format("{}: '{}' names no row of such files; put # where the number goes, as in {}",
-                  in.where(option), row.pattern(), example));
+      fmt::format("{}: '{}' is not a sequence of such files; write # for the number, as in {}",
+                  in.where(option), sequence.pattern(), example));
 }
 
-FileSequence outRow(const Invocation& in) {
+FileSequence outSequence(const Invocation& in) {
   const std::string pattern = in.text("out");
   const bool isMesh = levelset::isMeshFormat(pattern);
-  return rowOf(in, "out", mapsMesh(in) ? "frame_###.ply" : "frame_###.vdb",
-               isMesh || (levelset::isBandFormat(pattern) && !mapsMesh(in)));
+  return sequenceOf(in, "out", mapsMesh(in) ? "frame_###.ply" : "frame_###.vdb",
+                    isMesh || (levelset::isBandFormat(pattern) && !mapsMesh(in)));
 }
 
-FileSequence baseRow(const Invocation& in) {
-  return rowOf(in, "base-frames", "base_###.vdb", levelset::isBandFormat(in.text("base-frames")));
+FileSequence baseSequence(const Invocation& in) {
+  return sequenceOf(in, "base-frames", "base_###.vdb",
+                    levelset::isBandFormat(in.text("base-frames")));
 }
 
-FileSequence textureRow(const Invocation& in) {
+FileSequence textureSequence(const Invocation& in) {
   const std::string pattern = in.text("texture-frames");
-  return rowOf(in, "texture-frames", mapsMesh(in) ? "texture_###.ply" : "texture_###.vdb",
-               mapsMesh(in) ? levelset::isMeshFormat(pattern) : levelset::isBandFormat(pattern));
+  return sequenceOf(
+      in, "texture-frames", mapsMesh(in) ? "texture_###.ply" : "texture_###.vdb",
+      mapsMesh(in) ? levelset::isMeshFormat(pattern) : levelset::isBandFormat(pattern));
 }
 
 /// The file of a frame, 1 or more.
-std::filesystem::path frameFile(const Invocation& in, const FileSequence& row, const char* first,
-                                std::size_t frame) {
-  return row.file(static_cast<std::size_t>(in.integer(first)) + frame - 1);
+std::filesystem::path frameFile(const Invocation& in, const FileSequence& sequence,
+                                const char* first, std::size_t frame) {
+  return sequence.file(static_cast<std::size_t>(in.integer(first)) + frame - 1);
 }
 
 std::vector<std::string> outFiles(const Invocation& in) {
   std::vector<std::string> files;
-  const FileSequence row = outRow(in);
-  for (std::size_t f = 0; f < framesOf(in); ++f) files.push_back(row.file(f).string());
+  const FileSequence sequence = outSequence(in);
+  for (std::size_t f = 0; f < framesOf(in); ++f) files.push_back(sequence.file(f).string());
   return files;
 }
 
 /// Refuses what is missing before anything is computed.
-void requireFrames(const Invocation& in, const FileSequence& row, const char* first) {
+void requireFrames(const Invocation& in, const FileSequence& sequence, const char* first) {
   for (std::size_t f = 1; f < framesOf(in); ++f) {
-    const std::filesystem::path file = frameFile(in, row, first, f);
+    const std::filesystem::path file = frameFile(in, sequence, first, f);
     if (levelset::isMeshFormat(file)) {
       (void)levelset::meshFileInfo(file);
     } else {
@@ -96,17 +99,17 @@ void requireFrames(const Invocation& in, const FileSequence& row, const char* fi
   }
 }
 
-void requireApart(const Invocation& in, const char* row, const char* first) {
-  if (!in.given(row)) return;
+void requireApart(const Invocation& in, const char* sequence, const char* first) {
+  if (!in.given(sequence)) return;
   std::set<std::filesystem::path> read;
-  const FileSequence files(in.text(row));
+  const FileSequence files(in.text(sequence));
   for (std::size_t f = 1; f < framesOf(in); ++f)
     read.insert(levelset::canonicalFile(frameFile(in, files, first, f)));
   for (const std::string& file : outFiles(in)) {
     const std::filesystem::path written = levelset::canonicalFile(file);
     if (written.empty() || !read.contains(written)) continue;
-    throw UsageError(
-        fmt::format("animate: --out would write over '{}' of --{}; use other names", file, row));
+    throw UsageError(fmt::format("animate: --out would write over '{}' of --{}; use other names",
+                                 file, sequence));
   }
 }
 
@@ -148,17 +151,17 @@ void validateAnimate(const Invocation& in) {
   if (in.integer("frames") > kMostFrames)
     throw UsageError(fmt::format("animate: --frames {} are too many; give at most {}",
                                  in.integer("frames"), kMostFrames));
-  (void)outRow(in);
-  if (in.given("base-frames")) (void)baseRow(in);
-  if (in.given("texture-frames")) (void)textureRow(in);
-  for (const auto& [first, row] :
+  (void)outSequence(in);
+  if (in.given("base-frames")) (void)baseSequence(in);
+  if (in.given("texture-frames")) (void)textureSequence(in);
+  for (const auto& [first, sequence] :
        {std::pair{"base-first", "base-frames"}, std::pair{"texture-first", "texture-frames"}}) {
-    if (in.given(first) && !in.given(row))
-      throw UsageError(fmt::format("animate: --{} goes with --{}", first, row));
+    if (in.given(first) && !in.given(sequence))
+      throw UsageError(fmt::format("animate: --{} goes with --{}", first, sequence));
     if (in.integer(first) < 0)
       throw UsageError(
           fmt::format("{}: no file has the number {}", in.where(first), in.integer(first)));
-    requireApart(in, row, first);
+    requireApart(in, sequence, first);
   }
   if (in.number("drift") < 1)
     throw UsageError(fmt::format(
@@ -288,9 +291,9 @@ mapping::AnimationOptions animationOptions(Invocation& in,
     options.carry = mapping::CarryRule::Rigid;
   }
   if (in.given("base-frames")) {
-    options.bases = [row = baseRow(in), &in,
+    options.bases = [sequence = baseSequence(in), &in,
                      told = std::make_shared<std::set<std::size_t>>()](std::size_t frame) {
-      return readFrame(in, frame, frameFile(in, row, "base-first", frame), *told);
+      return readFrame(in, frame, frameFile(in, sequence, "base-first", frame), *told);
     };
   }
   return options;
@@ -308,14 +311,14 @@ void tellAnimation(Invocation& in, const mapping::AnimationReport& report) {
   mapping::Drift worst;
   for (const mapping::FrameReport& frame : report.frames) {
     nlohmann::ordered_json entry;
-    entry["farthest_way"] = frame.farthestWay;
+    entry["farthest_way"] = frame.farthestMove;
     entry["drift"] = {frame.drift.least, frame.drift.most};
     entry["remade"] = frame.isRemade;
     entry["skipped"] = frame.skipped;
     if (frame.corners.size() == 1)
       for (const Imath::V3d& c : frame.corners.front()) entry["corners"].push_back({c.x, c.y, c.z});
     json["frame"].push_back(std::move(entry));
-    farthest = std::max(farthest, frame.farthestWay);
+    farthest = std::max(farthest, frame.farthestMove);
     if (frame.drift.factor() > worst.factor()) worst = frame.drift;
   }
   in.notes.detailsJson = json.dump();
@@ -354,7 +357,7 @@ std::vector<Patch> improvedAt(Invocation& in, const mapping::PatchFrame& frame,
 /// Writes meshes frame by frame, and warns once of what their format leaves out.
 class MeshWriter {
  public:
-  explicit MeshWriter(Invocation& in) : in_(in), out_(outRow(in)) {}
+  explicit MeshWriter(Invocation& in) : in_(in), out_(outSequence(in)) {}
   void write(std::size_t frame, const levelset::TriMesh& mesh) {
     const std::filesystem::path file = out_.file(frame);
     levelset::writeMesh(file, mesh);
@@ -399,7 +402,7 @@ Value animateMesh(Invocation& in, const std::vector<mapping::AnimationKey>& keys
         bool isReused = frame.isUnchanged;
         if (frame.index > 0 && in.given("texture-frames")) {
           levelset::TriMesh next =
-              levelset::readMesh(frameFile(in, textureRow(in), "texture-first", frame.index),
+              levelset::readMesh(frameFile(in, textureSequence(in), "texture-first", frame.index),
                                  {.maxMemory = in.maxMemory});
           isReused = isReused && isSame(next, texture);
           texture = std::move(next);
@@ -427,8 +430,8 @@ Value animateMesh(Invocation& in, const std::vector<mapping::AnimationKey>& keys
 }
 
 Value animate(Invocation& in) {
-  if (in.given("base-frames")) requireFrames(in, baseRow(in), "base-first");
-  if (in.given("texture-frames")) requireFrames(in, textureRow(in), "texture-first");
+  if (in.given("base-frames")) requireFrames(in, baseSequence(in), "base-first");
+  if (in.given("texture-frames")) requireFrames(in, textureSequence(in), "texture-first");
   const Imath::Box3d textureBox = textureBoxOf(in);
   const std::vector<mapping::AnimationKey> keys = keysOf(in, textureBox);
   if (mapsMesh(in)) return animateMesh(in, keys);
@@ -443,11 +446,11 @@ Value animate(Invocation& in) {
   }
   std::set<std::size_t> told;
   if (in.given("texture-frames")) {
-    options.textures = [row = textureRow(in), &in, &told](std::size_t frame) {
-      return readFrame(in, frame, frameFile(in, row, "texture-first", frame), told);
+    options.textures = [sequence = textureSequence(in), &in, &told](std::size_t frame) {
+      return readFrame(in, frame, frameFile(in, sequence, "texture-first", frame), told);
     };
   }
-  const FileSequence out = outRow(in);
+  const FileSequence out = outSequence(in);
   MeshWriter writer(in);
   levelset::TriMesh mesh;  // of the frame before, where that is what is written
   NarrowBand last;

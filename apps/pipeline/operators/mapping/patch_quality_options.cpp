@@ -12,7 +12,7 @@
 #include "levelset/error.h"
 #include "mapping/distortion/jacobian_field.h"
 #include "mapping/maps/layer_map.h"
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/placement/shared_particles.h"
 #include "mapping/rbf/rbf_map.h"
 #include "mapping/textures/geometric_texture.h"
@@ -34,13 +34,13 @@ nlohmann::ordered_json spreadOf(const mapping::Spread& spread) {
   return json;
 }
 
-nlohmann::ordered_json foldsJson(const mapping::ShellFolds& folds) {
+nlohmann::ordered_json foldsJson(const mapping::FoldCount& folds) {
   return {{"folded_cells", folds.folded},
           {"cells", folds.cells},
           {"min_jacobian", folds.leastJacobian}};
 }
 
-nlohmann::ordered_json energyJson(const mapping::ShellDistortion& distortion) {
+nlohmann::ordered_json energyJson(const mapping::ElementDistortion& distortion) {
   return {{"energy", distortion.mean},
           {"median", distortion.median},
           {"percent_99", distortion.percent99},
@@ -55,12 +55,12 @@ bool isRelaxed(const Invocation& in) {
 }
 
 /// @param part, parts  which of the patches, for the progress
-mapping::ShellOptions shellOptions(const Invocation& in, const mapping::Patch& patch, double sink,
-                                   std::size_t part, std::size_t parts) {
+mapping::UntangleOptions shellOptions(const Invocation& in, const mapping::Patch& patch,
+                                      double sink, std::size_t part, std::size_t parts) {
   const auto share = [&](std::size_t n) {
     return static_cast<double>(n) / static_cast<double>(parts);
   };
-  return {.sink = sink / patch.height,
+  return {.embedDepth = sink / patch.height,
           .freeSides = in.text("sides") == "free",
           .maxMemory = in.maxMemory,
           .progress = levelset::subProgress(in.progress, share(part), share(part + 1))};
@@ -68,13 +68,13 @@ mapping::ShellOptions shellOptions(const Invocation& in, const mapping::Patch& p
 
 void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
                    double sink) {
-  mapping::ShellFolds before, after;
+  mapping::FoldCount before, after;
   before.leastJacobian = after.leastJacobian = HUGE_VAL;
   const std::size_t parts = improved.patches.size() * (isRelaxed(in) ? 2 : 1);
   for (mapping::Patch& patch : improved.patches) {
     const auto part = static_cast<std::size_t>(&patch - improved.patches.data());
-    mapping::Unfolding result =
-        mapping::unfold(base, patch, shellOptions(in, patch, sink, part, parts));
+    mapping::Untangling result =
+        mapping::untangle(base, patch, shellOptions(in, patch, sink, part, parts));
     improved.figures["unfold"].push_back({{"before", foldsJson(result.before)},
                                           {"after", foldsJson(result.after)},
                                           {"iterations", result.iterations},
@@ -108,9 +108,9 @@ void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatc
   const std::size_t parts = first + improved.patches.size();
   for (mapping::Patch& patch : improved.patches) {
     const auto part = first + static_cast<std::size_t>(&patch - improved.patches.data());
-    mapping::ShellOptions options = shellOptions(in, patch, sink, part, parts);
+    mapping::UntangleOptions options = shellOptions(in, patch, sink, part, parts);
     // What is left out afterwards need not be mended.
-    if (in.flag("skip-folds") && mapping::countFolds(patch, options.sink).folded > 0) {
+    if (in.flag("skip-folds") && mapping::countFolds(patch, options.embedDepth).folded > 0) {
       improved.figures["relax"].push_back(nullptr);
       continue;
     }
@@ -139,33 +139,33 @@ struct JudgedMap {
 
 JudgedMap judgeMap(Invocation& in, const mapping::Patch& patch, double sink, double voxel) {
   mapping::JacobianFieldOptions options{
-      .voxelSize = voxel, .sink = sink / patch.height, .maxMemory = in.maxMemory};
+      .voxelSize = voxel, .embedDepth = sink / patch.height, .maxMemory = in.maxMemory};
   const auto [u, v] = sidesOf(patch);  // in place of a texture's
   const V3d size(u, v, patch.height);
   const auto survey = [&](const std::vector<mapping::MapSample>& samples) {
     return mapping::surveyDistortion(samples, size, patch.mirrored);
   };
   if (in.text("map") == "mesh") {
-    mapping::FoldCertificate certificate = mapping::certifyLayers(patch, options.sink);
+    mapping::FoldCertificate certificate = mapping::certifyLayers(patch, options.embedDepth);
     levelset::FieldGrid field = mapping::jacobianField(patch, certificate, options);
-    return {std::move(certificate), survey(mapping::sampleLayerMap(patch, options.sink)),
+    return {std::move(certificate), survey(mapping::sampleLayerMap(patch, options.embedDepth)),
             std::move(field)};
   }
   if (in.text("map") == "shell") {
-    levelset::requireMemory(mapping::ShellMap::estimateBytes(patch), in.maxMemory, "folds");
-    const mapping::ShellMap map(patch, {.sink = options.sink});
-    mapping::FoldCertificate certificate = mapping::certifyShell(map, patch.mirrored);
+    levelset::requireMemory(mapping::PrismMap::estimateBytes(patch), in.maxMemory, "folds");
+    const mapping::PrismMap map(patch, {.embedDepth = options.embedDepth});
+    mapping::FoldCertificate certificate = mapping::certifyPrisms(map, patch.mirrored);
     levelset::FieldGrid field = mapping::jacobianField(patch, map, certificate, options);
     return {std::move(certificate), survey(map.samples()), std::move(field)};
   }
   mapping::TextureCost cost;
-  mapping::JudgedRbf judged = mapping::judgedRbf(patch, options.sink,
-                                                 {.kernel = kernelOf(in),
-                                                  .lambdaNear = in.number("lambda-near"),
-                                                  .lambdaFar = in.number("lambda-far"),
-                                                  .maxMemory = in.maxMemory,
-                                                  .progress = in.progress},
-                                                 cost);
+  mapping::CertifiedRbf judged = mapping::certifiedRbf(patch, options.embedDepth,
+                                                       {.kernel = kernelOf(in),
+                                                        .lambdaNear = in.number("lambda-near"),
+                                                        .lambdaFar = in.number("lambda-far"),
+                                                        .maxMemory = in.maxMemory,
+                                                        .progress = in.progress},
+                                                       cost);
   if (judged.isExtrapolated)
     in.notes.notes.push_back(
         "folds: where the texture is sunk no particles hold the map, since columns that go "
@@ -183,10 +183,10 @@ std::string verdictSentence(const mapping::FoldCertificate& certificate) {
   if (certificate.verdict() == mapping::FoldVerdict::Undecided)
     return fmt::format("no fold was met, but {:.2g} of the volume is not certified",
                        certificate.undecidedShare);
-  const mapping::FoldPlace& worst = certificate.worst.front();
+  const mapping::FoldPoint& worst = certificate.worst.front();
   return fmt::format(
       "the map folds, most at ({:.6g}, {:.6g}, {:.6g}), u, v, w = {:.3g}, {:.3g}, {:.3g}",
-      worst.place.x, worst.place.y, worst.place.z, worst.uvw.x, worst.uvw.y, worst.uvw.z);
+      worst.position.x, worst.position.y, worst.position.z, worst.uvw.x, worst.uvw.y, worst.uvw.z);
 }
 
 Value folds(Invocation& in) {
@@ -321,8 +321,8 @@ nlohmann::ordered_json certificateJson(const mapping::FoldCertificate& certifica
   json["undecided_share"] = certificate.undecidedShare;
   json["pieces"] = certificate.pieces;
   json["worst"] = nlohmann::ordered_json::array();
-  for (const mapping::FoldPlace& fold : certificate.worst)
-    json["worst"].push_back({{"place", {fold.place.x, fold.place.y, fold.place.z}},
+  for (const mapping::FoldPoint& fold : certificate.worst)
+    json["worst"].push_back({{"place", {fold.position.x, fold.position.y, fold.position.z}},
                              {"uvw", {fold.uvw.x, fold.uvw.y, fold.uvw.z}},
                              {"jacobian", fold.jacobian}});
   return json;

@@ -61,12 +61,12 @@ mapping::TextureOptions textureOptions(Invocation& in) {
   mapping::TextureOptions options;
   if (in.flag("carve")) options.merge = mapping::TextureMerge::Carve;
   if (in.flag("alone")) options.merge = mapping::TextureMerge::Alone;
-  options.sink = in.length("sink");
+  options.embedDepth = in.length("sink");
   options.blend = in.length("blend");
   if (in.given("texture-box")) options.textureBox = in.box("texture-box");
   if (in.given("voxel")) options.voxelSize = in.length("voxel");
   options.halfWidth = in.number("half-width");
-  if (in.text("map") == "shell") options.map = mapping::TextureMap::Shell;
+  if (in.text("map") == "shell") options.map = mapping::TextureMap::Prism;
   options.mapTolerance = in.number("map-tolerance");
   options.rbf.kernel = kernelOf(in);
   options.rbf.lambdaNear = in.number("lambda-near");
@@ -79,7 +79,7 @@ mapping::TextureOptions textureOptions(Invocation& in) {
 
 mapping::MeshTextureOptions meshTextureOptions(Invocation& in) {
   mapping::MeshTextureOptions options;
-  options.sink = in.length("sink");
+  options.embedDepth = in.length("sink");
   if (in.given("texture-box")) options.textureBox = in.box("texture-box");
   options.allowFolds = in.flag("allow-folds");
   options.skipFolds = in.flag("skip-folds");

@@ -182,9 +182,9 @@ void coarsen(Invocation& in, render::Scene& scene) {
   render::SurfaceShift most;
   for (render::Solid& solid : scene.solids) {
     if (solid.band.isEmpty()) continue;
-    render::CoarseBand coarse = render::coarsened(solid.band, bits);
+    render::QuantizedBand coarse = render::quantized(solid.band, bits);
     solid.band = std::move(coarse.band);
-    solid.held = coarse.held;
+    solid.quantization = coarse.quantization;
     most.largest = std::max(most.largest, coarse.shift.largest);
     most.rms = std::max(most.rms, coarse.shift.rms);
   }
@@ -252,14 +252,15 @@ RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&)
   const Imath::Box3d all = grown(plan.bounds, plan.halfWidth * plan.voxelSize);
   render::Scene scene;
   scene.camera = cameraOf(in, plan.bounds);
-  const render::FrustumCulling need(scene, {.style = {.style = style}}, all);
+  const render::FrustumCulling culling(scene, {.style = {.style = style}}, all);
   constexpr int kCells = 24;
   const Imath::V3d side = all.size() / kCells;
   Imath::Box3d seen;
   for (int i = 0; i < kCells * kCells * kCells; ++i) {
     const Imath::V3d low =
         all.min + side * Imath::V3d(i % kCells, i / kCells % kCells, i / (kCells * kCells));
-    if (need.needs(low + side / 2, side.length() / 2)) seen.extendBy(Imath::Box3d(low, low + side));
+    if (culling.keeps(low + side / 2, side.length() / 2))
+      seen.extendBy(Imath::Box3d(low, low + side));
   }
   if (seen.isEmpty()) return {};  // nothing is seen, and that has to be told of the whole
   constexpr double kRead = 8;     // voxels beside what is seen: by normals, curvatures and splines

@@ -44,7 +44,7 @@ double longestSide(const Value& value) {
 
 Value levelSet(Invocation& in) {
   levelset::MeshToBandOptions options{.halfWidth = in.number("half-width"),
-                                      .signAnyway = in.flag("sign-anyway"),
+                                      .acceptSign = in.flag("sign-anyway"),
                                       .searchSelfIntersections = !in.flag("trust-mesh"),
                                       .roi = in.roi,
                                       .maxMemory = in.maxMemory,
@@ -55,17 +55,17 @@ Value levelSet(Invocation& in) {
                                      : SignMode::Auto;
   options.nesting = in.text("nested") == "orientation" ? levelset::Nesting::Orientation
                                                        : levelset::Nesting::Parity;
-  options.certified = [&](const SignCertificate& certificate) {
+  options.onCertificate = [&](const SignCertificate& certificate) {
     in.notes.certificateJson = certificateJson(certificate);
     in.notes.notes.push_back(describe(certificate));
   };
   levelset::MeshToBandResult result =
       levelset::meshToBand(in.mesh(), in.voxelSize(longestSide(in.operands[0])), options);
-  if (options.signAnyway && result.band.zeroSetBounds().isEmpty()) {
+  if (options.acceptSign && result.band.zeroSetBounds().isEmpty()) {
     in.notes.warnings.push_back(
         "no grid point lies inside: the band holds distances to the mesh and no surface; close the "
         "mesh to get a solid");
-  } else if (options.signAnyway && result.certificate.ambiguousShare > levelset::kAmbiguousLimit) {
+  } else if (options.acceptSign && result.certificate.ambiguousShare > levelset::kAmbiguousLimit) {
     in.notes.warnings.push_back(
         fmt::format("the sign is a guess at a share of {:.2g} of the voxels beside the surface",
                     result.certificate.ambiguousShare));
@@ -103,20 +103,20 @@ Value surfaceBand(Invocation& in) {
       {.halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress});
   in.notes.notes.push_back(fmt::format("{} border edges, {} triangles dropped", result.borderEdges,
                                        result.droppedTriangles));
-  if (result.cutVoxels > 0)
+  if (result.removedVoxels > 0)
     in.notes.notes.push_back(
         fmt::format("{} voxels lie half way between the front of one part of the surface and the "
                     "back of another, and are cut out: patches cannot pass there",
-                    result.cutVoxels));
+                    result.removedVoxels));
   return Value(result.band);
 }
 
 void validateSurfaceBand(const Invocation& in) {
   requireVoxelSize(in);
-  if (in.number("half-width") < levelset::kLeastSurfaceHalfWidth) {
+  if (in.number("half-width") < levelset::kMinSurfaceHalfWidth) {
     throw levelset::UsageError(
         fmt::format("surface-band: --half-width is {} voxels; give at least {}",
-                    in.text("half-width"), levelset::kLeastSurfaceHalfWidth));
+                    in.text("half-width"), levelset::kMinSurfaceHalfWidth));
   }
 }
 
@@ -142,7 +142,7 @@ Value mesh(Invocation& in) {
   if (in.operands[0].kind() == Kind::Patch) {
     return Value(meshOfPatches(
         in.operands[0].patch().patches,
-        in.flag("sheets") ? mapping::PatchMeshKind::Sheets : mapping::PatchMeshKind::Shell));
+        in.flag("sheets") ? mapping::PatchMeshKind::Sheets : mapping::PatchMeshKind::Solid));
   }
   return Value(levelset::bandToMesh(
       in.band(),

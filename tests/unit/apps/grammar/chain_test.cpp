@@ -65,12 +65,12 @@ TEST(Chain, TakesOperandsByName) {
 
 TEST(Chain, RefusesUnknownWords) {
   EXPECT_REFUSAL("spere --radius 1", "did you mean 'sphere'");
-  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! run chain.txt", "run: stands alone");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! run chain.txt", "run: must be the only action");
   EXPECT_REFUSAL("sphere --raduis 1 --voxel 0.1", "did you mean --radius");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 --threads 2", "before the first action");
-  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! offset 1 2", "what is '2' for");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! offset 1 2", "unexpected argument '2'");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! union @nobody @else",
-                 "nothing is named '@nobody'");
+                 "no result is named '@nobody'");
 }
 
 TEST(Chain, RefusesMalformedChains) {
@@ -88,13 +88,13 @@ TEST(Chain, RefusesNumbersBeforeAnythingRuns) {
     EXPECT_NE(refusal(std::string("sphere --voxel 0.1 --radius=") + bad), "accepted") << bad;
   EXPECT_REFUSAL("sphere --radius 1 --voxel 2vx", "cannot be given in voxels");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 1 ! offset 2cm", "unknown unit");
-  EXPECT_REFUSAL("sphere --radius 1 --voxel 1 ! render a.png --size 0x0", "nothing to show");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 1 ! render a.png --size 0x0", "is empty");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 1 --center 1,2", "not a point");
 }
 
 TEST(Chain, ChecksOperandsAndTheirKinds) {
   EXPECT_REFUSAL("offset 1", "needs 1 operand");
-  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! union", "needs 2 operands and finds 1");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! union", "needs 2 operands but has 1");
   EXPECT_REFUSAL("read a.ply ! offset 1", "put 'level-set' before it");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! level-set --voxel 1", "put 'mesh' before it");
   EXPECT_REFUSAL(
@@ -103,7 +103,7 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! write p.patch", "cannot be written as 'p.patch'");
   EXPECT_REFUSAL(
       "sphere --radius 1 --voxel 0.1 ! patch --at 0,0,1 --size 1,1 --height 1 ! offset 1",
-      "is a patch, a level set is needed; 'texture' makes");
+      "is a patch, but a level set is needed; 'texture' builds");
   const std::string onto =
       "sphere --radius 3 --voxel 0.2 --as b ! patch @b --at 0,0,3 --size 2,2 --height 1 --as p ! ";
   EXPECT_REFUSAL(onto + "read a.ply --as t ! texture @b @t @p", "with `level-set`, or move its");
@@ -128,9 +128,9 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
 
 TEST(Chain, GivesStandardStreamsToOneUserOnly) {
   EXPECT_REFUSAL("sphere --radius 1 --voxel 1 ! write - --format vdb ! measure --json",
-                 "standard output is used already");
+                 "standard output is already used");
   EXPECT_REFUSAL("--report - sphere --radius 1 --voxel 1 ! measure --json", "--report");
-  EXPECT_REFUSAL("read - --format ply ! read - --format ply", "standard input is used already");
+  EXPECT_REFUSAL("read - --format ply ! read - --format ply", "standard input is already used");
   EXPECT_REFUSAL("info -", "info: '-' has no extension to tell the format; give --format");
   EXPECT_REFUSAL("info a.xyz", "no known format");
   EXPECT_EQ(refusal("sphere --radius 1 --voxel 1 ! measure ! check"), "accepted");

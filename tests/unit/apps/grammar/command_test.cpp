@@ -119,17 +119,17 @@ TEST_F(Command, NamesWhoSpeaksOnce) {
   const std::string ball = "sphere --radius 1 --voxel 0.1 ! ";
   const auto cut = levelsmith("--report r.json sphere --radius 1 --voxel 0.1 --half-width 4 ! " +
                               ball + "union ! measure");
-  EXPECT_NE(cut.err.find("levelsmith: union: operand 1 cut to half width 3 voxels\n"),
+  EXPECT_NE(cut.err.find("levelsmith: union: operand 1 was narrowed to a half width of 3 voxels\n"),
             std::string::npos)
       << cut.err;
   const Json notes = Json::parse(support::slurp(folder_ / "r.json"))["steps"][2]["notes"];
-  EXPECT_EQ(notes[0], "union: operand 1 cut to half width 3 voxels");
+  EXPECT_EQ(notes[0], "union: operand 1 was narrowed to a half width of 3 voxels");
 
   const auto says = [&](const support::Outcome& outcome, const std::string& start) {
     EXPECT_TRUE(outcome.err.starts_with(start)) << outcome.err;
   };
   says(levelsmith(ball + "sphere --radius 1 --center 9,0,0 --voxel 0.1 ! blend --radius 0.3"),
-       "levelsmith: blend: the surfaces do not meet");
+       "levelsmith: blend: the surfaces do not intersect");
   says(levelsmith("--threads 0 " + ball + "measure"), "levelsmith: --threads: ");
   says(levelsmith("spere"), "levelsmith: there is no action");
   says(shell(command() + " " + ball + "measure --json > /dev/full"),
@@ -252,7 +252,7 @@ TEST_F(Command, DryRunResolvesEveryLength) {
 TEST_F(Command, DryRunRefusesAsTheRunWould) {
   for (const char* run : {"", "--dry-run "}) {
     EXPECT_REFUSED(levelsmith(std::string(run) + "sphere --radius 1 --voxel 5"), 3,
-                   "larger than the whole shape");
+                   "larger than the longest side of the shape");
     EXPECT_REFUSED(levelsmith(std::string(run) + "sphere --radius 1 --voxel 1e-10"), 4, "32 bits");
     EXPECT_REFUSED(levelsmith(std::string(run) + "sphere --radius 1e300 --voxel 1e299"), 3,
                    "change the unit of length");

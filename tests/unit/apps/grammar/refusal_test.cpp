@@ -60,10 +60,10 @@ TEST_F(Refusal, UsageIsTwo) {
   EXPECT_REFUSED(levelsmith("sphere --radius -1 --voxel 0.1"), 2, "positive");
   EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! offset nan"), 2, "finite");
   EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! render a.png --size 0x0"), 2,
-                 "nothing to show");
+                 "is empty");
   EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! write a.xyz"), 2, "format");
   EXPECT_REFUSED(levelsmith("sphere --radius 1"), 2, "--voxel");
-  EXPECT_REFUSED(levelsmith("-v help"), 2, "help stands alone");
+  EXPECT_REFUSED(levelsmith("-v help"), 2, "help must be the only action");
   writeTetrahedron("tetra.ply");
   for (const char* bad : {"0", "-0.1", "nan", "inf", "2vx"})
     EXPECT_REFUSED(levelsmith(toBand("tetra.ply", std::string("--voxel ") + bad)), 2,
@@ -83,7 +83,7 @@ TEST_F(Refusal, PatchesAboutAPointOfASolidThatIsTooSmallSayThatItBends) {
                  3, "bends too much for a patch of size 10,10");
   EXPECT_REFUSED(levelsmith(ball + "scatter @ball --count 3 --size 10,10 --height 0.1 ! mesh ! "
                                    "write a.ply"),
-                 3, "none of");
+                 3, "no patch could be built");
 }
 
 TEST_F(Refusal, TexturesSunkThroughTheirBaseEndAtOnce) {
@@ -92,7 +92,7 @@ TEST_F(Refusal, TexturesSunkThroughTheirBaseEndAtOnce) {
                  "--as t ! patch @ball --at 1,0,0 --size 1,1 --height 0.2 --as p ! "
                  "texture @ball @t @p --sink 1e6 ! write a.vdb",
                  10),
-      3, "larger than the base");
+      3, "exceeds the diagonal of the base");
 }
 
 /// A chain whose end cannot work is refused before its beginning runs: within a second, though the
@@ -109,9 +109,9 @@ TEST_F(Refusal, WhatCanBeToldComesBeforeTheWork) {
   soon("render a.jpg", 2, "no known format");
   soon("render a.png --samples 4294967297", 2, "too many");
   soon("render - --format exr --png -", 2, "cannot share standard output");
-  soon("render - --format exr ! write - --format vdb", 2, "used already");
-  soon("render a.exr --png - ! write - --format vdb", 2, "used already");
-  soon("write /dev/stdout --format vdb ! measure --json", 2, "used already");
+  soon("render - --format exr ! write - --format vdb", 2, "already used");
+  soon("render a.exr --png - ! write - --format vdb", 2, "already used");
+  soon("write /dev/stdout --format vdb ! measure --json", 2, "already used");
   soon("render a.exr --png ./a.exr", 2, "named twice");
   soon("clip --box \"0,0,0 1,1,1\" --plane \"0,0,0 0,0,1\"", 2, "give one of");
   soon("resample", 2, "how fine");
@@ -165,7 +165,7 @@ TEST_F(Refusal, AReportThatCannotBeWrittenComesBeforeTheWork) {
   }
   EXPECT_REFUSED(levelsmith("--report ./out.vdb " + large, 5), 2, "--report");
   EXPECT_REFUSED(levelsmith("--report /dev/stdout " + large + " ! measure --json", 5), 2,
-                 "used already");
+                 "already used");
   EXPECT_EQ(support::slurp(folder_ / "there.json"), "kept");
   expectNothingWritten(1);
 }
@@ -255,7 +255,7 @@ TEST_F(Refusal, CorruptBandFilesAreThree) {
 
 TEST_F(Refusal, MeshesThatCannotBeUsedAsAskedAreThree) {
   writeFile("triangle.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  EXPECT_REFUSED(levelsmith(toBand("triangle.obj")), 3, "the mesh encloses nothing");
+  EXPECT_REFUSED(levelsmith(toBand("triangle.obj")), 3, "the mesh encloses no volume");
   writeFile("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
   EXPECT_REFUSED(levelsmith(toBand("open.obj", "--voxel 0.05 --sign closed")), 3,
                  "edges have one face");
@@ -310,7 +310,7 @@ TEST_F(Refusal, OneVertexFarAwayEndsAtOnce) {
 TEST_F(Refusal, MemoryInUseIsFour) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.005 ! write in.vdb").code, 0);
   EXPECT_REFUSED(levelsmith("--max-memory 110M read in.vdb ! mesh ! write out.ply"), 4,
-                 "memory in use passes --max-memory");
+                 "memory in use exceeds --max-memory");
   expectNothingWritten(1);
 }
 

@@ -79,12 +79,12 @@ TEST_F(Script, TellsTheLineOfAMistake) {
   EXPECT_REFUSED(levelsmith("run empty.txt"), 2, "no action");
   writeFile("nested.txt", "run bad.txt\n");
   EXPECT_REFUSED(levelsmith("run nested.txt"), 2, "cannot run another");
-  EXPECT_REFUSED(levelsmith("run bad.txt ! measure"), 2, "takes one file");
+  EXPECT_REFUSED(levelsmith("run bad.txt ! measure"), 2, "may follow the file");
   EXPECT_REFUSED(levelsmith("run"), 2, "takes one file");
   EXPECT_REFUSED(levelsmith("run missing.txt"), 6, "missing.txt");
   EXPECT_REFUSED(levelsmith("run ."), 6, "directory");
   writeFile("stdin.txt", "read - --format ply\nmeasure\n");
-  EXPECT_REFUSED(shell(command() + " run - < stdin.txt"), 2, "standard input is used already");
+  EXPECT_REFUSED(shell(command() + " run - < stdin.txt"), 2, "standard input is already used");
 }
 
 #define EXPECT_TOLD(sentence_, part_) \
@@ -109,14 +109,15 @@ TEST_F(Script, RefusesVariablesWithoutAValue) {
               "chain.txt, line 3: ${voxle} has no value; did "
               "you mean ${voxel}?");
   EXPECT_TOLD(refusal("box ${h}"), "give it with --set h=VALUE, or a line `set h VALUE`");
-  EXPECT_TOLD(refusal("box ${h}\nset h 1"), "stands further down");
+  EXPECT_TOLD(refusal("box ${h}\nset h 1"), "is further down");
   EXPECT_TOLD(refusal("box ${1}"), "write ${NAME}");
   EXPECT_TOLD(refusal("box ${a:base}", {{"a", "1"}}), "there is no part 'base'");
   EXPECT_TOLD(refusal("box 1\nbox ${a\n}"), "line 2: a ${ is not closed");
-  EXPECT_TOLD(refusal("set voxel 1\nbox", {{"voxl", "2"}}), "--set voxl=2: no variable of");
+  EXPECT_TOLD(refusal("set voxel 1\nbox", {{"voxl", "2"}}), "has no variable voxl");
   EXPECT_TOLD(refusal("set voxel 1\nbox", {{"voxl", "2"}}), "did you mean 'voxel'?");
-  EXPECT_TOLD(refusal("box", {{"voxl", "2"}}), "it has none");
-  EXPECT_TOLD(refusal("for i in 1\nbox ${i}\nend", {{"i", "2"}}), "takes it");  // it is the loop's
+  EXPECT_TOLD(refusal("box", {{"voxl", "2"}}), "it has no variables");
+  EXPECT_TOLD(refusal("for i in 1\nbox ${i}\nend", {{"i", "2"}}),
+              "has no variable i");  // it is the loop's
   EXPECT_EQ(line("repeat 0\nbox ${v}\nend\nball", {{"v", "2"}}), "ball");
 }
 
@@ -140,7 +141,7 @@ TEST_F(Script, CountsWithoutRounding) {
   EXPECT_EQ(list("2..2 a '0..2' 1..${n} b", {{"n", "2"}}), "2 a 0..2 1 2 b");
   EXPECT_EQ(list("${all} \"${all}\"", {{"all", " p  q "}}), "p q  p  q ");
   EXPECT_TOLD(refusal("for x in 3..1\nbox\nend"), "as in 10..0 step -1");
-  EXPECT_TOLD(refusal("for x in 1..3 step -1\nbox\nend"), "leads away");
+  EXPECT_TOLD(refusal("for x in 1..3 step -1\nbox\nend"), "never reaches its end");
   EXPECT_TOLD(refusal("for x in 1..3 step 0\nbox\nend"), "never ends");
   EXPECT_TOLD(refusal("for x in 1..3 step\nbox\nend"), "not a range");
   EXPECT_TOLD(refusal("for x in 1..b\nbox\nend"), "not a range");
@@ -168,14 +169,14 @@ TEST_F(Script, FindsFiles) {
 TEST_F(Script, RefusesMalformedLoops) {
   EXPECT_TOLD(refusal("box\nrepeat 2\nball"), "line 2: repeat: its `end` is missing");
   EXPECT_TOLD(refusal("box\nend"), "line 2: end: there is no loop");
-  EXPECT_TOLD(refusal("repeat 2\nbox\nend loop"), "stands alone");
+  EXPECT_TOLD(refusal("repeat 2\nbox\nend loop"), "must be alone");
   EXPECT_TOLD(refusal("repeat\nbox\nend"), "`repeat COUNT as NAME`");
   EXPECT_TOLD(refusal("repeat 2.5\nbox\nend"), "not a whole number");
-  EXPECT_TOLD(refusal("repeat -1\nbox\nend"), "no count");
+  EXPECT_TOLD(refusal("repeat -1\nbox\nend"), "not a count");
   EXPECT_TOLD(refusal("for x of 1 2\nbox\nend"), "`for NAME in LIST`");
   EXPECT_TOLD(refusal("for 1 in 1 2\nbox\nend"), "'1' is not a name");
   EXPECT_TOLD(refusal("set a=1 2\nbox"), "'a=1' is not a name");
-  EXPECT_TOLD(refusal("set a 1 2\nbox"), "quote what has blanks");
+  EXPECT_TOLD(refusal("set a 1 2\nbox"), "quote a value with blanks");
   EXPECT_TOLD(refusal("repeat 2\nset i 3\nbox\nend"), "the variable of a loop");
 }
 
@@ -200,8 +201,8 @@ TEST_F(Script, SurvivesWhateverAFileHolds) {
 
 TEST_F(Script, BoundsWhatLoopsComeTo) {
   EXPECT_TOLD(refusal("repeat 900\nrepeat 90\nbox\nball\nend\nend"), "more than 100000 actions");
-  EXPECT_TOLD(refusal("box\nrepeat 1000\nrepeat 1000\nend\nend"), "round more than 100000 times");
-  EXPECT_TOLD(refusal("repeat 100001\nbox\nend"), "no count from 0 to 100000");
+  EXPECT_TOLD(refusal("box\nrepeat 1000\nrepeat 1000\nend\nend"), "more than 100000 iterations");
+  EXPECT_TOLD(refusal("repeat 100001\nbox\nend"), "not a count from 0 to 100000");
   EXPECT_EQ(words("repeat 1000\nrepeat 90\nbox\nend\nend").size(), 2u * 90'000 - 1);
   EXPECT_TOLD(refusal("set a xxxxxxxx\nrepeat 40\nset a ${a}${a}\nend\nread ${a}"),
               "more than 64 MB of text");
@@ -269,7 +270,7 @@ TEST_F(Script, RunsLoopsAndSettings) {
             0);
   EXPECT_EQ(support::slurp(folder_ / "grown.vdb"), support::slurp(folder_ / "line.vdb"));
   EXPECT_REFUSED(levelsmith("run grow.txt --set out=a --set out=b"), 2, "'out' is given twice");
-  EXPECT_REFUSED(levelsmith("run grow.txt --set out"), 2, "'out' is not NAME=VALUE");
+  EXPECT_REFUSED(levelsmith("run grow.txt --set out"), 2, "'out' is not of the form NAME=VALUE");
   EXPECT_REFUSED(levelsmith("run grow.txt --get out=1"), 2, "no option --get");
   EXPECT_REFUSED(levelsmith("run grow.txt --set out=a --threads 2"), 2, "before the first action");
 }

@@ -216,7 +216,7 @@ TEST_F(Animate, RefusesPatchesThatWereMadeInAnotherWay) {
       refusal(
           "patch @ball --corners \"5,-1,-1 5,-1,1 5,1,1 5,1,-1\" --mirror --height 1 --levels 2 "
           "--spacing 1 --particles conforming"),
-      2, "patch 2 is mirrored and the first is not");
+      2, "one of patch 2 and the first patch is mirrored");
   EXPECT_EQ(fileCount(), 0u);
   // What is only finer is told.
   const auto outcome = refusal(patch + "--particles reduced");
@@ -254,7 +254,8 @@ TEST_F(Animate, TakesNumbersFromTheNameOfTheFileOnly) {
 TEST_F(Animate, RefusesBeforeAnythingIsComputed) {
   const std::string head = kScene + "animate @ball @ring @here ";
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --out frame.vdb"), 2, "put # where the number goes");
-  EXPECT_REFUSED(levelsmith(head + "--frames 3 --out f_#.txt"), 2, "names no row of such files");
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --out f_#.txt"), 2,
+                 "is not a sequence of such files");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --out no/where_#.vdb"), 6, "where_0.vdb");
   EXPECT_REFUSED(levelsmith(head + "--frames 0 --out f_#.vdb"), 2, "--frames");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --base-frames b.vdb --out f_#.vdb"), 2,

@@ -77,15 +77,15 @@ TEST_F(Generators, RefuseWhatTellsNoHeights) {
       "c.png",
       "89504e470d0a1a0a0000000d4948445200000002000000020802000000fdd49a73000000114944415478da63"
       "606462666165638050000111002b0512c78f0000000049454e44ae426082");
-  EXPECT_REFUSED(levelsmith(heightmap + "c.png"), 3, "has colours");
+  EXPECT_REFUSED(levelsmith(heightmap + "c.png"), 3, "is a colour picture");
   writeHex("short.png", "89504e470d0a1a0a0000000d4948445200000003000000020800000000b81f39c6");
-  EXPECT_REFUSED(levelsmith(heightmap + "short.png"), 3, "no whole PNG");
+  EXPECT_REFUSED(levelsmith(heightmap + "short.png"), 3, "not a complete PNG");
   EXPECT_REFUSED(levelsmith(heightmap + "none.png"), 6, "No such file");
   EXPECT_REFUSED(levelsmith(heightmap + "."), 6, "is a folder");
   for (const auto& [text, part] :
        {std::pair<const char*, const char*>{"1 2\n3\n", "line 2: it has 1 numbers"},
-        {"1 2\n3 nan\n", "line 2: 'nan' is no finite number"},
-        {"1 2\n3 x\n", "'x' is no finite number"},
+        {"1 2\n3 nan\n", "line 2: 'nan' is not a finite number"},
+        {"1 2\n3 x\n", "'x' is not a finite number"},
         {"1 2 3\n", "3 columns and 1 rows"},
         {"\n", "is empty"}}) {
     writeFile("bad.txt", text);
@@ -100,7 +100,7 @@ TEST_F(Generators, AreRefusedByADryRunAsByARun) {
                    "under two voxels");
     EXPECT_REFUSED(
         levelsmith(start + "ring --radius 1 --tube 0.3 --columns 2 --rows 2 --voxel 0.05"), 2,
-        "come within");
+        "the clearance between wires is");
     EXPECT_REFUSED(levelsmith(start + "gyroid --cell 1 --thickness 0.3 --voxel 0.02"), 2, "close");
     EXPECT_REFUSED(levelsmith(start + "scales --length 2 --step 3 --voxel 0.05"), 2, "overlap");
     EXPECT_REFUSED(levelsmith(start + "hexagons --size 1 --rounding 1 --voxel 0.05"), 2,

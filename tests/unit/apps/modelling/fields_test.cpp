@@ -102,7 +102,7 @@ TEST_F(FieldCommand, ReadsTellsAndWritesFields) {
   EXPECT_EQ(levelset::readField(folder_ / "again.vdb", {.grid = "wind"}).contentHash(),
             constantField(true).contentHash());
   EXPECT_EQ(levelsmith("--dry-run read wind.vdb --grid wind ! write b.vdb").code, 0);
-  EXPECT_REFUSED(levelsmith("read wind.vdb"), 3, "name one with --grid");
+  EXPECT_REFUSED(levelsmith("read wind.vdb"), 3, "name a grid with --grid");
   EXPECT_REFUSED(levelsmith("read wind.vdb --grid wind ! measure"), 2, "is a field");
   EXPECT_REFUSED(levelsmith("read wind.vdb --grid wind ! write a.ply"), 2, "write .vdb");
 }

@@ -50,7 +50,7 @@ TEST_F(OpenMesh, SeamsAreClosedAndWhatIsLeftAsideIsTold) {
             "vn 9 9 9\nf 1//1 3//1 2//1\nf 1//2 2//2 4//2\nf 1//3 4//3 3//3\nf 2//4 3//4 4//4\n");
   const auto written = levelsmith("read roof.obj ! write roof.off ! write roof.ply");
   EXPECT_EQ(written.code, 0) << written.err;
-  const std::string told = "1 of 5 normals, which no face names";
+  const std::string told = "1 of 5 normals, which no face refers to";
   const std::size_t at = written.err.find(told);
   ASSERT_NE(at, std::string::npos) << written.err;
   EXPECT_EQ(written.err.find(told, at + 1), std::string::npos) << written.err;  // once

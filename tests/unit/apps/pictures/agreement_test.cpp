@@ -49,9 +49,10 @@ NarrowBand knurledCylinder() {
   const mapping::PatchGridResult grid = mapping::makePatchGridAround(
       base, V3d(0, 0, -0.6), V3d(0, 0, 0.6), 0, 0.2, {.columns = 4, .rows = 2},
       {.layers = 3, .scheme = mapping::LayerScheme::Conforming, .spacing = 0.15});
-  return mapping::mapTexture(
-             base, mapping::makeKnurl(knurl, V3d(0), 0.04), grid.patches,
-             {.sink = 0.05, .textureBox = mapping::knurlBox(knurl, V3d(0)).tile, .voxelSize = 0.02})
+  return mapping::mapTexture(base, mapping::makeKnurl(knurl, V3d(0), 0.04), grid.patches,
+                             {.embedDepth = 0.05,
+                              .textureBox = mapping::knurlBox(knurl, V3d(0)).tile,
+                              .voxelSize = 0.02})
       .band;
 }
 

@@ -118,7 +118,7 @@ TEST_F(Scenes, AreBlended) {
   EXPECT_EQ(levelsmith("read soft.json ! render d.exr --renderer both --tables nanovdb").code, 2);
   const Outcome clear = levelsmith(wide + "--csg 'b - s' --soft 5vx --opacities '1 0.5' ! info");
   EXPECT_EQ(clear.code, 2);
-  EXPECT_NE(clear.err.find("leave their opacities out"), std::string::npos) << clear.err;
+  EXPECT_NE(clear.err.find("omit the opacity"), std::string::npos) << clear.err;
 
   const Outcome morphed =
       levelsmith(wide + "--morph 0.25 ! info --json ! write m.json ! render m.png --size 64x48");

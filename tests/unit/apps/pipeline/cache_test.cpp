@@ -101,7 +101,7 @@ TEST_F(CacheRun, GivesTheSameAndComputesNothingTwice) {
   const Outcome second = levelsmith("--cache c --report r.json " + chain());
   EXPECT_TRUE(left(second) == expected);
   EXPECT_EQ(ran(), 0u);
-  EXPECT_NE(second.err.find("nothing was computed: all 8 results are of an earlier run"),
+  EXPECT_NE(second.err.find("nothing was computed: all 8 results come from an earlier run"),
             std::string::npos)
       << second.err;
   // A file that went missing, or that somebody changed, is written anew from what is known.

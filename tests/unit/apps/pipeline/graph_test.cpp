@@ -65,7 +65,7 @@ TEST(Graph, TakesValuesThatAreGivenAndHandsOutResults) {
   std::map<std::size_t, pipeline::Value> made;
   std::vector<std::string> told;
   pipeline::RunSettings settings;
-  settings.made = [&](std::size_t node, const pipeline::Value& value) {
+  settings.onValue = [&](std::size_t node, const pipeline::Value& value) {
     made.emplace(node, value);
   };
   settings.warn = settings.note = [&](const std::string& text) { told.push_back(text); };
@@ -79,7 +79,7 @@ TEST(Graph, TakesValuesThatAreGivenAndHandsOutResults) {
 TEST(Graph, EndsAnActionThatIsNotToGoOn) {
   const Graph graph = parseChain({"sphere", "--radius", "1", "--voxel", "0.02"});
   pipeline::RunSettings settings;
-  settings.goesOn = [] { return false; };
+  settings.shouldContinue = [] { return false; };
   pipeline::RunReport report;
   EXPECT_THROW(run(graph, settings, report), levelset::Cancelled);
   EXPECT_EQ(report.exitCode, 130);
@@ -217,7 +217,7 @@ TEST_F(GraphRun, RunsWhatIsNeededAlone) {
   EXPECT_EQ(report["steps"].size(), 3u);
   EXPECT_EQ(report["left_out"].size(), 18u);
   EXPECT_EQ(report["graph"]["nodes"].size(), 21u);
-  EXPECT_NE(outcome.err.find("is not used; write it, or leave it out"), std::string::npos);
+  EXPECT_NE(outcome.err.find("is not used; write it, or leave out its action"), std::string::npos);
 }
 
 }  // namespace graph_test

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <sstream>
 #include <string>
@@ -248,7 +249,7 @@ class Demands : public support::ShellTest {
     pipeline::RunReport report;
     const auto silent = [](const std::string&) {};
     pipeline::run(pipeline::parseChain(words(chain)),
-                  {.wholeValues = whole, .print = silent, .warn = silent, .note = silent}, report);
+                  {.fullValues = whole, .print = silent, .warn = silent, .note = silent}, report);
     return report;
   }
   std::string path(const char* name) { return (folder_ / name).string(); }
@@ -287,10 +288,10 @@ TEST_F(Demands, OffsetAndClipAskForTheBoxAndTheBandThatTheyRead) {
   ASSERT_EQ(report.steps.size(), 5u);
   EXPECT_EQ(report.steps[0].halfWidth, 6);
   const double rim = (20 + 2) * 0.05;  // voxels of the band, of which a seam reads all
-  EXPECT_EQ(report.steps[1].needed.region,
+  EXPECT_EQ(report.steps[1].roi.region,
             Box3d(V3d(1.5, -0.5, -0.5) - V3d(rim), V3d(3, 0.5, 0.5) + V3d(rim)));
   EXPECT_EQ(report.steps[2].halfWidth, 1.5);
-  EXPECT_TRUE(report.steps[3].needed.isWhole());
+  EXPECT_TRUE(report.steps[3].roi.isWhole());
   const pipeline::RunReport whole = run("sphere --radius 2 --voxel 0.05 --half-width 20", true);
   EXPECT_LT(report.steps[0].activeVoxels, 0.3 * whole.steps[0].activeVoxels);
 }
@@ -318,7 +319,7 @@ TEST_F(Demands, PartsOfLargeSolidsKeepTheirInsides) {
         "-0.8,-0.3,-0.3_0.3,0.4,0.3 ! mesh"}) {
     const pipeline::RunReport report = expectSame(chain, ".ply");
     EXPECT_TRUE(std::any_of(report.steps.begin(), report.steps.end(), [](const auto& step) {
-      return !step.needed.isWhole();
+      return !step.roi.isWhole();
     })) << chain;
   }
 }
@@ -478,19 +479,19 @@ TEST_F(Demands, PlansTellWhatActionsTake) {
     const std::string whole = plan("--whole " + solid + action + " ! " + end),
                       part = plan(solid + action + " ! " + end);
     EXPECT_GT(figure(whole, name, " MB; "), 0.05) << whole;
-    EXPECT_GT(figure(whole, name, "works with "), 5) << whole;
+    EXPECT_GT(figure(whole, name, "working memory "), 5) << whole;
     const bool isWhole = name == "curvature-flow" || name == "keep";
-    for (const char* before : {" MB; ", "works with "}) {
+    for (const char* before : {" MB; ", "working memory "}) {
       const double of = figure(whole, name, before), is = figure(part, name, before);
       EXPECT_TRUE(isWhole ? is == of : is < 0.5 * of) << before << ": " << is << " of " << of;
     }
-    EXPECT_EQ(whole.find("cannot be told"), std::string::npos) << whole;
+    EXPECT_EQ(whole.find("unknown"), std::string::npos) << whole;
   }
   const std::string untimed =
       plan(solid + "sphere --radius 1 --center 2,0,0 --voxel 0.02 ! blend --radius 0.2 ! measure");
-  EXPECT_NE(untimed.find("what blend takes,"), std::string::npos) << untimed;
+  EXPECT_NE(untimed.find("plus blend,"), std::string::npos) << untimed;
   const std::string masked = plan(solid + "open 0.1 --mask x ! mesh --sharp ! measure");
-  EXPECT_NE(masked.find("what open takes,"), std::string::npos) << masked;
+  EXPECT_NE(masked.find("plus open,"), std::string::npos) << masked;
   EXPECT_GT(figure(masked, "mesh", " MB; "), 0) << masked;
 }
 

@@ -163,7 +163,7 @@ TEST(ReportPage, EscapesWhatOthersWrote) {
       "\"><script>alert('1')</script>&amp;\n' onerror='x\xEF\xBF\xBD\xEF\xBF\xBD";
   pipeline::RunReport report;
   pipeline::StepReport& step = report.steps.emplace_back();
-  step.action = step.resultName = step.resultKind = step.place = evil;
+  step.action = step.resultName = step.resultKind = step.location = evil;
   step.defaults = {{"b", evil}};
   step.notes.lengths = {{.param = evil, .written = evil, .world = 1, .voxels = {}}};
   step.notes.warnings = step.notes.notes = {evil};
@@ -224,17 +224,17 @@ TEST(ReportPage, ShowsWhatWasMadeBesideWhatWasNeeded) {
   settings.warn = settings.note = settings.print = [](const std::string&) {};
   pipeline::run(pipeline::parseChain(words), settings, report);
   const pipeline::StepReport& sphere = report.steps.at(0);
-  ASSERT_FALSE(levelset::isEverywhere(sphere.needed.region));
-  ASSERT_TRUE(std::isfinite(sphere.needed.halfWidth));
+  ASSERT_FALSE(levelset::isEverywhere(sphere.roi.region));
+  ASSERT_TRUE(std::isfinite(sphere.roi.halfWidth));
   const std::string source = pipeline::reportPage(report);
   expectSound(source);
   const HtmlPage page(source);
   EXPECT_TRUE(
       page.says(fmt::format("±{:.4g} vx = ±{:.4g}", sphere.halfWidth, sphere.halfWidth * 0.1)));
-  EXPECT_TRUE(page.says(fmt::format("±{:.4g} vx = ±{:.4g}the box from", sphere.needed.halfWidth,
-                                    sphere.needed.halfWidth * 0.1)));
-  EXPECT_TRUE(page.says(fmt::format("{:.6g}, {:.6g}, {:.6g}", sphere.needed.region.min.x,
-                                    sphere.needed.region.min.y, sphere.needed.region.min.z)));
+  EXPECT_TRUE(page.says(fmt::format("±{:.4g} vx = ±{:.4g}the box from", sphere.roi.halfWidth,
+                                    sphere.roi.halfWidth * 0.1)));
+  EXPECT_TRUE(page.says(fmt::format("{:.6g}, {:.6g}, {:.6g}", sphere.roi.region.min.x,
+                                    sphere.roi.region.min.y, sphere.roi.region.min.z)));
   // Of a band that was made for itself nothing less is needed.
   const HtmlPage whole(pipeline::reportPage(runDrawn("sphere --radius 1 --voxel 0.1")));
   EXPECT_TRUE(whole.says("±3 vx = ±0.3all"));
@@ -260,17 +260,17 @@ TEST(ReportPage, SaysWhyThereIsNoPicture) {
     return picture.missing;
   };
   const levelset::NarrowBand ball = levelset::makeSphere(1, {0, 0, 0}, 0.1);
-  EXPECT_EQ(missing(pipeline::Value(levelset::TriMesh())), "there is no surface that can be drawn");
+  EXPECT_EQ(missing(pipeline::Value(levelset::TriMesh())), "the value has no surface to draw");
   levelset::TriMesh nowhere;
   nowhere.positions.assign(3, Imath::V3d(std::numeric_limits<double>::quiet_NaN()));
   nowhere.triangles = {{0, 1, 2}};
-  EXPECT_EQ(missing(pipeline::Value(nowhere)), "there is no surface that can be drawn");
+  EXPECT_EQ(missing(pipeline::Value(nowhere)), "the value has no surface to draw");
   EXPECT_EQ(missing(pipeline::Value(ball), 1 << 20), "too little memory is left");
-  EXPECT_EQ(missing(pipeline::Value(pipeline::PatchValue())), "patches are not drawn");
+  EXPECT_EQ(missing(pipeline::Value(pipeline::PatchValue())), "a patch has no thumbnail");
   const HtmlPage page(
       pipeline::reportPage(runDrawn("sphere --radius 1 --voxel 0.1 ! march --speed 1 --to 0.2")));
   EXPECT_EQ(page.all("img").size(), 1u);
-  EXPECT_TRUE(page.says("no picture: fields are not drawn"));
+  EXPECT_TRUE(page.says("no picture: a field has no thumbnail"));
 }
 
 TEST(ReportPage, DrawsAsManyAsAskedFor) {
@@ -312,7 +312,7 @@ TEST(ReportPage, TellsWhatAToleranceCameTo) {
   const std::string source = pipeline::reportPage(run.report);
   expectSound(source);
   const HtmlPage page(source);
-  EXPECT_TRUE(page.says("Asked for: 1%"));
+  EXPECT_TRUE(page.says("Requested: 1%"));
   EXPECT_TRUE(page.says("requestedachievedreached"));
   EXPECT_TRUE(
       page.says(fmt::format("{:.4g}{:.3g}yes", run.output().requested, run.output().achieved)));
@@ -375,11 +375,11 @@ TEST_F(ReportPageCommand, TellsWhatIsOfAnEarlierRun) {
   const std::string chain =
       "--cache kept --report r.html sphere --radius 1 --voxel 0.1 ! offset 0.1 ! write ";
   ASSERT_EQ(levelsmith(chain + "a.vdb").code, 0);
-  EXPECT_FALSE(HtmlPage(support::slurp(folder_ / "r.html")).says("of an earlier run"));
+  EXPECT_FALSE(HtmlPage(support::slurp(folder_ / "r.html")).says("from an earlier run"));
   ASSERT_EQ(levelsmith(chain + "b.vdb").code, 0);
   const std::string source = support::slurp(folder_ / "r.html");
   expectSound(source);
-  EXPECT_EQ(HtmlPage(source).countOf("of an earlier run"), 2u);
+  EXPECT_EQ(HtmlPage(source).countOf("from an earlier run"), 2u);
   ASSERT_EQ(picturesOf(source).size(), 1u);  // of what was taken from there
   expectPicture(picturesOf(source)[0]);
 }
@@ -393,7 +393,7 @@ TEST_F(ReportPageCommand, TellsWhereInAScriptAStepStands) {
   const HtmlPage page(source);
   EXPECT_TRUE(page.says("line 3"));
   EXPECT_TRUE(page.says("not used"));
-  EXPECT_TRUE(page.says("Left out, since nothing needed it\n\ntorus"));
+  EXPECT_TRUE(page.says("Left out, because no requested result depends on it\n\ntorus"));
 }
 
 }  // namespace report_page_test

@@ -1,4 +1,4 @@
-// Jobs that wait for each other, on several threads; and branches of a graph as such jobs.
+// Scheduling of dependent tasks on several threads, and of branches of a graph.
 
 #include "apps/pipeline/run/task_scheduler.h"
 
@@ -21,20 +21,20 @@
 
 #include "tests/support/command_line.h"
 
-namespace side_by_side_test {
+namespace task_scheduler_test {
 
-using pipeline::Job;
-using pipeline::JobsDone;
+using pipeline::ScheduleResult;
 using pipeline::scheduleTasks;
+using pipeline::Task;
 using std::chrono::milliseconds;
-using GoesOn = std::function<bool()>;
+using ContinueCheck = std::function<bool()>;
 
-constexpr auto kAnyBeside = [](std::size_t, const std::vector<std::size_t>&) { return true; };
+constexpr auto kAnyTask = [](std::size_t, const std::vector<std::size_t>&) { return true; };
 
-/// Long enough on any machine: whoever waits so long waits for what never comes.
-constexpr std::chrono::seconds kForEver(60);
+/// Longer than any correct wait on any machine.
+constexpr std::chrono::seconds kTimeout(60);
 
-/// Opens once as many have come.
+/// Opens once the given number of threads have arrived.
 class Gate {
  public:
   void come() {
@@ -42,10 +42,10 @@ class Gate {
     ++here_;
     came_.notify_all();
   }
-  /// @return did they come?
+  /// @return true if they arrived in time
   bool await(int count) {
     std::unique_lock lock(mutex_);
-    return came_.wait_for(lock, kForEver, [&] { return here_ >= count; });
+    return came_.wait_for(lock, kTimeout, [&] { return here_ >= count; });
   }
   bool pass(int count) {
     come();
@@ -63,200 +63,202 @@ void raise(std::atomic<int>& most, int to) {
   }
 }
 
-TEST(SideBySide, RunsAtOnceWhatDoesNotWait) {
+TEST(TaskScheduler, RunsIndependentTasksConcurrently) {
   Gate gate;
   std::atomic<int> met = 0;
-  const JobsDone done =
-      scheduleTasks({Job{}, Job{}, Job{{0, 1}}}, {.threads = 2,
-                                                  .run =
-                                                      [&](std::size_t job, const GoesOn&) {
-                                                        if (job < 2) met += gate.pass(2);
-                                                        return true;
-                                                      },
-                                                  .mayJoin = kAnyBeside});
+  const ScheduleResult done = scheduleTasks({Task{}, Task{}, Task{{0, 1}}},
+                                            {.threads = 2,
+                                             .run =
+                                                 [&](std::size_t task, const ContinueCheck&) {
+                                                   if (task < 2) met += gate.pass(2);
+                                                   return true;
+                                                 },
+                                             .mayStart = kAnyTask});
   EXPECT_EQ(met, 2);
   EXPECT_EQ(done.isDone, (std::vector<char>{1, 1, 1}));
   EXPECT_FALSE(done.failed);
 }
 
-TEST(SideBySide, TakesAsManyThreadsAsThereAreJobs) {
+TEST(TaskScheduler, UsesAThreadForEachTask) {
   Gate gate;
   std::atomic<int> met = 0;
-  scheduleTasks(std::vector<Job>(4), {.threads = 4,
-                                      .run =
-                                          [&](std::size_t, const GoesOn&) {
-                                            met += gate.pass(4);
-                                            return true;
-                                          },
-                                      .mayJoin = kAnyBeside});
+  scheduleTasks(std::vector<Task>(4), {.threads = 4,
+                                       .run =
+                                           [&](std::size_t, const ContinueCheck&) {
+                                             met += gate.pass(4);
+                                             return true;
+                                           },
+                                       .mayStart = kAnyTask});
   EXPECT_EQ(met, 4);
 }
 
-/// One that may join nobody is not overtaken by those that come after it.
-TEST(SideBySide, WaitsForOneThatMayNotJoin) {
-  const auto isLarge = [](std::size_t job) { return job == 2; };
+/// Later tasks do not overtake a task that may not start beside others.
+TEST(TaskScheduler, DoesNotOvertakeATaskThatMayNotStart) {
+  const auto isLarge = [](std::size_t task) { return task == 2; };
   Gate asked, large;
   std::atomic<int> overtaken = 0;
-  const JobsDone done = scheduleTasks(std::vector<Job>(8),
-                                      {.threads = 2,
-                                       .run =
-                                           [&](std::size_t job, const GoesOn&) {
-                                             if (job == 0) asked.await(1);
-                                             if (isLarge(job)) large.come();
-                                             if (job > 2 && !large.await(1)) ++overtaken;
-                                             return true;
-                                           },
-                                       .mayJoin =
-                                           [&](std::size_t job, const std::vector<std::size_t>&) {
-                                             if (isLarge(job)) asked.come();
-                                             return !isLarge(job);
-                                           }});
+  const ScheduleResult done = scheduleTasks(
+      std::vector<Task>(8), {.threads = 2,
+                             .run =
+                                 [&](std::size_t task, const ContinueCheck&) {
+                                   if (task == 0) asked.await(1);
+                                   if (isLarge(task)) large.come();
+                                   if (task > 2 && !large.await(1)) ++overtaken;
+                                   return true;
+                                 },
+                             .mayStart =
+                                 [&](std::size_t task, const std::vector<std::size_t>&) {
+                                   if (isLarge(task)) asked.come();
+                                   return !isLarge(task);
+                                 }});
   EXPECT_EQ(overtaken, 0);
   EXPECT_EQ(std::count(done.isDone.begin(), done.isDone.end(), 1), 8);
 }
 
-TEST(SideBySide, KeepsToItsThreadsAndToWhatMayJoin) {
+TEST(TaskScheduler, RespectsThreadLimitAndMayStart) {
   for (const std::size_t threads : {1u, 2u, 3u}) {
     std::atomic<int> running = 0, most = 0, mostLarge = 0, large = 0;
-    const auto isLarge = [](std::size_t job) { return job % 2 == 0; };
-    const JobsDone done = scheduleTasks(
-        std::vector<Job>(40), {.threads = threads,
-                               .run =
-                                   [&](std::size_t job, const GoesOn&) {
-                                     const int now = ++running, nowLarge = large += isLarge(job);
-                                     raise(most, now);
-                                     raise(mostLarge, nowLarge);
-                                     std::this_thread::sleep_for(milliseconds(1));
-                                     large -= isLarge(job);
-                                     --running;
-                                     return true;
-                                   },
-                               .mayJoin =
-                                   [&](std::size_t job, const std::vector<std::size_t>& others) {
-                                     return !isLarge(job) ||
-                                            std::none_of(others.begin(), others.end(), isLarge);
-                                   }});
+    const auto isLarge = [](std::size_t task) { return task % 2 == 0; };
+    const ScheduleResult done = scheduleTasks(
+        std::vector<Task>(40), {.threads = threads,
+                                .run =
+                                    [&](std::size_t task, const ContinueCheck&) {
+                                      const int now = ++running, nowLarge = large += isLarge(task);
+                                      raise(most, now);
+                                      raise(mostLarge, nowLarge);
+                                      std::this_thread::sleep_for(milliseconds(1));
+                                      large -= isLarge(task);
+                                      --running;
+                                      return true;
+                                    },
+                                .mayStart =
+                                    [&](std::size_t task, const std::vector<std::size_t>& others) {
+                                      return !isLarge(task) ||
+                                             std::none_of(others.begin(), others.end(), isLarge);
+                                    }});
     EXPECT_LE(most, static_cast<int>(threads));
     EXPECT_EQ(mostLarge, 1);
     EXPECT_EQ(std::count(done.isDone.begin(), done.isDone.end(), 1), 40);
   }
 }
 
-/// Graphs of any shape, with jobs that wait for all, that are left, and that fail.
-TEST(SideBySide, KeepsEveryOrderThatIsAsked) {
+/// Random graphs with barriers, skipped tasks and failing tasks.
+TEST(TaskScheduler, RespectsEveryDependency) {
   std::mt19937 random(3);
   for (int round = 0; round < 300; ++round) {
     const std::size_t count = 1 + random() % 30;
-    std::vector<Job> jobs(count);
-    std::vector<int> fates(count, 0);  // 1: is left, 2: fails
+    std::vector<Task> tasks(count);
+    std::vector<int> outcomes(count, 0);  // 1: is left, 2: fails
     for (std::size_t i = 0; i < count; ++i) {
       for (std::size_t before = 0; before < i; ++before)
-        if (random() % 6 == 0) jobs[i].waitsFor.push_back(before);
-      jobs[i].waitsForAll = random() % 6 == 0;
-      fates[i] = random() % 40 == 0 ? 1 : random() % 40 == 0 ? 2 : 0;
+        if (random() % 6 == 0) tasks[i].dependencies.push_back(before);
+      tasks[i].isBarrier = random() % 6 == 0;
+      outcomes[i] = random() % 40 == 0 ? 1 : random() % 40 == 0 ? 2 : 0;
     }
     const std::size_t threads = 1 + random() % 4;
     std::mutex mutex;
     std::vector<char> ended(count, 0), began(count, 0);
-    const JobsDone done = scheduleTasks(
-        jobs, {.threads = threads,
-               .run =
-                   [&](std::size_t i, const GoesOn&) {
-                     {
-                       const std::lock_guard lock(mutex);
-                       EXPECT_FALSE(began[i]);
-                       began[i] = 1;
-                       for (const std::size_t before : jobs[i].waitsFor) EXPECT_TRUE(ended[before]);
-                       if (jobs[i].waitsForAll) {
-                         EXPECT_EQ(std::count(ended.begin(),
-                                              ended.begin() + static_cast<std::ptrdiff_t>(i), 1),
-                                   static_cast<std::ptrdiff_t>(i));
-                       }
-                     }
-                     if (i % 3 == 0) std::this_thread::yield();
-                     if (fates[i] == 2) throw std::runtime_error(std::to_string(i));
-                     const std::lock_guard lock(mutex);
-                     ended[i] = fates[i] == 0;
-                     return fates[i] == 0;
-                   },
-               .mayJoin = kAnyBeside});
+    const ScheduleResult done = scheduleTasks(
+        tasks, {.threads = threads,
+                .run =
+                    [&](std::size_t i, const ContinueCheck&) {
+                      {
+                        const std::lock_guard lock(mutex);
+                        EXPECT_FALSE(began[i]);
+                        began[i] = 1;
+                        for (const std::size_t before : tasks[i].dependencies)
+                          EXPECT_TRUE(ended[before]);
+                        if (tasks[i].isBarrier) {
+                          EXPECT_EQ(std::count(ended.begin(),
+                                               ended.begin() + static_cast<std::ptrdiff_t>(i), 1),
+                                    static_cast<std::ptrdiff_t>(i));
+                        }
+                      }
+                      if (i % 3 == 0) std::this_thread::yield();
+                      if (outcomes[i] == 2) throw std::runtime_error(std::to_string(i));
+                      const std::lock_guard lock(mutex);
+                      ended[i] = outcomes[i] == 0;
+                      return outcomes[i] == 0;
+                    },
+                .mayStart = kAnyTask});
     EXPECT_EQ(done.isDone, ended);
-    // What one after another would have come to.
+    // Expected result of running the tasks one after another.
     std::vector<char> reached(count, 0);
     for (std::size_t i = 0; i < count; ++i) {
       const auto isReached = [&](std::size_t before) { return reached[before] != 0; };
       const bool isReady =
-          jobs[i].waitsForAll
+          tasks[i].isBarrier
               ? std::all_of(reached.begin(), reached.begin() + static_cast<std::ptrdiff_t>(i),
                             [](char is) { return is != 0; })
-              : std::all_of(jobs[i].waitsFor.begin(), jobs[i].waitsFor.end(), isReached);
-      if (isReady && fates[i] == 2) {
+              : std::all_of(tasks[i].dependencies.begin(), tasks[i].dependencies.end(), isReached);
+      if (isReady && outcomes[i] == 2) {
         ASSERT_TRUE(done.failed);
         EXPECT_EQ(*done.failed, i);
         break;
       }
-      reached[i] = isReady && fates[i] == 0;
+      reached[i] = isReady && outcomes[i] == 0;
       EXPECT_EQ(done.isDone[i], reached[i]);
     }
     EXPECT_EQ(done.failed.has_value(), done.failure != nullptr);
   }
 }
 
-/// What cannot be done, and what waits for it, is not in the way of the others.
-TEST(SideBySide, GoesOnBehindWhatIsLeft) {
+/// A skipped task and its dependents do not block other tasks.
+TEST(TaskScheduler, RunsTasksAfterASkippedOne) {
   for (const std::size_t threads : {1u, 2u}) {
-    const JobsDone done =
-        scheduleTasks({Job{}, Job{{}, true}, Job{{1}}, Job{}, Job{{3}}},
+    const ScheduleResult done =
+        scheduleTasks({Task{}, Task{{}, true}, Task{{1}}, Task{}, Task{{3}}},
                       {.threads = threads,
-                       .run = [](std::size_t job, const GoesOn&) { return job != 0; },
-                       .mayJoin = kAnyBeside});
+                       .run = [](std::size_t task, const ContinueCheck&) { return task != 0; },
+                       .mayStart = kAnyTask});
     EXPECT_EQ(done.isDone, (std::vector<char>{0, 0, 0, 1, 1})) << threads;
   }
 }
 
-TEST(SideBySide, TellsThoseBehindAFailureToEnd) {
+TEST(TaskScheduler, CancelsTasksAfterAFailure) {
   Gate gate;
-  std::atomic<bool> wasTold = false;
-  const JobsDone done = scheduleTasks(
-      {Job{}, Job{}, Job{}}, {.threads = 2,
-                              .run =
-                                  [&](std::size_t job, const GoesOn& goesOn) {
-                                    gate.pass(2);
-                                    if (job == 0) throw std::runtime_error("first");
-                                    const auto end = std::chrono::steady_clock::now() + kForEver;
-                                    while (goesOn() && std::chrono::steady_clock::now() < end)
-                                      std::this_thread::sleep_for(milliseconds(1));
-                                    wasTold = !goesOn();
-                                    if (wasTold) throw std::runtime_error("ended");
-                                    return true;
-                                  },
-                              .mayJoin = kAnyBeside});
-  EXPECT_TRUE(wasTold);
+  std::atomic<bool> wasCanceled = false;
+  const ScheduleResult done =
+      scheduleTasks({Task{}, Task{}, Task{}},
+                    {.threads = 2,
+                     .run =
+                         [&](std::size_t task, const ContinueCheck& shouldContinue) {
+                           gate.pass(2);
+                           if (task == 0) throw std::runtime_error("first");
+                           const auto end = std::chrono::steady_clock::now() + kTimeout;
+                           while (shouldContinue() && std::chrono::steady_clock::now() < end)
+                             std::this_thread::sleep_for(milliseconds(1));
+                           wasCanceled = !shouldContinue();
+                           if (wasCanceled) throw std::runtime_error("ended");
+                           return true;
+                         },
+                     .mayStart = kAnyTask});
+  EXPECT_TRUE(wasCanceled);
   EXPECT_EQ(done.failed, 0u);
   EXPECT_FALSE(done.isDone[2]);
 }
 
-/// Those that wait for all hold the others back, so that results do not pile up.
-TEST(SideBySide, DoesNotRunFarAhead) {
-  std::vector<Job> jobs;
+/// Barriers hold later tasks back, so that results do not accumulate.
+TEST(TaskScheduler, DoesNotRunFarAhead) {
+  std::vector<Task> tasks;
   for (std::size_t i = 0; i < 20; ++i) {
-    jobs.push_back({});
-    jobs.push_back({.waitsFor = {2 * i}, .waitsForAll = true});
+    tasks.push_back({});
+    tasks.push_back({.dependencies = {2 * i}, .isBarrier = true});
   }
   std::atomic<int> made = 0, taken = 0, most = 0;
-  scheduleTasks(jobs, {.threads = 2,
-                       .run =
-                           [&](std::size_t job, const GoesOn&) {
-                             if (job == 0) std::this_thread::sleep_for(milliseconds(50));
-                             if (job % 2 == 1) {
-                               ++taken;
-                               return true;
-                             }
-                             const int now = ++made;  // before it asks what is taken
-                             raise(most, now - taken);
-                             return true;
-                           },
-                       .mayJoin = kAnyBeside});
+  scheduleTasks(tasks, {.threads = 2,
+                        .run =
+                            [&](std::size_t task, const ContinueCheck&) {
+                              if (task == 0) std::this_thread::sleep_for(milliseconds(50));
+                              if (task % 2 == 1) {
+                                ++taken;
+                                return true;
+                              }
+                              const int now = ++made;  // before it asks what is taken
+                              raise(most, now - taken);
+                              return true;
+                            },
+                        .mayStart = kAnyTask});
   EXPECT_EQ(taken, 20);
   EXPECT_LE(most, 2);
 }
@@ -279,7 +281,7 @@ class Branches : public support::ShellTest {
   }
 };
 
-TEST_F(Branches, LeaveWhatOneThreadLeaves) {
+TEST_F(Branches, GiveTheResultsOfOneThread) {
   const std::string chain =
       "sphere --radius 1 --voxel 0.03 --as a ! offset 0.1 ! offset -0.1 --as b ! box --size 1,1,3 "
       "--voxel 0.03 ! smooth --sigma 1vx --as c ! union @b @c ! clip --box \"-1,-1,0 1,1,2\" ! "
@@ -298,7 +300,7 @@ TEST_F(Branches, LeaveWhatOneThreadLeaves) {
   }
 }
 
-TEST_F(Branches, EndAtTheFirstRefusalWithAllBeforeItDone) {
+TEST_F(Branches, StopAtTheFirstErrorWithAllBeforeItDone) {
   const std::string chain = balls(3) +
                             " ! sphere --radius 1 --voxel 0.05 ! offset -2 ! write bad.vdb"
                             " ! sphere --radius 1 --voxel 0.05 ! write after.vdb";
@@ -321,8 +323,8 @@ TEST_F(Branches, EndAtTheFirstRefusalWithAllBeforeItDone) {
   EXPECT_NE(told[0].find("offset: "), std::string::npos) << told[0];
 }
 
-TEST_F(Branches, RunOneAfterAnotherWhereMemoryIsShort) {
-  // All at once they take 340 MB.
+TEST_F(Branches, RunOneAfterAnotherIfMemoryIsShort) {
+  // All branches at once would take 340 MB.
   std::string chain;
   for (int i = 0; i < 4; ++i)
     chain += (i == 0 ? "" : " ! ") +
@@ -336,7 +338,7 @@ TEST_F(Branches, RunOneAfterAnotherWhereMemoryIsShort) {
   EXPECT_LT(peak, 240e6);
 }
 
-TEST_F(Branches, AreToldInOrderWhereAMeshIsRefused) {
+TEST_F(Branches, AreReportedInOrderIfAMeshIsInvalid) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.05 ! mesh ! write s.ply").code, 0);
   const std::string chain =
       "sphere --radius 1 --voxel 0.02 ! offset 0.3 --as q ! read - --format ply --as r ! box "
@@ -360,14 +362,14 @@ TEST_F(Branches, AreReportedInTheOrderOfTheGraphWithTheirOwnCosts) {
     EXPECT_GT(report["steps"][i]["peak_bytes"], 1e6);
     cpu += report["steps"][i]["cpu_s"].get<double>();
   }
-  // Each step counted for itself: were the whole process told of each, it would be about twice
-  // what the process took.
+  // Each step has its own CPU time. If each step had that of the complete process, the sum would be
+  // about twice the time of the process.
   const double all = childrenCpuSeconds() - before;
   EXPECT_LT(cpu, all);
   EXPECT_GT(cpu, 0.4 * all);  // the rest is start-up, mostly
 }
 
-TEST_F(Branches, ReadTheFilesOfASceneThatIsWrittenBefore) {
+TEST_F(Branches, ReadTheFilesOfASceneWrittenBefore) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.05 ! write s-a.vdb").code, 0);
   const std::string chain =
       "sphere --radius 2 --voxel 0.05 --as a ! box --size 1,1,3 --voxel 0.05 --as b ! scene @a @b "
@@ -384,7 +386,8 @@ TEST_F(Branches, ReadTheFilesOfASceneThatIsWrittenBefore) {
 
 TEST_F(Branches, ReadPipesOnce) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.05 ! mesh ! write s.ply").code, 0);
-  // What is refused of a part is tried whole, and the mesh cannot be read again.
+  // A node that fails on a region of interest is retried on complete values, and the mesh cannot be
+  // read again.
   const std::string apart =
       "level-set --voxel 0.05 --as m ! sphere --radius 1 --center 5,0,0 --voxel 0.05 --as s ! "
       "union "
@@ -399,7 +402,7 @@ TEST_F(Branches, ReadPipesOnce) {
   EXPECT_EQ(broken.err.find("is empty"), std::string::npos) << broken.err;
 }
 
-TEST_F(Branches, ReadWhatThoseBeforeWrite) {
+TEST_F(Branches, ReadFilesThatEarlierActionsWrite) {
   const std::string chain =
       "sphere --radius 1 --voxel 0.05 ! offset 0.2 ! offset -0.1 ! write s.vdb ! box --size 1,2,3 "
       "--voxel 0.05 --as b ! read s.vdb ! measure --json ! union @b ! write u.vdb";
@@ -413,4 +416,4 @@ TEST_F(Branches, ReadWhatThoseBeforeWrite) {
   }
 }
 
-}  // namespace side_by_side_test
+}  // namespace task_scheduler_test

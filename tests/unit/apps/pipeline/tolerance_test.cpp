@@ -221,7 +221,7 @@ TEST(Tolerance, ThatCannotBeReachedLeavesTheBest) {
   EXPECT_EQ(run.exitCode, 5);
   EXPECT_FALSE(run.mesh.isEmpty());
   EXPECT_SAYS(run.refusal, "--max-memory");
-  EXPECT_SAYS(run.refusal, "1e-06 was asked for");
+  EXPECT_SAYS(run.refusal, "1e-06 was requested");
   EXPECT_FALSE(run.told().isReached());
   const double truth = support::trueError(run.mesh, support::exactSphere(1));
   EXPECT_LE(truth, run.output().achieved);
@@ -247,14 +247,14 @@ TEST(Tolerance, Refuses) {
   EXPECT_SAYS(refusalOf("--tolerance nan" + rest), "--tolerance");
   EXPECT_SAYS(refusalOf("--tolerance 2vx" + rest), "in voxels");
   EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 1 --voxel 0.1 ! measure"),
-              "no action is left to choose a voxel size for");
+              "every action has a voxel size already");
   EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 10vx ! measure"), "counts in voxels");
   EXPECT_SAYS(refusalOf("sphere --radius 1 ! measure"), "how fine?");
   EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 1 --voxel 0.1 --resolution 3 ! measure"),
               "twice");
   EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 1 ! box --size 1,1,1 ! morph "
                         "--keep-steps a_##.vdb ! measure"),
-              "writes files while it makes its result");
+              "writes files while it computes its result");
 }
 
 TEST(Tolerance, StaysWithTheGraph) {
@@ -336,7 +336,7 @@ TEST_F(ToleranceCommand, RunsScriptsAndGraphs) {
 TEST_F(ToleranceCommand, TellsInADryRunWhatTheModelsPick) {
   const auto told = levelsmith("--dry-run --tolerance 0.1% sphere --radius 1 ! write no.vdb");
   EXPECT_EQ(told.code, 0) << told.err;
-  EXPECT_NE(told.err.find("the error models pick voxels of"), std::string::npos) << told.err;
+  EXPECT_NE(told.err.find("the error models choose voxels of"), std::string::npos) << told.err;
   EXPECT_FALSE(exists("no.vdb"));
 }
 
@@ -345,7 +345,7 @@ TEST_F(ToleranceCommand, EndsWithFiveAndTheBestWhereMemoryEnds) {
       "--max-memory 150M --report r.json --tolerance 1e-7 sphere --radius 1 ! write best.vdb");
   EXPECT_EQ(outcome.code, 5) << outcome.err;
   EXPECT_TRUE(exists("best.vdb"));
-  EXPECT_NE(outcome.err.find("was asked for"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("was requested"), std::string::npos) << outcome.err;
   const Json report = Json::parse(support::slurp(folder_ / "r.json"));
   EXPECT_EQ(report["exit_code"], 5);
   EXPECT_EQ(report["tolerance"]["reached"], false);

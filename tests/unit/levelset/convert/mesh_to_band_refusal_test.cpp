@@ -16,12 +16,12 @@ using namespace support;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-/// The conversion fails with that exit class, and its sentence holds the words.
+/// Expects that the conversion fails with this exit code and that the message contains `words`.
 void expectRefused(const TriMesh& mesh, double voxel, ExitCode code, const std::string& words,
                    const MeshToBandOptions& options = {}) {
   try {
     (void)meshToBand(mesh, voxel, options);
-    FAIL() << "accepted, though: " << words;
+    FAIL() << "accepted instead of: " << words;
   } catch (const Error& error) {
     EXPECT_EQ(error.exitCode(), code) << error.what();
     EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
@@ -36,8 +36,8 @@ TEST(MeshToBandRefusal, NamesBadVoxelSizes) {
   expectRefused(box, 0.1, ExitCode::Usage, "half width is", {.halfWidth = 0.5});
   expectRefused(box, 0.1, ExitCode::Usage, "half width is", {.halfWidth = kNan});
   expectRefused(box, 1e-9, ExitCode::Resource, "GB");
-  expectRefused(box, 1e-12, ExitCode::Resource, "index of 32 bits");
-  expectRefused(box, 1e-3, ExitCode::Resource, "passes the limit", {.maxMemory = 1000000});
+  expectRefused(box, 1e-12, ExitCode::Resource, "32-bit indices");
+  expectRefused(box, 1e-3, ExitCode::Resource, "exceeds the limit", {.maxMemory = 1000000});
   expectRefused(box, 100, ExitCode::Input, "larger than the object");
 }
 
@@ -52,7 +52,7 @@ TEST(MeshToBandRefusal, NamesBadElements) {
   expectRefused(mesh, 0.1, ExitCode::Resource, "vertex 5");
   mesh = boxMesh(V3d(0), V3d(1));
   mesh.triangles[7][1] = 8;
-  expectRefused(mesh, 0.1, ExitCode::Input, "triangle 7 names vertex 8");
+  expectRefused(mesh, 0.1, ExitCode::Input, "triangle 7 refers to vertex 8");
   TriMesh point{{V3d(0), V3d(1), V3d(2)}, {{0, 0, 1}}};
   expectRefused(point, 0.1, ExitCode::Input, "degenerate");
 }
@@ -68,13 +68,13 @@ TEST(MeshToBandRefusal, NamesCoordinatesTooCoarse) {
 TEST(MeshToBandRefusal, NamesOpenMeshes) {
   const TriMesh triangle{{V3d(0), V3d(1, 0, 0), V3d(0, 1, 0)}, {{0, 1, 2}}};
   for (const SignMode mode : {SignMode::Auto, SignMode::Winding})
-    expectRefused(triangle, 0.1, ExitCode::Input, "encloses nothing", {.sign = mode});
+    expectRefused(triangle, 0.1, ExitCode::Input, "encloses no volume", {.sign = mode});
   expectRefused(triangle, 0.1, ExitCode::Input, "3 edges have one face",
                 {.sign = SignMode::Closed});
 
   const TriMesh bowl = sphereMesh(1, V3d(0), 8, 0.5);
   expectRefused(bowl, 0.1, ExitCode::Input, "use --sign winding", {.sign = SignMode::Closed});
-  expectRefused(bowl, 0.1, ExitCode::Input, "--sign-anyway");
+  expectRefused(bowl, 0.1, ExitCode::Input, "--accept-sign");
 
   const TriMesh moebius = [] {
     TriMesh mesh = patchMesh(33, 5, false, false, [](double u, double v) {
@@ -82,7 +82,7 @@ TEST(MeshToBandRefusal, NamesOpenMeshes) {
       const double r = 1 + w * std::cos(a / 2);
       return V3d(r * std::cos(a), r * std::sin(a), w * std::sin(a / 2));
     });
-    for (auto& t : mesh.triangles)  // the last row is the first, mirrored
+    for (auto& t : mesh.triangles)  // the last row is the first row mirrored
       for (auto& v : t)
         if (v >= 32 * 5) v = 4 - (v - 32 * 5);
     return mesh;
@@ -90,10 +90,10 @@ TEST(MeshToBandRefusal, NamesOpenMeshes) {
   expectRefused(moebius, 0.1, ExitCode::Input, "not closed", {.sign = SignMode::Closed});
 }
 
-TEST(MeshToBandRefusal, GivesDistancesWithoutAnInsideWhenAskedTo) {
+TEST(MeshToBandRefusal, GivesUnsignedDistancesOnRequest) {
   const TriMesh triangle{{V3d(0), V3d(1, 0, 0), V3d(0, 1, 0)}, {{0, 1, 2}}};
   for (const SignMode mode : {SignMode::Auto, SignMode::Winding}) {
-    const auto result = meshToBand(triangle, 0.1, {.sign = mode, .signAnyway = true});
+    const auto result = meshToBand(triangle, 0.1, {.sign = mode, .acceptSign = true});
     EXPECT_EQ(result.certificate.ambiguousShare, 1);
     EXPECT_TRUE(result.band.zeroSetBounds().isEmpty());
     EXPECT_GT(result.band.activeVoxelCount(), 300);
@@ -103,7 +103,7 @@ TEST(MeshToBandRefusal, GivesDistancesWithoutAnInsideWhenAskedTo) {
   }
 }
 
-TEST(MeshToBandRefusal, NamesShellsThatCannotFollowTheirOrientation) {
+TEST(MeshToBandRefusal, NamesComponentsOfInconsistentOrientation) {
   TriMesh mesh = boxMesh(V3d(0), V3d(1));
   std::swap(mesh.triangles[3][0], mesh.triangles[3][1]);
   expectRefused(mesh, 0.1, ExitCode::Input, "--nested parity",

@@ -156,7 +156,7 @@ TEST(MeshAttributes, GarbageIsRefusedWithItsPlace) {
   const std::string nans = ply("float", "nx\0ny\0nz\0", "0 nan 1");
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)parse("a.ply", nans); }),
               "line 15: a normal holds nan");
-  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)parse("a.ply", nans); }), "--bare");
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)parse("a.ply", nans); }), "--no-attributes");
   EXPECT_TRUE(parse("a.ply", nans, {.attributes = false}).attributes.isEmpty());
   EXPECT_SAYS(refusal<InvalidInput>(
                   [&] { (void)parse("a.ply", ply("uchar", "red\0green\0blue\0", "0 256 1")); }),
@@ -169,10 +169,10 @@ TEST(MeshAttributes, GarbageIsRefusedWithItsPlace) {
   EXPECT_SAYS(refused("vn 0 0\nf 1//1 2//1 3//1\n"), "a coordinate of a normal is missing");
   EXPECT_SAYS(refused("vt 0 inf\nf 1/1 2/1 3/1\n"), "a texture coordinate is inf");
   EXPECT_SAYS(refused("vt 0 0\nvt 1 0\nf 1/1 2/2 3/3\n"),
-              "line 6: a face names texture coordinate 3 of 2");
-  EXPECT_SAYS(refused("vn 0 0 1\nf 1//1 2//-2 3//1\n"), "names normal -2, but only 1 stand before");
+              "line 6: a face refers to texture coordinate 3 of 2");
+  EXPECT_SAYS(refused("vn 0 0 1\nf 1//1 2//-2 3//1\n"), "refers to normal -2, but only 1 precede");
   EXPECT_SAYS(refused("vn 0 0 1\nf 1//0 2//1 3//1\n"), "names normal 0, but OBJ counts from 1");
-  EXPECT_SAYS(refused("v 1 1 1 0.5 oops 0\nf 1 2 3\n"), "'oops' stands where a weight or colour");
+  EXPECT_SAYS(refused("v 1 1 1 0.5 oops 0\nf 1 2 3\n"), "found 'oops' where a weight or colour");
   EXPECT_SAYS(refused("vn 0 0 1\nf 1//1 2//1 9//1\n"), "vertex 8 (counted from 0) of 3");
   EXPECT_EQ(parse("a.obj", obj + "vn 0 0 nan\nf 1//1 2//7 3//1\n", {.attributes = false})
                 .triangles.size(),
@@ -290,15 +290,15 @@ TEST(MeshAttributes, TransformKeepsNormalsAcross) {
 TEST(MeshAttributes, CarriedNormalsSurviveAnyScale) {
   const V3d n(1, 2, -3);
   for (const double scale : {1e-150, 1.0, 1e150})
-    EXPECT_LT((levelset::carriedNormal(n * scale,
+    EXPECT_LT((levelset::transformedNormal(n * scale,
                                        {V3d(scale, 0, 0), V3d(0, scale, 0), V3d(0, 0, scale)}, 1) -
                n.normalized())
                   .length(),
               1e-15);
   // A thin map is no flat one.
-  EXPECT_EQ(levelset::carriedNormal({1, 0, 0}, {V3d(1, 0, 0), V3d(0, 1e-9, 0), V3d(0, 0, 1e-9)}, 1),
+  EXPECT_EQ(levelset::transformedNormal({1, 0, 0}, {V3d(1, 0, 0), V3d(0, 1e-9, 0), V3d(0, 0, 1e-9)}, 1),
             V3d(1, 0, 0));
-  EXPECT_EQ(levelset::carriedNormal({0, 0, 1}, {V3d(1, 2, 0.1), V3d(3, 6, 0.3), V3d(0, 0, 1)}, 1),
+  EXPECT_EQ(levelset::transformedNormal({0, 0, 1}, {V3d(1, 2, 0.1), V3d(3, 6, 0.3), V3d(0, 0, 1)}, 1),
             V3d(0));
 }
 

@@ -160,7 +160,7 @@ TEST(MeshSeams, PlyTakesTheFirstWholePairOfTextureCoordinates) {
 TEST(MeshSeams, PlyBeyondItsTypesIsRefused) {
   const std::string normal = "property float nx\nproperty double ny\nproperty float nz\n";
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)parse("a.ply", ply(normal, "1e39 0 1")); }),
-              "1e+39 is beyond the range of float");
+              "1e+39 exceeds the range");
   EXPECT_EQ(parse("a.ply", ply(normal, "0 1e39 1")).attributes.normals[0].y, 1e39);
   EXPECT_EQ(parse("a.ply", ply(normal, "1e39 0 1"), {.attributes = false}).triangles.size(), 1u);
   const std::string twice =
@@ -170,7 +170,7 @@ TEST(MeshSeams, PlyBeyondItsTypesIsRefused) {
       "property list uchar int vertex_indices\nend_header\n"
       "9 9 9\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n3 0 1 2\n";
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)parse("a.ply", twice); }),
-              "the element 'vertex' comes twice");
+              "the element 'vertex' occurs twice");
 }
 
 TEST(MeshSeams, WhatIsLeftAsideIsTold) {
@@ -180,16 +180,16 @@ TEST(MeshSeams, WhatIsLeftAsideIsTold) {
                   "property list uchar float texcoord\nproperty uchar red\nproperty uchar green\n"
                   "property uchar blue\n",
                   " 6 0 0 1 0 0 1 255 0 0"),
-              {.leftAside = &told});
+              {.unsupported = &told});
   EXPECT_EQ(told, (std::vector<std::string>{"colours of faces", "texture coordinates of faces"}));
   told.clear();
   const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 1\nvn 0 0 1\n";
-  (void)parse("a.obj", obj + "f 1/1 2/1 3/1\n", {.leftAside = &told});
-  EXPECT_EQ(told, (std::vector<std::string>{"1 of 2 texture coordinates, which no face names",
-                                            "1 of 1 normals, which no face names"}));
+  (void)parse("a.obj", obj + "f 1/1 2/1 3/1\n", {.unsupported = &told});
+  EXPECT_EQ(told, (std::vector<std::string>{"1 of 2 texture coordinates, which no face refers to",
+                                            "1 of 1 normals, which no face refers to"}));
   told.clear();
-  (void)parse("a.obj", obj + "f 1/1/1 2/2/1 3/1/1\n", {.leftAside = &told});
-  (void)parse("a.obj", obj + "f 1 2 3\n", {.attributes = false, .leftAside = &told});
+  (void)parse("a.obj", obj + "f 1/1/1 2/2/1 3/1/1\n", {.unsupported = &told});
+  (void)parse("a.obj", obj + "f 1 2 3\n", {.attributes = false, .unsupported = &told});
   EXPECT_TRUE(told.empty());
 }
 

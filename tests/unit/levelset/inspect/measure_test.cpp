@@ -140,12 +140,12 @@ TEST(Measure, TellsTopologyOfTorusAndNestedShells) {
                                   {V3d(-17, -17, -5), V3d(17, 17, 5)}, 1));
   EXPECT_EQ(torus.euler, 0);
   EXPECT_EQ(torus.components, 1u);
-  EXPECT_EQ(torus.shells, 1u);
+  EXPECT_EQ(torus.surfaces, 1u);
   EXPECT_EQ(torus.cavities, 0u);
   EXPECT_NEAR(torus.volume, 2 * pi * pi * 12 * 25, 0.01 * 2 * pi * pi * 12 * 25);
   const Measurement shells = measure(nested(1));
   EXPECT_EQ(shells.components, 2u);
-  EXPECT_EQ(shells.shells, 3u);
+  EXPECT_EQ(shells.surfaces, 3u);
   EXPECT_EQ(shells.cavities, 1u);
   EXPECT_EQ(shells.euler, 6);
   const double exact = 4 * pi / 3 * (20. * 20 * 20 - 14. * 14 * 14 + 6. * 6 * 6);
@@ -162,7 +162,7 @@ TEST(Measure, KnowsFiguresOfTheBand) {
   EXPECT_NEAR((m.bounds.min - box.min).length(), 0, 1e-3 * 0.5);
   EXPECT_NEAR((m.bounds.max - box.max).length(), 0, 1e-3 * 0.5);
   EXPECT_EQ(measure(NarrowBand()).volume, 0);
-  EXPECT_EQ(measure(NarrowBand()).shells, 0u);
+  EXPECT_EQ(measure(NarrowBand()).surfaces, 0u);
 }
 
 TEST(Measure, IsTheSameFarFromOrigin) {

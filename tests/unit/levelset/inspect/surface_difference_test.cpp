@@ -26,7 +26,7 @@ TriMesh sphere(double radius, double voxel, const V3d& center = V3d(0)) {
 SurfaceDifference differ(const TriMesh& a, const TriMesh& b, double spacing,
                          const std::vector<V3d>& creases = {}, double reach = 0) {
   return surfaceDifference(TriangleSurface(a), TriangleSurface(b),
-                           {.spacing = spacing, .creases = creases, .creaseReach = reach});
+                           {.spacing = spacing, .creases = creases, .creaseRadius = reach});
 }
 
 TEST(SurfaceDifference, OfConcentricSpheresIsThatOfTheirRadii) {

@@ -217,22 +217,22 @@ TEST(MeshFile, ReadsAsciiPly) {
 TEST(MeshFile, RefusesWhatGoesOnBehindItsHeader) {
   const std::string binary = strangePly("uchar", "int", "float", false);
   for (const std::string& ply : {kAsciiPly, binary}) {
-    EXPECT_SAYS(refused("a.ply", ply + "junk"), "goes on behind the elements");
+    EXPECT_SAYS(refused("a.ply", ply + "junk"), "has data after the elements");
     EXPECT_NO_THROW((void)parse("a.ply", ply + " \t\r\n\n"));
   }
   std::string ply = binary;
   ply.replace(ply.find("face 5"), 6, "face 4");
-  EXPECT_SAYS(refused("a.ply", ply), "goes on behind the elements");
+  EXPECT_SAYS(refused("a.ply", ply), "has data after the elements");
   ply = kAsciiPly;
   ply.replace(ply.find("face 2"), 6, "face 1");
-  EXPECT_SAYS(refused("a.ply", ply), "goes on behind the elements");
+  EXPECT_SAYS(refused("a.ply", ply), "has data after the elements");
   // Elements that no mesh needs are read to find the end.
   ply = kAsciiPly + "1 2\n3\n";
   ply.replace(ply.find("end_header"), 10, "element tag 2\nproperty list int int marks\nend_header");
   EXPECT_SAYS(refused("a.ply", ply), "the file ends within the elements 'tag'");
   EXPECT_EQ(parse("a.ply", ply + "5 6 7\n").triangles.size(), 2u);
   const std::string off = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
-  EXPECT_SAYS(refused("a.off", off + "3 0 2 1\n"), "goes on behind the 3 vertices and 1 faces");
+  EXPECT_SAYS(refused("a.off", off + "3 0 2 1\n"), "has data after the 3 vertices and 1 faces");
   EXPECT_NO_THROW((void)parse("a.off", off + "\n # the end\n\n"));
 }
 
@@ -282,7 +282,7 @@ TEST(MeshFile, RefusesBrokenPly) {
     ply.replace(ply.find(from), from.size(), to);
     return refused("a.ply", ply);
   };
-  EXPECT_SAYS(with("3 0 2 3", "3 0 2 4"), "line 15: a face names vertex 4");
+  EXPECT_SAYS(with("3 0 2 3", "3 0 2 4"), "line 15: a face refers to vertex 4");
   EXPECT_SAYS(with("3 0 2 3", "3 0 -2 3"), "line 15: the index of a vertex is -2");
   EXPECT_SAYS(with("3 0 2 3", "3 0 2.5 3"), "the index of a vertex is 2.5");
   EXPECT_SAYS(with("3 0 2 3", "-3 0 2 3"), "the length of a list is -3");
@@ -291,15 +291,15 @@ TEST(MeshFile, RefusesBrokenPly) {
   EXPECT_SAYS(with("1 1 0", "1 1e400 0"), "line 12: the coordinate inf");
   EXPECT_SAYS(with("1 1 0", "1 -1e39 0"), "beyond the range of float");
   EXPECT_SAYS(with("1 1 0", "1 1 0 7"), "line 12: there are more values");
-  EXPECT_SAYS(with("1 1 0", "1 1,5 0"), "line 12: '1,5' stands where a number should");
+  EXPECT_SAYS(with("1 1 0", "1 1,5 0"), "line 12: found '1,5' where a number is expected");
   EXPECT_SAYS(with("property float y", "property real y"), "the type 'real'");
   EXPECT_SAYS(with("property float y\n", ""), "no element 'vertex' with x, y and z");
   EXPECT_SAYS(with("vertex_indices", "something"), "no element 'face'");
-  EXPECT_SAYS(with("property float y", "property float x"), "comes twice");
+  EXPECT_SAYS(with("property float y", "property float x"), "occurs twice");
   EXPECT_SAYS(with("ascii", "ebcdic"), "'ebcdic'");
   EXPECT_SAYS(with("end_header", "property x"), "needs a type and a name");
   EXPECT_SAYS(with("ply", "plx"), "does not begin with 'ply'");
-  EXPECT_SAYS(with("element face 2", "element face 0"), "goes on behind the elements");
+  EXPECT_SAYS(with("element face 2", "element face 0"), "has data after the elements");
 }
 
 TEST(MeshFile, KeepsExtremeButFiniteCoordinates) {
@@ -344,12 +344,12 @@ TEST(MeshFile, ReadsObjWithFacesFirstAndLongLines) {
 
 TEST(MeshFile, RefusesBrokenObj) {
   const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
-  EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 4\n"), "line 4: a face names vertex 3");
-  EXPECT_SAYS(refused("a.obj", vertices + "f 0 1 2\n"), "line 4: a face names vertex 0");
-  EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 -4\n"), "line 4: a face names vertex -4");
+  EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 4\n"), "line 4: a face refers to vertex 3");
+  EXPECT_SAYS(refused("a.obj", vertices + "f 0 1 2\n"), "line 4: a face refers to vertex 0");
+  EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 -4\n"), "line 4: a face refers to vertex -4");
   EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 99999999999\n"), "vertex 99999999998");
   EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 9999999999999999999999\n"), "line 4");
-  EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 x\n"), "line 4: 'x' stands where the index");
+  EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 x\n"), "line 4: found 'x' where the index");
   EXPECT_SAYS(refused("a.obj", vertices + "f 1 2 3.5\n"), "line 4");
   EXPECT_SAYS(refused("a.obj", "v 0 0\n" + vertices + "f 1 2 3\n"),
               "line 1: a coordinate is missing");
@@ -403,9 +403,9 @@ TEST(MeshFile, ReadsBinaryStlWhateverItsHeader) {
     EXPECT_EQ(parse("a.stl", binaryStl(header, {triangle, triangle}, 2) + "\r\n").triangles.size(),
               2u);
     EXPECT_SAYS(refused("a.stl", binaryStl(header, {triangle, triangle}, 2) + "tail"),
-                "goes on behind the 2 triangles");
+                "has data after the 2 triangles");
     EXPECT_SAYS(refused("a.stl", binaryStl(header, {triangle, triangle}, 1)),
-                "goes on behind the 1 triangles that its header promises (it has room for 2)");
+                "has data after the 1 triangles that its header promises (it can hold 2)");
   }
 }
 
@@ -423,7 +423,7 @@ TEST(MeshFile, RefusesBrokenStl) {
   EXPECT_SAYS(refused("a.stl", binaryStl("x", {bad}, 1)), "triangle 0: the coordinate -inf");
   for (std::size_t size = 1; size + 15 < kAsciiStl.size(); ++size)
     ASSERT_FALSE(refused("a.stl", kAsciiStl.substr(0, size)).empty()) << size;
-  EXPECT_SAYS(refused("a.stl", "solid x\nfacette\n"), "line 2: 'facette' is no word");
+  EXPECT_SAYS(refused("a.stl", "solid x\nfacette\n"), "line 2: 'facette' is not a keyword");
 }
 
 // === OFF
@@ -448,8 +448,8 @@ TEST(MeshFile, RefusesBrokenOff) {
   EXPECT_SAYS(refused("a.off", "OFF BINARY" + body), "binary OFF");
   EXPECT_SAYS(refused("a.off", body), "does not begin with 'OFF'");
   EXPECT_SAYS(refused("a.off", "OFF\n3000000000 1 0\n0 0 0\n"), "promises 3000000000 vertices");
-  EXPECT_SAYS(refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"), "names vertex 3");
-  EXPECT_SAYS(refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 -1 2\n"), "whole number");
+  EXPECT_SAYS(refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"), "refers to vertex 3");
+  EXPECT_SAYS(refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 -1 2\n"), "non-negative integer");
   EXPECT_SAYS(refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1"), "the file ends");
 }
 
@@ -513,7 +513,7 @@ TEST(MeshFile, EndsAGzipBombAtTheMemoryLimit) {
   EXPECT_LT(bomb.size(), 100000u);
   const auto sentence = refusal<levelset::ResourceLimit>(
       [&] { static_cast<void>(parse("a.obj.gz", bomb, {.maxMemory = 16 << 20})); });
-  EXPECT_SAYS(sentence, "when decompressed passes the memory limit");
+  EXPECT_SAYS(sentence, "when decompressed exceeds the memory limit");
 }
 
 TEST(MeshFile, KeepsToTheMemoryLimit) {
@@ -571,7 +571,7 @@ TEST(MeshFile, NamesTheFaceThatGoesAstray) {
       "property uchar z\nelement face 1\nproperty list uchar uchar vertex_indices\nend_header\n";
   const auto sentence = refusal<levelset::InvalidInput>(
       [&] { (void)parse("a.ply", header + std::string("\0\0\0\3\0\0\7", 7)); });
-  EXPECT_SAYS(sentence, "face 0: a face names vertex 7");
+  EXPECT_SAYS(sentence, "face 0: a face refers to vertex 7");
 }
 
 TEST(MeshFile, RefusesWhatItsSeamsHeldOpen) {
@@ -584,7 +584,7 @@ TEST(MeshFile, RefusesWhatItsSeamsHeldOpen) {
     (void)parse("a.ply", header + "1 0 0 0 0\n1 0 0 0 1\n1 0 0 1 1\n3 0 1 2\n",
                 {.attributes = false});
   });
-  EXPECT_SAYS(sentence, "none is left");
+  EXPECT_SAYS(sentence, "none remains");
 }
 
 TEST(MeshFile, SaysThatTheDiskIsFull) {

@@ -89,7 +89,7 @@ TEST(Polygon, RefusesAPolygonTooIntricateToSplit) {
   }
   const std::string text = obj + "v 0 -9 0\n" + face + " 60001\n";
   const std::string sentence = refusal<levelset::InvalidInput>([&] { (void)readObj(text); });
-  EXPECT_NE(sentence.find("too intricate"), std::string::npos) << sentence;
+  EXPECT_NE(sentence.find("too complex"), std::string::npos) << sentence;
 }
 
 }  // namespace polygon_test

@@ -61,10 +61,10 @@ void expectDistance(const NarrowBand& band, const Distance& exact, double tolera
 TEST(Topology, CountsNestedShells) {
   const Topology t = topology(nestedShells());
   EXPECT_EQ(t.components, 3u);
-  EXPECT_EQ(t.shells, 5u);
+  EXPECT_EQ(t.surfaces, 5u);
   EXPECT_EQ(t.cavities, 2u);
   const Topology none = topology(NarrowBand());
-  EXPECT_EQ(none.components + none.shells + none.cavities, 0u);
+  EXPECT_EQ(none.components + none.surfaces + none.cavities, 0u);
 }
 
 TEST(Topology, TellsDiagonalNeighboursApart) {
@@ -82,13 +82,13 @@ TEST(KeepLargest, DropsSmallerSolidsAndKeepsBitsOfTheRest) {
   const NarrowBand one = keepLargest(solid, 1);
   const Topology t = topology(one);
   EXPECT_EQ(t.components, 1u);
-  EXPECT_EQ(t.shells, 2u);
+  EXPECT_EQ(t.surfaces, 2u);
   EXPECT_EQ(t.cavities, 1u);
   EXPECT_EQ(one.contentHash(),
             sample([](const V3d& p) { return std::max(p.length() - 24, 18 - p.length()); }, 46)
                 .contentHash());
   const NarrowBand two = keepLargest(solid, 2);
-  EXPECT_EQ(topology(two).shells, 4u);
+  EXPECT_EQ(topology(two).surfaces, 4u);
   EXPECT_EQ(two.contentHash(), sample(
                                    [](const V3d& p) {
                                      const double r = p.length();
@@ -107,7 +107,7 @@ TEST(KeepLargest, KeepsSolidInsideADroppedOne) {
   const auto inner = [](const V3d& p) { return p.length() - 22; };
   const NarrowBand kept =
       keepLargest(sample([&](const V3d& p) { return std::min(thin(p), inner(p)); }, 31), 1);
-  EXPECT_EQ(topology(kept).shells, 1u);
+  EXPECT_EQ(topology(kept).surfaces, 1u);
   EXPECT_EQ(kept.contentHash(), sample(inner, 31).contentHash());
 }
 
@@ -118,7 +118,7 @@ TEST(KeepLargest, RestoresDistanceBesideDroppedSolid) {
   const NarrowBand both = sample([&](const V3d& p) { return std::min(large(p), small(p)); }, 24);
   ASSERT_EQ(topology(both).components, 2u);
   const NarrowBand kept = keepLargest(both, 1);
-  EXPECT_EQ(topology(kept).shells, 1u);
+  EXPECT_EQ(topology(kept).surfaces, 1u);
   expectDistance(kept, large, 0.05);
   EXPECT_TRUE(check(kept).passed());
   std::size_t changed = 0;
@@ -143,7 +143,7 @@ TEST(KeepLargest, RefusesNothingToKeep) {
 TEST(FillCavities, FillsAllOrOnlySmallOnes) {
   const NarrowBand solid = nestedShells();
   const NarrowBand full = fillCavities(solid);
-  EXPECT_EQ(topology(full).shells, 2u);
+  EXPECT_EQ(topology(full).surfaces, 2u);
   EXPECT_EQ(topology(full).cavities, 0u);
   EXPECT_EQ(
       full.contentHash(),
@@ -151,12 +151,12 @@ TEST(FillCavities, FillsAllOrOnlySmallOnes) {
           .contentHash());
   // The void of radius 5 holds 524, the one around the inner shell 18² 4π/3 less what floats in it.
   const NarrowBand small = fillCavities(solid, 1.02 * ballVolume(5));
-  EXPECT_EQ(topology(small).shells, 4u);
+  EXPECT_EQ(topology(small).surfaces, 4u);
   EXPECT_EQ(topology(small).cavities, 1u);
   EXPECT_EQ(fillCavities(solid, 0.95 * ballVolume(5)).contentHash(), solid.contentHash());
   const double outer = ballVolume(18) - ballVolume(10);
-  EXPECT_EQ(topology(fillCavities(solid, 1.01 * outer)).shells, 2u);
-  EXPECT_EQ(topology(fillCavities(solid, 0.99 * outer)).shells, 4u);
+  EXPECT_EQ(topology(fillCavities(solid, 1.01 * outer)).surfaces, 2u);
+  EXPECT_EQ(topology(fillCavities(solid, 0.99 * outer)).surfaces, 4u);
 }
 
 TEST(FillCavities, RestoresDistanceUnderThinWalls) {
@@ -165,7 +165,7 @@ TEST(FillCavities, RestoresDistanceUnderThinWalls) {
       sample([&](const V3d& p) { return std::max(hull(p), -ball(p, V3d(0, 0, 3), 8.5)); }, 15);
   ASSERT_EQ(topology(hollow).cavities, 1u);
   const NarrowBand filled = fillCavities(hollow);
-  EXPECT_EQ(topology(filled).shells, 1u);
+  EXPECT_EQ(topology(filled).surfaces, 1u);
   expectDistance(filled, hull, 0.05);
   EXPECT_TRUE(check(filled).passed());
   EXPECT_NEAR(measure(filled).volume, ballVolume(14.2), 5e-3 * ballVolume(14.2));
@@ -192,7 +192,7 @@ TEST(FillCavities, FindsVoidsMadeOfTilesOnly) {
           .deepCopy();
   grid->pruneGrid();
   const NarrowBand filled = fillCavities(makeBand(grid));
-  EXPECT_EQ(topology(filled).shells, 1u);
+  EXPECT_EQ(topology(filled).surfaces, 1u);
   EXPECT_LT(vdb(filled).tree().getValue(openvdb::Coord(0)), 0);
 }
 

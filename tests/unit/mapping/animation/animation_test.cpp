@@ -132,7 +132,7 @@ TEST(CarryFootprint, StaysWhereTheSurfaceMovesAlongItself) {
   const Footprint first = footprint(ball, V3d(0, 0, 1));
   for (const CarryRule rule : {CarryRule::Corners, CarryRule::Rigid}) {
     const Footprint now = mapping::carryFootprint(ballAt(V3d(0), 1, 0.09), first, rule);
-    EXPECT_LT(mapping::farthestWay(first, now), 0.02 * kVoxel);
+    EXPECT_LT(mapping::farthestMove(first, now), 0.02 * kVoxel);
   }
 }
 
@@ -242,7 +242,7 @@ TEST(PatchPath, KeepsToTheSideOfItsGuide) {
   ASSERT_GT(left.at(0.5).centre.y, 0.9);
   const Footprint across = footprint(base, V3d(-1, -0.05, 0));
   EXPECT_LT(PatchPath(base, a, across, CarryRule::Rigid).at(0.5).centre.y, -0.9);
-  const PatchPath guided(base, a, across, CarryRule::Rigid, left.centreWay());
+  const PatchPath guided(base, a, across, CarryRule::Rigid, left.centrePath());
   EXPECT_FALSE(guided.hasJumped());
   EXPECT_GT(guided.at(0.5).centre.y, 0.9);
 }
@@ -252,7 +252,7 @@ TEST(PatchPath, RefusesAnotherComponent) {
   const Footprint a = footprint(two, V3d(-2, 0, 1)), b = footprint(two, V3d(2, 0, 1));
   EXPECT_NE(support::refusal<levelset::Error>([&] {
               PatchPath(two, a, b, CarryRule::Corners);
-            }).find("no way"),
+            }).find("no geodesic"),
             std::string::npos);
 }
 
@@ -330,7 +330,7 @@ TEST(AnimatePatches, TellsTheFrameOfWhatItRefuses) {
   const std::string torn = support::refusal<levelset::Error>(
       [&] { (void)play(first, {keyOf(a)}, {.frames = 4, .bases = bases}); });
   EXPECT_NE(torn.find("animate: frame 2: "), std::string::npos) << torn;
-  EXPECT_NE(torn.find("one part of the base"), std::string::npos) << torn;
+  EXPECT_NE(torn.find("the same surface component"), std::string::npos) << torn;
   EXPECT_EQ(torn.find("frame"), torn.rfind("frame")) << torn;
   // Nothing is left.
   const NarrowBand ball = ballAt(V3d(0));
@@ -348,7 +348,8 @@ TEST(AnimatePatches, TellsTheFrameOfWhatItRefuses) {
         {.frames = 4, .make = support::remakePatches}, [&](const PatchFrame&) { ++made; });
   });
   EXPECT_EQ(made, 0u);
-  EXPECT_NE(apart.find("animate: frame 1: no way on the surface"), std::string::npos) << apart;
+  EXPECT_NE(apart.find("animate: frame 1: the surface does not connect"), std::string::npos)
+      << apart;
 }
 
 TEST(AnimatePatches, WarnsOfPatchesThatDrift) {
@@ -362,7 +363,7 @@ TEST(AnimatePatches, WarnsOfPatchesThatDrift) {
   ASSERT_EQ(free.report.warnings.size(), 1u);
   EXPECT_NE(free.report.warnings[0].find("frame 3"), std::string::npos) << free.report.warnings[0];
   EXPECT_NEAR(free.report.frames[4].drift.most, 1.96, 0.01);
-  EXPECT_NEAR(free.report.frames[4].farthestWay, 0.24, 0.1 * kVoxel);
+  EXPECT_NEAR(free.report.frames[4].farthestMove, 0.24, 0.1 * kVoxel);
   const Played rigid =
       play(ball, {keyOf(a)}, {.frames = 5, .carry = CarryRule::Rigid, .bases = bases});
   EXPECT_TRUE(rigid.report.warnings.empty());
@@ -392,7 +393,7 @@ TEST(AnimatePatches, RefusesKeysThatDoNotGoTogether) {
   const auto refusal = [&](const std::vector<AnimationKey>& keys) {
     return support::refusal<levelset::Error>([&] { (void)play(ball, keys, {.frames = 4}); });
   };
-  EXPECT_NE(refusal({keyOf(a), keyOf(a, 4)}).find("patch 2 stands at frame 4"), std::string::npos);
+  EXPECT_NE(refusal({keyOf(a), keyOf(a, 4)}).find("patch 2 is at frame 4"), std::string::npos);
   EXPECT_NE(refusal({keyOf(a), keyOf(a, 2), keyOf(a, 2)}).find("patch 3"), std::string::npos);
   EXPECT_NE(refusal({keyOf(a, 1)}).find("frame 0"), std::string::npos);
   AnimationKey two = keyOf(a, 3);
@@ -400,11 +401,13 @@ TEST(AnimatePatches, RefusesKeysThatDoNotGoTogether) {
   EXPECT_NE(refusal({keyOf(a), two}).find("a set of 2"), std::string::npos);
   AnimationKey mirrored = keyOf(a, 3);
   mirrored.patches[0].mirrored = true;
-  EXPECT_NE(refusal({keyOf(a), mirrored}).find("patch 2 is mirrored"), std::string::npos);
+  EXPECT_NE(refusal({keyOf(a), mirrored}).find("one of patch 2 and the first patch is mirrored"),
+            std::string::npos);
   // Tiles have one outline, and each counts.
   AnimationKey tiles = keyOf(a), others = keyOf(a, 3);
   tiles.patches.push_back(a);
-  EXPECT_NE(refusal({tiles, others}).find("a set of 1 tiles, the first of 2"), std::string::npos);
+  EXPECT_NE(refusal({tiles, others}).find("a set of 1 tiles, the first patch a set of 2"),
+            std::string::npos);
   others.patches.push_back(a);
   others.patches[1].mirrored = true;
   EXPECT_NE(refusal({tiles, others}).find("in member 2"), std::string::npos);
@@ -414,7 +417,7 @@ TEST(AnimatePatches, RefusesKeysThatDoNotGoTogether) {
   const Patch b = makePatch(ball, a.corners, a.height, finer).patch;
   const Played played = play(ball, {keyOf(a), keyOf(b, 3)}, {.frames = 4});
   ASSERT_EQ(played.report.warnings.size(), 1u);
-  EXPECT_NE(played.report.warnings[0].find("3 layers and the first 2"), std::string::npos);
+  EXPECT_NE(played.report.warnings[0].find("3 layers and the first patch 2"), std::string::npos);
 }
 
 TEST(AnimatePatches, RefusesKeysOfAnotherBaseBeforeAFrameIsMade) {

@@ -108,7 +108,7 @@ TEST(AnimateTexture, ShowsTexturesThatGrowAndShrink) {
   const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
   const Patch a = patchAt(ball, V3d(0, 0, 1));
   const auto textures = [](std::size_t f) { return ballAt(V3d(0), f == 1 ? 0.35 : 0.7); };
-  for (const mapping::TextureMap map : {mapping::TextureMap::Rbf, mapping::TextureMap::Shell}) {
+  for (const mapping::TextureMap map : {mapping::TextureMap::Rbf, mapping::TextureMap::Prism}) {
     mapping::TextureAnimationOptions options{.animation = {.frames = 3}, .texture = coarse()};
     options.animation.make = support::remakePatches;
     options.texture.map = map;
@@ -127,10 +127,10 @@ TEST(AnimateTexture, ShowsTexturesThatGrowAndShrink) {
     if (map == mapping::TextureMap::Rbf) {
       EXPECT_GT(tops[2], tops[0] + 0.3 * kVoxel);
       EXPECT_TRUE(report.warnings.empty());
-    } else {  // the shell ends there
+    } else {  // the prism map ends there
       EXPECT_NEAR(tops[2], tops[0], 0.3 * kVoxel);
       ASSERT_EQ(report.warnings.size(), 1u);
-      EXPECT_NE(report.warnings[0].find("frame 2: the texture goes beyond"), std::string::npos);
+      EXPECT_NE(report.warnings[0].find("frame 2: the texture extends beyond"), std::string::npos);
     }
     // A box that is given is kept.
     options.texture.textureBox = ballAt(V3d(0), 0.7).zeroSetBounds();

@@ -16,13 +16,13 @@
 #include "mapping/distortion/jacobian_field.h"
 #include "mapping/layers/trilinear_volume.h"
 #include "mapping/maps/layer_map.h"
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
 #include "mapping/rbf/rbf_map.h"
 #include "mapping/rbf/rbf_taylor.h"
 #include "mapping/textures/geometric_texture.h"
 #include "mapping/textures/mesh_texture.h"
-#include "mapping/untangle/shell_cells.h"
+#include "mapping/untangle/prism_cells.h"
 #include "tests/support/component_counts.h"
 #include "tests/support/threads.h"
 
@@ -30,12 +30,12 @@ namespace fold_certificate_test {
 
 using Imath::V3d;
 using mapping::certifyLayers;
+using mapping::certifyPrisms;
 using mapping::certifyRbf;
-using mapping::certifyShell;
 using mapping::FoldCertificate;
 using mapping::FoldVerdict;
 using mapping::Patch;
-using mapping::ShellMap;
+using mapping::PrismMap;
 using support::patchAt;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
@@ -53,7 +53,7 @@ std::array<V3d, 8> unitCube() {
 }
 
 FoldCertificate shellOf(const Patch& patch, double sink = 0) {
-  return certifyShell(ShellMap(patch, {.sink = sink}), patch.mirrored);
+  return certifyPrisms(PrismMap(patch, {.embedDepth = sink}), patch.mirrored);
 }
 
 FoldCertificate rbfOf(const Patch& patch, double sink = 0) {
@@ -179,9 +179,9 @@ TEST(FoldCertificate, TellsThePlaceOfAFold) {
   for (const FoldCertificate& certificate : {shellOf(pushed(0.8)), certifyLayers(pushed(0.8), 0)}) {
     ASSERT_EQ(certificate.verdict(), FoldVerdict::Folds);
     ASSERT_FALSE(certificate.worst.empty());
-    EXPECT_LE(certificate.worst.size(), FoldCertificate::kMostPlaces);
+    EXPECT_LE(certificate.worst.size(), FoldCertificate::kMostPoints);
     EXPECT_LE((certificate.worst[0].uvw - V3d(0.5)).length(), 0.5);
-    EXPECT_LE((certificate.worst[0].place - V3d(2, 2, 0.5)).length(), 1.3);
+    EXPECT_LE((certificate.worst[0].position - V3d(2, 2, 0.5)).length(), 1.3);
     EXPECT_DOUBLE_EQ(certificate.worst[0].jacobian, certificate.leastJacobian);
     EXPECT_LT(certificate.leastJacobian, 0);
     EXPECT_GT(certificate.foldedShare, 0);
@@ -217,10 +217,11 @@ TEST(FoldCertificate, SmoothMapsAreJudgedAsTheirSlopesSay) {
     }
     if (certificate.verdict() == FoldVerdict::Folds) {
       ++folded;
-      for (const mapping::FoldPlace& fold : certificate.worst) {
-        EXPECT_LE((map(fold.place) - fold.uvw).length(), 1e-2);
-        EXPECT_LE(map.jacobian(fold.place).determinant(), 0);
-        EXPECT_NEAR(map.jacobian(fold.place).determinant() / certificate.unit, fold.jacobian, 1e-9);
+      for (const mapping::FoldPoint& fold : certificate.worst) {
+        EXPECT_LE((map(fold.position) - fold.uvw).length(), 1e-2);
+        EXPECT_LE(map.jacobian(fold.position).determinant(), 0);
+        EXPECT_NEAR(map.jacobian(fold.position).determinant() / certificate.unit, fold.jacobian,
+                    1e-9);
       }
     }
     if (least < 0) {
@@ -251,7 +252,7 @@ TEST(FoldCertificate, FoldsThatTheSamplesMissAreRefused) {
       (void)mapping::mapMesh(triangle, patch, {.textureBox = whole});
       ADD_FAILURE() << "a fold was let pass";
     } catch (const levelset::InvalidInput& error) {
-      EXPECT_NE(std::string(error.what()).find("in between"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("folds between the"), std::string::npos) << error.what();
     }
     const auto allowed =
         mapping::mapMesh(triangle, patch, {.textureBox = whole, .allowFolds = true});
@@ -264,11 +265,11 @@ TEST(FoldCertificate, FoldsThatTheSamplesMissAreRefused) {
 TEST(FoldCertificate, LayersOfUnlikeCountsAreCutWhereEitherEnds) {
   Patch patch = patchAt(box, 5, 4, 3);
   patch.layers[1] = patchAt(box, 4, 6, 3).layers[1];
-  const mapping::ShellCells cells(patch, 0.1);
+  const mapping::PrismCells cells(patch, 0.1);
   double volume = 0;
   const std::vector<V3d> positions = mapping::particlePositions(patch);
   for (std::size_t n = 0; n < cells.size(); ++n) {
-    const mapping::ShellCell cell = cells.at(n);
+    const mapping::PrismCell cell = cells.at(n);
     const V3d sides = cell.box.size();
     volume += sides.x * sides.y * sides.z;
     for (std::size_t corner = 0; corner < 8; ++corner) {
@@ -369,7 +370,7 @@ TEST(RbfTaylor, CubesKeepTheirBounds) {
   };
   const Patch patch = patchAt(wavy, 12, 12, 4);
   const mapping::RbfMap map = mapping::patchToTexture(patch);
-  const V3d sizes = mapping::shellSizes(patch);
+  const V3d sizes = mapping::meanExtents(patch);
   const mapping::RbfCubes cubes(map, sizes, 1e-2);
   mapping::RbfCube cube = cubes.root(V3d(0), 2);
   bool hasFar = false;
@@ -402,11 +403,12 @@ TEST(RbfTaylor, EvaluatesManyPlacesAsTheMapDoes) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(0, 1);
   std::vector<mapping::MapSample> samples(500);
-  for (auto& sample : samples) sample.place = V3d(3 * unit(random), 3 * unit(random), unit(random));
+  for (auto& sample : samples)
+    sample.position = V3d(3 * unit(random), 3 * unit(random), unit(random));
   mapping::evaluateRbf(map, patch, samples);
   for (const auto& sample : samples) {
-    EXPECT_LE((sample.uvw - map(sample.place)).length(), 1e-5);
-    const Imath::M33d exact = map.jacobian(sample.place);
+    EXPECT_LE((sample.uvw - map(sample.position)).length(), 1e-5);
+    const Imath::M33d exact = map.jacobian(sample.position);
     for (int k = 0; k < 3; ++k)
       for (int axis = 0; axis < 3; ++axis)
         EXPECT_NEAR(sample.jacobian[k][axis], exact[k][axis], 1e-5);
@@ -421,9 +423,9 @@ TEST(JacobianField, HoldsTheJacobianOfEachMap) {
   const FoldCertificate layers = certifyLayers(patch, 0);
   const auto field =
       levelset::asScalarField(mapping::jacobianField(patch, layers, options), "test");
-  const ShellMap shell(patch, {});
+  const PrismMap shell(patch, {});
   const auto straight = levelset::asScalarField(
-      mapping::jacobianField(patch, shell, certifyShell(shell, false), options), "test");
+      mapping::jacobianField(patch, shell, certifyPrisms(shell, false), options), "test");
   const mapping::RbfMap map = mapping::patchToTexture(patch);
   const FoldCertificate proof = certifyRbf(map, patch, 0);
   const auto smooth =
@@ -465,7 +467,7 @@ TEST(JacobianField, ShowsFoldsBetweenGridPoints) {
   ASSERT_EQ(certificate.verdict(), FoldVerdict::Folds);
   const levelset::FieldGrid field = mapping::jacobianField(patch, certificate, {.voxelSize = 0.5});
   const auto value = levelset::asScalarField(field, "test");
-  const V3d place = certificate.worst[0].place;
+  const V3d place = certificate.worst[0].position;
   const V3d point(std::round(place.x / 0.5) * 0.5, std::round(place.y / 0.5) * 0.5,
                   std::round(place.z / 0.5) * 0.5);
   EXPECT_LT(value(point), 0);

@@ -226,9 +226,9 @@ TEST(Ring, RefusesWiresThatMeet) {
   const auto refused = [](const Ring& ring) {
     return support::refusal<levelset::UsageError>([&] { (void)makeRing(ring, V3d(0), 0.04); });
   };
-  EXPECT_NE(refused({.tube = 0.26, .columns = 2, .rows = 2}).find("come within"),
+  EXPECT_NE(refused({.tube = 0.26, .columns = 2, .rows = 2}).find("the clearance between wires"),
             std::string::npos);
-  EXPECT_NE(refused({.tube = 0.15, .columns = 2, .rows = 2, .clearance = 0.3}).find("to be left"),
+  EXPECT_NE(refused({.tube = 0.15, .columns = 2, .rows = 2, .clearance = 0.3}).find("--clearance requires 0.3"),
             std::string::npos);
   EXPECT_NE(refused({.tube = 0.1, .columns = 2, .rows = 2, .spacing = V2d(3, 3)}).find("hold"),
             std::string::npos);

@@ -161,7 +161,7 @@ TEST(Scales, RefuseWhatDoesNotOverlap) {
   const auto refused = [](const Scales& scales) {
     return support::refusal<levelset::UsageError>([&] { (void)makeScales(scales, V3d(0), 0.05); });
   };
-  EXPECT_NE(refused({.step = 2}).find("do not overlap"), std::string::npos);
+  EXPECT_NE(refused({.step = 2}).find("rows must overlap"), std::string::npos);
   EXPECT_NE(refused({.tip = 0.2}).find("blunter"), std::string::npos);
   EXPECT_NE(refused({.tip = 3}).find("the tip"), std::string::npos);
   EXPECT_NE(refused({.thickness = 0.4}).find("rows touch"), std::string::npos);

@@ -11,7 +11,7 @@
 #include "mapping/distortion/distortion.h"
 #include "mapping/layers/layer_resampling.h"
 #include "mapping/layers/relaxation.h"
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
 #include "tests/support/patches.h"
 
@@ -38,7 +38,7 @@ NarrowBand makeGround(double bump, double voxel = 0.1) {
 }
 
 std::size_t foldsOf(const Patch& patch) {
-  return mapping::surveyDistortion(mapping::ShellMap(patch, {}).samples(), V3d(1)).folded;
+  return mapping::surveyDistortion(mapping::PrismMap(patch, {}).samples(), V3d(1)).folded;
 }
 
 TEST(SweepCurve, FollowsACircle) {
@@ -305,10 +305,10 @@ TEST(LayerSchemes, RefuseWhatMakesNoSense) {
     }
     return std::string();
   };
-  EXPECT_NE(refused({.fade = true}).find("spline scheme only"), std::string::npos);
+  EXPECT_NE(refused({.fade = true}).find("require --particles spline"), std::string::npos);
   EXPECT_NE(refused({.scheme = LayerScheme::Spline, .spline = {V3d(0, 0, 0.5)}}).find("only 0.5"),
             std::string::npos);
-  EXPECT_NE(refused({.scheme = LayerScheme::Spline, .spline = {V3d(0)}}).find("stands still"),
+  EXPECT_NE(refused({.scheme = LayerScheme::Spline, .spline = {V3d(0)}}).find("two equal points"),
             std::string::npos);
   EXPECT_NE(refused({.scheme = LayerScheme::Spline, .spline = {V3d(std::nan(""))}}).find("finite"),
             std::string::npos);

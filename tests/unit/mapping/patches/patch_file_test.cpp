@@ -76,7 +76,7 @@ TEST(PatchFile, RefusesWhatIsNoPatch) {
       {"", "JSON"},
       {"{}", "format"},
       {"[1, 2]", "format"},
-      {with("levelsmith patches", "something else"), "holds no patches"},
+      {with("levelsmith patches", "something else"), "is not a patch file"},
       {with("\"version\":1", "\"version\":7"), "version"},
       {with("\"columns\":", "\"columns\":1"), "positions"},
       {with("\"columns\":", "\"columns\":-"), "columns"},

@@ -8,7 +8,7 @@
 
 #include "levelset/error.h"
 #include "levelset/solids/shapes.h"
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
 #include "mapping/surface/surface_walk.h"
 #include "tests/support/files.h"
@@ -149,7 +149,7 @@ TEST(Decal, MirroredRunsTheOtherWayRound) {
 TEST(Decal, CarriesMapsLikeAnyPatch) {
   const PatchResult result = makeDecal(support::makeBall(1, 0.05, 12), V3d(0, 0, 1), V3d(1, 0, 0),
                                        0.5, 0.3, {.layers = 4, .spacing = 0.1});
-  const mapping::ShellMap map(result.patch, {});
+  const mapping::PrismMap map(result.patch, {});
   const ParticleLayer& layer = result.patch.layers[1];
   forEachParticle(layer, 1, [&](double u, double v, const V3d& p) {
     if (std::max(std::abs(u), std::abs(v)) > 0.99) return;  // the border belongs to two cells
@@ -203,7 +203,7 @@ TEST(Decal, RefusesLengthsThatMakeNone) {
 
 /// The radius that a refusal names last.
 double advisedRadius(const std::string& message) {
-  const std::string words = "take a radius below ";
+  const std::string words = "use a radius below ";
   const std::size_t at = message.rfind(words);
   return at == std::string::npos ? 0 : std::stod(message.substr(at + words.size()));
 }
@@ -226,7 +226,7 @@ TEST(Decal, RefusesToGoBeyondTheCutLocus) {
   EXPECT_NO_THROW((void)makeDecal(pipe, x, V3d(0, 1, 0), 0.93 * kPi, 0.1, options));
   const std::string round = support::refusal<levelset::Error>(
       [&] { (void)makeDecal(pipe, x, V3d(0, 1, 0), 1.15 * kPi, 0.1, options); });
-  EXPECT_NE(round.find("comes round to itself"), std::string::npos) << round;
+  EXPECT_NE(round.find("overlaps itself"), std::string::npos) << round;
   EXPECT_GT(advisedRadius(round), 0.75 * kPi) << round;
   EXPECT_NO_THROW((void)makeDecal(pipe, x, V3d(0, 1, 0), 0.99 * advisedRadius(round), 0.1, options))
       << round;
@@ -264,7 +264,7 @@ TEST(Decal, GoesAroundAnEarThatItsParticlesResolve) {
     (void)makeDecal(plate, at, x, 1, 0.05,
                     {.layers = 2, .scheme = LayerScheme::Conforming, .spacing = 0.5});
   });
-  EXPECT_NE(coarse.find("thinner than its particles are apart"), std::string::npos) << coarse;
+  EXPECT_NE(coarse.find("thinner than its particle spacing"), std::string::npos) << coarse;
 }
 
 }  // namespace decal_test

@@ -59,14 +59,14 @@ TEST(ManyPatches, AreTheUnionOfEach) {
   EXPECT_NEAR(many.volume, volume, 1e-6 * volume);
   EXPECT_EQ(all.report.particles, particles);
 
-  const levelset::Measurement joined =
-      levelset::measure(mapTexture(ball, stud(), patches, {.sink = 0.2, .voxelSize = kVoxel}).band);
+  const levelset::Measurement joined = levelset::measure(
+      mapTexture(ball, stud(), patches, {.embedDepth = 0.2, .voxelSize = kVoxel}).band);
   EXPECT_EQ(joined.components, 1u);
   EXPECT_GT(joined.volume, levelset::measure(ball).volume);
-  const levelset::Measurement carved =
-      levelset::measure(mapTexture(ball, stud(), patches,
-                                   {.merge = TextureMerge::Carve, .sink = 0.2, .voxelSize = kVoxel})
-                            .band);
+  const levelset::Measurement carved = levelset::measure(
+      mapTexture(ball, stud(), patches,
+                 {.merge = TextureMerge::Carve, .embedDepth = 0.2, .voxelSize = kVoxel})
+          .band);
   EXPECT_LT(carved.volume, levelset::measure(ball).volume);
 }
 

@@ -43,15 +43,15 @@ double leastApart(const std::vector<SurfacePoint>& points, std::size_t count) {
   double least = HUGE_VAL;
   for (std::size_t i = 0; i < count; ++i)
     for (std::size_t j = 0; j < i; ++j)
-      least = std::min(least, greatCircle(points[i].place, points[j].place));
+      least = std::min(least, greatCircle(points[i].position, points[j].position));
   return least;
 }
 
 TEST(ScatteredPoints, LieOnTheSurface) {
   const auto points = scatterPoints(ball(), {.count = 200}).points;
   for (const SurfacePoint& p : points) {
-    EXPECT_NEAR(p.place.length(), kRadius, 1e-3);
-    EXPECT_GT(p.normal.dot(p.place) / kRadius, 1 - 1e-4);
+    EXPECT_NEAR(p.position.length(), kRadius, 1e-3);
+    EXPECT_GT(p.normal.dot(p.position) / kRadius, 1 - 1e-4);
   }
 }
 
@@ -68,7 +68,7 @@ TEST(ScatteredPoints, KeepTheirDistanceAndLeaveNoRoom) {
     const V3d place = V3d(r * std::cos(angle), r * std::sin(angle), z) * kRadius;
     double nearest = HUGE_VAL;
     for (const SurfacePoint& p : result.points)
-      nearest = std::min(nearest, greatCircle(place, p.place));
+      nearest = std::min(nearest, greatCircle(place, p.position));
     EXPECT_LT(nearest, 1.3 * distance);
   }
 }
@@ -84,7 +84,7 @@ TEST(ScatteredPoints, OfACountAreSpreadAsDiscsAre) {
     // By area: as many above as below.
     const auto above = std::count_if(result.points.begin(),
                                      result.points.begin() + static_cast<std::ptrdiff_t>(count),
-                                     [](const SurfacePoint& p) { return p.place.z > 0; });
+                                     [](const SurfacePoint& p) { return p.position.z > 0; });
     EXPECT_NEAR(static_cast<double>(above), 0.5 * static_cast<double>(count),
                 2 + 0.05 * static_cast<double>(count));
   }
@@ -94,12 +94,12 @@ TEST(ScatteredPoints, FollowScaleAndWeight) {
   const auto scale = [](const V3d& p) { return p.z > 0 ? 1.0 : 2.0; };
   const auto points = scatterPoints(ball(), {.distance = 0.3, .scale = scale}).points;
   double above = 0, below = 0;
-  for (const SurfacePoint& p : points) (p.place.z > 0 ? above : below) += 1;
+  for (const SurfacePoint& p : points) (p.position.z > 0 ? above : below) += 1;
   EXPECT_NEAR(above / below, 4, 0.6);  // discs of half the radius
   // A small place at a small scale has room for as many as it has with that scale everywhere.
   const auto inCap = [](const std::vector<SurfacePoint>& all) {
     return static_cast<double>(
-        std::count_if(all.begin(), all.end(), [](const auto& p) { return p.place.x > 1.8; }));
+        std::count_if(all.begin(), all.end(), [](const auto& p) { return p.position.x > 1.8; }));
   };
   const auto fine = [](const V3d&) { return 0.1; };
   const auto fineInCap = [](const V3d& p) { return p.x > 1.8 ? 0.1 : 1.0; };
@@ -111,14 +111,14 @@ TEST(ScatteredPoints, FollowScaleAndWeight) {
   const auto weighted = scatterPoints(
       ball(), {.count = 50, .weight = [](const V3d& p) { return p.x > 1.5 ? 1.0 : 0.0; }});
   ASSERT_EQ(weighted.wanted, 50u);
-  for (const SurfacePoint& p : weighted.points) EXPECT_GT(p.place.x, 1.49);
+  for (const SurfacePoint& p : weighted.points) EXPECT_GT(p.position.x, 1.49);
 }
 
 TEST(ScatteredPoints, AreThoseOfTheirSeed) {
   const auto places = [](std::uint64_t seed) {
     std::vector<double> result;
     for (const SurfacePoint& p : scatterPoints(ball(), {.count = 30, .seed = seed}).points)
-      result.push_back(p.place.x);
+      result.push_back(p.position.x);
     return result;
   };
   EXPECT_EQ(places(1), places(1));
@@ -139,7 +139,7 @@ TEST(ScatteredPoints, DoNotSeeThroughThinWalls) {
   for (const SurfacePoint& a : result.points)
     for (const SurfacePoint& b : result.points)
       if (a.normal.z > 0.9 && b.normal.z < -0.9)
-        near = std::min(near, std::hypot(a.place.x - b.place.x, a.place.y - b.place.y));
+        near = std::min(near, std::hypot(a.position.x - b.position.x, a.position.y - b.position.y));
   EXPECT_LT(near, 0.9);
 }
 

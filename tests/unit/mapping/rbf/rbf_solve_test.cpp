@@ -70,7 +70,7 @@ TEST_P(Solve, ParticlesOfOnePlaceAndTargetAreOne) {
   EXPECT_EQ(map.size(), 64u);
   EXPECT_EQ(map.solveReport().merged, 3u);
   EXPECT_EQ(map.solveReport().averaged, 0u);
-  EXPECT_TRUE(says(map.solveReport(), "3 particles share the place and texture coordinates"));
+  EXPECT_TRUE(says(map.solveReport(), "3 particles share the position and texture coordinates"));
   for (const V3d& x : kPlaces) EXPECT_LT((map(x) - once(x)).length(), 1e-9);
 }
 
@@ -82,7 +82,7 @@ TEST_P(Solve, ParticlesOfOnePlaceAreAveraged) {
   mean.targets[9] += off / 2;
   const RbfMap map = fit(twice, 0, GetParam()), expected = fit(mean, 0, GetParam());
   EXPECT_EQ(map.solveReport().averaged, 1u);
-  EXPECT_TRUE(says(map.solveReport(), "1 particles share the place of another"));
+  EXPECT_TRUE(says(map.solveReport(), "1 particles share the position of another"));
   for (const V3d& x : kPlaces) EXPECT_LT((map(x) - expected(x)).length(), 1e-9);
   EXPECT_NEAR(map.maxResidual(), off.length() / 2, 1e-9);
   // Neighbours are about 1 apart in texture coordinates, too.

@@ -1,6 +1,6 @@
 // Stiff and extreme textures and patches, each with its stated outcome. Those that concern one room
 // alone are beside its other tests: corners (Patch.Refuses…), ears (Patch.WrapsAThinEar), offsets
-// past the medial axis (Patch.RefusesHeightsBeyondTheMedialAxis, Unfold.MendsOffsets…).
+// past the medial axis (Patch.RefusesHeightsBeyondTheMedialAxis, Untangle.MendsOffsets…).
 
 #include <gtest/gtest.h>
 
@@ -60,7 +60,7 @@ Measurement measureAlone(const NarrowBand& base, const NarrowBand& texture, cons
                          double voxel, TextureMap map = TextureMap::Rbf) {
   const mapping::TextureResult mapped =
       mapTexture(base, texture, patch,
-                 {.merge = TextureMerge::Alone, .map = map, .sink = 0.0, .voxelSize = voxel});
+                 {.merge = TextureMerge::Alone, .map = map, .embedDepth = 0.0, .voxelSize = voxel});
   EXPECT_TRUE(levelset::manifoldness(levelset::bandToMesh(mapped.band)).isClosedManifold());
   return levelset::measure(mapped.band);
 }
@@ -89,7 +89,7 @@ TEST(ExtremeTextures, AThousandTimesFinerThanTheBase) {
   const Patch patch = makePatch(slab(), square(0.3), 0.3, {.layers = 3}).patch;
   const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.1);
   mapping::TextureOptions options = {.merge = TextureMerge::Alone,
-                                     .sink = 0.0,
+                                     .embedDepth = 0.0,
                                      .textureBox = Imath::Box3d(V3d(-150), V3d(150)),
                                      .voxelSize = 2e-4,
                                      .maxMemory = 4 * kGiB};
@@ -135,7 +135,7 @@ TEST(ExtremeTextures, VoxelsFortyTimesTheBasesGiveASmoothSurface) {
   };
   const mapping::TextureResult result =
       mapTexture(base, rough, support::patchAt(place, 24, 24, 2, height),
-                 {.merge = TextureMerge::Alone, .map = TextureMap::Shell, .sink = 0.0});
+                 {.merge = TextureMerge::Alone, .map = TextureMap::Prism, .embedDepth = 0.0});
   EXPECT_EQ(result.report.voxelSize, voxel);
   EXPECT_GT(result.report.distortion.stretch.most * rough.voxelSize(), 40 * voxel);
   const Measurement mapped = levelset::measure(result.band);
@@ -169,7 +169,7 @@ TEST(ExtremeTextures, HolesAndHandlesStay) {
   ASSERT_EQ(levelset::measure(texture).euler, -2);
   const NarrowBand ball = support::makeBall(4, 0.2);
   const Patch patch = makePatch(ball, cap(0.5, 4), 1.5, {.layers = 6, .spacing = 0.3}).patch;
-  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell})
+  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Prism})
     EXPECT_EQ(measureAlone(ball, texture, patch, 0.1, map).euler, -2);
 }
 
@@ -182,7 +182,7 @@ TEST(ExtremeTextures, ASpikeUnderAVoxelIsLostAndNothingElse) {
   const NarrowBand spiked = levelset::combine(levelset::CsgOperation::Union, both).band;
   const Patch patch = makePatch(slab(), square(1), 3, {.layers = 4}).patch;
   const mapping::TextureOptions options = {.merge = TextureMerge::Alone,
-                                           .sink = 0.0,
+                                           .embedDepth = 0.0,
                                            .textureBox = Imath::Box3d(V3d(-1), V3d(1, 1, 2)),
                                            .voxelSize = voxel};
   const Measurement mapped = levelset::measure(mapTexture(slab(), spiked, patch, options).band),
@@ -211,10 +211,10 @@ TEST(ExtremeTextures, ASplineThroughItselfIsRefusedWithThePlace) {
     return "";
   };
   EXPECT_NE(refusal(11, TextureMap::Rbf).find("folds at"), std::string::npos);
-  const std::string shell = refusal(11, TextureMap::Shell);
+  const std::string shell = refusal(11, TextureMap::Prism);
   EXPECT_NE(shell.find("passes through itself"), std::string::npos) << shell;
   // Seven units of it stay clear.
-  EXPECT_EQ(refusal(7, TextureMap::Shell), "");
+  EXPECT_EQ(refusal(7, TextureMap::Prism), "");
 }
 
 TEST(ExtremeTextures, OverACreaseNothingTears) {
@@ -224,7 +224,7 @@ TEST(ExtremeTextures, OverACreaseNothingTears) {
                                       V3d(2.5, 1, 0)};
   const Patch patch = makePatch(slab(), corners, 0.6, {.layers = 4}).patch;
   const NarrowBand texture = levelset::makeBox(V3d(2, 2, 1), V3d(0), 0.2);
-  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell}) {
+  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Prism}) {
     const Measurement alone = measureAlone(slab(), texture, patch, 0.1, map);
     EXPECT_EQ(alone.components, 1u);
     EXPECT_EQ(alone.euler, 2);
@@ -252,7 +252,7 @@ TEST(ExtremeTextures, OffsetsBeyondTheCurvatureRadiusAreRefusedWithTheCause) {
   } catch (const levelset::Error& error) {
     message = error.what();
   }
-  EXPECT_NE(message.find("squeezes"), std::string::npos) << message;
+  EXPECT_NE(message.find("compresses"), std::string::npos) << message;
   EXPECT_NE(message.find("--voxel"), std::string::npos) << message;
   const Measurement mapped = measureAlone(trough, texture, patch, 0.1);
   EXPECT_GT(mapped.volume, 0.5);
@@ -267,7 +267,7 @@ TEST(ExtremeTextures, LayersBeyondTheCurvatureRadiusThatFoldAreRefused) {
   const Patch patch =
       makePatch(trough, troughCorners(0.7), kHeight, {.layers = 4, .spacing = 0.3}).patch;
   const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.1);
-  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell}) {
+  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Prism}) {
     SCOPED_TRACE(map == TextureMap::Rbf ? "rbf" : "shell");
     mapping::TextureOptions options = {.map = map, .voxelSize = 0.2};
     const std::string message = support::refusal<levelset::InvalidInput>(
@@ -283,7 +283,7 @@ TEST(ExtremeTextures, LayersBeyondTheCurvatureRadiusThatFoldAreRefused) {
     EXPECT_EQ(report.certificate.verdict(), mapping::FoldVerdict::Folds);
     EXPECT_GT(report.certificate.foldedShare, 0);
     EXPECT_FALSE(report.certificate.worst.empty());
-    for (const mapping::FoldPlace& fold : report.certificate.worst) {
+    for (const mapping::FoldPoint& fold : report.certificate.worst) {
       EXPECT_LE(fold.jacobian, 0);
       EXPECT_GE(fold.uvw.z * kHeight, kTrough) << fold.uvw;
     }

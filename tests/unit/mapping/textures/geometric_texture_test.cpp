@@ -12,7 +12,8 @@
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
 #include "levelset/inspect/measure.h"
-#include "mapping/maps/shell_map.h"
+#include "levelset/solids/shapes.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
 #include "tests/support/files.h"
 #include "tests/support/patches.h"
@@ -60,9 +61,9 @@ TEST(GeometricTexture, FlatPatchIsTheIdentity) {
   const double voxel = 0.0625, tube = 1, radius = 2;
   const NarrowBand base = makeSlab(voxel), ring = makeRing(radius, tube, voxel);
   const Patch patch = mapping::makePatch(base, square(radius + tube), 2 * tube).patch;
-  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell}) {
+  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Prism}) {
     const TextureResult result =
-        mapTexture(base, ring, patch, {.merge = TextureMerge::Alone, .map = map, .sink = 0});
+        mapTexture(base, ring, patch, {.merge = TextureMerge::Alone, .map = map, .embedDepth = 0});
     EXPECT_NEAR(result.report.distortion.jacobian.least, 1, 1e-3);
     EXPECT_NEAR(result.report.distortion.stretch.least, 1, 1e-3);
     EXPECT_NEAR(result.report.distortion.stretch.most, 1, 1e-3);
@@ -95,9 +96,10 @@ TEST(GeometricTexture, OtherKernelsMapAFlatPatchStraight) {
   using mapping::RbfKernel;
   for (const RbfKernel kernel :
        {RbfKernel::Triharmonic, RbfKernel::ThinPlate, RbfKernel::Gaussian}) {
-    const TextureResult result = mapTexture(
-        base, ring, patch,
-        {.merge = TextureMerge::Alone, .sink = 0, .rbf = {.kernel = kernel, .lambdaFar = 0.1}});
+    const TextureResult result = mapTexture(base, ring, patch,
+                                            {.merge = TextureMerge::Alone,
+                                             .embedDepth = 0,
+                                             .rbf = {.kernel = kernel, .lambdaFar = 0.1}});
     EXPECT_EQ(result.report.solve.directions, 3);
     EXPECT_EQ(result.report.solve.merged + result.report.solve.averaged, 0u);
     EXPECT_GT(result.report.solve.condition, 1);
@@ -138,7 +140,7 @@ TEST(GeometricTexture, ShellsEndBeyondTheTexturesBand) {
   const NarrowBand base = makeSlab(voxel), ring = makeRing(2, 1, voxel);
   const Patch patch = mapping::makePatch(base, square(3), 2, {.spacing = voxel}).patch;
   const TextureResult result = mapTexture(
-      base, ring, patch, {.merge = TextureMerge::Alone, .map = TextureMap::Shell, .sink = 0});
+      base, ring, patch, {.merge = TextureMerge::Alone, .map = TextureMap::Prism, .embedDepth = 0});
   double worst = 0;
   support::forEachActive(result.band, [&](const V3d& p, double phi) {
     const double truth = torusDistance(p - V3d(0, 0, 1), 2, 1);
@@ -156,7 +158,7 @@ TEST(GeometricTexture, WhatLiesBesideTheTextureDoesNotFoldTheMap) {
     const Patch patch =
         mapping::makePatch(rod, mapping::cornersAround(rod, V3d(radius, 0, 0), 1, 1), 0.5).patch;
     const TextureResult result = mapTexture(
-        rod, makeBall(1, 0.1), patch, {.merge = TextureMerge::Alone, .map = TextureMap::Shell});
+        rod, makeBall(1, 0.1), patch, {.merge = TextureMerge::Alone, .map = TextureMap::Prism});
     EXPECT_EQ(result.report.distortion.folded, 0u) << radius;
   }
   // The rim of a patch that ends beside an edge does not go round to the other side of a thin ear.
@@ -196,7 +198,7 @@ TEST(GeometricTexture, CylinderCoordinatesAreThoseOfTheCylinder) {
     }
   const double sink = 0.4;
   const mapping::RbfMap smooth = mapping::patchToTexture(sparse, {}, sink);
-  const mapping::ShellMap shell(dense, {.sink = sink, .rim = 0.1});
+  const mapping::PrismMap shell(dense, {.embedDepth = sink, .rim = 0.1});
   for (const mapping::PatchMap* map : {static_cast<const mapping::PatchMap*>(&smooth),
                                        static_cast<const mapping::PatchMap*>(&shell)}) {
     V3d worst(0);
@@ -226,7 +228,7 @@ void expectRadialCoordinates(double halfWidth) {
       mapping::makePatch(base, cap(polar, radius), height, {.spacing = voxel}).patch;
   const double sink = 0.4;
   const mapping::RbfMap smooth = mapping::patchToTexture(patch, {}, sink);
-  const mapping::ShellMap shell(dense, {.sink = sink, .rim = 0.1});
+  const mapping::PrismMap shell(dense, {.embedDepth = sink, .rim = 0.1});
   const double corner = std::tan(polar) / std::sqrt(2.0);
   for (const mapping::PatchMap* map : {static_cast<const mapping::PatchMap*>(&smooth),
                                        static_cast<const mapping::PatchMap*>(&shell)}) {
@@ -285,8 +287,8 @@ TEST(GeometricTexture, FillsTheInsideOfTheTexture) {
   const double voxel = 0.06;
   const NarrowBand base = makeSlab(0.1), ball = makeBall(1, voxel, 3);
   const Patch patch = mapping::makePatch(base, square(2), 4).patch;
-  const TextureResult result =
-      mapTexture(base, ball, patch, {.merge = TextureMerge::Alone, .sink = 0, .voxelSize = voxel});
+  const TextureResult result = mapTexture(
+      base, ball, patch, {.merge = TextureMerge::Alone, .embedDepth = 0, .voxelSize = voxel});
   const levelset::BandSampler sampler(result.band);
   for (int n = 0; n <= 40; ++n) {
     EXPECT_LT(sampler.value(V3d(0, 0, 0.1 + 0.095 * n)), 0) << n;
@@ -301,7 +303,7 @@ TEST(GeometricTexture, HonoursTheTextureBox) {
   const Patch patch = mapping::makePatch(base, square(2), 2).patch;
   const TextureResult result = mapTexture(base, ball, patch,
                                           {.merge = TextureMerge::Alone,
-                                           .sink = 0.5,
+                                           .embedDepth = 0.5,
                                            .textureBox = Box3d(V3d(-2, -1, -1), V3d(2, 1, 1))});
   const Box3d bounds = result.band.zeroSetBounds();
   EXPECT_NEAR(bounds.min.x, -1, 0.1 * voxel);
@@ -348,7 +350,7 @@ TEST(GeometricTexture, RefusesPatchesThatFold) {
   const NarrowBand ball = makeBall(1, 0.1, 3);
   const std::string message =
       support::refusal<levelset::InvalidInput>([&] { (void)mapTexture(trough, ball, patch); });
-  EXPECT_NE(message.find("most at ("), std::string::npos) << message;
+  EXPECT_NE(message.find("the worst at ("), std::string::npos) << message;
   EXPECT_NE(message.find("u, v, w"), std::string::npos) << message;
 }
 
@@ -363,21 +365,22 @@ TEST(GeometricTexture, UnionIsOneSolidAndCarvingLeavesAHole) {
   };
   // Sunk by 0.2, the ring melts into the ball; Euler's number tells the handle of none from a
   // ring's.
-  const levelset::Measurement united = measured({.sink = 0.2, .voxelSize = voxel});
+  const levelset::Measurement united = measured({.embedDepth = 0.2, .voxelSize = voxel});
   EXPECT_EQ(united.components, 1u);
-  EXPECT_EQ(united.shells, 1u);
+  EXPECT_EQ(united.surfaces, 1u);
   EXPECT_EQ(united.euler, 2);
   EXPECT_GT(united.volume, before.volume);
-  const levelset::Measurement blended = measured({.sink = 0.2, .blend = 0.2, .voxelSize = voxel});
+  const levelset::Measurement blended =
+      measured({.embedDepth = 0.2, .blend = 0.2, .voxelSize = voxel});
   EXPECT_EQ(blended.components, 1u);
   EXPECT_GT(blended.volume, united.volume);
   const levelset::Measurement carved =
-      measured({.merge = TextureMerge::Carve, .sink = 0.2, .voxelSize = voxel});
+      measured({.merge = TextureMerge::Carve, .embedDepth = 0.2, .voxelSize = voxel});
   EXPECT_EQ(carved.components, 1u);
   EXPECT_LT(carved.volume, before.volume);
   // What carving takes away and union adds are the two parts of the ring.
   const levelset::Measurement alone =
-      measured({.merge = TextureMerge::Alone, .sink = 0.2, .voxelSize = voxel});
+      measured({.merge = TextureMerge::Alone, .embedDepth = 0.2, .voxelSize = voxel});
   EXPECT_NEAR(united.volume - carved.volume, alone.volume, 0.02 * alone.volume);
 }
 
@@ -388,13 +391,13 @@ TEST(GeometricTexture, SunkTexturesHaveTheVolumeOfTheirShareOfTheShell) {
   const Patch patch = mapping::makePatch(base, cap(0.4, radius), height).patch;
   const auto volume = [&](TextureMap map, double sink) {
     const mapping::TextureOptions options = {
-        .merge = TextureMerge::Alone, .map = map, .sink = sink, .voxelSize = 0.1};
+        .merge = TextureMerge::Alone, .map = map, .embedDepth = sink, .voxelSize = 0.1};
     return levelset::measure(mapTexture(base, box, patch, options).band).volume;
   };
   const auto cubes = [&](double sink) {
     return std::pow(radius + height - sink, 3) - std::pow(radius - sink, 3);
   };
-  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell}) {
+  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Prism}) {
     const double flush = volume(map, 0);
     for (const double sink : {0.5, 1.5, 2.0})
       EXPECT_NEAR(volume(map, sink) / flush, cubes(sink) / cubes(0), 0.005)
@@ -408,15 +411,16 @@ TEST(GeometricTexture, CarvedFlushItLeavesNoSkins) {
   // The texture ends in the base's surface, but for what the map errs.
   const NarrowBand ball = makeBall(8, 0.25, 3), box = levelset::makeBox(V3d(4), V3d(0), 0.1);
   const Patch patch = mapping::makePatch(ball, cap(0.6, 8), 2).patch;
-  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Shell}) {
-    const TextureResult result = mapTexture(
-        ball, box, patch, {.merge = TextureMerge::Carve, .map = map, .sink = 2, .voxelSize = 0.1});
+  for (const TextureMap map : {TextureMap::Rbf, TextureMap::Prism}) {
+    const TextureResult result =
+        mapTexture(ball, box, patch,
+                   {.merge = TextureMerge::Carve, .map = map, .embedDepth = 2, .voxelSize = 0.1});
     const levelset::Measurement after = levelset::measure(result.band);
     EXPECT_EQ(after.components, 1u) << static_cast<int>(map);
     const double removed = 4 * std::numbers::pi / 3 * 512 - after.volume;
     const levelset::Measurement alone = levelset::measure(
         mapTexture(ball, box, patch,
-                   {.merge = TextureMerge::Alone, .map = map, .sink = 2, .voxelSize = 0.1})
+                   {.merge = TextureMerge::Alone, .map = map, .embedDepth = 2, .voxelSize = 0.1})
             .band);
     // The skins are a fifth of a voxel thick.
     EXPECT_NEAR(removed, alone.volume, 0.02 * alone.volume) << static_cast<int>(map);
@@ -431,7 +435,7 @@ TEST(GeometricTexture, AResultIsTheNextBase) {
   for (const double size : {1.2, 0.6, 0.3}) {
     const Patch patch =
         mapping::makePatch(base, mapping::cornersAround(base, top, size, size), size).patch;
-    base = mapTexture(base, makeBall(1, 0.1), patch, {.sink = 0.1 * size}).band;
+    base = mapTexture(base, makeBall(1, 0.1), patch, {.embedDepth = 0.1 * size}).band;
     const levelset::Measurement result = levelset::measure(base);
     EXPECT_EQ(result.components, 1u) << size;
     EXPECT_EQ(result.euler, 2) << size;
@@ -468,7 +472,7 @@ TEST(GeometricTexture, RefusesWhatCannotBeMapped) {
     (void)mapTexture(base, ball, patch, options);
   };
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(with({.sink = kNan}), levelset::UsageError);
+  EXPECT_THROW(with({.embedDepth = kNan}), levelset::UsageError);
   EXPECT_THROW(with({.blend = -1}), levelset::UsageError);
   EXPECT_THROW(with({.voxelSize = 0.0}), levelset::UsageError);
   EXPECT_THROW(with({.voxelSize = kNan}), levelset::UsageError);

@@ -78,7 +78,7 @@ void expectKnurled(
   const NarrowBand result =
       mapping::mapTexture(base, texture, grid.patches,
                           {.map = map,
-                           .sink = kSink,
+                           .embedDepth = kSink,
                            .textureBox = mapping::knurlBox(knurl(), V3d(0)).tile,
                            .voxelSize = kVoxel})
           .band;
@@ -114,7 +114,7 @@ TEST(KnurledCylinder, ClosesBySmoothMaps) {
 }
 
 TEST(KnurledCylinder, ClosesByTetrahedra) {
-  expectKnurled(TextureMap::Shell);
+  expectKnurled(TextureMap::Prism);
 }
 
 TEST(KnurledCylinder, StaysClosedWhenItsPatchesAreRelaxed) {
@@ -124,7 +124,7 @@ TEST(KnurledCylinder, StaysClosedWhenItsPatchesAreRelaxed) {
     for (mapping::Patch& patch : patches)
       patch = mapping::minimiseDistortion(
                   base, patch,
-                  {.sink = kSink / kHeight,
+                  {.embedDepth = kSink / kHeight,
                    .proportions = mapping::knurlBox(knurl(), V3d(0)).tile.size()})
                   .patch;
     double apart = 0, moved = 0;

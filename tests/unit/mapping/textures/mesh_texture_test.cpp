@@ -50,14 +50,14 @@ TEST(MeshTexture, AgreesWithTheImplicitMap) {
   const NarrowBand solid = levelset::meshToBand(ring, voxel).band;
   const Patch patch = mapping::makePatch(base, cap(0.6, radius), 0.6).patch;
   for (const double sink : {voxel, 0.3, 0.55})
-    for (const mapping::TextureMap map : {mapping::TextureMap::Rbf, mapping::TextureMap::Shell}) {
-      const mapping::MeshTextureResult moved = mapping::mapMesh(ring, patch, {.sink = sink});
+    for (const mapping::TextureMap map : {mapping::TextureMap::Rbf, mapping::TextureMap::Prism}) {
+      const mapping::MeshTextureResult moved = mapping::mapMesh(ring, patch, {.embedDepth = sink});
       EXPECT_EQ(moved.mesh.triangles, ring.triangles);
       EXPECT_GT(levelset::signedVolume(moved.mesh), 0);
       const NarrowBand warped = mapping::mapTexture(base, solid, patch,
                                                     {.merge = mapping::TextureMerge::Alone,
                                                      .map = map,
-                                                     .sink = sink,
+                                                     .embedDepth = sink,
                                                      .textureBox = levelset::bounds(ring),
                                                      .voxelSize = voxel})
                                     .band;
@@ -115,7 +115,8 @@ TEST(MeshTexture, RefusesWhatCannotBeMoved) {
   const TriMesh ring = makeRing(1, 0.3, 12, 8);
   EXPECT_THROW((void)mapping::mapMesh({}, patch), levelset::InvalidInput);
   EXPECT_THROW((void)mapping::mapMesh(ring, Patch{}), levelset::InvalidInput);
-  EXPECT_THROW((void)mapping::mapMesh(ring, patch, {.sink = std::nan("")}), levelset::UsageError);
+  EXPECT_THROW((void)mapping::mapMesh(ring, patch, {.embedDepth = std::nan("")}),
+               levelset::UsageError);
   TriMesh flat = ring;
   for (V3d& p : flat.positions) p.z = 0;
   EXPECT_THROW((void)mapping::mapMesh(flat, patch), levelset::InvalidInput);

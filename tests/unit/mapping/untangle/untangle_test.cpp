@@ -9,23 +9,23 @@
 
 #include "levelset/error.h"
 #include "mapping/distortion/fold_certificate.h"
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
-#include "mapping/untangle/shell_energy.h"
+#include "mapping/untangle/prism_elements.h"
 #include "tests/support/component_counts.h"
 #include "tests/support/threads.h"
 
-namespace unfold_test {
+namespace untangle_test {
 
 using Imath::V3d;
 using levelset::NarrowBand;
 using mapping::DistortionGain;
+using mapping::ElementSlopes;
 using mapping::FoldVerdict;
 using mapping::minimiseDistortion;
 using mapping::Patch;
-using mapping::ShellSlopes;
-using mapping::unfold;
-using mapping::Unfolding;
+using mapping::untangle;
+using mapping::Untangling;
 using support::makeSlab;
 using support::patchAt;
 
@@ -37,7 +37,7 @@ Patch flatPatch(std::size_t columns, std::size_t layers, double scale = 1) {
 
 void expectCertified(const Patch& patch) {
   EXPECT_EQ(mapping::certifyLayers(patch, 0).verdict(), FoldVerdict::Certified);
-  EXPECT_EQ(mapping::certifyShell(mapping::ShellMap(patch, {}), patch.mirrored).verdict(),
+  EXPECT_EQ(mapping::certifyPrisms(mapping::PrismMap(patch, {}), patch.mirrored).verdict(),
             FoldVerdict::Certified);
 }
 
@@ -50,18 +50,18 @@ double farthestFrom(const Patch& a, const Patch& b) {
   return most;
 }
 
-TEST(ShellEnergy, StressIsTheDerivativeOfTheEnergy) {
+TEST(PrismElements, StressIsTheDerivativeOfTheEnergy) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> unit(-1, 1);
   for (int trial = 0; trial < 40; ++trial) {
-    ShellSlopes f = {V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)};
+    ElementSlopes f = {V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)};
     for (V3d& column : f) column += V3d(unit(random), unit(random), unit(random)) * 0.8;
     const auto check = [&](const auto& density, double bound) {
       const mapping::ElementEnergy at = density(f);
       if (!std::isfinite(at.value)) return;
       for (std::size_t i = 0; i < 3; ++i)
         for (int axis = 0; axis < 3; ++axis) {
-          ShellSlopes ahead = f, behind = f;
+          ElementSlopes ahead = f, behind = f;
           ahead[i][axis] += 1e-6, behind[i][axis] -= 1e-6;
           const double slope = (density(ahead).value - density(behind).value) / 2e-6;
           EXPECT_NEAR(at.stress[i][axis], slope, bound * (1 + std::abs(slope)));
@@ -69,20 +69,20 @@ TEST(ShellEnergy, StressIsTheDerivativeOfTheEnergy) {
     };
     if (mapping::determinantOf(f) > 0.1) check(mapping::symmetricDirichlet, 1e-5);
     for (const double epsilon : {1.0, 0.3})
-      check([=](const ShellSlopes& g) { return mapping::foldoverEnergy(g, epsilon); }, 1e-5);
+      check([=](const ElementSlopes& g) { return mapping::foldoverEnergy(g, epsilon); }, 1e-5);
   }
 }
 
-TEST(ShellEnergy, RotationsHaveNoDistortionAndFoldsAreForbidden) {
+TEST(PrismElements, RotationsHaveNoDistortionAndFoldsAreForbidden) {
   const double c = std::cos(0.7), s = std::sin(0.7);
-  const ShellSlopes turned = {V3d(c, s, 0), V3d(-s, c, 0), V3d(0, 0, 1)};
+  const ElementSlopes turned = {V3d(c, s, 0), V3d(-s, c, 0), V3d(0, 0, 1)};
   EXPECT_NEAR(mapping::symmetricDirichlet(turned).value, 6, 1e-14);
   for (const V3d& column : mapping::symmetricDirichlet(turned).stress)
     EXPECT_LE(column.length(), 1e-14);
   // 2² + 1 + 1 and its reciprocals.
   EXPECT_NEAR(mapping::symmetricDirichlet({V3d(2, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)}).value,
               6 + 2.25, 1e-14);
-  const ShellSlopes mirrored = {V3d(-1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)};
+  const ElementSlopes mirrored = {V3d(-1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)};
   EXPECT_EQ(mapping::symmetricDirichlet(mirrored).value, std::numeric_limits<double>::infinity());
   // The other energy goes to that of a box, 3 + 2, and without bounds at a fold.
   EXPECT_NEAR(mapping::foldoverEnergy(turned, 1e-9).value, 5, 1e-9);
@@ -90,25 +90,25 @@ TEST(ShellEnergy, RotationsHaveNoDistortionAndFoldsAreForbidden) {
   EXPECT_TRUE(std::isfinite(mapping::foldoverEnergy(mirrored, 1e-3).value));
 }
 
-TEST(Unfold, APatchThatDoesNotFoldStays) {
+TEST(Untangle, APatchThatDoesNotFoldStays) {
   const Patch patch = flatPatch(7, 4);
-  const Unfolding result = unfold(makeSlab(2, 0.1), patch);
+  const Untangling result = untangle(makeSlab(2, 0.1), patch);
   EXPECT_EQ(result.before.folded, 0u);
   EXPECT_NEAR(result.before.leastJacobian, 1, 1e-12);
   EXPECT_EQ(result.iterations, 0u);
   EXPECT_EQ(farthestFrom(result.patch, patch), 0);
 }
 
-TEST(Unfold, MendsParticlesThatWentThroughTheirNeighbours) {
+TEST(Untangle, MendsParticlesThatWentThroughTheirNeighbours) {
   Patch patch = flatPatch(9, 4);
   patch.layers[1].positions[4 * 9 + 4] += V3d(0.9, 0.4, 0.5);
   patch.layers[3].positions[2 * 9 + 6] += V3d(-0.2, 0.6, -0.9);
   patch.layers[0].positions[3 * 9 + 3] += V3d(0.6, 0, 0);
   const NarrowBand base = makeSlab(2, 0.1);
-  const Unfolding result = unfold(base, patch);
+  const Untangling result = untangle(base, patch);
   EXPECT_GT(result.before.folded, 3u);
   EXPECT_LT(result.before.leastJacobian, -0.5);
-  ASSERT_TRUE(result.isUnfolded());
+  ASSERT_TRUE(result.isUntangled());
   EXPECT_GT(result.after.leastJacobian, 0.3);
   EXPECT_GT(result.farthestMove, 0.2);
   expectCertified(result.patch);
@@ -121,7 +121,7 @@ TEST(Unfold, MendsParticlesThatWentThroughTheirNeighbours) {
   for (const V3d& p : surface.positions) EXPECT_NEAR(p.z, 0, 1e-5);
 }
 
-TEST(Unfold, MendsOffsetsPastTheMedialAxis) {
+TEST(Untangle, MendsOffsetsPastTheMedialAxis) {
   // Above the axis of a trough of radius 1 the sides have crossed.
   const NarrowBand trough = support::sampleBand(
       [](const V3d& p) { return std::max(1 - std::hypot(p.y, p.z + 1e-9), -0.5); },
@@ -132,36 +132,36 @@ TEST(Unfold, MendsOffsetsPastTheMedialAxis) {
         return V3d(t.x - 0.5, r * std::sin(angle), -r * std::cos(angle));
       },
       7, 9, 5, 1.4);
-  const Unfolding result = unfold(trough, patch);
+  const Untangling result = untangle(trough, patch);
   EXPECT_GT(result.before.folded, 40u);
-  ASSERT_TRUE(result.isUnfolded());
+  ASSERT_TRUE(result.isUntangled());
   EXPECT_GT(result.after.leastJacobian, 0.05);
   expectCertified(result.patch);
   for (const V3d& p : result.patch.layers[0].positions) EXPECT_NEAR(std::hypot(p.y, p.z), 1, 1e-3);
 }
 
-TEST(Unfold, SaysWhereItCannot) {
+TEST(Untangle, SaysWhereItCannot) {
   // Two sides cross on the surface itself, and they stay.
   const auto crossed = [](const V3d& t) {
     return V3d((2 * t.x - 1) * (1 - 2 * t.y), 2 * t.y - 1, t.z);
   };
   const Patch patch = patchAt(crossed, 5, 6, 3);
   const NarrowBand base = makeSlab(2, 0.1);
-  const Unfolding result = unfold(base, patch, {.mostIterations = 200});
-  EXPECT_FALSE(result.isUnfolded());
+  const Untangling result = untangle(base, patch, {.mostIterations = 200});
+  EXPECT_FALSE(result.isUntangled());
   EXPECT_GT(result.after.folded, 0u);
   EXPECT_LE(result.after.folded, result.before.folded);
   EXPECT_EQ(mapping::countFolds(result.patch).folded, result.after.folded);
 }
 
-TEST(Unfold, CellsWithoutVolumeAndClockwisePatches) {
+TEST(Untangle, CellsWithoutVolumeAndClockwisePatches) {
   const NarrowBand base = makeSlab(2, 0.1);
   // All of the top lies upon the layer below it.
   Patch flat = flatPatch(5, 3);
   flat.layers[2].positions = flat.layers[1].positions;
-  const Unfolding raised = unfold(base, flat);
+  const Untangling raised = untangle(base, flat);
   EXPECT_EQ(raised.before.folded, 16u);
-  EXPECT_TRUE(raised.isUnfolded());
+  EXPECT_TRUE(raised.isUntangled());
   expectCertified(raised.patch);
 
   Patch clockwise =
@@ -169,28 +169,28 @@ TEST(Unfold, CellsWithoutVolumeAndClockwisePatches) {
   clockwise.mirrored = true;
   EXPECT_EQ(mapping::countFolds(clockwise).folded, 0u);
   clockwise.layers[1].positions[2 * 6 + 2] += V3d(0.7, 0.5, 0);
-  const Unfolding mended = unfold(base, clockwise);
+  const Untangling mended = untangle(base, clockwise);
   EXPECT_GT(mended.before.folded, 0u);
-  EXPECT_TRUE(mended.isUnfolded());
+  EXPECT_TRUE(mended.isUntangled());
   expectCertified(mended.patch);
 
   Patch smallest = flatPatch(2, 2);
   std::swap(smallest.layers[1].positions[0], smallest.layers[1].positions[3]);
   std::swap(smallest.layers[1].positions[1], smallest.layers[1].positions[2]);
-  const Unfolding turned = unfold(base, smallest);
+  const Untangling turned = untangle(base, smallest);
   EXPECT_EQ(turned.before.folded, 1u);
-  EXPECT_TRUE(turned.isUnfolded());
+  EXPECT_TRUE(turned.isUntangled());
 }
 
-TEST(Unfold, RimsFollowTheirNeighbours) {
+TEST(Untangle, RimsFollowTheirNeighbours) {
   // A patch with rims is moved as a whole where it is mended, and its rims with it.
   const NarrowBand base = support::makeBall(2, 0.1);
   Patch patch = mapping::makePatch(base, support::cap(0.5, 2), 0.5, {.spacing = 0.3}).patch;
   ASSERT_TRUE(patch.layers[3].hasRim());
   const std::size_t columns = patch.layers[3].columns;
   patch.layers[3].positions[2 * columns + 1] += V3d(0.5, 0.4, 0);
-  const Unfolding result = unfold(base, patch);
-  ASSERT_TRUE(result.isUnfolded());
+  const Untangling result = untangle(base, patch);
+  ASSERT_TRUE(result.isUntangled());
   for (std::size_t k = 0; k < patch.layers.size(); ++k) {
     const mapping::ParticleLayer &layer = result.patch.layers[k], &old = patch.layers[k];
     const int rows = static_cast<int>(layer.rows);
@@ -202,11 +202,11 @@ TEST(Unfold, RimsFollowTheirNeighbours) {
   }
 }
 
-TEST(Unfold, SameBitsForAnyNumberOfThreadsAndScale) {
+TEST(Untangle, SameBitsForAnyNumberOfThreadsAndScale) {
   const auto run = [](double scale) {
     Patch patch = flatPatch(6, 3, scale);
     patch.layers[1].positions[14] += V3d(0.8, 0.3, 0.1) * scale;
-    return unfold(makeSlab(2 * scale, 0.1 * scale), patch).patch;
+    return untangle(makeSlab(2 * scale, 0.1 * scale), patch).patch;
   };
   const Patch one = support::onThreads(1, [&] { return run(1); });
   const Patch three = support::onThreads(3, [&] { return run(1); });
@@ -319,9 +319,9 @@ TEST(MinimiseDistortion, ThinEarsKeepTheirSides) {
       patchAt([](const V3d& t) { return V3d(9 * t.x - 4.5, 9 * t.y - 4.5, 0.375 + 1.5 * t.z); }, 7,
               7, 3, 1.5);
   patch.layers[0].positions[3 * 7 + 3] += V3d(2.2, 0.4, 0);
-  const Unfolding mended = unfold(base, patch);
+  const Untangling mended = untangle(base, patch);
   EXPECT_GT(mended.before.folded, 0u);
-  ASSERT_TRUE(mended.isUnfolded());
+  ASSERT_TRUE(mended.isUntangled());
   const DistortionGain relaxed = minimiseDistortion(base, mended.patch);
   EXPECT_LE(relaxed.after.mean, 6 + 1e-4);
   for (const Patch* found : {&mended.patch, &relaxed.patch})
@@ -364,16 +364,17 @@ TEST(MinimiseDistortion, RefusesWhatItCannotRelax) {
   EXPECT_THROW((void)minimiseDistortion(base, {}), levelset::InvalidInput);
   const Patch patch = flatPatch(5, 3);
   EXPECT_THROW((void)minimiseDistortion(makeSlab(2, 0.1, 0.5), patch), levelset::InvalidInput);
-  EXPECT_THROW((void)minimiseDistortion(base, patch, {.sink = std::nan("")}), levelset::UsageError);
+  EXPECT_THROW((void)minimiseDistortion(base, patch, {.embedDepth = std::nan("")}),
+               levelset::UsageError);
   EXPECT_THROW((void)minimiseDistortion(base, patch, {.proportions = V3d(1, 1, 0)}),
                levelset::UsageError);
   EXPECT_THROW((void)minimiseDistortion(base, patch, {.maxMemory = 1000}), levelset::ResourceLimit);
   Patch broken = patch;
   broken.layers[2].positions[3].x = std::nan("");
-  EXPECT_THROW((void)unfold(base, broken), levelset::InvalidInput);
+  EXPECT_THROW((void)untangle(base, broken), levelset::InvalidInput);
   Patch mended = folded;
-  EXPECT_THROW((void)unfold(base, mended, {.progress = [](double) { return false; }}),
+  EXPECT_THROW((void)untangle(base, mended, {.progress = [](double) { return false; }}),
                levelset::Cancelled);
 }
 
-}  // namespace unfold_test
+}  // namespace untangle_test

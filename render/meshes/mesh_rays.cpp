@@ -1,4 +1,4 @@
-#include "render/embree/mesh_rays.h"
+#include "render/meshes/mesh_rays.h"
 
 #include <embree3/rtcore.h>
 
@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "render/embree/float_view.h"
+#include "render/meshes/embree_space.h"
 #include "render/shading/style.h"
 
 namespace render {
@@ -19,7 +19,7 @@ struct MeshRays::Impl {
   std::vector<MeshPart> parts;
   bool isOpaque;
   Box3d bounds;
-  FloatView view;
+  EmbreeSpace view;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
 
@@ -33,8 +33,8 @@ struct MeshRays::Impl {
 
   void build();
   void add(const MeshPart& part, unsigned number);
-  /// How far it is to where the ray enters the box, `near` at least, with Embree's ray from there;
-  /// nothing: it misses.
+  /// Computes Embree's ray and the distance to its start, where the ray enters the box, at least
+  /// `near`. Returns nothing when the ray misses the box.
   std::optional<double> prepare(const V3d& origin, const V3d& direction, double near, double far,
                                 RTCRay& ray) const;
   void complete(const RTCRayHit& found, const V3d& start, const V3d& direction, double moved,
@@ -48,10 +48,10 @@ MeshRays::Impl::Impl(const Scene& source) : parts(source.meshes) {
     for (const auto& triangle : part.mesh->triangles)
       for (const std::uint32_t v : triangle) bounds.extendBy(part.mesh->positions[v]);
   if (bounds.isEmpty()) return;
-  view = FloatView(bounds);
+  view = EmbreeSpace(bounds);
   try {
     build();
-  } catch (...) {  // the destructor does not run for a constructor that throws
+  } catch (...) {  // no destructor runs when a constructor throws
     if (scene) rtcReleaseScene(scene);
     if (device) rtcReleaseDevice(device);
     throw;
@@ -109,14 +109,15 @@ void MeshRays::Impl::complete(const RTCRayHit& found, const V3d& start, const V3
   const V3d across = (b - a).cross(c - a);
   const double rough = static_cast<double>(found.ray.tfar) / view.scale;
   const double exact = across.dot(a - start) / across.dot(direction);
-  // On its plane, unless the ray runs along it.
+  // Use the exact intersection with the triangle's plane, unless the ray runs almost parallel to
+  // it.
   const double t = std::abs(exact - rough) * view.scale < 1e-3 ? exact : rough;
   hit.found = true;
   hit.distance = moved + t;
   hit.position = start + direction * t;
   hit.facetNormal = across.length() > 0 ? across.normalized() : -direction;
   hit.normal = hit.facetNormal;
-  hit.surfaceError = FloatView::kPad / view.scale;
+  hit.surfaceError = EmbreeSpace::kPad / view.scale;
   hit.id = part.id;
   hit.solid = found.hit.geomID;
   hit.isOnMesh = true;

@@ -1,4 +1,4 @@
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 
 #include <algorithm>
 #include <array>
@@ -17,7 +17,8 @@ using Imath::V3d;
 using Cell = std::array<int, 3>;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// What rounding may leave of a point's share in a corner that it lies opposite of.
+// Tolerance for barycentric coordinates: a point on a face may have a share this far below 0 from
+// rounding.
 constexpr double kOnFace = -1e-9;
 
 bool isInside(const std::array<double, 4>& shares) {
@@ -29,7 +30,7 @@ V3d mix(const Lattice::Corners& corners, const std::array<double, 4>& shares) {
          corners[3] * shares[3];
 }
 
-/// Gradients of u, v and w in a tetrahedron, as rows; not finite where it has no volume.
+/// Gradients of u, v and w in a tetrahedron, as rows; not finite if it has no volume.
 M33d slopes(const Lattice::Corners& world, const Lattice::Corners& texture) {
   const std::array<V3d, 3> dual =
       dualBasis(world[1] - world[0], world[2] - world[0], world[3] - world[0]);
@@ -48,17 +49,17 @@ Box3d around(const GridBlock& block) {
   for (int i = 0; i < 3; ++i)
     for (int axis = 0; axis < 3; ++axis)
       half[axis] += std::abs(block.row(i)[axis]) * 0.5 * (block.edge - 1);
-  // Rounding must not lose what lies on the rim.
+  // The box grows a little so that rounding does not lose cells at its border.
   half *= 1 + 1e-9;
   return {center - half, center + half};
 }
 
 }  // namespace
 
-/// The cells of a shell map that touch a block.
-class ShellBlock final : public BlockMap {
+/// The cells of a prism map that touch a block.
+class PrismBlock final : public BlockMap {
  public:
-  ShellBlock(const ShellMap& map, const GridBlock& block) : map_(map), block_(block) {
+  PrismBlock(const PrismMap& map, const GridBlock& block) : map_(map), block_(block) {
     map.tree_.visit(around(block), [&](const Cell& cell) {
       cells_.push_back(cell);
       return false;
@@ -66,7 +67,8 @@ class ShellBlock final : public BlockMap {
   }
 
   [[nodiscard]] Box3d imageBounds() const override {
-    // Tetrahedra much smaller than the block fill their boxes.
+    // Tetrahedra much smaller than the block fill most of their boxes, so the boxes are tight
+    // enough.
     constexpr std::size_t kFew = 32;
     Box3d bounds;
     for (const Cell& cell : cells_) {
@@ -76,7 +78,7 @@ class ShellBlock final : public BlockMap {
       else
         for (int order = 0; order < 6; ++order) bounds.extendBy(imageIn({cell, order}, box));
     }
-    // Barycentric sums round.
+    // Barycentric sums have rounding errors.
     constexpr double kRounding = 1e-12;
     if (!bounds.isEmpty()) bounds = {bounds.min - V3d(kRounding), bounds.max + V3d(kRounding)};
     return bounds;
@@ -91,7 +93,7 @@ class ShellBlock final : public BlockMap {
   }
 
   [[nodiscard]] std::unique_ptr<BlockMap> octant(int bits) const override {
-    return std::unique_ptr<BlockMap>(new ShellBlock(*this, bits));
+    return std::unique_ptr<BlockMap>(new PrismBlock(*this, bits));
   }
 
   std::size_t evaluate(std::span<V3d, 512> uvw) const override {
@@ -107,24 +109,24 @@ class ShellBlock final : public BlockMap {
   }
 
  private:
-  ShellBlock(const ShellBlock& parent, int bits)
+  PrismBlock(const PrismBlock& parent, int bits)
       : map_(parent.map_), block_(parent.block_.octant(bits)) {
     const Box3d box = around(block_);
     for (const Cell& cell : parent.cells_)
       if (map_.lattice_.worldBox(cell).intersects(box)) cells_.push_back(cell);
   }
 
-  /// What one tetrahedron makes of the block: its straight map of the block's hull, as far as its
-  /// own box of texture space reaches.
+  /// Box of the image of the block's hull under the linear map of one tetrahedron, clipped to the
+  /// tetrahedron's own box in texture space.
   [[nodiscard]] Box3d imageIn(const Tetrahedron& t, const Box3d& own) const {
     const Lattice::Corners world = map_.lattice_.corners(t),
                            texture = map_.lattice_.textureCorners(t);
     const M33d slope = slopes(world, texture);
-    const V3d way = block_.center() - world[0];
+    const V3d offset = block_.center() - world[0];
     Box3d image;
     for (int k = 0; k < 3; ++k) {
       const V3d gradient(slope[k][0], slope[k][1], slope[k][2]);
-      const double middle = texture[0][k] + gradient.dot(way);
+      const double middle = texture[0][k] + gradient.dot(offset);
       double extent = 0;
       for (int i = 0; i < 3; ++i)
         extent += std::abs(gradient.dot(block_.row(i))) * 0.5 * (block_.edge - 1);
@@ -137,13 +139,13 @@ class ShellBlock final : public BlockMap {
     return image;
   }
 
-  /// Goes from point to point through faces; searches the block's cells where that fails.
+  /// Walks from point to point across faces; searches the block's cells when the walk fails.
   class Walk {
    public:
-    explicit Walk(const ShellBlock& block)
+    explicit Walk(const PrismBlock& block)
         : map_(block.map_), lattice_(block.map_.lattice_), block_(block) {}
 
-    /// The next point lies beside the first of the row before.
+    /// Resumes at the first point of the previous row, which is adjacent to the next point.
     void returnToRow() {
       current_ = first_;
       isAt_ = hasFirst_;
@@ -195,40 +197,40 @@ class ShellBlock final : public BlockMap {
       return barycentric(lattice_.corners(t), x);
     }
 
-    const ShellMap& map_;
+    const PrismMap& map_;
     const Lattice& lattice_;
-    const ShellBlock& block_;
+    const PrismBlock& block_;
     Tetrahedron current_, first_;
     bool isAt_ = false, hasFirst_ = false, isRowStart_ = true;
     std::size_t tests_ = 0;
   };
 
-  const ShellMap& map_;
+  const PrismMap& map_;
   GridBlock block_;
   std::vector<Cell> cells_;
 };
 
-ShellMap::ShellMap(const Patch& patch, const LatticeBorder& border)
-    : lattice_(patch, border), sink_(border.sink), tree_(lattice_) {}
+PrismMap::PrismMap(const Patch& patch, const LatticeBorder& border)
+    : lattice_(patch, border), embedDepth_(border.embedDepth), tree_(lattice_) {}
 
-double ShellMap::estimateBytes(const Patch& patch) {
+double PrismMap::estimateBytes(const Patch& patch) {
   double columns = 0, rows = 0;
   for (const ParticleLayer& layer : patch.layers) {
     columns = std::max(columns, static_cast<double>(layer.columns));
     rows = std::max(rows, static_cast<double>(layer.rows));
   }
-  // Nodes, boxes, samples and what is told from these, for each cell.
+  // Nodes, boxes, samples and the statistics computed from the samples, for each cell.
   constexpr double kBytesPerCell = 1200;
   return kBytesPerCell * (columns + 1) * (rows + 1) *
          (static_cast<double>(patch.layers.size()) + 3);
 }
 
-Box3d ShellMap::aroundPoint(const V3d& x) const {
+Box3d PrismMap::aroundPoint(const V3d& x) const {
   const V3d slack(-kOnFace * tree_.size());
   return {x - slack, x + slack};
 }
 
-bool ShellMap::find(const V3d& x, Tetrahedron& t) const {
+bool PrismMap::find(const V3d& x, Tetrahedron& t) const {
   return tree_.visit(aroundPoint(x), [&](const Cell& cell) {
     for (int order = 0; order < 6; ++order) {
       t = {cell, order};
@@ -238,28 +240,28 @@ bool ShellMap::find(const V3d& x, Tetrahedron& t) const {
   });
 }
 
-V3d ShellMap::operator()(const V3d& x) const {
+V3d PrismMap::operator()(const V3d& x) const {
   Tetrahedron t;
   if (!find(x, t)) return V3d(kNaN);
   return mix(lattice_.textureCorners(t), barycentric(lattice_.corners(t), x));
 }
 
-M33d ShellMap::jacobian(const V3d& x) const {
+M33d PrismMap::jacobian(const V3d& x) const {
   Tetrahedron t;
   if (!find(x, t)) return {kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, kNaN, kNaN};
   return slopes(lattice_.corners(t), lattice_.textureCorners(t));
 }
 
-std::unique_ptr<BlockMap> ShellMap::restrictTo(const GridBlock& block, double) const {
-  return std::make_unique<ShellBlock>(*this, block);
+std::unique_ptr<BlockMap> PrismMap::restrictTo(const GridBlock& block, double) const {
+  return std::make_unique<PrismBlock>(*this, block);
 }
 
-bool ShellMap::holdsTexture(const V3d& uvw) const {
+bool PrismMap::holdsTexture(const V3d& uvw) const {
   return std::min(uvw.x, uvw.y) >= 0 && std::max(uvw.x, uvw.y) <= 1 &&
-         uvw.z >= -std::max(0.0, sink_) && uvw.z <= 1 + std::max(0.0, -sink_);
+         uvw.z >= -std::max(0.0, embedDepth_) && uvw.z <= 1 + std::max(0.0, -embedDepth_);
 }
 
-std::vector<MapSample> ShellMap::samples() const {
+std::vector<MapSample> PrismMap::samples() const {
   std::vector<MapSample> result;
   result.reserve(6 * lattice_.cellCount());
   const Cell cells = lattice_.cells();
@@ -277,18 +279,18 @@ std::vector<MapSample> ShellMap::samples() const {
   return result;
 }
 
-std::size_t ShellMap::countOverlaps(std::span<const MapSample> samples, MapSample& first) const {
+std::size_t PrismMap::countOverlaps(std::span<const MapSample> samples, MapSample& first) const {
   constexpr double kElsewhere = 1e-6;  // of u, v, w; rounding is far less
   std::size_t count = 0;
   for (const MapSample& sample : samples) {
-    const V3d found = (*this)(sample.place);
+    const V3d found = (*this)(sample.position);
     if (!((found - sample.uvw).length() > kElsewhere) || !holdsTexture(found)) continue;
     if (count++ == 0) first = sample;
   }
   return count;
 }
 
-V3d ShellMap::toPatch(const V3d& uvw) const {
+V3d PrismMap::toPatch(const V3d& uvw) const {
   Tetrahedron t;
   if (!lattice_.locate(uvw, t)) return V3d(kNaN);
   return mix(lattice_.corners(t), barycentric(lattice_.textureCorners(t), uvw));

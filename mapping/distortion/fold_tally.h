@@ -9,28 +9,31 @@
 
 namespace mapping {
 
-/// The worst first, and no more than are told.
-inline void keepWorst(std::vector<FoldPlace>& places) {
+/// Sorts folds, the worst first, and keeps the number that is reported.
+inline void keepWorst(std::vector<FoldPoint>& places) {
   std::stable_sort(places.begin(), places.end(),
-                   [](const FoldPlace& a, const FoldPlace& b) { return a.jacobian < b.jacobian; });
-  places.resize(std::min(places.size(), FoldCertificate::kMostPlaces));
+                   [](const FoldPoint& a, const FoldPoint& b) { return a.jacobian < b.jacobian; });
+  places.resize(std::min(places.size(), FoldCertificate::kMostPoints));
 }
 
-/// Adds up what is known of the parts of a map, in their order.
+/// Accumulates the results of the parts of a map, in their order.
 struct FoldTally {
   FoldCertificate certificate = {};
 
   void addVolume(double size, double folded, double undecided) {
     size_ += size, folded_ += folded, undecided_ += undecided;
   }
-  /// @param typical  of a part, for the median; @param least  of the same part
+  /// Adds the determinants of one part.
+  /// @param typical  typical determinant, for the median
+  /// @param least    least determinant
   void addDeterminant(double typical, double least) {
     if (typical > 0) typical_.push_back(typical);
     least_ = std::min(least_, least);
   }
-  void addFold(const FoldPlace& fold) { certificate.worst.push_back(fold); }
+  void addFold(const FoldPoint& fold) { certificate.worst.push_back(fold); }
 
-  /// Determinants become shares of the median of those that are positive; the worst folds are kept.
+  /// Returns the certificate: determinants divided by the median of the positive ones, and the
+  /// worst folds.
   [[nodiscard]] FoldCertificate finish() {
     double unit = 1;
     if (!typical_.empty()) {
@@ -38,9 +41,9 @@ struct FoldTally {
       std::nth_element(typical_.begin(), middle, typical_.end());
       unit = *middle;
     }
-    std::vector<FoldPlace>& worst = certificate.worst;
+    std::vector<FoldPoint>& worst = certificate.worst;
     keepWorst(worst);
-    for (FoldPlace& fold : worst) fold.jacobian /= unit;
+    for (FoldPoint& fold : worst) fold.jacobian /= unit;
     certificate.unit = unit;
     if (size_ > 0) {
       certificate.foldedShare = folded_ / size_;

@@ -1,4 +1,4 @@
-#include "render/kernel/field_walk.h"
+#include "render/kernel/field_traversal.h"
 
 #include <array>
 #include <cmath>
@@ -15,13 +15,14 @@ using Join = FieldExpression::Join;
 using Range = FieldGrid::Range;
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr int kMostHalvings = 44;  // of a part of a ray, to the spacing of its places
-constexpr double kNoise = 1e-13;   // of the backgrounds: values below are rounding's
+constexpr int kMostHalvings =
+    44;  // halvings of a ray segment, down to the spacing of representable positions
+constexpr double kNoise = 1e-13;  // relative to the backgrounds: smaller values are rounding noise
 
-/// By Bernstein coefficients on a part of a ray.
+/// A cubic on a ray segment, by its Bernstein coefficients.
 using FieldCubic = std::array<double, 4>;
 
-/// Of a value and of its derivative along a part of the ray.
+/// Bounds on the value along a ray segment and on its derivative.
 struct FieldBounds {
   Range value, slope;
 };
@@ -36,7 +37,7 @@ Range negated(const Range& r) {
   return {-r.high, -r.low};
 }
 
-/// Slopes of a and b by the share that a may have.
+/// Bounds on the mixed slope share · a + (1 − share) · b.
 Range mixedSlope(const Range& share, const Range& a, const Range& b) {
   const auto at = [](double s, double u, double v) { return s * u + (1 - s) * v; };
   return {std::min(at(share.low, a.low, b.low), at(share.high, a.low, b.low)),
@@ -63,7 +64,7 @@ FieldBounds boundsOf(const FieldCubic& c) {
           {std::min(std::min(d[0], d[1]), d[2]), std::max(std::max(d[0], d[1]), d[2])}};
 }
 
-/// De Casteljau at one half.
+/// Splits a cubic at one half by De Casteljau's algorithm.
 void halve(const FieldCubic& c, FieldCubic& left, FieldCubic& right) {
   const double b01 = 0.5 * (c[0] + c[1]), b12 = 0.5 * (c[1] + c[2]), b23 = 0.5 * (c[2] + c[3]);
   const double b012 = 0.5 * (b01 + b12), b123 = 0.5 * (b12 + b23), middle = 0.5 * (b012 + b123);
@@ -76,29 +77,31 @@ double valueAt(const FieldCubic& c, double s) {
   return r * r * (r * c[0] + 3 * s * c[1]) + s * s * (3 * r * c[2] + s * c[3]);
 }
 
-/// A ray's way through a grid: the block it is in, and the cell of it.
-struct GridWay {
+/// Traversal of one grid by a ray: the present block, and the present cell in it.
+struct GridTraversal {
   const FieldGrid* grid;
-  V3d origin, direction;  // index space, by the world's distance along the ray
+  V3d origin, direction;  // index space; the parameter is the world distance along the ray
   double inverse[3];
   int block[3] = {}, cell[3] = {};
-  int number = -1;  // of the block; negative where the field is constant
+  int number = -1;  // number of the block; negative where the field is constant
   double blockExit = 0, cellExit = kNever;
-  int blockAxis = -1, cellAxis = -1;  // of the exit; −1: before the table
-  Range range{0, 0};                  // of the block, then of the cell
+  int blockAxis = -1, cellAxis = -1;  // axis of the exit; −1: before the table
+  Range range{0, 0};                  // range of the values in the block, then in the cell
   double corner[2][2][2];
 
-  GridWay(const FieldGrid& of, const V3d& start, const V3d& along) : grid(&of) {
+  GridTraversal(const FieldGrid& of, const V3d& start, const V3d& along) : grid(&of) {
     of.worldToIndex().multVecMatrix(start, origin);
     of.worldToIndex().multDirMatrix(along, direction);
     for (int a = 0; a < 3; ++a) {
       inverse[a] = 1 / direction[a];
-      if (!std::isfinite(inverse[a])) direction[a] = inverse[a] = 0;  // it meets no plane
+      if (!std::isfinite(inverse[a]))
+        direction[a] = inverse[a] = 0;  // the ray meets no plane across this axis
     }
     beAway(entry());
   }
 
-  /// The only such function: monotone in k, so that cells and blocks agree on their faces.
+  /// Parameter at the plane k of axis a. All cells and blocks use this function. It is monotone in
+  /// k, so they agree on their common faces.
   [[nodiscard]] double plane(int a, int k) const {
     return (static_cast<double>(k) - origin[a]) * inverse[a];
   }
@@ -115,7 +118,7 @@ struct GridWay {
     }
     return enter < leave ? enter : kNever;
   }
-  /// Outside the table, up to there.
+  /// Marks the ray as outside the table up to the parameter `until`.
   void beAway(double until) {
     number = -1;
     blockAxis = -1;
@@ -166,7 +169,7 @@ struct GridWay {
     if (cell[cellAxis] / FieldGrid::kEdge == block[cellAxis] && cell[cellAxis] >= 0)
       readCell();
     else
-      cellExit = kNever;  // the block ends there too
+      cellExit = kNever;  // the block ends here, too
   }
   void readCell() {
     constexpr int kPoints = FieldGrid::kPoints;
@@ -182,7 +185,7 @@ struct GridWay {
     cellExit = exitOf(cell, 1, cellAxis);
   }
 
-  /// The field from t0 to t1, within the cell, by its blossom.
+  /// The field between t0 and t1 within one cell, from the blossom of its cubic.
   [[nodiscard]] FieldCubic cubic(double t0, double t1) const {
     if (number < 0) return {range.low, range.low, range.low, range.low};
     double p[2][3];
@@ -190,7 +193,7 @@ struct GridWay {
       p[0][a] = std::clamp(origin[a] + t0 * direction[a] - cell[a], 0.0, 1.0);
       p[1][a] = std::clamp(origin[a] + t1 * direction[a] - cell[a], 0.0, 1.0);
     }
-    double blossom[2][2][2];  // by the end taken along x, y, z
+    double blossom[2][2][2];  // indexed by the end taken along x, y, z
     for (int i = 0; i < 2; ++i)
       for (int j = 0; j < 2; ++j) {
         double line[2];
@@ -206,13 +209,13 @@ struct GridWay {
   }
 };
 
-/// One ray's search for where it changes sides of the expression's zero set.
+/// Finds the points where one ray crosses the zero set of the expression.
 class FieldSearch {
  public:
-  std::vector<double> crossings;  // from the start
+  std::vector<double> crossings;  // distances from the start
   bool startsInside = false;
 
-  /// @param wantsAll  or the first alone
+  /// @param wantsAll  finds all crossings; false: only the first one
   FieldSearch(const FieldExpression& expression, const std::vector<FieldGrid>& grids,
               const V3d& start, const V3d& direction, double end, bool wantsAll)
       : e_(expression),
@@ -224,7 +227,7 @@ class FieldSearch {
         cubics_(grids.size() * (kMostHalvings + 1)) {
     double largest = 0;
     for (const FieldGrid& grid : grids) {
-      ways_.emplace_back(grid, start, direction);
+      traversals_.emplace_back(grid, start, direction);
       largest = std::max(largest, grid.background());
     }
     noise_ = kNoise * largest;
@@ -234,13 +237,13 @@ class FieldSearch {
  private:
   template <typename Value, typename JoinValues>
   Value joined(std::vector<Value>& values, const JoinValues& join) const {
-    std::size_t n = ways_.size();
+    std::size_t n = traversals_.size();
     for (const FieldExpression::Step& step : e_.steps)
       values[n++] = join(e_, step.join, values[step.a], values[step.b]);
     return values[e_.drawn];
   }
 
-  /// From t on the ray is on that side. @return does the search go on?
+  /// Records the side on which the ray is from t on. Returns true when the search continues.
   bool settle(bool isInside, double t) {
     if (!inside_) startsInside = isInside;
     const bool hasChanged = inside_ && *inside_ != isInside;
@@ -249,9 +252,9 @@ class FieldSearch {
     return wantsAll_ || !hasChanged;
   }
 
-  /// Where the grids' ranges leave no doubt. @return nothing: they do
+  /// Side of the surface, if the value ranges of the grids determine it; else nothing.
   std::optional<bool> sideByRanges() {
-    for (std::size_t i = 0; i < ways_.size(); ++i) ranges_[i] = ways_[i].range;
+    for (std::size_t i = 0; i < traversals_.size(); ++i) ranges_[i] = traversals_[i].range;
     const Range all = joined(ranges_, joinRanges);
     if (all.low >= 0) return false;
     if (all.high < 0) return true;
@@ -260,12 +263,12 @@ class FieldSearch {
 
   void walkBlocks() {
     for (double t = 0; t < end_;) {
-      for (GridWay& way : ways_) {
-        while (way.blockExit <= t) way.nextBlock(t);
-        way.range = way.grid->range(way.number);
+      for (GridTraversal& traversal : traversals_) {
+        while (traversal.blockExit <= t) traversal.nextBlock(t);
+        traversal.range = traversal.grid->range(traversal.number);
       }
       double next = end_;
-      for (const GridWay& way : ways_) next = std::min(next, way.blockExit);
+      for (const GridTraversal& traversal : traversals_) next = std::min(next, traversal.blockExit);
       const std::optional<bool> side = sideByRanges();
       if (side ? !settle(*side, t) : !walkCells(t, next)) return;
       t = next;
@@ -273,12 +276,12 @@ class FieldSearch {
   }
 
   bool walkCells(double t, double end) {
-    for (GridWay& way : ways_) way.firstCell(t);
+    for (GridTraversal& traversal : traversals_) traversal.firstCell(t);
     for (;;) {
-      for (GridWay& way : ways_)
-        while (way.cellExit <= t) way.nextCell();
+      for (GridTraversal& traversal : traversals_)
+        while (traversal.cellExit <= t) traversal.nextCell();
       double next = end;
-      for (const GridWay& way : ways_) next = std::min(next, way.cellExit);
+      for (const GridTraversal& traversal : traversals_) next = std::min(next, traversal.cellExit);
       const std::optional<bool> side = sideByRanges();
       if (side ? !settle(*side, t) : !solve(t, next)) return false;
       if (next == end) return true;
@@ -287,12 +290,12 @@ class FieldSearch {
   }
 
   bool solve(double t0, double t1) {
-    for (std::size_t i = 0; i < ways_.size(); ++i) cubics_[i] = ways_[i].cubic(t0, t1);
+    for (std::size_t i = 0; i < traversals_.size(); ++i) cubics_[i] = traversals_[i].cubic(t0, t1);
     return search(0, t0, t1);
   }
 
   bool search(int level, double t0, double t1) {
-    const std::size_t count = ways_.size();
+    const std::size_t count = traversals_.size();
     FieldCubic* cubics = cubics_.data() + static_cast<std::size_t>(level) * count;
     for (std::size_t i = 0; i < count; ++i) bounds_[i] = boundsOf(cubics[i]);
     const FieldBounds all = joined(bounds_, joinBounds);
@@ -316,14 +319,14 @@ class FieldSearch {
   }
 
   [[nodiscard]] double valueOf(const FieldCubic* cubics, double s) {
-    for (std::size_t i = 0; i < ways_.size(); ++i) values_[i] = valueAt(cubics[i], s);
+    for (std::size_t i = 0; i < traversals_.size(); ++i) values_[i] = valueAt(cubics[i], s);
     return joined(values_, [](const FieldExpression& e, Join join, double a, double b) {
       return e.join(join, a, b);
     });
   }
 
-  /// Where the value changes its sign, between 0 and 1: secants that keep it between, an end that
-  /// stays twice counting half (the Illinois method), and halvings lest that is slow.
+  /// Finds the sign change of the value between 0 and 1. Uses the Illinois variant of regula falsi,
+  /// and bisection where that converges slowly.
   [[nodiscard]] double rootOf(const FieldCubic* cubics) {
     constexpr int kMostSteps = 100;
     constexpr double kExact = 0x1p-50;
@@ -347,15 +350,15 @@ class FieldSearch {
   double end_;
   bool wantsAll_;
   double noise_ = 0;
-  std::vector<GridWay> ways_;
+  std::vector<GridTraversal> traversals_;
   std::optional<bool> inside_;
   std::vector<double> values_;
   std::vector<FieldBounds> bounds_;
   std::vector<Range> ranges_;
-  std::vector<FieldCubic> cubics_;  // of the grids, by halvings
+  std::vector<FieldCubic> cubics_;  // cubics of the grids, by depth of halving
 };
 
-/// The part of a ray in a box.
+/// Clips a ray to a box.
 std::optional<Range> partWithin(const Imath::Box3d& box, const V3d& origin, const V3d& direction,
                                 double near, double far) {
   if (box.isEmpty()) return std::nullopt;
@@ -374,7 +377,7 @@ std::optional<Range> partWithin(const Imath::Box3d& box, const V3d& origin, cons
 
 }  // namespace
 
-FieldWalk::FieldWalk(const Scene& scene, std::size_t maxBytes)
+FieldTraversal::FieldTraversal(const Scene& scene, std::size_t maxBytes)
     : expression_(fieldExpression(scene)) {
   double bytes = 0;
   for (const FieldExpression::Operand& operand : expression_.operands)
@@ -382,32 +385,34 @@ FieldWalk::FieldWalk(const Scene& scene, std::size_t maxBytes)
   levelset::requireMemory(bytes, maxBytes, "render");
   for (const FieldExpression::Operand& operand : expression_.operands)
     grids_.emplace_back(scene.solids[operand.solid].band);
-  place(scene);
+  updateTransforms(scene);
 }
 
-bool FieldWalk::place(const Scene& scene) {
+bool FieldTraversal::updateTransforms(const Scene& scene) {
   bool hasMoved = false;
   box_.makeEmpty();
   for (std::size_t i = 0; i < grids_.size(); ++i) {
-    hasMoved = grids_[i].place(scene.solids[expression_.operands[i].solid].band) || hasMoved;
+    hasMoved =
+        grids_[i].updateTransform(scene.solids[expression_.operands[i].solid].band) || hasMoved;
     box_.extendBy(grids_[i].worldBox());
   }
   return hasMoved;
 }
 
-std::size_t FieldWalk::bytes() const {
+std::size_t FieldTraversal::bytes() const {
   std::size_t sum = 0;
   for (const FieldGrid& grid : grids_) sum += grid.bytes();
   return sum;
 }
 
-std::size_t FieldWalk::blockCount() const {
+std::size_t FieldTraversal::blockCount() const {
   std::size_t sum = 0;
   for (const FieldGrid& grid : grids_) sum += grid.blockCount();
   return sum;
 }
 
-Hit FieldWalk::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
+Hit FieldTraversal::intersect(const V3d& origin, const V3d& direction, double near,
+                              double far) const {
   Hit hit;
   const std::optional<Range> part = partWithin(box_, origin, direction, near, far);
   if (!part) return hit;
@@ -422,15 +427,15 @@ Hit FieldWalk::intersect(const V3d& origin, const V3d& direction, double near, d
   return hit;
 }
 
-bool FieldWalk::isOccluded(const V3d& origin, const V3d& direction, double reach) const {
-  const std::optional<Range> part = partWithin(box_, origin, direction, 0, reach);
+bool FieldTraversal::isOccluded(const V3d& origin, const V3d& direction, double maxDistance) const {
+  const std::optional<Range> part = partWithin(box_, origin, direction, 0, maxDistance);
   return part && !FieldSearch(expression_, grids_, origin + direction * part->low, direction,
                               part->high - part->low, false)
                       .crossings.empty();
 }
 
-double FieldWalk::thickness(const V3d& origin, const V3d& direction, double near,
-                            double far) const {
+double FieldTraversal::thickness(const V3d& origin, const V3d& direction, double near,
+                                 double far) const {
   const std::optional<Range> part = partWithin(box_, origin, direction, near, far);
   if (!part) return 0;
   const double end = part->high - part->low;

@@ -1,4 +1,4 @@
-#include "render/embree/float_view.h"
+#include "render/meshes/embree_space.h"
 
 #include <fmt/core.h>
 
@@ -11,15 +11,15 @@ namespace render {
 using Imath::Box3d;
 using Imath::V3d;
 
-FloatView::FloatView(const Box3d& bounds) : centre(bounds.center()) {
+EmbreeSpace::EmbreeSpace(const Box3d& bounds) : centre(bounds.center()) {
   const double diagonal = bounds.size().length();
   scale = diagonal > 0 ? 1 / diagonal : 1;
   const V3d pad(1e-3 / scale);
   box = {bounds.min - pad, bounds.max + pad};
 }
 
-std::optional<double> FloatView::entryOf(const V3d& origin, const V3d& direction, double near,
-                                         double far) const {
+std::optional<double> EmbreeSpace::entryOf(const V3d& origin, const V3d& direction, double near,
+                                           double far) const {
   for (int a = 0; a < 3; ++a) {
     if (direction[a] == 0) {
       if (origin[a] < box.min[a] || origin[a] > box.max[a]) return std::nullopt;
@@ -33,7 +33,7 @@ std::optional<double> FloatView::entryOf(const V3d& origin, const V3d& direction
   return near <= far ? std::optional(near) : std::nullopt;
 }
 
-RTCRay FloatView::rayFrom(const V3d& start, const V3d& direction, double reach) const {
+RTCRay EmbreeSpace::rayFrom(const V3d& start, const V3d& direction, double maxDistance) const {
   const V3d from = (start - centre) * scale;
   RTCRay ray = {};
   ray.org_x = static_cast<float>(from.x);
@@ -42,8 +42,8 @@ RTCRay FloatView::rayFrom(const V3d& start, const V3d& direction, double reach) 
   ray.dir_x = static_cast<float>(direction.x);
   ray.dir_y = static_cast<float>(direction.y);
   ray.dir_z = static_cast<float>(direction.z);
-  // The scene has a diagonal of 1, so nothing lies beyond 2.
-  ray.tfar = static_cast<float>(std::min(2.0, reach * scale + kPad));
+  // The scaled scene has a diagonal of 1, so nothing lies beyond 2.
+  ray.tfar = static_cast<float>(std::min(2.0, maxDistance * scale + kPad));
   ray.mask = ~0u;
   return ray;
 }
@@ -52,7 +52,7 @@ void requireEmbree(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
   if (error == RTC_ERROR_NONE) return;
   throw levelset::ResourceLimit(fmt::format(
-      "render: Embree failed with its error {} ({}); use larger voxels, a coarser mesh, or free "
+      "render: Embree failed with error code {} ({}); use larger voxels, a coarser mesh, or free "
       "memory",
       static_cast<int>(error), error == RTC_ERROR_OUT_OF_MEMORY ? "out of memory" : "other"));
 }

@@ -12,44 +12,45 @@
 
 namespace mapping {
 
-/// The map that is straight in each tetrahedron of a patch's lattice, the hybrid of particle layers
-/// and shell maps [Brodersen07 §9; Porumbescu05]. Continuous, defined in the lattice only, and
-/// where no tetrahedron is turned over it goes both ways.
-class ShellMap final : public PatchMap {
+/// Piecewise linear map on the tetrahedra of a patch's lattice: a hybrid of particle layers and
+/// shell maps [Brodersen07 §9; Porumbescu05]. It is continuous and defined only in the lattice. It
+/// is invertible if no tetrahedron is inverted.
+class PrismMap final : public PatchMap {
  public:
-  ShellMap(const Patch& patch, const LatticeBorder& border);
+  PrismMap(const Patch& patch, const LatticeBorder& border);
 
   [[nodiscard]] Imath::V3d operator()(const Imath::V3d& x) const override;
   [[nodiscard]] Imath::M33d jacobian(const Imath::V3d& x) const override;
   [[nodiscard]] std::unique_ptr<BlockMap> restrictTo(const GridBlock& block,
                                                      double tolerance) const override;
-  /// Of every tetrahedron where the texture lies: the unit cube of the patch, and as far below or
-  /// above it as it is sunk or lifted.
+  /// Samples one point in every tetrahedron that holds the texture: in the unit cube of the patch,
+  /// extended below or above it by the embedding depth.
   [[nodiscard]] std::vector<MapSample> samples() const;
   [[nodiscard]] bool isLocal() const override { return true; }
-  /// What making it and looking at all of its tetrahedra takes.
+  /// Memory for building the map and for sampling all its tetrahedra, bytes.
   [[nodiscard]] static double estimateBytes(const Patch& patch);
-  /// From texture coordinates to patch space; NaN outside the lattice.
+  /// Maps texture coordinates to patch space; NaN outside the lattice.
   [[nodiscard]] Imath::V3d toPatch(const Imath::V3d& uvw) const;
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
-  /// How many of these places the map sends elsewhere in the texture than where they come from:
-  /// there the shell passes through itself. @param first  one of them, unchanged where there is
-  /// none
+  /// Counts the samples whose position maps to other texture coordinates inside the texture, which
+  /// means that the offset layer passes through itself.
+  /// @param first  one such sample; unchanged if there is none
   [[nodiscard]] std::size_t countOverlaps(std::span<const MapSample> samples,
                                           MapSample& first) const;
-  /// Is a place of texture space in the unit cube, or as far below or above it as the texture is
-  /// sunk or lifted?
+  /// True if a point of texture space lies in the unit cube, extended below or above it by the
+  /// embedding depth.
   [[nodiscard]] bool holdsTexture(const Imath::V3d& uvw) const;
 
  private:
-  friend class ShellBlock;
-  /// A point with what rounding may leave between it and the cell that holds it.
+  friend class PrismBlock;
+  /// Box around a point, large enough to meet the cell that contains the point despite rounding.
   [[nodiscard]] Imath::Box3d aroundPoint(const Imath::V3d& x) const;
-  /// @return false where no tetrahedron holds x
+  /// Finds the tetrahedron that contains x.
+  /// @return false if there is none
   [[nodiscard]] bool find(const Imath::V3d& x, Tetrahedron& t) const;
 
   Lattice lattice_;
-  double sink_;  ///< in w
+  double embedDepth_;  ///< in w
   CellTree tree_;
 };
 

@@ -1,4 +1,4 @@
-#include "mapping/untangle/shell_cells.h"
+#include "mapping/untangle/prism_cells.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,8 @@ namespace {
 
 using Imath::V3d;
 
-// Ends of the cells of unlike layers are further apart than this, whatever a million particles may
-// be laid out as, and rounding is far below.
+// Tolerance for equal cell borders of two layers. Different borders are further apart than this for
+// up to a million particles, and rounding errors are much smaller.
 constexpr double kSameEnd = 1e-9;
 
 void addEnds(std::vector<double>& ends, std::size_t count) {
@@ -30,7 +30,7 @@ std::vector<double> endsOf(std::size_t below, std::size_t above) {
 
 struct Share {
   std::size_t index;
-  double fraction;  ///< of the next one
+  double fraction;  ///< weight of the next particle
 };
 
 Share shareAt(double t, std::size_t count) {
@@ -42,7 +42,7 @@ Share shareAt(double t, std::size_t count) {
 
 }  // namespace
 
-ShellCells::ShellCells(const Patch& patch, double sink) {
+PrismCells::PrismCells(const Patch& patch, double embedDepth) {
   std::size_t particles = 0, cells = 0;
   for (const ParticleLayer& layer : patch.layers) {
     layers_.push_back({layer.columns, layer.rows, particles});
@@ -56,14 +56,14 @@ ShellCells::ShellCells(const Patch& patch, double sink) {
               w_[k + 1],
               endsOf(layers_[k][0], layers_[k + 1][0]),
               endsOf(layers_[k][1], layers_[k + 1][1])};
-    if (k == 0 && sink > 0) slab.from = -sink;
-    if (k + 2 == layers_.size() && sink < 0) slab.to -= sink;
+    if (k == 0 && embedDepth > 0) slab.from = -embedDepth;
+    if (k + 2 == layers_.size() && embedDepth < 0) slab.to -= embedDepth;
     cells += slab.count();
     slabs_.push_back(std::move(slab));
   }
 }
 
-void ShellCells::addLayer(ParticleSum& sum, std::size_t layer, double u, double v,
+void PrismCells::addLayer(ParticleSum& sum, std::size_t layer, double u, double v,
                           double share) const {
   if (share == 0) return;
   const auto& [columns, rows, first] = layers_[layer];
@@ -78,13 +78,13 @@ void ShellCells::addLayer(ParticleSum& sum, std::size_t layer, double u, double 
     }
 }
 
-ShellCell ShellCells::at(std::size_t index) const {
+PrismCell PrismCells::at(std::size_t index) const {
   const auto slab =
       std::prev(std::upper_bound(slabs_.begin(), slabs_.end(), index,
                                  [](std::size_t i, const Slab& s) { return i < s.first; }));
   const std::size_t rest = index - slab->first, columns = slab->u.size() - 1;
   const std::size_t i = rest % columns, j = rest / columns;
-  ShellCell cell;
+  PrismCell cell;
   cell.box = {V3d(slab->u[i], slab->v[j], slab->from),
               V3d(slab->u[i + 1], slab->v[j + 1], slab->to)};
   const double below = w_[slab->lower], above = w_[slab->lower + 1];
@@ -97,7 +97,7 @@ ShellCell ShellCells::at(std::size_t index) const {
   return cell;
 }
 
-V3d shellSizes(const Patch& patch) {
+V3d meanExtents(const Patch& patch) {
   const ParticleLayer& layer = patch.layers.front();
   double u = 0, v = 0;
   for (std::size_t j = 0; j < layer.rows; ++j)

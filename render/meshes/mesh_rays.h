@@ -9,11 +9,11 @@
 
 namespace render {
 
-/// The meshes of a scene for rays, of all renderers: Embree finds the triangle, double precision
-/// the place on its plane. Thread-safe. Rays are unit directions.
+/// Intersects rays with the meshes of a scene, for all renderers. Embree finds the triangle; double
+/// precision computes the position on its plane. Thread-safe. Ray directions have unit length.
 class MeshRays {
  public:
-  /// @throws levelset::ResourceLimit when Embree finds no memory
+  /// @throws levelset::ResourceLimit when Embree cannot allocate memory
   explicit MeshRays(const Scene& scene);
   ~MeshRays();
   MeshRays(MeshRays&&) noexcept;
@@ -21,13 +21,13 @@ class MeshRays {
 
   [[nodiscard]] bool isEmpty() const;
   [[nodiscard]] const Imath::Box3d& bounds() const;
-  /// First triangle, of either side, in [near, far]; `solid` is the index in Scene::meshes, normals
-  /// are those of the vertices where the mesh has some.
+  /// First triangle in [near, far], hit from either side. `solid` of the hit is the index in
+  /// Scene::meshes. Normals are interpolated from the vertices where the mesh has vertex normals.
   [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                               double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction,
                                 double far) const;
-  /// Share of light that all triangles in [0, far] let through, or less than kLeastTransmittance.
+  /// Share of light that passes all triangles in [0, far]; may stop below kLeastTransmittance.
   [[nodiscard]] double transmittance(const Imath::V3d& origin, const Imath::V3d& direction,
                                      double far) const;
 

@@ -1,4 +1,4 @@
-#include "mapping/maps/shell_map.h"
+#include "mapping/maps/prism_map.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include "mapping/distortion/distortion.h"
 #include "tests/support/formula_patches.h"
 
-namespace shell_map_test {
+namespace prism_map_test {
 
 using Imath::V3d;
 using mapping::Distortion;
@@ -18,7 +18,7 @@ using mapping::GridBlock;
 using mapping::Lattice;
 using mapping::LatticeBorder;
 using mapping::Patch;
-using mapping::ShellMap;
+using mapping::PrismMap;
 using mapping::Tetrahedron;
 
 /// A third of a cylinder of radius 2.
@@ -40,7 +40,7 @@ void forEachTetrahedron(const Lattice& lattice, const Visit& visit) {
 }
 
 TEST(Lattice, NeighboursShareTheFaceBetweenThem) {
-  const Lattice lattice(support::patchAt(onCylinder, 4, 3, 3), {.sink = 0.2, .rim = 0.1});
+  const Lattice lattice(support::patchAt(onCylinder, 4, 3, 3), {.embedDepth = 0.2, .rim = 0.1});
   std::size_t outside = 0;
   forEachTetrahedron(lattice, [&](const Tetrahedron& t) {
     const Lattice::Corners own = lattice.corners(t);
@@ -97,8 +97,8 @@ TEST(Lattice, RefinesLayersOfFewerParticles) {
   EXPECT_LE(worst, 0.003);
 }
 
-TEST(ShellMap, GoesBothWays) {
-  const ShellMap map(support::patchAt(onCylinder, 9, 7, 4), {.sink = 0.2, .rim = 0.3});
+TEST(PrismMap, GoesBothWays) {
+  const PrismMap map(support::patchAt(onCylinder, 9, 7, 4), {.embedDepth = 0.2, .rim = 0.3});
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(0, 1);
   for (int i = 0; i < 2000; ++i) {
@@ -111,9 +111,9 @@ TEST(ShellMap, GoesBothWays) {
   EXPECT_TRUE(std::isnan(map.jacobian(V3d(0, 0, 0))[0][0]));
 }
 
-TEST(ShellMap, FollowsTheCylinder) {
+TEST(PrismMap, FollowsTheCylinder) {
   // u, v and w within half a per cent of the height: chords of 64 cells stand off by 3e-4.
-  const ShellMap map(support::patchAt(onCylinder, 65, 33, 6), {.sink = 0.1, .rim = 0.1});
+  const PrismMap map(support::patchAt(onCylinder, 65, 33, 6), {.embedDepth = 0.1, .rim = 0.1});
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(0, 1);
   for (int i = 0; i < 500; ++i) {
@@ -124,7 +124,7 @@ TEST(ShellMap, FollowsTheCylinder) {
 
 /// Compares all leaf blocks below a block with the map's points; NaN only where that has it too.
 /// @param bounds  of the blocks that hold it
-void expectLeaves(const ShellMap& map, const GridBlock& block, const mapping::BlockMap& at,
+void expectLeaves(const PrismMap& map, const GridBlock& block, const mapping::BlockMap& at,
                   std::vector<Imath::Box3d> bounds, std::size_t& tests, std::size_t& inside) {
   bounds.push_back(at.imageBounds());
   if (block.edge > GridBlock::kLeafEdge) {
@@ -150,8 +150,8 @@ void expectLeaves(const ShellMap& map, const GridBlock& block, const mapping::Bl
   EXPECT_TRUE(here == 512 || !at.isTotal());
 }
 
-TEST(ShellMap, KnowsBlocksThatLieInsideIt) {
-  const ShellMap map(support::patchAt(onCylinder, 40, 40, 9), {.sink = 0.2, .rim = 0.1});
+TEST(PrismMap, KnowsBlocksThatLieInsideIt) {
+  const PrismMap map(support::patchAt(onCylinder, 40, 40, 9), {.embedDepth = 0.2, .rim = 0.1});
   GridBlock block{V3d(-0.1, 1.4, 2.4), Imath::M33d(), 16};
   for (int i = 0; i < 3; ++i) block.rows[i][i] = 0.01;
   EXPECT_TRUE(map.restrictTo(block, 0)->isTotal());
@@ -159,10 +159,10 @@ TEST(ShellMap, KnowsBlocksThatLieInsideIt) {
   EXPECT_FALSE(map.restrictTo(block, 0)->isTotal());
 }
 
-TEST(ShellMap, BlocksAgreeWithPoints) {
+TEST(PrismMap, BlocksAgreeWithPoints) {
   for (const std::size_t columns : {4u, 40u}) {
-    const ShellMap map(support::patchAt(onCylinder, columns, columns, 5),
-                       {.sink = 0.2, .rim = 0.1});
+    const PrismMap map(support::patchAt(onCylinder, columns, columns, 5),
+                       {.embedDepth = 0.2, .rim = 0.1});
     GridBlock block{V3d(-1.9, -0.2, 0.7), Imath::M33d(), 64};
     for (int i = 0; i < 3; ++i) block.rows[i][i] = 0.06;
     block.rows[0][1] = 0.01;
@@ -174,10 +174,10 @@ TEST(ShellMap, BlocksAgreeWithPoints) {
   }
 }
 
-TEST(ShellMap, TellsEveryTetrahedronThatFolds) {
+TEST(PrismMap, TellsEveryTetrahedronThatFolds) {
   const Patch sound = support::patchAt(onCylinder, 9, 9, 4);
   const Distortion distortion =
-      mapping::surveyDistortion(ShellMap(sound, {.sink = 0.1, .rim = 0.1}).samples(), V3d(1));
+      mapping::surveyDistortion(PrismMap(sound, {.embedDepth = 0.1, .rim = 0.1}).samples(), V3d(1));
   EXPECT_EQ(distortion.folded, 0u);
   EXPECT_EQ(distortion.samples, 6u * 8 * 8 * 4);
   EXPECT_GT(distortion.jacobian.least, 0.5);
@@ -185,8 +185,8 @@ TEST(ShellMap, TellsEveryTetrahedronThatFolds) {
 
   Patch turned = sound;
   std::swap(turned.layers[2].positions[40], turned.layers[2].positions[42]);
-  const Distortion folds =
-      mapping::surveyDistortion(ShellMap(turned, {.sink = 0.1, .rim = 0.1}).samples(), V3d(1));
+  const Distortion folds = mapping::surveyDistortion(
+      PrismMap(turned, {.embedDepth = 0.1, .rim = 0.1}).samples(), V3d(1));
   EXPECT_GT(folds.folded, 3u);
   EXPECT_LT(folds.folded, 100u);
   EXPECT_LT(folds.jacobian.least, 0);
@@ -198,9 +198,9 @@ TEST(ShellMap, TellsEveryTetrahedronThatFolds) {
         return onCylinder({1 - t.x, t.y, t.z});
       },
       9, 9, 4);
-  const ShellMap map(mirrored, {.sink = 0.1, .rim = 0.1});
+  const PrismMap map(mirrored, {.embedDepth = 0.1, .rim = 0.1});
   EXPECT_EQ(mapping::surveyDistortion(map.samples(), V3d(1), true).folded, 0u);
   EXPECT_GT(mapping::surveyDistortion(map.samples(), V3d(1)).folded, 0u);
 }
 
-}  // namespace shell_map_test
+}  // namespace prism_map_test

@@ -1,4 +1,4 @@
-#include "mapping/untangle/shell_solver.h"
+#include "mapping/untangle/prism_solver.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -18,14 +18,15 @@ namespace {
 
 using Imath::V3d;
 
-constexpr std::size_t kRemembered = 8;  // pairs
-constexpr double kSufficient = 1e-4;    // of the fall that the slope promises
+constexpr std::size_t kRemembered = 8;  // pairs of step and gradient change
+constexpr double kSufficient = 1e-4;    // share of the decrease that the slope predicts (Armijo)
 constexpr int kMostHalvings = 30;
 constexpr double kLongestStep = 0.5;  // particle spacings
 constexpr double kStandsStill = 1e-7;
-constexpr double kNoGain = 1e-11;  // of the energy, some times in a row
+// Relative decrease of the energy; kNoGainSteps such steps in a row end the search.
+constexpr double kNoGain = 1e-11;
 constexpr int kNoGainSteps = 5;
-// Second derivative of the symmetric Dirichlet energy at rest, along a change of the slopes.
+// Second derivative of the symmetric Dirichlet energy at rest, with respect to the slopes.
 constexpr double kStiffness = 8;
 
 double innerProduct(const std::vector<V3d>& a, const std::vector<V3d>& b) {
@@ -40,29 +41,29 @@ void addScaled(std::vector<V3d>& a, const std::vector<V3d>& b, double factor) {
 
 }  // namespace
 
-/// The Laplacian of the elements on particles that are not fixed, factorised.
-struct ShellSolver::Preconditioner {
-  std::vector<int> unknown;  ///< of each particle; −1: fixed
+/// Factorised Laplacian of the elements over the particles that are not fixed.
+struct PrismSolver::Preconditioner {
+  std::vector<int> unknown;  ///< index of each particle's unknown; −1: fixed
   int count = 0;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor;
 
-  Preconditioner(const ShellElements& elements, const std::vector<ParticleHold>& holds) {
+  Preconditioner(const PrismElements& elements, const std::vector<ParticleHold>& holds) {
     for (const ParticleHold hold : holds)
       unknown.push_back(hold == ParticleHold::Fixed ? -1 : count++);
     std::vector<Eigen::Triplet<double>> triplets;
     double trace = 0;
     for (std::size_t e = 0; e < elements.size(); ++e)
-      elements.forEachEntry(e, [&](const ShellElements::Entry& a) {
+      elements.forEachEntry(e, [&](const PrismElements::Entry& a) {
         const int row = unknown[a.particle];
         if (row < 0) return;
-        elements.forEachEntry(e, [&](const ShellElements::Entry& b) {
+        elements.forEachEntry(e, [&](const PrismElements::Entry& b) {
           const int column = unknown[b.particle];
           const double value = kStiffness * elements.weight(e) * a.slope.dot(b.slope);
           if (column >= 0 && column <= row) triplets.emplace_back(row, column, value);
           if (column == row) trace += value;
         });
       });
-    // Nothing may be fixed.
+    // The shift keeps the matrix regular when no particle is fixed.
     constexpr double kShift = 1e-6;
     for (int n = 0; n < count; ++n) triplets.emplace_back(n, n, kShift * trace / count);
     Eigen::SparseMatrix<double> matrix(count, count);
@@ -71,8 +72,8 @@ struct ShellSolver::Preconditioner {
   }
 };
 
-/// Steps and what they changed in the gradient.
-struct ShellSolver::Memory {
+/// L-BFGS memory: recent steps and the changes of the gradient over them.
+struct PrismSolver::Memory {
   struct Pair {
     Vectors step, change;
     double product;
@@ -88,7 +89,7 @@ struct ShellSolver::Memory {
     pairs.push_back({std::move(step), std::move(change), product});
   }
 
-  /// The inverse of the second derivatives, as far as it is known, times `vectors`.
+  /// Applies the approximate inverse Hessian to `vectors`.
   template <typename Start>
   Vectors apply(Vectors vectors, const Start& start) const {
     std::vector<double> alpha(pairs.size());
@@ -111,7 +112,7 @@ struct ShellSolver::Memory {
   }
 };
 
-ShellSolver::ShellSolver(const levelset::NarrowBand& base, const ShellElements& elements,
+PrismSolver::PrismSolver(const levelset::NarrowBand& base, const PrismElements& elements,
                          std::vector<ParticleHold> holds, std::vector<V3d> positions)
     : base_(base),
       elements_(elements),
@@ -119,11 +120,11 @@ ShellSolver::ShellSolver(const levelset::NarrowBand& base, const ShellElements& 
       positions_(std::move(positions)),
       normals_(positions_.size(), V3d(0)),
       preconditioner_(std::make_unique<Preconditioner>(elements, holds_)) {
-  // An element's slopes are differences over its edges at rest; the mean one tells the spacing.
+  // An element's slopes are differences along its edges at rest, so their mean is 1 / spacing.
   double steepness = 0;
   for (std::size_t e = 0; e < elements_.size(); ++e) {
     double steepest = 0;
-    elements_.forEachEntry(e, [&](const ShellElements::Entry& entry) {
+    elements_.forEachEntry(e, [&](const PrismElements::Entry& entry) {
       for (int axis = 0; axis < 3; ++axis)
         steepest = std::max(steepest, std::abs(entry.slope[axis]));
     });
@@ -133,10 +134,10 @@ ShellSolver::ShellSolver(const levelset::NarrowBand& base, const ShellElements& 
   updateNormals();
 }
 
-ShellSolver::~ShellSolver() = default;
+PrismSolver::~PrismSolver() = default;
 
-double ShellSolver::energyAt(const Density& density, const Vectors& positions,
-                             std::vector<ShellSlopes>* stress) const {
+double PrismSolver::energyAt(const Density& density, const Vectors& positions,
+                             std::vector<ElementSlopes>* stress) const {
   std::vector<double> values(elements_.size());
   if (stress) stress->resize(elements_.size());
   tbb::parallel_for(std::size_t{0}, elements_.size(), [&](std::size_t e) {
@@ -149,18 +150,18 @@ double ShellSolver::energyAt(const Density& density, const Vectors& positions,
   return std::isfinite(sum) ? sum : std::numeric_limits<double>::infinity();
 }
 
-double ShellSolver::energy(const Density& density) const {
+double PrismSolver::energy(const Density& density) const {
   return energyAt(density, positions_, nullptr);
 }
 
-double ShellSolver::leastDeterminant() const {
+double PrismSolver::leastDeterminant() const {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t e = 0; e < elements_.size(); ++e)
     least = std::min(least, determinantOf(elements_.slopes(e, positions_)));
   return least;
 }
 
-void ShellSolver::updateNormals() {
+void PrismSolver::updateNormals() {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, holds_.size(), 256), [&](const auto& range) {
     const SurfaceField field(base_);
     for (std::size_t n = range.begin(); n != range.end(); ++n)
@@ -168,20 +169,20 @@ void ShellSolver::updateNormals() {
   });
 }
 
-void ShellSolver::makeTangent(Vectors& vectors) const {
+void PrismSolver::makeTangent(Vectors& vectors) const {
   for (std::size_t n = 0; n < vectors.size(); ++n) {
     if (holds_[n] == ParticleHold::Fixed) vectors[n] = V3d(0);
     if (holds_[n] == ParticleHold::Slides) vectors[n] -= normals_[n] * normals_[n].dot(vectors[n]);
   }
 }
 
-ShellSolver::Vectors ShellSolver::gradientOf(const std::vector<ShellSlopes>& stress) const {
+PrismSolver::Vectors PrismSolver::gradientOf(const std::vector<ElementSlopes>& stress) const {
   Vectors gradient = elements_.gather(stress);
   makeTangent(gradient);
   return gradient;
 }
 
-ShellSolver::Vectors ShellSolver::preconditioned(Vectors vectors) const {
+PrismSolver::Vectors PrismSolver::preconditioned(Vectors vectors) const {
   makeTangent(vectors);
   Eigen::MatrixXd right(preconditioner_->count, 3);
   const std::vector<int>& unknown = preconditioner_->unknown;
@@ -195,7 +196,7 @@ ShellSolver::Vectors ShellSolver::preconditioned(Vectors vectors) const {
   return vectors;
 }
 
-bool ShellSolver::moved(const Vectors& direction, double step, Vectors& result) const {
+bool PrismSolver::moved(const Vectors& direction, double step, Vectors& result) const {
   result.resize(positions_.size());
   std::atomic<bool> isOn = true;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, holds_.size(), 256), [&](const auto& range) {
@@ -208,10 +209,10 @@ bool ShellSolver::moved(const Vectors& direction, double step, Vectors& result) 
   return isOn;
 }
 
-std::size_t ShellSolver::minimise(const Density& density, std::size_t mostIterations) {
+std::size_t PrismSolver::minimise(const Density& density, std::size_t mostIterations) {
   if (preconditioner_->count == 0) return 0;
   Memory memory;
-  std::vector<ShellSlopes> stress;
+  std::vector<ElementSlopes> stress;
   double energy = energyAt(density, positions_, &stress);
   Vectors gradient = gradientOf(stress), next;
   const auto start = [&](Vectors vectors) { return preconditioned(std::move(vectors)); };
@@ -241,15 +242,15 @@ std::size_t ShellSolver::minimise(const Density& density, std::size_t mostIterat
       memory.pairs.clear();
       continue;
     }
-    Vectors way = next, change = gradient;
-    addScaled(way, positions_, -1);
+    Vectors offset = next, change = gradient;
+    addScaled(offset, positions_, -1);
     positions_.swap(next);
     updateNormals();
     gradient = gradientOf(stress);
     for (std::size_t n = 0; n < change.size(); ++n) change[n] = gradient[n] - change[n];
-    makeTangent(way);
+    makeTangent(offset);
     makeTangent(change);
-    memory.add(std::move(way), std::move(change));
+    memory.add(std::move(offset), std::move(change));
     still = energy - reached < kNoGain * energy ? still + 1 : 0;
     energy = reached;
     ++iterations;

@@ -1,4 +1,4 @@
-#include "mapping/untangle/shell_energy.h"
+#include "mapping/untangle/prism_elements.h"
 
 #include <tbb/parallel_for.h>
 
@@ -6,34 +6,34 @@
 #include <cmath>
 #include <limits>
 
-#include "mapping/untangle/shell_cells.h"
+#include "mapping/untangle/prism_cells.h"
 
 namespace mapping {
 namespace {
 
 using Imath::V3d;
 
-/// Derivatives of the determinant by the columns.
-ShellSlopes cofactors(const ShellSlopes& f) {
+/// Derivatives of the determinant with respect to the columns.
+ElementSlopes cofactors(const ElementSlopes& f) {
   return {f[1].cross(f[2]), f[2].cross(f[0]), f[0].cross(f[1])};
 }
 
-double squaredNorm(const ShellSlopes& f) {
+double squaredNorm(const ElementSlopes& f) {
   return f[0].length2() + f[1].length2() + f[2].length2();
 }
 
-// Paths from a cell's first corner to its last, one axis after the other, as in Lattice.
+// Paths from the first corner of a cell to its last, one axis after the other, as in Lattice.
 constexpr std::array<std::array<std::size_t, 3>, 6> kPaths = {
     {{0, 1, 2}, {0, 2, 1}, {2, 0, 1}, {1, 0, 2}, {1, 2, 0}, {2, 1, 0}}};
 
 }  // namespace
 
-double determinantOf(const ShellSlopes& f) {
+double determinantOf(const ElementSlopes& f) {
   return f[0].dot(f[1].cross(f[2]));
 }
 
-ElementEnergy symmetricDirichlet(const ShellSlopes& f) {
-  const ShellSlopes c = cofactors(f);
+ElementEnergy symmetricDirichlet(const ElementSlopes& f) {
+  const ElementSlopes c = cofactors(f);
   const double det = f[0].dot(c[0]);
   ElementEnergy result;
   if (!(det > 0)) {
@@ -51,10 +51,10 @@ ElementEnergy symmetricDirichlet(const ShellSlopes& f) {
   return result;
 }
 
-ElementEnergy foldoverEnergy(const ShellSlopes& f, double epsilon) {
-  const ShellSlopes c = cofactors(f);
+ElementEnergy foldoverEnergy(const ElementSlopes& f, double epsilon) {
+  const ElementSlopes c = cofactors(f);
   const double det = f[0].dot(c[0]), root = std::hypot(epsilon, det);
-  // For negative determinants the sum would cancel.
+  // For negative determinants the sum would suffer cancellation.
   const double chi = det >= 0 ? 0.5 * (det + root) : 0.5 * epsilon * epsilon / (root - det);
   ElementEnergy result;
   if (!(chi > 0)) {
@@ -70,16 +70,16 @@ ElementEnergy foldoverEnergy(const ShellSlopes& f, double epsilon) {
   return result;
 }
 
-ShellElements::ShellElements(const Patch& patch, const V3d& rest, double sink) {
+PrismElements::PrismElements(const Patch& patch, const V3d& rest, double embedDepth) {
   for (const ParticleLayer& layer : patch.layers) particles_ += layer.positions.size();
-  const ShellCells cells(patch, sink);
+  const PrismCells cells(patch, embedDepth);
   double volume = 0;
   for (std::size_t n = 0; n < cells.size(); ++n) {
-    const ShellCell cell = cells.at(n);
+    const PrismCell cell = cells.at(n);
     V3d sides = cell.box.size() * rest;
     const double size = sides.x * sides.y * sides.z;
     volume += size;
-    // What is mirrored on purpose is turned back.
+    // A patch that is mirrored on purpose is mirrored back.
     if (patch.mirrored) sides.x = -sides.x;
     for (std::size_t corner = 0; corner < 8; ++corner)
       addElement(
@@ -100,7 +100,7 @@ ShellElements::ShellElements(const Patch& patch, const V3d& rest, double sink) {
   addTransposed();
 }
 
-void ShellElements::addElement(const Corners& corners,
+void PrismElements::addElement(const Corners& corners,
                                const std::array<std::array<std::size_t, 2>, 3>& edges,
                                const V3d& sides, double weight) {
   const std::size_t first = entries_.size();
@@ -124,7 +124,7 @@ void ShellElements::addElement(const Corners& corners,
   weights_.push_back(weight);
 }
 
-void ShellElements::addTransposed() {
+void PrismElements::addTransposed() {
   firstUse_.assign(particles_ + 1, 0);
   for (const Entry& entry : entries_) ++firstUse_[entry.particle + 1];
   for (std::size_t n = 0; n < particles_; ++n) firstUse_[n + 1] += firstUse_[n];
@@ -136,8 +136,8 @@ void ShellElements::addTransposed() {
                                              static_cast<std::uint32_t>(n)};
 }
 
-ShellSlopes ShellElements::slopes(std::size_t element, const std::vector<V3d>& positions) const {
-  ShellSlopes result = {V3d(0), V3d(0), V3d(0)};
+ElementSlopes PrismElements::slopes(std::size_t element, const std::vector<V3d>& positions) const {
+  ElementSlopes result = {V3d(0), V3d(0), V3d(0)};
   forEachEntry(element, [&](const Entry& entry) {
     const V3d& p = positions[entry.particle];
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -146,7 +146,7 @@ ShellSlopes ShellElements::slopes(std::size_t element, const std::vector<V3d>& p
   return result;
 }
 
-std::vector<V3d> ShellElements::gather(const std::vector<ShellSlopes>& stress) const {
+std::vector<V3d> PrismElements::gather(const std::vector<ElementSlopes>& stress) const {
   std::vector<V3d> result(particles_);
   tbb::parallel_for(std::size_t{0}, particles_, [&](std::size_t n) {
     V3d sum(0);
@@ -162,8 +162,8 @@ std::vector<V3d> ShellElements::gather(const std::vector<ShellSlopes>& stress) c
   return result;
 }
 
-double ShellElements::estimateBytes(const Patch& patch) {
-  // Fourteen elements of four particles or more, twice, and a factorised matrix.
+double PrismElements::estimateBytes(const Patch& patch) {
+  // 14 elements of at least four particles each, stored twice, and a factorised matrix.
   constexpr double kBytesPerParticle = 8000;
   return kBytesPerParticle * static_cast<double>(patch.particleCount());
 }

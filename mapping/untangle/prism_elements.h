@@ -1,0 +1,81 @@
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "mapping/patches/patch.h"
+
+namespace mapping {
+
+/// Slopes of the map texture → patch as columns: ∂x/∂u, ∂x/∂v, ∂x/∂w in units of the rest shape.
+using ElementSlopes = std::array<Imath::V3d, 3>;
+
+/// Energy density of one element per unit of rest volume, and its derivative with respect to the
+/// slopes.
+struct ElementEnergy {
+  double value = 0;  ///< infinite for slopes that the energy forbids
+  ElementSlopes stress{Imath::V3d(0), Imath::V3d(0), Imath::V3d(0)};
+};
+
+/// Returns |F|² + |F⁻¹|², the symmetric Dirichlet energy: 6 for a rotation, infinite where F is
+/// inverted [Smith15].
+[[nodiscard]] ElementEnergy symmetricDirichlet(const ElementSlopes& slopes);
+
+/// Returns |F|² / χ^⅔ + (1 + det²) / χ, where χ = (det + √(ε² + det²)) / 2 replaces det. The energy
+/// is finite for every F, and forbids folds in the limit ε → 0 [Garanzha21].
+[[nodiscard]] ElementEnergy foldoverEnergy(const ElementSlopes& slopes, double epsilon);
+
+[[nodiscard]] double determinantOf(const ElementSlopes& slopes);
+
+/// The prism cells of a patch split into elements whose slopes are linear in the particle
+/// positions. Each cell has 14 elements: its eight corners, where a trilinear map inverts first,
+/// and its six tetrahedra.
+class PrismElements {
+ public:
+  /// @param rest  size of the unit cube at rest, world units
+  /// @param embedDepth  in w, see PrismCells
+  PrismElements(const Patch& patch, const Imath::V3d& rest, double embedDepth);
+
+  [[nodiscard]] std::size_t size() const { return weights_.size(); }
+  [[nodiscard]] std::size_t particleCount() const { return particles_; }
+  /// Share of an element in the total rest volume.
+  [[nodiscard]] double weight(std::size_t element) const { return weights_[element]; }
+  [[nodiscard]] ElementSlopes slopes(std::size_t element,
+                                     const std::vector<Imath::V3d>& positions) const;
+  /// Collects the derivatives with respect to particle positions from those with respect to element
+  /// slopes.
+  [[nodiscard]] std::vector<Imath::V3d> gather(const std::vector<ElementSlopes>& stress) const;
+
+  /// Contribution of one particle to an element: slopes += position × slope, column by column.
+  struct Entry {
+    std::uint32_t particle;
+    Imath::V3d slope;
+  };
+  /// Calls visit(entry) for each particle of an element.
+  template <typename Visit>
+  void forEachEntry(std::size_t element, const Visit& visit) const {
+    for (std::size_t n = first_[element]; n < first_[element + 1]; ++n) visit(entries_[n]);
+  }
+  /// Memory for the elements and for minimising over them, bytes.
+  [[nodiscard]] static double estimateBytes(const Patch& patch);
+
+ private:
+  using Corners = std::array<struct ParticleSum, 8>;
+  void addElement(const Corners& corners, const std::array<std::array<std::size_t, 2>, 3>& edges,
+                  const Imath::V3d& sides, double weight);
+  void addTransposed();
+
+  std::size_t particles_ = 0;
+  std::vector<std::size_t> first_ = {0};
+  std::vector<Entry> entries_;
+  std::vector<double> weights_;
+  std::vector<std::size_t> firstUse_;
+  /// Element and entry of each use, particle by particle.
+  std::vector<std::array<std::uint32_t, 2>> uses_;
+};
+
+}  // namespace mapping

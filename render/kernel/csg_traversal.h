@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "render/scene/csg_expression.h"
+
+namespace render {
+
+/// Follows rays through solids, from one surface of the result of a CSG expression to the next.
+/// Without an expression, each surface of each solid counts.
+///
+/// The caller computes the intersections. The traversal requests the first crossing of a ray with
+/// each solid, and later crossings when it needs them. Surfaces at equal distance are crossed
+/// together; the hit is attributed to the solid with the lowest number.
+class CsgTraversal {
+ public:
+  /// Requested crossing of a ray with a solid: the one after `passing` earlier crossings.
+  struct Query {
+    std::size_t ray;
+    std::int32_t passing;
+  };
+
+  /// @param solids  number of solids of the expression
+  /// @param maxDistances  largest distance along each ray; crossings beyond it do not count
+  CsgTraversal(const CsgExpression& csg, std::size_t solids, std::vector<double> maxDistances);
+
+  /// Open queries about a solid. All of them must be answered before the next advance().
+  [[nodiscard]] std::vector<Query> queriesFor(std::size_t solid) const;
+  void answer(std::size_t solid, const Query& query, double place, bool enters);
+  void answerNone(std::size_t solid, const Query& query);
+  /// Advances all rays as far as the answers allow.
+  /// @return true when there are open queries
+  bool advance();
+
+  /// Lets a ray continue from its present hit to the next one.
+  void resume(std::size_t ray) { met_[ray] = -1; }
+
+  /// Number of the solid that the ray hits, or −1.
+  [[nodiscard]] std::int32_t solidMet(std::size_t ray) const { return met_[ray]; }
+  /// True when the outside of that solid is inside the result of the expression.
+  [[nodiscard]] bool isFlipped(std::size_t ray) const { return flipped_[ray] != 0; }
+
+ private:
+  bool advance(std::size_t ray);
+  void cross(std::size_t ray, double place);
+
+  const CsgExpression& csg_;
+  std::size_t solids_;
+  std::vector<double> maxDistances_;
+  // Indexed by ray and solid.
+  std::vector<double> place_;  // distance of the next crossing
+  std::vector<std::int32_t> passed_;
+  std::vector<char> inside_, asked_;
+  // Indexed by ray.
+  std::vector<std::int32_t> met_;
+  std::vector<char> flipped_;
+};
+
+}  // namespace render
