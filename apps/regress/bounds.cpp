@@ -11,7 +11,7 @@ double Bound::limit() const {
     case Kind::Measured:
       return std::min(kMargin * stated, ceiling);
     case Kind::Order:
-      return stated - kOrderMargin;
+      return std::max(stated - kOrderMargin, least);
     case Kind::Rounding:
       return stated * static_cast<double>(std::numeric_limits<float>::epsilon());
     case Kind::Required:
@@ -49,7 +49,7 @@ Bounds& Bounds::ceiling(double limit, int resolution) {
 }
 
 Bounds& Bounds::order(const std::string& variant, const std::string& figure,
-                      std::initializer_list<MeasuredAt> figures) {
+                      std::initializer_list<MeasuredAt> figures, double least) {
   for (const MeasuredAt& at : figures)
     all_.push_back({.variant = variant,
                     .figure = figure,
@@ -57,7 +57,8 @@ Bounds& Bounds::order(const std::string& variant, const std::string& figure,
                     .stated = at.figure,
                     .resolution = at.resolution,
                     .sense = Sense::AtLeast,
-                    .budget = at.budget});
+                    .budget = at.budget,
+                    .least = least});
   return *this;
 }
 

@@ -18,10 +18,11 @@ enum class Sense { AtMost, AtLeast };
 /// A limit on one of our figures in the worst placement.
 struct Bound {
   enum class Kind {
-    Measured,    ///< `stated`: the magnitude measured; limit: kMargin times that, or `ceiling`
-    Order,       ///< `stated`: the order of convergence measured; limit: kOrderMargin below that
-    Rounding,    ///< `stated`: a multiple of the machine epsilon of float, which is the limit
-    Required,    ///< `stated`: the limit itself, which follows from a requirement
+    Measured,  ///< `stated`: the magnitude measured; limit: kMargin times that, or `ceiling`
+    Order,     ///< `stated`: the order of convergence measured; limit: kOrderMargin below that, or
+               ///< `least`
+    Rounding,  ///< `stated`: a multiple of the machine epsilon of float, which is the limit
+    Required,  ///< `stated`: the limit itself, which follows from a requirement
     Unmeasured,  ///< `stated`: the limit itself, of a run too long to measure; never stale
   };
   /// Limit over measured figure.
@@ -42,6 +43,7 @@ struct Bound {
   Sense sense = Sense::AtMost;        ///< of Required; follows from the kind for the others
   std::optional<Budget> budget = {};  ///< the budget that the bound is for; empty: both
   double ceiling = std::numeric_limits<double>::infinity();  ///< largest limit of Measured
+  double least = -std::numeric_limits<double>::infinity();   ///< smallest limit of Order
 
   [[nodiscard]] double limit() const;
   [[nodiscard]] bool isMet(double found) const;
@@ -72,8 +74,10 @@ class Bounds {
   /// @param resolution  0: every one
   Bounds& ceiling(double limit, int resolution = 0);
   /// Orders of convergence at least Bound::kOrderMargin below the measured ones.
+  /// @param least  promised order; the limits are not below it
   Bounds& order(const std::string& variant, const std::string& figure,
-                std::initializer_list<MeasuredAt> figures);
+                std::initializer_list<MeasuredAt> figures,
+                double least = -std::numeric_limits<double>::infinity());
   /// A magnitude at rounding level: at most `multiple` times the machine epsilon of float.
   /// @param resolution  0: every one
   Bounds& rounding(const std::string& variant, const std::string& figure, double multiple,

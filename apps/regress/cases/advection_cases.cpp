@@ -208,42 +208,63 @@ Bounds enrightBounds() {
 
 Bounds vortexBounds() {
   return Bounds()
-      .measured("sphere, front", "volume_error", {{16, 0.0267}, {20, 0.0168}, {32, 0.00608}})
-      .measured("sphere, front", "value_error", {{16, 0.026}, {20, 0.0164}, {32, 0.00593}})
-      .measured("sphere, front", "surface_linf_vx", {{16, 0.0984}, {20, 0.0507}, {32, 0.0337}})
-      .measured("sphere, front", "missed_hits", {{16, 0.02}, {20, 0.00661}, {32, 0.00135}})
+      .measured("sphere, front", "volume_error",
+                {{16, 0.0267}, {20, 0.0168}, {32, 0.00619}, {64, 0.00166}, {128, 0.000559}})
+      .measured("sphere, front", "value_error",
+                {{16, 0.026}, {20, 0.0164}, {32, 0.00643}, {64, 0.00235}, {128, 0.00106}})
+      .measured("sphere, front", "surface_linf_vx",
+                {{16, 0.0984}, {20, 0.0507}, {32, 0.057}, {64, 0.0297}, {128, 0.0304}})
+      .measured("sphere, front", "missed_hits",
+                {{16, 0.02},
+                 {20, 0.00661},
+                 {32, 0.00135, Budget::Quick},
+                 {32, 0.00337, Budget::Full},
+                 {64, 0.0012},
+                 {128, 0.000585}})
       .ceiling(0.025);
 }
 
 Bounds zalesakBounds() {
   return Bounds()
-      .measured("slotted sphere, front", "surface_linf_vx", {{24, 0.545}, {32, 0.355}, {50, 0.542}})
-      .measured("slotted sphere, front", "missed_hits", {{24, 0.162}, {32, 0.0691}, {50, 0.0462}})
+      .measured("slotted sphere, front", "surface_linf_vx",
+                {{24, 0.545}, {32, 0.355}, {50, 0.6}, {100, 0.336}, {200, 0.312}})
+      .measured("slotted sphere, front", "missed_hits",
+                {{24, 0.162}, {32, 0.0691}, {50, 0.0532}, {100, 0.0177}, {200, 0.0076}})
       .ceiling(0.1666)
-      .measured("slotted sphere, front", "volume_error", {{24, 0.138}, {32, 0.017}, {50, 0.018}});
+      .measured("slotted sphere, front", "volume_error",
+                {{24, 0.138}, {32, 0.017}, {50, 0.018}, {100, 0.00337}, {200, 0.00154}});
 }
 
 Bounds rigidRotationBounds() {
   return Bounds()
-      .measured("cube, front", "surface_l1_vx", {{8, 0.0785}, {12, 0.0463}, {16, 0.0379}})
+      .measured("cube, front", "surface_l1_vx",
+                {{8, 0.0785}, {12, 0.0463}, {16, 0.0522}, {32, 0.0279}, {64, 0.0146}})
       .ceiling(0.1)
-      .measured("torus, front", "surface_l1_vx", {{8, 0.0738}, {12, 0.0202}, {16, 0.0158}})
+      .measured("torus, front", "surface_l1_vx",
+                {{8, 0.0738}, {12, 0.0202}, {16, 0.0167}, {32, 0.00838}, {64, 0.00403}})
       .ceiling(0.1)
       .measured("plate of two voxels, front", "surface_l1_vx",
-                {{8, 0.117}, {12, 0.0815}, {16, 0.0819}})
+                {{8, 0.117}, {12, 0.0815}, {16, 0.0984}, {32, 0.0961}, {64, 0.1}})
       .ceiling(0.15)
-      .measured("torus, front", "surface_linf_vx", {{8, 0.192}, {12, 0.0824}, {16, 0.0571}})
+      .measured("torus, front", "surface_linf_vx",
+                {{8, 0.192}, {12, 0.0824}, {16, 0.0668}, {32, 0.0376}, {64, 0.0185}})
       .ceiling(0.2)
-      .measured("cube, front", "missed_hits", {{8, 0.132}, {12, 0.066}, {16, 0.0498}})
-      .ceiling(0.15)
-      .measured("torus, front", "missed_hits", {{8, 0.0941}, {12, 0.0217}, {16, 0.00803}})
+      .measured("cube, front", "missed_hits",
+                {{8, 0.132}, {12, 0.066}, {16, 0.0777}, {32, 0.0328}, {64, 0.0154}})
+      .ceiling(0.15, 8)
+      .ceiling(0.075, 16)
+      .ceiling(0.0375, 32)
+      .measured("torus, front", "missed_hits",
+                {{8, 0.0941}, {12, 0.0217}, {16, 0.00904}, {32, 0.00188}, {64, 0.000433}})
       .ceiling(0.1, 8)
       .ceiling(0.025, 12)
       .measured("plate of two voxels, front", "missed_hits",
-                {{8, 0.216}, {12, 0.122}, {16, 0.0835}})
+                {{8, 0.216}, {12, 0.122}, {16, 0.0923}, {32, 0.0669}, {64, 0.0289}})
       .ceiling(0.225, 8)
       .ceiling(0.15, 12)
-      .ceiling(0.1125, 16);
+      .ceiling(0.1125, 16)
+      .ceiling(0.0562, 32)
+      .ceiling(0.0281, 64);
 }
 
 }  // namespace

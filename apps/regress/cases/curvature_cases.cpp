@@ -268,7 +268,9 @@ Bounds curvatureSphereBounds() {
 }
 
 Bounds curvatureCylinderBounds() {
-  return Bounds().measured("cylinder", "value_error", {{8, 0.0121}, {10, 0.00229}, {16, 0.000805}});
+  return Bounds().measured(
+      "cylinder", "value_error",
+      {{8, 0.0121}, {10, 0.00229}, {16, 0.000842}, {32, 0.000138}, {64, 0.0001}});
 }
 
 }  // namespace

@@ -259,29 +259,31 @@ Bounds eikonalMediaBounds() {
 
 Bounds eikonalSurfaceBounds() {
   return Bounds()
-      .measured("sphere, marching, order 2", "band_out_linf_vx",
-                {{8, 0.0387}, {12, 0.0245}, {24, 0.00937}})
+      .measured(
+          "sphere, marching, order 2", "band_out_linf_vx",
+          {{8, 0.0387}, {12, 0.0245}, {16, 0.0168}, {24, 0.00937}, {32, 0.00596}, {64, 0.00182}})
       .ceiling(0.05)
-      .measured("sphere, sweeping, order 2", "band_out_linf_vx",
-                {{8, 0.0387}, {12, 0.0245}, {24, 0.00937}})
+      .measured(
+          "sphere, sweeping, order 2", "band_out_linf_vx",
+          {{8, 0.0387}, {12, 0.0245}, {16, 0.0187}, {24, 0.00937}, {32, 0.00834}, {64, 0.00554}})
       .ceiling(0.05)
       .measured("two spheres, sweeping, order 2", "band_out_linf_vx",
-                {{8, 0.115}, {12, 0.0818}, {24, 0.0721}})
+                {{8, 0.115}, {12, 0.0818}, {16, 0.0798}, {24, 0.0721}, {32, 0.0824}, {64, 0.0733}})
       .ceiling(0.15)
       .measured("two spheres, marching, order 2", "band_out_linf_vx",
-                {{8, 0.111}, {12, 0.0792}, {24, 0.0721}})
+                {{8, 0.111}, {12, 0.0792}, {16, 0.0769}, {24, 0.0721}, {32, 0.0629}, {64, 0.053}})
       .ceiling(0.15)
       .measured("sphere, marching, order 2", "band_in_linf_vx",
-                {{8, 0.389}, {12, 0.218}, {24, 0.0194}})
+                {{8, 0.389}, {12, 0.218}, {16, 0.0706}, {24, 0.0194}, {32, 0.00909}, {64, 0.00179}})
       .ceiling(0.5)
       .measured("sphere, sweeping, order 2", "band_in_linf_vx",
-                {{8, 0.389}, {12, 0.218}, {24, 0.0194}})
+                {{8, 0.389}, {12, 0.218}, {16, 0.0706}, {24, 0.0194}, {32, 0.00909}, {64, 0.00179}})
       .ceiling(0.5)
       .measured("two spheres, marching, order 2", "band_in_linf_vx",
-                {{8, 0.379}, {12, 0.293}, {24, 0.104}})
+                {{8, 0.379}, {12, 0.293}, {16, 0.402}, {24, 0.104}, {32, 0.0377}, {64, 0.00582}})
       .ceiling(0.5)
       .measured("two spheres, sweeping, order 2", "band_in_linf_vx",
-                {{8, 0.379}, {12, 0.293}, {24, 0.104}})
+                {{8, 0.379}, {12, 0.293}, {16, 0.402}, {24, 0.104}, {32, 0.0377}, {64, 0.00582}})
       .ceiling(0.5);
 }
 

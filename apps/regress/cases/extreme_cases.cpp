@@ -232,46 +232,53 @@ Bounds halfWidthsBounds() {
 Bounds contactBounds() {
   return Bounds()
       .measured("torus closes its hole", "surface_l1_vx",
-                {{12, 0.00254}, {16, 0.00126}, {24, 0.000508}})
+                {{12, 0.00254}, {16, 0.00132}, {24, 0.000508}, {32, 0.000268}, {64, 5.52e-5}})
       .rounding("union of balls that touch", "band_out_linf_vx", 1.5)
       .rounding("union of balls that touch", "band_in_linf_vx", 1.5)
       .rounding("union of balls 0.3 voxels apart", "band_out_linf_vx", 1.5)
       .rounding("union of balls 0.3 voxels apart", "band_in_linf_vx", 1.5)
       .measured("boxes that share a face, united", "band_in_linf_vx",
-                {{12, 0.739}, {16, 0.505}, {24, 0.505}})
+                {{12, 0.739}, {16, 0.739}, {24, 0.505}, {32, 0.739}, {64, 0.739}})
       .ceiling(0.75)
       .measured("boxes that share a face, united", "band_out_linf_vx",
-                {{12, 0.545}, {16, 0.505}, {24, 0.505}})
+                {{12, 0.545}, {16, 0.545}, {24, 0.505}, {32, 0.545}, {64, 0.545}})
       .ceiling(0.75)
       .measured("boxes that share a face, united", "surface_linf_vx",
-                {{12, 0.51}, {16, 0.502}, {24, 0.492}})
+                {{12, 0.51}, {16, 0.602}, {24, 0.492}, {32, 0.591}, {64, 0.566}})
       .ceiling(0.75)
       .measured("boxes that share a face, united", "surface_l1_vx",
-                {{12, 0.0285}, {16, 0.0249}, {24, 0.0172}})
+                {{12, 0.0285}, {16, 0.0243}, {24, 0.0172}, {32, 0.0135}, {64, 0.00729}})
       .ceiling(0.03)
       .measured("box cut by one with three faces in common", "band_in_linf_vx",
-                {{12, 0.111}, {16, 0.111}, {24, 0.111}})
+                {{12, 0.111}, {16, 0.141}, {24, 0.111}, {32, 0.141}, {64, 0.141}})
       .measured("box cut by one with three faces in common", "band_out_linf_vx",
-                {{12, 0.488}, {16, 0.397}, {24, 0.397}})
+                {{12, 0.488}, {16, 0.442}, {24, 0.397}, {32, 0.442}, {64, 0.442}})
       .measured("box cut by one with three faces in common", "surface_linf_vx",
-                {{12, 0.319}, {16, 0.292}, {24, 0.239}})
+                {{12, 0.319}, {16, 0.315}, {24, 0.239}, {32, 0.305}, {64, 0.299}})
       .measured("box cut by one with three faces in common", "surface_l1_vx",
-                {{12, 0.0298}, {16, 0.0216}, {24, 0.0137}})
+                {{12, 0.0298}, {16, 0.021}, {24, 0.0137}, {32, 0.0122}, {64, 0.00685}})
       .ceiling(0.03)
       .measured("boxes that share a face, united", "missed_hits",
-                {{12, 0.0482}, {16, 0.0294}, {24, 0.0242}})
+                {{12, 0.0482}, {16, 0.031}, {24, 0.0242}, {32, 0.0158}, {64, 0.00666}})
       .measured("box cut by one with three faces in common", "missed_hits",
-                {{12, 0.0462}, {16, 0.0498}, {24, 0.0235}})
-      .measured("torus closes its hole", "missed_hits", {{12, 0.000757}, {24, 0.00062}})
+                {{12, 0.0462}, {16, 0.0364}, {24, 0.0235}, {32, 0.0181}, {64, 0.0113}})
+      .measured("torus closes its hole", "missed_hits",
+                {{12, 0.000757}, {16, 0.000172, Budget::Full}, {24, 0.00062}})
       .measured("boxes that share a face, united", "volume_error",
-                {{12, 0.0386}, {16, 0.0117}, {24, 0.00614}})
+                {{12, 0.0386}, {16, 0.0221}, {24, 0.00614}, {32, 0.0057}, {64, 0.00177}})
       .measured("box cut by one with three faces in common", "volume_error",
-                {{12, 0.0633}, {16, 0.0126}, {24, 0.00617}});
+                {{12, 0.0633},
+                 {16, 0.0126, Budget::Quick},
+                 {16, 0.0365, Budget::Full},
+                 {24, 0.00617},
+                 {32, 0.00944},
+                 {64, 0.0024}});
 }
 
 Bounds tenMillionBounds() {
   return Bounds()
-
+      .measured("re-distanced", "band_in_linf_vx", {{365, 3.72e-6}})
+      .measured("grown by 3 voxels", "band_out_linf_vx", {{365, 4.45e-6}})
       .required("re-distanced", "peak_bytes", 4e9, 365)
       .required("re-distanced", "active_voxels", 1e7, 365, Sense::AtLeast)
       .required("grown by 3 voxels", "peak_bytes", 4e9, 365);

@@ -192,19 +192,49 @@ Bounds filletPlanesBounds() {
 
 Bounds filletCylindersBounds() {
   return Bounds()
-      .measured("crossed cylinders", "value_error", {{3, 0.0042}, {4, 0.000835}, {5, 0.000325}})
+      .measured("crossed cylinders", "value_error",
+                {{3, 0.0042},
+                 {4, 0.000835, Budget::Quick},
+                 {4, 0.00177, Budget::Full},
+                 {5, 0.000325},
+                 {8, 0.00015},
+                 {16, 1.66e-5}})
       .zero("crossed cylinders", "checks_failed")
       .zero("crossed cylinders", "cavities");
 }
 
 Bounds filletBallsBounds() {
   return Bounds()
-      .measured("balls", "band_in_linf_vx", {{10, 0.000894}, {14, 0.00049}, {20, 0.000186}})
-      .measured("balls", "band_out_linf_vx", {{10, 0.000844}, {14, 0.000457}, {20, 0.000204}})
-      .measured("balls", "surface_l1_vx", {{10, 0.000629}, {14, 0.00031}, {20, 0.000139}})
-      .measured("balls", "surface_linf_vx", {{10, 0.0142}, {14, 0.00889}, {20, 0.00677}})
+      .measured("balls", "band_in_linf_vx",
+                {{10, 0.000894},
+                 {14, 0.00049},
+                 {16, 0.000436},
+                 {20, 0.000186},
+                 {24, 0.000174},
+                 {32, 0.000119}})
+      .measured("balls", "band_out_linf_vx",
+                {{10, 0.000844},
+                 {14, 0.000457},
+                 {16, 0.00038},
+                 {20, 0.000204},
+                 {24, 0.000157},
+                 {32, 0.000109}})
+      .measured("balls", "surface_l1_vx",
+                {{10, 0.000629},
+                 {14, 0.00031},
+                 {16, 0.000226},
+                 {20, 0.000139},
+                 {24, 0.0001},
+                 {32, 5.85e-5}})
+      .measured(
+          "balls", "surface_linf_vx",
+          {{10, 0.0142}, {14, 0.00889}, {16, 0.0086}, {20, 0.00677}, {24, 0.00548}, {32, 0.00428}})
       .measured("balls", "volume_error", {{10, 9.3e-6}, {14, 1.15e-6}})
-      .rounding("balls", "volume_error", 1, 20);
+      .rounding("balls", "volume_error", 7, 16)
+      .rounding("balls", "volume_error", 1, 20)
+      .rounding("balls", "volume_error", 3, 24)
+      .rounding("balls", "volume_error", 0.5, 32)
+      .measured("balls", "missed_hits", {{16, 0.000267}, {24, 0.000245}});
 }
 
 }  // namespace

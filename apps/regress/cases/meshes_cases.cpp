@@ -121,20 +121,38 @@ Bounds meshRoundTripBounds() {
       .rounding("cube", "band_out_linf_vx", 1.5)
       .rounding("rotated cube", "band_in_linf_vx", 1.5)
       .rounding("rotated cube", "band_out_linf_vx", 1.5)
-      .order("torus and back", "order_surface", {{24, 2.11}})
-      .measured("torus and back", "band_in_linf_vx", {{12, 0.17}, {16, 0.111}, {24, 0.0835}})
+      .order("torus and back", "order_surface", {{24, 2.11}, {64, 1.99}}, 1.8)
+      .measured("torus and back", "band_in_linf_vx",
+                {{12, 0.17}, {16, 0.111}, {24, 0.0835}, {32, 0.066}, {64, 0.0343}, {128, 0.0177}})
       .ceiling(0.25)
-      .measured("torus and back", "band_out_linf_vx", {{12, 0.17}, {16, 0.11}, {24, 0.0825}})
+      .measured("torus and back", "band_out_linf_vx",
+                {{12, 0.17}, {16, 0.11}, {24, 0.0825}, {32, 0.0653}, {64, 0.033}, {128, 0.0174}})
       .ceiling(0.25)
-      .measured("torus and back", "surface_l1_vx", {{12, 0.0265}, {16, 0.0199}, {24, 0.0127}})
-      .measured("torus and back", "missed_hits", {{12, 0.0215}, {16, 0.00669}, {24, 0.00109}})
+      .measured(
+          "torus and back", "surface_l1_vx",
+          {{12, 0.0265}, {16, 0.0199}, {24, 0.0127}, {32, 0.00973}, {64, 0.0049}, {128, 0.00246}})
+      .measured("torus and back", "missed_hits",
+                {{12, 0.0215},
+                 {16, 0.00669},
+                 {24, 0.00109},
+                 {32, 0.00286},
+                 {64, 0.000578},
+                 {128, 0.000346}})
       .ceiling(0.025);
 }
 
 Bounds sharpMeshBounds() {
   return Bounds()
-      .measured("sharp", "value_error", {{16, 0.00627}, {24, 0.00245}, {32, 0.00467}})
-      .measured("sharp", "mesh_linf_vx", {{16, 0.00396}, {24, 0.000823}, {32, 0.00272}});
+      .measured("sharp", "value_error",
+                {{16, 0.00627}, {24, 0.00245}, {32, 0.00467}, {64, 0.0478}, {128, 0.00335}})
+      .ceiling(0.05)
+      .measured("sharp", "mesh_linf_vx",
+                {{16, 0.00396},
+                 {24, 0.000823},
+                 {32, 0.00272, Budget::Quick},
+                 {32, 0.00878, Budget::Full},
+                 {64, 0.0105},
+                 {128, 0.00846}});
 }
 
 }  // namespace

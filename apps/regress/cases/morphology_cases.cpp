@@ -76,30 +76,58 @@ void hollow(Recorder& out) {
 
 Bounds openingClosingBounds() {
   return Bounds()
-      .measured("opening of a box", "band_in_linf_vx", {{12, 0.0297}, {16, 0.00944}, {24, 0.00863}})
-      .measured("opening of a box", "band_out_linf_vx", {{12, 0.032}, {16, 0.015}, {24, 0.00858}})
-      .measured("opening of a box", "surface_l1_vx", {{12, 0.0072}, {16, 0.00297}, {24, 0.00134}})
+      .measured(
+          "opening of a box", "band_in_linf_vx",
+          {{12, 0.0297}, {16, 0.00944}, {24, 0.00863}, {32, 0.0109}, {64, 0.00265}, {128, 0.00143}})
+      .measured(
+          "opening of a box", "band_out_linf_vx",
+          {{12, 0.032}, {16, 0.015}, {24, 0.00858}, {32, 0.00936}, {64, 0.00235}, {128, 0.00138}})
+      .measured("opening of a box", "surface_l1_vx",
+                {{12, 0.0072},
+                 {16, 0.00297},
+                 {24, 0.00134},
+                 {32, 0.00105},
+                 {64, 0.000223},
+                 {128, 0.000142}})
       .measured("closing of a box", "band_in_linf_vx",
-                {{12, 0.000939}, {16, 0.000124}, {24, 0.000313}})
+                {{12, 0.000939},
+                 {16, 0.000124},
+                 {24, 0.000313},
+                 {32, 0.00117},
+                 {64, 0.000514},
+                 {128, 0.0002}})
       .measured("closing of a box", "band_out_linf_vx",
-                {{12, 0.00196}, {16, 0.000124}, {24, 0.000313}})
-      .measured("opening of a box", "missed_hits", {{12, 0.00262}, {16, 0.00218}})
-      .measured("closing of a box", "surface_l1_vx", {{12, 0.0222}, {16, 0.0149}, {24, 0.0104}})
-      .measured("opening of a dumb-bell", "surface_l1_vx",
-                {{12, 0.00865}, {16, 0.00284}, {24, 0.00469}})
-      .measured("closing of a box", "missed_hits", {{12, 0.0602}, {16, 0.039}, {24, 0.0234}})
-      .measured("opening of a dumb-bell", "missed_hits", {{12, 0.00422}, {24, 0.00167}});
+                {{12, 0.00196},
+                 {16, 0.000124},
+                 {24, 0.000313},
+                 {32, 0.0016},
+                 {64, 0.00072},
+                 {128, 0.000226}})
+      .measured("opening of a box", "missed_hits",
+                {{12, 0.00262}, {16, 0.00218}, {32, 0.000205}, {128, 0.000162}})
+      .measured(
+          "closing of a box", "surface_l1_vx",
+          {{12, 0.0222}, {16, 0.0149}, {24, 0.0104}, {32, 0.00877}, {64, 0.00454}, {128, 0.00218}})
+      .measured(
+          "opening of a dumb-bell", "surface_l1_vx",
+          {{12, 0.00865}, {16, 0.00284}, {24, 0.00469}, {32, 0.0116}, {64, 0.0144}, {128, 0.0279}})
+      .measured(
+          "closing of a box", "missed_hits",
+          {{12, 0.0602}, {16, 0.039}, {24, 0.0234}, {32, 0.0176}, {64, 0.0084}, {128, 0.00565}})
+      .measured("opening of a dumb-bell", "missed_hits",
+                {{12, 0.00422}, {24, 0.00167}, {32, 0.00153}, {64, 0.000345}, {128, 0.000987}});
 }
 
 Bounds shellBounds() {
   return Bounds()
-      .measured("wall of a sphere", "surface_l1_vx", {{12, 0.00177}, {16, 0.000165}, {24, 3.06e-5}})
+      .measured("wall of a sphere", "surface_l1_vx",
+                {{12, 0.00177}, {16, 0.000185}, {24, 3.06e-5}, {32, 1.7e-5}, {64, 4.29e-6}})
       .ceiling(0.002)
       .measured("wall of a sphere", "band_in_linf_vx",
-                {{12, 0.00076}, {16, 0.000429}, {24, 0.000195}})
+                {{12, 0.00076}, {16, 0.000429}, {24, 0.000195}, {32, 0.0001}, {64, 2.79e-5}})
       .measured("wall of a sphere", "band_out_linf_vx",
-                {{12, 0.000751}, {16, 0.000428}, {24, 0.000162}})
-      .measured("wall of a sphere", "missed_hits", {{12, 0.000456}});
+                {{12, 0.000751}, {16, 0.000428}, {24, 0.000162}, {32, 0.000103}, {64, 2.77e-5}})
+      .measured("wall of a sphere", "missed_hits", {{12, 0.000456}, {32, 8.09e-5}});
 }
 
 }  // namespace

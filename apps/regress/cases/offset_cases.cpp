@@ -80,12 +80,18 @@ void offsetLaws(Recorder& out) {
 
 Bounds offsetSphereBounds() {
   return Bounds()
-      .measured("+10 voxels", "surface_l1_vx", {{8, 0.000196}, {24, 2.07e-5}, {64, 3.46e-6}})
-      .measured("+10 voxels", "band_in_linf_vx", {{8, 0.00092}, {24, 0.0001}, {64, 1.85e-5}})
-      .measured("+10 voxels", "band_out_linf_vx", {{8, 0.000922}, {24, 9.99e-5}, {64, 1.97e-5}})
-      .measured("-5 voxels", "surface_l1_vx", {{8, 0.00281}, {24, 3.96e-5}, {64, 4.43e-6}})
-      .measured("-5 voxels", "band_in_linf_vx", {{8, 0.00827}, {24, 0.000176}, {64, 2.34e-5}})
-      .measured("-5 voxels", "band_out_linf_vx", {{8, 0.00827}, {24, 0.00015}, {64, 2.36e-5}});
+      .measured("+10 voxels", "surface_l1_vx",
+                {{8, 0.000196}, {24, 2.07e-5}, {32, 1.24e-5}, {64, 3.5e-6}, {128, 1.08e-6}})
+      .measured("+10 voxels", "band_in_linf_vx",
+                {{8, 0.00092}, {24, 0.0001}, {32, 6.26e-5}, {64, 1.87e-5}, {128, 1.01e-5}})
+      .measured("+10 voxels", "band_out_linf_vx",
+                {{8, 0.000922}, {24, 9.99e-5}, {32, 6.26e-5}, {64, 1.97e-5}, {128, 9.55e-6}})
+      .measured("-5 voxels", "surface_l1_vx",
+                {{8, 0.00281}, {24, 3.96e-5}, {32, 2.03e-5}, {64, 4.45e-6}, {128, 1.2e-6}})
+      .measured("-5 voxels", "band_in_linf_vx",
+                {{8, 0.00827}, {24, 0.000176}, {32, 9.93e-5}, {64, 2.5e-5}, {128, 1.12e-5}})
+      .measured("-5 voxels", "band_out_linf_vx",
+                {{8, 0.00827}, {24, 0.00015}, {32, 8.3e-5}, {64, 2.36e-5}, {128, 1.02e-5}});
 }
 
 Bounds offsetCubeBounds() {
