@@ -203,8 +203,10 @@ std::string help(const std::vector<std::string>& words) {
   if (!search.empty()) return helpSearch(search);
   if (name.empty() || name == "help") return helpOverview();
   const std::vector<const Operator*> topics = helpTopics();
-  const auto op = std::find_if(topics.begin(), topics.end(),
-                               [&](const Operator* topic) { return topic->name == name; });
+  const Operator* known = findOperator(name);
+  const auto op = std::find_if(topics.begin(), topics.end(), [&](const Operator* topic) {
+    return topic->name == (known ? known->name : name);
+  });
   if (op == topics.end()) {
     std::vector<std::string> names;
     for (const Operator* each : topics) names.push_back(each->name);

@@ -57,7 +57,7 @@ Value read(Invocation& in) {
   if (fileKind(in) == Kind::Mesh) {
     std::vector<std::string> unsupported;
     levelset::TriMesh mesh = levelset::readMesh(file, {.format = in.text("format"),
-                                                       .attributes = !in.flag("bare"),
+                                                       .attributes = !in.flag("no-attributes"),
                                                        .maxMemory = in.maxMemory,
                                                        .unsupported = &unsupported,
                                                        .progress = in.progress});
@@ -107,7 +107,7 @@ Plan planRead(Invocation& in) {
 
 void validateRead(const Invocation& in) {
   const Kind kind = fileKind(in);
-  if (kind != Kind::Mesh && in.flag("bare"))
+  if (kind != Kind::Mesh && in.flag("no-attributes"))
     throw UsageError(
         fmt::format("read: --bare leaves out what a mesh carries, and this is a {}; leave it out",
                     kindName(kind)));
@@ -192,10 +192,11 @@ void addFileOperators(std::vector<Operator>& all) {
                   .type = ParamType::Text,
                   .doc = "ply, obj, stl, off, vdb, patch, json; default: by extension"},
                  {.name = "grid", .type = ParamType::Text, .doc = "name of the grid in a .vdb"},
-                 {.name = "bare",
+                 {.name = "no-attributes",
                   .type = ParamType::Flag,
                   .doc = "of a mesh: positions and triangles only, no normals, texture coordinates "
-                         "and colours"}},
+                         "and colours",
+                  .formerName = "bare"}},
       .resultKind = readKind,
       .run = read,
       .plan = planRead,

@@ -120,7 +120,12 @@ struct Operator {
 };
 
 [[nodiscard]] const std::vector<Operator>& operators();
+/// Finds an operator by its name, or by its former name; null: there is none.
 [[nodiscard]] const Operator* findOperator(const std::string& name);
+/// Finds a parameter by its name, or by its former name; null: there is none.
+[[nodiscard]] const Param* findParam(const std::vector<Param>& params, const std::string& name);
+/// The sentence that names the new word for a former one.
+[[nodiscard]] std::string renamedSentence(const std::string& former, const std::string& name);
 [[nodiscard]] const std::vector<Param>& globalParams();
 /// `run FILE`, which parseChain() replaces by the actions of the file: for help only.
 [[nodiscard]] const Operator& runOperator();

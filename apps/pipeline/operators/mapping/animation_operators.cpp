@@ -335,15 +335,15 @@ void tellAnimation(Invocation& in, const mapping::AnimationReport& report) {
         worst.least, worst.most));
 }
 
-/// Patches as --unfold and --relax leave them. Warnings are told of their frame, notes of the first
-/// only.
+/// Patches as --untangle and --relax leave them. Warnings are told of their frame, notes of the
+/// first only.
 std::vector<Patch> improvedAt(Invocation& in, const mapping::PatchFrame& frame,
                               const Imath::V3d& textureSize) {
   std::vector<std::string>&notes = in.notes.notes, &warnings = in.notes.warnings;
   const std::size_t firstNote = notes.size(), firstWarning = warnings.size();
   const levelset::Progress progress = std::exchange(in.progress, frame.progress);
   ImprovedPatches improved =
-      improvedPatches(in, frame.base, frame.patches, in.length("sink"), textureSize);
+      improvedPatches(in, frame.base, frame.patches, in.length("embed"), textureSize);
   in.progress = progress;
   for (std::size_t i = firstWarning; i < warnings.size(); ++i) {
     const std::string own = "animate: ";

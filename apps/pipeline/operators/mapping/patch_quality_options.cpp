@@ -87,15 +87,15 @@ void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPat
     patch = std::move(result.patch);
   }
   if (before.folded == 0) {
-    in.notes.notes.push_back("--unfold: no cell of the patch folds, it stays as it is");
+    in.notes.notes.push_back("--untangle: no cell of the patch folds, it stays as it is");
   } else if (after.folded == 0) {
     in.notes.notes.push_back(fmt::format(
-        "--unfold: {} of {} cells folded, none does now; the least Jacobian went from {:.3g} to "
+        "--untangle: {} of {} cells folded, none does now; the least Jacobian went from {:.3g} to "
         "{:.3g}",
         before.folded, before.cells, before.leastJacobian, after.leastJacobian));
   } else {
     in.notes.warnings.push_back(fmt::format(
-        "{}: --unfold cannot mend the patch, {} of {} cells fold where {} did; lower its height, "
+        "{}: --untangle cannot mend the patch, {} of {} cells fold where {} did; lower its height, "
         "let its sides move with --sides free, or choose a flatter place",
         in.op().name, after.folded, before.cells, before.folded));
   }
@@ -104,7 +104,7 @@ void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPat
 void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
                   double sink, const V3d& textureSize) {
   double before = 0, after = 0;
-  const std::size_t first = in.flag("unfold") ? improved.patches.size() : 0;
+  const std::size_t first = in.flag("untangle") ? improved.patches.size() : 0;
   const std::size_t parts = first + improved.patches.size();
   for (mapping::Patch& patch : improved.patches) {
     const auto part = first + static_cast<std::size_t>(&patch - improved.patches.data());
@@ -196,7 +196,7 @@ Value folds(Invocation& in) {
         "folds: the patch has --height auto, which only its texture tells; give it a height");
   if (onto.patches.size() != 1)
     throw UsageError(fmt::format("folds: there are {} patches; give one", onto.patches.size()));
-  const double sink = in.length("sink");
+  const double sink = in.length("embed");
   const double voxel = in.given("voxel") ? in.length("voxel") : in.band(0).voxelSize();
   // Relaxed towards the patch's own proportions, since there is no texture.
   ImprovedPatches improved = improvedPatches(in, in.band(0), onto.patches, sink, V3d(1));
@@ -271,9 +271,10 @@ mapping::RbfKernel kernelOf(const Invocation& in) {
 }
 
 std::vector<Param> withShell(std::vector<Param> params) {
-  params.push_back({.name = "unfold",
+  params.push_back({.name = "untangle",
                     .type = ParamType::Flag,
-                    .doc = "move particles of the patch until none of its cells folds"});
+                    .doc = "move particles of the patch until none of its cells folds",
+                    .formerName = "unfold"});
   params.push_back({.name = "relax",
                     .type = ParamType::Choice,
                     .doc = "move particles to the least distortion of the whole patch, against its "
@@ -282,20 +283,20 @@ std::vector<Param> withShell(std::vector<Param> params) {
                     .choices = {"none", "patch", "texture"}});
   params.push_back({.name = "sides",
                     .type = ParamType::Choice,
-                    .doc = "with --unfold and --relax: the sides on the surface stay, or slide",
+                    .doc = "with --untangle and --relax: the sides on the surface stay, or slide",
                     .fallback = "fixed",
                     .choices = {"fixed", "free"}});
   return params;
 }
 
 bool improvesPatches(const Invocation& in) {
-  return in.flag("unfold") || isRelaxed(in);
+  return in.flag("untangle") || isRelaxed(in);
 }
 
 void validateShell(const Invocation& in) {
   if (in.given("sides") && !improvesPatches(in))
     throw UsageError(
-        fmt::format("{}: --sides goes with --unfold or --relax; leave it out", in.op().name));
+        fmt::format("{}: --sides goes with --untangle or --relax; leave it out", in.op().name));
 }
 
 ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base,
@@ -306,7 +307,7 @@ ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base
   if (!improvesPatches(in)) return improved;
   const double start = apps::processCpuSeconds();
   const std::vector<mapping::Patch> before = improved.patches;
-  if (in.flag("unfold")) unfoldPatches(in, base, improved, sink);
+  if (in.flag("untangle")) unfoldPatches(in, base, improved, sink);
   if (isRelaxed(in)) relaxPatches(in, base, improved, sink, textureSize);
   mapping::joinSharedParticles(before, improved.patches);
   improved.figures["improvement_cpu_s"] = apps::processCpuSeconds() - start;
@@ -345,11 +346,12 @@ void addFoldOperators(std::vector<Operator>& all) {
                             .doc = "as of `texture`",
                             .fallback = "rbf",
                             .choices = {"rbf", "shell", "mesh"}},
-                           {.name = "sink",
+                           {.name = "embed",
                             .type = ParamType::Length,
                             .doc = "how deep the texture dips into the base",
                             .fallback = "1vx",
-                            .range = Range::NonNegative},
+                            .range = Range::NonNegative,
+                            .formerName = "sink"},
                            voxelParam("of the field; default: the base's"),
                            kernelParam(),
                            {.name = "lambda-near",

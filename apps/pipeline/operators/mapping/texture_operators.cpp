@@ -64,10 +64,10 @@ std::size_t particlesOf(std::span<const mapping::Patch> patches) {
   return particles;
 }
 
-/// And as --unfold and --relax leave them.
+/// And as --untangle and --relax leave them.
 ImprovedPatches patchesFor(Invocation& in, const Imath::Box3d& textureBox) {
   return improvedPatches(in, in.band(0), patchesAtHeight(in, in.operands[2].patch(), textureBox),
-                         in.length("sink"), textureBox.size());
+                         in.length("embed"), textureBox.size());
 }
 
 Value textureMesh(Invocation& in) {
