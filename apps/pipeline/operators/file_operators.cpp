@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
@@ -170,12 +171,13 @@ Value write(Invocation& in) {
 
 }  // namespace
 
-void addFileOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator readOperator() {
+  return {
       .name = "read",
       .group = "Files",
-      .summary = "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), patches "
-                 "(patch), a scene (json)",
+      .summary =
+          "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), patches "
+          "(patch), a scene (json)",
       .details =
           "A .vdb with more than one level set needs --grid. A grid that is no level set "
           "must be named too; it becomes a field: of numbers, or of vectors, staggered ones "
@@ -203,18 +205,23 @@ void addFileOperators(std::vector<Operator>& all) {
       .cost = costPerVoxel(50, 0, 250),
       .validate = validateRead,
       .usesStandardInput = isStandardStream,
-  });
-  all.push_back({
+  };
+}
+
+Operator writeOperator() {
+  return {
       .name = "write",
       .group = "Files",
-      .summary = "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), "
-                 "patches (patch), a scene (json)",
-      .details = "The file is written beside its target and renamed when whole; what was there "
-                 "stays until then. "
-                 "A scene's level sets and meshes go to .vdb and .ply files beside it, "
-                 "FILE-NAME.vdb for the "
-                 "level set NAME, and replace what has those names. "
-                 "The value stays on the stack.",
+      .summary =
+          "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), "
+          "patches (patch), a scene (json)",
+      .details =
+          "The file is written beside its target and renamed when whole; what was there "
+          "stays until then. "
+          "A scene's level sets and meshes go to .vdb and .ply files beside it, "
+          "FILE-NAME.vdb for the "
+          "level set NAME, and replace what has those names. "
+          "The value stays on the stack.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! write sphere.ply",
       .params = {{.name = "file",
                   .type = ParamType::Path,
@@ -236,7 +243,7 @@ void addFileOperators(std::vector<Operator>& all) {
       .targets = [](const Invocation& in) { return std::vector{in.text("file")}; },
       .usesStandardOutput =
           [](const Invocation& in) { return levelset::isStandardOutput(in.text("file")); },
-  });
+  };
 }
 
 }  // namespace pipeline

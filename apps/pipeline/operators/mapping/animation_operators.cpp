@@ -12,6 +12,7 @@
 
 #include "apps/pipeline/grammar/file_sequence.h"
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/mapping/patch_quality_options.h"
 #include "apps/pipeline/operators/mapping/texture_options.h"
 #include "apps/pipeline/registry/invocation.h"
@@ -517,8 +518,8 @@ std::vector<Param> animateParams() {
 
 }  // namespace
 
-void addAnimationOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator animateOperator() {
+  return {
       .name = "animate",
       .group = "Texture mapping",
       .summary = "a texture that moves: on a moving base, from patch to patch, or by itself",
@@ -543,7 +544,7 @@ void addAnimationOperators(std::vector<Operator>& all) {
       .plan = planTexture,
       .validate = validateAnimate,
       .targets = outFiles,
-  });
+  };
 }
 
 }  // namespace pipeline

@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/mapping/patch_options.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
@@ -434,19 +435,21 @@ std::vector<Param> joinParams(std::vector<Param> a, const std::vector<Param>& b)
 
 }  // namespace
 
-void addPatchOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator patchOperator() {
+  return {
       .name = "patch",
       .group = "Texture mapping",
       .summary = "lay a patch onto a surface: where a texture will stand",
-      .details = "Points are projected to the surface along the distance. u runs from corner 0 to "
-                 "1, v from corner 0 to 3, w outwards; corners run anticlockwise seen from "
-                 "outside. Sides are the shortest ways on the surface, through the points of "
-                 "--side0 to --side3 with a corner at each.",
-      .example = "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
-                 "--size 8,8 --height 3 --as p "
-                 "! torus --radius 4 --tube 1.5 --voxel 0.5 --as ring ! texture @ball @ring @p "
-                 "--blend 1 ! mesh ! write ring.ply",
+      .details =
+          "Points are projected to the surface along the distance. u runs from corner 0 to "
+          "1, v from corner 0 to 3, w outwards; corners run anticlockwise seen from "
+          "outside. Sides are the shortest ways on the surface, through the points of "
+          "--side0 to --side3 with a corner at each.",
+      .example =
+          "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
+          "--size 8,8 --height 3 --as p "
+          "! torus --radius 4 --tube 1.5 --voxel 0.5 --as ring ! texture @ball @ring @p "
+          "--blend 1 ! mesh ! write ring.ply",
       .params = joinParams(
           joinParams(outlineParams(), {{.name = "rotate",
                                         .type = ParamType::Degrees,
@@ -468,18 +471,23 @@ void addPatchOperators(std::vector<Operator>& all) {
       .run = patch,
       .plan = planPatch,
       .validate = validatePatch,
-  });
-  all.push_back({
+  };
+}
+
+Operator decalOperator() {
+  return {
       .name = "decal",
       .group = "Texture mapping",
       .summary = "lay a square patch onto a surface about one point",
-      .details = "Distances and directions from the point are kept: every particle lies at the end "
-                 "of the straightest way that sets out in its direction. A decal that would fold, "
-                 "come round to itself or run off the surface is refused, with a radius that does.",
-      .example = "levelsmith cylinder --radius 8 --height 30 --voxel 0.4 --as post ! decal @post "
-                 "--at 8,0,0 --direction 0,1,0 --radius 6 --height 2 --as p "
-                 "! torus --radius 4 --tube 1 --voxel 0.3 --as ring ! texture @post @ring @p "
-                 "! mesh ! write post.ply",
+      .details =
+          "Distances and directions from the point are kept: every particle lies at the end "
+          "of the straightest way that sets out in its direction. A decal that would fold, "
+          "come round to itself or run off the surface is refused, with a radius that does.",
+      .example =
+          "levelsmith cylinder --radius 8 --height 30 --voxel 0.4 --as post ! decal @post "
+          "--at 8,0,0 --direction 0,1,0 --radius 6 --height 2 --as p "
+          "! torus --radius 4 --tube 1 --voxel 0.3 --as ring ! texture @post @ring @p "
+          "! mesh ! write post.ply",
       .params = joinParams({{.name = "at",
                              .type = ParamType::Point,
                              .doc = "the centre, projected to the surface",
@@ -502,19 +510,24 @@ void addPatchOperators(std::vector<Operator>& all) {
       .run = decal,
       .plan = planDecal,
       .validate = validateLayers,
-  });
-  all.push_back({
+  };
+}
+
+Operator patchGridOperator() {
+  return {
       .name = "patch-grid",
       .group = "Texture mapping",
       .summary = "tile a patch, or all around an axis, with patches whose textures meet",
-      .details = "Neighbours share the particles of their common border. With --around the tiles "
-                 "close: u runs around the axis, anticlockwise seen from its second point, v "
-                 "along it between the planes through the two points. A texture meets itself where "
-                 "it reaches the border of its box, see --texture-box.",
-      .example = "levelsmith cylinder --radius 5 --height 20 --voxel 0.2 --as grip ! patch-grid "
-                 "@grip --count 12,6 --around \"0,0,-6 0,0,6\" --height 0.8 --as p "
-                 "! box --size 1,1,1 --voxel 0.1 --as stud ! texture @grip @stud @p "
-                 "--texture-box \"-1,-1,-0.5 1,1,0.5\" ! mesh ! write grip.ply",
+      .details =
+          "Neighbours share the particles of their common border. With --around the tiles "
+          "close: u runs around the axis, anticlockwise seen from its second point, v "
+          "along it between the planes through the two points. A texture meets itself where "
+          "it reaches the border of its box, see --texture-box.",
+      .example =
+          "levelsmith cylinder --radius 5 --height 20 --voxel 0.2 --as grip ! patch-grid "
+          "@grip --count 12,6 --around \"0,0,-6 0,0,6\" --height 0.8 --as p "
+          "! box --size 1,1,1 --voxel 0.1 --as stud ! texture @grip @stud @p "
+          "--texture-box \"-1,-1,-0.5 1,1,0.5\" ! mesh ! write grip.ply",
       .params = joinParams(
           joinParams({{.name = "count",
                        .type = ParamType::Text,
@@ -548,7 +561,7 @@ void addPatchOperators(std::vector<Operator>& all) {
       .run = patchGrid,
       .plan = planGrid,
       .validate = validateGrid,
-  });
+  };
 }
 
 }  // namespace pipeline

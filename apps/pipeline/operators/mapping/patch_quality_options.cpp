@@ -1,4 +1,5 @@
 #include "apps/pipeline/operators/mapping/patch_quality_options.h"
+#include "apps/pipeline/operators/declarations.h"
 
 #include <fmt/core.h>
 
@@ -329,8 +330,8 @@ nlohmann::ordered_json certificateJson(const mapping::FoldCertificate& certifica
   return json;
 }
 
-void addFoldOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator foldsOperator() {
+  return {
       .name = "folds",
       .group = "Texture mapping",
       .summary = "certify that a patch's map folds nowhere, and its Jacobian as a field",
@@ -339,8 +340,9 @@ void addFoldOperators(std::vector<Operator>& all) {
           "points of the patch: 1 where it is the median, 0 or less where the map turns "
           "over. The certificate is in the report, and how lengths and volumes spread, against "
           "the patch's own size.",
-      .example = "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
-                 "--size 8,8 --height 3 --as p ! folds @ball @p ! write jacobian.vdb",
+      .example =
+          "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
+          "--size 8,8 --height 3 --as p ! folds @ball @p ! write jacobian.vdb",
       .params = withShell({{.name = "map",
                             .type = ParamType::Choice,
                             .doc = "as of `texture`",
@@ -369,7 +371,7 @@ void addFoldOperators(std::vector<Operator>& all) {
       .run = folds,
       .plan = planFolds,
       .validate = validateFolds,
-  });
+  };
 }
 
 }  // namespace pipeline

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/fields.h"
 #include "apps/pipeline/operators/mapping/patch_options.h"
 #include "apps/pipeline/registry/invocation.h"
@@ -137,14 +138,15 @@ Plan planScatter(Invocation& in) {
 
 }  // namespace
 
-void addScatterOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator scatterOperator() {
+  return {
       .name = "scatter",
       .group = "Texture mapping",
       .summary = "strew patches over a surface, evenly and at random",
-      .details = "Places are Poisson-disc samples of the surface. --scale makes patches and their "
-                 "distances larger or smaller from place to place, --along turns u, a mask thins "
-                 "out. Where the surface bears no patch, or the patch would fold, none is laid.",
+      .details =
+          "Places are Poisson-disc samples of the surface. --scale makes patches and their "
+          "distances larger or smaller from place to place, --along turns u, a mask thins "
+          "out. Where the surface bears no patch, or the patch would fold, none is laid.",
       .example =
           "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! scatter @ball --count 12 "
           "--size 4,4 --height 1.5 --levels 2 --as many ! torus --radius 2 --tube 0.6 "
@@ -188,7 +190,7 @@ void addScatterOperators(std::vector<Operator>& all) {
       .run = scatter,
       .plan = planScatter,
       .validate = validateScatter,
-  });
+  };
 }
 
 }  // namespace pipeline

@@ -8,6 +8,7 @@
 
 #include "apps/pipeline/graph/region_of_interest.h"
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/pictures/camera_options.h"
 #include "apps/pipeline/registry/invocation.h"
@@ -347,58 +348,9 @@ Value compareImages(Invocation& in) {
   return Value(Plan{});
 }
 
-Operator compareImagesOperator() {
-  return {
-      .name = "compare-images",
-      .group = "Pictures",
-      .summary = "compare two EXR pictures of one scene layer by layer",
-      .details =
-          "Shares of the differences and the worst pixels for each layer: Z and P relative to Z, "
-          "angles of N, curvatures by the voxel, id, colour. Exit code 5, after everything is "
-          "written, when they differ by more than two correct renderers may: pixels that only one "
-          "hits off the outline, or a layer that passes its tolerance.",
-      .example =
-          "levelsmith sphere --radius 1 --voxel 0.1 ! render a.exr --size 64x64 --samples 1 "
-          "! render b.exr --size 64x64 --samples 2 ! compare-images a.exr b.exr",
-      .params = {{.name = "first",
-                  .type = ParamType::Path,
-                  .doc = "an EXR with the layers of 'render'",
-                  .required = true,
-                  .position = 0},
-                 {.name = "second",
-                  .type = ParamType::Path,
-                  .doc = "another of the same size",
-                  .required = true,
-                  .position = 1},
-                 {.name = "exact", .type = ParamType::Flag, .doc = "ask for the same bits"},
-                 {.name = "tolerance",
-                  .type = ParamType::Text,
-                  .doc = "LAYER=USUAL,WORST: what 999 pixels of 1000 and all may differ by; blanks "
-                         "between several"},
-                 {.name = "difference",
-                  .type = ParamType::Path,
-                  .doc = "write the differences to this .exr, a channel for each layer"},
-                 {.name = "format", .type = ParamType::Text, .doc = "of the differences: exr"},
-                 jsonParam()},
-      .flow = Flow::PassesThrough,
-      .run = compareImages,
-      .plan = [](Invocation&) { return Plan{}; },
-      .validate = validateComparison,
-      .targets =
-          [](const Invocation& in) {
-            return in.given("difference") ? std::vector<std::string>{in.text("difference")}
-                                          : std::vector<std::string>{};
-          },
-      .usesStandardOutput =
-          [](const Invocation& in) {
-            return in.given("difference") && levelset::isStandardOutput(in.text("difference"));
-          },
-  };
-}
-
 }  // namespace
 
-void addPictureOperators(std::vector<Operator>& all) {
+Operator renderOperator() {
   Operator picture = {
       .name = "render",
       .group = "Pictures",
@@ -489,8 +441,56 @@ void addPictureOperators(std::vector<Operator>& all) {
           },
   };
   addCameraParams(picture.params);
-  all.push_back(std::move(picture));
-  all.push_back(compareImagesOperator());
+  return picture;
+}
+
+Operator compareImagesOperator() {
+  return {
+      .name = "compare-images",
+      .group = "Pictures",
+      .summary = "compare two EXR pictures of one scene layer by layer",
+      .details =
+          "Shares of the differences and the worst pixels for each layer: Z and P relative to Z, "
+          "angles of N, curvatures by the voxel, id, colour. Exit code 5, after everything is "
+          "written, when they differ by more than two correct renderers may: pixels that only one "
+          "hits off the outline, or a layer that passes its tolerance.",
+      .example =
+          "levelsmith sphere --radius 1 --voxel 0.1 ! render a.exr --size 64x64 --samples 1 "
+          "! render b.exr --size 64x64 --samples 2 ! compare-images a.exr b.exr",
+      .params = {{.name = "first",
+                  .type = ParamType::Path,
+                  .doc = "an EXR with the layers of 'render'",
+                  .required = true,
+                  .position = 0},
+                 {.name = "second",
+                  .type = ParamType::Path,
+                  .doc = "another of the same size",
+                  .required = true,
+                  .position = 1},
+                 {.name = "exact", .type = ParamType::Flag, .doc = "ask for the same bits"},
+                 {.name = "tolerance",
+                  .type = ParamType::Text,
+                  .doc = "LAYER=USUAL,WORST: what 999 pixels of 1000 and all may differ by; blanks "
+                         "between several"},
+                 {.name = "difference",
+                  .type = ParamType::Path,
+                  .doc = "write the differences to this .exr, a channel for each layer"},
+                 {.name = "format", .type = ParamType::Text, .doc = "of the differences: exr"},
+                 jsonParam()},
+      .flow = Flow::PassesThrough,
+      .run = compareImages,
+      .plan = [](Invocation&) { return Plan{}; },
+      .validate = validateComparison,
+      .targets =
+          [](const Invocation& in) {
+            return in.given("difference") ? std::vector<std::string>{in.text("difference")}
+                                          : std::vector<std::string>{};
+          },
+      .usesStandardOutput =
+          [](const Invocation& in) {
+            return in.given("difference") && levelset::isStandardOutput(in.text("difference"));
+          },
+  };
 }
 
 }  // namespace pipeline

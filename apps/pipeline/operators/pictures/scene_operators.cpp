@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/pictures/camera_options.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "apps/pipeline/values/units.h"
@@ -148,7 +149,7 @@ void validateScene(const Invocation& in) {
 
 }  // namespace
 
-void addSceneOperators(std::vector<Operator>& all) {
+Operator sceneOperator() {
   Operator scene = {
       .name = "scene",
       .group = "Pictures",
@@ -198,7 +199,7 @@ void addSceneOperators(std::vector<Operator>& all) {
       .validate = validateScene,
   };
   addCameraParams(scene.params);
-  all.push_back(std::move(scene));
+  return scene;
 }
 
 }  // namespace pipeline
