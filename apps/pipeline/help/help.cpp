@@ -164,7 +164,7 @@ std::string helpSearch(const std::string& word) {
 
 namespace {
 
-/// The whole pages, which nothing stands beside; empty for other words.
+/// Returns a page that takes no further words; empty for other words.
 std::string wholePage(const std::vector<std::string>& words) {
   if (words[0] == "--markdown" && words.size() == 1) return referencePage();
   if (words[0] == "--schema" && words.size() == 1) return graphSchema();

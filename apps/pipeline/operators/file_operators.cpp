@@ -31,14 +31,14 @@ Kind fileKind(const Invocation& in) {
       in.op().name, name, in.op().name == "write" ? ", nvdb" : ""));
 }
 
-/// A grid that is named may be a field: its file tells, if it is there already.
+/// A named grid may be a field. Its file decides, if the file exists already.
 Kind readKind(const Invocation& in) {
   const Kind kind = fileKind(in);
   if (kind != Kind::Band || !in.given("grid") || isStandardStream(in)) return kind;
   try {
     for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file")))
       if (grid.name == in.text("grid")) return grid.isLevelSet ? Kind::Band : Kind::Field;
-  } catch (const levelset::Error&) {  // the run will tell
+  } catch (const levelset::Error&) {  // reported by the run
   }
   return kind;
 }
@@ -81,7 +81,7 @@ Value read(Invocation& in) {
   return value;
 }
 
-/// Meshes are read, since lengths resolve on their size; of bands the header is enough.
+/// A mesh is read completely, since lengths refer to its size. The header of a band suffices.
 Plan planRead(Invocation& in) {
   if (fileKind(in) != Kind::Band) return read(in).plan();
   for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file"))) {
@@ -93,7 +93,7 @@ Plan planRead(Invocation& in) {
     }
     Plan plan{.kind = Kind::Band, .voxelSize = grid.voxelSize, .halfWidth = grid.halfWidth};
     if (!grid.worldBounds.isEmpty()) {
-      // The zero set lies half a band's width inside of its voxels.
+      // The zero set lies half the band's width inside the box of its voxels.
       plan.bounds = grid.worldBounds;
       const Imath::V3d rim(plan.halfWidth * plan.voxelSize);
       if (Imath::Box3d inner(plan.bounds.min + rim, plan.bounds.max - rim); !inner.isEmpty())

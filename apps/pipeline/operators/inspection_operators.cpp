@@ -138,7 +138,7 @@ Value check(Invocation& in) {
   return in.operands[0];
 }
 
-/// Counts that a header does not tell are 0 there.
+/// Counts that the header lacks are 0.
 Json countOrNull(std::uint64_t count) {
   return count > 0 ? Json(count) : Json(nullptr);
 }

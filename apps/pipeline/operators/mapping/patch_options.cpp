@@ -118,7 +118,7 @@ void tellOrigin(const Invocation& in, PatchRecipe& recipe) {
   recipe.action = in.op().name;
   const auto written = [&](const Param& param) -> std::string {
     if (param.type == ParamType::Flag || param.type == ParamType::Points)
-      return in.given(param.name) ? "given" : "none";  // a spline lies elsewhere, as the patch does
+      return in.given(param.name) ? "given" : "none";  // a spline moves with its patch
     if (param.type == ParamType::Number) return fmt::format("{}", in.number(param.name));
     if (param.type == ParamType::Degrees) return fmt::format("{}", in.radians(param.name));
     return in.given(param.name) || !param.fallback.empty() ? in.text(param.name) : "none";

@@ -55,27 +55,27 @@ bool isRelaxed(const Invocation& in) {
   return in.text("relax") != "none";
 }
 
-/// @param part, parts  which of the patches, for the progress
+/// @param part, parts  index and number of the patches, for the progress
 mapping::UntangleOptions shellOptions(const Invocation& in, const mapping::Patch& patch,
-                                      double sink, std::size_t part, std::size_t parts) {
+                                      double embedDepth, std::size_t part, std::size_t parts) {
   const auto share = [&](std::size_t n) {
     return static_cast<double>(n) / static_cast<double>(parts);
   };
-  return {.embedDepth = sink / patch.height,
+  return {.embedDepth = embedDepth / patch.height,
           .freeSides = in.text("sides") == "free",
           .maxMemory = in.maxMemory,
           .progress = levelset::subProgress(in.progress, share(part), share(part + 1))};
 }
 
 void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
-                   double sink) {
+                   double embedDepth) {
   mapping::FoldCount before, after;
   before.leastJacobian = after.leastJacobian = HUGE_VAL;
   const std::size_t parts = improved.patches.size() * (isRelaxed(in) ? 2 : 1);
   for (mapping::Patch& patch : improved.patches) {
     const auto part = static_cast<std::size_t>(&patch - improved.patches.data());
     mapping::Untangling result =
-        mapping::untangle(base, patch, shellOptions(in, patch, sink, part, parts));
+        mapping::untangle(base, patch, shellOptions(in, patch, embedDepth, part, parts));
     improved.figures["unfold"].push_back({{"before", foldsJson(result.before)},
                                           {"after", foldsJson(result.after)},
                                           {"iterations", result.iterations},
@@ -103,14 +103,14 @@ void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPat
 }
 
 void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
-                  double sink, const V3d& textureSize) {
+                  double embedDepth, const V3d& textureSize) {
   double before = 0, after = 0;
   const std::size_t first = in.flag("untangle") ? improved.patches.size() : 0;
   const std::size_t parts = first + improved.patches.size();
   for (mapping::Patch& patch : improved.patches) {
     const auto part = first + static_cast<std::size_t>(&patch - improved.patches.data());
-    mapping::UntangleOptions options = shellOptions(in, patch, sink, part, parts);
-    // What is left out afterwards need not be mended.
+    mapping::UntangleOptions options = shellOptions(in, patch, embedDepth, part, parts);
+    // Patches that are left out afterwards need no untangling.
     if (in.flag("skip-folds") && mapping::countFolds(patch, options.embedDepth).folded > 0) {
       improved.figures["relax"].push_back(nullptr);
       continue;
@@ -131,17 +131,17 @@ void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatc
                   before, after));
 }
 
-/// A certificate, the distortion and the field of the map that --map names.
+/// Certificate, distortion and Jacobian field of the map that --map names.
 struct JudgedMap {
   mapping::FoldCertificate certificate;
   mapping::Distortion distortion;
   levelset::FieldGrid field;
 };
 
-JudgedMap judgeMap(Invocation& in, const mapping::Patch& patch, double sink, double voxel) {
+JudgedMap judgeMap(Invocation& in, const mapping::Patch& patch, double embedDepth, double voxel) {
   mapping::JacobianFieldOptions options{
-      .voxelSize = voxel, .embedDepth = sink / patch.height, .maxMemory = in.maxMemory};
-  const auto [u, v] = sidesOf(patch);  // in place of a texture's
+      .voxelSize = voxel, .embedDepth = embedDepth / patch.height, .maxMemory = in.maxMemory};
+  const auto [u, v] = sidesOf(patch);  // used in place of a texture's box
   const V3d size(u, v, patch.height);
   const auto survey = [&](const std::vector<mapping::MapSample>& samples) {
     return mapping::surveyDistortion(samples, size, patch.mirrored);
@@ -197,11 +197,11 @@ Value folds(Invocation& in) {
         "folds: the patch has --height auto, which only its texture tells; give it a height");
   if (onto.patches.size() != 1)
     throw UsageError(fmt::format("folds: there are {} patches; give one", onto.patches.size()));
-  const double sink = in.length("embed");
+  const double embedDepth = in.length("embed");
   const double voxel = in.given("voxel") ? in.length("voxel") : in.band(0).voxelSize();
-  // Relaxed towards the patch's own proportions, since there is no texture.
-  ImprovedPatches improved = improvedPatches(in, in.band(0), onto.patches, sink, V3d(1));
-  JudgedMap judged = judgeMap(in, improved.patches.front(), sink, voxel);
+  // Without a texture, the patch is relaxed towards its own proportions.
+  ImprovedPatches improved = improvedPatches(in, in.band(0), onto.patches, embedDepth, V3d(1));
+  JudgedMap judged = judgeMap(in, improved.patches.front(), embedDepth, voxel);
   nlohmann::ordered_json json = std::move(improved.figures);
   addDistortion(judged.distortion, json);
   json["certificate"] = certificateJson(judged.certificate);
@@ -301,15 +301,15 @@ void validateShell(const Invocation& in) {
 }
 
 ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base,
-                                std::vector<mapping::Patch> patches, double sink,
+                                std::vector<mapping::Patch> patches, double embedDepth,
                                 const V3d& textureSize) {
   for (const mapping::Patch& patch : patches) mapping::requirePatchOn(base, patch);
   ImprovedPatches improved{.patches = std::move(patches)};
   if (!improvesPatches(in)) return improved;
   const double start = apps::processCpuSeconds();
   const std::vector<mapping::Patch> before = improved.patches;
-  if (in.flag("untangle")) unfoldPatches(in, base, improved, sink);
-  if (isRelaxed(in)) relaxPatches(in, base, improved, sink, textureSize);
+  if (in.flag("untangle")) unfoldPatches(in, base, improved, embedDepth);
+  if (isRelaxed(in)) relaxPatches(in, base, improved, embedDepth, textureSize);
   mapping::joinSharedParticles(before, improved.patches);
   improved.figures["improvement_cpu_s"] = apps::processCpuSeconds() - start;
   return improved;

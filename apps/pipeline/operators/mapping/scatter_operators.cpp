@@ -53,7 +53,7 @@ mapping::ScatterOptions scatterOptions(Invocation& in) {
   return options;
 }
 
-/// Each patch goes its own way, and keeps its scale.
+/// Each patch moves by itself and keeps its scale.
 std::shared_ptr<const PatchRecipe> recipeOf(const Invocation& in,
                                             const std::vector<mapping::PatchSite>& sites,
                                             const mapping::PatchOptions& options) {
@@ -123,8 +123,8 @@ Plan planScatter(Invocation& in) {
   const std::vector<double> size = in.lengths("size");
   const bool isAuto = in.text("height") == "auto";
   plan.patchSize = {size[0], size[1], isAuto ? 0 : in.length("height")};
-  // Of discs in a plane that are thrown until there is no room, seven tenths of the densest packing
-  // find a place.
+  // Discs thrown at random into a plane until no more fit reach seven tenths of the densest
+  // packing.
   constexpr double kPacked = 0.7 / 0.866;
   const double distance = in.given("distance") ? in.length("distance") : 0;
   plan.patchCount = in.given("count") ? static_cast<double>(in.integer("count"))

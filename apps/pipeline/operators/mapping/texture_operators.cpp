@@ -65,7 +65,7 @@ std::size_t particlesOf(std::span<const mapping::Patch> patches) {
   return particles;
 }
 
-/// And as --untangle and --relax leave them.
+/// Patches after --untangle and --relax.
 ImprovedPatches patchesFor(Invocation& in, const Imath::Box3d& textureBox) {
   return improvedPatches(in, in.band(0), patchesAtHeight(in, in.operands[2].patch(), textureBox),
                          in.length("embed"), textureBox.size());
@@ -94,7 +94,7 @@ Value textureMesh(Invocation& in) {
   return Value(std::move(result.mesh));
 }
 
-/// Of the fast evaluation, where the map was evaluated directly beside it.
+/// Error of the fast evaluation, where the map was also evaluated directly.
 void tellMapError(Invocation& in, const mapping::TextureReport& report, double tolerance) {
   if (report.mapErrorPoints == 0) return;
   in.notes.errors.push_back(

@@ -16,7 +16,7 @@ namespace {
 using Imath::V3d;
 using levelset::UsageError;
 
-/// Height that keeps the texture's proportions on patches of this size.
+/// Returns the height that keeps the texture's proportions on patches of this size.
 double aspectHeight(std::span<const mapping::Patch> patches, const Imath::Box3d& textureBox) {
   const V3d size = textureBox.size();
   double sum = 0;
@@ -27,8 +27,8 @@ double aspectHeight(std::span<const mapping::Patch> patches, const Imath::Box3d&
   return sum / static_cast<double>(patches.size());
 }
 
-/// How far the flattest map of the texture's box onto the patch squeezes: the run surveys the real
-/// one.
+/// Estimates the smallest stretch by the flattest map of the texture's box onto the patch. The run
+/// measures the actual map.
 double plannedStretch(const Invocation& in, const Plan& texture, const Plan& patch) {
   const V3d box = in.given("texture-box") ? in.box("texture-box").size() : texture.bounds.size();
   double stretch = HUGE_VAL;

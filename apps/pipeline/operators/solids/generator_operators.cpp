@@ -23,7 +23,7 @@ using Imath::V3d;
 using levelset::NarrowBand;
 using levelset::ShapeOptions;
 
-/// A texture once its lengths are world units.
+/// A texture whose lengths are resolved to world units.
 struct Generator {
   levelset::ShapeExtent extent;
   mapping::TileBox box;
@@ -38,7 +38,7 @@ mapping::Tiling tilingOf(Invocation& in) {
           .overlap = in.length("overlap")};
 }
 
-/// A length for which `auto` was not given.
+/// Returns a length, or an empty value for `auto`.
 std::optional<double> lengthUnlessAuto(Invocation& in, const char* name) {
   if (in.text(name) == "auto") return {};
   return in.length(name);
@@ -184,7 +184,7 @@ Generator heightmap(Invocation& in) {
           }};
 }
 
-/// The texture, its voxel size, and what the report says of both.
+/// The texture and its voxel size. Adds notes on both.
 std::pair<Generator, double> describeTexture(Invocation& in, Generate generate) {
   if (in.asksVoxelSize() && in.given("voxel")) in.setReference(in.length("voxel"), 0);
   Generator generator = generate(in);
@@ -211,7 +211,7 @@ Value makeTexture(Invocation& in) {
 
 Value heightmapSheet(Invocation& in) {
   if (in.asksVoxelSize() && in.given("voxel")) in.setReference(in.length("voxel"), 0);
-  const mapping::Heightmap map = heightmapOf(in);  // once: the picture may be a pipe
+  const mapping::Heightmap map = heightmapOf(in);  // read once, since the picture may be a pipe
   const V3d center = in.point("center");
   const V3d size = mapping::heightmapExtent(map, center).bounds.size();
   const double voxel = in.voxelSize(std::max({size.x, size.y, size.z}));
