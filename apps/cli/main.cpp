@@ -137,7 +137,7 @@ int runGraph(const pipeline::Graph& graph) {
       if (globals.contains(option))
         throw levelset::UsageError(fmt::format(
             "--explain: nothing runs, so --{} has no effect; leave one of them out", option));
-    pipeline::explain(graph, maxMemory, globals.contains("whole") || globals.contains("cache"),
+    pipeline::explain(graph, maxMemory, globals.contains("no-roi") || globals.contains("cache"),
                       printAll);
     return static_cast<int>(ExitCode::Done);
   }
@@ -146,7 +146,7 @@ int runGraph(const pipeline::Graph& graph) {
   pipeline::RunSettings settings;
   settings.dryRun = dryRun;
   settings.maxMemory = maxMemory;
-  settings.fullValues = globals.contains("whole");
+  settings.fullValues = globals.contains("no-roi");
   if (globals.contains("cache")) settings.cache = globals.at("cache");
   settings.measureErrors = verbose || globals.contains("report");
   if (globals.contains("report") && pipeline::isPage(globals.at("report")))
@@ -211,11 +211,20 @@ int levelsmith(const std::vector<std::string>& words) {
     printAll("levelsmith " LEVELSMITH_VERSION "\n");
     return 0;
   }
+  if (words[0] != "help") {
+    if (const std::optional<std::string> action = pipeline::helpRequest(words)) {
+      printAll(action->empty() ? pipeline::helpOverview() : pipeline::help({*action}));
+      return 0;
+    }
+  }
   if (words[0] == "help") {
     printAll(pipeline::help({words.begin() + 1, words.end()}));
     return 0;
   }
-  return runGraph(pipeline::parseChain(words));
+  const pipeline::Graph graph = pipeline::parseChain(words);
+  if (!graph.globals.contains("quiet"))
+    for (const std::string& sentence : graph.renamed) printMessage(sentence);
+  return runGraph(graph);
 }
 
 }  // namespace

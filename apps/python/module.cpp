@@ -146,6 +146,7 @@ py::list describeOperators() {
   for (const Operator& op : pipeline::operators()) {
     py::dict result;
     result["name"] = op.name;
+    result["former_name"] = op.formerName;
     result["group"] = op.group;
     result["summary"] = op.summary;
     result["details"] = op.details;

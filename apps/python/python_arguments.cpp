@@ -125,7 +125,10 @@ const ParamsByName& paramsOf(std::size_t action) {
     std::vector<ParamsByName> list;
     for (const Operator& op : pipeline::operators()) {
       ParamsByName& names = list.emplace_back();
-      for (const Param& param : op.params) names.emplace(pythonName(param.name), &param);
+      for (const Param& param : op.params) {
+        names.emplace(pythonName(param.name), &param);
+        if (!param.formerName.empty()) names.emplace(pythonName(param.formerName), &param);
+      }
     }
     return list;
   }();

@@ -34,12 +34,12 @@ bool findIn(const std::vector<Param>& params, const std::string& name) {
   return std::any_of(params.begin(), params.end(), [&](const Param& p) { return p.name == name; });
 }
 
-/// Finds a parameter by its full name or by a unique prefix.
+/// Finds a parameter by its full name, its former name or a unique prefix of its name.
 const Param& matchParam(const std::vector<Param>& params, const std::string& name,
                         const std::string& who) {
+  if (const Param* param = findParam(params, name)) return *param;
   std::vector<const Param*> begun;
   for (const Param& param : params) {
-    if (param.name == name) return param;
     if (!name.empty() && param.name.starts_with(name)) begun.push_back(&param);
   }
   if (begun.size() == 1) return *begun[0];
@@ -63,6 +63,7 @@ struct Reader {
   const Script* script = nullptr;  // script that contains the tokens; null: command line
   bool isStandardInput = false;    // the script came from standard input
   std::size_t next = 0;
+  Graph graph = {};  // what has been read so far, without the nodes
 
   [[nodiscard]] bool atEnd() const { return next >= tokens.size(); }
   [[nodiscard]] bool atBang() const { return !atEnd() && tokens[next] == "!"; }
@@ -78,8 +79,9 @@ struct Reader {
           fmt::format("{}: '{}' is not an option; an option begins with two dashes", who, token));
     }
     const std::size_t equals = token.find('=');
-    const Param& param =
-        matchParam(params, token.substr(2, equals == std::string::npos ? equals : equals - 2), who);
+    const std::string name = token.substr(2, equals == std::string::npos ? equals : equals - 2);
+    const Param& param = matchParam(params, name, who);
+    if (param.formerName == name) graph.addRenamed("--" + name, "--" + param.name);
     const std::string where = who + ": --" + param.name;
     if (options.contains(param.name)) throw UsageError(where + ": is given twice");
     if (param.type == ParamType::Flag) {
@@ -134,7 +136,9 @@ struct Action {
 
 Action readAction(Reader& reader) {
   Action action;
-  action.op = &matchOperator(reader.tokens[reader.next++]);
+  const std::string& word = reader.tokens[reader.next++];
+  action.op = &matchOperator(word);
+  reader.graph.addRenamed(word, action.op->name);
   const Operator& op = *action.op;
   std::vector<Param> params = op.params;
   if (op.flow == Flow::Makes)
@@ -333,16 +337,19 @@ Graph parseFile(Reader& reader, const Graph& before) {
       throw UsageError(
           fmt::format("run: --set has no effect on '{}': a graph has no variables; leave out --set",
                       call.file));
-    return readGraph(call.file, before.globals);
+    Graph graph = readGraph(call.file, before.globals);
+    graph.renamed.insert(graph.renamed.begin(), before.renamed.begin(), before.renamed.end());
+    return graph;
   }
   Graph graph = parseLines(readScript(call.file, call.settings), before.globals);
+  graph.renamed.insert(graph.renamed.begin(), before.renamed.begin(), before.renamed.end());
   reader.isStandardInput = call.file == "-";
   return graph;
 }
 
 Graph parse(Reader& reader, bool mayRun, const std::map<std::string, std::string>& outer) {
   const std::vector<std::string>& tokens = reader.tokens;
-  Graph graph;
+  Graph& graph = reader.graph;
   while (!reader.atEnd() && isOption(tokens[reader.next]))
     reader.readOption(globalParams(), "levelsmith", graph.globals);
   if (!reader.atEnd() && tokens[reader.next] == runOperator().name) {
@@ -369,10 +376,31 @@ Graph parse(Reader& reader, bool mayRun, const std::map<std::string, std::string
   }
   if (graph.nodes.empty())
     throw UsageError("levelsmith: nothing to do; `levelsmith help` shows how to begin");
-  return graph;
+  return std::move(graph);
 }
 
 }  // namespace
+
+std::optional<std::string> helpRequest(const std::vector<std::string>& tokens) {
+  std::string action;
+  bool isAtAction = true;
+  for (std::size_t i = 0; i < tokens.size(); ++i) {
+    const std::string& token = tokens[i];
+    if (token == "--help" || token == "-h") return action;
+    if (token == "!") {
+      isAtAction = true;
+      action.clear();
+    } else if (isAtAction && isOption(token)) {  // a global option, perhaps with a value
+      const Param* param =
+          token.starts_with("--") ? findParam(globalParams(), token.substr(2)) : nullptr;
+      if (param && param->type != ParamType::Flag) ++i;
+    } else if (isAtAction) {
+      action = token;
+      isAtAction = false;
+    }
+  }
+  return std::nullopt;
+}
 
 Graph parseChain(const std::vector<std::string>& tokens) {
   Reader reader{tokens};

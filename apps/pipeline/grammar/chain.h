@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,5 +16,9 @@ namespace pipeline {
 
 /// Parses an expanded script into a graph, with the same checks.
 [[nodiscard]] Graph parseScript(const Script& script);
+
+/// Finds `--help` or `-h` in a chain. Returns the action before it, or an empty text before the
+/// first action; an empty value without such a word.
+[[nodiscard]] std::optional<std::string> helpRequest(const std::vector<std::string>& tokens);
 
 }  // namespace pipeline

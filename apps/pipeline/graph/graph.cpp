@@ -142,6 +142,13 @@ const Operator& givenOperator() {
   return op;
 }
 
+void Graph::addRenamed(const std::string& written, const std::string& name) {
+  if (written == name) return;
+  const std::string sentence = renamedSentence(written, name);
+  if (std::find(renamed.begin(), renamed.end(), sentence) == renamed.end())
+    renamed.push_back(sentence);
+}
+
 void leaveVoxelOpen(Node& node) {
   const bool canBeTold = node.op->find("voxel") && node.op->find("resolution");
   node.voxelFollows =

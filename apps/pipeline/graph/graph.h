@@ -33,6 +33,10 @@ struct Graph {
   std::map<std::size_t, Value>
       given;  ///< by node: values from outside the graph, see givenOperator()
   std::vector<std::size_t> results;  ///< nodes whose values are requested
+  std::vector<std::string> renamed;  ///< one sentence for each former word that was used
+
+  /// Adds the sentence for a former word, once.
+  void addRenamed(const std::string& written, const std::string& name);
 };
 
 /// Operator of nodes whose values are in Graph::given. It never runs, and files cannot refer to it.

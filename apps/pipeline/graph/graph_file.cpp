@@ -71,6 +71,7 @@ class GraphReader {
     Node node;
     const std::string op = textOf(json, "op");
     node.op = findOperator(op);
+    if (node.op) graph_.addRenamed(op, node.op->name);
     if (!node.op)
       throw UsageError(
           fmt::format("run: there is no action '{}'; `levelsmith help` lists them", op));
@@ -89,16 +90,16 @@ class GraphReader {
     graph_.nodes.push_back(std::move(node));
   }
 
-  void readOptions(const Json& json, Node& node) const {
+  void readOptions(const Json& json, Node& node) {
     if (!json.contains("options")) return;
     const Json& options = json["options"];
     if (!options.is_object()) refuse("'options' is not an object; write {\"radius\": \"1\"}");
     for (const auto& [name, value] : options.items()) {
       const Param& param = paramOf(node, name);
-      const std::string where = node.op->name + ": --" + name;
+      const std::string where = node.op->name + ": --" + param.name;
       if (param.type == ParamType::Flag) {
         if (!value.is_boolean()) refuse(fmt::format("--{} is a flag; write true", name));
-        if (value.get<bool>()) node.options[name] = "true";
+        if (value.get<bool>()) node.options[param.name] = "true";
         continue;
       }
       std::string text;
@@ -112,11 +113,11 @@ class GraphReader {
         throw UsageError(fmt::format(
             "{}: '{}' names a value; give the number of its node under \"named\"", where, text));
       checkText(param, text, where);
-      node.options[name] = text;
+      node.options[param.name] = text;
     }
   }
 
-  void readNamed(const Json& json, Node& node) const {
+  void readNamed(const Json& json, Node& node) {
     if (!json.contains("named")) return;
     const Json& named = json["named"];
     if (!named.is_object()) refuse("'named' is not an object; write {\"mask\": 0}");
@@ -129,10 +130,10 @@ class GraphReader {
         throw UsageError(
             fmt::format("{}: --{} takes no value of another action; give it under \"options\"",
                         node.op->name, name));
-      if (node.options.contains(name))
+      if (node.options.contains(param.name))
         throw UsageError(fmt::format("{}: --{}: is given twice", node.op->name, name));
-      node.options[name] = text;
-      node.named[name] = number;
+      node.options[param.name] = text;
+      node.named[param.name] = number;
     }
   }
 
@@ -145,8 +146,11 @@ class GraphReader {
     node.name = name;
   }
 
-  [[nodiscard]] const Param& paramOf(const Node& node, const std::string& name) const {
-    if (const Param* param = node.op->find(name)) return *param;
+  [[nodiscard]] const Param& paramOf(const Node& node, const std::string& name) {
+    if (const Param* param = findParam(node.op->params, name)) {
+      if (param->name != name) graph_.addRenamed("--" + name, "--" + param->name);
+      return *param;
+    }
     throw UsageError(fmt::format("{}: there is no option --{}; `levelsmith help {}` lists them",
                                  node.op->name, name, node.op->name));
   }

@@ -9,8 +9,8 @@
 namespace pipeline {
 namespace {
 
-/// `--name` of a flag, `--name=KIND` of what takes a value, `0=KIND` of what stands without a name:
-/// FILE, ACTION, VALUE, or the choices with commas between them.
+/// Returns `--name` for a flag, `--name=KIND` for an option with a value, and `0=KIND` for a
+/// positional value. KIND is FILE, ACTION, VALUE, or the choices with commas between them.
 std::string paramWord(const Param& param) {
   std::string kind = "VALUE";
   if (param.type == ParamType::Path) kind = "FILE";
@@ -21,7 +21,7 @@ std::string paramWord(const Param& param) {
                              : fmt::format("--{}={}", param.name, kind);
 }
 
-/// The function that tells the parameters of an action, for both shells; those of '' are global.
+/// Shell function that sets the parameters of an action; '' stands for the global options.
 std::string completionTable() {
   std::string text = "_levelsmith_params() {\n  case $1 in\n";
   const auto add = [&](const std::string& action, const std::vector<Param>& params,
@@ -38,7 +38,7 @@ std::string completionTable() {
   return text + "  *) params='' ;;\n  esac\n}\n";
 }
 
-/// For both shells.
+/// Shell function for both shells.
 constexpr const char* kVariables = R"sh(
 # Prints `NAME=` for what a script sets.
 _levelsmith_variables() {
@@ -237,7 +237,7 @@ else
 fi
 )sh";
 
-/// As an entry of zsh's _describe, in single quotes.
+/// Returns an entry of zsh's _describe, in single quotes.
 std::string summaryWord(const Operator& op) {
   std::string text;
   for (char c : op.name + ":" + op.summary) {

@@ -4,8 +4,8 @@
 
 namespace pipeline {
 
-/// A script for bash or zsh, to be evaluated there, that completes actions, options, choices,
-/// files, the names that --as gave, and the variables of scripts.
+/// Writes a script for bash or zsh that completes actions, options, choices, files, names of --as,
+/// and variables of scripts. The shell evaluates it.
 /// @throws levelset::UsageError for another shell
 [[nodiscard]] std::string completionScript(const std::string& shell);
 

@@ -13,7 +13,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kNumber = R"(\+?-?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?)";
 
-/// The texts that are such a value, where a pattern can tell; else empty.
+/// Returns a pattern of the texts that are values of the parameter; empty: there is no pattern.
 std::string patternOf(const Param& param) {
   const std::string number = kNumber;
   const std::string length = number + (param.allowsVoxels ? "(vx|%)?" : "%?");
@@ -40,7 +40,7 @@ std::string patternOf(const Param& param) {
   }
 }
 
-/// May the value be written as a JSON number too?
+/// Returns whether a JSON number may stand for the value.
 bool takesNumber(ParamType type) {
   return type == ParamType::Number || type == ParamType::Degrees || type == ParamType::Length ||
          type == ParamType::Scalar || type == ParamType::Numbers || type == ParamType::Bytes;
@@ -60,7 +60,7 @@ Json valueSchema(const Param& param) {
   const bool isInteger = param.type == ParamType::Integer;
   if (isInteger || takesNumber(param.type)) {
     json["type"] = {"string", isInteger ? "integer" : "number"};
-    // Of texts, patterns tell no more than their form.
+    // The limits hold for numbers; a pattern checks only the form of a text.
     if (param.range == Range::Positive) json["exclusiveMinimum"] = 0;
     if (param.range == Range::NonNegative) json["minimum"] = 0;
   } else {
@@ -74,12 +74,12 @@ Json valueSchema(const Param& param) {
   return json;
 }
 
-/// The number of a node.
+/// Schema of the number of a node.
 Json nodeNumber() {
   return {{"type", "integer"}, {"minimum", 0}};
 }
 
-/// What a node of the action has beside `op`.
+/// Schema of the members of an action's node beside `op`.
 Json actionSchema(const Operator& op) {
   Json options = Json::object(), named = Json::object(), required = Json::array();
   for (const Param& param : op.params) {
@@ -112,7 +112,7 @@ Json actionSchema(const Operator& op) {
           {"additionalProperties", false}};
 }
 
-/// The one option of the run that a graph holds.
+/// Schema of --tolerance, the only global option that a graph holds.
 Json toleranceSchema() {
   for (const Param& param : globalParams())
     if (param.name == "tolerance") return valueSchema(param);
@@ -129,7 +129,7 @@ std::string graphSchema() {
     cases.push_back({{"if", {{"properties", {{"op", {{"const", op.name}}}}}}},
                      {"then", {{"$ref", "#/$defs/" + op.name}}}});
   }
-  // By its `op`, so that what is wrong is told of that action alone.
+  // Selected by `op`, so that errors name only that action.
   const Json node = {{"type", "object"},
                      {"properties", {{"op", {{"enum", names}}}}},
                      {"required", {"op"}},

@@ -4,8 +4,8 @@
 
 namespace pipeline {
 
-/// A JSON Schema (draft 2020-12) of the files that graphFromJson() reads: each action with its
-/// options. That inputs come before what takes them, and of which kinds they are, it cannot tell.
+/// Writes a JSON Schema (draft 2020-12) of the files that graphFromJson() reads: each action with
+/// its options. The schema checks neither the order of nodes nor the kinds of operands.
 [[nodiscard]] std::string graphSchema();
 
 }  // namespace pipeline

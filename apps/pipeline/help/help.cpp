@@ -164,7 +164,7 @@ std::string helpSearch(const std::string& word) {
 
 namespace {
 
-/// The whole pages, which nothing stands beside; empty for other words.
+/// Returns a page that takes no further words; empty for other words.
 std::string wholePage(const std::vector<std::string>& words) {
   if (words[0] == "--markdown" && words.size() == 1) return referencePage();
   if (words[0] == "--schema" && words.size() == 1) return graphSchema();
@@ -203,8 +203,10 @@ std::string help(const std::vector<std::string>& words) {
   if (!search.empty()) return helpSearch(search);
   if (name.empty() || name == "help") return helpOverview();
   const std::vector<const Operator*> topics = helpTopics();
-  const auto op = std::find_if(topics.begin(), topics.end(),
-                               [&](const Operator* topic) { return topic->name == name; });
+  const Operator* known = findOperator(name);
+  const auto op = std::find_if(topics.begin(), topics.end(), [&](const Operator* topic) {
+    return topic->name == (known ? known->name : name);
+  });
   if (op == topics.end()) {
     std::vector<std::string> names;
     for (const Operator* each : topics) names.push_back(each->name);

@@ -12,22 +12,22 @@ struct HelpGroup {
   std::vector<const Operator*> actions;
 };
 
-/// What help knows of: every action, and `run`.
+/// Groups of the help: every action, and `run`.
 [[nodiscard]] std::vector<HelpGroup> helpGroups();
-/// The kinds of an action's operands, "mesh or level set, patch", or "none".
+/// Returns the kinds of an action's operands, "mesh or level set, patch", or "none".
 [[nodiscard]] std::string operandText(const Operator& op);
 
-/// `help`: every action by group, the chain grammar, the global options.
+/// Page of `help`: every action by group, the grammar of chains, the global options.
 [[nodiscard]] std::string helpOverview();
-/// `help OP`
+/// Page of `help ACTION`.
 [[nodiscard]] std::string helpPage(const Operator& op);
-/// `help OP --json`: the declaration as an object.
+/// Page of `help ACTION --json`: the declaration as an object.
 [[nodiscard]] std::string helpJson(const Operator& op);
-/// `help --search WORD`: actions and options that mention it.
+/// Page of `help --search WORD`: actions and options that mention the word.
 [[nodiscard]] std::string helpSearch(const std::string& word);
 
-/// Answers the words behind `help`; those that other headers answer too. @throws
-/// levelset::UsageError for an unknown action
+/// Returns the page for the words behind `help`.
+/// @throws levelset::UsageError for an unknown action
 [[nodiscard]] std::string help(const std::vector<std::string>& words);
 
 }  // namespace pipeline

@@ -10,7 +10,7 @@
 namespace pipeline {
 namespace {
 
-/// What Markdown would take for marks, and what would end a cell.
+/// Escapes marks of Markdown, and the end of a cell.
 std::string inMarkdown(const std::string& text) {
   std::string result;
   bool isCode = false;
@@ -78,7 +78,7 @@ std::string paramTable(const std::vector<Param>& params) {
   return text + "\n";
 }
 
-/// As GitHub links to a heading.
+/// Returns the anchor that GitHub gives to a heading.
 std::string anchorOf(std::string heading) {
   std::replace(heading.begin(), heading.end(), ' ', '-');
   std::transform(heading.begin(), heading.end(), heading.begin(), [](char c) {

@@ -4,7 +4,7 @@
 
 namespace pipeline {
 
-/// docs/reference.md: every action by group, with its operands, parameters and example.
+/// Writes docs/reference.md: every action by group, with operands, parameters and example.
 [[nodiscard]] std::string referencePage();
 
 }  // namespace pipeline

@@ -1,3 +1,4 @@
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/flow/morph_operator.h"
 #include "apps/pipeline/operators/level_set_operator.h"
 #include "apps/pipeline/operators/solids/mesh_operator.h"
@@ -22,66 +23,64 @@
 
 namespace pipeline {
 
-void addFileOperators(std::vector<Operator>& all);
-void addPatchOperators(std::vector<Operator>& all);
-void addScatterOperators(std::vector<Operator>& all);
-void addTextureOperators(std::vector<Operator>& all);
-void addAnimationOperators(std::vector<Operator>& all);
-void addGeneratorOperators(std::vector<Operator>& all);
-void addFoldOperators(std::vector<Operator>& all);
-void addInspectionOperators(std::vector<Operator>& all);
-void addSceneOperators(std::vector<Operator>& all);
-void addSliceOperators(std::vector<Operator>& all);
-void addPictureOperators(std::vector<Operator>& all);
-void addRegressionOperators(std::vector<Operator>& all);
-void addCacheOperators(std::vector<Operator>& all);
-
 std::vector<Operator> allOperators() {
-  std::vector<Operator> all;
-  addFileOperators(all);
-  all.push_back(levelSetOperator<levelset::SphereOperator>());
-  all.push_back(levelSetOperator<levelset::BoxOperator>());
-  all.push_back(levelSetOperator<levelset::TorusOperator>());
-  all.push_back(levelSetOperator<levelset::CylinderOperator>());
-  all.push_back(levelSetOperator<levelset::CapsuleOperator>());
-  all.push_back(levelSetOperator<levelset::LevelSetOperator>());
-  all.push_back(levelSetOperator<levelset::SurfaceBandOperator>());
-  all.push_back(meshOperator());
-  all.push_back(levelSetOperator<levelset::UnionOperator>());
-  all.push_back(levelSetOperator<levelset::IntersectionOperator>());
-  all.push_back(levelSetOperator<levelset::DifferenceOperator>());
-  all.push_back(levelSetOperator<levelset::BlendOperator>());
-  all.push_back(levelSetOperator<levelset::OffsetOperator>());
-  all.push_back(levelSetOperator<levelset::OpenOperator>());
-  all.push_back(levelSetOperator<levelset::CloseOperator>());
-  all.push_back(levelSetOperator<levelset::ShellOperator>());
-  all.push_back(levelSetOperator<levelset::KeepOperator>());
-  all.push_back(levelSetOperator<levelset::FillCavitiesOperator>());
-  all.push_back(levelSetOperator<levelset::AdvectOperator>());
-  all.push_back(levelSetOperator<levelset::ReinitializeOperator>());
-  all.push_back(levelSetOperator<levelset::RebuildBandOperator>());
-  all.push_back(levelSetOperator<levelset::FastMarchingOperator>());
-  all.push_back(levelSetOperator<levelset::FastSweepingOperator>());
-  all.push_back(levelSetOperator<levelset::ClosestPointOperator>());
-  all.push_back(levelSetOperator<levelset::CurvatureFlowOperator>());
-  all.push_back(levelSetOperator<levelset::SmoothOperator>());
-  all.push_back(morphOperator());
-  all.push_back(levelSetOperator<levelset::TransformOperator>());
-  all.push_back(levelSetOperator<levelset::ResampleOperator>());
-  all.push_back(levelSetOperator<levelset::ClipOperator>());
-  addPatchOperators(all);
-  addScatterOperators(all);
-  addTextureOperators(all);
-  addAnimationOperators(all);
-  addGeneratorOperators(all);
-  addFoldOperators(all);
-  addInspectionOperators(all);
-  addSceneOperators(all);
-  addSliceOperators(all);
-  addPictureOperators(all);
-  addRegressionOperators(all);
-  addCacheOperators(all);
-  return all;
+  return {
+      readOperator(),
+      writeOperator(),
+      levelSetOperator<levelset::SphereOperator>(),
+      levelSetOperator<levelset::BoxOperator>(),
+      levelSetOperator<levelset::TorusOperator>(),
+      levelSetOperator<levelset::CylinderOperator>(),
+      levelSetOperator<levelset::CapsuleOperator>(),
+      levelSetOperator<levelset::LevelSetOperator>(),
+      levelSetOperator<levelset::SurfaceBandOperator>(),
+      meshOperator(),
+      levelSetOperator<levelset::UnionOperator>(),
+      levelSetOperator<levelset::IntersectionOperator>(),
+      levelSetOperator<levelset::DifferenceOperator>(),
+      levelSetOperator<levelset::BlendOperator>(),
+      levelSetOperator<levelset::OffsetOperator>(),
+      levelSetOperator<levelset::OpenOperator>(),
+      levelSetOperator<levelset::CloseOperator>(),
+      levelSetOperator<levelset::ShellOperator>(),
+      levelSetOperator<levelset::KeepOperator>(),
+      levelSetOperator<levelset::FillCavitiesOperator>(),
+      levelSetOperator<levelset::AdvectOperator>(),
+      levelSetOperator<levelset::ReinitializeOperator>(),
+      levelSetOperator<levelset::RebuildBandOperator>(),
+      levelSetOperator<levelset::FastMarchingOperator>(),
+      levelSetOperator<levelset::FastSweepingOperator>(),
+      levelSetOperator<levelset::ClosestPointOperator>(),
+      levelSetOperator<levelset::CurvatureFlowOperator>(),
+      levelSetOperator<levelset::SmoothOperator>(),
+      morphOperator(),
+      levelSetOperator<levelset::TransformOperator>(),
+      levelSetOperator<levelset::ResampleOperator>(),
+      levelSetOperator<levelset::ClipOperator>(),
+      patchOperator(),
+      decalOperator(),
+      patchGridOperator(),
+      scatterOperator(),
+      textureOperator(),
+      animateOperator(),
+      knurlOperator(),
+      scalesOperator(),
+      hexagonsOperator(),
+      ringOperator(),
+      gyroidOperator(),
+      heightmapOperator(),
+      foldsOperator(),
+      measureOperator(),
+      compareOperator(),
+      checkOperator(),
+      infoOperator(),
+      sceneOperator(),
+      sliceOperator(),
+      renderOperator(),
+      compareImagesOperator(),
+      regressOperator(),
+      cacheOperator(),
+  };
 }
 
 }  // namespace pipeline

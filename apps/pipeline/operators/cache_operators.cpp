@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "apps/pipeline/cache/cache.h"
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "apps/pipeline/values/units.h"
@@ -69,14 +70,15 @@ Value manageCache(Invocation& in) {
 
 }  // namespace
 
-void addCacheOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator cacheOperator() {
+  return {
       .name = "cache",
       .group = "Results of earlier runs",
       .summary = "list what --cache has kept in a folder, or remove the longest unused (gc)",
-      .details = "Results are told apart by what they follow from: the program, the action, its "
-                 "options and the content of what it reads. So a folder holds nothing wrong, only "
-                 "what may not be asked for again. It may be in use, also by several programs.",
+      .details =
+          "Results are told apart by what they follow from: the program, the action, its "
+          "options and the content of what it reads. So a folder holds nothing wrong, only "
+          "what may not be asked for again. It may be in use, also by several programs.",
       .example = "levelsmith --cache kept sphere --radius 1 --voxel 0.1 ! offset 0.2 ! measure",
       .params = {{.name = "verb",
                   .type = ParamType::Choice,
@@ -99,7 +101,7 @@ void addCacheOperators(std::vector<Operator>& all) {
       .plan = [](Invocation&) { return Plan{}; },
       .validate = validateCache,
       .usesStandardOutput = asksJson,
-  });
+  };
 }
 
 }  // namespace pipeline

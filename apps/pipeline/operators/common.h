@@ -16,7 +16,7 @@
 
 namespace pipeline {
 
-/// The format of the parameter `file`, by --format or the name that tells it.
+/// Returns the format of the parameter `file`: --format, or the extension of the name.
 inline std::string formatName(const Invocation& in) {
   if (in.given("format")) return in.text("format");
   if (in.text("file") != "-") return in.text("file");
@@ -24,7 +24,7 @@ inline std::string formatName(const Invocation& in) {
       fmt::format("{}: '-' has no extension to tell the format; give --format", in.op().name));
 }
 
-/// What a grid that was read from a file lacked to be a band, to warn of.
+/// Warnings about repairs that made a grid from a file a band.
 inline std::vector<std::string> sentencesOf(const levelset::BandRepairs& repairs,
                                             const std::filesystem::path& file) {
   std::vector<std::string> sentences;

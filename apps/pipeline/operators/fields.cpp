@@ -30,7 +30,7 @@ levelset::Attribute attribute(const Invocation& in, const std::string& param) {
   if (named != in.named.end() && named->second.kind() == Kind::Field &&
       named->second.field().isVector())
     return {.vector = vectorField(in, param)};
-  // Refused here, where the parameter's text is known, not in the field that is made of it.
+  // Checked here, where the parameter's text is known for the message.
   return {.scalar = [scalar = scalarField(in, param), where = in.where(param),
                      text = in.text(param)](const Imath::V3d& p) {
     const double value = scalar(p);

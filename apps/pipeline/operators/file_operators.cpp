@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
@@ -30,14 +31,14 @@ Kind fileKind(const Invocation& in) {
       in.op().name, name, in.op().name == "write" ? ", nvdb" : ""));
 }
 
-/// A grid that is named may be a field: its file tells, if it is there already.
+/// A named grid may be a field. Its file decides, if the file exists already.
 Kind readKind(const Invocation& in) {
   const Kind kind = fileKind(in);
   if (kind != Kind::Band || !in.given("grid") || isStandardStream(in)) return kind;
   try {
     for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file")))
       if (grid.name == in.text("grid")) return grid.isLevelSet ? Kind::Band : Kind::Field;
-  } catch (const levelset::Error&) {  // the run will tell
+  } catch (const levelset::Error&) {  // reported by the run
   }
   return kind;
 }
@@ -57,7 +58,7 @@ Value read(Invocation& in) {
   if (fileKind(in) == Kind::Mesh) {
     std::vector<std::string> unsupported;
     levelset::TriMesh mesh = levelset::readMesh(file, {.format = in.text("format"),
-                                                       .attributes = !in.flag("bare"),
+                                                       .attributes = !in.flag("no-attributes"),
                                                        .maxMemory = in.maxMemory,
                                                        .unsupported = &unsupported,
                                                        .progress = in.progress});
@@ -80,7 +81,7 @@ Value read(Invocation& in) {
   return value;
 }
 
-/// Meshes are read, since lengths resolve on their size; of bands the header is enough.
+/// A mesh is read completely, since lengths refer to its size. The header of a band suffices.
 Plan planRead(Invocation& in) {
   if (fileKind(in) != Kind::Band) return read(in).plan();
   for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file"))) {
@@ -92,7 +93,7 @@ Plan planRead(Invocation& in) {
     }
     Plan plan{.kind = Kind::Band, .voxelSize = grid.voxelSize, .halfWidth = grid.halfWidth};
     if (!grid.worldBounds.isEmpty()) {
-      // The zero set lies half a band's width inside of its voxels.
+      // The zero set lies half the band's width inside the box of its voxels.
       plan.bounds = grid.worldBounds;
       const Imath::V3d rim(plan.halfWidth * plan.voxelSize);
       if (Imath::Box3d inner(plan.bounds.min + rim, plan.bounds.max - rim); !inner.isEmpty())
@@ -107,7 +108,7 @@ Plan planRead(Invocation& in) {
 
 void validateRead(const Invocation& in) {
   const Kind kind = fileKind(in);
-  if (kind != Kind::Mesh && in.flag("bare"))
+  if (kind != Kind::Mesh && in.flag("no-attributes"))
     throw UsageError(
         fmt::format("read: --bare leaves out what a mesh carries, and this is a {}; leave it out",
                     kindName(kind)));
@@ -170,12 +171,13 @@ Value write(Invocation& in) {
 
 }  // namespace
 
-void addFileOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator readOperator() {
+  return {
       .name = "read",
       .group = "Files",
-      .summary = "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), patches "
-                 "(patch), a scene (json)",
+      .summary =
+          "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), patches "
+          "(patch), a scene (json)",
       .details =
           "A .vdb with more than one level set needs --grid. A grid that is no level set "
           "must be named too; it becomes a field: of numbers, or of vectors, staggered ones "
@@ -192,28 +194,34 @@ void addFileOperators(std::vector<Operator>& all) {
                   .type = ParamType::Text,
                   .doc = "ply, obj, stl, off, vdb, patch, json; default: by extension"},
                  {.name = "grid", .type = ParamType::Text, .doc = "name of the grid in a .vdb"},
-                 {.name = "bare",
+                 {.name = "no-attributes",
                   .type = ParamType::Flag,
                   .doc = "of a mesh: positions and triangles only, no normals, texture coordinates "
-                         "and colours"}},
+                         "and colours",
+                  .formerName = "bare"}},
       .resultKind = readKind,
       .run = read,
       .plan = planRead,
       .cost = costPerVoxel(50, 0, 250),
       .validate = validateRead,
       .usesStandardInput = isStandardStream,
-  });
-  all.push_back({
+  };
+}
+
+Operator writeOperator() {
+  return {
       .name = "write",
       .group = "Files",
-      .summary = "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), "
-                 "patches (patch), a scene (json)",
-      .details = "The file is written beside its target and renamed when whole; what was there "
-                 "stays until then. "
-                 "A scene's level sets and meshes go to .vdb and .ply files beside it, "
-                 "FILE-NAME.vdb for the "
-                 "level set NAME, and replace what has those names. "
-                 "The value stays on the stack.",
+      .summary =
+          "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), "
+          "patches (patch), a scene (json)",
+      .details =
+          "The file is written beside its target and renamed when whole; what was there "
+          "stays until then. "
+          "A scene's level sets and meshes go to .vdb and .ply files beside it, "
+          "FILE-NAME.vdb for the "
+          "level set NAME, and replace what has those names. "
+          "The value stays on the stack.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! write sphere.ply",
       .params = {{.name = "file",
                   .type = ParamType::Path,
@@ -235,7 +243,7 @@ void addFileOperators(std::vector<Operator>& all) {
       .targets = [](const Invocation& in) { return std::vector{in.text("file")}; },
       .usesStandardOutput =
           [](const Invocation& in) { return levelset::isStandardOutput(in.text("file")); },
-  });
+  };
 }
 
 }  // namespace pipeline

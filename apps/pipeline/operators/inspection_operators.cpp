@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
@@ -137,7 +138,7 @@ Value check(Invocation& in) {
   return in.operands[0];
 }
 
-/// Counts that a header does not tell are 0 there.
+/// Counts that the header lacks are 0.
 Json countOrNull(std::uint64_t count) {
   return count > 0 ? Json(count) : Json(nullptr);
 }
@@ -260,13 +261,14 @@ Value info(Invocation& in) {
 
 }  // namespace
 
-void addInspectionOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator measureOperator() {
+  return {
       .name = "measure",
       .group = "Inspection",
       .summary = "volume, area, bounds, topology, centroid, inertia, mean curvature",
-      .details = "Inertia is about the centroid for density 1; mean_curvature is the integral of "
-                 "(k1 + k2) / 2 over the surface; euler is V - E + F of the surface.",
+      .details =
+          "Inertia is about the centroid for density 1; mean_curvature is the integral of "
+          "(k1 + k2) / 2 over the surface; euler is V - E + F of the surface.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! measure --json",
       .params = {jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh}},
@@ -274,16 +276,21 @@ void addInspectionOperators(std::vector<Operator>& all) {
       .run = measure,
       .cost = costPerVoxel(720, 130, 520),
       .usesStandardOutput = asksJson,
-  });
-  all.push_back({
+  };
+}
+
+Operator compareOperator() {
+  return {
       .name = "compare",
       .group = "Inspection",
       .summary = "how far two solids differ: Hausdorff, mean and Chamfer distance, volume",
-      .details = "Both stay on the stack. hausdorff is the larger of both ways, chamfer the sum of "
-                 "both means, symmetric_difference the volume in one of the solids only. The grids "
-                 "need not be the same.",
-      .example = "levelsmith sphere --radius 1 --voxel 0.05 ! sphere --radius 1 --center 0.1,0,0 "
-                 "--voxel 0.05 ! compare --tolerance 0.11",
+      .details =
+          "Both stay on the stack. hausdorff is the larger of both ways, chamfer the sum of "
+          "both means, symmetric_difference the volume in one of the solids only. The grids "
+          "need not be the same.",
+      .example =
+          "levelsmith sphere --radius 1 --voxel 0.05 ! sphere --radius 1 --center 0.1,0,0 "
+          "--voxel 0.05 ! compare --tolerance 0.11",
       .params = {{.name = "tolerance",
                   .type = ParamType::Length,
                   .doc = "exit code 5 if the Hausdorff distance is larger",
@@ -294,8 +301,11 @@ void addInspectionOperators(std::vector<Operator>& all) {
       .run = compare,
       .cost = costPerVoxel(1500, 60),
       .usesStandardOutput = asksJson,
-  });
-  all.push_back({
+  };
+}
+
+Operator checkOperator() {
+  return {
       .name = "check",
       .group = "Inspection",
       .summary = "is it a sound level set? exit code 5 if not",
@@ -306,8 +316,11 @@ void addInspectionOperators(std::vector<Operator>& all) {
       .run = check,
       .cost = costPerVoxel(75),
       .usesStandardOutput = asksJson,
-  });
-  all.push_back({
+  };
+}
+
+Operator infoOperator() {
+  return {
       .name = "info",
       .group = "Inspection",
       .summary = "what is in a file, without loading its voxels, or what is on the stack",
@@ -329,7 +342,7 @@ void addInspectionOperators(std::vector<Operator>& all) {
       .validate = validateInfo,
       .usesStandardOutput = asksJson,
       .usesStandardInput = [](const Invocation& in) { return in.text("file") == "-"; },
-  });
+  };
 }
 
 }  // namespace pipeline

@@ -1,6 +1,6 @@
 #pragma once
 
-// What actions that tell figures share: one JSON object on standard output with --json.
+// Output of figures: with --json, one JSON object on standard output.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -12,7 +12,7 @@ namespace pipeline {
 
 using Json = nlohmann::ordered_json;
 
-/// File and grid names may be of any bytes.
+/// Names of files and grids may hold any bytes, so invalid UTF-8 is replaced.
 inline std::string printed(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -2,6 +2,7 @@
 
 #include <sstream>
 
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "apps/pipeline/registry/operator.h"
 #include "apps/regress/suite.h"
@@ -59,8 +60,8 @@ Value runRegression(Invocation& in) {
 
 }  // namespace
 
-void addRegressionOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator regressOperator() {
+  return {
       .name = "regress",
       .group = "Inspection",
       .summary = "run problems with exact answers and tell error against run time",
@@ -93,7 +94,7 @@ void addRegressionOperators(std::vector<Operator>& all) {
       .run = runRegression,
       .plan = [](Invocation&) { return Plan{}; },
       .validate = validateRegression,
-  });
+  };
 }
 
 }  // namespace pipeline

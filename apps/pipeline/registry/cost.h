@@ -12,26 +12,14 @@ class Invocation;
 
 using levelset::Cost;
 
-/// Its operands are plans of what is read, and Invocation::planned that of what is made. Empty
-/// where it cannot be told.
+/// Estimates the cost of an action. Operands are plans of the parts that are read, and
+/// Invocation::planned is the plan of the part that is made. Empty where the cost is not known.
 using CostOf = std::function<std::optional<Cost>(Invocation&)>;
 
-/// For each active voxel of bands, the operands together or the result, whichever are more.
-/// @param perTriangle  nanoseconds, of meshes; 0: not known. Nor is it of other values
+/// Cost in proportion to the active voxels of the operands together or of the result, whichever are
+/// more.
+/// @param nanoseconds,bytes  for each active voxel
+/// @param perTriangle  nanoseconds for each triangle of a mesh; 0: the cost of meshes is not known
 [[nodiscard]] CostOf costPerVoxel(double nanoseconds, double bytes = 0, double perTriangle = 0);
-
-/// Grid points of a layer one voxel thick all along the surface of a band.
-[[nodiscard]] double layerOf(const Plan& band);
-
-/// Of distances made again of a band.
-/// @param layer      of the surface that they are distances to
-/// @param halfWidth  of the result, voxels
-[[nodiscard]] Cost costOfDistances(double layer, double halfWidth);
-
-/// Of a surface that is moved.
-/// @param before,after  layers of the two surfaces
-/// @param way           voxels
-/// @param halfWidth     of the result, voxels
-[[nodiscard]] Cost costOfOffset(double before, double after, double way, double halfWidth);
 
 }  // namespace pipeline

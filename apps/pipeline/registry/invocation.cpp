@@ -83,7 +83,7 @@ double Invocation::toWorld(const std::string& name, const std::string& text,
   return world;
 }
 
-/// A length that is asked for again is told once, by what is known last.
+/// A length that is resolved again replaces its earlier entry.
 void Invocation::note(const Resolved& length) {
   const auto known =
       std::find_if(notes.lengths.begin(), notes.lengths.end(),
@@ -164,7 +164,7 @@ double Invocation::voxelSize(double longestSide) {
   return countIn(voxel);
 }
 
-/// Lengths that were asked for before the voxel size are told in voxels from now on, too.
+/// Adds the number of voxels to lengths that were resolved before the voxel size was known.
 double Invocation::countIn(double voxel) {
   for (Resolved& length : notes.lengths)
     if (!length.voxels) length.voxels = length.world / voxel;

@@ -19,7 +19,7 @@
 
 namespace pipeline {
 
-/// Lengths as they were resolved, for the report.
+/// A resolved length, for the report.
 struct Resolved {
   std::string param;
   std::string written;
@@ -29,29 +29,27 @@ struct Resolved {
 
 using levelset::ErrorEstimate;
 
-/// What an operator left behind beside its value.
+/// Notes and figures that an operator leaves beside its result.
 struct StepNotes {
   std::vector<Resolved> lengths;
   std::vector<std::string> warnings;
   std::vector<std::string> notes;
   std::vector<ErrorEstimate> errors;
-  /// A numeric check that the value does not pass: the chain goes on with it and then ends with
-  /// exit code 5.
+  /// A numeric check that the result fails. The chain continues, and ends with exit code 5.
   std::string failure;
-  std::string certificateJson;  ///< of level-set
-  std::string detailsJson;      ///< operator's own figures, an object
+  std::string certificateJson;  ///< sign certificate of level-set
+  std::string detailsJson;      ///< figures of the operator, a JSON object
 };
 
-/// One action of a chain as its operator sees it: typed parameters, operands, and where to report
-/// to.
+/// One action of a chain as its operator sees it: typed parameters, operands and notes.
 class Invocation {
  public:
   Invocation(const Operator& op, std::map<std::string, std::string> options)
       : op_(&op), options_(std::move(options)) {}
 
-  // Operands, oldest first.
+  // Operands; the oldest is first.
   std::vector<Value> operands;
-  /// What --as called them; empty where nobody did. As many, when it runs.
+  /// Names of the operands by --as; empty: none. Set when the action runs, one for each operand.
   std::vector<std::string> operandNames;
   [[nodiscard]] const levelset::NarrowBand& band(std::size_t index = 0) const {
     return operands.at(index).band();
@@ -60,11 +58,11 @@ class Invocation {
     return operands.at(index).mesh();
   }
 
-  /// The values that parameters name ("--mask @NAME"), by parameter.
+  /// Values that parameters name ("--mask @NAME"), by parameter.
   std::map<std::string, Value> named;
 
-  // Parameters. A parameter that was not given answers with its default; asking for one that has
-  // neither is a programming error.
+  // Parameters. A parameter that was not given has its default. To read a parameter that has
+  // neither a value nor a default is a programming error.
   [[nodiscard]] bool given(const std::string& name) const { return options_.contains(name); }
   [[nodiscard]] bool flag(const std::string& name) const { return given(name); }
   [[nodiscard]] std::string text(const std::string& name) const;
@@ -77,20 +75,22 @@ class Invocation {
   [[nodiscard]] Imath::Box3d box(const std::string& name) const;
   [[nodiscard]] Imath::M44d matrix(const std::string& name) const;
   [[nodiscard]] std::pair<int, int> imageSize(const std::string& name) const;
-  /// World units. `vx` and `%` refer to the first operand, or to setReference().
+  /// Returns a length in world units. `vx` and `%` refer to the first operand, or to
+  /// setReference().
   [[nodiscard]] double length(const std::string& name);
-  /// The number of a length as it was written, whatever its unit.
+  /// Returns the number of a length as written, whatever its unit.
   [[nodiscard]] double writtenLength(const std::string& name) const;
-  /// As many as its parameter counts.
+  /// Returns as many lengths as Param::count.
   [[nodiscard]] std::vector<double> lengths(const std::string& name);
-  /// The voxel size asked by --voxel or --resolution; the latter needs the object's longest side.
+  /// Returns the voxel size of --voxel, or of --resolution and the object's longest side.
   [[nodiscard]] double voxelSize(double longestSide);
-  /// Refuses a call that gives both --voxel and --resolution, or neither where it does not follow.
+  /// Throws UsageError unless exactly one of --voxel and --resolution is given, or the voxel size
+  /// follows from --tolerance.
   void requireVoxelSize() const;
-  /// True when --voxel or --resolution was given; both, or a `vx` beside --resolution, are refused.
+  /// Returns whether --voxel or --resolution is given. Throws UsageError for both.
   [[nodiscard]] bool asksVoxelSize() const;
   void setReference(double voxelSize, double diagonal);
-  /// Every length that was given or has a default, for a dry run's report.
+  /// Resolves every length that is given or has a default, for the report of a dry run.
   void resolveLengths();
 
   [[nodiscard]] const Operator& op() const { return *op_; }
@@ -98,26 +98,27 @@ class Invocation {
     return op_->name + ": --" + param;
   }
 
-  // What is needed of the result: run() may make no more than that.
+  // Part of the result that is needed; run() may make no more than that.
   levelset::RegionOfInterest roi = {};
-  /// Of the whole result, where that was told before.
+  /// Plan of the complete result, where it is known.
   std::optional<Plan> planned = {};
-  bool isPartial = false;  ///< the first operand is narrower than its whole
-  /// The half width of what is made, where the whole has `whole`; voxels.
+  bool isPartial = false;  ///< the first operand is narrower than the complete band
+  /// Half width to make, voxels.
+  /// @param whole  half width of the complete result
   [[nodiscard]] double neededHalfWidth(double whole) const {
     return std::min(whole, roi.halfWidth);
   }
 
-  // What comes from the run as a whole.
+  // Settings of the run.
   levelset::Progress progress = {};
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   bool dryRun = false;
-  bool voxelFollows = false;  ///< the voxel size is told later (Node::voxelFollows)
+  bool voxelFollows = false;  ///< the voxel size follows from --tolerance (Node::voxelFollows)
   StepNotes notes;
   std::string output;  ///< text for people, printed when the operator is done
 
  private:
-  /// @param label  what the report calls it
+  /// @param label  name of the length in the report
   [[nodiscard]] double toWorld(const std::string& name, const std::string& text,
                                const std::string& label);
   void note(const Resolved& length);

@@ -201,9 +201,29 @@ const std::vector<Operator>& operators() {
 }
 
 const Operator* findOperator(const std::string& name) {
-  const auto it = std::find_if(operators().begin(), operators().end(),
-                               [&](const Operator& op) { return op.name == name; });
-  return it == operators().end() ? nullptr : &*it;
+  const auto find = [&](std::string Operator::*word) {
+    const auto it = std::find_if(operators().begin(), operators().end(),
+                                 [&](const Operator& op) { return op.*word == name; });
+    return it == operators().end() ? nullptr : &*it;
+  };
+  if (name.empty()) return nullptr;
+  const Operator* op = find(&Operator::name);
+  return op ? op : find(&Operator::formerName);
+}
+
+const Param* findParam(const std::vector<Param>& params, const std::string& name) {
+  const auto find = [&](std::string Param::*word) {
+    const auto it =
+        std::find_if(params.begin(), params.end(), [&](const Param& p) { return p.*word == name; });
+    return it == params.end() ? nullptr : &*it;
+  };
+  if (name.empty()) return nullptr;
+  const Param* param = find(&Param::name);
+  return param ? param : find(&Param::formerName);
+}
+
+std::string renamedSentence(const std::string& former, const std::string& name) {
+  return "'" + former + "' is now '" + name + "'; the old word keeps working";
 }
 
 const Operator& runOperator() {
@@ -257,9 +277,10 @@ const std::vector<Param>& globalParams() {
        .type = ParamType::Path,
        .doc = "write what is asked for as a .json that `run` takes; with --dry-run nothing else is "
               "done"},
-      {.name = "whole",
+      {.name = "no-roi",
        .type = ParamType::Flag,
-       .doc = "make all of every value, also where less of it is needed: to compare, or to look"},
+       .doc = "compute every value completely, also where a part of it suffices",
+       .formerName = "whole"},
       {.name = "cache",
        .type = ParamType::Path,
        .doc = "a folder that keeps results: what is known there is not computed again"},

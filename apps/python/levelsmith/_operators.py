@@ -154,8 +154,12 @@ def install(package):
         name, call = python_name(operator), make(number, operator)
         package[name] = _values.operators[name] = call
         names.append(name)
+        former = operator["former_name"].replace("-", "_")
+        if former:
+            package[former] = _values.operators[former] = call
         for kind in operator["operands"][0] if operator["operands"] else ():
-            if name not in vars(_values.classes[kind]):
-                setattr(_values.classes[kind], name, call)
+            for word in filter(None, (name, former)):
+                if word not in vars(_values.classes[kind]):
+                    setattr(_values.classes[kind], word, call)
             if name == "write":
                 _values.classes[kind].save = call

@@ -22,7 +22,7 @@ FileSequence stepSequence(const Invocation& in) {
   return sequence;
 }
 
-/// Every file that --keep-steps may write.
+/// Names of all files that --keep-steps may write.
 std::vector<std::string> stepFiles(const Invocation& in) {
   std::vector<std::string> files;
   if (!in.given("keep-steps")) return files;

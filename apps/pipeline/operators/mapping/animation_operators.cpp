@@ -12,6 +12,7 @@
 
 #include "apps/pipeline/grammar/file_sequence.h"
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/mapping/patch_quality_options.h"
 #include "apps/pipeline/operators/mapping/texture_options.h"
 #include "apps/pipeline/registry/invocation.h"
@@ -44,8 +45,8 @@ std::size_t keyCount(const Invocation& in) {
 
 // === Files
 
-/// @param what  of their content
-/// @param isKnown  is the format one that holds it?
+/// @param what  name of the content, for the message
+/// @param isKnown  returns whether the format can hold the content
 FileSequence sequenceOf(const Invocation& in, const char* option, const char* example,
                         bool isKnown) {
   FileSequence sequence(in.text(option));
@@ -74,7 +75,7 @@ FileSequence textureSequence(const Invocation& in) {
       mapsMesh(in) ? levelset::isMeshFormat(pattern) : levelset::isBandFormat(pattern));
 }
 
-/// The file of a frame, 1 or more.
+/// Returns the file of a frame, whose number is 1 or more.
 std::filesystem::path frameFile(const Invocation& in, const FileSequence& sequence,
                                 const char* first, std::size_t frame) {
   return sequence.file(static_cast<std::size_t>(in.integer(first)) + frame - 1);
@@ -87,7 +88,7 @@ std::vector<std::string> outFiles(const Invocation& in) {
   return files;
 }
 
-/// Refuses what is missing before anything is computed.
+/// Checks that all files exist before anything is computed.
 void requireFrames(const Invocation& in, const FileSequence& sequence, const char* first) {
   for (std::size_t f = 1; f < framesOf(in); ++f) {
     const std::filesystem::path file = frameFile(in, sequence, first, f);
@@ -115,7 +116,7 @@ void requireApart(const Invocation& in, const char* sequence, const char* first)
 
 // === Keys
 
-/// When the patches stand as they are: --key-frames, or evenly spread.
+/// Frames of the key patches: --key-frames, or evenly spread.
 std::vector<std::size_t> keyFrames(const Invocation& in) {
   const std::size_t count = keyCount(in), frames = framesOf(in);
   std::vector<std::size_t> keys;
@@ -169,12 +170,12 @@ void validateAnimate(const Invocation& in) {
   (void)keyFrames(in);
 }
 
-/// The frames between follow the first patch: refuses another that was made in another way, and
-/// warns where it is only finer, or not known.
+/// Frames between the keys follow the first patch. Rejects a key patch that another action or other
+/// options made, and warns where its fineness differs or is unknown.
 void requireLikeFirst(Invocation& in, std::size_t patch) {
   const PatchRecipe* first = in.operands[2].patch().recipe.get();
   const PatchRecipe* other = in.operands[1 + patch].patch().recipe.get();
-  if (!first) return;  // told where it is made again
+  if (!first) return;  // reported when the patch is built again
   if (!other) {
     in.notes.warnings.push_back(fmt::format(
         "how patch {} was made is not in its file; the frames between are made as the first",
@@ -226,7 +227,7 @@ std::vector<mapping::AnimationKey> keysOf(Invocation& in, const Imath::Box3d& te
   return keys;
 }
 
-/// Of patches that were read from a file.
+/// Recipe of patches that were read from a file.
 mapping::PatchMaker makerLike(const std::vector<Patch>& patches) {
   std::vector<mapping::PatchOptions> options;
   for (const Patch& patch : patches) options.push_back(mapping::optionsLike(patch));
@@ -243,7 +244,8 @@ mapping::PatchMaker makerLike(const std::vector<Patch>& patches) {
   };
 }
 
-/// A level set, and once what it lacked. @param told  frames of which that was done
+/// Reads a level set, and warns once about repairs.
+/// @param told  frames with such a warning
 NarrowBand readFrame(Invocation& in, std::size_t frame, const std::filesystem::path& file,
                      std::set<std::size_t>& told) {
   levelset::BandRepairs repairs;
@@ -299,7 +301,7 @@ mapping::AnimationOptions animationOptions(Invocation& in,
   return options;
 }
 
-// === What is told
+// === Notes
 
 void tellAnimation(Invocation& in, const mapping::AnimationReport& report) {
   nlohmann::ordered_json json;
@@ -335,15 +337,14 @@ void tellAnimation(Invocation& in, const mapping::AnimationReport& report) {
         worst.least, worst.most));
 }
 
-/// Patches as --unfold and --relax leave them. Warnings are told of their frame, notes of the first
-/// only.
+/// Untangles and relaxes patches. Warnings name their frame; only the first frame adds notes.
 std::vector<Patch> improvedAt(Invocation& in, const mapping::PatchFrame& frame,
                               const Imath::V3d& textureSize) {
   std::vector<std::string>&notes = in.notes.notes, &warnings = in.notes.warnings;
   const std::size_t firstNote = notes.size(), firstWarning = warnings.size();
   const levelset::Progress progress = std::exchange(in.progress, frame.progress);
   ImprovedPatches improved =
-      improvedPatches(in, frame.base, frame.patches, in.length("sink"), textureSize);
+      improvedPatches(in, frame.base, frame.patches, in.length("embed"), textureSize);
   in.progress = progress;
   for (std::size_t i = firstWarning; i < warnings.size(); ++i) {
     const std::string own = "animate: ";
@@ -354,7 +355,7 @@ std::vector<Patch> improvedAt(Invocation& in, const mapping::PatchFrame& frame,
   return std::move(improved.patches);
 }
 
-/// Writes meshes frame by frame, and warns once of what their format leaves out.
+/// Writes meshes frame by frame, and warns once about attributes that the format cannot hold.
 class MeshWriter {
  public:
   explicit MeshWriter(Invocation& in) : in_(in), out_(outSequence(in)) {}
@@ -386,10 +387,11 @@ bool isSame(const levelset::TriMesh& a, const levelset::TriMesh& b) {
 // === The action
 
 Value animateMesh(Invocation& in, const std::vector<mapping::AnimationKey>& keys) {
-  constexpr double kImproving = 0.3;  // of the progress
+  constexpr double kImproving = 0.3;  // share of the progress
   MeshWriter writer(in);
   mapping::MeshTextureOptions options = meshTextureOptions(in);
-  options.textureBox = textureBoxOf(in);  // of frame 0 for all, so that what grows is seen to
+  options.textureBox = textureBoxOf(
+      in);  // the box of frame 0 for all frames, so that growth of the texture is visible
   levelset::TriMesh texture = in.mesh(1);
   mapping::MeshTextureResult result;
   std::vector<Patch> patches;
@@ -452,7 +454,7 @@ Value animate(Invocation& in) {
   }
   const FileSequence out = outSequence(in);
   MeshWriter writer(in);
-  levelset::TriMesh mesh;  // of the frame before, where that is what is written
+  levelset::TriMesh mesh;  // mesh of the previous frame, where meshes are written
   NarrowBand last;
   tellAnimation(in,
                 mapping::animateTexture(
@@ -517,8 +519,8 @@ std::vector<Param> animateParams() {
 
 }  // namespace
 
-void addAnimationOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator animateOperator() {
+  return {
       .name = "animate",
       .group = "Texture mapping",
       .summary = "a texture that moves: on a moving base, from patch to patch, or by itself",
@@ -543,7 +545,7 @@ void addAnimationOperators(std::vector<Operator>& all) {
       .plan = planTexture,
       .validate = validateAnimate,
       .targets = outFiles,
-  });
+  };
 }
 
 }  // namespace pipeline

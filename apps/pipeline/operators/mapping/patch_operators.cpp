@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/mapping/patch_options.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
@@ -23,7 +24,7 @@ using levelset::UsageError;
 
 constexpr std::array<const char*, 4> kSides = {"side0", "side1", "side2", "side3"};
 
-/// --corners, or --at and --size.
+/// Reads --corners, or --at and --size.
 void validateOutline(const Invocation& in) {
   const std::string& name = in.op().name;
   if (in.given("at") && !in.given("size"))
@@ -48,7 +49,7 @@ void validatePatch(const Invocation& in) {
   validateLayers(in);
 }
 
-/// "n,m", both whole and positive.
+/// Reads "n,m", two positive integers.
 std::array<std::size_t, 2> countOf(const Invocation& in) {
   const std::string text = in.text("count");
   std::array<std::size_t, 2> count = {0, 0};
@@ -100,8 +101,8 @@ std::array<V3d, 4> cornersOf(Invocation& in) {
   return mapping::cornersAround(in.band(), in.point("at"), size[0], size[1], in.radians("rotate"));
 }
 
-/// Corners about a point run the right way round, unless the surface bends too much between them.
-/// @return what to say then; empty where the caller gave the corners, or allowed it
+/// Checks the orientation of corners around a point, which a strongly curved surface may reverse.
+/// @return a warning; empty where the user gave the corners, or allowed the reversal
 std::string whyMirrored(const Invocation& in, const mapping::PatchOptions& options) {
   if (in.given("corners") || options.mirror) return "";
   return fmt::format(
@@ -114,7 +115,7 @@ void requireUpright(const std::vector<mapping::Patch>& patches, const std::strin
   if (!whyMirrored.empty() && patches.front().mirrored) throw levelset::InvalidInput(whyMirrored);
 }
 
-/// Where the surface bends, a patch whose diagonals are as asked has other sides.
+/// On a curved surface, a patch with the requested diagonals has different sides.
 void requireSize(Invocation& in, const mapping::PatchReport& report) {
   if (in.op().name != "patch" || !in.given("at")) return;
   const std::array<double, 2> asked = patchSizeOf(in);
@@ -134,7 +135,7 @@ void requireSize(Invocation& in, const mapping::PatchReport& report) {
   }
 }
 
-/// Distortion and counts, for the report; warns of particles that were slowed.
+/// Reports distortion and counts, and warns about particles that were slowed.
 void tellPatches(Invocation& in, const mapping::PatchReport& report,
                  const std::vector<mapping::Patch>& patches) {
   std::size_t particles = 0;
@@ -170,12 +171,12 @@ void tellPatches(Invocation& in, const mapping::PatchReport& report,
       particles, layers));
 }
 
-/// Made at the height asked, and again once the texture has told one.
-/// @param make  of a height: patches and their report
+/// Builds patches at the requested height, or again once the texture determines the height.
+/// @param make  builds the patches and their report for a height
 template <typename Make>
 Value patchesOf(Invocation& in, PatchRecipe recipe, const Make& make) {
   const bool isAuto = in.text("height") == "auto";
-  // The texture will tell the height; one voxel is enough to know the patch's size until then.
+  // The texture determines the height. Until then one voxel suffices to find the patch's size.
   auto [patches, report] = make(isAuto ? in.band().voxelSize() : in.length("height"), in.progress);
   requireSize(in, report);
   tellPatches(in, report, patches);
@@ -201,8 +202,8 @@ PatchGridResult asSet(mapping::PatchResult result) {
   return set;
 }
 
-/// For a patch that stands elsewhere than it did: a spline and directions go with it, corners that
-/// have come to run the other way round are for the caller to judge.
+/// Options of a patch that moves to another position. A spline and directions move with it. The
+/// caller checks whether its corners have reversed their orientation.
 mapping::PatchOptions optionsElsewhere(mapping::PatchOptions options,
                                        const mapping::Footprint& origin,
                                        const mapping::Footprint& now, const Progress& progress) {
@@ -246,7 +247,7 @@ Value patch(Invocation& in) {
                    });
 }
 
-/// Mean way along u and along v from the centre to the corners.
+/// Mean distance along u and along v from the centre to the corners.
 double meanReach(const mapping::Footprint& footprint) {
   double sum = 0;
   for (const Imath::V2d& way : footprint.reach.value()) sum += std::abs(way.x) + std::abs(way.y);
@@ -316,7 +317,7 @@ Value patchGrid(Invocation& in) {
     if (in.given(kSides[side])) options.sides[side] = in.points(kSides[side]);
   const std::array<V3d, 4> corners = cornersOf(in);
   PatchRecipe recipe{.fixed = whyFixed(in)};
-  // One outline to all tiles: their borders stay shared.
+  // All tiles use one outline, so that they keep their shared borders.
   recipe.outlines = [corners](const std::vector<mapping::Patch>& patches) {
     const mapping::Patch& middle = patches[patches.size() / 2];
     return std::vector<mapping::PatchOutline>{
@@ -343,7 +344,7 @@ Value patchGrid(Invocation& in) {
                    });
 }
 
-/// With a box that the patch's height is added to on all sides.
+/// Plan whose box is grown by the patch's height on all sides.
 Plan raisedPlan(Invocation& in, Plan plan, Imath::Box3d box) {
   const bool isAuto = in.text("height") == "auto";
   const double height = isAuto ? box.size().length() / 2 : in.length("height");
@@ -391,11 +392,11 @@ Plan planGrid(Invocation& in) {
   }
   Plan plan = in.operands[0].plan();
   plan.kind = Kind::Patch;
-  plan.patchSize = V3d(0);  // the surface will tell
+  plan.patchSize = V3d(0);  // depends on the surface
   return raisedPlan(in, plan, plan.bounds);
 }
 
-/// What all patches have above the surface.
+/// Parameters of the part above the surface, which all patches share.
 std::vector<Param> layerParams(const char* particles) {
   std::vector<Param> params = withLayers({});
   for (Param& param : params)
@@ -434,19 +435,21 @@ std::vector<Param> joinParams(std::vector<Param> a, const std::vector<Param>& b)
 
 }  // namespace
 
-void addPatchOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator patchOperator() {
+  return {
       .name = "patch",
       .group = "Texture mapping",
       .summary = "lay a patch onto a surface: where a texture will stand",
-      .details = "Points are projected to the surface along the distance. u runs from corner 0 to "
-                 "1, v from corner 0 to 3, w outwards; corners run anticlockwise seen from "
-                 "outside. Sides are the shortest ways on the surface, through the points of "
-                 "--side0 to --side3 with a corner at each.",
-      .example = "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
-                 "--size 8,8 --height 3 --as p "
-                 "! torus --radius 4 --tube 1.5 --voxel 0.5 --as ring ! texture @ball @ring @p "
-                 "--blend 1 ! mesh ! write ring.ply",
+      .details =
+          "Points are projected to the surface along the distance. u runs from corner 0 to "
+          "1, v from corner 0 to 3, w outwards; corners run anticlockwise seen from "
+          "outside. Sides are the shortest ways on the surface, through the points of "
+          "--side0 to --side3 with a corner at each.",
+      .example =
+          "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
+          "--size 8,8 --height 3 --as p "
+          "! torus --radius 4 --tube 1.5 --voxel 0.5 --as ring ! texture @ball @ring @p "
+          "--blend 1 ! mesh ! write ring.ply",
       .params = joinParams(
           joinParams(outlineParams(), {{.name = "rotate",
                                         .type = ParamType::Degrees,
@@ -468,18 +471,23 @@ void addPatchOperators(std::vector<Operator>& all) {
       .run = patch,
       .plan = planPatch,
       .validate = validatePatch,
-  });
-  all.push_back({
+  };
+}
+
+Operator decalOperator() {
+  return {
       .name = "decal",
       .group = "Texture mapping",
       .summary = "lay a square patch onto a surface about one point",
-      .details = "Distances and directions from the point are kept: every particle lies at the end "
-                 "of the straightest way that sets out in its direction. A decal that would fold, "
-                 "come round to itself or run off the surface is refused, with a radius that does.",
-      .example = "levelsmith cylinder --radius 8 --height 30 --voxel 0.4 --as post ! decal @post "
-                 "--at 8,0,0 --direction 0,1,0 --radius 6 --height 2 --as p "
-                 "! torus --radius 4 --tube 1 --voxel 0.3 --as ring ! texture @post @ring @p "
-                 "! mesh ! write post.ply",
+      .details =
+          "Distances and directions from the point are kept: every particle lies at the end "
+          "of the straightest way that sets out in its direction. A decal that would fold, "
+          "come round to itself or run off the surface is refused, with a radius that does.",
+      .example =
+          "levelsmith cylinder --radius 8 --height 30 --voxel 0.4 --as post ! decal @post "
+          "--at 8,0,0 --direction 0,1,0 --radius 6 --height 2 --as p "
+          "! torus --radius 4 --tube 1 --voxel 0.3 --as ring ! texture @post @ring @p "
+          "! mesh ! write post.ply",
       .params = joinParams({{.name = "at",
                              .type = ParamType::Point,
                              .doc = "the centre, projected to the surface",
@@ -502,19 +510,24 @@ void addPatchOperators(std::vector<Operator>& all) {
       .run = decal,
       .plan = planDecal,
       .validate = validateLayers,
-  });
-  all.push_back({
+  };
+}
+
+Operator patchGridOperator() {
+  return {
       .name = "patch-grid",
       .group = "Texture mapping",
       .summary = "tile a patch, or all around an axis, with patches whose textures meet",
-      .details = "Neighbours share the particles of their common border. With --around the tiles "
-                 "close: u runs around the axis, anticlockwise seen from its second point, v "
-                 "along it between the planes through the two points. A texture meets itself where "
-                 "it reaches the border of its box, see --texture-box.",
-      .example = "levelsmith cylinder --radius 5 --height 20 --voxel 0.2 --as grip ! patch-grid "
-                 "@grip --count 12,6 --around \"0,0,-6 0,0,6\" --height 0.8 --as p "
-                 "! box --size 1,1,1 --voxel 0.1 --as stud ! texture @grip @stud @p "
-                 "--texture-box \"-1,-1,-0.5 1,1,0.5\" ! mesh ! write grip.ply",
+      .details =
+          "Neighbours share the particles of their common border. With --around the tiles "
+          "close: u runs around the axis, anticlockwise seen from its second point, v "
+          "along it between the planes through the two points. A texture meets itself where "
+          "it reaches the border of its box, see --texture-box.",
+      .example =
+          "levelsmith cylinder --radius 5 --height 20 --voxel 0.2 --as grip ! patch-grid "
+          "@grip --count 12,6 --around \"0,0,-6 0,0,6\" --height 0.8 --as p "
+          "! box --size 1,1,1 --voxel 0.1 --as stud ! texture @grip @stud @p "
+          "--texture-box \"-1,-1,-0.5 1,1,0.5\" ! mesh ! write grip.ply",
       .params = joinParams(
           joinParams({{.name = "count",
                        .type = ParamType::Text,
@@ -548,7 +561,7 @@ void addPatchOperators(std::vector<Operator>& all) {
       .run = patchGrid,
       .plan = planGrid,
       .validate = validateGrid,
-  });
+  };
 }
 
 }  // namespace pipeline

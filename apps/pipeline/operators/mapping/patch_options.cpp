@@ -27,11 +27,12 @@ std::vector<Param> withLayers(std::vector<Param> params) {
        .range = Range::Positive,
        .required = true,
        .allowsAuto = true},
-      {.name = "levels",
+      {.name = "layers",
        .type = ParamType::Integer,
-       .doc = "of particles, 2 or more",
+       .doc = "number of layers of particles, 2 or more",
        .fallback = "6",
-       .range = Range::Positive},
+       .range = Range::Positive,
+       .formerName = "levels"},
       {.name = "particles",
        .type = ParamType::Choice,
        .doc = "how they are laid above the surface",
@@ -72,15 +73,15 @@ void validateLayers(const Invocation& in) {
         "{}: --height auto does not go with --particles spline; give the length along the spline",
         name));
   }
-  const long layers = in.integer("levels");
+  const long layers = in.integer("layers");
   if (layers < 2 || layers > kMostLayers) {
     throw UsageError(
-        fmt::format("{}: --levels {} is out of range; give 2 to {}", name, layers, kMostLayers));
+        fmt::format("{}: --layers {} is out of range; give 2 to {}", name, layers, kMostLayers));
   }
 }
 
 mapping::PatchOptions patchOptionsOf(Invocation& in) {
-  mapping::PatchOptions options = {.layers = static_cast<std::size_t>(in.integer("levels")),
+  mapping::PatchOptions options = {.layers = static_cast<std::size_t>(in.integer("layers")),
                                    .scheme = schemeOf(in),
                                    .fade = in.given("fade"),
                                    .spacing = in.given("spacing") ? in.length("spacing") : 0,
@@ -117,7 +118,7 @@ void tellOrigin(const Invocation& in, PatchRecipe& recipe) {
   recipe.action = in.op().name;
   const auto written = [&](const Param& param) -> std::string {
     if (param.type == ParamType::Flag || param.type == ParamType::Points)
-      return in.given(param.name) ? "given" : "none";  // a spline lies elsewhere, as the patch does
+      return in.given(param.name) ? "given" : "none";  // a spline moves with its patch
     if (param.type == ParamType::Number) return fmt::format("{}", in.number(param.name));
     if (param.type == ParamType::Degrees) return fmt::format("{}", in.radians(param.name));
     return in.given(param.name) || !param.fallback.empty() ? in.text(param.name) : "none";

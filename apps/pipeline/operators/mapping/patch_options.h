@@ -7,19 +7,21 @@
 #include "mapping/animation/footprint.h"
 #include "mapping/patches/patch.h"
 
-/// What all actions that make patches have in common: height and layers of particles.
+/// Parameters that all actions share that make patches: height and layers of particles.
 namespace pipeline {
 
-/// `params` and --height, --levels, --particles, --twist, --taper, --bend, --spacing.
+/// Appends --height, --layers, --particles, --twist, --taper, --bend and --spacing to
+/// `params`.
 [[nodiscard]] std::vector<Param> withLayers(std::vector<Param> params);
 /// @throws levelset::UsageError for options that exclude each other or are out of range
 void validateLayers(const Invocation& in);
 [[nodiscard]] mapping::PatchOptions patchOptionsOf(Invocation& in);
-/// Of --size: along u, along v, world units. @throws levelset::InvalidInput for far too large ones
+/// Reads --size: lengths along u and along v, world units.
+/// @throws levelset::InvalidInput for lengths far beyond the size of the base
 [[nodiscard]] std::array<double, 2> patchSizeOf(Invocation& in);
 [[nodiscard]] std::vector<mapping::PatchOutline> outlinesOf(
     const std::vector<mapping::Patch>& patches);
-/// Notes the action and those of its options that other patches can be compared by.
+/// Stores the action and the options that decide whether patches can be compared.
 void tellOrigin(const Invocation& in, PatchRecipe& recipe);
 
 }  // namespace pipeline

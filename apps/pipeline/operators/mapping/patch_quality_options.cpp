@@ -1,4 +1,5 @@
 #include "apps/pipeline/operators/mapping/patch_quality_options.h"
+#include "apps/pipeline/operators/declarations.h"
 
 #include <fmt/core.h>
 
@@ -54,27 +55,27 @@ bool isRelaxed(const Invocation& in) {
   return in.text("relax") != "none";
 }
 
-/// @param part, parts  which of the patches, for the progress
+/// @param part, parts  index and number of the patches, for the progress
 mapping::UntangleOptions shellOptions(const Invocation& in, const mapping::Patch& patch,
-                                      double sink, std::size_t part, std::size_t parts) {
+                                      double embedDepth, std::size_t part, std::size_t parts) {
   const auto share = [&](std::size_t n) {
     return static_cast<double>(n) / static_cast<double>(parts);
   };
-  return {.embedDepth = sink / patch.height,
+  return {.embedDepth = embedDepth / patch.height,
           .freeSides = in.text("sides") == "free",
           .maxMemory = in.maxMemory,
           .progress = levelset::subProgress(in.progress, share(part), share(part + 1))};
 }
 
 void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
-                   double sink) {
+                   double embedDepth) {
   mapping::FoldCount before, after;
   before.leastJacobian = after.leastJacobian = HUGE_VAL;
   const std::size_t parts = improved.patches.size() * (isRelaxed(in) ? 2 : 1);
   for (mapping::Patch& patch : improved.patches) {
     const auto part = static_cast<std::size_t>(&patch - improved.patches.data());
     mapping::Untangling result =
-        mapping::untangle(base, patch, shellOptions(in, patch, sink, part, parts));
+        mapping::untangle(base, patch, shellOptions(in, patch, embedDepth, part, parts));
     improved.figures["unfold"].push_back({{"before", foldsJson(result.before)},
                                           {"after", foldsJson(result.after)},
                                           {"iterations", result.iterations},
@@ -87,29 +88,29 @@ void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPat
     patch = std::move(result.patch);
   }
   if (before.folded == 0) {
-    in.notes.notes.push_back("--unfold: no cell of the patch folds, it stays as it is");
+    in.notes.notes.push_back("--untangle: no cell of the patch folds, it stays as it is");
   } else if (after.folded == 0) {
     in.notes.notes.push_back(fmt::format(
-        "--unfold: {} of {} cells folded, none does now; the least Jacobian went from {:.3g} to "
+        "--untangle: {} of {} cells folded, none does now; the least Jacobian went from {:.3g} to "
         "{:.3g}",
         before.folded, before.cells, before.leastJacobian, after.leastJacobian));
   } else {
     in.notes.warnings.push_back(fmt::format(
-        "{}: --unfold cannot mend the patch, {} of {} cells fold where {} did; lower its height, "
+        "{}: --untangle cannot mend the patch, {} of {} cells fold where {} did; lower its height, "
         "let its sides move with --sides free, or choose a flatter place",
         in.op().name, after.folded, before.cells, before.folded));
   }
 }
 
 void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
-                  double sink, const V3d& textureSize) {
+                  double embedDepth, const V3d& textureSize) {
   double before = 0, after = 0;
-  const std::size_t first = in.flag("unfold") ? improved.patches.size() : 0;
+  const std::size_t first = in.flag("untangle") ? improved.patches.size() : 0;
   const std::size_t parts = first + improved.patches.size();
   for (mapping::Patch& patch : improved.patches) {
     const auto part = first + static_cast<std::size_t>(&patch - improved.patches.data());
-    mapping::UntangleOptions options = shellOptions(in, patch, sink, part, parts);
-    // What is left out afterwards need not be mended.
+    mapping::UntangleOptions options = shellOptions(in, patch, embedDepth, part, parts);
+    // Patches that are left out afterwards need no untangling.
     if (in.flag("skip-folds") && mapping::countFolds(patch, options.embedDepth).folded > 0) {
       improved.figures["relax"].push_back(nullptr);
       continue;
@@ -130,17 +131,17 @@ void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatc
                   before, after));
 }
 
-/// A certificate, the distortion and the field of the map that --map names.
+/// Certificate, distortion and Jacobian field of the map that --map names.
 struct JudgedMap {
   mapping::FoldCertificate certificate;
   mapping::Distortion distortion;
   levelset::FieldGrid field;
 };
 
-JudgedMap judgeMap(Invocation& in, const mapping::Patch& patch, double sink, double voxel) {
+JudgedMap judgeMap(Invocation& in, const mapping::Patch& patch, double embedDepth, double voxel) {
   mapping::JacobianFieldOptions options{
-      .voxelSize = voxel, .embedDepth = sink / patch.height, .maxMemory = in.maxMemory};
-  const auto [u, v] = sidesOf(patch);  // in place of a texture's
+      .voxelSize = voxel, .embedDepth = embedDepth / patch.height, .maxMemory = in.maxMemory};
+  const auto [u, v] = sidesOf(patch);  // used in place of a texture's box
   const V3d size(u, v, patch.height);
   const auto survey = [&](const std::vector<mapping::MapSample>& samples) {
     return mapping::surveyDistortion(samples, size, patch.mirrored);
@@ -196,11 +197,11 @@ Value folds(Invocation& in) {
         "folds: the patch has --height auto, which only its texture tells; give it a height");
   if (onto.patches.size() != 1)
     throw UsageError(fmt::format("folds: there are {} patches; give one", onto.patches.size()));
-  const double sink = in.length("sink");
+  const double embedDepth = in.length("embed");
   const double voxel = in.given("voxel") ? in.length("voxel") : in.band(0).voxelSize();
-  // Relaxed towards the patch's own proportions, since there is no texture.
-  ImprovedPatches improved = improvedPatches(in, in.band(0), onto.patches, sink, V3d(1));
-  JudgedMap judged = judgeMap(in, improved.patches.front(), sink, voxel);
+  // Without a texture, the patch is relaxed towards its own proportions.
+  ImprovedPatches improved = improvedPatches(in, in.band(0), onto.patches, embedDepth, V3d(1));
+  JudgedMap judged = judgeMap(in, improved.patches.front(), embedDepth, voxel);
   nlohmann::ordered_json json = std::move(improved.figures);
   addDistortion(judged.distortion, json);
   json["certificate"] = certificateJson(judged.certificate);
@@ -271,9 +272,10 @@ mapping::RbfKernel kernelOf(const Invocation& in) {
 }
 
 std::vector<Param> withShell(std::vector<Param> params) {
-  params.push_back({.name = "unfold",
+  params.push_back({.name = "untangle",
                     .type = ParamType::Flag,
-                    .doc = "move particles of the patch until none of its cells folds"});
+                    .doc = "move particles of the patch until none of its cells folds",
+                    .formerName = "unfold"});
   params.push_back({.name = "relax",
                     .type = ParamType::Choice,
                     .doc = "move particles to the least distortion of the whole patch, against its "
@@ -282,32 +284,32 @@ std::vector<Param> withShell(std::vector<Param> params) {
                     .choices = {"none", "patch", "texture"}});
   params.push_back({.name = "sides",
                     .type = ParamType::Choice,
-                    .doc = "with --unfold and --relax: the sides on the surface stay, or slide",
+                    .doc = "with --untangle and --relax: the sides on the surface stay, or slide",
                     .fallback = "fixed",
                     .choices = {"fixed", "free"}});
   return params;
 }
 
 bool improvesPatches(const Invocation& in) {
-  return in.flag("unfold") || isRelaxed(in);
+  return in.flag("untangle") || isRelaxed(in);
 }
 
 void validateShell(const Invocation& in) {
   if (in.given("sides") && !improvesPatches(in))
     throw UsageError(
-        fmt::format("{}: --sides goes with --unfold or --relax; leave it out", in.op().name));
+        fmt::format("{}: --sides goes with --untangle or --relax; leave it out", in.op().name));
 }
 
 ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base,
-                                std::vector<mapping::Patch> patches, double sink,
+                                std::vector<mapping::Patch> patches, double embedDepth,
                                 const V3d& textureSize) {
   for (const mapping::Patch& patch : patches) mapping::requirePatchOn(base, patch);
   ImprovedPatches improved{.patches = std::move(patches)};
   if (!improvesPatches(in)) return improved;
   const double start = apps::processCpuSeconds();
   const std::vector<mapping::Patch> before = improved.patches;
-  if (in.flag("unfold")) unfoldPatches(in, base, improved, sink);
-  if (isRelaxed(in)) relaxPatches(in, base, improved, sink, textureSize);
+  if (in.flag("untangle")) unfoldPatches(in, base, improved, embedDepth);
+  if (isRelaxed(in)) relaxPatches(in, base, improved, embedDepth, textureSize);
   mapping::joinSharedParticles(before, improved.patches);
   improved.figures["improvement_cpu_s"] = apps::processCpuSeconds() - start;
   return improved;
@@ -328,8 +330,8 @@ nlohmann::ordered_json certificateJson(const mapping::FoldCertificate& certifica
   return json;
 }
 
-void addFoldOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator foldsOperator() {
+  return {
       .name = "folds",
       .group = "Texture mapping",
       .summary = "certify that a patch's map folds nowhere, and its Jacobian as a field",
@@ -338,18 +340,20 @@ void addFoldOperators(std::vector<Operator>& all) {
           "points of the patch: 1 where it is the median, 0 or less where the map turns "
           "over. The certificate is in the report, and how lengths and volumes spread, against "
           "the patch's own size.",
-      .example = "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
-                 "--size 8,8 --height 3 --as p ! folds @ball @p ! write jacobian.vdb",
+      .example =
+          "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
+          "--size 8,8 --height 3 --as p ! folds @ball @p ! write jacobian.vdb",
       .params = withShell({{.name = "map",
                             .type = ParamType::Choice,
                             .doc = "as of `texture`",
                             .fallback = "rbf",
                             .choices = {"rbf", "shell", "mesh"}},
-                           {.name = "sink",
+                           {.name = "embed",
                             .type = ParamType::Length,
                             .doc = "how deep the texture dips into the base",
                             .fallback = "1vx",
-                            .range = Range::NonNegative},
+                            .range = Range::NonNegative,
+                            .formerName = "sink"},
                            voxelParam("of the field; default: the base's"),
                            kernelParam(),
                            {.name = "lambda-near",
@@ -367,7 +371,7 @@ void addFoldOperators(std::vector<Operator>& all) {
       .run = folds,
       .plan = planFolds,
       .validate = validateFolds,
-  });
+  };
 }
 
 }  // namespace pipeline

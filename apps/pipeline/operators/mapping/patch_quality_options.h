@@ -12,29 +12,30 @@
 #include "mapping/fast_sums/rbf_kernel.h"
 #include "mapping/patches/patch.h"
 
-// Certified, unfolded and relaxed patches, for the operators that map onto them.
+// Certifying, untangling and relaxing of patches, for operators that map onto patches.
 namespace pipeline {
 
-/// `params`, --unfold, --relax and --sides.
+/// Appends --untangle, --relax and --sides to `params`.
 [[nodiscard]] std::vector<Param> withShell(std::vector<Param> params);
 void validateShell(const Invocation& in);
 
 struct ImprovedPatches {
   std::vector<mapping::Patch> patches;
-  /// Before and after, an array with an object for each patch under "unfold" and "relax".
+  /// Figures before and after: under "unfold" and "relax" an array with an object for each patch.
   nlohmann::ordered_json figures = nlohmann::ordered_json::object();
 };
 
-/// Do --unfold or --relax move particles?
+/// Returns whether --untangle or --relax move particles.
 [[nodiscard]] bool improvesPatches(const Invocation& in);
 
-/// What --unfold and --relax make of patches of a base, told in the notes.
-/// @param sink  world units; @param textureSize  of the box that is the unit cube
+/// Untangles and relaxes patches of a base as the options request, and adds notes.
+/// @param embedDepth  embedding depth, world units
+/// @param textureSize  size of the texture's box
 [[nodiscard]] ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base,
-                                              std::vector<mapping::Patch> patches, double sink,
-                                              const Imath::V3d& textureSize);
+                                              std::vector<mapping::Patch> patches,
+                                              double embedDepth, const Imath::V3d& textureSize);
 
-/// Mean lengths of the rows and of the columns of particles on the surface.
+/// Mean lengths of the rows and of the columns of particles on the surface, world units.
 [[nodiscard]] std::array<double, 2> sidesOf(const mapping::Patch& patch);
 
 [[nodiscard]] Param kernelParam();

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/fields.h"
 #include "apps/pipeline/operators/mapping/patch_options.h"
 #include "apps/pipeline/registry/invocation.h"
@@ -52,7 +53,7 @@ mapping::ScatterOptions scatterOptions(Invocation& in) {
   return options;
 }
 
-/// Each patch goes its own way, and keeps its scale.
+/// Each patch moves by itself and keeps its scale.
 std::shared_ptr<const PatchRecipe> recipeOf(const Invocation& in,
                                             const std::vector<mapping::PatchSite>& sites,
                                             const mapping::PatchOptions& options) {
@@ -122,8 +123,8 @@ Plan planScatter(Invocation& in) {
   const std::vector<double> size = in.lengths("size");
   const bool isAuto = in.text("height") == "auto";
   plan.patchSize = {size[0], size[1], isAuto ? 0 : in.length("height")};
-  // Of discs in a plane that are thrown until there is no room, seven tenths of the densest packing
-  // find a place.
+  // Discs thrown at random into a plane until no more fit reach seven tenths of the densest
+  // packing.
   constexpr double kPacked = 0.7 / 0.866;
   const double distance = in.given("distance") ? in.length("distance") : 0;
   plan.patchCount = in.given("count") ? static_cast<double>(in.integer("count"))
@@ -137,14 +138,15 @@ Plan planScatter(Invocation& in) {
 
 }  // namespace
 
-void addScatterOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator scatterOperator() {
+  return {
       .name = "scatter",
       .group = "Texture mapping",
       .summary = "strew patches over a surface, evenly and at random",
-      .details = "Places are Poisson-disc samples of the surface. --scale makes patches and their "
-                 "distances larger or smaller from place to place, --along turns u, a mask thins "
-                 "out. Where the surface bears no patch, or the patch would fold, none is laid.",
+      .details =
+          "Places are Poisson-disc samples of the surface. --scale makes patches and their "
+          "distances larger or smaller from place to place, --along turns u, a mask thins "
+          "out. Where the surface bears no patch, or the patch would fold, none is laid.",
       .example =
           "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! scatter @ball --count 12 "
           "--size 4,4 --height 1.5 --levels 2 --as many ! torus --radius 2 --tube 0.6 "
@@ -188,7 +190,7 @@ void addScatterOperators(std::vector<Operator>& all) {
       .run = scatter,
       .plan = planScatter,
       .validate = validateScatter,
-  });
+  };
 }
 
 }  // namespace pipeline

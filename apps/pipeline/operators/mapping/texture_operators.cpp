@@ -4,6 +4,7 @@
 #include <span>
 
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/mapping/patch_quality_options.h"
 #include "apps/pipeline/operators/mapping/texture_options.h"
 #include "apps/pipeline/registry/invocation.h"
@@ -64,10 +65,10 @@ std::size_t particlesOf(std::span<const mapping::Patch> patches) {
   return particles;
 }
 
-/// And as --unfold and --relax leave them.
+/// Patches after --untangle and --relax.
 ImprovedPatches patchesFor(Invocation& in, const Imath::Box3d& textureBox) {
   return improvedPatches(in, in.band(0), patchesAtHeight(in, in.operands[2].patch(), textureBox),
-                         in.length("sink"), textureBox.size());
+                         in.length("embed"), textureBox.size());
 }
 
 Value textureMesh(Invocation& in) {
@@ -93,7 +94,7 @@ Value textureMesh(Invocation& in) {
   return Value(std::move(result.mesh));
 }
 
-/// Of the fast evaluation, where the map was evaluated directly beside it.
+/// Error of the fast evaluation, where the map was also evaluated directly.
 void tellMapError(Invocation& in, const mapping::TextureReport& report, double tolerance) {
   if (report.mapErrorPoints == 0) return;
   in.notes.errors.push_back(
@@ -137,14 +138,15 @@ Value texture(Invocation& in) {
 
 }  // namespace
 
-void addTextureOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator textureOperator() {
+  return {
       .name = "texture",
       .group = "Texture mapping",
       .summary = "map a solid onto a patch of a surface, and join the two",
-      .details = "The operands are base, texture and patch. The texture's zero-set box is the unit "
-                 "cube of u, v, w. A map that "
-                 "folds is refused with the place.",
+      .details =
+          "The operands are base, texture and patch. The texture's zero-set box is the unit "
+          "cube of u, v, w. A map that "
+          "folds is refused with the place.",
       .example =
           "levelsmith box --size 40,40,10 --voxel 0.5 --as base ! torus --radius 4 --tube "
           "1.5 --voxel 0.25 --as rings "
@@ -157,7 +159,7 @@ void addTextureOperators(std::vector<Operator>& all) {
       .run = texture,
       .plan = planTexture,
       .validate = validateTextureOptions,
-  });
+  };
 }
 
 }  // namespace pipeline

@@ -16,7 +16,7 @@ namespace {
 using Imath::V3d;
 using levelset::UsageError;
 
-/// Height that keeps the texture's proportions on patches of this size.
+/// Returns the height that keeps the texture's proportions on patches of this size.
 double aspectHeight(std::span<const mapping::Patch> patches, const Imath::Box3d& textureBox) {
   const V3d size = textureBox.size();
   double sum = 0;
@@ -27,8 +27,8 @@ double aspectHeight(std::span<const mapping::Patch> patches, const Imath::Box3d&
   return sum / static_cast<double>(patches.size());
 }
 
-/// How far the flattest map of the texture's box onto the patch squeezes: the run surveys the real
-/// one.
+/// Estimates the smallest stretch by the flattest map of the texture's box onto the patch. The run
+/// measures the actual map.
 double plannedStretch(const Invocation& in, const Plan& texture, const Plan& patch) {
   const V3d box = in.given("texture-box") ? in.box("texture-box").size() : texture.bounds.size();
   double stretch = HUGE_VAL;
@@ -61,7 +61,7 @@ mapping::TextureOptions textureOptions(Invocation& in) {
   mapping::TextureOptions options;
   if (in.flag("carve")) options.merge = mapping::TextureMerge::Carve;
   if (in.flag("alone")) options.merge = mapping::TextureMerge::Alone;
-  options.embedDepth = in.length("sink");
+  options.embedDepth = in.length("embed");
   options.blend = in.length("blend");
   if (in.given("texture-box")) options.textureBox = in.box("texture-box");
   if (in.given("voxel")) options.voxelSize = in.length("voxel");
@@ -79,7 +79,7 @@ mapping::TextureOptions textureOptions(Invocation& in) {
 
 mapping::MeshTextureOptions meshTextureOptions(Invocation& in) {
   mapping::MeshTextureOptions options;
-  options.embedDepth = in.length("sink");
+  options.embedDepth = in.length("embed");
   if (in.given("texture-box")) options.textureBox = in.box("texture-box");
   options.allowFolds = in.flag("allow-folds");
   options.skipFolds = in.flag("skip-folds");
@@ -150,11 +150,12 @@ std::vector<Param> textureParams() {
         .doc = "how far the fast evaluation of the map may be off, texture voxels",
         .fallback = "0.05",
         .range = Range::NonNegative},
-       {.name = "sink",
+       {.name = "embed",
         .type = ParamType::Length,
         .doc = "how deep the texture dips into the base",
         .fallback = "1vx",
-        .range = Range::NonNegative},
+        .range = Range::NonNegative,
+        .formerName = "sink"},
        {.name = "blend",
         .type = ParamType::Length,
         .doc = "radius along the seam",

@@ -8,21 +8,22 @@
 #include "mapping/textures/geometric_texture.h"
 #include "mapping/textures/mesh_texture.h"
 
-/// What the actions that map a texture have in common. Their operands begin with base, texture and
+/// Parameters that all actions share that map a texture. Their first operands are base, texture and
 /// patch.
 namespace pipeline {
 
 [[nodiscard]] std::vector<Param> textureParams();
 /// @throws levelset::UsageError for options that exclude each other or do not fit the texture
 void validateTextureOptions(const Invocation& in);
-/// With --map mesh: the texture and the result are meshes.
+/// Returns whether --map is mesh, so that texture and result are meshes.
 [[nodiscard]] bool mapsMesh(const Invocation& in);
-/// --texture-box, or the box of the texture.
+/// Returns --texture-box, or the bounds of the texture.
 [[nodiscard]] Imath::Box3d textureBoxOf(const Invocation& in);
-/// The patches at the height that the texture asks for, under --height auto; told in the notes.
+/// Returns the patches, rebuilt at the height that the texture needs under --height auto. Adds a
+/// note with that height.
 [[nodiscard]] std::vector<mapping::Patch> patchesAtHeight(Invocation& in, const PatchValue& onto,
                                                           const Imath::Box3d& textureBox);
-// All but the progress.
+// The options without the progress.
 [[nodiscard]] mapping::TextureOptions textureOptions(Invocation& in);
 [[nodiscard]] mapping::MeshTextureOptions meshTextureOptions(Invocation& in);
 [[nodiscard]] Plan planTexture(Invocation& in);

@@ -19,7 +19,7 @@ void setDepths(Invocation& in, render::Camera& camera) {
   if (in.given("far")) camera.far = in.length("far");
 }
 
-/// Those that are given, or all.
+/// Names of the given camera options, or of all.
 void setOptions(Invocation& in, bool isAll, render::Camera& camera) {
   const auto asks = [&](const char* name) { return isAll || in.given(name); };
   if (asks("size")) std::tie(camera.width, camera.height) = in.imageSize("size");

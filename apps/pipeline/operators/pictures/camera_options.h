@@ -11,17 +11,17 @@
 
 namespace pipeline {
 
-/// --size, --from, --to, --up, --fov, --ortho, --near, --far.
+/// Appends --size, --from, --to, --up, --fov, --ortho, --near and --far.
 void addCameraParams(std::vector<Param>& params);
 
 [[nodiscard]] bool givesCamera(const Invocation& in);
 
-/// @param known  what is changed by the options that are given; null: a three-quarter view that
-///               frames `bounds`, unless they say from where
+/// @param known  view that given options change; null: a three-quarter view that frames `bounds`,
+///               unless --from is given
 [[nodiscard]] render::Camera cameraOf(Invocation& in, const Imath::Box3d& bounds,
                                       const render::Camera* known = nullptr);
 
-/// Refuses what can be told from the options alone.
+/// Checks the options that need no operand.
 void validateCamera(const Invocation& in);
 
 }  // namespace pipeline

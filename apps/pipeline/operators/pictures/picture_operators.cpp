@@ -8,6 +8,7 @@
 
 #include "apps/pipeline/graph/regions_of_interest.h"
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/pictures/camera_options.h"
 #include "apps/pipeline/registry/invocation.h"
@@ -27,7 +28,7 @@ namespace {
 
 using levelset::UsageError;
 
-/// What the operand is of a scene, seen as the options ask.
+/// Makes a scene of the operand, with the view that the options request.
 render::Scene sceneOf(Invocation& in) {
   const Value& drawn = in.operands[0];
   render::ViewedScene viewed = sceneOf(drawn);
@@ -90,7 +91,7 @@ std::vector<std::string> targetsOf(const Invocation& in) {
   return targets;
 }
 
-/// Infinity has no number in JSON.
+/// JSON has no number for infinity, so a text stands for it.
 Json numberOrText(double value) {
   return std::isfinite(value) ? Json(value) : Json("infinite");
 }
@@ -129,8 +130,8 @@ Json toJson(const render::ImageComparison& found) {
   return json;
 }
 
-/// The kernel's picture: by OpenGL, or by the processor where there is none, or where the shader
-/// does not know what is drawn.
+/// Draws with the kernel: by OpenGL, or by the processor where OpenGL is missing or the shader
+/// cannot draw the scene.
 render::Image drawByKernel(Invocation& in, const render::Scene& scene,
                            const render::RenderOptions& options) {
   if (scene.isBlended()) return render::renderCpu(scene, options);
@@ -171,7 +172,7 @@ render::StyleOptions styleOf(const Invocation& in) {
   return options;
 }
 
-/// In as few bits as asked for; how far the surfaces moved goes into a note.
+/// Quantizes values to the requested bits, and adds a note with the displacement of the surfaces.
 void coarsen(Invocation& in, render::Scene& scene) {
   const int bits = std::stoi(in.text("value-bits"));
   if (bits == 32) return;
@@ -197,7 +198,7 @@ void coarsen(Invocation& in, render::Scene& scene) {
 Value draw(Invocation& in) {
   render::Scene scene = sceneOf(in);
   coarsen(in, scene);
-  // The judge of fields is slow.
+  // The judge is slow on fields.
   const std::string renderer =
       scene.isBlended() && !in.given("renderer") ? "cpu" : in.text("renderer");
   const bool isBoth = renderer == "both";
@@ -220,7 +221,7 @@ Value draw(Invocation& in) {
   render::writeImage(in.text("file"), image, in.text("format"));
   if (in.given("png")) render::writeImage(in.text("png"), image, "png");
   if (isBoth) {
-    // Layers alone are judged, and they are of the pixels' centres.
+    // Only layers are compared, which are sampled at the centres of pixels.
     options.samples = 1;
     options.ambientSamples = options.shadowSamples = 0;
     options.progress = levelset::subProgress(in.progress, 0.5, 1);
@@ -239,8 +240,9 @@ Value draw(Invocation& in) {
   return in.operands[0];
 }
 
-/// What the frame sees, where that alone makes the picture: light comes from beside it too, and the
-/// view, the range of curvatures and coarse values are by the size of the whole.
+/// The region inside the frame, where it alone determines the picture. Shadows also depend on
+/// solids beside the frame; the default view, the range of curvatures and coarse values depend on
+/// the size of the complete solid.
 RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&) {
   const render::Style style = styleNamed(in.text("style"));
   const bool isFramed = in.operands[0].kind() == Kind::Band && in.given("from") && in.given("to") &&
@@ -262,8 +264,9 @@ RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&)
     if (culling.keeps(low + side / 2, side.length() / 2))
       seen.extendBy(Imath::Box3d(low, low + side));
   }
-  if (seen.isEmpty()) return {};  // nothing is seen, and that has to be told of the whole
-  constexpr double kRead = 8;     // voxels beside what is seen: by normals, curvatures and splines
+  if (seen.isEmpty()) return {};  // the picture is empty, which only the complete solid shows
+  constexpr double kRead =
+      8;  // voxels beside the visible part that normals, curvatures and splines read
   return {.region = grown(seen, kRead * plan.voxelSize)};
 }
 
@@ -272,7 +275,7 @@ Plan planDraw(Invocation& in) {
   return in.operands[0].plan();
 }
 
-/// "LAYER=USUAL,WORST …"
+/// Reads "LAYER=USUAL,WORST …".
 std::map<std::string, render::LayerTolerance> tolerancesOf(const Invocation& in) {
   std::map<std::string, render::LayerTolerance> all;
   if (!in.given("tolerance")) return all;
@@ -347,58 +350,9 @@ Value compareImages(Invocation& in) {
   return Value(Plan{});
 }
 
-Operator compareImagesOperator() {
-  return {
-      .name = "compare-images",
-      .group = "Pictures",
-      .summary = "compare two EXR pictures of one scene layer by layer",
-      .details =
-          "Shares of the differences and the worst pixels for each layer: Z and P relative to Z, "
-          "angles of N, curvatures by the voxel, id, colour. Exit code 5, after everything is "
-          "written, when they differ by more than two correct renderers may: pixels that only one "
-          "hits off the outline, or a layer that passes its tolerance.",
-      .example =
-          "levelsmith sphere --radius 1 --voxel 0.1 ! render a.exr --size 64x64 --samples 1 "
-          "! render b.exr --size 64x64 --samples 2 ! compare-images a.exr b.exr",
-      .params = {{.name = "first",
-                  .type = ParamType::Path,
-                  .doc = "an EXR with the layers of 'render'",
-                  .required = true,
-                  .position = 0},
-                 {.name = "second",
-                  .type = ParamType::Path,
-                  .doc = "another of the same size",
-                  .required = true,
-                  .position = 1},
-                 {.name = "exact", .type = ParamType::Flag, .doc = "ask for the same bits"},
-                 {.name = "tolerance",
-                  .type = ParamType::Text,
-                  .doc = "LAYER=USUAL,WORST: what 999 pixels of 1000 and all may differ by; blanks "
-                         "between several"},
-                 {.name = "difference",
-                  .type = ParamType::Path,
-                  .doc = "write the differences to this .exr, a channel for each layer"},
-                 {.name = "format", .type = ParamType::Text, .doc = "of the differences: exr"},
-                 jsonParam()},
-      .flow = Flow::PassesThrough,
-      .run = compareImages,
-      .plan = [](Invocation&) { return Plan{}; },
-      .validate = validateComparison,
-      .targets =
-          [](const Invocation& in) {
-            return in.given("difference") ? std::vector<std::string>{in.text("difference")}
-                                          : std::vector<std::string>{};
-          },
-      .usesStandardOutput =
-          [](const Invocation& in) {
-            return in.given("difference") && levelset::isStandardOutput(in.text("difference"));
-          },
-  };
-}
-
 }  // namespace
 
-void addPictureOperators(std::vector<Operator>& all) {
+Operator renderOperator() {
   Operator picture = {
       .name = "render",
       .group = "Pictures",
@@ -489,8 +443,56 @@ void addPictureOperators(std::vector<Operator>& all) {
           },
   };
   addCameraParams(picture.params);
-  all.push_back(std::move(picture));
-  all.push_back(compareImagesOperator());
+  return picture;
+}
+
+Operator compareImagesOperator() {
+  return {
+      .name = "compare-images",
+      .group = "Pictures",
+      .summary = "compare two EXR pictures of one scene layer by layer",
+      .details =
+          "Shares of the differences and the worst pixels for each layer: Z and P relative to Z, "
+          "angles of N, curvatures by the voxel, id, colour. Exit code 5, after everything is "
+          "written, when they differ by more than two correct renderers may: pixels that only one "
+          "hits off the outline, or a layer that passes its tolerance.",
+      .example =
+          "levelsmith sphere --radius 1 --voxel 0.1 ! render a.exr --size 64x64 --samples 1 "
+          "! render b.exr --size 64x64 --samples 2 ! compare-images a.exr b.exr",
+      .params = {{.name = "first",
+                  .type = ParamType::Path,
+                  .doc = "an EXR with the layers of 'render'",
+                  .required = true,
+                  .position = 0},
+                 {.name = "second",
+                  .type = ParamType::Path,
+                  .doc = "another of the same size",
+                  .required = true,
+                  .position = 1},
+                 {.name = "exact", .type = ParamType::Flag, .doc = "ask for the same bits"},
+                 {.name = "tolerance",
+                  .type = ParamType::Text,
+                  .doc = "LAYER=USUAL,WORST: what 999 pixels of 1000 and all may differ by; blanks "
+                         "between several"},
+                 {.name = "difference",
+                  .type = ParamType::Path,
+                  .doc = "write the differences to this .exr, a channel for each layer"},
+                 {.name = "format", .type = ParamType::Text, .doc = "of the differences: exr"},
+                 jsonParam()},
+      .flow = Flow::PassesThrough,
+      .run = compareImages,
+      .plan = [](Invocation&) { return Plan{}; },
+      .validate = validateComparison,
+      .targets =
+          [](const Invocation& in) {
+            return in.given("difference") ? std::vector<std::string>{in.text("difference")}
+                                          : std::vector<std::string>{};
+          },
+      .usesStandardOutput =
+          [](const Invocation& in) {
+            return in.given("difference") && levelset::isStandardOutput(in.text("difference"));
+          },
+  };
 }
 
 }  // namespace pipeline

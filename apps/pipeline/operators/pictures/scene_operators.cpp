@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/pictures/camera_options.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "apps/pipeline/values/units.h"
@@ -26,7 +27,7 @@ std::vector<std::string> wordsOf(const std::string& text) {
   return words;
 }
 
-/// By --names, else what --as called them, else part1, part2, …
+/// Names of the parts: --names, else those of --as, else part1, part2, …
 std::vector<std::string> partNames(const Invocation& in) {
   std::vector<std::string> names;
   if (in.given("names")) {
@@ -44,7 +45,7 @@ std::vector<std::string> partNames(const Invocation& in) {
   return names;
 }
 
-/// One for each part, or as many as there are by turns.
+/// Colours of the parts; fewer colours than parts repeat.
 std::vector<Imath::C3f> partColours(const Invocation& in) {
   std::vector<Imath::C3f> colours;
   if (in.given("colours")) {
@@ -64,7 +65,7 @@ std::vector<Imath::C3f> partColours(const Invocation& in) {
   return colours;
 }
 
-/// One for each part.
+/// Opacities, one for each part.
 std::vector<double> partOpacities(const Invocation& in) {
   std::vector<double> opacities(in.operands.size(), 1);
   if (!in.given("opacities")) return opacities;
@@ -91,7 +92,7 @@ Plan planScene(Invocation& in) {
     if (one.voxelSize == 0) continue;  // a mesh
     plan.voxelSize = plan.voxelSize > 0 ? std::min(plan.voxelSize, one.voxelSize) : one.voxelSize;
   }
-  // Lengths count on all of them, whichever comes first.
+  // Lengths refer to all parts, whatever their order.
   in.setReference(plan.voxelSize, plan.bounds.isEmpty() ? 0 : plan.bounds.size().length());
   return plan;
 }
@@ -148,7 +149,7 @@ void validateScene(const Invocation& in) {
 
 }  // namespace
 
-void addSceneOperators(std::vector<Operator>& all) {
+Operator sceneOperator() {
   Operator scene = {
       .name = "scene",
       .group = "Pictures",
@@ -198,7 +199,7 @@ void addSceneOperators(std::vector<Operator>& all) {
       .validate = validateScene,
   };
   addCameraParams(scene.params);
-  all.push_back(std::move(scene));
+  return scene;
 }
 
 }  // namespace pipeline

@@ -6,6 +6,7 @@
 #include <tuple>
 #include <vector>
 
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
@@ -47,8 +48,8 @@ Value slice(Invocation& in) {
 
 }  // namespace
 
-void addSliceOperators(std::vector<Operator>& all) {
-  all.push_back({
+Operator sliceOperator() {
+  return {
       .name = "slice",
       .group = "Pictures",
       .summary = "draw the distance in a plane, with contour lines",
@@ -57,8 +58,9 @@ void addSliceOperators(std::vector<Operator>& all) {
           "line black; grey tones where the band does not reach. Seen from where the normal "
           "points, z upwards (y for a normal along z). The layers are R G B A, phi and P.X P.Y "
           "P.Z.",
-      .example = "levelsmith torus --radius 2 --tube 0.8 --voxel 0.1 ! slice --plane \"0,0,0 "
-                 "1,0,0\" --png slice.png --size 320x240",
+      .example =
+          "levelsmith torus --radius 2 --tube 0.8 --voxel 0.1 ! slice --plane \"0,0,0 "
+          "1,0,0\" --png slice.png --size 320x240",
       .params =
           {{.name = "plane",
             .type = ParamType::Points,
@@ -83,7 +85,7 @@ void addSliceOperators(std::vector<Operator>& all) {
               if (levelset::isStandardOutput(target)) return true;
             return false;
           },
-  });
+  };
 }
 
 }  // namespace pipeline

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "apps/pipeline/values/height_file.h"
 #include "levelset/error.h"
@@ -22,7 +23,7 @@ using Imath::V3d;
 using levelset::NarrowBand;
 using levelset::ShapeOptions;
 
-/// A texture once its lengths are world units.
+/// A texture whose lengths are resolved to world units.
 struct Generator {
   levelset::ShapeExtent extent;
   mapping::TileBox box;
@@ -37,7 +38,7 @@ mapping::Tiling tilingOf(Invocation& in) {
           .overlap = in.length("overlap")};
 }
 
-/// A length for which `auto` was not given.
+/// Returns a length, or an empty value for `auto`.
 std::optional<double> lengthUnlessAuto(Invocation& in, const char* name) {
   if (in.text(name) == "auto") return {};
   return in.length(name);
@@ -183,7 +184,7 @@ Generator heightmap(Invocation& in) {
           }};
 }
 
-/// The texture, its voxel size, and what the report says of both.
+/// The texture and its voxel size. Adds notes on both.
 std::pair<Generator, double> describeTexture(Invocation& in, Generate generate) {
   if (in.asksVoxelSize() && in.given("voxel")) in.setReference(in.length("voxel"), 0);
   Generator generator = generate(in);
@@ -210,7 +211,7 @@ Value makeTexture(Invocation& in) {
 
 Value heightmapSheet(Invocation& in) {
   if (in.asksVoxelSize() && in.given("voxel")) in.setReference(in.length("voxel"), 0);
-  const mapping::Heightmap map = heightmapOf(in);  // once: the picture may be a pipe
+  const mapping::Heightmap map = heightmapOf(in);  // read once, since the picture may be a pipe
   const V3d center = in.point("center");
   const V3d size = mapping::heightmapExtent(map, center).bounds.size();
   const double voxel = in.voxelSize(std::max({size.x, size.y, size.z}));
@@ -298,8 +299,8 @@ Operator generator(const char* name, const char* summary, const char* details, c
 
 }  // namespace
 
-void addGeneratorOperators(std::vector<Operator>& all) {
-  all.push_back(generator<knurl>(
+Operator knurlOperator() {
+  return generator<knurl>(
       "knurl", "make a plate with knurled grooves",
       "V-grooves in the top of a plate, as knurling wheels press them. The tile goes on across its "
       "sides as it begins on the other; a column and row of diamonds is pitch / cos(angle) wide "
@@ -312,8 +313,11 @@ void addGeneratorOperators(std::vector<Operator>& all) {
              degrees("flanks", "between the two flanks of a groove", "90"),
              degrees("angle", "of the grooves from y", "30"),
              size("base", "of solid below the grooves; 'auto': as much as their depth", "auto",
-                  Range::NonNegative)})));
-  all.push_back(generator<scales>(
+                  Range::NonNegative)}));
+}
+
+Operator scalesOperator() {
+  return generator<scales>(
       "scales", "make a plate of overlapping scales",
       "Rows of tongues along x, tips towards +y, every second row half a width aside. An even "
       "number of rows goes on across the tile's sides.",
@@ -328,8 +332,11 @@ void addGeneratorOperators(std::vector<Operator>& all) {
                   Range::Positive),
              size("rounding", "radius of the edges", "0", Range::NonNegative),
              size("base", "thickness of the plate; 'auto': 0.2 of the length", "auto",
-                  Range::NonNegative)})));
-  all.push_back(generator<hexagons>(
+                  Range::NonNegative)}));
+}
+
+Operator hexagonsOperator() {
+  return generator<hexagons>(
       "hexagons", "make a plate of raised hexagons, or a honeycomb",
       "Hexagons with flats across x in rows along x, every second row half a spacing aside. "
       "An even number of rows goes on across the tile's sides.",
@@ -341,8 +348,11 @@ void addGeneratorOperators(std::vector<Operator>& all) {
              size("height", "above the plate; 'auto': 0.4 of the size", "auto", Range::Positive),
              size("base", "thickness of the plate, 0: none; 'auto': 0.2 of the size", "auto",
                   Range::NonNegative),
-             size("rounding", "radius of the upper edges", "0", Range::NonNegative)})));
-  all.push_back(generator<ring>(
+             size("rounding", "radius of the upper edges", "0", Range::NonNegative)}));
+}
+
+Operator ringOperator() {
+  return generator<ring>(
       "ring", "make a ring, or a sheet of chain mail",
       "More than one column or row is European 4-in-1: each ring holds two of the row before and "
       "two of the row behind, and none touch. Left to themselves, spacing and lean leave the most "
@@ -357,8 +367,11 @@ void addGeneratorOperators(std::vector<Operator>& all) {
        count("columns", "of rings, along x", "1"),
        count("rows", "of rings, along y", "1"),
        pair("spacing", "of rings along a row, and of rows"),
-       size("clearance", "that must be left between wires", "0", Range::NonNegative)}));
-  all.push_back(generator<gyroid>(
+       size("clearance", "that must be left between wires", "0", Range::NonNegative)});
+}
+
+Operator gyroidOperator() {
+  return generator<gyroid>(
       "gyroid", "make a box of gyroid walls or struts",
       "The surface sin x cos y + sin y cos z + sin z cos x = 0, thickened by its true distance and "
       "cut off by the box of its cells, where small parts may come loose (`keep` drops them).",
@@ -368,8 +381,11 @@ void addGeneratorOperators(std::vector<Operator>& all) {
        size("thickness", "of walls, or of struts at their thinnest; 'auto': 0.1 cell", "auto",
             Range::Positive),
        count("columns", "of cells, along x", "2"), count("rows", "of cells, along y", "2"),
-       count("layers", "of cells, along z", "1")}));
-  all.push_back(generator<heightmap>(
+       count("layers", "of cells, along z", "1")});
+}
+
+Operator heightmapOperator() {
+  Operator op = generator<heightmap>(
       "heightmap", "make a plate whose top is a picture",
       "A grey PNG (black is low, white is high, what is transparent is low) or lines of numbers "
       "(the least is low, the largest is high). The first row lies at the largest y.",
@@ -386,23 +402,22 @@ void addGeneratorOperators(std::vector<Operator>& all) {
        {.name = "invert", .type = ParamType::Flag, .doc = "black is high, white is low"},
        {.name = "sheet",
         .type = ParamType::Flag,
-        .doc = "its top alone, as an open mesh with a vertex every voxel: for 'surface-band'"}}));
-  all.back().resultKind = [](const Invocation& in) {
-    return in.flag("sheet") ? Kind::Mesh : Kind::Band;
-  };
-  all.back().run = [](Invocation& in) {
+        .doc = "its top alone, as an open mesh with a vertex every voxel: for 'surface-band'"}});
+  op.resultKind = [](const Invocation& in) { return in.flag("sheet") ? Kind::Mesh : Kind::Band; };
+  op.run = [](Invocation& in) {
     return in.flag("sheet") ? heightmapSheet(in) : makeTexture<heightmap>(in);
   };
-  all.back().plan = [](Invocation& in) {
+  op.plan = [](Invocation& in) {
     Plan plan = planTextureSolid<heightmap>(in);
     if (in.flag("sheet")) plan.kind = Kind::Mesh;
     return plan;
   };
-  all.back().validate = [](const Invocation& in) {
+  op.validate = [](const Invocation& in) {
     in.requireVoxelSize();
     if (in.flag("sheet") && in.given("half-width"))
       throw levelset::UsageError("heightmap: a --sheet is a mesh and has no --half-width");
   };
+  return op;
 }
 
 }  // namespace pipeline

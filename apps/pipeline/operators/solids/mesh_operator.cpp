@@ -12,7 +12,7 @@ bool isPatch(const Invocation& in) {
   return in.operands[0].kind() == Kind::Patch;
 }
 
-/// All patches of a set in one mesh.
+/// Builds one mesh of all patches of a set.
 levelset::TriMesh meshOfPatches(const std::vector<mapping::Patch>& patches,
                                 mapping::PatchMeshKind kind) {
   levelset::TriMesh all;

@@ -4,7 +4,7 @@
 
 namespace pipeline {
 
-/// `mesh`, of level sets and of patches.
+/// The action `mesh`, for level sets and patches.
 [[nodiscard]] Operator meshOperator();
 
 }  // namespace pipeline

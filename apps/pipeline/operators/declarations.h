@@ -1,0 +1,47 @@
+#pragma once
+
+#include "apps/pipeline/registry/operator.h"
+
+/// Operators of files, textures, pictures and inspection, each of which describes itself in the
+/// pipeline. Those of level sets are described in levelset (level_set_operator.h).
+namespace pipeline {
+
+[[nodiscard]] Operator readOperator();
+[[nodiscard]] Operator writeOperator();
+
+[[nodiscard]] Operator knurlOperator();
+[[nodiscard]] Operator scalesOperator();
+[[nodiscard]] Operator hexagonsOperator();
+[[nodiscard]] Operator ringOperator();
+[[nodiscard]] Operator gyroidOperator();
+[[nodiscard]] Operator heightmapOperator();
+
+[[nodiscard]] Operator patchOperator();
+[[nodiscard]] Operator decalOperator();
+[[nodiscard]] Operator patchGridOperator();
+
+[[nodiscard]] Operator scatterOperator();
+
+[[nodiscard]] Operator textureOperator();
+
+[[nodiscard]] Operator animateOperator();
+
+[[nodiscard]] Operator foldsOperator();
+
+[[nodiscard]] Operator measureOperator();
+[[nodiscard]] Operator compareOperator();
+[[nodiscard]] Operator checkOperator();
+[[nodiscard]] Operator infoOperator();
+
+[[nodiscard]] Operator sceneOperator();
+
+[[nodiscard]] Operator sliceOperator();
+
+[[nodiscard]] Operator renderOperator();
+[[nodiscard]] Operator compareImagesOperator();
+
+[[nodiscard]] Operator regressOperator();
+
+[[nodiscard]] Operator cacheOperator();
+
+}  // namespace pipeline
