@@ -18,15 +18,15 @@ done
 # From one end of a bone to the other, half a turn on the way.
 "$levelsmith" --quiet sphere --radius 6 --center -9,0,0 --voxel 0.4 ! capsule --from -9,0,0 --to 9,0,0 --radius 4 --voxel 0.4 \
   ! blend --op union --radius 3 ! sphere --radius 6 --center 9,0,0 --voxel 0.4 ! blend --op union --radius 3 --as bone \
-  ! read star.vdb --as star ! patch @bone --at -11,-2.5,5 --size 7,7 --height 1.4 --levels 3 --as from \
-  ! patch @bone --at 11,-2.5,5 --size 7,7 --rotate 180 --height 1.4 --levels 3 --as to \
+  ! read star.vdb --as star ! patch @bone --at -11,-2.5,5 --size 7,7 --height 1.4 --layers 3 --as from \
+  ! patch @bone --at 11,-2.5,5 --size 7,7 --rotate 180 --height 1.4 --layers 3 --as to \
   ! animate @bone @star @from @to --frames 4 --carry rigid --voxel 0.3 --blend 0.4 --out place_#.vdb
 
 # On a ball that becomes a ring, from its top to its rim.
 "$levelsmith" --quiet sphere --radius 9 --voxel 0.4 --as ball ! torus --radius 9 --tube 4 --voxel 0.4 --as ring \
   ! morph @ball @ring --steps 6 --keep-steps step_#.vdb --as last ! read star.vdb --as star \
-  ! patch @ball --at 0,-3,8.5 --size 8,8 --height 1.6 --levels 3 --as from \
-  ! patch @last --at 8,-8,3 --size 6,6 --rotate -40 --height 1.2 --levels 3 --as to \
+  ! patch @ball --at 0,-3,8.5 --size 8,8 --height 1.6 --layers 3 --as from \
+  ! patch @last --at 8,-8,3 --size 6,6 --rotate -40 --height 1.2 --layers 3 --as to \
   ! animate @ball @star @from @to --frames 7 --base-frames step_#.vdb --carry rigid --voxel 0.3 --blend 0.4 --out both_#.vdb
 
 for frame in place_0 place_1 place_2 place_3 both_0 both_2 both_4 both_6; do

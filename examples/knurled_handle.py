@@ -14,7 +14,7 @@ os.makedirs(folder, exist_ok=True)
 
 handle = ls.cylinder(radius=1, height=5, voxel=voxel)
 tiles = handle.patch_grid(
-    count=(6, 3), around=((0, 0, -1.8), (0, 0, 1.8)), height=0.15, levels=3, spacing=0.15
+    count=(6, 3), around=((0, 0, -1.8), (0, 0, 1.8)), height=0.15, layers=3, spacing=0.15
 )
 
 # The tile extends beyond its sides, so that it connects to its neighbours.
@@ -24,7 +24,7 @@ tile = knurl.bounds
 tile[0, :2] += overlap
 tile[1, :2] -= overlap
 
-grip = handle.texture(knurl, tiles, texture_box=tile, sink=0.04)
+grip = handle.texture(knurl, tiles, texture_box=tile, embed=0.04)
 part = grip - ls.cylinder(radius=0.3, height=6, voxel=voxel)  # for the tang
 picture = os.path.join(folder, "knurled_handle.png")
 part.render(picture, size=(360, 480), samples=2, from_=(9, -9, 6), to=(0, 0, 0), up=(0, 0, 1), fov=28)

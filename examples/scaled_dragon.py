@@ -30,10 +30,10 @@ warnings.filterwarnings("ignore", "scatter: ", ls.Warning)  # scales whose map w
 # A flat tongue; its bounding box is mapped to the box of each patch.
 scale = ls.sphere(radius=1, voxel=0.08).transform(scale=(1, 1.4, 0.4), bake=True)
 places = skin.scatter(
-    count=5 * resolution // 2, size=(0.045 * span, 0.055 * span), height=0.013 * span, levels=3,
+    count=5 * resolution // 2, size=(0.045 * span, 0.055 * span), height=0.013 * span, layers=3,
     along="0,-1,0", jitter=10, seed=2,
 )  # fmt: skip
-scaled = skin.texture(scale, places, sink=0.005 * span, skip_folds=True, voxel=skin.voxel)
+scaled = skin.texture(scale, places, embed=0.005 * span, skip_folds=True, voxel=skin.voxel)
 
 picture = os.path.join(folder, "scaled_dragon.png")
 eye = (low + high) / 2 + span * numpy.array([0.4, 0.25, 1.35])

@@ -207,7 +207,7 @@ void FileTarget::createTemporary(const fs::path& folder, std::string name) {
     }
     if (errno == EEXIST) continue;
     if (errno == ENOENT || errno == ENOTDIR)
-      throwIo(target_, fmt::format("cannot be created: there is no folder '{}'; make it first",
+      throwIo(target_, fmt::format("cannot be created: there is no folder '{}'; create it first",
                                    folder.string()));
     throwErrno(target_, "cannot be created", errno);
   }

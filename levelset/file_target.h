@@ -14,9 +14,9 @@ namespace levelset {
 /// data from a job that failed.
 class FileTarget {
  public:
-  /// @throws IoError when the folder is missing or not writable, or the target is a directory, a
-  ///         read-only file or a device that accepts no data; also when the target exists and
-  ///         `clobber` (or setClobberDefault) is false
+  /// @throws IoError when the folder is missing or not writable, or when the target is a directory,
+  ///         a read-only file or a device that accepts no data. Also throws when the target exists
+  ///         and `clobber` (or setClobberDefault) is false.
   explicit FileTarget(const std::filesystem::path& target, bool clobber = true);
   ~FileTarget();
   FileTarget(const FileTarget&) = delete;

@@ -158,8 +158,8 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action, BandRepairs* repa
   const std::string name = grid->getName().empty() ? "(unnamed)" : grid->getName();
   if (grid->getGridClass() != openvdb::GRID_LEVEL_SET) {
     throw InvalidInput(
-        fmt::format("{}: grid '{}' is of class '{}', not a level set; convert it before it is read",
-                    action, name, FloatGrid::gridClassToString(grid->getGridClass())));
+        fmt::format("{}: grid '{}' is of class '{}', not a level set; convert it first", action,
+                    name, FloatGrid::gridClassToString(grid->getGridClass())));
   }
   if (!isSimilarity(grid->transform())) {
     throw InvalidInput(

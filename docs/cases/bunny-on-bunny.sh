@@ -6,9 +6,9 @@ bunny 100
 standing_bunny 190
 echo "| spacing | map | particles | setup s | mapping s | points | tests a point | least Jacobian | thesis: particles, setup s, mapping s |"
 echo "|--:|---|--:|--:|--:|--:|--:|--:|---|"
-lay() {  # lay SPACING LEVELS MAP "THESIS"
+lay() {  # lay SPACING LAYERS MAP "THESIS"
   map "bunny-$3-$1" read "$out/bunny100.vdb" --as base ! read "$out/standing190.vdb" --as small \
-    ! patch @base --at 0.5,0.1,0.24 --size 30vx,30vx --rotate 20 --height 21vx --levels "$2" --spacing "$1vx" --as back \
+    ! patch @base --at 0.5,0.1,0.24 --size 30vx,30vx --rotate 20 --height 21vx --layers "$2" --spacing "$1vx" --as back \
     ! texture @base @small @back --map "$3" --alone --voxel 0.0034
   row "bunny-$3-$1" "'$1'" "'$3'" particles cpu_s.setup cpu_s.mapping points operations_per_point min_jacobian "'$4'"
 }

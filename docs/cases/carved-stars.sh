@@ -8,8 +8,8 @@ make lantern sphere --radius 10 --voxel 0.1 ! shell --thickness 0.8
 echo "| | stars | particles | mapping s | merging s |"
 echo "|---|--:|--:|--:|--:|"
 map carved-stars read "$out/lantern.vdb" --as lantern ! read "$out/star.vdb" --as star \
-  ! scatter @lantern --count 32 --size 3.4,3.4 --height 2 --levels 3 --spacing 4vx --along "0,1,0" --mask "x*x+y*y+z*z" --mask-min 95 --mask-max 96 --as places \
-  ! texture @lantern @star @places --carve --sink 1.4 --voxel 0.1
+  ! scatter @lantern --count 32 --size 3.4,3.4 --height 2 --layers 3 --spacing 4vx --along "0,1,0" --mask "x*x+y*y+z*z" --mask-min 95 --mask-max 96 --as places \
+  ! texture @lantern @star @places --carve --embed 1.4 --voxel 0.1
 row carved-stars "'here'" patches particles cpu_s.mapping cpu_s.merging
 echo "| thesis | – | – | a couple each | – |"
 expect carved-stars patches = 32

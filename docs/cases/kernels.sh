@@ -7,8 +7,8 @@ echo "| kernel | mapping s | of biharmonic | thesis case 1: s, of biharmonic | c
 echo "|---|--:|--:|---|---|--:|--:|--:|--:|--:|--:|"
 lay() {  # lay KERNEL "CASE 1" "CASE 2"
   map "kernel-$1" read "$out/bunny150.vdb" --as base ! read "$out/dragon200.vdb" --as small \
-    ! patch @base --at 0.2,-0.3,0.7 --size 0.8,0.4 --height 0.4 --levels 6 --spacing 0.12 --as side \
-    ! texture @base @small @side --kernel "$1" --allow-folds --sink 1vx --voxel 0.004
+    ! patch @base --at 0.2,-0.3,0.7 --size 0.8,0.4 --height 0.4 --layers 6 --spacing 0.12 --as side \
+    ! texture @base @small @side --kernel "$1" --allow-folds --embed 1vx --voxel 0.004
   cost=$("${PYTHON:-python3}" "$here/figures.py" row "$out" "kernel-$1" cpu_s.mapping | tr -d '| ')
   [ "$1" = biharmonic ] && first=$cost
   ratio=$(awk -v a="$cost" -v b="$first" 'BEGIN { printf "%.2f", a / b }')

@@ -7,15 +7,15 @@ echo "| level | particles | voxel | set-up s | mapping s | points | least Jacobi
 echo "|---|--:|--:|--:|--:|--:|--:|"
 map recursion-1 read "$out/bunny120.vdb" --as base ! read "$out/standing150.vdb" --as small \
   ! patch @base --at 0.45,0.13,0.24 --size 0.6,0.5 --rotate 20 --height 0.55 --as back \
-  ! texture @base @small @back --sink 2vx --blend 2vx --voxel 0.006
+  ! texture @base @small @back --embed 2vx --blend 2vx --voxel 0.006
 row recursion-1 "'1'" particles voxel_size cpu_s.setup cpu_s.mapping points min_jacobian
 map recursion-2 read "$out/recursion-1.vdb" --as base ! read "$out/standing150.vdb" --as small \
   ! patch @base --at 0.82,0.37,0.32 --size 0.18,0.15 --rotate 20 --height 0.165 --as back \
-  ! texture @base @small @back --sink 2vx --blend 2vx --voxel 0.003
+  ! texture @base @small @back --embed 2vx --blend 2vx --voxel 0.003
 row recursion-2 "'2'" particles voxel_size cpu_s.setup cpu_s.mapping points min_jacobian
 map recursion-3 read "$out/recursion-2.vdb" --as base ! read "$out/standing150.vdb" --as small \
   ! patch @base --at 0.905,0.38,0.345 --size 0.054,0.045 --rotate 20 --height 0.05 --as back \
-  ! texture @base @small @back --sink 1.5vx --blend 2vx --voxel 0.0015
+  ! texture @base @small @back --embed 1.5vx --blend 2vx --voxel 0.0015
 row recursion-3 "'3'" particles voxel_size cpu_s.setup cpu_s.mapping points min_jacobian
 echo "| thesis, bunnies | – | – | – | – | – | – |"
 echo "| thesis, small latch | 280 | – | – | 20 to 30 | 4 M | – |"

@@ -11,7 +11,7 @@ make starfish capsule --from 0,0,0 --to "$(arm 0)" --radius 0.24 --voxel 0.03 \
 echo "| | pieces | particles | set-up s | certificate s | mapping s | points | distance s | merging s |"
 echo "|---|--:|--:|--:|--:|--:|--:|--:|--:|"
 map starfish-55 read "$out/bunny200.vdb" --as base ! read "$out/starfish.vdb" --as starfish \
-  ! scatter @base --count 55 --seed 2 --size 0.26,0.26 --height 0.05 --levels 3 --jitter 180 --as places \
+  ! scatter @base --count 55 --seed 2 --size 0.26,0.26 --height 0.05 --layers 3 --jitter 180 --as places \
   ! texture @base @starfish @places --blend 1vx --voxel 0.0075
 row starfish-55 "'here'" patches particles cpu_s.setup cpu_s.certificate cpu_s.mapping points cpu_s.distance cpu_s.merging
 echo "| thesis | 55 | – | – | – | a couple each | – | – | – |"

@@ -7,8 +7,8 @@ echo "| levels | twist | particles | least Jacobian | stretch 1 % | 99 % | place
 echo "|--:|--:|--:|--:|--:|--:|--:|---|"
 lay() {  # lay NAME LEVELS TWIST "THESIS"
   map "twist-$1" sphere --radius 1 --voxel 0.025 --as ball ! read "$out/standing150.vdb" --as statue \
-    ! patch @ball --at 0,0,1 --size 1,0.8 --height 1.1 --levels "$2" --twist "$3" --as p \
-    ! texture @ball @statue @p --allow-folds --sink 2vx --voxel 0.0125
+    ! patch @ball --at 0,0,1 --size 1,0.8 --height 1.1 --layers "$2" --twist "$3" --as p \
+    ! texture @ball @statue @p --allow-folds --embed 2vx --voxel 0.0125
   row "twist-$1" "'$2'" "'$3'" particles min_jacobian stretch.percent_1 stretch.percent_99 folded "'$4'"
   picture "twist-$1" --from 2.6,-3.2,2.2 --to 0,0,0.9 --up 0,0,1
 }

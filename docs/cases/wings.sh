@@ -7,9 +7,9 @@ echo "| posture | particles | mapping s | least Jacobian | stretch 1 % | 99 % | 
 echo "|---|--:|--:|--:|--:|--:|---|"
 lay() {  # lay POSTURE LEFT RIGHT: points of the two splines
   map "wings-$1" read "$out/bunny150.vdb" --as base ! read "$out/feathers.vdb" --as feathers \
-    ! patch @base --at 0.35,0.0,0.55 --size 0.5,0.12 --rotate 180 --particles spline --spline "$2" --fade --height 1 --levels 12 --as left \
-    ! patch @base --at 0.35,0.0,-0.3 --size 0.5,0.12 --particles spline --spline "$3" --fade --height 1 --levels 12 --as right \
-    ! texture @base @feathers @left --sink 3vx --voxel 0.006 --as one ! texture @one @feathers @right --sink 3vx --voxel 0.006
+    ! patch @base --at 0.35,0.0,0.55 --size 0.5,0.12 --rotate 180 --particles spline --spline "$2" --fade --height 1 --layers 12 --as left \
+    ! patch @base --at 0.35,0.0,-0.3 --size 0.5,0.12 --particles spline --spline "$3" --fade --height 1 --layers 12 --as right \
+    ! texture @base @feathers @left --embed 3vx --voxel 0.006 --as one ! texture @one @feathers @right --embed 3vx --voxel 0.006
   row "wings-$1" "'$1'" particles cpu_s.mapping min_jacobian stretch.percent_1 stretch.percent_99 "'–'"
   picture "wings-$1" --from 3.4,1.6,2.6 --to 0.1,0.1,0.1
 }

@@ -22,8 +22,8 @@ struct SurfaceBandResult {
   NarrowBand band;  ///< isOpenSurface()
   std::size_t borderEdges = 0;
   std::size_t droppedTriangles = 0;  ///< triangles without area and exact duplicates
-  std::size_t removedVoxels = 0;     ///< voxels removed where the front of one part of the surface
-                                  ///< meets the back of another
+  /// Voxels removed where the front of one part of the surface meets the back of another.
+  std::size_t removedVoxels = 0;
 };
 
 /// Computes distances to an open, consistently oriented mesh, positive on the side that the
@@ -38,9 +38,9 @@ struct SurfaceBandResult {
 /// @param mesh  vertices at equal positions count as one
 /// @param voxelSize  world units, positive and finite; grid points lie at its integer multiples
 /// @throws UsageError for a voxel size or half width out of range
-/// @throws InvalidInput for a mesh that meshToBand refuses, a mesh without a border, an edge with
-///         three faces, or an edge whose two faces have opposite orientations (any Möbius strip has
-///         one)
+/// @throws InvalidInput for a mesh that meshToBand refuses or a mesh without a border. Also throws
+///         for an edge with three faces or with two faces of opposite orientations. Any Möbius
+///         strip has such an edge.
 /// @throws ResourceLimit, Cancelled
 [[nodiscard]] SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
                                             const SurfaceBandOptions& options = {});

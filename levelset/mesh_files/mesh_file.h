@@ -35,9 +35,9 @@ struct ReadMeshOptions {
 /// Reads a mesh.
 /// @param path  a file, or "-" for standard input (requires options.format)
 /// @throws IoError when the file cannot be opened or read
-/// @throws InvalidInput when the file is empty, truncated or without triangles; when a count
-///         exceeds the file's size, an index is out of range, or a coordinate or attribute is not
-///         finite
+/// @throws InvalidInput when the file is empty, truncated or without triangles. Also throws when a
+///         count exceeds the file's size, an index is out of range, or a coordinate or attribute is
+///         not finite.
 [[nodiscard]] TriMesh readMesh(const std::filesystem::path& path,
                                const ReadMeshOptions& options = {});
 

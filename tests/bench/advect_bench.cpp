@@ -1,7 +1,8 @@
-// Enright's deformation there and back, beside OpenVDB's own advection (HJ-WENO5, TVD-RK3) on the
-// same grid in one run; the velocity is a function, then a staggered grid of the same voxels, which
-// both read with the same sampler. Exits 1 when the front's CPU seconds over OpenVDB's pass a bound
-// or cannot be told. advect_bench [function=BOUND] [staggered=BOUND] [RESOLUTION …]
+// Times Enright's deformation, forward and back, beside OpenVDB's own advection (HJ-WENO5, TVD-RK3)
+// on the same grid in one run. The velocity is first a function, then a staggered grid of the same
+// voxels. Both programs read it with the same sampler. Exits 1 when the ratio of the front's CPU
+// seconds to OpenVDB's exceeds a bound or cannot be computed.
+// Usage: advect_bench [function=BOUND] [staggered=BOUND] [RESOLUTION …]
 
 #include <fmt/core.h>
 #include <sys/resource.h>
@@ -36,7 +37,8 @@ double cpuSeconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-/// Mean distance of linear zeros along the grid's edges from the ball, voxels.
+/// Mean distance from the ball, in voxels, of the zeros that linear interpolation finds on grid
+/// edges.
 double surfaceError(const NarrowBand& band) {
   const openvdb::FloatGrid& grid = levelset::vdb(band);
   const auto accessor = grid.getConstAccessor();
@@ -56,7 +58,7 @@ double surfaceError(const NarrowBand& band) {
   return sum / count / band.voxelSize();
 }
 
-/// @return the CPU seconds
+/// @return CPU seconds
 template <typename Run>
 double show(const char* name, int resolution, const NarrowBand& ball, const Run& run) {
   const double start = cpuSeconds();
@@ -69,10 +71,10 @@ double show(const char* name, int resolution, const NarrowBand& ball, const Run&
   return seconds;
 }
 
-/// Most that the front may take, in parts of what OpenVDB does, by the name of the velocity.
+/// Largest accepted ratio of the front's time to OpenVDB's, by the name of the velocity.
 using Bounds = std::map<std::string, double>;
 
-/// @return whether a bound is missed
+/// @return true if a bound is exceeded
 bool judge(const Bounds& bounds, const char* velocity, double ours, double theirs) {
   const double ratio = ours / theirs;
   fmt::print("      front / OpenVDB, {:<9} {:6.2f}", velocity, ratio);

@@ -1,4 +1,4 @@
-// Curvature flow and smoothing beside OpenVDB's own on the same grid, in one run.
+// Times curvature flow and smoothing beside OpenVDB's own on the same grid, in one run.
 
 #include <benchmark/benchmark.h>
 #include <openvdb/tools/LevelSetFilter.h>
@@ -12,7 +12,7 @@ namespace {
 
 using levelset::NarrowBand;
 
-/// From R = 32 to R = 16 voxels.
+/// Shrinks a ball from R = 32 to R = 16 voxels.
 void BM_HalveABall(benchmark::State& state) {
   const NarrowBand ball = levelset::makeSphere(32, {0.3, 0.2, 0.1}, 1);
   for (auto _ : state) benchmark::DoNotOptimize(levelset::curvatureFlow(ball, 192));
@@ -22,7 +22,8 @@ void BM_HalveABallOpenVdb(benchmark::State& state) {
   for (auto _ : state) {
     auto grid = levelset::vdb(ball).deepCopy();
     openvdb::tools::LevelSetFilter<openvdb::FloatGrid> filter(*grid);
-    for (int i = 0; i < 1152; ++i) filter.meanCurvature();  // each of 1/6 voxels² of our time
+    // Each step covers 1/6 voxels² of our time.
+    for (int i = 0; i < 1152; ++i) filter.meanCurvature();
   }
 }
 
@@ -33,7 +34,7 @@ void BM_Gaussian(benchmark::State& state) {
     benchmark::DoNotOptimize(
         levelset::smooth(ball, levelset::SmoothKind::Gaussian, ball.voxelSize()));
 }
-/// What vdb_tool -gauss does.
+/// Runs the filter of `vdb_tool -gauss`.
 void BM_GaussianOpenVdb(benchmark::State& state) {
   const NarrowBand ball =
       levelset::makeSphere(1, Imath::V3d(0), 2.0 / static_cast<double>(state.range(0)));

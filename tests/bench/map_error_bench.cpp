@@ -1,10 +1,10 @@
-// Error against run time of the three ways to map grid points: the direct sum of an RBF map, the
-// fast sum, and tetrahedra; for 10³ to 10⁵ particles and 10⁶ to 10⁸ grid points of a third of a
-// cylinder's wall, on one thread, all threads to solve. The error is that of the whole map, against
-// the exact inverse of the one that made the particles, 99 % and largest of 2000 places well
-// inside. Direct sums above 10⁴ particles × 10⁷ points are timed on a sample of the blocks, and
-// marked so. Exits 1 when at any point of theirs the fast sum is off the direct one by more than
-// 0.05 texture voxel.
+// Measures error against run time of three methods that map grid points: the direct sum of an RBF
+// map, its fast sum, and tetrahedra. Maps 10⁶ to 10⁸ grid points of a third of a cylinder's wall
+// with 10³ to 10⁵ particles. Mapping uses one thread, solving all threads. The error is that of the
+// complete map, against the exact inverse of the map that placed the particles. Prints the 99th
+// percentile and the maximum over 2000 positions well inside. Direct sums above 10⁴ particles × 10⁷
+// points are timed on a sample of the blocks, and marked. Exits 1 when the fast sum differs from
+// the direct sum by more than 0.05 texture voxel at any point that both evaluate.
 //   map_error_bench [POINTS = 100000000] > map-error.csv
 
 #include <fmt/core.h>
@@ -34,11 +34,13 @@ using wall::kTextureVoxels;
 using wall::kTolerance;
 using wall::now;
 
-constexpr int kPlaces = 2000;  // to ask for the error
-// Particles times points up to which a direct sum runs whole, and of the sample beyond.
+constexpr int kPlaces = 2000;  // positions where the error is measured
+// Particles × points up to which a direct sum runs completely, and the size of the sample above
+// that.
 constexpr double kWhole = 1.1e11, kSampled = 1e10;
 
-/// The exact u, v, w of a place, to rounding: the waves are so small that the fixed point is found.
+/// Exact u, v, w of a position, to rounding. The waves are so small that the fixed-point iteration
+/// converges.
 V3d fromWall(const V3d& x) {
   const double w = (std::hypot(x.x, x.z) - kInner) / kHeight;
   V3d uvw(std::atan2(x.x, x.z) / kAngle + 0.5, x.y / kLength, w);
@@ -49,7 +51,7 @@ V3d fromWall(const V3d& x) {
   return uvw;
 }
 
-/// As far apart across the wall as along it.
+/// Places particles at the same spacing across the wall and along it.
 mapping::Patch makePatch(double particles) {
   const double spacing = std::cbrt(kLength * kLength * kHeight / particles);
   return wall::makePatch(particles, std::max(4.0, std::round(kHeight / spacing) + 1));
@@ -62,12 +64,12 @@ mapping::RbfMap solve(const mapping::Patch& patch) {
   return mapping::patchToTexture(patch, options);
 }
 
-/// Evaluates the leaf blocks of the wall, all of them or a share.
+/// Evaluates all leaf blocks of the wall, or a random share of them.
 struct Run {
   double points = 0, seconds = 0;
-  double share = 1;    ///< of the blocks, chosen at random
-  double timed = 0;    ///< points
-  double fastOff = 0;  ///< how far the fast sum is off at those, texture voxels, at the most
+  double share = 1;    ///< share of the blocks, chosen at random
+  double timed = 0;    ///< number of timed points
+  double fastOff = 0;  ///< largest difference of the fast sum at these points, texture voxels
   std::mt19937_64 random{7};
 
   void descend(const GridBlock& block, const mapping::BlockMap& map) {
@@ -83,8 +85,8 @@ struct Run {
     points += 512;
   }
 
-  /// Only the direct sum is timed: it has nothing to gain from descending. The fast one tells how
-  /// far they differ.
+  /// Times only the direct sum, which gains nothing from the descent. The fast sum gives the
+  /// difference between the two.
   void direct(const GridBlock& block, const mapping::PatchMap& map, const mapping::BlockMap& fast) {
     if (block.edge > GridBlock::kLeafEdge) {
       for (int bits = 0; bits < 8; ++bits) direct(block.octant(bits), map, *fast.octant(bits));
@@ -110,7 +112,7 @@ struct Error {
   double percent99 = 0, largest = 0;  ///< texture voxels
 };
 
-/// @param at  the map's value at a place
+/// @param at  value of the map at a position
 template <typename At>
 Error errorOf(const At& at) {
   std::mt19937_64 random(7);
@@ -125,7 +127,7 @@ Error errorOf(const At& at) {
   return {errors[errors.size() * 99 / 100], errors.back()};
 }
 
-/// A block of one spot's size about a place, to ask the fast sum there.
+/// Evaluates the fast sum in a block of a single spot around a position.
 V3d fastAt(const mapping::RbfMap& map, const V3d& x, double step) {
   Imath::M33d rows;
   for (int i = 0; i < 3; ++i) rows[i][i] = step;

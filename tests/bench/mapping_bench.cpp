@@ -1,13 +1,16 @@
-// What a grid point, or a vertex, costs under each map, beside the direct sum of the RBF map, on
-// one thread: a third of a cylinder's wall with a texture of 256 x 256 x 64 voxels laid onto it.
-// Solving is timed apart. The direct sum runs on a hundredth of the blocks, drawn at random with
-// the seed 7, so that no pattern of the grid is in the sample and each run has the same one.
+// Measures the time per grid point, or per vertex, of each map beside the direct sum of the RBF
+// map. Uses one thread, and a third of a cylinder's wall with a texture of 256 x 256 x 64 voxels.
+// Solving is timed separately. The direct sum runs on a hundredth of the blocks. A random choice
+// (seed 7) keeps grid patterns out of the sample, and each run has the same sample.
 //   mapping_bench [PARTICLES = 10000] [POINTS = 10000000] [SOLVED = 100000]
-// Then the six kernels, on a tenth of the points with 2000 particles; and what solving for SOLVED
-// particles by iteration takes, on all threads (0: nothing).
-// Exits 1 when the fast sum is less than 30 times as fast as the direct one, or off by more than
-// 0.05 texture voxel, when tetrahedra are less than 5 times as fast, or when a mesh, bare or with
-// normals and texture coordinates, moves at less than 5 million vertices a second.
+// Then times the six kernels on a tenth of the points with 2000 particles. Last, times the
+// iterative solution for SOLVED particles on all threads (0: skipped). Exits 1 in any of these
+// cases:
+// - the fast sum is less than 30 times as fast as the direct sum, or off by more than 0.05 texture
+// voxel
+// - tetrahedra are less than 5 times as fast
+// - a mesh maps less than 5 million vertices a second, with or without normals and texture
+// coordinates
 
 #include <fmt/core.h>
 #include <tbb/global_control.h>
@@ -45,7 +48,8 @@ struct Cost {
   double points = 0, seconds = 0, directPoints = 0, directSeconds = 0, operations = 0, worst = 0;
 };
 
-/// Descends into what touches the unit cube, as a texture warp does, and evaluates the wall.
+/// Descends into the blocks that touch the unit cube, as a texture warp does, and evaluates the
+/// wall.
 template <typename Direct>
 void descend(const GridBlock& block, const mapping::BlockMap& map, Cost& cost,
              const Direct& direct) {
@@ -121,7 +125,7 @@ int main(int argc, char** argv) {
   const mapping::RbfMap rbf = patchToTexture(patch, {.denseLimit = particles + 1000});
   fmt::print("{} particles, solved in {:.1f} s\n", rbf.size(), now() - start);
 
-  // Every particle at every grid point, with the same vector code.
+  // Direct sum: every particle at every grid point, with the same vector code.
   std::mt19937 random(kSeed);
   const Cost fast = run(rbf, grid, kTolerance / kTextureVoxels,
                         [&](const GridBlock& block, const std::array<V3d, 512>& uvw, Cost& cost) {
@@ -165,7 +169,7 @@ int main(int argc, char** argv) {
   fmt::print("vertices {:.3g} million a second (5 wanted){}\n", kVertices / (now() - start) / 1e6,
              sum.x == 0.5 ? " " : "");
 
-  // The whole of `texture --map mesh`, without and with what vertices carry.
+  // The complete work of `texture --map mesh`, without and with vertex attributes.
   levelset::TriMesh cloud;
   for (int i = 0; i < kVertices; ++i) {
     const double t = static_cast<double>(i) / kVertices;

@@ -1,5 +1,7 @@
-// Converts a mesh several times and prints the median CPU seconds of a conversion, reading apart.
-//   mesh_to_band_bench FILE VOXEL RUNS closed|winding|search
+// Converts a mesh several times and prints the median CPU seconds of a conversion, without reading.
+//   mesh_to_band_bench FILE VOXEL RUNS closed
+// winding
+// search
 
 #include <fmt/core.h>
 
@@ -15,7 +17,7 @@
 
 namespace {
 
-/// Of all threads.
+/// CPU seconds of all threads.
 double cpuSeconds() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }

@@ -1,5 +1,5 @@
-// The operators without a bound of their own, beside OpenVDB's where it has one, in one run: on the
-// ball of 256 voxels across, unless a benchmark says otherwise.
+// Times the operators that have no bound of their own, beside OpenVDB's where it has one, in one
+// run. The input is a ball with a diameter of 256 voxels, unless a benchmark states another.
 
 #include <benchmark/benchmark.h>
 #include <openvdb/tools/Composite.h>
@@ -31,7 +31,7 @@ using Filter = openvdb::tools::LevelSetFilter<openvdb::FloatGrid>;
 
 constexpr double kVoxel = 2.0 / 256;
 
-/// Radius 1.
+/// Ball of radius 1.
 const NarrowBand& ball() {
   static const NarrowBand solid = levelset::makeSphere(1, Imath::V3d(0), kVoxel);
   return solid;
@@ -116,16 +116,16 @@ void BM_Taubin(benchmark::State& state) {
   smoothed(state, levelset::SmoothKind::Taubin);
 }
 
-/// The ball five voxels beside it.
+/// Ball moved by five voxels.
 NarrowBand shifted() {
   return levelset::makeSphere(1, Imath::V3d(5 * kVoxel, 0, 0), kVoxel);
 }
-/// In twenty steps.
+/// Morphs in twenty steps.
 void BM_Morph(benchmark::State& state) {
   const NarrowBand target = shifted();
   time(state, [&] { return levelset::morph(ball(), target, {.steps = 20}); });
 }
-/// To time 1, some steps of its own.
+/// Morphs to time 1, with as many steps as OpenVDB chooses.
 void BM_MorphOpenVdb(benchmark::State& state) {
   const NarrowBand target = shifted();
   for (auto _ : state) {
@@ -157,7 +157,8 @@ void BM_Compare(benchmark::State& state) {
 void BM_Measure(benchmark::State& state) {
   time(state, [] { return levelset::measure(ball()); });
 }
-/// Area, volume, mean and Gaussian curvature; no centroid, inertia or components.
+/// Measures area, volume, mean and Gaussian curvature. OpenVDB has no centroid, inertia or
+/// components.
 void BM_MeasureOpenVdb(benchmark::State& state) {
   for (auto _ : state) {
     openvdb::tools::LevelSetMeasure<openvdb::FloatGrid> measure(levelset::vdb(ball()));
@@ -203,7 +204,7 @@ LEVELSMITH_BENCH(BM_KeepLargest);
 }  // namespace
 
 int main(int argc, char** argv) {
-  (void)ball();  // lest the first benchmark pays for it
+  (void)ball();  // so that the first benchmark does not include it
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();
 }

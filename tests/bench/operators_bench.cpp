@@ -1,4 +1,4 @@
-// Operators beside OpenVDB's own on the same grid, in one run. Items are active voxels of the
+// Times operators beside OpenVDB's own on the same grid, in one run. Items are active voxels of the
 // input.
 
 #include <benchmark/benchmark.h>
@@ -22,7 +22,7 @@ namespace {
 
 using levelset::NarrowBand;
 
-/// A ball whose diameter is range(0) voxels.
+/// Ball with a diameter of range(0) voxels.
 NarrowBand ball(const benchmark::State& state, double shift = 0) {
   return levelset::makeSphere(1, Imath::V3d(shift, 0, 0),
                               2.0 / static_cast<double>(state.range(0)));
@@ -37,7 +37,7 @@ void BM_Union(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(levelset::unite(a, b));
   countVoxels(state, a);
 }
-/// vdb_tool's default: CSG, then a rebuild of the band.
+/// Runs the default of vdb_tool: CSG, then a rebuild of the band.
 void BM_UnionOpenVdb(benchmark::State& state) {
   const NarrowBand a = ball(state), b = ball(state, 0.5);
   for (auto _ : state) {
@@ -74,8 +74,8 @@ void BM_RedistanceOpenVdb(benchmark::State& state) {
   countVoxels(state, a);
 }
 
-/// Eight voxels more on each side; items are active voxels of the result, since OpenVDB's dilation
-/// reaches less far along diagonals.
+/// Widens the band by eight voxels on each side. Items are active voxels of the result, because
+/// OpenVDB's dilation extends less far along diagonals.
 void BM_Widen8(benchmark::State& state) {
   const NarrowBand a = ball(state);
   std::int64_t voxels = 0;

@@ -27,13 +27,13 @@ cost() {
 alone=$(cost $needed $(three))
 of_twelve=$(cost $others $needed $(three))
 
-# A part of a large solid, made as far as it is needed and made whole (--whole).
+# A part of a large solid, made as far as it is needed and made whole (--no-roi).
 part="sphere --radius 2 --voxel 0.01 --half-width 10 ! offset 0.1 ! clip --box"
 memory() { { /usr/bin/env time -f '%M' "$levelsmith" -q "$@" >/dev/null; } 2>&1 | tail -1; }
 needed_time=$(cost $part "1.5,-0.5,-0.5 3,0.5,0.5" ! mesh ! write part.ply)
-whole_time=$(cost --whole $part "1.5,-0.5,-0.5 3,0.5,0.5" ! mesh ! write whole.ply)
+whole_time=$(cost --no-roi $part "1.5,-0.5,-0.5 3,0.5,0.5" ! mesh ! write whole.ply)
 needed_memory=$(memory $part "1.5,-0.5,-0.5 3,0.5,0.5" ! mesh ! write part.ply)
-whole_memory=$(memory --whole $part "1.5,-0.5,-0.5 3,0.5,0.5" ! mesh ! write whole.ply)
+whole_memory=$(memory --no-roi $part "1.5,-0.5,-0.5 3,0.5,0.5" ! mesh ! write whole.ply)
 cmp part.ply whole.ply
 
 # Three branches with parts that no thread shares; on one thread, and on all.

@@ -1,6 +1,7 @@
-// Primary rays of a band's default view at 1024x768: CPU seconds of the kernel on one thread, of
-// the kernel on the GPU (or Mesa's llvmpipe, whose seconds are the processor's too), and of the
-// judge; what the tables take. render.sh holds them against vdb_render.
+// Measures primary rays of a band's default view at 1024x768. Reports CPU seconds of the kernel on
+// one thread, of the kernel on the GPU, and of the judge, and the memory of the tables. With Mesa's
+// llvmpipe in place of a GPU, its seconds are CPU time too. render.sh compares them with
+// vdb_render.
 //   render_bench FILE.vdb            a table on standard output: NAME VALUE
 //   render_bench --view FILE.vdb     the view, as vdb_render takes it
 
@@ -36,9 +37,10 @@ double cpuSeconds() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-constexpr std::size_t kAtOnce = 1u << 12;  // of the processor: what stays in its cache
+// Rays per call on the processor, few enough for its cache.
+constexpr std::size_t kAtOnce = 1u << 12;
 
-/// The picture's pixels, squares of neighbours next to each other, so many at a time.
+/// All pixels of the picture in blocks of `atOnce`, as squares of neighbouring pixels.
 std::vector<PixelBlock> allPixels(std::size_t atOnce) {
   const std::size_t blocks = static_cast<std::size_t>(kRays) / atOnce;
   std::vector<PixelBlock> all(blocks, PixelBlock(atOnce));
@@ -53,7 +55,7 @@ std::vector<PixelBlock> allPixels(std::size_t atOnce) {
   return all;
 }
 
-/// The least of three, CPU seconds.
+/// Least CPU seconds of three runs.
 template <typename Job>
 double timeOf(const Job& job) {
   double least = 1e300;
@@ -90,7 +92,7 @@ void benchmark(const Scene& scene) {
     const GlContext context;
     const GpuTracer tracer(context, surfaces);
     const PixelBlock pixels = allPixels(static_cast<std::size_t>(kRays))[0];
-    (void)surfaces.castPixels(tracer, pixels);  // compiles
+    (void)surfaces.castPixels(tracer, pixels);  // compiles the shader
     tell("gpu_mrays_per_cpu_s",
          1e-6 * kRays / timeOf([&] { (void)surfaces.castPixels(tracer, pixels); }));
     const auto begin = std::chrono::steady_clock::now();

@@ -1,7 +1,8 @@
-// What primary rays of the kernel cost, in CPU seconds of one thread, against the pixels of the
-// picture, the size of a ball (its surface grows with the square, its volume with the cube), and
-// the length of outlines (one ball, four, sixteen, … in the same frame). Exits 1 when a ball of
-// 4096 times the volume costs more than four times as much, or pixels more than in proportion.
+// Measures the cost of primary rays of the kernel, in CPU seconds of one thread, against three
+// sizes. These are the pixels of the picture, the size of a ball, and the length of outlines. The
+// ball's surface grows with the square of its size, its volume with the cube. Outlines come from
+// one, four, sixteen, … balls in the same frame. Exits 1 when a ball of 4096 times the volume costs
+// more than four times as much, or when cost grows faster than the number of pixels.
 //   render_cost_bench > render-cost.csv
 
 #include <fmt/core.h>
@@ -30,7 +31,7 @@ double cpuSeconds() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-/// The least of three.
+/// Least of three runs.
 double secondsOf(const NarrowBand& band, int pixels) {
   Scene scene;
   scene.solids.push_back({.band = band});
@@ -44,7 +45,7 @@ double secondsOf(const NarrowBand& band, int pixels) {
       for (int left = 0; left < pixels; left += kTile) {
         PixelBlock block(kTile * kTile);
         for (int i = 0; i < kTile * kTile; ++i) {
-          // Squares of four, as the renderer packs them.
+          // Squares of four pixels, in the renderer's order.
           const int square = i / 16, x = left + square % 4 * 4 + i % 4,
                     y = top + square / 4 * 4 + i / 4 % 4;
           block.x[static_cast<std::size_t>(i)] = static_cast<float>(x + 0.5 - 0.5 * pixels);
@@ -57,7 +58,7 @@ double secondsOf(const NarrowBand& band, int pixels) {
   return least;
 }
 
-/// n × n balls in a square of 256 voxels across the view.
+/// n × n balls in a square of 256 voxels that spans the view.
 NarrowBand ballsOf(int n) {
   std::vector<NarrowBand> balls;
   const double step = 256.0 / n;

@@ -9,9 +9,9 @@ model=$2
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 /usr/bin/time -f '%U %S %M' -o "$work/cost" "$levelsmith" --report "$work/report.json" read "$model" ! level-set --resolution 512 --as dragon \
-  ! scatter @dragon --count 106 --size 0.011,0.008 --along "0,-1,0" --jitter 10 --height 0.0022 --levels 3 --as places \
+  ! scatter @dragon --count 106 --size 0.011,0.008 --along "0,-1,0" --jitter 10 --height 0.0022 --layers 3 --as places \
   ! sphere --radius 1 --voxel 0.04 --as scale \
-  ! texture @dragon @scale @places --voxel 0.0004 --sink 0.0006 --skip-folds ! write "$work/scales.vdb"
+  ! texture @dragon @scale @places --voxel 0.0004 --embed 0.0006 --skip-folds ! write "$work/scales.vdb"
 # Some places fold and are left out.
 scales=$(sed -n 's/.*"patches": *\([0-9]*\),*/\1/p' "$work/report.json" | tail -n 1)
 echo "$scales scales"

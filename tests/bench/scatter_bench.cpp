@@ -1,8 +1,8 @@
-// What a patch costs for being one of many: equal studs on equal patches of a sphere, laid one by
-// one, ten at once and a hundred at once, on one thread.
+// Measures the cost of one patch among many. Maps equal studs on equal patches of a sphere: one at
+// a time, ten at once and a hundred at once, on one thread.
 //   scatter_bench
-// Exits 1 when the patches from the eleventh to the hundredth cost more than 1.2 times as much each
-// as the first one does, making the patch, mapping and joining with the base included.
+// Exits 1 when each of the patches 11 to 100 costs more than 1.2 times as much as the first. The
+// cost includes construction of the patch, mapping, and union with the base.
 
 #include <fmt/core.h>
 #include <tbb/global_control.h>

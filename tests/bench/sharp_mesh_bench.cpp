@@ -1,5 +1,6 @@
-// Sharp meshing at random places and turns: round solids must show no edge, cubes and cylinders
-// theirs. sharp_mesh_bench [SOLIDS OF EACH KIND]
+// Tests sharp meshing at random positions and rotations. Round solids must show no edge, cubes and
+// cylinders must show theirs.
+//   sharp_mesh_bench [SOLIDS OF EACH KIND]
 
 #include <fmt/core.h>
 
@@ -31,13 +32,13 @@ V3d direction() {
     if (v.length() > 0.1 && v.length() < 0.5) return v.normalized();
   }
 }
-/// Turned anyhow and moved by less than a voxel.
+/// Rotates the solid at random and moves it by less than a voxel.
 Truth placed(const Truth& solid) {
   Imath::M44d matrix;
   matrix.setEulerAngles(V3d(between(0, 3), between(0, 3), between(0, 3)));
   return regress::moved(solid, matrix * Imath::M44d().setTranslation(somewhere()));
 }
-/// Small ones more often.
+/// Random radius; small ones are more frequent.
 double smallRadius() {
   return 1.2 + 7.8 * between(0, 1) * between(0, 1);
 }

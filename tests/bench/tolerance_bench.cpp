@@ -1,6 +1,8 @@
-// What --tolerance asks for, what it says that it reached, and what it did: a table of sphere,
-// torus, solids in one another and models, against exact surfaces. tolerance_bench [MODELS]
-// Ends with 1 where a true error passes what was asked for, or where most are below a tenth of it.
+// Prints the requested tolerance, the reported error and the true error of runs with --tolerance.
+// The solids are sphere, torus, nested solids and models, compared with exact surfaces.
+//   tolerance_bench [MODELS]
+// Exits 1 if a true error exceeds the requested tolerance, or if most errors are below a tenth of
+// it.
 
 #include <fmt/core.h>
 
@@ -21,7 +23,7 @@ struct Row {
   std::function<double(const levelset::TriMesh& result, double voxel)> truth;
 };
 
-/// Against the same chain with voxels of a quarter.
+/// Compares with the same chain at a quarter of the voxel size.
 double finerRun(const std::string& chain, const levelset::TriMesh& result, double voxel) {
   std::string finer = chain;
   for (std::size_t at = 0; (at = finer.find("HERE", at)) != std::string::npos;)
@@ -43,12 +45,14 @@ Row exact(const std::string& name, const std::string& chain, const support::Exac
           }};
 }
 
-/// The mesh itself, or a finer run where that is nearer: a mesh may have parts inside of the solid.
+/// Compares with the mesh itself, or with a finer run if that is nearer. A mesh may have parts
+/// inside the solid.
 Row model(const std::string& name, const std::string& file) {
   Row row = finer(name, "read " + file + " ! level-set HERE ! mesh");
   row.truth = [finer = row.truth, file](const levelset::TriMesh& result, double voxel) {
     const double error = support::differenceOf(result, levelset::readMesh(file), voxel / 2);
-    // Farther than half a percent: something inside that is no surface of the solid, or all is.
+    // More than half a percent: a part inside is no surface of the solid, or the entire result is
+    // wrong.
     return error < 0.005 * levelset::bounds(result).size().length()
                ? error
                : std::min(error, finer(result, voxel));
@@ -76,7 +80,7 @@ int main(int count, char** words) {
              "requested", "estimate", "true", "voxel", "rounds", "true/rq", "seconds");
   for (const Row& row : rows)
     for (const char* asked : {"2%", "0.5%", "0.1%"}) {
-      // A run with voxels of a quarter takes more memory than most machines have.
+      // A run at a quarter of the voxel size needs more memory than most machines have.
       if (row.name.starts_with("dragon") && std::string(asked) != "2%") continue;
       const auto start = std::chrono::steady_clock::now();
       const support::ToleranceRun run = support::runToTolerance(asked, row.chain);

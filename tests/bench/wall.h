@@ -11,10 +11,10 @@
 #include "mapping/maps/patch_map.h"
 #include "tests/support/formula_patches.h"
 
-/// A third of a cylinder's wall, and grid points over it, to time maps on.
+/// A third of a cylinder's wall, and grid points over it, to time maps.
 namespace wall {
 
-constexpr double kTextureVoxels = 256;  // along the unit cube
+constexpr double kTextureVoxels = 256;  // voxels along the unit cube
 constexpr double kTolerance = 0.05;     // texture voxels
 constexpr double kAngle = 2.1, kLength = 4.2, kInner = 2, kHeight = 0.6;
 
@@ -23,7 +23,8 @@ inline double now() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-/// Not quite regular, as relaxed particles are not, and a little wavy, so that no map is exact.
+/// Position of a texture point. Slightly irregular, like relaxed particles, and slightly wavy, so
+/// that no map is exact.
 inline Imath::V3d place(const Imath::V3d& uvw) {
   const double angle = kAngle * (uvw.x - 0.5) + 0.02 * std::sin(7 * uvw.y),
                r = kInner + kHeight * uvw.z;
@@ -36,7 +37,7 @@ inline mapping::Patch makePatch(double particles, double levels) {
   return support::patchAt(place, side, side, static_cast<std::size_t>(levels), kHeight);
 }
 
-/// Blocks of 64³ over the whole of it, some `points` grid points within.
+/// Root blocks of 64³ over the entire wall, with about `points` grid points inside.
 inline std::vector<mapping::GridBlock> rootsOf(double points) {
   const double outer = kInner + kHeight;
   const double volume = kAngle * kLength * 0.5 * (outer * outer - kInner * kInner);

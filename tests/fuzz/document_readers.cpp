@@ -21,7 +21,7 @@ void readPatch(std::string_view bytes) {
   });
 }
 
-/// The level set and the mesh that scenes of the corpus name.
+/// Writes the level set and the mesh that the scenes of the corpus name.
 void writeSceneParts() {
   const levelset::NarrowBand ball = levelset::makeSphere(1, Imath::V3d(0), 0.25);
   levelset::writeBand(scratchFile("ball.vdb", ""), ball);
@@ -38,7 +38,8 @@ void readScene(std::string_view bytes) {
   accepts([&] { static_cast<void>(render::readScene(file, {.maxMemory = kMaxMemory})); });
 }
 
-/// An entry's description, a zero byte, and the bytes of a mesh, whose digest is made here.
+/// Reads a cache entry. `bytes` are its description, a zero byte, and the bytes of a mesh; the
+/// digest is computed here.
 void readCache(std::string_view bytes) {
   static const std::filesystem::path folder = scratchFile("place", "").parent_path() / "cache";
   static const pipeline::Cache cache(folder);

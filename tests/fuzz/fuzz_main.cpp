@@ -1,5 +1,5 @@
-// libFuzzer's side: one program, the reader is chosen by `--reader=NAME`, which libFuzzer itself
-// passes over. One program is linked in the time that each of many would take.
+// Entry point for libFuzzer. `--reader=NAME` chooses the reader; libFuzzer ignores this option. A
+// single program links in the time that each of many programs would take.
 
 #include <oneapi/tbb/global_control.h>
 #include <unistd.h>
@@ -27,7 +27,7 @@ const fuzz::Reader* chosen = nullptr;
 }  // namespace
 
 extern "C" int LLVMFuzzerInitialize(int* count, char*** arguments) {
-  // One thread: a crash is then of the input that is tried, and the same every time.
+  // One thread makes a crash belong to the current input, and makes it reproducible.
   static const oneapi::tbb::global_control single(
       oneapi::tbb::global_control::max_allowed_parallelism, 1);
   constexpr std::string_view kOption = "--reader=";
@@ -40,7 +40,7 @@ extern "C" int LLVMFuzzerInitialize(int* count, char*** arguments) {
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  // Any other exception leaves, and libFuzzer tells it as a crash: bad_alloc among them.
+  // Any other exception, bad_alloc included, propagates, and libFuzzer reports it as a crash.
   chosen->read({reinterpret_cast<const char*>(data), size});
   return 0;
 }

@@ -11,9 +11,9 @@
 namespace fuzz {
 namespace {
 
-/// What is written of a graph is read back as the same.
+/// Requires that a graph, written and read back, is unchanged.
 void requireWritable(const pipeline::Graph& graph) {
-  constexpr std::size_t kMostNodes = 100;  // loops make many of one kind
+  constexpr std::size_t kMostNodes = 100;  // loops create many nodes of one kind
   if (graph.nodes.size() > kMostNodes) return;
   const std::string text = pipeline::graphJson(graph);
   std::string again;
@@ -27,27 +27,27 @@ void readGraph(std::string_view bytes) {
   accepts([&] { requireWritable(pipeline::graphFromJson(std::string(bytes), "graph.json")); });
 }
 
-/// From text to graph, with variables and loops; nothing runs.
+/// Parses text into a graph, with variables and loops. Runs nothing.
 void readScript(std::string_view bytes) {
   const std::filesystem::path file = scratchFile("chain.pipeline", bytes);
   constexpr std::size_t kMostLines =
-      1000;  // 100000 are checked in a second, under sanitizers in ten
+      1000;  // 100000 are checked in a second, or in ten under sanitizers
   std::size_t lines = 0;
   accepts([&] { lines = pipeline::readScript(file).begins.size(); });
   if (lines <= kMostLines)
     accepts([&] { requireWritable(pipeline::parseChain({"run", file.string()})); });
 }
 
-/// A word on each line.
+/// Parses a chain with one word on each line.
 void readChain(std::string_view bytes) {
   std::vector<std::string> words(1);
   for (const char c : bytes) {
     if (c == '\n')
       words.emplace_back();
-    else if (c != '\0')  // which no word of a command line holds
+    else if (c != '\0')  // a command line cannot contain it in a word
       words.back() += c;
   }
-  if (words[0] == "run") return;  // which reads whatever file it names
+  if (words[0] == "run") return;  // it would read any file that it names
   accepts([&] { requireWritable(pipeline::parseChain(words)); });
 }
 

@@ -13,7 +13,7 @@ void readGrids(const std::filesystem::path& file) {
     levelset::BandRepairs repairs;
     static_cast<void>(levelset::readBand(file, {.maxMemory = kMaxMemory, .repairs = &repairs}));
   });
-  constexpr std::size_t kMostGrids = 4;  // of which each is read
+  constexpr std::size_t kMostGrids = 4;  // number of grids that are read
   for (std::size_t i = 0; i < std::min(grids.size(), kMostGrids); ++i) {
     const ReadBandOptions options{.grid = grids[i].name, .maxMemory = kMaxMemory};
     accepts([&] { static_cast<void>(levelset::readGrid(file, options)); });
@@ -25,7 +25,7 @@ void readVdb(std::string_view bytes) {
   readGrids(scratchFile("grid.vdb", bytes));
 }
 
-/// What is written for renderers is refused by its name, and by its content under another.
+/// A file for renderers is refused by its name, and under another name by its content.
 void readNvdb(std::string_view bytes) {
   const std::filesystem::path file = scratchFile("grid.nvdb", bytes);
   require(!accepts([&] { static_cast<void>(levelset::readBand(file)); }), ".nvdb is not read");

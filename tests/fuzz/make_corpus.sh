@@ -20,7 +20,7 @@ head -c 1000 "$work/box.nvdb" >nvdb/head.nvdb
 $levelsmith $solid ! march --to 1 ! write vdb/march.vdb
 $levelsmith $solid ! closest-point ! write vdb/closest-point.vdb
 $levelsmith $solid ! render exr/box.exr --size 4x3 --samples 1 --renderer cpu --png png/box.png
-$levelsmith sphere --radius 1 --voxel 0.25 ! patch --at 0,0,1 --size 0.6,0.6 --height 0.2 --spacing 0.3 --levels 2 ! \
+$levelsmith sphere --radius 1 --voxel 0.25 ! patch --at 0,0,1 --size 0.6,0.6 --height 0.2 --spacing 0.3 --layers 2 ! \
   write patch/sphere.patch
 $levelsmith $solid ! sphere --radius 0.5 --voxel 0.25 --as b ! scene @a @b --csg "a - b" ! write "$work/scene.json"
 sed 's/"scene-a.vdb"/"ball.vdb"/; s/"scene-b.vdb"/"ball.vdb"/' "$work/scene.json" >scene/difference.json

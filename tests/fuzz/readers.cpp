@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// In memory where there is such a place, and gone with the process.
+/// Temporary folder, in memory if possible, removed when the process ends.
 class ScratchFolder {
  public:
   ScratchFolder() : owner_(::getpid()) {

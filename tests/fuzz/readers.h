@@ -5,36 +5,38 @@
 #include <string_view>
 #include <vector>
 
-/// What reads files and texts that others wrote, each by one name, to be tried with whatever bytes:
-/// by libFuzzer (fuzz_main.cpp), and with the corpus by the unit tests (replay_test.cpp).
+/// Readers of files and texts from others, each under one name, tested with arbitrary bytes.
+/// libFuzzer runs them (fuzz_main.cpp), and the unit tests run them on the corpus
+/// (replay_test.cpp).
 namespace fuzz {
 
-/// Bytes that a reader is told it may use.
+/// Memory limit given to each reader, bytes.
 inline constexpr std::size_t kMaxMemory = std::size_t{64} << 20;
 
 struct Reader {
-  const char* name;  ///< also of its folder in tests/fuzz/corpus
-  /// Takes the bytes or refuses them by a levelset::Error; whatever else leaves it is a defect.
+  const char* name;  ///< name of the reader and of its folder in tests/fuzz/corpus
+  /// Reads the bytes or rejects them with a levelset::Error. Any other exception is a defect.
   void (*read)(std::string_view bytes);
 };
 [[nodiscard]] const std::vector<Reader>& readers();
 [[nodiscard]] const Reader* findReader(std::string_view name);
 
-// Each file of readers tells its own.
+// Each source file of readers provides its own list.
 [[nodiscard]] std::vector<Reader> meshReaders();
 [[nodiscard]] std::vector<Reader> gridReaders();
 [[nodiscard]] std::vector<Reader> pictureReaders();
 [[nodiscard]] std::vector<Reader> documentReaders();
 [[nodiscard]] std::vector<Reader> grammarReaders();
 
-/// A file of that name with these bytes, in a folder of this process, in memory where that can be.
+/// Writes the bytes to a file of that name in a folder of this process, in memory if possible.
 [[nodiscard]] std::filesystem::path scratchFile(const std::string& name, std::string_view bytes);
 
-/// Runs `job`. @return whether it went through; false when it was refused by a levelset::Error
+/// Runs `job`.
+/// @return true if it completes; false if a levelset::Error rejects the input
 template <typename Job>
 bool accepts(const Job& job);
 
-/// What must hold of what was read; says so and aborts otherwise, with or without NDEBUG.
+/// Aborts with message `what` unless `isTrue`, with or without NDEBUG.
 void require(bool isTrue, const char* what);
 
 }  // namespace fuzz

@@ -1,4 +1,4 @@
-// What the fuzzers began with, and what they found, read once more: without clang too.
+// Reads the seeds of the fuzzers and the inputs that they found once more. Needs no clang.
 
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ class FuzzCorpus : public testing::TestWithParam<fuzz::Reader> {};
 
 TEST_P(FuzzCorpus, IsReadOrRefused) {
   const fs::path folder = fs::path(LEVELSMITH_FUZZ_CORPUS) / GetParam().name;
-  ASSERT_TRUE(fs::is_directory(folder)) << "every reader has seeds";
+  ASSERT_TRUE(fs::is_directory(folder)) << "no seeds for this reader";
   std::size_t count = 0;
   for (const auto& file : fs::directory_iterator(folder)) {
     SCOPED_TRACE(file.path().string());
@@ -33,7 +33,7 @@ TEST_P(FuzzCorpus, IsReadOrRefused) {
   EXPECT_GT(count, 0u);
 }
 
-TEST_P(FuzzCorpus, IsReadOrRefusedWhereverItIsCut) {
+TEST_P(FuzzCorpus, IsReadOrRefusedWhereverItIsTruncated) {
   const fs::path folder = fs::path(LEVELSMITH_FUZZ_CORPUS) / GetParam().name;
   for (const auto& file : fs::directory_iterator(folder)) {
     const std::string whole = contentOf(file.path());
@@ -47,8 +47,9 @@ TEST_P(FuzzCorpus, IsReadOrRefusedWhereverItIsCut) {
 INSTANTIATE_TEST_SUITE_P(Readers, FuzzCorpus, testing::ValuesIn(fuzz::readers()),
                          [](const auto& of) { return std::string(of.param.name); });
 
-/// Inputs that showed a defect and take long still: no seeds, or little else would be tried.
-TEST(FuzzReaders, ReadOrRefuseWhatIsCostly) {
+/// Inputs that revealed a defect and still take long. They are no seeds, because the fuzzer would
+/// try little else.
+TEST(FuzzReaders, ReadOrRefuseCostlyInputs) {
   for (const auto& folder : fs::directory_iterator(LEVELSMITH_FUZZ_COSTLY)) {
     const fuzz::Reader* reader = fuzz::findReader(folder.path().filename().string());
     ASSERT_NE(reader, nullptr) << folder.path();
@@ -57,7 +58,7 @@ TEST(FuzzReaders, ReadOrRefuseWhatIsCostly) {
   }
 }
 
-TEST(FuzzReaders, HaveEachSeedsOfItsOwn) {
+TEST(FuzzReaders, HaveSeedsOfTheirOwn) {
   std::set<std::string> folders, names;
   for (const auto& entry : fs::directory_iterator(LEVELSMITH_FUZZ_CORPUS))
     if (entry.is_directory()) folders.insert(entry.path().filename());
@@ -65,9 +66,9 @@ TEST(FuzzReaders, HaveEachSeedsOfItsOwn) {
   EXPECT_EQ(folders, names);
 }
 
-// === What no seed of a few kB shows
+// === Inputs that no seed of a few kB covers
 
-TEST(FuzzDepth, ListsInListsAreRefusedBeforeTheyFillTheStack) {
+TEST(FuzzDepth, NestedListsAreRefusedBeforeStackOverflow) {
   constexpr std::size_t kDeep = 1 << 20;
   const std::string lists = std::string(kDeep, '[') + std::string(kDeep, ']');
   const std::pair<const char*, std::string> documents[] = {
@@ -80,7 +81,7 @@ TEST(FuzzDepth, ListsInListsAreRefusedBeforeTheyFillTheStack) {
     EXPECT_NO_THROW(fuzz::findReader(name)->read(text)) << name;
 }
 
-TEST(FuzzDepth, LoopsInLoopsAreRefused) {
+TEST(FuzzDepth, NestedLoopsAreRefused) {
   std::string text;
   for (int i = 0; i < 100'000; ++i) text += "repeat 1\n";
   text += "box\n";

@@ -10,7 +10,7 @@
 #include "mapping/animation/animation.h"
 #include "mapping/placement/make_patch.h"
 
-/// Small scenes that move.
+/// Small animated scenes.
 namespace support {
 
 inline constexpr double kStageVoxel = 0.1;
@@ -47,7 +47,7 @@ inline std::vector<mapping::Patch> remakePatches(const levelset::NarrowBand& bas
   return patches;
 }
 
-/// Plays, and keeps the patches of all frames.
+/// Plays an animation and keeps the patches of all frames.
 struct Played {
   mapping::AnimationReport report;
   std::vector<mapping::Patch> patches;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Bands made in code, for tests.
+// Bands from formulas, for tests.
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 
 namespace support {
 
-/// Samples a signed distance (world) on the axis-aligned grid of `voxelSize` inside `box`.
+/// Samples a signed distance (world units) on the axis-aligned grid of `voxelSize` inside `box`.
 inline levelset::NarrowBand sampleBand(const std::function<double(const Imath::V3d&)>& phi,
                                        const Imath::Box3d& box, double voxelSize,
                                        double halfWidth = 3) {

@@ -11,7 +11,7 @@
 #include "mapping/rbf/rbf_map.h"
 
 namespace mapping {
-/// For the names of tests.
+/// Prints the kernel in test names.
 inline void PrintTo(RbfKernel kernel, std::ostream* out) {
   constexpr std::array<const char*, 6> kNames = {"Biharmonic", "Triharmonic", "ThinPlate",
                                                  "Sum",        "Laplacian",   "Gaussian"};
@@ -44,7 +44,7 @@ inline Imath::V3d affine(const Imath::V3d& p) {
   return {0.3 * p.x - 0.1 * p.y + 7, 0.2 * p.y + 0.4 * p.z - 3, 0.5 * p.z + 0.1 * p.x};
 }
 
-/// A slightly jittered lattice of spacing 1, moved far from the origin by `shift`.
+/// Slightly jittered lattice of spacing 1, moved far from the origin by `shift`.
 template <typename Map>
 Cloud lattice(int edge, const Map& map, const Imath::V3d& shift = Imath::V3d(0)) {
   std::mt19937 random(7);
@@ -59,7 +59,7 @@ Cloud lattice(int edge, const Map& map, const Imath::V3d& shift = Imath::V3d(0))
   return cloud;
 }
 
-/// @param options  all but λ
+/// @param options  all options except λ
 inline mapping::RbfMap fit(const Cloud& cloud, double lambda, mapping::RbfMapOptions options = {}) {
   options.lambdaNear = options.lambdaFar = lambda;
   return {cloud.points, cloud.targets, cloud.near, options};

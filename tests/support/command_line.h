@@ -27,7 +27,7 @@ inline std::string slurp(const std::filesystem::path& file) {
   return text.str();
 }
 
-/// A folder of its own for each test, removed afterwards.
+/// Gives each test a folder of its own and removes it afterwards.
 class ShellTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -38,7 +38,7 @@ class ShellTest : public ::testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
-  /// Runs `levelsmith ARGUMENTS` by a shell in the test's folder; ends it after `seconds`.
+  /// Runs `levelsmith ARGUMENTS` in a shell in the test's folder. Ends it after `seconds`.
   Outcome levelsmith(const std::string& arguments, int seconds = 60) {
     return shell(command() + " " + arguments, seconds);
   }
@@ -63,7 +63,7 @@ class ShellTest : public ::testing::Test {
     return std::filesystem::exists(folder_ / name);
   }
 
-  /// Files in the folder, apart from the harness's own.
+  /// Number of files in the folder, without those of the harness.
   [[nodiscard]] std::size_t fileCount() const {
     std::size_t count = 0;
     for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
@@ -80,7 +80,8 @@ class ShellTest : public ::testing::Test {
 
 }  // namespace support
 
-/// The command ended with `code_`, and the sentence on standard error has `part_` in it.
+/// Expects that the command exits with `code_`, and that its message on standard error contains
+/// `part_`.
 #define EXPECT_REFUSED(outcome_, code_, part_)                                        \
   do {                                                                                \
     const auto& refused_ = (outcome_);                                                \

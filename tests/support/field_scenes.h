@@ -14,7 +14,7 @@
 #include "render/images/compare_images.h"
 #include "tests/support/bands.h"
 
-/// Scenes of soft CSG and of morphs, and what the judge has to say of them.
+/// Scenes of soft CSG and of morphs, and their comparison with the judge.
 namespace support::fields {
 
 using Imath::V3d;
@@ -48,7 +48,7 @@ inline Scene morphed(const NarrowBand& a, const NarrowBand& b, double share, int
   return scene;
 }
 
-/// Sampled from a formula, in a wide band.
+/// Ball sampled from a formula, in a wide band.
 inline NarrowBand exactBall(const V3d& centre, double radius, double voxel, double halfWidth = 6) {
   const V3d reach(radius + halfWidth * voxel);
   return support::sampleBand([&](const V3d& p) { return (p - centre).length() - radius; },
@@ -70,7 +70,7 @@ inline std::optional<Pixel> pixelOf(const Image& image, std::size_t i) {
   return Pixel{read("P"), read("N")};
 }
 
-/// The bounds of Agreement.*, in voxels of the finest grid.
+/// Compares kernel and judge with the bounds of Agreement.*, in voxels of the finest grid.
 inline void expectJudged(const Scene& scene, const std::string& what) {
   const Image ours = renderCpu(scene, kDataOnly), judge = renderEmbree(scene, kDataOnly);
   const ImageComparison found = compareImages(ours, judge);
@@ -86,7 +86,7 @@ inline void expectJudged(const Scene& scene, const std::string& what) {
     const auto a = pixelOf(ours, i), b = pixelOf(judge, i);
     if (!a || !b) continue;
     ++compared;
-    // Places are floats.
+    // Positions are single precision.
     beyond += (a->place - b->place).length() > 1e-3 * voxel + 1e-6 * a->place.length();
     turned += 2 * std::asin(std::min(1.0, (a->normal - b->normal).length() / 2)) >
               0.1 * std::numbers::pi / 180;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Files for tests: a folder that goes away, whole files as strings, refusals with their sentence.
+// Files for tests: temporary folders, complete files as strings, and expected error messages.
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -49,7 +49,7 @@ inline void writeText(const std::filesystem::path& path, const std::string& text
   std::ofstream(path, std::ios::binary) << text;
 }
 
-/// Runs `action`, expects it to throw `ErrorT`, and returns the sentence.
+/// Runs `action`, expects an exception of type `ErrorT`, and returns its message.
 template <typename ErrorT, typename Action>
 std::string refusal(Action action) {
   try {

@@ -8,10 +8,10 @@
 
 #include "mapping/patches/patch.h"
 
-/// Patches whose particles are where a formula puts them.
+/// Patches with particles at positions from a formula.
 namespace support {
 
-/// Particles at place(u, v, w), on layers of those counts.
+/// Particles at place(u, v, w), on layers with these counts.
 inline mapping::Patch patchAt(const std::function<Imath::V3d(const Imath::V3d&)>& place,
                               std::size_t columns, std::size_t rows, std::size_t layers,
                               double height = 1) {

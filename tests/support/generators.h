@@ -9,10 +9,10 @@
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 
-/// What ready-made textures are held to.
+/// Requirements on the texture generators.
 namespace support {
 
-/// Grid values at p and at p + shift agree wherever both are in `box`, to rounding.
+/// Expects that grid values at p and at p + shift agree to rounding wherever both are in `box`.
 inline void expectPeriodic(const levelset::NarrowBand& band, const Imath::V3d& shift,
                            const Imath::Box3d& box) {
   const double voxel = band.voxelSize();
@@ -32,9 +32,11 @@ inline void expectPeriodic(const levelset::NarrowBand& band, const Imath::V3d& s
   EXPECT_GT(compared, 500u);
 }
 
-/// Independent of how the band was made: nothing of the other side lies nearer than the value says
-/// by `slack`, and something by four of them further, as corners show in so many directions.
-/// @param isInside  of the solid
+/// Checks distances against the solid itself, without regard to how the band was built. No point of
+/// the other side may be closer than the value less `slack`. Some point of the other side must lie
+/// at most four times `slack` beyond the value. Corners need that much, because only finitely many
+/// directions are tried.
+/// @param isInside  true for points of the solid
 inline void expectNearest(const levelset::NarrowBand& band,
                           const std::function<bool(const Imath::V3d&)>& isInside, double slack,
                           std::size_t stride, bool alsoInside = true) {
@@ -57,7 +59,7 @@ inline void expectNearest(const levelset::NarrowBand& band,
   });
   EXPECT_GT(looked, 40u);
   EXPECT_LT(static_cast<double>(missed), 0.06 * static_cast<double>(looked))
-      << "slim corners hide between the directions, faces do not";
+      << "directions may miss a slim corner, but no face";
 }
 
 inline void expectSound(const levelset::NarrowBand& band) {

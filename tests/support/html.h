@@ -1,6 +1,6 @@
 #pragma once
 
-// Pages, read as strictly as no browser does: what is open must be closed, what is quoted ends.
+// Strict parser for test pages: every open element must be closed, and every quote must end.
 
 #include <algorithm>
 #include <cctype>
@@ -13,16 +13,18 @@ namespace support {
 
 struct HtmlTag {
   std::string name;
-  std::map<std::string, std::string> attributes;  ///< decoded
+  std::map<std::string, std::string> attributes;  ///< attribute values, decoded
 };
 
-/// A page in pieces; what was found before a fault stays.
+/// Parsed page. After a fault it contains the part before the fault.
 class HtmlPage {
  public:
   explicit HtmlPage(const std::string& source) : source_(source) { read(); }
 
-  [[nodiscard]] const std::string& fault() const { return fault_; }  ///< empty: well-formed
-  [[nodiscard]] const std::string& text() const { return text_; }    ///< between tags, decoded
+  /// Empty if the page is well-formed.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
+  /// Text between the tags, decoded.
+  [[nodiscard]] const std::string& text() const { return text_; }
   [[nodiscard]] std::vector<HtmlTag> all(const std::string& name) const {
     std::vector<HtmlTag> found;
     for (const HtmlTag& tag : tags_)

@@ -1,6 +1,6 @@
 #pragma once
 
-// Bands of meshes against brute force, for tests.
+// Comparison of bands from meshes with brute force, for tests.
 
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
@@ -16,13 +16,13 @@ namespace support {
 
 using Inside = std::function<bool(const V3d&)>;
 
-/// By the exact winding number, which the points are taken not to lie on the edge of.
+/// Inside test by the exact winding number. The points must not lie on the edge of the mesh.
 inline Inside byWinding(const TriMesh& mesh, double flip = 1) {
   return [&mesh, flip](const V3d& p) { return flip * levelset::windingNumber(mesh, p) > 0.5; };
 }
 
-/// Compares every grid point around the mesh with brute force: which are active, how far, which
-/// side.
+/// Compares every grid point around the mesh with brute force: whether it is active, its distance,
+/// and its side.
 inline void expectExact(const levelset::MeshToBandResult& result, const TriMesh& mesh,
                         const Inside& inside) {
   const openvdb::FloatGrid& grid = levelset::vdb(result.band);
@@ -57,8 +57,9 @@ inline void expectExact(const levelset::MeshToBandResult& result, const TriMesh&
   EXPECT_LT(worst, 1e-4 * h);
 }
 
-/// Signs as the exact winding number has them, every change of sign between active voxels,
-/// distances never beyond those to the mesh, and a surface where the number passes 1/2.
+/// Checks the band of an open mesh. Signs follow the exact winding number, and every sign change
+/// lies between active voxels. No value exceeds the distance to the mesh, and the surface lies
+/// where the winding number passes 1/2.
 inline void expectOpenSound(const levelset::MeshToBandResult& result, const TriMesh& mesh) {
   const openvdb::FloatGrid& grid = levelset::vdb(result.band);
   const double h = result.band.voxelSize();

@@ -7,7 +7,7 @@
 
 namespace support {
 
-/// What readMesh makes of `text` in a file of that name.
+/// Reads `text` as a file of that name with readMesh.
 inline levelset::TriMesh parse(const std::string& name, const std::string& text,
                                const levelset::ReadMeshOptions& options = {}) {
   const TemporaryFolder folder;

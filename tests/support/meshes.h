@@ -1,6 +1,6 @@
 #pragma once
 
-// Meshes made in code, and exact answers about them by brute force, for tests.
+// Meshes from formulas, and exact answers about them by brute force, for tests.
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,7 @@ namespace support {
 using Imath::V3d;
 using levelset::TriMesh;
 
-/// An (m × n) grid of vertices, closed in either direction where asked, split into triangles.
+/// An (m × n) grid of vertices, split into triangles and closed in u or v on request.
 inline TriMesh patchMesh(unsigned m, unsigned n, bool closedU, bool closedV,
                          const std::function<V3d(double u, double v)>& place) {
   TriMesh mesh;
@@ -32,7 +32,7 @@ inline TriMesh patchMesh(unsigned m, unsigned n, bool closedU, bool closedV,
   return mesh;
 }
 
-/// Around the z axis, facing out.
+/// Torus around the z axis, facing outwards.
 inline TriMesh torusMesh(double radius, double tube, unsigned m = 64, unsigned n = 32,
                          V3d centre = V3d(0)) {
   return patchMesh(m, n, true, true, [=](double u, double v) {
@@ -42,8 +42,8 @@ inline TriMesh torusMesh(double radius, double tube, unsigned m = 64, unsigned n
   });
 }
 
-/// The part of a sphere from the south pole up to `latitude` (1: whole), facing out. The poles are
-/// single vertices.
+/// Part of a sphere from the south pole up to `latitude` (1: complete sphere), facing outwards.
+/// Each pole is a single vertex.
 inline TriMesh sphereMesh(double radius, V3d centre = V3d(0), unsigned rings = 24,
                           double latitude = 1) {
   TriMesh mesh;
@@ -109,7 +109,7 @@ inline TriMesh joined(TriMesh a, const TriMesh& b) {
   return a;
 }
 
-/// Each triangle with vertices of its own, moved by up to `jitter`: no two share an edge.
+/// Gives each triangle its own vertices, moved by up to `jitter`. No two triangles share an edge.
 inline TriMesh soup(const TriMesh& mesh, double jitter = 0) {
   TriMesh result;
   std::uint64_t state = 1;
@@ -126,8 +126,8 @@ inline TriMesh soup(const TriMesh& mesh, double jitter = 0) {
   return result;
 }
 
-/// Closest point of a triangle by the regions of its plane (Ericson, Real-Time Collision Detection,
-/// section 5.1.5).
+/// Closest point of a triangle, by the regions of its plane (Ericson, Real-Time Collision
+/// Detection, section 5.1.5).
 inline V3d closestPoint(const V3d& a, const V3d& b, const V3d& c, const V3d& p) {
   const V3d ab = b - a, ac = c - a, ap = p - a;
   const double d1 = ab.dot(ap), d2 = ac.dot(ap);

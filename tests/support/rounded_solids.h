@@ -1,7 +1,7 @@
 #pragma once
 
-// Solids whose curvature is a good part of a voxel's, in voxels: what looks for edges finds them
-// where there are none. Some placements made false ones once.
+// Solids with radii of curvature close to a voxel, in voxels. Edge detection may find false edges
+// on them. Some of these placements once did.
 
 #include <array>
 #include <cmath>

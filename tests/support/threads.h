@@ -7,8 +7,8 @@
 
 namespace support {
 
-/// Runs on that many threads, whatever number of cores there is: a limit alone gives no more
-/// threads than cores.
+/// Calls `run` on exactly `threads` threads, whatever the number of cores. A limit alone gives at
+/// most one thread per core.
 template <typename F>
 auto onThreads(std::size_t count, const F& run) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, count);

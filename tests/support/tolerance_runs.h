@@ -1,6 +1,6 @@
 #pragma once
 
-// Runs of chains with --tolerance, without files: what came of them, and how far off that is.
+// Runs chains with --tolerance without files, and measures the errors of the results.
 
 #include <filesystem>
 #include <optional>
@@ -17,9 +17,9 @@
 namespace support {
 
 struct ToleranceRun {
-  levelset::TriMesh mesh;  ///< that was written
+  levelset::TriMesh mesh;  ///< mesh that the run writes
   pipeline::RunReport report;
-  std::string refusal;  ///< what was thrown in the end
+  std::string refusal;  ///< message of the final error
   int exitCode = 0;
   [[nodiscard]] const pipeline::ToleranceReport& told() const { return *report.tolerance; }
   [[nodiscard]] const pipeline::ToleranceOutput& output() const { return told().outputs.at(0); }
@@ -37,7 +37,7 @@ inline std::vector<std::string> wordsOf(const std::string& text) {
   return words;
 }
 
-/// The words of a command line, none with blanks; all are told nothing.
+/// Runs the words of a command line, none with blanks. Drops all messages.
 inline pipeline::RunReport runWords(const std::string& line, pipeline::RunSettings settings = {}) {
   settings.warn = settings.note = settings.print = [](const std::string&) {};
   const pipeline::Graph graph = pipeline::parseChain(wordsOf(line));
@@ -68,7 +68,7 @@ inline ToleranceRun runToTolerance(const std::string& tolerance, const std::stri
   return run;
 }
 
-/// The mesh that a chain without --tolerance ends with.
+/// Mesh at the end of a chain without --tolerance.
 inline levelset::TriMesh meshOf(const std::string& chain) {
   const TemporaryFolder folder;
   const std::string file = (folder / "result.ply").string();
@@ -76,7 +76,7 @@ inline levelset::TriMesh meshOf(const std::string& chain) {
   return levelset::readMesh(file);
 }
 
-/// With its edge cut into two parts of each voxel.
+/// Difference of two meshes, with cells of half a voxel.
 inline double differenceOf(const levelset::TriMesh& a, const levelset::TriMesh& b, double voxel) {
   return levelset::surfaceDifference(levelset::TriangleSurface(a), levelset::TriangleSurface(b),
                                      {.spacing = voxel / 2})

@@ -1,6 +1,6 @@
 #pragma once
 
-// How far the triangles of a result are from a surface that is known in closed form, both ways.
+// Two-sided distance between the triangles of a result and a surface in closed form.
 
 #include <Imath/ImathVec.h>
 
@@ -17,15 +17,15 @@ namespace support {
 
 using Imath::V3d;
 
-/// A surface that is known exactly.
+/// Surface in closed form.
 struct ExactSurface {
   std::function<double(const V3d&)> distance;  ///< with or without sign
-  std::vector<V3d> points;                     ///< dense on it
+  std::vector<V3d> points;                     ///< dense samples of the surface
 };
 
 inline ExactSurface exactSphere(double radius) {
   ExactSurface sphere{[=](const V3d& p) { return p.length() - radius; }, {}};
-  constexpr int kCount = 60000;  // a spiral from pole to pole
+  constexpr int kCount = 60000;  // points of a spiral from pole to pole
   for (int i = 0; i < kCount; ++i) {
     const double z = 1 - (2.0 * i + 1) / kCount, r = std::sqrt(1 - z * z),
                  angle = i * std::numbers::pi * (3 - std::sqrt(5.0));
@@ -46,17 +46,17 @@ inline ExactSurface exactTorus(double radius, double tube) {
   return torus;
 }
 
-/// A box about the origin, of which only what is farther than `margin` from its edges counts.
+/// Faces of a box about the origin. Only parts farther than `margin` from the edges count.
 inline ExactSurface exactBoxFaces(const V3d& size, double margin) {
   const V3d half = size / 2;
-  const auto beyond = [=](const V3d& p) {  // of the faces: how far outside of each pair
+  const auto beyond = [=](const V3d& p) {  // distance outside each pair of faces
     return V3d(std::abs(p.x), std::abs(p.y), std::abs(p.z)) - half;
   };
   ExactSurface box{[=](const V3d& p) {
                      V3d d = beyond(p);
                      if (d.y > d.x) std::swap(d.x, d.y);
                      if (d.z > d.x) std::swap(d.x, d.z);
-                     if (std::max(d.y, d.z) > -margin) return 0.0;  // beside an edge
+                     if (std::max(d.y, d.z) > -margin) return 0.0;  // near an edge
                      return d.x;
                    },
                    {}};
@@ -75,7 +75,7 @@ inline ExactSurface exactBoxFaces(const V3d& size, double margin) {
   return box;
 }
 
-/// Two-sided Hausdorff distance, each triangle sampled at 6² places.
+/// Two-sided Hausdorff distance, with 6² samples on each triangle.
 inline double trueError(const levelset::TriMesh& result, const ExactSurface& exact) {
   double worst = 0;
   for (const auto& [a, b, c] : result.triangles)

@@ -24,7 +24,7 @@ mode_t modeOf(const fs::path& path) {
   return status.st_mode & 07777;
 }
 
-TEST(FileTarget, PutsTheFileInPlaceOnCommitOnly) {
+TEST(FileTarget, MovesTheFileIntoPlaceOnCommitOnly) {
   const TemporaryFolder folder;
   const fs::path file = folder / "out.ply";
   writeText(file, "before");
@@ -64,7 +64,7 @@ TEST(FileTarget, KeepsPermissionsAndFollowsUmask) {
   EXPECT_EQ(readText(folder / "old"), "");
 }
 
-TEST(FileTarget, KeepsALinkAndReplacesWhatItPointsTo) {
+TEST(FileTarget, KeepsALinkAndReplacesItsTarget) {
   const TemporaryFolder folder;
   fs::create_directory(folder / "far");
   writeText(folder / "far/real", "before");
@@ -91,7 +91,7 @@ TEST(FileTarget, WritesThroughAPipe) {
   const TemporaryFolder folder;
   const fs::path pipe = folder / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  const std::string sent(300000, 'x');  // more than a pipe holds
+  const std::string sent(300000, 'x');  // more than the buffer of a pipe
   std::string received;
   std::thread reader([&] { received = readText(pipe); });
   FileTarget target(pipe);
@@ -102,7 +102,7 @@ TEST(FileTarget, WritesThroughAPipe) {
   EXPECT_TRUE(fs::is_fifo(pipe));
 }
 
-/// Standard output of the process, for as long as this lives, is `fd`.
+/// Redirects standard output of the process to `fd` during its lifetime.
 class StandardOutput {
  public:
   explicit StandardOutput(int fd) : before_(::dup(STDOUT_FILENO)) { ::dup2(fd, STDOUT_FILENO); }
@@ -133,7 +133,7 @@ TEST(FileTarget, AppendsToStandardOutput) {
   }
 }
 
-TEST(FileTarget, KnowsStandardOutputAndOneFileByItsNames) {
+TEST(FileTarget, RecognizesStandardOutputAndEqualPaths) {
   for (const char* name : {"-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"})
     EXPECT_TRUE(levelset::isStandardOutput(name)) << name;
   for (const char* name : {"", "stdout", "/dev/stderr", "/dev/null"})
@@ -147,7 +147,7 @@ TEST(FileTarget, KnowsStandardOutputAndOneFileByItsNames) {
   EXPECT_TRUE(levelset::isSameFile("-", "/dev/stdout"));
 }
 
-TEST(FileTarget, SaysThatTheReaderIsGone) {
+TEST(FileTarget, ReportsThatTheReaderIsGone) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
   ::close(ends[0]);
@@ -164,7 +164,7 @@ TEST(FileTarget, SaysThatTheReaderIsGone) {
   EXPECT_NE(sentence.find("Broken pipe"), std::string::npos) << sentence;
 }
 
-TEST(FileTarget, SaysThatTheDiskIsFull) {
+TEST(FileTarget, ReportsThatTheDiskIsFull) {
   const std::string sentence = refusal<levelset::IoError>([] {
     FileTarget target("/dev/full");
     writeText(target.path(), "text");
@@ -181,7 +181,7 @@ TEST(FileTarget, AcceptsTheNullDevice) {
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
 
-TEST(FileTarget, RefusesWhatCannotBeWritten) {
+TEST(FileTarget, RefusesUnwritablePaths) {
   const TemporaryFolder folder;
   const auto sentence = [](const fs::path& path) {
     return refusal<levelset::IoError>([&] { const FileTarget target(path); });
@@ -212,7 +212,7 @@ TEST(FileTarget, ObeysNoClobber) {
   EXPECT_EQ(readText(folder / "late"), "came first");
 }
 
-TEST(FileTarget, TakesLongAndForeignNames) {
+TEST(FileTarget, TakesLongAndNonAsciiNames) {
   const TemporaryFolder folder;
   std::string name;
   for (int i = 0; i < 120; ++i) name += "\xC3\xA9";  // é: 240 bytes
@@ -222,7 +222,7 @@ TEST(FileTarget, TakesLongAndForeignNames) {
   EXPECT_EQ(readText(folder / name), "text");
 }
 
-// In a process of its own: afterwards no FileTarget of the process works any more.
+// Runs in a separate process, because no FileTarget of the process works afterwards.
 TEST(FileTargetDeathTest, RemovesTemporaryFilesAndRenamesNothing) {
   const TemporaryFolder folder;
   writeText(folder / "out", "before");

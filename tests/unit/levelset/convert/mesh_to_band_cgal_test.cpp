@@ -1,5 +1,5 @@
-// Distances and signs against CGAL's tree of triangles, an implementation that shares nothing with
-// ours. In an executable of its own: CGAL asks for -frounding-math.
+// Compares distances and signs with CGAL's triangle tree, an independent implementation. Built as a
+// separate executable, because CGAL requires -frounding-math.
 
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
@@ -22,7 +22,7 @@ using Triangles = std::vector<Kernel::Triangle_3>;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
 using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 
-/// What CGAL says about a closed mesh: how far, and on which side.
+/// CGAL's answers about a closed mesh: distance and side.
 class Oracle {
  public:
   explicit Oracle(const TriMesh& mesh) {
@@ -37,8 +37,8 @@ class Oracle {
   [[nodiscard]] double distance(const Imath::V3d& p) const {
     return std::sqrt(tree_.squared_distance(point(p)));
   }
-  /// By the parity of what a ray meets; of three rays in odd directions two must agree, so that one
-  /// may graze an edge.
+  /// Parity of the intersections along a ray. Two of three rays in odd directions must agree,
+  /// because one of them may graze an edge.
   [[nodiscard]] bool isInside(const Imath::V3d& p) const {
     const auto odd = [&](double x, double y, double z) {
       const Kernel::Ray_3 ray(point(p), Kernel::Vector_3(x, y, z));
@@ -54,9 +54,9 @@ class Oracle {
   Tree tree_;
 };
 
-/// Every voxel of the band, its sign too, the signs beyond it, and that none is missing: each
-/// vertex lies between active grid points, and no grid point next to an active one lies within
-/// reach unless it is active.
+/// Checks every voxel of the band with its sign, the signs beyond the band, and that no voxel is
+/// missing. Each vertex must lie between active grid points. An inactive neighbour of an active
+/// grid point must lie beyond the half width.
 void expectExact(const TriMesh& mesh, double h, SignMode sign) {
   const Oracle oracle(mesh);
   const auto result = meshToBand(mesh, h, {.sign = sign});
@@ -70,14 +70,14 @@ void expectExact(const TriMesh& mesh, double h, SignMode sign) {
     const double exact = oracle.distance(place(c));
     worst = std::max(worst, std::abs(std::abs(static_cast<double>(*it)) - exact));
     if (exact > 1e-6 * h) wrong += (*it < 0) != oracle.isInside(place(c));
-    if (exact < 2 * h) continue;  // its neighbours are within reach
+    if (exact < 2 * h) continue;  // its neighbours are within the half width
     for (int n = 0; n < 27; ++n) {
       const openvdb::Coord next = c.offsetBy(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1);
       if (accessor.isValueOn(next)) continue;
       missing += oracle.distance(place(next)) < (result.band.halfWidth() - 1e-6) * h;
     }
   }
-  // Beyond the band only the side is kept: every tile, and some of the inactive voxels.
+  // Beyond the band only the side is stored: in every tile, and in some of the inactive voxels.
   std::ptrdiff_t beyond = 0;
   for (auto it = grid.cbeginValueOff(); it; ++it) {
     if (it.isVoxelValue() && beyond++ % 41 != 0) continue;

@@ -1,4 +1,4 @@
-// Meshes that break converters, each with the outcome that is right for it.
+// Meshes that break converters, each with its correct outcome.
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ void expectSays(const std::string& sentence, const std::string& words) {
   EXPECT_NE(sentence.find(words), std::string::npos) << sentence;
 }
 
-/// A strip about the z axis whose last row is the first, mirrored: its back is its front.
+/// Strip around the z axis whose last row is the first row mirrored, so that it has one side only.
 TriMesh twisted(unsigned m, unsigned n, bool closedAcross,
                 const std::function<V3d(double, double)>& place) {
   TriMesh mesh = patchMesh(m + 1, n, false, closedAcross, place);
@@ -36,7 +36,7 @@ TriMesh twisted(unsigned m, unsigned n, bool closedAcross,
   return mesh;
 }
 
-/// The figure-eight immersion: a closed surface without an inside.
+/// Figure-eight immersion of the Klein bottle: a closed surface without an inside.
 TriMesh kleinBottle() {
   return twisted(48, 24, true, [](double u, double v) {
     const double a = kTurn * u, b = kTurn * v;
@@ -47,11 +47,12 @@ TriMesh kleinBottle() {
 }
 
 TEST(MeshToBandNasty, SurfacesWithoutAnInside) {
-  // Every edge of a Klein bottle has two faces, so only the search tells that it crosses itself.
+  // Every edge of a Klein bottle has two faces, so only the search for intersections finds that it
+  // crosses itself.
   const TriMesh klein = kleinBottle();
   EXPECT_GT(countSelfIntersections(klein), 0u);
   expectSays(refusal<InvalidInput>([&] { (void)meshToBand(klein, 0.07); }), "level-set: ");
-  // Parity has an answer all the same: the two tubes of the eight.
+  // Parity still gives an answer: the two tubes of the eight.
   const auto parity = meshToBand(klein, 0.07, {.sign = SignMode::Closed});
   EXPECT_TRUE(parity.certificate.closed);
   expectSays(refusal<InvalidInput>([&] {
@@ -77,7 +78,8 @@ TEST(MeshToBandNasty, BowTieVertex) {
 }
 
 TEST(MeshToBandNasty, TJunctions) {
-  // The edge 0–1 is split for one of its faces only: no gap, but three edges with one face.
+  // The edge 0–1 is split for only one of its faces. There is no gap, but there are three edges
+  // with one face.
   TriMesh mesh = boxMesh(V3d(0), V3d(1));
   const auto middle = static_cast<std::uint32_t>(mesh.positions.size());
   mesh.positions.emplace_back(0.5, 0, 0);
@@ -92,7 +94,7 @@ TEST(MeshToBandNasty, TJunctions) {
   expectExact(result, mesh, byWinding(boxMesh(V3d(0), V3d(1))));
 }
 
-TEST(MeshToBandNasty, ShellsCloserThanAVoxel) {
+TEST(MeshToBandNasty, ComponentsCloserThanAVoxel) {
   const double h = 0.1;
   for (const double gap : {0.3 * h, 1e-9}) {
     const TriMesh mesh =
@@ -109,18 +111,19 @@ TEST(MeshToBandNasty, ShellsCloserThanAVoxel) {
 
 TEST(MeshToBandNasty, RepeatedAndOppositeFaces) {
   TriMesh mesh = boxMesh(V3d(0), V3d(1));
-  mesh.triangles.push_back({0, 2, 1});  // again
+  mesh.triangles.push_back({0, 2, 1});  // the same face again
   const auto repeated = meshToBand(mesh, 0.11);
   EXPECT_EQ(repeated.certificate.method, SignMode::Closed);
   EXPECT_EQ(repeated.certificate.droppedTriangles, 1u);
   EXPECT_EQ(repeated.band.contentHash(),
             meshToBand(boxMesh(V3d(0), V3d(1)), 0.11).band.contentHash());
-  mesh.triangles.back() = {0, 1, 2};  // against: the face cancels, a hole is left
+  mesh.triangles.back() = {0, 1, 2};  // the opposite face; both cancel and leave a hole
   expectSays(refusal<InvalidInput>([&] { (void)meshToBand(mesh, 0.11); }), "--accept-sign");
   expectOpenSound(meshToBand(mesh, 0.11, {.acceptSign = true}), mesh);
 }
 
-/// A rectangle across an axis, as two triangles of a soup; distances do not ask which way it faces.
+/// Adds a rectangle across an axis, as two triangles of a soup. Distances do not depend on its
+/// orientation.
 void addRectangle(TriMesh& mesh, const V3d& low, const V3d& high) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   const int flat = low.x == high.x ? 0 : (low.y == high.y ? 1 : 2), u = (flat + 1) % 3;
@@ -132,7 +135,7 @@ void addRectangle(TriMesh& mesh, const V3d& low, const V3d& high) {
   mesh.triangles.push_back({first, first + 2, first + 3});
 }
 
-/// The faces of a box, without those named: 0 for x low, 1 for x high, 2 for y low, …
+/// Adds the faces of a box except the listed ones: 0 for low x, 1 for high x, 2 for low y, …
 void addBox(TriMesh& mesh, const V3d& low, const V3d& high, std::initializer_list<int> without) {
   for (int face = 0; face < 6; ++face) {
     if (std::find(without.begin(), without.end(), face) != without.end()) continue;
@@ -143,7 +146,7 @@ void addBox(TriMesh& mesh, const V3d& low, const V3d& high, std::initializer_lis
 }
 
 TEST(MeshToBandNasty, BoxesThroughEachOther) {
-  // A pillar of twelve triangles through the top of a block of twelve: what lies inside separates
+  // A pillar of twelve triangles through the top of a block of twelve. Inner faces separate
   // nothing, and distances are those to the boundary of the union.
   const TriMesh mesh =
       joined(boxMesh(V3d(-1), V3d(1)), boxMesh(V3d(-0.5, -0.4, 0), V3d(0.5, 0.4, 2)));
@@ -200,12 +203,12 @@ TEST(MeshToBandNasty, IslandsAMillionApart) {
                   windingNumber(mesh, p) > 0.5);
   }
   EXPECT_LT(worst, 1e-5);
-  // Nothing lies between: the tree holds no tile that is inside.
+  // The space between is empty: no tile of the tree is inside.
   EXPECT_GT(vdb(result.band).tree().getValue({0, 0, 0}), 0);
   EXPECT_EQ(result.band.activeVoxelCount(), 2 * meshToBand(left, 0.1).band.activeVoxelCount());
 }
 
-/// A ball of so many rings of triangles, far smaller than a voxel.
+/// Converts a ball of `rings` rings of triangles that are far smaller than a voxel.
 void expectBallOfTiny(unsigned rings) {
   const V3d center(0.01, 0.02, 0.03);
   const TriMesh mesh = sphereMesh(1, center, rings);
@@ -218,7 +221,8 @@ void expectBallOfTiny(unsigned rings) {
     const V3d p = toImath(it.getCoord().asVec3d()) * h - center;
     worst = std::max(worst, std::abs(static_cast<double>(*it) - (p.length() - 1)));
   }
-  // Chords lie (π / rings)² / 8 below the sphere, both ways; single precision adds the rest.
+  // Chords lie (π / rings)² / 8 below the sphere, in both directions. Single precision adds the
+  // rest.
   const double chord = std::numbers::pi / rings;
   EXPECT_LT(worst, 2 * chord * chord / 8 + 1e-6);
 }
@@ -252,7 +256,8 @@ TEST(MeshToBandNasty, TwelveTrianglesLargerThanTheGrid) {
   EXPECT_LT(worst, 1e-4);
 }
 
-/// No triangle shares a vertex with another; `tolerance` is for the chords' and the jitter.
+/// Converts a soup in which no triangles share a vertex. `tolerance` covers the chords and the
+/// jitter.
 void expectSoup(unsigned rings, double tolerance) {
   const TriMesh mesh = soup(sphereMesh(1, V3d(0.01, 0.02, 0.03), rings), 1e-5);
   const double h = 0.07;
@@ -276,8 +281,8 @@ TEST(SlowMeshToBandNasty, SoupOf57600Triangles) {
   expectSoup(120, 3e-4);
 }
 
-/// Scans with edges of three and more faces: signs against the winding number summed directly, at
-/// every `stride`th voxel of the band.
+/// Converts scans with edges of three and more faces. Compares signs with the directly summed
+/// winding number at every `stride`th voxel of the band.
 void expectScan(const std::string& name, double voxels, std::size_t stride) {
   const std::filesystem::path file = std::filesystem::path(LEVELSMITH_DATA_DIR) / "models" / name;
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is missing: run data/fetch";
@@ -310,7 +315,8 @@ TEST(SlowMeshToBandNasty, DecimatedDragons) {
   expectScan("dragon_vrip_res2.ply.gz", 200, 200);
 }
 
-/// A prism over a polygon in the plane z = 0, counter-clockwise, whose first corner sees all.
+/// Prism over a polygon in the plane z = 0, counter-clockwise. All of the polygon is visible from
+/// its first corner.
 TriMesh prism(const std::vector<V3d>& base, double height) {
   TriMesh mesh;
   const auto n = static_cast<std::uint32_t>(base.size());
@@ -340,16 +346,16 @@ TEST(MeshToBandNasty, FacesThroughGridPointsLeaveNoSpecks) {
       for (const SignMode sign : {SignMode::Closed, SignMode::Winding}) {
         const Measurement found = measure(meshToBand(mesh, voxel, {.sign = sign}).band);
         EXPECT_EQ(found.components, 1u) << voxel;
-        // Edges are cut off by up to half a voxel's square.
+        // Edges are rounded by up to half a square voxel in cross-section.
         EXPECT_NEAR(found.volume, signedVolume(mesh), 0.2 * voxel * surfaceArea(mesh)) << voxel;
       }
-  // Of the small one only points of its faces are grid points: nothing is inside.
+  // In the small tetrahedron only points of its faces are grid points, so no grid point is inside.
   for (V3d& p : tetrahedron.positions) p /= 8;
   expectSays(refusal<InvalidInput>([&] { (void)meshToBand(tetrahedron, 0.9); }),
              "no grid point lies inside");
 }
 
-TEST(MeshToBandNasty, VerticesThatNoFaceUsesDoNotCount) {
+TEST(MeshToBandNasty, IgnoresVerticesThatNoFaceUses) {
   TriMesh mesh = boxMesh(V3d(0), V3d(1));
   mesh.positions.emplace_back(100, 100, 100);
   EXPECT_EQ(bounds(mesh).max, V3d(1));

@@ -16,12 +16,12 @@ using namespace support;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-/// The conversion fails with that exit class, and its sentence holds the words.
+/// Expects that the conversion fails with this exit code and that the message contains `words`.
 void expectRefused(const TriMesh& mesh, double voxel, ExitCode code, const std::string& words,
                    const MeshToBandOptions& options = {}) {
   try {
     (void)meshToBand(mesh, voxel, options);
-    FAIL() << "accepted, though: " << words;
+    FAIL() << "accepted instead of: " << words;
   } catch (const Error& error) {
     EXPECT_EQ(error.exitCode(), code) << error.what();
     EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
@@ -82,7 +82,7 @@ TEST(MeshToBandRefusal, NamesOpenMeshes) {
       const double r = 1 + w * std::cos(a / 2);
       return V3d(r * std::cos(a), r * std::sin(a), w * std::sin(a / 2));
     });
-    for (auto& t : mesh.triangles)  // the last row is the first, mirrored
+    for (auto& t : mesh.triangles)  // the last row is the first row mirrored
       for (auto& v : t)
         if (v >= 32 * 5) v = 4 - (v - 32 * 5);
     return mesh;
@@ -90,7 +90,7 @@ TEST(MeshToBandRefusal, NamesOpenMeshes) {
   expectRefused(moebius, 0.1, ExitCode::Input, "not closed", {.sign = SignMode::Closed});
 }
 
-TEST(MeshToBandRefusal, GivesDistancesWithoutAnInsideWhenAskedTo) {
+TEST(MeshToBandRefusal, GivesUnsignedDistancesOnRequest) {
   const TriMesh triangle{{V3d(0), V3d(1, 0, 0), V3d(0, 1, 0)}, {{0, 1, 2}}};
   for (const SignMode mode : {SignMode::Auto, SignMode::Winding}) {
     const auto result = meshToBand(triangle, 0.1, {.sign = mode, .acceptSign = true});
@@ -103,7 +103,7 @@ TEST(MeshToBandRefusal, GivesDistancesWithoutAnInsideWhenAskedTo) {
   }
 }
 
-TEST(MeshToBandRefusal, NamesShellsThatCannotFollowTheirOrientation) {
+TEST(MeshToBandRefusal, NamesComponentsOfInconsistentOrientation) {
   TriMesh mesh = boxMesh(V3d(0), V3d(1));
   std::swap(mesh.triangles[3][0], mesh.triangles[3][1]);
   expectRefused(mesh, 0.1, ExitCode::Input, "--nested parity",

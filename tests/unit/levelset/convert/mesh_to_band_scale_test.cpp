@@ -1,4 +1,4 @@
-// Meshes and bands of any unit of length, and coordinates coarser than the grid.
+// Meshes and bands in any unit of length, and coordinates coarser than the grid.
 
 #include <gtest/gtest.h>
 
@@ -56,7 +56,7 @@ TEST(MeshToBandScale, CopiesWritesAndCombinesBandsInAnyUnit) {
     writeBand(folder / "ball.vdb", ball);
     EXPECT_EQ(readBand(folder / "ball.vdb").contentHash(), ball.contentHash()) << unit;
     EXPECT_EQ(unite(ball, ball).activeVoxelCount(), ball.activeVoxelCount()) << unit;
-    // Voxels half as large are another grid, though both sizes may be below OpenVDB's tolerance.
+    // Half the voxel size is another grid, even if both sizes are below OpenVDB's tolerance.
     EXPECT_FALSE(shareGrid(ball, makeSphere(unit, Imath::V3d(0), h / 2))) << unit;
     const NarrowBand finer = resample(ball, h / 2);
     EXPECT_NEAR(finer.zeroSetBounds().max.x, unit, 0.02 * h) << unit;
@@ -65,7 +65,7 @@ TEST(MeshToBandScale, CopiesWritesAndCombinesBandsInAnyUnit) {
   }
 }
 
-TEST(MeshToBandScale, RefusesWhatFloatsOrOpenVdbCannotHold) {
+TEST(MeshToBandScale, RefusesValuesBeyondFloatsOrOpenVdb) {
   const TemporaryFolder folder;
   const NarrowBand ball = makeSphere(1e-6, Imath::V3d(0), 1e-7);
   const std::string sentence = refusal<ResourceLimit>(
@@ -83,7 +83,7 @@ TEST(MeshToBandScale, RefusesWhatFloatsOrOpenVdbCannotHold) {
       std::string::npos);
   EXPECT_NE(refusal<InvalidInput>([&] { (void)meshToBand(scaled(1e39), 2e38); }).find("too large"),
             std::string::npos);
-  // Denormal coordinates are no reason to divide by nothing.
+  // Denormal coordinates must not cause a division by zero.
   EXPECT_THROW((void)meshToBand(scaled(5e-324), 5e-324), InvalidInput);
   TriMesh nearly = box;
   for (V3d& p : nearly.positions)
@@ -99,17 +99,17 @@ TriMesh floatBoxFarAway() {
   return mesh;
 }
 
-TEST(MeshToBandScale, RemembersHowFinelyCoordinatesWereKnown) {
+TEST(MeshToBandScale, KeepsTheSpacingOfCoordinates) {
   const TriMesh home = transform(floatBoxFarAway(), Imath::M44d().setTranslation(V3d(-1e7)));
-  EXPECT_EQ(home.spacing, 1);  // of floats from 2²³ to 2²⁴
+  EXPECT_EQ(home.spacing, 1);  // spacing of floats from 2²³ to 2²⁴
   const std::string sentence = refusal<InvalidInput>([&] { (void)meshToBand(home, 0.02); });
   EXPECT_NE(sentence.find("before the mesh was moved, its coordinates were 1 apart"),
             std::string::npos);
-  // Scaling down scales what is not known.
+  // Scaling down also scales the uncertainty.
   const TriMesh small = transform(home, Imath::M44d().setScale(0.01));
   EXPECT_NEAR(small.spacing, 0.01, 1e-12);
   EXPECT_THROW((void)meshToBand(small, 0.005), InvalidInput);
-  // What was fine where it was read stays fine.
+  // Coordinates that were fine when read remain fine.
   TriMesh near = boxMesh(V3d(0), V3d(4));
   near.precision = CoordinatePrecision::Float;
   const TriMesh moved = transform(near, Imath::M44d().setTranslation(V3d(1e7)));

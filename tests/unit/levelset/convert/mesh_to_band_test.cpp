@@ -46,7 +46,7 @@ TEST(MeshToBand, CountsCubeOnGridLinesOnce) {
   expectExact(closed(mesh, 0.5), mesh, byWinding(mesh));
 }
 
-TEST(MeshToBand, MatchesWindingNumberOfNestedShells) {
+TEST(MeshToBand, MatchesWindingNumberOfNestedComponents) {
   const TriMesh outer = sphereMesh(1, V3d(0.01, 0.02, 0.03), 12);
   const TriMesh same = joined(outer, sphereMesh(0.5, V3d(0), 10));
   const TriMesh cavity = joined(outer, reversed(sphereMesh(0.5, V3d(0), 10)));
@@ -55,16 +55,17 @@ TEST(MeshToBand, MatchesWindingNumberOfNestedShells) {
     return meshToBand(mesh, h, {.sign = SignMode::Winding});
   };
   expectExact(winding(cavity), cavity, byWinding(cavity));
-  // An inner shell that faces the same way separates nothing.
+  // An inner component with the same orientation separates nothing.
   expectExact(winding(same), outer, byWinding(same));
-  // Parity keeps the cavity whichever way the inner shell faces, orientation follows it.
+  // Parity keeps the cavity for either orientation of the inner component; the winding number
+  // depends on the orientation.
   expectExact(closed(same, h), cavity, byWinding(cavity));
   expectExact(closed(cavity, h), cavity, byWinding(cavity));
   expectExact(closed(cavity, h, Nesting::Orientation), cavity, byWinding(cavity));
   expectExact(closed(same, h, Nesting::Orientation), outer, byWinding(same));
 }
 
-TEST(MeshToBand, TurnsSoupThatFacesInwards) {
+TEST(MeshToBand, ReversesSoupThatFacesInwards) {
   const TriMesh out = sphereMesh(1, V3d(0.01, 0.02, 0.03), 8);
   const TriMesh in = soup(reversed(out), 1e-4);
   const auto result = meshToBand(in, 0.13, {.sign = SignMode::Winding});
@@ -74,7 +75,7 @@ TEST(MeshToBand, TurnsSoupThatFacesInwards) {
   expectExact(result, in, byWinding(in, -1));
 }
 
-TEST(MeshToBand, MeasuresToTheBoundaryOfSelfIntersectingUnion) {
+TEST(MeshToBand, MeasuresDistanceToTheBoundaryOfASelfIntersectingUnion) {
   const TriMesh first = sphereMesh(1, V3d(0.01, 0.02, 0.03), 10),
                 second = sphereMesh(0.8, V3d(0.9, 0.1, 0.05), 10), mesh = joined(first, second);
   const double h = 0.13;
@@ -87,7 +88,7 @@ TEST(MeshToBand, MeasuresToTheBoundaryOfSelfIntersectingUnion) {
     const V3d p = toImath(it.getCoord().asVec3d()) * h;
     const double value = static_cast<double>(*it);
     ASSERT_EQ(value<0, windingNumber(mesh, p)> 0.5) << p;
-    // Nearest points of each sheet, and whether the other shell leaves them on the boundary.
+    // Distances to each sheet, and to its part on the boundary, outside the other component.
     double all = 1e9, boundary = 1e9;
     for (const TriMesh* shell : {&first, &second}) {
       const TriMesh& other = shell == &first ? second : first;
@@ -99,7 +100,7 @@ TEST(MeshToBand, MeasuresToTheBoundaryOfSelfIntersectingUnion) {
         if (d < boundary && windingNumber(other, q) < 0.5) boundary = d;
       }
     }
-    // A triangle that the seam crosses may have its nearest point inside and others outside.
+    // A triangle across the seam may have its nearest point inside and other points outside.
     ASSERT_GT(std::abs(value), all - 1e-4 * h) << p;
     ASSERT_LT(std::abs(value), boundary + 1e-4 * h) << p;
     apart += boundary > all + 1e-3 * h && std::abs(value) > all + 1e-3 * h;
@@ -110,12 +111,14 @@ TEST(MeshToBand, MeasuresToTheBoundaryOfSelfIntersectingUnion) {
 TEST(MeshToBand, SpansHoleOfHemisphere) {
   const TriMesh mesh = sphereMesh(1, V3d(0.01, 0.02, 0.03), 10, 0.5);
   const double h = 0.11;
-  EXPECT_THROW((void)meshToBand(mesh, h), InvalidInput);  // half the rim's disc is a guess
+  // Half of the rim's disc has an uncertain sign.
+  EXPECT_THROW((void)meshToBand(mesh, h), InvalidInput);
   const auto result = meshToBand(mesh, h, {.acceptSign = true});
   EXPECT_EQ(result.certificate.method, SignMode::Winding);
   EXPECT_GT(result.certificate.ambiguousShare, 1e-3);
   expectOpenSound(result, mesh);
-  // The rim lies in a plane, which its opening sees under half the sphere: w = 1/2 spans it flatly.
+  // The rim lies in a plane that sees its opening under half the sphere, so w = 1/2 closes it with
+  // a flat disc.
   auto accessor = vdb(result.band).getConstAccessor();
   for (int z = -2; z <= 2; ++z) {
     const double phi = static_cast<double>(accessor.getValue({0, 0, z}));
@@ -123,7 +126,7 @@ TEST(MeshToBand, SpansHoleOfHemisphere) {
   }
 }
 
-TEST(MeshToBand, KeepsSmallHoleOfScanClosed) {
+TEST(MeshToBand, ClosesSmallHoleOfScan) {
   TriMesh mesh = torusMesh(1, 0.4, 48, 24, V3d(0.013, -0.021, 0.007));
   mesh.triangles.erase(mesh.triangles.begin() + 100);
   const auto result = meshToBand(mesh, 0.1);
@@ -134,11 +137,12 @@ TEST(MeshToBand, KeepsSmallHoleOfScanClosed) {
 
 TEST(MeshToBand, KeepsFacesThatCloseSheets) {
   const TriMesh box = boxMesh(V3d(0), V3d(1));
-  // Every face twice is the same solid.
+  // A mesh with every face twice is the same solid.
   const auto twice = closed(joined(box, box), 0.1);
   EXPECT_EQ(twice.certificate.droppedTriangles, 12u);
   EXPECT_EQ(twice.band.contentHash(), closed(box, 0.1).band.contentHash());
-  // Two boxes that share an edge: four faces there, still crossed an even number of times.
+  // Two boxes that share an edge. The edge has four faces and is still crossed an even number of
+  // times.
   const TriMesh touching = joined(box, boxMesh(V3d(1, 1, 0), V3d(2, 2, 1)));
   const auto result = meshToBand(touching, 0.11);
   EXPECT_EQ(result.certificate.nonManifoldEdges, 1u);
@@ -147,11 +151,12 @@ TEST(MeshToBand, KeepsFacesThatCloseSheets) {
 }
 
 TEST(MeshToBand, MeasuresNeedlesAndDegenerateFaces) {
-  // A box with a face split at a point on an edge (T-junction closed by a face without area).
+  // A box with a face split at a point on an edge (a T-junction closed by a face of zero area).
   TriMesh mesh = boxMesh(V3d(0), V3d(1));
   const auto middle = static_cast<std::uint32_t>(mesh.positions.size());
   mesh.positions.emplace_back(0.5, 0, 0);
-  mesh.triangles[0] = {0, 2, middle};  // {0, 2, 1} split; the neighbour keeps the whole edge 0–1
+  // {0, 2, 1} is split; its neighbour keeps the complete edge 0–1.
+  mesh.triangles[0] = {0, 2, middle};
   mesh.triangles.push_back({middle, 2, 1});
   mesh.triangles.push_back({0, middle, 1});
   mesh.triangles.push_back({3, 3, 5});
@@ -200,7 +205,7 @@ TEST(MeshToBand, GivesTheSameBitsForAnyThreadCount) {
   for (std::size_t i = 2; i < hashes.size(); ++i) EXPECT_EQ(hashes[i], hashes[i % 2]);
 }
 
-TEST(MeshToBand, StopsWhenAsked) {
+TEST(MeshToBand, StopsWhenCancelled) {
   int calls = 0;
   double last = 0;
   const Progress progress = [&](double fraction) {
@@ -213,7 +218,7 @@ TEST(MeshToBand, StopsWhenAsked) {
   EXPECT_GE(calls, 5);
 }
 
-/// A prism over a regular polygon, read from a file whose caps are polygons.
+/// Prism over a regular polygon, read from a file whose caps are polygons.
 TriMesh prismOf(int corners) {
   std::string obj, caps[2] = {"f", "f"}, sides;
   for (int i = 0; i < corners; ++i) {
@@ -230,17 +235,18 @@ TriMesh prismOf(int corners) {
 }
 
 TEST(SlowSelfIntersections, SearchesLargeCapsInTime) {
-  // Written as polygons and read again: the reader splits the caps.
+  // Written as polygons and read again, because the reader splits the caps.
   const TriMesh mesh = prismOf(100000);
   EXPECT_EQ(mesh.triangles.size(), 2 * (100000u - 2) + 2 * 100000u);
   const std::clock_t start = std::clock();
   EXPECT_EQ(countSelfIntersections(mesh), 0u);
-  // CPU seconds; all pairs of a cap take minutes.
+  // CPU seconds. A test of all pairs of a cap takes minutes.
   EXPECT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 20);
 }
 
-TEST(SelfIntersections, JudgesFlatFansAroundACorner) {
-  // A disc of triangles about one vertex lies flat; one of them turned over lies on another.
+TEST(SelfIntersections, HandlesFlatFansAroundACorner) {
+  // A disc of triangles around one vertex is flat. A triangle that is turned over lies on another
+  // one.
   TriMesh fan{{V3d(0)}, {}};
   constexpr std::uint32_t kSides = 4000;
   for (std::uint32_t i = 0; i < kSides; ++i) {
@@ -248,18 +254,18 @@ TEST(SelfIntersections, JudgesFlatFansAroundACorner) {
     fan.positions.emplace_back(turned(V3d(std::cos(angle), std::sin(angle), 0), 0.3));
     fan.triangles.push_back({0, i + 1, (i + 1) % kSides + 1});
   }
-  // Turned, its corners lie in no plane exactly; flat, they do.
+  // The rotated corners lie in no plane exactly, the corners with z = 0 do.
   EXPECT_EQ(countSelfIntersections(fan), 0u);
   for (V3d& p : fan.positions) p = turned(p, -0.3), p.z = 0;
   EXPECT_EQ(countSelfIntersections(fan), 0u);
-  fan.triangles.push_back({0, 11, 13});  // over those from 11 to 12 and to 13
+  fan.triangles.push_back({0, 11, 13});  // lies on the triangles from 11 to 12 and from 12 to 13
   EXPECT_EQ(countSelfIntersections(fan), 2u);
 }
 
-TEST(SelfIntersections, CountsPairsThatCross) {
+TEST(SelfIntersections, CountsIntersectingPairs) {
   EXPECT_EQ(countSelfIntersections(torusMesh(1, 0.4)), 0u);
   EXPECT_EQ(countSelfIntersections(boxMesh(V3d(0), V3d(1))), 0u);
-  // A face folded back onto its neighbour, a coplanar overlap, a piercing edge.
+  // A face folded back onto its neighbour, a coplanar overlap, and an edge through a face.
   const auto pair = [](const V3d& a, const V3d& b, const V3d& c) {
     TriMesh mesh{{V3d(0, 0, 0), V3d(1, 0, 0), V3d(0, 1, 0), a, b, c}, {{0, 1, 2}, {3, 4, 5}}};
     return countSelfIntersections(mesh);

@@ -41,13 +41,13 @@ using levelset::TriMesh;
 using support::patchMesh;
 using support::refusal;
 
-/// A square of edge 2 about the middle, in the plane through it across `normal`.
+/// Square with edges of length 2, centred at `middle`, in the plane through u and v.
 TriMesh square(const V3d& middle, const V3d& u, const V3d& v, unsigned cells = 4) {
   return patchMesh(cells + 1, cells + 1, false, false,
                    [=](double s, double t) { return middle + u * (2 * s - 1) + v * (2 * t - 1); });
 }
 
-TEST(SurfaceBand, OfAPlaneIsTheDistanceToIt) {
+TEST(SurfaceBand, OfAPlaneIsTheDistanceToThePlane) {
   const double h = 0.1;
   const V3d u = V3d(2, 1, 0).normalized(), v = V3d(-1, 2, 1.5).normalized();
   const V3d normal = u.cross(v), middle(0.33, 0.21, -0.07);
@@ -62,18 +62,18 @@ TEST(SurfaceBand, OfAPlaneIsTheDistanceToIt) {
     EXPECT_NEAR(phi, way.dot(normal), 1e-6) << p;
     EXPECT_LT(std::abs(phi), 5 * h + 1e-6);
     const double over = std::max({0.0, std::abs(way.dot(u)) - 1, std::abs(way.dot(v)) - 1});
-    EXPECT_LE(over, 3.5 * h + 1e-6);  // the border, and what goes on straight
+    EXPECT_LE(over, 3.5 * h + 1e-6);  // the border and its straight continuation
     ++(over > 0 ? beyond : within);
   });
-  // All of the slab of ten voxels over the square, and no more around it than a rim of three and a
-  // half.
+  // The complete slab of ten voxels over the square, with a rim of at most three and a half voxels
+  // around it.
   EXPECT_NEAR(static_cast<double>(within) * h * h * h, 4 * 10 * h, 0.1);
   EXPECT_NEAR(static_cast<double>(beyond) * h * h * h,
               (4 * 2 * 3.5 * h + M_PI * 12.25 * h * h) * 10 * h, 0.1);
 }
 
 TEST(SurfaceBand, SignsAboutEdgesAndCorners) {
-  // A box without its lid: edges and corners that are convex from below, and concave from above.
+  // A box without its lid. Its edges and corners are convex from below and concave from above.
   TriMesh box;
   box.positions = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
                    {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
@@ -89,7 +89,7 @@ TEST(SurfaceBand, SignsAboutEdgesAndCorners) {
   const double h = 0.11;
   std::size_t seen = 0;
   support::forEachActive(surfaceBand(box, h).band, [&](const V3d& p, double phi) {
-    if (p.z > 1) return;  // straight on
+    if (p.z > 1) return;  // straight continuation
     const V3d q(std::abs(p.x) - 1, std::abs(p.y) - 1, -1 - p.z);
     const V3d out(std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0));
     const double inside = std::max({q.x, q.y, q.z});
@@ -100,7 +100,7 @@ TEST(SurfaceBand, SignsAboutEdgesAndCorners) {
 }
 
 TEST(SurfaceBand, OfACapIsTheDistanceToTheBall) {
-  // 60 rings: the chords' sagitta is R (π / 60)² / 8 = 3.4e-4.
+  // With 60 rings the sagitta of the chords is R (π / 60)² / 8 = 3.4e-4.
   const double h = 0.05;
   std::size_t seen = 0;
   const TriMesh cap = support::sphereMesh(1, V3d(0), 60, 0.5);
@@ -113,7 +113,7 @@ TEST(SurfaceBand, OfACapIsTheDistanceToTheBall) {
 }
 
 TEST(SurfaceBand, FrontAndBackDoNotMeet) {
-  // Two sheets above each other, the back of the upper over the front of the lower.
+  // Two parallel sheets. The back of the upper one faces the front of the lower one.
   const double h = 0.1;
   for (const double gap : {0.73, 0.41, 0.26}) {
     TriMesh sheets = square(V3d(0, 0, 0.013), V3d(1, 0, 0), V3d(0, 1, 0));
@@ -125,12 +125,12 @@ TEST(SurfaceBand, FrontAndBackDoNotMeet) {
       const openvdb::Coord c = it.getCoord();
       float next;
       if (!accessor.probeValue(c.offsetBy(0, 0, 1), next) || (*it < 0) == (next < 0)) continue;
-      EXPECT_LT(*it, next) << gap;  // from below to above only
+      EXPECT_LT(*it, next) << gap;  // sign changes from below to above only
     }
   }
 }
 
-TEST(SurfaceBand, SeamsAndThreadsDoNotMatter) {
+TEST(SurfaceBand, IgnoresSeamsAndThreads) {
   TriMesh whole = support::sphereMesh(1, V3d(0), 12, 0.7), torn;
   for (const auto& t : whole.triangles) {
     const auto first = static_cast<std::uint32_t>(torn.positions.size());
@@ -143,14 +143,14 @@ TEST(SurfaceBand, SeamsAndThreadsDoNotMatter) {
     support::onThreads(count, [&] { EXPECT_EQ(surfaceBand(whole, 0.1).band.contentHash(), hash); });
 }
 
-TEST(SurfaceBand, RefusesWhatHasNoTwoSides) {
+TEST(SurfaceBand, RefusesSurfacesWithoutTwoSides) {
   // A strip that is turned over where it closes.
   TriMesh moebius = patchMesh(40, 5, false, false, [](double u, double v) {
     const double a = 2 * M_PI * u, w = 0.4 * (v - 0.5);
     return V3d((1 + w * std::cos(a / 2)) * std::cos(a), (1 + w * std::cos(a / 2)) * std::sin(a),
                w * std::sin(a / 2));
   });
-  // The ends meet to rounding only.
+  // The ends coincide only up to rounding.
   for (std::size_t j = 0; j < 5; ++j) moebius.positions[39 * 5 + j] = moebius.positions[4 - j];
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand(moebius, 0.05); }),
               "two faces have opposite orientations");
@@ -161,14 +161,14 @@ TEST(SurfaceBand, RefusesWhatHasNoTwoSides) {
   EXPECT_SAYS(sentence, "orient all faces alike");
   TriMesh fin = square(V3d(0), V3d(1, 0, 0), V3d(0, 1, 0), 2);
   fin.positions.emplace_back(0, 0.5, 1);
-  fin.triangles.push_back({4, 5, 9});  // on the edge from (0, 0) to (0, 1)
+  fin.triangles.push_back({4, 5, 9});  // third face of the edge from (0, 0) to (0, 1)
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand(fin, 0.1); }),
               "at the edge from (0, 0, 0) to (0, 1, 0) 3 faces meet");
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand(support::sphereMesh(1), 0.1); }),
               "'level-set' converts a closed mesh");
 }
 
-TEST(SurfaceBand, RefusesTheCall) {
+TEST(SurfaceBand, RefusesInvalidArguments) {
   const TriMesh sheet = square(V3d(0), V3d(1, 0, 0), V3d(0, 1, 0));
   EXPECT_THROW((void)surfaceBand(sheet, 0.1, {.halfWidth = 3}), levelset::UsageError);
   EXPECT_THROW((void)surfaceBand(sheet, 0), levelset::UsageError);
@@ -181,7 +181,7 @@ TEST(SurfaceBand, RefusesTheCall) {
   EXPECT_THROW((void)surfaceBand(sheet, 0.01, {.maxMemory = 1000}), levelset::ResourceLimit);
 }
 
-TEST(SurfaceBand, TellsWhatIsBeyondTheBorder) {
+TEST(SurfaceBand, ReportsPositionsBeyondTheBorder) {
   const double h = 0.1;
   const NarrowBand band = surfaceBand(square(V3d(0), V3d(1, 0, 0), V3d(0, 1, 0)), h).band;
   const levelset::BandSampler sampler(band);

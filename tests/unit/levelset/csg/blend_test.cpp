@@ -34,7 +34,8 @@ NarrowBand sample(const Shape& shape, const V3d& extent) {
   return support::sampleBand(shape, {-extent, extent}, 1);
 }
 
-/// A floor with its top at z = 0.3 and a wall with its face at x = 0.2: a concave crease along y.
+/// Floor with its top at z = 0.3 and wall with its face at x = 0.2. Their concave crease runs along
+/// y.
 struct Corner {
   NarrowBand floor, wall;
   explicit Corner(double size)
@@ -44,7 +45,7 @@ struct Corner {
                     V3d(size + 2))) {}
 };
 
-/// Where φ changes sign along the diagonal from the crease: its distance from the crease.
+/// Distance along the diagonal from the crease to the sign change of φ.
 double fillDepth(const NarrowBand& band) {
   const openvdb::FloatGrid& grid = vdb(band);
   auto accessor = grid.getConstAccessor();
@@ -62,7 +63,7 @@ double fillDepth(const NarrowBand& band) {
   return low;
 }
 
-TEST(Blend, TakesTheRadiusAskedFor) {
+TEST(Blend, UsesTheRequestedRadius) {
   const Corner corner(40);
   for (const double radius : {4.0, 8.0, 12.0}) {
     const CsgResult result = blend(CsgOperation::Union, corner.floor, corner.wall, radius);
@@ -97,7 +98,7 @@ TEST(Blend, ChangesNothingBeyondTheRadius) {
       for (c[2] = -26; c[2] <= 26; ++c[2]) {
         const bool same =
             before.getValue(c) == after.getValue(c) && before.isValueOn(c) == after.isValueOn(c);
-        // The curve is known to a small part of a voxel.
+        // The position of the curve is known to a small fraction of a voxel.
         if (TwoBalls::distanceToCurve(toImath(c.asVec3d())) > radius + 0.1)
           beyond += !same;
         else
@@ -108,7 +109,7 @@ TEST(Blend, ChangesNothingBeyondTheRadius) {
   EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(soft.band), 6), "");
 }
 
-TEST(Blend, LeavesSolidsApartThatDoNotMeet) {
+TEST(Blend, KeepsSeparateSolidsApart) {
   for (const double gap : {0.8, 1.5, 3.0}) {
     const NarrowBand left = sample(sphere(V3d(-15 - gap / 2, 0.3, 0.1), 15), V3d(34, 18, 18));
     const NarrowBand right = sample(sphere(V3d(15 + gap / 2, 0.3, 0.1), 15), V3d(34, 18, 18));
@@ -119,7 +120,7 @@ TEST(Blend, LeavesSolidsApartThatDoNotMeet) {
   }
 }
 
-/// Inner and outer volume by which `after` differs from `before`, counted in grid points.
+/// Volumes inside and outside by which `after` differs from `before`, counted in grid points.
 std::pair<std::size_t, std::size_t> lostAndGained(const NarrowBand& before,
                                                   const NarrowBand& after) {
   auto read = vdb(after).getConstAccessor();
@@ -145,7 +146,7 @@ TEST(Blend, WorksOnOneSideOnly) {
                both = run(BlendSide::Both);
     EXPECT_EQ(add.first, 0u);
     EXPECT_EQ(remove.second, 0u);
-    // The crease of a union is hollow, those of the others stick out.
+    // The crease of a union is concave, those of the other operations are convex.
     if (operation == CsgOperation::Union) {
       EXPECT_GT(add.second, 100u);
       EXPECT_GT(both.second, 100u);
@@ -156,8 +157,8 @@ TEST(Blend, WorksOnOneSideOnly) {
   }
 }
 
-TEST(Blend, KeepsWhatIsRounderThanTheRadius) {
-  // Curvature of the balls themselves does not make them flow, however long the seam takes.
+TEST(Blend, KeepsSurfacesRounderThanTheRadius) {
+  // The curvature of the balls themselves does not move them, however long the seam takes.
   const TwoBalls balls;
   const CsgResult soft = blend(CsgOperation::Union, balls.left, balls.right, 5);
   double worst = 0;
@@ -170,7 +171,7 @@ TEST(Blend, KeepsWhatIsRounderThanTheRadius) {
   EXPECT_LE(worst, 0.02);
 }
 
-TEST(Blend, SaysWhatTheGridCannotShow) {
+TEST(Blend, ReportsRadiiTheGridCannotResolve) {
   const TwoBalls balls;
   EXPECT_EQ(blend(CsgOperation::Union, balls.left, balls.right, 1).notes.size(), 1u);
   EXPECT_TRUE(blend(CsgOperation::Union, balls.left, balls.right, 0).notes.empty());

@@ -19,14 +19,14 @@ using Imath::Box3d;
 using Imath::Plane3d;
 using Imath::V3d;
 
-TEST(Clip, HalfASphereIsClosedByThePlane) {
+TEST(Clip, ClosesHalfASphereAtThePlane) {
   const NarrowBand ball = makeSphere(1, V3d(0), 0.05);
-  // Behind a tilted plane through the centre there is half of it, wherever the plane looks.
+  // A plane through the centre leaves half of the sphere for any direction of its normal.
   for (const V3d& normal : {V3d(0, 0, 1), V3d(1, 2, 3), V3d(-1, 0.2, 0)}) {
     const NarrowBand half = clip(ball, Plane3d(normal, 0));
     EXPECT_NEAR(measure(half).volume, 2 * M_PI / 3, 0.01);
-    // A grid rounds a right-angled edge over a voxel: no more is lost than its two legs to the
-    // chord.
+    // A grid rounds a right-angled edge over a voxel. The area shrinks by at most the two legs less
+    // the chord.
     EXPECT_LT(measure(half).area, 3 * M_PI + 0.01);
     EXPECT_GT(measure(half).area, 3 * M_PI - 2 * M_PI * 0.05 * (2 - std::sqrt(2.0)));
     EXPECT_LT(vdb(half).tree().getValue(openvdb::Coord::round(toVdb(-normal.normalized() * 10))),
@@ -58,7 +58,7 @@ TEST(Clip, WorksInWorldSpaceOnATurnedGrid) {
   });
 }
 
-TEST(Clip, RegionsAroundTheSolidChangeNothing) {
+TEST(Clip, RegionsAroundTheSolidHaveNoEffect) {
   const NarrowBand ball = makeSphere(1, V3d(0), 0.1);
   const double far = std::numeric_limits<double>::infinity();
   EXPECT_EQ(clip(ball, Box3d(V3d(-9), V3d(9))).contentHash(), ball.contentHash());
@@ -67,17 +67,17 @@ TEST(Clip, RegionsAroundTheSolidChangeNothing) {
   EXPECT_EQ(half.zeroSetBounds(), clip(ball, Plane3d(V3d(0, 0, -1), -0.02)).zeroSetBounds());
 }
 
-TEST(Clip, RefusesWhatLeavesNothing) {
+TEST(Clip, RefusesAnEmptyResult) {
   const NarrowBand ball = makeSphere(1, V3d(0), 0.1);
   EXPECT_THROW((void)clip(ball, Box3d(V3d(5), V3d(6))), InvalidInput);
   EXPECT_THROW((void)clip(ball, Box3d(V3d(0.01), V3d(0.02))), InvalidInput);
   EXPECT_THROW((void)clip(ball, Box3d(V3d(0.9), V3d(2))), InvalidInput)
-      << "the box's corner misses";
+      << "the corner of the box misses the ball";
   EXPECT_THROW((void)clip(ball, Plane3d(V3d(0, 0, 1), -2)), InvalidInput);
   EXPECT_THROW((void)clip(NarrowBand(), Plane3d(V3d(0, 0, 1), 0)), InvalidInput);
 }
 
-TEST(Clip, RefusesWhatIsNoRegion) {
+TEST(Clip, RefusesInvalidRegions) {
   const NarrowBand ball = makeSphere(1, V3d(0), 0.1);
   EXPECT_THROW((void)clip(ball, Box3d(V3d(1), V3d(-1))), UsageError);
   EXPECT_THROW((void)clip(ball, Box3d(V3d(0), V3d(1, 1, 0))), UsageError);

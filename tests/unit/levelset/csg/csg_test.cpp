@@ -31,8 +31,8 @@ float minMax(CsgOperation operation, float a, float b) {
   return std::max(a, operation == CsgOperation::Intersection ? b : -b);
 }
 
-/// Signs everywhere, and values beside the surface, are those of min and max to the bit; elsewhere
-/// the distance has only grown.
+/// Expects that signs everywhere, and values beside the surface, are those of min and max to the
+/// bit. Elsewhere the distance may only be larger.
 void expectMinMax(CsgOperation operation, const NarrowBand& a, const NarrowBand& b) {
   const NarrowBand result = combine(operation, std::array{a, b}).band;
   const auto inA = vdb(a).getConstAccessor(), inB = vdb(b).getConstAccessor();
@@ -77,15 +77,16 @@ TEST(Csg, TakesMinAndMaxEverywhere) {
   }
   expectMinMax(CsgOperation::Union, ball, apart);
   expectMinMax(CsgOperation::Difference, ball, apart);
-  // Larger than a leaf, so that tiles meet tiles, leaves and nothing.
+  // Larger than a leaf, so that tiles meet tiles, leaves and empty space.
   const NarrowBand large = makeSphere(40, V3d(0), 1), bite = makeSphere(25, V3d(31, 3, 2), 1);
   for (const auto operation :
        {CsgOperation::Union, CsgOperation::Intersection, CsgOperation::Difference})
     expectMinMax(operation, large, bite);
 }
 
-/// Distance to the surface of two overlapping spheres' union or intersection: the nearest point of
-/// either sphere counts where it is on the surface, else the circle in which they meet.
+/// Distance to the surface of two overlapping spheres' union or intersection. The nearest point of
+/// a sphere counts if it is on the surface. Otherwise the nearest point of the circle of
+/// intersection counts.
 struct TwoSpheres {
   double radius, half;  ///< centres at x = ± half
 
@@ -121,14 +122,15 @@ TEST(Csg, HoldsTheDistanceBeyondTheSeam) {
         beside |= (accessor.getValue(near) < 0) != (*it < 0);
       if (beside) continue;
       const double want = truth.distance(toImath(vdb(result).indexToWorld(c)), operation);
-      // Planes stand in for spheres of 32 voxels over a cell: κ/4 each, more where they meet.
+      // The spheres of 32 voxels are approximated by planes over a cell. The error is κ/4 for each,
+      // and more where they meet.
       ASSERT_NEAR(*it, want, 0.05 * h) << c;
     }
   }
 }
 
 TEST(Csg, OverlappingBoxesAreOneBox) {
-  // The face within is no surface and must leave no trace, nor must one between grid points.
+  // The inner face is no surface and must leave no trace, whether or not it lies on grid points.
   const double h = 0.1;
   const NarrowBand both = makeBox(V3d(2, 2, 2), V3d(0), h, {.halfWidth = 4});
   const auto want = vdb(both).getConstAccessor();
@@ -139,10 +141,10 @@ TEST(Csg, OverlappingBoxesAreOneBox) {
     const NarrowBand united = unite(lower, upper);
     const auto have = vdb(united).getConstAccessor();
     for (const openvdb::Coord& c : openvdb::CoordBBox(openvdb::Coord(-14), openvdb::Coord(14))) {
-      // The outermost layer within is beside the surface and keeps the values of min.
+      // The outermost inside layer is beside the surface and keeps the values of min.
       if (std::max({std::abs(c.x()), std::abs(c.y()), std::abs(c.z())}) == 9) continue;
-      // At the inner face's rim four faces share a cell, more than the two planes that stand for
-      // them.
+      // At the rim of the inner face four faces share a cell. The approximation has two planes
+      // only.
       const bool isAtRim = std::max(std::abs(c.x()), std::abs(c.y())) > 5 && std::abs(c.z()) < 10;
       ASSERT_NEAR(have.getValue(c), want.getValue(c), isAtRim ? 0.4 * h : 1e-5)
           << c << " top " << top;
@@ -150,7 +152,7 @@ TEST(Csg, OverlappingBoxesAreOneBox) {
   }
 }
 
-TEST(Csg, FacesThatTouchOnGridPointsLeaveNoCrack) {
+TEST(Csg, TouchingFacesOnGridPointsLeaveNoCrack) {
   const double h = 0.1;
   // Sides on grid points and between them.
   for (const double side : {2.0, 1.92}) {
@@ -163,14 +165,14 @@ TEST(Csg, FacesThatTouchOnGridPointsLeaveNoCrack) {
     const auto want = vdb(both).getConstAccessor(), have = vdb(united).getConstAccessor();
     for (const openvdb::Coord& c : openvdb::CoordBBox(openvdb::Coord(-14), openvdb::Coord(14)))
       ASSERT_NEAR(have.getValue(c), want.getValue(c), 1e-5) << c << " side " << side;
-    // Taking the touching solid away takes nothing.
+    // Subtracting the touching solid removes nothing.
     const double volume = measure(lower).volume;
     EXPECT_NEAR(measure(subtract(lower, upper)).volume, volume, 1e-6 * volume);
   }
 }
 
-TEST(Csg, FacesInCommonLeaveNothingBehindWhatIsTakenAway) {
-  // Three, five and one face in common; on grid points and between them, turned too.
+TEST(Csg, CommonFacesLeaveNoSheetAfterSubtraction) {
+  // Three, five and one common face, on grid points and between them, rotated too.
   const double h = 0.1;
   for (const double shift : {0.0, 0.037}) {
     const V3d at(shift, shift, shift);
@@ -180,25 +182,25 @@ TEST(Csg, FacesInCommonLeaveNothingBehindWhatIsTakenAway) {
     EXPECT_NEAR(static_cast<double>(half.activeVoxelCount()),
                 static_cast<double>(want.activeVoxelCount()), 200)
         << shift;
-    // Between grid points nothing is left to tell where the edge of the cut runs, but rounded.
+    // Between grid points the position of the cut's edge is lost, so that the edge is rounded.
     const double tolerance = (shift == 0 ? 0.06 : 0.5) * h;
     const auto exact = vdb(want).getConstAccessor(), have = vdb(half).getConstAccessor();
     for (const openvdb::Coord& c : openvdb::CoordBBox(openvdb::Coord(-14), openvdb::Coord(14)))
       ASSERT_NEAR(have.getValue(c), exact.getValue(c), tolerance) << c << " shift " << shift;
 
-    // A corner: the wall around what is left is one piece with a cavity, and bounds no crack.
+    // A corner: the remaining wall is one piece with a cavity, and has no crack.
     const NarrowBand corner = subtract(whole, makeBox(V3d(1), at + V3d(0.5, 0.5, 0.5), h));
     const Measurement wall = measure(shell(corner, 2 * h, ShellSide::Out));
     EXPECT_EQ(wall.euler, 4) << shift;
     EXPECT_EQ(wall.cavities, 1u) << shift;
     const NarrowBand slot = subtract(whole, makeBox(V3d(1, 1, 2), at + V3d(0.5, 0, 0), h));
     EXPECT_EQ(measure(slot).euler, 2) << shift;
-    EXPECT_NEAR(measure(slot).volume, 6, 0.2) << shift;  // a grid shows no edge whole
+    EXPECT_NEAR(measure(slot).volume, 6, 0.2) << shift;  // a grid rounds edges
     EXPECT_TRUE(check(slot).passed()) << shift;
   }
 }
 
-TEST(Csg, SpheresThatTouchInAPointStayTwo) {
+TEST(Csg, SpheresThatTouchInAPointStaySeparate) {
   const NarrowBand a = makeSphere(1, V3d(-1, 0, 0), 0.125), b = makeSphere(1, V3d(1, 0, 0), 0.125);
   EXPECT_EQ(vdb(unite(a, b)).tree().getValue(openvdb::Coord(0)), 0);
 }
@@ -239,7 +241,7 @@ TEST(SlowCsg, VolumesOfTwoSpheresConverge) {
   expectVolumesConverge({32, 64, 128});
 }
 
-/// Signs everywhere, and values beside the surface, agree to the bit.
+/// Expects that signs everywhere, and values beside the surface, agree to the bit.
 void expectSameSurface(const NarrowBand& left, const NarrowBand& right) {
   const auto inLeft = vdb(left).getConstAccessor(), inRight = vdb(right).getConstAccessor();
   openvdb::CoordBBox box = vdb(left).evalActiveVoxelBoundingBox();
@@ -262,7 +264,7 @@ void expectSameSurface(const NarrowBand& left, const NarrowBand& right) {
   EXPECT_GT(besides, 0u);
 }
 
-TEST(Csg, ObeysTheLawsOfSets) {
+TEST(Csg, ObeysTheLawsOfSetAlgebra) {
   const NarrowBand a = makeSphere(1, V3d(0), 0.1), b = makeBox(V3d(1.5), V3d(0.7, 0.3, 0.2), 0.1),
                    c = makeTorus(0.8, 0.3, V3d(0.1), V3d(0, 0, 1), 0.1);
   EXPECT_EQ(unite(a, a).contentHash(), a.contentHash());
@@ -278,14 +280,14 @@ TEST(Csg, ObeysTheLawsOfSets) {
   expectSameSurface(subtract(a, intersect(b, c)), unite(subtract(a, b), subtract(a, c)));
 }
 
-TEST(Csg, SolidsInOneAnotherAreKeptOrDropped) {
+TEST(Csg, NestedSolidsAreKeptOrDropped) {
   const NarrowBand outer = makeSphere(1, V3d(0), 0.05), inner = makeSphere(0.5, V3d(0), 0.05);
   EXPECT_EQ(unite(outer, inner).contentHash(), outer.contentHash());
   EXPECT_EQ(intersect(outer, inner).contentHash(), inner.contentHash());
   EXPECT_NEAR(measure(subtract(outer, inner)).volume, 4 * kPi / 3 * (1 - 0.125), 2e-2);
 }
 
-TEST(Csg, BringsOperandsToTheFinestGrid) {
+TEST(Csg, ResamplesOperandsToTheFinestGrid) {
   const NarrowBand fine = makeSphere(1, V3d(-0.5, 0, 0), 0.05, {.halfWidth = 4});
   const NarrowBand coarse = makeSphere(1, V3d(0.5, 0, 0), 0.1);
   const CsgResult result = combine(CsgOperation::Union, std::array{coarse, fine});
@@ -299,7 +301,7 @@ TEST(Csg, BringsOperandsToTheFinestGrid) {
   EXPECT_EQ(result.notes[1], "union: operand 2 was narrowed to a half width of 3 voxels");
   const double direct = measure(unite(makeSphere(1, V3d(0.5, 0, 0), 0.05), fine)).volume;
   EXPECT_NEAR(measure(result.band).volume, direct, 1e-3 * direct);
-  // Widths alone are cut, not resampled.
+  // Different half widths alone do not cause resampling.
   const NarrowBand wide = makeSphere(1, V3d(0), 0.1, {.halfWidth = 5});
   const CsgResult cut = combine(CsgOperation::Union, std::array{wide, coarse});
   EXPECT_EQ(cut.notes,
@@ -308,7 +310,7 @@ TEST(Csg, BringsOperandsToTheFinestGrid) {
   EXPECT_EQ(cut.band.contentHash(), unite(makeSphere(1, V3d(0), 0.1), coarse).contentHash());
 }
 
-TEST(Csg, MovesAndScalesWithItsOperands) {
+TEST(Csg, IsInvariantUnderMotionAndScale) {
   Imath::M44d matrix;
   matrix.setTranslation(V3d(1 << 20, -(1 << 20), 1 << 20));
   matrix = Imath::M44d().setScale(8) * Imath::M44d().setEulerAngles(V3d(0.3, 0.2, 0.1)) * matrix;
@@ -337,7 +339,7 @@ TEST(Csg, SameBitsForAnyNumberOfThreads) {
   for (std::size_t i = 2; i < hashes.size(); ++i) EXPECT_EQ(hashes[i], hashes[i % 2]);
 }
 
-TEST(Csg, RefusesWhatLeavesNothing) {
+TEST(Csg, RefusesAnEmptyResult) {
   const NarrowBand a = makeSphere(1, V3d(0), 0.1), apart = makeSphere(1, V3d(5, 0, 0), 0.1);
   EXPECT_THROW((void)intersect(a, apart), InvalidInput);
   EXPECT_THROW((void)subtract(a, a), InvalidInput);
@@ -345,7 +347,7 @@ TEST(Csg, RefusesWhatLeavesNothing) {
   EXPECT_THROW((void)intersect(a, makeSphere(1, V3d(2, 0, 0), 0.1)), InvalidInput) << "touching";
 }
 
-TEST(Csg, RefusesWrongCalls) {
+TEST(Csg, RefusesInvalidArguments) {
   const NarrowBand a = makeSphere(1, V3d(0), 0.1);
   EXPECT_THROW((void)combine(CsgOperation::Union, {}), UsageError);
   EXPECT_THROW((void)combine(CsgOperation::Union, std::array{a}), UsageError);

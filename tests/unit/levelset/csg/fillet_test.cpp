@@ -29,9 +29,9 @@ BlendOptions rolled(BlendSide side = BlendSide::Both, std::optional<double> reac
   return options;
 }
 
-constexpr double kDepth = 24;  ///< half of the length of the edges, along y
+constexpr double kDepth = 24;  ///< half the length of the edges, along y
 
-/// Half a space, as far as a box shows it: negative where `normal` points away from.
+/// Half-space within a box: negative on the side opposite to `normal`.
 NarrowBand halfSpace(const V3d& normal, const V3d& through, double extent) {
   return support::sampleBand(
       [=](const V3d& p) {
@@ -42,15 +42,15 @@ NarrowBand halfSpace(const V3d& normal, const V3d& through, double extent) {
       {V3d(-extent, -kDepth, -extent), V3d(extent, kDepth, extent)}, 1);
 }
 
-/// Two planes with the angle `degrees` between them outside, meeting along y through kEdge.
+/// Two planes with the outside angle `degrees` between them, which meet along y through kEdge.
 const V3d kEdge(0.27, 0.1, -0.38);
 struct Wedge {
-  V3d n1, n2, middle;  ///< outward normals; from the edge into the space between
-  V3d along1, along2;  ///< from the edge along the planes
-  double half = 0;     ///< of the angle
+  V3d n1, n2, middle;  ///< outward normals; direction from the edge into the space between
+  V3d along1, along2;  ///< directions from the edge along the planes
+  double half = 0;     ///< half of the angle
 
   explicit Wedge(double degrees) : half(degrees * M_PI / 360) {
-    // Turned off the axes.
+    // Rotated off the axes.
     const double tilt = 0.37;
     const auto direction = [](double angle) { return V3d(std::cos(angle), 0, std::sin(angle)); };
     middle = direction(tilt);
@@ -73,7 +73,8 @@ WedgeError wedgeError(const NarrowBand& filleted, const NarrowBand& plain, const
   const double tangent = radius / std::tan(wedge.half);
   const BandSampler phi(filleted, Interpolation::Tricubic);
   WedgeError error;
-  // Rays from the axis towards the solid, a little inside both radii to where the ball touches.
+  // Rays from the axis towards the solid, slightly inside both directions in which the ball
+  // touches.
   const double reach = M_PI / 2 - wedge.half - 0.03;
   for (double angle = -reach; angle <= reach; angle += 0.02) {
     const V3d across = wedge.middle.cross(V3d(0, 1, 0));
@@ -124,7 +125,7 @@ TEST(Fillet, HasItsRadiusBetweenPlanes) {
 TEST(Fillet, RoundsConvexEdgesOfIntersections) {
   const double radius = 8, extent = 28;
   const Wedge wedge(90);
-  // The space between the planes is the solid now.
+  // The space between the planes is the solid here.
   const NarrowBand a = halfSpace(-wedge.n1, kEdge, extent), b = halfSpace(-wedge.n2, kEdge, extent);
   const NarrowBand plain = intersect(a, b);
   const CsgResult result = blend(CsgOperation::Intersection, a, b, radius, rolled());
@@ -144,7 +145,8 @@ Shape cylinder(int axis, double radius, double length, const V3d& centre) {
   };
 }
 
-// From each point of the fillet, along the normal, lies the centre of a ball that touches both.
+// From each point of the fillet, the centre of a ball that touches both cylinders lies along the
+// normal.
 TEST(Fillet, RollsAlongCrossedCylinders) {
   const double radius = 6;
   const V3d centre(0.3, -0.2, 0.1);
@@ -178,8 +180,8 @@ double largestChange(const NarrowBand& a, const NarrowBand& b) {
 }
 
 TEST(Fillet, LeavesNoVoidWhereTheSpineBendsAroundTheSeam) {
-  // On the plane through both seams the way along the spine to its nearest point shrinks by a fifth
-  // of each step only; the grid points there once gave up.
+  // On the plane through both seams the distance to the nearest point of the spine shrinks by only
+  // a fifth per step. An earlier version gave up at these grid points.
   const V3d turned = V3d(2, 1, 2) / 3.0, across = V3d(1, 2, -2) / 3.0;
   for (const auto& [u, v] : {std::pair{V3d(1, 0, 0), V3d(0, 1, 0)}, std::pair{turned, across}}) {
     const NarrowBand a = makeCapsule(u * -24.0, u * 24.0, 12, 1),
@@ -190,9 +192,9 @@ TEST(Fillet, LeavesNoVoidWhereTheSpineBendsAroundTheSeam) {
   }
 }
 
-TEST(Fillet, KnowsHowDeepInsideItIs) {
-  // Further from its surface than the blocks around that, a solid once passed for empty space, in
-  // which the ball rolled along the other one.
+TEST(Fillet, KnowsTheDepthInsideThickSolids) {
+  // In an earlier version a solid was empty far from its surface, beyond the blocks there. The ball
+  // then rolled through it along the other solid.
   const NarrowBand thick = makeSphere(40, V3d(0), 1);
   const std::vector<openvdb::Vec3d> points = {{40, 0, 0}, {0, 40, 0}};
   const eikonal::PointTree curve(points);
@@ -203,8 +205,8 @@ TEST(Fillet, KnowsHowDeepInsideItIs) {
   EXPECT_GT(part->tree().getValue(openvdb::Coord(80, 0, 0)), 0);
 }
 
-TEST(Fillet, MakesNoBulgeWhereSurfacesNearlyTouch) {
-  // Two balls that sink into each other by little meet at a small angle.
+TEST(Fillet, HasNoBulgeWhereSurfacesNearlyTouch) {
+  // Two balls with a small overlap meet at a small angle.
   const auto ball = [](double x) {
     return support::sampleBand([=](const V3d& p) { return (p - V3d(x, 0.2, 0.1)).length() - 24; },
                                {V3d(x - 24, -24, -24), V3d(x + 24, 25, 25)}, 1);
@@ -216,25 +218,26 @@ TEST(Fillet, MakesNoBulgeWhereSurfacesNearlyTouch) {
   support::forEachActive(result.band, [&](const V3d& p, double value) {
     if (std::abs(value) > 0.5) return;
     const V3d centre(p.x < 0 ? -23.3 : 23.3, 0.2, 0.1);
-    EXPECT_LT((p - centre).length() - 24, reach);  // no further from the solids than the reach
+    // No further from the solids than the extent of the fillet.
+    EXPECT_LT((p - centre).length() - 24, reach);
   });
   const CsgResult gap = blend(CsgOperation::Union, a, apart, 8, rolled());
   EXPECT_FALSE(gap.notes.empty());
   EXPECT_EQ(gap.band.contentHash(), unite(a, apart).contentHash());
 }
 
-TEST(Fillet, ReachesNoFurtherThanTheSolids) {
+TEST(Fillet, DoesNotExtendBeyondTheSolids) {
   const Wedge wedge(45);
   const NarrowBand a = halfSpace(wedge.n1, kEdge, 24), b = halfSpace(wedge.n2, kEdge, 24);
   const auto hash = [&](double reach) {
     return blend(CsgOperation::Union, a, b, 5, rolled(BlendSide::Both, reach)).band.contentHash();
   };
-  // At 45° the middle of the arc is 8 voxels from the seam: more changes nothing.
+  // At 45° the middle of the arc is 8 voxels from the seam. A larger radius changes nothing.
   const std::uint64_t expected = hash(9);
   for (const double reach : {1e3, 1e300}) EXPECT_EQ(hash(reach), expected) << reach;
 }
 
-TEST(Fillet, TellsHowFarItIs) {
+TEST(Fillet, ReportsProgress) {
   const Wedge wedge(90);
   const NarrowBand a = halfSpace(wedge.n1, kEdge, 20), b = halfSpace(wedge.n2, kEdge, 20);
   BlendOptions options = rolled();
@@ -250,7 +253,7 @@ TEST(Fillet, TellsHowFarItIs) {
   EXPECT_GT(during, 5);
 }
 
-TEST(Fillet, KeepsToItsSide) {
+TEST(Fillet, StaysOnItsSide) {
   const Wedge wedge(90);
   const NarrowBand a = halfSpace(wedge.n1, kEdge, 24), b = halfSpace(wedge.n2, kEdge, 24);
   const NarrowBand plain = unite(a, b);
@@ -261,11 +264,11 @@ TEST(Fillet, KeepsToItsSide) {
   EXPECT_EQ(added.band.contentHash(),
             blend(CsgOperation::Union, a, b, 5, rolled()).band.contentHash());
   EXPECT_GT(largestChange(plain, added.band), 1);
-  // Of the difference, what is left of a has a convex edge along the seam.
+  // In a difference, the remaining part of `a` has a convex edge along the seam.
   const NarrowBand cut = subtract(a, b);
   const CsgResult removed = blend(CsgOperation::Difference, a, b, 5, rolled(BlendSide::Remove));
   support::forEachActive(removed.band, [&](const V3d& p, double value) {
-    // Up to what the seam's own distances are exact to.
+    // Equal up to the accuracy of the distances at the seam.
     const auto before =
         static_cast<double>(vdb(cut).tree().getValue(openvdb::Coord::round(toVdb(p))));
     EXPECT_GE(value, before - 0.05);

@@ -25,7 +25,7 @@ NarrowBand ball(double radius) {
   return makeSphere(radius, kCentre, 1);
 }
 
-/// Mean and greatest distance of the zero set from a centre, less `radius`, along fixed rays.
+/// Mean and maximum over fixed rays of the zero set's distance from a centre, less `radius`.
 struct RadiusError {
   double mean = 0, worst = 0;
 };
@@ -47,7 +47,7 @@ RadiusError radiusError(const NarrowBand& band, double radius) {
   return error;
 }
 
-TEST(CurvatureFlow, ShrinksABallBySquares) {
+TEST(CurvatureFlow, ShrinksABallByTheSquareLaw) {
   for (const double time : {5.0, 40.0}) {
     const CurvatureFlowResult result = curvatureFlow(ball(20), time);
     const double radius = std::sqrt(400 - 4 * time);
@@ -58,8 +58,8 @@ TEST(CurvatureFlow, ShrinksABallBySquares) {
   }
 }
 
-// At first, edges are where they were; when they are no longer looked for, corners are a voxel off.
-TEST(CurvatureFlow, BeginsWhereTheSolidIs) {
+// At first, edges keep their positions. Without edge detection, corners are a voxel off.
+TEST(CurvatureFlow, StartsFromTheGivenSurface) {
   const NarrowBand cube = makeBox(V3d(20), kCentre, 1);
   double before = 0;
   for (const double time : {1e-6, 0.01, 0.1}) {
@@ -67,7 +67,7 @@ TEST(CurvatureFlow, BeginsWhereTheSolidIs) {
     EXPECT_GT(change, before) << time;
     before = change;
     if (time < 1e-5) {
-      EXPECT_LT(change, 1) << "of an area of 2400";
+      EXPECT_LT(change, 1) << "area of 2400";
     }
   }
   EXPECT_GT(compare(curvatureFlow(cube, 0.5).band, cube).hausdorff(), 1);
@@ -87,10 +87,11 @@ TEST(CurvatureFlow, MeasuresTimeInWorldUnits) {
 }
 
 TEST(CurvatureFlow, ConvergesWithTheVoxel) {
-  // One ball, the same time, three resolutions, steps that err by next to nothing. The differences
-  // are of higher order; what is left comes of re-distancing, as often as the voxels grow finer.
+  // One ball, the same time, three resolutions, and steps of negligible error. The differences are
+  // of higher order. The remaining error comes from redistancing, whose frequency grows with the
+  // resolution.
   for (const double tolerance : {1e-3, 5e-4}) {
-    std::vector<double> errors;  // in parts of the radius
+    std::vector<double> errors;  // relative to the radius
     for (const double n : {8.0, 16.0, 32.0}) {
       const NarrowBand flowed = curvatureFlow(ball(n), n * n / 16, {.tolerance = tolerance}).band;
       const double worst = radiusError(flowed, n * std::sqrt(0.75)).worst;
@@ -99,7 +100,7 @@ TEST(CurvatureFlow, ConvergesWithTheVoxel) {
     }
     EXPECT_GE(std::log2(errors[0] / errors[2]) / 2, 1.5) << tolerance;
     EXPECT_LE(errors[2], errors[1]) << tolerance;
-    // The shorter the steps, the more of the finest's error is re-distancing's.
+    // The shorter the steps, the larger the share of redistancing in the finest error.
     if (tolerance == 1e-3) {
       EXPECT_GE(std::log2(errors[0] / errors[1]), 0.8);
       EXPECT_GE(std::log2(errors[1] / errors[2]), 0.8);
@@ -107,9 +108,9 @@ TEST(CurvatureFlow, ConvergesWithTheVoxel) {
   }
 }
 
-// Far from the surface level sets follow those nearer to it as parallel surfaces do: when all went
-// alike, halving this radius left 0.044 voxels, six times what the estimate said.
-TEST(CurvatureFlow, ErrsByWhatItEstimates) {
+// Far from the surface, level sets follow nearer ones as parallel surfaces. With one rule for all,
+// halving this radius left an error of 0.044 voxels, six times the estimate.
+TEST(CurvatureFlow, HasTheEstimatedError) {
   const CurvatureFlowResult result = curvatureFlow(ball(16), 48);
   EXPECT_LE(radiusError(result.band, 8).worst, 0.015);
   EXPECT_LE(std::abs(radiusError(result.band, 8).mean), 1.6 * result.errorEstimate);
@@ -125,7 +126,7 @@ TEST(CurvatureFlow, AllSchemesAgree) {
   }
 }
 
-TEST(CurvatureFlow, IsStableWhateverStepIsAsked) {
+TEST(CurvatureFlow, IsStableForAnyRequestedStep) {
   for (const FlowScheme scheme : {FlowScheme::Stabilized, FlowScheme::Implicit}) {
     const NarrowBand flowed =
         curvatureFlow(ball(16), 30, {.scheme = scheme, .tolerance = 100, .step = 160}).band;
@@ -134,7 +135,7 @@ TEST(CurvatureFlow, IsStableWhateverStepIsAsked) {
 }
 
 TEST(CurvatureFlow, IsExactInLongSteps) {
-  // Whatever long steps find wrong in the rates at the band's edge comes to the surface.
+  // Errors of long steps in the rates at the band's edge would travel to the surface.
   const double radius = std::sqrt(100.0 * 100 - 4 * 150);
   for (const FlowScheme scheme : {FlowScheme::Stabilized, FlowScheme::Implicit}) {
     const NarrowBand flowed =
@@ -143,8 +144,8 @@ TEST(CurvatureFlow, IsExactInLongSteps) {
   }
 }
 
-TEST(CurvatureFlow, ShrinksACylinderByItsOneCurvature) {
-  // Long enough for its middle not to know of the ends.
+TEST(CurvatureFlow, ShrinksACylinderByItsSingleCurvature) {
+  // Long enough that the ends do not affect its middle.
   const NarrowBand rod = makeCylinder(10, 80, kCentre, V3d(0, 0, 1), 1);
   const NarrowBand flowed = curvatureFlow(rod, 18).band;
   auto accessor = vdb(flowed).getConstAccessor();
@@ -174,15 +175,15 @@ TEST(CurvatureFlow, PinchesADumbBell) {
 }
 
 TEST(CurvatureFlow, KeepsThePlateOfOneVoxelFlat) {
-  // It has no curvature but at its rim.
+  // The plate is curved at its rim only.
   const NarrowBand plate = support::sampleBand(
       [](const V3d& p) {
         const V3d q(std::abs(p.x) - 20, std::abs(p.y) - 20, std::abs(p.z - 0.2) - 0.5);
         return std::max({q.x, q.y, q.z});
       },
       {V3d(-20, -20, -1), V3d(20, 20, 1)}, 1);
-  // Against what making distances before and after the flow does to so thin a plate: the
-  // interpolant reads across it, and each time moves its faces by a tenth of a voxel.
+  // Compared with redistancing before and after the flow. The interpolant reads across so thin a
+  // plate, and each redistancing moves its faces by a tenth of a voxel.
   const NarrowBand still = redistance(redistance(plate)), flowed = curvatureFlow(plate, 1).band;
   auto before = vdb(still).getConstAccessor(), after = vdb(flowed).getConstAccessor();
   for (const int x : {-8, 0, 7})
@@ -192,8 +193,8 @@ TEST(CurvatureFlow, KeepsThePlateOfOneVoxelFlat) {
     }
 }
 
-TEST(CurvatureFlow, KeepsTheVolumeAskedFor) {
-  // Smooth from the start: measure() cuts edges, and would see them come and go.
+TEST(CurvatureFlow, KeepsTheRequestedVolume) {
+  // Smooth from the start, because measure() rounds edges and would report changes of them.
   const NarrowBand rod = makeCapsule(kCentre - V3d(12, 0, 0), kCentre + V3d(12, 0, 0), 12, 1);
   const double before = measure(rod).volume;
   const NarrowBand flowed = curvatureFlow(rod, 40, {.preservesVolume = true}).band;
@@ -201,9 +202,9 @@ TEST(CurvatureFlow, KeepsTheVolumeAskedFor) {
   EXPECT_LT(measure(flowed).area, 0.99 * measure(rod).area);
 }
 
-// While the surface is almost at rest the level sets within it shrink: left alone, they would leave
-// a cavity where they vanish.
-TEST(CurvatureFlow, LetsNoOtherLevelSetComeUpToTheSurface) {
+// While the surface is almost at rest, inner level sets shrink. Without a remedy they would leave a
+// cavity where they vanish.
+TEST(CurvatureFlow, KeepsOtherLevelSetsFromReachingTheSurface) {
   const NarrowBand rod = makeCapsule(kCentre - V3d(1, 0, 0), kCentre + V3d(1, 0, 0), 12, 1);
   const double before = measure(rod).volume;
   for (const FlowScheme scheme : {FlowScheme::Stabilized, FlowScheme::Implicit}) {
@@ -217,25 +218,25 @@ TEST(CurvatureFlow, LetsNoOtherLevelSetComeUpToTheSurface) {
   }
 }
 
-TEST(CurvatureFlow, EndsWhenWhatKeepsItsVolumeIsRound) {
+TEST(CurvatureFlow, EndsWhenAVolumePreservingFlowIsRound) {
   const NarrowBand rod = makeCapsule(V3d(-10.69, -0.17, 0.43), V3d(13.31, -0.17, 0.43), 10, 1);
   const CurvatureFlowResult rested = curvatureFlow(rod, 1e9, {.preservesVolume = true});
   ASSERT_TRUE(rested.restedAfter.has_value());
   EXPECT_LT(*rested.restedAfter, 1000);
-  // A ball has the least area of all that hold as much.
+  // A ball has the least area for its volume.
   const Measurement round = measure(rested.band);
   EXPECT_NEAR(round.volume, measure(rod).volume, 2e-3 * round.volume);  // 0.01 voxels of radius
   EXPECT_NEAR(round.area, std::cbrt(36 * M_PI * round.volume * round.volume), 2e-3 * round.area);
   EXPECT_FALSE(curvatureFlow(rod, 5, {.preservesVolume = true}).restedAfter.has_value());
 }
 
-TEST(CurvatureFlow, RefusesStepsWithoutEnd) {
+TEST(CurvatureFlow, RefusesEndlessSteps) {
   EXPECT_THROW((void)curvatureFlow(ball(6), 1, {.step = 1e-18}), ResourceLimit);
   EXPECT_THROW((void)curvatureFlow(ball(6), 1, {.preservesVolume = true, .step = 1e-18}),
                ResourceLimit);
 }
 
-TEST(CurvatureFlow, LeavesWhatTheMaskLeaves) {
+TEST(CurvatureFlow, KeepsTheSurfaceOutsideTheMask) {
   const Mask right{.field = [](const V3d& p) { return p.x; }, .min = 0, .max = 1};
   const NarrowBand flowed = curvatureFlow(ball(16), 20, {.mask = right}).band;
   auto accessor = vdb(flowed).getConstAccessor();
@@ -244,10 +245,10 @@ TEST(CurvatureFlow, LeavesWhatTheMaskLeaves) {
   EXPECT_NEAR(SampleBlock<4>(accessor, toVdb(kCentre + V3d(free, 0, 0))).value(), 0, 0.05);
 }
 
-TEST(CurvatureFlow, TellsWhenTheSolidVanishes) {
+TEST(CurvatureFlow, ReportsThatTheSolidVanishes) {
   try {
     (void)curvatureFlow(ball(4), 10);
-    FAIL() << "a ball of radius 4 lives for a time of 4";
+    FAIL() << "a ball of radius 4 vanishes at time 4";
   } catch (const InvalidInput& error) {
     const std::string sentence = error.what();
     const std::string before = "after a time of ";
@@ -259,7 +260,7 @@ TEST(CurvatureFlow, TellsWhenTheSolidVanishes) {
   EXPECT_THROW((void)curvatureFlow(needle, 5), InvalidInput);
 }
 
-TEST(CurvatureFlow, DoesNothingInNoTime) {
+TEST(CurvatureFlow, DoesNothingInZeroTime) {
   EXPECT_EQ(curvatureFlow(ball(6), 0).band.contentHash(), ball(6).contentHash());
 }
 

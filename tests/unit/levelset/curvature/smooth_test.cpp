@@ -26,7 +26,8 @@ NarrowBand ball(double radius) {
 }
 
 double radiusOf(const NarrowBand& band) {
-  // The mesh that is measured has its corners on the surface: the ball it came from measures alike.
+  // The corners of the measured mesh lie on the surface. The original ball is measured in the same
+  // way.
   return std::cbrt(3 * measure(band).volume / (4 * M_PI));
 }
 
@@ -34,8 +35,8 @@ double shrinkage(double radius, double sigma, SmoothKind kind) {
   return radiusOf(ball(radius)) - radiusOf(smooth(ball(radius), kind, sigma));
 }
 
-/// Greatest distance from a sphere of the zeros of the tricubic interpolant on all edges of the
-/// grid whose ends are on two sides.
+/// Largest distance from a sphere over the zeros of the tricubic interpolant, on all grid edges
+/// whose ends have different signs.
 double worstZero(const NarrowBand& band, double radius) {
   const openvdb::FloatGrid& grid = vdb(band);
   auto accessor = grid.getConstAccessor();
@@ -57,9 +58,11 @@ double worstZero(const NarrowBand& band, double radius) {
   return worst;
 }
 
-// The mean of |x| over a Gaussian about a point at radius r is r + σ²/r, but for what the other
-// side of the ball adds, exp(−r²/2σ²): there the ball of radius R ends where that is R.
-TEST(Smooth, GaussianHasTheSigmaAskedFor) {
+// The mean of
+// x
+//  over a Gaussian about a point at radius r is r + σ²/r, except for the contribution of the ball's
+//  other side, exp(−r²/2σ²). The smoothed ball of radius R ends where this mean is R.
+TEST(Smooth, GaussianHasTheRequestedSigma) {
   constexpr double kRadius = 24;
   for (const double sigma : {0.7, 1.0, 2.0, 3.5}) {
     const double radius = (kRadius + std::sqrt(kRadius * kRadius - 4 * sigma * sigma)) / 2;
@@ -76,9 +79,9 @@ TEST(Smooth, TaubinKeepsTheVolume) {
   EXPECT_NEAR(shrinkage(24, 2, SmoothKind::Taubin), 0, 0.015);
 }
 
-TEST(Smooth, GaussianRoundsAnEdgeAsFarAsItShould) {
-  // Beside the edge φ is the greater of two planes; the mean of max(x, y) over a Gaussian there is
-  // σ/√π, and so far the surface goes inwards along the diagonal, by √2 times as much.
+TEST(Smooth, GaussianRoundsAnEdgeByTheExactAmount) {
+  // Near the edge φ is the maximum of two planes. The mean of max(x, y) over a Gaussian is σ/√π.
+  // The surface moves inwards along the diagonal by √2 times that.
   const double sigma = 2;
   const NarrowBand box = makeBox(V3d(40, 40, 40), kCentre, 1);
   const NarrowBand rounded = smooth(box, SmoothKind::Gaussian, sigma);
@@ -88,14 +91,15 @@ TEST(Smooth, GaussianRoundsAnEdgeAsFarAsItShould) {
     const V3d p = kCentre + V3d(20 - t, 20 - t, 0);
     t += 0.5 * SampleBlock<4>(accessor, toVdb(p)).value();
   }
-  // Outside the edge φ is the distance to it, not the greater of the planes, which adds a little.
+  // Outside the edge φ is the distance to the edge, not the maximum of the planes, which adds a
+  // little.
   EXPECT_GT(t, sigma / std::sqrt(M_PI));
   EXPECT_LT(t, 1.3 * sigma / std::sqrt(M_PI));
   EXPECT_NEAR(SampleBlock<4>(accessor, toVdb(kCentre + V3d(20, 0, 0))).value(), 0, 5e-3);
   EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(rounded), 6), "");
 }
 
-TEST(Smooth, MedianDropsASpeck) {
+TEST(Smooth, MedianRemovesASpeck) {
   const NarrowBand speckled = support::sampleBand(
       [](const V3d& p) {
         return std::min((p - kCentre).length() - 10, (p - V3d(20.2, 0, 0)).length() - 0.8);
@@ -107,9 +111,9 @@ TEST(Smooth, MedianDropsASpeck) {
   EXPECT_NEAR(radiusOf(cleaned), 10, 0.2);
 }
 
-/// By definition: the median of the exact distances around each grid point.
-TEST(Smooth, MedianIsTheMedian) {
-  const double sigma = 9.3;  // across more blocks than the next
+/// Compares with the definition: the median of the exact distances around each grid point.
+TEST(Smooth, MedianMatchesItsDefinition) {
+  const double sigma = 9.3;  // extends beyond the neighbouring block
   const NarrowBand solid = makeBox(V3d(30, 22, 26), kCentre, 1);
   const NarrowBand wide = redistance(solid, {.halfWidth = sigma + 4});
   const NarrowBand smoothed = smooth(solid, SmoothKind::Median, sigma);
@@ -128,7 +132,7 @@ TEST(Smooth, MedianIsTheMedian) {
   }
 }
 
-TEST(Smooth, TellsOfEachBlock) {
+TEST(Smooth, ReportsProgressForEachBlock) {
   for (const SmoothKind kind : {SmoothKind::Median, SmoothKind::Mean, SmoothKind::Taubin}) {
     int during = 0;
     double last = 0;
@@ -145,14 +149,14 @@ TEST(Smooth, TellsOfEachBlock) {
   }
 }
 
-TEST(Smooth, RefusesAMedianWithoutEnd) {
+TEST(Smooth, RefusesAnEndlessMedian) {
   EXPECT_THROW((void)smooth(ball(6), SmoothKind::Median, 63), ResourceLimit);
 }
 
-/// Grid points that a mask reaches are worked on, all others keep their bits.
-TEST(Smooth, TouchesOnlyWhatTheMaskReaches) {
+/// Only grid points that a mask covers are changed. All others keep their bits.
+TEST(Smooth, ChangesOnlyMaskedPoints) {
   const NarrowBand before = makeBox(V3d(40, 40, 40), kCentre, 1);
-  // A corner, within 8 of it fully.
+  // The full mask covers a corner up to a distance of 8.
   const V3d corner = kCentre + V3d(20);
   const Mask mask{.field = [=](const V3d& p) { return (p - corner).length(); },
                   .min = 8,
@@ -163,7 +167,8 @@ TEST(Smooth, TouchesOnlyWhatTheMaskReaches) {
     const double sigma = 1.5;
     const NarrowBand after = smooth(before, kind, sigma, {.mask = mask});
     const NarrowBand everywhere = smooth(before, kind, sigma);
-    // With a second place at the far corner all of the box is worked on: here it is the same.
+    // With a second masked position at the far corner the complete box is processed. The result
+    // here is the same.
     const V3d far = kCentre - V3d(20);
     const Mask both{
         .field = [=](const V3d& p) { return std::min((p - corner).length(), (p - far).length()); },
@@ -190,7 +195,7 @@ TEST(Smooth, TouchesOnlyWhatTheMaskReaches) {
             ASSERT_EQ(now.getValue(c), old.getValue(c)) << c;
             ASSERT_EQ(now.isValueOn(c), old.isValueOn(c)) << c;
           }
-          // Where both the surface and what the distance looks at are masked fully.
+          // Both the surface and the samples that its distance depends on are fully masked.
           if (from.length() < 3) {
             off = std::max(off, std::abs(static_cast<double>(now.getValue(c) - all.getValue(c))));
             moved =
@@ -202,7 +207,7 @@ TEST(Smooth, TouchesOnlyWhatTheMaskReaches) {
   }
 }
 
-TEST(Smooth, LeavesASolidAloneThatTheMaskDoesNotMeet) {
+TEST(Smooth, KeepsASolidOutsideTheMask) {
   const NarrowBand before = ball(12);
   const NarrowBand after =
       smooth(before, SmoothKind::Gaussian, 1,
@@ -210,8 +215,8 @@ TEST(Smooth, LeavesASolidAloneThatTheMaskDoesNotMeet) {
   EXPECT_EQ(after.contentHash(), before.contentHash());
 }
 
-TEST(Smooth, TakesAPartAwayThatTheMaskHolds) {
-  // A small ball that a wide Gaussian melts, beside one that is left out.
+TEST(Smooth, RemovesAComponentInsideTheMask) {
+  // A wide Gaussian removes a small ball, beside a large one outside the mask.
   const NarrowBand small = makeSphere(2.2, V3d(30, 0, 0), 1), large = makeSphere(12, V3d(0), 1);
   const NarrowBand after =
       smooth(unite(small, large), SmoothKind::Gaussian, 4,
@@ -220,7 +225,7 @@ TEST(Smooth, TakesAPartAwayThatTheMaskHolds) {
   EXPECT_NEAR(measure(after).volume, measure(large).volume, 1e-6 * measure(large).volume);
 }
 
-TEST(Smooth, LeavesWhatTheMaskLeaves) {
+TEST(Smooth, KeepsTheSurfaceOutsideTheMask) {
   const Mask right{.field = [](const V3d& p) { return p.x; }, .min = 0, .max = 1};
   const NarrowBand smoothed = smooth(ball(10), SmoothKind::Gaussian, 2, {.mask = right});
   auto accessor = vdb(smoothed).getConstAccessor();

@@ -61,7 +61,7 @@ TEST(ClosestPoints, ConvergeOnTheSurface) {
 
 TEST(ClosestPoints, CarryAnAttributeAlongNormals) {
   const auto attribute = [](const V3d& p) { return std::atan2(p.y, p.x) + p.z * p.z; };
-  // Away from where the angle jumps.
+  // Away from the jump of the angle.
   const FieldGrid field = extendOffSurface(ball(20), attribute, {.halfWidth = 5});
   const openvdb::FloatGrid& grid = *field.shared()->scalar;
   double error = 0;
@@ -77,7 +77,7 @@ TEST(ClosestPoints, CarryAnAttributeAlongNormals) {
   EXPECT_LE(error, 5e-3);
 }
 
-TEST(ClosestPoints, CarryVectorsAsTheirNumbers) {
+TEST(ClosestPoints, CarryVectorsByComponent) {
   const VectorField spin = [](const V3d& p, double time) { return V3d(-p.y, p.x, p.z + time); };
   const NarrowBand solid = ball(12);
   const FieldGrid vectors = extendOffSurface(solid, spin);

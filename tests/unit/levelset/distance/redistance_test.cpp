@@ -34,8 +34,8 @@ BandError bandError(const NarrowBand& band, const Shape& exact) {
   return e;
 }
 
-/// Mean distance to `exact` of the places where values change sign along an edge of the grid, found
-/// by cubic interpolation: how far the surface is off, in voxels.
+/// Mean distance to `exact`, in voxels, of the sign changes along grid edges, found by cubic
+/// interpolation. This is the position error of the surface.
 double surfaceError(const NarrowBand& band, const Shape& exact) {
   const openvdb::FloatGrid& grid = vdb(band);
   auto accessor = grid.getConstAccessor();
@@ -69,7 +69,7 @@ Shape sphere(double radius) {
   return [=](const V3d& p) { return (p - kCentre).length() - radius; };
 }
 
-/// A sphere whose slope runs from 0.7 to 2.3.
+/// Sphere whose slope varies from 0.7 to 2.3.
 Shape distortedSphere(double radius) {
   return [=](const V3d& p) {
     const V3d q = (p - kCentre) / radius;
@@ -85,8 +85,8 @@ Shape box(const V3d& half) {
   };
 }
 
-/// A sphere in voxels whose slope changes within a few of them, from 0.7 to 2.3; `wave` is the
-/// length of a radian of that.
+/// Sphere in voxels whose slope varies between 0.7 and 2.3 within a few voxels. One radian of that
+/// variation has length `wave`.
 Shape rippledSphere(double radius, double wave) {
   return [=](const V3d& p) {
     const double ripple = std::sin(p.x / wave) * std::sin(p.y / wave) * std::sin(p.z / wave);
@@ -103,7 +103,7 @@ NarrowBand sampleUnit(const Shape& shape, int voxelsPerUnit, double halfWidth = 
   return support::sampleBand(shape, {V3d(-size), V3d(size)}, 1.0 / voxelsPerUnit, halfWidth);
 }
 
-/// Between the values of two bands, voxels.
+/// Largest difference between the values of two bands, voxels.
 double largestDifference(const NarrowBand& a, const NarrowBand& b) {
   auto accessor = vdb(b).getConstAccessor();
   double largest = vdb(a).activeVoxelCount() == vdb(b).activeVoxelCount() ? 0 : a.halfWidth();
@@ -124,7 +124,7 @@ TEST(Redistance, KeepsAnExactDistance) {
   expectSound(result);
 }
 
-TEST(Redistance, MendsSlopesWithoutMovingTheSurface) {
+TEST(Redistance, RestoresSlopesWithoutMovingTheSurface) {
   const NarrowBand field = sampleUnit(distortedSphere(1), 64);
   const NarrowBand result = redistance(field);
   EXPECT_LE(bandError(result, sphere(1)).linf, 0.05);
@@ -145,20 +145,20 @@ TEST(Redistance, ConvergesSecondOrderOverTheBand) {
   }
 }
 
-TEST(Redistance, MendsRipplesThatTheBandCutsOff) {
+TEST(Redistance, RestoresRipplesThatTheBandTruncates) {
   const NarrowBand result = redistance(sampleVoxels(rippledSphere(32, 4), 33));
   EXPECT_LE(bandError(result, sphere(32)).linf, 0.05);
   EXPECT_LE(surfaceError(result, sphere(32)), 1e-3);
   expectSound(result);
 }
 
-TEST(Redistance, ReachesAsFarAsAsked) {
+TEST(Redistance, ExtendsToTheRequestedHalfWidth) {
   const int n = 20;
   const NarrowBand result = redistance(sampleUnit(sphere(1), n), {.halfWidth = 1.5 * n});
   const BandError e = bandError(result, sphere(1));
   EXPECT_NEAR(static_cast<double>(e.count), 4.0 / 3 * M_PI * std::pow(2.5 * n, 3), 0.01 * 1e6);
   EXPECT_LE(e.l1, 1e-3);
-  // At the centre every point of the sphere is as near; there the error is first order.
+  // At the centre every point of the sphere is equally near. There the error is first order.
   EXPECT_LE(e.linf, 0.1);
   expectSound(result);
 }
@@ -177,13 +177,13 @@ TEST(Redistance, StaysInItsRegion) {
     ASSERT_NEAR(*it * n, accessor.getValue(it.getCoord()) * n, 2e-3);
   }
   EXPECT_GT(count, 1000u);
-  // Signs hold outside the region as well.
+  // Signs are correct outside the region as well.
   EXPECT_LT(vdb(part).tree().getValue(openvdb::Coord(0)), 0);
   EXPECT_LT(vdb(part).tree().getValue(openvdb::Coord(-n + 2, 0, 0)), 0);
   EXPECT_GT(vdb(part).tree().getValue(openvdb::Coord(-n - 2, 0, 0)), 0);
 }
 
-TEST(Redistance, MeasuresRoundTheEdgesOfACube) {
+TEST(Redistance, MeasuresAroundTheEdgesOfACube) {
   const V3d half(0.413, 0.377, 0.291);
   const int n = 32;
   const NarrowBand flat = sampleUnit(
@@ -192,10 +192,10 @@ TEST(Redistance, MeasuresRoundTheEdgesOfACube) {
       },
       n, 4, 0.5);
   const NarrowBand result = redistance(flat, {.halfWidth = 8});
-  double nearFaces = 0, nearEdges = 0;  // by where the closest point lies
+  double nearFaces = 0, nearEdges = 0;  // by the position of the closest point
   support::forEachActive(result, [&](const V3d& p, double value) {
     const double error = std::abs(value - box(half)(p)) * n;
-    int free = 0;  // axes along which the closest point is well inside a face
+    int free = 0;  // number of axes along which the closest point is well inside a face
     for (int i = 0; i < 3; ++i) free += std::abs(p[i]) < half[i] - 2.0 / n;
     double& worst = box(half)(p) > 0 && free == 2 ? nearFaces : nearEdges;
     worst = std::max(worst, error);
@@ -206,7 +206,7 @@ TEST(Redistance, MeasuresRoundTheEdgesOfACube) {
 }
 
 TEST(Redistance, SeesBothWallsOfANarrowGap) {
-  // Two slabs 1.6 voxels apart: grid points in the gap have a wall on either side.
+  // Two slabs 1.6 voxels apart. Grid points in the gap have a wall on either side.
   const double gap = 0.8;
   const NarrowBand field = support::sampleBand(
       [=](const V3d& p) { return gap - std::abs(p.z - 0.3); }, {V3d(-12), V3d(12)}, 1, 3);
@@ -219,20 +219,20 @@ TEST(Redistance, SeesBothWallsOfANarrowGap) {
   EXPECT_LE(worst, 0.2);
 }
 
-TEST(Redistance, SeesNoSurfaceWhereValuesOnlyDip) {
-  // Beside the ball the field falls to 0.02 along sheets and rises again: an interpolant that
+TEST(Redistance, FindsNoSurfaceWhereValuesOnlyDip) {
+  // Near the ball the field falls to 0.02 along sheets and rises again. An interpolant that
   // overshoots would pass zero there.
   const Shape dipped = [](const V3d& p) {
     const double sheet = 0.02 + std::abs(p.x - 9.5) + 0.6 * std::max(0.0, p.z);
     return std::min(sphere(8)(p), std::hypot(p.y, p.z) < 5 ? sheet : 4.0);
   };
   const NarrowBand result = redistance(sampleVoxels(dipped, 16), {.halfWidth = 6});
-  // Some of the dip is within reach of the interpolant at the ball; a false surface would be a
-  // whole voxel off.
+  // Part of the dip is within the interpolant's stencil at the ball. A false surface would be an
+  // entire voxel off.
   EXPECT_LE(bandError(result, sphere(8)).linf, 0.1);
 }
 
-TEST(Redistance, DoesNotDependOnScaleOrPlace) {
+TEST(Redistance, DoesNotDependOnScaleOrPosition) {
   const double l1 = bandError(redistance(sampleVoxels(sphere(10), 11)), sphere(10)).l1;
   for (const double h : {1e-6, 1e6}) {
     const Shape ball = [=](const V3d& p) { return h * sphere(10)(p / h); };
@@ -245,7 +245,7 @@ TEST(Redistance, DoesNotDependOnScaleOrPlace) {
   EXPECT_NEAR(bandError(redistance(field), ball).l1, l1, 1e-4);
 }
 
-TEST(Redistance, LeavesRoundedEdgesRound) {
+TEST(Redistance, KeepsRoundedEdgesRound) {
   for (const support::RoundedSolid& solid : support::roundedSolids()) {
     const BandError e = bandError(redistance(solid.band()), solid.distance);
     EXPECT_LE(e.l1, 0.02) << solid.name;
@@ -258,17 +258,18 @@ TEST(Redistance, WorksAtAnyHalfWidth) {
     for (const double to : {1.0, 1.5, 3.0, 50.0}) {
       const NarrowBand result = redistance(sampleVoxels(sphere(12), 13, from), {.halfWidth = to});
       const BandError e = bandError(result, sphere(12));
-      // One layer on each side shows curvature badly; at the centre all of the surface is as near.
+      // One layer on each side resolves curvature badly, and at the centre the entire surface is
+      // equally near.
       EXPECT_LE(e.l1, from < 2 ? 0.06 : 0.01) << from << " to " << to;
       EXPECT_LE(e.linf, from < 2 ? 0.25 : 0.1) << from << " to " << to;
       EXPECT_NEAR(result.halfWidth(), to, 1e-5);
     }
 }
 
-TEST(Redistance, TakesABackgroundOtherThanTheBand) {
+TEST(Redistance, AcceptsABackgroundOtherThanTheBand) {
   const NarrowBand field = sampleVoxels(sphere(12), 13, 5);
   openvdb::FloatGrid::Ptr grid = vdb(field).deepCopy();
-  // A band of three voxels under a background of five.
+  // A band of three voxels with a background of five.
   for (auto it = grid->beginValueOn(); it; ++it)
     if (std::abs(*it) > 3) it.setActiveState(false), it.setValue(std::copysign(5.0f, *it));
   const NarrowBand result = redistance(makeBand(grid), {.halfWidth = 6});
@@ -287,7 +288,8 @@ TEST(Redistance, KeepsASingleVoxel) {
 }
 
 TEST(Redistance, IsStableUnderRepetition) {
-  // What is a distance keeps its values to the bit, and what was none comes to rest.
+  // A field that is already a distance keeps its values to the bit. Any other field converges to
+  // one.
   for (const int radius : {10, 16}) {
     const NarrowBand ball = sampleUnit(sphere(1), radius);
     EXPECT_EQ(largestDifference(ball, redistance(ball)), 0) << radius;
@@ -302,7 +304,7 @@ TEST(Redistance, IsStableUnderRepetition) {
 }
 
 TEST(Redistance, CountsZeroAsOutside) {
-  // Faces on grid points, one of them a single layer thick beside the band's end.
+  // Faces on grid points. One of them is a single layer thick beside the band's end.
   const NarrowBand field =
       support::sampleBand(box(V3d(8, 6, 4)), {V3d(-8, -6, -4), V3d(8, 6, 4)}, 1, 3);
   const NarrowBand result = redistance(field);
@@ -347,7 +349,7 @@ TEST(Redistance, Refuses) {
 }
 
 TEST(SlowRedistance, MeetsItsBoundsAtThreeSizes) {
-  // Ripples of a fixed part of the radius: as fine as four voxels at R = 64.
+  // The length of ripples is a fixed fraction of the radius, four voxels at R = 64.
   double previous = 0;
   for (const double radius : {32.0, 64.0, 128.0}) {
     const NarrowBand result =
@@ -365,10 +367,10 @@ TEST(SlowRedistance, MeetsItsBoundsAtThreeSizes) {
   }
 }
 
-TEST(SlowRedistance, HundredTimesMoveTheSurfaceLittle) {
+TEST(SlowRedistance, HundredRepetitionsMoveTheSurfaceLittle) {
   NarrowBand band = sampleVoxels(rippledSphere(64, 4), 65);
   for (int i = 0; i < 100; ++i) band = redistance(std::move(band));
-  // Band and surface: no grid point is further off, nor is the zero set.
+  // Neither a grid point of the band nor the zero set has a larger error.
   EXPECT_LE(bandError(band, sphere(64)).linf, 0.01);
   EXPECT_LE(surfaceError(band, sphere(64)), 1e-3);
 }

@@ -28,11 +28,11 @@ NarrowBand sample(const Shape& shape, double extent, double voxelSize = 1) {
 }
 
 struct Errors {
-  double l1 = 0, inside = 0, outside = 0;  ///< voxels; the worst on either side
+  double l1 = 0, inside = 0, outside = 0;  ///< largest errors on the two sides, voxels
   std::size_t count = 0;
 };
 
-/// Of the grid points whose exact value is between the limits.
+/// Errors at grid points whose exact value is between the limits.
 Errors errors(const openvdb::FloatGrid& grid, const Shape& exact, double from, double to) {
   Errors e;
   for (auto it = grid.cbeginValueOn(); it; ++it) {
@@ -66,7 +66,7 @@ TEST(Arrival, MeasuresDistancesAroundASphere) {
     EXPECT_LE(std::max(two.inside, two.outside), 0.02);
     EXPECT_NEAR(second.band.halfWidth(), 9, 1e-5);
     EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(second.band), 6), "");
-    // First order loses half the curvature for each voxel of the way: about 7 / 48 in all.
+    // First order loses half the curvature for each voxel of distance, about 7 / 48 in total.
     const Errors one =
         errors(vdb(frontDistance(ball, 9, options(method, 1)).band), sphere(24), 0, 8.5);
     EXPECT_LE(one.inside, 0.3);
@@ -75,7 +75,7 @@ TEST(Arrival, MeasuresDistancesAroundASphere) {
   }
 }
 
-TEST(Arrival, ConvergesInItsOrder) {
+TEST(Arrival, ConvergesWithItsOrder) {
   const double reach = 0.8;
   for (const FrontMethod method : kMethods)
     for (const int order : {1, 2}) {
@@ -85,11 +85,11 @@ TEST(Arrival, ConvergesInItsOrder) {
         const Shape exact = sphere(1, kCentre * h);
         const NarrowBand ball = support::sampleBand(exact, {V3d(-1), V3d(1)}, h);
         const FrontDistance result = frontDistance(ball, reach, options(method, order));
-        // For each unit of the way that is not given by the start.
+        // Error per unit of distance beyond the initial band.
         const double error =
             errors(vdb(result.band), exact, 0, reach - h).outside * h / (reach - 2 * h);
         if (previous > 0) {
-          const double least = n == 32 ? 0.9 : 0.75;  // eight voxels in all are no small step
+          const double least = n == 32 ? 0.9 : 0.75;  // eight voxels of distance are few
           EXPECT_GE(std::log2(previous / error), order == 1 ? least : 1.7) << n << ", " << order;
         }
         previous = error;
@@ -142,7 +142,7 @@ TEST(Arrival, FollowsALinearSpeedFromAPoint) {
           errors(grid(arrivalTimesFromPoints(lattice, sources, 0.8, o)), exact, 0, 0.78);
       EXPECT_LE(e.l1, 0.02) << n;
       EXPECT_LE(e.outside, 0.1) << n;
-      // Voxels: of order 1.8 in units of the world.
+      // In voxels; the order is 1.8 in world units.
       if (n == 64) {
         EXPECT_LE(e.l1, std::exp2(-0.8) * coarser);
       }
@@ -170,7 +170,8 @@ TEST(Arrival, IsExactAroundPointsAtConstantSpeed) {
   }
 }
 
-/// Fermat: the fastest way from a point below z = 0, at speed 1, to one above it, at speed v.
+/// Fermat's principle: the fastest path from a point below z = 0, at speed 1, to a point above, at
+/// speed v.
 double refracted(const V3d& from, const V3d& to, double v) {
   const double across = std::hypot(to.x - from.x, to.y - from.y);
   double low = 0, high = across;
@@ -197,7 +198,7 @@ TEST(Arrival, RefractsIntoSlowAndFastInclusions) {
       for (auto it = grid(times).cbeginValueOn(); it; ++it) {
         const V3d p = toImath(it.getCoord().asVec3d());
         if (p.z < 0.5 || *it > 26) continue;
-        // The interface lies half way between grid points as the solver sees it.
+        // The solver places the interface half way between grid points.
         const double truth = refracted(source + V3d(0, 0, 0.5), p + V3d(0, 0, 0.5), v);
         sum += std::abs(static_cast<double>(*it) - truth);
         worst = std::max(worst, std::abs(static_cast<double>(*it) - truth));
@@ -209,13 +210,13 @@ TEST(Arrival, RefractsIntoSlowAndFastInclusions) {
     }
 }
 
-TEST(Arrival, GoesAroundWhatItCannotPass) {
+TEST(Arrival, GoesAroundObstacles) {
   const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
   const V3d sources[] = {V3d(0, 0, -10)};
   for (const double blocked : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()})
     for (const FrontMethod method : kMethods) {
       ArrivalOptions o = options(method, 2);
-      // A disk in the way, and a closed shell that nothing enters.
+      // A disk as obstacle, and a closed shell that no front enters.
       o.speed = [=](const V3d& p) {
         const bool disk = std::abs(p.z) < 1.1 && std::hypot(p.x, p.y) < 8;
         const double shell = (p - V3d(0, 20, -10)).length();
@@ -225,7 +226,7 @@ TEST(Arrival, GoesAroundWhatItCannotPass) {
       const auto& tree = grid(times).tree();
       EXPECT_FALSE(tree.isValueOn(openvdb::Coord(0)));
       EXPECT_FALSE(tree.isValueOn(openvdb::Coord(0, 20, -10)));
-      // Over the rim and back: twice the hypotenuse, about.
+      // Over the rim and back: about twice the hypotenuse.
       EXPECT_TRUE(tree.isValueOn(openvdb::Coord(0, 0, 10)));
       EXPECT_NEAR(tree.getValue(openvdb::Coord(0, 0, 10)), 2 * std::hypot(8.5, 9) + 2, 1.0);
     }
@@ -233,7 +234,7 @@ TEST(Arrival, GoesAroundWhatItCannotPass) {
 
 TEST(Arrival, StopsAtAWallBesideItsSource) {
   const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
-  // Walls that three places on a straight way of eight voxels miss; the last one slants.
+  // Walls that three samples of a straight path of eight voxels miss. The last wall is oblique.
   const std::pair<V3d, Shape> cases[] = {
       {V3d(0), [](const V3d& p) { return p.x - 4; }},
       {V3d(0.3, 0.2, -0.4), [](const V3d& p) { return p.x - 3; }},
@@ -251,12 +252,12 @@ TEST(Arrival, StopsAtAWallBesideItsSource) {
       }
 }
 
-TEST(Arrival, IsSlowedAndSpedByWhatIsBesideItsSource) {
+TEST(Arrival, RespectsSlowAndFastRegionsNearItsSource) {
   const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
   const V3d sources[] = {V3d(0)};
   for (const FrontMethod method : kMethods) {
     ArrivalOptions o = options(method, 2);
-    // A wall of one grid point's width, a hundred times slower; all in a box.
+    // A wall one grid point wide and a hundred times slower, inside a box.
     o.speed = [](const V3d& p) {
       if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > 9) return 0.0;
       return std::abs(p.x - 4) < 0.4 ? 0.01 : 1.0;
@@ -264,7 +265,7 @@ TEST(Arrival, IsSlowedAndSpedByWhatIsBesideItsSource) {
     const ArrivalTimes slowed = arrivalTimesFromPoints(lattice, sources, 150, o);
     EXPECT_NEAR(grid(slowed).tree().getValue(openvdb::Coord(3, 0, 0)), 3, 0.1);
     EXPECT_NEAR(grid(slowed).tree().getValue(openvdb::Coord(6, 0, 0)), 105, 10);
-    // A lane that makes the way round faster than the straight one.
+    // A lane in which the detour is faster than the straight path.
     o.speed = [](const V3d& p) {
       if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > 9) return 0.0;
       return std::abs(p.y - 3) < 0.6 ? 50.0 : 1.0;
@@ -275,7 +276,7 @@ TEST(Arrival, IsSlowedAndSpedByWhatIsBesideItsSource) {
   }
 }
 
-TEST(Arrival, ErrsAlikeAtAnySpeed) {
+TEST(Arrival, HasTheSameErrorAtAnySpeed) {
   const NarrowBand ball = sample(sphere(12), 13);
   for (const FrontMethod method : kMethods)
     for (const int order : {1, 2}) {
@@ -295,21 +296,21 @@ TEST(Arrival, ErrsAlikeAtAnySpeed) {
     }
 }
 
-TEST(Arrival, SolvesLittleFurtherThanAsked) {
+TEST(Arrival, ComputesLittleBeyondTheLimit) {
   const NarrowBand ball = sample(sphere(12), 13);
   ArrivalOptions o = options(FrontMethod::Sweeping, 2);
-  // A voxel's time at speed 1 would be a hundred voxels here, 270 MB of blocks.
+  // A limit of one voxel at speed 1 would be a hundred voxels here, 270 MB of blocks.
   o.speed = [](const V3d&) { return 100.0; };
   o.maxMemory = 40 << 20;
   EXPECT_GT(arrivalTimes(ball, 0.06, o).figures.reached, 10000u);
 }
 
-TEST(Arrival, TakesManySourcesInLittleRoom) {
+TEST(Arrival, TakesManySourcesInLittleMemory) {
   const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
   std::vector<V3d> sources;
   for (int i = 0; i < 3000; ++i) sources.emplace_back(i % 50 * 0.2, i / 50 * 0.1, 0.3);
   ArrivalOptions o = options(FrontMethod::Sweeping, 2);
-  o.maxMemory = 20 << 20;  // in a row of their own, their starts would take 100 MB
+  o.maxMemory = 20 << 20;  // separate start solutions would take 100 MB
   int early = 0;
   o.progress = [&](double fraction) {
     early += fraction < 0.1;
@@ -323,8 +324,8 @@ TEST(Arrival, TakesManySourcesInLittleRoom) {
   EXPECT_THROW((void)arrivalTimesFromPoints(lattice, sources, 9, o), Cancelled);
 }
 
-TEST(Arrival, StartsAtTheSurfaceAtItsOwnSpeed) {
-  // Speed constant on spheres: T = ∫ dr / F(r).
+TEST(Arrival, StartsAtTheSurfaceWithItsLocalSpeed) {
+  // The speed is constant on spheres: T = ∫ dr / F(r).
   const auto speed = [](const V3d& p) { return 0.5 + 0.05 * (p - kCentre).length(); };
   const Shape exact = [](const V3d& p) {
     return std::log((0.5 + 0.05 * (p - kCentre).length()) / (0.5 + 0.05 * 16)) / 0.05;
@@ -369,8 +370,9 @@ TEST(Arrival, FromPointsDoesNotDependOnThreads) {
   EXPECT_EQ(hashes[0], hashes[2]);
 }
 
-// The straight way's part is larger there than the whole: a root of less than nothing.
-TEST(Arrival, EndsBesideASourceInALayer) {
+// The contribution of the straight path exceeds the total there, so that a root of a negative
+// number arose.
+TEST(Arrival, EndsNearASourceInALayer) {
   const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
   const V3d sources[] = {V3d(0.5, 0.5, 0.9)};
   for (const FrontMethod method : kMethods) {
@@ -385,8 +387,8 @@ TEST(Arrival, EndsBesideASourceInALayer) {
   }
 }
 
-// Two neighbours are as far from it, but for rounding.
-TEST(Arrival, IsExactAroundThePointBetweenTwoGridPoints) {
+// Two neighbours are equally far from the source, up to rounding.
+TEST(Arrival, IsExactAroundAPointMidwayBetweenTwoGridPoints) {
   const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
   for (const double off : {0.0, 1e-12, -1e-12, 1e-5, -1e-5, 1e-3}) {
     const V3d sources[] = {V3d(0.5 + off, 0.5 - off, 0.2)};
@@ -399,10 +401,10 @@ TEST(Arrival, IsExactAroundThePointBetweenTwoGridPoints) {
   }
 }
 
-// One voxel beside a point source along an axis, the second grid point behind lies beyond the
-// source, where the front came later: on that axis the first order is all there is, on the others
-// the second is.
-TEST(Arrival, CountsGridPointsWithAnAxisOfFirstOrder) {
+// One voxel from a point source along an axis, the second upwind grid point lies beyond the source.
+// The front arrived later there. On that axis only first order is possible, on the others second
+// order is.
+TEST(Arrival, CountsGridPointsWithAFirstOrderAxis) {
   const NarrowBand lattice = makeBand(emptyLevelSet(uniformTransform(1), 3));
   const V3d sources[] = {V3d(0.2, -0.3, 0.1)};  // nearest to the grid point 0, 0, 0
   for (const FrontMethod method : kMethods) {

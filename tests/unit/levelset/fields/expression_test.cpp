@@ -24,7 +24,7 @@ TEST(Expression, ReadsSpaceAndTime) {
   EXPECT_EQ(scalarExpression("x > 0 ? 1 : -1", "test")(V3d(-3, 0, 0)), -1);
 }
 
-TEST(Expression, ThreadsDoNotMixTheirPlaces) {
+TEST(Expression, ThreadsDoNotShareVariables) {
   const ScalarField field = scalarExpression("x * 3 + y", "test");
   std::atomic<int> wrong = 0;
   tbb::parallel_for(0, 100000, [&](int i) {
@@ -33,7 +33,7 @@ TEST(Expression, ThreadsDoNotMixTheirPlaces) {
   EXPECT_EQ(wrong, 0);
 }
 
-TEST(Expression, RefusesWhatIsNoFormula) {
+TEST(Expression, RefusesInvalidFormulas) {
   for (const char* text : {"", "x +", "x y", "q + 1", "x, y", "system(1)", "sin(", "x = 3,"})
     EXPECT_THROW((void)scalarExpression(text, "test"), UsageError) << text;
   for (const char* text : {"x, y", "x, y, z, 1", "1", ",,"})
@@ -42,14 +42,14 @@ TEST(Expression, RefusesWhatIsNoFormula) {
     EXPECT_THROW((void)timeExpression(text, "test"), UsageError) << text;
 }
 
-TEST(Expression, RefusesWhatIsTooLong) {
+TEST(Expression, RefusesLongFormulas) {
   const std::string sentence = support::refusal<UsageError>(
       [] { (void)scalarExpression(std::string(100'000, '-') + "x", "test"); });
   EXPECT_SAYS(sentence, "cannot be read");
   EXPECT_LT(sentence.size(), 1000u);
 }
 
-TEST(Expression, KnowsOnlyWhatHasAMeaning) {
+TEST(Expression, KnowsOnlyMeaningfulVariables) {
   EXPECT_EQ(timeExpression("2*t + pi", "test")(0.5), 1 + M_PI);
   const std::string sentence =
       support::refusal<UsageError>([] { (void)scalarExpression("0.3*t", "test"); });

@@ -26,7 +26,7 @@ using support::TemporaryFolder;
 
 constexpr int kReach = 12;
 
-/// Values a + b·x that trilinear interpolation repeats exactly, at voxel centres.
+/// Values a + b·x at voxel centres, which trilinear interpolation reproduces exactly.
 FloatGrid::Ptr linearGrid() {
   const auto grid = FloatGrid::create(0);
   grid->setName("density");
@@ -92,7 +92,7 @@ TEST(FieldGrid, InterpolatesNumbersThroughItsTransform) {
   EXPECT_EQ(grid.bounds().min, V3d(1 - 6, 2 - 6, 3 - 6));
 }
 
-TEST(FieldGrid, ReadsComponentsOffTheFacesWhenStaggered) {
+TEST(FieldGrid, ReadsStaggeredComponentsAtFaces) {
   for (const bool staggered : {false, true}) {
     const FieldGrid grid = levelset::importField(velocityGrid(staggered), "test");
     EXPECT_EQ(grid.isStaggered(), staggered);
@@ -180,7 +180,7 @@ TEST(FieldGrid, ReadsEveryStorageOfOpenVdb) {
     EXPECT_EQ(read("wide").contentHash(), vectors.contentHash()) << compression;
     const V3d place(0.3, -0.4, 0.9);
     const V3d coarse = levelset::asVectorField(read("half"), "test")(place, 0);
-    // Half floats keep 11 bits; no component passes 16 here.
+    // Half floats have 11 bits; no component exceeds 16 here.
     EXPECT_LT((coarse - linearVelocity(place)).length(), 16 * 0x1p-11);
   }
 }
@@ -198,7 +198,7 @@ TEST(FieldGrid, KeepsActiveTilesAsTiles) {
   EXPECT_EQ(levelset::asScalarField(field, "test")(V3d(1000.5, 7, 7)), 2);
 }
 
-TEST(FieldGrid, TellsBandsFromFields) {
+TEST(FieldGrid, DistinguishesBandsFromFields) {
   const TemporaryFolder folder;
   const Imath::Box3d box(V3d(-2), V3d(2));
   const auto band = support::sampleBand([](const V3d& p) { return p.length() - 1.5; }, box, 0.25);

@@ -30,14 +30,14 @@ NarrowBand sphere(double radius = 4, double voxelSize = 0.5) {
                              voxelSize);
 }
 
-/// A copy of the band's grid with that name, to be changed.
+/// Editable copy of the band's grid with that name.
 FloatGrid::Ptr gridOf(const NarrowBand& band, const std::string& name) {
   const FloatGrid::Ptr grid = levelset::vdb(band).deepCopy();
   grid->setName(name);
   return grid;
 }
 
-/// Writes with OpenVDB's own writer.
+/// Writes grids with OpenVDB's own writer.
 void writeForeign(const fs::path& path, const openvdb::GridPtrVec& grids,
                   std::uint32_t compression = openvdb::io::COMPRESS_BLOSC |
                                               openvdb::io::COMPRESS_ACTIVE_MASK) {
@@ -152,7 +152,7 @@ TEST(BandFile, ReadsHalfAndDoubleGrids) {
     support::forEachActive(coarse, [&](const Imath::V3d& p, double phi) {
       const auto index =
           levelset::vdb(coarse).transform().worldToIndexCellCentered(levelset::toVdb(p));
-      // Half floats keep 11 bits.
+      // Half floats have 11 bits.
       ASSERT_NEAR(phi, static_cast<double>(accessor.getValue(index)),
                   std::abs(phi) * 0x1p-11 + 1e-7);
     });
@@ -171,7 +171,7 @@ TEST(BandFile, ReadsActiveTilesAsVoxels) {
   EXPECT_EQ(repairs.inactiveValues, 0u);
 }
 
-TEST(BandFile, TellsWhatItRepaired) {
+TEST(BandFile, ReportsItsRepairs) {
   const TemporaryFolder folder;
   const auto grid = gridOf(sphere(), "a");
   const auto leaf = grid->tree().beginLeaf();
@@ -183,7 +183,7 @@ TEST(BandFile, TellsWhatItRepaired) {
   const NarrowBand band = readBand(folder / "a.vdb", {.repairs = &repairs});
   EXPECT_EQ(repairs.inactiveValues, changed);
   EXPECT_EQ(band.contentHash(), sphere().contentHash());
-  static_cast<void>(readBand(folder / "a.vdb"));  // nobody need ask
+  static_cast<void>(readBand(folder / "a.vdb"));  // the report is optional
 }
 
 TEST(BandFile, ReadsASharedTree) {
@@ -222,7 +222,7 @@ TEST(BandFile, PicksTheOnlyLevelSet) {
   EXPECT_SAYS(sentence(""), "no level set");
 }
 
-TEST(BandFile, RefusesBandsThatAreNone) {
+TEST(BandFile, RefusesInvalidBands) {
   const TemporaryFolder folder;
   const auto sentence = [&](const FloatGrid::Ptr& grid) {
     writeForeign(folder / "a.vdb", {grid});
@@ -247,7 +247,7 @@ TEST(BandFile, KeepsToTheMemoryLimit) {
                levelset::ResourceLimit);
   EXPECT_THROW(static_cast<void>(readBand(folder / "a.vdb", {.maxMemory = 1000})),
                levelset::ResourceLimit);
-  // An active tile stands for more voxels than any machine holds.
+  // An active tile represents more voxels than any machine can store.
   const auto grid = gridOf(sphere(), "a");
   for (int i = 1; i < 100; ++i) grid->tree().addTile(3, openvdb::Coord(4096 * i, 0, 0), 0.1f, true);
   writeForeign(folder / "a.vdb", {grid});
@@ -268,7 +268,7 @@ TEST(BandFile, RefusesMissingAndForeignFiles) {
   EXPECT_THROW(static_cast<void>(readBand(folder / "a.nvdb")), levelset::UsageError);
 }
 
-TEST(BandFile, RefusesWhatCannotBeWritten) {
+TEST(BandFile, RefusesUnwritableFiles) {
   const TemporaryFolder folder;
   EXPECT_THROW(levelset::writeBand(folder / "a.xyz", sphere()), levelset::UsageError);
   EXPECT_THROW(levelset::writeBand(folder / "a.vdb", NarrowBand()), InvalidInput);
@@ -277,9 +277,9 @@ TEST(BandFile, RefusesWhatCannotBeWritten) {
   EXPECT_EQ(folder.fileCount(), 0u);
 }
 
-// === Damage: an error or a valid band, soon, whatever the bytes
+// === Damaged files: an error or a valid band, quickly, for any bytes
 
-/// @return true when the file was taken
+/// @return true if the file was accepted
 bool survives(const fs::path& path) {
   const auto begin = std::chrono::steady_clock::now();
   bool taken = false;
@@ -296,7 +296,7 @@ bool survives(const fs::path& path) {
   return taken;
 }
 
-TEST(BandFile, RefusesAnyCut) {
+TEST(BandFile, RefusesAnyTruncation) {
   const TemporaryFolder folder;
   for (const std::uint32_t compression : {0u, 3u, 6u}) {
     writeForeign(folder / "a.vdb", {gridOf(sphere(), "a")}, compression);
@@ -319,7 +319,7 @@ void expectSurvivesDamage(int times) {
     const std::string whole = support::readText(folder / "a.vdb");
     for (int i = 0; i < times; ++i) {
       std::string damaged = whole;
-      // Every other time near the front, where the counts and sizes stand.
+      // Every other change is near the front of the file, where counts and sizes are stored.
       const std::size_t reach = i % 2 ? damaged.size() : 2000;
       for (int k = 0; k <= i % 3; ++k)
         damaged[random() % reach] = static_cast<char>(i % 5 ? random() & 0xFF : 0xFF);
@@ -339,7 +339,7 @@ TEST(SlowBandFile, SurvivesRandomDamage) {
   expectSurvivesDamage(2000);
 }
 
-TEST(BandFile, TellsWhatIsInAFile) {
+TEST(BandFile, ReportsTheContentsOfAFile) {
   const TemporaryFolder folder;
   const auto fog = openvdb::DoubleGrid::create();
   fog->setName("fog");
@@ -360,7 +360,7 @@ TEST(BandFile, TellsWhatIsInAFile) {
   EXPECT_TRUE(grids[1].indexBounds.isEmpty());
 }
 
-TEST(BandFile, TellsWhereABandLies) {
+TEST(BandFile, ReportsTheBoundsOfABand) {
   const TemporaryFolder folder;
   NarrowBand band = support::sampleBand([](const Imath::V3d& p) { return p.length() - 4; },
                                         Imath::Box3d(Imath::V3d(-4), Imath::V3d(4)), 0.25, 5);
@@ -370,13 +370,13 @@ TEST(BandFile, TellsWhereABandLies) {
   const levelset::GridInfo info = levelset::bandFileInfo(folder / "a.vdb").at(0);
   EXPECT_NEAR(info.halfWidth, 5, 1e-6);
   EXPECT_NEAR((info.worldBounds.center() - Imath::V3d(1, -7, 30)).length(), 0, 1e-6);
-  // A turned box around the ball and its band: as wide as its edges' projections.
+  // The rotated box around the ball and its band, as wide as the projections of its edges.
   const double reach = (4 + 5 * 0.25) * (std::cos(0.3) + std::sin(0.3));
   EXPECT_NEAR(info.worldBounds.size().x / 2, reach, 0.5);
   EXPECT_NEAR(info.worldBounds.size().y / 2, 4 + 5 * 0.25, 0.26);
 }
 
-TEST(BandFile, TellsFormatsByName) {
+TEST(BandFile, RecognizesFormatsByName) {
   for (const char* name : {"a.vdb", "A.VDB", "nvdb", "x/y.nvdb"})
     EXPECT_TRUE(levelset::isBandFormat(name)) << name;
   for (const char* name : {"a.ply", "a.vdb.gz", "", "vdbx"})

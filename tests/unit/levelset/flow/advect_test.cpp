@@ -35,10 +35,11 @@ constexpr double kPi = 3.14159265358979323846;
 using Distance = std::function<double(const V3d&)>;
 
 struct SurfaceError {
-  double mean = 0, largest = 0;  ///< voxels
+  double mean = 0, largest = 0;  ///< errors of the surface, voxels
 };
 
-/// |exact distance| where linear interpolation puts the zeros along the grid's edges.
+/// exact distance
+///  at the zeros that linear interpolation finds on grid edges.
 SurfaceError surfaceError(const NarrowBand& band, const Distance& exact) {
   const openvdb::FloatGrid& grid = levelset::vdb(band);
   const auto accessor = grid.getConstAccessor();
@@ -79,14 +80,14 @@ double volumeChange(const AdvectResult& result) {
 const V3d kEnrightCenter(0.35);
 constexpr double kEnrightRadius = 0.15;
 
-/// There and back: the volume's change and the surface's error.
+/// Runs the deformation forward and back, and returns the volume change and the surface error.
 AdvectResult enright(int resolution, AdvectScheme scheme = AdvectScheme::Front,
                      const VectorField& velocity = levelset::enrightVelocity()) {
   const NarrowBand ball = levelset::makeSphere(kEnrightRadius, kEnrightCenter, 1.0 / resolution);
   return levelset::advect(ball, velocity, 3, {.scheme = scheme});
 }
 
-TEST(SlowAdvect, ComesBackFromEnrightsDeformation) {
+TEST(SlowAdvect, ReversesEnrightsDeformation) {
   const AdvectResult result = enright(64);
   const SurfaceError error =
       surfaceError(result.band, ballDistance(kEnrightCenter, kEnrightRadius));
@@ -96,7 +97,7 @@ TEST(SlowAdvect, ComesBackFromEnrightsDeformation) {
   EXPECT_TRUE(levelset::check(result.band).passed());
 }
 
-TEST(SlowAdvect, ComesBackFromEnrightsDeformationOnAFineGrid) {
+TEST(SlowAdvect, ReversesEnrightsDeformationOnAFineGrid) {
   const AdvectResult result = enright(128);
   const SurfaceError error =
       surfaceError(result.band, ballDistance(kEnrightCenter, kEnrightRadius));
@@ -104,7 +105,7 @@ TEST(SlowAdvect, ComesBackFromEnrightsDeformationOnAFineGrid) {
   EXPECT_LT(error.mean, 0.02);
 }
 
-/// LeVeque's velocity at time 0 on a staggered grid; the factor in time is applied outside.
+/// LeVeque's velocity at time 0 on a staggered grid. The time factor is applied outside.
 levelset::FieldGrid staggeredEnright(int resolution) {
   const auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3s(0.0f));
   grid->setTransform(levelset::uniformTransform(1.0 / resolution));
@@ -125,7 +126,7 @@ levelset::FieldGrid staggeredEnright(int resolution) {
   return levelset::importField(grid, "test");
 }
 
-TEST(SlowAdvect, ComesBackWithAVelocityGrid) {
+TEST(SlowAdvect, ReversesTheDeformationWithAVelocityGrid) {
   const VectorField steady = levelset::asVectorField(staggeredEnright(64), "test");
   const AdvectResult result = enright(64, AdvectScheme::Front, [steady](const V3d& p, double time) {
     return steady(p, time) * std::cos(kPi * time / 3);
@@ -146,7 +147,7 @@ TEST(Advect, MovesASphereExactly) {
     EXPECT_EQ(result.band.indexToWorld(), ball.indexToWorld());
   }
   EXPECT_EQ(levelset::advect(ball, constantVelocity(by), 0).band.contentHash(), ball.contentHash());
-  // Still air leaves the solid where it is.
+  // Zero velocity does not move the solid.
   EXPECT_LT(
       surfaceError(levelset::advect(ball, constantVelocity(V3d(0)), 5).band, ballDistance(from, 1))
           .largest,
@@ -165,9 +166,9 @@ TEST(Advect, ConvergesInSecondOrder) {
   EXPECT_GT(std::log2(errors[1] / errors[2]), 1.7);
 }
 
-// Triangles do not get fewer where a surface shrinks: by their number for its area alone it would
-// look crumpled, as Enright's sphere did on its way back at 128.
-TEST(Advect, FollowsASurfaceThatIsPressedTogether) {
+// A shrinking surface keeps its number of triangles. Judged by triangles per area it would look
+// crumpled, as Enright's sphere once did on its way back at 128.
+TEST(Advect, FollowsACompressedSurface) {
   const V3d center(0.3, -0.2, 0.1);
   const auto inwards = [=](const V3d& p, double) { return center - p; };
   const AdvectResult result =
@@ -175,7 +176,7 @@ TEST(Advect, FollowsASurfaceThatIsPressedTogether) {
   EXPECT_LT(surfaceError(result.band, ballDistance(center, 6)).mean, 0.01);
 }
 
-TEST(Advect, TurnsSolidsRigidly) {
+TEST(Advect, RotatesSolidsRigidly) {
   const double h = 0.05;
   const VectorField spin = levelset::rotationVelocity(V3d(0.5, 0.3, 0), V3d(1, 2, 3));
   const auto turned = [&](const NarrowBand& solid) { return levelset::advect(solid, spin, 1); };
@@ -195,7 +196,7 @@ TEST(Advect, TurnsSolidsRigidly) {
       return out.length() + std::min(0.0, std::max({q.x, q.y, q.z}));
     };
   };
-  // Edges fall between grid points: linear zeros cut them by up to half a voxel.
+  // Edges fall between grid points, so linear zeros are off by up to half a voxel.
   const AdvectResult cube = turned(levelset::makeBox(V3d(1.52), V3d(0), h));
   const SurfaceError cubeError = surfaceError(cube.band, boxDistance(V3d(0.76)));
   EXPECT_LT(cubeError.mean, 0.02);
@@ -207,7 +208,7 @@ TEST(Advect, TurnsSolidsRigidly) {
   EXPECT_LT(std::abs(volumeChange(plate)), 0.02);
 }
 
-TEST(Advect, TurnsZalesaksSphere) {
+TEST(Advect, RotatesZalesaksSphere) {
   const V3d center(50, 75, 50);
   const NarrowBand solid = levelset::subtract(
       levelset::makeSphere(15, center, 1), levelset::makeBox(V3d(5, 40, 40), V3d(50, 65, 50), 1));
@@ -247,7 +248,7 @@ TEST(Advect, RunsBackwards) {
             0.05);
 }
 
-TEST(Advect, StaysWhereTheMaskIsZero) {
+TEST(Advect, DoesNotMoveWhereTheMaskIsZero) {
   const double h = 0.05;
   const NarrowBand ball = levelset::makeSphere(1, V3d(0), h);
   AdvectOptions options;
@@ -258,14 +259,15 @@ TEST(Advect, StaysWhereTheMaskIsZero) {
   EXPECT_NEAR(moved.zeroSetBounds().min.x, -1, 0.05 * h);
   const auto accessor = levelset::vdb(moved).getConstAccessor();
   for (auto it = levelset::vdb(ball).cbeginValueOn(); it; ++it) {
-    // Three voxels away from what moves, distances cannot tell.
+    // Farther than three voxels, the moving part does not affect distances.
     if (it.getCoord().x() > 0.2 / h - 4) continue;
     ASSERT_NEAR(accessor.getValue(it.getCoord()), *it, 0.02 * h);
   }
 }
 
-TEST(Advect, SeesWhatMovesOnlyASmallPart) {
-  // Three voxels of a large ball, and fast: nothing can leave the place that moves.
+TEST(Advect, DetectsMotionOfASmallPart) {
+  // The jet is fast and covers only three voxels of a large ball. The surface cannot move beyond
+  // it.
   const NarrowBand ball = levelset::makeSphere(40, V3d(0), 1);
   const V3d place(39, 7, 5);
   const VectorField jet = [&](const V3d& p, double) {
@@ -283,14 +285,14 @@ TEST(Advect, SeesWhatMovesOnlyASmallPart) {
   EXPECT_GE(masked.zeroSetBounds().max.x, 40.5);
 }
 
-TEST(Advect, FollowsVelocitiesThatComeAndGo) {
+TEST(Advect, FollowsVelocitiesThatStartAndStop) {
   const NarrowBand ball = levelset::makeSphere(10, V3d(0), 1);
   const VectorField shaken = [](const V3d&, double t) { return V3d(60 * std::cos(60 * t), 0, 0); };
-  // Still at the start, in the middle and at the end.
+  // At rest at the start, in the middle and at the end.
   const VectorField pulses = [](const V3d&, double t) {
     return V3d(60 * std::pow(std::sin(20 * kPi * t), 2), 0, 0);
   };
-  // Within the first step, and only at its end.
+  // Nonzero within the first step and zero at its ends only.
   const VectorField early = [](const V3d&, double t) {
     return V3d(t < 0.0259001 ? 6000 * std::sin(415.86 * t) : 0, 0, 0);
   };
@@ -298,7 +300,7 @@ TEST(Advect, FollowsVelocitiesThatComeAndGo) {
   EXPECT_LE(
       surfaceError(levelset::advect(ball, early, 1).band, ballDistance(V3d(shift, 0, 0), 10)).mean,
       0.3);
-  // Long still.
+  // At rest for most of the interval.
   const VectorField late = [](const V3d&, double t) {
     return V3d(t > 0.18 && t < 0.24 ? 1000 * std::pow(std::sin(kPi * (t - 0.18) / 0.06), 2) : 0, 0,
                0);
@@ -316,7 +318,7 @@ TEST(Advect, FollowsVelocitiesThatComeAndGo) {
 
 TEST(Advect, FollowsAVelocityThatChangesAheadOfTheSurface) {
   const NarrowBand ball = levelset::makeSphere(16, V3d(0), 1);
-  // A gust across the way, narrower than a step might be.
+  // A gust across the path, narrower than a step.
   const VectorField gust = [](const V3d& p, double) {
     const double x = (p.x - 25) / 1.5;
     return V3d(60, 60 * std::exp(-x * x), 0);
@@ -328,7 +330,7 @@ TEST(Advect, FollowsAVelocityThatChangesAheadOfTheSurface) {
   EXPECT_LE(error.largest, 0.05);
 }
 
-TEST(Advect, FixesTheVolumeOnlyWhenAsked) {
+TEST(Advect, CorrectsTheVolumeOnlyOnRequest) {
   const NarrowBand ball = levelset::makeSphere(1, V3d(0), 0.08);
   const VectorField growth = [](const V3d& p, double) { return p * 0.1; };
   const AdvectResult grown = levelset::advect(ball, growth, 1);
@@ -338,7 +340,7 @@ TEST(Advect, FixesTheVolumeOnlyWhenAsked) {
   EXPECT_NEAR(volumeChange(fixed), std::exp(0.3) - 1, 0.01);
 }
 
-TEST(SlowAdvect, GridSchemesCarryASphereRound) {
+TEST(SlowAdvect, GridSchemesTransportASphere) {
   const double h = 0.08;
   const V3d center(0.6, 0, 0);
   const NarrowBand ball = levelset::makeSphere(0.4, center, h);
@@ -379,10 +381,10 @@ TEST(Advect, AnswersOnTurnedGrids) {
   }
 }
 
-TEST(Advect, EndsForVelocitiesWithJumps) {
+TEST(Advect, EndsForDiscontinuousVelocities) {
   const double h = 0.2;
   const NarrowBand ball = levelset::makeSphere(1, V3d(0), h);
-  // Apart, past each other, and into each other.
+  // Away from each other, past each other, and towards each other.
   for (const char* text :
        {"x > 0 ? 1 : -1, 0, 0", "y > 0 ? 1 : -1, 0, 0", "x > 0 ? -1 : 1, 0, 0"}) {
     for (const AdvectScheme scheme : {AdvectScheme::Front, AdvectScheme::SemiLagrangian}) {
@@ -400,8 +402,8 @@ TEST(Advect, EndsForVelocitiesWithJumps) {
 }
 
 TEST(Front, HasFewTrianglesWhereItIsStretched) {
-  // Enright's sphere at half time, where the sheet is widest and thinnest: a third less than where
-  // a front is given up for crumpled, whatever the voxels.
+  // Enright's sphere at half time, where the sheet is widest and thinnest. Its number of triangles
+  // is a third below the limit for a crumpled front, at any resolution.
   for (const double n : {16.0, 32.0}) {
     const NarrowBand ball = levelset::makeSphere(kEnrightRadius * n, kEnrightCenter * n, 1);
     const VectorField enrights = levelset::enrightVelocity();
@@ -416,7 +418,7 @@ TEST(Front, HasFewTrianglesWhereItIsStretched) {
   }
 }
 
-TEST(Advect, RefusesWhatAJumpCrumples) {
+TEST(Advect, RefusesCrumplingByAJump) {
   const NarrowBand ball = levelset::makeSphere(1, V3d(0.01, 0.02, 0.03), 1.0 / 16);
   EXPECT_THROW((void)levelset::advect(
                    ball, levelset::vectorExpression("0, x < 0.01 ? -1 : 1, 0", "test"), 0.25),
@@ -437,7 +439,7 @@ TEST(Advect, GivesTheSameBitsForAnyNumberOfThreads) {
   }
 }
 
-TEST(Advect, RefusesWhatCannotBeFollowed) {
+TEST(Advect, RefusesUndefinedVelocities) {
   const NarrowBand ball = levelset::makeSphere(1, V3d(0), 0.1);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const AdvectScheme scheme :
@@ -452,7 +454,7 @@ TEST(Advect, RefusesWhatCannotBeFollowed) {
               }).find("shorter time"),
               std::string::npos);
   }
-  // What lies beyond the surface's way does not matter.
+  // Velocities beyond the path of the surface do not matter.
   const VectorField halfSpace = [nan](const V3d& p, double) {
     return p.x < 3 ? V3d(1, 0, 0) : V3d(nan);
   };
@@ -468,7 +470,7 @@ TEST(Advect, RefusesWhatCannotBeFollowed) {
     EXPECT_NO_THROW((void)levelset::advect(ball, fromStart, 0.3, {.start = 0.1, .scheme = scheme}));
   EXPECT_NO_THROW(
       (void)levelset::advect(ball, constantVelocity(V3d(1, 0, 0)), 2e-6, {.start = 1.7e9}));
-  // NaN that begins on the way.
+  // NaN that begins during the motion.
   EXPECT_THROW(
       (void)levelset::advect(ball, levelset::vectorExpression("1/sqrt(0.5 - t), 0, 0", "test"), 1),
       levelset::Error);

@@ -16,7 +16,7 @@ namespace morph_test {
 using namespace levelset;
 using Imath::V3d;
 
-/// Grid points inside one of two solids only.
+/// Number of grid points inside exactly one of two solids.
 std::size_t symmetricDifference(const NarrowBand& a, const NarrowBand& b) {
   openvdb::CoordBBox box = vdb(a).evalActiveVoxelBoundingBox();
   box.expand(vdb(b).evalActiveVoxelBoundingBox());
@@ -72,9 +72,9 @@ TEST(Morph, ChangesTheTopology) {
   EXPECT_EQ(measure(morph(ball, ring)).euler, 0);
 }
 
-TEST(Morph, GoesAsFarAsTheMaskLetsIt) {
-  // Radius 20 on one side, 12 on the other, halfway where the mask is a half; walls of the step
-  // stand where it passes between.
+TEST(Morph, FollowsTheMask) {
+  // Radius 20 on one side, 12 on the other, and in between where the mask is a half. Between these
+  // the surface has walls.
   const NarrowBand from = makeSphere(12, V3d(0.2), 1), to = makeSphere(20, V3d(0.2), 1);
   const auto radiusAlong = [](const NarrowBand& band, const V3d& direction) {
     const BandSampler sampler(band, Interpolation::Tricubic);
@@ -103,13 +103,13 @@ TEST(Morph, GoesAsFarAsTheMaskLetsIt) {
   EXPECT_NEAR(radiusAlong(masked(half, 3), V3d(1, 2, 3)), 16, 0.02);
 }
 
-TEST(Morph, StopsOnTheWay) {
+TEST(Morph, StopsAtAnIntermediateTime) {
   const NarrowBand half =
       morph(makeSphere(8, V3d(0.2), 1), makeSphere(16, V3d(0.2), 1), {.until = 0.5});
   EXPECT_NEAR(std::cbrt(3 * measure(half).volume / (4 * M_PI)), 12, 0.05);
 }
 
-TEST(Morph, EndsOnceItIsNearEnough) {
+TEST(Morph, EndsWithinTheTolerance) {
   // Radii 8, 10, 12, 14, 16: the fourth is the first within 2.1 of the target.
   int steps = 0;
   const NarrowBand result =
@@ -126,7 +126,7 @@ TEST(Morph, WorksAcrossGrids) {
   EXPECT_NEAR(measure(result).volume, measure(box).volume, 0.03 * measure(box).volume);
 }
 
-TEST(Morph, RefusesWhatLiesApartAndReachesItInOneStep) {
+TEST(Morph, RefusesSeparateSolidsUnlessInOneStep) {
   const NarrowBand a = makeSphere(4, V3d(0.2), 1), b = makeSphere(4, V3d(14.2, 0.2, 0.2), 1);
   EXPECT_THROW((void)morph(a, b, {.steps = 10}), InvalidInput);
   EXPECT_EQ(symmetricDifference(morph(a, b), b), 0u);
