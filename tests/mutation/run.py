@@ -4,8 +4,9 @@
 run.py WORK [--only WORD] [--list]
 
 Copies the sources to WORK/tree, builds the tests there, and applies the mutants of mutants.tsv to the copy one at a
-time. For each it rebuilds, runs the suites that should fail, then the other fast tests of the module, up to the first
-failure. Exit code 1 unless at least 27 of the 30 are caught. A second run in the same WORK is incremental.
+time. For each it rebuilds and runs, up to the first failure, the suites that should fail, the other fast tests of the
+module, and the quick regression suite. Exit code 1 unless at least 27 of the 30 are caught. A second run in the same
+WORK is incremental.
 """
 
 import argparse
@@ -72,7 +73,8 @@ def run(command, limit=None):
 def configure(tree, build, mutants):
     files = sorted({mutant[0] for mutant in mutants if mutant[0].endswith(".cpp")})
     command = ["cmake", "-G", "Ninja", "-S", tree, "-B", build, "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_UNITY_BUILD=ON",
-               "-DCMAKE_UNITY_BUILD_BATCH_SIZE=16", "-DLEVELSMITH_APPS=OFF", "-DLEVELSMITH_MUTATED=" + ";".join(files),
+               "-DCMAKE_UNITY_BUILD_BATCH_SIZE=16", "-DLEVELSMITH_APPS=ON", "-DLEVELSMITH_PYTHON=OFF",
+               "-DLEVELSMITH_VIEWER=OFF", "-DLEVELSMITH_MUTATED=" + ";".join(files),
                f"-DCMAKE_PROJECT_Levelsmith_INCLUDE={tree}/tests/mutation/alone.cmake"]
     if shutil.which("ccache"):
         command.append("-DCMAKE_CXX_COMPILER_LAUNCHER=ccache")
@@ -100,10 +102,17 @@ def failure(build, executable, suites, others):
     return found.group(1) if found else f"exit code {code}"
 
 
+def regression_failure(build):
+    """Bound of the quick regression suite that is missed, or an empty string."""
+    code, output = run([build / "apps/levelsmith", "--quiet", "regress", "--budget", "quick", "--no-plots", "--out",
+                        build / "regression"], CPU_LIMIT)
+    return "" if code == 0 else "regress: " + (output.strip().splitlines() or [f"exit code {code}"])[-1][:100]
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("work", type=Path)
-    parser.add_argument("--only", default="", help="mutants whose line contains this text")
+    parser.add_argument("--only", action="append", default=[], help="mutants whose line contains this text")
     parser.add_argument("--list", action="store_true", help="check mutants.tsv against the sources only")
     arguments = parser.parse_args()
     mutants = read_mutants()
@@ -116,9 +125,10 @@ def main():
     begin = time.time()
     synchronise(tree)
     configure(tree, build, mutants)
-    mutants = [mutant for mutant in mutants if arguments.only in "\t".join(map(str, mutant))]
+    if arguments.only:
+        mutants = [mutant for mutant in mutants if any(text in "\t".join(map(str, mutant)) for text in arguments.only)]
     executables = sorted({mutant[3] for mutant in mutants})
-    built, output = compile_tests(build, executables)
+    built, output = compile_tests(build, [*executables, "levelsmith"])
     if not built:
         sys.exit(output)
     print(f"built in {time.time() - begin:.0f} s", flush=True)
@@ -127,6 +137,9 @@ def main():
         name = failure(build, executable, suites, False)
         if name:
             sys.exit(f"{name} fails without a mutant; correct that first")
+    name = regression_failure(build)
+    if name:
+        sys.exit(f"{name} without a mutant; correct that first")
     caught = 0
     for number, (file, old, new, executable, suites, meaning) in enumerate(mutants, 1):
         path = tree / file
@@ -139,6 +152,9 @@ def main():
                 sys.exit(f"{file}: '{new}' does not compile\n{output}")
             middle = time.time()
             name = failure(build, executable, suites, False) or failure(build, executable, suites, True)
+            if not name and not executable.startswith("render"):
+                built, output = compile_tests(build, ["levelsmith"])
+                name = regression_failure(build) if built else sys.exit(output)
         finally:
             path.write_text(original)
         caught += bool(name)
