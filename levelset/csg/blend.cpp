@@ -121,7 +121,8 @@ CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b
     throw InvalidInput("blend: a solid is empty, so there is nothing to blend; give two solids");
 
   // === Plain CSG
-  const solids::SeamOperands operands = solids::onOneGrid(a, b, options);
+  const solids::SeamOperands operands =
+      solids::onOneGrid(a, b, {"blend", options.maxMemory, subProgress(options.progress, 0, 0.2)});
   CsgOptions csg;
   csg.maxMemory = options.maxMemory;
   csg.progress = subProgress(options.progress, 0.2, 0.4);

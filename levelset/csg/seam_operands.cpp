@@ -45,21 +45,19 @@ void copyInsideTiles(const FloatTree& source, FloatTree& target) {
 
 }  // namespace
 
-SeamOperands onOneGrid(const NarrowBand& a, const NarrowBand& b, const BlendOptions& options) {
+SeamOperands onOneGrid(const NarrowBand& a, const NarrowBand& b, const SeamRequest& request) {
   if (shareTransform(vdb(a), vdb(b))) return {a, b, {}};
   const bool firstIsFiner = a.voxelSize() <= b.voxelSize();
   const NarrowBand& fine = firstIsFiner ? a : b;
   const NarrowBand& coarse = firstIsFiner ? b : a;
   ResampleOptions resampling;
   resampling.halfWidth = std::min(fine.halfWidth(), coarse.halfWidth());
-  resampling.maxMemory = options.maxMemory;
-  resampling.progress = subProgress(options.progress, 0, 0.2);
+  resampling.maxMemory = request.maxMemory;
+  resampling.progress = request.progress;
   const NarrowBand moved = resampleTo(coarse, fine.indexToWorld(), resampling);
   std::string note = fmt::format(
-      "blend: the {} operand was resampled from voxels of {:.4g} to voxels of {:.4g}, the grid of "
-      "the "
-      "other operand",
-      firstIsFiner ? "second" : "first", coarse.voxelSize(), fine.voxelSize());
+      "{}: the {} operand was resampled from voxels of {:.4g} to the other's grid of {:.4g}",
+      request.action, firstIsFiner ? "second" : "first", coarse.voxelSize(), fine.voxelSize());
   return {firstIsFiner ? fine : moved, firstIsFiner ? moved : fine, {std::move(note)}};
 }
 

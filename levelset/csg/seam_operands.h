@@ -8,14 +8,20 @@
 
 namespace levelset::solids {
 
+struct SeamRequest {
+  const char* action;  ///< prefix of notes
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
+};
+
 struct SeamOperands {
   NarrowBand a, b;
   std::vector<std::string> notes;
 };
 
-/// Resamples both solids of a blend to the finer grid. Uses the first fifth of the progress.
+/// Resamples both solids to the finer grid of the two.
 [[nodiscard]] SeamOperands onOneGrid(const NarrowBand& a, const NarrowBand& b,
-                                     const BlendOptions& options);
+                                     const SeamRequest& request);
 
 /// Copies the blocks of a solid within `radius` plus a margin of the curve, with values in voxels.
 /// Neighbour blocks and tiles deep inside contain only signs.
