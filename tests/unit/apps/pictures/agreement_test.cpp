@@ -204,7 +204,7 @@ class ManyPlaces {
     const ImageComparison found =
         compareImages(renderCpu(scene, kData), renderEmbree(scene, kData));
     EXPECT_EQ(found.unlikeElsewhere, 0u)
-        << "place " << places_ << ", pixel " << (found.unlike.empty() ? 0 : found.unlike[0].x)
+        << "position " << places_ << ", pixel " << (found.unlike.empty() ? 0 : found.unlike[0].x)
         << "," << (found.unlike.empty() ? 0 : found.unlike[0].y);
     ++places_;
     pixels_ += found.pixels;
