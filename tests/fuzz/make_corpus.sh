@@ -17,7 +17,7 @@ $levelsmith $solid ! mesh ! write "$work/box.off.gz"
 mv "$work/box.off.gz" gzip/box.off.gz
 $levelsmith $solid ! write vdb/box.vdb ! write "$work/box.nvdb"
 head -c 1000 "$work/box.nvdb" >nvdb/head.nvdb
-$levelsmith $solid ! march --to 1 ! write vdb/march.vdb
+$levelsmith $solid ! fast-marching --to 1 ! write vdb/march.vdb
 $levelsmith $solid ! closest-point ! write vdb/closest-point.vdb
 $levelsmith $solid ! render exr/box.exr --size 4x3 --samples 1 --renderer cpu --png png/box.png
 $levelsmith sphere --radius 1 --voxel 0.25 ! patch --at 0,0,1 --size 0.6,0.6 --height 0.2 --spacing 0.3 --layers 2 ! \

@@ -204,9 +204,9 @@ class ManyPlaces {
     const ImageComparison found =
         compareImages(renderCpu(scene, kData), renderEmbree(scene, kData));
     EXPECT_EQ(found.unlikeElsewhere, 0u)
-        << "place " << places_ << ", pixel " << (found.unlike.empty() ? 0 : found.unlike[0].x)
+        << "position " << positions_ << ", pixel " << (found.unlike.empty() ? 0 : found.unlike[0].x)
         << "," << (found.unlike.empty() ? 0 : found.unlike[0].y);
-    ++places_;
+    ++positions_;
     pixels_ += found.pixels;
     hit_ += found.bothHit;
     atOutline_ += found.unlikeAtOutline;
@@ -222,7 +222,7 @@ class ManyPlaces {
   std::mt19937 random_{5};
   std::normal_distribution<double> normal_;
   std::uniform_real_distribution<double> even_{0, 1};
-  std::size_t places_ = 0, pixels_ = 0, hit_ = 0, atOutline_ = 0;
+  std::size_t positions_ = 0, pixels_ = 0, hit_ = 0, atOutline_ = 0;
 };
 
 TEST(Agreement, From200PositionsNothingLeaks) {
