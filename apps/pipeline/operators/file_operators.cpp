@@ -109,9 +109,8 @@ Plan planRead(Invocation& in) {
 void validateRead(const Invocation& in) {
   const Kind kind = fileKind(in);
   if (kind != Kind::Mesh && in.flag("no-attributes"))
-    throw UsageError(
-        fmt::format("read: --bare leaves out what a mesh carries, and this is a {}; leave it out",
-                    kindName(kind)));
+    throw UsageError(fmt::format(
+        "read: --no-attributes is for meshes, and this is a {}; leave it out", kindName(kind)));
   if (kind != Kind::Band && in.given("grid"))
     throw UsageError(fmt::format(
         "read: --grid picks a grid of a .vdb, and this is a {}; leave it out", kindName(kind)));
