@@ -34,12 +34,10 @@ const OperatorText LevelSetOperator::text{
     .group = "Conversion",
     .summary = "turn a mesh into a level set with exact distances",
     .details =
-        "auto takes 'closed' when every edge has two faces and no self-intersection is "
-        "found, otherwise "
-        "'winding' (inside where the generalised winding number passes one half). The sign "
-        "certificate says what "
-        "was found; where the sign would be a guess the mesh is refused unless "
-        "--accept-sign.",
+        "auto takes 'closed' when every edge has two faces and no self-intersection is found, "
+        "otherwise 'winding' (inside where the generalised winding number passes one half). The "
+        "sign certificate lists the findings. A mesh whose sign would be a guess is an error "
+        "without --accept-sign.",
     .example = "levelsmith read dragon.ply ! level-set --resolution 512 ! write dragon.vdb"};
 
 double LevelSetOperator::longestSide(const Options&, Plans operands) {
@@ -98,14 +96,13 @@ std::optional<Cost> LevelSetOperator::cost(const Options&, const OperatorPlans& 
 const OperatorText SurfaceBandOperator::text{
     .name = "surface-band",
     .group = "Conversion",
-    .summary = "make an open mesh (terrain, a sheet) a base for patches",
+    .summary = "turn an open mesh (terrain, a sheet) into a base for patches",
     .details =
-        "Distances to one side and the other of a mesh whose faces are all turned to one side, "
-        "up "
-        "to its border. It has no inside: 'patch', 'decal', 'patch-grid', 'scatter' and 'folds' "
-        "take it as base, 'texture' with --alone or --map mesh. Patches end at the border. The "
-        "band has to be as wide as patches are high, and six voxels more, unless their layers "
-        "follow a spline. A closed mesh is for 'level-set'.",
+        "Signed distances to an open, consistently oriented mesh, up to its border. The band has "
+        "no inside: 'patch', 'decal', 'patch-grid', 'scatter' and 'folds' take it as base, "
+        "'texture' with --alone or --map mesh. Patches end at the border. The half width must be "
+        "the height of the patches and six voxels more, unless their layers follow a spline. Use "
+        "'level-set' for a closed mesh.",
     .example =
         "levelsmith heightmap --image <(printf '0 1 0\\n1 2 1\\n0 1 0\\n') --size 8,8 --height 2 "
         "--voxel 0.2 --sheet ! surface-band --voxel 0.2 --half-width 12 ! patch --at "

@@ -10,9 +10,8 @@ namespace levelset {
 namespace {
 
 constexpr const char* kCsgDetails =
-    "Operands on different grids are brought to the finest of them, and the report says "
-    "so. Without "
-    "names it takes the two newest values, older first.";
+    "Operands on different grids are resampled to the finest grid, and the report says so. Without "
+    "names the operands are the two newest values, older first.";
 
 /// Share of the box that also lies in the other; 1 where the box has no volume.
 double shareWithin(const Imath::Box3d& box, const Imath::Box3d& other) {
@@ -90,7 +89,7 @@ template struct CsgOperator<CsgOperation::Difference>;
 const OperatorText UnionOperator::text{
     .name = "union",
     .group = "Solids",
-    .summary = "all that is in any of the solids",
+    .summary = "join solids: the points inside any of them",
     .details = kCsgDetails,
     .example =
         "levelsmith sphere --radius 2 --voxel 0.1 ! box --size 3,3,3 --voxel 0.1 ! union ! "
@@ -99,7 +98,7 @@ const OperatorText UnionOperator::text{
 const OperatorText IntersectionOperator::text{
     .name = "intersection",
     .group = "Solids",
-    .summary = "what is in all of the solids",
+    .summary = "intersect solids: the points inside all of them",
     .details = kCsgDetails,
     .example =
         "levelsmith sphere --radius 2 --voxel 0.1 ! box --size 3,3,3 --voxel 0.1 ! "
@@ -108,7 +107,7 @@ const OperatorText IntersectionOperator::text{
 const OperatorText DifferenceOperator::text{
     .name = "difference",
     .group = "Solids",
-    .summary = "the first solid without the others",
+    .summary = "subtract solids from the first",
     .details = kCsgDetails,
     .example =
         "levelsmith box --size 3,3,3 --voxel 0.1 ! sphere --radius 1.8 --voxel 0.1 ! "
@@ -119,11 +118,10 @@ const OperatorText BlendOperator::text{
     .group = "Solids",
     .summary = "union, intersection or difference with a rounded seam",
     .details =
-        "'curvature' flows along the curve in which the two surfaces meet; nothing changes "
-        "further than the radius from it. 'fillet' is what a ball of that radius leaves "
-        "that rolls along the seam: an arc of the radius, tangent to both surfaces, with "
-        "nothing changed beyond radius / tan(angle / 2). Solids that are near but do not "
-        "meet stay apart.",
+        "'curvature' smooths along the curve in which the two surfaces meet; nothing changes "
+        "further than the radius from it. 'fillet' is the surface of a ball of that radius that "
+        "rolls along the seam: an arc of the radius, tangent to both surfaces, with nothing "
+        "changed beyond radius / tan(angle / 2). Solids that are near but do not meet stay apart.",
     .example =
         "levelsmith box --size 8,8,2 --voxel 0.1 ! cylinder --radius 1.5 --height 6 "
         "--voxel 0.1 ! blend --radius 0.8 ! measure"};

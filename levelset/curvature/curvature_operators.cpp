@@ -14,10 +14,10 @@ const OperatorText CurvatureFlowOperator::text{
     .group = "Flow",
     .summary = "move the surface inwards with its curvature k1 + k2",
     .details =
-        "A ball obeys R² = R0² - 4 time. Topology may change; a solid that vanishes on the "
-        "way is refused, with the time. Steps are as long as the tolerance allows and "
-        "stable whatever is asked. Where the tolerance is not reached the result is still "
-        "written, and the exit code is 5. A flow that keeps its volume ends at rest.",
+        "A ball obeys R² = R0² - 4 time. Topology may change; a solid that vanishes is an error, "
+        "which gives the time. Steps are as long as the tolerance allows, and always stable. Where "
+        "the tolerance is not reached the result is still written, and the exit code is 5. A flow "
+        "that keeps its volume comes to rest.",
     .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! curvature-flow --time 0.05 ! measure"};
 
 NarrowBand CurvatureFlowOperator::run(std::vector<NarrowBand> operands, const Options& options,
@@ -62,10 +62,9 @@ const OperatorText SmoothOperator::text{
     .group = "Flow",
     .summary = "smooth the surface by a filter of its distances",
     .details =
-        "gaussian: a Gaussian of that sigma; mean: a box of the same variance; median: over "
-        "the grid points within sigma, which takes long when it is large; taubin: a Gaussian "
-        "that gives long waves back what "
-        "they lost.",
+        "gaussian: a Gaussian of that sigma; mean: a box of the same variance; median: over the "
+        "grid points within sigma, which takes long when sigma is large; taubin: a Gaussian, then "
+        "sharpened so that long waves keep their amplitude.",
     .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! smooth --sigma 1vx ! measure"};
 
 NarrowBand SmoothOperator::run(std::vector<NarrowBand> operands, const Options& options,

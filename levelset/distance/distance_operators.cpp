@@ -45,7 +45,7 @@ template struct RedistanceOperator<true>;
 const OperatorText ReinitializeOperator::text{
     .name = "reinitialize",
     .group = "Distances",
-    .summary = "make the values distances again without moving the surface",
+    .summary = "compute distances again without moving the surface",
     .details = "Only signs and the values beside the surface are read; they may have any slope.",
     .example = "levelsmith sphere --radius 1 --voxel 0.05 ! reinitialize --half-width 4 ! check"};
 
@@ -60,7 +60,7 @@ const OperatorText RebuildBandOperator::text{
 const OperatorText ClosestPointOperator::text{
     .name = "closest-point",
     .group = "Distances",
-    .summary = "the closest point of the surface, for each grid point of the band",
+    .summary = "compute the closest point of the surface for each grid point of the band",
     .details = "A field of vectors, in world units.",
     .example = "levelsmith sphere --radius 1 --voxel 0.05 ! closest-point --half-width 4 ! info"};
 

@@ -101,7 +101,7 @@ template struct FrontOperator<FrontMethod::Sweeping>;
 const OperatorText FastMarchingOperator::text{
     .name = "fast-marching",
     .group = "Distances",
-    .summary = "arrival times and distances by fast marching",
+    .summary = "compute arrival times and distances by fast marching",
     .details = kFrontDetails,
     .example =
         "levelsmith sphere --radius 1 --voxel 0.05 ! fast-marching --speed \"1 + 0.5*x\" "
@@ -111,7 +111,7 @@ const OperatorText FastMarchingOperator::text{
 const OperatorText FastSweepingOperator::text{
     .name = "fast-sweeping",
     .group = "Distances",
-    .summary = "arrival times and distances by fast sweeping",
+    .summary = "compute arrival times and distances by fast sweeping",
     .details = kFrontDetails,
     .example = "levelsmith sphere --radius 1 --voxel 0.05 ! fast-sweeping --to 8vx ! check",
     .formerName = "sweep"};

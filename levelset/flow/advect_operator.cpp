@@ -27,12 +27,10 @@ const OperatorText AdvectOperator::text{
     .group = "Flow",
     .summary = "carry a solid along with a velocity",
     .details =
-        "The velocity is one known by its name, three formulas in x, y, z, r and t, or a "
-        "field "
-        "of "
-        "vectors (read FILE.vdb --grid NAME --as v, then --field @v), staggered or not. A "
-        "negative time runs backwards. The scheme 'front' moves the surface as triangles and "
-        "keeps volume and thin sheets; the two others work on the grid.",
+        "The velocity is a named one, three formulas in x, y, z, r and t, or a field of vectors "
+        "(read FILE.vdb --grid NAME --as v, then --field @v), staggered or not. A negative time "
+        "runs backwards. The scheme 'front' moves the surface as triangles and keeps volume and "
+        "thin sheets; the two others work on the grid.",
     .example =
         "levelsmith sphere --radius 0.15 --center 0.35,0.35,0.35 --voxel 0.03 ! advect "
         "--field enright --time 0.3 ! measure"};

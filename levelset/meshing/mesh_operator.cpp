@@ -8,8 +8,8 @@ const OperatorText MeshOperator::text{
     .group = "Conversion",
     .summary = "turn a level set, or the space of a patch, into a closed triangle mesh",
     .details =
-        "Of a patch: its lowest and highest particles and its sides, one closed surface for "
-        "each patch, or with --sheets every layer as it is.",
+        "The mesh of a patch is one closed surface of its lowest and highest particles and its "
+        "sides, or with --sheets each layer.",
     .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! mesh --sharp ! write box.ply"};
 
 void MeshOperator::check(const Options& options, const GivenOptions&) {

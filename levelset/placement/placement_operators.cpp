@@ -106,7 +106,7 @@ RegionOfInterest sampledRegion(const OperatorPlans& plans, const RegionOfInteres
 const OperatorText ResampleOperator::text{
     .name = "resample",
     .group = "Placement",
-    .summary = "the same solid on an axis-aligned grid of another voxel size",
+    .summary = "resample a solid on an axis-aligned grid of another voxel size",
     .example =
         "levelsmith torus --radius 2 --tube 0.7 --voxel 0.1 ! resample --voxel 0.05 ! measure"};
 
@@ -142,10 +142,9 @@ const OperatorText TransformOperator::text{
     .group = "Placement",
     .summary = "move, turn, scale or mirror a solid or a mesh",
     .details =
-        "Applied in the order matrix, mirror, scale, rotate, translate. A level set moves "
-        "exactly, by its grid's "
-        "transform; what mirrors, shears or scales unevenly needs --bake, which resamples "
-        "on an axis-aligned grid.",
+        "The order is matrix, mirror, scale, rotate, translate. A level set moves exactly, by its "
+        "grid's transform. A matrix that mirrors, shears or scales unevenly needs --bake, which "
+        "resamples on an axis-aligned grid.",
     .example =
         "levelsmith box --size 2,1,1 --voxel 0.05 ! transform --rotate 30 --translate "
         "1,0,0 ! measure"};

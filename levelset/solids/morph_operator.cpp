@@ -32,10 +32,10 @@ const OperatorText MorphOperator::text{
     .group = "Flow",
     .summary = "turn the first solid into the second, step by step",
     .details =
-        "Every step is nearer to the target than the one before; topology may change. The "
-        "result stays on the grid of the first. With --mask a part of the way is gone at each "
-        "point, and the end is no longer the target. Without names it takes the two newest "
-        "values, the target last.",
+        "Every step is nearer to the target than the one before; topology may change. The result "
+        "is on the grid of the first solid. With --mask each point moves only a part of the way, "
+        "so the last step is not the target. Without names the operands are the two newest values, "
+        "the target last.",
     .example =
         "levelsmith sphere --radius 1 --voxel 0.1 ! box --size 1.6,1.6,1.6 --voxel 0.1 ! "
         "morph --steps 3 ! measure"};

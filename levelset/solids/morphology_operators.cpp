@@ -57,7 +57,7 @@ std::optional<Cost> MorphologyOperator::cost(const Options& options, const Opera
 const OperatorText OpenOperator::text{
     .name = "open",
     .group = "Solids",
-    .summary = "all balls of a radius that fit into the solid: drops thin parts",
+    .summary = "keep all balls of a radius that fit into the solid: drops thin parts",
     .details =
         "Moves the surface inwards and back: parts thinner than twice the radius go, convex "
         "edges are rounded to it, the rest stays.",
@@ -74,7 +74,7 @@ NarrowBand OpenOperator::run(std::vector<NarrowBand> operands, const Options& op
 const OperatorText CloseOperator::text{
     .name = "close",
     .group = "Solids",
-    .summary = "fill what no ball of a radius outside the solid gets into",
+    .summary = "fill the space that no ball of a radius outside the solid enters",
     .details =
         "Moves the surface outwards and back: gaps narrower than twice the radius are "
         "filled, concave edges are rounded to it, the rest stays.",

@@ -19,9 +19,9 @@ const OperatorText OffsetOperator::text{
     .group = "Solids",
     .summary = "move the surface along its normal; positive grows the solid",
     .details =
-        "Outwards, convex edges become round and concave ones stay sharp; inwards the "
-        "reverse. --by displaces each point of the surface by a length of its own, "
-        "--mask a part of it.",
+        "Outwards, convex edges become round and concave ones stay sharp; inwards the reverse. "
+        "--by displaces each point of the surface by a length of its own, --mask limits the offset "
+        "to a part of the surface.",
     .example = "levelsmith sphere --radius 1 --voxel 0.05 ! offset 2vx ! measure"};
 
 void OffsetOperator::check(const Options&, const GivenOptions& given) {

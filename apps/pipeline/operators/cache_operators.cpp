@@ -74,26 +74,27 @@ Operator cacheOperator() {
   return {
       .name = "cache",
       .group = "Results of earlier runs",
-      .summary = "list what --cache has kept in a folder, or remove the longest unused (gc)",
+      .summary =
+          "list the results that --cache keeps in a folder, or remove the least recently used (gc)",
       .details =
-          "Results are told apart by what they follow from: the program, the action, its "
-          "options and the content of what it reads. So a folder holds nothing wrong, only "
-          "what may not be asked for again. It may be in use, also by several programs.",
+          "The key of a result is made of the program, the action, its options and the content of "
+          "its operands and files. So no entry is ever wrong, though some may not be needed again. "
+          "Several programs may use the folder at the same time.",
       .example = "levelsmith --cache kept sphere --radius 1 --voxel 0.1 ! offset 0.2 ! measure",
       .params = {{.name = "verb",
                   .type = ParamType::Choice,
-                  .doc = "what to do",
+                  .doc = "list the results, or remove some",
                   .choices = {"list", "gc"},
                   .required = true,
                   .position = 0},
                  {.name = "folder",
                   .type = ParamType::Path,
-                  .doc = "that --cache was given",
+                  .doc = "folder that --cache was given",
                   .required = true,
                   .position = 1},
                  {.name = "max-size",
                   .type = ParamType::Bytes,
-                  .doc = "of what stays, for gc: the last used"},
+                  .doc = "gc: memory to keep; the most recently used results stay"},
                  jsonParam()},
       .isRepeatable = false,
       .flow = Flow::PassesThrough,

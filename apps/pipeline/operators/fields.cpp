@@ -45,18 +45,18 @@ levelset::Attribute attribute(const Invocation& in, const std::string& param) {
 std::vector<Param> maskParams() {
   return {{.name = "mask",
            .type = ParamType::Scalar,
-           .doc = "where to act: not below --mask-min, fully from --mask-max on"},
+           .doc = "field that limits the effect: none up to --mask-min, full from --mask-max on"},
           {.name = "mask-min",
            .type = ParamType::Number,
            .doc = "value of the mask up to which nothing changes",
            .fallback = "0"},
           {.name = "mask-max",
            .type = ParamType::Number,
-           .doc = "value of the mask from which on it acts fully",
+           .doc = "value of the mask from which the effect is full",
            .fallback = "1"},
           {.name = "mask-invert",
            .type = ParamType::Flag,
-           .doc = "act where the mask would have kept, and the reverse"}};
+           .doc = "exchange the parts that change and that stay"}};
 }
 
 std::vector<Param> withMask(std::vector<Param> params) {

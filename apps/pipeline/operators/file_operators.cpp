@@ -109,9 +109,8 @@ Plan planRead(Invocation& in) {
 void validateRead(const Invocation& in) {
   const Kind kind = fileKind(in);
   if (kind != Kind::Mesh && in.flag("no-attributes"))
-    throw UsageError(
-        fmt::format("read: --bare leaves out what a mesh carries, and this is a {}; leave it out",
-                    kindName(kind)));
+    throw UsageError(fmt::format(
+        "read: --no-attributes is for meshes, and this is a {}; leave it out", kindName(kind)));
   if (kind != Kind::Band && in.given("grid"))
     throw UsageError(fmt::format(
         "read: --grid picks a grid of a .vdb, and this is a {}; leave it out", kindName(kind)));
@@ -179,15 +178,14 @@ Operator readOperator() {
           "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), patches "
           "(patch), a scene (json)",
       .details =
-          "A .vdb with more than one level set needs --grid. A grid that is no level set "
-          "must be named too; it becomes a field: of numbers, or of vectors, staggered ones "
-          "among them. Meshes keep the normals, texture coordinates and colours that PLY and "
-          "OBJ give their vertices. "
-          "'-' is standard input and needs --format.",
+          "A .vdb with more than one level set needs --grid. A grid of another class must be "
+          "named, too. It becomes a field of numbers or of vectors, which may be staggered. Meshes "
+          "keep the normals, texture coordinates and colours of their vertices in PLY and OBJ. '-' "
+          "is standard input and needs --format.",
       .example = "levelsmith read dragon.ply.gz ! info",
       .params = {{.name = "file",
                   .type = ParamType::Path,
-                  .doc = "what to read, or -",
+                  .doc = "file to read, or -",
                   .required = true,
                   .position = 0},
                  {.name = "format",
@@ -196,8 +194,8 @@ Operator readOperator() {
                  {.name = "grid", .type = ParamType::Text, .doc = "name of the grid in a .vdb"},
                  {.name = "no-attributes",
                   .type = ParamType::Flag,
-                  .doc = "of a mesh: positions and triangles only, no normals, texture coordinates "
-                         "and colours",
+                  .doc = "meshes: read positions and triangles only, no normals, texture "
+                         "coordinates and colours",
                   .formerName = "bare"}},
       .resultKind = readKind,
       .run = read,
@@ -216,16 +214,14 @@ Operator writeOperator() {
           "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), "
           "patches (patch), a scene (json)",
       .details =
-          "The file is written beside its target and renamed when whole; what was there "
-          "stays until then. "
-          "A scene's level sets and meshes go to .vdb and .ply files beside it, "
-          "FILE-NAME.vdb for the "
-          "level set NAME, and replace what has those names. "
-          "The value stays on the stack.",
+          "The file is written beside its target and renamed when it is complete; an existing file "
+          "stays until then. The level sets and meshes of a scene go to .vdb and .ply files beside "
+          "it, FILE-NAME.vdb for the level set NAME, and replace files of those names. The value "
+          "stays on the stack.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! write sphere.ply",
       .params = {{.name = "file",
                   .type = ParamType::Path,
-                  .doc = "where to, or -",
+                  .doc = "file to write, or -",
                   .required = true,
                   .position = 0},
                  {.name = "format",
@@ -233,7 +229,7 @@ Operator writeOperator() {
                   .doc = "ply, obj, stl, off, vdb, nvdb, patch, json; default: by extension"},
                  {.name = "name",
                   .type = ParamType::Text,
-                  .doc = "of the grid in a .vdb or .nvdb; a field keeps its own",
+                  .doc = "name of the grid in a .vdb or .nvdb; default for a field: its own name",
                   .fallback = "surface"}},
       .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene}},
       .flow = Flow::PassesThrough,

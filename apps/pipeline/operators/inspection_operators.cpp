@@ -283,11 +283,11 @@ Operator compareOperator() {
   return {
       .name = "compare",
       .group = "Inspection",
-      .summary = "how far two solids differ: Hausdorff, mean and Chamfer distance, volume",
+      .summary = "difference of two solids: Hausdorff, mean and Chamfer distance, volume",
       .details =
-          "Both stay on the stack. hausdorff is the larger of both ways, chamfer the sum of "
-          "both means, symmetric_difference the volume in one of the solids only. The grids "
-          "need not be the same.",
+          "Both solids stay on the stack. hausdorff is the larger of the two directed distances, "
+          "chamfer the sum of the two means, symmetric_difference the volume inside exactly one of "
+          "the solids. The grids may differ.",
       .example =
           "levelsmith sphere --radius 1 --voxel 0.05 ! sphere --radius 1 --center 0.1,0,0 "
           "--voxel 0.05 ! compare --tolerance 0.11",
@@ -308,7 +308,7 @@ Operator checkOperator() {
   return {
       .name = "check",
       .group = "Inspection",
-      .summary = "is it a sound level set? exit code 5 if not",
+      .summary = "check that a level set is sound; exit code 5 if it is not",
       .example = "levelsmith box --size 1,1,1 --voxel 0.05 ! check",
       .params = {jsonParam()},
       .operands = {{Kind::Band}},
@@ -323,7 +323,7 @@ Operator infoOperator() {
   return {
       .name = "info",
       .group = "Inspection",
-      .summary = "what is in a file, without loading its voxels, or what is on the stack",
+      .summary = "describe a file, without loading its voxels, or the newest value",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! info",
       .params = {{.name = "file",
                   .type = ParamType::Path,
@@ -331,7 +331,7 @@ Operator infoOperator() {
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
-                  .doc = "of the file; default: by extension"},
+                  .doc = "format of the file; default: by extension"},
                  jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface, Kind::Scene}},
       .operandsOptional = true,

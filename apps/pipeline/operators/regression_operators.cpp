@@ -64,24 +64,24 @@ Operator regressOperator() {
   return {
       .name = "regress",
       .group = "Inspection",
-      .summary = "run problems with exact answers and tell error against run time",
+      .summary = "run problems with exact solutions and report errors and run times",
       .details =
           "Each case runs at several resolutions and at five placements between the grid points, "
-          "beside OpenVDB's own tool where it has one. The folder gets results.json, results.csv, "
-          "plots and index.html. Exit code 5 when an accuracy bound is missed, after everything "
-          "is written; times are shown, never judged.",
+          "beside OpenVDB's own tool where it has one. The folder receives results.json, "
+          "results.csv, plots and index.html. The exit code is 5 when an accuracy bound is missed, "
+          "after everything is written. Times are shown but have no bound.",
       .example = "levelsmith regress --case empty-and-full --out regression",
       .params = {{.name = "case",
                   .type = ParamType::Text,
                   .doc = "names of cases, between commas; default: all"},
                  {.name = "budget",
                   .type = ParamType::Choice,
-                  .doc = "under three minutes on two cores, or everything",
+                  .doc = "quick: under three minutes on two cores; full: everything",
                   .fallback = "quick",
                   .choices = {"quick", "full"}},
                  {.name = "out",
                   .type = ParamType::Path,
-                  .doc = "folder for the results; made if it is missing"},
+                  .doc = "folder for the results; created if it is missing"},
                  {.name = "no-plots",
                   .type = ParamType::Flag,
                   .doc =

@@ -230,7 +230,7 @@ const Operator& runOperator() {
   static const Operator op{
       .name = "run",
       .group = "Chains in files",
-      .summary = "run what a file holds: a chain, one action a line, or a graph (.json)",
+      .summary = "run a file: a chain, one action a line, or a graph (.json)",
       .details =
           "No '!' between actions; # begins a comment; quotes and backslashes as in a "
           "shell. Lines of options before the first action are global options; those of the "
@@ -242,12 +242,12 @@ const Operator& runOperator() {
       .example = "levelsmith --threads 2 run holes.pipeline --set voxel=0.3",
       .params = {{.name = "file",
                   .type = ParamType::Path,
-                  .doc = "what to run, or -",
+                  .doc = "file to run, or -",
                   .required = true,
                   .position = 0},
                  {.name = "set",
                   .type = ParamType::Text,
-                  .doc = "NAME=VALUE of a variable of the file; as often as one likes"}},
+                  .doc = "NAME=VALUE of a variable of the file; may be repeated"}},
       .flow = Flow::PassesThrough};
   return op;
 }
@@ -260,10 +260,11 @@ const std::vector<Param>& globalParams() {
        .range = Range::Positive},
       {.name = "max-memory",
        .type = ParamType::Bytes,
-       .doc = "refuse or stop what would take more, e.g. 4G; default: 80 % of what is free"},
+       .doc = "memory limit, e.g. 4G: an action that needs more is an error; default: 80 % of the "
+              "free memory"},
       {.name = "tolerance",
        .type = ParamType::Length,
-       .doc = "largest error of the result, from which voxel sizes that are not given follow",
+       .doc = "largest error of the result; voxel sizes that are not given follow from it",
        .range = Range::Positive,
        .allowsVoxels = false},
       {.name = "quiet", .type = ParamType::Flag, .doc = "errors only"},
@@ -272,18 +273,18 @@ const std::vector<Param>& globalParams() {
        .doc = "time, memory and voxels of each step (also -v)"},
       {.name = "report",
        .type = ParamType::Path,
-       .doc = "write what each step did and cost: as .json, or as a page with pictures (.html)"},
+       .doc = "write the result and the cost of each step: as .json, or as a page with pictures "
+              "(.html)"},
       {.name = "save-graph",
        .type = ParamType::Path,
-       .doc = "write what is asked for as a .json that `run` takes; with --dry-run nothing else is "
-              "done"},
+       .doc = "write the graph as a .json for `run`; with --dry-run nothing else is done"},
       {.name = "no-roi",
        .type = ParamType::Flag,
        .doc = "compute every value completely, also where a part of it suffices",
        .formerName = "whole"},
       {.name = "cache",
        .type = ParamType::Path,
-       .doc = "a folder that keeps results: what is known there is not computed again"},
+       .doc = "folder that keeps results; known results are not computed again"},
       {.name = "progress",
        .type = ParamType::Choice,
        .doc = "bars on a terminal, lines of JSON, or nothing",
@@ -292,12 +293,11 @@ const std::vector<Param>& globalParams() {
       {.name = "no-clobber", .type = ParamType::Flag, .doc = "never overwrite a file"},
       {.name = "explain",
        .type = ParamType::Flag,
-       .doc = "tell what would run, what not and why, how much of each value is needed and what it "
-              "takes; without computing anything or writing a result"},
+       .doc = "list the actions that would run or be left out, with the reason, the needed part of "
+              "each value, and its cost; computes and writes nothing"},
       {.name = "dry-run",
        .type = ParamType::Flag,
-       .doc = "resolve every parameter and estimate cost, without computing anything or writing a "
-              "result"},
+       .doc = "resolve every parameter and estimate the cost; computes and writes nothing"},
   };
   return params;
 }

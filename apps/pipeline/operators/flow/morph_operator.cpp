@@ -45,7 +45,7 @@ Operator morphOperator() {
   return levelSetOperator<levelset::MorphOperator>(
       {.params = {{.name = "keep-steps",
                    .type = ParamType::Path,
-                   .doc = "write every step; # in the name is its number (step_###.vdb)"}},
+                   .doc = "write every step; # in the name stands for its number (step_###.vdb)"}},
        .validate =
            [](const Invocation& in) {
              if (in.given("keep-steps")) (void)stepSequence(in);

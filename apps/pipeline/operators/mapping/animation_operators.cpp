@@ -476,17 +476,17 @@ std::vector<Param> animateParams() {
   std::vector<Param> params = {
       {.name = "frames",
        .type = ParamType::Integer,
-       .doc = "how many, the first is frame 0",
+       .doc = "number of frames; the first is frame 0",
        .range = Range::Positive,
        .required = true},
       {.name = "out",
        .type = ParamType::Path,
-       .doc = "where the frames go, as .vdb or as meshes; # in the name is the number "
+       .doc = "files of the frames, .vdb or meshes; # in the name stands for the number "
               "(frame_###.vdb)",
        .required = true},
       {.name = "base-frames",
        .type = ParamType::Path,
-       .doc = "bases of the frames after the first, # in the name is the number"},
+       .doc = "bases of the frames after the first; # in the name stands for the number"},
       {.name = "base-first",
        .type = ParamType::Integer,
        .doc = "number of the file that is the base of frame 1",
@@ -494,22 +494,22 @@ std::vector<Param> animateParams() {
       {.name = "texture-frames",
        .type = ParamType::Path,
        .doc = "textures of the frames after the first, likewise; without --texture-box, the box of "
-              "the first is the unit cube of all"},
+              "the first frame's texture holds for all"},
       {.name = "texture-first",
        .type = ParamType::Integer,
        .doc = "number of the file that is the texture of frame 1",
        .fallback = "1"},
       {.name = "key-frames",
        .type = ParamType::Text,
-       .doc = "0,12,30: when the patches stand as they are; default: evenly spread"},
+       .doc = "frames at which the patches are reached, as 0,12,30; default: evenly spread"},
       {.name = "carry",
        .type = ParamType::Choice,
-       .doc = "corners by themselves, or the whole patch, which keeps its shape and turns",
+       .doc = "move each corner by itself, or turn the patch as a rigid shape",
        .fallback = "corners",
        .choices = {"corners", "rigid"}},
       {.name = "drift",
        .type = ParamType::Number,
-       .doc = "warn of carried patches that have grown or shrunk by more than this factor",
+       .doc = "warn about carried patches that grow or shrink by more than this factor",
        .fallback = "1.5",
        .range = Range::Positive}};
   const std::vector<Param> texture = textureParams();
@@ -523,18 +523,18 @@ Operator animateOperator() {
   return {
       .name = "animate",
       .group = "Texture mapping",
-      .summary = "a texture that moves: on a moving base, from patch to patch, or by itself",
+      .summary = "animate a texture: on a moving base, from patch to patch, or by a moving texture",
       .details =
-          "The operands are base, texture and patch, as of `texture`, and further patches to go "
-          "to. All are those of frame 0, but for the further patches, each of which stands on the "
-          "base of its own frame. Between two patches the first is carried forwards and the second "
-          "backwards along the bases, and the way between them is gone evenly; frames between "
-          "follow the first in how they are made. Each frame is written when it is done; the "
-          "result is the last. What does not change is not computed again.",
+          "The operands are base, texture and patch, as for `texture`, and further patches as key "
+          "frames. Base, texture and first patch belong to frame 0; each further patch lies on the "
+          "base of its own frame. Between two key patches the first is carried forwards and the "
+          "second backwards along the bases, and the frames interpolate evenly between them. "
+          "Frames in between use the options of the first patch. Each frame is written when it is "
+          "done; the result is the last frame. Unchanged parts are not computed again.",
       .example =
           "levelsmith sphere --radius 10 --voxel 0.8 --as ball ! torus --radius 4 --tube 1.5 "
-          "--voxel 0.8 --as ring ! patch @ball --at 0,0,10 --size 8,8 --height 3 --levels 2 "
-          "--as here ! patch @ball --at 10,0,0 --size 6,6 --rotate -90 --height 2 --levels 2 "
+          "--voxel 0.8 --as ring ! patch @ball --at 0,0,10 --size 8,8 --height 3 --layers 2 "
+          "--as here ! patch @ball --at 10,0,0 --size 6,6 --rotate -90 --height 2 --layers 2 "
           "--as there ! animate @ball @ring @here @there --frames 3 --voxel 0.8 --out "
           "ring_##.vdb ! measure",
       .params = animateParams(),

@@ -403,12 +403,11 @@ std::vector<Param> layerParams(const char* particles) {
     if (param.name == "particles") param.fallback = particles;
   params.push_back({.name = "spline",
                     .type = ParamType::Points,
-                    .doc = "with --particles spline: points that its curve passes from the patch's "
+                    .doc = "--particles spline: points that the curve passes, from the patch's "
                            "centre on; default: straight along the normal"});
-  params.push_back(
-      {.name = "fade",
-       .type = ParamType::Flag,
-       .doc = "with --particles spline: the surface's relief goes to nothing on the way"});
+  params.push_back({.name = "fade",
+                    .type = ParamType::Flag,
+                    .doc = "--particles spline: the relief of the surface fades along the curve"});
   return params;
 }
 
@@ -417,12 +416,12 @@ std::vector<Param> outlineParams() {
           {.name = "at", .type = ParamType::Point, .doc = "centre of a patch of --size"},
           {.name = "size",
            .type = ParamType::Lengths,
-           .doc = "along u and v, on the surface",
+           .doc = "lengths along u and v, on the surface",
            .range = Range::Positive,
            .count = 2},
           {.name = "side0",
            .type = ParamType::Points,
-           .doc = "points that the side from corner 0 to 1 passes on its shortest ways"},
+           .doc = "points that the side from corner 0 to 1 passes, on shortest paths"},
           {.name = "side1", .type = ParamType::Points, .doc = "the same from corner 1 to 2"},
           {.name = "side2", .type = ParamType::Points, .doc = "the same from corner 3 to 2"},
           {.name = "side3", .type = ParamType::Points, .doc = "the same from corner 0 to 3"}};
@@ -439,12 +438,12 @@ Operator patchOperator() {
   return {
       .name = "patch",
       .group = "Texture mapping",
-      .summary = "lay a patch onto a surface: where a texture will stand",
+      .summary = "lay a patch onto a surface, for a texture to be mapped onto",
       .details =
-          "Points are projected to the surface along the distance. u runs from corner 0 to "
-          "1, v from corner 0 to 3, w outwards; corners run anticlockwise seen from "
-          "outside. Sides are the shortest ways on the surface, through the points of "
-          "--side0 to --side3 with a corner at each.",
+          "Points are projected to the surface along the gradient of the distance. u runs from "
+          "corner 0 to 1, v from corner 0 to 3, w outwards; corners run anticlockwise seen from "
+          "outside. Sides are shortest paths on the surface, through the points of --side0 to "
+          "--side3 with a corner at each.",
       .example =
           "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
           "--size 8,8 --height 3 --as p "
@@ -453,19 +452,20 @@ Operator patchOperator() {
       .params = joinParams(
           joinParams(outlineParams(), {{.name = "rotate",
                                         .type = ParamType::Degrees,
-                                        .doc = "of u about the normal, with --at",
+                                        .doc = "--at: angle of u about the normal",
                                         .fallback = "0"}}),
-          joinParams(layerParams("reduced"),
-                     {{.name = "directions",
-                       .type = ParamType::Points,
-                       .doc = "with --particles reduced: vectors in which the corners rise, one "
-                              "for all or \"d0 d1 d2 d3\"; default: along the distance"},
-                      {.name = "parallel",
-                       .type = ParamType::Flag,
-                       .doc = "the same, all along the normal at the patch's centre"},
-                      {.name = "mirror",
-                       .type = ParamType::Flag,
-                       .doc = "accept corners that run clockwise: the texture is mirrored"}})),
+          joinParams(
+              layerParams("reduced"),
+              {{.name = "directions",
+                .type = ParamType::Points,
+                .doc = "--particles reduced: directions in which the corners rise, one for all or "
+                       "\"d0 d1 d2 d3\"; default: along the gradient of the distance"},
+               {.name = "parallel",
+                .type = ParamType::Flag,
+                .doc = "the same, all along the normal at the patch's centre"},
+               {.name = "mirror",
+                .type = ParamType::Flag,
+                .doc = "accept corners that run clockwise: the texture is mirrored"}})),
       .operands = {{Kind::Band, Kind::Surface}},
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = patch,
@@ -480,31 +480,31 @@ Operator decalOperator() {
       .group = "Texture mapping",
       .summary = "lay a square patch onto a surface about one point",
       .details =
-          "Distances and directions from the point are kept: every particle lies at the end "
-          "of the straightest way that sets out in its direction. A decal that would fold, "
-          "come round to itself or run off the surface is refused, with a radius that does.",
+          "Distances and directions from the point are kept: every particle lies at the end of a "
+          "geodesic that starts in its direction. A decal that would fold, overlap itself or leave "
+          "the surface is an error, which gives a radius that works.",
       .example =
           "levelsmith cylinder --radius 8 --height 30 --voxel 0.4 --as post ! decal @post "
           "--at 8,0,0 --direction 0,1,0 --radius 6 --height 2 --as p "
           "! torus --radius 4 --tube 1 --voxel 0.3 --as ring ! texture @post @ring @p "
           "! mesh ! write post.ply",
-      .params = joinParams({{.name = "at",
-                             .type = ParamType::Point,
-                             .doc = "the centre, projected to the surface",
-                             .required = true},
-                            {.name = "direction",
-                             .type = ParamType::Point,
-                             .doc = "of u; its part along the surface counts",
-                             .required = true},
-                            {.name = "radius",
-                             .type = ParamType::Length,
-                             .doc = "half of the square's side, along the surface",
-                             .range = Range::Positive,
-                             .required = true}},
-                           joinParams(layerParams("reduced"),
-                                      {{.name = "mirror",
-                                        .type = ParamType::Flag,
-                                        .doc = "v runs the other way: the texture is mirrored"}})),
+      .params = joinParams(
+          {{.name = "at",
+            .type = ParamType::Point,
+            .doc = "the centre, projected to the surface",
+            .required = true},
+           {.name = "direction",
+            .type = ParamType::Point,
+            .doc = "direction of u; its tangential part counts",
+            .required = true},
+           {.name = "radius",
+            .type = ParamType::Length,
+            .doc = "half the side of the square, along the surface",
+            .range = Range::Positive,
+            .required = true}},
+          joinParams(layerParams("reduced"), {{.name = "mirror",
+                                               .type = ParamType::Flag,
+                                               .doc = "reverse v, which mirrors the texture"}})),
       .operands = {{Kind::Band, Kind::Surface}},
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = decal,
@@ -519,10 +519,10 @@ Operator patchGridOperator() {
       .group = "Texture mapping",
       .summary = "tile a patch, or all around an axis, with patches whose textures meet",
       .details =
-          "Neighbours share the particles of their common border. With --around the tiles "
-          "close: u runs around the axis, anticlockwise seen from its second point, v "
-          "along it between the planes through the two points. A texture meets itself where "
-          "it reaches the border of its box, see --texture-box.",
+          "Neighbours share the particles of their common border. With --around the tiles form a "
+          "closed ring: u runs around the axis, anticlockwise seen from its second point, and v "
+          "runs along the axis between the planes through the two points. A texture continues in "
+          "the next tile where it reaches the border of its box, see --texture-box.",
       .example =
           "levelsmith cylinder --radius 5 --height 20 --voxel 0.2 --as grip ! patch-grid "
           "@grip --count 12,6 --around \"0,0,-6 0,0,6\" --height 0.8 --as p "
@@ -536,20 +536,20 @@ Operator patchGridOperator() {
                      outlineParams()),
           joinParams({{.name = "around",
                        .type = ParamType::Points,
-                       .doc = "two points, \"from to\": all around the axis between them"},
+                       .doc = "two points, \"from to\": tile all around the axis between them"},
                       {.name = "rotate",
                        .type = ParamType::Degrees,
-                       .doc = "of u about the normal with --at; of the first seam with --around",
+                       .doc = "angle of u about the normal (--at), or of the first seam (--around)",
                        .fallback = "0"},
                       {.name = "mirror",
                        .type = ParamType::Choice,
-                       .doc = "every other tile is turned over along u, along v, or along both",
+                       .doc = "mirror every other tile along u, along v, or along both",
                        .fallback = "none",
                        .choices = {"none", "u", "v", "both"}},
                       {.name = "shift",
                        .type = ParamType::Number,
-                       .doc = "of every other row along u, in tiles; such a row has one tile less "
-                              "unless the tiles close",
+                       .doc = "shift of every other row along u, in tiles; such a row has one tile "
+                              "less, unless the tiles close",
                        .fallback = "0",
                        .range = Range::NonNegative},
                       {.name = "mirrored",

@@ -261,7 +261,7 @@ void addDistortion(const mapping::Distortion& distortion, nlohmann::ordered_json
 Param kernelParam() {
   return {.name = "kernel",
           .type = ParamType::Choice,
-          .doc = "with --map rbf: what a particle does at a distance",
+          .doc = "--map rbf: kernel, the influence of a particle by distance",
           .fallback = "biharmonic",
           .choices = kKernelNames};
 }
@@ -278,13 +278,13 @@ std::vector<Param> withShell(std::vector<Param> params) {
                     .formerName = "unfold"});
   params.push_back({.name = "relax",
                     .type = ParamType::Choice,
-                    .doc = "move particles to the least distortion of the whole patch, against its "
+                    .doc = "move particles so that the patch is distorted least, relative to its "
                            "own proportions or the texture's",
                     .fallback = "none",
                     .choices = {"none", "patch", "texture"}});
   params.push_back({.name = "sides",
                     .type = ParamType::Choice,
-                    .doc = "with --untangle and --relax: the sides on the surface stay, or slide",
+                    .doc = "--untangle and --relax: the sides on the surface stay, or slide",
                     .fallback = "fixed",
                     .choices = {"fixed", "free"}});
   return params;
@@ -334,12 +334,11 @@ Operator foldsOperator() {
   return {
       .name = "folds",
       .group = "Texture mapping",
-      .summary = "certify that a patch's map folds nowhere, and its Jacobian as a field",
+      .summary = "certify that a patch's map does not fold, and compute its Jacobian as a field",
       .details =
-          "The operands are base and patch. The field holds the map's Jacobian on the grid "
-          "points of the patch: 1 where it is the median, 0 or less where the map turns "
-          "over. The certificate is in the report, and how lengths and volumes spread, against "
-          "the patch's own size.",
+          "The operands are base and patch. The field holds the map's Jacobian on the grid points "
+          "of the patch: 1 at the median, 0 or less where the map folds. The report holds the "
+          "certificate, and the spread of lengths and volumes relative to the patch's own size.",
       .example =
           "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
           "--size 8,8 --height 3 --as p ! folds @ball @p ! write jacobian.vdb",
@@ -350,7 +349,7 @@ Operator foldsOperator() {
                             .choices = {"rbf", "shell", "mesh"}},
                            {.name = "embed",
                             .type = ParamType::Length,
-                            .doc = "how deep the texture dips into the base",
+                            .doc = "depth of the texture below the surface of the base",
                             .fallback = "1vx",
                             .range = Range::NonNegative,
                             .formerName = "sink"},

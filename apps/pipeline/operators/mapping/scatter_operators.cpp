@@ -142,49 +142,50 @@ Operator scatterOperator() {
   return {
       .name = "scatter",
       .group = "Texture mapping",
-      .summary = "strew patches over a surface, evenly and at random",
+      .summary = "scatter patches over a surface, evenly and at random",
       .details =
-          "Places are Poisson-disc samples of the surface. --scale makes patches and their "
-          "distances larger or smaller from place to place, --along turns u, a mask thins "
-          "out. Where the surface bears no patch, or the patch would fold, none is laid.",
+          "The centres are Poisson-disc samples of the surface. --scale varies the size of patches "
+          "and their distances over the surface, --along turns u, a mask thins the patches out. "
+          "There is no patch where the surface is too curved for one, or where the patch would "
+          "fold.",
       .example =
           "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! scatter @ball --count 12 "
-          "--size 4,4 --height 1.5 --levels 2 --as many ! torus --radius 2 --tube 0.6 "
+          "--size 4,4 --height 1.5 --layers 2 --as many ! torus --radius 2 --tube 0.6 "
           "--voxel 0.3 --as ring ! texture @ball @ring @many --voxel 0.5 ! write studded.vdb",
       .params = withMask(withLayers(
           {{.name = "count",
             .type = ParamType::Integer,
-            .doc = "how many patches",
+            .doc = "number of patches",
             .range = Range::Positive},
            {.name = "distance",
             .type = ParamType::Length,
-            .doc = "least distance of their centres along the surface; as many as there is room",
+            .doc = "least distance of their centres along the surface; as many patches as fit",
             .range = Range::Positive},
            {.name = "size",
             .type = ParamType::Lengths,
-            .doc = "along u and v, on the surface",
+            .doc = "lengths along u and v, on the surface",
             .range = Range::Positive,
             .required = true,
             .count = 2},
            {.name = "scale",
             .type = ParamType::Scalar,
-            .doc = "of size, height and distance, from place to place; default: 1"},
+            .doc = "factor of size, height and distance at each point; default: 1"},
            {.name = "along",
             .type = ParamType::Velocity,
-            .doc = "where u points, as far as the surface lets it"},
+            .doc = "direction of u; its tangential part counts"},
            {.name = "rotate",
             .type = ParamType::Degrees,
-            .doc = "of u about the normal",
+            .doc = "angle of u about the normal",
             .fallback = "0"},
            {.name = "jitter",
             .type = ParamType::Degrees,
-            .doc = "a random turn of up to this to either side; 180 is any",
+            .doc = "largest random rotation to either side; 180 allows all",
             .fallback = "0"},
            {.name = "seed",
             .type = ParamType::Integer,
-            .doc = "another number gives other places",
+            .doc = "seed of the random positions",
             .fallback = "1"},
-           {.name = "allow-folds", .type = ParamType::Flag, .doc = "lay patches that fold"}})),
+           {.name = "allow-folds", .type = ParamType::Flag, .doc = "keep patches that fold"}})),
       .operands = {{Kind::Band, Kind::Surface}},
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = scatter,

@@ -144,14 +144,13 @@ Operator textureOperator() {
       .group = "Texture mapping",
       .summary = "map a solid onto a patch of a surface, and join the two",
       .details =
-          "The operands are base, texture and patch. The texture's zero-set box is the unit "
-          "cube of u, v, w. A map that "
-          "folds is refused with the place.",
+          "The operands are base, texture and patch. The box of the texture's zero set is the unit "
+          "cube of u, v, w. A map that folds is an error, which names the position.",
       .example =
           "levelsmith box --size 40,40,10 --voxel 0.5 --as base ! torus --radius 4 --tube "
           "1.5 --voxel 0.25 --as rings "
           "! patch @base --corners \"-10,-10,5 10,-10,5 10,10,5 -10,10,5\" --height 8 "
-          "--levels 6 --as p "
+          "--layers 6 --as p "
           "! texture @base @rings @p --map rbf --blend 1 ! write out.vdb ! mesh ! write out.ply",
       .params = textureParams(),
       .operands = {{Kind::Band, Kind::Surface}, {Kind::Band, Kind::Mesh}, {Kind::Patch}},

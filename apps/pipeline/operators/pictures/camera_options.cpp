@@ -36,12 +36,15 @@ void setOptions(Invocation& in, bool isAll, render::Camera& camera) {
 
 void addCameraParams(std::vector<Param>& params) {
   const std::vector<Param> camera = {
-      {.name = "size", .type = ParamType::ImageSize, .doc = "pixels", .fallback = "1024x768"},
-      {.name = "from", .type = ParamType::Point, .doc = "where the eye is"},
+      {.name = "size",
+       .type = ParamType::ImageSize,
+       .doc = "size in pixels",
+       .fallback = "1024x768"},
+      {.name = "from", .type = ParamType::Point, .doc = "position of the eye"},
       {.name = "to",
        .type = ParamType::Point,
-       .doc = "where it looks; default: the middle of the solid"},
-      {.name = "up", .type = ParamType::Point, .doc = "what is up", .fallback = "0,1,0"},
+       .doc = "point that the camera looks at; default: the middle of the solid"},
+      {.name = "up", .type = ParamType::Point, .doc = "upward direction", .fallback = "0,1,0"},
       {.name = "fov",
        .type = ParamType::Degrees,
        .doc = "vertical field of view",
@@ -49,15 +52,16 @@ void addCameraParams(std::vector<Param>& params) {
        .range = Range::Positive},
       {.name = "ortho",
        .type = ParamType::Length,
-       .doc = "orthographic; height of the view",
+       .doc = "height of an orthographic view",
        .range = Range::Positive},
       {.name = "near",
        .type = ParamType::Length,
-       .doc = "along the view axis: what is nearer is cut off, though it casts shadows; default: 0",
+       .doc = "distance along the view axis up to which surfaces are cut off; they still cast "
+              "shadows; default: 0",
        .range = Range::NonNegative},
       {.name = "far",
        .type = ParamType::Length,
-       .doc = "what is farther is cut off; default: nothing",
+       .doc = "distance beyond which surfaces are cut off; default: none",
        .range = Range::Positive}};
   params.insert(params.end(), camera.begin(), camera.end());
 }

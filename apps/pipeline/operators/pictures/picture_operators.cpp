@@ -107,7 +107,7 @@ Json toJson(const render::ImageComparison& found) {
   Json json;
   json["agrees"] = found.agrees();
   json["exact"] = found.isExact;
-  json["pixels"] = found.pixels;
+  json["size in pixels"] = found.pixels;
   json["both_hit"] = found.bothHit;
   json["unlike_at_outline"] = found.unlikeAtOutline;
   json["unlike_elsewhere"] = found.unlikeElsewhere;
@@ -358,15 +358,13 @@ Operator renderOperator() {
       .group = "Pictures",
       .summary = "draw a level set, a mesh or a scene to an EXR with all layers, or a PNG",
       .details =
-          "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y "
-          "N.Z, P.X P.Y P.Z, "
-          "curvature.mean .gauss .k1 .k2, id. Without --from, a three-quarter view that "
-          "frames the solid, or the scene's own. 'gpu' and 'cpu' are one kernel in single "
-          "precision, with the "
-          "same bits; 'embree' finds places by code of its own in double precision. 'both' "
-          "draws with the kernel, writes that, compares the layers with those of embree, "
-          "and ends with exit code 5 where they differ by more than two correct renderers "
-          "may.",
+          "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y N.Z, P.X "
+          "P.Y P.Z, curvature.mean .gauss .k1 .k2, id. Without --from, the view is the scene's "
+          "own, or a three-quarter view that frames the solid. 'gpu' and 'cpu' run one kernel in "
+          "single precision, with the same bits; 'embree' finds hits by independent code in double "
+          "precision. 'both' draws with the kernel, writes that picture, compares the layers with "
+          "those of embree, and ends with exit code 5 where they differ by more than two correct "
+          "renderers may.",
       .example =
           "levelsmith torus --radius 2 --tube 0.8 --voxel 0.05 ! render torus.png --size "
           "320x240 --from 5,4,6 --to 0,0,0",
@@ -379,32 +377,31 @@ Operator renderOperator() {
            {.name = "png", .type = ParamType::Path, .doc = "write the colours to this .png too"},
            {.name = "renderer",
             .type = ParamType::Choice,
-            .doc = "which one draws; both: gpu and embree, compared; soft expressions and morphs "
-                   "are drawn by cpu unless embree is asked for",
+            .doc = "renderer; both: gpu and embree, compared; soft expressions and morphs use cpu "
+                   "unless embree is given",
             .fallback = "embree",
             .choices = {"gpu", "cpu", "embree", "both"}},
            {.name = "filter",
             .type = ParamType::Choice,
-            .doc = "what is drawn between grid points: the trilinear interpolant, the tricubic "
-                   "B-spline, which shrinks, or the one with corrected coefficients",
+            .doc = "interpolation between grid points: trilinear, a tricubic B-spline, which "
+                   "shrinks the solid, or one with corrected coefficients",
             .fallback = "trilinear",
             .choices = {"trilinear", "bspline", "bspline-qi"}},
            {.name = "tables",
             .type = ParamType::Choice,
-            .doc = "what the shader of gpu and both reads: bricks made for it, or the NanoVDB grid "
-                   "itself, which is slower and gives the same bits",
+            .doc = "grid that the shader of gpu and both reads: bricks, or a NanoVDB grid, which "
+                   "is slower and gives the same bits",
             .fallback = "bricks",
             .choices = {"bricks", "nanovdb"}},
            {.name = "value-bits",
             .type = ParamType::Choice,
-            .doc =
-                "what the ray caster holds a value in; 16 and 8 save memory, and the report says "
-                "how far they move the surface",
+            .doc = "bits of a value in the ray caster; 16 and 8 save memory, and the report gives "
+                   "the displacement of the surface",
             .fallback = "32",
             .choices = {"32", "16", "8"}},
            {.name = "style",
             .type = ParamType::Choice,
-            .doc = "of the colours; mean, gauss and principal are curvatures",
+            .doc = "style of the colours; mean, gauss and principal are curvatures",
             .fallback = "lit",
             .choices = styleNames()},
            {.name = "matcap",
@@ -412,20 +409,20 @@ Operator renderOperator() {
             .doc = "a PNG of a shaded ball, for --style matcap"},
            {.name = "curvature-range",
             .type = ParamType::Number,
-            .doc = "per world unit: half way along the colours, and where ridges and valleys "
-                   "begin; default: 40 over the diagonal",
+            .doc = "curvature, per world unit, half way along the colours and at which ridges and "
+                   "valleys begin; default: 40 / diagonal",
             .range = Range::Positive},
            {.name = "line",
             .type = ParamType::Number,
-            .doc = "pixels: width of the silhouettes of tone and ink",
+            .doc = "width of the silhouettes of tone and ink, pixels",
             .fallback = "2",
             .range = Range::NonNegative},
            {.name = "thickness",
             .type = ParamType::Flag,
-            .doc = "a layer more: how far the ray is within the solids"},
+            .doc = "add a layer with the length of the ray inside the solids"},
            {.name = "samples",
             .type = ParamType::Integer,
-            .doc = "of colour per pixel",
+            .doc = "colour samples per pixel",
             .fallback = "4",
             .range = Range::Positive},
            {.name = "format", .type = ParamType::Text, .doc = "exr or png; default: by extension"}},
@@ -466,18 +463,20 @@ Operator compareImagesOperator() {
                   .position = 0},
                  {.name = "second",
                   .type = ParamType::Path,
-                  .doc = "another of the same size",
+                  .doc = "another EXR of the same size",
                   .required = true,
                   .position = 1},
-                 {.name = "exact", .type = ParamType::Flag, .doc = "ask for the same bits"},
+                 {.name = "exact", .type = ParamType::Flag, .doc = "require the same bits"},
                  {.name = "tolerance",
                   .type = ParamType::Text,
-                  .doc = "LAYER=USUAL,WORST: what 999 pixels of 1000 and all may differ by; blanks "
-                         "between several"},
+                  .doc = "LAYER=USUAL,WORST: largest difference of 999 in 1000 pixels, and of all; "
+                         "blanks between several"},
                  {.name = "difference",
                   .type = ParamType::Path,
                   .doc = "write the differences to this .exr, a channel for each layer"},
-                 {.name = "format", .type = ParamType::Text, .doc = "of the differences: exr"},
+                 {.name = "format",
+                  .type = ParamType::Text,
+                  .doc = "format of the differences: exr"},
                  jsonParam()},
       .flow = Flow::PassesThrough,
       .run = compareImages,

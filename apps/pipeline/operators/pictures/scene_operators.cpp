@@ -153,43 +153,41 @@ Operator sceneOperator() {
   Operator scene = {
       .name = "scene",
       .group = "Pictures",
-      .summary =
-          "level sets and meshes to be drawn together, or what an expression makes of solids",
+      .summary = "combine level sets and meshes in one picture, or solids by a CSG expression",
       .details =
-          "With --csg the rays of 'render' cut the solids as they go: a | b is what is in either, "
-          "a & b in both, a - b in a alone. Nothing is resampled, each keeps its voxels. The names "
-          "are those of --as. Meshes stand beside, by their vertices' normals and colours if they "
-          "have "
-          "some. Surfaces of one and the same place on different grids are told apart "
-          "by rounding only: let what is taken away stick out. --soft blends the distances "
-          "themselves: "
-          "surfaces that are closer than that run into each other, --morph goes from one solid's "
-          "distances to another's; renderers are then cpu and embree. 'write scene.json' saves "
-          "it, with the parts in files beside it.",
+          "With --csg the rays of 'render' combine the solids: a | b is the union, a & b the "
+          "intersection, a - b the difference. Solids are not resampled; each keeps its voxels. "
+          "The names are those of --as. Meshes are drawn beside them, with the normals and colours "
+          "of their vertices if they have some. Coincident surfaces on different grids are "
+          "separated by rounding only, so let the subtracted solid protrude. --soft blends the "
+          "distances: surfaces closer than that merge. --morph interpolates between the distances "
+          "of two solids. Both need the renderers cpu or embree. 'write scene.json' saves the "
+          "scene, with the parts in files beside it.",
       .example =
           "levelsmith box --size 2,2,2 --voxel 0.05 --as b ! sphere --radius 1.3 --voxel "
           "0.03 --as s ! scene @b @s --csg 'b - s' ! render cut.png --size 320x240",
       .params = {{.name = "csg",
                   .type = ParamType::Text,
-                  .doc = "what is drawn, as '(a | b) - c'; default: each of them"},
+                  .doc = "expression to draw, as '(a | b) - c'; default: all parts"},
                  {.name = "soft",
                   .type = ParamType::Length,
-                  .doc = "of --csg: how far from each other surfaces begin to blend, at most the "
-                         "half width of the narrowest band",
+                  .doc = "--csg: distance at which surfaces begin to blend, at most the half width "
+                         "of the narrowest band",
                   .range = Range::NonNegative},
                  {.name = "morph",
                   .type = ParamType::Number,
-                  .doc = "of two solids: how far on the way from the first to the second, 0 to 1"},
+                  .doc = "two solids: 0 draws the first, 1 the second, values between them a blend "
+                         "of their distances"},
                  {.name = "names",
                   .type = ParamType::Text,
-                  .doc = "of the parts, blanks between them; default: those of --as"},
+                  .doc = "names of the parts, blanks between them; default: those of --as"},
                  {.name = "colours",
                   .type = ParamType::Points,
-                  .doc = "of the parts: red,green,blue from 0 to 1, blanks between them"},
+                  .doc = "colours of the parts: red,green,blue from 0 to 1, blanks between them"},
                  {.name = "opacities",
                   .type = ParamType::Text,
-                  .doc = "of the parts' surfaces: above 0, up to 1, blanks between them; less than "
-                         "1 is seen through, in R G B A, and casts a weaker shadow"}},
+                  .doc = "opacities of the surfaces: above 0, up to 1, blanks between them; below "
+                         "1 a surface is transparent in R G B A and casts a weaker shadow"}},
       .operands = {{Kind::Band, Kind::Mesh}},
       .takesMore = true,
       .readsNames = true,

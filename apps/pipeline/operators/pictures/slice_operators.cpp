@@ -54,26 +54,28 @@ Operator sliceOperator() {
       .group = "Pictures",
       .summary = "draw the distance in a plane, with contour lines",
       .details =
-          "Blue inside, brown outside, a line for each voxel of distance, or each --step, the zero "
-          "line black; grey tones where the band does not reach. Seen from where the normal "
-          "points, z upwards (y for a normal along z). The layers are R G B A, phi and P.X P.Y "
-          "P.Z.",
+          "The inside is blue, the outside brown. There is a contour line for each voxel of "
+          "distance, or for each --step; the zero line is black. Grey tones mark points outside "
+          "the band. The view is against the normal, z upwards (y for a normal along z). The "
+          "layers are R G B A, phi and P.X P.Y P.Z.",
       .example =
           "levelsmith torus --radius 2 --tube 0.8 --voxel 0.1 ! slice --plane \"0,0,0 "
           "1,0,0\" --png slice.png --size 320x240",
-      .params =
-          {{.name = "plane",
-            .type = ParamType::Points,
-            .doc = "a point of it and its normal",
-            .required = true},
-           {.name = "png", .type = ParamType::Path, .doc = "the picture"},
-           {.name = "exr", .type = ParamType::Path, .doc = "the picture with its layers"},
-           {.name = "step",
-            .type = ParamType::Length,
-            .doc = "from one contour line to the next",
-            .fallback = "1vx",
-            .range = Range::Positive},
-           {.name = "size", .type = ParamType::ImageSize, .doc = "pixels", .fallback = "1024x768"}},
+      .params = {{.name = "plane",
+                  .type = ParamType::Points,
+                  .doc = "point and normal of the plane",
+                  .required = true},
+                 {.name = "png", .type = ParamType::Path, .doc = "PNG to write"},
+                 {.name = "exr", .type = ParamType::Path, .doc = "EXR with layers to write"},
+                 {.name = "step",
+                  .type = ParamType::Length,
+                  .doc = "distance between contour lines",
+                  .fallback = "1vx",
+                  .range = Range::Positive},
+                 {.name = "size",
+                  .type = ParamType::ImageSize,
+                  .doc = "size in pixels",
+                  .fallback = "1024x768"}},
       .operands = {{Kind::Band, Kind::Surface}},
       .flow = Flow::PassesThrough,
       .run = slice,

@@ -281,8 +281,10 @@ std::vector<Param> tiled(std::vector<Param> params) {
 template <Generate generate>
 Operator generator(const char* name, const char* summary, const char* details, const char* example,
                    std::vector<Param> params) {
-  params.push_back(
-      {.name = "center", .type = ParamType::Point, .doc = "of its box", .fallback = "0,0,0"});
+  params.push_back({.name = "center",
+                    .type = ParamType::Point,
+                    .doc = "centre of its box",
+                    .fallback = "0,0,0"});
   params.push_back(voxelParam());
   params.push_back(resolutionParam());
   params.push_back(halfWidthParam());
@@ -302,50 +304,55 @@ Operator generator(const char* name, const char* summary, const char* details, c
 Operator knurlOperator() {
   return generator<knurl>(
       "knurl", "make a plate with knurled grooves",
-      "V-grooves in the top of a plate, as knurling wheels press them. The tile goes on across its "
-      "sides as it begins on the other; a column and row of diamonds is pitch / cos(angle) wide "
-      "and pitch / sin(angle) long, of straight grooves a pitch both ways.",
+      "V-grooves in the top of a plate, as knurling wheels press them. The tile repeats across its "
+      "sides. A column and row of diamonds is pitch / cos(angle) wide and pitch / sin(angle) long; "
+      "one of straight grooves is a pitch wide and long.",
       "levelsmith knurl --pitch 2 --columns 3 --rows 2 --voxel 0.1 ! measure",
-      tiled({choice("pattern", "which grooves", {"diamond", "diagonal", "straight"}),
-             size("pitch", "of neighbouring grooves, across them"),
-             size("depth", "of the grooves; 'auto': until the crests are sharp", "auto",
+      tiled({choice("pattern", "arrangement of the grooves", {"diamond", "diagonal", "straight"}),
+             size("pitch", "distance of neighbouring grooves, across them"),
+             size("depth", "depth of the grooves; 'auto': until the crests are sharp", "auto",
                   Range::Positive),
-             degrees("flanks", "between the two flanks of a groove", "90"),
-             degrees("angle", "of the grooves from y", "30"),
-             size("base", "of solid below the grooves; 'auto': as much as their depth", "auto",
+             degrees("flanks", "angle between the two flanks of a groove", "90"),
+             degrees("angle", "angle of the grooves from y", "30"),
+             size("base", "thickness below the grooves; 'auto': as much as their depth", "auto",
                   Range::NonNegative)}));
 }
 
 Operator scalesOperator() {
   return generator<scales>(
       "scales", "make a plate of overlapping scales",
-      "Rows of tongues along x, tips towards +y, every second row half a width aside. An even "
-      "number of rows goes on across the tile's sides.",
+      "Rows of tongues along x with tips towards +y. Every second row is shifted by half a width, "
+      "so an even number of rows continues across the tile's sides.",
       "levelsmith scales --length 3 --columns 2 --rows 4 --voxel 0.1 ! measure",
-      tiled({size("length", "of a scale"),
-             size("width", "of a scale; 'auto': 0.7 of its length", "auto", Range::Positive),
-             size("thickness", "of a scale, with room under its tip; 0: solid down to the plate",
-                  "0", Range::NonNegative),
-             degrees("tilt", "of a scale against the plate", "20"),
-             size("step", "from row to row; 'auto': half a length", "auto", Range::Positive),
-             size("tip", "length of the pointed part; 'auto': half a width, which is round", "auto",
-                  Range::Positive),
-             size("rounding", "radius of the edges", "0", Range::NonNegative),
-             size("base", "thickness of the plate; 'auto': 0.2 of the length", "auto",
-                  Range::NonNegative)}));
+      tiled(
+          {size("length", "length of a scale"),
+           size("width", "width of a scale; 'auto': 0.7 of its length", "auto", Range::Positive),
+           size("thickness",
+                "thickness of a scale, with a gap under its tip; 0: solid down to the plate", "0",
+                Range::NonNegative),
+           degrees("tilt", "angle of a scale against the plate", "20"),
+           size("step", "distance from row to row; 'auto': half a length", "auto", Range::Positive),
+           size("tip", "length of the pointed part; 'auto': half a width, which is round", "auto",
+                Range::Positive),
+           size("rounding", "radius of the edges", "0", Range::NonNegative),
+           size("base", "thickness of the plate; 'auto': 0.2 of the length", "auto",
+                Range::NonNegative)}));
 }
 
 Operator hexagonsOperator() {
   return generator<hexagons>(
       "hexagons", "make a plate of raised hexagons, or a honeycomb",
-      "Hexagons with flats across x in rows along x, every second row half a spacing aside. "
-      "An even number of rows goes on across the tile's sides.",
+      "Rows of hexagons along x with flats across x. Every second row is shifted by half a "
+      "spacing, so an even number of rows continues across the tile's sides.",
       "levelsmith hexagons --size 2 --kind honeycomb --columns 3 --rows 2 --voxel 0.1 ! measure",
       tiled({choice("kind", "pillars with gaps, or walls between cells", {"raised", "honeycomb"}),
-             size("size", "of a hexagon across its flats"),
-             size("gap", "between hexagons, the honeycomb's walls; 'auto': 0.2 of the size", "auto",
+             size("size", "width of a hexagon across its flats"),
+             size("gap",
+                  "gap between hexagons, or thickness of the honeycomb's walls; 'auto': 0.2 of the "
+                  "size",
+                  "auto", Range::Positive),
+             size("height", "height above the plate; 'auto': 0.4 of the size", "auto",
                   Range::Positive),
-             size("height", "above the plate; 'auto': 0.4 of the size", "auto", Range::Positive),
              size("base", "thickness of the plate, 0: none; 'auto': 0.2 of the size", "auto",
                   Range::NonNegative),
              size("rounding", "radius of the upper edges", "0", Range::NonNegative)}));
@@ -354,20 +361,22 @@ Operator hexagonsOperator() {
 Operator ringOperator() {
   return generator<ring>(
       "ring", "make a ring, or a sheet of chain mail",
-      "More than one column or row is European 4-in-1: each ring holds two of the row before and "
-      "two of the row behind, and none touch. Left to themselves, spacing and lean leave the most "
-      "room between wires.",
+      "More than one column or row is European 4-in-1 chain mail: each ring links two rings of the "
+      "row before and two of the row behind, and no rings touch. The defaults of spacing and lean "
+      "leave the largest distance between wires.",
       "levelsmith ring --radius 3 --columns 2 --rows 3 --voxel 0.15 ! measure",
       {size("radius", "from the centre to the middle of the wire"),
        size("tube", "radius of round wire; 'auto': 0.16 of the ring's", "auto", Range::Positive),
-       pair("section", "of flat wire, in place of --tube: across the ring, and along its axis"),
+       pair("section",
+            "section of flat wire, in place of --tube: across the ring, and along its axis"),
        {.name = "lean",
         .type = ParamType::Degrees,
-        .doc = "of rings about x, to the other side in every second row; default: 0 for one ring"},
-       count("columns", "of rings, along x", "1"),
-       count("rows", "of rings, along y", "1"),
-       pair("spacing", "of rings along a row, and of rows"),
-       size("clearance", "that must be left between wires", "0", Range::NonNegative)});
+        .doc = "angle of rings about x, to the other side in every second row; default: 0 for one "
+               "ring"},
+       count("columns", "number of rings along x", "1"),
+       count("rows", "number of rings along y", "1"),
+       pair("spacing", "distance of rings along a row, and of rows"),
+       size("clearance", "least distance between wires", "0", Range::NonNegative)});
 }
 
 Operator gyroidOperator() {
@@ -378,31 +387,33 @@ Operator gyroidOperator() {
       "levelsmith gyroid --cell 5 --columns 1 --rows 1 --layers 1 --voxel 0.2 ! measure",
       {choice("kind", "walls between two labyrinths, or the struts of one", {"sheet", "network"}),
        size("cell", "edge of a cubic cell"),
-       size("thickness", "of walls, or of struts at their thinnest; 'auto': 0.1 cell", "auto",
-            Range::Positive),
-       count("columns", "of cells, along x", "2"), count("rows", "of cells, along y", "2"),
-       count("layers", "of cells, along z", "1")});
+       size("thickness", "thickness of walls, or of struts at their thinnest; 'auto': 0.1 cell",
+            "auto", Range::Positive),
+       count("columns", "number of cells along x", "2"),
+       count("rows", "number of cells along y", "2"),
+       count("layers", "number of cells along z", "1")});
 }
 
 Operator heightmapOperator() {
   Operator op = generator<heightmap>(
       "heightmap", "make a plate whose top is a picture",
-      "A grey PNG (black is low, white is high, what is transparent is low) or lines of numbers "
-      "(the least is low, the largest is high). The first row lies at the largest y.",
+      "A grey PNG (black and transparent are low, white is high) or lines of numbers (the least is "
+      "low, the largest is high). The first row lies at the largest y.",
       "levelsmith heightmap --image <(printf '0 1 0\\n1 2 1\\n0 1 0\\n') --size 4,4 --height 1 "
       "--voxel 0.1 ! measure",
       {{.name = "image",
         .type = ParamType::Path,
         .doc = "a grey .png, or a text file of numbers",
         .required = true},
-       pair("size", "from the first to the last column and row", true),
-       size("height", "of white above black"),
-       size("base", "of solid below black; 'auto': half the height", "auto", Range::NonNegative),
-       choice("interpolation", "between pixels", {"cubic", "linear"}),
+       pair("size", "distance from the first to the last column and row", true),
+       size("height", "height of white above black"),
+       size("base", "thickness below black; 'auto': half the height", "auto", Range::NonNegative),
+       choice("interpolation", "interpolation between pixels", {"cubic", "linear"}),
        {.name = "invert", .type = ParamType::Flag, .doc = "black is high, white is low"},
        {.name = "sheet",
         .type = ParamType::Flag,
-        .doc = "its top alone, as an open mesh with a vertex every voxel: for 'surface-band'"}});
+        .doc =
+            "return only the top, as an open mesh with a vertex every voxel, for 'surface-band'"}});
   op.resultKind = [](const Invocation& in) { return in.flag("sheet") ? Kind::Mesh : Kind::Band; };
   op.run = [](Invocation& in) {
     return in.flag("sheet") ? heightmapSheet(in) : makeTexture<heightmap>(in);

@@ -34,7 +34,7 @@ Operator meshOperator() {
   Operator op = levelSetOperator<levelset::MeshOperator>(
       {.params = {{.name = "sheets",
                    .type = ParamType::Flag,
-                   .doc = "of a patch: its layers of particles, each by itself"}},
+                   .doc = "patches: each layer of particles by itself"}},
        .validate = validateMesh});
   op.operands = {{Kind::Band, Kind::Patch}};
   op.run = [ofBand = op.run](Invocation& in) {
