@@ -11,6 +11,12 @@ namespace levelset::flow {
 /// Solver of (1/w − dt Δ) change = dt rate / w on the grid points of a band, with no flow through
 /// its rim. Uses conjugate gradients with sums in a fixed order. The change vanishes where the
 /// weight w does.
+///
+/// Eigen's ConjugateGradient is not used: it needs contiguous vectors, while the fields here are
+/// blocks that are read with a border. It adds the products of single-precision vectors in single
+/// precision. Here they are added in double precision, in parallel and in tree order, so that any
+/// number of threads gives the same bits. Its loop also has no callback that could report progress
+/// or cancel.
 class HelmholtzSolver {
  public:
   /// Keeps a reference to both arguments.

@@ -163,36 +163,19 @@ class BlockFilter {
 
   /// Copies the values of a block and of `pad` grid points on each side of it, rows along z.
   void gatherWide(const Field& field, std::size_t i, int pad, std::vector<float>& dense) const {
-    const int side = 8 + 2 * pad, chain = (pad + 7) / 8;
+    const int side = 8 + 2 * pad;
     dense.resize(static_cast<std::size_t>(side) * static_cast<std::size_t>(side) *
                  static_cast<std::size_t>(side));
-    // Range [from, to) of the block `k` blocks away, in coordinates of the block itself.
-    const auto from = [&](int k) { return std::max(8 * k, -pad); };
-    const auto to = [&](int k) { return std::min(8 * k + 8, 8 + pad); };
-    for (int bx = -chain; bx <= chain; ++bx)
-      for (int by = -chain; by <= chain; ++by)
-        for (int bz = -chain; bz <= chain; ++bz) {
-          const Coord origin = blocks_.origin(i).offsetBy(8 * bx, 8 * by, 8 * bz);
-          const std::uint32_t n = blocks_.find(origin);
-          const float* source = n == BandBlocks::kNone ? nullptr : field[n / 512].data();
-          const float constant = source ? 0 : farValue(origin);
-          const std::ptrdiff_t count = to(bz) - from(bz);
-          for (int x = from(bx); x < to(bx); ++x)
-            for (int y = from(by); y < to(by); ++y) {
-              float* target = dense.data() +
-                              (static_cast<std::ptrdiff_t>(x + pad) * side + y + pad) * side +
-                              from(bz) + pad;
-              if (source)
-                std::copy_n(source + ((x & 7) << 6) + ((y & 7) << 3) + (from(bz) & 7), count,
-                            target);
-              else
-                std::fill_n(target, count, constant);
-            }
-        }
+    copyPadded(pad, pad, side, dense.data(), [&](const Coord& step) -> BlockValues {
+      const Coord origin = blocks_.origin(i).offsetBy(8 * step.x(), 8 * step.y(), 8 * step.z());
+      const std::uint32_t n = blocks_.find(origin);
+      if (n != BandBlocks::kNone) return {field[n / 512].data(), 0};
+      return {nullptr, farValue(origin)};
+    });
   }
 
   /// Convolves along an axis: copies the chain of blocks around each block, then filters its 64
-  /// lines.
+  /// lines. Not a padded leaf: the copy extends along one axis only, and its lines are transposed.
   void alongAxis(const Field& in, int axis, const std::vector<float>& weights, Field& out) const {
     const int reach = static_cast<int>(weights.size()) - 1, chain = (reach + 7) / 8;
     const std::size_t stride = axis == 0 ? 64 : axis == 1 ? 8 : 1;

@@ -1,14 +1,13 @@
 #include "levelset/distance/interpolant.h"
 
-#include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace levelset::eikonal {
 namespace {
 
 using openvdb::Coord;
 using openvdb::Vec3d;
-using LeafNode = openvdb::FloatTree::LeafNodeType;
 using Float4 = float __attribute__((vector_size(16)));
 
 Float4 load4(const float* values) {
@@ -18,6 +17,8 @@ Float4 load4(const float* values) {
 }
 
 /// Catmull-Rom weights of four samples at -1, 0, 1, 2, with first and second derivatives.
+/// Separate from AxisWeights of interpolate_vdb.h: these are single-precision numbers for vector
+/// instructions, and two of the polynomials round differently there.
 struct Weights {
   float w[4], d[4], dd[4];
   explicit Weights(double t) {
@@ -49,35 +50,16 @@ double dot(const float (&w)[4], const Float4& v) {
 
 void DenseBlock::load(const openvdb::FloatGrid::ConstAccessor& accessor, const Coord& origin) {
   origin_ = origin;
-  // Per axis: the padding before the leaf, the leaf, the padding after it.
-  constexpr int kFrom[3] = {-kPad, 0, 8}, kTo[3] = {0, 8, 8 + kPad};
-  for (int bx = 0; bx < 3; ++bx)
-    for (int by = 0; by < 3; ++by)
-      for (int bz = 0; bz < 3; ++bz) {
-        const Coord neighbour = origin.offsetBy(8 * (bx - 1), 8 * (by - 1), 8 * (bz - 1));
-        const LeafNode* leaf = accessor.probeConstLeaf(neighbour);
-        const float* source = leaf ? leaf->buffer().data() : nullptr;
-        const float tile = leaf ? 0.0f : accessor.getValue(neighbour);
-        const auto count = static_cast<std::size_t>(kTo[bz] - kFrom[bz]);
-        for (int x = kFrom[bx]; x < kTo[bx]; ++x)
-          for (int y = kFrom[by]; y < kTo[by]; ++y) {
-            float* target = &values_[static_cast<std::size_t>(
-                ((x + kPad) * kSide + y + kPad) * kSide + kFrom[bz] + kPad)];
-            if (source)
-              std::memcpy(target, source + ((x & 7) << 6) + ((y & 7) << 3) + (kFrom[bz] & 7),
-                          count * sizeof(float));
-            else
-              std::fill_n(target, count, tile);
-          }
-      }
+  values_.fill([&](const Coord& step) {
+    return blockValues(accessor, origin.offsetBy(8 * step.x(), 8 * step.y(), 8 * step.z()));
+  });
 }
 
 Jet DenseBlock::jet(const Vec3d& p) const {
   const int cx = static_cast<int>(std::floor(p.x())), cy = static_cast<int>(std::floor(p.y())),
             cz = static_cast<int>(std::floor(p.z()));
   const Weights wx(p.x() - cx), wy(p.y() - cy), wz(p.z() - cz);
-  const float* corner = &values_[static_cast<std::size_t>(
-      ((cx + kPad - 1) * kSide + cy + kPad - 1) * kSide + cz + kPad - 1)];
+  const float* corner = values_.at(cx - 1, cy - 1, cz - 1);
   Float4 v[4], dx[4], dxx[4];  // rows along z, summed over x
   for (int j = 0; j < 4; ++j) {
     Float4 rows[4];

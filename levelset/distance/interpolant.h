@@ -3,8 +3,9 @@
 // Internal header of levelset: public headers must not include it.
 
 #include <array>
-#include <cstring>
+#include <vector>
 
+#include "levelset/grids/padded_leaf_vdb.h"
 #include "levelset/vdb.h"
 
 namespace levelset::eikonal {
@@ -41,8 +42,9 @@ struct CompactJet {
 /// point of the leaf.
 class DenseBlock {
  public:
-  static constexpr int kPad = 4;
-  static constexpr int kSide = 16;
+  using Values = PaddedLeaf<4>;
+  static constexpr int kPad = Values::kPad;
+  static constexpr int kSide = Values::kSide;
   /// Bounds of the positions whose 4³ stencil lies inside the copy.
   static constexpr double kDomainMin = 1 - kPad;
   static constexpr double kDomainMax = kSide - kPad - 2;
@@ -52,7 +54,7 @@ class DenseBlock {
 
   [[nodiscard]] const openvdb::Coord& origin() const { return origin_; }
   [[nodiscard]] float at(int x, int y, int z) const {
-    return values_[static_cast<std::size_t>(((x + kPad) * kSide + y + kPad) * kSide + z + kPad)];
+    return values_.values[Values::slot(x, y, z)];
   }
   [[nodiscard]] static bool contains(const openvdb::Vec3d& p) {
     for (int i = 0; i < 3; ++i)
@@ -65,7 +67,7 @@ class DenseBlock {
 
  private:
   openvdb::Coord origin_;
-  alignas(64) std::array<float, kSide * kSide * kSide> values_;
+  Values values_;
 };
 
 /// Cache of a few dense blocks of one tree, for queries at neighbouring positions. One per thread.

@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "levelset/geometry/point_tree.h"
+#include "levelset/grids/padded_leaf_vdb.h"
 
 namespace levelset::eikonal {
 namespace {
@@ -51,11 +52,11 @@ using Int4 = std::int32_t __attribute__((vector_size(16)));
 class BlockWorker {
  public:
   BlockWorker(Block& block, const SurfacePoints& points) : block_(block), points_(points) {
-    held_.fill(-1);
+    held_.values.fill(-1);
     for (int x = block.low.x(); x <= block.high.x(); ++x)
       for (int y = block.low.y(); y <= block.high.y(); ++y)
         for (int z = block.low.z(); z <= block.high.z(); ++z)
-          held_[slot(x, y, z)] = block.squared[offsetOf(x, y, z)];
+          held_.values[Held::slot(x, y, z)] = block.squared[offsetOf(x, y, z)];
   }
 
   void relax() {
@@ -78,10 +79,8 @@ class BlockWorker {
  private:
   // Squared distances of the block and of two grid points around it. The padding holds -1 and
   // accepts nothing, so rows of four need no bounds check.
-  static constexpr int kPad = 2, kSide = 12, kRow = 16;
-  static std::size_t slot(int x, int y, int z) {
-    return static_cast<std::size_t>(((x + kPad) * kSide + y + kPad) * kRow + z + kPad);
-  }
+  // Only the layout is that of a padded leaf: neighbours offer points and are not copied.
+  using Held = PaddedLeaf<2, 16>;
 
   [[nodiscard]] openvdb::Vec3f local(std::uint32_t point) const {
     return openvdb::Vec3f(points_.positions[point] - block_.origin.asVec3d());
@@ -89,7 +88,7 @@ class BlockWorker {
 
   void accept(int x, int y, int z, std::uint32_t point, float squared) {
     const openvdb::Index n = offsetOf(x, y, z);
-    held_[slot(x, y, z)] = squared;
+    held_.values[Held::slot(x, y, z)] = squared;
     block_.squared[n] = squared;
     block_.nearest[n] = point;
     block_.own.setOff(n);
@@ -112,7 +111,7 @@ class BlockWorker {
         const float dy = at[1] - static_cast<float>(y);
         const Float4 squared = squareZ + (dx * dx + dy * dy);
         Float4 held;
-        std::memcpy(&held, &held_[slot(x, y, c.z() - 1)], sizeof(held));
+        std::memcpy(&held, held_.at(x, y, c.z() - 1), sizeof(held));
         const Int4 better = squared < held;  // a tie keeps the first point, so the order is fixed
         std::uint64_t any[2];
         std::memcpy(any, &better, sizeof(any));
@@ -141,7 +140,7 @@ class BlockWorker {
 
   Block& block_;
   const SurfacePoints& points_;
-  std::array<float, kSide * kSide * kRow> held_;
+  Held held_;
   std::vector<openvdb::Index> queue_;
   NearestPoints::Mask changed_;
 };

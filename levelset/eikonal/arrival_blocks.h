@@ -20,6 +20,8 @@ namespace levelset::eikonal {
 /// Arrival times at the 8³ grid points of a leaf block.
 /// Times are divided by the time that the front takes for a voxel at a typical speed. At that speed
 /// they are distances in voxels. They count from the front's start and are positive on both sides.
+/// Not a padded copy: accepted times must be visible in neighbouring blocks at once, so a block has
+/// links to its neighbours.
 struct ArrivalBlock {
   using Mask = openvdb::util::NodeMask<3>;
   static constexpr openvdb::Index kSize = 512;

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <optional>
 
+#include "levelset/grids/padded_leaf_vdb.h"
+
 namespace levelset::eikonal {
 namespace {
 
@@ -152,10 +154,10 @@ class FirstOrderWorker {
  public:
   FirstOrderWorker(ArrivalBlock& block, BlockState& state, const SweepLimit& limit)
       : block_(block), state_(state), limit_(limit) {
-    times_.fill(kFar);
+    times_.values.fill(kFar);
     for (int x = 0; x < 8; ++x)
       for (int y = 0; y < 8; ++y)
-        std::copy_n(&block.time[offset(x, y, 0)], 8, &times_[slot(x, y, 0)]);
+        std::copy_n(&block.time[offset(x, y, 0)], 8, &times_.values[slot(x, y, 0)]);
     for (int d = 0; d < 6; ++d) loadFace(d);
   }
 
@@ -171,17 +173,17 @@ class FirstOrderWorker {
     state_.earliest = kFar;
     for (auto it = changed_.beginOn(); it; ++it) {
       const Index n = it.pos();
-      const float time = times_[slot(n)];
+      const float time = times_.values[slot(n)];
       block_.time[n] = time;
       if (time <= limit_.at(block_.slownessAt(n))) markDirty(state_, n, time, 1);
     }
   }
 
  private:
+  using Times = PaddedLeaf<1>;
+
   static Index offset(int x, int y, int z) { return static_cast<Index>((x << 6) + (y << 3) + z); }
-  static std::size_t slot(int x, int y, int z) {
-    return static_cast<std::size_t>(((x + 1) * 10 + y + 1) * 10 + z + 1);
-  }
+  static std::size_t slot(int x, int y, int z) { return Times::slot(x, y, z); }
   static std::size_t slot(Index n) {
     return slot(static_cast<int>(n >> 6), static_cast<int>(n >> 3 & 7u), static_cast<int>(n & 7u));
   }
@@ -197,7 +199,7 @@ class FirstOrderWorker {
       for (int j = 0; j < 8; ++j) {
         here[u] = there[u] = i;
         here[v] = there[v] = j;
-        times_[slot(here.x(), here.y(), here.z())] =
+        times_.values[slot(here.x(), here.y(), here.z())] =
             other->time[offset(there.x(), there.y(), there.z())];
       }
   }
@@ -247,7 +249,7 @@ class FirstOrderWorker {
   void markReaders(int x, int y, int z) {
     const std::size_t here = slot(x, y, z);
     const auto mark = [&](int i, int j, int k) {
-      if (times_[slot(i, j, k)] > times_[here])
+      if (times_.values[slot(i, j, k)] > times_.values[here])
         pending_[static_cast<std::size_t>(i)] |= std::uint64_t{1} << (8 * j + k);
     };
     if (x > 0) mark(x - 1, y, z);
@@ -262,12 +264,13 @@ class FirstOrderWorker {
   /// @return true when the time improved
   bool relax(int x, int y, int z) {
     const std::size_t s = slot(x, y, z);
-    float a = std::min(times_[s - 100], times_[s + 100]),
-          b = std::min(times_[s - 10], times_[s + 10]), c = std::min(times_[s - 1], times_[s + 1]);
+    float a = std::min(times_.values[s - Times::kStepX], times_.values[s + Times::kStepX]),
+          b = std::min(times_.values[s - Times::kStepY], times_.values[s + Times::kStepY]),
+          c = std::min(times_.values[s - 1], times_.values[s + 1]);
     if (a > b) std::swap(a, b);
     if (b > c) std::swap(b, c);
     if (a > b) std::swap(a, b);
-    const float here = times_[s];
+    const float here = times_.values[s];
     if (!(a < here)) return false;
     const Index n = offset(x, y, z);
     if (block_.known.isOn(n)) return false;
@@ -286,7 +289,7 @@ class FirstOrderWorker {
     }
     const float time = a + u;
     if (!(time < here - kImprovement * slowness)) return false;
-    times_[s] = time;
+    times_.values[s] = time;
     changed_.setOn(n);
     return true;
   }
@@ -294,7 +297,7 @@ class FirstOrderWorker {
   ArrivalBlock& block_;
   BlockState& state_;
   SweepLimit limit_;
-  std::array<float, 1000> times_;
+  Times times_;  ///< only the faces of the border are filled, from six neighbours
   std::array<std::uint64_t, 8> pending_{};  ///< grid points to solve: slices of x, bits 8 y + z
   Mask changed_;
 };

@@ -8,6 +8,7 @@
 
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
+#include "levelset/grids/interpolate_vdb.h"
 #include "levelset/tree_hash_vdb.h"
 
 namespace levelset {
@@ -37,7 +38,8 @@ struct Cell {
 };
 
 /// The N³ grid points from a lowest one upwards: a view of their leaf, or a copy gathered from
-/// several.
+/// several. Separate from SampleBlock, which always copies: most cells lie in one leaf, and the
+/// values may be vectors.
 template <typename Value, int N>
 class PointBlock {
  public:
@@ -51,17 +53,7 @@ class PointBlock {
       return;
     }
     first_ = gathered_, strideX_ = N * N, strideY_ = N;
-    const auto next = [&](int axis, int i) { return i < 8 - place[axis] ? 8 - place[axis] : N; };
-    for (Coord from(0), to; from[0] < N; from[0] = to[0]) {
-      to[0] = std::min(N, next(0, from[0]));
-      for (from[1] = 0; from[1] < N; from[1] = to[1]) {
-        to[1] = std::min(N, next(1, from[1]));
-        for (from[2] = 0; from[2] < N; from[2] = to[2]) {
-          to[2] = std::min(N, next(2, from[2]));
-          gather(accessor, low, from, to);
-        }
-      }
-    }
+    gatherSamples<N>(accessor, low, gathered_);
   }
   PointBlock(const PointBlock&) = delete;
   PointBlock& operator=(const PointBlock&) = delete;
@@ -82,20 +74,6 @@ class PointBlock {
   }
 
  private:
-  /// Copies the values of one leaf or tile.
-  template <typename Accessor>
-  void gather(const Accessor& accessor, const Coord& low, const Coord& from, const Coord& to) {
-    const Coord first = low + from;
-    const auto* leaf = accessor.probeConstLeaf(first);
-    const Value* values = leaf ? leaf->buffer().data() + leaf->coordToOffset(first) : nullptr;
-    const Value tile = leaf ? Value(0) : accessor.getValue(first);
-    for (int x = from[0]; x < to[0]; ++x)
-      for (int y = from[1]; y < to[1]; ++y)
-        for (int z = from[2]; z < to[2]; ++z)
-          gathered_[(x * N + y) * N + z] =
-              values ? values[64 * (x - from[0]) + 8 * (y - from[1]) + (z - from[2])] : tile;
-  }
-
   const Value* first_;
   int strideX_, strideY_;
   Value gathered_[N * N * N];

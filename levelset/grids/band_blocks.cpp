@@ -1,6 +1,3 @@
-#include <algorithm>
-#include <cstring>
-
 #include "levelset/grids/band_blocks_vdb.h"
 
 namespace levelset::flow {
@@ -54,25 +51,12 @@ void BandBlocks::write(const Field& field, double unit, FloatTree& tree) const {
 
 void BandBlocks::gather(const Field& field, std::size_t i, float outside,
                         PaddedBlock& block) const {
-  // Ranges for each axis: the border before the leaf, the leaf, the border after it.
-  constexpr int kFrom[3] = {-PaddedBlock::kPad, 0, 8}, kTo[3] = {0, 8, 8 + PaddedBlock::kPad};
-  for (int bx = 0; bx < 3; ++bx)
-    for (int by = 0; by < 3; ++by)
-      for (int bz = 0; bz < 3; ++bz) {
-        const std::int32_t n = neighbours_[i][static_cast<std::size_t>(bx * 9 + by * 3 + bz)];
-        const float* source = n >= 0 ? field[static_cast<std::size_t>(n)].data() : nullptr;
-        const float constant = n == kInside ? -outside : outside;
-        const auto count = static_cast<std::size_t>(kTo[bz] - kFrom[bz]);
-        for (int x = kFrom[bx]; x < kTo[bx]; ++x)
-          for (int y = kFrom[by]; y < kTo[by]; ++y) {
-            float* target = const_cast<float*>(block.at(x, y, kFrom[bz]));
-            if (source)
-              std::memcpy(target, source + ((x & 7) << 6) + ((y & 7) << 3) + (kFrom[bz] & 7),
-                          count * sizeof(float));
-            else
-              std::fill_n(target, count, constant);
-          }
-      }
+  block.fill([&](const Coord& step) -> BlockValues {
+    const int neighbour = (step.x() + 1) * 9 + (step.y() + 1) * 3 + step.z() + 1;
+    const std::int32_t n = neighbours_[i][static_cast<std::size_t>(neighbour)];
+    if (n >= 0) return {field[static_cast<std::size_t>(n)].data(), 0};
+    return {nullptr, n == kInside ? -outside : outside};
+  });
 }
 
 }  // namespace levelset::flow

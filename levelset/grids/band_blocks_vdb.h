@@ -7,9 +7,11 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <unordered_map>
 #include <vector>
 
+#include "levelset/grids/padded_leaf_vdb.h"
 #include "levelset/vdb.h"
 
 namespace levelset::flow {
@@ -19,16 +21,9 @@ using Values = std::array<float, 512>;
 /// One block for each leaf, in tree order.
 using Field = std::vector<Values>;
 
-/// A leaf block with a border of two grid points on each side; rows run along z.
-struct PaddedBlock {
-  static constexpr int kPad = 2, kSide = 12, kRow = 16;
-  static constexpr int kStepX = kSide * kRow, kStepY = kRow;
-  alignas(64) std::array<float, kSide * kSide * kRow> values;
-
-  /// Address of the value at the grid point (x, y, z) of the leaf.
-  [[nodiscard]] const float* at(int x, int y, int z) const {
-    return values.data() + ((x + kPad) * kSide + y + kPad) * kRow + z + kPad;
-  }
+/// A leaf block with a border of two grid points on each side. The rows of 16 keep vector reads
+/// inside the array.
+struct PaddedBlock : PaddedLeaf<2, 16> {
   /// Sum of the values at the six neighbours of a grid point, given by its offset in the leaf.
   [[nodiscard]] float neighbourSum(openvdb::Index offset) const {
     const auto n = static_cast<int>(offset);

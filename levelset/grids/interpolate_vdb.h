@@ -1,7 +1,7 @@
 #pragma once
 
-// Interpolation between the samples of a tree, for the .cpp files of this library. The sampler and
-// the resampling kernels share it.
+// Interpolation between the samples of a tree, for the .cpp files of this library. The sampler, the
+// resampling kernels and the fields from grids share it.
 
 #include <algorithm>
 #include <array>
@@ -12,9 +12,46 @@
 
 namespace levelset {
 
+/// Copies the N³ values from grid point `first` on to a dense cube, x slowest. Reads leaf by leaf:
+/// along each axis the values lie in one or two leaves.
+template <int N, typename Accessor, typename Value>
+void gatherSamples(const Accessor& accessor, const openvdb::Coord& first, Value* out) {
+  static_assert(N <= 8);
+  const auto endOfLeaf = [&](int axis, int from) {
+    return std::min(N, from + 8 - ((first[axis] + from) & 7));
+  };
+  const auto copyPart = [&](const openvdb::Coord& from, const openvdb::Coord& to) {
+    const openvdb::Coord start = first + from;
+    const auto* leaf = accessor.probeConstLeaf(start);
+    const Value* samples = leaf ? leaf->buffer().data() + leaf->coordToOffset(start) : nullptr;
+    const Value tile = leaf ? Value(0) : accessor.getValue(start);
+    const int count = to[2] - from[2];
+    for (int x = from[0]; x < to[0]; ++x)
+      for (int y = from[1]; y < to[1]; ++y) {
+        Value* row = out + (x * N + y) * N + from[2];
+        if (samples)
+          std::copy_n(samples + (x - from[0]) * 64 + (y - from[1]) * 8, count, row);
+        else
+          std::fill_n(row, count, tile);
+      }
+  };
+  openvdb::Coord from(0), to;
+  for (from[0] = 0; from[0] < N; from[0] = to[0]) {
+    to[0] = endOfLeaf(0, from[0]);
+    for (from[1] = 0; from[1] < N; from[1] = to[1]) {
+      to[1] = endOfLeaf(1, from[1]);
+      for (from[2] = 0; from[2] < N; from[2] = to[2]) {
+        to[2] = endOfLeaf(2, from[2]);
+        copyPart(from, to);
+      }
+    }
+  }
+}
+
 /// Weights of N = 2 (linear) or N = 4 (Catmull-Rom) samples, and their derivatives by t. The
 /// position lies at fraction t in [0, 1) after the preceding sample. The weights sum to 1, the
-/// derivatives to 0.
+/// derivatives to 0. DenseBlock has weights of its own: it needs second derivatives, in single
+/// precision.
 template <int N>
 struct AxisWeights {
   std::array<double, N> weight, slope;
@@ -44,7 +81,7 @@ struct SampleBlock {
 
   template <typename Accessor>
   SampleBlock(const Accessor& accessor, const openvdb::Vec3d& index) : SampleBlock(index) {
-    fetch(accessor);
+    gatherSamples<N>(accessor, origin, values.data());
   }
 
   /// Without values: only for allActive().
@@ -128,43 +165,6 @@ struct SampleBlock {
     double sum = 0;
     for (int z = 0; z < N; ++z) sum += weights[z] * static_cast<double>(samples[z]);
     return sum;
-  }
-
-  /// Copies the samples leaf by leaf: along each axis they lie in one or two leaves.
-  template <typename Accessor>
-  void fetch(const Accessor& accessor) {
-    openvdb::Coord from(0), to;
-    for (from[0] = 0; from[0] < N; from[0] = to[0]) {
-      to[0] = endOfLeaf(0, from[0]);
-      for (from[1] = 0; from[1] < N; from[1] = to[1]) {
-        to[1] = endOfLeaf(1, from[1]);
-        for (from[2] = 0; from[2] < N; from[2] = to[2]) {
-          to[2] = endOfLeaf(2, from[2]);
-          fetchPart(accessor, from, to);
-        }
-      }
-    }
-  }
-
-  [[nodiscard]] int endOfLeaf(int axis, int from) const {
-    return std::min(N, from + 8 - ((origin[axis] + from) & 7));
-  }
-
-  template <typename Accessor>
-  void fetchPart(const Accessor& accessor, const openvdb::Coord& from, const openvdb::Coord& to) {
-    const openvdb::Coord first = origin + from;
-    const auto* leaf = accessor.probeConstLeaf(first);
-    const float* samples = leaf ? leaf->buffer().data() + leaf->coordToOffset(first) : nullptr;
-    const float tile = leaf ? 0.0f : accessor.getValue(first);
-    const int count = to[2] - from[2];
-    for (int x = from[0]; x < to[0]; ++x)
-      for (int y = from[1]; y < to[1]; ++y) {
-        float* out = values.data() + (x * N + y) * N + from[2];
-        if (samples)
-          std::copy_n(samples + (x - from[0]) * 64 + (y - from[1]) * 8, count, out);
-        else
-          std::fill_n(out, count, tile);
-      }
   }
 };
 

@@ -13,7 +13,8 @@
 namespace levelset {
 
 /// Block of 8³ grid points, with the cells and edges whose lowest corner is one of them. Bit y·8 +
-/// z of word x stands for a grid point, as in OpenVDB's masks.
+/// z of word x stands for a grid point, as in OpenVDB's masks. Not a padded copy: all blocks exist
+/// at once, so each refers to its leaf and its neighbours.
 struct SurfaceBlock {
   openvdb::Coord origin;
   const float* values = nullptr;  ///< values of the leaf; null: `fill` everywhere

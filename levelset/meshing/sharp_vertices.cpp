@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "levelset/grids/padded_leaf_vdb.h"
+
 namespace levelset {
 namespace {
 
@@ -82,13 +84,12 @@ struct VertexPlacer::Plane {
 class VertexPlacer::BlockField {
  public:
   BlockField(const FloatGrid& grid, const Coord& origin) {
-    auto values = grid.getConstAccessor();
+    const auto accessor = grid.getConstAccessor();
     const double inverse = 1 / grid.voxelSize()[0];
-    std::size_t i = 0;
-    for (int x = -1; x <= kEnd; ++x)
-      for (int y = -1; y <= kEnd; ++y)
-        for (int z = -1; z <= kEnd; ++z)
-          values_[i++] = static_cast<double>(values.getValue(origin.offsetBy(x, y, z))) * inverse;
+    std::array<float, kDim * kDim * kDim> values;
+    copyPaddedLeaf(accessor, origin, 1, 2, values.data());
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values_[i] = static_cast<double>(values[i]) * inverse;
   }
 
   [[nodiscard]] double value(int x, int y, int z) const {

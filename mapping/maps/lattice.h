@@ -4,21 +4,12 @@
 #include <Imath/ImathVec.h>
 
 #include <array>
-#include <cstdint>
-#include <vector>
+#include <cstddef>
 
+#include "mapping/maps/lattice_nodes.h"
 #include "mapping/patches/patch.h"
 
 namespace mapping {
-
-/// Extent of a lattice beyond the unit cube of a patch, so that the band of a texture ends inside
-/// the lattice.
-struct LatticeBorder {
-  /// Depth of the texture below w = 0; if negative, its lift above w = 1; in w.
-  double embedDepth = 0;
-  /// Further margin on all six sides, world units; 0: no margin and no outer cells.
-  double rim = 0;
-};
 
 /// One of the six tetrahedra of a cell [Brodersen07 §9]. The cell is two prisms, one over each half
 /// of its bottom, each split by its lowest and highest corner. Every tetrahedron is a path from the
@@ -42,11 +33,11 @@ class Lattice {
   /// particles.
   /// @param border  extent beyond the layers and sides, continued linearly; a rim is at least one
   ///         cell wide
-  Lattice(const Patch& patch, const LatticeBorder& border);
+  Lattice(const Patch& patch, const LatticeBorder& border) : nodes_(latticeNodes(patch, border)) {}
 
-  [[nodiscard]] const std::array<int, 3>& cells() const { return cells_; }
+  [[nodiscard]] const std::array<int, 3>& cells() const { return nodes_.cells; }
   [[nodiscard]] std::size_t cellCount() const;
-  [[nodiscard]] std::size_t nodeCount() const { return positions_.size(); }
+  [[nodiscard]] std::size_t nodeCount() const { return nodes_.positions.size(); }
 
   /// World positions of a tetrahedron's corners, along its path.
   [[nodiscard]] Corners corners(const Tetrahedron& t) const;
@@ -67,20 +58,7 @@ class Lattice {
   [[nodiscard]] bool locate(const Imath::V3d& uvw, Tetrahedron& t) const;
 
  private:
-  [[nodiscard]] std::size_t nodeIndex(const std::array<int, 3>& node) const {
-    const auto at = [](int i) { return static_cast<std::size_t>(i); };
-    return (at(node[2]) * at(cells_[1] + 1) + at(node[1])) * at(cells_[0] + 1) + at(node[0]);
-  }
-  [[nodiscard]] Imath::V3d textureOf(const std::array<int, 3>& node) const {
-    return {coordinates_[0][static_cast<std::size_t>(node[0])],
-            coordinates_[1][static_cast<std::size_t>(node[1])],
-            coordinates_[2][static_cast<std::size_t>(node[2])]};
-  }
-
-  std::array<int, 3> cells_{};  ///< along u, v, w
-  /// Texture coordinates of the nodes, along u, v, w.
-  std::array<std::vector<double>, 3> coordinates_;
-  std::vector<Imath::V3d> positions_;
+  LatticeNodes nodes_;
 };
 
 /// Barycentric coordinates of x; not finite if the tetrahedron has no volume.

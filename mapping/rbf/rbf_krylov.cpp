@@ -105,6 +105,12 @@ class Hessenberg {
 };
 
 /// Flexible GMRES for u, v and w in lockstep.
+///
+/// Eigen has GMRES only in unsupported/, without a flexible variant. It preconditions from the
+/// left, so its tolerance bounds the preconditioned residual. It assumes a linear preconditioner,
+/// but RbfPreconditioner solves its leaves in single precision and is linear only to that
+/// precision. It also takes one right-hand side at a time, while here one fast sum serves u, v and
+/// w.
 class KrylovSolver {
  public:
   KrylovSolver(const RbfCloud& cloud, const RbfMapOptions& options, const MatrixXd& q,

@@ -5,10 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
-#include <iterator>
 #include <map>
-#include <memory>
 #include <span>
 
 #include "levelset/csg/blend.h"
@@ -19,9 +16,8 @@
 #include "levelset/grids/sample.h"
 #include "levelset/placement/resample.h"
 #include "levelset/solids/components.h"
-#include "mapping/layers/layer_resampling.h"
-#include "mapping/maps/prism_map.h"
 #include "mapping/textures/shared_sides.h"
+#include "mapping/textures/texture_maps.h"
 #include "mapping/textures/texture_warp.h"
 
 namespace mapping {
@@ -33,80 +29,63 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-constexpr const char* kTexture = "texture";
 // Accuracy of the sampled stretch; within it, a flat patch keeps the base's own grid.
 constexpr double kStretchError = 0.01;
-// Result voxels that the texture's band must extend on each side, so that the high-order
-// interpolant at the zero set reads only distances.
-constexpr double kBandNeeded = 3;
 // Ratio of result to texture voxel size above which the texture is resampled first. Then the cost
 // of its band follows the result and not the cube of the ratio.
 constexpr double kCoarser = 6;
 // A map whose least stretch is below this share of the median counts as compressing.
 constexpr double kSqueezed = 0.2;
-// Share of the map's tolerance that the solver may use, and the finest useful tolerance.
-constexpr double kSolveShare = 0.1, kFinestSolve = 1e-10;
-
-/// Calls `work` and adds its CPU time to `seconds`.
-/// @return the result of `work`
-template <typename Work>
-auto timed(double& seconds, const Work& work) {
-  const std::clock_t start = std::clock();
-  auto result = work();
-  seconds += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-  return result;
-}
-
 void checkArguments(const NarrowBand& base, const NarrowBand& texture,
                     std::span<const Patch> patches, const TextureOptions& options) {
   const auto requirePositive = [](double value, const char* name) {
     if (!(value > 0) || !std::isfinite(value)) {
       throw UsageError(
-          fmt::format("{}: the {} is {}; give a positive number", kTexture, name, value));
+          fmt::format("{}: the {} is {}; give a positive number", kTextureAction, name, value));
     }
   };
   if (options.voxelSize) requirePositive(*options.voxelSize, "voxel size");
   if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth)) {
-    throw UsageError(fmt::format("{}: the half width is {}; give at least 1 voxel", kTexture,
+    throw UsageError(fmt::format("{}: the half width is {}; give at least 1 voxel", kTextureAction,
                                  options.halfWidth));
   }
   if (!(options.mapTolerance >= 0) || !std::isfinite(options.mapTolerance)) {
     throw UsageError(fmt::format("{}: the map's tolerance is {}; give texture voxels, at least 0",
-                                 kTexture, options.mapTolerance));
+                                 kTextureAction, options.mapTolerance));
   }
   if (options.embedDepth && !std::isfinite(*options.embedDepth)) {
     throw UsageError(fmt::format("{}: the embedding depth is {}; give a length with --embed",
-                                 kTexture, *options.embedDepth));
+                                 kTextureAction, *options.embedDepth));
   }
   const double diagonal = base.zeroSetBounds().size().length();
   if (options.embedDepth && std::abs(*options.embedDepth) > diagonal) {
     throw InvalidInput(
         fmt::format("{}: the embedding depth of {:.6g} exceeds the diagonal of the base, {:.6g}; "
                     "give a smaller --embed",
-                    kTexture, *options.embedDepth, diagonal));
+                    kTextureAction, *options.embedDepth, diagonal));
   }
   if (!(options.blend >= 0) || !std::isfinite(options.blend)) {
     throw UsageError(fmt::format("{}: the blend radius is {}; give a length of at least 0",
-                                 kTexture, options.blend));
+                                 kTextureAction, options.blend));
   }
   if (options.merge != TextureMerge::Alone && base.isOpenSurface()) {
     throw levelset::InvalidInput(
         fmt::format("{}: the base is an open surface, which has no inside; give --alone for the "
                     "texture alone, or map a mesh with --map mesh",
-                    kTexture));
+                    kTextureAction));
   }
-  requireSolid(texture, kTexture);
+  requireSolid(texture, kTextureAction);
   if (base.isEmpty() || texture.isEmpty()) {
     throw InvalidInput(
-        fmt::format("{}: the {} has no surface; give a solid with at least one voxel", kTexture,
-                    base.isEmpty() ? "base" : "texture"));
+        fmt::format("{}: the {} has no surface; give a solid with at least one voxel",
+                    kTextureAction, base.isEmpty() ? "base" : "texture"));
   }
   if (patches.empty())
-    throw UsageError(fmt::format("{}: there is no patch; build one with `patch`", kTexture));
+    throw UsageError(fmt::format("{}: there is no patch; build one with `patch`", kTextureAction));
   for (const Patch& patch : patches) {
     if (patch.layers.size() < 2 || !(patch.height > 0)) {
-      throw InvalidInput(
-          fmt::format("{}: the patch has no layers of particles; build it with `patch`", kTexture));
+      throw InvalidInput(fmt::format(
+          "{}: the patch has no layers of particles; build it with `patch`", kTextureAction));
     }
     requirePatchOn(base, patch);
   }
@@ -141,10 +120,10 @@ NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least,
       throw InvalidInput(
           fmt::format("{}: on the patch the texture is smaller than a voxel of {:.6g}; use "
                       "smaller voxels",
-                      kTexture, voxelSize));
+                      kTextureAction, voxelSize));
     }
   }
-  const double needed = kBandNeeded * voxelSize / (least * fitted.voxelSize());
+  const double needed = kTextureBandNeeded * voxelSize / (least * fitted.voxelSize());
   if (needed <= fitted.halfWidth() * (1 + 1e-6)) return fitted;
   return levelset::redistance(fitted,
                               {.halfWidth = std::ceil(needed), .maxMemory = options.maxMemory});
@@ -192,164 +171,6 @@ class TextureParts {
   std::vector<SharedSides> ofPatch_;
 };
 
-/// A map of the chosen kind, with its measurements.
-struct ChosenMap {
-  std::unique_ptr<PatchMap> map;
-  Distortion distortion = {};
-  FoldCertificate certificate = {};
-  std::size_t particles = 0;
-  V3d residual{0};  ///< at the particles, in u, v and w
-  /// Sample points where the patch passes through itself without folding.
-  std::size_t overlaps = 0;
-  MapSample overlap = {};  ///< one of these points
-  RbfSolveReport solve = {};
-  bool isExtrapolated = false;  ///< true: no particles support the map below the surface
-
-  /// Stretch that determines the voxel size: the least stretch where the texture is visible.
-  /// Isolated folds do not count, nor do parts embedded in the base that a crease compresses.
-  [[nodiscard]] double leastStretch(TextureMerge merge) const {
-    if (distortion.folded > 0) return distortion.stretch.percent1;
-    return merge == TextureMerge::Union ? distortion.leastAbove : distortion.stretch.least;
-  }
-};
-
-/// Solver tolerance in u, v and w for a map tolerance in texture voxels.
-double solveTolerance(const NarrowBand& texture, const V3d& boxSize, double mapTolerance) {
-  const double longest = std::max({boxSize.x, boxSize.y, boxSize.z});
-  return std::max(kFinestSolve, kSolveShare * mapTolerance * texture.voxelSize() / longest);
-}
-
-std::unique_ptr<PrismMap> buildPrismMap(const NarrowBand& base, const Patch& patch,
-                                        double embedDepth, const TextureOptions& options) {
-  levelset::requireMemory(PrismMap::estimateBytes(patch), options.maxMemory, kTexture);
-  levelset::report(options.progress, 0, kTexture);
-  // Margin for the texture's band, which extends beyond the texture.
-  const double rim = (kBandNeeded + 1) * std::max(base.voxelSize(), options.voxelSize.value_or(0));
-  return std::make_unique<PrismMap>(patch, LatticeBorder{.embedDepth = embedDepth, .rim = rim});
-}
-
-/// Builds and certifies the map of one patch.
-/// @param embedDepth  as a share of the patch's height
-ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double embedDepth,
-                  const V3d& textureSize, double tolerance, const TextureOptions& options,
-                  TextureCost& cost) {
-  ChosenMap result;
-  if (options.map == TextureMap::Prism) {
-    auto prisms =
-        timed(cost.setup, [&] { return buildPrismMap(base, patch, embedDepth, options); });
-    result.particles = prisms->lattice().nodeCount();
-    result.certificate = timed(cost.certificate, [&] {
-      const std::vector<MapSample> samples = prisms->samples();
-      result.distortion = surveyDistortion(samples, textureSize, patch.mirrored);
-      result.overlaps = prisms->countOverlaps(samples, result.overlap);
-      return certifyPrisms(*prisms, patch.mirrored);
-    });
-    result.map = std::move(prisms);
-    return result;
-  }
-  RbfMapOptions rbf = options.rbf;
-  rbf.maxMemory = std::min(rbf.maxMemory, options.maxMemory);
-  rbf.solveTolerance = tolerance;
-  rbf.progress = levelset::subProgress(options.progress, 0, 0.2);
-  CertifiedRbf certified = certifiedRbf(patch, embedDepth, rbf, cost);
-  result.particles = certified.map->size();
-  result.residual = certified.map->axisResidual();
-  result.solve = certified.map->solveReport();
-  result.distortion = surveyDistortion(certified.samples, textureSize, patch.mirrored);
-  result.certificate = std::move(certified.certificate);
-  result.isExtrapolated = certified.isExtrapolated;
-  result.map = std::move(certified.map);
-  return result;
-}
-
-/// Combines solver reports: figures of the worst, sums of the counts, and each note once.
-void addSolve(const RbfSolveReport& one, TextureReport& report) {
-  RbfSolveReport& all = report.solve;
-  all.merged += one.merged;
-  all.averaged += one.averaged;
-  all.directions = std::min(all.directions, one.directions);
-  all.condition = std::max(all.condition, one.condition);
-  all.isRegularized = all.isRegularized || one.isRegularized;
-  all.isIterative = all.isIterative || one.isIterative;
-  all.iterations = std::max(all.iterations, one.iterations);
-  all.solveResidual = std::max(all.solveResidual, one.solveResidual);
-  for (const std::string& note : one.notes) {
-    if (std::find(all.notes.begin(), all.notes.end(), note) != all.notes.end()) continue;
-    all.notes.push_back(note);
-    report.notes.push_back(note);
-  }
-}
-
-std::string overlapMessage(const ChosenMap& map) {
-  const V3d &p = map.overlap.position, &uvw = map.overlap.uvw;
-  return fmt::format(
-      "{}: the patch passes through itself at {} of {} sample points, one at ({:.6g}, {:.6g}, "
-      "{:.6g}), u, v, w = {:.3g}, {:.3g}, {:.3g}, where the texture would have two values; keep "
-      "its spline clear of itself, use a lower height, or map its halves one after the other",
-      kTexture, map.overlaps, map.distortion.samples, p.x, p.y, p.z, uvw.x, uvw.y, uvw.z);
-}
-
-/// Builds the maps of all patches; a skipped patch gets no map. Other folds are errors, or notes if
-/// folds are allowed.
-std::vector<ChosenMap> makeMaps(const NarrowBand& base, std::span<const Patch> patches,
-                                double embedDepth, const V3d& textureSize, double tolerance,
-                                const TextureOptions& options, TextureReport& report) {
-  std::vector<ChosenMap> maps;
-  std::vector<Distortion> distortions;
-  std::vector<FoldCertificate> certificates;
-  std::size_t extrapolated = 0;
-  for (const Patch& patch : patches) {
-    const auto done = static_cast<double>(maps.size());
-    const auto share = [&](double n) { return 0.2 * n / static_cast<double>(patches.size()); };
-    TextureOptions part = options;
-    part.progress = levelset::subProgress(options.progress, share(done), share(done + 1));
-    ChosenMap chosen =
-        makeMap(base, patch, embedDepth / patch.height, textureSize, tolerance, part, report.cost);
-    const bool folds =
-        chosen.distortion.folded > 0 || chosen.certificate.verdict() == FoldVerdict::Folds;
-    if (!folds && chosen.overlaps > 0) {
-      const std::string message = overlapMessage(chosen);
-      if (!options.skipFolds && !options.allowFolds) throw InvalidInput(message);
-      if (!options.skipFolds) report.notes.push_back(message);
-    }
-    if (options.skipFolds && (folds || chosen.overlaps > 0)) {
-      ++report.skipped;
-      maps.emplace_back();
-      continue;
-    }
-    std::vector<std::string> notes =
-        checkFolds(chosen.distortion, chosen.certificate, options.allowFolds);
-    std::move(notes.begin(), notes.end(), std::back_inserter(report.notes));
-    extrapolated += chosen.isExtrapolated;
-    report.particles += chosen.particles;
-    addSolve(chosen.solve, report);
-    report.mapResidual = std::max(report.mapResidual, (chosen.residual * textureSize).length());
-    distortions.push_back(chosen.distortion);
-    certificates.push_back(std::move(chosen.certificate));
-    maps.push_back(std::move(chosen));
-  }
-  report.patches = distortions.size();
-  if (distortions.empty()) {
-    throw InvalidInput(
-        fmt::format("{}: all of {} patches fold; use a lower height or smaller patches", kTexture,
-                    patches.size()));
-  }
-  if (extrapolated > 0) {
-    report.notes.push_back(
-        fmt::format("below {} of {} patches the surface has a crease or bends too much for the "
-                    "embedding depth, so the map is extrapolated there without particles; give a "
-                    "smaller --embed, or --map shell",
-                    extrapolated, patches.size()));
-  }
-  if (report.skipped > 0) {
-    report.notes.push_back(
-        fmt::format("{} of {} patches fold and were left out", report.skipped, patches.size()));
-  }
-  report.distortion = worstOf(distortions);
-  report.certificate = worstOf(certificates);
-  return maps;
-}
-
 /// Checks the memory estimate of the result, from the voxel count of the texture, before anything
 /// is allocated.
 void requireResult(const NarrowBand& texture, const TextureReport& report,
@@ -373,14 +194,115 @@ void requireResult(const NarrowBand& texture, const TextureReport& report,
   if (bytes > static_cast<double>(options.maxMemory) && !options.voxelSize &&
       worst.stretch.least < kSqueezed * worst.stretch.median) {
     const V3d& p = worst.foldPoint;
-    throw levelset::ResourceLimit(
-        fmt::format("{}: the map compresses the texture to {:.2g} of its size near ({:.6g}, "
-                    "{:.6g}, {:.6g}); voxels fine enough for that, {:.3g}, need about {:.3g} GB; "
-                    "give --voxel, a lower height or a flatter position",
-                    kTexture, worst.stretch.least, p.x, p.y, p.z, report.voxelSize, bytes / 1e9));
+    throw levelset::ResourceLimit(fmt::format(
+        "{}: the map compresses the texture to {:.2g} of its size near ({:.6g}, "
+        "{:.6g}, {:.6g}); voxels fine enough for that, {:.3g}, need about {:.3g} GB; "
+        "give --voxel, a lower height or a flatter position",
+        kTextureAction, worst.stretch.least, p.x, p.y, p.z, report.voxelSize, bytes / 1e9));
   }
-  levelset::requireMemory(bytes, options.maxMemory, kTexture);
+  levelset::requireMemory(bytes, options.maxMemory, kTextureAction);
 }
+
+/// Range of the maps' stretch, for the choice of voxels and of the texture's band.
+struct StretchRange {
+  double least = HUGE_VAL, most = 0;
+  /// Least stretch that the texture's band must bear. Parts compressed more than this are under a
+  /// voxel, unless the voxel size follows them.
+  double ofBand = HUGE_VAL;
+};
+
+StretchRange stretchRange(std::span<const ChosenMap> maps, TextureMerge merge) {
+  StretchRange range;
+  for (const ChosenMap& chosen : maps) {
+    if (!chosen.map) continue;
+    range.least = std::min(range.least, chosen.leastStretch(merge));
+    range.most = std::max(range.most, chosen.distortion.stretch.most);
+    range.ofBand = std::min(range.ofBand, std::max(chosen.leastStretch(merge),
+                                                   kSqueezed * chosen.distortion.stretch.median));
+  }
+  return range;
+}
+
+/// Warps the texture into patches, one after the other.
+class TextureWarper {
+ public:
+  /// Keeps references to the arguments.
+  TextureWarper(const NarrowBand& base, std::span<const Patch> patches, const TextureParts& parts,
+                const Box3d& box, double embedDepth, const TextureOptions& options,
+                TextureReport& report)
+      : base_(base),
+        patches_(patches),
+        parts_(parts),
+        box_(box),
+        embedDepth_(embedDepth),
+        options_(options),
+        report_(report) {}
+
+  /// Warps the texture into patch `n`, then restores distances: the warped field has the right zero
+  /// set and signs, but its values are only approximate distances [Brodersen07 §8.3].
+  NarrowBand warpInto(std::size_t n, const ChosenMap& chosen) {
+    Warp warp = timed(report_.cost.mapping, [&] {
+      return warpTexture(parts_.of(n), {box_, embedDepth_ / patches_[n].height}, patches_[n],
+                         *chosen.map,
+                         {.indexToWorld = chooseGrid(base_, report_.voxelSize, options_.merge),
+                          .scale = chosen.distortion.meanStretch,
+                          .mapTolerance = options_.mapTolerance,
+                          .maxMemory = options_.maxMemory,
+                          .progress = progress(n, 0, 0.8)});
+    });
+    count(warp);
+    return timed(report_.cost.distance, [&] {
+      return levelset::redistance(std::move(warp.field), {.halfWidth = options_.halfWidth,
+                                                          .maxMemory = options_.maxMemory,
+                                                          .progress = progress(n, 0.8, 1)});
+    });
+  }
+
+  /// Adds the figures of all patches to the report.
+  void finish() {
+    report_.operationsPerPoint =
+        static_cast<double>(operations_) / (512 * static_cast<double>(report_.blocksEvaluated));
+    if (ghosts_ > 0) {
+      report_.notes.push_back(fmt::format(
+          "{} grid points far from the patch, which the map sends back into the texture, "
+          "were left out",
+          ghosts_));
+    }
+    if (crumbs_ > 0) {
+      report_.notes.push_back(fmt::format(
+          "{} isolated inside grid points, less than a tenth of a voxel deep, were left out; "
+          "they occur where a flat side coincides with a plane of the grid",
+          crumbs_));
+    }
+  }
+
+ private:
+  void count(const Warp& warp) {
+    report_.blocksTested += warp.blocksTested;
+    report_.blocksEvaluated += warp.blocksEvaluated;
+    operations_ += warp.operations;
+    ghosts_ += warp.ghosts;
+    crumbs_ += warp.crumbs;
+    report_.mapErrorPoints += warp.checked;
+    report_.mapError = std::max(report_.mapError, warp.mapError);
+  }
+
+  [[nodiscard]] levelset::Progress progress(std::size_t n, double from, double to) const {
+    const auto share = [&](double part) {
+      return 0.2 + 0.6 * (static_cast<double>(n) + part) / static_cast<double>(patches_.size());
+    };
+    return levelset::subProgress(options_.progress, share(from), share(to));
+  }
+
+  const NarrowBand& base_;
+  std::span<const Patch> patches_;
+  const TextureParts& parts_;
+  const Box3d& box_;
+  double embedDepth_;
+  const TextureOptions& options_;
+  TextureReport& report_;
+  std::size_t operations_ = 0, ghosts_ = 0, crumbs_ = 0;
+};
 
 /// Unites all mapped pieces.
 NarrowBand join(std::vector<NarrowBand> pieces, const TextureOptions& options) {
@@ -431,55 +353,9 @@ void requirePatchOn(const NarrowBand& base, const Patch& patch) {
       throw InvalidInput(fmt::format(
           "{}: the patch does not lie on the base: at ({:.6g}, {:.6g}, {:.6g}) the surface is "
           "at least {:.3g} voxels away; build the patch on this base",
-          kTexture, p.x, p.y, p.z, distance));
+          kTextureAction, p.x, p.y, p.z, distance));
     }
   }
-}
-
-RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options, double embedDepth) {
-  std::vector<V3d> points, targets;
-  std::vector<char> near;
-  for (const ParticleLayer& layer : patch.layers) {
-    const int rim = layer.hasRim() ? 1 : 0;
-    const auto columns = static_cast<int>(layer.columns), rows = static_cast<int>(layer.rows);
-    for (int j = -rim; j < rows + rim; ++j)
-      for (int i = -rim; i < columns + rim; ++i) {
-        points.push_back(layer.beyond(i, j));
-        targets.emplace_back(static_cast<double>(i) / (columns - 1),
-                             static_cast<double>(j) / (rows - 1), layer.w);
-        near.push_back(layer.w == 0);
-      }
-  }
-  for (const EmbeddedParticle& particle : embeddedParticles(patch, embedDepth)) {
-    points.push_back(particle.position);
-    targets.push_back(particle.uvw);
-    near.push_back(false);
-  }
-  return {points, targets, near, options};
-}
-
-CertifiedRbf certifiedRbf(const Patch& patch, double embedDepth, const RbfMapOptions& options,
-                          TextureCost& cost) {
-  const auto certify = [&](double held) {
-    CertifiedRbf result;
-    result.map = timed(
-        cost.setup, [&] { return std::make_unique<RbfMap>(patchToTexture(patch, options, held)); });
-    result.certificate = timed(cost.certificate, [&] {
-      result.samples = sampleRbf(*result.map, patch, embedDepth);
-      return certifyRbf(*result.map, patch, embedDepth);
-    });
-    return result;
-  };
-  const auto folds = [&](const CertifiedRbf& one) {
-    return one.certificate.verdict() == FoldVerdict::Folds ||
-           surveyDistortion(one.samples, V3d(1), patch.mirrored).folded > 0;
-  };
-  CertifiedRbf result = certify(embedDepth);
-  if (embedDepth == 0 || !folds(result)) return result;
-  CertifiedRbf free = certify(0);
-  if (folds(free)) return result;
-  free.isExtrapolated = true;
-  return free;
 }
 
 TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture, const Patch& patch,
@@ -493,82 +369,33 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
   TextureResult result;
   TextureReport& report = result.report;
   const Box3d box = chooseTextureBox(texture.zeroSetBounds(), options.textureBox);
-
-  // === The maps and their distortion
   const double embedDepth = options.embedDepth ? *options.embedDepth : base.voxelSize();
-  const double tolerance = solveTolerance(texture, box.size(), options.mapTolerance);
+
+  // === Maps and voxel size
   const std::vector<ChosenMap> maps =
-      makeMaps(base, patches, embedDepth, box.size(), tolerance, options, report);
-  double minStretch = HUGE_VAL, maxStretch = 0, bandStretch = HUGE_VAL;
-  for (const ChosenMap& chosen : maps) {
-    if (!chosen.map) continue;
-    minStretch = std::min(minStretch, chosen.leastStretch(options.merge));
-    maxStretch = std::max(maxStretch, chosen.distortion.stretch.most);
-    // Parts compressed more than this are under a voxel, unless the voxel size follows them.
-    bandStretch = std::min(bandStretch, std::max(chosen.leastStretch(options.merge),
-                                                 kSqueezed * chosen.distortion.stretch.median));
-  }
-  report.voxelSize = chooseVoxelSize(base, texture, minStretch, options);
+      makeMaps(base, texture, patches, {box, embedDepth}, options, report);
+  const StretchRange stretch = stretchRange(maps, options.merge);
+  report.voxelSize = chooseVoxelSize(base, texture, stretch.least, options);
   requireResult(texture, report, maps, options);
 
-  // === Warp the texture, then restore distances: the warped field has the right zero set and
-  // signs, but its values are only approximate distances [Brodersen07 §8.3]
+  // === Warped pieces
   const bool isCut = options.map == TextureMap::Prism &&
                      isBeyond(texture.zeroSetBounds(), box, texture.voxelSize());
   const TextureParts parts(
       texture, box, patches, report.voxelSize, isCut, [&](const NarrowBand& part) {
-        return fitTexture(part, report.voxelSize, bandStretch, maxStretch, options);
+        return fitTexture(part, report.voxelSize, stretch.ofBand, stretch.most, options);
       });
+  TextureWarper warper(base, patches, parts, box, embedDepth, options, report);
   std::vector<NarrowBand> pieces;
-  std::size_t operations = 0, ghosts = 0, crumbs = 0;
-  for (std::size_t n = 0; n < patches.size(); ++n) {
-    if (!maps[n].map) continue;
-    const auto progress = [&](double from, double to) {
-      const auto share = [&](double part) {
-        return 0.2 + 0.6 * (static_cast<double>(n) + part) / static_cast<double>(patches.size());
-      };
-      return levelset::subProgress(options.progress, share(from), share(to));
-    };
-    Warp warp = timed(report.cost.mapping, [&] {
-      return warpTexture(parts.of(n), {box, embedDepth / patches[n].height}, patches[n],
-                         *maps[n].map,
-                         {.indexToWorld = chooseGrid(base, report.voxelSize, options.merge),
-                          .scale = maps[n].distortion.meanStretch,
-                          .mapTolerance = options.mapTolerance,
-                          .maxMemory = options.maxMemory,
-                          .progress = progress(0, 0.8)});
-    });
-    report.blocksTested += warp.blocksTested;
-    report.blocksEvaluated += warp.blocksEvaluated;
-    operations += warp.operations;
-    ghosts += warp.ghosts;
-    crumbs += warp.crumbs;
-    report.mapErrorPoints += warp.checked;
-    report.mapError = std::max(report.mapError, warp.mapError);
-    pieces.push_back(timed(report.cost.distance, [&] {
-      return levelset::redistance(std::move(warp.field), {.halfWidth = options.halfWidth,
-                                                          .maxMemory = options.maxMemory,
-                                                          .progress = progress(0.8, 1)});
-    }));
-  }
-  report.operationsPerPoint =
-      static_cast<double>(operations) / (512 * static_cast<double>(report.blocksEvaluated));
-  if (ghosts > 0) {
-    report.notes.push_back(
-        fmt::format("{} grid points far from the patch, which the map sends back into the texture, "
-                    "were left out",
-                    ghosts));
-  }
-  if (crumbs > 0) {
-    report.notes.push_back(fmt::format(
-        "{} isolated inside grid points, less than a tenth of a voxel deep, were left out; "
-        "they occur where a flat side coincides with a plane of the grid",
-        crumbs));
-  }
+  for (std::size_t n = 0; n < patches.size(); ++n)
+    if (maps[n].map) pieces.push_back(warper.warpInto(n, maps[n]));
+  warper.finish();
+
+  // === Result
   result.band = timed(report.cost.merging, [&] {
     return merge(base, join(std::move(pieces), options), options, report);
   });
-  levelset::report(options.progress, 1, kTexture);
+  levelset::report(options.progress, 1, kTextureAction);
   return result;
 }
 

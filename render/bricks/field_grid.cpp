@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "levelset/error.h"
+#include "levelset/grids/padded_leaf_vdb.h"
 #include "levelset/vdb.h"
 
 namespace render {
@@ -16,7 +17,6 @@ namespace {
 using Imath::M44d;
 using Imath::V3d;
 using openvdb::Coord;
-using Leaf = openvdb::FloatTree::LeafNodeType;
 
 constexpr double kWidestField = 1 << 14;  // voxels; gives 2^24 pages in the table
 constexpr int kPageCells = 64;
@@ -35,20 +35,9 @@ std::vector<Coord> blockOrigins(const openvdb::FloatTree& tree) {
 
 /// Reads the values of the block's points, from up to eight leaves.
 void readBlock(const openvdb::FloatTree& tree, const Coord& origin, float* to) {
-  constexpr int kPoints = FieldGrid::kPoints;
+  static_assert(FieldGrid::kPoints == 8 + 1);
   openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> accessor(tree);
-  for (int n = 0; n < 8; ++n) {
-    const int from[3] = {8 * (n >> 2), 8 * (n >> 1 & 1), 8 * (n & 1)};
-    const Coord at = origin.offsetBy(from[0], from[1], from[2]);
-    const Leaf* leaf = accessor.probeConstLeaf(at);
-    const float* values = leaf ? leaf->buffer().data() : nullptr;
-    const float tile = leaf ? 0 : accessor.getValue(at);
-    for (int x = from[0]; x < (from[0] ? kPoints : 8); ++x)
-      for (int y = from[1]; y < (from[1] ? kPoints : 8); ++y)
-        for (int z = from[2]; z < (from[2] ? kPoints : 8); ++z)
-          to[(x * kPoints + y) * kPoints + z] =
-              values ? values[(x & 7) << 6 | (y & 7) << 3 | (z & 7)] : tile;
-  }
+  levelset::copyPaddedLeaf(accessor, origin, 0, 1, to);
 }
 
 /// Weights of six points around a cell, starting two points before its lowest corner, for a

@@ -10,6 +10,8 @@
 #include <numbers>
 #include <utility>
 
+#include "levelset/grids/padded_leaf_vdb.h"
+
 namespace render {
 namespace {
 
@@ -37,22 +39,10 @@ std::vector<Coord> blocksOf(const openvdb::FloatTree& tree) {
 /// true when they differ in sign.
 template <typename Accessor>
 bool fill(const Accessor& accessor, Brick& brick) {
-  constexpr int kEdge = BrickPool::kEdge;
+  static_assert(BrickPool::kEdge == kBlock + 1);
+  levelset::copyPaddedLeaf(accessor, brick.origin, 0, 1, brick.value.data());
   bool anyInside = false, anyOutside = false;
-  for (int i = 0; i < 8; ++i) {
-    const int fromX = i & 4 ? kBlock : 0, fromY = i & 2 ? kBlock : 0, fromZ = i & 1 ? kBlock : 0;
-    const Coord at = brick.origin.offsetBy(fromX, fromY, fromZ);
-    const Leaf* leaf = accessor.probeConstLeaf(at);
-    const float* values = leaf ? leaf->buffer().data() : nullptr;
-    const float tile = leaf ? 0.0f : accessor.getValue(at);
-    for (int x = fromX; x < (fromX ? kEdge : kBlock); ++x)
-      for (int y = fromY; y < (fromY ? kEdge : kBlock); ++y)
-        for (int z = fromZ; z < (fromZ ? kEdge : kBlock); ++z) {
-          const float v = values ? values[(x - fromX) << 6 | (y - fromY) << 3 | (z - fromZ)] : tile;
-          brick.value[static_cast<std::size_t>((x * kEdge + y) * kEdge + z)] = v;
-          (v < 0 ? anyInside : anyOutside) = true;
-        }
-  }
+  for (const float v : brick.value) (v < 0 ? anyInside : anyOutside) = true;
   return anyInside && anyOutside;
 }
 
@@ -86,25 +76,7 @@ struct SplineBlock {
 
   template <typename Accessor>
   SplineBlock(const Accessor& accessor, const Coord& origin) {
-    constexpr int kFirst[4] = {
-        0, 1, kBlock + 1, kAround};  // first index in the previous block, this one and the next one
-    for (int n = 0; n < 27; ++n) {
-      const int b[3] = {n / 9, n / 3 % 3, n % 3};
-      const Coord at =
-          origin.offsetBy((b[0] - 1) * kBlock, (b[1] - 1) * kBlock, (b[2] - 1) * kBlock);
-      const Leaf* leaf = accessor.probeConstLeaf(at);
-      const float tile = leaf ? 0.0f : accessor.getValue(at);
-      const int z0 = kFirst[b[2]], z1 = kFirst[b[2] + 1];
-      for (int x = kFirst[b[0]]; x < kFirst[b[0] + 1]; ++x)
-        for (int y = kFirst[b[1]]; y < kFirst[b[1] + 1]; ++y) {
-          if (!leaf) {
-            std::fill(c[x][y] + z0, c[x][y] + z1, tile);
-            continue;
-          }
-          const float* row = leaf->buffer().data() + (((x - 1) & 7) << 6 | ((y - 1) & 7) << 3);
-          std::copy_n(row + ((z0 - 1) & 7), z1 - z0, c[x][y] + z0);
-        }
-    }
+    levelset::copyPaddedLeaf(accessor, origin, 1, 2, &c[0][0][0]);
   }
 
   using SignRows = std::array<std::array<unsigned, kAround>, kAround>;

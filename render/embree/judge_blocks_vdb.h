@@ -30,7 +30,8 @@ struct IndexRay {
 };
 
 /// The 8³ cells from `origin` on, with the values in OpenVDB's tree. Cell (i, j, k) spans the grid
-/// points i … i+1, j … j+1, k … k+1.
+/// points i … i+1, j … j+1, k … k+1. Shares no code with the kernel's bricks, so that the judge is
+/// an independent check of them.
 struct SurfaceBlock {
   openvdb::Coord origin;
   std::array<const float*, 8>

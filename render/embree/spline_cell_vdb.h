@@ -11,7 +11,9 @@
 
 namespace render {
 
-/// Spline coefficients that the cells from (0, 0, 0) to (size − 1)³ of a block read.
+/// Spline coefficients that the cells from (0, 0, 0) to (size − 1)³ of a block read. Reads every
+/// value from the tree and not from a padded copy, so that the judge shares no code with the
+/// kernel.
 template <int size>
 struct SplineCoefficients {
   double c[size + 3][size + 3][size + 3];

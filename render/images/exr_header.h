@@ -4,6 +4,10 @@
 #include <filesystem>
 
 // Private to render. Needed because OpenEXR allocates memory for any size that a file claims.
+// Header::setMaxImageSize and setMaxTileSize of OpenEXR 3.1 do not replace these checks: they bound
+// width and height one by one for the complete process, which may use OpenEXR for other files too.
+// They check neither the number of pixels and the memory of a chunk nor the sizes of attributes and
+// tables, and OpenEXR has already read the header when it applies them.
 
 namespace render {
 

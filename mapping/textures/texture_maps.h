@@ -1,0 +1,68 @@
+#pragma once
+
+// Private to geometric textures: the maps of the patches and their measurements.
+
+#include <ctime>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "mapping/maps/patch_map.h"
+#include "mapping/textures/geometric_texture.h"
+
+namespace mapping {
+
+inline constexpr const char* kTextureAction = "texture";
+/// Result voxels that the texture's band must extend on each side, so that the high-order
+/// interpolant at the zero set reads only distances.
+inline constexpr double kTextureBandNeeded = 3;
+
+/// Calls `work` and adds its CPU time to `seconds`.
+/// @return the result of `work`
+template <typename Work>
+auto timed(double& seconds, const Work& work) {
+  const std::clock_t start = std::clock();
+  auto result = work();
+  seconds += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  return result;
+}
+
+/// A map of the chosen kind, with its measurements.
+struct ChosenMap {
+  std::unique_ptr<PatchMap> map;
+  Distortion distortion = {};
+  FoldCertificate certificate = {};
+  std::size_t particles = 0;
+  Imath::V3d residual{0};  ///< at the particles, in u, v and w
+  /// Sample points where the patch passes through itself without folding.
+  std::size_t overlaps = 0;
+  MapSample overlap = {};  ///< one of these points
+  RbfSolveReport solve = {};
+  bool isExtrapolated = false;  ///< true: no particles support the map below the surface
+
+  /// Stretch that determines the voxel size: the least stretch where the texture is visible.
+  /// Isolated folds do not count, nor do parts embedded in the base that a crease compresses.
+  [[nodiscard]] double leastStretch(TextureMerge merge) const {
+    if (distortion.folded > 0) return distortion.stretch.percent1;
+    return merge == TextureMerge::Union ? distortion.leastAbove : distortion.stretch.least;
+  }
+};
+
+/// Mapped box of a texture, and the depth of the texture below the surface, world units.
+struct TextureExtent {
+  Imath::Box3d box;
+  double embedDepth = 0;
+};
+
+/// Builds and certifies the maps of all patches; a skipped patch gets no map. Other folds are
+/// errors, or notes if folds are allowed. Adds the measurements to the report.
+/// @throws InvalidInput for folds that are not allowed, and if all patches were skipped
+/// @throws NumericalError if the iterative solver of an RBF map stagnates
+/// @throws ResourceLimit if the memory estimate exceeds the limit
+[[nodiscard]] std::vector<ChosenMap> makeMaps(const levelset::NarrowBand& base,
+                                              const levelset::NarrowBand& texture,
+                                              std::span<const Patch> patches,
+                                              const TextureExtent& extent,
+                                              const TextureOptions& options, TextureReport& report);
+
+}  // namespace mapping
