@@ -216,8 +216,8 @@ TEST(Ring, KeepsItsClearanceBetweenRings) {
   EXPECT_EQ(m.components, 12u);
   EXPECT_EQ(m.euler, 0);
   EXPECT_NEAR(m.volume, 12 * 2 * M_PI * M_PI * 0.15 * 0.15, 2e-3 * m.volume);
-  // Half of the distance between two neighbours lies in the band. Between them the value is at least
-  // half of the clearance everywhere.
+  // Half of the distance between two neighbours lies in the band. Between them the value is at
+  // least half of the clearance everywhere.
   const TileBox box = ringBox(mail, V3d(0));
   EXPECT_NEAR(m.bounds.max.x, box.whole.max.x, 0.01);
   EXPECT_NEAR(m.bounds.max.z, box.whole.max.z, 0.01);
