@@ -3,6 +3,7 @@
 import ast
 import inspect
 import pydoc
+import warnings
 from pathlib import Path
 
 import pytest
@@ -31,7 +32,7 @@ def test_help_of_offset(ls):
         "mask_max=1, mask_invert=False)" in text
     )
     assert "Move the surface along its normal; positive grows the solid." in text
-    assert "half_width: of the result, in voxels; default: as before (number)" in text
+    assert "half_width: half width of the result, in voxels; default: as before (number)" in text
     assert "mask_min" in text and "--mask" not in text.split("On the command line")[0]
 
 
@@ -66,7 +67,7 @@ def test_the_stub_matches_the_registry(ls):
         names += [hinted.vararg.arg] if hinted.vararg else []
         assert sorted(names) == sorted(inspect.signature(getattr(ls, name)).parameters), name
     solid = {n.name: n for n in classes["Solid"].body if isinstance(n, ast.FunctionDef)}
-    assert ast.unparse(solid["march"].returns) == "Union[Solid, Field]"
+    assert ast.unparse(solid["fast_marching"].returns) == "Union[Solid, Field]"
     assert ast.unparse(functions["transform"].returns) == "Union[Solid, Mesh]"
     assert ast.unparse(solid["transform"].returns) == "Solid"
     assert all(n.args.posonlyargs + n.args.args for n in solid.values())
@@ -88,3 +89,21 @@ def test_exported_names_are_documented(ls):
 def test_pages_are_plain(ls, name):
     text = pydoc.plain(pydoc.render_doc(getattr(ls, name)))
     assert max(map(len, text.split("On the command line")[0].split("\n")[3:])) < 110
+
+
+def test_former_names_keep_working(ls):
+    for former, name in {
+        "march": "fast_marching",
+        "sweep": "fast_sweeping",
+        "widen": "rebuild_band",
+    }.items():
+        assert getattr(ls, former) is getattr(ls, name)
+        assert getattr(ls.Solid, former) is getattr(ls.Solid, name)
+        assert former not in ls.__all__
+    ball = ls.sphere(radius=1, voxel=0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ball.widen(half_width=4)
+        ball.patch(at=(0, 0, 1), size=(1, 1), height=0.5, levels=3)
+    with pytest.raises(ls.UsageError, match="given twice"):
+        ball.patch(at=(0, 0, 1), size=(1, 1), height=0.5, levels=3, layers=3)

@@ -96,7 +96,7 @@ const std::map<std::string, std::function<Options(Random&)>> kCalls = {
        return random() % 2 ? Options{}
                            : Options{{"half-width", std::to_string(between(random, 2, 9))}};
      }},
-    {"widen",
+    {"rebuild-band",
      [](Random& random) {
        return Options{{"half-width", std::to_string(between(random, 2, 14))}};
      }},
