@@ -62,42 +62,50 @@ class GraphRun {
     Load,      // the cache has its value, which a node that runs or the caller takes
     UpToDate   // its results exist and no node that runs takes its value
   };
+  /// Failure of a node on a region of interest. The node may succeed on complete values.
+  struct RegionFailure {};
   using ContinueCheck = std::function<bool()>;
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
+  // Order of the run and report: graph_run.cpp.
   std::vector<std::size_t> decideStates();
+  void runNodes();
+  void runInOrder(const std::vector<char>& isDone, std::size_t end);
+  StepReport& begin(std::size_t i);
+  void collectSteps();
+  Thumbnail thumbnailFor(std::size_t i, const Value& value);
+  void queueOutput(std::size_t i, const std::string& output);
+  void reportInOrder();
+  [[nodiscard]] bool isGiven(std::size_t i) const { return graph_.given.contains(i); }
+  [[nodiscard]] bool isLimited() const { return settings_.maxMemory != levelset::kNoMemoryLimit; }
+
+  // Results of earlier runs: graph_run_cache.cpp.
   void useCache(const std::vector<char>& needed);
   [[nodiscard]] bool isUpToDate(const std::string& key) const;
+  void loadFromCache(std::size_t i);
+  bool tryLoad(std::size_t i);
+  void storeInCache(std::size_t i, const Invocation& invocation, const Value& value);
 
+  // Sizes and regions of interest before the run: graph_run_plan.cpp.
   void planNodes();
   std::optional<Plan> planFromMesh(std::size_t i);
   [[nodiscard]] bool isRestricted(std::size_t i) const;
   void requestFullValues(std::size_t i);
+  [[nodiscard]] bool fitsInMemory(std::size_t i, const std::vector<std::size_t>& running) const;
+  [[nodiscard]] std::optional<double> workingBytes(std::size_t i) const;
 
-  void runNodes();
-  void runInOrder(const std::vector<char>& isDone, std::size_t end);
+  // Concurrent branches: graph_run_tasks.cpp.
   [[nodiscard]] bool hasBranches() const;
   [[nodiscard]] std::vector<Task> tasks() const;
   ScheduleResult scheduleTasks();
   bool runTask(std::size_t i, const ContinueCheck& shouldContinue);
-  [[nodiscard]] bool fitsInMemory(std::size_t i, const std::vector<std::size_t>& running) const;
-  [[nodiscard]] std::optional<double> workingBytes(std::size_t i) const;
 
-  [[nodiscard]] bool isGiven(std::size_t i) const { return graph_.given.contains(i); }
-  Thumbnail thumbnailFor(std::size_t i, const Value& value);
-  [[nodiscard]] bool isLimited() const { return settings_.maxMemory != levelset::kNoMemoryLimit; }
-  StepReport& begin(std::size_t i);
-  void collectSteps();
-  void queueOutput(std::size_t i, const std::string& output);
-  void reportInOrder();
-  void loadFromCache(std::size_t i);
-  bool tryLoad(std::size_t i);
+  // One node: graph_run_node.cpp.
   void compute(std::size_t i);
   void runChecked(std::size_t i, const ContinueCheck& shouldContinue, const ArenaCpu* arena);
   void runNode(std::size_t i, StepReport& step, StepClock& clock,
                const ContinueCheck& shouldContinue);
   [[nodiscard]] Invocation invocationOf(std::size_t i, const ContinueCheck& shouldContinue);
-  void storeInCache(std::size_t i, const Invocation& invocation, const Value& value);
 
   const Graph& graph_;
   const RunSettings& settings_;
