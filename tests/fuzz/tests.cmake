@@ -1,5 +1,5 @@
-# Ten seconds for each reader, and ten minutes for each under `slow`. The program is built by a test
-# before them, as the consumer is: by another compiler, from modules of this build.
+# Each reader runs for ten seconds, and under `slow` for ten minutes. A test before them builds the program,
+# like the consumer: with another compiler, from modules of this build.
 set(fuzz_readers
   ply obj stl off gzip vdb nvdb png exr heights patch scene cache graph script chain formula)
 set(fuzz_program ${PROJECT_SOURCE_DIR}/build/fuzz/tests/fuzz/levelsmith_fuzz)
