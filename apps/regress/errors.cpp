@@ -44,8 +44,8 @@ struct Sides {
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-/// Active voxels, and those inactive ones of a leaf that the band should reach; what has no leaf is
-/// counted by missingShare().
+/// Errors of the active voxels of a leaf, and of inactive voxels that the band should reach.
+/// missingShare() counts grid points without a leaf.
 Sides leafErrors(const Leaf& leaf, const openvdb::FloatGrid& grid, const Truth& truth) {
   Sides sides;
   const double background = static_cast<double>(grid.background());
@@ -88,7 +88,7 @@ Tally meshErrors(const NarrowBand& result, const Truth& truth, Mesher mesher) {
   openvdb::tools::volumeToMesh(levelset::vdb(result), points, quads);
   const auto at = [&](openvdb::Index32 i) { return levelset::toImath(openvdb::Vec3d(points[i])); };
   for (openvdb::Index32 i = 0; i < points.size(); ++i) tally.add(truth.distance(at(i)));
-  // Drawn as two triangles each.
+  // Renderers draw each quad as two triangles.
   for (const openvdb::Vec4I& q : quads)
     for (const int k : {1, 2})
       tally.add(truth.distance((at(q[0]) + at(q[k]) + at(q[k + 1])) / 3.0));

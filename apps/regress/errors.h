@@ -4,26 +4,27 @@
 #include "apps/regress/truth/rays.h"
 #include "levelset/narrow_band.h"
 
-/// How far a band is from the truth.
+/// Errors of a band against the truth.
 namespace regress {
 
-/// Whose surface extraction the column of the mesh is about.
+/// Surface extraction that builds the mesh of the mesh columns.
 enum class Mesher { Ours, OpenVdb };
 
-/// All columns that compare `result` with `truth`, both sides of the surface apart.
+/// Adds all columns that compare `result` with `truth`. Both sides of the surface have columns of
+/// their own.
 void addErrors(const levelset::NarrowBand& result, const Truth& truth, Mesher mesher,
                Figures& figures, int rays = kRayCount);
 
-/// The surface columns, volume and, as the value, the volume of what is in one of them only,
-/// against a band that stands for the truth. Distances are taken both ways, and the worse told.
+/// Adds the surface columns, the volume and, as the value, the volume of the symmetric difference.
+/// The reference band stands for the truth. Distances are the larger of both directions.
 void addDifferences(const levelset::NarrowBand& result, const levelset::NarrowBand& reference,
                     Figures& figures);
 
-/// Volume, area, eikonal residual and checks.
+/// Adds volume, area, eikonal residual and checks.
 void addInvariants(const levelset::NarrowBand& result, const Truth& truth, Figures& figures);
 
 /// Largest difference of φ over the grid points at which either band is active, in voxels;
-/// infinite where the grids are not the same.
+/// infinite where the grids differ.
 [[nodiscard]] double deviation(const levelset::NarrowBand& a, const levelset::NarrowBand& b);
 
 }  // namespace regress

@@ -14,7 +14,8 @@
 namespace regress {
 
 inline constexpr const char* kOurs = "levelsmith";
-/// The placement, aligned with nothing, that stands for all where the quick budget has no time.
+/// Placement that the quick budget uses alone at finer resolutions. It is aligned with no grid
+/// point.
 inline constexpr int kQuickPhase = 3;
 
 /// One piece of work with an exact answer.
@@ -24,44 +25,44 @@ struct Subject {
   Truth truth;
 };
 
-/// What a case writes its results into.
+/// Collects the results of a case.
 class Recorder {
  public:
   Recorder(const Case& of, Budget budget, levelset::Progress progress);
 
   [[nodiscard]] bool isQuick() const { return budget_ == Budget::Quick; }
-  /// Every resolution with every placement; in the quick budget, all placements at the coarsest
-  /// resolution and kQuickPhase at the others.
+  /// Samples of every resolution and placement. The quick budget has all placements at the coarsest
+  /// resolution only, and kQuickPhase at the others.
   [[nodiscard]] std::vector<Sample> samples() const;
-  /// True where OpenVDB's tool runs too: at kQuickPhase in the quick budget, and only up to
-  /// `finest`; at `phases` placements in the full one.
+  /// True where OpenVDB's tool runs, too. In the quick budget it runs at kQuickPhase up to
+  /// `finest`, in the full budget at the first `phases` placements.
   [[nodiscard]] bool wantsPeer(const Sample& at, int finest, int phases = 5) const;
 
-  /// True where work that is repeated many times is done: everywhere in the full budget, at the
-  /// coarsest resolution in the quick one.
+  /// True where work that is repeated many times runs: at every sample of the full budget, at the
+  /// coarsest resolution of the quick budget.
   [[nodiscard]] bool wantsRepeats(const Sample& at) const;
 
-  /// Runs and times `work`, compares what it returns with the truth and adds a row. A refusal
-  /// becomes a row that says so.
-  /// @return the result, for more figures by set(); empty if refused
+  /// Runs and times `work`, compares its result with the truth and adds a row. A refusal becomes a
+  /// row with its message.
+  /// @return the result, so that set() can add figures; empty if refused
   std::optional<levelset::NarrowBand> measure(const Subject& subject, const std::string& tool,
                                               const std::function<levelset::NarrowBand()>& work);
-  /// The same where there is no closed form: the result is compared with a finer band.
+  /// Measures work without a closed form: the result is compared with a finer band.
   void measure(const std::string& variant, const Sample& at, const levelset::NarrowBand& reference,
                const std::string& tool, const std::function<levelset::NarrowBand()>& work);
-  /// Adds a row without a band to look at.
+  /// Adds a row without a band.
   void row(const std::string& variant, const std::string& tool, const Sample& at, Figures figures);
-  /// One more figure of the newest row.
+  /// Figure of the newest row.
   [[nodiscard]] double newest(const std::string& column) const {
     return result_.rows.back().figures.at(column);
   }
   void set(const std::string& column, double value) { result_.rows.back().figures[column] = value; }
 
-  /// States that `work` is refused with this exit class.
+  /// Adds the outcome that `work` is refused with this exit class.
   void expectRefusal(const std::string& variant, levelset::ExitCode code,
                      const std::function<void()>& work);
-  /// States that something holds. `work` returns what it found, and true if that is as expected;
-  /// a refusal is not.
+  /// Adds the outcome of a statement. `work` returns true where the statement holds, and a text of
+  /// the findings. A refusal fails the statement.
   void expect(const std::string& variant, const std::string& expected,
               const std::function<std::pair<bool, std::string>()>& work);
 
@@ -79,7 +80,8 @@ class Recorder {
   CaseResult result_;
 };
 
-/// The worst placement for each variant, tool and resolution, with observed orders.
+/// Summarizes rows: the worst placement for each variant, tool and resolution, with observed
+/// orders.
 [[nodiscard]] std::vector<Row> summarize(const std::vector<Row>& rows);
 
 /// Compares our summaries with the bounds of the case. A bound fails where the figure misses the

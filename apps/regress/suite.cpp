@@ -44,11 +44,12 @@ std::vector<const Case*> chosen(const std::vector<std::string>& names) {
   for (const std::string& name : names)
     if (std::none_of(list.begin(), list.end(), [&](const Case* c) { return c->name == name; }))
       throw levelset::UsageError(
-          fmt::format("regress: there is no case '{}'; --list tells their names", name));
+          fmt::format("regress: there is no case '{}'; --list prints all names", name));
   return list;
 }
 
-/// What a case does not catch itself is a missed outcome of it; the others go on.
+/// Runs a case. An exception that the case does not catch is a missed outcome, and the other cases
+/// go on.
 void runWhole(const Case& of, Recorder& recorder) {
   std::exception_ptr failure;
   try {

@@ -11,7 +11,7 @@
 namespace regress {
 
 struct SuiteOptions {
-  std::vector<std::string> names = {};  ///< of cases; empty: all
+  std::vector<std::string> names = {};  ///< names of cases; empty: all
   Budget budget = Budget::Quick;
   levelset::Progress progress = {};
   std::function<void(const CaseResult&)> finished = {};  ///< called after each case
@@ -29,17 +29,17 @@ void checkNames(const std::vector<std::string>& names);
 /// @throws UsageError as checkNames(); Cancelled
 [[nodiscard]] SuiteResult runSuite(const SuiteOptions& options);
 
-/// A sentence for each bound that was missed and each statement that does not hold.
+/// Lists a sentence for each missed bound and each statement that does not hold.
 [[nodiscard]] std::vector<std::string> failures(const CaseResult& result);
 [[nodiscard]] std::vector<std::string> failures(const SuiteResult& result);
 
-/// Makes the folder for results if it is missing.
+/// Creates the folder for results if it is missing.
 /// @throws IoError
 void makeFolder(const std::filesystem::path& folder);
 
 /// Writes results.json, results.csv, index.html and, where Python has matplotlib, the plots (PNG
-/// and SVG; only `withPlots`) with the script that made them.
-/// @return notes: what was left out, and why
+/// and SVG, only `withPlots`) with the script that draws them.
+/// @return notes on missing plots, with the reason
 /// @throws IoError
 std::vector<std::string> writeResults(const SuiteResult& result,
                                       const std::filesystem::path& folder, bool withPlots);

@@ -27,20 +27,20 @@ struct Scheme {
 constexpr Scheme kSchemes[] = {{"front", AdvectScheme::Front},
                                {"semi-Lagrangian", AdvectScheme::SemiLagrangian}};
 
-/// Volume of what is in one of the solids only, over that of the truth; nothing may be left of `a`.
+/// Volume of the symmetric difference of two solids over the volume of the truth. `a` may be empty.
 double symmetricDifference(const NarrowBand& a, const NarrowBand& b, const Truth& truth) {
   if (a.isEmpty()) return 1;
   return levelset::compare(a, b).symmetricDifference / *truth.volume;
 }
 
-/// After its time, a solid is where it was.
+/// Velocity that returns a solid to its start after `time`.
 struct TimeInterval {
   VectorField velocity;
   double time;
-  bool turnsBack;  ///< at half the time
+  bool turnsBack;  ///< true: the velocity turns back at half the time
 };
 
-/// @param finestPeer  resolution up to which OpenVDB is asked, too
+/// @param finestPeer  finest resolution at which OpenVDB runs, too
 void carry(Recorder& out, const std::string& variant, const Sample& at, const Truth& truth,
            const TimeInterval& journey, int finestPeer) {
   const NarrowBand solid = exactBand(truth, at.voxelSize);
@@ -58,7 +58,7 @@ void carry(Recorder& out, const std::string& variant, const Sample& at, const Tr
   if (theirs) out.set("value_error", symmetricDifference(*theirs, solid, truth));
 }
 
-/// At half the time, where nothing is at its start, against the solid made without a level set.
+/// Measures the solid at half the time against a reference that was moved without a level set.
 void halfWay(Recorder& out, const std::string& variant, const Sample& at, const NarrowBand& solid,
              const VectorField& velocity, const NarrowBand& reference) {
   for (const Scheme& s : kSchemes)
@@ -78,7 +78,7 @@ void enright(Recorder& out) {
       return gridded(p, 0) * std::cos(std::numbers::pi * t / 3);
     };
     carry(out, "staggered grid", at, truth, {swinging, 3, true}, 0);
-    // Stopped and begun again from the band.
+    // The run stops and restarts from the band.
     const auto halting = out.measure({"stopped at quarters", at, truth}, kOurs, [&] {
       NarrowBand band = solid;
       for (int quarter = 0; quarter < 4; ++quarter)
@@ -105,9 +105,9 @@ void vortex(Recorder& out) {
   }
 }
 
-/// A ball of radius 15 with a slot 5 wide from below up to y = 85, everything in hundredths. The
-/// distance is exact inside; beyond the slot's edges, where the sphere and the slot meet almost at
-/// right angles, it is so to a few per cent.
+/// Ball of radius 15 with a slot 5 wide from below up to y = 85, all lengths in hundredths. The
+/// distance is exact inside. Beyond the edges of the slot, where sphere and slot meet almost at
+/// right angles, its error is a few per cent.
 Truth zalesakSphere(const V3d& centre) {
   Truth truth;
   truth.centre = centre;
@@ -115,13 +115,14 @@ Truth zalesakSphere(const V3d& centre) {
   truth.distance = [=](const V3d& p) {
     const V3d q = p - centre;
     const double a = q.length() - 0.15;
-    // Distance out of the slot |x| < 2.5, y < 10 about the centre.
+    // Distance to the slot |x| < 2.5, y < 10 about the centre, negative in the slot.
     const double x = std::abs(q.x) - 0.025, y = q.y - 0.10;
     const double slot =
         std::hypot(std::max(x, 0.0), std::max(y, 0.0)) + std::min(0.0, std::max(x, y));
     return a > 0 && slot < 0 ? std::hypot(a, slot) : std::max(a, -slot);
   };
-  // The slot's volume in the ball by midpoints: ∫ over |x| < 2.5, y < 10 of the chord along z.
+  // Volume of the slot in the ball by the midpoint rule: the integral of the chord along z over |x|
+  // < 2.5, y < 10.
   constexpr int kSteps = 2000;
   double volume = 0;
   const double dx = 0.05 / kSteps * 20, dy = 0.25 / kSteps;
@@ -169,13 +170,14 @@ void badVelocities(Recorder& out) {
         isAsMeasured(error, 0.0107) && isAsMeasured(missed, 3.13e-4),
         fmt::format("surface L∞ {:.3g} voxels, {:.3g} of the hits missed", error, missed)};
   });
-  // Nothing can follow it for long: thousands of turns a step, or memory for the spun sheet.
+  // No method can follow this velocity for long: a step has thousands of turns, or the sheet needs
+  // too much memory.
   out.expectRefusal("velocity of 1e9 that winds up", levelset::ExitCode::Resource, [&] {
     (void)levelset::advect(
         solid, [](const V3d& p, double) { return V3d(-p.y, p.x, 0) * (1e9 * p.length2()); }, 1,
         {.maxMemory = std::size_t{256} << 20});
   });
-  // Along the jump the front stretches without end; a grid does not see that.
+  // Along the jump the front stretches without limit. A grid does not resolve the stretching.
   const VectorField jump = [](const V3d& p, double) { return V3d(0, p.x < 0.01 ? -1 : 1, 0); };
   out.expectRefusal("velocity with a jump, front", levelset::ExitCode::Resource,
                     [&] { (void)levelset::advect(solid, jump, 0.25); });
@@ -224,6 +226,7 @@ Bounds vortexBounds() {
       .ceiling(0.025);
 }
 
+/// Rays that pass the edges of the slot within a fraction of a voxel can miss it or not.
 Bounds zalesakBounds() {
   return Bounds()
       .measured("slotted sphere, front", "surface_linf_vx",
@@ -235,6 +238,7 @@ Bounds zalesakBounds() {
                 {{24, 0.138}, {32, 0.017}, {50, 0.018}, {100, 0.00337}, {200, 0.00154}});
 }
 
+/// The tube of the torus has a radius of one voxel at the coarsest resolution.
 Bounds rigidRotationBounds() {
   return Bounds()
       .measured("cube, front", "surface_l1_vx",
@@ -273,15 +277,15 @@ void addAdvectionCases(std::vector<Case>& all) {
   all.push_back(
       {.name = "enright",
        .group = "advection, Enright",
-       .title = "a sphere stretched to a sheet and back",
+       .title = "a sphere is stretched to a sheet and returns",
        .definition =
            "Sphere of radius 0.15 at (0.35, 0.35, 0.35) in LeVeque's deformation with T = 3, the "
-           "velocity given as a function and on a staggered grid of the same voxels. At T it is "
-           "the sphere again. value: volume of what is in one of start and end only, over the "
-           "start's. A run that is stopped and begun again from the band at every quarter of T "
-           "has no bound. At T/2, where the sheet is thinnest, the answer is a band of 512 voxels "
-           "per unit (64 in the quick budget) made from points of the sphere that were carried "
-           "there one by one; surface: mean and largest distance both ways.",
+           "velocity given as a function and on a staggered grid of the same voxels. At T the "
+           "solid is the sphere again. value: volume of the symmetric difference of start and end, "
+           "over the volume of the start. A run that stops and restarts from the band at every "
+           "quarter of T has no bound. At T/2 the sheet is thinnest. The reference there is a band "
+           "of 512 voxels per unit (64 in the quick budget) from points of the sphere that are "
+           "moved one by one. surface: mean and largest distance in both directions.",
        .citation = "LeVeque96, Enright02",
        .quick = {20, 24, 28},
        .full = {32, 64, 128},
@@ -289,7 +293,7 @@ void addAdvectionCases(std::vector<Case>& all) {
        .run = enright});
   all.push_back({.name = "vortex",
                  .group = "advection, vortex",
-                 .title = "a sphere in the single vortex and back",
+                 .title = "a sphere in the single vortex returns",
                  .definition =
                      "Sphere of radius 0.15 at (0.5, 0.75, 0.5) in the vortex of the unit square, "
                      "T = 8, 2 in the quick budget. value as for enright.",
@@ -298,18 +302,17 @@ void addAdvectionCases(std::vector<Case>& all) {
                  .full = {32, 64, 128},
                  .bounds = vortexBounds(),
                  .run = vortex});
-  all.push_back(
-      {.name = "zalesak",
-       .group = "advection, Zalesak",
-       .title = "a slotted sphere turns once",
-       .definition =
-           "Sphere of radius 15 at (50, 75, 50) with a slot 5 wide up to y = 85, one turn "
-           "about (50, 50) in 628; in hundredths here. value as for enright.",
-       .citation = "Zalesak79, Enright02",
-       .quick = {24, 32, 50},
-       .full = {50, 100, 200},
-       .bounds = zalesakBounds(),
-       .run = zalesak});
+  all.push_back({.name = "zalesak",
+                 .group = "advection, Zalesak",
+                 .title = "a slotted sphere turns once",
+                 .definition =
+                     "Sphere of radius 15 at (50, 75, 50) with a slot 5 wide up to y = 85, one "
+                     "turn about (50, 50) in 628, all lengths in hundredths. value as for enright.",
+                 .citation = "Zalesak79, Enright02",
+                 .quick = {24, 32, 50},
+                 .full = {50, 100, 200},
+                 .bounds = zalesakBounds(),
+                 .run = zalesak});
   all.push_back({.name = "rigid-rotation",
                  .group = "advection, rotation",
                  .title = "cube, torus and thin plate turn once",
@@ -324,7 +327,7 @@ void addAdvectionCases(std::vector<Case>& all) {
   all.push_back({.name = "bad-velocities",
                  .group = "bad-velocities",
                  .title = "velocities of 1e9, of NaN, with a jump",
-                 .definition = "What velocities from elsewhere may do.",
+                 .definition = "Velocities that input files or programs can give.",
                  .citation = "stated outcomes",
                  .run = badVelocities});
 }

@@ -30,14 +30,14 @@ NarrowBand solid() {
   return exactBand(ball(V3d(0.01, 0.02, 0.03), 1), kVoxel);
 }
 
-/// A band with a bad value, as a program or a damaged file may hand it over.
+/// Builds a band with one bad value, as a program or a damaged file can contain.
 openvdb::FloatGrid::Ptr spoiled(float value) {
   const auto grid = levelset::vdb(solid()).deepCopy();
   grid->tree().setValueOn(grid->cbeginValueOn().getCoord(), value);
   return grid;
 }
 
-/// The sphere on a grid whose axes are not those of a uniform one.
+/// Builds the sphere on a grid with the given, non-uniform axes.
 openvdb::FloatGrid::Ptr onAxes(const openvdb::math::Mat4d& matrix) {
   const auto grid = levelset::vdb(solid()).deepCopy();
   grid->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
@@ -49,7 +49,7 @@ void hugeOffsets(Recorder& out) {
                     [] { (void)levelset::offset(solid(), -1.2); });
   out.expectRefusal("offset to nothing, far", ExitCode::Input,
                     [] { (void)levelset::offset(solid(), -100); });
-  // A ball of 101 radii takes about 6 × 4π (16 × 101)² voxels: a gigabyte.
+  // A ball of 101 radii needs about 6 × 4π (16 × 101)² voxels, or a gigabyte.
   out.expectRefusal("offset by 100 times the object under 256 MB", ExitCode::Resource, [] {
     (void)levelset::offset(solid(), 100, {.maxMemory = std::size_t{256} << 20});
   });
@@ -87,7 +87,7 @@ void emptyAndFull(Recorder& out) {
     grid->tree().setValueOn(openvdb::Coord(0), grid->background());
     (void)levelset::redistance(levelset::makeBand(grid));
   });
-  // No value tells how far off the surface is.
+  // No value gives the distance to the surface.
   out.expectRefusal("redistance of a block of equal values", ExitCode::Input,
                     [&] { (void)levelset::redistance(full()); });
   out.expect("redistance of a single voxel", "a sound band of one small solid", [&] {
@@ -101,8 +101,8 @@ void emptyAndFull(Recorder& out) {
     grid->tree().setValueOn(openvdb::Coord(0), static_cast<float>(-0.4 * kVoxel));
     const NarrowBand made = levelset::redistance(levelset::makeBand(grid));
     const levelset::Measurement m = levelset::measure(made);
-    // An octahedron whose tips are 0.4 of the way to the neighbours has 0.085 voxels³, the cube of
-    // its facets' planes some four times that.
+    // The volume of an octahedron with tips 0.4 voxel from the centre is 0.085 voxels³. The cube
+    // bounded by the planes of its facets has about four times that volume.
     const double volume = m.volume / (kVoxel * kVoxel * kVoxel);
     const bool isSound = m.components == 1 && m.cavities == 0 && m.euler == 2 && volume > 0.02 &&
                          volume < 0.6 && levelset::check(made).passed();
@@ -177,14 +177,14 @@ void addBadInputCases(std::vector<Case>& all) {
     all.push_back(statedCase(name, title, definition, "stated outcomes", run));
   };
   add("huge-offsets", "offsets to nothing and to a hundred times the object",
-      "A sphere of 16 voxels' radius: what cannot be is refused before memory is taken; on coarser "
-      "voxels it is done.",
+      "A sphere of 16 voxels' radius. Impossible offsets are refused before memory is allocated. "
+      "The same offset on coarser voxels succeeds.",
       hugeOffsets);
   add("empty-and-full", "bands without a surface",
       "Empty bands, bands without a change of sign, a block of equal values and a single voxel.",
       emptyAndFull);
   add("damaged-grids", "NaN, infinity and a background other than the half width",
-      "Grids as a program or a damaged file may hand them over.", damagedGrids);
+      "Grids that a program or a damaged file can contain.", damagedGrids);
   add("skewed-axes", "anisotropic, sheared and left-handed transforms",
       "Grids with such axes are refused; solids moved by such matrices are baked.", skewedAxes);
 }

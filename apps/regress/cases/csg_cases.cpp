@@ -24,7 +24,8 @@ constexpr std::array<Named, 3> kOperations = {{{CsgOperation::Union, "union"},
 
 const V3d kApart(0.9, 0.3, 0.2);
 
-/// The crease itself lies between grid points: what is nearer to it than 1.5 voxels is left out.
+/// Leaves out grid points within 1.5 voxels of the crease, since the crease lies between grid
+/// points.
 Truth awayFromCrease(Truth truth, const V3d& a, const V3d& b, double radius, double voxelSize) {
   const V3d middle = (a + b) / 2.0, axis = (b - a).normalized();
   const double ring = std::sqrt(radius * radius - (b - a).length2() / 4);
@@ -76,6 +77,8 @@ void laws(Recorder& out) {
   }
 }
 
+/// The position of the crease between grid points is known to a third of a voxel, which limits the
+/// band where the crease is nearest.
 Bounds csgBallsBounds() {
   return Bounds()
       .measured("union", "band_in_linf_vx", {{12, 0.0412}, {16, 0.0539}, {32, 0.0557}})
@@ -112,31 +115,31 @@ Bounds csgLawsBounds() {
 }  // namespace
 
 void addCsgCases(std::vector<Case>& all) {
-  all.push_back(
-      {.name = "csg-balls",
-       .group = "CSG",
-       .title = "union, intersection and difference of two balls as distances",
-       .definition =
-           "Two spheres of radius 1 whose centres are (0.9, 0.3, 0.2) apart. The exact distance "
-           "is that to the nearest of the two spheres' parts and of the circle between them; "
-           "volume and area are those of caps. Grid points nearer than 1.5 voxels to the circle "
-           "are left out of the band's errors.",
-       .citation = "closed form",
-       .quick = {12, 16, 32},
-       .full = {32, 64, 128, 256},
-       .bounds = csgBallsBounds(),
-       .run = combineBalls});
-  all.push_back({.name = "csg-laws",
-                 .group = "CSG laws",
-                 .title = "idempotence, commutativity, De Morgan",
+  all.push_back({.name = "csg-balls",
+                 .group = "CSG",
+                 .title = "union, intersection and difference of two balls as distances",
                  .definition =
-                     "The same balls, and a box of edge 4 around them. deviation: largest "
-                     "difference of the two sides' bands, in voxels; none, to the bit.",
-                 .citation = "set algebra",
-                 .quick = {8, 12, 16},
-                 .full = {16, 32, 64},
-                 .bounds = csgLawsBounds(),
-                 .run = laws});
+                     "Two spheres of radius 1 whose centres are (0.9, 0.3, 0.2) apart. The exact "
+                     "distance is the distance to the nearest part of the two spheres or of the "
+                     "circle between them. Volume and area follow from spherical caps. The band's "
+                     "errors leave out grid points within 1.5 voxels of the circle.",
+                 .citation = "closed form",
+                 .quick = {12, 16, 32},
+                 .full = {32, 64, 128, 256},
+                 .bounds = csgBallsBounds(),
+                 .run = combineBalls});
+  all.push_back(
+      {.name = "csg-laws",
+       .group = "CSG laws",
+       .title = "idempotence, commutativity, De Morgan",
+       .definition =
+           "The same balls, and a box of edge 4 around them. deviation: largest difference between "
+           "the bands of both sides, in voxels. It is zero to the bit.",
+       .citation = "set algebra",
+       .quick = {8, 12, 16},
+       .full = {16, 32, 64},
+       .bounds = csgLawsBounds(),
+       .run = laws});
 }
 
 }  // namespace regress

@@ -30,8 +30,8 @@ constexpr std::array<Front, 4> kFronts = {{{"marching, order 1", FrontMethod::Ma
                                            {"sweeping, order 1", FrontMethod::Sweeping, 1},
                                            {"sweeping, order 2", FrontMethod::Sweeping, 2}}};
 
-/// Where a front from a point must have come: all times but those that end within `margin` voxels,
-/// at speed 1, of the latest.
+/// Region that a front from a point must have reached. Times within `margin` voxels, at speed 1, of
+/// the latest are left out.
 Region reachedRegion(const Distance& exact, double until, const Sample& at, double margin,
                      double fastest, double slowest) {
   return {.value = exact,
@@ -42,8 +42,8 @@ Region reachedRegion(const Distance& exact, double until, const Sample& at, doub
           .extent = until * fastest};
 }
 
-/// Errors of arrival times at active grid points, in voxels at speed 1, and how many of the
-/// region's have none.
+/// Errors of arrival times at active grid points, in voxels at speed 1, and the share of the
+/// region's grid points without a time.
 Figures timeErrors(const levelset::FieldGrid& times, const Region& region, double voxelSize) {
   double sum = 0, largest = 0, count = 0;
   const openvdb::FloatGrid& grid = *times.shared()->scalar;
@@ -88,7 +88,7 @@ void fromPoint(Recorder& out) {
   }
 }
 
-/// Speed 1 + g·(p − source): rays are arcs of circles.
+/// Measures fronts at the speed 1 + g·(p − source), where rays are arcs of circles.
 void fromPointWithGradient(Recorder& out) {
   const V3d slope(0.5, 0.3, 0.2);
   for (const Sample& at : out.samples()) {
@@ -99,8 +99,8 @@ void fromPointWithGradient(Recorder& out) {
       return std::acosh(1 + slope.length2() * (p - at.shift).length2() / (2 * speed(p))) /
              slope.length();
     };
-    // Straight ahead the front gets to (exp(0.8 |g|) − 1) / |g| = 1.03, and back to where the speed
-    // is 0.61; the blocks around that reach to 0.35.
+    // Along g the front reaches (exp(0.8 |g|) − 1) / |g| = 1.03. Against g it reaches points where
+    // the speed is 0.61, and the blocks around those extend to a speed of 0.35.
     const Region reached = reachedRegion(exact, 0.8, at, 1, 1.3, 0.35);
     for (const Front& front : kFronts) {
       const ArrivalOptions options{.method = front.method, .order = front.order, .speed = speed};
@@ -110,10 +110,10 @@ void fromPointWithGradient(Recorder& out) {
   }
 }
 
-/// A point source at height −`depth` below a plane z = 0 beyond which the speed is `speed`, 1
-/// before: the quickest way crosses the plane where Snell's law holds. Convex in the place of
-/// crossing, so it is found by golden section; before the plane a faster medium beyond sends a head
-/// wave back.
+/// Shortest travel time from a source at z = −`depth` in two media. The speed is 1 below the plane
+/// z = 0 and `speed` above it. The fastest path crosses the plane where Snell's law holds. The time
+/// is convex in the crossing point, so golden section finds that point. A faster medium above the
+/// plane sends a head wave back below it.
 double quickest(double away, double z, double depth, double speed) {
   const auto shortest = [&](const auto& cost) {
     constexpr double kGolden = 0.6180339887498949;
@@ -129,7 +129,8 @@ double quickest(double away, double z, double depth, double speed) {
         [&](double x) { return std::hypot(x, depth) + std::hypot(away - x, z) / speed; });
   const double direct = std::hypot(away, z + depth);
   if (speed <= 1) return direct;
-  // Down to the plane under the critical angle, along it, and back under the same.
+  // The head wave meets the plane at the critical angle, follows the plane, and returns at the same
+  // angle.
   const double cosine = std::sqrt(1 - 1 / (speed * speed)), tangent = 1 / (speed * cosine);
   const double along = away - (depth - z) * tangent;
   return along < 0 ? direct : std::min(direct, (depth - z) / cosine + along / speed);
@@ -145,7 +146,7 @@ void throughMedia(Recorder& out) {
         const V3d q = p - at.shift;
         return quickest(std::hypot(q.x, q.y), q.z, kDepth, speed);
       };
-      // The bound on times is 1.5 voxels.
+      // A margin of two voxels exceeds the error of the times.
       Region reached =
           reachedRegion(exact, kUntil, at, 2, std::max(1.0, speed), std::min(1.0, speed));
       reached.centre = source[0];
@@ -162,7 +163,7 @@ void throughMedia(Recorder& out) {
 
 void fromSurface(Recorder& out) {
   for (const Sample& at : out.samples()) {
-    // As far as OpenVDB's: eight voxels beyond a band of three.
+    // The same distance as in OpenVDB: eight voxels beyond a band of three.
     const double reach = 11 * at.voxelSize;
     const auto measure = [&](const std::string& name, const Truth& truth) {
       const NarrowBand solid = exactBand(truth, at.voxelSize);
@@ -176,7 +177,7 @@ void fromSurface(Recorder& out) {
         out.measure({name, at, truth}, peer::kDilate, [&] { return peer::dilate(solid, 8); });
     };
     measure("sphere", ball(at.shift, 1));
-    // Fronts that meet half-way leave a crease.
+    // Fronts that meet halfway leave a crease.
     measure("two spheres", apart(ball(at.shift, 0.6), ball(at.shift + V3d(1.3, 0.2, 0.1), 0.6)));
   }
 }
@@ -312,8 +313,8 @@ void addEikonalCases(std::vector<Case>& all) {
                  .group = "eikonal, point source",
                  .title = "arrival times from a point",
                  .definition = "|∇T| = 1 from one point between the grid points, out to T = 1. The "
-                               "singularity at the source costs first-order schemes O(h log h); "
-                               "taken apart, it costs the second-order ones nothing.",
+                               "singularity at the source costs first-order schemes O(h log h). "
+                               "The second-order schemes factor it out and lose nothing.",
                  .citation = "Sethian99, Zhao05, Treister16",
                  .quick = {6, 8, 12},
                  .full = {16, 32, 64},
@@ -335,8 +336,8 @@ void addEikonalCases(std::vector<Case>& all) {
                  .title = "slow and fast inclusions",
                  .definition =
                      "A point source 0.25 below a plane beyond which the speed is 0.5 or 2, 1 "
-                     "before, out to T = 0.6. Exact by Fermat's principle: rays refracted by "
-                     "Snell's law, and the head wave that a faster medium sends back.",
+                     "before, out to T = 0.6. The exact times follow from Fermat's principle: rays "
+                     "refracted by Snell's law, and the head wave that a faster medium sends back.",
                  .citation = "Sethian99, Zhao05",
                  .quick = {12, 16, 24},
                  .full = {32, 64, 128},
@@ -354,17 +355,18 @@ void addEikonalCases(std::vector<Case>& all) {
                  .full = {16, 32, 64},
                  .bounds = eikonalSurfaceBounds(),
                  .run = fromSurface});
-  all.push_back({.name = "closest-point",
-                 .group = "closest point",
-                 .title = "closest points of a sphere and a torus",
-                 .definition =
-                     "Closest points at the grid points of a band. surface: their exact distance "
-                     "to the surface. value: largest distance to the exact closest point, voxels.",
-                 .citation = "Chopp01, Saye14",
-                 .quick = {8, 12, 24},
-                 .full = {16, 32, 64},
-                 .bounds = closestPointBounds(),
-                 .run = closest});
+  all.push_back(
+      {.name = "closest-point",
+       .group = "closest point",
+       .title = "closest points of a sphere and a torus",
+       .definition =
+           "Closest points at the grid points of a band. surface: exact distance of the closest "
+           "points to the surface. value: largest distance to the exact closest point, voxels.",
+       .citation = "Chopp01, Saye14",
+       .quick = {8, 12, 24},
+       .full = {16, 32, 64},
+       .bounds = closestPointBounds(),
+       .run = closest});
 }
 
 }  // namespace regress

@@ -14,8 +14,8 @@ using levelset::NarrowBand;
 
 namespace {
 
-/// Sampled, re-distanced and grown by three voxels: the same errors in voxels wherever it lies and
-/// however large a voxel is. Radii are `at.resolution` voxels.
+/// Samples a sphere of `at.resolution` voxels, re-distances it and offsets it by three voxels. The
+/// errors in voxels must not depend on the position or on the voxel size.
 void chainOfThree(Recorder& out, const std::string& variant, const Sample& at, double voxelSize,
                   const V3d& centre) {
   Sample here = at;
@@ -44,11 +44,11 @@ void halfWidths(Recorder& out) {
       const Truth truth = ball(at.shift, 1);
       const NarrowBand field = exactBand(truth, at.voxelSize, width);
       std::string name = "half width " + std::to_string(width).substr(0, width > 9 ? 2 : 3);
-      // Beyond the centre every point of the sphere is as near.
+      // At the centre every point of the sphere is equally near.
       out.measure({name, at, truth}, kOurs,
                   [&] { return levelset::redistance(field, {.halfWidth = width}); });
     }
-    // A band of three voxels on a background of ten: widened by re-distancing.
+    // Redistancing widens a band of three voxels to ten and narrows it again.
     Truth truth = ball(at.shift, 1);
     const NarrowBand narrow = exactBand(truth, at.voxelSize, 3);
     out.measure({"background 10 voxels, band 3", at, truth}, kOurs, [&] {
@@ -58,8 +58,8 @@ void halfWidths(Recorder& out) {
   }
 }
 
-/// The torus 1 / 0.3 grown past its hole: the part of the torus 1 / 1.1 that lies outside of
-/// itself.
+/// Torus whose tube radius exceeds its ring radius: an offset torus whose hole has closed. The
+/// surface is the outer part of the torus, which meets itself on the axis.
 Truth spindle(const V3d& centre, double radius, double tube) {
   const double tip = std::sqrt(tube * tube - radius * radius);
   Truth truth;
@@ -70,7 +70,8 @@ Truth spindle(const V3d& centre, double radius, double tube) {
     const double away = std::hypot(q.x, q.y), up = std::abs(q.z);
     const double toRing = std::hypot(away - radius, up);
     if (toRing >= tube) return toRing - tube;
-    // Inside: the outer arc, if the foot on it is on this side of the axis, or the tip.
+    // Inside, the closest point lies on the outer arc where its foot is on this side of the axis,
+    // else at the tip.
     const double foot = toRing > 0 ? radius + (away - radius) / toRing * tube : radius + tube;
     const double toTip = std::hypot(away, up - tip);
     return -(foot >= 0 ? std::min(tube - toRing, toTip) : toTip);
@@ -96,14 +97,14 @@ void pastTheAxis(Recorder& out) {
       const std::string name = touching ? "balls that touch" : "balls 0.3 voxels apart";
       const V3d middle = (a + b) / 2.0;
       Truth judged = pair;
-      // Between the poles no grid point tells the two surfaces apart.
+      // Between the poles no grid point separates the two surfaces.
       judged.compared = [=](const V3d& p) { return (p - middle).length() > 4 * at.voxelSize; };
       out.measure({"union of " + name, at, judged}, kOurs, [&] {
         return levelset::unite(exactBand(ball(a, 0.5), at.voxelSize),
                                exactBand(ball(b, 0.5), at.voxelSize));
       });
     }
-    // Faces that lie in one plane, on and between grid points.
+    // Faces in one plane, on and between grid points.
     const V3d half(0.5, 1, 1), at0 = at.shift;
     out.measure({"boxes that share a face, united", at, box(at0 + V3d(0.25, 0, 0), V3d(1, 1, 1))},
                 kOurs, [&] {
@@ -121,7 +122,7 @@ void pastTheAxis(Recorder& out) {
 }
 
 void tenMillion(Recorder& out) {
-  // 4 π R² 2w voxels: ten million at R = 365, w = 3.
+  // A band has 4 π R² 2w voxels: ten million at R = 365, w = 3.
   if (out.isQuick()) return;
   const Sample at{365, 3, 1.0 / 365, subVoxelPhases()[3] / 365};
   const Truth truth = ball(at.shift, 1);
@@ -293,7 +294,7 @@ void addExtremeCases(std::vector<Case>& all) {
                  .definition =
                      "A sphere is sampled, re-distanced and grown by three voxels: with voxels of "
                      "1, 1e-6 and 1e6, and with its centre 1e6 voxels from the origin along each "
-                     "axis. Resolution is the radius in voxels; the errors must be the same.",
+                     "axis. The resolution is the radius in voxels. The errors must be the same.",
                  .citation = "closed form",
                  .quick = {6, 8, 12},
                  .full = {16, 32, 64},
@@ -315,9 +316,9 @@ void addExtremeCases(std::vector<Case>& all) {
        .group = "contact",
        .title = "surfaces that meet, touch and coincide",
        .definition =
-           "A torus 0.6 / 0.2 grown by 0.6, past the axis, so that its hole closes; balls of "
-           "radius 0.5 that touch in a point or are 0.3 voxels apart, united, compared further "
-           "than 4 voxels from the place; boxes with a face or three in one plane, united and "
+           "A torus 0.6 / 0.2 offset by 0.6, past the axis, so that its hole closes. Balls of "
+           "radius 0.5 that touch in a point or are 0.3 voxels apart, united and compared beyond 4 "
+           "voxels from the contact. Boxes with one or three faces in one plane, united and "
            "subtracted.",
        .citation = "closed form",
        .quick = {12, 16, 24},

@@ -22,8 +22,8 @@ using levelset::NarrowBand;
 
 namespace {
 
-/// Two slabs whose faces meet along z at the angle θ of the free space between them, symmetric to
-/// the plane y = 0: free is x > |y| / tan(θ/2).
+/// Two slabs whose faces meet along z. The free space between them has the angle θ and is symmetric
+/// to the plane y = 0: x > |y| / tan(θ/2).
 struct Wedge {
   double half;  ///< θ / 2
   Truth first, second;
@@ -32,7 +32,7 @@ struct Wedge {
 Wedge wedge(double degrees, const V3d& corner, double size) {
   const double half = degrees / 2 * std::numbers::pi / 180;
   const auto slab = [&](double side) {
-    // A box below the plane through the corner with this normal; far larger than the fillet.
+    // Box below the plane through the corner with this normal, far larger than the fillet.
     M44d turn, shift;
     turn.setAxisAngle(V3d(0, 0, 1), side * half);
     shift.setTranslation(corner);
@@ -41,7 +41,8 @@ Wedge wedge(double degrees, const V3d& corner, double size) {
   return {half, slab(1), slab(-1)};
 }
 
-/// Where on the line from the circle's centre the surface is, seen from there; NaN if nowhere near.
+/// Distance from the circle's centre to the surface along a line. NaN where no surface is within
+/// `reach` of the expected distance.
 double crossing(const levelset::BandSampler& phi, const V3d& from, const V3d& direction,
                 double expected, double reach) {
   double low = expected - reach, high = expected + reach;
@@ -54,7 +55,7 @@ double crossing(const levelset::BandSampler& phi, const V3d& from, const V3d& di
   return 0.5 * (low + high);
 }
 
-/// Relative error of the fillet's radius over its arc, on several sections.
+/// Largest relative error of the fillet's radius over its arc, on several sections.
 double radiusError(const NarrowBand& band, const Wedge& w, const V3d& corner, double radius) {
   const levelset::BandSampler phi(band, levelset::Interpolation::Tricubic);
   const V3d centre = corner + V3d(radius / std::sin(w.half), 0, 0);
@@ -72,8 +73,8 @@ double radiusError(const NarrowBand& band, const Wedge& w, const V3d& corner, do
   return worst;
 }
 
-/// Largest change of φ beyond r / tan(θ/2) from the edge, in voxels. A place off the surface
-/// belongs to its foot.
+/// Largest change of φ beyond r / tan(θ/2) from the edge, in voxels. A grid point counts at its
+/// closest point on the surface.
 double changeBeyond(const NarrowBand& blended, const NarrowBand& plain, const V3d& corner,
                     double reach) {
   constexpr double kMargin = 0.1;  // voxels
@@ -86,7 +87,7 @@ double changeBeyond(const NarrowBand& blended, const NarrowBand& plain, const V3
     if (std::abs(value) >= plain.halfWidth() * plain.voxelSize() || !before.isInBand(p)) continue;
     const V3d foot = p - before.normal(p) * value - corner;
     const double away = std::hypot(foot.x, foot.y);
-    // The slabs' other edges are out of this.
+    // The other edges of the slabs are left out.
     if (away < reach + kMargin * blended.voxelSize() || away > 3.5 || std::abs(foot.z) > 2)
       continue;
     largest = std::max(largest, std::abs(static_cast<double>(*it) - value));
@@ -96,7 +97,7 @@ double changeBeyond(const NarrowBand& blended, const NarrowBand& plain, const V3
 
 void roundWedges(Recorder& out) {
   for (const Sample& at : out.samples()) {
-    // Resolution is voxels per radius of the fillet.
+    // The resolution counts voxels per radius of the fillet.
     const double radius = 1, h = at.voxelSize;
     for (const double degrees : {45.0, 90.0, 135.0}) {
       const Wedge w = wedge(degrees, at.shift, 4);
@@ -120,17 +121,18 @@ void roundWedges(Recorder& out) {
   }
 }
 
-/// Cylinders of radius R along x and y through one point: the ball that touches both from outside
-/// rolls along the ellipses |x| = |y|, x² + z² = (R + r)².
+/// Largest relative error of the radius between crossed cylinders of radius R along x and y through
+/// one point. A ball that touches both from outside rolls along the ellipses |x| = |y|, x² + z² =
+/// (R + r)².
 double crossedError(const NarrowBand& band, const V3d& centre, double cylinderRadius,
                     double radius) {
   const levelset::BandSampler phi(band, levelset::Interpolation::Tricubic);
   const double sum = cylinderRadius + radius;
   double worst = 0;
   for (int i = -6; i <= 6; ++i) {
-    const double angle = 0.12 * i;  // about the middle between top and bottom
+    const double angle = 0.12 * i;  // from the middle between top and bottom
     const V3d s(sum * std::cos(angle), sum * std::cos(angle), sum * std::sin(angle));
-    // The points in which the ball touches lie towards both axes.
+    // The ball touches the cylinders in the directions of their axes.
     const V3d toFirst = V3d(0, -s.y, -s.z).normalized(), toSecond = V3d(-s.x, 0, -s.z).normalized();
     for (const double t : {0.25, 0.5, 0.75}) {
       const V3d direction = (toFirst * (1 - t) + toSecond * t).normalized();
@@ -261,8 +263,8 @@ void addFilletCases(std::vector<Case>& all) {
        .definition =
            "Cylinders of radius 1.5 along x and y, their union rounded with radius 1. The "
            "ball rolls along two ellipses. value: largest relative error of the radius "
-           "about the middle of one of them; cavities: nothing may stay empty between the "
-           "fillet and the seam.",
+           "about the middle of one of them; cavities: no void may remain between the fillet and "
+           "the seam.",
        .citation = "closed form; Rossignac84",
        .quick = {3, 4, 5},
        .full = {4, 8, 16},
@@ -271,7 +273,7 @@ void addFilletCases(std::vector<Case>& all) {
   all.push_back(
       {.name = "fillet-balls",
        .group = "fillets of balls",
-       .title = "the fillet between two balls, with all its distances",
+       .title = "the fillet between two balls, and all distances",
        .definition =
            "Balls of radius 1 and 0.7 whose centres are 1.16 apart, their union rounded "
            "with radius 0.5: a solid of revolution with an arc between two. Resolution is "

@@ -19,7 +19,7 @@ using levelset::TriMesh;
 
 namespace {
 
-/// The cube of edge 1 about the origin, twelve triangles.
+/// Builds the cube of edge 1 about the origin from twelve triangles.
 TriMesh cubeMesh() {
   TriMesh mesh;
   for (int i = 0; i < 8; ++i)
@@ -50,7 +50,7 @@ void convertMeshes(Recorder& out) {
       if (out.wantsPeer(at, 16))
         out.measure(subject, peer::kMesh, [&] { return peer::fromMesh(mesh, at.voxelSize); });
     }
-    // To a mesh and back: the error is that of the mesh between.
+    // The error of a round trip is the error of the mesh between.
     const Truth ring = torus(at.shift, V3d(1, 2, 3), 0.35, 0.15);
     const levelset::NarrowBand exact = exactBand(ring, at.voxelSize);
     const Subject subject{"torus and back", at, ring};
@@ -63,7 +63,7 @@ void convertMeshes(Recorder& out) {
   }
 }
 
-/// Distance of a point to a mesh, as far as `reach`.
+/// Distance of a point to a mesh, at most `reach`.
 double distanceTo(const TriMesh& mesh, const V3d& point, double reach) {
   double nearest = reach * reach;
   for (const auto& t : mesh.triangles) {
@@ -75,7 +75,7 @@ double distanceTo(const TriMesh& mesh, const V3d& point, double reach) {
   return std::sqrt(nearest);
 }
 
-/// Largest distance of the cube's corners, and of points of its edges, to the mesh.
+/// Largest distance of the cube's corners, and of points on its edges, to the mesh, in voxels.
 double edgeError(const TriMesh& mesh, const M44d& matrix, double voxelSize) {
   constexpr int kPieces = 16;
   double largest = 0;
@@ -158,19 +158,17 @@ Bounds sharpMeshBounds() {
 }  // namespace
 
 void addMeshCases(std::vector<Case>& all) {
-  all.push_back(
-      {.name = "mesh-round-trip",
-       .group = "mesh conversion",
-       .title = "meshes to distances, and distances to meshes and back",
-       .definition =
-           "A cube of edge 1 made of twelve triangles, aligned with the grid and rotated, becomes "
-           "a band: every distance is known exactly. An exact band of a torus 0.35 / 0.15 becomes "
-           "a mesh and a band again.",
-       .citation = "closed forms; Jones95",
-       .quick = {12, 16, 24},
-       .full = {32, 64, 128},
-       .bounds = meshRoundTripBounds(),
-       .run = convertMeshes});
+  all.push_back({.name = "mesh-round-trip",
+                 .group = "mesh conversion",
+                 .title = "meshes to distances, and distances to meshes and back",
+                 .definition = "A cube of edge 1 made of twelve triangles, aligned with the grid "
+                               "and rotated, becomes a band, whose distances are known exactly. An "
+                               "exact band of a torus 0.35 / 0.15 becomes a mesh and a band again.",
+                 .citation = "closed forms; Jones95",
+                 .quick = {12, 16, 24},
+                 .full = {32, 64, 128},
+                 .bounds = meshRoundTripBounds(),
+                 .run = convertMeshes});
   all.push_back(
       {.name = "sharp-mesh",
        .group = "meshing",

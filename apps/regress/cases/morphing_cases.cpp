@@ -15,7 +15,8 @@ using levelset::NarrowBand;
 
 namespace {
 
-/// The largest part of a difference that the next step leaves: below 1 if they fall strictly.
+/// Largest ratio of a difference to the one before it. A ratio below 1 means that the differences
+/// fall strictly.
 double mostLeft(const std::vector<double>& differences) {
   double most = 0;
   for (std::size_t i = 1; i < differences.size(); ++i)
@@ -23,7 +24,8 @@ double mostLeft(const std::vector<double>& differences) {
   return most;
 }
 
-/// Of twenty even steps the first leaves 0.95 of the difference, and each after it less.
+/// Largest allowed ratio. The first of twenty even steps leaves 0.95 of the difference, each later
+/// step less.
 constexpr double kMostLeft = 0.99;
 
 void morphShapes(Recorder& out) {
@@ -53,7 +55,7 @@ void morphShapes(Recorder& out) {
       std::vector<double> differences{levelset::compare(from, to).symmetricDifference};
       for (const NarrowBand& step : kept)
         differences.push_back(levelset::compare(step, to).symmetricDifference);
-      // Steps that were not kept did not fall.
+      // A step that was not kept counts as one that does not fall.
       const bool isWhole = static_cast<int>(kept.size()) == steps;
       out.set("value_error", isWhole ? mostLeft(differences) : 1);
     }
@@ -95,20 +97,20 @@ Bounds morphBounds() {
 }  // namespace
 
 void addMorphCases(std::vector<Case>& all) {
-  all.push_back({.name = "morph",
-                 .group = "morphing",
-                 .title = "sphere, cube and torus into each other",
-                 .definition =
-                     "Sphere of radius 0.8, cube of edge 1.3 and torus 0.7 / 0.3 about one point, "
-                     "and a sphere shifted by (0.5, 0.3, 0.2), in 20 kept steps, 5 in the quick "
-                     "budget. value: the volume by which a step differs from the target, over "
-                     "that of the step before it, where it falls least. A disjoint target is "
-                     "refused, but in one step.",
-                 .citation = "closed forms; Museth02",
-                 .quick = {5, 6, 8},
-                 .full = {16, 32, 64},
-                 .bounds = morphBounds(),
-                 .run = morphShapes});
+  all.push_back(
+      {.name = "morph",
+       .group = "morphing",
+       .title = "sphere, cube and torus into each other",
+       .definition =
+           "Sphere of radius 0.8, cube of edge 1.3 and torus 0.7 / 0.3 about one point, "
+           "and a sphere shifted by (0.5, 0.3, 0.2), in 20 kept steps, 5 in the quick "
+           "budget. value: largest ratio of the volume by which a step differs from the target to "
+           "that of the step before. A disjoint target is refused, except in one step.",
+       .citation = "closed forms; Museth02",
+       .quick = {5, 6, 8},
+       .full = {16, 32, 64},
+       .bounds = morphBounds(),
+       .run = morphShapes});
 }
 
 }  // namespace regress

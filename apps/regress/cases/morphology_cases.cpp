@@ -34,7 +34,7 @@ void openAndClose(Recorder& out) {
       out.measure({"closing of a box", at, cuboid}, peer::kFilter,
                   [&] { return peer::offset(peer::offset(solid, kRadius), -kRadius); });
     }
-    // A bar thinner than the ball goes, the balls at its ends stay as they are.
+    // Opening removes a bar thinner than the ball. The balls at its ends stay unchanged.
     const Truth one = ball(at.shift, 0.5), other = ball(at.shift + V3d(1.5, 0, 0), 0.5);
     const NarrowBand joined =
         levelset::unite(exactBand(apart(one, other), h),
@@ -135,12 +135,12 @@ Bounds shellBounds() {
 void addMorphologyCases(std::vector<Case>& all) {
   all.push_back({.name = "opening-closing",
                  .group = "opening and closing",
-                 .title = "balls that fit inside and beside",
+                 .title = "opening and closing by a ball",
                  .definition =
                      "With a ball of radius 0.2: opening a box 1.2 × 0.9 × 0.7 rounds its edges, "
-                     "closing leaves it; opening two balls of radius 0.5 with a bar of radius "
-                     "0.12 leaves the balls, and the little that the opening ball reaches into the "
-                     "bar: the closed form has the balls alone, so only the mean is bounded.",
+                     "closing leaves it unchanged. Opening two balls of radius 0.5 with a bar of "
+                     "radius 0.12 leaves the balls and a small part of the bar at each ball. The "
+                     "closed form has the balls alone, so only the mean is bounded.",
                  .citation = "Serra82",
                  .quick = {12, 16, 24},
                  .full = {32, 64, 128},

@@ -156,31 +156,29 @@ void addOffsetCases(std::vector<Case>& all) {
        .full = {32, 64, 128},
        .bounds = offsetSphereBounds(),
        .run = offsetSphere});
-  all.push_back(
-      {.name = "offset-cube",
-       .group = "offset of a cube",
-       .title = "a cube shrinks to a cube and grows to a rounded one",
-       .definition =
-           "The exact band of a cube of edge 1, aligned with the grid and rotated. Inwards by 5 "
-           "voxels it is the smaller cube, edges and corners sharp; outwards by 5 it is the cube "
-           "with edges rounded by 5 voxels.",
-       .citation = "closed form",
-       .quick = {14, 20, 32},
-       .full = {40, 80, 160},
-       .bounds = offsetCubeBounds(),
-       .run = offsetCube});
-  all.push_back(
-      {.name = "offset-laws",
-       .group = "offset laws",
-       .title = "two offsets are one of their sum; there and back is nothing",
-       .definition =
-           "Sphere of radius 1 and box 1.6 × 1.2 × 0.8: +3 then +4 voxels must be +7 (deviation), "
-           "+5 then −5 must be the solid again, since both are convex.",
-       .citation = "closed form",
-       .quick = {6, 8, 12},
-       .full = {16, 32, 64},
-       .bounds = offsetLawsBounds(),
-       .run = offsetLaws});
+  all.push_back({.name = "offset-cube",
+                 .group = "offset of a cube",
+                 .title = "a cube shrinks to a cube and grows to a rounded one",
+                 .definition =
+                     "The exact band of a cube of edge 1, aligned with the grid and rotated. The "
+                     "inward offset by 5 voxels is the smaller cube with sharp edges and corners. "
+                     "The outward offset by 5 voxels is the cube with edges rounded by 5 voxels.",
+                 .citation = "closed form",
+                 .quick = {14, 20, 32},
+                 .full = {40, 80, 160},
+                 .bounds = offsetCubeBounds(),
+                 .run = offsetCube});
+  all.push_back({.name = "offset-laws",
+                 .group = "offset laws",
+                 .title = "two offsets equal one offset by their sum; out and back gives the solid",
+                 .definition =
+                     "Sphere of radius 1 and box 1.6 × 1.2 × 0.8: +3 then +4 voxels must equal +7 "
+                     "(deviation). +5 then −5 must give the solid, since both solids are convex.",
+                 .citation = "closed form",
+                 .quick = {6, 8, 12},
+                 .full = {16, 32, 64},
+                 .bounds = offsetLawsBounds(),
+                 .run = offsetLaws});
 }
 
 }  // namespace regress

@@ -46,6 +46,8 @@ void repeat(Recorder& out) {
   }
 }
 
+/// The order of 2 at 128 voxels is a requirement of the full budget that the operator misses: the
+/// measured order is 0.96.
 Bounds redistanceBounds() {
   return Bounds()
       .measured("waves of 4 voxels", "band_in_linf_vx",
@@ -73,12 +75,12 @@ void addRedistanceCases(std::vector<Case>& all) {
   all.push_back(
       {.name = "redistance",
        .group = "redistancing",
-       .title = "a distance again, without moving the surface",
+       .title = "redistancing restores the distance and keeps the surface",
        .definition =
            "φ (1.5 + 0.8 sin(x/4w) sin(y/4w) sin(z/4w)) of a sphere of radius 1, half width 3, "
-           "values clipped at the background, is re-distanced once: with w = h, waves that get "
-           "shorter with the voxels, so that the same error in voxels is the most that can show, "
-           "and with w = 1/16.",
+           "values clipped at the background, is re-distanced once. With w = h the waves shorten "
+           "with the voxels, so that the error in voxels stays constant at best. The other case "
+           "has w = 1/16.",
        .citation = "Russo00, Min10",
        .quick = {12, 24, 64},
        .full = {32, 64, 128},
@@ -88,7 +90,7 @@ void addRedistanceCases(std::vector<Case>& all) {
       {.name = "redistance-again",
        .group = "redistancing again and again",
        .title = "once, ten and a hundred times",
-       .definition = "The same field, re-distanced over and over: does the surface creep?",
+       .definition = "The same field is re-distanced repeatedly; the surface must not drift.",
        .citation = "Russo00, Min10",
        .quick = {8, 10, 12},
        .full = {16, 32, 64},

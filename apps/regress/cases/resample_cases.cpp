@@ -11,7 +11,7 @@ using levelset::NarrowBand;
 
 namespace {
 
-/// Ten times to voxels of 0.8 and back.
+/// Resamples `times` times to voxels of 0.8 times the size and back.
 template <typename Resample>
 NarrowBand chain(NarrowBand band, double voxelSize, int times, const Resample& resample) {
   for (int i = 0; i < times; ++i) {
@@ -63,7 +63,7 @@ Bounds resampleChainBounds() {
 void addResampleCases(std::vector<Case>& all) {
   all.push_back({.name = "resample-chain",
                  .group = "resampling",
-                 .title = "to finer voxels and back, again and again",
+                 .title = "resampling to finer voxels and back, once and ten times",
                  .definition =
                      "The exact band of a torus 0.7 / 0.3 about (1, 2, 3) and of a rotated cube of "
                      "edge 1 is resampled to voxels of 0.8 times the size and back, once and ten "

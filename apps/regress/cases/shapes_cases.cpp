@@ -35,6 +35,7 @@ void sampleShapes(Recorder& out) {
   }
 }
 
+/// Voxels hold floats. The volume of the sphere is at their rounding level and shows no order.
 Bounds shapesBounds() {
   return Bounds()
       .rounding("sphere", "band_in_linf_vx", 1.5)
@@ -61,8 +62,8 @@ void addShapeCases(std::vector<Case>& all) {
        .definition =
            "Sphere of radius 1, box 1.6 × 1.2 × 0.8, and about the axis (1, 2, 3) a torus "
            "0.7 / 0.3, a cylinder of radius 0.5 and height 1.2 and a capsule of radius "
-           "0.4, against their closed forms on both sides. What is left of the surface's "
-           "error is that of tricubic interpolation.",
+           "0.4, against their closed forms on both sides. The remaining error of the surface is "
+           "that of tricubic interpolation.",
        .citation = "closed forms",
        .quick = {8, 16, 24},
        .full = {16, 32, 64},

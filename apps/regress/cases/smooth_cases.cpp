@@ -14,16 +14,16 @@ using levelset::SmoothKind;
 
 namespace {
 
-/// Mean of |x + σξ| at |x| = r, ξ standard normal in space: the distance from the origin, convolved
-/// with a Gaussian.
+/// Mean of |x + σξ| at |x| = r, ξ standard normal in space. This is the distance from the origin,
+/// convolved with a Gaussian.
 double meanLength(double r, double sigma) {
   const double u = r / (sigma * std::numbers::sqrt2);
   return sigma * std::sqrt(2 / std::numbers::pi) * std::exp(-u * u) +
          (r + sigma * sigma / r) * std::erf(u);
 }
 
-/// The radius at which that is `radius`: there is the zero set of the convolved |x| − radius. The
-/// mean rises with r, and is larger than r.
+/// Radius r at which meanLength() equals `radius`. The zero set of the convolved |x| − radius lies
+/// at r. The mean rises with r and exceeds r.
 double smoothedRadius(double radius, double sigma) {
   double low = 0, high = radius;
   while (high - low > 1e-12 * radius) {
@@ -76,12 +76,11 @@ void addSmoothCases(std::vector<Case>& all) {
        .group = "smoothing",
        .title = "a sphere's distance under a Gaussian",
        .definition =
-           "|x| − R of a sphere of radius R = 1, convolved with a Gaussian of σ and made a "
-           "distance "
-           "again: a sphere of the radius r at which the mean of |x + σξ|, ξ standard normal, is "
+           "|x| − R of a sphere of radius R = 1, convolved with a Gaussian of σ and re-distanced, "
+           "gives a sphere of the radius r at which the mean of |x + σξ|, ξ standard normal, is "
            "R. In space that mean is σ √(2/π) exp(−r² / 2σ²) + (r + σ²/r) erf(r / σ√2), about r + "
-           "σ²/r. σ is one voxel, and √(8/3), which OpenVDB's four passes of a box of three voxels "
-           "come to.",
+           "σ²/r. σ is one voxel, and √(8/3), which equals four passes of OpenVDB's box filter of "
+           "three voxels.",
        .citation = "closed form",
        .quick = {6, 12, 24},
        .full = {16, 64, 256},

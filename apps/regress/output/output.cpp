@@ -139,7 +139,7 @@ void makeFolder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error || !std::filesystem::is_directory(folder))
-    throw levelset::IoError(fmt::format("regress: the folder '{}' cannot be made: {}",
+    throw levelset::IoError(fmt::format("regress: the folder '{}' cannot be created: {}",
                                         folder.string(),
                                         error ? error.message() : "a file is in its place"));
 }

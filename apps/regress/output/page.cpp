@@ -32,7 +32,7 @@ std::string number(double value) {
   return std::abs(value) >= 1e6 ? fmt::format("{:.3e}", value) : fmt::format("{:.4g}", value);
 }
 
-/// Columns that any of the rows has.
+/// Columns that at least one row has.
 std::vector<const Column*> used(const std::vector<Row>& rows) {
   std::vector<const Column*> list;
   for (const Column& column : columns())
@@ -68,7 +68,7 @@ void appendSummary(const CaseResult& result, std::string& html) {
   html += "</table></div>\n";
 }
 
-/// The figure that a bound states, as text.
+/// Formats the figure that a bound states.
 std::string stated(const Bound& bound) {
   switch (bound.kind) {
     case Bound::Kind::Measured:
@@ -133,7 +133,8 @@ std::string pageText(const SuiteResult& result, const std::vector<std::string>& 
   html += "<h2>Error against run time</h2>\n<div class=\"plots\">\n";
   for (const std::string& name : plots)
     html += fmt::format("<a href=\"{0}.svg\"><img src=\"{0}.png\" alt=\"{0}\"></a>\n", name);
-  html += plots.empty() ? "<p>No plots were made: matplotlib is missing.</p></div>\n" : "</div>\n";
+  html += plots.empty() ? "<p>The page has no plots, since matplotlib is missing.</p></div>\n"
+                        : "</div>\n";
   for (const CaseResult& c : result.cases) {
     html += fmt::format(
         "<h2 id=\"{0}\">{0}: {1}</h2>\n<p>{2}</p>\n<p>Source: {3}. {4:.1f} CPU seconds with all "

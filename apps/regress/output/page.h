@@ -7,7 +7,8 @@
 
 namespace regress {
 
-/// index.html: failures, plots, and for each case its definition, bounds, outcomes and figures.
+/// Builds index.html: failures, plots, and for each case its definition, bounds, outcomes and
+/// figures.
 [[nodiscard]] std::string pageText(const SuiteResult& result,
                                    const std::vector<std::string>& plots);
 

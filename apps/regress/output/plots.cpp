@@ -18,13 +18,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The exit status of `python script`, or -1 when there is no such program.
+/// Runs `python script`. @return its exit status, or -1 where the program does not exist
 int runPython(const std::string& python, const fs::path& script, const fs::path& log) {
   std::string program = python, path = script.string();
   char* arguments[] = {program.data(), path.data(), nullptr};
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  // Its own words belong neither to our data nor to our messages.
+  // The output of Python goes to a log, apart from our data and messages.
   posix_spawn_file_actions_addopen(&actions, 1, log.c_str(), 02000 | 0101, 0644);
   posix_spawn_file_actions_adddup2(&actions, 1, 2);
   pid_t child = 0;
@@ -57,7 +57,7 @@ Plots makePlots(const fs::path& folder) {
   }
   writeText(folder / "plots.py", kPlotsScript);
   const fs::path log = folder / "plots.log";
-  // Distributions' own Python first: it is the one with the packaged matplotlib.
+  // The Python of the distribution comes first, since it has the packaged matplotlib.
   int status = -1;
   for (const char* python : {"/usr/bin/python3", "python3"}) {
     status = runPython(python, folder / "plots.py", log);
@@ -66,10 +66,10 @@ Plots makePlots(const fs::path& folder) {
   Plots plots;
   if (status != 0) {
     plots.notes.push_back(
-        status < 0 ? "no plots: there is no python3; install it with python3-matplotlib and run "
-                     "plots.py in the output folder"
-                   : fmt::format("no plots: plots.py ended with {}, see plots.log; is "
-                                 "python3-matplotlib installed?",
+        status < 0 ? "no plots: python3 is missing; install python3-matplotlib and run plots.py in "
+                     "the output folder"
+                   : fmt::format("no plots: plots.py failed with exit status {}; read plots.log "
+                                 "and check that python3-matplotlib is installed",
                                  status));
     return plots;
   }

@@ -7,11 +7,11 @@
 namespace regress {
 
 struct Plots {
-  std::vector<std::string> names;  ///< each is there as NAME.png and NAME.svg
-  std::vector<std::string> notes;  ///< why there are none
+  std::vector<std::string> names;  ///< plots; each exists as NAME.png and NAME.svg
+  std::vector<std::string> notes;  ///< reasons why plots are missing
 };
 
-/// Puts plots.py beside results.json and runs it; it can be run again by hand.
+/// Writes plots.py beside results.json and runs it. Users can run it again by hand.
 [[nodiscard]] Plots makePlots(const std::filesystem::path& folder);
 
 }  // namespace regress

@@ -5,7 +5,7 @@
 
 namespace regress {
 
-/// Replaces the file as a whole. @throws IoError
+/// Replaces the complete file. @throws IoError
 void writeText(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace regress

@@ -7,7 +7,7 @@
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
 
-/// OpenVDB 10's own tools on the same input, by their defaults.
+/// OpenVDB 10's own tools on the same input, with their defaults.
 namespace regress::peer {
 
 inline constexpr const char* kRebuild = "OpenVDB levelSetRebuild";
@@ -32,17 +32,17 @@ inline constexpr const char* kResample = "OpenVDB resampleToMatch";
 [[nodiscard]] levelset::NarrowBand combine(levelset::CsgOperation operation,
                                            const levelset::NarrowBand& a,
                                            const levelset::NarrowBand& b);
-/// To `voxels` more on both sides; the band is as much wider.
+/// Widens the band by `voxels` on both sides.
 [[nodiscard]] levelset::NarrowBand dilate(const levelset::NarrowBand& band, int voxels);
 [[nodiscard]] levelset::NarrowBand curvatureFlow(const levelset::NarrowBand& band, double time);
-/// Four passes of a box of three voxels: σ = √(8/3).
+/// Smooths by four passes of a box filter of three voxels: σ = √(8/3).
 [[nodiscard]] levelset::NarrowBand gaussian(const levelset::NarrowBand& band);
-/// By HJ-WENO5 and TVD-RK3.
-/// @param turnsBack  the velocity vanishes at half the time, where OpenVDB would stop
+/// Advects a band with HJ-WENO5 and TVD-RK3.
+/// @param turnsBack  true: the velocity vanishes at half the time, where OpenVDB would stop
 [[nodiscard]] levelset::NarrowBand advect(const levelset::NarrowBand& band,
                                           const levelset::VectorField& velocity, double time,
                                           bool turnsBack);
-/// The velocity at time 0 on a staggered grid over the unit cube.
+/// Samples the velocity at time 0 on a staggered grid over the unit cube.
 [[nodiscard]] levelset::VectorField staggered(const levelset::VectorField& velocity,
                                               double voxelSize);
 [[nodiscard]] levelset::NarrowBand resample(const levelset::NarrowBand& band, double voxelSize);

@@ -13,7 +13,7 @@ using levelset::VectorField;
 
 namespace {
 
-/// A velocity as OpenVDB's advection asks for it.
+/// Velocity with the interface that OpenVDB's advection needs.
 class Velocity {
  public:
   using VectorType = openvdb::Vec3f;

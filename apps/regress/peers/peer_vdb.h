@@ -4,7 +4,7 @@
 
 namespace regress::peer {
 
-/// A result of OpenVDB as a band: active tiles as voxels, inactive values ± background.
+/// Turns a result of OpenVDB into a band. Active tiles become voxels, inactive values ± background.
 [[nodiscard]] inline levelset::NarrowBand adopt(const openvdb::FloatGrid::Ptr& grid) {
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   return levelset::importBand(grid, "OpenVDB");

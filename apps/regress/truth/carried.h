@@ -7,12 +7,11 @@
 
 namespace regress {
 
-/// A ball where a velocity has taken it, without any level set on the way: points of its sphere,
-/// four to a voxel, are carried by 256 classical Runge-Kutta steps of fourth order, and the
-/// triangles between them become a band by exact distances. Of its own, since what it judges must
-/// not take part.
-/// @param velocity  smooth; one that stretches the points further apart than a voxel or two leaves
-///                  the surface rounded off there
+/// Ball moved by a velocity without a level set between. 256 classical Runge-Kutta steps of fourth
+/// order move points of its sphere, four to a voxel. The triangles between the points become a band
+/// by exact distances. The code shares nothing with the advection that it judges.
+/// @param velocity  smooth; the surface is rounded off where the velocity stretches the points more
+/// than a voxel or two apart
 /// @param time      from 0
 [[nodiscard]] levelset::NarrowBand carriedBall(const Imath::V3d& centre, double radius,
                                                const levelset::VectorField& velocity, double time,

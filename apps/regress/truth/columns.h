@@ -5,10 +5,10 @@
 
 namespace regress {
 
-/// Figures that rows may have. Their names are the columns of results.csv.
+/// Figure that a row can have. The names are the columns of results.csv.
 struct Column {
   const char* name;
-  const char* heading;  ///< for people
+  const char* heading;  ///< heading of the page
   const char* meaning;
 };
 [[nodiscard]] const std::vector<Column>& columns();

@@ -19,7 +19,7 @@ void fillBlock(const openvdb::Coord& origin, const Distance& distance, openvdb::
   const float background = grid.background();
   auto leaf = std::make_unique<Leaf>(origin, background);
   for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
-    // Rounded first: a value that rounds to the background is not one of the band.
+    // A value that rounds to the background is not part of the band, so rounding comes first.
     const auto value = static_cast<float>(
         distance(levelset::toImath(grid.indexToWorld(leaf->offsetToGlobalCoord(i)))));
     if (std::abs(value) < background)

@@ -13,13 +13,13 @@ using openvdb::Coord;
 
 namespace {
 
-constexpr int kEdge = 8;  // of a leaf, grid points
+constexpr int kEdge = 8;  // edge of a leaf, grid points
 
 struct Count {
   double wanted = 0, missing = 0;
 };
 
-/// Origins of the leaf blocks that a region may reach into.
+/// Origins of the leaf blocks that can hold grid points of a region.
 std::vector<Coord> blocksOf(const Region& region, const openvdb::math::Transform& transform) {
   const double h = transform.voxelSize()[0];
   const double toCorner = (kEdge - 1) / 2.0 * std::numbers::sqrt3 * h * region.steepest;
@@ -70,7 +70,7 @@ double shareOf(const Region& region, const Grid& grid) {
     all.wanted += count.wanted;
     all.missing += count.missing;
   }
-  // A region without a grid point would pass whatever is missing.
+  // A region without grid points would pass with any gaps.
   return all.wanted > 0 ? all.missing / all.wanted : std::nan("");
 }
 

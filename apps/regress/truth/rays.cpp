@@ -17,7 +17,7 @@ using levelset::NarrowBand;
 
 namespace {
 
-/// The i-th number of the van der Corput sequence of that base, in [0, 1).
+/// Returns number i of the van der Corput sequence of `base`, in [0, 1).
 double radicalInverse(int i, int base) {
   double result = 0, digit = 1.0 / base;
   for (; i > 0; i /= base, digit /= base) result += digit * (i % base);
@@ -34,7 +34,8 @@ struct Chord {
   double length = 0;
 };
 
-/// Between two independent points of a sphere: such chords spread evenly over all lines.
+/// Builds a chord between two independent points of a sphere. Such chords spread evenly over all
+/// lines.
 Chord chord(int i, const V3d& centre, double radius) {
   const V3d from = onSphere(radicalInverse(i + 1, 2), radicalInverse(i + 1, 3));
   const V3d to = onSphere(radicalInverse(i + 1, 5), radicalInverse(i + 1, 7));
@@ -43,12 +44,12 @@ Chord chord(int i, const V3d& centre, double radius) {
   return {centre + from * radius, length > 0 ? way / length : V3d(1, 0, 0), length};
 }
 
-/// Regula falsi; the end that stays twice counts half (the Illinois rule).
+/// Finds a zero by regula falsi with the Illinois rule: an end that stays twice counts half.
 template <typename Function>
 double root(const Function& f, double low, double high, double atLow, double atHigh,
             double tolerance) {
   const bool rises = atLow < 0;
-  int stayed = 0;  // -1: the lower end did the last time, 1: the upper one
+  int stayed = 0;  // end that stayed last; -1: the lower one, 1: the upper one
   for (int i = 0; i < 60 && high - low > tolerance; ++i) {
     const double t = std::clamp((low * atHigh - high * atLow) / (atHigh - atLow), low, high);
     const double value = f(t);
@@ -68,7 +69,8 @@ double root(const Function& f, double low, double high, double atLow, double atH
   return 0.5 * (low + high);
 }
 
-/// Walks along a chord in steps that no zero can hide in, as far as the band is a distance.
+/// Finds zeros along a chord. The steps are so short that they skip no zero where the band is a
+/// distance.
 class Walk {
  public:
   explicit Walk(const NarrowBand& band)
@@ -93,15 +95,15 @@ class Walk {
   }
 
  private:
-  /// Voxels that a step has at least: zeros nearer to each other count as none or as one.
+  /// Shortest step, voxels. Zeros nearer to each other count as none or as one.
   static constexpr double kShortest = 0.25;
 
   struct Sample {
     bool isInside = false;
-    double clear = 0;  ///< how far there is no surface, world units
+    double clear = 0;  ///< distance without a surface, world units
   };
 
-  /// Away from the surface the nearest grid point, at most 0.87 voxels off, tells enough.
+  /// Away from the surface the value at the nearest grid point, at most 0.87 voxels off, suffices.
   Sample sample(const Chord& line, double t) {
     const V3d p = line.from + t * line.direction;
     const openvdb::Vec3d index = grid_->worldToIndex(levelset::toVdb(p));
@@ -114,7 +116,7 @@ class Walk {
     return {value < 0, 0.7 * std::abs(value)};
   }
 
-  /// Where there is no leaf there is no surface; its neighbours' values reach in by two voxels.
+  /// A block without a leaf has no surface. The values of its neighbours extend two voxels into it.
   [[nodiscard]] double leaveBlock(const Chord& line, const openvdb::Vec3d& index,
                                   const openvdb::Coord& c) const {
     const openvdb::Vec3d way =
@@ -134,7 +136,7 @@ class Walk {
   double voxel_;
 };
 
-/// Sphere tracing: exact distances leave no zero out.
+/// Finds zeros by sphere tracing, which skips no zero of an exact distance.
 int exactZeros(const Chord& line, const Distance& exact, double voxel) {
   int count = 0;
   double value = exact(line.from);

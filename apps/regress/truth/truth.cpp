@@ -18,7 +18,7 @@ double capVolume(double radius, double height) {
   return kPi * height * height * (3 * radius - height) / 3;
 }
 
-/// Distance to a rectangle's complement in the quadrant of the half plane, with sign.
+/// Signed distance to the corner of a rectangle in a half plane, from the distances to both sides.
 double cornerDistance(double x, double y) {
   return std::hypot(std::max(x, 0.0), std::max(y, 0.0)) + std::min(0.0, std::max(x, y));
 }
@@ -109,7 +109,7 @@ Truth twoBalls(CsgOperation operation, const V3d& centreA, double radiusA, const
                double radiusB) {
   const V3d axis = (centreB - centreA).normalized();
   const double gap = (centreB - centreA).length();
-  // The plane of the circle in which the surfaces meet, and the circle.
+  // Position of the plane in which the surfaces meet, and radius of the circle there.
   const double plane = (gap * gap + radiusA * radiusA - radiusB * radiusB) / (2 * gap);
   const double ring = std::sqrt(radiusA * radiusA - plane * plane);
   const double heightA = radiusA - plane, heightB = radiusB - (gap - plane);
@@ -122,12 +122,12 @@ Truth twoBalls(CsgOperation operation, const V3d& centreA, double radiusA, const
     const bool inside = operation == CsgOperation::Union          ? fromA < 0 || fromB < 0
                         : operation == CsgOperation::Intersection ? fromA < 0 && fromB < 0
                                                                   : fromA < 0 && fromB >= 0;
-    // Nearest of the circle and of those points of each sphere that bound the solid.
+    // Nearest of the circle and of the points of each sphere that bound the solid.
     const double along = a.dot(axis);
     double nearest = std::hypot((a - along * axis).length() - ring, along - plane);
     const V3d footA = a.normalized() * radiusA, footB = b.normalized() * radiusB;
     const bool footAInB = footA.dot(axis) > plane, footBInA = gap + footB.dot(axis) < plane;
-    // Intersection keeps of A what lies in B; union and difference keep what lies outside of B.
+    // Intersection keeps the points of A in B. Union and difference keep the points of A outside B.
     if (footAInB == insideA) nearest = std::min(nearest, std::abs(fromA));
     if (footBInA == insideB) nearest = std::min(nearest, std::abs(fromB));
     return inside ? -nearest : nearest;
@@ -159,8 +159,9 @@ Truth twoBalls(CsgOperation operation, const V3d& centreA, double radiusA, const
   return truth;
 }
 
-// A solid of revolution: in the half plane (x along the axis, y from it) two arcs and between them
-// the fillet's, about a centre that is as far from both circles as it is wide.
+// The solid is one of revolution. Its profile in the half plane (x along the axis, y from it) has
+// two arcs and the arc of the fillet between them. The distance of the fillet's centre from both
+// circles is the fillet's radius.
 Truth filletedBalls(const V3d& centreA, double radiusA, const V3d& centreB, double radiusB,
                     double fillet) {
   const V3d axis = (centreB - centreA).normalized();
@@ -171,7 +172,7 @@ Truth filletedBalls(const V3d& centreA, double radiusA, const V3d& centreB, doub
   const Distance distance = [=](const V3d& p) {
     const V3d a = p - centreA;
     const double along = a.dot(axis), off = (a - along * axis).length();
-    // Within the triangle of the three centres the fillet is nearest.
+    // In the triangle of the three centres the fillet is nearest.
     const bool isBetween = along * y >= off * x && (gap - along) * y >= off * (gap - x);
     if (isBetween) return fillet - std::hypot(along - x, off - y);
     return std::min(a.length() - radiusA, (p - centreB).length() - radiusB);
@@ -180,7 +181,8 @@ Truth filletedBalls(const V3d& centreA, double radiusA, const V3d& centreB, doub
   Truth truth{.distance = distance,
               .centre = (centreA + centreB) / 2.0,
               .reach = gap / 2 + std::max(radiusA, radiusB)};
-  // Whole balls but for what is beyond the planes where the arcs touch; between these by Simpson.
+  // Volume and area of both balls without the caps beyond the planes where the arcs touch.
+  // Simpson's rule adds the part between these planes.
   const double touchA = x * radiusA / sumA, touchB = gap - (gap - x) * radiusB / sumB;
   const double heightA = radiusA - touchA, heightB = radiusB - (gap - touchB);
   double volume = 4 * kPi / 3 * (std::pow(radiusA, 3) + std::pow(radiusB, 3)) -

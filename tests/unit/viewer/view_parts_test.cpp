@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <thread>
 
@@ -44,14 +45,21 @@ View ballView(const std::shared_ptr<const Model>& model) {
   return view;
 }
 
+/// Waits for a condition. One that never holds runs into the time limit of the test.
+void waitFor(const std::function<bool()>& condition) {
+  while (!condition()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+}
+
+/// Waits for the complete frame of a view.
 std::shared_ptr<const Frame> finished(const ProgressivePicture& picture, const View& view) {
-  for (int i = 0; i < 3000; ++i) {
-    const auto frame = picture.frame();
-    if (frame && frame->isComplete && isSame(frame->view, view)) return frame;
+  std::shared_ptr<const Frame> frame;
+  waitFor([&] {
+    frame = picture.frame();
+    if (frame && frame->isComplete && isSame(frame->view, view)) return true;
     if (picture.failure()) std::rethrow_exception(picture.failure());
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return nullptr;
+    return false;
+  });
+  return frame;
 }
 
 TEST(ProgressivePicture, CompletesTheLastRequest) {
@@ -76,10 +84,10 @@ TEST(ProgressivePicture, ShowsAnotherLayerOfTheSamePicture) {
   ASSERT_NE(first, nullptr);
   picture.request(view, {.layer = Layer::Normal});
   std::shared_ptr<const Frame> second;
-  for (int i = 0; i < 1000 && (!second || second == first); ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  waitFor([&] {
     second = picture.frame();
-  }
+    return second && second != first;
+  });
   EXPECT_EQ(second->image, first->image);
   const std::size_t middle = 4 * (24 * 64 + 32);
   EXPECT_NEAR(second->canvas.colours[middle + 2], 255, 2);
@@ -91,8 +99,7 @@ TEST(ProgressivePicture, ReportsWhyAViewCannotBeDrawnAndContinues) {
   View view = ballView(model), blind = view;
   blind.camera.from = blind.camera.to;
   picture.request(blind, {});
-  for (int i = 0; i < 1000 && !picture.failure(); ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  waitFor([&] { return picture.failure() != nullptr; });
   ASSERT_TRUE(picture.failure());
   EXPECT_THROW(std::rethrow_exception(picture.failure()), levelset::UsageError);
   picture.request(view, {});

@@ -4,7 +4,7 @@
 #include <nanovdb/util/IO.h>
 #include <openvdb/io/Stream.h>
 
-#include <chrono>
+#include <ctime>
 #include <cstdint>
 #include <limits>
 #include <random>
@@ -281,7 +281,7 @@ TEST(BandFile, RefusesUnwritableFiles) {
 
 /// @return true if the file was accepted
 bool survives(const fs::path& path) {
-  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t begin = std::clock();
   bool taken = false;
   try {
     taken = !readBand(path).isEmpty();
@@ -292,7 +292,8 @@ bool survives(const fs::path& path) {
     static_cast<void>(levelset::bandFileInfo(path));
   } catch (const levelset::InvalidInput&) {
   }
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));
+  // CPU seconds of all threads, so that other processes do not count.
+  EXPECT_LT(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC, 2);
   return taken;
 }
 
